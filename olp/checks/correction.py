@@ -20,6 +20,7 @@ from olp.errormodel.base import ErrorModel
 from olp.findings.catalogue import Finding
 from olp.program.program import Program
 from olp.proof.judgement import Judgements
+from olp.proof.measured import SHOWN
 from olp.proof.proof import Counts, Proof
 
 #: blocks that the report lists
@@ -213,30 +214,20 @@ def orientation(path: Toolpath, model: ErrorModel) -> dict[str, float]:
     return {"max_urad": angle.largest, "rms_urad": angle.rms}
 
 
-def worst_blocks(program: Program, proof: Proof) -> list[dict[str, Any]]:
+def worst_blocks(program: Program, table: Judgements) -> list[dict[str, Any]]:
     """The blocks farthest from the nominal path once corrected, and their uncorrected deviation."""
-    size = proof.size_mm()
-    uncorrected = np.fmax(np.nan_to_num(proof.before.waypoint), np.nan_to_num(proof.before.path))
-    rows: list[dict[str, Any]] = []
-    seen: set[int] = set()
-    few = min(50 * _WORST, len(size))
-    top = np.argpartition(size, len(size) - few)[len(size) - few :] if few else np.zeros(0, np.int64)
-    for move in top[np.lexsort((top, -size[top]))].tolist():
-        line = int(program.toolpath.line[move])
-        if line in seen or size[move] == 0:
-            continue
-        seen.add(line)
-        rows.append(
-            {
-                "line": line,
-                "text": program.text(line),
-                "before_um": float(uncorrected[move]) * 1e3,
-                "after_um": float(size[move]) * 1e3,
-            }
-        )
-        if len(rows) == _WORST:
-            break
-    return rows
+    rows = table.by_line()
+    size = np.where(rows["state"] == SHOWN, 0.0, np.nan_to_num(rows["corrected_um"]))
+    return [
+        {
+            "line": int(rows["line"][k]),
+            "text": program.text(int(rows["line"][k])),
+            "before_um": float(np.nan_to_num(rows["uncorrected_um"][k])),
+            "after_um": float(size[k]),
+        }
+        for k in np.lexsort((rows["line"], -size))[:_WORST].tolist()
+        if size[k] > 0.0
+    ]
 
 
 def tally_moves(path: Toolpath, uncorrected: int, parts: npt.NDArray[np.int32]) -> dict[str, int]:

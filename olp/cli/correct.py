@@ -147,15 +147,9 @@ def _review(
 def _report(call: Given, result: Correction, options: CorrectOptions, name: str) -> bytes:
     """The report as a file, on the program that was corrected: unrolled where the call asks for it."""
     from olp.workflows import report
-    from olp.workflows.flatten import unrolled
+    from olp.workflows.flatten import as_asked
 
-    program = call.source
-    if options.flatten or options.expand_cycles:
-        setup, dialect = call.session.reading(program)
-        program = program.holding(unrolled(
-            call.session.sources, program, setup, dialect, expand_cycles=options.expand_cycles,
-            peck_clearance_mm=options.peck_clearance_mm,
-        ))  # fmt: skip
+    program = as_asked(call.session.sources, call.source, *call.session.reading(call.source), options)
     return report.correction(result, program, call.session, options, name)
 
 

@@ -12,29 +12,33 @@ from olp.cli.options import (
     contour_option,
     doubt_options,
     force_option,
+    json_option,
     output_option,
     quiet_option,
     setup_options,
 )
+from olp.core.errors import UsageError
 from olp.findings.rule import Severity
 
 
 @click.command("simulate")
 @click.argument("program", required=False)
 @setup_options
-@output_option("measured.csv", "Default: stdout.", default=STREAM)
+@output_option("measured.csv", "Default: stdout; with --json no points.")
 @click.option(
     "--step-mm", type=Length(), default=1.0, show_default=True, help="Distance between points on a move."
 )
 @doubt_options
 @contour_option
+@json_option()
 @quiet_option("No messages.")
 @force_option("the output file")
 def command(
     program: str | None,
     machine: str | None,
     job: str | None,
-    output: str,
+    output: str | None,
+    as_json: bool,
     quiet: bool,
     force: bool,
     **words: Any,
@@ -43,22 +47,26 @@ def command(
 
     The points are those of the tool tip, in the first work frame of the program.
     """
+    if as_json and output == STREAM:
+        raise UsageError("stdout takes one result; write the points to a file (-o), or leave --json out")
     call = given(program, machine, job)
     refuse_early(files_of(output), call.inputs, force=force)
 
     from olp.files.write import write_bytes
+    from olp.reports.report import to_json
     from olp.workflows import simulate
 
     options = options_of(simulate.SimulateOptions, words)
     result = simulate.run(call.session, call.source, options)
-    data = result.to_csv()
     if not quiet:
         for finding in result.findings:
             if finding.severity > Severity.INFO:
                 diagnostic(f"olp: warning: {finding.code}: {finding.message}")
-    if output == STREAM:
-        put(data)
-        return
-    write_bytes(output, data, force=force, inputs=call.inputs)
-    if not quiet:
-        diagnostic(f"wrote {output}: {len(result.points_mm)} points in frame {result.frame}")
+    if output not in (None, STREAM):
+        write_bytes(output, result.to_csv(), force=force, inputs=call.inputs)
+        if not quiet:
+            diagnostic(f"wrote {output}: {len(result.points_mm)} points in frame {result.frame}")
+    if as_json:
+        put(to_json(result.report))
+    elif output in (None, STREAM):
+        put(result.to_csv())

@@ -13,6 +13,7 @@ from olp.cli.options import (
     proof_options,
     quiet_option,
     setup_options,
+    unroll_options,
 )
 from olp.core.errors import UsageError
 
@@ -22,6 +23,7 @@ from olp.core.errors import UsageError
 @click.argument("corrected")
 @setup_options
 @proof_options
+@unroll_options
 @confidence_options
 @outside_box_option("refuse the program", "take the error at the box's face", default="hold")
 @quiet_option("No report; only the exit code.")
@@ -32,7 +34,8 @@ def command(
     """Prove a corrected program from the nominal and the corrected text alone.
 
     CORRECTED may come from any source. It is read, run through the model of the machine's errors, and
-    compared with the path of NOMINAL.
+    compared with the path of NOMINAL. Where it was corrected with --flatten or --expand-cycles, give the
+    same options here.
     """
     if nominal == corrected == STREAM:
         raise UsageError("NOMINAL and CORRECTED cannot both come from stdin; name one of the files")

@@ -79,10 +79,6 @@ def command(
         raise UsageError("--live serves files: leave out -o, and name PROGRAM as a file")
     if port and not live:
         raise UsageError("--port is for --live; add --live")
-    if corrected is not None and (words["flatten"] or words["expand_cycles"]):
-        raise UsageError(
-            "--flatten and --expand-cycles change the nominal program; leave them out, or --corrected"
-        )
     if STREAM in (corrected, *measured):
         raise UsageError("stdin can be PROGRAM only; name the corrected program and measurements as files")
     inputs = (*call.inputs, *files_of(corrected, *measured))

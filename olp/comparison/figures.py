@@ -22,15 +22,20 @@ _AWAY = 10.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Run:
-    """A measured run in the nominal frame: points (m, 3) in mm, their pairing, and their deviation.
+    """A measured run in the nominal frame: points (m, 3) in mm and their pairing with the path.
 
-    `good` (m,) are those with a position on the path within reach; all figures come from them.
+    (m, 3) `nominal_mm` is the nominal point of each: the nearest one of the path, or the stop that it was
+    measured at, whose index is (m,) `stop` (-1: none). `deviation` is from there, and (m,) `size_mm` its
+    size. `good` (m,) are points within reach, and those `counted` give the figures.
     """
 
     name: str
     points_mm: Array
     pairing: Pairing
+    nominal_mm: Array
+    stop: Index
     deviation: Split
+    size_mm: Array
     good: Mask
     counted: Mask
 
@@ -38,16 +43,29 @@ class Run:
     def of(
         name: str, path: Path, points_mm: Array, pairing: Pairing, reach_mm: float, order: Order = "forward"
     ) -> Run:
-        """`counted` are good points on moves that cut."""
+        """`counted` are good points on moves that cut, and the nearest one to each stop."""
         if order != "free":
             pairing = replace(pairing, beyond=_off_the_ends(path, points_mm, pairing, reach_mm, order))
         good = (pairing.distance_mm <= reach_mm) & ~pairing.beyond & ~pairing.doubtful
-        deviation = split(path, pairing.segment, points_mm - pairing.foot_mm)
-        return Run(name, points_mm, pairing, deviation, good, good & path.cutting[pairing.segment])
+        stop = _at_stops(path, points_mm, pairing, reach_mm)
+        nominal_mm = pairing.foot_mm.copy()
+        nominal_mm[stop >= 0] = path.vertex_mm[path.stops.vertex[stop[stop >= 0]]]
+        away = points_mm - nominal_mm
+        size_mm = np.sqrt(np.einsum("ij,ij->i", away, away))
+        good |= stop >= 0
+        counted = good & (path.cutting[pairing.segment] | (stop >= 0))
+        deviation = split(path, pairing.segment, away)
+        return Run(name, points_mm, pairing, nominal_mm, stop, deviation, size_mm, good, counted)
+
+    def line(self, path: Path) -> Index:
+        """(m,) the line of the program or file that each point belongs to."""
+        line = path.line[self.pairing.segment]
+        line[self.stop >= 0] = path.stops.line[self.stop[self.stop >= 0]]
+        return line
 
     def figures(self, path: Path) -> dict[str, Any]:
-        """Counts and deviations in um, of cutting moves only."""
-        size = self.deviation.across[self.counted] * UM_PER_MM
+        """Counts and deviations in um, of points that count only."""
+        size = self.size_mm[self.counted] * UM_PER_MM
         report: dict[str, Any] = {
             "name": self.name,
             "points": len(self.points_mm),
@@ -73,7 +91,10 @@ class Run:
         return report
 
     def covered(self, path: Path) -> float:
-        """Share of the cutting path that lies between neighbouring measured points."""
+        """Share of the cutting path that lies between neighbouring measured points; where nothing cuts, share
+        of the stops that were measured."""
+        if not path.cutting.any():
+            return float((self.stop >= 0).sum() / max(len(path.stops), 1))
         s = np.unique(self.pairing.s_mm[self.good])
         if len(s) < 2:
             return 0.0
@@ -109,13 +130,25 @@ class Run:
         attained[near] = (place + between)[near]
         return attained
 
-    def largest_by_line(self, path: Path) -> dict[int, float]:
-        """The largest deviation in um of each line of the program."""
-        line = path.line[self.pairing.segment[self.counted]]
-        names, which = np.unique(line, return_inverse=True)
-        most = np.zeros(len(names))
-        np.maximum.at(most, which, self.deviation.across[self.counted] * UM_PER_MM)
-        return dict(zip(names.tolist(), most.tolist(), strict=True))
+
+def _at_stops(path: Path, points: Array, pairing: Pairing, reach: float) -> Index:
+    """(m,) the stop that each point was measured at, -1 for others: of the points nearer along the path to a
+    stop than to others, the nearest one in space, within reach."""
+    stop = np.full(len(points), -1, np.int64)
+    if not len(path.stops):
+        return stop
+    arc_mm = path.s_mm[path.stops.vertex]
+    after = np.clip(np.searchsorted(arc_mm, pairing.s_mm), 1, max(len(arc_mm) - 1, 1))
+    first = after - 1
+    after = np.minimum(after, len(arc_mm) - 1)
+    which = np.where(pairing.s_mm - arc_mm[first] <= arc_mm[after] - pairing.s_mm, first, after)
+    away = points - path.vertex_mm[path.stops.vertex[which]]
+    distance = np.sqrt(np.einsum("ij,ij->i", away, away))
+    order = np.lexsort((distance, which))
+    nearest = order[np.diff(which[order], prepend=-1) != 0]
+    nearest = nearest[distance[nearest] <= reach]
+    stop[nearest] = which[nearest]
+    return stop
 
 
 def _off_the_ends(path: Path, points: Array, pairing: Pairing, reach: float, order: Order) -> Mask:

@@ -9,10 +9,11 @@ import numpy as np
 
 from olp.comparison.path import Path
 from olp.compensation.plan import targets, zero_shifts
-from olp.core.arrays import Array, Index
+from olp.core.arrays import Array, Index, Mask
 from olp.core.geometry import arc_points
-from olp.core.toolpath import Kind, Toolpath
+from olp.core.toolpath import Flag, Kind, Toolpath
 from olp.errormodel.base import ErrorModel
+from olp.proof.deviation import cutting_moves
 
 #: mm; how far chords may be from their arcs.
 CHORD_MM = 2e-5
@@ -22,14 +23,18 @@ _MOST_CHORDS = 20_000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Nominal:
-    """A path, and the move of the program that each of its segments (n,) is part of."""
+    """A path, the move of the program that each of its segments (n,) is part of, and that of each of its
+    stops (k,)."""
 
     path: Path
     move: Index
+    stop_move: Index
 
 
-def nominal_of(toolpath: Toolpath, model: ErrorModel | None, positions: Literal["tip", "axes"]) -> Nominal:
-    """The commanded path of a program, arcs within CHORD_MM.
+def nominal_of(
+    toolpath: Toolpath, model: ErrorModel | None, positions: Literal["tip", "axes"], *, points: bool = False
+) -> Nominal:
+    """The commanded path of a program, arcs within CHORD_MM; `points`: its dialect has points, no paths.
 
     "axes": axis positions in the machine frame. "tip": of the tip in the first work frame, as `simulate`
     states it. With a model, zeros that were touched off on the uncompensated machine are shifted by its error
@@ -39,17 +44,31 @@ def nominal_of(toolpath: Toolpath, model: ErrorModel | None, positions: Literal[
     if model is not None:
         shift = zero_shifts(toolpath.frames, model)
     end = targets(toolpath, shift)
-    points, move = _chords(toolpath, end)
+    place, move = _chords(toolpath, end)
     if positions == "tip" and len(toolpath):
         first = int(toolpath.frame[0])
         home = toolpath.frames[first]
         lengths = toolpath.per_frame([f.length_mm for f in toolpath.frames])
-        points = home.tip_mm(points - shift[first] - (lengths if lengths.ndim == 1 else lengths[move]))
-    known = np.isfinite(points).all(axis=1)
-    points, move = points[known], move[known]
-    cutting = toolpath.kind[move] != Kind.RAPID
-    path = Path.through(points, move, cutting)
-    return Nominal(replace(path, line=toolpath.line[path.line].astype(np.int64)), path.line)
+        place = home.tip_mm(place - shift[first] - (lengths if lengths.ndim == 1 else lengths[move]))
+    known = np.isfinite(place).all(axis=1)
+    place, move = place[known], move[known]
+    along, at_end = counting(toolpath, points=points)
+    path = Path.through(place, move, along[move], at_end[move])
+    line = toolpath.line.astype(np.int64)
+    stops = replace(path.stops, line=line[path.stops.line])
+    return Nominal(replace(path, line=line[path.line], stops=stops), path.line, path.stops.line)
+
+
+def counting(toolpath: Toolpath, *, points: bool) -> tuple[Mask, Mask]:
+    """(n,) moves that count when measured, along their path and at their end, as in the table of judgements.
+    Along the path counts all that cuts, also where the program leaves it uncorrected. At the end count the
+    points of a program of points, and touches."""
+    feed = toolpath.kind != Kind.RAPID
+    hole = feed & ((toolpath.flag & np.uint8(Flag.CYCLE)) != 0)
+    along = cutting_moves(toolpath) | hole
+    own = (toolpath.flag & np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE)) != 0
+    at_end = ~along & ~own & (feed | points | (not feed.any()))
+    return np.asarray(along, bool), np.asarray(at_end, bool)
 
 
 def _chords(toolpath: Toolpath, end: Array) -> tuple[Array, Index]:

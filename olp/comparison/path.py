@@ -14,34 +14,51 @@ _UPRIGHT = 0.999
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Stops:
+    """The k points of a path that count as points: their `vertex` and `line` (k,), in order."""
+
+    vertex: Index
+    line: Index
+
+    def __len__(self) -> int:
+        return len(self.vertex)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Path:
     """A polyline in mm: `vertex_mm` (n, 3), no two neighbours equal; per segment (n-1,) the `line` of the
-    program or file it comes from and whether it is `cutting` (a feed move, not a rapid). `s_mm` (n,) is arc
-    length."""
+    program or file it comes from and whether it is `cutting`, so that all of it counts. `s_mm` (n,) is arc
+    length. `stops` are the points that count where the way to them does not."""
 
     vertex_mm: Array
     line: Index
     cutting: Mask
     s_mm: Array
+    stops: Stops
 
     @staticmethod
-    def through(points_mm: Array, line: Index | None = None, cutting: Mask | None = None) -> Path:
-        """A path through points (n, 3); `line` and `cutting` (n,) belong to the segment that ends there.
+    def through(
+        points_mm: Array, line: Index | None = None, cutting: Mask | None = None, stop: Mask | None = None
+    ) -> Path:
+        """A path through points (n, 3); `line` and `cutting` (n,) belong to the segment that ends there, and
+        `stop` (n,) are points that count.
 
         Repeated points are merged. Raises CannotCompute for fewer than two different points.
         """
         points = np.asarray(points_mm, float)
         line = np.arange(1, len(points) + 1) if line is None else np.asarray(line, np.int64)
         cutting = np.ones(len(points), bool) if cutting is None else np.asarray(cutting, bool)
+        counts = np.flatnonzero(np.zeros(len(points), bool) if stop is None else stop)
         length = np.sqrt((np.diff(points, axis=0) ** 2).sum(axis=1))
         kept = np.append(True, length > 0.0) if len(points) else np.zeros(0, bool)
+        stops = Stops((np.cumsum(kept) - 1)[counts], line[counts])
         points, line, cutting = points[kept], line[kept], cutting[kept]
         if len(points) < 2:
             raise CannotCompute(
                 "the nominal path has fewer than two different points, so there is nothing to compare with"
             )
         s = np.append(0.0, np.cumsum(length[length > 0.0]))
-        return Path(points, line[1:], cutting[1:], s)
+        return Path(points, line[1:], cutting[1:], s, stops)
 
     def __len__(self) -> int:
         """Number of segments."""
@@ -56,6 +73,7 @@ class Path:
         return Path(
             self.vertex_mm[::-1].copy(), self.line[::-1].copy(), self.cutting[::-1].copy(),
             self.s_mm[-1] - self.s_mm[::-1],
+            Stops(len(self.vertex_mm) - 1 - self.stops.vertex[::-1], self.stops.line[::-1]),
         )  # fmt: skip
 
     def at(self, s_mm: Array) -> tuple[Array, Index]:

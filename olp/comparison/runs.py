@@ -150,10 +150,11 @@ def findings(path: Path, placed: Placed) -> list[Finding]:
                 "OLP608", f"{run.name}: {doubtful} points are equally near to another pass", count=doubtful
             ))  # fmt: skip
         covered = run.covered(path)
-        if covered < _COVERED:
-            result.append(Finding(
-                "OLP603", f"{run.name}: {covered * 100:.1f} % of the cutting path has measured points"
-            ))  # fmt: skip
+        what = "cutting path has measured points" if path.cutting.any() else "points that count are measured"
+        if not run.counted.any():
+            result.append(Finding("OLP603", f"{run.name}: no measured point counts"))
+        elif covered < _COVERED:
+            result.append(Finding("OLP603", f"{run.name}: {covered * 100:.1f} % of the {what}"))
         if order != "forward":
             how = "run against the path" if order == "backward" else "are in no order along the path"
             result.append(Finding("OLP606", f"{run.name}: the points {how}"))

@@ -7,17 +7,19 @@ program are groups of rows. Nothing else decides whether a program is within tol
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Index, Mask
+from olp.core.arrays import Array, Index, Mask
+from olp.core.toolpath import Toolpath
 from olp.core.units import UM_PER_MM
 from olp.findings.catalogue import Finding
 from olp.findings.rule import Severity
+from olp.proof.measured import ABOVE, SHOWN, WITHIN, Measured
 from olp.proof.proof import Counts, Proof
 
 Single = npt.NDArray[np.float32]
@@ -36,8 +38,8 @@ REASONS = {
 class Judgements:
     """(n,) per nominal move: `line`, `tool` (-1: none), `operation` (from 0: of one tool and work offset) and
     `counts`. In mm: `uncorrected` and `corrected` are the deviations that count, or where the move only is
-    shown its deviation at the end; `at_end` is the corrected deviation at the end of the move. NaN where a
-    position is unknown. `allowed_mm` is numerical tolerance plus rounding."""
+    shown its deviation at the end. NaN where a position is unknown. `allowed_mm` is numerical tolerance plus
+    rounding. `measured` is the layer of runs on the machine, None where there are none."""
 
     line: Index
     tool: Index
@@ -45,18 +47,14 @@ class Judgements:
     counts: npt.NDArray[np.uint8]
     uncorrected: Single
     corrected: Single
-    at_end: Single
     tolerance_mm: float
     allowed_mm: float
+    measured: Measured | None = None
 
     @staticmethod
     def of(proof: Proof) -> Judgements:
         path = proof.nominal
-        numbers = np.array([-1 if f.tool is None else f.tool for f in path.frames] or [-1])
-        offsets = [f.work_offset for f in path.frames] or [""]
-        keys = list(zip(numbers.tolist(), offsets, strict=True))
-        key = np.array([keys.index(k) for k in keys])[path.frame] if len(path.frames) else path.frame
-        operation = np.cumsum(np.diff(key, prepend=key[:1]) != 0) if len(key) else key
+        tool, operation = groups_of(path)
         judged = proof.judged
         shown = (proof.counts == Counts.RAPID) | (proof.counts == Counts.UNCORRECTED)
         sides = [
@@ -64,9 +62,13 @@ class Judgements:
             for part, size in ((proof.before, proof.before_mm), (proof.after, proof.after_mm))
         ]
         return Judgements(
-            path.line.astype(np.int64), numbers[path.frame], operation.astype(np.int64), proof.counts,
-            sides[0], sides[1], proof.after.waypoint, proof.tolerance_mm, proof.allowed_mm,
+            path.line.astype(np.int64), tool, operation, proof.counts, sides[0], sides[1],
+            proof.tolerance_mm, proof.allowed_mm,
         )  # fmt: skip
+
+    def with_measured(self, runs: Measured) -> Judgements:
+        """The same table with the layer of measured runs."""
+        return replace(self, measured=runs)
 
     @property
     def judged(self) -> Mask:
@@ -84,20 +86,25 @@ class Judgements:
         return float(np.nan_to_num(self.corrected[rows]).max(initial=0.0))
 
     def by_line(self) -> dict[str, npt.NDArray[Any]]:
-        """Of each line that moves: `line`, `uncorrected_um` and `corrected_um`, the largest of what counts on
-        it, else of what is shown, and `state`: 0 within, 1 above, 2 shown and not judged."""
+        """Of each line that moves: `line`, and of each layer the largest deviation of what counts on it, else
+        of what is shown, and its state: 0 within, 1 above, 2 shown and not judged. `uncorrected_um` and
+        `corrected_um` are judged by what is allowed, `measured_um` (NaN: not measured) by the part tolerance.
+        `state` is that of the line: of the corrected program, and above where the measured one is."""
         lines, row = np.unique(self.line, return_inverse=True)
         result: dict[str, npt.NDArray[Any]] = {"line": lines}
         counted = np.zeros(len(lines), bool)
         counted[row[self.judged]] = True
         rows = self.judged | ~counted[row]
-        for name, values in (("uncorrected_um", self.uncorrected), ("corrected_um", self.corrected)):
-            largest = np.full(len(lines), np.nan, np.float32)
-            np.fmax.at(largest, row[rows], values[rows] * np.float32(UM_PER_MM))
-            result[name] = largest
-        state = np.where(counted, 0, 2).astype(np.uint8)
-        state[row[self.over]] = 1
-        return result | {"state": state}
+        for name, values in (("uncorrected", self.uncorrected), ("corrected", self.corrected)):
+            largest = np.full(len(lines), np.nan)
+            np.fmax.at(largest, row[rows], values[rows].astype(float) * UM_PER_MM)
+            result[f"{name}_um"] = largest
+            over = self.judged & (np.nan_to_num(values) > self.allowed_mm)
+            state = np.where(counted, WITHIN, SHOWN).astype(np.uint8)
+            state[row[over]] = ABOVE
+            result[f"{name}_state"] = state
+        result["state"] = result["corrected_state"].copy()
+        return result | _measured_columns(self.measured, lines, result["state"])
 
     def groups(self, of: Index) -> list[dict[str, Any]]:
         """Largest deviations and verdict of the moves that count of each value of `of` (n,), in order of
@@ -141,7 +148,35 @@ class Judgements:
             "shown_um": shown,
             "operations": self.groups(self.operation),
             "tools": self.groups(self.tool),
-        }
+        } | ({} if self.measured is None else {"measured": self.measured.report()})
+
+
+def groups_of(path: Toolpath) -> tuple[Index, Index]:
+    """(n,) the tool of each move (-1: none), and its operation, from 0: of one tool and work offset."""
+    numbers = np.array([-1 if f.tool is None else f.tool for f in path.frames] or [-1])
+    offsets = [f.work_offset for f in path.frames] or [""]
+    keys = list(zip(numbers.tolist(), offsets, strict=True))
+    # frames of the same key have the number of the first of them
+    first = {key: k for k, key in reversed(list(enumerate(keys)))}
+    number = np.array([first[key] for key in keys])[path.frame] if len(path.frames) else path.frame
+    operation = np.cumsum(np.diff(number, prepend=number[:1]) != 0) if len(number) else number
+    return numbers[path.frame].astype(np.int64), operation.astype(np.int64)
+
+
+def _measured_columns(
+    runs: Measured | None, lines: Index, state: npt.NDArray[np.uint8]
+) -> dict[str, npt.NDArray[Any]]:
+    """`measured_um` and `measured_state` of all runs; `state` is set where a line is above when measured."""
+    if runs is None:
+        return {}
+    table = runs.by_line()
+    row = np.searchsorted(lines, table["line"])
+    size: Array = np.full(len(lines), np.nan)
+    size[row] = table["measured_um"]
+    own = np.full(len(lines), SHOWN, np.uint8)
+    own[row] = table["state"]
+    state[own == ABOVE] = ABOVE
+    return {"measured_um": size, "measured_state": own}
 
 
 def verdict(
@@ -171,32 +206,32 @@ def verdict(
     return {"ok": ok, "numerical": numerical, "part": part, "errors": errors, "sentences": sentences}
 
 
-def measured(largest_um: float | None, tolerance_um: float | None) -> dict[str, Any]:
-    """The verdict on measured runs: `ok` is None where no part tolerance is stated. `largest_um` is the
-    largest distance of a point of a cutting move from the path, None where no point counts."""
-    result = {"largest_um": largest_um, "tolerance_um": tolerance_um}
-    if largest_um is None:
-        ok = None if tolerance_um is None else False
-        words = "Not verified: no measured point of a cutting move counts."
-    elif tolerance_um is None:
-        ok = None
-        words = (
-            f"The measured path is at most {_um(largest_um)} um from the nominal one; no part tolerance is "
-            "stated."
-        )
-    else:
-        ok = largest_um <= tolerance_um
-        words = (
-            f"{'Within the' if ok else 'ABOVE the'} part tolerance of {tolerance_um:g} um: the measured path "
-            f"is at most {_um(largest_um)} um from the nominal one."
-        )
-    return {"ok": ok, "measured": result, "sentences": [words]}
+def measured(runs: Sequence[tuple[str, float | None]], tolerance_um: float | None) -> dict[str, Any]:
+    """The verdict on measured runs, by name and largest deviation in um, None where no point of the run
+    counts: such a run is not verified. `ok` is None where no part tolerance is stated."""
+    known = [size for _, size in runs if size is not None]
+    missing = [name for name, size in runs if size is None]
+    largest_um = max(known, default=None)
+    result = {"largest_um": largest_um, "tolerance_um": tolerance_um, "not_verified": missing}
+    holds = largest_um is not None and tolerance_um is not None and largest_um <= tolerance_um
+    sentences = []
+    if largest_um is not None:
+        off = f"he measured path is at most {_um(largest_um)} um from the nominal one"
+        part = f"{'Within' if holds else 'ABOVE'} the part tolerance of {tolerance_um or 0.0:g} um"
+        stated = tolerance_um is not None
+        sentences.append(f"{part}: t{off}." if stated else f"T{off}; no part tolerance is stated.")
+    if missing or not runs:
+        names = f" of {', '.join(missing)}" if missing else ""
+        sentences.append(f"Not verified: no measured point{names} counts.")
+    ok = None if tolerance_um is None else holds and not missing
+    return {"ok": ok, "measured": result, "sentences": sentences}
 
 
 def with_measured(predicted: dict[str, Any], runs: dict[str, Any]) -> dict[str, Any]:
-    """One verdict of a prediction and of what was measured: the measured runs decide, unless the prediction
-    fails already."""
-    ok = runs["ok"] if predicted["ok"] else False
+    """One verdict of a prediction and of what was measured: it fails where either does, and is open where
+    either is."""
+    answers = predicted["ok"], runs["ok"]
+    ok = False if False in answers else None if None in answers else True
     return predicted | runs | {"ok": ok, "sentences": [*predicted["sentences"], *runs["sentences"]]}
 
 

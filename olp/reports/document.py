@@ -68,11 +68,12 @@ class Section:
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """`verdict` is (good, sentence), None where there is nothing to decide."""
+    """`verdict` is (good, sentence), where good is None if it is open; None where there is nothing to
+    decide."""
 
     title: str
     subtitle: str
-    verdict: tuple[bool, str] | None
+    verdict: tuple[bool | None, str] | None
     sections: Sequence[Section] = field(default=())
     footer: str = ""
 
@@ -94,7 +95,7 @@ header p { color: var(--soft); margin: 1mm 0 0; overflow-wrap: anywhere; }
 .verdict { border-left: 4pt solid; padding: 2.5mm 4mm; margin: 0 0 5mm; font-weight: 600; background:
   #f5f7f8; }
 .good { border-color: var(--good); color: var(--good); } .bad { border-color: var(--bad); color:
-  var(--bad); }
+  var(--bad); } .open { border-color: var(--soft); color: var(--soft); }
 section { margin: 0 0 6mm; }
 h2 { font-size: 12.5pt; margin: 7mm 0 2mm; border-bottom: .5pt solid var(--line); padding-bottom: 1mm; }
 h3 { font-size: 10.5pt; margin: 4.5mm 0 1.5mm; }
@@ -139,7 +140,8 @@ def to_html(document: Document) -> bytes:
     ]  # fmt: skip
     if document.verdict is not None:
         good, sentence = document.verdict
-        parts.append(f'<p class="verdict {"good" if good else "bad"}">{_text(sentence)}</p>')
+        mark = "open" if good is None else "good" if good else "bad"
+        parts.append(f'<p class="verdict {mark}">{_text(sentence)}</p>')
     for number, section in _numbered(document.sections):
         tag = f"h{section.level + 1}"
         parts.append(f"<{tag}>{number} {_text(section.title)}</{tag}>")

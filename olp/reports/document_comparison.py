@@ -26,11 +26,11 @@ from olp.reports.report import MEASURED_BOTH, Report, measured_sides, number
 
 def comparison(report: Report, plots: Plots, version: str, date: datetime.date | None) -> Document:
     """The document of a report of `compare` ("olp-comparison-1")."""
-    verdict = None
+    verdict: tuple[bool | None, str] | None = None
     wrong = any(f["code"] == "OLP601" for f in report["findings"])
     if wrong:
         verdict = (False, "Measured and nominal path do not match: no figures are given.")
-    elif (report.get("verdict") or {}).get("ok") is not None:
+    elif report.get("verdict"):
         verdict = (report["verdict"]["ok"], " ".join(report["verdict"]["sentences"]))
     sections = [
         Section("Result", list(_comparison_result(report))),

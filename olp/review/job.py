@@ -21,23 +21,24 @@ from olp.files.sources import Source, Sources
 from olp.files.write import write_bytes
 from olp.program.program import Program
 from olp.program.registry import Options, read
-from olp.proof import judgement
 from olp.proof.judgement import Judgements
 from olp.review.listing import aligned
 from olp.review.manifest import manifest_of
-from olp.review.measured import Matched, Matcher
+from olp.review.measured import Matched, Matcher, refuse_unplaced, with_measured
 from olp.review.meshes import Body, of_job, of_machine
-from olp.review.motion import by_feed, retimed, table
+from olp.review.motion import by_feed, retimed
+from olp.review.motion import table as motion_table
 from olp.review.page import page
 from olp.review.samples import Samples, by_source, sample
 from olp.review.scene import Frame, Scene, TipUncertainty
 from olp.uncertainty.probability import within
 from olp.uncertainty.spread import Points, bands, covariances
 from olp.workflows import retime
+from olp.workflows.compare_runs import Ground, How, judged
 from olp.workflows.confidence import unknowns_of
 from olp.workflows.correct import Correction, CorrectOptions
 from olp.workflows.correct import corrected as correct_program
-from olp.workflows.flatten import unrolled
+from olp.workflows.flatten import as_asked
 from olp.workflows.proof import ProofOptions, Run, verify_programs
 from olp.workflows.retime import RetimeOptions, Retiming
 from olp.workflows.session import Loaded, Outside, PathLike, Session, opened
@@ -108,7 +109,8 @@ def view(
 ) -> Review:
     """A program, its correction and measurements of it, for a browser.
 
-    `corrected` is the corrected program, which is proved as in `verify`. Without it the program is corrected
+    `corrected` is the corrected program, which is proved as in `verify`, against the nominal program unrolled
+    where `flatten` or `expand_cycles` ask for it. Without it the program is corrected
     as in `correct`, or `correction` is the result of that, under the name `corrected_name`. `measured` are
     files of tip positions, read and placed on the path as in `olp.compare`; the findings of that are added
     to the others. Without `time` the motion is not planned: times are those of the
@@ -147,7 +149,7 @@ def run(
     program.load()
     with program.errors():
         loaded = session.loaded(outside, only_sure=options.only_sure_components).reading(program)
-        data = _unrolled(session, program, loaded, options)
+        data = as_asked(session.sources, program, loaded.setup, loaded.dialect, options).data
     if corrected is not None:
         corrected.load()
         other, corrected_name = corrected.data, corrected.name
@@ -207,15 +209,6 @@ class _Shown:
     plan: Retiming | None
 
 
-def _unrolled(session: Session, program: Source, loaded: Loaded, options: ViewOptions) -> bytes:
-    if not (options.flatten or options.expand_cycles):
-        return program.data
-    return unrolled(
-        session.sources, program, loaded.setup, loaded.dialect, expand_cycles=options.expand_cycles,
-        peck_clearance_mm=options.peck_clearance_mm,
-    )  # fmt: skip
-
-
 def _corrected(session: Session, data: bytes, loaded: Loaded, options: ViewOptions, tell: Progress) -> Run:
     correcting = CorrectOptions(**options.proof(), outside_box=options.outside_box)
     return correct_program(session.sources, session.sources.source(data), loaded, correcting, tell)
@@ -247,21 +240,21 @@ def _scene(
     position = frame.positions(nominal.toolpath, samples.move, samples.axis_mm)
     report = texts.proved.report
     part_um = loaded.part_tolerance_um(options.part_tolerance_um)
-    runs: list[Matched] = []
-    digests: list[str] = []
+    table = texts.proved.table
+    shown_runs: tuple[Matched, ...] = ()
+    digests: tuple[str, ...] = ()
     if measured:
-        matcher = Matcher(nominal.toolpath, samples, loaded.model, setup, np.array(frame.origin_mm))
-        for path in measured:
-            points = read_points(path, read=session.sources.read_last)
-            runs.append(matcher.match(points))
-            digests.append(points.sha256)
-        more = [finding.as_dict() for run in runs for finding in run.findings]
-        sizes = [run.largest_um for run in runs if run.largest_um is not None]
-        judged = judgement.measured(max(sizes, default=None), part_um)
-        report = report | {
-            "findings": [*report["findings"], *more],
-            "verdict": judgement.with_measured(report["verdict"], judged),
-        }
+        files = [read_points(path, read=session.sources.read_last) for path in measured]
+        digests = tuple(points.sha256 for points in files)
+        ground = Ground.of_program(nominal, loaded)
+        how = How(part_tolerance_um=part_um)
+        done = judged(ground, files, how)
+        refuse_unplaced(files, done.placed, how.reach_mm)
+        matcher = Matcher(ground, samples, setup, np.array(frame.origin_mm))
+        placed = zip(done.placed.runs, done.placed.orders, strict=True)
+        shown_runs = tuple(matcher.match(run, order) for run, order in placed)
+        table = table.with_measured(done.layers["after"])
+        report = with_measured(report, table, done)
     bodies = tuple(_bodies(session, setup, nominal, samples, frame, position))
     return Scene(
         name=texts.source.short or "program",
@@ -273,14 +266,14 @@ def _scene(
         samples=samples,
         position_mm=position,
         time_s=moment,
-        motion=None if plan is None else table(plan.trajectories, plan.routes),
+        motion=None if plan is None else motion_table(plan.trajectories, plan.routes),
         duration_s=float(moment[-1]) if plan is None else plan.duration_s,
         sources=tuple(by_source(nominal.toolpath, samples, loaded.model)),
         listing=aligned(nominal, texts.second, texts.proved.groups),
         bodies=bodies,
-        measured=tuple(runs),
+        measured=shown_runs,
         report=report,
-        table=texts.proved.table,
+        table=table,
         tolerance_um=report["verdict"]["numerical"]["allowed_um"],
         tool_radius_mm=_radius(setup, nominal),
         uncertainty=_uncertainty(loaded, nominal, samples, part_um, options.date),

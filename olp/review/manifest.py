@@ -12,6 +12,7 @@ from olp.core.arrays import Array
 from olp.core.toolpath import Kind
 from olp.core.units import AXES, UM_PER_MM
 from olp.findings.catalogue import RULES
+from olp.review.judged import callouts, judged_lines, measured_names, statistics
 from olp.review.meshes import nodes
 from olp.review.pack import ARC_MM, DEVIATION_MM, POSITION_MM, TIME_S, Arrays, resolution
 from olp.review.scene import Scene
@@ -34,16 +35,16 @@ _PARTS = (
     ("along", "along the path", "diverging"),
     ("normal", "across the path", "sequential"),
 )
-#: State of a line of the listing without a move.
-NOT_JUDGED = 3
+#: The part that is judged.
+_JUDGED = "magnitude"
+#: The part that is judged.
+_JUDGED = "magnitude"
 #: Fewest steps of an error source over its range: colours show no more.
 _SOURCE_LEVELS = 200
 #: Finest step of an error source in um.
 _FINEST_UM = 0.001
 #: Step of a probability in %.
 _PERCENT = 0.1
-#: Stored bits of the largest error of a line: a part in a thousand, much smaller than a full float.
-_ERROR_BITS = 9
 #: Fewest steps of a column of the motion over its range.
 _MOTION_LEVELS = 20_000
 
@@ -72,6 +73,7 @@ def manifest_of(scene: Scene) -> tuple[dict[str, Any], Arrays]:
         "origin_mm": origin.tolist(),
         "samples": len(scene.samples),
         "tolerance_um": scene.tolerance_um,
+        "part_tolerance_um": None if scene.table.measured is None else scene.table.measured.tolerance_um,
         "base": base,
         "line": "line",
         "rapid": "rapid",
@@ -88,9 +90,9 @@ def manifest_of(scene: Scene) -> tuple[dict[str, Any], Arrays]:
         "nodes": [{"path": list(path), "axis": axis} for path, axis in nodes(scene.machine)],
         "axes": "Q",
         "axes_origin_mm": axes_origin.tolist(),
-        "statistics": list(_statistics(scene)),
+        "statistics": list(statistics(scene)),
         "findings": _findings(scene),
-        "callouts": list(_callouts(scene)),
+        "callouts": list(callouts(scene)),
         "verdict": _verdict(scene),
         "frame": scene.frame.label,
         "tool_radius_mm": scene.tool_radius_mm,
@@ -119,7 +121,7 @@ def _layers(scene: Scene, arrays: Arrays, origin: Array) -> list[dict[str, Any]]
     layers = [
         _layer(name, label, "P", deltas[name], None, colour, width) for name, label, colour, width in LAYERS
     ]
-    for k, (name, measured) in enumerate(zip(_measured(scene), scene.measured, strict=True)):
+    for k, (name, measured) in enumerate(zip(measured_names(scene), scene.measured, strict=True)):
         base = arrays.quantised(f"P_{name}", measured.base_mm - origin, POSITION_MM)
         delta = arrays.quantised(f"d_{name}", measured.delta_mm, DEVIATION_MM)
         index = arrays.quantised(f"i_{name}", measured.index, 1.0)
@@ -129,12 +131,6 @@ def _layers(scene: Scene, arrays: Arrays, origin: Array) -> list[dict[str, Any]]
             _layer(name, label, base, delta, index, MEASURED[k % len(MEASURED)], 2.0) | {"kind": kind}
         )
     return layers
-
-
-def _measured(scene: Scene) -> list[str]:
-    """Names of the layers of measured runs."""
-    count = len(scene.measured)
-    return ["measured"] if count == 1 else [f"measured-{k + 1}" for k in range(count)]
 
 
 def _layer(
@@ -147,11 +143,11 @@ def _layer(
 
 
 def _metrics(scene: Scene, arrays: Arrays) -> list[dict[str, Any]]:
-    names = ["uncorrected", "corrected", "result", *_measured(scene)]
+    names = ["uncorrected", "corrected", "result", *measured_names(scene)]
     metrics: list[dict[str, Any]] = [
         {
             "name": part, "label": label, "unit": "um", "kind": kind, "of": part,
-            "by_layer": dict.fromkeys(names), "limit": scene.tolerance_um,
+            "by_layer": dict.fromkeys(names), "judged": part == _JUDGED,
         }
         for part, label, kind in _PARTS
     ]  # fmt: skip
@@ -163,7 +159,7 @@ def _metrics(scene: Scene, arrays: Arrays) -> list[dict[str, Any]]:
         metrics.append(
             {
                 "name": f"source:{name}", "label": f"share of {name}", "unit": "um", "kind": "sequential",
-                "by_layer": {"uncorrected": array}, "limit": None,
+                "by_layer": {"uncorrected": array}, "judged": False,
             }
         )  # fmt: skip
     return metrics
@@ -179,7 +175,7 @@ def _uncertainty(scene: Scene, arrays: Arrays) -> Iterator[dict[str, Any]]:
     array = arrays.quantised("band", band, step)
     yield {
         "name": "band", "label": "uncertainty (k = 2)", "unit": "um", "kind": "sequential",
-        "by_layer": dict.fromkeys(("uncorrected", "result"), array), "limit": scene.tolerance_um,
+        "by_layer": dict.fromkeys(("uncorrected", "result"), array), "judged": False,
     }  # fmt: skip
     if uncertainty.within_mm is None:
         return
@@ -189,7 +185,7 @@ def _uncertainty(scene: Scene, arrays: Arrays) -> Iterator[dict[str, Any]]:
     }
     yield {
         "name": "beyond", "label": f"probability beyond {uncertainty.within_mm * UM_PER_MM:g} µm",
-        "unit": "%", "kind": "sequential", "by_layer": by_layer, "limit": None,
+        "unit": "%", "kind": "sequential", "by_layer": by_layer, "judged": False,
     }  # fmt: skip
 
 
@@ -233,22 +229,12 @@ def _listing(scene: Scene, arrays: Arrays) -> dict[str, Any]:
     like = np.full(int(listing.row_corrected.max(initial=0)), -1, np.int64)
     like[listing.row_corrected[lines] - 1] = listing.row_nominal[lines].astype(np.int64) - 1
     arrays.patch("text_corrected", listing.corrected, "text_nominal", listing.nominal, _resembled(like))
-    table = scene.table.by_line()
-    row = listing.row_of(table["line"])
-    columns = {}
-    for name, key in (("error_um", "uncorrected_um"), ("result_um", "corrected_um")):
-        values = np.full(len(listing.row_nominal), np.nan, np.float32)
-        values[row] = table[key]
-        columns[name] = arrays.raw(name, _rounded(values), "f4")
-    state = np.full(len(listing.row_nominal), NOT_JUDGED, np.uint8)
-    state[row] = table["state"]
     return {
         "nominal": "text_nominal",
         "corrected": "text_corrected",
         "row_nominal": arrays.quantised("row_nominal", listing.row_nominal, 1.0),
         "row_corrected": arrays.quantised("row_corrected", listing.row_corrected, 1.0),
-        **columns,
-        "state": arrays.raw("line_state", state, "u1"),
+        **judged_lines(scene, arrays),
     }
 
 
@@ -258,12 +244,6 @@ def _resembled(like: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
     known = np.where(like >= 0, np.arange(len(like)), len(like) - 1)
     after = np.minimum.accumulate(known[::-1])[::-1]
     return np.asarray(like[after])
-
-
-def _rounded(values: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
-    """Values to _ERROR_BITS bits; NaN is unchanged."""
-    fraction, exponent = np.frexp(values)
-    return np.asarray(np.ldexp(np.rint(np.ldexp(fraction, _ERROR_BITS)), exponent - _ERROR_BITS), np.float32)
 
 
 def _meshes(scene: Scene, arrays: Arrays, origin: Array) -> Iterator[dict[str, Any]]:
@@ -280,30 +260,6 @@ def _meshes(scene: Scene, arrays: Arrays, origin: Array) -> Iterator[dict[str, A
         }
 
 
-def _statistics(scene: Scene) -> Iterator[dict[str, Any]]:
-    """The figures of the report, of each layer and of the job."""
-    deviation, table = scene.report["deviation"], scene.table
-    largest = {
-        "uncorrected": np.nan_to_num(table.uncorrected[table.judged]).max(initial=0.0) * UM_PER_MM,
-        "result": table.largest_mm() * UM_PER_MM,
-    }
-    for side, layer in (("before", "uncorrected"), ("after", "result")):
-        yield {"label": "largest", "value": float(largest[layer]), "unit": "um", "layer": layer}
-        rms, waypoints = deviation[side]["between"]["rms_um"], deviation[side]["waypoints"]["max_um"]
-        yield {"label": "rms", "value": float(rms), "unit": "um", "layer": layer}
-        yield {"label": "at waypoints", "value": float(waypoints), "unit": "um", "layer": layer}
-    for name, run in zip(_measured(scene), scene.measured, strict=True):
-        for label, value in (("largest", run.largest_um), ("rms", run.rms_um)):
-            if value is not None:
-                yield {"label": label, "value": value, "unit": "um", "layer": name}
-    moves = scene.nominal.toolpath
-    length_m = float(scene.samples.arc_mm[-1]) * 1e-3
-    yield {"label": "path length", "value": length_m, "unit": "m", "layer": None}
-    yield {"label": "time", "value": scene.duration_s, "unit": "s", "layer": None}
-    yield {"label": "moves", "value": len(moves), "unit": "", "layer": None}
-    yield {"label": "lines", "value": scene.nominal.lines, "unit": "", "layer": None}
-
-
 def _findings(scene: Scene) -> list[dict[str, Any]]:
     return [
         {
@@ -316,24 +272,6 @@ def _findings(scene: Scene) -> list[dict[str, Any]]:
         }
         for finding in scene.report.get("findings", ())
     ]
-
-
-def _callouts(scene: Scene) -> Iterator[dict[str, Any]]:
-    """The worst line, uncorrected and corrected, of the moves that count."""
-    table = scene.table
-    for layer, words, values in (
-        ("uncorrected", "uncorrected", table.uncorrected), ("result", "corrected", table.corrected),
-    ):  # fmt: skip
-        size = np.where(table.judged, np.nan_to_num(values), -1.0)
-        if not len(size) or size.max() < 0.0:
-            continue
-        move = int(size.argmax())
-        own = np.flatnonzero(scene.samples.move == move)
-        if not own.size:
-            continue
-        away = np.linalg.norm(getattr(scene.samples, layer)[own], axis=1)
-        text = f"largest, {words}: {size[move] * UM_PER_MM:.2f} µm, line {int(table.line[move])}"
-        yield {"sample": int(own[away.argmax()]), "text": text, "layer": layer}
 
 
 def _verdict(scene: Scene) -> dict[str, Any]:

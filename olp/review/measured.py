@@ -1,86 +1,65 @@
-"""Measured runs on the page: each point with its point of the nominal path, paired as in `olp compare`."""
+"""Measured runs on the page: each point with its nominal point, paired as in `olp compare`."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from olp.comparison import runs
 from olp.comparison.figures import Run
-from olp.comparison.nominal import Nominal, nominal_of
-from olp.compensation.plan import zero_shifts
+from olp.comparison.frames import Frames
+from olp.comparison.pairing import Order
 from olp.core.arrays import Array, Index, Mask
-from olp.core.errors import ConfigError, InputError
+from olp.core.errors import InputError
 from olp.core.machine import Setup
-from olp.core.toolpath import Toolpath
-from olp.errormodel.base import ErrorModel
 from olp.files.points import Points, row_line
-from olp.findings.catalogue import Finding
+from olp.proof import judgement
+from olp.proof.judgement import Judgements
 from olp.review.samples import Samples
-
-#: Points farther from the path are left out, in mm.
-REACH_MM = 1.0
+from olp.workflows.compare_runs import Ground, Judged
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Matched:
-    """Of n measured points in the order of the path: (n, 3) `base_mm`, the nearest point of the path,
-    `delta_mm` from there, and (n,) the `index` of the sample next to it. `findings` are those of
-    `olp compare` on how the run was placed. (n,) `counted` are points of cutting moves: figures are of these,
-    `largest_um` of all (None where none counts), `by_line_um` of each line."""
+    """Of n measured points in the order of the path: (n, 3) `base_mm`, the nominal point of each, `delta_mm`
+    from there, and (n,) the `index` of the sample next to it. (n,) `counted` are the points that count."""
 
     label: str
     base_mm: Array
     delta_mm: Array
     index: Index
-    findings: tuple[Finding, ...]
     counted: Mask
-    largest_um: float | None
-    rms_um: float | None
-    by_line_um: dict[int, float]
 
 
 class Matcher:
-    """Places measured points on the path of a program whose samples are shown about `origin_mm`: the axis
-    position, without tool lengths, of the zero of the page."""
+    """Puts measured runs, placed on the path of a program, among its samples, which are shown about
+    `origin_mm`: the axis position, without tool lengths, of the zero of the page."""
 
-    def __init__(
-        self, path: Toolpath, samples: Samples, model: ErrorModel, setup: Setup, origin_mm: Array
-    ) -> None:
-        self._path, self._setup = path, setup
-        self._nominal = nominal_of(path, model, "tip")
-        self._shift = zero_shifts(path.frames, model)
-        self._home = self._zero(int(path.frame[0]))
+    def __init__(self, ground: Ground, samples: Samples, setup: Setup, origin_mm: Array) -> None:
+        assert ground.program is not None and ground.loaded is not None
+        self._path, self._ground = ground.program.toolpath, ground
+        self._frames = Frames.of(self._path, ground.loaded.model, setup)
         self._origin = origin_mm
-        self._samples, self._arc_mm = samples, _arc_lengths(self._nominal, samples)
+        self._samples, self._arc_mm = samples, _arc_lengths(ground, samples)
 
-    def match(self, points: Points) -> Matched:
-        """The run on the path. Raises InputError with the line of the first point that is not on it, and
-        ConfigError for a frame that the machine does not have."""
-        point_mm = points.points_mm + self._from_frame(points)
-        nominal = self._nominal.path
-        placed = runs.place(nominal, [Path(points.file).name], [point_mm], "auto", None, REACH_MM)
-        run = placed.runs[0]
-        if not placed.right[0]:
-            raise _refusal(points, run)
+    def match(self, run: Run, order: Order) -> Matched:
+        """A run whose points are measured in an order along the path."""
         rows = np.flatnonzero(run.good)
-        if placed.orders[0] == "backward":
+        if order == "backward":
             rows = rows[::-1]
-        elif placed.orders[0] == "free":
+        elif order == "free":
             rows = rows[np.argsort(run.pairing.s_mm[rows], kind="stable")]
-        foot = run.pairing.foot_mm[rows]
+        move = self._ground.row(run)[rows]
         # the page shows the program's own positions, without the errors of touched zeros
-        move = self._nominal.move[run.pairing.segment[rows]]
-        base = foot + self._home - self._shift[self._path.frame[move]] - self._origin
+        first = int(self._path.frame[0])
+        nominal = self._frames.on_machine(run.nominal_mm[rows], first)
+        base = nominal - self._frames.shift_mm[self._path.frame[move]] - self._origin
+        delta = self._frames.on_machine(run.points_mm[rows], first) - nominal
         index = np.maximum.accumulate(self._nearest(run.pairing.s_mm[rows], move))
-        findings = tuple(runs.findings(nominal, placed))
-        across = run.figures(nominal)["across_um"] or {}
-        return Matched(
-            run.name, base, run.points_mm[rows] - foot, index, findings, run.counted[rows], across.get("max"),
-            across.get("rms"), run.largest_by_line(nominal),
-        )  # fmt: skip
+        return Matched(run.name, base, delta, index, run.counted[rows])
 
     def _nearest(self, s_mm: Array, move: Index) -> Index:
         """(n,) the sample next to each arc length, but not the last one of the move before."""
@@ -90,45 +69,38 @@ class Matcher:
         nearer = (s_mm - arc_mm[before] < arc_mm[after] - s_mm) & (self._samples.move[before] >= move)
         return np.where(nearer, before, after).astype(np.int64)
 
-    def _zero(self, frame: int) -> Array:
-        """The axis position of the zero of a frame of the program, without tool lengths."""
-        known = self._path.frames[frame]
-        return np.asarray(np.subtract(known.offset_mm, known.length_mm) + self._shift[frame], float)
 
-    def _from_frame(self, points: Points) -> Array:
-        """The shift from the frame that a file states into the first frame of the program."""
-        first = self._path.frames[int(self._path.frame[0])]
-        if points.frame in (None, first.work_offset):
-            return np.zeros(3)
-        if points.frame == "machine":
-            return np.asarray(-self._home, float)
-        assert points.frame is not None
-        for frame in np.unique(self._path.frame).tolist():
-            if self._path.frames[frame].work_offset == points.frame:
-                return np.asarray(self._zero(frame) - self._home, float)
-        offset = self._setup.work_offset(points.frame)
-        if offset is None or any(offset.rotation_deg):
-            raise ConfigError(
-                f"frame {points.frame!r} is not an unrotated work offset of machine or job; expected "
-                f'{first.work_offset!r} or "machine"',
-                file=points.file,
-            )
-        return np.asarray(np.array(offset.offset_mm) - self._home, float)
+def refuse_unplaced(files: Sequence[Points], placed: runs.Placed, reach_mm: float) -> None:
+    """Raise InputError with the line of the first point that is not on the path: what cannot be paired cannot
+    be shown."""
+    for points, run, right in zip(files, placed.runs, placed.right, strict=True):
+        if not right:
+            raise _refusal(points, run, reach_mm)
 
 
-def _refusal(points: Points, run: Run) -> InputError:
+def with_measured(report: dict[str, Any], table: Judgements, done: Judged) -> dict[str, Any]:
+    """The report of a proof with the figures, the findings and the verdict of measured runs."""
+    return report | {
+        "judgement": table.report(),
+        "measured": done.figures["after"],
+        "findings": [*report["findings"], *(finding.as_dict() for finding in done.findings)],
+        "verdict": judgement.with_measured(report["verdict"], done.verdict),
+    }
+
+
+def _refusal(points: Points, run: Run, reach_mm: float) -> InputError:
     off = np.flatnonzero(~run.good & ~run.pairing.beyond)
     worst = int(off[0]) if len(off) else int(run.pairing.distance_mm.argmax())
     return InputError(
         f"the point is {run.pairing.distance_mm[worst]:.3g} mm from the path, or the points are not in its "
-        f"order; expected points within {REACH_MM:g} mm of it; run olp compare for details",
+        f"order; expected points within {reach_mm:g} mm of it; run olp compare for details",
         file=points.file, line=row_line(points, worst),
     )  # fmt: skip
 
 
-def _arc_lengths(nominal: Nominal, samples: Samples) -> Array:
+def _arc_lengths(ground: Ground, samples: Samples) -> Array:
     """(n,) arc length on the nominal path at each sample; a move that is not on it has the one before."""
-    s, of = nominal.path.s_mm, nominal.move
+    s, of = ground.path.s_mm, ground.move
     begin = s[np.searchsorted(of, samples.move, "left")]
     end = s[np.searchsorted(of, samples.move, "right")]
     return np.maximum.accumulate(begin + samples.share * (end - begin))

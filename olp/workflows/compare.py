@@ -6,17 +6,14 @@ import datetime
 import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path as FilePath
 from typing import Any, Literal
 
 import numpy as np
 
 from olp.checks.state import calibration_findings
 from olp.comparison import figures, runs
-from olp.comparison.nominal import Nominal, nominal_of
 from olp.comparison.pairing import Order
 from olp.comparison.path import Path
-from olp.core.arrays import Array, Index
 from olp.core.errors import InputError, UsageError
 from olp.core.machine import Setup
 from olp.core.progress import Progress, silent
@@ -30,6 +27,7 @@ from olp.program.registry import Options, read
 from olp.workflows import compare_report as parts
 from olp.workflows.compare_poses import part_frame as poses_frame
 from olp.workflows.compare_poses import poses_report
+from olp.workflows.compare_runs import Ground, How, Judged, judged
 from olp.workflows.doubt import acceptable, with_accepted
 from olp.workflows.session import Loaded, PathLike, Session
 
@@ -69,21 +67,23 @@ class Comparison:
     part_frame: str | None = None
 
     def to_csv(self) -> Iterator[bytes]:
-        """One row per measured point: run, arc length, line, nominal point, deviations, whether it counts."""
-        yield b"run,s_mm,line,X_mm,Y_mm,Z_mm,along_um,normal_um,binormal_um,counted\n"
+        """One row per measured point: run, arc length, line, nominal point, deviations from there, whether it
+        counts, and the distance from there, which is what counts."""
+        yield b"run,s_mm,line,X_mm,Y_mm,Z_mm,along_um,normal_um,binormal_um,counted,size_um\n"
         for run in (*self.before, *self.runs):
             assert self.path is not None
             name = _quoted(run.name)
-            d, foot = run.deviation, run.pairing.foot_mm
+            d, foot = run.deviation, run.nominal_mm
             columns = (
-                run.pairing.s_mm, self.path.line[run.pairing.segment], *foot.T,
+                run.pairing.s_mm, run.line(self.path), *foot.T,
                 *(v * UM_PER_MM for v in (d.along, d.normal, d.binormal)), run.counted.astype(int),
+                run.size_mm * UM_PER_MM,
             )  # fmt: skip
             for a in range(0, len(foot), 1 << 14):
                 rows = zip(*(c[a : a + (1 << 14)].tolist() for c in columns), strict=True)
                 yield "".join(
-                    f"{name},{s:.6f},{line},{x:.6f},{y:.6f},{z:.6f},{t:.4f},{n:.4f},{b:.4f},{good}\n"
-                    for s, line, x, y, z, t, n, b, good in rows
+                    f"{name},{s:.6f},{line},{x:.6f},{y:.6f},{z:.6f},{t:.4f},{n:.4f},{b:.4f},{good},{size:.4f}\n"
+                    for s, line, x, y, z, t, n, b, good, size in rows
                 ).encode()
 
 
@@ -158,7 +158,7 @@ def run(
         [read_points(name, options.profile, sources.read_last) for name in names]
         for names in (measured, options.before)
     ]
-    side = _nominal_side(nominal, session, options.contour)
+    side = _nominal_side(nominal, session, options)
     if side.loaded is not None:
         part_um = side.loaded.part_tolerance_um(options.part_tolerance_um)
         options = replace(options, part_tolerance_um=part_um)
@@ -184,77 +184,75 @@ def _paths(
             "--add-errors is for axis positions of a control's log; give a program as NOMINAL, -m, and a "
             'profile with positions = "axes"'
         )
-    path, move = _nominal(side, axes)
-    _same_frame(side, sets, axes)
-    names = _names([p.file for files in sets for p in files])
+    _same_frame(side, sets)
+    ground = _ground(side, axes)
+    how = How(
+        align=options.align, order=options.order, reach_mm=options.reach_mm, axes=axes,
+        part_tolerance_um=options.part_tolerance_um, add_errors=options.add_errors,
+    )  # fmt: skip
     tell("pair", 0.2)
-    points = [p.points_mm for files in sets for p in files]
-    if options.add_errors:
-        points = [_with_errors(side, path, move, p, options.order, options.reach_mm) for p in points]
-    placed = runs.place(path, names, points, options.align, options.order, options.reach_mm)
-    tell("figures", 0.8)
-    findings = runs.findings(path, placed)
-    judged = placed.fitted and all(placed.right) and bool(placed.runs[0].counted.any())
-    absorbed = _absorbed(side, path, move, placed, axes) if judged else None
-    if absorbed is not None:
-        findings += runs.absorbed_finding(*absorbed)
-    report = _head(side, sets, options) | _placed_report(path, placed, absorbed, axes, options)
-    count = len(sets[0])
-    groups = {"after": placed.runs[:count], "before": placed.runs[count:]}
-    right = {"after": placed.right[:count], "before": placed.right[count:]}
-    for name, members in groups.items():
-        if members:
-            report[name] = parts.group(path, members, right[name])
-    if side.program is not None and all(right["after"]):
-        worst = report["after"].get("worst") or []
-        report["worst"] = [row | {"text": side.program.text(row["line"])} for row in worst]
-    findings += parts.verdict(report, options.part_tolerance_um)
-    findings += parts.cycles(groups)
+    done = judged(ground, sets[0], how, sets[1])
+    findings = [*done.findings]
     if side.loaded is not None:
         days = side.loaded.setup.machine.sanity.calibration_days
         doubts = calibration_findings(side.loaded.calibration, options.date, days)
         findings += with_accepted(doubts, acceptable(options.accept), refuse=False)
-    after, before = groups["after"], groups["before"]
-    return Comparison(_with(report, findings), tuple(findings), sets[0][0].profile, path, after, before)
+    report = _head(side, sets, options) | _judged_report(side, ground, done, axes, options)
+    after, before = done.groups["after"], done.groups.get("before", ())
+    return Comparison(
+        _with(report, findings), tuple(findings), sets[0][0].profile, ground.path, after, before
+    )
 
 
-def _placed_report(
-    path: Path, placed: runs.Placed, absorbed: tuple[float, float, str] | None, axes: bool,
-    options: CompareOptions,
-) -> dict[str, Any]:  # fmt: skip
-    frame = parts.frame(placed)
-    if absorbed is not None:
-        frame |= {"error_rms_um": absorbed[0], "left_by_fit_rms_um": absorbed[1], "error_is": absorbed[2]}
-    return {
+def _judged_report(
+    side: _Side, ground: Ground, done: Judged, axes: bool, options: CompareOptions
+) -> dict[str, Any]:
+    path, frame = ground.path, parts.frame(done.placed)
+    if done.absorbed is not None:
+        error, rest, whose = done.absorbed
+        frame |= {"error_rms_um": error, "left_by_fit_rms_um": rest, "error_is": whose}
+    report: dict[str, Any] = {
         "frame": frame,
         "path": {
             "length_mm": path.length_mm,
             "segments": len(path),
             "cutting_mm": float(np.diff(path.s_mm)[path.cutting].sum()),
+            "points": len(path.stops),
             "compared_in": "axis positions" if axes else "the program's frame",
             "machine_errors_added": options.add_errors,
         },
+        **done.figures,
+        "judgement": done.layers["after"].report(),
+        "verdict": done.verdict,
     }
+    if options.part_tolerance_um is not None:
+        report["holds"] = done.verdict["ok"]
+    worst = done.figures["after"].get("worst")
+    if side.program is not None and worst is not None:
+        report["worst"] = [row | {"text": side.program.text(row["line"])} for row in worst]
+    return report
 
 
 def _with(report: dict[str, Any], findings: Sequence[Finding]) -> dict[str, Any]:
     return report | {"findings": [f.as_dict() for f in findings]}
 
 
-def _nominal_side(nominal: Source, session: Session | None, contour: bool) -> _Side:
+def _nominal_side(nominal: Source, session: Session | None, options: CompareOptions) -> _Side:
+    """A table of points is a path, or poses; with a machine whose dialect has points, it is a program."""
     nominal.load()
     name, data = nominal.name, nominal.data
-    if layout_of(data) is not None:
-        loaded = None if session is None else session.loaded("hold")
-        return _Side(nominal, parse_points(data, name or "<stdin>"), None, loaded)
-    if session is None:
+    points = layout_of(data) is not None
+    if session is None and not points:
         raise UsageError(
             f"{name or 'the nominal path'} is not a table of points, and a program needs its machine; "
             "name the machine file with -m, or a job with -j"
         )
     with nominal.errors("<stdin>"):
-        loaded = session.loaded("hold").reading(nominal)
-        program = read(data, loaded.setup, loaded.dialect, Options(contour=contour))
+        loaded = None if session is None else session.loaded("hold").reading(nominal)
+    if loaded is None or (points and (options.poses or not loaded.dialect.points)):
+        return _Side(nominal, parse_points(data, name or "<stdin>"), None, loaded)
+    with nominal.errors("<stdin>"):
+        program = read(data, loaded.setup, loaded.dialect, Options(contour=options.contour))
     return _Side(nominal, None, program, loaded)
 
 
@@ -267,22 +265,20 @@ def _positions(sets: Sequence[Sequence[Points]]) -> Literal["tip", "axes"]:
     return kinds.pop()
 
 
-def _nominal(side: _Side, axes: bool) -> tuple[Path, Index | None]:
+def _ground(side: _Side, axes: bool) -> Ground:
     if side.points is not None:
-        return Path.through(side.points.points_mm, side.points.line), None
+        return Ground.of_points(side.points)
     assert side.program is not None and side.loaded is not None
-    nominal: Nominal = nominal_of(side.program.toolpath, side.loaded.model, "axes" if axes else "tip")
-    return nominal.path, nominal.move
+    return Ground.of_program(side.program, side.loaded, axes=axes)
 
 
-def _same_frame(side: _Side, sets: Sequence[Sequence[Points]], axes: bool) -> None:
-    """Raise InputError where files state different frames."""
+def _same_frame(side: _Side, sets: Sequence[Sequence[Points]]) -> None:
+    """Raise InputError where files state different frames, and no machine says how they lie."""
+    if side.points is None:
+        return
     stated = {p.frame: p.file for files in sets for p in files if p.frame}
-    if side.points is not None and side.points.frame:
+    if side.points.frame:
         stated.setdefault(side.points.frame, side.points.file)
-    if side.program is not None and len(side.program.toolpath) and not axes:
-        path = side.program.toolpath
-        stated.setdefault(path.frames[int(path.frame[0])].work_offset, side.source.name)
     if len(stated) > 1:
         (a, file_a), (b, file_b) = list(stated.items())[:2]
         raise InputError(
@@ -290,51 +286,6 @@ def _same_frame(side: _Side, sets: Sequence[Sequence[Points]], axes: bool) -> No
             "remove the statement and fit them with --align fit",
             file=file_a,
         )
-
-
-def _names(files: Sequence[str]) -> list[str]:
-    short = [FilePath(f).name for f in files]
-    return [s if short.count(s) == 1 else f for s, f in zip(short, files, strict=True)]
-
-
-def _with_errors(
-    side: _Side, path: Path, move: Index | None, points: Array, order: Order | None, reach_mm: float
-) -> Array:
-    """Axis positions plus the error of the calibrated machine, with the tool vector: tip positions."""
-    assert side.program is not None and side.loaded is not None and move is not None
-    tool = side.program.toolpath.tool_mm()
-    model = side.loaded.model
-    if tool.ndim == 2:
-        first = runs.place(path, [""], [points], "none", order, reach_mm).runs[0]
-        tool = tool[move[first.pairing.segment]]
-    return np.asarray(points + model.error(points, tool), float)
-
-
-def _absorbed(
-    side: _Side, path: Path, move: Index | None, placed: runs.Placed, axes: bool
-) -> tuple[float, float, str] | None:
-    """The error that is absorbed by the fit: rms in um across the path before and after the fit, and which
-    error; None where that is not known."""
-    run, rigid = placed.runs[0], placed.rigid[0]
-    moved = float(np.abs(rigid.inverse()(run.points_mm) - run.points_mm).max())
-    if moved < 1.0:  # probably stated in the nominal frame already
-        return *runs.absorbed(path, run, rigid), "as measured"
-    if side.program is None or side.loaded is None or move is None:
-        return None
-    toolpath = side.program.toolpath
-    tool = toolpath.tool_mm()
-    which = move[run.pairing.segment]
-    position_mm = run.pairing.foot_mm
-    if not axes:
-        nominal = nominal_of(toolpath, side.loaded.model, "axes")
-        share = (run.pairing.s_mm - path.s_mm[run.pairing.segment]) / np.diff(path.s_mm)[run.pairing.segment]
-        if len(nominal.path) != len(path):
-            return None
-        begin = nominal.path.vertex_mm[run.pairing.segment]
-        position_mm = begin + share[:, None] * (nominal.path.vertex_mm[run.pairing.segment + 1] - begin)
-    error = side.loaded.model.error(position_mm, tool if tool.ndim == 1 else tool[which])
-    whose = "that the calibration predicts for the uncompensated machine"
-    return *runs.absorbed_of_field(path, run, error), whose
 
 
 def _head(side: _Side, sets: Sequence[Sequence[Points]], options: CompareOptions) -> dict[str, Any]:

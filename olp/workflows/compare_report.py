@@ -14,9 +14,10 @@ from olp.core.units import UM_PER_MM
 from olp.files.points import Points
 from olp.findings.catalogue import Finding
 from olp.proof import judgement
+from olp.proof.measured import Measured
 from olp.workflows.session import Loaded
 
-#: Number of lines with the largest deviations in a report.
+#: Most lines of a finding.
 _WORST = 10
 
 
@@ -59,8 +60,11 @@ def frame(placed: runs.Placed) -> dict[str, Any]:
     }
 
 
-def group(path: Path, members: Sequence[figures.Run], right: Sequence[bool]) -> dict[str, Any]:
-    """Figures of the runs of a group, of each and of all; None for a run whose pairing is wrong."""
+def group(
+    path: Path, members: Sequence[figures.Run], right: Sequence[bool], layer: Measured
+) -> dict[str, Any]:
+    """Figures of the runs of a group, of each and of all; None for a run whose pairing is wrong. `layer` is
+    that of the table."""
     rows: list[dict[str, Any]] = [
         run.figures(path) if good else {"name": run.name, "points": len(run.points_mm), "across_um": None}
         for run, good in zip(members, right, strict=True)
@@ -71,17 +75,12 @@ def group(path: Path, members: Sequence[figures.Run], right: Sequence[bool]) -> 
     sizes: list[dict[str, float]] = [row["across_um"] for row in rows if row["across_um"]]
     if sizes:
         report["across_um"] = {
-            "max": max(s["max"] for s in sizes),
+            "max": layer.largest_um(),
             "rms": float(np.sqrt(np.mean([s["rms"] ** 2 for s in sizes]))),
             "mean": float(np.mean([s["mean"] for s in sizes])),
             "q95": max(s["q95"] for s in sizes),
         }
-    worst: dict[int, float] = {}
-    for run in members:
-        for line, size in run.largest_by_line(path).items():
-            worst[line] = max(worst.get(line, 0.0), size)
-    top = sorted(worst.items(), key=lambda item: (-item[1], item[0]))[:_WORST]
-    report["worst"] = [{"line": line, "max_um": size} for line, size in top]
+    report["worst"] = layer.worst()
     return report
 
 
@@ -97,22 +96,21 @@ def _iso_9283(path: Path, members: Sequence[figures.Run]) -> dict[str, Any]:
     return report
 
 
-def verdict(report: dict[str, Any], tolerance_um: float | None) -> list[Finding]:
-    """The finding where the measured path is not within tolerance; sets `verdict`, and `holds` where a
-    tolerance is stated."""
-    size = (report["after"].get("across_um") or {}).get("max")
-    report["verdict"] = judgement.measured(size, tolerance_um)
-    if tolerance_um is None:
-        return []
-    report["holds"] = report["verdict"]["ok"]
-    if size is None:
-        message = f"no measured point of a cutting move counts, so {tolerance_um:g} um cannot be verified"
-        return [Finding("OLP609", message)]
-    if report["verdict"]["ok"]:
-        return []
-    lines = tuple(row["line"] for row in report["after"]["worst"] if row["max_um"] > tolerance_um)
-    message = f"{size:.2f} um off the nominal path, {tolerance_um:g} um allowed"
-    return [Finding("OLP609", message, lines[0], lines, len(lines))]
+def verdict(layer: Measured) -> tuple[dict[str, Any], list[Finding]]:
+    """The verdict on measured runs, and the finding where they are not within the part tolerance."""
+    sizes = [(name, layer.largest_um(k)) for k, name in enumerate(layer.names)]
+    result = judgement.measured(sizes, layer.tolerance_um)
+    found = []
+    lines = tuple(layer.lines_over())
+    if lines:
+        message = f"{layer.largest_um():.2f} um off the nominal path, {layer.tolerance_um:g} um allowed"
+        found.append(Finding("OLP609", message, lines[0], lines[:_WORST], len(lines)))
+    missing = result["measured"]["not_verified"]
+    if missing and layer.tolerance_um is not None:
+        names = ", ".join(missing)
+        message = f"no measured point of {names} counts, so {layer.tolerance_um:g} um cannot be verified"
+        found.append(Finding("OLP609", message))
+    return result, found
 
 
 def cycles(groups: Mapping[str, Sequence[figures.Run]]) -> list[Finding]:

@@ -26,7 +26,7 @@ from olp.program.registry import Options, read
 from olp.proof.judgement import Judgements
 from olp.uncertainty.spread import Confidence
 from olp.workflows.doubt import accepted_of, doubted
-from olp.workflows.flatten import unrolled
+from olp.workflows.flatten import as_asked
 from olp.workflows.proof import Pair, ProofOptions, Run, limits_of, proved
 from olp.workflows.session import Loaded, Outside, PathLike, Session, opened
 
@@ -121,12 +121,7 @@ def corrected(
     at its face. Without `refuse_doubts` they are findings alone. Raises as `correct`."""
     _refuse_stamped(program.data)
     loaded = loaded.reading(program)
-    data = program.data
-    if options.flatten or options.expand_cycles:
-        data = unrolled(
-            sources, program, loaded.setup, loaded.dialect, expand_cycles=options.expand_cycles,
-            peck_clearance_mm=options.peck_clearance_mm,
-        )  # fmt: skip
+    data = as_asked(sources, program, loaded.setup, loaded.dialect, options).data
     done = _rewritten(data, program.name, loaded, options, refuse_doubts, tell)
     tell("prove", 0.7)
     reading = Options(contour=options.contour)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Protocol
 
 from olp.core.errors import UsageError
 from olp.core.machine import Setup
@@ -24,6 +25,30 @@ def flatten(
     with source.errors("<program>"):
         setup, dialect = session.reading(source)
         return unrolled(session.sources, source, setup, dialect, expand_cycles=expand_cycles)
+
+
+class Unrolling(Protocol):
+    """The options of a verb that may unroll a program first."""
+
+    @property
+    def flatten(self) -> bool: ...
+    @property
+    def expand_cycles(self) -> bool: ...
+    @property
+    def peck_clearance_mm(self) -> float | None: ...
+
+
+def as_asked(
+    sources: Sources, program: Source, setup: Setup, dialect: Dialect, options: Unrolling
+) -> Source:
+    """The program, unrolled where the options ask for it. Raises as `unrolled`."""
+    if not (options.flatten or options.expand_cycles):
+        return program
+    text = unrolled(
+        sources, program, setup, dialect, expand_cycles=options.expand_cycles,
+        peck_clearance_mm=options.peck_clearance_mm,
+    )  # fmt: skip
+    return program.holding(text)
 
 
 def unrolled(

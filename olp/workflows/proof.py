@@ -158,7 +158,8 @@ def proved(
         *(assessment[2] if assessment else ()),
         *findings_of_model(first.toolpath, loaded, tolerance_mm),
     )
-    report = report_of(first, (pair.data, pair.name), loaded, proof, findings, options.tolerance_um)
+    source = pair.data, pair.name
+    report = report_of(first, source, loaded, proof, table, findings, options.tolerance_um)
     report["corrected"] = {"sha256": hashlib.sha256(pair.text).hexdigest(), "lines": pair.text.count(b"\n")}
     report["largest_correction_um"] = largest_mm * UM_PER_MM
     if assessment:
@@ -233,6 +234,7 @@ def report_of(
     source: tuple[bytes, str],
     loaded: Loaded,
     proof: Proof,
+    table: Judgements,
     findings: tuple[Finding, ...],
     tolerance_um: float,
 ) -> dict[str, Any]:
@@ -260,7 +262,7 @@ def report_of(
         "budget_um": _budget(bend, proof, program, loaded),
         "orientation": checks.orientation(program.toolpath, loaded.model),
         "sources": checks.sources(program.toolpath, loaded.model),
-        "worst": checks.worst_blocks(program, proof),
+        "worst": checks.worst_blocks(program, table),
         "accepted": accepted_of(findings),
         "findings": [f.as_dict() for f in findings],
         "proves": list(_PROVES),

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import datetime
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -14,8 +15,9 @@ from olp.core.arrays import Array
 from olp.core.machine import Setup
 from olp.files.sources import Source
 from olp.findings.catalogue import Finding
+from olp.program.program import Program
 from olp.program.registry import Options, read
-from olp.workflows.doubt import doubted
+from olp.workflows.doubt import accepted_of, doubted
 from olp.workflows.session import Loaded, Outside, PathLike, Session, opened
 
 
@@ -33,11 +35,13 @@ class SimulateOptions:
 @dataclass(frozen=True, slots=True, eq=False)
 class Simulation:
     """(n, 3) tip positions of the machine with its errors, in the program's first work frame, and the line of
-    each; the findings are doubts about the inputs."""
+    each; the findings are doubts about the inputs. The report ("olp-simulation-1") is a mapping; it judges
+    nothing, as only one program is known."""
 
     points_mm: Array
     line: Array
     frame: str
+    report: dict[str, Any]
     findings: tuple[Finding, ...] = ()
 
     def to_csv(self) -> bytes:
@@ -92,7 +96,9 @@ def simulated(program: Source, loaded: Loaded, options: SimulateOptions) -> Simu
         path = parsed.toolpath
         shift = zero_shifts(path.frames, loaded.model)
     if not len(path):
-        return Simulation(np.zeros((0, 3)), np.zeros(0), "", doubts)
+        points_mm = np.zeros((0, 3))
+        report = _report(program, parsed, loaded, options, points_mm, "", doubts)
+        return Simulation(points_mm, np.zeros(0), "", report, doubts)
     actual, move = Tracer.trace(path, loaded.model, options.step_mm)
     home = path.frames[int(path.frame[0])]
     lengths = path.per_frame([f.length_mm for f in path.frames])
@@ -100,4 +106,29 @@ def simulated(program: Source, loaded: Loaded, options: SimulateOptions) -> Simu
     actual = home.tip_mm(tip)
     known = np.isfinite(actual).all(axis=1)
     line = path.line[move[known]].astype(np.float64)
-    return Simulation(actual[known], line, home.work_offset, doubts)
+    report = _report(program, parsed, loaded, options, actual[known], home.work_offset, doubts)
+    return Simulation(actual[known], line, home.work_offset, report, doubts)
+
+
+def _report(
+    source: Source, program: Program, loaded: Loaded, options: SimulateOptions, points_mm: Array, frame: str,
+    findings: tuple[Finding, ...],
+) -> dict[str, Any]:  # fmt: skip
+    some = len(points_mm) > 0
+    return {
+        "schema": "olp-simulation-1",
+        "program": {
+            "name": source.short,
+            "sha256": hashlib.sha256(source.data).hexdigest(),
+            "lines": program.lines,
+            "dialect": loaded.dialect.name,
+            "moves": len(program.toolpath),
+        },
+        **loaded.heads(),
+        "frame": frame,
+        "step_mm": options.step_mm,
+        "points": len(points_mm),
+        "range_mm": [points_mm.min(axis=0).tolist(), points_mm.max(axis=0).tolist()] if some else None,
+        "accepted": accepted_of(findings),
+        "findings": [finding.as_dict() for finding in findings],
+    }

@@ -15,15 +15,19 @@ from olp.program.program import Program
 from olp.program.registry import Options, read
 from olp.proof.judgement import Judgements
 from olp.uncertainty.spread import Confidence
+from olp.workflows.flatten import as_asked
 from olp.workflows.proof import ProofOptions, verify_programs
 from olp.workflows.session import Loaded, Outside, PathLike, Session
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VerifyOptions(ProofOptions):
-    """The options of `verify`."""
+    """The options of `verify`; the nominal program is unrolled as in `correct`."""
 
     outside_box: Outside = "hold"
+    flatten: bool = False
+    expand_cycles: bool = False
+    peck_clearance_mm: float | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,6 +48,9 @@ def verify(
     *,
     tolerance_um: float = 1.0,
     outside_box: Literal["refuse", "hold"] = "hold",
+    flatten: bool = False,
+    expand_cycles: bool = False,
+    peck_clearance_mm: float | None = None,
     contour: bool = False,
     part_tolerance_um: float | None = None,
     only_sure_components: bool = False,
@@ -53,13 +60,16 @@ def verify(
 ) -> Verification:
     """Compare a corrected program with the nominal one, from the two texts and the machine's files alone.
 
-    Doubts about the inputs that `accept` or the stamp of the corrected program names are no error.
-    `outside_box` is as in `correct`. Raises OutsideBox and ProgramError as that does, also
-    ProgramError where the second is not a correction of the first, Doubtful where a doubt is not accepted.
+    `flatten`, `expand_cycles` and `peck_clearance_mm` are those with which the program was corrected: the
+    nominal program is unrolled first, as there. Doubts about the inputs that `accept` or the stamp of the
+    corrected program names are no error. `outside_box` is as in `correct`. Raises OutsideBox and ProgramError
+    as that does, also ProgramError where the second is not a correction of the first, Doubtful where a doubt
+    is not accepted.
     """
     session = Session.start(machine, job)
     options = VerifyOptions(
-        tolerance_um=tolerance_um, outside_box=outside_box, contour=contour,
+        tolerance_um=tolerance_um, outside_box=outside_box, flatten=flatten, expand_cycles=expand_cycles,
+        peck_clearance_mm=peck_clearance_mm, contour=contour,
         part_tolerance_um=part_tolerance_um, only_sure_components=only_sure_components, date=date,
         accept=tuple(accept),
     )  # fmt: skip
@@ -81,6 +91,7 @@ def run(
         source.load()
     with nominal.errors():
         loaded = loaded.reading(nominal)
+        nominal = as_asked(session.sources, nominal, loaded.setup, loaded.dialect, options)
     programs = []
     for source, role in ((nominal, "<nominal>"), (corrected, "<corrected>")):
         tell("read", 0.0)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
@@ -360,3 +361,39 @@ def test_a_dialect_in_capitals_is_recognised(tmp_path: Path) -> None:
     result = run("inspect", tmp_path / "a.nc", "-m", tmp_path / "mill" / "machine.toml", "--dialect", "GRBL")
     assert result.exit_code == 2
     assert "there is no dialect 'GRBL'; did you mean grbl?" in result.stderr
+
+
+@pytest.mark.parametrize("word", ["--flatten", "--expand-cycles"])
+def test_verify_unrolls_the_nominal_program_as_correct_does(word: str, tmp_path: Path) -> None:
+    program, machine = tmp_path / "loop.ngc", PROGRAMS / "nasty" / "machine.toml"
+    program.write_text(
+        "G21 G90 G54 G64 P0.01 Q0\nG43 H1\nG0 X0 Y0 Z20\n#1 = 0\no1 while [#1 lt 3]\n"
+        "G81 X[#1 * 20] Y10 Z-5 R2 F200\nG80\n#1 = [#1 + 1]\no1 endwhile\nG1 X50 F600\nM2\n"
+    )
+    out, report = tmp_path / "out.ngc", tmp_path / "report.json"
+    corrected = ["correct", program, "-m", machine, "--flatten", word, "-q", "-o", out, "--report", report]
+    assert run(*corrected).exit_code == 0
+    call = ["verify", program, out, "-m", machine, "--json"]
+    assert run(*call).exit_code == 3
+    verified = run(*call, "--flatten", word)
+    assert verified.exit_code == 0, verified.stderr
+    stated = json.loads(report.read_text())
+    for key in ("program", "verdict", "judgement", "deviation", "worst"):
+        assert json.loads(verified.stdout)[key] == stated[key]
+    page = tmp_path / "page.html"
+    shown = ["view", program, "--corrected", out, "-m", machine, "--flatten", word, "--no-time", "-o", page]
+    assert run(*shown).exit_code == 0
+
+
+def test_simulate_reports_as_json(tmp_path: Path) -> None:
+    words = ["simulate", PROGRAMS / "nasty" / "modal.ngc", "-m", PROGRAMS / "nasty" / "machine.toml"]
+    report = json.loads(run(*words, "--json").stdout)
+    assert report["schema"] == "olp-simulation-1"
+    out = tmp_path / "tip.csv"
+    again = run(*words, "--json", "-o", out)
+    assert json.loads(again.stdout) == report
+    points = np.loadtxt(out, delimiter=",", skiprows=2)[:, :3]
+    assert report["points"] == len(points)
+    assert np.abs(np.array(report["range_mm"]) - [points.min(axis=0), points.max(axis=0)]).max() < 1e-6
+    assert run(*words).stdout == out.read_text()
+    assert run(*words, "--json", "-o", "-").exit_code == 2

@@ -94,7 +94,6 @@ def test_a_corrected_program_and_measurements_are_shown(job: Path) -> None:
     [
         (("--live", "-o", "x.html"), "--live serves files: leave out -o"),
         (("--port", "8000"), "--port is for --live"),
-        (("--corrected", "modal.ngc", "--flatten"), "leave them out, or --corrected"),
         (("--corrected", "-"), "stdin can be PROGRAM only"),
         (("--measured", "-"), "stdin can be PROGRAM only"),
         (("--step-mm", "0"), "--step-mm"),

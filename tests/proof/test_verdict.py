@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-import json
+import pkgutil
 import re
 import tomllib
+from collections.abc import Iterator
+from dataclasses import is_dataclass, replace
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from cases.consumers import Job, measured, measured_briefly, predicted
 from cli.test_cli import run
 from judge.machines import Recipe, random_machine, zero_machine
-from judge.unpacker import Page
+from judge.programs import random_program
 
 import olp
 from olp.proof.proof import Counts
@@ -33,67 +35,171 @@ def machine(folder: Path, seed: int = 4, recipe: Recipe = PLAY) -> Path:
     return random_machine(folder, seed, recipe)
 
 
-def wrapped(text: str) -> str:
-    return re.sub(r"\s+", " ", text)
-
-
 # -- the same everywhere ---------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("job", JOBS, ids=lambda job: f"{job.parent.name}/{job.name}")
-def test_every_consumer_says_the_same(job: Path, tmp_path: Path) -> None:
-    out, report = tmp_path / "out.txt", tmp_path / "report.json"
-    done = run("correct", "-j", job, "-o", out, "--report", report, "--fail-on", "never")
+def job_of(path: Path, folder: Path) -> Job:
+    return Job(path.parent / tomllib.loads(path.read_text())["program"], ("-j", path), folder)
+
+
+def simulated(job: Job, program: Path, name: str, off_um: float = 0.0) -> Path:
+    """A run of a program on the machine, shifted along the diagonal."""
+    path = job.folder / name
+    done = run("simulate", program, *job.setup, "--step-mm", "5", "-o", path, "--force", "-q")
     assert done.exit_code == 0, done.stderr
-    stated = json.loads(report.read_text())
-    verdict = stated["verdict"]
-    words = " ".join(verdict["sentences"])
-    assert verdict["numerical"]["largest_um"] == stated["deviation"]["path_max_um"]
-    assert verdict["numerical"]["holds"] is stated["deviation"]["holds"]
-    assert words in wrapped(done.stdout)
-
-    program = job.parent / tomllib.loads(job.read_text())["program"]
-    verified = json.loads(run("verify", program, out, "-j", job, "--json", "--fail-on", "never").stdout)
-    for key in ("verdict", "judgement", "deviation", "largest_correction_um", "worst"):
-        assert verified[key] == stated[key], key
-
-    for ending in (".html", ".md"):
-        shown = tmp_path / f"shown{ending}"
-        again = tmp_path / f"again{ending}.txt"
-        assert (
-            run("correct", "-j", job, "-o", again, "--report", shown, "-q", "--fail-on", "never").exit_code
-            == 0
-        )
-        assert verdict["sentences"][0] in shown.read_text().replace("\\", "")
-
-    options = ("check", "-j", job, "--fail-on", "never", "--format")
-    checked = json.loads(run(*options, "json").stdout)
-    assert checked["verdict"] == verdict
-    assert words in wrapped(run(*options, "text").stdout)
-    sarif = json.loads(run(*options, "sarif").stdout)
-    assert sarif["runs"][0]["properties"]["verdict"] == verdict
-    junit = ElementTree.fromstring(run(*options, "junit").stdout)
-    assert [p.get("value") for p in junit.iter("property")] == verdict["sentences"]
+    head, columns, *rows = path.read_text().splitlines()
+    values = np.array([row.split(",") for row in rows], float)
+    values[:, :3] += off_um * 1e-3 / np.sqrt(3.0)
+    table = [",".join(f"{v:.6f}" for v in row) for row in values.tolist()]
+    path.write_text("\n".join([head, columns, *table]) + "\n")
+    return path
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_the_page_shows_the_table(seed: int, tmp_path: Path) -> None:
-    path = machine(tmp_path / "m", seed)
-    text = HEAD + b"G0 X100 Y100 Z50\nG1 Z20 F600\nX400 Y180\nG2 X500 Y280 J100\nG1 Y150\nG0 Z50\nM2\n"
-    done = olp.correct(text, path)
-    page = Page(olp.view(text, path, correction=done, time=False).html())
-    assert page.manifest["verdict"]["ok"] is done.report["verdict"]["ok"]
-    assert page.manifest["verdict"]["text"] == " ".join(done.report["verdict"]["sentences"])
-    table = done.table.by_line()
-    rows = page.array(page.manifest["listing"]["row_nominal"]).astype(int)
-    for key, column in (("error_um", "uncorrected_um"), ("result_um", "corrected_um")):
-        shown = page.array(page.manifest["listing"][key])
-        for line, value in zip(table["line"], table[column], strict=True):
-            assert shown[rows == line][0] == pytest.approx(value, rel=2e-3, nan_ok=True)
-    state = page.array(page.manifest["listing"]["state"])
-    assert [int(state[rows == line][0]) for line in table["line"]] == table["state"].tolist()
-    largest = {s["layer"]: s["value"] for s in page.manifest["statistics"] if s["label"] == "largest"}
-    assert largest["result"] == pytest.approx(done.report["verdict"]["numerical"]["largest_um"])
+def heard(job: Job, *, plots: bool = False) -> None:
+    """All consumers of a job, also of two measured runs of it."""
+    _, out = predicted(job, plots=plots)
+    if job.unroll:
+        return
+    files = [simulated(job, out, "first.csv"), simulated(job, out, "second.csv", 7.0)]
+    measured(job, out, files, 5.0, plots=plots)
+    measured_briefly(job, out, files[:1], None)
+
+
+SHORT = ROOT / "nasty" / "job.toml"
+#: A cut and a hole.
+FEW = HEAD + b"G0 X100 Y100 Z50\nG1 X130 F600\nY110\nG0 Z60\nG81 X140 Y120 Z-60 R40 F300\nG80\nM2\n"
+TEXT = HEAD + (
+    b"G0 X100 Y100 Z50\nG1 Z20 F600\nX400 Y180\nG2 X500 Y280 J100\nG1 Y150\nG0 Z50\n"
+    b"G81 X300 Y120 Z-60 R40 F300\nX350\nG80\nG0 X100 Y100\nM2\n"
+)
+
+
+def own_job(folder: Path, text: bytes = TEXT, seed: int = 4, recipe: Recipe = PLAY) -> Job:
+    path = machine(folder / "m", seed, recipe)
+    program = folder / "part.ngc"
+    program.write_bytes(text)
+    return Job(program, ("-m", path), folder)
+
+
+def test_every_consumer_says_the_same_of_a_shipped_job(tmp_path: Path) -> None:
+    predicted(job_of(SHORT, tmp_path))
+
+
+def test_page_and_compare_say_the_same_of_two_runs(tmp_path: Path) -> None:
+    job = own_job(tmp_path, FEW)
+    out = tmp_path / "out.ngc"
+    out.write_bytes(olp.correct(job.program, **job.api).data)
+    files = [simulated(job, out, "first.csv"), simulated(job, out, "second.csv", 7.0)]
+    measured_briefly(job, out, files, 5.0)
+
+
+@pytest.mark.slow
+def test_every_consumer_says_the_same_of_holes_and_arcs(tmp_path: Path) -> None:
+    heard(own_job(tmp_path), plots=True)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("job", JOBS, ids=lambda job: f"{job.parent.name}/{job.name}")
+def test_every_consumer_says_the_same_of_every_shipped_job(job: Path, tmp_path: Path) -> None:
+    heard(job_of(job, tmp_path), plots=True)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(8))
+def test_every_consumer_says_the_same_of_random_jobs(seed: int, tmp_path: Path) -> None:
+    features = ("lines", "short", "arcs", "helix", "circle", "incremental", "cycles", "rapid", "tools")
+    text = random_program(seed, features=features, blocks=8)
+    play = {"X": 14.0, "Y": 6.0} if seed % 2 else {}
+    heard(own_job(tmp_path, text, seed, Recipe(backlash_um=play)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("unroll", [("--flatten",), ("--expand-cycles",)])
+def test_every_consumer_says_the_same_of_unrolled_programs(unroll: tuple[str, ...], tmp_path: Path) -> None:
+    job = own_job(tmp_path)
+    heard(Job(job.program, job.setup, tmp_path, unroll))
+
+
+def louder(said: Any) -> Any:
+    """Another number, another verdict."""
+    if isinstance(said, bool):
+        return not said
+    if isinstance(said, float):
+        return said + 1.0
+    if isinstance(said, bytes):
+        return louder(said.decode()).encode()
+    if isinstance(said, str):
+        return re.sub(r"\d+\.\d\d(?= um| µm)", "98.76", said)
+    if isinstance(said, dict):
+        return {key: louder(value) for key, value in said.items()}
+    if isinstance(said, list | tuple):
+        return type(said)(louder(value) for value in said)
+    if is_dataclass(said):
+        return replace(said, report=louder(said.report))  # type: ignore[type-var]
+    return [louder(value) for value in said] if isinstance(said, Iterator) else said
+
+
+def in_result(function: Any) -> Any:
+    return lambda *args, **words: louder(function(*args, **words))
+
+
+def in_lines(function: Any) -> Any:
+    return lambda scene, arrays, name, line, um: function(scene, arrays, name, line, um + 1.0)
+
+
+def in_states(function: Any) -> Any:
+    return lambda scene, arrays, name, line, state: function(scene, arrays, name, line, 1 - (state == 1))
+
+
+def in_limit(function: Any) -> Any:
+    return lambda path, runs, limit, sides: function(path, runs, limit + 1.0, sides)
+
+
+def in_points(function: Any) -> Any:
+    return lambda self: (part.replace(b",1,", b",0,") for part in function(self))
+
+
+#: Every place in which a consumer has its say, and a contradiction planted there.
+PLANTS = {
+    "report: verdict": ("olp.workflows.proof.verdict", in_result),
+    "report: worst blocks": ("olp.checks.correction.worst_blocks", in_result),
+    "report: groups": ("olp.proof.judgement.Judgements.groups", in_result),
+    "text": ("olp.reports.report._verdict", in_result),
+    "document": ("olp.reports.document.to_markdown", in_result),
+    "plots": ("olp.workflows.report._path_plots", in_limit),
+    "verify": ("olp.workflows.verify.verify_programs", in_result),
+    "check": ("olp.workflows.check._verdict", in_result),
+    "check: text": ("olp.reports.check._verdict", in_result),
+    "check: SARIF": ("olp.reports.check.FORMATS sarif", in_result),
+    "check: JUnit": ("olp.reports.check.FORMATS junit", in_result),
+    "page: verdict": ("olp.review.manifest._verdict", in_result),
+    "page: statistics": ("olp.review.manifest.statistics", in_result),
+    "page: callouts": ("olp.review.manifest.callouts", in_result),
+    "page: lines": ("olp.review.judged._line_column", in_lines),
+    "page: states": ("olp.review.judged._line_states", in_states),
+    "compare: figures": ("olp.comparison.figures.Run.figures", in_result),
+    "compare: worst lines": ("olp.proof.measured.Measured.worst", in_result),
+    "compare: groups": ("olp.proof.measured.Measured._group", in_result),
+    "compare: verdict": ("olp.proof.judgement.measured", in_result),
+    "compare: text": ("olp.reports.compare._verdict", in_result),
+    "compare: points": ("olp.workflows.compare.Comparison.to_csv", in_points),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", PLANTS)
+def test_a_planted_contradiction_is_found(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    target, plant = PLANTS[name]
+    where, _, key = target.partition(" ")
+    if key:
+        formats = pkgutil.resolve_name(where)
+        monkeypatch.setitem(formats, key, plant(formats[key]))
+    else:
+        monkeypatch.setattr(where, plant(pkgutil.resolve_name(where)))
+    with pytest.raises(AssertionError):
+        heard(own_job(tmp_path, FEW), plots=name == "plots")
 
 
 # -- what counts -----------------------------------------------------------------------------------------

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 import shutil
 import threading
@@ -330,7 +329,7 @@ def lightness(rgb: np.ndarray) -> np.ndarray:
 
 def test_colour_maps_are_even_in_lightness_and_signed_ones_symmetric(page: Any) -> None:
     def table(**scheme: Any) -> np.ndarray:
-        scheme = {"mode": "continuous", "map": "ember", "min": -1, "max": 1, "tolerance": 0.5} | scheme
+        scheme = {"mode": "continuous", "map": "ember"} | scheme
         return np.array(page.evaluate("s => Array.from(OLP.colour.table(s))", scheme)).reshape(-1, 4)[:-1, :3]
 
     for theme in ("light", "dark"):
@@ -344,27 +343,43 @@ def test_colour_maps_are_even_in_lightness_and_signed_ones_symmetric(page: Any) 
         assert (np.diff(signed[half::32]) * direction < 0).all()
         assert abs(signed[0] - signed[-1]) < 12
         assert len(np.unique(table(kind="sequential", mode="steps", theme=theme), axis=0)) == 10
-    bands = table(kind="diverging", mode="bands", theme="light")
-    value = np.linspace(-1, 1, len(bands))
-    fail = (bands == bands[0]).all(axis=1)
-    assert np.array_equal(fail, np.abs(value) > 0.5)
+    states = table(kind="sequential", mode="states", theme="light")
+    assert len(np.unique(states, axis=0)) == 2
+    assert (states[: len(states) // 2] == states[0]).all()
+    assert (states[len(states) // 2 :] == states[-1]).all()
 
 
-def test_statistics_are_those_of_the_feed_moves(page: Any, review: Review) -> None:
-    page.fill("#tolerance", "20")
-    page.press("#tolerance", "Enter")
-    feed = array(page, "rapid") == 0
-    samples = review.scene.samples
-    for layer, delta in (("uncorrected", samples.uncorrected), ("result", samples.result)):
-        size = 1e3 * np.linalg.norm(delta, axis=1)[feed]
-        summary = page.evaluate("n => olp.app.metrics.summary(olp.app.plot_metric(), n, 20)", layer)
-        truth = {
-            "largest": size.max(), "mean": size.mean(), "rms": np.sqrt((size**2).mean()), "sigma": size.std(),
-            "inside": (size <= 20).mean(),
-        }  # fmt: skip
-        assert {k: summary[k] for k in truth} == pytest.approx(truth, rel=1e-4, abs=2e-3)
+def test_statistics_are_those_of_the_proof(page: Any, review: Review) -> None:
     shown = page.locator("#statistics table").first.inner_text()
-    assert f"{1e3 * np.linalg.norm(review.scene.samples.uncorrected[feed], axis=1).max():.3g}" in shown
+    proof = review.scene.report["deviation"]
+    largest = review.scene.report["verdict"]["numerical"]["largest_um"]
+    for value in (largest, proof["before"]["between"]["rms_um"], proof["after"]["waypoints"]["max_um"]):
+        assert f"{value:.2f}" in shown
+    allowed = review.scene.report["verdict"]["numerical"]["allowed_um"]
+    assert page.inner_text("#allowed") == f"{allowed:.2f} µm, corrected"
+    page.select_option("#metric", "magnitude")
+    assert page.evaluate("olp.app.plots.deviation.limits.map(l => l.value)") == [allowed]
+
+
+def test_pass_and_fail_are_the_states_of_the_table(page: Any, review: Review) -> None:
+    page.select_option("#metric", "magnitude")
+    page.select_option("#scale-mode", "states")
+    table = review.scene.table.by_line()
+    path, samples = review.scene.nominal.toolpath, review.scene.samples
+    rapid = array(page, "rapid") != 0
+    for layer, key in (("uncorrected", "uncorrected_state"), ("result", "corrected_state")):
+        state = dict(zip(table["line"].tolist(), table[key].tolist(), strict=True))
+        truth = np.array([state[line] for line in path.line[samples.move].tolist()])
+        shown = page.evaluate(
+            "n => Array.from(olp.app.layers.get(n).values, v => Number.isNaN(v) ? null : v)", layer
+        )
+        judged = [None if r or s > 1 else s + 1 for s, r in zip(truth.tolist(), rapid.tolist(), strict=True)]
+        assert shown == judged
+    assert page.evaluate("olp.app.layers.get('corrected').values") is None
+    assert page.evaluate("document.getElementById('legend-title').textContent") == "line"
+    # what the table does not judge has no pass and no fail
+    page.select_option("#metric", "z")
+    assert page.evaluate("olp.app.scale.scheme.mode") == "continuous"
 
 
 # -- path, program and plots follow one another --------------------------------------------------------------
@@ -551,22 +566,25 @@ def test_only_the_travelled_path_on_demand(page: Any) -> None:
 # -- finding -------------------------------------------------------------------------------------------------
 
 
-def test_the_worst_points_come_in_order(page: Any, review: Review) -> None:
-    feed = array(page, "rapid") == 0
-    size = np.where(feed, np.linalg.norm(review.scene.samples.result, axis=1), 0.0)
-    rows = array(page, "line")
-    first = page.evaluate("olp.worst()")
-    assert first["value"] == pytest.approx(1e3 * size.max(), rel=1e-4, abs=2e-3)
-    assert page.evaluate("olp.state.sample") == first["sample"]
-    values = [first["value"]] + [page.evaluate("olp.worst()")["value"] for _ in range(3)]
-    assert values == sorted(values, reverse=True)
-    best = sorted((size[rows == row].max() for row in np.unique(rows)), reverse=True)
-    assert values == pytest.approx([1e3 * v for v in best[:4]], rel=1e-4, abs=2e-3)
+def test_the_worst_lines_of_the_table_come_in_order(page: Any, review: Review) -> None:
+    table = review.scene.table.by_line()
+    size = np.where(table["state"] == 2, 0.0, np.nan_to_num(table["corrected_um"]))
+    order = np.lexsort((table["line"], -np.round(size, 2)))
+    found = [page.evaluate("olp.worst()") for _ in range(4)]
+    assert [f["value"] for f in found] == pytest.approx(size[order[:4]].tolist(), abs=0.0051)
+    lines = [page.evaluate("row => olp.app.listing.number(row, 0)", f["row"]) for f in found]
+    assert lines == table["line"][order[:4]].tolist()
+    assert page.evaluate("olp.state.sample") == found[-1]["sample"]
+    # by whatever paths are coloured
+    page.select_option("#metric", "y")
+    assert page.evaluate("olp.worst()")["value"] == found[0]["value"]
+    page.evaluate("olp.worst()")
+    page.evaluate("olp.worst()")
     back = page.evaluate("olp.worst(-1)")
-    assert back["rank"] == 3
+    assert back["rank"] == 2
     page.click("#worst")
-    assert page.evaluate("olp.state.worst") == 3
-    assert "Worst 4 of" in page.inner_text("#toast")
+    assert page.evaluate("olp.state.worst") == 2
+    assert f"Worst 3 of {found[0]['count']}: {size[order[2]]:.2f} µm" in page.inner_text("#toast")
 
 
 def test_search_and_go_to_line(page: Any) -> None:
@@ -660,7 +678,7 @@ def test_dark_and_light(chromium: Any, file: Path) -> None:
 def test_keys(page: Any) -> None:
     page.locator("#listing").focus()
     page.keyboard.press("?")
-    assert page.is_visible("#help") and "next worst point" in page.inner_text("#help")
+    assert page.is_visible("#help") and "next worst line" in page.inner_text("#help")
     page.keyboard.press("Escape")
     assert page.is_hidden("#help")
     row = page.evaluate("olp.state.row")
@@ -840,7 +858,7 @@ def synthetic(rows: int, samples: int) -> tuple[dict[str, Any], bytes]:
         "layers": [{"name": "nominal", "label": "nominal", "delta": None, **layer},
                    {"name": "uncorrected", "label": "uncorrected", "delta": "d", **layer}],
         "metrics": [{"name": "magnitude", "label": "deviation", "unit": "um", "kind": "sequential",
-                     "of": "magnitude", "by_layer": {"uncorrected": None}, "limit": None}],
+                     "of": "magnitude", "by_layer": {"uncorrected": None}, "judged": True}],
         "listing": {"nominal": "text", "corrected": None, "row_nominal": "number", "row_corrected": None,
                     "error_um": "error", "result_um": None},
         "statistics": [], "findings": [], "callouts": [], "frame": "machine", "tool_radius_mm": 3,
@@ -918,7 +936,13 @@ def test_measured_paths_and_workpieces_stand_beside_the_rest(chromium: Any, tmp_
         page.uncheck("#layer-workpiece")
         still(page)
         assert (browser.picture(page) != before).any(axis=2).mean() > 0.05
-        assert page.evaluate("olp.worst()")["layer"] == "measured"
+        worst = page.evaluate("olp.worst()")
+        most = olp.compare(tmp_path / "part.ngc", [tmp_path / "tip.csv"], GANTRY).report["worst"][0]
+        assert (worst["layer"], worst["value"]) == ("measured", pytest.approx(most["max_um"], abs=0.0051))
+        assert page.evaluate("row => olp.app.listing.number(row, 0)", worst["row"]) == most["line"]
+        assert f"{most['max_um']:.2f}" in page.inner_text("#statistics")
+        row = f'.row[data-row="{worst["row"]}"]'
+        assert page.inner_text(row).endswith(f" → {most['max_um']:.2f}")
 
 
 def test_a_live_page_follows_its_inputs_and_keeps_its_view(chromium: Any, tmp_path: Path) -> None:
@@ -960,7 +984,6 @@ def test_shipped_jobs_open(
         still(page)
         assert colourful(browser.picture(page)) > 1000
         assert page.evaluate("olp.manifest.title") in page.title()
-        shown = json.loads(json.dumps(page.evaluate("olp.worst()")))
-        assert shown and shown["value"] > 0
+        assert page.evaluate("olp.worst()")["value"] > 0
         origin = np.array(page.evaluate("olp.manifest.origin_mm"))
         assert np.abs(array(page, "P", 3) + origin - review.scene.position_mm).max() <= 0.5e-4 * (1 + 1e-6)

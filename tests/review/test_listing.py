@@ -94,16 +94,17 @@ def test_an_inserted_block_stands_before_the_block_that_it_was_split_from(tmp_pa
     assert rows[1] == 0 or rows[0] == 0  # the stamp
 
 
-def test_largest_errors_are_those_of_the_samples_of_the_line(tmp_path: Path) -> None:
+def test_a_line_is_never_farther_off_its_path_than_its_samples_are_off_their_points(tmp_path: Path) -> None:
     machine = random_machine(tmp_path / "m", 3, Recipe())
     page = Page(olp.view(TEXT.encode(), machine, time=False).html())
     row = page.array("line").astype(int)
     for name, layer in (("error_um", "uncorrected"), ("result_um", "result")):
         size = np.linalg.norm(page.array(page.layer(layer)["delta"]), axis=1) * 1e3
         stated = page.array(page.manifest["listing"][name])
-        assert np.flatnonzero(np.isfinite(stated)).tolist() == np.unique(row).tolist()
+        # below 0: not known
+        assert np.flatnonzero(stated >= 0.0).tolist() == np.unique(row).tolist()
         for k in np.unique(row):
-            assert stated[k] == pytest.approx(size[row == k].max(), rel=2e-3, abs=1e-3)
+            assert stated[k] <= size[row == k].max() + 0.006
 
 
 # -- texts ----------------------------------------------------------------------------------------------

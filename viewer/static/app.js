@@ -183,14 +183,30 @@
       this.state.worst = -1;
       const metric = this.metrics.find(this.state.metric);
       this.metrics.keep([metric, this.plot_metric()]);
-      for (const {path, uniforms} of this.scene.lines.values()) {
-        path.values = this.metrics.values(metric, path.name);
-        uniforms.coloured.value = path.values ? 1 : 0;
-      }
-      this.paint();
       this.scale.use(metric);
       this.scene.schedule(0);
       OLP.emit("metric");
+    }
+
+    // Gives the lines the values of the metric, or with `judges` their states in the table of judgements.
+    colour_lines(judges) {
+      const metric = this.metrics.find(this.state.metric);
+      for (const {path, uniforms} of this.scene.lines.values()) {
+        path.values = judges ? this.metrics.states(path.name) : this.metrics.values(metric, path.name);
+        uniforms.coloured.value = path.values ? 1 : 0;
+      }
+      this.paint();
+      this.scene.schedule(0);
+    }
+
+    // What a deviation is judged by: of the corrected program, and of what was measured.
+    limits() {
+      return [
+        [this.manifest.tolerance_um, "corrected"],
+        [this.manifest.part_tolerance_um, "measured"],
+      ]
+        .filter(([value]) => value > 0)
+        .map(([value, label]) => ({value, label}));
     }
 
     // Without a metric layers have their own colours; with one, layers without values are grey.
@@ -237,43 +253,51 @@
       return AXES[this.state.theme][i % 3];
     }
 
-    // Layer whose largest values are listed: the last state that is shown.
+    // Layer whose values are ranked and counted: the last state that is shown.
     judged(metric) {
       const names = this.metrics.layers(metric).filter(n => this.layers.get(n).visible);
       return JUDGED.map(p => names.find(n => n.startsWith(p))).find(Boolean) ?? names[0] ?? null;
     }
 
-    // The next row by its largest value, in a circle; returns {rank, count, sample, value, layer} or null.
+    // The next line of the table of judgements by its deviation, in a circle; returns {rank, count, sample, value, layer}
+    // or null.
     worst(step = 1) {
-      const metric = this.metrics.find(this.state.metric) ?? this.plot_metric(),
-        name = this.judged(metric),
-        key = `${metric?.name} ${name}`;
-      if (!name) return null;
-      if (this.ranking?.key !== key)
-        this.ranking = {key, list: this.rank(this.metrics.values(metric, name), this.layers.get(name))};
+      const name = this.judged(this.plot_metric());
+      if (this.ranking?.name !== name) this.ranking = {name, list: this.rank(name)};
       const {list} = this.ranking;
       if (!list.length) return null;
       this.state.worst =
         this.state.worst < 0 ? (step > 0 ? 0 : list.length - 1) : (this.state.worst + step + list.length) % list.length;
-      const {sample, value} = list[this.state.worst];
+      const {row, value} = list[this.state.worst],
+        sample = this.largest_of(row, name);
       this.set_sample(sample);
-      this.select_row(this.row_at(), true);
+      this.select_row(row, true);
       this.camera.reveal(this.tool_point());
-      return {rank: this.state.worst + 1, count: list.length, sample, value, layer: name, unit: metric.unit};
+      return {rank: this.state.worst + 1, count: list.length, sample, row, value, layer: name};
     }
 
-    // Worst sample of each row, the worst row first.
-    rank(values, layer) {
-      const best = new Map();
-      for (let i = 1; i < values.length; i++) {
-        const sample = layer.index ? layer.index[i] : i,
-          size = Math.abs(values[i]);
-        if (!(size > 0)) continue;
-        const row = this.rows[sample],
-          known = best.get(row);
-        if (!known || size > known.size) best.set(row, {sample, size, value: values[i]});
+    // The rows that count, the one with the largest deviation of the layer first; measured ones count all.
+    rank(name) {
+      const own = this.manifest.listing.by_layer?.[name];
+      if (!own) return [];
+      const [um, state] = [own.um, own.state].map(n => this.arrays.get(n)),
+        rows = [];
+      for (let row = 0; row < um.length; row++)
+        if (um[row] > 0 && this.first[row] >= 0 && (state[row] < 2 || name.startsWith("measured"))) rows.push({row, value: um[row]});
+      return rows.sort((p, q) => q.value - p.value || p.row - q.row).slice(0, RANKED);
+    }
+
+    // The sample of a row where the layer is shown farthest off.
+    largest_of(row, name) {
+      const values = this.metrics.values(this.plot_metric(), name),
+        layer = this.layers.get(name);
+      let sample = this.first[row],
+        most = -1;
+      for (let i = 0; i < values.length; i++) {
+        const at = layer.index ? layer.index[i] : i;
+        if (this.rows[at] === row && values[i] > most) [sample, most] = [at, values[i]];
       }
-      return [...best.values()].sort((p, q) => q.size - p.size).slice(0, RANKED);
+      return sample;
     }
   }
 

@@ -51,8 +51,8 @@
       [0.82, 0.15, 75],
     ],
   };
-  // Okabe and Ito's blue and vermilion, with a light blue for the outer half of the tolerance.
-  const BANDS = {light: ["#0072b2", "#4fa8d8", "#d55e00"], dark: ["#3b9bd9", "#8fcdf2", "#ff7a2e"]};
+  // Okabe and Ito's blue and vermilion, for lines within and above.
+  const STATES = {light: ["#0072b2", "#d55e00"], dark: ["#3b9bd9", "#ff7a2e"]};
   const UNKNOWN = {light: "#8a94a3", dark: "#76818f"};
   const SIZE = 1024;
 
@@ -86,13 +86,9 @@
 
   const hex_rgb = text => [1, 3, 5].map(i => parseInt(text.slice(i, i + 2), 16));
 
-  // Colour of the fraction x of a scale; `scale` = {kind, mode, map, theme, min, max, tolerance}.
+  // Colour of the fraction x of a scale; `scale` = {kind, mode, map, theme}. The lower half of states is within.
   function rgb(scale, x) {
-    const value = scale.min + x * (scale.max - scale.min);
-    if (scale.mode === "bands") {
-      const share = Math.abs(value) / scale.tolerance;
-      return hex_rgb(BANDS[scale.theme][share <= 0.5 ? 0 : share <= 1 ? 1 : 2]);
-    }
+    if (scale.mode === "states") return hex_rgb(STATES[scale.theme][x < 0.5 ? 0 : 1]);
     const at = scale.mode === "steps" ? (Math.min(9, Math.floor(x * 10)) + 0.5) / 10 : x;
     if (scale.kind === "diverging") return along(DIVERGING[scale.theme], at);
     const {stops} = MAPS[scale.map];
@@ -156,6 +152,9 @@
     return (size >= 10 ** digits ? Math.round(v).toString() : String(+v.toPrecision(digits))).replace("-", "−");
   }
 
+  // A deviation in µm as every report prints it.
+  const um = v => (v === null || v === undefined || Number.isNaN(v) ? "–" : v < 0.005 ? "<0.01" : v.toFixed(2));
+
   const unit_label = unit =>
     unit === "um"
       ? "µm"
@@ -165,5 +164,5 @@
           .replace("mm/s2", "mm/s²")
           .replace("mm/s3", "mm/s³");
 
-  Object.assign(OLP, {colour: {MAPS, SIZE, rgb, table, round_up, ticks, number, unit_label, hex_rgb, readable}});
+  Object.assign(OLP, {colour: {MAPS, SIZE, rgb, table, round_up, ticks, number, um, unit_label, hex_rgb, readable}});
 })();

@@ -14,8 +14,8 @@
         [[".", "ArrowRight"], "next block", press("step-forward")],
         [["ArrowUp"], "row above", () => app.select_row(Math.max(0, app.state.row - 1))],
         [["ArrowDown"], "row below", () => app.select_row(Math.min(app.listing.n - 1, app.state.row + 1))],
-        [["w"], "next worst point", () => this.worst(1)],
-        [["W"], "previous worst point", () => this.worst(-1)],
+        [["w"], "next worst line", () => this.worst(1)],
+        [["W"], "previous worst line", () => this.worst(-1)],
         [["+", "="], "exaggerate more", () => this.exaggerate(1)],
         [["-"], "exaggerate less", () => this.exaggerate(-1)],
         [["1"], "isometric", press("view-iso")],
@@ -103,11 +103,11 @@
     worst(step) {
       const {app} = this,
         point = app.worst(step),
-        {number, unit_label} = OLP.colour;
-      if (!point) app.toast("No values to rank", 2500);
+        {um} = OLP.colour;
+      if (!point) app.toast("No lines to rank", 2500);
       else
         app.toast(
-          `Worst ${point.rank} of ${point.count}: ${number(point.value, 4)} ${unit_label(point.unit)}, ${app.layers.get(point.layer).label}, line ${app.listing.number(app.state.row, 0)}`,
+          `Worst ${point.rank} of ${point.count}: ${um(point.value)} µm, ${app.layers.get(point.layer).label}, line ${app.listing.number(point.row, 0)}`,
           4000,
         );
     }

@@ -13,7 +13,7 @@
       this.app = app;
       this.texts = [get(listing.nominal), get(listing.corrected)];
       this.numbers = [get(listing.row_nominal), get(listing.row_corrected)];
-      this.errors = [get(listing.error_um), get(listing.result_um)];
+      this.errors = [listing.error_um, listing.result_um, listing.measured_um].map(get); // below 0: not known
       this.state = get(listing.state); // of each row: 0 within, 1 above, 2 shown and not judged, 3 no move
       this.n = this.numbers[0].length;
       this.box = document.getElementById("listing");
@@ -27,6 +27,7 @@
       const digits = String(Math.max(this.texts[0].n, this.texts[1]?.n ?? 0)).length;
       document.getElementById("right").style.setProperty("--number", `${12 + 7 * Math.max(3, digits)}px`);
       this.box.classList.toggle("single", !this.texts[1]);
+      document.getElementById("right").classList.toggle("measured", Boolean(this.errors[2]));
       this.heading();
       this.listen();
       new ResizeObserver(() => this.paint()).observe(this.box);
@@ -52,9 +53,8 @@
       head.replaceChildren(
         ...titles.map(text => Object.assign(document.createElement("span"), {textContent: text, title: text})),
       );
-      head.lastChild.title = this.errors[1]
-        ? "Largest deviation of the line, uncorrected → corrected"
-        : "Largest deviation of the line";
+      const shown = ["uncorrected", "corrected", "measured"].filter((_, k) => this.errors[k]);
+      head.lastChild.title = `Largest deviation of the line, ${shown.join(" → ")}`;
     }
 
     // Line of the file at a row: side 0 nominal, 1 corrected; "" where that side has none.
@@ -68,11 +68,8 @@
     }
 
     error(row) {
-      const [before, after] = this.errors.map(e => (e ? e[row] : NaN)),
-        known = v => !Number.isNaN(v) && v !== undefined;
-      if (!known(before) && !known(after)) return "";
-      const n = v => (known(v) ? OLP.colour.number(v, v < 10 ? 2 : 3) : "–");
-      return this.errors[1] ? `${n(before)} → ${n(after)}` : n(before);
+      const values = this.errors.filter(Boolean).map(e => (e[row] >= 0 ? e[row] : NaN));
+      return values.every(Number.isNaN) ? "" : values.map(OLP.colour.um).join(" → ");
     }
 
     make_row() {

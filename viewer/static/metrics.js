@@ -31,6 +31,20 @@
       return this.known.get(key);
     }
 
+    // (n) states of a layer in the table of judgements, by the line of each sample: 1 within, 2 above, NaN for what is
+    // not judged and in rapids; null where the table has none of the layer.
+    states(name) {
+      const own = this.app.manifest.listing.by_layer?.[name],
+        layer = this.app.layers.get(name);
+      if (!own || !layer) return null;
+      const state = this.app.arrays.get(own.state),
+        {index, kind} = layer;
+      return Float32Array.from({length: layer.n}, (_, i) => {
+        const code = state[this.app.rows[index ? index[i] : i]];
+        return code > 1 || kind?.[i] ? NaN : code + 1;
+      });
+    }
+
     // Metrics other than these are dropped from memory.
     keep(metrics) {
       const names = new Set(metrics.filter(Boolean).map(m => m.name));

@@ -110,7 +110,7 @@
         theme: state.theme,
         callouts: state.callouts,
         camera: camera.save(),
-        scale: {min: scale.min, max: scale.max, mode: scale.mode, map: scale.map, tolerance: scale.tolerance},
+        scale: {min: scale.min, max: scale.max, mode: scale.mode, map: scale.map},
       };
     }
 

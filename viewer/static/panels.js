@@ -122,7 +122,7 @@
     // The file's own figures of layers: one row per label.
     packed_rows(table, names) {
       const rows = new Map(),
-        {number} = OLP.colour;
+        {um} = OLP.colour;
       for (const s of this.app.manifest.statistics ?? [])
         if (s.layer) rows.set(s.label, {...rows.get(s.label), [s.layer]: s});
       for (const [label, by] of rows) {
@@ -133,7 +133,7 @@
             {},
             make("th", {textContent: label}),
             ...names.map(n =>
-              make("td", {textContent: by[n] ? number(by[n].value) + (by[n].unit === "um" ? "" : ` ${by[n].unit ?? ""}`) : "–"}),
+              make("td", {textContent: by[n] ? um(by[n].value) : "–"}),
             ),
           ),
         );

@@ -90,14 +90,12 @@
           : this.axis;
         series.push({label: name, colour: layer.colour, x, y: app.metrics.values(metric, name)});
       }
-      const t = app.scale.tolerance,
-        limits = metric?.unit === "um" && t > 0 ? (metric.kind === "diverging" ? [t, -t] : [t]).map(value => ({value})) : [];
       this.deviation.set({
         title: metric?.label ?? "Deviation",
         unit: OLP.colour.unit_label(metric?.unit),
         x_label: this.x_label,
         series,
-        limits,
+        limits: metric?.judged ? app.limits() : [],
       });
     }
 

@@ -12,7 +12,6 @@
         max: 1,
         mode: "continuous",
         map: "ember",
-        tolerance: app.manifest.tolerance_um > 0 ? app.manifest.tolerance_um : 10,
       });
       const {manifest} = app,
         select = $("metric");
@@ -36,12 +35,10 @@
         ["scale-max", "max"],
       ])
         $(id).onchange = e => this.edit(end, e.target.value);
-      $("tolerance").onchange = e => {
-        const value = OLP.parse(e.target.value);
-        if (value > 0) this.tolerance = value;
-        this.apply();
-        OLP.emit("metric");
-      };
+      $("allowed").textContent = app
+        .limits()
+        .map(({value, label}) => `${OLP.colour.um(value)} µm, ${label}`)
+        .join("; ");
       $("exaggeration").onchange = e => app.set_exaggeration(OLP.parse(e.target.value));
       $("exaggeration-slider").oninput = e => app.set_exaggeration(+(10 ** +e.target.value).toPrecision(2));
       OLP.on("exaggeration", () => {
@@ -74,6 +71,11 @@
       return this.metric?.kind ?? "sequential";
     }
 
+    // Whether colours are the states of the table: its verdict, which this page does not compute.
+    get judges() {
+      return this.mode === "states" && Boolean(this.metric?.judged);
+    }
+
     // A round number that no value of a feed move on the metric's layers exceeds.
     automatic() {
       if (!this.metric) return;
@@ -101,27 +103,26 @@
     }
 
     apply() {
-      const {app} = this,
-        bands = this.mode === "bands" && this.metric?.unit === "um";
+      const {app, judges} = this;
       this.scheme = {
         kind: this.kind,
-        mode: this.mode === "bands" && !bands ? "continuous" : this.mode,
+        mode: this.mode === "states" && !judges ? "continuous" : this.mode,
         map: this.map,
         theme: app.state.theme,
         min: this.min,
         max: this.max,
-        tolerance: this.tolerance,
       };
-      app.scene.set_uniform("low", this.min);
-      app.scene.set_uniform("high", this.max);
+      app.colour_lines(judges);
+      // states are 1 and 2
+      app.scene.set_uniform("low", judges ? 0.5 : this.min);
+      app.scene.set_uniform("high", judges ? 2.5 : this.max);
       app.scene.set_colours(OLP.colour.table(this.scheme));
       const text = v => String(+v.toPrecision(6));
       $("scale-min").value = text(this.min);
       $("scale-max").value = text(this.max);
-      $("tolerance").value = text(this.tolerance);
       $("scale-mode").value = this.mode;
       $("map").value = this.map;
-      $("map").disabled = this.kind === "diverging" || this.scheme.mode === "bands";
+      $("map").disabled = this.kind === "diverging" || judges;
       for (const id of ["scale-min", "scale-max", "scale-auto", "scale-mode"]) $(id).disabled = !this.metric;
       this.draw();
     }
@@ -152,7 +153,7 @@
         w = canvas.clientWidth,
         h = canvas.clientHeight,
         c = canvas.getContext("2d");
-      $("legend-title").textContent = `${this.metric.label}${unit ? ", " + unit : ""}`;
+      $("legend-title").textContent = this.judges ? "line" : `${this.metric.label}${unit ? ", " + unit : ""}`;
       Object.assign(canvas, {width: Math.round(w * ratio), height: Math.round(h * ratio)});
       c.setTransform(ratio, 0, 0, ratio, 0, 0);
       const style = getComputedStyle(document.documentElement),
@@ -162,6 +163,10 @@
       for (let y = 0; y < bar.h; y++) {
         c.fillStyle = `rgb(${colour.rgb(this.scheme, 1 - (y + 0.5) / bar.h).map(Math.round)})`;
         c.fillRect(bar.x, bar.y + y, bar.w, 1.5);
+      }
+      if (this.judges) {
+        this.draw_states(c, bar, ink);
+        return;
       }
       c.fillStyle = style.getPropertyValue("--soft").trim();
       this.histogram().forEach((share, i) => {
@@ -174,12 +179,18 @@
         c.fillRect(bar.x + bar.w, Math.round(y_of(v)), 4, 1);
         c.fillText(colour.number(v, 4), bar.x + bar.w + 8, y_of(v));
       }
-      if (this.metric.unit !== "um") return;
-      for (const v of [this.tolerance, -this.tolerance]) {
-        if (v < this.min || v > this.max || (v < 0 && this.kind !== "diverging")) continue;
+      if (!this.metric.judged) return;
+      for (const {value} of this.app.limits()) {
+        if (value < this.min || value > this.max) continue;
         c.lineWidth = 2;
-        c.strokeRect(bar.x - 2, Math.round(y_of(v)), bar.w + 4, 0.5);
+        c.strokeRect(bar.x - 2, Math.round(y_of(value)), bar.w + 4, 0.5);
       }
+    }
+
+    draw_states(c, bar, ink) {
+      Object.assign(c, {fillStyle: ink, textBaseline: "middle"});
+      c.fillText("above", bar.x + bar.w + 8, bar.y + bar.h / 4);
+      c.fillText("within", bar.x + bar.w + 8, bar.y + (3 * bar.h) / 4);
     }
   }
 

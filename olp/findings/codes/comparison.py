@@ -33,7 +33,8 @@ RULES = (
         "OLP603",
         "part of the path not measured",
         Severity.WARNING,
-        "A section of the cutting path has no measured points. The figures do not cover it.",
+        "A section of the cutting path has no measured points, or points that count were not measured, or a "
+        "run has no point that counts. The figures do not cover it.",
         "Measure it, or compare with a program that ends where the measurement does.",
         "The tracker lost its target between lines 210 and 260.",
     ),
@@ -88,7 +89,8 @@ RULES = (
         "measured path above tolerance",
         Severity.ERROR,
         "The measured path deviates from the nominal one by more than --part-tolerance-um, or "
-        "part_tolerance_um of the job.",
+        "part_tolerance_um of the job. It is also an error where a run has no point that counts, so that the "
+        "tolerance cannot be verified.",
         "Look at the worst lines. With --before, the table shows what the correction gained.",
         "12 um at line 340 with `--part-tolerance-um 5`.",
     ),

@@ -42,7 +42,7 @@ def picture(path: Path, runs: Runs, sides: Mapping[str, str]) -> bytes:
 
         names = [name for name in ("before", "after") if runs.get(name)]
         plots = figure.subplots(1, len(names), squeeze=False)[0]
-        sizes = [run.deviation.across[run.counted] * UM_PER_MM for name in names for run in runs[name]]
+        sizes = [run.size_mm[run.counted] * UM_PER_MM for name in names for run in runs[name]]
         top = max((float(size.max()) for size in sizes if len(size)), default=1.0)
         norm = LogNorm(max(top / 300.0, _FLOOR_UM), max(top, 10 * _FLOOR_UM))
         pieces = None
@@ -86,7 +86,7 @@ def _nominal(plot: Axes, path: Path) -> None:
 def _sampled(run: Run) -> tuple[Array, Array]:
     rows = np.flatnonzero(run.counted)
     rows = rows[:: max(len(rows) // _DRAWN, 1)]
-    return run.pairing.foot_mm[rows][:, :2], run.deviation.across[rows] * UM_PER_MM
+    return run.nominal_mm[rows][:, :2], run.size_mm[rows] * UM_PER_MM
 
 
 def along(path: Path, runs: Runs, tolerance_um: float | None, sides: Mapping[str, str]) -> bytes:
@@ -102,7 +102,7 @@ def along(path: Path, runs: Runs, tolerance_um: float | None, sides: Mapping[str
             low, high = np.full(_COLUMNS, np.inf), np.full(_COLUMNS, -np.inf)
             for run in group:
                 column = np.clip(np.searchsorted(edges, run.pairing.s_mm[run.counted]) - 1, 0, _COLUMNS - 1)
-                size = run.deviation.across[run.counted] * UM_PER_MM
+                size = run.size_mm[run.counted] * UM_PER_MM
                 np.minimum.at(low, column, size)
                 np.maximum.at(high, column, size)
             filled = np.isfinite(low)
@@ -133,7 +133,7 @@ def histogram(runs: Runs, tolerance_um: float | None, sides: Mapping[str, str]) 
     def draw(figure: Figure) -> None:
         plot = figure.subplots()
         sizes = {
-            name: np.concatenate([run.deviation.across[run.counted] * UM_PER_MM for run in group])
+            name: np.concatenate([run.size_mm[run.counted] * UM_PER_MM for run in group])
             for name, group in runs.items()
             if any(run.counted.any() for run in group)
         }
