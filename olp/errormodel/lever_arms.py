@@ -31,7 +31,7 @@ CROSS = ((0, 1, 2, 1.0), (0, 2, 1, -1.0), (1, 2, 0, 1.0), (1, 0, 2, -1.0), (2, 0
 
 class Measured(Protocol):
     """What was measured of one axis: names of components, the axes by whose position they are tabled, and
-    where the others stood and with what tool."""
+    the positions of the others, and with what tool."""
 
     @property
     def names(self) -> tuple[str, ...]: ...
@@ -106,8 +106,8 @@ def lever_arms_of(
             carried = AXES[k] in after or (own and carries)
             moves[k] = carried and (on_table or AXES[k] not in arguments)
             line = None if source is None or on_table else source.line_mm
-            stood_mm = (datum_mm if line is None else line)[k] if moves[k] else 0.0
-            offset[k] = stood_mm + tool
+            position_mm = (datum_mm if line is None else line)[k] if moves[k] else 0.0
+            offset[k] = position_mm + tool
         return LeverArm((moves[0], moves[1], moves[2]), (offset[0], offset[1], offset[2]))
 
     rows: dict[LeverArm, list[int]] = {}

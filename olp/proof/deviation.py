@@ -74,8 +74,8 @@ def measure(
 def _from_unknown(
     nominal: Toolpath, target: Array, path: Toolpath, groups: Index, model: ErrorModel, worst: Single
 ) -> None:
-    """Where a feed move starts at a position of which an axis is unknown, how far the tip may be off there in
-    the others: the largest over the box of the unknown axis, whatever the play."""
+    """A feed move may start where an axis is unknown. How far the tip may be off there in the others: the
+    largest over the box of the unknown axis, whatever the play."""
     start = nominal.starts_mm()
     has_play = model.backlash_at(np.array(model.box_mm).mean(axis=1)[None]) is not None
     sides = [np.array(side) for side in product((-1.0, 1.0), repeat=3)] if has_play else [None]

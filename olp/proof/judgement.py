@@ -183,10 +183,10 @@ def verdict(
     table: Judgements, part_tolerance_um: float | None, uncertainty: dict[str, Any] | None,
     findings: Iterable[Finding],
 ) -> dict[str, Any]:  # fmt: skip
-    """The verdict on a proved program: does the written program do what the model asks (`numerical`), is the
-    part good as far as that is known (`part`, None where no part tolerance is stated), and both in sentences.
-    `ok` is False where either fails, or another finding is an error, and None where nothing could be judged,
-    a feed move could not, or the part is good with a probability that is too low."""
+    """The verdict on a proved program, in values and in sentences. `numerical`: does the written program do
+    what the model asks. `part`: is the part good as far as that is known, None without a part tolerance.
+    `ok` is False where either fails, or another finding is an error. It is None where nothing could be
+    judged, a feed move could not, or the part is good with a probability that is too low."""
     numerical = _numerical(table)
     part = None if part_tolerance_um is None else _part(table, part_tolerance_um, uncertainty)
     errors = sorted({f.code for f in findings if f.severity >= Severity.ERROR} - _OWN)

@@ -1,8 +1,8 @@
 """How far the strokes of canned cycles are from the axis and the bottom of their holes.
 
-A corrected hole may have a peck more or less than the nominal one, so strokes are not compared one by one: a
-feed stroke anywhere in the hole counts by its distance from the axis of the hole, and the deepest one by its
-depth.
+A corrected hole may have a peck more or less than the nominal one, so strokes are not compared one by one. A
+feed stroke anywhere in the hole counts by its distance from the axis of the hole, the deepest one by its
+depth, too.
 """
 
 from __future__ import annotations

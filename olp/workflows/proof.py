@@ -64,8 +64,8 @@ class ProofOptions:
 @dataclass(frozen=True, slots=True, eq=False)
 class Run:
     """A correction, or a verification of one: the corrected text and both programs as read, the proof and its
-    table of judgements, the report ("olp-report-1"), the findings, and bands and probabilities where a part
-    tolerance is stated and the calibration states uncertainties."""
+    table of judgements, the report ("olp-report-1") and the findings. `confidence` has bands and
+    probabilities where a part tolerance is stated and the calibration states uncertainties."""
 
     text: bytes
     nominal: Program

@@ -69,7 +69,8 @@ class Whole:
     """Figures in um. `certain_um` is the largest where the state of the machine is known, `possible_um` the
     largest with every side of the backlash that is possible. By nominal line, the same. `open` counts points
     of cuts with an unknown play, `left_out` those with an unknown position, `loose` cuts that start where an
-    uncorrected move ended."""
+    uncorrected move ended. Of what was judged, `lines`, `arcs` and `holes` count nominal ones, and `inserted`
+    the moves of the corrected program that end within a nominal cut."""
 
     certain_um: float
     possible_um: float
@@ -79,6 +80,10 @@ class Whole:
     open: int
     left_out: int
     loose: int
+    lines: int
+    arcs: int
+    holes: int
+    inserted: int
     #: nominal line that ends with each line of the corrected program
     owners: dict[int, int]
 
@@ -111,7 +116,7 @@ def judge_whole(
     holes, other = _runs(moves, said.cycles), _runs(own, written.cycles)
     if len(holes) != len(other):
         holes, other = [], []
-    result = _Sum(moves.line)
+    result = _Sum(moves)
     owner = np.full(len(own), -1)
     ends = real.middle[real.dense.last]
     for (a, b), (c, d) in zip(_between(holes, len(moves)), _between(other, len(own)), strict=True):
@@ -147,11 +152,16 @@ def _forget_changes(moves: CanonMoves, changes: frozenset[int]) -> CanonMoves:
     """All axes are unknown after a tool change until the program moves them, even where the tool stays."""
     known = moves.known.copy()
     for change in _first_after(moves, changes):
-        if change:
-            away = np.abs(moves.axis[change:] - moves.axis[change - 1]) > 1e-9
-            known[change:] &= np.logical_or.accumulate(away, axis=0)
-            known[change - 1] = False
+        away = np.abs(moves.axis[change:] - moves.begin[change]) > 1e-9
+        known[change:] &= np.logical_or.accumulate(away, axis=0)
     return replace(moves, known=known)
+
+
+def _known_before(moves: CanonMoves, changes: frozenset[int]) -> np.ndarray:
+    """(n, 3) axes known where each move begins: as the move before ended, but none after a tool change."""
+    before = np.vstack([np.full((1, 3), moves.start_known), moves.known])[: len(moves)]
+    before[_first_after(moves, changes)] = False
+    return np.asarray(before)
 
 
 def _forget_homes(moves: CanonMoves, homes: frozenset[int]) -> CanonMoves:
@@ -185,7 +195,7 @@ class _Tips:
     def of(cls, moves: CanonMoves, model: JudgeModel, spacing_mm: float, changes: frozenset[int]) -> _Tips:
         dense = densify(moves, spacing_mm)
         known = dense.moves.known
-        before = np.vstack([np.full((1, 3), moves.start_known), known[:-1]])
+        before = _known_before(dense.moves, changes)
         settled = (known & before)[dense.move] | (known[dense.move] & dense.last[:, None])
         after = np.isin(dense.move, _first_after(moves, changes))
         first = after & np.concatenate([[True], np.diff(dense.move) != 0])
@@ -238,8 +248,10 @@ def _sides(
 class _Sum:
     """Collects distances by nominal line."""
 
-    def __init__(self, lines: np.ndarray) -> None:
-        self.lines = lines
+    def __init__(self, moves: CanonMoves) -> None:
+        self.lines, self.kind = moves.line, moves.kind
+        self.cuts: set[int] = set()
+        self.holes = self.inserted = 0
         self.certain: dict[int, float] = {}
         self.possible: dict[int, float] = {}
         self.judged = self.open = self.left_out = 0
@@ -257,9 +269,11 @@ class _Sum:
 
     def done(self, loose: int, owners: dict[int, int]) -> Whole:
         largest = (max(values.values(), default=0.0) for values in (self.certain, self.possible))
+        arcs = sum(int(self.kind[cut]) == ARC for cut in self.cuts)
         return Whole(
-            *largest, self.certain, self.possible, self.judged, self.open, self.left_out, loose, owners
-        )
+            *largest, self.certain, self.possible, self.judged, self.open, self.left_out, loose,
+            len(self.cuts) - arcs, arcs, self.holes, self.inserted, owners,
+        )  # fmt: skip
 
 
 def _runs(moves: CanonMoves, lines: frozenset[int]) -> list[tuple[int, int]]:
@@ -297,7 +311,7 @@ def _cuts(
     owner = owner_of[dense.move[rows]]
     cutting = np.isin(moves.kind, (FEED, ARC)) & ~np.isin(moves.line, list(said.left))
     known = moves.known.all(axis=1)
-    whole = known & np.concatenate([[moves.start_known], known[:-1]])
+    whole = known & _known_before(moves, said.changes).all(axis=1)
     # from another zero or another tool there is no nominal path, but an end
     whole[1:] &= (np.diff(shift, axis=0) == 0).all(axis=1) & (np.diff(moves.tool) == 0)
     counts = cutting[owner] & (dense.moves.kind[dense.move[rows]] != RAPID)
@@ -306,24 +320,30 @@ def _cuts(
     has_nominal = whole[owner] | (known[owner] & end)
     result.left_out += int((counts & ~(has_nominal & real.settled[rows])).sum())
     pick = counts & has_nominal & real.settled[rows]
+    result.inserted += int((pick & dense.last[rows] & ~end).sum())
     # a cut starts where the move before it ended
     rows = np.concatenate([rows[pick], rows[begins] - 1])
     owner = np.concatenate([owner[pick], owner[begins]])
-    rows, owner = rows[real.settled[rows]], owner[real.settled[rows]]
+    end = np.concatenate([end[pick], np.zeros(begins.sum(), bool)])
+    keep = real.settled[rows]
+    rows, owner, end = rows[keep], owner[keep], end[keep]
     if not len(rows):
         return
+    result.cuts |= set(owner.tolist())
     curves = _Curves.of(moves)
 
-    def away(tips: np.ndarray, own: np.ndarray) -> np.ndarray:
+    def away(tips: np.ndarray, own: np.ndarray, end: np.ndarray) -> np.ndarray:
         points = tips - shift[own]
-        return np.asarray(np.linalg.norm(points - curves.at(own, curves.nearest(own, points)), axis=1))
+        # the end of a cut has its own point on the path
+        share = np.where(end, 1.0, curves.nearest(own, points))
+        return np.asarray(np.linalg.norm(points - curves.at(own, share), axis=1))
 
-    certain = away(real.middle[rows], owner)
+    certain = away(real.middle[rows], owner, end)
     possible = certain.copy()
     index = np.searchsorted(real.rows, rows)
     doubtful = np.flatnonzero(np.isin(rows, real.rows))
     for corner in range(real.corners.shape[1]):
-        here = away(real.corners[index[doubtful], corner], owner[doubtful])
+        here = away(real.corners[index[doubtful], corner], owner[doubtful], end[doubtful])
         possible[doubtful] = np.maximum(possible[doubtful], here)
     certain[doubtful] = np.nan
     result.open += len(doubtful)
@@ -372,4 +392,5 @@ def _hole(
             possible = np.maximum(possible, away(tips))
         certain[doubtful] = np.nan
     result.open += len(doubtful)
+    result.holes += 1
     result.add(np.full(len(rows), deepest), certain, possible)

@@ -19,6 +19,14 @@ FEED = 1
 ARC = 2
 PROBE = 3
 DWELL = 4
+#: active modal codes are listed in tenths
+METRIC = 210
+
+
+def stand_at(library, point):
+    """Tells the library where the machine stands, a point in program units. After a tool change it goes on
+    from there. On its own it would go on from the last straight move: arcs and new offsets are forgotten."""
+    library._Z13STRAIGHT_FEEDiddddddddd(-1, *map(ctypes.c_double, (*point, *[0.0] * 6)))
 
 
 def prepare_tools(table):
@@ -45,13 +53,17 @@ def read_tools(table):
 class Canon:
     """Receives the canonical calls; points are controlled-point coordinates before the offsets."""
 
-    def __init__(self, tools):
+    def __init__(self, tools, library):
         self.tools = tools
+        self.library = library
         self.data = array("d")
         self.line, self.tool, self.plane, self.feed, self.index = 0, -1, 1, 0.0, 1
         self.g5x, self.g92, self.length = [0.0] * 3, [0.0] * 3, [0.0] * 3
         self.cos, self.sin = 1.0, 0.0
         self.position = [0.0] * 3
+        self.axis = None
+        self.unit = MM
+        self.silent = False
         self.messages = []
 
     def __getattr__(self, name):
@@ -61,7 +73,10 @@ class Canon:
         return lambda *_: None
 
     def next_line(self, state):
+        if self.silent:
+            return
         self.line = state.sequence_number
+        self.unit = MM if METRIC in state.gcodes else 1.0
 
     def set_g5x_offset(self, index, *offset):
         self.index, self.g5x = index, list(offset[:3])
@@ -84,6 +99,12 @@ class Canon:
     def change_tool(self, index):
         self.tools[0] = self.tools[index] if index > 0 else (0,) + (0.0,) * 12 + (0,)
         self.tool = self.tools[0][0]
+        if self.axis is None:
+            return
+        self.silent = True
+        point = [a / MM - length for a, length in zip(self.axis, self.length, strict=True)]
+        stand_at(self.library, [self.unit * value for value in self.relative(*point)])
+        self.silent = False
 
     def get_tool(self, index):
         return self.tools[index] if 0 <= index < len(self.tools) else (-1,) + (0.0,) * 12 + (0,)
@@ -111,9 +132,18 @@ class Canon:
         x, y = x * self.cos - y * self.sin, x * self.sin + y * self.cos
         return [MM * (x + self.g5x[0]), MM * (y + self.g5x[1]), MM * (z + self.g5x[2])]
 
+    def relative(self, x, y, z):
+        """The controlled point that lies at an absolute one, both in inches."""
+        x, y, z = x - self.g5x[0], y - self.g5x[1], z - self.g5x[2]
+        x, y = x * self.cos + y * self.sin, y * self.cos - x * self.sin
+        return x - self.g92[0], y - self.g92[1], z - self.g92[2]
+
     def row(self, kind, tip, centre=(0.0, 0.0, 0.0), turns=0, extra=0.0):
+        if self.silent:
+            return
         self.position = tip
         length = [MM * value for value in self.length]
+        self.axis = [a + b for a, b in zip(tip, length, strict=True)]
         self.data.extend([float(self.line), float(kind), *tip, *length, float(self.tool), float(self.index)])
         self.data.extend([MM * self.feed, *centre, float(turns), float(self.plane), extra])
         self.data.extend([MM * value for value in self.g92])
@@ -147,7 +177,7 @@ def main():
     keep = prepare_tools(table)  # the library reads this block for as long as the interpreter runs
     import gcode
 
-    canon = Canon(read_tools(table))
+    canon = Canon(read_tools(table), ctypes.PyDLL(gcode.__file__))
     canon.parameter_file = variables
     result, line = gcode.parse(program, canon, unitcode, initcode)
     Path(output).write_bytes(canon.data.tobytes())

@@ -506,6 +506,30 @@ def test_axes_are_unknown_until_commanded() -> None:
 
 
 @pytest.mark.oracle
+@pytest.mark.parametrize(
+    ("blocks", "x_mm"),
+    [
+        ("G21 G0 X1 Y0 Z5\nG2 X21 I10 F100", 21.0),
+        ("G20 G0 X1 Y0 Z5\nG2 X3 I1 F100", 76.2),
+        ("G21 G0 X1 Y0 Z5\nG20", 1.0),
+        ("G21 G0 X1 Y0 Z5\nG55", 1.0),
+        ("G21 G0 X1 Y0 Z5\nG92 X7", 1.0),
+        ("G21 G0 X1 Y0 Z5\nG43 H1", 1.0),
+        ("G21 G10 L2 P1 R90\nG0 X1 Y2 Z5\nG10 L2 P1 R0", -2.0),
+    ],
+)
+def test_a_tool_change_leaves_the_axes_where_they_are(blocks: str, x_mm: float) -> None:
+    """The library alone goes on from the last straight move, in the offsets that held then."""
+    text = f"{blocks}\nT2 M6\nG0 Y5\nM2\n".encode()
+    moves = linuxcnc.interpret(text, offsets={"G55": (100.0, 0.0, 0.0)}, tools={1: (8.0, 0, 9), 2: (0, 0, 9)})
+    assert moves.axis[-1, 0] == pytest.approx(x_mm)
+    assert moves.axis[-1, 2] == pytest.approx(moves.axis[0, 2])
+    assert moves.tool[-1] == 2
+    assert moves.kind.tolist()[0] == moves.kind.tolist()[-1] == linuxcnc.RAPID
+    assert len(moves) == 2 + ("G2 " in blocks)
+
+
+@pytest.mark.oracle
 def test_a_known_start_and_the_default_tool_count(tmp_path: Path) -> None:
     recipe = Recipe(job_defaults={"tool": 2, "work_offset": "G55", "length_active": True})
     folder = machines.zero_machine(tmp_path, recipe).parent

@@ -95,7 +95,7 @@ class CyclicTable(Table):
     phase_rad: float = Field(default=0.0, description="the phase at axis position 0, in rad")
     line_mm: Position | None = Field(
         default=None,
-        description="where the other axes stood while an angular error was measured, such as "
+        description="positions of the other axes while an angular error was measured, such as "
         "{ Y = 0.0, Z = 0.0 } in mm; as of the axis's curve if left out, else the datum",
     )
     tool_mm: Triple | None = Field(
