@@ -115,6 +115,8 @@ class _Alignment:
         free = (nominal.flag[mine.last] & _FREE) != 0
         self.unknown = np.asarray(np.isnan(self.target).all(axis=1), bool)
         self.loose = np.asarray(free | self.unknown, bool)
+        #: what is left uncorrected is known by its commands
+        self.said, self.written = nominal.end_mm[mine.last], path.end_mm[theirs.last]
         # a rapid with an unknown axis is left uncorrected
         partly = np.isnan(self.target).any(axis=1) & (mine.kind == Kind.RAPID)
         self.reach = np.where(partly, _FAR_MM / 2, near_mm)
@@ -158,6 +160,10 @@ class _Alignment:
         away = _apart(self.tip[j], self.target[i]).max(axis=1, initial=0.0)
         unknown = self.loose[i] & (self.lost[j] | self.unknown[i])
         good = np.asarray((away < self.reach[i]) | unknown, bool)
+        free = np.flatnonzero(self.loose[i])
+        if free.size:
+            same = _apart(self.written[j[free]], self.said[i[free]]).max(axis=1) < self.near
+            good[free] |= same
         return np.asarray(good & (self.mine.kind[i] == self.theirs.kind[j]), bool)
 
     def _stretch(self, i: int, j: int, size: int) -> Index:
@@ -290,7 +296,7 @@ class _Alignment:
         """mm2: what it costs that unit i ends at each of units j, and that each of them is a part of it."""
         away = np.minimum((_apart(self.tip[j], self.target[i : i + 1]) ** 2).sum(axis=1), _FAR_MM**2)
         if self.loose[i]:
-            away = np.where(self.lost[j] == self.unknown[i], 0.0, _FAR_MM**2)
+            away = np.minimum((_apart(self.written[j], self.said[i : i + 1]) ** 2).sum(axis=1), _FAR_MM**2)
         end = away + np.where(self.mine.kind[i] == self.theirs.kind[j], 0.0, _OTHER_KIND_MM2)
         of = np.full(len(j), i)
         part = np.minimum(self._along(of, j), _FAR_MM) ** 2

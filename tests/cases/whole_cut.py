@@ -309,7 +309,7 @@ def _cuts(
     dense = real.dense
     rows = np.flatnonzero((dense.move >= span[0]) & (dense.move < span[1]))
     owner = owner_of[dense.move[rows]]
-    cutting = np.isin(moves.kind, (FEED, ARC)) & ~np.isin(moves.line, list(said.left))
+    cutting = np.isin(moves.kind, (FEED, ARC))
     known = moves.known.all(axis=1)
     whole = known & _known_before(moves, said.changes).all(axis=1)
     # from another zero or another tool there is no nominal path, but an end

@@ -183,7 +183,7 @@ def kinds(job: Job, nominal: bytes, whole: Whole) -> set[str]:
     return {name for name, value in shown.items() if value and whole.judged}
 
 
-def check(seed: int, folder: Path) -> set[str][str, Any]:
+def check(seed: int, folder: Path) -> set[str]:
     job = draw(seed, folder)
     nominal, result = corrected(job)
     machine, file = job.files
