@@ -276,12 +276,12 @@ def _numerical_sentence(numerical: dict[str, Any]) -> str:
     if numerical["holds"] is None:
         return "Not judged: the program has no feed move, hole or point at a known position."
     word = "Within tolerance" if numerical["holds"] else "ABOVE TOLERANCE"
+    largest, allowed = _um(numerical["largest_um"]), _um(numerical["allowed_um"])
     left = f", where line {numerical['line']} is left uncorrected" if numerical["left"] else ""
     return (
-        f"{word}: the corrected path is at most {_um(numerical['largest_um'])} um from the nominal "
-        f"one{left}; "
-        f"{_um(numerical['allowed_um'])} um are allowed (numerical tolerance "
-        f"{numerical['tolerance_um']:g} um, rounding {_um(numerical['rounding_um'])} um)."
+        f"{word}: the corrected path is at most {largest} um from the nominal one{left}; {allowed} um are "
+        f"allowed (numerical tolerance {numerical['tolerance_um']:g} um, rounding "
+        f"{_um(numerical['rounding_um'])} um)."
     )
 
 

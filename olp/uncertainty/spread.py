@@ -208,9 +208,10 @@ def confidence(
     tell: Progress,
     seed: int = SEED,
 ) -> Confidence:
-    """Bands at each waypoint, and with a part tolerance `limit_mm` the probabilities of being within it,
-    exact for normal errors to first order; those of lines and of the whole by Monte-Carlo over the
-    calibration's covariance, in memory of blocks."""
+    """Bands at each waypoint, and with a part tolerance `limit_mm` the probabilities of being within it.
+
+    Those of waypoints are exact for normal errors to first order. Those of lines and of the whole are by
+    Monte-Carlo over the calibration's covariance, in memory of blocks."""
     n = len(points)
     line = path.line[points.move].astype(np.int64)
     covariance = np.zeros((n, 3, 3))
