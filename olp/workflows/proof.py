@@ -63,9 +63,9 @@ class ProofOptions:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Run:
-    """A correction, or a verification of one: the corrected text and both programs as read, the proof and its
-    table of judgements, the report ("olp-report-1"), the findings, and bands and probabilities where a part
-    tolerance is stated and the calibration states uncertainties."""
+    """A correction, or a verification of one: the corrected text and both programs as read, the proof, its
+    table of judgements, the report ("olp-report-1") and the findings. `confidence` has bands and
+    probabilities where a part tolerance is stated and the calibration states uncertainties."""
 
     text: bytes
     nominal: Program
@@ -185,9 +185,7 @@ def _prove_without_deleted(
     with naming(pair.other or "<corrected>"):
         other = read(pair.text, loaded.setup, loaded.dialect, reading, words=False)
     try:
-        rows = plan(
-            nominal.toolpath, loaded.model, limits_of(nominal, loaded, options, refuse_outside=False)
-        )
+        rows = plan(nominal.toolpath, loaded.model, limits_of(nominal, loaded, options, refuse_outside=False))
         without = Judgements.of(
             prove(
                 nominal, other, loaded.model, tolerance_mm=proof.tolerance_mm, digit_mm=proof.digit_mm,
