@@ -26,8 +26,9 @@ _OTHERS = 3
 _NO_ANGLE_RAD = 0.2e-6
 #: rad; below this an angle is what an adjustment leaves of nothing.
 _NOTHING_RAD = 1e-12
-#: mm; a machine with such errors has angles that can be measured.
-_PLAIN_MM = 5e-3
+#: Over the diagonal of the box they are less than this share of the largest error of length. Machines of 5 um
+#: have shares of 2 %.
+_SHARE_OF_LENGTHS = 3e-3
 #: Errors per length that no instrument measures: 0.1 um/m.
 UNMEASURABLE = 1e-7
 #: mm; an offset of a whole column above this shows no error of the machine.
@@ -103,21 +104,30 @@ def _columns_of_other_unit(sizes: Mapping[str, float], tiny: float) -> Iterator[
 
 def _no_angles(calibration: Calibration) -> Iterator[Finding]:
     angle = max(_sizes(calibration, "ABC").values(), default=0.0)
-    length = max(_sizes(calibration, "XYZ").values(), default=0.0)
-    if _NOTHING_RAD < angle < _NO_ANGLE_RAD and length > _PLAIN_MM:
+    if _vanishing(angle, calibration):
         text = f"calibration: the angles of all axes are at most {angle / RAD_PER_URAD:.2g} urad"
-        yield finding("OLP450", f"{text}, beside errors of {length * UM_PER_MM:.3g} um; {_EXPECTED}")
+        yield finding("OLP450", f"{text}, which is nothing beside its other errors; {_EXPECTED}")
 
 
 def _squareness(calibration: Calibration) -> Iterator[Finding]:
     angles = [abs(angle) for angle in calibration.squareness.values() if angle]
-    if len(angles) > 1 and _NOTHING_RAD < max(angles) < _NO_ANGLE_RAD:
+    if len(angles) > 1 and _vanishing(max(angles), calibration):
         text = f"calibration: every squareness is at most {max(angles) / RAD_PER_URAD:.2g} urad"
         yield finding("OLP450", f"{text}; expected angles in urad that can be measured")
 
 
+def _vanishing(angle: float, calibration: Calibration) -> bool:
+    """Whether an angle is stated and does nothing on this machine."""
+    length = max(_sizes(calibration, "XYZ").values(), default=0.0)
+    return _NOTHING_RAD < angle < _NO_ANGLE_RAD and angle * _span_mm(calibration) < _SHARE_OF_LENGTHS * length
+
+
+def _span_mm(calibration: Calibration) -> float:
+    return float(np.linalg.norm(np.ptp(calibration.box_mm, axis=1)))
+
+
 def _maps(calibration: Calibration) -> Iterator[Finding]:
-    least = UNMEASURABLE * float(np.linalg.norm(np.ptp(calibration.box_mm, axis=1)))
+    least = UNMEASURABLE * _span_mm(calibration)
     for one in calibration.maps:
         size = float(np.abs(one.values).max())
         if 0.0 < size < least:

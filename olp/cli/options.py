@@ -151,9 +151,9 @@ def doubt_options(function: F, of: str = "run") -> F:
         "--accept", multiple=True, callback=_acceptable, metavar="CODES",
         help="Go on in spite of these doubts about the inputs, such as OLP409; may be repeated.",
     )(function)  # fmt: skip
-    return day_option(
-        f"The day of the {of}, or today; it is compared with valid_until of the calibration."
-    )(function)
+    return day_option(f"The day of the {of}, or today; it is compared with valid_until of the calibration.")(
+        function
+    )
 
 
 def output_option(metavar: str, help: str | None = None, **settings: Any) -> Callable[[F], F]:

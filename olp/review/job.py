@@ -222,7 +222,9 @@ def _shown(
     plan = None
     if options.time:
         other = session.sources.source(texts.corrected)
-        timing = RetimeOptions(contour=options.contour, date=options.date, accept=options.accept)
+        # what the proof accepts holds for the motion, also where its stamp is that of sure components alone
+        accept = tuple(texts.proved.report["accepted"])
+        timing = RetimeOptions(contour=options.contour, date=options.date, accept=accept)
         plan = retime.run(session.of(loaded.setup), other, timing, progress=progress)
     return _Shown(samples, plan)
 

@@ -184,9 +184,7 @@ def _prove_without_deleted(
     with naming(pair.other or "<corrected>"):
         other = read(pair.text, loaded.setup, loaded.dialect, reading, words=False)
     try:
-        rows = plan(
-            nominal.toolpath, loaded.model, limits_of(nominal, loaded, options, refuse_outside=False)
-        )
+        rows = plan(nominal.toolpath, loaded.model, limits_of(nominal, loaded, options, refuse_outside=False))
         without = Judgements.of(
             prove(
                 nominal, other, loaded.model, tolerance_mm=proof.tolerance_mm, digit_mm=proof.digit_mm,

@@ -265,9 +265,7 @@ def run(
     tell = progress or silent
     tell("read", 0.0)
     case = _case(session, program, options)
-    doubts = doubted_motion(
-        case.program, session.of(case.setup), options.accept, options.date, program.name
-    )
+    doubts = doubted_motion(case.program, session.of(case.setup), options.accept, options.date, program.name)
     other = None if nominal is None else _case(session, nominal, options)
     compliance = compliance_of(setup.machine)
     limits = axis_limits(setup.machine)

@@ -11,7 +11,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 from cases.acceptance import TRUE_ZERO, machine
-from cases.gate import HEAD, scaled, valued
+from cases.gate import HEAD, known, scaled, valued
 from click.testing import CliRunner
 
 import olp
@@ -92,6 +92,18 @@ def test_a_stamp_accepts_for_its_own_calibration_alone(tmp_path: Path) -> None:
     # without a calibration there is none that it could be of
     path.with_name("calibration.toml").unlink()
     assert olp.retime(done.data, path).report["accepted"] == []
+
+
+def test_the_motion_on_the_page_accepts_what_the_proof_accepts(tmp_path: Path) -> None:
+    """The stamp of a correction with sure components alone is that of another model."""
+    words = known(0.01)
+    words["calibration"] += '[[curves]]\nfile = "y.csv"\n'
+    words["curves"]["y.csv"] = "Y_mm,EYY_um,sigma_EYY_um\n-1000,1,5\n2000,1,5\n"
+    path = made(tmp_path, words)
+    path.write_text(path.read_text().replace("[axes.X]", "[check]\nlargest_correction_um = 5.0\n[axes.X]"))
+    done = olp.correct(TEXT, path, only_sure_components=True, accept=["OLP409"])
+    page = olp.view(TEXT, path, corrected=done.data, only_sure_components=True)
+    assert page.scene.report["accepted"] == ["OLP409"]
 
 
 def cli(*words: object) -> tuple[int, str]:
