@@ -86,6 +86,7 @@ def test_periods_keep_no_step_with_the_samples(period_mm: float) -> None:
     assert orientation(path, model)["max_urad"] == pytest.approx(10.0, rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_long_path_of_a_machine_of_many_sources() -> None:
     """Ten lines of some metres; a dense sampling of each finds no more than 2 % above what is stated."""
     rng = np.random.default_rng(8)

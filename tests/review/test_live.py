@@ -138,6 +138,7 @@ def test_a_port_is_bound_before_the_work_and_left_where_that_fails(served: Serve
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Ctrl-C reaches a whole console there")
+@pytest.mark.slow
 def test_ctrl_c_ends_it(tmp_path: Path) -> None:
     machine = zero_machine(tmp_path / "m")
     (tmp_path / "part.ngc").write_text(TEXT)

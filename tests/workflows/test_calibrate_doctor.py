@@ -201,6 +201,7 @@ def test_the_command_on_a_good_calibration(shop: Path) -> None:
     assert report["decided"] > 8
 
 
+@pytest.mark.slow
 def test_what_is_put_right_keeps_its_uncertainty(shop: Path, tmp_path: Path) -> None:
     good = load_calibration(shop / "calibration.toml")
     known = load_uncertainty(shop / "calibration.toml", good)

@@ -223,6 +223,7 @@ def example(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_the_table_says_what_was_found(example: Path) -> None:
     shown = (example / "told.txt").read_text()
     for words in ("EXX", "Squareness", "Backlash um", "ezx.csv: row 42", "wrote"):

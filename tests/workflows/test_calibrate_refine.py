@@ -44,6 +44,7 @@ def begun():
     return machine, calibration, uncertainty
 
 
+@pytest.mark.slow
 def test_the_update_is_that_of_bayes(begun) -> None:
     """Against the textbook form with the gain, and the frame as columns of a large variance."""
     machine, calibration, uncertainty = begun

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from cases.fast import some_fast
 from click.testing import CliRunner
 from judge.machines import CHAINS, Recipe, random_machine, zero_machine
 
@@ -321,7 +322,7 @@ def test_without_a_slip_all_verbs_go_on(tmp_path: Path) -> None:
         assert code == 0, (verb, output)
 
 
-@pytest.mark.parametrize("name", SLIPS)
+@pytest.mark.parametrize("name", some_fast(SLIPS, 4))
 def test_a_slip_is_told_before_a_program_is_written(name: str, tmp_path: Path) -> None:
     code, slip = SLIPS[name]
     folder = written(tmp_path / "slip")
@@ -502,7 +503,7 @@ def test_shipped_jobs_raise_no_doubt(job: Path) -> None:
     assert doubts_of(olp.check(program, None, job, select=sorted(DOUBTS), date=date).findings) == []
 
 
-@pytest.mark.parametrize("seed", range(100))
+@pytest.mark.parametrize("seed", some_fast(range(100), 5))
 def test_random_machines_raise_no_doubt(seed: int, tmp_path: Path) -> None:
     recipe = Recipe(
         chain=CHAINS[seed % 24], off_datum=seed % 2 == 1, cyclic=seed % 3 == 0,
