@@ -110,6 +110,17 @@ def test_a_side_that_is_unknown_at_the_start_alone_counts(tmp_path: Path) -> Non
     assert largest[4] < 0.6
 
 
+@pytest.mark.parametrize("block", (1, 2, 1 << 15))
+def test_the_side_is_kept_from_block_to_block(
+    tmp_path: Path, block: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """X has taken up its backlash of 14 um in line 3, and is 7 um behind in the cuts along Y that follow."""
+    monkeypatch.setattr("olp.proof.deviation._BLOCK", block)
+    path = machine(tmp_path, "[backlash]\nX_um = 14.0\n", tables=TRUE_ZERO)
+    text = b"G0 X0 Y0 Z0\nG0 X50\nG1 Y50 F500\nY60\nY70\nY80\nG0 Z10\nM2\n"
+    assert by_line(path, text) == pytest.approx(dict.fromkeys((4, 5, 6, 7), 7.0), abs=0.01)
+
+
 def test_rapids_do_not_count(tmp_path: Path) -> None:
     path = stiff(tmp_path, curve("X", "EYX", (-1000, 0), (0, 0), (30, 20), (100, 0), (2000, 0)))
     assert by_line(path, b"G0 X30 Y0 Z5\nX100\nG1 Z0 F500\nG0 Z10\nM2\n") == pytest.approx({4: 0.0}, abs=1e-3)
