@@ -52,7 +52,7 @@ def test_an_arc_counts_between_its_ends(tmp_path: Path) -> None:
     assert by_line(path, b"G0 X0 Y0 Z0\nG2 X100 I50 F500\nG0 Z10\nM2\n") == pytest.approx({3: 20.0}, abs=0.3)
 
 
-@pytest.mark.parametrize("start_deg", (0.0, 45.0))
+@pytest.mark.parametrize("start_deg", (0.0, 22.5, 45.0))
 def test_an_arc_counts_where_it_is_farthest_off(tmp_path: Path, start_deg: float) -> None:
     """X is off by 0.5 um per mm. Across a circle of 40 mm that is 20 um at its two ends in X."""
     path = stiff(tmp_path, curve("X", "EXX", (-1000, -500), (2000, 1000)))
@@ -61,7 +61,7 @@ def test_an_arc_counts_where_it_is_farthest_off(tmp_path: Path, start_deg: float
     assert by_line(path, text) == pytest.approx({3: 20.0}, abs=0.27)
 
 
-@pytest.mark.parametrize("rise_mm", (0.0,))
+@pytest.mark.parametrize("rise_mm", (0.0, 2.0, 30.0))
 def test_the_start_of_a_helix_counts(tmp_path: Path, rise_mm: float) -> None:
     """Where it starts, the tool is 20 um too low, which is before the start of the helix."""
     nodes = ((-1000.0, -20.0), (0.0, -20.0), (0.1, 0.0), (2000.0, 0.0))
@@ -90,12 +90,17 @@ def test_a_cut_counts_from_where_the_rapid_left_the_tool(tmp_path: Path) -> None
     assert by_line(path, nominal, nominal.replace(b"Y0", b"Y0.0050")) == pytest.approx({3: 5.0}, abs=0.01)
 
 
-@pytest.mark.parametrize("peak_mm", (500,))
+@pytest.mark.parametrize("peak_mm", (500, 700))
 def test_a_cut_from_an_unknown_position_counts_with_the_worst_of_it(tmp_path: Path, peak_mm: int) -> None:
     """Y may be anywhere in the box where the cut starts, and one of its places is off by 20 um in X."""
     nodes = ((-1000, 0), (peak_mm - 300, 0), (peak_mm, 20), (peak_mm + 300, 0), (2000, 0))
     path = stiff(tmp_path, curve("Y", "EXY", *nodes))
     assert by_line(path, b"G0 X0 Z0\nG1 Y50 F500\nG0 Z10\nM2\n") == pytest.approx({3: 20.0}, abs=0.2)
+
+
+def test_an_unknown_side_and_an_unknown_position_count_once(tmp_path: Path) -> None:
+    path = machine(tmp_path, "[backlash]\nX_um = 14.0\n", tables=TRUE_ZERO)
+    assert by_line(path, b"G0 X0 Z0\nG1 Y50 F500\nG0 Z10\nM2\n") == pytest.approx({3: 7.0}, abs=0.1)
 
 
 def test_a_side_that_is_unknown_at_the_start_alone_counts(tmp_path: Path) -> None:
@@ -108,6 +113,17 @@ def test_a_side_that_is_unknown_at_the_start_alone_counts(tmp_path: Path) -> Non
     assert largest[2] == pytest.approx(7.0, abs=0.6)
     assert largest[3] == pytest.approx(7.0, abs=0.6)
     assert largest[4] < 0.6
+
+
+@pytest.mark.parametrize("block", (1, 2, 1 << 15))
+def test_the_side_is_kept_from_block_to_block(
+    tmp_path: Path, block: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """X has taken up its backlash of 14 um in line 3, and is 7 um behind in the cuts along Y that follow."""
+    monkeypatch.setattr("olp.proof.deviation._BLOCK", block)
+    path = machine(tmp_path, "[backlash]\nX_um = 14.0\n", tables=TRUE_ZERO)
+    text = b"G0 X0 Y0 Z0\nG0 X50\nG1 Y50 F500\nY60\nY70\nY80\nG0 Z10\nM2\n"
+    assert by_line(path, text) == pytest.approx(dict.fromkeys((4, 5, 6, 7), 7.0), abs=0.01)
 
 
 def test_rapids_do_not_count(tmp_path: Path) -> None:
@@ -126,14 +142,14 @@ def test_a_hole_counts_across_its_axis(tmp_path: Path, level_mm: int) -> None:
     assert by_line(path, HOLE) == pytest.approx({3: 12.0}, abs=0.2)
 
 
-@pytest.mark.parametrize("off_um", (9,))
+@pytest.mark.parametrize("off_um", (-9, 9))
 def test_a_hole_counts_at_its_depth(tmp_path: Path, off_um: int) -> None:
     path = stiff(tmp_path, curve("Z", "EZZ", (-1000, off_um), (-10, off_um), (-9, 0), (2000, 0)))
     assert by_line(path, HOLE) == pytest.approx({3: 9.0}, abs=0.01)
 
 
 @pytest.mark.parametrize("back", (b"G98", b"G99"))
-@pytest.mark.parametrize("off_um", (-9,))
+@pytest.mark.parametrize("off_um", (-9, 9))
 def test_a_hole_counts_from_where_its_stroke_starts(tmp_path: Path, back: bytes, off_um: int) -> None:
     """As a cut that starts before its line. Too deep a start lies on the axis."""
     path = stiff(tmp_path, curve("Z", "EZZ", (-1000, 0), (3, 0), (5, off_um), (2000, off_um)))

@@ -232,6 +232,19 @@ def test_the_stated_maximum_is_what_the_whole_cut_is_off(tmp_path: Path, seed: i
     assert check(seed, tmp_path, lines=True) >= {"judged", "lines", "inserted", *SEEDS[seed].split()}
 
 
+@pytest.mark.oracle
+@pytest.mark.parametrize("seed", SEEDS)
+def test_each_line_of_an_uncorrected_program_is_what_it_is_off(tmp_path: Path, seed: int) -> None:
+    """The nominal program as its own correction: every line is off, and each of them counts."""
+    job = draw(seed, tmp_path)
+    nominal, _ = corrected(job)
+    verified = olp.verify(nominal, nominal, *job.files)
+    whole = judge_whole(nominal, nominal, tmp_path, start_mm=job.start_mm)
+    assert len(whole.by_line) > 2
+    compare(verified.report["deviation"]["path_max_um"], whole)
+    compare_lines(verified.table, whole, 0)
+
+
 def test_the_seeds_try_everything() -> None:
     tried = Counter(word for words in SEEDS.values() for word in words.split())
     assert {kind: tried[kind] for kind in EACH if tried[kind] < EACH[kind]} == {}
