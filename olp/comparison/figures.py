@@ -18,6 +18,8 @@ STATIONS = 2000
 _GAP = 8.0
 #: distance from an end, in reaches, beyond which the path has left that end
 _AWAY = 10.0
+#: mm by which a point may be past the place that it is said to be at
+_AT_MM = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,7 +45,8 @@ class Run:
     def of(
         name: str, path: Path, points_mm: Array, pairing: Pairing, reach_mm: float, order: Order = "forward"
     ) -> Run:
-        """`counted` are good points on moves that cut, and the nearest one to each stop."""
+        """`counted` are good points on moves that cut, and the nearest one to each stop. Before the start of
+        the first of them the tool comes from elsewhere, which is no cut."""
         if order != "free":
             pairing = replace(pairing, beyond=_off_the_ends(path, points_mm, pairing, reach_mm, order))
         good = (pairing.distance_mm <= reach_mm) & ~pairing.beyond & ~pairing.doubtful
@@ -53,7 +56,8 @@ class Run:
         away = points_mm - nominal_mm
         size_mm = np.sqrt(np.einsum("ij,ij->i", away, away))
         good |= stop >= 0
-        counted = good & (path.cutting[pairing.segment] | (stop >= 0))
+        cuts = path.cutting[pairing.segment] & ~_comes(path, pairing)
+        counted = good & (cuts | (stop >= 0))
         deviation = split(path, pairing.segment, away)
         return Run(name, points_mm, pairing, nominal_mm, stop, deviation, size_mm, good, counted)
 
@@ -129,6 +133,13 @@ class Run:
         near = self._near(arc_mm, s)
         attained[near] = (place + between)[near]
         return attained
+
+
+def _comes(path: Path, pairing: Pairing) -> Mask:
+    """(m,) points that are nearest to where a cut begins after a move that does not cut."""
+    first = path.cutting & ~np.concatenate(([False], path.cutting[:-1]))
+    at_start = pairing.s_mm <= path.s_mm[pairing.segment] + _AT_MM
+    return np.asarray(first[pairing.segment] & at_start & (pairing.segment > 0), bool)
 
 
 def _at_stops(path: Path, points: Array, pairing: Pairing, reach: float) -> Index:

@@ -80,17 +80,24 @@ def arc_distance(
     # the point lies on the turn of share `near`
     guess = near * sweep
     angle = angle + 2 * np.pi * np.rint((guess - angle) / (2 * np.pi))
-    share = np.clip(angle / sweep, 0.0, 1.0)
-    radius = np.hypot(s0, s1)
-    radius = radius + (np.hypot(end[rows, first] - c0, end[rows, second] - c1) - radius) * share
-    lead = (end[rows, third] - start[rows, third]) / sweep
-    level = point[rows, third] - start[rows, third] - share * lead * sweep
-    # a helix rises by `lead` per radian; across it a difference in level counts by the cosine of its pitch
-    across = np.hypot(np.hypot(p0, p1) - radius, level * radius / np.hypot(radius, lead))
+    size = np.abs(sweep)
+    turned = angle * np.sign(sweep)
+    place = np.clip(turned, 0.0, size)
     # beyond the end that is nearer, whatever the turn
-    turned = np.mod(angle * np.sign(sweep), 2 * np.pi)
-    beyond = np.minimum(turned - np.abs(sweep), 2 * np.pi - turned)
-    return np.asarray(np.hypot(across, np.maximum(beyond, 0.0) * radius), float)
+    wrapped = np.mod(turned, 2 * np.pi)
+    beyond = np.maximum(np.minimum(wrapped - size, 2 * np.pi - wrapped), 0.0)
+    beyond = np.where(size >= 2 * np.pi, np.abs(turned - place), beyond) * np.sign(turned - place)
+    radius = np.hypot(s0, s1)
+    wider = (np.hypot(end[rows, first] - c0, end[rows, second] - c1) - radius) / size
+    lead = (end[rows, third] - start[rows, third]) / size
+    level = point[rows, third] - start[rows, third]
+    # a helix rises by `lead` per radian: the nearest point is a little ahead, unless it ends before
+    mean = radius + wider * place
+    ahead = (beyond * mean**2 + (level - place * lead) * lead) / np.maximum(mean**2 + lead**2, 1e-24)
+    nearest = np.clip(place + ahead, 0.0, size)
+    across = np.hypot(p0, p1) - radius - wider * nearest
+    along = (place + beyond - nearest) * mean
+    return np.asarray(np.sqrt(across**2 + along**2 + (level - nearest * lead) ** 2), float)
 
 
 def arc_directions(

@@ -48,14 +48,16 @@ def strokes_mm(
     tip, of = _tips(path, rows, model, bend_mm)
     hole_of = which[of]
     away = segment_distance(tip, top[hole_of], bottom[hole_of])
-    np.fmax.at(worst, hole_of, away.astype(np.float32))
     along = bottom - top
     size = np.maximum(np.sqrt((along * along).sum(axis=1)), 1e-12)
     depth = ((tip - top[hole_of]) * along[hole_of]).sum(axis=1) / size[hole_of]
     deepest = np.full(count, -np.inf)
     np.fmax.at(deepest, hole_of, depth)
-    off = np.where(np.isfinite(deepest), np.abs(deepest - size), np.nan).astype(np.float32)
-    return move, np.hypot(worst, np.where(np.isfinite(off), off, 0.0)).astype(np.float32)
+    # the deepest of a hole counts to its bottom
+    lowest = depth == deepest[hole_of]
+    away[lowest] = np.sqrt(((tip - bottom[hole_of]) ** 2).sum(axis=1))[lowest]
+    np.fmax.at(worst, hole_of, away.astype(np.float32))
+    return move, worst
 
 
 def _axis(path: Toolpath, target: Array, hole: Hole) -> tuple[int, Array, Array]:
@@ -68,7 +70,8 @@ def _axis(path: Toolpath, target: Array, hole: Hole) -> tuple[int, Array, Array]
     bottom = target[move].copy()
     top = bottom.copy()
     side = 1.0 if hole.r_mm >= hole.z_mm else -1.0
-    levels = np.append(target[some, axis], bottom[axis] + hole.r_mm - hole.z_mm)
+    strokes = some[path.kind[some] != Kind.RAPID]
+    levels = np.append(target[strokes, axis], bottom[axis] + hole.r_mm - hole.z_mm)
     top[axis] = side * np.nanmax(side * levels)
     return move, top, bottom
 
