@@ -18,7 +18,9 @@ STATIONS = 2000
 _GAP = 8.0
 #: distance from an end, in reaches, beyond which the path has left that end
 _AWAY = 10.0
-#: mm by which a point may be past the place that it is said to be at
+#: a point is about where a cut begins within so many times its own distance from the path
+_ABOUT = 3.0
+#: mm; the same of points on the path
 _AT_MM = 1e-9
 
 
@@ -136,10 +138,12 @@ class Run:
 
 
 def _comes(path: Path, pairing: Pairing) -> Mask:
-    """(m,) points that are nearest to where a cut begins after a move that does not cut."""
+    """(m,) points about where a cut begins after a move that does not cut: a rapid that takes up backlash
+    goes past that place and comes back."""
     first = path.cutting & ~np.concatenate(([False], path.cutting[:-1]))
-    at_start = pairing.s_mm <= path.s_mm[pairing.segment] + _AT_MM
-    return np.asarray(first[pairing.segment] & at_start & (pairing.segment > 0), bool)
+    since_mm = pairing.s_mm - path.s_mm[pairing.segment]
+    about = since_mm <= _ABOUT * pairing.distance_mm + _AT_MM
+    return np.asarray(first[pairing.segment] & about & (pairing.segment > 0), bool)
 
 
 def _at_stops(path: Path, points: Array, pairing: Pairing, reach: float) -> Index:

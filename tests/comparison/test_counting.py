@@ -34,6 +34,27 @@ def test_an_overshoot_at_the_end_of_a_slot_is_a_distance() -> None:
     assert one.figures(path)["across_um"]["max"] == pytest.approx(50.0, abs=0.01)
 
 
+def test_where_a_rapid_takes_up_backlash_nothing_is_cut() -> None:
+    """The rapid goes 10 um past the place where the plunge begins, on every axis, and comes back."""
+    corners = np.array([[0.0, 0.0, 4.0], [80.0, 60.0, 4.0], [80.0, 60.0, -3.0], [0.0, 60.0, -3.0]])
+    path = Path.through(corners, cutting=np.array([False, False, True, True]))
+    past = corners[1] + np.array([0.01, 0.01, -0.01])
+
+    def between(a: np.ndarray, b: np.ndarray, count: int) -> np.ndarray:
+        return a + np.linspace(0.0, 1.0, count)[1:, None] * (b - a)
+
+    off = np.array([0.0, 0.003, 0.0])
+    points = np.concatenate((
+        corners[:1], between(corners[0], past, 200), between(past, corners[1], 9),
+        between(corners[1], corners[2], 400) + off, between(corners[2] + off, corners[3] + off, 400),
+    ))  # fmt: skip
+    one = Run.of("a", path, points, pair(path, points, "forward"), 1.0)
+    assert one.size_mm.max() > 0.01
+    assert one.size_mm[one.counted].max() == pytest.approx(0.003, abs=1e-6)
+    # a cut that is off from its first point on is counted but for that point
+    assert one.counted.sum() == pytest.approx(798, abs=3)
+
+
 def test_a_stop_counts_by_the_nearest_point_that_was_measured() -> None:
     corners = np.array([[0.0, 0.0, 0.0], [50.0, 0.0, 0.0], [50.0, 40.0, 0.0]])
     path = Path.through(corners, cutting=np.zeros(3, bool), stop=np.ones(3, bool))
