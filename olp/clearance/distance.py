@@ -191,7 +191,30 @@ def _weights(corners: Array) -> Array:
             inside = (det > _FLAT * g * h) & (u > 0) & (v > 0) & (u + v < 1)
             _take(inside & (norm < best), norm, best, share, {i: u, j: v})
         _whole(edge, first, gram, best, share)
+        _refine(edge, first, gram, share)
     return np.concatenate((1.0 - share.sum(axis=1, keepdims=True), share), axis=1)
+
+
+def _refine(edge: Array, first: Array, gram: Array, share: Array) -> None:
+    """One step more towards the nearest point of the face that was chosen. Corners may be far from it beside
+    its distance: then the rounding of the shares would turn the direction to it."""
+    point = first + np.einsum("ni,nik->nk", share, edge)
+    goal = -np.einsum("nik,nk->ni", edge, point)
+    used = share > 0
+    count = used.sum(axis=1)
+    more = np.zeros_like(share)
+    for i in range(3):
+        alone = (count == 1) & used[:, i]
+        more[alone, i] = (goal[:, i] / gram[:, i, i])[alone]
+    for i, j in _PAIRS:
+        g, h, k = gram[:, i, i], gram[:, j, j], gram[:, i, j]
+        det = g * h - k * k
+        both = (count == 2) & used[:, i] & used[:, j]
+        more[both, i] = ((goal[:, i] * h - goal[:, j] * k) / det)[both]
+        more[both, j] = ((goal[:, j] * g - goal[:, i] * k) / det)[both]
+    moved = share + more
+    inside = (moved >= 0).all(axis=1) & (moved.sum(axis=1) <= 1)
+    share[inside] = moved[inside]
 
 
 def _take(better: Mask, norm: Array, best: Array, share: Array, parts: dict[int, Array]) -> None:

@@ -142,6 +142,7 @@ def test_the_search_finds_what_looking_at_all_finds(seed: int, count: int) -> No
 @few
 @given(SEEDS)
 @example(9998)
+@example(99)
 def test_no_contact_between_waypoints_is_missed(seed: int) -> None:
     """Small triangles, each somewhere in the path of a fast move, among many that are not."""
     rng = np.random.default_rng(seed)

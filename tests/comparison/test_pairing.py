@@ -206,6 +206,7 @@ def test_a_wrong_pairing_is_a_finding_and_not_a_number() -> None:
     (np.column_stack((np.linspace(0, 500, 800), np.zeros(800), np.zeros(800))), "shift in X"),
     (np.column_stack((100 * np.cos(t := np.linspace(0, 6.28, 800)), 100 * np.sin(t), 0 * t)), "turn about Z"),
 ])  # fmt: skip
+@pytest.mark.slow
 def test_what_a_path_does_not_determine_is_named(points: np.ndarray, word: str) -> None:
     path = Path.through(points)
     noisy = points + np.random.default_rng(1).normal(0, NOISE_MM, points.shape)

@@ -38,6 +38,7 @@ def rough_machine(seed: int, slope: float, cyclic_mm: float) -> ErrorModel:
     cyclic_mm=st.sampled_from([0.0, 1e-3, 0.02]),
     count=st.integers(1, 400),
 )
+@pytest.mark.slow
 def test_the_tip_comes_to_its_place(seed: int, slope: float, cyclic_mm: float, count: int) -> None:
     model = rough_machine(seed, slope, cyclic_mm)
     target = np.random.default_rng(seed).uniform(BOX[:, 0], BOX[:, 1], (count, 3))

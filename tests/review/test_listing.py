@@ -47,6 +47,7 @@ def checked(review: Review, nominal: bytes, corrected: bytes) -> Page:
     return page
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", PROGRAMS, ids=lambda path: path.stem)
 def test_rows_are_the_lines_of_the_files(path: Path) -> None:
     result = olp.correct(path, NASTY / "machine.toml")

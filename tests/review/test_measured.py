@@ -35,6 +35,7 @@ def csv(points: np.ndarray, frame: str = "G54") -> str:
 
 
 @pytest.mark.parametrize("name", ["modal", "full-circle", "g91-steps", "helix-turns", "planes", "inch"])
+@pytest.mark.slow
 def test_what_simulate_writes_is_the_uncorrected_machine(name: str, tmp_path: Path) -> None:
     program, machine = NASTY / f"{name}.ngc", NASTY / "machine.toml"
     path = written(tmp_path, olp.simulate(program, machine, step_mm=0.7).to_csv())

@@ -41,6 +41,7 @@ def case(seed: int, chain: str = "FXYZ", n: int = 60, sigma: float = 0.002):
 
 
 @pytest.mark.parametrize("seed", (0, 3, 5))
+@pytest.mark.slow
 def test_no_wrong_decision_among_blunders(seed: int) -> None:
     one = trial(seed, 40, 0.005)
     assert one.wrong == []
@@ -225,6 +226,7 @@ def test_what_is_put_right_keeps_its_uncertainty(shop: Path, tmp_path: Path) -> 
         assert np.array_equal(a.factor, b.factor)
 
 
+@pytest.mark.slow
 def test_the_command_puts_right_what_is_wrong(shop: Path, tmp_path: Path) -> None:
     good = load_calibration(shop / "calibration.toml")
     text = (shop / "calibration.toml").read_text("utf-8")

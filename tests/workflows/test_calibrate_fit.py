@@ -257,6 +257,7 @@ def test_the_python_way_gives_the_same(example: Path) -> None:
     assert fitted.findings[0].code == "OLP802"
 
 
+@pytest.mark.slow
 def test_json_and_fail_on(example: Path) -> None:
     code, output = run("calibrate", "fit", example, "--json", "--fail-on", "warning")
     report = json.loads(output[output.index("{") :])

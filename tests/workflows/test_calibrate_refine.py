@@ -95,6 +95,7 @@ def test_a_run_that_fits_nothing_is_told_and_widens(begun) -> None:
     assert rms[0] > 0.05 * rms[1]
 
 
+@pytest.mark.slow
 def test_a_slip_is_left_out(begun) -> None:
     machine, calibration, uncertainty = begun
     points = run(machine, 7, 60, 0.005)
@@ -201,6 +202,7 @@ def test_a_run_of_a_corrected_program(shop: Path, tmp_path: Path) -> None:
     assert refined.refinement.after_mm < 0.6 * refined.refinement.before_mm
 
 
+@pytest.mark.slow
 def test_a_calibration_without_uncertainty_is_refused(shop: Path) -> None:
     gantry = PROGRAMS / "gantry-plate"
     with pytest.raises(ConfigError, match="states no uncertainty"):

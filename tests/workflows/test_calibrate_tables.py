@@ -41,6 +41,7 @@ def random_points(seed: int, n: int = 200) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("chain", CHAINS)
+@pytest.mark.slow
 def test_lines_through_zero_make_the_same_errors(chain: str, tmp_path: Path) -> None:
     """The judge measures off the datum and on tables; moved to 0 the model is the same to first order."""
     carried = chain.split("F")[0]

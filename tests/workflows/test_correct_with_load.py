@@ -67,6 +67,7 @@ TOOL += "[job_defaults]\ntool = 1\n"
 
 @pytest.mark.parametrize("support", ["simple", "fixed"])
 @pytest.mark.parametrize("known", ["measured", "beam"])
+@pytest.mark.slow
 def test_the_deflection_that_a_payload_adds_is_removed(tmp_path: Path, support: str, known: str) -> None:
     beam = GantryBeam(support)
     table = MEASURED if known == "measured" else BEAM.format(support, SECTION[support])

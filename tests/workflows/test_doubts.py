@@ -463,6 +463,7 @@ def test_a_fit_states_its_quality(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("factor", [25.4, -1.0])
+@pytest.mark.slow
 def test_a_fit_with_a_line_in_another_unit_or_sign_is_refused(factor: float, tmp_path: Path) -> None:
     folder = tmp_path / "lines"
     shutil.copytree(PROGRAMS / "gantry-lines", folder)

@@ -77,6 +77,7 @@ def test_the_job_is_refused_with_its_line(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", JOBS)
+@pytest.mark.slow
 def test_comments_and_unchanged_lines_survive(name: str) -> None:
     try:
         nominal, result = run(name)
