@@ -392,9 +392,7 @@ class Tracer:
         place = before[part] - begin[of] + share * turn[part]
         return np.asarray(place / np.maximum(total[of], 1e-12), float)
 
-    def _bend(
-        self, a: int, reached: Array, inner: _Inner, owner: Index, curved: Mask, bend: Single
-    ) -> None:
+    def _bend(self, a: int, reached: Array, inner: _Inner, owner: Index, curved: Mask, bend: Single) -> None:
         """How far the samples of straight parts leave the chord between the actual ends of their part."""
         straight = (inner.part > 0) & ~curved[inner.part]
         part, actual = inner.part[straight], inner.actual[straight]

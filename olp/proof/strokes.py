@@ -99,9 +99,7 @@ def _tips(path: Toolpath, rows: Index, model: ErrorModel, bend_mm: float) -> tup
     return point + model.error(point, tool if tool.ndim == 1 else tool[of], play), of
 
 
-def _turns(
-    start: Array, end: Array, before: Array, after: Array, width: Array | None
-) -> tuple[Array, Index]:
+def _turns(start: Array, end: Array, before: Array, after: Array, width: Array | None) -> tuple[Array, Index]:
     """(k,) shares of strokes at which an axis has taken up its backlash, and (k,) the stroke of each."""
     size = np.zeros(start.shape) if width is None else np.maximum(np.nan_to_num(width), 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):

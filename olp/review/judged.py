@@ -41,9 +41,7 @@ def judged_lines(scene: Scene, arrays: Arrays) -> dict[str, Any]:
     shown = {"error_um": columns["uncorrected"], "result_um": columns["result"], "measured_um": None}
     runs = scene.table.measured
     if runs is not None:
-        shown["measured_um"] = _line_column(
-            scene, arrays, "measured_um", table["line"], table["measured_um"]
-        )
+        shown["measured_um"] = _line_column(scene, arrays, "measured_um", table["line"], table["measured_um"])
         for k, name in enumerate(measured_names(scene)):
             own = runs.by_line(k)
             columns[name] = _line_column(scene, arrays, f"um_{name}", own["line"], own["measured_um"])

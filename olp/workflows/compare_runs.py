@@ -50,9 +50,7 @@ class Ground:
         )
         tool, operation = judgement.groups_of(program.toolpath)
         line = program.toolpath.line.astype(np.int64)
-        return Ground(
-            nominal.path, nominal.move, nominal.stop_move, line, tool, operation, program, loaded
-        )
+        return Ground(nominal.path, nominal.move, nominal.stop_move, line, tool, operation, program, loaded)
 
     @staticmethod
     def of_points(points: Points) -> Ground:
@@ -96,16 +94,12 @@ class Judged:
     findings: tuple[Finding, ...] = field(default=())
 
 
-def judged(
-    ground: Ground, measured: Sequence[Points], how: How, before: Sequence[Points] = ()
-) -> Judged:
+def judged(ground: Ground, measured: Sequence[Points], how: How, before: Sequence[Points] = ()) -> Judged:
     """Runs of points, a file each, placed on the path together and judged. Raises CannotCompute, and
     ConfigError for a frame that the machine does not have."""
     files = [*measured, *before]
     names = names_of([p.file for p in files])
-    placed = runs.place(
-        ground.path, names, _stated(ground, files, how), how.align, how.order, how.reach_mm
-    )
+    placed = runs.place(ground.path, names, _stated(ground, files, how), how.align, how.order, how.reach_mm)
     findings = runs.findings(ground.path, placed)
     absorbed = None
     if placed.fitted and all(placed.right) and placed.runs[0].counted.any():

@@ -38,9 +38,7 @@ class Unrolling(Protocol):
     def peck_clearance_mm(self) -> float | None: ...
 
 
-def as_asked(
-    sources: Sources, program: Source, setup: Setup, dialect: Dialect, options: Unrolling
-) -> Source:
+def as_asked(sources: Sources, program: Source, setup: Setup, dialect: Dialect, options: Unrolling) -> Source:
     """The program, unrolled where the options ask for it. Raises as `unrolled`."""
     if not (options.flatten or options.expand_cycles):
         return program

@@ -129,9 +129,7 @@ def _predicted_plots(
     loaded = session.loaded("hold").reading(nominal)
     program = read(nominal.data, loaded.setup, loaded.dialect, Options(contour=options.contour), words=False)
     try:
-        path = nominal_of(
-            program.toolpath, loaded.model, "tip", points=program.dialect.points
-        ).path
+        path = nominal_of(program.toolpath, loaded.model, "tip", points=program.dialect.points).path
     except CannotCompute:
         return {}
     step = max(_STEP_MM, path.length_mm / _POINTS)

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 from judge import linuxcnc
-from judge.linuxcnc import DWELL, CanonMoves
+from judge.linuxcnc import DWELL, RAPID, CanonMoves
 from judge.model import JudgeModel
 from judge.path import ActualPath, Deviation, _Curves, _forget, _measure, actual, match, shifts
 
@@ -24,6 +24,8 @@ TOLERANCE_UM = 1.0
 ROUNDING = 0.87
 #: mm of extra distance per mm of path, so that passes over one position are separated
 _LIFT = 0.05
+#: mm of extra distance between a rapid and a cut: a part of a cut is a cut
+_APART_MM = 50.0
 
 _AXIS = "[axes.{}]\ntravel_mm = [-1000.0, 2000.0]\nleast_increment_mm = {}\nvelocity_mm_s = 500.0\n"
 _AXIS += "acceleration_mm_s2 = 2000.0\njerk_mm_s3 = 20000.0\n"
@@ -127,7 +129,8 @@ def judged(
     shift = shifts(moves, model, shift_by_frame)
     uncorrected = np.isin(moves.line, list(skip_lines))
     real = _sure_of_play(actual(own, model, spacing_mm), model)
-    groups = match(real.points[real.dense.last] + _lift(own), moves.axis + shift + _lift(moves))
+    ends = real.points[real.dense.last] + _apart(own)
+    groups = matched(ends, own, moves.axis + shift + _apart(moves), moves)
     after = _measure(real, groups, moves, shift, uncorrected, kinds)
     before = _measure(
         _sure_of_play(actual(moves, model, spacing_mm), model),
@@ -162,8 +165,21 @@ def _sure_of_play(real: ActualPath, model: JudgeModel) -> ActualPath:
     return replace(real, determined=determined & (begun | dense.last))
 
 
-def _lift(moves: CanonMoves) -> np.ndarray:
-    return np.outer(_LIFT * np.cumsum(_Curves.of(moves).lengths()), (0.0, 0.0, 1.0))
+def matched(ends: np.ndarray, own: CanonMoves, vertices: np.ndarray, moves: CanonMoves) -> np.ndarray:
+    """As `judge.path.match`, with the length along the path in the third axis.
+
+    Corrected and nominal lengths drift apart: the second time they count from the first matches.
+    """
+    length, nominal = (np.cumsum(_Curves.of(path).lengths()) for path in (own, moves))
+    along = np.array([0.0, 0.0, _LIFT])
+    there = vertices + np.outer(nominal, along)
+    groups = match(ends + np.outer(length, along), there)
+    drift = np.interp(np.arange(len(own)), groups, length[groups] - nominal)
+    return match(ends + np.outer(length - drift, along), there)
+
+
+def _apart(moves: CanonMoves) -> np.ndarray:
+    return np.outer(_APART_MM * (moves.kind != RAPID), (1.0, 0.0, 0.0))
 
 
 def allowed_um(text: bytes) -> float:

@@ -253,9 +253,7 @@ def measured(
     return stated
 
 
-def measured_briefly(
-    job: Job, corrected: Path, files: Sequence[Path], tolerance_um: float | None
-) -> None:
+def measured_briefly(job: Job, corrected: Path, files: Sequence[Path], tolerance_um: float | None) -> None:
     """The report of `compare` and the page alone, which is quicker."""
     part = () if tolerance_um is None else ("--part-tolerance-um", str(tolerance_um))
     stated = json.loads(run("compare", job.program, *files, *job.setup, *part, "--json").stdout)

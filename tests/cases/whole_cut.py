@@ -14,11 +14,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from cases.acceptance import _lift
+from cases.acceptance import matched
 from judge import linuxcnc
 from judge.linuxcnc import ARC, DWELL, FEED, RAPID, CanonMoves
 from judge.model import JudgeModel
-from judge.path import DensePath, _Curves, densify, match, shifts, tool_vectors
+from judge.path import DensePath, _Curves, densify, shifts, tool_vectors
 
 #: mm by which moves of different kinds are moved apart in the matching
 _APART_MM = 100.0
@@ -124,8 +124,8 @@ def judge_whole(
             continue
         mine = replace(moves.pick(np.arange(a, b)), start=moves.begin[a])
         theirs = replace(own.pick(np.arange(c, d)), start=own.begin[c])
-        lifts = (_lift(mine) + _apart(mine, said), _lift(theirs) + _apart(theirs, written))
-        groups = match(ends[c:d] + lifts[1], moves.axis[a:b] + shift[a:b] + lifts[0])
+        vertices = moves.axis[a:b] + shift[a:b] + _apart(mine, said)
+        groups = matched(ends[c:d] + _apart(theirs, written), theirs, vertices, mine)
         owner[c:d] = np.minimum(a + np.searchsorted(groups, np.arange(d - c)), b - 1)
         at_end = np.zeros(len(own), bool)
         at_end[c + groups] = True

@@ -60,11 +60,11 @@ def test_holes_and_inserted_blocks_are_counted(tmp_path: Path) -> None:
     assert whole.by_line == pytest.approx({3: 1.0, 4: 2.0, 7: 0.8}, abs=1e-6)
 
 
-def test_what_is_off_is_marked_and_not_judged(tmp_path: Path) -> None:
+def test_what_is_off_is_marked_and_judged(tmp_path: Path) -> None:
     stiff(tmp_path)
     text = HEAD + b"G0 X0 Y0 Z5\n(olp off)\nG1 X500 F100\n(olp on)\nG1 X400\nG53 G0 Z0\nM2\n"
     assert marks(text).left == {3, 4, 7}
     whole = judge_whole(text, text, tmp_path)
-    # from 500 mm, where the tool is left 10 um off
-    assert whole.by_line == pytest.approx({6: 10.0}, abs=1e-6)
+    # to 500 mm and from there, where the tool is left 10 um off
+    assert whole.by_line == pytest.approx({4: 10.0, 6: 10.0}, abs=1e-6)
     assert whole.loose == 1

@@ -374,7 +374,10 @@ def check_change(seed: int, folder: Path) -> dict[str, Any]:
         assert numerical["line"] in touched or numerical["line"] in already
         rest = ~np.isin(lines["line"], list(touched))
         np.testing.assert_allclose(
-            lines["corrected_um"][rest], base["corrected_um"][rest], rtol=0, atol=1e-3,
+            lines["corrected_um"][rest],
+            base["corrected_um"][rest],
+            rtol=0,
+            atol=1e-3,
             err_msg=f"{step} {line}",
         )
         if step < 1.0:  # the judge's own matching may go astray beyond

@@ -188,9 +188,7 @@ PLANTS = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PLANTS)
-def test_a_planted_contradiction_is_found(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_planted_contradiction_is_found(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     target, plant = PLANTS[name]
     where, _, key = target.partition(" ")
     if key:

@@ -69,10 +69,7 @@ def test_a_mesh_in_a_rotated_frame_is_rotated(tmp_path: Path) -> None:
 
 def test_rotations_are_right_handed_and_in_order() -> None:
     """A point on X, turned by 90 degrees about Z, lies on Y; A comes before B, B before C."""
-    about = {
-        axis: rotation_matrix(tuple(90.0 * (k == axis) for k in range(3)))
-        for axis in range(3)
-    }
+    about = {axis: rotation_matrix(tuple(90.0 * (k == axis) for k in range(3))) for axis in range(3)}
     np.testing.assert_allclose(about[2] @ [1, 0, 0], [0, 1, 0], atol=1e-15)
     np.testing.assert_allclose(about[0] @ [0, 1, 0], [0, 0, 1], atol=1e-15)
     np.testing.assert_allclose(about[1] @ [0, 0, 1], [1, 0, 0], atol=1e-15)

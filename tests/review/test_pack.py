@@ -90,9 +90,7 @@ def test_a_line_that_is_the_same_costs_no_letters() -> None:
     assert set(unpacked(arrays, "corrected_middle")) == {""}
 
 
-@pytest.mark.parametrize(
-    ("dtype", "kind"), [("f4", np.float32), ("u4", np.uint32), ("u1", np.uint8)]
-)
+@pytest.mark.parametrize(("dtype", "kind"), [("f4", np.float32), ("u4", np.uint32), ("u1", np.uint8)])
 def test_raw_values_come_out_as_they_are(dtype: str, kind: type) -> None:
     values = np.arange(30).astype(kind).reshape(10, 3)
     arrays = Arrays()

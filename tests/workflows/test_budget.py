@@ -32,7 +32,6 @@ def test_the_parts_of_the_budget_worked_by_hand(tmp_path: Path) -> None:
     assert beside["budget_um"] == report["budget_um"]
 
 
-
 def test_inches_are_rounded_by_the_control_once_more(tmp_path: Path) -> None:
     """0.00001 in are 0.254 um, no multiple of 1 um: up to half an increment an axis on top."""
     path = machine(tmp_path, tables=TRUE_ZERO)

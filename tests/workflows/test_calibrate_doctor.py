@@ -187,9 +187,7 @@ def shop(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def call(shop: Path, calibration: str, *more: str):
     files = [str(shop / name) for name in (calibration, "tracker.csv")]
-    return CliRunner().invoke(
-        main, ["calibrate", "doctor", *files, "-m", str(shop / "machine.toml"), *more]
-    )
+    return CliRunner().invoke(main, ["calibrate", "doctor", *files, "-m", str(shop / "machine.toml"), *more])
 
 
 @pytest.mark.slow
@@ -209,9 +207,7 @@ def test_what_is_put_right_keeps_its_uncertainty(shop: Path, tmp_path: Path) -> 
     assert known is not None
     factors = {"EXX": -1.0, "EYY": -1.0}
     wrong = scaled(good, factors)
-    entries = [
-        dataclasses.replace(e, factor=e.factor * factors.get(e.name, 1.0)) for e in known.entries
-    ]
+    entries = [dataclasses.replace(e, factor=e.factor * factors.get(e.name, 1.0)) for e in known.entries]
     spoilt = dataclasses.replace(known, entries=tuple(entries), fingerprint=fingerprint(wrong))
     for path, data in calibration_files(wrong, shop / "flipped.toml", covariance=spoilt).items():
         path.write_bytes(data)

@@ -194,9 +194,7 @@ def test_a_run_of_a_corrected_program(shop: Path, tmp_path: Path) -> None:
     true = PROGRAMS / "gantry-plate" / "machine.toml"
     done = call("simulate", str(corrected), "-m", str(true), "-o", str(measured))
     assert done.exit_code == 0, done.output
-    refined = refine_calibration(
-        shop / "off.toml", measured, machine, program=plate, sigma_um=10.0
-    )
+    refined = refine_calibration(shop / "off.toml", measured, machine, program=plate, sigma_um=10.0)
     new = refined.calibration.squareness["C0Y"] * 1e6
     assert abs(new - value) < 12.0
     assert refined.refinement.after_mm < 0.6 * refined.refinement.before_mm

@@ -58,7 +58,7 @@ BOX = {"[[-1000.0, 2000.0], [-1000.0, 2000.0]": "[[-1000.0, 2000.0], [-400.0, 24
 MEASURED = '[[compliance]]\nfile = "load.csv"\n'
 BEAM = (
     '[[compliance_beam]]\naxis = "Y"\nsupport = "{}"\nspan_mm = [-500.0, 2500.0]\nyoungs_modulus_GPa = '
-    '210.0\n'
+    "210.0\n"
     "second_moment_mm4 = {}\n"
 )
 TOOL = f"[tools.1]\nZ_mm = {RAM}\ngauge_to_tip_mm = [{TIP[0]}, {TIP[1]}, {TIP[2]}]\n"

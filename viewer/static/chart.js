@@ -29,10 +29,8 @@
     }
 
     // series: [{label, colour, x, y}], limits: [{value, label, colour}]; x ascending, NaN in y is a gap
-    set({title, unit, x_label, series, limits, include = false}) {
-      Object.assign(this, {title, unit, x_label, series, limits, include});
-      const ends = series.filter(s => s.x.length).flatMap(s => [s.x[0], s.x[s.x.length - 1]]);
-      this.extent = ends.length ? [Math.min(...ends), Math.max(...ends)] : [0, 1];
+    set({extent, title, unit, x_label, series, limits, include = false}) {
+      Object.assign(this, {extent, title, unit, x_label, series, limits, include});
       if (!(this.extent[1] > this.extent[0])) this.extent[1] = this.extent[0] + 1;
       this.draw();
     }

@@ -52,6 +52,18 @@
     get axis() {
       return this.abscissa === "time" ? this.app.time : this.app.arc;
     }
+    // Ascending abscissa of the samples of the motion.
+    get motion_axis() {
+      const time = this.app.arrays.get(this.app.manifest.motion.time);
+      return this.abscissa === "time" ? time : this.cached("motion arc", () => Float64Array.from(time, t => this.x_of(t)));
+    }
+    // First and last abscissa of all charts, so that one window is the same place in each.
+    get extent() {
+      const ends = [this.axis, ...(this.movement ? [this.motion_axis] : [])]
+        .filter(x => x.length)
+        .flatMap(x => [x[0], x[x.length - 1]]);
+      return ends.length ? [Math.min(...ends), Math.max(...ends)] : [0, 1];
+    }
     get x_label() {
       return this.abscissa === "time" ? "time, s" : "distance along the path, mm";
     }
@@ -91,6 +103,7 @@
         series.push({label: name, colour: layer.colour, x, y: app.metrics.values(metric, name)});
       }
       this.deviation.set({
+        extent: this.extent,
         title: metric?.label ?? "Deviation",
         unit: OLP.colour.unit_label(metric?.unit),
         x_label: this.x_label,
@@ -105,9 +118,8 @@
           arrays,
           manifest: {motion},
         } = this.app,
-        time = arrays.get(motion.time),
         kind = this.motion;
-      const x = this.abscissa === "time" ? time : this.cached("motion arc", () => Float64Array.from(time, t => this.x_of(t)));
+      const x = this.motion_axis;
       let series,
         limits = [];
       if (kind === "speed") {
@@ -133,7 +145,7 @@
           .filter(l => Number.isFinite(l.value));
       }
       const [, title, unit] = MOTIONS.find(m => m[0] === kind);
-      this.movement.set({title, unit, x_label: this.x_label, series, limits, include: true});
+      this.movement.set({extent: this.extent, title, unit, x_label: this.x_label, series, limits, include: true});
     }
 
     // Largest of velocity, acceleration and jerk of an axis as a share of its limits, %.

@@ -33,8 +33,7 @@ STYLI += '[styli."A90.0B0.0"]\noffset_mm = [0, 120, -50]\n'
 RECIPE = Recipe(controller="dmis", increment_mm=0.0001, work_offsets=FRAMES, job_defaults={})
 NUMBER = rb"([-+]?(?:\d+\.?\d*|\.\d+))"
 MOTION = re.compile(
-    rb"(?im)^[ \t]*(?:GOTO|PTMEAS)[ \t]*/[ \t]*(?:CART[ \t]*,)?[ \t]*"
-    + rb"[ \t]*,[ \t]*".join([NUMBER] * 3)
+    rb"(?im)^[ \t]*(?:GOTO|PTMEAS)[ \t]*/[ \t]*(?:CART[ \t]*,)?[ \t]*" + rb"[ \t]*,[ \t]*".join([NUMBER] * 3)
 )
 HEAD = "DMISMN/'PART',05.2\nUNITS/MM,ANGDEC\n"
 HEAD += "S(STAR1)=SNSDEF/PROBE,FIXED,CART,0,0,-120.0,0,0,1,4.0\nMODE/PROG,MAN\n"
