@@ -18,7 +18,7 @@ Each holds its data and builds its message in `__str__`, as
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 
 class OlpError(Exception):
@@ -75,7 +75,36 @@ class ConfigError(InputError):
 
 
 class ProgramError(InputError):
-    """A program is refused; `line` counts from 1 in the source file."""
+    """A program is refused; `line` counts from 1 in the source file.
+
+    `code` says why, as a row of `olp.findings.codes.refusal`. `others` are refusals of other lines that were
+    found at the same time. `missing` is the table and the name of what machine and job do not define, such
+    as ("tools", "7"). `hint` is the end of the message: what to do, where that may not help.
+    """
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        file: str | None = None,
+        line: int | None = None,
+        code: str = "OLP500",
+        others: tuple[ProgramError, ...] = (),
+        missing: tuple[str, str] | None = None,
+        hint: str = "",
+    ) -> None:
+        super().__init__(f"{message}; {hint}" if hint else message, file=file, line=line)
+        self.code = code
+        self.others = others
+        self.missing = missing
+        self.hint = hint
+
+    @staticmethod
+    def together(errors: Iterable[ProgramError]) -> ProgramError:
+        """Refusals that were found at the same time, as the one of the first line with the others."""
+        first, *others = sorted(errors, key=lambda error: error.line or 0)
+        first.others = tuple(others)
+        return first
 
 
 class AlreadyCorrected(ProgramError):

@@ -20,7 +20,8 @@ class Rule:
 
     `topic` is the module of the code. `gate` says whether `olp check` looks for it in a program. It does not
     look for findings of measured paths, of results, and of measurements of a machine. A `doubt` says that an
-    input is not plausible: as an error it stops a run before anything is written, unless it is accepted.
+    input is not plausible: as an error it stops a run before anything is written, unless it is accepted. A
+    refusal that `follows` may be there only because an earlier statement was refused.
     """
 
     code: str
@@ -32,3 +33,4 @@ class Rule:
     topic: str
     gate: bool = True
     doubt: bool = False
+    follows: bool = False

@@ -1,0 +1,289 @@
+"""Why a program is refused: the codes that `ProgramError` carries."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from olp.findings.rule import Rule, Severity
+
+_rule = partial(Rule, severity=Severity.ERROR, topic="refusal", gate=False)
+
+RULES = (
+    _rule(
+        "OLP500",
+        "refused",
+        why="The statement cannot be read correctly, and what is read wrongly is corrected wrongly.",
+        remedy="Do what the message says.",
+        example="A statement for which no other code of this group fits.",
+    ),
+    _rule(
+        "OLP501",
+        "not a program that is read",
+        why="The text is in a language of another control, or it is another kind of file.",
+        remedy="Give the program for the control of the machine file, or what the CAM system writes before "
+        "its "
+        "post-processor (APT CLDATA).",
+        example="`BEGIN PGM 12 MM` at the start: Heidenhain conversational.",
+    ),
+    _rule(
+        "OLP502",
+        "not plain text",
+        why="Programs are read byte by byte, so that all that is not corrected remains as it is. UTF-16 and "
+        "binary files have no such bytes.",
+        remedy="Save or export the program as plain text (ASCII or UTF-8).",
+        example="A program that a Windows editor saved as Unicode (UTF-16).",
+    ),
+    _rule(
+        "OLP503",
+        "dialect is not certain",
+        why="The text, or its text and the ending of its file, fit several dialects. They read the same "
+        "statement differently.",
+        remedy="Name the dialect with --dialect, or with the key dialect of the job file.",
+        example="A file `part.dmi` with the statements of an APT program.",
+    ),
+    _rule(
+        "OLP504",
+        "no columns of positions",
+        why="The list does not show which of its columns are X, Y and Z, or a row has no numbers there.",
+        remedy="Name the columns in the header, or give a profile with --dialect. Use the same delimiter and "
+        "decimal mark in all rows.",
+        example="`1;2` as a row of a list with three columns.",
+    ),
+    _rule(
+        "OLP510",
+        "statement is not understood",
+        why="It may move the machine, or change how later statements are read.",
+        remedy="Correct it, or take it out. If it is right, the text may be of another dialect (--dialect).",
+        example="`X10,5`: a comma instead of a decimal point.",
+    ),
+    _rule(
+        "OLP511",
+        "parameters or flow control",
+        why="Loops, calls and expressions get their values at run time. A correction needs plain blocks.",
+        remedy="Unroll the program: olp correct --flatten. Or have the CAM system write plain blocks.",
+        example="`#1=5` and `G1 X#1`, or `M98 P1000`.",
+    ),
+    _rule(
+        "OLP512",
+        "statement is not read in this dialect",
+        why="Its effect is made inside the control, needs axes that are not modelled, or is not known.",
+        remedy="Have the CAM system write plain moves for it. If another control is meant, state it in the "
+        "machine file (controller), or with --dialect.",
+        example="`G68 X0 Y0 R30`, a rotation.",
+    ),
+    _rule(
+        "OLP513",
+        "cutter compensation",
+        why="The control makes the path of the tool itself, from a radius in its tables.",
+        remedy="Have the CAM system write the path of the tool centre, or take the contour as the path of "
+        "the "
+        "tool (--contour).",
+        example="`G41 D1`.",
+    ),
+    _rule(
+        "OLP514",
+        "nested comment",
+        why="A comment ends at the first closing bracket. So the rest of its line is read as words, and the "
+        "control refuses it, or moves.",
+        remedy="Take the inner brackets out, or replace them by [ and ].",
+        example="`(ROUGHING (TOOL 5) SIDE A)`.",
+    ),
+    _rule(
+        "OLP515",
+        "stated twice in one block",
+        why="A control takes one word of a letter and one code of a modal group per block. Which one it "
+        "takes "
+        "of two is not known.",
+        remedy="Leave one of the two, or write two blocks.",
+        example="`G1 X10 X20`, or `G0 G1 X10`.",
+    ),
+    _rule(
+        "OLP516",
+        "word is missing or impossible",
+        why="Without the word, or with this value, the control refuses the block or reads it in a way that "
+        "is "
+        "not known.",
+        remedy="Give the word that the message names.",
+        example="`M61` without Q, or `T1.5`.",
+    ),
+    _rule(
+        "OLP517",
+        "no motion code in force",
+        why="A block has axis words, and no code says how to move there.",
+        remedy="Give G0, G1, G2 or G3 in the block or before it.",
+        example="`X10 Y10` as the first block, or after G80.",
+        follows=True,
+    ),
+    _rule(
+        "OLP518",
+        "does not go with what is in force",
+        why="The statement and a mode, or two statements of one block, exclude each other.",
+        remedy="End the mode before, or write two blocks, as the message says.",
+        example="`G53 X0` under G91.",
+        follows=True,
+    ),
+    _rule(
+        "OLP520",
+        "work offset is not defined",
+        why="Without the offset the positions of the machine are not known, and its errors depend on them.",
+        remedy="Give [work_offsets.NAME] in the machine or job file, with the values of the control.",
+        example="`G55` and no [work_offsets.G55].",
+    ),
+    _rule(
+        "OLP521",
+        "tool is not defined",
+        why="Angular errors act on the vector from the gauge point to the tip, and the tool length is part "
+        "of "
+        "the axis positions.",
+        remedy="Give [tools.N] in the machine or job file, with its length from the table of the control.",
+        example="`T7 M6` and no [tools.7].",
+    ),
+    _rule(
+        "OLP522",
+        "stylus is not defined",
+        why="Angular errors act on the vector from the end of the ram to the centre of the tip.",
+        remedy="Give [styli.NAME] offset_mm in the machine or job file.",
+        example='`SNSLCT/S(S2)` and no [styli."S2"].',
+    ),
+    _rule(
+        "OLP523",
+        "frame is not read in this form",
+        why="The frame is turned, tilted or named in a way whose effect on positions is not known here.",
+        remedy="State the frame with its numbers and without the turn, as the message says.",
+        example="`CSYS/A1` with a name instead of numbers.",
+    ),
+    _rule(
+        "OLP524",
+        "position is not known",
+        why="The block needs the present position, and an axis has not been commanded yet. The error of the "
+        "machine depends on it.",
+        remedy="Command X, Y and Z first, or give start_mm in the job file.",
+        example="`G2 X10 Y0 I5` as the first move.",
+        follows=True,
+    ),
+    _rule(
+        "OLP525",
+        "later blocks depend on block delete",
+        why="One corrected program cannot be right for both positions of the switch.",
+        remedy="Take the `/` out, or restate the code or the axes in the next block without `/`.",
+        example="`/G91` before `G1 X10`.",
+    ),
+    _rule(
+        "OLP526",
+        "writes a table of the control",
+        why="Tables of tools and offsets decide later positions, and what this block writes there is not "
+        "read.",
+        remedy="State the values in the machine or job file, and take the block out.",
+        example="`G10 L1 P1 Z100`.",
+    ),
+    _rule(
+        "OLP530",
+        "impossible arc",
+        why="The control refuses an arc whose start, end and centre or radius do not fit.",
+        remedy="Write more digits, or check the plane (G17, G18, G19) and whether I, J, K are absolute "
+        "(G90.1).",
+        example="`G2 X10 Y0 I4 J0` from X0 Y0: the radius is 4 mm at its start and 6 mm at its end.",
+        follows=True,
+    ),
+    _rule(
+        "OLP531",
+        "canned cycle is incomplete",
+        why="A word of the cycle is missing or impossible, so its path is not known.",
+        remedy="Give the word in the first block of the cycle.",
+        example="`G83 X0 Y0 Z-10 R2` without Q.",
+        follows=True,
+    ),
+    _rule(
+        "OLP532",
+        "order of statements",
+        why="The statement needs another one before it or after it.",
+        remedy="Give the statement that the message names.",
+        example="`ENDMES` without MEAS.",
+        follows=True,
+    ),
+    _rule(
+        "OLP533",
+        "named position is not certain",
+        why="The statement moves to a position by its name, and the text has none or two of that name.",
+        remedy="Define the position once, or correct the list of positions that has it.",
+        example="`JMOVE P5` without a definition of P5.",
+        follows=True,
+    ),
+    _rule(
+        "OLP540",
+        "expression is not valid",
+        why="The value of the word cannot be computed.",
+        remedy="Correct the expression.",
+        example="`X[1/0]`.",
+        follows=True,
+    ),
+    _rule(
+        "OLP541",
+        "value is not known off line",
+        why="The value is in the control: a probe result, an offset, a setting, or a parameter that another "
+        "program has set.",
+        remedy="Assign the value in the program, before it is used.",
+        example="`X#5061` (the last probe result).",
+        follows=True,
+    ),
+    _rule(
+        "OLP542",
+        "loop, branch or call without its other end",
+        why="A loop has no end, a branch no target, or a subprogram no text.",
+        remedy="Add what is missing, or put the file of the subprogram beside the program.",
+        example="`M98 P1000` and no O1000.",
+        follows=True,
+    ),
+    _rule(
+        "OLP543",
+        "run is too long",
+        why="The unrolled program would have more blocks, levels or pecks than can be meant.",
+        remedy="Correct the endless loop, or the step that is too small.",
+        example="`WHILE [1 EQ 1] DO1`.",
+    ),
+    _rule(
+        "OLP544",
+        "cannot be unrolled",
+        why="Plain blocks cannot have the effect of this statement.",
+        remedy="Write the path as plain blocks, as the message says.",
+        example="`G66 P9000`, a macro after every move.",
+    ),
+    _rule(
+        "OLP550",
+        "payload is not certain",
+        why="The errors of the machine depend on the payload, and two sources contradict each other or one "
+        "is "
+        "not understood.",
+        remedy="State the payload once: in the comments of the program, or in the job file.",
+        example="`(OLP PAYLOAD heavy)`.",
+    ),
+    _rule(
+        "OLP551",
+        "feed or dwell has no value",
+        why="Without it the time of the motion is not known.",
+        remedy="Give the word that the message names.",
+        example="`G1 X10` before any F.",
+        follows=True,
+    ),
+    _rule(
+        "OLP560",
+        "already corrected",
+        why="The text has the stamp of a correction. A second one would apply the model twice.",
+        remedy="Correct the nominal program.",
+        example="`olp correct part.corrected.ngc`.",
+    ),
+    _rule(
+        "OLP561",
+        "correction cannot be written",
+        why="The corrected block would not have the meaning that it must have.",
+        remedy="Change the block in the nominal program, as the message says.",
+        example="A short arc of G93 before which backlash has to be taken up.",
+    ),
+    _rule(
+        "OLP562",
+        "not a correction of the nominal program",
+        why="The two programs do not belong together, so nothing is proved about them.",
+        remedy="Give the nominal program and its own correction, the nominal one first.",
+        example="`olp verify part.corrected.ngc part.ngc`: the order is wrong.",
+    ),
+)
