@@ -114,6 +114,8 @@ class AxisState(State):
                     f'work offset {name} is used but not defined; give [work_offsets."{name}"] '
                     "in the machine or job file",
                     line=line,
+                    code="OLP520",
+                    missing=("work_offsets", name),
                 )
             base = list(work.offset_mm)
         if work is not None and any(work.rotation_deg):
@@ -121,6 +123,7 @@ class AxisState(State):
                 f"work offset {name} is rotated, which is not read in this dialect; "
                 "state it with A_deg = B_deg = C_deg = 0",
                 line=line,
+                code="OLP523",
             )
         frame = Frame(
             unit_mm=self.unit_mm,
@@ -174,6 +177,8 @@ class AxisState(State):
                 f"{what} uses tool {number}, which is not defined; give [tools.{number}] in the machine or "
                 "job file",
                 line=line,
+                code="OLP521",
+                missing=("tools", str(number)),
             )
         return tool.length_mm
 
@@ -208,12 +213,14 @@ class AxisState(State):
             self.selected = self._integer(by_letter["T"], line)
         if TOOL_CHANGE in m_codes:
             if self.selected is None:
-                raise ProgramError("M6 changes to a tool, but no T word comes before it; give T", line=line)
+                raise ProgramError(
+                    "M6 changes to a tool, but no T word comes before it; give T", line=line, code="OLP516"
+                )
             self.spindle = self.selected
             self._tool(self.spindle, line, "M6")
         if SET_TOOL in m_codes and self.profile.m61_sets_tool:
             if "Q" not in by_letter:
-                raise ProgramError("M61 needs a Q word with the tool number", line=line)
+                raise ProgramError("M61 needs a Q word with the tool number", line=line, code="OLP516")
             self.spindle = self._integer(by_letter["Q"], line)
         if any(self.may_move(m) for m in m_codes):
             self.forget()
@@ -279,7 +286,9 @@ class AxisState(State):
             w.letter == "G" and w.value in (0, 1, 2, 3) for w in by_letter.values()
         ):
             raise ProgramError(
-                "a dwell and a motion are in one block; put the dwell into its own block", line=line
+                "a dwell and a motion are in one block; put the dwell into its own block",
+                line=line,
+                code="OLP518",
             )
         return Effect(consumed=True)
 
@@ -293,7 +302,9 @@ class AxisState(State):
         elif self.profile.length_of_spindle_tool and code != 432:
             number = self.spindle or 0
         else:
-            raise ProgramError(f"{name} needs an H word with the number of the tool length", line=line)
+            raise ProgramError(
+                f"{name} needs an H word with the number of the tool length", line=line, code="OLP516"
+            )
         if self.spindle is None and number:
             # only the length that is called up shows which tool is in the spindle
             self.length_tool = number
@@ -325,7 +336,9 @@ class AxisState(State):
         if code in (541, 1540):
             if "P" not in by_letter:
                 raise ProgramError(
-                    f"G{code / 10:g} needs a P word with the number of the work offset", line=line
+                    f"G{code / 10:g} needs a P word with the number of the work offset",
+                    line=line,
+                    code="OLP516",
                 )
             name = f"G{code / 10:g}P{self._integer(by_letter['P'], line)}"
         else:
@@ -355,12 +368,17 @@ class AxisState(State):
             raise ProgramError(
                 f"{what} writes tables of the control, which is not read; expected L2 or L20",
                 line=line,
+                code="OLP526",
             )
         if "R" in by_letter and by_letter["R"].value != 0:
-            raise ProgramError("G10 R rotates the work offset, which is not read; use R0", line=line)
+            raise ProgramError(
+                "G10 R rotates the work offset, which is not read; use R0", line=line, code="OLP526"
+            )
         number = self._integer(by_letter["P"], line) if "P" in by_letter else -1
         if not 0 <= number <= self.profile.g10_offsets:
-            raise ProgramError("G10 needs a P word with the number of a work offset, 1 for G54", line=line)
+            raise ProgramError(
+                "G10 needs a P word with the number of a work offset, 1 for G54", line=line, code="OLP516"
+            )
         name = self.offsets.name if number == 0 else f"G{53 + number}" if number < 7 else f"G59.{number - 6}"
         base = self._work_mm(name)
         for i, word in axis_words:
@@ -404,13 +422,14 @@ class AxisState(State):
                 f"{word.letter} is stored as the present position, but the axis has not been commanded yet; "
                 "give start_mm in the job file or command the axis first",
                 line=line,
+                code="OLP524",
             )
         self.captures.append(Capture(word.index, axis, self.unit_mm, moves, line))
 
     @staticmethod
     def _integer(word: Word, line: int) -> int:
         if word.value != round(word.value) or word.value < 0:
-            raise ProgramError(f"{word.letter}{word.value:g} is not an integer", line=line)
+            raise ProgramError(f"{word.letter}{word.value:g} is not an integer", line=line, code="OLP516")
         return round(word.value)
 
     @staticmethod

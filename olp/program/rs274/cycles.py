@@ -150,7 +150,8 @@ def hole_moves(
     _check(code, plane, r, z, q, p)
     if not rules.taps_in_any_plane and code in _TAPPING and plane != 17:
         raise ProgramError(
-            f"G{code // 10} in plane G{plane}: LinuxCNC 2.9 taps along the wrong axes outside G17; use G17"
+            f"G{code // 10} in plane G{plane}: LinuxCNC 2.9 taps along the wrong axes outside G17; use G17",
+            code="OLP531",
         )
     axes = PLANES[plane]
     level = start[axes[2]]
@@ -199,7 +200,7 @@ def cycle_moves(
     In G90 the step is zero: RS-274 makes the same hole again. Other arguments and errors as in `hole_moves`.
     """
     if repeats < 1:
-        raise ProgramError("the cycle is repeated fewer than one time; expected L1 or more")
+        raise ProgramError("the cycle is repeated fewer than one time; expected L1 or more", code="OLP531")
     strokes: list[Stroke] = []
     for _ in range(repeats):
         strokes += hole_moves(
@@ -328,20 +329,27 @@ def _check(code: int, plane: int, r: float, z: float, q: float | None, p: float 
     if code not in CODES:
         raise ProgramError(
             f"{name} has no geometry that is known offline; expected one of "
-            f"{', '.join(f'G{known / 10:g}' for known in sorted(CODES))}; write the hole as plain moves"
+            f"{', '.join(f'G{known / 10:g}' for known in sorted(CODES))}; write the hole as plain moves",
+            code="OLP544",
         )
     if plane not in PLANES:
-        raise ProgramError(f"{name} in plane G{plane}; expected G17, G18 or G19")
+        raise ProgramError(f"{name} in plane G{plane}; expected G17, G18 or G19", code="OLP531")
     if not all(map(math.isfinite, (r, z))):
-        raise ProgramError(f"{name} without a finite R and Z; give both on the first block of the cycle")
+        raise ProgramError(
+            f"{name} without a finite R and Z; give both on the first block of the cycle", code="OLP531"
+        )
     if r < z:
-        raise ProgramError(f"{name} has R {r:g} below the bottom {z:g}; R must not be below it")
+        raise ProgramError(
+            f"{name} has R {r:g} below the bottom {z:g}; R must not be below it", code="OLP531"
+        )
     if code in _PECKING:
         if q is None or not q > 0:
-            raise ProgramError(f"{name} needs a peck Q greater than zero, found {q}")
+            raise ProgramError(f"{name} needs a peck Q greater than zero, found {q}", code="OLP531")
         if (r - z) / q > _MAX_PECKS:
-            raise ProgramError(f"{name} with Q {q:g} makes more than {_MAX_PECKS} pecks; give a larger Q")
+            raise ProgramError(
+                f"{name} with Q {q:g} makes more than {_MAX_PECKS} pecks; give a larger Q", code="OLP543"
+            )
     if code in _DWELL_NEEDED and p is None:
-        raise ProgramError(f"{name} needs a dwell P; give P0 for none")
+        raise ProgramError(f"{name} needs a dwell P; give P0 for none", code="OLP531")
     if p is not None and p < 0:
-        raise ProgramError(f"{name} has a negative dwell P {p:g}; expected zero or more")
+        raise ProgramError(f"{name} has a negative dwell P {p:g}; expected zero or more", code="OLP531")

@@ -32,6 +32,8 @@ from olp.program.rs274.profiles.base import Act
 Modal = npt.NDArray[np.int16]
 
 _FLOW = re.compile(rb"[#\[=<]|^/?\s*O|^\W*N?\d*\s*(IF|WHILE|GOTO|END|DO)", re.IGNORECASE)
+#: A bracket that opens inside a comment, with text behind the one that closes it
+_NESTED = re.compile(rb"\([^()]*\([^()]*\)[^()]*\)")
 #: Events whose axis words are not motion: G10 G52 G92 G43.1
 _CLAIMS = (WRITE_OFFSET, *SHIFTS, LENGTH_FROM_WORDS)
 _LENGTHS = np.zeros(256, bool)
@@ -106,6 +108,7 @@ class Modes:
                     "the end of the program is under block delete; "
                     "expected the same end for both positions of the switch",
                     line=chunk.first_line + int(ends[0]) + 1,
+                    code="OLP525",
                 )
             last, self._ended = int(ends[0]) + 1, True
         for mark in chunk.marks.tolist():
@@ -188,23 +191,36 @@ class Modes:
 
 
 def check_odd(data: bytes, chunk: WordChunk, active: Mask) -> None:
-    """Refuse active lines with more than words."""
-    for line in chunk.odd.tolist():
-        if not active[line]:
-            continue
-        text = data[chunk.line_start[line] : chunk.line_end[line]].strip()
-        number = chunk.first_line + line + 1
-        shown = text[:60].decode("latin-1")
-        if _FLOW.search(text):
-            raise ProgramError(
-                f"`{shown}` uses parameters, expressions or flow control; unroll the program with olp "
-                "correct --flatten",
-                line=number,
-            )
-        raise ProgramError(
-            f"`{shown}` is not understood and may move the machine; expected words of a letter and a number",
+    """Refuse active lines with more than words, all of the chunk at once."""
+    lines = chunk.odd[active[chunk.odd]].tolist()
+    if lines:
+        raise ProgramError.together(_odd(data, chunk, line) for line in lines)
+
+
+def _odd(data: bytes, chunk: WordChunk, line: int) -> ProgramError:
+    """Why a line with more than words is refused."""
+    text = data[chunk.line_start[line] : chunk.line_end[line]].strip()
+    number = chunk.first_line + line + 1
+    shown = text[:60].decode("latin-1")
+    if _NESTED.search(text):
+        return ProgramError(
+            f"`{shown}` has a comment inside a comment, and the first `)` ends both; "
+            "take the inner brackets out, or write [ and ] there",
             line=number,
+            code="OLP514",
         )
+    if _FLOW.search(text):
+        return ProgramError(
+            f"`{shown}` uses parameters, expressions or flow control",
+            hint="unroll the program with olp correct --flatten",
+            line=number,
+            code="OLP511",
+        )
+    return ProgramError(
+        f"`{shown}` is not understood and may move the machine; expected words of a letter and a number",
+        line=number,
+        code="OLP510",
+    )
 
 
 def scaled(context: Context, state: AxisState, remarks: dict[str, tuple[int, str]]) -> Array:
@@ -237,10 +253,13 @@ def _modal(chunk: WordChunk, codes: Codes, which: Act, now: int | None) -> Modal
 
 def _in_force(chunk: WordChunk, lines: Index, code: Index, now: int | None) -> Modal:
     if (lines[1:] == lines[:-1]).any():
-        twice = int(lines[1:][lines[1:] == lines[:-1]][0])
-        raise ProgramError(
-            "two G codes of the same modal group are in this block; expected one",
-            line=chunk.first_line + twice + 1,
+        raise ProgramError.together(
+            ProgramError(
+                "two G codes of the same modal group are in this block; expected one",
+                line=chunk.first_line + twice + 1,
+                code="OLP515",
+            )
+            for twice in np.unique(lines[1:][lines[1:] == lines[:-1]]).tolist()
         )
     return modal(len(chunk.line_start), lines, code, -1 if now is None else now)
 
@@ -263,4 +282,5 @@ def _check_deleted(context: Context, active: Mask, state: AxisState) -> None:
                     "a block under block delete changes a modal code that later blocks depend on; "
                     "restate the code in the next block or remove the `/`",
                     line=context.number(line),
+                    code="OLP525",
                 )

@@ -111,10 +111,13 @@ def _slots(
     flat = row_of[chunk.line[words]] * width + column[words]
     slot.reshape(-1)[flat] = words
     if np.count_nonzero(slot >= 0) != len(words):
-        twice = int(np.flatnonzero(np.bincount(flat, minlength=slot.size) > 1)[0])
-        raise ProgramError(
-            f"the word {chr(names[twice % width])} is twice in this block; expected it once",
-            line=int(rows[twice // width]) + chunk.first_line + 1,
+        raise ProgramError.together(
+            ProgramError(
+                f"the word {chr(names[twice % width])} is twice in this block; expected it once",
+                line=int(rows[twice // width]) + chunk.first_line + 1,
+                code="OLP515",
+            )
+            for twice in np.flatnonzero(np.bincount(flat, minlength=slot.size) > 1).tolist()
         )
     return slot
 
@@ -178,16 +181,21 @@ def arc_geometry(
     axes = np.array(PLANES)[plane]
     first, second = axes[:, 0], axes[:, 1]
 
-    def refuse(bad: Mask, message: str) -> None:
+    def refuse(bad: Mask, message: str, code: str = "OLP530") -> None:
         if bad.any():
-            i = int(np.flatnonzero(bad)[0])
-            raise ProgramError(message.format(r0=r0[i], r1=r1[i], chord=2 * half[i]), line=int(line[i]))
+            raise ProgramError.together(
+                ProgramError(
+                    message.format(r0=r0[i], r1=r1[i], chord=2 * half[i]), line=int(line[i]), code=code
+                )
+                for i in np.flatnonzero(bad).tolist()
+            )
 
     r0 = r1 = half = np.zeros(len(start))
     refuse(
         ~np.asarray(np.isfinite(start).all(axis=1) & np.isfinite(end).all(axis=1)),
         "an arc starts or ends where an axis has not been commanded yet; "
         "command X, Y and Z first, or give start_mm in the job file",
+        "OLP524",
     )
     s0, s1, e0, e1 = start[rows, first], start[rows, second], end[rows, first], end[rows, second]
     c0, c1, radius, turns = words[rows, first], words[rows, second], words[:, 3], words[:, 4]
@@ -195,15 +203,18 @@ def arc_geometry(
     refuse(
         ~by_radius & np.isnan(c0) & np.isnan(c1),
         "an arc has neither centre words of its plane nor a radius; expected I, J, K or R",
+        "OLP516",
     )
     refuse(
         ~by_radius & absolute & (np.isnan(c0) | np.isnan(c1)),
         "in G90.1 an arc needs both centre words of its plane",
+        "OLP516",
     )
     turns = np.where(np.isnan(turns), 1.0, turns)
     refuse(
         (turns != np.rint(turns)) | (turns < 1),
         "P of an arc is its number of turns; expected an integer from 1",
+        "OLP516",
     )
     base0, base1 = (np.where(absolute, offset[rows, f], s) for f, s in ((first, s0), (second, s1)))
     centre0, centre1 = np.nan_to_num(c0) + base0, np.nan_to_num(c1) + base1

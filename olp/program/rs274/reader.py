@@ -37,7 +37,7 @@ from olp.program.rs274.lexer import WordChunk, chunks
 from olp.program.rs274.modes import Context, Modes, check_odd, scaled
 from olp.program.rs274.motion import Blocks, arc_geometry, fill, gather
 from olp.program.rs274.profiles.base import Profile
-from olp.program.rs274.special_blocks import SpecialBlocks, event_block
+from olp.program.rs274.special_blocks import SpecialBlocks, check_codes, event_block
 
 #: motion code to kind of move; 255 where it is not plain motion, the last entry is for "none yet"
 _KIND = np.full(1001, 255, np.uint8)
@@ -88,7 +88,9 @@ class _Reader:
         data = self.data
         if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
             raise ProgramError(
-                "the text is UTF-16; expected one byte per character; save it as plain text", line=1
+                "the text is UTF-16; expected one byte per character; save it as plain text",
+                line=1,
+                code="OLP502",
             )
         if data[:3] == b"\xef\xbb\xbf":
             # the lexer reads a byte order mark as blanks; it stays in the text
@@ -112,6 +114,7 @@ class _Reader:
             active &= ~chunk.deleted
         check_odd(self.data, chunk, active)
         context = self.modes.read(chunk, base, active)
+        check_codes(context, active, self.state.profile)
         # a payload makes a new frame, from the motion of its own line on
         context.event[[line for line in self.payloads if active[line]]] = True
         self._stretches(context, gather(chunk, context.motion, context.consumed))
@@ -178,8 +181,8 @@ class _Reader:
         motion = context.motion[line]
         kind = _KIND[np.maximum(motion, -1)]
         if (kind == 255).any():
-            i = int(np.flatnonzero(kind == 255)[0])
-            _refuse_motion(int(motion[i]), int(number[i]))
+            rows_without = np.flatnonzero(kind == 255).tolist()
+            raise ProgramError.together(_no_motion(int(motion[i]), int(number[i])) for i in rows_without)
         incremental = context.distance[line] == INCREMENTAL
         frame = rows.frame[a:upto]
         offset, unit = self._offsets(frame)
@@ -244,10 +247,11 @@ class _Reader:
         return offsets[frame], units[frame][:, None]
 
 
-def _refuse_motion(code: int, line: int) -> None:
+def _no_motion(code: int, line: int) -> ProgramError:
     if code in (-1, 800):
-        raise ProgramError(
+        return ProgramError(
             "a block has axis words, but no motion code is in force; expected G0, G1, G2 or G3",
             line=line,
+            code="OLP517",
         )
-    raise ProgramError(f"G{code / 10:g} is not read as motion", line=line)
+    return ProgramError(f"G{code / 10:g} is not read as motion", line=line, code="OLP512")

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Index
+from olp.core.arrays import Index, Mask
 from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES
 from olp.core.toolpath import Flag, Kind
@@ -40,6 +40,7 @@ _M_REFUSED = {
     730: "saves modal codes", 960: "branches", 970: "calls a subprogram", 980: "calls a subprogram",
     990: "repeats the program",
 }  # fmt: skip
+_M_CODES = np.array(list(_M_REFUSED))
 
 
 def event_block(context: Context, line: int, profile: Profile) -> tuple[list[Word], list[int]]:
@@ -61,6 +62,7 @@ def event_block(context: Context, line: int, profile: Profile) -> tuple[list[Wor
             "a block under block delete changes offsets, units, path mode, the tool or its compensation, "
             "so later blocks depend on the switch; remove the `/`",
             line=number,
+            code="OLP525",
         )
     return words, events
 
@@ -78,14 +80,33 @@ def _checked(
             raise ProgramError(
                 why or f"{name} is not known to the {profile.name} profile and may move the machine",
                 line=line,
+                code="OLP513" if c in CUTTER_COMPENSATION else "OLP512",
             )
     for word in words:
         m = round(word.value * 10)
         if word.letter == "M" and m in _M_REFUSED:
             raise ProgramError(
-                f"M{m / 10:g} {_M_REFUSED[m]}; unroll the program with olp correct --flatten", line=line
+                f"M{m / 10:g} {_M_REFUSED[m]}",
+                hint="unroll the program with olp correct --flatten",
+                line=line,
+                code="OLP511",
             )
     return [c for c, a in zip(code.tolist(), act.tolist(), strict=True) if a == Act.EVENT]
+
+
+def check_codes(context: Context, active: Mask, profile: Profile) -> None:
+    """Refuse the codes of a chunk that need no state to be refused, all at once."""
+    chunk, codes = context.chunk, context.codes
+    m = (chunk.letter == ord("M")) & active[chunk.line] & np.isin(np.rint(context.value * 10), _M_CODES)
+    lines = np.union1d(codes.line[codes.act == Act.REFUSE], chunk.line[m])
+    errors = []
+    for line in lines.tolist():
+        try:
+            event_block(context, line, profile)
+        except ProgramError as error:
+            errors.append(error)
+    if errors:
+        raise ProgramError.together(errors)
 
 
 class SpecialBlocks:
@@ -134,9 +155,13 @@ class SpecialBlocks:
         offset = np.array(frame.offset_mm)
         if effect.machine:
             if incremental:
-                raise ProgramError("G53 takes axis positions, and the block is in G91; give G90", line=line)
+                raise ProgramError(
+                    "G53 takes axis positions, and the block is in G91; give G90", line=line, code="OLP518"
+                )
             if motion not in (0, 10):
-                raise ProgramError("G53 takes G0 or G1 only; give one of them in the block", line=line)
+                raise ProgramError(
+                    "G53 takes G0 or G1 only; give one of them in the block", line=line, code="OLP518"
+                )
             kind = Kind(motion // 10)
             flag |= Flag.PASS | Flag.MACHINE
             offset = np.zeros(3)
@@ -198,6 +223,7 @@ class SpecialBlocks:
                 "a canned cycle starts where an axis has not been commanded yet; "
                 "command X, Y and Z first, or give start_mm in the job file",
                 line=line,
+                code="OLP524",
             )
         start = (state.position[0], state.position[1], state.position[2])
         exempt = Flag.PASS if self._switches.off(line) else Flag(0)
@@ -211,7 +237,7 @@ class SpecialBlocks:
                     rules=state.profile.cycles,
                 )  # fmt: skip
             except ProgramError as error:
-                raise ProgramError(error.message, line=line) from None
+                raise ProgramError(error.message, line=line, code=error.code) from None
             moving = [s for s in strokes if s.kind in ("rapid", "feed")]
             count = len(moving)
             begin = collector.moves
@@ -252,7 +278,9 @@ class SpecialBlocks:
         missing = [letter for letter in ("R", depth) if letter not in series.held]
         if missing:
             raise ProgramError(
-                f"the cycle G{code / 10:g} has no {' and no '.join(missing)} word", line=context.number(row)
+                f"the cycle G{code / 10:g} has no {' and no '.join(missing)} word",
+                line=context.number(row),
+                code="OLP531",
             )
         return {letter: value for letter, value in series.held.items() if value is not None}
 
@@ -264,6 +292,7 @@ class SpecialBlocks:
             raise ProgramError(
                 "a canned cycle with zero repeats only stores values, which is not read; give one or more",
                 line=line,
+                code="OLP531",
             )
         return times
 

@@ -73,7 +73,7 @@ def whole(value: float, what: str) -> int:
     """`value` as an integer where it is one within 1e-4; ProgramError otherwise."""
     nearest = math.floor(value + 0.5) if math.isfinite(value) else 0
     if not math.isfinite(value) or abs(value - nearest) > EQUAL_WITHIN:
-        raise ProgramError(f"{what} is {value:g}; expected an integer")
+        raise ProgramError(f"{what} is {value:g}; expected an integer", code="OLP540")
     return nearest
 
 
@@ -103,7 +103,9 @@ class Reader:
         """A real value: number, parameter, function or bracketed expression, with an optional sign."""
         self._depth += 1
         if self._depth > _MAX_DEPTH:
-            raise ProgramError(f"an expression is nested deeper than {_MAX_DEPTH}; split it over lines")
+            raise ProgramError(
+                f"an expression is nested deeper than {_MAX_DEPTH}; split it over lines", code="OLP543"
+            )
         try:
             return self._value()
         finally:
@@ -128,7 +130,9 @@ class Reader:
         if function:
             self.position = function.end()
             return self._call(function.group(1))
-        raise ProgramError(f"expected a number, a parameter or [expression] at {text[start : start + 12]!r}")
+        raise ProgramError(
+            f"expected a number, a parameter or [expression] at {text[start : start + 12]!r}", code="OLP540"
+        )
 
     def parameter_index(self) -> Callable[[Parameters], int | str]:
         """Index (int) or name (str) of the parameter at this position, which starts with `#`."""
@@ -136,7 +140,7 @@ class Reader:
         if self.text.startswith("<", self.position):
             end = self.text.find(">", self.position)
             if end < 0:
-                raise ProgramError("a parameter name has no closing '>'")
+                raise ProgramError("a parameter name has no closing '>'", code="OLP540")
             name = self.text[self.position + 1 : end]
             self.position = end + 1
             return lambda _: name
@@ -190,7 +194,7 @@ class Reader:
         if name == "exists":
             self._expect("[")
             if not self.text.startswith("#<", self.position):
-                raise ProgramError("EXISTS takes a named parameter, as in EXISTS[#<name>]")
+                raise ProgramError("EXISTS takes a named parameter, as in EXISTS[#<name>]", code="OLP540")
             where = self.parameter_index()
             self._expect("]")
             return lambda parameters: float(parameters.exists(str(where(parameters))))
@@ -202,7 +206,7 @@ class Reader:
                 angle = self.arithmetic.angle
                 return lambda p: angle(filled(argument(p)), filled(run(p)))
             if not self.arithmetic.single_atan:
-                raise ProgramError("ATAN takes two arguments, as in ATAN[y]/[x]")
+                raise ProgramError("ATAN takes two arguments, as in ATAN[y]/[x]", code="OLP540")
             return lambda p: math.degrees(math.atan(filled(argument(p))))
         function = self.arithmetic.functions[name]
         return lambda p: _finite(function(filled(argument(p))), name)
@@ -210,7 +214,7 @@ class Reader:
     def _expect(self, character: str) -> None:
         if not self.text.startswith(character, self.position):
             rest = self.text[self.position : self.position + 12]
-            raise ProgramError(f"expected {character!r} in an expression, found {rest!r}")
+            raise ProgramError(f"expected {character!r} in an expression, found {rest!r}", code="OLP540")
         self.position += 1
 
 
@@ -224,26 +228,26 @@ def _negated(operand: Expression) -> Expression:
 
 def _finite(value: float, what: str) -> float:
     if not math.isfinite(value):
-        raise ProgramError(f"{what.upper()} gives a number that is not finite")
+        raise ProgramError(f"{what.upper()} gives a number that is not finite", code="OLP540")
     return value
 
 
 def _divide(a: float, b: float) -> float:
     if b == 0:
-        raise ProgramError("division by zero in an expression")
+        raise ProgramError("division by zero in an expression", code="OLP540")
     return a / b
 
 
 def _modulo(a: float, b: float) -> float:
     if b == 0:
-        raise ProgramError("MOD by zero in an expression")
+        raise ProgramError("MOD by zero in an expression", code="OLP540")
     rest = math.fmod(a, b)
     return rest + abs(b) if rest < 0 else rest
 
 
 def _fanuc_modulo(a: float, b: float) -> float:
     if b == 0:
-        raise ProgramError("MOD by zero in an expression")
+        raise ProgramError("MOD by zero in an expression", code="OLP540")
     return math.fmod(a, b)
 
 
@@ -251,7 +255,7 @@ def _power(a: float, b: float) -> float:
     try:
         return math.pow(a, b)
     except (ValueError, OverflowError):
-        raise ProgramError(f"{a:g} ** {b:g} has no finite real value") from None
+        raise ProgramError(f"{a:g} ** {b:g} has no finite real value", code="OLP540") from None
 
 
 def _guarded(function: Callable[[float], float], name: str) -> Callable[[float], float]:
@@ -259,7 +263,7 @@ def _guarded(function: Callable[[float], float], name: str) -> Callable[[float],
         try:
             return function(x)
         except (ValueError, OverflowError):
-            raise ProgramError(f"{name}[{x:g}] has no finite real value") from None
+            raise ProgramError(f"{name}[{x:g}] has no finite real value", code="OLP540") from None
 
     return call
 
@@ -272,7 +276,8 @@ def _atan2_of_positive(rise: float, run: float) -> float:
     if rise < 0:
         raise ProgramError(
             "ATAN of a negative first argument is in 0..360 or in -180..180, as a parameter of the control "
-            "decides, which is not known off line; write the angle with ACOS or ASIN"
+            "decides, which is not known off line; write the angle with ACOS or ASIN",
+            code="OLP541",
         )
     return math.degrees(math.atan2(rise, run))
 

@@ -160,7 +160,9 @@ def _compile(source: _Source, begin: int, language: Language) -> Line:
         if flow is not None:
             if reader.position < len(text):
                 rest = text[reader.position :]
-                raise ProgramError(f"{flow.keyword.upper()} is followed by {rest!r}, which is not understood")
+                raise ProgramError(
+                    f"{flow.keyword.upper()} is followed by {rest!r}, which is not understood", code="OLP510"
+                )
             break
         words.append(_word(reader, source.places, language))
     return Line(
@@ -173,7 +175,7 @@ def _word(reader: Reader, places: list[int], language: Language) -> Word:
     text, start = reader.text, reader.position
     letter = _LETTER.match(text, start)
     if letter is None:
-        raise ProgramError(f"expected a word at {text[start : start + 12]!r}")
+        raise ProgramError(f"expected a word at {text[start : start + 12]!r}", code="OLP510")
     value_start = letter.end()
     literal = _LITERAL.match(text, value_start)
     if literal and _PLAIN_END.match(text, literal.end()):
@@ -186,7 +188,8 @@ def _word(reader: Reader, places: list[int], language: Language) -> Word:
         if language.increments_open and ("round[" in written or "rnd[" in written):
             raise ProgramError(
                 "ROUND inside a word rounds to the least increment, which is not known here; "
-                "assign the rounded value to a variable first"
+                "assign the rounded value to a variable first",
+                code="OLP541",
             )
     return Word(
         letter.group(),
@@ -203,7 +206,7 @@ def _assignment(reader: Reader, places: list[int], language: Language) -> Assign
     start = reader.position
     target = reader.parameter_index()
     if not reader.text.startswith("=", reader.position):
-        raise ProgramError("a parameter without '=' is where a word is expected")
+        raise ProgramError("a parameter without '=' is where a word is expected", code="OLP510")
     reader.position += 1
     value = reader.unbracketed() if language.macro_b else reader.value()
     return Assignment(target, value, places[start], places[reader.position - 1] + 1)
@@ -226,7 +229,8 @@ def _o_word(reader: Reader) -> Flow:
     if keyword is None:
         if reader.position < len(text) or not label.isdigit():
             raise ProgramError(
-                f"O-word without a known keyword at {text[reader.position : reader.position + 12]!r}"
+                f"O-word without a known keyword at {text[reader.position : reader.position + 12]!r}",
+                code="OLP542",
             )
         return Flow("program", label)
     reader.position = keyword.end()
@@ -235,9 +239,13 @@ def _o_word(reader: Reader) -> Flow:
         values.append(reader.bracket())
     name = keyword.group()
     if name in _WITH_VALUE and len(values) != 1:
-        raise ProgramError(f"O-word {name.upper()} has {len(values)} values; expected one [expression]")
+        raise ProgramError(
+            f"O-word {name.upper()} has {len(values)} values; expected one [expression]", code="OLP542"
+        )
     if dynamic is not None and name != "call":
-        raise ProgramError(f"O-word {name.upper()} has a computed label; only CALL may have one")
+        raise ProgramError(
+            f"O-word {name.upper()} has a computed label; only CALL may have one", code="OLP542"
+        )
     return Flow(name, label, dynamic, tuple(values))
 
 
@@ -256,12 +264,12 @@ def _macro_b(
             while text.startswith("#", reader.position):
                 assignments.append(_assignment(reader, places, language))
             return Flow("when-then", "", None, (condition,))
-        raise ProgramError("IF is followed by neither GOTO nor THEN")
+        raise ProgramError("IF is followed by neither GOTO nor THEN", code="OLP510")
     if text.startswith("while[", start):
         reader.position += 5
         condition = reader.bracket()
         if not text.startswith("do", reader.position):
-            raise ProgramError("WHILE is not followed by DO")
+            raise ProgramError("WHILE is not followed by DO", code="OLP542")
         reader.position += 2
         return Flow("while-do", _number_label(reader), None, (condition,))
     for keyword in ("goto", "do", "end"):
@@ -276,5 +284,5 @@ def _macro_b(
 def _number_label(reader: Reader) -> str:
     number = reader.number()
     if number is None:
-        raise ProgramError("DO and END take a plain number")
+        raise ProgramError("DO and END take a plain number", code="OLP542")
     return str(int(number))

@@ -54,13 +54,16 @@ class Walk:
             try:
                 if index >= len(frame.unit.lines):
                     if len(self._frames) > 1:
-                        raise ProgramError(f"subprogram {frame.label} has no end (ENDSUB or M99)")
+                        raise ProgramError(
+                            f"subprogram {frame.label} has no end (ENDSUB or M99)", code="OLP542"
+                        )
                     return
                 visits += 1
                 if visits > self.limit:
                     raise ProgramError(
                         f"the run visits more than {self.limit} blocks; "
-                        "correct an endless loop, or raise the limit"
+                        "correct an endless loop, or raise the limit",
+                        code="OLP543",
                     )
                 line = frame.unit.line(index)
                 frame.next_index += 1
@@ -121,7 +124,9 @@ class Walk:
         """A header such as O1234 is written at the start; a later one means that the program before has no
         end."""
         if len(self._frames) > 1:
-            raise ProgramError(f"subprogram {frame.label} runs into the next program; M99 is missing")
+            raise ProgramError(
+                f"subprogram {frame.label} runs into the next program; M99 is missing", code="OLP542"
+            )
         if self._headers:
             return True
         self._headers += 1
@@ -146,7 +151,7 @@ class Walk:
 
     def _do_elseif(self, flow: Flow, frame: Frame, index: int) -> None:
         if flow.label not in frame.taken:
-            raise ProgramError(f"{flow.keyword.upper()} without an IF with label {flow.label}")
+            raise ProgramError(f"{flow.keyword.upper()} without an IF with label {flow.label}", code="OLP542")
         frame.next_index = frame.unit.following(index, flow.label, frozenset({"endif"}))
 
     _do_else = _do_elseif
@@ -198,7 +203,9 @@ class Walk:
 
     def _do_continue(self, flow: Flow, frame: Frame, index: int) -> None:
         if flow.label in frame.dos:
-            raise ProgramError("CONTINUE within DO ... WHILE ends the loop in LinuxCNC 2.9; use IF")
+            raise ProgramError(
+                "CONTINUE within DO ... WHILE ends the loop in LinuxCNC 2.9; use IF", code="OLP544"
+            )
         frame.next_index = frame.unit.following(index, flow.label, self._loop_end(flow, frame))
 
     def _loop_end(self, flow: Flow, frame: Frame) -> frozenset[str]:
@@ -209,7 +216,9 @@ class Walk:
 
     def _open(self, table: dict[str, int], flow: Flow) -> int:
         if flow.label not in table:
-            raise ProgramError(f"{flow.keyword.upper()} with label {flow.label} has no open loop")
+            raise ProgramError(
+                f"{flow.keyword.upper()} with label {flow.label} has no open loop", code="OLP542"
+            )
         return table[flow.label]
 
     def _do_while_do(self, flow: Flow, frame: Frame, index: int) -> None:
@@ -242,7 +251,9 @@ class Walk:
     def _do_endsub(self, flow: Flow, frame: Frame, index: int) -> None:
         # RETURN may have any label, as in LinuxCNC.
         if len(self._frames) == 1 or (flow.keyword == "endsub" and flow.label != frame.label):
-            raise ProgramError(f"{flow.keyword.upper()} with label {flow.label} outside of its SUB")
+            raise ProgramError(
+                f"{flow.keyword.upper()} with label {flow.label} outside of its SUB", code="OLP542"
+            )
         value = flow.values[0](self.variables) if flow.values else None
         self.variables.globals |= {"_value": filled(value), "_value_returned": float(bool(flow.values))}
         self._leave()
@@ -257,17 +268,21 @@ class Walk:
         if label not in self._files:
             data = self._subprograms(label)
             if data is None:
-                raise ProgramError(f"subprogram {label} is not in the file, and no file for it was given")
+                raise ProgramError(
+                    f"subprogram {label} is not in the file, and no file for it was given", code="OLP542"
+                )
             self._files[label] = Unit(data, self.language, label)
         unit = self._files[label]
         start = unit.definition(label, keyword)
         if start is None:
-            raise ProgramError(f"the file of subprogram {label} does not define it")
+            raise ProgramError(f"the file of subprogram {label} does not define it", code="OLP542")
         return unit, start
 
     def _enter(self, frame: Frame) -> None:
         if len(self._frames) >= MAX_LEVEL:
-            raise ProgramError(f"subprograms call one another more than {MAX_LEVEL} levels deep")
+            raise ProgramError(
+                f"subprograms call one another more than {MAX_LEVEL} levels deep", code="OLP543"
+            )
         self._frames.append(frame)
         self.variables.locals, self.variables.names = frame.locals, frame.names
 
@@ -284,14 +299,18 @@ class Walk:
         saves = self.language.saved_modes and codes & {("m", 70.0), ("m", 72.0), ("m", 73.0)}
         if saves and (len(self._frames) > 1 or ("m", 73.0) in saves):
             raise ProgramError(
-                "M70, M72 and M73 act on a level of subprograms, which plain blocks do not have"
+                "M70, M72 and M73 act on a level of subprograms, which plain blocks do not have",
+                code="OLP544",
             )
         if self.language.profile_cycles and codes & _PROFILE_CYCLES:
             raise ProgramError(
-                "G70 to G72 take their profile from a subprogram, which plain blocks do not have"
+                "G70 to G72 take their profile from a subprogram, which plain blocks do not have",
+                code="OLP544",
             )
         if ("g", 66.0) in codes or ("g", 66.1) in codes:
-            raise ProgramError("G66 calls a macro after every move, which is not unrolled; call it with G65")
+            raise ProgramError(
+                "G66 calls a macro after every move, which is not unrolled; call it with G65", code="OLP544"
+            )
         if ("g", 65.0) in codes:
             self._macro(line, frame)
             return False
@@ -312,14 +331,14 @@ class Walk:
     def _call_m98(self, line: Line, frame: Frame, index: int, *, local: bool) -> None:
         target = self._word(line, "p")
         if target is None:
-            raise ProgramError("a subprogram call has no P word")
+            raise ProgramError("a subprogram call has no P word", code="OLP516")
         number = whole(target, "the program number P")
         count = self._word(line, "l")
         repeats = 1 if count is None else whole(count, "the repeat count L")
         if self.language.counts_in_p and count is None and number > 9999 and not local:
             repeats, number = divmod(number, 10_000)
         if repeats < 1:
-            raise ProgramError(f"a subprogram is called {repeats} times; expected one or more")
+            raise ProgramError(f"a subprogram is called {repeats} times; expected one or more", code="OLP516")
         without = frozenset(
             i
             for i, w in enumerate(line.words)
@@ -366,7 +385,7 @@ class Walk:
     def _macro(self, line: Line, frame: Frame) -> None:
         number = self._word(line, "p")
         if number is None:
-            raise ProgramError("G65 has no P word")
+            raise ProgramError("G65 has no P word", code="OLP516")
         count = self._word(line, "l")
         repeats = 1 if count is None else whole(count, "the repeat count L")
         arguments = dict(macro_arguments(line, self.variables))

@@ -87,7 +87,8 @@ class ProgramState(State):
         if math.isnan(value) or self.compensated:
             raise ProgramError(
                 f"the position of {AXES[axis]} is needed here and not known off line; "
-                f"command {AXES[axis]} before in the program"
+                f"command {AXES[axis]} before in the program",
+                code="OLP524",
             )
         return value
 
@@ -177,7 +178,9 @@ class ProgramState(State):
         if self.unit != unit:
             factor = NAN if self.unit is None else MM_PER_INCH if unit == METRIC else 1 / MM_PER_INCH
             if self.unit is not None and self.series.initial is not None:
-                raise ProgramError("the unit changes within a series of canned cycles; end it with G80 first")
+                raise ProgramError(
+                    "the unit changes within a series of canned cycles; end it with G80 first", code="OLP518"
+                )
             self.position = [p * factor for p in self.position]
             self.unit = unit
 
@@ -188,7 +191,7 @@ class ProgramState(State):
         elif code == 71:
             self.saved = None
         elif self.saved is None:
-            raise ProgramError("M72 without saved modes; M70 must come before")
+            raise ProgramError("M72 without saved modes; M70 must come before", code="OLP532")
         else:
             unit, modes, self.path = self.saved
             if unit is None and self.unit is not None:
@@ -208,19 +211,24 @@ class ProgramState(State):
         """Follow a block that makes a canned cycle; its strokes. ProgramError where a value is not known."""
         for letter, value in words:
             if letter in ("a", "b", "c", "u", "v", "w", "@", "^"):
-                raise ProgramError(f"a canned cycle moves {letter.upper()}, which is not understood")
+                raise ProgramError(
+                    f"a canned cycle moves {letter.upper()}, which is not understood", code="OLP531"
+                )
             if letter == "m" and value in _STOPS:
-                raise ProgramError(f"M{value:g} in the block of a canned cycle; put it into its own block")
+                raise ProgramError(
+                    f"M{value:g} in the block of a canned cycle; put it into its own block", code="OLP518"
+                )
         codes = self._modes(words)
         if self.inverse_time or self.compensated or self.odd_frame:
             raise ProgramError(
                 "a canned cycle is in inverse time, cutter compensation or a turned frame, "
-                "which is not read; end these modes first"
+                "which is not read; end these modes first",
+                code="OLP518",
             )
         chosen = codes & CYCLES
         code = next(iter(chosen)) if chosen else self.motion
         if code is None:
-            raise ProgramError("a canned cycle has no code; give one, such as G81")
+            raise ProgramError("a canned cycle has no code; give one, such as G81", code="OLP531")
         series = self.series
         if self.motion not in CYCLES:
             series.begin(None)
@@ -235,7 +243,9 @@ class ProgramState(State):
         follows = self.profile.cycles.levels_follow_distance
         turned = follows and series.held and self.held_absolute is not self.absolute
         if turned and not {depth, "R"} <= given.keys():
-            raise ProgramError("G90 and G91 change within a series of cycles; give R and the depth again")
+            raise ProgramError(
+                "G90 and G91 change within a series of cycles; give R and the depth again", code="OLP518"
+            )
         self.held_absolute = self.absolute
         series.hold(given, depth)
         repeats = self._repeats(given)
@@ -276,7 +286,7 @@ class ProgramState(State):
 
     def _no_repeats(self) -> int:
         if not self.profile.cycles.stores:
-            raise ProgramError("the cycle is repeated L0 times; expected L1 or more")
+            raise ProgramError("the cycle is repeated L0 times; expected L1 or more", code="OLP531")
         return 0
 
     def _hole_and_step(
@@ -299,13 +309,14 @@ class ProgramState(State):
         if value is None:
             raise ProgramError(
                 f"{letter} has no decimal point, so a parameter of the control decides whether it counts "
-                "least increments or whole units; write the point"
+                "least increments or whole units; write the point",
+                code="OLP541",
             )
         return value
 
     def _needed(self, letter: str) -> float:
         if letter not in self.series.held:
-            raise ProgramError(f"the canned cycle has no {letter} word")
+            raise ProgramError(f"the canned cycle has no {letter} word", code="OLP531")
         return self._known(letter, self.series.held[letter])
 
     def _optional(self, letter: str) -> float | None:
@@ -318,8 +329,11 @@ class ProgramState(State):
         if self.profile.cycles.peck_by_parameter:
             raise ProgramError(
                 f"G{code // 10} pecks with a clearance that a parameter of the control sets; "
-                "give peck_clearance_mm (--peck-clearance-mm)"
+                "give peck_clearance_mm (--peck-clearance-mm)",
+                code="OLP541",
             )
         if self.unit is None:
-            raise ProgramError(f"G{code // 10} before any G20 or G21, on which its peck clearance depends")
+            raise ProgramError(
+                f"G{code // 10} before any G20 or G21, on which its peck clearance depends", code="OLP541"
+            )
         return LCNC_CLEARANCE_INCH if self.unit == INCH else LCNC_CLEARANCE_MM

@@ -76,7 +76,9 @@ class Unit:
                 inner = flow.label
             elif flow.keyword in ("endsub", "program"):
                 break
-        raise ProgramError(f"no {' or '.join(sorted(keywords)).upper()} with label {label} follows")
+        raise ProgramError(
+            f"no {' or '.join(sorted(keywords)).upper()} with label {label} follows", code="OLP542"
+        )
 
     def block_number(self, number: int, index: int) -> int:
         """Index of the line N`number` in the program around `index`: forward first, then from its start."""
@@ -86,7 +88,7 @@ class Unit:
         for i in itertools.chain(range(index + 1, stop), range(start, index + 1)):
             if any(w.letter == "n" and w.value is None and w.number == number for w in self.line(i).words):
                 return i
-        raise ProgramError(f"GOTO {number}: the program has no block N{number}")
+        raise ProgramError(f"GOTO {number}: the program has no block N{number}", code="OLP542")
 
 
 @dataclass(slots=True)

@@ -74,7 +74,7 @@ def number_text(value: float, letter: str, language: Language, exact: bool = Fal
     if letter in language.counts and letter != "g":
         return str(whole(value, f"the value of {letter.upper()}"))
     if not math.isfinite(value):
-        raise ProgramError(f"the value of {letter.upper()} is not finite")
+        raise ProgramError(f"the value of {letter.upper()} is not finite", code="OLP540")
     most = language.decimals
     decimals = 0 if value == 0 else min(most, max(0, 9 - math.floor(math.log10(abs(value)))))
     text = f"{Decimal(repr(value)):f}" if exact and language.all_digits else f"{value:.{decimals}f}"
@@ -163,7 +163,9 @@ class _Flattener:
                 self.state.forget()
             return None
         if self.cycles.taps_by_control and self.state.codes(active) & {740, 840}:
-            raise ProgramError("G74 and G84 are synchronised by the control: plain moves cannot replace them")
+            raise ProgramError(
+                "G74 and G84 are synchronised by the control: plain moves cannot replace them", code="OLP544"
+            )
         return self.state.cycle(active, self.peck_clearance)
 
     def _of_cycle(self, word: Word, value: float | None) -> bool:
@@ -228,7 +230,8 @@ class _Flattener:
             else:
                 if spindle not in (3, 4):
                     raise ProgramError(
-                        "the cycle reverses the spindle, whose direction is not set; give M3 or M4 before"
+                        "the cycle reverses the spindle, whose direction is not set; give M3 or M4 before",
+                        code="OLP532",
                     )
                 lines.append(f"M{spindle if stroke.spindle == 'restore' else 7 - spindle}")
         if not lines:

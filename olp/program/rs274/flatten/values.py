@@ -42,7 +42,7 @@ class Variables:
         if self.state.profile.language.macro_b:
             return self._macro_b(index)
         if not 1 <= index <= _NGC_LAST:
-            raise ProgramError(f"#{index} is out of range; parameters are #1 to #{_NGC_LAST}")
+            raise ProgramError(f"#{index} is out of range; parameters are #1 to #{_NGC_LAST}", code="OLP540")
         if index <= _NGC_LOCAL:
             return self.locals.get(index, 0.0)
         if index <= _NGC_FREE:
@@ -51,7 +51,8 @@ class Variables:
             return self.state.position_of(index - 5420)
         raise ProgramError(
             f"#{index} is kept by the control (probe result, offset, tool or position) and not known "
-            "off line; use a free parameter (#31 to #5060)"
+            "off line; use a free parameter (#31 to #5060)",
+            code="OLP541",
         )
 
     def _macro_b(self, index: int) -> float | None:
@@ -65,7 +66,8 @@ class Variables:
             if base <= index <= base + 2:
                 return self.state.position_of(index - base)
         raise ProgramError(
-            f"#{index} is not set before in the program and not known off line; assign it in the program"
+            f"#{index} is not set before in the program and not known off line; assign it in the program",
+            code="OLP541",
         )
 
     def named(self, name: str) -> float:
@@ -75,13 +77,15 @@ class Variables:
         table = self.globals if name.startswith("_") else self.names
         if name not in table:
             raise ProgramError(
-                f"#<{name}> is not set before in the program and not known off line; assign it in the program"
+                f"#<{name}> is not set before in the program and not known off line; "
+                "assign it in the program",
+                code="OLP541",
             )
         return table[name]
 
     def exists(self, name: str) -> bool:
         if name.startswith(("_ini[", "_hal[")):
-            raise ProgramError(f"#<{name}> belongs to the control and is not known off line")
+            raise ProgramError(f"#<{name}> belongs to the control and is not known off line", code="OLP541")
         table = self.globals if name.startswith("_") else self.names
         return self._predefined(name) is not None or name in table
 
@@ -101,13 +105,13 @@ class Variables:
 
     def _set(self, value: float | None, name: str) -> float:
         if value is None:
-            raise ProgramError(f"#<{name}> is used before the program sets it")
+            raise ProgramError(f"#<{name}> is used before the program sets it", code="OLP541")
         return value
 
     def assign(self, target: int | str, value: float | None) -> None:
         if isinstance(target, str):
             if self._predefined(target) is not None:
-                raise ProgramError(f"#<{target}> belongs to the control and cannot be set")
+                raise ProgramError(f"#<{target}> belongs to the control and cannot be set", code="OLP544")
             (self.globals if target.startswith("_") else self.names)[target] = filled(value)
         elif self.state.profile.language.macro_b:
             self._assign_macro_b(target, value)
@@ -117,7 +121,8 @@ class Variables:
             self.common[target] = value
         else:
             raise ProgramError(
-                f"#{target} belongs to the control, and no plain block has the effect of setting it"
+                f"#{target} belongs to the control, and no plain block has the effect of setting it",
+                code="OLP544",
             )
 
     def _assign_macro_b(self, index: int, value: float | None) -> None:
@@ -126,10 +131,11 @@ class Variables:
         elif 100 <= index < _MACRO_B_COMMON:
             self.common[index] = value
         elif index == 3000:
-            raise ProgramError("the program stops here with its own alarm (#3000)")
+            raise ProgramError("the program stops here with its own alarm (#3000)", code="OLP544")
         elif index not in (3003, 3004):
             raise ProgramError(
-                f"#{index} belongs to the control, and no plain block has the effect of setting it"
+                f"#{index} belongs to the control, and no plain block has the effect of setting it",
+                code="OLP544",
             )
 
 
@@ -141,12 +147,15 @@ def macro_arguments(line: Line, variables: Variables) -> Iterator[tuple[int, flo
         if letter in _NOT_ARGUMENTS:
             continue
         if letter not in _ARGUMENTS:
-            raise ProgramError(f"G65 has the argument {letter.upper()}, which is not an argument of a macro")
+            raise ProgramError(
+                f"G65 has the argument {letter.upper()}, which is not an argument of a macro", code="OLP516"
+            )
         value = word.number if word.value is None else word.value(variables)
         if word.value is None and not word.pointed and value != 0 and letter not in _COUNT_ARGUMENTS:
             raise ProgramError(
                 f"the argument {letter.upper()} has no decimal point, so the control scales it by its least "
-                "increment; write the point"
+                "increment; write the point",
+                code="OLP516",
             )
         index = _ARGUMENTS[letter]
         if letter in "ijk":
