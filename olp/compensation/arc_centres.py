@@ -131,4 +131,5 @@ def _check_sweep(
             "the last digit decides whether this short arc is a whole circle; state more digits "
             "(least_increment_mm) if the control takes them, or write this arc as a line",
             line=int(line[bad[0]]),
+            code="OLP561",
         )

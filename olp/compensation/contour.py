@@ -80,6 +80,7 @@ def _refuse_change(path: Toolpath, on: Mask) -> None:
             "the side, plane or radius of the cutter compensation changes here without G40 before it, and "
             "how the control goes over is not known; program G40 between the two contours",
             line=int(path.line[change[0]]),
+            code="OLP524",
         )
 
 

@@ -85,6 +85,7 @@ def _check_take_up(writer: Writer, rows: Rows, row: int) -> None:
             "before this arc in G93 a step has to take up backlash, and G93 gives no time for it; program "
             "the arc in G94",
             line=int(writer.path.line[rows.move[row]]),
+            code="OLP561",
         )
 
 
@@ -121,7 +122,9 @@ def _inverse_time(writer: Writer, rows: Rows, tails: Index, edits: EditList) -> 
         line = int(writer.path.line[move])
         index = writer.style.word(line, "F")
         if index is None:
-            raise ProgramError("this block in G93 has no F word; expected one in every block", line=line)
+            raise ProgramError(
+                "this block in G93 has no F word; expected one in every block", line=line, code="OLP561"
+            )
         value = float(writer.words.mantissa[index]) / 10.0 ** int(writer.words.decimals[index])
         reach = writer.plan.reach[rows.first + part]
         share = np.maximum(np.diff(reach, prepend=0.0), 1e-6)

@@ -94,6 +94,7 @@ def _untouched(path: Toolpath, model: ErrorModel) -> tuple[Mask, Index]:
                 f"the position of {axes} is not known at this feed move, and its correction needs it; "
                 "command all axes in a rapid first, or give start_mm in the job file",
                 line=int(path.line[i]),
+                code="OLP524",
             )
         raw[some] |= blind | unknown[some]
         uncorrected = wanting

@@ -88,6 +88,7 @@ class VerbatimWriter(PointWriter):
                 f"this position serves line {other} too, where its correction differs (another tool, or "
                 "another direction of approach); state the position separately for each move",
                 line=line,
+                code="OLP561",
             )
 
     def _omitted(self, rows: Rows, head: Index, slot: npt.NDArray[np.int32]) -> None:
@@ -99,6 +100,7 @@ class VerbatimWriter(PointWriter):
             raise ProgramError(
                 "the correction needs an axis that this statement leaves out; state X, Y and Z in it",
                 line=line,
+                code="OLP561",
             )
 
     def _number(self, rows: Rows, row: int, axis: int, word: int) -> bytes:

@@ -65,12 +65,13 @@ class Directives:
             if payload is None:
                 continue
             if place in payloads:
-                raise ProgramError("this line has two payloads; expected one", line=number)
+                raise ProgramError("this line has two payloads; expected one", line=number, code="OLP550")
             if chunk.deleted[place]:
                 raise ProgramError(
                     "a payload is under block delete, so it is not known whether it holds afterwards; "
                     "move it to a block without `/`",
                     line=number,
+                    code="OLP525",
                 )
             payloads[place] = payload
         return payloads
@@ -94,6 +95,7 @@ def _payload(content: str, line: int) -> float | None:
             f"the comment `olp {content[:40]}` is not understood; "
             "expected a mass in kg, such as (OLP PAYLOAD 30 kg)",
             line=line,
+            code="OLP550",
         )
     return float(match[1])
 
@@ -111,13 +113,15 @@ def with_payloads(data: bytes, payloads: Mapping[int, float], comment: tuple[byt
                 "the program states a payload here, and the job file states payloads in [[payloads]]; "
                 "expected one of the two",
                 line=len(_LINE_END.findall(data, 0, match.start())) + 1,
+                code="OLP550",
             )
         marks[int(match[2])] = float(match[1])
     if marks:
         if marks != dict(payloads):
             raise ProgramError(
                 "the payloads in the comments of this program are not those of [[payloads]] in the job file; "
-                "give the job file that it was made with"
+                "give the job file that it was made with",
+                code="OLP550",
             )
         return data
     ends = [m.start() for m in _LINE_END.finditer(data)]
@@ -128,7 +132,8 @@ def with_payloads(data: bytes, payloads: Mapping[int, float], comment: tuple[byt
         if line > len(ends) or (line == len(ends) and starts[-1] == len(data)):
             raise ProgramError(
                 f"[[payloads]] of the job file names line {line}, and the program has fewer lines; "
-                "give the number of one of its lines"
+                "give the number of one of its lines",
+                code="OLP550",
             )
         text = data[starts[line - 1] : ends[line - 1]]
         semicolon = _outside_brackets(text)

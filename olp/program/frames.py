@@ -49,6 +49,8 @@ def tool_vector_of(setup: Setup, number: int, line: int) -> Vector:
             f"tool {number} is in the spindle but not defined; give [tools.{number}] in the machine or "
             "job file",
             line=line,
+            code="OLP521",
+            missing=("tools", str(number)),
         )
     tool_vector = tool.tool_vector_mm
     if tool_vector is None:
@@ -56,6 +58,8 @@ def tool_vector_of(setup: Setup, number: int, line: int) -> Vector:
             f"tool {number} has Z_mm = {tool.length_mm[2]:g}, which is a touch-off value and not a length; "
             f"give tools.{number}.gauge_to_tip_mm",
             line=line,
+            code="OLP521",
+            missing=("tools", str(number)),
         )
     return tool_vector
 
@@ -73,6 +77,8 @@ def touch_of(setup: Setup, work: WorkOffset, line: int | None) -> Touch | None:
                 f"work offset {work.name} was touched off with tool {work.touch_tool}, "
                 "whose tool vector is not defined; give its Z_mm or gauge_to_tip_mm",
                 line=line,
+                code="OLP521",
+                missing=("tools", str(work.touch_tool)),
             )
         length, tool_vector = tool.length_mm, tool.tool_vector_mm
     axis_mm = [
@@ -192,6 +198,8 @@ class FrameTable:
                 f"{what} needs the frame {name}, which is not defined; give [work_offsets.{name}] in the job "
                 "file: X_mm, Y_mm, Z_mm and, where it is turned, A_deg, B_deg, C_deg",
                 line=line,
+                code="OLP520",
+                missing=("work_offsets", name),
             )
         return work
 
@@ -244,6 +252,7 @@ def _tilted(vector: Vector, axis: Vector, tool: int | None, line: int) -> Vector
             f"tool {tool} is tilted and its vector has X or Y, and how the head turns these is not known; "
             "give its X and Y as 0",
             line=line,
+            code="OLP523",
         )
     x, y, z = (vector[2] * a for a in axis)
     return (x, y, z)

@@ -71,11 +71,15 @@ def _refuse_payloads(data: bytes, setup: Setup, dialect: Dialect) -> None:
         f"{dialect.title} programs have one payload; give payload_kg in the job file, and split the program"
     )
     if setup.job.payloads:
-        raise ProgramError(f"[[payloads]] of the job file: {what}", line=min(setup.job.payloads))
+        raise ProgramError(
+            f"[[payloads]] of the job file: {what}", line=min(setup.job.payloads), code="OLP550"
+        )
     comment = _PAYLOAD.search(data)
     if comment:
         raise ProgramError(
-            f"a comment changes the payload: {what}", line=data.count(b"\n", 0, comment.start()) + 1
+            f"a comment changes the payload: {what}",
+            line=data.count(b"\n", 0, comment.start()) + 1,
+            code="OLP550",
         )
 
 
@@ -109,14 +113,16 @@ def dialect_of(name: str | None, control: Dialect, data: bytes, file: str) -> Di
     if len(names) > 1:
         raise ProgramError(
             f"the text may be {' or '.join(sorted(names))}; name its dialect with --dialect, "
-            "or with the key dialect of the job file"
+            "or with the key dialect of the job file",
+            code="OLP503",
         )
     if names:
         (one,) = names
         if ending not in (None, one):
             raise ProgramError(
                 f"the ending of the file is that of {ending}, and its text is {one}; name its dialect with "
-                "--dialect, or with the key dialect of the job file"
+                "--dialect, or with the key dialect of the job file",
+                code="OLP503",
             )
         return DIALECTS[one]
     return DIALECTS[ending] if ending is not None else control

@@ -25,6 +25,7 @@ def check_contours(nominal: Toolpath, written: Toolpath, groups: Index) -> None:
         "fit into its corners, and uncorrected it only just fits; make the block longer, or use a smaller "
         "cutter",
         line=int(nominal.line[new[0]]),
+        code="OLP561",
     )
 
 

@@ -33,6 +33,7 @@ def check_kinds(nominal: Program, corrected: Program, groups: Index, digit_mm: f
             f"line {int(corrected.toolpath.line[other])} of the corrected program {text}; it is not a "
             "correction of this program; correct the nominal program again",
             line=int(nominal.toolpath.line[move]),
+            code="OLP562",
         )
 
 

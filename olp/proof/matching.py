@@ -62,7 +62,8 @@ def match(program: Program, target_mm: Array, corrected: Program, model: ErrorMo
         word = "fewer than" if len(mine) else "not"
         raise ProgramError(
             f"the corrected program has {len(theirs)} moves and holes, {word} the {len(mine)} of the "
-            "nominal one, so it is not a correction of it; give the two programs of one job"
+            "nominal one, so it is not a correction of it; give the two programs of one job",
+            code="OLP562",
         )
     if not len(mine):
         return np.zeros(0, np.int64)
@@ -337,7 +338,8 @@ def _refuse_others(nominal: Toolpath, target: Array, mine: _Units, tip: Array) -
         raise ProgramError(
             f"{int(far.sum())} of {int(counted.sum())} waypoints are farther than {_FAR_MM:g} mm from those "
             f"of the nominal program, the first at its line {int(nominal.line[first])}; it is not a "
-            "correction of this program for this machine"
+            "correction of this program for this machine",
+            code="OLP562",
         )
 
 

@@ -208,6 +208,7 @@ def _refuse_blind(path: Toolpath, blind: Mask) -> None:
             "the deviation of this move cannot be computed: where the corrected program commands it, the "
             "error is not known; correct the nominal program again, or give start_mm in the job file",
             line=int(path.line[np.argmax(blind)]),
+            code="OLP561",
         )
 
 

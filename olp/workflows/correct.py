@@ -139,6 +139,7 @@ def _refuse_stamped(data: bytes) -> None:
             f"the program has the stamp `{stamp.group().decode()}` of a correction; a second one would apply "
             "the model twice; correct the nominal program",
             line=data.count(b"\n", 0, stamp.start()) + 1,
+            code="OLP560",
         )
 
 

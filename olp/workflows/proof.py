@@ -199,6 +199,7 @@ def _prove_without_deleted(
             "later blocks depend on this block under block delete, so one correction cannot be right for "
             "both switch positions; remove the `/`, or give every axis in the first block after it",
             line=int(path.line[deleted][0]),
+            code="OLP525",
         )
 
 

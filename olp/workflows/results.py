@@ -118,6 +118,7 @@ def _corrected(
             f"the results have the stamp `{stamp.group().decode()}` of a correction; a second one would add "
             "the error twice; correct the file that the machine wrote",
             line=data.count(b"\n", 0, stamp.start()) + 1,
+            code="OLP560",
         )
     reported = _read(data, layout)
     radius = options.tip_radius_mm if options.tip_radius_mm is not None else reported.tip_radius_mm

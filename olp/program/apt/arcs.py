@@ -76,6 +76,7 @@ def _numbers(fields: Sequence[Field], least: int, statement: Statement, what: st
         raise ProgramError(
             f"{what} has {count} numbers where {least} are expected; send the output of the APT processor",
             line=statement.line,
+            code="OLP516",
         )
     return [n[0] / 10.0 ** n[1] for n in pairs[:count] if n is not None]
 
@@ -129,7 +130,9 @@ def movarc(statement: Statement, collector: StatementCollector) -> ArcForm:
     angle_word = next((i for i, f in enumerate(fields) if f.text == b"ANGLE"), -1)
     angle = fields[angle_word + 1].number if 0 < angle_word < len(fields) - 1 else None
     if angle is None:
-        raise ProgramError("MOVARC has no ANGLE; expected ANGLE and degrees", line=statement.line)
+        raise ProgramError(
+            "MOVARC has no ANGLE; expected ANGLE and degrees", line=statement.line, code="OLP516"
+        )
     a, b, c = (collector.word(f) for f in fields[:3])
     text = ArcText(
         statement.begin,
@@ -153,13 +156,16 @@ def tlon(statement: Statement, collector: StatementCollector) -> tuple[ArcForm, 
         raise ProgramError(
             "this form of TLON is not read; expected TLON,GOFWD/(CIRCLE/…),ON,(LINE/…)",
             line=statement.line,
+            code="OLP516",
         )
     size = 4 if kind == b"CIRCLE" else 7
     round_, straight = groups[kind], groups[b"LINE"]
     values = _numbers(round_, size, statement, kind.decode())
     line = _numbers(straight, 6, statement, "LINE")
     if max(abs(p - q) for p, q in zip(values[:2], line[:2], strict=True)) > 1e-3:
-        raise ProgramError("the LINE of TLON does not begin at the centre of its circle", line=statement.line)
+        raise ProgramError(
+            "the LINE of TLON does not begin at the centre of its circle", line=statement.line, code="OLP530"
+        )
     normal = (0.0, 0.0, 1.0) if kind == b"CIRCLE" else tuple(values[3:6])
     again = _AGAIN.search(statement.text)
     long = None if again is None else (statement.place(again.start()), statement.place(again.end() - 1) + 1)
@@ -211,6 +217,7 @@ def resolved(
             "an arc is not in a plane of two axes of the machine, which is not read; "
             "have the CAM system write it as GOTOs",
             line=forms[i].line,
+            code="OLP512",
         )
     plane = _PLANE_OF[axis]
     axes = np.array(PLANES)[plane]
@@ -258,6 +265,7 @@ def _catia(form: ArcForm, start: Array, end: Array, centre: Array, axes: Array, 
         raise ProgramError(
             "INDIRV does not say in which direction the arc turns; expected one along the arc at its start",
             line=form.line,
+            code="OLP516",
         )
     to = end - centre
     angle = np.arctan2(to[second], to[first]) - np.arctan2(arm[second], arm[first])
@@ -268,6 +276,7 @@ def _catia(form: ArcForm, start: Array, end: Array, centre: Array, axes: Array, 
             f"the arc meets its line the {times} time on the other side of its centre, "
             "not at the end that the line states",
             line=form.line,
+            code="OLP530",
         )
     return turning < 0
 
@@ -283,6 +292,7 @@ def _check(form: ArcForm, start: Array, centre: Array, axes: Array, sweep: float
                 f"the arc states a radius of {abs(form.radius) * unit_mm:.4f} mm, "
                 f"and its start is {size:.4f} mm from its centre",
                 line=form.line,
+                code="OLP530",
             )
     if form.angle_rad is not None:
         off = abs(abs(form.angle_rad) - abs(sweep))
@@ -291,4 +301,5 @@ def _check(form: ArcForm, start: Array, centre: Array, axes: Array, sweep: float
                 f"the arc states an angle of {np.degrees(form.angle_rad):.4f} degrees, "
                 f"and its points give {np.degrees(abs(sweep)):.4f}",
                 line=form.line,
+                code="OLP530",
             )

@@ -153,7 +153,7 @@ class Events:
             self.unit_mm = MM_PER_INCH
         else:
             raise ProgramError(
-                "UNITS names a unit that is not read; expected MM or INCH", line=statement.line
+                "UNITS names a unit that is not read; expected MM or INCH", line=statement.line, code="OLP516"
             )
         self.unit_stated = True
 
@@ -163,6 +163,7 @@ class Events:
             raise ProgramError(
                 "an arc follows an arc without a GOTO between them; expected a GOTO to the end of the first",
                 line=statement.line,
+                code="OLP532",
             )
         self.arcs.append((row, form))
 
@@ -171,6 +172,7 @@ class Events:
             raise ProgramError(
                 "no INDIRV comes before TLON, so its direction is not known; expected one before each TLON",
                 line=statement.line,
+                code="OLP532",
             )
         form = directed(self.driven.pop(statement.line), self.direction, self.collector)
         self.direction = None
@@ -186,7 +188,7 @@ class Events:
         number = fields[0].number if fields else None
         if number is None or (number[1] and number[0] % 10 ** number[1]):
             raise ProgramError(
-                f"{shown(statement.head()[1])} needs the number of a tool", line=statement.line
+                f"{shown(statement.head()[1])} needs the number of a tool", line=statement.line, code="OLP516"
             )
         self._unknown(statement, row)
         self.tool = number[0] // 10 ** number[1]
@@ -230,6 +232,7 @@ class Events:
                 "CUTCOM (cutter compensation) makes the path inside the control; "
                 "send the path of the tool's centre, or take the points as that path with --contour",
                 line=statement.line,
+                code="OLP513",
             )
         self._resolve(row)
         if b"OFF" in words:
@@ -244,12 +247,15 @@ class Events:
             raise ProgramError(
                 "TLAXIS is read with three numbers only: the direction from tip to gauge point",
                 line=statement.line,
+                code="OLP516",
             )
         x, y, z = (n[0] / 10.0 ** n[1] for n in numbers if n is not None)
         size = (x * x + y * y + z * z) ** 0.5
         if not abs(size - 1.0) < UNIT:
             raise ProgramError(
-                f"TLAXIS has length {size:.6g}; expected a direction of length 1", line=statement.line
+                f"TLAXIS has length {size:.6g}; expected a direction of length 1",
+                line=statement.line,
+                code="OLP516",
             )
         self.axis = axis_of(x / size, y / size, z / size)
 
@@ -263,6 +269,7 @@ class Events:
                 raise ProgramError(
                     f"the coordinate system is given by the name {shown(field.text)}; expected its numbers",
                     line=statement.line,
+                    code="OLP523",
                 )
             values.append(round(pair[0] / 10.0 ** pair[1], 9) + 0.0)
         key: object = tuple(values)
@@ -281,13 +288,14 @@ class Events:
                 "TRACUT transforms points in the APT processor; "
                 "send its output (CLDATA), or state the transform as a frame of the job",
                 line=statement.line,
+                code="OLP512",
             )
 
     def _from(self, statement: Statement, row: int) -> None:
         self._resolve(row)
         numbers = [f.number for f in statement.fields()][:3]
         if len(numbers) != 3 or None in numbers:
-            raise ProgramError("FROM needs three numbers", line=statement.line)
+            raise ProgramError("FROM needs three numbers", line=statement.line, code="OLP516")
         point = np.array([n[0] / 10.0 ** n[1] for n in numbers if n is not None]) * self.unit_mm
         number = self._frame(statement.line)
         frame = self.table.frames[number]
@@ -317,7 +325,7 @@ class Events:
     def _delay(self, statement: Statement, row: int) -> None:
         number = next((f.number for f in statement.fields() if f.number is not None), None)
         if number is None:
-            raise ProgramError("DELAY needs a number of seconds", line=statement.line)
+            raise ProgramError("DELAY needs a number of seconds", line=statement.line, code="OLP516")
         if any(f.text == b"REV" for f in statement.fields()):
             seconds = number[0] / 10.0 ** number[1] / self.turns_s if self.turns_s else 0.0
         else:
@@ -334,6 +342,7 @@ class Events:
                 "INSERT gives the control a block that may move the machine; "
                 "leave such blocks to the post-processor",
                 line=statement.line,
+                code="OLP512",
             )
 
     def _fini(self, statement: Statement, row: int) -> None:

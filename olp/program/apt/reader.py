@@ -109,11 +109,13 @@ class _Reader(Events):
         handler = self._handlers.get(first)
         if first == b"RAPID":
             self._resolve(row)
-            raise ProgramError("RAPID has words that are not read; expected RAPID alone", line=statement.line)
+            raise ProgramError(
+                "RAPID has words that are not read; expected RAPID alone", line=statement.line, code="OLP510"
+            )
         if label:
             what = TABLE.get(first, (Support.REFUSED, "is an assignment that is not read"))[1]
             raise ProgramError(
-                f"{shown(label)} = {shown(first)} {what or 'is not read'}", line=statement.line
+                f"{shown(label)} = {shown(first)} {what or 'is not read'}", line=statement.line, code="OLP512"
             )
         if handler is not None:
             handler(statement, row)
@@ -126,7 +128,7 @@ class _Reader(Events):
         if first in (b"TLON", b"GODLTA"):
             return
         if support is Support.REFUSED:
-            raise ProgramError(f"{shown(first)} {why}", line=statement.line)
+            raise ProgramError(f"{shown(first)} {why}", line=statement.line, code="OLP512")
 
     # -- points --------------------------------------------------------------------------------------
 
@@ -148,12 +150,14 @@ class _Reader(Events):
                 f"{shown(major)} names {shown(bad.text) or 'nothing'} where a number is expected; send the "
                 "output of the APT processor (CLDATA)",
                 line=line,
+                code="OLP516",
             )
         if len(fields) not in ((1, 3) if major == b"GODLTA" else (3, 6)):
             raise ProgramError(
                 f"{shown(major)} has {len(fields)} numbers; expected "
                 + ("a distance along the tool axis, or three" if major == b"GODLTA" else "three, or six"),
                 line=line,
+                code="OLP516",
             )
         return Point(
             line, statement.begin, statement.end, fields[:3], fields[3:], incremental=major == b"GODLTA"
@@ -194,6 +198,7 @@ class _Reader(Events):
                 raise ProgramError(
                     "an arc is not read while a CYCLE is in force; end the cycle with CYCLE/OFF",
                     line=int(line[arcs[0][0]]),
+                    code="OLP518",
                 )
             self._holes(self.cycle, line, frame, end, slot, begin, stop, up)
         else:
@@ -202,7 +207,9 @@ class _Reader(Events):
                 if (kind[rows] == Kind.RAPID).any() or (flag[rows] & ~np.uint8(Flag.INCREMENTAL)).any():
                     bad = rows[(kind[rows] == Kind.RAPID) | (flag[rows] != 0)][0]
                     raise ProgramError(
-                        "an arc is at rapid, or its tool axis changes, which is not read", line=int(line[bad])
+                        "an arc is at rapid, or its tool axis changes, which is not read",
+                        line=int(line[bad]),
+                        code="OLP518",
                     )
                 start = np.where(rows[:, None] > 0, end[np.maximum(rows - 1, 0)], np.array(self.position))
                 geometry = resolved(
@@ -244,6 +251,7 @@ class _Reader(Events):
                 "the arc begins in the direction opposite to the move before it: its normal seems to be "
                 "left-handed, which is not read",
                 line=self.back[0],
+                code="OLP530",
             )
         doubt = self.unconfirmed if self.unconfirmed is not None else next(iter(self.back), None)
         if doubt is not None and not self.onward:
@@ -266,6 +274,7 @@ class _Reader(Events):
             raise ProgramError(
                 f"the tool axis has length {size[bad]:.6g}; expected a direction of length 1",
                 line=int(points.line[part][bad]),
+                code="OLP516",
             )
         held = np.maximum.accumulate(np.where(stated, np.arange(count), -1))
         axes = np.where((held >= 0)[:, None], (direction / size[:, None])[held], np.array(self.axis))
@@ -298,6 +307,7 @@ class _Reader(Events):
             raise ProgramError(
                 "GODLTA with one number goes along the tool axis, which is tilted here; write it with three",
                 line=int(points.line[part][np.flatnonzero(alone)[0]]),
+                code="OLP518",
             )
 
     def _holes(

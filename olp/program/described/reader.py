@@ -97,7 +97,9 @@ class _Reader:
     def run(self, *, words: bool) -> Program:
         if self.data[:2] in (b"\xff\xfe", b"\xfe\xff"):
             raise ProgramError(
-                "the text is UTF-16; expected one byte per character; save it as plain text", line=1
+                "the text is UTF-16; expected one byte per character; save it as plain text",
+                line=1,
+                code="OLP502",
             )
         text = Text(self.data)
         items = self._matched(text)
@@ -233,6 +235,7 @@ class _Reader:
             f"`{text.strip()[:60]}` is not a statement of the dialect {dialect.name}, and may move the "
             "machine; describe it in the dialect file, or take it out",
             line=line.number,
+            code="OLP510",
         )
 
     def _statement(self, line: Line, rule: Rule, match: re.Match[str]) -> None:
@@ -241,6 +244,7 @@ class _Reader:
             raise ProgramError(
                 f"`{line.text.strip()[:60]}` is not read: {rule.why or 'it may move the machine'}",
                 line=line.number,
+                code="OLP512",
             )
         if rule.does == "unit":
             self.unit = rule.unit
@@ -267,7 +271,9 @@ class _Reader:
     @staticmethod
     def _integer(line: Line, text: str) -> int:
         if not text.isdigit():
-            raise ProgramError(f"tool {text} is not a tool number; expected an integer", line=line.number)
+            raise ProgramError(
+                f"tool {text} is not a tool number; expected an integer", line=line.number, code="OLP516"
+            )
         return int(text)
 
     def _unit_mm(self, line: int) -> float:
@@ -275,6 +281,7 @@ class _Reader:
             raise ProgramError(
                 "no unit is stated before this position; give the key unit in the dialect file",
                 line=line,
+                code="OLP516",
             )
         return MM[self.unit]
 
@@ -293,7 +300,9 @@ class _Reader:
             form = number(self.data[start:end])
             if form is None:
                 raise ProgramError(
-                    f"the number {digits} goes on in another line; write it in one line", line=line.number
+                    f"the number {digits} goes on in another line; write it in one line",
+                    line=line.number,
+                    code="OLP510",
                 )
             slots.append(self.moves.number(start, end))
             values.append(form.value)
@@ -356,12 +365,14 @@ class _Reader:
                 f"the position {text} is not defined in this text; "
                 "add its definition, or correct the list of positions that has it",
                 line=line.number,
+                code="OLP533",
             )
         if point.twice:
             raise ProgramError(
                 f"the position {text} is defined twice, in lines {point.line} and {point.twice}, "
                 "so which one holds here depends on the run; give each its own name",
                 line=line.number,
+                code="OLP533",
             )
         return point
 
@@ -383,6 +394,7 @@ class _Reader:
                 f"this text has moves in two parts, here and from line {first[1]} on, "
                 "and their order is not known; put each part into its own file",
                 line=line,
+                code="OLP532",
             )
 
     def _put(

@@ -92,6 +92,8 @@ class Events:
                 f'the stylus {name} is selected, and its offset is not stated; give [styli."{name}"] '
                 "offset_mm = [x, y, z] in the job or machine file, end of the ram to centre of the tip",
                 line=line,
+                code="OLP522",
+                missing=("styli", name),
             )
         return defined
 
@@ -112,6 +114,7 @@ class Events:
                 f"{shown(statement.head()[1])} is inside {shown(self.nesting[-1])}, "
                 "so whether it holds is known at run time only; move it before or after",
                 line=statement.line,
+                code="OLP511",
             )
 
     def _unchanged(self, statement: Statement, label: bytes, row: int) -> None:
@@ -124,7 +127,7 @@ class Events:
         unit = _UNITS.get(fields[0].text) if fields else None
         if unit is None:
             what = "UNITS names a unit that is not read; expected MM, CM, M or INCH"
-            raise ProgramError(what, line=statement.line)
+            raise ProgramError(what, line=statement.line, code="OLP512")
         self.unit_mm, self.unit_stated = unit, True
 
     def _snsdef(self, statement: Statement, label: bytes, row: int) -> None:
@@ -144,7 +147,9 @@ class Events:
         fields = statement.fields()
         name = _name(fields[0].text) if fields else None
         if name is None:
-            raise ProgramError("SNSLCT names no sensor; expected S() or SA()", line=statement.line)
+            raise ProgramError(
+                "SNSLCT names no sensor; expected S() or SA()", line=statement.line, code="OLP516"
+            )
         if name == self.sensor:
             return
         self._settled(statement)
@@ -157,6 +162,7 @@ class Events:
             raise ProgramError(
                 f"{shown(statement.head()[1])} has no label, so its frame has no name; expected D(name) = …",
                 line=statement.line,
+                code="OLP516",
             )
         self._settled(statement)
         self._resolve(row)
@@ -167,7 +173,9 @@ class Events:
         match = _LABEL.match(fields[0].text) if fields else None
         if match is None or match[1] not in (b"D", b"DA"):
             if match is not None and match[1] in (b"S", b"SA", b"RT"):
-                raise ProgramError("RECALL is read for datums only: D() or DA()", line=statement.line)
+                raise ProgramError(
+                    "RECALL is read for datums only: D() or DA()", line=statement.line, code="OLP542"
+                )
             return
         self._settled(statement)
         self._resolve(row)
@@ -199,12 +207,14 @@ class Events:
 
     def _meas(self, statement: Statement, label: bytes, row: int) -> None:
         if self.feature is not None:
-            raise ProgramError("MEAS is inside MEAS; expected ENDMES before it", line=statement.line)
+            raise ProgramError(
+                "MEAS is inside MEAS; expected ENDMES before it", line=statement.line, code="OLP532"
+            )
         self.feature = (statement.line, False)
 
     def _endmes(self, statement: Statement, label: bytes, row: int) -> None:
         if self.feature is None:
-            raise ProgramError("ENDMES has no MEAS before it", line=statement.line)
+            raise ProgramError("ENDMES has no MEAS before it", line=statement.line, code="OLP532")
         if not self.feature[1]:
             # the control chooses the points itself
             self._unknown(statement, row)
@@ -224,7 +234,9 @@ class Events:
             self.nesting.append(word)
         elif word in (b"ENDIF", b"ENDDO"):
             if not self.nesting or self.nesting[-1] != word[3:]:
-                raise ProgramError(f"{shown(word)} has no {shown(word[3:])} before it", line=statement.line)
+                raise ProgramError(
+                    f"{shown(word)} has no {shown(word[3:])} before it", line=statement.line, code="OLP532"
+                )
             self.nesting.pop()
 
     def _macro(self, statement: Statement, label: bytes, row: int) -> None:
@@ -250,6 +262,7 @@ class Events:
                 "CALL runs a macro that is not in this program and may move the machine; "
                 "put the macro into this program",
                 line=statement.line,
+                code="OLP542",
             )
 
     def _endfil(self, statement: Statement, label: bytes, row: int) -> None:

@@ -37,7 +37,9 @@ class _Reader(Events):
         for chunk in chunks(self.data):
             self._chunk(chunk)
         if self.nesting and not self.ended:
-            raise ProgramError(f"{shown(self.nesting[-1])} has no end", line=max(self.data.count(b"\n"), 1))
+            raise ProgramError(
+                f"{shown(self.nesting[-1])} has no end", line=max(self.data.count(b"\n"), 1), code="OLP532"
+            )
         x, y, z = self.start
         end = self.ended or self.data.count(b"\n") + 1
         return self.collector.program(self.table.frames, (x, y, z), end, b"")
@@ -95,6 +97,7 @@ class _Reader(Events):
                     "the comment before ends with `$`, so this line may belong to it; "
                     "take that `$` away, or put `$$` before this line",
                     line=comment.line + 1,
+                    code="OLP510",
                 )
 
     def _event(self, statement: Statement, row: int) -> None:
@@ -110,7 +113,9 @@ class _Reader(Events):
         if first == b"PTMEAS":
             if self.feature is None:
                 raise ProgramError(
-                    "PTMEAS is outside MEAS and ENDMES; expected MEAS before it", line=statement.line
+                    "PTMEAS is outside MEAS and ENDMES; expected MEAS before it",
+                    line=statement.line,
+                    code="OLP532",
                 )
             self.feature = (self.feature[0], True)
             return
@@ -118,6 +123,7 @@ class _Reader(Events):
             raise ProgramError(
                 f"{shown(label)} is assigned, and its effect is known at run time only",
                 line=statement.line,
+                code="OLP511",
             )
         known = TABLE.get(first)
         if known is None and not text:
@@ -127,7 +133,7 @@ class _Reader(Events):
             "is not a statement that olp knows, and may move the machine",
         )
         if support is Support.REFUSED:
-            raise ProgramError(f"{shown(first)} {why}", line=statement.line)
+            raise ProgramError(f"{shown(first)} {why}", line=statement.line, code="OLP512")
 
     # -- points --------------------------------------------------------------------------------------
 
@@ -140,7 +146,9 @@ class _Reader(Events):
         elif major == b"PTMEAS" or (fields and fields[0].number is None):
             first = shown(fields[0].text) if fields else "nothing"
             raise ProgramError(
-                f"{shown(major)}/{first} is not read; expected CART and x,y,z as numbers", line=statement.line
+                f"{shown(major)}/{first} is not read; expected CART and x,y,z as numbers",
+                line=statement.line,
+                code="OLP512",
             )
         bad = next((f for f in fields if f.number is None), None)
         if bad is not None:
@@ -148,12 +156,14 @@ class _Reader(Events):
                 f"{shown(major)} has {shown(bad.text) or 'nothing'} where a number is expected; "
                 "its value is known at run time only",
                 line=statement.line,
+                code="OLP511",
             )
         if len(fields) not in ((3, 6) if major == b"PTMEAS" else (3,)):
             raise ProgramError(
                 f"{shown(major)} has {len(fields)} numbers; expected x,y,z"
                 + (" and a direction" if major == b"PTMEAS" else ""),
                 line=statement.line,
+                code="OLP516",
             )
         return Point(statement.line, statement.begin, statement.end, fields[:3])
 
@@ -166,11 +176,14 @@ class _Reader(Events):
         line = self.points.line[part]
         wide = ~np.isnan(self.points.direction[part][:, 0])
         if wide.any():
-            raise ProgramError("GOTO has 6 numbers; expected x,y,z", line=int(line[np.flatnonzero(wide)[0]]))
+            raise ProgramError(
+                "GOTO has 6 numbers; expected x,y,z", line=int(line[np.flatnonzero(wide)[0]]), code="OLP516"
+            )
         if self.macro is not None:
             raise ProgramError(
                 f"the macro {self.macro} moves the machine, which is not read; write out its moves",
                 line=int(line[0]),
+                code="OLP512",
             )
         number = self._frame(int(line[0]))
         frame = self.table.frames[number]

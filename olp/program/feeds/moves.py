@@ -190,6 +190,7 @@ def _spindle(scan: Scan, line: Index) -> Array:
         raise ProgramError(
             "G95 states its feed per turn of the spindle, and no S word comes before; give S or use G94",
             line=int(line[np.flatnonzero(bad)[0]]),
+            code="OLP551",
         )
     surface = np.isin(scan.code, (960, 970))
     if (scan.code == 960).any():
@@ -199,6 +200,7 @@ def _spindle(scan: Scan, line: Index) -> Array:
             raise ProgramError(
                 "G95 needs the turns of the spindle, and under G96 these depend on a radius; use G97 or G94",
                 line=int(line[np.flatnonzero(constant)[0]]),
+                code="OLP551",
             )
     return turns
 
@@ -209,11 +211,12 @@ def _refuse(missing: Mask, line: Index, inverse: Mask) -> None:
     i = int(np.flatnonzero(missing)[0])
     if inverse[i]:
         raise ProgramError(
-            "in G93 each feed move needs an F word in its own block; give F", line=int(line[i])
+            "in G93 each feed move needs an F word in its own block; give F", line=int(line[i]), code="OLP551"
         )
     raise ProgramError(
         "a feed move has no feed: no F word comes after the feed mode (G93, G94, G95) was set; give F",
         line=int(line[i]),
+        code="OLP551",
     )
 
 
@@ -223,6 +226,7 @@ def _refuse_cycles(path: Toolpath, move: Index, inverse: Mask, line: Index) -> N
         raise ProgramError(
             "in G93 a block has one time, but a canned cycle makes many moves; use G94",
             line=int(line[np.flatnonzero(bad)[0]]),
+            code="OLP561",
         )
 
 
@@ -231,7 +235,7 @@ def _check_values(scan: Scan, modes: _Modes, line: Index, value: Array, pointed:
     bad = ~(value > 0)
     if bad.any():
         i = int(np.flatnonzero(bad)[0])
-        raise ProgramError(f"the feed F{value[i]:g} is not above zero", line=int(line[i]))
+        raise ProgramError(f"the feed F{value[i]:g} is not above zero", line=int(line[i]), code="OLP551")
     if scan.program.calculator:
         return
     # Fanuc counts whole mm/min; Haas follows its setting 77, and other units have their own increments
@@ -244,4 +248,5 @@ def _check_values(scan: Scan, modes: _Modes, line: Index, value: Array, pointed:
             f"F{value[i]:g} has no decimal point, so its unit depends on the settings of the control; "
             'write a point, or state decimal_point = "calculator" in the machine file',
             line=int(line[i]),
+            code="OLP551",
         )

@@ -62,5 +62,6 @@ def _stated(program: Program, statements: Statements) -> Array:
             "a feed move has no feed that is a speed; give one in a unit of speed before it, "
             "or one per turn and the turns of the spindle",
             line=int(path.line[np.flatnonzero(lacking)[0]]),
+            code="OLP551",
         )
     return feed

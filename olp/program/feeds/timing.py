@@ -94,7 +94,9 @@ def timing(program: Program, *, blend_mm: float = BLEND_MM, block_delete: bool =
     for hole in program.holes:
         for moves, seconds in hole.rests:
             if not seconds >= 0:
-                raise ProgramError("a dwell is negative; expected zero or more", line=hole.line)
+                raise ProgramError(
+                    "a dwell is negative; expected zero or more", line=hole.line, code="OLP551"
+                )
             rest[hole.first + moves] = True
             dwell[hole.first + moves] += seconds
     for column in (feed, control, blend, rest, dwell):
@@ -193,10 +195,13 @@ def _dwell_seconds(program: Program, scan: Scan, pauses: Index) -> Array:
         raise ProgramError(
             "a dwell has two times in one block; expected one",
             line=int(pauses[np.flatnonzero(stated > 1)[0]]),
+            code="OLP551",
         )
     if not axis_dwell and (stated == 0).any():
         raise ProgramError(
-            "a dwell G4 has no P word with its time; give P", line=int(pauses[np.flatnonzero(stated == 0)[0]])
+            "a dwell G4 has no P word with its time; give P",
+            line=int(pauses[np.flatnonzero(stated == 0)[0]]),
+            code="OLP551",
         )
     number = numbers(words, word)
     pointed = words.pointed[word]
@@ -206,6 +211,8 @@ def _dwell_seconds(program: Program, scan: Scan, pauses: Index) -> Array:
     seconds[owner] = np.where(bare & axis_dwell, number / 1000.0, number)
     if (seconds < 0).any():
         raise ProgramError(
-            "a dwell is negative; expected zero or more", line=int(pauses[np.flatnonzero(seconds < 0)[0]])
+            "a dwell is negative; expected zero or more",
+            line=int(pauses[np.flatnonzero(seconds < 0)[0]]),
+            code="OLP551",
         )
     return seconds

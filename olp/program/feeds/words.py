@@ -127,6 +127,7 @@ def _written(program: Program, words: Words, word: int, share: float, line: int)
             f"the planned feed {wanted:g} cannot be written in the form of F{value:g}; "
             "give that word a decimal point",
             line=line,
+            code="OLP561",
         )
     text = f"{new:.{decimals}f}"
     if decimals == 0 and old.endswith(b"."):

@@ -88,12 +88,13 @@ def read_list(
                 "does not show which columns hold X, Y and Z; name them in the header, or give olp correct "
                 "--column X=.. --column Y=.. --column Z=.., or give any verb a profile with --dialect"
                 if data.strip()
-                else "has no positions; expected one row per waypoint"
+                else "has no positions; expected one row per waypoint",
+                code="OLP504",
             )
         unit = layout.unit_mm
         rows = _rows(data, layout)
     except InputError as error:
-        raise ProgramError(error.message, line=error.line) from None
+        raise ProgramError(error.message, line=error.line, code="OLP504") from None
     frame_name = stated_frame(first_lines(data)) or layout.frame
     table = FrameTable(setup)
     kind = Kind.LINE if layout.joined == "lines" else Kind.RAPID

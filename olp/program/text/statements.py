@@ -231,6 +231,7 @@ class Chunk:
                     "a `$` is inside a statement; expected it at the end of a line that goes on, "
                     "or twice before a comment",
                     line=number + last - line,
+                    code="OLP510",
                 )
             text += code
             where += range(start, start + len(code))
@@ -240,6 +241,7 @@ class Chunk:
                 raise ProgramError(
                     "the last line ends with `$`, so it should go on; remove the `$`",
                     line=number + last - line,
+                    code="OLP510",
                 )
             last += 1
         end = int(self.line_end[last])
@@ -285,7 +287,9 @@ def chunks(data: bytes, size: int = CHUNK) -> Iterator[Chunk]:
         data = _CARD.sub(rb"\1        ", data)
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         raise ProgramError(
-            "the text is UTF-16; expected one byte per character; save it as plain text", line=1
+            "the text is UTF-16; expected one byte per character; save it as plain text",
+            line=1,
+            code="OLP502",
         )
     if data[:3] == b"\xef\xbb\xbf":
         # the lexer reads a byte order mark as blanks; it stays in the text
