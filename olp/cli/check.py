@@ -98,7 +98,7 @@ def command(
 
     from olp.files.write import write_files
     from olp.reports.check import FORMATS, to_csv
-    from olp.workflows import check
+    from olp.workflows import check, refusals
 
     options = options_of(check.CheckOptions, words)
     other = None if nominal is None else source(call.session.sources, nominal)
@@ -113,4 +113,6 @@ def command(
     if not quiet:
         for name in files_of(*parts):
             diagnostic(f"wrote {name}")
+    if result.refused is not None:
+        raise refusals.short(result.refused).in_file(call.stream or call.program)
     exit_for(result.findings, fail_on)

@@ -69,14 +69,26 @@ def command(
     elif file is None:
         values = shown = machine_summary(session)
     else:
-        from olp.workflows import inspect
-
-        values = inspect.run(session, source(session.sources, file))
+        values = _program(session, file, as_json=as_json)
         shown = values | {"support": _by_support(values.get("support") or ())}
     from olp.cli.outline import outline
     from olp.reports.report import to_json
 
     put(to_json(values) if as_json else outline(shown))
+
+
+def _program(session: Session, file: str, *, as_json: bool) -> dict[str, Any]:
+    """What a program does. One that is refused is reported with all the reasons, and the error is raised."""
+    from olp.reports.refusals import refusals_text
+    from olp.reports.report import to_json
+    from olp.workflows import inspect, refusals
+
+    values, error = inspect.examined(session, source(session.sources, file))
+    if error is None:
+        return values
+    text = refusals_text(values["refused"], complete=values["refused_complete"])
+    put(to_json(values) if as_json else "\n".join(text) + "\n")
+    raise refusals.short(error)
 
 
 def _plot(session: Session, name: str, inputs: Sequence[str], force: bool) -> None:

@@ -5,6 +5,7 @@
     ├── InputError             a file is unreadable, invalid or refused        exit 3
     │   ├── ConfigError        machine, calibration or job file
     │   ├── ProgramError       a program, with its line
+    │   │   ├── Refused        for several reasons, each with its line
     │   │   └── AlreadyCorrected
     │   ├── OutsideBox         a command leaves the calibrated volume
     │   └── Doubtful           inputs that are not plausible, and are not accepted
@@ -18,7 +19,12 @@ Each holds its data and builds its message in `__str__`, as
 from __future__ import annotations
 
 import contextlib
+import re
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+#: What a message states of its statement: quoted text, and numbers.
+_OWN = re.compile(r"`[^`]*`|'[^']*'|-?\d+(?:\.\d+)?")
 
 
 class OlpError(Exception):
@@ -80,6 +86,7 @@ class ProgramError(InputError):
     `code` says why, as a row of `olp.findings.codes.refusal`. `others` are refusals of other lines that were
     found at the same time. `missing` is the table and the name of what machine and job do not define, such
     as ("tools", "7"). `hint` is the end of the message: what to do, where that may not help.
+    `word` is the word of a block that is refused, such as "G68", where the rest of the block could be read.
     """
 
     def __init__(
@@ -92,12 +99,14 @@ class ProgramError(InputError):
         others: tuple[ProgramError, ...] = (),
         missing: tuple[str, str] | None = None,
         hint: str = "",
+        word: str = "",
     ) -> None:
         super().__init__(f"{message}; {hint}" if hint else message, file=file, line=line)
         self.code = code
         self.others = others
         self.missing = missing
         self.hint = hint
+        self.word = word
 
     @staticmethod
     def together(errors: Iterable[ProgramError]) -> ProgramError:
@@ -105,6 +114,54 @@ class ProgramError(InputError):
         first, *others = sorted(errors, key=lambda error: error.line or 0)
         first.others = tuple(others)
         return first
+
+
+@dataclass(frozen=True, slots=True)
+class Reason:
+    """Why one statement is refused; `statement` is its text, shortened. It `follows` perhaps from what was
+    refused in that line, else None."""
+
+    line: int | None
+    code: str
+    message: str
+    statement: str
+    follows: int | None = None
+
+    @property
+    def sentence(self) -> str:
+        """The message, and what it may follow from."""
+        after = "" if self.follows is None else f" (it may follow from line {self.follows})"
+        return f"{self.message}{after}"
+
+    @property
+    def kind(self) -> tuple[str, str, bool]:
+        """What reasons that are alike have in common: all but the text and the numbers of the statement."""
+        return self.code, _OWN.sub("", self.message), self.follows is None
+
+
+class Refused(ProgramError):
+    """A program is refused for several `reasons`, in the order of lines; there may be more where they are not
+    `complete`."""
+
+    #: Reasons that the message lists.
+    LISTED = 20
+
+    def __init__(self, reasons: tuple[Reason, ...], *, complete: bool) -> None:
+        super().__init__(reasons[0].message, line=reasons[0].line, code=reasons[0].code)
+        self.reasons = reasons
+        self.complete = complete
+
+    def __str__(self) -> str:
+        prefix = f"{self.file}:" if self.file else ""
+        lines = [f"{prefix}{reason.line}: {reason.sentence}" for reason in self.reasons[: self.LISTED]]
+        more = len(self.reasons) - self.LISTED
+        place = f"{self.file}: " if self.file else ""
+        if more > 0:
+            least = "" if self.complete else "at least "
+            lines.append(f"{place}{least}{more} more statements are refused; olp inspect lists them")
+        elif not self.complete:
+            lines.append(f"{place}more statements may be refused; correct these first")
+        return "\n".join(lines)
 
 
 class AlreadyCorrected(ProgramError):

@@ -96,6 +96,10 @@ class Dialect:
         """The support matrix, from the table that the reader uses."""
         raise NotImplementedError
 
+    def continues(self, line: bytes) -> bool:
+        """Whether the statement of a line goes on in the next line."""
+        return False
+
     def support(self) -> list[dict[str, str]]:
         """The support matrix as plain data: statement, support, why."""
         return [row.as_dict() for row in self.rows()]
@@ -106,6 +110,9 @@ class StatementDialect(Dialect):
     """A dialect of whole statements: `table` says what becomes of each by its name, and why."""
 
     table: Mapping[bytes, tuple[Support, str]]
+
+    def continues(self, line: bytes) -> bool:
+        return line.rstrip().endswith(b"$") and b"$$" not in line
 
     def rows(self) -> Sequence[Row]:
         return [Row(name.decode(), support, why) for name, (support, why) in self.table.items()]

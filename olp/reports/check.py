@@ -12,9 +12,11 @@ from typing import Any
 from urllib.parse import quote
 from xml.etree import ElementTree
 
+from olp.core.errors import InputError
 from olp.core.version import __version__
 from olp.findings.catalogue import GATE_CODES, RULES
 from olp.findings.rule import Rule, Severity
+from olp.reports.refusals import refusals_text
 from olp.reports.report import WIDTH, Report, findings_text, number, pairs, printable, table, to_json
 
 #: Level of SARIF by severity.
@@ -29,10 +31,17 @@ def to_text(report: Report, fail_on: str) -> str:
     sections = (
         _heads(report),
         _clearance(report),
-        findings_text(report["findings"]),
+        _findings(report),
         _verdict(report, fail_on),
     )
     return "\n\n".join("\n".join(lines) for lines in map(list, sections) if lines) + "\n"
+
+
+def _findings(report: Report) -> Iterator[str]:
+    if report.get("refused"):
+        yield from refusals_text(report["refused"], complete=report["refused_complete"])
+    else:
+        yield from findings_text(report["findings"])
 
 
 def _heads(report: Report) -> Iterator[str]:
@@ -41,7 +50,8 @@ def _heads(report: Report) -> Iterator[str]:
         ("Program", printable(f"{program['name'] or 'stdin'}, {program['lines']} lines")),
         ("Checked", report["checked"]),
         ("Machine", printable("{name}, chain {chain}, control {controller}".format(**machine))),
-        ("Codes", f"{len(report['rules'])} of {len(GATE_CODES)} checked"),
+        ("Codes", "none checked" if report.get("refused") else
+         f"{len(report['rules'])} of {len(GATE_CODES)} checked"),
     ])  # fmt: skip
 
 
@@ -64,7 +74,9 @@ def _verdict(report: Report, fail_on: str) -> Iterator[str]:
     for sentence in (report.get("verdict") or {}).get("sentences") or ():
         yield from textwrap.wrap(sentence, WIDTH)
     failing = failures(report, fail_on)
-    if failing:
+    if report.get("refused"):
+        yield "NO GO: the program is refused, so nothing else was checked."
+    elif failing:
         yield f"NO GO: {len(failing)} of {len(report['findings'])} findings are at or above {fail_on}."
     else:
         yield "Go: no finding" + ("." if fail_on == "never" else f" at or above {fail_on}.")
@@ -83,6 +95,7 @@ def to_sarif(report: Report, fail_on: str) -> str:
     program as a whole; further lines are related locations."""
     rules = [RULES[code] for code in report["rules"]]
     uri = _uri(report["program"]["path"])
+    refused = bool(report.get("refused"))
     run: dict[str, Any] = {
         "tool": {
             "driver": {
@@ -93,11 +106,16 @@ def to_sarif(report: Report, fail_on: str) -> str:
         },
         "columnKind": "unicodeCodePoints",
         "results": [_sarif_result(f, report["rules"], uri) for f in report["findings"]],
-        "invocations": [{"executionSuccessful": True, "exitCode": int(bool(failures(report, fail_on)))}],
+        "invocations": [{"executionSuccessful": not refused, "exitCode": _exit_code(report, fail_on)}],
     }
     if report["verdict"] is not None:
         run["properties"] = {"verdict": report["verdict"]}
     return json.dumps({"$schema": _SCHEMA, "version": "2.1.0", "runs": [run]}, indent=2) + "\n"
+
+
+def _exit_code(report: Report, fail_on: str) -> int:
+    """As the command line ends: an input that is refused counts before findings."""
+    return InputError.exit_code if report.get("refused") else int(bool(failures(report, fail_on)))
 
 
 def _sarif_rule(rule: Rule) -> dict[str, Any]:

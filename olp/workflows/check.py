@@ -16,7 +16,7 @@ from olp.checks.base import finding
 from olp.checks.clearance import Clearances, Solid, clearances
 from olp.checks.model import model_findings
 from olp.compensation.stamp import find_stamp, is_of
-from olp.core.errors import UsageError
+from olp.core.errors import ProgramError, UsageError
 from olp.core.machine import Setup
 from olp.core.progress import Progress, silent
 from olp.core.units import MM_PER_UM, RAD_PER_URAD
@@ -28,6 +28,7 @@ from olp.program.program import Program
 from olp.program.registry import Options, read
 from olp.proof.judgement import verdict
 from olp.proof.proof import Proof, corrections_mm
+from olp.workflows import refusals
 from olp.workflows.correct import CorrectOptions, corrected
 from olp.workflows.doubt import accepted_of, doubted
 from olp.workflows.proof import ProofOptions, Run, last_digit_mm, verify_programs
@@ -54,11 +55,12 @@ class CheckOptions(ProofOptions):
 @dataclass(frozen=True, slots=True, eq=False)
 class Check:
     """The findings of a gate, its report ("olp-check-1"), and the clearance of every block where the job has
-    meshes."""
+    meshes. `refused` is the error of a program that is refused; the findings are its reasons then."""
 
     findings: tuple[Finding, ...]
     report: dict[str, Any]
     clearances: Clearances | None = None
+    refused: ProgramError | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -120,7 +122,10 @@ def check(
     chosen(options)
     session = Session.start(machine, job)
     other = None if nominal is None else session.sources.source(nominal)
-    return run(session, session.sources.source(program), options, nominal=other, progress=progress)
+    result = run(session, session.sources.source(program), options, nominal=other, progress=progress)
+    if result.refused is not None:
+        raise result.refused
+    return result
 
 
 def run(
@@ -131,7 +136,7 @@ def run(
     nominal: Source | None = None,
     progress: Progress | None = None,
 ) -> Check:
-    """As `check`, in a session."""
+    """As `check`, in a session; a program that is refused gives its reasons as findings."""
     codes = chosen(options)
     tell = progress or silent
     setup = session.setup
@@ -141,9 +146,13 @@ def run(
         session = session.of(setup)
     loaded = session.loaded("hold", only_sure=options.only_sure_components)
     program.load()
+    try:
+        with program.errors():
+            loaded = loaded.reading(program)
+            case = _case(session.sources, program, nominal, loaded, options, tell)
+    except ProgramError as error:
+        return _refused(error, program, loaded, options)
     with program.errors():
-        loaded = loaded.reading(program)
-        case = _case(session.sources, program, nominal, loaded, options, tell)
         tell("check", 0.8)
         findings = _findings(case, options)
         around = _clearances(case, codes, session.sources, tell)
@@ -156,6 +165,20 @@ def run(
     if around is not None:
         report["clearance"] = list(around.nearest(_NEAREST).rows())
     return Check(kept, report, around)
+
+
+def _refused(error: ProgramError, program: Source, loaded: Loaded, options: CheckOptions) -> Check:
+    """The findings of a program that is refused; no code is left out of them."""
+    name = error.file or program.name
+    report = {
+        **_head(name, program.data, loaded, options),
+        "checked": "nothing: the program is refused",
+        "accepted": [],
+        "rules": list(refusals.REFUSALS),
+        "verdict": None,
+        **refusals.parts_of(error),
+    }
+    return Check(refusals.findings_of(error), report, refused=error)
 
 
 def chosen(options: CheckOptions) -> list[str]:
@@ -186,13 +209,13 @@ def _case(
         path = replace(run.proof.written, line=run.proof.nominal.line[run.proof.owner()])
         proof = replace(run.proof, written=path)
         return _Case(name, data, run.corrected, run, proof, loaded, reading, what, corrected_here=True)
-    written = read(data, loaded.setup, loaded.dialect, reading)
+    written = refusals.read(sources, program, loaded.setup, loaded.dialect, reading)
     if nominal is None:
         what = "the corrected program; checks that need the nominal one are left out (give --nominal)"
         return _Case(name, data, written, None, None, loaded, reading, what)
     nominal.load()
     with nominal.errors("<nominal>"):
-        first = read(nominal.data, loaded.setup, loaded.dialect, reading)
+        first = refusals.read(sources, nominal, loaded.setup, loaded.dialect, reading)
     run = verify_programs(
         (first, nominal.name), (written, name), loaded, options,
         outside=options.outside_code, refuse_doubts=False,
@@ -326,25 +349,32 @@ def _verdict(
 def _report(
     case: _Case, findings: tuple[Finding, ...], codes: list[str], options: CheckOptions
 ) -> dict[str, Any]:
-    machine, calibration = case.loaded.setup.machine, case.loaded.calibration
     return {
-        "schema": "olp-check-1",
-        "program": {
-            "name": Path(case.name).name if case.name else "",
-            "path": case.name,
-            "lines": case.data.count(b"\n") + (not case.data.endswith(b"\n")),
-        },
+        **_head(case.name, case.data, case.loaded, options),
         "checked": case.checked,
-        "machine": {"name": machine.name, "chain": machine.chain, "controller": machine.controller},
-        "calibration": {
-            "measured": calibration.measured,
-            "valid_until": calibration.valid_until,
-            "sha256": case.loaded.digest,
-        },
-        "date": options.date,
-        "tolerance_um": options.tolerance_um,
         "accepted": accepted_of(findings),
         "rules": codes,
         "verdict": _verdict(case, findings, codes, options),
         "findings": [f.as_dict() for f in findings],
+    }
+
+
+def _head(name: str, data: bytes, loaded: Loaded, options: CheckOptions) -> dict[str, Any]:
+    """The parts of a report that a refused program has too."""
+    machine, calibration = loaded.setup.machine, loaded.calibration
+    return {
+        "schema": "olp-check-1",
+        "program": {
+            "name": Path(name).name if name else "",
+            "path": name,
+            "lines": data.count(b"\n") + (not data.endswith(b"\n")),
+        },
+        "machine": {"name": machine.name, "chain": machine.chain, "controller": machine.controller},
+        "calibration": {
+            "measured": calibration.measured,
+            "valid_until": calibration.valid_until,
+            "sha256": loaded.digest,
+        },
+        "date": options.date,
+        "tolerance_um": options.tolerance_um,
     }

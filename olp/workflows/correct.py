@@ -25,6 +25,7 @@ from olp.program.program import Program
 from olp.program.registry import Options, read
 from olp.proof.judgement import Judgements
 from olp.uncertainty.spread import Confidence
+from olp.workflows import refusals
 from olp.workflows.doubt import accepted_of, doubted
 from olp.workflows.flatten import as_asked
 from olp.workflows.proof import Pair, ProofOptions, Run, limits_of, proved
@@ -122,7 +123,7 @@ def corrected(
     _refuse_stamped(program.data)
     loaded = loaded.reading(program)
     data = as_asked(sources, program, loaded.setup, loaded.dialect, options).data
-    done = _rewritten(data, program.name, loaded, options, refuse_doubts, tell)
+    done = _rewritten(sources, program.holding(data), loaded, options, refuse_doubts, tell)
     tell("prove", 0.7)
     reading = Options(contour=options.contour)
     second = read(done.text, loaded.setup, loaded.dialect, reading, words=False)
@@ -157,17 +158,18 @@ class _Rewritten:
 
 
 def _rewritten(
-    data: bytes, name: str, loaded: Loaded, options: CorrectOptions, refuse_doubts: bool, tell: Progress
-) -> _Rewritten:
+    sources: Sources, source: Source, loaded: Loaded, options: CorrectOptions, refuse_doubts: bool,
+    tell: Progress,
+) -> _Rewritten:  # fmt: skip
     """Read, plan and write. Words and plan of a long program are large: this function releases them."""
     tell("read", 0.0)
-    program = read(data, loaded.setup, loaded.dialect, Options(contour=options.contour))
+    program = refusals.read(sources, source, loaded.setup, loaded.dialect, Options(contour=options.contour))
     if options.split_rapids and program.verbatim:
         raise UsageError(
             "--split-rapids does not go with this dialect: it does not state the path between its points; "
             'set joined = "lines" and insert = true in the profile'
         )
-    doubts = doubted(program, loaded, options.accept, options.date, name=name, refuse=refuse_doubts)
+    doubts = doubted(program, loaded, options.accept, options.date, name=source.name, refuse=refuse_doubts)
     accepted = accepted_of(doubts)
     tell("correct", 0.2)
     limits = limits_of(
@@ -184,7 +186,7 @@ def _rewritten(
         stamp_always=bool(accepted),
     )  # fmt: skip
     nominal = replace(program, words=None, slot=program.slot[:0])
-    text = written.text if written.changed else data
+    text = written.text if written.changed else source.data
     return _Rewritten(nominal, text, rows.uncorrected, written.parts, written.tally, doubts)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol
 
@@ -69,8 +70,19 @@ def unrolled(
     if dialect.unroller is None:
         raise UsageError(f"{dialect.title} cannot be unrolled; leave --flatten and --expand-cycles out")
     data = with_payloads(program.data, setup.job.payloads, dialect.comment)
+    return dialect.unroller(
+        data,
+        dialect,
+        subprograms=beside(sources, program),
+        expand_cycles=expand_cycles,
+        peck_clearance=peck_clearance_mm,
+    )
 
-    def beside(wanted: str) -> bytes | None:
+
+def beside(sources: Sources, program: Source) -> Callable[[str], bytes | None]:
+    """Gives the file of a subprogram in the folder of the program, None where there is none."""
+
+    def in_folder(wanted: str) -> bytes | None:
         if not program.name:
             return None
         for suffix in ("", ".ngc", ".nc"):
@@ -79,6 +91,4 @@ def unrolled(
                 return sources.read(candidate)
         return None
 
-    return dialect.unroller(
-        data, dialect, subprograms=beside, expand_cycles=expand_cycles, peck_clearance=peck_clearance_mm
-    )
+    return in_folder

@@ -8,11 +8,11 @@ import numpy as np
 
 from olp.checks import correction as checks
 from olp.compensation.stamp import find_stamp
-from olp.core.errors import ConfigError
+from olp.core.errors import ConfigError, ProgramError
 from olp.core.machine import Setup
 from olp.core.toolpath import Kind, carried
 from olp.files.sources import Source
-from olp.program.registry import read
+from olp.workflows import refusals
 from olp.workflows.session import PathLike, Session, opened
 
 
@@ -20,16 +20,27 @@ def inspect(
     program: PathLike | bytes, machine: PathLike | Setup, job: PathLike | None = None
 ) -> dict[str, Any]:
     """What a program does: moves by kind, ranges, tools, offsets, path modes, findings and the support
-    matrix."""
+    matrix. Raises Refused with all the reasons where the program is refused for several, ProgramError for
+    one."""
     session, source = opened(program, machine, job, "<program>")
     return run(session, source)
+
+
+def examined(session: Session, program: Source) -> tuple[dict[str, Any], ProgramError | None]:
+    """As `run`. A program that is refused gives all the reasons, and the error."""
+    program.load()
+    try:
+        return run(session, program), None
+    except ProgramError as error:
+        lines = program.data.count(b"\n") + (not program.data.endswith(b"\n"))
+        return {"name": program.short, "lines": lines} | refusals.parts_of(error), error
 
 
 def run(session: Session, program: Source) -> dict[str, Any]:
     """As `inspect`, in a session."""
     with program.errors("<program>"):
         setup, dialect = session.reading(program)
-        parsed = read(program.data, setup, dialect)
+        parsed = refusals.read(session.sources, program, setup, dialect)
     path = parsed.toolpath
     with np.errstate(all="ignore"):
         known = path.end_mm[np.isfinite(path.end_mm).all(axis=1)]

@@ -28,6 +28,8 @@ from olp.program.statement_rows import Point, Points
 from olp.program.text.statements import Chunk, Comment, Statement, chunks, shown
 
 NAN = float("nan")
+#: Refused by the table of statements, wherever it is.
+NOT_READ = "OLP512"
 _FREE = re.compile(rb"(?i)(?:" + b"|".join(FREE) + rb")(?![A-Z])")
 _CREO = re.compile(rb"\$\$->\s*([A-Z_]+)\s*/?")
 #: so many joints in the opposite direction are no coincidence
@@ -82,8 +84,13 @@ class _Reader(Events):
         self.points = collector.points(chunk, alone)
         self.done = 0
         upto = np.searchsorted(self.points.line, np.array([e.line for e in events], np.int64)).tolist()
-        for statement, row in zip(events, upto, strict=True):
-            self._event(statement, row)
+        for k, (statement, row) in enumerate(zip(events, upto, strict=True)):
+            try:
+                self._event(statement, row)
+            except ProgramError as error:
+                if error.code == NOT_READ:
+                    error.others = tuple(filter(None, map(self._by_table, events[k + 1 :])))
+                raise
             if self.ended:
                 collector.finish()
                 return
@@ -120,15 +127,26 @@ class _Reader(Events):
         if handler is not None:
             handler(statement, row)
             return
+        if first == b"TLON":
+            self._tlon(statement, row)
+        refusal = self._by_table(statement)
+        if refusal is not None:
+            raise refusal
+
+    def _by_table(self, statement: Statement) -> ProgramError | None:
+        """Why a statement is refused wherever it is; None where that depends on others, or it is read."""
+        label, major = statement.head()
+        first = major.split(b",")[0].strip()
+        text = statement.text.lstrip()
+        special = label or text[:2] == b"$$" or _FREE.match(text.upper()) or first in self._handlers
+        if special or first in (b"RAPID", b"TLON", b"GODLTA"):
+            return None
         support, why = TABLE.get(
             first, (Support.REFUSED, "is not a statement that olp knows, and may move the machine")
         )
-        if first == b"TLON":
-            self._tlon(statement, row)
-        if first in (b"TLON", b"GODLTA"):
-            return
-        if support is Support.REFUSED:
-            raise ProgramError(f"{shown(first)} {why}", line=statement.line, code="OLP512")
+        if support is not Support.REFUSED:
+            return None
+        return ProgramError(f"{shown(first)} {why}", line=statement.line, code=NOT_READ)
 
     # -- points --------------------------------------------------------------------------------------
 

@@ -77,6 +77,9 @@ class UserDialect(Dialect):
                 }
         return frozenset(words)
 
+    def continues(self, line: bytes) -> bool:
+        return bool(self.continuation) and line.rstrip().endswith(self.continuation.encode())
+
     def rows(self) -> Sequence[Row]:
         rows = []
         for rule in self.statements:

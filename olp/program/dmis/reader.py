@@ -21,6 +21,8 @@ from olp.program.statement_rows import Point
 from olp.program.text.statements import Chunk, Comment, Statement, chunks, shown
 
 NAN = float("nan")
+#: Refused by the table of statements, wherever it is.
+NOT_READ = "OLP512"
 _NO_TEXT = re.compile(rb"(?!)")
 
 
@@ -66,8 +68,13 @@ class _Reader(Events):
         self.points = collector.points(chunk, alone)
         self.done = 0
         upto = np.searchsorted(self.points.line, np.array([e.line for e in events], np.int64)).tolist()
-        for statement, row in zip(events, upto, strict=True):
-            self._event(statement, row)
+        for k, (statement, row) in enumerate(zip(events, upto, strict=True)):
+            try:
+                self._event(statement, row)
+            except ProgramError as error:
+                if error.code == NOT_READ:
+                    error.others = tuple(filter(None, map(self._by_table, events[k + 1 :])))
+                raise
             if self.ended:
                 break
         if not self.ended:
@@ -125,15 +132,26 @@ class _Reader(Events):
                 line=statement.line,
                 code="OLP511",
             )
-        known = TABLE.get(first)
-        if known is None and not text:
-            return
-        support, why = known or (
-            Support.REFUSED,
-            "is not a statement that olp knows, and may move the machine",
+        refusal = self._by_table(statement)
+        if refusal is not None:
+            raise refusal
+
+    def _by_table(self, statement: Statement) -> ProgramError | None:
+        """Why a statement is refused wherever it is; None where that depends on others, or it is read."""
+        label, major = statement.head()
+        text = statement.text.strip()
+        bracketed = major.startswith(b"(") and major.endswith(b")")
+        first = major.split(b" ")[0].split(b"(")[0] if major[:3] in (b"IF ", b"IF(") else major
+        if not text or bracketed or first == b"PTMEAS" or first in self._handlers:
+            return None
+        if label and b"/" not in statement.text:
+            return None
+        support, why = TABLE.get(
+            first, (Support.REFUSED, "is not a statement that olp knows, and may move the machine")
         )
-        if support is Support.REFUSED:
-            raise ProgramError(f"{shown(first)} {why}", line=statement.line, code="OLP512")
+        if support is not Support.REFUSED:
+            return None
+        return ProgramError(f"{shown(first)} {why}", line=statement.line, code=NOT_READ)
 
     # -- points --------------------------------------------------------------------------------------
 

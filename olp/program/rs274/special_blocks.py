@@ -81,6 +81,7 @@ def _checked(
                 why or f"{name} is not known to the {profile.name} profile and may move the machine",
                 line=line,
                 code="OLP513" if c in CUTTER_COMPENSATION else "OLP512",
+                word=name,
             )
     for word in words:
         m = round(word.value * 10)
@@ -90,6 +91,7 @@ def _checked(
                 hint="unroll the program with olp correct --flatten",
                 line=line,
                 code="OLP511",
+                word=f"M{m / 10:g}",
             )
     return [c for c, a in zip(code.tolist(), act.tolist(), strict=True) if a == Act.EVENT]
 
