@@ -61,7 +61,11 @@ def _wrong_calls() -> Iterator[None]:
         # A group without a verb shows its help, which click raises as an error of its own.
         if type(error).show is not click.UsageError.show:
             raise
-        raise _WrongCall(error.format_message(), error.ctx) from None
+        message = error.format_message()
+        takes = [] if error.ctx is None else [name for p in error.ctx.command.params for name in p.opts]
+        if message.startswith("Got unexpected extra argument") and "--machine" in takes:
+            message += "; name the machine file with -m, and the job file with -j"
+        raise _WrongCall(message, error.ctx) from None
 
 
 class _Verbs(LateGroup):

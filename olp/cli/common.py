@@ -55,6 +55,12 @@ class Given:
 
 def given(program: str | None, machine: str | None, job: str | None) -> Given:
     """Program and machine file: the command line's, else the job's. Raises UsageError, InputError."""
+    if program is not None and program.lower().endswith(".toml"):
+        raise UsageError(
+            "is a TOML file and no program; name the program first, the machine file with -m, and the "
+            "job file with -j",
+            file=program,
+        )
     session, inputs = machine_given(machine, job)
     program = program if program is not None else session.setup.job.program
     if program is None:

@@ -51,11 +51,13 @@ def _syntax_error(message: str, text: str, file: str) -> ConfigError:
         hint = "write a decimal point instead of the comma"
     elif written.count('"') % 2:
         hint = "close the quotes"
-    elif "Invalid value" in what:
+    elif "Invalid value" in what or "'\\'" in what:
         hint = "text needs quotes, and a file name on Windows single quotes"
     problem = (
         f"line {line}: {written!r} is not TOML ({what}); expected key = value, [table] or [[table]]; {hint}"
     )
+    if not file.lower().endswith(".toml"):
+        problem += "; the files that describe machine and job end in .toml"
     return ConfigError(problem, file=file, line=line)
 
 

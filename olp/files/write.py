@@ -24,10 +24,12 @@ def read_bytes(path: PathLike) -> bytes:
     except FileNotFoundError:
         raise InputError("no such file; check the path", file=str(path)) from None
     except IsADirectoryError:
-        raise InputError("is a folder; expected a file", file=str(path)) from None
+        raise InputError("is a folder; expected a file in it", file=str(path)) from None
     except PermissionError:
         folder = Path(path).is_dir()
-        sentence = "is a folder; expected a file" if folder else "may not be read; check its permissions"
+        sentence = (
+            "is a folder; expected a file in it" if folder else "may not be read; check its permissions"
+        )
         raise InputError(sentence, file=str(path)) from None
     except (OSError, ValueError) as error:
         raise InputError(f"cannot be read ({_reason(error)})", file=str(path)) from None

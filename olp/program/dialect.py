@@ -100,6 +100,10 @@ class Dialect:
         """Whether the statement of a line goes on in the next line."""
         return False
 
+    def straightened(self, line: bytes) -> bytes:
+        """The line with a straight move to the end of its arc, unchanged where the dialect has no such line."""
+        return line
+
     def support(self) -> list[dict[str, str]]:
         """The support matrix as plain data: statement, support, why."""
         return [row.as_dict() for row in self.rows()]

@@ -3,7 +3,7 @@
 Three repairs let the reading go on with as little harm as possible. A work offset, tool or stylus that is not
 defined is defined. A start position that is not known is set to zero. Any other refused statement is taken
 out: its bytes become blanks, so that lines keep their numbers. In blocks of words the refused G or M word
-goes alone, so that positions remain. Refusals that may be there only because of a repair say so.
+goes alone, and an arc becomes straight, so that positions remain. Refusals that may be there only because of a repair say so.
 """
 
 from __future__ import annotations
@@ -41,6 +41,8 @@ UNROLLED = 20_000
 TOO_LONG = "OLP543"
 #: Its repair is a start position.
 UNKNOWN_POSITION = "OLP524"
+#: Its repair is a straight move.
+ARC = "OLP530"
 #: What is taken out with it states nothing.
 COMMENT = "OLP514"
 
@@ -142,6 +144,11 @@ class _Survey:
 
     def _take_out(self, error: ProgramError, index: int, *, again: bool) -> None:
         """Blank the word that is refused, or the statement with the lines that it goes on in."""
+        if error.code == ARC and not again:
+            line = self.lines[index]
+            self.lines[index] = self.dialect.straightened(line)
+            if self.lines[index] != line:
+                return
         if error.code != COMMENT:
             self.taken.append(index + 1)
         if error.word and not again:

@@ -17,6 +17,7 @@ from olp.checks.model import model_findings
 from olp.compensation.invert import TOLERANCE_MM
 from olp.compensation.plan import Limits
 from olp.compensation.planning import plan
+from olp.compensation.stamp import find_stamp
 from olp.compensation.style import fewest_decimals
 from olp.core.arrays import Index
 from olp.core.errors import ProgramError, naming
@@ -100,6 +101,13 @@ def verify_programs(
     findings outside the calibrated box; with None such a path raises OutsideBox, as in `correct`. Raises
     ProgramError where the second is not a correction of the first, Doubtful with `refuse_doubts`."""
     (first, name), (second, other) = nominal, corrected
+    if find_stamp(first.data) is not None and find_stamp(second.data) is None:
+        raise ProgramError(
+            "the program given as nominal has the stamp of a correction, and the corrected one has none; "
+            "exchange the two",
+            file=name or "<nominal>",
+            code="OLP562",
+        )
     doubts = doubted(
         first, loaded, options.accept, options.date, name=name, stamped=second.data, refuse=refuse_doubts
     )

@@ -25,6 +25,8 @@ def read(
 ) -> Program:
     """Read a program. Raises Refused with all the reasons where there are several, ProgramError where there
     is one."""
+    if not program.data.strip():
+        raise ProgramError("the file is empty; expected a program of at least one block", code="OLP501")
     return read_all(program.data, setup, dialect, options, subprograms=beside(sources, program))
 
 

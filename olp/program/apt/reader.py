@@ -28,6 +28,8 @@ from olp.program.statement_rows import Point, Points
 from olp.program.text.statements import Chunk, Comment, Statement, chunks, shown
 
 NAN = float("nan")
+#: Whether these are refused depends on other statements.
+_BY_ORDER = frozenset({b"RAPID", b"TLON", b"GODLTA"})
 #: Refused by the table of statements, wherever it is.
 NOT_READ = "OLP512"
 _FREE = re.compile(rb"(?i)(?:" + b"|".join(FREE) + rb")(?![A-Z])")
@@ -136,10 +138,12 @@ class _Reader(Events):
     def _by_table(self, statement: Statement) -> ProgramError | None:
         """Why a statement is refused wherever it is; None where that depends on others, or it is read."""
         label, major = statement.head()
+        text = statement.text.strip().upper()
+        free = _FREE.match(text)
+        if free:
+            label, major = b"", free[0]
         first = major.split(b",")[0].strip()
-        text = statement.text.lstrip()
-        special = label or text[:2] == b"$$" or _FREE.match(text.upper()) or first in self._handlers
-        if special or first in (b"RAPID", b"TLON", b"GODLTA"):
+        if label or text[:2] == b"$$" or first in self._handlers or first in _BY_ORDER:
             return None
         support, why = TABLE.get(
             first, (Support.REFUSED, "is not a statement that olp knows, and may move the machine")

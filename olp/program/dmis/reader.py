@@ -109,7 +109,6 @@ class _Reader(Events):
 
     def _event(self, statement: Statement, row: int) -> None:
         label, major = statement.head()
-        text = statement.text.strip()
         if major.startswith(b"(") and major.endswith(b")"):
             return
         first = major.split(b" ")[0].split(b"(")[0] if major[:3] in (b"IF ", b"IF(") else major

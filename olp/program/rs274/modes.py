@@ -34,6 +34,7 @@ Modal = npt.NDArray[np.int16]
 _FLOW = re.compile(rb"[#\[=<]|^/?\s*O|^\W*N?\d*\s*(IF|WHILE|GOTO|END|DO)", re.IGNORECASE)
 #: A bracket that opens inside a comment, with text behind the one that closes it
 _NESTED = re.compile(rb"\([^()]*\([^()]*\)[^()]*\)")
+_COMMA = re.compile(rb"\d,\d")
 #: Events whose axis words are not motion: G10 G52 G92 G43.1
 _CLAIMS = (WRITE_OFFSET, *SHIFTS, LENGTH_FROM_WORDS)
 _LENGTHS = np.zeros(256, bool)
@@ -216,8 +217,10 @@ def _odd(data: bytes, chunk: WordChunk, line: int) -> ProgramError:
             line=number,
             code="OLP511",
         )
+    comma = "; write a decimal point instead of the comma" if _COMMA.search(text) else ""
     return ProgramError(
-        f"`{shown}` is not understood and may move the machine; expected words of a letter and a number",
+        f"`{shown}` is not understood and may move the machine; expected words of a letter and a number"
+        f"{comma}",
         line=number,
         code="OLP510",
     )

@@ -14,14 +14,22 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from olp.core.errors import InputError
+from olp.program.foreign import recognised
 from olp.program.text.delimited import DELIMITERS, Layout
 from olp.program.text.numbers import Number, number
 
 Span = tuple[int, int]
+#: Bytes that show whether a file is binary.
+_HEAD = 1024
 
 
 def decoded(data: bytes) -> str:
-    """The text of a file. Raises InputError with the line of the first byte that is not UTF-8."""
+    """The text of a file. Raises InputError with the line of the first byte that is not UTF-8, and for a
+    binary file with the name of what it is."""
+    if b"\0" in data[:_HEAD]:
+        other = recognised(data, languages=False)
+        if other is not None:
+            raise InputError(other.message, line=1)
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -6,6 +6,7 @@ profile. G codes are keyed by ten times their number (G5.1 is 51).
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
 from enum import IntEnum
@@ -96,6 +97,9 @@ class Profile(Dialect):
         counted = increment(machine, letter, unit_mm) if self.counts_increments(machine) else 1.0
         return counted * unit_mm
 
+    def straightened(self, line: bytes) -> bytes:
+        return b"G1 " + _OF_ARC.sub(b" ", line)
+
     def rows(self) -> Sequence[Row]:
         return [
             Row(
@@ -114,6 +118,9 @@ def increment(machine: Machine, letter: str, unit_mm: float) -> float:
     metric = 0.0001 if least < 0.0005 else 0.001
     return metric if unit_mm == 1.0 else metric / 10
 
+
+#: The words of a block that make its move an arc.
+_OF_ARC = re.compile(rb"(?i)G[ \t]*0*[23](?![\d.])|[IJKRP][ \t]*[-+]?[\d.]+")
 
 #: Why codes are refused, where a control has no other reason.
 REFUSALS: Mapping[int, str] = {
