@@ -101,7 +101,7 @@ class Dialect:
         return False
 
     def straightened(self, line: bytes) -> bytes:
-        """The line with a straight move to the end of its arc, unchanged where the dialect has no such line."""
+        """The line with a straight move to the end of its arc; unchanged where arcs have no such line."""
         return line
 
     def support(self) -> list[dict[str, str]]:

@@ -86,7 +86,7 @@ FOREIGN = (
         "Heidenhain conversational",
         _line(
             rb"\d+[ \t]+(?:L|CC?|CR|CT|LBL|TOOL[ \t]+CALL|CYCL[ \t]+DEF)"
-            rb"[ \t]+[^\r\n]*(?:R[0LR]|F[ \t]*MAX|X[+-]|DEF)"
+            rb"[ \t]+[^\r\n]*(?:R[0LR]|F[ \t]*MAX|[XYZ][+-]\d|DEF)"
         ),
         _OTHER_POST,
         2,
@@ -95,7 +95,7 @@ FOREIGN = (
     Foreign(
         "KUKA KRL",
         _line(
-            rb"&(?:ACCESS|REL|PARAM)\b|DEF(?:DAT|FCT)?[ \t]+[A-Z_]\w*[ \t]*\([^\r\n]*\r?$|"
+            rb"&(?:ACCESS|REL|PARAM)\b|DEF(?:DAT|FCT)?[ \t]+[A-Z_]\w*[ \t]*\([^:\r\n]*\r?$|"
             rb"(?:PTP|LIN|CIRC)(?:_REL)?[ \t]+(?:\{|X[A-Z_]*\w*\b(?![ \t]*[-+.\d]))"
         ),
         _ROBOT,
@@ -112,6 +112,13 @@ FOREIGN = (
     ),
     Foreign("FANUC TP", _line(rb"/(?:PROG|ATTR|MN|POS)\b|\d*:[ \t]*[JLC][ \t]+PR?\["), _ROBOT, language=True),
     Foreign(
+        "Stäubli VAL 3",
+        re.compile(rb"(?im)<Program[^>]*staubli|^[ \t]*begin[ \t]*\r?\n[ \t]*move[jlc]\("),
+        _ROBOT,
+        language=True,
+    ),
+    Foreign("Mazatrol", re.compile(rb"\AMAZATROL|\A\s*UNo\.[ \t]"), _OTHER_POST, language=True),
+    Foreign(
         "UR script",
         _line(rb"def[ \t]+\w+\(\):|(?:movej|movel|movep|movec|servoj)[ \t]*\("),
         _ROBOT,
@@ -123,13 +130,6 @@ FOREIGN = (
         _ROBOT,
         language=True,
     ),
-    Foreign(
-        "Stäubli VAL 3",
-        re.compile(rb"(?im)<Program[^>]*staubli|^[ \t]*begin[ \t]*\r?\n[ \t]*move[jlc]\("),
-        _ROBOT,
-        language=True,
-    ),
-    Foreign("Mazatrol", re.compile(rb"\AMAZATROL|\A\s*UNo\.[ \t]"), _OTHER_POST, language=True),
     Foreign(
         "Sinumerik (Siemens)",
         _line(

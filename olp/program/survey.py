@@ -3,7 +3,8 @@
 Three repairs let the reading go on with as little harm as possible. A work offset, tool or stylus that is not
 defined is defined. A start position that is not known is set to zero. Any other refused statement is taken
 out: its bytes become blanks, so that lines keep their numbers. In blocks of words the refused G or M word
-goes alone, and an arc becomes straight, so that positions remain. Refusals that may be there only because of a repair say so.
+goes alone, and an arc becomes straight, so that positions remain. Refusals that may be there only because of
+a repair say so.
 """
 
 from __future__ import annotations

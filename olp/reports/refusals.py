@@ -10,8 +10,10 @@ from olp.core.errors import Reason
 from olp.findings.catalogue import RULES
 from olp.reports.report import WIDTH, printable
 
-#: Most reasons of a kind that are written out, and lines of the others that are named.
-_WRITTEN, _LINES = 6, 12
+#: Most reasons of a kind that are written out.
+_WRITTEN = 6
+#: Most lines of the others that are named.
+_LINES = 12
 
 
 def refusals_text(rows: Sequence[Mapping[str, Any]], *, complete: bool) -> Iterator[str]:

@@ -61,10 +61,13 @@ def parts_of(error: ProgramError) -> dict[str, Any]:
 
 
 def short(error: ProgramError) -> ProgramError:
-    """The error of a verb that has listed all reasons: a single one, or their number."""
+    """The error of a verb that has listed all reasons: a single one, or the first with their number."""
     if not isinstance(error, Refused):
         return error
-    count = f"{'' if error.complete else 'at least '}{len(error.reasons)} statements"
+    count = f"{'' if error.complete else 'at least '}{len(error.reasons)}"
     return ProgramError(
-        f"{count} are refused; the report lists each with its reason", file=error.file, code=error.code
+        f"{error.message}; {count} statements are refused in all, and the report lists each with its reason",
+        file=error.file,
+        line=error.line,
+        code=error.code,
     )

@@ -1,5 +1,5 @@
-"""Typical mistakes of a first day: each gets one sentence that says what, where, what was expected, and how to
-go on."""
+"""Typical mistakes of a first day: each gets one sentence that says what, where, what was expected, and how
+to go on."""
 
 from __future__ import annotations
 
@@ -89,7 +89,8 @@ CASES = [
          args=("correct", "part.nc", "-m", "part.nc")),
     Case("job file as machine file", ("job.toml", "this is a job file", "expected a machine file"),
          args=("correct", "part.nc", "-m", "job.toml")),
-    Case("calibration as machine file", ("calibration.toml", "this is a calibration", "expected a machine file"),
+    Case("calibration as machine file", ("calibration.toml", "this is a calibration",
+         "expected a machine file"),
          args=("correct", "part.nc", "-m", "calibration.toml")),
     Case("folder as machine file", (".: is a folder", "expected a file in it"),
          args=("correct", "part.nc", "-m", ".")),
@@ -112,7 +113,8 @@ CASES = [
          changed("x.csv", ",", ";")),
     Case("mm in columns of um", ("OLP450", "axis X", "expected columns in um and urad", "Check the unit"),
          thousandths),
-    Case("sheet instead of CSV", ("x.csv: line 1", "spreadsheet", "save the sheet as CSV"), written("x.csv", XLSX)),
+    Case("sheet instead of CSV", ("x.csv: line 1", "spreadsheet", "save the sheet as CSV"),
+         written("x.csv", XLSX)),
     Case("key with a typo", ("machine.toml: line 10", "axes.X.travl_mm", "did you mean travel_mm?"),
          changed("machine.toml", "travel_mm", "travl_mm", 1)),
     Case("text without quotes", ("machine.toml: line 5", "is not TOML", "text needs quotes"),
@@ -134,11 +136,13 @@ CASES = [
          program(b"X50.", b"X50,5")),
     Case("tool is not defined", ("part.nc:3", "tool 77", "is not defined", "give [tools.77]"),
          program(b"T1 M6", b"T77 M6")),
-    Case("work offset is not defined", ("part.nc:5", "G58 is used but not defined", 'give [work_offsets."G58"]'),
+    Case("work offset is not defined", ("part.nc:5", "G58 is used but not defined",
+         'give [work_offsets."G58"]'),
          program(b"G54", b"G58")),
     Case("macro program", ("part.nc:7", "`X#1`", "olp correct --flatten"),
          program(b"X50.", b"X#1")),
-    Case("macro program that unrolls", ("part.nc:6", "`#1=50.`", "unroll the program with olp correct --flatten"),
+    Case("macro program that unrolls", ("part.nc:6", "`#1=50.`",
+         "unroll the program with olp correct --flatten"),
          program(b"G1 Z5. F300.\nX50.", b"#1=50.\nG1 Z5. F300.\nX#1")),
     Case("nested comment", ("part.nc:2", "comment inside a comment", "take the inner brackets out"),
          program(b"G21 G90", b"(A (B) C)\nG21 G90")),
@@ -147,8 +151,10 @@ CASES = [
     Case("programs exchanged", ("done.nc", "exchange the two"), corrected,
          args=("verify", "done.nc", "part.nc", "-m", "machine.toml")),
     Case("empty program", ("part.nc", "the file is empty", "expected a program"), written("part.nc", b"")),
-    Case("binary file", ("part.nc:1", "binary file", "plain text"), written("part.nc", bytes(range(256)) * 4)),
-    Case("UTF-16", ("part.nc:1", "UTF-16", "plain text"), written("part.nc", PLAIN.decode().encode("utf-16"))),
+    Case("binary file", ("part.nc:1", "binary file", "plain text"),
+         written("part.nc", bytes(range(256)) * 4)),
+    Case("UTF-16", ("part.nc:1", "UTF-16", "plain text"),
+         written("part.nc", PLAIN.decode().encode("utf-16"))),
     Case("sheet as program", ("part.nc:1", "spreadsheet", "CSV"), written("part.nc", XLSX)),
     Case("output is the input", ("part.nc: is an input", "name another output"),
          args=("correct", "part.nc", "-m", "machine.toml", "-o", "part.nc"), code=2),

@@ -36,8 +36,8 @@ RULES = (
     _rule(
         "OLP503",
         "dialect is not certain",
-        why="The text, or its text and the ending of its file, fit several dialects. They read the same "
-        "statement differently.",
+        why="The text, or its text and the ending of its file, fit several dialects. "
+        "They read the same statement differently.",
         remedy="Name the dialect with --dialect, or with the key dialect of the job file.",
         example="A file `part.dmi` with the statements of an APT program.",
     ),
@@ -76,8 +76,8 @@ RULES = (
         "cutter compensation",
         why="The control makes the path of the tool itself, from a radius in its tables.",
         remedy="Have the CAM system write the path of the tool centre, or take the contour as the path of "
-        "the "
-        "tool (--contour).",
+        "the tool "
+        "(--contour).",
         example="`G41 D1`.",
     ),
     _rule(
@@ -101,8 +101,8 @@ RULES = (
         "OLP516",
         "word is missing or impossible",
         why="Without the word, or with this value, the control refuses the block or reads it in a way that "
-        "is "
-        "not known.",
+        "is not "
+        "known.",
         remedy="Give the word that the message names.",
         example="`M61` without Q, or `T1.5`.",
     ),
@@ -171,8 +171,8 @@ RULES = (
     _rule(
         "OLP526",
         "writes a table of the control",
-        why="Tables of tools and offsets decide later positions, and what this block writes there is not "
-        "read.",
+        why="Tables of tools and offsets decide later positions, and what "
+        "this block writes there is not read.",
         remedy="State the values in the machine or job file, and take the block out.",
         example="`G10 L1 P1 Z100`.",
     ),
@@ -180,8 +180,8 @@ RULES = (
         "OLP530",
         "impossible arc",
         why="The control refuses an arc whose start, end and centre or radius do not fit.",
-        remedy="Write more digits, or check the plane (G17, G18, G19) and whether I, J, K are absolute "
-        "(G90.1).",
+        remedy="Write more digits, or check the plane (G17, G18, G19) and "
+        "whether I, J, K are absolute (G90.1).",
         example="`G2 X10 Y0 I4 J0` from X0 Y0: the radius is 4 mm at its start and 6 mm at its end.",
         follows=True,
     ),
@@ -252,8 +252,8 @@ RULES = (
         "OLP550",
         "payload is not certain",
         why="The errors of the machine depend on the payload, and two sources contradict each other or one "
-        "is "
-        "not understood.",
+        "is not "
+        "understood.",
         remedy="State the payload once: in the comments of the program, or in the job file.",
         example="`(OLP PAYLOAD heavy)`.",
     ),
