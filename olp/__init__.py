@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from olp.core.errors import InputError as InputError
     from olp.core.errors import OlpError as OlpError
     from olp.core.errors import ProgramError as ProgramError
+    from olp.core.errors import Refused as Refused
     from olp.files.config import load_setup as load_setup
     from olp.findings.catalogue import Finding as Finding
     from olp.review.job import Review as Review
@@ -104,6 +105,7 @@ _HOME = {
     "InputError": "olp.core.errors",
     "OlpError": "olp.core.errors",
     "ProgramError": "olp.core.errors",
+    "Refused": "olp.core.errors",
     "Finding": "olp.findings.catalogue",
     "load_setup": "olp.files.config",
     "evaluate_lines": "olp.workflows.calibrate_evaluate",
