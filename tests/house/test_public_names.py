@@ -22,7 +22,7 @@ PUBLIC = {
     *("import_table", "export_table", "compare_tables", "TableImport", "TableExport"),
     *("evaluate_lines", "fit_ballbar", "fit_diagonals", "fit_postures", "go_return"),
     *("fit_thermal", "ThermalFitting", "correct_results", "ResultCorrection"),
-    *("OlpError", "InputError", "ConfigError", "ProgramError", "CannotCompute"),
+    *("OlpError", "InputError", "ConfigError", "ProgramError", "Refused", "CannotCompute"),
 }
 
 

@@ -20,24 +20,23 @@ RULES = (
         "OLP501",
         "not a program that is read",
         why="The text is in a language of another control, or it is another kind of file.",
-        remedy="Give the program for the control of the machine file, or what the CAM system writes before "
-        "its "
-        "post-processor (APT CLDATA).",
+        remedy="Give the program for the control of the machine file, or what the CAM system writes "
+        "before its post-processor (APT CLDATA).",
         example="`BEGIN PGM 12 MM` at the start: Heidenhain conversational.",
     ),
     _rule(
         "OLP502",
         "not plain text",
-        why="Programs are read byte by byte, so that all that is not corrected remains as it is. UTF-16 and "
-        "binary files have no such bytes.",
+        why="Programs are read byte by byte, so that all that is not corrected remains as it is. "
+        "UTF-16 and binary files have no such bytes.",
         remedy="Save or export the program as plain text (ASCII or UTF-8).",
         example="A program that a Windows editor saved as Unicode (UTF-16).",
     ),
     _rule(
         "OLP503",
         "dialect is not certain",
-        why="The text, or its text and the ending of its file, fit several dialects. "
-        "They read the same statement differently.",
+        why="The text, or its text and the ending of its file, fit several dialects. They "
+        "read the same statement differently.",
         remedy="Name the dialect with --dialect, or with the key dialect of the job file.",
         example="A file `part.dmi` with the statements of an APT program.",
     ),
@@ -45,8 +44,8 @@ RULES = (
         "OLP504",
         "no columns of positions",
         why="The list does not show which of its columns are X, Y and Z, or a row has no numbers there.",
-        remedy="Name the columns in the header, or give a profile with --dialect. Use the same delimiter and "
-        "decimal mark in all rows.",
+        remedy="Name the columns in the header, or give a profile with --dialect. Use the same "
+        "delimiter and decimal mark in all rows.",
         example="`1;2` as a row of a list with three columns.",
     ),
     _rule(
@@ -75,34 +74,31 @@ RULES = (
         "OLP513",
         "cutter compensation",
         why="The control makes the path of the tool itself, from a radius in its tables.",
-        remedy="Have the CAM system write the path of the tool centre, or take the contour as the path of "
-        "the tool "
-        "(--contour).",
+        remedy="Have the CAM system write the path of the tool centre, or take the contour as "
+        "the path of the tool (--contour).",
         example="`G41 D1`.",
     ),
     _rule(
         "OLP514",
         "nested comment",
-        why="A comment ends at the first closing bracket. So the rest of its line is read as words, and the "
-        "control refuses it, or moves.",
+        why="A comment ends at the first closing bracket. So the rest of its line is read as words, "
+        "and the control refuses it, or moves.",
         remedy="Take the inner brackets out, or replace them by [ and ].",
         example="`(ROUGHING (TOOL 5) SIDE A)`.",
     ),
     _rule(
         "OLP515",
         "stated twice in one block",
-        why="A control takes one word of a letter and one code of a modal group per block. Which one it "
-        "takes "
-        "of two is not known.",
+        why="A control takes one word of a letter and one code of a modal group per block. "
+        "Which one it takes of two is not known.",
         remedy="Leave one of the two, or write two blocks.",
         example="`G1 X10 X20`, or `G0 G1 X10`.",
     ),
     _rule(
         "OLP516",
         "word is missing or impossible",
-        why="Without the word, or with this value, the control refuses the block or reads it in a way that "
-        "is not "
-        "known.",
+        why="Without the word, or with this value, the control refuses the block or reads "
+        "it in a way that is not known.",
         remedy="Give the word that the message names.",
         example="`M61` without Q, or `T1.5`.",
     ),
@@ -132,9 +128,8 @@ RULES = (
     _rule(
         "OLP521",
         "tool is not defined",
-        why="Angular errors act on the vector from the gauge point to the tip, and the tool length is part "
-        "of "
-        "the axis positions.",
+        why="Angular errors act on the vector from the gauge point to the tip, and the tool "
+        "length is part of the axis positions.",
         remedy="Give [tools.N] in the machine or job file, with its length from the table of the control.",
         example="`T7 M6` and no [tools.7].",
     ),
@@ -155,8 +150,8 @@ RULES = (
     _rule(
         "OLP524",
         "position is not known",
-        why="The block needs the present position, and an axis has not been commanded yet. The error of the "
-        "machine depends on it.",
+        why="The block needs the present position, and an axis has not been commanded yet. The "
+        "error of the machine depends on it.",
         remedy="Command X, Y and Z first, or give start_mm in the job file.",
         example="`G2 X10 Y0 I5` as the first move.",
         follows=True,
@@ -171,8 +166,8 @@ RULES = (
     _rule(
         "OLP526",
         "writes a table of the control",
-        why="Tables of tools and offsets decide later positions, and what "
-        "this block writes there is not read.",
+        why="Tables of tools and offsets decide later positions, and what this block "
+        "writes there is not read.",
         remedy="State the values in the machine or job file, and take the block out.",
         example="`G10 L1 P1 Z100`.",
     ),
@@ -180,8 +175,7 @@ RULES = (
         "OLP530",
         "impossible arc",
         why="The control refuses an arc whose start, end and centre or radius do not fit.",
-        remedy="Write more digits, or check the plane (G17, G18, G19) and "
-        "whether I, J, K are absolute (G90.1).",
+        remedy="Write more digits, or check the plane (G17, G18, G19) and whether I, J, K are absolute (G90.1).",
         example="`G2 X10 Y0 I4 J0` from X0 Y0: the radius is 4 mm at its start and 6 mm at its end.",
         follows=True,
     ),
@@ -220,8 +214,8 @@ RULES = (
     _rule(
         "OLP541",
         "value is not known off line",
-        why="The value is in the control: a probe result, an offset, a setting, or a parameter that another "
-        "program has set.",
+        why="The value is in the control: a probe result, an offset, a setting, or a "
+        "parameter that another program has set.",
         remedy="Assign the value in the program, before it is used.",
         example="`X#5061` (the last probe result).",
         follows=True,
@@ -251,9 +245,8 @@ RULES = (
     _rule(
         "OLP550",
         "payload is not certain",
-        why="The errors of the machine depend on the payload, and two sources contradict each other or one "
-        "is not "
-        "understood.",
+        why="The errors of the machine depend on the payload, and two sources contradict each "
+        "other or one is not understood.",
         remedy="State the payload once: in the comments of the program, or in the job file.",
         example="`(OLP PAYLOAD heavy)`.",
     ),
