@@ -175,7 +175,8 @@ RULES = (
         "OLP530",
         "impossible arc",
         why="The control refuses an arc whose start, end and centre or radius do not fit.",
-        remedy="Write more digits, or check the plane (G17, G18, G19) and whether I, J, K are absolute (G90.1).",
+        remedy="Write more digits, or check the plane (G17, G18, G19) and whether I, J and K are "
+        "absolute (G90.1).",
         example="`G2 X10 Y0 I4 J0` from X0 Y0: the radius is 4 mm at its start and 6 mm at its end.",
         follows=True,
     ),

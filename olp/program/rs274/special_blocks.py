@@ -99,7 +99,8 @@ def _checked(
 def check_codes(context: Context, active: Mask, profile: Profile) -> None:
     """Refuse the codes of a chunk that need no state to be refused, all at once."""
     chunk, codes = context.chunk, context.codes
-    m = (chunk.letter == ord("M")) & active[chunk.line] & np.isin(np.rint(context.value * 10), _M_CODES)
+    m = np.flatnonzero((chunk.letter == ord("M")) & active[chunk.line])
+    m = m[np.isin(np.rint(context.value[m] * 10), _M_CODES)]
     lines = np.union1d(codes.line[codes.act == Act.REFUSE], chunk.line[m])
     errors = []
     for line in lines.tolist():
