@@ -103,7 +103,7 @@ def command(
     options = options_of(check.CheckOptions, words)
     other = None if nominal is None else source(call.session.sources, nominal)
     with progress(quiet or form != "text") as show, naming(call.stream):
-        result = check.run(call.session, call.source, options, nominal=other, progress=show)
+        result = check.examined(call.session, call.source, options, nominal=other, progress=show)
     parts = {output: FORMATS[form](result.report, fail_on).encode()}
     if clearances is not None and result.clearances is not None:
         parts[clearances] = to_csv(result.clearances.rows())

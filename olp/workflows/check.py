@@ -122,10 +122,7 @@ def check(
     chosen(options)
     session = Session.start(machine, job)
     other = None if nominal is None else session.sources.source(nominal)
-    result = run(session, session.sources.source(program), options, nominal=other, progress=progress)
-    if result.refused is not None:
-        raise result.refused
-    return result
+    return run(session, session.sources.source(program), options, nominal=other, progress=progress)
 
 
 def run(
@@ -136,7 +133,22 @@ def run(
     nominal: Source | None = None,
     progress: Progress | None = None,
 ) -> Check:
-    """As `check`, in a session; a program that is refused gives its reasons as findings."""
+    """As `check`, in a session."""
+    result = examined(session, program, options, nominal=nominal, progress=progress)
+    if result.refused is not None:
+        raise result.refused
+    return result
+
+
+def examined(
+    session: Session,
+    program: Source,
+    options: CheckOptions,
+    *,
+    nominal: Source | None = None,
+    progress: Progress | None = None,
+) -> Check:
+    """As `run`. A program that is refused gives its reasons as findings, and the error."""
     codes = chosen(options)
     tell = progress or silent
     setup = session.setup

@@ -25,9 +25,10 @@ def read(
 ) -> Program:
     """Read a program. Raises Refused with all the reasons where there are several, ProgramError where there
     is one."""
+    parsed = read_all(program.data, setup, dialect, options, subprograms=beside(sources, program))
     if not program.data.strip():
         raise ProgramError("the file is empty; expected a program of at least one block", code="OLP501")
-    return read_all(program.data, setup, dialect, options, subprograms=beside(sources, program))
+    return parsed
 
 
 def reasons_of(error: ProgramError) -> tuple[Reason, ...]:

@@ -11,6 +11,7 @@ import olp
 from olp.checks import motion
 from olp.core.errors import ProgramError, UsageError
 from olp.findings.catalogue import GATE_CODES, RULES
+from olp.program import survey
 from olp.workflows import check as gate
 
 PROGRAMS = Path(__file__).resolve().parents[2] / "programs"
@@ -110,7 +111,7 @@ def test_each_text_is_read_and_timed_once(
         reads.append(data)
         return read(data, *more, **words)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(gate, "read", counted)
+    monkeypatch.setattr(survey if pair else gate, "read", counted)
     monkeypatch.setattr(motion.Feeds, "of", lambda parsed: timed.append(parsed) or of(parsed))
     olp.check(program, path, nominal=nominal if pair else None)
     assert len(reads) == len(set(reads)) == 2
