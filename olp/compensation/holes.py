@@ -20,7 +20,9 @@ class HoleWords:
 
     def __init__(self, holes: Sequence[Hole]) -> None:
         self._hole_of = {m: i for i, hole in enumerate(holes) for m in range(hole.first, hole.last)}
-        self._series, self._initial = -1, 0.0
+        self._series = -1
+        # program coordinate of the tool axis before the series
+        self._initial = 0.0
         self._inherited: dict[str, float] = {}
 
     def edits(self, writer: Writer, rows: Rows, a: int, b: int) -> list[Edits]:
@@ -47,12 +49,15 @@ class HoleWords:
         first, second, third = PLANES[hole.plane]
         frame = writer.frame_of(hole.first)
         before = rows.emitted[a - 1].copy() if a else rows.entry.copy()
+        if self._series != hole.series:
+            self._series = hole.series
+            self._initial = float(before[third] - frame.offset_mm[third]) / frame.unit_mm
+            self._inherited = {}
         if rows.flag[a] & np.uint8(Flag.PASS):
             rows.emitted[a:b] = writer.path.end_mm[hole.last - 1]
+            self._inherit(writer, hole, third, frame.unit_mm)
             return
-        if self._series != hole.series:
-            self._series, self._initial = hole.series, float(before[third])
-            self._inherited = {}
+        initial = self._initial * frame.unit_mm + frame.offset_mm[third]
         words = _Words(writer, hole, frame.unit_mm, edits)
         command = (plan.level_mm[index] + plan.bottom_mm[index]) / 2
         emitted = before.copy()
@@ -65,14 +70,22 @@ class HoleWords:
             if slot is not None or moved:
                 emitted[axis] = base + mantissa / 10**decimals * frame.unit_mm
                 words.put("XYZ"[axis], axis, mantissa, decimals)
-        r_base = self._initial if hole.incremental else frame.offset_mm[third]
+        r_base = initial if hole.incremental else frame.offset_mm[third]
         r_place = self._depth(words, "R", plan.level_mm[index][third], r_base, third)
         z_base = r_place if hole.incremental else frame.offset_mm[third]
         self._depth(words, "XYZ"[third], plan.bottom_mm[index][third], z_base, third)
         words.finish()
         retract_to_r = abs(writer.path.end_mm[hole.last - 1, third] - hole.r_mm) < 1e-9
-        emitted[third] = r_place if retract_to_r else max(self._initial, r_place)
+        emitted[third] = r_place if retract_to_r else max(initial, r_place)
         rows.emitted[a:b] = emitted
+
+    def _inherit(self, writer: Writer, hole: Hole, third: int, unit_mm: float) -> None:
+        """Take over R and the depth of a block that stays as it is."""
+        for letter in ("R", "XYZ"[third]):
+            if letter in hole.words:
+                slot = hole.words[letter]
+                decimals = writer.style.decimals_of(slot, third, unit_mm)
+                self._inherited[letter] = int(writer.words.mantissa[slot]) / 10**decimals
 
     def _depth(self, words: _Words, letter: str, wanted: float, base: float, axis: int) -> float:
         """R or the depth word: replaced where given, inserted where the inherited value would be wrong.

@@ -17,13 +17,11 @@ from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import ProgramError
 from olp.program.rs274.axis_state import AxisState
 from olp.program.rs274.codes import (
+    AXIS_VALUES,
     COMPENSATION_OFF,
     CUTTER_COMPENSATION,
     DWELL,
     GROUPS,
-    LENGTH_FROM_WORDS,
-    SHIFTS,
-    WRITE_OFFSET,
 )
 from olp.program.rs274.lexer import WordChunk
 from olp.program.rs274.motion import modal, values
@@ -32,8 +30,6 @@ from olp.program.rs274.profiles.base import Act
 Modal = npt.NDArray[np.int16]
 
 _FLOW = re.compile(rb"[#\[=<]|^/?\s*O|^\W*N?\d*\s*(IF|WHILE|GOTO|END|DO)", re.IGNORECASE)
-#: Events whose axis words are not motion: G10 G52 G92 G43.1
-_CLAIMS = (WRITE_OFFSET, *SHIFTS, LENGTH_FROM_WORDS)
 _LENGTHS = np.zeros(256, bool)
 _LENGTHS[list(b"XYZIJKRQ")] = True
 
@@ -83,7 +79,7 @@ class Modes:
         self._block_delete = block_delete
         profile = state.profile
         self._cycles_apart = profile.cycles_apart
-        self._claims = (*_CLAIMS, DWELL) if profile.axis_dwell else _CLAIMS
+        self._claims = sorted(AXIS_VALUES | {DWELL} if profile.axis_dwell else AXIS_VALUES)
         self._act = np.full(2000, Act.REFUSE, np.int8)
         for code, act in profile.codes.items():
             self._act[code] = act

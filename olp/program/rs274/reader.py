@@ -116,6 +116,7 @@ class _Reader:
         context.event[[line for line in self.payloads if active[line]]] = True
         self._stretches(context, gather(chunk, context.motion, context.consumed))
         self.modes.leave(context, last - 1)
+        self.special_blocks.leave(context, last - 1)
 
     # -- stretches between events ------------------------------------------------------------------
 

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from olp.core.arrays import Index
 from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES
-from olp.core.toolpath import Flag, Kind
+from olp.core.toolpath import Flag, Frame, Kind
 from olp.program.directives import Directives
 from olp.program.program import Hole
 from olp.program.rs274.axis_state import AxisState, Effect, Word
@@ -33,8 +33,9 @@ from olp.program.rs274.cycles import Stroke, hole_moves, levels
 from olp.program.rs274.modes import Context, scaled
 from olp.program.rs274.motion import fill
 from olp.program.rs274.profiles.base import Act, Profile
-from olp.program.rs274.state import NAN
+from olp.program.rs274.state import NAN, Series
 
+_CYCLES = np.array(sorted(CYCLES))
 _M_REFUSED = {
     700: "saves modal codes", 710: "forgets saved modal codes", 720: "restores modal codes",
     730: "saves modal codes", 960: "branches", 970: "calls a subprogram", 980: "calls a subprogram",
@@ -96,6 +97,17 @@ class SpecialBlocks:
         self._state = state
         self._collector = collector
         self._switches = switches
+        self._last_cycle = -1
+
+    def leave(self, context: Context, line: int) -> None:
+        """Keep for the next chunk whether a series of cycles has ended up to this line, the last one read."""
+        if self._last_cycle >= 0 and self._ended(context, line + 1):
+            self._last_cycle = -1
+
+    def _ended(self, context: Context, row: int) -> bool:
+        """Whether another motion code came into force between the last block of a cycle and this line."""
+        first = max(self._last_cycle + 1 - context.chunk.first_line, 0)
+        return self._last_cycle < 0 or not np.isin(context.motion[first:row], _CYCLES).all()
 
     def run(self, context: Context, row: int, slot: Index, frame: int, effect: Effect) -> None:
         """Carry out the motion on line `row` of the chunk, whose axis words are `slot` (1, 3), in this
@@ -175,24 +187,24 @@ class SpecialBlocks:
         given = {letter: float(value[i]) for letter, i in words.items()}
         if "P" in given:
             given["P"] = state.profile.dwell_s(given["P"], pointed=bool(chunk.pointed[words["P"]]))
-        held = self._inherit(context, row, given, code, third, frame.unit_mm)
+        held = self._inherit(context, row, given, code, third, frame)
         series = state.series
-        initial = NAN if series.initial is None else series.initial
         times = self._repeats(context, words, line)
         offset = frame.offset_mm
-        z_word, r_word = held["XYZ"[third]], held["R"]
-        if incremental:
-            r, z = levels(r_word, z_word, absolute=False, initial_z=initial)
-        else:
-            r, z = r_word + offset[third], z_word + offset[third]
+        number = NAN if series.initial is None else series.initial
+        r, z, initial = (
+            value * frame.unit_mm + offset[third]
+            for value in (
+                *levels(held["R"], held["XYZ"[third]], absolute=not incremental, initial_z=number),
+                number,
+            )
+        )
         place, step = [], []
         for axis in (first, second):
             before, letter = state.position[axis], "XYZ"[axis]
-            number = given[letter] * frame.unit_mm if letter in given else None
-            step.append(number if incremental and number is not None else 0.0)
-            place.append(
-                before if number is None else before + number if incremental else number + offset[axis]
-            )
+            to = given[letter] * frame.unit_mm if letter in given else None
+            step.append(to if incremental and to is not None else 0.0)
+            place.append(before if to is None else before + to if incremental else to + offset[axis])
         if any(np.isnan((*place, *state.position))):
             raise ProgramError(
                 "a canned cycle starts where an axis has not been commanded yet; "
@@ -205,7 +217,8 @@ class SpecialBlocks:
         for repeat in range(times):
             try:
                 strokes = hole_moves(
-                    code, start=start, xy=(place[0], place[1]), r=r, z=z, q=held.get("Q"),
+                    code, start=start, xy=(place[0], place[1]), r=r, z=z,
+                    q=held["Q"] * frame.unit_mm if "Q" in held else None,
                     p=held.get("P"), retract_to_r=bool(context.retract[row] == RETRACT_TO_R),
                     initial_z=initial, plane=17 + plane,
                     rules=state.profile.cycles,
@@ -237,24 +250,39 @@ class SpecialBlocks:
         state.position[:] = list(start)
 
     def _inherit(
-        self, context: Context, row: int, given: dict[str, float], code: int, third: int, unit_mm: float
+        self, context: Context, row: int, given: dict[str, float], code: int, third: int, frame: Frame
     ) -> dict[str, float]:
-        """The words of a block and those inherited from its series, lengths in mm; a new series starts after
-        any other move."""
-        series, depth = self._state.series, "XYZ"[third]
-        previous = int(context.motion[row - 1]) if row else (self._state.motion or -1)
-        holes = self._collector.holes
-        if not (previous in CYCLES and holes and holes[-1].last == self._collector.moves):
-            series.begin(self._state.position[third])
-        elif previous != code:
-            series.held = {}
-        series.hold({a: v if a == "P" else v * unit_mm for a, v in given.items()}, depth)
+        """The words of a block and those inherited from its series, in program units (P in s)."""
+        series, depth, line = self._state.series, "XYZ"[third], context.number(row)
+        ground, unit = frame.offset_mm[third], frame.unit_mm
+        if self._ended(context, row):
+            series.begin((self._state.position[third] - ground) / unit, ground, unit)
+        else:
+            if not self._state.profile.cycles.keeps_numbers:
+                self._check_whole(series, ground, unit, line)
+            if self._collector.holes[-1].code != code and self._state.profile.cycles.new_code_forgets:
+                series.held = {}
+        self._last_cycle = line - 1
+        series.hold(given, depth)
         missing = [letter for letter in ("R", depth) if letter not in series.held]
         if missing:
-            raise ProgramError(
-                f"the cycle G{code / 10:g} has no {' and no '.join(missing)} word", line=context.number(row)
-            )
+            raise ProgramError(f"the cycle G{code / 10:g} has no {' and no '.join(missing)} word", line=line)
         return {letter: value for letter, value in series.held.items() if value is not None}
+
+    def _check_whole(self, series: Series, ground_mm: float, unit_mm: float, line: int) -> None:
+        """Refuse what is not known of this control: what a series keeps when the frame changes or after
+        other moves."""
+        if (series.ground_mm, series.unit_mm) != (ground_mm, unit_mm):
+            what = "an offset, the tool length or the unit changes"
+        elif self._collector.holes[-1].last != self._collector.moves:
+            what = "another move comes"
+        else:
+            return
+        raise ProgramError(
+            f"{what} within a series of canned cycles, and which levels the control keeps then is not known; "
+            "end the series with G80 and give the cycle with all its words again",
+            line=line,
+        )
 
     def _repeats(self, context: Context, words: dict[str, int], line: int) -> int:
         """How many holes the block makes: its L word, or K on ISO controls."""

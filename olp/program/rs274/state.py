@@ -42,16 +42,23 @@ class PathMode:
 
 @dataclass(slots=True)
 class Series:
-    """Canned cycles that follow one another: how many series there were, the level before this one (None:
-    not needed yet), and the words that later blocks inherit, by upper-case letter."""
+    """Canned cycles that follow one another, until another motion code is in force.
+
+    `count` is how many series there were, `initial` the program coordinate of the tool axis before this one
+    (None: not needed yet), `held` the words that later blocks inherit, by upper-case letter. All are numbers
+    in program units, as controls keep them (`CycleRules.keeps_numbers`): `ground_mm` is the offset of the
+    tool axis and `unit_mm` the unit where the series began.
+    """
 
     count: int = 0
     initial: float | None = None
     held: dict[str, float | None] = field(default_factory=dict)
+    ground_mm: float = NAN
+    unit_mm: float = NAN
 
-    def begin(self, initial: float | None) -> None:
+    def begin(self, initial: float | None, ground_mm: float = NAN, unit_mm: float = NAN) -> None:
         self.count += 1
-        self.initial = initial
+        self.initial, self.ground_mm, self.unit_mm = initial, ground_mm, unit_mm
         self.held = {}
 
     def hold(self, words: Mapping[str, float | None], depth: str) -> None:
