@@ -25,7 +25,7 @@ from olp.program.rs274.codes import (
 )
 from olp.program.rs274.lexer import WordChunk
 from olp.program.rs274.motion import modal, values
-from olp.program.rs274.profiles.base import Act
+from olp.program.rs274.profiles.base import Act, Profile
 
 Modal = npt.NDArray[np.int16]
 
@@ -183,13 +183,19 @@ class Modes:
         return _in_force(chunk, line, code, self._state.motion)
 
 
-def check_odd(data: bytes, chunk: WordChunk, active: Mask) -> None:
+def check_odd(data: bytes, chunk: WordChunk, active: Mask, profile: Profile) -> None:
     """Refuse active lines with more than words."""
     for line in chunk.odd.tolist():
         if not active[line]:
             continue
-        text = data[chunk.line_start[line] : chunk.line_end[line]].strip()
         number = chunk.first_line + line + 1
+        start = int(chunk.line_start[line])
+        newline = data.find(b"\n", start)
+        text = data[start : newline if newline >= 0 else len(data)]
+        why = profile.text.refusal(text)
+        if why is not None:
+            raise ProgramError(why, line=number)
+        text = data[start : chunk.line_end[line]].strip()
         shown = text[:60].decode("latin-1")
         if _FLOW.search(text):
             raise ProgramError(

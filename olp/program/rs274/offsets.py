@@ -18,8 +18,8 @@ def _zeros() -> list[float]:
 @dataclass(slots=True)
 class Offsets:
     """The offsets in force, in mm. `name` is the work offset, `written` are those that the program has
-    written, by name. `shift` is that of G92, `saved` its stored value for G92.3, `local` that of G52, `length`
-    that of the tool."""
+    written, by name. `shift` is that of G92, `saved` its stored value, `local` that of G52, `length` that of
+    the tool."""
 
     name: str
     written: dict[str, list[float]] = field(default_factory=dict)

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from olp.core.arrays import Index
 from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES
-from olp.core.toolpath import Flag, Frame, Kind
+from olp.core.toolpath import Flag, Kind
 from olp.program.directives import Directives
 from olp.program.program import Hole
 from olp.program.rs274.axis_state import AxisState, Effect, Word
@@ -33,7 +33,7 @@ from olp.program.rs274.cycles import Stroke, hole_moves, levels
 from olp.program.rs274.modes import Context, scaled
 from olp.program.rs274.motion import fill
 from olp.program.rs274.profiles.base import Act, Profile
-from olp.program.rs274.state import NAN, Series
+from olp.program.rs274.state import BROKEN_SERIES, NAN
 
 _CYCLES = np.array(sorted(CYCLES))
 _M_REFUSED = {
@@ -97,7 +97,8 @@ class SpecialBlocks:
         self._state = state
         self._collector = collector
         self._switches = switches
-        self._last_cycle = -1
+        # line, from 0, and frame of the last block of a series; -1 where none goes on
+        self._last_cycle = self._frame = -1
 
     def leave(self, context: Context, line: int) -> None:
         """Keep for the next chunk whether a series of cycles has ended up to this line, the last one read."""
@@ -187,7 +188,7 @@ class SpecialBlocks:
         given = {letter: float(value[i]) for letter, i in words.items()}
         if "P" in given:
             given["P"] = state.profile.dwell_s(given["P"], pointed=bool(chunk.pointed[words["P"]]))
-        held = self._inherit(context, row, given, code, third, frame)
+        held = self._inherit(context, row, given, code, third, frame_index)
         series = state.series
         times = self._repeats(context, words, line)
         offset = frame.offset_mm
@@ -250,39 +251,29 @@ class SpecialBlocks:
         state.position[:] = list(start)
 
     def _inherit(
-        self, context: Context, row: int, given: dict[str, float], code: int, third: int, frame: Frame
+        self, context: Context, row: int, given: dict[str, float], code: int, third: int, frame_index: int
     ) -> dict[str, float]:
         """The words of a block and those inherited from its series, in program units (P in s)."""
         series, depth, line = self._state.series, "XYZ"[third], context.number(row)
+        frame = self._state.frames[frame_index]
         ground, unit = frame.offset_mm[third], frame.unit_mm
+        holes, rules = self._collector.holes, self._state.profile.cycles
         if self._ended(context, row):
-            series.begin((self._state.position[third] - ground) / unit, ground, unit)
+            series.begin((self._state.position[third] - ground) / unit)
         else:
-            if not self._state.profile.cycles.keeps_numbers:
-                self._check_whole(series, ground, unit, line)
-            if self._collector.holes[-1].code != code and self._state.profile.cycles.new_code_forgets:
+            before = self._state.frames[self._frame]
+            series.broken |= (before.offset_mm[third], before.unit_mm) != (ground, unit)
+            series.broken |= holes[-1].last != self._collector.moves
+            if series.broken and not rules.keeps_numbers:
+                raise ProgramError(BROKEN_SERIES, line=line)
+            if holes[-1].code != code and rules.new_code_forgets:
                 series.held = {}
-        self._last_cycle = line - 1
+        self._last_cycle, self._frame = line - 1, frame_index
         series.hold(given, depth)
         missing = [letter for letter in ("R", depth) if letter not in series.held]
         if missing:
             raise ProgramError(f"the cycle G{code / 10:g} has no {' and no '.join(missing)} word", line=line)
         return {letter: value for letter, value in series.held.items() if value is not None}
-
-    def _check_whole(self, series: Series, ground_mm: float, unit_mm: float, line: int) -> None:
-        """Refuse what is not known of this control: what a series keeps when the frame changes or after
-        other moves."""
-        if (series.ground_mm, series.unit_mm) != (ground_mm, unit_mm):
-            what = "an offset, the tool length or the unit changes"
-        elif self._collector.holes[-1].last != self._collector.moves:
-            what = "another move comes"
-        else:
-            return
-        raise ProgramError(
-            f"{what} within a series of canned cycles, and which levels the control keeps then is not known; "
-            "end the series with G80 and give the cycle with all its words again",
-            line=line,
-        )
 
     def _repeats(self, context: Context, words: dict[str, int], line: int) -> int:
         """How many holes the block makes: its L word, or K on ISO controls."""
