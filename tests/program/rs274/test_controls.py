@@ -122,7 +122,7 @@ CYCLES: dict[str, tuple[str, dict[str, str]]] = {
     ),
     "keeps_numbers": (
         f"G21\n{_SERIES}\nG20\nX2. Y1.",
-        {LINUXCNC: "G20|G61|G0 X2 Y1 Z3|G1 Z-2|G0 Z3"} | dict.fromkeys(_ISO, "within a series of canned cycles"),
+        {LINUXCNC: "G20|G61|G0 X2 Y1 Z3|G1 Z-2"} | dict.fromkeys(_ISO, "comes within a series of canned"),
     ),
     "exact_corners": (
         f"G64\n{_SERIES}",
