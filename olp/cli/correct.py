@@ -30,12 +30,11 @@ from olp.cli.options import (
     force_option,
     output_option,
     outside_box_option,
+    program_options,
     proof_options,
     quiet_option,
     renamed_option,
     report_option,
-    setup_options,
-    unroll_options,
 )
 from olp.cli.progress import Report, progress
 from olp.core.errors import ProgramError, UsageError
@@ -51,12 +50,11 @@ LAST_DIGITS_UM = 10.0
 
 @click.command("correct")
 @click.argument("program", required=False)
-@setup_options
+@program_options
 @output_option("OUT", "Default: PROGRAM.corrected.SUFFIX beside PROGRAM.")
 @proof_options
 @confidence_options
 @outside_box_option("refuse the program", "take the error at the box's face")
-@unroll_options
 @click.option("--split-rapids", is_flag=True, help="Split rapids like feed moves.")
 @report_option()
 @click.option("--review", "review_file", metavar="review.html", help="Also write the page of olp view.")

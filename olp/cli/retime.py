@@ -31,14 +31,13 @@ from olp.cli.options import (
     contour_option,
     doubt_options,
     fail_on_option,
-    flatten_option,
     force_option,
     json_option,
     output_option,
     plot_option,
+    program_options,
     quiet_option,
     report_option,
-    setup_options,
 )
 from olp.cli.progress import Report, progress
 from olp.core.errors import InputError, OlpError, UsageError, naming
@@ -55,7 +54,7 @@ FORMATS = ("csv", "npz", "parquet", "ros", "pvt")
 
 @click.command("retime")
 @click.argument("program", required=False)
-@setup_options
+@program_options
 @output_option("OUT", "The trajectory; - is stdout. Default: the report alone.")
 @click.option(
     "--format",
@@ -94,7 +93,6 @@ FORMATS = ("csv", "npz", "parquet", "ros", "pvt")
 @doubt_options
 @contour_option
 @click.option("--block-delete", is_flag=True, help="Leave / blocks out; they count as executed otherwise.")
-@flatten_option
 @report_option((".json",))
 @json_option()
 @fail_on_option

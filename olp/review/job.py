@@ -52,9 +52,6 @@ class ViewOptions(ProofOptions):
     """The options of `view`."""
 
     outside_box: Outside = "refuse"
-    flatten: bool = False
-    expand_cycles: bool = False
-    peck_clearance_mm: float | None = None
     time: bool = True
     step_mm: float | None = None
 

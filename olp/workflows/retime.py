@@ -28,7 +28,7 @@ from olp.trajectory.route import Route
 from olp.trajectory.usage import LineUse, SlowStretches
 from olp.trajectory.variants import Case, Plan, blend_study, planned, with_feeds, within_inertial
 from olp.workflows.doubt import accepted_of, doubted_motion
-from olp.workflows.flatten import unrolled
+from olp.workflows.flatten import UnrollOptions, as_asked
 from olp.workflows.retime_report import against, proved, report_of
 from olp.workflows.session import PathLike, Session
 
@@ -46,7 +46,7 @@ FACTORS = (0.25, 0.5, 1.0, 2.0, 4.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RetimeOptions:
+class RetimeOptions(UnrollOptions):
     """The options of `retime`."""
 
     blend_mm: float | None = None
@@ -54,7 +54,6 @@ class RetimeOptions:
     max_inertial_um: float | None = None
     contour: bool = False
     block_delete: bool = False
-    flatten: bool = False
     date: datetime.date | None = None
     accept: tuple[str, ...] = ()
 
@@ -222,6 +221,8 @@ def retime(
     contour: bool = False,
     block_delete: bool = False,
     flatten: bool = False,
+    expand_cycles: bool = False,
+    peck_clearance_mm: float | None = None,
     date: datetime.date | None = None,
     accept: Sequence[str] = (),
     progress: Progress | None = None,
@@ -234,16 +235,17 @@ def retime(
     `blend_mm` is the path tolerance where the program names none; it has priority over the machine file, and
     the path mode at the start is then to blend. `study_blend` adds times and deviations at a quarter to four
     times the path tolerances in use. `max_inertial_um` limits the deviation by accelerations and the
-    machine's compliance. `block_delete` leaves `/` blocks out. `flatten` unrolls loops, subprograms and
-    expressions first: lines are then those of the unrolled text. Axes commanded beyond their travel are
-    findings (OLP402), and planned all the same. `date` and `accept` are those of `correct`, for doubts about
+    machine's compliance. `block_delete` leaves `/` blocks out. `flatten`, `expand_cycles` and
+    `peck_clearance_mm` are those of `correct`. Axes commanded beyond their travel are findings (OLP402), and
+    planned all the same. `date` and `accept` are those of `correct`, for doubts about
     the inputs. Raises InputError (ProgramError with its line, ConfigError, Doubtful), UsageError and
     CannotCompute.
     """
     session = Session.start(machine, job)
     options = RetimeOptions(
         blend_mm=blend_mm, study_blend=study_blend, max_inertial_um=max_inertial_um, contour=contour,
-        block_delete=block_delete, flatten=flatten, date=date, accept=tuple(accept),
+        block_delete=block_delete, flatten=flatten, expand_cycles=expand_cycles,
+        peck_clearance_mm=peck_clearance_mm, date=date, accept=tuple(accept),
     )  # fmt: skip
     other = None if nominal is None else session.sources.source(nominal)
     source = session.sources.source(program)
@@ -296,8 +298,10 @@ def _case(session: Session, program: Source, options: RetimeOptions) -> Case:
     program.load()
     with program.errors():
         setup, dialect = session.reading(program)
-        text = unrolled(session.sources, program, setup, dialect) if options.flatten else program.data
-        parsed = read(text, setup, dialect, reading)
+        program = as_asked(
+            session.sources, program, setup, dialect, options, block_delete=options.block_delete
+        )
+        parsed = read(program.data, setup, dialect, reading)
         if setup.machine.path_mode == "exact-stop" and blend_mm is None:
             # a mode of line 0 holds from the start
             parsed = replace(parsed, path_modes=(PathMode(0, "G61.1"), *parsed.path_modes))

@@ -27,7 +27,7 @@ class Walk:
         self,
         main: Unit,
         variables: Variables,
-        subprograms: Callable[[str], bytes | None],
+        subprograms: Callable[[str], tuple[str, bytes] | None],
         write: WriteBlock,
         *,
         block_delete: bool,
@@ -255,10 +255,11 @@ class Walk:
             if start is not None:
                 return unit, start
         if label not in self._files:
-            data = self._subprograms(label)
-            if data is None:
+            given = self._subprograms(label)
+            if given is None:
                 raise ProgramError(f"subprogram {label} is not in the file, and no file for it was given")
-            self._files[label] = Unit(data, self.language, label)
+            name, data = given
+            self._files[label] = Unit(data, self.language, name)
         unit = self._files[label]
         start = unit.definition(label, keyword)
         if start is None:
