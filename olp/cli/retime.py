@@ -191,10 +191,10 @@ def _files(
     written: dict[Path, Content] = {}
     if outputs.output is not None and outputs.output != STREAM:
         written |= result.files(outputs.output, outputs.kind, outputs.cycle_s, outputs.stretch, show)
-    written |= {Path(name): tables.lines_csv(result.lines) for name in files_of(outputs.lines)}
+    written |= {Path(name): tables.lines_csv(result.lines, result.origin) for name in files_of(outputs.lines)}
     if feeds is not None:
         written |= {Path(name): feeds for name in files_of(outputs.write_feed)}
-    written |= {Path(name): tables.slow_csv(result.slow) for name in files_of(outputs.slow)}
+    written |= {Path(name): tables.slow_csv(result.slow, result.origin) for name in files_of(outputs.slow)}
     if outputs.plot is not None:
         start, end = outputs.plot_span or (0.0, None)
         written |= result.plots(outputs.plot, outputs.stretch, from_s=start, to_s=end)

@@ -18,6 +18,7 @@ from olp.files.write import write_files
 from olp.findings.catalogue import Finding
 from olp.program.feeds.timing import BLEND_MM
 from olp.program.feeds.words import Shared
+from olp.program.origin import Origin
 from olp.program.registry import Options, read
 from olp.program.rs274.state import PathMode
 from olp.reports.plots.base import Format as Picture
@@ -29,6 +30,7 @@ from olp.trajectory.usage import LineUse, SlowStretches
 from olp.trajectory.variants import Case, Plan, blend_study, planned, with_feeds, within_inertial
 from olp.workflows.doubt import accepted_of, doubted_motion
 from olp.workflows.flatten import UnrollOptions, as_asked
+from olp.workflows.original import placed, placed_findings
 from olp.workflows.retime_report import against, proved, report_of
 from olp.workflows.session import PathLike, Session
 
@@ -62,30 +64,37 @@ class RetimeOptions(UnrollOptions):
 class Retiming:
     """A trajectory for each stretch of the program between moves of the control itself, as `plan`; the report
     ("olp-retime-1"), and the findings: doubts about the inputs, and axes
-    commanded beyond their travel."""
+    commanded beyond their travel. `by_original` is the plan with the lines of the text that the program was
+    unrolled from, which count through its files."""
 
     plan: Plan
     report: dict[str, Any]
-    findings: tuple[Finding, ...] = ()
+    findings: tuple[Finding, ...]
+    by_original: Plan
 
     @property
     def trajectories(self) -> tuple[Trajectory, ...]:
-        return self.plan.trajectories
+        return self.by_original.trajectories
+
+    @property
+    def origin(self) -> Origin | None:
+        """Where the lines come from; None where the program was not unrolled."""
+        return self.plan.case.program.origin
 
     @property
     def routes(self) -> tuple[Route, ...]:
         """The paths of the trajectories."""
-        return self.plan.case.legs
+        return self.by_original.case.legs
 
     @property
     def lines(self) -> LineUse:
         """Time, speed and limit of each line."""
-        return self.plan.lines
+        return self.by_original.lines
 
     @property
     def slow(self) -> tuple[SlowStretches, ...]:
         """Of each stretch, where the speed is below half the feed."""
-        return self.plan.slow
+        return self.by_original.slow
 
     @property
     def duration_s(self) -> float:
@@ -154,7 +163,8 @@ class Retiming:
         An F word for several blocks gets the feed with the same total time, or with "least" the least planned
         feed of them. Raises ProgramError for a feed that cannot be written in the style of its word.
         """
-        data, self.report["write_feed"] = with_feeds(self.plan, shared, progress or silent)
+        data, report = with_feeds(self.plan, shared, progress or silent)
+        self.report["write_feed"] = placed(report, self.origin)
         return data
 
     def plots(
@@ -177,7 +187,8 @@ class Retiming:
             trajectory = self._stretch(number)
             route = self.routes[number - 1]
             name = f"{self.report['program'] or 'program'} on {self.report['machine']}"
-            lines = f"lines {int(route.line.min())} to {int(route.line.max())}"
+            place = str if self.origin is None else self.origin.place
+            lines = f"lines {place(int(route.line.min()))} to {place(int(route.line.max()))}"
             where = numbered(target, number) if len(numbers) > 1 else target
             title = f"{name}, {lines}"
             pictures[where] = motion_plot(trajectory, route, title, kind, from_s=from_s, to_s=to_s)
@@ -275,19 +286,22 @@ def run(
         plan = planned(case, limits, tell)
     else:
         plan = within_inertial(case, limits, compliance, most_um * 1e-3, tell)
-    report = report_of(case, plan, compliance, most_um)
+    shown, origin = plan.in_original(), case.program.origin
+    report = placed(report_of(shown.case, shown, compliance, most_um), origin)
     if other is not None:
-        report["nominal"] = against(plan, planned(other, plan.limits, tell, "nominal"), other)
+        versus = against(plan, planned(other, plan.limits, tell, "nominal"), other)
+        report["nominal"] = placed(versus, other.program.origin)
     if stated is not None:
         moving = sum(report["budget_um"].values())
         report["proof"] = stated | {"at_most_um": stated["path_max_um"] + moving}
     if options.study_blend:
         report["blend_study"] = blend_study(case, plan, FACTORS, tell)
     # the motion is inside the box of its waypoints, so commands within travel are motion within travel
-    findings = (*doubts, *travel_findings(case.program.toolpath, setup.machine))
+    path = case.program.in_original().toolpath
+    findings = placed_findings((*doubts, *travel_findings(path, setup.machine)), origin)
     report["accepted"] = accepted_of(findings)
     report["findings"] = [f.as_dict() for f in findings]
-    return Retiming(plan, report, findings)
+    return Retiming(plan, report, findings, shown)
 
 
 def _case(session: Session, program: Source, options: RetimeOptions) -> Case:
@@ -305,12 +319,13 @@ def _case(session: Session, program: Source, options: RetimeOptions) -> Case:
         if setup.machine.path_mode == "exact-stop" and blend_mm is None:
             # a mode of line 0 holds from the start
             parsed = replace(parsed, path_modes=(PathMode(0, "G61.1"), *parsed.path_modes))
-        case = Case(
-            program.short, setup, parsed,
-            next(v for v in (blend_mm, stated, BLEND_MM) if v is not None),
-            "the call" if blend_mm is not None else "the machine file" if stated else "the default",
-            options.block_delete, options.contour, (),
-        ).driven()  # fmt: skip
+        with parsed.errors():
+            case = Case(
+                program.short, setup, parsed,
+                next(v for v in (blend_mm, stated, BLEND_MM) if v is not None),
+                "the call" if blend_mm is not None else "the machine file" if stated else "the default",
+                options.block_delete, options.contour, (),
+            ).driven()  # fmt: skip
     if not case.legs and case.untimed()["moves"]:
         raise CannotCompute(
             "no move of the program begins and ends at known positions of all axes, so nothing can be timed; "
