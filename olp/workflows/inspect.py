@@ -48,7 +48,8 @@ def run(session: Session, program: Source, options: UnrollOptions) -> dict[str, 
         for i, axis in enumerate("XYZ")
     }
     findings = checks.program_findings(parsed, setup, contour=False)
-    report = {
+    origin = parsed.origin
+    return {
         "name": program.short,
         "dialect": dialect.name,
         "dialect_title": dialect.title,
@@ -60,13 +61,13 @@ def run(session: Session, program: Source, options: UnrollOptions) -> dict[str, 
         "work_offsets": sorted({f.work_offset for f in path.frames}),
         "payloads_kg": list(dict.fromkeys(f.payload_kg for f in path.frames)),
         "path_modes": [
-            {"line": m.line, "name": m.name, "tolerance_mm": m.tolerance_mm} for m in parsed.path_modes
+            placed({"line": m.line, "name": m.name, "tolerance_mm": m.tolerance_mm}, origin)
+            for m in parsed.path_modes
         ],
         "stamped": find_stamp(program.data) is not None,
-        "findings": [f.as_dict() for f in findings],
+        "findings": [placed(f.as_dict(), origin) for f in findings],
         "support": dialect.support(),
     }
-    return placed(report, parsed.origin)
 
 
 def error_at(

@@ -23,10 +23,9 @@ def placed_findings(findings: Iterable[Finding], origin: Origin | None) -> tuple
 
 
 def _placed_finding(finding: Finding, origin: Origin) -> Finding:
-    files, lines = _split(finding.lines, origin)
-    own = [] if finding.line is None else [finding.line]
-    _, first = _split(own, origin)
-    return replace(finding, line=first[0] if first else None, lines=tuple(lines), files=tuple(files))
+    own = () if finding.line is None else (finding.line,)
+    files, lines = _split(finding.lines or own, origin)
+    return replace(finding, line=lines[0] if own else None, lines=tuple(lines), files=tuple(files))
 
 
 def placed(report: Mapping[str, Any], origin: Origin | None) -> dict[str, Any]:

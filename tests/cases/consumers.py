@@ -124,18 +124,15 @@ def _verified(job: Job, out: Path, stated: dict[str, Any]) -> None:
 
 
 def _checked(job: Job, out: Path, verdict: dict[str, Any]) -> None:
-    """The gate has no --flatten, so an unrolled program is not checked."""
-    if job.unroll:
-        return
     words = " ".join(verdict["sentences"])
-    options = ("check", job.program, *job.setup, "--fail-on", "never", "--format")
+    options = ("check", job.program, *job.words("--fail-on", "never", "--format"))
     assert json.loads(run(*options, "json").stdout)["verdict"] == verdict
     assert words in wrapped(run(*options, "text").stdout)
     sarif = json.loads(run(*options, "sarif").stdout)
     assert sarif["runs"][0]["properties"]["verdict"] == verdict
     junit = ElementTree.fromstring(run(*options, "junit").stdout)
     assert [p.get("value") for p in junit.iter("property")] == verdict["sentences"]
-    pair = ("check", out, "--nominal", job.program, *job.setup, "--fail-on", "never", "--json")
+    pair = ("check", out, "--nominal", job.program, *job.words("--fail-on", "never", "--json"))
     checked = json.loads(run(*pair).stdout)["verdict"]
     # its lines are those of the program that it was given
     assert checked["numerical"] | {"line": 0} == verdict["numerical"] | {"line": 0}
@@ -224,7 +221,7 @@ def measured(
     """The report of `compare`, once every consumer of measured runs has been heard."""
     part = () if tolerance_um is None else ("--part-tolerance-um", str(tolerance_um))
     target, text = job.folder / "points.csv", job.folder / "compared.md"
-    call = ("compare", job.program, *files, *job.setup, *part, "--force")
+    call = ("compare", job.program, *files, *job.words(*part, "--force"))
     done = run(*call, "--json", "-o", target, "--report", text)
     stated = json.loads(done.stdout)
     verdict = stated["verdict"]
@@ -245,7 +242,7 @@ def measured(
     html = job.folder / "measured.html"
     runs = [word for file in files for word in ("--measured", file)]
     shown_run = run(
-        "view", job.program, *job.setup, *part, "--corrected", corrected, *runs, "--no-time", "-o", html,
+        "view", job.program, *job.words(*part, "--corrected", corrected, *runs, "--no-time", "-o", html),
         "--force",
     )  # fmt: skip
     assert shown_run.exit_code == 0, shown_run.stderr
@@ -256,7 +253,7 @@ def measured(
 def measured_briefly(job: Job, corrected: Path, files: Sequence[Path], tolerance_um: float | None) -> None:
     """The report of `compare` and the page alone, which is quicker."""
     part = () if tolerance_um is None else ("--part-tolerance-um", str(tolerance_um))
-    stated = json.loads(run("compare", job.program, *files, *job.setup, *part, "--json").stdout)
+    stated = json.loads(run("compare", job.program, *files, *job.words(*part, "--json")).stdout)
     _one_comparison(stated)
     review = olp.view(
         job.program, **job.api, corrected=corrected, measured=files, part_tolerance_um=tolerance_um,
