@@ -51,6 +51,11 @@ class Origin:
         k = int(np.searchsorted(self.first, line, "left")) - 1
         return (None, line) if k < 0 else (self.files[k], line - int(self.first[k]))
 
+    def counted(self) -> Iterator[dict[str, Any]]:
+        """The files of subprograms as plain data: where the lines of each begin, as they count through."""
+        for name, first in zip(self.files, self.first.tolist(), strict=True):
+            yield {"name": Path(name).name, "lines_from": first + 1}
+
     def place(self, line: int) -> str:
         """A line in words: its number, with the name of its file where that is not the program's."""
         file, number = self.file_of(line)

@@ -135,7 +135,8 @@ class Plan:
 
 def planned(case: Case, limits: AxisLimits, tell: Progress, what: str = "plan") -> Plan:
     """Plan every route of a case. Raises CannotCompute as `olp.trajectory.plan.plan`."""
-    trajectories = _motions(case.legs, limits, tell, what)
+    with case.program.errors():
+        trajectories = _motions(case.legs, limits, tell, what)
     used = [usage(t, leg) for t, leg in zip(trajectories, case.legs, strict=True)]
     lines = LineUse.joined([lines for lines, _ in used])
     return Plan(case, limits, trajectories, lines, tuple(slow for _, slow in used))

@@ -282,12 +282,15 @@ def run(
     other = None if nominal is None else _case(session, nominal, options)
     compliance = compliance_of(setup.machine)
     limits = axis_limits(setup.machine)
-    if most_um is None:
-        plan = planned(case, limits, tell)
-    else:
-        plan = within_inertial(case, limits, compliance, most_um * 1e-3, tell)
+    with program.errors():
+        if most_um is None:
+            plan = planned(case, limits, tell)
+        else:
+            plan = within_inertial(case, limits, compliance, most_um * 1e-3, tell)
     shown, origin = plan.in_original(), case.program.origin
     report = placed(report_of(shown.case, shown, compliance, most_um), origin)
+    if origin is not None and origin.files:
+        report["files"] = list(origin.counted())
     if other is not None:
         versus = against(plan, planned(other, plan.limits, tell, "nominal"), other)
         report["nominal"] = placed(versus, other.program.origin)

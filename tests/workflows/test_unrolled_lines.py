@@ -167,6 +167,14 @@ def test_tables_name_the_file_beside_the_line(folder: Path, monkeypatch: pytest.
         found = {(row["file"], int(row["line"])) for row in csv.DictReader(rows)}
         assert_moves(found)
         assert {file for file, _ in found} == {"", "other.ngc"}, name
+    # samples have the number alone; it counts through the files as the report says
+    run("retime", "part.ngc", *machine, "-o", "t.csv", "--report", "t.json")
+    (file,) = json.loads(Path("t.json").read_text())["files"]
+    assert file == {"name": "other.ngc", "lines_from": len(TEXTS["part.ngc"]) + 1}
+    sampled = {int(row["line"]) for row in csv.DictReader(Path("t.csv").read_text().splitlines())}
+    through = [*TEXTS["part.ngc"], *TEXTS["other.ngc"]]
+    assert all(re.search("[XYZ]", through[line - 1]) for line in sampled)
+    assert max(sampled) >= file["lines_from"]
     # the verb that reads such points reads these
     done = run("compare", "part.ngc", "points.csv", "-m", "machine.toml", "--flatten", "--json")
     assert done.exit_code in (0, 1), done.stderr
