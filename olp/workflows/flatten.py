@@ -54,7 +54,8 @@ def run(session: Session, program: Source, options: UnrollOptions) -> bytes:
     """As `flatten`, in a session."""
     program.load()
     with program.errors("<program>"):
-        return as_asked(session.sources, program, *session.reading(program), options).data
+        # a text of its own: what is said of it later has its own lines
+        return bytes(as_asked(session.sources, program, *session.reading(program), options).data)
 
 
 def as_asked(

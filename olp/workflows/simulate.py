@@ -38,7 +38,7 @@ class SimulateOptions(UnrollOptions):
 @dataclass(frozen=True, slots=True, eq=False)
 class Simulation:
     """(n, 3) tip positions of the machine with its errors, in the program's first work frame, and the line of
-    each, which count through the files of an unrolled program (`origin`); the findings are doubts about the
+    each. Lines count through the files of an unrolled program (`origin`). The findings are doubts about the
     inputs. The report ("olp-simulation-1") is a mapping; it judges nothing, as only one program is known."""
 
     points_mm: Array

@@ -10,6 +10,7 @@ import csv
 import json
 import re
 from collections.abc import Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +31,8 @@ from olp.core.errors import Doubtful, OlpError, OutsideBox, ProgramError, UsageE
 from olp.findings.catalogue import Finding
 from olp.program.origin import Origin, Unrolled
 from olp.workflows.doubt import with_accepted
+from olp.workflows.flatten import UnrollOptions, as_asked
+from olp.workflows.session import Session
 
 #: Lines of the program before its first move; more than the unrolled text has.
 SILENT = 60
@@ -156,6 +159,7 @@ def test_reports_name_lines_of_the_files_that_were_given(
         assert row["text"] == texts[row["line"] - 1]
 
 
+@pytest.mark.slow
 def test_tables_name_the_file_beside_the_line(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
     machine = ("-m", "machine.toml", "--flatten", "--force", "-q")
@@ -280,34 +284,45 @@ def both(call: Any) -> tuple[Any, str]:
         return None, error.message
 
 
+LAW = (
+    *PARAMETRIC,
+    "G81 X5. Y5. Z-4. R2. F100\nX9.\nG80\nG0 Z5.\n",
+    "G83 X5. Z-4. R2. Q1. F100\nG80\nG0 Z5.\n",
+    MAIN.replace("  o<other> call\n", ""),
+)
+
+
+@pytest.mark.parametrize("text", LAW, ids=range(len(LAW)))
 @pytest.mark.parametrize("control", ["linuxcnc", "fanuc", "haas"])
 def test_correcting_an_unrolled_program_is_unrolling_and_correcting(
-    control: str, controls: Mapping[str, Path]
+    control: str, text: str, controls: Mapping[str, Path]
 ) -> None:
-    machine, corrected = controls[control], 0
-    cycles = ("G81 X5. Y5. Z-4. R2. F100\nX9.\nG80\nG0 Z5.\n", "G83 X5. Z-4. R2. Q1. F100\nG80\nG0 Z5.\n")
-    for text in (*PARAMETRIC, *cycles, MAIN.replace("  o<other> call\n", "")):
-        for expand in (False, True):
-            program = (START + text).encode()
-            unrolling = {"expand_cycles": expand, "peck_clearance_mm": 0.5}
-            flat, refusal = both(lambda p=program, u=unrolling: olp.flatten(p, machine, **u))
-            ours, said = both(
-                lambda p=program, u=unrolling: olp.correct(p, machine, flatten=True, outside_box="hold", **u)
-            )
-            if flat is None:
-                assert said == refusal
-                continue
-            theirs, other = both(lambda f=flat: olp.correct(f, machine, outside_box="hold"))
-            assert (said == other) or re.sub(r"line \d+", "", said) == re.sub(r"line \d+", "", other)
-            if theirs is None:
-                continue
-            corrected += 1
-            assert ours.data == theirs.data
-            assert ours.nominal == flat
-            assert without_lines(ours.report) == without_lines(theirs.report)
-            assert [f.code for f in ours.findings] == [f.code for f in theirs.findings]
-            np.testing.assert_array_equal(ours.table.corrected, theirs.table.corrected)
-    assert corrected >= 8
+    machine, program = controls[control], (START + text).encode()
+    for expand in (False, True):
+        unrolling: dict[str, Any] = {"expand_cycles": expand, "peck_clearance_mm": 0.5}
+        flat, refusal = both(partial(olp.flatten, program, machine, **unrolling))
+        call = partial(olp.correct, program, machine, flatten=True, outside_box="hold", **unrolling)
+        ours, said = both(call)
+        if flat is None:
+            assert said == refusal
+            continue
+        theirs, other = both(partial(olp.correct, flat, machine, outside_box="hold"))
+        assert re.sub(r"line \d+", "", said) == re.sub(r"line \d+", "", other)
+        if theirs is None:
+            continue
+        assert ours.data == theirs.data
+        assert ours.nominal == flat
+        assert without_lines(ours.report) == without_lines(theirs.report)
+        assert [f.code for f in ours.findings] == [f.code for f in theirs.findings]
+        np.testing.assert_array_equal(ours.table.corrected, theirs.table.corrected)
+
+
+def test_the_law_is_about_programs_that_are_corrected(controls: Mapping[str, Path]) -> None:
+    """Not only about refusals; of each control some are."""
+    for control, machine in controls.items():
+        texts = [LAW[k] for k in (-1, -3, 0 if control == "linuxcnc" else 10)]
+        for text in texts if control == "linuxcnc" else texts[1:]:
+            assert olp.correct((START + text).encode(), machine, flatten=True, outside_box="hold").data
 
 
 # -- errors ------------------------------------------------------------------------------------------------
@@ -377,6 +392,24 @@ def _index(*numbers: int) -> Any:
     return np.array(numbers, np.int64)
 
 
+def test_feeds_and_times_are_told_by_lines_of_the_original(folder: Path) -> None:
+    silent, machine = "#1 = 0\n" * SILENT, folder / "machine.toml"
+    text = silent + "G21 G90 G54\nG0 X10 Y10 Z5\n" + LOOP.format("G93\nG1 X[20 * #1] F10\nG94\n")
+    checked = olp.check(text.encode(), machine, flatten=True, select=["OLP308"])
+    assert [f.lines for f in checked.findings] == [(SILENT + 5,)]
+    text = silent + "G21 G90 G54\nG0 X10 Y10 Z5\n" + LOOP.format("G1 X[20 * #1]\n")
+    checked = olp.check(text.encode(), machine, flatten=True, select=["OLP307"])
+    assert [f.lines for f in checked.findings] == [(SILENT + 5,)]
+    versus = olp.retime(folder / "out.ngc", machine, nominal=folder / "part.ngc", flatten=True).report[
+        "nominal"
+    ]
+    assert versus["lines_correspond"]
+    rows = [(row.get("file", ""), row["line"]) for row in versus["differences"]]
+    assert_moves(set(rows))
+    assert len(rows) == len(set(rows)) > 3
+    assert sum(row["nominal_s"] for row in versus["differences"]) <= versus["duration_s"] * (1.0 + 1e-9)
+
+
 # -- what the job and the switch say of lines -------------------------------------------------------------
 
 
@@ -438,8 +471,12 @@ def test_a_table_of_points_is_not_unrolled(folder: Path) -> None:
 
 
 def test_the_text_keeps_where_its_lines_come_from(folder: Path) -> None:
-    flat = olp.flatten(folder / "part.ngc", folder / "machine.toml")
+    session = Session.start(folder / "machine.toml")
+    program = session.sources.source(folder / "part.ngc")
+    flat = as_asked(session.sources, program, *session.reading(program), UnrollOptions(flatten=True)).data
     assert isinstance(flat, Unrolled)
+    # the text that is written has lines of its own
+    assert type(olp.flatten(folder / "part.ngc", folder / "machine.toml")) is bytes
     origin = flat.origin
     lines = flat.decode().splitlines()
     assert len(origin.line) == len(lines)
