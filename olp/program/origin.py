@@ -61,14 +61,6 @@ class Origin:
         file, number = self.file_of(line)
         return str(number) if file is None else f"{number} of {Path(file).name}"
 
-    def written(self, line: int, file: str = "") -> int | None:
-        """The first line of the unrolled text that was made from a line of a file, by its name alone; None
-        where there is none."""
-        names = [Path(name).name for name in self.files]
-        number = line + int(self.first[names.index(file)]) if file else line
-        made = np.flatnonzero(self.line == number)
-        return int(made[0]) + 1 if made.size else None
-
     def text(self, line: int) -> str:
         """The text of a line, without its end."""
         return self.texts[line - 1].rstrip(b"\r\n").decode("latin-1")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -272,18 +272,12 @@ def _meshes(scene: Scene, arrays: Arrays, origin: Array) -> Iterator[dict[str, A
 
 
 def _findings(scene: Scene) -> list[dict[str, Any]]:
-    """Findings; `line` is that of the nominal text as shown, `place` the line in words."""
-    origin = scene.nominal.origin
-
-    def shown(finding: Mapping[str, Any]) -> int | None:
-        line: int | None = finding["line"]
-        return line if line is None or origin is None else origin.written(line, finding.get("file", ""))
-
+    """Findings; `place` is the line as the listing names it."""
     return [
         {
             "code": finding["code"],
             "severity": finding["severity"],
-            "line": shown(finding),
+            "line": finding["line"],
             "place": None if finding["line"] is None else place(finding),
             "message": finding["message"],
             "title": RULES[finding["code"]].title,

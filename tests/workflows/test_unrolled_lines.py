@@ -250,7 +250,7 @@ def test_the_page_shows_the_unrolled_text_with_the_lines_of_the_files(
         assert text == original or "[" in original
     (left,) = (f for f in page.manifest["findings"] if f["code"] == "OLP102")
     assert left["place"] == "124 of other.ngc"
-    assert shown[left["line"] - 1] == "G53 G0 Z0"
+    assert shown[names.index(left["place"])] == "G53 G0 Z0"
     for callout in page.manifest["callouts"]:
         line, file = re.search(r"line (\d+)(?: of (.*))?$", callout["text"]).groups()  # type: ignore[union-attr]
         assert_moves({(file or "", int(line))})
@@ -485,4 +485,3 @@ def test_the_text_keeps_where_its_lines_come_from(folder: Path) -> None:
         original = TEXTS[Path(file).name if file else "part.ngc"][line - 1]
         assert text == original or "[" in original
         assert origin.text(origin.line_of(number)) == original
-    assert [origin.written(SILENT + 2), origin.written(124, "other.ngc"), origin.written(1)] == [3, 7, None]

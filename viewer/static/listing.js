@@ -193,8 +193,15 @@
       });
     }
 
+    // First row of a nominal line by its name, or -1.
+    row_named(name) {
+      for (let row = 0; row < this.n; row++) if (this.number(row, 0) === name) return row;
+      return -1;
+    }
+
     // Row of a 1-based line of the nominal (0) or corrected (1) file, or -1.
     row_of_line(line, side = 0) {
+      if (side === 0 && this.names) return this.row_named(String(line));
       return this.numbers[side] ? this.numbers[side].indexOf(line) : -1;
     }
 
