@@ -65,10 +65,10 @@ def as_asked(
     dialect: Dialect,
     options: UnrollOptions,
     *,
-    block_delete: bool = False,
+    block_delete: bool | None = None,
 ) -> Source:
     """The program, unrolled where the options ask for it and it is not yet. Subprograms are searched in its
-    folder; `block_delete` leaves `/` blocks out.
+    folder. `block_delete` is the position of that switch, None where the result has to be right for both.
 
     Payloads that the job gives by line become comments first, as unrolling changes the lines. Raises
     UsageError for a dialect that cannot be unrolled, ProgramError with the line of the original.

@@ -32,9 +32,11 @@ def placed(report: Mapping[str, Any], origin: Origin | None) -> dict[str, Any]:
     """A report, or a part of it, with the file of each line: `file` beside `line`, `worst_file` beside
     `worst_line`, `files` beside a list `lines` ("" for the program)."""
     result: dict[str, Any] = {}
+    if origin is None:
+        return dict(report)
     for key, value in report.items():
         result[key] = _inside(value, origin)
-        if origin is None or not _of_lines(key):
+        if not _of_lines(key):
             continue
         name = key.removesuffix("lines").removesuffix("line")
         if isinstance(value, int) and not key.endswith("lines"):
@@ -50,7 +52,7 @@ def _of_lines(key: str) -> bool:
     return key in ("line", "lines") or key.endswith(("_line", "_lines"))
 
 
-def _inside(value: Any, origin: Origin | None) -> Any:
+def _inside(value: Any, origin: Origin) -> Any:
     if isinstance(value, Mapping):
         return placed(value, origin)
     if isinstance(value, list):

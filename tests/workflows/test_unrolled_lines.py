@@ -433,6 +433,17 @@ def test_blocks_under_the_switch_are_unrolled_as_it_stands(folder: Path) -> None
     assert lengths == {False: pytest.approx(110.0), True: pytest.approx(20.0)}
 
 
+@pytest.mark.parametrize("block", ["/#1 = 100", "/o<other> call", "/o3 if [1]", "/ N5 #7=[1+2]"])
+def test_a_block_under_the_switch_that_changes_the_program_is_refused(block: str, folder: Path) -> None:
+    """Corrected programs have to be right for both positions; the unrolled text is for one."""
+    error = refused(folder, f"{block}\nG1 X[20 + #1] F600\nM2\n")
+    assert error.line == SILENT + 3
+    assert "for each position of the switch" in error.message
+    # a block that only moves stays under the switch
+    text = b"G21 G90 G54\nG0 X10 Y10 Z5\n#1 = 10\n/G1 X[20 + #1] F600\nG1 X50 Y[#1] Z[#1] F600\nM2\n"
+    assert b"\n/G1 X30" in olp.flatten(text, folder / "machine.toml")
+
+
 # -- the verb ----------------------------------------------------------------------------------------------
 
 

@@ -46,7 +46,7 @@ def flatten(
     profile: Profile,
     *,
     subprograms: Callable[[str], tuple[str, bytes] | None] = no_subprograms,
-    block_delete: bool = False,
+    block_delete: bool | None = False,
     expand_cycles: bool = False,
     file: str | None = None,
     peck_clearance: float | None = None,
@@ -55,12 +55,11 @@ def flatten(
     """Plain blocks of a program, with the origin of each; see the module for what is kept.
 
     `subprograms` gives the file and the text of a program that the file does not have, by its number or
-    lower-case name.
-    `block_delete`: blocks with `/` are left out (switch on); else they count as executed. `expand_cycles`
-    writes canned cycles as G0, G1, G4 and spindle blocks. `peck_clearance` (program units) is the clearance
-    of G73 and G83, needed where a parameter of the control sets it. `limit` is the largest number of blocks
-    that the run may visit. Raises ProgramError with the line in the source, or with the line in the
-    subprogram and its file.
+    lower-case name. `block_delete`: blocks with `/` are left out (switch on), or count as executed (off); with
+    None both positions of the switch have to give the same program. `expand_cycles` writes canned cycles as
+    G0, G1, G4 and spindle blocks. `peck_clearance` (program units) is the clearance of G73 and G83, needed
+    where a parameter of the control sets it. `limit` is the largest number of blocks that the run may visit.
+    Raises ProgramError with the line in the source, or with the line in the subprogram and its file.
     """
     writer = _Flattener(profile, expand_cycles=expand_cycles, peck_clearance=peck_clearance)
     main = Unit(data, profile.language, file)
