@@ -55,7 +55,7 @@ def flatten(
     """Plain blocks of a program, with the origin of each; see the module for what is kept.
 
     `subprograms` gives the file and the text of a program that the file does not have, by its number or
-    lower-case name. `block_delete`: blocks with `/` are left out (switch on), or count as executed (off); with
+    lower-case name. `block_delete`: blocks with `/` are left out (switch on), or executed (off). With
     None both positions of the switch have to give the same program. `expand_cycles` writes canned cycles as
     G0, G1, G4 and spindle blocks. `peck_clearance` (program units) is the clearance of G73 and G83, needed
     where a parameter of the control sets it. `limit` is the largest number of blocks that the run may visit.
