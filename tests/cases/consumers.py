@@ -178,6 +178,9 @@ class _allowed_lines:
 
 def _page_and_table(page: Page, table: Judgements) -> None:
     listing, rows = page.manifest["listing"], table.by_line()
+    if listing["names"] is not None:
+        _named_rows(page, rows)
+        return
     numbers = page.array(listing["row_nominal"]).astype(int)
     row = {int(n): k for k, n in enumerate(numbers.tolist()) if n}
     where = [row[int(line)] for line in rows["line"]]
@@ -193,6 +196,33 @@ def _page_and_table(page: Page, table: Judgements) -> None:
     state = page.array(listing["state"])
     assert state[where].tolist() == rows["state"].tolist()
     assert set(np.delete(state, where).tolist()) <= {3}
+
+
+def _rows_of_lines(page: Page) -> dict[str, list[int]]:
+    """The rows of the listing of each line of the program: several where it was unrolled."""
+    listing, made = page.manifest["listing"], dict[str, list[int]]()
+    names = None if listing["names"] is None else page.array(listing["names"])
+    for row, number in enumerate(page.array(listing["row_nominal"]).astype(int).tolist()):
+        if number:
+            made.setdefault(names[number - 1] if names else str(number), []).append(row)
+    return made
+
+
+def _named_rows(page: Page, rows: dict[str, Any]) -> None:
+    """The rows of an unrolled text, whose lines were made from one of the program, say together what the
+    table says of that: the largest of what counts, else of what is shown."""
+    listing, made = page.manifest["listing"], _rows_of_lines(page)
+    for layer, key in (("uncorrected", "uncorrected"), ("result", "corrected")):
+        own = listing["by_layer"][layer]
+        shown, state = page.array(own["um"]), page.array(own["state"]).astype(int)
+        for line, value, verdict in zip(rows["line"], rows[f"{key}_um"], rows[f"{key}_state"], strict=True):
+            mine = made[str(line)]
+            counted = [row for row in mine if state[row] < 2] or [row for row in mine if state[row] == 2]
+            assert max(shown[row] for row in counted) == pytest.approx(
+                np.nan_to_num(value, nan=-1.0), abs=PRINTED_UM
+            )
+            states = {int(state[row]) for row in counted}
+            assert verdict == (1 if 1 in states else min(states))
 
 
 def _page_and_report(page: Page, stated: dict[str, Any]) -> None:
@@ -328,10 +358,10 @@ def _layers(stated: dict[str, Any]) -> Iterator[str]:
 
 def _measured_lines(page: Page, stated: dict[str, Any], names: Sequence[str]) -> None:
     listing, tolerance = page.manifest["listing"], stated["judgement"]["tolerance_um"]
-    numbers = page.array(listing["row_nominal"]).astype(int)
+    made = _rows_of_lines(page)
     shown = page.array(listing["measured_um"])
     for row in stated["worst"]:
-        assert shown[numbers == row["line"]][0] == pytest.approx(row["max_um"], abs=PRINTED_UM)
+        assert max(shown[made[str(row["line"])]]) == pytest.approx(row["max_um"], abs=PRINTED_UM)
     each = [page.array(listing["by_layer"][name]["um"]) for name in names]
     assert np.maximum.reduce(each).tolist() == shown.tolist()
     for name, run_ in zip(names, stated["judgement"]["runs"], strict=True):
