@@ -206,13 +206,14 @@ def render(
     near_um: float = 1000.0,
     bare_mm: BareMm | None = None,
     statements: bool = False,
+    place: Callable[[int], str] = str,
     colour: bool = False,
 ) -> str:
     """The changed lines as text: line in the nominal program, nominal, corrected, change of lengths in um.
 
     The change of an axis is corrected command minus nominal command. No correction is larger than `near_um`.
     `bare_mm` is what the control takes numbers without a point for; without it they are as with one.
-    `statements`: the texts are APT or DMIS.
+    `statements`: the texts are APT or DMIS. `place` puts a line of the nominal text into words.
     """
     nominal, corrected = (
         (_StatementReader() if statements else _Reader(bare_mm)).read(data)
@@ -227,11 +228,11 @@ def render(
                 rows.append(("+", "", corrected[j].text, ""))
         elif j is None:
             counts["left out"] += 1
-            rows.append((f"- {i + 1}", nominal[i].text, "", ""))
+            rows.append((f"- {place(i + 1)}", nominal[i].text, "", ""))
         elif nominal[i].text != corrected[j].text:
             counts["changed"] += 1
             changes = "  ".join(_changes(nominal[i], corrected[j], near_um))
-            rows.append((str(i + 1), nominal[i].text, corrected[j].text, changes))
+            rows.append((place(i + 1), nominal[i].text, corrected[j].text, changes))
     total = ", ".join(f"{count} {what}" for what, count in counts.items())
     return "".join(_table(rows, colour)) + f"lines: {total}\n"
 

@@ -8,8 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from olp.cli.common import diagnostic, files_of, machine_given, plot_ending, put, refuse_early, source
-from olp.cli.options import NUMBER, Integer, force_option, json_option, plot_option, setup_options
+from olp.cli.common import (
+    diagnostic,
+    files_of,
+    machine_given,
+    options_of,
+    plot_ending,
+    put,
+    refuse_early,
+    source,
+)
+from olp.cli.options import NUMBER, Integer, force_option, json_option, plot_option, program_options
 from olp.core.errors import UsageError
 
 if TYPE_CHECKING:
@@ -19,7 +28,7 @@ if TYPE_CHECKING:
 
 @click.command("inspect")
 @click.argument("file", metavar="PROGRAM|machine.toml", required=False)
-@setup_options
+@program_options
 @click.option(
     "--at", type=(NUMBER, NUMBER, NUMBER), metavar="X Y Z", help="Show the error at an axis position in mm."
 )
@@ -36,6 +45,7 @@ def command(
     plot: str | None,
     as_json: bool,
     force: bool,
+    **words: Any,
 ) -> None:
     """Show what a program does, or what a machine's calibration holds.
 
@@ -70,8 +80,10 @@ def command(
         values = shown = machine_summary(session)
     else:
         from olp.workflows import inspect
+        from olp.workflows.flatten import UnrollOptions
 
-        values = inspect.run(session, source(session.sources, file))
+        options = options_of(UnrollOptions, words)
+        values = inspect.run(session, source(session.sources, file), options)
         shown = values | {"support": _by_support(values.get("support") or ())}
     from olp.cli.outline import outline
     from olp.reports.report import to_json

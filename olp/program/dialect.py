@@ -15,6 +15,8 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
+from olp.program.origin import Unrolled
+
 
 @dataclass(frozen=True, slots=True)
 class Options:
@@ -78,7 +80,7 @@ class Dialect:
     title: str
     path_mode: str
     reader: Callable[..., Any]
-    unroller: Callable[..., bytes] | None = None
+    unroller: Callable[..., Unrolled] | None = None
     endings: tuple[str, ...] = ()
     sign: re.Pattern[bytes] | None = None
     shared_sign: re.Pattern[bytes] | None = None

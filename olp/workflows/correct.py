@@ -27,6 +27,7 @@ from olp.proof.judgement import Judgements
 from olp.uncertainty.spread import Confidence
 from olp.workflows.doubt import accepted_of, doubted
 from olp.workflows.flatten import as_asked
+from olp.workflows.original import placed, placed_findings
 from olp.workflows.proof import Pair, ProofOptions, Run, limits_of, proved
 from olp.workflows.session import Loaded, Outside, PathLike, Session, opened
 
@@ -36,9 +37,6 @@ class CorrectOptions(ProofOptions):
     """The options of `correct`."""
 
     outside_box: Outside = "refuse"
-    flatten: bool = False
-    expand_cycles: bool = False
-    peck_clearance_mm: float | None = None
     split_rapids: bool = False
 
 
@@ -47,18 +45,24 @@ class Correction:
     """A corrected program: its bytes, the report as a mapping ("olp-report-1"), and the findings;
     `confidence` has bands and probabilities by waypoint where a part tolerance is stated and the calibration
     states uncertainties. `table` has the judgement of every nominal move, and (n,) `groups` the last move of
-    the corrected program that belongs to each."""
+    the corrected program that belongs to each. `nominal` is the text that was corrected, unrolled where the
+    call asks for it; lines of the table are then those of its original, which count through its files."""
 
     data: bytes
     report: dict[str, Any]
     findings: tuple[Finding, ...]
     table: Judgements
     groups: Index
+    nominal: bytes
     confidence: Confidence | None = None
 
     @staticmethod
     def of(run: Run) -> Correction:
-        return Correction(run.text, run.report, run.findings, run.table, run.proof.groups, run.confidence)
+        origin = run.nominal.origin
+        return Correction(
+            run.text, placed(run.report, origin), placed_findings(run.findings, origin), run.table,
+            run.proof.groups, run.nominal.data, run.confidence,
+        )  # fmt: skip
 
 
 def correct(
@@ -169,21 +173,23 @@ def _rewritten(
     doubts = doubted(program, loaded, options.accept, options.date, name=name, refuse=refuse_doubts)
     accepted = accepted_of(doubts)
     tell("correct", 0.2)
-    limits = limits_of(
-        program, loaded, options, refuse_outside=options.outside_box == "refuse",
-        split_rapids=options.split_rapids,
-    )  # fmt: skip
-    rows = plan(program.toolpath, loaded.model, limits)
-    tell("write", 0.5)
-    marked = loaded.dialect.marks
-    written = write(
-        program, rows, loaded.model, tolerance_mm=limits.tolerance_mm,
-        increments_mm=loaded.setup.machine.least_increment_mm,
-        stamp=stamp_line(loaded.digest, loaded.dialect.comment, accepted) if marked else b"",
-        stamp_always=bool(accepted),
-    )  # fmt: skip
+    with program.errors():
+        limits = limits_of(
+            program, loaded, options, refuse_outside=options.outside_box == "refuse",
+            split_rapids=options.split_rapids,
+        )  # fmt: skip
+        rows = plan(program.toolpath, loaded.model, limits)
+        tell("write", 0.5)
+        marked = loaded.dialect.marks
+        written = write(
+            program, rows, loaded.model, tolerance_mm=limits.tolerance_mm,
+            increments_mm=loaded.setup.machine.least_increment_mm,
+            stamp=stamp_line(loaded.digest, loaded.dialect.comment, accepted) if marked else b"",
+            stamp_always=bool(accepted),
+        )  # fmt: skip
     nominal = replace(program, words=None, slot=program.slot[:0])
-    text = written.text if written.changed else data
+    # the corrected text has lines of its own
+    text = written.text if written.changed else bytes(data)
     return _Rewritten(nominal, text, rows.uncorrected, written.parts, written.tally, doubts)
 
 

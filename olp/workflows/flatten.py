@@ -1,15 +1,34 @@
-"""A program with its loops, subprograms and expressions unrolled."""
+"""A program with its loops, subprograms and expressions unrolled: `flatten`, and what --flatten does."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Protocol
 
-from olp.core.errors import UsageError
+from olp.core.errors import ProgramError, UsageError
 from olp.core.machine import Setup
 from olp.files.sources import Source, Sources
 from olp.program.dialect import Dialect
-from olp.workflows.session import PathLike, opened
+from olp.program.origin import Origin, Unrolled
+from olp.workflows.session import PathLike, Session, opened
+
+#: Endings of files of subprograms.
+_ENDINGS = ("", ".ngc", ".nc")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UnrollOptions:
+    """The options of every verb that reads a program: `flatten` unrolls loops, subprograms and expressions
+    first, `expand_cycles` canned cycles too. `peck_clearance_mm` is the clearance above the last peck, for
+    controls where it is a parameter."""
+
+    flatten: bool = False
+    expand_cycles: bool = False
+    peck_clearance_mm: float | None = None
+
+    @property
+    def asked(self) -> bool:
+        return self.flatten or self.expand_cycles
 
 
 def flatten(
@@ -18,67 +37,77 @@ def flatten(
     job: PathLike | None = None,
     *,
     expand_cycles: bool = False,
+    peck_clearance_mm: float | None = None,
 ) -> bytes:
-    """Unroll loops, subprograms, expressions and, with `expand_cycles`, canned cycles into plain blocks. This
-    is not lossless."""
+    """The text of a program with loops, subprograms, expressions and, with `expand_cycles`, canned cycles
+    written out as plain blocks. This is not lossless.
+
+    `peck_clearance_mm` is the clearance above the last peck, for controls where it is a parameter. Raises
+    ProgramError with the line of the program, or of the file of a subprogram.
+    """
     session, source = opened(program, machine, job, "<program>")
-    with source.errors("<program>"):
-        setup, dialect = session.reading(source)
-        return unrolled(session.sources, source, setup, dialect, expand_cycles=expand_cycles)
+    options = UnrollOptions(flatten=True, expand_cycles=expand_cycles, peck_clearance_mm=peck_clearance_mm)
+    return run(session, source, options)
 
 
-class Unrolling(Protocol):
-    """The options of a verb that may unroll a program first."""
-
-    @property
-    def flatten(self) -> bool: ...
-    @property
-    def expand_cycles(self) -> bool: ...
-    @property
-    def peck_clearance_mm(self) -> float | None: ...
+def run(session: Session, program: Source, options: UnrollOptions) -> bytes:
+    """As `flatten`, in a session."""
+    program.load()
+    with program.errors("<program>"):
+        # a text of its own: what is said of it later has its own lines
+        return bytes(as_asked(session.sources, program, *session.reading(program), options).data)
 
 
-def as_asked(sources: Sources, program: Source, setup: Setup, dialect: Dialect, options: Unrolling) -> Source:
-    """The program, unrolled where the options ask for it. Raises as `unrolled`."""
-    if not (options.flatten or options.expand_cycles):
-        return program
-    text = unrolled(
-        sources, program, setup, dialect, expand_cycles=options.expand_cycles,
-        peck_clearance_mm=options.peck_clearance_mm,
-    )  # fmt: skip
-    return program.holding(text)
-
-
-def unrolled(
+def as_asked(
     sources: Sources,
     program: Source,
     setup: Setup,
     dialect: Dialect,
+    options: UnrollOptions,
     *,
-    expand_cycles: bool = False,
-    peck_clearance_mm: float | None = None,
-) -> bytes:
-    """The text with loops, subprograms and expressions unrolled; subprograms are searched in its folder.
+    block_delete: bool | None = None,
+) -> Source:
+    """The program, unrolled where the options ask for it and it is not yet. Subprograms are searched in its
+    folder. `block_delete` is the position of that switch, None where the result has to be right for both.
 
-    With `expand_cycles` canned cycles are written out too. `peck_clearance_mm` is the clearance above the
-    last peck, for controls where it is a parameter. Payloads that the job gives by line become comments
-    first, as unrolling changes the lines. Raises UsageError for a dialect that has none of them.
+    Payloads that the job gives by line become comments first, as unrolling changes the lines. Raises
+    UsageError for a dialect that cannot be unrolled, ProgramError with the line of the original.
     """
     from olp.program.directives import with_payloads
 
+    if not options.asked or isinstance(program.data, Unrolled):
+        return program
     if dialect.unroller is None:
         raise UsageError(f"{dialect.title} cannot be unrolled; leave --flatten and --expand-cycles out")
     data = with_payloads(program.data, setup.job.payloads, dialect.comment)
 
-    def beside(wanted: str) -> bytes | None:
+    def beside(wanted: str) -> tuple[str, bytes] | None:
         if not program.name:
             return None
-        for suffix in ("", ".ngc", ".nc"):
-            candidate = Path(program.name).parent / f"{wanted}{suffix}"
+        for ending in _ENDINGS:
+            candidate = Path(program.name).parent / f"{wanted}{ending}"
             if candidate.is_file():
-                return sources.read(candidate)
+                return str(candidate), sources.read(candidate)
         return None
 
-    return dialect.unroller(
-        data, dialect, subprograms=beside, expand_cycles=expand_cycles, peck_clearance=peck_clearance_mm
-    )
+    text = dialect.unroller(
+        data, dialect, subprograms=beside, expand_cycles=options.expand_cycles, block_delete=block_delete,
+        peck_clearance=options.peck_clearance_mm,
+    )  # fmt: skip
+    _refuse_payloads_not_reached(setup, text.origin)
+    # the comments of payloads are not in the file
+    given = tuple(program.data.splitlines(keepends=True))
+    text.origin = replace(text.origin, texts=given + text.origin.texts[len(given) :])
+    return program.holding(text)
+
+
+def _refuse_payloads_not_reached(setup: Setup, origin: Origin) -> None:
+    """Raise ProgramError for a payload of the job at a line that the unrolled text does not have."""
+    written = set(origin.line.tolist())
+    for line in setup.job.payloads:
+        if line not in written:
+            raise ProgramError(
+                "[[payloads]] of the job file names this line, which the unrolled program does not have; "
+                "name the line of a block that is executed",
+                line=line,
+            )

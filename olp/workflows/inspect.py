@@ -13,23 +13,33 @@ from olp.core.machine import Setup
 from olp.core.toolpath import Kind, carried
 from olp.files.sources import Source
 from olp.program.registry import read
+from olp.workflows.flatten import UnrollOptions, as_asked
+from olp.workflows.original import placed
 from olp.workflows.session import PathLike, Session, opened
 
 
 def inspect(
-    program: PathLike | bytes, machine: PathLike | Setup, job: PathLike | None = None
+    program: PathLike | bytes,
+    machine: PathLike | Setup,
+    job: PathLike | None = None,
+    *,
+    flatten: bool = False,
+    expand_cycles: bool = False,
+    peck_clearance_mm: float | None = None,
 ) -> dict[str, Any]:
     """What a program does: moves by kind, ranges, tools, offsets, path modes, findings and the support
-    matrix."""
+    matrix. `flatten`, `expand_cycles` and `peck_clearance_mm` are those of `correct`."""
     session, source = opened(program, machine, job, "<program>")
-    return run(session, source)
+    options = UnrollOptions(flatten=flatten, expand_cycles=expand_cycles, peck_clearance_mm=peck_clearance_mm)
+    return run(session, source, options)
 
 
-def run(session: Session, program: Source) -> dict[str, Any]:
+def run(session: Session, program: Source, options: UnrollOptions) -> dict[str, Any]:
     """As `inspect`, in a session."""
     with program.errors("<program>"):
         setup, dialect = session.reading(program)
-        parsed = read(program.data, setup, dialect)
+        program = as_asked(session.sources, program, setup, dialect, options)
+        parsed = read(program.data, setup, dialect).in_original()
     path = parsed.toolpath
     with np.errstate(all="ignore"):
         known = path.end_mm[np.isfinite(path.end_mm).all(axis=1)]
@@ -38,6 +48,7 @@ def run(session: Session, program: Source) -> dict[str, Any]:
         for i, axis in enumerate("XYZ")
     }
     findings = checks.program_findings(parsed, setup, contour=False)
+    origin = parsed.origin
     return {
         "name": program.short,
         "dialect": dialect.name,
@@ -50,10 +61,11 @@ def run(session: Session, program: Source) -> dict[str, Any]:
         "work_offsets": sorted({f.work_offset for f in path.frames}),
         "payloads_kg": list(dict.fromkeys(f.payload_kg for f in path.frames)),
         "path_modes": [
-            {"line": m.line, "name": m.name, "tolerance_mm": m.tolerance_mm} for m in parsed.path_modes
+            placed({"line": m.line, "name": m.name, "tolerance_mm": m.tolerance_mm}, origin)
+            for m in parsed.path_modes
         ],
         "stamped": find_stamp(program.data) is not None,
-        "findings": [f.as_dict() for f in findings],
+        "findings": [placed(f.as_dict(), origin) for f in findings],
         "support": dialect.support(),
     }
 

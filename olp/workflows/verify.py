@@ -16,6 +16,7 @@ from olp.program.registry import Options, read
 from olp.proof.judgement import Judgements
 from olp.uncertainty.spread import Confidence
 from olp.workflows.flatten import as_asked
+from olp.workflows.original import placed, placed_findings
 from olp.workflows.proof import ProofOptions, verify_programs
 from olp.workflows.session import Loaded, Outside, PathLike, Session
 
@@ -25,9 +26,6 @@ class VerifyOptions(ProofOptions):
     """The options of `verify`; the nominal program is unrolled as in `correct`."""
 
     outside_box: Outside = "hold"
-    flatten: bool = False
-    expand_cycles: bool = False
-    peck_clearance_mm: float | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,7 +99,9 @@ def run(
     done = verify_programs(
         (programs[0], nominal.name), (programs[1], corrected.name), loaded, options, outside=outside
     )
-    return Verification(done.report, done.findings, done.table, done.confidence)
+    origin = done.nominal.origin
+    report, findings = placed(done.report, origin), placed_findings(done.findings, origin)
+    return Verification(report, findings, done.table, done.confidence)
 
 
 def _read(source: Source, loaded: Loaded, options: VerifyOptions) -> Program:

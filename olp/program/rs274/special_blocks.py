@@ -85,7 +85,7 @@ def _checked(
         m = round(word.value * 10)
         if word.letter == "M" and m in _M_REFUSED:
             raise ProgramError(
-                f"M{m / 10:g} {_M_REFUSED[m]}; unroll the program with olp correct --flatten", line=line
+                f"M{m / 10:g} {_M_REFUSED[m]}; unroll the program with --flatten", line=line
             )
     return [c for c, a in zip(code.tolist(), act.tolist(), strict=True) if a == Act.EVENT]
 

@@ -15,7 +15,7 @@ from olp.files.sources import Source, Sources
 from olp.program.registry import DIALECTS, read
 from olp.program.rs274.cycles import CycleRules
 from olp.program.rs274.profiles.base import Profile
-from olp.workflows.flatten import unrolled
+from olp.workflows.flatten import UnrollOptions, as_asked
 
 LINUXCNC, FANUC, HAAS, GRBL = CONTROLS = ("linuxcnc", "fanuc", "haas", "grbl")
 #: Each tool has a length along X, too.
@@ -164,7 +164,8 @@ def written_out(text: str, setup: Setup, control: Profile) -> str:
     """The program with its cycles written out, its blocks between bars, or what the refusal says."""
     source = Source("", text.encode)
     try:
-        return unrolled(Sources(), source, setup, control, expand_cycles=True).decode().replace("\n", "|")
+        expanded = as_asked(Sources(), source, setup, control, UnrollOptions(expand_cycles=True))
+        return expanded.data.decode().replace("\n", "|")
     except ProgramError as error:
         return str(error)
 

@@ -101,9 +101,13 @@ M2
 
 def test_external_subprogram_and_computed_label() -> None:
     files = {"101": b"o101 sub\nX#1\no101 endsub\n", "deep": b"o<deep> sub\nX#5063\no<deep> endsub\n"}
-    assert lcnc("o[100+1] call [4]\nM2\n", subprograms=files.get) == "X4\nM2\n"
-    error = refusal("X1\no<deep> call\nM2\n", subprograms=files.get)
-    assert (error.file, error.line) == ("deep", 2)
+
+    def beside(wanted: str) -> tuple[str, bytes]:
+        return f"{wanted}.ngc", files[wanted]
+
+    assert lcnc("o[100+1] call [4]\nM2\n", subprograms=beside) == "X4\nM2\n"
+    error = refusal("X1\no<deep> call\nM2\n", subprograms=beside)
+    assert (error.file, error.line) == ("deep.ngc", 2)
 
 
 def test_fanuc_calls_inside_linuxcnc() -> None:
