@@ -1,17 +1,25 @@
-"""LinuxCNC's interpreter on one program, run by the system's Python: PROGRAM TABLE VAR OUT INITCODE UNITCODE.
+"""LinuxCNC's interpreter as a server, run by the system's Python: it is loaded once, and each program is
+carried out by a child of its own.
 
-Writes OUT as rows of COLUMNS doubles, prints one JSON line (error, error_line, messages, rows). Standard
-library only. Lengths come from the interpreter in inches, whatever the program's units.
+A request on the standard input is a JSON line (table, variables, start, unit, deletes, seconds, size), then
+`size` bytes of program. The answer on the standard output is a JSON line (error, error_line, messages, size;
+`failed` where the child ended without an answer: a crash, a limit of time), then `size` bytes: rows of
+COLUMNS doubles. Standard library only. Lengths come from the interpreter in inches, whatever the program's
+units.
 """
 
 import ctypes
 import json
 import math
+import os
+import select
+import signal
 import sys
+import time
 from array import array
 from pathlib import Path
 
-COLUMNS = 20
+COLUMNS = 22  # the last one is the speed of the spindle
 MM = 25.4
 #: Kinds of rows, as in `linuxcnc`.
 RAPID = 0
@@ -19,6 +27,7 @@ FEED = 1
 ARC = 2
 PROBE = 3
 DWELL = 4
+FEED_MODE = "interpreter: feed mode set to"
 #: active modal codes are listed in tenths
 METRIC = 210
 
@@ -53,9 +62,11 @@ def read_tools(table):
 class Canon:
     """Receives the canonical calls; points are controlled-point coordinates before the offsets."""
 
-    def __init__(self, tools, library):
+    def __init__(self, tools, library, *, deletes):
         self.tools = tools
         self.library = library
+        self.deletes = deletes
+        self.feed_mode, self.rows, self.changed = 0, 0, False
         self.data = array("d")
         self.line, self.tool, self.plane, self.feed, self.index = 0, -1, 1, 0.0, 1
         self.g5x, self.g92, self.length = [0.0] * 3, [0.0] * 3, [0.0] * 3
@@ -75,20 +86,31 @@ class Canon:
     def next_line(self, state):
         if self.silent:
             return
-        self.line = state.sequence_number
+        self.line, self.changed = state.sequence_number, False
+        self.set_speeds(state.speed)
         self.unit = MM if METRIC in state.gcodes else 1.0
+
+    def set_speeds(self, speed):
+        """The speed after a block is that of its moves; it comes with the next block."""
+        last = len(self.data) // COLUMNS
+        for row in range(self.rows, last):
+            self.data[row * COLUMNS + COLUMNS - 1] = speed
+        self.rows = last
 
     def set_g5x_offset(self, index, *offset):
         self.index, self.g5x = index, list(offset[:3])
+        self.stand()
 
     def set_g92_offset(self, *offset):
         self.g92 = list(offset[:3])
+        self.stand()
 
     def set_xy_rotation(self, degrees):
         self.cos, self.sin = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
 
     def tool_offset(self, *offset):
         self.length = list(offset[:3])
+        self.stand()
 
     def set_plane(self, plane):
         self.plane = plane
@@ -96,10 +118,21 @@ class Canon:
     def set_feed_rate(self, feed):
         self.feed = feed
 
+    def comment(self, text):
+        """The only word of the interpreter about G93, G94 and G95."""
+        if text.startswith(FEED_MODE):
+            self.feed_mode = int(text.endswith("revolution"))
+
     def change_tool(self, index):
         self.tools[0] = self.tools[index] if index > 0 else (0,) + (0.0,) * 12 + (0,)
         self.tool = self.tools[0][0]
-        if self.axis is None:
+        self.changed = True
+        self.stand()
+
+    def stand(self):
+        """After a tool change the interpreter asks at the end of the block where the machine stands, in the
+        offsets that are in force then."""
+        if self.axis is None or not self.changed:
             return
         self.silent = True
         point = [a / MM - length for a, length in zip(self.axis, self.length, strict=True)]
@@ -119,7 +152,7 @@ class Canon:
         return 7
 
     def get_block_delete(self):
-        return 0
+        return int(self.deletes)
 
     def check_abort(self):
         return False
@@ -147,6 +180,7 @@ class Canon:
         self.data.extend([float(self.line), float(kind), *tip, *length, float(self.tool), float(self.index)])
         self.data.extend([MM * self.feed, *centre, float(turns), float(self.plane), extra])
         self.data.extend([MM * value for value in self.g92])
+        self.data.extend([float(self.feed_mode), math.nan])
 
     def straight_traverse(self, x, y, z, *_):
         self.row(RAPID, self.absolute(x, y, z))
@@ -172,23 +206,91 @@ class Canon:
         self.row(ARC, self.absolute(*tip), self.absolute(*middle), turns)
 
 
-def main():
-    program, table, variables, output, initcode, unitcode = sys.argv[1:7]
-    keep = prepare_tools(table)  # the library reads this block for as long as the interpreter runs
+def interpret(request, program):
+    """The report and the rows of one program, in a process that interprets no other."""
+    Path("t.tbl").write_text(request["table"])
+    keep = prepare_tools("t.tbl")  # the library reads this block for as long as the interpreter runs
+    result = parse(request, program)
+    del keep
+    return result
+
+
+def parse(request, program):
+    """The report and the rows of one program."""
     import gcode
 
-    canon = Canon(read_tools(table), ctypes.PyDLL(gcode.__file__))
-    canon.parameter_file = variables
-    result, line = gcode.parse(program, canon, unitcode, initcode)
-    Path(output).write_bytes(canon.data.tobytes())
+    Path("v.var").write_text(request["variables"])
+    Path("p.ngc").write_bytes(program)
+    canon = Canon(read_tools("t.tbl"), ctypes.PyDLL(gcode.__file__), deletes=request["deletes"])
+    canon.parameter_file = "v.var"
+    result, line = gcode.parse("p.ngc", canon, request["unit"], request["start"])
     failed = result > gcode.MIN_ERROR
     report = {
         "error": gcode.strerror(result) if failed else None,
         "error_line": line,
         "messages": canon.messages,
     }
-    print(json.dumps(report))
-    del keep
+    return report, canon.data.tobytes()
+
+
+def send(stream, report, rows):
+    stream.write(json.dumps({**report, "size": len(rows)}).encode() + b"\n" + rows)
+    stream.flush()
+
+
+def child(request, program, pipe):
+    """Carries out one program and ends the process; what the interpreter prints is not kept."""
+    silent = os.open(os.devnull, os.O_RDWR)
+    for descriptor in (0, 1):
+        os.dup2(silent, descriptor)
+    try:
+        report, rows = interpret(request, program)
+    except BaseException as error:
+        report, rows = {"failed": repr(error)}, b""
+    with os.fdopen(pipe, "wb") as stream:
+        send(stream, report, rows)
+    os._exit(0)
+
+
+def answer(request, program):
+    """What the child of a program sends, or why it sends nothing."""
+    read_end, write_end = os.pipe()
+    process = os.fork()
+    if not process:
+        os.close(read_end)
+        child(request, program, write_end)
+    os.close(write_end)
+    parts, late = [], False
+    end = time.monotonic() + request["seconds"]
+    while True:
+        late = not select.select([read_end], [], [], max(0.0, end - time.monotonic()))[0]
+        part = b"" if late else os.read(read_end, 1 << 20)
+        if not part:
+            break
+        parts.append(part)
+    os.close(read_end)
+    if late:
+        os.kill(process, signal.SIGKILL)
+    _, status = os.waitpid(process, 0)
+    if late:
+        return json.dumps({"failed": "time", "size": 0}).encode() + b"\n"
+    if os.WIFSIGNALED(status):
+        name = signal.Signals(os.WTERMSIG(status)).name
+        return json.dumps({"failed": name, "size": 0}).encode() + b"\n"
+    return b"".join(parts)
+
+
+def main():
+    """Answers requests until the input ends. The working folder is this process's own."""
+    # the first program of a process loads what all others use
+    warm = {"table": "", "variables": "5220\t1.0\n", "deletes": False, "unit": "G21", "start": "G0 X0"}
+    Path("t.tbl").write_text("")
+    parse(warm, b"M2\n")
+    while line := sys.stdin.buffer.readline():
+        request = json.loads(line)
+        program = sys.stdin.buffer.read(request["size"])
+        sys.stdout.buffer.write(answer(request, program))
+        sys.stdout.buffer.flush()
 
 
 if __name__ == "__main__":
