@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from olp.core.units import AXES
+from olp.program.text.line_ends import LINE_END_TEXT
 from olp.reports.report import printable, shortened
 
 #: Insertions, in lines, that are searched for the partner of a line.
@@ -29,7 +30,6 @@ _GREEN = "\x1b[32m"
 _DIM = "\x1b[2m"
 _PLAIN = "\x1b[0m"
 
-_END = re.compile(r"\r\n|\n|\r")
 _TOKEN = re.compile(r"(\([^)]*\)|;.*)|([A-Z])\s*([-+]?[\d.]+|[^\sA-Z(;]*)")
 #: Letters of words that hold lengths.
 _LENGTHS = frozenset("XYZIJKR")
@@ -79,7 +79,7 @@ class _Reader:
         self._position = _UNKNOWN
 
     def read(self, data: bytes) -> list[Line]:
-        return [self._line(text) for text in _END.split(data.decode("latin-1"))]
+        return [self._line(text) for text in LINE_END_TEXT.split(data.decode("latin-1"))]
 
     def _line(self, text: str) -> Line:
         words: list[tuple[str, str]] = []
@@ -126,7 +126,7 @@ class _StatementReader:
         self._unit_um = 1000.0
 
     def read(self, data: bytes) -> list[Line]:
-        return [self._line(text) for text in _END.split(data.decode("latin-1"))]
+        return [self._line(text) for text in LINE_END_TEXT.split(data.decode("latin-1"))]
 
     def _line(self, text: str) -> Line:
         statement = _POINT.match(text.upper())

@@ -13,6 +13,7 @@ from olp.core.toolpath import Toolpath
 from olp.program.dialect import Dialect
 from olp.program.rs274.profiles.base import Profile
 from olp.program.rs274.state import Capture, PathMode
+from olp.program.text.line_ends import LINE_END
 
 Small = npt.NDArray[np.int32]
 
@@ -176,9 +177,5 @@ class Program:
     def eol(self, line: int) -> bytes:
         """The line end that a block after this line takes: this line's, or the first one of the text."""
         end = int(self.line_end[line - 1])
-        for mark in (b"\r\n", b"\r\r\n"):
-            if self.data[end : end + len(mark)] == mark:
-                return mark
-        if self.data[end : end + 1] in (b"\n", b"\r"):
-            return self.data[end : end + 1]
-        return b"\r\n" if b"\r\n" in self.data[:4096] else b"\n"
+        mark = LINE_END.match(self.data, end) or LINE_END.search(self.data)
+        return mark[0] if mark else b"\n"

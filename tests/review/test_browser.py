@@ -466,7 +466,7 @@ def test_no_peak_is_lost_in_a_plot_of_a_million_points(page: Any) -> None:
           y[123457] = 9; y[777777] = -4; y[500000] = NaN;
           const chart = olp.app.plots.deviation;
           const series = [{label: "s", colour: "#000", x, y}];
-          chart.set({title: "t", unit: "", x_label: "", series, limits: []});
+          chart.set({extent: [x[0], x[x.length - 1]], title: "t", unit: "", x_label: "", series, limits: []});
           const columns = chart.columns(series[0]), ends = [1, 2].map(k => columns.map(c => c[k]));
           return [columns.length, Math.max(...ends[1]), Math.min(...ends[0]), chart.wide];
         }"""

@@ -62,10 +62,9 @@ class Word:
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """What the axis words of a block mean after its events: `consumed`, or `machine` coordinates (G53), or
-    `home`, the axes that G28/G30 send home after the intermediate point."""
+    """What the axis words of a block mean after its events: `machine` coordinates (G53), or `home`, the axes
+    that G28/G30 send home after the intermediate point."""
 
-    consumed: bool = False
     machine: bool = False
     home: tuple[int, ...] = ()
 
@@ -239,13 +238,12 @@ class AxisState(State):
         effect: Effect,
     ) -> Effect:
         if code == DWELL:
-            return self._dwell(line, by_letter)
+            self._dwell(line, by_letter)
         if code in UNITS:
             self.unit = code
         elif code == LENGTH_FROM_WORDS:
             values = [(i, self.length_mm(w)) for i, w in axis_words]
             self.offsets.length = self._merged(self.offsets.length, values)
-            return replace(effect, consumed=True)
         elif code in LENGTHS:
             self._tool_length(code, line, by_letter)
         elif code in WORK_OFFSETS or code in FURTHER_OFFSETS:
@@ -258,41 +256,42 @@ class AxisState(State):
             self._cutter_compensation(code, line, by_letter)
         elif code in HOMES:
             if not axis_words:
-                return replace(effect, consumed=True, home=(0, 1, 2))
+                return replace(effect, home=(0, 1, 2))
             return replace(effect, home=tuple(i for i, _ in axis_words))
         elif code == MACHINE:
             return replace(effect, machine=True)
         elif code == WRITE_OFFSET:
             self._write_offset(line, by_letter, axis_words, moves)
-            return replace(effect, consumed=True)
         elif code in SHIFTS:
             self._shift(code, line, axis_words, moves)
-            return replace(effect, consumed=True)
         return effect
 
-    def _dwell(self, line: int, by_letter: dict[str, Word]) -> Effect:
+    def _dwell(self, line: int, by_letter: dict[str, Word]) -> None:
         """G4: ISO controls take its time from X too; RS-274 takes it from P only, so axis words still
         move."""
-        if not self.profile.axis_dwell:
-            return Effect()
-        if any(a in by_letter for a in "YZ") or any(
-            w.letter == "G" and w.value in (0, 1, 2, 3) for w in by_letter.values()
+        if self.profile.axis_dwell and (
+            any(a in by_letter for a in "YZ")
+            or any(w.letter == "G" and w.value in (0, 1, 2, 3) for w in by_letter.values())
         ):
             raise ProgramError(
                 "a dwell and a motion are in one block; put the dwell into its own block", line=line
             )
-        return Effect(consumed=True)
 
     def _tool_length(self, code: int, line: int, by_letter: dict[str, Word]) -> None:
         if code == 490:
             self.offsets.length, self.length_tool = ZERO, None
             return
         name = f"G{code / 10:g}"
-        if "H" in by_letter:
-            number = self._integer(by_letter["H"], line)
-        elif self.profile.length_of_spindle_tool and code != 432:
-            number = self.spindle or 0
-        else:
+        number = self._integer(by_letter["H"], line) if "H" in by_letter else None
+        if not number and self.profile.length_of_spindle_tool and (number is not None or code != 432):
+            number = self.spindle
+            if number is None:
+                raise ProgramError(
+                    f"{name} takes the length of the tool in the spindle, which is not known; give T and M6 "
+                    "before it, or `tool` in the job file",
+                    line=line,
+                )
+        if number is None:
             raise ProgramError(f"{name} needs an H word with the number of the tool length", line=line)
         if self.spindle is None and number:
             # only the length that is called up shows which tool is in the spindle
@@ -386,12 +385,14 @@ class AxisState(State):
             target = offsets.shift if self.profile.g52_is_g92 else offsets.local
             for i, word in axis_words:
                 target[i] = self.length_mm(word)
+            if self.profile.g52_is_g92:
+                offsets.store_shift()
         else:
             work = self._work_mm(offsets.name)
             for i, word in axis_words:
                 self._capture(i, word, line, moves)
                 offsets.preset(i, self.position[i], work, self.length_mm(word))
-            offsets.saved = list(offsets.shift)
+            offsets.store_shift()
 
     def _work_mm(self, name: str) -> list[float]:
         """A work offset as the program has written it, else that of the setup (a copy), else NaN."""

@@ -60,6 +60,8 @@ class CycleRules:
     - `stores`: zero holes store the words of the cycle, else they are an error.
     - `new_code_forgets`: another cycle of a series takes no words from the one before.
     - `levels_follow_distance`: after a change between G90 and G91 a series needs R and depth again.
+    - `keeps_numbers`: a series keeps its initial level, R and depth as numbers of the program, whatever
+      becomes of offsets and unit, and goes on after moves of other codes (G28); else it has to end there.
     - `exact_corners`: all corners of a cycle are exact, whatever the path mode.
     """
 
@@ -72,6 +74,7 @@ class CycleRules:
     stores: bool
     new_code_forgets: bool
     levels_follow_distance: bool
+    keeps_numbers: bool
     exact_corners: bool
 
     def counter(self, words: Mapping[str, int]) -> int | None:
@@ -82,12 +85,12 @@ class CycleRules:
 NGC_CYCLES = CycleRules(
     rises_first=True, feeds_home=True, taps_in_any_plane=False, taps_by_control=False,
     peck_by_parameter=False, repeat_words="L", stores=False, new_code_forgets=True,
-    levels_follow_distance=False, exact_corners=True,
+    levels_follow_distance=False, keeps_numbers=True, exact_corners=True,
 )  # fmt: skip
 ISO_CYCLES = CycleRules(
     rises_first=False, feeds_home=False, taps_in_any_plane=True, taps_by_control=True,
     peck_by_parameter=True, repeat_words="LK", stores=True, new_code_forgets=False,
-    levels_follow_distance=True, exact_corners=False,
+    levels_follow_distance=True, keeps_numbers=False, exact_corners=False,
 )  # fmt: skip
 
 

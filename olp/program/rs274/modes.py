@@ -17,23 +17,19 @@ from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import ProgramError
 from olp.program.rs274.axis_state import AxisState
 from olp.program.rs274.codes import (
+    AXIS_VALUES,
     COMPENSATION_OFF,
     CUTTER_COMPENSATION,
     DWELL,
     GROUPS,
-    LENGTH_FROM_WORDS,
-    SHIFTS,
-    WRITE_OFFSET,
 )
 from olp.program.rs274.lexer import WordChunk
 from olp.program.rs274.motion import modal, values
-from olp.program.rs274.profiles.base import Act
+from olp.program.rs274.profiles.base import Act, Profile
 
 Modal = npt.NDArray[np.int16]
 
 _FLOW = re.compile(rb"[#\[=<]|^/?\s*O|^\W*N?\d*\s*(IF|WHILE|GOTO|END|DO)", re.IGNORECASE)
-#: Events whose axis words are not motion: G10 G52 G92 G43.1
-_CLAIMS = (WRITE_OFFSET, *SHIFTS, LENGTH_FROM_WORDS)
 _LENGTHS = np.zeros(256, bool)
 _LENGTHS[list(b"XYZIJKRQ")] = True
 
@@ -83,7 +79,7 @@ class Modes:
         self._block_delete = block_delete
         profile = state.profile
         self._cycles_apart = profile.cycles_apart
-        self._claims = (*_CLAIMS, DWELL) if profile.axis_dwell else _CLAIMS
+        self._claims = sorted(AXIS_VALUES | {DWELL} if profile.axis_dwell else AXIS_VALUES)
         self._act = np.full(2000, Act.REFUSE, np.int8)
         for code, act in profile.codes.items():
             self._act[code] = act
@@ -187,13 +183,19 @@ class Modes:
         return _in_force(chunk, line, code, self._state.motion)
 
 
-def check_odd(data: bytes, chunk: WordChunk, active: Mask) -> None:
+def check_odd(data: bytes, chunk: WordChunk, active: Mask, profile: Profile) -> None:
     """Refuse active lines with more than words."""
     for line in chunk.odd.tolist():
         if not active[line]:
             continue
-        text = data[chunk.line_start[line] : chunk.line_end[line]].strip()
         number = chunk.first_line + line + 1
+        start = int(chunk.line_start[line])
+        newline = data.find(b"\n", start)
+        text = data[start : newline if newline >= 0 else len(data)]
+        why = profile.text.refusal(text)
+        if why is not None:
+            raise ProgramError(why, line=number)
+        text = data[start : chunk.line_end[line]].strip()
         shown = text[:60].decode("latin-1")
         if _FLOW.search(text):
             raise ProgramError(

@@ -120,6 +120,10 @@ CYCLES: dict[str, tuple[str, dict[str, str]]] = {
         f"{_SERIES}\nG91\nX2.",
         {LINUXCNC: "G0 Z12|G0 X3|G1 Z10|"} | dict.fromkeys(_ISO, "give R and the depth again"),
     ),
+    "keeps_numbers": (
+        f"G21\n{_SERIES}\nG20\nX2. Y1.",
+        {LINUXCNC: "G20|G61|G0 X2 Y1 Z3|G1 Z-2"} | dict.fromkeys(_ISO, "comes within a series of canned"),
+    ),
     "exact_corners": (
         f"G64\n{_SERIES}",
         {LINUXCNC: "G61|G0 X1 Y1"} | dict.fromkeys(_ISO, "F60.|G0 X1. Y1."),
@@ -130,7 +134,7 @@ OF_TIME = {
     "feed_without_point", "exact_stop", "feed_words_end", "feed_before_unit", "m_with_motion",
 }  # fmt: skip
 #: Tables and texts, which have tests of their own.
-TABLES = {"codes", "refusals", "harmless_m", "cycles", "language", "written_ending"}
+TABLES = {"codes", "refusals", "harmless_m", "text", "cycles", "language", "written_ending"}
 
 
 @pytest.fixture(scope="module")

@@ -258,7 +258,7 @@ class Walk:
             data = self._subprograms(label)
             if data is None:
                 raise ProgramError(f"subprogram {label} is not in the file, and no file for it was given")
-            self._files[label] = Unit(data, self.language, label)
+            self._files[label] = Unit(data, self.main.profile, label)
         unit = self._files[label]
         start = unit.definition(label, keyword)
         if start is None:

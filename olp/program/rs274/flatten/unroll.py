@@ -59,7 +59,7 @@ def flatten(
     subprogram and its name as the file.
     """
     writer = _Flattener(profile, expand_cycles=expand_cycles, peck_clearance=peck_clearance)
-    main = Unit(data, profile.language, file)
+    main = Unit(data, profile, file)
     visit = writer.block
     Walk(main, writer.variables, subprograms, visit, block_delete=block_delete, limit=limit).run()
     return writer.text(main)

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import re
+
+from olp.program.rs274.block_text import BlockText
 from olp.program.rs274.cycles import NGC_CYCLES
 from olp.program.rs274.entry import read_blocks, unroll_blocks
 from olp.program.rs274.flatten.language import NGC
 from olp.program.rs274.profiles.base import ARC_DISTANCE, ISO_M, REFUSALS, Act, Profile, g_codes
+from olp.program.text.line_ends import LONE_CR
 
 _EVENTS = dict.fromkeys((431, 432, 591, 592, 593, 611, 921, 922, 923), Act.EVENT)
 
@@ -25,6 +29,12 @@ DIALECT = Profile(
     feed_words_end=True,
     feed_before_unit=True,
     m_with_motion=frozenset({62, 63, 67}),
+    text=BlockText(
+        odd_bytes=re.compile(rb"\x00|" + LONE_CR.pattern),
+        skips_control=False,
+        nested_comments=False,
+        longest=252,
+    ),
     cycles=NGC_CYCLES,
     language=NGC,
     path_mode="G64 without tolerance, LinuxCNC's default",
