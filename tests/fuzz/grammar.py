@@ -18,7 +18,8 @@ FRAMES = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 TOOLS = (1, 2, 3)
 #: axes of a plane: first, second, along the tool
 PLANES = {"G17": (0, 1, 2), "G18": (2, 0, 1), "G19": (1, 2, 0)}
-CYCLES = ("G73", "G81", "G82", "G83", "G85", "G86", "G89", "G84", "G74")
+CYCLES = ("G73", "G81", "G82", "G83", "G85", "G89", "G86", "G84", "G74")
+_TAPS = ("G74", "G84")
 _REMARKS = ("(x1 y2)", "( G1 X99 )", "()", "(msg, a)", "(g0 ; z5)", "(debug)")
 _WRONG = (
     "X1 X2", "G1 G0 X1", "G41", "G2 X1", "G99.5", "M3 M4", "G81 X1", "P-1 G4", "G1 X", "X1..2", "G1 X-+2", "Q", "G10 L3",
@@ -58,6 +59,7 @@ class _Grammar:
     series: str = ""
     cycles: bool = True
     slashes: float = 0.0
+    turning: str = ""
 
     def chance(self, share: float) -> bool:
         return self.rng.random() < share
@@ -174,7 +176,8 @@ class _Grammar:
     def hole(self) -> list[str]:
         third = "XYZ"[PLANES[self.plane][2]]
         level = self.at[PLANES[self.plane][2]]
-        plain = CYCLES[:7] if self.plane != "G17" or self.chance(0.9) else CYCLES
+        turning = {"": CYCLES[:6], "M3": CYCLES[:7] + ("G84",), "M4": CYCLES[:7] + ("G74",)}[self.turning]
+        plain = CYCLES if self.chance(0.02) else [c for c in turning if c not in _TAPS or self.plane == "G17"]
         on = bool(self.series) and self.chance(0.7)
         code = self.series if on else self.rng.choice(plain)
         words = [] if on and self.motion == code and self.chance(0.7) else [self.code(code)]
@@ -245,7 +248,9 @@ class _Grammar:
         return words if how < 0.8 else words + self.tool_length()
 
     def machine(self) -> list[str]:
-        code = self.rng.choice(("G0", "G1", ""))
+        if self.relative and self.chance(0.95):
+            return self.distance()
+        code = self.rng.choice(("G0", "G1", "" if self.motion in ("G0", "G1") else "G0"))
         words = [self.code("G53"), *([self.code(code)] if code else [])]
         self.motion, self.series = code or self.motion, ""
         if code == "G1" and self.feed == "G93":
@@ -282,7 +287,10 @@ class _Grammar:
         return [self.code(self.plane)]
 
     def feed_mode(self) -> list[str]:
-        self.feed = self.rng.choice(("G94", "G94", "G93", "G95"))
+        self.feed = self.rng.choice(("G94", "G94", "G93", "G95" if self.turning else "G94"))
+        if self.feed == "G93" and self.series:
+            self.motion = self.series = ""
+            return [self.code("G80"), self.code("G93")]
         words = [self.code(self.feed)]
         if self.feed != "G93" and self.chance(0.95):
             words.append(self.word("F", self.rng.choice((100, 300.5, 0.25))))
@@ -302,7 +310,15 @@ class _Grammar:
         return words
 
     def spindle(self) -> list[str]:
-        return self.rng.choice((["S1000", "M3"], ["M5", "M3"], ["S500"], ["M8"], ["M9"], ["M3"], ["F100"], ["F20.5"], ["M1"]))
+        words = self.rng.choice(
+            (["S1000", "M3"], ["M4"], ["M5"], ["S500"], ["M8"], ["M9"], ["M3"], ["F100"], ["F20.5"], ["M1"], ["M3"], ["M48"])
+        )  # fmt: skip
+        if words[-1] in ("M3", "M4", "M5"):
+            self.turning = "" if words[-1] == "M5" else words[-1]
+            if self.series in ("G86", *_TAPS):
+                self.motion = self.series = ""
+                return [self.code("G80"), *words]
+        return list(words)
 
     def nothing(self) -> list[str]:
         return self.rng.choice(([], ["N10"], ["(remark)"], ["N5", "(x)"], [";rest G0 X5"], ["%"], ["M0"], [" "]))
@@ -315,20 +331,17 @@ class _Grammar:
 
     def words_of(self) -> list[str]:
         move = self.rng.choice(_MOVES)
-        if move is _Grammar.hole and not self.cycles:
+        if move is _Grammar.hole and not (self.cycles and (self.feed != "G93" or self.chance(0.03))):
             move = _Grammar.straight
         if self.wrong and self.chance(self.wrong):
             return self.bad()
         if self.chance(0.45):
             return move(self)
-        words = self.rng.choice(_STATES)(self)
-        if self.chance(0.3):
-            # two groups in one block: those that change how the words of a move are meant come with it
-            with_it = (self.distance, self.units, self.plane_code, self.frame, self.retract, self.feed_mode, self.tool_length,
-                       self.centre, self.mode, self.spindle, self.change)  # fmt: skip
-            words = self.rng.choice(with_it)()
-            if not words[0].replace(" ", "").endswith((".1", ".2")) or self.chance(0.1):
-                words = words + move(self)
+        state = self.rng.choice(_STATES)
+        words = state(self)
+        if state in _JOINED and self.chance(0.35) and not words[0].endswith((".1", ".2")):
+            # those that change how the words of a move are meant come with it
+            words = words + move(self)
         return words
 
     def block(self) -> str:
@@ -368,6 +381,10 @@ _STATES: tuple[Callable[[_Grammar], list[str]], ...] = (
     _Grammar.distance, _Grammar.centre, _Grammar.plane_code, _Grammar.feed_mode, _Grammar.retract, _Grammar.end_cycle,
     _Grammar.mode, _Grammar.spindle, _Grammar.nothing,
 )  # fmt: skip
+_JOINED = frozenset((
+    _Grammar.frame, _Grammar.units, _Grammar.tool_length, _Grammar.change, _Grammar.distance, _Grammar.centre,
+    _Grammar.plane_code, _Grammar.feed_mode, _Grammar.retract, _Grammar.mode, _Grammar.spindle,
+))  # fmt: skip
 
 
 def program(seed: int) -> Drawn:
@@ -379,8 +396,9 @@ def program(seed: int) -> Drawn:
     grammar.slashes = rng.choice((0.0, 0.0, 0.0, 0.15))
     lines = []
     if rng.random() < 0.85:
-        lines.append("G21 G90 G17 G94 F300 S1000 M3" if rng.random() < 0.8 else "F200")
-    if rng.random() < 0.9:
+        grammar.turning = rng.choice(("M3", "M3", "M3", "M4", ""))
+        lines.append(f"G21 G90 G17 G94 F300 S1000 {grammar.turning}" if grammar.turning else "F200")
+    if rng.random() < 0.95:
         grammar.motion = "G0"
         words = ["G0"]
         grammar.go(words, ["X", "Y", "Z"])
@@ -400,9 +418,9 @@ def program(seed: int) -> Drawn:
         ends = ["\r\n"]
     elif how < 0.2:
         ends = ["\r\r\n"]
-    elif how < 0.23:
+    elif how < 0.205:
         ends = ["\r"]
-    elif how < 0.27:
+    elif how < 0.22:
         ends = ["\n", "\r\n", "\r", "\n\r", "\r\r\n"]
     text = "".join(line + rng.choice(ends) for line in lines)
     if rng.random() < 0.1:

@@ -7,6 +7,7 @@ moves: kinds, ends, centres, turns, planes, feeds, units, and no axis known that
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -30,6 +31,7 @@ from olp.program.program import Program
 SLACK_MM = 1e-6
 #: relative, of feeds
 FEED_SLACK = 1e-9
+ARC_SLACK = 1e-4
 #: s that a program of a few blocks may take in the interpreter
 SECONDS = 20.0
 #: of `Outcome.kind`
@@ -40,9 +42,11 @@ LOOSER = "looser"
 DIFFERENT = "different"
 CRASH = "crash"
 UNJUDGED = "unjudged"
+WRONG = (LOOSER, DIFFERENT, CRASH)
 _KINDS = {Kind.RAPID: RAPID, Kind.LINE: FEED, Kind.ARC_CW: ARC, Kind.ARC_CCW: ARC, Kind.PROBE: PROBE}
 #: index of the plane in the interpreter's order to that of olp
 _PLANE = {0: 0, 1: 2, 2: 1}
+_HOME = re.compile(rb"(?i)G\s*0*(28|30)(?![.\s]*[0-9])")
 _AXES = ((0, 1), (2, 0), (1, 2))
 
 
@@ -140,6 +144,7 @@ class _Comparison:
     def __init__(self, data: bytes, program: Program, feed: np.ndarray, moves: CanonMoves) -> None:
         self.path, self.feed = program.toolpath, feed
         self.moves = moves.pick(moves.kind != DWELL)
+        self.text = data.split(b"\n")
         line_feeds = np.flatnonzero(np.frombuffer(data, np.uint8) == 10)
         begins = np.asarray(program.line_start)[self.path.line - 1]
         self.own_line = np.searchsorted(line_feeds, begins) + 1
@@ -162,15 +167,21 @@ class _Comparison:
     def _line(self, line: int) -> str | None:
         mine = np.flatnonzero(self.own_line == line).tolist()
         theirs = np.flatnonzero(self.moves.line == line).tolist()
-        for k in mine:
-            if self.path.flag[k] & Flag.CONTROL:
-                self.excused |= np.isnan(self.path.end_mm[k])
-        if len(mine) != len(theirs):
-            # moves of the control have no end, and rapids without a length are left out of cycles
-            mine = [k for k in mine if not self.path.flag[k] & Flag.CONTROL]
-        if len(mine) != len(theirs):
-            mine = [k for k in mine if not self._idle(k)]
+        own = [k for k in mine if not self.path.flag[k] & Flag.CONTROL]
+        unknown = np.isnan(self.path.end_mm[[k for k in mine if k not in own]]).any(axis=0)
+        self.excused |= unknown
+        if len(own) < len(theirs) and _HOME.search(self.text[line - 1]):
+            # where the reference points are, the program does not say
+            theirs, unknown = theirs[: len(own)], np.ones(3, bool)
+        if len(own) != len(theirs):
+            # rapids without a length are left out of cycles
+            own = [k for k in own if not self._idle(k)]
             theirs = [k for k in theirs if not self._still(k)]
+        text = self._moves_of(own, theirs)
+        self.excused |= unknown
+        return text
+
+    def _moves_of(self, mine: list[int], theirs: list[int]) -> str | None:
         if len(mine) != len(theirs):
             return f"{len(mine)} moves here, {len(theirs)} there"
         for k, j in zip(mine, theirs, strict=True):
@@ -202,8 +213,6 @@ class _Comparison:
             if abs(end[i] - there[i]) > SLACK_MM:
                 return f"{axis} ends at {end[i]:.6f}, there {there[i]:.6f}"
         kind = Kind(int(path.kind[k]))
-        if path.flag[k] & Flag.CONTROL:
-            return None
         if _KINDS[kind] != moves.kind[j]:
             return f"{kind.name} here, {linuxcnc.KINDS[moves.kind[j]]} there"
         if moves.kind[j] == ARC:
@@ -233,6 +242,8 @@ class _Comparison:
         if moves.feed_mode[j] and math.isnan(moves.speed[j]):
             return None
         there = float(moves.feed[j]) / 60.0 * (float(moves.speed[j]) if moves.feed_mode[j] else 1.0)
-        if abs(there - self.feed[k]) > FEED_SLACK * max(there, self.feed[k]):
+        # of an arc whose radii differ the interpreter takes one
+        inverse = self.path.flag[k] & Flag.INVERSE_TIME and moves.kind[j] == ARC
+        if abs(there - self.feed[k]) > (ARC_SLACK if inverse else FEED_SLACK) * max(there, self.feed[k]):
             return f"feed {self.feed[k]:.9g} mm/s, there {there:.9g}"
         return None

@@ -33,8 +33,8 @@ METRIC = 210
 
 
 def stand_at(library, point):
-    """Tells the library where the machine stands, a point in program units. After a tool change it goes on
-    from there. On its own it would go on from the last straight move: arcs and new offsets are forgotten."""
+    """Tells the library where the machine stands, a point in program units. After M6 and M61 it goes on from
+    there. On its own it would go on from the last straight move: arcs and new offsets are forgotten."""
     library._Z13STRAIGHT_FEEDiddddddddd(-1, *map(ctypes.c_double, (*point, *[0.0] * 6)))
 
 
@@ -66,7 +66,7 @@ class Canon:
         self.tools = tools
         self.library = library
         self.deletes = deletes
-        self.feed_mode, self.rows, self.changed = 0, 0, False
+        self.feed_mode, self.speed, self.rows = 0, 0.0, 0
         self.data = array("d")
         self.line, self.tool, self.plane, self.feed, self.index = 0, -1, 1, 0.0, 1
         self.g5x, self.g92, self.length = [0.0] * 3, [0.0] * 3, [0.0] * 3
@@ -86,16 +86,20 @@ class Canon:
     def next_line(self, state):
         if self.silent:
             return
-        self.line, self.changed = state.sequence_number, False
-        self.set_speeds(state.speed)
-        self.unit = MM if METRIC in state.gcodes else 1.0
+        self.line = state.sequence_number
+        self.check_speeds(state.speed)
+        unit = MM if METRIC in state.gcodes else 1.0
+        if unit != self.unit:
+            self.unit = unit
+            self.stand()
 
-    def set_speeds(self, speed):
-        """The speed after a block is that of its moves; it comes with the next block."""
-        last = len(self.data) // COLUMNS
-        for row in range(self.rows, last):
-            self.data[row * COLUMNS + COLUMNS - 1] = speed
-        self.rows = last
+    def check_speeds(self, speed):
+        """The speed of moves counts where it is the same before and after them; else it is NaN."""
+        if speed != self.speed:
+            last = len(self.data) // COLUMNS
+            for row in range(self.rows, last):
+                self.data[row * COLUMNS + COLUMNS - 1] = math.nan
+        self.speed, self.rows = speed, len(self.data) // COLUMNS
 
     def set_g5x_offset(self, index, *offset):
         self.index, self.g5x = index, list(offset[:3])
@@ -126,13 +130,11 @@ class Canon:
     def change_tool(self, index):
         self.tools[0] = self.tools[index] if index > 0 else (0,) + (0.0,) * 12 + (0,)
         self.tool = self.tools[0][0]
-        self.changed = True
         self.stand()
 
     def stand(self):
-        """After a tool change the interpreter asks at the end of the block where the machine stands, in the
-        offsets that are in force then."""
-        if self.axis is None or not self.changed:
+        """M6 and M61 ask at the end of their block where the machine stands, in the offsets in force then."""
+        if self.axis is None or self.silent:
             return
         self.silent = True
         point = [a / MM - length for a, length in zip(self.axis, self.length, strict=True)]
@@ -180,7 +182,7 @@ class Canon:
         self.data.extend([float(self.line), float(kind), *tip, *length, float(self.tool), float(self.index)])
         self.data.extend([MM * self.feed, *centre, float(turns), float(self.plane), extra])
         self.data.extend([MM * value for value in self.g92])
-        self.data.extend([float(self.feed_mode), math.nan])
+        self.data.extend([float(self.feed_mode), self.speed])
 
     def straight_traverse(self, x, y, z, *_):
         self.row(RAPID, self.absolute(x, y, z))
@@ -204,6 +206,7 @@ class Canon:
         end, centre = (first, second, third), (centre_1, centre_2, third)
         tip, middle = ([point[i] for i in order] for point in (end, centre))
         self.row(ARC, self.absolute(*tip), self.absolute(*middle), turns)
+        self.stand()
 
 
 def interpret(request, program):

@@ -58,7 +58,7 @@ class CanonMoves:
     g92: np.ndarray  # (n, 3)
     known: np.ndarray  # (n, 3) axis position at the end does not depend on the start position
     feed_mode: np.ndarray  # (n,) 0 `feed` counts by the minute, 1 by the turn
-    speed: np.ndarray  # (n,) turns of the spindle per minute, NaN in the last block
+    speed: np.ndarray  # (n,) turns of the spindle per minute, NaN where it changes beside the move
     start_known: bool = True
     ended: bool = True
     messages: list[Any] = field(default_factory=list)
