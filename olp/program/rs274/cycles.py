@@ -60,8 +60,8 @@ class CycleRules:
     - `stores`: zero holes store the words of the cycle, else they are an error.
     - `new_code_forgets`: another cycle of a series takes no words from the one before.
     - `levels_follow_distance`: after a change between G90 and G91 a series needs R and depth again.
-    - `keeps_numbers`: a series keeps its initial level, R and depth as numbers of the program, whatever
-      becomes of offsets and unit, and goes on after moves of other codes (G28); else it has to end there.
+    - `keeps_numbers`: a series keeps its initial level, R and depth as numbers of the program. Offsets and
+      units may change, and G28 may come between. Else it has to end there.
     - `exact_corners`: all corners of a cycle are exact, whatever the path mode.
     """
 
