@@ -35,11 +35,13 @@ _WRONG = (
 
 @dataclass(slots=True)
 class Drawn:
-    """A program, whether the block-delete switch is on, and where the machine stands first (None: unknown)."""
+    """A program, whether the block-delete switch is on, where the machine stands first (None: unknown), and
+    the number of a machine with errors."""
 
     data: bytes
     deletes: bool
     start_mm: tuple[float, float, float] | None
+    machine: int = 0
 
 
 @dataclass(slots=True)
@@ -60,6 +62,8 @@ class _Grammar:
     cycles: bool = True
     slashes: float = 0.0
     turning: str = ""
+    sets_tool: bool = True
+    gone: bool = False
 
     def chance(self, share: float) -> bool:
         return self.rng.random() < share
@@ -202,6 +206,12 @@ class _Grammar:
 
     # -- state ---------------------------------------------------------------------------------------
 
+    def again(self) -> list[str]:
+        self.gone, self.relative, self.motion, self.series = False, False, "G0", ""
+        words = ["G90", "G0"]
+        self.go(words, ["X", "Y", "Z"])
+        return words
+
     def frame(self) -> list[str]:
         self.lost()
         return [self.code(self.rng.choice(FRAMES[:2] if self.chance(0.5) else FRAMES))]
@@ -239,11 +249,12 @@ class _Grammar:
 
     def change(self) -> list[str]:
         self.lost()
-        how = self.rng.random()
+        how = self.rng.random() if self.sets_tool else self.rng.uniform(0.4, 1.0)
         if how < 0.2:
             return [self.word("T", self.rng.choice(TOOLS))]
         if how < 0.4:
             return [self.code("M61"), self.word("Q", self.rng.choice(TOOLS))]
+        self.gone = True
         words = [self.word("T", self.rng.choice((*TOOLS, 0) if self.chance(0.2) else TOOLS)), self.code("M6")]
         return words if how < 0.8 else words + self.tool_length()
 
@@ -260,6 +271,7 @@ class _Grammar:
         return words
 
     def home(self) -> list[str]:
+        self.gone = True
         words = [self.code(self.rng.choice(("G28", "G30")))]
         self.go(words, self.axes(0) if self.chance(0.7) else [])
         self.lost()
@@ -345,8 +357,9 @@ class _Grammar:
         return words
 
     def block(self) -> str:
-        words = self.words_of()
         rng = self.rng
+        # after what the control does by itself most programs state all axes
+        words = self.again() if self.gone and self.chance(0.6) else self.words_of()
         if self.chance(0.3):
             rng.shuffle(words)
         if self.chance(0.1) and not any(w.startswith("N") for w in words):
@@ -385,6 +398,22 @@ _JOINED = frozenset((
     _Grammar.frame, _Grammar.units, _Grammar.tool_length, _Grammar.change, _Grammar.distance, _Grammar.centre,
     _Grammar.plane_code, _Grammar.feed_mode, _Grammar.retract, _Grammar.mode, _Grammar.spindle,
 ))  # fmt: skip
+
+
+def legal(seed: int) -> Drawn:
+    """The program of a seed in plain text, with no block that a control refuses on purpose."""
+    rng = random.Random(f"legal {seed}")
+    grammar = _Grammar(rng, odd=False, wrong=0.0, sets_tool=False, turning="M3")
+    grammar.cycles = rng.random() < 0.6
+    grammar.slashes = rng.choice((0.0, 0.0, 0.0, 0.1))
+    words = ["G0"]
+    grammar.go(words, ["X", "Y", "Z"])
+    lines = ["G21 G90 G17 G94 F300 S1000 M3", " ".join(words)]
+    lines += [grammar.block() for _ in range(rng.choice((3, 5, 8, 12, 20)))]
+    lines.append(rng.choice(("M2", "M30")))
+    end = rng.choice(("\n", "\n", "\r\n"))
+    start = None if rng.random() < 0.2 else (12.0, -8.0, 30.0)
+    return Drawn("".join(line + end for line in lines).encode(), False, start, seed)
 
 
 def program(seed: int) -> Drawn:

@@ -18,7 +18,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from fuzz import grammar, minimise, nominal
+from fuzz import bent, grammar, minimise, nominal
 from fuzz.grammar import Drawn
 from fuzz.nominal import Outcome
 
@@ -42,7 +42,7 @@ class Found:
     causes: dict[tuple[tuple[str, str], str], tuple[int, Drawn, Outcome]] = field(default_factory=dict)
     refusals: Counter[str] = field(default_factory=Counter)
 
-    def add(self, judge: nominal.Judge, seed: int, drawn: Drawn) -> None:
+    def add(self, judge: nominal.Judge | bent.Judge, seed: int, drawn: Drawn) -> None:
         outcome = judge.outcome(drawn)
         self.counts[outcome.kind] += 1
         if outcome.kind == nominal.REFUSED:
@@ -68,13 +68,15 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--bent", action="store_true")
     parser.add_argument("--write", type=Path)
     options = parser.parse_args()
     found, begun = Found(), time.monotonic()
     with tempfile.TemporaryDirectory() as name:
-        judge = nominal.Judge.of(Path(name))
+        judge, draw = (bent.Judge, grammar.legal) if options.bent else (nominal.Judge, grammar.program)
+        judges = judge.of(Path(name))
         for seed in range(options.seed, options.seed + options.count):
-            found.add(judge, seed, grammar.program(seed))
+            found.add(judges, seed, draw(seed))
     spent = time.monotonic() - begun
     for (what, _), (seed, small, outcome) in sorted(found.causes.items()):
         switch = " with block delete" if small.deletes else ""

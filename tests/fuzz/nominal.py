@@ -61,18 +61,20 @@ class Outcome:
     oracle: str = ""
 
 
-def machine(folder: Path) -> Path:
-    """A machine without errors with all the frames and tools of the grammar."""
+def recipe() -> Recipe:
+    """All the frames and tools of the grammar, tool 1 in the spindle."""
     frames = {
         name: {"X_mm": 10.5 * i, "Y_mm": -7.25 * i, "Z_mm": 3.0 * i - 20.0, "set_by": "true"}
         for i, name in enumerate(FRAMES, 1)
     }
-    tools = {n: {"X_mm": 0.5 * (n - 1), "Y_mm": -0.25 * (n - 1), "Z_mm": 30.0 + 11.0 * n, "radius_mm": 3.0} for n in TOOLS}
-    recipe = Recipe(
+    tools = {
+        n: {"X_mm": 0.5 * (n - 1), "Y_mm": -0.25 * (n - 1), "Z_mm": 30.0 + 11.0 * n, "radius_mm": 3.0}
+        for n in TOOLS
+    }
+    return Recipe(
         travel=((-3000.0, 3000.0),) * 3, tools=tools, work_offsets=frames,
         job_defaults={"tool": 1, "work_offset": "G54"},
     )  # fmt: skip
-    return machines.zero_machine(folder, recipe)
 
 
 def loaded(path: Path) -> Setup:
@@ -89,7 +91,7 @@ class Judge:
 
     @staticmethod
     def of(folder: Path) -> Judge:
-        path = machine(folder)
+        path = machines.zero_machine(folder, recipe())
         return Judge(path, loaded(path))
 
     def read(self, drawn: Drawn) -> tuple[Program, np.ndarray]:
