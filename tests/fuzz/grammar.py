@@ -64,6 +64,7 @@ class _Grammar:
     turning: str = ""
     sets_tool: bool = True
     gone: bool = False
+    told: bool = False
 
     def chance(self, share: float) -> bool:
         return self.rng.random() < share
@@ -240,8 +241,9 @@ class _Grammar:
     def tool_length(self) -> list[str]:
         code = self.rng.choice(("G43", "G43", "G43.1", "G43.2", "G49"))
         words = [self.code(code)]
-        if code == "G43" and self.chance(0.8) or code == "G43.2" and self.chance(0.9):
-            words.append(self.word("H", self.rng.choice((0, *TOOLS))))
+        if code == "G43" and (self.told or self.chance(0.8)) or code == "G43.2" and (self.told or self.chance(0.9)):
+            # the interpreter alone does not know what is in the spindle after M61
+            words.append(self.word("H", self.rng.choice(TOOLS if self.told else (0, *TOOLS))))
         if code == "G43.1":
             self.go(words, self.axes(1))
         self.lost()
@@ -253,6 +255,7 @@ class _Grammar:
         if how < 0.2:
             return [self.word("T", self.rng.choice(TOOLS))]
         if how < 0.4:
+            self.told = True
             return [self.code("M61"), self.word("Q", self.rng.choice(TOOLS))]
         self.gone = True
         words = [self.word("T", self.rng.choice((*TOOLS, 0) if self.chance(0.2) else TOOLS)), self.code("M6")]

@@ -46,7 +46,8 @@ WRONG = (LOOSER, DIFFERENT, CRASH)
 _KINDS = {Kind.RAPID: RAPID, Kind.LINE: FEED, Kind.ARC_CW: ARC, Kind.ARC_CCW: ARC, Kind.PROBE: PROBE}
 #: index of the plane in the interpreter's order to that of olp
 _PLANE = {0: 0, 1: 2, 2: 1}
-_HOME = re.compile(rb"(?i)G\s*0*(28|30)(?![.\s]*[0-9])")
+_FEED = re.compile("zero feed rate|inverse time|feed per rev")
+_HOME = re.compile(rb"(?i)G0*(28|30)(\.0*)?(?![.0-9])")
 _AXES = ((0, 1), (2, 0), (1, 2))
 
 
@@ -94,13 +95,16 @@ class Judge:
         path = machines.zero_machine(folder, recipe())
         return Judge(path, loaded(path))
 
-    def read(self, drawn: Drawn) -> tuple[Program, np.ndarray]:
-        """The program and its feeds in mm/s. Raises OlpError."""
+    def read(self, drawn: Drawn) -> tuple[Program, np.ndarray | None]:
+        """The program and its feeds in mm/s, None where these alone are refused. Raises OlpError."""
         start = (None, None, None) if drawn.start_mm is None else drawn.start_mm
         setup = replace(self.setup, job=replace(self.setup.job, start_mm=start))
         options = Options(block_delete=drawn.deletes)
         program = registry.read(drawn.data, setup, registry.DIALECTS["linuxcnc"], options)
-        return program, programmed(program, block_delete=drawn.deletes)
+        try:
+            return program, programmed(program, block_delete=drawn.deletes)
+        except OlpError:
+            return program, None
 
     def interpret(self, drawn: Drawn) -> CanonMoves:
         """Raises InterpreterError and InterpreterFailure."""
@@ -119,7 +123,8 @@ class Judge:
         try:
             moves = self.interpret(drawn)
         except InterpreterError as error:
-            return Outcome(LOOSER, str(error).partition(": ")[2], error.line, str(error))
+            own = feed is None and _FEED.search(str(error))
+            return Outcome(BOTH_REFUSE if own else LOOSER, str(error).partition(": ")[2], error.line, str(error))
         except InterpreterFailure as error:
             # the interpreter's Python hands out text of comments, and only as UTF-8
             own = not drawn.data.isascii() and "parse_file" in error.failed
@@ -143,7 +148,7 @@ class Judge:
 class _Comparison:
     """Two readings of one program, move by move. Lines are counted by line feeds, as the interpreter does."""
 
-    def __init__(self, data: bytes, program: Program, feed: np.ndarray, moves: CanonMoves) -> None:
+    def __init__(self, data: bytes, program: Program, feed: np.ndarray | None, moves: CanonMoves) -> None:
         self.path, self.feed = program.toolpath, feed
         self.moves = moves.pick(moves.kind != DWELL)
         self.text = data.split(b"\n")
@@ -172,7 +177,7 @@ class _Comparison:
         own = [k for k in mine if not self.path.flag[k] & Flag.CONTROL]
         unknown = np.isnan(self.path.end_mm[[k for k in mine if k not in own]]).any(axis=0)
         self.excused |= unknown
-        if len(own) < len(theirs) and _HOME.search(self.text[line - 1]):
+        if len(own) < len(theirs) and _HOME.search(re.sub(rb"\s", b"", self.text[line - 1])):
             # where the reference points are, the program does not say
             theirs, unknown = theirs[: len(own)], np.ones(3, bool)
         if len(own) != len(theirs):
@@ -239,7 +244,7 @@ class _Comparison:
 
     def _feed(self, k: int, j: int) -> str | None:
         moves = self.moves
-        if moves.kind[j] == RAPID or not math.isfinite(self.feed[k]):
+        if self.feed is None or moves.kind[j] == RAPID or not math.isfinite(self.feed[k]):
             return None
         if moves.feed_mode[j] and math.isnan(moves.speed[j]):
             return None
