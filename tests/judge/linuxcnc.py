@@ -167,13 +167,18 @@ class _Setup:
     length_active: bool
 
 
+@functools.lru_cache(maxsize=16)
+def _parsed(text: str) -> dict[str, Any]:
+    return tomllib.loads(text)
+
+
 def _setup(
     machine: str | Path | None, offsets: Mapping[str, Point], tools: Mapping[int, Point], g92: Point | None
 ) -> _Setup:
     text: dict[str, Any] = {}
     if machine is not None:
         path = Path(machine)
-        text = tomllib.loads((path / "machine.toml" if path.is_dir() else path).read_text())
+        text = _parsed((path / "machine.toml" if path.is_dir() else path).read_text())
     frames: dict[str, tuple[float, float, float, float]] = {}
     for name, entry in text.get("work_offsets", {}).items():
         if entry.get("A_deg") or entry.get("B_deg"):
