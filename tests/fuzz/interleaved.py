@@ -8,6 +8,7 @@ independent: run parts side by side.
 from __future__ import annotations
 
 import argparse
+import os
 import re
 import sys
 import tempfile
@@ -62,6 +63,12 @@ class Found:
         folder.mkdir(parents=True, exist_ok=True)
         for number, (seed, small, _) in enumerate(self.causes.values(), 1):
             (folder / f"{number:03}-{seed}.ngc").write_bytes(small.data)
+
+
+def more_programs() -> list[Path]:
+    """Folders of programs beside those that LinuxCNC installs: the value of OLP_LINUXCNC_TESTS."""
+    name = os.environ.get("OLP_LINUXCNC_TESTS")
+    return [Path(name)] if name else []
 
 
 def main() -> int:

@@ -18,9 +18,10 @@ def minimised(drawn: Drawn, shows: Callable[[Drawn], bool]) -> Drawn:
     for pattern in (_BLOCK, _WORD):
         parts = [part for part in pattern.findall(drawn.data) if part]
         drawn = _without(drawn, parts, shows)
-    for simpler in (replace(drawn, deletes=False), replace(drawn, start_mm=(12.0, -8.0, 30.0))):
-        if simpler != drawn and shows(simpler):
-            drawn = simpler
+    for simpler in ({"deletes": False}, {"start_mm": (12.0, -8.0, 30.0)}):
+        trial = replace(drawn, **simpler)
+        if trial != drawn and shows(trial):
+            drawn = trial
     return drawn
 
 

@@ -108,7 +108,7 @@ class Judge:
 
     def interpret(self, drawn: Drawn) -> CanonMoves:
         """Raises InterpreterError and InterpreterFailure."""
-        how: dict[str, Any] = {"deletes": drawn.deletes, "seconds": SECONDS}
+        how: dict[str, Any] = {"deletes": drawn.deletes, "axes": linuxcnc.ALL_AXES, "seconds": SECONDS}
         if drawn.start_mm is not None:
             how |= {"start_mm": drawn.start_mm, "find_known": False}
         return linuxcnc.interpret(drawn.data, self.path, **how)
@@ -131,7 +131,7 @@ class Judge:
             return Outcome(UNJUDGED if own else LOOSER, f"the interpreter: {error.failed}")
         except RuntimeError as error:
             return Outcome(UNJUDGED, str(error))
-        text = _Comparison(drawn.data, program, feed, moves).difference()
+        text = difference(drawn.data, program, feed, moves)
         return Outcome(SAME) if text is None else Outcome(DIFFERENT, *text)
 
     def _refused(self, drawn: Drawn, error: OlpError) -> Outcome:
@@ -143,6 +143,13 @@ class Judge:
         except RuntimeError as refusal:
             return Outcome(BOTH_REFUSE, str(error), line, str(refusal))
         return Outcome(REFUSED, str(error), line)
+
+
+def difference(
+    data: bytes, program: Program, feed: np.ndarray | None, moves: CanonMoves
+) -> tuple[str, int] | None:
+    """The first difference and its line, None where both readings agree."""
+    return _Comparison(data, program, feed, moves).first()
 
 
 class _Comparison:
@@ -160,12 +167,10 @@ class _Comparison:
         arc[self.path.arcs.move] = np.arange(len(self.path.arcs))
         self.arc = arc
 
-    def difference(self) -> tuple[str, int] | None:
-        """The first difference and its line."""
+    def first(self) -> tuple[str, int] | None:
         # an axis may be unknown here after moves that the control makes by itself
         self.excused = np.isnan(np.array(self.path.start_mm))
-        lines = sorted({*self.own_line.tolist(), *self.moves.line.tolist()})
-        for line in lines:
+        for line in sorted({*self.own_line.tolist(), *self.moves.line.tolist()}):
             text = self._line(line)
             if text is not None:
                 return text, line

@@ -1,7 +1,8 @@
 """LinuxCNC's interpreter as a server, run by the system's Python: it is loaded once, and each program is
 carried out by a child of its own.
 
-A request on the standard input is a JSON line (table, variables, start, unit, deletes, seconds, size), then
+A request on the standard input is a JSON line (table, variables, start, unit, deletes, axes, seconds,
+size), then
 `size` bytes of program. The answer on the standard output is a JSON line (error, error_line, messages, size;
 `failed` where the child ended without an answer: a crash, a limit of time), then `size` bytes: rows of
 COLUMNS doubles. Standard library only. Lengths come from the interpreter in inches, whatever the program's
@@ -63,10 +64,10 @@ def read_tools(table):
 class Canon:
     """Receives the canonical calls; points are controlled-point coordinates before the offsets."""
 
-    def __init__(self, tools, library, *, deletes):
+    def __init__(self, tools, library, *, deletes, axes):
         self.tools = tools
         self.library = library
-        self.deletes = deletes
+        self.deletes, self.axes = deletes, axes
         self.feed_mode, self.speed, self.rows = 0, 0.0, 0
         self.data = array("d")
         self.line, self.tool, self.plane, self.feed, self.index = 0, -1, 1, 0.0, 1
@@ -152,7 +153,7 @@ class Canon:
         return 1.0
 
     def get_axis_mask(self):
-        return 7
+        return self.axes
 
     def get_block_delete(self):
         return int(self.deletes)
@@ -225,7 +226,8 @@ def parse(request, program):
 
     Path("v.var").write_text(request["variables"])
     Path("p.ngc").write_bytes(program)
-    canon = Canon(read_tools("t.tbl"), ctypes.PyDLL(gcode.__file__), deletes=request["deletes"])
+    library = ctypes.PyDLL(gcode.__file__)
+    canon = Canon(read_tools("t.tbl"), library, deletes=request["deletes"], axes=request["axes"])
     canon.parameter_file = "v.var"
     result, line = gcode.parse("p.ngc", canon, request["unit"], request["start"])
     failed = result > gcode.MIN_ERROR
@@ -287,7 +289,7 @@ def answer(request, program):
 def main():
     """Answers requests until the input ends. The working folder is this process's own."""
     # the first program of a process loads what all others use
-    warm = {"table": "", "variables": "5220\t1.0\n", "deletes": False, "unit": "G21", "start": "G0 X0"}
+    warm = {"table": "", "variables": "5220\t1.0\n", "deletes": False, "axes": 7, "unit": "G21", "start": "G0 X0"}
     Path("t.tbl").write_text("")
     parse(warm, b"M2\n")
     # a child then copies fewer pages of its parent

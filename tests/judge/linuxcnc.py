@@ -28,6 +28,9 @@ DWELL = 4
 KINDS = ("rapid", "feed", "arc", "probe", "dwell")
 NO_END = "File ended with no percent sign or program end"
 COLUMNS = 22
+#: masks of axes
+XYZ = 0b111
+ALL_AXES = 0b1_1111_1111
 Point = Sequence[float]
 
 
@@ -127,6 +130,7 @@ def interpret(
     start_mm: Point = (0.0, 0.0, 0.0),
     find_known: bool = True,
     deletes: bool = False,
+    axes: int = XYZ,
     seconds: float = 300.0,
 ) -> CanonMoves:
     """Canonical moves of a program with the offsets and tools of a machine folder; arguments override it.
@@ -134,16 +138,17 @@ def interpret(
     With `find_known` the start counts as unknown, and a second run from elsewhere shows which axis positions
     depend on it; without, the machine really stands at `start_mm` and all is known.
 
-    `deletes` is the block-delete switch: it takes out blocks with `/`. Raises InterpreterError where LinuxCNC
+    `deletes` is the block-delete switch: it takes out blocks with `/`. `axes` is a mask of what the machine
+    has, as other words are refused. Raises InterpreterError where LinuxCNC
     refuses; a missing program end alone is let pass (`ended`). Raises InterpreterFailure where it crashes or
     takes longer than `seconds`.
     """
     setup = _setup(machine, offsets or {}, tools or {}, g92_mm)
-    moves = _run(data, setup, start_mm, deletes=deletes, seconds=seconds)
+    how = {"deletes": deletes, "axes": axes, "seconds": seconds}
+    moves = _run(data, setup, start_mm, **how)
     if not find_known or not len(moves):
         return moves
-    elsewhere = [value - 7.0 for value in start_mm]
-    other = _run(data, setup, elsewhere, deletes=deletes, seconds=seconds)
+    other = _run(data, setup, [value - 7.0 for value in start_mm], **how)
     if len(other) != len(moves):
         raise RuntimeError("the moves depend on the start position: give start_mm and find_known=False")
     return replace(moves, known=np.abs(other.axis - moves.axis) < 1e-6, start_known=False)
@@ -253,7 +258,7 @@ def _server(process: int) -> _Server:
 
 
 def _run(
-    data: bytes, setup: _Setup, start_mm: Point, *, deletes: bool = False, seconds: float = 300.0
+    data: bytes, setup: _Setup, start_mm: Point, *, deletes: bool, axes: int, seconds: float
 ) -> CanonMoves:
     x, y, z = (float(value) for value in start_mm)
     begin = f"G53 G0 X{x:.9f} Y{y:.9f} Z{z:.9f}"
@@ -267,6 +272,7 @@ def _run(
         "start": begin,
         "unit": "G21",
         "deletes": deletes,
+        "axes": axes,
         "seconds": seconds,
     }
     report, rows = _server(os.getpid()).ask(request, data)
