@@ -26,6 +26,7 @@ from olp.program.rs274.codes import (
     LENGTHS,
     LOCAL_OFFSET,
     MACHINE,
+    METRIC,
     PATH_MODES,
     PLANE_OF,
     SHIFTS,
@@ -42,6 +43,8 @@ TOOL_CHANGE = 60
 #: M61, as ten times its number.
 SET_TOOL = 610
 
+#: What changes or uses offsets beside the move of a block.
+_OFFSET_CODES = LENGTHS | HOMES | SHIFTS | WORK_OFFSETS | FURTHER_OFFSETS | {MACHINE, WRITE_OFFSET}
 #: RS-274's order of execution within a block; other codes come last.
 _RANK = {
     code: rank
@@ -80,6 +83,8 @@ class AxisState(State):
     length_tool: int | None = None
     selected: int | None = None
     spindle: int | None = None
+    turning: int = -1
+    length_unit: int = METRIC
     payload_kg: float = 0.0
     compensation: CutterCompensation | None = None
     frames: list[Frame] = field(default_factory=list)
@@ -217,6 +222,8 @@ class AxisState(State):
         if any(self.may_move(m) for m in m_codes):
             self.forget()
         effect = Effect()
+        self.unit = next((code for code in codes if code in UNITS), self.unit)
+        self._check_modes(codes, line)
         for code in sorted(codes, key=lambda code: _RANK.get(code, len(_RANK))):
             effect = self._event(code, line, by_letter, axis_words, moves, effect)
         return effect
@@ -239,11 +246,9 @@ class AxisState(State):
     ) -> Effect:
         if code == DWELL:
             self._dwell(line, by_letter)
-        if code in UNITS:
-            self.unit = code
-        elif code == LENGTH_FROM_WORDS:
+        if code == LENGTH_FROM_WORDS:
             values = [(i, self.length_mm(w)) for i, w in axis_words]
-            self.offsets.length = self._merged(self.offsets.length, values)
+            self._set_length(self._merged(self.offsets.length, values))
         elif code in LENGTHS:
             self._tool_length(code, line, by_letter)
         elif code in WORK_OFFSETS or code in FURTHER_OFFSETS:
@@ -279,7 +284,8 @@ class AxisState(State):
 
     def _tool_length(self, code: int, line: int, by_letter: dict[str, Word]) -> None:
         if code == 490:
-            self.offsets.length, self.length_tool = ZERO, None
+            self._set_length(ZERO)
+            self.length_tool = None
             return
         name = f"G{code / 10:g}"
         number = self._integer(by_letter["H"], line) if "H" in by_letter else None
@@ -303,7 +309,25 @@ class AxisState(State):
             vector = (-vector[0], -vector[1], -vector[2])
         if code == 432:
             vector = self._sum(self.offsets.length, vector)
-        self.offsets.length, self.length_tool = vector, number or None
+        self._set_length(vector)
+        self.length_tool = number or None
+
+    def _set_length(self, vector: Vector) -> None:
+        self.offsets.length, self.length_unit = vector, self.unit or METRIC
+
+    def _check_modes(self, codes: Sequence[int], line: int) -> None:
+        """Refuse codes in modes in which the control refuses them or loses its position."""
+        mixed = self.profile.lengths_keep_unit and any(self.offsets.length)
+        if mixed and (self.unit or METRIC) != self.length_unit and _OFFSET_CODES.intersection(codes):
+            raise ProgramError(
+                "the tool length in force was set in the other unit, and the control does not convert it: it "
+                "loses the position in this block; give G49 before G20 or G21, and G43 after it",
+                line=line,
+            )
+        if self.compensation is not None and (_OFFSET_CODES - LENGTHS).intersection(codes):
+            raise ProgramError(
+                "offsets and reference positions are used in cutter compensation; give G40 before", line=line
+            )
 
     def _cutter_compensation(self, code: int, line: int, by_letter: dict[str, Word]) -> None:
         """G41 and G42: D is the number of a tool, or a diameter; without it the tool in the spindle counts on

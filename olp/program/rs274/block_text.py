@@ -9,8 +9,8 @@ from olp.program.text.line_ends import LINE_END, LONE_CR
 
 #: Bytes of an unclosed comment that are shown.
 _SHOWN = 40
-#: Control characters that are no white space.
-CONTROL = re.compile(rb"[\x00-\x08\x0e-\x1f]")
+#: Control characters but tab and those of line ends.
+CONTROL = re.compile(rb"[\x00-\x08\x0b\x0c\x0e-\x1f]")
 _COMMENTS = re.compile(rb"\([^)]*\)?|;.*", re.DOTALL)
 _NEWLINE = re.compile(rb"\n")
 
@@ -23,6 +23,7 @@ class BlockText:
     - `skips_control`: control characters mean nothing, as blanks; else they are refused outside comments.
     - `cr_ends_line`: a lone carriage return ends a line.
     - `open_comments`: a comment that is not closed ends with its line. `nested_comments`: `(` may be in one.
+    - `marks_in_pairs`: `%` is the first line and the last one, alone in its line, or not there.
     - `longest`: bytes of a line at most, without its line feed (None: no limit).
     """
 
@@ -31,6 +32,7 @@ class BlockText:
     cr_ends_line: bool = False
     open_comments: bool = False
     nested_comments: bool = True
+    marks_in_pairs: bool = False
     longest: int | None = None
 
     @property
@@ -52,6 +54,8 @@ class BlockText:
         if odd is not None:
             what = "a carriage return" if odd[0] == b"\r" else f"the byte 0x{odd[0][0]:02x}"
             return f"{what} is inside this line, at column {odd.start() + 1}; expected plain text; remove it"
+        if self.marks_in_pairs and line.strip().startswith(b"%") and line.strip() != b"%":
+            return "`%` is not alone in its line; put what is behind it into the next one"
         for comment in _COMMENTS.finditer(line):
             text = comment[0]
             shown = text[:_SHOWN].decode("latin-1").strip()

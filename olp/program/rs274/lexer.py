@@ -97,10 +97,13 @@ def lex(
 
     keep = text > 32
     if not rules.skips_control:
-        keep |= (text < 9) | ((text > 13) & (text < 32))
+        keep |= (text < 9) | ((text > 10) & (text < 32) & (text != 13))
     keep[newline] = True
     deleted = np.zeros(lines, bool)
     marks = _line_heads(text, starts, ends, keep, deleted)
+    if rules.marks_in_pairs and marks.size:
+        alone = [bytes(text[starts[m] : ends[m]]).strip() == b"%" for m in marks.tolist()]
+        strange = np.append(strange, starts[marks[~np.array(alone)]])
     comments, refused = _drop_comments(text, ends, keep, rules)
     content = without_cr(text, starts, ends)
     if rules.longest is not None:

@@ -16,6 +16,7 @@ import numpy.typing as npt
 from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import ProgramError
 from olp.program.rs274.axis_state import AxisState
+from olp.program.rs274.block_rules import M
 from olp.program.rs274.codes import (
     AXIS_VALUES,
     COMPENSATION_OFF,
@@ -61,6 +62,8 @@ class Context:
     arc_distance: Modal
     feed_mode: Modal
     retract: Modal
+    #: 3, 4 or 5: M3, M4, M5; -1 before any
+    spindle: Modal
     event: Mask
     consumed: Mask
     #: numbers as written, by the unit in force
@@ -87,6 +90,7 @@ class Modes:
             self._act[[COMPENSATION_OFF, *CUTTER_COMPENSATION]] = Act.EVENT
         self._m_event = np.ones(10_001, bool)
         self._m_event[[m * 10 for m in profile.harmless_m]] = False
+        self._rules = profile.rules.tables()
         self._linear_motion = state.motion
         self._ended = self._tape = False
 
@@ -107,10 +111,19 @@ class Modes:
         for mark in chunk.marks.tolist():
             if mark >= last:
                 break
-            if not self._tape and chunk.first_line == 0 and not chunk.first_word[mark]:
+            pairs = self._state.profile.text.marks_in_pairs
+            first = chunk.first_line == 0 and not chunk.first_word[mark]
+            if pairs and chunk.comments.size:
+                first &= bool(chunk.comments[0] > chunk.line_start[mark])
+            if not self._tape and first:
                 self._tape = True
-            else:
+            elif self._tape or not pairs:
                 last, self._ended = mark, True
+            else:
+                raise ProgramError(
+                    "`%` is in the middle of the program; expected it as the first line, or not at all",
+                    line=chunk.first_line + mark + 1,
+                )
         return last
 
     def read(self, chunk: WordChunk, base: int, active: Mask) -> Context:
@@ -130,9 +143,12 @@ class Modes:
             arc_distance=_modal(chunk, codes, Act.ARC_DISTANCE, state.arc_distance),
             feed_mode=_modal(chunk, codes, Act.FEED, state.feed_mode),
             retract=_modal(chunk, codes, Act.RETRACT, state.retract),
+            spindle=self._spindle(chunk, usable),
             event=self._events(chunk, value, codes, usable),
             consumed=self._consumed(codes, active),
         )
+        keys = self._keys(chunk, value, codes, usable)
+        self._rules.check(chunk, active, keys, context.motion, context.plane)
         _check_deleted(context, active, state)
         return context
 
@@ -141,6 +157,7 @@ class Modes:
         state = self._state
         state.take({int(getattr(context, group)[line]) for group in GROUPS})
         state.motion = None if context.motion[line] < 0 else int(context.motion[line])
+        state.turning = int(context.spindle[line])
 
     def _codes(self, chunk: WordChunk, value: Array, usable: Mask) -> Codes:
         g = np.flatnonzero((chunk.letter == 71) & usable)
@@ -148,6 +165,16 @@ class Modes:
         act = self._act[code]
         act[np.abs(code - value[g] * 10) > 1e-6] = Act.REFUSE
         return Codes(chunk.line[g], code, act)
+
+    def _spindle(self, chunk: WordChunk, usable: Mask) -> Modal:
+        m = (chunk.letter == 77) & usable & np.isin(chunk.mantissa, (3, 4, 5)) & (chunk.decimals == 0)
+        return modal(len(chunk.line_start), chunk.line[m], chunk.mantissa[m], self._state.turning)
+
+    def _keys(self, chunk: WordChunk, value: Array, codes: Codes, usable: Mask) -> tuple[Index, Index]:
+        """The lines and keys of G and M codes for `block_rules`."""
+        m = np.flatnonzero((chunk.letter == 77) & usable)
+        key = M + np.clip(np.rint(value[m] * 10), 0, M - 1).astype(np.int64)
+        return np.append(codes.line, chunk.line[m]), np.append(codes.code, key)
 
     def _events(self, chunk: WordChunk, value: Array, codes: Codes, usable: Mask) -> Mask:
         """The lines with a G word that is an event or refused, an M word not known as harmless, or a T
@@ -238,12 +265,6 @@ def _modal(chunk: WordChunk, codes: Codes, which: Act, now: int | None) -> Modal
 
 
 def _in_force(chunk: WordChunk, lines: Index, code: Index, now: int | None) -> Modal:
-    if (lines[1:] == lines[:-1]).any():
-        twice = int(lines[1:][lines[1:] == lines[:-1]][0])
-        raise ProgramError(
-            "two G codes of the same modal group are in this block; expected one",
-            line=chunk.first_line + twice + 1,
-        )
     return modal(len(chunk.line_start), lines, code, -1 if now is None else now)
 
 

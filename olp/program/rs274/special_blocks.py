@@ -24,6 +24,7 @@ from olp.program.rs274.codes import (
     DWELL,
     HOMES,
     INCREMENTAL,
+    INVERSE_TIME,
     MACHINE,
     PLANE_OF,
     RETRACT_TO_R,
@@ -178,6 +179,7 @@ class SpecialBlocks:
     def _cycle(self, context: Context, row: int, frame_index: int, code: int) -> None:
         state, collector, chunk, line = self._state, self._collector, context.chunk, context.number(row)
         frame = state.frames[frame_index]
+        self._check_cycle(context, row, code)
         incremental = bool(context.distance[row] == INCREMENTAL)
         plane = PLANE_OF[int(context.plane[row])]
         first, second, third = PLANES[plane]
@@ -249,6 +251,19 @@ class SpecialBlocks:
             start = moving[-1].point if moving else start
             place = [place[0] + step[0], place[1] + step[1]]
         state.position[:] = list(start)
+
+    def _check_cycle(self, context: Context, row: int, code: int) -> None:
+        """Refuse modes in which the control makes no cycle."""
+        why = ""
+        turning = self._state.profile.cycles.turning.get(code)
+        if context.feed_mode[row] == INVERSE_TIME:
+            why = "is in inverse time (G93); give G94 before it"
+        elif self._state.compensation is not None:
+            why = "is in cutter compensation; give G40 before it"
+        elif turning is not None and int(context.spindle[row]) not in turning:
+            why = f"needs a turning spindle; give {' or '.join(f'M{m}' for m in turning)} before it"
+        if why:
+            raise ProgramError(f"the cycle G{code / 10:g} {why}", line=context.number(row))
 
     def _inherit(
         self, context: Context, row: int, given: dict[str, float], code: int, third: int, frame_index: int

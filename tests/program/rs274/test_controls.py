@@ -63,7 +63,7 @@ READINGS: dict[str, tuple[str, dict[str, Outcome], Any]] = {
     ),
     "axis_dwell": (
         "G0 X0. Y0. Z0.\nG4 X1.",
-        {FANUC: (0, 0, 0), HAAS: (0, 0, 0), LINUXCNC: (1, 0, 0), GRBL: (1, 0, 0)},
+        {FANUC: (0, 0, 0), HAAS: (0, 0, 0), GRBL: (1, 0, 0)},
         "not",
     ),
     "m61_sets_tool": (
@@ -74,6 +74,11 @@ READINGS: dict[str, tuple[str, dict[str, Outcome], Any]] = {
     "length_of_spindle_tool": (
         "T1 M6\nG43\nG0 X0. Y0. Z10.",
         {LINUXCNC: (1, 0, 20)} | dict.fromkeys((FANUC, HAAS), "G43 needs an H word"),
+        "not",
+    ),
+    "lengths_keep_unit": (
+        "G20 G43 H1\nG0 X0. Y0. Z1.\nG21 G49\nG0 X1.",
+        {LINUXCNC: "the control does not convert it", FANUC: (1, 0, 35.4), HAAS: (1, 0, 35.4)},
         "not",
     ),
     "lengths_along_z": (
@@ -134,7 +139,7 @@ OF_TIME = {
     "feed_without_point", "exact_stop", "feed_words_end", "feed_before_unit", "m_with_motion",
 }  # fmt: skip
 #: Tables and texts, which have tests of their own.
-TABLES = {"codes", "refusals", "harmless_m", "text", "cycles", "language", "written_ending"}
+TABLES = {"codes", "refusals", "harmless_m", "text", "rules", "cycles", "language", "written_ending"}
 
 
 @pytest.fixture(scope="module")
@@ -171,8 +176,8 @@ def is_it(got: Outcome, want: Outcome) -> bool:
 def test_every_field_is_read_by_hand() -> None:
     own = {f.name for f in fields(Profile)} - {f.name for f in fields(Profile.__base__)}  # type: ignore[arg-type]
     assert own == set(READINGS) | OF_TIME | TABLES
-    # `repeat_words` are letters: K on Fanuc and Haas
-    assert {f.name for f in fields(CycleRules)} == {*CYCLES, "repeat_words"}
+    # letters, K on Fanuc and Haas, and the spindle, which `test_interleaved` holds
+    assert {f.name for f in fields(CycleRules)} == {*CYCLES, "repeat_words", "turning"}
 
 
 @pytest.mark.parametrize(

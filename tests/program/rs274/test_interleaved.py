@@ -47,13 +47,48 @@ PLACES: dict[str, tuple[str, tuple[float, float, float]]] = {
     "H0 is the tool in the spindle": ("G43 H0\nG0 Z1", (251, 202, -179)),
     "H0 after another length": ("T2 M6\nG43 H1\nG43 H0\nG0 X1 Y2 Z1", (251, 202, -213.5)),
     "G43.2 H0 adds it": ("T2 M6\nG43 H1\nG43.2 H0\nG0 X1 Y2 Z1", (251, 202, -93.5)),
-    "form feeds are blanks": ("G0 X9\x0b\x0c", (259, 202, -297)),
+    "P of an arc": ("G3 X1 Y2 I5 J0 P2", (251, 202, -297)),
+    "a centre alone in the mode": ("G2 X1 Y2 I5\nI2", (251, 202, -297)),
+    "G80 beside a motion": ("G80 G0 X5", (255, 202, -297)),
+    "words beside G4": ("G4 P1 X5", (255, 202, -297)),
+    "words beside G43": ("G43 H1 G1 Z5", (251, 202, -175)),
 }
 #: Lines that the control refuses or sees in another way than an editor, and what is said of them.
 REFUSED = {
     "G1 Z1 ; old\rZ-40": "carriage return is inside this line, at column 12",
     "G0 X9\0 Y3": "byte 0x00 is inside this line, at column 6",
     "G0 X9 Y7 \x1a": "byte 0x1a is inside this line, at column 10",
+    "G0 X9\x0c Y1": "byte 0x0c is inside this line, at column 6",
+    "%\nG0 X9": "in the middle of the program",
+    "% G0 X9": "in the middle of the program",
+    "G0 X9 N5": "N is not the first word",
+    "(x)N5 G0 X9": "N is not the first word",
+    "F20 F10": "the word F is twice",
+    "G20 G21": "G20 and G21 of one modal group",
+    "G43 G49 H1": "G43 and G49 of one modal group",
+    "M3 M4": "M3 and M4 of one modal group",
+    "M7 M8": "M7 and M8 of one modal group",
+    "G4 P1 G28": "G4 and G28 of one modal group",
+    "G0 X5 P1": "uses its word P",
+    "L3": "uses its word L",
+    "R5": "uses its word R",
+    "G1 X9 I5": "uses its word I",
+    "G2 X5 Y2 I2 J0 K1": "uses its word K",
+    "H1": "uses its word H",
+    "D1": "uses its word D",
+    "G81 X5 R2 Z-3 P1": "uses its word P",
+    "G81 X5 R2 Z-3 Q1": "uses its word Q",
+    "G92": "G92 needs one of X, Y, Z",
+    "G4": "G4 needs P",
+    "G2": "G2 needs one of I, J, K, R",
+    "G81": "G81 needs one of X, Y, Z",
+    "G43.2": "G43.2 needs one of H, X, Y, Z",
+    "G92 X5 G1": "two G codes of this block use its axis words",
+    "G28 G1 X5": "two G codes of this block use its axis words",
+    "G93 G81 X5 R2 Z-3 F1": "is in inverse time",
+    "M5 G84 X5 R2 Z-3": "give M3 before it",
+    "G74 X5 R2 Z-3": "give M4 before it",
+    "M5 G86 X5 R2 Z-3 P0": "give M3 or M4 before it",
     "(a (b) c)\nG0 X9": "has a `(` in it",
     "(a\nG0 X9": "`(a` is not closed",
     "G0 X9 (" + "a" * 250 + ")": "takes 252 at most",
@@ -98,6 +133,13 @@ def test_what_the_control_sees_in_another_way_is_refused(text: str, place: Path)
     assert caught.value.line == 4
     # behind the end nothing is read
     reached(f"{HEAD}M2\n{text}\n", place)
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize("text", [t for t in REFUSED if not set("\r\0") & set(t)])
+def test_linuxcnc_refuses_it(text: str, place: Path) -> None:
+    with pytest.raises(linuxcnc.InterpreterError):
+        linuxcnc.interpret(f"{HEAD}{text}\nM2\n".encode("latin-1"), place.parent)
 
 
 @pytest.mark.oracle

@@ -13,6 +13,7 @@ from enum import IntEnum
 from olp.core.machine import Machine
 from olp.core.units import AXES
 from olp.program.dialect import Dialect, Row, Support
+from olp.program.rs274.block_rules import OTHER_RULES, BlockRules
 from olp.program.rs274.block_text import BlockText
 from olp.program.rs274.codes import CYCLES, PROBES
 from olp.program.rs274.cycles import CycleRules
@@ -53,10 +54,11 @@ class Profile(Dialect):
       A G0 begins and ends at rest, and M5 and M9 come after the motion of their block.
     - `m61_sets_tool`: M61 Q says which tool is in the spindle. `length_of_spindle_tool`: G43 without H, and
       with H0, takes the length of that tool. `lengths_along_z`: a tool length counts along Z alone.
+      `lengths_keep_unit`: a change of unit does not convert the length in force.
     - `feed_words_end`: each G94 and G95 forgets F. `feed_before_unit`: F of a block counts before its G20 or
       G21. `m_with_motion`: M codes carried out along with the motion, without a rest.
-    - `text`, `cycles`, `language`: what may be in a line, how canned cycles are made, and how parametric
-      programs are written.
+    - `text`, `rules`, `cycles`, `language`: what may be in a line and in a block, how canned cycles are made,
+      and how parametric programs are written.
     - `written_ending`: the ending of files that are written for the control.
     """
 
@@ -79,10 +81,12 @@ class Profile(Dialect):
     m61_sets_tool: bool = False
     length_of_spindle_tool: bool = False
     lengths_along_z: bool = False
+    lengths_keep_unit: bool = False
     feed_words_end: bool = False
     feed_before_unit: bool = False
     m_with_motion: frozenset[int] = frozenset()
     text: BlockText
+    rules: BlockRules = OTHER_RULES
     cycles: CycleRules
     language: Language
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+from olp.program.rs274.block_rules import NGC_RULES
 from olp.program.rs274.block_text import BlockText
 from olp.program.rs274.cycles import NGC_CYCLES
 from olp.program.rs274.entry import read_blocks, unroll_blocks
@@ -26,6 +27,7 @@ DIALECT = Profile(
     g10_offsets=9,
     m61_sets_tool=True,
     length_of_spindle_tool=True,
+    lengths_keep_unit=True,
     feed_words_end=True,
     feed_before_unit=True,
     m_with_motion=frozenset({62, 63, 67}),
@@ -33,8 +35,10 @@ DIALECT = Profile(
         odd_bytes=re.compile(rb"\x00|" + LONE_CR.pattern),
         skips_control=False,
         nested_comments=False,
+        marks_in_pairs=True,
         longest=252,
     ),
+    rules=NGC_RULES,
     cycles=NGC_CYCLES,
     language=NGC,
     path_mode="G64 without tolerance, LinuxCNC's default",

@@ -1,0 +1,271 @@
+"""Which words may stand in one block: modal groups, words that need a code, and codes that need words.
+
+A control refuses a block that breaks these rules, or takes the words in a way that is not known. So such a
+block is refused here, many lines at a time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.core.arrays import Index, Mask
+from olp.core.errors import ProgramError
+from olp.program.rs274.codes import (
+    AXIS_VALUES,
+    COMPENSATION_OFF,
+    CUTTER_COMPENSATION,
+    CYCLES,
+    DWELL,
+    GROUPS,
+    HOMES,
+    LENGTHS,
+    MACHINE,
+    PATH_MODES,
+    PROBES,
+    SHIFTS,
+    UNITS,
+    WORK_OFFSETS,
+    WRITE_OFFSET,
+)
+from olp.program.rs274.lexer import WordChunk
+
+#: A line of the chunk from 0, and why it is refused.
+Refusal = tuple[int, str]
+Bits = npt.NDArray[np.int64]
+Codes = npt.NDArray[np.int16]
+
+#: M codes are keyed by this plus ten times their number.
+M = 10_000
+_ARCS = frozenset({20, 30})
+
+
+def _bits(letters: str) -> int:
+    return sum(1 << (ord(letter) - 65) for letter in letters)
+
+
+_AXES = _bits("XYZABCUVW")
+_CENTRE = _bits("IJK")
+#: Centre words of arcs by plane code.
+_IN_PLANE = {170: _bits("IJ"), 180: _bits("IK"), 190: _bits("JK")}
+#: Letters of which a block may have several.
+_FREE = _bits("GM")
+_MOTION = frozenset({0, 10, *_ARCS, *CYCLES, *PROBES})
+_MOTIONS = np.array(sorted(_MOTION))
+#: Codes that take the axis words of their block for something else.
+_STATING = np.array(sorted(AXIS_VALUES - {431} | HOMES))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BlockRules:
+    """The rules of one control.
+
+    - `users`: the codes that use a letter; beside no such code it is refused. Letters that are not here are
+      free. Ten times the number of a G code, `M` plus ten times that of an M code.
+    - `groups`: codes of which a block may have one.
+    - `needs`: codes that need one of these letters.
+    - `number_first`: N is the first word of its line. `one_use_of_axes`: no motion code may be beside a code
+      that uses the axis words for something else.
+    """
+
+    users: Mapping[str, frozenset[int]] = field(default_factory=dict)
+    groups: tuple[frozenset[int], ...] = ()
+    needs: Mapping[int, str] = field(default_factory=dict)
+    number_first: bool = False
+    one_use_of_axes: bool = False
+
+    def tables(self) -> _Tables:
+        """The rules by code."""
+        allowed = np.zeros(2 * M, np.int64)
+        for letter, codes in self.users.items():
+            allowed[sorted(codes)] |= _bits(letter)
+        group = np.full(2 * M, -1, np.int64)
+        for number, codes in enumerate(self.groups):
+            group[sorted(codes)] = number
+        return _Tables(self, allowed, group, sum(_bits(letter) for letter in self.users))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Tables:
+    """`allowed` (2 M,) the letters that a code uses, as bits; `group` of a code or -1; `bound` are the
+    letters that need a user."""
+
+    rules: BlockRules
+    allowed: Bits
+    group: Bits
+    bound: int
+
+    def check(
+        self, chunk: WordChunk, active: Mask, codes: tuple[Index, Index], motion: Codes, plane: Codes
+    ) -> None:
+        """Refuse the first block of a chunk that breaks a rule. `active` (lines,) are lines that count,
+        `codes` the lines and keys of their G and M codes, `motion` and `plane` the codes in force by line."""
+        bit = np.left_shift(1, chunk.letter.astype(np.int64) - 65)
+        present = np.where(active, _by_line(np.bitwise_or, chunk, bit), 0)
+        refusals = [
+            self._twice(chunk, active, bit, present),
+            self._groups(codes),
+            self._unused(codes, present, motion, plane),
+            self._lacking(codes, present),
+            self._numbers(chunk, active),
+        ]
+        found = [refusal for refusal in refusals if refusal is not None]
+        if found:
+            line, why = min(found)
+            raise ProgramError(why, line=chunk.first_line + line + 1)
+
+    def _twice(self, chunk: WordChunk, active: Mask, bit: Bits, present: Bits) -> Refusal | None:
+        together = _by_line(np.add, chunk, np.where((bit & _FREE) != 0, 0, bit))
+        several = active & (together != (present & ~_FREE))
+        if not several.any():
+            return None
+        line = int(np.flatnonzero(several)[0])
+        mine = chunk.letter[chunk.first_word[line] : chunk.first_word[line + 1]]
+        letters = [chr(letter) for letter in mine.tolist() if letter not in b"GM"]
+        letter = next(x for x in letters if letters.count(x) > 1)
+        return line, f"the word {letter} is twice in this block; expected it once"
+
+    def _groups(self, codes: tuple[Index, Index]) -> Refusal | None:
+        line, key = codes
+        group = self.group[key]
+        some = group >= 0
+        place = np.sort(line[some] * 64 + group[some])
+        again = place[1:][place[1:] == place[:-1]]
+        if not again.size:
+            return None
+        where, which = divmod(int(again[0]), 64)
+        names = [_name(k) for k in key[(line == where) & (group == which)].tolist()]
+        return where, f"{' and '.join(names)} of one modal group are in this block; expected one of them"
+
+    def _unused(
+        self, codes: tuple[Index, Index], present: Bits, motion: Codes, plane: Codes
+    ) -> Refusal | None:
+        if not (present & self.bound).any():
+            return None
+        line, key = codes
+        allowed = np.zeros(len(present), np.int64)
+        using = self.allowed[key] != 0
+        np.bitwise_or.at(allowed, line[using], self.allowed[key[using]])
+        moves = (present & _AXES) != 0
+        arcs = np.isin(motion, sorted(_ARCS))
+        moves |= arcs & ((present & _CENTRE) != 0)
+        moves[line[np.isin(key, _MOTIONS)]] = True
+        allowed |= np.where(moves & (motion > 0), self.allowed[np.maximum(motion, 0)], 0)
+        outside = np.zeros(len(present), np.int64)
+        for code, letters in _IN_PLANE.items():
+            outside[plane == code] = _CENTRE & ~letters
+        outside[~(moves & arcs)] = 0
+        spare = present & self.bound & (~allowed | outside)
+        if not spare.any():
+            return None
+        where = int(np.flatnonzero(spare)[0])
+        letter = chr(64 + int(spare[where] & -spare[where]).bit_length())
+        return (
+            where,
+            f"no code of this block uses its word {letter}; remove it, or give the code that does",
+        )
+
+    def _lacking(self, codes: tuple[Index, Index], present: Bits) -> Refusal | None:
+        line, key = codes
+        has = present[line]
+        for code, letters in self.rules.needs.items():
+            lacking = line[(key == code) & ((has & _bits(letters)) == 0)]
+            if lacking.size:
+                what = f"one of {', '.join(letters)}" if len(letters) > 1 else letters
+                return int(lacking[0]), f"{_name(code)} needs {what} in its block"
+        if self.rules.one_use_of_axes:
+            both = np.intersect1d(line[np.isin(key, _STATING)], line[np.isin(key, _MOTIONS)])
+            if both.size:
+                return int(both[0]), "two G codes of this block use its axis words; give each its own block"
+        return None
+
+    def _numbers(self, chunk: WordChunk, active: Mask) -> Refusal | None:
+        if not self.rules.number_first:
+            return None
+        words = np.flatnonzero(chunk.letter == ord("N"))
+        words = words[active[chunk.line[words]]]
+        late = chunk.first_word[chunk.line[words]] != words
+        if chunk.comments.size:
+            opens = np.searchsorted(chunk.comments, chunk.line_start[chunk.line[words]])
+            late |= opens < np.searchsorted(chunk.comments, chunk.start[words])
+        late |= chunk.mantissa[words] < 0
+        if not late.any():
+            return None
+        where = int(chunk.line[words[late]][0])
+        return where, "N is not the first word of this block, or negative; put the block number in front"
+
+
+def _by_line(how: np.ufunc, chunk: WordChunk, bit: Bits) -> Bits:
+    """(lines,) the bits of the words of each line together."""
+    out = np.zeros(len(chunk.line_start), np.int64)
+    first = chunk.first_word
+    some = np.flatnonzero(first[1:] > first[:-1])
+    if some.size:
+        out[some] = how.reduceat(bit, first[some])
+    return out
+
+
+def _name(key: int) -> str:
+    return f"G{key / 10:g}" if key < M else f"M{(key - M) / 10:g}"
+
+
+def _m(*numbers: int) -> frozenset[int]:
+    return frozenset(M + 10 * number for number in numbers)
+
+
+_OWN_M = _m(*range(100, 200))
+_SYNCHRONOUS = _m(62, 63, 64, 65)
+_OUTPUTS = _m(66, 67, 68)
+
+#: What any control takes one of in a block: motion, and the modal codes that the reader follows.
+_GROUPS = (frozenset({*_MOTION, 330, 331, 760, 870, 880}), *map(frozenset, GROUPS.values()))
+
+#: LinuxCNC 2.9, found by asking its interpreter code by code and letter by letter.
+NGC_RULES = BlockRules(
+    users={
+        "D": CUTTER_COMPENSATION | {960},
+        "E": _OUTPUTS,
+        "H": frozenset({430, 432, 760}),
+        "I": frozenset({*_ARCS, 50, 51, 52, 760, 870}),
+        "J": frozenset({*_ARCS, 50, 51, 52, 760, 870}),
+        "K": frozenset({*_ARCS, 330, 331, 760, 870}),
+        "L": frozenset({*CYCLES, WRITE_OFFSET, 760}) | _m(66),
+        "P": frozenset({*_ARCS, DWELL, WRITE_OFFSET, 640, 50, 51, 52, 760, 820, 840, 860, 880, 890, 740})
+        | _SYNCHRONOUS | _m(50, 51, 52, 53, 66, 19) | _OWN_M,
+        "Q": frozenset({50, WRITE_OFFSET, 640, 730, 760, 830}) | _m(19, 61) | _OUTPUTS | _OWN_M,
+        "R": frozenset({*_ARCS, *CYCLES, WRITE_OFFSET, 760}) | _m(19),
+    },
+    groups=(
+        *_GROUPS,
+        frozenset({DWELL, WRITE_OFFSET, *HOMES, MACHINE, *SHIFTS, 281, 301}),
+        frozenset(UNITS),
+        frozenset({COMPENSATION_OFF, *CUTTER_COMPENSATION}),
+        LENGTHS,
+        WORK_OFFSETS,
+        PATH_MODES,
+        frozenset({960, 970}),
+        frozenset({70, 80}),
+        _m(0, 1, 2, 30, 60),
+        _m(6, 61),
+        _m(3, 4, 5, 19),
+        _m(7, 8, 9),
+        _m(48, 49),
+        _m(50, 51, 52, 53),
+        _m(*range(62, 69)),
+        _OWN_M,
+    ),
+    needs={
+        **dict.fromkeys((520, 920), "XYZABCUVW"),
+        **dict.fromkeys(sorted(CYCLES | PROBES), "XYZABCUVW"),
+        **dict.fromkeys(sorted(_ARCS), "IJKR"),
+        DWELL: "P",
+        432: "HXYZ",
+    },
+    number_first=True,
+    one_use_of_axes=True,
+)  # fmt: skip
+#: Controls whose rules are not known so well: what is ambiguous on any control.
+OTHER_RULES = BlockRules(groups=_GROUPS)
