@@ -8,6 +8,7 @@ independent: run parts side by side.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import re
 import sys
@@ -82,8 +83,10 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as name:
         judge, draw = (bent.Judge, grammar.legal) if options.bent else (nominal.Judge, grammar.program)
         judges = judge.of(Path(name))
-        for seed in range(options.seed, options.seed + options.count):
-            found.add(judges, seed, draw(seed))
+        # what was found until then is shown after Ctrl-C, too
+        with contextlib.suppress(KeyboardInterrupt):
+            for seed in range(options.seed, options.seed + options.count):
+                found.add(judges, seed, draw(seed))
     spent = time.monotonic() - begun
     for (what, _), (seed, small, outcome) in sorted(found.causes.items()):
         switch = " with block delete" if small.deletes else ""

@@ -47,6 +47,9 @@ _KINDS = {Kind.RAPID: RAPID, Kind.LINE: FEED, Kind.ARC_CW: ARC, Kind.ARC_CCW: AR
 #: index of the plane in the interpreter's order to that of olp
 _PLANE = {0: 0, 1: 2, 2: 1}
 _FEED = re.compile("zero feed rate|inverse time|feed per rev")
+_BEFORE_TAPE = re.compile(rb"\s+(?=%)")
+#: the control may have such a code, by a file of its own
+_REMAPPED = "M-code greater than 199"
 _HOME = re.compile(rb"(?i)G0*(28|30)(\.0*)?(?![.0-9])")
 _AXES = ((0, 1), (2, 0), (1, 2))
 
@@ -123,6 +126,8 @@ class Judge:
         try:
             moves = self.interpret(drawn)
         except InterpreterError as error:
+            if _REMAPPED in str(error):
+                return Outcome(UNJUDGED, str(error))
             own = feed is None and _FEED.search(str(error))
             return Outcome(BOTH_REFUSE if own else LOOSER, str(error).partition(": ")[2], error.line, str(error))
         except InterpreterFailure as error:
@@ -161,7 +166,9 @@ class _Comparison:
         self.text = data.split(b"\n")
         line_feeds = np.flatnonzero(np.frombuffer(data, np.uint8) == 10)
         begins = np.asarray(program.line_start)[self.path.line - 1]
-        self.own_line = np.searchsorted(line_feeds, begins) + 1
+        # blank lines before a tape mark do not count there
+        blank = _BEFORE_TAPE.match(data)
+        self.own_line = np.searchsorted(line_feeds, begins) + 1 - (blank[0].count(b"\n") if blank else 0)
         self.starts = self.path.starts_mm()
         arc = np.full(len(self.path), -1)
         arc[self.path.arcs.move] = np.arange(len(self.path.arcs))

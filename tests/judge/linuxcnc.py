@@ -275,7 +275,13 @@ def _run(
         "axes": axes,
         "seconds": seconds,
     }
-    report, rows = _server(os.getpid()).ask(request, data)
+    try:
+        report, rows = _server(os.getpid()).ask(request, data)
+    except InterpreterFailure as failure:
+        if not failure.failed.startswith("SIG"):
+            raise
+        # a crash counts where it comes again
+        report, rows = _server(os.getpid()).ask(request, data)
     if report["error"] not in (None, NO_END):
         raise InterpreterError(report["error"], report["error_line"])
     rows = rows[1:]  # the first row goes to the start position
