@@ -35,7 +35,7 @@ from olp.program.rs274.lexer import WordChunk
 
 #: A line of the chunk from 0, and why it is refused.
 Refusal = tuple[int, str]
-Bits = npt.NDArray[np.int64]
+Bits = npt.NDArray[np.int32]
 Codes = npt.NDArray[np.int16]
 
 #: M codes are keyed by this plus ten times their number.
@@ -47,6 +47,8 @@ def _bits(letters: str) -> int:
     return sum(1 << (ord(letter) - 65) for letter in letters)
 
 
+_BIT = np.zeros(256, np.int32)
+_BIT[65:91] = 1 << np.arange(26)
 _AXES = _bits("XYZABCUVW")
 _CENTRE = _bits("IJK")
 #: Centre words of arcs by plane code.
@@ -79,10 +81,10 @@ class BlockRules:
 
     def tables(self) -> _Tables:
         """The rules by code."""
-        allowed = np.zeros(2 * M, np.int64)
+        allowed = np.zeros(2 * M, np.int32)
         for letter, codes in self.users.items():
             allowed[sorted(codes)] |= _bits(letter)
-        group = np.full(2 * M, -1, np.int64)
+        group = np.full(2 * M, -1, np.int8)
         for number, codes in enumerate(self.groups):
             group[sorted(codes)] = number
         return _Tables(self, allowed, group, sum(_bits(letter) for letter in self.users))
@@ -95,7 +97,7 @@ class _Tables:
 
     rules: BlockRules
     allowed: Bits
-    group: Bits
+    group: npt.NDArray[np.int8]
     bound: int
 
     def check(
@@ -103,12 +105,11 @@ class _Tables:
     ) -> None:
         """Refuse the first block of a chunk that breaks a rule. `active` (lines,) are lines that count,
         `codes` the lines and keys of their G and M codes, `motion` and `plane` the codes in force by line."""
-        bit = np.left_shift(1, chunk.letter.astype(np.int64) - 65)
-        present = np.where(active, _by_line(np.bitwise_or, chunk, bit), 0)
+        present = _present(chunk)
         refusals = [
-            self._twice(chunk, active, bit, present),
+            self._twice(chunk, active, present),
             self._groups(codes),
-            self._unused(codes, present, motion, plane),
+            self._unused(active, codes, present, motion, plane),
             self._lacking(codes, present),
             self._numbers(chunk, active),
         ]
@@ -117,9 +118,10 @@ class _Tables:
             line, why = min(found)
             raise ProgramError(why, line=chunk.first_line + line + 1)
 
-    def _twice(self, chunk: WordChunk, active: Mask, bit: Bits, present: Bits) -> Refusal | None:
-        together = _by_line(np.add, chunk, np.where((bit & _FREE) != 0, 0, bit))
-        several = active & (together != (present & ~_FREE))
+    def _twice(self, chunk: WordChunk, active: Mask, present: Bits) -> Refusal | None:
+        free = chunk.line[(chunk.letter == ord("G")) | (chunk.letter == ord("M"))]
+        words = np.diff(chunk.first_word) - np.bincount(free, minlength=len(present))
+        several = active & (np.bitwise_count(present & ~_FREE) != words)
         if not several.any():
             return None
         line = int(np.flatnonzero(several)[0])
@@ -141,12 +143,13 @@ class _Tables:
         return where, f"{' and '.join(names)} of one modal group are in this block; expected one of them"
 
     def _unused(
-        self, codes: tuple[Index, Index], present: Bits, motion: Codes, plane: Codes
+        self, active: Mask, codes: tuple[Index, Index], present: Bits, motion: Codes, plane: Codes
     ) -> Refusal | None:
-        if not (present & self.bound).any():
+        bound = np.where(active, present & self.bound, 0)
+        if not bound.any():
             return None
         line, key = codes
-        allowed = np.zeros(len(present), np.int64)
+        allowed = np.zeros(len(present), np.int32)
         using = self.allowed[key] != 0
         np.bitwise_or.at(allowed, line[using], self.allowed[key[using]])
         moves = (present & _AXES) != 0
@@ -154,11 +157,11 @@ class _Tables:
         moves |= arcs & ((present & _CENTRE) != 0)
         moves[line[np.isin(key, _MOTIONS)]] = True
         allowed |= np.where(moves & (motion > 0), self.allowed[np.maximum(motion, 0)], 0)
-        outside = np.zeros(len(present), np.int64)
+        outside = np.zeros(len(present), np.int32)
         for code, letters in _IN_PLANE.items():
             outside[plane == code] = _CENTRE & ~letters
         outside[~(moves & arcs)] = 0
-        spare = present & self.bound & (~allowed | outside)
+        spare = bound & (~allowed | outside)
         if not spare.any():
             return None
         where = int(np.flatnonzero(spare)[0])
@@ -198,13 +201,13 @@ class _Tables:
         return where, "N is not the first word of this block, or negative; put the block number in front"
 
 
-def _by_line(how: np.ufunc, chunk: WordChunk, bit: Bits) -> Bits:
-    """(lines,) the bits of the words of each line together."""
-    out = np.zeros(len(chunk.line_start), np.int64)
+def _present(chunk: WordChunk) -> Bits:
+    """(lines,) the letters of each line, as bits."""
+    out = np.zeros(len(chunk.line_start), np.int32)
     first = chunk.first_word
     some = np.flatnonzero(first[1:] > first[:-1])
     if some.size:
-        out[some] = how.reduceat(bit, first[some])
+        out[some] = np.bitwise_or.reduceat(_BIT[chunk.letter], first[some])
     return out
 
 

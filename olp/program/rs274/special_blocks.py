@@ -30,7 +30,7 @@ from olp.program.rs274.codes import (
     RETRACT_TO_R,
 )
 from olp.program.rs274.collector import Collector
-from olp.program.rs274.cycles import Stroke, hole_moves, levels
+from olp.program.rs274.cycles import LCNC_CLEARANCE_MM, Stroke, hole_moves, levels
 from olp.program.rs274.modes import Context, scaled
 from olp.program.rs274.motion import fill
 from olp.program.rs274.profiles.base import Act, Profile
@@ -195,13 +195,9 @@ class SpecialBlocks:
         times = self._repeats(context, words, line)
         offset = frame.offset_mm
         number = NAN if series.initial is None else series.initial
-        r, z, initial = (
-            value * frame.unit_mm + offset[third]
-            for value in (
-                *levels(held["R"], held["XYZ"[third]], absolute=not incremental, initial_z=number),
-                number,
-            )
-        )
+        unit, ground = frame.unit_mm, offset[third]
+        levels_of = levels(held["R"], held["XYZ"[third]], absolute=not incremental, initial_z=number)
+        r, z, initial = (value * unit + ground for value in (*levels_of, number))
         place, step = [], []
         for axis in (first, second):
             before, letter = state.position[axis], "XYZ"[axis]
@@ -220,8 +216,8 @@ class SpecialBlocks:
         for repeat in range(times):
             try:
                 strokes = hole_moves(
-                    code, start=start, xy=(place[0], place[1]), r=r, z=z,
-                    q=held["Q"] * frame.unit_mm if "Q" in held else None,
+                    code, start=start, xy=(place[0], place[1]), r=levels_of[0], z=levels_of[1],
+                    q=held.get("Q"), clearance=LCNC_CLEARANCE_MM / unit, unit=unit, ground=ground,
                     p=held.get("P"), retract_to_r=bool(context.retract[row] == RETRACT_TO_R),
                     initial_z=initial, plane=17 + plane,
                     rules=state.profile.cycles,
