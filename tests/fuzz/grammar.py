@@ -2,34 +2,32 @@
 
 Each block takes from all modal groups, whatever is in force: motion, cycles, frames, units, lengths, planes,
 distances, retracts, feed modes. Spelling, order of words, comments and line ends are drawn too, and now and
-then a block that a control must refuse. The positions that the grammar follows only help it to arcs that a
-control accepts.
+then a block that a control must refuse.
 """
 
 from __future__ import annotations
 
-import math
 import random
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
-#: what the machine of `interleaved` has: work offsets and lengths of its tools
+from fuzz.drawn_words import TAPS, TOOLS, Words
+
+#: work offsets of the control
 FRAMES = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
-TOOLS = (1, 2, 3)
-#: axes of a plane: first, second, along the tool
-PLANES = {"G17": (0, 1, 2), "G18": (2, 0, 1), "G19": (1, 2, 0)}
-CYCLES = ("G73", "G81", "G82", "G83", "G85", "G89", "G86", "G84", "G74")
-_TAPS = ("G74", "G84")
 _REMARKS = ("(x1 y2)", "( G1 X99 )", "()", "(msg, a)", "(g0 ; z5)", "(debug)")
+_SPINDLE = ("S1000 M3", "M4", "M5", "S500", "M8", "M9", "M3", "F100", "F20.5", "M1", "M3", "M48")
 _WRONG = (
-    "X1 X2", "G1 G0 X1", "G41", "G2 X1", "G99.5", "M3 M4", "G81 X1", "P-1 G4", "G1 X", "X1..2", "G1 X-+2", "Q", "G10 L3",
-    "G43 H9", "G53 X1", "G54 G55", "G17 G18", "G92", "G90 G91", "G21 G20", "M6", "T-1", "L-1 G81 X1 Z-1 R1",
-    "(open", "closed) X1", "G93 G94", "G1 F-5", "G82 X1 Z-2 R1 P-1", "G83 X1 Z-2 R1 Q0", "G43.1", "G10 L2 P12 X0", "A1 B2",
-    "G80 X5", "G4", "G28 G53 X1", "G0 G10 L2 P1 X0", "R5 X1", "I5 X1", "D1", "H1", "K2 X1", "P5 X1", "L3 X1",
-    "G10 L20 P0 X0", "G2 X1 Y1 I1 R2", "G1.5", "N1 N2 X1", "G61 P1", "G43 G49", "G92 X1 G92.1", "U1", "G5 X1", "G38.2 X1",
-    "S-5", "M30 X1", "G33 Z1 K1", "Z", "G9", "G9 X1", "#1=5", "G1 X[1+1]", "G0 X#1", "O1", "M98 P1", "!", "/ /", "G91.1 G90.1",
-    "E5", "G1 X1e2", "G61.1", "G7", "G8", "G96", "G96 S10 D5", "M19", "M60", "M0", "M1", "M48", "M7 M8", "M5 M9", "M99",
-    "G15", "G16", "G50", "G51", "G68", "G69", "M2.0", "M30.", "G00.0 X1", "G1.0 X1", "G01 X1 G40", "G 2 8", "M62 P1", "M66 P0 L0",
+    "X1 X2", "G1 G0 X1", "G41", "G2 X1", "G99.5", "M3 M4", "G81 X1", "P-1 G4", "G1 X", "X1..2", "G1 X-+2",
+    "Q", "G10 L3", "G43 H9", "G53 X1", "G54 G55", "G17 G18", "G92", "G90 G91", "G21 G20", "M6", "T-1",
+    "L-1 G81 X1 Z-1 R1", "(open", "closed) X1", "G93 G94", "G1 F-5", "G82 X1 Z-2 R1 P-1",
+    "G83 X1 Z-2 R1 Q0", "G43.1", "G10 L2 P12 X0", "A1 B2", "G80 X5", "G4", "G28 G53 X1", "G0 G10 L2 P1 X0",
+    "R5 X1", "I5 X1", "D1", "H1", "K2 X1", "P5 X1", "L3 X1", "G10 L20 P0 X0", "G2 X1 Y1 I1 R2", "G1.5",
+    "N1 N2 X1", "G61 P1", "G43 G49", "G92 X1 G92.1", "U1", "G5 X1", "G38.2 X1", "S-5", "M30 X1",
+    "G33 Z1 K1", "Z", "G9", "G9 X1", "#1=5", "G1 X[1+1]", "G0 X#1", "O1", "M98 P1", "!", "/ /",
+    "G91.1 G90.1", "E5", "G1 X1e2", "G61.1", "G7", "G8", "G96", "G96 S10 D5", "M19", "M60", "M0", "M1",
+    "M48", "M7 M8", "M5 M9", "M99", "G15", "G16", "G50", "G51", "G68", "G69", "M2.0", "M30.", "G00.0 X1",
+    "G1.0 X1", "G01 X1 G40", "G 2 8", "M62 P1", "M66 P0 L0",
 )  # fmt: skip
 
 
@@ -45,165 +43,8 @@ class Drawn:
 
 
 @dataclass(slots=True)
-class _Grammar:
-    """What is in force while a program is drawn. `at` are program coordinates, None where not followed."""
-
-    rng: random.Random
-    odd: bool
-    wrong: float
-    at: list[float | None] = field(default_factory=lambda: [None] * 3)
-    motion: str = ""
-    relative: bool = False
-    centres: bool = False
-    plane: str = "G17"
-    inch: bool = False
-    feed: str = "G94"
-    series: str = ""
-    cycles: bool = True
-    slashes: float = 0.0
-    turning: str = ""
-    sets_tool: bool = True
-    gone: bool = False
-    told: bool = False
-
-    def chance(self, share: float) -> bool:
-        return self.rng.random() < share
-
-    # -- numbers and words ---------------------------------------------------------------------------
-
-    def spelt(self, value: float) -> str:
-        """A number as a person or a program may write it."""
-        rng = self.rng
-        text = f"{abs(value):.{rng.choice((0, 1, 2, 3))}f}" if value == round(value) else f"{abs(value):.4f}".rstrip("0")
-        how = rng.random()
-        if how < 0.15 and text.startswith("0."):
-            text = text[1:]
-        elif how < 0.3 and "." not in text:
-            text += "."
-        elif how < 0.35:
-            text = "0" + text
-        sign = "-" if value < 0 else ("+" if rng.random() < 0.05 else "")
-        text = sign + text
-        if self.odd and rng.random() < 0.05:
-            place = rng.randrange(len(text) + 1)
-            text = text[:place] + rng.choice((" ", "\t", "  ")) + text[place:]
-        return text
-
-    def word(self, letter: str, value: float) -> str:
-        gap = " " if self.odd and self.chance(0.03) else ""
-        return letter + gap + self.spelt(value)
-
-    def code(self, name: str) -> str:
-        if self.chance(0.06):
-            name = name[0] + "0" + name[1:]
-        if self.odd and self.chance(0.02):
-            name = name[0] + " " + name[1:]
-        return name if "." in name or not self.odd or self.chance(0.97) else name + self.rng.choice((".", ".0"))
-
-    def length(self, low: float = -20.0, high: float = 20.0) -> float:
-        """A length in program units."""
-        value = round(self.rng.uniform(low, high), self.rng.choice((0, 0, 1, 2, 3)))
-        return round(value / 25.0, 4) if self.inch else value
-
-    def axes(self, least: int = 0, letters: str = "XYZ") -> list[str]:
-        picked = [a for a in letters if self.chance(0.55)]
-        while len(picked) < least:
-            picked = sorted({*picked, self.rng.choice(letters)})
-        return picked
-
-    def lost(self) -> None:
-        self.at = [None] * 3
-
-    # -- motion --------------------------------------------------------------------------------------
-
-    def go(self, words: list[str], letters: list[str]) -> None:
-        for letter in letters:
-            value, i = self.length(), "XYZ".index(letter)
-            words.append(self.word(letter, value))
-            before = self.at[i]
-            self.at[i] = value if not self.relative else None if before is None else before + value
-
-    def straight(self) -> list[str]:
-        code = self.rng.choice(("G0", "G1", "G1"))
-        words = []
-        if code != self.motion or self.chance(0.3):
-            words.append(self.code(code))
-        self.motion, self.series = code, ""
-        if code == "G1" and (self.feed == "G93" or self.chance(0.25)):
-            words.append(self.word("F", self.rng.choice((100, 250.5, 10, 2))))
-        self.go(words, self.axes(1))
-        return words
-
-    def arc(self) -> list[str]:
-        code = self.rng.choice(("G2", "G3"))
-        first, second, third = PLANES[self.plane]
-        words = [self.code(code)] if code != self.motion or self.chance(0.4) else []
-        self.motion, self.series = code, ""
-        if self.feed == "G93":
-            words.append(self.word("F", 3))
-        scale = 0.04 if self.inch else 1.0
-        radius = self.rng.choice((1.0, 2.5, 5.0, 8.0)) * scale
-        here = self.at[first], self.at[second]
-        known = None not in here
-        known_here = (here[0] or 0.0, here[1] or 0.0)
-        turn = self.rng.choice((0.0, 90.0, 180.0, 270.0, 30.0, 211.0))
-        begin = self.rng.choice((0.0, 90.0, 180.0, 270.0, 45.0))
-        middle = [round(radius * math.cos(math.radians(begin)), 4), round(radius * math.sin(math.radians(begin)), 4)]
-        radius = math.hypot(*middle)
-        angle = math.radians(begin + 180.0 + turn)
-        step = [round(middle[0] + radius * math.cos(angle), 4), round(middle[1] + radius * math.sin(angle), 4)]
-        full = turn == 0.0 or not (known or self.relative)
-        if self.centres and not known:
-            full = False
-        centre = [m + h for m, h in zip(middle, known_here)] if self.centres else middle
-        letters = "IJK"[first], "IJK"[second]
-        by_radius = not full and self.chance(0.35)
-        if by_radius:
-            words.append(self.word("R", round(radius * self.rng.choice((1.0, 1.5, -1.0, -1.2)), 4)))
-        else:
-            for letter, value in zip(letters, centre):
-                if value or self.centres or self.chance(0.5):
-                    words.append(self.word(letter, round(value, 4)))
-        if not full or self.chance(0.3):
-            ends = zip((first, second), step if not full else (0.0, 0.0), known_here)
-            for axis, value, before in ends:
-                if full and not self.relative and not known:
-                    continue
-                words.append(self.word("XYZ"[axis], round(value if self.relative else value + before, 4)))
-                if known:
-                    self.at[axis] = round(value + before, 4)
-        if self.chance(0.4):
-            self.go(words, ["XYZ"[third]])
-        if self.chance(0.2):
-            words.append(self.word("P", self.rng.choice((1, 2, 3))))
-        return words
-
-    def hole(self) -> list[str]:
-        third = "XYZ"[PLANES[self.plane][2]]
-        level = self.at[PLANES[self.plane][2]]
-        turning = {"": CYCLES[:6], "M3": CYCLES[:7] + ("G84",), "M4": CYCLES[:7] + ("G74",)}[self.turning]
-        plain = CYCLES if self.chance(0.02) else [c for c in turning if c not in _TAPS or self.plane == "G17"]
-        on = bool(self.series) and self.chance(0.7)
-        code = self.series if on else self.rng.choice(plain)
-        words = [] if on and self.motion == code and self.chance(0.7) else [self.code(code)]
-        sticky = self.series == code
-        self.motion = self.series = code
-        words += [self.word(a, self.length()) for a in self.axes(0, "XYZ".replace(third, ""))]
-        top = self.length(2, 8) if self.relative or level is None or self.chance(0.5) else level - self.length(0, 4)
-        if not sticky or self.chance(0.25):
-            words.append(self.word(third, -abs(self.length(1, 20)) if self.relative else top - abs(self.length(0, 9))))
-        if not sticky or self.chance(0.25):
-            words.append(self.word("R", -abs(self.length(0, 5)) if self.relative else top))
-        if code in ("G73", "G83") and (not sticky or self.chance(0.2)):
-            words.append(self.word("Q", abs(self.length(2, 9)) or 1.0))
-        if code in ("G82", "G86", "G89", "G84", "G74") and (not sticky or self.chance(0.2)) or self.chance(0.03):
-            words.append(self.word("P", self.rng.choice((0, 0.5, 1))))
-        if self.chance(0.15):
-            words.append(self.word("L", self.rng.choice((1, 2, 3))))
-        if not words or not any(w[0] in "XYZ" for w in words) and self.chance(0.9):
-            words.append(self.word("XYZ".replace(third, "")[0], self.length()))
-        self.lost()
-        return words
+class _Grammar(Words):
+    """Blocks: what changes the state, and how words become a line."""
 
     # -- state ---------------------------------------------------------------------------------------
 
@@ -226,7 +67,11 @@ class _Grammar:
         return words
 
     def write(self) -> list[str]:
-        words = [self.code("G10"), "L" + self.rng.choice(("2", "20")), self.word("P", self.rng.choice((0, 1, 2, 3, 9)))]
+        words = [
+            self.code("G10"),
+            "L" + self.rng.choice(("2", "20")),
+            self.word("P", self.rng.choice((0, 1, 2, 3, 9))),
+        ]
         if self.chance(0.1):
             words.append("R0")
         self.go(words, self.axes(1))
@@ -241,7 +86,9 @@ class _Grammar:
     def tool_length(self) -> list[str]:
         code = self.rng.choice(("G43", "G43", "G43.1", "G43.2", "G49"))
         words = [self.code(code)]
-        if code == "G43" and (self.told or self.chance(0.8)) or code == "G43.2" and (self.told or self.chance(0.9)):
+        if (code == "G43" and (self.told or self.chance(0.8))) or (
+            code == "G43.2" and (self.told or self.chance(0.9))
+        ):
             # the interpreter alone does not know what is in the spindle after M61
             words.append(self.word("H", self.rng.choice(TOOLS if self.told else (0, *TOOLS))))
         if code == "G43.1":
@@ -325,18 +172,18 @@ class _Grammar:
         return words
 
     def spindle(self) -> list[str]:
-        words = self.rng.choice(
-            (["S1000", "M3"], ["M4"], ["M5"], ["S500"], ["M8"], ["M9"], ["M3"], ["F100"], ["F20.5"], ["M1"], ["M3"], ["M48"])
-        )  # fmt: skip
+        words = self.rng.choice(_SPINDLE).split()
         if words[-1] in ("M3", "M4", "M5"):
             self.turning = "" if words[-1] == "M5" else words[-1]
-            if self.series in ("G86", *_TAPS):
+            if self.series in ("G86", *TAPS):
                 self.motion = self.series = ""
                 return [self.code("G80"), *words]
-        return list(words)
+        return words
 
     def nothing(self) -> list[str]:
-        return self.rng.choice(([], ["N10"], ["(remark)"], ["N5", "(x)"], [";rest G0 X5"], ["%"], ["M0"], [" "]))
+        return self.rng.choice(
+            ([], ["N10"], ["(remark)"], ["N5", "(x)"], [";rest G0 X5"], ["%"], ["M0"], [" "])
+        )
 
     def bad(self) -> list[str]:
         self.lost()
@@ -384,7 +231,27 @@ class _Grammar:
         if not self.chance(0.04):
             return text
         place = self.rng.randrange(len(text) + 1)
-        byte = self.rng.choice(("\0", "\xff", "\x80", "\xa0", "\t", "\v", "\f", "\r", "\x1a", "\x7f", "\xb5", " ", "(", ")", ";", "/", "%"))
+        byte = self.rng.choice(
+            (
+                "\0",
+                "\xff",
+                "\x80",
+                "\xa0",
+                "\t",
+                "\v",
+                "\f",
+                "\r",
+                "\x1a",
+                "\x7f",
+                "\xb5",
+                " ",
+                "(",
+                ")",
+                ";",
+                "/",
+                "%",
+            )
+        )
         return text[:place] + byte + text[place:]
 
 
@@ -394,8 +261,8 @@ _MOVES: tuple[Callable[[_Grammar], list[str]], ...] = (
 _STATES: tuple[Callable[[_Grammar], list[str]], ...] = (
     _Grammar.frame, _Grammar.frame, _Grammar.preset, _Grammar.preset, _Grammar.write, _Grammar.units,
     _Grammar.tool_length, _Grammar.change, _Grammar.machine, _Grammar.home, _Grammar.dwell, _Grammar.distance,
-    _Grammar.distance, _Grammar.centre, _Grammar.plane_code, _Grammar.feed_mode, _Grammar.retract, _Grammar.end_cycle,
-    _Grammar.mode, _Grammar.spindle, _Grammar.nothing,
+    _Grammar.distance, _Grammar.centre, _Grammar.plane_code, _Grammar.feed_mode, _Grammar.retract,
+    _Grammar.end_cycle, _Grammar.mode, _Grammar.spindle, _Grammar.nothing,
 )  # fmt: skip
 _JOINED = frozenset((
     _Grammar.frame, _Grammar.units, _Grammar.tool_length, _Grammar.change, _Grammar.distance, _Grammar.centre,
@@ -437,7 +304,9 @@ def program(seed: int) -> Drawn:
         lines.append(" ".join(words))
     lines += [grammar.block() for _ in range(rng.choice((3, 5, 8, 12, 20)))]
     if rng.random() < 0.6:
-        lines.append(rng.choice(("M2", "M30", "m2", "M02", "M30 (end)", "G0 X1 M2", "M2.0", "G80 M30", "G92.1 M2")))
+        lines.append(
+            rng.choice(("M2", "M30", "m2", "M02", "M30 (end)", "G0 X1 M2", "M2.0", "G80 M30", "G92.1 M2"))
+        )
         if rng.random() < 0.2:
             lines.append("G0 X50")
     if rng.random() < 0.08:

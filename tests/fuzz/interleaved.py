@@ -1,4 +1,6 @@
-"""Random programs with interleaved modal state against LinuxCNC: python tests/fuzz/interleaved.py --count N --seed S
+"""Random programs with interleaved modal state against LinuxCNC.
+
+    python tests/fuzz/interleaved.py --count N --seed S [--bent] [--write FOLDER]
 
 Every difference is made as small as possible; one of each cause is shown, and written with `--write FOLDER`.
 `--bent` judges the corrected text on machines with errors. Ends with 1 if there was any difference. Seeds are

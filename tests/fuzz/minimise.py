@@ -1,4 +1,4 @@
-"""The least of a program that still shows what the whole one shows: blocks go first, then words, then bytes."""
+"""The least of a program that still shows what the whole one shows: blocks go first, then words."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """The nominal reading of a program against LinuxCNC's: what differs, in one line each.
 
-A program that olp refuses is never different. One that olp accepts must be accepted by LinuxCNC, with the same
-moves: kinds, ends, centres, turns, planes, feeds, units, and no axis known that depends on the start.
+A program that olp refuses is never different. One that olp accepts must be accepted by LinuxCNC, with the
+same moves: kinds, ends, centres, turns, planes, feeds, units, and no axis known that depends on the start.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from fuzz.grammar import FRAMES, TOOLS, Drawn
+from fuzz.drawn_words import TOOLS
+from fuzz.grammar import FRAMES, Drawn
 from judge import linuxcnc, machines
 from judge.linuxcnc import ARC, DWELL, FEED, PROBE, RAPID, CanonMoves, InterpreterError, InterpreterFailure
 from judge.machines import Recipe
@@ -129,7 +130,9 @@ class Judge:
             if _REMAPPED in str(error):
                 return Outcome(UNJUDGED, str(error))
             own = feed is None and _FEED.search(str(error))
-            return Outcome(BOTH_REFUSE if own else LOOSER, str(error).partition(": ")[2], error.line, str(error))
+            return Outcome(
+                BOTH_REFUSE if own else LOOSER, str(error).partition(": ")[2], error.line, str(error)
+            )
         except InterpreterFailure as error:
             # the interpreter's Python hands out text of comments, and only as UTF-8
             own = not drawn.data.isascii() and "parse_file" in error.failed
@@ -216,7 +219,9 @@ class _Comparison:
         return bool(((np.abs(a - b) < 1e-9) | (np.isnan(a) & np.isnan(b))).all())
 
     def _still(self, j: int) -> bool:
-        return self.moves.kind[j] != ARC and float(np.abs(self.moves.axis[j] - self.moves.begin[j]).max()) < 1e-9
+        return (
+            self.moves.kind[j] != ARC and float(np.abs(self.moves.axis[j] - self.moves.begin[j]).max()) < 1e-9
+        )
 
     def _move(self, k: int, j: int) -> str | None:
         path, moves = self.path, self.moves

@@ -22,7 +22,9 @@ def judge(tmp_path_factory: pytest.TempPathFactory) -> nominal.Judge:
     return nominal.Judge.of(tmp_path_factory.mktemp("nominal"))
 
 
-def differences(judge: nominal.Judge | bent.Judge, programs: Iterator[Drawn]) -> tuple[list[str], Counter[str]]:
+def differences(
+    judge: nominal.Judge | bent.Judge, programs: Iterator[Drawn]
+) -> tuple[list[str], Counter[str]]:
     """What is wrong, by program, and how often each outcome came."""
     wrong, counts = [], Counter[str]()
     for drawn in programs:
@@ -43,8 +45,11 @@ def test_a_seed_is_one_program() -> None:
 
 def test_the_grammar_draws_every_code_and_every_odd_spelling() -> None:
     text = b"\n".join(grammar.program(seed).data for seed in range(2000)).upper()
-    codes = "G0 G1 G2 G3 G4 G10 G17 G18 G19 G20 G21 G28 G30 G40 G43 G43.1 G43.2 G49 G52 G53 G54 G55 G59.3 G61 G61.1 G64 "
-    codes += "G73 G74 G80 G81 G82 G83 G84 G85 G86 G89 G90 G90.1 G91 G91.1 G92 G92.1 G92.2 G92.3 G93 G94 G95 G98 G99 M6 M61 M2 M30"
+    codes = "G0 G1 G2 G3 G4 G10 G17 G18 G19 G20 G21 G28 G30 G40 G43 G43.1 G43.2 G49 G52 G53 G54 G55 G59.3 "
+    codes += (
+        "G61 G61.1 G64 G73 G74 G80 G81 G82 G83 G84 G85 G86 G89 G90 G90.1 G91 G91.1 G92 G92.1 G92.2 G92.3 "
+    )
+    codes += "G93 G94 G95 G98 G99 M6 M61 M2 M30"
     missing = [c for c in codes.split() if c.encode() not in text]
     odd = [b"\r\r\n", b"\0", b"\xff", b"\t", b"%", b"/", b";", b"(", b"X-.", b"G 1", b"M2.0", b"+", b"\x0b"]
     assert missing + [byte for byte in odd if byte not in text] == []
@@ -52,7 +57,9 @@ def test_the_grammar_draws_every_code_and_every_odd_spelling() -> None:
 
 def test_the_smallest_program_still_shows_what_the_whole_one_did() -> None:
     data = b"G21 G90\nG0 X1 Y2\n(remark)\nG1 X5 F100 (x)\nG92 X3 Y4\nM2\n"
-    small = minimise.minimised(Drawn(data, True, None), lambda drawn: b"G92" in drawn.data and b"X5" in drawn.data)
+    small = minimise.minimised(
+        Drawn(data, True, None), lambda drawn: b"G92" in drawn.data and b"X5" in drawn.data
+    )
     assert small.data.split() == [b"X5", b"G92"]
     assert not small.deletes
     assert minimise.signature(b"G01 X1.5 Y-2\r\nG92.1\n") == "G1 X Y | G92.1"

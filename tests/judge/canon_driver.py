@@ -289,7 +289,14 @@ def answer(request, program):
 def main():
     """Answers requests until the input ends. The working folder is this process's own."""
     # the first program of a process loads what all others use
-    warm = {"table": "", "variables": "5220\t1.0\n", "deletes": False, "axes": 7, "unit": "G21", "start": "G0 X0"}
+    warm = {
+        "table": "",
+        "variables": "5220\t1.0\n",
+        "deletes": False,
+        "axes": 7,
+        "unit": "G21",
+        "start": "G0 X0",
+    }
     Path("t.tbl").write_text("")
     parse(warm, b"M2\n")
     # a child then copies fewer pages of its parent
