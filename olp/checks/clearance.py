@@ -10,7 +10,7 @@ surface that it cuts. There it is taken smaller by `SLACK_MM`, and only contact 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -82,8 +82,9 @@ class Clearances:
             self.solid[order], self.parts, self.solids, self.unknown,
         )  # fmt: skip
 
-    def findings(self, limit_mm: float) -> list[Finding]:
-        """Contacts, clearances below the limit, and blocks that were not checked."""
+    def findings(self, limit_mm: float, place_of: Callable[[int], str] = str) -> list[Finding]:
+        """Contacts, clearances below the limit, and blocks that were not checked; `place_of` puts a line into
+        words."""
         findings = []
         touching = self.clearance_mm <= 0.0
         for code, rows, what in (
@@ -100,7 +101,7 @@ class Clearances:
             )
             if code == "OLP702":
                 text += f": {self.clearance_mm[first]:.4g} mm, expected {limit_mm:g} mm"
-            text += f", line {int(self.line[first])}"
+            text += f", line {place_of(int(self.line[first]))}"
             findings.append(finding(code, text, self.line[rows].tolist()))
         if self.unknown:
             text = (

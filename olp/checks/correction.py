@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -126,8 +126,8 @@ def path_mode_findings(program: Program, correction_mm: float) -> list[Finding]:
     return findings
 
 
-def proof_findings(proof: Proof, uncorrected: Index) -> list[Finding]:
-    """Findings from the proof."""
+def proof_findings(proof: Proof, uncorrected: Index, place: Callable[[int], str] = str) -> list[Finding]:
+    """Findings from the proof; `place` puts a line into words."""
     findings = []
     path = proof.nominal
     size = proof.size_mm()
@@ -138,7 +138,7 @@ def proof_findings(proof: Proof, uncorrected: Index) -> list[Finding]:
             finding(
                 "OLP101",
                 f"{int(above.sum())} moves are above tolerance: {size[worst] * 1e3:.2f} um at line "
-                f"{int(path.line[worst])}, allowed {proof.allowed_mm * 1e3:.2f} um",
+                f"{place(int(path.line[worst]))}, allowed {proof.allowed_mm * 1e3:.2f} um",
                 lines_of(path, above),
             )
         )

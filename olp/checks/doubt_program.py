@@ -21,7 +21,7 @@ def program_doubts(program: Program, setup: Setup) -> list[Finding]:
     if line is None or setup.machine.decimal_point is not None:
         return []
     if _POINTED.search(_COMMENT.sub(b" ", program.data)):
-        what = f"line {line} has a length without a decimal point, read as least increments"
+        what = f"line {program.place(line)} has a length without a decimal point, read as least increments"
         return [finding("OLP302", what, [line])]
     what = "no length of the program has a decimal point: all are read as least increments, X100 as 0.1 mm"
     return [finding("OLP461", what, [line])]

@@ -55,14 +55,14 @@ class Feeds:
             assert program.words is not None
             scan = Scan.of(program, program.words, block_delete=False)
             modes = {
-                code: scan.code_line[scan.code == code].tolist()
+                code: program.original_lines(scan.code_line[scan.code == code]).tolist()
                 for code in (_INVERSE, _PER_TURN)
                 if (scan.code == code).any()
             }
         try:
             return Feeds(programmed(program), modes, None)
         except ProgramError as error:
-            line = [] if error.line is None else [error.line]
+            line = [] if error.line is None else program.original_lines([error.line]).tolist()
             return Feeds(None, modes, finding("OLP307", error.message, line))
 
     def findings(self) -> list[Finding]:

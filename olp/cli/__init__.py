@@ -25,6 +25,7 @@ VERBS = {
     "results": "Correct what a measuring machine reported.",
     "verify": "Prove a corrected program from the nominal and the corrected text alone.",
     "simulate": "Write the path that the machine would take with its errors, as CSV.",
+    "flatten": "Write a program with its loops, subprograms and expressions unrolled.",
     "retime": "Re-time a program within the limits of the axes, and say how long it takes.",
     "check": "Check whether a program may run on the machine: findings, for people and pipelines.",
     "view": "Show a job in the browser: paths, enlarged errors, time, program text.",

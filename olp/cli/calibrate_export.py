@@ -15,7 +15,7 @@ from olp.cli.options import (
     fail_on_option,
     json_option,
     output_option,
-    setup_options,
+    program_options,
 )
 from olp.core.errors import UsageError
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 @click.command("export")
-@setup_options
+@program_options
 @click.option("-c", "--calibration", metavar="FILE", help="A calibration alone, without a machine.")
 @click.option("--format", "kind", metavar="FORMAT", help="One of: olp calibrate formats.")
 @output_option("FILE", "The table; further files go beside it.")
@@ -55,6 +55,7 @@ def command(
     reference: Reference | None,
     chain: str | None,
     force: bool,
+    **unrolling: Any,
 ) -> None:
     """Write a calibration as the compensation table of a control, and show the residual error.
 
@@ -69,7 +70,7 @@ def command(
     inputs = (*files_of(calibration, program), *described)
     common: dict[str, Any] = {
         "calibration": calibration, "program": program, "reference": reference, "most_rows": most_rows,
-        "chain": chain, "date": date, "accept": accept,
+        "chain": chain, "date": date, "accept": accept, **unrolling,
     }  # fmt: skip
     if kind is None:
         _put(compare_tables(machine, job, **common), as_json)

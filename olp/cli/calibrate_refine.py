@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+from typing import Any
 
 import click
 
@@ -14,8 +15,8 @@ from olp.cli.options import (
     instrument_options,
     json_option,
     output_option,
+    program_options,
     quiet_option,
-    setup_options,
 )
 from olp.core.errors import UsageError
 
@@ -23,7 +24,7 @@ from olp.core.errors import UsageError
 @click.command("refine")
 @click.argument("calibration", metavar="CALIBRATION")
 @click.argument("measured", metavar="MEASURED.csv")
-@setup_options
+@program_options
 @output_option("NEW.toml", "Where to write; never over CALIBRATION.", required=True)
 @click.option(
     "--program", metavar="NOMINAL", help="MEASURED are tip positions along a corrected run of this program."
@@ -48,6 +49,7 @@ def command(
     fail_on: str,
     quiet: bool,
     force: bool,
+    **unrolling: Any,
 ) -> None:
     """Update a calibration by a measured run, within its covariance.
 
@@ -74,7 +76,7 @@ def command(
 
     refined = refine_calibration(
         calibration, measured, machine, job, program=program, sigma_um=sigma_um, tool_mm=reflector,
-        date=date,
+        date=date, **unrolling,
     )  # fmt: skip
     files = refined.files(output)
     write_files(files, force=force, inputs=inputs)

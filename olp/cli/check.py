@@ -29,8 +29,8 @@ from olp.cli.options import (
     json_option,
     output_option,
     outside_box_option,
+    program_options,
     quiet_option,
-    setup_options,
     tolerance_option,
 )
 from olp.cli.progress import progress
@@ -39,7 +39,7 @@ from olp.core.errors import UsageError, naming
 
 @click.command("check")
 @click.argument("program", required=False)
-@setup_options
+@program_options
 @click.option("--nominal", metavar="NOMINAL", help="The nominal program, where PROGRAM is a corrected one.")
 @click.option(
     "--select", multiple=True, callback=codes, metavar="CODES", help="Only these codes, such as OLP4,OLP701."
@@ -106,7 +106,7 @@ def command(
         result = check.examined(call.session, call.source, options, nominal=other, progress=show)
     parts = {output: FORMATS[form](result.report, fail_on).encode()}
     if clearances is not None and result.clearances is not None:
-        parts[clearances] = to_csv(result.clearances.rows())
+        parts[clearances] = to_csv(list(result.rows()))
     write_files({Path(name): parts[name] for name in files_of(*parts)}, force=force, inputs=inputs)
     if STREAM in parts and not (quiet and form == "text" and output == STREAM):
         put(parts[STREAM])

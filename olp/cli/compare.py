@@ -34,10 +34,10 @@ from olp.cli.options import (
     json_option,
     output_option,
     part_tolerance_option,
+    program_options,
     quiet_option,
     renamed_option,
     report_option,
-    setup_options,
 )
 from olp.cli.progress import progress
 from olp.core.errors import UsageError
@@ -56,7 +56,7 @@ _LAYOUT = ("profile", "columns", "unit", "delimiter", "positions")
 @click.command("compare")
 @click.argument("nominal")
 @click.argument("measured", nargs=-1, required=True)
-@setup_options
+@program_options
 @click.option("--before", multiple=True, metavar="FILE", help="A run without correction; may be repeated.")
 @click.option("--poses", is_flag=True, help="Rows are poses, not points along a path.")
 @layout_options(

@@ -30,12 +30,11 @@ from olp.cli.options import (
     force_option,
     output_option,
     outside_box_option,
+    program_options,
     proof_options,
     quiet_option,
     renamed_option,
     report_option,
-    setup_options,
-    unroll_options,
 )
 from olp.cli.progress import Report, progress
 from olp.core.errors import ProgramError, UsageError
@@ -51,12 +50,11 @@ LAST_DIGITS_UM = 10.0
 
 @click.command("correct")
 @click.argument("program", required=False)
-@setup_options
+@program_options
 @output_option("OUT", "Default: PROGRAM.corrected.SUFFIX beside PROGRAM.")
 @proof_options
 @confidence_options
 @outside_box_option("refuse the program", "take the error at the box's face")
-@unroll_options
 @click.option("--split-rapids", is_flag=True, help="Split rapids like feed moves.")
 @report_option()
 @click.option("--review", "review_file", metavar="review.html", help="Also write the page of olp view.")
@@ -147,10 +145,8 @@ def _review(
 def _report(call: Given, result: Correction, options: CorrectOptions, name: str) -> bytes:
     """The report as a file, on the program that was corrected: unrolled where the call asks for it."""
     from olp.workflows import report
-    from olp.workflows.flatten import as_asked
 
-    program = as_asked(call.session.sources, call.source, *call.session.reading(call.source), options)
-    return report.correction(result, program, call.session, options, name)
+    return report.correction(result, call.source.holding(result.nominal), call.session, options, name)
 
 
 def _say(call: Given, result: Correction, outputs: _Outputs, written: Iterable[Path]) -> None:
@@ -161,7 +157,7 @@ def _say(call: Given, result: Correction, outputs: _Outputs, written: Iterable[P
     if on_stderr:
         put(result.data)
     if outputs.show_diff:
-        put(_diff(call.source.data, result, call.setup.machine, on_stderr), err=on_stderr)
+        put(_diff(result, call.setup.machine, on_stderr), err=on_stderr)
     if outputs.as_json:
         put(report.to_json(result.report))
     elif not outputs.quiet:
@@ -171,19 +167,22 @@ def _say(call: Given, result: Correction, outputs: _Outputs, written: Iterable[P
             diagnostic(f"wrote {path}")
 
 
-def _diff(nominal: bytes, result: Correction, machine: Machine, on_stderr: bool) -> str:
+def _diff(result: Correction, machine: Machine, on_stderr: bool) -> str:
     from olp.cli.diff import render
+    from olp.program.origin import origin_of
     from olp.program.registry import find
     from olp.program.rs274.profiles.base import Profile
 
     dialect = find(result.report["program"]["dialect"])
     profile = dialect if isinstance(dialect, Profile) else None
     largest_um = float(result.report.get("largest_correction_um", 0.0))
+    origin = origin_of(result.nominal)
     return render(
-        nominal,
+        result.nominal,
         result.data,
         near_um=1.1 * largest_um + LAST_DIGITS_UM,
         bare_mm=partial(profile.bare_mm, machine) if profile else None,
         statements=profile is None,
+        place=str if origin is None else lambda line: origin.place(origin.line_of(line)),
         colour=(sys.stderr if on_stderr else sys.stdout).isatty(),
     )

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from olp.core.units import AXES
+from olp.program.text.line_ends import LINE_END_TEXT
 from olp.reports.report import printable, shortened
 
 #: Insertions, in lines, that are searched for the partner of a line.
@@ -29,7 +30,6 @@ _GREEN = "\x1b[32m"
 _DIM = "\x1b[2m"
 _PLAIN = "\x1b[0m"
 
-_END = re.compile(r"\r\n|\n|\r")
 _TOKEN = re.compile(r"(\([^)]*\)|;.*)|([A-Z])\s*([-+]?[\d.]+|[^\sA-Z(;]*)")
 #: Letters of words that hold lengths.
 _LENGTHS = frozenset("XYZIJKR")
@@ -79,7 +79,7 @@ class _Reader:
         self._position = _UNKNOWN
 
     def read(self, data: bytes) -> list[Line]:
-        return [self._line(text) for text in _END.split(data.decode("latin-1"))]
+        return [self._line(text) for text in LINE_END_TEXT.split(data.decode("latin-1"))]
 
     def _line(self, text: str) -> Line:
         words: list[tuple[str, str]] = []
@@ -126,7 +126,7 @@ class _StatementReader:
         self._unit_um = 1000.0
 
     def read(self, data: bytes) -> list[Line]:
-        return [self._line(text) for text in _END.split(data.decode("latin-1"))]
+        return [self._line(text) for text in LINE_END_TEXT.split(data.decode("latin-1"))]
 
     def _line(self, text: str) -> Line:
         statement = _POINT.match(text.upper())
@@ -206,13 +206,14 @@ def render(
     near_um: float = 1000.0,
     bare_mm: BareMm | None = None,
     statements: bool = False,
+    place: Callable[[int], str] = str,
     colour: bool = False,
 ) -> str:
     """The changed lines as text: line in the nominal program, nominal, corrected, change of lengths in um.
 
     The change of an axis is corrected command minus nominal command. No correction is larger than `near_um`.
     `bare_mm` is what the control takes numbers without a point for; without it they are as with one.
-    `statements`: the texts are APT or DMIS.
+    `statements`: the texts are APT or DMIS. `place` puts a line of the nominal text into words.
     """
     nominal, corrected = (
         (_StatementReader() if statements else _Reader(bare_mm)).read(data)
@@ -227,11 +228,11 @@ def render(
                 rows.append(("+", "", corrected[j].text, ""))
         elif j is None:
             counts["left out"] += 1
-            rows.append((f"- {i + 1}", nominal[i].text, "", ""))
+            rows.append((f"- {place(i + 1)}", nominal[i].text, "", ""))
         elif nominal[i].text != corrected[j].text:
             counts["changed"] += 1
             changes = "  ".join(_changes(nominal[i], corrected[j], near_um))
-            rows.append((str(i + 1), nominal[i].text, corrected[j].text, changes))
+            rows.append((place(i + 1), nominal[i].text, corrected[j].text, changes))
     total = ", ".join(f"{count} {what}" for what, count in counts.items())
     return "".join(_table(rows, colour)) + f"lines: {total}\n"
 

@@ -8,18 +8,28 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from olp.cli.common import diagnostic, files_of, machine_given, plot_ending, put, refuse_early, source
-from olp.cli.options import NUMBER, Integer, force_option, json_option, plot_option, setup_options
+from olp.cli.common import (
+    diagnostic,
+    files_of,
+    machine_given,
+    options_of,
+    plot_ending,
+    put,
+    refuse_early,
+    source,
+)
+from olp.cli.options import NUMBER, Integer, force_option, json_option, plot_option, program_options
 from olp.core.errors import UsageError
 
 if TYPE_CHECKING:
     from olp.errormodel.calibration import Calibration
+    from olp.workflows.flatten import UnrollOptions
     from olp.workflows.session import Session
 
 
 @click.command("inspect")
 @click.argument("file", metavar="PROGRAM|machine.toml", required=False)
-@setup_options
+@program_options
 @click.option(
     "--at", type=(NUMBER, NUMBER, NUMBER), metavar="X Y Z", help="Show the error at an axis position in mm."
 )
@@ -36,6 +46,7 @@ def command(
     plot: str | None,
     as_json: bool,
     force: bool,
+    **words: Any,
 ) -> None:
     """Show what a program does, or what a machine's calibration holds.
 
@@ -69,7 +80,9 @@ def command(
     elif file is None:
         values = shown = machine_summary(session)
     else:
-        values = _program(session, file, as_json=as_json)
+        from olp.workflows.flatten import UnrollOptions
+
+        values = _program(session, file, options_of(UnrollOptions, words), as_json=as_json)
         shown = values | {"support": _by_support(values.get("support") or ())}
     from olp.cli.outline import outline
     from olp.reports.report import to_json
@@ -77,13 +90,13 @@ def command(
     put(to_json(values) if as_json else outline(shown))
 
 
-def _program(session: Session, file: str, *, as_json: bool) -> dict[str, Any]:
+def _program(session: Session, file: str, options: UnrollOptions, *, as_json: bool) -> dict[str, Any]:
     """What a program does. One that is refused is reported with all the reasons, and the error is raised."""
     from olp.reports.refusals import refusals_text
     from olp.reports.report import to_json
     from olp.workflows import inspect, refusals
 
-    values, error = inspect.examined(session, source(session.sources, file))
+    values, error = inspect.examined(session, source(session.sources, file), options)
     if error is None:
         return values
     text = refusals_text(values["refused"], complete=values["refused_complete"])

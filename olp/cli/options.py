@@ -88,7 +88,8 @@ def machine_option(help: str = "The machine file.", *, required: bool = False) -
 
 
 def setup_options(function: F) -> F:
-    """-m, -j and --dialect, which every verb that needs a machine takes."""
+    """-m, -j and --dialect, which every verb that needs a machine takes; one that reads a program takes
+    `program_options`."""
     function = click.option(
         "--dialect",
         metavar="NAME",
@@ -244,24 +245,27 @@ tolerance_option = click.option(
     show_default=True,
     help="Numerical tolerance: largest deviation of the corrected path, without rounding.",
 )
-flatten_option = click.option(
-    "--flatten", is_flag=True, help="Write out loops, subprograms and expressions first."
-)
 
 
-def unroll_options(function: F) -> F:
-    """--flatten, --expand-cycles and --peck-clearance-mm."""
-    for option in (
-        click.option(
-            "--peck-clearance-mm",
-            type=Length(),
-            help="For --expand-cycles: clearance above the last peck, a parameter of Fanuc and Haas.",
-        ),
-        click.option("--expand-cycles", is_flag=True, help="Write canned cycles out as plain moves."),
-        flatten_option,
-    ):
-        function = option(function)
-    return function
+def cycle_options(function: F) -> F:
+    """--expand-cycles and --peck-clearance-mm."""
+    function = click.option(
+        "--peck-clearance-mm",
+        type=Length(),
+        help="For --expand-cycles: clearance above the last peck, a parameter of Fanuc and Haas.",
+    )(function)
+    return click.option("--expand-cycles", is_flag=True, help="Write canned cycles out as plain moves.")(
+        function
+    )
+
+
+def program_options(function: F) -> F:
+    """-m, -j and --dialect, and how a program is unrolled: the options of every verb that reads one."""
+    function = cycle_options(function)
+    function = click.option(
+        "--flatten", is_flag=True, help="Write out loops, subprograms and expressions first."
+    )(function)
+    return setup_options(function)
 
 
 def part_tolerance_option(says: str) -> Callable[[F], F]:

@@ -31,14 +31,13 @@ from olp.cli.options import (
     contour_option,
     doubt_options,
     fail_on_option,
-    flatten_option,
     force_option,
     json_option,
     output_option,
     plot_option,
+    program_options,
     quiet_option,
     report_option,
-    setup_options,
 )
 from olp.cli.progress import Report, progress
 from olp.core.errors import InputError, OlpError, UsageError, naming
@@ -55,7 +54,7 @@ FORMATS = ("csv", "npz", "parquet", "ros", "pvt")
 
 @click.command("retime")
 @click.argument("program", required=False)
-@setup_options
+@program_options
 @output_option("OUT", "The trajectory; - is stdout. Default: the report alone.")
 @click.option(
     "--format",
@@ -94,7 +93,6 @@ FORMATS = ("csv", "npz", "parquet", "ros", "pvt")
 @doubt_options
 @contour_option
 @click.option("--block-delete", is_flag=True, help="Leave / blocks out; they count as executed otherwise.")
-@flatten_option
 @report_option((".json",))
 @json_option()
 @fail_on_option
@@ -193,10 +191,10 @@ def _files(
     written: dict[Path, Content] = {}
     if outputs.output is not None and outputs.output != STREAM:
         written |= result.files(outputs.output, outputs.kind, outputs.cycle_s, outputs.stretch, show)
-    written |= {Path(name): tables.lines_csv(result.lines) for name in files_of(outputs.lines)}
+    written |= {Path(name): tables.lines_csv(result.lines, result.origin) for name in files_of(outputs.lines)}
     if feeds is not None:
         written |= {Path(name): feeds for name in files_of(outputs.write_feed)}
-    written |= {Path(name): tables.slow_csv(result.slow) for name in files_of(outputs.slow)}
+    written |= {Path(name): tables.slow_csv(result.slow, result.origin) for name in files_of(outputs.slow)}
     if outputs.plot is not None:
         start, end = outputs.plot_span or (0.0, None)
         written |= result.plots(outputs.plot, outputs.stretch, from_s=start, to_s=end)

@@ -14,8 +14,8 @@ from olp.cli.options import (
     force_option,
     json_option,
     output_option,
+    program_options,
     quiet_option,
-    setup_options,
 )
 from olp.core.errors import UsageError
 from olp.findings.rule import Severity
@@ -23,7 +23,7 @@ from olp.findings.rule import Severity
 
 @click.command("simulate")
 @click.argument("program", required=False)
-@setup_options
+@program_options
 @output_option("measured.csv", "Default: stdout; with --json no points.")
 @click.option(
     "--step-mm", type=Length(), default=1.0, show_default=True, help="Distance between points on a move."

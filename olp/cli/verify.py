@@ -10,10 +10,9 @@ from olp.cli.common import STREAM, exit_for, given, options_of, put, source
 from olp.cli.options import (
     confidence_options,
     outside_box_option,
+    program_options,
     proof_options,
     quiet_option,
-    setup_options,
-    unroll_options,
 )
 from olp.core.errors import UsageError
 
@@ -21,9 +20,8 @@ from olp.core.errors import UsageError
 @click.command("verify")
 @click.argument("nominal")
 @click.argument("corrected")
-@setup_options
+@program_options
 @proof_options
-@unroll_options
 @confidence_options
 @outside_box_option("refuse the program", "take the error at the box's face", default="hold")
 @quiet_option("No report; only the exit code.")

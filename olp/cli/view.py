@@ -18,10 +18,9 @@ from olp.cli.options import (
     force_option,
     output_option,
     outside_box_option,
+    program_options,
     quiet_option,
-    setup_options,
     tolerance_option,
-    unroll_options,
 )
 from olp.cli.progress import progress
 from olp.core.errors import UsageError, naming
@@ -32,7 +31,7 @@ if TYPE_CHECKING:
 
 @click.command("view")
 @click.argument("program", required=False)
-@setup_options
+@program_options
 @click.option("--corrected", metavar="FILE", help="The corrected program. Default: correct PROGRAM.")
 @click.option(
     "--measured", multiple=True, metavar="FILE.csv", help="Measured positions of the tip; may be repeated."
@@ -46,7 +45,6 @@ if TYPE_CHECKING:
 @outside_box_option("refuse the program", "take the error at the box's face")
 @doubt_options
 @contour_option
-@unroll_options
 @confidence_options
 @click.option("--no-time", is_flag=True, help="Do not plan the motion; times come from the programmed feed.")
 @click.option(

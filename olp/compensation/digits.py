@@ -18,6 +18,10 @@ from olp.core.arrays import Array, Index, Mask
 POW10 = 10.0 ** np.arange(19)
 #: the same as integers
 INT10 = 10 ** np.arange(19, dtype=np.int64)
+#: program units: a word that would change by no more stays as it is, whatever its digits
+NO_CHANGE = 1e-11
+#: up to this many decimals a double tells every digit of a position
+_EXACT = 9
 #: relative slack when a command is compared with half a digit
 _SLACK = 1 + 1e-9
 
@@ -96,6 +100,8 @@ def absolute(rows: AxisRows, before: float, least: int, usual: int) -> Digits:
         insert = moves & ~(np.abs(emitted - previous) < 1e-9)
     more = decimals - np.minimum(rows.decimals, decimals)
     same = (rows.word * INT10[more] if more.any() else rows.word) == mantissa
+    if count and int(decimals.max()) > _EXACT:
+        same |= np.abs(mantissa - rows.word * INT10[more]) <= NO_CHANGE * scale
     return Digits(emitted, mantissa, decimals.astype(np.int8), (fix & ~same) | insert)
 
 
@@ -104,6 +110,7 @@ def incremental(rows: AxisRows, before: float, grid: int) -> Digits:
     unit = rows.unit
     decimals = np.full(len(rows.command), grid, np.int8)
     own = rows.word * INT10[np.maximum(grid - rows.decimals, 0)]
+    fine = rows.decimals > grid
     with np.errstate(invalid="ignore"):
         place = np.rint((rows.command - before) / unit * POW10[grid])
     known = ~np.isnan(place) & ~rows.raw
@@ -112,6 +119,11 @@ def incremental(rows: AxisRows, before: float, grid: int) -> Digits:
     steps = place.astype(np.int64)
     mantissa = np.diff(steps, prepend=0)
     write = np.where(rows.given, mantissa != own, mantissa != 0)
+    if fine.any():
+        step = np.diff(rows.command, prepend=before) / unit
+        write = np.where(
+            fine & rows.given, np.abs(step - rows.word / POW10[rows.decimals]) > NO_CHANGE, write
+        )
     return Digits(before + steps / POW10[grid] * unit, mantissa, decimals, write)
 
 
@@ -131,6 +143,10 @@ def _incremental_raw(
             new = round((rows.command[i] - base) / unit * 10.0**grid)
             mantissa[i] = new - steps
             write[i] = mantissa[i] != own[i] if rows.given[i] else mantissa[i] != 0
+            if rows.given[i] and rows.decimals[i] > grid:
+                last = rows.command[i - 1] if i and known[i - 1] else position
+                step = (rows.command[i] - last) / unit
+                write[i] = abs(step - rows.word[i] / 10.0 ** int(rows.decimals[i])) > NO_CHANGE
             steps = new
             position = base + steps / 10.0**grid * unit
         else:

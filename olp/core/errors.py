@@ -86,7 +86,8 @@ class ProgramError(InputError):
     `code` says why, as a row of `olp.findings.codes.refusal`. `others` are refusals of other lines that were
     found at the same time. `missing` is the table and the name of what machine and job do not define, such
     as ("tools", "7"). `hint` is the end of the message: what to do, where that may not help.
-    `word` is the word of a block that is refused, such as "G68", where the rest of the block could be read.
+    `word` is the word of a block that is refused, such as "G68", where the rest of the block could be read;
+    of other words than G and M the letter.
     """
 
     def __init__(
@@ -119,24 +120,30 @@ class ProgramError(InputError):
 @dataclass(frozen=True, slots=True)
 class Reason:
     """Why one statement is refused; `statement` is its text, shortened. It `follows` perhaps from what was
-    refused in that line, else None."""
+    refused in that line, else None. The lines are those of `file` and `follows_file`, files of subprograms
+    that were unrolled; None is the program itself."""
 
     line: int | None
     code: str
     message: str
     statement: str
     follows: int | None = None
+    file: str | None = None
+    follows_file: str | None = None
 
     @property
     def sentence(self) -> str:
         """The message, and what it may follow from."""
-        after = "" if self.follows is None else f" (it may follow from line {self.follows})"
-        return f"{self.message}{after}"
+        if self.follows is None:
+            return self.message
+        apart = self.follows_file != self.file
+        there = f" of {self.follows_file or 'the program'}" if apart else ""
+        return f"{self.message} (it may follow from line {self.follows}{there})"
 
     @property
-    def kind(self) -> tuple[str, str, bool]:
+    def kind(self) -> tuple[str | None, str, str, bool]:
         """What reasons that are alike have in common: all but the text and the numbers of the statement."""
-        return self.code, _OWN.sub("", self.message), self.follows is None
+        return self.file, self.code, _OWN.sub("", self.message), self.follows is None
 
 
 class Refused(ProgramError):
@@ -147,13 +154,16 @@ class Refused(ProgramError):
     LISTED = 20
 
     def __init__(self, reasons: tuple[Reason, ...], *, complete: bool) -> None:
-        super().__init__(reasons[0].message, line=reasons[0].line, code=reasons[0].code)
+        first = reasons[0]
+        super().__init__(first.message, file=first.file, line=first.line, code=first.code)
         self.reasons = reasons
         self.complete = complete
 
     def __str__(self) -> str:
-        prefix = f"{self.file}:" if self.file else ""
-        lines = [f"{prefix}{reason.line}: {reason.sentence}" for reason in self.reasons[: self.LISTED]]
+        lines = []
+        for reason in self.reasons[: self.LISTED]:
+            file = reason.file or self.file
+            lines.append(f"{f'{file}:' if file else ''}{reason.line}: {reason.sentence}")
         more = len(self.reasons) - self.LISTED
         place = f"{self.file}: " if self.file else ""
         if more > 0:

@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from olp.core.errors import ConfigError, UsageError
 from olp.core.units import AXES
+from olp.program.origin import Files, Origin
 from olp.trajectory.plan import Trajectory
 from olp.trajectory.usage import LIMITS, LineUse, SlowStretches
 
@@ -196,9 +197,17 @@ def pvt(trajectory: Trajectory, cycle_s: float) -> Iterator[bytes]:
         yield "".join(lines).encode()
 
 
-def lines_csv(use: LineUse) -> Iterator[bytes]:
-    """One row per line that moves. The feed of a line with rapids only is empty."""
-    yield (",".join(LINE_COLUMNS) + "\n").encode()
+def _head(columns: Sequence[str], origin: Origin | None) -> bytes:
+    more = Files(origin).head
+    names = (f"line{more}" if column == "line" else column for column in columns)
+    return (",".join(names) + "\n").encode()
+
+
+def lines_csv(use: LineUse, origin: Origin | None = None) -> Iterator[bytes]:
+    """One row per line that moves, with its file where `origin` has several. The feed of a line with rapids
+    only is empty."""
+    yield _head(LINE_COLUMNS, origin)
+    files = Files(origin)
     limit = use.limit()
     held = use.at_limit_s[np.arange(len(use)), limit]
     columns = (
@@ -211,20 +220,23 @@ def lines_csv(use: LineUse) -> Iterator[bytes]:
         for line, seconds, dwell, length, feed, achieved, fastest, lost, which, at_limit in part:
             shown = f"{feed:.6g}" if np.isfinite(feed) else ""
             texts.append(
-                f"{line},{seconds:.9f},{dwell:.9g},{length:.6f},{shown},{achieved:.6g},{fastest:.6g},"
+                f"{files.cells(line)},{seconds:.9f},{dwell:.9g},{length:.6f},{shown},{achieved:.6g},{fastest:.6g},"
                 f"{lost:.9f},{LIMITS[which]},{at_limit:.9f}\n"
             )
         yield "".join(texts).encode()
 
 
-def slow_csv(parts: Sequence[SlowStretches]) -> Iterator[bytes]:
-    """One row per section below half the feed. Times count from the start of its stretch."""
-    yield (",".join(SLOW_COLUMNS) + "\n").encode()
+def slow_csv(parts: Sequence[SlowStretches], origin: Origin | None = None) -> Iterator[bytes]:
+    """One row per section below half the feed, with its file where `origin` has several. Times count from the
+    start of its stretch."""
+    yield _head(SLOW_COLUMNS, origin)
+    files = Files(origin)
     for stretch, slow in enumerate(parts, 1):
         for i in range(len(slow)):
             x, y, z = slow.position_mm[i].tolist()
+            line = files.cells(int(slow.line[i]))
             yield (
-                f"{stretch},{slow.start_s[i]:.6f},{slow.seconds[i]:.6f},{slow.lost_s[i]:.6f},{slow.line[i]},"
+                f"{stretch},{slow.start_s[i]:.6f},{slow.seconds[i]:.6f},{slow.lost_s[i]:.6f},{line},"
                 f"{x:.6f},{y:.6f},{z:.6f},{slow.slowest_mm_s[i]:.6g},{slow.feed_mm_s[i]:.6g},"
                 f"{LIMITS[int(slow.limit[i])]}\n"
             ).encode()

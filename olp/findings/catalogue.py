@@ -18,7 +18,8 @@ from olp.findings.rule import Rule, Severity
 @dataclass(frozen=True, slots=True)
 class Finding:
     """One finding; `line` counts from 1 in the program, `lines` are the first few of all lines concerned.
-    A doubt that is `accepted` is one step less severe."""
+    `files` are their files where some are not the program's (""); the first is that of `line`. A doubt that
+    is `accepted` is one step less severe."""
 
     code: str
     message: str
@@ -26,6 +27,7 @@ class Finding:
     lines: tuple[int, ...] = ()
     count: int = 1
     accepted: bool = False
+    files: tuple[str, ...] = ()
 
     @property
     def severity(self) -> Severity:
@@ -45,6 +47,8 @@ class Finding:
             "lines": list(self.lines),
             "count": self.count,
         }
+        if self.files:
+            stated |= ({"file": self.files[0]} if self.files[0] else {}) | {"files": list(self.files)}
         return stated | ({"accepted": True} if self.accepted else {})
 
 

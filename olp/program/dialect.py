@@ -15,6 +15,9 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
+from olp.program.origin import Unrolled
+from olp.program.text.line_ends import split
+
 
 @dataclass(frozen=True, slots=True)
 class Options:
@@ -78,7 +81,7 @@ class Dialect:
     title: str
     path_mode: str
     reader: Callable[..., Any]
-    unroller: Callable[..., bytes] | None = None
+    unroller: Callable[..., Unrolled] | None = None
     endings: tuple[str, ...] = ()
     sign: re.Pattern[bytes] | None = None
     shared_sign: re.Pattern[bytes] | None = None
@@ -95,6 +98,10 @@ class Dialect:
     def rows(self) -> Sequence[Row]:
         """The support matrix, from the table that the reader uses."""
         raise NotImplementedError
+
+    def lines(self, data: bytes) -> list[bytes]:
+        """The lines of a text with their ends, as errors count them."""
+        return split(data)
 
     def continues(self, line: bytes) -> bool:
         """Whether the statement of a line goes on in the next line."""
@@ -114,6 +121,10 @@ class StatementDialect(Dialect):
     """A dialect of whole statements: `table` says what becomes of each by its name, and why."""
 
     table: Mapping[bytes, tuple[Support, str]]
+
+    def lines(self, data: bytes) -> list[bytes]:
+        """The lines of a text with their ends, as errors count them."""
+        return split(data)
 
     def continues(self, line: bytes) -> bool:
         return line.rstrip().endswith(b"$") and b"$$" not in line

@@ -21,6 +21,7 @@ import numpy.typing as npt
 from olp.core.arrays import Mask
 from olp.core.errors import ProgramError
 from olp.program.rs274.lexer import WordChunk
+from olp.program.text.line_ends import LINE_END
 
 _DIRECTIVE = re.compile(rb"([(;])[ \t]*olp[ \t]+([^\r\n]*)", re.IGNORECASE)
 _SWITCH = re.compile(rb"(off|on)\b", re.IGNORECASE)
@@ -30,7 +31,6 @@ _PAYLOAD = re.compile(
 _MARKED = re.compile(
     rb"[(;][ \t]*olp[ \t]+payload[ \t]+([\d.]+)[ \t]*(?:kg)?[ \t]*(?:,[ \t]*line[ \t]+(\d+))?", re.IGNORECASE
 )
-_LINE_END = re.compile(rb"\r\n|\n|\r")
 
 
 class Directives:
@@ -112,7 +112,7 @@ def with_payloads(data: bytes, payloads: Mapping[int, float], comment: tuple[byt
             raise ProgramError(
                 "the program states a payload here, and the job file states payloads in [[payloads]]; "
                 "expected one of the two",
-                line=len(_LINE_END.findall(data, 0, match.start())) + 1,
+                line=len(LINE_END.findall(data, 0, match.start())) + 1,
                 code="OLP550",
             )
         marks[int(match[2])] = float(match[1])
@@ -124,8 +124,8 @@ def with_payloads(data: bytes, payloads: Mapping[int, float], comment: tuple[byt
                 code="OLP550",
             )
         return data
-    ends = [m.start() for m in _LINE_END.finditer(data)]
-    starts = [0, *(m.end() for m in _LINE_END.finditer(data))]
+    ends = [m.start() for m in LINE_END.finditer(data)]
+    starts = [0, *(m.end() for m in LINE_END.finditer(data))]
     ends += [len(data)]
     pieces, done = [], 0
     for line, mass in sorted(payloads.items()):

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -11,8 +12,10 @@ import numpy.typing as npt
 from olp.core.arrays import Index
 from olp.core.toolpath import Toolpath
 from olp.program.dialect import Dialect
+from olp.program.origin import Origin, in_original, origin_of
 from olp.program.rs274.profiles.base import Profile
 from olp.program.rs274.state import Capture, PathMode
+from olp.program.text.line_ends import LINE_END
 
 Small = npt.NDArray[np.int32]
 
@@ -136,7 +139,8 @@ class Statements:
 @dataclass(frozen=True, slots=True, eq=False)
 class Program:
     """`slot` (n, 3): index of the X, Y, Z word of each move, -1 where omitted. `calculator`: lengths without
-    a decimal point are whole units. `statements` is None for blocks of words."""
+    a decimal point are whole units. `statements` is None for blocks of words. `by_original`: lines are those
+    of the text that this one was unrolled from (`in_original`)."""
 
     data: bytes
     dialect: Dialect
@@ -153,10 +157,47 @@ class Program:
     end_line: int = 0
     calculator: bool = True
     statements: Statements | None = None
+    by_original: bool = False
 
     @property
     def lines(self) -> int:
-        return len(self.line_start)
+        """The lines of the text, or of the original."""
+        origin = self.origin
+        return origin.lines if origin is not None and self.by_original else len(self.line_start)
+
+    @property
+    def origin(self) -> Origin | None:
+        """Where the lines of the text come from; None where it was not unrolled."""
+        return origin_of(self.data)
+
+    def in_original(self) -> Program:
+        """The same with the lines of the text that this one was unrolled from, as people are told them. Lines
+        do not rise any more, so it is neither written nor timed."""
+        origin = self.origin
+        if origin is None or self.by_original:
+            return self
+        line_of, path = origin.line_of, self.toolpath
+        return replace(
+            self,
+            toolpath=replace(path, line=self.original_lines(path.line).astype(np.int32)),
+            path_modes=tuple(replace(mode, line=line_of(mode.line)) for mode in self.path_modes),
+            holes=tuple(replace(hole, line=line_of(hole.line)) for hole in self.holes),
+            remarks=tuple((name, line_of(line), text) for name, line, text in self.remarks),
+            by_original=True,
+        )
+
+    def original_lines(self, line: npt.ArrayLike) -> Index:
+        """The lines that lines of the text were made from; the same where it was not unrolled."""
+        origin = self.origin
+        return np.asarray(line, np.int64) if origin is None else origin.lines_of(line)
+
+    def errors(self) -> AbstractContextManager[None]:
+        """Errors with a line of the text get the line of its original, where it was unrolled."""
+        return in_original(self.data)
+
+    def place(self, line: int) -> str:
+        """A line in words; of the original with its file where that is not the program's."""
+        return self.origin.place(line) if self.origin is not None and self.by_original else str(line)
 
     @property
     def verbatim(self) -> bool:
@@ -171,14 +212,12 @@ class Program:
 
     def text(self, line: int) -> str:
         """The text of a line, counted from 1, for messages."""
+        if self.origin is not None and self.by_original:
+            return self.origin.text(line)
         return self.data[int(self.line_start[line - 1]) : int(self.line_end[line - 1])].decode("latin-1")
 
     def eol(self, line: int) -> bytes:
         """The line end that a block after this line takes: this line's, or the first one of the text."""
         end = int(self.line_end[line - 1])
-        for mark in (b"\r\n", b"\r\r\n"):
-            if self.data[end : end + len(mark)] == mark:
-                return mark
-        if self.data[end : end + 1] in (b"\n", b"\r"):
-            return self.data[end : end + 1]
-        return b"\r\n" if b"\r\n" in self.data[:4096] else b"\n"
+        mark = LINE_END.match(self.data, end) or LINE_END.search(self.data)
+        return mark[0] if mark else b"\n"

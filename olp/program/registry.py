@@ -16,6 +16,7 @@ from olp.core.errors import ProgramError, UsageError
 from olp.core.machine import Setup
 from olp.program.dialect import Dialect
 from olp.program.dialect import Options as Options
+from olp.program.origin import in_original
 from olp.program.program import Program
 
 _MODULES = (
@@ -55,13 +56,14 @@ def read(
     data: bytes, setup: Setup, dialect: Dialect, options: Options | None = None, *, words: bool = True
 ) -> Program:
     """Read a whole program. Raises ProgramError with the line of the first statement that cannot be read
-    correctly.
+    correctly; of an unrolled text with the line, and the file, that it was made from.
 
     Without `words` the columns that only writing needs are left out.
     """
-    if not dialect.payload_comments:
-        _refuse_payloads(data, setup, dialect)
-    program: Program = dialect.reader(data, setup, dialect, options or Options(), words=words)
+    with in_original(data):
+        if not dialect.payload_comments:
+            _refuse_payloads(data, setup, dialect)
+        program: Program = dialect.reader(data, setup, dialect, options or Options(), words=words)
     return program
 
 

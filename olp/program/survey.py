@@ -5,6 +5,9 @@ defined is defined. A start position that is not known is set to zero. Any other
 out: its bytes become blanks, so that lines keep their numbers. In blocks of words the refused G or M word
 goes alone, and an arc becomes straight, so that positions remain. Refusals that may be there only because of
 a repair say so.
+
+A program that is to be unrolled is mended in its own lines, and in those of the files of its subprograms,
+and is unrolled again for each reading.
 """
 
 from __future__ import annotations
@@ -13,29 +16,38 @@ import re
 from bisect import bisect_left
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 
 from olp.core.errors import ProgramError, Reason, Refused
 from olp.core.machine import ZERO, Setup, Tool, WorkOffset
 from olp.findings.catalogue import RULES
 from olp.program.dialect import Dialect, Options
 from olp.program.foreign import recognised
+from olp.program.origin import Unrolled
 from olp.program.program import Program
 from olp.program.registry import read
 
-#: Gives the file of a subprogram by its name, None where there is none.
-Subprograms = Callable[[str], bytes | None]
+#: Gives name and text of the file of a subprogram by its name, None where there is none.
+Subprograms = Callable[[str], tuple[str, bytes] | None]
+#: Gives the text that is taken instead of the one of a file; of the program where it has no name.
+Change = Callable[[str | None, bytes], bytes]
+#: Unrolls a program with its texts changed, in so many blocks at most (None: as many as usual).
+Unroll = Callable[[Change, int | None], Unrolled]
+#: A file, "" for the program, and a line of it from 1.
+_Place = tuple[str, int]
 
 #: Most readings of one text; each finds at least one refusal, most find all of a kind.
 READINGS = 40
 #: Most bytes that are read in all: eight readings of a text of 100 kB.
 BYTES = 800_000
+#: What an unrolling counts as beside the bytes of its text.
+REFUSED_BYTES = BYTES // 20
 #: Least number of readings of a long text.
 LEAST_READINGS = 3
 #: Most characters of a statement that are shown.
 SHOWN = 60
 
-_LINE_END = re.compile(rb"\r\n|\n|\r")
+#: A number behind its letter; that of an expression goes with its whole block.
+_NUMBER = rb"[ \t]*[-+]?[ \t]*[\d.]+"
 _NO_LINE_END = re.compile(rb"[^\r\n]")
 #: Most blocks of an unrolling that is tried; a longer one counts as one that helps.
 UNROLLED = 20_000
@@ -48,6 +60,11 @@ ARC = "OLP530"
 COMMENT = "OLP514"
 
 
+def as_it_is(file: str | None, text: bytes) -> bytes:
+    """Changes nothing."""
+    return text
+
+
 def read_all(
     data: bytes,
     setup: Setup,
@@ -56,121 +73,172 @@ def read_all(
     *,
     words: bool = True,
     subprograms: Subprograms | None = None,
+    unroll: Unroll | None = None,
+    expands: bool = False,
 ) -> Program:
-    """As `olp.program.registry.read`, and a refusal has all reasons; `subprograms` gives the file of one for
-    unrolling, if that would help. Raises Refused where there are several, ProgramError where there is one."""
+    """As `olp.program.registry.read`, and a refusal has all reasons. With `unroll` the program is unrolled
+    first, and lines are those of the original; `expands` says that its canned cycles are plain moves then.
+    Else `subprograms` gives the file of one, to see whether unrolling would help. Raises Refused where there
+    are several reasons, ProgramError where there is one."""
+    options = options or Options()
     try:
-        return read(data, setup, dialect, options, words=words)
+        text = data if unroll is None else unroll(as_it_is, None)
+        return read(text, setup, dialect, options, words=words)
     except ProgramError as error:
         certain = dialect.sign is not None or setup.job.described is not None
         other = recognised(data, languages=not certain)
         if other is not None:
             raise other from None
-        raise refused(data, setup, dialect, options or Options(), error, subprograms) from None
+        # an unrolled text has no statements of its own
+        if error.line is None or isinstance(data, Unrolled):
+            raise
+        survey = _Survey(data, setup, dialect, options, unroll)
+        if survey.ran_long(error):
+            raise
+        if unroll is not None and not expands:
+            plain = _plain(replace(survey, unroll=None))
+            if plain is not None:
+                raise plain from None
+        complete = survey.run(error)
+        if unroll is None:
+            survey.judge_hints(subprograms)
+        raise survey.error(complete=complete) from None
 
 
-def refused(
-    data: bytes,
-    setup: Setup,
-    dialect: Dialect,
-    options: Options,
-    first: ProgramError,
-    subprograms: Subprograms | None = None,
-) -> ProgramError:
-    """All that is refused in a program whose reading ended with the error `first`."""
-    if first.line is None:
-        return first
-    survey = _Survey(data, setup, dialect, options)
-    complete = survey.run(first)
-    survey.judge_hints(subprograms)
-    reasons = survey.reasons()
-    return first if len(reasons) == 1 and complete else Refused(reasons, complete=complete)
+def _plain(survey: _Survey) -> ProgramError | None:
+    """All that is refused in a program that needs no unrolling, the same as without; None for others."""
+    error = survey.reading()
+    if error is None or error.line is None:
+        return None
+    complete = survey.run(error)
+    return None if survey.hinted() else survey.error(complete=complete)
 
 
 @dataclass(slots=True, eq=False)
 class _Survey:
-    """The text with its repairs, and what was refused in it."""
+    """The texts with their repairs, and what was refused in them; texts are by file, "" for the program."""
 
     data: bytes
     setup: Setup
     dialect: Dialect
     options: Options
-    #: refusals by line and message, each with the line that it may follow from
-    errors: dict[tuple[int, str], tuple[ProgramError, int | None]] = field(default_factory=dict)
-    #: lines whose statements were taken out, in order
-    taken: list[int] = field(default_factory=list)
-    #: the lines of the text with their ends, as they are and with the repairs
-    whole: list[bytes] = field(init=False)
-    lines: list[bytes] = field(init=False)
+    unroll: Unroll | None = None
+    #: refusals by place and message, each with the place that it may follow from
+    errors: dict[tuple[_Place, str], tuple[ProgramError, _Place | None]] = field(init=False)
+    #: where statements were taken out
+    taken: list[_Place] = field(init=False)
+    #: the lines of the texts with their ends, as they are and with the repairs
+    whole: dict[str, list[bytes]] = field(init=False)
+    lines: dict[str, list[bytes]] = field(init=False)
+    #: bytes that were read
+    spent: int = field(init=False)
 
     def __post_init__(self) -> None:
-        ends = [match.end() for match in _LINE_END.finditer(self.data)]
-        self.whole = [self.data[a:b] for a, b in pairwise((0, *ends, len(self.data)))]
-        self.lines = list(self.whole)
+        self.errors, self.taken, self.whole, self.lines, self.spent = {}, [], {}, {}, 0
+        self._mended(None, self.data)
 
-    def run(self, error: ProgramError) -> bool:
+    def _mended(self, file: str | None, text: bytes) -> bytes:
+        """A text with its repairs."""
+        name = file or ""
+        if name not in self.lines:
+            self.whole[name] = self.dialect.lines(text)
+            self.lines[name] = list(self.whole[name])
+        return b"".join(self.lines[name])
+
+    def reading(self) -> ProgramError | None:
+        """Read the text with its repairs; why it is refused."""
+        try:
+            text = self._mended(None, self.data)
+            if self.unroll is not None:
+                # one that is refused may have run long
+                self.spent += REFUSED_BYTES
+                text = self.unroll(self._mended, UNROLLED)
+            self.spent += len(text)
+            read(text, self.setup, self.dialect, self.options, words=False)
+        except ProgramError as error:
+            return error
+        return None
+
+    def run(self, error: ProgramError | None) -> bool:
         """Read until nothing is refused; False where the survey ends before that."""
-        for _ in range(max(LEAST_READINGS, min(READINGS, BYTES // max(len(self.data), 1)))):
-            before = (self.setup, list(self.lines))
+        before_all, most = self.spent, BYTES - len(self.data)
+        for reading in range(READINGS):
+            if error is None:
+                return True
+            if reading >= LEAST_READINGS and self.spent - before_all > most:
+                return False
+            before = (self.setup, {file: list(lines) for file, lines in self.lines.items()})
             # those of one reading do not follow from each other
             taken = sorted(self.taken)
             for each in (error, *error.others):
                 self._note(each, taken)
             if (self.setup, self.lines) == before:
                 return False
-            try:
-                read(b"".join(self.lines), self.setup, self.dialect, self.options, words=False)
-                return True
-            except ProgramError as another:
-                error = another
-            if error.line is None:
+            error = self.reading()
+            if error is not None and (error.line is None or self.ran_long(error)):
                 return False
-        return False
+        return error is None
 
-    def _note(self, error: ProgramError, taken: list[int]) -> None:
-        """Note a refusal, and mend what is refused. `taken` are the lines taken out before this reading."""
-        line = error.line or 1
-        key = (line, error.message)
+    def ran_long(self, error: ProgramError) -> bool:
+        """Whether unrolling ended at its limit; there is nothing to mend then."""
+        return self.unroll is not None and error.code == TOO_LONG
+
+    def _note(self, error: ProgramError, taken: list[_Place]) -> None:
+        """Note a refusal, and mend what is refused. `taken` is where statements were taken out before this
+        reading."""
+        place = (error.file or "", error.line or 1)
+        key = (place, error.message)
         again = key in self.errors
-        if not again:
-            before = bisect_left(taken, line) if RULES[error.code].follows else 0
+        follows = RULES[error.code].follows
+        if self.unroll is not None and error.hint:
+            instead = "--flatten does not unroll it; write plain blocks"
+            error.message, error.hint = error.message.removesuffix(error.hint) + instead, ""
+        # the rest of a block without its refused word is refused only because of that
+        if not again and not (follows and place in taken):
+            before = bisect_left(taken, place) if follows else 0
             self.errors[key] = (error, taken[before - 1] if before else None)
         if error.missing is not None and not again:
             self.setup = _defined(self.setup, *error.missing)
         elif error.code == UNKNOWN_POSITION and not again and None in self.setup.job.start_mm:
             x, y, z = (0.0 if value is None else value for value in self.setup.job.start_mm)
             self.setup = replace(self.setup, job=replace(self.setup.job, start_mm=(x, y, z)))
-        elif line <= len(self.lines):
-            self._take_out(error, line - 1, again=again)
+        elif place[0] in self.lines and place[1] <= len(self.lines[place[0]]):
+            self._take_out(error, place, again=again)
 
-    def _take_out(self, error: ProgramError, index: int, *, again: bool) -> None:
+    def _take_out(self, error: ProgramError, place: _Place, *, again: bool) -> None:
         """Blank the word that is refused, or the statement with the lines that it goes on in."""
+        lines, index = self.lines[place[0]], place[1] - 1
         if error.code == ARC and not again:
-            line = self.lines[index]
-            self.lines[index] = self.dialect.straightened(line)
-            if self.lines[index] != line:
+            line = lines[index]
+            lines[index] = self.dialect.straightened(line)
+            if lines[index] != line:
                 return
         if error.code != COMMENT:
-            self.taken.append(index + 1)
+            self.taken.append(place)
         if error.word and not again:
-            form = rb"(?i)" + error.word[:1].encode() + rb"0*" + re.escape(error.word[1:].encode())
-            text = re.sub(form + rb"(?![\d.])", lambda m: b" " * len(m[0]), self.lines[index])
-            if text != self.lines[index]:
-                self.lines[index] = text
+            number = rb"0*" + re.escape(error.word[1:].encode()) + rb"(?![\d.])"
+            form = rb"(?i)" + error.word[:1].encode() + (number if error.word[1:] else _NUMBER)
+            text = re.sub(form, lambda m: b" " * len(m[0]), lines[index])
+            if text != lines[index]:
+                lines[index] = text
                 return
         goes_on = True
-        while goes_on and index < len(self.lines):
-            goes_on = self.dialect.continues(self.lines[index])
-            self.lines[index] = _NO_LINE_END.sub(b" ", self.lines[index])
+        while goes_on and index < len(lines):
+            goes_on = self.dialect.continues(lines[index])
+            lines[index] = _NO_LINE_END.sub(b" ", lines[index])
             index += 1
+
+    def hinted(self) -> list[ProgramError]:
+        """The refusals that unrolling may help with."""
+        return [error for error, _ in self.errors.values() if error.hint]
 
     def judge_hints(self, subprograms: Subprograms | None) -> None:
         """Replace the hint to unroll a text that cannot be unrolled by the reason for that. The refusals
         without the hint are taken out before."""
-        hinted = [error for error, _ in self.errors.values() if error.hint]
+        hinted = self.hinted()
         if not hinted or self.dialect.unroller is None:
             return
-        text = list(self.whole)
+        text = list(self.whole[""])
         for error, _ in self.errors.values():
             if not error.hint and error.line is not None and error.line <= len(text):
                 text[error.line - 1] = _NO_LINE_END.sub(b" ", text[error.line - 1])
@@ -181,24 +249,29 @@ class _Survey:
             if error.code == TOO_LONG:
                 return
             place = f"line {error.line}" + (f" of {error.file}" if error.file else "")
-            instead = f"olp correct --flatten does not unroll it: {place}: {error.message}"
+            instead = f"--flatten does not unroll it: {place}: {error.message}"
             for each in hinted:
                 each.message = each.message.removesuffix(each.hint) + instead
                 each.hint = ""
 
-    def reasons(self) -> tuple[Reason, ...]:
-        """What was refused, in the order of lines."""
-        rows = sorted(self.errors.values(), key=lambda row: row[0].line or 0)
-        return tuple(
+    def error(self, *, complete: bool) -> ProgramError:
+        """What was refused, in the order of lines; a single refusal as it is."""
+        rows = sorted(self.errors.items(), key=lambda row: row[0][0])
+        if len(rows) == 1 and complete:
+            return rows[0][1][0]
+        reasons = tuple(
             Reason(
-                line=error.line or 1, code=error.code, message=error.message,
-                statement=self._statement(error.line or 1), follows=follows,
+                line=place[1], code=error.code, message=error.message, statement=self._statement(place),
+                follows=follows[1] if follows else None, file=place[0] or None,
+                follows_file=follows[0] or None if follows else None,
             )
-            for error, follows in rows
+            for (place, _), (error, follows) in rows
         )  # fmt: skip
+        return Refused(reasons, complete=complete)
 
-    def _statement(self, line: int) -> str:
-        text = self.whole[line - 1] if line <= len(self.whole) else b""
+    def _statement(self, place: _Place) -> str:
+        lines, line = self.whole.get(place[0], []), place[1]
+        text = lines[line - 1] if line <= len(lines) else b""
         shown = text.strip()[:SHOWN].decode("utf-8", "replace")
         return "".join(c if c.isprintable() else "?" for c in shown)
 

@@ -15,6 +15,7 @@ from olp.core.toolpath import Arcs, Frame, Kind, Toolpath
 from olp.program.dialect import Dialect
 from olp.program.pointlist.columns import plain_numbers
 from olp.program.program import ArcSlots, Program, StatedFeeds, Statements, Words
+from olp.program.text.line_ends import split
 from olp.program.text.numbers import MOST_DECIMALS, number
 
 Small = npt.NDArray[np.int32]
@@ -158,7 +159,7 @@ def _line_bounds(data: bytes) -> tuple[Small, Small]:
         return np.concatenate(([0], ends[:-1] + 1)).astype(np.int32), ends.astype(np.int32)
     starts, stops = [], []
     begin = 0
-    for raw in data.splitlines(keepends=True):
+    for raw in split(data):
         starts.append(begin)
         stops.append(begin + len(raw.rstrip(b"\r\n")))
         begin += len(raw)

@@ -7,7 +7,7 @@ program are groups of rows. Nothing else decides whether a program is within tol
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -181,16 +181,17 @@ def _measured_columns(
 
 def verdict(
     table: Judgements, part_tolerance_um: float | None, uncertainty: dict[str, Any] | None,
-    findings: Iterable[Finding],
+    findings: Iterable[Finding], place: Callable[[int], str] = str,
 ) -> dict[str, Any]:  # fmt: skip
     """The verdict on a proved program, in values and in sentences. `numerical`: does the written program do
     what the model asks. `part`: is the part good as far as that is known, None without a part tolerance.
     `ok` is False where either fails, or another finding is an error. It is None where nothing could be
-    judged, a feed move could not, or the part is good with a probability that is too low."""
+    judged, a feed move could not, or the part is good with a probability that is too low. `place` puts a line
+    into words."""
     numerical = _numerical(table)
     part = None if part_tolerance_um is None else _part(table, part_tolerance_um, uncertainty)
     errors = sorted({f.code for f in findings if f.severity >= Severity.ERROR} - _OWN)
-    sentences = [_numerical_sentence(numerical)]
+    sentences = [_numerical_sentence(numerical, place)]
     if numerical["unknown"]:
         sentences.append(f"{numerical['unknown']} feed moves to unknown positions are not judged.")
     if part is not None:
@@ -272,12 +273,12 @@ def _um(value: float) -> str:
     return "<0.01" if 0.0 < value < 0.005 else f"{value:.2f}"
 
 
-def _numerical_sentence(numerical: dict[str, Any]) -> str:
+def _numerical_sentence(numerical: dict[str, Any], place: Callable[[int], str]) -> str:
     if numerical["holds"] is None:
         return "Not judged: the program has no feed move, hole or point at a known position."
     word = "Within tolerance" if numerical["holds"] else "ABOVE TOLERANCE"
     largest, allowed = _um(numerical["largest_um"]), _um(numerical["allowed_um"])
-    left = f", where line {numerical['line']} is left uncorrected" if numerical["left"] else ""
+    left = f", where line {place(numerical['line'])} is left uncorrected" if numerical["left"] else ""
     return (
         f"{word}: the corrected path is at most {largest} um from the nominal one{left}; {allowed} um are "
         f"allowed (numerical tolerance {numerical['tolerance_um']:g} um, rounding "

@@ -73,7 +73,7 @@ def match(program: Program, target_mm: Array, corrected: Program, model: ErrorMo
     tip = path.end_mm + np.nan_to_num(model.error(path.end_mm, path.tool_mm(), play))
     aligned = _Alignment(program.toolpath, target_mm, mine, path, tip, theirs, near_mm)
     ends = aligned.ends()
-    _refuse_others(program.toolpath, target_mm, mine, tip[theirs.last[ends]])
+    _refuse_others(program, target_mm, mine, tip[theirs.last[ends]])
     return _groups(target_mm, mine, tip, theirs, ends)
 
 
@@ -328,16 +328,18 @@ def _apart(tip: Array, target: Array) -> Array:
     return np.where(np.isnan(tip) & np.isnan(target), 0.0, np.nan_to_num(away, nan=_FAR_MM))
 
 
-def _refuse_others(nominal: Toolpath, target: Array, mine: _Units, tip: Array) -> None:
+def _refuse_others(program: Program, target: Array, mine: _Units, tip: Array) -> None:
     """Raise ProgramError where most waypoints are far off: this is another job."""
+    nominal = program.toolpath
     counted = ((nominal.flag[mine.last] & _FREE) == 0) & ~np.isnan(target[mine.last]).all(axis=1)
     near = np.asarray(_apart(tip, target[mine.last]).max(axis=1, initial=0.0) < _FAR_MM, bool)
     far = np.asarray(counted & ~near, bool)
     if counted.any() and far.sum() > _MOST_FAR * counted.sum():
-        first = int(mine.last[np.argmax(far)])
+        stated = program.in_original()
+        line = stated.place(int(stated.toolpath.line[mine.last[np.argmax(far)]]))
         raise ProgramError(
             f"{int(far.sum())} of {int(counted.sum())} waypoints are farther than {_FAR_MM:g} mm from those "
-            f"of the nominal program, the first at its line {int(nominal.line[first])}; it is not a "
+            f"of the nominal program, the first at its line {line}; it is not a "
             "correction of this program for this machine",
             code="OLP562",
         )

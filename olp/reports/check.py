@@ -17,7 +17,7 @@ from olp.core.version import __version__
 from olp.findings.catalogue import GATE_CODES, RULES
 from olp.findings.rule import Rule, Severity
 from olp.reports.refusals import refusals_text
-from olp.reports.report import WIDTH, Report, findings_text, number, pairs, printable, table, to_json
+from olp.reports.report import WIDTH, Report, findings_text, number, pairs, place, printable, table, to_json
 
 #: Level of SARIF by severity.
 _LEVEL = {Severity.INFO: "note", Severity.WARNING: "warning", Severity.ERROR: "error"}
@@ -62,7 +62,7 @@ def _clearance(report: Report) -> Iterator[str]:
     yield "Least clearance in mm, point in the frame of the mesh"
     rows = [
         [
-            str(b["line"]), b["part"], printable(b["mesh"]), number(b["clearance_mm"], 3),
+            place(b), b["part"], printable(b["mesh"]), number(b["clearance_mm"], 3),
             " ".join(number(v, 3) for v in b["point_mm"]),
         ]
         for b in sorted(blocks, key=lambda b: b["clearance_mm"])[:_NEAREST]
@@ -94,7 +94,7 @@ def to_sarif(report: Report, fail_on: str) -> str:
     """SARIF 2.1.0 (OASIS): a run with every rule that was checked. A finding without a line is located at the
     program as a whole; further lines are related locations."""
     rules = [RULES[code] for code in report["rules"]]
-    uri = _uri(report["program"]["path"])
+    path = report["program"]["path"]
     refused = bool(report.get("refused"))
     run: dict[str, Any] = {
         "tool": {
@@ -105,7 +105,7 @@ def to_sarif(report: Report, fail_on: str) -> str:
             }
         },
         "columnKind": "unicodeCodePoints",
-        "results": [_sarif_result(f, report["rules"], uri) for f in report["findings"]],
+        "results": [_sarif_result(f, report["rules"], path) for f in report["findings"]],
         "invocations": [{"executionSuccessful": not refused, "exitCode": _exit_code(report, fail_on)}],
     }
     if report["verdict"] is not None:
@@ -129,25 +129,29 @@ def _sarif_rule(rule: Rule) -> dict[str, Any]:
     }
 
 
-def _sarif_result(finding: Mapping[str, Any], rules: Sequence[str], uri: str) -> dict[str, Any]:
-    def place(line: int | None) -> dict[str, Any]:
+def _sarif_result(finding: Mapping[str, Any], rules: Sequence[str], path: str) -> dict[str, Any]:
+    def located(line: int | None, file: str) -> dict[str, Any]:
         region = {} if line is None else {"region": {"startLine": line}}
-        return {"physicalLocation": {"artifactLocation": {"uri": uri}, **region}}
+        return {"physicalLocation": {"artifactLocation": {"uri": _uri(path, file)}, **region}}
 
-    related = [{"id": k, **place(line)} for k, line in enumerate(finding["lines"][1:], 1)]
+    files = finding.get("files") or [""] * len(finding["lines"])
+    pairs = list(zip(finding["lines"], files, strict=True))
+    related = [{"id": k, **located(*pair)} for k, pair in enumerate(pairs[1:], 1)]
     return {
         "ruleId": finding["code"],
         "ruleIndex": rules.index(finding["code"]),
         "level": _LEVEL[Severity[finding["severity"].upper()]],
         "message": {"text": finding["message"]},
-        "locations": [place(finding["line"])],
+        "locations": [located(finding["line"], finding.get("file", ""))],
         **({"relatedLocations": related} if related else {}),
     }
 
 
-def _uri(path: str) -> str:
-    """The URI reference of a program: relative where it was named so, else with the scheme of files."""
+def _uri(path: str, file: str = "") -> str:
+    """The URI reference of a program, or of a file beside it: relative where the program was named so, else
+    with the scheme of files."""
     pure = PurePath(path or "stdin")
+    pure = pure.with_name(file) if file else pure
     return pure.as_uri() if pure.is_absolute() else quote(pure.as_posix())
 
 
@@ -190,20 +194,27 @@ def to_junit(report: Report, fail_on: str) -> str:
 
 
 def _sentence(finding: Mapping[str, Any], name: str) -> str:
-    place = name if finding["line"] is None else f"{name}:{finding['line']}"
-    return f"{place}: {finding['severity']}: {finding['code']} {finding['message']}"
+    name = finding.get("file", name)
+    where = name if finding["line"] is None else f"{name}:{finding['line']}"
+    return f"{where}: {finding['severity']}: {finding['code']} {finding['message']}"
 
 
 def to_csv(rows: Iterable[Mapping[str, Any]]) -> bytes:
     """Clearances by block: `line,clearance_mm,part,mesh,role,frame,X_mm,Y_mm,Z_mm`, the point in the named
-    frame."""
+    frame, and `file` last where lines are of several files."""
+    rows = list(rows)
+    files = any("file" in row for row in rows)
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
-    writer.writerow(["line", "clearance_mm", "part", "mesh", "role", "frame", "X_mm", "Y_mm", "Z_mm"])
+    writer.writerow(
+        ["line", "clearance_mm", "part", "mesh", "role", "frame", "X_mm", "Y_mm", "Z_mm"] + ["file"] * files
+    )
     for row in rows:
         names = (row["part"], row["mesh"], row["role"], row["frame"])
         lengths = (f"{v:.6f}" for v in row["point_mm"])
-        writer.writerow([row["line"], f"{row['clearance_mm']:.6f}", *names, *lengths])
+        writer.writerow(
+            [row["line"], f"{row['clearance_mm']:.6f}", *names, *lengths, *[row.get("file", "")] * files]
+        )
     return buffer.getvalue().encode()
 
 

@@ -15,6 +15,7 @@ from olp.reports.report import (
     measured_sides,
     number,
     pairs,
+    place,
     printable,
     shortened,
     table,
@@ -165,11 +166,10 @@ def _worst(report: Report) -> Iterator[str]:
     worst = (report.get("after") or {}).get("worst") or ()
     if not worst:
         return
-    texts = {row["line"]: printable(row["text"]) for row in report.get("worst") or ()}
+    texts = {place(row): printable(row["text"]) for row in report.get("worst") or ()}
     yield "Lines with the largest deviation, in um"
     rows = [
-        [str(row["line"]), number(row["max_um"]), shortened(texts.get(row["line"], ""), 60)]
-        for row in worst[:5]
+        [place(row), number(row["max_um"]), shortened(texts.get(place(row), ""), 60)] for row in worst[:5]
     ]
     for line in table(["line", "max", ""], [[a, b, ""] for a, b, _ in rows], text_columns=0):
         yield f"{line}  {rows.pop(0)[2]}".rstrip() if line.split()[0] != "line" else line

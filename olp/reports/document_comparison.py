@@ -21,7 +21,7 @@ from olp.reports.document_parts import (
     subtitle_of,
     test_sections,
 )
-from olp.reports.report import MEASURED_BOTH, Report, measured_sides, number
+from olp.reports.report import MEASURED_BOTH, Report, measured_sides, number, place
 
 
 def comparison(report: Report, plots: Plots, version: str, date: datetime.date | None) -> Document:
@@ -91,8 +91,10 @@ def _iso(figures: Report) -> Iterator[str]:
         value = figures.get(f"{name}_um")
         if isinstance(value, float) and math.isfinite(value):
             line, pose = figures.get(f"{name}_line"), figures.get(f"{name}_pose")
-            place = f" at line {line}" if line else f" at {pose}" if pose else ""
-            yield f"{name} {number(value)} um{place}"
+            at_pose = f" at {pose}" if pose else ""
+            yield f"{name} {number(value)} um" + (
+                f" at line {place(figures, f'{name}_line')}" if line else at_pose
+            )
 
 
 def _measured(report: Report, plots: Plots) -> Iterator[Block]:
@@ -123,7 +125,7 @@ def _measured(report: Report, plots: Plots) -> Iterator[Block]:
     if worst:
         yield Paragraph(f"Lines with the largest deviation, {sides['after']}, in um:")
         yield Grid(["line", "largest", "block"], [
-            [str(w["line"]), number(w["max_um"]), w.get("text", "")] for w in worst
+            [place(w), number(w["max_um"]), w.get("text", "")] for w in worst
         ], code=2)  # fmt: skip
     for name, side in sides.items():
         poses: Sequence[Mapping[str, Any]] = (report.get(name) or {}).get("poses") or ()

@@ -20,7 +20,7 @@ from olp.reports.document_parts import (
     subtitle_of,
     test_sections,
 )
-from olp.reports.report import CORRECTED, UNCORRECTED, Report, number, percent
+from olp.reports.report import CORRECTED, UNCORRECTED, Report, number, percent, place
 
 #: Titles of the parts of the budget.
 _PART = {
@@ -109,7 +109,7 @@ def _validation(report: Report, plots: Plots) -> Iterator[Block]:
         yield Paragraph("Blocks with the largest residual deviation, in um:")
         yield Grid(
             ["line", UNCORRECTED, CORRECTED, "block"],
-            [[str(w["line"]), number(w["before_um"]), number(w["after_um"]), w["text"]] for w in worst],
+            [[place(w), number(w["before_um"]), number(w["after_um"]), w["text"]] for w in worst],
             code=3,
         )
 
@@ -179,7 +179,7 @@ def _uncertainty(report: Report, plots: Plots) -> Iterator[Section]:
                 "corrected is nearer",
             ],
             [
-                [str(row["line"]), number(row["before_um"]), number(row["band_um"]),
+                [place(row), number(row["before_um"]), number(row["band_um"]),
                  percent(row["within_before"]), percent(row["within_after"]), percent(row["nearer"])]
                 for row in part["lines"]
             ],

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 
 from olp.findings.catalogue import RULES
 from olp.reports.document import Block, Grid, Notice, Pairs, Paragraph, Plot, Section
-from olp.reports.report import CORRECTED, UNCORRECTED, Report, by_severity, number
+from olp.reports.report import CORRECTED, UNCORRECTED, Report, by_severity, number, places
 
 Plots = Mapping[str, bytes]
 #: Most rows of the table of error sources.
@@ -128,12 +128,8 @@ def notice_blocks(report: Report) -> Iterator[Block]:
     findings = by_severity(report.get("findings") or ())
     for f in findings:
         rule = RULES[f["code"]]
-        lines = f["lines"][:8]
-        place = (
-            f" Lines {', '.join(map(str, lines))}{' and more' if f['count'] > len(lines) else ''}."
-            if lines
-            else ""
-        )
+        lines = places(f)[:8] if f["lines"] else []
+        place = f" Lines {', '.join(lines)}{' and more' if f['count'] > len(lines) else ''}." if lines else ""
         message = f"{f['message'][:1].upper()}{f['message'][1:]}.{place}"
         yield Notice(f["severity"], f["code"], rule.title, message, rule.remedy)
     if not findings:

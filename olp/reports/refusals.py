@@ -31,7 +31,8 @@ def refusals_text(rows: Sequence[Mapping[str, Any]], *, complete: bool) -> Itera
 def _alike(reasons: Sequence[Reason]) -> Iterator[str]:
     """Reasons of one kind: the first ones in full, then the lines of the others."""
     for reason in reasons[:_WRITTEN]:
-        place = "" if reason.line is None else f"line {reason.line}: "
+        of = f" of {reason.file}" if reason.file else ""
+        place = "" if reason.line is None else f"line {reason.line}{of}: "
         known = not reason.statement or f"`{reason.statement[:20]}" in reason.message
         statement = "" if known else f"`{reason.statement}`: "
         yield from _wrapped(f"{place}{statement}{reason.sentence}", 6)

@@ -272,7 +272,7 @@ def _worst(report: Report) -> Iterator[str]:
         return
     yield "Worst blocks in um"
     rows = (
-        [str(block.get("line", "")), number(block.get("before_um")), number(block.get("after_um"))]
+        [place(block), number(block.get("before_um")), number(block.get("after_um"))]
         for block in blocks[:MAX_WORST]
     )
     lines = list(table(["line", UNCORRECTED, CORRECTED], rows, text_columns=0))
@@ -352,12 +352,25 @@ def by_severity(findings: Iterable[Report]) -> list[Report]:
     return sorted(findings, key=lambda f: order.get(str(f.get("severity")), 3))
 
 
+def place(row: Report, key: str = "line") -> str:
+    """The line of a row, with its file where that is not the program's."""
+    file = row.get(f"{key.removesuffix('line')}file")
+    return f"{row[key]} of {printable(str(file))}" if file else str(row.get(key, ""))
+
+
+def places(row: Report, key: str = "lines") -> list[str]:
+    """The lines that a finding or another row lists, as `place` gives them."""
+    lines = list(row.get(key) or ())
+    if not lines and row.get("line") is not None:
+        return [place(row)]
+    files = row.get(f"{key.removesuffix('lines')}files") or [""] * len(lines)
+    return [place({"line": line, "file": file}) for line, file in zip(lines, files, strict=True)]
+
+
 def _place(finding: Report) -> str:
-    lines = list(finding.get("lines") or ())
-    if not lines and finding.get("line") is not None:
-        lines = [finding["line"]]
+    lines = places(finding)
     count = finding.get("count", 1)
-    shown = ", ".join(str(line) for line in lines[:MAX_LINES])
+    shown = ", ".join(lines[:MAX_LINES])
     more = ", ..." if len(lines) > MAX_LINES or count > len(lines) > 0 else ""
     place = f", line{'s' if len(lines) > 1 else ''} {shown}{more}" if lines else ""
     return place + (f" ({count} in all)" if count > 1 else "")

@@ -6,7 +6,18 @@ import textwrap
 from collections.abc import Iterator
 from typing import Any
 
-from olp.reports.report import WIDTH, Report, findings_text, number, pairs, printable, shortened, table
+from olp.reports.report import (
+    WIDTH,
+    Report,
+    findings_text,
+    number,
+    pairs,
+    place,
+    places,
+    printable,
+    shortened,
+    table,
+)
 
 #: Most rows of a table.
 _ROWS = 8
@@ -54,7 +65,7 @@ def _head(report: Report) -> Iterator[str]:
     )
     if len(stretches) > 1:
         rows = [
-            (str(n), f"{s['first_line']}-{s['last_line']}", f"{s['duration_s']:.2f}")
+            (str(n), f"{place(s, 'first_line')}-{place(s, 'last_line')}", f"{s['duration_s']:.2f}")
             for n, s in enumerate(stretches, 1)
         ]
         yield from _cut(table(("stretch", "lines", "seconds"), rows), len(rows))
@@ -73,7 +84,7 @@ def _nominal(report: Report) -> Iterator[str]:
         return
     rows = [
         (
-            str(row["line"]), f"{row['nominal_s']:.4f}", f"{row['corrected_s']:.4f}",
+            place(row), f"{row['nominal_s']:.4f}", f"{row['corrected_s']:.4f}",
             f"{row['corrected_s'] - row['nominal_s']:+.4f}",
         )
         for row in nominal["differences"][:_ROWS]
@@ -133,7 +144,7 @@ def _budget(report: Report) -> Iterator[str]:
             else f"; {allowed:g} um are allowed, so accelerations of X, Y, Z are limited to {held} mm/s2"
         )
         text = (
-            f"Inertial deviation: {inertial['max_um']:.2f} um max in line {inertial['line']}, "
+            f"Inertial deviation: {inertial['max_um']:.2f} um max in line {place(inertial)}, "
             f"{inertial['rms_um']:.2f} rms, {inertial['across_path_max_um']:.2f} max across the path{bound}"
         )
         yield from textwrap.wrap(text, WIDTH, initial_indent="  ", subsequent_indent="    ")
@@ -158,7 +169,7 @@ def _slow(report: Report) -> Iterator[str]:
     )
     rows = [
         (
-            str(w["line"]), *(f"{round(v, 3) + 0.0:.3f}" for v in w["position_mm"]),
+            place(w), *(f"{round(v, 3) + 0.0:.3f}" for v in w["position_mm"]),
             f"{60.0 * w['feed_mm_s']:.0f}", f"{60.0 * w['slowest_mm_s']:.0f}", f"{w['lost_s']:.3f}",
             w["limit"],
         )
@@ -176,7 +187,7 @@ def _lines(report: Report) -> Iterator[str]:
         feed = row["feed_mm_s"]
         rows.append(
             (
-                str(row["line"]), f"{row['seconds']:.3f}", "rapid" if feed is None else f"{60.0 * feed:.0f}",
+                place(row), f"{row['seconds']:.3f}", "rapid" if feed is None else f"{60.0 * feed:.0f}",
                 f"{60.0 * row['achieved_mm_s']:.0f}", row["limit"],
             )
         )  # fmt: skip
@@ -207,7 +218,7 @@ def _feeds_written(report: Report) -> Iterator[str]:
             WIDTH, initial_indent="  ", subsequent_indent="  ",
         )  # fmt: skip
     if written["kept_lines"]:
-        kept = ", ".join(map(str, written["kept_lines"][:_ROWS]))
+        kept = ", ".join(places(written, "kept_lines")[:_ROWS])
         yield from textwrap.wrap(
             f"Kept as written, because their moves are not timed: lines {kept}",
             WIDTH, initial_indent="  ", subsequent_indent="  ",
@@ -217,7 +228,7 @@ def _feeds_written(report: Report) -> Iterator[str]:
 def _notes(report: Report) -> Iterator[str]:
     untimed = report["untimed"]
     if untimed["moves"]:
-        lines = ", ".join(map(str, untimed["lines"]))
+        lines = ", ".join(places(untimed))
         more = ", ..." if untimed["moves"] > len(untimed["lines"]) else ""
         yield from textwrap.wrap(
             f"Not timed: {_count(untimed['moves'], 'move', 'moves')} from or to unknown positions "

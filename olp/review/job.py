@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 import hashlib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -33,12 +33,12 @@ from olp.review.samples import Samples, by_source, sample
 from olp.review.scene import Frame, Scene, TipUncertainty
 from olp.uncertainty.probability import within
 from olp.uncertainty.spread import Points, bands, covariances
-from olp.workflows import retime
+from olp.workflows import refusals, retime
 from olp.workflows.compare_runs import Ground, How, judged
 from olp.workflows.confidence import unknowns_of
 from olp.workflows.correct import Correction, CorrectOptions
 from olp.workflows.correct import corrected as correct_program
-from olp.workflows.flatten import as_asked
+from olp.workflows.original import placed, placed_findings
 from olp.workflows.proof import ProofOptions, Run, verify_programs
 from olp.workflows.retime import RetimeOptions, Retiming
 from olp.workflows.session import Loaded, Outside, PathLike, Session, opened
@@ -52,9 +52,6 @@ class ViewOptions(ProofOptions):
     """The options of `view`."""
 
     outside_box: Outside = "refuse"
-    flatten: bool = False
-    expand_cycles: bool = False
-    peck_clearance_mm: float | None = None
     time: bool = True
     step_mm: float | None = None
 
@@ -149,7 +146,12 @@ def run(
     program.load()
     with program.errors():
         loaded = session.loaded(outside, only_sure=options.only_sure_components).reading(program)
-        data = as_asked(session.sources, program, loaded.setup, loaded.dialect, options).data
+        tell("read", 0.0)
+        reading = Options(contour=options.contour)
+        text, nominal = refusals.read(
+            session.sources, program, loaded.setup, loaded.dialect, reading, options
+        )
+        data = text.data
     if corrected is not None:
         corrected.load()
         other, corrected_name = corrected.data, corrected.name
@@ -158,10 +160,6 @@ def run(
             with program.errors():
                 correction = Correction.of(_corrected(session, data, loaded, options, tell))
         other = correction.data
-    tell("read", 0.0)
-    reading = Options(contour=options.contour)
-    with program.errors():
-        nominal = read(data, loaded.setup, loaded.dialect, reading)
     name = program.name
     with naming(corrected_name or (f"{name} (corrected)" if name else "")):
         second = read(other, loaded.setup, loaded.dialect, reading)
@@ -170,7 +168,7 @@ def run(
         else:
             texts_read = (nominal, name), (second, corrected_name)
             run = verify_programs(*texts_read, loaded, options, outside="OLP403")
-            proved = _Proved(run.report, run.table, run.proof.groups)
+            proved = _Proved(placed(run.report, nominal.origin), run.table, run.proof.groups)
         texts = _Texts(program, data, corrected_name, other, nominal, second, proved)
         shown = _shown(session, texts, loaded, options, progress)
     tell("pack", 0.0)
@@ -248,14 +246,16 @@ def _scene(
     if measured:
         files = [read_points(path, read=session.sources.read_last) for path in measured]
         digests = tuple(points.sha256 for points in files)
-        ground = Ground.of_program(nominal, loaded)
+        ground = Ground.of_program(nominal.in_original(), loaded)
         how = How(part_tolerance_um=part_um)
         done = judged(ground, files, how)
         refuse_unplaced(files, done.placed, how.reach_mm)
         matcher = Matcher(ground, samples, setup, np.array(frame.origin_mm))
-        placed = zip(done.placed.runs, done.placed.orders, strict=True)
-        shown_runs = tuple(matcher.match(run, order) for run, order in placed)
-        table = table.with_measured(done.layers["after"])
+        runs = zip(done.placed.runs, done.placed.orders, strict=True)
+        shown_runs = tuple(matcher.match(run, order) for run, order in runs)
+        layer = done.layers["after"]
+        done = replace(done, findings=placed_findings(done.findings, nominal.origin))
+        table = table.with_measured(replace(layer, line=table.line))
         report = with_measured(report, table, done)
     bodies = tuple(_bodies(session, setup, nominal, samples, frame, position))
     return Scene(
@@ -275,11 +275,18 @@ def _scene(
         bodies=bodies,
         measured=shown_runs,
         report=report,
-        table=table,
+        table=_as_shown(table, nominal),
         tolerance_um=report["verdict"]["numerical"]["allowed_um"],
         tool_radius_mm=_radius(setup, nominal),
         uncertainty=_uncertainty(loaded, nominal, samples, part_um, options.date),
     )
+
+
+def _as_shown(table: Judgements, nominal: Program) -> Judgements:
+    """The table with the lines of the text that is shown."""
+    line = nominal.toolpath.line.astype(np.int64)
+    runs = table.measured
+    return replace(table, line=line, measured=None if runs is None else replace(runs, line=line))
 
 
 def _uncertainty(

@@ -108,7 +108,7 @@ def callouts(scene: Scene) -> Iterator[dict[str, Any]]:
         if not own.size:
             continue
         away = np.linalg.norm(getattr(scene.samples, layer)[own], axis=1)
-        text = f"largest, {words}: {size[move] * UM_PER_MM:.2f} µm, line {int(table.line[move])}"
+        text = f"largest, {words}: {size[move] * UM_PER_MM:.2f} µm, line {scene.place(int(table.line[move]))}"
         yield {"sample": int(own[away.argmax()]), "text": text, "layer": layer}
     yield from _measured_callout(scene)
 
@@ -123,5 +123,5 @@ def _measured_callout(scene: Scene) -> Iterator[dict[str, Any]]:
     shown = scene.measured[k]
     away = np.where(shown.counted, np.linalg.norm(shown.delta_mm, axis=1), -1.0)
     worst = runs.worst(1)[0]
-    text = f"largest, measured: {worst['max_um']:.2f} µm, line {worst['line']}"
+    text = f"largest, measured: {worst['max_um']:.2f} µm, line {scene.place(worst['line'])}"
     yield {"sample": int(shown.index[away.argmax()]), "text": text, "layer": measured_names(scene)[k]}

@@ -15,14 +15,13 @@ import numpy.typing as npt
 
 from olp.core.arrays import Index
 from olp.program.program import Program
+from olp.program.text.line_ends import LINE_END_TEXT
 
 Small = npt.NDArray[np.int32]
 
 #: Most characters of a line; a longer one is cut, as browsers are slow with it.
 LONGEST = 2000
 
-#: Ends of lines other than line feeds.
-_END = re.compile(r"\r\n|\r")
 #: Characters that act on a terminal, hide text, or change its direction, except tab and line feed.
 _CONTROL = re.compile(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb]"
@@ -62,7 +61,7 @@ def shown(data: bytes) -> str:
     except UnicodeDecodeError:
         text = data.decode("latin-1")
     if "\r" in text:
-        text = _END.sub("\n", text)
+        text = LINE_END_TEXT.sub("\n", text)
     if _CONTROL.search(text):
         text = _CONTROL.sub(_picture, text)
     text = _LONG.sub(lambda m: f"{m[0][:LONGEST]} … ({len(m[0])} characters)", text)

@@ -12,6 +12,7 @@ from olp.core.arrays import Array
 from olp.core.toolpath import Kind
 from olp.core.units import AXES, UM_PER_MM
 from olp.findings.catalogue import RULES
+from olp.reports.report import place
 from olp.review.judged import callouts, judged_lines, measured_names, statistics
 from olp.review.meshes import nodes
 from olp.review.pack import ARC_MM, DEVIATION_MM, POSITION_MM, TIME_S, Arrays, resolution
@@ -234,8 +235,18 @@ def _listing(scene: Scene, arrays: Arrays) -> dict[str, Any]:
         "corrected": "text_corrected",
         "row_nominal": arrays.quantised("row_nominal", listing.row_nominal, 1.0),
         "row_corrected": arrays.quantised("row_corrected", listing.row_corrected, 1.0),
+        **_names(scene, arrays),
         **judged_lines(scene, arrays),
     }
+
+
+def _names(scene: Scene, arrays: Arrays) -> dict[str, Any]:
+    """What the lines of the nominal text are called where it was unrolled, and the characters of the longest
+    name."""
+    if scene.nominal.origin is None:
+        return {"names": None, "names_width": 0}
+    names = [scene.place(line + 1) for line in range(scene.nominal.lines)]
+    return {"names": arrays.text("line_names", "\n".join(names)), "names_width": max(map(len, names))}
 
 
 def _resembled(like: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
@@ -261,11 +272,13 @@ def _meshes(scene: Scene, arrays: Arrays, origin: Array) -> Iterator[dict[str, A
 
 
 def _findings(scene: Scene) -> list[dict[str, Any]]:
+    """Findings; `place` is the line as the listing names it."""
     return [
         {
             "code": finding["code"],
             "severity": finding["severity"],
             "line": finding["line"],
+            "place": None if finding["line"] is None else place(finding),
             "message": finding["message"],
             "title": RULES[finding["code"]].title,
             "count": finding["count"],

@@ -64,8 +64,8 @@ class TipUncertainty:
 class Scene:
     """`position_mm` (n, 3) are the samples in `frame`; `time_s` (n,) are their times on the re-timed motion,
     where there is one, else at the feed. `sources` are (name, (n,) mm) by size; `report` is that of the
-    correction or verification ("olp-report-1"), `table` its judgements;
-    `uncertainty` is None where the calibration states none."""
+    correction or verification ("olp-report-1"), `table` its judgements with lines of the nominal text as
+    shown; `uncertainty` is None where the calibration states none."""
 
     name: str
     corrected_name: str
@@ -87,3 +87,8 @@ class Scene:
     tolerance_um: float
     tool_radius_mm: float
     uncertainty: TipUncertainty | None = None
+
+    def place(self, line: int) -> str:
+        """A line of the nominal text in words: the line that it was unrolled from, where it was."""
+        origin = self.nominal.origin
+        return str(line) if origin is None else origin.place(origin.line_of(line))

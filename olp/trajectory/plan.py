@@ -106,7 +106,7 @@ def _check(route: Route, limits: AxisLimits) -> None:
             raise CannotCompute(f"the route has a {name} that is not a finite number")
     if not (route.feed_mm_s > 0.0).all():
         line = int(route.line[np.flatnonzero(~(route.feed_mm_s > 0.0))[0]])
-        raise CannotCompute(f"line {line} has no feed above 0, so it would never end")
+        raise CannotCompute("this line has no feed above 0, so it would never end", line=line)
     for name in AxisLimits.__slots__:
         values = getattr(limits, name)
         if not (np.isfinite(values).all() and (values > 0.0).all()):
@@ -161,7 +161,7 @@ def _legs(
         return
     stops = first + stops_of(run.route)
     if len(stops) <= 2:
-        raise CannotCompute(f"no solver found a motion along line {int(route.line[first])}")
+        raise CannotCompute("no solver found a motion along this line", line=int(route.line[first]))
     for begin, end in pairwise(stops.tolist()):
         yield from _legs(route, limits, Stretch(begin, end, stretch.candidates), least)
 

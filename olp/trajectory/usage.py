@@ -6,7 +6,7 @@ Each piece is sampled in the middle and at both ends, weighted by the trapezoida
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -75,6 +75,14 @@ class LineUse:
         """Lines of several stretches; lines of the same number are added."""
         if len(parts) == 1:
             return parts[0]
+        return LineUse._added(parts)
+
+    def numbered(self, line: Index) -> LineUse:
+        """The same with other numbers (m,) of the lines; lines that get the same number are added."""
+        return LineUse._added([replace(self, line=line)])
+
+    @staticmethod
+    def _added(parts: Sequence[LineUse]) -> LineUse:
         if not parts:
             none, wide = np.zeros(0), np.zeros((0, len(LIMITS)))
             return LineUse(none.astype(np.int64), none, none, none, none, none, none, none, wide, wide)

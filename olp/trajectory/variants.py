@@ -94,7 +94,7 @@ class Case:
     def untimed(self) -> dict[str, Any]:
         """Moves from or to positions that only the control knows: how many, and their first lines."""
         path = self.program.toolpath
-        line = path.line[np.isnan(lengths_mm(path))]
+        line = self.program.original_lines(path.line[np.isnan(lengths_mm(path))])
         return {"moves": len(line), "lines": np.unique(line)[:_LINES].tolist()}
 
 
@@ -117,10 +117,26 @@ class Plan:
         """The largest distance of the motion from the chords of the path."""
         return max((leg.deviation_mm for t in self.trajectories for leg in t.legs), default=0.0)
 
+    def in_original(self) -> Plan:
+        """The same with the lines of the text that the program was unrolled from, as people are told them."""
+        program = self.case.program
+        if program.origin is None:
+            return self
+        line_of = program.original_lines
+        legs = tuple(replace(leg, line=line_of(leg.line)) for leg in self.case.legs)
+        motions = (replace(t.motion, line=line_of(t.motion.line)) for t in self.trajectories)
+        return Plan(
+            replace(self.case, legs=legs), self.limits,
+            tuple(replace(t, motion=m) for t, m in zip(self.trajectories, motions, strict=True)),
+            self.lines.numbered(line_of(self.lines.line)),
+            tuple(replace(slow, line=line_of(slow.line)) for slow in self.slow),
+        )  # fmt: skip
+
 
 def planned(case: Case, limits: AxisLimits, tell: Progress, what: str = "plan") -> Plan:
     """Plan every route of a case. Raises CannotCompute as `olp.trajectory.plan.plan`."""
-    trajectories = _motions(case.legs, limits, tell, what)
+    with case.program.errors():
+        trajectories = _motions(case.legs, limits, tell, what)
     used = [usage(t, leg) for t, leg in zip(trajectories, case.legs, strict=True)]
     lines = LineUse.joined([lines for lines, _ in used])
     return Plan(case, limits, trajectories, lines, tuple(slow for _, slow in used))
@@ -174,13 +190,15 @@ def with_feeds(base: Plan, shared: Shared, tell: Progress) -> tuple[bytes, dict[
     fed = np.flatnonzero((lines.feed_length_mm > 0.0) & (lines.feed_seconds > 0.0))
     planned_s = lines.feed_seconds[fed]
     try:
-        written = write_feeds(
-            case.program, lines.line[fed], planned_s, planned_s - lines.lost_s()[fed], shared=shared,
-            block_delete=case.block_delete,
-        )  # fmt: skip
+        with case.program.errors():
+            written = write_feeds(
+                case.program, lines.line[fed], planned_s, planned_s - lines.lost_s()[fed], shared=shared,
+                block_delete=case.block_delete,
+            )  # fmt: skip
     except OlpError as error:
         raise (error.in_file(case.name) if case.name else error) from None
-    other = case.rewritten(written.data)
+    # the written text has lines of its own
+    other = case.rewritten(bytes(written.data))
     check_feeds(case.program, other.program, block_delete=case.block_delete)
     again = planned(other, base.limits, tell, "feeds")
     return written.data, {
@@ -189,7 +207,7 @@ def with_feeds(base: Plan, shared: Shared, tell: Progress) -> tuple[bytes, dict[
         "shared": written.shared,
         "rule": shared,
         "slower_lines": written.slower,
-        "kept_lines": list(written.kept),
+        "kept_lines": np.unique(case.program.original_lines(written.kept)).tolist(),
         "duration_s": again.duration_s,
     }
 

@@ -30,8 +30,8 @@ from olp.files.control_tables.base import Exported, Given, Sense
 from olp.files.control_tables.registry import FORMATS, format_named, read_table, write_table
 from olp.files.sources import Sources
 from olp.findings.catalogue import Finding
-from olp.program.registry import read
 from olp.reports.report import number
+from olp.workflows import refusals
 from olp.workflows.control_table import given_of
 from olp.workflows.correct import CorrectOptions, corrected
 from olp.workflows.doubt import acceptable
@@ -70,21 +70,28 @@ def export_table(
     reference: Reference | None = None,
     most_rows: int | None = None,
     chain: str | None = None,
+    flatten: bool = False,
+    expand_cycles: bool = False,
+    peck_clearance_mm: float | None = None,
     date: datetime.date | None = None,
     accept: Sequence[str] = (),
 ) -> TableExport:
     """Write the calibration of a machine, or a calibration file alone, as the table of a control.
 
     The report states the residual error over the calibrated box and, with `program`, along it. The figures
-    are those of the written table, read back. `date` and `accept` are those of `correct`, for the program.
-    Raises UsageError, InputError.
+    are those of the written table, read back. `flatten` and the options after it are those of `correct`, for
+    the program. Raises UsageError, InputError.
     """
+    options = CorrectOptions(
+        outside_box="hold", flatten=flatten, expand_cycles=expand_cycles, peck_clearance_mm=peck_clearance_mm,
+        date=date, accept=tuple(sorted(acceptable(accept))),
+    )  # fmt: skip
     source = _source(machine, job, calibration, chain)
     given = given_of(source.machine, chain, sense, None, comp_type, axis_names, reference, most_rows)
     form = format_named(kind)
     written = write_table(source.rest, kind, Path(target), given)
     control = _control(written, kind, given, source)
-    report = _report(source, {form.key: control}, program, _correcting(date, accept))
+    report = _report(source, {form.key: control}, program, options)
     corrects = sorted(written.corrects | source.compensated)
     report["compensated_by_controller"] = corrects
     findings = (*source.findings, *written.findings)
@@ -101,12 +108,19 @@ def compare_tables(
     reference: Reference | None = None,
     most_rows: int | None = None,
     chain: str | None = None,
+    flatten: bool = False,
+    expand_cycles: bool = False,
+    peck_clearance_mm: float | None = None,
     date: datetime.date | None = None,
     accept: Sequence[str] = (),
 ) -> dict[str, Any]:
     """The residual error of each format of tables, next to a corrected program ("olp-tables-1"). Nothing is
     written. Where a format leaves sign convention or reference open, the figures are those of the right one.
     """
+    options = CorrectOptions(
+        outside_box="hold", flatten=flatten, expand_cycles=expand_cycles, peck_clearance_mm=peck_clearance_mm,
+        date=date, accept=tuple(sorted(acceptable(accept))),
+    )  # fmt: skip
     source = _source(machine, job, calibration, chain)
     controls: dict[str, Control] = {}
     findings: dict[str, list[dict[str, object]]] = {}
@@ -118,7 +132,7 @@ def compare_tables(
         written = write_table(source.rest, key, _MAIN.with_suffix(form.ending), given)
         controls[key] = _control(written, key, given, source)
         findings[key] = [f.as_dict() for f in written.findings if f.code not in ("OLP874", "OLP875")]
-    report = _report(source, controls, program, _correcting(date, accept))
+    report = _report(source, controls, program, options)
     report["formats"] = {
         key: {"title": form.title, "status": form.status, "holds": form.holds, "findings": findings[key]}
         for key, form in FORMATS.items()
@@ -204,11 +218,6 @@ def _control(written: Exported, kind: str, given: Given, source: _Source) -> Con
     return format_named(kind).control(imported.calibration, source.chain)
 
 
-def _correcting(date: datetime.date | None, accept: Sequence[str]) -> CorrectOptions:
-    """How the program is corrected for comparison. Raises UsageError for a code that is no doubt."""
-    return CorrectOptions(outside_box="hold", date=date, accept=tuple(sorted(acceptable(accept))))
-
-
 def _report(
     source: _Source, controls: Mapping[str, Control], program: PathLike | bytes | None,
     options: CorrectOptions,
@@ -240,7 +249,10 @@ def _along(
     text.load()
     with text.errors("<program>"):
         loaded = loaded.reading(text)
-        path = read(text.data, loaded.setup, loaded.dialect, words=False).toolpath
+        text, program_read = refusals.read(
+            source.sources, text, loaded.setup, loaded.dialect, None, options, words=False
+        )
+    path = program_read.toolpath
     points = along(path, box, source.chain)
     if points.counted is None or not points.counted.any():
         raise InputError("has no cutting move whose axes are all known", file=text.name or "<program>")

@@ -29,8 +29,8 @@ from olp.files.calibration.writer import calibration_files
 from olp.files.measurements.checkpoints import load_checkpoints
 from olp.files.sources import Source
 from olp.findings.catalogue import Finding
-from olp.program.registry import read
-from olp.workflows import compare
+from olp.workflows import compare, refusals
+from olp.workflows.flatten import UnrollOptions
 from olp.workflows.session import PathLike, Session
 
 #: A run with a reduced chi-square above this does not agree with the covariance.
@@ -75,6 +75,9 @@ def refine_calibration(
     job: PathLike | None = None,
     *,
     program: PathLike | None = None,
+    flatten: bool = False,
+    expand_cycles: bool = False,
+    peck_clearance_mm: float | None = None,
     frame_known: bool = False,
     sigma_um: float | None = None,
     tool_mm: Vector | None = None,
@@ -85,7 +88,8 @@ def refine_calibration(
     `measured` are points: commanded axis positions and measured positions of the reflector (a file as for
     `diagnose_calibration`, or Points). With `program`, the nominal program, they are tip positions along a
     run of its correction, paired as in `compare`; only deviations across the path are used. `sigma_um` is the
-    standard uncertainty of a coordinate, `date` the day of the run. Raises InputError, ConfigError where the
+    standard uncertainty of a coordinate, `date` the day of the run. `flatten`, `expand_cycles` and
+    `peck_clearance_mm` are those of `correct`, for the program. Raises InputError, ConfigError where the
     calibration states no uncertainty, and CannotCompute.
     """
     session = Session.start(machine, job)
@@ -105,7 +109,10 @@ def refine_calibration(
             raise ConfigError("points along a program state no uncertainty; give sigma_um (--sigma-um)")
         run = session.of(dataclasses.replace(session.setup, machine=described))
         nominal = session.sources.source(program)
-        points, along, play = _along(old, skip, run, nominal, measured, sigma_um * MM_PER_UM)
+        unrolling = UnrollOptions(
+            flatten=flatten, expand_cycles=expand_cycles, peck_clearance_mm=peck_clearance_mm
+        )
+        points, along, play = _along(old, skip, run, nominal, measured, sigma_um * MM_PER_UM, unrolling)
     elif isinstance(measured, Points):
         points = measured
     else:
@@ -130,15 +137,18 @@ def _along(
     program: Source,
     measured: PathLike,
     sigma: float,
+    unrolling: UnrollOptions,
 ) -> tuple[Points, Array, Array | None]:
     """Points of a corrected run with their commands, tangents of the path and play of axes."""
     chain = session.setup.machine.chain
     model = build(calibration, chain, outside="hold", skip_components=skip)
+    setup, dialect = session.reading(program)
+    with program.errors():
+        program, parsed = refusals.read(session.sources, program, setup, dialect, None, unrolling)
     comparison = compare.run(session.sources, session, program, [measured], compare.CompareOptions())
     path, run = comparison.path, comparison.runs[0]
     assert path is not None
-    setup, dialect = session.reading(program)
-    toolpath = read(program.data, setup, dialect).toolpath
+    toolpath = parsed.toolpath
     axes = nominal_of(toolpath, model, "axes")
     if len(axes.path) != len(path):
         raise CannotCompute("the path has moves whose axis positions are not known; give start_mm in the job")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import datetime
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -24,6 +24,7 @@ from olp.files.meshes import read_mesh
 from olp.files.sources import Source, Sources
 from olp.findings.catalogue import GATE_CODES, RULES, Finding
 from olp.findings.rule import Severity
+from olp.program.origin import Origin
 from olp.program.program import Program
 from olp.program.registry import Options, read
 from olp.proof.judgement import verdict
@@ -31,6 +32,8 @@ from olp.proof.proof import Proof, corrections_mm
 from olp.workflows import refusals
 from olp.workflows.correct import CorrectOptions, corrected
 from olp.workflows.doubt import accepted_of, doubted
+from olp.workflows.flatten import AS_IT_IS
+from olp.workflows.original import placed, placed_findings
 from olp.workflows.proof import ProofOptions, Run, last_digit_mm, verify_programs
 from olp.workflows.session import Loaded, Outside, PathLike, Session
 
@@ -61,6 +64,12 @@ class Check:
     report: dict[str, Any]
     clearances: Clearances | None = None
     refused: ProgramError | None = None
+    origin: Origin | None = None
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        """The clearance of every block as plain data."""
+        for row in self.clearances.rows() if self.clearances is not None else ():
+            yield placed(row, self.origin)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,6 +87,16 @@ class _Case:
     checked: str
     corrected_here: bool = False
 
+    @property
+    def origin(self) -> Origin | None:
+        """Where the lines come from: those of the given program that was unrolled."""
+        first = self.run.nominal if self.run is not None and self.corrected_here else self.written
+        return first.origin
+
+    def place(self, line: int) -> str:
+        """A line of the given program in words."""
+        return str(line) if self.origin is None else self.origin.place(line)
+
     def worded(self, program: Program) -> Program:
         """A program with its words; a correction drops them early."""
         if program.words is not None:
@@ -94,6 +113,9 @@ def check(
     tolerance_um: float = 1.0,
     outside_box: Literal["refuse", "hold"] = "refuse",
     contour: bool = False,
+    flatten: bool = False,
+    expand_cycles: bool = False,
+    peck_clearance_mm: float | None = None,
     part_tolerance_um: float | None = None,
     only_sure_components: bool = False,
     date: datetime.date | None = None,
@@ -107,7 +129,8 @@ def check(
     With `nominal`, `program` is the corrected program, from any source, and is proved against it. Alone and
     without the stamp of a correction it is the nominal program: it is corrected here, and the result is
     checked. Alone and with a stamp it is checked unchanged, without the checks that need the nominal one.
-    Lines are those of `program`. `select` and `ignore` are codes or their beginnings (OLP4). A path outside
+    Lines are those of `program`. `flatten`, `expand_cycles` and `peck_clearance_mm` are those of `correct`,
+    for the nominal program. `select` and `ignore` are codes or their beginnings (OLP4). A path outside
     the calibrated box is not refused: that is finding OLP405, or OLP403 with `outside_box` "hold". Doubts
     about the inputs are findings too; those that `accept` or the stamp names are one step less severe.
 
@@ -115,7 +138,8 @@ def check(
     (ProgramError with its line), and CannotCompute.
     """
     options = CheckOptions(
-        tolerance_um=tolerance_um, outside_box=outside_box, contour=contour,
+        tolerance_um=tolerance_um, outside_box=outside_box, contour=contour, flatten=flatten,
+        expand_cycles=expand_cycles, peck_clearance_mm=peck_clearance_mm,
         part_tolerance_um=part_tolerance_um, only_sure_components=only_sure_components,
         date=date, accept=tuple(accept), select=tuple(select), ignore=tuple(ignore),
     )  # fmt: skip
@@ -163,7 +187,7 @@ def examined(
             loaded = loaded.reading(program)
             case = _case(session.sources, program, nominal, loaded, options, tell)
     except ProgramError as error:
-        return _refused(error, program, loaded, options)
+        return _refused(error, program, nominal, loaded, options)
     with program.errors():
         tell("check", 0.8)
         findings = _findings(case, options)
@@ -171,26 +195,31 @@ def examined(
     if everything:
         findings.append(finding("OLP410", 'compensated_by_controller is "all"'))
     if around is not None:
-        findings += around.findings(setup.machine.sanity.clearance_mm)
-    kept = tuple(sorted((f for f in findings if f.code in codes), key=lambda f: (f.code, f.line or 0)))
-    report = _report(case, kept, codes, options)
+        findings += around.findings(setup.machine.sanity.clearance_mm, case.place)
+    ordered = sorted((f for f in findings if f.code in codes), key=lambda f: (f.code, f.line or 0))
+    report = _report(case, tuple(ordered), codes, options)
     if around is not None:
         report["clearance"] = list(around.nearest(_NEAREST).rows())
-    return Check(kept, report, around)
+    kept = placed_findings(ordered, case.origin)
+    return Check(kept, placed(report, case.origin), around, origin=case.origin)
 
 
-def _refused(error: ProgramError, program: Source, loaded: Loaded, options: CheckOptions) -> Check:
+def _refused(
+    error: ProgramError, program: Source, nominal: Source | None, loaded: Loaded, options: CheckOptions
+) -> Check:
     """The findings of a program that is refused; no code is left out of them."""
-    name = error.file or program.name
+    # the file of an error may be that of a subprogram too
+    other = "" if nominal is None else nominal.name or "<nominal>"
+    name = other if other and error.file == other else program.name
     report = {
         **_head(name, program.data, loaded, options),
         "checked": "nothing: the program is refused",
         "accepted": [],
         "rules": list(refusals.REFUSALS),
         "verdict": None,
-        **refusals.parts_of(error),
+        **refusals.parts_of(error, name),
     }
-    return Check(refusals.findings_of(error), report, refused=error)
+    return Check(refusals.findings_of(error, name), report, refused=error)
 
 
 def chosen(options: CheckOptions) -> list[str]:
@@ -221,13 +250,14 @@ def _case(
         path = replace(run.proof.written, line=run.proof.nominal.line[run.proof.owner()])
         proof = replace(run.proof, written=path)
         return _Case(name, data, run.corrected, run, proof, loaded, reading, what, corrected_here=True)
-    written = refusals.read(sources, program, loaded.setup, loaded.dialect, reading)
+    unrolling = options if nominal is None else AS_IT_IS
+    program, written = refusals.read(sources, program, loaded.setup, loaded.dialect, reading, unrolling)
     if nominal is None:
         what = "the corrected program; checks that need the nominal one are left out (give --nominal)"
         return _Case(name, data, written, None, None, loaded, reading, what)
     nominal.load()
     with nominal.errors("<nominal>"):
-        first = refusals.read(sources, nominal, loaded.setup, loaded.dialect, reading)
+        nominal, first = refusals.read(sources, nominal, loaded.setup, loaded.dialect, reading, options)
     run = verify_programs(
         (first, nominal.name), (written, name), loaded, options,
         outside=options.outside_code, refuse_doubts=False,
@@ -251,7 +281,8 @@ def _findings(case: _Case, options: CheckOptions) -> list[Finding]:
     ]
     if date is None:
         findings.append(finding("OLP408", "no date is given"))
-    path = case.written.toolpath
+    written = case.written.in_original()
+    path = written.toolpath
     if run is not None and proof is not None and case.corrected_here:
         findings += run.findings
         path = proof.written
@@ -260,7 +291,7 @@ def _findings(case: _Case, options: CheckOptions) -> list[Finding]:
         findings += state.box_findings(path, loaded.model.box_mm, options.outside_code)
         if run is None:
             findings += doubted(case.written, loaded, options.accept, date, stamped=case.data, refuse=False)
-        findings += checks.program_findings(case.written, loaded.setup, contour=options.contour)
+        findings += checks.program_findings(written, loaded.setup, contour=options.contour)
         findings += model_findings(path, loaded.calibration, loaded.model, sanity, tolerance_mm)
         if run is not None and proof is not None:
             findings += checks.proof_findings(proof, run.uncorrected)
@@ -314,7 +345,7 @@ def _clearances(case: _Case, codes: list[str], sources: Sources, tell: Progress)
     solids = [
         Solid(mesh, Path(mesh.file).name, vertices[faces] * mesh.unit_mm) for mesh, vertices, faces in read
     ]
-    path = case.written.toolpath if case.proof is None else case.proof.written
+    path = case.written.in_original().toolpath if case.proof is None else case.proof.written
     return clearances(path, case.loaded.model, setup, solids)
 
 
@@ -348,7 +379,8 @@ def _verdict(
     if run is None:
         return None
     part_um = case.loaded.part_tolerance_um(options.part_tolerance_um)
-    result = verdict(run.table, part_um, run.report.get("uncertainty"), kept)
+    place = run.nominal.in_original().place
+    result = verdict(run.table, part_um, run.report.get("uncertainty"), kept, place)
     line = result["numerical"]["line"]
     if not case.corrected_here and line is not None:
         result["numerical"]["line"] = _lines(run)[line]

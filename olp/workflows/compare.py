@@ -22,18 +22,22 @@ from olp.files.point_profile import PointProfile
 from olp.files.points import Points, layout_of, parse_points, read_points
 from olp.files.sources import Source, Sources
 from olp.findings.catalogue import Finding
+from olp.program.origin import Files, Origin, original_of, quoted
 from olp.program.program import Program
-from olp.program.registry import Options, read
+from olp.program.registry import Options
 from olp.workflows import compare_report as parts
+from olp.workflows import refusals
 from olp.workflows.compare_poses import part_frame as poses_frame
 from olp.workflows.compare_poses import poses_report
 from olp.workflows.compare_runs import Ground, How, Judged, judged
 from olp.workflows.doubt import acceptable, with_accepted
+from olp.workflows.flatten import UnrollOptions
+from olp.workflows.original import placed, placed_findings
 from olp.workflows.session import Loaded, PathLike, Session
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CompareOptions:
+class CompareOptions(UnrollOptions):
     """The options of `compare`."""
 
     before: tuple[PathLike, ...] = ()
@@ -65,14 +69,18 @@ class Comparison:
     runs: tuple[figures.Run, ...] = ()
     before: tuple[figures.Run, ...] = ()
     part_frame: str | None = None
+    origin: Origin | None = None
 
     def to_csv(self) -> Iterator[bytes]:
         """One row per measured point: run, arc length, line, nominal point, deviations from there, whether it
-        counts, and the distance from there, which is what counts."""
-        yield b"run,s_mm,line,X_mm,Y_mm,Z_mm,along_um,normal_um,binormal_um,counted,size_um\n"
+        counts, and the distance from there, which is what counts; `file` after the line where there are
+        several."""
+        files = Files(self.origin)
+        head = f"run,s_mm,line{files.head},X_mm,Y_mm,Z_mm,along_um,normal_um,binormal_um,counted,size_um\n"
+        yield head.encode()
         for run in (*self.before, *self.runs):
             assert self.path is not None
-            name = _quoted(run.name)
+            name = quoted(run.name)
             d, foot = run.deviation, run.nominal_mm
             columns = (
                 run.pairing.s_mm, run.line(self.path), *foot.T,
@@ -82,14 +90,9 @@ class Comparison:
             for a in range(0, len(foot), 1 << 14):
                 rows = zip(*(c[a : a + (1 << 14)].tolist() for c in columns), strict=True)
                 yield "".join(
-                    f"{name},{s:.6f},{line},{x:.6f},{y:.6f},{z:.6f},{t:.4f},{n:.4f},{b:.4f},{good},{size:.4f}\n"
+                    f"{name},{s:.6f},{files.cells(line)},{x:.6f},{y:.6f},{z:.6f},{t:.4f},{n:.4f},{b:.4f},{good},{size:.4f}\n"
                     for s, line, x, y, z, t, n, b, good, size in rows
                 ).encode()
-
-
-def _quoted(cell: str) -> str:
-    """A cell of a CSV file (RFC 4180)."""
-    return '"' + cell.replace('"', '""') + '"' if any(c in cell for c in ',"\r\n') else cell
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,6 +121,9 @@ def compare(
     add_errors: bool = False,
     part_frame: str | None = None,
     contour: bool = False,
+    flatten: bool = False,
+    expand_cycles: bool = False,
+    peck_clearance_mm: float | None = None,
     date: datetime.date | None = None,
     accept: Sequence[str] = (),
     progress: Progress | None = None,
@@ -129,14 +135,16 @@ def compare(
     `order` are as in `olp.comparison.runs.place`; points farther than `reach_mm` from the path are in no
     figure. With `add_errors` the errors of the calibrated machine are added to measured axis positions (a
     control's log), which gives tip positions. `part_frame` names the work offset to compute from poses
-    measured in axis positions. Raises InputError, UsageError and CannotCompute.
+    measured in axis positions. `flatten` and the options after it are those of `correct`. Raises
+    InputError, UsageError and CannotCompute.
     """
     sources = Sources()
     session = None if machine is None and job is None else Session.start(machine, job, sources=sources)
     options = CompareOptions(
         before=tuple(before), poses=poses, profile=profile, align=align, order=order, reach_mm=reach_mm,
         part_tolerance_um=part_tolerance_um, add_errors=add_errors, part_frame=part_frame,
-        contour=contour, date=date, accept=tuple(accept),
+        contour=contour, flatten=flatten, expand_cycles=expand_cycles, peck_clearance_mm=peck_clearance_mm,
+        date=date, accept=tuple(accept),
     )  # fmt: skip
     return run(sources, session, sources.source(nominal), measured, options, progress)
 
@@ -199,9 +207,12 @@ def _paths(
         findings += with_accepted(doubts, acceptable(options.accept), refuse=False)
     report = _head(side, sets, options) | _judged_report(side, ground, done, axes, options)
     after, before = done.groups["after"], done.groups.get("before", ())
+    origin = None if side.program is None else side.program.origin
+    findings = list(placed_findings(findings, origin))
     return Comparison(
-        _with(report, findings), tuple(findings), sets[0][0].profile, ground.path, after, before
-    )
+        _with(placed(report, origin), findings), tuple(findings), sets[0][0].profile, ground.path, after,
+        before, origin=origin,
+    )  # fmt: skip
 
 
 def _judged_report(
@@ -250,10 +261,16 @@ def _nominal_side(nominal: Source, session: Session | None, options: CompareOpti
     with nominal.errors("<stdin>"):
         loaded = None if session is None else session.loaded("hold").reading(nominal)
     if loaded is None or (points and (options.poses or not loaded.dialect.points)):
+        if options.asked:
+            raise UsageError(
+                "--flatten and --expand-cycles are for a program, and NOMINAL is a table of points"
+            )
         return _Side(nominal, parse_points(data, name or "<stdin>"), None, loaded)
     with nominal.errors("<stdin>"):
-        program = read(data, loaded.setup, loaded.dialect, Options(contour=options.contour))
-    return _Side(nominal, None, program, loaded)
+        sources = session.sources if session is not None else Sources()
+        reading = Options(contour=options.contour)
+        nominal, program = refusals.read(sources, nominal, loaded.setup, loaded.dialect, reading, options)
+    return _Side(nominal, None, program.in_original(), loaded)
 
 
 def _positions(sets: Sequence[Sequence[Points]]) -> Literal["tip", "axes"]:
@@ -291,7 +308,7 @@ def _same_frame(side: _Side, sets: Sequence[Sequence[Points]]) -> None:
 def _head(side: _Side, sets: Sequence[Sequence[Points]], options: CompareOptions) -> dict[str, Any]:
     nominal = {
         "name": side.source.short,
-        "sha256": hashlib.sha256(side.source.data).hexdigest(),
+        "sha256": hashlib.sha256(original_of(side.source.data)).hexdigest(),
         "kind": "program" if side.program else "points",
     }
     stated = {"align": options.align, "reach_mm": options.reach_mm, "tolerance_um": options.part_tolerance_um}

@@ -27,7 +27,7 @@ from olp.proof.judgement import Judgements
 from olp.uncertainty.spread import Confidence
 from olp.workflows import refusals
 from olp.workflows.doubt import accepted_of, doubted
-from olp.workflows.flatten import as_asked
+from olp.workflows.original import placed, placed_findings
 from olp.workflows.proof import Pair, ProofOptions, Run, limits_of, proved
 from olp.workflows.session import Loaded, Outside, PathLike, Session, opened
 
@@ -37,9 +37,6 @@ class CorrectOptions(ProofOptions):
     """The options of `correct`."""
 
     outside_box: Outside = "refuse"
-    flatten: bool = False
-    expand_cycles: bool = False
-    peck_clearance_mm: float | None = None
     split_rapids: bool = False
 
 
@@ -48,18 +45,24 @@ class Correction:
     """A corrected program: its bytes, the report as a mapping ("olp-report-1"), and the findings;
     `confidence` has bands and probabilities by waypoint where a part tolerance is stated and the calibration
     states uncertainties. `table` has the judgement of every nominal move, and (n,) `groups` the last move of
-    the corrected program that belongs to each."""
+    the corrected program that belongs to each. `nominal` is the text that was corrected, unrolled where the
+    call asks for it; lines of the table are then those of its original, which count through its files."""
 
     data: bytes
     report: dict[str, Any]
     findings: tuple[Finding, ...]
     table: Judgements
     groups: Index
+    nominal: bytes
     confidence: Confidence | None = None
 
     @staticmethod
     def of(run: Run) -> Correction:
-        return Correction(run.text, run.report, run.findings, run.table, run.proof.groups, run.confidence)
+        origin = run.nominal.origin
+        return Correction(
+            run.text, placed(run.report, origin), placed_findings(run.findings, origin), run.table,
+            run.proof.groups, run.nominal.data, run.confidence,
+        )  # fmt: skip
 
 
 def correct(
@@ -122,8 +125,8 @@ def corrected(
     at its face. Without `refuse_doubts` they are findings alone. Raises as `correct`."""
     _refuse_stamped(program.data)
     loaded = loaded.reading(program)
-    data = as_asked(sources, program, loaded.setup, loaded.dialect, options).data
-    done = _rewritten(sources, program.holding(data), loaded, options, refuse_doubts, tell)
+    done = _rewritten(sources, program, loaded, options, refuse_doubts, tell)
+    data = done.source.data
     tell("prove", 0.7)
     reading = Options(contour=options.contour)
     second = read(done.text, loaded.setup, loaded.dialect, reading, words=False)
@@ -146,9 +149,11 @@ def _refuse_stamped(data: bytes) -> None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Rewritten:
-    """A program written with its corrections: `nominal` is the program as read, without its words,
-    `uncorrected` are moves that are left so, (n,) `parts` the number of moves of each nominal one."""
+    """A program written with its corrections: `source` is the text that was read, `nominal` what it says,
+    without its words, `uncorrected` are moves that are left so, (n,) `parts` the number of moves of each
+    nominal one."""
 
+    source: Source
     nominal: Program
     text: bytes
     uncorrected: Index
@@ -163,7 +168,8 @@ def _rewritten(
 ) -> _Rewritten:  # fmt: skip
     """Read, plan and write. Words and plan of a long program are large: this function releases them."""
     tell("read", 0.0)
-    program = refusals.read(sources, source, loaded.setup, loaded.dialect, Options(contour=options.contour))
+    reading = Options(contour=options.contour)
+    source, program = refusals.read(sources, source, loaded.setup, loaded.dialect, reading, options)
     if options.split_rapids and program.verbatim:
         raise UsageError(
             "--split-rapids does not go with this dialect: it does not state the path between its points; "
@@ -172,22 +178,24 @@ def _rewritten(
     doubts = doubted(program, loaded, options.accept, options.date, name=source.name, refuse=refuse_doubts)
     accepted = accepted_of(doubts)
     tell("correct", 0.2)
-    limits = limits_of(
-        program, loaded, options, refuse_outside=options.outside_box == "refuse",
-        split_rapids=options.split_rapids,
-    )  # fmt: skip
-    rows = plan(program.toolpath, loaded.model, limits)
-    tell("write", 0.5)
-    marked = loaded.dialect.marks
-    written = write(
-        program, rows, loaded.model, tolerance_mm=limits.tolerance_mm,
-        increments_mm=loaded.setup.machine.least_increment_mm,
-        stamp=stamp_line(loaded.digest, loaded.dialect.comment, accepted) if marked else b"",
-        stamp_always=bool(accepted),
-    )  # fmt: skip
+    with program.errors():
+        limits = limits_of(
+            program, loaded, options, refuse_outside=options.outside_box == "refuse",
+            split_rapids=options.split_rapids,
+        )  # fmt: skip
+        rows = plan(program.toolpath, loaded.model, limits)
+        tell("write", 0.5)
+        marked = loaded.dialect.marks
+        written = write(
+            program, rows, loaded.model, tolerance_mm=limits.tolerance_mm,
+            increments_mm=loaded.setup.machine.least_increment_mm,
+            stamp=stamp_line(loaded.digest, loaded.dialect.comment, accepted) if marked else b"",
+            stamp_always=bool(accepted),
+        )  # fmt: skip
     nominal = replace(program, words=None, slot=program.slot[:0])
-    text = written.text if written.changed else source.data
-    return _Rewritten(nominal, text, rows.uncorrected, written.parts, written.tally, doubts)
+    # the corrected text has lines of its own
+    text = written.text if written.changed else bytes(source.data)
+    return _Rewritten(source, nominal, text, rows.uncorrected, written.parts, written.tally, doubts)
 
 
 def _written_report(done: _Rewritten) -> dict[str, Any]:

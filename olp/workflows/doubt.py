@@ -10,7 +10,9 @@ from olp.compensation.stamp import accepted_in
 from olp.core.errors import Doubtful, InputError, UsageError
 from olp.findings.catalogue import DOUBTS, RULES, Finding
 from olp.findings.rule import Severity
+from olp.program.origin import Origin
 from olp.program.program import Program
+from olp.workflows.original import placed_findings
 from olp.workflows.session import Loaded, Session
 
 
@@ -36,9 +38,10 @@ def doubted(
     """The doubts of a run; those that the call or the stamp of the text `stamped` accepts are less severe.
     With `refuse`, one that is an error and not accepted raises Doubtful; UsageError as `acceptable`. `name`
     is that of the program."""
+    program = program.in_original()
     inputs = Inputs(loaded.setup, program, loaded.calibration, loaded.model, date)
     accepted = acceptable(accept) | accepted_in(stamped, loaded.digest)
-    return with_accepted(doubts(inputs), accepted, name=name, refuse=refuse)
+    return with_accepted(doubts(inputs), accepted, name=name, origin=program.origin, refuse=refuse)
 
 
 def doubted_motion(
@@ -49,19 +52,22 @@ def doubted_motion(
     if _calibrated(session):
         return doubted(program, session.loaded("hold"), accept, date, name=name, stamped=program.data)
     accepted = acceptable(accept) | accepted_in(program.data, None)
-    return with_accepted(doubts(Inputs(session.setup, program, None, None, date)), accepted, name=name)
+    inputs = Inputs(session.setup, program.in_original(), None, None, date)
+    return with_accepted(doubts(inputs), accepted, name=name, origin=program.origin)
 
 
 def with_accepted(
-    findings: Iterable[Finding], accepted: frozenset[str], *, name: str = "", refuse: bool = True
-) -> tuple[Finding, ...]:
+    findings: Iterable[Finding], accepted: frozenset[str], *, name: str = "", origin: Origin | None = None,
+    refuse: bool = True,
+) -> tuple[Finding, ...]:  # fmt: skip
     """Doubts with those that are `accepted` one step less severe. With `refuse`, another error raises
-    Doubtful."""
+    Doubtful, which names its line in the program `name`, or in the file that `origin` has for it."""
     result = tuple(f.accept() if f.code in accepted else f for f in findings)
     errors = [finding for finding in result if finding.severity == Severity.ERROR]
     if refuse and errors:
         codes = tuple(dict.fromkeys(finding.code for finding in errors))
-        raise Doubtful(tuple(_sentence(finding, name) for finding in errors), codes)
+        placed = placed_findings(errors, origin)
+        raise Doubtful(tuple(_sentence(finding, name) for finding in placed), codes)
     return result
 
 
@@ -83,6 +89,7 @@ def _calibrated(session: Session) -> bool:
 
 def _sentence(finding: Finding, name: str) -> str:
     """What is wrong, where, what was expected, what to do, and how to go on all the same."""
+    name = next(filter(None, finding.files[:1]), name)
     place = f"line {finding.line}" + (f" of {name}" if name else "")
     line = f"{place}: " if finding.line is not None else ""
     remedy = RULES[finding.code].remedy

@@ -1,16 +1,40 @@
-"""A program with its loops, subprograms and expressions unrolled."""
+"""A program with its loops, subprograms and expressions unrolled: `flatten`, and what --flatten does."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Protocol
 
-from olp.core.errors import UsageError
+from olp.core.errors import ProgramError, UsageError
 from olp.core.machine import Setup
 from olp.files.sources import Source, Sources
 from olp.program.dialect import Dialect
-from olp.workflows.session import PathLike, opened
+from olp.program.origin import Origin, Unrolled
+from olp.program.survey import Change, Unroll, as_it_is
+from olp.workflows.session import PathLike, Session, opened
+
+#: Endings of files of subprograms.
+_ENDINGS = ("", ".ngc", ".nc")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UnrollOptions:
+    """The options of every verb that reads a program: `flatten` unrolls loops, subprograms and expressions
+    first, `expand_cycles` canned cycles too. `peck_clearance_mm` is the clearance above the last peck, for
+    controls where it is a parameter."""
+
+    flatten: bool = False
+    expand_cycles: bool = False
+    peck_clearance_mm: float | None = None
+
+    @property
+    def asked(self) -> bool:
+        return self.flatten or self.expand_cycles
+
+
+#: The options of a program that is read as it is.
+AS_IT_IS = UnrollOptions()
 
 
 def flatten(
@@ -19,76 +43,109 @@ def flatten(
     job: PathLike | None = None,
     *,
     expand_cycles: bool = False,
+    peck_clearance_mm: float | None = None,
 ) -> bytes:
-    """Unroll loops, subprograms, expressions and, with `expand_cycles`, canned cycles into plain blocks. This
-    is not lossless."""
+    """The text of a program with loops, subprograms, expressions and, with `expand_cycles`, canned cycles
+    written out as plain blocks. This is not lossless.
+
+    `peck_clearance_mm` is the clearance above the last peck, for controls where it is a parameter. Raises
+    ProgramError with the line of the program, or of the file of a subprogram.
+    """
     session, source = opened(program, machine, job, "<program>")
-    with source.errors("<program>"):
-        setup, dialect = session.reading(source)
-        return unrolled(session.sources, source, setup, dialect, expand_cycles=expand_cycles)
+    options = UnrollOptions(flatten=True, expand_cycles=expand_cycles, peck_clearance_mm=peck_clearance_mm)
+    return run(session, source, options)
 
 
-class Unrolling(Protocol):
-    """The options of a verb that may unroll a program first."""
-
-    @property
-    def flatten(self) -> bool: ...
-    @property
-    def expand_cycles(self) -> bool: ...
-    @property
-    def peck_clearance_mm(self) -> float | None: ...
+def run(session: Session, program: Source, options: UnrollOptions) -> bytes:
+    """As `flatten`, in a session."""
+    program.load()
+    with program.errors("<program>"):
+        # a text of its own: what is said of it later has its own lines
+        return bytes(as_asked(session.sources, program, *session.reading(program), options).data)
 
 
-def as_asked(sources: Sources, program: Source, setup: Setup, dialect: Dialect, options: Unrolling) -> Source:
-    """The program, unrolled where the options ask for it. Raises as `unrolled`."""
-    if not (options.flatten or options.expand_cycles):
-        return program
-    text = unrolled(
-        sources, program, setup, dialect, expand_cycles=options.expand_cycles,
-        peck_clearance_mm=options.peck_clearance_mm,
-    )  # fmt: skip
-    return program.holding(text)
-
-
-def unrolled(
+def as_asked(
     sources: Sources,
     program: Source,
     setup: Setup,
     dialect: Dialect,
+    options: UnrollOptions,
     *,
-    expand_cycles: bool = False,
-    peck_clearance_mm: float | None = None,
-) -> bytes:
-    """The text with loops, subprograms and expressions unrolled; subprograms are searched in its folder.
+    block_delete: bool | None = None,
+) -> Source:
+    """The program, unrolled where the options ask for it and it is not yet. Subprograms are searched in its
+    folder. `block_delete` is the position of that switch, None where the result has to be right for both.
+    Raises UsageError for a dialect that cannot be unrolled, ProgramError with the line of the original."""
+    unroll = unroller(sources, program, setup, dialect, options, block_delete=block_delete)
+    return program if unroll is None else program.holding(unroll(as_it_is, None))
 
-    With `expand_cycles` canned cycles are written out too. `peck_clearance_mm` is the clearance above the
-    last peck, for controls where it is a parameter. Payloads that the job gives by line become comments
-    first, as unrolling changes the lines. Raises UsageError for a dialect that has none of them.
+
+def unroller(
+    sources: Sources,
+    program: Source,
+    setup: Setup,
+    dialect: Dialect,
+    options: UnrollOptions,
+    *,
+    block_delete: bool | None = None,
+) -> Unroll | None:
+    """What unrolls the program as in `as_asked`; None where there is nothing to do.
+
+    Payloads that the job gives by line become comments first, as unrolling changes the lines.
     """
     from olp.program.directives import with_payloads
 
-    if dialect.unroller is None:
+    if not options.asked or isinstance(program.data, Unrolled):
+        return None
+    unrolled = dialect.unroller
+    if unrolled is None:
         raise UsageError(f"{dialect.title} cannot be unrolled; leave --flatten and --expand-cycles out")
-    data = with_payloads(program.data, setup.job.payloads, dialect.comment)
-    return dialect.unroller(
-        data,
-        dialect,
-        subprograms=beside(sources, program),
-        expand_cycles=expand_cycles,
-        peck_clearance=peck_clearance_mm,
-    )
+    subprograms = beside(sources, program)
+
+    def unroll(change: Change, limit: int | None) -> Unrolled:
+        def changed(wanted: str) -> tuple[str, bytes] | None:
+            given = subprograms(wanted)
+            return None if given is None else (given[0], change(*given))
+
+        given = change(None, program.data)
+        text = unrolled(
+            with_payloads(given, setup.job.payloads, dialect.comment), dialect, subprograms=changed,
+            expand_cycles=options.expand_cycles, block_delete=block_delete,
+            peck_clearance=options.peck_clearance_mm, **({} if limit is None else {"limit": limit}),
+        )  # fmt: skip
+        _refuse_payloads_not_reached(setup, text.origin)
+        if setup.job.payloads:
+            # the comments of payloads are not in the file
+            lines = tuple(dialect.lines(given))
+            text.origin = replace(text.origin, texts=lines + text.origin.texts[len(lines) :])
+        return text
+
+    return unroll
 
 
-def beside(sources: Sources, program: Source) -> Callable[[str], bytes | None]:
-    """Gives the file of a subprogram in the folder of the program, None where there is none."""
+def beside(sources: Sources, program: Source) -> Callable[[str], tuple[str, bytes] | None]:
+    """Gives name and text of the file of a subprogram in the folder of the program, None without one."""
 
-    def in_folder(wanted: str) -> bytes | None:
+    def in_folder(wanted: str) -> tuple[str, bytes] | None:
         if not program.name:
             return None
-        for suffix in ("", ".ngc", ".nc"):
-            candidate = Path(program.name).parent / f"{wanted}{suffix}"
+        for ending in _ENDINGS:
+            candidate = Path(program.name).parent / f"{wanted}{ending}"
             if candidate.is_file():
-                return sources.read(candidate)
+                return str(candidate), sources.read(candidate)
         return None
 
     return in_folder
+
+
+def _refuse_payloads_not_reached(setup: Setup, origin: Origin) -> None:
+    """Raise ProgramError for a payload of the job at a line that the unrolled text does not have."""
+    written = set(origin.line.tolist())
+    for line in setup.job.payloads:
+        if line not in written:
+            raise ProgramError(
+                "[[payloads]] of the job file names this line, which the unrolled program does not have; "
+                "name the line of a block that is executed",
+                line=line,
+                code="OLP550",
+            )

@@ -13,34 +13,48 @@ from olp.core.machine import Setup
 from olp.core.toolpath import Kind, carried
 from olp.files.sources import Source
 from olp.workflows import refusals
+from olp.workflows.flatten import UnrollOptions
+from olp.workflows.original import placed
 from olp.workflows.session import PathLike, Session, opened
 
 
 def inspect(
-    program: PathLike | bytes, machine: PathLike | Setup, job: PathLike | None = None
+    program: PathLike | bytes,
+    machine: PathLike | Setup,
+    job: PathLike | None = None,
+    *,
+    flatten: bool = False,
+    expand_cycles: bool = False,
+    peck_clearance_mm: float | None = None,
 ) -> dict[str, Any]:
     """What a program does: moves by kind, ranges, tools, offsets, path modes, findings and the support
-    matrix. Raises Refused with all the reasons where the program is refused for several, ProgramError for
-    one."""
+    matrix. `flatten`, `expand_cycles` and `peck_clearance_mm` are those of `correct`. Raises Refused with all
+    the reasons where the program is refused for several, ProgramError for one."""
     session, source = opened(program, machine, job, "<program>")
-    return run(session, source)
+    options = UnrollOptions(flatten=flatten, expand_cycles=expand_cycles, peck_clearance_mm=peck_clearance_mm)
+    return run(session, source, options)
 
 
-def examined(session: Session, program: Source) -> tuple[dict[str, Any], ProgramError | None]:
+def examined(
+    session: Session, program: Source, options: UnrollOptions
+) -> tuple[dict[str, Any], ProgramError | None]:
     """As `run`. A program that is refused gives all the reasons, and the error."""
     program.load()
     try:
-        return run(session, program), None
+        return run(session, program, options), None
     except ProgramError as error:
         lines = program.data.count(b"\n") + (not program.data.endswith(b"\n"))
-        return {"name": program.short, "lines": lines} | refusals.parts_of(error), error
+        return {"name": program.short, "lines": lines} | refusals.parts_of(
+            error, program.name or "<program>"
+        ), error
 
 
-def run(session: Session, program: Source) -> dict[str, Any]:
+def run(session: Session, program: Source, options: UnrollOptions) -> dict[str, Any]:
     """As `inspect`, in a session."""
     with program.errors("<program>"):
         setup, dialect = session.reading(program)
-        parsed = refusals.read(session.sources, program, setup, dialect)
+        program, parsed = refusals.read(session.sources, program, setup, dialect, None, options)
+        parsed = parsed.in_original()
     path = parsed.toolpath
     with np.errstate(all="ignore"):
         known = path.end_mm[np.isfinite(path.end_mm).all(axis=1)]
@@ -49,6 +63,7 @@ def run(session: Session, program: Source) -> dict[str, Any]:
         for i, axis in enumerate("XYZ")
     }
     findings = checks.program_findings(parsed, setup, contour=False)
+    origin = parsed.origin
     return {
         "name": program.short,
         "dialect": dialect.name,
@@ -61,10 +76,11 @@ def run(session: Session, program: Source) -> dict[str, Any]:
         "work_offsets": sorted({f.work_offset for f in path.frames}),
         "payloads_kg": list(dict.fromkeys(f.payload_kg for f in path.frames)),
         "path_modes": [
-            {"line": m.line, "name": m.name, "tolerance_mm": m.tolerance_mm} for m in parsed.path_modes
+            placed({"line": m.line, "name": m.name, "tolerance_mm": m.tolerance_mm}, origin)
+            for m in parsed.path_modes
         ],
         "stamped": find_stamp(program.data) is not None,
-        "findings": [f.as_dict() for f in findings],
+        "findings": [placed(f.as_dict(), origin) for f in findings],
         "support": dialect.support(),
     }
 

@@ -26,6 +26,7 @@ from olp.core.progress import Progress, silent
 from olp.core.toolpath import Flag, Toolpath
 from olp.core.units import MM_PER_UM, UM_PER_MM
 from olp.findings.catalogue import Finding
+from olp.program.origin import original_of
 from olp.program.program import Program
 from olp.program.registry import Options, read
 from olp.proof.judgement import Judgements, verdict
@@ -33,6 +34,7 @@ from olp.proof.proof import ROUNDING_SHARE, Counts, Proof, largest_correction_mm
 from olp.uncertainty.spread import Confidence
 from olp.workflows.confidence import assess
 from olp.workflows.doubt import accepted_of, doubted
+from olp.workflows.flatten import UnrollOptions
 from olp.workflows.session import Loaded
 
 _PROVES = (
@@ -46,9 +48,10 @@ _DOES_NOT_PROVE = (
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ProofOptions:
+class ProofOptions(UnrollOptions):
     """Options of every verb that proves a correction: the numerical tolerance, the part tolerance
-    (`part_tolerance_um`, default: the job's), the day of the run, and the codes of doubts to accept."""
+    (`part_tolerance_um`, default: the job's), the day of the run, and the codes of doubts to accept. What is
+    unrolled is the nominal program."""
 
     tolerance_um: float = 1.0
     contour: bool = False
@@ -114,8 +117,9 @@ def verify_programs(
     try:
         # lines of errors are those of the nominal text
         with naming(name or "<nominal>"):
-            limits = limits_of(first, loaded, options, refuse_outside=outside is None)
-            rows = plan(first.toolpath, loaded.model, limits)
+            with first.errors():
+                limits = limits_of(first, loaded, options, refuse_outside=outside is None)
+                rows = plan(first.toolpath, loaded.model, limits)
             pair = Pair(first, first.data, name, second, second.data, other, rows.uncorrected)
             return proved(pair, loaded.held(), options, doubts, outside=outside)
     except ProgramError as error:
@@ -142,14 +146,14 @@ def proved(
     where nothing is outside. Raises ProgramError where the second is not a correction of the first, or not
     with the block-delete switch on."""
     tolerance_mm = options.tolerance_um * MM_PER_UM
-    first = pair.nominal
-    proof = prove(
-        first, pair.corrected, loaded.model, tolerance_mm=tolerance_mm,
-        digit_mm=last_digit_mm(pair.corrected, loaded.setup), uncorrected=pair.uncorrected,
+    proof = _prove(
+        pair.nominal, pair.corrected, loaded, pair.uncorrected, tolerance_mm,
+        last_digit_mm(pair.corrected, loaded.setup),
     )  # fmt: skip
     table = Judgements.of(proof)
     _prove_without_deleted(pair, loaded, options, proof, table)
     part_um = loaded.part_tolerance_um(options.part_tolerance_um)
+    first = pair.nominal.in_original()
     assessment = assess(
         loaded, first, pair.corrected, proof.groups, pair.uncorrected, part_um, options.date, tell
     )
@@ -157,7 +161,7 @@ def proved(
     findings = (
         *doubts,
         *_unstamped(doubts, loaded),
-        *checks.proof_findings(proof, pair.uncorrected),
+        *checks.proof_findings(proof, pair.uncorrected, first.place),
         *checks.part_findings(table, part_um),
         *checks.between_findings(first, proof, loaded.model),
         *position_findings(proof, loaded, outside),
@@ -173,9 +177,24 @@ def proved(
     if assessment:
         report["uncertainty"] = assessment[1]
     report["judgement"] = table.report()
-    report["verdict"] = verdict(table, part_um, report.get("uncertainty"), findings)
+    report["verdict"] = verdict(table, part_um, report.get("uncertainty"), findings, first.place)
     confidence = assessment[0] if assessment else None
-    return Run(pair.text, first, pair.corrected, proof, table, pair.uncorrected, report, findings, confidence)
+    return Run(
+        pair.text, pair.nominal, pair.corrected, proof, table, pair.uncorrected, report, findings, confidence
+    )
+
+
+def _prove(
+    nominal: Program, corrected: Program, loaded: Loaded, uncorrected: Index, tolerance_mm: float,
+    digit_mm: float,
+) -> Proof:  # fmt: skip
+    """The proof of two programs, whose nominal lines are those of the original."""
+    with nominal.errors():
+        proof = prove(
+            nominal, corrected, loaded.model, tolerance_mm=tolerance_mm, digit_mm=digit_mm,
+            uncorrected=uncorrected,
+        )  # fmt: skip
+    return replace(proof, nominal=nominal.in_original().toolpath)
 
 
 def _prove_without_deleted(
@@ -194,21 +213,19 @@ def _prove_without_deleted(
     try:
         rows = plan(nominal.toolpath, loaded.model, limits_of(nominal, loaded, options, refuse_outside=False))
         without = Judgements.of(
-            prove(
-                nominal, other, loaded.model, tolerance_mm=proof.tolerance_mm, digit_mm=proof.digit_mm,
-                uncorrected=rows.uncorrected,
-            )
-        )  # fmt: skip
+            _prove(nominal, other, loaded, rows.uncorrected, proof.tolerance_mm, proof.digit_mm)
+        )
         good = bool(np.isin(without.line[without.over], table.line[table.over]).all())
     except ProgramError:
         good = False
-    if not good:
-        raise ProgramError(
-            "later blocks depend on this block under block delete, so one correction cannot be right for "
-            "both switch positions; remove the `/`, or give every axis in the first block after it",
-            line=int(path.line[deleted][0]),
-            code="OLP525",
-        )
+    with pair.nominal.errors():
+        if not good:
+            raise ProgramError(
+                "later blocks depend on this block under block delete, so one correction cannot be right for "
+                "both switch positions; remove the `/`, or give every axis in the first block after it",
+                line=int(path.line[deleted][0]),
+                code="OLP525",
+            )
 
 
 def _unstamped(doubts: tuple[Finding, ...], loaded: Loaded) -> list[Finding]:
@@ -252,7 +269,7 @@ def report_of(
         "schema": "olp-report-1",
         "program": {
             "name": Path(name).name if name else "",
-            "sha256": hashlib.sha256(data).hexdigest(),
+            "sha256": hashlib.sha256(original_of(data)).hexdigest(),
             "lines": program.lines,
             "dialect": loaded.dialect.name,
             "moves": len(program.toolpath),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 from olp.core.errors import ProgramError, Reason, Refused
@@ -12,53 +13,83 @@ from olp.findings.catalogue import RULES, Finding
 from olp.program.dialect import Dialect, Options
 from olp.program.program import Program
 from olp.program.survey import read_all
-from olp.workflows.flatten import beside
+from olp.workflows.flatten import AS_IT_IS, UnrollOptions, beside, unroller
 
 #: Lines that a finding names.
 _LINES = 10
+#: What of a reason names a file.
+_FILES = ("file", "follows_file")
 
 REFUSALS = tuple(code for code, rule in RULES.items() if rule.topic == "refusal")
 
 
 def read(
-    sources: Sources, program: Source, setup: Setup, dialect: Dialect, options: Options | None = None
-) -> Program:
-    """Read a program. Raises Refused with all the reasons where there are several, ProgramError where there
-    is one."""
-    parsed = read_all(program.data, setup, dialect, options, subprograms=beside(sources, program))
+    sources: Sources,
+    program: Source,
+    setup: Setup,
+    dialect: Dialect,
+    options: Options | None = None,
+    unrolling: UnrollOptions = AS_IT_IS,
+    *,
+    words: bool = True,
+    block_delete: bool | None = None,
+) -> tuple[Source, Program]:
+    """Read a program, unrolled where that is asked for; the text that was read, and what it says.
+    `block_delete` as in `as_asked`. Raises Refused with all the reasons where there are several, ProgramError
+    where there is one; lines are those of the original."""
+    unroll = unroller(sources, program, setup, dialect, unrolling, block_delete=block_delete)
+    parsed = read_all(
+        program.data,
+        setup,
+        dialect,
+        options,
+        words=words,
+        subprograms=beside(sources, program),
+        unroll=unroll,
+        expands=unrolling.expand_cycles,
+    )
     if not program.data.strip():
         raise ProgramError("the file is empty; expected a program of at least one block", code="OLP501")
-    return parsed
+    return program if unroll is None else program.holding(parsed.data), parsed
 
 
-def reasons_of(error: ProgramError) -> tuple[Reason, ...]:
-    """All the reasons of a refusal."""
+def reasons_of(error: ProgramError, name: str) -> tuple[Reason, ...]:
+    """All the reasons of a refusal of the program `name`."""
     if isinstance(error, Refused):
         return error.reasons
-    return (Reason(error.line, error.code, error.message, ""),)
+    file = None if error.file == name else error.file
+    return (Reason(error.line, error.code, error.message, "", file=file),)
 
 
-def findings_of(error: ProgramError) -> tuple[Finding, ...]:
-    """The reasons of a refusal as findings; those that are alike are one."""
-    alike: dict[tuple[str, str, bool], list[Reason]] = {}
-    for reason in reasons_of(error):
+def findings_of(error: ProgramError, name: str) -> tuple[Finding, ...]:
+    """The reasons of a refusal of the program `name` as findings; those that are alike are one."""
+    alike: dict[tuple[str | None, str, str, bool], list[Reason]] = {}
+    for reason in reasons_of(error, name):
         alike.setdefault(reason.kind, []).append(reason)
     return tuple(_finding(reasons) for reasons in alike.values())
 
 
 def _finding(reasons: list[Reason]) -> Finding:
     first = reasons[0]
-    lines = tuple(reason.line for reason in reasons if reason.line is not None)
-    return Finding(first.code, first.sentence, first.line, lines[:_LINES], len(reasons))
+    lines = tuple(reason.line for reason in reasons if reason.line is not None)[:_LINES]
+    files = () if first.file is None else (Path(first.file).name,) * len(lines)
+    return Finding(first.code, first.sentence, first.line, lines, len(reasons), files=files)
 
 
-def parts_of(error: ProgramError) -> dict[str, Any]:
-    """The parts of a report on a refused program; `refused` are its reasons as data."""
+def parts_of(error: ProgramError, name: str) -> dict[str, Any]:
+    """The parts of a report on the refused program `name`; `refused` are its reasons as data."""
     return {
-        "refused": [row | {"remedy": RULES[row["code"]].remedy} for row in map(asdict, reasons_of(error))],
+        "refused": [_row(reason) for reason in reasons_of(error, name)],
         "refused_complete": not isinstance(error, Refused) or error.complete,
-        "findings": [finding.as_dict() for finding in findings_of(error)],
+        "findings": [finding.as_dict() for finding in findings_of(error, name)],
     }
+
+
+def _row(reason: Reason) -> dict[str, Any]:
+    """A reason as data, with the names of files where they are not the program's."""
+    files = {name: Path(file).name for name in _FILES if (file := getattr(reason, name)) is not None}
+    row = {name: value for name, value in asdict(reason).items() if name not in _FILES}
+    return row | files | {"remedy": RULES[reason.code].remedy}
 
 
 def short(error: ProgramError) -> ProgramError:

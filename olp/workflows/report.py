@@ -139,7 +139,7 @@ def _predicted_plots(
     )
     corrected = session.sources.source(result.data)
     for side, text in (("before", session.sources.source(nominal.data)), ("after", corrected)):
-        points = simulated(text, loaded, simulating).points_mm
+        points = simulated(session.sources, text, loaded, simulating).points_mm
         # points farther away are no part of the path, such as those of a tool change
         reach = 10.0 * float(result.report["deviation"]["before"]["between"]["max_um"]) * 1e-3 + 0.1
         runs[side] = (Run.of(side, path, points, pair(path, points, "forward"), reach),)

@@ -18,7 +18,8 @@ from olp.files.write import write_files
 from olp.findings.catalogue import Finding
 from olp.program.feeds.timing import BLEND_MM
 from olp.program.feeds.words import Shared
-from olp.program.registry import Options, read
+from olp.program.origin import Origin
+from olp.program.registry import Options
 from olp.program.rs274.state import PathMode
 from olp.reports.plots.base import Format as Picture
 from olp.trajectory.from_program import axis_limits
@@ -27,8 +28,10 @@ from olp.trajectory.plan import Trajectory
 from olp.trajectory.route import Route
 from olp.trajectory.usage import LineUse, SlowStretches
 from olp.trajectory.variants import Case, Plan, blend_study, planned, with_feeds, within_inertial
+from olp.workflows import refusals
 from olp.workflows.doubt import accepted_of, doubted_motion
-from olp.workflows.flatten import unrolled
+from olp.workflows.flatten import UnrollOptions
+from olp.workflows.original import placed, placed_findings
 from olp.workflows.retime_report import against, proved, report_of
 from olp.workflows.session import PathLike, Session
 
@@ -46,7 +49,7 @@ FACTORS = (0.25, 0.5, 1.0, 2.0, 4.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RetimeOptions:
+class RetimeOptions(UnrollOptions):
     """The options of `retime`."""
 
     blend_mm: float | None = None
@@ -54,7 +57,6 @@ class RetimeOptions:
     max_inertial_um: float | None = None
     contour: bool = False
     block_delete: bool = False
-    flatten: bool = False
     date: datetime.date | None = None
     accept: tuple[str, ...] = ()
 
@@ -63,30 +65,37 @@ class RetimeOptions:
 class Retiming:
     """A trajectory for each stretch of the program between moves of the control itself, as `plan`; the report
     ("olp-retime-1"), and the findings: doubts about the inputs, and axes
-    commanded beyond their travel."""
+    commanded beyond their travel. `by_original` is the plan with the lines of the text that the program was
+    unrolled from, which count through its files."""
 
     plan: Plan
     report: dict[str, Any]
-    findings: tuple[Finding, ...] = ()
+    findings: tuple[Finding, ...]
+    by_original: Plan
 
     @property
     def trajectories(self) -> tuple[Trajectory, ...]:
-        return self.plan.trajectories
+        return self.by_original.trajectories
+
+    @property
+    def origin(self) -> Origin | None:
+        """Where the lines come from; None where the program was not unrolled."""
+        return self.plan.case.program.origin
 
     @property
     def routes(self) -> tuple[Route, ...]:
         """The paths of the trajectories."""
-        return self.plan.case.legs
+        return self.by_original.case.legs
 
     @property
     def lines(self) -> LineUse:
         """Time, speed and limit of each line."""
-        return self.plan.lines
+        return self.by_original.lines
 
     @property
     def slow(self) -> tuple[SlowStretches, ...]:
         """Of each stretch, where the speed is below half the feed."""
-        return self.plan.slow
+        return self.by_original.slow
 
     @property
     def duration_s(self) -> float:
@@ -155,7 +164,8 @@ class Retiming:
         An F word for several blocks gets the feed with the same total time, or with "least" the least planned
         feed of them. Raises ProgramError for a feed that cannot be written in the style of its word.
         """
-        data, self.report["write_feed"] = with_feeds(self.plan, shared, progress or silent)
+        data, report = with_feeds(self.plan, shared, progress or silent)
+        self.report["write_feed"] = placed(report, self.origin)
         return data
 
     def plots(
@@ -178,7 +188,8 @@ class Retiming:
             trajectory = self._stretch(number)
             route = self.routes[number - 1]
             name = f"{self.report['program'] or 'program'} on {self.report['machine']}"
-            lines = f"lines {int(route.line.min())} to {int(route.line.max())}"
+            place = str if self.origin is None else self.origin.place
+            lines = f"lines {place(int(route.line.min()))} to {place(int(route.line.max()))}"
             where = numbered(target, number) if len(numbers) > 1 else target
             title = f"{name}, {lines}"
             pictures[where] = motion_plot(trajectory, route, title, kind, from_s=from_s, to_s=to_s)
@@ -222,6 +233,8 @@ def retime(
     contour: bool = False,
     block_delete: bool = False,
     flatten: bool = False,
+    expand_cycles: bool = False,
+    peck_clearance_mm: float | None = None,
     date: datetime.date | None = None,
     accept: Sequence[str] = (),
     progress: Progress | None = None,
@@ -234,16 +247,17 @@ def retime(
     `blend_mm` is the path tolerance where the program names none; it has priority over the machine file, and
     the path mode at the start is then to blend. `study_blend` adds times and deviations at a quarter to four
     times the path tolerances in use. `max_inertial_um` limits the deviation by accelerations and the
-    machine's compliance. `block_delete` leaves `/` blocks out. `flatten` unrolls loops, subprograms and
-    expressions first: lines are then those of the unrolled text. Axes commanded beyond their travel are
-    findings (OLP402), and planned all the same. `date` and `accept` are those of `correct`, for doubts about
+    machine's compliance. `block_delete` leaves `/` blocks out. `flatten`, `expand_cycles` and
+    `peck_clearance_mm` are those of `correct`. Axes commanded beyond their travel are findings (OLP402), and
+    planned all the same. `date` and `accept` are those of `correct`, for doubts about
     the inputs. Raises InputError (ProgramError with its line, ConfigError, Doubtful), UsageError and
     CannotCompute.
     """
     session = Session.start(machine, job)
     options = RetimeOptions(
         blend_mm=blend_mm, study_blend=study_blend, max_inertial_um=max_inertial_um, contour=contour,
-        block_delete=block_delete, flatten=flatten, date=date, accept=tuple(accept),
+        block_delete=block_delete, flatten=flatten, expand_cycles=expand_cycles,
+        peck_clearance_mm=peck_clearance_mm, date=date, accept=tuple(accept),
     )  # fmt: skip
     other = None if nominal is None else session.sources.source(nominal)
     source = session.sources.source(program)
@@ -269,23 +283,29 @@ def run(
     other = None if nominal is None else _case(session, nominal, options)
     compliance = compliance_of(setup.machine)
     limits = axis_limits(setup.machine)
-    if most_um is None:
-        plan = planned(case, limits, tell)
-    else:
-        plan = within_inertial(case, limits, compliance, most_um * 1e-3, tell)
-    report = report_of(case, plan, compliance, most_um)
+    with program.errors():
+        if most_um is None:
+            plan = planned(case, limits, tell)
+        else:
+            plan = within_inertial(case, limits, compliance, most_um * 1e-3, tell)
+    shown, origin = plan.in_original(), case.program.origin
+    report = placed(report_of(shown.case, shown, compliance, most_um), origin)
+    if origin is not None and origin.files:
+        report["files"] = list(origin.counted())
     if other is not None:
-        report["nominal"] = against(plan, planned(other, plan.limits, tell, "nominal"), other)
+        versus = against(plan, planned(other, plan.limits, tell, "nominal"), other)
+        report["nominal"] = placed(versus, other.program.origin)
     if stated is not None:
         moving = sum(report["budget_um"].values())
         report["proof"] = stated | {"at_most_um": stated["path_max_um"] + moving}
     if options.study_blend:
         report["blend_study"] = blend_study(case, plan, FACTORS, tell)
     # the motion is inside the box of its waypoints, so commands within travel are motion within travel
-    findings = (*doubts, *travel_findings(case.program.toolpath, setup.machine))
+    path = case.program.in_original().toolpath
+    findings = placed_findings((*doubts, *travel_findings(path, setup.machine)), origin)
     report["accepted"] = accepted_of(findings)
     report["findings"] = [f.as_dict() for f in findings]
-    return Retiming(plan, report, findings)
+    return Retiming(plan, report, findings, shown)
 
 
 def _case(session: Session, program: Source, options: RetimeOptions) -> Case:
@@ -296,17 +316,19 @@ def _case(session: Session, program: Source, options: RetimeOptions) -> Case:
     program.load()
     with program.errors():
         setup, dialect = session.reading(program)
-        text = unrolled(session.sources, program, setup, dialect) if options.flatten else program.data
-        parsed = read(text, setup, dialect, reading)
+        program, parsed = refusals.read(
+            session.sources, program, setup, dialect, reading, options, block_delete=options.block_delete
+        )
         if setup.machine.path_mode == "exact-stop" and blend_mm is None:
             # a mode of line 0 holds from the start
             parsed = replace(parsed, path_modes=(PathMode(0, "G61.1"), *parsed.path_modes))
-        case = Case(
-            program.short, setup, parsed,
-            next(v for v in (blend_mm, stated, BLEND_MM) if v is not None),
-            "the call" if blend_mm is not None else "the machine file" if stated else "the default",
-            options.block_delete, options.contour, (),
-        ).driven()  # fmt: skip
+        with parsed.errors():
+            case = Case(
+                program.short, setup, parsed,
+                next(v for v in (blend_mm, stated, BLEND_MM) if v is not None),
+                "the call" if blend_mm is not None else "the machine file" if stated else "the default",
+                options.block_delete, options.contour, (),
+            ).driven()  # fmt: skip
     if not case.legs and case.untimed()["moves"]:
         raise CannotCompute(
             "no move of the program begins and ends at known positions of all axes, so nothing can be timed; "

@@ -8,6 +8,7 @@ from typing import Any
 
 from olp.core.errors import UsageError
 from olp.core.machine import Setup
+from olp.program.program import Program
 from olp.trajectory.inertia import Inertial
 from olp.trajectory.summary import MOST, compare, summary
 from olp.trajectory.variants import Case, Plan
@@ -16,6 +17,7 @@ from olp.trajectory.variants import Case, Plan
 def against(plan: Plan, nominal: Plan, other: Case) -> dict[str, Any]:
     """The times of the nominal program, in all and by line."""
     rows = compare((nominal.case.legs, nominal.lines), (plan.case.legs, plan.lines))
+    rows = None if rows is None else _by_original(rows, other.program)
     return {
         "program": other.name,
         "duration_s": nominal.duration_s,
@@ -24,6 +26,19 @@ def against(plan: Plan, nominal: Plan, other: Case) -> dict[str, Any]:
         if rows is None
         else [row for row in rows[:MOST] if row["nominal_s"] != row["corrected_s"]],
     }
+
+
+def _by_original(rows: list[dict[str, Any]], program: Program) -> list[dict[str, Any]]:
+    """The times by line of the original, where the nominal program was unrolled."""
+    if program.origin is None:
+        return rows
+    added: dict[int, dict[str, Any]] = {}
+    for row in rows:
+        line = program.origin.line_of(row["line"])
+        one = added.setdefault(line, {"line": line, "nominal_s": 0.0, "corrected_s": 0.0})
+        one["nominal_s"] += row["nominal_s"]
+        one["corrected_s"] += row["corrected_s"]
+    return sorted(added.values(), key=lambda row: -abs(row["corrected_s"] - row["nominal_s"]))
 
 
 def proved(proof: Mapping[str, Any], setup: Setup) -> dict[str, Any]:

@@ -13,16 +13,20 @@ import numpy as np
 from olp.compensation.plan import zero_shifts
 from olp.core.arrays import Array
 from olp.core.machine import Setup
-from olp.files.sources import Source
+from olp.files.sources import Source, Sources
 from olp.findings.catalogue import Finding
+from olp.program.origin import Files, Origin, original_of
 from olp.program.program import Program
-from olp.program.registry import Options, read
+from olp.program.registry import Options
+from olp.workflows import refusals
 from olp.workflows.doubt import accepted_of, doubted
+from olp.workflows.flatten import UnrollOptions
+from olp.workflows.original import placed, placed_findings
 from olp.workflows.session import Loaded, Outside, PathLike, Session, opened
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SimulateOptions:
+class SimulateOptions(UnrollOptions):
     """The options of `simulate`."""
 
     step_mm: float = 1.0
@@ -35,20 +39,22 @@ class SimulateOptions:
 @dataclass(frozen=True, slots=True, eq=False)
 class Simulation:
     """(n, 3) tip positions of the machine with its errors, in the program's first work frame, and the line of
-    each; the findings are doubts about the inputs. The report ("olp-simulation-1") is a mapping; it judges
-    nothing, as only one program is known."""
+    each. Lines count through the files of an unrolled program (`origin`). The findings are doubts about the
+    inputs. The report ("olp-simulation-1") is a mapping; it judges nothing, as only one program is known."""
 
     points_mm: Array
     line: Array
     frame: str
     report: dict[str, Any]
     findings: tuple[Finding, ...] = ()
+    origin: Origin | None = None
 
     def to_csv(self) -> bytes:
-        """`X_mm,Y_mm,Z_mm,line` with the frame named in a comment."""
-        rows = [f"# frame={self.frame}", "X_mm,Y_mm,Z_mm,line"]
+        """`X_mm,Y_mm,Z_mm,line` with the frame named in a comment; `file` too where lines are of several."""
+        files = Files(self.origin)
+        rows = [f"# frame={self.frame}", f"X_mm,Y_mm,Z_mm,line{files.head}"]
         rows += [
-            f"{x:.6f},{y:.6f},{z:.6f},{int(n)}"
+            f"{x:.6f},{y:.6f},{z:.6f},{files.cells(int(n))}"
             for (x, y, z), n in zip(self.points_mm.tolist(), self.line.tolist(), strict=True)
         ]
         return ("\n".join(rows) + "\n").encode()
@@ -62,17 +68,22 @@ def simulate(
     step_mm: float = 1.0,
     outside_box: Literal["refuse", "hold"] = "hold",
     contour: bool = False,
+    flatten: bool = False,
+    expand_cycles: bool = False,
+    peck_clearance_mm: float | None = None,
     date: datetime.date | None = None,
     accept: Sequence[str] = (),
 ) -> Simulation:
     """The path of the tip that the uncompensated machine would take, in the program's first work frame.
 
-    Raises Doubtful where the inputs are not plausible, except for the codes of `accept` and of the stamp.
+    `flatten`, `expand_cycles` and `peck_clearance_mm` are those of `correct`. Raises Doubtful where the
+    inputs are not plausible, except for the codes of `accept` and of the stamp.
     """
     session, source = opened(program, machine, job, "<program>")
     options = SimulateOptions(
-        step_mm=step_mm, outside_box=outside_box, contour=contour, date=date, accept=tuple(accept)
-    )
+        step_mm=step_mm, outside_box=outside_box, contour=contour, flatten=flatten,
+        expand_cycles=expand_cycles, peck_clearance_mm=peck_clearance_mm, date=date, accept=tuple(accept),
+    )  # fmt: skip
     return run(session, source, options)
 
 
@@ -80,25 +91,28 @@ def run(session: Session, program: Source, options: SimulateOptions) -> Simulati
     """As `simulate`, in a session."""
     with program.errors("<program>"):
         loaded = session.loaded(options.outside_box).reading(program)
-    return simulated(program, loaded, options)
+    return simulated(session.sources, program, loaded, options)
 
 
-def simulated(program: Source, loaded: Loaded, options: SimulateOptions) -> Simulation:
+def simulated(sources: Sources, program: Source, loaded: Loaded, options: SimulateOptions) -> Simulation:
     """As `simulate`, of a program whose dialect is settled in `loaded`."""
     from olp.proof.deviation import Tracer
 
     with program.errors("<program>"):
         reading = Options(contour=options.contour)
-        parsed = read(program.data, loaded.setup, loaded.dialect, reading, words=False)
+        program, parsed = refusals.read(
+            sources, program, loaded.setup, loaded.dialect, reading, options, words=False
+        )
         doubts = doubted(
             parsed, loaded, options.accept, options.date, name=program.name, stamped=program.data
         )
+        parsed = parsed.in_original()
         path = parsed.toolpath
         shift = zero_shifts(path.frames, loaded.model)
     if not len(path):
         points_mm = np.zeros((0, 3))
         report = _report(program, parsed, loaded, options, points_mm, "", doubts)
-        return Simulation(points_mm, np.zeros(0), "", report, doubts)
+        return Simulation(points_mm, np.zeros(0), "", *report, parsed.origin)
     actual, move = Tracer.trace(path, loaded.model, options.step_mm)
     home = path.frames[int(path.frame[0])]
     lengths = path.per_frame([f.length_mm for f in path.frames])
@@ -107,19 +121,20 @@ def simulated(program: Source, loaded: Loaded, options: SimulateOptions) -> Simu
     known = np.isfinite(actual).all(axis=1)
     line = path.line[move[known]].astype(np.float64)
     report = _report(program, parsed, loaded, options, actual[known], home.work_offset, doubts)
-    return Simulation(actual[known], line, home.work_offset, report, doubts)
+    return Simulation(actual[known], line, home.work_offset, *report, parsed.origin)
 
 
 def _report(
     source: Source, program: Program, loaded: Loaded, options: SimulateOptions, points_mm: Array, frame: str,
     findings: tuple[Finding, ...],
-) -> dict[str, Any]:  # fmt: skip
+) -> tuple[dict[str, Any], tuple[Finding, ...]]:  # fmt: skip
+    """The report, and the findings with the files of their lines."""
     some = len(points_mm) > 0
-    return {
+    report = {
         "schema": "olp-simulation-1",
         "program": {
             "name": source.short,
-            "sha256": hashlib.sha256(source.data).hexdigest(),
+            "sha256": hashlib.sha256(original_of(source.data)).hexdigest(),
             "lines": program.lines,
             "dialect": loaded.dialect.name,
             "moves": len(program.toolpath),
@@ -132,3 +147,4 @@ def _report(
         "accepted": accepted_of(findings),
         "findings": [finding.as_dict() for finding in findings],
     }
+    return placed(report, program.origin), placed_findings(findings, program.origin)

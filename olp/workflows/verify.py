@@ -11,13 +11,14 @@ from olp.core.machine import Setup
 from olp.core.progress import Progress, silent
 from olp.files.sources import Source
 from olp.findings.catalogue import Finding
-from olp.program.program import Program
-from olp.program.registry import Options, read
+from olp.program.registry import Options
 from olp.proof.judgement import Judgements
 from olp.uncertainty.spread import Confidence
-from olp.workflows.flatten import as_asked
+from olp.workflows import refusals
+from olp.workflows.flatten import AS_IT_IS
+from olp.workflows.original import placed, placed_findings
 from olp.workflows.proof import ProofOptions, verify_programs
-from olp.workflows.session import Loaded, Outside, PathLike, Session
+from olp.workflows.session import Outside, PathLike, Session
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,9 +26,6 @@ class VerifyOptions(ProofOptions):
     """The options of `verify`; the nominal program is unrolled as in `correct`."""
 
     outside_box: Outside = "hold"
-    flatten: bool = False
-    expand_cycles: bool = False
-    peck_clearance_mm: float | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,18 +89,22 @@ def run(
         source.load()
     with nominal.errors():
         loaded = loaded.reading(nominal)
-        nominal = as_asked(session.sources, nominal, loaded.setup, loaded.dialect, options)
     programs = []
-    for source, role in ((nominal, "<nominal>"), (corrected, "<corrected>")):
+    reading = Options(contour=options.contour)
+    for source, role, unrolling in (
+        (nominal, "<nominal>", options),
+        (corrected, "<corrected>", AS_IT_IS),
+    ):
         tell("read", 0.0)
         with source.errors(role):
-            programs.append(_read(source, loaded, options))
+            _, parsed = refusals.read(
+                session.sources, source, loaded.setup, loaded.dialect, reading, unrolling
+            )
+            programs.append(parsed)
     outside = "OLP403" if options.outside_box == "hold" else None
     done = verify_programs(
         (programs[0], nominal.name), (programs[1], corrected.name), loaded, options, outside=outside
     )
-    return Verification(done.report, done.findings, done.table, done.confidence)
-
-
-def _read(source: Source, loaded: Loaded, options: VerifyOptions) -> Program:
-    return read(source.data, loaded.setup, loaded.dialect, Options(contour=options.contour))
+    origin = done.nominal.origin
+    report, findings = placed(done.report, origin), placed_findings(done.findings, origin)
+    return Verification(report, findings, done.table, done.confidence)

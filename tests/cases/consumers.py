@@ -124,18 +124,15 @@ def _verified(job: Job, out: Path, stated: dict[str, Any]) -> None:
 
 
 def _checked(job: Job, out: Path, verdict: dict[str, Any]) -> None:
-    """The gate has no --flatten, so an unrolled program is not checked."""
-    if job.unroll:
-        return
     words = " ".join(verdict["sentences"])
-    options = ("check", job.program, *job.setup, "--fail-on", "never", "--format")
+    options = ("check", job.program, *job.words("--fail-on", "never", "--format"))
     assert json.loads(run(*options, "json").stdout)["verdict"] == verdict
     assert words in wrapped(run(*options, "text").stdout)
     sarif = json.loads(run(*options, "sarif").stdout)
     assert sarif["runs"][0]["properties"]["verdict"] == verdict
     junit = ElementTree.fromstring(run(*options, "junit").stdout)
     assert [p.get("value") for p in junit.iter("property")] == verdict["sentences"]
-    pair = ("check", out, "--nominal", job.program, *job.setup, "--fail-on", "never", "--json")
+    pair = ("check", out, "--nominal", job.program, *job.words("--fail-on", "never", "--json"))
     checked = json.loads(run(*pair).stdout)["verdict"]
     # its lines are those of the program that it was given
     assert checked["numerical"] | {"line": 0} == verdict["numerical"] | {"line": 0}
@@ -181,6 +178,9 @@ class _allowed_lines:
 
 def _page_and_table(page: Page, table: Judgements) -> None:
     listing, rows = page.manifest["listing"], table.by_line()
+    if listing["names"] is not None:
+        _named_rows(page, rows)
+        return
     numbers = page.array(listing["row_nominal"]).astype(int)
     row = {int(n): k for k, n in enumerate(numbers.tolist()) if n}
     where = [row[int(line)] for line in rows["line"]]
@@ -196,6 +196,33 @@ def _page_and_table(page: Page, table: Judgements) -> None:
     state = page.array(listing["state"])
     assert state[where].tolist() == rows["state"].tolist()
     assert set(np.delete(state, where).tolist()) <= {3}
+
+
+def _rows_of_lines(page: Page) -> dict[str, list[int]]:
+    """The rows of the listing of each line of the program: several where it was unrolled."""
+    listing, made = page.manifest["listing"], dict[str, list[int]]()
+    names = None if listing["names"] is None else page.array(listing["names"])
+    for row, number in enumerate(page.array(listing["row_nominal"]).astype(int).tolist()):
+        if number:
+            made.setdefault(names[number - 1] if names else str(number), []).append(row)
+    return made
+
+
+def _named_rows(page: Page, rows: dict[str, Any]) -> None:
+    """The rows of an unrolled text, whose lines were made from one of the program, say together what the
+    table says of that: the largest of what counts, else of what is shown."""
+    listing, made = page.manifest["listing"], _rows_of_lines(page)
+    for layer, key in (("uncorrected", "uncorrected"), ("result", "corrected")):
+        own = listing["by_layer"][layer]
+        shown, state = page.array(own["um"]), page.array(own["state"]).astype(int)
+        for line, value, verdict in zip(rows["line"], rows[f"{key}_um"], rows[f"{key}_state"], strict=True):
+            mine = made[str(line)]
+            counted = [row for row in mine if state[row] < 2] or [row for row in mine if state[row] == 2]
+            assert max(shown[row] for row in counted) == pytest.approx(
+                np.nan_to_num(value, nan=-1.0), abs=PRINTED_UM
+            )
+            states = {int(state[row]) for row in counted}
+            assert verdict == (1 if 1 in states else min(states))
 
 
 def _page_and_report(page: Page, stated: dict[str, Any]) -> None:
@@ -224,7 +251,7 @@ def measured(
     """The report of `compare`, once every consumer of measured runs has been heard."""
     part = () if tolerance_um is None else ("--part-tolerance-um", str(tolerance_um))
     target, text = job.folder / "points.csv", job.folder / "compared.md"
-    call = ("compare", job.program, *files, *job.setup, *part, "--force")
+    call = ("compare", job.program, *files, *job.words(*part, "--force"))
     done = run(*call, "--json", "-o", target, "--report", text)
     stated = json.loads(done.stdout)
     verdict = stated["verdict"]
@@ -245,7 +272,7 @@ def measured(
     html = job.folder / "measured.html"
     runs = [word for file in files for word in ("--measured", file)]
     shown_run = run(
-        "view", job.program, *job.setup, *part, "--corrected", corrected, *runs, "--no-time", "-o", html,
+        "view", job.program, *job.words(*part, "--corrected", corrected, *runs, "--no-time", "-o", html),
         "--force",
     )  # fmt: skip
     assert shown_run.exit_code == 0, shown_run.stderr
@@ -256,7 +283,7 @@ def measured(
 def measured_briefly(job: Job, corrected: Path, files: Sequence[Path], tolerance_um: float | None) -> None:
     """The report of `compare` and the page alone, which is quicker."""
     part = () if tolerance_um is None else ("--part-tolerance-um", str(tolerance_um))
-    stated = json.loads(run("compare", job.program, *files, *job.setup, *part, "--json").stdout)
+    stated = json.loads(run("compare", job.program, *files, *job.words(*part, "--json")).stdout)
     _one_comparison(stated)
     review = olp.view(
         job.program, **job.api, corrected=corrected, measured=files, part_tolerance_um=tolerance_um,
@@ -331,10 +358,10 @@ def _layers(stated: dict[str, Any]) -> Iterator[str]:
 
 def _measured_lines(page: Page, stated: dict[str, Any], names: Sequence[str]) -> None:
     listing, tolerance = page.manifest["listing"], stated["judgement"]["tolerance_um"]
-    numbers = page.array(listing["row_nominal"]).astype(int)
+    made = _rows_of_lines(page)
     shown = page.array(listing["measured_um"])
     for row in stated["worst"]:
-        assert shown[numbers == row["line"]][0] == pytest.approx(row["max_um"], abs=PRINTED_UM)
+        assert max(shown[made[str(row["line"])]]) == pytest.approx(row["max_um"], abs=PRINTED_UM)
     each = [page.array(listing["by_layer"][name]["um"]) for name in names]
     assert np.maximum.reduce(each).tolist() == shown.tolist()
     for name, run_ in zip(names, stated["judgement"]["runs"], strict=True):

@@ -22,6 +22,13 @@ from judge.path import DensePath, _Curves, densify, shifts, tool_vectors
 
 #: mm by which moves of different kinds are moved apart in the matching
 _APART_MM = 100.0
+#: what the judge's arcs may be off
+ARCS_UM = 0.27
+#: Without an unknown play the stated maximum is at most this factor above the judge's, and this much.
+FACTOR = 1.5
+MORE_UM = 0.5
+#: the axis along which a hole is drilled, by plane
+_DRILLED = (2, 0, 1)
 _CODE = re.compile(r"G([0-9.]+)")
 _REMARK = re.compile(r"\([^)\n]*\)|;[^\n]*")
 _CYCLES = (73.0, 74.0, *(float(code) for code in range(81, 90)))
@@ -140,6 +147,18 @@ def judge_whole(
     known = owner >= 0
     owners = dict(zip(own.line[known].tolist(), moves.line[owner[known]].tolist(), strict=True))
     return result.done(int((feeds & before & ~left).sum()), owners)
+
+
+def compare(stated_um: float, whole: Whole) -> None:
+    """The stated maximum is not below the judge's, and not far above."""
+    assert stated_um >= whole.possible_um - ARCS_UM, (
+        f"stated {stated_um:.2f}, is {whole.possible_um:.2f} um (certain: {whole.certain_um:.2f}), "
+        f"line {whole.worst_line}"
+    )
+    assert whole.possible_um or not stated_um or whole.left_out, f"stated {stated_um:.2f}, but no cut is off"
+    above = FACTOR * whole.possible_um + MORE_UM
+    if not whole.left_out and not whole.open:
+        assert stated_um <= above, f"stated {stated_um:.2f}, is {whole.possible_um:.2f} um"
 
 
 def _first_after(moves: CanonMoves, lines: frozenset[int]) -> list[int]:
@@ -354,15 +373,16 @@ def _hole(
     result: _Sum, real: _Tips, moves: CanonMoves, shift: np.ndarray, mine: tuple[int, int],
     theirs: tuple[int, int],
 ) -> None:  # fmt: skip
-    """Distances of the feed strokes of a hole from its axis, along Z, and of the deepest from the bottom."""
+    """Distances of the feed strokes of a hole from its axis, and of the deepest from the bottom."""
     dense = real.dense
     strokes = np.arange(*mine)[moves.kind[mine[0] : mine[1]] == FEED]
     if not len(strokes):
         return
-    level = np.concatenate([moves.axis[strokes, 2], moves.begin[strokes, 2]])
-    deepest = int(strokes[np.argmin(moves.axis[strokes, 2])])
+    drill = _DRILLED[int(moves.plane[mine[0]])]
+    level = np.concatenate([moves.axis[strokes, drill], moves.begin[strokes, drill]])
+    deepest = int(strokes[np.argmin(moves.axis[strokes, drill])])
     bottom = moves.axis[deepest] + shift[deepest]
-    top = bottom + np.array([0.0, 0.0, float(np.ptp(level))])
+    top = bottom[drill] + float(np.ptp(level))
     feeds = dense.moves.kind[dense.move] == FEED
     rows = np.flatnonzero((dense.move >= theirs[0]) & (dense.move < theirs[1]) & feeds & real.settled)
     if not len(rows):
@@ -373,11 +393,10 @@ def _hole(
     rows = np.union1d(rows, begin[begin >= 0])
 
     def away(tips: np.ndarray) -> np.ndarray:
-        held = tips.copy()
-        held[:, :2] = bottom[:2]
-        held[:, 2] = np.clip(tips[:, 2], bottom[2], top[2])
+        held = np.tile(bottom, (len(tips), 1))
+        held[:, drill] = np.clip(tips[:, drill], bottom[drill], top)
         size = np.linalg.norm(tips - held, axis=1)
-        low = int(np.argmin(tips[:, 2]))
+        low = int(np.argmin(tips[:, drill]))
         size[low] = max(size[low], float(np.linalg.norm(tips[low] - bottom)))
         return np.asarray(size)
 

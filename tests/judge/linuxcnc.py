@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import functools
 import json
 import os
@@ -26,7 +27,10 @@ PROBE = 3
 DWELL = 4
 KINDS = ("rapid", "feed", "arc", "probe", "dwell")
 NO_END = "File ended with no percent sign or program end"
-COLUMNS = 20
+COLUMNS = 22
+#: masks of axes
+XYZ = 0b111
+ALL_AXES = 0b1_1111_1111
 Point = Sequence[float]
 
 
@@ -56,6 +60,8 @@ class CanonMoves:
     seconds: np.ndarray  # (n,) of dwells
     g92: np.ndarray  # (n, 3)
     known: np.ndarray  # (n, 3) axis position at the end does not depend on the start position
+    feed_mode: np.ndarray  # (n,) 0 `feed` counts by the minute, 1 by the turn
+    speed: np.ndarray  # (n,) turns of the spindle per minute, NaN where it changes beside the move
     start_known: bool = True
     ended: bool = True
     messages: list[Any] = field(default_factory=list)
@@ -81,6 +87,8 @@ class CanonMoves:
             seconds=np.zeros(n),
             g92=nil,
             known=np.ones((n, 3), bool),
+            feed_mode=ints,
+            speed=np.zeros(n),
         )
 
     @property
@@ -121,19 +129,26 @@ def interpret(
     g92_mm: Point | None = None,
     start_mm: Point = (0.0, 0.0, 0.0),
     find_known: bool = True,
+    deletes: bool = False,
+    axes: int = XYZ,
+    seconds: float = 300.0,
 ) -> CanonMoves:
     """Canonical moves of a program with the offsets and tools of a machine folder; arguments override it.
 
     With `find_known` the start counts as unknown, and a second run from elsewhere shows which axis positions
     depend on it; without, the machine really stands at `start_mm` and all is known.
 
-    Raises InterpreterError where LinuxCNC refuses; a missing program end alone is let pass (`ended`).
+    `deletes` is the block-delete switch: it takes out blocks with `/`. `axes` is a mask of what the machine
+    has, as other words are refused. Raises InterpreterError where LinuxCNC
+    refuses; a missing program end alone is let pass (`ended`). Raises InterpreterFailure where it crashes or
+    takes longer than `seconds`.
     """
     setup = _setup(machine, offsets or {}, tools or {}, g92_mm)
-    moves = _run(data, setup, start_mm)
+    how = {"deletes": deletes, "axes": axes, "seconds": seconds}
+    moves = _run(data, setup, start_mm, **how)
     if not find_known or not len(moves):
         return moves
-    other = _run(data, setup, [value - 7.0 for value in start_mm])
+    other = _run(data, setup, [value - 7.0 for value in start_mm], **how)
     if len(other) != len(moves):
         raise RuntimeError("the moves depend on the start position: give start_mm and find_known=False")
     return replace(moves, known=np.abs(other.axis - moves.axis) < 1e-6, start_known=False)
@@ -157,13 +172,18 @@ class _Setup:
     length_active: bool
 
 
+@functools.lru_cache(maxsize=16)
+def _parsed(text: str) -> dict[str, Any]:
+    return tomllib.loads(text)
+
+
 def _setup(
     machine: str | Path | None, offsets: Mapping[str, Point], tools: Mapping[int, Point], g92: Point | None
 ) -> _Setup:
     text: dict[str, Any] = {}
     if machine is not None:
         path = Path(machine)
-        text = tomllib.loads((path / "machine.toml" if path.is_dir() else path).read_text())
+        text = _parsed((path / "machine.toml" if path.is_dir() else path).read_text())
     frames: dict[str, tuple[float, float, float, float]] = {}
     for name, entry in text.get("work_offsets", {}).items():
         if entry.get("A_deg") or entry.get("B_deg"):
@@ -189,34 +209,79 @@ def _setup(
     )
 
 
-def _run(data: bytes, setup: _Setup, start_mm: Point) -> CanonMoves:
-    with tempfile.TemporaryDirectory(prefix="canon_") as name:
-        folder = Path(name)
-        (folder / "p.ngc").write_bytes(data)
-        (folder / "t.tbl").write_text(
-            "".join(f"T{n} P{n} X{x!r} Y{y!r} Z{z!r} D{d!r}\n" for n, (x, y, z, d) in setup.tools.items())
+class InterpreterFailure(RuntimeError):
+    """LinuxCNC neither accepted nor refused: it crashed, or did not come to an end (`failed` is "time")."""
+
+    def __init__(self, failed: str) -> None:
+        super().__init__(f"the interpreter stopped: {failed}")
+        self.failed = failed
+
+
+class _Server:
+    """LinuxCNC's interpreter in a process of its own, which answers one program after the other."""
+
+    def __init__(self) -> None:
+        self.folder = tempfile.TemporaryDirectory(prefix="canon_")
+        self.process = subprocess.Popen(
+            [SYSTEM_PYTHON, "-I", str(DRIVER)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            cwd=self.folder.name,
+            env={"HOME": self.folder.name, "PATH": os.environ.get("PATH", "")},
         )
-        (folder / "v.var").write_text(_parameters(setup))
-        x, y, z = (float(value) for value in start_mm)
-        begin = f"G53 G0 X{x:.9f} Y{y:.9f} Z{z:.9f}"
-        if setup.tool in setup.tools:
-            activate = f"G43 H{setup.tool}" if setup.length_active else ""
-            begin = f"T{setup.tool} M6 {activate} {begin}"
-        command = [SYSTEM_PYTHON, "-I", str(DRIVER)]
-        command += [str(folder / file) for file in ("p.ngc", "t.tbl", "v.var", "out.bin")]
-        done = subprocess.run(
-            [*command, begin, "G21"],
-            capture_output=True,
-            check=False,
-            timeout=300,
-            cwd=folder,
-            env={"HOME": name, "PATH": os.environ.get("PATH", "")},
-        )
-        if done.returncode:
-            detail = done.stderr.decode(errors="replace").strip()
-            raise RuntimeError(f"the driver stopped with {done.returncode}: {detail}")
-        report = json.loads(done.stdout.splitlines()[-1])
-        rows = np.fromfile(folder / "out.bin").reshape(-1, COLUMNS)
+        self.owner = os.getpid()
+        atexit.register(self.close)
+
+    def close(self) -> None:
+        if self.owner == os.getpid():
+            self.process.communicate()
+            self.folder.cleanup()
+
+    def ask(self, request: Mapping[str, Any], data: bytes) -> tuple[dict[str, Any], np.ndarray]:
+        """The report and the rows (n, COLUMNS) of a program. Raises InterpreterFailure."""
+        into, out = self.process.stdin, self.process.stdout
+        assert into is not None
+        assert out is not None
+        into.write(json.dumps({**request, "size": len(data)}).encode() + b"\n" + data)
+        into.flush()
+        report = json.loads(out.readline())
+        rows = np.frombuffer(out.read(report["size"])).reshape(-1, COLUMNS)
+        if "failed" in report:
+            raise InterpreterFailure(report["failed"])
+        return report, rows
+
+
+@functools.cache
+def _server(process: int) -> _Server:
+    """One for each `process`: a fork must not share the pipes of its parent."""
+    return _Server()
+
+
+def _run(
+    data: bytes, setup: _Setup, start_mm: Point, *, deletes: bool, axes: int, seconds: float
+) -> CanonMoves:
+    x, y, z = (float(value) for value in start_mm)
+    begin = f"G53 G0 X{x:.9f} Y{y:.9f} Z{z:.9f}"
+    if setup.tool in setup.tools:
+        activate = f"G43 H{setup.tool}" if setup.length_active else ""
+        begin = f"T{setup.tool} M6 {activate} {begin}"
+    table = "".join(f"T{n} P{n} X{x!r} Y{y!r} Z{z!r} D{d!r}\n" for n, (x, y, z, d) in setup.tools.items())
+    request = {
+        "table": table,
+        "variables": _parameters(setup),
+        "start": begin,
+        "unit": "G21",
+        "deletes": deletes,
+        "axes": axes,
+        "seconds": seconds,
+    }
+    try:
+        report, rows = _server(os.getpid()).ask(request, data)
+    except InterpreterFailure as failure:
+        if not failure.failed.startswith("SIG"):
+            raise
+        # a crash counts where it comes again
+        report, rows = _server(os.getpid()).ask(request, data)
     if report["error"] not in (None, NO_END):
         raise InterpreterError(report["error"], report["error_line"])
     rows = rows[1:]  # the first row goes to the start position
@@ -236,6 +301,8 @@ def _run(data: bytes, setup: _Setup, start_mm: Point) -> CanonMoves:
         rows[:, 16],
         rows[:, 17:20],
         np.ones(tip.shape, bool),
+        feed_mode=rows[:, 20].astype(int),
+        speed=rows[:, 21],
         ended=report["error"] is None,
         messages=report["messages"],
     )

@@ -91,7 +91,7 @@ def _machine_text(recipe: Recipe, name: str) -> str:
             "jerk_mm_s3": 20000.0,
         }
         parts.append(_table(f"[axes.{axis}]", limits))
-    parts += [_table(f"[work_offsets.{key}]", entry) for key, entry in recipe.work_offsets.items()]
+    parts += [_table(f'[work_offsets."{key}"]', entry) for key, entry in recipe.work_offsets.items()]
     parts += [_table(f"[tools.{number}]", entry) for number, entry in recipe.tools.items()]
     parts.append(_table("[job_defaults]", recipe.job_defaults))
     return "".join(parts)

@@ -28,7 +28,7 @@ from olp.program.dialect import Dialect, Options
 from olp.program.feeds.timing import timing
 from olp.program.rs274.positions import positions_program
 from olp.program.rs274.profiles.base import Profile
-from olp.workflows.flatten import unrolled
+from olp.workflows.flatten import UnrollOptions, as_asked
 
 ROOT = Path(__file__).resolve().parents[2]
 OTHER = "another-name"
@@ -145,7 +145,8 @@ def test_programs_are_read_and_timed_alike(pairs: Mapping[str, Pair], name: str,
 def _unrolled(text: bytes, setup: Setup, dialect: Dialect, expand: bool, clearance: float | None) -> bytes:
     sources = Sources()
     given = sources.source(text)
-    return unrolled(sources, given, setup, dialect, expand_cycles=expand, peck_clearance_mm=clearance)
+    options = UnrollOptions(flatten=True, expand_cycles=expand, peck_clearance_mm=clearance)
+    return as_asked(sources, given, setup, dialect, options).data
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -108,7 +108,7 @@ def test_l1_chosen_texts(zero: dict[str, Setup], shifted: dict[str, Setup], name
 @settings(max_examples=15)
 def test_l1_text_in_a_comment_is_opaque(zero: dict[str, Setup], name: str, noise: bytes) -> None:
     case = CASES[name]
-    content = re.sub(rb"[\r\n()]|olp", b"", noise).rstrip(b" $\t\v\f").decode("latin-1")
+    content = re.sub(rb"[\0\r\n()]|olp", b"", noise).rstrip(b" $\t\v\f").decode("latin-1")
     text = "\n".join([*case.head, case.comment(content), case.point((1.0, 2.0, 3.0), 3), *case.tail])
     data = text.encode("latin-1")
     assert olp.correct(data, zero[name]).data == data

@@ -17,7 +17,7 @@ def shifted(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return machines.shift_machine(tmp_path_factory.mktemp("shift"))
 
 
-@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r\r\n"])
 @pytest.mark.parametrize(
     ("off", "on"),
     [("(olp off)", "(olp on)"), ("; OLP OFF", ";olp on"), ("( Olp Off: probing)", "(oLP ON)")],

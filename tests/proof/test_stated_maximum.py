@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from cases.acceptance import TRUE_ZERO
 from cases.acceptance import machine as small_machine
-from cases.whole_cut import Whole, judge_whole, marks
+from cases.whole_cut import ARCS_UM, Whole, compare, judge_whole, marks
 from judge import linuxcnc, machines, programs
 from judge.linuxcnc import DWELL, FEED, RAPID, CanonMoves
 from judge.machines import CHAINS, Recipe
@@ -24,11 +24,6 @@ import olp
 from olp.core.errors import ProgramError
 from olp.proof.judgement import Judgements
 
-#: what the judge's arcs may be off
-ARCS_UM = 0.27
-#: Without an unknown play the stated maximum is at most this factor above the judge's, and this much.
-FACTOR = 1.5
-MORE_UM = 0.5
 #: Samples of both along arcs are a few degrees apart: that may miss so much of a deviation.
 SHARE = 0.01
 #: Programs, and what each of them tries besides lines and inserted blocks.
@@ -142,18 +137,6 @@ def same(one: dict[str, Any], other: dict[str, Any]) -> None:
         assert one[key] == other[key], key
     codes = [sorted(f["code"] for f in report["findings"]) for report in (one, other)]
     assert codes[0] == codes[1]
-
-
-def compare(stated_um: float, whole: Whole) -> None:
-    """1 and 4: not below the judge, and not far above."""
-    assert stated_um >= whole.possible_um - ARCS_UM, (
-        f"stated {stated_um:.2f}, is {whole.possible_um:.2f} um (certain: {whole.certain_um:.2f}), "
-        f"line {whole.worst_line}"
-    )
-    assert whole.possible_um or not stated_um or whole.left_out
-    above = FACTOR * whole.possible_um + MORE_UM
-    if not whole.left_out and not whole.open:
-        assert stated_um <= above, f"stated {stated_um:.2f}, is {whole.possible_um:.2f} um"
 
 
 def compare_lines(table: Judgements, whole: Whole, slack: int) -> None:

@@ -58,8 +58,6 @@ def simulated(job: Job, program: Path, name: str, off_um: float = 0.0) -> Path:
 def heard(job: Job, *, plots: bool = False) -> None:
     """All consumers of a job, also of two measured runs of it."""
     _, out = predicted(job, plots=plots)
-    if job.unroll:
-        return
     files = [simulated(job, out, "first.csv"), simulated(job, out, "second.csv", 7.0)]
     measured(job, out, files, 5.0, plots=plots)
     measured_briefly(job, out, files[:1], None)

@@ -164,6 +164,26 @@ def test_rows_have_the_line_numbers_and_the_texts_of_both_files(page: Any) -> No
     assert inserted, "the arcs were to be split"
 
 
+def test_unrolled_lines_are_called_as_in_the_file(chromium: Any, tmp_path: Path) -> None:
+    loop = b"G21 G90 G64 P0.01\n#1 = 0\n#1 = 1\no1 while [#1 lt 4]\nG1 X[#1 * 10] Y5 Z5 F600\n#1 = [#1 + 1]\n"
+    review = view(loop + b"o1 endwhile\nG53 G0 X20\nM2\n", GANTRY, flatten=True)
+    review.write(tmp_path / "unrolled.html")
+    with browser.opened(chromium, tmp_path / "unrolled.html") as page:
+        rows = page.evaluate(
+            "[...Array(olp.app.listing.n).keys()].map(r => [0, 1].map(s => olp.app.listing.number(r, s)))"
+        )
+        named = [str(a) for a, _ in rows if a]
+        assert named == ["1", "5", "5", "5", "8", "9"]
+        # the corrected program has lines of its own
+        assert [b for _, b in rows if b] == list(range(1, 1 + sum(b != "" for _, b in rows)))
+        page.fill("#find", "8")
+        page.press("#find", "Enter")
+        assert page.evaluate("olp.app.listing.text(olp.state.row, 0)") == "G53 G0 X20"
+        page.evaluate("document.querySelectorAll('details').forEach(d => (d.open = true))")
+        page.click("#findings .warning")
+        assert page.evaluate("olp.app.listing.number(olp.state.row, 0)") in ("5", "8")
+
+
 def test_each_move_is_tied_to_its_line_of_the_file(page: Any, review: Review) -> None:
     scene = review.scene
     line = scene.nominal.toolpath.line[scene.samples.move]
@@ -466,7 +486,7 @@ def test_no_peak_is_lost_in_a_plot_of_a_million_points(page: Any) -> None:
           y[123457] = 9; y[777777] = -4; y[500000] = NaN;
           const chart = olp.app.plots.deviation;
           const series = [{label: "s", colour: "#000", x, y}];
-          chart.set({title: "t", unit: "", x_label: "", series, limits: []});
+          chart.set({extent: [x[0], x[x.length - 1]], title: "t", unit: "", x_label: "", series, limits: []});
           const columns = chart.columns(series[0]), ends = [1, 2].map(k => columns.map(c => c[k]));
           return [columns.length, Math.max(...ends[1]), Math.min(...ends[0]), chart.wide];
         }"""

@@ -4,7 +4,8 @@
 (() => {
   const ROW = 19,
     TALLEST = 8e6,
-    SHOWN = 400; // px, px, characters of a line in the list
+    SHOWN = 400, // px, px, characters of a line in the list
+    WIDEST = 16; // characters of a line's name
 
   class Listing {
     constructor(app) {
@@ -13,6 +14,7 @@
       this.app = app;
       this.texts = [get(listing.nominal), get(listing.corrected)];
       this.numbers = [get(listing.row_nominal), get(listing.row_corrected)];
+      this.names = get(listing.names); // of the nominal lines, where they were unrolled from others
       this.errors = [listing.error_um, listing.result_um, listing.measured_um].map(get); // below 0: not known
       this.state = get(listing.state); // of each row: 0 within, 1 above, 2 shown and not judged, 3 no move
       this.n = this.numbers[0].length;
@@ -24,7 +26,8 @@
       this.top = 0; // first visible row, may be a part
       this.rows = [];
       this.current = this.selected = -1;
-      const digits = String(Math.max(this.texts[0].n, this.texts[1]?.n ?? 0)).length;
+      const longest = String(Math.max(this.texts[0].n, this.texts[1]?.n ?? 0)).length,
+        digits = Math.max(longest, Math.min(listing.names_width ?? 0, WIDEST));
       document.getElementById("right").style.setProperty("--number", `${12 + 7 * Math.max(3, digits)}px`);
       this.box.classList.toggle("single", !this.texts[1]);
       document.getElementById("right").classList.toggle("measured", Boolean(this.errors[2]));
@@ -63,8 +66,10 @@
       return line > 0 && this.texts[side] ? this.texts[side].line(line - 1) : "";
     }
 
+    // What a row's line is called: its number, or the line that it was unrolled from.
     number(row, side) {
-      return this.numbers[side]?.[row] || "";
+      const line = this.numbers[side]?.[row] || "";
+      return line && side === 0 && this.names ? this.names.line(line - 1) : line;
     }
 
     error(row) {
@@ -188,8 +193,15 @@
       });
     }
 
+    // First row of a nominal line by its name, or -1.
+    row_named(name) {
+      for (let row = 0; row < this.n; row++) if (this.number(row, 0) === name) return row;
+      return -1;
+    }
+
     // Row of a 1-based line of the nominal (0) or corrected (1) file, or -1.
     row_of_line(line, side = 0) {
+      if (side === 0 && this.names) return this.row_named(String(line));
       return this.numbers[side] ? this.numbers[side].indexOf(line) : -1;
     }
 

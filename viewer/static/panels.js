@@ -171,10 +171,10 @@
           "button",
           {className: `finding ${order.includes(f.severity) ? f.severity : "info"}`},
           make("b", {textContent: f.code}),
-          make("span", {textContent: f.line ? `${f.message} (line ${f.line})` : f.message}),
+          make("span", {textContent: f.line ? `${f.message} (line ${f.place ?? f.line})` : f.message}),
         );
         entry.disabled = !f.line;
-        entry.onclick = () => app.go_to_line(f.line);
+        entry.onclick = () => app.go_to_line(app.listing.names ? f.place : f.line);
         $("findings").append(entry);
       }
     }

@@ -49,6 +49,14 @@ RULES = (
         example="`1;2` as a row of a list with three columns.",
     ),
     _rule(
+        "OLP505",
+        "form of a line",
+        why="The control refuses a line that is too long, or whose tape mark or block number is not in its "
+        "place.",
+        remedy="Write the line as the message says.",
+        example="`X10 N20`: the block number is not the first word.",
+    ),
+    _rule(
         "OLP510",
         "statement is not understood",
         why="It may move the machine, or change how later statements are read.",
@@ -59,7 +67,7 @@ RULES = (
         "OLP511",
         "parameters or flow control",
         why="Loops, calls and expressions get their values at run time. A correction needs plain blocks.",
-        remedy="Unroll the program: olp correct --flatten. Or have the CAM system write plain blocks.",
+        remedy="Unroll the program with --flatten. Or have the CAM system write plain blocks.",
         example="`#1=5` and `G1 X#1`, or `M98 P1000`.",
     ),
     _rule(
@@ -80,10 +88,10 @@ RULES = (
     ),
     _rule(
         "OLP514",
-        "nested comment",
+        "comment is nested or not closed",
         why="A comment ends at the first closing bracket. So the rest of its line is read as words, "
         "and the control refuses it, or moves.",
-        remedy="Take the inner brackets out, or replace them by [ and ].",
+        remedy="Take the inner brackets out, or replace them by [ and ]. Close each comment in its line.",
         example="`(ROUGHING (TOOL 5) SIDE A)`.",
     ),
     _rule(
@@ -116,6 +124,14 @@ RULES = (
         why="The statement and a mode, or two statements of one block, exclude each other.",
         remedy="End the mode before, or write two blocks, as the message says.",
         example="`G53 X0` under G91.",
+        follows=True,
+    ),
+    _rule(
+        "OLP519",
+        "word that no code uses",
+        why="The control refuses a block with a word that no code of it takes. Often a code is missing.",
+        remedy="Remove the word, or give the code that uses it.",
+        example="`G1 X10 R5`: G1 has no R.",
         follows=True,
     ),
     _rule(

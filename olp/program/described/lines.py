@@ -16,6 +16,7 @@ from olp.core.arrays import Index, Mask
 from olp.program.described.forms import NUMBERS
 from olp.program.described.language import Rule, UserDialect
 from olp.program.rs274.lexer import Bytes, numbers, runs
+from olp.program.text.line_ends import split
 from olp.program.text.numbers import LONGEST
 
 #: Bytes of a number without a sign.
@@ -208,7 +209,7 @@ def _lines(data: bytes) -> tuple[Index, Index]:
         rest = not len(newline) or newline[-1] < len(data) - 1
         end = np.append(newline, len(data)) if rest and len(data) > head else newline
         return np.concatenate(([head], end[:-1] + 1))[: len(end)], end
-    rows = data[head:].splitlines(keepends=True)
+    rows = split(data[head:])
     size = np.array([len(r) for r in rows], np.int64)
     start = head + np.cumsum(size) - size
     return start, start + np.array([len(r.rstrip(b"\r\n")) for r in rows], np.int64)

@@ -26,6 +26,7 @@ from olp.program.rs274.codes import (
     LENGTHS,
     LOCAL_OFFSET,
     MACHINE,
+    METRIC,
     PATH_MODES,
     PLANE_OF,
     SHIFTS,
@@ -42,6 +43,8 @@ TOOL_CHANGE = 60
 #: M61, as ten times its number.
 SET_TOOL = 610
 
+#: What changes or uses offsets beside the move of a block.
+_OFFSET_CODES = LENGTHS | HOMES | SHIFTS | WORK_OFFSETS | FURTHER_OFFSETS | {MACHINE, WRITE_OFFSET}
 #: RS-274's order of execution within a block; other codes come last.
 _RANK = {
     code: rank
@@ -62,10 +65,9 @@ class Word:
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """What the axis words of a block mean after its events: `consumed`, or `machine` coordinates (G53), or
-    `home`, the axes that G28/G30 send home after the intermediate point."""
+    """What the axis words of a block mean after its events: `machine` coordinates (G53), or `home`, the axes
+    that G28/G30 send home after the intermediate point."""
 
-    consumed: bool = False
     machine: bool = False
     home: tuple[int, ...] = ()
 
@@ -81,6 +83,8 @@ class AxisState(State):
     length_tool: int | None = None
     selected: int | None = None
     spindle: int | None = None
+    turning: int = -1
+    length_unit: int = METRIC
     payload_kg: float = 0.0
     compensation: CutterCompensation | None = None
     frames: list[Frame] = field(default_factory=list)
@@ -218,6 +222,12 @@ class AxisState(State):
                 )
             self.spindle = self.selected
             self._tool(self.spindle, line, "M6")
+            if "H" in by_letter and not by_letter["H"].value and self.profile.length_of_spindle_tool:
+                raise ProgramError(
+                    "H0 beside M6 takes the length of the tool before the change; put it into the next block",
+                    line=line,
+                    code="OLP518",
+                )
         if SET_TOOL in m_codes and self.profile.m61_sets_tool:
             if "Q" not in by_letter:
                 raise ProgramError("M61 needs a Q word with the tool number", line=line, code="OLP516")
@@ -225,6 +235,8 @@ class AxisState(State):
         if any(self.may_move(m) for m in m_codes):
             self.forget()
         effect = Effect()
+        self.unit = next((code for code in codes if code in UNITS), self.unit)
+        self._check_modes(codes, line)
         for code in sorted(codes, key=lambda code: _RANK.get(code, len(_RANK))):
             effect = self._event(code, line, by_letter, axis_words, moves, effect)
         return effect
@@ -246,13 +258,10 @@ class AxisState(State):
         effect: Effect,
     ) -> Effect:
         if code == DWELL:
-            return self._dwell(line, by_letter)
-        if code in UNITS:
-            self.unit = code
-        elif code == LENGTH_FROM_WORDS:
+            self._dwell(line, by_letter)
+        if code == LENGTH_FROM_WORDS:
             values = [(i, self.length_mm(w)) for i, w in axis_words]
-            self.offsets.length = self._merged(self.offsets.length, values)
-            return replace(effect, consumed=True)
+            self._set_length(self._merged(self.offsets.length, values))
         elif code in LENGTHS:
             self._tool_length(code, line, by_letter)
         elif code in WORK_OFFSETS or code in FURTHER_OFFSETS:
@@ -265,43 +274,46 @@ class AxisState(State):
             self._cutter_compensation(code, line, by_letter)
         elif code in HOMES:
             if not axis_words:
-                return replace(effect, consumed=True, home=(0, 1, 2))
+                return replace(effect, home=(0, 1, 2))
             return replace(effect, home=tuple(i for i, _ in axis_words))
         elif code == MACHINE:
             return replace(effect, machine=True)
         elif code == WRITE_OFFSET:
             self._write_offset(line, by_letter, axis_words, moves)
-            return replace(effect, consumed=True)
         elif code in SHIFTS:
             self._shift(code, line, axis_words, moves)
-            return replace(effect, consumed=True)
         return effect
 
-    def _dwell(self, line: int, by_letter: dict[str, Word]) -> Effect:
+    def _dwell(self, line: int, by_letter: dict[str, Word]) -> None:
         """G4: ISO controls take its time from X too; RS-274 takes it from P only, so axis words still
         move."""
-        if not self.profile.axis_dwell:
-            return Effect()
-        if any(a in by_letter for a in "YZ") or any(
-            w.letter == "G" and w.value in (0, 1, 2, 3) for w in by_letter.values()
+        if self.profile.axis_dwell and (
+            any(a in by_letter for a in "YZ")
+            or any(w.letter == "G" and w.value in (0, 1, 2, 3) for w in by_letter.values())
         ):
             raise ProgramError(
                 "a dwell and a motion are in one block; put the dwell into its own block",
                 line=line,
                 code="OLP518",
             )
-        return Effect(consumed=True)
 
     def _tool_length(self, code: int, line: int, by_letter: dict[str, Word]) -> None:
         if code == 490:
-            self.offsets.length, self.length_tool = ZERO, None
+            self._set_length(ZERO)
+            self.length_tool = None
             return
         name = f"G{code / 10:g}"
-        if "H" in by_letter:
-            number = self._integer(by_letter["H"], line)
-        elif self.profile.length_of_spindle_tool and code != 432:
-            number = self.spindle or 0
-        else:
+        number = self._integer(by_letter["H"], line) if "H" in by_letter else None
+        if not number and self.profile.length_of_spindle_tool and (number is not None or code != 432):
+            number = self.spindle
+            if number is None:
+                raise ProgramError(
+                    f"{name} takes the length of the tool in the spindle, which is not known; give T and M6 "
+                    "before it, or `tool` in the job file",
+                    line=line,
+                    code="OLP532",
+                )
+        if number is None:
             raise ProgramError(
                 f"{name} needs an H word with the number of the tool length", line=line, code="OLP516"
             )
@@ -315,7 +327,28 @@ class AxisState(State):
             vector = (-vector[0], -vector[1], -vector[2])
         if code == 432:
             vector = self._sum(self.offsets.length, vector)
-        self.offsets.length, self.length_tool = vector, number or None
+        self._set_length(vector)
+        self.length_tool = number or None
+
+    def _set_length(self, vector: Vector) -> None:
+        self.offsets.length, self.length_unit = vector, self.unit or METRIC
+
+    def _check_modes(self, codes: Sequence[int], line: int) -> None:
+        """Refuse codes in modes in which the control refuses them or loses its position."""
+        mixed = self.profile.lengths_keep_unit and any(self.offsets.length)
+        if mixed and (self.unit or METRIC) != self.length_unit and _OFFSET_CODES.intersection(codes):
+            raise ProgramError(
+                "the tool length in force was set in the other unit, and the control does not convert it: it "
+                "loses the position in this block; give G49 before G20 or G21, and G43 after it",
+                line=line,
+                code="OLP518",
+            )
+        if self.compensation is not None and (_OFFSET_CODES - LENGTHS).intersection(codes):
+            raise ProgramError(
+                "offsets and reference positions are used in cutter compensation; give G40 before",
+                line=line,
+                code="OLP518",
+            )
 
     def _cutter_compensation(self, code: int, line: int, by_letter: dict[str, Word]) -> None:
         """G41 and G42: D is the number of a tool, or a diameter; without it the tool in the spindle counts on
@@ -404,12 +437,14 @@ class AxisState(State):
             target = offsets.shift if self.profile.g52_is_g92 else offsets.local
             for i, word in axis_words:
                 target[i] = self.length_mm(word)
+            if self.profile.g52_is_g92:
+                offsets.store_shift()
         else:
             work = self._work_mm(offsets.name)
             for i, word in axis_words:
                 self._capture(i, word, line, moves)
                 offsets.preset(i, self.position[i], work, self.length_mm(word))
-            offsets.saved = list(offsets.shift)
+            offsets.store_shift()
 
     def _work_mm(self, name: str) -> list[float]:
         """A work offset as the program has written it, else that of the setup (a copy), else NaN."""

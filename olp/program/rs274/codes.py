@@ -68,6 +68,8 @@ MACHINE = 530
 HOMES = frozenset({280, 300})
 #: G10 L2 and L20, G52, and the family of G92: they write offsets between axis and program positions.
 SHIFTS = frozenset({LOCAL_OFFSET, PRESET, 921, 922, 923})
+#: Their axis words are values, not motion: G10, G52, G92 and G43.1. Beside G92.1 to G92.3 they are motion.
+AXIS_VALUES = frozenset({WRITE_OFFSET, LOCAL_OFFSET, PRESET, 431})
 #: Tool lengths from the table of tools, and G43.1 and G43.2.
 TABLE_LENGTHS = frozenset({430, 440, 490})
 #: G43.1, a tool length from the words of the block.

@@ -60,6 +60,9 @@ class CycleRules:
     - `stores`: zero holes store the words of the cycle, else they are an error.
     - `new_code_forgets`: another cycle of a series takes no words from the one before.
     - `levels_follow_distance`: after a change between G90 and G91 a series needs R and depth again.
+    - `keeps_numbers`: a series keeps its initial level, R and depth as numbers of the program. Offsets and
+      units may change, and G28 may come between. Else it has to end there.
+    - `turning`: how the spindle has to turn in these cycles, M3 or M4.
     - `exact_corners`: all corners of a cycle are exact, whatever the path mode.
     """
 
@@ -72,7 +75,9 @@ class CycleRules:
     stores: bool
     new_code_forgets: bool
     levels_follow_distance: bool
+    keeps_numbers: bool
     exact_corners: bool
+    turning: Mapping[int, tuple[int, ...]]
 
     def counter(self, words: Mapping[str, int]) -> int | None:
         """Of the words of a block by letter the one that counts its holes."""
@@ -82,12 +87,14 @@ class CycleRules:
 NGC_CYCLES = CycleRules(
     rises_first=True, feeds_home=True, taps_in_any_plane=False, taps_by_control=False,
     peck_by_parameter=False, repeat_words="L", stores=False, new_code_forgets=True,
-    levels_follow_distance=False, exact_corners=True,
+    levels_follow_distance=False, keeps_numbers=True, exact_corners=True,
+    turning={740: (4,), 840: (3,), 860: (3, 4)},
 )  # fmt: skip
 ISO_CYCLES = CycleRules(
     rises_first=False, feeds_home=False, taps_in_any_plane=True, taps_by_control=True,
     peck_by_parameter=True, repeat_words="LK", stores=True, new_code_forgets=False,
-    levels_follow_distance=True, exact_corners=False,
+    levels_follow_distance=True, keeps_numbers=False, exact_corners=False,
+    turning={},
 )  # fmt: skip
 
 
@@ -134,6 +141,8 @@ def hole_moves(
     initial_z: float,
     plane: int = 17,
     clearance: float = LCNC_CLEARANCE_MM,
+    unit: float = 1.0,
+    ground: float = 0.0,
     rules: CycleRules = NGC_CYCLES,
 ) -> tuple[Stroke, ...]:
     """Strokes of one hole, in order; rapids of zero length are left out, a feed of zero length is not.
@@ -142,7 +151,9 @@ def hole_moves(
     second axis of the plane: (X, Y) in G17, (Z, X) in G18, (Y, Z) in G19. `r`, `z` and `initial_z` are
     absolute, along the tool axis; `initial_z` is the position on that axis before the first cycle of the
     series of contiguous cycles. `q` is the peck, `p` the dwell in s, `clearance` the distance kept above
-    the last peck (G83) or drawn back after it (G73). All lengths in program units.
+    the last peck (G83) or drawn back after it (G73). All lengths are in program units. Or `r`, `z`, `q` and
+    `clearance` are, and the others are lengths where a level n lies at n * `unit` + `ground`: pecks are
+    counted in numbers of the program, as the control does it, since the last one may hang on the last bit.
 
     A second hole of the same series starts where the first ended, with the same `initial_z`.
     Raises ProgramError (without a line) for a cycle without offline geometry and for words it cannot accept.
@@ -155,16 +166,18 @@ def hole_moves(
         )
     axes = PLANES[plane]
     level = start[axes[2]]
+    depths = _depths(r, z, q or 0.0) if code in _PECKING else []
+    pecks = [(d * unit + ground, (d + clearance) * unit + ground) for d in depths]
+    r, z = r * unit + ground, z * unit + ground
     clear = r if retract_to_r else max(initial_z, r)
     hole = _Hole(
         position=list(start),
         axes=axes,
         r=r,
         z=z,
-        q=q or 0.0,
+        pecks=pecks,
         p=p or 0.0,
         clear=clear,
-        clearance=clearance,
         feed_home=rules.feeds_home,
     )
     if rules.rises_first:
@@ -176,6 +189,17 @@ def hole_moves(
     hole.rapid_to(r)
     _RECIPES[code](hole)
     return tuple(hole.strokes)
+
+
+def _depths(r: float, z: float, q: float) -> list[float]:
+    """The depths of all pecks but the last. Repeated subtraction, as the control does it: a closed form may
+    differ by one peck through rounding."""
+    depths = []
+    depth = r - q
+    while depth > z:
+        depths.append(depth)
+        depth -= q
+    return depths
 
 
 def cycle_moves(
@@ -214,16 +238,16 @@ def cycle_moves(
 
 @dataclass(slots=True)
 class _Hole:
-    """One hole while its strokes are made: the position, the strokes so far, and the values of the cycle."""
+    """One hole while its strokes are made: the position, the strokes so far, and the values of the cycle.
+    `pecks` are the depths of all but the last one, and how far the tool comes back from each."""
 
     position: list[float]
     axes: tuple[int, int, int]
     r: float
     z: float
-    q: float
+    pecks: list[tuple[float, float]]
     p: float
     clear: float
-    clearance: float
     feed_home: bool
     strokes: list[Stroke] = field(default_factory=list)
 
@@ -269,14 +293,11 @@ class _Hole:
         self._pecks(full_retract=False)
 
     def _pecks(self, *, full_retract: bool) -> None:
-        # Repeated subtraction, as the control does it: a closed form may differ by one peck through rounding.
-        depth = self.r - self.q
-        while depth > self.z:
+        for depth, back in self.pecks:
             self.feed_to(depth)
             if full_retract:
                 self.rapid_to(self.r)
-            self.rapid_to(depth + self.clearance)
-            depth -= self.q
+            self.rapid_to(back)
         self.drill()
 
     def tap(self) -> None:

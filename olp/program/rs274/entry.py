@@ -6,6 +6,7 @@ from typing import Any
 
 from olp.core.machine import Setup
 from olp.program.dialect import Options
+from olp.program.origin import Unrolled
 from olp.program.program import Program
 from olp.program.rs274.profiles.base import Profile
 
@@ -17,7 +18,7 @@ def read_blocks(data: bytes, setup: Setup, profile: Profile, options: Options, *
     return read(data, setup, profile, options, words=words)
 
 
-def unroll_blocks(data: bytes, profile: Profile, **options: Any) -> bytes:
+def unroll_blocks(data: bytes, profile: Profile, **options: Any) -> Unrolled:
     """`olp.program.rs274.flatten.unroll.flatten`."""
     from olp.program.rs274.flatten.unroll import flatten
 

@@ -9,12 +9,14 @@ reported, so that the interpreter can decide whether the line may stay unchanged
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Index, Mask
+from olp.program.rs274.block_text import CONTROL, BlockText
+from olp.program.text.line_ends import LONE_CR
 
 Bytes = npt.NDArray[np.uint8]
 
@@ -25,6 +27,7 @@ _U = np.uint64
 #: Bytes before and after the text, so that eight bytes can be read at a time at either end.
 _PAD = 8
 #: Masks of the high bytes of a number of eight bytes, by how many of them are kept.
+_NONE = np.zeros(0, np.int64)
 _HIGH = np.array([0] + [(~((1 << (8 * (8 - n))) - 1)) & (2**64 - 1) for n in range(1, 9)], dtype=np.uint64)
 #: Powers of ten by their exponent: those of the decimals of a number.
 _POW10 = 10 ** np.arange(19, dtype=np.int64)
@@ -57,34 +60,34 @@ class WordChunk:
     first_line: int
 
 
-def chunks(data: bytes, size: int = CHUNK) -> Iterator[WordChunk]:
-    """Lex a whole text, chunk by chunk, each ending at a line end."""
+def chunks(data: bytes, rules: BlockText, size: int = CHUNK) -> Iterator[WordChunk]:
+    """Lex a whole text, chunk by chunk, each ending at a line end. Lines that the `rules` refuse are odd."""
+    if rules.cr_ends_line and b"\r" in data:
+        data = LONE_CR.sub(b"\n", data)
+    places = [] if rules.odd_bytes is None else [match.start() for match in rules.odd_bytes.finditer(data)]
+    strange = np.array(places, np.int64)
+    if not rules.skips_control and not CONTROL.search(data):
+        rules = replace(rules, skips_control=True)
     text = np.frombuffer(data, np.uint8)
-    lone_cr = b"\r" in data and data.count(b"\r") != data.count(b"\r\n")
     start = line = 0
     while start < len(data):
         cut = len(data)
         if start + size < len(data):
             newline = data.find(b"\n", start + size)
-            if lone_cr:
-                ends = [p for p in (newline, data.find(b"\r", start + size)) if p >= 0]
-                newline = min(ends) if ends else -1
-                if newline >= 0 and data[newline : newline + 2] == b"\r\n":
-                    newline += 1
             cut = newline + 1 if newline >= 0 else cut
-        chunk = lex(text[start:cut], start, line, lone_cr=lone_cr)
+        here = strange[slice(*np.searchsorted(strange, (start, cut)))] if places else strange
+        chunk = lex(text[start:cut], rules, start, line, strange=here - start)
         line += len(chunk.line_start)
         start = cut
         yield chunk
 
 
-def lex(text: Bytes, offset: int = 0, first_line: int = 0, *, lone_cr: bool = False) -> WordChunk:
-    """Lex whole lines; `offset` and `first_line` are where they begin in the text."""
+def lex(
+    text: Bytes, rules: BlockText, offset: int = 0, first_line: int = 0, *, strange: Index = _NONE
+) -> WordChunk:
+    """Lex whole lines; `offset` and `first_line` are where they begin in the text. The lines of bytes
+    `strange` are odd."""
     size = len(text)
-    if lone_cr:
-        text = text.copy()
-        following = np.append(text[1:], 0)
-        text[(text == 13) & (following != 10)] = 10
     newline = np.flatnonzero(text == 10)
     ends = newline if size and newline.size and newline[-1] == size - 1 else np.append(newline, size)
     lines = len(ends)
@@ -93,10 +96,19 @@ def lex(text: Bytes, offset: int = 0, first_line: int = 0, *, lone_cr: bool = Fa
     starts[1:] = ends[:-1] + 1
 
     keep = text > 32
+    if not rules.skips_control:
+        keep |= (text < 9) | ((text > 10) & (text < 32) & (text != 13))
     keep[newline] = True
     deleted = np.zeros(lines, bool)
     marks = _line_heads(text, starts, ends, keep, deleted)
-    comments = _drop_comments(text, ends, keep)
+    if rules.marks_in_pairs and marks.size:
+        alone = [bytes(text[starts[m] : ends[m]]).strip() == b"%" for m in marks.tolist()]
+        strange = np.append(strange, starts[marks[~np.array(alone)]])
+    comments, refused = _drop_comments(text, ends, keep, rules)
+    content = without_cr(text, starts, ends)
+    if rules.longest is not None:
+        refused = np.append(refused, starts[ends - starts > rules.longest])
+    strange = np.append(strange, refused) if refused.size else strange
     where: Index | None = None
     compact, begin, stop = runs(blanked(text, keep))
     line_breaks = newline
@@ -118,15 +130,13 @@ def lex(text: Bytes, offset: int = 0, first_line: int = 0, *, lone_cr: bool = Fa
     first_word[0] = 0
     first_word[1:] = np.searchsorted(begin, line_breaks)
     line = np.repeat(np.arange(lines), np.diff(first_word))
-    odd = np.unique(np.searchsorted(line_breaks, bad)) if bad.size else np.zeros(0, np.int64)
+    odd = np.searchsorted(line_breaks, bad) if bad.size else _NONE
+    odd = np.unique(np.append(odd, np.searchsorted(ends, strange))) if odd.size or strange.size else odd
     if odd.size:
         good = ~np.isin(line, odd)
         begin, stop, letter, line = begin[good], stop[good], letter[good], line[good]
         mantissa, decimals, pointed = mantissa[good], decimals[good], pointed[good]
         first_word = np.searchsorted(line, np.arange(lines + 1))
-    content_end = ends.copy()
-    has_cr = (ends > starts) & (text[np.maximum(ends - 1, 0)] == 13)
-    content_end[has_cr] -= 1
     return WordChunk(
         letter=letter,
         mantissa=mantissa,
@@ -138,13 +148,23 @@ def lex(text: Bytes, offset: int = 0, first_line: int = 0, *, lone_cr: bool = Fa
         line=line,
         first_word=first_word,
         line_start=starts + offset,
-        line_end=content_end + offset,
+        line_end=content + offset,
         deleted=deleted,
         marks=marks,
         odd=odd,
         comments=comments + offset,
         first_line=first_line,
     )
+
+
+def without_cr(text: Bytes, starts: Index, ends: Index) -> Index:
+    """(n,) where lines end without the carriage returns before their line feeds."""
+    content = ends.copy()
+    while True:
+        has_cr = (content > starts) & (text[np.maximum(content - 1, 0)] == 13)
+        if not has_cr.any():
+            return content
+        content[has_cr] -= 1
 
 
 def blanked(text: Bytes, keep: Mask) -> Bytes:
@@ -186,12 +206,13 @@ def _line_heads(text: Bytes, starts: Index, ends: Index, keep: Mask, deleted: Ma
     return np.array(marks, np.int64)
 
 
-def _drop_comments(text: Bytes, ends: Index, keep: Mask) -> Index:
+def _drop_comments(text: Bytes, ends: Index, keep: Mask, rules: BlockText) -> tuple[Index, Index]:
     """Clear `keep` inside comments: `(` to `)` or the end of the line, `;` to the end of the line. Returns
-    where they open."""
+    where they open, and where comments are that the rules refuse."""
     opening = np.flatnonzero((text == 40) | (text == 59))
     if not opening.size:
-        return opening
+        return opening, opening
+    refused = [_NONE]
     line_end = ends[np.searchsorted(ends, opening)]
     closing = np.flatnonzero(text == 41)
     stop = line_end
@@ -199,12 +220,18 @@ def _drop_comments(text: Bytes, ends: Index, keep: Mask) -> Index:
         nearest = np.append(closing, len(text))[np.searchsorted(closing, opening)]
         stop = np.where((text[opening] == 40) & (nearest < line_end), nearest + 1, line_end)
     if (opening[1:] < stop[:-1]).any():
-        real, last = [], 0
+        real, inner, last, round_one = [], [], 0, False
         for i, (first, to) in enumerate(zip(opening.tolist(), stop.tolist(), strict=True)):
             if first >= last:
                 real.append(i)
-                last = to
+                last, round_one = to, text[first] == 40
+            elif round_one and text[first] == 40:
+                inner.append(first)
         opening, stop = opening[real], stop[real]
+        if not rules.nested_comments:
+            refused.append(np.array(inner, np.int64))
+    if not rules.open_comments:
+        refused.append(opening[(text[opening] == 40) & (text[stop - 1] != 41)])
     lengths = np.zeros(2 * len(opening) + 1, np.int64)
     lengths[1::2] = stop - opening
     lengths[2:-1:2] = opening[1:] - stop[:-1]
@@ -215,7 +242,7 @@ def _drop_comments(text: Bytes, ends: Index, keep: Mask) -> Index:
     inside = np.repeat(comment, lengths)
     inside &= text != 10
     keep[inside] = False
-    return opening
+    return opening, np.concatenate(refused)
 
 
 def _misplaced(body: Bytes, begin: Index, stop: Index, letter: Bytes) -> Index:

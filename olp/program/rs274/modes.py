@@ -1,8 +1,8 @@
 """What is in force on each line of a chunk: modal codes, the end of the program, and which lines are events,
 which are read one by one.
 
-A whole chunk is read at once. Refused here are lines with more than words, two codes of one modal group, and
-block delete that later blocks depend on.
+A whole chunk is read at once. Refused here are lines with more than words, words that may not be in one block
+(`block_rules`), and block delete that later blocks depend on.
 """
 
 from __future__ import annotations
@@ -16,27 +16,24 @@ import numpy.typing as npt
 from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import ProgramError
 from olp.program.rs274.axis_state import AxisState
+from olp.program.rs274.block_rules import M
 from olp.program.rs274.codes import (
+    AXIS_VALUES,
     COMPENSATION_OFF,
     CUTTER_COMPENSATION,
     DWELL,
     GROUPS,
-    LENGTH_FROM_WORDS,
-    SHIFTS,
-    WRITE_OFFSET,
 )
 from olp.program.rs274.lexer import WordChunk
 from olp.program.rs274.motion import modal, values
-from olp.program.rs274.profiles.base import Act
+from olp.program.rs274.profiles.base import Act, Profile
 
 Modal = npt.NDArray[np.int16]
 
 _FLOW = re.compile(rb"[#\[=<]|^/?\s*O|^\W*N?\d*\s*(IF|WHILE|GOTO|END|DO)", re.IGNORECASE)
-#: A bracket that opens inside a comment, with text behind the one that closes it
-_NESTED = re.compile(rb"\([^()]*\([^()]*\)[^()]*\)")
+#: What to do where the unroller helps.
+UNROLL = "unroll the program with --flatten"
 _COMMA = re.compile(rb"\d,\d")
-#: Events whose axis words are not motion: G10 G52 G92 G43.1
-_CLAIMS = (WRITE_OFFSET, *SHIFTS, LENGTH_FROM_WORDS)
 _LENGTHS = np.zeros(256, bool)
 _LENGTHS[list(b"XYZIJKRQ")] = True
 
@@ -68,6 +65,8 @@ class Context:
     arc_distance: Modal
     feed_mode: Modal
     retract: Modal
+    #: 3, 4 or 5: M3, M4, M5; -1 before any
+    spindle: Modal
     event: Mask
     consumed: Mask
     #: numbers as written, by the unit in force
@@ -86,7 +85,7 @@ class Modes:
         self._block_delete = block_delete
         profile = state.profile
         self._cycles_apart = profile.cycles_apart
-        self._claims = (*_CLAIMS, DWELL) if profile.axis_dwell else _CLAIMS
+        self._claims = sorted(AXIS_VALUES | {DWELL} if profile.axis_dwell else AXIS_VALUES)
         self._act = np.full(2000, Act.REFUSE, np.int8)
         for code, act in profile.codes.items():
             self._act[code] = act
@@ -94,6 +93,7 @@ class Modes:
             self._act[[COMPENSATION_OFF, *CUTTER_COMPENSATION]] = Act.EVENT
         self._m_event = np.ones(10_001, bool)
         self._m_event[[m * 10 for m in profile.harmless_m]] = False
+        self._rules = profile.rules.tables()
         self._linear_motion = state.motion
         self._ended = self._tape = False
 
@@ -115,10 +115,20 @@ class Modes:
         for mark in chunk.marks.tolist():
             if mark >= last:
                 break
-            if not self._tape and chunk.first_line == 0 and not chunk.first_word[mark]:
+            pairs = self._state.profile.text.marks_in_pairs
+            first = chunk.first_line == 0 and not chunk.first_word[mark]
+            if pairs and chunk.comments.size:
+                first &= bool(chunk.comments[0] > chunk.line_start[mark])
+            if not self._tape and first:
                 self._tape = True
-            else:
+            elif self._tape or not pairs:
                 last, self._ended = mark, True
+            else:
+                raise ProgramError(
+                    "`%` is in the middle of the program; expected it as the first line, or not at all",
+                    line=chunk.first_line + mark + 1,
+                    code="OLP505",
+                )
         return last
 
     def read(self, chunk: WordChunk, base: int, active: Mask) -> Context:
@@ -138,17 +148,24 @@ class Modes:
             arc_distance=_modal(chunk, codes, Act.ARC_DISTANCE, state.arc_distance),
             feed_mode=_modal(chunk, codes, Act.FEED, state.feed_mode),
             retract=_modal(chunk, codes, Act.RETRACT, state.retract),
+            spindle=self._spindle(chunk, usable),
             event=self._events(chunk, value, codes, usable),
             consumed=self._consumed(codes, active),
         )
         _check_deleted(context, active, state)
         return context
 
+    def check_rules(self, context: Context, active: Mask) -> None:
+        """Refuse the blocks of a chunk with words that may not be together, all at once."""
+        keys = self._keys(context.chunk, context.value, context.codes, active[context.chunk.line])
+        self._rules.check(context.chunk, active, keys, context.motion, context.plane)
+
     def leave(self, context: Context, line: int) -> None:
         """Keep the codes in force on this line, the last one that is read, for the next chunk."""
         state = self._state
         state.take({int(getattr(context, group)[line]) for group in GROUPS})
         state.motion = None if context.motion[line] < 0 else int(context.motion[line])
+        state.turning = int(context.spindle[line])
 
     def _codes(self, chunk: WordChunk, value: Array, usable: Mask) -> Codes:
         g = np.flatnonzero((chunk.letter == 71) & usable)
@@ -156,6 +173,16 @@ class Modes:
         act = self._act[code]
         act[np.abs(code - value[g] * 10) > 1e-6] = Act.REFUSE
         return Codes(chunk.line[g], code, act)
+
+    def _spindle(self, chunk: WordChunk, usable: Mask) -> Modal:
+        m = (chunk.letter == 77) & usable & np.isin(chunk.mantissa, (3, 4, 5)) & (chunk.decimals == 0)
+        return modal(len(chunk.line_start), chunk.line[m], chunk.mantissa[m], self._state.turning)
+
+    def _keys(self, chunk: WordChunk, value: Array, codes: Codes, usable: Mask) -> tuple[Index, Index]:
+        """The lines and keys of G and M codes for `block_rules`."""
+        m = np.flatnonzero((chunk.letter == 77) & usable)
+        key = M + np.clip(np.rint(value[m] * 10), 0, M - 1).astype(np.int64)
+        return np.append(codes.line, chunk.line[m]), np.append(codes.code, key)
 
     def _events(self, chunk: WordChunk, value: Array, codes: Codes, usable: Mask) -> Mask:
         """The lines with a G word that is an event or refused, an M word not known as harmless, or a T
@@ -191,31 +218,27 @@ class Modes:
         return _in_force(chunk, line, code, self._state.motion)
 
 
-def check_odd(data: bytes, chunk: WordChunk, active: Mask) -> None:
+def check_odd(data: bytes, chunk: WordChunk, active: Mask, profile: Profile) -> None:
     """Refuse active lines with more than words, all of the chunk at once."""
     lines = chunk.odd[active[chunk.odd]].tolist()
     if lines:
-        raise ProgramError.together(_odd(data, chunk, line) for line in lines)
+        raise ProgramError.together(_odd(data, chunk, line, profile) for line in lines)
 
 
-def _odd(data: bytes, chunk: WordChunk, line: int) -> ProgramError:
+def _odd(data: bytes, chunk: WordChunk, line: int, profile: Profile) -> ProgramError:
     """Why a line with more than words is refused."""
-    text = data[chunk.line_start[line] : chunk.line_end[line]].strip()
     number = chunk.first_line + line + 1
+    start = int(chunk.line_start[line])
+    newline = data.find(b"\n", start)
+    error = profile.text.refusal(data[start : newline if newline >= 0 else len(data)])
+    if error is not None:
+        error.line = number
+        return error
+    text = data[start : chunk.line_end[line]].strip()
     shown = text[:60].decode("latin-1")
-    if _NESTED.search(text):
-        return ProgramError(
-            f"`{shown}` has a comment inside a comment, and the first `)` ends both; "
-            "take the inner brackets out, or write [ and ] there",
-            line=number,
-            code="OLP514",
-        )
     if _FLOW.search(text):
         return ProgramError(
-            f"`{shown}` uses parameters, expressions or flow control",
-            hint="unroll the program with olp correct --flatten",
-            line=number,
-            code="OLP511",
+            f"`{shown}` uses parameters, expressions or flow control", hint=UNROLL, line=number, code="OLP511"
         )
     comma = "; write a decimal point instead of the comma" if _COMMA.search(text) else ""
     return ProgramError(
@@ -255,15 +278,6 @@ def _modal(chunk: WordChunk, codes: Codes, which: Act, now: int | None) -> Modal
 
 
 def _in_force(chunk: WordChunk, lines: Index, code: Index, now: int | None) -> Modal:
-    if (lines[1:] == lines[:-1]).any():
-        raise ProgramError.together(
-            ProgramError(
-                "two G codes of the same modal group are in this block; expected one",
-                line=chunk.first_line + twice + 1,
-                code="OLP515",
-            )
-            for twice in np.unique(lines[1:][lines[1:] == lines[:-1]]).tolist()
-        )
     return modal(len(chunk.line_start), lines, code, -1 if now is None else now)
 
 

@@ -18,7 +18,7 @@ def _zeros() -> list[float]:
 @dataclass(slots=True)
 class Offsets:
     """The offsets in force, in mm. `name` is the work offset, `written` are those that the program has
-    written, by name. `shift` is that of G92, `saved` the one for G92.3, `local` that of G52, `length` that of
+    written, by name. `shift` is that of G92, `saved` its stored value, `local` that of G52, `length` that of
     the tool."""
 
     name: str
@@ -42,9 +42,14 @@ class Offsets:
         self.shift[axis] = position - work[axis] - self.length[axis] - self.local[axis] - value
 
     def clear_shift(self, *, save: bool) -> None:
-        """End the shift; `save` keeps it for G92.3 (G92.2), else that is zero too (G92.1)."""
-        self.saved = list(self.shift) if save else _zeros()
+        """End the shift; `save` leaves the stored one for G92.3 (G92.2), else that is zero too (G92.1)."""
+        if not save:
+            self.saved = _zeros()
         self.shift = _zeros()
+
+    def store_shift(self) -> None:
+        """The stored shift is the present one (G92, and G52 where it is the same)."""
+        self.saved = list(self.shift)
 
     def restore_shift(self) -> None:
         """The saved shift again (G92.3)."""

@@ -95,7 +95,7 @@ class _Reader:
         if data[:3] == b"\xef\xbb\xbf":
             # the lexer reads a byte order mark as blanks; it stays in the text
             data = b"   " + data[3:]
-        for chunk in chunks(data):
+        for chunk in chunks(data, self.state.profile.text):
             self._chunk(chunk)
         return self.collector.program(self.state, self.end_line)
 
@@ -112,13 +112,16 @@ class _Reader:
         active = np.arange(len(chunk.line_start)) < last
         if self.options.block_delete:
             active &= ~chunk.deleted
-        check_odd(self.data, chunk, active)
+        check_odd(self.data, chunk, active, self.state.profile)
         context = self.modes.read(chunk, base, active)
+        # a code that is not read says more than its words, which no other code uses
         check_codes(context, active, self.state.profile)
+        self.modes.check_rules(context, active)
         # a payload makes a new frame, from the motion of its own line on
         context.event[[line for line in self.payloads if active[line]]] = True
         self._stretches(context, gather(chunk, context.motion, context.consumed))
         self.modes.leave(context, last - 1)
+        self.special_blocks.leave(context, last - 1)
 
     # -- stretches between events ------------------------------------------------------------------
 

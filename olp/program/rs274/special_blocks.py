@@ -24,17 +24,19 @@ from olp.program.rs274.codes import (
     DWELL,
     HOMES,
     INCREMENTAL,
+    INVERSE_TIME,
     MACHINE,
     PLANE_OF,
     RETRACT_TO_R,
 )
 from olp.program.rs274.collector import Collector
-from olp.program.rs274.cycles import Stroke, hole_moves, levels
-from olp.program.rs274.modes import Context, scaled
+from olp.program.rs274.cycles import LCNC_CLEARANCE_MM, Stroke, hole_moves, levels
+from olp.program.rs274.modes import UNROLL, Context, scaled
 from olp.program.rs274.motion import fill
 from olp.program.rs274.profiles.base import Act, Profile
-from olp.program.rs274.state import NAN
+from olp.program.rs274.state import BROKEN_SERIES, NAN
 
+_CYCLES = np.array(sorted(CYCLES))
 _M_REFUSED = {
     700: "saves modal codes", 710: "forgets saved modal codes", 720: "restores modal codes",
     730: "saves modal codes", 960: "branches", 970: "calls a subprogram", 980: "calls a subprogram",
@@ -88,7 +90,7 @@ def _checked(
         if word.letter == "M" and m in _M_REFUSED:
             raise ProgramError(
                 f"M{m / 10:g} {_M_REFUSED[m]}",
-                hint="unroll the program with olp correct --flatten",
+                hint=UNROLL,
                 line=line,
                 code="OLP511",
                 word=f"M{m / 10:g}",
@@ -120,6 +122,18 @@ class SpecialBlocks:
         self._state = state
         self._collector = collector
         self._switches = switches
+        # line, from 0, and frame of the last block of a series; -1 where none goes on
+        self._last_cycle = self._frame = -1
+
+    def leave(self, context: Context, line: int) -> None:
+        """Keep for the next chunk whether a series of cycles has ended up to this line, the last one read."""
+        if self._last_cycle >= 0 and self._ended(context, line + 1):
+            self._last_cycle = -1
+
+    def _ended(self, context: Context, row: int) -> bool:
+        """Whether another motion code came into force between the last block of a cycle and this line."""
+        first = max(self._last_cycle + 1 - context.chunk.first_line, 0)
+        return self._last_cycle < 0 or not np.isin(context.motion[first:row], _CYCLES).all()
 
     def run(self, context: Context, row: int, slot: Index, frame: int, effect: Effect) -> None:
         """Carry out the motion on line `row` of the chunk, whose axis words are `slot` (1, 3), in this
@@ -193,6 +207,7 @@ class SpecialBlocks:
     def _cycle(self, context: Context, row: int, frame_index: int, code: int) -> None:
         state, collector, chunk, line = self._state, self._collector, context.chunk, context.number(row)
         frame = state.frames[frame_index]
+        self._check_cycle(context, row, code)
         incremental = bool(context.distance[row] == INCREMENTAL)
         plane = PLANE_OF[int(context.plane[row])]
         first, second, third = PLANES[plane]
@@ -203,24 +218,20 @@ class SpecialBlocks:
         given = {letter: float(value[i]) for letter, i in words.items()}
         if "P" in given:
             given["P"] = state.profile.dwell_s(given["P"], pointed=bool(chunk.pointed[words["P"]]))
-        held = self._inherit(context, row, given, code, third, frame.unit_mm)
+        held = self._inherit(context, row, given, code, third, frame_index)
         series = state.series
-        initial = NAN if series.initial is None else series.initial
         times = self._repeats(context, words, line)
         offset = frame.offset_mm
-        z_word, r_word = held["XYZ"[third]], held["R"]
-        if incremental:
-            r, z = levels(r_word, z_word, absolute=False, initial_z=initial)
-        else:
-            r, z = r_word + offset[third], z_word + offset[third]
+        number = NAN if series.initial is None else series.initial
+        unit, ground = frame.unit_mm, offset[third]
+        levels_of = levels(held["R"], held["XYZ"[third]], absolute=not incremental, initial_z=number)
+        r, z, initial = (value * unit + ground for value in (*levels_of, number))
         place, step = [], []
         for axis in (first, second):
             before, letter = state.position[axis], "XYZ"[axis]
-            number = given[letter] * frame.unit_mm if letter in given else None
-            step.append(number if incremental and number is not None else 0.0)
-            place.append(
-                before if number is None else before + number if incremental else number + offset[axis]
-            )
+            to = given[letter] * frame.unit_mm if letter in given else None
+            step.append(to if incremental and to is not None else 0.0)
+            place.append(before if to is None else before + to if incremental else to + offset[axis])
         if any(np.isnan((*place, *state.position))):
             raise ProgramError(
                 "a canned cycle starts where an axis has not been commanded yet; "
@@ -234,7 +245,8 @@ class SpecialBlocks:
         for repeat in range(times):
             try:
                 strokes = hole_moves(
-                    code, start=start, xy=(place[0], place[1]), r=r, z=z, q=held.get("Q"),
+                    code, start=start, xy=(place[0], place[1]), r=levels_of[0], z=levels_of[1],
+                    q=held.get("Q"), clearance=LCNC_CLEARANCE_MM / unit, unit=unit, ground=ground,
                     p=held.get("P"), retract_to_r=bool(context.retract[row] == RETRACT_TO_R),
                     initial_z=initial, plane=17 + plane,
                     rules=state.profile.cycles,
@@ -265,25 +277,43 @@ class SpecialBlocks:
             place = [place[0] + step[0], place[1] + step[1]]
         state.position[:] = list(start)
 
+    def _check_cycle(self, context: Context, row: int, code: int) -> None:
+        """Refuse modes in which the control makes no cycle."""
+        why = ""
+        turning = self._state.profile.cycles.turning.get(code)
+        if context.feed_mode[row] == INVERSE_TIME:
+            why = "is in inverse time (G93); give G94 before it"
+        elif self._state.compensation is not None:
+            why = "is in cutter compensation; give G40 before it"
+        elif turning is not None and int(context.spindle[row]) not in turning:
+            why = f"needs a turning spindle; give {' or '.join(f'M{m}' for m in turning)} before it"
+        if why:
+            raise ProgramError(f"the cycle G{code / 10:g} {why}", line=context.number(row), code="OLP518")
+
     def _inherit(
-        self, context: Context, row: int, given: dict[str, float], code: int, third: int, unit_mm: float
+        self, context: Context, row: int, given: dict[str, float], code: int, third: int, frame_index: int
     ) -> dict[str, float]:
-        """The words of a block and those inherited from its series, lengths in mm; a new series starts after
-        any other move."""
-        series, depth = self._state.series, "XYZ"[third]
-        previous = int(context.motion[row - 1]) if row else (self._state.motion or -1)
-        holes = self._collector.holes
-        if not (previous in CYCLES and holes and holes[-1].last == self._collector.moves):
-            series.begin(self._state.position[third])
-        elif previous != code:
-            series.held = {}
-        series.hold({a: v if a == "P" else v * unit_mm for a, v in given.items()}, depth)
+        """The words of a block and those inherited from its series, in program units (P in s)."""
+        series, depth, line = self._state.series, "XYZ"[third], context.number(row)
+        frame = self._state.frames[frame_index]
+        ground, unit = frame.offset_mm[third], frame.unit_mm
+        holes, rules = self._collector.holes, self._state.profile.cycles
+        if self._ended(context, row):
+            series.begin((self._state.position[third] - ground) / unit)
+        else:
+            before = self._state.frames[self._frame]
+            series.broken |= (before.offset_mm[third], before.unit_mm) != (ground, unit)
+            series.broken |= holes[-1].last != self._collector.moves
+            if series.broken and not rules.keeps_numbers:
+                raise ProgramError(BROKEN_SERIES, line=line, code="OLP518")
+            if holes[-1].code != code and rules.new_code_forgets:
+                series.held = {}
+        self._last_cycle, self._frame = line - 1, frame_index
+        series.hold(given, depth)
         missing = [letter for letter in ("R", depth) if letter not in series.held]
         if missing:
             raise ProgramError(
-                f"the cycle G{code / 10:g} has no {' and no '.join(missing)} word",
-                line=context.number(row),
-                code="OLP531",
+                f"the cycle G{code / 10:g} has no {' and no '.join(missing)} word", line=line, code="OLP531"
             )
         return {letter: value for letter, value in series.held.items() if value is not None}
 

@@ -40,19 +40,33 @@ class PathMode:
     merges: bool = False
 
 
+#: Why a broken series is refused.
+BROKEN_SERIES = (
+    "an offset, the tool length, the unit or another move comes within a series of canned cycles, and what "
+    "this control keeps then is not known; end the series with G80 and give all words again"
+)
+
+
 @dataclass(slots=True)
 class Series:
-    """Canned cycles that follow one another: how many series there were, the level before this one (None:
-    not needed yet), and the words that later blocks inherit, by upper-case letter."""
+    """Canned cycles that follow one another, until another motion code is in force.
+
+    `count` is how many series there were, `initial` the program coordinate of the tool axis before this one
+    (None: not needed yet), `held` the words that later blocks inherit, by upper-case letter. All are numbers
+    in program units, as controls keep them. `broken`: an offset, the unit or another move came between, and
+    not every control keeps them then (`CycleRules.keeps_numbers`).
+    """
 
     count: int = 0
     initial: float | None = None
     held: dict[str, float | None] = field(default_factory=dict)
+    broken: bool = False
 
     def begin(self, initial: float | None) -> None:
         self.count += 1
         self.initial = initial
         self.held = {}
+        self.broken = False
 
     def hold(self, words: Mapping[str, float | None], depth: str) -> None:
         """Keep the words of a block that later blocks inherit; `depth` is the letter of the tool axis."""

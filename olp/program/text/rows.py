@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from olp.core.errors import InputError
 from olp.program.foreign import recognised
 from olp.program.text.delimited import DELIMITERS, Layout
+from olp.program.text.line_ends import LINE_END
 from olp.program.text.numbers import Number, number
 
 Span = tuple[int, int]
@@ -200,11 +201,10 @@ class Cells:
         """Number, start and end of the lines that are neither empty nor comments."""
         data = self.data
         begin = 3 if data[:3] == b"\xef\xbb\xbf" else 0
-        ending = re.compile(rb"\r\n|\n|\r")
         number = 0
         while begin < len(data):
             number += 1
-            match = ending.search(data, begin)
+            match = LINE_END.search(data, begin)
             stop, following = (len(data), len(data)) if match is None else match.span()
             held = data[begin:stop].strip()
             if held and not held.startswith(self._comments):

@@ -18,7 +18,8 @@ import numpy.typing as npt
 
 from olp.core.arrays import Index, Mask
 from olp.core.errors import ProgramError
-from olp.program.rs274.lexer import CHUNK, blanked, numbers, runs, slow_number
+from olp.program.rs274.lexer import CHUNK, blanked, numbers, runs, slow_number, without_cr
+from olp.program.text.line_ends import LONE_CR
 
 Bytes = npt.NDArray[np.uint8]
 
@@ -295,7 +296,7 @@ def chunks(data: bytes, size: int = CHUNK) -> Iterator[Chunk]:
         # the lexer reads a byte order mark as blanks; it stays in the text
         data = b"   " + data[3:]
     if b"\r" in data and data.count(b"\r") != data.count(b"\r\n"):
-        data = data.replace(b"\r\n", b"\r\0").replace(b"\r", b"\n").replace(b"\n\0", b"\r\n")
+        data = LONE_CR.sub(b"\n", data)
     text = np.frombuffer(data, np.uint8)
     begin = line = 0
     while begin < len(data):
@@ -318,9 +319,7 @@ def _lex(data: bytes, text: Bytes, offset: int, first_line: int) -> Chunk:
     starts = np.empty(len(ends), np.int64)
     starts[0] = 0
     starts[1:] = ends[:-1] + 1
-    content = ends.copy()
-    has_cr = (ends > starts) & (text[np.maximum(ends - 1, 0)] == 13)
-    content[has_cr] -= 1
+    content = without_cr(text, starts, ends)
 
     printed = np.flatnonzero(text > 32)
     leading = np.append(printed, size)[np.searchsorted(printed, starts)]

@@ -102,11 +102,10 @@ REFUSED = {
     "G95 without S": ("G95\nG1 X1 F60", "linuxcnc", 2, "no S word"),
     "G95 with S0": ("G95 S0\nG1 X1 F60", "linuxcnc", 2, "no S word"),
     "G95 with G96": ("G95 G96 S100\nG1 X1. F60.", "fanuc", 2, "G96"),
-    "a cycle in G93": ("G0 Z5\nG93 G81 X5 Y5 Z-2 R1 F1", "linuxcnc", 2, "G93"),
     "a probe without F": ("G38.2 X9", "linuxcnc", 1, "no feed"),
     "no point on a Haas": ("G1 X1. F60", "haas", 1, "decimal point"),
     "no point in inches": ("G20\nG1 X1. F60", "fanuc", 2, "decimal point"),
-    "a dwell without a time": ("G4", "linuxcnc", 1, "no P word"),
+    "a dwell without a time": ("G4", "grbl", 1, "no P word"),
     "a negative dwell": ("G4 P-1", "linuxcnc", 1, "negative"),
     "a dwell with two times": ("G4 X1. P100", "fanuc", 1, "two times"),
 }
@@ -163,7 +162,7 @@ RESTS: dict[str, tuple[str, str, list[float | None]]] = {
         "G82 X10 Y0 Z-2 R0 P0.5\nX11\nG80 G1", "linuxcnc",
         [None, None, 0.5, None, None, 0.5, None, None],
     ),
-    "spindle of a cycle": ("G86 X10 Y0 Z-2 R0 P1\nG80 G1", "linuxcnc", [None, None, 1, 0, None]),
+    "spindle of a cycle": ("M3 G86 X10 Y0 Z-2 R0 P1\nG80 G1", "linuxcnc", [None, 0, 1, 0, None]),
 }  # fmt: skip
 
 

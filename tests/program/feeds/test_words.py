@@ -133,7 +133,7 @@ def test_the_planned_mean_of_a_block_in_every_mode() -> None:
     move = "X100\nM0\nG1 X0"
     for text in (
         f"G1 F6000 {move} F6000",
-        f"G20 F236.2205 G21\nG1 {move} F6000",
+        f"G20 F236.2205\nG21 G1 {move} F6000",
         "G93 G1 X100 F60\nM0\nX0 F60",
         "S1000\nG95 G1 F6 X100\nM0\nX0 F6",
     ):

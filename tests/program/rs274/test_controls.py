@@ -15,7 +15,7 @@ from olp.files.sources import Source, Sources
 from olp.program.registry import DIALECTS, read
 from olp.program.rs274.cycles import CycleRules
 from olp.program.rs274.profiles.base import Profile
-from olp.workflows.flatten import unrolled
+from olp.workflows.flatten import UnrollOptions, as_asked
 
 LINUXCNC, FANUC, HAAS, GRBL = CONTROLS = ("linuxcnc", "fanuc", "haas", "grbl")
 #: Each tool has a length along X, too.
@@ -63,7 +63,7 @@ READINGS: dict[str, tuple[str, dict[str, Outcome], Any]] = {
     ),
     "axis_dwell": (
         "G0 X0. Y0. Z0.\nG4 X1.",
-        {FANUC: (0, 0, 0), HAAS: (0, 0, 0), LINUXCNC: (1, 0, 0), GRBL: (1, 0, 0)},
+        {FANUC: (0, 0, 0), HAAS: (0, 0, 0), GRBL: (1, 0, 0)},
         "not",
     ),
     "m61_sets_tool": (
@@ -74,6 +74,11 @@ READINGS: dict[str, tuple[str, dict[str, Outcome], Any]] = {
     "length_of_spindle_tool": (
         "T1 M6\nG43\nG0 X0. Y0. Z10.",
         {LINUXCNC: (1, 0, 20)} | dict.fromkeys((FANUC, HAAS), "G43 needs an H word"),
+        "not",
+    ),
+    "lengths_keep_unit": (
+        "G20 G43 H1\nG0 X0. Y0. Z1.\nG21 G49\nG0 X1.",
+        {LINUXCNC: "the control does not convert it", FANUC: (1, 0, 35.4), HAAS: (1, 0, 35.4)},
         "not",
     ),
     "lengths_along_z": (
@@ -120,6 +125,10 @@ CYCLES: dict[str, tuple[str, dict[str, str]]] = {
         f"{_SERIES}\nG91\nX2.",
         {LINUXCNC: "G0 Z12|G0 X3|G1 Z10|"} | dict.fromkeys(_ISO, "give R and the depth again"),
     ),
+    "keeps_numbers": (
+        f"G21\n{_SERIES}\nG20\nX2. Y1.",
+        {LINUXCNC: "G20|G61|G0 X2 Y1 Z3|G1 Z-2"} | dict.fromkeys(_ISO, "comes within a series of canned"),
+    ),
     "exact_corners": (
         f"G64\n{_SERIES}",
         {LINUXCNC: "G61|G0 X1 Y1"} | dict.fromkeys(_ISO, "F60.|G0 X1. Y1."),
@@ -130,7 +139,7 @@ OF_TIME = {
     "feed_without_point", "exact_stop", "feed_words_end", "feed_before_unit", "m_with_motion",
 }  # fmt: skip
 #: Tables and texts, which have tests of their own.
-TABLES = {"codes", "refusals", "harmless_m", "cycles", "language", "written_ending"}
+TABLES = {"codes", "refusals", "harmless_m", "text", "rules", "cycles", "language", "written_ending"}
 
 
 @pytest.fixture(scope="module")
@@ -155,7 +164,8 @@ def written_out(text: str, setup: Setup, control: Profile) -> str:
     """The program with its cycles written out, its blocks between bars, or what the refusal says."""
     source = Source("", text.encode)
     try:
-        return unrolled(Sources(), source, setup, control, expand_cycles=True).decode().replace("\n", "|")
+        expanded = as_asked(Sources(), source, setup, control, UnrollOptions(expand_cycles=True))
+        return expanded.data.decode().replace("\n", "|")
     except ProgramError as error:
         return str(error)
 
@@ -167,8 +177,8 @@ def is_it(got: Outcome, want: Outcome) -> bool:
 def test_every_field_is_read_by_hand() -> None:
     own = {f.name for f in fields(Profile)} - {f.name for f in fields(Profile.__base__)}  # type: ignore[arg-type]
     assert own == set(READINGS) | OF_TIME | TABLES
-    # `repeat_words` are letters: K on Fanuc and Haas
-    assert {f.name for f in fields(CycleRules)} == {*CYCLES, "repeat_words"}
+    # letters, K on Fanuc and Haas, and the spindle, which `test_interleaved` holds
+    assert {f.name for f in fields(CycleRules)} == {*CYCLES, "repeat_words", "turning"}
 
 
 @pytest.mark.parametrize(

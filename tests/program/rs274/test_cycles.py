@@ -60,6 +60,14 @@ def test_deep_hole_leaves_the_clearance_above_every_peck() -> None:
     assert z == pytest.approx([5.0, 1.0, -1.0, -0.5, -2.0, 1.0])
 
 
+def test_pecks_are_counted_in_numbers_of_the_program() -> None:
+    """6.57 - 3 is greater than 3.57 by one bit, which makes one more peck; in mm with an offset it is not."""
+    hole = {"start": (1.0, 2.0, -10.0), "xy": (1.0, 2.0), "initial_z": -10.0, "q": 3.0, "retract_to_r": True}
+    strokes = hole_moves(730, r=6.57, z=3.57, ground=-17.0, **hole)  # type: ignore[arg-type]
+    assert [s.kind for s in strokes].count("feed") == 2
+    assert strokes[-1].z == 6.57 - 17.0
+
+
 def test_tapping_feeds_home_and_turns_the_spindle_twice() -> None:
     strokes = hole_moves(840, **HOLE, p=0.5, retract_to_r=False)
     assert _path(strokes)[2:] == [

@@ -69,10 +69,12 @@ def test_g92_and_g10_make_the_present_position_the_value_given() -> None:
     assert again == work
 
 
-def test_g92_2_saves_the_shift_and_g92_1_does_not() -> None:
+def test_g92_2_leaves_the_stored_shift_and_g92_1_does_not() -> None:
     offsets = Offsets("G54", shift=[1.0, 2.0, 3.0])
-    offsets.clear_shift(save=True)
-    assert offsets.shift == [0.0, 0.0, 0.0]
+    offsets.store_shift()
+    for _ in range(2):
+        offsets.clear_shift(save=True)
+        assert offsets.shift == [0.0, 0.0, 0.0]
     offsets.restore_shift()
     assert offsets.shift == [1.0, 2.0, 3.0]
     offsets.clear_shift(save=False)

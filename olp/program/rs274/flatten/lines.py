@@ -14,7 +14,6 @@ from olp.core.errors import ProgramError
 from olp.program.rs274.flatten.expressions import Expression, Parameters, Reader
 from olp.program.rs274.flatten.language import Language
 
-_LINE = re.compile(rb"[^\r\n]*(?:\r\n|\n|\r|$)")
 _SKIP = re.compile(r"\([^)]*\)?|;.*|[\x00-\x20]+")
 _LETTER = re.compile(r",?[a-z@^]")
 _LITERAL = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)")
@@ -85,11 +84,6 @@ class Line:
     def plain(self) -> bool:
         """True where the line has no variable, so that its bytes can be copied."""
         return not self.assignments and all(word.value is None for word in self.words)
-
-
-def split_lines(data: bytes) -> list[bytes]:
-    """Lines with their ends (LF, CR LF or a lone CR)."""
-    return [line for line in _LINE.findall(data) if line]
 
 
 def compile_line(line: bytes, number: int, language: Language) -> Line:

@@ -20,6 +20,21 @@ _PROFILE_CYCLES = {("g", code) for code in (70.0, 71.0, 71.1, 71.2, 72.0, 72.1, 
 WriteBlock = Callable[[Line, Frame, frozenset[int]], bool]
 
 
+#: Codes of subprogram calls and returns.
+_CALLS = {("m", 97.0), ("m", 98.0), ("m", 99.0), ("g", 65.0)}
+
+
+def _refuse_by_switch(line: Line) -> None:
+    """Raise ProgramError for a block under block delete that changes what later blocks are."""
+    codes = {(word.letter, word.number) for word in line.words if word.value is None}
+    if line.flow is not None or line.assignments or codes & _CALLS:
+        raise ProgramError(
+            "this block under block delete changes a parameter or the flow, so the unrolled program differs "
+            "for each position of the switch; remove the `/`, or the block",
+            code="OLP525",
+        )
+
+
 class Walk:
     """Runs a program; gives every executed line to `write`."""
 
@@ -27,10 +42,10 @@ class Walk:
         self,
         main: Unit,
         variables: Variables,
-        subprograms: Callable[[str], bytes | None],
+        subprograms: Callable[[str], tuple[str, bytes] | None],
         write: WriteBlock,
         *,
-        block_delete: bool,
+        block_delete: bool | None,
         limit: int,
     ) -> None:
         self.main = main
@@ -69,6 +84,8 @@ class Walk:
                 frame.next_index += 1
                 if line.deleted and self.block_delete:
                     continue
+                if line.deleted and self.block_delete is None:
+                    _refuse_by_switch(line)
                 if self._step(line, frame, index):
                     self._close_tape()
                     return
@@ -266,12 +283,13 @@ class Walk:
             if start is not None:
                 return unit, start
         if label not in self._files:
-            data = self._subprograms(label)
-            if data is None:
+            given = self._subprograms(label)
+            if given is None:
                 raise ProgramError(
                     f"subprogram {label} is not in the file, and no file for it was given", code="OLP542"
                 )
-            self._files[label] = Unit(data, self.language, label)
+            name, data = given
+            self._files[label] = Unit(data, self.main.profile, name)
         unit = self._files[label]
         start = unit.definition(label, keyword)
         if start is None:

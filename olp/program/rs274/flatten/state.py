@@ -43,7 +43,7 @@ from olp.program.rs274.cycles import (
     levels,
 )
 from olp.program.rs274.flatten.expressions import whole
-from olp.program.rs274.state import NAN, State
+from olp.program.rs274.state import BROKEN_SERIES, NAN, State
 
 #: A word with its value; None is a value whose unit is not known (`Language.increments_open`).
 Value = tuple[str, float | None]
@@ -109,7 +109,7 @@ class ProgramState(State):
         motion = codes & _MOTION
         if self.profile.language.splines:
             motion |= codes & SPLINES
-        if motion or codes & HOMES:
+        if motion:
             self.series.begin(None)
         if motion:
             # G80 beside another motion ends the cycle, and the other code is the motion
@@ -159,6 +159,7 @@ class ProgramState(State):
             self.compensated = False
             self.forget()
         unsetting = codes & _UNSETTING
+        self.series.broken |= bool(unsetting) or PRESET in codes
         along_z = self.profile.lengths_along_z and unsetting <= TABLE_LENGTHS
         if unsetting and along_z and not self.odd_frame:
             self.forget((2,))
@@ -177,10 +178,7 @@ class ProgramState(State):
     def _change_unit(self, unit: int) -> None:
         if self.unit != unit:
             factor = NAN if self.unit is None else MM_PER_INCH if unit == METRIC else 1 / MM_PER_INCH
-            if self.unit is not None and self.series.initial is not None:
-                raise ProgramError(
-                    "the unit changes within a series of canned cycles; end it with G80 first", code="OLP518"
-                )
+            self.series.broken = True
             self.position = [p * factor for p in self.position]
             self.unit = unit
 
@@ -238,8 +236,11 @@ class ProgramState(State):
         given = {letter.upper(): value for letter, value in words if letter in CYCLE_WORDS}
         first, second, tool = PLANES[self.plane // 10]
         if series.initial is None:
-            series.initial = self.position_of(tool)
+            series.begin(self.position_of(tool))
+        initial = NAN if series.initial is None else series.initial
         depth = AXES[tool]
+        if series.broken and not self.profile.cycles.keeps_numbers:
+            raise ProgramError(BROKEN_SERIES, code="OLP518")
         follows = self.profile.cycles.levels_follow_distance
         turned = follows and series.held and self.held_absolute is not self.absolute
         if turned and not {depth, "R"} <= given.keys():
@@ -252,9 +253,7 @@ class ProgramState(State):
         if repeats == 0:
             return ()
         xy, step = self._hole_and_step(given, first, second)
-        r, z = levels(
-            self._needed("R"), self._needed(depth), absolute=self.absolute, initial_z=series.initial
-        )
+        r, z = levels(self._needed("R"), self._needed(depth), absolute=self.absolute, initial_z=initial)
         self.position_of(tool)
         strokes = cycle_moves(
             code,
@@ -267,7 +266,7 @@ class ProgramState(State):
             q=self._optional("Q"),
             p=self._optional("P"),
             retract_to_r=self.retract_to_r,
-            initial_z=series.initial,
+            initial_z=initial,
             plane=self.plane // 10,
             clearance=self._clearance(code, clearance),
             rules=self.profile.cycles,

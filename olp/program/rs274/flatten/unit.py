@@ -7,8 +7,9 @@ import re
 from dataclasses import dataclass, field
 
 from olp.core.errors import ProgramError
-from olp.program.rs274.flatten.language import Language
-from olp.program.rs274.flatten.lines import Flow, Line, compile_line, split_lines
+from olp.program.rs274.flatten.lines import Flow, Line, compile_line
+from olp.program.rs274.profiles.base import Profile
+from olp.program.text.line_ends import split
 
 _MAYBE_O = re.compile(rb"[\s/]*(?:\([^)]*\)\s*)*(?:[nN][\d\s]*)?[oO]")
 _RADIUS_ARC = re.compile(rb"^[^(;]*[rR]\s*[-+\d.#\[]")
@@ -19,11 +20,12 @@ _units = itertools.count()
 class Unit:
     """One text (the program or a file of a subprogram), compiled line by line when first met."""
 
-    def __init__(self, data: bytes, language: Language, file: str | None) -> None:
+    def __init__(self, data: bytes, profile: Profile, file: str | None) -> None:
         self.key = next(_units)
         self.file = file
-        self.language = language
-        self.lines = split_lines(data)
+        self.profile = profile
+        self.language = profile.language
+        self.lines = split(data, profile.text.line_end)
         self.radius_arcs = any(_RADIUS_ARC.search(line) for line in self.lines)
         self.ends_with_eol = data.endswith((b"\n", b"\r"))
         self._compiled: dict[int, Line] = {}
@@ -33,6 +35,9 @@ class Unit:
     def line(self, index: int) -> Line:
         if index not in self._compiled:
             try:
+                refusal = self.profile.text.refusal(self.lines[index].removesuffix(b"\n"))
+                if refusal is not None:
+                    raise refusal
                 self._compiled[index] = compile_line(self.lines[index], index + 1, self.language)
             except ProgramError as error:
                 error.line = index + 1

@@ -17,8 +17,11 @@ import re
 from collections.abc import Callable
 from decimal import Decimal
 
+import numpy as np
+
 from olp.core.errors import ProgramError
 from olp.core.units import AXES
+from olp.program.origin import Origin, Unrolled
 from olp.program.rs274.cycles import Stroke
 from olp.program.rs274.flatten.expressions import filled, whole
 from olp.program.rs274.flatten.language import Language
@@ -33,7 +36,7 @@ _COMMENT = re.compile(rb"\([^)]*\)")
 _ENDS = frozenset({2, 30})
 
 
-def no_subprograms(name: str) -> bytes | None:
+def no_subprograms(name: str) -> tuple[str, bytes] | None:
     """The default of `flatten`: there is no other file."""
     return None
 
@@ -42,27 +45,27 @@ def flatten(
     data: bytes,
     profile: Profile,
     *,
-    subprograms: Callable[[str], bytes | None] = no_subprograms,
-    block_delete: bool = False,
+    subprograms: Callable[[str], tuple[str, bytes] | None] = no_subprograms,
+    block_delete: bool | None = False,
     expand_cycles: bool = False,
     file: str | None = None,
     peck_clearance: float | None = None,
     limit: int = 1_000_000,
-) -> bytes:
-    """Plain blocks of a program; see the module for what is kept.
+) -> Unrolled:
+    """Plain blocks of a program, with the origin of each; see the module for what is kept.
 
-    `subprograms` gives the text of a program that the file does not have, by its number or lower-case name.
-    `block_delete`: blocks with `/` are left out (switch on); else they count as executed. `expand_cycles`
-    writes canned cycles as G0, G1, G4 and spindle blocks. `peck_clearance` (program units) is the clearance
-    of G73 and G83, needed where a parameter of the control sets it. `limit` is the largest number of blocks
-    that the run may visit. Raises ProgramError with the line in the source, or with the line in the
-    subprogram and its name as the file.
+    `subprograms` gives the file and the text of a program that the file does not have, by its number or
+    lower-case name. `block_delete`: blocks with `/` are left out (switch on), or executed (off). With
+    None both positions of the switch have to give the same program. `expand_cycles` writes canned cycles as
+    G0, G1, G4 and spindle blocks. `peck_clearance` (program units) is the clearance of G73 and G83, needed
+    where a parameter of the control sets it. `limit` is the largest number of blocks that the run may visit.
+    Raises ProgramError with the line in the source, or with the line in the subprogram and its file.
     """
     writer = _Flattener(profile, expand_cycles=expand_cycles, peck_clearance=peck_clearance)
-    main = Unit(data, profile.language, file)
+    main = Unit(data, profile, file)
     visit = writer.block
     Walk(main, writer.variables, subprograms, visit, block_delete=block_delete, limit=limit).run()
-    return writer.text(main)
+    return Unrolled.of(writer.text(main), writer.origin(main))
 
 
 def number_text(value: float, letter: str, language: Language, exact: bool = False) -> str:
@@ -98,6 +101,10 @@ class _Flattener:
         self.peck_clearance = peck_clearance
         self._seen: set[tuple[int, int]] = set()
         self._blocks: list[tuple[bytes, bytes]] = []
+        # the unit and the line that each block was made from, and those of the present line
+        self._sources: list[tuple[int, int]] = []
+        self._present = (0, 0)
+        self._units: dict[int, Unit] = {}
 
     def text(self, main: Unit) -> bytes:
         """All blocks; lines without a line end take that of the program."""
@@ -108,12 +115,31 @@ class _Flattener:
             whole_text[: -len(eol)] if self._blocks and not last[1] and not main.ends_with_eol else whole_text
         )
 
+    def origin(self, main: Unit) -> Origin:
+        """The source line of every block."""
+        units = [unit for unit in self._units.values() if unit is not main]
+        counts = np.array([len(unit.lines) for unit in (main, *units)], np.int64)
+        first = np.cumsum(counts) - counts
+        before = {unit.key: int(first[k]) for k, unit in enumerate((main, *units))}
+        lines = (line for unit in (main, *units) for line in unit.lines)
+        return Origin(
+            tuple(unit.file or "" for unit in units), first[1:], tuple(lines),
+            np.array([before[key] + number for key, number in self._sources], np.int64),
+        )  # fmt: skip
+
+    def _put(self, raw: bytes, eol: bytes) -> None:
+        """Write a block of the present line."""
+        self._blocks.append((raw, eol))
+        self._sources.append(self._present)
+
     def block(self, line: Line, frame: Frame, without: frozenset[int]) -> bool:
         """Write one executed line, its words at indices `without` left out; True where the program ends."""
-        seen = (frame.unit.key, line.number) in self._seen
-        self._seen.add((frame.unit.key, line.number))
+        self._present = (frame.unit.key, line.number)
+        self._units[frame.unit.key] = frame.unit
+        seen = self._present in self._seen
+        self._seen.add(self._present)
         if line.opaque:
-            self._blocks.append((line.raw, line.eol))
+            self._put(line.raw, line.eol)
             self.state.forget()
             return False
         values = [(word.letter, self._value(word)) for word in line.words]
@@ -177,12 +203,12 @@ class _Flattener:
         self, line: Line, values: list[tuple[str, float | None]], cut: set[int], *, exact: bool
     ) -> None:
         if line.plain and not cut and line.flow is None:
-            self._blocks.append((line.raw, line.eol))
+            self._put(line.raw, line.eol)
             return
         # A flow statement has no words: only comments and assignments are in the line.
         if line.flow is not None and line.flow.keyword != "program":
             if line.comments:
-                self._blocks.append((b" ".join(line.comments), line.eol))
+                self._put(b" ".join(line.comments), line.eol)
             return
         pieces, done = [], 0
         splices = [(a.start, a.end, b"") for a in line.assignments]
@@ -202,7 +228,7 @@ class _Flattener:
         rest = [word for i, word in enumerate(line.words) if i not in cut]
         if line.comments or any(word.letter != "n" for word in rest) or line.flow is not None:
             raw = b"".join(pieces)
-            self._blocks.append((raw.rstrip() if line.raw.rstrip() == line.raw else raw, line.eol))
+            self._put(raw.rstrip() if line.raw.rstrip() == line.raw else raw, line.eol)
 
     def _write_strokes(
         self, strokes: tuple[Stroke, ...], line: Line, before: tuple[bool, str, tuple[float, ...]]
@@ -243,4 +269,5 @@ class _Flattener:
             lines.insert(0, "G61")
             lines.append(self.state.path)
         mark = b"/" if line.deleted else b""
-        self._blocks += [(mark + text.encode(), line.eol) for text in lines]
+        for text in lines:
+            self._put(mark + text.encode(), line.eol)

@@ -14,9 +14,12 @@ from enum import IntEnum
 from olp.core.machine import Machine
 from olp.core.units import AXES
 from olp.program.dialect import Dialect, Row, Support
+from olp.program.rs274.block_rules import OTHER_RULES, BlockRules
+from olp.program.rs274.block_text import BlockText
 from olp.program.rs274.codes import CYCLES, PROBES
 from olp.program.rs274.cycles import CycleRules
 from olp.program.rs274.flatten.language import Language
+from olp.program.text.line_ends import split
 
 
 class Act(IntEnum):
@@ -51,11 +54,13 @@ class Profile(Dialect):
     - `axis_dwell`: G4 takes its time from X and U, too, and counts milliseconds where it has no point.
     - `exact_stop`: G61 stops at the end of each block, as G9 does in one, and G62 and G63 end it as G64 does.
       A G0 begins and ends at rest, and M5 and M9 come after the motion of their block.
-    - `m61_sets_tool`: M61 Q says which tool is in the spindle. `length_of_spindle_tool`: G43 without H takes
-      the length of that tool. `lengths_along_z`: a tool length counts along Z alone.
+    - `m61_sets_tool`: M61 Q says which tool is in the spindle. `length_of_spindle_tool`: G43 without H, and
+      with H0, takes the length of that tool. `lengths_along_z`: a tool length counts along Z alone.
+      `lengths_keep_unit`: a change of unit does not convert the length in force.
     - `feed_words_end`: each G94 and G95 forgets F. `feed_before_unit`: F of a block counts before its G20 or
       G21. `m_with_motion`: M codes carried out along with the motion, without a rest.
-    - `cycles`, `language`: how canned cycles are made, and how parametric programs are written.
+    - `text`, `rules`, `cycles`, `language`: what may be in a line and in a block, how canned cycles are made,
+      and how parametric programs are written.
     - `written_ending`: the ending of files that are written for the control.
     """
 
@@ -78,9 +83,12 @@ class Profile(Dialect):
     m61_sets_tool: bool = False
     length_of_spindle_tool: bool = False
     lengths_along_z: bool = False
+    lengths_keep_unit: bool = False
     feed_words_end: bool = False
     feed_before_unit: bool = False
     m_with_motion: frozenset[int] = frozenset()
+    text: BlockText
+    rules: BlockRules = OTHER_RULES
     cycles: CycleRules
     language: Language
 
@@ -96,6 +104,9 @@ class Profile(Dialect):
         """mm per unit of a length without a decimal point, as the control reads it."""
         counted = increment(machine, letter, unit_mm) if self.counts_increments(machine) else 1.0
         return counted * unit_mm
+
+    def lines(self, data: bytes) -> list[bytes]:
+        return split(data, self.text.line_end)
 
     def straightened(self, line: bytes) -> bytes:
         return b"G1 " + _OF_ARC.sub(b" ", line)

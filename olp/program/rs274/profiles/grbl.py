@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from olp.program.rs274.block_text import BlockText
 from olp.program.rs274.codes import CYCLES
 from olp.program.rs274.cycles import NGC_CYCLES
 from olp.program.rs274.entry import read_blocks, unroll_blocks
@@ -26,6 +27,7 @@ DIALECT = Profile(
     harmless_m=ISO_M | {56},
     motion=0,
     initial_retract=990,
+    text=BlockText(odd_bytes=None, cr_ends_line=True, open_comments=True),
     cycles=replace(NGC_CYCLES, exact_corners=False),
     language=NGC,
     path_mode="junction deviation of the control ($11)",

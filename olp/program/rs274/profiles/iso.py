@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from olp.program.rs274.block_text import BlockText
 from olp.program.rs274.cycles import ISO_CYCLES
 from olp.program.rs274.entry import read_blocks, unroll_blocks
 from olp.program.rs274.flatten.language import MACRO_B
@@ -28,6 +29,7 @@ ISO = Profile(
     axis_dwell=True,
     exact_stop=True,
     lengths_along_z=True,
+    text=BlockText(),
     cycles=ISO_CYCLES,
     language=MACRO_B,
     path_mode="not stated",

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import re
+
+from olp.program.rs274.block_rules import NGC_RULES
+from olp.program.rs274.block_text import BlockText
 from olp.program.rs274.cycles import NGC_CYCLES
 from olp.program.rs274.entry import read_blocks, unroll_blocks
 from olp.program.rs274.flatten.language import NGC
 from olp.program.rs274.profiles.base import ARC_DISTANCE, ISO_M, REFUSALS, Act, Profile, g_codes
+from olp.program.text.line_ends import LONE_CR
 
 _EVENTS = dict.fromkeys((431, 432, 591, 592, 593, 611, 921, 922, 923), Act.EVENT)
 
@@ -22,9 +27,18 @@ DIALECT = Profile(
     g10_offsets=9,
     m61_sets_tool=True,
     length_of_spindle_tool=True,
+    lengths_keep_unit=True,
     feed_words_end=True,
     feed_before_unit=True,
     m_with_motion=frozenset({62, 63, 67}),
+    text=BlockText(
+        odd_bytes=re.compile(rb"\x00|" + LONE_CR.pattern),
+        skips_control=False,
+        nested_comments=False,
+        marks_in_pairs=True,
+        longest=252,
+    ),
+    rules=NGC_RULES,
     cycles=NGC_CYCLES,
     language=NGC,
     path_mode="G64 without tolerance, LinuxCNC's default",

@@ -32,8 +32,13 @@ def refusal(text: str, profile: str = "linuxcnc", **options: object) -> ProgramE
     return caught.value
 
 
-@pytest.mark.parametrize("profile", ["linuxcnc", "grbl", "fanuc", "haas"])
-@pytest.mark.parametrize("eol", ["\n", "\r\n", "\r"])
+@pytest.mark.parametrize(
+    ("profile", "eol"),
+    [
+        ("grbl", "\r"),
+        *((p, e) for p in ("linuxcnc", "grbl", "fanuc", "haas") for e in ("\n", "\r\n", "\r\r\n")),
+    ],
+)
 def test_plain_program_is_copied_byte_for_byte(profile: str, eol: str) -> None:
     lines = ["%", "N10 g0 X 1 2.5 (Gr\xf6\xdfe) Y-.3", "", "  ;  semi", "/G1X1.F100.", "X2. ,R3", "M30", "%"]
     data = eol.join(lines).encode("latin-1")
@@ -43,7 +48,7 @@ def test_plain_program_is_copied_byte_for_byte(profile: str, eol: str) -> None:
 
 @given(st.binary(max_size=60).filter(lambda b: not set(b) & set(b"#[oO%/mMgG") and b"\x85" not in b))
 def test_text_without_variables_is_never_changed(data: bytes) -> None:
-    assert flatten(data, profile="linuxcnc") == data
+    assert flatten(data, profile="grbl") == data
 
 
 def test_values_on_a_line_are_read_before_any_is_set() -> None:
@@ -96,9 +101,13 @@ M2
 
 def test_external_subprogram_and_computed_label() -> None:
     files = {"101": b"o101 sub\nX#1\no101 endsub\n", "deep": b"o<deep> sub\nX#5063\no<deep> endsub\n"}
-    assert lcnc("o[100+1] call [4]\nM2\n", subprograms=files.get) == "X4\nM2\n"
-    error = refusal("X1\no<deep> call\nM2\n", subprograms=files.get)
-    assert (error.file, error.line) == ("deep", 2)
+
+    def beside(wanted: str) -> tuple[str, bytes]:
+        return f"{wanted}.ngc", files[wanted]
+
+    assert lcnc("o[100+1] call [4]\nM2\n", subprograms=beside) == "X4\nM2\n"
+    error = refusal("X1\no<deep> call\nM2\n", subprograms=beside)
+    assert (error.file, error.line) == ("deep.ngc", 2)
 
 
 def test_fanuc_calls_inside_linuxcnc() -> None:

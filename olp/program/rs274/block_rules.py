@@ -1,0 +1,273 @@
+"""Which words may stand in one block: modal groups, words that need a code, and codes that need words.
+
+A control refuses a block that breaks these rules, or takes the words in a way that is not known. So such a
+block is refused here, many lines at a time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.core.arrays import Index, Mask
+from olp.core.errors import ProgramError
+from olp.program.rs274.codes import (
+    AXIS_VALUES,
+    COMPENSATION_OFF,
+    CUTTER_COMPENSATION,
+    CYCLES,
+    DWELL,
+    GROUPS,
+    HOMES,
+    LENGTHS,
+    MACHINE,
+    PATH_MODES,
+    PROBES,
+    SHIFTS,
+    UNITS,
+    WORK_OFFSETS,
+    WRITE_OFFSET,
+)
+from olp.program.rs274.lexer import WordChunk
+
+#: A line of the chunk from 0, why it is refused, the code of that, and the letter of a word that goes alone.
+Refusal = tuple[int, str, str, str]
+Bits = npt.NDArray[np.int32]
+Codes = npt.NDArray[np.int16]
+
+#: M codes are keyed by this plus ten times their number.
+M = 10_000
+_ARCS = frozenset({20, 30})
+
+
+def _bits(letters: str) -> int:
+    return sum(1 << (ord(letter) - 65) for letter in letters)
+
+
+_BIT = np.zeros(256, np.int32)
+_BIT[65:91] = 1 << np.arange(26)
+_AXES = _bits("XYZABCUVW")
+_CENTRE = _bits("IJK")
+#: Centre words of arcs by plane code.
+_IN_PLANE = {170: _bits("IJ"), 180: _bits("IK"), 190: _bits("JK")}
+#: Letters of which a block may have several.
+_FREE = _bits("GM")
+_MOTION = frozenset({0, 10, *_ARCS, *CYCLES, *PROBES})
+_MOTIONS = np.array(sorted(_MOTION))
+#: Codes that take the axis words of their block for something else.
+_STATING = np.array(sorted(AXIS_VALUES - {431} | HOMES))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BlockRules:
+    """The rules of one control.
+
+    - `users`: the codes that use a letter; beside no such code it is refused. Letters that are not here are
+      free. Ten times the number of a G code, `M` plus ten times that of an M code.
+    - `groups`: codes of which a block may have one.
+    - `needs`: codes that need one of these letters.
+    - `number_first`: N is the first word of its line. `one_use_of_axes`: no motion code may be beside a code
+      that uses the axis words for something else.
+    """
+
+    users: Mapping[str, frozenset[int]] = field(default_factory=dict)
+    groups: tuple[frozenset[int], ...] = ()
+    needs: Mapping[int, str] = field(default_factory=dict)
+    number_first: bool = False
+    one_use_of_axes: bool = False
+
+    def tables(self) -> _Tables:
+        """The rules by code."""
+        allowed = np.zeros(2 * M, np.int32)
+        for letter, codes in self.users.items():
+            allowed[sorted(codes)] |= _bits(letter)
+        group = np.full(2 * M, -1, np.int8)
+        for number, codes in enumerate(self.groups):
+            group[sorted(codes)] = number
+        return _Tables(self, allowed, group, sum(_bits(letter) for letter in self.users))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Tables:
+    """`allowed` (2 M,) the letters that a code uses, as bits; `group` of a code or -1; `bound` are the
+    letters that need a user."""
+
+    rules: BlockRules
+    allowed: Bits
+    group: npt.NDArray[np.int8]
+    bound: int
+
+    def check(
+        self, chunk: WordChunk, active: Mask, codes: tuple[Index, Index], motion: Codes, plane: Codes
+    ) -> None:
+        """Refuse all blocks of a chunk that break a rule, at once. `active` (lines,) are lines that count,
+        `codes` the lines and keys of their G and M codes, `motion` and `plane` the codes in force by line."""
+        present = _present(chunk)
+        errors: dict[int, ProgramError] = {}
+        for rule in (
+            self._twice(chunk, active, present),
+            self._groups(codes),
+            self._lacking(codes, present),
+            self._unused(active, codes, present, motion, plane),
+            self._numbers(chunk, active),
+        ):
+            for line, why, code, word in rule:
+                number = chunk.first_line + line + 1
+                errors.setdefault(line, ProgramError(why, line=number, code=code, word=word))
+        if errors:
+            raise ProgramError.together(errors.values())
+
+    def _twice(self, chunk: WordChunk, active: Mask, present: Bits) -> Iterator[Refusal]:
+        free = chunk.line[(chunk.letter == ord("G")) | (chunk.letter == ord("M"))]
+        words = np.diff(chunk.first_word) - np.bincount(free, minlength=len(present))
+        several = active & (np.bitwise_count(present & ~_FREE) != words)
+        for line in np.flatnonzero(several).tolist():
+            mine = chunk.letter[chunk.first_word[line] : chunk.first_word[line + 1]]
+            letters = [chr(letter) for letter in mine.tolist() if letter not in b"GM"]
+            letter = next(x for x in letters if letters.count(x) > 1)
+            yield line, f"the word {letter} is twice in this block; expected it once", "OLP515", ""
+
+    def _groups(self, codes: tuple[Index, Index]) -> Iterator[Refusal]:
+        line, key = codes
+        group = self.group[key]
+        some = np.flatnonzero(group >= 0)
+        place = line[some] * 64 + group[some]
+        order = np.argsort(place, kind="stable")
+        place, some = place[order], some[order]
+        for twice in np.unique(place[1:][place[1:] == place[:-1]]).tolist():
+            mine = some[slice(*np.searchsorted(place, (twice, twice + 1)))]
+            names = " and ".join(_name(k) for k in key[mine].tolist())
+            yield (
+                twice // 64,
+                f"{names} of one modal group are in this block; expected one of them",
+                "OLP515",
+                "",
+            )
+
+    def _unused(
+        self, active: Mask, codes: tuple[Index, Index], present: Bits, motion: Codes, plane: Codes
+    ) -> Iterator[Refusal]:
+        bound = np.where(active, present & self.bound, 0)
+        if not bound.any():
+            return
+        line, key = codes
+        allowed = np.zeros(len(present), np.int32)
+        using = self.allowed[key] != 0
+        np.bitwise_or.at(allowed, line[using], self.allowed[key[using]])
+        moves = (present & _AXES) != 0
+        arcs = np.isin(motion, sorted(_ARCS))
+        moves |= arcs & ((present & _CENTRE) != 0)
+        moves[line[np.isin(key, _MOTIONS)]] = True
+        allowed |= np.where(moves & (motion > 0), self.allowed[np.maximum(motion, 0)], 0)
+        outside = np.zeros(len(present), np.int32)
+        for code, letters in _IN_PLANE.items():
+            outside[plane == code] = _CENTRE & ~letters
+        outside[~(moves & arcs)] = 0
+        spare = bound & (~allowed | outside)
+        for where in np.flatnonzero(spare).tolist():
+            letter = chr(64 + int(spare[where] & -spare[where]).bit_length())
+            why = f"no code of this block uses its word {letter}; remove it, or give the code that does"
+            yield where, why, "OLP519", letter
+
+    def _lacking(self, codes: tuple[Index, Index], present: Bits) -> Iterator[Refusal]:
+        line, key = codes
+        has = present[line]
+        for code, letters in self.rules.needs.items():
+            what = f"one of {', '.join(letters)}" if len(letters) > 1 else letters
+            for where in line[(key == code) & ((has & _bits(letters)) == 0)].tolist():
+                yield where, f"{_name(code)} needs {what} in its block", "OLP516", ""
+        if self.rules.one_use_of_axes:
+            both = np.intersect1d(line[np.isin(key, _STATING)], line[np.isin(key, _MOTIONS)])
+            for where in both.tolist():
+                why = "two G codes of this block use its axis words; give each its own block"
+                yield where, why, "OLP518", ""
+
+    def _numbers(self, chunk: WordChunk, active: Mask) -> Iterator[Refusal]:
+        if not self.rules.number_first:
+            return
+        words = np.flatnonzero(chunk.letter == ord("N"))
+        words = words[active[chunk.line[words]]]
+        late = chunk.first_word[chunk.line[words]] != words
+        if chunk.comments.size:
+            opens = np.searchsorted(chunk.comments, chunk.line_start[chunk.line[words]])
+            late |= opens < np.searchsorted(chunk.comments, chunk.start[words])
+        late |= chunk.mantissa[words] < 0
+        for where in chunk.line[words[late]].tolist():
+            why = "N is not the first word of this block, or negative; put the block number in front"
+            yield where, why, "OLP505", ""
+
+
+def _present(chunk: WordChunk) -> Bits:
+    """(lines,) the letters of each line, as bits."""
+    out = np.zeros(len(chunk.line_start), np.int32)
+    first = chunk.first_word
+    some = np.flatnonzero(first[1:] > first[:-1])
+    if some.size:
+        out[some] = np.bitwise_or.reduceat(_BIT[chunk.letter], first[some])
+    return out
+
+
+def _name(key: int) -> str:
+    return f"G{key / 10:g}" if key < M else f"M{(key - M) / 10:g}"
+
+
+def _m(*numbers: int) -> frozenset[int]:
+    return frozenset(M + 10 * number for number in numbers)
+
+
+_OWN_M = _m(*range(100, 200))
+_SYNCHRONOUS = _m(62, 63, 64, 65)
+_OUTPUTS = _m(66, 67, 68)
+
+#: What any control takes one of in a block: motion, and the modal codes that the reader follows.
+_GROUPS = (frozenset({*_MOTION, 330, 331, 760, 870, 880}), *map(frozenset, GROUPS.values()))
+
+#: LinuxCNC 2.9, found by asking its interpreter code by code and letter by letter.
+NGC_RULES = BlockRules(
+    users={
+        "D": CUTTER_COMPENSATION | {960},
+        "E": _OUTPUTS,
+        "H": frozenset({430, 432, 760}),
+        "I": frozenset({*_ARCS, 50, 51, 52, 760, 870}),
+        "J": frozenset({*_ARCS, 50, 51, 52, 760, 870}),
+        "K": frozenset({*_ARCS, 330, 331, 760, 870}),
+        "L": frozenset({*CYCLES, WRITE_OFFSET, 760}) | _m(66),
+        "P": frozenset({*_ARCS, DWELL, WRITE_OFFSET, 640, 50, 51, 52, 760, 820, 840, 860, 880, 890, 740})
+        | _SYNCHRONOUS | _m(50, 51, 52, 53, 66, 19) | _OWN_M,
+        "Q": frozenset({50, WRITE_OFFSET, 640, 730, 760, 830}) | _m(19, 61) | _OUTPUTS | _OWN_M,
+        "R": frozenset({*_ARCS, *CYCLES, WRITE_OFFSET, 760}) | _m(19),
+    },
+    groups=(
+        *_GROUPS,
+        frozenset({DWELL, WRITE_OFFSET, *HOMES, MACHINE, *SHIFTS, 281, 301}),
+        frozenset(UNITS),
+        frozenset({COMPENSATION_OFF, *CUTTER_COMPENSATION}),
+        LENGTHS,
+        WORK_OFFSETS,
+        PATH_MODES,
+        frozenset({960, 970}),
+        frozenset({70, 80}),
+        _m(0, 1, 2, 30, 60),
+        _m(6, 61),
+        _m(3, 4, 5, 19),
+        _m(7, 8, 9),
+        _m(48, 49),
+        _m(50, 51, 52, 53),
+        _m(*range(62, 69)),
+        _OWN_M,
+    ),
+    needs={
+        **dict.fromkeys((520, 920), "XYZABCUVW"),
+        **dict.fromkeys(sorted(CYCLES | PROBES), "XYZABCUVW"),
+        **dict.fromkeys(sorted(_ARCS), "IJKR"),
+        DWELL: "P",
+        432: "HXYZ",
+    },
+    number_first=True,
+    one_use_of_axes=True,
+)  # fmt: skip
+#: Controls whose rules are not known so well: what is ambiguous on any control.
+OTHER_RULES = BlockRules(groups=_GROUPS)

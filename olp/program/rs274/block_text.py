@@ -1,0 +1,92 @@
+"""How a control takes the bytes of a block: line ends, comments, bytes that are no text, and the length."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from olp.core.errors import ProgramError
+from olp.program.text.line_ends import LINE_END, LONE_CR
+
+#: Bytes of an unclosed comment that are shown.
+_SHOWN = 40
+#: Bytes of a line that are shown.
+_SHOWN_OF_LINE = 60
+#: Control characters but tab and those of line ends.
+CONTROL = re.compile(rb"[\x00-\x08\x0b\x0c\x0e-\x1f]")
+_COMMENTS = re.compile(rb"\([^)]*\)?|;.*", re.DOTALL)
+_NEWLINE = re.compile(rb"\n")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BlockText:
+    """What may be in a line of a control.
+
+    - `odd_bytes`: bytes that are refused, since the control or an editor takes them for something else.
+    - `skips_control`: control characters mean nothing, as blanks; else they are refused outside comments.
+    - `cr_ends_line`: a lone carriage return ends a line.
+    - `open_comments`: a comment that is not closed ends with its line. `nested_comments`: `(` may be in one.
+    - `marks_in_pairs`: `%` is the first line and the last one, alone in its line, or not there.
+    - `longest`: bytes of a line at most, without its line feed (None: no limit).
+    """
+
+    odd_bytes: re.Pattern[bytes] | None = LONE_CR
+    skips_control: bool = True
+    cr_ends_line: bool = False
+    open_comments: bool = False
+    nested_comments: bool = True
+    marks_in_pairs: bool = False
+    longest: int | None = None
+
+    @property
+    def line_end(self) -> re.Pattern[bytes]:
+        """What separates lines."""
+        return LINE_END if self.cr_ends_line else _NEWLINE
+
+    def refusal(self, line: bytes) -> ProgramError | None:
+        """Why a line, up to its line feed, is refused; None where its bytes are good."""
+        if self.longest is not None and len(line) > self.longest:
+            return ProgramError(
+                f"the line has {len(line)} bytes, and the control takes {self.longest} at most; "
+                "shorten its comment or split it",
+                code="OLP505",
+            )
+        line = line.rstrip(b"\r")
+        odd = None if self.odd_bytes is None else self.odd_bytes.search(line)
+        if odd is None and not self.skips_control:
+            odd = CONTROL.search(_COMMENTS.sub(lambda comment: b" " * len(comment[0]), line))
+        if odd is not None:
+            what = "a carriage return" if odd[0] == b"\r" else f"the byte 0x{odd[0][0]:02x}"
+            return ProgramError(
+                f"{what} is inside this line, at column {odd.start() + 1}; expected plain text; remove it",
+                code="OLP502",
+            )
+        if self.marks_in_pairs and line.strip().startswith(b"%") and line.strip() != b"%":
+            return ProgramError(
+                "`%` is not alone in its line; put what is behind it into the next one", code="OLP505"
+            )
+        return self._comments(line)
+
+    def _comments(self, line: bytes) -> ProgramError | None:
+        """Why the comments of a line are refused."""
+        # the first `)` ends a comment, so a further one is outside of it
+        behind = b")" in _COMMENTS.sub(b"", line)
+        for comment in _COMMENTS.finditer(line):
+            text = comment[0]
+            shown = text[:_SHOWN].decode("latin-1").strip()
+            if not text.startswith(b"("):
+                continue
+            why = None
+            if not self.open_comments and not text.endswith(b")"):
+                why = f"the comment `{shown}` is not closed; expected `)` in the same line"
+            elif b"(" in text[1:] and behind:
+                whole = line.strip()[:_SHOWN_OF_LINE].decode("latin-1")
+                why = (
+                    f"`{whole}` has a comment inside a comment, and the first `)` ends both; "
+                    "take the inner brackets out, or write [ and ] there"
+                )
+            elif b"(" in text[1:] and not self.nested_comments:
+                why = f"the comment `{shown}` has a `(` in it, which the control refuses; remove it"
+            if why is not None:
+                return ProgramError(why, code="OLP514")
+        return None

@@ -1,0 +1,26 @@
+"""Where lines of a text end: at a line feed and the carriage returns before it, or at a lone carriage return.
+
+Some exporters write CR CR LF, which editors and controls take for one line end.
+"""
+
+from __future__ import annotations
+
+import re
+
+#: One line end, where a lone carriage return is one.
+LINE_END = re.compile(rb"\r*\n|\r")
+#: The same in text.
+LINE_END_TEXT = re.compile(r"\r*\n|\r")
+#: A carriage return that belongs to no line feed and not to the end of the text.
+LONE_CR = re.compile(rb"\r(?!\r*(?:\n|\Z))")
+
+
+def split(data: bytes, ending: re.Pattern[bytes] = LINE_END) -> list[bytes]:
+    """The lines with their ends; the end of the last line begins no further line."""
+    rows, begin = [], 0
+    for match in ending.finditer(data):
+        rows.append(data[begin : match.end()])
+        begin = match.end()
+    if begin < len(data):
+        rows.append(data[begin:])
+    return rows
