@@ -36,38 +36,50 @@ class Recorder:
             self.failed.add(report.nodeid)
 
     def write(self, path: Path) -> None:
-        """The map as JSON; tests that fail or skip on the unchanged code are not in it."""
+        """Put the tests that ran into the map at `path`. Those that fail or skip on the unchanged code, and
+        those of the same files that are no more, are not in it."""
         self.coverage.stop()
         data = self.coverage.get_data()
-        good = sorted(self.seconds.keys() - self.failed)
-        number = {name: i for i, name in enumerate(good)}
-        lines: dict[str, dict[int, list[int]]] = {}
+        ran = {name.split("::")[0] for name in self.seconds}
+        map_ = Map.read(path, self.root) if path.is_file() else Map(self.root, {}, {})
+        kept = {name: s for name, s in map_.seconds.items() if name.split("::")[0] not in ran}
+        good = {name: s for name, s in self.seconds.items() if name not in self.failed}
+        lines: dict[str, dict[int, set[str]]] = {}
         for file in self.files:
             contexts = data.contexts_by_lineno(str(self.root / file))
+            held = map_.lines.get(file, {})
             lines[file] = {
-                line: sorted(number[name] for name in names if name in number)
-                for line, names in contexts.items()
+                line: {*held.get(line, set()) & kept.keys(), *good.keys() & set(contexts.get(line, ()))}
+                for line in sorted({*held, *contexts})
             }
-        value = {"tests": good, "seconds": [self.seconds[name] for name in good], "lines": lines}
-        path.write_text(json.dumps(value), "utf-8")
+        Map(self.root, kept | good, lines).write(path)
 
 
 @dataclass(frozen=True, slots=True)
 class Map:
-    """Tests, their seconds, and for each file the tests of each line."""
+    """Seconds of each test, and for each file the tests of each line."""
 
     root: Path
-    tests: list[str]
-    seconds: list[float]
-    lines: dict[str, dict[int, list[int]]]
+    seconds: dict[str, float]
+    lines: dict[str, dict[int, set[str]]]
 
     @classmethod
     def read(cls, path: Path, root: Path) -> Map:
         value: dict[str, Any] = json.loads(path.read_text("utf-8"))
+        names = list(value["seconds"])
         lines = {
-            file: {int(line): tests for line, tests in held.items()} for file, held in value["lines"].items()
+            file: {int(line): {names[i] for i in tests} for line, tests in held.items()}
+            for file, held in value["lines"].items()
         }
-        return cls(root, value["tests"], value["seconds"], lines)
+        return cls(root, value["seconds"], lines)
+
+    def write(self, path: Path) -> None:
+        number = {name: i for i, name in enumerate(self.seconds)}
+        lines = {
+            file: {line: sorted(number[name] for name in tests) for line, tests in held.items()}
+            for file, held in self.lines.items()
+        }
+        path.write_text(json.dumps({"seconds": self.seconds, "lines": lines}), "utf-8")
 
     def tests_of(self, site: Site, at_most_s: float) -> list[str]:
         """Tests that run a site, the nearest folder first and there the fastest, `at_most_s` seconds of them.
@@ -83,14 +95,14 @@ class Map:
                 met |= self._within(path, 1, 1 << 30)
         chosen: list[str] = []
         spent = 0.0
-        for test in sorted(met, key=lambda i: (-_near(self.tests[i], site.path), self.seconds[i])):
+        for test in sorted(met, key=lambda name: (-_near(name, site.path), self.seconds[name])):
             spent += self.seconds[test]
             if chosen and spent > at_most_s:
                 break
-            chosen.append(self.tests[test])
+            chosen.append(test)
         return chosen
 
-    def _within(self, path: str, first: int, last: int) -> set[int]:
+    def _within(self, path: str, first: int, last: int) -> set[str]:
         held = self.lines.get(path, {})
         return {test for line, tests in held.items() if first <= line <= last for test in tests}
 

@@ -6,7 +6,7 @@ ones by room; ends with 1 where that is below `--least`. Changes named in tests/
 not count.
 
 Needs `pip install -e ".[test,mutation]"`. The map of tests by line takes several minutes: it is kept in
-`--work` and built anew with `--map`.
+`--work`; `--map tests/proof` builds that part of it anew, `--map` all of it.
 """
 
 from __future__ import annotations
@@ -46,25 +46,27 @@ def main() -> int:
     parser.add_argument(
         "--work", type=Path, default=Path("/tmp/olp-mutation"), help="folder of copies and map"
     )
-    parser.add_argument("--map", action="store_true", help="build the map of tests by line anew")
+    parser.add_argument("--map", nargs="*", help="build the map of tests by line anew, or these tests in it")
     parser.add_argument("--again", type=Path, help="only the survivors of this table, an earlier --write")
     parser.add_argument("--write", type=Path, help="table of all changes: outcome, file, line, before, after")
     options = parser.parse_args()
     options.work.mkdir(parents=True, exist_ok=True)
     recorded = options.work / "map.json"
     servers = [Server(_copied(options.work / f"copy{job}")) for job in range(options.jobs)]
-    if options.map or not recorded.is_file():
-        paths = sorted(p for p in (ROOT / "tests").iterdir() if p.is_dir() and p.name not in NOT_RUN)
-        servers[0].record([f"tests/{path.name}" for path in paths], sites.files(ROOT), recorded)
+    if options.map is not None or not recorded.is_file():
+        if not options.map:
+            recorded.unlink(missing_ok=True)
+        servers[0].record(options.map or _folders(), sites.files(ROOT), recorded)
     tests = Map.read(recorded, ROOT)
     drawn = list(sites.drawn(ROOT, options.count, options.seed, options.only))
     if options.again:
-        wanted = {tuple(row.split("\t")[1:]) for row in options.again.read_text("utf-8").splitlines()
-                  if row.startswith("survived\t")}  # fmt: skip
-        drawn = [one for one in drawn if _row(one)[0:] in wanted]
+        rows = [tuple(row.split("\t")) for row in options.again.read_text("utf-8").splitlines()]
+        wanted = {row[1:] for row in rows if row[0] == "survived"}
+        drawn = [one for one in drawn if _row(one) in wanted]
     named = _named()
     counts: Counter[tuple[str, str]] = Counter()
-    table = []
+    if options.write:
+        options.write.write_text("", "utf-8")
 
     def one_job(job: int) -> None:
         for one in drawn[job :: options.jobs]:
@@ -75,7 +77,9 @@ def main() -> int:
             if word == "survived" and (one.site.path, one.before, one.after) in named:
                 word = "equivalent"
             counts[one.room, word] += 1
-            table.append("\t".join((word, *_row(one))))
+            if options.write:
+                with options.write.open("a", encoding="utf-8") as table:
+                    table.write("\t".join((word, *_row(one))) + "\n")
             if word == "survived":
                 why = outcome.why or f"{len(chosen)} tests, {time.monotonic() - begun:.0f} s"
                 print(
@@ -84,9 +88,12 @@ def main() -> int:
 
     with ThreadPoolExecutor(options.jobs) as pool:
         list(pool.map(one_job, range(options.jobs)))
-    if options.write:
-        options.write.write_text("\n".join(table) + "\n", "utf-8")
     return int(_printed(counts, options.seed) < options.least)
+
+
+def _folders() -> list[str]:
+    names = sorted(path.name for path in (ROOT / "tests").iterdir() if path.is_dir())
+    return [f"tests/{name}" for name in names if name not in NOT_RUN and not name.startswith("__")]
 
 
 def _row(one: sites.Mutant) -> tuple[str, ...]:
