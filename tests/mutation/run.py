@@ -58,23 +58,25 @@ def main() -> int:
             recorded.unlink(missing_ok=True)
         servers[0].record(options.map or _folders(), sites.files(ROOT), recorded)
     tests = Map.read(recorded, ROOT)
-    drawn = list(sites.drawn(ROOT, options.count, options.seed, options.only))
-    if options.again:
-        rows = [tuple(row.split("\t")) for row in options.again.read_text("utf-8").splitlines()]
-        wanted = {row[1:] for row in rows if row[0] == "survived"}
-        drawn = [one for one in drawn if _row(one) in wanted]
+    drawn = sites.drawn(ROOT, options.count, options.seed, options.only)
+    wanted = None if options.again is None else _survivors(options.again)
     named = _named()
     counts: Counter[tuple[str, str]] = Counter()
     if options.write:
         options.write.write_text("", "utf-8")
 
     def one_job(job: int) -> None:
-        for one in drawn[job :: options.jobs]:
-            chosen = tests.tests_of(one.site, options.seconds)
+        for site, change in drawn[job :: options.jobs]:
+            if wanted is not None and (site.path, str(site.line)) not in {row[:2] for row in wanted}:
+                continue
+            one = sites.mutant(ROOT, site, change)
+            if wanted is not None and _row(one) not in wanted:
+                continue
+            chosen = tests.tests_of(site, options.seconds)
             begun = time.monotonic()
             outcome = servers[job].judge(one, chosen) if chosen else Outcome("survived", "no test runs it")
             word = outcome.word
-            if word == "survived" and (one.site.path, one.before, one.after) in named:
+            if word == "survived" and (site.path, one.before, one.after) in named:
                 word = "equivalent"
             counts[one.room, word] += 1
             if options.write:
@@ -82,9 +84,7 @@ def main() -> int:
                     table.write("\t".join((word, *_row(one))) + "\n")
             if word == "survived":
                 why = outcome.why or f"{len(chosen)} tests, {time.monotonic() - begun:.0f} s"
-                print(
-                    f"{one.site.path}:{one.site.line} ({why})\n  - {one.before}\n  + {one.after}", flush=True
-                )
+                print(f"{site.path}:{site.line} ({why})\n  - {one.before}\n  + {one.after}", flush=True)
 
     with ThreadPoolExecutor(options.jobs) as pool:
         list(pool.map(one_job, range(options.jobs)))
@@ -98,6 +98,11 @@ def _folders() -> list[str]:
 
 def _row(one: sites.Mutant) -> tuple[str, ...]:
     return one.site.path, str(one.site.line), one.before.replace("\t", " "), one.after.replace("\t", " ")
+
+
+def _survivors(table: Path) -> set[tuple[str, ...]]:
+    rows = [tuple(row.split("\t")) for row in table.read_text("utf-8").splitlines()]
+    return {row[1:] for row in rows if row[0] == "survived"}
 
 
 def _named() -> set[tuple[str, str, str]]:

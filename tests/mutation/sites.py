@@ -232,9 +232,10 @@ def mutant(root: Path, site: Site, change: int) -> Mutant:
     return Mutant(site, before, after, text)
 
 
-def drawn(root: Path, count: int, seed: int, only: str = "") -> Iterator[Mutant]:
-    """`count` changes of different sites in files whose path contains `only`, in the order of the draw."""
+def drawn(root: Path, count: int, seed: int, only: str = "") -> list[tuple[Site, int]]:
+    """`count` different sites in files whose path contains `only`, and which of its changes each has, in the
+    order of the draw."""
     listed = [site for path in files(root) if only in path for site in sites(root, path)]
     generator = random.Random(seed)
-    for site in generator.sample(listed, min(count, len(listed))):
-        yield mutant(root, site, generator.randrange(site.changes))
+    chosen = generator.sample(listed, min(count, len(listed)))
+    return [(site, generator.randrange(site.changes)) for site in chosen]
