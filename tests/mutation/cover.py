@@ -84,15 +84,13 @@ class Map:
     def tests_of(self, site: Site, at_most_s: float) -> list[str]:
         """Tests that run a site, the nearest folder first and there the fastest, `at_most_s` seconds of them.
 
-        Code that the import runs is met by every test of its module, or where the module has no functions, of
-        the modules that import it.
+        Code that the import runs is met by all tests of its module, or where it has none, of the modules that
+        import it, or else of those in its folder.
         """
         if site.function is not None:
             met = self._within(site.path, *site.statement) or self._within(site.path, site.line, site.line)
         else:
-            met = self._within(site.path, 1, 1 << 30)
-            for path in () if met else self._importers(site.path):
-                met |= self._within(path, 1, 1 << 30)
+            met = self._met_by_import(site.path)
         chosen: list[str] = []
         spent = 0.0
         for test in sorted(met, key=lambda name: (-_near(name, site.path), self.seconds[name])):
@@ -101,6 +99,17 @@ class Map:
                 break
             chosen.append(test)
         return chosen
+
+    def _met_by_import(self, path: str) -> set[str]:
+        paths, met = {path}, set[str]()
+        while paths and not met:
+            met = {test for one in paths for test in self._within(one, 1, 1 << 30)}
+            paths = {importer for one in paths for importer in self._importers(one)}
+        folder = PurePosixPath(path).parent
+        while not met and folder.name:
+            inside = [one for one in self.lines if folder in PurePosixPath(one).parents]
+            met, folder = {test for one in inside for test in self._within(one, 1, 1 << 30)}, folder.parent
+        return met
 
     def _within(self, path: str, first: int, last: int) -> set[str]:
         held = self.lines.get(path, {})
