@@ -57,6 +57,8 @@ def main() -> int:
         if not options.map:
             recorded.unlink(missing_ok=True)
         servers[0].record(options.map or _folders(), sites.files(ROOT), recorded)
+    for server in servers:
+        server.warm_up(_folders())
     tests = Map.read(recorded, ROOT)
     drawn = sites.drawn(ROOT, options.count, options.seed, options.only)
     wanted = None if options.again is None else _survivors(options.again)

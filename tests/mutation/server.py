@@ -44,6 +44,15 @@ class Server:
             importlib.import_module(name)
         gc.freeze()
 
+    def warm_up(self, folders: list[str]) -> None:
+        """Compiles the copy once, as each run of tests imports all of it."""
+
+        def child() -> int:
+            sys.dont_write_bytecode = False
+            return int(pytest.main([*_OPTIONS, "--collect-only", *folders]))
+
+        self._ended(child, float("inf"), self.root.with_suffix(".log"))
+
     def record(self, folders: list[str], files: Iterable[str], to: Path) -> None:
         """Runs whole folders on the unchanged copy, and writes the map of tests by line."""
 
