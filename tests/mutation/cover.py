@@ -41,10 +41,11 @@ class Recorder:
         self.coverage.stop()
         data = self.coverage.get_data()
         ran = {name.split("::")[0] for name in self.seconds}
-        map_ = Map.read(path, self.root) if path.is_file() else Map(self.root, {}, {})
+        map_ = Map.read(path, self.root) if path.is_file() else Map(self.root, {}, {}, {})
         kept = {name: s for name, s in map_.seconds.items() if name.split("::")[0] not in ran}
         good = {name: s for name, s in self.seconds.items() if name not in self.failed}
         lines: dict[str, dict[int, set[str]]] = {}
+        imported: dict[str, set[int]] = {}
         for file in self.files:
             contexts = data.contexts_by_lineno(str(self.root / file))
             held = map_.lines.get(file, {})
@@ -52,16 +53,20 @@ class Recorder:
                 line: {*held.get(line, set()) & kept.keys(), *good.keys() & set(contexts.get(line, ()))}
                 for line in sorted({*held, *contexts})
             }
-        Map(self.root, kept | good, lines).write(path)
+            # coverage has the lines before the first test under an empty name
+            imported[file] = {line for line, names in contexts.items() if "" in names}
+            imported[file] |= map_.imported.get(file, set())
+        Map(self.root, kept | good, lines, imported).write(path)
 
 
 @dataclass(frozen=True, slots=True)
 class Map:
-    """Seconds of each test, and for each file the tests of each line."""
+    """Seconds of each test, and for each file the tests of each line, and the lines that imports run."""
 
     root: Path
     seconds: dict[str, float]
     lines: dict[str, dict[int, set[str]]]
+    imported: dict[str, set[int]]
 
     @classmethod
     def read(cls, path: Path, root: Path) -> Map:
@@ -71,7 +76,8 @@ class Map:
             file: {int(line): {names[i] for i in tests} for line, tests in held.items()}
             for file, held in value["lines"].items()
         }
-        return cls(root, value["seconds"], lines)
+        imported = {file: set(held) for file, held in value["imported"].items()}
+        return cls(root, value["seconds"], lines, imported)
 
     def write(self, path: Path) -> None:
         number = {name: i for i, name in enumerate(self.seconds)}
@@ -79,7 +85,9 @@ class Map:
             file: {line: sorted(number[name] for name in tests) for line, tests in held.items()}
             for file, held in self.lines.items()
         }
-        path.write_text(json.dumps({"seconds": self.seconds, "lines": lines}), "utf-8")
+        imported = {file: sorted(held) for file, held in self.imported.items()}
+        value = {"seconds": self.seconds, "lines": lines, "imported": imported}
+        path.write_text(json.dumps(value), "utf-8")
 
     def tests_of(self, site: Site, at_most_s: float) -> list[str]:
         """Tests that run a site, the nearest folder first and there the fastest, `at_most_s` seconds of them.
@@ -87,9 +95,12 @@ class Map:
         Code that the import runs is met by all tests of its module, or where it has none, of the modules that
         import it, or else of those in its folder.
         """
+        met: set[str] = set()
+        by_import = site.function is None
         if site.function is not None:
             met = self._within(site.path, *site.statement) or self._within(site.path, site.line, site.line)
-        else:
+            by_import = not met and site.line in self.imported.get(site.path, set())
+        if by_import:
             met = self._met_by_import(site.path)
         chosen: list[str] = []
         spent = 0.0

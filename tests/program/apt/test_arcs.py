@@ -178,3 +178,38 @@ def test_a_joint_is_smooth_backward_or_a_corner() -> None:
     other = Resolved(np.zeros((1, 3)), np.array([2]), np.array([HALF]))
     begin = np.array([[0.0, 10.0, 0.0]])
     assert joints(other, begin, begin - [[0.0, 0.0, 3.0]]).tolist() == [1]
+
+
+#: An arc that goes on as the line before it, and one that turns back.
+ONWARD = "GOTO/10,-10,5\nGOTO/10,0,5\nCIRCLE/0,0,5,0,0,1,10{more}\nGOTO/0,10,5\n"
+BACK = ONWARD.replace("0,0,1", "0,0,-1")
+
+
+@pytest.mark.parametrize(
+    ("onward", "back", "refused"), [(0, 2, False), (0, 3, True), (1, 3, True), (2, 4, False), (2, 5, True)]
+)
+def test_several_arcs_that_turn_back_are_left_handed(
+    onward: int, back: int, refused: bool, setup: Setup
+) -> None:
+    text = (ONWARD * onward + BACK * back).format(more="")
+    if not refused:
+        assert len(program(text, setup).toolpath.arcs) == onward + back
+        return
+    with pytest.raises(ProgramError, match="its normal seems to be left-handed") as caught:
+        program(text, setup)
+    assert caught.value.line == 2 + 4 * onward + 3
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [(ONWARD, None), (BACK, 5), (ONWARD.replace("GOTO/10,-10,5", "GOTO/20,-10,5"), None),
+     (ONWARD.replace("GOTO/10,-10,5", "GOTO/20,-10,5").replace("{more}", ",1,2"), 5),
+     (ONWARD.replace("{more}", ",1,2"), None)],
+)  # fmt: skip
+def test_arcs_whose_direction_nothing_shows_are_remarked(text: str, line: int | None, setup: Setup) -> None:
+    remarks = program(text.format(more=""), setup).remarks
+    assert [at for what, at, _ in remarks if what == "arcs"] == ([] if line is None else [line])
+
+
+def test_a_point_may_end_with_one_comma(setup: Setup) -> None:
+    assert program("GOTO/1,2,3,\n", setup).toolpath.end_mm.tolist() == [[101.0, 2.0, 3.0]]
