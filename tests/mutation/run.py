@@ -28,8 +28,8 @@ from mutation.server import Outcome, Server
 
 ROOT = Path(__file__).resolve().parents[2]
 EQUIVALENT = Path(__file__).with_name("equivalent.toml")
-#: Folders of tests that judge texts and the shape of the code, not what it does.
-NOT_RUN = ("docs", "house", "mutation", "benchmarks", "fuzz")
+#: Folders of tests that judge the shape of the code, not what it does.
+NOT_RUN = ("house", "mutation", "benchmarks", "fuzz")
 COPIED = ("olp", "tests", "viewer", "programs", "pyproject.toml", "README.md", ".ci")
 
 

@@ -228,3 +228,23 @@ def test_calls_and_saved_modes_say_how_to_unroll_them(word: str, why: str, setup
     got = outcome(f"G0 X1.\n{word}", setups[LINUXCNC], DIALECTS[LINUXCNC])  # type: ignore[arg-type]
     assert isinstance(got, str)
     assert f"{word} {why}" in got
+
+
+#: M codes that move no axis, by the manuals of the controls.
+HARMLESS = {
+    LINUXCNC: "0-5 7-9 19 30 48-53 62-68",
+    FANUC: "0-5 7-11 13 19 29 30 48 49 88 89",
+    HAAS: "0-5 7-11 19 29-31 33-35 41 42 48 49 59 69 83 84 88 89",
+    GRBL: "0-5 7-9 19 30 48 49 56",
+}
+
+
+@pytest.mark.parametrize("control", CONTROLS)
+def test_m_codes_that_move_no_axis(control: str) -> None:
+    listed = set()
+    for part in HARMLESS[control].split():
+        first, _, last = part.partition("-")
+        listed |= set(range(int(first), int(last or first) + 1))
+    profile = DIALECTS[control]
+    assert isinstance(profile, Profile)
+    assert profile.harmless_m == listed
