@@ -204,6 +204,8 @@ def test_several_arcs_that_turn_back_are_left_handed(
     ("text", "line"),
     [(ONWARD, None), (BACK, 5), (ONWARD.replace("GOTO/10,-10,5", "GOTO/20,-10,5"), None),
      (ONWARD.replace("GOTO/10,-10,5", "GOTO/20,-10,5").replace("{more}", ",1,2"), 5),
+     (ONWARD.replace("GOTO/10,-10,5", "GOTO/20,-10,5").replace("{more}", ",1,TIMES,1"), 5),
+     (ONWARD.replace("GOTO/10,-10,5", "GOTO/20,-10,5").replace("{more}", ",TIMES,1"), None),
      (ONWARD.replace("{more}", ",1,2"), None)],
 )  # fmt: skip
 def test_arcs_whose_direction_nothing_shows_are_remarked(text: str, line: int | None, setup: Setup) -> None:
