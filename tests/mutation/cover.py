@@ -93,7 +93,7 @@ class Map:
         """Tests that run a site, the nearest folder first and there the fastest, `at_most_s` seconds of them.
 
         Code that the import runs is met by all tests of its module, or where it has none, of the modules that
-        import it, or else of those in its folder.
+        import it, and by the tests of its folder.
         """
         met: set[str] = set()
         by_import = site.function is None
@@ -116,11 +116,12 @@ class Map:
         while paths and not met:
             met = {test for one in paths for test in self._within(one, 1, 1 << 30)}
             paths = {importer for one in paths for importer in self._importers(one)}
-        folder = PurePosixPath(path).parent
-        while not met and folder.name:
-            inside = [one for one in self.lines if folder in PurePosixPath(one).parents]
-            met, folder = {test for one in inside for test in self._within(one, 1, 1 << 30)}, folder.parent
-        return met
+        # a test of a table runs no line of it: those in the folder of the same name, or above
+        folder, beside = PurePosixPath(path).parent, set[str]()
+        while not beside and folder.name:
+            tests = PurePosixPath("tests", *folder.parts[1:]).as_posix() + "/"
+            beside, folder = {test for test in self.seconds if test.startswith(tests)}, folder.parent
+        return met | beside
 
     def _within(self, path: str, first: int, last: int) -> set[str]:
         held = self.lines.get(path, {})

@@ -6,7 +6,7 @@ ones by room; ends with 1 where that is below `--least`. Changes named in tests/
 not count.
 
 Needs `pip install -e ".[test,mutation]"`. The map of tests by line takes several minutes: it is kept in
-`--work`; `--map tests/proof` builds that part of it anew, `--map` all of it.
+`--work`; `--map tests/proof` builds that part of it again, `--map` all of it.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def main() -> int:
     parser.add_argument(
         "--work", type=Path, default=Path("/tmp/olp-mutation"), help="folder of copies and map"
     )
-    parser.add_argument("--map", nargs="*", help="build the map of tests by line anew, or these tests in it")
+    parser.add_argument("--map", nargs="*", help="build the map of tests by line again, or these tests in it")
     parser.add_argument("--again", type=Path, help="only the survivors of this table, an earlier --write")
     parser.add_argument("--write", type=Path, help="table of all changes: outcome, file, line, before, after")
     options = parser.parse_args()
