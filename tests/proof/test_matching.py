@@ -124,3 +124,20 @@ def test_another_job_is_refused(folder: Path) -> None:
     two = program("G1 X10 F500\nX20\nX33\nX44\n", folder)
     assert groups(program(text, folder), two) == [0, 1, 2, 3, 4]
     assert groups(program("", folder), program("", folder)) == [0]
+
+
+@pytest.mark.parametrize("parts", (63, 66, 200, 700))
+@pytest.mark.parametrize("split", (3, 8, 13))
+def test_a_move_of_many_parts_beside_a_wrong_one(split: int, parts: int, folder: Path) -> None:
+    """Where a waypoint is far off, so much is in doubt that the next moves are aligned at once."""
+    ends = np.array([[10.0 * k, 5.0 * (k % 2), 0.0] for k in range(1, 15)])
+    nominal = "".join(word("G1", end) + "\n" for end in ends)
+    lines, last = [], [0]
+    for k, end in enumerate(ends):
+        count = parts if k == split else 1
+        begin = ends[k - 1] if k else np.zeros(3)
+        for share in np.arange(1, count + 1) / count:
+            lines.append(word("G1", begin + share * (end - begin)))
+        last.append(last[-1] + count)
+    lines[last[2] - 1] = word("G1", ends[1] + [0.0, 3.0, 0.0])
+    assert groups(program(nominal, folder), program("\n".join(lines) + "\n", folder)) == last
