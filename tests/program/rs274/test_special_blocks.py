@@ -87,7 +87,8 @@ def test_repeated_holes_step_in_g91_only_and_along_their_words_only(
 
 
 def test_g98_is_the_level_before_and_g99_the_level_r(setup: Setup) -> None:
-    for code, z in (("G98", 303.0), ("G99", 301.0)):
+    # LinuxCNC begins in G99
+    for code, z in (("G98", 303.0), ("G99", 301.0), ("", 301.0)):
         assert ends(f"{code} G81 X4 Z-2 R1 F60\nG80\n", setup)[-1] == [104.0, 202.0, z]
 
 
