@@ -338,3 +338,12 @@ def test_a_word_that_is_the_first_of_the_program_is_corrected_too(tmp_path: Path
     text = unstamped(olp.correct((first + "\nM2\n").encode(), path, path.with_name("job.toml")).data)
     assert words(text, "X")[-1] == pytest.approx(59.94, abs=0.002)
     assert words(text, "I")[0] == pytest.approx(29.97, abs=0.002)
+
+
+def test_the_level_of_a_hole_that_is_reached_from_below_leads_upward(tmp_path: Path) -> None:
+    """6 um of backlash: up to R with half of it above, down to the bottom with half of it below."""
+    path = machine(tmp_path, "[backlash]\nZ_um = 6.0\n", tables=TRUE_ZERO)
+    text = corrected(path, b"G0 X0. Y0. Z-1.\nZ0.5\nG99 G81 X10. Z-2. R1. F100\nG80\n")
+    (block,) = (line for line in text.splitlines() if b"G81" in line)
+    assert words(block, "R") == [1.003]
+    assert words(block, "Z") == [-2.003]
