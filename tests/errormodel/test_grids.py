@@ -9,7 +9,7 @@ import pytest
 
 from olp.core.errors import ConfigError
 from olp.errormodel.gridded import ComponentTable, grid_rows
-from olp.errormodel.sources.maps import DeviationMap
+from olp.errormodel.sources.maps import DeviationMap, Maps
 
 ONE = np.array([0.0])
 TWO = np.array([0.0, 10.0])
@@ -101,3 +101,15 @@ def test_a_grid_as_text_has_one_row_per_node_the_last_argument_first() -> None:
     cells = {"a": ["1", "2", "3", "4"], "b": ["5", "6", "7", "8"]}
     text = grid_rows(("X", "Z"), (TWO, np.array([-1.5, 2.0])), cells)
     assert text == "X_mm,Z_mm,a,b\n0,-1.5,1,5\n0,2,2,6\n10,-1.5,3,7\n10,2,4,8\n"
+
+
+def test_inspect_shows_a_map_with_its_largest_deviation() -> None:
+    """3, 4 and 12 um along the axes at one node: 13 um."""
+    values = np.zeros((2, 2, 2, 3))
+    values[1, 0, 1] = 3e-3, -4e-3, 12e-3
+    shown = Maps().inspect((deviations(values=values, tool_mm=(1.0, 2.0, 3.0), name="a"),), None)  # type: ignore[arg-type]
+    assert shown["maps"] == [
+        {"name": "a", "kind": "residual", "interpolation": "linear", "nodes": "2 x 2 x 2",
+         "tool_mm": [1.0, 2.0, 3.0], "max_um": pytest.approx(13.0)}
+    ]  # fmt: skip
+    assert Maps().inspect((), None) == {}  # type: ignore[arg-type]
