@@ -117,6 +117,25 @@ def test_a_module_that_would_end_its_element_is_refused(
         olp.view(TEXT, machine, time=False).html()
 
 
+def test_the_title_is_text_and_the_data_cannot_end_their_element() -> None:
+    hostile = """</script><!-- <b a='"'> & @@DATA@@"""
+    page = b"".join(pages.page({"title": hostile}, b"AAAA")).decode()
+    assert "<title>&lt;/script&gt;&lt;!-- &lt;b a=&#x27;&quot;&#x27;&gt; &amp; @@DATA@@" in page
+    assert hostile not in page
+    data = pages.as_json({"title": hostile, "umlaut": "ä"})
+    assert b"<" not in data and "ä".encode() in data and b", " not in data
+    assert json.loads(data) == {"title": hostile, "umlaut": "ä"}
+    with pytest.raises(ValueError):
+        pages.as_json({"a": float("nan")})
+
+
+@pytest.mark.parametrize("text", ("</script", "</SCRIPT>", "a <!-- b"))
+def test_a_script_that_would_end_its_element_is_refused(monkeypatch: pytest.MonkeyPatch, text: str) -> None:
+    monkeypatch.setattr(pages, "_bundle", lambda: (text, "main.min.js"))
+    with pytest.raises(CannotCompute, match=r"main\.min\.js: contains the end of a script element"):
+        b"".join(pages.page({"title": "a"}, b""))
+
+
 # -- hostile programs -----------------------------------------------------------------------------------
 
 
