@@ -19,6 +19,7 @@ from olp.cli.common import (
     exit_for,
     files_of,
     given,
+    is_terminal,
     options_of,
     put,
     refuse_early,
@@ -185,5 +186,5 @@ def _diff(nominal: bytes, result: Correction, machine: Machine, on_stderr: bool)
         near_um=1.1 * largest_um + LAST_DIGITS_UM,
         bare_mm=partial(profile.bare_mm, machine) if profile else None,
         statements=profile is None,
-        colour=(sys.stderr if on_stderr else sys.stdout).isatty(),
+        colour=is_terminal(sys.stderr if on_stderr else sys.stdout),
     )

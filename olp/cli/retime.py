@@ -21,7 +21,6 @@ from olp.cli.common import (
     refuse_early,
     refuse_stream,
     refuse_twice,
-    silence_stdout,
     source,
 )
 from olp.cli.options import (
@@ -41,7 +40,7 @@ from olp.cli.options import (
     setup_options,
 )
 from olp.cli.progress import Report, progress
-from olp.core.errors import InputError, OlpError, UsageError, naming
+from olp.core.errors import InputError, UsageError, naming
 
 if TYPE_CHECKING:
     from olp.files.sources import Sources
@@ -136,7 +135,7 @@ def command(program: str | None, machine: str | None, job: str | None, **words: 
     if feeds is not None and outputs.write_feed == STREAM:
         put(feeds)
     if outputs.output == STREAM:
-        _stream(streamed)
+        put(streamed)
     _say(result, outputs, written)
     exit_for(result.findings, outputs.fail_on)
 
@@ -234,17 +233,3 @@ def _of_one(result: Retiming, outputs: _Outputs) -> Iterable[bytes]:
             "--stretch, or name a file with -o"
         )
     return result.parts(outputs.kind or "csv", outputs.cycle_s, outputs.stretch)
-
-
-def _stream(parts: Iterable[bytes]) -> None:
-    """Write to stdout part by part. A reader that has gone is no error."""
-    import sys
-
-    try:
-        for part in parts:
-            sys.stdout.buffer.write(part)
-        sys.stdout.buffer.flush()
-    except BrokenPipeError:
-        silence_stdout()
-    except OSError as error:
-        raise OlpError(f"cannot be written ({error.strerror})", file="<stdout>") from error
