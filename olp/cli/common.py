@@ -116,7 +116,7 @@ def refuse_twice(names: Iterable[str]) -> None:
     """Raise where two outputs are one file."""
     seen: set[Path] = set()
     for name in names:
-        path = Path(name).resolve()
+        path = Path(os.path.realpath(name))
         if path in seen:
             raise UsageError("is named as output twice; name two files", file=name)
         seen.add(path)

@@ -88,7 +88,6 @@ def test_what_the_system_refuses_is_no_defect(
         ("olp frob 2>&-", 2, None),
         ("olp frob 2>/dev/full", 2, None),
         ("olp inspect - -j job.toml <&-", 3, "<stdin>: is closed"),
-        ("olp inspect - -j job.toml <.", 3, "<stdin>: cannot be read"),
         ("olp explain OLP101 >/dev/full", 4, "<stdout>: cannot be written (No space left on device)"),
         ("olp --help >/dev/full", 4, "the system refuses (No space left on device)"),
     ],
