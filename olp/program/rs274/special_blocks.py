@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Index
+from olp.core.budget import Budget
 from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES
 from olp.core.toolpath import Flag, Kind
@@ -29,7 +30,7 @@ from olp.program.rs274.codes import (
     RETRACT_TO_R,
 )
 from olp.program.rs274.collector import Collector
-from olp.program.rs274.cycles import Stroke, hole_moves, levels
+from olp.program.rs274.cycles import HOLE_STROKES, Stroke, check_repeats, hole_moves, levels
 from olp.program.rs274.modes import Context, scaled
 from olp.program.rs274.motion import fill
 from olp.program.rs274.profiles.base import Act, Profile
@@ -92,10 +93,11 @@ class SpecialBlocks:
     """Carries these blocks out from the position in `state`, and puts their moves and holes into
     `collector`."""
 
-    def __init__(self, state: AxisState, collector: Collector, switches: Directives) -> None:
+    def __init__(self, state: AxisState, collector: Collector, switches: Directives, strokes: Budget) -> None:
         self._state = state
         self._collector = collector
         self._switches = switches
+        self._strokes = strokes
 
     def run(self, context: Context, row: int, slot: Index, frame: int, effect: Effect) -> None:
         """Carry out the motion on line `row` of the chunk, whose axis words are `slot` (1, 3), in this
@@ -210,6 +212,7 @@ class SpecialBlocks:
                     initial_z=initial, plane=17 + plane,
                     rules=state.profile.cycles,
                 )  # fmt: skip
+                self._strokes.spend(HOLE_STROKES + len(strokes))
             except ProgramError as error:
                 raise ProgramError(error.message, line=line) from None
             moving = [s for s in strokes if s.kind in ("rapid", "feed")]
@@ -265,6 +268,10 @@ class SpecialBlocks:
                 "a canned cycle with zero repeats only stores values, which is not read; give one or more",
                 line=line,
             )
+        try:
+            check_repeats(times)
+        except ProgramError as error:
+            raise ProgramError(error.message, line=line) from None
         return times
 
 

@@ -23,6 +23,8 @@ _LABEL = re.compile(r"\d+|<[^>]*>")
 _KEYWORD = re.compile(
     r"endsub|sub|call|return|elseif|else|endif|if|endwhile|while|do|endrepeat|repeat|break|continue"
 )
+#: characters of a text that a message shows, and of a label at most
+_SHOWN, _LONGEST_LABEL = 60, 250
 _WITH_VALUE = frozenset({"if", "elseif", "while", "repeat"})
 
 
@@ -159,7 +161,7 @@ def _compile(source: _Source, begin: int, language: Language) -> Line:
             flow = _macro_b(reader, assignments, source.places, language)
         if flow is not None:
             if reader.position < len(text):
-                rest = text[reader.position :]
+                rest = text[reader.position : reader.position + _SHOWN]
                 raise ProgramError(f"{flow.keyword.upper()} is followed by {rest!r}, which is not understood")
             break
         words.append(_word(reader, source.places, language))
@@ -218,8 +220,10 @@ def _o_word(reader: Reader) -> Flow:
     if static:
         label = static.group().strip("<>")
         if static.group()[0] != "<":
-            label = str(int(label))
+            label = label.lstrip("0") or "0"
         reader.position = static.end()
+        if len(label) > _LONGEST_LABEL:
+            raise ProgramError(f"a label has {len(label)} characters; expected at most {_LONGEST_LABEL}")
     else:
         dynamic = reader.value()
     keyword = _KEYWORD.match(text, reader.position)
