@@ -25,6 +25,10 @@ if TYPE_CHECKING:
 STREAM = "-"
 #: Exit code of a run with findings at or above --fail-on.
 FINDINGS_EXIT = 1
+#: Endings of files that browsers open as pages, and whose scripts they run.
+_PAGES = frozenset(
+    (".htm", ".html", ".xht", ".xhtml", ".shtml", ".svg", ".svgz", ".mht", ".mhtml", ".hta", ".xsl", ".xslt")
+)
 PLOT_ENDINGS = (".svg", ".png")
 
 #: Key under which a call keeps the value of --dialect.
@@ -100,9 +104,19 @@ def files_of(*names: str | None) -> list[str]:
 
 
 def default_output(program: str) -> str:
-    """PROGRAM.corrected.SUFFIX beside PROGRAM."""
+    """PROGRAM.corrected.SUFFIX beside PROGRAM. Raises UsageError where that is the name of a page."""
     path = Path(program)
-    return STREAM if program == STREAM else str(path.with_name(f"{path.stem}.corrected{path.suffix}"))
+    return (
+        STREAM if program == STREAM else no_page(str(path.with_name(f"{path.stem}.corrected{path.suffix}")))
+    )
+
+
+def no_page(name: str) -> str:
+    """The name of a file that is no page. Raises UsageError where it ends as one: a browser would run what
+    its text holds."""
+    if Path(name).suffix.lower() in _PAGES:
+        raise UsageError("ends as a page, which a browser would run; give it another ending", file=name)
+    return name
 
 
 def refuse_early(targets: Iterable[str], inputs: Iterable[str], *, force: bool) -> None:
@@ -211,5 +225,7 @@ def exit_for(findings: Iterable[Finding], fail_on: str) -> None:
 
 
 def _encodable(text: str, encoding: str | None) -> str:
+    """The text as a stream can take it, without the control characters that a terminal would obey."""
     encoding = encoding or "utf-8"
+    text = "".join(c if c.isprintable() or c in "\n\t" else "\ufffd" for c in text)
     return text.encode(encoding, "replace").decode(encoding)

@@ -30,6 +30,7 @@ from olp.cli.options import (
     contour_option,
     doubt_options,
     fail_on_option,
+    file_option,
     flatten_option,
     force_option,
     json_option,
@@ -76,13 +77,13 @@ FORMATS = ("csv", "npz", "parquet", "ros", "pvt")
 @click.option("--blend-study", is_flag=True, help="Also report time and deviation at other path tolerances.")
 @click.option("--nominal", metavar="NOMINAL", help="Compare the times with those of another program.")
 @click.option("--proof", metavar="report.json", help="Also show the error budget of a report of olp correct.")
-@click.option("--lines", metavar="FILE.csv", help="Write time, speed and limit of each line.")
-@click.option("--slow", metavar="FILE.csv", help="Write where the motion is below half of the feed.")
+@file_option("--lines", "FILE.csv", "Write time, speed and limit of each line.")
+@file_option("--slow", "FILE.csv", "Write where the motion is below half of the feed.")
 @plot_option("Draw the motion and its limits over time, as .svg or .png.")
 @click.option(
     "--plot-span", type=(NUMBER, NUMBER), metavar="FROM TO", help="Seconds of the motion that --plot draws."
 )
-@click.option("--write-feed", metavar="FILE", help="Write the program with the planned feeds in its F words.")
+@file_option("--write-feed", "FILE", "Write the program with the planned feeds in its F words.")
 @click.option(
     "--shared-feed",
     type=click.Choice(["mean", "least"]),

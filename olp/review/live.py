@@ -31,7 +31,7 @@ _Stamp = tuple[tuple[str, int, int], ...]
 
 
 class _Http(ThreadingHTTPServer):
-    """Answers a bounded number of requests at a time, each in a thread of its own. Clients may go at any time."""
+    """Answers a bounded number of requests at a time, each in its own thread. Clients may leave."""
 
     def __init__(self, address: tuple[str, int], handler: type[BaseHTTPRequestHandler]) -> None:
         self._free = threading.Semaphore(MOST_REQUESTS)

@@ -24,6 +24,7 @@ from olp.files.sources import Source, Sources
 from olp.findings.catalogue import Finding
 from olp.program.program import Program
 from olp.program.registry import Options, read
+from olp.reports.report import cell
 from olp.workflows import compare_report as parts
 from olp.workflows.compare_poses import part_frame as poses_frame
 from olp.workflows.compare_poses import poses_report
@@ -72,7 +73,7 @@ class Comparison:
         yield b"run,s_mm,line,X_mm,Y_mm,Z_mm,along_um,normal_um,binormal_um,counted,size_um\n"
         for run in (*self.before, *self.runs):
             assert self.path is not None
-            name = _quoted(run.name)
+            name = _quoted(cell(run.name))
             d, foot = run.deviation, run.nominal_mm
             columns = (
                 run.pairing.s_mm, run.line(self.path), *foot.T,

@@ -17,6 +17,7 @@ from olp.files.sources import Source
 from olp.findings.catalogue import Finding
 from olp.program.program import Program
 from olp.program.registry import Options, read
+from olp.reports.report import printable
 from olp.workflows.doubt import accepted_of, doubted
 from olp.workflows.session import Loaded, Outside, PathLike, Session, opened
 
@@ -46,7 +47,7 @@ class Simulation:
 
     def to_csv(self) -> bytes:
         """`X_mm,Y_mm,Z_mm,line` with the frame named in a comment."""
-        rows = [f"# frame={self.frame}", "X_mm,Y_mm,Z_mm,line"]
+        rows = [f"# frame={printable(self.frame)}", "X_mm,Y_mm,Z_mm,line"]
         rows += [
             f"{x:.6f},{y:.6f},{z:.6f},{int(n)}"
             for (x, y, z), n in zip(self.points_mm.tolist(), self.line.tolist(), strict=True)
