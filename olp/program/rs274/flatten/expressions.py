@@ -99,7 +99,7 @@ class Reader:
         if match is None:
             return None
         self.position = match.end()
-        return float(match.group())
+        return plain_number(match.group())
 
     def value(self) -> Expression:
         """A real value: number, parameter, function or bracketed expression, with an optional sign."""
@@ -125,7 +125,7 @@ class Reader:
         plain = _UNSIGNED.match(text, start)
         if plain:
             self.position = plain.end()
-            return _constant(float(plain.group()))
+            return _constant(plain_number(plain.group()))
         function = _FUNCTION.match(text, start)
         if function:
             self.position = function.end()
@@ -227,6 +227,14 @@ def _chained(first: Expression, rest: tuple[tuple[_Join, Expression], ...]) -> E
 
 def _constant(value: float) -> Expression:
     return lambda _: value
+
+
+def plain_number(text: str) -> float:
+    """The number that a text writes. Raises ProgramError where it is too large for any control."""
+    value = float(text)
+    if not math.isfinite(value):
+        raise ProgramError(f"a number of {len(text)} digits is too large; expected at most 300")
+    return value
 
 
 def _negated(operand: Expression) -> Expression:

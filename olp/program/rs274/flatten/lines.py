@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from olp.core.errors import ProgramError
-from olp.program.rs274.flatten.expressions import Expression, Parameters, Reader
+from olp.program.rs274.flatten.expressions import Expression, Parameters, Reader, plain_number
 from olp.program.rs274.flatten.language import Language
 
 _LINE = re.compile(rb"[^\r\n]*(?:\r\n|\n|\r|$)")
@@ -179,7 +179,7 @@ def _word(reader: Reader, places: list[int], language: Language) -> Word:
     value_start = letter.end()
     literal = _LITERAL.match(text, value_start)
     if literal and _PLAIN_END.match(text, literal.end()):
-        number, value, pointed = float(literal.group()), None, "." in literal.group()
+        number, value, pointed = plain_number(literal.group()), None, "." in literal.group()
         reader.position = literal.end()
     else:
         reader.position = value_start
