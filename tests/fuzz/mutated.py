@@ -9,6 +9,7 @@ smallest input found; ends with 1 if there was any. `--write` keeps these inputs
 from __future__ import annotations
 
 import argparse
+import contextlib
 import faulthandler
 import mmap
 import os
@@ -63,16 +64,16 @@ def input_of(seed: int, number: int, all_targets: Sequence[Target]) -> tuple[Tar
     return target, mutated(draw, draw.choice(target.inputs), target.inputs)
 
 
-def tried(target: Target, data: bytes, limit_s: float = LIMIT_S) -> tuple[str, str]:
+def tried(target: Target, data: bytes) -> tuple[str, str]:
     """What is wrong with the outcome of an input and its traceback, ("", "") for nothing."""
-    signal.setitimer(signal.ITIMER_VIRTUAL, limit_s)
+    signal.setitimer(signal.ITIMER_VIRTUAL, LIMIT_S)
     try:
         target.call(data)
     except OlpError as error:
         text = str(error)
         return ("", "") if text and len(text) < 20_000 else (f"a message of {len(text)} characters", "")
     except _TooSlow:
-        return f"takes more than {limit_s:g} s", traceback.format_exc(limit=-4)
+        return f"takes more than {LIMIT_S:g} s", traceback.format_exc(limit=-4)
     except Exception as error:
         frames = traceback.extract_tb(error.__traceback__)
         ours = [f for f in frames if "/olp/" in f.filename] or frames
@@ -132,10 +133,14 @@ def defects_of(seed: int, numbers: range, all_targets: Sequence[Target]) -> Iter
         reader, writer = os.pipe()
         child = os.fork()
         if not child:
-            os.close(reader)
-            with os.fdopen(writer, "wb") as stream:
-                stream.write(pickle.dumps(_batch(seed, part, all_targets, present)))
-            os._exit(0)
+            try:
+                os.close(reader)
+                with os.fdopen(writer, "wb") as stream:
+                    stream.write(pickle.dumps(_batch(seed, part, all_targets, present)))
+                os._exit(0)
+            finally:
+                # whatever has gone wrong here is not for the parent's code
+                os._exit(1)
         os.close(writer)
         with os.fdopen(reader, "rb") as stream:
             answer = stream.read()
@@ -158,24 +163,29 @@ def main() -> int:
     parser.add_argument("--only", default="", help="targets whose names begin so")
     parser.add_argument("--write", type=Path, help="folder for the inputs of defects")
     options = parser.parse_args()
-    begun = time.monotonic()
     known: set[tuple[str, str]] = set()
-    with tempfile.TemporaryDirectory() as folder:
+    done, last = options.first, options.first + options.count
+    with tempfile.TemporaryDirectory() as folder, contextlib.suppress(KeyboardInterrupt):
         chosen = [t for t in targets(Path(folder)) if t.name.startswith(options.only)]
-        made_s, begun = time.monotonic() - begun, time.monotonic()
-        for defect in defects_of(options.seed, range(options.first, options.first + options.count), chosen):
-            if (defect.target, defect.kind) in known:
-                continue
-            known.add((defect.target, defect.kind))
-            print(f"{defect.number} {defect.target}: {defect.kind}\n  {defect.data[:300]!r}", flush=True)
-            print("".join(f"  {line}\n" for line in defect.trace.strip().split("\n")[-7:]), flush=True)
-            if options.write:
-                options.write.mkdir(parents=True, exist_ok=True)
-                (options.write / f"{options.seed}-{defect.number}").write_bytes(defect.data)
-    spent = time.monotonic() - begun
-    print(f"{options.count} inputs of {len(chosen)} targets, {len(known)} kinds of defects, "
-          f"{options.count / spent:.0f} a second, made ready in {made_s:.0f} s")  # fmt: skip
+        begun = time.monotonic()
+        while done < last:
+            part = range(done, min(done + _BATCH, last))
+            for defect in defects_of(options.seed, part, chosen):
+                if (defect.target, defect.kind) not in known:
+                    known.add((defect.target, defect.kind))
+                    _show(defect, options.seed, options.write)
+            done = part.stop
+    count = done - options.first
+    print(f"{count} inputs, {len(known)} kinds of defects, {count / (time.monotonic() - begun):.0f} a second")
     return int(bool(known))
+
+
+def _show(defect: Defect, seed: int, folder: Path | None) -> None:
+    print(f"{defect.number} {defect.target}: {defect.kind}\n  {defect.data[:300]!r}")
+    print("".join(f"  {line}\n" for line in defect.trace.strip().split("\n")[-7:]), flush=True)
+    if folder is not None:
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / f"{seed}-{defect.number}").write_bytes(defect.data)
 
 
 if __name__ == "__main__":

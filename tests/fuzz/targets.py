@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import shutil
 from collections.abc import Callable, Iterator, Sequence
@@ -93,7 +94,9 @@ def _programs(folder: Path) -> Iterator[Target]:
         yield Target(f"correct {name}", texts, _corrected(setup), 0.3)
         yield Target(f"check {name}", texts, _checked(setup), 0.1)
         yield Target(f"verify {name}", texts, _verified(setup, texts), 0.1)
-        yield Target(f"retime {name}", texts, _retimed(setup), 0.05)
+        if own is None:
+            # programs of robots state no feed that is a speed
+            yield Target(f"retime {name}", texts, _retimed(setup), 0.05)
 
 
 def _reading(setup: Setup, dialect: Dialect) -> Callable[[bytes], object]:
@@ -224,6 +227,8 @@ def _tables(folder: Path) -> Iterator[Target]:
     source = PROGRAMS / "bridge-cmm"
     calibration = load_calibration(source / "calibration.toml")
     given = Given(machine=calibration.machine, travel_mm=calibration.box_mm, sense=None)
+    # a file of one screw does not name its axis
+    alone = replace(given, axis="X", kind=1)
     for key, form in control_tables.FORMATS.items():
         try:
             files = control_tables.write_table(calibration, key, folder / f"table{form.ending}", given).files
@@ -232,10 +237,15 @@ def _tables(folder: Path) -> Iterator[Target]:
         for path, content in files.items():
             data = content if isinstance(content, bytes) else b"".join(content)
 
-            def call(mutant: bytes, key: str = key, path: Path = path) -> object:
-                return control_tables.read_table(path, key, given, lambda _: mutant)
+            stated = alone if path.suffix == ".comp" else given
 
-            yield Target(f"table {key}", (data,), call, 0.5)
+            def call(mutant: bytes, key: str = key, path: Path = path, stated: Given = stated) -> object:
+                return control_tables.read_table(path, key, stated, lambda _: mutant)
+
+            with contextlib.suppress(olp.OlpError):
+                # some of the files are notes beside the tables
+                call(data)
+                yield Target(f"table {key}", (data,), call, 0.5)
     ini = folder / "mill.ini"
     text = b"[TRAJ]\nCOORDINATES = XYZ\nLINEAR_UNITS = mm\n[KINS]\nKINEMATICS = trivkins\n" + b"".join(
         b"[AXIS_%s]\nMIN_LIMIT = -10\nMAX_LIMIT = 300\nMAX_VELOCITY = 50\nMAX_ACCELERATION = 400\n" % axis
