@@ -16,6 +16,10 @@ _KEY = re.compile(r'"(?:[^"\\]|\\.)*"|\'[^\']*\'|[A-Za-z0-9_-]+')
 _KEY_LINE = re.compile(rf"\s*((?:{_KEY.pattern})(?:\s*\.\s*(?:{_KEY.pattern}))*)\s*=(.*)")
 _HEADER = re.compile(r"\s*(\[\[?)(.*?)\]\]?\s*(?:#.*)?$")
 _STRING_OR_COMMENT = re.compile(r'"(?:[^"\\]|\\.)*"|\'[^\']*\'|#.*')
+#: parts of a key at most; the time to read one goes with their square
+_DEEPEST = 16
+_PART = r"(?:[A-Za-z0-9_-]++|\"[^\"\n]*+\"|'[^'\n]*+')[ \t]*+"
+_DEEP_KEY = re.compile(rf"(?m)(?:^|[\[{{,])[ \t]*+(?:{_PART}\.[ \t]*+){{{_DEEPEST}}}")
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
@@ -29,6 +33,12 @@ def read_toml(data: bytes, file: str) -> tuple[dict[str, object], dict[Path, int
             f"line {line}: byte 0x{data[error.start]:02x} is not UTF-8; expected a text file saved as UTF-8"
         )
         raise ConfigError(problem, file=file, line=line) from None
+    deep = _DEEP_KEY.search(text)
+    if deep is not None:
+        line = text.count("\n", 0, deep.end()) + 1
+        raise ConfigError(
+            f"line {line}: a key has more than {_DEEPEST} parts; correct it", file=file, line=line
+        )
     try:
         values = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
