@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 
 from olp.core.errors import INTERRUPTED
@@ -11,22 +10,13 @@ from olp.core.errors import INTERRUPTED
 def run() -> None:
     """Run the command line; an interrupt while it is imported ends as any other."""
     try:
-        _keep_streams()
         from olp.cli import main
+        from olp.cli.endings import keep_streams
 
+        keep_streams()
         main(prog_name="olp")
     except KeyboardInterrupt:
         sys.exit(INTERRUPTED)
-
-
-def _keep_streams() -> None:
-    """Take the numbers of closed streams, so that no file that is opened later is written as stdout."""
-    for number in range(3):
-        try:
-            os.fstat(number)
-        except OSError:
-            # the lowest free number is given
-            os.open(os.devnull, os.O_RDWR)
 
 
 if __name__ == "__main__":

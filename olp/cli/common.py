@@ -173,7 +173,8 @@ def put(text: str | bytes | Iterable[bytes], *, err: bool = False) -> None:
         text = text.encode(stream.encoding or "utf-8", "replace")
     try:
         stream.flush()
-        stream.buffer.writelines([text] if isinstance(text, bytes) else text)
+        for part in (text,) if isinstance(text, bytes) else text:
+            stream.buffer.write(part)
         stream.buffer.flush()
     except BrokenPipeError:
         silence(stream)

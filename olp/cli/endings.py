@@ -55,6 +55,16 @@ def with_exit_code(words: Sequence[str]) -> Iterator[None]:
         _end_defect(words, error)
 
 
+def keep_streams() -> None:
+    """Take the numbers of closed streams, so that no file that is opened later is written as stdout."""
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            # the lowest free number is given
+            os.open(os.devnull, os.O_RDWR)
+
+
 def _end(message: str, code: int) -> NoReturn:
     for line in message.split("\n"):
         diagnostic(f"olp: error: {line}")

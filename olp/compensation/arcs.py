@@ -27,7 +27,8 @@ _STIFFNESS = 1e-3
 #: rounds of division, at most
 _DEEPEST = 14
 #: pieces of all arcs that do not fit yet: of few arcs, and for each arc
-_PIECES, _PIECES_PER_ARC = 20_000, 16
+_PIECES = 20_000
+_PIECES_PER_ARC = 16
 #: rad; arcs beyond this sweep need not have equal radii at both ends
 WIDE = 0.95 * np.pi
 #: samples at a time, so that memory is small

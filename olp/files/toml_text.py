@@ -16,6 +16,8 @@ _KEY = re.compile(r'"(?:[^"\\]|\\.)*"|\'[^\']*\'|[A-Za-z0-9_-]+')
 _KEY_LINE = re.compile(rf"\s*((?:{_KEY.pattern})(?:\s*\.\s*(?:{_KEY.pattern}))*)\s*=(.*)")
 _HEADER = re.compile(r"\s*(\[\[?)(.*?)\]\]?\s*(?:#.*)?$")
 _STRING_OR_COMMENT = re.compile(r'"(?:[^"\\]|\\.)*"|\'[^\']*\'|#.*')
+#: characters of a line that a message shows
+_SHOWN = 120
 #: parts of a key at most; the time to read one goes with their square
 _DEEPEST = 16
 _PART = r"(?:[A-Za-z0-9_-]++|\"[^\"\n]*+\"|'[^'\n]*+')[ \t]*+"
@@ -63,6 +65,8 @@ def _syntax_error(message: str, text: str, file: str) -> ConfigError:
         hint = "close the quotes"
     elif "Invalid value" in what:
         hint = "text needs quotes, and a file name on Windows single quotes"
+    if len(written) > _SHOWN:
+        written = written[:_SHOWN] + "..."
     problem = (
         f"line {line}: {written!r} is not TOML ({what}); expected key = value, [table] or [[table]]; {hint}"
     )

@@ -23,7 +23,9 @@ _TOKEN = re.compile(
 _NUMBER = r"(?>[-+]?(?:\d+(?:\.\d*)?|\.\d+))(?:[eE][-+]?\d++)?(?![\d.])"
 #: Of one form at most, as each more of them may double the time to compare it: parts in brackets, `...`; and
 #: characters.
-_OPTIONAL, _RESTS, _LONGEST = 8, 2, 500
+_OPTIONAL = 8
+_RESTS = 2
+_LONGEST = 500
 _NAME = r"[A-Za-z_$.][\w.$]*(?:\[[\w,. ]*\])?"
 
 

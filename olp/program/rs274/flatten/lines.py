@@ -24,7 +24,8 @@ _KEYWORD = re.compile(
     r"endsub|sub|call|return|elseif|else|endif|if|endwhile|while|do|endrepeat|repeat|break|continue"
 )
 #: characters of a text that a message shows, and of a label at most
-_SHOWN, _LONGEST_LABEL = 60, 250
+_SHOWN = 60
+_LONGEST_LABEL = 250
 _WITH_VALUE = frozenset({"if", "elseif", "while", "repeat"})
 
 
