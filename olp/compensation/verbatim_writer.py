@@ -106,7 +106,7 @@ class VerbatimWriter(PointWriter):
         form = number(self.program.data[start:end], self.statements.decimal)
         if not isinstance(form, Number):
             raise ProgramError(
-                f"the number {self.program.data[start:end].decode('latin-1')[:40]} is larger than any machine; "
+                f"the number {self.program.data[start:end].decode('latin-1')[:30]} is larger than a machine; "
                 "correct it",
                 line=int(self.path.line[rows.move[row]]),
             )
