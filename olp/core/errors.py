@@ -20,6 +20,9 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator
 
+#: Exit code of an interrupted run, as shells report it.
+INTERRUPTED = 130
+
 
 class OlpError(Exception):
     """Base of all errors of `olp`; `exit_code` is the status of the command line."""

@@ -97,7 +97,9 @@ class Modes:
     def program_end(self, chunk: WordChunk) -> int:
         """The number of lines up to the end of the program: M2, M30, or the second tape mark."""
         last = 0 if self._ended else len(chunk.line_start)
-        ends = chunk.line[(chunk.letter == 77) & np.isin(chunk.mantissa, (2, 30)) & (chunk.decimals == 0)]
+        codes = np.flatnonzero(chunk.letter == 77)
+        value = chunk.mantissa[codes] / 10.0 ** chunk.decimals[codes]
+        ends = chunk.line[codes[np.isin(value, (2.0, 30.0))]]
         if self._block_delete:
             ends = ends[~chunk.deleted[ends]]
         if ends.size and ends[0] < last:

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Index
+from olp.core.budget import Budget
 from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES
 from olp.core.toolpath import Flag, Kind
@@ -30,7 +31,14 @@ from olp.program.rs274.codes import (
     RETRACT_TO_R,
 )
 from olp.program.rs274.collector import Collector
-from olp.program.rs274.cycles import LCNC_CLEARANCE_MM, Stroke, hole_moves, levels
+from olp.program.rs274.cycles import (
+    HOLE_STROKES,
+    LCNC_CLEARANCE_MM,
+    Stroke,
+    check_repeats,
+    hole_moves,
+    levels,
+)
 from olp.program.rs274.modes import Context, scaled
 from olp.program.rs274.motion import fill
 from olp.program.rs274.profiles.base import Act, Profile
@@ -84,9 +92,7 @@ def _checked(
     for word in words:
         m = round(word.value * 10)
         if word.letter == "M" and m in _M_REFUSED:
-            raise ProgramError(
-                f"M{m / 10:g} {_M_REFUSED[m]}; unroll the program with --flatten", line=line
-            )
+            raise ProgramError(f"M{m / 10:g} {_M_REFUSED[m]}; unroll the program with --flatten", line=line)
     return [c for c, a in zip(code.tolist(), act.tolist(), strict=True) if a == Act.EVENT]
 
 
@@ -94,10 +100,11 @@ class SpecialBlocks:
     """Carries these blocks out from the position in `state`, and puts their moves and holes into
     `collector`."""
 
-    def __init__(self, state: AxisState, collector: Collector, switches: Directives) -> None:
+    def __init__(self, state: AxisState, collector: Collector, switches: Directives, strokes: Budget) -> None:
         self._state = state
         self._collector = collector
         self._switches = switches
+        self._strokes = strokes
         # line, from 0, and frame of the last block of a series; -1 where none goes on
         self._last_cycle = self._frame = -1
 
@@ -222,6 +229,7 @@ class SpecialBlocks:
                     initial_z=initial, plane=17 + plane,
                     rules=state.profile.cycles,
                 )  # fmt: skip
+                self._strokes.spend(HOLE_STROKES + len(strokes))
             except ProgramError as error:
                 raise ProgramError(error.message, line=line) from None
             moving = [s for s in strokes if s.kind in ("rapid", "feed")]
@@ -295,6 +303,10 @@ class SpecialBlocks:
                 "a canned cycle with zero repeats only stores values, which is not read; give one or more",
                 line=line,
             )
+        try:
+            check_repeats(times)
+        except ProgramError as error:
+            raise ProgramError(error.message, line=line) from None
         return times
 
 
