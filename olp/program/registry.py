@@ -65,7 +65,7 @@ def read(
         if not dialect.payload_comments:
             _refuse_payloads(data, setup, dialect)
         program: Program = dialect.reader(data, setup, dialect, options or Options(), words=words)
-    return bounded(program)
+        return bounded(program)
 
 
 def _refuse_payloads(data: bytes, setup: Setup, dialect: Dialect) -> None:
