@@ -141,14 +141,15 @@ def test_a_script_that_would_end_its_element_is_refused(monkeypatch: pytest.Monk
 
 @pytest.mark.parametrize("comment", HOSTILE, ids=lambda text: ascii(text[:12]))
 def test_a_hostile_comment_is_text(comment: bytes, machine: Path, html: bytes) -> None:
-    program = HEAD + b"; " + comment + b"\nG1 X100 Y50 F600\nM2\n"
+    # behind the end a control takes anything
+    program = HEAD + b"G1 X100 Y50 F600\nM2\n; " + comment + b"\n"
     page = Page(olp.view(program, machine).html())
     clean = Page(html)
     # the same elements and the same scripts as any page has
     assert [tag for tag, _ in page.tags] == [tag for tag, _ in clean.tags]
     assert page.scripts == clean.scripts
     assert "<" not in page.manifest_text
-    line = page.array("text_nominal")[3]
+    line = page.array("text_nominal")[5]
     assert len(line) < 2100
     assert all(c.isprintable() or c in "\t�" for c in line)
     visible = comment.decode("utf-8", "ignore")[:50]

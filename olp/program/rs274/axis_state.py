@@ -384,8 +384,8 @@ class AxisState(State):
                 f"{what} writes tables of the control, which is not read; expected L2 or L20",
                 line=line,
             )
-        if "R" in by_letter and by_letter["R"].value != 0:
-            raise ProgramError("G10 R rotates the work offset, which is not read; use R0", line=line)
+        if "R" in by_letter and (kind == 20 or by_letter["R"].value != 0):
+            raise ProgramError("G10 R rotates the work offset, which is not read; leave R out", line=line)
         number = self._integer(by_letter["P"], line) if "P" in by_letter else -1
         if not 0 <= number <= self.profile.g10_offsets:
             raise ProgramError("G10 needs a P word with the number of a work offset, 1 for G54", line=line)

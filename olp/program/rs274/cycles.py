@@ -160,8 +160,8 @@ def hole_moves(
     absolute, along the tool axis; `initial_z` is the position on that axis before the first cycle of the
     series of contiguous cycles. `q` is the peck, `p` the dwell in s, `clearance` the distance kept above
     the last peck (G83) or drawn back after it (G73). All lengths are in program units. Or `r`, `z`, `q` and
-    `clearance` are, and the others are lengths where a level n lies at n * `unit` + `ground`: pecks are
-    counted in numbers of the program, as the control does it, since the last one may hang on the last bit.
+    `clearance` alone are, and a level n lies at n * `unit` + `ground` of the others. Pecks are counted in
+    numbers of the program, as the control does it: the last one may hang on the last bit.
 
     A second hole of the same series starts where the first ended, with the same `initial_z`.
     Raises ProgramError (without a line) for a cycle without offline geometry and for words it cannot accept.

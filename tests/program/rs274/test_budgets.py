@@ -18,7 +18,7 @@ HEAD = "G21 G90 G54 G17\nG0 X1 Y2 Z3\nF100 S100 M3\n"
 SERIES = "G91 G81 X0.001 Z-1 R1 "
 
 
-def profile(name: str = "linuxcnc") -> Profile:
+def profile(name: str = "grbl") -> Profile:
     found = named(name)
     assert isinstance(found, Profile)
     return found
@@ -68,8 +68,8 @@ NESTED += "".join(f"o{k} endrepeat\n" for k in reversed(range(12)))
     [
         ("linuxcnc", "o1 while [1]\nG1 X1\nG1 X2\no1 endwhile\n"),
         ("linuxcnc", NESTED),
-        ("linuxcnc", "o1 repeat [99999]\n(" + "c" * 90_000 + ")\no1 endrepeat\n"),
-        ("linuxcnc", "o1 repeat [99999]\nG1 X[" + "+".join(["1"] * 9000) + "]\no1 endrepeat\n"),
+        ("grbl", "o1 repeat [99999]\n(" + "c" * 90_000 + ")\no1 endrepeat\n"),
+        ("grbl", "o1 repeat [99999]\nG1 X[" + "+".join(["1"] * 9000) + "]\no1 endrepeat\n"),
         ("fanuc", "O1\nM98 P2 L99999999\nM30\nO2\nG91\nG1 X0.001\nM99\n"),
         ("fanuc", "O1\nN1 G0 X1.\nGOTO 1\nM30\n"),
     ],
