@@ -172,13 +172,3 @@ def test_the_verdict_turns_at_what_is_allowed(tmp_path: Path) -> None:
         verdict = olp.verify(HEAD + nominal, HEAD + other, path).report["verdict"]
         assert verdict["ok"] is verdict["numerical"]["holds"] is holds
         assert verdict["numerical"]["line"] == 3
-
-
-@pytest.mark.parametrize("turns", [1, 2, 3])
-def test_turns_of_a_circle_belong_to_it(turns: int, tmp_path: Path) -> None:
-    """A circle of several turns passes its end before it ends there."""
-    path = stiff(tmp_path, curve("X", "EXY", (-1000.0, -30.0), (0.0, 0.0), (2000.0, 400.0)))
-    nominal = f"G0 X12 Y-8 Z30\nF300\nG2 X12 Y-8 I8 P{turns}\nG1 X15\nM2\n".encode()
-    quarter = b"G2 X20 Y0 I8 J0\nX28 Y-8 I0 J-8\nX20 Y-16 I-8 J0\nX12 Y-8 I0 J8\n"
-    corrected = b"G0 X12 Y-8 Z30\nF300\n" + quarter * turns + b"G1 X15\nM2\n"
-    assert max(by_line(path, nominal, corrected).values()) < 7.0
