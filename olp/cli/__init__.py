@@ -1,6 +1,6 @@
 """The command line: one module per verb, imported when that verb is called.
 
-Every error of `olp` becomes one `olp: error: ...` on stderr and an exit code here, and nowhere else.
+Every exception becomes `olp: error: ...` on stderr and an exit code in `endings`, and nowhere else.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from typing import IO, Any
 
 import click
 
-from olp.cli.common import diagnostic, silence_stdout
+from olp.cli.common import diagnostic
+from olp.cli.endings import with_exit_code
 from olp.cli.late import LateGroup
-from olp.core.errors import OlpError
 from olp.core.version import __version__
 
 #: Verb to what it does. Kept here so that `olp --help` imports no verb.
@@ -36,8 +36,8 @@ VERBS = {
     "help": "Show the documentation on a topic, or answer a question.",
 }
 
-#: Exit code of an interrupted run, as shells report it.
-INTERRUPTED = 130
+#: Key under which a call keeps its words.
+_WORDS = "olp.words"
 
 # Read when numpy and pydantic are imported, which a verb does. The matrices here are 3 x 3: threads for them
 # would only spin, and a search for plug-ins reads the metadata of every installed package.
@@ -70,27 +70,20 @@ def _wrong_calls() -> Iterator[None]:
 
 
 class _Verbs(LateGroup):
-    """The verbs; an error of `olp` ends in one line and an exit code."""
+    """The verbs; every exception ends in its lines and an exit code."""
 
-    def make_context(self, *words: Any, **settings: Any) -> click.Context:
-        with _wrong_calls():
-            return super().make_context(*words, **settings)
+    def make_context(
+        self, info_name: str | None, args: list[str], parent: click.Context | None = None, **extra: Any
+    ) -> click.Context:
+        words = tuple(args)
+        with with_exit_code(words), _wrong_calls():
+            context = super().make_context(info_name, args, parent, **extra)
+        context.meta[_WORDS] = words
+        return context
 
     def invoke(self, ctx: click.Context) -> object:
-        try:
-            with _wrong_calls():
-                return super().invoke(ctx)
-        except OlpError as error:
-            for line in str(error).split("\n"):
-                diagnostic(f"olp: error: {line}")
-            ctx.exit(error.exit_code)
-        except KeyboardInterrupt:
-            diagnostic("olp: interrupted")
-            ctx.exit(INTERRUPTED)
-        except BrokenPipeError:
-            # The reader of stdout has closed it, such as `head`: no error.
-            silence_stdout()
-            ctx.exit(0)
+        with with_exit_code(ctx.meta[_WORDS]), _wrong_calls():
+            return super().invoke(ctx)
 
 
 _HELP = """Corrects off-line programs of machines with three linear axes by the machine's calibrated errors.
@@ -99,7 +92,7 @@ The result goes to stdout, messages to stderr; - is stdin or stdout. No file is 
 
 \b
 Exit codes: 0 good; 1 findings at or above --fail-on; 2 wrong call; 3 input unreadable or refused;
-4 cannot be computed; 130 interrupted."""
+4 cannot be computed, or a defect of olp; 130 interrupted."""
 
 main = _Verbs(
     VERBS,

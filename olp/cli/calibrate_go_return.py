@@ -9,7 +9,7 @@ import numpy as np
 
 from olp.cli.common import files_of
 from olp.cli.instruments import end, ending_options, numbered, plot_kind
-from olp.cli.options import Count, Length, machine_option, output_option, plot_option
+from olp.cli.options import Count, Length, file_option, machine_option, output_option, plot_option
 from olp.core.errors import UsageError
 
 
@@ -18,7 +18,7 @@ from olp.core.errors import UsageError
 @machine_option("Chain, and travel for --program.")
 @output_option("OUT.toml", "Write [backlash] for calibration.toml.")
 @plot_option("Draw the reversal along each axis, as FILE-reversal.svg or .png.")
-@click.option("--program", metavar="OUT.ngc", help="Write the program of the test instead (-m, --axis).")
+@file_option("--program", "OUT.ngc", "Write the program of the test instead (-m, --axis).")
 @click.option("--axis", type=click.Choice(["X", "Y", "Z"]), help="The axis of the program.")
 @click.option("--count", type=Count(min=1), default=10, show_default=True, help="Number of targets.")
 @click.option("--over-mm", type=Length(), default=2.0, show_default=True, help="Overtravel past each target.")

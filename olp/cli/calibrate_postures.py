@@ -8,7 +8,7 @@ import click
 
 from olp.cli.common import files_of
 from olp.cli.instruments import end, ending_options
-from olp.cli.options import Length, machine_option
+from olp.cli.options import Length, file_option, machine_option
 from olp.core.errors import UsageError
 
 
@@ -16,9 +16,7 @@ from olp.core.errors import UsageError
 @click.argument("file", required=False)
 @machine_option("Machine file: its tools, and its calibration, whose errors are removed first.")
 @click.option("--reference", metavar="TOOL", help="The tool whose vector is known.")
-@click.option(
-    "--program", metavar="OUT.ngc", help="Write the program of the test instead (--tools, --point)."
-)
+@file_option("--program", "OUT.ngc", "Write the program of the test instead (--tools, --point).")
 @click.option("--tools", metavar="1,2,3", help="Tool numbers of the program.")
 @click.option("--point", metavar="X,Y,Z", help="The point, in the active work offset, in mm.")
 @click.option("--clearance-mm", type=Length(), default=50.0, show_default=True, help="Retract between tools.")

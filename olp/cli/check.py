@@ -25,6 +25,7 @@ from olp.cli.options import (
     contour_option,
     doubt_options,
     fail_on_option,
+    file_option,
     force_option,
     json_option,
     output_option,
@@ -60,7 +61,7 @@ from olp.core.errors import UsageError, naming
 @tolerance_option
 @outside_box_option("an error (OLP405)", "a warning (OLP403) and the error at the face")
 @confidence_options
-@click.option("--clearances", metavar="FILE.csv", help="Also write the clearance of every block as CSV.")
+@file_option("--clearances", "FILE.csv", "Also write the clearance of every block as CSV.")
 @contour_option
 @quiet_option("No report and no progress; only the exit code.")
 @force_option("the output file")

@@ -8,11 +8,11 @@ import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TextIO, TypeVar
 
 import click
 
-from olp.core.errors import OlpError, UsageError
+from olp.core.errors import InputError, OlpError, UsageError
 from olp.findings.catalogue import Finding, worst
 from olp.findings.rule import Severity
 
@@ -25,6 +25,10 @@ if TYPE_CHECKING:
 STREAM = "-"
 #: Exit code of a run with findings at or above --fail-on.
 FINDINGS_EXIT = 1
+#: Endings of files that browsers open as pages, and whose scripts they run.
+_PAGES = frozenset(
+    (".htm", ".html", ".xht", ".xhtml", ".shtml", ".svg", ".svgz", ".mht", ".mhtml", ".hta", ".xsl", ".xslt")
+)
 PLOT_ENDINGS = (".svg", ".png")
 
 #: Key under which a call keeps the value of --dialect.
@@ -83,7 +87,16 @@ def source(sources: Sources, name: str) -> Source:
     """A program for a session: a file, or stdin for `-`."""
     from olp.files.sources import Source
 
-    return Source.stream(sys.stdin.buffer.read) if name == STREAM else sources.source(name)
+    return Source.stream(_read_stdin) if name == STREAM else sources.source(name)
+
+
+def _read_stdin() -> bytes:
+    if sys.stdin is None:
+        raise InputError("is closed; name a file", file="<stdin>")
+    try:
+        return sys.stdin.buffer.read()
+    except OSError as error:
+        raise InputError(f"cannot be read ({error.strerror})", file="<stdin>") from None
 
 
 def options_of(kind: type[T], words: Mapping[str, Any]) -> T:
@@ -97,9 +110,19 @@ def files_of(*names: str | None) -> list[str]:
 
 
 def default_output(program: str) -> str:
-    """PROGRAM.corrected.SUFFIX beside PROGRAM."""
+    """PROGRAM.corrected.SUFFIX beside PROGRAM. Raises UsageError where that is the name of a page."""
     path = Path(program)
-    return STREAM if program == STREAM else str(path.with_name(f"{path.stem}.corrected{path.suffix}"))
+    return (
+        STREAM if program == STREAM else no_page(str(path.with_name(f"{path.stem}.corrected{path.suffix}")))
+    )
+
+
+def no_page(name: str) -> str:
+    """The name of a file that is no page. Raises UsageError where it ends as one: a browser would run what
+    its text holds."""
+    if Path(name).suffix.lower() in _PAGES:
+        raise UsageError("ends as a page, which a browser would run; give it another ending", file=name)
+    return name
 
 
 def refuse_early(targets: Iterable[str], inputs: Iterable[str], *, force: bool) -> None:
@@ -113,7 +136,7 @@ def refuse_twice(names: Iterable[str]) -> None:
     """Raise where two outputs are one file."""
     seen: set[Path] = set()
     for name in names:
-        path = Path(name).resolve()
+        path = Path(os.path.realpath(name))
         if path in seen:
             raise UsageError("is named as output twice; name two files", file=name)
         seen.add(path)
@@ -134,30 +157,59 @@ def plot_ending(name: str) -> None:
 
 
 def diagnostic(message: str) -> None:
-    """Write a message to stderr."""
-    click.echo(_encodable(message, sys.stderr.encoding), err=True)
+    """Write a message to stderr. Where that is closed or full, the message is lost, and the run goes on."""
+    if sys.stderr is None:
+        return
+    try:
+        click.echo(_encodable(message, sys.stderr.encoding), err=True)
+    except (OSError, ValueError):
+        silence(sys.stderr)
 
 
-def put(text: str | bytes, *, err: bool = False) -> None:
-    """Write a result to stdout or stderr. A reader that has gone is no error: the run goes on without it."""
-    stream = sys.stderr if err else sys.stdout
-    data = text if isinstance(text, bytes) else text.encode(stream.encoding or "utf-8", "replace")
+def put(text: str | bytes | Iterable[bytes], *, err: bool = False) -> None:
+    """Write a result, whole or in parts, to stdout or stderr. A reader that has gone is no error: the run
+    goes on without it.
+
+    Raises OlpError where stdout is closed, or cannot take it.
+    """
+    if err and sys.stderr is None:
+        return
+    stream = sys.stderr if err else _stdout()
+    if isinstance(text, str):
+        text = text.encode(stream.encoding or "utf-8", "replace")
     try:
         stream.flush()
-        stream.buffer.write(data)
+        for part in (text,) if isinstance(text, bytes) else text:
+            stream.buffer.write(part)
         stream.buffer.flush()
     except BrokenPipeError:
-        if not err:
-            silence_stdout()
+        silence(stream)
     except OSError as error:
-        raise OlpError(f"cannot be written ({error.strerror})", file="<stdout>") from error
+        silence(stream)
+        if not err:
+            raise OlpError(
+                f"cannot be written ({error.strerror}); each output file is whole, or is not written",
+                file="<stdout>",
+            ) from error
 
 
-def silence_stdout() -> None:
+def _stdout() -> TextIO:
+    if sys.stdout is None:
+        raise OlpError("is closed; give a file with -o, or open it", file="<stdout>")
+    return sys.stdout
+
+
+def is_terminal(stream: TextIO | None) -> bool:
+    """Whether people read the stream; a closed one is none."""
+    return stream is not None and stream.isatty()
+
+
+def silence(stream: TextIO | None) -> None:
     """Discard what is still to be flushed, so that the interpreter does not complain at its end."""
-    devnull = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(devnull, sys.stdout.fileno())
-    os.close(devnull)
+    if stream is not None:
+        devnull = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(devnull, stream.fileno())
+        os.close(devnull)
 
 
 def put_report(report: Mapping[str, Any], *, as_json: bool, quiet: bool) -> None:
@@ -180,5 +232,7 @@ def exit_for(findings: Iterable[Finding], fail_on: str) -> None:
 
 
 def _encodable(text: str, encoding: str | None) -> str:
+    """The text as a stream can take it, without the control characters that a terminal would obey."""
     encoding = encoding or "utf-8"
+    text = "".join(c if c.isprintable() or c in "\n\t" else "\ufffd" for c in text)
     return text.encode(encoding, "replace").decode(encoding)

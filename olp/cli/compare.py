@@ -30,6 +30,7 @@ from olp.cli.options import (
     contour_option,
     doubt_options,
     fail_on_option,
+    file_option,
     force_option,
     json_option,
     output_option,
@@ -69,7 +70,7 @@ _LAYOUT = ("profile", "columns", "unit", "delimiter", "positions")
 @click.option(
     "--positions", type=click.Choice(["tip", "axes"]), help="Tip positions, or axis positions of a log."
 )
-@click.option("--save-profile", metavar="FILE.toml", help="Write the layout as a profile.")
+@file_option("--save-profile", "FILE.toml", "Write the layout as a profile.")
 @click.option(
     "--align", type=click.Choice(["auto", "none", "fit", "each"]), default="auto", show_default=True,
     help="Best-fit frame: only where points lie far off, never, one for all runs, or one per run.",
@@ -86,10 +87,7 @@ _LAYOUT = ("profile", "columns", "unit", "delimiter", "positions")
 @part_tolerance_option("Exit with 1 where the measured path is farther off. Default: the job's.")
 @click.option("--add-errors", is_flag=True, help="Add the machine's errors to the axis positions of a log.")
 @output_option("OUT.csv", "Deviation of every point.")
-@click.option(
-    "--part-frame", metavar="FILE.toml",
-    help="Write the work offset from three or more poses, for the job file.",
-)  # fmt: skip
+@file_option("--part-frame", "FILE.toml", "Write the work offset from three or more poses, for the job file.")
 @click.option("--frame-name", default="G54", show_default=True, help="Name of that work offset.")
 @report_option()
 @contour_option

@@ -19,6 +19,7 @@ from olp.cli.common import (
     exit_for,
     files_of,
     given,
+    is_terminal,
     options_of,
     put,
     refuse_early,
@@ -184,5 +185,5 @@ def _diff(result: Correction, machine: Machine, on_stderr: bool) -> str:
         bare_mm=partial(profile.bare_mm, machine) if profile else None,
         statements=profile is None,
         place=str if origin is None else lambda line: origin.place(origin.line_of(line)),
-        colour=(sys.stderr if on_stderr else sys.stdout).isatty(),
+        colour=is_terminal(sys.stderr if on_stderr else sys.stdout),
     )

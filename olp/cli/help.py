@@ -6,7 +6,7 @@ import sys
 
 import click
 
-from olp.cli.common import diagnostic, put
+from olp.cli.common import diagnostic, is_terminal, put
 from olp.cli.options import force_option
 from olp.core.errors import UsageError
 
@@ -29,7 +29,7 @@ def command(topic: tuple[str, ...], folder: str | None, force: bool) -> None:
         diagnostic(f"wrote {workflow.write_site(folder, force=force)}")
         return
     text = workflow.topic(topic)
-    if topic and sys.stdout.isatty():
+    if topic and is_terminal(sys.stdout):
         from rich.console import Console
         from rich.markdown import Markdown
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import click
@@ -57,7 +58,7 @@ def command(
     else:
         limits = TRAVEL_MM | {axis: (low, high) for axis, low, high in travel}
         machine = starter.starter_machine(
-            name or Path(folder).resolve().name or "machine", chain, limits, controller or "linuxcnc"
+            name or Path(os.path.realpath(folder)).name or "machine", chain, limits, controller or "linuxcnc"
         )
     texts = starter.starter_set(machine)
     if notes:

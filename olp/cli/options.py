@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import click
 
-from olp.cli.common import DIALECT, STREAM
+from olp.cli.common import DIALECT, STREAM, no_page
 from olp.core.errors import UsageError
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -157,9 +157,21 @@ def doubt_options(function: F, of: str = "run") -> F:
     )
 
 
-def output_option(metavar: str, help: str | None = None, **settings: Any) -> Callable[[F], F]:
-    """-o."""
-    return click.option("-o", "--output", metavar=metavar, help=help, **settings)
+def output_option(
+    metavar: str, help: str | None = None, *, page: bool = False, **settings: Any
+) -> Callable[[F], F]:
+    """-o; a file that is no `page` may not be named as one."""
+    check = None if page else _no_page
+    return click.option("-o", "--output", metavar=metavar, help=help, callback=check, **settings)
+
+
+def file_option(name: str, metavar: str, help: str) -> Callable[[F], F]:
+    """A further file that is written, and that is no page."""
+    return click.option(name, metavar=metavar, help=help, callback=_no_page)
+
+
+def _no_page(_: click.Context, __: click.Parameter, name: str | None) -> str | None:
+    return None if name is None else no_page(name)
 
 
 def json_option(help: str = "Print the report as JSON.") -> Callable[[F], F]:

@@ -8,6 +8,8 @@ import time
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
+from olp.cli.common import is_terminal
+
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
@@ -44,7 +46,7 @@ class _Bar:
 @contextlib.contextmanager
 def progress(quiet: bool) -> Iterator[Report | None]:
     """What the library calls with (stage, fraction of it done); None where stderr is not a terminal."""
-    if quiet or not sys.stderr.isatty():
+    if quiet or not is_terminal(sys.stderr):
         yield None
         return
     bar = _Bar()

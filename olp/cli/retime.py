@@ -21,7 +21,6 @@ from olp.cli.common import (
     refuse_early,
     refuse_stream,
     refuse_twice,
-    silence_stdout,
     source,
 )
 from olp.cli.options import (
@@ -31,6 +30,7 @@ from olp.cli.options import (
     contour_option,
     doubt_options,
     fail_on_option,
+    file_option,
     force_option,
     json_option,
     output_option,
@@ -40,7 +40,7 @@ from olp.cli.options import (
     report_option,
 )
 from olp.cli.progress import Report, progress
-from olp.core.errors import InputError, OlpError, UsageError, naming
+from olp.core.errors import InputError, UsageError, naming
 
 if TYPE_CHECKING:
     from olp.files.sources import Sources
@@ -76,13 +76,13 @@ FORMATS = ("csv", "npz", "parquet", "ros", "pvt")
 @click.option("--blend-study", is_flag=True, help="Also report time and deviation at other path tolerances.")
 @click.option("--nominal", metavar="NOMINAL", help="Compare the times with those of another program.")
 @click.option("--proof", metavar="report.json", help="Also show the error budget of a report of olp correct.")
-@click.option("--lines", metavar="FILE.csv", help="Write time, speed and limit of each line.")
-@click.option("--slow", metavar="FILE.csv", help="Write where the motion is below half of the feed.")
+@file_option("--lines", "FILE.csv", "Write time, speed and limit of each line.")
+@file_option("--slow", "FILE.csv", "Write where the motion is below half of the feed.")
 @plot_option("Draw the motion and its limits over time, as .svg or .png.")
 @click.option(
     "--plot-span", type=(NUMBER, NUMBER), metavar="FROM TO", help="Seconds of the motion that --plot draws."
 )
-@click.option("--write-feed", metavar="FILE", help="Write the program with the planned feeds in its F words.")
+@file_option("--write-feed", "FILE", "Write the program with the planned feeds in its F words.")
 @click.option(
     "--shared-feed",
     type=click.Choice(["mean", "least"]),
@@ -134,7 +134,7 @@ def command(program: str | None, machine: str | None, job: str | None, **words: 
     if feeds is not None and outputs.write_feed == STREAM:
         put(feeds)
     if outputs.output == STREAM:
-        _stream(streamed)
+        put(streamed)
     _say(result, outputs, written)
     exit_for(result.findings, outputs.fail_on)
 
@@ -232,17 +232,3 @@ def _of_one(result: Retiming, outputs: _Outputs) -> Iterable[bytes]:
             "--stretch, or name a file with -o"
         )
     return result.parts(outputs.kind or "csv", outputs.cycle_s, outputs.stretch)
-
-
-def _stream(parts: Iterable[bytes]) -> None:
-    """Write to stdout part by part. A reader that has gone is no error."""
-    import sys
-
-    try:
-        for part in parts:
-            sys.stdout.buffer.write(part)
-        sys.stdout.buffer.flush()
-    except BrokenPipeError:
-        silence_stdout()
-    except OSError as error:
-        raise OlpError(f"cannot be written ({error.strerror})", file="<stdout>") from error

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 @click.option(
     "--measured", multiple=True, metavar="FILE.csv", help="Measured positions of the tip; may be repeated."
 )
-@output_option("review.html", "Default: PROGRAM.review.html beside PROGRAM.")
+@output_option("review.html", "Default: PROGRAM.review.html beside PROGRAM.", page=True)
 @click.option(
     "--live", is_flag=True, help="Serve the page on this computer until Ctrl-C, and keep it up to date."
 )

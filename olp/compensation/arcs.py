@@ -26,6 +26,9 @@ from olp.errormodel.sampling import steps_needed
 _STIFFNESS = 1e-3
 #: rounds of division, at most
 _DEEPEST = 14
+#: pieces of all arcs that do not fit yet: of few arcs, and for each arc
+_PIECES = 20_000
+_PIECES_PER_ARC = 16
 #: rad; arcs beyond this sweep need not have equal radii at both ends
 WIDE = 0.95 * np.pi
 #: samples at a time, so that memory is small
@@ -76,7 +79,7 @@ def subdivide_arcs(
     tools = path.tool_mm()
     done: list[Pieces] = []
     for _ in range(_DEEPEST):
-        if not len(pieces):
+        if not len(pieces) or len(pieces) > max(_PIECES, _PIECES_PER_ARC * len(arc)):
             break
         departure = np.zeros(len(pieces))
         for part, count in sample_groups(path, model, target, pieces, tools, tolerance):

@@ -13,8 +13,19 @@ from olp.compensation.writer import Writer
 from olp.core.arrays import Index, Mask
 from olp.core.errors import ProgramError
 from olp.core.toolpath import Flag, Kind
+from olp.program.rs274.codes import (
+    ABSOLUTE,
+    FURTHER_OFFSETS,
+    INCREMENTAL,
+    LENGTHS,
+    SHIFTS,
+    UNITS,
+    WORK_OFFSETS,
+)
 from olp.program.text.edits import BARE, EditList, Edits
 
+#: Codes that a block must not set together with an arc that a step comes before.
+_CHANGES = WORK_OFFSETS | FURTHER_OFFSETS | LENGTHS | SHIFTS | {*UNITS, ABSOLUTE, INCREMENTAL}
 #: M words that act when their block has ended
 _END_M = frozenset({0, 1, 2, 5, 9, 30, 60})
 
@@ -87,6 +98,17 @@ def _check_take_up(writer: Writer, rows: Rows, row: int) -> None:
             line=int(writer.path.line[rows.move[row]]),
             code="OLP561",
         )
+    line = int(writer.path.line[rows.move[row]])
+    words = writer.words
+    for i in words.of_line(line):
+        code = int(words.mantissa[i]) * 10 // 10 ** int(words.decimals[i])
+        if words.letter[i] == ord("G") and code in _CHANGES:
+            raise ProgramError(
+                f"before this arc a step has to take up backlash, and its block sets G{code / 10:g} too; put "
+                "that code into a block of its own before it",
+                line=line,
+                code="OLP561",
+            )
 
 
 def _feed_of(writer: Writer, line: int) -> bytes:

@@ -106,7 +106,13 @@ class VerbatimWriter(PointWriter):
     def _number(self, rows: Rows, row: int, axis: int, word: int) -> bytes:
         start, end = int(self.words.number[word]), int(self.words.end[word])
         form = number(self.program.data[start:end], self.statements.decimal)
-        assert isinstance(form, Number)
+        if not isinstance(form, Number):
+            raise ProgramError(
+                f"the number {self.program.data[start:end].decode('latin-1')[:30]} is larger than a machine; "
+                "correct it",
+                line=int(self.path.line[rows.move[row]]),
+                code="OLP561",
+            )
         decimals = int(rows.decimals[row, axis])
         value = int(rows.mantissa[row, axis]) / 10.0**decimals
         return written(form, value, max(decimals, form.decimals), self.statements.decimal)

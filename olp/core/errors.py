@@ -26,6 +26,9 @@ from dataclasses import dataclass
 #: What a message states of its statement: quoted text, and numbers.
 _OWN = re.compile(r"`[^`]*`|'[^']*'|-?\d+(?:\.\d+)?")
 
+#: Exit code of an interrupted run, as shells report it.
+INTERRUPTED = 130
+
 
 class OlpError(Exception):
     """Base of all errors of `olp`; `exit_code` is the status of the command line."""

@@ -67,6 +67,6 @@ def _sine_terms(components: AxisComponents, lever_arms: LeverArms, box_mm: Array
     peak = max((v.peak for v in components.variation[3:] if v is not None), default=0.0)
     tool = np.array([[TOOL_REACH_MM] * 3, [-TOOL_REACH_MM] * 3])
     reach = max(float(lever_arm.reach_mm(box_mm, tool).max()) for _, lever_arm in lever_arms)
-    if peak**4 / 8.0 * reach > TRIGONOMETRY_MM:
+    if (peak * peak) * (peak * peak) / 8.0 * reach > TRIGONOMETRY_MM:
         return 0
     return 2 if peak**3 / 6.0 * reach > TRIGONOMETRY_MM else 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import logging
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,8 @@ def read_mesh(path: PathLike, read: Reader = read_bytes) -> tuple[Array, Index]:
     """
     import trimesh
 
+    # it logs the exceptions of a damaged file, which become one sentence here
+    logging.getLogger("trimesh").addHandler(logging.NullHandler())
     data = read(path)
     try:
         # trimesh detects the format from the suffix in lower case only

@@ -16,6 +16,12 @@ _KEY = re.compile(r'"(?:[^"\\]|\\.)*"|\'[^\']*\'|[A-Za-z0-9_-]+')
 _KEY_LINE = re.compile(rf"\s*((?:{_KEY.pattern})(?:\s*\.\s*(?:{_KEY.pattern}))*)\s*=(.*)")
 _HEADER = re.compile(r"\s*(\[\[?)(.*?)\]\]?\s*(?:#.*)?$")
 _STRING_OR_COMMENT = re.compile(r'"(?:[^"\\]|\\.)*"|\'[^\']*\'|#.*')
+#: characters of a line that a message shows
+_SHOWN = 120
+#: parts of a key at most; the time to read one goes with their square
+_DEEPEST = 16
+_PART = r"(?:[A-Za-z0-9_-]++|\"[^\"\n]*+\"|'[^'\n]*+')[ \t]*+"
+_DEEP_KEY = re.compile(rf"(?m)(?:^|[\[{{,])[ \t]*+(?:{_PART}\.[ \t]*+){{{_DEEPEST}}}")
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
@@ -29,6 +35,12 @@ def read_toml(data: bytes, file: str) -> tuple[dict[str, object], dict[Path, int
             f"line {line}: byte 0x{data[error.start]:02x} is not UTF-8; expected a text file saved as UTF-8"
         )
         raise ConfigError(problem, file=file, line=line) from None
+    deep = _DEEP_KEY.search(text)
+    if deep is not None:
+        line = text.count("\n", 0, deep.end()) + 1
+        raise ConfigError(
+            f"line {line}: a key has more than {_DEEPEST} parts; correct it", file=file, line=line
+        )
     try:
         values = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -53,6 +65,8 @@ def _syntax_error(message: str, text: str, file: str) -> ConfigError:
         hint = "close the quotes"
     elif "Invalid value" in what or "'\\'" in what:
         hint = "text needs quotes, and a file name on Windows single quotes"
+    if len(written) > _SHOWN:
+        written = written[:_SHOWN] + "..."
     problem = (
         f"line {line}: {written!r} is not TOML ({what}); expected key = value, [table] or [[table]]; {hint}"
     )

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import os
-import secrets
-import shutil
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 from olp.core.errors import InputError, OlpError, UsageError
+from olp.files.replacing import Replacement, remove_stale
 
 PathLike = str | os.PathLike[str]
 #: A whole file, or its parts in order.
@@ -49,13 +48,14 @@ def write_files(
 
     Contents in parts are written part by part, so that a long file never has to be in memory.
 
-    Each file is first written beside its target under a temporary name and synced. Then all replace their
-    targets. A device such as the null device is written to directly. Raises UsageError where a target is one
-    of `inputs` (also with `force`), exists without `force`, or has no folder. Raises OlpError where the
-    system refuses to write.
+    Each file is first written beside its target under a temporary name and synced, with the owner and mode of
+    the file that it replaces. Then all replace their targets. Temporary files of killed runs are removed. A
+    device such as the null device is written to directly. Raises UsageError where a target is one of `inputs`
+    (also with `force`), exists without `force`, or has no folder. Raises OlpError where the system refuses to
+    write, or where another program has changed a target meanwhile.
     """
     check_targets(files, inputs, force=force)
-    waiting: list[tuple[Path, Path]] = []
+    waiting: list[Replacement] = []
     current = Path()
     try:
         for current, data in files.items():
@@ -63,22 +63,17 @@ def write_files(
                 with current.open("wb") as device:
                     device.writelines([data] if isinstance(data, bytes) else data)
                 continue
-            # A link still points to the file that is written.
-            final = Path(os.path.realpath(current))
-            temporary = final.with_name(f".{final.name[:80]}.{secrets.token_hex(4)}.tmp")
-            waiting.append((temporary, final))
-            _write_synced(temporary, data)
-            if final.exists():
-                shutil.copymode(final, temporary)
+            waiting.append(Replacement(current))
+            waiting[-1].write(data)
         while waiting:
-            temporary, current = waiting[0]
-            temporary.replace(current)
-            waiting.pop(0)
+            current = waiting[0].target
+            waiting[0].replace(force=force)
+            remove_stale(waiting.pop(0).final)
     except OSError as error:
         raise OlpError(f"cannot be written ({_reason(error)})", file=str(current)) from error
     finally:
-        for temporary, _ in waiting:
-            temporary.unlink(missing_ok=True)
+        for replacement in waiting:
+            replacement.discard()
 
 
 def check_targets(
@@ -87,7 +82,10 @@ def check_targets(
     """Raise UsageError as `write_files` does. With `new_folders` those of the targets need not exist."""
     sources = [Path(source) for source in inputs]
     for target in targets:
-        _check(target, force, sources, new_folders)
+        try:
+            _check(target, force, sources, new_folders)
+        except OSError as error:
+            raise UsageError(f"is no name for a file ({_reason(error)})", file=str(target)) from None
 
 
 def make_folder(folder: Path) -> None:
@@ -106,6 +104,8 @@ def _check(target: Path, force: bool, sources: Iterable[Path], new_folders: bool
     if target.is_dir():
         raise UsageError("is a folder; name a file to write", file=str(target))
     if not target.exists():
+        if Path(os.path.realpath(target)).is_symlink():
+            raise UsageError("is a link that leads back to itself; name a file", file=str(target))
         return
     if any(source.exists() and target.samefile(source) for source in sources):
         raise UsageError(
@@ -113,13 +113,6 @@ def _check(target: Path, force: bool, sources: Iterable[Path], new_folders: bool
         )
     if target.is_file() and not force:
         raise UsageError("exists already; name another file, or overwrite it with --force", file=str(target))
-
-
-def _write_synced(path: Path, data: Content) -> None:
-    with path.open("xb") as stream:
-        stream.writelines([data] if isinstance(data, bytes) else data)
-        stream.flush()
-        os.fsync(stream.fileno())
 
 
 def _reason(error: Exception) -> str:

@@ -14,6 +14,7 @@ from types import MappingProxyType
 
 from olp.core.errors import ProgramError, UsageError
 from olp.core.machine import Setup
+from olp.program.bounds import bounded
 from olp.program.dialect import Dialect
 from olp.program.dialect import Options as Options
 from olp.program.origin import in_original
@@ -64,7 +65,7 @@ def read(
         if not dialect.payload_comments:
             _refuse_payloads(data, setup, dialect)
         program: Program = dialect.reader(data, setup, dialect, options or Options(), words=words)
-    return program
+        return bounded(program)
 
 
 def _refuse_payloads(data: bytes, setup: Setup, dialect: Dialect) -> None:

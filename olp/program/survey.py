@@ -30,7 +30,7 @@ from olp.program.registry import read
 Subprograms = Callable[[str], tuple[str, bytes] | None]
 #: Gives the text that is taken instead of the one of a file; of the program where it has no name.
 Change = Callable[[str | None, bytes], bytes]
-#: Unrolls a program with its texts changed, in so many blocks at most (None: as many as usual).
+#: Unrolls a program with its texts changed, in so many bytes of visited blocks (None: as many as usual).
 Unroll = Callable[[Change, int | None], Unrolled]
 #: A file, "" for the program, and a line of it from 1.
 _Place = tuple[str, int]
@@ -49,8 +49,8 @@ SHOWN = 60
 #: A number behind its letter; that of an expression goes with its whole block.
 _NUMBER = rb"[ \t]*[-+]?[ \t]*[\d.]+"
 _NO_LINE_END = re.compile(rb"[^\r\n]")
-#: Most blocks of an unrolling that is tried; a longer one counts as one that helps.
-UNROLLED = 20_000
+#: Most bytes of visited blocks of an unrolling that is tried; a longer one counts as one that helps.
+UNROLLED = 1_000_000
 TOO_LONG = "OLP543"
 #: Its repair is a start position.
 UNKNOWN_POSITION = "OLP524"

@@ -202,7 +202,11 @@ class _Alignment:
         end = np.flatnonzero(self._near(np.full(len(ahead), i), ahead))
         if not end.size:
             return None
-        count = int(end[0])
+        # a path of a turn or more passes its end before it ends there
+        gone = self.gone[ahead[end]] - (self.gone[j - 1] if j else 0.0)
+        own = self.length[i] - (self.length[i - 1] if i else 0.0)
+        several = self.arc[i] >= 0 and abs(self.arcs.sweep_rad[self.arc[i]]) > 2 * np.pi - _WHOLE
+        count = int(end[np.argmin(np.abs(gone - own)) if several else 0])
         of = np.full(count, i)
         astray = (self._along(of, ahead[:count]) >= self.near) | self._unlike(of, ahead[:count])
         return None if astray.any() else count

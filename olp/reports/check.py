@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import os
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import PurePath
@@ -17,7 +18,18 @@ from olp.core.version import __version__
 from olp.findings.catalogue import GATE_CODES, RULES
 from olp.findings.rule import Rule, Severity
 from olp.reports.refusals import refusals_text
-from olp.reports.report import WIDTH, Report, findings_text, number, pairs, place, printable, table, to_json
+from olp.reports.report import (
+    WIDTH,
+    Report,
+    cell,
+    findings_text,
+    number,
+    pairs,
+    place,
+    printable,
+    table,
+    to_json,
+)
 
 #: Level of SARIF by severity.
 _LEVEL = {Severity.INFO: "note", Severity.WARNING: "warning", Severity.ERROR: "error"}
@@ -152,7 +164,7 @@ def _uri(path: str, file: str = "") -> str:
     with the scheme of files."""
     pure = PurePath(path or "stdin")
     pure = pure.with_name(file) if file else pure
-    return pure.as_uri() if pure.is_absolute() else quote(pure.as_posix())
+    return pure.as_uri() if pure.is_absolute() else quote(os.fsencode(pure.as_posix()))
 
 
 def to_junit(report: Report, fail_on: str) -> str:
@@ -210,7 +222,7 @@ def to_csv(rows: Iterable[Mapping[str, Any]]) -> bytes:
         ["line", "clearance_mm", "part", "mesh", "role", "frame", "X_mm", "Y_mm", "Z_mm"] + ["file"] * files
     )
     for row in rows:
-        names = (row["part"], row["mesh"], row["role"], row["frame"])
+        names = map(cell, (row["part"], row["mesh"], row["role"], row["frame"]))
         lengths = (f"{v:.6f}" for v in row["point_mm"])
         writer.writerow(
             [row["line"], f"{row['clearance_mm']:.6f}", *names, *lengths, *[row.get("file", "")] * files]

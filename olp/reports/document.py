@@ -9,6 +9,7 @@ import html
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import zip_longest
 from pathlib import Path
 
 from olp.reports.report import printable
@@ -145,8 +146,7 @@ def to_html(document: Document) -> bytes:
     for number, section in _numbered(document.sections):
         tag = f"h{section.level + 1}"
         parts.append(f"<{tag}>{number} {_text(section.title)}</{tag}>")
-        following = (*section.blocks[1:], None)
-        parts += [_html(block, after) for block, after in zip(section.blocks, following, strict=True)]
+        parts += [_html(block, after) for block, after in zip_longest(section.blocks, section.blocks[1:])]
     parts.append(f"<footer>{_text(document.footer)}</footer></body></html>")
     return ("\n".join(parts) + "\n").encode()
 

@@ -15,6 +15,8 @@ from typing import Any
 from olp.findings.catalogue import RULES
 
 #: Columns of a text report.
+#: A cell that begins with one of these is a formula to a spreadsheet.
+_FORMULA = frozenset("=+-@")
 WIDTH = 100
 #: Lines of the program that a finding lists by number.
 MAX_LINES = 8
@@ -99,6 +101,12 @@ def number(value: object, digits: int = 2) -> str:
 def printable(text: str) -> str:
     """Text of a program in one line, without control characters."""
     return "".join(c if c.isprintable() else " " for c in text)
+
+
+def cell(text: str) -> str:
+    """Text for a cell of a table, in one line, that no spreadsheet takes for a formula."""
+    text = printable(text)
+    return "'" + text if text.lstrip()[:1] in _FORMULA else text
 
 
 def shortened(text: str, width: int) -> str:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from typing import Any
 
 from olp.core.errors import OlpError
 from olp.review.job import Review
@@ -18,9 +20,38 @@ VERSION = "version"
 #: Seconds between checks of the inputs.
 WATCH_S = 0.5
 
+#: Requests at a time; a browser makes a few, and one more is closed unanswered.
+MOST_REQUESTS = 16
+#: Seconds that a request may take to arrive.
+REQUEST_S = 10.0
+
 Make = Callable[[], Review]
 Tell = Callable[[str], None]
 _Stamp = tuple[tuple[str, int, int], ...]
+
+
+class _Http(ThreadingHTTPServer):
+    """Answers a bounded number of requests at a time, each in its own thread. Clients may leave."""
+
+    def __init__(self, address: tuple[str, int], handler: type[BaseHTTPRequestHandler]) -> None:
+        self._free = threading.Semaphore(MOST_REQUESTS)
+        super().__init__(address, handler)
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        if self._free.acquire(blocking=False):
+            super().process_request(request, client_address)
+        else:
+            self.shutdown_request(request)
+
+    def process_request_thread(self, request: Any, client_address: Any) -> None:
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            self._free.release()
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        if not isinstance(sys.exception(), OSError):
+            super().handle_error(request, client_address)
 
 
 class Server:
@@ -32,7 +63,7 @@ class Server:
     def __init__(self, make: Make, inputs: Iterable[str], tell: Tell, port: int = 0) -> None:
         self._make, self._inputs, self._tell = make, tuple(inputs), tell
         try:
-            self._http = ThreadingHTTPServer((LOOPBACK, port), self._handler())
+            self._http = _Http((LOOPBACK, port), self._handler())
         except OSError as error:
             raise OlpError(f"port {port} of {LOOPBACK} cannot be served ({error.strerror})") from None
         self._stamp = self._look()
@@ -95,6 +126,8 @@ class Server:
         server = self
 
         class Handler(BaseHTTPRequestHandler):
+            timeout = REQUEST_S
+
             def do_GET(self) -> None:
                 if not self._from_here():
                     self.send_error(HTTPStatus.FORBIDDEN)

@@ -25,6 +25,7 @@ from olp.findings.catalogue import Finding
 from olp.program.origin import Files, Origin, original_of, quoted
 from olp.program.program import Program
 from olp.program.registry import Options
+from olp.reports.report import cell
 from olp.workflows import compare_report as parts
 from olp.workflows import refusals
 from olp.workflows.compare_poses import part_frame as poses_frame
@@ -80,7 +81,7 @@ class Comparison:
         yield head.encode()
         for run in (*self.before, *self.runs):
             assert self.path is not None
-            name = quoted(run.name)
+            name = quoted(cell(run.name))
             d, foot = run.deviation, run.nominal_mm
             columns = (
                 run.pairing.s_mm, run.line(self.path), *foot.T,

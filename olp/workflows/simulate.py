@@ -18,6 +18,7 @@ from olp.findings.catalogue import Finding
 from olp.program.origin import Files, Origin, original_of
 from olp.program.program import Program
 from olp.program.registry import Options
+from olp.reports.report import printable
 from olp.workflows import refusals
 from olp.workflows.doubt import accepted_of, doubted
 from olp.workflows.flatten import UnrollOptions
@@ -52,7 +53,7 @@ class Simulation:
     def to_csv(self) -> bytes:
         """`X_mm,Y_mm,Z_mm,line` with the frame named in a comment; `file` too where lines are of several."""
         files = Files(self.origin)
-        rows = [f"# frame={self.frame}", f"X_mm,Y_mm,Z_mm,line{files.head}"]
+        rows = [f"# frame={printable(self.frame)}", f"X_mm,Y_mm,Z_mm,line{files.head}"]
         rows += [
             f"{x:.6f},{y:.6f},{z:.6f},{files.cells(int(n))}"
             for (x, y, z), n in zip(self.points_mm.tolist(), self.line.tolist(), strict=True)

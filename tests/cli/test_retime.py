@@ -255,7 +255,7 @@ def test_an_interrupt_leaves_nothing(
     [
         ("G1 X5\n", 3, ":1: a feed move has no feed"),
         ("G1 X5 F60\nG41 D1 X7\n", 3, ":2: "),
-        ("G1 X5 F60\nG4\n", 3, ":2: a dwell"),
+        ("G1 X5 F60\nG4\n", 3, ":2: G4 needs P"),
         ("G1 X[#1 + 1] F60\n", 3, "--flatten"),
     ],
 )

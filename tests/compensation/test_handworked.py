@@ -323,3 +323,27 @@ def test_simulate_shows_the_errors_that_correct_removes(tmp_path: Path) -> None:
     clean = olp.simulate(olp.correct(body, path).data, path, step_mm=10.0)
     assert np.abs(clean.points_mm[:, 0]).max() <= 0.5e-3
     assert clean.points_mm[-1] == pytest.approx((0.0, 100.0, 0.0), abs=1e-6)
+
+
+# -- order of words -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("first", ("I30. X60. Y0. G2 F100", "X60. I30. G2 F100 Y0.", "Y0. G2 X60. F100 I30."))
+def test_a_word_that_is_the_first_of_the_program_is_corrected_too(tmp_path: Path, first: str) -> None:
+    """X and Y are 1 mm too long in 1000 mm, so X60 becomes X59.94, and the centre of 30 mm 29.97 mm."""
+    rows = "-1000,-1000\n2000,2000\n"
+    curve = {"x.csv": f"X_mm,EXX_um\n{rows}", "y.csv": f"Y_mm,EYY_um\n{rows}"}
+    start = "start_mm = { X = 0.0, Y = 0.0, Z = 0.0 }\n"
+    path = machine(tmp_path, CURVE_X + CURVE_X.replace("x.csv", "y.csv"), curve, tables=TRUE_ZERO, job=start)
+    text = unstamped(olp.correct((first + "\nM2\n").encode(), path, path.with_name("job.toml")).data)
+    assert words(text, "X")[-1] == pytest.approx(59.94, abs=0.002)
+    assert words(text, "I")[0] == pytest.approx(29.97, abs=0.002)
+
+
+def test_the_level_of_a_hole_that_is_reached_from_below_leads_upward(tmp_path: Path) -> None:
+    """6 um of backlash: up to R with half of it above, down to the bottom with half of it below."""
+    path = machine(tmp_path, "[backlash]\nZ_um = 6.0\n", tables=TRUE_ZERO)
+    text = corrected(path, b"G0 X0. Y0. Z-1.\nZ0.5\nG99 G81 X10. Z-2. R1. F100\nG80\n")
+    (block,) = (line for line in text.splitlines() if b"G81" in line)
+    assert words(block, "R") == [1.003]
+    assert words(block, "Z") == [-2.003]

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from olp.compensation.invert import TOLERANCE_MM, invert
+from olp.compensation.invert import BLOCK, TOLERANCE_MM, bent, invert
 from olp.core.errors import NotInvertible
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.build import build
@@ -54,3 +54,43 @@ def test_an_error_that_grows_faster_than_the_position_is_refused() -> None:
     target = np.random.default_rng(1).uniform(BOX[:, 0], BOX[:, 1], (50, 3))
     with pytest.raises(NotInvertible, match="grow as fast"):
         invert(model, target, np.zeros(3))
+
+
+def stretched(slope: float) -> ErrorModel:
+    """X is too far by `slope` of itself, and nothing else is wrong."""
+    nodes = np.array([-1000.0, 2000.0])
+    curve = Curve("X", nodes, {"EXX": slope * nodes}, interpolation="linear")
+    return build(Calibration("stretched", np.tile([-1000.0, 2000.0], (3, 1)), curves=(curve,)), "FXYZ")
+
+
+@pytest.mark.parametrize("play", (None, np.zeros((1, 3))))
+def test_a_command_is_where_the_error_brings_the_tip_to_its_target(play: np.ndarray | None) -> None:
+    """c + c / 1000 = 200.2, so c = 200; Y and Z have no error."""
+    command = invert(stretched(1e-3), np.array([[200.2, 7.0, -3.0]]), np.zeros(3), play)
+    assert command == pytest.approx(np.array([[200.0, 7.0, -3.0]]), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("x_mm", "expected_mm"),
+    # one step of the iteration up to an error of 0.15 mm, two above: 200 - 199.8 / 1000
+    [(100.0, 99.9), (-100.0, -99.9), (150.0, 149.85), (200.0, 199.8002), (-200.0, -199.8002)],
+)
+def test_a_sample_is_bent_against_its_error(x_mm: float, expected_mm: float) -> None:
+    sample = bent(stretched(1e-3), np.array([[x_mm, 5.0, 6.0]]), np.zeros(3))
+    assert sample == pytest.approx(np.array([[expected_mm, 5.0, 6.0]]), abs=1e-9)
+
+
+def test_an_axis_that_is_not_known_keeps_its_target_and_others_do_not_wait_for_it() -> None:
+    target = np.array([[np.nan, 7.0, 8.0], [100.1, 7.0, 8.0]])
+    command = invert(stretched(1e-3), target, np.zeros(3))
+    assert np.isnan(command[0, 0])
+    assert command[0, 1:].tolist() == [7.0, 8.0]
+    assert command[1] == pytest.approx([100.0, 7.0, 8.0], abs=1e-9)
+
+
+def test_many_points_are_inverted_as_each_alone() -> None:
+    model, tools = stretched(1e-3), np.zeros((BLOCK + 3, 3))
+    target = np.column_stack([np.linspace(-500.0, 500.0, BLOCK + 3), *np.zeros((2, BLOCK + 3))])
+    command = invert(model, target, tools)
+    assert command[:, 0] == pytest.approx(target[:, 0] / 1.001, abs=1e-9)
+    assert invert(model, target[:0], tools[:0]).shape == (0, 3)

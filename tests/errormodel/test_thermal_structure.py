@@ -22,7 +22,7 @@ from olp.core.errors import CannotCompute, ConfigError
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration, Thermal
 from olp.errormodel.distortion import lagged, shapes
-from olp.errormodel.sources.structure import Distortion, Sensor, Structure
+from olp.errormodel.sources.structure import Distortion, Sensor, Structure, ThermalStructure
 from olp.files.calibration.reader import load_calibration
 from olp.files.calibration.structure import load_structure, parse_drift_log, structure_text
 from olp.files.calibration.writer import calibration_files
@@ -376,3 +376,19 @@ def test_a_job_without_temperatures_is_told_so_and_one_out_of_range_is_refused(t
     job.write_text(f'schema = "olp-job-1"\n[temperatures_degC]\n{both}')
     with pytest.raises(ConfigError, match="expected one of the two"):
         olp.correct(source, path, job)
+
+
+def test_inspect_shows_the_structure_in_its_units() -> None:
+    """EXX: 1 um/K, 0.01 um/(mm K) is 10 um/(m K). EZX: a bow of 5 um/K. EBX: 2 urad/K."""
+    shown = ThermalStructure().inspect(STRUCTURE, None)  # type: ignore[arg-type]
+    assert shown["sensors"] == [
+        {"name": "beam", "reference_degC": 20.0, "lowest_degC": 15.0, "highest_degC": 30.0, "lag_s": 600.0},
+        {"name": "column", "reference_degC": 21.0, "lowest_degC": 15.0, "highest_degC": 30.0, "lag_s": 0.0},
+    ]
+    names = ("EXX by beam", "EZX by beam", "EBX by column")
+    assert [row["name"] for row in shown["distortions"]] == list(names)
+    exx, ezx, ebx = ({k: v for k, v in row.items() if k != "name"} for row in shown["distortions"])
+    assert exx == pytest.approx({"offset_um_K": 1.0, "growth_um_m_K": 10.0, "bow_um_K": 0.0})
+    assert ezx == pytest.approx({"offset_um_K": 0.0, "growth_um_m_K": 0.0, "bow_um_K": 5.0})
+    assert ebx == pytest.approx({"offset_urad_K": 2.0, "growth_urad_m_K": 0.0, "bow_urad_K": 0.0})
+    assert ThermalStructure().inspect(None, None) == {}  # type: ignore[arg-type]

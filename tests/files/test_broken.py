@@ -15,8 +15,10 @@ from hypothesis import strategies as st
 
 from olp.core.errors import ConfigError, InputError
 from olp.files.config import load_calibration, load_job, load_machine, load_setup
+from olp.files.meshes import read_mesh
 from olp.files.problems import MOST_PROBLEMS
 from olp.files.tables import parse_curves
+from olp.files.toml_text import read_toml
 
 GOOD = Path(__file__).parents[1] / "broken" / "good"
 
@@ -564,3 +566,31 @@ def test_any_bytes_as_table_are_refused_with_our_error_or_load(data: bytes) -> N
         assert error.exit_code == 3
     else:
         assert len(table.position_mm) == len(table.columns["EXX"]) >= 2
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("a = " + "[" * 50_000, "brackets nested too deeply"),
+        ("a = " + "1" * 50_000, "thousands of digits"),
+        ("b = 1\n" + "a." * 50_000 + "a = 1\n", "line 2: a key has more than 16 parts"),
+        ("[" + "a." * 50_000 + "a]\n", "line 1: a key has more than 16 parts"),
+        ("b = 1\na = { " + '"x" . ' * 50_000 + "a = 1 }\n", "line 2: a key has more than 16 parts"),
+    ],
+)
+def test_deep_and_huge_values_of_toml_are_refused_at_once(text: str, expected: str) -> None:
+    with pytest.raises(ConfigError, match=expected):
+        read_toml(text.encode(), "a.toml")
+
+
+def test_dots_in_texts_are_no_keys() -> None:
+    text = 'a = "' + "a." * 99 + '"\nb.c.d = [' + "1.5, " * 99 + "]\n"
+    assert read_toml(text.encode(), "a.toml")[0]["a"] == "a." * 99
+
+
+def test_a_damaged_mesh_is_one_sentence(capfd: pytest.CaptureFixture[str]) -> None:
+    """The library of meshes logs tracebacks of its own."""
+    data = b"solid a\nfacet normal 0 0 x\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n" * 9
+    with pytest.raises(InputError):
+        read_mesh("a.stl", lambda _: data)
+    assert "Traceback" not in capfd.readouterr().err

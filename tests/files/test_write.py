@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from olp.core.errors import InputError, OlpError, UsageError
-from olp.files import write
+from olp.files.replacing import Replacement
 from olp.files.starter import starter_machine, write_starter
 from olp.files.write import read_bytes, write_bytes, write_files
 
@@ -76,15 +76,15 @@ def test_a_device_is_written_in_place(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == [device]
 
 
-def full_disk(path: Path, data: bytes) -> None:
-    path.write_bytes(data[: len(data) // 2])
+def full_disk(replacement: Replacement, data: bytes) -> None:
+    replacement._temporary.write_bytes(data[: len(data) // 2])
     raise OSError(errno.ENOSPC, "No space left on device")
 
 
 def test_a_failing_write_leaves_nothing_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     old = tmp_path / "old.ngc"
     old.write_bytes(b"old")
-    monkeypatch.setattr(write, "_write_synced", full_disk)
+    monkeypatch.setattr(Replacement, "write", full_disk)
     for target in (old, tmp_path / "new.ngc"):
         with pytest.raises(OlpError, match=r"cannot be written \(No space left on device\)") as caught:
             write_bytes(target, b"a longer program", force=True)
@@ -113,9 +113,9 @@ def test_of_several_files_none_is_written_where_one_cannot_be(
         write_files(files)
     assert [path.name for path in tmp_path.iterdir()] == ["c"]
 
-    whole = write._write_synced
+    whole = Replacement.write
     monkeypatch.setattr(
-        write, "_write_synced", lambda path, data: (full_disk if ".b." in path.name else whole)(path, data)
+        Replacement, "write", lambda r, data: (full_disk if r.target.name == "b" else whole)(r, data)
     )
     with pytest.raises(OlpError, match="cannot be written"):
         write_files(files, force=True)

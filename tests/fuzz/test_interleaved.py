@@ -13,6 +13,8 @@ from fuzz.grammar import Drawn
 from judge import linuxcnc
 from judge.linuxcnc import InterpreterFailure
 
+import olp
+
 #: where LinuxCNC's packages have programs
 INSTALLED = Path("/usr/share/linuxcnc/ncfiles")
 
@@ -155,3 +157,12 @@ def test_programs_of_linuxcnc_read_alike(judge: nominal.Judge) -> None:
     wrong, counts = differences(judge, (Drawn(p.read_bytes(), False, (0.0, 0.0, 0.0)) for p in paths))
     assert wrong == []
     assert counts[nominal.SAME] >= 5, counts
+
+
+@pytest.mark.parametrize("number", range(5))
+def test_turns_of_a_circle_belong_to_it(number: int, tmp_path: Path) -> None:
+    """A circle of several turns passes its end before it ends there: none goes to the next move."""
+    _, setup = bent.Judge.of(tmp_path).setups[number]
+    setup = replace(setup, job=replace(setup.job, start_mm=(12.0, -8.0, 30.0)))
+    text = b"G0 X12 Y-8 Z30\nF300\nG2 X12 Y-8 I8 P2\nG1 X15\nM2\n"
+    assert olp.correct(text, setup).report["deviation"]["path_max_um"] < 2.0

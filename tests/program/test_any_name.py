@@ -41,7 +41,7 @@ OFFSETS = {
     **FRAMES,
     **{
         name: {"X_mm": 150.0, "Y_mm": 100.0, "Z_mm": -200.0, "set_by": "true"}
-        for name in ("G55", '"G59.1"', '"G54.1 P1"', '"G154 P1"', "G110", "COOR_0001")
+        for name in ("G55", "G59.1", "G54.1 P1", "G154 P1", "G110", "COOR_0001")
     },
 }
 #: Path modes, offsets that the program writes, holes that are counted: what writer and findings see.

@@ -135,6 +135,16 @@ def test_blocks_of_the_proof_do_not_matter(
     np.testing.assert_array_equal(again.table.corrected, done.table.corrected)
 
 
+@pytest.mark.parametrize("block", (1, 2, 3))
+def test_blocks_of_a_program_without_z_do_not_matter(
+    scaled: Path, monkeypatch: pytest.MonkeyPatch, block: int
+) -> None:
+    done = olp.verify(LASER, LASER, scaled)
+    monkeypatch.setattr(deviation, "_BLOCK", block)
+    again = olp.verify(LASER, LASER, scaled)
+    np.testing.assert_array_equal(again.table.corrected, done.table.corrected)
+
+
 def test_groups_are_those_of_a_loop() -> None:
     rng = np.random.default_rng(5)
     n = 400

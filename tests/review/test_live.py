@@ -6,6 +6,7 @@ import http.client
 import os
 import signal
 import socket
+import struct
 import subprocess
 import sys
 import threading
@@ -135,6 +136,49 @@ def test_a_port_is_bound_before_the_work_and_left_where_that_fails(served: Serve
     for _ in range(2):
         with pytest.raises(OlpError, match="no page"):
             Server(fails, [], print, other)  # type: ignore[arg-type]
+
+
+def test_clients_that_go_are_no_error(served: Served, capfd: pytest.CaptureFixture[str]) -> None:
+    """A client that asks, resets its connection, and is gone before the page is written."""
+    served.server._page = b"x" * 10_000_000
+    port = served.server._http.server_address[1]
+    for words in (b"GET / HTTP/1.1\r\nHost: 127.0.0.1:1\r\n\r\n", b"GET / HT", b"\x00\xff" * 99, b""):
+        client = socket.create_connection((live.LOOPBACK, port), timeout=5)
+        client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+        client.sendall(words)
+        client.close()
+    assert served.get("/version")[0] == 200
+    until(lambda: served.server._http._free._value == live.MOST_REQUESTS)
+    assert capfd.readouterr().err == ""
+
+
+def test_requests_at_a_time_are_bounded(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+    port = served.server._http.server_address[1]
+    before = threading.active_count()
+    clients = [
+        socket.create_connection((live.LOOPBACK, port), timeout=5) for _ in range(2 * live.MOST_REQUESTS)
+    ]
+    until(lambda: served.server._http._free._value == 0)
+    assert threading.active_count() <= before + live.MOST_REQUESTS
+    # one that comes too much is closed, and does not wait
+    assert clients[-1].recv(9) == b""
+    for client in clients:
+        client.close()
+    until(lambda: served.server._http._free._value == live.MOST_REQUESTS)
+    assert served.get("/version")[0] == 200
+
+
+def test_a_request_that_never_arrives_is_dropped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(live, "REQUEST_S", 0.05)
+    served = Served(tmp_path)
+    try:
+        port = served.server._http.server_address[1]
+        with socket.create_connection((live.LOOPBACK, port), timeout=10) as client:
+            client.sendall(b"GET /")
+            assert client.recv(9) == b""
+    finally:
+        served.server.stop()
+        served.thread.join(10)
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Ctrl-C reaches a whole console there")

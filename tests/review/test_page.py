@@ -117,19 +117,39 @@ def test_a_module_that_would_end_its_element_is_refused(
         olp.view(TEXT, machine, time=False).html()
 
 
+def test_the_title_is_text_and_the_data_cannot_end_their_element() -> None:
+    hostile = """</script><!-- <b a='"'> & @@DATA@@"""
+    page = b"".join(pages.page({"title": hostile}, b"AAAA")).decode()
+    assert "<title>&lt;/script&gt;&lt;!-- &lt;b a=&#x27;&quot;&#x27;&gt; &amp; @@DATA@@" in page
+    assert hostile not in page
+    data = pages.as_json({"title": hostile, "umlaut": "ä"})
+    assert b"<" not in data and "ä".encode() in data and b", " not in data
+    assert json.loads(data) == {"title": hostile, "umlaut": "ä"}
+    with pytest.raises(ValueError):
+        pages.as_json({"a": float("nan")})
+
+
+@pytest.mark.parametrize("text", ("</script", "</SCRIPT>", "a <!-- b"))
+def test_a_script_that_would_end_its_element_is_refused(monkeypatch: pytest.MonkeyPatch, text: str) -> None:
+    monkeypatch.setattr(pages, "_bundle", lambda: (text, "main.min.js"))
+    with pytest.raises(CannotCompute, match=r"main\.min\.js: contains the end of a script element"):
+        b"".join(pages.page({"title": "a"}, b""))
+
+
 # -- hostile programs -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("comment", HOSTILE, ids=lambda text: ascii(text[:12]))
 def test_a_hostile_comment_is_text(comment: bytes, machine: Path, html: bytes) -> None:
-    program = HEAD + b"; " + comment + b"\nG1 X100 Y50 F600\nM2\n"
+    # behind the end a control takes anything
+    program = HEAD + b"G1 X100 Y50 F600\nM2\n; " + comment + b"\n"
     page = Page(olp.view(program, machine).html())
     clean = Page(html)
     # the same elements and the same scripts as any page has
     assert [tag for tag, _ in page.tags] == [tag for tag, _ in clean.tags]
     assert page.scripts == clean.scripts
     assert "<" not in page.manifest_text
-    line = page.array("text_nominal")[3]
+    line = page.array("text_nominal")[5]
     assert len(line) < 2100
     assert all(c.isprintable() or c in "\t�" for c in line)
     visible = comment.decode("utf-8", "ignore")[:50]

@@ -9,7 +9,6 @@ is the share of a variance that the factor leaves out.
 from __future__ import annotations
 
 import io
-import zipfile
 from dataclasses import replace
 from pathlib import Path as FilePath
 
@@ -21,6 +20,7 @@ from olp.errormodel.calibration import Calibration
 from olp.errormodel.entry import Entry
 from olp.errormodel.sources.registry import NUMBERS, SOURCES
 from olp.errormodel.uncertainty import Uncertainty, fingerprint, of_sigmas
+from olp.files.archive import read_arrays
 from olp.files.calibration.reader import CalibrationReading
 from olp.files.calibration.schema import covariance_of
 from olp.files.write import PathLike, Reader, read_bytes
@@ -97,22 +97,25 @@ def parse_covariance(data: bytes, file: str) -> Uncertainty:
     """As written by `covariance_bytes`. Raises ConfigError."""
     wanted = f'expected a file "{SCHEMA}" as olp calibrate fit writes it'
     try:
-        with np.load(io.BytesIO(data), allow_pickle=False) as archive:
-            arrays = {name: np.asarray(archive[name]) for name in archive.files}
-    except (ValueError, OSError, EOFError, KeyError, zipfile.BadZipFile, zipfile.LargeZipFile):
-        raise ConfigError(f"is not a covariance of a calibration; {wanted}", file=file) from None
+        arrays = read_arrays(data, _ARRAYS)
+    except ValueError as error:
+        raise ConfigError(f"is not a covariance of a calibration: {error}; {wanted}", file=file) from None
     lacking = [
         name for name, kind in _ARRAYS.items() if name not in arrays or arrays[name].dtype.kind != kind
     ]
-    if lacking or arrays["schema"].shape != () or str(arrays["schema"]) != SCHEMA:
+    if lacking or str(arrays["schema"]) != SCHEMA:
         what = f"array {lacking[0]} is missing or of another type" if lacking else "has another schema"
         raise ConfigError(f"{what}; {wanted}", file=file)
     count = arrays["count"]
-    total = int(count.sum()) if count.size and (count > 0).all() else -1
+    whole = count.ndim == 1 and count.size and (count > 0).all() and (count <= arrays["rest"].size).all()
+    total = int(count.sum()) if whole else -1
+    alone = all(arrays[name].shape == () for name in ("schema", "fingerprint", "source", "dropped"))
     per_entry = all(arrays[name].shape == count.shape for name in ("kind", "name", "period_mm"))
     per_number = all(arrays[name].shape == (total,) for name in ("position_mm", "rest"))
     factor = arrays["factor"]
-    if not per_entry or not per_number or factor.ndim != 2 or len(factor) != total or count.ndim != 1:
+    # a covariance of so many numbers has no higher rank
+    fits = factor.ndim == 2 and len(factor) == total and factor.shape[1] <= total
+    if not (alone and per_entry and per_number and fits):
         raise ConfigError(f"its arrays do not fit each other; {wanted}", file=file)
     entries = []
     ends = np.cumsum(count).tolist()

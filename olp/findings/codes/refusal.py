@@ -248,8 +248,9 @@ RULES = (
     _rule(
         "OLP543",
         "run is too long",
-        why="The unrolled program would have more blocks, levels or pecks than can be meant.",
-        remedy="Correct the endless loop, or the step that is too small.",
+        why="The program would have more blocks, levels, holes, strokes or turns than can be meant.",
+        remedy="Correct the endless loop, or the number that is too large or too small. "
+        "Divide a long program.",
         example="`WHILE [1 EQ 1] DO1`.",
     ),
     _rule(

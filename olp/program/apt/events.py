@@ -220,7 +220,7 @@ class Events:
         feed = NAN
         for name, scale in _PER_MINUTE.items():
             if name in after:
-                feed = after[name] * scale / 60.0
+                feed = after[name] * (self.unit_mm if name == b"PERMIN" else scale) / 60.0
         return Cycle(
             length(b"DEPTH", b"FEDTO"), length(b"CLEAR", b"RAPTO"), length(b"RTRCTO", b"RETURN"), feed
         )

@@ -19,7 +19,13 @@ _TOKEN = re.compile(
     r"(?P<blank>\s+)|(?P<field>\{(?P<name>\w+)\})|(?P<rest>\.\.\.)|(?P<either><[^<>]+>)|(?P<open>\[)|(?P<close>\])|"
     r"(?P<word>(?:(?!\.\.\.)[\w.$#%])+)|(?P<mark>[^\w\s])"
 )
-_NUMBER = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?"
+#: Its digits are taken as a whole, so that no number is ever parted into two; an E behind them may be a word.
+_NUMBER = r"(?>[-+]?(?:\d+(?:\.\d*)?|\.\d+))(?:[eE][-+]?\d++)?(?![\d.])"
+#: Of one form at most, as each more of them may double the time to compare it: parts in brackets, `...`; and
+#: characters.
+_OPTIONAL = 8
+_RESTS = 2
+_LONGEST = 500
 _NAME = r"[A-Za-z_$.][\w.$]*(?:\[[\w,. ]*\])?"
 
 
@@ -52,14 +58,14 @@ def form(text: str, *, ignore_case: bool) -> Form:
             depth += 1 if kind == "open" else -1
             if depth < 0:
                 break
-            pieces.append(r"(?:\s*" if kind == "open" else ")?")
+            pieces.append(r"(?:\s*+" if kind == "open" else ")?")
             before = "mark" if kind == "open" else "close"
             blank = False
             continue
         if before != "start":
             # no blank inside a word; around marks blanks are free
             apart = wordy and before == "wordy"
-            pieces.append((r"\s+" if blank else "") if apart else r"\s*")
+            pieces.append((r"\s++" if blank else "") if apart else r"\s*+")
         pieces.append(_piece(kind or "", token, fields, text))
         if before == "start" and kind == "word":
             first = token_text
@@ -69,13 +75,29 @@ def form(text: str, *, ignore_case: bool) -> Form:
         raise ConfigError(f'the form "{text}" has an opening or closing bracket without the other')
     if len(set(fields)) < len(fields):
         raise ConfigError(f'the form "{text}" has a field twice')
+    _check_size(text)
     flags = re.IGNORECASE if ignore_case else 0
     return Form(
         text,
-        re.compile(r"\s*" + "".join(pieces) + r"\s*", flags),
+        re.compile(r"\s*+" + "".join(pieces) + r"\s*+", flags),
         first.upper() if ignore_case else first,
         frozenset(fields),
     )
+
+
+def _check_size(text: str) -> None:
+    """Raise ConfigError for a form that takes long to compare with a statement."""
+    if len(text) > _LONGEST:
+        raise ConfigError(
+            f'the form "{text[:60]}..." has {len(text)} characters; expected at most {_LONGEST}'
+        )
+    kinds = [token.lastgroup for token in _TOKEN.finditer(text)]
+    for kind, most, what in (("open", _OPTIONAL, "optional parts"), ("rest", _RESTS, "places for any text")):
+        if kinds.count(kind) > most:
+            raise ConfigError(
+                f'the form "{text[:60]}" has {kinds.count(kind)} {what}; expected at most {most}; '
+                "describe the statement with several forms"
+            )
 
 
 def _piece(kind: str, token: re.Match[str], fields: list[str], text: str) -> str:

@@ -30,6 +30,8 @@ NAN = float("nan")
 _AXES = ("x", "y", "z")
 _TURNS = ("a", "b", "c")
 _NO_DIGITS = str.maketrans("", "", "0123456789.")
+#: characters; the time to compare a statement with its forms may go with the square of its length
+_LONGEST_STATEMENT = 4000
 _FIRST = re.compile(r"\s*([\w.$#%]*)")
 
 
@@ -213,6 +215,12 @@ class _Reader:
         """A statement without its label, its rule and its fields; follows the sections. Raises ProgramError
         where there is no rule."""
         text, dialect = line.text, self.dialect
+        if len(text) > _LONGEST_STATEMENT:
+            raise ProgramError(
+                f"the statement has {len(text)} characters; expected at most {_LONGEST_STATEMENT}",
+                line=line.number,
+                code="OLP505",
+            )
         last = stop = len(text.rstrip())
         if dialect.terminator and text[:stop].endswith(dialect.terminator):
             stop -= len(dialect.terminator)

@@ -403,9 +403,9 @@ class AxisState(State):
                 line=line,
                 code="OLP526",
             )
-        if "R" in by_letter and by_letter["R"].value != 0:
+        if "R" in by_letter and (kind == 20 or by_letter["R"].value != 0):
             raise ProgramError(
-                "G10 R rotates the work offset, which is not read; use R0", line=line, code="OLP526"
+                "G10 R rotates the work offset, which is not read; leave R out", line=line, code="OLP526"
             )
         number = self._integer(by_letter["P"], line) if "P" in by_letter else -1
         if not 0 <= number <= self.profile.g10_offsets:

@@ -58,7 +58,7 @@ _FREE = _bits("GM")
 _MOTION = frozenset({0, 10, *_ARCS, *CYCLES, *PROBES})
 _MOTIONS = np.array(sorted(_MOTION))
 #: Codes that take the axis words of their block for something else.
-_STATING = np.array(sorted(AXIS_VALUES - {431} | HOMES))
+_STATING = np.array(sorted(AXIS_VALUES | HOMES))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -234,9 +234,9 @@ NGC_RULES = BlockRules(
         "I": frozenset({*_ARCS, 50, 51, 52, 760, 870}),
         "J": frozenset({*_ARCS, 50, 51, 52, 760, 870}),
         "K": frozenset({*_ARCS, 330, 331, 760, 870}),
-        "L": frozenset({*CYCLES, WRITE_OFFSET, 760}) | _m(66),
+        "L": frozenset({*(CYCLES - {740}), WRITE_OFFSET, 760}) | _m(66, 98),
         "P": frozenset({*_ARCS, DWELL, WRITE_OFFSET, 640, 50, 51, 52, 760, 820, 840, 860, 880, 890, 740})
-        | _SYNCHRONOUS | _m(50, 51, 52, 53, 66, 19) | _OWN_M,
+        | _SYNCHRONOUS | _m(50, 51, 52, 53, 66, 19, 98) | _OWN_M,
         "Q": frozenset({50, WRITE_OFFSET, 640, 730, 760, 830}) | _m(19, 61) | _OUTPUTS | _OWN_M,
         "R": frozenset({*_ARCS, *CYCLES, WRITE_OFFSET, 760}) | _m(19),
     },
@@ -265,6 +265,7 @@ NGC_RULES = BlockRules(
         **dict.fromkeys(sorted(_ARCS), "IJKR"),
         DWELL: "P",
         432: "HXYZ",
+        960: "S",
     },
     number_first=True,
     one_use_of_axes=True,

@@ -26,6 +26,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from olp.core.budget import Budget
 from olp.core.errors import ProgramError
 
 Point = tuple[float, float, float]
@@ -45,6 +46,13 @@ _PECKING = frozenset({730, 830})
 _DWELL_NEEDED = frozenset({820, 860, 890})
 #: pecks of a hole at most: a step far below the resolution of the numbers would never end
 _MAX_PECKS = 100_000
+#: holes of a block at most
+_MAX_REPEATS = 20_000
+#: strokes of all holes of a program: of a short one, and for each byte of a long one
+_STROKES = 250_000
+_STROKES_PER_BYTE = 4.0
+#: work of a hole beside its strokes, in strokes
+HOLE_STROKES = 10
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -152,8 +160,8 @@ def hole_moves(
     absolute, along the tool axis; `initial_z` is the position on that axis before the first cycle of the
     series of contiguous cycles. `q` is the peck, `p` the dwell in s, `clearance` the distance kept above
     the last peck (G83) or drawn back after it (G73). All lengths are in program units. Or `r`, `z`, `q` and
-    `clearance` are, and the others are lengths where a level n lies at n * `unit` + `ground`: pecks are
-    counted in numbers of the program, as the control does it, since the last one may hang on the last bit.
+    `clearance` alone are, and a level n lies at n * `unit` + `ground` of the others. Pecks are counted in
+    numbers of the program, as the control does it: the last one may hang on the last bit.
 
     A second hole of the same series starts where the first ended, with the same `initial_z`.
     Raises ProgramError (without a line) for a cycle without offline geometry and for words it cannot accept.
@@ -225,6 +233,7 @@ def cycle_moves(
     """
     if repeats < 1:
         raise ProgramError("the cycle is repeated fewer than one time; expected L1 or more", code="OLP531")
+    check_repeats(repeats)
     strokes: list[Stroke] = []
     for _ in range(repeats):
         strokes += hole_moves(
@@ -234,6 +243,20 @@ def cycle_moves(
         start = strokes[-1].point
         xy = (xy[0] + step[0], xy[1] + step[1])
     return tuple(strokes)
+
+
+def check_repeats(repeats: int) -> None:
+    """Raise ProgramError where a block makes more holes than any part has."""
+    if repeats > _MAX_REPEATS:
+        raise ProgramError(f"the block makes {repeats} holes; expected at most {_MAX_REPEATS}", code="OLP543")
+
+
+def stroke_budget(size: int) -> Budget:
+    """The strokes that the holes of a program of `size` bytes may have together."""
+    return Budget.of(
+        size, least=_STROKES, per_byte=_STROKES_PER_BYTE,
+        message="the canned cycles of the program have more than {limit} strokes; split the program",
+    )  # fmt: skip
 
 
 @dataclass(slots=True)

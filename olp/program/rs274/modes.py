@@ -100,7 +100,9 @@ class Modes:
     def program_end(self, chunk: WordChunk) -> int:
         """The number of lines up to the end of the program: M2, M30, or the second tape mark."""
         last = 0 if self._ended else len(chunk.line_start)
-        ends = chunk.line[(chunk.letter == 77) & np.isin(chunk.mantissa, (2, 30)) & (chunk.decimals == 0)]
+        codes = np.flatnonzero(chunk.letter == 77)
+        value = chunk.mantissa[codes] / 10.0 ** chunk.decimals[codes]
+        ends = chunk.line[codes[np.isin(value, (2.0, 30.0))]]
         if self._block_delete:
             ends = ends[~chunk.deleted[ends]]
         if ends.size and ends[0] < last:
@@ -175,8 +177,13 @@ class Modes:
         return Codes(chunk.line[g], code, act)
 
     def _spindle(self, chunk: WordChunk, usable: Mask) -> Modal:
-        m = (chunk.letter == 77) & usable & np.isin(chunk.mantissa, (3, 4, 5)) & (chunk.decimals == 0)
-        return modal(len(chunk.line_start), chunk.line[m], chunk.mantissa[m], self._state.turning)
+        m = (chunk.letter == 77) & usable & np.isin(chunk.mantissa, (3, 4, 5, 6)) & (chunk.decimals == 0)
+        line, code = chunk.line[m], chunk.mantissa[m]
+        # a tool change stops the spindle, and comes before its start in one block
+        order = np.lexsort((code != 6, line))
+        line, code = line[order], code[order]
+        last = np.append(line[1:] != line[:-1], True)[: len(line)]
+        return modal(len(chunk.line_start), line[last], code[last], self._state.turning)
 
     def _keys(self, chunk: WordChunk, value: Array, codes: Codes, usable: Mask) -> tuple[Index, Index]:
         """The lines and keys of G and M codes for `block_rules`."""

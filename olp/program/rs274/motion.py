@@ -32,6 +32,10 @@ for _i, _letter in enumerate(b"IJKRP"):
 SPIRAL_ABSOLUTE_MM = 0.0283
 #: The same as a share of the radius.
 SPIRAL_RELATIVE = 0.001
+#: of an arc; a double has 2e-9 mm at this distance, so its path is good to a hundredth of a micrometre
+LARGEST_RADIUS_MM = 1e7
+#: turns of one arc, at most
+MOST_TURNS = 10_000
 
 
 def values(chunk: WordChunk) -> Array:
@@ -216,6 +220,7 @@ def arc_geometry(
         "P of an arc is its number of turns; expected an integer from 1",
         "OLP516",
     )
+    refuse(turns > MOST_TURNS, f"P of an arc is its number of turns; expected at most {MOST_TURNS}")
     base0, base1 = (np.where(absolute, offset[rows, f], s) for f, s in ((first, s0), (second, s1)))
     centre0, centre1 = np.nan_to_num(c0) + base0, np.nan_to_num(c1) + base1
     if by_radius.any():
@@ -236,6 +241,11 @@ def arc_geometry(
         centre1 = np.where(by_radius, s1 + dy / 2 + lean * dx, centre1)
     r0, r1 = np.hypot(s0 - centre0, s1 - centre1), np.hypot(e0 - centre0, e1 - centre1)
     refuse((r0 < 1e-9) | (r1 < 1e-9), "an arc has zero radius")
+    refuse(
+        np.maximum(r0, r1) > LARGEST_RADIUS_MM,
+        "the radius of an arc is {r0:.4g} mm; expected at most "
+        f"{LARGEST_RADIUS_MM:g} mm, as its centre has too few digits; write a straight move",
+    )
     refuse(
         np.abs(r0 - r1) > np.maximum(SPIRAL_ABSOLUTE_MM, SPIRAL_RELATIVE * r1),
         "the radius of an arc is {r0:.4f} mm at its start and {r1:.4f} mm at its end; "

@@ -33,6 +33,7 @@ from olp.program.rs274.codes import (
     WRITE_OFFSET,
 )
 from olp.program.rs274.collector import Collector
+from olp.program.rs274.cycles import stroke_budget
 from olp.program.rs274.lexer import WordChunk, chunks
 from olp.program.rs274.modes import Context, Modes, check_odd, scaled
 from olp.program.rs274.motion import Blocks, arc_geometry, fill, gather
@@ -81,7 +82,9 @@ class _Reader:
         self.modes = Modes(self.state, block_delete=options.block_delete, contour=options.contour)
         self.switches = Directives(data)
         self.payloads: dict[int, float] = {}
-        self.special_blocks = SpecialBlocks(self.state, self.collector, self.switches)
+        self.special_blocks = SpecialBlocks(
+            self.state, self.collector, self.switches, stroke_budget(len(data))
+        )
         self.end_line = 0
 
     def run(self) -> Program:

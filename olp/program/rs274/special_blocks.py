@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Index, Mask
+from olp.core.budget import Budget
 from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES
 from olp.core.toolpath import Flag, Kind
@@ -30,7 +31,14 @@ from olp.program.rs274.codes import (
     RETRACT_TO_R,
 )
 from olp.program.rs274.collector import Collector
-from olp.program.rs274.cycles import LCNC_CLEARANCE_MM, Stroke, hole_moves, levels
+from olp.program.rs274.cycles import (
+    HOLE_STROKES,
+    LCNC_CLEARANCE_MM,
+    Stroke,
+    check_repeats,
+    hole_moves,
+    levels,
+)
 from olp.program.rs274.modes import UNROLL, Context, scaled
 from olp.program.rs274.motion import fill
 from olp.program.rs274.profiles.base import Act, Profile
@@ -118,10 +126,11 @@ class SpecialBlocks:
     """Carries these blocks out from the position in `state`, and puts their moves and holes into
     `collector`."""
 
-    def __init__(self, state: AxisState, collector: Collector, switches: Directives) -> None:
+    def __init__(self, state: AxisState, collector: Collector, switches: Directives, strokes: Budget) -> None:
         self._state = state
         self._collector = collector
         self._switches = switches
+        self._strokes = strokes
         # line, from 0, and frame of the last block of a series; -1 where none goes on
         self._last_cycle = self._frame = -1
 
@@ -251,6 +260,7 @@ class SpecialBlocks:
                     initial_z=initial, plane=17 + plane,
                     rules=state.profile.cycles,
                 )  # fmt: skip
+                self._strokes.spend(HOLE_STROKES + len(strokes))
             except ProgramError as error:
                 raise ProgramError(error.message, line=line, code=error.code) from None
             moving = [s for s in strokes if s.kind in ("rapid", "feed")]
@@ -327,6 +337,10 @@ class SpecialBlocks:
                 line=line,
                 code="OLP531",
             )
+        try:
+            check_repeats(times)
+        except ProgramError as error:
+            raise ProgramError(error.message, line=line, code=error.code) from None
         return times
 
 

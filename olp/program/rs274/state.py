@@ -42,8 +42,8 @@ class PathMode:
 
 #: Why a broken series is refused.
 BROKEN_SERIES = (
-    "an offset, the tool length, the unit or another move comes within a series of canned cycles, and what "
-    "this control keeps then is not known; end the series with G80 and give all words again"
+    "an offset, the tool length, the unit or another move comes within a series of canned cycles; what this "
+    "control keeps then is not known; end the series with G80"
 )
 
 

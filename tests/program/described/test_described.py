@@ -209,6 +209,13 @@ def test_what_may_move_and_is_not_understood_is_refused(
     assert caught.value.line == line
 
 
+def test_a_long_statement_is_refused(machine: Path, own: Path) -> None:
+    dialect = load_described(own)
+    with pytest.raises(ProgramError, match="has 5004 characters; expected at most 4000") as caught:
+        read(b"GO X1 Y2 Z3\nSAY " + b"a" * 5000, setup_of(machine, dialect), dialect)
+    assert caught.value.line == 2
+
+
 def test_inches_are_inches(machine: Path, own: Path) -> None:
     text = b"INCH\nGO X1.00000 Y2.00000 Z1.50000\nCUT X3.00000 Y2.50000 Z1.50000\n"
     setup = setup_of(machine, load_described(own))
@@ -272,6 +279,11 @@ def test_similar_lines_are_read_as_each_is_alone(
     ("<MOVE|MOVES> #...", ["MOVE #p", "MOVES # p 1"], ["MOVE p", "MOVET #p"]),
     ("G{number} X{x}", ["G1 X5", "G01 X-.5"], ["G X5", "G1X5 Y"]),
     ("END", ["END", "  end"], ["ENDING", "END 1"]),
+    # a number is never parted into two: 100 200 are no three numbers
+    ("P {x} [,] {y} [,] {z}", ["P 1 2 3", "P 1,2,3"], ["P 100 200", "P 123", "P 1.2.3 4"]),
+    ("X{x}E{number}", ["X1E2", "X1.5E2"], ["X1E2E", "X12"]),
+    ("CUT" + " [A]" * 8, ["CUT A A", "CUT" + " A" * 8], ["CUT" + " A" * 9, "CUT A A B"]),
+    ("SAY ... X ... Y", ["SAY a X b Y"], ["SAY" + " X" * 900, "SAY" + " " * 3000]),
 ])  # fmt: skip
 def test_forms(text: str, matches: list[str], fails: list[str]) -> None:
     made = form(text, ignore_case=True)
@@ -288,6 +300,9 @@ def test_forms(text: str, matches: list[str], fails: list[str]) -> None:
     (('unit = "inch"\n', ""), "expected the key unit"),
     (('form = "GO X{x} Y{y} Z{z} [A{a}]"', 'form = "GO"'), "has neither fields"),
     (('title = "A language of our own"\n', ""), "title is missing"),
+    (("SAY ...", "SAY" + " [A]" * 9), "has 9 optional parts; expected at most 8"),
+    (("SAY ...", "SAY ... A ... B ..."), "has 3 places for any text; expected at most 2"),
+    (("SAY ...", "SAY " + "A" * 500), "has 504 characters; expected at most 500"),
     (('stamp = ["! ", ""]', 'stamp = ["! "]'), "stamp needs two marks"),
 ])  # fmt: skip
 def test_what_is_wrong_with_a_file_is_said(tmp_path: Path, change: tuple[str, str], words: str) -> None:

@@ -14,7 +14,7 @@ from olp.files.config import load_setup
 from olp.files.sources import Source, Sources
 from olp.program.registry import DIALECTS, read
 from olp.program.rs274.cycles import CycleRules
-from olp.program.rs274.profiles.base import Profile
+from olp.program.rs274.profiles.base import Act, Profile
 from olp.workflows.flatten import UnrollOptions, as_asked
 
 LINUXCNC, FANUC, HAAS, GRBL = CONTROLS = ("linuxcnc", "fanuc", "haas", "grbl")
@@ -215,3 +215,46 @@ def test_k_counts_holes(control: str, setups: dict[str, Setup]) -> None:
     assert isinstance(profile, Profile)
     text = "G0 X0. Y0. Z9.\nG91 G81 X1. Z-2. R-3. F60. K3"
     assert written_out(text, setups[control], profile).count("G1") == 3
+
+
+PROFILES = [dialect for dialect in DIALECTS.values() if isinstance(dialect, Profile)]
+
+
+@pytest.mark.parametrize("profile", PROFILES, ids=lambda profile: profile.name)
+def test_a_reason_names_its_code_and_the_code_is_refused(profile: Profile, setups: dict[str, Setup]) -> None:
+    for code, why in profile.refusals.items():
+        name = f"G{code / 10:g}"
+        assert why.startswith(f"{name} ")
+        if profile.codes.get(code, Act.REFUSE) is Act.REFUSE:
+            assert f"1: {why}" in str(outcome(f"{name} X1.", setups[profile.name], profile))
+
+
+@pytest.mark.parametrize(
+    ("word", "why"),
+    [("M70", "saves modal"), ("M71", "forgets"), ("M72", "restores"), ("M73", "saves modal"),
+     ("M96", "branches"), ("M97", "calls"), ("M98", "calls"), ("M99", "repeats")],
+)  # fmt: skip
+def test_calls_and_saved_modes_say_how_to_unroll_them(word: str, why: str, setups: dict[str, Setup]) -> None:
+    got = outcome(f"G0 X1.\n{word}", setups[LINUXCNC], DIALECTS[LINUXCNC])  # type: ignore[arg-type]
+    assert isinstance(got, str)
+    assert f"{word} {why}" in got
+
+
+#: M codes that move no axis, by the manuals of the controls.
+HARMLESS = {
+    LINUXCNC: "0-5 7-9 19 30 48-53 62-68",
+    FANUC: "0-5 7-11 13 19 29 30 48 49 88 89",
+    HAAS: "0-5 7-11 19 29-31 33-35 41 42 48 49 59 69 83 84 88 89",
+    GRBL: "0-5 7-9 19 30 48 49 56",
+}
+
+
+@pytest.mark.parametrize("control", CONTROLS)
+def test_m_codes_that_move_no_axis(control: str) -> None:
+    listed = set()
+    for part in HARMLESS[control].split():
+        first, _, last = part.partition("-")
+        listed |= set(range(int(first), int(last or first) + 1))
+    profile = DIALECTS[control]
+    assert isinstance(profile, Profile)
+    assert profile.harmless_m == listed

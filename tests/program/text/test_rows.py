@@ -103,3 +103,22 @@ def test_both_ways_of_reading_find_the_same_cells(table: list[list[str]], mark: 
     cells = Cells(text.encode(), layout)
     rows = [(line, [cells.text(span) for span in row]) for line, row in cells.rows()]
     assert rows == list(form_of(layout).rows(text))
+
+
+@pytest.mark.parametrize(
+    ("row", "cells"),
+    [
+        (b'"a,b",1', ["a,b", "1"]),
+        (b'"a"",b",1', ['a"",b', "1"]),
+        (b'"a"""",b",1,2', ['a"""",b', "1", "2"]),
+        (b'"",1', ["", "1"]),
+        (b' "a" , 1 ', ["a", "1"]),
+        (b'"a,1', ['"a,1']),
+        (b"a,,1,", ["a", "", "1", ""]),
+    ],
+)
+def test_a_comma_in_quotes_ends_no_cell(row: bytes, cells: list[str]) -> None:
+    table = Cells(row, Layout(XYZ, header=False))
+    ((line, spans),) = table.rows()
+    assert line == 1
+    assert [table.text(span) for span in spans] == cells

@@ -44,6 +44,8 @@ class Parameters(Protocol):
 #: A compiled expression. None is a vacant variable, and only a bare variable can be vacant.
 Expression = Callable[[Parameters], float | None]
 Binary = Callable[[float, float], float]
+#: An operator with operands that may be vacant.
+_Join = Callable[[float | None, float | None], float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +99,7 @@ class Reader:
         if match is None:
             return None
         self.position = match.end()
-        return float(match.group())
+        return plain_number(match.group())
 
     def value(self) -> Expression:
         """A real value: number, parameter, function or bracketed expression, with an optional sign."""
@@ -125,7 +127,7 @@ class Reader:
         plain = _UNSIGNED.match(text, start)
         if plain:
             self.position = plain.end()
-            return _constant(float(plain.group()))
+            return _constant(plain_number(plain.group()))
         function = _FUNCTION.match(text, start)
         if function:
             self.position = function.end()
@@ -171,24 +173,21 @@ class Reader:
         levels = self.arithmetic.levels
         if level == len(levels):
             return self.value()
-        value = self._level(level + 1)
+        first = self._level(level + 1)
+        rest: list[tuple[_Join, Expression]] = []
         while True:
             match = _OPERATOR.match(self.text, self.position)
             if match is None or match.group() not in levels[level]:
-                return value
+                return _chained(first, tuple(rest)) if rest else first
             self.position = match.end()
-            value = self._joined(match.group(), value, self._level(level + 1))
+            rest.append((self._join(match.group()), self._level(level + 1)))
 
-    def _joined(self, operator: str, first: Expression, second: Expression) -> Expression:
+    def _join(self, operator: str) -> _Join:
         if self.arithmetic.exact and operator in ("eq", "ne"):
             same = operator == "eq"
-            return lambda p: float((first(p) == second(p)) is same)
+            return lambda first, second: float((first == second) is same)
         function = self.arithmetic.operators[operator]
-
-        def joined(parameters: Parameters) -> float:
-            return _finite(function(filled(first(parameters)), filled(second(parameters))), operator)
-
-        return joined
+        return lambda first, second: _finite(function(filled(first), filled(second)), operator)
 
     def _call(self, name: str) -> Expression:
         if name == "exists":
@@ -218,8 +217,30 @@ class Reader:
         self.position += 1
 
 
+def _chained(first: Expression, rest: tuple[tuple[_Join, Expression], ...]) -> Expression:
+    """Operators of one level, from left to right. A loop, so that a long sum needs no deep stack."""
+
+    def chained(parameters: Parameters) -> float | None:
+        value = first(parameters)
+        for join, operand in rest:
+            value = join(value, operand(parameters))
+        return value
+
+    return chained
+
+
 def _constant(value: float) -> Expression:
     return lambda _: value
+
+
+def plain_number(text: str) -> float:
+    """The number that a text writes. Raises ProgramError where it is too large for any control."""
+    value = float(text)
+    if not math.isfinite(value):
+        raise ProgramError(
+            f"a number of {len(text)} digits is too large; expected at most 300", code="OLP540"
+        )
+    return value
 
 
 def _negated(operand: Expression) -> Expression:

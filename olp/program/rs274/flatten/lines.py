@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from olp.core.errors import ProgramError
-from olp.program.rs274.flatten.expressions import Expression, Parameters, Reader
+from olp.program.rs274.flatten.expressions import Expression, Parameters, Reader, plain_number
 from olp.program.rs274.flatten.language import Language
 
 _SKIP = re.compile(r"\([^)]*\)?|;.*|[\x00-\x20]+")
@@ -22,6 +22,9 @@ _LABEL = re.compile(r"\d+|<[^>]*>")
 _KEYWORD = re.compile(
     r"endsub|sub|call|return|elseif|else|endif|if|endwhile|while|do|endrepeat|repeat|break|continue"
 )
+#: characters of a text that a message shows, and of a label at most
+_SHOWN = 60
+_LONGEST_LABEL = 250
 _WITH_VALUE = frozenset({"if", "elseif", "while", "repeat"})
 
 
@@ -153,7 +156,7 @@ def _compile(source: _Source, begin: int, language: Language) -> Line:
             flow = _macro_b(reader, assignments, source.places, language)
         if flow is not None:
             if reader.position < len(text):
-                rest = text[reader.position :]
+                rest = text[reader.position : reader.position + _SHOWN]
                 raise ProgramError(
                     f"{flow.keyword.upper()} is followed by {rest!r}, which is not understood", code="OLP510"
                 )
@@ -173,7 +176,7 @@ def _word(reader: Reader, places: list[int], language: Language) -> Word:
     value_start = letter.end()
     literal = _LITERAL.match(text, value_start)
     if literal and _PLAIN_END.match(text, literal.end()):
-        number, value, pointed = float(literal.group()), None, "." in literal.group()
+        number, value, pointed = plain_number(literal.group()), None, "." in literal.group()
         reader.position = literal.end()
     else:
         reader.position = value_start
@@ -215,8 +218,12 @@ def _o_word(reader: Reader) -> Flow:
     if static:
         label = static.group().strip("<>")
         if static.group()[0] != "<":
-            label = str(int(label))
+            label = label.lstrip("0") or "0"
         reader.position = static.end()
+        if len(label) > _LONGEST_LABEL:
+            raise ProgramError(
+                f"a label has {len(label)} characters; expected at most {_LONGEST_LABEL}", code="OLP505"
+            )
     else:
         dynamic = reader.value()
     keyword = _KEYWORD.match(text, reader.position)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from olp.core.budget import Budget
 from olp.core.errors import ProgramError
 from olp.program.rs274.flatten.expressions import filled, whole
 from olp.program.rs274.flatten.lines import Flow, Line
@@ -12,6 +13,9 @@ from olp.program.rs274.flatten.values import Variables, macro_arguments
 
 #: levels of subprograms at most: LinuxCNC allows 10, Fanuc 4 to 10; more is an endless recursion
 MAX_LEVEL = 50
+
+#: work of a visit to a block beside the bytes of its line
+_VISIT = 32
 
 #: turning cycles of LinuxCNC, which name a subprogram by Q
 _PROFILE_CYCLES = {("g", code) for code in (70.0, 71.0, 71.1, 71.2, 72.0, 72.1, 72.2)}
@@ -46,14 +50,14 @@ class Walk:
         write: WriteBlock,
         *,
         block_delete: bool | None,
-        limit: int,
+        budget: Budget,
     ) -> None:
         self.main = main
         self.variables = variables
         self.write = write
         self.language = main.language
         self.block_delete = block_delete
-        self.limit = limit
+        self.budget = budget
         self._subprograms = subprograms
         self._files: dict[str, Unit] = {}
         self._frames = [Frame(main, 0, "", variables.locals, variables.names)]
@@ -62,7 +66,6 @@ class Walk:
 
     def run(self) -> None:
         """Run to the end. ProgramError carries the line and file where it happened."""
-        visits = 0
         while self._frames:
             frame = self._frames[-1]
             index = frame.next_index
@@ -73,13 +76,7 @@ class Walk:
                             f"subprogram {frame.label} has no end (ENDSUB or M99)", code="OLP542"
                         )
                     return
-                visits += 1
-                if visits > self.limit:
-                    raise ProgramError(
-                        f"the run visits more than {self.limit} blocks; "
-                        "correct an endless loop, or raise the limit",
-                        code="OLP543",
-                    )
+                self.budget.spend(_VISIT + len(frame.unit.lines[index]))
                 line = frame.unit.line(index)
                 frame.next_index += 1
                 if line.deleted and self.block_delete:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import bisect
+import contextlib
 import itertools
 import re
 from dataclasses import dataclass, field
@@ -15,6 +17,10 @@ _MAYBE_O = re.compile(rb"[\s/]*(?:\([^)]*\)\s*)*(?:[nN][\d\s]*)?[oO]")
 _RADIUS_ARC = re.compile(rb"^[^(;]*[rR]\s*[-+\d.#\[]")
 
 _units = itertools.count()
+
+
+def _index(flow: tuple[int, Flow]) -> int:
+    return flow[0]
 
 
 class Unit:
@@ -31,6 +37,9 @@ class Unit:
         self._compiled: dict[int, Line] = {}
         self._flows: list[tuple[int, Flow]] | None = None
         self._next: dict[tuple[int, str, frozenset[str]], int] = {}
+        self._definitions: dict[tuple[str, str], int] | None = None
+        self._bounds: list[int] | None = None
+        self._numbers: dict[float, list[int]] | None = None
 
     def line(self, index: int) -> Line:
         if index not in self._compiled:
@@ -58,7 +67,11 @@ class Unit:
 
     def definition(self, label: str, keyword: str) -> int | None:
         """Index of the first `sub` or `program` with this label."""
-        return next((i for i, flow in self.flows() if flow.keyword == keyword and flow.label == label), None)
+        if self._definitions is None:
+            self._definitions = {}
+            for i, flow in self.flows():
+                self._definitions.setdefault((flow.label, flow.keyword), i)
+        return self._definitions.get((label, keyword))
 
     def following(self, index: int, label: str, keywords: frozenset[str]) -> int:
         """Index of the next statement with this label, in the same subprogram; ProgramError if none."""
@@ -69,9 +82,9 @@ class Unit:
 
     def _search(self, index: int, label: str, keywords: frozenset[str]) -> int:
         inner = ""
-        for i, flow in self.flows():
-            if i <= index:
-                continue
+        flows = self.flows()
+        for k in range(bisect.bisect_right(flows, index, key=_index), len(flows)):
+            i, flow = flows[k]
             if inner:
                 inner = "" if (flow.keyword, flow.label) == ("endsub", inner) else inner
                 continue
@@ -87,13 +100,30 @@ class Unit:
 
     def block_number(self, number: int, index: int) -> int:
         """Index of the line N`number` in the program around `index`: forward first, then from its start."""
-        bounds = [i for i, flow in self.flows() if flow.keyword == "program"]
-        start = max((i for i in bounds if i <= index), default=0)
-        stop = min((i for i in bounds if i > index), default=len(self.lines))
-        for i in itertools.chain(range(index + 1, stop), range(start, index + 1)):
-            if any(w.letter == "n" and w.value is None and w.number == number for w in self.line(i).words):
-                return i
+        if self._bounds is None:
+            self._bounds = [i for i, flow in self.flows() if flow.keyword == "program"]
+        k = bisect.bisect_right(self._bounds, index)
+        start = self._bounds[k - 1] if k else 0
+        stop = self._bounds[k] if k < len(self._bounds) else len(self.lines)
+        places = self._numbered().get(number, [])
+        ahead = bisect.bisect_right(places, index)
+        if ahead < len(places) and places[ahead] < stop:
+            return places[ahead]
+        first = bisect.bisect_left(places, start)
+        if first < ahead:
+            return places[first]
         raise ProgramError(f"GOTO {number}: the program has no block N{number}", code="OLP542")
+
+    def _numbered(self) -> dict[float, list[int]]:
+        """The lines of each block number, in order. A line that is broken has none, until it is run."""
+        if self._numbers is None:
+            self._numbers = {}
+            for i in range(len(self.lines)):
+                with contextlib.suppress(ProgramError):
+                    for word in self.line(i).words:
+                        if word.letter == "n" and word.value is None:
+                            self._numbers.setdefault(word.number, []).append(i)
+        return self._numbers
 
 
 @dataclass(slots=True)

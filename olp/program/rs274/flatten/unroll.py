@@ -19,10 +19,11 @@ from decimal import Decimal
 
 import numpy as np
 
+from olp.core.budget import Budget
 from olp.core.errors import ProgramError
 from olp.core.units import AXES
 from olp.program.origin import Origin, Unrolled
-from olp.program.rs274.cycles import Stroke
+from olp.program.rs274.cycles import Stroke, stroke_budget
 from olp.program.rs274.flatten.expressions import filled, whole
 from olp.program.rs274.flatten.language import Language
 from olp.program.rs274.flatten.lines import Line, Word
@@ -34,6 +35,11 @@ from olp.program.rs274.profiles.base import Profile
 
 _COMMENT = re.compile(rb"\([^)]*\)")
 _ENDS = frozenset({2, 30})
+
+#: bytes of visited blocks, each with some for the visit itself: of a short program, and for each byte
+UNROLLED_BYTES = 12_000_000
+UNROLLED_PER_BYTE = 80
+_TOO_LONG = "the run visits more than {limit} bytes of blocks; correct an endless loop, or divide the program"
 
 
 def no_subprograms(name: str) -> tuple[str, bytes] | None:
@@ -50,7 +56,7 @@ def flatten(
     expand_cycles: bool = False,
     file: str | None = None,
     peck_clearance: float | None = None,
-    limit: int = 1_000_000,
+    limit: int = UNROLLED_BYTES,
 ) -> Unrolled:
     """Plain blocks of a program, with the origin of each; see the module for what is kept.
 
@@ -58,13 +64,16 @@ def flatten(
     lower-case name. `block_delete`: blocks with `/` are left out (switch on), or executed (off). With
     None both positions of the switch have to give the same program. `expand_cycles` writes canned cycles as
     G0, G1, G4 and spindle blocks. `peck_clearance` (program units) is the clearance of G73 and G83, needed
-    where a parameter of the control sets it. `limit` is the largest number of blocks that the run may visit.
-    Raises ProgramError with the line in the source, or with the line in the subprogram and its file.
+    where a parameter of the control sets it. `limit` is the work that a short program may cause, in bytes of
+    visited blocks; a long one may cause `UNROLLED_PER_BYTE` for each of its bytes. Raises ProgramError with
+    the line in the source, or with the line in the subprogram and its file.
     """
-    writer = _Flattener(profile, expand_cycles=expand_cycles, peck_clearance=peck_clearance)
+    strokes = stroke_budget(len(data))
+    writer = _Flattener(profile, strokes, expand_cycles=expand_cycles, peck_clearance=peck_clearance)
     main = Unit(data, profile, file)
     visit = writer.block
-    Walk(main, writer.variables, subprograms, visit, block_delete=block_delete, limit=limit).run()
+    budget = Budget.of(len(data), least=limit, per_byte=UNROLLED_PER_BYTE, message=_TOO_LONG)
+    Walk(main, writer.variables, subprograms, visit, block_delete=block_delete, budget=budget).run()
     return Unrolled.of(writer.text(main), writer.origin(main))
 
 
@@ -93,10 +102,13 @@ def number_text(value: float, letter: str, language: Language, exact: bool = Fal
 class _Flattener:
     """Writes the blocks that a walk visits and follows the state of the control."""
 
-    def __init__(self, profile: Profile, *, expand_cycles: bool, peck_clearance: float | None) -> None:
+    def __init__(
+        self, profile: Profile, strokes: Budget, *, expand_cycles: bool, peck_clearance: float | None
+    ) -> None:
         self.language, self.cycles = profile.language, profile.cycles
         self.state = ProgramState(profile)
         self.variables = Variables(self.state)
+        self.strokes = strokes
         self.expand_cycles = expand_cycles
         self.peck_clearance = peck_clearance
         self._seen: set[tuple[int, int]] = set()
@@ -183,16 +195,20 @@ class _Flattener:
     def _cycle(self, active: list[Value]) -> tuple[Stroke, ...] | None:
         if not self.expand_cycles:
             try:
-                self.state.cycle(active, self.peck_clearance or 1.0)
+                count = len(self.state.cycle(active, self.peck_clearance or 1.0))
             except ProgramError:
                 # Only the position is lost; a block that needs it is an error.
                 self.state.forget()
+            else:
+                self.strokes.spend(count)
             return None
         if self.cycles.taps_by_control and self.state.codes(active) & {740, 840}:
             raise ProgramError(
                 "G74 and G84 are synchronised by the control: plain moves cannot replace them", code="OLP544"
             )
-        return self.state.cycle(active, self.peck_clearance)
+        strokes = self.state.cycle(active, self.peck_clearance)
+        self.strokes.spend(len(strokes))
+        return strokes
 
     def _of_cycle(self, word: Word, value: float | None) -> bool:
         if word.letter == "g":

@@ -145,7 +145,7 @@ def test_block_delete_switch() -> None:
         ("X#5602000\n", 1, "out of range"),
         ("X#<none>\n", 1, "#<none>"),
         ("#<_x>=1\n", 1, "#<_x>"),
-        ("o1 while [1]\n#1=1\no1 endwhile\n", 3, "blocks"),
+        ("o1 while [1]\n#1=1\no1 endwhile\n", 1, "blocks"),
         ("o1 sub\no1 call\no1 endsub\no1 call\n", 2, "levels deep"),
         ("o1 if [0]\nX1\n", 1, "label 1"),
         ("o1 endwhile\n", 1, "no open loop"),

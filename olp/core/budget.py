@@ -1,0 +1,28 @@
+"""How much work an input may cause: bounded by its bytes, so that no small file takes long."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from olp.core.errors import ProgramError
+
+
+@dataclass(slots=True)
+class Budget:
+    """An amount of work that may be spent once. `message` is raised where it is exceeded, with {limit} put
+    in."""
+
+    limit: int
+    message: str
+    spent: int = 0
+
+    @classmethod
+    def of(cls, size: int, *, least: int, per_byte: float, message: str) -> Budget:
+        """For an input of `size` bytes: `least`, or so much for each byte where that is more."""
+        return cls(max(least, int(per_byte * size)), message)
+
+    def spend(self, amount: int) -> None:
+        """Take an amount. Raises ProgramError, without a line, where the budget is exceeded."""
+        self.spent += amount
+        if self.spent > self.limit:
+            raise ProgramError(self.message.format(limit=self.limit), code="OLP543")

@@ -1,0 +1,59 @@
+"""Words of a block that is split: which part they go to, by hand."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from cases.acceptance import TRUE_ZERO, machine, unstamped
+
+import olp
+
+#: A line to X400 bends by 25 um at X160, so it needs more parts than one.
+BEND = {"x.csv": "X_mm,EYX_um\n-1000,0\n150,0\n160,25\n2000,25\n"}
+CURVE = '[[curves]]\nfile = "x.csv"\ninterpolation = "linear"\n'
+HEAD = b"G21 G90 G54\nG0 X0. Y0. Z0.\n"
+
+
+def parts(folder: Path, block: bytes, head: bytes = HEAD) -> list[bytes]:
+    path = machine(folder, CURVE, BEND, tables=TRUE_ZERO)
+    text = unstamped(olp.correct(head + block + b"\nM2\n", path).data)
+    lines = text[len(head) :].splitlines()[:-1]
+    assert len(lines) >= 3
+    return lines
+
+
+@pytest.mark.parametrize("word", (b"M0", b"M1", b"M2", b"M5", b"M9", b"M30"))
+def test_what_ends_a_block_goes_to_its_last_part(tmp_path: Path, word: bytes) -> None:
+    *first, last = parts(tmp_path, b"G1 X400. F100. " + word)
+    assert last.endswith(b" " + word)
+    assert not any(word in line.split() for line in first)
+
+
+@pytest.mark.parametrize("word", (b"M3 S500", b"M4 S500", b"M7", b"M8"))
+def test_what_begins_a_block_stays_with_its_first_part(tmp_path: Path, word: bytes) -> None:
+    first, *rest = parts(tmp_path, b"G1 X400. F100. " + word)
+    assert first.endswith(word)
+    assert not any(b"M" in line for line in rest)
+
+
+def test_both_keep_their_order(tmp_path: Path) -> None:
+    first, *_, last = parts(tmp_path, b"G1 X400. F100. M48 M5 M9")
+    assert b"M48" in first and b"M5" not in first and b"M9" not in first
+    assert last.endswith(b" M5 M9")
+
+
+def test_every_part_of_a_deletable_block_is_deletable(tmp_path: Path) -> None:
+    lines = parts(tmp_path, b"/G1 X400. F100.\nG1 X0. Y0. Z0.")
+    assert all(line.startswith(b"/") for line in lines[: len(lines) // 2])
+
+
+def test_parts_in_g93_share_the_time_of_their_block(tmp_path: Path) -> None:
+    """F1.25 is 0.8 min a block: the times of the parts, 1 / F each, add up to that."""
+    lines = parts(tmp_path, b"G1 X400. F1.25", HEAD + b"G93\n")
+    feeds = [float(line.split(b"F")[1].split()[0]) for line in lines]
+    assert sum(1 / feed for feed in feeds) == pytest.approx(0.8, rel=1e-4)
+    # as long as its part is
+    x_mm = [0.0, *(float(line.split(b"X")[1].split()[0]) for line in lines)]
+    for a, b, feed in zip(x_mm, x_mm[1:], feeds, strict=False):
+        assert 1 / feed == pytest.approx(0.8 * (b - a) / 400.0, rel=1e-3)

@@ -1,0 +1,131 @@
+"""Short texts that would make work without end are refused in one sentence that states the bound."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from cases.acceptance import TRUE_ZERO, machine
+
+import olp
+from olp.core.budget import Budget
+from olp.core.errors import ProgramError
+from olp.program.registry import named
+from olp.program.rs274.flatten import unroll
+from olp.program.rs274.profiles.base import Profile
+
+HEAD = "G21 G90 G54 G17\nG0 X1 Y2 Z3\nF100 S100 M3\n"
+SERIES = "G91 G81 X0.001 Z-1 R1 "
+
+
+def profile(name: str = "grbl") -> Profile:
+    found = named(name)
+    assert isinstance(found, Profile)
+    return found
+
+
+def test_a_budget_is_spent_once_and_grows_with_the_input() -> None:
+    budget = Budget.of(100, least=10, per_byte=0.5, message="more than {limit}")
+    budget.spend(50)
+    with pytest.raises(ProgramError, match="more than 50"):
+        budget.spend(1)
+    assert Budget.of(100, least=60, per_byte=0.5, message="").limit == 60
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "expected"),
+    [
+        ("G2 X2 R99999999999\n", 4, r"radius of an arc is 1e\+11 mm; expected at most 1e\+07 mm"),
+        ("G2 X2 I99999999\n", 4, r"radius of an arc is 1e\+08 mm"),
+        ("G2 X1 I5 Z9 P9999999\n", 4, "number of turns; expected at most 10000"),
+        ("G2 I5 Z9 P6000\nG2 I5 Z3 P6000\n", 5, "make more than 10000 further turns; divide the program"),
+        (SERIES + "L99999999\n", 4, "makes 99999999 holes; expected at most 20000"),
+        (SERIES + "L12000\nX0.001 L12000\n", 5, "have more than 250000 strokes"),
+        ("G83 X1 Z-100 R1 Q0.0012\n", 4, "have more than 250000 strokes"),
+    ],
+)
+def test_the_reader_states_the_bound_with_the_line(
+    text: str, line: int, expected: str, tmp_path: Path
+) -> None:
+    path = machine(tmp_path, tables=TRUE_ZERO)
+    with pytest.raises(ProgramError, match=expected) as caught:
+        olp.inspect((HEAD + text + "M2\n").encode(), path)
+    assert caught.value.line == line
+
+
+@pytest.mark.parametrize("text", ["G2 X2 R9999999\n", "G2 X1 I5 Z2 P3000\n", SERIES + "L9000\n"])
+def test_what_is_large_and_within_the_bounds_is_read(text: str, tmp_path: Path) -> None:
+    path = machine(tmp_path, tables=TRUE_ZERO)
+    assert olp.inspect((HEAD + text + "M2\n").encode(), path)
+
+
+NESTED = "".join(f"o{k} repeat [10]\n" for k in range(12)) + "G1 X1\n"
+NESTED += "".join(f"o{k} endrepeat\n" for k in reversed(range(12)))
+
+
+@pytest.mark.parametrize(
+    ("dialect", "text"),
+    [
+        ("linuxcnc", "o1 while [1]\nG1 X1\nG1 X2\no1 endwhile\n"),
+        ("linuxcnc", NESTED),
+        ("grbl", "o1 repeat [99999]\n(" + "c" * 90_000 + ")\no1 endrepeat\n"),
+        ("grbl", "o1 repeat [99999]\nG1 X[" + "+".join(["1"] * 9000) + "]\no1 endrepeat\n"),
+        ("fanuc", "O1\nM98 P2 L99999999\nM30\nO2\nG91\nG1 X0.001\nM99\n"),
+        ("fanuc", "O1\nN1 G0 X1.\nGOTO 1\nM30\n"),
+    ],
+)
+def test_unrolling_is_bounded_by_the_bytes_of_visited_blocks(
+    dialect: str, text: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(unroll, "UNROLLED_PER_BYTE", 0)
+    with pytest.raises(ProgramError, match="visits more than 200000 bytes of blocks; correct") as caught:
+        unroll.flatten(text.encode(), profile(dialect), limit=200_000)
+    assert caught.value.line is not None
+
+
+@pytest.mark.parametrize("expand", [False, True])
+def test_strokes_of_unrolled_cycles_are_bounded(expand: bool) -> None:
+    text = HEAD + "o1 repeat [99]\nG91 G81 X0.001 Z-1 R1 L19999\no1 endrepeat\nM2\n"
+    with pytest.raises(ProgramError, match="have more than 250000 strokes") as caught:
+        unroll.flatten(text.encode(), profile(), expand_cycles=expand)
+    assert caught.value.line == 5
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"),
+    [
+        ("**".join(["9"] * 9000), "has no finite real value"),
+        ("[" * 500 + "1" + "]" * 500, "nested deeper than 60"),
+        ("-" * 9000 + "1", "nested deeper than 60"),
+        ("#" * 9000 + "1", "nested deeper than 60"),
+        ("1" + "0" * 9000 + "*10", "is too large"),
+    ],
+)
+def test_expressions_are_bounded_in_depth_and_value(value: str, expected: str) -> None:
+    with pytest.raises(ProgramError, match=expected) as caught:
+        unroll.flatten(f"G21\nG0 X[{value}]\n".encode(), profile())
+    assert caught.value.line == 2
+
+
+def test_a_long_sum_is_no_deep_one() -> None:
+    text = f"G0 X[{'+'.join(['1'] * 9000)}]\n"
+    assert unroll.flatten(text.encode(), profile()) == b"G0 X9000\n"
+
+
+def test_a_long_label_is_refused() -> None:
+    with pytest.raises(ProgramError, match="a label has 9000 characters; expected at most 250"):
+        unroll.flatten(("o" + "1" * 9000 + " sub\n").encode(), profile())
+
+
+def test_twenty_thousand_o_words_are_found_by_their_labels(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each search begins where it is, and looks at few statements."""
+    count = 5000
+    text = "".join(f"o{k} sub\nG0 X{k}\no{k} endsub\n" for k in range(1, count + 1))
+    text += "".join(f"o{k} call\n" for k in range(1, count + 1)) + "M2\n"
+    assert unroll.flatten(text.encode(), profile()).count(b"\n") == count + 1
+
+
+def test_goto_takes_the_next_block_of_a_number_then_the_first() -> None:
+    text = "O1\nN1 #1=0\nN5 #1=#1+1\nIF[#1EQ2]GOTO 5\nIF[#1LT3]GOTO 5\nG0 X#1\nN5 M30\n"
+    assert b"X3" in unroll.flatten(text.replace("N5 M30", "N6 M30").encode(), profile("fanuc"))
+    assert b"X" not in unroll.flatten(text.encode(), profile("fanuc"))
