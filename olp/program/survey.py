@@ -58,6 +58,8 @@ UNKNOWN_POSITION = "OLP524"
 ARC = "OLP530"
 #: What is taken out with it states nothing.
 COMMENT = "OLP514"
+#: Instead of the hint to unroll, of a word that an unrolled program still has.
+_KEPT = "--flatten does not unroll it; write plain blocks"
 
 
 def as_it_is(file: str | None, text: bytes) -> bytes:
@@ -191,8 +193,7 @@ class _Survey:
         again = key in self.errors
         follows = RULES[error.code].follows
         if self.unroll is not None and error.hint:
-            instead = "--flatten does not unroll it; write plain blocks"
-            error.message, error.hint = error.message.removesuffix(error.hint) + instead, ""
+            _without_hint(error, _KEPT)
         # the rest of a block without its refused word is refused only because of that
         if not again and not (follows and place in taken):
             before = bisect_left(taken, place) if follows else 0
@@ -216,9 +217,7 @@ class _Survey:
         if error.code != COMMENT:
             self.taken.append(place)
         if error.word and not again:
-            number = rb"0*" + re.escape(error.word[1:].encode()) + rb"(?![\d.])"
-            form = rb"(?i)" + error.word[:1].encode() + (number if error.word[1:] else _NUMBER)
-            text = re.sub(form, lambda m: b" " * len(m[0]), lines[index])
+            text = _form(error.word).sub(lambda m: b" " * len(m[0]), lines[index])
             if text != lines[index]:
                 lines[index] = text
                 return
@@ -233,8 +232,8 @@ class _Survey:
         return [error for error, _ in self.errors.values() if error.hint]
 
     def judge_hints(self, subprograms: Subprograms | None) -> None:
-        """Replace the hint to unroll a text that cannot be unrolled by the reason for that. The refusals
-        without the hint are taken out before."""
+        """Replace the hint to unroll what cannot be unrolled by the reason for that. The refusals without the
+        hint are taken out before."""
         hinted = self.hinted()
         if not hinted or self.dialect.unroller is None:
             return
@@ -244,15 +243,21 @@ class _Survey:
                 text[error.line - 1] = _NO_LINE_END.sub(b" ", text[error.line - 1])
         beside = {} if subprograms is None else {"subprograms": subprograms}
         try:
-            self.dialect.unroller(b"".join(text), self.dialect, limit=UNROLLED, **beside)
+            unrolled = self.dialect.unroller(b"".join(text), self.dialect, limit=UNROLLED, **beside)
         except ProgramError as error:
             if error.code == TOO_LONG:
                 return
             place = f"line {error.line}" + (f" of {error.file}" if error.file else "")
             instead = f"--flatten does not unroll it: {place}: {error.message}"
             for each in hinted:
-                each.message = each.message.removesuffix(each.hint) + instead
-                each.hint = ""
+                _without_hint(each, instead)
+            return
+        kept = list(zip(unrolled.origin.line.tolist(), self.dialect.lines(unrolled), strict=True))
+        for each in hinted:
+            if each.word and any(
+                line == each.line and _form(each.word).search(block) for line, block in kept
+            ):
+                _without_hint(each, _KEPT)
 
     def error(self, *, complete: bool) -> ProgramError:
         """What was refused, in the order of lines; a single refusal as it is."""
@@ -274,6 +279,16 @@ class _Survey:
         text = lines[line - 1] if line <= len(lines) else b""
         shown = text.strip()[:SHOWN].decode("utf-8", "replace")
         return "".join(c if c.isprintable() else "?" for c in shown)
+
+
+def _form(word: str) -> re.Pattern[bytes]:
+    """How a word is written, such as G068 for G68; of a letter alone with any number."""
+    number = rb"0*" + re.escape(word[1:].encode()) + rb"(?![\d.])"
+    return re.compile(rb"(?i)" + word[:1].encode() + (number if word[1:] else _NUMBER))
+
+
+def _without_hint(error: ProgramError, instead: str) -> None:
+    error.message, error.hint = error.message.removesuffix(error.hint) + instead, ""
 
 
 def _defined(setup: Setup, table: str, name: str) -> Setup:

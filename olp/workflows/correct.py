@@ -149,8 +149,8 @@ def _refuse_stamped(data: bytes) -> None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Rewritten:
-    """A program written with its corrections: `source` is the text that was read, `nominal` what it says,
-    without its words, `uncorrected` are moves that are left so, (n,) `parts` the number of moves of each
+    """A program written with its corrections. `source` is the text that was read, `nominal` what it says,
+    without its words. `uncorrected` are moves that are left so, (n,) `parts` the number of moves of each
     nominal one."""
 
     source: Source

@@ -92,6 +92,34 @@ def test_a_hint_to_unroll_is_given_where_that_helps() -> None:
     assert mixed[1].message.endswith("with --flatten")
 
 
+def test_a_hint_to_unroll_is_not_given_for_what_an_unrolled_program_still_has() -> None:
+    (saved,) = reasons(HEAD + b"M70\n")
+    assert saved.message == "M70 saves modal codes; --flatten does not unroll it; write plain blocks"
+    (called,) = reasons(HEAD + b"M98 P1\nM2\nO1\nG1 X1.\nM99\n", "fanuc")[:1]
+    assert called.message.endswith("unroll the program with --flatten")
+
+
+def test_blocks_that_break_a_rule_of_the_control_are_found_in_one_reading(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    done = []
+
+    def counted(data: bytes, *args: Any, **options: Any) -> Program:
+        done.append(len(data))
+        return read(data, *args, **options)
+
+    monkeypatch.setattr(survey, "read", counted)
+    # a word without a use, a word twice, two motions, a code without its word, N behind, a comment
+    blocks = b"G1 X1. R5.\nG1 X1. X2.\nG0 G1 X3.\nG4\nX5. N9\n" * 20
+    codes = ("OLP519", "OLP515", "OLP515", "OLP516", "OLP505") * 20
+    assert stated(HEAD + blocks) == [(line, code, None) for line, code in enumerate(codes, 3)]
+    # the program, and once more without them
+    assert len(done) <= 3
+    assert stated(HEAD + b"(a\n(b (c)\n%5\nG1 X1.\x05\n") == [
+        (3, "OLP514", None), (4, "OLP514", None), (5, "OLP505", None), (6, "OLP502", None),
+    ]  # fmt: skip
+
+
 def test_the_message_lists_twenty_and_counts_the_others() -> None:
     with pytest.raises(Refused) as caught:
         survey.read_all(HEAD + b"G68 R3\n" * 33, SETUP, named("linuxcnc"))
