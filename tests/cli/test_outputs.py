@@ -111,7 +111,7 @@ def test_only_what_came_from_stdin_is_called_so(
 
 
 @pytest.mark.parametrize(("verb", "target"), [
-    ("check", "olp.workflows.check.run"), ("view", "olp.review.job.run"),
+    ("check", "olp.workflows.check.examined"), ("view", "olp.review.job.run"),
     ("retime", "olp.workflows.retime.run"),
 ])  # fmt: skip
 def test_an_error_of_no_file_stays_of_no_file(

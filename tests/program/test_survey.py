@@ -97,6 +97,10 @@ def test_a_hint_to_unroll_is_not_given_for_what_an_unrolled_program_still_has() 
     assert saved.message == "M70 saves modal codes; --flatten does not unroll it; write plain blocks"
     (called,) = reasons(HEAD + b"M98 P1\nM2\nO1\nG1 X1.\nM99\n", "fanuc")[:1]
     assert called.message.endswith("unroll the program with --flatten")
+    (macro,) = reasons(HEAD + b"G65 P1 X5.\nM2\nO1\nG1 X#24\nM99\n", "fanuc")[:1]
+    assert macro.message == "G65 calls a macro; unroll the program with --flatten"
+    (absent,) = reasons(HEAD + b"G65 P1 X5.\n", "fanuc")
+    assert absent.message.endswith("line 3: subprogram 1 is not in the file, and no file for it was given")
 
 
 def test_blocks_that_break_a_rule_of_the_control_are_found_in_one_reading(

@@ -417,7 +417,7 @@ def test_feeds_and_times_are_told_by_lines_of_the_original(folder: Path) -> None
 #: Blocks that need no unrolling, refused for many reasons, by line and by what stands before.
 PLAIN = (
     "G21 G90 G54 G17 F100\nG0 X1. Y1. Z1.\nG68 X1 R30\nG1 X1,5\nT77 M6\nG1 X1 R5\n(a (b) c)\n"
-    "G1 X2 X3\nG0 G1 X4\nG2 X20. Y0. I4. J0.\nG58 X5\nG81 X6 Z-1\nG80\nG1 X7\nM2\n"
+    "G1 X2 X3\nG0 G1 X4\nG2 X20. Y0. I4. J0.\nG58 X5\nG81 X6 Z-1\nG80\nG1 X7 &1\nG66 P1\nM2\n"
 )
 
 
@@ -438,7 +438,7 @@ def test_every_verb_lists_the_same_refusals_with_and_without_unrolling(
         stated[verb] = done.stdout + done.stderr
     # and every verb lists all of them
     lines = set(re.findall(r"plain\.ngc:(\d+): ", stated["correct"]))
-    assert lines == {str(line) for line in range(3, 13)}
+    assert lines == {str(line) for line in (*range(3, 13), 14, 15)}
     for verb, text in stated.items():
         named = re.findall(r'plain\.ngc:(\d+): |"line": (\d+)', text)
         assert {a or b for a, b in named} == lines, verb
@@ -486,6 +486,13 @@ def test_the_reasons_of_an_unrolled_program_are_those_of_its_own_lines(
     # without unrolling the hint says what --flatten would refuse
     hinted = run("correct", "reasons.ngc", "-m", "machine.toml").stderr
     assert "--flatten does not unroll it: line" in hinted
+
+
+def test_a_macro_call_that_is_unrolled_is_no_reason(controls: Mapping[str, Path]) -> None:
+    text = (START + "G65 P1 X5.\nG68 R3.\nG1 X1.\nM30\nO1\nG1 X#24\nM99\n").encode()
+    with pytest.raises(ProgramError) as caught:
+        olp.correct(text, controls["fanuc"], flatten=True)
+    assert (type(caught.value), caught.value.line) == (ProgramError, 4)
 
 
 def test_an_expanded_cycle_is_not_refused_for_what_its_block_has(folder: Path) -> None:

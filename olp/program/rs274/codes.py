@@ -56,6 +56,8 @@ PATH_MODES = frozenset({610, 611, 640})
 
 #: G4, a dwell.
 DWELL = 40
+#: G65, a macro call.
+MACRO = 650
 #: G10, which writes offsets.
 WRITE_OFFSET = 100
 #: G52, a local offset.

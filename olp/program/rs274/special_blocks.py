@@ -27,6 +27,7 @@ from olp.program.rs274.codes import (
     INCREMENTAL,
     INVERSE_TIME,
     MACHINE,
+    MACRO,
     PLANE_OF,
     RETRACT_TO_R,
 )
@@ -90,8 +91,10 @@ def _checked(
             raise ProgramError(
                 why or f"{name} is not known to the {profile.name} profile and may move the machine",
                 line=line,
-                code="OLP513" if c in CUTTER_COMPENSATION else "OLP512",
-                word=name,
+                code="OLP513" if c in CUTTER_COMPENSATION else "OLP511" if c == MACRO else "OLP512",
+                hint=UNROLL if c == MACRO else "",
+                # the other words of a macro call are its arguments
+                word="" if c == MACRO else name,
             )
     for word in words:
         m = round(word.value * 10)

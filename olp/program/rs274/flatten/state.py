@@ -23,6 +23,7 @@ from olp.program.rs274.codes import (
     LINEAR,
     LOCAL_OFFSET,
     MACHINE,
+    MACRO,
     METRIC,
     PATH_MODES,
     PRESET,
@@ -57,12 +58,12 @@ _UNSETTING = (
     | (SHIFTS - {PRESET})
     | HOMES
     | PROBES
-    | {WRITE_OFFSET, 101, 281, 301, 310, 331, 760, 870, 880, 650, 660}
+    | {WRITE_OFFSET, 101, 281, 301, 310, 331, 760, 870, 880, MACRO, 660}
 )
 _ODD_FRAME = frozenset({70, 71, 121, 160, 434, 510, 511, 680, 682})
 _EVEN_FRAME = frozenset({80, 130, 131, 150, 490, 500, 501, 690})
 #: Codes whose axis words are no motion, or a motion to another position.
-_NO_AXES = HOMES | {DWELL, WRITE_OFFSET, LOCAL_OFFSET, PRESET, MACHINE, 650}
+_NO_AXES = HOMES | {DWELL, WRITE_OFFSET, LOCAL_OFFSET, PRESET, MACHINE, MACRO}
 _STOPS = frozenset({0, 1, 2, 30, 60, 98, 99})
 #: Words that belong to a cycle.
 CYCLE_WORDS = frozenset({"x", "y", "z", "r", "q", "p", "l", "k"})
