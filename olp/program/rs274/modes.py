@@ -154,6 +154,13 @@ class Modes:
         _check_deleted(context, active, state)
         return context
 
+    def check_end(self, line: int) -> None:
+        """Refuse a text that begins with `%` and has no end, where the control does."""
+        if self._state.profile.text.marks_in_pairs and self._tape and not self._ended:
+            raise ProgramError(
+                "the program begins with `%` and has no end; give M2, M30 or a second `%`", line=max(line, 1)
+            )
+
     def leave(self, context: Context, line: int) -> None:
         """Keep the codes in force on this line, the last one that is read, for the next chunk."""
         state = self._state
@@ -169,9 +176,9 @@ class Modes:
         return Codes(chunk.line[g], code, act)
 
     def _spindle(self, chunk: WordChunk, usable: Mask) -> Modal:
-        m = (chunk.letter == 77) & usable & np.isin(chunk.mantissa, (3, 4, 5, 6)) & (chunk.decimals == 0)
+        m = (chunk.letter == 77) & usable & np.isin(chunk.mantissa, (3, 4, 5, 6, 19)) & (chunk.decimals == 0)
         line, code = chunk.line[m], chunk.mantissa[m]
-        # a tool change stops the spindle, and comes before its start in one block
+        # a tool change and an oriented stop end it, the change before its start in one block
         order = np.lexsort((code != 6, line))
         line, code = line[order], code[order]
         last = np.append(line[1:] != line[:-1], True)[: len(line)]
