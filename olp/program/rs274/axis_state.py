@@ -287,6 +287,8 @@ class AxisState(State):
     def _dwell(self, line: int, by_letter: dict[str, Word]) -> None:
         """G4: ISO controls take its time from X too; RS-274 takes it from P only, so axis words still
         move."""
+        if "P" in by_letter and by_letter["P"].value < 0:
+            raise ProgramError("a dwell is negative; expected P0 or more", line=line, code="OLP516")
         if self.profile.axis_dwell and (
             any(a in by_letter for a in "YZ")
             or any(w.letter == "G" and w.value in (0, 1, 2, 3) for w in by_letter.values())

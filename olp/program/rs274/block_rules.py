@@ -69,6 +69,7 @@ class BlockRules:
       free. Ten times the number of a G code, `M` plus ten times that of an M code.
     - `groups`: codes of which a block may have one.
     - `needs`: codes that need one of these letters.
+    - `excludes`: codes that take one of two kinds of letters. `positive`: letters without a negative number.
     - `number_first`: N is the first word of its line. `one_use_of_axes`: no motion code may be beside a code
       that uses the axis words for something else.
     """
@@ -76,6 +77,8 @@ class BlockRules:
     users: Mapping[str, frozenset[int]] = field(default_factory=dict)
     groups: tuple[frozenset[int], ...] = ()
     needs: Mapping[int, str] = field(default_factory=dict)
+    excludes: Mapping[int, tuple[str, str]] = field(default_factory=dict)
+    positive: str = ""
     number_first: bool = False
     one_use_of_axes: bool = False
 
@@ -87,7 +90,9 @@ class BlockRules:
         group = np.full(2 * M, -1, np.int8)
         for number, codes in enumerate(self.groups):
             group[sorted(codes)] = number
-        return _Tables(self, allowed, group, sum(_bits(letter) for letter in self.users))
+        positive = np.zeros(256, bool)
+        positive[list(self.positive.encode())] = True
+        return _Tables(self, allowed, group, positive, sum(_bits(letter) for letter in self.users))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,6 +103,7 @@ class _Tables:
     rules: BlockRules
     allowed: Bits
     group: npt.NDArray[np.int8]
+    _positive: Mask
     bound: int
 
     def check(
@@ -112,6 +118,7 @@ class _Tables:
             self._groups(codes),
             self._lacking(codes, present),
             self._unused(active, codes, present, motion, plane),
+            self._negative(chunk, active),
             self._numbers(chunk, active),
         ):
             for line, why, code, word in rule:
@@ -179,11 +186,23 @@ class _Tables:
             what = f"one of {', '.join(letters)}" if len(letters) > 1 else letters
             for where in line[(key == code) & ((has & _bits(letters)) == 0)].tolist():
                 yield where, f"{_name(code)} needs {what} in its block", "OLP516", ""
+        for code, (one, other) in self.rules.excludes.items():
+            both = line[(key == code) & ((has & _bits(one)) != 0) & ((has & _bits(other)) != 0)]
+            for where in both.tolist():
+                why = f"{_name(code)} takes {one}, or words of axes; expected one of the two"
+                yield where, why, "OLP518", ""
         if self.rules.one_use_of_axes:
             both = np.intersect1d(line[np.isin(key, _STATING)], line[np.isin(key, _MOTIONS)])
             for where in both.tolist():
                 why = "two G codes of this block use its axis words; give each its own block"
                 yield where, why, "OLP518", ""
+
+    def _negative(self, chunk: WordChunk, active: Mask) -> Iterator[Refusal]:
+        words = np.flatnonzero((chunk.mantissa < 0) & self._positive[chunk.letter])
+        for word in words[active[chunk.line[words]]].tolist():
+            letter = chr(int(chunk.letter[word]))
+            why = f"the word {letter} is negative; expected zero or more"
+            yield int(chunk.line[word]), why, "OLP516", letter
 
     def _numbers(self, chunk: WordChunk, active: Mask) -> Iterator[Refusal]:
         if not self.rules.number_first:
@@ -194,10 +213,9 @@ class _Tables:
         if chunk.comments.size:
             opens = np.searchsorted(chunk.comments, chunk.line_start[chunk.line[words]])
             late |= opens < np.searchsorted(chunk.comments, chunk.start[words])
-        late |= chunk.mantissa[words] < 0
         for where in chunk.line[words[late]].tolist():
-            why = "N is not the first word of this block, or negative; put the block number in front"
-            yield where, why, "OLP505", ""
+            why = "N is not the first word of this block; put the block number in front"
+            yield where, why, "OLP505", "N"
 
 
 def _present(chunk: WordChunk) -> Bits:
@@ -267,6 +285,8 @@ NGC_RULES = BlockRules(
         432: "HXYZ",
         960: "S",
     },
+    excludes={432: ("H", "XYZ")},
+    positive="NFSTLH",
     number_first=True,
     one_use_of_axes=True,
 )  # fmt: skip

@@ -95,7 +95,9 @@ class Modes:
         self._m_event[[m * 10 for m in profile.harmless_m]] = False
         self._rules = profile.rules.tables()
         self._linear_motion = state.motion
-        self._ended = self._tape = False
+        self._ended = False
+        # the line of the first tape mark, from 1
+        self._tape = 0
 
     def program_end(self, chunk: WordChunk) -> int:
         """The number of lines up to the end of the program: M2, M30, or the second tape mark."""
@@ -122,7 +124,7 @@ class Modes:
             if pairs and chunk.comments.size:
                 first &= bool(chunk.comments[0] > chunk.line_start[mark])
             if not self._tape and first:
-                self._tape = True
+                self._tape = chunk.first_line + mark + 1
             elif self._tape or not pairs:
                 last, self._ended = mark, True
             else:
@@ -162,6 +164,15 @@ class Modes:
         keys = self._keys(context.chunk, context.value, context.codes, active[context.chunk.line])
         self._rules.check(context.chunk, active, keys, context.motion, context.plane)
 
+    def check_end(self) -> None:
+        """Refuse a text that begins with `%` and has no end, where the control does."""
+        if self._state.profile.text.marks_in_pairs and self._tape and not self._ended:
+            raise ProgramError(
+                "the program begins with `%` and has no end; give M2, M30 or a second `%`",
+                line=self._tape,
+                code="OLP532",
+            )
+
     def leave(self, context: Context, line: int) -> None:
         """Keep the codes in force on this line, the last one that is read, for the next chunk."""
         state = self._state
@@ -177,9 +188,9 @@ class Modes:
         return Codes(chunk.line[g], code, act)
 
     def _spindle(self, chunk: WordChunk, usable: Mask) -> Modal:
-        m = (chunk.letter == 77) & usable & np.isin(chunk.mantissa, (3, 4, 5, 6)) & (chunk.decimals == 0)
+        m = (chunk.letter == 77) & usable & np.isin(chunk.mantissa, (3, 4, 5, 6, 19)) & (chunk.decimals == 0)
         line, code = chunk.line[m], chunk.mantissa[m]
-        # a tool change stops the spindle, and comes before its start in one block
+        # a tool change and an oriented stop end it, the change before its start in one block
         order = np.lexsort((code != 6, line))
         line, code = line[order], code[order]
         last = np.append(line[1:] != line[:-1], True)[: len(line)]

@@ -100,6 +100,7 @@ class _Reader:
             data = b"   " + data[3:]
         for chunk in chunks(data, self.state.profile.text):
             self._chunk(chunk)
+        self.modes.check_end()
         return self.collector.program(self.state, self.end_line)
 
     # -- one chunk ---------------------------------------------------------------------------------

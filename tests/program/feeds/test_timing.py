@@ -92,7 +92,7 @@ REFUSED = {
     "no F at all": ("G0 X1\nG1 X2", "linuxcnc", 2, "no feed"),
     "F too late": ("G1 X2\nF60\nX3", "linuxcnc", 1, "no feed"),
     "zero": ("G1 X2 F0", "linuxcnc", 1, "not above zero"),
-    "negative": ("G1 X2 F-3", "linuxcnc", 1, "not above zero"),
+    "negative": ("G1 X2 F-3", "grbl", 1, "not above zero"),
     "G93 needs one in each block": ("G93 G1 X2 F1\nX3", "linuxcnc", 2, "in its own block"),
     "G93 does not take an older one": ("F3\nG93\nG1 X2", "linuxcnc", 3, "in its own block"),
     "G94 after G93": ("F60\nG1 X1\nG93 X2 F1\nG94\nX3", "linuxcnc", 5, "no feed"),
@@ -106,7 +106,7 @@ REFUSED = {
     "no point on a Haas": ("G1 X1. F60", "haas", 1, "decimal point"),
     "no point in inches": ("G20\nG1 X1. F60", "fanuc", 2, "decimal point"),
     "a dwell without a time": ("G4", "grbl", 1, "no P word"),
-    "a negative dwell": ("G4 P-1", "linuxcnc", 1, "negative"),
+    "a negative dwell": ("G4 X-1.", "fanuc", 1, "negative"),
     "a dwell with two times": ("G4 X1. P100", "fanuc", 1, "two times"),
 }
 
