@@ -217,8 +217,8 @@ class InterpreterFailure(RuntimeError):
         self.failed = failed
 
 
-#: The interpreter relies on zeros where it sets nothing, as for its spindles. A process that has freed much memory
-#: would give it used memory: so large blocks always come fresh.
+#: The interpreter relies on zeros where it sets nothing, as for its spindles. A process that has freed much
+#: memory would give it used memory: so large blocks always come fresh.
 _FRESH_MEMORY = {"MALLOC_MMAP_THRESHOLD_": "16384"}
 
 
