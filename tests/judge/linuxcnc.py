@@ -217,6 +217,11 @@ class InterpreterFailure(RuntimeError):
         self.failed = failed
 
 
+#: The interpreter relies on zeros where it sets nothing, as for its spindles. A process that has freed much
+#: memory would give it used memory: so large blocks always come fresh.
+_FRESH_MEMORY = {"MALLOC_MMAP_THRESHOLD_": "16384"}
+
+
 class _Server:
     """LinuxCNC's interpreter in a process of its own, which answers one program after the other."""
 
@@ -227,7 +232,7 @@ class _Server:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             cwd=self.folder.name,
-            env={"HOME": self.folder.name, "PATH": os.environ.get("PATH", "")},
+            env={"HOME": self.folder.name, "PATH": os.environ.get("PATH", ""), **_FRESH_MEMORY},
         )
         self.owner = os.getpid()
         atexit.register(self.close)
