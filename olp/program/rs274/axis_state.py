@@ -222,9 +222,11 @@ class AxisState(State):
                 )
             self.spindle = self.selected
             self._tool(self.spindle, line, "M6")
-            if "H" in by_letter and not by_letter["H"].value and self.profile.length_of_spindle_tool:
+            lengths = {430, 432}.intersection(codes) and self.profile.length_of_spindle_tool
+            if lengths and not (by_letter["H"].value if "H" in by_letter else self.spindle):
                 raise ProgramError(
-                    "H0 beside M6 takes the length of the tool before the change; put it into the next block",
+                    "a tool length beside M6 is that of the tool before the change; put it into the next "
+                    "block",
                     line=line,
                     code="OLP518",
                 )

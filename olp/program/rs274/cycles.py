@@ -71,6 +71,7 @@ class CycleRules:
     - `keeps_numbers`: a series keeps its initial level, R and depth as numbers of the program. Offsets and
       units may change, and G28 may come between. Else it has to end there.
     - `turning`: how the spindle has to turn in these cycles, M3 or M4.
+    - `other_axes`: words of further axes may be in the block of a cycle.
     - `exact_corners`: all corners of a cycle are exact, whatever the path mode.
     """
 
@@ -85,6 +86,7 @@ class CycleRules:
     levels_follow_distance: bool
     keeps_numbers: bool
     exact_corners: bool
+    other_axes: bool
     turning: Mapping[int, tuple[int, ...]]
 
     def counter(self, words: Mapping[str, int]) -> int | None:
@@ -96,13 +98,13 @@ NGC_CYCLES = CycleRules(
     rises_first=True, feeds_home=True, taps_in_any_plane=False, taps_by_control=False,
     peck_by_parameter=False, repeat_words="L", stores=False, new_code_forgets=True,
     levels_follow_distance=False, keeps_numbers=True, exact_corners=True,
-    turning={740: (4,), 840: (3,), 860: (3, 4)},
+    other_axes=False, turning={740: (4,), 840: (3,), 860: (3, 4)},
 )  # fmt: skip
 ISO_CYCLES = CycleRules(
     rises_first=False, feeds_home=False, taps_in_any_plane=True, taps_by_control=True,
     peck_by_parameter=True, repeat_words="LK", stores=True, new_code_forgets=False,
     levels_follow_distance=True, keeps_numbers=False, exact_corners=False,
-    turning={},
+    other_axes=True, turning={},
 )  # fmt: skip
 
 

@@ -125,11 +125,12 @@ class Modes:
                 first &= bool(chunk.comments[0] > chunk.line_start[mark])
             if not self._tape and first:
                 self._tape = chunk.first_line + mark + 1
-            elif self._tape or not pairs:
+            elif (self._tape and mark not in chunk.odd) or not pairs:
                 last, self._ended = mark, True
             else:
                 raise ProgramError(
-                    "`%` is in the middle of the program; expected it as the first line, or not at all",
+                    "`%` is in the middle of the program, or not alone in its line; expected it as the first "
+                    "line and the last one, or not at all",
                     line=chunk.first_line + mark + 1,
                     code="OLP505",
                 )

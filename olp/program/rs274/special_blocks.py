@@ -294,7 +294,11 @@ class SpecialBlocks:
         """Refuse modes in which the control makes no cycle."""
         why = ""
         turning = self._state.profile.cycles.turning.get(code)
-        if context.feed_mode[row] == INVERSE_TIME:
+        span = slice(int(context.chunk.first_word[row]), int(context.chunk.first_word[row + 1]))
+        others = set(context.chunk.letter[span].tolist()).intersection(b"ABCUVW")
+        if others and not self._state.profile.cycles.other_axes:
+            why = f"moves {chr(min(others))} too, which the control refuses; move it in a block of its own"
+        elif context.feed_mode[row] == INVERSE_TIME:
             why = "is in inverse time (G93); give G94 before it"
         elif self._state.compensation is not None:
             why = "is in cutter compensation; give G40 before it"

@@ -178,7 +178,7 @@ def test_every_field_is_read_by_hand() -> None:
     own = {f.name for f in fields(Profile)} - {f.name for f in fields(Profile.__base__)}  # type: ignore[arg-type]
     assert own == set(READINGS) | OF_TIME | TABLES
     # letters, K on Fanuc and Haas, and the spindle, which `test_interleaved` holds
-    assert {f.name for f in fields(CycleRules)} == {*CYCLES, "repeat_words", "turning"}
+    assert {f.name for f in fields(CycleRules)} == {*CYCLES, "repeat_words", "turning", "other_axes"}
 
 
 @pytest.mark.parametrize(

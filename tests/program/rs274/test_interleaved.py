@@ -98,7 +98,9 @@ REFUSED = {
     "G4 P-1": "a dwell is negative",
     "M19 G74 X5 R2 Z-3": "give M4 before it",
     "T2 M6 G84 X5 R2 Z-3": "give M3 before it",
-    "T2 M6 G43 H0": "H0 beside M6",
+    "T2 M6 G43 H0": "a tool length beside M6",
+    "T0 M6 G43": "a tool length beside M6",
+    "G81 X5 R2 Z-3 U1": "moves U too",
     "M5 G84 X5 R2 Z-3": "give M3 before it",
     "G74 X5 R2 Z-3": "give M4 before it",
     "M5 G86 X5 R2 Z-3 P0": "give M3 or M4 before it",
@@ -110,7 +112,7 @@ REFUSED = {
 
 
 #: Those that the control refuses as well; it reads the others in another way.
-UNSAFE = [t for t in REFUSED if not set("\r\0") & set(t) and not {"H0", "G43.1"} & set(t.split())]
+UNSAFE = [t for t in REFUSED if not set("\r\0") & set(t) and not {"H0", "G43.1", "T0"} & set(t.split())]
 
 
 @pytest.fixture(scope="module")
