@@ -824,7 +824,9 @@ HOSTILE = (
 def test_a_hostile_program_is_text_and_nothing_else(chromium: Any, tmp_path: Path) -> None:
     comments = [b"(" + text.replace(b"(", b"[").replace(b")", b"]") + b")" for text in HOSTILE]
     comments.append(b"(" + b"A" * 1_000_000 + b")")
-    program = b"\n".join([b"G21 G90 G54", *comments, b"T1 M6\nG43 H1\nG0 X10 Y10 Z5\nG1 X50 F600\nM2\n"])
+    # behind the end a control takes anything
+    path = b"G21 G90 G54\nT1 M6\nG43 H1\nG0 X10 Y10 Z5\nG1 X50 F600\nM2"
+    program = b"\n".join([path, *comments, b""])
     name = tmp_path / "<b>part&.ngc"
     name.write_bytes(program)
     view(name, GANTRY).write(tmp_path / "hostile.html")
@@ -843,7 +845,7 @@ def test_a_hostile_program_is_text_and_nothing_else(chromium: Any, tmp_path: Pat
         assert page.evaluate("document.querySelectorAll('#right img, #right svg, #right script').length") == 0
         tags = page.evaluate("[...document.querySelectorAll('#listing *')].map(e => e.tagName)")
         assert set(tags) <= {"B", "DIV", "SPAN"}
-        first = page.evaluate("olp.app.listing.text(olp.app.listing.row_of_line(2), 0)")
+        first = page.evaluate("olp.app.listing.text(olp.app.listing.row_of_line(7), 0)")
         assert first == comments[0].decode()
         everything = page.evaluate(
             "Array.from({length: olp.app.listing.n}, (_, k) => olp.app.listing.text(k, 0))"
