@@ -183,16 +183,21 @@ def _weights(corners: Array) -> Array:
             norm = base - 2 * t * goal[:, i] + t * t * square
             _take(norm < best, norm, best, share, {i: t})
         for i, j in _PAIRS:
-            g, h, k = gram[:, i, i], gram[:, j, j], gram[:, i, j]
-            det = g * h - k * k
-            u = (goal[:, i] * h - goal[:, j] * k) / det
-            v = (goal[:, j] * g - goal[:, i] * k) / det
+            u, v, flat = _in_plane(gram, goal, i, j)
             norm = base - u * goal[:, i] - v * goal[:, j]
-            inside = (det > _FLAT * g * h) & (u > 0) & (v > 0) & (u + v < 1)
+            inside = ~flat & (u > 0) & (v > 0) & (u + v < 1)
             _take(inside & (norm < best), norm, best, share, {i: u, j: v})
         _whole(edge, first, gram, best, share)
         _refine(edge, first, gram, share)
     return np.concatenate((1.0 - share.sum(axis=1, keepdims=True), share), axis=1)
+
+
+def _in_plane(gram: Array, goal: Array, i: int, j: int) -> tuple[Array, Array, Mask]:
+    """(n,) shares of edges i and j whose sum is nearest to a goal, and where the two hardly span a plane."""
+    g, h, k = gram[:, i, i], gram[:, j, j], gram[:, i, j]
+    det = g * h - k * k
+    u, v = goal[:, i] * h - goal[:, j] * k, goal[:, j] * g - goal[:, i] * k
+    return u / det, v / det, np.asarray(~(det > _FLAT * g * h), bool)
 
 
 def _refine(edge: Array, first: Array, gram: Array, share: Array) -> None:
@@ -207,11 +212,9 @@ def _refine(edge: Array, first: Array, gram: Array, share: Array) -> None:
         alone = (count == 1) & used[:, i]
         more[alone, i] = (goal[:, i] / gram[:, i, i])[alone]
     for i, j in _PAIRS:
-        g, h, k = gram[:, i, i], gram[:, j, j], gram[:, i, j]
-        det = g * h - k * k
         both = (count == 2) & used[:, i] & used[:, j]
-        more[both, i] = ((goal[:, i] * h - goal[:, j] * k) / det)[both]
-        more[both, j] = ((goal[:, j] * g - goal[:, i] * k) / det)[both]
+        u, v, _ = _in_plane(gram[both], goal[both], i, j)
+        more[both, i], more[both, j] = u, v
     moved = share + more
     inside = (moved >= 0).all(axis=1) & (moved.sum(axis=1) <= 1)
     share[inside] = moved[inside]

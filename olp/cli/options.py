@@ -152,9 +152,8 @@ def doubt_options(function: F, of: str = "run") -> F:
         "--accept", multiple=True, callback=_acceptable, metavar="CODES",
         help="Go on in spite of these doubts about the inputs, such as OLP409; may be repeated.",
     )(function)  # fmt: skip
-    return day_option(f"The day of the {of}, or today; it is compared with valid_until of the calibration.")(
-        function
-    )
+    day = day_option(f"The day of the {of}, or today; it is compared with valid_until of the calibration.")
+    return day(function)
 
 
 def output_option(
@@ -290,8 +289,8 @@ def confidence_options(function: F) -> F:
     for option in (
         renamed_option("--within-um", "--part-tolerance-um"),
         part_tolerance_option(
-            "The tolerance of the part: the probability that the tip stays within is stated. Default: the "
-            "job's, else --tolerance-um."
+            "The tolerance of the part: says whether the part is good, and with what probability. "
+            "Default: the job's, else none."
         ),
         click.option(
             "--only-sure-components",

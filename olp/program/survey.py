@@ -17,7 +17,7 @@ from bisect import bisect_left
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
-from olp.core.errors import ProgramError, Reason, Refused
+from olp.core.errors import ConfigError, ProgramError, Reason, Refused
 from olp.core.machine import ZERO, Setup, Tool, WorkOffset
 from olp.findings.catalogue import RULES
 from olp.program.dialect import Dialect, Options
@@ -148,7 +148,8 @@ class _Survey:
         return b"".join(self.lines[name])
 
     def reading(self) -> ProgramError | None:
-        """Read the text with its repairs; why it is refused."""
+        """Read the text with its repairs; why it is refused. What is wrong in the files of the setup, or in
+        their repairs, has no line."""
         try:
             text = self._mended(None, self.data)
             if self.unroll is not None:
@@ -159,6 +160,8 @@ class _Survey:
             read(text, self.setup, self.dialect, self.options, words=False)
         except ProgramError as error:
             return error
+        except ConfigError as error:
+            return ProgramError(str(error))
         return None
 
     def run(self, error: ProgramError | None) -> bool:

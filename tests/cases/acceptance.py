@@ -24,8 +24,8 @@ TOLERANCE_UM = 1.0
 ROUNDING = 0.87
 #: mm of extra distance per mm of path, so that passes over one position are separated
 _LIFT = 0.05
-#: mm of extra distance between a rapid and a cut: a part of a cut is a cut
-_APART_MM = 50.0
+#: mm of extra distance between moves of different kinds
+APART_MM = 100.0
 
 _AXIS = "[axes.{}]\ntravel_mm = [-1000.0, 2000.0]\nleast_increment_mm = {}\nvelocity_mm_s = 500.0\n"
 _AXIS += "acceleration_mm_s2 = 2000.0\njerk_mm_s3 = 20000.0\n"
@@ -129,8 +129,8 @@ def judged(
     shift = shifts(moves, model, shift_by_frame)
     uncorrected = np.isin(moves.line, list(skip_lines))
     real = _sure_of_play(actual(own, model, spacing_mm), model)
-    ends = real.points[real.dense.last] + _apart(own)
-    groups = matched(ends, own, moves.axis + shift + _apart(moves), moves)
+    ends = real.points[real.dense.last] + apart(own)
+    groups = matched(ends, own, moves.axis + shift + apart(moves), moves)
     after = _measure(real, groups, moves, shift, uncorrected, kinds)
     before = _measure(
         _sure_of_play(actual(moves, model, spacing_mm), model),
@@ -178,8 +178,9 @@ def matched(ends: np.ndarray, own: CanonMoves, vertices: np.ndarray, moves: Cano
     return match(ends + np.outer(length - drift, along), there)
 
 
-def _apart(moves: CanonMoves) -> np.ndarray:
-    return np.outer(_APART_MM * (moves.kind != RAPID), (1.0, 0.0, 0.0))
+def apart(moves: CanonMoves) -> np.ndarray:
+    """(n, 3) mm by which cuts are moved from rapids: a part of a cut is a cut, and never ends a rapid."""
+    return np.outer(APART_MM * (moves.kind != RAPID), (1.0, 0.0, 0.0))
 
 
 def allowed_um(text: bytes) -> float:

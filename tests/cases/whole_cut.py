@@ -14,14 +14,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from cases.acceptance import matched
+from cases.acceptance import APART_MM, apart, matched
 from judge import linuxcnc
 from judge.linuxcnc import ARC, DWELL, FEED, RAPID, CanonMoves
 from judge.model import JudgeModel
 from judge.path import DensePath, _Curves, densify, shifts, tool_vectors
 
-#: mm by which moves of different kinds are moved apart in the matching
-_APART_MM = 100.0
 #: what the judge's arcs may be off
 ARCS_UM = 0.27
 #: Without an unknown play the stated maximum is at most this factor above the judge's, and this much.
@@ -315,9 +313,9 @@ def _between(runs: list[tuple[int, int]], count: int) -> Iterator[tuple[int, int
 
 
 def _apart(moves: CanonMoves, said: Marks) -> np.ndarray:
-    """A part of a cut is a cut, and never the end of a rapid; what is left uncorrected has one block each."""
+    """As `acceptance.apart`; what is left uncorrected, one block each, is away from the rest too."""
     left = np.isin(moves.line, list(said.left))
-    return np.stack([_APART_MM * (moves.kind != RAPID), _APART_MM * left, np.zeros(len(moves))], axis=1)
+    return apart(moves) + np.outer(APART_MM * left, (0.0, 1.0, 0.0))
 
 
 def _cuts(

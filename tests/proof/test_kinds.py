@@ -97,7 +97,7 @@ def test_a_wrong_first_feed_from_a_partly_unknown_place_is_seen(scaled: Path) ->
 # -- nothing that could be judged ------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("text", (b"", b"G21 G90\nM2\n", HEAD + b"G53 G0 X0 Y0 Z0\nM2\n"))
+@pytest.mark.parametrize("text", (b"G21 G90\nM2\n", HEAD + b"G53 G0 X0 Y0 Z0\nM2\n"))
 def test_nothing_judged_is_no_pass(scaled: Path, text: bytes) -> None:
     done = olp.correct(text, scaled)
     assert done.report["verdict"]["ok"] is None

@@ -18,6 +18,7 @@ from olp.findings.catalogue import RULES
 from olp.review import job
 from olp.review import page as pages
 from olp.review.manifest import manifest_of
+from olp.workflows import refusals
 from olp.workflows.session import Session
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -294,7 +295,7 @@ def test_a_correction_of_an_unrolled_program_is_shown_beside_it(
     corrected = olp.correct(text, machine, flatten=True)
     ours = olp.view(text, machine, correction=corrected, flatten=True, time=False).scene
     calls: list[str] = []
-    for name, where, key in (("read", job, "read"), ("load", Session, "loaded")):
+    for name, where, key in (("read", job, "read"), ("read", refusals, "read"), ("load", Session, "loaded")):
         what = getattr(where, key)
 
         def counted(*args: Any, _what: Any = what, _name: str = name, **more: Any) -> Any:
@@ -302,7 +303,6 @@ def test_a_correction_of_an_unrolled_program_is_shown_beside_it(
             return _what(*args, **more)
 
         monkeypatch.setattr(where, key, counted)
-    monkeypatch.setattr("olp.workflows.verify.read", None)
     theirs = olp.view(text, machine, corrected=corrected.data, flatten=True, time=False).scene
     np.testing.assert_array_equal(ours.samples.result, theirs.samples.result)
     assert theirs.report["deviation"] == ours.report["deviation"]

@@ -108,7 +108,7 @@ RULES = (
         Severity.ERROR,
         "The errors of one axis are hundreds of times smaller than those of both other axes. Millimetres "
         "in a column of micrometres do that.",
-        "Check the unit of the columns of this axis.",
+        "Check the unit of these values: lengths are in um, angles in urad.",
         "0.012 in the column EXX_um, and 9.7 in EYY_um.",
     ),
     _rule(
