@@ -161,7 +161,7 @@ class _Survey:
         except ProgramError as error:
             return error
         except ConfigError as error:
-            return ProgramError(str(error))
+            return ProgramError(str(error), code="OLP500")
         return None
 
     def run(self, error: ProgramError | None) -> bool:

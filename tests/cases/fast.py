@@ -9,7 +9,8 @@ import pytest
 
 
 def some_fast(cases: Iterable[Any], each: int) -> list[Any]:
-    """The cases, all but one in `each` marked as slow."""
+    """The cases, all but one in `each` marked as slow; a tuple is the values of several names."""
+    values = [case if isinstance(case, tuple) else (case,) for case in cases]
     return [
-        case if k % each == 0 else pytest.param(case, marks=pytest.mark.slow) for k, case in enumerate(cases)
+        pytest.param(*value, marks=pytest.mark.slow if k % each else ()) for k, value in enumerate(values)
     ]

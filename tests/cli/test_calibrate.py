@@ -193,6 +193,7 @@ def test_diagonals(tmp_path: Path) -> None:
     assert wrong.exit_code == 2 and "SX=12.5,0.5" in wrong.stderr
 
 
+@pytest.mark.slow
 def test_squareness_of_a_check_goes_into_a_fit(tmp_path: Path) -> None:
     """What ballbar and diagonals write is a part of a plan that the fit takes."""
     folder = tmp_path / "lines"
@@ -265,6 +266,7 @@ def test_report_of_a_fit(tmp_path: Path) -> None:
         assert words in text
 
 
+@pytest.mark.slow
 def test_the_same_readings_give_the_same_plots() -> None:
     evaluated = evaluate_all(load_measurements([LINES]))
     [one] = evaluated.of("EXX")

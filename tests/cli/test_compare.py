@@ -401,6 +401,7 @@ def test_few_points_in_the_nominal_frame_are_as_they_are(nominal: Path) -> None:
     assert report["after"]["across_um"]["max"] == pytest.approx(10, abs=0.3)
 
 
+@pytest.mark.slow
 def test_nothing_that_counts_is_no_pass(tmp_path: Path) -> None:
     """A run along a rapid alone, fitted or not, shows no tolerance to hold, and no nan."""
     program, measured = tmp_path / "p.ngc", tmp_path / "m.csv"

@@ -192,6 +192,7 @@ def test_streams(job: Path, tmp_path: Path) -> None:
         assert refused.stderr.startswith("olp: error: ")
 
 
+@pytest.mark.slow
 def test_a_reader_that_goes_is_no_error(job: Path, tmp_path: Path) -> None:
     words = ["retime", str(program(tmp_path)), "-j", str(job), "-o", "-", "--cycle-ms", "0.02"]
     call = [sys.executable, "-W", "error", "-m", "olp", *words]

@@ -62,6 +62,7 @@ def test_sentences_of_a_page_are_short_in_the_mean(path: Path) -> None:
     assert mean(of_paper(path)) <= MEAN
 
 
+@pytest.mark.slow
 def test_messages_are_short_in_the_mean() -> None:
     assert mean(sentence for path in modules() for sentence in of_module(path)) <= MEAN
 

@@ -52,6 +52,7 @@ def _falls(data: bytes) -> object:
     raise InputError("no")
 
 
+@pytest.mark.slow
 def test_every_kind_of_defect_is_found_and_made_small(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mutated, "LIMIT_S", 0.2)
     target = Target("falls", (b"a quiet text\n" * 5, b"two\n"), _falls)

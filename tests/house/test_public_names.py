@@ -70,6 +70,7 @@ def test_the_probe_sees_what_is_loaded() -> None:
     assert loaded_by("import numpy", "numpy", "scipy") == {"numpy"}
 
 
+@pytest.mark.slow
 def test_a_correction_needs_no_large_library(tmp_path: Path) -> None:
     words = ["correct", "-j", "programs/bridge-cmm/job.toml", "-o", str(tmp_path / "out.ngc"), "--force"]
     assert loaded_by(RUN.format(words), *LARGE) == set()

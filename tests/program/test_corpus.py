@@ -82,6 +82,7 @@ def test_nine_in_ten_legal_programs_are_corrected(corpus: Path, setups: dict[str
     }
 
 
+@pytest.mark.slow
 def test_no_error_no_edit(corpus: Path, tmp_path: Path) -> None:
     for folder, controller in PROFILE_OF.items():
         recipe = Recipe(

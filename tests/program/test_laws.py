@@ -197,6 +197,7 @@ def test_l6_increments_do_not_drift(bent: Path) -> None:
 # -- L7: arcs stay arcs of the control ----------------------------------------------------------------
 
 
+@pytest.mark.slow
 @given(
     radius=st.floats(1.0, 40.0), begin=st.floats(0, 6.2), sweep=st.floats(0.2, 6.0), clockwise=st.booleans()
 )

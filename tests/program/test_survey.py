@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from cases.fast import some_fast
 
 from olp.core.errors import ProgramError, Reason, Refused
 from olp.core.machine import Axis, Machine, Setup, WorkOffset
@@ -141,7 +142,7 @@ ENDLESS = {
 
 
 @pytest.mark.parametrize(
-    ("dialect", "line"), [(name, line) for name, lines in ENDLESS.items() for line in lines]
+    ("dialect", "line"), some_fast([(name, line) for name, lines in ENDLESS.items() for line in lines], 3)
 )
 def test_the_work_is_bounded(monkeypatch: pytest.MonkeyPatch, dialect: str, line: bytes) -> None:
     size = 30_000

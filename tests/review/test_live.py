@@ -152,6 +152,7 @@ def test_clients_that_go_are_no_error(served: Served, capfd: pytest.CaptureFixtu
     assert capfd.readouterr().err == ""
 
 
+@pytest.mark.slow
 def test_requests_at_a_time_are_bounded(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
     port = served.server._http.server_address[1]
     before = threading.active_count()

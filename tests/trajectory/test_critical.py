@@ -53,6 +53,7 @@ def test_adversarial_routes_are_driven_inside_the_limits(name: str) -> None:
     laws_hold(given_route, limits, path, critical(path, limits))
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.integers(0, 2**32 - 1))
 def test_random_routes_are_driven_inside_the_limits(seed: int) -> None:

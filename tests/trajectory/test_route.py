@@ -267,6 +267,7 @@ def text_of(points: list[tuple[float, ...]], mode: str, scale: float = 1.0, part
     return "\n".join(rows) + "\nM2\n"
 
 
+@pytest.mark.slow
 @given(corners, modes)
 def test_collinear_parts_take_no_more_time(points: list[tuple[float, ...]], mode: str) -> None:
     whole, split = driven(text_of(points, mode)), driven(text_of(points, mode, parts=4))

@@ -289,6 +289,7 @@ def fitted() -> Iterator[tuple[Fit, Calibration, Uncertainty]]:
     yield result, calibration, covariance_of(result, calibration)
 
 
+@pytest.mark.slow
 def test_the_covariance_of_a_fit_is_that_of_the_path(fitted: tuple[Fit, Calibration, Uncertainty]) -> None:
     result, calibration, known = fitted
     position = np.random.default_rng(4).uniform(*result.box_mm.T, (60, 3))

@@ -78,6 +78,7 @@ def test_the_update_is_that_of_bayes(begun) -> None:
     assert np.allclose(moved, gained, atol=6e-4)
 
 
+@pytest.mark.slow
 def test_what_is_known_exactly_does_not_move(begun) -> None:
     machine, calibration, uncertainty = begun
     done = refine(calibration, machine.chain, uncertainty.scaled(1e-6), run(machine, 5, 40, 0.01))

@@ -11,12 +11,14 @@ import json
 import re
 from collections.abc import Iterator, Mapping
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import click
 import numpy as np
 import pytest
+from cases.fast import some_fast
 from cases.rs274_texts import PARAMETRIC
 from cli.test_cli import run
 from judge import machines
@@ -294,8 +296,7 @@ LAW = (
 )
 
 
-@pytest.mark.parametrize("text", LAW, ids=range(len(LAW)))
-@pytest.mark.parametrize("control", ["linuxcnc", "fanuc", "haas"])
+@pytest.mark.parametrize(("text", "control"), some_fast(product(LAW, ("linuxcnc", "fanuc", "haas")), 5))
 def test_correcting_an_unrolled_program_is_unrolling_and_correcting(
     control: str, text: str, controls: Mapping[str, Path]
 ) -> None:

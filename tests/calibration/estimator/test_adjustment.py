@@ -172,6 +172,7 @@ def test_what_one_offset_of_the_reflector_hides(chain: str, hidden: str) -> None
     assert not unobservable(three)
 
 
+@pytest.mark.slow
 def test_where_the_instrument_stands_means_nothing() -> None:
     machine = simulated.machine(2, "smooth", "FXYZ")
     points = cloud(machine, 2, 60, 5.0)
@@ -182,6 +183,7 @@ def test_where_the_instrument_stands_means_nothing() -> None:
     assert first.error(position, FRESH[0]) == pytest.approx(second.error(position, FRESH[0]), abs=1e-6)
 
 
+@pytest.mark.slow
 def test_a_point_that_slipped_is_left_out_and_named() -> None:
     machine = simulated.machine(2, "smooth", "FXYZ")
     points = cloud(machine, 2, 150, 5.0)
@@ -224,6 +226,7 @@ def test_residuals_with_lengths() -> None:
     assert np.median(left_other) <= 1.2
 
 
+@pytest.mark.slow
 def test_a_length_that_slipped_is_left_out_and_named() -> None:
     machine = simulated.machine(0, "smooth", "FXYZ")
     all_rays = rays(machine, 0, 6, 120)
@@ -309,6 +312,7 @@ def test_straightness_without_a_square_leaves_squareness_unknown() -> None:
     assert {f.message.split()[0] for f in findings_with(fitted, "OLP806")} == {"C0Y", "B0Z", "A0Z"}
 
 
+@pytest.mark.slow
 def test_a_reading_of_squareness_does_what_a_square_does() -> None:
     """The true mean slopes at the position of the lines, given as a value, instead of the square."""
     machine, measurements = case(0, "smooth", "FXYZ")
@@ -337,6 +341,7 @@ def test_a_reading_of_squareness_does_what_a_square_does() -> None:
         )
 
 
+@pytest.mark.slow
 def test_an_aliased_period_is_never_fitted() -> None:
     machine = simulated.machine(3, "rough", "FXYZ")
     taken = simulated.all_lines(machine, 3, jitter=0.0)
@@ -346,6 +351,7 @@ def test_an_aliased_period_is_never_fitted() -> None:
     assert not calibration_of(fitted).cyclic
 
 
+@pytest.mark.slow
 def test_a_fine_sweep_shows_what_is_not_observable_at_the_targets() -> None:
     """Targets at multiples of the pitch, and a sweep over two pitches: amplitude and phase of X, judged by
     what the machine does at the sweep and far from it."""
@@ -484,6 +490,7 @@ def test_one_run_without_sigma_is_refused() -> None:
         fit(Measurements("m", (line,)), "FXYZ")
 
 
+@pytest.mark.slow
 def test_a_wrong_sign_of_one_line_does_not_fit() -> None:
     """Two lines of one straightness at two heights contradict each other when one is reversed."""
     machine, measurements = case(0, "smooth", "FXYZ")

@@ -52,6 +52,7 @@ def residual_um(machine: simulated.Machine, error: np.ndarray, tool: np.ndarray)
 # -- what it finds ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_sag_is_found_and_the_residual_falls_with_tools_not_measured_with(
     bent: tuple[simulated.Machine, Fit, NonRigid],
 ) -> None:
@@ -113,6 +114,7 @@ def test_directions_of_pods_show_a_sag_too() -> None:
     assert after < 0.9 * residual_um(machine, before.error(position, tool), tool)
 
 
+@pytest.mark.slow
 def test_too_few_points_or_points_in_a_plane_make_no_map() -> None:
     machine = simulated.machine(3, "smooth")
     few = nonrigid(of_points(machine, 3, 30))
@@ -170,6 +172,7 @@ def test_the_evidence_is_that_of_the_dense_gaussian() -> None:
     assert ours(1.0) - ours(0.1) == pytest.approx(dense(1.0) - dense(0.1), abs=2e-2)
 
 
+@pytest.mark.slow
 def test_derivatives_of_the_evidence() -> None:
     machine = simulated.bent(simulated.machine(5, "smooth"))
     work = Adjustment(of_points(machine, 5, 60), modes := Modes.over(BOX, 60))
@@ -217,6 +220,7 @@ def test_the_map_loses_no_more_than_stated(bent: tuple[simulated.Machine, Fit, N
         residual_map(result, fitted.calibration, 1e-9)
 
 
+@pytest.mark.slow
 def test_sigmas_of_curves_and_map_add_up_to_that_of_both(
     bent: tuple[simulated.Machine, Fit, NonRigid],
 ) -> None:
@@ -275,6 +279,7 @@ def test_from_points_to_a_calibration_with_a_map(tmp_path: Path) -> None:
     assert "map" not in json.loads(plain.stdout)
 
 
+@pytest.mark.slow
 def test_one_offset_says_what_the_map_holds_for(tmp_path: Path) -> None:
     machine = simulated.bent(simulated.machine(1, "smooth", "YFXZ"))
     plan = written(tmp_path, machine, tools=[simulated.OFFSETS[0]])
@@ -283,6 +288,7 @@ def test_one_offset_says_what_the_map_holds_for(tmp_path: Path) -> None:
     assert "[0, 0, -120] mm" in " ".join(result.output.split())
 
 
+@pytest.mark.slow
 def test_no_map_is_reported(tmp_path: Path) -> None:
     plan = written(tmp_path, simulated.machine(1, "smooth", "YFXZ"))
     result = CliRunner().invoke(

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
+from cases.fast import some_fast
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -97,8 +99,7 @@ def tables(draw: st.DrawFn, key: str) -> str | Calibration:
     return Calibration(machine="g", box_mm=box, curves=tuple(curves), squareness=square)
 
 
-@pytest.mark.parametrize("sense", ["error", "correction"])
-@pytest.mark.parametrize("key", FORMATS)
+@pytest.mark.parametrize(("key", "sense"), some_fast(product(FORMATS, ("error", "correction")), 3))
 def test_import_export_import_is_exact(key: str, sense: str) -> None:
     if key in ("linuxcnc", "klipper") and sense != FORMATS[key].sense:
         pytest.skip("the format has its own sign convention")

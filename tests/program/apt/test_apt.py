@@ -5,12 +5,14 @@ from __future__ import annotations
 import re
 import runpy
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
 from cases import posts as posts
 from cases.acceptance import unstamped
+from cases.fast import some_fast
 from judge import linuxcnc, machines
 from judge.cldata import read_apt
 from judge.linuxcnc import CanonMoves
@@ -69,8 +71,7 @@ def refused(text: str, path: Path, line: int, words: str) -> None:
 # -- whole jobs under the judge ------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("flavour", posts.FLAVOURS)
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize(("seed", "flavour"), some_fast(product(range(4), posts.FLAVOURS), 4))
 def test_every_flavour_follows_its_path(bent: Path, zero: Path, flavour: str, seed: int) -> None:
     data = posts.apt(posts.job(seed, count=10), flavour)
     assert olp.correct(data, zero).data == data

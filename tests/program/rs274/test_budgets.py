@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from cases.acceptance import TRUE_ZERO, machine
+from cases.fast import some_fast
 
 import olp
 from olp.core.budget import Budget
@@ -83,7 +84,7 @@ def test_unrolling_is_bounded_by_the_bytes_of_visited_blocks(
     assert caught.value.line is not None
 
 
-@pytest.mark.parametrize("expand", [False, True])
+@pytest.mark.parametrize("expand", some_fast([False, True], 2))
 def test_strokes_of_unrolled_cycles_are_bounded(expand: bool) -> None:
     text = HEAD + "o1 repeat [99]\nG91 G81 X0.001 Z-1 R1 L19999\no1 endrepeat\nM2\n"
     with pytest.raises(ProgramError, match="have more than 250000 strokes") as caught:

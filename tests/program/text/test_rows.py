@@ -28,6 +28,7 @@ def reads_csv(source: str) -> bool:
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_delimited_text_is_split_in_one_place() -> None:
     modules = {p.relative_to(PACKAGE).as_posix() for p in PACKAGE.rglob("*.py") if reads_csv(p.read_text())}
     assert modules == {"program/text/rows.py"}
