@@ -126,10 +126,19 @@ class _Alignment:
         index[nominal.arcs.move] = np.arange(len(nominal.arcs))
         self.arc = index[mine.last]
         self.arcs = nominal.arcs
+        move = self.arcs.move
+        #: the centres move with the waypoints, by the shift of the zero
+        self.centre = self.arcs.centre_mm + np.nan_to_num(target[move] - nominal.end_mm[move])
         #: the length of the path up to the end of each unit
         self.length = _lengths(nominal, mine, self.begin, self.target)
         start = np.vstack((path.starts_mm()[:1], self.tip[:-1]))
         self.gone = _lengths(path, theirs, start, self.tip)
+        #: mm, before which a unit does not end: a path of whole turns passes its end before it ends there
+        self.least = np.full(len(mine), -np.inf)
+        turning = np.flatnonzero(self.arc >= 0)
+        sweep = np.abs(self.arcs.sweep_rad[self.arc[turning]])
+        turning, sweep = turning[sweep > 2 * np.pi - _WHOLE], sweep[sweep > 2 * np.pi - _WHOLE]
+        self.least[turning] = np.diff(self.length, prepend=0.0)[turning] * (1.0 - np.pi / sweep)
         self.tries = 0
 
     def ends(self) -> Index:
@@ -177,6 +186,8 @@ class _Alignment:
         about = np.searchsorted(self.gone, length + (self.gone[j - 1] if j else 0.0))
         choice = np.clip(about[:, None] + _BESIDE, j, len(self.theirs) - 1)
         near = self._near(np.repeat(rows, len(_BESIDE)), choice.ravel()).reshape(choice.shape)
+        behind = np.concatenate(([0.0], length[:-1])) + (self.gone[j - 1] if j else 0.0)
+        near &= self.gone[choice] - behind[:, None] >= self.least[rows][:, None]
         ends = choice[np.arange(len(rows)), near.argmax(axis=1)]
         before = np.concatenate(([j - 1], ends[:-1]))
         inserted = ends - before - 1
@@ -190,7 +201,8 @@ class _Alignment:
             part = before[owner] + 1 + np.arange(len(owner)) - first[owner]
             of = rows[owner]
             # one that ends as the unit does leaves a choice
-            astray = self._unlike(of, part) | self._near(of, part)
+            gone = self.gone[part] - np.where(before < 0, 0.0, self.gone[before])[owner]
+            astray = self._unlike(of, part) | (self._near(of, part) & (gone >= self.least[of]))
             astray |= np.asarray(self._along(of, part) >= self.near, bool)
             count = int(owner[int(np.argmax(astray))]) if astray.any() else count
         return np.asarray(ends[:count], np.int64)
@@ -199,14 +211,11 @@ class _Alignment:
         """The number of moves inserted before the end of unit i where they all lie along it, None where that
         is not plain."""
         ahead = np.arange(j, j + min(self._room(i, j), _SPARE) + 1)
-        end = np.flatnonzero(self._near(np.full(len(ahead), i), ahead))
+        gone = self.gone[ahead] - (self.gone[j - 1] if j else 0.0)
+        end = np.flatnonzero(self._near(np.full(len(ahead), i), ahead) & (gone >= self.least[i]))
         if not end.size:
             return None
-        # a path of a turn or more passes its end before it ends there
-        gone = self.gone[ahead[end]] - (self.gone[j - 1] if j else 0.0)
-        own = self.length[i] - (self.length[i - 1] if i else 0.0)
-        several = self.arc[i] >= 0 and abs(self.arcs.sweep_rad[self.arc[i]]) > 2 * np.pi - _WHOLE
-        count = int(end[np.argmin(np.abs(gone - own)) if several else 0])
+        count = int(end[0])
         of = np.full(count, i)
         astray = (self._along(of, ahead[:count]) >= self.near) | self._unlike(of, ahead[:count])
         return None if astray.any() else count
@@ -233,7 +242,7 @@ class _Alignment:
     def _from_arcs(self, arc: Index, begin: Array, end: Array, point: Array, plane: int) -> Array:
         """(m,) distances of points from nominal arcs of a plane: across them, and beyond their ends."""
         first, second, third = PLANES[plane]
-        centre, sweep = self.arcs.centre_mm[arc], self.arcs.sweep_rad[arc]
+        centre, sweep = self.centre[arc], self.arcs.sweep_rad[arc]
         (x0, y0), (x1, y1), (x, y) = (
             (some[:, first] - centre[:, first], some[:, second] - centre[:, second])
             for some in (begin, end, point)

@@ -103,6 +103,20 @@ def test_steps_before_a_move_belong_to_it(folder: Path) -> None:
     assert groups(program(nominal, folder), program(corrected, folder)) == [0, 1, 3, 5, 6]
 
 
+def test_whole_circles_on_a_shifted_zero_leave_no_doubt(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each passes its end as it begins, and has a step before each half; only what is in doubt is searched."""
+    nominal = program("G0 X0\n" + 30 * "G2 I9 F500\n", folder)
+    half = "G1 X1.003 F500\nG2 X19 I9\nG1 X18.997\nG2 X1 I-9\n"
+    corrected = program("G0 X1\n" + 30 * half, folder)
+    monkeypatch.setattr("olp.proof.matching._Alignment._window", None)
+    target = nominal.toolpath.end_mm.copy()
+    target[1:, 0] += 1.0
+    ends = match(nominal, target, corrected, MODEL, NEAR_MM)
+    assert ends.tolist() == [0, 1, *range(5, 125, 4)]
+
+
 def test_what_comes_behind_the_last_waypoint_belongs_to_it(folder: Path) -> None:
     nominal, corrected = "G1 X10 F500\nG2 X10 I-5\n", "G1 X10 F500\nG2 X0 I-5\nX10 I5\n"
     assert groups(program(nominal, folder), program(corrected, folder)) == [0, 1, 3]
