@@ -106,7 +106,7 @@ def test_steps_before_a_move_belong_to_it(folder: Path) -> None:
 def test_whole_circles_on_a_shifted_zero_leave_no_doubt(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Each passes its end as it begins, and has a step before each half; only what is in doubt is searched."""
+    """Each passes its end as it begins, and has a step before each half; only doubts are searched."""
     nominal = program("G0 X0\n" + 30 * "G2 I9 F500\n", folder)
     half = "G1 X1.003 F500\nG2 X19 I9\nG1 X18.997\nG2 X1 I-9\n"
     corrected = program("G0 X1\n" + 30 * half, folder)

@@ -120,7 +120,7 @@ def feeds(scan: Scan) -> Array:
     """(n,) feed of each move in mm/s: inf for rapids, NaN for moves that the control makes by itself and
     where the time of G93 has no length. Raises ProgramError for a feed move without a feed, or with one that
     cannot be read correctly."""
-    path = scan.program.toolpath
+    program, path = scan.program, scan.program.toolpath
     feed_mm_s = np.full(len(path), np.inf)
     feed_mm_s[(path.flag & np.uint8(Flag.CONTROL)) != 0] = np.nan
     move, latest = governing(scan)
@@ -131,7 +131,8 @@ def feeds(scan: Scan) -> Array:
     mode, _ = modes.in_force(line)
     f_word, f_line = scan.of_letter(b"F")
     value, pointed = numbers(scan.words, f_word), scan.words.pointed[f_word]
-    unit = _unit(scan, f_line)
+    # RS-274 takes F before a G20 or G21 of the same block
+    unit = _unit(scan, f_line, before=program.rs274.feed_before_unit)
     inverse = mode == _INVERSE
     used = np.unique(latest)
     _check_values(scan, modes, f_line[used], value[used], pointed[used], unit[used])
@@ -140,8 +141,9 @@ def feeds(scan: Scan) -> Array:
     if turning.any():
         feed[turning] *= _spindle(scan, line[turning])
     if inverse.any():
-        feed[inverse] = value[latest[inverse]] / 60.0 * lengths_mm(path)[move[inverse]]
-        feed[inverse & ~(feed > 0)] = np.nan
+        own = value[latest[inverse]] / 60.0 * lengths_mm(path)[move[inverse]]
+        least = program.rs274.least_inverse_feed / 60.0 * _unit(scan, line[inverse])
+        feed[inverse] = np.where(own > 0, np.maximum(own, least), np.nan)
     feed_mm_s[move] = feed
     return feed_mm_s
 
@@ -170,12 +172,11 @@ def _modes(scan: Scan) -> _Modes:
     return _Modes(line, code, since)
 
 
-def _unit(scan: Scan, line: Index) -> Array:
-    """mm per unit of F words on these lines; RS-274 takes F before a G20 or G21 of the same block."""
+def _unit(scan: Scan, line: Index, *, before: bool = False) -> Array:
+    """mm per unit on these lines, or `before` what their own G20 and G21 say."""
     chosen = np.isin(scan.code, (200, 210))
-    side = "left" if scan.program.rs274.feed_before_unit else "right"
-    before = np.searchsorted(scan.code_line[chosen], line, side=side)  # type: ignore[call-overload]
-    inch = np.concatenate(([False], scan.code[chosen] == 200))[before]
+    place = np.searchsorted(scan.code_line[chosen], line, side="left" if before else "right")
+    inch = np.concatenate(([False], scan.code[chosen] == 200))[place]
     return np.asarray(np.where(inch, MM_PER_INCH, 1.0), float)
 
 

@@ -58,7 +58,8 @@ class Profile(Dialect):
       with H0, takes the length of that tool. `lengths_along_z`: a tool length counts along Z alone.
       `lengths_keep_unit`: a change of unit does not convert the length in force.
     - `feed_words_end`: each G94 and G95 forgets F. `feed_before_unit`: F of a block counts before its G20 or
-      G21. `m_with_motion`: M codes carried out along with the motion, without a rest.
+      G21. `least_inverse_feed`: units per minute, the least feed of a block in G93. `m_with_motion`: M codes
+      carried out along with the motion, without a rest.
     - `text`, `rules`, `cycles`, `language`: what may be in a line and in a block, how canned cycles are made,
       and how parametric programs are written.
     - `written_ending`: the ending of files that are written for the control.
@@ -86,6 +87,7 @@ class Profile(Dialect):
     lengths_keep_unit: bool = False
     feed_words_end: bool = False
     feed_before_unit: bool = False
+    least_inverse_feed: float = 0.0
     m_with_motion: frozenset[int] = frozenset()
     text: BlockText
     rules: BlockRules = OTHER_RULES

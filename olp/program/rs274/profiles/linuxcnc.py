@@ -30,6 +30,7 @@ DIALECT = Profile(
     lengths_keep_unit=True,
     feed_words_end=True,
     feed_before_unit=True,
+    least_inverse_feed=0.1,
     m_with_motion=frozenset({62, 63, 67}),
     text=BlockText(
         odd_bytes=re.compile(rb"\x00|" + LONE_CR.pattern),
