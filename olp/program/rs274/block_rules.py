@@ -70,8 +70,9 @@ class BlockRules:
     - `groups`: codes of which a block may have one.
     - `needs`: codes that need one of these letters.
     - `excludes`: codes that take one of two kinds of letters. `positive`: letters without a negative number.
-    - `number_first`: N is the first word of its line. `one_use_of_axes`: no motion code may be beside a code
-      that uses the axis words for something else.
+    - `alone`: a letter with a whole number, in a block of its own. `number_first`: N is the first word of
+      its line. `one_use_of_axes`: no motion code may be beside a code that uses the axis words for something
+      else.
     """
 
     users: Mapping[str, frozenset[int]] = field(default_factory=dict)
@@ -79,6 +80,7 @@ class BlockRules:
     needs: Mapping[int, str] = field(default_factory=dict)
     excludes: Mapping[int, tuple[str, str]] = field(default_factory=dict)
     positive: str = ""
+    alone: str = ""
     number_first: bool = False
     one_use_of_axes: bool = False
 
@@ -120,6 +122,7 @@ class _Tables:
             self._unused(active, codes, present, motion, plane),
             self._negative(chunk, active),
             self._numbers(chunk, active),
+            self._alone(chunk, active, present),
         ):
             for line, why, code, word in rule:
                 number = chunk.first_line + line + 1
@@ -217,6 +220,18 @@ class _Tables:
             why = "N is not the first word of this block; put the block number in front"
             yield where, why, "OLP505", "N"
 
+    def _alone(self, chunk: WordChunk, active: Mask, present: Bits) -> Iterator[Refusal]:
+        letter = self.rules.alone
+        if not letter:
+            return
+        words = np.flatnonzero(chunk.letter == ord(letter))
+        words = words[active[chunk.line[words]]]
+        line = chunk.line[words]
+        whole = chunk.mantissa[words] % 10 ** chunk.decimals[words].astype(np.int64) == 0
+        for where in line[(present[line] != _bits(letter)) | ~whole].tolist():
+            why = f"{letter} is a program number; expected a whole number in a block of its own"
+            yield where, why, "OLP505", letter
+
 
 def _present(chunk: WordChunk) -> Bits:
     """(lines,) the letters of each line, as bits."""
@@ -283,10 +298,15 @@ NGC_RULES = BlockRules(
         **dict.fromkeys(sorted(_ARCS), "IJKR"),
         DWELL: "P",
         432: "HXYZ",
+        MACHINE: "XYZABCUVW",
         960: "S",
+        **dict.fromkeys(sorted(_SYNCHRONOUS), "P"),
+        **dict.fromkeys(sorted(_m(66)), "PE"),
+        **dict.fromkeys(sorted(_m(67, 68)), "E"),
     },
     excludes={432: ("H", "XYZ")},
     positive="NFSTLH",
+    alone="O",
     number_first=True,
     one_use_of_axes=True,
 )  # fmt: skip

@@ -237,15 +237,18 @@ class Modes:
         return _in_force(chunk, line, code, self._state.motion)
 
 
-def check_odd(data: bytes, chunk: WordChunk, active: Mask, profile: Profile) -> None:
-    """Refuse active lines with more than words, all of the chunk at once."""
-    lines = chunk.odd[active[chunk.odd]].tolist()
-    if lines:
-        raise ProgramError.together(_odd(data, chunk, line, profile) for line in lines)
+def check_odd(data: bytes, chunk: WordChunk, before_end: Mask, active: Mask, profile: Profile) -> None:
+    """Refuse active lines with more than words, all of the chunk at once; of those `before_end` that block
+    delete skips the ones whose bytes are refused, as the control reads these all the same."""
+    lines = chunk.odd[before_end[chunk.odd]].tolist()
+    errors = [_odd(data, chunk, line, profile, words=bool(active[line])) for line in lines]
+    some = [error for error in errors if error is not None]
+    if some:
+        raise ProgramError.together(some)
 
 
-def _odd(data: bytes, chunk: WordChunk, line: int, profile: Profile) -> ProgramError:
-    """Why a line with more than words is refused."""
+def _odd(data: bytes, chunk: WordChunk, line: int, profile: Profile, *, words: bool) -> ProgramError | None:
+    """Why a line with more than words is refused, by its bytes, or by its `words` too."""
     number = chunk.first_line + line + 1
     start = int(chunk.line_start[line])
     newline = data.find(b"\n", start)
@@ -253,6 +256,8 @@ def _odd(data: bytes, chunk: WordChunk, line: int, profile: Profile) -> ProgramE
     if error is not None:
         error.line = number
         return error
+    if not words:
+        return None
     text = data[start : chunk.line_end[line]].strip()
     shown = text[:60].decode("latin-1")
     if _FLOW.search(text):

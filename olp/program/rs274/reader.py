@@ -114,9 +114,10 @@ class _Reader:
             return
         self.end_line = chunk.first_line + last
         active = np.arange(len(chunk.line_start)) < last
+        before_end = active.copy()
         if self.options.block_delete:
             active &= ~chunk.deleted
-        check_odd(self.data, chunk, active, self.state.profile)
+        check_odd(self.data, chunk, before_end, active, self.state.profile)
         context = self.modes.read(chunk, base, active)
         # a code that is not read says more than its words, which no other code uses
         check_codes(context, active, self.state.profile)

@@ -136,7 +136,8 @@ CYCLES: dict[str, tuple[str, dict[str, str]]] = {
 }  # fmt: skip
 #: What these decide is a matter of time: feeds and rests by hand stand in `tests/program/feeds`.
 OF_TIME = {
-    "feed_without_point", "exact_stop", "feed_words_end", "feed_before_unit", "m_with_motion",
+    "feed_without_point", "exact_stop", "feed_words_end", "feed_before_unit", "least_inverse_feed",
+    "m_with_motion",
 }  # fmt: skip
 #: Tables and texts, which have tests of their own.
 TABLES = {"codes", "refusals", "harmless_m", "text", "rules", "cycles", "language", "written_ending"}

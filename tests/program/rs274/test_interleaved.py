@@ -13,7 +13,7 @@ from judge import linuxcnc
 import olp
 from olp.core.errors import ProgramError
 from olp.files.config import load_setup
-from olp.program.registry import DIALECTS, read
+from olp.program.registry import DIALECTS, Options, read
 
 TABLES = "".join(
     f'[work_offsets.{name}]\nX_mm = {x}.0\nY_mm = {y}.0\nZ_mm = {z}.0\nset_by = "true"\n'
@@ -106,6 +106,14 @@ REFUSED = {
     "M5 G86 X5 R2 Z-3 P0": "give M3 or M4 before it",
     "(a (b) c)\nG0 X9": "the first `)` ends both",
     "(a (b c)\nG0 X9": "has a `(` in it",
+    "M62": "M62 needs P",
+    "M66": "M66 needs one of P, E",
+    "M67 Q1": "M67 needs E",
+    "M68": "M68 needs E",
+    "G53": "G53 needs one of X, Y, Z",
+    "G0 O5": "O is a program number",
+    "O5 X1": "O is a program number",
+    "O0.5": "O is a program number",
     "(a\nG0 X9": "`(a` is not closed",
     "G0 X9 (" + "a" * 250 + ")": "takes 252 at most",
 }
@@ -155,11 +163,35 @@ def test_what_the_control_sees_in_another_way_is_refused(text: str, place: Path)
     reached(f"{HEAD}M2\n{text}\n", place)
 
 
+@pytest.mark.parametrize("line", ["/(a", "/X1 (" + "a" * 250 + ")"])
+def test_the_control_reads_the_bytes_of_a_deleted_block(line: str, place: Path) -> None:
+    with pytest.raises(ProgramError) as caught:
+        deleted(line, place)
+    assert caught.value.line == 4
+
+
+def test_the_words_of_a_deleted_block_may_be_any(place: Path) -> None:
+    deleted("/X[1+1] G2 U O5 X2", place)
+
+
+def deleted(line: str, place: Path) -> None:
+    """Read a line with block delete on."""
+    data = f"{HEAD}{line}\nM2\n".encode()
+    read(data, load_setup(place), DIALECTS["linuxcnc"], Options(block_delete=True))
+
+
 @pytest.mark.oracle
 @pytest.mark.parametrize("text", UNSAFE)
 def test_linuxcnc_refuses_it(text: str, place: Path) -> None:
     with pytest.raises(linuxcnc.InterpreterError):
         linuxcnc.interpret(f"{HEAD}{text}\nM2\n".encode("latin-1"), place.parent)
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize("line", ["/(a", "/X1 (" + "a" * 250 + ")"])
+def test_linuxcnc_reads_the_bytes_of_a_deleted_block(line: str, place: Path) -> None:
+    with pytest.raises(linuxcnc.InterpreterError):
+        linuxcnc.interpret(f"{HEAD}{line}\nM2\n".encode(), place.parent, deletes=True)
 
 
 @pytest.mark.oracle
