@@ -1,8 +1,9 @@
 """Random programs with interleaved modal state against LinuxCNC.
 
-    python tests/fuzz/interleaved.py --count N --seed S [--bent] [--write FOLDER]
+    python tests/fuzz/interleaved.py --count N --seed S [--any-words | --bent] [--write FOLDER]
 
-Every difference is made as small as possible; one of each cause is shown, and written with `--write FOLDER`.
+`--any-words` draws programs of any words instead. Every difference is made as small as possible; one of each
+cause is shown, and written with `--write FOLDER`.
 `--bent` judges the corrected text on machines with errors. Ends with 1 if there was any difference. Seeds are
 independent: run parts side by side.
 """
@@ -22,7 +23,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from fuzz import bent, grammar, minimise, nominal
+from fuzz import any_words, bent, grammar, minimise, nominal
 from fuzz.grammar import Drawn
 from fuzz.nominal import Outcome
 
@@ -78,12 +79,15 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--bent", action="store_true")
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--bent", action="store_true")
+    which.add_argument("--any-words", action="store_true")
     parser.add_argument("--write", type=Path)
     options = parser.parse_args()
     found, begun = Found(), time.monotonic()
     with tempfile.TemporaryDirectory() as name:
-        judge, draw = (bent.Judge, grammar.legal) if options.bent else (nominal.Judge, grammar.program)
+        judge = bent.Judge if options.bent else nominal.Judge
+        draw = any_words.program if options.any_words else grammar.legal if options.bent else grammar.program
         judges = judge.of(Path(name))
         # what was found until then is shown after Ctrl-C, too
         with contextlib.suppress(KeyboardInterrupt):

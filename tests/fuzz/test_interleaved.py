@@ -7,8 +7,9 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
-from fuzz import bent, grammar, interleaved, minimise, nominal
+from fuzz import any_words, bent, grammar, interleaved, minimise, nominal
 from fuzz.grammar import Drawn
 from judge import linuxcnc
 from judge.linuxcnc import InterpreterFailure
@@ -97,6 +98,19 @@ def test_an_axis_that_only_the_start_knows_is_a_difference(judge: nominal.Judge)
     assert nominal.difference(drawn.data, program, feed, moves) == ("Y is known here only", 1)
 
 
+@pytest.mark.oracle
+@pytest.mark.parametrize("start", [None, (12.0, -8.0, 30.0)], ids=["unknown", "known"])
+@pytest.mark.parametrize(
+    "before", [b"", b"G20\n", b"G20\nG0 X1\nG21\n", b"F9\n", b"G55\n", b"G92 X3\n", b"G43 H2\n"]
+)
+def test_after_m61_the_judge_stands_where_it_was(
+    judge: nominal.Judge, before: bytes, start: tuple[float, float, float] | None
+) -> None:
+    drawn = Drawn(before + b"G0 X1 Y-14\nM61 Q2\nZ13\nM2\n", False, start)
+    moves = judge.interpret(drawn)
+    np.testing.assert_allclose(moves.axis[-1, :2], moves.axis[-2, :2], atol=1e-9)
+
+
 # -- the server -------------------------------------------------------------------------------------------
 
 
@@ -135,6 +149,14 @@ def test_nominal_readings_agree(judge: nominal.Judge, block: int) -> None:
     wrong, counts = differences(judge, (grammar.program(seed) for seed in range(first, first + 150)))
     assert wrong == []
     assert counts[nominal.SAME] >= 50, counts
+
+
+@pytest.mark.oracle
+@pytest.mark.slow
+def test_readings_of_any_words_agree(judge: nominal.Judge) -> None:
+    wrong, counts = differences(judge, (any_words.program(seed) for seed in range(4_000_000, 4_000_400)))
+    assert wrong == []
+    assert counts[nominal.SAME] >= 15, counts
 
 
 @pytest.mark.oracle

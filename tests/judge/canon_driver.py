@@ -31,7 +31,7 @@ PROBE = 3
 DWELL = 4
 FEED_MODE = "interpreter: feed mode set to"
 #: active modal codes are listed in tenths
-METRIC = 210
+UNITS = {200: 1.0, 210: MM}
 
 
 def stand_at(library, point):
@@ -77,6 +77,7 @@ class Canon:
         self.axis = None
         self.unit = MM
         self.silent = False
+        self.told = True
         self.messages = []
 
     def __getattr__(self, name):
@@ -90,9 +91,12 @@ class Canon:
             return
         self.line = state.sequence_number
         self.check_speeds(state.speed)
-        unit = MM if METRIC in state.gcodes else 1.0
+        # before the first line of the program no code is listed
+        unit = next((UNITS[code] for code in state.gcodes if code in UNITS), self.unit)
         if unit != self.unit:
             self.unit = unit
+            # a straight move has told where it ends before this call
+            self.told = False
             self.stand()
 
     def check_speeds(self, speed):
@@ -187,13 +191,19 @@ class Canon:
         self.data.extend([float(self.feed_mode), self.speed])
 
     def straight_traverse(self, x, y, z, *_):
-        self.row(RAPID, self.absolute(x, y, z))
+        self.straight(RAPID, self.absolute(x, y, z))
 
     def straight_feed(self, x, y, z, *_):
-        self.row(FEED, self.absolute(x, y, z))
+        self.straight(FEED, self.absolute(x, y, z))
 
     def straight_probe(self, x, y, z, *_):
-        self.row(PROBE, self.absolute(x, y, z))
+        self.straight(PROBE, self.absolute(x, y, z))
+
+    def straight(self, kind, tip):
+        self.row(kind, tip)
+        if not (self.told or self.silent):
+            self.told = True
+            self.stand()
 
     def rigid_tap(self, x, y, z, *_):
         back = self.position

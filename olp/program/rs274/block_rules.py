@@ -175,6 +175,8 @@ class _Tables:
         outside = np.zeros(len(present), np.int32)
         for code, letters in _IN_PLANE.items():
             outside[plane == code] = _CENTRE & ~letters
+        # a radius and a centre are two ways to say one thing
+        outside[(present & _bits("R")) != 0] = _CENTRE
         outside[~(moves & arcs)] = 0
         spare = bound & (~allowed | outside)
         for where in np.flatnonzero(spare).tolist():
@@ -212,10 +214,7 @@ class _Tables:
             return
         words = np.flatnonzero(chunk.letter == ord("N"))
         words = words[active[chunk.line[words]]]
-        late = chunk.first_word[chunk.line[words]] != words
-        if chunk.comments.size:
-            opens = np.searchsorted(chunk.comments, chunk.line_start[chunk.line[words]])
-            late |= opens < np.searchsorted(chunk.comments, chunk.start[words])
+        late = (chunk.first_word[chunk.line[words]] != words) | _behind_comment(chunk, words)
         for where in chunk.line[words[late]].tolist():
             why = "N is not the first word of this block; put the block number in front"
             yield where, why, "OLP505", "N"
@@ -227,10 +226,17 @@ class _Tables:
         words = np.flatnonzero(chunk.letter == ord(letter))
         words = words[active[chunk.line[words]]]
         line = chunk.line[words]
-        whole = chunk.mantissa[words] % 10 ** chunk.decimals[words].astype(np.int64) == 0
-        for where in line[(present[line] != _bits(letter)) | ~whole].tolist():
-            why = f"{letter} is a program number; expected a whole number in a block of its own"
+        broken = chunk.mantissa[words] % 10 ** chunk.decimals[words].astype(np.int64) != 0
+        with_others = (present[line] != _bits(letter)) | _behind_comment(chunk, words)
+        for where in line[with_others | broken].tolist():
+            why = f"{letter} is a program number; expected a whole number, first in a block of its own"
             yield where, why, "OLP505", letter
+
+
+def _behind_comment(chunk: WordChunk, words: Index) -> Mask:
+    """(m,) whether a comment opens before these words of their lines."""
+    opens = np.searchsorted(chunk.comments, chunk.line_start[chunk.line[words]])
+    return np.asarray(opens < np.searchsorted(chunk.comments, chunk.start[words]), bool)
 
 
 def _present(chunk: WordChunk) -> Bits:

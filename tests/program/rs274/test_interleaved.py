@@ -114,6 +114,8 @@ REFUSED = {
     "G0 O5": "O is a program number",
     "O5 X1": "O is a program number",
     "O0.5": "O is a program number",
+    "(msg, a)O1": "O is a program number",
+    "G2 Y3 I1 R2": "uses its word I",
     "(a\nG0 X9": "`(a` is not closed",
     "G0 X9 (" + "a" * 250 + ")": "takes 252 at most",
 }
