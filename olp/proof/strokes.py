@@ -64,13 +64,13 @@ def _axis(path: Toolpath, target: Array, hole: Hole) -> tuple[int, Array, Array]
     """The move that reaches the bottom, and the ends of the hole's axis where its strokes are, targets."""
     axis = PLANES[hole.plane][2]
     some = np.arange(hole.first, hole.last)
-    depth = path.end_mm[some, axis]
-    at_bottom = some[np.abs(depth - hole.z_mm) < 1e-9]
+    strokes = some[path.kind[some] != Kind.RAPID]
+    # the rapid before the first stroke may end at the bottom, too
+    at_bottom = strokes[np.abs(path.end_mm[strokes, axis] - hole.z_mm) < 1e-9]
     move = int(at_bottom[0]) if at_bottom.size else int(some[-1])
     bottom = target[move].copy()
     top = bottom.copy()
     side = 1.0 if hole.r_mm >= hole.z_mm else -1.0
-    strokes = some[path.kind[some] != Kind.RAPID]
     levels = np.append(target[strokes, axis], bottom[axis] + hole.r_mm - hole.z_mm)
     top[axis] = side * np.nanmax(side * levels)
     return move, top, bottom

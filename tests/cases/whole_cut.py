@@ -75,7 +75,8 @@ class Whole:
     largest with every side of the backlash that is possible. By nominal line, the same. `open` counts points
     of cuts with an unknown play, `left_out` those with an unknown position, `loose` cuts that start where an
     uncorrected move ended. Of what was judged, `lines`, `arcs` and `holes` count nominal ones, and `inserted`
-    the moves of the corrected program that end within a nominal cut."""
+    the moves of the corrected program that end within a nominal cut. Without `matched`, lines of holes are
+    split, and their strokes count as cuts."""
 
     certain_um: float
     possible_um: float
@@ -91,6 +92,7 @@ class Whole:
     inserted: int
     #: nominal line that ends with each line of the corrected program
     owners: dict[int, int]
+    matched: bool
 
     @property
     def worst_line(self) -> int:
@@ -119,7 +121,8 @@ def judge_whole(
     real = _Tips.of(own, model, spacing_mm, written.changes)
     shift = shifts(moves, model)
     holes, other = _runs(moves, said.cycles), _runs(own, written.cycles)
-    if len(holes) != len(other):
+    split = len(holes) != len(other)
+    if split:
         holes, other = [], []
     result = _Sum(moves)
     owner = np.full(len(own), -1)
@@ -144,24 +147,29 @@ def judge_whole(
     before = np.concatenate([[False], left[:-1]])
     known = owner >= 0
     owners = dict(zip(own.line[known].tolist(), moves.line[owner[known]].tolist(), strict=True))
-    return result.done(int((feeds & before & ~left).sum()), owners)
+    return result.done(int((feeds & before & ~left).sum()), owners, matched=not split)
 
 
 def compare(stated_um: float, whole: Whole) -> None:
     """The stated maximum is not below the judge's, and not far above."""
-    assert stated_um >= whole.possible_um - ARCS_UM, (
-        f"stated {stated_um:.2f}, is {whole.possible_um:.2f} um (certain: {whole.certain_um:.2f}), "
-        f"line {whole.worst_line}"
-    )
-    assert whole.possible_um or not stated_um or whole.left_out, f"stated {stated_um:.2f}, but no cut is off"
+    not_below(stated_um, whole)
     above = FACTOR * whole.possible_um + MORE_UM
     if not whole.left_out and not whole.open:
         assert stated_um <= above, f"stated {stated_um:.2f}, is {whole.possible_um:.2f} um"
 
 
+def not_below(stated_um: float, whole: Whole) -> None:
+    """The stated maximum is not below the judge's."""
+    assert stated_um >= whole.possible_um - ARCS_UM, (
+        f"stated {stated_um:.2f}, is {whole.possible_um:.2f} um (certain: {whole.certain_um:.2f}), "
+        f"line {whole.worst_line}"
+    )
+    assert whole.possible_um or not stated_um or whole.left_out, f"stated {stated_um:.2f}, but no cut is off"
+
+
 def _first_after(moves: CanonMoves, lines: frozenset[int]) -> list[int]:
-    """The first move after each of these lines; programs of the judge have no loops."""
-    first = np.searchsorted(moves.line, sorted(lines), side="right")
+    """The first move after each of these tool changes, or in its block; the programs have no loops."""
+    first = np.searchsorted(moves.line, sorted(lines), side="left")
     return sorted({k for k in first.tolist() if k < len(moves)})
 
 
@@ -284,12 +292,12 @@ class _Sum:
                 self.certain[line] = max(self.certain.get(line, 0.0), 1e3 * float(known.max()))
             self.possible[line] = max(self.possible.get(line, 0.0), 1e3 * float(possible[mine].max()))
 
-    def done(self, loose: int, owners: dict[int, int]) -> Whole:
+    def done(self, loose: int, owners: dict[int, int], *, matched: bool) -> Whole:
         largest = (max(values.values(), default=0.0) for values in (self.certain, self.possible))
         arcs = sum(int(self.kind[cut]) == ARC for cut in self.cuts)
         return Whole(
             *largest, self.certain, self.possible, self.judged, self.open, self.left_out, loose,
-            len(self.cuts) - arcs, arcs, self.holes, self.inserted, owners,
+            len(self.cuts) - arcs, arcs, self.holes, self.inserted, owners, matched,
         )  # fmt: skip
 
 

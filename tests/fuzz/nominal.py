@@ -49,8 +49,8 @@ _KINDS = {Kind.RAPID: RAPID, Kind.LINE: FEED, Kind.ARC_CW: ARC, Kind.ARC_CCW: AR
 _PLANE = {0: 0, 1: 2, 2: 1}
 _FEED = re.compile("zero feed rate|inverse time|feed per rev")
 _BEFORE_TAPE = re.compile(rb"\s+(?=%)")
-#: the control may have such a code, by a file of its own
-_REMAPPED = "M-code greater than 199"
+#: the control may have such a code, or such a tool, by a file of its own
+_OWN_FILES = ("M-code greater than 199", "not found in the tool table")
 _HOME = re.compile(rb"(?i)G0*(28|30)(\.0*)?(?![.0-9])")
 _AXES = ((0, 1), (2, 0), (1, 2))
 
@@ -127,7 +127,7 @@ class Judge:
         try:
             moves = self.interpret(drawn)
         except InterpreterError as error:
-            if _REMAPPED in str(error):
+            if any(what in str(error) for what in _OWN_FILES):
                 return Outcome(UNJUDGED, str(error))
             own = feed is None and _FEED.search(str(error))
             return Outcome(

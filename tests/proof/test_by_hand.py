@@ -142,6 +142,12 @@ def test_a_hole_counts_across_its_axis(tmp_path: Path, level_mm: int) -> None:
     assert by_line(path, HOLE) == pytest.approx({3: 12.0}, abs=0.2)
 
 
+def test_a_hole_without_a_depth_counts_at_its_place(tmp_path: Path) -> None:
+    """The rapid ends at the bottom, where the stroke begins and ends."""
+    path = stiff(tmp_path, curve("Z", "EXZ", (-1000, 12), (2000, 12)))
+    assert by_line(path, HOLE.replace(b"R5", b"R-10")) == pytest.approx({3: 12.0}, abs=0.01)
+
+
 @pytest.mark.parametrize("off_um", (-9, 9))
 def test_a_hole_counts_at_its_depth(tmp_path: Path, off_um: int) -> None:
     path = stiff(tmp_path, curve("Z", "EZZ", (-1000, off_um), (-10, off_um), (-9, 0), (2000, 0)))

@@ -53,6 +53,8 @@ _AXES = _bits("XYZABCUVW")
 _CENTRE = _bits("IJK")
 #: Centre words of arcs by plane code.
 _IN_PLANE = {170: _bits("IJ"), 180: _bits("IK"), 190: _bits("JK")}
+#: Words of their ends.
+_ENDS = {170: _bits("XY"), 180: _bits("XZ"), 190: _bits("YZ")}
 #: Letters of which a block may have several.
 _FREE = _bits("GM")
 _MOTION = frozenset({0, 10, *_ARCS, *CYCLES, *PROBES})
@@ -70,9 +72,9 @@ class BlockRules:
     - `groups`: codes of which a block may have one.
     - `needs`: codes that need one of these letters.
     - `excludes`: codes that take one of two kinds of letters. `positive`: letters without a negative number.
-    - `alone`: a letter with a whole number, in a block of its own. `number_first`: N is the first word of
-      its line. `one_use_of_axes`: no motion code may be beside a code that uses the axis words for something
-      else.
+    - `whole`: letters with integers. `alone`: a letter that is first in a block of its own. `number_first`: N
+      is the first word of its line. `one_use_of_axes`: no motion code may be beside a code that uses the axis
+      words for something else.
     """
 
     users: Mapping[str, frozenset[int]] = field(default_factory=dict)
@@ -80,6 +82,7 @@ class BlockRules:
     needs: Mapping[int, str] = field(default_factory=dict)
     excludes: Mapping[int, tuple[str, str]] = field(default_factory=dict)
     positive: str = ""
+    whole: str = ""
     alone: str = ""
     number_first: bool = False
     one_use_of_axes: bool = False
@@ -123,6 +126,7 @@ class _Tables:
             self._negative(chunk, active),
             self._numbers(chunk, active),
             self._alone(chunk, active, present),
+            self._broken(chunk, active),
         ):
             for line, why, code, word in rule:
                 number = chunk.first_line + line + 1
@@ -170,13 +174,17 @@ class _Tables:
         moves = (present & _AXES) != 0
         arcs = np.isin(motion, sorted(_ARCS))
         moves |= arcs & ((present & _CENTRE) != 0)
+        moves[line[np.isin(key, _STATING)]] = False
         moves[line[np.isin(key, _MOTIONS)]] = True
         allowed |= np.where(moves & (motion > 0), self.allowed[np.maximum(motion, 0)], 0)
         outside = np.zeros(len(present), np.int32)
+        radius = (present & _bits("R")) != 0
         for code, letters in _IN_PLANE.items():
             outside[plane == code] = _CENTRE & ~letters
+            # through one point lead all circles of a radius
+            outside[radius & (plane == code) & ((present & _ENDS[code]) == 0)] |= _bits("R")
         # a radius and a centre are two ways to say one thing
-        outside[(present & _bits("R")) != 0] = _CENTRE
+        outside[radius] |= _CENTRE
         outside[~(moves & arcs)] = 0
         spare = bound & (~allowed | outside)
         for where in np.flatnonzero(spare).tolist():
@@ -226,11 +234,20 @@ class _Tables:
         words = np.flatnonzero(chunk.letter == ord(letter))
         words = words[active[chunk.line[words]]]
         line = chunk.line[words]
-        broken = chunk.mantissa[words] % 10 ** chunk.decimals[words].astype(np.int64) != 0
         with_others = (present[line] != _bits(letter)) | _behind_comment(chunk, words)
-        for where in line[with_others | broken].tolist():
-            why = f"{letter} is a program number; expected a whole number, first in a block of its own"
+        for where in line[with_others].tolist():
+            why = f"{letter} is a program number; expected it first, in a block of its own"
             yield where, why, "OLP505", letter
+
+    def _broken(self, chunk: WordChunk, active: Mask) -> Iterator[Refusal]:
+        whole = np.isin(chunk.letter, list(self.rules.whole.encode()))
+        words = np.flatnonzero(whole & (chunk.decimals > 0))
+        words = words[active[chunk.line[words]]]
+        words = words[chunk.mantissa[words] % 10 ** chunk.decimals[words].astype(np.int64) != 0]
+        for word in words.tolist():
+            letter = chr(int(chunk.letter[word]))
+            why = f"the word {letter} has a fraction; expected an integer"
+            yield int(chunk.line[word]), why, "OLP516", letter
 
 
 def _behind_comment(chunk: WordChunk, words: Index) -> Mask:
@@ -312,6 +329,7 @@ NGC_RULES = BlockRules(
     },
     excludes={432: ("H", "XYZ")},
     positive="NFSTLH",
+    whole="LO",
     alone="O",
     number_first=True,
     one_use_of_axes=True,

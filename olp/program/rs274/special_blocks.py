@@ -204,6 +204,10 @@ class SpecialBlocks:
         relative = np.array([True]) if incremental else None
         value = scaled(context, state, self._collector.remarks)
         end = fill(slot, value, relative, offset, frame.unit_mm, before)
+        if kind == Kind.PROBE and end[0].tolist() == before:
+            raise ProgramError(
+                "a probe ends where it starts; give it a path of X, Y or Z", line=line, code="OLP516"
+            )
         self._collector.put_moves(
             np.array([kind], np.uint8), np.array([flag], np.uint8), np.array([line]),
             np.array([frame_index]), end, np.where(slot >= 0, slot + context.base, -1),

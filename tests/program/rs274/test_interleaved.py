@@ -113,7 +113,12 @@ REFUSED = {
     "G53": "G53 needs one of X, Y, Z",
     "G0 O5": "O is a program number",
     "O5 X1": "O is a program number",
-    "O0.5": "O is a program number",
+    "O0.5": "the word O has a fraction",
+    "G81 X5 R2 Z-3 L1.5": "the word L has a fraction",
+    "G10 L2.5 P1 X1": "the word L has a fraction",
+    "G3 R5": "uses its word R",
+    "G18 G3 R5 Y1": "uses its word R",
+    "G38.4 X1": "ends where it starts",
     "(msg, a)O1": "O is a program number",
     "G2 Y3 I1 R2": "uses its word I",
     "(a\nG0 X9": "`(a` is not closed",
@@ -163,6 +168,12 @@ def test_what_the_control_sees_in_another_way_is_refused(text: str, place: Path)
     assert caught.value.line == 4
     # behind the end nothing is read
     reached(f"{HEAD}M2\n{text}\n", place)
+
+
+def test_a_series_uses_no_words_of_a_block_that_states_a_zero(place: Path) -> None:
+    with pytest.raises(ProgramError, match="uses its word R") as caught:
+        reached(f"{HEAD}G81 X5 R2 Z-3\nG52 X1 R1\nM2\n", place)
+    assert caught.value.line == 5
 
 
 @pytest.mark.parametrize("line", ["/(a", "/X1 (" + "a" * 250 + ")"])
