@@ -111,6 +111,12 @@ def test_after_m61_the_judge_stands_where_it_was(
     np.testing.assert_allclose(moves.axis[-1, :2], moves.axis[-2, :2], atol=1e-9)
 
 
+@pytest.mark.oracle
+def test_between_tape_marks_the_judge_starts_where_it_is_told(judge: nominal.Judge) -> None:
+    moves = judge.interpret(Drawn(b"%\nG0 Z2\nG4 P0\nM61 Q2\nZ3\n%\n", False, (12.0, -8.0, 30.0)))
+    np.testing.assert_allclose(moves.axis[:, :2], [[12.0, -8.0]] * len(moves), atol=1e-9)
+
+
 # -- the server -------------------------------------------------------------------------------------------
 
 

@@ -200,8 +200,10 @@ class Canon:
         self.straight(PROBE, self.absolute(x, y, z))
 
     def straight(self, kind, tip):
+        # the move to the start may come while the codes of the next line are listed
+        begun = self.axis is not None
         self.row(kind, tip)
-        if not (self.told or self.silent):
+        if begun and not (self.told or self.silent):
             self.told = True
             self.stand()
 
