@@ -308,20 +308,26 @@ def _in_force(chunk: WordChunk, lines: Index, code: Index, now: int | None) -> M
 def _check_deleted(context: Context, active: Mask, state: AxisState) -> None:
     """A `/` block must not change how later blocks are read, unless the next block restates it."""
     chunk = context.chunk
-    deleted = np.flatnonzero(chunk.deleted & active)
-    pairs = [(context.motion, -1 if state.motion is None else state.motion)]
-    pairs += [(getattr(context, group), getattr(state, group)) for group in GROUPS]
-    for line in deleted.tolist():
-        following = line + 1
-        while following < len(chunk.deleted) and chunk.deleted[following]:
-            following += 1
-        restated = (context.codes.line == following) & (context.codes.act == Act.MOTION)
-        for which, (mode, last_mode) in enumerate(pairs):
-            before = mode[line - 1] if line else last_mode
-            if mode[line] != before and not (which == 0 and restated.any()):
-                raise ProgramError(
-                    "a block under block delete changes a modal code that later blocks depend on; "
-                    "restate the code in the next block or remove the `/`",
-                    line=context.number(line),
-                    code="OLP525",
-                )
+    lines = np.flatnonzero(chunk.deleted & active)
+    if not lines.size:
+        return
+    kept = np.flatnonzero(~chunk.deleted)
+    following = np.append(kept, len(chunk.deleted))[np.searchsorted(kept, lines)]
+    restated = np.zeros(len(chunk.deleted) + 1, bool)
+    restated[context.codes.line[context.codes.act == Act.MOTION]] = True
+    changed = _changes(context.motion, state.motion)[lines] & ~restated[following]
+    for group in GROUPS:
+        changed |= _changes(getattr(context, group), getattr(state, group))[lines]
+    if changed.any():
+        raise ProgramError(
+            "a block under block delete changes a modal code that later blocks depend on; "
+            "restate the code in the next block or remove the `/`",
+            line=context.number(int(lines[np.argmax(changed)])),
+            code="OLP525",
+        )
+
+
+def _changes(mode: npt.NDArray[np.int16], before: int | None) -> Mask:
+    """(lines,) whether a mode is another one than in the line before."""
+    first = np.array([-1 if before is None else before], mode.dtype)
+    return np.asarray(mode != np.concatenate((first, mode[:-1])), bool)

@@ -62,12 +62,14 @@ def read(
 
 @dataclass(slots=True, eq=False)
 class _Rows:
-    """The motion lines of a chunk while they are read: how many have a frame, how many a position."""
+    """The motion lines of a chunk while they are read: how many have a frame, how many a position. `present`
+    is the index of the frame in force, None after what may have changed it."""
 
     blocks: Blocks
     frame: npt.NDArray[np.int32]
     assigned: int = 0
     resolved: int = 0
+    present: int | None = None
 
 
 class _Reader:
@@ -143,6 +145,7 @@ class _Reader:
             if not event[line]:
                 self._alone(context, rows, upto, Effect())
                 continue
+            rows.present = None
             number, deleted = context.number(line), bool(chunk.deleted[line])
             words, codes = event_block(context, line, state.profile)
             moved = any(state.may_move(round(w.value * 10)) for w in words if w.letter == "M")
@@ -173,7 +176,9 @@ class _Reader:
         """Give the present frame to the rows since the last event."""
         if upto > rows.assigned:
             line = context.number(int(rows.blocks.line[rows.assigned]))
-            rows.frame[rows.assigned : upto] = self.state.frame(line)
+            if rows.present is None:
+                rows.present = self.state.frame(line)
+            rows.frame[rows.assigned : upto] = rows.present
             if self.state.unit is None:
                 self.collector.remarks.setdefault("unit", (line, "mm"))
             rows.assigned = upto

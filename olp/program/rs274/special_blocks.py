@@ -45,7 +45,6 @@ from olp.program.rs274.motion import fill
 from olp.program.rs274.profiles.base import Act, Profile
 from olp.program.rs274.state import BROKEN_SERIES, NAN
 
-_CYCLES = np.array(sorted(CYCLES))
 _M_REFUSED = {
     700: "saves modal codes", 710: "forgets saved modal codes", 720: "restores modal codes",
     730: "saves modal codes", 960: "branches", 970: "calls a subprogram", 980: "calls a subprogram",
@@ -145,7 +144,7 @@ class SpecialBlocks:
     def _ended(self, context: Context, row: int) -> bool:
         """Whether another motion code came into force between the last block of a cycle and this line."""
         first = max(self._last_cycle + 1 - context.chunk.first_line, 0)
-        return self._last_cycle < 0 or not np.isin(context.motion[first:row], _CYCLES).all()
+        return self._last_cycle < 0 or not CYCLES.issuperset(context.motion[first:row].tolist())
 
     def run(self, context: Context, row: int, slot: Index, frame: int, effect: Effect) -> None:
         """Carry out the motion on line `row` of the chunk, whose axis words are `slot` (1, 3), in this

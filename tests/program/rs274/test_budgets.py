@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
+from types import FrameType
 
 import pytest
 from cases.acceptance import TRUE_ZERO, machine
@@ -130,3 +132,47 @@ def test_goto_takes_the_next_block_of_a_number_then_the_first() -> None:
     text = "O1\nN1 #1=0\nN5 #1=#1+1\nIF[#1EQ2]GOTO 5\nIF[#1LT3]GOTO 5\nG0 X#1\nN5 M30\n"
     assert b"X3" in unroll.flatten(text.replace("N5 M30", "N6 M30").encode(), profile("fanuc"))
     assert b"X" not in unroll.flatten(text.encode(), profile("fanuc"))
+
+
+# -- work by the length of the text ----------------------------------------------------------------------
+
+#: lines that are repeated, and what they are about
+REPEATED = {
+    "deleted blocks": "/M3\n/M5\n",
+    "plain moves": "G1 X1\nX2\n",
+    "distance modes": "G91 X1\nG90 X2\n",
+    "whole circles": "G2 I9\n",
+    "arcs with a radius": "G3 X2 R5\nG3 X1 R5\n",
+    "canned cycles": "G81 X1 Z-1 R1\nX2\n",
+    "cycles that end": "G81 X1 Z-1 R1\nG80\nG0 Z9\n",
+    "offsets": "G92 X3\nG0 X4\nG92.1\n",
+    "tools": "T1 M6\nG0 X1 Y1 Z1\n",
+    "dwells": "G4 P1\nX1\n",
+    "machine positions": "G53 G0 X300\nG0 X2\n",
+    "comments": "(a)\nX1\n",
+}
+
+
+def calls(text: str, place: Path) -> int:
+    """How many functions a correction of the text calls, those of C too."""
+    count = 0
+
+    def counted(frame: FrameType, event: str, _: object) -> None:
+        nonlocal count
+        count += event in ("call", "c_call")
+
+    sys.setprofile(counted)
+    try:
+        olp.correct((HEAD + text + "M2\n").encode(), place)
+    finally:
+        sys.setprofile(None)
+    return count
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", REPEATED)
+def test_work_grows_with_the_text_and_no_faster(name: str, tmp_path: Path) -> None:
+    place = machine(tmp_path, tables=TRUE_ZERO + "[tools.1]\nZ_mm = 100.0\n")
+    calls(REPEATED[name], place)
+    one, two, three = (calls(REPEATED[name] * count, place) for count in (200, 400, 600))
+    assert three - two < 1.2 * (two - one) + 2000
