@@ -129,7 +129,9 @@ class Judge:
         except InterpreterError as error:
             if any(what in str(error) for what in _OWN_FILES):
                 return Outcome(UNJUDGED, str(error))
-            own = feed is None and _FEED.search(str(error))
+            # a block that only states G1 needs a feed there, and moves nothing
+            bare = error.line not in program.toolpath.line
+            own = (feed is None or bare) and _FEED.search(str(error))
             return Outcome(
                 BOTH_REFUSE if own else LOOSER, str(error).partition(": ")[2], error.line, str(error)
             )

@@ -165,7 +165,8 @@ class _Tables:
         self, active: Mask, codes: tuple[Index, Index], present: Bits, motion: Codes, plane: Codes
     ) -> Iterator[Refusal]:
         bound = np.where(active, present & self.bound, 0)
-        if not bound.any():
+        probes = np.isin(motion, sorted(PROBES)) if self.bound else np.zeros(0, bool)
+        if not (bound.any() or probes.any()):
             return
         line, key = codes
         allowed = np.zeros(len(present), np.int32)
@@ -186,7 +187,9 @@ class _Tables:
         # a radius and a centre are two ways to say one thing
         outside[radius] |= _CENTRE
         outside[~(moves & arcs)] = 0
-        spare = bound & (~allowed | outside)
+        # a probe needs a path of X, Y or Z
+        outside[moves & probes & ((present & _bits("XYZ")) == 0)] = _AXES
+        spare = (bound & ~allowed) | (np.where(active, present, 0) & outside)
         for where in np.flatnonzero(spare).tolist():
             letter = chr(64 + int(spare[where] & -spare[where]).bit_length())
             why = f"no code of this block uses its word {letter}; remove it, or give the code that does"

@@ -119,6 +119,7 @@ REFUSED = {
     "G3 R5": "uses its word R",
     "G18 G3 R5 Y1": "uses its word R",
     "G38.4 X1": "ends where it starts",
+    "G38.2 C5": "uses its word C",
     "(msg, a)O1": "O is a program number",
     "G2 Y3 I1 R2": "uses its word I",
     "(a\nG0 X9": "`(a` is not closed",
