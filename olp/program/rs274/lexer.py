@@ -89,7 +89,7 @@ def lex(
     `strange` are odd."""
     size = len(text)
     newline = np.flatnonzero(text == 10)
-    ends = newline if size and newline.size and newline[-1] == size - 1 else np.append(newline, size)
+    ends = newline if newline.size and newline[-1] == size - 1 else np.append(newline, size)
     lines = len(ends)
     starts = np.empty(lines, np.int64)
     starts[0] = 0
@@ -112,7 +112,7 @@ def lex(
     where: Index | None = None
     compact, begin, stop = runs(blanked(text, keep))
     line_breaks = newline
-    if begin.size and (compact[begin + (_PAD - 1)] == 32).any():
+    if (compact[begin + (_PAD - 1)] == 32).any():
         # blanks inside words: take them all out
         where = np.flatnonzero(keep)
         compact, begin, stop = runs(text[where])
@@ -125,7 +125,7 @@ def lex(
         bad = np.concatenate((bad, begin[malformed]))
 
     if len(line_breaks) < lines:
-        line_breaks = np.append(line_breaks, len(body) - 1)
+        line_breaks = np.append(line_breaks, len(body))
     first_word = np.empty(lines + 1, np.int64)
     first_word[0] = 0
     first_word[1:] = np.searchsorted(begin, line_breaks)
