@@ -170,8 +170,7 @@ class _Tables:
         allowed |= np.where(moves, self.allowed[np.maximum(motion, 0)], 0)
         outside = np.zeros(len(present), np.int32)
         for code, letters in _IN_PLANE.items():
-            outside[plane == code] = _CENTRE & ~letters
-        outside[~(moves & arcs)] = 0
+            outside[arcs & (plane == code)] = _CENTRE & ~letters
         spare = bound & (~allowed | outside)
         for where in np.flatnonzero(spare).tolist():
             letter = chr(64 + int(spare[where] & -spare[where]).bit_length())

@@ -40,7 +40,7 @@ _LENGTHS[list(b"XYZIJKRQ")] = True
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Codes:
-    """The G words of a chunk: line, code x 10, what it does."""
+    """The G words of a chunk: line, code x 10 (-1: no control has it), what it does."""
 
     line: Index
     code: Index
@@ -86,6 +86,7 @@ class Modes:
         profile = state.profile
         self._cycles_apart = profile.cycles_apart
         self._claims = sorted(AXIS_VALUES | {DWELL} if profile.axis_dwell else AXIS_VALUES)
+        # the last entry is of codes that no control has
         self._act = np.full(2000, Act.REFUSE, np.int8)
         for code, act in profile.codes.items():
             self._act[code] = act
@@ -183,10 +184,11 @@ class Modes:
 
     def _codes(self, chunk: WordChunk, value: Array, usable: Mask) -> Codes:
         g = np.flatnonzero((chunk.letter == 71) & usable)
-        code = np.clip(np.rint(value[g] * 10), 0, 1999).astype(np.int64)
-        act = self._act[code]
-        act[np.abs(code - value[g] * 10) > 1e-6] = Act.REFUSE
-        return Codes(chunk.line[g], code, act)
+        tenths = value[g] * 10
+        code = np.rint(tenths)
+        listed = (np.abs(code - tenths) < 1e-6) & (code >= 0) & (code < len(self._act))
+        code = np.where(listed, code, -1).astype(np.int64)
+        return Codes(chunk.line[g], code, self._act[code])
 
     def _spindle(self, chunk: WordChunk, usable: Mask) -> Modal:
         m = (chunk.letter == 77) & usable & np.isin(chunk.mantissa, (3, 4, 5, 6, 19)) & (chunk.decimals == 0)

@@ -189,7 +189,7 @@ class _Reader:
         kind = _KIND[np.maximum(motion, -1)]
         if (kind == 255).any():
             rows_without = np.flatnonzero(kind == 255).tolist()
-            raise ProgramError.together(_no_motion(int(motion[i]), int(number[i])) for i in rows_without)
+            raise ProgramError.together(_no_motion(int(number[i])) for i in rows_without)
         incremental = context.distance[line] == INCREMENTAL
         frame = rows.frame[a:upto]
         offset, unit = self._offsets(frame)
@@ -254,11 +254,9 @@ class _Reader:
         return offsets[frame], units[frame][:, None]
 
 
-def _no_motion(code: int, line: int) -> ProgramError:
-    if code in (-1, 800):
-        return ProgramError(
-            "a block has axis words, but no motion code is in force; expected G0, G1, G2 or G3",
-            line=line,
-            code="OLP517",
-        )
-    return ProgramError(f"G{code / 10:g} is not read as motion", line=line, code="OLP512")
+def _no_motion(line: int) -> ProgramError:
+    return ProgramError(
+        "a block has axis words, but no motion code is in force; expected G0, G1, G2 or G3",
+        line=line,
+        code="OLP517",
+    )

@@ -82,10 +82,11 @@ def _checked(
     code: Index, act: npt.NDArray[np.int8], words: list[Word], profile: Profile, line: int
 ) -> list[int]:
     """The event codes of a block; refuses those that cannot be read correctly."""
-    for c, a in zip(code.tolist(), act.tolist(), strict=True):
+    numbers = [word.value for word in words if word.letter == "G"]
+    for c, a, number in zip(code.tolist(), act.tolist(), numbers, strict=True):
         if a == Act.REFUSE:
             why = profile.refusals.get(c)
-            name = f"G{c / 10:g}"
+            name = f"G{number:g}"
             if c in CUTTER_COMPENSATION:
                 why = f"{why}; program the tool path, or take the contour as tool path with --contour"
             raise ProgramError(

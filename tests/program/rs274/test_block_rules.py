@@ -238,6 +238,7 @@ def test_a_number_of_a_block_is_its_first_word(block: str, wrong: bool, before: 
     [
         ("X1 Y1 X2", ("the word X is twice in this block; expected it once", "OLP515", "")),
         ("Y1 X1 X2 Y2", ("the word Y is twice in this block; expected it once", "OLP515", "")),
+        ("X1 Y1 Y2", ("the word Y is twice in this block; expected it once", "OLP515", "")),
         ("F1 G90 F1 G1 M3 M8", ("the word F is twice in this block; expected it once", "OLP515", "")),
         ("X1 Y1 G90 G17 G1 M3 M8", None),
         ("A1 A2", ("the word A is twice in this block; expected it once", "OLP515", "")),

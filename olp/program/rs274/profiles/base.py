@@ -175,7 +175,6 @@ def g_codes(*, unchanged: set[int], extra: dict[int, Act], without: Set[int] = f
     """The table of a control: the usual codes, those that stay `unchanged`, those with an `extra` or another
     act, `without` those that it does not have."""
     codes = dict.fromkeys((0, 10, 20, 30, 800, *CYCLES, *PROBES), Act.MOTION)
-    codes |= dict.fromkeys((330, 331, 760, 870, 880), Act.REFUSE)
     codes |= dict.fromkeys((170, 180, 190), Act.PLANE)
     codes |= dict.fromkeys((900, 910), Act.DISTANCE)
     codes |= dict.fromkeys((930, 940, 950), Act.FEED)
