@@ -468,7 +468,11 @@ class AxisState(State):
     @staticmethod
     def _integer(word: Word, line: int) -> int:
         if word.value != round(word.value) or word.value < 0:
-            raise ProgramError(f"{word.letter}{word.value:g} is not an integer", line=line, code="OLP516")
+            raise ProgramError(
+                f"{word.letter}{word.value:g} is not a number of a table; expected an integer from 0",
+                line=line,
+                code="OLP516",
+            )
         return round(word.value)
 
     @staticmethod

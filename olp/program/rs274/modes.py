@@ -22,6 +22,7 @@ from olp.program.rs274.codes import (
     COMPENSATION_OFF,
     CUTTER_COMPENSATION,
     DWELL,
+    END_OF_CYCLES,
     GROUPS,
 )
 from olp.program.rs274.lexer import WordChunk
@@ -206,11 +207,10 @@ class Modes:
         return np.append(codes.line, chunk.line[m]), np.append(codes.code, key)
 
     def _events(self, chunk: WordChunk, value: Array, codes: Codes, usable: Mask) -> Mask:
-        """The lines with a G word that is an event or refused, an M word not known as harmless, or a T
-        word."""
+        """The lines with a G word that is an event, an M word not known as harmless, or a T word."""
         letter, line = chunk.letter, chunk.line
         event = np.zeros(len(chunk.line_start), bool)
-        event[codes.line[(codes.act == Act.EVENT) | (codes.act == Act.REFUSE)]] = True
+        event[codes.line[codes.act == Act.EVENT]] = True
         m = np.flatnonzero((letter == 77) & usable)
         event[line[m[self._m_event[np.clip(np.rint(value[m] * 10), 0, 10_000).astype(np.int64)]]]] = True
         event[line[(letter == 84) & usable]] = True
@@ -224,15 +224,13 @@ class Modes:
     def _motion(self, chunk: WordChunk, codes: Codes) -> Modal:
         chosen = codes.act == Act.MOTION
         line, code = codes.line[chosen], codes.code[chosen]
-        if (code == 800).any():
-            # G80 may be beside another motion code, which then holds
-            beside = np.isin(line, line[1:][line[1:] == line[:-1]])
-            line, code = line[~(beside & (code == 800))], code[~(beside & (code == 800))]
+        # G80 may be beside another motion code, which then holds
+        beside = (code == END_OF_CYCLES) & np.isin(line, line[1:][line[1:] == line[:-1]])
+        line, code = line[~beside], code[~beside]
         if self._cycles_apart:
             # cycles are a separate group: after G80 alone the last of G0 to G3 is in force again
-            code = code.copy()
             for i, c in enumerate(code.tolist()):
-                if c == 800:
+                if c == END_OF_CYCLES:
                     code[i] = -1 if self._linear_motion is None else self._linear_motion
                 elif c < 330:
                     self._linear_motion = c

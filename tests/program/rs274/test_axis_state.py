@@ -265,6 +265,7 @@ SPINDLE = (
 )
 BESIDE = "a tool length beside M6 is that of the tool before the change; put it into the next block"
 DWELL = "a dwell and a motion are in one block; put the dwell into its own block"
+TABLE = "is not a number of a table; expected an integer from 0"
 NUMBER = "G10 needs a P word with the number of a work offset, 1 for G54"
 POSITION = (
     "is stored as the present position, but the axis has not been commanded yet; "
@@ -313,9 +314,9 @@ REFUSED: dict[tuple[str, str], dict[str, object]] = {
     ("linuxcnc", "T0 M6 G43"): {"why": BESIDE, "code": "OLP518"},
     ("linuxcnc", "T1 M6 G43.2 H0"): {"why": BESIDE, "code": "OLP518"},
     ("linuxcnc", "M61"): {"why": "M61 needs a Q word with the tool number", "code": "OLP516"},
-    ("linuxcnc", "M61 Q1.5"): {"why": "Q1.5 is not an integer", "code": "OLP516"},
-    ("linuxcnc", "T1.5"): {"why": "T1.5 is not an integer", "code": "OLP516"},
-    ("fanuc", "T-1"): {"why": "T-1 is not an integer", "code": "OLP516"},
+    ("linuxcnc", "M61 Q1.5"): {"why": f"Q1.5 {TABLE}", "code": "OLP516"},
+    ("linuxcnc", "T1.5"): {"why": f"T1.5 {TABLE}", "code": "OLP516"},
+    ("fanuc", "T-1"): {"why": f"T-1 {TABLE}", "code": "OLP516"},
     ("linuxcnc", "G4 P-0.1"): {"why": "a dwell is negative; expected P0 or more", "code": "OLP516"},
     ("fanuc", "G4 X1. Y1."): {"why": DWELL, "code": "OLP518"},
     ("fanuc", "G4 P1 Z1."): {"why": DWELL, "code": "OLP518"},
@@ -356,7 +357,7 @@ REFUSED: dict[tuple[str, str], dict[str, object]] = {
     ("linuxcnc", "G10 L2 X5"): {"why": NUMBER, "code": "OLP516"},
     ("linuxcnc", "G10 L2 P10 X5"): {"why": NUMBER, "code": "OLP516"},
     ("fanuc", "G10 L2 P7 X5."): {"why": NUMBER, "code": "OLP516"},
-    ("linuxcnc", "G10 L2 P1.5 X5"): {"why": "P1.5 is not an integer", "code": "OLP516"},
+    ("linuxcnc", "G10 L2 P1.5 X5"): {"why": f"P1.5 {TABLE}", "code": "OLP516"},
     ("linuxcnc", "M100\nG92 Y5"): {"why": f"Y {POSITION}", "code": "OLP524", "line": 4},
     ("linuxcnc", "M100\nG10 L20 P1 Z5"): {"why": f"Z {POSITION}", "code": "OLP524", "line": 4},
     ("fanuc", "G54.1 X1."): {
