@@ -155,7 +155,7 @@ class Modes:
             arc_distance=_modal(chunk, codes, Act.ARC_DISTANCE, state.arc_distance),
             feed_mode=_modal(chunk, codes, Act.FEED, state.feed_mode),
             retract=_modal(chunk, codes, Act.RETRACT, state.retract),
-            spindle=self._spindle(chunk, usable),
+            spindle=self._spindle(chunk, value, usable),
             event=self._events(chunk, value, codes, usable),
             consumed=self._consumed(codes, active),
         )
@@ -191,9 +191,9 @@ class Modes:
         code = np.where(listed, code, -1).astype(np.int64)
         return Codes(chunk.line[g], code, self._act[code])
 
-    def _spindle(self, chunk: WordChunk, usable: Mask) -> Modal:
-        m = (chunk.letter == 77) & usable & np.isin(chunk.mantissa, (3, 4, 5, 6, 19)) & (chunk.decimals == 0)
-        line, code = chunk.line[m], chunk.mantissa[m]
+    def _spindle(self, chunk: WordChunk, value: Array, usable: Mask) -> Modal:
+        m = (chunk.letter == 77) & usable & np.isin(value, (3, 4, 5, 6, 19))
+        line, code = chunk.line[m], value[m]
         # a tool change and an oriented stop end it, the change before its start in one block
         order = np.lexsort((code != 6, line))
         line, code = line[order], code[order]

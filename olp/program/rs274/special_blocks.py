@@ -194,7 +194,7 @@ class SpecialBlocks:
                 )
             kind = Kind(motion // 10)
             flag |= Flag.PASS | Flag.MACHINE
-            offset = np.zeros(3)
+            offset = np.zeros_like(offset)
         elif effect.home:
             flag |= Flag.PASS
         else:

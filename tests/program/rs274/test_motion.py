@@ -141,7 +141,7 @@ def test_omitted_words_keep_their_axis_in_absolute_and_in_incremental_blocks() -
     assert end[:, 0] == pytest.approx(x)
     assert end[:, 1] == pytest.approx(y)
     assert end[:, 2].tolist() == [9.0] * 5
-    absolute = motion.fill(slot, value, None, np.tile(offset, (5, 1)), np.full(5, 2.0), start)
+    absolute = motion.fill(slot, value, None, np.tile(offset, (5, 1)), 2.0, start)
     assert absolute[:, 0].tolist() == [102.0, 102.0, 106.0, 108.0, 108.0]
     assert absolute[:, 1].tolist() == [8.0, 204.0, 204.0, 204.0, 204.0]
     assert absolute[:, 2].tolist() == [9.0] * 5
