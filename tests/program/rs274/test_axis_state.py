@@ -196,7 +196,9 @@ PATH_MODES: dict[str, tuple[PathMode, ...]] = {
 @pytest.mark.parametrize("text", PATH_MODES)
 def test_a_path_mode_has_its_path_tolerance(text: str, setups: dict[str, Setup]) -> None:
     read = program(f"{HEAD}{text}\nM2\n", setups["linuxcnc"])
-    assert [m.tolerance_mm for m in read.path_modes] == pytest.approx([m.tolerance_mm for m in PATH_MODES[text]])
+    assert [m.tolerance_mm for m in read.path_modes] == pytest.approx(
+        [m.tolerance_mm for m in PATH_MODES[text]]
+    )
     assert [replace(m, tolerance_mm=None) for m in read.path_modes] == [
         replace(m, tolerance_mm=None) for m in PATH_MODES[text]
     ]
@@ -212,7 +214,10 @@ def test_words_that_store_the_present_position_are_kept(setups: dict[str, Setup]
     read = program(text, setups["linuxcnc"])
     words = read.words
     assert words is not None
-    got = [(c.axis, c.unit_mm, c.moves, c.line, text[words.start[c.word] : words.end[c.word]]) for c in read.captures]
+    got = [
+        (c.axis, c.unit_mm, c.moves, c.line, text[words.start[c.word] : words.end[c.word]])
+        for c in read.captures
+    ]
     assert got == [
         (0, 1.0, 1, 3, "X5"),
         (2, 1.0, 1, 3, "Z7"),
@@ -376,7 +381,9 @@ def test_what_changes_offsets_and_tools_is_refused_in_these_words(
     assert refusal(f"{HEAD}{text}\nM2\n", setups[control], control) == {"line": 3} | REFUSED[control, text]
 
 
-@pytest.mark.parametrize("text", ["G10 L2 P2 X1", "G92 X1", "G28 X1", "G30 X1", "G53 G0 X1", "G52 X1", "G55", "G59.3"])
+@pytest.mark.parametrize(
+    "text", ["G10 L2 P2 X1", "G92 X1", "G28 X1", "G30 X1", "G53 G0 X1", "G52 X1", "G55", "G59.3"]
+)
 def test_offsets_are_refused_in_cutter_compensation(text: str, setups: dict[str, Setup]) -> None:
     before = f"{HEAD}G41 D1\n"
     said = refusal(f"{before}{text}\nM2\n", setups["linuxcnc"], contour=True)

@@ -359,6 +359,8 @@ def test_how_programs_of_a_control_are_written() -> None:
         assert profile.first == (b"%", b"O|:")
         assert profile.payload_comments
         assert profile.unroller is not None
+        # outputs that are switched along with a motion
+        assert profile.m_with_motion == (frozenset({62, 63, 67}) if profile.name == LINUXCNC else frozenset())
 
 
 @pytest.mark.parametrize(

@@ -240,7 +240,9 @@ _ALL = "G73, G74, G81, G82, G83, G84, G85, G86, G89"
         ),
     ],
 )  # fmt: skip
-def test_a_cycle_is_refused_in_these_words(code: int, change: dict[str, float], why: str, refused: str) -> None:
+def test_a_cycle_is_refused_in_these_words(
+    code: int, change: dict[str, float], why: str, refused: str
+) -> None:
     with pytest.raises(ProgramError) as caught:
         hole_moves(code, **{**HOLE, **change}, retract_to_r=True)  # type: ignore[arg-type]
     assert (caught.value.message, caught.value.code) == (why, refused)

@@ -305,7 +305,9 @@ def columns(parts: Iterator[WordChunk]) -> dict[str, list[object]]:
         BlockText(odd_bytes=None, cr_ends_line=True, open_comments=True),
     ],
 )
-@pytest.mark.parametrize("text", [TEXT, TEXT[:-1], TEXT.replace(b"\n", b"\r\r\n"), TEXT.replace(b"=", b"\r=")])
+@pytest.mark.parametrize(
+    "text", [TEXT, TEXT[:-1], TEXT.replace(b"\n", b"\r\r\n"), TEXT.replace(b"=", b"\r=")]
+)
 def test_chunks_of_any_size_hold_the_same(text: bytes, rules: BlockText) -> None:
     whole = columns(chunks(text, rules))
     assert len(whole["line_start"]) == text.count(b"\n") + (text[-1:] != b"\n") + (

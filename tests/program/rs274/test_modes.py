@@ -267,7 +267,11 @@ def outcome(text: str, setup: Setup, control: str) -> object:
     columns = [moves(read), read.holes, read.captures, read.path_modes, read.end_line]
     columns += [arcs.move.tolist(), arcs.centre_mm.tolist(), arcs.sweep_rad.tolist(), arcs.plane.tolist()]
     columns += [read.arc_slots.word.tolist(), read.toolpath.frame.tolist(), read.toolpath.frames]
-    columns += [read.line_start.tolist(), read.line_end.tolist(), np.nan_to_num(read.toolpath.start_mm).tolist()]
+    columns += [
+        read.line_start.tolist(),
+        read.line_end.tolist(),
+        np.nan_to_num(read.toolpath.start_mm).tolist(),
+    ]
     return columns
 
 

@@ -242,7 +242,9 @@ def test_an_arc_that_ends_beside_its_start_is_a_whole_turn_or_a_short_arc(clockw
     for end in ((10.0, 0.0, 5.0), (10.0, sign * 1e-9, 5.0)):
         assert arc(end, i=-10.0, clockwise=clockwise)[1] == pytest.approx(sign * 4 * QUARTER)
     # farther on it is a short arc, and before its start nearly a whole turn
-    assert arc((10.0, sign * 1e-6, 5.0), i=-10.0, clockwise=clockwise)[1] == pytest.approx(sign * 1e-7, rel=1e-6)
+    assert arc((10.0, sign * 1e-6, 5.0), i=-10.0, clockwise=clockwise)[1] == pytest.approx(
+        sign * 1e-7, rel=1e-6
+    )
     assert arc((10.0, -sign * 1e-6, 5.0), i=-10.0, clockwise=clockwise)[1] == pytest.approx(
         sign * (4 * QUARTER - 1e-7), abs=1e-9
     )
@@ -251,7 +253,9 @@ def test_an_arc_that_ends_beside_its_start_is_a_whole_turn_or_a_short_arc(clockw
 @pytest.mark.parametrize("plane", (0, 1, 2))
 @pytest.mark.parametrize("clockwise", [False, True])
 @pytest.mark.parametrize("r", [13.0, -13.0])
-def test_both_ends_of_an_arc_by_radius_are_as_far_from_its_centre(plane: int, clockwise: bool, r: float) -> None:
+def test_both_ends_of_an_arc_by_radius_are_as_far_from_its_centre(
+    plane: int, clockwise: bool, r: float
+) -> None:
     """A chord of 24 is 5 from the centre of a circle of 13; the arc above zero is the shorter one."""
     first, second, third = ((0, 1, 2), (2, 0, 1), (1, 2, 0))[plane]
     a, b = [0.0] * 3, [0.0] * 3
@@ -259,7 +263,9 @@ def test_both_ends_of_an_arc_by_radius_are_as_far_from_its_centre(plane: int, cl
     b[first], b[second], b[third] = 25.0, 2.0, 9.0
     centre, turned = arc(tuple(b), start=tuple(a), r=r, clockwise=clockwise, plane=plane)  # type: ignore[arg-type]
     above = clockwise == (r < 0)
-    assert (centre[first], centre[second], centre[third]) == pytest.approx((13.0, 7.0 if above else -3.0, 7.0))
+    assert (centre[first], centre[second], centre[third]) == pytest.approx(
+        (13.0, 7.0 if above else -3.0, 7.0)
+    )
     half = math.asin(12 / 13)
     size = 2 * half if r > 0 else 2 * math.pi - 2 * half
     assert turned == pytest.approx(-size if clockwise else size)
@@ -329,7 +335,8 @@ def test_motion_lines_are_those_with_axis_words_and_centres_of_arcs() -> None:
 
     def texts(table: np.ndarray) -> list[str]:
         spoken = [
-            [text[chunk.start[i] : chunk.end[i]].decode() if i >= 0 else "-" for i in row] for row in table.tolist()
+            [text[chunk.start[i] : chunk.end[i]].decode() if i >= 0 else "-" for i in row]
+            for row in table.tolist()
         ]
         return [" ".join(row) for row in spoken]
 
@@ -361,7 +368,12 @@ def test_other_axes_move_the_block(letter: str) -> None:
 
 @pytest.mark.parametrize(
     ("text", "lines", "letters"),
-    [("X1 X2", [31], "X"), ("Y1\nX1 Z2 Z3 Z4\nY1 Y2", [32, 33], "ZY"), ("I1 X1 I2", [31], "I"), ("P1 X1 P2", [31], "P")],
+    [
+        ("X1 X2", [31], "X"),
+        ("Y1\nX1 Z2 Z3 Z4\nY1 Y2", [32, 33], "ZY"),
+        ("I1 X1 I2", [31], "I"),
+        ("P1 X1 P2", [31], "P"),
+    ],
 )
 def test_a_letter_that_is_twice_is_named(text: str, lines: list[int], letters: str) -> None:
     chunk = lex(np.frombuffer(text.encode(), np.uint8), BlockText(), first_line=30)

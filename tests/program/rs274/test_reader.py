@@ -125,7 +125,13 @@ def test_a_milling_program_is_read_column_by_column(setups: dict[str, Setup], si
     assert read.calculator
     assert read.data == MILLED.encode()
     assert [read.text(i) for i in (1, 10, 23)] == ["%", "G94 F60 (olp off)", "G1 X9"]
-    assert [MILLED[words.start[i] : words.end[i]] for i in words.of_line(18)] == ["G18", "G3", "X3", "Z3", "R1"]
+    assert [MILLED[words.start[i] : words.end[i]] for i in words.of_line(18)] == [
+        "G18",
+        "G3",
+        "X3",
+        "Z3",
+        "R1",
+    ]
     number = words.of_line(8)[1]
     assert (chr(words.letter[number]), words.mantissa[number], words.decimals[number]) == ("X", -1, 0)
     pointed = [MILLED[words.start[i] : words.end[i]] for i in np.flatnonzero(words.pointed)]

@@ -183,7 +183,9 @@ def test_moves_of_the_control_have_their_flags(text: str, with_tool: Setup) -> N
 
 
 @pytest.mark.parametrize("text", ["G28", "M100", "M6 T1"])
-def test_where_the_program_starts_is_unknown_behind_a_move_of_the_control(text: str, with_tool: Setup) -> None:
+def test_where_the_program_starts_is_unknown_behind_a_move_of_the_control(
+    text: str, with_tool: Setup
+) -> None:
     known = replace(with_tool, job=replace(with_tool.job, start_mm=(1.0, 2.0, 3.0)))
     toolpath = read(f"G21 G90\n{text}\nG0 X5\nM2\n".encode(), known, DIALECTS["linuxcnc"]).toolpath
     assert np.isnan(toolpath.start_mm).all()
@@ -204,7 +206,10 @@ def holes(text: str, setup: Setup, control: str = "linuxcnc") -> list[tuple[int,
     ("text", "expected"),
     [
         # words are inherited within a series
-        ("G81 X2 Z1 R2\nX3\nX4 Z-1\nX5 R1", [(1, 303, 302, 301)] * 2 + [(1, 303, 302, 299), (1, 303, 301, 299)]),
+        (
+            "G81 X2 Z1 R2\nX3\nX4 Z-1\nX5 R1",
+            [(1, 303, 302, 301)] * 2 + [(1, 303, 302, 299), (1, 303, 301, 299)],
+        ),
         # a move ends it, and so does G80, whatever comes between
         ("G98 G81 X2 Z1 R2\nG0 Z9\nG81 X3 Z1 R2", [(1, 303, 302, 301), (2, 309, 302, 301)]),
         ("G98 G81 X2 Z1 R2\nG80\nG81 X3 Z1 R2", [(1, 303, 302, 301), (2, 303, 302, 301)]),

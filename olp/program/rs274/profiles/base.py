@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
-from enum import IntEnum
+from enum import IntEnum, auto
 
 from olp.core.machine import Machine
 from olp.core.units import AXES
@@ -25,15 +25,15 @@ from olp.program.text.line_ends import split
 class Act(IntEnum):
     """What a G code does to the reading of a program."""
 
-    UNCHANGED = 0  #: nothing: its bytes are unchanged
-    MOTION = 1
-    PLANE = 2
-    DISTANCE = 3
-    ARC_DISTANCE = 4
-    FEED = 5
-    RETRACT = 6
-    EVENT = 7  #: changes frames, units, tools or path mode; handled block by block
-    REFUSE = 8
+    UNCHANGED = auto()  #: nothing: its bytes are unchanged
+    MOTION = auto()
+    PLANE = auto()
+    DISTANCE = auto()
+    ARC_DISTANCE = auto()
+    FEED = auto()
+    RETRACT = auto()
+    EVENT = auto()  #: changes frames, units, tools or path mode; handled block by block
+    REFUSE = auto()
 
 
 _SUPPORT = {Act.UNCHANGED: Support.UNCHANGED, Act.REFUSE: Support.REFUSED, Act.MOTION: Support.CORRECTED}
