@@ -1,4 +1,5 @@
-"""Programs of blocks for tests of the reader: a machine with offsets and tools, and what is read or refused."""
+"""Programs of blocks for tests of the reader: a machine with offsets and tools, what is read, what is
+refused."""
 
 from __future__ import annotations
 

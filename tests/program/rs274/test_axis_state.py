@@ -279,11 +279,13 @@ POSITION = (
 #: Control and blocks behind `HEAD`: what is said of them.
 REFUSED: dict[tuple[str, str], dict[str, object]] = {
     ("linuxcnc", "G58 X1"): {
-        "why": 'work offset G58 is used but not defined; give [work_offsets."G58"] in the machine or job file',
+        "why": 'work offset G58 is used but not defined; give [work_offsets."G58"] in the machine or '
+        "job file",
         "code": "OLP520", "missing": ("work_offsets", "G58"),
     },
     ("linuxcnc", "G58\n\nX1"): {
-        "why": 'work offset G58 is used but not defined; give [work_offsets."G58"] in the machine or job file',
+        "why": 'work offset G58 is used but not defined; give [work_offsets."G58"] in the machine or '
+        "job file",
         "code": "OLP520", "missing": ("work_offsets", "G58"), "line": 5,
     },
     ("fanuc", "G54.1 P9 X1."): {
@@ -465,8 +467,8 @@ def test_the_job_states_where_the_axes_and_which_tool_are_at_the_start(
     unknown = replace(at, machine=replace(at.machine, default_tool=9))
     assert refusal("G0 X1\n", unknown) == {
         "line": 1,
-        "why": "the tool in the spindle at the start uses tool 9, which is not defined; give [tools.9] in the "
-        "machine or job file",
+        "why": "the tool in the spindle at the start uses tool 9, which is not defined; give [tools.9] in "
+        "the machine or job file",
         "code": "OLP521",
         "missing": ("tools", "9"),
     }

@@ -12,9 +12,9 @@ from olp.core.errors import ProgramError
 from olp.core.machine import Setup
 from olp.files.config import load_setup
 from olp.files.sources import Source, Sources
+from olp.program.dialect import Row, Support
 from olp.program.registry import DIALECTS, read
 from olp.program.rs274.cycles import CycleRules
-from olp.program.dialect import Row, Support
 from olp.program.rs274.profiles.base import Act, Profile, increment
 from olp.workflows.flatten import UnrollOptions, as_asked
 

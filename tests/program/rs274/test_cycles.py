@@ -204,7 +204,8 @@ _ALL = "G73, G74, G81, G82, G83, G84, G85, G86, G89"
     [
         (
             870, {},
-            f"G87 has no geometry that is known offline; expected one of {_ALL}; write the hole as plain moves",
+            f"G87 has no geometry that is known offline; expected one of {_ALL}; "
+            "write the hole as plain moves",
             "OLP544",
         ),
         *(
@@ -230,7 +231,10 @@ _ALL = "G73, G74, G81, G82, G83, G84, G85, G86, G89"
         (830, {"q": 0.0}, "G83 needs a peck Q greater than zero, found 0.0", "OLP531"),
         (730, {"q": -1.0}, "G73 needs a peck Q greater than zero, found -1.0", "OLP531"),
         (730, {}, "G73 needs a peck Q greater than zero, found None", "OLP531"),
-        (730, {"q": 2.999e-5}, "G73 with Q 2.999e-05 makes more than 100000 pecks; give a larger Q", "OLP543"),
+        (
+            730, {"q": 2.999e-5},
+            "G73 with Q 2.999e-05 makes more than 100000 pecks; give a larger Q", "OLP543",
+        ),
         (820, {}, "G82 needs a dwell P; give P0 for none", "OLP531"),
         (860, {}, "G86 needs a dwell P; give P0 for none", "OLP531"),
         (890, {}, "G89 needs a dwell P; give P0 for none", "OLP531"),

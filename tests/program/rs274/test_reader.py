@@ -11,7 +11,6 @@ from cases.blocks import moves, program, refusal, setup_of
 
 from olp.core.machine import Setup
 from olp.core.toolpath import Flag
-from olp.program.registry import DIALECTS
 from olp.program.rs274 import reader
 from olp.program.rs274.lexer import chunks
 
@@ -320,8 +319,8 @@ REFUSED: dict[tuple[str, str], dict[str, object]] = {
         "code": "OLP513", "word": "G41",
     },
     ("linuxcnc", "G42.1 D1"): {
-        "why": "G42.1 (cutter compensation) makes the path inside the control; program the tool path, or take "
-        "the contour as tool path with --contour",
+        "why": "G42.1 (cutter compensation) makes the path inside the control; program the tool path, or "
+        "take the contour as tool path with --contour",
         "code": "OLP513", "word": "G42.1",
     },
     ("fanuc", "M98 P1\nM3\nG68\nM99"): {
