@@ -246,7 +246,7 @@ class AxisState(State):
     def may_move(self, m10: int) -> bool:
         """Whether an M code may move axes: M6, and codes that are not known to leave the axes where they
         are."""
-        if m10 in (20, 300) or (m10 == SET_TOOL and self.profile.m61_sets_tool):
+        if m10 == SET_TOOL and self.profile.m61_sets_tool:
             return False
         return m10 % 10 != 0 or m10 // 10 not in self.profile.harmless_m
 

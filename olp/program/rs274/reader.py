@@ -187,7 +187,7 @@ class _Reader:
         line = blocks.line[a:upto]
         number = line + (chunk.first_line + 1)
         motion = context.motion[line]
-        kind = _KIND[np.maximum(motion, -1)]
+        kind = _KIND[motion]
         if (kind == 255).any():
             rows_without = np.flatnonzero(kind == 255).tolist()
             raise ProgramError.together(_no_motion(int(number[i])) for i in rows_without)

@@ -98,6 +98,12 @@ PLACES: dict[tuple[str, str], Vector] = {
     ("linuxcnc", "G20 G43.1 Z1\nZ1"): (101, 202, 300 + 2 * INCH),
     ("linuxcnc", "G55 G43 H1\nZ1"): (101, 202, 81),
     ("linuxcnc", "G43 H1\nG55\nX1 Y1 Z1"): (11, 21, 81),
+    # units, lengths and work offsets come before what else is in a block
+    ("linuxcnc", "G92 X5 G55\nX6 Y2 Z3"): (102, 22, 33),
+    ("linuxcnc", "G10 L20 P0 X5 G55\nX6 Y2 Z3"): (102, 22, 33),
+    ("linuxcnc", "G92 X5 G43 H2\nX6 Y2 Z3"): (102, 204, 363),
+    ("linuxcnc", "G92 X1 G20\nX2"): (101 + INCH, 202, 303),
+    ("linuxcnc", "G10 L2 P0 X5 G55\nG54 X1 Y1 Z1"): (101, 201, 301),
     # a length in the other unit is converted by ISO controls
     ("fanuc", "G43 H1\nG20\nG55\nZ1."): (101, 202, 80 + INCH),
 }  # fmt: skip
