@@ -396,6 +396,8 @@ def test_offsets_are_refused_in_cutter_compensation(text: str, setups: dict[str,
     before = f"{HEAD}G41 D1\n"
     said = refusal(f"{before}{text}\nM2\n", setups["linuxcnc"], contour=True)
     assert said == {"line": 4, "why": CUTTING, "code": "OLP518"}
+    said = refusal(f"{before}G81 X5 Z1 R2\nM2\n", setups["linuxcnc"], contour=True)
+    assert said["why"] == "the cycle G81 is in cutter compensation; give G40 before it"
     program(f"{before}G40\n{text}\nM2\n", setups["linuxcnc"], contour=True)
     program(f"{before}G43 H2\nG4 P1\nG61\nM2\n", setups["linuxcnc"], contour=True)
 

@@ -126,7 +126,7 @@ class Profile(Dialect):
 
 def increment(machine: Machine, letter: str, unit_mm: float) -> float:
     """Least increment in program units: 0.001 mm goes with 0.0001 inch, 0.0001 mm with 0.00001 inch."""
-    axis = {"I": "X", "J": "Y", "K": "Z"}.get(letter, letter)
+    axis = {"J": "Y", "K": "Z"}.get(letter, letter)
     least = machine.axes[axis if axis in AXES else "X"].least_increment_mm
     metric = 0.0001 if least < 0.0005 else 0.001
     return metric if unit_mm == 1.0 else metric / 10
