@@ -333,6 +333,12 @@ def test_what_becomes_of_each_g_code(control: str) -> None:
     for row, (_, act) in zip(rows, sorted(profile.codes.items()), strict=True):
         assert row.support == support.get(act, Support.READ)
         assert bool(row.why) == (act is Act.REFUSE)
+        assert not row.why or row.why.startswith(f"{row.statement} ") or row.statement == "G61.1"
+    of_g92_1 = {
+        FANUC: "G92.1 presets offsets that are not known off line",
+        HAAS: "G92.1 is not a code of this control",
+    }
+    assert profile.refusals.get(921) == of_g92_1.get(control)
 
 
 def test_a_code_without_a_reason_is_not_of_the_control() -> None:
