@@ -220,12 +220,12 @@ def _drop_comments(text: Bytes, ends: Index, keep: Mask, rules: BlockText) -> tu
         nearest = np.append(closing, len(text))[np.searchsorted(closing, opening)]
         stop = np.where((text[opening] == 40) & (nearest < line_end), nearest + 1, line_end)
     if (opening[1:] < stop[:-1]).any():
-        real, inner, last, round_one = [], [], 0, False
+        real, inner, last = [], [], 0
         for i, (first, to) in enumerate(zip(opening.tolist(), stop.tolist(), strict=True)):
             if first >= last:
                 real.append(i)
-                last, round_one = to, text[first] == 40
-            elif round_one and text[first] == 40:
+                last = to
+            elif text[opening[real[-1]]] == 40 and text[first] == 40:
                 inner.append(first)
         opening, stop = opening[real], stop[real]
         if not rules.nested_comments:
