@@ -53,7 +53,8 @@ class Context:
     """A chunk with its numbers and the modal codes in force on each line; `base` is its first word's
     index.
 
-    `event` marks the lines to be read one by one, `consumed` those whose axis words are not motion.
+    `event` marks the lines to be read one by one, `consumed` those whose axis words are not motion, `active`
+    those that count.
     """
 
     chunk: WordChunk
@@ -70,6 +71,7 @@ class Context:
     spindle: Modal
     event: Mask
     consumed: Mask
+    active: Mask
     #: numbers as written, by the unit in force
     scaled: dict[float, Array] = field(default_factory=dict)
 
@@ -158,14 +160,16 @@ class Modes:
             spindle=self._spindle(chunk, value, usable),
             event=self._events(chunk, value, codes, usable),
             consumed=self._consumed(codes, active),
+            active=active,
         )
-        _check_deleted(context, active, state)
+        _check_deleted(context, state)
         return context
 
-    def check_rules(self, context: Context, active: Mask) -> None:
+    def check_rules(self, context: Context) -> None:
         """Refuse the blocks of a chunk with words that may not be together, all at once."""
-        keys = self._keys(context.chunk, context.value, context.codes, active[context.chunk.line])
-        self._rules.check(context.chunk, active, keys, context.motion, context.plane)
+        chunk, active = context.chunk, context.active
+        keys = self._keys(chunk, context.value, context.codes, active[chunk.line])
+        self._rules.check(chunk, active, keys, context.motion, context.plane)
 
     def check_end(self) -> None:
         """Refuse a text that begins with `%` and has no end, where the control does."""
@@ -285,6 +289,7 @@ def scaled(context: Context, state: AxisState, remarks: dict[str, tuple[int, str
         numbers[mine] *= state.increment(chr(letter))
     # 0 is 0 either way, and K counts the holes of a cycle too
     some = bare[(context.value[bare] != 0.0) & (chunk.letter[bare] != ord("K"))]
+    some = some[context.active[chunk.line[some]]]
     if some.size:
         remarks.setdefault("increments", (context.number(int(chunk.line[some[0]])), ""))
     context.scaled[state.unit_mm] = numbers
@@ -300,10 +305,10 @@ def _in_force(chunk: WordChunk, lines: Index, code: Index, now: int | None) -> M
     return modal(len(chunk.line_start), lines, code, -1 if now is None else now)
 
 
-def _check_deleted(context: Context, active: Mask, state: AxisState) -> None:
+def _check_deleted(context: Context, state: AxisState) -> None:
     """A `/` block must not change how later blocks are read, unless the next block restates it."""
     chunk = context.chunk
-    deleted = np.flatnonzero(chunk.deleted & active)
+    deleted = np.flatnonzero(chunk.deleted & context.active)
     pairs = [(context.motion, -1 if state.motion is None else state.motion)]
     pairs += [(getattr(context, group), getattr(state, group)) for group in GROUPS]
     for line in deleted.tolist():

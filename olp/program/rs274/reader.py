@@ -120,8 +120,8 @@ class _Reader:
         check_odd(self.data, chunk, active, self.state.profile)
         context = self.modes.read(chunk, base, active)
         # a code that is not read says more than its words, which no other code uses
-        check_codes(context, active, self.state.profile)
-        self.modes.check_rules(context, active)
+        check_codes(context, self.state.profile)
+        self.modes.check_rules(context)
         # a payload makes a new frame, from the motion of its own line on
         context.event[[line for line in self.payloads if active[line]]] = True
         self._stretches(context, gather(chunk, context.motion, context.consumed))

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Index, Mask
+from olp.core.arrays import Index
 from olp.core.budget import Budget
 from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES
@@ -110,10 +110,10 @@ def _checked(
     return [c for c, a in zip(code.tolist(), act.tolist(), strict=True) if a == Act.EVENT]
 
 
-def check_codes(context: Context, active: Mask, profile: Profile) -> None:
+def check_codes(context: Context, profile: Profile) -> None:
     """Refuse the codes of a chunk that need no state to be refused, all at once."""
     chunk, codes = context.chunk, context.codes
-    m = np.flatnonzero((chunk.letter == ord("M")) & active[chunk.line])
+    m = np.flatnonzero((chunk.letter == ord("M")) & context.active[chunk.line])
     m = m[np.isin(np.rint(context.value[m] * 10), _M_CODES)]
     lines = np.union1d(codes.line[codes.act == Act.REFUSE], chunk.line[m])
     errors = []

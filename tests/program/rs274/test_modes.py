@@ -231,6 +231,7 @@ def test_a_block_is_read_in_the_codes_in_force(control: str, text: str, setups: 
         ("G91 G81 X5. R-1. Z-1. K3", None),
         ("G91 G81 X5. R-1 Z-1. K3", 3),
         ("A5 B5\nX1.", None),
+        ("X1.\nM30\nX5", None),
         ("G2 X3. I1000 F60.\nX5. R1000", 3),
         ("\n\nG83 X1. R2. Z1. Q1", 5),
     ],

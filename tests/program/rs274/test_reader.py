@@ -327,6 +327,9 @@ REFUSED: dict[tuple[str, str], dict[str, object]] = {
         "why": f"M98 calls a subprogram; {UNROLL}", "code": "OLP511", "hint": UNROLL, "word": "M98",
         "others": (5, 6),
     },
+    ("linuxcnc", "M1 M0"): {
+        "why": "M1 and M0 of one modal group are in this block; expected one of them", "code": "OLP515",
+    },
     ("linuxcnc", "M70"): {
         "why": f"M70 saves modal codes; {UNROLL}", "code": "OLP511", "hint": UNROLL, "word": "M70",
     },
