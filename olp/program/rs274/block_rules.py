@@ -167,7 +167,7 @@ class _Tables:
         moves = (present & _AXES) != 0
         arcs = np.isin(motion, sorted(_ARCS))
         moves |= arcs & ((present & _CENTRE) != 0)
-        allowed |= np.where(moves, self.allowed[np.maximum(motion, 0)], 0)
+        allowed[moves] |= self.allowed[np.maximum(motion[moves], 0)]
         outside = np.zeros(len(present), np.int32)
         for code, letters in _IN_PLANE.items():
             outside[arcs & (plane == code)] = _CENTRE & ~letters
