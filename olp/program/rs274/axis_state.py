@@ -246,7 +246,7 @@ class AxisState(State):
     def may_move(self, m10: int) -> bool:
         """Whether an M code may move axes: M6, and codes that are not known to leave the axes where they
         are."""
-        if m10 in (20, 300) or (m10 == SET_TOOL and self.profile.m61_sets_tool):
+        if m10 == SET_TOOL and self.profile.m61_sets_tool:
             return False
         return m10 % 10 != 0 or m10 // 10 not in self.profile.harmless_m
 
@@ -468,7 +468,11 @@ class AxisState(State):
     @staticmethod
     def _integer(word: Word, line: int) -> int:
         if word.value != round(word.value) or word.value < 0:
-            raise ProgramError(f"{word.letter}{word.value:g} is not an integer", line=line, code="OLP516")
+            raise ProgramError(
+                f"{word.letter}{word.value:g} is not a number of a table; expected an integer from 0",
+                line=line,
+                code="OLP516",
+            )
         return round(word.value)
 
     @staticmethod

@@ -176,8 +176,9 @@ class _Tables:
         arcs = np.isin(motion, sorted(_ARCS))
         moves |= arcs & ((present & _CENTRE) != 0)
         moves[line[np.isin(key, _STATING)]] = False
+        allowed[moves] |= self.allowed[np.maximum(motion[moves], 0)]
+        # a code of this block moves without words, too
         moves[line[np.isin(key, _MOTIONS)]] = True
-        allowed |= np.where(moves & (motion > 0), self.allowed[np.maximum(motion, 0)], 0)
         outside = np.zeros(len(present), np.int32)
         radius = (present & _bits("R")) != 0
         for code, letters in _IN_PLANE.items():

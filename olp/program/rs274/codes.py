@@ -79,6 +79,6 @@ LENGTH_FROM_WORDS = 431
 #: Every code that sets a tool length.
 LENGTHS = TABLE_LENGTHS | {LENGTH_FROM_WORDS, 432}
 #: G54 to G59.3, and G54.1 P.
-WORK_OFFSETS = frozenset({540, 541, *range(550, 594)})
+WORK_OFFSETS = frozenset({540, 541, *range(550, 600, 10), 591, 592, 593})
 #: G154 P and G110 to G129.
 FURTHER_OFFSETS = frozenset({1540, *range(1100, 1300, 10)})

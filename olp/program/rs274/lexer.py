@@ -89,7 +89,7 @@ def lex(
     `strange` are odd."""
     size = len(text)
     newline = np.flatnonzero(text == 10)
-    ends = newline if size and newline.size and newline[-1] == size - 1 else np.append(newline, size)
+    ends = newline if newline.size and newline[-1] == size - 1 else np.append(newline, size)
     lines = len(ends)
     starts = np.empty(lines, np.int64)
     starts[0] = 0
@@ -112,7 +112,7 @@ def lex(
     where: Index | None = None
     compact, begin, stop = runs(blanked(text, keep))
     line_breaks = newline
-    if begin.size and (compact[begin + (_PAD - 1)] == 32).any():
+    if (compact[begin + (_PAD - 1)] == 32).any():
         # blanks inside words: take them all out
         where = np.flatnonzero(keep)
         compact, begin, stop = runs(text[where])
@@ -125,7 +125,7 @@ def lex(
         bad = np.concatenate((bad, begin[malformed]))
 
     if len(line_breaks) < lines:
-        line_breaks = np.append(line_breaks, len(body) - 1)
+        line_breaks = np.append(line_breaks, len(body))
     first_word = np.empty(lines + 1, np.int64)
     first_word[0] = 0
     first_word[1:] = np.searchsorted(begin, line_breaks)
@@ -220,12 +220,12 @@ def _drop_comments(text: Bytes, ends: Index, keep: Mask, rules: BlockText) -> tu
         nearest = np.append(closing, len(text))[np.searchsorted(closing, opening)]
         stop = np.where((text[opening] == 40) & (nearest < line_end), nearest + 1, line_end)
     if (opening[1:] < stop[:-1]).any():
-        real, inner, last, round_one = [], [], 0, False
+        real, inner, last = [], [], 0
         for i, (first, to) in enumerate(zip(opening.tolist(), stop.tolist(), strict=True)):
             if first >= last:
                 real.append(i)
-                last, round_one = to, text[first] == 40
-            elif round_one and text[first] == 40:
+                last = to
+            elif text[opening[real[-1]]] == 40 and text[first] == 40:
                 inner.append(first)
         opening, stop = opening[real], stop[real]
         if not rules.nested_comments:

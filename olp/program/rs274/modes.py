@@ -22,6 +22,7 @@ from olp.program.rs274.codes import (
     COMPENSATION_OFF,
     CUTTER_COMPENSATION,
     DWELL,
+    END_OF_CYCLES,
     GROUPS,
 )
 from olp.program.rs274.lexer import WordChunk
@@ -40,7 +41,7 @@ _LENGTHS[list(b"XYZIJKRQ")] = True
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Codes:
-    """The G words of a chunk: line, code x 10, what it does."""
+    """The G words of a chunk: line, code x 10 (-1: no control has it), what it does."""
 
     line: Index
     code: Index
@@ -52,7 +53,8 @@ class Context:
     """A chunk with its numbers and the modal codes in force on each line; `base` is its first word's
     index.
 
-    `event` marks the lines to be read one by one, `consumed` those whose axis words are not motion.
+    `event` marks the lines to be read one by one, `consumed` those whose axis words are not motion, `active`
+    those that count.
     """
 
     chunk: WordChunk
@@ -69,6 +71,7 @@ class Context:
     spindle: Modal
     event: Mask
     consumed: Mask
+    active: Mask
     #: numbers as written, by the unit in force
     scaled: dict[float, Array] = field(default_factory=dict)
 
@@ -86,6 +89,7 @@ class Modes:
         profile = state.profile
         self._cycles_apart = profile.cycles_apart
         self._claims = sorted(AXIS_VALUES | {DWELL} if profile.axis_dwell else AXIS_VALUES)
+        # the last entry is of codes that no control has
         self._act = np.full(2000, Act.REFUSE, np.int8)
         for code, act in profile.codes.items():
             self._act[code] = act
@@ -153,17 +157,19 @@ class Modes:
             arc_distance=_modal(chunk, codes, Act.ARC_DISTANCE, state.arc_distance),
             feed_mode=_modal(chunk, codes, Act.FEED, state.feed_mode),
             retract=_modal(chunk, codes, Act.RETRACT, state.retract),
-            spindle=self._spindle(chunk, usable),
+            spindle=self._spindle(chunk, value, usable),
             event=self._events(chunk, value, codes, usable),
             consumed=self._consumed(codes, active),
+            active=active,
         )
-        _check_deleted(context, active, state)
+        _check_deleted(context, state)
         return context
 
-    def check_rules(self, context: Context, active: Mask) -> None:
+    def check_rules(self, context: Context) -> None:
         """Refuse the blocks of a chunk with words that may not be together, all at once."""
-        keys = self._keys(context.chunk, context.value, context.codes, active[context.chunk.line])
-        self._rules.check(context.chunk, active, keys, context.motion, context.plane)
+        chunk, active = context.chunk, context.active
+        keys = self._keys(chunk, context.value, context.codes, active[chunk.line])
+        self._rules.check(chunk, active, keys, context.motion, context.plane)
 
     def check_end(self) -> None:
         """Refuse a text that begins with `%` and has no end, where the control does."""
@@ -183,14 +189,15 @@ class Modes:
 
     def _codes(self, chunk: WordChunk, value: Array, usable: Mask) -> Codes:
         g = np.flatnonzero((chunk.letter == 71) & usable)
-        code = np.clip(np.rint(value[g] * 10), 0, 1999).astype(np.int64)
-        act = self._act[code]
-        act[np.abs(code - value[g] * 10) > 1e-6] = Act.REFUSE
-        return Codes(chunk.line[g], code, act)
+        tenths = value[g] * 10
+        code = np.rint(tenths)
+        listed = (np.abs(code - tenths) < 1e-6) & (code >= 0) & (code < len(self._act))
+        code = np.where(listed, code, -1).astype(np.int64)
+        return Codes(chunk.line[g], code, self._act[code])
 
-    def _spindle(self, chunk: WordChunk, usable: Mask) -> Modal:
-        m = (chunk.letter == 77) & usable & np.isin(chunk.mantissa, (3, 4, 5, 6, 19)) & (chunk.decimals == 0)
-        line, code = chunk.line[m], chunk.mantissa[m]
+    def _spindle(self, chunk: WordChunk, value: Array, usable: Mask) -> Modal:
+        m = (chunk.letter == 77) & usable & np.isin(value, (3, 4, 5, 6, 19))
+        line, code = chunk.line[m], value[m]
         # a tool change and an oriented stop end it, the change before its start in one block
         order = np.lexsort((code != 6, line))
         line, code = line[order], code[order]
@@ -204,11 +211,10 @@ class Modes:
         return np.append(codes.line, chunk.line[m]), np.append(codes.code, key)
 
     def _events(self, chunk: WordChunk, value: Array, codes: Codes, usable: Mask) -> Mask:
-        """The lines with a G word that is an event or refused, an M word not known as harmless, or a T
-        word."""
+        """The lines with a G word that is an event, an M word not known as harmless, or a T word."""
         letter, line = chunk.letter, chunk.line
         event = np.zeros(len(chunk.line_start), bool)
-        event[codes.line[(codes.act == Act.EVENT) | (codes.act == Act.REFUSE)]] = True
+        event[codes.line[codes.act == Act.EVENT]] = True
         m = np.flatnonzero((letter == 77) & usable)
         event[line[m[self._m_event[np.clip(np.rint(value[m] * 10), 0, 10_000).astype(np.int64)]]]] = True
         event[line[(letter == 84) & usable]] = True
@@ -222,15 +228,13 @@ class Modes:
     def _motion(self, chunk: WordChunk, codes: Codes) -> Modal:
         chosen = codes.act == Act.MOTION
         line, code = codes.line[chosen], codes.code[chosen]
-        if (code == 800).any():
-            # G80 may be beside another motion code, which then holds
-            beside = np.isin(line, line[1:][line[1:] == line[:-1]])
-            line, code = line[~(beside & (code == 800))], code[~(beside & (code == 800))]
+        # G80 may be beside another motion code, which then holds
+        beside = (code == END_OF_CYCLES) & np.isin(line, line[1:][line[1:] == line[:-1]])
+        line, code = line[~beside], code[~beside]
         if self._cycles_apart:
             # cycles are a separate group: after G80 alone the last of G0 to G3 is in force again
-            code = code.copy()
             for i, c in enumerate(code.tolist()):
-                if c == 800:
+                if c == END_OF_CYCLES:
                     code[i] = -1 if self._linear_motion is None else self._linear_motion
                 elif c < 330:
                     self._linear_motion = c
@@ -290,6 +294,7 @@ def scaled(context: Context, state: AxisState, remarks: dict[str, tuple[int, str
         numbers[mine] *= state.increment(chr(letter))
     # 0 is 0 either way, and K counts the holes of a cycle too
     some = bare[(context.value[bare] != 0.0) & (chunk.letter[bare] != ord("K"))]
+    some = some[context.active[chunk.line[some]]]
     if some.size:
         remarks.setdefault("increments", (context.number(int(chunk.line[some[0]])), ""))
     context.scaled[state.unit_mm] = numbers
@@ -305,10 +310,10 @@ def _in_force(chunk: WordChunk, lines: Index, code: Index, now: int | None) -> M
     return modal(len(chunk.line_start), lines, code, -1 if now is None else now)
 
 
-def _check_deleted(context: Context, active: Mask, state: AxisState) -> None:
+def _check_deleted(context: Context, state: AxisState) -> None:
     """A `/` block must not change how later blocks are read, unless the next block restates it."""
     chunk = context.chunk
-    lines = np.flatnonzero(chunk.deleted & active)
+    lines = np.flatnonzero(chunk.deleted & context.active)
     if not lines.size:
         return
     kept = np.flatnonzero(~chunk.deleted)

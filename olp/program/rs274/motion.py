@@ -131,22 +131,18 @@ def fill(
     value: Array,
     incremental: Mask | None,
     offset: Array,
-    unit: Array | float,
+    unit: float,
     start: list[float],
 ) -> Array:
-    """(n, 3) axis positions of consecutive blocks from `start`; offsets (3,) or (n, 3), units scalar or (n,
-    1)."""
+    """(n, 3) axis positions of consecutive blocks from `start`; offsets (3,) or (n, 3)."""
     count = len(slot)
     end = np.empty((count, 3))
     order = np.arange(count)
-    units = (
-        np.broadcast_to(np.asarray(unit, float).reshape(-1, 1), (count, 1))[:, 0] if np.ndim(unit) else unit
-    )
     for a in range(3):
         words = slot[:, a]
         given = words >= 0
         shift = offset[a] if offset.ndim == 1 else offset[:, a]
-        column = value[words] * units
+        column = value[words] * unit
         if incremental is None:
             column += shift
             if not given.all():

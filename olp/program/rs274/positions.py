@@ -43,7 +43,7 @@ def positions_program(
         if wait > 0.0:
             count = profile.increments_without_point
             lines.append(f"G4 P{round(1000.0 * wait)}" if count else f"G4 P{wait:.3f}")
-    lines.append("M30" if 30 in profile.harmless_m else "M2")
+    lines.append("M30")
     return ("\n".join(lines) + "\n").encode()
 
 

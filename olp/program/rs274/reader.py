@@ -30,6 +30,7 @@ from olp.program.rs274.codes import (
     PLANE_OF,
     PRESET,
     PROBES,
+    UNITS,
     WRITE_OFFSET,
 )
 from olp.program.rs274.collector import Collector
@@ -44,8 +45,8 @@ from olp.program.rs274.special_blocks import SpecialBlocks, check_codes, event_b
 _KIND = np.full(1001, 255, np.uint8)
 _KIND[[0, 10, 20, 30]] = (Kind.RAPID, Kind.LINE, Kind.ARC_CW, Kind.ARC_CCW)
 _ALONE = np.array(sorted(CYCLES | PROBES))
-#: Events that need the present position
-_POSITION = HOMES | {WRITE_OFFSET, MACHINE, PRESET}
+#: Events that need the present position, or change the unit of the numbers behind them
+_APART = HOMES | {WRITE_OFFSET, MACHINE, PRESET, *UNITS}
 
 
 def read(
@@ -122,8 +123,8 @@ class _Reader:
         check_odd(self.data, chunk, before_end, active, self.state.profile)
         context = self.modes.read(chunk, base, active)
         # a code that is not read says more than its words, which no other code uses
-        check_codes(context, active, self.state.profile)
-        self.modes.check_rules(context, active)
+        check_codes(context, self.state.profile)
+        self.modes.check_rules(context)
         # a payload makes a new frame, from the motion of its own line on
         context.event[[line for line in self.payloads if active[line]]] = True
         self._stretches(context, gather(chunk, context.motion, context.consumed))
@@ -149,7 +150,7 @@ class _Reader:
             number, deleted = context.number(line), bool(chunk.deleted[line])
             words, codes = event_block(context, line, state.profile)
             moved = any(state.may_move(round(w.value * 10)) for w in words if w.letter == "M")
-            if moved or any(c in _POSITION for c in codes):
+            if moved or any(c in _APART for c in codes):
                 self._resolve(context, rows, upto)
             state.distance, state.plane = int(context.distance[line]), int(context.plane[line])
             state.payload_kg = self.payloads.get(line, state.payload_kg)
@@ -184,7 +185,7 @@ class _Reader:
             rows.assigned = upto
 
     def _resolve(self, context: Context, rows: _Rows, upto: int) -> None:
-        """Positions, kinds and arcs of the plain rows up to `upto`."""
+        """Positions, kinds and arcs of the plain rows up to `upto`, which are in one unit."""
         a, rows.resolved = rows.resolved, max(upto, rows.resolved)
         if upto <= a:
             return
@@ -192,13 +193,13 @@ class _Reader:
         line = blocks.line[a:upto]
         number = line + (chunk.first_line + 1)
         motion = context.motion[line]
-        kind = _KIND[np.maximum(motion, -1)]
+        kind = _KIND[motion]
         if (kind == 255).any():
             rows_without = np.flatnonzero(kind == 255).tolist()
-            raise ProgramError.together(_no_motion(int(motion[i]), int(number[i])) for i in rows_without)
+            raise ProgramError.together(_no_motion(int(number[i])) for i in rows_without)
         incremental = context.distance[line] == INCREMENTAL
         frame = rows.frame[a:upto]
-        offset, unit = self._offsets(frame)
+        offset, unit = self._offsets(frame), state.frames[int(frame[0])].unit_mm
         value = scaled(context, state, self.collector.remarks)
         slot = blocks.slot[a:upto]
         end = fill(slot, value, incremental if incremental.any() else None, offset, unit, state.position)
@@ -225,7 +226,7 @@ class _Reader:
         end: Array,
         value: Array,
         offset: Array,
-        unit: Array | float,
+        unit: float,
     ) -> None:
         blocks = rows.blocks
         row = blocks.arc_row[arcs] - a
@@ -233,7 +234,7 @@ class _Reader:
         line = blocks.line[blocks.arc_row[arcs]]
         start = np.where(row[:, None] > 0, end[np.maximum(row - 1, 0)], np.array(self.state.position))
         size = np.where(words >= 0, value[words], np.nan)
-        size[:, :4] *= np.asarray(unit)[row] if np.ndim(unit) else unit
+        size[:, :4] *= unit
         absolute = context.arc_distance[line] == 901
         plane = np.array([PLANE_OF[p] for p in (170, 180, 190)])[(context.plane[line] - 170) // 10]
         cw = context.motion[line] == 20
@@ -250,21 +251,17 @@ class _Reader:
         slot = np.where(words >= 0, words + context.base, -1)
         self.collector.put_worded_arcs(row + self.collector.moves, centre, plane, sweep, slot, absolute)
 
-    def _offsets(self, frame: npt.NDArray[np.int32]) -> tuple[Array, Array | float]:
+    def _offsets(self, frame: npt.NDArray[np.int32]) -> Array:
+        """(3,) where it is the same for all rows, else (n, 3)."""
         frames = self.state.frames
         if (frame == frame[0]).all():
-            one = frames[int(frame[0])]
-            return np.array(one.offset_mm), one.unit_mm
-        offsets = np.array([f.offset_mm for f in frames])
-        units = np.array([f.unit_mm for f in frames])
-        return offsets[frame], units[frame][:, None]
+            return np.array(frames[int(frame[0])].offset_mm)
+        return np.array([f.offset_mm for f in frames])[frame]
 
 
-def _no_motion(code: int, line: int) -> ProgramError:
-    if code in (-1, 800):
-        return ProgramError(
-            "a block has axis words, but no motion code is in force; expected G0, G1, G2 or G3",
-            line=line,
-            code="OLP517",
-        )
-    return ProgramError(f"G{code / 10:g} is not read as motion", line=line, code="OLP512")
+def _no_motion(line: int) -> ProgramError:
+    return ProgramError(
+        "a block has axis words, but no motion code is in force; expected G0, G1, G2 or G3",
+        line=line,
+        code="OLP517",
+    )

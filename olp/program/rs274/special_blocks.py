@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Index, Mask
+from olp.core.arrays import Index
 from olp.core.budget import Budget
 from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES
@@ -81,10 +81,11 @@ def _checked(
     code: Index, act: npt.NDArray[np.int8], words: list[Word], profile: Profile, line: int
 ) -> list[int]:
     """The event codes of a block; refuses those that cannot be read correctly."""
-    for c, a in zip(code.tolist(), act.tolist(), strict=True):
+    numbers = [word.value for word in words if word.letter == "G"]
+    for c, a, number in zip(code.tolist(), act.tolist(), numbers, strict=True):
         if a == Act.REFUSE:
             why = profile.refusals.get(c)
-            name = f"G{c / 10:g}"
+            name = f"G{number:g}"
             if c in CUTTER_COMPENSATION:
                 why = f"{why}; program the tool path, or take the contour as tool path with --contour"
             raise ProgramError(
@@ -108,10 +109,10 @@ def _checked(
     return [c for c, a in zip(code.tolist(), act.tolist(), strict=True) if a == Act.EVENT]
 
 
-def check_codes(context: Context, active: Mask, profile: Profile) -> None:
+def check_codes(context: Context, profile: Profile) -> None:
     """Refuse the codes of a chunk that need no state to be refused, all at once."""
     chunk, codes = context.chunk, context.codes
-    m = np.flatnonzero((chunk.letter == ord("M")) & active[chunk.line])
+    m = np.flatnonzero((chunk.letter == ord("M")) & context.active[chunk.line])
     m = m[np.isin(np.rint(context.value[m] * 10), _M_CODES)]
     lines = np.union1d(codes.line[codes.act == Act.REFUSE], chunk.line[m])
     errors = []
@@ -192,7 +193,7 @@ class SpecialBlocks:
                 )
             kind = Kind(motion // 10)
             flag |= Flag.PASS | Flag.MACHINE
-            offset = np.zeros(3)
+            offset = np.zeros_like(offset)
         elif effect.home:
             flag |= Flag.PASS
         else:

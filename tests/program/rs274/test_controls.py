@@ -12,9 +12,10 @@ from olp.core.errors import ProgramError
 from olp.core.machine import Setup
 from olp.files.config import load_setup
 from olp.files.sources import Source, Sources
+from olp.program.dialect import Row, Support
 from olp.program.registry import DIALECTS, read
 from olp.program.rs274.cycles import CycleRules
-from olp.program.rs274.profiles.base import Act, Profile
+from olp.program.rs274.profiles.base import Act, Profile, increment
 from olp.workflows.flatten import UnrollOptions, as_asked
 
 LINUXCNC, FANUC, HAAS, GRBL = CONTROLS = ("linuxcnc", "fanuc", "haas", "grbl")
@@ -259,3 +260,170 @@ def test_m_codes_that_move_no_axis(control: str) -> None:
     profile = DIALECTS[control]
     assert isinstance(profile, Profile)
     assert profile.harmless_m == listed
+
+
+_MILLING = "G0-G3 G38.2-G38.5 G80"
+_DRILLING = "G73 G74 G81-G86 G89"
+_FAMILY_REFUSED = "G5.2 G5.3 G6 G7 G7.1 G10.1 G12 G12.1 G13 G16 G31 G43.4 G51 G51.1 G65 G66 G68 G68.2"
+_REFUSED = f"G5 {_FAMILY_REFUSED} G28.1 G30.1 G33 G33.1 G41 G41.1 G42 G42.1 G76 G87 G88"
+_EVENTS = "G4 G10 G20 G21 G28 G49 G53-G59 G61 G92"
+_ISO_EVENTS = f"{_EVENTS} G30 G43 G44 G52 G54.1 G64"
+_ISO_UNCHANGED = "G8 G9 G13.1 G15 G23.1 G25 G40 G50 G50.1 G62 G63 G67 G69 G69.1 G96 G97"
+#: What becomes of the G codes of each control; other codes are refused as not known.
+CODES: dict[str, dict[Act, str]] = {
+    LINUXCNC: {
+        Act.UNCHANGED: "G8 G40 G96 G97",
+        Act.MOTION: f"{_MILLING} {_DRILLING}",
+        Act.ARC_DISTANCE: "G90.1 G91.1",
+        Act.FEED: "G93-G95",
+        Act.RETRACT: "G98 G99",
+        Act.EVENT: f"{_EVENTS} G30 G43 G43.1 G43.2 G52 G59.1-G59.3 G61.1 G64 G92.1-G92.3",
+        Act.REFUSE: f"{_REFUSED} G5.1",
+    },
+    FANUC: {
+        Act.UNCHANGED: f"{_ISO_UNCHANGED} G5.1 G11",
+        Act.MOTION: f"{_MILLING} {_DRILLING}",
+        Act.FEED: "G93-G95",
+        Act.RETRACT: "G98 G99",
+        Act.EVENT: _ISO_EVENTS,
+        Act.REFUSE: f"{_REFUSED} G92.1",
+    },
+    HAAS: {
+        Act.UNCHANGED: f"{_ISO_UNCHANGED} G103 G187",
+        Act.MOTION: f"{_MILLING} {_DRILLING}",
+        Act.FEED: "G93-G95",
+        Act.RETRACT: "G98 G99",
+        Act.EVENT: f"{_ISO_EVENTS} G110-G129 G154",
+        Act.REFUSE: f"{_REFUSED} G5.1 G92.1",
+    },
+    GRBL: {
+        Act.UNCHANGED: "G40",
+        Act.MOTION: _MILLING,
+        Act.ARC_DISTANCE: "G91.1",
+        Act.FEED: "G93 G94",
+        Act.EVENT: f"{_EVENTS} G43.1 G92.1",
+        Act.REFUSE: f"G5 {_FAMILY_REFUSED} G5.1 G61.1",
+    },
+}
+
+
+def listed_codes(text: str) -> set[int]:
+    """Ten times the numbers of codes; `G1-G3` are G1, G2, G3, and `G1.1-G1.3` by tenths."""
+    codes: set[int] = set()
+    for part in text.split():
+        first, _, last = part.partition("-")
+        low, high = (round(10 * float(code[1:])) for code in (first, last or first))
+        codes |= set(range(low, high + 1, 1 if "." in first else 10))
+    return codes
+
+
+@pytest.mark.parametrize("control", CONTROLS)
+def test_what_becomes_of_each_g_code(control: str) -> None:
+    profile = DIALECTS[control]
+    assert isinstance(profile, Profile)
+    wanted = CODES[control] | {Act.PLANE: "G17-G19", Act.DISTANCE: "G90 G91"}
+    own: dict[Act, set[int]] = {}
+    for code, act in profile.codes.items():
+        own.setdefault(act, set()).add(code)
+    assert own == {act: listed_codes(text) for act, text in wanted.items()}
+    # the table for people says the same
+    rows = profile.rows()
+    assert [round(10 * float(row.statement[1:])) for row in rows] == sorted(profile.codes)
+    support = {Act.UNCHANGED: Support.UNCHANGED, Act.REFUSE: Support.REFUSED, Act.MOTION: Support.CORRECTED}
+    for row, (_, act) in zip(rows, sorted(profile.codes.items()), strict=True):
+        assert row.support == support.get(act, Support.READ)
+        assert bool(row.why) == (act is Act.REFUSE)
+        assert not row.why or row.why.startswith(f"{row.statement} ") or row.statement == "G61.1"
+    of_g92_1 = {
+        FANUC: "G92.1 presets offsets that are not known off line",
+        HAAS: "G92.1 is not a code of this control",
+    }
+    assert profile.refusals.get(921) == of_g92_1.get(control)
+
+
+def test_a_code_without_a_reason_is_not_of_the_control() -> None:
+    rows = {row.statement: row for row in DIALECTS[GRBL].rows()}
+    assert rows["G61.1"] == Row("G61.1", Support.REFUSED, "is not a code of this control")
+    assert rows["G68"] == Row("G68", Support.REFUSED, "G68 (rotation) is not read")
+    assert rows["G54"] == Row("G54", Support.READ)
+
+
+def test_how_programs_of_a_control_are_written() -> None:
+    """Names, endings of files, decimals of inches and of centres, and bounds of feeds, by the manuals."""
+    written = {
+        d.name: (d.written_ending, d.inch_decimals, d.free_digits, d.path_tolerance, d.least_inverse_feed)
+        for d in PROFILES
+    }
+    assert written == {
+        LINUXCNC: ("ngc", 5, 1, True, 0.1),
+        FANUC: ("nc", 4, 0, False, 0.0),
+        HAAS: ("nc", 4, 0, False, 0.0),
+        GRBL: ("nc", 5, 1, False, 0.0),
+    }
+    for profile in PROFILES:
+        assert profile.title.startswith({GRBL: "Grbl 1.1 and", HAAS: "Haas mills"}.get(profile.name, ""))
+        assert profile.first == (b"%", b"O|:")
+        assert profile.payload_comments
+        assert profile.unroller is not None
+        # outputs that are switched along with a motion
+        assert profile.m_with_motion == (frozenset({62, 63, 67}) if profile.name == LINUXCNC else frozenset())
+
+
+@pytest.mark.parametrize(
+    ("least_mm", "metric", "inch"),
+    [(0.001, 0.001, 0.0001), (0.0005, 0.001, 0.0001), (0.0004, 0.0001, 0.00001), (0.0001, 0.0001, 0.00001)],
+)
+def test_a_number_without_a_point_counts_increments_of_its_axis(
+    least_mm: float, metric: float, inch: float, setups: dict[str, Setup]
+) -> None:
+    """0.001 mm goes with 0.0001 inch. I, J and K are along X, Y and Z; R and Q count as X."""
+    there = setups[FANUC].machine
+    for axis, letters in (("X", "XIRQ"), ("Y", "YJ"), ("Z", "ZK")):
+        axes = {a: replace(x, least_increment_mm=1e-3) for a, x in there.axes.items()}
+        axes[axis] = replace(axes[axis], least_increment_mm=least_mm)
+        fine = replace(there, axes=axes)
+        for letter in "XYZIJKRQ":
+            mine = letter in letters
+            assert increment(fine, letter, 1.0) == (metric if mine else 0.001)
+            assert increment(fine, letter, 25.4) == pytest.approx(inch if mine else 0.0001, rel=1e-12)
+
+
+def test_a_calculator_control_counts_whole_units(setups: dict[str, Setup]) -> None:
+    fanuc, linuxcnc = DIALECTS[FANUC], DIALECTS[LINUXCNC]
+    assert isinstance(fanuc, Profile) and isinstance(linuxcnc, Profile)
+    there = setups[FANUC].machine
+    pocket = replace(there, decimal_point="calculator")
+    assert fanuc.counts_increments(there)
+    assert not fanuc.counts_increments(pocket)
+    assert not linuxcnc.counts_increments(there)
+    assert fanuc.bare_mm(there, "X", 1.0) == 0.001
+    assert fanuc.bare_mm(there, "X", 25.4) == pytest.approx(0.00254, rel=1e-12)
+    assert fanuc.bare_mm(pocket, "X", 25.4) == linuxcnc.bare_mm(there, "X", 25.4) == 25.4
+
+
+def test_dwells_without_a_point_are_milliseconds_on_iso_controls() -> None:
+    fanuc, linuxcnc = DIALECTS[FANUC], DIALECTS[LINUXCNC]
+    assert isinstance(fanuc, Profile) and isinstance(linuxcnc, Profile)
+    assert fanuc.dwell_s(500.0, pointed=False) == 0.5
+    assert fanuc.dwell_s(500.0, pointed=True) == 500.0
+    assert linuxcnc.dwell_s(500.0, pointed=False) == linuxcnc.dwell_s(500.0, pointed=True) == 500.0
+
+
+@pytest.mark.parametrize(
+    ("line", "straight"),
+    [
+        (b"G2 X1 Y2 I3 J-4.5 F6", b"G1   X1 Y2     F6"),
+        (b"N5 G03X1Y2R+.5", b"G1 N5  X1Y2 "),
+        (b"X1 Y2 k 3 p2", b"G1 X1 Y2    "),
+        (b"g 002 G20 G30 G2.1 G23 X3", b"G1   G20 G30 G2.1 G23 X3"),
+        (b"G90 X1 I.5", b"G1 G90 X1  "),
+    ],
+)
+def test_an_arc_made_straight_keeps_its_other_words(line: bytes, straight: bytes) -> None:
+    assert DIALECTS[LINUXCNC].straightened(line) == straight
+
+
+def test_lines_end_where_the_control_ends_them() -> None:
+    text = b"X1\rX2\r\nX3"
+    assert DIALECTS[LINUXCNC].lines(text) == [b"X1\rX2\r\n", b"X3"]
+    assert DIALECTS[GRBL].lines(text) == [b"X1\r", b"X2\r\n", b"X3"]

@@ -16,14 +16,17 @@ from olp.core.errors import ProgramError
 from olp.program.rs274.cycles import (
     CODES,
     ISO_CYCLES,
+    LCNC_CLEARANCE_INCH,
     LCNC_CLEARANCE_MM,
     NGC_CYCLES,
     PLANES,
     CycleRules,
     Stroke,
+    check_repeats,
     cycle_moves,
     hole_moves,
     levels,
+    stroke_budget,
 )
 
 HOLE = {"start": (0.0, 0.0, 5.0), "xy": (1.0, 2.0), "r": 1.0, "z": -2.0, "initial_z": 5.0}
@@ -89,32 +92,210 @@ def test_levels_count_from_the_initial_level_in_g91() -> None:
     assert levels(-2.0, -3.0, absolute=False, initial_z=7.0) == (5.0, 2.0)
 
 
+#: Code, whether LinuxCNC makes it, whether it returns to R only, and its strokes: rapids and feeds to a
+#: level, dwells, and what the spindle does.
+STROKES: list[tuple[int, bool, bool, str]] = [
+    (810, True, False, "r5 r1 f-2 r5"),
+    (810, True, True, "r5 r1 f-2 r1"),
+    (820, True, False, "r5 r1 f-2 d0.5 r5"),
+    (820, False, True, "r5 r1 f-2 d0.5 r1"),
+    (730, True, False, "r5 r1 f-1 r-0.746 f-2 r5"),
+    (730, True, True, "r5 r1 f-1 r-0.746 f-2 r1"),
+    (830, True, False, "r5 r1 f-1 r1 r-0.746 f-2 r5"),
+    (830, False, True, "r5 r1 f-1 r1 r-0.746 f-2 r1"),
+    (840, True, False, "r5 r1 f-2 stop reverse d0.5 f5 stop restore"),
+    (840, True, True, "r5 r1 f-2 stop reverse d0.5 f1 stop restore"),
+    (740, True, False, "r5 r1 f-2 stop reverse d0.5 f5 stop restore"),
+    (840, False, False, "r5 r1 f-2 stop reverse d0.5 f1 stop restore r5"),
+    (740, False, True, "r5 r1 f-2 stop reverse d0.5 f1 stop restore"),
+    (850, True, False, "r5 r1 f-2 f1 r5"),
+    (850, False, True, "r5 r1 f-2 f1"),
+    (860, True, False, "r5 r1 f-2 d0.5 stop r5 restore"),
+    (860, False, True, "r5 r1 f-2 d0.5 stop r1 restore"),
+    (890, True, False, "r5 r1 f-2 d0.5 f5"),
+    (890, True, True, "r5 r1 f-2 d0.5 f1"),
+    (890, False, False, "r5 r1 f-2 d0.5 f1 r5"),
+]
+
+
+def _spelled(strokes: tuple[Stroke, ...], tool: int = 2) -> str:
+    moves = {"rapid": "r", "feed": "f"}
+    return " ".join(
+        f"{moves[s.kind]}{s.point[tool]:g}"
+        if s.kind in moves
+        else f"d{s.seconds:g}"
+        if s.kind == "dwell"
+        else s.spindle
+        for s in strokes
+    )
+
+
+@pytest.mark.parametrize(("code", "linuxcnc", "retract_to_r", "expected"), STROKES)
+def test_each_cycle_has_its_strokes(code: int, linuxcnc: bool, retract_to_r: bool, expected: str) -> None:
+    rules = NGC_CYCLES if linuxcnc else ISO_CYCLES
+    words = {"q": 2.0, "p": 0.5, "retract_to_r": retract_to_r, "rules": rules}
+    strokes = hole_moves(code, **HOLE, **words)  # type: ignore[arg-type]
+    assert _spelled(strokes) == expected
+    assert {(s.x, s.y) for s in strokes} == {(1.0, 2.0)}
+    # in another plane the same strokes go along another axis
+    for plane in (18, 19) if code not in (740, 840) or not linuxcnc else ():
+        first, second, tool = PLANES[plane]
+        start = [0.0, 0.0, 0.0]
+        start[tool] = 5.0
+        turned = hole_moves(code, **{**HOLE, "start": tuple(start)}, **words, plane=plane)  # type: ignore[arg-type]
+        assert _spelled(turned, tool) == expected
+        assert {(s.point[first], s.point[second]) for s in turned} == {(1.0, 2.0)}
+
+
 @pytest.mark.parametrize(
-    ("code", "change", "message"),
+    ("start", "initial_z", "retract_to_r", "linuxcnc", "iso"),
     [
-        (870, {}, "G87"),
-        (880, {}, "G88"),
-        (760, {}, "G76"),
-        (830, {}, "peck Q"),
-        (830, {"q": 0.0}, "peck Q"),
-        (730, {"q": 1e-9}, "pecks"),
-        (820, {}, "dwell P"),
-        (860, {}, "dwell P"),
-        (890, {"p": -1.0}, "negative dwell"),
-        (810, {"r": -3.0}, "below the bottom"),
-        (810, {"z": float("nan")}, "finite"),
-        (810, {"plane": 20}, "G17"),
-        (840, {"plane": 18}, "wrong axes"),
+        # over the hole and at R already
+        ((1.0, 2.0, 1.0), 5.0, True, "f-2 r1", "f-2 r1"),
+        ((1.0, 2.0, 5.0), 5.0, True, "r1 f-2 r1", "r1 f-2 r1"),
+        # a series goes on at R, or just above it, or below it
+        ((0.0, 0.0, 1.0), 5.0, False, "r5 r1 f-2 r5", "r1 f-2 r5"),
+        ((0.0, 0.0, 1.0), 5.0, True, "r1 f-2 r1", "r1 f-2 r1"),
+        ((0.0, 0.0, 1.01), 5.0, False, "r1.01 r1 f-2 r5", "r1.01 r1 f-2 r5"),
+        ((0.0, 0.0, 0.5), 5.0, False, "r5 r1 f-2 r5", "r0.5 r1 f-2 r5"),
+        # the level before the series is at R, or just below it
+        ((0.0, 0.0, 1.0), 1.0, False, "r1 f-2 r1", "r1 f-2 r1"),
+        ((0.0, 0.0, 0.9), 0.9, False, "r1 r1 f-2 r1", "r0.9 r1 f-2 r1"),
+        ((0.0, 0.0, 3.0), 0.9, False, "r1 r1 f-2 r1", "r3 r1 f-2 r1"),
     ],
 )
-def test_refusals_name_the_word(code: int, change: dict[str, float], message: str) -> None:
-    with pytest.raises(ProgramError, match=re.escape(message)):
+def test_the_level_before_a_hole_is_left_as_the_control_leaves_it(
+    start: tuple[float, float, float], initial_z: float, retract_to_r: bool, linuxcnc: str, iso: str
+) -> None:
+    hole = {**HOLE, "start": start, "initial_z": initial_z, "retract_to_r": retract_to_r}
+    assert _spelled(hole_moves(810, **hole)) == linuxcnc  # type: ignore[arg-type]
+    assert _spelled(hole_moves(810, **hole, rules=ISO_CYCLES)) == iso  # type: ignore[arg-type]
+
+
+def test_levels_of_the_program_are_put_into_axis_positions() -> None:
+    """In inches, program zero at 100 mm; places and the level before it are axis positions."""
+    hole = {"start": (0.0, 0.0, 200.0), "xy": (10.0, 20.0), "initial_z": 200.0, "retract_to_r": True}
+    strokes = hole_moves(830, r=1.0, z=-1.0, q=1.0, clearance=0.01, unit=25.4, ground=100.0, **hole)  # type: ignore[arg-type]
+    assert _spelled(strokes) == "r200 r125.4 f100 r125.4 r100.254 f74.6 r125.4"
+
+
+def test_holes_of_a_block_follow_one_another() -> None:
+    words = {"q": 2.0, "p": 0.5, "step": (1.0, -3.0), "repeats": 3}
+    strokes = cycle_moves(810, **HOLE, **words, retract_to_r=True)  # type: ignore[arg-type]
+    assert [s.point for s in strokes if s.kind == "feed"] == [(1, 2, -2), (2, -1, -2), (3, -4, -2)]
+    assert _spelled(strokes) == "r5 r1 f-2 r1 r1 f-2 r1 r1 f-2 r1"
+    iso = cycle_moves(810, **HOLE, **words, retract_to_r=False, rules=ISO_CYCLES)  # type: ignore[arg-type]
+    assert _spelled(iso) == "r5 r1 f-2 r5 r5 r1 f-2 r5 r5 r1 f-2 r5"
+    # in G90 the same hole again
+    same = cycle_moves(830, **HOLE, q=2.0, repeats=2, retract_to_r=True, clearance=0.5)  # type: ignore[arg-type]
+    assert _spelled(same) == "r5 r1 f-1 r1 r-0.5 f-2 r1 f-1 r1 r-0.5 f-2 r1"
+    turned = cycle_moves(
+        820, **{**HOLE, "start": (5.0, 0.0, 0.0)}, p=0.25, retract_to_r=True, plane=19, rules=ISO_CYCLES,
+    )  # type: ignore[arg-type]  # fmt: skip
+    assert [s.point for s in turned if s.kind == "feed"] == [(-2, 1, 2)]
+    assert _spelled(turned, 0) == "r5 r1 f-2 d0.25 r1"
+
+
+_ALL = "G73, G74, G81, G82, G83, G84, G85, G86, G89"
+
+
+@pytest.mark.parametrize(
+    ("code", "change", "why", "refused"),
+    [
+        (
+            870, {},
+            f"G87 has no geometry that is known offline; expected one of {_ALL}; "
+            "write the hole as plain moves",
+            "OLP544",
+        ),
+        *(
+            (
+                code, {},
+                f"G{code // 10} has no geometry that is known offline; expected one of {_ALL}; "
+                "write the hole as plain moves",
+                "OLP544",
+            )
+            for code in (760, 880)
+        ),
+        (890, {"p": -1.0}, "G89 has a negative dwell P -1; expected zero or more", "OLP531"),
+        (810, {"plane": 20}, "G81 in plane G20; expected G17, G18 or G19", "OLP531"),
+        (
+            810, {"r": float("inf")},
+            "G81 without a finite R and Z; give both on the first block of the cycle", "OLP531",
+        ),
+        (
+            810, {"z": float("nan")},
+            "G81 without a finite R and Z; give both on the first block of the cycle", "OLP531",
+        ),
+        (810, {"z": 1.5}, "G81 has R 1 below the bottom 1.5; R must not be below it", "OLP531"),
+        (830, {"q": 0.0}, "G83 needs a peck Q greater than zero, found 0.0", "OLP531"),
+        (730, {"q": -1.0}, "G73 needs a peck Q greater than zero, found -1.0", "OLP531"),
+        (730, {}, "G73 needs a peck Q greater than zero, found None", "OLP531"),
+        (
+            730, {"q": 2.999e-5},
+            "G73 with Q 2.999e-05 makes more than 100000 pecks; give a larger Q", "OLP543",
+        ),
+        (820, {}, "G82 needs a dwell P; give P0 for none", "OLP531"),
+        (860, {}, "G86 needs a dwell P; give P0 for none", "OLP531"),
+        (890, {}, "G89 needs a dwell P; give P0 for none", "OLP531"),
+        (
+            740, {"plane": 19},
+            "G74 in plane G19: LinuxCNC 2.9 taps along the wrong axes outside G17; use G17", "OLP531",
+        ),
+    ],
+)  # fmt: skip
+def test_a_cycle_is_refused_in_these_words(
+    code: int, change: dict[str, float], why: str, refused: str
+) -> None:
+    with pytest.raises(ProgramError) as caught:
         hole_moves(code, **{**HOLE, **change}, retract_to_r=True)  # type: ignore[arg-type]
+    assert (caught.value.message, caught.value.code) == (why, refused)
 
 
-def test_no_repeats_is_refused() -> None:
-    with pytest.raises(ProgramError, match="L1"):
+def test_bounds_of_a_hole_are_within_them() -> None:
+    """R at the bottom, no dwell, and as many holes as there may be."""
+    assert _spelled(hole_moves(810, **{**HOLE, "z": 1.0}, retract_to_r=True)) == "r5 r1 f1"  # type: ignore[arg-type]
+    assert "d0" in _spelled(hole_moves(820, **HOLE, p=0.0, retract_to_r=True))
+    assert hole_moves(840, **HOLE, retract_to_r=True)[4].seconds == 0.0
+    deep = {**HOLE, "r": 100_000.0, "z": 0.0, "start": (0.0, 0.0, 2e5), "initial_z": 2e5}
+    with pytest.raises(ProgramError, match="more than 100000 pecks"):
+        hole_moves(730, **{**deep, "r": 100_000.5}, q=1.0, retract_to_r=True)  # type: ignore[arg-type]
+    check_repeats(20_000)
+    with pytest.raises(ProgramError) as caught:
+        check_repeats(20_001)
+    assert caught.value.message == "the block makes 20001 holes; expected at most 20000"
+    assert caught.value.code == "OLP543"
+    with pytest.raises(ProgramError) as caught:
         cycle_moves(810, **HOLE, repeats=0, retract_to_r=True)
+    assert caught.value.code == "OLP531"
+
+
+def test_strokes_of_a_program_are_bounded_by_its_size() -> None:
+    assert stroke_budget(0).limit == stroke_budget(62_500).limit == 250_000
+    assert stroke_budget(62_501).limit == 250_004
+    budget = stroke_budget(10)
+    budget.spend(250_000)
+    with pytest.raises(ProgramError) as caught:
+        budget.spend(1)
+    assert caught.value.message == (
+        "the canned cycles of the program have more than 250000 strokes; split the program"
+    )
+
+
+def test_the_word_that_counts_holes_is_l_and_on_iso_controls_k_too() -> None:
+    words = {"X": 1, "K": 2, "L": 3}
+    assert NGC_CYCLES.counter(words) == ISO_CYCLES.counter(words) == 3
+    assert ISO_CYCLES.counter({"X": 1, "K": 2}) == 2
+    assert NGC_CYCLES.counter({"X": 1, "K": 2}) is None
+
+
+def test_how_the_spindle_turns_in_a_cycle_of_linuxcnc() -> None:
+    """G74 taps to the left, G84 to the right; G86 stops a spindle that turns either way."""
+    assert NGC_CYCLES.turning == {740: (4,), 840: (3,), 860: (3, 4)}
+    assert ISO_CYCLES.turning == {}
+    assert (LCNC_CLEARANCE_MM, LCNC_CLEARANCE_INCH) == (0.254, 0.01)
+    assert not NGC_CYCLES.other_axes
+    assert ISO_CYCLES.other_axes
 
 
 _level = st.integers(-3000, 3000).map(lambda n: n / 100)

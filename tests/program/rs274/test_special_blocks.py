@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import functools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from cases.acceptance import TRUE_ZERO, machine
+from cases.blocks import moves
 
 from olp.core.errors import ProgramError
-from olp.core.machine import Setup
+from olp.core.machine import Setup, Tool, WorkOffset
 from olp.core.toolpath import Flag, Kind, Toolpath
 from olp.files.config import load_setup
 from olp.program.registry import DIALECTS, read
+from olp.program.rs274 import reader
+from olp.program.rs274.lexer import chunks
 
 START = "G21 G90 G17 G54\nG0 X1 Y2 Z3\n"
 
@@ -102,3 +107,158 @@ def test_g10_l20_makes_the_position_the_value_given(setup: Setup) -> None:
 @pytest.mark.parametrize("p", ("0", "-1", "1.5"))
 def test_turns_of_an_arc_are_an_integer_from_one(p: str, setup: Setup) -> None:
     assert "expected an integer from 1" in refused(f"G2 X1 Y2 I5 P{p} F60\n", setup)
+
+
+PASS, DELETED, INCREMENTAL, CYCLE = Flag.PASS, Flag.DELETED, Flag.INCREMENTAL, Flag.CYCLE
+MACHINE, CONTROL, NONE = Flag.MACHINE, Flag.CONTROL, Flag(0)
+#: Blocks behind `START`: kind, flags and end of their moves, None where an axis is unknown.
+FLAGS: dict[str, list[tuple[str, Flag, tuple[float | None, float | None, float | None]]]] = {
+    "/G28 Z9": [
+        ("RAPID", PASS | DELETED, (101, 202, 309)),
+        ("RAPID", PASS | CONTROL | DELETED, (101, 202, None)),
+    ],
+    "G91 G28 Y1 Z0": [
+        ("RAPID", PASS | INCREMENTAL, (101, 203, 303)),
+        ("RAPID", PASS | CONTROL, (101, None, None)),
+    ],
+    "G28": [("RAPID", PASS | CONTROL, (None, None, None))],
+    "/G53 G0 X7": [("RAPID", PASS | MACHINE | DELETED, (7, 202, 303))],
+    "G1 F60\nG53 X7 Z1": [("LINE", PASS | MACHINE, (7, 202, 1))],
+    "G20\nG53 X2": [("RAPID", PASS | MACHINE, (50.8, 202, 303))],
+    "G38.2 X5 Z3 F60": [
+        ("PROBE", NONE, (105, 202, 303)),
+        ("RAPID", PASS | CONTROL, (None, 202, 303)),
+    ],
+    "G91 G38.3 X0 Y-4 F60": [
+        ("PROBE", INCREMENTAL, (101, 198, 303)),
+        ("RAPID", PASS | CONTROL, (101, None, 303)),
+    ],
+    "G1 F60\nG38.2 Z1\n/Z0\nG0 X1 Y1 Z1": [
+        ("PROBE", NONE, (101, 202, 301)),
+        ("RAPID", PASS | CONTROL, (101, 202, None)),
+        ("PROBE", DELETED, (101, 202, 300)),
+        ("RAPID", PASS | CONTROL | DELETED, (101, 202, None)),
+        ("RAPID", NONE, (101, 201, 301)),
+    ],
+    "G81 X2 Z1 R2\n/X3\n(olp off)\nX4": [
+        ("RAPID", CYCLE, (102, 202, 303)),
+        ("RAPID", CYCLE, (102, 202, 302)),
+        ("LINE", CYCLE, (102, 202, 301)),
+        ("RAPID", CYCLE, (102, 202, 302)),
+        ("RAPID", CYCLE | DELETED, (103, 202, 302)),
+        ("LINE", CYCLE | DELETED, (103, 202, 301)),
+        ("RAPID", CYCLE | DELETED, (103, 202, 302)),
+        ("RAPID", CYCLE | PASS, (104, 202, 302)),
+        ("LINE", CYCLE | PASS, (104, 202, 301)),
+        ("RAPID", CYCLE | PASS, (104, 202, 302)),
+    ],
+    # the block of a cycle sends the axes home first
+    "G81 X2 Z1 R2\nG28 X3": [
+        ("RAPID", CYCLE, (102, 202, 303)),
+        ("RAPID", CYCLE, (102, 202, 302)),
+        ("LINE", CYCLE, (102, 202, 301)),
+        ("RAPID", CYCLE, (102, 202, 302)),
+        ("RAPID", PASS, (103, 202, 302)),
+        ("RAPID", PASS | CONTROL, (None, 202, 302)),
+    ],
+    "M6 T1\nG0 X5": [
+        ("RAPID", PASS | CONTROL, (None, None, None)),
+        ("RAPID", NONE, (105, None, None)),
+    ],
+    "/M100": [("RAPID", PASS | CONTROL | DELETED, (None, None, None))],
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def with_tool(setup: Setup) -> Setup:
+    return replace(setup, machine=replace(setup.machine, tools={1: Tool(1)}))
+
+
+@pytest.mark.parametrize("text", FLAGS)
+def test_moves_of_the_control_have_their_flags(text: str, with_tool: Setup) -> None:
+    read_ = read((START + text + "\nM2\n").encode(), with_tool, DIALECTS["linuxcnc"])
+    assert [row[1:4] for row in moves(read_)[1:]] == FLAGS[text]
+    assert read_.toolpath.frame[-1] == len(read_.toolpath.frames) - 1
+    assert read_.slot[np.isnan(read_.toolpath.end_mm).all(axis=1)].max(initial=-1) == -1
+
+
+@pytest.mark.parametrize("text", ["G28", "M100", "M6 T1"])
+def test_where_the_program_starts_is_unknown_behind_a_move_of_the_control(
+    text: str, with_tool: Setup
+) -> None:
+    known = replace(with_tool, job=replace(with_tool.job, start_mm=(1.0, 2.0, 3.0)))
+    toolpath = read(f"G21 G90\n{text}\nG0 X5\nM2\n".encode(), known, DIALECTS["linuxcnc"]).toolpath
+    assert np.isnan(toolpath.start_mm).all()
+    assert toolpath.line.tolist() == [3]
+    assert np.isnan(toolpath.end_mm[0]).tolist() == [False, True, True]
+    plain = read(b"G21 G90\nG0 X5\nM2\n", known, DIALECTS["linuxcnc"]).toolpath
+    assert plain.start_mm == (1.0, 2.0, 3.0)
+    assert plain.end_mm[0].tolist() == [105.0, 2.0, 3.0]
+
+
+def holes(text: str, setup: Setup, control: str = "linuxcnc") -> list[tuple[int, float, float, float]]:
+    """Series, and the axis positions of the level before it, of R and of the depth, of each hole."""
+    read_ = read((START + text + "\nM2\n").encode(), setup, DIALECTS[control])
+    return [(h.series, h.initial_mm, h.r_mm, h.z_mm) for h in read_.holes]
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        # words are inherited within a series
+        (
+            "G81 X2 Z1 R2\nX3\nX4 Z-1\nX5 R1",
+            [(1, 303, 302, 301)] * 2 + [(1, 303, 302, 299), (1, 303, 301, 299)],
+        ),
+        # a move ends it, and so does G80, whatever comes between
+        ("G98 G81 X2 Z1 R2\nG0 Z9\nG81 X3 Z1 R2", [(1, 303, 302, 301), (2, 309, 302, 301)]),
+        ("G98 G81 X2 Z1 R2\nG80\nG81 X3 Z1 R2", [(1, 303, 302, 301), (2, 303, 302, 301)]),
+        ("G81 X2 Z1 R2\nG80\nG81 X3 Z1 R2", [(1, 303, 302, 301), (2, 302, 302, 301)]),
+        ("G81 X2 Z1 R2\n\nF60\nG82 X3 Z1 R2 P0", [(1, 303, 302, 301)] * 2),
+        ("G81 X2 Z1 R2\nG80\n\nG0\nF60\nG81 X3 Z1 R2", [(1, 303, 302, 301), (2, 302, 302, 301)]),
+        # incremental: R from the level before the series, the depth from R
+        ("G91 G81 X2 Z-1 R-2", [(1, 303, 301, 300)]),
+        # in inches, and with the tool axis along Y or X
+        ("G20 G98 G81 X2 Z-1 R1", [(1, 303, 325.4, 274.6)]),
+        ("G18 G81 X2 Z1 Y-3 R1", [(1, 202, 201, 197)]),
+        ("G19 G81 X-2 Z1 R0", [(1, 101, 100, 98)]),
+    ],
+)
+def test_levels_of_holes_count_from_their_series(
+    text: str, expected: list[tuple[int, float, float, float]], setup: Setup
+) -> None:
+    got = holes(text, setup)
+    assert [row[0] for row in got] == [row[0] for row in expected]
+    assert np.array(got) == pytest.approx(np.array(expected), abs=1e-9)
+
+
+def test_each_spot_of_a_program_may_end_a_chunk(setup: Setup, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Series of cycles, codes and positions go over from chunk to chunk, wherever these are cut."""
+    text = START + (
+        "G98 G81 X2 Z1 R2\nX3\nG80\nG0 Z5\nG81 X4 Z1 R2\n(a)\nX5 L2\nG91 G0 X1\nG90 G82 X6 Z1 R3 P1\nM8\n"
+        "G99 X7\nG80\nG55\nG1 X1 F60\nG2 X3 I1\nX5 I1\nM2\n"
+    )
+    frames = {"G55": WorkOffset("G55", offset_mm=(1.0, 2.0, 3.0), set_by="true")}
+    there = replace(setup, machine=replace(setup.machine, work_offsets=setup.machine.work_offsets | frames))
+    whole = read(text.encode(), there, DIALECTS["linuxcnc"])
+    assert [hole.series for hole in whole.holes] == [1, 1, 2, 2, 2, 3, 3]
+    for size in (i for i, letter in enumerate(text) if letter == "\n"):
+        monkeypatch.setattr(reader, "chunks", functools.partial(chunks, size=size))
+        cut = read(text.encode(), there, DIALECTS["linuxcnc"])
+        assert moves(cut) == moves(whole)
+        assert cut.holes == whole.holes
+        assert cut.toolpath.arcs.move.tolist() == whole.toolpath.arcs.move.tolist()
+        assert cut.toolpath.arcs.centre_mm.tolist() == whole.toolpath.arcs.centre_mm.tolist()
+        assert cut.arc_slots.word.tolist() == whole.arc_slots.word.tolist()
+
+
+def test_rests_of_holes_are_dwells_and_reversals(setup: Setup) -> None:
+    """How many moves of the hole come before each, and how long it is."""
+    text = "M3 S100\nG84 X2 Z1 R2 P0.5\nG80\nG86 X3 Z1 R2 P2\nG80\nG89 X3 Z1 R2 P0\nG80\nG85 X4 Z1 R2\nG80\n"
+    read_ = read((START + text + "M2\n").encode(), setup, DIALECTS["linuxcnc"])
+    assert [hole.rests for hole in read_.holes] == [
+        ((3, 0.0), (3, 0.0), (3, 0.5), (4, 0.0), (4, 0.0)),
+        ((2, 2.0), (2, 0.0), (3, 0.0)),
+        ((1, 0.0),),
+        (),
+    ]

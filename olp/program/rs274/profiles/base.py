@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
-from enum import IntEnum
+from enum import IntEnum, auto
 
 from olp.core.machine import Machine
 from olp.core.units import AXES
@@ -25,15 +25,15 @@ from olp.program.text.line_ends import split
 class Act(IntEnum):
     """What a G code does to the reading of a program."""
 
-    UNCHANGED = 0  #: nothing: its bytes are unchanged
-    MOTION = 1
-    PLANE = 2
-    DISTANCE = 3
-    ARC_DISTANCE = 4
-    FEED = 5
-    RETRACT = 6
-    EVENT = 7  #: changes frames, units, tools or path mode; handled block by block
-    REFUSE = 8
+    UNCHANGED = auto()  #: nothing: its bytes are unchanged
+    MOTION = auto()
+    PLANE = auto()
+    DISTANCE = auto()
+    ARC_DISTANCE = auto()
+    FEED = auto()
+    RETRACT = auto()
+    EVENT = auto()  #: changes frames, units, tools or path mode; handled block by block
+    REFUSE = auto()
 
 
 _SUPPORT = {Act.UNCHANGED: Support.UNCHANGED, Act.REFUSE: Support.REFUSED, Act.MOTION: Support.CORRECTED}
@@ -126,7 +126,7 @@ class Profile(Dialect):
 
 def increment(machine: Machine, letter: str, unit_mm: float) -> float:
     """Least increment in program units: 0.001 mm goes with 0.0001 inch, 0.0001 mm with 0.00001 inch."""
-    axis = {"I": "X", "J": "Y", "K": "Z"}.get(letter, letter)
+    axis = {"J": "Y", "K": "Z"}.get(letter, letter)
     least = machine.axes[axis if axis in AXES else "X"].least_increment_mm
     metric = 0.0001 if least < 0.0005 else 0.001
     return metric if unit_mm == 1.0 else metric / 10
@@ -175,7 +175,6 @@ def g_codes(*, unchanged: set[int], extra: dict[int, Act], without: Set[int] = f
     """The table of a control: the usual codes, those that stay `unchanged`, those with an `extra` or another
     act, `without` those that it does not have."""
     codes = dict.fromkeys((0, 10, 20, 30, 800, *CYCLES, *PROBES), Act.MOTION)
-    codes |= dict.fromkeys((330, 331, 760, 870, 880), Act.REFUSE)
     codes |= dict.fromkeys((170, 180, 190), Act.PLANE)
     codes |= dict.fromkeys((900, 910), Act.DISTANCE)
     codes |= dict.fromkeys((930, 940, 950), Act.FEED)

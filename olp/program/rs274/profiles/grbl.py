@@ -31,6 +31,4 @@ DIALECT = Profile(
     cycles=replace(NGC_CYCLES, exact_corners=False),
     language=NGC,
     path_mode="junction deviation of the control ($11)",
-    inch_decimals=5,
-    free_digits=1,
 )

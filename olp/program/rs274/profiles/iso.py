@@ -6,7 +6,7 @@ from olp.program.rs274.block_text import BlockText
 from olp.program.rs274.cycles import ISO_CYCLES
 from olp.program.rs274.entry import read_blocks, unroll_blocks
 from olp.program.rs274.flatten.language import MACRO_B
-from olp.program.rs274.profiles.base import ISO_M, REFUSALS, Act, Profile, g_codes
+from olp.program.rs274.profiles.base import ISO_M, REFUSALS, Act, Profile
 
 #: G codes without effect on the path on these controls.
 ISO_UNCHANGED = frozenset({80, 90, 150, 500, 501, 620, 630, 670, 690, 691, 131, 231, 250})
@@ -19,7 +19,7 @@ ISO = Profile(
     title="ISO controls of mills",
     reader=read_blocks,
     unroller=unroll_blocks,
-    codes=g_codes(unchanged={*ISO_UNCHANGED}, extra=ISO_EXTRA),
+    codes={},
     refusals=REFUSALS,
     harmless_m=ISO_M,
     initial_retract=980,

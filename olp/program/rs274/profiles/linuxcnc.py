@@ -45,6 +45,4 @@ DIALECT = Profile(
     path_mode="G64 without tolerance, LinuxCNC's default",
     path_tolerance=True,
     written_ending="ngc",
-    inch_decimals=5,
-    free_digits=1,
 )
