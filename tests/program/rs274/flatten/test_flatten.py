@@ -3,33 +3,13 @@
 from __future__ import annotations
 
 import pytest
+from cases.unrolling import fanuc, flatten, lcnc, refusal
 from hypothesis import given
 from hypothesis import strategies as st
 
-from olp.core.errors import ProgramError, UsageError
-from olp.program.registry import named
+from olp.core.errors import UsageError
 from olp.program.rs274.flatten.language import MACRO_B, NGC
 from olp.program.rs274.flatten.unroll import number_text
-
-
-def flatten(data: bytes, *, profile: str, **options: object) -> bytes:
-    dialect = named(profile)
-    assert dialect.unroller is not None
-    return dialect.unroller(data, dialect, **options)
-
-
-def lcnc(text: str, **options: object) -> str:
-    return flatten(text.encode(), profile="linuxcnc", **options).decode()
-
-
-def fanuc(text: str, **options: object) -> str:
-    return flatten(text.encode(), profile="fanuc", **options).decode()
-
-
-def refusal(text: str, profile: str = "linuxcnc", **options: object) -> ProgramError:
-    with pytest.raises(ProgramError) as caught:
-        flatten(text.encode(), profile=profile, file="p.ngc", **options)
-    return caught.value
 
 
 @pytest.mark.parametrize(
