@@ -380,7 +380,7 @@ def _plain(text: Bytes, starts: Index, ends: Index, leading: Index) -> tuple[Mas
     lines = len(starts)
     size = len(text)
     upper = text & np.uint8(0xDF)
-    letters = np.flatnonzero((upper >= 65) & (upper <= 90) & (text >= 65))
+    letters = np.flatnonzero((upper >= 65) & (upper <= 90))
     where = np.searchsorted(letters, starts)
     count = np.searchsorted(letters, ends) - where
     padded = np.concatenate((text, np.zeros(8, np.uint8)))

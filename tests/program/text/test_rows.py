@@ -38,6 +38,7 @@ def test_delimited_text_is_split_in_one_place() -> None:
 def test_rows_are_numbered_as_an_editor_does() -> None:
     text = "# a\n\nx,y\n  # b\r\n1, 2\r3,4"
     assert list(LOOSE_CSV.rows(text)) == [(3, ["x", "y"]), (5, ["1", "2"]), (6, ["3", "4"])]
+    assert list(LOOSE_CSV.lines("a\r\n b \n\nc")) == [(1, "a"), (2, " b "), (3, ""), (4, "c")]
     assert list(LOOSE_CSV.rows(text, 3)) == [(5, ["1", "2"]), (6, ["3", "4"])]
 
 
