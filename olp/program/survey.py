@@ -166,6 +166,10 @@ class _Survey:
 
     def run(self, error: ProgramError | None) -> bool:
         """Read until nothing is refused; False where the survey ends before that."""
+        if error is not None and (error.file or "") not in self.lines:
+            # the file of a subprogram has been read when the program is unrolled from here
+            again = self.reading()
+            error = error if again is None or self.ran_long(again) else again
         before_all, most = self.spent, BYTES - len(self.data)
         for reading in range(READINGS):
             if error is None:

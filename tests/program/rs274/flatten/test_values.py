@@ -73,6 +73,10 @@ def test_names_with_an_underscore_are_global() -> None:
     )
 
 
+def test_parameters_that_were_never_set_are_0() -> None:
+    assert lcnc("X#1 Y#30 Z#31 A#5060\nM2\n") == "X0 Y0 Z0 A0\nM2\n"
+
+
 def test_the_switch_of_debug_comments_may_be_set() -> None:
     assert lcnc("#5599=0\nX1\nM2\n") == "X1\nM2\n"
 
