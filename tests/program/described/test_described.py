@@ -452,3 +452,12 @@ def test_the_command_line(machine: Path, own: Path, tmp_path: Path) -> None:
     demo.write_bytes(SMALL["kawasaki-as"])
     done = run.invoke(main, ["correct", str(demo), "-m", str(other), "-o", str(tmp_path / "x.as")])
     assert done.exit_code == 0, done.output
+
+
+def test_a_number_larger_than_a_machine_is_refused_with_its_line(machine: Path) -> None:
+    """It is met where numbers keep their columns, as behind two blanks."""
+    text = b"MOVES TRANS(  60.0,20.0,30.0,0,180,0)\nMOVES TRANS(  100000000.0,20.0,30.0,0,180,0)\n"
+    with pytest.raises(ProgramError) as caught:
+        olp.correct(text, setup_of(machine, described("val2")), outside_box="hold")
+    assert (caught.value.line, caught.value.code) == (2, "OLP561")
+    assert caught.value.message == "the number 100000000.0 is larger than a machine; correct it"
