@@ -452,7 +452,9 @@ def test_polynomial_machine_of_an_independent_program(chain: str, expected_um: V
     np.testing.assert_allclose(error[0] * 1e3, expected_um, atol=5e-5, rtol=0)
 
 
-@pytest.mark.parametrize(("angle", "terms"), [(1e-6, 1), (1e-4, 2), (1.0, 0), (1e78, 0), (1e160, 0), (1e308, 0)])
+@pytest.mark.parametrize(
+    ("angle", "terms"), [(1e-6, 1), (1e-4, 2), (1.0, 0), (1e78, 0), (1e160, 0), (1e308, 0)]
+)
 def test_angles_too_large_for_a_series_take_sine_and_cosine(angle: float, terms: int) -> None:
     """Also where a power of the angle is no number any more."""
     calibration = Calibration("m", BOX, curves=(constant("X", {"EAX": angle}),))

@@ -35,7 +35,9 @@ def test_ten_thousand_further_turns_are_read(code: str) -> None:
     most = ROUND.format(code, 10_000)
     assert refusal(most + ROUND.format(code, 2)) is None
     assert refusal(most + ROUND.format(code, 3)) == expected(4, 10_000)
-    assert refusal(most + ROUND.format(code, 1) + ROUND.format(code, 3) + ROUND.format(code, 9)) == expected(5, 10_000)
+    assert refusal(most + ROUND.format(code, 1) + ROUND.format(code, 3) + ROUND.format(code, 9)) == expected(
+        5, 10_000
+    )
 
 
 def test_less_than_a_turn_takes_nothing_off() -> None:

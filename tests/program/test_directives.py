@@ -53,7 +53,8 @@ def test_sections_that_are_left_uncorrected(text: str, moves: str) -> None:
 @pytest.mark.parametrize(
     ("comment", "kg"),
     [
-        ("(olp payload 30 kg)", 30.0), ("(OLP PAYLOAD 30)", 30.0), ("( olp\tpayload 2.5kg )", 2.5), ("; olp payload .5 kg", 0.5),
+        ("(olp payload 30 kg)", 30.0), ("(OLP PAYLOAD 30)", 30.0), ("( olp\tpayload 2.5kg )", 2.5),
+        ("; olp payload .5 kg", 0.5),
         ("(olp payload 7.)", 7.0), ("; olp payload 3 )", None), ("(olp payload 30 kg, line 4)", 30.0),
         ("(olp payload 30 kg , line 4)", 30.0), ("(olp payload 30,line 4)", 30.0),
         # about something else
@@ -70,26 +71,32 @@ def test_a_payload_holds_from_its_line_on(comment: str, kg: float | None) -> Non
 
 
 def test_payloads_follow_one_another() -> None:
-    assert payloads("(olp payload 3)\nG1 X1\n(olp off)\nX2\nX3 (olp payload 0)\nX4 ; olp payload 1.5 kg\n") == [
-        3.0, 3.0, 0.0, 1.5
-    ]  # fmt: skip
+    text = "(olp payload 3)\nG1 X1\n(olp off)\nX2\nX3 (olp payload 0)\nX4 ; olp payload 1.5 kg\n"
+    assert payloads(text) == [3.0, 3.0, 0.0, 1.5]
 
 
 @pytest.mark.parametrize(
     ("block", "code", "message"),
     [
-        *((f"({comment})", "OLP550", f"the comment `{comment}` is not understood; expected a mass in kg, such as "
+        *((f"({comment})", "OLP550",
+          f"the comment `{comment}` is not understood; expected a mass in kg, such as "
            "(OLP PAYLOAD 30 kg)")
-          for comment in ("olp payload", "olp paylod 30", "olp payload: 30", "olp payload 30 lb", "olp Payload=30", "olp payloads 3",
-                          "olp payload 3 kg x", "olp playload 3", "olp payload, 3", "olp payload 1e3", "olp plod 3")),
-        ("(olp payload 30 kg, line x)", "OLP550", "the comment `olp payload 30 kg, line x` is not understood; expected a mass in "
+          for comment in ("olp payload", "olp paylod 30", "olp payload: 30", "olp payload 30 lb",
+           "olp Payload=30", "olp payloads 3",
+                          "olp payload 3 kg x", "olp playload 3", "olp payload, 3", "olp payload 1e3",
+                          "olp plod 3")),
+        ("(olp payload 30 kg, line x)", "OLP550",
+         "the comment `olp payload 30 kg, line x` is not understood; expected a mass in "
          "kg, such as (OLP PAYLOAD 30 kg)"),
-        (f"(olp payload {'x' * 60})", "OLP550", f"the comment `olp payload {'x' * 32}` is not understood; expected a mass in kg, "
+        (f"(olp payload {'x' * 60})", "OLP550",
+         f"the comment `olp payload {'x' * 32}` is not understood; expected a mass in kg, "
          "such as (OLP PAYLOAD 30 kg)"),
-        (f"(olp payload {'9' * 310})", "OLP550", f"the comment `olp payload {'9' * 32}` is not understood; expected a mass in kg, "
+        (f"(olp payload {'9' * 310})", "OLP550",
+         f"the comment `olp payload {'9' * 32}` is not understood; expected a mass in kg, "
          "such as (OLP PAYLOAD 30 kg)"),
         ("(olp payload 3)(olp payload 3)", "OLP550", "this line has two payloads; expected one"),
-        ("/X2 (olp payload 3)", "OLP525", "a payload is under block delete, so it is not known whether it holds afterwards; "
+        ("/X2 (olp payload 3)", "OLP525",
+         "a payload is under block delete, so it is not known whether it holds afterwards; "
          "move it to a block without `/`"),
     ],
 )  # fmt: skip
@@ -99,7 +106,7 @@ def test_payloads_that_are_refused(block: str, code: str, message: str) -> None:
     assert (caught.value.code, caught.value.line, caught.value.message) == (code, 3, message)
 
 
-# --- payloads by line of the job file -------------------------------------------------------------------------
+# --- payloads by line of the job file -----------------------------------------------------------------------
 
 ROUND, SEMICOLON = (b"(", b")"), (b"; ", b"")
 
@@ -136,21 +143,29 @@ def test_comments_of_several_lines_come_in_their_order() -> None:
 @pytest.mark.parametrize(
     ("text", "payloads", "line", "message"),
     [
-        (b"a\nb\n", {3: 1.0}, None, "[[payloads]] of the job file names line 3, and the program has fewer lines; give the number "
+        (b"a\nb\n", {3: 1.0}, None,
+         "[[payloads]] of the job file names line 3, and the program has fewer lines; give the number "
          "of one of its lines"),
-        (b"a\nb", {3: 1.0}, None, "[[payloads]] of the job file names line 3, and the program has fewer lines; give the number "
+        (b"a\nb", {3: 1.0}, None,
+         "[[payloads]] of the job file names line 3, and the program has fewer lines; give the number "
          "of one of its lines"),
-        (b"", {1: 1.0}, None, "[[payloads]] of the job file names line 1, and the program has fewer lines; give the number "
+        (b"", {1: 1.0}, None,
+         "[[payloads]] of the job file names line 1, and the program has fewer lines; give the number "
          "of one of its lines"),
-        (b"a\nb\n", {2: 1.0, 9: 1.0}, None, "[[payloads]] of the job file names line 9, and the program has fewer lines; give the "
+        (b"a\nb\n", {2: 1.0, 9: 1.0}, None,
+         "[[payloads]] of the job file names line 9, and the program has fewer lines; give the "
          "number of one of its lines"),
-        (b"a\r\nb\r(olp payload 3)\n", {1: 1.0}, 3, "the program states a payload here, and the job file states payloads in "
+        (b"a\r\nb\r(olp payload 3)\n", {1: 1.0}, 3,
+         "the program states a payload here, and the job file states payloads in "
          "[[payloads]]; expected one of the two"),
-        (b"a;OLP PAYLOAD 3KG\n", {1: 1.0}, 1, "the program states a payload here, and the job file states payloads in "
+        (b"a;OLP PAYLOAD 3KG\n", {1: 1.0}, 1,
+         "the program states a payload here, and the job file states payloads in "
          "[[payloads]]; expected one of the two"),
-        (b"a (olp payload 1 kg, line 1)\n", {1: 2.0}, None, "the payloads in the comments of this program are not those of "
+        (b"a (olp payload 1 kg, line 1)\n", {1: 2.0}, None,
+         "the payloads in the comments of this program are not those of "
          "[[payloads]] in the job file; give the job file that it was made with"),
-        (b"a (olp payload 1 kg, line 1)\n", {1: 1.0, 2: 1.0}, None, "the payloads in the comments of this program are not those "
+        (b"a (olp payload 1 kg, line 1)\n", {1: 1.0, 2: 1.0}, None,
+         "the payloads in the comments of this program are not those "
          "of [[payloads]] in the job file; give the job file that it was made with"),
     ],
 )  # fmt: skip

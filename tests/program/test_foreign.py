@@ -50,9 +50,7 @@ def test_what_is_no_program_is_named(tmp_path: Path, name: str) -> None:
     assert "; " in result.stderr
 
 
-OTHER_POST = (
-    "post-process the part for the control of the machine file, or give the CAM system's APT CLDATA"
-)
+OTHER_POST = "post-process the part for the control of the machine file, or give the CAM system's APT CLDATA"
 ROBOT = (
     "robots are not corrected from their own language; give a list of positions in the frame of the machine "
     "(CSV), or the CAM system's APT CLDATA"
@@ -90,21 +88,26 @@ SIGNS = {
     ),
     ("a web page or XML", PROGRAM, "OLP501"): (b"<html>", b" \n<!DocType html>", b"<?xml version='1.0'?>"),
     ("a file of olp in TOML", TOML, "OLP501"): (
-        b"[machine]\n", b'name = "a"\n', b"# c\n\n  # d\r\n[a.b_c]\r\n", b"values=[1,2]\n", b"a_b = 5\n", b"name\t=\t7",
+        b"[machine]\n", b'name = "a"\n', b"# c\n\n  # d\r\n[a.b_c]\r\n", b"values=[1,2]\n", b"a_b = 5\n",
+        b"name\t=\t7",
     ),
     ("JSON", PROGRAM, "OLP501"): (b'{"a": 1}', b' [\n{"a": 1}]', b'["a"]', b"[[1]]", b"{{", b"{["),
     ("Heidenhain conversational", OTHER_POST, "OLP501"): (
-        b"BEGIN PGM A MM", b"12 end  pgm", b"0\tBegin\tPGM", b"1 L X+1 R0\n2 L X+2 RL\n", b"1 L X+1 RR\n2 L Y-2 F MAX\n",
+        b"BEGIN PGM A MM", b"12 end  pgm", b"0\tBegin\tPGM", b"1 L X+1 R0\n2 L X+2 RL\n",
+        b"1 L X+1 RR\n2 L Y-2 F MAX\n",
         b"1 CC Z-0 \n2 C X+1 FMAX\n", b"1 CR X+1 R0\n2 CT Y-5 RL\n", b"1 LBL 1 DEF\n2 TOOL  CALL 1 DEF\n",
         b"1 CYCL DEF 200 DEF\n2 L Z-1 FMAX\n",
     ),
     ("KUKA KRL", ROBOT, "OLP501"): (
-        b"&ACCESS RV\n", b" &rel 1\n", b"&PARAM A\n", b"DEF part()\n", b"DEFDAT part (x)\n", b"DEFFCT a_1 (b)\r\n",
+        b"&ACCESS RV\n", b" &rel 1\n", b"&PARAM A\n", b"DEF part()\n", b"DEFDAT part (x)\n",
+        b"DEFFCT a_1 (b)\r\n",
         b"PTP {X 1}\n", b"LIN_REL {\n", b"CIRC XP1\n", b"lin\tX_1\n", b"PTP XHOME Vel\n",
     ),
     ("ABB RAPID", ROBOT, "OLP501"): (
-        b"%%% VERSION:1", b"%%%\n VERSION", b"MODULE a\n", b"module a_1 (SYSMODULE)\n", b"PROC main()\n", b"proc a (num b)\n",
-        b"MoveL p1, v1", b"movej [[1", b"MoveC p1 ,p2", b"MoveAbsJ a,", b"CONST robtarget p", b"pers tooldata t", b"VAR\trobtarget p",
+        b"%%% VERSION:1", b"%%%\n VERSION", b"MODULE a\n", b"module a_1 (SYSMODULE)\n", b"PROC main()\n",
+        b"proc a (num b)\n",
+        b"MoveL p1, v1", b"movej [[1", b"MoveC p1 ,p2", b"MoveAbsJ a,", b"CONST robtarget p",
+        b"pers tooldata t", b"VAR\trobtarget p",
     ),
     ("FANUC TP", ROBOT, "OLP501"): (
         b"/PROG A", b"/ATTR\n", b"/MN", b"/pos\n", b"1:J P[1]", b"  12: L PR[1]", b":C P[", b"1:\tj  P[2]",
@@ -120,10 +123,14 @@ SIGNS = {
         b"/JOB\n", b"//NAME A", b"//pos\n", b"//INST", b"MOVJ C00001", b" MOVL  C1", b"movc\tC2",
     ),
     ("Sinumerik (Siemens)", OTHER_POST, "OLP501"): (
-        b"%_N_A_MPF", b";%_N_A", b";$PATH=/_N_", b"TRAORI\n", b"N10 TRAFOOF", b"CYCLE81(1", b"N5CYCLE832 (", b"MCALL\n",
-        b"DEF REAL A", b"N10 PROC A", b"POCKET3(", b"HOLES1 (", b'MSG("a")', b"TRANS X1", b"ATRANS Y1", b"ROT Z30", b"AROT Z1",
-        b"MIRROR X0", b"AMIRROR X0", b"SCALE X2", b"ASCALE X2", b"R1=5", b"R12 = R1", b"EXTERN A", b"SUPA G0", b"FFWON", b"SOFT",
-        b"COMPCAD", b"COMPON", b"G641", b"N9 G642 X1", b"WORKPIECE(", b"G1 X=R1", b"G1 Y=-5", b"G2 I=5", b"S1=500", b"G0 Z= +5",
+        b"%_N_A_MPF", b";%_N_A", b";$PATH=/_N_", b"TRAORI\n", b"N10 TRAFOOF", b"CYCLE81(1", b"N5CYCLE832 (",
+        b"MCALL\n",
+        b"DEF REAL A", b"N10 PROC A", b"POCKET3(", b"HOLES1 (", b'MSG("a")', b"TRANS X1", b"ATRANS Y1",
+        b"ROT Z30", b"AROT Z1",
+        b"MIRROR X0", b"AMIRROR X0", b"SCALE X2", b"ASCALE X2", b"R1=5", b"R12 = R1", b"EXTERN A", b"SUPA G0",
+        b"FFWON", b"SOFT",
+        b"COMPCAD", b"COMPON", b"G641", b"N9 G642 X1", b"WORKPIECE(", b"G1 X=R1", b"G1 Y=-5", b"G2 I=5",
+        b"S1=500", b"G0 Z= +5",
         b"X1=5", b"G1 F=(1)",
     ),
     ("Okuma OSP", OTHER_POST, "OLP501"): (
@@ -134,7 +141,8 @@ SIGNS = {
     ),
 }  # fmt: skip
 LANGUAGES = (
-    "Heidenhain conversational", "KUKA KRL", "ABB RAPID", "FANUC TP", "Stäubli VAL 3", "Mazatrol", "UR script",
+    "Heidenhain conversational", "KUKA KRL", "ABB RAPID", "FANUC TP", "Stäubli VAL 3", "Mazatrol",
+    "UR script",
     "Yaskawa INFORM (JBI)", "Sinumerik (Siemens)", "Okuma OSP", "HPGL",
 )  # fmt: skip
 
@@ -162,12 +170,16 @@ def test_every_sign_says_what_it_is_and_what_to_do(kind: tuple[str, str, str]) -
 @pytest.mark.parametrize(
     "text",
     [
-        b"", b"G0 X1\n", b" \xff\xfe", b" PK\x03\x04" + b"X" * 99, b"X\x1f\x8b" + b"X" * 99, b" %PDF-", b"BM", b"GIF7", b"solid\nX1\n", b"solids\nfacet",
+        b"", b"G0 X1\n", b" \xff\xfe", b" PK\x03\x04" + b"X" * 99, b"X\x1f\x8b" + b"X" * 99, b" %PDF-", b"BM",
+        b"GIF7", b"solid\nX1\n", b"solids\nfacet",
         b"ISO-10303-22;", b"a" * 71 + b"S      1", b"0\nSECTIONS\n", b"1\nSECTION\n", b"<a>", b"(<html>",
-        b"[Machine]\n", b"G1 X1\n[machine]\n", b"[1]", b"BEGINPGM", b"PGM BEGIN", b"1 L X+1 R0\n2 M30\n", b"L X+1 R0\nL X+2 R0\n",
+        b"[Machine]\n", b"G1 X1\n[machine]\n", b"[1]", b"BEGINPGM", b"PGM BEGIN", b"1 L X+1 R0\n2 M30\n",
+        b"L X+1 R0\nL X+2 R0\n",
         b"&ACCESSED", b"PTP X -5\n", b"LIN P2\n", b"MODULE a b\n", b"MoveL p1 v1",
-        b"VAR num a", b"/PROGS", b"1:J X[", b"1 J P[1]", b"begin\nX1", b"begin movej(", b"(MAZATROL)", b"UNo.1",
-        b"xmovej(", b"/JOBS", b"MOVJ P1", b"MOVX C1", b"(R1=5)", b"; X=5", b"#1=5", b"G64 X1", b"G6411", b"TRANSX", b"CYCLE(",
+        b"VAR num a", b"/PROGS", b"1:J X[", b"1 J P[1]", b"begin\nX1", b"begin movej(", b"(MAZATROL)",
+        b"UNo.1",
+        b"xmovej(", b"/JOBS", b"MOVJ P1", b"MOVX C1", b"(R1=5)", b"; X=5", b"#1=5", b"G64 X1", b"G6411",
+        b"TRANSX", b"CYCLE(",
         b"CALL P1", b"$A.MINI", b"VX1=5", b"PU 1;", b"PD1,A;", b"(IN;)", b"(PU0,0", b"G1 IN;",
     ],
 )  # fmt: skip
@@ -198,7 +210,11 @@ def test_more_than_one_byte_in_fifty_is_of_a_binary_file() -> None:
         assert recognised(text, languages=False) is None
         error = recognised(text[:-1], languages=False)
         assert error is not None
-        assert (error.message, error.code, error.line) == (f"the byte {byte:#04x} {sentence}; {PLAIN}", "OLP502", 2)
+        assert (error.message, error.code, error.line) == (
+            f"the byte {byte:#04x} {sentence}; {PLAIN}",
+            "OLP502",
+            2,
+        )
         assert recognised(text * 9, languages=True) is None
         assert recognised(text[:-1] * 9, languages=True) is not None
     for byte in (9, 10, 13, 0x11, 0x14, 0x1A, 0x1B, 0x20, 0x7F, 0xFF):

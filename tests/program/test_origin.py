@@ -64,7 +64,8 @@ def test_the_files_are_counted_through() -> None:
 
 @pytest.mark.parametrize(
     ("cell", "expected"),
-    [("a b", "a b"), ("a,b", '"a,b"'), ('a"b', '"a""b"'), ("a\nb", '"a\nb"'), ("a\rb", '"a\rb"'), ("", ""), ("a;b", "a;b")],
+    [("a b", "a b"), ("a,b", '"a,b"'), ('a"b', '"a""b"'), ("a\nb", '"a\nb"'), ("a\rb", '"a\rb"'), ("", ""),
+     ("a;b", "a;b")],
 )  # fmt: skip
 def test_cells_of_a_table(cell: str, expected: str) -> None:
     assert quoted(cell) == expected
@@ -77,7 +78,12 @@ def test_a_text_knows_its_original() -> None:
 
 
 def test_errors_get_the_line_of_the_original() -> None:
-    others = (ProgramError("b", line=3), ProgramError("c", line=1), ProgramError("d"), ProgramError("e", line=2, file="x"))
+    others = (
+        ProgramError("b", line=3),
+        ProgramError("c", line=1),
+        ProgramError("d"),
+        ProgramError("e", line=2, file="x"),
+    )
     with pytest.raises(ProgramError) as caught, in_original(TEXT):
         raise ProgramError("a", line=4, others=others)
     rows = [(each.file, each.line) for each in (caught.value, *caught.value.others)]

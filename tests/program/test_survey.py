@@ -194,12 +194,11 @@ def test_a_reason_shows_its_statement() -> None:
         (b"G55 X1.\nG56 X2.\nG55 X3.\nT99 M6\nT99 M6\nT98 M6\n",
          [(3, "OLP520", None), (4, "OLP520", None), (6, "OLP521", None), (8, "OLP521", None)]),
         # an arc that is no arc when it is straight
-        (b"G2 X5. Y5. I1. J1.\nG3 X5. Y5. R1.\nG03 X9. Y5. R.1\nG1 X5. Y5.\n", [(3, "OLP530", None), (4, "OLP530", None), (5, "OLP530", None)]),
+        (b"G2 X5. Y5. I1. J1.\nG3 X5. Y5. R1.\nG03 X9. Y5. R.1\nG1 X5. Y5.\n",
+         [(3, "OLP530", None), (4, "OLP530", None), (5, "OLP530", None)]),
     ],
 )  # fmt: skip
-def test_what_is_refused_after_a_repair(
-    blocks: bytes, expected: list[tuple[int, str, int | None]]
-) -> None:
+def test_what_is_refused_after_a_repair(blocks: bytes, expected: list[tuple[int, str, int | None]]) -> None:
     assert stated(HEAD + blocks) == expected
 
 
@@ -280,7 +279,8 @@ def test_the_file_of_a_subprogram_is_mended_where_it_is_refused_first() -> None:
     files = {"7": b"o7 sub\nG1 X#5061\nG1 X[5] R3\no7 endsub\n"}
     rows, _ = unrolled(HEAD + b"o7 call\nG68 R1\nM2\n", files)
     assert [(row[:3], row[4]) for row in rows] == [
-        ((None, 4, "OLP512"), "G68 R1"), (("7.ngc", 2, "OLP541"), "G1 X#5061"), (("7.ngc", 3, "OLP519"), "G1 X[5] R3")
+        ((None, 4, "OLP512"), "G68 R1"), (("7.ngc", 2, "OLP541"), "G1 X#5061"),
+        (("7.ngc", 3, "OLP519"), "G1 X[5] R3")
     ]  # fmt: skip
 
 
@@ -332,7 +332,9 @@ def test_hints_are_judged_with_the_files_of_subprograms() -> None:
         return [reason.message.partition("; ")[2] for reason in caught.value.reasons]
 
     assert all("with --flatten" in hint for hint in hints(lambda name: ("7.ngc", b"o7 sub\nX1\no7 endsub\n")))
-    lost = "--flatten does not unroll it: line 4: subprogram 7 is not in the file, and no file for it was given"
+    lost = (
+        "--flatten does not unroll it: line 4: subprogram 7 is not in the file, and no file for it was given"
+    )
     assert hints(None) == hints(lambda name: None) == [lost] * 2
     broken = "--flatten does not unroll it: line 2 of 7.ngc: division by zero in an expression"
     assert hints(lambda name: ("7.ngc", b"o7 sub\nX[1/0]\no7 endsub\n")) == [broken] * 2
@@ -344,3 +346,41 @@ def test_a_hint_is_kept_where_it_takes_too_long_to_try(monkeypatch: pytest.Monke
     with pytest.raises(Refused) as caught:
         survey.read_all(text, SETUP, named("linuxcnc"))
     assert all(reason.message.endswith("with --flatten") for reason in caught.value.reasons)
+
+
+# -- the limits of the work ----------------------------------------------------------------------------------
+
+
+def tools(count: int) -> bytes:
+    """A program with a reason for each of several readings."""
+    return HEAD + b"".join(b"T%d M6\n" % tool for tool in range(900, 900 + count))
+
+
+def found(text: bytes) -> tuple[int, bool]:
+    with pytest.raises(Refused) as caught:
+        survey.read_all(text, SETUP, named("linuxcnc"))
+    return len(caught.value.reasons), caught.value.complete
+
+
+def test_there_are_so_many_readings_at_most(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(survey, "READINGS", 4)
+    assert found(tools(4)) == (4, True)
+    assert found(tools(5)) == (4, False)
+
+
+@pytest.mark.parametrize(("most", "readings"), [(0, 3), (3, 3), (4, 4), (5, 5)])
+def test_a_long_text_is_read_less_often(most: int, readings: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = tools(9)
+    monkeypatch.setattr(survey, "BYTES", most * len(text))
+    assert found(text) == (readings, False)
+    # a reading more than that is not begun
+    monkeypatch.setattr(survey, "BYTES", (most + 1) * len(text) - 1)
+    assert found(text) == (max(readings, 3), False)
+
+
+def test_an_unrolling_counts_as_some_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
+    text = HEAD + b"".join(b"T[%d] M6\n" % tool for tool in range(900, 909))
+    monkeypatch.setattr(survey, "BYTES", len(text) + 4 * survey.REFUSED_BYTES)
+    rows, limits = unrolled(text)
+    # each of them, and the reading without unrolling
+    assert (len(rows), rows[-1], len(limits)) == (5, ("more",), 5)

@@ -18,7 +18,9 @@ AXES = {axis: Axis((-1000.0, 1000.0), 0.001, 100.0, 1000.0, 1e5) for axis in "XY
 SETUP = Setup(Machine("m", "FXYZ", "linuxcnc", AXES))
 
 
-def program(moves: Moves, data: bytes, *, decimal: bytes = b".", words: bool = True, setup: Setup = SETUP) -> Program:
+def program(
+    moves: Moves, data: bytes, *, decimal: bytes = b".", words: bool = True, setup: Setup = SETUP
+) -> Program:
     frames = (Frame(), Frame(unit_mm=25.4))
     return moves.program(data, DIALECT, setup, frames, [("a", 1, "b")], decimal=decimal, words=words)
 
@@ -36,16 +38,21 @@ def test_moves_one_by_one_and_many_at_once() -> None:
     data = b"1 2 3\r\n4 5 6\n7 8 9\r\n10 11 12"
     moves = Moves()
     slots = [moves.number(i, i + 1) for i in (0, 2, 4)]
-    moves.put(kind=Kind.RAPID, flag=0, line=1, frame=0, end=(1.0, 2.0, 3.0), slot=slots, bounds=(0, 5), feed=5.0)
+    moves.put(
+        kind=Kind.RAPID, flag=0, line=1, frame=0, end=(1.0, 2.0, 3.0), slot=slots, bounds=(0, 5), feed=5.0
+    )
     moves.put_all(
         kind=[Kind.LINE] * 2, flag=[Flag.PASS, 0], line=[2, 3], frame=[1, 1], end=[[4, 5, 6], [7, 8, 9]],
-        slot=np.arange(6).reshape(2, 3) + moves.number_count, bounds=[[7, 12], [13, 18]], feed=[2.5, math.inf],
+        slot=np.arange(6).reshape(2, 3) + moves.number_count, bounds=[[7, 12], [13, 18]],
+        feed=[2.5, math.inf],
         spans=[[i, i + 1] for i in (7, 9, 11, 13, 15, 17)],
     )  # fmt: skip
     assert moves.number_count == 9
     slots = [moves.number(a, b) for a, b in ((20, 22), (23, 25), (26, 28))]
     assert slots == [9, 10, 11]
-    moves.put(kind=Kind.LINE, flag=0, line=4, frame=0, end=(10.0, 11.0, 12.0), slot=slots, bounds=(-1, -1), feed=7.0)
+    moves.put(
+        kind=Kind.LINE, flag=0, line=4, frame=0, end=(10.0, 11.0, 12.0), slot=slots, bounds=(-1, -1), feed=7.0
+    )
     read = program(moves, data)
     path = read.toolpath
     assert path.kind.tolist() == [Kind.RAPID, Kind.LINE, Kind.LINE, Kind.LINE]
@@ -99,7 +106,8 @@ def test_the_start_is_that_of_the_job() -> None:
     ("data", "starts", "ends"),
     [
         (b"ab\nc\n", [0, 3], [2, 4]), (b"ab\nc", [0, 3], [2, 4]), (b"\n\n", [0, 1], [0, 1]), (b"a", [0], [1]),
-        (b"ab\r\nc\r\n", [0, 4], [2, 5]), (b"ab\rc", [0, 3], [2, 4]), (b"\r", [0], [0]), (b"a\r\r\nb", [0, 4], [1, 5]),
+        (b"ab\r\nc\r\n", [0, 4], [2, 5]), (b"ab\rc", [0, 3], [2, 4]), (b"\r", [0], [0]),
+        (b"a\r\r\nb", [0, 4], [1, 5]),
         (b"\n", [0], [0]), (b"a\n\nb", [0, 2, 3], [1, 2, 4]),
     ],
 )  # fmt: skip
@@ -119,9 +127,12 @@ def test_where_lines_begin_and_end(data: bytes, starts: list[int], ends: list[in
         ((b"1.5e1", b"2.5"), b".", [15, 25], [0, 1]), ((b"1.5E-3", b"-7.0"), b".", [15, -70], [4, 1]),
         ((b"2e2", b"1"), b".", [200, 1], [0, 0]), ((b"1,5e1", b"2,5"), b",", [15, 25], [0, 1]),
         # no more than ten decimals
-        ((b"0.1234567890", b"1"), b".", [1234567890, 1], [10, 0]), ((b"0.12345678905", b"2"), b".", [1234567890, 2], [10, 0]),
-        ((b"0.12345678907", b"2"), b".", [1234567891, 2], [10, 0]), ((b"1.5e-11", b"2"), b".", [0, 2], [10, 0]),
-        ((b"0.000000000026e0", b"2"), b".", [0, 2], [10, 0]), ((b"3.00000000016e0", b"2"), b".", [30000000002, 2], [10, 0]),
+        ((b"0.1234567890", b"1"), b".", [1234567890, 1], [10, 0]),
+        ((b"0.12345678905", b"2"), b".", [1234567890, 2], [10, 0]),
+        ((b"0.12345678907", b"2"), b".", [1234567891, 2], [10, 0]),
+        ((b"1.5e-11", b"2"), b".", [0, 2], [10, 0]),
+        ((b"0.000000000026e0", b"2"), b".", [0, 2], [10, 0]),
+        ((b"3.00000000016e0", b"2"), b".", [30000000002, 2], [10, 0]),
     ],
 )  # fmt: skip
 def test_numbers_are_words(

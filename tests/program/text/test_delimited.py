@@ -19,11 +19,13 @@ from olp.program.text.delimited import Layout, detected_layout, first_lines, map
         ("X(um),Y(um),Z(um)", {"X": "X(um)", "Y": "Y(um)", "Z": "Z(um)"}, "um"),
         ("X m,Y m,Z m", {"X": "X m", "Y": "Y m", "Z": "Z m"}, "m"),
         ("Label,X,Y,Z,Time_s", {"X": "X", "Y": "Y", "Z": "Z", "t": "Time_s", "name": "Label"}, None),
-        ("t [ms],X,Y,Z,nx,ny,nz", {"X": "X", "Y": "Y", "Z": "Z", "t": "t [ms]", "I": "nx", "J": "ny", "K": "nz"}, None),
+        ("t [ms],X,Y,Z,nx,ny,nz",
+         {"X": "X", "Y": "Y", "Z": "Z", "t": "t [ms]", "I": "nx", "J": "ny", "K": "nz"}, None),
         ("line,X,Y,Z,rx_deg,ry,rz [rad]",
          {"X": "X", "Y": "Y", "Z": "Z", "line": "line", "A": "rx_deg", "B": "ry", "C": "rz [rad]"}, None),
         ("X,Y,Z,zone,stylus,sx,stylus_y,SZ_mm",
-         {"X": "X", "Y": "Y", "Z": "Z", "blend": "zone", "tool": "stylus", "SX": "sx", "SY": "stylus_y", "SZ": "SZ_mm"},
+         {"X": "X", "Y": "Y", "Z": "Z", "blend": "zone", "tool": "stylus", "SX": "sx", "SY": "stylus_y",
+          "SZ": "SZ_mm"},
          None),
         # the first cell with a name of its role holds it
         ("tag,X,Y,Z,point", {"X": "X", "Y": "Y", "Z": "Z", "name": "tag"}, None),
@@ -57,7 +59,8 @@ def test_every_name_of_a_role_is_known(role: str) -> None:
 
 @pytest.mark.parametrize(
     ("speed", "unit"),
-    [("feed_mm/min", "mm/min"), ("Speed [m/s]", "m/s"), ("velocity (inch/min)", "inch/min"), ("feedrate mm_s", "mm/s"),
+    [("feed_mm/min", "mm/min"), ("Speed [m/s]", "m/s"), ("velocity (inch/min)", "inch/min"),
+     ("feedrate mm_s", "mm/s"),
      ("feed", None)],
 )  # fmt: skip
 def test_a_header_may_state_the_unit_of_speeds(speed: str, unit: str | None) -> None:
@@ -83,7 +86,8 @@ def test_a_header_may_state_the_unit_of_speeds(speed: str, unit: str | None) -> 
         (["Set,7,1,2,3"], "comma", "point", {"X": 3, "Y": 4, "Z": 5, "name": 2}),
         (["A;B;P1;1;2;3"], "semicolon", "point", {"X": 4, "Y": 5, "Z": 6, "name": 3}),
         # a choice is left
-        (["1,2"], "", "", None), (["1,2,3,4"], "", "", None), (["P1,1,2"], "", "", None), (["Set,7,8,1,2,3"], "", "", None),
+        (["1,2"], "", "", None), (["1,2,3,4"], "", "", None), (["P1,1,2"], "", "", None),
+        (["Set,7,8,1,2,3"], "", "", None),
         (["P1,1,2,3,end"], "", "", None), (["a,b,c"], "", "", None), (["X,Y,W", "1,2,3"], "", "", None),
         (["X_mm,Y_inch,Z", "1,2,3"], "", "", None), ([], "", "", None), (["# 1,2,3", "  "], "", "", None),
     ],
@@ -137,8 +141,10 @@ def test_the_first_lines_of_a_text() -> None:
 @pytest.mark.parametrize(
     ("lines", "frame"),
     [
-        (["# frame=G54"], "G54"), (["#frame = part_1 x"], "part_1"), (["// FRAME=a"], "a"), (["% ; frame=b"], "b"),
-        (["frame=c"], "c"), (["X,Y,Z", "# frame=d"], "d"), (["# frame=e", "# frame=e"], "e"), (["# a frame=f"], None),
+        (["# frame=G54"], "G54"), (["#frame = part_1 x"], "part_1"), (["// FRAME=a"], "a"),
+        (["% ; frame=b"], "b"),
+        (["frame=c"], "c"), (["X,Y,Z", "# frame=d"], "d"), (["# frame=e", "# frame=e"], "e"),
+        (["# a frame=f"], None),
         (["X,Y,Z"], None), ([], None), (["# frame=g", "1,2,3"], "g"),
     ],
 )  # fmt: skip
@@ -171,5 +177,20 @@ def test_a_layout_without_a_unit_says_where_to_give_it() -> None:
     with pytest.raises(TypeError):
         columns["Y"] = 2  # type: ignore[index]
     assert Layout(columns) == Layout(
-        columns, "comma", "point", None, "s", None, True, "#", None, None, None, None, "points", False, True, ()
+        columns,
+        "comma",
+        "point",
+        None,
+        "s",
+        None,
+        True,
+        "#",
+        None,
+        None,
+        None,
+        None,
+        "points",
+        False,
+        True,
+        (),
     )

@@ -19,7 +19,10 @@ from olp.program.text.line_ends import LINE_END, LINE_END_TEXT, LONE_CR, split
 )  # fmt: skip
 def test_lines_keep_their_ends(data: bytes, lines: list[bytes]) -> None:
     assert split(data) == lines
-    assert LINE_END.split(data) == [line.rstrip(b"\r\n") for line in [*lines, b""]][: len(LINE_END.findall(data)) + 1]
+    assert (
+        LINE_END.split(data)
+        == [line.rstrip(b"\r\n") for line in [*lines, b""]][: len(LINE_END.findall(data)) + 1]
+    )
     text = data.decode("latin-1")
     assert [len(part) for part in LINE_END_TEXT.split(text)] == [len(part) for part in LINE_END.split(data)]
 

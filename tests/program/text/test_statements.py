@@ -43,15 +43,19 @@ def fields(text: str) -> list[tuple[bytes, bytes]]:
     ("text", "pair"),
     [
         (b"0", (0, 0)), (b"12", (12, 0)), (b"-12.50", (-1250, 2)), (b"+.5", (5, 1)), (b"7.", (7, 0)),
-        (b"123456789012", (123456789012, 0)), (b"1234567890123", None), (b"-123456789.012", (-123456789012, 3)),
+        (b"123456789012", (123456789012, 0)), (b"1234567890123", None),
+        (b"-123456789.012", (-123456789012, 3)),
         (b"0000000000000012", (12, 0)), (b"0.123456789012345678", (123456789012345678, 18)),
         (b"0.1234567890123456789", (123456789012345678, 18)),
         # exponents
-        (b"1.5E2", (150, 0)), (b"1.5e+1", (15, 0)), (b"1.5D0", (15, 1)), (b"1.5d-3", (15, 4)), (b"-2E1", (-20, 0)),
+        (b"1.5E2", (150, 0)), (b"1.5e+1", (15, 0)), (b"1.5D0", (15, 1)), (b"1.5d-3", (15, 4)),
+        (b"-2E1", (-20, 0)),
         (b"2E-18", (2, 18)), (b"2E-19", None), (b"1E17", (10**17, 0)), (b"1E18", None), (b"-1E18", None),
-        (b"9E17", (9 * 10**17, 0)), (b"1E-017", (1, 17)), (b"1E+0017", None), (b"1E19", None), (b"1.5E19", None),
+        (b"9E17", (9 * 10**17, 0)), (b"1E-017", (1, 17)), (b"1E+0017", None), (b"1E19", None),
+        (b"1.5E19", None),
         # other words
-        (b"", None), (b".", None), (b"-", None), (b"+", None), (b"1.2.3", None), (b"--1", None), (b"1-", None), (b"A", None),
+        (b"", None), (b".", None), (b"-", None), (b"+", None), (b"1.2.3", None), (b"--1", None),
+        (b"1-", None), (b"A", None),
         (b"1E", None), (b"E5", None), (b"1 2", None), (b"1,5", None), (b"0x1", None), (b"\xb2", None),
     ],
 )  # fmt: skip
@@ -68,17 +72,23 @@ def test_text_is_shown_in_printable_form() -> None:
 @pytest.mark.parametrize(
     ("line", "numbers"),
     [
-        ("GOTO/1,2,3", 3), ("goto/1,2,3", 3), ("  GOTO /  -1.5 , +2 ,3. ", 3), ("GOTO/1,2,3,0,0,1", 6), ("GOTO/1 2 3", 3),
-        ("GOTO/1,2,3,", 3), ("GOTO/.5,-.5,+.5", 3), ("\tGOTO/1,\t2,3\t", 3), ("GoTo/1,2,3", 3), ("GOTO/1234567890,0,9", 3),
+        ("GOTO/1,2,3", 3), ("goto/1,2,3", 3), ("  GOTO /  -1.5 , +2 ,3. ", 3), ("GOTO/1,2,3,0,0,1", 6),
+        ("GOTO/1 2 3", 3),
+        ("GOTO/1,2,3,", 3), ("GOTO/.5,-.5,+.5", 3), ("\tGOTO/1,\t2,3\t", 3), ("GoTo/1,2,3", 3),
+        ("GOTO/1234567890,0,9", 3),
         # statements that are read one by one
-        ("GOTO/1,2", 0), ("GOTO/1,2,3,4", 0), ("GOTO/1,2,3,4,5", 0), ("GOTO/1,2,3,4,5,6,7", 0), ("GOTO/", 0), ("GOTO", 0),
+        ("GOTO/1,2", 0), ("GOTO/1,2,3,4", 0), ("GOTO/1,2,3,4,5", 0), ("GOTO/1,2,3,4,5,6,7", 0), ("GOTO/", 0),
+        ("GOTO", 0),
         ("GOTO/,1,2,3", 0), ("GOTO/1,,2,3", 0), ("GOTO/1,2,3,,", 0), ("GOTO/1,2,A", 0), ("GOTO/1,2,3E1", 0),
-        ("GODLTA/1,2,3", 0), ("FROM/1,2,3", 0), ("GOTX/1,2,3", 0), ("XOTO/1,2,3", 0), ("GXTO/1,2,3", 0), ("GOXO/1,2,3", 0),
+        ("GODLTA/1,2,3", 0), ("FROM/1,2,3", 0), ("GOTX/1,2,3", 0), ("XOTO/1,2,3", 0), ("GXTO/1,2,3", 0),
+        ("GOXO/1,2,3", 0),
         ("AGOTO/1,2,3", 0), ("L=GOTO/1,2,3", 0), ("1GOTO/1,2,3", 0), ("GO TO/1,2,3", 0), ("GOTO1/1,2,3", 0),
-        ("GOTO/1/2,3", 0), ("GOTO/1,2,3 $$ a", 0), ("GOTO/1,2,3 $", 0), ("GOTO/(1,2,3)", 0), ("GOTO/1,2,3;", 0),
+        ("GOTO/1/2,3", 0), ("GOTO/1,2,3 $$ a", 0), ("GOTO/1,2,3 $", 0), ("GOTO/(1,2,3)", 0),
+        ("GOTO/1,2,3;", 0),
         ("GOTO/1,2,3:", 0), ("GOTO/1,2,'3'", 0), ("GOTO/1,2,3*", 0), ("GOTO/1,2,[3]", 0), ("GOTO/1,2,3{", 0),
         ("GOTO/1.2.3,4,5", 0), ("GOTO/1,2,-", 0), ("GOTO/1,2,3-4", 0), ("GOTO/1,2,1234567890123456789", 0),
-        ("GOTO/1,2,3\xff", 0), ("GOTO/1,2,3@", 0), ("GOTO/1,2,3`", 0), *((f"GOTO/1,2,3{c}", 0) for c in "AZaz"), ("/GOTO/1,2,3", 0), ("GOTO,1,2,3", 0),
+        ("GOTO/1,2,3\xff", 0), ("GOTO/1,2,3@", 0), ("GOTO/1,2,3`", 0),
+        *((f"GOTO/1,2,3{c}", 0) for c in "AZaz"), ("/GOTO/1,2,3", 0), ("GOTO,1,2,3", 0),
     ],
 )  # fmt: skip
 @pytest.mark.parametrize("place", [0, 1, 2])
@@ -113,13 +123,19 @@ def test_a_line_behind_one_that_goes_on_is_no_point() -> None:
 
 
 _LINES = st.sampled_from(
-    [b"GOTO/1.5,-2,3", b"  goto / 1, 2 ,3 ", b"GOTO/1,2,3,0,0,1", b"", b"$$ c", b"FROM/1,2,3", b"GOTO/1,2", b"L=GOTO/1,2,3",
+    [b"GOTO/1.5,-2,3", b"  goto / 1, 2 ,3 ", b"GOTO/1,2,3,0,0,1", b"", b"$$ c", b"FROM/1,2,3", b"GOTO/1,2",
+     b"L=GOTO/1,2,3",
      b"GOTO/1,2,3 $$ c", b"FOO/A, 'b,c', (1,2)", b"FROM/1,$\n2,3", b" \t", b"GOTO/1,2,$\n3"]
 )  # fmt: skip
 
 
 @settings(max_examples=40)
-@given(st.lists(_LINES, max_size=12), st.sampled_from([b"\n", b"\r\n", b"\r\r\n", b"\r"]), st.booleans(), st.integers(1, 60))
+@given(
+    st.lists(_LINES, max_size=12),
+    st.sampled_from([b"\n", b"\r\n", b"\r\r\n", b"\r"]),
+    st.booleans(),
+    st.integers(1, 60),
+)
 def test_chunks_of_any_size_are_the_whole(lines: list[bytes], eol: bytes, ended: bool, size: int) -> None:
     data = eol.join(line.replace(b"\n", eol) for line in lines) + eol * ended
     whole, pieces = (_as_statements(data, limit) for limit in (1 << 18, size))
@@ -141,7 +157,9 @@ def _as_statements(data: bytes, size: int) -> list[tuple[int, int, int, bytes]]:
             rows.append((chunk.first_line + line + 1, begin, int(chunk.line_end[line]), raw))
             words = Statement(1, begin, begin + len(raw), raw).fields()
             held = slice(int(chunk.first[k]), int(chunk.first[k + 1]))
-            columns = zip(chunk.mantissa[held], chunk.decimals[held], chunk.start[held], chunk.end[held], strict=True)
+            columns = zip(
+                chunk.mantissa[held], chunk.decimals[held], chunk.start[held], chunk.end[held], strict=True
+            )
             assert [(f.number, f.start, f.end) for f in words] == [((m, d), a, b) for m, d, a, b in columns]
         rows += [(each.line, each.begin, each.end, each.text) for each in chunk.statements(FREE)]
     return sorted(rows)
@@ -150,7 +168,8 @@ def _as_statements(data: bytes, size: int) -> list[tuple[int, int, int, bytes]]:
 @pytest.mark.parametrize(
     ("text", "label", "major"),
     [
-        ("FOO/1", b"", b"FOO"), ("foo /1", b"", b"FOO"), ("L1 = FOO/1", b"L1", b"FOO"), ("l1=foo  bar", b"L1", b"FOO BAR"),
+        ("FOO/1", b"", b"FOO"), ("foo /1", b"", b"FOO"), ("L1 = FOO/1", b"L1", b"FOO"),
+        ("l1=foo  bar", b"L1", b"FOO BAR"),
         ("FOO", b"", b"FOO"), ("FOO/A=B", b"", b"FOO"), ("=FOO", b"", b"FOO"), ("a=b=c/1", b"A", b"B=C"),
     ],
 )  # fmt: skip
@@ -163,12 +182,15 @@ def test_heads_of_statements(text: str, label: bytes, major: bytes) -> None:
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("FOO", []), ("FOO/", []), ("FOO/a", ["a"]), ("FOO/ a , b", ["a", "b"]), ("FOO/a,b,", ["a", "b"]), ("FOO/a, ", ["a"]),
+        ("FOO", []), ("FOO/", []), ("FOO/a", ["a"]), ("FOO/ a , b", ["a", "b"]), ("FOO/a,b,", ["a", "b"]),
+        ("FOO/a, ", ["a"]),
         ("FOO/a,,b", ["a", "", "b"]), ("FOO/,a", ["", "a"]), ("FOO/a b", ["a b"]), ("FOO/1 2", ["1", "2"]),
         ("FOO/1 2 a", ["1 2 a"]), ("FOO/1\t-2.5E1, 3", ["1", "-2.5E1", "3"]), ("FOO/a/b", ["a/b"]),
         # brackets and quotes keep their commas
-        ("FOO/(1,2),3", ["(1,2)", "3"]), ("FOO/a,(b,(c,d)),e", ["a", "(b,(c,d))", "e"]), ("FOO/'a,b',c", ["'a,b'", "c"]),
-        ("FOO/'(',a", ["'('", "a"]), ("FOO/(a),", ["(a)"]), ("FOO/(a), ", ["(a)"]), ("FOO/(a),,b", ["(a)", "", "b"]),
+        ("FOO/(1,2),3", ["(1,2)", "3"]), ("FOO/a,(b,(c,d)),e", ["a", "(b,(c,d))", "e"]),
+        ("FOO/'a,b',c", ["'a,b'", "c"]),
+        ("FOO/'(',a", ["'('", "a"]), ("FOO/(a),", ["(a)"]), ("FOO/(a), ", ["(a)"]),
+        ("FOO/(a),,b", ["(a)", "", "b"]),
         ("FOO/(1) 2", ["(1) 2"]), ("FOO/1 2,(3)", ["1", "2", "(3)"]), ("FOO/''',',a", ["''','", "a"]),
     ],
 )  # fmt: skip
@@ -195,7 +217,8 @@ def test_fields_of_a_joined_statement_keep_their_places() -> None:
     assert statement.text == b"L=FOO/A, 1234 , bc,'x$',(1,2), 5 6 "
     got = [(f.text, data[f.start : f.end]) for f in statement.fields()]
     assert got == [
-        (b"A", b"A"), (b"1234", b"12$ \n34"), (b"BC", b"b$\r\nc"), (b"'X$'", b"'x$'"), (b"(1,2)", b"(1,$\n2)"),
+        (b"A", b"A"), (b"1234", b"12$ \n34"), (b"BC", b"b$\r\nc"), (b"'X$'", b"'x$'"),
+        (b"(1,2)", b"(1,$\n2)"),
         (b"5", b"5"), (b"6", b"6"),
     ]  # fmt: skip
     assert [f.number for f in statement.fields()] == [None, (1234, 0), None, None, None, (5, 0), (6, 0)]
@@ -215,7 +238,8 @@ def test_simple_fields_of_a_joined_statement() -> None:
     ("line", "text"),
     [
         (b"FOO/1 $$ c", b"FOO/1 "), (b"FOO/'$$' $$ c", b"FOO/'$$' "), (b"FOO/'$$'", b"FOO/'$$'"),
-        (b"FOO/1 $$ c $", b"FOO/1 "), (b"FOO/'a$", None), (b"PARTNO A $ B", b"PARTNO A $ B"), (b" partno $$ B", b" partno $$ B"),
+        (b"FOO/1 $$ c $", b"FOO/1 "), (b"FOO/'a$", None), (b"PARTNO A $ B", b"PARTNO A $ B"),
+        (b" partno $$ B", b" partno $$ B"),
         (b"PARTNOX $$ B", b"PARTNOX "),
     ],
 )  # fmt: skip
@@ -229,9 +253,11 @@ def test_comments_behind_statements(line: bytes, text: bytes | None) -> None:
 @pytest.mark.parametrize(
     ("data", "line", "message"),
     [
-        (b"A\nFOO/$1\n", 2, "a `$` is inside a statement; expected it at the end of a line that goes on, or twice before "
+        (b"A\nFOO/$1\n", 2,
+         "a `$` is inside a statement; expected it at the end of a line that goes on, or twice before "
          "a comment"),
-        (b"A\nFOO/1$\n2,$3\n", 3, "a `$` is inside a statement; expected it at the end of a line that goes on, or twice "
+        (b"A\nFOO/1$\n2,$3\n", 3,
+         "a `$` is inside a statement; expected it at the end of a line that goes on, or twice "
          "before a comment"),
         (b"A\nFOO/1$", 2, "the last line ends with `$`, so it should go on; remove the `$`"),
         (b"A\nFOO/1$\n2 $\n", 3, "the last line ends with `$`, so it should go on; remove the `$`"),
@@ -249,7 +275,12 @@ def card(text: str, number: str) -> bytes:
 
 @pytest.mark.parametrize("eol", [b"\n", b"\r\n"])
 def test_the_numbers_of_cards_are_blanks(eol: bytes) -> None:
-    cards = [card("GOTO/1,2,3", "10"), card("GOTO/4,5,6", "AB    20"), card("FOO/7", "30"), card("FOO/8", "00000040")]
+    cards = [
+        card("GOTO/1,2,3", "10"),
+        card("GOTO/4,5,6", "AB    20"),
+        card("FOO/7", "30"),
+        card("FOO/8", "00000040"),
+    ]
     data = eol.join(cards) + eol
     assert is_cards(data)
     chunk = only(data)

@@ -210,7 +210,13 @@ def test_logic_of_rs274_takes_every_number_but_zero_as_true() -> None:
 
 def test_a_number_is_an_integer_within_one_ten_thousandth() -> None:
     assert [whole(x, "L") for x in (2.0, 1.99991, 2.00009, -2.99991, -3.00009, 0.0)] == [2, 2, 2, -3, -3, 0]
-    for x, shown in ((2.0002, "2.0002"), (1.9998, "1.9998"), (0.5, "0.5"), (math.inf, "inf"), (math.nan, "nan")):
+    for x, shown in (
+        (2.0002, "2.0002"),
+        (1.9998, "1.9998"),
+        (0.5, "0.5"),
+        (math.inf, "inf"),
+        (math.nan, "nan"),
+    ):
         with pytest.raises(ProgramError, match=f"^the count is {shown}; expected an integer$") as caught:
             whole(x, "the count")
         assert caught.value.code == "OLP540"

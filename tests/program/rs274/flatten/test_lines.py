@@ -70,8 +70,10 @@ def test_a_line_that_is_not_understood_keeps_its_comments() -> None:
 @pytest.mark.parametrize(
     ("raw", "language", "keyword", "label", "values"),
     [
-        (b"o7 sub", NGC, "sub", "7", 0), (b"N5 O007 SUB", NGC, "sub", "7", 0), (b"o0 sub", NGC, "sub", "0", 0),
-        (b"o00 sub", NGC, "sub", "0", 0), (b"o<A b> sub", NGC, "sub", "ab", 0), (b"/o7 sub", NGC, "sub", "7", 0),
+        (b"o7 sub", NGC, "sub", "7", 0), (b"N5 O007 SUB", NGC, "sub", "7", 0),
+        (b"o0 sub", NGC, "sub", "0", 0),
+        (b"o00 sub", NGC, "sub", "0", 0), (b"o<A b> sub", NGC, "sub", "ab", 0),
+        (b"/o7 sub", NGC, "sub", "7", 0),
         (b"o<007> endsub", NGC, "endsub", "007", 0), (b"o7 call [1] [2]", NGC, "call", "7", 2),
         (b"o7 endsub [1]", NGC, "endsub", "7", 1), (b"o7 return", NGC, "return", "7", 0),
         (b"o7 if [1]", NGC, "if", "7", 1), (b"o7 else if [1]", NGC, "elseif", "7", 1),
@@ -82,8 +84,10 @@ def test_a_line_that_is_not_understood_keeps_its_comments() -> None:
         (b"o7 continue", NGC, "continue", "7", 0), (b"O0123 (head)", NGC, "program", "123", 0),
         (b"o[1+2] call [3]", NGC, "call", "", 1), (b"o#3 call", NGC, "call", "", 0),
         (b"O123", MACRO_B, "program", "123", 0), (b"N5 IF[1EQ1]GOTO 5", MACRO_B, "when-goto", "", 2),
-        (b"IF [1EQ1] THEN #1=2", MACRO_B, "when-then", "", 1), (b"WHILE[1EQ1] DO 02", MACRO_B, "while-do", "2", 1),
-        (b"DO3", MACRO_B, "do", "3", 0), (b"END03", MACRO_B, "end", "3", 0), (b"GOTO #1", MACRO_B, "goto", "", 1),
+        (b"IF [1EQ1] THEN #1=2", MACRO_B, "when-then", "", 1),
+        (b"WHILE[1EQ1] DO 02", MACRO_B, "while-do", "2", 1),
+        (b"DO3", MACRO_B, "do", "3", 0), (b"END03", MACRO_B, "end", "3", 0),
+        (b"GOTO #1", MACRO_B, "goto", "", 1),
     ],
 )  # fmt: skip
 def test_flow_of_a_line(raw: bytes, language: Language, keyword: str, label: str, values: int) -> None:
@@ -154,8 +158,8 @@ def test_names_of_digits_and_numbers_are_the_same_label() -> None:
 @pytest.mark.parametrize("function", ["ROUND", "RND"])
 def test_rounding_in_a_word_counts_increments_on_some_controls(function: str) -> None:
     message = (
-        "ROUND inside a word rounds to the least increment, which is not known here; assign the rounded value "
-        "to a variable first"
+        "ROUND inside a word rounds to the least increment, which is not known here; assign the rounded "
+        "value to a variable first"
     )
     block = f"G1 X[1.+{function}[1.5]]"
     assert said(f"O1\n{block}\n", "fanuc") == ("OLP541", message, 2)

@@ -106,7 +106,8 @@ def test_a_continue_in_a_do_loop_is_refused() -> None:
 
 
 def test_comments_of_flow_are_kept_where_it_runs() -> None:
-    source = "o1 sub (a)\nX1\no1 endsub (b)\no2 if [1] (c) ; d\no1 call\no2 endif\no3 if [0] (e)\nX2 (f)\no3 endif\nM2\n"
+    source = "o1 sub (a)\nX1\no1 endsub (b)\no2 if [1] (c) ; d\no1 call\no2 endif\n"
+    source += "o3 if [0] (e)\nX2 (f)\no3 endif\nM2\n"
     assert lcnc(source) == "(c) ; d\nX1\n(b)\n(e)\nM2\n"
 
 
@@ -181,7 +182,8 @@ def test_a_computed_label_is_a_whole_number() -> None:
 
 @pytest.mark.parametrize(
     ("call", "runs"),
-    [("M98 P2", 1), ("M98 P2 L3", 3), ("M98 P00032", 0), ("M98 P10002", 1), ("M98 P30002", 3), ("M98 P120002", 12),
+    [("M98 P2", 1), ("M98 P2 L3", 3), ("M98 P00032", 0), ("M98 P10002", 1), ("M98 P30002", 3),
+     ("M98 P120002", 12),
      ("M98 P[2]", 1), ("M98 P#1 L#2", 2), ("G65 P2", 1), ("G65 P2 L3", 3), ("G65 P2 L0", 1), ("G65 P#1", 1)],
 )  # fmt: skip
 def test_how_often_a_subprogram_runs(call: str, runs: int) -> None:
@@ -264,7 +266,9 @@ def test_a_macro_may_be_called_more_than_once_with_its_own_variables() -> None:
           for code in ("70", "71", "71.1", "71.2", "72", "72.1", "72.2")),
     ],
 )  # fmt: skip
-def test_codes_of_a_level_and_of_a_profile_are_refused(source: str, code: str, message: str, line: int) -> None:
+def test_codes_of_a_level_and_of_a_profile_are_refused(
+    source: str, code: str, message: str, line: int
+) -> None:
     error = said(source + "\n")
     assert (error[0], error[2]) == (code, line)
     assert error[1].startswith(message)

@@ -66,15 +66,18 @@ def known(block: str, profile: str = "linuxcnc", start: str = _START) -> dict[st
         ("G55 X5", {"X": 5}), ("G59.3 X5 Y6", {"X": 5, "Y": 6}), ("G43 H1 Z5", {"Z": 5}),
         ("G43.1 Z5 X4", {"X": 4, "Z": 5}), ("G91 G55 X5", {}), ("G92.1 X5", {}), ("G10 L20 P1 X5", {}),
         # what moves without axis words, and polar words
-        ("@5 ^30", {}), ("@5", {}), ("^30 X5", {}), ("M6", {}), ("M100", {}), ("M199", {}), ("M6 X5", {"X": 5}),
+        ("@5 ^30", {}), ("@5", {}), ("^30 X5", {}), ("M6", {}), ("M100", {}), ("M199", {}),
+        ("M6 X5", {"X": 5}),
         ("M8", {"X": 1, "Y": 2, "Z": 3}), ("M68 E1 Q1", {"X": 1, "Y": 2, "Z": 3}),
         # motion that does not end at its words
         ("G38.2 X5", {}), ("G38.3 X5", {}), ("G38.4 X5", {}), ("G38.5 X5", {}), ("G38.2 X5\nG1 X6", {"X": 6}),
         ("G80\nX5", {"Y": 2, "Z": 3}), ("G91 G80\nX5", {"Y": 2, "Z": 3}),
         ("G80 G1 X5", {"X": 5, "Y": 2, "Z": 3}), ("G91 G80 G1 X5", {"X": 6, "Y": 2, "Z": 3}),
         # saved modes
-        ("M70\nG91 G20\nM72\nX5", {"X": 5, "Y": 2, "Z": 3}), ("G91\nM70\nG90\nM72\nX5", {"X": 6, "Y": 2, "Z": 3}),
-        ("M70\nG91\nM71\nX5", {"X": 6, "Y": 2, "Z": 3}), ("G20\nM70\nG21\nM72\nG21", {"X": 1, "Y": 2, "Z": 3}),
+        ("M70\nG91 G20\nM72\nX5", {"X": 5, "Y": 2, "Z": 3}),
+        ("G91\nM70\nG90\nM72\nX5", {"X": 6, "Y": 2, "Z": 3}),
+        ("M70\nG91\nM71\nX5", {"X": 6, "Y": 2, "Z": 3}),
+        ("G20\nM70\nG21\nM72\nG21", {"X": 1, "Y": 2, "Z": 3}),
     ],
 )  # fmt: skip
 def test_the_position_behind_a_block(block: str, positions: dict[str, float]) -> None:
@@ -83,8 +86,10 @@ def test_the_position_behind_a_block(block: str, positions: dict[str, float]) ->
 
 @pytest.mark.parametrize(
     "code",
-    ["G43 H1", "G44 H1", "G49", "G43.1 Z1", "G43.2 H1", "G54", "G54.1 P1", "G55", "G56", "G57", "G58", "G59", "G59.1",
-     "G59.2", "G59.3", "G52 X1", "G92.1", "G92.2", "G92.3", "G28", "G30", "G38.2 X1", "G10 L2 P1 X1", "G10.1 X1",
+    ["G43 H1", "G44 H1", "G49", "G43.1 Z1", "G43.2 H1", "G54", "G54.1 P1", "G55", "G56", "G57", "G58", "G59",
+     "G59.1",
+     "G59.2", "G59.3", "G52 X1", "G92.1", "G92.2", "G92.3", "G28", "G30", "G38.2 X1", "G10 L2 P1 X1",
+     "G10.1 X1",
      "G28.1", "G30.1", "G31 X1", "G33.1 Z1 K1", "G76 Z1", "G87 Z1", "G88 Z1"],
 )  # fmt: skip
 def test_no_position_is_known_behind_what_only_the_control_knows(code: str) -> None:
@@ -93,7 +98,8 @@ def test_no_position_is_known_behind_what_only_the_control_knows(code: str) -> N
 
 @pytest.mark.parametrize(
     ("code", "end"),
-    [("G7", "G8"), ("G7.1", "G8"), ("G12.1", "G13.1"), ("G16", "G15"), ("G43.4 H1", "G49"), ("G51 X1 P2", "G50"),
+    [("G7", "G8"), ("G7.1", "G8"), ("G12.1", "G13.1"), ("G16", "G15"), ("G43.4 H1", "G49"),
+     ("G51 X1 P2", "G50"),
      ("G51.1 X1", "G50.1"), ("G68 X1 Y1 R30", "G69"), ("G68.2 X1", "G69")],
 )  # fmt: skip
 def test_no_position_is_known_in_a_turned_frame(code: str, end: str) -> None:
@@ -127,7 +133,8 @@ def test_what_fanuc_reads_in_its_own_way() -> None:
     everything = {"X": 1, "Y": 2, "Z": 3}
     cases = {
         # a tool length counts along Z alone
-        "G43 H1": {"X": 1, "Y": 2}, "G44 H1": {"X": 1, "Y": 2}, "G49": {"X": 1, "Y": 2}, "G43 H1 Z5.": {"X": 1, "Y": 2, "Z": 5},
+        "G43 H1": {"X": 1, "Y": 2}, "G44 H1": {"X": 1, "Y": 2}, "G49": {"X": 1, "Y": 2},
+        "G43 H1 Z5.": {"X": 1, "Y": 2, "Z": 5},
         "G68 X0 Y0 R30.\nG43 H1": {}, "G54 G43 H1": {}, "G43.1 Z1.": {"Z": 1},
         # G5 is no motion, and M70 is not known
         "G5 P1": everything, "G91\nG5 P1 X1.": {"X": 2, "Y": 2, "Z": 3}, "M70": everything,
@@ -139,7 +146,7 @@ def test_what_fanuc_reads_in_its_own_way() -> None:
     assert {block: known(block, "fanuc", start) for block in cases} == cases
 
 
-# --- canned cycles that are written out -----------------------------------------------------------------------
+# --- canned cycles that are written out ---------------------------------------------------------------------
 
 
 def strokes(text: str, profile: str = "linuxcnc", **options: object) -> list[str]:
@@ -233,7 +240,8 @@ def test_blocks_of_a_cycle_under_block_delete_have_its_mark() -> None:
 
 @pytest.mark.parametrize(
     ("spindle", "expected"),
-    [("M3", ["M5", "M4", "M5", "M3"]), ("M4", ["M5", "M3", "M5", "M4"]), ("M3\n(s) M8\n(s) M4", ["M5", "M3", "M5", "M4"])],
+    [("M3", ["M5", "M4", "M5", "M3"]), ("M4", ["M5", "M3", "M5", "M4"]),
+     ("M3\n(s) M8\n(s) M4", ["M5", "M3", "M5", "M4"])],
 )  # fmt: skip
 def test_tapping_reverses_the_spindle(spindle: str, expected: list[str]) -> None:
     code = "G84" if spindle == "M3" else "G74"
@@ -263,7 +271,8 @@ def test_a_cycle_that_reverses_needs_a_direction(before: str) -> None:
         *((f"G81 X2 Z-1 R1 M{m}", "OLP518", f"M{m} in the block of a canned cycle; put it into its own block")
           for m in (0, 1, 2, 30, 60, 99)),
         ("G81 X2 Z-1 R1 M[98]", "OLP518", "M98 in the block of a canned cycle; put it into its own block"),
-        *((f"{mode}\nG81 X2 Z-1 R1", "OLP518", "a canned cycle is in inverse time, cutter compensation or a turned frame, "
+        *((f"{mode}\nG81 X2 Z-1 R1", "OLP518",
+          "a canned cycle is in inverse time, cutter compensation or a turned frame, "
            "which is not read; end these modes first") for mode in ("G93", "G41 D1", "G68 R3")),
         ("G81 X2 R1", "OLP531", "the canned cycle has no Z word"),
         ("G81 X2 Z-1", "OLP531", "the canned cycle has no R word"),
@@ -306,7 +315,11 @@ def test_the_clearance_of_pecks() -> None:
             "OLP541", f"G{code} pecks with a clearance that a parameter of the control sets; "
             "give peck_clearance_mm (--peck-clearance-mm)", 3
         )  # fmt: skip
-    assert fanuc_strokes("G73 X2. Z-1. R1. Q1.5", peck_clearance=0.25)[2:5] == ["G1 Z-0.5", "G0 Z-0.25", "G1 Z-1."]
+    assert fanuc_strokes("G73 X2. Z-1. R1. Q1.5", peck_clearance=0.25)[2:5] == [
+        "G1 Z-0.5",
+        "G0 Z-0.25",
+        "G1 Z-1.",
+    ]
     # other cycles need none
     assert strokes("(s) G0 X1 Y1 Z5\nG99 G81 X2 Z-1 R1\n")[0] == "G0 X2"
 
@@ -335,10 +348,12 @@ _FANUC_HOLE = ["G0 X2.", "G0 Z1.", "G1 Z-1.", "G0 Z1."]
         ("G81 X2. Z-1. R1.\nG91 X1. Z-2. R-4.", [*_FANUC_HOLE, "G0 X3.", "G1 Z-1.", "G0 Z1."]),
         ("G91 G81 X1. Z-2. R-4.\nX1.", [*_FANUC_HOLE, "G0 X3.", "G1 Z-1.", "G0 Z1."]),
         # the change counts within a series only
-        ("G81 X2. Z-1. R1.\nG80\n(s) G91 G0 Z4.\nG81 Z-2. R-4.", [*_FANUC_HOLE, "G0 Z1.", "G1 Z-1.", "G0 Z1."]),
+        ("G81 X2. Z-1. R1.\nG80\n(s) G91 G0 Z4.\nG81 Z-2. R-4.",
+         [*_FANUC_HOLE, "G0 Z1.", "G1 Z-1.", "G0 Z1."]),
         ("G81 X2. Z-1. R1.\n(s) G91\n(s) G90\nX3.", [*_FANUC_HOLE, "G0 X3.", "G1 Z-1.", "G0 Z1."]),
         # a series that ended may be in another frame
-        ("G81 X2. Z-1. R1.\nG80\n(s) G92 X7.\nG81 X8. Z-1. R1.", [*_FANUC_HOLE, "G0 X8.", "G1 Z-1.", "G0 Z1."]),
+        ("G81 X2. Z-1. R1.\nG80\n(s) G92 X7.\nG81 X8. Z-1. R1.",
+         [*_FANUC_HOLE, "G0 X8.", "G1 Z-1.", "G0 Z1."]),
     ],
 )  # fmt: skip
 def test_strokes_of_fanuc(block: str, expected: list[str]) -> None:
@@ -351,8 +366,8 @@ _BROKEN = (
 )
 _CHANGED = "G90 and G91 change within a series of cycles; give R and the depth again"
 _NO_POINT = (
-    "{} has no decimal point, so a parameter of the control decides whether it counts least increments or whole "
-    "units; write the point"
+    "{} has no decimal point, so a parameter of the control decides whether it counts least increments or "
+    "whole units; write the point"
 )
 
 
@@ -371,7 +386,8 @@ _NO_POINT = (
         ("G82 X2. Z-1. R1.", "OLP531", "G82 needs a dwell P; give P0 for none"),
         ("G83 X2. Z-1. R1. Q2", "OLP541", _NO_POINT.format("Q")),
         *((f"G{code} X2. Z-1. R1.", "OLP544",
-           "G74 and G84 are synchronised by the control: plain moves cannot replace them") for code in (74, 84)),
+           "G74 and G84 are synchronised by the control: plain moves cannot replace them") for code in (74,
+           84)),
     ],
 )  # fmt: skip
 def test_cycles_of_fanuc_that_are_refused(block: str, code: str, message: str) -> None:
