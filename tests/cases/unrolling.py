@@ -32,7 +32,7 @@ def refusal(text: str, profile: str = "linuxcnc", **options: Any) -> ProgramErro
     return caught.value
 
 
-def said(text: str, profile: str = "linuxcnc", **options: Any) -> tuple[str, str, int | None]:
+def refused(text: str, profile: str = "linuxcnc", **options: Any) -> tuple[str, str, int | None]:
     """Code, message and line of a refusal."""
     error = refusal(text, profile, **options)
     return error.code, error.message, error.line

@@ -356,7 +356,7 @@ def tools(count: int) -> bytes:
     return HEAD + b"".join(b"T%d M6\n" % tool for tool in range(900, 900 + count))
 
 
-def found(text: bytes) -> tuple[int, bool]:
+def reasons_of(text: bytes) -> tuple[int, bool]:
     with pytest.raises(Refused) as caught:
         survey.read_all(text, SETUP, named("linuxcnc"))
     return len(caught.value.reasons), caught.value.complete
@@ -364,18 +364,18 @@ def found(text: bytes) -> tuple[int, bool]:
 
 def test_there_are_so_many_readings_at_most(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(survey, "READINGS", 4)
-    assert found(tools(4)) == (4, True)
-    assert found(tools(5)) == (4, False)
+    assert reasons_of(tools(4)) == (4, True)
+    assert reasons_of(tools(5)) == (4, False)
 
 
 @pytest.mark.parametrize(("most", "readings"), [(0, 3), (3, 3), (4, 4), (5, 5)])
 def test_a_long_text_is_read_less_often(most: int, readings: int, monkeypatch: pytest.MonkeyPatch) -> None:
     text = tools(9)
     monkeypatch.setattr(survey, "BYTES", most * len(text))
-    assert found(text) == (readings, False)
+    assert reasons_of(text) == (readings, False)
     # a reading more than that is not begun
     monkeypatch.setattr(survey, "BYTES", (most + 1) * len(text) - 1)
-    assert found(text) == (max(readings, 3), False)
+    assert reasons_of(text) == (max(readings, 3), False)
 
 
 def test_an_unrolling_counts_as_some_bytes(monkeypatch: pytest.MonkeyPatch) -> None:

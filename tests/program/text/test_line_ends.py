@@ -47,6 +47,6 @@ def test_columns_are_appended_to_and_taken_once() -> None:
     assert columns.take("a", np.int8, 3).shape == (0, 3)
     assert columns.take("c", np.int8).shape == (0,)
     assert columns.take("c", np.int8).dtype == np.int8
-    # what was taken begins anew
+    # what was taken is empty again
     columns.put("a", [7], np.int64)
     assert columns.take("a", np.int64).tolist() == [7]

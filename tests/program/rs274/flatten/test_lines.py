@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from cases.unrolling import fanuc, flatten, lcnc, said
+from cases.unrolling import fanuc, flatten, lcnc, refused
 
 from olp.core.errors import ProgramError
 from olp.program.rs274.flatten.language import MACRO_B, NGC, Language
@@ -64,7 +64,7 @@ def test_a_line_that_is_not_understood_keeps_its_comments() -> None:
     line = compile_line(b"X1! (c)\r\n", 3, NGC)
     assert (line.number, line.raw, line.eol, line.comments) == (3, b"X1! (c)", b"\r\n", (b"(c)",))
     assert lcnc("X1!\nM2\n") == "X1!\nM2\n"
-    assert said("G0 X1\nX2!\nY#5420\n")[::2] == ("OLP524", 3)
+    assert refused("G0 X1\nX2!\nY#5420\n")[::2] == ("OLP524", 3)
 
 
 @pytest.mark.parametrize(
@@ -127,7 +127,7 @@ def test_what_is_flow_of_one_language_is_words_of_the_other() -> None:
     ],
 )
 def test_lines_that_are_refused(line: str, code: str, message: str) -> None:
-    assert said(f"G0 X1\n{line}\n") == (code, message, 2)
+    assert refused(f"G0 X1\n{line}\n") == (code, message, 2)
 
 
 @pytest.mark.parametrize(
@@ -162,7 +162,7 @@ def test_rounding_in_a_word_counts_increments_on_some_controls(function: str) ->
         "value to a variable first"
     )
     block = f"G1 X[1.+{function}[1.5]]"
-    assert said(f"O1\n{block}\n", "fanuc") == ("OLP541", message, 2)
+    assert refused(f"O1\n{block}\n", "fanuc") == ("OLP541", message, 2)
     assert lcnc(f"{block}\nM2\n") == "G1 X3\nM2\n"
     assert fanuc(f"O1\n#1={function}[1.5]\nX#1\nM30\n") == "O1\nX2.\nM30\n"
 
@@ -178,7 +178,7 @@ def test_a_block_number_of_its_own_is_searched_for() -> None:
 
 
 def test_lines_that_the_control_cannot_read_are_refused() -> None:
-    code, message, line = said("G0 X1\n" + "X1" * 200 + "\n")
+    code, message, line = refused("G0 X1\n" + "X1" * 200 + "\n")
     assert (code, line) == ("OLP505", 2)
     assert "252" in message
     # 252 characters with the line end

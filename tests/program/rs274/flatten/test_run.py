@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from cases.unrolling import fanuc, flatten, lcnc, refusal, said
+from cases.unrolling import fanuc, flatten, lcnc, refusal, refused
 
 # --- IF, WHILE, DO, REPEAT of LinuxCNC ----------------------------------------------------------------------
 
@@ -83,7 +83,7 @@ def test_how_often_a_loop_runs(loop: str, runs: int) -> None:
     ],
 )
 def test_flow_without_its_other_half(source: str, line: int, message: str) -> None:
-    assert said(source + "\n") == ("OLP542", message, line)
+    assert refused(source + "\n") == ("OLP542", message, line)
 
 
 def test_flow_is_searched_within_its_subprogram() -> None:
@@ -92,15 +92,15 @@ def test_flow_is_searched_within_its_subprogram() -> None:
     assert lcnc(source) == "X3\nM2\n"
     # the ENDIF behind the end of the subprogram is another one
     inside = "o9 sub\no1 if [0]\nX1\no9 endsub\no1 endif\no9 call\n"
-    assert said(inside) == ("OLP542", "no ELSE OR ELSEIF OR ENDIF with label 1 follows", 2)
+    assert refused(inside) == ("OLP542", "no ELSE OR ELSEIF OR ENDIF with label 1 follows", 2)
     # so is one behind the head of another program
-    assert said("O1\no1 if [0]\nO2\no1 endif\n") == (
+    assert refused("O1\no1 if [0]\nO2\no1 endif\n") == (
         "OLP542", "no ELSE OR ELSEIF OR ENDIF with label 1 follows", 2
     )  # fmt: skip
 
 
 def test_a_continue_in_a_do_loop_is_refused() -> None:
-    assert said("o1 do\no1 continue\no1 while [0]\n") == (
+    assert refused("o1 do\no1 continue\no1 while [0]\n") == (
         "OLP544", "CONTINUE within DO ... WHILE ends the loop in LinuxCNC 2.9; use IF", 2
     )  # fmt: skip
 
@@ -117,7 +117,7 @@ def test_comments_of_flow_are_kept_where_it_runs() -> None:
 def test_a_recursion_may_have_fifty_levels() -> None:
     sub = "o1 sub\no2 if [#1 GT 1]\no1 call [#1-1]\no2 else\nX#1\no2 endif\no1 endsub\n"
     assert lcnc(f"{sub}o1 call [49]\nM2\n") == "X1\nM2\n"
-    assert said(f"{sub}o1 call [50]\n") == (
+    assert refused(f"{sub}o1 call [50]\n") == (
         "OLP543", "subprograms call one another more than 50 levels deep", 3
     )  # fmt: skip
 
@@ -149,10 +149,10 @@ def test_a_subprogram_is_searched_near_its_call_then_in_the_program_then_in_its_
     assert (lost.file, lost.line, lost.code, lost.message) == (
         "7.ngc", 3, "OLP542", "subprogram 9 is not in the file, and no file for it was given"
     )  # fmt: skip
-    assert said("o6 call\n", subprograms=beside) == (
+    assert refused("o6 call\n", subprograms=beside) == (
         "OLP542", "the file of subprogram 6 does not define it", 1
     )  # fmt: skip
-    assert said("o5 call\n") == (
+    assert refused("o5 call\n") == (
         "OLP542", "subprogram 5 is not in the file, and no file for it was given", 1
     )  # fmt: skip
 
@@ -174,7 +174,7 @@ def test_the_origin_of_blocks_counts_through_the_files() -> None:
 def test_a_computed_label_is_a_whole_number() -> None:
     assert lcnc("o12 sub\nX1\no12 endsub\n#1=10\no[#1+2] call\nM2\n") == "X1\nM2\n"
     assert lcnc("o12 sub\nX#1\no12 endsub\n#1=12\no#1 call [4]\nM2\n") == "X4\nM2\n"
-    assert said("o[1.5] call\n") == ("OLP540", "the label of CALL is 1.5; expected an integer", 1)
+    assert refused("o[1.5] call\n") == ("OLP540", "the label of CALL is 1.5; expected an integer", 1)
 
 
 # --- M98, M99, M97, G65 -------------------------------------------------------------------------------------
@@ -220,7 +220,7 @@ def test_the_count_stands_in_p_only_without_l_and_only_on_some_controls() -> Non
     ],
 )
 def test_calls_that_are_refused(block: str, code: str, message: str) -> None:
-    assert said(f"O1\n{block}\nM30\nO2\nM99\n", "fanuc") == (code, message, 2)
+    assert refused(f"O1\n{block}\nM30\nO2\nM99\n", "fanuc") == (code, message, 2)
 
 
 def test_the_other_words_of_a_call_and_of_a_return_are_kept() -> None:
@@ -234,7 +234,7 @@ def test_m98_shares_the_variables_of_its_caller_where_the_control_does() -> None
     source = "O1\n#1=4\n#<a>=1\nM98 P2\nX#1\nM30\nO2\nX#1\n#1=5\nM99\n"
     assert fanuc(source.replace("#<a>=1\n", "")) == "O1\nX4.\nX5.\nM30\n"
     assert lcnc(source) == "O1\nX0\nX4\nM30\n"
-    assert said(source.replace("X#1\n#1=5", "X#<a>"))[0] == "OLP541"
+    assert refused(source.replace("X#1\n#1=5", "X#<a>"))[0] == "OLP541"
 
 
 def test_m99_returns_to_a_block_of_the_caller() -> None:
@@ -242,7 +242,7 @@ def test_m99_returns_to_a_block_of_the_caller() -> None:
     source = "O1\nN5 X1.\n#1=#1+1\nIF[#1GT2]GOTO9\nM98 P2\nX8.\nN{} X2.\nN9 M30\nO2\nM99 P5\n"
     assert fanuc(source.format(5)) == "O1\nN5 X1.\nN5 X2.\nN9 M30\n"
     assert fanuc(source.format(6)) == "O1\nN5 X1.\nX1.\nX1.\nN9 M30\n"
-    assert said("O1\nM98 P2\nM30\nO2\nM99 P1.5\n", "fanuc") == (
+    assert refused("O1\nM98 P2\nM30\nO2\nM99 P1.5\n", "fanuc") == (
         "OLP540", "the block number P is 1.5; expected an integer", 5
     )  # fmt: skip
     # P counts at the last return only
@@ -269,7 +269,7 @@ def test_a_macro_may_be_called_more_than_once_with_its_own_variables() -> None:
 def test_codes_of_a_level_and_of_a_profile_are_refused(
     source: str, code: str, message: str, line: int
 ) -> None:
-    error = said(source + "\n")
+    error = refused(source + "\n")
     assert (error[0], error[2]) == (code, line)
     assert error[1].startswith(message)
 
@@ -318,14 +318,17 @@ def test_flow_of_macro_b(source: str, expected: str) -> None:
     ],
 )
 def test_flow_of_macro_b_that_is_refused(source: str, code: str, message: str) -> None:
-    assert said(f"O1\n{source}\n", "fanuc") == (code, message, 2)
+    assert refused(f"O1\n{source}\n", "fanuc") == (code, message, 2)
 
 
 def test_a_goto_stays_in_its_program() -> None:
     source = "O1\nM98 P2\nGOTO5\nX1.\nN5 M30\nO2\nGOTO5\nX2.\nN5 X3.\nM99\nO3\nN5 X4.\n"
     assert fanuc(source) == "O1\nN5 X3.\nN5 M30\n"
-    assert said("O1\nGOTO5\nO2\nN5 X1.\n", "fanuc")[:2] == ("OLP542", "GOTO 5: the program has no block N5")
-    assert said("O1\nN5 X1.\nM98 P2\nO2\nGOTO5\n", "fanuc")[0] == "OLP542"
+    assert refused("O1\nGOTO5\nO2\nN5 X1.\n", "fanuc")[:2] == (
+        "OLP542",
+        "GOTO 5: the program has no block N5",
+    )
+    assert refused("O1\nN5 X1.\nM98 P2\nO2\nGOTO5\n", "fanuc")[0] == "OLP542"
 
 
 def test_a_program_number_must_follow_an_end() -> None:
@@ -333,10 +336,10 @@ def test_a_program_number_must_follow_an_end() -> None:
     assert fanuc("O1\nO2\nX2.\nM30\n") == "O1\n"
     assert fanuc("N5\nO1\nX1.\nM30\n") == "N5\nO1\nX1.\nM30\n"
     assert fanuc("X1.\nO1\nX2.\nM30\n") == "X1.\n"
-    assert said("O1\nM98 P2\nM30\nO2\nX1.\nO3\nM99\n", "fanuc") == (
+    assert refused("O1\nM98 P2\nM30\nO2\nX1.\nO3\nM99\n", "fanuc") == (
         "OLP542", "subprogram 2 runs into the next program; M99 is missing", 6
     )  # fmt: skip
-    assert said("O1\nM98 P2\nM30\nO2\nX1.\n", "fanuc") == (
+    assert refused("O1\nM98 P2\nM30\nO2\nX1.\n", "fanuc") == (
         "OLP542", "subprogram 2 has no end (ENDSUB or M99)", 5
     )  # fmt: skip
 
@@ -371,7 +374,7 @@ def test_percent_signs_of_the_file_of_a_subprogram_are_left_out() -> None:
 )
 def test_a_block_of_flow_under_block_delete_needs_the_switch(block: str) -> None:
     profile = "linuxcnc" if block.startswith("o") else "fanuc"
-    code, message, line = said(f"O1\nX1.\n/{block}\n", profile, block_delete=None)
+    code, message, line = refused(f"O1\nX1.\n/{block}\n", profile, block_delete=None)
     assert (code, line) == ("OLP525", 3)
     assert message.startswith("this block under block delete changes a parameter or the flow")
     assert message.endswith("remove the `/`, or the block")
@@ -391,7 +394,7 @@ def test_the_work_is_bounded_by_the_bytes_of_blocks() -> None:
     work = (32 + 15) + 99 * ((32 + 3) + (32 + 13)) + (32 + 3)
     assert lcnc(text, limit=work) == "X1\n" * 99 + "M2\n"
     ending = "bytes of blocks; correct an endless loop, or divide the program"
-    assert said(text, limit=work - 1) == ("OLP543", f"the run visits more than {work - 1} {ending}", 4)
+    assert refused(text, limit=work - 1) == ("OLP543", f"the run visits more than {work - 1} {ending}", 4)
     # a long program may do more: 80 for each of its bytes
     endless = "o1 while [1]\no1 endwhile\n"
-    assert said(endless, limit=1)[1] == f"the run visits more than {80 * len(endless)} {ending}"
+    assert refused(endless, limit=1)[1] == f"the run visits more than {80 * len(endless)} {ending}"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from cases.unrolling import fanuc, flatten, lcnc, refusal, said
+from cases.unrolling import fanuc, flatten, lcnc, refusal, refused
 
 from olp.core.errors import ProgramError
 
@@ -258,7 +258,7 @@ def test_boring_with_a_stop_gives_the_spindle_back() -> None:
 @pytest.mark.parametrize("before", ["", "M3\n(s) M5"])
 def test_a_cycle_that_reverses_needs_a_direction(before: str) -> None:
     source = f"G21 G0 X1 Y1 Z5 {before}\nG84 X2 Z-1 R1\n"
-    assert said(source, expand_cycles=True)[:2] == (
+    assert refused(source, expand_cycles=True)[:2] == (
         "OLP532", "the cycle reverses the spindle, whose direction is not set; give M3 or M4 before"
     )  # fmt: skip
 
@@ -293,7 +293,7 @@ def test_a_cycle_that_reverses_needs_a_direction(before: str) -> None:
 )  # fmt: skip
 def test_cycles_of_linuxcnc_that_are_refused(block: str, code: str, message: str) -> None:
     source = f"G21 G90 G0 X1 Y1 Z5\n{block}\n"
-    assert said(source, expand_cycles=True) == (code, message, source.count("\n"))
+    assert refused(source, expand_cycles=True) == (code, message, source.count("\n"))
     # as they are they may be kept
     text = f"{source}M2\n"
     assert lcnc(text).startswith(source.replace("M[98]", "M98"))
@@ -308,10 +308,10 @@ def test_the_clearance_of_pecks() -> None:
     assert strokes(inch, peck_clearance=0.0)[2:6] == ["G1 Z-0.5", "G0 Z1", "G0 Z-0.5", "G1 Z-1"]
     for code in (83, 73):
         source = f"G0 X1 Y1 Z5\nG{code} X2 Z-1 R1 Q1.5\n"
-        assert said(source, expand_cycles=True) == (
+        assert refused(source, expand_cycles=True) == (
             "OLP541", f"G{code} before any G20 or G21, on which its peck clearance depends", 2
         )  # fmt: skip
-        assert said(f"O1\nG0 X1. Y1. Z5.\nG{code} X2. Z-1. R1. Q1.5\n", "fanuc", expand_cycles=True) == (
+        assert refused(f"O1\nG0 X1. Y1. Z5.\nG{code} X2. Z-1. R1. Q1.5\n", "fanuc", expand_cycles=True) == (
             "OLP541", f"G{code} pecks with a clearance that a parameter of the control sets; "
             "give peck_clearance_mm (--peck-clearance-mm)", 3
         )  # fmt: skip
@@ -393,7 +393,7 @@ _NO_POINT = (
 def test_cycles_of_fanuc_that_are_refused(block: str, code: str, message: str) -> None:
     source = f"O1\nG21 G90 G0 X1. Y1. Z5.\n{block}\n"
     line = source.count("\n")
-    assert said(source, "fanuc", expand_cycles=True, peck_clearance=1.0) == (code, message, line)
+    assert refused(source, "fanuc", expand_cycles=True, peck_clearance=1.0) == (code, message, line)
     assert fanuc(f"{source}M30\n") == f"{source}M30\n"
 
 
@@ -431,6 +431,6 @@ def test_the_strokes_of_a_program_are_bounded(expand_cycles: bool, monkeypatch: 
     monkeypatch.setattr("olp.program.rs274.cycles._STROKES", 7)
     assert lcnc(source, expand_cycles=expand_cycles).endswith("M2\n")
     monkeypatch.setattr("olp.program.rs274.cycles._STROKES", 6)
-    assert said(source, expand_cycles=expand_cycles) == (
+    assert refused(source, expand_cycles=expand_cycles) == (
         "OLP543", "the canned cycles of the program have more than 6 strokes; split the program", 3
     )  # fmt: skip

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from cases.unrolling import fanuc, lcnc, said
+from cases.unrolling import fanuc, lcnc, refused
 
 _BY_CONTROL = "and no plain block has the effect of setting it"
 _KEPT = (
@@ -44,7 +44,7 @@ def test_parameters_up_to_30_are_local_to_a_subprogram() -> None:
     ],
 )  # fmt: skip
 def test_parameters_that_are_not_known(source: str, code: str, message: str) -> None:
-    assert said(source + "\n") == (code, message, source.count("\n") + 1)
+    assert refused(source + "\n") == (code, message, source.count("\n") + 1)
 
 
 def test_positions_by_number_and_by_name() -> None:
@@ -110,7 +110,7 @@ def test_variables_of_macro_b_are_local_up_to_33() -> None:
     ],
 )  # fmt: skip
 def test_variables_of_macro_b_that_are_not_known(block: str, code: str, message: str) -> None:
-    assert said(f"O1\n{block}\n", "fanuc") == (code, message, 2)
+    assert refused(f"O1\n{block}\n", "fanuc") == (code, message, 2)
 
 
 def test_variables_of_macro_b_that_change_no_path() -> None:
@@ -173,4 +173,4 @@ def test_arguments_of_a_macro(call: str, values: dict[int, float]) -> None:
     ],
 )  # fmt: skip
 def test_arguments_of_a_macro_that_are_refused(word: str, message: str) -> None:
-    assert said(f"O1\nG65 P2 {word}\nM30\nO2\nM99\n", "fanuc") == ("OLP516", message, 2)
+    assert refused(f"O1\nG65 P2 {word}\nM30\nO2\nM99\n", "fanuc") == ("OLP516", message, 2)
