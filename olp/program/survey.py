@@ -180,7 +180,10 @@ class _Survey:
             # those of one reading do not follow from each other
             taken = sorted(self.taken)
             for each in (error, *error.others):
-                self._note(each, taken)
+                known = self.setup.job.start_mm != before[0].job.start_mm
+                # with the start known since, it may not be refused; if it is, the next reading finds it
+                if not (known and each.code == UNKNOWN_POSITION):
+                    self._note(each, taken)
             if (self.setup, self.lines) == before:
                 return False
             error = self.reading()

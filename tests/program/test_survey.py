@@ -10,6 +10,7 @@ from cases.fast import some_fast
 from olp.core.errors import ProgramError, Reason, Refused
 from olp.core.machine import Axis, Machine, Setup, WorkOffset
 from olp.program import survey
+from olp.program.dialect import Options
 from olp.program.origin import Unrolled
 from olp.program.program import Program
 from olp.program.registry import named, read
@@ -55,7 +56,18 @@ def test_one_missing_offset_is_one_reason() -> None:
 
 
 def test_one_unknown_start_is_one_reason() -> None:
-    assert stated(b"G21 G90 G54 F100\nG2 X5. Y0. I2.5\nG2 X10. Y0. I2.5\n")[0] == (2, "OLP524", None)
+    text = b"G21 G90 G54 F100\nG2 X5. Y0. I2.5\nG2 X10. Y0. I2.5\n"
+    assert stated(text) == [(2, "OLP524", None)]
+    # a position that is lost later is another one
+    assert stated(text + b"G28 Z0\nG2 X20. Y0. I5.\n") == [(2, "OLP524", None), (5, "OLP524", None)]
+
+
+def test_all_readings_have_the_options() -> None:
+    text = HEAD + b"/G68 R1\nG51\nG55 X1.\n"
+    for block_delete, lines in ((True, [4, 5]), (False, [3, 4, 5])):
+        with pytest.raises(Refused) as caught:
+            survey.read_all(text, SETUP, named("linuxcnc"), Options(block_delete=block_delete))
+        assert [reason.line for reason in caught.value.reasons] == lines
 
 
 def test_an_arc_that_is_refused_leaves_its_end_to_the_next() -> None:
@@ -293,6 +305,20 @@ def test_what_needs_no_unrolling_is_refused_as_without() -> None:
     assert limits == [None, survey.UNROLLED]
 
 
+def test_what_needs_no_unrolling_has_as_many_readings_as_without(monkeypatch: pytest.MonkeyPatch) -> None:
+    text = tools(9)
+    monkeypatch.setattr(survey, "BYTES", 5 * len(text))
+    rows, limits = unrolled(text)
+    assert (len(rows), rows[-1], limits) == (6, ("more",), [None])
+
+
+def test_a_refusal_in_a_file_that_is_reached_late_is_the_only_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(survey, "UNROLLED", 1)
+    text = HEAD + b"o1 repeat [999]\no1 endrepeat\no7 call\nM2\n"
+    rows, limits = unrolled(text, {"7": b"o7 sub\nG1 X#5061\no7 endsub\n"})
+    assert (rows, limits) == ([("7.ngc", 2, "OLP541", None, ""), ("more",)], [None, 1])
+
+
 def test_an_endless_loop_is_the_only_reason() -> None:
     text = HEAD + b"G68 R1\no1 while [1]\no1 endwhile\nM2\n"
     unroll = Unrolling(text, "linuxcnc", {})
@@ -338,6 +364,12 @@ def test_hints_are_judged_with_the_files_of_subprograms() -> None:
     assert hints(None) == hints(lambda name: None) == [lost] * 2
     broken = "--flatten does not unroll it: line 2 of 7.ngc: division by zero in an expression"
     assert hints(lambda name: ("7.ngc", b"o7 sub\nX[1/0]\no7 endsub\n")) == [broken] * 2
+
+
+def test_a_hint_is_judged_without_the_other_refusals_and_in_the_same_lines() -> None:
+    # a first line that is refused, and a last line without an end
+    text = b"(a (b)\nG21 G90 G54 G17 F100\nG1 X#5061"
+    assert "--flatten does not unroll it: line 3: #5061" in reasons(text)[1].message
 
 
 def test_a_hint_is_kept_where_it_takes_too_long_to_try(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -188,19 +188,14 @@ _HOLE = ["G0 X2", "G0 Z1", "G1 Z-1", "G0 Z1"]
         ("G91 G81 X1 Z-2 R-4", _HOLE), ("G91 G81 X1 Z-2 R-4 L2", [*_HOLE, "G0 X3", "G1 Z-1", "G0 Z1"]),
         ("G81 X2 Z-1 R1 L2", [*_HOLE, "G1 Z-1", "G0 Z1"]),
         # other planes
-        ("G18 G81 X2 Z3 Y0 R1", ["G0 X2 Z3", "G0 Y0", "G0 Y1"]),
+        ("G18 G81 X2 Z3 Y0 R1", ["G0 X2 Z3", "G1 Y0", "G0 Y1"]),
         ("G19 G81 Y2 Z3 X0 R.5", ["G0 Y2 Z3", "G0 X0.5", "G1 X0", "G0 X0.5"]),
         # what the block does besides
         ("G81 X2 Z-1 R1 M8", ["M8", *_HOLE]), ("G0 G81 X2 Z-1 R1", _HOLE),
     ],
 )  # fmt: skip
 def test_strokes_of_linuxcnc(block: str, expected: list[str]) -> None:
-    got = lcnc_strokes(block)
-    if block.startswith("G18"):
-        # R is at the position itself
-        assert got == ["G0 X2 Z3", "G1 Y0", "G0 Y1"]
-    else:
-        assert got == expected
+    assert lcnc_strokes(block) == expected
 
 
 def test_the_words_of_a_cycle_are_taken_out_and_the_others_kept() -> None:
@@ -223,8 +218,8 @@ def test_the_words_of_a_cycle_are_taken_out_and_the_others_kept() -> None:
     ],
 )  # fmt: skip
 def test_the_modes_around_a_cycle_come_back(before: str, expected: list[str]) -> None:
-    source = f"G21 G0 X1 Y1 Z5\n{before} (b)\nG81 X2 Z1 R{'-4' if 'G91' in before else '1'}\nM2\n"
-    source = source.replace("Z1 R-4", "Z0 R-4")
+    levels = "Z0 R-4" if "G91" in before else "Z1 R1"
+    source = f"G21 G0 X1 Y1 Z5\n{before} (b)\nG81 X2 {levels}\nM2\n"
     blocks = lcnc(source, expand_cycles=True).splitlines()
     blocks = blocks[blocks.index(next(b for b in blocks if "(b)" in b)) + 1 : -1]
     assert [block for block in blocks if "Z" not in block] == expected
