@@ -84,7 +84,8 @@ def test_payloads_follow_one_another() -> None:
           for comment in ("olp payload", "olp paylod 30", "olp payload: 30", "olp payload 30 lb",
            "olp Payload=30", "olp payloads 3",
                           "olp payload 3 kg x", "olp playload 3", "olp payload, 3", "olp payload 1e3",
-                          "olp plod 3")),
+                          "olp plod 3",
+                          "olp load: 30", "olp load= 30", "olp load, 30")),
         ("(olp payload 30 kg, line x)", "OLP550",
          "the comment `olp payload 30 kg, line x` is not understood; expected a mass in "
          "kg, such as (OLP PAYLOAD 30 kg)"),

@@ -454,9 +454,13 @@ def test_the_command_line(machine: Path, own: Path, tmp_path: Path) -> None:
     assert done.exit_code == 0, done.output
 
 
-def test_a_number_larger_than_a_machine_is_refused_with_its_line(machine: Path) -> None:
-    """It is met where numbers keep their columns, as behind two blanks."""
-    text = b"MOVES TRANS(  60.0,20.0,30.0,0,180,0)\nMOVES TRANS(  100000000.0,20.0,30.0,0,180,0)\n"
+@pytest.mark.parametrize(("blanks", "z"), [(b"  ", b"30.0"), (b"", b"3e1")])
+def test_a_number_larger_than_a_machine_is_refused_with_its_line(
+    machine: Path, blanks: bytes, z: bytes
+) -> None:
+    """It is met where numbers keep their columns, as behind two blanks, and where one has an exponent."""
+    block = b"MOVES TRANS(" + blanks + b"%s,20.0,%s,0,180,0)\n"
+    text = block % (b"60.0", b"30.0") + block % (b"100000000.0", b"30.0") + block % (b"60.0", z)
     with pytest.raises(ProgramError) as caught:
         olp.correct(text, setup_of(machine, described("val2")), outside_box="hold")
     assert (caught.value.line, caught.value.code) == (2, "OLP561")
