@@ -73,6 +73,7 @@ def test_a_payload_holds_from_its_line_on(comment: str, kg: float | None) -> Non
 def test_payloads_follow_one_another() -> None:
     text = "(olp payload 3)\nG1 X1\n(olp off)\nX2\nX3 (olp payload 0)\nX4 ; olp payload 1.5 kg\n"
     assert payloads(text) == [3.0, 3.0, 0.0, 1.5]
+    assert payloads("(olp weight 3)\nG1 X1 (olp off)\nX2 (olp payload 3)\n") == [0.0, 3.0]
 
 
 @pytest.mark.parametrize(
@@ -85,7 +86,7 @@ def test_payloads_follow_one_another() -> None:
            "olp Payload=30", "olp payloads 3",
                           "olp payload 3 kg x", "olp playload 3", "olp payload, 3", "olp payload 1e3",
                           "olp plod 3",
-                          "olp load: 30", "olp load= 30", "olp load, 30")),
+                          "olp payload_of_the_tool 3", "olp load: 30", "olp load= 30", "olp load, 30")),
         ("(olp payload 30 kg, line x)", "OLP550",
          "the comment `olp payload 30 kg, line x` is not understood; expected a mass in "
          "kg, such as (OLP PAYLOAD 30 kg)"),
