@@ -166,6 +166,10 @@ class _Survey:
 
     def run(self, error: ProgramError | None) -> bool:
         """Read until nothing is refused; False where the survey ends before that."""
+        if error is not None and (error.file or "") not in self.lines:
+            # the file of a subprogram has been read when the program is unrolled from here
+            again = self.reading()
+            error = error if again is None or self.ran_long(again) else again
         before_all, most = self.spent, BYTES - len(self.data)
         for reading in range(READINGS):
             if error is None:
@@ -176,7 +180,10 @@ class _Survey:
             # those of one reading do not follow from each other
             taken = sorted(self.taken)
             for each in (error, *error.others):
-                self._note(each, taken)
+                known = self.setup.job.start_mm != before[0].job.start_mm
+                # with the start known since, it may not be refused; if it is, the next reading finds it
+                if not (known and each.code == UNKNOWN_POSITION):
+                    self._note(each, taken)
             if (self.setup, self.lines) == before:
                 return False
             error = self.reading()

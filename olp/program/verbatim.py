@@ -127,10 +127,12 @@ class Moves:
                 mantissa = np.where(fine, np.rint(mantissa / 10.0 ** (decimals - MOST_DECIMALS)), mantissa)
                 decimals = np.minimum(decimals, MOST_DECIMALS)
         else:
-            parsed_numbers = [number(data[a:b], decimal) for a, b in spans.tolist()]
-            known = [n for n in parsed_numbers if n is not None]
-            decimals = np.array([min(max(n.places, 0), MOST_DECIMALS) for n in known], np.int8)
-            value = np.array([n.value for n in known], float)
+            # one that is larger than any machine stays a word, and is refused where it would be written
+            forms = [number(data[a:b], decimal) for a, b in spans.tolist()]
+            decimals = np.array(
+                [0 if n is None else min(max(n.places, 0), MOST_DECIMALS) for n in forms], np.int8
+            )
+            value = np.array([0.0 if n is None else n.value for n in forms], float)
             mantissa = np.rint(value * 10.0 ** decimals.astype(np.int64))
         return Words(
             letter=np.zeros(len(start), np.uint8),

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from olp.core.errors import ConfigError, UsageError
 from olp.core.machine import CHAINS, COMPONENTS, SQUARENESS, Vector
+from olp.errormodel.bodies import build_bodies
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration, Curve, Cyclic, Thermal
 from olp.errormodel.total import total
@@ -449,3 +450,13 @@ def test_polynomial_machine_of_an_independent_program(chain: str, expected_um: V
     model = build(Calibration("m", np.array([[0.0, 1000.0]] * 3), curves=curves), chain)
     error = model.error(np.array([[400.0, 300.0, 200.0]]), np.array([0.0, 130.0, -243.4852]))
     np.testing.assert_allclose(error[0] * 1e3, expected_um, atol=5e-5, rtol=0)
+
+
+@pytest.mark.parametrize(
+    ("angle", "terms"), [(1e-6, 1), (1e-4, 2), (1.0, 0), (1e78, 0), (1e160, 0), (1e308, 0)]
+)
+def test_angles_too_large_for_a_series_take_sine_and_cosine(angle: float, terms: int) -> None:
+    """Also where a power of the angle is no number any more."""
+    calibration = Calibration("m", BOX, curves=(constant("X", {"EAX": angle}),))
+    bodies = build_bodies(calibration, "FXYZ", frozenset())
+    assert [body.sine_terms for body in bodies] == [terms if body.axis == 0 else 1 for body in bodies]

@@ -10,6 +10,8 @@ from cases.fast import some_fast
 from olp.core.errors import ProgramError, Reason, Refused
 from olp.core.machine import Axis, Machine, Setup, WorkOffset
 from olp.program import survey
+from olp.program.dialect import Options
+from olp.program.origin import Unrolled
 from olp.program.program import Program
 from olp.program.registry import named, read
 
@@ -54,7 +56,18 @@ def test_one_missing_offset_is_one_reason() -> None:
 
 
 def test_one_unknown_start_is_one_reason() -> None:
-    assert stated(b"G21 G90 G54 F100\nG2 X5. Y0. I2.5\nG2 X10. Y0. I2.5\n")[0] == (2, "OLP524", None)
+    text = b"G21 G90 G54 F100\nG2 X5. Y0. I2.5\nG2 X10. Y0. I2.5\n"
+    assert stated(text) == [(2, "OLP524", None)]
+    # a position that is lost later is another one
+    assert stated(text + b"G28 Z0\nG2 X20. Y0. I5.\n") == [(2, "OLP524", None), (5, "OLP524", None)]
+
+
+def test_all_readings_have_the_options() -> None:
+    text = HEAD + b"/G68 R1\nG51\nG55 X1.\n"
+    for block_delete, lines in ((True, [4, 5]), (False, [3, 4, 5])):
+        with pytest.raises(Refused) as caught:
+            survey.read_all(text, SETUP, named("linuxcnc"), Options(block_delete=block_delete))
+        assert [reason.line for reason in caught.value.reasons] == lines
 
 
 def test_an_arc_that_is_refused_leaves_its_end_to_the_next() -> None:
@@ -167,3 +180,239 @@ def test_a_survey_that_ends_early_says_so() -> None:
     assert not caught.value.complete
     assert len(caught.value.reasons) >= Refused.LISTED
     assert "at least" in str(caught.value)
+
+
+def test_a_reason_shows_its_statement() -> None:
+    long = b"G68 R1 (" + b"x" * 80 + b")"
+    shown = [r.statement for r in reasons(HEAD + b"  G68 R3 (a\tb\xff\xc3\xa9)  \n" + long + b"\nG51\n")]
+    assert shown == ["G68 R3 (a?b\N{REPLACEMENT CHARACTER}é)", "G68 R1 (" + "x" * 52, "G51"]
+
+
+@pytest.mark.parametrize(
+    ("blocks", "expected"),
+    [
+        # each word of a block that is refused, in any form
+        (b"g0068 G51 X1. R2\n", [(3, "OLP512", None), (3, "OLP512", None)]),
+        # only the word goes: X5 is the end of the block
+        (b"G1 X5. R3\nG2 X15. Y0. I5.\n", [(3, "OLP519", None)]),
+        (b"G1 X5. R - .5\nG2 X15. Y0. I5.\n", [(3, "OLP519", None)]),
+        (b"G1 X5. r3\nG2 X15. Y0. I5.\n", [(3, "OLP519", None)]),
+        # what may follow names the last statement that was taken out before it
+        (b"G68 R1\nG1 X1,5\nX2.\nG51\nG2 X9. Y9. I1.\n",
+         [(3, "OLP512", None), (4, "OLP510", None), (6, "OLP512", None), (7, "OLP530", 6)]),
+        # a comment states nothing
+        (b"(a (b)\nG2 X5. Y5. I1.\n", [(3, "OLP514", None), (4, "OLP530", None)]),
+        # offsets, tools and styli are refused once
+        (b"G55 X1.\nG56 X2.\nG55 X3.\nT99 M6\nT99 M6\nT98 M6\n",
+         [(3, "OLP520", None), (4, "OLP520", None), (6, "OLP521", None), (8, "OLP521", None)]),
+        # an arc that is no arc when it is straight
+        (b"G2 X5. Y5. I1. J1.\nG3 X5. Y5. R1.\nG03 X9. Y5. R.1\nG1 X5. Y5.\n",
+         [(3, "OLP530", None), (4, "OLP530", None), (5, "OLP530", None)]),
+    ],
+)  # fmt: skip
+def test_what_is_refused_after_a_repair(blocks: bytes, expected: list[tuple[int, str, int | None]]) -> None:
+    assert stated(HEAD + blocks) == expected
+
+
+def test_a_single_reason_is_the_refusal_itself() -> None:
+    with pytest.raises(ProgramError) as caught:
+        survey.read_all(HEAD + b"G68 R3\n", SETUP, named("linuxcnc"))
+    assert not isinstance(caught.value, Refused)
+    assert (caught.value.line, caught.value.code, caught.value.word) == (3, "OLP512", "G68")
+
+
+def test_another_language_is_said_instead() -> None:
+    for text in (HEAD + b"CYCLE81(1)\n", HEAD + b"#1=5\nCOMPON\n"):
+        with pytest.raises(ProgramError, match="this is Sinumerik") as caught:
+            survey.read_all(text, SETUP, named("linuxcnc"))
+        assert caught.value.code == "OLP501"
+    # not in a text whose dialect is certain
+    assert stated(b"PARTNO A\nUNITS/MM\nSOFT\nGOTO/1,2,3\n", "apt") == [(3, "OLP512", None)]
+    with pytest.raises(ProgramError, match="this is a PDF document"):
+        survey.read_all(b"%PDF-1.7\n" + HEAD, SETUP, named("apt"))
+
+
+# -- programs that are unrolled first ------------------------------------------------------------------------
+
+
+class Unrolling:
+    """Unrolls a program with files beside it, and keeps the limits that were given."""
+
+    def __init__(self, data: bytes, dialect: str, files: dict[str, bytes], **options: Any) -> None:
+        self.data, self.dialect, self.files, self.options = data, named(dialect), files, options
+        self.limits: list[int | None] = []
+
+    def __call__(self, change: survey.Change, limit: int | None) -> Unrolled:
+        self.limits.append(limit)
+        given = {} if limit is None else {"limit": limit}
+
+        def beside(name: str) -> tuple[str, bytes] | None:
+            file = f"{name}.ngc"
+            return (file, change(file, self.files[name])) if name in self.files else None
+
+        assert self.dialect.unroller is not None
+        text = change(None, self.data)
+        return self.dialect.unroller(text, self.dialect, subprograms=beside, **self.options, **given)
+
+
+def unrolled(
+    text: bytes, files: dict[str, bytes] | None = None, dialect: str = "linuxcnc", **options: Any
+) -> tuple[list[tuple[object, ...]], list[int | None]]:
+    """File, line, code, what it follows, and statement of each reason; and the limits of all unrollings."""
+    unroll = Unrolling(text, dialect, files or {}, **options)
+    expands = bool(options.get("expand_cycles"))
+    try:
+        survey.read_all(text, SETUP, named(dialect), unroll=unroll, expands=expands)
+    except Refused as error:
+        rows: list[tuple[object, ...]] = [
+            (r.file, r.line, r.code, (r.follows_file, r.follows) if r.follows else None, r.statement)
+            for r in error.reasons
+        ]
+        return [*rows, *[("more",)] * (not error.complete)], unroll.limits
+    except ProgramError as error:
+        return [(error.file, error.line, error.code, None, error.message)], unroll.limits
+    return [], unroll.limits
+
+
+def test_a_program_that_is_unrolled_is_mended_in_its_own_lines() -> None:
+    text = HEAD + b"#1=5\nG1 X#1 R3\nG68 R1\no7 call\nM2\n"
+    files = {"7": b"o7 sub\nG1 X5 R3\nG55 X#1\no7 endsub\n"}
+    rows, limits = unrolled(text, files)
+    assert rows == [
+        (None, 4, "OLP519", None, "G1 X#1 R3"), (None, 5, "OLP512", None, "G68 R1"),
+        ("7.ngc", 2, "OLP519", (None, 5), "G1 X5 R3"), ("7.ngc", 3, "OLP520", None, "G55 X#1"),
+    ]  # fmt: skip
+    assert limits[0] is None
+    assert set(limits[1:]) == {survey.UNROLLED}
+    assert unrolled(HEAD + b"#1=5\nG1 X#1\nM2\n") == ([], [None])
+
+
+def test_the_file_of_a_subprogram_is_mended_where_it_is_refused_first() -> None:
+    files = {"7": b"o7 sub\nG1 X#5061\nG1 X[5] R3\no7 endsub\n"}
+    rows, _ = unrolled(HEAD + b"o7 call\nG68 R1\nM2\n", files)
+    assert [(row[:3], row[4]) for row in rows] == [
+        ((None, 4, "OLP512"), "G68 R1"), (("7.ngc", 2, "OLP541"), "G1 X#5061"),
+        (("7.ngc", 3, "OLP519"), "G1 X[5] R3")
+    ]  # fmt: skip
+
+
+def test_what_needs_no_unrolling_is_refused_as_without() -> None:
+    rows, limits = unrolled(HEAD + b"G1 X5. R3\nG68 R1\nM2\n")
+    assert [row[:3] for row in rows] == [(None, 3, "OLP519"), (None, 4, "OLP512")]
+    assert limits == [None]
+    rows, limits = unrolled(HEAD + b"G1 X5. R3\nG99 G81 X1 Z-1 R1\nM2\n", expand_cycles=True)
+    assert [row[:3] for row in rows] == [(None, 3, "OLP519")]
+    assert limits == [None, survey.UNROLLED]
+
+
+def test_what_needs_no_unrolling_has_as_many_readings_as_without(monkeypatch: pytest.MonkeyPatch) -> None:
+    text = tools(9)
+    monkeypatch.setattr(survey, "BYTES", 5 * len(text))
+    rows, limits = unrolled(text)
+    assert (len(rows), rows[-1], limits) == (6, ("more",), [None])
+
+
+def test_a_refusal_in_a_file_that_is_reached_late_is_the_only_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(survey, "UNROLLED", 1)
+    text = HEAD + b"o1 repeat [999]\no1 endrepeat\no7 call\nM2\n"
+    rows, limits = unrolled(text, {"7": b"o7 sub\nG1 X#5061\no7 endsub\n"})
+    assert (rows, limits) == ([("7.ngc", 2, "OLP541", None, ""), ("more",)], [None, 1])
+
+
+def test_an_endless_loop_is_the_only_reason() -> None:
+    text = HEAD + b"G68 R1\no1 while [1]\no1 endwhile\nM2\n"
+    unroll = Unrolling(text, "linuxcnc", {})
+
+    def short(change: survey.Change, limit: int | None) -> Unrolled:
+        return unroll(change, 1)
+
+    with pytest.raises(ProgramError) as caught:
+        survey.read_all(text, SETUP, named("linuxcnc"), unroll=short)
+    assert (caught.value.code, caught.value.line) == (survey.TOO_LONG, 4)
+    assert not isinstance(caught.value, Refused)
+    assert unroll.limits == [1]
+
+
+def test_what_unrolling_leaves_is_not_hinted_at_again() -> None:
+    rows, _ = unrolled(HEAD + b"M70\nG1 X[2]\nM2\n")
+    assert rows == [
+        (None, 3, "OLP511", None, "M70 saves modal codes; --flatten does not unroll it; write plain blocks")
+    ]
+
+
+def test_an_unrolled_text_has_no_statements_of_its_own() -> None:
+    text = Unrolling(HEAD + b"#1=5\nG1 X#1 R3\nG68 R1\nM2\n", "linuxcnc", {})(survey.as_it_is, None)
+    with pytest.raises(ProgramError) as caught:
+        survey.read_all(text, SETUP, named("linuxcnc"))
+    assert not isinstance(caught.value, Refused)
+    # in the lines of the original
+    assert caught.value.line == 5
+
+
+def test_hints_are_judged_with_the_files_of_subprograms() -> None:
+    text = HEAD + b"G1 X[1]\no7 call\nM2\n"
+
+    def hints(subprograms: survey.Subprograms | None) -> list[str]:
+        with pytest.raises(Refused) as caught:
+            survey.read_all(text, SETUP, named("linuxcnc"), subprograms=subprograms)
+        return [reason.message.partition("; ")[2] for reason in caught.value.reasons]
+
+    assert all("with --flatten" in hint for hint in hints(lambda name: ("7.ngc", b"o7 sub\nX1\no7 endsub\n")))
+    lost = (
+        "--flatten does not unroll it: line 4: subprogram 7 is not in the file, and no file for it was given"
+    )
+    assert hints(None) == hints(lambda name: None) == [lost] * 2
+    broken = "--flatten does not unroll it: line 2 of 7.ngc: division by zero in an expression"
+    assert hints(lambda name: ("7.ngc", b"o7 sub\nX[1/0]\no7 endsub\n")) == [broken] * 2
+
+
+def test_a_hint_is_judged_without_the_other_refusals_and_in_the_same_lines() -> None:
+    # a first line that is refused, and a last line without an end
+    text = b"(a (b)\nG21 G90 G54 G17 F100\nG1 X#5061"
+    assert "--flatten does not unroll it: line 3: #5061" in reasons(text)[1].message
+
+
+def test_a_hint_is_kept_where_it_takes_too_long_to_try(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(survey, "UNROLLED", 1)
+    text = HEAD + b"o1 while [1]\no1 endwhile\n"
+    with pytest.raises(Refused) as caught:
+        survey.read_all(text, SETUP, named("linuxcnc"))
+    assert all(reason.message.endswith("with --flatten") for reason in caught.value.reasons)
+
+
+# -- the limits of the work ----------------------------------------------------------------------------------
+
+
+def tools(count: int) -> bytes:
+    """A program with a reason for each of several readings."""
+    return HEAD + b"".join(b"T%d M6\n" % tool for tool in range(900, 900 + count))
+
+
+def reasons_of(text: bytes) -> tuple[int, bool]:
+    with pytest.raises(Refused) as caught:
+        survey.read_all(text, SETUP, named("linuxcnc"))
+    return len(caught.value.reasons), caught.value.complete
+
+
+def test_there_are_so_many_readings_at_most(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(survey, "READINGS", 4)
+    assert reasons_of(tools(4)) == (4, True)
+    assert reasons_of(tools(5)) == (4, False)
+
+
+@pytest.mark.parametrize(("most", "readings"), [(0, 3), (3, 3), (4, 4), (5, 5)])
+def test_a_long_text_is_read_less_often(most: int, readings: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = tools(9)
+    monkeypatch.setattr(survey, "BYTES", most * len(text))
+    assert reasons_of(text) == (readings, False)
+    # a reading more than that is not begun
+    monkeypatch.setattr(survey, "BYTES", (most + 1) * len(text) - 1)
+    assert reasons_of(text) == (max(readings, 3), False)
+
+
+def test_an_unrolling_counts_as_some_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
+    text = HEAD + b"".join(b"T[%d] M6\n" % tool for tool in range(900, 909))
+    monkeypatch.setattr(survey, "BYTES", len(text) + 4 * survey.REFUSED_BYTES)
+    rows, limits = unrolled(text)
+    # each of them, and the reading without unrolling
+    assert (len(rows), rows[-1], len(limits)) == (5, ("more",), 5)

@@ -380,13 +380,14 @@ def _plain(text: Bytes, starts: Index, ends: Index, leading: Index) -> tuple[Mas
     lines = len(starts)
     size = len(text)
     upper = text & np.uint8(0xDF)
-    letters = np.flatnonzero((upper >= 65) & (upper <= 90) & (text >= 65))
+    letter = (upper >= 65) & (upper <= 90)
+    letters = np.flatnonzero(letter)
     where = np.searchsorted(letters, starts)
     count = np.searchsorted(letters, ends) - where
     padded = np.concatenate((text, np.zeros(8, np.uint8)))
     hot = count == 4
-    for i, letter in enumerate(b"GOTO"):
-        hot &= (padded[np.minimum(leading + i, size)] & 0xDF) == letter
+    for i, byte in enumerate(b"GOTO"):
+        hot &= (padded[np.minimum(leading + i, size)] & 0xDF) == byte
     slashes = np.flatnonzero(text == 47)
     rank = np.searchsorted(slashes, starts)
     hot &= np.searchsorted(slashes, ends) - rank == 1
@@ -396,7 +397,7 @@ def _plain(text: Bytes, starts: Index, ends: Index, leading: Index) -> tuple[Mas
     inside = np.minimum(slash, size - 1)
     hot &= printed[inside] - printed[np.minimum(leading, size - 1)] == 4
     blank = (text == 32) | (text == 9) | (text == 10) | (text == 13)
-    odd = np.flatnonzero(((text < 43) & ~blank) | ((text > 57) & (upper < 65)) | (upper > 90))
+    odd = np.flatnonzero(((text < 43) & ~blank) | ((text > 57) & ~letter))
     hot &= np.searchsorted(odd, starts) == np.searchsorted(odd, ends)
     dollars = np.flatnonzero(text == 36)
     if dollars.size:

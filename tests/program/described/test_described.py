@@ -452,3 +452,16 @@ def test_the_command_line(machine: Path, own: Path, tmp_path: Path) -> None:
     demo.write_bytes(SMALL["kawasaki-as"])
     done = run.invoke(main, ["correct", str(demo), "-m", str(other), "-o", str(tmp_path / "x.as")])
     assert done.exit_code == 0, done.output
+
+
+@pytest.mark.parametrize(("blanks", "z"), [(b"  ", b"30.0"), (b"", b"3e1")])
+def test_a_number_larger_than_a_machine_is_refused_with_its_line(
+    machine: Path, blanks: bytes, z: bytes
+) -> None:
+    """It is met where numbers keep their columns, as behind two blanks, and where one has an exponent."""
+    block = b"MOVES TRANS(" + blanks + b"%s,20.0,%s,0,180,0)\n"
+    text = block % (b"60.0", b"30.0") + block % (b"100000000.0", b"30.0") + block % (b"60.0", z)
+    with pytest.raises(ProgramError) as caught:
+        olp.correct(text, setup_of(machine, described("val2")), outside_box="hold")
+    assert (caught.value.line, caught.value.code) == (2, "OLP561")
+    assert caught.value.message == "the number 100000000.0 is larger than a machine; correct it"

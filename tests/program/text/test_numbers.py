@@ -132,3 +132,54 @@ def test_edits_are_made_in_the_order_of_the_text() -> None:
     edits = [(4, 5, b"E"), (0, 1, b"A"), (2, 2, b"x"), (2, 2, b"y")]
     assert spliced(b"abcdef", edits) == b"AbxycdEf"
     assert spliced(b"abc", []) == b"abc"
+
+
+@pytest.mark.parametrize(
+    ("line", "old", "new", "others", "expected"),
+    [
+        # a tab is a blank, before and behind
+        (b"X \t1.5 Y", b"1.5", b"12.5", (), b"X 12.5 Y"), (b"X\t\t1.5", b"1.5", b"1", (), b"X\t\t  1"),
+        (b"X 1.5\t\tY", b"1.5", b"12.5", (), b"X 12.5\t\tY"),
+        # one padded number makes the text padded, also for the others
+        (b"X 1.5   2.5", b"1.5", b"12.5", (b"2.5",), b"X 12.5   2.5"),
+        (b"X 1.5   2.5", b"1.5", b"1", (b"2.5",), b"X   1   2.5"),
+        (b"X 2.5  1.5  Y", b"1.5", b"12.5", (b"2.5",), b"X 2.5 12.5  Y"),
+        # a left edge: the blanks behind are taken, but for the last one, at the end of a text all of them
+        (b"1.5  2.5 Y", b"1.5", b"1.25", (), b"1.25 2.5 Y"), (b"1.5  2", b"1.5", b"1.2345", (), b"1.2345 2"),
+        (b"X 1.5  ", b"1.5", b"12.50", (), b"X 12.50"), (b"X 1.5   ", b"1.5", b"12.5", (), b"X 12.5  "),
+        (b"1.5  Y2.5 ", b"2.5", b"2", (b"1.5",), b"1.5  Y2   "),
+        (b"1.5  Y2.5;", b"2.5", b"2", (b"1.5",), b"1.5  Y2;"),
+        (b"1.5  Y2.5\t;", b"2.5", b"2", (b"1.5",), b"1.5  Y2  \t;"),
+        (b"1.5  Y2.5;", b"2.5", b"2.25", (b"1.5",), b"1.5  Y2.25;"),
+        # the same width, and a number at the start of the text
+        (b"X   1.5", b"1.5", b"2.5", (), b"X   2.5"),
+        (b"1.5   2.5", b"1.5", b"12.5", (b"2.5",), b"12.5   2.5"),
+        (b"  1.5", b"1.5", b"112.5", (), b" 112.5"), (b"1.5", b"1.5", b"12.5", (), b"12.5"),
+    ],
+)  # fmt: skip
+def test_edges_of_columns(
+    line: bytes, old: bytes, new: bytes, others: tuple[bytes, ...], expected: bytes
+) -> None:
+    assert placed(line, old, new, *others) == expected
+
+
+def test_a_number_holds_its_form() -> None:
+    form = number(b"+007.50E-02")
+    assert form is not None
+    assert (form.plus, form.whole, form.bare, form.mark, form.decimals) == (True, 3, False, b".", 2)
+    assert (form.letter, form.exponent_digits, form.exponent_plus, form.places) == (b"E", 2, False, 4)
+    plain = number(b".5e+3")
+    assert plain is not None
+    assert (plain.plus, plain.whole, plain.bare, plain.letter) == (False, 0, True, b"e")
+    assert (plain.exponent_digits, plain.exponent_plus, plain.places) == (1, True, -2)
+    whole = number(b"-12")
+    assert whole is not None
+    assert (whole.plus, whole.whole, whole.bare, whole.mark, whole.decimals, whole.letter) == (
+        False,
+        2,
+        False,
+        b"",
+        0,
+        b"",
+    )
+    assert (whole.exponent_digits, whole.exponent_plus) == (0, False)

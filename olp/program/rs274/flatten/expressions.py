@@ -116,7 +116,7 @@ class Reader:
     def _value(self) -> Expression:
         text, start = self.text, self.position
         head = text[start : start + 1]
-        if head in ("+", "-") and head:
+        if head in ("+", "-"):
             self.position += 1
             operand = self.value()
             return operand if head == "+" else _negated(operand)

@@ -277,8 +277,7 @@ class ProgramState(State):
         return strokes
 
     def _repeats(self, given: dict[str, float | None]) -> int:
-        # where a block has both, both are kept in the unrolled block, and the reader takes the first
-        for letter in reversed(self.profile.cycles.repeat_words):
+        for letter in self.profile.cycles.repeat_words:
             if letter in given:
                 count = whole(self._known(letter, given[letter]), f"the repeat count {letter}")
                 return count or self._no_repeats()

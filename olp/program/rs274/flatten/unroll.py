@@ -186,6 +186,9 @@ class _Flattener:
 
     def _tracked(self, word: Word, value: float | None) -> float | None:
         """The value in program units; None where a missing point leaves its unit open."""
+        if word.letter == "p" and word.pointed and "p" in self.language.counts:
+            # a dwell in seconds; it is written without a point, which counts milliseconds
+            return float(round(1000.0 * word.number))
         open_unit = self.language.increments_open and word.value is None and not word.pointed
         counts = word.letter in self.language.counts or word.letter in ("f", "k")
         if open_unit and not counts and value != 0:

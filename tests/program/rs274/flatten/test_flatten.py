@@ -2,34 +2,16 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
+from cases.unrolling import fanuc, flatten, lcnc, refusal
 from hypothesis import given
 from hypothesis import strategies as st
 
 from olp.core.errors import ProgramError, UsageError
-from olp.program.registry import named
 from olp.program.rs274.flatten.language import MACRO_B, NGC
 from olp.program.rs274.flatten.unroll import number_text
-
-
-def flatten(data: bytes, *, profile: str, **options: object) -> bytes:
-    dialect = named(profile)
-    assert dialect.unroller is not None
-    return dialect.unroller(data, dialect, **options)
-
-
-def lcnc(text: str, **options: object) -> str:
-    return flatten(text.encode(), profile="linuxcnc", **options).decode()
-
-
-def fanuc(text: str, **options: object) -> str:
-    return flatten(text.encode(), profile="fanuc", **options).decode()
-
-
-def refusal(text: str, profile: str = "linuxcnc", **options: object) -> ProgramError:
-    with pytest.raises(ProgramError) as caught:
-        flatten(text.encode(), profile=profile, file="p.ngc", **options)
-    return caught.value
 
 
 @pytest.mark.parametrize(
@@ -292,3 +274,108 @@ def test_number_text_keeps_ten_digits(value: float) -> None:
     assert float(number_text(value, "x", NGC, exact=True)) == value
     assert "." in number_text(value, "x", MACRO_B)
     assert float(number_text(value, "x", MACRO_B)) == pytest.approx(value, abs=0.5001e-4)
+
+
+@pytest.mark.parametrize(
+    ("value", "letter", "expected"),
+    [
+        (0.1 + 0.2, "x", "0.3"), (1 / 3, "x", "0.3333333333"), (-2 / 3, "x", "-0.6666666667"),
+        (10 / 3, "x", "3.333333333"), (123456.789012345, "x", "123456.789"),
+        (12345678901.6, "x", "12345678902"),
+        (1e9 / 3, "x", "333333333.3"), (1e10 / 3, "x", "3333333333"), (1e-5 / 3, "x", "0.000003333333"),
+        (1e-13, "x", "0"), (-1e-13, "x", "0"), (0.0, "x", "0"), (-0.0, "x", "0"), (100.0, "x", "100"),
+        (1e3, "f", "1000"), (2.5, "p", "2.5"), (5.1, "g", "5.1"), (1.0, "m", "1"),
+    ],
+)  # fmt: skip
+def test_numbers_of_linuxcnc(value: float, letter: str, expected: str) -> None:
+    assert number_text(value, letter, NGC) == expected
+
+
+@pytest.mark.parametrize(
+    ("value", "letter", "expected"),
+    [
+        (1 / 3, "x", "0.3333"), (100.0, "x", "100."), (2.5, "y", "2.5"), (0.00005, "x", "0.0001"),
+        (0.00004, "x", "0."), (-0.00004, "x", "0."), (0.0, "x", "0."), (-0.0, "z", "0."), (-3.0, "r", "-3."),
+        (123456.78, "f", "123456.78"), (81.0, "g", "81"), (54.1, "g", "54.1"),
+        *((7.00004, letter, "7") for letter in "mnpltdhos"), (-7.0, "p", "-7"), (7.0, "k", "7."),
+        (7.0, "f", "7."),
+    ],
+)  # fmt: skip
+def test_numbers_of_macro_b(value: float, letter: str, expected: str) -> None:
+    assert number_text(value, letter, MACRO_B) == expected
+    assert number_text(value, letter, MACRO_B, exact=True) == expected
+
+
+def test_exact_numbers_have_all_digits() -> None:
+    assert number_text(1 / 3, "x", NGC, exact=True) == "0.3333333333333333"
+    assert number_text(1e-7 / 3, "x", NGC, exact=True) == "0.000000033333333333333334"
+    assert number_text(100.0, "x", NGC, exact=True) == "100"
+
+
+@pytest.mark.parametrize(
+    ("value", "letter", "message"),
+    [
+        (math.inf, "x", "the value of X is not finite"), (math.nan, "f", "the value of F is not finite"),
+        (1.5, "p", "the value of P is 1.5; expected an integer"),
+        (math.inf, "t", "the value of T is inf; expected an integer"),
+    ],
+)  # fmt: skip
+def test_numbers_that_cannot_be_written(value: float, letter: str, message: str) -> None:
+    with pytest.raises(ProgramError, match=f"^{message}$") as caught:
+        number_text(value, letter, MACRO_B)
+    assert caught.value.code == "OLP540"
+
+
+@pytest.mark.parametrize(
+    ("source", "expected"),
+    [
+        # the end of the last line, and of lines without one
+        ("G0 X[1]\r\nM2", "G0 X1\r\nM2"), ("G0 X[1]\r\nM2\r\n", "G0 X1\r\nM2\r\n"), ("X[1]", "X1"), ("", ""),
+        ("#1=2", ""), ("#1=2\n", ""), ("X[1]\n#1=2", "X1\n"), ("X[1]\n\n", "X1\n\n"),
+        ("X1\r\nM98 P2\r\nM2\r\nO2\r\nX2\r\nX3 M99", "X1\r\nX2\r\nX3\r\nM2\r\n"),
+        # blanks beside what is taken out
+        ("#1=2 X#1  Y3\n", "X0  Y3\n"), ("X1  #1=2  Y3\n", "X1  Y3\n"), ("X1 #1=2\n", "X1\n"),
+        ("\tX[2]  \n", "\tX2  \n"),
+        ("X1 #1=2 \n", "X1 \n"), ("X1 #1=[2 (in)] (out)\n", "X1 (in)(out)\n"), ("#1=2 ; end\n", "; end\n"),
+        ("#1=2 (a)\n", "(a)\n"), ("N5 #1=2\n", ""), ("N5 #1=2 (a)\n", "N5 (a)\n"), ("/#1=2 X1\n", "/X1\n"),
+        # two values in one word stay together
+        ("G1X[1+1]Y-[3]\n", "G1X2Y-3\n"), ("g1 x#1\n", "g1 x0\n"), ("X [ 1 ] Y 2\n", "X 1 Y 2\n"),
+        ("G[80+1-80] X[2]\n", "G1 X2\n"), ("N[5] X1\n", "N5 X1\n"),
+    ],
+)  # fmt: skip
+def test_blocks_are_written_with_what_is_around_their_values(source: str, expected: str) -> None:
+    assert lcnc(source) == expected
+
+
+def test_a_last_block_without_an_end_takes_that_of_the_program() -> None:
+    def beside(name: str) -> tuple[str, bytes]:
+        return "7.ngc", b"o7 sub\r\nM2"
+
+    assert lcnc("X1\no7 call\n", subprograms=beside) == "X1\nM2\n"
+    assert lcnc("X1\no7 call", subprograms=beside) == "X1\nM2"
+    assert lcnc("o7 call\n", subprograms=beside) == "M2\n"
+
+
+def test_values_of_a_block_are_those_before_it() -> None:
+    # X moves in the same block
+    assert lcnc("G0 X5\nG0 X[#5420+1] Y#5420\nX#5420 #1=#5420\nY#1\nM2\n") == "G0 X5\nG0 X6 Y5\nX6\nY6\nM2\n"
+
+
+def test_block_numbers_of_each_file_are_seen_once() -> None:
+    def beside(name: str) -> tuple[str, bytes]:
+        return "7.ngc", b"o7 sub\nN5 X7\no7 endsub\n"
+
+    source = "o1 repeat [2]\nN5 X1\no7 call\no1 endrepeat\nM2\n"
+    assert lcnc(source, subprograms=beside) == "N5 X1\nN5 X7\nX1\nX7\nM2\n"
+    assert lcnc("o1 repeat [2]\nN5\no1 endrepeat\nM2\n") == "N5\nM2\n"
+
+
+@pytest.mark.parametrize("code", ["M2", "M30", "m[2]", "M 3 0"])
+def test_the_end_of_the_program(code: str) -> None:
+    assert lcnc(f"X1\nG0 X2 {code}\nX3\n").splitlines()[:1] == ["X1"]
+    assert len(lcnc(f"X1\nG0 X2 {code}\nX3\n").splitlines()) == 2
+    assert len(lcnc("X1\nM3 G2 X2 I1\nX3\n").splitlines()) == 3
+
+
+def test_the_end_within_a_subprogram_ends_the_program() -> None:
+    assert lcnc("o1 sub\nX1\nM2\no1 endsub\no1 call\nX3\n") == "X1\nM2\n"

@@ -1,0 +1,176 @@
+"""Parameters while a program is unrolled: which are local, which are common, which only the control knows."""
+
+from __future__ import annotations
+
+import pytest
+from cases.unrolling import fanuc, lcnc, refused
+
+_BY_CONTROL = "and no plain block has the effect of setting it"
+_KEPT = (
+    "is kept by the control (probe result, offset, tool or position) and not known off line; use a free "
+    "parameter (#31 to #5060)"
+)
+_NOT_SET = "is not set before in the program and not known off line; assign it in the program"
+
+
+def test_parameters_up_to_30_are_local_to_a_subprogram() -> None:
+    source = "#{0}=7\no1 sub\nX#{0}\n#{0}=8\no1 endsub\no1 call\nX#{0}\nM2\n"
+    local = {index: lcnc(source.format(index)) for index in (1, 29, 30, 31, 32, 5060)}
+    assert local == {
+        **dict.fromkeys((1, 29, 30), "X0\nX7\nM2\n"),
+        **dict.fromkeys((31, 32, 5060), "X7\nX8\nM2\n"),
+    }
+
+
+@pytest.mark.parametrize(
+    ("source", "code", "message"),
+    [
+        ("X#0", "OLP540", "#0 is out of range; parameters are #1 to #5602"),
+        ("X#5603", "OLP540", "#5603 is out of range; parameters are #1 to #5602"),
+        *((f"X#{n}", "OLP541", f"#{n} {_KEPT}") for n in (5061, 5419, 5423, 5599, 5602)),
+        *((f"#{n}=1", "OLP544", f"#{n} belongs to the control, {_BY_CONTROL}") for n in (0, 5061, 5420,
+          5600)),
+        ("#<_x>=1", "OLP544", "#<_x> belongs to the control and cannot be set"),
+        ("X#<a>", "OLP541", f"#<a> {_NOT_SET}"),
+        ("#<a>=1\nX#<_a>", "OLP541", f"#<_a> {_NOT_SET}"),
+        ("X[EXISTS[#<_ini[AXIS]NAME>]]", "OLP541",
+         "#<_ini[axis]name> belongs to the control and is not known off line"),
+        ("X[EXISTS[#<_hal[pin]>]]", "OLP541",
+         "#<_hal[pin]> belongs to the control and is not known off line"),
+        ("X#<_metric>", "OLP541", "#<_metric> is used before the program sets it"),
+        ("X#<_imperial>", "OLP541", "#<_imperial> is used before the program sets it"),
+        ("S5\nX#<_feed>", "OLP541", "#<_feed> is used before the program sets it"),
+        ("F5\nX#<_rpm>", "OLP541", "#<_rpm> is used before the program sets it"),
+    ],
+)  # fmt: skip
+def test_parameters_that_are_not_known(source: str, code: str, message: str) -> None:
+    assert refused(source + "\n") == (code, message, source.count("\n") + 1)
+
+
+def test_positions_by_number_and_by_name() -> None:
+    start = "G21 G90 G0 X1 Y2 Z3\n"
+    assert lcnc(f"{start}X#5420 Y#5421 Z#5422\nM2\n") == f"{start}X1 Y2 Z3\nM2\n"
+    assert lcnc(f"{start}A#<_x> B#<_y> C#<_z>\nM2\n") == f"{start}A1 B2 C3\nM2\n"
+
+
+@pytest.mark.parametrize(
+    ("before", "name", "value"),
+    [
+        ("G21", "_metric", 1), ("G20", "_metric", 0), ("G21", "_imperial", 0), ("G20", "_imperial", 1),
+        ("G90", "_absolute", 1), ("G91", "_absolute", 0), ("G90", "_incremental", 0),
+        ("G91", "_incremental", 1), ("", "_absolute", 1), ("", "_plane", 170), ("G18", "_plane", 180),
+        ("F250", "_feed", 250), ("S900", "_rpm", 900), ("F1 S2", "_feed", 1), ("F1 S2", "_rpm", 2),
+        ("", "_value", 0), ("", "_value_returned", 0),
+    ],
+)  # fmt: skip
+def test_predefined_names(before: str, name: str, value: int) -> None:
+    assert lcnc(f"{before}\nA#<{name}>\nA[EXISTS[#<{name}>]]\nM2\n") == f"{before}\nA{value}\nA1\nM2\n"
+
+
+def test_names_with_an_underscore_are_global() -> None:
+    source = "#<a>=1 #<_b>=2\nX[EXISTS[#<a>]] Y[EXISTS[#<_b>]] Z[EXISTS[#<_a>]] A[EXISTS[#<b>]]\n"
+    within = "X[EXISTS[#<a>]] Y#<_b>\n"
+    assert lcnc(f"{source}o1 sub\n{within}#<a>=5\no1 endsub\no1 call\nX#<a>\nM2\n") == (
+        "X1 Y1 Z0 A0\nX0 Y2\nX1\nM2\n"
+    )
+
+
+def test_parameters_that_were_never_set_are_0() -> None:
+    assert lcnc("X#1 Y#30 Z#31 A#5060\nM2\n") == "X0 Y0 Z0 A0\nM2\n"
+
+
+def test_the_switch_of_debug_comments_may_be_set() -> None:
+    assert lcnc("#5599=0\nX1\nM2\n") == "X1\nM2\n"
+
+
+def test_a_returned_value_is_0_again_after_a_call_without_one() -> None:
+    source = "o1 sub\no1 endsub [3]\no2 sub\no2 endsub\n"
+    value = "X#<_value> Y#<_value_returned>\n"
+    assert lcnc(f"{source}o1 call\n{value}o2 call\n{value}M2\n") == "X3 Y1\nX0 Y0\nM2\n"
+
+
+# --- Macro B ----------------------------------------------------------------------------------------------
+
+
+def test_variables_of_macro_b_are_local_up_to_33() -> None:
+    # a block of nothing but a vacant word is no block
+    for index in (1, 33):
+        assert fanuc(f"O1\n#{index}=7\nG65 P2\nX#{index}\nM30\nO2\nX#{index}\nM99\n") == "O1\nX7.\nM30\n"
+    for index in (100, 999):
+        assert fanuc(f"O1\n#{index}=7\nG65 P2\nM30\nO2\nX#{index}\nM99\n") == "O1\nX7.\nM30\n"
+
+
+@pytest.mark.parametrize(
+    ("block", "code", "message"),
+    [
+        *((f"X#{n}", "OLP541", f"#{n} {_NOT_SET}") for n in (34, 99, 100, 5000, 5004, 5040, 5044)),
+        *((f"#{n}=1", "OLP544", f"#{n} belongs to the control, {_BY_CONTROL}")
+          for n in (0, 34, 99, 1000, 2999, 3001, 3002, 3005)),
+        ("#3000=1", "OLP544", "the program stops here with its own alarm (#3000)"),
+    ],
+)  # fmt: skip
+def test_variables_of_macro_b_that_are_not_known(block: str, code: str, message: str) -> None:
+    assert refused(f"O1\n{block}\n", "fanuc") == (code, message, 2)
+
+
+def test_variables_of_macro_b_that_change_no_path() -> None:
+    assert fanuc("O1\n#3003=1\n#3004=7\nX1.\nM30\n") == "O1\nX1.\nM30\n"
+
+
+@pytest.mark.parametrize("base", [5001, 5041])
+def test_positions_of_macro_b(base: int) -> None:
+    start = "O1\nG21 G90 G0 X1. Y2. Z3.\n"
+    words = f"A#{base} B#{base + 1} C#{base + 2}\n"
+    assert fanuc(f"{start}{words}M30\n") == f"{start}A1. B2. C3.\nM30\n"
+
+
+def test_a_vacant_variable_stays_vacant_when_it_is_copied() -> None:
+    # a word with it is left out; in arithmetic it is 0
+    assert fanuc("O1\n#100=#5\nG1 X#100 Y#0 Z1.\nX[#100+1]\n#100=[#100+0]\nX#100\nM30\n") == (
+        "O1\nG1 Z1.\nX1.\nX0.\nM30\n"
+    )
+
+
+def test_each_argument_of_a_macro_has_its_variable() -> None:
+    letters = "ABCDEFHIJKMQRSTUVWXYZ"
+    numbers = (1, 2, 3, 7, 8, 9, 11, 4, 5, 6, 13, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26)
+    call = "".join(f"{letter}{n}." for n, letter in enumerate(letters, 50))
+    read = "".join(f"G1 X#{number}\n" for number in numbers)
+    expected = "".join(f"G1 X{n}.\n" for n in range(50, 50 + len(letters)))
+    assert fanuc(f"O1\nG65 P2 {call}\nM30\nO2\n{read}M99\n") == f"O1\n{expected}M30\n"
+
+
+@pytest.mark.parametrize(
+    ("call", "values"),
+    [
+        # sets of I, J, K: a letter that does not come behind the last one begins the next set
+        ("I1. J2. K3.", {4: 1, 5: 2, 6: 3}),
+        ("I1. J2. K3. I4. J5. K6. I7.", {4: 1, 5: 2, 6: 3, 7: 4, 8: 5, 9: 6, 10: 7}),
+        ("I1. I2. I3.", {4: 1, 7: 2, 10: 3}),
+        ("K1. I2. K3.", {6: 1, 7: 2, 9: 3}),
+        ("J1. A5. J2.", {5: 1, 1: 5, 8: 2}),
+        ("J1. J2. I3.", {5: 1, 8: 2, 10: 3}),
+        # no point is needed by zero, by an expression, and by counts
+        ("A0 B[1+1] D3 H4 M5 S6 T7", {1: 0, 2: 2, 7: 3, 11: 4, 13: 5, 19: 6, 20: 7}),
+        ("A1. A2.", {1: 2}),
+        # N and L are no arguments
+        ("L1 A5.", {1: 5}),
+    ],
+)
+def test_arguments_of_a_macro(call: str, values: dict[int, float]) -> None:
+    read = "".join(f"G1 X#{number}\n" for number in sorted(values))
+    expected = "".join(f"G1 X{values[number]}.\n" for number in sorted(values))
+    assert fanuc(f"O1\nG65 P2 {call}\nM30\nO2\n{read}M99\n") == f"O1\n{expected}M30\n"
+
+
+@pytest.mark.parametrize(
+    ("word", "message"),
+    [
+        *((f"{letter}5", f"the argument {letter} has no decimal point, so the control scales it by its least "
+           "increment; write the point") for letter in "ABCIJKEFQRUVWXYZ"),
+        ("@5.", "G65 has the argument @, which is not an argument of a macro"),
+        (",R5.", "G65 has the argument ,R, which is not an argument of a macro"),
+    ],
+)  # fmt: skip
+def test_arguments_of_a_macro_that_are_refused(word: str, message: str) -> None:
+    assert refused(f"O1\nG65 P2 {word}\nM30\nO2\nM99\n", "fanuc") == ("OLP516", message, 2)
