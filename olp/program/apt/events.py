@@ -264,14 +264,14 @@ class Events:
         for field in statement.fields():
             pair = field.number
             if pair is None:
-                if field.text in (b"OFF", b"NOMORE"):
+                if field.text in _OFF:
                     continue
                 raise ProgramError(
                     f"the coordinate system is given by the name {shown(field.text)}; expected its numbers",
                     line=statement.line,
                     code="OLP523",
                 )
-            values.append(round(pair[0] / 10.0 ** pair[1], 9) + 0.0)
+            values.append(round(pair[0] / 10.0 ** pair[1], 9))
         key: object = tuple(values)
         if key == _IDENTITY or not any(values) or key == (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0):
             key = None

@@ -113,11 +113,10 @@ class _Reader(Events):
             label, major = b"", b"CSYS"
         free = _FREE.match(text)
         if free:
-            label, major = b"", free[0].upper()
+            label, major = b"", free[0]
         first = major.split(b",")[0].strip()
         handler = self._handlers.get(first)
         if first == b"RAPID":
-            self._resolve(row)
             raise ProgramError(
                 "RAPID has words that are not read; expected RAPID alone", line=statement.line, code="OLP510"
             )
@@ -158,13 +157,13 @@ class _Reader(Events):
         """A GOTO, GODLTA or TLON that was not read in columns."""
         _, major = statement.head()
         line = statement.line
-        if major.startswith(b"TLON"):
+        if major.split(b",")[0] == b"TLON":
             self.driven[line], fields = tlon(statement, self.collector)
             return Point(line, statement.begin, statement.end, fields)
         if major not in (b"GOTO", b"GODLTA"):
             return None
         fields = statement.fields()
-        if fields and all(f.text == b"" for f in fields[-1:]):
+        if fields and not fields[-1].text:
             fields = fields[:-1]
         if any(f.number is None for f in fields):
             bad = next(f for f in fields if f.number is None)
@@ -363,18 +362,15 @@ class _Reader(Events):
 
     def _creo(self, chunk: Chunk, comment: Comment) -> Statement:
         """The statement that Creo writes in a comment, which goes on where its line ends with `$`."""
-        text, last = comment.text.rstrip(), comment.line - 1 - chunk.first_line
+        text, last = comment.text.strip(), comment.line - 1 - chunk.first_line
         lines = 1
         match = _CREO.match(text.upper())
         while text.endswith(b"$") and last + 1 < len(chunk.line_start):
             last, lines = last + 1, lines + 1
             text = text[:-1] + chunk.raw(last).rstrip()
-        known = match is not None and match[1] == b"CSYS"
-        body = text[text.find(b"/") :] if known else b"/1,0,0,0,0,1,0,0,0,0,1,0"
-        statement = Statement(comment.line, comment.begin, comment.end, b"$$" + body, None, lines)
-        return (
-            statement if known else Statement(comment.line, comment.begin, comment.end, b"TITLE", None, lines)
-        )
+        csys = match is not None and match[1] == b"CSYS"
+        body = b"$$" + text[text.find(b"/") :] if csys else b"TITLE"
+        return Statement(comment.line, comment.begin, comment.end, body, None, lines)
 
 
 def _summed(value: Array, point: Array, incremental: Mask, start: Sequence[float]) -> Array:
