@@ -28,8 +28,6 @@ from olp.program.statement_rows import Point, Points
 from olp.program.text.statements import Chunk, Comment, Statement, chunks, shown
 
 NAN = float("nan")
-#: Whether these are refused depends on other statements.
-_BY_ORDER = frozenset({b"RAPID", b"TLON", b"GODLTA"})
 #: Refused by the table of statements, wherever it is.
 NOT_READ = "OLP512"
 _FREE = re.compile(rb"(?i)(?:" + b"|".join(FREE) + rb")(?![A-Z])")
@@ -142,7 +140,7 @@ class _Reader(Events):
         if free:
             label, major = b"", free[0]
         first = major.split(b",")[0].strip()
-        if label or text[:2] == b"$$" or first in self._handlers or first in _BY_ORDER:
+        if label or text[:2] == b"$$":
             return None
         support, why = TABLE.get(
             first, (Support.REFUSED, "is not a statement that olp knows, and may move the machine")
