@@ -70,7 +70,7 @@ def test_each_plane_has_its_normal(normal: str, start: str, end: str, plane: int
 
 
 @pytest.mark.parametrize(
-    ("times", "sweep"), [("", 0.5), (",TIMES,1", 0.5), (",TIMES,3", 4.5), (",TIMES,0", 0.5)]
+    ("times", "sweep"), [("", 0.5), (",TIMES,1", 0.5), (",TIMES,3.0", 4.5), (",TIMES,0", 0.5)]
 )
 def test_full_circles_come_before_the_last_part(times: str, sweep: float, setup: Setup) -> None:
     text = f"GOTO/10,0,5\nCIRCLE/0,0,5,0,0,1,10{times}\nGOTO/0,10,5\n"

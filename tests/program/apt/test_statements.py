@@ -198,7 +198,7 @@ def test_a_cycle_has_its_own_feed(setup: Setup) -> None:
     ("word", "rest", "seconds"),
     [
         ("DELAY/2.5", True, 2.5), ("DELAY/-1", True, 0.0), ("SPINDL/600,RPM\nDELAY/5,REV", True, 0.5),
-        ("DELAY/5,REV", True, 0.0), ("STOP", True, 0.0), ("OPSTOP", True, 0.0), ("SPINDL/ON", True, 0.0),
+        ("SPINDL/240.0\nDELAY/2.5,REV", True, 0.625), ("DELAY/5,REV", True, 0.0), ("STOP", True, 0.0), ("OPSTOP", True, 0.0), ("SPINDL/ON", True, 0.0),
         ("COOLNT/ON", False, 0.0),
     ],
 )  # fmt: skip
@@ -366,7 +366,7 @@ def turned_setup(tmp_path_factory: pytest.TempPathFactory) -> Setup:
 def test_a_turned_frame_turns_points_homes_and_axes(turned_setup: Setup) -> None:
     """C is 90 degrees: X of the program is Y of the machine, and Y is against X. The tool is 40 mm long."""
     path = program(
-        "FROM/1,2,3\nGOTO/4,5,6\nGOHOME\nGOTO/1,0,0,0,.6,.8\nGODLTA/1,2,3\n", turned_setup
+        "FROM/1.0,2.,3\nGOTO/4,5,6\nGOHOME\nGOTO/1,0,0,0,.6,.8\nGODLTA/1,2,3\n", turned_setup
     ).toolpath
     assert path.start_mm == pytest.approx((98.0, 1.0, 43.0))
     want = [[95.0, 4.0, 46.0], [98.0, 1.0, 43.0], [76.0, 1.0, 32.0], [74.0, 2.0, 35.0]]

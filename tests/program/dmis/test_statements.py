@@ -321,7 +321,7 @@ def test_names_of_datums_are_found_in_capitals_or_not(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("definition", "offset"),
     [
-        ("PROBE,FIXED,CART,0,4,-20", [0, 4, -20]), ("FIXED,CART,0,4,-20,0,0,1,4", [0, 4, -20]),
+        ("PROBE,FIXED,CART,0.5,4,-20.25", [0.5, 4, -20.25]), ("FIXED,CART,0,4,-20,0,0,1,4", [0, 4, -20]),
         ("CART,0,4,-20", None), ("PROBE,CART,0,4,-20,FIXED", None), ("PROBE,FIXED,CART,0,4", None),
         ("PROBE,FIXED,0,4,-20", None),
     ],
@@ -344,7 +344,8 @@ def test_the_last_definition_of_a_stylus_holds(setup: Setup) -> None:
 def test_what_is_recalled_and_is_no_datum_changes_nothing(setup: Setup) -> None:
     for text in ("RECALL/F(A)", "RECALL", "RECALL/LONG", "MODE", "MODE/AUTO,MAN", "FROM/9,9,9", "RAPID/ON",
     "DECL/A",
-                 "ENDMAC", "MACRO/1", "(A B)", "( C )", "FEDRAT/MESVEL", "ASSIGN/A", "TEXT/MAN", "$\n"):  # fmt: skip
+                 "ENDMAC", "MACRO/1", "(A B)", "( C )", "FEDRAT/MESVEL", "ASSIGN/A", "TEXT/MAN",
+                 "$\n"):  # fmt: skip
         path = program(f"{text}\nGOTO/1,2,3\n", setup).toolpath
         assert path.end_mm.tolist() == [[101.0, 2.0, 3.0]], text
         assert path.flag.tolist() == [0]
