@@ -93,10 +93,6 @@ def timing(program: Program, *, blend_mm: float = BLEND_MM, block_delete: bool =
         rest[rapids] = rest[rapids + 1] = True
     for hole in program.holes:
         for moves, seconds in hole.rests:
-            if not seconds >= 0:
-                raise ProgramError(
-                    "a dwell is negative; expected zero or more", line=hole.line, code="OLP551"
-                )
             rest[hole.first + moves] = True
             dwell[hole.first + moves] += seconds
     for column in (feed, control, blend, rest, dwell):

@@ -120,7 +120,7 @@ ROUND = "CIRCLE/0,0,5"
     [
         ("0,1", "", "0,10,5", 0.5), ("0,-1", "2,INTOF,", "0,10,5", -1.5), ("0,-1", "", "0,-10,5", -0.5),
         ("0,1", "2,INTOF,", "0,-10,5", 1.5), ("0,2", "", "-10,0,5", 1.0), ("0,1", "2,INTOF,", "10,0,5", 2.0),
-        ("9,1", "", "0,10,5", 0.5),
+        ("9,1", "", "0,10,5", 0.5), ("0,.05", "", "0,10,5", 0.5), ("0,-.05", "", "0,-10,5", -0.5),
     ],
 )  # fmt: skip
 @pytest.mark.parametrize("circle", (ROUND, "CYLNDR/0,0,5,0,0,1"))
@@ -490,6 +490,8 @@ C = [b"0", b"0.", b"5"]
         ("CIRCLE/0,0.,5,0,0,1,10,TIMES,1", {"radius": [b"10"]}),
         ("CIRCLE/0,0.,5,$\n0,0,1,10", {"radius": [b"10"]}),
         ("CIRCLE/0,0.,5,$\n0,0,1", {}),
+        ("CIRCLE/0,0.,5,0,0,1E0", {}),
+        ("CIRCLE/0,0.,5,0,0,1E0,10.0", {"radius": [b"10.0"]}),
         ("MOVARC/0,0.,5,0,0,1,10,ANGLE,90.0", {"radius": [b"10"], "angle": [b"90.0"]}),
         ("INDIRV/0,1,0\nTLON,GOFWD/(CIRCLE/0,0.,5,10),ON,(LINE/0,0.,5,0,10,5)",
          {"radius": [b"10"], "direction": [b"0", b"1", b"0"], "whole": True, "centres": [C, C]}),
@@ -532,7 +534,8 @@ def test_an_arc_behind_a_turn_of_the_tool_is_where_its_tool_is(tmp_path: Path) -
 
 
 def test_numbers_of_a_circle_have_many_forms(setup: Setup) -> None:
-    for row in ("0,0,5,0,0,1,10", "+0.,-0,5.,0,0,+1.,10.", "0,0,.5E1,0,0,1,1D1", "0 0 5 0 0 1 10",
+    for row in ("0,0,5,0,0,1,10", "+0.,-0,5.,0,0,+1.,10.", "0,0,.5E1,0,0,1,1D1", "0,0,.5E1,0,0,1",
+    "0 0 5 0 0 1 10",
                 "0,0,5,0,0,1,10,-1,2,.5", "0.000000000001,0,5,0,0,1,10"):  # fmt: skip
         arcs = program(f"GOTO/10,0,5\nCIRCLE/{row}\nGOTO/0,10,5\n", setup).toolpath.arcs
         assert arcs.centre_mm == pytest.approx(np.array([[100.0, 0.0, 5.0]]))
