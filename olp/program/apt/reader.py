@@ -336,22 +336,23 @@ class _Reader(Events):
         """Moves of holes: to the clearance above the stated point, down, and up."""
         collector = self.collector
         tip = np.array(self.position)
+        clear_mm, depth_mm = cycle.clear_mm or 0.0, cycle.depth_mm
+        stroke = depth_mm is not None and cycle.clear_mm is not None
         for i in range(len(line)):
             line_of, up = int(line[i]), ups[i]
-            x, y, z = (up * (cycle.clear_mm or 0.0)).tolist()
-            own = self.table.lifted(int(frame[i]), (x, y, z)) if cycle.clear_mm else int(frame[i])
-            tip = end[i] + up * (cycle.clear_mm or 0.0)
-            stroke = cycle.depth_mm is not None and cycle.clear_mm is not None
+            x, y, z = (up * clear_mm).tolist()
+            own = self.table.lifted(int(frame[i]), (x, y, z))
+            tip = end[i] + up * clear_mm
             flag = np.array([Flag.CYCLE if stroke else 0], np.uint8)
             collector.put_stated_moves(
                 np.array([Kind.RAPID], np.uint8), flag, [line_of], [own], tip[None],
                 slot[i : i + 1], begin[i : i + 1], stop[i : i + 1],
             )  # fmt: skip
             collector.put_feed(collector.moves, cycle.feed_mm_s, line_of)
-            if cycle.depth_mm is not None and cycle.clear_mm is not None:
+            if depth_mm is not None and stroke:
                 collector.strokes.append((collector.moves - 1, collector.moves))
-                collector.put_lone(Kind.LINE, Flag.CYCLE, line_of, own, end[i] - up * cycle.depth_mm)
-                tip = end[i] + up * (cycle.retract_mm if cycle.retract_mm is not None else cycle.clear_mm)
+                collector.put_lone(Kind.LINE, Flag.CYCLE, line_of, own, end[i] - up * depth_mm)
+                tip = end[i] + up * (cycle.retract_mm if cycle.retract_mm is not None else clear_mm)
                 collector.put_lone(Kind.RAPID, Flag.CYCLE, line_of, own, tip)
         collector.put_feed(collector.moves, self.feed_mm_s, *self.feed_stated)
         end[-1] = tip

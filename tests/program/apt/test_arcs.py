@@ -262,6 +262,7 @@ def test_a_point_may_end_with_one_comma(setup: Setup) -> None:
          "an arc is not in a plane of two axes"),
         ("GOTO/10,0,5\nCIRCLE/0,0,5,0,0,1,11\nGOTO/0,10,5", 4, "OLP530",
          r"states a radius of 11\.0000 mm, and its start is 10\.0000 mm from its centre"),
+        ("GOTO/10,0,5\nCIRCLE/0,0,5,0,0,1E0,11\nGOTO/0,10,5", 4, "OLP530", r"states a radius of 11\.0000 mm"),
         ("GOTO/10,0,5\nMOVARC/0,0,5,0,0,1,10,ANGLE,80\nGOTO/0,10,5", 4, "OLP530",
          r"states an angle of 80\.0000 degrees, and its points give 90\.0000"),
         (BACK * 3, 5, "OLP530", "its normal seems to be left-handed"),
