@@ -78,8 +78,9 @@ class Events:
         self.onward = 0
         self.back: list[int] = []
         self.unconfirmed: int | None = None
+        #: the points of the chunk, and how many of them are moves
         self.points: Points
-        self.done = 0
+        self.done: int
         self._handlers: dict[bytes, Callable[[Statement, int], None]] = {
             b"FEDRAT": self._feed, b"UNITS": self._units, b"UNIT": self._units, b"CIRCLE": self._circle,
             b"MOVARC": self._circle, b"LOADTL": self._load, b"LOAD": self._load, b"TOOLNO": self._load,

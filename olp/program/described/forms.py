@@ -32,7 +32,7 @@ _NAME = r"[A-Za-z_$.][\w.$]*(?:\[[\w,. ]*\])?"
 @dataclass(frozen=True, slots=True)
 class Form:
     """A form and the pattern that it means; `first` is the word that it begins with, "" where it may begin
-    with several."""
+    with several, as `G{number}` does."""
 
     text: str
     pattern: re.Pattern[str]
@@ -67,7 +67,7 @@ def form(text: str, *, ignore_case: bool) -> Form:
             apart = wordy and before == "wordy"
             pieces.append((r"\s++" if blank else "") if apart else r"\s*+")
         pieces.append(_piece(kind or "", token, fields, text))
-        if before == "start" and kind == "word":
+        if before == "start" and kind == "word" and text[token.end() : token.end() + 1] not in tuple("{<[."):
             first = token_text
         before = "wordy" if wordy else "mark"
         blank = False

@@ -323,7 +323,7 @@ def test_names_of_datums_are_found_in_capitals_or_not(tmp_path: Path) -> None:
     [
         ("PROBE,FIXED,CART,0.5,4,-20.25", [0.5, 4, -20.25]), ("FIXED,CART,0,4,-20,0,0,1,4", [0, 4, -20]),
         ("CART,0,4,-20", None), ("PROBE,CART,0,4,-20,FIXED", None), ("PROBE,FIXED,CART,0,4", None),
-        ("PROBE,FIXED,0,4,-20", None),
+        ("PROBE,FIXED,0,4,-20", None), ("FIXED,0,4,-20,9", None),
     ],
 )  # fmt: skip
 def test_which_definitions_of_a_stylus_have_an_offset(
