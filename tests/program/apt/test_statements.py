@@ -718,6 +718,8 @@ OF_TWO_WORDS = {b"TOOL PATH": Support.UNCHANGED, b"$$-> CSYS": Support.READ}
 def test_each_word_has_its_row_in_the_table() -> None:
     want = {word.encode(): support for support, words in WORDS.items() for word in words.split()}
     assert {word: support for word, (support, _) in TABLE.items()} == want | OF_TWO_WORDS
+    clear = {*WORDS[Support.UNCHANGED].split(), "TOOL PATH"} - {"INSERT"}
+    assert {word.decode() for word, (_, why) in TABLE.items() if why == ""} == clear
 
 
 def test_what_has_no_effect_on_the_path_is_passed_over(setup: Setup) -> None:

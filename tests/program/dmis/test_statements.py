@@ -191,7 +191,7 @@ def test_what_is_not_read_is_refused(text: str, words: str, setup: Setup) -> Non
 
 
 def test_a_point_may_end_with_one_comma_and_name_its_form(setup: Setup) -> None:
-    for point in ("1,2,3", "1,2,3,", "CART,1,2,3", "CART,1,2,3,"):
+    for point in ("1,2,3", "1,2,3,", "CART,1,2,3", "CART,1,2,3,", "1,2,3,,", "CART,1,2,3,,"):
         assert ends(f"GOTO/{point}\n", setup) == [[101.0, 2.0, 3.0]]
 
 
@@ -235,6 +235,8 @@ FIXED = "PROBE,FIXED,CART,0,4,-20"
         ("DO/I,1,3\nIF/(A)\nENDIF", 5, "OLP532", "DO has no end"),
         ("A=5", 3, "OLP511", "A is assigned, and its effect is known at run time only"),
         ("ROTAB/1", 3, "OLP512", "ROTAB moves an axis that is not read"),
+        ("UNITS A/MM", 3, "OLP512", "UNITS A is not a statement that olp knows"),
+        ("TEXT (A)/MM", 3, "OLP512", r"TEXT \(A\) is not a statement that olp knows"),
         ("S(A)=CALIB/1", 3, "OLP512", "CALIB goes to a position that only the run of the program decides"),
         ("$$ a $\nGOTO/1,2,3", 4, "OLP510", "the comment before ends with `\\$`"),
         ("GOTO/POL,1,2,3", 3, "OLP512", "GOTO/POL is not read; expected CART"),
@@ -541,6 +543,10 @@ WORDS = {
 def test_each_word_has_its_row_in_the_table() -> None:
     want = {word.encode(): support for support, words in WORDS.items() for word in words.split()}
     assert {word: support for word, (support, _) in TABLE.items()} == want
+    feature = "FEAT TOL CONST DATDEF DATTRG OUTPUT EVAL REFMNT BOUND ASSIGN OBTAIN PROMPT"
+    clear = {*WORDS[Support.UNCHANGED].split()} - {*feature.split()}
+    clear |= {"ENDMES", "ELSE", "ELSEIF", "ENDIF", "ENDDO", "ENDMAC"}
+    assert {word.decode() for word, (_, why) in TABLE.items() if why == ""} == clear
 
 
 def test_what_has_no_effect_on_the_path_is_passed_over(setup: Setup) -> None:
