@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cases.acceptance import machine
-from cases.readings import feeds_of, said, text_of
+from cases.readings import feeds_of, said, text_of, word_of
 
 from olp.core.errors import ProgramError
 from olp.core.machine import Setup
@@ -691,6 +691,47 @@ def test_without_words_the_path_is_the_same(setup: Setup) -> None:
     assert len(bare.slot) == 0
     assert bare.toolpath.end_mm == pytest.approx(full.toolpath.end_mm, rel=0, abs=0, nan_ok=True)
     assert bare.toolpath.kind.tolist() == full.toolpath.kind.tolist()
+
+
+@pytest.mark.parametrize(("longest", "width"), [(71, 72), (72, 72), (73, 80), (80, 80), (81, 0)])
+def test_lines_of_old_terminals_are_kept_as_narrow(longest: int, width: int, setup: Setup) -> None:
+    text = f"PPRINT {'A' * (longest - 7)}\r\nGOTO/1,2,3\r\n"
+    statements = program(text, setup).statements
+    assert statements is not None
+    assert (statements.width, statements.cards, statements.mark) == (width, False, b"$")
+    assert (statements.rapid, statements.decimal) == (b"RAPID", b"")
+
+
+def test_cards_have_their_numbers_behind_72_columns(setup: Setup) -> None:
+    cards = ["UNITS/MM", "GOTO/1,2,3", "GOTO/4,5,6", "FINI"]
+    text = "".join(f"{card:<72}{10 * k:08d}\n" for k, card in enumerate(cards))
+    done = program(text, setup, head="")
+    assert done.statements is not None
+    assert (done.statements.width, done.statements.cards) == (72, True)
+    assert done.toolpath.end_mm.tolist() == [[101.0, 2.0, 3.0], [104.0, 5.0, 6.0]]
+
+
+def test_words_of_statements_have_no_letters(setup: Setup) -> None:
+    done = program("GOTO/1,2.,-.5\nGOTO/1E1,2,3\nGOTO/4$\n4,5,$\n6\nGODLTA/-2.50\n", setup)
+    words = done.words
+    assert words is not None
+    assert (words.letter == 0).all()
+    assert words.number.tolist() == words.start.tolist()
+    assert len(words.first_word) == 0
+    rows = [[word_of(done, k) for k in row] for row in done.slot.tolist()]
+    assert rows == [
+        [(b"1", 1.0, False), (b"2.", 2.0, True), (b"-.5", -0.5, True)],
+        [(b"1E1", 10.0, False), (b"2", 2.0, False), (b"3", 3.0, False)],
+        [(b"4$\n4", 44.0, False), (b"5", 5.0, False), (b"6", 6.0, False)],
+        [None, None, (b"-2.50", -2.5, True)],
+    ]
+    assert done.statements is not None
+    assert [(word_of(done, k), mark) for k, mark in done.statements.broken.items()] == [
+        ((b"4$\n4", 44.0, False), b"$\n")
+    ]  # fmt: skip
+    arcs = program("GOTO/10,0,5\nCIRCLE/0,0,5,0,0,1\nGOTO/0,10,5\n", setup).arc_slots
+    assert arcs.word.tolist() == [[-1] * 5]
+    assert arcs.absolute.tolist() == [True]
 
 
 # -- the table of statements ---------------------------------------------------------------------------
