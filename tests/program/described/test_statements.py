@@ -201,6 +201,9 @@ TEXTS: dict[str, tuple[str, list[tuple[int, int, int, list[float], str, float]]]
         (2, L, 0, [-2, 1, 3], "CUT 1, 2, 3", NAN), (3, L, W, [-2, 4, 3], "PART X4", NAN),
         (4, L, I, [-2, 5, 3], "STEP 1 0 0", NAN), (6, L, 0, [101, 2, 3], "CUT 1, 2, 3", NAN),
         (8, L, 0, [-2, 1, 3], "CUT 1, 2, 3", NAN)]),
+    "turned frames in inches": ("BASE\nINCH\nCUT 1, 2, 3\nPART X4\nSTEP 1 0 0\n", [
+        (3, L, 0, [-50.8, 25.4, 76.2], "CUT 1, 2, 3", NAN), (4, L, W, [-50.8, 101.6, 76.2], "PART X4", NAN),
+        (5, L, I, [-50.8, 127, 76.2], "STEP 1 0 0", NAN)]),
     "speeds": (
         "SPEED 5\nCUT 1, 2, 3\nSLOW 1 2 4 F60\nCUT 1, 2, 5\nQUICK 2\nCUT 1, 2, 6\nGO X1 Y2 Z7 V9\nCUT "
         "1, 2, 8\n"
@@ -272,6 +275,16 @@ def test_tools_and_frames_of_moves(way: str, small: UserDialect, setup: Setup) -
     assert [f.tool_mm[2] for f in frames] == [0, -40, -40, -30, 0]
     assert path.start_mm[:2] == (1.0, 2.0)
     assert math.isnan(path.start_mm[2])
+
+
+def test_the_length_of_a_tool_counts_where_the_machine_says_so(tmp_path: Path, small: UserDialect) -> None:
+    tables = TABLES + "[job_defaults]\nlength_active = true\ntool = 2\n"
+    setup = load_setup(machine(tmp_path, tables=tables))
+    text = b"CUT 1, 2, 3\nPART X4\nTOOL 1\nBASE\nCUT 1, 2, 3\nPART X4\nSTEP 0 0 1\n"
+    path = read(text, setup, small).toolpath
+    want = [[101, 2, 43], [104, 2, 43], [-2, 1, 33], [-2, 4, 33], [-2, 4, 34]]
+    assert path.end_mm == pytest.approx(np.array(want, float))
+    assert [path.frames[k].tool for k in path.frame.tolist()] == [2, 2, 1, 1, 1]
 
 
 def test_where_a_program_begins_is_that_of_the_job(small: UserDialect, setup: Setup) -> None:
