@@ -48,7 +48,7 @@ def form(text: str, *, ignore_case: bool) -> Form:
     before = "start"
     blank = False
     for token in _TOKEN.finditer(text):
-        kind = token.lastgroup if token.lastgroup != "name" else "field"
+        kind = token.lastgroup or ""
         if kind == "blank":
             blank = True
             continue
@@ -66,7 +66,7 @@ def form(text: str, *, ignore_case: bool) -> Form:
             # no blank inside a word; around marks blanks are free
             apart = wordy and before == "wordy"
             pieces.append((r"\s++" if blank else "") if apart else r"\s*+")
-        pieces.append(_piece(kind or "", token, fields, text))
+        pieces.append(_piece(kind, token, fields, text))
         if before == "start" and kind == "word" and text[token.end() : token.end() + 1] not in tuple("{<[."):
             first = token_text
         before = "wordy" if wordy else "mark"

@@ -42,6 +42,9 @@ carry = ["SAY ...", "AT{number} GO"]
 form = "GO X{x} Y{y} Z{z} [A{a}] [B{b}] [C{c}] [V{speed}]"
 does = "rapid"
 [[statements]]
+form = "TAG '...' GO X{x} Y{y} Z{z}"
+does = "rapid"
+[[statements]]
 form = "CUT {x}, {y}, {z} [V{speed}]"
 does = "line"
 [[statements]]
@@ -220,6 +223,12 @@ TEXTS: dict[str, tuple[str, list[tuple[int, int, int, list[float], str, float]]]
         (2, L, W, [104, 5, 6], "", NAN), (3, L, 0, [101, 2, 3], "CUT 1, 2, 3", NAN)]),
     "quotes": ("SAY '! // ' CUT\nSAY 'a' ! 'b\nCUT 1, 2, 3 ! 'c\nSAY '// !\n", [
         (3, L, 0, [101, 2, 3], "CUT 1, 2, 3", NAN)]),
+    "comments behind quotes": (
+        "TAG 'a ! // b' GO X1 Y2 Z3 ! c\nTAG '' GO X4 Y5 Z6 // 'c' ! d\nTAG 'e' GO X7 Y8 Z9\n",
+        [(1, R, 0, [101, 2, 3], "TAG 'a ! // b' GO X1 Y2 Z3", INF), (2, R, 0, [104, 5, 6],
+        "TAG '' GO X4 Y5 Z6", INF),
+         (3, R, 0, [107, 8, 9], "TAG 'e' GO X7 Y8 Z9", INF)],
+    ),
     "forms with digits": ("AT5 GO\nat7 go\nGO X1 Y2 Z3\nGO X2 Y2 Z3\n", [
         (3, R, 0, [101, 2, 3], "GO X1 Y2 Z3", INF), (4, R, 0, [102, 2, 3], "GO X2 Y2 Z3", INF)]),
     "line ends of Windows": ("\ufeffCUT 1, 2, 3\r\nCUT 4, 5, 6\r\n", [
