@@ -6,6 +6,7 @@ import math
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -261,6 +262,43 @@ def test_both_ways_say_the_same(
     fast = said(read(data, setup, small))
     monkeypatch.setattr(reader, "same_form_of", lambda *_: None)
     assert said(read(data, setup, small)) == fast
+
+
+def test_similar_lines_are_matched_once(
+    small: UserDialect, setup: Setup, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A program of many moves is compared with the forms once per kind of line."""
+    matched: list[int] = []
+    match = reader._Reader._rule
+
+    def counted(self: Any, line: Any) -> Any:
+        matched.append(line.number)
+        return match(self, line)
+
+    monkeypatch.setattr(reader._Reader, "_rule", counted)
+    lines = [
+        "CUT 1, 2, 3",
+        "N5 GO X1 Y2 Z3 A4 V5",
+        "CUT 11, .2, 3.5",
+        "N60 GO X1 Y22 Z3 A.4 V5",
+        "GO X1 Y2 Z3 A4 V5",
+    ]
+    assert len(read("\n".join(lines * 20).encode(), setup, small).toolpath) == 100
+    assert matched == [1, 2, 5]
+    matched.clear()
+    # where a number ends, where a line has more of them, and what is no move
+    more = [
+        "PART X1",
+        "PART X2",
+        "STEP 1 1 1",
+        "STEP 1 1 2",
+        "CUT 1, 2, 3 ! 4",
+        "CUT 1, 2, 3 ! 5",
+        "TOOL 1",
+        "TOOL 2",
+    ]
+    read("\n".join(["CUT 1, 2, 3", *more]).encode(), setup, small)
+    assert matched == [1, 2, 3, 4, 5, 6, 7, 8, 9]
 
 
 def test_the_words_of_a_move_are_its_numbers(way: str, small: UserDialect, setup: Setup) -> None:
