@@ -148,6 +148,8 @@ PLAIN: dict[str, tuple[bytes, list[float] | None]] = {
     "an empty cell": (b"1,,3\n", None), "an exponent": (b"1e1,2,3\n", None), "a word": (b"1,2,z\n", None),
     "two numbers": (b"1 2,2,3\n", None), "a later word": (b"1,2,3\n1,x,3\n", None),
     "two points": (b"1.2.3,2,3\n", None),
+    "a mark behind a number": (b"1,2!,3\n", None), "a mark before a number": (b"1,!2,3\n", None),
+    "a short last row": (b"1,2,3\n5", None), "a short last row of two": (b"1,2,3\n5\n", None),
     "a sign alone": (b"-,2,3\n", None),
 }  # fmt: skip
 
@@ -323,6 +325,13 @@ def test_what_is_remarked_of_a_list(way: str, setup: Setup) -> None:
     assert listed("X_mm,Y_mm,Z_mm\n", setup, dialect(frame="G54")).remarks == (
         ("joined", 1, "how the machine goes from row to row is not stated"),
     )
+
+
+@pytest.mark.parametrize("column", "ABCIJK")
+def test_each_column_of_a_direction_may_turn(column: str, way: str, setup: Setup) -> None:
+    text = f"X_mm,Y_mm,Z_mm,{column}\n1,2,3,1\n1,2,3,1\n1,2,3,2\n"
+    assert ("turning", 4, "the orientation changes from row to row") in listed(text, setup).remarks
+    assert "turning" not in {name for name, *_ in listed(text.replace(",2\n", ",1\n"), setup).remarks}
 
 
 @pytest.mark.parametrize(
