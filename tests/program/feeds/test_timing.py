@@ -234,6 +234,16 @@ def test_lengths_of_moves(text: str, length: float) -> None:
     assert later == pytest.approx([1.0, 1.0, length, 5.0], rel=1e-12)
 
 
+def test_a_helix_is_as_high_as_its_ends_are_apart() -> None:
+    for text, rise in (
+        ("G1 Z2\nG2 X10 I5 Z5", 3),
+        ("G18 G1 Y-2\nG2 X10 I5 Y1", 3),
+        ("G19 G1 X9\nG3 Y10 J5 X5", 4),
+    ):
+        lengths = lengths_mm(reading(f"F60\n{text}").toolpath)
+        assert lengths[1] == pytest.approx(math.hypot(5 * np.pi, rise), rel=1e-12)
+
+
 def test_columns_of_time_are_not_changed() -> None:
     for program in (reading("G1 X1 F60"), statements("GOTO/1,2,3", FEDRAT)):
         times = timing(program)
