@@ -13,8 +13,6 @@ from olp.core.errors import ConfigError, ProgramError
 from olp.core.machine import ZERO, Axis, Job, Machine, Setup, Tool, Vector, WorkOffset
 from olp.core.toolpath import CutterCompensation, LengthError
 from olp.program.frames import (
-    DOWN,
-    UP,
     FrameTable,
     length_errors_of,
     tool_vector_of,
@@ -24,6 +22,9 @@ from olp.program.frames import (
     turned,
 )
 
+#: directions from tip to gauge point, in machine coordinates
+UP: Vector = (0.0, 0.0, 1.0)
+DOWN: Vector = (0.0, 0.0, -1.0)
 AXES = {axis: Axis((-1000.0, 1000.0), 0.001, 100.0, 1000.0, 1e5) for axis in "XYZ"}
 TRUE = WorkOffset("G54", (10.0, 20.0, 30.0), set_by="true")
 TOUCH = WorkOffset("G55", (10.0, 20.0, 30.0), set_by="touch")
