@@ -729,6 +729,12 @@ def test_words_of_statements_have_no_letters(setup: Setup) -> None:
     assert [(word_of(done, k), mark) for k, mark in done.statements.broken.items()] == [
         ((b"4$\n4", 44.0, False), b"$\n")
     ]  # fmt: skip
+    once = program("GOTO/4$\r4$\r4,5,6\r", setup, head="UNITS/MM\r").statements
+    assert once is not None
+    assert list(once.broken.values()) == [b"$\r4$\r"]
+    lone = program("GOTO/1,2,3\nRETRCT\n", setup).statements
+    assert lone is not None
+    assert (lone.begin.tolist(), lone.end.tolist()) == ([9, -1], [19, -1])
     arcs = program("GOTO/10,0,5\nCIRCLE/0,0,5,0,0,1\nGOTO/0,10,5\n", setup).arc_slots
     assert arcs.word.tolist() == [[-1] * 5]
     assert arcs.absolute.tolist() == [True]
