@@ -735,6 +735,7 @@ def test_words_of_statements_have_no_letters(setup: Setup) -> None:
     lone = program("GOTO/1,2,3\nRETRCT\n", setup).statements
     assert lone is not None
     assert (lone.begin.tolist(), lone.end.tolist()) == ([9, -1], [19, -1])
+    assert program("GOTO/1,2,3\nRETRCT\n", setup).slot.tolist()[1] == [-1, -1, -1]
     arcs = program("GOTO/10,0,5\nCIRCLE/0,0,5,0,0,1\nGOTO/0,10,5\n", setup).arc_slots
     assert arcs.word.tolist() == [[-1] * 5]
     assert arcs.absolute.tolist() == [True]
