@@ -15,8 +15,6 @@ Turn = tuple[Vector, Vector, Vector]
 
 UP: Vector = (0.0, 0.0, 1.0)
 DOWN: Vector = (0.0, 0.0, -1.0)
-#: A direction is an axis of the machine where its other components are below this.
-ALONG = 1e-7
 
 
 def turn_of(angles_deg: Vector) -> Turn | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,7 @@ from cases.acceptance import TRUE_ZERO, machine
 
 from olp.core.errors import ProgramError, UsageError
 from olp.files.config import load_setup
+from olp.program.dialect import Row, Support
 from olp.program.registry import DIALECTS, dialect_of, find, named, read
 
 HAAS = DIALECTS["haas"]
@@ -63,3 +65,136 @@ def test_a_payload_comment_of_a_dialect_that_has_none_is_refused(
     with pytest.raises(ProgramError, match=r"a comment changes the payload: .* one payload") as caught:
         read(before + b"PPRINT (olp payload 30 kg)\nGOTO/1,2,3\n", setup, DIALECTS["apt"])
     assert caught.value.line == line
+
+
+#: lines that only one dialect has, each the only one of its text
+SIGNS = {
+    "apt": (
+        "PARTNO A", "LOADTL/1", "LOAD/TOOL,1", "LOAD /1", "SPINDL/9", "FINI", "FINI\r", "CUTTER/1",
+        "TOOL PATH/A",
+        "CUTCOM/LEFT", "MULTAX/ON", "TLAXIS/0,0,1", "RAPID", "RAPID/", "RAPID / \r", "FEDRAT/9", "FEDRAT/.5",
+        "FEDRAT / IPM,1", "FEDRAT/MMPM,5", "FEDRAT/IM,5", "GODLTA/1", "INDIRV/1,0,0", "MOVARC/1", "CIRCLE/1",
+        "CIRCLE /1", "CYCLE/OFF", "CYCLE /OFF", "UNITS/MM", "UNIT/INCH", "UNITS / INCHES \r",
+        "GOTO/1,2,3,0,0,1",
+        "GOTO / -1.5, +2E1 ,3D0 , 0,0,1",
+    ),
+    "dmis": (
+        "DMISMN/A", "FILNAM/A", "SNSLCT/S(A)", "SNSET/A", "PTMEAS/CART", "MEAS/POINT", "MEAS /POINT",
+        "ENDMES",
+        "ENDFIL", "WKPLAN/XY", "TECOMP/ON", "UNITS/MM,ANGDEC", "UNITS / MM , A", "GOTO/CART,1",
+        "GOTO / CART,1",
+        "MODE/MAN", "MODE / PROG,MAN", "MODE/AUTO", "F(A)=FEAT/1", "F(A b) = FEAT/1", "FEDRAT/POSVEL,1",
+        "FEDRAT / MESVEL,1",
+    ),
+}  # fmt: skip
+#: lines that no dialect of statements has alone
+NO_SIGNS = (
+    "LOAD 1", "FINISH", "RAPID A", "RAPID/5", "FEDRAT/A", "CIRCLE 1", "CYCLE 1", "UNITS MM", "UNIT/MM,X",
+    "GOTO 1",
+    "GOTO/1,2,3", "GOTO/A,2,3,0,0,1", "MEAS", "MODE/OFF", "F(A)=5", "X PARTNO", "(PARTNO)", "G0 X1 FINI",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "line"), [(n, line) for n, lines in SIGNS.items() for line in lines])
+def test_a_line_that_only_one_dialect_has_shows_it(name: str, line: str) -> None:
+    """Anywhere in the text, in capitals or not, behind blanks; else the control's dialect is taken."""
+    for text in (line, f"A\n \t{line}\nB", f"G0 X1\n{line.lower()}\n"):
+        assert chosen(None, text.encode(), "a.txt") == name
+
+
+@pytest.mark.parametrize("line", NO_SIGNS)
+def test_a_line_that_others_have_too_shows_nothing(line: str) -> None:
+    assert chosen(None, f"{line}\n".encode(), "a.nc", "apt") == "apt"
+    signs = [d.sign for d in DIALECTS.values() if d.sign is not None]
+    assert not any(sign.search(line.encode()) for sign in signs)
+
+
+@pytest.mark.parametrize("line", ("GOTO/1,2,3", "goto / 1", "RAPID/5", "FROM/1,2,3", " \tFROM /1"))
+def test_points_by_slash_are_of_two_dialects(line: str) -> None:
+    with pytest.raises(ProgramError, match="the text may be apt or dmis; name its dialect") as caught:
+        chosen(None, f"A\n{line}\n".encode(), "a.txt")
+    assert caught.value.code == "OLP503"
+
+
+def test_more_signs_decide_and_as_many_do_not() -> None:
+    assert chosen(None, b"PARTNO\nFINI\nENDMES\n", "") == "apt"
+    assert chosen(None, b"PARTNO\nENDFIL\nENDMES\n", "") == "dmis"
+    with pytest.raises(ProgramError, match="may be apt or dmis"):
+        chosen(None, b"PARTNO\nENDMES\n", "")
+    assert chosen(None, b"PARTNO\nENDMES\n", "a.dmis") == "dmis"
+    assert chosen(None, b"PARTNO\nENDMES\n", "a.cl", "dmis") == "apt"
+    # signs count in the first 65536 bytes
+    assert chosen(None, b"\n" * 65530 + b"PARTNO\n", "") == "apt"
+    assert chosen(None, b"\n" * 65531 + b"PARTNO\n", "") == "haas"
+
+
+@pytest.mark.parametrize(
+    ("file", "name"),
+    [
+        *((f"part.{e}", "apt") for e in ("apt", "aptsource", "ncl", "cls", "cl", "clt", "cldata", "clf")),
+        *((f"part.{e}", "dmis") for e in ("dmi", "dms", "dmis")), ("part.csv", "list"), ("PART.TSV", "list"),
+        ("part.ncl.12", "apt"), ("part.12", "haas"), ("part.ncl.x", "haas"), ("", "haas"), ("part", "haas"),
+    ],
+)  # fmt: skip
+def test_endings_of_files(file: str, name: str) -> None:
+    assert chosen(None, b"", file) == name
+
+
+def test_a_contradiction_has_its_code() -> None:
+    with pytest.raises(ProgramError, match="with --dialect, or with the key dialect") as caught:
+        chosen(None, b"PARTNO A\n", "a.dmi")
+    assert caught.value.code == "OLP503"
+
+
+def test_what_each_dialect_of_statements_says_of_itself() -> None:
+    apt, dmis = DIALECTS["apt"], DIALECTS["dmis"]
+    assert list(DIALECTS) == ["linuxcnc", "fanuc", "grbl", "haas", "apt", "dmis", "list"]
+    assert apt.title == "APT and cutter-location data (ISO 4343, ISO 3592)"
+    assert dmis.title == "DMIS part programs of coordinate measuring machines (ISO 22093)"
+    assert (apt.path_mode, dmis.path_mode) == (
+        "the post-processor's", "the control's own approach and retract"
+    )  # fmt: skip
+    assert apt.comment == dmis.comment == (b"$$ ", b"")
+    assert (apt.first, dmis.first) == ((b"%", b"$$*", b"PARTNO"), (b"FILNAM|DMISMN|DMISMD",))
+    assert (apt.points, apt.axes_at_ram, dmis.points, dmis.axes_at_ram) == (False, False, True, True)
+    for dialect in (apt, dmis, DIALECTS["list"]):
+        assert (dialect.marks, dialect.payload_comments, dialect.path_tolerance) == (True, False, False)
+        assert (dialect.inch_decimals, dialect.free_digits, dialect.unroller) == (5, 1, None)
+        assert dialect.straightened(b"G2 X1\n") == b"G2 X1\n"
+        assert dialect.lines(b"a\r\nb\rc") == [b"a\r\n", b"b\r", b"c"]
+    assert not DIALECTS["list"].continues(b"a $")
+
+
+@pytest.mark.parametrize(
+    ("line", "goes_on"),
+    [(b"A $", True), (b"A $ \r\n", True), (b"$", True), (b"A $ B", False), (b"$$ A $", False), (b"A", False)],
+)
+def test_statements_go_on_behind_a_dollar(line: bytes, goes_on: bool) -> None:
+    assert DIALECTS["apt"].continues(line) is DIALECTS["dmis"].continues(line) is goes_on
+
+
+def test_support_is_said_for_people_and_for_reports() -> None:
+    titles = {support: (support.value, support.title) for support in Support}
+    assert titles == {
+        Support.CORRECTED: ("corrected", "corrected"), Support.READ: ("read", "read"),
+        Support.UNCHANGED: ("carried", "unchanged"), Support.REFUSED: ("refused", "refused"),
+    }  # fmt: skip
+    assert Row("A", Support.UNCHANGED).as_dict() == {"statement": "A", "support": "carried", "why": ""}
+    assert DIALECTS["apt"].support()[0] == {
+        "statement": "GOTO", "support": "corrected", "why": "points with or without a tool axis"
+    }  # fmt: skip
+
+
+def test_payloads_of_a_job_belong_to_languages_that_have_them(tmp_path: Path) -> None:
+    setup = load_setup(machine(tmp_path, tables=TRUE_ZERO), None)
+    changing = replace(setup, job=replace(setup.job, payloads={7: 1.0, 3: 2.0}))
+    with pytest.raises(ProgramError, match=r"\[\[payloads\]\] of the job file: .* one payload") as caught:
+        read(b"GOTO/1,2,3\n", changing, DIALECTS["apt"])
+    assert (caught.value.line, caught.value.code) == (3, "OLP550")
+    assert "APT and cutter-location data (ISO 4343, ISO 3592) programs have one payload" in str(caught.value)
+    for comment in (b"$$ olp payload 3", b"PPRINT OLP\tPAYLOAD", b"olp  payload"):
+        with pytest.raises(ProgramError, match="a comment changes the payload") as caught:
+            read(b"GOTO/1,2,3\n\n" + comment, setup, DIALECTS["apt"])
+        assert (caught.value.line, caught.value.code) == (3, "OLP550")
+    for comment in (b"$$ xolp payload", b"$$ olp payloads", b"$$ olp-payload", b"$$ olp\n$$ payload"):
+        assert len(read(b"GOTO/1,2,3\n" + comment, setup, DIALECTS["apt"]).toolpath) == 1

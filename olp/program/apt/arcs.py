@@ -270,7 +270,7 @@ def _catia(form: ArcForm, start: Array, end: Array, centre: Array, axes: Array, 
     to = end - centre
     angle = np.arctan2(to[second], to[first]) - np.arctan2(arm[second], arm[first])
     angle = float(angle if turning > 0 else -angle) % (2 * np.pi) or 2 * np.pi
-    if (angle > np.pi + 1e-6) != form.second and abs(angle - np.pi) > 1e-3:
+    if (angle > np.pi) != form.second and abs(angle - np.pi) > 1e-3:
         times = "first" if not form.second else "second"
         raise ProgramError(
             f"the arc meets its line the {times} time on the other side of its centre, "

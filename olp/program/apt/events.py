@@ -78,8 +78,9 @@ class Events:
         self.onward = 0
         self.back: list[int] = []
         self.unconfirmed: int | None = None
+        #: the points of the chunk, and how many of them are moves
         self.points: Points
-        self.done = 0
+        self.done: int
         self._handlers: dict[bytes, Callable[[Statement, int], None]] = {
             b"FEDRAT": self._feed, b"UNITS": self._units, b"UNIT": self._units, b"CIRCLE": self._circle,
             b"MOVARC": self._circle, b"LOADTL": self._load, b"LOAD": self._load, b"TOOLNO": self._load,
@@ -264,14 +265,14 @@ class Events:
         for field in statement.fields():
             pair = field.number
             if pair is None:
-                if field.text in (b"OFF", b"NOMORE"):
+                if field.text in _OFF:
                     continue
                 raise ProgramError(
                     f"the coordinate system is given by the name {shown(field.text)}; expected its numbers",
                     line=statement.line,
                     code="OLP523",
                 )
-            values.append(round(pair[0] / 10.0 ** pair[1], 9) + 0.0)
+            values.append(round(pair[0] / 10.0 ** pair[1], 9))
         key: object = tuple(values)
         if key == _IDENTITY or not any(values) or key == (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0):
             key = None

@@ -28,8 +28,6 @@ from olp.program.statement_rows import Point, Points
 from olp.program.text.statements import Chunk, Comment, Statement, chunks, shown
 
 NAN = float("nan")
-#: Whether these are refused depends on other statements.
-_BY_ORDER = frozenset({b"RAPID", b"TLON", b"GODLTA"})
 #: Refused by the table of statements, wherever it is.
 NOT_READ = "OLP512"
 _FREE = re.compile(rb"(?i)(?:" + b"|".join(FREE) + rb")(?![A-Z])")
@@ -113,11 +111,10 @@ class _Reader(Events):
             label, major = b"", b"CSYS"
         free = _FREE.match(text)
         if free:
-            label, major = b"", free[0].upper()
+            label, major = b"", free[0]
         first = major.split(b",")[0].strip()
         handler = self._handlers.get(first)
         if first == b"RAPID":
-            self._resolve(row)
             raise ProgramError(
                 "RAPID has words that are not read; expected RAPID alone", line=statement.line, code="OLP510"
             )
@@ -143,7 +140,7 @@ class _Reader(Events):
         if free:
             label, major = b"", free[0]
         first = major.split(b",")[0].strip()
-        if label or text[:2] == b"$$" or first in self._handlers or first in _BY_ORDER:
+        if label or text[:2] == b"$$":
             return None
         support, why = TABLE.get(
             first, (Support.REFUSED, "is not a statement that olp knows, and may move the machine")
@@ -158,13 +155,13 @@ class _Reader(Events):
         """A GOTO, GODLTA or TLON that was not read in columns."""
         _, major = statement.head()
         line = statement.line
-        if major.startswith(b"TLON"):
+        if major.split(b",")[0] == b"TLON":
             self.driven[line], fields = tlon(statement, self.collector)
             return Point(line, statement.begin, statement.end, fields)
         if major not in (b"GOTO", b"GODLTA"):
             return None
         fields = statement.fields()
-        if fields and all(f.text == b"" for f in fields[-1:]):
+        if fields and not fields[-1].text:
             fields = fields[:-1]
         if any(f.number is None for f in fields):
             bad = next(f for f in fields if f.number is None)
@@ -339,22 +336,23 @@ class _Reader(Events):
         """Moves of holes: to the clearance above the stated point, down, and up."""
         collector = self.collector
         tip = np.array(self.position)
+        clear_mm, depth_mm = cycle.clear_mm or 0.0, cycle.depth_mm
+        stroke = depth_mm is not None and cycle.clear_mm is not None
         for i in range(len(line)):
             line_of, up = int(line[i]), ups[i]
-            x, y, z = (up * (cycle.clear_mm or 0.0)).tolist()
-            own = self.table.lifted(int(frame[i]), (x, y, z)) if cycle.clear_mm else int(frame[i])
-            tip = end[i] + up * (cycle.clear_mm or 0.0)
-            stroke = cycle.depth_mm is not None and cycle.clear_mm is not None
+            x, y, z = (up * clear_mm).tolist()
+            own = self.table.lifted(int(frame[i]), (x, y, z))
+            tip = end[i] + up * clear_mm
             flag = np.array([Flag.CYCLE if stroke else 0], np.uint8)
             collector.put_stated_moves(
                 np.array([Kind.RAPID], np.uint8), flag, [line_of], [own], tip[None],
                 slot[i : i + 1], begin[i : i + 1], stop[i : i + 1],
             )  # fmt: skip
             collector.put_feed(collector.moves, cycle.feed_mm_s, line_of)
-            if cycle.depth_mm is not None and cycle.clear_mm is not None:
+            if depth_mm is not None and stroke:
                 collector.strokes.append((collector.moves - 1, collector.moves))
-                collector.put_lone(Kind.LINE, Flag.CYCLE, line_of, own, end[i] - up * cycle.depth_mm)
-                tip = end[i] + up * (cycle.retract_mm if cycle.retract_mm is not None else cycle.clear_mm)
+                collector.put_lone(Kind.LINE, Flag.CYCLE, line_of, own, end[i] - up * depth_mm)
+                tip = end[i] + up * (cycle.retract_mm if cycle.retract_mm is not None else clear_mm)
                 collector.put_lone(Kind.RAPID, Flag.CYCLE, line_of, own, tip)
         collector.put_feed(collector.moves, self.feed_mm_s, *self.feed_stated)
         end[-1] = tip
@@ -363,18 +361,15 @@ class _Reader(Events):
 
     def _creo(self, chunk: Chunk, comment: Comment) -> Statement:
         """The statement that Creo writes in a comment, which goes on where its line ends with `$`."""
-        text, last = comment.text.rstrip(), comment.line - 1 - chunk.first_line
+        text, last = comment.text.strip(), comment.line - 1 - chunk.first_line
         lines = 1
         match = _CREO.match(text.upper())
         while text.endswith(b"$") and last + 1 < len(chunk.line_start):
             last, lines = last + 1, lines + 1
             text = text[:-1] + chunk.raw(last).rstrip()
-        known = match is not None and match[1] == b"CSYS"
-        body = text[text.find(b"/") :] if known else b"/1,0,0,0,0,1,0,0,0,0,1,0"
-        statement = Statement(comment.line, comment.begin, comment.end, b"$$" + body, None, lines)
-        return (
-            statement if known else Statement(comment.line, comment.begin, comment.end, b"TITLE", None, lines)
-        )
+        csys = match is not None and match[1] == b"CSYS"
+        body = b"$$" + text[text.find(b"/") :] if csys else b"TITLE"
+        return Statement(comment.line, comment.begin, comment.end, body, None, lines)
 
 
 def _summed(value: Array, point: Array, incremental: Mask, start: Sequence[float]) -> Array:

@@ -32,7 +32,7 @@ _NAME = r"[A-Za-z_$.][\w.$]*(?:\[[\w,. ]*\])?"
 @dataclass(frozen=True, slots=True)
 class Form:
     """A form and the pattern that it means; `first` is the word that it begins with, "" where it may begin
-    with several."""
+    with several, as `G{number}` does."""
 
     text: str
     pattern: re.Pattern[str]
@@ -48,7 +48,7 @@ def form(text: str, *, ignore_case: bool) -> Form:
     before = "start"
     blank = False
     for token in _TOKEN.finditer(text):
-        kind = token.lastgroup if token.lastgroup != "name" else "field"
+        kind = token.lastgroup or ""
         if kind == "blank":
             blank = True
             continue
@@ -66,8 +66,8 @@ def form(text: str, *, ignore_case: bool) -> Form:
             # no blank inside a word; around marks blanks are free
             apart = wordy and before == "wordy"
             pieces.append((r"\s++" if blank else "") if apart else r"\s*+")
-        pieces.append(_piece(kind or "", token, fields, text))
-        if before == "start" and kind == "word":
+        pieces.append(_piece(kind, token, fields, text))
+        if before == "start" and kind == "word" and text[token.end() : token.end() + 1] not in tuple("{<[."):
             first = token_text
         before = "wordy" if wordy else "mark"
         blank = False

@@ -72,9 +72,8 @@ class UserDialect(Dialect):
                 begin = _BEGIN.match(rule.form.text)
                 if begin is None:
                     return None
-                words |= {
-                    word.strip().upper().translate(_NO_DIGITS) for word in begin[0].strip("<>").split("|")
-                }
+                either = (word.split() or [""] for word in begin[0].strip("<>").split("|"))
+                words |= {word.upper().translate(_NO_DIGITS) for word, *_ in either}
         return frozenset(words)
 
     def continues(self, line: bytes) -> bool:

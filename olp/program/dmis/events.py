@@ -48,8 +48,9 @@ class Events:
         self.header = False
         self.ended = 0
         self.touches: set[int] = set()
+        #: the points of the chunk, and how many of them are moves
         self.points: Points
-        self.done = 0
+        self.done: int
         self._handlers: dict[bytes, Callable[[Statement, bytes, int], None]] = {
             b"UNITS": self._units, b"SNSDEF": self._snsdef, b"SNSLCT": self._snslct, b"TRANS": self._datum,
             b"ROTATE": self._datum, b"DATSET": self._datum, b"RECALL": self._recall, b"MODE": self._mode,

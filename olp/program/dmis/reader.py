@@ -65,6 +65,8 @@ class _Reader(Events):
                     self.touches.add(point.line)
             if major != b"GOTO":
                 events.append(item)
+            if major == b"ENDFIL":
+                break
         self.points = collector.points(chunk, alone)
         self.done = 0
         upto = np.searchsorted(self.points.line, np.array([e.line for e in events], np.int64)).tolist()
@@ -141,7 +143,7 @@ class _Reader(Events):
         text = statement.text.strip()
         bracketed = major.startswith(b"(") and major.endswith(b")")
         first = major.split(b" ")[0].split(b"(")[0] if major[:3] in (b"IF ", b"IF(") else major
-        if not text or bracketed or first == b"PTMEAS" or first in self._handlers:
+        if not text or bracketed:
             return None
         if label and b"/" not in statement.text:
             return None

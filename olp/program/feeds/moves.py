@@ -97,7 +97,7 @@ def lengths_mm(path: Toolpath) -> Array:
 def governing(scan: Scan) -> tuple[Index, Index]:
     """(n,) the feed moves, and which of the F words of the scan, in order, gives the feed of each.
 
-    Raises ProgramError for a feed move without a feed, and a canned cycle in G93.
+    Raises ProgramError for a feed move without a feed.
     """
     path = scan.program.toolpath
     move = np.flatnonzero(path.kind != Kind.RAPID)
@@ -112,7 +112,6 @@ def governing(scan: Scan) -> tuple[Index, Index]:
     needed = np.where(inverse, line, since)
     stated = (latest >= 0) & (np.append(f_line, -1)[latest] >= needed)
     _refuse(~stated, line, inverse)
-    _refuse_cycles(path, move, inverse, line)
     return move, latest.astype(np.int64)
 
 
@@ -219,16 +218,6 @@ def _refuse(missing: Mask, line: Index, inverse: Mask) -> None:
         line=int(line[i]),
         code="OLP551",
     )
-
-
-def _refuse_cycles(path: Toolpath, move: Index, inverse: Mask, line: Index) -> None:
-    bad = inverse & ((path.flag[move] & np.uint8(Flag.CYCLE)) != 0)
-    if bad.any():
-        raise ProgramError(
-            "in G93 a block has one time, but a canned cycle makes many moves; use G94",
-            line=int(line[np.flatnonzero(bad)[0]]),
-            code="OLP561",
-        )
 
 
 def _check_values(scan: Scan, modes: _Modes, line: Index, value: Array, pointed: Mask, unit: Array) -> None:

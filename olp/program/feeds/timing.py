@@ -93,10 +93,6 @@ def timing(program: Program, *, blend_mm: float = BLEND_MM, block_delete: bool =
         rest[rapids] = rest[rapids + 1] = True
     for hole in program.holes:
         for moves, seconds in hole.rests:
-            if not seconds >= 0:
-                raise ProgramError(
-                    "a dwell is negative; expected zero or more", line=hole.line, code="OLP551"
-                )
             rest[hole.first + moves] = True
             dwell[hole.first + moves] += seconds
     for column in (feed, control, blend, rest, dwell):
@@ -169,13 +165,13 @@ def _rests(program: Program, scan: Scan) -> tuple[Mask, Array]:
     m_line, code = m_line[~along], code[~along]
     late = np.isin(code, _AFTER + _AFTER_EXACT if program.rs274.exact_stop else _AFTER)
     rest[np.searchsorted(line, m_line[late], "right")] = True
-    rest[np.searchsorted(line, m_line[~late], "left")] = True
-    rest[np.searchsorted(line, scan.of_letter(b"S")[1], "left")] = True
+    rest[np.searchsorted(line, m_line[~late])] = True
+    rest[np.searchsorted(line, scan.of_letter(b"S")[1])] = True
     if program.rs274.exact_stop:
         rest[np.searchsorted(line, scan.code_line[scan.code == 90], "right")] = True
     pauses = scan.code_line[scan.code == 40]
     if len(pauses):
-        where = np.searchsorted(line, pauses, "left")
+        where = np.searchsorted(line, pauses)
         rest[where] = True
         np.add.at(dwell, where, _dwell_seconds(program, scan, pauses))
     return rest, dwell

@@ -149,10 +149,10 @@ def plain_numbers(
     step[last] -= 1
     keep = np.cumsum(step[:-1], dtype=np.int8).astype(bool)
     work = blanked(text, keep)
-    if comma:
-        if (work == 46).any():
-            return None
-        work[work == 44] = 46
+    # `+,-./` and digits make a number here: a slash and the other decimal mark do not belong to one
+    if ((work == 47) | (work == (46 if comma else 44))).any():
+        return None
+    work[work == 44] = 46
     compact, begin, end = runs(work)
     if len(begin) != len(first) or (begin != first).any() or (end != last).any():
         return None

@@ -93,9 +93,9 @@ def read_list(
             )
         unit = layout.unit_mm
         rows = _rows(data, layout)
+        frame_name = stated_frame(first_lines(data)) or layout.frame
     except InputError as error:
         raise ProgramError(error.message, line=error.line, code="OLP504") from None
-    frame_name = stated_frame(first_lines(data)) or layout.frame
     table = FrameTable(setup)
     kind = Kind.LINE if layout.joined == "lines" else Kind.RAPID
     whole = kind is Kind.LINE and (not layout.insert or "t" in layout.columns)

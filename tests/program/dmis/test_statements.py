@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 from cases.acceptance import machine
+from cases.readings import feeds_of, said, text_of
 
 from olp.core.errors import ProgramError
 from olp.core.machine import Setup
 from olp.core.toolpath import Flag, Kind
 from olp.files.config import load_setup
+from olp.program.dialect import Support
+from olp.program.dmis import reader
+from olp.program.dmis.table import TABLE
 from olp.program.program import Program
 from olp.program.registry import DIALECTS, read
+from olp.program.text.statements import chunks
 
 TABLES = (
     '[work_offsets.MCS]\nset_by = "true"\n[work_offsets.PART]\nset_by = "true"\nX_mm = 100.0\n'
@@ -185,7 +191,7 @@ def test_what_is_not_read_is_refused(text: str, words: str, setup: Setup) -> Non
 
 
 def test_a_point_may_end_with_one_comma_and_name_its_form(setup: Setup) -> None:
-    for point in ("1,2,3", "1,2,3,", "CART,1,2,3", "CART,1,2,3,"):
+    for point in ("1,2,3", "1,2,3,", "CART,1,2,3", "CART,1,2,3,", "1,2,3,,", "CART,1,2,3,,"):
         assert ends(f"GOTO/{point}\n", setup) == [[101.0, 2.0, 3.0]]
 
 
@@ -195,3 +201,365 @@ def test_endfil_ends_the_program_and_units_are_remarked_where_they_lack(setup: S
     assert [line for what, line, _ in without if what == "unit"] == [2]
     assert not [1 for what, *_ in program("GOTO/1,2,3\n", setup).remarks if what == "unit"]
     assert np.isfinite(program("GOTO/1,2,3\n", setup).toolpath.end_mm).all()
+
+
+# -- refusals ------------------------------------------------------------------------------------------
+
+NAN = math.nan
+FIXED = "PROBE,FIXED,CART,0,4,-20"
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "code", "words"),
+    [
+        ("UNITS/FOOT", 3, "OLP512", "UNITS names a unit that is not read"),
+        ("UNITS", 3, "OLP512", "UNITS names a unit that is not read"),
+        ("SNSLCT", 3, "OLP516", "SNSLCT names no sensor"),
+        ("SNSLCT/LONG", 3, "OLP516", "SNSLCT names no sensor"),
+        ("SNSLCT/S(NONE)\nGOTO/1,2,3", 4, "OLP522", r'the stylus NONE is selected, .* \[styli\."NONE"\]'),
+        ("TRANS/XORIG,1", 3, "OLP516", "TRANS has no label"),
+        ("RECALL/RT(1)", 3, "OLP542", "RECALL is read for datums only"),
+        ("RECALL/S(LONG)", 3, "OLP542", "RECALL is read for datums only"),
+        ("RECALL/SA(LONG)", 3, "OLP542", "RECALL is read for datums only"),
+        ("RECALL/D(OTHER)\nGOTO/1,2,3", 4, "OLP520", r"the datum D\(OTHER\) needs the frame OTHER"),
+        ("MEAS/POINT,F(A),1\nRMEAS/POINT,F(A),1", 4, "OLP532", "MEAS is inside MEAS"),
+        ("ENDMES", 3, "OLP532", "ENDMES has no MEAS before it"),
+        ("PTMEAS/CART,1,2,3", 3, "OLP532", "PTMEAS is outside MEAS and ENDMES"),
+        ("IF/(A)\nENDDO", 4, "OLP532", "ENDDO has no DO before it"),
+        ("ENDIF", 3, "OLP532", "ENDIF has no IF before it"),
+        ("IF/(A)\nUNITS/MM\nENDIF", 4, "OLP511", "UNITS is inside IF, so whether it holds"),
+        ("M(A)=MACRO\nUNITS/MM\nENDMAC", 4, "OLP511", "UNITS is inside MACRO, so whether it holds"),
+        ("M(A)=MACRO\nTEXT/A\nGOTO/1,2,3\nENDMAC", 5, "OLP512", "the macro A moves the machine"),
+        ("CALL/M(B)", 3, "OLP542", "CALL runs a macro that is not in this program"),
+        ("IF/(A)\nTEXT/A", 4, "OLP532", "IF has no end"),
+        ("DO/I,1,3\nIF/(A)\nENDIF", 5, "OLP532", "DO has no end"),
+        ("A=5", 3, "OLP511", "A is assigned, and its effect is known at run time only"),
+        ("ROTAB/1", 3, "OLP512", "ROTAB moves an axis that is not read"),
+        ("UNITS A/MM", 3, "OLP512", "UNITS A is not a statement that olp knows"),
+        ("TEXT (A)/MM", 3, "OLP512", r"TEXT \(A\) is not a statement that olp knows"),
+        ("S(A)=CALIB/1", 3, "OLP512", "CALIB goes to a position that only the run of the program decides"),
+        ("$$ a $\nGOTO/1,2,3", 4, "OLP510", "the comment before ends with `\\$`"),
+        ("GOTO/POL,1,2,3", 3, "OLP512", "GOTO/POL is not read; expected CART"),
+        ("PTMEAS/", 3, "OLP512", "PTMEAS/nothing is not read; expected CART"),
+        ("PTMEAS/1,2,3", 3, "OLP512", "PTMEAS/1 is not read; expected CART"),
+        ("GOTO/1,,3", 3, "OLP511", "GOTO has nothing where a number is expected"),
+        ("GOTO/CART,1,A,B", 3, "OLP511", "GOTO has A where a number is expected"),
+        ("GOTO/", 3, "OLP516", "GOTO has 0 numbers; expected x,y,z$"),
+        ("GOTO/CART,1,2,3,0,0,1", 3, "OLP516", "GOTO has 6 numbers; expected x,y,z$"),
+        ("GOTO/1,2,3\nGOTO/1,2,3,0,0,1", 4, "OLP516", "GOTO has 6 numbers; expected x,y,z$"),
+        ("PTMEAS/CART,1,2", 3, "OLP516", "PTMEAS has 2 numbers; expected x,y,z and a direction$"),
+    ],
+)  # fmt: skip
+def test_a_refusal_has_its_line_its_code_and_its_sentence(
+    text: str, line: int, code: str, words: str, setup: Setup
+) -> None:
+    with pytest.raises(ProgramError, match=words) as caught:
+        program(text + "\n", setup)
+    assert (caught.value.line, caught.value.code) == (line, code)
+
+
+def test_what_is_missing_in_the_files_is_named(setup: Setup, tmp_path: Path) -> None:
+    with pytest.raises(ProgramError) as caught:
+        program("SNSLCT/S(NONE)\nGOTO/1,2,3\n", setup)
+    assert caught.value.missing == ("styli", "NONE")
+    bare = load_setup(machine(tmp_path, controller="dmis"))
+    with pytest.raises(ProgramError, match="the frame of the machine needs the frame MCS") as caught:
+        program("GOTO/1,2,3\n", bare, head="UNITS/MM\n")
+    assert caught.value.missing == ("work_offsets", "MCS")
+
+
+def test_refusals_of_the_table_are_named_together(setup: Setup) -> None:
+    """Those that other statements may put right are not among them, nor is what is behind the end."""
+    text = "ROTAB/1\nA=5\nSCAN/1\nTEXT/A\nIF/1\nMEAS/A\n(B)\nIF (C)\nXTERN/1\nS(D)=PATH/1\nENDFIL\nJUMPTO/1\n"
+    with pytest.raises(ProgramError, match="ROTAB") as caught:
+        program(text, setup)
+    others = caught.value.others
+    assert [(e.line, e.code) for e in others] == [(5, "OLP512"), (11, "OLP512"), (12, "OLP512")]
+    assert [str(e)[:9] for e in others] == ["5: SCAN s", "11: XTERN", "12: PATH "]
+    with pytest.raises(ProgramError) as caught:
+        program("A=5\nSCAN/1\n", setup)
+    assert caught.value.others == ()
+
+
+def test_behind_the_end_nothing_counts(setup: Setup) -> None:
+    text = "GOTO/1,2,3\nENDFIL\nGOTO/A\nGOTO/4,5,6\nROTAB/1\nPTMEAS/1\n"
+    assert ends(text, setup) == [[101.0, 2.0, 3.0]]
+    assert program("DO/I,1,3\nENDFIL\n", setup).end_line == 4
+    assert program("GOTO/1,2,3", setup).end_line == 3
+    assert program("GOTO/1,2,3\n", setup).end_line == 4
+
+
+# -- frames and styli ----------------------------------------------------------------------------------
+
+
+def test_the_tool_of_the_machine_counts_until_a_stylus_is_selected(tmp_path: Path) -> None:
+    """Axes count at the end of the ram: a tool of 30 mm has its tip as far below."""
+    tables = TABLES + "[tools.3]\nZ_mm = 30.0\n[job_defaults]\ntool = 3\n"
+    setup = load_setup(machine(tmp_path, controller="dmis", tables=tables))
+    path = program("GOTO/1,2,3\nSNSLCT/S(LONG)\nGOTO/1,2,3\n", setup).toolpath
+    assert path.end_mm[[0, 2]].tolist() == [[101.0, 2.0, 33.0], [100.0, 0.0, 53.0]]
+    frames = [path.frames[k] for k in path.frame.tolist()]
+    assert [f.tool for f in frames] == [3, 3, None]
+    assert [f.tool_mm for f in frames[::2]] == [(0.0, 0.0, -30.0), (1.0, 2.0, -50.0)]
+    assert [f.length_mm for f in frames[::2]] == [(0.0, 0.0, 30.0), (-1.0, -2.0, 50.0)]
+
+
+def test_a_turned_datum_turns_points(tmp_path: Path) -> None:
+    tables = '[work_offsets.PART]\nset_by = "true"\nX_mm = 100.0\nC_deg = 90.0\n'
+    setup = load_setup(machine(tmp_path, controller="dmis", tables=tables))
+    assert program("GOTO/1,2,3\n", setup).toolpath.end_mm == pytest.approx(np.array([[98.0, 1.0, 3.0]]))
+
+
+def test_names_of_datums_are_found_in_capitals_or_not(tmp_path: Path) -> None:
+    tables = '[work_offsets.part]\nset_by = "true"\nX_mm = 100.0\n'
+    path = machine(
+        tmp_path, controller="dmis", tables=tables, job='[work_offsets.Part]\nset_by = "true"\nX_mm = 300.0'
+    )
+    setup = load_setup(path, path.with_name("job.toml"))
+    # the job comes before the machine
+    assert ends("GOTO/1,2,3\n", setup) == [[301.0, 2.0, 3.0]]
+
+
+@pytest.mark.parametrize(
+    ("definition", "offset"),
+    [
+        ("PROBE,FIXED,CART,0.5,4,-20.25", [0.5, 4, -20.25]), ("FIXED,CART,0,4,-20,0,0,1,4", [0, 4, -20]),
+        ("CART,0,4,-20", None), ("PROBE,CART,0,4,-20,FIXED", None), ("PROBE,FIXED,CART,0,4", None),
+        ("PROBE,FIXED,0,4,-20", None), ("FIXED,0,4,-20,9", None),
+    ],
+)  # fmt: skip
+def test_which_definitions_of_a_stylus_have_an_offset(
+    definition: str, offset: list[float] | None, setup: Setup
+) -> None:
+    text = f"S(OWN)=SNSDEF/{definition}\nSNSDEF/PROBE,FIXED,CART,7,7,7\nSNSLCT/SA( OWN )\nGOTO/0,0,0\n"
+    if offset is None:
+        assert refused(text, setup, "the stylus OWN is selected") == 6
+    else:
+        assert ends(text, setup) == [[100.0 - offset[0], 0.0 - offset[1], 0.0 - offset[2]]]
+
+
+def test_the_last_definition_of_a_stylus_holds(setup: Setup) -> None:
+    text = f"S(OWN)=SNSDEF/{FIXED}\nS(OWN)=SNSDEF/INDEX,CART,0,0,1\nSNSLCT/S(OWN)\nGOTO/0,0,0\n"
+    assert refused(text, setup, "the stylus OWN is selected") == 6
+
+
+def test_what_is_recalled_and_is_no_datum_changes_nothing(setup: Setup) -> None:
+    for text in ("RECALL/F(A)", "RECALL", "RECALL/LONG", "MODE", "MODE/AUTO,MAN", "FROM/9,9,9", "RAPID/ON",
+    "DECL/A",
+                 "ENDMAC", "MACRO/1", "(A B)", "( C )", "FEDRAT/MESVEL", "ASSIGN/A", "TEXT/MAN",
+                 "$\n"):  # fmt: skip
+        path = program(f"{text}\nGOTO/1,2,3\n", setup).toolpath
+        assert path.end_mm.tolist() == [[101.0, 2.0, 3.0]], text
+        assert path.flag.tolist() == [0]
+
+
+def test_an_unknown_position_has_its_line_and_the_frame_before_it(setup: Setup) -> None:
+    path = program("GOTO/1,2,3\nGOHOME\nSNSLCT/S(LONG)\nGOTO/1,2,3\nGOHOME\n", setup).toolpath
+    assert path.line.tolist() == [3, 4, 5, 6, 7]
+    assert path.flag.tolist() == [0, 129, 129, 0, 129]
+    assert path.kind.tolist() == [Kind.RAPID] * 5
+    assert [path.frames[k].tool_mm[2] for k in path.frame.tolist()] == [0.0, 0.0, 0.0, -50.0, -50.0]
+    assert np.isnan(path.end_mm).all(axis=1).tolist() == [False, True, True, False, True]
+    assert np.isnan(program("GOHOME\nGOTO/1,2,3\n", setup).toolpath.start_mm).all()
+
+
+def test_where_the_machine_starts_is_that_of_the_job(tmp_path: Path) -> None:
+    path = machine(tmp_path, controller="dmis", tables=TABLES, job="start_mm = { X = 1.0, Z = 3.0 }")
+    start = program("GOTO/1,2,3\n", load_setup(path, path.with_name("job.toml"))).toolpath.start_mm
+    assert (start[0], start[2]) == (1.0, 3.0)
+    assert math.isnan(start[1])
+
+
+# -- branches, features, remarks -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("form", ("IF/(A.EQ.1)", "IF (A .EQ. 1)", "IF(A .EQ. 1)", "if/(A.EQ.1)"))
+def test_each_branch_begins_anywhere(form: str, setup: Setup) -> None:
+    text = f"GOTO/1,2,3\n{form}\nGOTO/2,2,3\nELSEIF/(B)\nGOTO/3,2,3\nENDIF\nGOTO/4,2,3\n"
+    want = [101.0, None, 102.0, None, 103.0, None, 104.0]
+    assert [row and row[0] for row in ends(text, setup)] == want
+    nested = f"{form}\nDO/I,1,2\n{form}\nENDIF\nENDDO\nENDIF\nMODE/MAN\nGOTO/1,2,3\n"
+    assert ends(nested, setup) == [[101.0, 2.0, 3.0]]
+    assert refused(f"{form}\nDO/I,1,2\nENDDO\nMODE/MAN\nENDIF\n", setup, "MODE is inside IF") == 6
+
+
+def test_a_macro_ends_and_its_name_is_found_in_any_field(setup: Setup) -> None:
+    text = "M(Ab)=MACRO/A\nTEXT/OPER,'a'\nENDMAC\nENDMAC\nUNITS/MM\nCALL/X,M(aB),Y\nGOTO/1,2,3\n"
+    assert ends(text, setup) == [[101.0, 2.0, 3.0]]
+    moved = "GOTO/1,2,3\nM(A)=MACRO\nENDMAC\nGOTO/2,2,3\n"
+    assert ends(moved, setup) == [[101.0, 2.0, 3.0], [102.0, 2.0, 3.0]]
+
+
+def test_a_feature_with_touches_ends_where_the_last_touch_is(setup: Setup) -> None:
+    text = (
+        "GOTO/1,2,3\nMEAS/POINT,F(P),1\nGOTO/1,2,4\nENDMES\nMEAS/POINT,F(P),1\n"
+        "PTMEAS/CART,2,2,3\nPTMEAS/CART,3,2,3,0,0,1,\nGOTO/5,5,5\nENDMES\nGOTO/1,2,3\n"
+    )
+    path = program(text, setup).toolpath
+    assert path.kind.tolist() == [0, 0, 0, Kind.PROBE, Kind.PROBE, 0, 0]
+    assert path.flag.tolist() == [0, 0, 129, Flag.WHOLE, Flag.WHOLE, 0, 0]
+    assert path.end_mm[3:, 0].tolist() == [102.0, 103.0, 105.0, 101.0]
+
+
+def test_points_of_the_operator_are_not_corrected_whatever_they_are(setup: Setup) -> None:
+    text = (
+        "MODE/MAN\nMEAS/POINT,F(P),1\nPTMEAS/CART,2,2,3\nENDMES\nGOTO/1,2,3\nMODE/AUTO,PROG,MAN\nGOTO/1,2,3\n"
+    )
+    assert program(text, setup).toolpath.flag.tolist() == [Flag.WHOLE | Flag.PASS, Flag.PASS, 0]
+
+
+def test_remarks_have_their_words(setup: Setup) -> None:
+    text = "TEMPR/A\nTECOMP/ON\nGOTO/1,2,3\nGOTO/1,2,4\n"
+    assert program(text, setup, head="").remarks == (
+        ("thermal", 1, "TEMPR makes the control compensate"), ("unit", 3, "the program states no UNITS")
+    )  # fmt: skip
+    for text, line in (("TECOMP", 3), ("TECOMP/ON,OFF", 3), ("TECOMP/OFF,ON", None)):
+        remarks = program(f"{text}\nGOTO/1,2,3\n", setup).remarks
+        assert [at for what, at, _ in remarks if what == "thermal"] == ([] if line is None else [line])
+
+
+@pytest.mark.parametrize(
+    ("speed", "mm_s"),
+    [("MPMM,6", 100.0), ("MMPM,60", 1.0), ("MPM,6", 100.0), ("IPM,6", 2.54), ("IPS,.5,9", 12.7),
+    ("MMPS,2,IPS", 2.0),
+     ("7", NAN), ("KNOTS,7", NAN)],
+)  # fmt: skip
+def test_speeds_of_measuring(speed: str, mm_s: float, setup: Setup) -> None:
+    text = (
+        f"MEAS/POINT,F(P),2\nPTMEAS/CART,2,2,3\nFEDRAT/MESVEL,{speed}\nPTMEAS/CART,3,2,3\n"
+        f"ENDMES\nGOTO/1,1,1\n"
+    )
+    statements = program("FEDRAT/MESVEL,MMPS,5\n" + text, setup).statements
+    assert statements is not None
+    assert statements.feed_mm_s.tolist() == pytest.approx([5.0, mm_s, math.inf], nan_ok=True)
+
+
+def test_only_the_speed_of_measuring_is_a_feed(setup: Setup) -> None:
+    text = (
+        "GOTO/1,1,1\nFEDRAT/POSVEL,MMPS,9\nGOTO/1,1,2\nFEDRAT/MESVEL,MMPS,5\nGOTO/1,1,1\n"
+        "UNITS/MM\nGOTO/1,1,1\n"
+    )
+    text += "FEDRAT/MESVEL\nFEDRAT\nFEDRAT/20,MESVEL\nGOTO/1,1,1\n"
+    done = program(text, setup)
+    assert feeds_of(done) == [(0, 0, None), (2, 6, None), (4, 10, None)]
+    assert done.statements is not None
+    begins = zip(done.statements.begin, done.statements.end, strict=True)
+    assert {text_of(done, a, b) for a, b in begins} == {b"GOTO/1,1,1", b"GOTO/1,1,2"}
+
+
+# -- comments, headers, pieces -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "comment", ("$$", "$$ a", "  $$ a $\n", "$$ a $\n$$ b", "$$ a $ \n  $$ b $\n$$", "$$ $\n\n", "$$ a$b")
+)
+def test_comments_that_end_before_the_next_line(comment: str, setup: Setup) -> None:
+    assert ends(f"{comment}\nGOTO/1,2,3\n", setup) == [[101.0, 2.0, 3.0]]
+
+
+def test_a_comment_may_go_on_at_the_end_of_the_text(setup: Setup) -> None:
+    assert ends("GOTO/1,2,3\n$$ a $", setup) == [[101.0, 2.0, 3.0]]
+    assert ends("GOTO/1,2,3\n$$ a $\n", setup) == [[101.0, 2.0, 3.0]]
+    text = "GOTO/1,2,3\n$$ a\n$$ b  $\n  GOTO/1,2,3\n"
+    assert refused(text, setup, "this line may belong to it") == 6
+
+
+def test_the_header_of_winwerth_is_no_program(setup: Setup) -> None:
+    text = "BEGIN / CHFILE\nROTAB/1\nGOTO/A\nA=5\nend/chfile\nGOTO/1,2,3\nEND/CHFILE\n"
+    with pytest.raises(ProgramError, match="END is not a statement"):
+        program(text + "END/X\n", setup)
+    assert ends(text.removesuffix("END/CHFILE\n"), setup) == [[101.0, 2.0, 3.0]]
+    assert refused("BEGIN/OTHER\nROTAB/1\nEND/CHFILE\n", setup, "BEGIN is not a statement") == 3
+
+
+WHOLE = """DMISMN/'a',05.2
+UNITS/MM,ANGDEC
+S(OWN)=SNSDEF/PROBE,FIXED,CART,0,4,-20,0,0,1,4
+$$ a comment
+D(PART)=TRANS/XORIG,1
+GOTO/1,2,3
+SNSLCT/S(OWN)
+FEDRAT/MESVEL,MMPS,5
+GOTO/CART,1.$
+5,2,3
+MEAS/POINT,F(P),1
+PTMEAS/CART,2,2,3,-1,0,0
+GOTO/2,2,3
+PTMEAS/CART,3,2,3
+ENDMES
+MODE/MAN
+GOTO/4,2,3
+MODE/PROG,MAN
+IF/(A.EQ.1)
+GOTO/5,2,3
+GOTO/6,2,3
+ENDIF
+MEAS/POINT,F(P),1
+ENDMES
+M(A)=MACRO
+ENDMAC
+CALL/M(A)
+RECALL/D(MCS)
+GOTO/1,2,3
+ENDFIL
+GOTO/9,9,9
+"""
+
+
+@pytest.mark.parametrize("size", (1, 20, 60, 130, 300))
+def test_a_text_says_the_same_in_pieces(size: int, setup: Setup, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Long texts are read in pieces of whole lines: what holds for the next point goes on in the next one."""
+    whole = said(program(WHOLE, setup, head=""))
+    assert len(whole["kind"]) == 13
+    monkeypatch.setattr(reader, "chunks", lambda data: chunks(data, size))
+    assert said(program(WHOLE, setup, head="")) == whole
+
+
+# -- the table of statements ---------------------------------------------------------------------------
+
+#: words of DMIS by what becomes of their statements
+WORDS = {
+    Support.CORRECTED: "GOTO PTMEAS",
+    Support.READ: "MEAS RMEAS ENDMES FROM GOHOME RAPID UNITS SNSDEF SNSLCT TRANS ROTATE DATSET RECALL "
+    "MODE TECOMP "
+    "TEMPR FEDRAT IF ELSE ELSEIF ENDIF DO ENDDO MACRO ENDMAC CALL ENDFIL",
+    Support.UNCHANGED: "FEAT TOL CONST DATDEF DATTRG OUTPUT EVAL REFMNT BOUND FILNAM DMISMN DMISMD "
+    "DVPOFT DECPL "
+    "TEXT SNSET ACLRAT FLY PRCOMP WKPLAN SAVE DISPLY DISPLAY VFORM OPEN CLOSE WRITE REPORT GEOALG "
+    "ALGDEF LITDEF "
+    "FILDEF CZSLCT CZONE PIEZOWFP POINTDIST SCANFILTER SPLINESCAN3D W3D DELETE DEVICE DID FINPOS MFGDEV "
+    "PARTID "
+    "PARTREV PARTSER QISDEF OPERID PLANID LOTID DATE TIME CMPNTGRP SENSOR SNSMNT SNSGRP WRIST EXTENS "
+    "THLDEF CLMPID "
+    "CLMPSN FIXTID FIXTSN PREVOP PROCID ROTDEF CRGDEF ERROR BADTST ALGOR LOTNUM KEYCHAR QUERY VALUE "
+    "LIGHTOPTION "
+    "SIMREQT UNCERTSET UNCERTALG ENDXTN DECL PSTHRU ASSIGN OBTAIN PROMPT",
+    Support.REFUSED: "PATH PAMEAS SCNMOD SCNSET SCNPLN SCAN JUMPTO XTERN INCLUD LOCATE ITERAT BFSET "
+    "PTBUFF CALIB "
+    "RESUME ROTSET ROTAB CRSLCT CRMODE THLCHG",
+}  # fmt: skip
+
+
+def test_each_word_has_its_row_in_the_table() -> None:
+    want = {word.encode(): support for support, words in WORDS.items() for word in words.split()}
+    assert {word: support for word, (support, _) in TABLE.items()} == want
+    feature = "FEAT TOL CONST DATDEF DATTRG OUTPUT EVAL REFMNT BOUND ASSIGN OBTAIN PROMPT"
+    clear = {*WORDS[Support.UNCHANGED].split()} - {*feature.split()}
+    clear |= {"ENDMES", "ELSE", "ELSEIF", "ENDIF", "ENDDO", "ENDMAC"}
+    assert {word.decode() for word, (_, why) in TABLE.items() if why == ""} == clear
+
+
+def test_what_has_no_effect_on_the_path_is_passed_over(setup: Setup) -> None:
+    words = WORDS[Support.UNCHANGED].split()
+    text = "".join(f"{word}/ON\nF(A) = {word.lower()} / 1,2\n" for word in words)
+    assert ends(text + "GOTO/1,2,3\n", setup) == [[101.0, 2.0, 3.0]]
+
+
+def test_what_the_table_refuses_is_refused_with_its_reason(setup: Setup) -> None:
+    words = WORDS[Support.REFUSED].split()
+    with pytest.raises(ProgramError) as caught:
+        program("".join(f"{word}/1\n" for word in words), setup)
+    errors = [caught.value, *caught.value.others]
+    assert [error.line for error in errors] == list(range(3, len(words) + 3))
+    for word, error in zip(words, errors, strict=True):
+        assert str(error) == f"{error.line}: {word} {TABLE[word.encode()][1]}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import tempfile
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -20,9 +21,11 @@ import olp
 from olp.core.errors import ProgramError, UsageError
 from olp.files.config import load_setup
 from olp.program.feeds.moves import lengths_mm
-from olp.program.feeds.timing import BLEND_MM, PathControl, Timing, timing
+from olp.program.feeds.stated import programmed
+from olp.program.feeds.timing import BLEND_MM, PathControl, Timing, path_modes, timing
 from olp.program.program import Program
 from olp.program.registry import DIALECTS, Options, read
+from olp.program.rs274.state import PathMode
 
 START = "start_mm = { X = 0.0, Y = 0.0, Z = 0.0 }"
 TOOLS = "".join(f"[tools.{n}]\nZ_mm = 50.0\n" for n in (1, 2))
@@ -78,7 +81,22 @@ FEEDS: dict[str, tuple[str, str, list[float]]] = {
     "a probe": ("G38.2 X9 F120", "linuxcnc", [2, np.nan]),
     "after the end": ("G1 X1 F60\nM2\nF120\nG95", "linuxcnc", [1]),
     "lower case and blanks": ("g1 x1 f 6 0\nx2", "linuxcnc", [1, 1]),
-}
+    "decimals": ("G1 X1 F60.5", "linuxcnc", [60.5 / 60]),
+    "the least feed in inches": ("G20 G93\nG1 X1 F0.001", "linuxcnc", [0.1 * INCH]),
+    "the least feed in one of two units": (
+        "G93\nG1 X1 F0.001\nG20 X2 F0.001\nG21 X1 F0.001", "linuxcnc", [0.1 / 60, 0.1 * INCH, 0.1 / 60]
+    ),
+    "inverse time without a point": ("G93 G1 X1. F2", "haas", [2 / 60]),
+    "G97 after G96": ("G96 S100\nG97 S600\nG95 G1 X1. F.5", "fanuc", [5]),
+    "G97 alone": ("G97 S600\nG95 G1 X1. F.5", "fanuc", [5]),
+    "one that nothing uses": ("F0\nF60\nG1 X1\nF0", "linuxcnc", [1]),
+    "one that nothing uses on a Haas": ("F0\nF60.\nG1 X1.\nF5", "haas", [1]),
+    "rapids alone": ("G0 X1\nG0 X2", "linuxcnc", [np.inf, np.inf]),
+    "a mode that is stated again": ("G94\nG1 X1 F60\nG94\nX2", "grbl", [1, 1]),
+    "G93 once more": ("G93\nG1 X100 F2\nG93\nX70 F1", "linuxcnc", [200 / 60, 0.5]),
+    "a unit before a rapid": ("G1 X1 F60\nG20\nG0 X2\nG1 X3", "linuxcnc", [1, np.inf, 1]),
+    "a block of no length": ("G93\nG1 X9 F6\nX9 F6", "linuxcnc", [0.9, np.nan]),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", FEEDS)
@@ -110,6 +128,14 @@ REFUSED = {
     "a dwell without a time": ("G4", "grbl", 1, "no P word"),
     "a negative dwell": ("G4 X-1.", "fanuc", 1, "negative"),
     "a dwell with two times": ("G4 X1. P100", "fanuc", 1, "two times"),
+    "a later dwell without a time": ("G4 P1\nG4", "grbl", 2, "no P word"),
+    "a later negative dwell": ("G4 X1.\nG4 X-1.", "fanuc", 2, "negative"),
+    "a later dwell with two times": ("G4 X1.\nG4 X1. P100", "fanuc", 2, "two times"),
+    "a later G96": ("G97 S600\nG95 G1 X1. F.5\nG96 S100\nX2.", "fanuc", 4, "G96"),
+    "a later zero": ("F60\nG1 X1\nF0\nX2", "linuxcnc", 3, "the feed F0 is not above zero"),
+    "a later F without a point": ("G1 X1. F60.\nX2. F5", "haas", 2, r"F5 has no decimal point"),
+    "no point by turns": ("S60\nG95\nG1 X1. F5", "fanuc", 3, r"F5 has no decimal point"),
+    "later without F": ("G1 X1 F60\nG94\nG0 X2\nG1 X3", "linuxcnc", 4, "no F word comes after the feed mode"),
 }
 
 
@@ -119,7 +145,7 @@ def test_refused_when_timed_and_not_when_read(name: str) -> None:
     program = reading(text, control)
     with pytest.raises(ProgramError, match=words) as caught:
         timing(program)
-    assert caught.value.line == line
+    assert (caught.value.line, caught.value.code) == (line, "OLP551")
 
 
 def test_words_are_needed() -> None:
@@ -164,6 +190,19 @@ RESTS: dict[str, tuple[str, str, list[float | None]]] = {
         "G82 X10 Y0 Z-2 R0 P0.5\nX11\nG80 G1", "linuxcnc",
         [None, None, 0.5, None, None, 0.5, None, None],
     ),
+    "a pause": ("Y5 M1", "linuxcnc", [None, None, 0, None]),
+    "a pallet": ("Y5 M60", "linuxcnc", [None, None, None, 0, None]),
+    "M9 after the motion": ("Y5 M9", "haas", [None, None, 0, None]),
+    "M9 before the motion": ("Y5 M9", "linuxcnc", [None, 0, None, None]),
+    "M8 before the motion": ("Y5. M8", "haas", [None, 0, None, None]),
+    "milliseconds of X": ("G4 X500", "haas", [None, 0.5, None]),
+    "seconds with decimals": ("G4 P0.25", "linuxcnc", [None, 0.25, None]),
+    "one behind the other": ("G4 X1.\nG4 P500", "fanuc", [None, 1.5, None]),
+    "with other words": ("G4 P1.5 F9", "linuxcnc", [None, 1.5, None]),
+    "in several places": ("G4 P1\nY5\nG4 P2", "linuxcnc", [None, 1, 2, None]),
+    "a speed before the motion": ("Y5 S500", "linuxcnc", [None, 0, None, None]),
+    "G9 in every block": ("G9 Y5.\nG9 Y6.", "haas", [None, None, 0, 0, None]),
+    "G9 of others": ("G61 Y5\nG64", "linuxcnc", [None] * 4),
     "spindle of a cycle": ("M3 G86 X10 Y0 Z-2 R0 P1\nG80 G1", "linuxcnc", [None, 0, 1, 0, None]),
 }  # fmt: skip
 
@@ -176,6 +215,122 @@ def test_rests_by_hand(name: str) -> None:
     shown = [s if r else None for r, s in zip(got.rest.tolist(), got.dwell_s.tolist(), strict=True)]
     assert shown == want
     assert not got.dwell_s[~got.rest].any()
+
+
+@pytest.mark.parametrize(
+    ("text", "length"),
+    [
+        ("G1 X3 Y4 Z12", 13.0), ("G2 X10 I5", 5 * np.pi), ("G2 X10 I5 Z3", math.hypot(5 * np.pi, 3)),
+        ("G18 G2 X10 I5 Y3", math.hypot(5 * np.pi, 3)), ("G19 G3 Y10 J5 X3", math.hypot(5 * np.pi, 3)),
+        ("G18 G3 X10 I5", 5 * np.pi), ("G3 I5 Z7 P2", math.hypot(20 * np.pi, 7)),
+        # the radius is 5 mm at the start and 5.02 mm at the end: the mean counts
+        ("G2 X10.02 I5", 5.01 * np.pi), ("G19 G3 Y10.02 J5", 5.01 * np.pi),
+    ],
+)  # fmt: skip
+def test_lengths_of_moves(text: str, length: float) -> None:
+    assert lengths_mm(reading(f"{text} F60").toolpath) == pytest.approx([length], rel=1e-12)
+    # also behind other moves
+    later = lengths_mm(reading(f"F60\nG1 X1\nG0 X0\n{text}\nG1 G91 Z5").toolpath)
+    assert later == pytest.approx([1.0, 1.0, length, 5.0], rel=1e-12)
+
+
+def test_a_helix_is_as_high_as_its_ends_are_apart() -> None:
+    for text, rise in (
+        ("G1 Z2\nG2 X10 I5 Z5", 3),
+        ("G18 G1 Y-2\nG2 X10 I5 Y1", 3),
+        ("G19 G1 X9\nG3 Y10 J5 X5", 4),
+    ):
+        lengths = lengths_mm(reading(f"F60\n{text}").toolpath)
+        assert lengths[1] == pytest.approx(math.hypot(5 * np.pi, rise), rel=1e-12)
+
+
+def test_columns_of_time_are_not_changed() -> None:
+    for program in (reading("G1 X1 F60"), statements("GOTO/1,2,3", FEDRAT)):
+        times = timing(program)
+        for column in (times.feed_mm_s, times.control, times.blend_mm, times.rest, times.dwell_s):
+            assert not column.flags.writeable
+        # the program keeps its own
+        assert timing(program).feed_mm_s.tolist() == times.feed_mm_s.tolist()
+
+
+# -- programs of statements ----------------------------------------------------------------------------
+
+FEDRAT = "UNITS/MM\nFEDRAT/60,MMPM\n"
+
+
+def statements(text: str, head: str = "UNITS/MM\n", dialect: str = "apt") -> Program:
+    controller = "dmis" if dialect == "dmis" else "linuxcnc"
+    zero = TRUE_ZERO + TRUE_ZERO.replace("G54", "MCS")
+    setup = load_setup(machine(folder() / dialect, controller=controller, tables=zero + TOOLS))
+    return read((head + text + "\n").encode(), setup, DIALECTS[dialect])
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("GOTO/1,0,0", 2), ("RAPID\nGOTO/1,0,0\nGOTO/2,0,0", 4), ("FEDRAT/0\nGOTO/1,0,0", 3),
+        ("FEDRAT/1,MMPR\nGOTO/1,0,0", 3),
+        ("RAPID\nGOTO/10,0,0\nCIRCLE/0,0,0,0,0,1\nGOTO/0,10,0", 5),
+        ("RAPID\nGOTO/10,0,0\nCIRCLE/0,0,0,0,0,-1\nGOTO/0,10,0", 5),
+        ("CYCLE/DRILL,DEPTH,1,CLEAR,2\nGOTO/1,0,0\nCYCLE/OFF\nGOTO/1,0,0", 5),
+    ],
+)  # fmt: skip
+def test_statements_that_cut_have_a_feed(text: str, line: int) -> None:
+    with pytest.raises(ProgramError, match="a feed move has no feed that is a speed") as caught:
+        timing(statements(text))
+    assert (caught.value.line, caught.value.code) == (line, "OLP551")
+
+
+def test_what_the_control_does_by_itself_needs_no_feed() -> None:
+    text = "RAPID\nGOTO/1,0,0\nLOADTL/1\nRAPID\nGOTO/1,0,0\nCYCLE/DRILL,DEPTH,1,CLEAR,2\nGOTO/1,0,0\nSTOP\n"
+    times = timing(statements(text), blend_mm=0.3)
+    np.testing.assert_equal(times.feed_mm_s, [np.inf, np.nan, np.inf, np.inf, np.nan, np.inf])
+    assert times.control.tolist() == [PathControl.BLEND] * 6
+    assert times.blend_mm.tolist() == [0.3] * 6
+    assert np.flatnonzero(times.rest).tolist() == [6]
+
+
+def test_touches_of_a_measuring_machine_end_at_rest() -> None:
+    text = "GOTO/1,2,3\nMEAS/POINT,F(P),2\nPTMEAS/CART,1,2,4\nPTMEAS/CART,1,2,5\nENDMES\nGOTO/1,2,3"
+    times = timing(statements(text, dialect="dmis"))
+    assert times.rest.tolist() == [False, False, True, True, False]
+    assert np.isnan(times.feed_mm_s[1:3]).all()
+
+
+def test_statements_take_the_path_mode_of_the_machine() -> None:
+    parsed = statements("GOTO/1,0,0\nGOTO/2,0,0", FEDRAT)
+    stops = replace(parsed, path_modes=(PathMode(0, "G61.1"),))
+    assert timing(stops).control.tolist() == [PathControl.EXACT_STOP] * 2
+    assert timing(stops).blend_mm.tolist() == [0.0, 0.0]
+    assert [(m.line, m.control, m.stated_mm) for m in path_modes(stops)] == [
+        (0, PathControl.EXACT_STOP, None)
+    ]
+    for blends in (parsed, replace(parsed, path_modes=(PathMode(0, "G64"),))):
+        assert timing(blends).control.tolist() == [PathControl.BLEND] * 2
+        assert path_modes(blends) == ()
+
+
+def test_path_modes_are_in_the_order_of_lines() -> None:
+    program = reading("G61 G1 X1. F60.\nG62\nX2.\nG64\nG61\n", "fanuc")
+    stop, blend = PathControl.EXACT_STOP, PathControl.BLEND
+    assert [(m.line, m.control) for m in path_modes(program)] == [
+        (1, stop),
+        (2, blend),
+        (4, blend),
+        (5, stop),
+    ]
+    stated = path_modes(reading("G64 P0.05 G1 X1 F60\nG64\nG61\nG61.1\n"))
+    assert [(m.line, m.control, m.stated_mm) for m in stated] == [
+        (1, blend, 0.05), (2, blend, None), (3, PathControl.EXACT_PATH, None), (4, stop, None)
+    ]  # fmt: skip
+
+
+def test_feeds_need_words() -> None:
+    bare = read(b"G1 X1 F60\n", setup_of("linuxcnc", ""), DIALECTS["linuxcnc"], words=False)
+    with pytest.raises(UsageError, match="without its words; feeds need them"):
+        programmed(bare)
+    assert programmed(reading("G1 X1 F60\n/F120\nX2\n"), block_delete=True).tolist() == [1.0, 1.0]
+    assert programmed(reading("G1 X1 F60\n/F120\nX2\n")).tolist() == [1.0, 2.0]
 
 
 def test_a_probe_ends_at_rest() -> None:
@@ -195,6 +350,11 @@ MODES: dict[str, tuple[str, str, list[tuple[PathControl, float]]]] = {
     "exact path of grbl": ("G61\nX1", "grbl", [(P, 0.0)]),
     "exact stop": ("G61.1\nX1\nG64 P1 X2", "linuxcnc", [(S, 0.0), (B, 1.0)]),
     "exact stop of ISO": ("G61\nX1.\nG64 X2.", "fanuc", [(S, 0.0), (B, BLEND_MM)]),
+    "tapping mode": ("G61\nX1.\nG63 X2.\nX3.", "fanuc", [(S, 0.0), (B, BLEND_MM), (B, BLEND_MM)]),
+    "corner override first": ("G62\nX1.\nG61 X2.", "fanuc", [(B, BLEND_MM), (S, 0.0)]),
+    "G62 of others": ("G61\nX1\nX2", "linuxcnc", [(P, 0.0), (P, 0.0)]),
+    "less than nought": ("G64 P-1\nX1", "linuxcnc", [(B, BLEND_MM)]),
+    "exact stop of a Haas": ("G61 X1.\nX2.", "haas", [(S, 0.0), (S, 0.0)]),
     "corner override": ("G61\nX1.\nG62 X2.", "fanuc", [(S, 0.0), (B, BLEND_MM)]),
 }
 

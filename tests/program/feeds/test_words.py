@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,13 +11,15 @@ import pytest
 from cases.acceptance import TRUE_ZERO, machine
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from program.feeds.test_timing import reading, setup_of, timed
+from program.feeds.test_timing import reading, setup_of, statements, timed
 
 import olp
-from olp.core.errors import ProgramError
+from olp.core.errors import CannotCompute, ProgramError
 from olp.files.config import load_setup
 from olp.program.feeds.moves import lengths_mm
-from olp.program.feeds.words import FeedsWritten, write_feeds
+from olp.program.feeds.words import FeedsWritten, check_feeds, write_feeds
+from olp.program.program import Program
+from olp.program.registry import DIALECTS, read
 from olp.workflows.retime import Retiming
 
 START = "start_mm = { X = 0.0, Y = 0.0, Z = 0.0 }"
@@ -173,3 +176,141 @@ def test_one_long_block_is_written_in_closed_form(tmp_path: Path) -> None:
     result = olp.retime(f"G1 X{way} F{60 * feed:.2f}\n".encode(), setup)
     assert result.duration_s == pytest.approx(seconds, rel=1e-6)
     assert result.with_feeds() == f"G1 X{way} F{60 * way / seconds:.2f}\n".encode()
+
+
+@pytest.mark.parametrize(
+    ("text", "share", "want"),
+    [
+        # a feed is changed where it differs by more than 1 %
+        ("F600", 0.995, b"600"), ("F600", 0.991, b"600"), ("F600", 0.985, b"591"), ("F100.", 0.98, b"98."),
+        # and takes another decimal where rounding changes it by more than 1 %
+        ("F1", 1 / 3, b"0.33"), ("F11", 1 / 3, b"3.7"), ("F100", 1 / 3, b"33"), ("F3", 0.5, b"1.5"),
+        ("F33", 0.5, b"16.5"), ("F333", 0.5, b"166"), ("F60.0", 1 / 3, b"20.0"),
+        ("F0.000007", 0.5, b"0.000003"), ("F.000007", 0.5, b".000003"),
+        # digits before the point keep their number
+        ("F007", 0.5, b"003.5"), ("F+.5", 0.5, b"+.25"), ("F00.5", 0.5, b"00.25"), ("F+0600", 0.5, b"+0300"),
+        ("F1000", 0.5, b"500"), ("F010", 0.01, b"000.1"), ("F 1\t2 .0", 0.5, b"6.0"), ("F0.5", 0.5, b"0.25"),
+    ],
+)  # fmt: skip
+def test_a_planned_feed_keeps_the_form_of_its_word(text: str, share: float, want: bytes) -> None:
+    written = halved(f"G1 X9 {text}\n", share=share)
+    assert values(written.data) == [want]
+    assert blanked(written.data) == blanked(f"G1 X9 {text}\n".encode())
+    assert (written.words, written.changed) == (1, int(want != text[1:].encode()))
+
+
+def test_a_feed_that_would_round_to_nothing_is_refused() -> None:
+    for text, control in (("G1 X5\nX9 F.000001", "linuxcnc"), ("G1 X5.\nX9. F1", "fanuc")):
+        with pytest.raises(ProgramError, match="cannot be written in the form of") as caught:
+            halved(text.replace("X5", "X5 F60"), control, share=0.1)
+        assert (caught.value.line, caught.value.code) == (2, "OLP561")
+
+
+def test_what_the_shared_words_count() -> None:
+    program = reading("F600\nG1 X10\nX20\nF60\nX30\nX40\nF6\n")
+    lines = np.array([2, 3, 5, 6])
+    planned, programmed = np.array([2.0, 8.0, 10.0, 20.0]), np.array([1.0, 1.0, 5.0, 5.0])
+    mean = write_feeds(program, lines, planned, programmed)
+    assert mean.data == b"F120\nG1 X10\nX20\nF20\nX30\nX40\nF6\n"
+    assert (mean.words, mean.changed, mean.shared, mean.slower, mean.kept) == (3, 2, 2, 2, ())
+    least = write_feeds(program, lines, planned, programmed, shared="least")
+    assert least.data == b"F75\nG1 X10\nX20\nF15\nX30\nX40\nF6\n"
+    assert (least.changed, least.shared, least.slower) == (2, 2, 0)
+
+
+def test_lines_that_are_not_planned_do_not_count() -> None:
+    program = reading("F600\nG1 X10\nX20\nX30\n")
+    some = write_feeds(program, np.array([3]), np.array([4.0]), np.array([1.0]))
+    assert (some.data, some.shared) == (b"F150\nG1 X10\nX20\nX30\n", 0)
+    none = write_feeds(program, np.zeros(0, np.int64), np.zeros(0), np.zeros(0))
+    assert (none.data, none.words, none.changed) == (program.data, 1, 0)
+    # a line that is planned faster than its feed keeps it
+    faster = write_feeds(program, np.array([2, 3]), np.array([1.0, 1.0]), np.array([2.0, 2.0]))
+    assert (faster.data, faster.changed) == (program.data, 0)
+    rapids = write_feeds(reading("G0 X9\nF60\n"), np.array([1]), np.array([2.0]), np.array([1.0]))
+    assert (rapids.data, rapids.words, rapids.changed, rapids.kept) == (b"G0 X9\nF60\n", 1, 0, ())
+
+
+def test_a_line_counts_as_slower_from_one_percent_on() -> None:
+    program = reading("F600\nG1 X10\nX20\n")
+    for first, slower in ((1.015, 1), (1.005, 0)):
+        seconds = np.array([first, 0.1])
+        written = write_feeds(program, np.array([2, 3]), seconds, np.array([1.0, 0.115]))
+        assert (written.changed, written.slower) == (0, slower)
+
+
+def test_words_are_needed() -> None:
+    bare = read(b"G1 X1 F60\n", setup_of("linuxcnc", ""), DIALECTS["linuxcnc"], words=False)
+    with pytest.raises(CannotCompute, match="was read without its words"):
+        write_feeds(bare, np.array([1]), np.array([2.0]), np.array([1.0]))
+
+
+def test_words_under_block_delete_do_not_count() -> None:
+    program = reading("G1 X10 F600\n/F60\nX20\n")
+    args = np.array([1, 3]), np.array([2.0, 2.0]), np.array([1.0, 1.0])
+    assert write_feeds(program, *args).data == b"G1 X10 F300\n/F30\nX20\n"
+    assert write_feeds(program, *args, block_delete=True).data == b"G1 X10 F300\n/F60\nX20\n"
+
+
+def test_a_feed_of_statements_holds_again_after_a_cycle() -> None:
+    program = statements(
+        "FROM/0,0,0\nFEDRAT/600,MMPM\nGOTO/1,0,0\nCYCLE/DRILL,DEPTH,1,CLEAR,2,MMPM,50\nGOTO/1,0,0\n"
+        "CYCLE/OFF\nGOTO/2,0,0\nFEDRAT/MMPM,60\nGOTO/3,0,0\nGOTO/4,0,0\nFEDRAT/5\nRAPID\nGOTO/5,0,0"
+    )
+    lines = np.array([4, 6, 8, 10, 11])
+    written = write_feeds(program, lines, np.array([2.0, 9.0, 2.0, 4.0, 4.0]), np.ones(5))
+    assert written.data == program.data.replace(b"/600,", b"/300,").replace(b",60", b",15")
+    assert (written.words, written.changed, written.shared, written.slower, written.kept) == (3, 2, 2, 0, ())
+
+
+def test_words_over_unknown_lengths_are_named() -> None:
+    program = statements(
+        "FEDRAT/600,MMPM\nGOTO/1,0,0\nGOTO/2,0,0\nFEDRAT/60\nGOTO/3,0,0\nLOADTL/1\nFEDRAT/30\nGOTO/3,0,0"
+    )
+    written = write_feeds(program, np.array([3, 4, 6, 9]), np.full(4, 2.0), np.ones(4))
+    assert written.data == program.data.replace(b"/60\n", b"/30\n")
+    assert (written.words, written.changed, written.slower, written.kept) == (3, 1, 3, (2, 8))
+
+
+FIRST = "G1 X9 F600\nX12 F60\nG0 X1\nG38.2 Z1 F60\nG1 Z5 F60"
+
+
+@pytest.mark.parametrize(
+    ("second", "same"),
+    [
+        (FIRST, True), (FIRST.replace("600", "599.9"), True), (FIRST.replace("F60\nG0", "F1\nG0"), True),
+        (FIRST.replace("600", "600.0001"), False), (FIRST.replace("F60\nG0", "F61\nG0"), False),
+        (FIRST.replace("X12", "X12.001"), False), (FIRST.replace("G0 X1", "G1 X1"), False),
+        ("\n" + FIRST, False), (FIRST + "\nX2", False),
+    ],
+)  # fmt: skip
+def test_a_text_with_other_feeds_is_read_back(second: str, same: bool) -> None:
+    before, after = reading(FIRST), reading(second)
+    if same:
+        check_feeds(before, after)
+        return
+    with pytest.raises(CannotCompute, match="is not read back as the same moves"):
+        check_feeds(before, after)
+
+
+def test_feeds_that_are_not_known_stay_so() -> None:
+    def told(text: str) -> Program:
+        return statements(f"FEDRAT/60\nGOTO/1,0,0\nGOTO/2,0,0\nLOADTL/1\n{text}GOTO/3,0,0")
+
+    known = told("")
+    check_feeds(known, told(""))
+    assert known.statements is not None
+    unknown = replace(known, statements=replace(known.statements, feed_mm_s=np.array([1.0, 1.0, 1.0, 1.0])))
+    for before, after in ((known, unknown), (unknown, known)):
+        with pytest.raises(CannotCompute):
+            check_feeds(before, after)
+    # without words the moves alone are compared
+    check_feeds(replace(known, words=None), unknown)
+    check_feeds(unknown, replace(known, words=None))
+
+
+def test_blocks_under_block_delete_are_compared_as_they_run() -> None:
+    before, after = reading("G1 X9 F60\n/F600\nX12"), reading("G1 X9 F60\n/F900\nX12")
+    check_feeds(before, after, block_delete=True)
+    with pytest.raises(CannotCompute):
+        check_feeds(before, after)
