@@ -171,7 +171,9 @@ def test_a_polyline_over_one_axis_departs_by_its_kinks_its_slope_or_its_span() -
 
 def test_a_window_holds_all_kinks_that_a_move_of_its_length_crosses() -> None:
     """Kinks of 1 and 2 at 10 and 18 mm; 7.5 to 8 mm is one bin."""
-    grid = Grid.through([np.array([0.0, 10.0, 18.0, 40.0])], np.array([[0.0], [0.0], [8.0], [-14.0]]), "linear")
+    grid = Grid.through(
+        [np.array([0.0, 10.0, 18.0, 40.0])], np.array([[0.0], [0.0], [8.0], [-14.0]]), "linear"
+    )
     bound = GridBound.of(grid, ("Z",))
     for length, jump in ((0.1, 2.0), (7.4, 2.0), (7.6, 3.0), (9.0, 3.0)):
         steep = 0.5 * length
@@ -181,7 +183,9 @@ def test_a_window_holds_all_kinks_that_a_move_of_its_length_crosses() -> None:
 def test_a_product_of_two_axes_departs_by_its_mixed_derivative() -> None:
     """f = x y over 10 x 20 mm: 2 dx dy / 8; it changes by 20 dx + 10 dy at most, and by no more than 200."""
     values = np.outer([0.0, 10.0], [0.0, 20.0])[..., None]
-    bound = GridBound.of(Grid.through([np.array([0.0, 10.0]), np.array([0.0, 20.0])], values, "linear"), ("X", "Z"))
+    bound = GridBound.of(
+        Grid.through([np.array([0.0, 10.0]), np.array([0.0, 20.0])], values, "linear"), ("X", "Z")
+    )
     assert departure(bound, 2.0, 7.0, 4.0) == pytest.approx([2.0])
     assert departure(bound, 2.0, 7.0, 0.0) == [0.0]
     assert departure(bound, 1.0, 0.0, 100.0) == pytest.approx([25.0])
@@ -248,7 +252,12 @@ def test_the_bound_of_an_axis_is_read_off_its_tables() -> None:
     # below the cell d^2 + 2 h d = 0.3125 exceeds what the table says, 2.8125e-3; 1e-3 mm does not: 1.001e-3
     small = 1e-6 + 2.0 * 0.5 * 1e-3
     table = [1e-2 * 0.28125, 1e-2 * 5.5, min(small, 1e-2 * float(at(UPPER_MM, 1e-3))), 0.0]
-    cross = [0.25 * (1e-3 + 2e-4 * 10 + 7e-4 * 20), 5 * (1e-3 + 2e-3 + 6e-3), 1e-3 * (1e-3 + 2e-3 + 14e-3), 0.0]
+    cross = [
+        0.25 * (1e-3 + 2e-4 * 10 + 7e-4 * 20),
+        5 * (1e-3 + 2e-3 + 6e-3),
+        1e-3 * (1e-3 + 2e-3 + 14e-3),
+        0.0,
+    ]
     np.testing.assert_allclose(bound.at(lengths), np.add(table, cross), rtol=1e-12)
     plain = AxisBound(1, 0.5, 1e-4, np.full(320, 9.0), None, (None, None, None))
     # d^2 + 2 h min(d, h): 0.0625 + 0.25, 25 + 0.5
@@ -345,7 +354,10 @@ def test_two_turns_on_one_moving_arm_join_as_one_length() -> None:
 
 def test_smooth_errors_count_by_curvature_on_their_arms() -> None:
     """A sine of 2 um along X and one of 5 urad about Y, 390 and 30 mm long."""
-    terms = (Cyclic("EXX", 10.0, 2e-3), Cyclic("EBX", 10.0, 5e-6, 0.3, (0.0, 40.0, -100.0), (0.0, 0.0, -60.0)))
+    terms = (
+        Cyclic("EXX", 10.0, 2e-3),
+        Cyclic("EBX", 10.0, 5e-6, 0.3, (0.0, 40.0, -100.0), (0.0, 0.0, -60.0)),
+    )
     line = Curve("X", BOX[0], {"EYX": [0.0, 0.0]}, line_mm=(0.0, 40.0, -100.0), tool_mm=(0.0, 0.0, -60.0))
     bodies = build_bodies(Calibration("m", BOX, cyclic=terms, curves=(line,)), "FXYZ", frozenset())
     (bound,) = axis_bounds(bodies, BOX, TOOLS, second_order=False)

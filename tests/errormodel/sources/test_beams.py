@@ -18,7 +18,9 @@ STIFFNESS = 200e3 * 5e6
 UNIT = 9.80665 / STIFFNESS
 
 
-def beam(axis: str = "X", support: Any = "simple", span: tuple[float, float] = (-200.0, 1000.0), **more: Any) -> Beam:
+def beam(
+    axis: str = "X", support: Any = "simple", span: tuple[float, float] = (-200.0, 1000.0), **more: Any
+) -> Beam:
     return Beam(axis, support, span, 200.0, 5e6, **more)
 
 
@@ -97,7 +99,9 @@ def test_beams_bend_with_the_payload_beyond_the_calibration_each_on_its_own_leve
     # between nodes of the table a cubic is within 1e-4
     expected = 10.0 * np.array([[turn * -80.0 + bend * -30.0, 0.0, -one - other]])
     np.testing.assert_allclose(model.error(points, tool), expected, rtol=1e-4)
-    np.testing.assert_allclose(model.rotation(points, None, 14.0), [[0.0, 10.0 * (turn + bend), 0.0]], rtol=1e-4)
+    np.testing.assert_allclose(
+        model.rotation(points, None, 14.0), [[0.0, 10.0 * (turn + bend), 0.0]], rtol=1e-4
+    )
     names = [name for name, _ in model.contributions(points, tool)]
     assert names == ["load EZX", "load EBX"] * 2
 

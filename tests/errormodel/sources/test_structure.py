@@ -100,7 +100,9 @@ def test_a_log_settles_to_its_end_or_to_a_time_in_it() -> None:
     # the last reading before a time between two readings
     assert settled(699.0) == {"beam": 20.0, "column": 18.0}
     for outside in (99.9, 1300.1):
-        with pytest.raises(ConfigError, match=rf"the time {outside:g} s is not in the log of temperatures, 100 to"):
+        with pytest.raises(
+            ConfigError, match=rf"the time {outside:g} s is not in the log of temperatures, 100 to"
+        ):
             settled(outside)
 
 
@@ -108,7 +110,9 @@ def test_the_shapes_over_a_span() -> None:
     """Middle 500, half 200: 1, q - 500 and 1 - ((q - 500) / 200)^2."""
     assert SHAPES == ("offset", "growth", "bow")
     expected = [[1, -200, 0], [1, -100, 0.75], [1, 0, 1], [1, 200, 0], [1, 400, -3]]
-    np.testing.assert_allclose(shapes((300.0, 700.0), np.array([300.0, 400.0, 500.0, 700.0, 900.0])), expected)
+    np.testing.assert_allclose(
+        shapes((300.0, 700.0), np.array([300.0, 400.0, 500.0, 700.0, 900.0])), expected
+    )
 
 
 def test_a_part_follows_its_sensor_with_its_lag() -> None:
@@ -122,7 +126,9 @@ def test_a_part_follows_its_sensor_with_its_lag() -> None:
     # a step falls off with the lag, whatever the spacing
     step = np.array([20.0, 30.0, 30.0, 30.0])
     rest = lagged(np.array([0.0, 1e-6, 40.0, 80.0]), step, 40.0)
-    np.testing.assert_allclose(rest[2:], [30.0 - 10.0 * math.exp(-1.0), 30.0 - 10.0 * math.exp(-2.0)], rtol=1e-6)
+    np.testing.assert_allclose(
+        rest[2:], [30.0 - 10.0 * math.exp(-1.0), 30.0 - 10.0 * math.exp(-2.0)], rtol=1e-6
+    )
 
 
 def test_tables_are_one_per_line_and_span_and_sensors_add() -> None:
@@ -144,7 +150,9 @@ def test_tables_are_one_per_line_and_span_and_sensors_add() -> None:
     ]  # fmt: skip
     assert one.knots_mm[0].tolist() == [0.0, 400.0, 800.0]
     assert three.knots_mm[0].tolist() == [-100.0, 400.0, 900.0]
-    np.testing.assert_allclose(one.columns["EXX"], np.array([4 * -3.0 - 2.0, 4 * 5.0 - 2.0, 4 * 5.0 - 2.0]) * 1e-3)
+    np.testing.assert_allclose(
+        one.columns["EXX"], np.array([4 * -3.0 - 2.0, 4 * 5.0 - 2.0, 4 * 5.0 - 2.0]) * 1e-3
+    )
     np.testing.assert_allclose(one.columns["EYX"], [0.0, 4e-3, 0.0])
     np.testing.assert_allclose(two.columns["EBX"], [4e-6] * 3)
     np.testing.assert_allclose(three.columns["EZX"], [-5e-3] * 3)
@@ -160,7 +168,9 @@ def test_a_distortion_acts_on_the_lever_arms_of_its_line() -> None:
     now = structure(bend, beam=24.0, column=20.0)
     points, tool = np.array([[100.0, 0.0, -90.0]]), np.array([7.0, 0.0, -60.0])
     model = build(Calibration("m", BOX, structure=now), "FXYZ")
-    np.testing.assert_allclose(model.error(points, tool), [[4e-6 * (-90 + 20 - 10), 0.0, -4e-6 * 7.0]], atol=1e-15)
+    np.testing.assert_allclose(
+        model.error(points, tool), [[4e-6 * (-90 + 20 - 10), 0.0, -4e-6 * 7.0]], atol=1e-15
+    )
     # the equation of the paper knows no tool
     paper = build(Calibration("m", BOX, structure=now, model="huddersfield"), "FXYZ")
     np.testing.assert_allclose(paper.error(points, tool), [[4e-6 * (-90 + 20), 0.0, 0.0]], atol=1e-15)

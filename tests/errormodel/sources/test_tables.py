@@ -630,7 +630,10 @@ TURN = '[[cyclic]]\ncomponent = "EAX"\nperiod_mm = 10\n'
     ("tables", "sentence"),
     [
         (SCREW, "component EXX; expected exactly one amplitude: amplitude_um, in um"),
-        (f"{SCREW}amplitude_urad = 1\n", "component EXX; expected exactly one amplitude: amplitude_um, in um"),
+        (
+            f"{SCREW}amplitude_urad = 1\n",
+            "component EXX; expected exactly one amplitude: amplitude_um, in um",
+        ),
         (f"{SCREW}amplitude_um = 1\namplitude_urad = 1\n", "component EXX; expected exactly one amplitude"),
         (TURN, "component EAX; expected exactly one amplitude: amplitude_urad, in urad"),
         (f"{TURN}amplitude_um = 1\n", "component EAX; expected exactly one amplitude: amplitude_urad"),
