@@ -1,4 +1,4 @@
-"""The component errors of one axis: their table, directions, cyclic terms and bounds; and bodies of a chain."""
+"""The component errors of one axis: table, directions, cyclic terms and bounds; and bodies of a chain."""
 
 from __future__ import annotations
 
@@ -178,8 +178,8 @@ def test_positions_that_differ_by_rounding_are_one() -> None:
 @pytest.mark.parametrize(
     ("chain", "moved"),
     [
-        # 10 urad about Y: row X by the z of the curve's line less the term's own, (-20 + 5) - (-90 + 60); row Z
-        # by its x: -(7 - 1)
+        # 10 urad about Y: row X by the z of the curve's line less that of the term, (-20 + 5) - (-90 + 60);
+        # row Z by its x: -(7 - 1)
         ("FXYZ", {0: 15.0, 2: -6.0}),
     ],
 )

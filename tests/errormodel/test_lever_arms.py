@@ -41,7 +41,10 @@ def arms(
         (curve("EXX", reference="table"), {"carries": False}, (False, True, True), (4.0, 7.0, 9.0)),
         # tabled by the position of another axis, that one has no arm, and the own one may
         (Measurement(("EXX",), ("Z",), (1.0, 2.0, 3.0)), {}, (False, True, False), (0.0, 2.0, 0.0)),
-        (Measurement(("EXX",), ("Z",), (1.0, 2.0, 3.0)), {"carries": True}, (True, True, False), (1.0, 2.0, 0.0)),
+        (
+            Measurement(("EXX",), ("Z",), (1.0, 2.0, 3.0)), {"carries": True}, (True, True, False),
+            (1.0, 2.0, 0.0),
+        ),
         (Measurement(("EXX",), ("X", "Y", "Z")), {"carries": True}, (False, False, False), (0.0, 0.0, 0.0)),
     ],
 )  # fmt: skip

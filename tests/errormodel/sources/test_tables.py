@@ -1,4 +1,4 @@
-"""The example of each source: its values as read, and what it writes, states, shows and stamps, key by key."""
+"""The example of each source: its values as read, and what it writes, states, shows and stamps."""
 
 from __future__ import annotations
 
