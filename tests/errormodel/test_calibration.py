@@ -9,7 +9,7 @@ import pytest
 
 from olp.core.errors import ConfigError
 from olp.errormodel.build import build
-from olp.errormodel.calibration import Calibration, Curve, Cyclic, Thermal
+from olp.errormodel.calibration import PLACEHOLDER_DATE, Calibration, Curve, Cyclic, Thermal
 from olp.errormodel.gridded import ComponentTable
 from olp.errormodel.sources.beams import Beam
 from olp.errormodel.sources.maps import DeviationMap
@@ -281,6 +281,21 @@ def test_a_calibration_copies_and_freezes_what_it_is_given() -> None:
     assert not calibration.box_mm.flags.writeable
     with pytest.raises(TypeError):
         calibration.squareness["C0Y"] = 0.0  # type: ignore[index]
+
+
+def test_what_a_calibration_does_not_state_is_nothing() -> None:
+    plain = Calibration("m", BOX)
+    assert (plain.model, plain.payload_kg, plain.temperature_degC) == ("rigid-body", 0.0, 20.0)
+    assert plain.datum_mm == plain.backlash_mm == (0.0, 0.0, 0.0)
+    for name in ("repeatability_mm", "thermal", "structure", "measured", "valid_until", "quality"):
+        assert getattr(plain, name) is None
+    for name in ("curves", "squareness", "cyclic", "maps", "compliance", "beams", "more"):
+        assert not getattr(plain, name)
+    # files that are to be filled in have a date that no calibration has
+    assert PLACEHOLDER_DATE.isoformat() == "2000-01-01"
+    assert plain.curves_of("X") == () and plain.active_during_measurement == frozenset()
+    model = build(plain, "FXYZ")
+    assert not model.error(np.array([[1.0, 2.0, 3.0]]), np.zeros(3)).any()
 
 
 def test_what_the_models_of_sources_are_told() -> None:

@@ -126,6 +126,11 @@ def test_entries_of_standard_uncertainties_alone() -> None:
     many = alone("mean", "EXX", np.array([1.0, 2.0, 3.0]), X)
     assert many.factor.shape == (3, 0) and many.rest.tolist() == [1.0, 2.0, 3.0]
     assert many.position_mm is X
+    whole = alone("mean", "EXX", np.array([1, 2, 3]), X)
+    assert whole.rest.dtype == np.float64
+    # of a factor in single precision as well
+    single = replace(MEAN, factor=MEAN.factor.astype(np.float32))
+    assert single.sigma.dtype == np.float64
 
 
 # -- values ------------------------------------------------------------------------------------------------

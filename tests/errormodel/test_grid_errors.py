@@ -9,6 +9,7 @@ import pytest
 
 from olp.errormodel.grid_errors import GridErrors
 from olp.errormodel.gridded import ComponentTable
+from olp.errormodel.total import total
 
 BOX = np.array([[0.0, 800.0], [-300.0, 300.0], [-400.0, 0.0]])
 ZERO = (0.0, 0.0, 0.0)
@@ -61,6 +62,9 @@ def test_what_one_component_per_kg_does(name: str, error: tuple[float, ...]) -> 
     np.testing.assert_allclose(model.error(np.tile(POINT, (3, 1)), rows), expected, atol=1e-18)
     np.testing.assert_allclose(model.error(POINT, TOOL), -4e-6 * np.array([error]), atol=1e-18)
     assert model.backlash_at(POINT) is None
+    # without a payload none is on the machine
+    np.testing.assert_array_equal(model.rotation(POINT), model.rotation(POINT, None, 0.0))
+    np.testing.assert_array_equal(total([model, model]).rotation(POINT), 2.0 * model.rotation(POINT))
 
 
 def test_without_a_mass_the_payload_does_not_matter_and_without_tool_terms_neither_does_the_tool() -> None:
@@ -74,6 +78,11 @@ def test_without_a_mass_the_payload_does_not_matter_and_without_tool_terms_neith
         np.testing.assert_allclose(paper.error(POINT, tool), [[-40e-6, 0.0, 0.0]], atol=1e-18)
     delta = np.array([[10.0, 0.0, 7.0]])
     assert paper.chord_bound(delta, TOOL)[0] == paper.chord_bound(delta, np.zeros(3))[0]
+
+
+def test_a_table_may_hold_all_three_angles() -> None:
+    model = errors(table("Z", {"EAZ": 1e-6, "EBZ": 2e-6, "ECZ": 3e-6}), table("Y", {"EBY": 5e-6}))
+    np.testing.assert_allclose(model.rotation(POINT), [[1e-6, 7e-6, 3e-6]])
 
 
 def test_tables_of_one_axis_share_their_lever_arms_and_those_apart_do_not() -> None:

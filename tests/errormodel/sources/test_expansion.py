@@ -9,10 +9,11 @@ from olp.core.errors import UsageError
 from olp.errormodel.sources.expansion import Thermal, ThermalExpansion
 
 BOX = np.array([[0.0, 400.0], [0.0, 300.0], [-200.0, 0.0]])
-#: Scales of X and Z are 2 K warmer and 1.5 K cooler than at the calibration (21 degC); the part is at 24 degC.
+#: At 21 degC while calibrating: scales of X and Z are 2 K warmer and 1.5 K cooler; the part is at 24 degC.
 WARM = Thermal(
     scale_per_K=(10e-6, 0.0, 8e-6), fixed_at_mm=(100.0, 7.0, -50.0), workpiece_per_K=25e-6,
-    clamped_at_mm=(40.0, 30.0, -20.0), calibrated_at_degC=21.0, scale_degC=(23.0, 50.0, 19.5), workpiece_degC=24.0,
+    clamped_at_mm=(40.0, 30.0, -20.0), calibrated_at_degC=21.0, scale_degC=(23.0, 50.0, 19.5),
+    workpiece_degC=24.0,
 )  # fmt: skip
 POINTS = np.array([[300.0, 200.0, -150.0], [100.0, 30.0, -50.0]])
 TOOL = np.array([5.0, -6.0, -70.0])
@@ -28,7 +29,7 @@ def test_scales_and_part_expand_by_hand() -> None:
     np.testing.assert_allclose(model().error(POINTS, TOOL), SCALES + PART, atol=1e-15)
     # one tool per point, and a payload that does not matter
     rows = np.array([[*TOOL, 9.0], [0.0, 0.0, 0.0, 0.0]])
-    expected = (SCALES + PART)[:1].tolist() + [[-60e-4, 0.0, 30e-4]]
+    expected = [(SCALES + PART)[0], [-60e-4, 0.0, 30e-4]]
     np.testing.assert_allclose(model().error(POINTS, rows), expected, atol=1e-15)
     play = np.ones((2, 3))
     np.testing.assert_array_equal(model().error(POINTS, TOOL, play), model().error(POINTS, TOOL))
@@ -38,7 +39,8 @@ def test_each_axis_is_a_source() -> None:
     parts = dict(model().contributions(POINTS, TOOL))
     expected = {
         "scale expansion X": (0, SCALES), "scale expansion Z": (2, SCALES),
-        "workpiece expansion X": (0, PART), "workpiece expansion Y": (1, PART), "workpiece expansion Z": (2, PART),
+        "workpiece expansion X": (0, PART), "workpiece expansion Y": (1, PART),
+        "workpiece expansion Z": (2, PART),
     }  # fmt: skip
     assert list(parts) == list(expected)
     for name, (j, value) in expected.items():

@@ -12,13 +12,16 @@ import numpy as np
 import pytest
 
 from olp.core.errors import ConfigError
+from olp.core.schema import Position
 from olp.errormodel.calibration import Calibration, Curve, Cyclic, Thermal
-from olp.errormodel.sources.base import Frame
+from olp.errormodel.gridded import ComponentTable, cover_problems
+from olp.errormodel.sensitivity import Expansion
+from olp.errormodel.sources.base import Frame, digits, files_of_tables, floats, line_at, line_key, vector
 from olp.errormodel.sources.beams import Beam
 from olp.errormodel.sources.maps import DeviationMap
 from olp.errormodel.sources.registry import NUMBERS, SOURCES
-from olp.errormodel.sources.structure import Distortion, Sensor, Structure
-from olp.errormodel.uncertainty import fingerprint
+from olp.errormodel.sources.structure import Distortion, Sensor, Structure, structure_tables
+from olp.errormodel.uncertainty import Uncertainty, fingerprint
 from olp.files.calibration.covariance import load_uncertainty
 from olp.files.calibration.reader import load_calibration
 
@@ -337,6 +340,11 @@ def test_what_differs_from_the_examples_is_written_too() -> None:
     assert writing.tables[0][1]["workpiece_um_m_K"] == 23.0
     last = writing.files["thermal"][-1][1]
     assert (last["line_mm"], last["tool_mm"]) == ({"X": 0.0, "Y": 1.0, "Z": 2.0}, [0.0, 0.0, -5.0])
+    # lengths come before angles
+    table = ComponentTable("Y", ("Y",), (BOX[1],), {"EAY": [1e-6, 2e-6], "EZY": [3e-3, 4e-3]})
+    writing = Written()
+    NAMES["compliance"].write((table,), writing)
+    assert writing.files["load"] == "Y_mm,EZY_um_kg,EAY_urad_kg\n0,3,1\n300,4,2\n"
     for key, nothing in (("backlash", ZERO), ("repeatability", None), ("thermal", None), ("structure", None)):
         assert written(key, nothing) == []
 
@@ -530,6 +538,16 @@ def test_the_stamp_of_a_calibration_stays_what_it_was() -> None:
     assert fingerprint(calibration) == hashlib.sha256("".join(f"{n}\n" for n in lines).encode()).hexdigest()
 
 
+def test_an_uncertainty_of_zero_is_none_that_is_stated(tmp_path: Path) -> None:
+    rows = "X_mm,EXX_um,EYX_um,sigma_EXX_um,sigma_EYX_um\n0,1,1,0,0\n400,2,2,0,0.5\n"
+    tables = "[backlash]\nsigma_X_um = 0.0\nsigma_Y_um = 2.0\n[squareness]\nsigma_B0Z_urad = 3.0\n"
+    calibration = read(tmp_path, f'[[curves]]\nfile = "a.csv"\n{tables}', {"a.csv": rows})
+    known = load_uncertainty(tmp_path / "calibration.toml", calibration)
+    assert known is not None
+    found = [(entry.name, entry.rest.tolist()) for entry in known.entries]
+    assert found == [("EYX", [0.0, 5e-4]), ("B0Z", [3e-6]), ("Y", [2e-3])]
+
+
 @pytest.mark.parametrize(
     ("tables", "key", "expected"),
     [
@@ -646,6 +664,12 @@ TURN = '[[cyclic]]\ncomponent = "EAX"\nperiod_mm = 10\n'
         (f"{BEAM}section_mm = [4, 6, 2.1]\n", "has a wall of 2.1 mm; expected at most half of width"),
         (f"{BEAM}section_mm = [6, 4, 2.1]\n", "has a wall of 2.1 mm; expected at most half of width"),
         (f'{BEAM}section_mm = [4, 6, 1]\ndirection = "+X"\n', '"+X" is along the beam'),
+        # a key that is wrong itself is one problem, not also one of the keys beside it
+        (f"{SCREW.replace('EXX', 'EXQ')}line_mm = {{ Y = 1 }}\n", "component"),
+        (f'{SCREW}amplitude_um = "a"\n', "amplitude_um"),
+        (f'{TURN}amplitude_um = "a"\namplitude_urad = 1\n', "amplitude_um"),
+        (f"{BEAM}second_moment_mm4 = 0\n", "second_moment_mm4"),
+        (BEAM.replace('"X"', '"A"') + "section_mm = [4, 6, 1]\n", "axis"),
         (BEAM.replace("[-100, 500]", "[5, 5]") + "section_mm = [4, 6, 1]\n", "span_mm = is empty"),
         (BEAM.replace("[-100, 500]", "[10, 500]") + "section_mm = [4, 6, 1]\n", "spans 10 to 500 mm"),
     ],
@@ -657,6 +681,12 @@ def test_a_table_that_contradicts_itself_is_refused(tables: str, sentence: str, 
     assert len(caught.value.problems) == 1
 
 
+def test_an_amplitude_of_zero_is_zero(tmp_path: Path) -> None:
+    for table in (f"{TURN}amplitude_urad = 0\n", f"{SCREW}amplitude_um = 0\n"):
+        (term,) = read(tmp_path, table, {}).cyclic
+        assert term.amplitude == 0.0 and term.phase_rad == 0.0
+
+
 def test_a_wall_of_half_the_width_is_a_full_bar(tmp_path: Path) -> None:
     for section in ("[40, 60, 20]", "[60, 40, 20]"):
         (beam,) = read(tmp_path, f"{BEAM}section_mm = {section}\n", {}).beams
@@ -664,6 +694,7 @@ def test_a_wall_of_half_the_width_is_a_full_bar(tmp_path: Path) -> None:
         assert beam.second_moment_mm4 == width * height**3 / 12.0
 
 
+BEAM_SENSOR = Sensor("beam", 20.0, (15.0, 30.0))
 THERMAL = """schema = "olp-thermal-1"
 machine = "example"
 [[sensors]]
@@ -698,6 +729,7 @@ def test_keys_of_a_thermal_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("component", "stated", "sentence"),
     [
+        ("EXQ", "offset_urad_K = 1\n", "component"),
         ("EXX", "offset_urad_K = 1\n", "(offset_urad_K) is of the wrong unit for EXX; expected keys in um"),
         ("EXX", "bow_urad_K = 1\n", "(bow_urad_K) is of the wrong unit for EXX; expected keys in um"),
         ("EBX", "growth_um_m_K = 1\n", "(growth_um_m_K) is of the wrong unit for EBX; expected keys in urad"),
@@ -716,3 +748,47 @@ def test_a_wrong_distortion_is_refused(component: str, stated: str, sentence: st
 def test_numbers_are_known_by_their_kind() -> None:
     assert sorted(NUMBERS) == ["backlash", "half", "mean", "squareness", "wave"]
     assert {source.key for source in SOURCES if not source.correctable} == {"repeatability"}
+
+
+TWO: Any = (1e-3, 2e-3)
+
+
+@pytest.mark.parametrize(
+    "call",
+    {
+        "backlash is written": lambda: NAMES["backlash"].write(TWO, Written()),
+        "repeatability is written": lambda: NAMES["repeatability"].write(TWO, Written()),
+        "repeatability is shown": lambda: NAMES["repeatability"].inspect(TWO, FRAME),
+        "expansion is written": lambda: NAMES["thermal"].write(Thermal(scale_per_K=TWO), Written()),
+        "expansion is uncertain": lambda: Expansion.of(
+            Calibration("m", BOX, thermal=Thermal(scale_per_K=TWO)), Uncertainty((), "", ""), {}
+        ),
+        "a scale counts twice": lambda: Calibration(
+            "m", BOX, structure=Structure((), ()), thermal=Thermal(scale_per_K=TWO)
+        ),
+        "a line is read": lambda: line_at(Position(X=1.0), TWO),
+        "a line is written": lambda: line_key(TWO),
+        "the line of a distortion is written": lambda: list(
+            structure_tables(Structure((BEAM_SENSOR,), (Distortion("EXX", "beam", TWO, line_mm=TWO),)), "m")
+        ),
+        "levels of a table": lambda: ComponentTable("X", ("X", "Y"), (BOX[0],), {"EXX": BOX[0]}),
+        "levels reach the box": lambda: cover_problems("", ("X", "Y"), (BOX[0],), BOX),
+    }.items(),
+    ids=lambda item: item[0],
+)
+def test_where_a_vector_has_too_few_numbers_none_is_left_out_in_silence(call: tuple[str, Any]) -> None:
+    with pytest.raises(ValueError, match=r"shorter|unpack"):
+        call[1]()
+
+
+def test_keys_of_lines() -> None:
+    """An axis that is left out was at the datum; the own axis has no key."""
+    assert line_at(Position(Y=5.0), DATUM) == (1.0, 5.0, -3.0)
+    assert line_at(Position(X=0.0, Z=0.0), DATUM) == (0.0, 2.0, 0.0)
+    assert line_key((4.0, 5.0, 6.0)) == {"X": 4.0, "Y": 5.0, "Z": 6.0}
+    assert line_key((4.0, 5.0, 6.0), "Y") == {"X": 4.0, "Z": 6.0}
+    assert line_key(None, "Y") is None
+    assert floats([1, 2]) == [1.0, 2.0] and vector([1, 2, 3]) == (1, 2, 3)
+    assert digits(-0.0) == "0.000000000e+00" and digits([1.0, 2e-9]) == "1.000000000e+00 2.000000000e-09"
+    named = {"a": [{"file": "x"}, {"file": "y"}], "b": []}
+    assert [files_of_tables(named, key) for key in "abc"] == [["x", "y"], [], []]
