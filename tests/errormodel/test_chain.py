@@ -564,6 +564,7 @@ def test_bounds_are_kept_by_tool_and_stay_right_for_many_tools() -> None:
         again = [model.chord_bound(delta, np.array([0.0, 0.0, -float(z)]))[0] for z in range(80)]
         np.testing.assert_array_equal(again, alone)
     assert len(set(alone)) == 80
+    assert "AxisBound" not in repr(model)
     assert model.chord_bound(np.zeros((0, 3)), np.zeros((0, 3))).shape == (0,)
 
 
@@ -576,6 +577,8 @@ def test_a_model_of_first_order_is_the_linear_part_of_the_exact_one() -> None:
     np.testing.assert_allclose(model.error(points, tool), parts, atol=1e-15)
     np.testing.assert_array_equal(model.error(points, tool), model.error(points, np.zeros(3)))
     assert model.depends_on.tolist() == [[True, True, True], [True, True, True], [True, True, True]]
+    delta = np.array([[30.0, 20.0, 10.0]])
+    assert model.chord_bound(delta, tool)[0] == model.chord_bound(delta, np.zeros(3))[0] > 0.0
     few = Curve("X", BOX[0], {"EXX": [0.0, 1e-3], "ECX": [1e-5, 1e-5]}, interpolation="linear")
     small = build(Calibration("m", BOX, model="huddersfield", curves=(few,)), "FXYZ")
     # dX = EXX - ECX y; dY = ECX x, of which X has none without a tool
