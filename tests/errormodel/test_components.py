@@ -251,7 +251,7 @@ def test_bodies_come_from_tool_to_workpiece() -> None:
 @pytest.mark.parametrize(
     ("angle", "terms"),
     # on 1 m of tool: the third power over 6 or the fourth over 8 of the angle times 1 m is 2e-11 mm
-    [(0.0, 1), (4.9e-5, 1), (4.97e-5, 2), (6.3e-4, 2), (6.35e-4, 0), (-6.35e-4, 0), (0.1, 0)],
+    [(0.0, 1), (4.9316e-5, 1), (4.934e-5, 2), (6.3e-4, 2), (6.35e-4, 0), (-6.35e-4, 0), (0.1, 0)],
 )
 def test_short_series_are_taken_where_they_are_exact(angle: float, terms: int) -> None:
     turned = Curve("Z", BOX[2], {"EAZ": [angle, angle]})

@@ -338,6 +338,8 @@ def test_expansion_acts_by_axis_position_and_by_place_of_the_part() -> None:
 def test_expansion_comes_behind_the_other_unknowns() -> None:
     known = Uncertainty((TILT,), "", "", temperature_K=1.0)
     expansion = Expansion.of(calibration(), known, {})
+    assert expansion.unmodelled_K == 0.0
+    assert Expansion((0.0,) * 3, (0.0,) * 3, 0.0, (0.0,) * 3).unmodelled_K == 0.0
     sensitivity = Sensitivity.of(calibration(), "FXYZ", known, expansion=expansion)
     rows = sensitivity.rows(POINTS, TOOL)
     assert rows.shape == (3, 2, 6)

@@ -144,6 +144,32 @@ def test_what_a_component_depends_on() -> None:
     assert body.turns_with().tolist() == [[no] * 3, [no] * 3, [yes, no, no]]
 
 
+def kinked(name: str, jump: float, **more: Any) -> ComponentTable:
+    """Along X, with one kink of `jump` per mm at 400."""
+    options = {"line_mm": LINE, "tool_mm": TOOL_THEN, "interpolation": "linear"} | more
+    knots = (np.array([0.0, 400.0, 800.0]),)
+    return ComponentTable("X", ("X",), knots, {name: np.array([0.0, 0.0, 400.0 * jump])}, **options)
+
+
+def test_bounds_of_several_angles_and_tables_add_row_by_row() -> None:
+    """EBX and ECX on rows X, Y and Z, a kink of EXX in a table of its own, and one of the axis Z."""
+    tables = kinked("EBX", 1e-8), kinked("ECX", 2e-8), kinked("EXX", 3e-6)
+    other = ComponentTable(
+        "Z", ("Z",), (np.array([-400.0, -200.0, 0.0]),), {"EYZ": [0.0, 0.0, 4e-4]}, interpolation="linear"
+    )
+    delta = np.array([[20.0, 5.0, -30.0]])
+    # arms with this tool, at most in the box: x 4; y 282 or -318; z -420 or -20
+    row_x = 5.0 * (1e-8 * 420.0 + 2e-8 * 318.0 + 3e-6) + 0.25 * 20.0 * (1e-8 * 30.0 + 2e-8 * 5.0)
+    row_y, row_z = 5.0 * 2e-8 * 4.0 + 0.25 * 30.0 * 2e-6, 5.0 * 1e-8 * 4.0
+    expected = (row_x**2 + row_y**2 + row_z**2) ** 0.5
+    model = errors(*tables, other)
+    assert model.chord_bound(delta, TOOL)[0] == pytest.approx(expected, rel=1e-12)
+    # all of them are hidden where X is not known, whichever table comes last
+    unknown = np.array([[np.nan, 0.0, 0.0]])
+    for several in (tables, tables[::-1], (*tables, other)):
+        np.testing.assert_array_equal(np.isnan(errors(*several).rotation(unknown)), [[False, True, True]])
+
+
 def test_outside_the_box_the_end_holds_also_without_hold() -> None:
     tilt = ComponentTable("X", ("X",), (BOX[0],), {"EZX": [0.0, 8e-3]}, interpolation="linear")
     outside = np.array([[900.0, 0.0, 0.0], [-100.0, 0.0, 0.0]])

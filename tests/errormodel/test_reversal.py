@@ -151,6 +151,8 @@ def test_play_after_motions_in_one_direction() -> None:
     width = np.array([[4.0] * 3, [4.0] * 3, [0.0] * 3, [-4.0, np.nan, np.nan]])
     expected = [[-0.5, 0.5, 1.0], [-1.0, 0.0, -0.5], [1.0, -1.0, 0.3], [1.0, -1.0, 0.3]]
     np.testing.assert_allclose(play_after(play, moved, width), expected)
+    # the same in um
+    np.testing.assert_allclose(play_after(play, 1e-3 * moved, 1e-3 * width), expected)
     # without backlash it is the sign of the last motion
     signs = [[1.0, 1.0, 1.0], [-1.0, -1.0, -0.5], [1.0, -1.0, 0.3], [1.0, -1.0, 0.3]]
     np.testing.assert_allclose(play_after(play, moved, None), signs)
@@ -226,6 +228,9 @@ def test_the_start_holds_until_the_position_is_lost() -> None:
     np.testing.assert_allclose(high[:, 0], [0.0, 0.5, 1.0, 1.0, 1.0])
     np.testing.assert_allclose((low[4, 1], high[4, 1]), (1.0, 1.0))
     np.testing.assert_allclose(low[:, 2], [0.25, 0.75, 1.0, 1.0, 1.0])
+    # the last command alone is not known
+    low, high = play_interval(command[:3], np.full(3, 4.0), np.zeros(3))
+    np.testing.assert_array_equal((low[:, 0], high[:, 0]), ([0.0, 0.5, -1.0], [0.0, 0.5, 1.0]))
     # a first command that is not known has no start
     lost = np.array([[nan] * 3, [1.0] * 3, [2.0] * 3])
     low, high = play_interval(lost, np.full(3, 4.0), np.zeros(3))

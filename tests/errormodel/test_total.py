@@ -99,6 +99,7 @@ def test_tools_of_a_caller_with_and_without_a_payload() -> None:
     ):
         np.testing.assert_array_equal(as_tool(given, 2), np.array(vector, float))
         np.testing.assert_array_equal(payload_of(given), payload)
+        assert as_tool(given, 2).dtype == np.asarray(payload_of(given)).dtype == np.float64
     for wrong in (np.zeros(2), np.zeros(5), np.zeros((3, 3)), np.zeros((2, 2)), np.zeros((1, 4))):
         with pytest.raises(
             UsageError, match=r"expected \(3,\) or \(2, 3\), or a fourth column with the payload"

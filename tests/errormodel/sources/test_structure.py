@@ -123,6 +123,10 @@ def test_a_part_follows_its_sensor_with_its_lag() -> None:
     np.testing.assert_allclose(lagged(time, ramp, 40.0), ramp - behind, rtol=1e-12)
     np.testing.assert_allclose(lagged(time, ramp, -40.0), ramp + behind, rtol=1e-12)
     np.testing.assert_array_equal(lagged(time, ramp, 0.0), ramp)
+    for lag in (0.5, 1.0):
+        behind = 0.1 * lag * (1.0 - np.exp(-time / lag))
+        np.testing.assert_allclose(lagged(time, ramp, lag), ramp - behind, rtol=1e-12)
+        np.testing.assert_allclose(lagged(time, ramp, -lag), ramp + behind, rtol=1e-12)
     # a step falls off with the lag, whatever the spacing
     step = np.array([20.0, 30.0, 30.0, 30.0])
     rest = lagged(np.array([0.0, 1e-6, 40.0, 80.0]), step, 40.0)
