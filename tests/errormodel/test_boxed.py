@@ -13,7 +13,6 @@ from olp.errormodel.gridded import ComponentTable
 from olp.errormodel.sources.maps import DeviationMap
 
 BOX = np.array([[0.0, 100.0], [-300.0, 300.0], [-400.0, 0.0]])
-POINTS = np.array([[25.0, 0.0, -100.0], [100.0, 30.0, 0.0]])
 TOOL = np.array([5.0, -6.0, -70.0])
 
 

@@ -22,7 +22,6 @@ WAVE = Entry("wave", "EXX", np.array([[3.0], [4.0]]), np.array([0.3, 0.4]), peri
 TILT = Entry("squareness", "B0Z", np.array([[2.0]]), np.array([0.5]))
 LOST = Entry("backlash", "Y", np.array([[2.0]]), np.array([0.5]))
 ALL = (MEAN, HALF, WAVE, TILT, LOST)
-BOX = np.array([[0.0, 40.0], [0.0, 300.0], [-200.0, 0.0]])
 
 
 @pytest.mark.parametrize("entry", ALL, ids=lambda entry: entry.kind)

@@ -15,7 +15,6 @@ from olp.errormodel.gridded import ComponentTable
 from olp.errormodel.sources.maps import DeviationMap
 
 BOX = np.array([[0.0, 800.0], [-300.0, 300.0], [-400.0, 0.0]])
-NO_TOOL = np.zeros((1, 3))
 
 
 def departure(bound: GridBound, *delta: float) -> list[float]:

@@ -14,14 +14,8 @@ from olp.errormodel.entry import Entry
 from olp.errormodel.sensitivity import Expansion, Sensitivity
 from olp.errormodel.uncertainty import EXPANSION_PER_K, Uncertainty, fingerprint, of_sigmas
 
-NAN = float("nan")
 X = np.array([0.0, 10.0, 40.0])
-MEAN = Entry("mean", "EXX", np.array([[1.0, 0.0], [2.0, 5.0], [4.0, 0.0]]), np.zeros(3), X)
-HALF = replace(MEAN, kind="half")
-WAVE = Entry("wave", "EXX", np.array([[3.0], [4.0]]), np.array([0.3, 0.4]), period_mm=8.0)
 TILT = Entry("squareness", "B0Z", np.array([[2.0]]), np.array([0.5]))
-LOST = Entry("backlash", "Y", np.array([[2.0]]), np.array([0.5]))
-ALL = (MEAN, HALF, WAVE, TILT, LOST)
 BOX = np.array([[0.0, 40.0], [0.0, 300.0], [-200.0, 0.0]])
 
 

@@ -13,15 +13,12 @@ from olp.errormodel.sensitivity import value_rows
 from olp.errormodel.sources.curves import CELLS
 from olp.errormodel.sources.registry import NUMBERS
 
-NAN = float("nan")
 X = np.array([0.0, 10.0, 40.0])
 MEAN = Entry("mean", "EXX", np.array([[1.0, 0.0], [2.0, 5.0], [4.0, 0.0]]), np.zeros(3), X)
 HALF = replace(MEAN, kind="half")
 WAVE = Entry("wave", "EXX", np.array([[3.0], [4.0]]), np.array([0.3, 0.4]), period_mm=8.0)
 TILT = Entry("squareness", "B0Z", np.array([[2.0]]), np.array([0.5]))
 LOST = Entry("backlash", "Y", np.array([[2.0]]), np.array([0.5]))
-ALL = (MEAN, HALF, WAVE, TILT, LOST)
-BOX = np.array([[0.0, 40.0], [0.0, 300.0], [-200.0, 0.0]])
 
 
 def value(entry: Entry, q: list[float]) -> np.ndarray:

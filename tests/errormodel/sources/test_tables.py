@@ -16,7 +16,16 @@ from olp.core.schema import Position
 from olp.errormodel.calibration import Calibration, Curve, Cyclic, Thermal
 from olp.errormodel.gridded import ComponentTable, cover_problems
 from olp.errormodel.sensitivity import Expansion
-from olp.errormodel.sources.base import Frame, digits, files_of_tables, floats, line_at, line_key, vector
+from olp.errormodel.sources.base import (
+    ErrorSource,
+    Frame,
+    digits,
+    files_of_tables,
+    floats,
+    line_at,
+    line_key,
+    vector,
+)
 from olp.errormodel.sources.beams import Beam
 from olp.errormodel.sources.maps import DeviationMap
 from olp.errormodel.sources.registry import NUMBERS, SOURCES
@@ -792,3 +801,51 @@ def test_keys_of_lines() -> None:
     assert digits(-0.0) == "0.000000000e+00" and digits([1.0, 2e-9]) == "1.000000000e+00 2.000000000e-09"
     named = {"a": [{"file": "x"}, {"file": "y"}], "b": []}
     assert [files_of_tables(named, key) for key in "abc"] == [["x", "y"], [], []]
+
+
+@pytest.mark.parametrize(
+    ("tables", "sentence"),
+    [
+        ('[[curves]]\nfile = "no.csv"\n', 'line 10: curves[0].file = "no.csv": no such file; check the path'),
+        (
+            '[[maps]]\nkind = "total"\nfile = "no.csv"\n',
+            'line 11: maps[0].file = "no.csv": no such file; check the path',
+        ),
+        ('[[compliance]]\nfile = "no.csv"\n', 'line 10: compliance[0].file = "no.csv": no such file;'),
+        ('[thermal]\nstructure = "no.toml"\n', 'line 10: thermal.structure = "no.toml": no such file;'),
+    ],
+)
+def test_a_file_that_is_not_there_is_named_with_its_key(tables: str, sentence: str, tmp_path: Path) -> None:
+    with pytest.raises(ConfigError) as caught:
+        read(tmp_path, tables, {})
+    (problem,) = caught.value.problems
+    assert problem.startswith(sentence)
+
+
+def test_files_that_a_calibration_names_before_it_is_read() -> None:
+    named = {"a": [{"file": "x"}], "thermal": {"structure": "t"}}
+    for key in ("curves", "maps", "compliance"):
+        assert list(NAMES[key].named({key: [{"file": "x"}, {"file": "y"}]})) == ["x", "y"]
+        assert list(NAMES[key].named(named)) == []
+    assert NAMES["structure"].named(named) == ["t"]
+    assert NAMES["structure"].named({"thermal": {}}) == NAMES["structure"].named({}) == []
+    for key in ("squareness", "backlash", "repeatability", "cyclic", "compliance_beam", "thermal"):
+        assert NAMES[key].named(named) == []
+
+
+def test_a_source_that_leaves_methods_out_says_nothing() -> None:
+    """What is not written, shown, modelled or uncertain of any source."""
+    source: Any = ErrorSource()
+    assert (source.field, source.schema, source.numbers) == ("", None, ())
+    assert source.correctable is True and source.covered is True
+    assert source.named({}) == source.problems(None, BOX) == source.loads(None, FRAME) == []
+    assert source.models(None, FRAME) == source.entries(None, {}) == []
+    assert source.sigmas(None, None) == source.inspect(None, FRAME) == source.inspect_axis(None, "X") == {}
+    assert list(source.fingerprint(None, DATUM)) == []
+    for call in (
+        lambda: source.example(1.0),
+        lambda: source.read(None, None),
+        lambda: source.write(None, None),
+    ):
+        with pytest.raises(NotImplementedError):
+            call()
