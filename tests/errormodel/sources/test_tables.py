@@ -348,6 +348,9 @@ def test_what_differs_from_the_examples_is_written_too() -> None:
     assert writing.tables[0][1]["structure"] == "thermal.toml"
     assert writing.tables[0][1]["workpiece_um_m_K"] == 23.0
     last = writing.files["thermal"][-1][1]
+    assert (last["offset_um_K"], last["growth_um_m_K"], last["bow_um_K"]) == (1.0, 0.0, 0.0)
+    shown = NAMES["structure"].inspect(Structure(sensors, (measured,)), FRAME)["distortions"]
+    same(shown, [{"name": "EXX by beam", "offset_um_K": 1.0, "growth_um_m_K": 0.0, "bow_um_K": 0.0}])
     assert (last["line_mm"], last["tool_mm"]) == ({"X": 0.0, "Y": 1.0, "Z": 2.0}, [0.0, 0.0, -5.0])
     # lengths come before angles
     table = ComponentTable("Y", ("Y",), (BOX[1],), {"EAY": [1e-6, 2e-6], "EZY": [3e-3, 4e-3]})
@@ -732,6 +735,7 @@ def test_keys_of_a_thermal_file(tmp_path: Path) -> None:
     expected = Distortion("EBX", "beam", span, 0.0, 2e-9, -3e-6, (0.0, 5.0, 6.0), (0.0, 0.0, -7.0))
     assert one("EBX", stated) == expected
     stated = "offset_um_K = 1\ngrowth_um_m_K = 2\nbow_um_K = -3\n"
+    assert one("EXX", stated) == Distortion("EXX", "beam", span, 1e-3, 2e-6, -3e-3)
     assert one("EZX", stated) == Distortion("EZX", "beam", span, 1e-3, 2e-6, -3e-3)
 
 
