@@ -397,3 +397,24 @@ def test_a_curve_of_two_positions_in_either_form_is_taken() -> None:
     half = two.half_difference("EYY")
     assert half is not None
     assert two.mean("EYY").tolist() == [3.0, 2.5] and half.tolist() == [-2.0, 0.5]
+
+
+def test_problems_of_all_parts_come_at_once() -> None:
+    """Each kind of relation is broken once, in two places where it can be."""
+    short = np.array([0.0, 99.0])
+    ends = (short, *BOX[1:])
+    maps = tuple(DeviationMap(ends, np.zeros((2, 2, 2, 3)), "total", name=f"map {n}") for n in "ab")
+    tables = tuple(ComponentTable("X", ("X",), (short,), {"EZX": short}, name=f"load {n}") for n in "ab")
+    stretched = Structure((Sensor("s", 20.0, (15.0, 25.0)),), (Distortion("EYY", "s", (0.0, 99.0), 1e-3),))
+    found = problems(
+        curves=(curve(0.0, 99.0), curve(0.0, 99.0)), maps=maps, compliance=tables, structure=stretched,
+        thermal=Thermal(scale_per_K=(0.0, 1e-5, 0.0)), beams=(Beam("X", "simple", (0.0, 99.0), 210.0, 1e6),),
+        repeatability_mm=(-1.0, 0.0, 0.0), payload_kg=-1.0,
+    )  # fmt: skip
+    starts = [
+        "curve of axis X runs", "curve of axis X runs", "EXX is in two curves", "map a runs", "map b runs",
+        "map b is a second map", "map a is of kind", "load a runs", "EZX is in load a and in load b",
+        "load b runs", "the distortion of EYY", "the thermal structure holds EYY", "EZX is in load b, and a",
+        "beam of axis X spans", "repeatability_mm =", "payload_kg =",
+    ]  # fmt: skip
+    assert [p[: len(start)] for p, start in zip(found, starts, strict=True)] == starts

@@ -7,8 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from olp.core.errors import UsageError
 from olp.errormodel.grid_errors import GridErrors
 from olp.errormodel.gridded import ComponentTable
+from olp.errormodel.sources.maps import DeviationMap, MapErrors
 from olp.errormodel.total import total
 
 BOX = np.array([[0.0, 800.0], [-300.0, 300.0], [-400.0, 0.0]])
@@ -168,6 +170,25 @@ def test_bounds_of_several_angles_and_tables_add_row_by_row() -> None:
     unknown = np.array([[np.nan, 0.0, 0.0]])
     for several in (tables, tables[::-1], (*tables, other)):
         np.testing.assert_array_equal(np.isnan(errors(*several).rotation(unknown)), [[False, True, True]])
+
+
+def test_wrong_rows_are_named() -> None:
+    model = errors(table("X", {"EBX": 1e-6}))
+    maps = MapErrors.of(DeviationMap(tuple(BOX), np.ones((2, 2, 2, 3)), name="a"), BOX, False)  # type: ignore[arg-type]
+    for one in (model, maps):
+        with pytest.raises(UsageError, match="delta_mm has shape"):
+            one.chord_bound(np.zeros(3), TOOL)
+        for call in (
+            one.error,
+            lambda p, t, m=one: m.rotation(p),
+            lambda p, t, m=one: list(m.contributions(p, t)),
+        ):
+            with pytest.raises(UsageError, match="axis_mm has shape"):
+                call(np.zeros(3), TOOL)
+    with pytest.raises(UsageError, match="tool_mm has shape"):
+        model.chord_bound(POINT, np.zeros(2))
+    assert [name for name, _ in maps.contributions(POINT, TOOL)] == ["a"]
+    assert maps.rotation(POINT).tolist() == [[0.0, 0.0, 0.0]] and maps.backlash_at(POINT) is None
 
 
 def test_outside_the_box_the_end_holds_also_without_hold() -> None:
