@@ -309,29 +309,6 @@ def test_what_the_models_of_sources_are_told() -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "sentence"),
-    [
-        ({"component": "EXW"}, "cyclic component 'EXW'; expected a name such as EXX or EAX"),
-        ({"period_mm": 0.0}, "cyclic EAX: period 0.0 mm; expected more than 0"),
-        ({"period_mm": math.inf}, "cyclic EAX: period inf mm; expected more than 0"),
-        ({"amplitude": math.nan}, "cyclic EAX: amplitude and phase must be finite"),
-        ({"phase_rad": math.inf}, "cyclic EAX: amplitude and phase must be finite"),
-        ({"component": "EXX", "tool_mm": (0, 0, 0)}, "cyclic EXX has no lever arm; expected no tool_mm"),
-        (
-            {"component": "EZX", "line_mm": (0, 0, 0), "reference": "table"},
-            "cyclic EZX has no lever arm; expected no line_mm, reference",
-        ),
-    ],
-)
-def test_what_is_wrong_with_a_cyclic_term(options: dict[str, object], sentence: str) -> None:
-    good = {"component": "EAX", "period_mm": 1e-9, "amplitude": 0.0}
-    assert Cyclic(**good).measured() == {} and Cyclic(**good).phase_rad == 0.0
-    with pytest.raises(ConfigError) as caught:
-        Cyclic(**(good | options))
-    assert caught.value.problems == (sentence,)
-
-
-@pytest.mark.parametrize(
     "options",
     [
         {"scale_per_K": (0.0, math.nan, 0.0)},
