@@ -90,11 +90,10 @@ class RigidBody(Boxed):
                 if np.any(value != 0.0):
                     yield name, _hide(value, hidden)
             for i, name in ((0, "C0Y" if body.axis == 1 else "B0Z"), (1, "A0Z")):
-                if body.shear[i] != 0.0:
-                    value = np.zeros(points.shape)
-                    value[:, i] = body.shear[i] * (position[body.axis] - body.datum_mm)
-                    if np.any(value != 0.0):
-                        yield name, _hide(value, hidden)
+                value = np.zeros(points.shape)
+                value[:, i] = body.shear[i] * (position[body.axis] - body.datum_mm)
+                if np.any(value != 0.0):
+                    yield name, _hide(value, hidden)
 
     @property
     def depends_on(self) -> Mask:
@@ -202,9 +201,9 @@ class RigidBody(Boxed):
                     if variation[3 + a] is None:
                         continue
                     pair = list(_PLANES[a])
+                    # all that either of them carries, so also what earlier turns gave them
                     both = carried[pair].any(axis=0) | (own & varies[3 + a])
-                    turned[pair] |= both
-                    carried[pair] |= both
+                    turned[pair] = carried[pair] = both
             else:
                 for i, a, k, _ in CROSS:
                     if variation[3 + a] is not None and present[k]:

@@ -3,7 +3,13 @@
 Per axis the bounds of its components are summed row by row with their largest lever arms, and the rows joined
 to one length. First-order cross terms: change of an angle times change of its lever arm / 4. To cover all
 second-order terms (angle times displacement, products of angles), lever arms, slopes and translations are
-widened by a multiple of the sum of all angles.
+widened by a multiple of the sum of all angles. With A the sum of the largest angles of all axes:
+
+    extra    4 A (1 + A): a translation counts (1 + extra) times
+    widened  the largest displacement of all errors + extra * the sum of all lever arms: added to each lever
+             arm, also along its own axis of rotation
+    stretch  (extra + 2 * the sum of all slopes of displacements) times the change of all angles of the axis:
+             added to the cross term of each axis
 """
 
 from __future__ import annotations

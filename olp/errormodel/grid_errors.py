@@ -50,8 +50,7 @@ class GridBody:
     ) -> GridBody:
         """`beside` are all tables of this axis that were measured together, this one included: a translation
         holds the effect of the angles on its own line, whichever table holds the angles."""
-        order = chain.replace("F", "")
-        after = order[order.index(table.axis) + 1 :]
+        after = chain[chain.index(table.axis) + 1 :]
         carries = chain.index(table.axis) < chain.index("F")
         names = table.names
         grid = Grid.through(
@@ -120,7 +119,7 @@ class GridBody:
         varies, turns = self.grid.varies(), self.turns_with()
         for i, column in enumerate(self.column[:3]):
             if column is not None:
-                depends[i, list(self.axes)] |= varies[column]
+                depends[i, list(self.axes)] = varies[column]
         for rows, lever_arm in self.lever_arms:
             for i, a, k, _ in CROSS:
                 column = self.column[3 + a]

@@ -78,7 +78,7 @@ def _interval(command: Array, width: Array, start: float) -> tuple[Array, Array]
     # Commands that leave the axis alone repeat the state before them.
     kept = np.concatenate([[0], np.flatnonzero(~same) + 1])
     moved = kept[1:] - 1
-    low, high = np.full(len(kept), -1.0), np.full(len(kept), 1.0)
+    low, high = np.empty(len(kept)), np.empty(len(kept))
     gain, shift = np.ones(len(kept)), np.zeros(len(kept))
     if len(moved):
         _maps(motion[moved], width[moved], width[moved + 1], gain[1:], shift[1:], low[1:], high[1:])

@@ -48,7 +48,7 @@ def steps_needed(
         bound = model.chord_bound(delta_mm[todo] / count[todo, None], tool)
         bends = np.flatnonzero((bound > bend_mm) & (count[todo] < at_most))
         todo = todo[bends]
-        # a bend goes with the square of the length, or slower: so many halvings are needed at the least
-        halvings = np.maximum(np.ceil(0.5 * np.log2(bound[bends] / bend_mm)), 1).astype(np.int64)
+        # a bend goes with the square of the length, or slower: so many halvings (one or more) are needed
+        halvings = np.ceil(0.5 * np.log2(bound[bends] / bend_mm)).astype(np.int64)
         count[todo] = np.minimum(count[todo] << halvings, at_most)
     return count

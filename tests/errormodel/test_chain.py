@@ -460,3 +460,141 @@ def test_angles_too_large_for_a_series_take_sine_and_cosine(angle: float, terms:
     calibration = Calibration("m", BOX, curves=(constant("X", {"EAX": angle}),))
     bodies = build_bodies(calibration, "FXYZ", frozenset())
     assert [body.sine_terms for body in bodies] == [terms if body.axis == 0 else 1 for body in bodies]
+
+
+# -- contributions to first order, by hand -------------------------------------------------------------------
+
+#: FXYZ with the datum at (50, -40, 20), at P = (100, 60, -80) with a tool of (5, -6, -90).
+PLACE, SHORT = np.array([[100.0, 60.0, -80.0]]), np.array([5.0, -6.0, -90.0])
+UNIT = 1e-6
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("EXX", (1, 0, 0)), ("EYX", (0, 1, 0)), ("EZX", (0, 0, 1)),
+        # on X all that is behind it: t_x, y + 40 + t_y, z - 20 + t_z
+        ("EAX", (0, 190, 94)), ("EBX", (-190, 0, -5)), ("ECX", (-94, 5, 0)),
+        ("EAY", (0, 190, -6)), ("EBY", (-190, 0, -5)), ("ECY", (6, 5, 0)),
+        ("EAZ", (0, 90, -6)), ("EBZ", (-90, 0, -5)), ("ECZ", (6, 5, 0)),
+        # squareness from the datum: -C0Y y + B0Z z, -A0Z z
+        ("C0Y", (-100, 0, 0)), ("B0Z", (-100, 0, 0)), ("A0Z", (0, 100, 0)),
+    ],
+)  # fmt: skip
+def test_what_one_unit_of_each_error_contributes(name: str, expected: Vector) -> None:
+    if name in SQUARENESS:
+        calibration = Calibration("m", BOX, datum_mm=DATUM, squareness={name: UNIT})
+    else:
+        calibration = Calibration("m", BOX, datum_mm=DATUM, curves=(constant(name[2], {name: UNIT}),))
+    ((source, value),) = build(calibration, "FXYZ").contributions(PLACE, SHORT)
+    assert source == name
+    np.testing.assert_allclose(value, UNIT * np.array([expected]), atol=1e-18)
+    np.testing.assert_allclose(
+        build(calibration, "FXYZ").error(PLACE, SHORT), UNIT * np.array([expected]), atol=1e-9
+    )
+
+
+def test_contributions_come_axis_by_axis_and_only_where_they_are_not_zero() -> None:
+    curves = (
+        constant("Z", {"EBZ": UNIT, "EXZ": 0.0}), constant("X", {"EXX": UNIT, "ECX": UNIT}),
+        Curve("Y", BOX[1], {"EYY": [0.0, 1e-3]}, interpolation="linear"),
+    )  # fmt: skip
+    calibration = Calibration(
+        "m", BOX, datum_mm=DATUM, curves=curves, squareness={"A0Z": UNIT, "B0Z": UNIT, "C0Y": UNIT},
+        backlash_mm=(0.0, 0.0, 4e-3), cyclic=(Cyclic("EYX", 8.0, UNIT, 1.0),),
+    )  # fmt: skip
+    model = build(calibration, "ZYFX")
+    play = np.array([[1.0, 1.0, 0.5]])
+    names = [name for name, _ in model.contributions(PLACE, SHORT, play)]
+    assert names == ["EXX", "ECX", "cyclic EYX", "EYY", "C0Y", "EBZ", "backlash Z", "B0Z", "A0Z"]
+    parts = dict(model.contributions(PLACE, SHORT, play))
+    np.testing.assert_allclose(parts["backlash Z"], [[0.0, 0.0, -1e-3]])
+    assert "backlash Z" not in dict(model.contributions(PLACE, SHORT))
+    # at the datum squareness moves nothing, and at the lower face of Y its curve does not
+    face = np.array([[100.0, -300.0, 20.0]])
+    assert [name for name, _ in model.contributions(face, SHORT)] == [
+        "EXX",
+        "ECX",
+        "cyclic EYX",
+        "C0Y",
+        "EBZ",
+    ]
+    # each row has its own tool
+    rows = np.array([SHORT, np.zeros(3)])
+    turned = dict(model.contributions(np.repeat(PLACE, 2, axis=0), rows))["EBZ"]
+    one, two = (dict(model.contributions(PLACE, tool))["EBZ"][0] for tool in rows)
+    np.testing.assert_array_equal(turned, [one, two])
+    assert not np.array_equal(one, two)
+
+
+def test_angles_of_a_turn_with_the_play_and_of_rows_that_are_not_known() -> None:
+    """EAX 10 to 30 urad forward and 20 to 60 backward, EBX the same everywhere, ECZ along Z."""
+    curves = (
+        Curve(
+            "X", BOX[0], forward={"EAX": [1e-5, 3e-5], "EBX": [4e-6, 4e-6]},
+            backward={"EAX": [2e-5, 6e-5], "EBX": [4e-6, 4e-6]}, interpolation="linear",
+        ),
+        Curve("Z", BOX[2], {"ECZ": [0.0, 5e-6]}, interpolation="linear"),
+    )  # fmt: skip
+    model = build(Calibration("m", BOX, curves=curves), "FXYZ")
+    nan = np.nan
+    points = np.array([[100.0, 0.0, 50.0], [600.0, 0.0, -450.0], [nan, 0.0, 50.0], [100.0, nan, nan]])
+    mean = model.rotation(points)
+    np.testing.assert_allclose(
+        mean, [[3e-5, 4e-6, 5e-6], [4.5e-5, 4e-6, 0], [nan, 4e-6, 5e-6], [3e-5, 4e-6, nan]]
+    )
+    play = np.array([[1.0, 0, 0], [-1.0, 0, 0], [1.0, 0, 0], [0.5, 0, 0]])
+    forward = model.rotation(points, play)[:, 0]
+    np.testing.assert_allclose(forward, [2e-5, 6e-5, nan, 2.5e-5])
+
+
+def test_the_play_of_each_row_counts_across_blocks_and_beside_unknown_rows() -> None:
+    model = build(Calibration("m", BOX, backlash_mm=(2e-3, 0.0, 0.0)), "FXYZ")
+    n = 40_000
+    play = np.zeros((n, 3))
+    play[:, 0] = np.linspace(-1.0, 1.0, n)
+    points = np.tile(PLACE, (n, 1))
+    points[::7] = np.nan
+    np.testing.assert_allclose(model.error(points, SHORT, play), -1e-3 * play * [1.0, 0.0, 0.0])
+    tools = np.tile(SHORT, (n, 1)) * np.linspace(0.0, 1.0, n)[:, None]
+    turned = build(Calibration("m", BOX, curves=(constant("Z", {"EBZ": UNIT}),)), "FXYZ")
+    np.testing.assert_allclose(
+        turned.error(np.tile(PLACE, (n, 1)), tools)[:, 0], UNIT * tools[:, 2], atol=1e-12
+    )
+
+
+def test_bounds_are_kept_by_tool_and_stay_right_for_many_tools() -> None:
+    curve = Curve("X", [-400.0, 100.0, 600.0], {"EBX": [0.0, 1e-5, 0.0]}, interpolation="linear")
+    model = build(Calibration("m", BOX, curves=(curve,)), "FXYZ")
+    delta = np.array([[30.0, 0.0, 0.0]])
+    alone = [
+        build(Calibration("m", BOX, curves=(curve,)), "FXYZ").chord_bound(delta, np.array([0.0, 0.0, -z]))[0]
+        for z in range(80)
+    ]
+    for _ in range(2):
+        again = [model.chord_bound(delta, np.array([0.0, 0.0, -float(z)]))[0] for z in range(80)]
+        np.testing.assert_array_equal(again, alone)
+    assert len(set(alone)) == 80
+    assert "AxisBound" not in repr(model)
+    assert model.chord_bound(np.zeros((0, 3)), np.zeros((0, 3))).shape == (0,)
+
+
+def test_a_model_of_first_order_is_the_linear_part_of_the_exact_one() -> None:
+    """Huddersfield's equation against contributions, with all 21 errors at once and a payload column."""
+    calibration = random_calibration(4, model="huddersfield")
+    model = build(calibration, "FXYZ")
+    points, tool = random_points(5, 20), np.array([*TOOL, 12.0])
+    parts = sum(value for _, value in model.contributions(points, tool))
+    np.testing.assert_allclose(model.error(points, tool), parts, atol=1e-15)
+    np.testing.assert_array_equal(model.error(points, tool), model.error(points, np.zeros(3)))
+    assert model.depends_on.tolist() == [[True, True, True], [True, True, True], [True, True, True]]
+    delta = np.array([[30.0, 20.0, 10.0]])
+    assert model.chord_bound(delta, tool)[0] == model.chord_bound(delta, np.zeros(3))[0] > 0.0
+    few = Curve("X", BOX[0], {"EXX": [0.0, 1e-3], "ECX": [1e-5, 1e-5]}, interpolation="linear")
+    small = build(Calibration("m", BOX, model="huddersfield", curves=(few,)), "FXYZ")
+    # dX = EXX - ECX y; dY = ECX x, of which X has none without a tool
+    assert small.depends_on.tolist() == [[True, True, False], [False] * 3, [False] * 3]
+    turned = Curve("Y", BOX[1], {"EAY": [0.0, 1e-5], "EBY": [1e-5, 1e-5]}, interpolation="linear")
+    small = build(Calibration("m", BOX, model="huddersfield", curves=(turned,)), "FXYZ")
+    # dX = EBY z; dY = -EAY z; dZ = EAY times the y that Y itself does not move
+    assert small.depends_on.tolist() == [[False, False, True], [False, True, True], [False] * 3]

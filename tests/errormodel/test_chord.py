@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.interpolate import PchipInterpolator
 
+from olp.core.interpolation import Interpolant
 from olp.core.machine import CHAINS, SQUARENESS
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration, Curve, Cyclic, Thermal
+from olp.errormodel.chord import LOWER_MM, UPPER_MM, Variation, bins
 
 BOX = np.array([[0.0, 800.0], [-300.0, 300.0], [-400.0, 0.0]])
 TOOL = np.array([10.0, -30.0, -150.0])
@@ -136,3 +141,124 @@ def test_the_bound_holds_in_either_direction(direction: float) -> None:
     departure = np.linalg.norm(error - chord, axis=2).max(axis=1)
     assert np.all(departure <= model.chord_bound(delta, TOOL) * (1 + 1e-9) + 1e-12)
     assert departure.max() > 1e-3
+
+
+def at(values: np.ndarray, length_mm: float) -> float:
+    return float(values[bins(np.array([length_mm]))[0]])
+
+
+# -- bins of lengths ---------------------------------------------------------------------------------------
+
+
+def test_bins_are_eighths_of_an_octave_from_a_millionth_to_a_million() -> None:
+    assert len(LOWER_MM) == len(UPPER_MM) == 320
+    assert (LOWER_MM[0], UPPER_MM[-1]) == (2.0**-20, 2.0**20)
+    np.testing.assert_array_equal(LOWER_MM[1:], UPPER_MM[:-1])
+    np.testing.assert_array_equal(LOWER_MM[8:], 2.0 * LOWER_MM[:-8])
+    np.testing.assert_array_equal(LOWER_MM[160:168], 1.0 + np.arange(8) / 8.0)
+
+
+def test_a_length_lies_in_its_bin_from_the_lower_edge_on() -> None:
+    lengths = np.random.default_rng(1).uniform(-20.0, 20.0, 500)
+    index = bins(2.0**lengths)
+    assert np.all(LOWER_MM[index] <= 2.0**lengths) and np.all(2.0**lengths < UPPER_MM[index])
+    np.testing.assert_array_equal(bins(LOWER_MM.copy()), np.arange(320))
+    assert bins(np.array([2.0**-21]))[0] < 0 and bins(np.array([2.0**20]))[0] == 320
+
+
+# -- a function of one axis --------------------------------------------------------------------------------
+
+
+def test_a_sine_bends_by_its_curvature_and_by_no_more_than_twice_its_amplitude() -> None:
+    wave = Variation.of_cyclic(Cyclic("EXX", 10.0, -3e-3))
+    rate = 2.0 * math.pi / 10.0
+    sizes = (wave.peak, wave.slope, wave.curvature)
+    assert sizes == pytest.approx((3e-3, 3e-3 * rate, 3e-3 * rate**2))
+    np.testing.assert_allclose(wave.smooth, np.minimum(3e-3 * rate**2 * UPPER_MM**2 / 8.0, 6e-3))
+    np.testing.assert_allclose(wave.change, np.minimum(3e-3 * rate, 6e-3 / LOWER_MM))
+    assert wave.kinks.shape == (320,) and not wave.kinks.any() and wave.varies
+    assert not Variation.of_cyclic(Cyclic("EXX", 10.0, 0.0)).varies
+
+
+def test_a_sine_times_a_linear_factor_by_the_product_rule() -> None:
+    """(f g)' = f' g + f g', (f g)'' = f'' g + 2 f' g', with g at most 50 and g' = -0.5."""
+    wave = Variation.of_cyclic(Cyclic("EAX", 4.0, 2e-5), 50.0, -0.5)
+    rate = math.pi / 2.0
+    sizes = (wave.peak, wave.slope, wave.curvature)
+    expected = (1e-3, 2e-5 * (rate * 50.0 + 0.5), 2e-5 * (rate**2 * 50.0 + 2.0 * rate * 0.5))
+    assert sizes == pytest.approx(expected)
+    np.testing.assert_allclose(wave.smooth, np.minimum(expected[2] * UPPER_MM**2 / 8.0, 2e-3))
+    np.testing.assert_allclose(wave.change, np.minimum(expected[1], 2e-3 / LOWER_MM))
+
+
+#: Slopes 0.2, -0.1, 0.3, 0.3, 0: jumps 0.3, 0.4, 0, 0.3 at 10, 26, 30 and 90 mm.
+KNOTS = np.array([0.0, 10.0, 26.0, 30.0, 90.0, 100.0])
+VALUES = np.cumsum([-5.0, 2.0, -1.6, 1.2, 18.0, 0.0])
+
+
+def test_a_polyline_bends_at_its_kinks() -> None:
+    """A quarter of the jumps that one window of the length can hold, ends included, times the length."""
+    other = np.zeros(6)
+    curve = Interpolant.through(KNOTS, np.stack([other, VALUES], axis=1), "linear")
+    bent = Variation.of_curve(curve, 1, 0.5)
+    # from -5 to 14.6: the largest value, the range, and the steepest piece
+    assert (bent.peak, bent.slope, bent.curvature) == pytest.approx((14.6, 0.3, 0.0))
+    assert not bent.smooth.any() and bent.smooth.shape == (320,)
+    np.testing.assert_allclose(bent.change, np.minimum(0.3, 19.6 / LOWER_MM))
+    kinks, jumps = [10.0, 26.0, 90.0], [0.3, 0.4, 0.3]
+    for bin_, upper in enumerate(UPPER_MM.tolist()):
+        held = [
+            sum(j for p, j in zip(kinks, jumps, strict=True) if start <= p <= start + upper)
+            for start in kinks
+        ]
+        assert bent.kinks[bin_] == pytest.approx(0.25 * max(held)), upper
+    # 16 mm is the upper edge of the bin from 15 mm on; 64 and 80 mm apart
+    held_by = {14.9: 0.4, 15.1: 0.7, 63.0: 0.7, 65.0: 0.7, 79.0: 1.0, 81.0: 1.0}
+    for length, jump in held_by.items():
+        assert at(bent.kinks, length) == pytest.approx(0.25 * jump), length
+    straight = Variation.of_curve(curve, 0, 0.5)
+    assert not straight.varies and not straight.kinks.any() and straight.peak == 0.0
+    line = Variation.of_curve(Interpolant.through(KNOTS[:2], VALUES[:2, None], "linear"), 0, 0.5)
+    assert line.varies and not line.kinks.any() and line.kinks.shape == (320,)
+
+
+def test_a_smooth_curve_bends_by_its_curvature_its_change_of_slope_or_its_range() -> None:
+    """The least of the three, from the coefficients of scipy's pchip; and a quarter of the curvature times
+    the square of the cell of the table."""
+    spline, cell = PchipInterpolator(KNOTS, VALUES), 0.5
+    curve = Interpolant.through(KNOTS, np.stack([np.zeros(6), VALUES], axis=1), "pchip")
+    bent = Variation.of_curve(curve, 1, cell)
+    dense = np.linspace(0.0, 100.0, 200001)
+    assert bent.peak == pytest.approx(14.6)
+    assert bent.slope == pytest.approx(np.abs(spline(dense, 1)).max(), rel=1e-6)
+    second = [abs(2.0 * spline.c[1, i] + 6.0 * spline.c[0, i] * t * w)
+              for i, w in enumerate(np.diff(KNOTS)) for t in (0.0, 1.0)]  # fmt: skip
+    assert bent.curvature == pytest.approx(max(second))
+    np.testing.assert_allclose(bent.change, np.minimum(bent.slope, 19.6 / LOWER_MM))
+    assert not bent.kinks.any() and bent.kinks.shape == (320,)
+    # change of slope: the trapezoid of |f''| over quarters of the pieces; a window begins anywhere in one
+    starts, ends, areas = [], [], []
+    for i, width in enumerate(np.diff(KNOTS).tolist()):
+        size = [abs(2.0 * spline.c[1, i] + 6.0 * spline.c[0, i] * width * k / 4.0) for k in range(5)]
+        starts += [KNOTS[i] + width / 4.0 * k for k in range(4)]
+        ends += [KNOTS[i] + width / 4.0 * (k + 1) for k in range(4)]
+        areas += [0.5 * (size[k] + size[k + 1]) * width / 4.0 for k in range(4)]
+    for bin_, upper in enumerate(UPPER_MM.tolist()):
+        windows = [
+            sum(area for s, area in zip(starts, areas, strict=True) if start <= s < end + upper)
+            for start, end in zip(starts, ends, strict=True)
+        ]
+        by = min(bent.curvature * upper**2 / 8.0, 0.25 * upper * max(windows), 19.6)
+        assert bent.smooth[bin_] == pytest.approx(by + 0.25 * bent.curvature * cell**2, rel=1e-9), upper
+
+
+def test_bounds_of_a_sum_add() -> None:
+    one = Variation.of_cyclic(Cyclic("EXX", 10.0, 3e-3))
+    two = Variation.of_curve(Interpolant.through(KNOTS, VALUES[:, None], "linear"), 0, 0.5)
+    both = Variation.total([one, two, two])
+    for name in ("peak", "slope", "curvature", "smooth", "kinks", "change"):
+        expected = getattr(one, name) + 2.0 * getattr(two, name)
+        np.testing.assert_allclose(getattr(both, name), expected, err_msg=name)
+    nothing = Variation.total([])
+    assert (nothing.peak, nothing.slope, nothing.curvature, nothing.varies) == (0.0, 0.0, 0.0, False)
+    assert nothing.smooth.shape == nothing.kinks.shape == nothing.change.shape == (320,)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from pathlib import Path
 
 import numpy as np
@@ -98,3 +99,26 @@ def test_the_chord_bound_holds_with_a_line_of_its_own(chain: str) -> None:
     chord = error[:, :1] + share[None, :, None] * (error[:, -1:] - error[:, :1])
     departure = np.linalg.norm(error - chord, axis=2).max(axis=1)
     assert np.all(departure <= model.chord_bound(delta, tool) * (1.0 + 1e-9) + 1e-13)
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        ({"component": "EXW"}, "cyclic component 'EXW'; expected a name such as EXX or EAX"),
+        ({"period_mm": 0.0}, "cyclic EAX: period 0.0 mm; expected more than 0"),
+        ({"period_mm": math.inf}, "cyclic EAX: period inf mm; expected more than 0"),
+        ({"amplitude": math.nan}, "cyclic EAX: amplitude and phase must be finite"),
+        ({"phase_rad": math.inf}, "cyclic EAX: amplitude and phase must be finite"),
+        ({"component": "EXX", "tool_mm": (0, 0, 0)}, "cyclic EXX has no lever arm; expected no tool_mm"),
+        (
+            {"component": "EZX", "line_mm": (0, 0, 0), "reference": "table"},
+            "cyclic EZX has no lever arm; expected no line_mm, reference",
+        ),
+    ],
+)
+def test_what_is_wrong_with_a_cyclic_term(options: dict[str, object], sentence: str) -> None:
+    good = {"component": "EAX", "period_mm": 1e-9, "amplitude": 0.0}
+    assert Cyclic(**good).measured() == {} and Cyclic(**good).phase_rad == 0.0
+    with pytest.raises(ConfigError) as caught:
+        Cyclic(**(good | options))
+    assert caught.value.problems == (sentence,)

@@ -64,6 +64,44 @@ def test_all_that_is_wrong_is_said_at_once() -> None:
     assert "load: reference 'floor'" in str(caught.value)
 
 
+def test_problems_of_a_table_and_of_a_map_come_at_once() -> None:
+    down = TWO[::-1]
+    for make, starts in (
+        (
+            lambda: table(
+                knots_mm=(down, ONE), columns={"EZY": ONE, "EZX": np.zeros((2, 2))}, name="load",
+                interpolation="square", reference="floor",
+            ),
+            ["positions along X do not", "1 levels along Z", "column 'EZY'", "column EZX is",
+             "interpolation 'square'", "reference 'floor'"],
+        ),
+        (
+            lambda: deviations(
+                knots_mm=(down, TWO, np.array([0.0, np.inf])), values=np.zeros((2, 2, 1, 3)), kind="part",
+                sigma=np.zeros(3), interpolation="square", holds_along=("Y",), name="load",
+            ),
+            ["positions along X do not", "positions along Z do not", "expected three finite",
+             "expected three uncertainties", "kind 'part'", "interpolation 'square'", "2 levels along Y"],
+        ),
+    ):  # fmt: skip
+        with pytest.raises(ConfigError) as caught:
+            make()
+        found = [p.replace("load has ", "load: ").removeprefix("load: ") for p in caught.value.problems]
+        assert [p[: len(start)] for p, start in zip(found, starts, strict=True)] == starts
+
+
+def test_what_a_table_does_not_state() -> None:
+    plain = table()
+    assert (plain.line_mm, plain.tool_mm, plain.name) == (None, (0.0, 0.0, 0.0), "compliance")
+    assert (plain.reference, plain.interpolation) == ("functional-point", "cubic")
+    rest = deviations()
+    assert (rest.kind, rest.tool_mm, rest.interpolation) == ("residual", (0.0, 0.0, 0.0), "linear")
+    assert (rest.holds_along, rest.name, rest.sigma) == ((), "map", None)
+    assert not rest.values.flags.writeable and not rest.knots_mm[0].flags.writeable
+    with pytest.raises(TypeError):
+        plain.columns["EXX"] = TWO  # type: ignore[index]
+
+
 def deviations(**changes: Any) -> DeviationMap:
     stated: dict[str, Any] = {"knots_mm": (TWO, TWO, TWO), "values": np.zeros((2, 2, 2, 3))}
     return DeviationMap(**(stated | changes))

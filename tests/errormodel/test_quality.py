@@ -26,6 +26,9 @@ def test_the_deviations_are_those_of_wilson_and_hilferty() -> None:
         (8.2, 2.0, False),
         (3900.0, 1000.0, False),
         (40.0, 0.5, True),
+        # five standard deviations in 10 degrees: ten times (5 / sqrt(45) + 1 - 1 / 45)^3 = 51.17
+        (51.3, 10.0, True),
+        (51.0, 10.0, False),
     ],
 )
 def test_a_misfit_is_gross_and_no_chance(chi_square: float, freedom: float, failed: bool) -> None:
@@ -37,3 +40,14 @@ def test_what_fails_comes_with_the_worst_first() -> None:
     bad, worse = Fitted("bad", 600.0, 100.0), Fitted("worse", 700.0, 100.0)
     assert Quality(total, (bad, good, worse)).failed() == (worse, bad, total)
     assert Quality(good).failed() == ()
+
+
+def test_less_than_one_degree_of_freedom_counts_as_one() -> None:
+    assert [Fitted("a", 6.0, freedom).reduced for freedom in (0.0, 0.5, 1.0, 1.5)] == [6.0, 6.0, 6.0, 4.0]
+    assert Fitted("a", 6.0, 0.5).deviations == Fitted("a", 6.0, 1.0).deviations
+    assert Fitted("a", 8.0, 1.0).deviations == pytest.approx((2.0 - 7.0 / 9.0) / (2.0 / 9.0) ** 0.5)
+
+
+def test_a_quality_without_sources_is_its_total() -> None:
+    assert Quality(Fitted("all", 500.0, 100.0)).failed() == (Fitted("all", 500.0, 100.0),)
+    assert Quality(Fitted("all", 90.0, 100.0)).sources == ()

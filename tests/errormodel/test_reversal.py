@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from olp.core.errors import UsageError
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration, Curve
-from olp.errormodel.reversal import play_interval, play_states
+from olp.errormodel.reversal import play_after, play_interval, play_states, plays
 
 BOX = np.array([[0.0, 100.0]] * 3)
 TOOL = np.zeros(3)
@@ -142,3 +142,97 @@ def test_backlash_is_unknown_where_the_position_is() -> None:
     model = build(bidirectional(), "FXYZ")
     lost = model.backlash_at(np.array([[np.nan, 1.0, 1.0], [1.0, np.nan, np.nan]]))
     np.testing.assert_array_equal(np.isnan(lost), [[True, False, False], [False] * 3])
+
+
+def test_play_after_motions_in_one_direction() -> None:
+    """Backlash of 4 mm: a motion of 1 mm takes up a half of what play goes from -1 to 1."""
+    play = np.array([[-1.0, 0.0, 0.5], [1.0, 0.25, -0.5], [0.3, 0.3, 0.3], [0.3, -0.3, 0.3]])
+    moved = np.array([[1.0, 1.0, 2.0], [-9.0, -0.5, 0.0], [2.0, -1e-9, 0.0], [1.0, -1.0, 0.0]])
+    width = np.array([[4.0] * 3, [4.0] * 3, [0.0] * 3, [-4.0, np.nan, np.nan]])
+    expected = [[-0.5, 0.5, 1.0], [-1.0, 0.0, -0.5], [1.0, -1.0, 0.3], [1.0, -1.0, 0.3]]
+    np.testing.assert_allclose(play_after(play, moved, width), expected)
+    # the same in um
+    np.testing.assert_allclose(play_after(play, 1e-3 * moved, 1e-3 * width), expected)
+    # without backlash it is the sign of the last motion
+    signs = [[1.0, 1.0, 1.0], [-1.0, -1.0, -0.5], [1.0, -1.0, 0.3], [1.0, -1.0, 0.3]]
+    np.testing.assert_allclose(play_after(play, moved, None), signs)
+
+
+def test_plays_of_a_model_take_its_backlash_by_position() -> None:
+    """A backlash of 4 um at X 0, 3 um at 50, 6 um at 100: moves of 1.5 um take up a part of it."""
+    model = build(bidirectional(), "FXYZ")
+    commands = np.zeros((4, 3))
+    commands[:, 0] = 0.0, 50.0, 50.0015, 50.0
+    states = plays(model, commands)
+    assert states is not None
+    np.testing.assert_allclose(states[:, 0], [0.0, 1.0, 1.0, 0.0], atol=1e-3)
+    np.testing.assert_array_equal(states, play_states(commands, model.backlash_at(commands)))
+    assert plays(build(Calibration("m", BOX), "FXYZ"), commands) is None
+
+
+def test_shapes_that_are_refused_are_named() -> None:
+    command = np.zeros((4, 3))
+    for call, sentence in (
+        (
+            lambda: play_interval(command, np.zeros(4)),
+            r"backlash_mm has shape \(4,\); expected \(3,\) or \(4, 3\)",
+        ),
+        (lambda: play_interval(command, np.zeros((3, 3))), r"backlash_mm has shape \(3, 3\)"),
+        (
+            lambda: play_interval(command, np.zeros(3), np.zeros(2)),
+            r"start has shape \(2,\); expected \(3,\)",
+        ),
+        (lambda: play_interval(command, np.zeros(3), np.zeros((4, 3))), r"start has shape \(4, 3\)"),
+        (lambda: play_interval(np.zeros(3), np.zeros(3)), "axis_mm has shape"),
+    ):
+        with pytest.raises(UsageError, match=sentence):
+            call()
+
+
+def test_what_is_given_is_not_changed() -> None:
+    """Backlash per command with unknown rows counts as none there."""
+    command = np.cumsum(np.ones((5, 3)), axis=0)
+    width = np.full((5, 3), 4.0)
+    width[2, 1] = np.nan
+    before = width.copy()
+    low, high = play_interval(command, width, np.array([-1.0, -1.0, np.nan]))
+    np.testing.assert_array_equal(width, before)
+    np.testing.assert_allclose(low[:, 0], [-1.0, -0.5, 0.0, 0.5, 1.0])
+    np.testing.assert_allclose(low[:, 1], [-1.0, -0.5, 1.0, 1.0, 1.0])
+    np.testing.assert_allclose(low[:, 2], [-1.0, -0.5, 0.0, 0.5, 1.0])
+    np.testing.assert_array_equal(high[:, :2], low[:, :2])
+    np.testing.assert_array_equal(high[:, 2], 1.0)
+
+
+@pytest.mark.parametrize("steps", [1, 2, 3, 4, 5, 8, 9, 31, 32, 33])
+def test_a_long_run_of_short_moves_takes_up_the_backlash_bit_by_bit(steps: int) -> None:
+    """So many moves of 2 / steps mm, of a backlash of 4 mm, then half as far back: all within reach."""
+    forward = np.full(steps, 2.0 / steps)
+    command = np.cumsum(np.concatenate([[7.0], forward, -0.5 * forward]))
+    positions = np.stack([command] * 3, axis=1)
+    low, high = play_interval(positions, np.array([4.0, 4.0, 4.0]), np.array([-1.0, 0.0, np.nan]))
+    moved = command - 7.0
+    np.testing.assert_allclose(low[:, 0], -1.0 + 0.5 * moved, atol=1e-12)
+    np.testing.assert_allclose(high[:, 1], np.clip(0.5 * moved, -1.0, 1.0), atol=1e-12)
+    # unknown: between what it would be from either end
+    up = np.arange(2 * steps + 1) <= steps
+    np.testing.assert_allclose(low[:, 2], -1.0 + 0.5 * moved, atol=1e-12)
+    np.testing.assert_allclose(high[:, 2], np.where(up, 1.0, 1.0 - 0.5 * (2.0 - moved)), atol=1e-12)
+
+
+def test_the_start_holds_until_the_position_is_lost() -> None:
+    nan = np.nan
+    command = np.array([[0.0] * 3, [1.0] * 3, [nan, nan, 2.0], [3.0] * 3, [4.0, 13.0, 4.0]])
+    low, high = play_interval(command, np.full(3, 4.0), np.array([0.0, 0.0, 0.25]))
+    np.testing.assert_allclose(low[:, 0], [0.0, 0.5, -1.0, -1.0, -0.5])
+    np.testing.assert_allclose(high[:, 0], [0.0, 0.5, 1.0, 1.0, 1.0])
+    np.testing.assert_allclose((low[4, 1], high[4, 1]), (1.0, 1.0))
+    np.testing.assert_allclose(low[:, 2], [0.25, 0.75, 1.0, 1.0, 1.0])
+    # the last command alone is not known
+    low, high = play_interval(command[:3], np.full(3, 4.0), np.zeros(3))
+    np.testing.assert_array_equal((low[:, 0], high[:, 0]), ([0.0, 0.5, -1.0], [0.0, 0.5, 1.0]))
+    # a first command that is not known has no start
+    lost = np.array([[nan] * 3, [1.0] * 3, [2.0] * 3])
+    low, high = play_interval(lost, np.full(3, 4.0), np.zeros(3))
+    np.testing.assert_array_equal(low[:, 0], [-1.0, -1.0, -0.5])
+    np.testing.assert_array_equal(high[:, 0], [1.0, 1.0, 1.0])

@@ -184,7 +184,7 @@ class Half(Mean):
 
 
 def _cells(entry: Entry) -> int:
-    return min(CELLS, max(len(entry.position_mm) - 1, 0))
+    return min(CELLS, len(entry.position_mm) - 1)
 
 
 class Curves(ErrorSource[list[CurveTable], tuple[Curve, ...]]):

@@ -65,7 +65,7 @@ COMMON = GROUPS[:6]
 NEEDS = {
     "G2": "IJKR", "G3": "IJKR", "G4": "P", "G43.2": "HXYZ", "G96": "S", "G52": AXES, "G92": AXES,
     **dict.fromkeys(f"{DRILLING} G74 G38.2 G38.3 G38.4 G38.5 G53".split(), AXES),
-    **dict.fromkeys("M62 M63 M64 M65".split(), "P"), "M66": "PE", "M67": "E", "M68": "E",
+    **dict.fromkeys(["M62", "M63", "M64", "M65"], "P"), "M66": "PE", "M67": "E", "M68": "E",
 }  # fmt: skip
 CODES = sorted({code for group in (*GROUPS, *USERS.values()) for code in group.split()})
 
