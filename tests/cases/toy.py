@@ -68,9 +68,10 @@ def parabola(bend: float, of: int = 0, into: int = 1) -> Toy:
 
 
 def linear(matrix: Sequence[Sequence[float]], constant: Sequence[float] = (0.0, 0.0, 0.0), **more: object) -> Toy:
-    """The error is a matrix times the position, and a constant."""
+    """The error is a matrix times the position, and a constant. An axis that is not known makes that unknown
+    which needs it."""
     m, c = np.array(matrix, float), np.array(constant, float)
-    return Toy(lambda point, tool: point @ m.T + c, **more)  # type: ignore[arg-type]
+    return Toy(lambda p, tool: np.where(m != 0, p[:, None] * m, 0.0).sum(axis=2) + c, **more)  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)
