@@ -67,7 +67,9 @@ def parabola(bend: float, of: int = 0, into: int = 1) -> Toy:
     return Toy(error, lambda delta, tool: np.abs(gain(tool)) * delta[:, of] ** 2 / 4)
 
 
-def linear(matrix: Sequence[Sequence[float]], constant: Sequence[float] = (0.0, 0.0, 0.0), **more: object) -> Toy:
+def linear(
+    matrix: Sequence[Sequence[float]], constant: Sequence[float] = (0.0, 0.0, 0.0), **more: object
+) -> Toy:
     """The error is a matrix times the position, and a constant. An axis that is not known makes that unknown
     which needs it."""
     m, c = np.array(matrix, float), np.array(constant, float)

@@ -71,7 +71,12 @@ def test_each_move_has_its_own_tool() -> None:
     frames = (Frame(), Frame(tool_mm=(0.0, 0.0, 4.0)))
     path = toolpath(feed(*WHOLE), feed(0.0, 0.0, 0.0, frame=1), feed(*WHOLE), frames=frames)
     move, share, target = cut(path, parabola(TWICE))
-    assert sorted(zip(move.tolist(), (share * 64).tolist(), strict=True)) == [(0, 44), (1, 22), (1, 44), (2, 44)]
+    assert sorted(zip(move.tolist(), (share * 64).tolist(), strict=True)) == [
+        (0, 44),
+        (1, 22),
+        (1, 44),
+        (2, 44),
+    ]
     place = {0: 55.0, 1: 80.0 - 80.0 * share[move == 1], 2: 55.0}
     for k, x_mm in place.items():
         assert target[move == k, 0] == pytest.approx(x_mm)

@@ -167,9 +167,7 @@ def test_a_chord_may_use_95_hundredths_of_the_tolerance_or_70_beside_the_dead_ba
     assert parts(THERE, um=um, backlash=backlash) == [count]
 
 
-@pytest.mark.parametrize(
-    "flag", (Flag.PASS, Flag.CONTROL, Flag.MACHINE, Flag.CYCLE, Flag.WHOLE)
-)
+@pytest.mark.parametrize("flag", (Flag.PASS, Flag.CONTROL, Flag.MACHINE, Flag.CYCLE, Flag.WHOLE))
 def test_what_may_not_be_split_is_whole(flag: Flag) -> None:
     assert parts(feed(80.0, 0.0, 0.0, flag=flag)) == [1]
     assert parts(feed(80.0, 0.0, 0.0, flag=Flag.INCREMENTAL)) == [2]

@@ -65,7 +65,9 @@ def test_a_rapid_takes_up_the_play_for_the_motion_that_follows(moves: list[Move]
     assert x_um(planned(rapid(0.0, 0.0, 0.0), *moves))[0] == first_um
 
 
-@pytest.mark.parametrize(("digit_mm", "first_um"), [(0.0004, -4.0), (0.0005, -4.0), (0.001, -5.0), (0.01, -23.0)])
+@pytest.mark.parametrize(
+    ("digit_mm", "first_um"), [(0.0004, -4.0), (0.0005, -4.0), (0.001, -5.0), (0.01, -23.0)]
+)
 def test_a_rapid_goes_past_its_end_by_two_digits_more(digit_mm: float, first_um: float) -> None:
     rows = planned(rapid(0.0, 0.0, 0.0), *along_x(10.0), limits=Limits(0.001, digit_mm))
     assert x_um(rows) == [first_um, 3.0, 10003.0]
@@ -73,7 +75,12 @@ def test_a_rapid_goes_past_its_end_by_two_digits_more(digit_mm: float, first_um:
 
 @pytest.mark.parametrize(
     ("low", "high", "x", "first_um"),
-    [(-0.004, 100.0, 10.0, -4.0), (-0.0039, 100.0, 10.0, 4.0), (-100.0, 10.5, -10.0, 4.0), (-100.0, 0.0039, -10.0, -4.0)],
+    [
+        (-0.004, 100.0, 10.0, -4.0),
+        (-0.0039, 100.0, 10.0, 4.0),
+        (-100.0, 10.5, -10.0, 4.0),
+        (-100.0, 0.0039, -10.0, -4.0),
+    ],
 )
 def test_a_rapid_goes_past_its_end_within_the_box(low: float, high: float, x: float, first_um: float) -> None:
     box = np.array([[low, high], [-9.0, 9.0], [-9.0, 9.0]])
@@ -125,7 +132,9 @@ def test_no_row_comes_behind_a_block_that_may_be_deleted() -> None:
 
 
 def test_the_rapids_of_a_hole_take_up_what_the_rapid_before_them_can() -> None:
-    hole = [rapid(0.0, 0.0, -k, flag=Flag.CYCLE) for k in (1.0, 2.0)] + [feed(0.0, 0.0, -5.0, flag=Flag.CYCLE)]
+    hole = [rapid(0.0, 0.0, -k, flag=Flag.CYCLE) for k in (1.0, 2.0)] + [
+        feed(0.0, 0.0, -5.0, flag=Flag.CYCLE)
+    ]
     assert inserted(rapid(0.0, 0.0, 0.0), *hole, *CUT) == [0]
     # there is none before
     assert inserted(*hole, *CUT) == []

@@ -17,7 +17,9 @@ POINT = b"GOTO/1,2,3"
         (7, POINT),
     ],
 )  # fmt: skip
-def test_a_line_breaks_behind_the_last_comma_that_leaves_room_for_the_mark(width: int, expected: bytes) -> None:
+def test_a_line_breaks_behind_the_last_comma_that_leaves_room_for_the_mark(
+    width: int, expected: bytes
+) -> None:
     assert wrapped(POINT, width, b"$") == expected
 
 
@@ -87,9 +89,7 @@ def test_each_number_is_written_once() -> None:
     assert carded(b"\n".join(between), 12, b"$").split(b"\n")[2] == card(b"GOTO/4,5,6")
 
 
-@pytest.mark.parametrize(
-    "line", [b"", b"   ", b"\r"]
-)
+@pytest.mark.parametrize("line", [b"", b"   ", b"\r"])
 def test_empty_lines_of_cards_are_unchanged(line: bytes) -> None:
     assert carded(b"A\n" + line + b"\nB", 3, b"$") == b"A          \n" + line + b"\nB          "
 
