@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from olp.core.toolpath import Arcs, Flag, Frame, Kind, Toolpath
+from olp.core.toolpath import Arcs, Frame, Kind, Toolpath
 
 WIDE_BOX = np.tile([-1000.0, 1000.0], (3, 1))
 
@@ -82,7 +82,7 @@ class Move:
 
     kind: Kind
     end_mm: tuple[float, float, float]
-    flag: Flag = Flag(0)
+    flag: int = 0
     frame: int = 0
     line: int | None = None
     centre_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)

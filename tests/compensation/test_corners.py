@@ -69,7 +69,7 @@ def test_a_move_between_two_concave_corners_is_longer_than_what_both_take(
     middle: float, expected: list[int]
 ) -> None:
     """Along +X and then up, with the cutter on the left, both corners are concave; downwards neither is."""
-    assert bad(*steps((20.0, 0.0), (20.0, middle), (40.0 if middle < 0 else 0.0, middle))) == expected
+    assert bad(*steps((20.0, 0.0), (20.0, middle), (0.0, middle))) == expected
 
 
 def test_the_last_move_loses_nothing_at_its_end() -> None:
@@ -258,8 +258,9 @@ def test_the_moves_onto_a_contour_and_off_it_are_whole() -> None:
 def test_until_each_axis_moves_it_is_held() -> None:
     """Down before the entry; up, then X, then Y behind the exit."""
     path = contour(
-        rapid(5.0, 5.0, 9.0), feed(5.0, 5.0, 0.0, **ON), *steps((20.0, 0.0), (20.0, 30.0)), feed(20.0, 30.0, -2.0, **ON),
-        *steps((0.0, 30.0)), rapid(0.0, 30.0, 9.0), rapid(7.0, 30.0, 9.0), rapid(7.0, 0.0, 9.0), rapid(1.0, 1.0, 9.0),
+        rapid(5.0, 5.0, 9.0), feed(5.0, 5.0, 0.0, **ON), *steps((20.0, 0.0), (20.0, 30.0)),
+        feed(20.0, 30.0, -2.0, **ON), *steps((0.0, 30.0)), rapid(0.0, 30.0, 9.0), rapid(7.0, 30.0, 9.0),
+        rapid(7.0, 0.0, 9.0), rapid(1.0, 1.0, 9.0),
     )  # fmt: skip
     whole, steady, held, beside = columns(path)
     assert held == ["", "XY", "", "", "XY", "", "XY", "Y", "", ""]

@@ -8,6 +8,7 @@ sqrt(1/2) of it: 22 positions.
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from cases.toy import Toy, feed, linear, parabola, rapid, toolpath
 
 from olp.compensation import lines
 from olp.compensation.lines import Cuts, subdivide_lines
-from olp.core.toolpath import Flag, Frame, Kind, Toolpath
+from olp.core.toolpath import Frame, Kind, Toolpath
 
 TOLERANCE_MM = 0.01
 LENGTH_MM = 80.0
@@ -52,7 +53,7 @@ def test_cuts_lie_on_the_line_from_where_the_move_begins() -> None:
 def test_targets_count_not_ends() -> None:
     """The targets of the same path lie at other positions."""
     path = toolpath(rapid(0.0, 0.0, 0.0), feed(*WHOLE))
-    target = path.end_mm + (100.0, -3.0, 4.0)
+    target = path.end_mm + np.array([100.0, -3.0, 4.0])
     got = subdivide_lines(path, parabola(TWICE), target, np.array([False, True]), TOLERANCE_MM)
     assert got[2].tolist() == [[155.0, -3.0, 4.0]]
 
@@ -159,16 +160,16 @@ def test_chords_of_a_wave_fit_and_could_be_no_longer(tolerance: float, way: int)
     ends = [np.zeros(3), *target[order], path.end_mm[0]]
     assert len(ends) > 8
     assert set(move.tolist()) == {0}
-    for a, b in zip(ends, ends[1:], strict=False):
+    for a, b in pairwise(ends):
         assert departure(model, a, b) <= 1.05 * tolerance
-    for a, b in zip(ends, ends[1:-1], strict=False):
+    for a, b in pairwise(ends[:-1]):
         assert departure(model, a, b + 0.06 * (b - a)) > 0.95 * tolerance
 
 
 def test_how_many_samples_are_held_at_once_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     model = Toy(wave, lambda delta, tool: (0.05 / 49.0 + 2e-5) * delta[:, 0] ** 2 / 8)
     frames = (Frame(), Frame(tool_mm=(0.0, 0.0, 4.0)))
-    path = toolpath(*(feed(200.0 * (k % 2), float(k), 0.0, frame=k % 2) for k in range(1, 6)), frames=frames)
+    path = toolpath(*(feed(200.0 * (k % 2), float(k), 0.0, frame=k % 2) for k in range(1, 4)), frames=frames)
     whole = [np.sort(column, axis=0) for column in cut(path, model)]
     for batch in (1, 300):
         monkeypatch.setattr(lines, "_BATCH", batch)
@@ -185,7 +186,7 @@ def test_a_long_program_is_cut_as_a_short_one() -> None:
     frame = np.zeros(count, np.int32)
     frame[-1] = 1
     path = Toolpath(
-        np.full(count, Kind.LINE, np.uint8), np.zeros(count, np.uint8) | Flag(0), np.arange(1, count + 1, dtype=np.int32),
+        np.full(count, Kind.LINE, np.uint8), np.zeros(count, np.uint8), np.arange(count, dtype=np.int32) + 1,
         frame, end, frames, start_mm=(0.0, 3.0, 0.0),
     )  # fmt: skip
     move, share, target = cut(path, parabola(TWICE))

@@ -117,7 +117,10 @@ def test_after_a_tool_change_the_side_is_taken_up_again() -> None:
     [
         (feed(0.0, 0.0, 0.0), LIMITS),
         (rapid(0.0, 0.0, 0.0), Limits(0.001, insert=False)),
-        *((rapid(0.0, 0.0, 0.0, flag=flag), LIMITS) for flag in (Flag.PASS, Flag.WHOLE, Flag.DELETED, Flag.MACHINE)),
+        (rapid(0.0, 0.0, 0.0, flag=Flag.PASS), LIMITS),
+        (rapid(0.0, 0.0, 0.0, flag=Flag.WHOLE), LIMITS),
+        (rapid(0.0, 0.0, 0.0, flag=Flag.DELETED), LIMITS),
+        (rapid(0.0, 0.0, 0.0, flag=Flag.MACHINE), LIMITS),
         (rapid(0.0, NAN, 0.0), LIMITS),
     ],
 )  # fmt: skip
@@ -219,7 +222,7 @@ def test_no_step_comes_at_the_start_or_behind_an_unknown_position() -> None:
 
 
 def test_rows_behind_cuts_are_those_of_their_part() -> None:
-    """Y is off by -1e-5 x^2 and has backlash too: it goes down to the middle of the move, and up behind it."""
+    """Y is off by -1e-5 x^2 and has backlash: it goes down to the middle of the move, and up behind it."""
     bend = parabola(-1e-5)
     model = Toy(bend.error_mm, bend.bound, constant_backlash(0.0, 0.006, 0.0))
     rows = planned(rapid(-60.0, 0.0, 0.0), feed(60.0, 0.0, 0.0), model=model)

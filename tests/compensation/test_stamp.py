@@ -42,7 +42,8 @@ def test_doubts_are_accepted_for_one_calibration() -> None:
     ("before", "behind"),
     [
         (b"", b"G1\n"), (b"%\n", b"G1\n"), (b"%\nO100 (NAME)\n", b"G1\n"), (b"O100\n", b"G1\n"),
-        (b"%\r\n:5\r\n", b"G1\r\n"), (b" \t% abc\n o7\n", b"G1\n"), (b"\xef\xbb\xbf", b"G1\n"), (b"\xef\xbb\xbf%\n", b"G1\n"),
+        (b"%\r\n:5\r\n", b"G1\r\n"), (b" \t% abc\n o7\n", b"G1\n"),
+        (b"\xef\xbb\xbf", b"G1\n"), (b"\xef\xbb\xbf%\n", b"G1\n"),
         # one of each kind, and in this order
         (b"%\n", b"%\nG1\n"), (b"O1\n", b"%\nG1\n"), (b"O1\n", b"O2\n"),
         # an end of the text is an end of a line

@@ -98,7 +98,8 @@ def test_empty_lines_of_cards_are_unchanged(line: bytes) -> None:
     ("line", "numbered"),
     [
         (b"GO/1 ABCD 1 2 ", False), (b"GO/1 ABCDE123", False), (b"A/123456", False), (b"A 12345678", True),
-        (b"A/1,12345678", False), (b"A/1,2,3,4,5,12345678", True), (b"AB  ABCD1234", True), (b"AB  abcd1234", False),
+        (b"A/1,12345678", False), (b"A/1,2,3,4,5,12345678", True), (b"AB  ABCD1234", True),
+        (b"AB  abcd1234", False),
     ],
 )  # fmt: skip
 def test_what_is_the_number_of_a_card(line: bytes, numbered: bool) -> None:
