@@ -361,6 +361,37 @@ def test_arcs_that_need_very_many_parts_are_refused(monkeypatch: pytest.MonkeyPa
     assert cuts(path, STRETCH, 1e-5)
 
 
+@pytest.mark.parametrize(("count", "rounds"), [(1, 14), (2, 14), (3, 13)])
+def test_arcs_are_divided_in_at_most_14_rounds(
+    count: int, rounds: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What never fits is halved: 2^13 pieces of one arc, and 3 times 2^13 are more than 20000."""
+    seen = []
+
+    def never(*rest: object) -> np.ndarray:
+        seen.append(len(rest[3]))  # type: ignore[arg-type]
+        return np.full(len(rest[3]), 0.0012)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(arcs, "fit_pieces", never)
+    path = toolpath(CIRCLE[0], *(CIRCLE[1] for _ in range(count)))
+    with pytest.raises(CannotCompute):
+        cuts(path, NONE)
+    assert sum(seen) == count * (2**rounds - 1)
+
+
+@pytest.mark.parametrize(
+    ("times", "parts"), [(1.01, 2), (6.9, 2), (7.0, 3), (1000.0, 11), (3400.0, 16), (1e6, 16)]
+)
+def test_an_arc_is_divided_by_the_third_root_of_what_it_exceeds(
+    times: float, parts: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And 5 % more, from 2 to 16."""
+    departures = iter([0.001 * times, 0.0])
+    monkeypatch.setattr(arcs, "fit_pieces", lambda *rest: np.full(len(rest[3]), next(departures)))
+    got = cuts(toolpath(*CIRCLE), NONE)[1]
+    assert got == pytest.approx(np.arange(1, parts) / parts)
+
+
 X, Y, Z = (np.arange(3) == axis for axis in range(3))
 #: without an error every part fits
 NONE = Toy()

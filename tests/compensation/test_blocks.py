@@ -19,10 +19,16 @@ CURVE = '[[curves]]\nfile = "{}.csv"\ninterpolation = "linear"\n'
 SCALE = "".join(CURVE.format(axis) for axis in "xyz")
 SCALES = {f"{a.lower()}.csv": f"{a}_mm,E{a}{a}_um\n-1000,-100\n2000,200\n" for a in "XYZ"}
 LEANS = {"y.csv": "Y_mm,EXY_um,EZY_um\n-1000,100,-200\n2000,-200,400\n"}
+#: X and Y are turned by 100 urad: X becomes X - Y / 10000, and Y becomes Y + X / 10000
+TURNED = {
+    "x.csv": "X_mm,EYX_um\n-1000,100\n2000,-200\n",
+    "y.csv": "Y_mm,EXY_um\n-1000,-100\n2000,200\n",
+}
 MACHINES = {
     "scale": (SCALE, SCALES),
     "leans": (CURVE.format("y"), LEANS),
     "X": ("[backlash]\nX_um = 6.0\n", {}),
+    "turned": (CURVE.format("x") + CURVE.format("y"), TURNED),
     "XY": ("[backlash]\nX_um = 6.0\nY_um = 4.0\n", {}),
 }
 HEAD = "G21 G90 G54\nG0 X0 Y0 Z0\n"
@@ -94,6 +100,32 @@ CASES = {
         "G1 F100\nG2 X20.000 Y0 I10.0000 J0.0000\n\tG3\tx40.000\ty0\ti10.0000\tj0.0000\n"
         "G18 G2 X20.000 Z0 K0.0000 I-10.0000\n",
         (6, 0, 0),
+    ),
+    "centre words that come in": (
+        "turned",
+        "G1 F100\nG2 X20 Y0 I10\n\tg3\tx0\ty0\ti-10\nG2 I10 F90\nG2 I4.9 F90\n",
+        # 4.9 mm are turned by half of a position's digit: no word is worth it
+        "G1 F100\nG2 X20 Y0.002 I10 J0.0010\n\tg3\tx0\ty0\ti-10\tj-0.0010\nG2 I10 J0.0010 F90\nG2 I4.9 F90\n",
+        (1, 3, 0),
+    ),
+    "more than one turn": (
+        "scale",
+        "G1 X20.002 F100\nG3 X19.977 Y1 I-20.002 J0 P2\n",
+        "G1 X20.000 F100\nG3 X19.975 Y1 I-20.0000 J0 P2\n",
+        (3, 0, 0),
+    ),
+    "nearly a whole circle": (
+        "scale",
+        # both ends become 5.000
+        "G1 X5.000 F100\nG3 X5.001 Y0 I0.0005 J-10\n",
+        "G1 X5.000 F100\nG3 X5.000 Y0 I0.0000 J-9.9990\n",
+        (3, 0, 0),
+    ),
+    "as many digits as most words have": (
+        "leans",
+        "G1 X1.0000 Y2.00 F100\nX5.0000\nX7.0\nY100\n",
+        "G1 X1.0002 Y2.00 F100\nX5.0002\nX7.0\nY100 X7.0100 Z-0.020\n",
+        (2, 2, 0),
     ),
     "inches": (
         "scale",
@@ -205,6 +237,20 @@ TURNS = {
         "G2 X20.003 Y0 R10 F100\nG1 X19.997\nG3 X-0.003 Y0 R10\n",
         (3, 0, 2),
     ),
+    "times in G93": (
+        "X",
+        "G93 G1 X20 F2\nX10 F4.5\nX30 F.5\nG94 X0 F100\n",
+        # the step a millionth of the time of its block
+        "G93 G1 X20.003 F2\nX19.997 F4500000.0000\nX9.997 F4.5000\nX10.003 F500000.0000\nX30.003 F0.5000\n"
+        "G94 X29.997 F100\nX-0.003\n",
+        (5, 0, 4),
+    ),
+    "distances, and words that end a block": (
+        "X",
+        "G91 G1 X20 F100\nX-10 Y1\nX5.000 M5 (there)\nX3 M9 M30\n",
+        "G91 G1 X20 F100\nX-0.006 Y0.000\nX-10.000 Y1.000\nX0.006  (there)\nX5.000 M5\nX3 M9 M30\n",
+        (4, 0, 3),
+    ),
     "the time of a circle in G93": (
         "X",
         "G1 X20 F100\nG93 G3 X20 Y0 I20 J0 F2\nG94 G1 X40 F100\n",
@@ -253,6 +299,44 @@ def test_what_no_step_can_come_before_is_refused(name: str, tmp_path: Path) -> N
         corrected(tmp_path, "X", HEAD + text)
     assert (caught.value.line, caught.value.code) == (line, "OLP561")
     assert says in str(caught.value)
+
+
+def test_a_short_arc_that_rounding_would_make_a_circle_is_refused(tmp_path: Path) -> None:
+    """Both ends become 5.000."""
+    with pytest.raises(ProgramError, match="the last digit decides") as caught:
+        corrected(tmp_path, "scale", HEAD + "G1 X5.000 F100\nG2 X5.001 Y0 I0.0005 J-10\n")
+    assert (caught.value.line, caught.value.code) == (4, "OLP561")
+
+
+@pytest.mark.parametrize("head", ["G21G90G54\nG0X0Y0Z0\n", "G21 G90 G54\nG0 X0 Y0 Z0\n"])
+def test_a_word_behind_the_first_of_a_block_is_spaced_as_most_are(head: str, tmp_path: Path) -> None:
+    space = " " if " " in head else ""
+    text = corrected(tmp_path, "leans", head + "Y100\nY200\n").data
+    assert f"Y100{space}X0.010{space}Z-0.020\nY200{space}X0.020{space}Z-0.040\n".encode() in text
+
+
+@pytest.mark.parametrize(
+    ("text", "expected", "counts"),
+    [
+        # without a point a number counts in digits: 10.010 mm
+        (
+            "G1 X10010 Y100000 F100\nY200.\nX10.\nG91 Y1000 X50\n",
+            "G1 X10.020 Y100000 Z-0.020 F100\nY200. X10.030 Z-0.040\nX10.020\nG91 Y1000 X50\n",
+            (2, 3, 0),
+        ),
+        # 1.0010 inch
+        (
+            "G20 G1 X10010 Y100000 F100\nY20.\nX10.\nG91 Y1000 X50\n",
+            "G20 G1 X1.0020 Y100000 Z-0.0020 F100\nY20. X1.0030 Z-0.0040\nX10.0020\nG91 Y1000 X50\n",
+            (2, 3, 0),
+        ),
+    ],
+)
+def test_numbers_without_a_point(text: str, expected: str, counts: tuple[int, ...], tmp_path: Path) -> None:
+    head = "G21 G90 G54\nG0 X0. Y0. Z0.\n"
+    result = corrected(tmp_path, "leans", head + text, controller="fanuc")
+    assert unstamped(result.data).decode() == head + expected + "M2\n"
+    assert tally(result) == counts
 
 
 def test_other_codes_may_come_with_the_arc(tmp_path: Path) -> None:

@@ -267,6 +267,12 @@ def test_backlash_counts_wherever_in_the_box_it_is() -> None:
     assert Reversal.of(linear(np.eye(3)), 1e-3) is None
 
 
+def test_backlash_on_a_250th_of_an_axis_is_found() -> None:
+    box = np.array([[0.0, 1.0], [0.0, 1.0], [0.0, 100.0]])
+    backlash = lambda p: np.where(np.abs(p - 50.5) < 0.25, [0.0, 0.0, 0.01], 0.0)  # noqa: E731
+    assert Reversal.of(Toy(backlash=backlash, box_mm=box), 1e-3) is not None
+
+
 def test_the_strokes_of_a_hole_move_no_axis_across_them() -> None:
     """X is off by 1e-3 of Z: over a stroke of 10 mm the load would move by 10 um, and turn."""
     model = linear([[0, 0, 1e-3], [0, 0, 0], [0, 0, 0]], backlash=PLAY.backlash)

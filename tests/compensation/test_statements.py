@@ -138,8 +138,8 @@ CASES = {
         "".join(card(line, 10 * k) for k, line in enumerate([*CARDS, "GOTO/10,5,0", "FINI"], 1)),
         "".join(card(line, 10 * k) for k, line in enumerate(CARDS[:5], 1))
         + card("GOTO/-0.005,-0.004,0", 60) + card("RAPID", "") + card("GOTO/0.003,0.002,0.000", "")
-        + card("GOTO/20.003,0.002,0", 70) + card("GOTO/19.997,0.002,0", 80) + card("GOTO/9.997,5.002,0.000", "")
-        + card("FINI", 90),
+        + card("GOTO/20.003,0.002,0", 70) + card("GOTO/19.997,0.002,0", 80)
+        + card("GOTO/9.997,5.002,0.000", "") + card("FINI", 90),
         (6, 0, 2),
     ),
     "points of a measuring machine": (
