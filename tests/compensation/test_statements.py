@@ -22,7 +22,8 @@ MACHINES = {
     "leans": (CURVE.format("y"), LEANS),
     "plays": ("[backlash]\nX_um = 6.0\nY_um = 4.0\n", {}),
 }
-FRAMES = TRUE_ZERO + '[work_offsets.MCS]\nset_by = "true"\n[tools.1]\nZ_mm = 0.0\n'
+TABLE = '[work_offsets.TABLE]\nX_mm = 10.0\nZ_mm = 3.0\nC_deg = 90.0\nset_by = "true"\n'
+FRAMES = TABLE + TRUE_ZERO + '[work_offsets.MCS]\nset_by = "true"\n[tools.1]\nZ_mm = 0.0\n'
 APT = "PARTNO A\nUNITS/MM\nLOADTL/1\nFEDRAT/600,MMPM\n"
 #: a rapid to X 20, which takes up the play for motions in +X and +Y
 THERE = APT + "RAPID\nGOTO/20,0,0\nGOTO/30,0,0\n"
@@ -156,6 +157,14 @@ CASES = {
         "X_mm,Y_mm,Z_mm\n10.001,20.002,0\n20.002,20.002,5.0005\n",
         "X_mm,Y_mm,Z_mm\n10.0000,20.0000,0\n20.0000,20.0000,5.0000\n",
         (5, 0, 0),
+    ),
+    "a frame that is turned": (
+        "leans",
+        "list",
+        "# frame=TABLE\nX_mm,Y_mm,Z_mm\n0,0,0\n100.0,0,0\n100.0,5.0,1.0\n200.0,5.0,1.0\n",
+        # its X runs along Y of the machine, its Y against X
+        "# frame=TABLE\nX_mm,Y_mm,Z_mm\n0,0,0\n100.0,-0.010,-0.020\n100.0,4.990,0.980\n200.0,4.980,0.960\n",
+        (6, 0, 0),
     ),
     "a list of columns": (
         # a number takes from the space behind it
