@@ -13,6 +13,7 @@ import pytest
 from cases.acceptance import TRUE_ZERO, machine, unstamped
 
 import olp
+from olp.compensation.writer import Writer
 from olp.core.errors import ProgramError
 
 CURVE = '[[curves]]\nfile = "{}.csv"\ninterpolation = "linear"\n'
@@ -164,6 +165,13 @@ CASES = {
         "/Y200 X7.020 Z-0.040\n/Y150 X7.015 Z-0.030\nG1 Y150 X1.015 Z-0.030\nG91 X5\n",
         (3, 10, 0),
     ),
+    "a word that a deleted block may have had": (
+        "leans",
+        "G0 Y100\nF60\n/G1 Y200\nG1 Y200 Z5\n/G1 Y100\n/G1 Y300\nG1 Y300\nX1\n",
+        "G0 Y100 X0.010 Z-0.020\nF60\n/G1 Y200 X0.020 Z-0.040\nG1 Y200 Z4.960 X0.020\n"
+        "/G1 Y100 X0.010 Z4.980\n/G1 Y300 X0.030 Z4.940\nG1 Y300 X0.030 Z4.940\nX1.030\n",
+        (2, 11, 0),
+    ),
     "stored positions": (
         "leans",
         "G0 Y100\nG92 X5 Y6 Z7\nG1 Y106 F100\nG92.1\nG1 X0 Y0\nG20\nG10 L20 P1 X0.5 Y0. Z-.25\nY10.\n",
@@ -277,6 +285,26 @@ def test_steps_take_up_the_play(name: str, tmp_path: Path) -> None:
     assert unstamped(result.data).decode() == (XY_TAKEN if of == "XY" else X_TAKEN) + expected + "M2\n"
     assert tally(result) == counts
     assert result.report["deviation"]["holds"]
+
+
+@pytest.mark.parametrize("chunk", (1, 2))
+@pytest.mark.parametrize(
+    "name",
+    [
+        "stored positions",
+        "a word that a deleted block may have had",
+        "behind deleted blocks",
+        "two turns of a deleted helix",
+    ],
+)
+def test_texts_are_the_same_where_they_are_written_in_chunks(
+    name: str, chunk: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    of, text, expected, counts = (CASES | TURNS)[name]
+    monkeypatch.setattr(Writer, "chunk", chunk)
+    result = corrected(tmp_path, of, HEAD + text)
+    assert unstamped(result.data).decode() == (X_TAKEN if of == "X" else HEAD) + expected + "M2\n"
+    assert tally(result) == counts
 
 
 REFUSED = {

@@ -8,6 +8,7 @@ import pytest
 from cases.acceptance import TRUE_ZERO, machine, unstamped
 
 import olp
+from olp.compensation.writer import Writer
 
 CURVE = '[[curves]]\nfile = "{}.csv"\ninterpolation = "linear"\n'
 #: 10.001 becomes 10.000 in X, Y and Z
@@ -89,12 +90,15 @@ CASES = {
 }
 
 
+@pytest.mark.parametrize("chunk", (1 << 15, 1))
 @pytest.mark.parametrize("name", CASES)
-def test_words_of_holes(name: str, tmp_path: Path) -> None:
+def test_words_of_holes(name: str, chunk: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     of, text, expected, counts = CASES[name]
     calibration, curves = MACHINES[of]
     head = "G21 G90 G54\n"
     path = machine(tmp_path, calibration, curves, tables=TRUE_ZERO)
+    # as one, and a block at a time
+    monkeypatch.setattr(Writer, "chunk", chunk)
     result = olp.correct(f"{head}{text}G80\nM2\n".encode(), path)
     assert unstamped(result.data).decode() == f"{head}{expected}G80\nM2\n"
     moves = result.report["moves"]

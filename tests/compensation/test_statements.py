@@ -13,6 +13,7 @@ import pytest
 from cases.acceptance import TRUE_ZERO, machine, unstamped
 
 import olp
+from olp.compensation.writer import Writer
 
 CURVE = '[[curves]]\nfile = "{}.csv"\ninterpolation = "linear"\n'
 SCALES = {f"{a.lower()}.csv": f"{a}_mm,E{a}{a}_um\n-1000,-100\n2000,200\n" for a in "XYZ"}
@@ -184,11 +185,16 @@ CASES = {
 }  # fmt: skip
 
 
+@pytest.mark.parametrize("chunk", (1 << 15, 1))
 @pytest.mark.parametrize("name", CASES)
-def test_statements_are_changed_and_inserted(name: str, tmp_path: Path) -> None:
+def test_statements_are_changed_and_inserted(
+    name: str, chunk: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     of, control, text, expected, counts = CASES[name]
     calibration, curves = MACHINES[of]
     path = machine(tmp_path, calibration, curves, tables=FRAMES, controller=control)
+    # as one, and a move at a time
+    monkeypatch.setattr(Writer, "chunk", chunk)
     result = olp.correct(text.encode(), path)
     assert unstamped(result.data).decode() == expected
     moves = result.report["moves"]
