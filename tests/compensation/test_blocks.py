@@ -29,13 +29,20 @@ MACHINES = {
     "scale": (SCALE, SCALES),
     "leans": (CURVE.format("y"), LEANS),
     "X": ("[backlash]\nX_um = 6.0\n", {}),
+    "shifted": (
+        CURVE.format("x"),
+        {"x.csv": "X_mm,EXX_um,EYX_um,EZX_um\n-1000,-10,20,-30\n2000,-10,20,-30\n"},
+    ),
     "turned": (CURVE.format("x") + CURVE.format("y"), TURNED),
     "XY": ("[backlash]\nX_um = 6.0\nY_um = 4.0\n", {}),
 }
 HEAD = "G21 G90 G54\nG0 X0 Y0 Z0\n"
-#: After the rapid has taken up the play for a motion in +X, and in +X and +Y.
-X_TAKEN = "G21 G90 G54\nG0 X-0.005 Y0 Z0\nX0.003\n"
-XY_TAKEN = "G21 G90 G54\nG0 X-0.005 Y-0.004 Z0\nX0.003 Y0.002\n"
+#: As corrected: a rapid has taken up the play for a motion in +X, and in +X and +Y.
+HEADS = {
+    "X": "G21 G90 G54\nG0 X-0.005 Y0 Z0\nX0.003\n",
+    "XY": "G21 G90 G54\nG0 X-0.005 Y-0.004 Z0\nX0.003 Y0.002\n",
+    "shifted": "G21 G90 G54\nG0 X.010 Y-.020 Z.030\n",
+}
 
 
 def corrected(folder: Path, name: str, text: str, **options: object) -> olp.Correction:
@@ -108,6 +115,14 @@ CASES = {
         # 4.9 mm are turned by half of a position's digit: no word is worth it
         "G1 F100\nG2 X20 Y0.002 I10 J0.0010\n\tg3\tx0\ty0\ti-10\tj-0.0010\nG2 I10 J0.0010 F90\nG2 I4.9 F90\n",
         (1, 3, 0),
+    ),
+    "what is only shifted": (
+        "shifted",
+        "G1 X20 F100\nG2 X20.5 Y.5 I.25 J.25\nG3 X0 Y0 R15\nG90.1 G2 X10 Y0 I5 J0\nG92 X1 Y1 Z1\nG1 X5\n",
+        # a centre that counts from the start keeps its words
+        "G1 X20.010 F100\nG2 X20.510 Y.480 I.25 J.25\nG3 X.010 Y-.020 R15\n"
+        "G90.1 G2 X10.010 Y-.020 I5.0100 J-.0200\nG92 X1.010 Y.980 Z1.030\nG1 X5.010\n",
+        (16, 0, 0),
     ),
     "more than one turn": (
         "scale",
@@ -245,6 +260,38 @@ TURNS = {
         "G2 X20.003 Y0 R10 F100\nG1 X19.997\nG3 X-0.003 Y0 R10\n",
         (3, 0, 2),
     ),
+    "quarters about an absolute centre": (
+        "XY",
+        "G1 X20 F100\nG90.1 G2 X20 Y0 I0 J0\n",
+        # each quarter is shifted by half of the backlash in the directions in which it goes
+        "G1 X20.003 F100\nG1 X19.997 Y-0.002\nG90.1 G2 X-0.003 Y-20.002 I-0.0030 J-0.0020\nG1 Y-19.998\n"
+        "G2 X-20.003 Y0.002 I-0.0030 J0.0020\nG1 X-19.997\nG2 X0.003 Y20.002 I0.0030 J0.0020\nG1 Y19.998\n"
+        "G2 X20.003 Y-0.002 I0.0030 J-0.0020\n",
+        (7, 0, 8),
+    ),
+    "parts of arcs with a radius": (
+        "XY",
+        "G1 X20 Y5 F100\nG2 X25 Y0 R5\nG3 X35 Y10 R-10\n",
+        # a part of at most half a circle has no minus
+        "G1 X20.003 Y5.002 F100\nG1 Y4.998\nG2 X25.003 Y-0.002 R5\nG3 X35.003 Y-10.002 R10.0000\n"
+        "G1 Y-9.998\nG3 X45.003 Y0.002 I0.0000 J10.0000\nG1 X44.997\nG3 X34.997 Y10.002 I-10.0000 J0.0000\n",
+        (9, 0, 6),
+    ),
+    "circles in G91": (
+        "X",
+        "G1 X20 F100\nG91\nG3 X0 Y0 I-20 J0\nX0 Y0 I20\nG90 G1 X0\n",
+        "G1 X20.003 F100\nG91\nG1 X-0.006\nG3 X-40.000 Y0 I-20 J0\nG1 X0.006\n"
+        "G3 X40.000 Y0.000 I20.0000 J0.0000\n"
+        "X40.000 Y0 I20\nG1 X-0.006\nG3 X-40.000 Y0.000 I-20.0000 J0.0000\nG90 G1 X-0.003\n",
+        (5, 0, 6),
+    ),
+    "a circle without an end": (
+        "X",
+        "G1 X20 F100\nN3 g3 i-20 j0 m9 (c)\n",
+        "G1 X20.003 F100\nG1 X19.997\nN3 g3 i-20 j0  x-20.003 (c)\nG1 X-19.997\n"
+        "G3 X20.003 Y0.000 I20.0000 J0.0000 m9\n",
+        (2, 1, 4),
+    ),
     "times in G93": (
         "X",
         "G93 G1 X20 F2\nX10 F4.5\nX30 F.5\nG94 X0 F100\n",
@@ -274,7 +321,7 @@ TURNS = {
 def test_words_are_changed_and_inserted(name: str, tmp_path: Path) -> None:
     of, text, expected, counts = CASES[name]
     result = corrected(tmp_path, of, HEAD + text)
-    assert unstamped(result.data).decode() == HEAD + expected + "M2\n"
+    assert unstamped(result.data).decode() == HEADS.get(of, HEAD) + expected + "M2\n"
     assert tally(result) == counts
 
 
@@ -282,7 +329,7 @@ def test_words_are_changed_and_inserted(name: str, tmp_path: Path) -> None:
 def test_steps_take_up_the_play(name: str, tmp_path: Path) -> None:
     of, text, expected, counts = TURNS[name]
     result = corrected(tmp_path, of, HEAD + text)
-    assert unstamped(result.data).decode() == (XY_TAKEN if of == "XY" else X_TAKEN) + expected + "M2\n"
+    assert unstamped(result.data).decode() == HEADS[of] + expected + "M2\n"
     assert tally(result) == counts
     assert result.report["deviation"]["holds"]
 
@@ -303,7 +350,7 @@ def test_texts_are_the_same_where_they_are_written_in_chunks(
     of, text, expected, counts = (CASES | TURNS)[name]
     monkeypatch.setattr(Writer, "chunk", chunk)
     result = corrected(tmp_path, of, HEAD + text)
-    assert unstamped(result.data).decode() == (X_TAKEN if of == "X" else HEAD) + expected + "M2\n"
+    assert unstamped(result.data).decode() == HEADS.get(of, HEAD) + expected + "M2\n"
     assert tally(result) == counts
 
 
@@ -334,6 +381,14 @@ def test_a_short_arc_that_rounding_would_make_a_circle_is_refused(tmp_path: Path
     with pytest.raises(ProgramError, match="the last digit decides") as caught:
         corrected(tmp_path, "scale", HEAD + "G1 X5.000 F100\nG2 X5.001 Y0 I0.0005 J-10\n")
     assert (caught.value.line, caught.value.code) == (4, "OLP561")
+
+
+def test_a_circle_that_rounding_would_make_a_short_arc_is_refused(tmp_path: Path) -> None:
+    """It begins at 5.002, and ends at 5.0025: in G3 that is ahead, in G2 behind."""
+    text = HEAD + "G1 X5.003 F100\n{} X5.0030 Y0 J10\n"
+    with pytest.raises(ProgramError, match="the last digit decides"):
+        corrected(tmp_path, "scale", text.format("G3"))
+    assert b"G2 X5.0025 Y0" in corrected(tmp_path, "scale", text.format("G2")).data
 
 
 @pytest.mark.parametrize("head", ["G21G90G54\nG0X0Y0Z0\n", "G21 G90 G54\nG0 X0 Y0 Z0\n"])
