@@ -57,6 +57,13 @@ CASES = {
         "\ty300 x20.030 r1.940 z-10.060\nX5.030 Z-20.060\nG80\nG0 Y0 X5.000 Z2.000\n",
         (6, 8, 0),
     ),
+    "half a digit": (
+        "leans",
+        "G0 X0 Y0 Z5\nG99 G81 X10 Y0 Z-10 R2 F100\nY5\nY5.1\n",
+        # at Y 5 X is off by half a digit: no word is worth it
+        "G0 X0 Y0 Z5\nG99 G81 X10 Y0 Z-10 R2 F100\nY5 R1.999 Z-10.001\nY5.1 X10.001\n",
+        (0, 3, 0),
+    ),
     "repeats that need different words": (
         "leans",
         # each is 0.020 lower than the one before; R counts from Z 5, and the depth from R
