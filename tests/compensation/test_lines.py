@@ -136,6 +136,18 @@ def test_a_chord_goes_past_a_kink_as_far_as_it_may() -> None:
     assert end * (1 - 1 / 31) <= share[0] * LENGTH_MM <= end
 
 
+def test_a_chord_ends_at_each_corner_of_a_zigzag() -> None:
+    """Y goes up and down by half a millimetre every 10 mm: at the corners lie the samples of 80 mm."""
+
+    def zigzag(point: np.ndarray, _: np.ndarray) -> np.ndarray:
+        return np.outer(0.5 * np.abs((point[:, 0] / 10 + 1) % 2 - 1), [0.0, 1.0, 0.0])
+
+    model = Toy(zigzag, lambda delta, tool: np.where(delta[:, 0] > 10.0, 0.5, 0.0))
+    move, share, _ = cut(toolpath(feed(*WHOLE)), model)
+    assert move.tolist() == [0] * 7
+    assert sorted((share * 8).tolist()) == [1, 2, 3, 4, 5, 6, 7]
+
+
 def wave(point: np.ndarray, _: np.ndarray) -> np.ndarray:
     values = np.zeros((len(point), 3))
     values[:, 1] = 0.05 * np.sin(point[:, 0] / 7.0) + 1e-5 * point[:, 0] ** 2
