@@ -173,6 +173,12 @@ CASES = {
         "G1 X.510 Y100. Z-.020 F100\nY50. X.505 Z-.010\n",
         (1, 3, 0),
     ),
+    "no more than nine digits": (
+        "leans",
+        "G1 X1.000000000000 Y2.0 F100\nX5.000000000000\nY100\nG91 Y100\n",
+        "G1 X1.000200000000 Y2.0 F100\nX5.000200000000\nY100 X5.010000000 Z-0.020\nG91 Y100 X0.010 Z-0.020\n",
+        (2, 4, 0),
+    ),
     "behind deleted blocks": (
         "leans",
         "G0 Y100\n/G1 Y200 F60\nG1 Y100\nX5\n/Y200 X7\n/Y150\nG1 Y150 X1\nG91 X5\n",
@@ -391,9 +397,18 @@ def test_a_circle_that_rounding_would_make_a_short_arc_is_refused(tmp_path: Path
     assert b"G2 X5.0025 Y0" in corrected(tmp_path, "scale", text.format("G2")).data
 
 
-@pytest.mark.parametrize("head", ["G21G90G54\nG0X0Y0Z0\n", "G21 G90 G54\nG0 X0 Y0 Z0\n"])
-def test_a_word_behind_the_first_of_a_block_is_spaced_as_most_are(head: str, tmp_path: Path) -> None:
-    space = " " if " " in head else ""
+@pytest.mark.parametrize(
+    ("head", "space"),
+    [
+        ("G21G90G54\nG0X0Y0Z0\n", ""), ("G21 G90 G54\nG0 X0 Y0 Z0\n", " "),
+        # two of five words, three of five, three of six
+        ("G21 G90G54\nG0 X0Y0Z0\n", ""), ("G21 G90 G54\nG0 X0Y0Z0\n", " "),
+        ("G21 G90G54\nG0 X0Y0 Z0F9\n", " "),
+    ],
+)  # fmt: skip
+def test_a_word_behind_the_first_of_a_block_is_spaced_as_most_are(
+    head: str, space: str, tmp_path: Path
+) -> None:
     text = corrected(tmp_path, "leans", head + "Y100\nY200\n").data
     assert f"Y100{space}X0.010{space}Z-0.020\nY200{space}X0.020{space}Z-0.040\n".encode() in text
 

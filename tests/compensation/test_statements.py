@@ -199,3 +199,29 @@ def test_statements_are_changed_and_inserted(
     assert unstamped(result.data).decode() == expected
     moves = result.report["moves"]
     assert (moves["changed_words"], moves["inserted_words"], moves["inserted_blocks"]) == counts
+
+
+#: head, rows, corrected rows: what is written otherwise than a number needs keeps its own form
+LISTS = [
+    ("X_mm,Y_mm,Z_mm", "10.001,20.002,0\n010.001,20.002,0.5", "10.000,20.000,0\n010.000,20.000,0.5"),
+    ("X_mm,Y_mm,Z_mm", "10.001,20.002,0\n+10.001,20.002,0.5", "10.000,20.000,0\n+10.000,20.000,0.5"),
+    ("X_mm,Y_mm,Z_mm", "10.001,20.002,-0\n10.001,-20.002,-0.0", "10.000,20.000,-0\n10.000,-20.000,-0.0"),
+    ("X_mm,Y_mm,Z_mm", "10.001,20.002,0\n.5,-.5,5.", "10.000,20.000,0\n.5,-.5,5."),
+    ("X_mm,Y_mm,Z_mm", "10.001,20.002,0\n1e2,-20.002,5", "10.000,20.000,0\n99.990,-20.000,5"),
+    ("X_mm Y_mm Z_mm", "10.001 20.002 0\n-5 20.002 5", "10.000 20.000 0\n-5 20.000 5"),
+    (
+        "    X_mm    Y_mm  Z_mm",
+        "  10.001  20.002  0\n 100.010  20.002  0\n  -5.000  20.002  5",
+        "  10.000  20.000  0\n 100.000  20.000  0\n  -5.000  20.000  5",
+    ),
+    ("X_mm,Y_mm,N,Z_mm", "10.001,20.002,7,0\n10.001,20.002,8,3", "10.000,20.000,7,0\n10.000,20.000,8,3"),
+    ("X_mm,Y_mm,Z_mm", "0.000,-0.001,0.001\n0.001,0.001,0.001", "0.000,-0.001,0.001\n0.001,0.001,0.001"),
+]
+
+
+@pytest.mark.parametrize(("head", "rows", "expected"), LISTS)
+def test_numbers_of_lists_keep_their_form(head: str, rows: str, expected: str, tmp_path: Path) -> None:
+    calibration, curves = MACHINES["scale"]
+    path = machine(tmp_path, calibration, curves, tables=TRUE_ZERO, controller="list")
+    result = olp.correct(f"{head}\n{rows}\n".encode(), path)
+    assert unstamped(result.data).decode() == f"{head}\n{expected}\n"
