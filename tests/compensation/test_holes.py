@@ -64,6 +64,16 @@ CASES = {
         "G0 X0 Y0 Z5\nG99 G81 X10 Y0 Z-10 R2 F100\nY5 R1.999 Z-10.001\nY5.1 X10.001\n",
         (0, 3, 0),
     ),
+    "where Z is behind the cycle": (
+        "leans",
+        # at the initial level, which has no correction; at R; at R, which is higher
+        "G0 X0 Y0 Z5\nG98 G81 X10 Y100 Z-10 R2 F100\nG80\nG0 Y200\nG99 G81 Y100 Z-10 R2\nG80\nG0 Y200\n"
+        "G98 G81 Y100 Z-10 R7\nG80\nG0 Y200\n",
+        "G0 X0 Y0 Z5\nG98 G81 X10.010 Y100 Z-10.020 R1.980 F100\nG80\nG0 Y200 X10.020 Z4.960\n"
+        "G99 G81 Y100 Z-10.020 R1.980 X10.010\nG80\nG0 Y200 X10.020 Z1.960\n"
+        "G98 G81 Y100 Z-10.020 R6.980 X10.010\nG80\nG0 Y200 X10.020 Z6.960\n",
+        (7, 8, 0),
+    ),
     "repeats that need different words": (
         "leans",
         # each is 0.020 lower than the one before; R counts from Z 5, and the depth from R
