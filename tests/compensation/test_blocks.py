@@ -33,6 +33,7 @@ MACHINES = {
         CURVE.format("x"),
         {"x.csv": "X_mm,EXX_um,EYX_um,EZX_um\n-1000,-10,20,-30\n2000,-10,20,-30\n"},
     ),
+    "kink": (CURVE.format("z"), {"z.csv": "Z_mm,EZZ_um\n-1000,0\n20,0\n40,10\n2000,10\n"}),
     "turned": (CURVE.format("x") + CURVE.format("y"), TURNED),
     "XY": ("[backlash]\nX_um = 6.0\nY_um = 4.0\n", {}),
 }
@@ -358,6 +359,18 @@ def test_texts_are_the_same_where_they_are_written_in_chunks(
     result = corrected(tmp_path, of, HEAD + text)
     assert unstamped(result.data).decode() == HEADS.get(of, HEAD) + expected + "M2\n"
     assert tally(result) == counts
+
+
+def test_parts_of_a_long_helix_state_their_own_turns(tmp_path: Path) -> None:
+    """Z has a kink in the middle of 3.3 turns: the first and the last third, 1.1 turns each, stay whole."""
+    text = HEAD.replace("X0", "X10") + "G1 F100\nG3 X3.4549 Y4.7553 Z40 I-5 J0 P4\n"
+    result = corrected(tmp_path, "kink", text)
+    first, *rest, last, _ = unstamped(result.data).decode().splitlines()[3:]
+    # 1.1 turns are 36 degrees more than one
+    assert first == "G3 X9.0451 Y2.9389 Z13.333 I-5 J0 P2"
+    assert last.startswith("X3.455 Y4.755 Z39.990 I-1.545") and last.endswith(" P2")
+    assert rest and not any("P" in line for line in rest)
+    assert result.report["deviation"]["holds"]
 
 
 REFUSED = {
