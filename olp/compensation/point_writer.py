@@ -62,7 +62,7 @@ class PointWriter(Writer):
             np.rint(word / POW10[np.maximum(-more, 0)]).astype(np.int64),
         )  # fmt: skip
         counting = (rows.flag & np.uint8(Flag.INCREMENTAL)) != 0
-        held = raw.any(axis=1) | ~(self.program.slot[move] >= 0).any(axis=1)
+        held = np.asarray(raw.any(axis=1) | (self.program.slot[move] < 0).all(axis=1), bool)
         written = np.where(unknown, local, mantissa / POW10[decimals])
         # a number that is kept is the program's own, to the last bit
         nominal = self.path.end_mm[move]
