@@ -27,8 +27,8 @@ _DIGITS = 2.0
 _LEAST_MM = 1e-3
 #: Moves in which the next motion of an axis is looked for; behind them any side is as good.
 _AHEAD = 1000
-#: Moves that take no further block.
-_FIXED = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE | Flag.CYCLE | Flag.WHOLE | Flag.DELETED)
+#: Moves that take no further block, beside those that keep the program's own command.
+_FIXED = np.uint8(Flag.CYCLE | Flag.WHOLE | Flag.DELETED)
 
 
 def with_approaches(

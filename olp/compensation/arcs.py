@@ -262,6 +262,8 @@ def fit(
     # the control counts the angle about the new centre, and reaches the end with its own sweep
     begin = np.arctan2(s1 - y, s0 - x)
     turn = _near(np.arctan2(e1 - y, e0 - x) - begin, sweep[:, None])
+    # ends that rounding made one point
+    turn = np.where(turn == 0.0, sweep[:, None], turn)
     reached = _near(np.arctan2(q1 - y, q0 - x) - begin, share * turn) / turn
     radial = np.hypot(q0 - x, q1 - y) - (rs + (re - rs) * reached)
     level = (q2 - (s2 + (e2 - s2) * reached)) * rs / np.hypot(rs, (e2 - s2) / turn)

@@ -116,8 +116,8 @@ class BlockWriter(Writer):
                 self._force(rows, row, axis)
 
     def _nominal_moved(self, rows: Rows, begin: int, row: int, axis: int) -> bool:
-        end = self.path.end_mm
-        before = end[rows.move[begin], axis] if begin >= 0 else self.path.start_mm[axis]
+        end, first = self.path.end_mm, int(rows.move[begin + 1])
+        before = end[first - 1, axis] if first else self.path.start_mm[axis]
         return not abs(end[rows.move[row - 1], axis] - before) < 1e-9
 
     def _force(self, rows: Rows, row: int, axis: int) -> None:

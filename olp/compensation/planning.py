@@ -30,8 +30,8 @@ ARC_DIGIT_SHARE = 0.6
 DEAD_BAND_SHARE = 0.25
 #: moves that are left as they are
 _UNTOUCHED = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE)
-#: moves that are never split
-_UNSPLIT = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE | Flag.CYCLE | Flag.WHOLE)
+#: moves that are never split, beside those that are left as they are
+_UNSPLIT = np.uint8(Flag.CYCLE | Flag.WHOLE)
 
 
 def plan(path: Toolpath, model: ErrorModel, limits: Limits) -> Plan:

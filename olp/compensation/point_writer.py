@@ -16,8 +16,6 @@ from olp.program.text.numbers import MOST_DECIMALS
 
 #: digits of inserted numbers, where the program itself has as many
 FINE_DECIMALS = 6
-#: Moves whose numbers are kept as written.
-_BYPASS = np.uint8(Flag.CONTROL | Flag.PASS)
 
 
 class PointWriter(Writer):
@@ -64,7 +62,7 @@ class PointWriter(Writer):
             np.rint(word / POW10[np.maximum(-more, 0)]).astype(np.int64),
         )  # fmt: skip
         counting = (rows.flag & np.uint8(Flag.INCREMENTAL)) != 0
-        held = raw.any(axis=1) | ((rows.flag & _BYPASS) != 0) | ~(self.program.slot[move] >= 0).any(axis=1)
+        held = np.asarray(raw.any(axis=1) | (self.program.slot[move] < 0).all(axis=1), bool)
         written = np.where(unknown, local, mantissa / POW10[decimals])
         # a number that is kept is the program's own, to the last bit
         nominal = self.path.end_mm[move]

@@ -61,11 +61,7 @@ class Rows:
     def _mark_take_ups(self) -> None:
         """The first part of an arc keeps the arc's own text, so backlash is taken up in front of it."""
         row = np.flatnonzero(self.take_up & self.arc & self.head)
-        while row.size:
-            self.before[row] = True
-            self.head[row] = False
-            self.head[row + 1] = True
-            row = row[self.take_up[row + 1]] + 1
+        self.before[row], self.head[row], self.head[row + 1] = True, False, True
 
     def __len__(self) -> int:
         return len(self.move)

@@ -21,7 +21,7 @@ from olp.compensation.stamp import stamped
 from olp.compensation.style import Style
 from olp.compensation.tally import Tally
 from olp.core.machine import Vector
-from olp.core.toolpath import Frame
+from olp.core.toolpath import Flag, Frame
 from olp.errormodel.base import ErrorModel
 from olp.program.program import Program
 from olp.program.text.edits import Edits, Prefixes, splice
@@ -90,12 +90,14 @@ class Writer(ABC):
         return b"".join(pieces)
 
     def _spans(self) -> list[tuple[int, int]]:
-        """Chunks of rows that end between lines."""
+        """Chunks of rows that end between lines, and not behind a deleted block: words of the next one depend
+        on it."""
         count, move, line = len(self.plan), self.plan.move, self.path.line
+        deleted = (self.path.flag & np.uint8(Flag.DELETED)) != 0
         cuts = [0]
         while cuts[-1] < count:
             cut = min(cuts[-1] + self.chunk, count)
-            while cut < count and line[move[cut]] == line[move[cut - 1]]:
+            while cut < count and (line[move[cut]] == line[move[cut - 1]] or deleted[move[cut - 1]]):
                 cut += 1
             cuts.append(cut)
         return list(pairwise(cuts))

@@ -137,6 +137,23 @@ def test_a_raw_step_keeps_its_word_and_the_next_counts_from_its_end() -> None:
     assert got.emitted.tolist() == [3.0, 3.25, 3.5]
 
 
+def test_a_raw_step_between_two_others() -> None:
+    got = incremental(rows([1.5, 9.0, 5.0, 5.25], ["1.5", "2.0", "1.25", None], raw=[1]), 0.0, 2)
+    assert written(got) == [None, None, "1.50", "0.25"]
+    assert got.emitted.tolist() == [1.5, 3.5, 5.0, 5.25]
+
+
+@pytest.mark.parametrize(("step", "word"), [("1.500000000005", None), ("1.5000000002", "1.50")])
+def test_a_step_of_many_digits_is_left_alone_where_it_says_the_same(step: str, word: str | None) -> None:
+    """Also between raw ones, and where the position behind it is rounded."""
+    got = incremental(rows([9.0, 3.5, 5.0], ["2.0", "1.5", step], raw=[0]), 0.0, 2)
+    assert written(got) == [None, None, word]
+    got = incremental(rows([1.5], [step]), 0.0, 2)
+    assert written(got) == [word]
+    got = incremental(rows([1.004, 2.504], ["1.004", step]), 0.0, 2)
+    assert written(got) == [None, word]
+
+
 def test_a_reset_step_starts_again_where_the_machine_has_it() -> None:
     command, words = [NAN, 4.5, 5.0], [None, "0.5", "0.5"]
     got = incremental(rows(command, words, reset=[0], nominal=[4.0, 4.5, 5.0]), NAN, 1)

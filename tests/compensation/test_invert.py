@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from cases.toy import Toy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -78,6 +79,25 @@ def test_a_command_is_where_the_error_brings_the_tip_to_its_target(play: np.ndar
 def test_a_sample_is_bent_against_its_error(x_mm: float, expected_mm: float) -> None:
     sample = bent(stretched(1e-3), np.array([[x_mm, 5.0, 6.0]]), np.zeros(3))
     assert sample == pytest.approx(np.array([[expected_mm, 5.0, 6.0]]), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("slope", "x_mm", "evaluations"),
+    # changes of 10 um, 10 nm, 10 pm; of 50 um, 0.5 um, 5 nm; none at all
+    [(1e-3, 10.0, 3), (1e-2, 0.5, 4), (0.0, 10.0, 2), (1e-3, 1e-4, 2)],
+)
+def test_the_error_is_asked_for_no_more_than_needed(slope: float, x_mm: float, evaluations: int) -> None:
+    """The next change is taken for ten times what the last two let expect, and a hundredth of it at least."""
+    model, asked = stretched(slope), []
+
+    def error(point: np.ndarray, tool: np.ndarray, play: np.ndarray | None = None) -> np.ndarray:
+        asked.append(point)
+        return model.error(point, tool, play)
+
+    counting = Toy(lambda point, tool: error(point, tool[0]))
+    command = invert(counting, np.array([[x_mm, 0.0, 0.0]]), np.zeros(3))
+    assert command[0, 0] == pytest.approx(x_mm / (1 + slope), abs=1e-9)
+    assert len(asked) == evaluations
 
 
 def test_an_axis_that_is_not_known_keeps_its_target_and_others_do_not_wait_for_it() -> None:
