@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Array, Index, Mask
-from olp.core.geometry import arc_distance, arc_points, segment_distance
+from olp.core.geometry import arc_distance, arc_points, quarter_shares, segment_distance
 from olp.core.toolpath import Flag, Kind, Toolpath
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.reversal import play_after, play_interval, play_states, plays
@@ -168,29 +168,42 @@ class Tracer:
             radius = np.sqrt(np.nansum((start[rows] - path.arcs.centre_mm) ** 2, axis=1))
             length[rows] = np.maximum(length[rows], radius * np.abs(path.arcs.sweep_rad))
         steps = np.maximum(np.ceil(length / step_mm), 1).astype(np.int64)
-        point, part, _ = tracer.points(start, end, arc, steps, np.isfinite(length))
+        point, part, _ = tracer.points(start, end, arc, steps)
         return tracer.actual(point, tool if tool.ndim == 1 else tool[part]), part
 
     def points(
-        self, start: Array, end: Array, arc: Index, steps: Index, known: Mask
+        self, start: Array, end: Array, arc: Index, steps: Index, turns: Mask | None = None
     ) -> tuple[Array, Index, Array]:
-        """Sample moves at equal steps: positions, the move of each sample, and its share of the move."""
+        """Sample moves at equal steps, and the arcs `turns` where an axis turns round, too: positions, the move
+        of each sample, and its share of the move."""
         part = np.repeat(np.arange(len(steps)), steps)
         offset = np.cumsum(steps) - steps
         share = (np.arange(len(part)) - offset[part] + 1) / steps[part]
+        if turns is not None and turns.any():
+            of, more = self._quarters(start, arc, np.flatnonzero(turns))
+            part, share = np.concatenate((part, of)), np.concatenate((share, more))
+            order = np.lexsort((share, part))
+            part, share = part[order], share[order]
         if len(part) == len(steps):
             return end, part, share
-        point = start[part] + share[:, None] * (end - start)[part]
-        point[offset + steps - 1] = end
-        curved = np.flatnonzero(arc[part] >= 0)
-        curved = curved[(share[curved] < 1) & known[part[curved]]]
-        if curved.size:
-            arcs, which = self.path.arcs, arc[part[curved]]
-            point[curved] = arc_points(
-                start[part[curved]], end[part[curved]], arcs.centre_mm[which], arcs.plane[which],
-                arcs.sweep_rad[which], share[curved],
-            )  # fmt: skip
+        point = self._at(start, end, arc, part, share)
+        point[share == 1.0] = end
         return point, part, share
+
+    def _quarters(self, start: Array, arc: Index, rows: Index) -> tuple[Index, Array]:
+        """The arcs among moves `rows` that pass a quadrant between their ends, and the shares of them."""
+        arcs, which = self.path.arcs, arc[rows]
+        size = np.abs(arcs.sweep_rad[which])
+        found = []
+        for turn in range(int(size.max() // (2 * np.pi)) + 1):
+            for quarter in range(4):
+                share = quarter_shares(
+                    start[rows], arcs.centre_mm[which], arcs.plane[which], arcs.sweep_rad[which], quarter
+                )
+                share = share + 2 * np.pi * turn / size
+                some = np.flatnonzero((share > 0.0) & (share < 1.0))
+                found.append((rows[some], share[some]))
+        return np.concatenate([of for of, _ in found]), np.concatenate([share for _, share in found])
 
     def block(self, a: int, b: int, waypoint: Single, worst: Single, bend: Single) -> None:
         """Fill the columns of nominal moves a..b."""
@@ -228,7 +241,7 @@ class Tracer:
         self._ends(a, b, tips, ends, waypoint)
         worst[:] = waypoint
         if len(inner.part) or len(cuts):
-            self._bend(a, reached, inner, owner, arc >= 0, bend)
+            self._bend(a, tips, inner, owner, arc >= 0, bend)
             self._along(a, b, first, owner, inner.with_ends(cuts, reached), worst)
         self._starts(a, b, first, owner, tips, waypoint, worst)
 
@@ -244,7 +257,8 @@ class Tracer:
     ) -> tuple[Array, _Inner]:  # fmt: skip
         """Where the tip really is at the end of each part, and at samples inside parts."""
         long = np.arange(len(end)) if self.has_play else np.flatnonzero(steps > 1)
-        point, part, share = self.points(start[long], end[long], arc[long], steps[long], known[long])
+        turns = (arc[long] >= 0) & known[long] if self.has_play else None
+        point, part, share = self.points(start[long], end[long], arc[long], steps[long], turns)
         part = long[part]
         inside = share < 1.0
         if self.has_play:
@@ -255,21 +269,21 @@ class Tracer:
             if before is None:
                 before = plays[0] if len(plays) else np.zeros(3)
             samples = _Inner(part[inside], share[inside], actual[inside])
-            turns = self._turns(start, end, arc, steps, part, share, np.vstack((before, plays)), tool, kind)
-            return actual[~inside], samples.with_more(turns)
+            taken_up = self._turns(start, end, arc, part, share, np.vstack((before, plays)), tool, kind)
+            return actual[~inside], samples.with_more(taken_up)
         part, share, point = part[inside], share[inside], point[inside]
         reached = self.actual(end, tool)
         return reached, _Inner(part, share, self.actual(point, tool if tool.ndim == 1 else tool[part]))
 
     def _turns(
-        self, start: Array, end: Array, arc: Index, steps: Index, part: Index, share: Array, plays: Array,
-        tool: Array, kind: npt.NDArray[np.uint8],
+        self, start: Array, end: Array, arc: Index, part: Index, share: Array, plays: Array, tool: Array,
+        kind: npt.NDArray[np.uint8],
     ) -> _Inner:  # fmt: skip
         """Samples where an axis that turned round has taken up its backlash: from there on the tip is off by
         all of it. `plays` are those before and at each of the samples `share` of `part`."""
         turned = np.flatnonzero((plays[1:] != plays[:-1]).any(axis=1) & (kind[part] != Kind.RAPID))
-        part, early = part[turned], share[turned] - 1.0 / steps[part[turned]]
-        span = share[turned] - early
+        early = np.where(np.diff(part, prepend=-1) != 0, 0.0, np.concatenate((share[:1], share[:-1])))[turned]
+        part, span = part[turned], share[turned] - early
         old, new = plays[:-1][turned], plays[1:][turned]
         begin = self._at(start, end, arc, part, early)
         stop = self._at(start, end, arc, part, share[turned])
@@ -392,13 +406,14 @@ class Tracer:
         place = before[part] - begin[of] + share * turn[part]
         return np.asarray(place / np.maximum(total[of], 1e-12), float)
 
-    def _bend(self, a: int, reached: Array, inner: _Inner, owner: Index, curved: Mask, bend: Single) -> None:
-        """How far the samples of straight parts leave the chord between the actual ends of their part."""
-        straight = (inner.part > 0) & ~curved[inner.part]
+    def _bend(self, a: int, tips: Array, inner: _Inner, owner: Index, curved: Mask, bend: Single) -> None:
+        """How far the samples of straight parts leave the chord between the actual ends of their part, which
+        are `tips` and the ones behind them."""
+        straight = ~curved[inner.part]
         part, actual = inner.part[straight], inner.actual[straight]
         of = a + owner[part]
         departure = segment_distance(
-            *(self._known(of, some) for some in (actual, reached[part - 1], reached[part]))
+            *(self._known(of, some) for some in (actual, tips[part], tips[part + 1]))
         )
         np.fmax.at(bend, owner[part], departure)
 
