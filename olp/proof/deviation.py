@@ -174,8 +174,8 @@ class Tracer:
     def points(
         self, start: Array, end: Array, arc: Index, steps: Index, turns: Mask | None = None
     ) -> tuple[Array, Index, Array]:
-        """Sample moves at equal steps, and the arcs `turns` where an axis turns round, too: positions, the move
-        of each sample, and its share of the move."""
+        """Sample moves at equal steps, and the arcs `turns` where an axis turns round, too: positions, the
+        move of each sample, and its share of the move."""
         part = np.repeat(np.arange(len(steps)), steps)
         offset = np.cumsum(steps) - steps
         share = (np.arange(len(part)) - offset[part] + 1) / steps[part]

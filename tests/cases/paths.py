@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -78,6 +79,49 @@ def program(path: Toolpath, *holes: Hole, dialect: Dialect = DIALECTS["linuxcnc"
     return Program(b"", dialect, path, None, np.full((len(path), 3), -1), slots, none, none, holes=holes)
 
 
+def drawn(seed: int, count: int = 9) -> tuple[Toolpath, Toolpath, list[int]]:
+    """A path of lines, arcs and rapids, one whose moves are split and a little off, and its groups."""
+    rng = np.random.default_rng(seed)
+    tools = tuple(Frame(tool_mm=tuple(rng.uniform(-300, 300, 3).tolist())) for _ in range(3))
+    mine: list[Move] = [rapid(0, 0, 0)]
+    theirs: list[Move] = [rapid(0, 0, 0)]
+    groups = [0]
+    here, frame = np.zeros(3), 0
+    for _ in range(count):
+        kind = rng.choice(["rapid", "line", "line", "arc"])
+        frame = int(rng.integers(3)) if kind == "rapid" else frame
+        parts = 1 if kind == "rapid" or rng.random() < 0.5 else 3
+        off = rng.uniform(-0.004, 0.004, (parts, 3)) * (np.arange(parts) < parts - 1)[:, None]
+        if kind == "arc":
+            plane, sweep = int(rng.integers(3)), float(rng.choice([-1, 1]) * rng.uniform(0.4, 5.0))
+            first, second, third = ((0, 1, 2), (2, 0, 1), (1, 2, 0))[plane]
+            arm = rng.uniform(5, 20, 2)
+            centre = here.copy()
+            centre[[first, second]] -= arm
+            rise = rng.uniform(-4, 4)
+            ends = []
+            for share in np.arange(1, parts + 1) / parts:
+                end = here + rise * share * np.eye(3)[third]
+                c, s = math.cos(share * sweep), math.sin(share * sweep)
+                turned = c * arm[0] - s * arm[1], s * arm[0] + c * arm[1]
+                end[[first, second]] = centre[[first, second]] + turned
+                ends.append(end)
+            mine.append(arc(*ends[-1], centre=tuple(centre), sweep=sweep, plane=plane, frame=frame))
+            theirs += [
+                arc(*end, centre=tuple(centre), sweep=sweep / parts, plane=plane, frame=frame) for end in ends
+            ]
+            here = ends[-1]
+        else:
+            there = rng.uniform(-60, 60, 3)
+            move = rapid if kind == "rapid" else line
+            mine.append(move(*there, frame=frame))
+            shares = np.arange(1, parts + 1)[:, None] / parts
+            theirs += [move(*end, frame=frame) for end in here + shares * (there - here) + off]
+            here = there
+        groups.append(groups[-1] + parts)
+    return toolpath(*mine, frames=tools), toolpath(*theirs, frames=tools), groups
+
+
 # -- models ----------------------------------------------------------------------------------------------
 
 
@@ -126,8 +170,8 @@ def wave(component: int, of_axis: int, size: float, length: float, phase: float 
 
 
 def points_of(path: Toolpath, shift: Array, i: int, count: int) -> Array:
-    """(m, 3) points of a move, its start first, all moved by `shift`: `count` of them at equal steps, and more
-    of a straight one near its start, where backlash is taken up, and where an axis turns round."""
+    """(m, 3) points of a move, its start first, all moved by `shift`: `count` of them at equal steps, and
+    more of a straight one near its start, where backlash is taken up, and where an axis turns round."""
     start = np.array(path.start_mm) if i == 0 else path.end_mm[i - 1]
     end, share = path.end_mm[i], np.linspace(0.0, 1.0, count + 1)
     if i not in path.arcs.move:

@@ -14,6 +14,7 @@ from cases.paths import (
     Known,
     Move,
     arc,
+    drawn,
     farthest,
     line,
     rapid,
@@ -287,52 +288,7 @@ def test_a_turn_counts_where_the_backlash_is_taken_up() -> None:
 # -- against the slow judge ------------------------------------------------------------------------------
 
 
-def drawn(seed: int) -> tuple[Toolpath, Toolpath, list[int]]:
-    """A path of lines, arcs and rapids, one whose moves are split and a little off, and its groups."""
-    rng = np.random.default_rng(seed)
-    tools = tuple(Frame(tool_mm=tuple(rng.uniform(-300, 300, 3).tolist())) for _ in range(3))
-    mine: list[Move] = [rapid(0, 0, 0)]
-    theirs: list[Move] = [rapid(0, 0, 0)]
-    groups = [0]
-    here, frame = np.zeros(3), 0
-    for _ in range(9):
-        kind = rng.choice(["rapid", "line", "line", "arc"])
-        frame = int(rng.integers(3)) if kind == "rapid" else frame
-        count = 1 if kind == "rapid" or rng.random() < 0.5 else 3
-        off = rng.uniform(-0.004, 0.004, (count, 3)) * (np.arange(count) < count - 1)[:, None]
-        if kind == "arc":
-            plane, sweep = int(rng.integers(3)), float(rng.choice([-1, 1]) * rng.uniform(0.4, 5.0))
-            first, second, third = ((0, 1, 2), (2, 0, 1), (1, 2, 0))[plane]
-            arm = rng.uniform(5, 20, 2)
-            centre = here.copy()
-            centre[[first, second]] -= arm
-            rise = rng.uniform(-4, 4)
-            ends = []
-            for share in np.arange(1, count + 1) / count:
-                end = here + rise * share * np.eye(3)[third]
-                c, s = math.cos(share * sweep), math.sin(share * sweep)
-                end[[first, second]] = centre[[first, second]] + (
-                    c * arm[0] - s * arm[1],
-                    s * arm[0] + c * arm[1],
-                )
-                ends.append(end)
-            mine.append(arc(*ends[-1], centre=tuple(centre), sweep=sweep, plane=plane, frame=frame))
-            theirs += [
-                arc(*end, centre=tuple(centre), sweep=sweep / count, plane=plane, frame=frame) for end in ends
-            ]
-            here = ends[-1]
-        else:
-            there = rng.uniform(-60, 60, 3)
-            move = rapid if kind == "rapid" else line
-            mine.append(move(*there, frame=frame))
-            shares = np.arange(1, count + 1)[:, None] / count
-            theirs += [move(*end, frame=frame) for end in here + shares * (there - here) + off]
-            here = there
-        groups.append(groups[-1] + count)
-    return toolpath(*mine, frames=tools), toolpath(*theirs, frames=tools), groups
-
-
-def both(seed: int, model: Known, block: int | None = None) -> tuple[Array, Array]:
+def both(seed: int, model: Known) -> tuple[Array, Array]:
     """What is stated of a drawn program, and what the judge finds."""
     path, corrected, groups = drawn(seed)
     shift = np.random.default_rng(seed).uniform(-0.01, 0.01, 3)
