@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Array, Index, Mask
-from olp.core.geometry import arc_distance, arc_points, quarter_shares, segment_distance
+from olp.core.geometry import arc_distance, arc_points, arms, segment_distance
 from olp.core.toolpath import Flag, Kind, Toolpath
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.reversal import play_after, play_interval, play_states, plays
@@ -26,8 +26,9 @@ Single = npt.NDArray[np.float32]
 _BLOCK = 1 << 15
 #: steps over the box at most in which an unknown axis is tried, and two of them
 _MOST_PROBES = (1 << 10, 1 << 7)
-#: samples of an arc move at the least
+#: samples of an arc move at the least, and of a move at the most
 _ARC_STEPS = 8
+_MOST_STEPS = 1 << 12
 #: rad between samples of an arc at most. What is off in one direction counts across the arc, and the largest
 #: of it is then missed by 0.12 %.
 _ARC_ANGLE_RAD = 0.1
@@ -116,7 +117,7 @@ def _unknown_side(path: Toolpath, groups: Index, model: ErrorModel) -> Array:
     low, high = play_interval(path.end_mm, width)
     half = (high - low) / 2
     half[np.isnan(path.end_mm)] = 0.0
-    rows = np.flatnonzero((half > 0.0).any(axis=1) & (np.nan_to_num(width) > 0.0).any(axis=1))
+    rows = np.flatnonzero((half > 0.0).any(axis=1))
     unknown = np.zeros(len(path))
     if rows.size:
         tool = path.tool_mm()
@@ -162,7 +163,7 @@ class Tracer:
         tracer = Tracer(path, path.end_mm, path, np.arange(len(path)), model, 1.0)
         start, end, tool = path.starts_mm(), path.end_mm, path.tool_mm()
         length = np.nan_to_num(np.sqrt(((end - start) ** 2).sum(axis=1)))
-        arc = tracer.path_arc if tracer.path_arc is not None else np.full(len(path), -1)
+        arc = tracer.path_arc
         rows = np.flatnonzero(arc >= 0)
         if rows.size:
             radius = np.sqrt(np.nansum((start[rows] - path.arcs.centre_mm) ** 2, axis=1))
@@ -193,17 +194,15 @@ class Tracer:
     def _quarters(self, start: Array, arc: Index, rows: Index) -> tuple[Index, Array]:
         """The arcs among moves `rows` that pass a quadrant between their ends, and the shares of them."""
         arcs, which = self.path.arcs, arc[rows]
-        size = np.abs(arcs.sweep_rad[which])
-        found = []
-        for turn in range(int(size.max() // (2 * np.pi)) + 1):
-            for quarter in range(4):
-                share = quarter_shares(
-                    start[rows], arcs.centre_mm[which], arcs.plane[which], arcs.sweep_rad[which], quarter
-                )
-                share = share + 2 * np.pi * turn / size
-                some = np.flatnonzero((share > 0.0) & (share < 1.0))
-                found.append((rows[some], share[some]))
-        return np.concatenate([of for of, _ in found]), np.concatenate([share for _, share in found])
+        size, sign = np.abs(arcs.sweep_rad[which]), np.sign(arcs.sweep_rad[which])
+        along, across = arms(start[rows], arcs.centre_mm[which], arcs.plane[which])
+        first = np.mod(-sign * np.arctan2(across, along), np.pi / 2)
+        count = np.maximum(np.ceil((size - first) / (np.pi / 2)), 0).astype(np.int64)
+        of = np.repeat(np.arange(len(rows)), count)
+        quarter = np.arange(len(of)) - (np.cumsum(count) - count)[of]
+        share = (first[of] + quarter * np.pi / 2) / size[of]
+        within = (share > 0.0) & (share < 1.0)
+        return rows[of[within]], share[within]
 
     def block(self, a: int, b: int, waypoint: Single, worst: Single, bend: Single) -> None:
         """Fill the columns of nominal moves a..b."""
@@ -221,22 +220,21 @@ class Tracer:
         delta = np.where(np.isnan(end), 0.0, end - start)
         steps = np.ones(last - first, np.int64)
         known = np.asarray(np.isfinite(delta).all(axis=1))
-        cut = known & (path.kind[first:last] != Kind.RAPID)
+        arc = self.path_arc[first:last]
+        cut = known & (path.kind[first:last] != Kind.RAPID) & (arc < 0)
         which = longer(delta, self.clear_mm)
         which = which[cut[which]]
         if which.size:
             steps[which] = steps_needed(
-                self.model, delta[which], tool if tool.ndim == 1 else tool[which], self.bend, at_most=1 << 12
-            )
-        arc = self.path_arc[first:last] if self.path_arc is not None else np.full(last - first, -1)
-        steps[(arc >= 0) & known] = np.maximum(steps[(arc >= 0) & known], _ARC_STEPS)
-        if arc.max(initial=-1) >= 0:
-            self._arc_steps(arc, known, steps, start, tool)
+                self.model, delta[which], tool if tool.ndim == 1 else tool[which], self.bend,
+                at_most=_MOST_STEPS,
+            )  # fmt: skip
+        curved = np.flatnonzero((arc >= 0) & known)
+        if curved.size:
+            steps[curved] = self._arc_steps(arc[curved], start[curved], delta[curved], tool, curved)
         reached, inner = self._samples(start, end, arc, steps, known, tool, path.kind[first:last])
         # ends of parts inside a nominal move lie along it, too
-        last_part = np.zeros(last - first, bool)
-        last_part[ends[ends >= 0]] = True
-        cuts = np.flatnonzero(~last_part)
+        cuts = np.setdiff1d(np.arange(last - first), ends)
         tips = np.concatenate((self.before[None], reached))
         self._ends(a, b, tips, ends, waypoint)
         worst[:] = waypoint
@@ -266,8 +264,7 @@ class Tracer:
             before = self.play
             actual = self.actual(point, tool if tool.ndim == 1 else tool[part])
             plays = self.plays
-            if before is None:
-                before = plays[0] if len(plays) else np.zeros(3)
+            before = plays[0] if before is None else before
             samples = _Inner(part[inside], share[inside], actual[inside])
             taken_up = self._turns(start, end, arc, part, share, np.vstack((before, plays)), tool, kind)
             return actual[~inside], samples.with_more(taken_up)
@@ -282,7 +279,8 @@ class Tracer:
         """Samples where an axis that turned round has taken up its backlash: from there on the tip is off by
         all of it. `plays` are those before and at each of the samples `share` of `part`."""
         turned = np.flatnonzero((plays[1:] != plays[:-1]).any(axis=1) & (kind[part] != Kind.RAPID))
-        early = np.where(np.diff(part, prepend=-1) != 0, 0.0, np.concatenate((share[:1], share[:-1])))[turned]
+        # a move ends with its sample at 1, and the next one begins at 0
+        early = (np.concatenate(([1.0], share[:-1])) % 1.0)[turned]
         part, span = part[turned], share[turned] - early
         old, new = plays[:-1][turned], plays[1:][turned]
         begin = self._at(start, end, arc, part, early)
@@ -340,19 +338,18 @@ class Tracer:
             starts = _Inner(begin[rows], np.zeros(len(rows)), tips[begin[rows]])
             self._along(a, b, first, owner, starts, worst)
 
-    def _arc_steps(self, arc: Index, known: Mask, steps: Index, start: Array, tool: Array) -> None:
-        rows = np.flatnonzero((arc >= 0) & known)
+    def _arc_steps(self, arc: Index, start: Array, delta: Array, tool: Array, rows: Index) -> Index:
+        """Steps of the moves `rows`, which are arcs."""
         arcs = self.path.arcs
-        centre = arcs.centre_mm[arc[rows]]
-        radius = np.sqrt(np.nansum((start[rows] - centre) ** 2, axis=1))
-        reach = np.minimum(radius * np.abs(arcs.sweep_rad[arc[rows]]), 2 * radius)
-        delta = np.repeat(reach[:, None], 3, axis=1)
-        part = tool if tool.ndim == 1 else tool[rows]
-        turns = np.ceil(np.abs(arcs.sweep_rad[arc[rows]]) / _ARC_ANGLE_RAD).astype(np.int64)
-        steps[rows] = np.maximum(
-            np.maximum(steps[rows], turns),
-            steps_needed(self.model, delta, part, self.bend, at_least=_ARC_STEPS, at_most=1 << 10),
-        )
+        radius = np.sqrt(np.nansum((start - arcs.centre_mm[arc]) ** 2, axis=1))
+        sweep = np.abs(arcs.sweep_rad[arc])
+        # no axis moves farther than the arc is long and wide, or than the helix rises
+        reach = np.maximum(np.minimum(radius * sweep, 2 * radius)[:, None], np.abs(delta))
+        needed = steps_needed(
+            self.model, reach, tool if tool.ndim == 1 else tool[rows], self.bend, at_least=_ARC_STEPS,
+            at_most=_MOST_STEPS,
+        )  # fmt: skip
+        return np.maximum(needed, np.ceil(sweep / _ARC_ANGLE_RAD).astype(np.int64))
 
     def actual(self, point: Array, tool: Array) -> Array:
         """Where the tip really is; keeps the play of the axes from call to call."""
@@ -379,9 +376,9 @@ class Tracer:
         of = owner[inner.part]
         actual = self._known(a + of, inner.actual)
         distance = segment_distance(actual, self._known(a + of, begin[of]), self._known(a + of, goal[of]))
-        arc = self.nominal_arc[a:b] if self.nominal_arc is not None else None
-        if arc is not None and arc.max(initial=-1) >= 0:
-            rows = np.flatnonzero(arc[of] >= 0)
+        arc = self.nominal_arc[a:b]
+        rows = np.flatnonzero(arc[of] >= 0)
+        if rows.size:
             which = arc[of[rows]]
             arcs = nominal.arcs
             shift = goal[of[rows]] - nominal.end_mm[a:b][of[rows]]
@@ -397,9 +394,8 @@ class Tracer:
     def _near(self, owner: Index, first: int, part: Index, share: Array, of: Index) -> Array:
         """Roughly where on its nominal arc each sample lies: by the angles of the arcs that it became."""
         turn = np.zeros(len(owner))
-        if self.path_arc is not None:
-            arc = self.path_arc[first : first + len(owner)]
-            turn[arc >= 0] = np.abs(self.path.arcs.sweep_rad[arc[arc >= 0]])
+        arc = self.path_arc[first : first + len(owner)]
+        turn[arc >= 0] = np.abs(self.path.arcs.sweep_rad[arc[arc >= 0]])
         total = np.bincount(owner, turn)
         before = np.cumsum(turn) - turn
         begin = np.cumsum(total) - total
@@ -439,10 +435,8 @@ class _Inner:
         return self.with_more(_Inner(cuts, np.ones(len(cuts)), reached[cuts]))
 
 
-def _arc_index(path: Toolpath) -> npt.NDArray[np.int64] | None:
+def _arc_index(path: Toolpath) -> Index:
     """(n,) index into the arcs of each move, -1 where it is none."""
-    if not len(path.arcs):
-        return None
     index = np.full(len(path), -1, np.int64)
     index[path.arcs.move] = np.arange(len(path.arcs))
     return index

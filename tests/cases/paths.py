@@ -151,6 +151,8 @@ class Known:
         return np.tile(self.backlash_mm, (len(axis_mm), 1)) if any(self.backlash_mm) else None
 
     def chord_bound(self, delta_mm: Array, tool_mm: Array) -> Array:
+        assert delta_mm.shape[1] == 3
+        assert tool_mm.shape in ((3,), delta_mm.shape)
         return self.curvature * (delta_mm**2).sum(axis=1) / 8
 
 

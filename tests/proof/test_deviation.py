@@ -174,6 +174,41 @@ def test_a_place_that_is_wholly_unknown_has_no_figure() -> None:
     assert got.path[[0, 2]] == pytest.approx([0.001, 0.005], rel=1e-5)
 
 
+def test_parts_between_count_along_the_axes_that_are_known() -> None:
+    """Z is not known at first: half a wave across a line and across an arc, 5 mm above nothing."""
+    moves = (
+        rapid(0, 0, NAN), line(50, 0, NAN), arc(50, 30, NAN, centre=(50, 15, NAN), sweep=math.pi),
+        rapid(50, 30, 5), line(0, 30, 5), line(0, 0, 5),
+    )  # fmt: skip
+    path = toolpath(*moves, start=(0.0, 0.0, NAN))
+    got = of(path, wave(1, 0, 0.01, 100.0))
+    # the sine at X 65, across the arc there and then along it
+    assert got.path[[0, 1, 3, 4, 5]] == pytest.approx([0.0, 0.01, 0.0, 0.01, 0.0], abs=1e-4)
+    angle = np.linspace(-math.pi / 2, math.pi / 2, 2001)
+    across = 0.01 * np.sin(2 * np.pi * (50 + 15 * np.cos(angle)) / 100) * np.sin(angle)
+    assert got.path[2] == pytest.approx(np.abs(across).max(), rel=0.01)
+    assert got.bend == pytest.approx([0.0, 0.01, 0.0, 0.0, 0.01, 0.0], abs=1e-4)
+    assert 1e3 * of(path, wave(2, 0, 0.01, 100.0)).path == pytest.approx([0, 0, 0, 0, 10, 0], abs=0.1)
+
+
+def test_the_first_cut_begins_where_the_path_does() -> None:
+    path = toolpath(line(25, 0, 0), line(25, 9, 0))
+    assert of(path, wave(1, 0, 0.01, 100.0, phase=math.pi / 2)).path == pytest.approx([0.01, 0.0], abs=1e-8)
+
+
+def test_a_group_without_moves_has_the_end_before_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A hole with a peck less: its last stroke ends where the one before it did."""
+    nominal = toolpath(rapid(0, 0, 0), line(0, 0, -5), line(0, 0, -7), line(0, 9, -7))
+    corrected = toolpath(rapid(0, 0, 0), line(0, 0.001, -5), line(0, 9, -7))
+    for block in (1, 2, 3, 9):
+        monkeypatch.setattr(deviation, "_BLOCK", block)
+        got = of(nominal, Known(), corrected, [0, 1, 1, 2])
+        assert got.waypoint == pytest.approx([0.0, 0.001, math.hypot(2.0, 0.001), 0.0])
+        assert got.path[:3] == pytest.approx([0.0, 0.001, math.hypot(2.0, 0.001)])
+        # from there the last cut begins
+        assert got.path[3] == pytest.approx(2.0, abs=1e-6)
+
+
 # -- from where an axis is unknown -----------------------------------------------------------------------
 
 PARTLY = (0.0, NAN, 0.0)
@@ -285,6 +320,55 @@ def test_a_turn_counts_where_the_backlash_is_taken_up() -> None:
     assert 1e3 * got.path[1:] == pytest.approx([5.0, 5.0, 5.0], abs=1e-5)
 
 
+def test_the_end_of_the_play_is_met_within_a_line() -> None:
+    """X turns round and takes up 10 um on the first 20 um of the cut: 15 um are off there in X, 5 um before
+    it, and nothing at its end."""
+
+    def error(axis_mm: Array) -> Array:
+        result = np.zeros(axis_mm.shape)
+        result[:, 0] = 0.01 - 0.00075 * axis_mm[:, 1]
+        return result
+
+    path = toolpath(rapid(0, 0, 0), rapid(20, 0, 0), line(10, 20, 0))
+    got = of(path, Known(error, backlash_mm=(0.01, 0.0, 0.0)))
+    assert 1e3 * got.path[2] == pytest.approx((15 - 0.015) * 2 / math.sqrt(5), abs=1e-3)
+    # and not along a rapid
+    path = toolpath(rapid(0, 0, 0), rapid(20, 0, 0), rapid(10, 20, 0))
+    assert 1e3 * of(path, Known(error, backlash_mm=(0.01, 0.0, 0.0))).path[2] == pytest.approx(0.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("plane", (0, 1, 2))
+@pytest.mark.parametrize(("begin", "sweep", "passed"), [
+    (0.3, 1.2, ()), (0.3, 1.3, (1,)), (0.3, -0.2, ()), (0.3, -0.4, (0,)), (0.0, 1.6, (1,)),
+    (-0.1, 9.0, (0, 1, 2, 3, 4, 5)), (2.0, -9.0, (1, 0, -1, -2, -3, -4)), (3.0, 3.0, (2, 3)),
+])  # fmt: skip
+def test_with_backlash_an_arc_is_sampled_where_an_axis_turns_round(
+    plane: int, begin: float, sweep: float, passed: tuple[int, ...]
+) -> None:
+    first, second = [(0, 1), (2, 0), (1, 2)][plane]
+
+    def at(angle: float) -> np.ndarray:
+        place = np.zeros(3)
+        place[[first, second]] = 3 + 10 * math.cos(angle), 4 + 10 * math.sin(angle)
+        return place
+
+    centre = np.zeros(3)
+    centre[[first, second]] = 3, 4
+    move = arc(*at(begin + sweep), centre=tuple(centre), sweep=sweep, plane=plane)
+    path = toolpath(rapid(*at(begin)), move, rapid(*at(0)), line(*at(1)), start=tuple(at(begin)))
+    model = Known(backlash_mm=(0.01, 0.01, 0.01))
+    of(path, model)
+    asked = next(points for points, _ in model.asked if len(points) > 8)
+    steps = 8
+    while steps < abs(sweep) / 0.1:
+        steps = steps * 2 if steps * 2 < abs(sweep) / 0.1 else math.ceil(abs(sweep) / 0.1)
+    expected = [at(begin), *(at(begin + sweep * k / steps) for k in range(1, steps + 1)), at(0), at(1)]
+    expected += [at(quarter * math.pi / 2) for quarter in passed]
+    key = np.round(np.array(expected), 6) + 0.0
+    got = np.round(asked, 6) + 0.0
+    np.testing.assert_allclose(got[np.lexsort(got.T)], key[np.lexsort(key.T)], atol=2e-6)
+
+
 # -- against the slow judge ------------------------------------------------------------------------------
 
 
@@ -309,6 +393,24 @@ def test_with_backlash_too(seed: int) -> None:
     model.backlash_mm = ((0.03, 0.0, 0.0), (0.02, 0.03, 0.01))[seed % 2]
     stated, largest = both(seed, model)
     assert stated == pytest.approx(largest, rel=0.005, abs=1.5e-4)
+
+
+@pytest.mark.parametrize("block", (1, 2, 3))
+def test_blocks_of_a_path_with_an_unknown_axis_do_not_matter(
+    block: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    moves = (
+        rapid(0, 0, NAN), line(50, 0, NAN), arc(50, 30, NAN, centre=(50, 15, NAN), sweep=math.pi),
+        rapid(50, 30, 5), line(0, 30, 5), arc(0, 0, 5, centre=(0, 15, 5), sweep=math.pi), line(0, 0, NAN),
+        line(30, 0, NAN),
+    )  # fmt: skip
+    path = toolpath(*moves, start=(0.0, 0.0, NAN))
+    whole = of(path, wave(1, 0, 0.01, 70.0))
+    assert whole.path.min() >= 0.0
+    monkeypatch.setattr(deviation, "_BLOCK", block)
+    parts = of(path, wave(1, 0, 0.01, 70.0))
+    for name in ("waypoint", "path", "bend", "side"):
+        np.testing.assert_array_equal(getattr(parts, name), getattr(whole, name))
 
 
 @pytest.mark.parametrize("block", (1, 3))
@@ -343,6 +445,49 @@ def test_samples_of_an_arc_are_a_tenth_of_a_radian_apart(sweep: float, count: in
     assert len(angle) - 1 >= abs(sweep) / 0.1
     assert np.diff(angle).max() < 0.1 + 1e-9
     assert len(angle) - 1 <= count
+
+
+@pytest.mark.parametrize(
+    ("move", "count"),
+    [(line(20, 0, 0), 4096), (rapid(20, 0, 0), 1), (arc(0, 10, 0, centre=(0, 0, 0), sweep=1.5), 4096)],
+)
+def test_what_bends_much_is_sampled_so_often_and_no_more(move: Move, count: int) -> None:
+    start = (10.0, 0.0, 0.0)
+    points = sampled(toolpath(rapid(*start), move, start=start), Known(curvature=1e9))
+    assert len(np.unique(points, axis=0)) - 1 == count
+
+
+@pytest.mark.parametrize(("length", "count"), [(4.0, 1), (4.1, 2), (8.0, 2), (8.1, 4), (16.1, 8)])
+def test_a_line_is_halved_until_it_bends_no_more_than_that(length: float, count: int) -> None:
+    """An error with a curvature of 1/20000 mm leaves its chord by 0.1 um on 4 mm."""
+    points = sampled(toolpath(rapid(0, 0, 0), line(length, 0, 0)), Known(curvature=5e-5))
+    assert np.unique(points[:, 0]) == pytest.approx(np.linspace(0, length, count + 1))
+
+
+@pytest.mark.parametrize(
+    ("end", "sweep", "count"),
+    [
+        ((16, 0, 0), math.pi, 32),
+        ((16, 0, 32), math.pi, 64),
+        ((0, 0, 0), 2 * math.pi, 63),
+        ((8, -8, 0), math.pi / 2, 32),
+    ],
+)
+def test_an_arc_is_halved_until_it_bends_no_more_than_that(
+    end: tuple[float, ...], sweep: float, count: int
+) -> None:
+    """As if each axis moved as far as the arc is wide, which is 16 mm here, or as the helix rises."""
+    path = toolpath(rapid(0, 0, 0), arc(*end, centre=(8, 0, 0), sweep=sweep))
+    points = sampled(path, Known(curvature=9e-4))
+    assert len(np.unique(np.round(points, 7), axis=0)) - (end != (0, 0, 0)) == count
+
+
+def test_moves_with_other_tools_are_sampled_together() -> None:
+    frames = (Frame(), Frame(tool_mm=(0.0, 300.0, 0.0)), Frame(tool_mm=(0.0, 0.0, -400.0)))
+    turn = arc(0, 20, 0, centre=(0, 10, 0), sweep=-math.pi, frame=2)
+    moves = (rapid(0, 0, 0), line(50, 0, 0, frame=1), rapid(0, 0, 0, frame=2), turn)
+    got = of(toolpath(*moves, frames=frames), Known(curvature=1e-4))
+    assert got.path == pytest.approx([0.0, 300 * PER_TOOL_MM, 400 * PER_TOOL_MM, 400 * PER_TOOL_MM], rel=1e-4)
 
 
 # -- the trace of a simulation ---------------------------------------------------------------------------
