@@ -87,7 +87,7 @@ def _radial(lap: Array, radius: float) -> Array:
     """(n,) distance from the centre of the least-squares circle, minus the nominal radius."""
     system = np.column_stack((2.0 * lap, np.ones(len(lap))))
     x, y, _ = np.linalg.lstsq(system, (lap * lap).sum(axis=1), rcond=None)[0]
-    return np.asarray(np.hypot(lap[:, 0] - x, lap[:, 1] - y) - radius, float)
+    return np.asarray(np.hypot(lap[:, 0] - x, lap[:, 1] - y) - radius)
 
 
 def _diagonals(model: ErrorModel, tool: Array, digit: float) -> dict[str, Any]:

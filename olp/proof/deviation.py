@@ -51,7 +51,7 @@ def cutting_moves(path: Toolpath) -> Mask:
     nor to a touch whose path the control chooses."""
     own = (path.kind == Kind.PROBE) & ((path.flag & np.uint8(Flag.WHOLE)) != 0)
     cutting = (path.kind != Kind.RAPID) & ((path.flag & np.uint8(Flag.CYCLE)) == 0)
-    return np.asarray(cutting & ~own, bool)
+    return np.asarray(cutting & ~own)
 
 
 def measure(
@@ -132,7 +132,7 @@ def _unknown_side(path: Toolpath, groups: Index, model: ErrorModel) -> Array:
     largest = np.maximum(unknown, np.concatenate((unknown[:1], unknown[:-1])))
     first = np.concatenate(([0], groups[:-1] + 1))
     result = np.maximum(largest[groups], largest[np.minimum(first, len(path) - 1)])
-    return np.asarray(result, float)
+    return np.asarray(result)
 
 
 class Tracer:
@@ -320,7 +320,7 @@ class Tracer:
         """(3,) where the tip is before the first move."""
         start = np.array(self.path.start_mm)[None]
         tool = self.path.tool_mm(0, 1) if len(self.path) else np.zeros(3)
-        return np.asarray((start + self.model.error(start, tool))[0], float)
+        return np.asarray((start + self.model.error(start, tool))[0])
 
     def _starts(
         self, a: int, b: int, first: int, owner: Index, tips: Array, waypoint: Single, worst: Single
@@ -400,7 +400,7 @@ class Tracer:
         before = np.cumsum(turn) - turn
         begin = np.cumsum(total) - total
         place = before[part] - begin[of] + share * turn[part]
-        return np.asarray(place / np.maximum(total[of], 1e-12), float)
+        return np.asarray(place / np.maximum(total[of], 1e-12))
 
     def _bend(self, a: int, tips: Array, inner: _Inner, owner: Index, curved: Mask, bend: Single) -> None:
         """How far the samples of straight parts leave the chord between the actual ends of their part, which

@@ -31,8 +31,9 @@ def test_a_corner_that_only_just_fits_is_refused_once_it_does_not() -> None:
         with pytest.raises(ProgramError) as caught:
             check_contours(pocket(10.01), written, groups)
         assert str(caught.value) == (
-            "40: the control would refuse this block once corrected: a cutter radius of 5 mm does not fit into "
-            "its corners, and uncorrected it only just fits; make the block longer, or use a smaller cutter"
+            "40: the control would refuse this block once corrected: a cutter radius of 5 mm does not fit "
+            "into its corners, and uncorrected it only just fits; make the block longer, or use a smaller "
+            "cutter"
         )
         assert (caught.value.line, caught.value.code) == (40, "OLP561")
 

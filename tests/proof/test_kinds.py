@@ -265,10 +265,10 @@ def test_each_kind_of_change_is_refused_with_both_lines(
         # other moves of a hole are compared as one
         ((START, *DRILL, GONE), (START, *DRILL, *DRILL[1:], GONE), [0, 1, 2, 5, 6],
          (DRILLED, (hole(1, 6, r=5.0, z=-5.0),)), None),
-        ((START, *DRILL, GONE), (START, *DRILL, GONE), [0, 1, 2, 3, 4], ((hole(2, 4, r=5.0, z=-5.0),), DRILLED),
-         (2, f"line 2 {NO_DRILL}")),
-        ((START, *DRILL, GONE), (START, *DRILL, GONE), [0, 1, 2, 3, 4], (DRILLED, (hole(1, 3, r=5.0, z=-5.0),)),
-         None),
+        ((START, *DRILL, GONE), (START, *DRILL, GONE), [0, 1, 2, 3, 4],
+         ((hole(2, 4, r=5.0, z=-5.0),), DRILLED), (2, f"line 2 {NO_DRILL}")),
+        ((START, *DRILL, GONE), (START, *DRILL, GONE), [0, 1, 2, 3, 4],
+         (DRILLED, (hole(1, 3, r=5.0, z=-5.0),)), None),
         ((START, *DRILL, GONE), (START, CUT, *DRILL, GONE), [0, 2, 3, 4, 5],
          (DRILLED, (hole(2, 5, r=5.0, z=-5.0),)), (2, f"line 20 {FEEDS}")),
         # without holes in one of them every move counts

@@ -205,6 +205,12 @@ def plain(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(matching._Alignment, "_window", in_doubt)
 
 
+@pytest.fixture
+def at_once(plain: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """So does a search for the end of one move alone."""
+    monkeypatch.setattr(matching._Alignment, "_plain_split", in_doubt)
+
+
 #: A step before each cut, and the last one split.
 STEPS = (
     rapid(0, 0, 0), line(10, 0, 0), line(10.004, 0, 0), line(20, 0, 0), line(20, 0.004, 0), line(20, 5, 0),
@@ -213,7 +219,7 @@ STEPS = (
 CUTS = (rapid(0, 0, 0), line(10, 0, 0), line(20, 0, 0), line(20, 20, 0), rapid(20, 20, 9))
 
 
-@pytest.mark.usefixtures("plain")
+@pytest.mark.usefixtures("at_once")
 @pytest.mark.parametrize("seed", range(5))
 def test_parts_of_lines_and_arcs_in_all_planes_are_in_no_doubt(seed: int) -> None:
     nominal, corrected, groups = drawn(seed, 40)
@@ -289,7 +295,7 @@ def test_a_place_that_is_unknown_in_both_is_as_meant(plain: None) -> None:
     assert ends(nominal, corrected) == [0, 1, 3, 6, 7, 8, 9, 11]
 
 
-@pytest.mark.usefixtures("plain")
+@pytest.mark.usefixtures("at_once")
 @pytest.mark.parametrize("turns", (1, 3))
 @pytest.mark.parametrize("plane", (0, 1, 2))
 def test_whole_circles_end_where_their_turns_end(turns: int, plane: int) -> None:
@@ -384,6 +390,61 @@ def test_parts_beyond_the_guess_by_length_are_found_one_by_one() -> None:
     along = [line(x, 0, 0) for x in (10, 40, 10, 40, 10, 40, 10, 40, 50)]
     corrected = toolpath(rapid(0, 0, 0), *along, line(50, 20, 0), line(50, 50, 0), line(0, 50, 0))
     assert ends(nominal, corrected) == [0, 9, 11, 12]
+
+
+@pytest.mark.usefixtures("at_once")
+@pytest.mark.parametrize("plane", (0, 1, 2))
+@pytest.mark.parametrize(("low", "high"), [(500.0, 503.0), (-500.0, -440.0), (0.0, 60.0)])
+def test_the_length_of_a_helix_is_that_of_its_turn_and_its_rise(plane: int, low: float, high: float) -> None:
+    """In 20 parts, behind one and before two lines in 20 parts."""
+    roll = [(0, 1, 2), (2, 0, 1), (1, 2, 0)][plane]
+
+    def at(*values: float) -> tuple[float, ...]:
+        return tuple(float(values[roll.index(axis)]) for axis in range(3))
+
+    def turned(share: float) -> tuple[float, ...]:
+        angle = 1.5 * math.pi * share
+        return at(20 * math.sin(angle), 20 - 20 * math.cos(angle), low + share * (high - low))
+
+    def lines(begin: tuple[float, ...], end: tuple[float, ...]) -> list[Move]:
+        ends = np.array(begin) + np.outer(np.arange(1, 21) / 20, np.subtract(end, begin))
+        return [line(*one) for one in ends.tolist()]
+
+    corners = at(-40, 0, low), at(0, 0, low), turned(1.0), at(0, 90, high), at(0, 90, low)
+    more = {"centre": at(0, 20, 0), "plane": plane}
+    nominal = toolpath(
+        rapid(*corners[0]), line(*corners[1]), arc(*corners[2], sweep=1.5 * math.pi, **more),
+        line(*corners[3]), line(*corners[4]), start=corners[0],
+    )  # fmt: skip
+    parts = [arc(*turned(k / 20), sweep=0.075 * math.pi, **more) for k in range(1, 21)]
+    corrected = toolpath(
+        rapid(*corners[0]), *lines(corners[0], corners[1]), *parts, *lines(corners[2], corners[3]),
+        *lines(corners[3], corners[4]), start=corners[0],
+    )  # fmt: skip
+    assert ends(nominal, corrected) == [0, 20, 40, 60, 80]
+
+
+@pytest.mark.parametrize("written", (rapid(10, 5, 0), rapid(10, 0, NAN), rapid(NAN, NAN, 0)))
+def test_an_axis_that_is_unknown_in_one_of_them_is_far_off(
+    written: Move, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(matching._Alignment, "_window", in_doubt)
+    meant = rapid(10, NAN, 0)
+    tail = rapid(0, 0, 0), line(5, 0, 0), line(9, 0, 0)
+    nominal = toolpath(meant, tail[0], tail[2])
+    assert ends(nominal, toolpath(meant, *tail)) == [0, 1, 3]
+    with pytest.raises(AssertionError, match="searched"):
+        ends(nominal, toolpath(written, *tail))
+
+
+def test_what_is_exactly_so_far_off_is_in_doubt(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(matching._Alignment, "_window", in_doubt)
+    nominal = toolpath(rapid(0, 0, 0), line(16, 0, 0), line(16, 16, 0))
+    for part, end in ((line(8, 0.0625, 0), line(16, 0, 0)), (line(8, 0, 0), line(16, 0, 0.0625))):
+        corrected = toolpath(rapid(0, 0, 0), part, end, line(16, 16, 0))
+        assert ends(nominal, corrected, near_mm=0.0626) == [0, 2, 3]
+        with pytest.raises(AssertionError, match="searched"):
+            ends(nominal, corrected, near_mm=0.0625)
 
 
 # -- what is looked at in one go -------------------------------------------------------------------------

@@ -220,8 +220,8 @@ def test_a_cut_whose_error_is_not_known_is_refused_with_its_line() -> None:
     with pytest.raises(ProgramError) as caught:
         proved(path, model=Known(lost))
     assert str(caught.value) == (
-        "7: the deviation of this move cannot be computed: where the corrected program commands it, the error "
-        "is not known; correct the nominal program again, or give start_mm in the job file"
+        "7: the deviation of this move cannot be computed: where the corrected program commands it, the "
+        "error is not known; correct the nominal program again, or give start_mm in the job file"
     )
     assert (caught.value.line, caught.value.code) == (7, "OLP561")
 
