@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -395,6 +396,35 @@ def test_with_backlash_too(seed: int) -> None:
     assert stated == pytest.approx(largest, rel=0.005, abs=1.5e-4)
 
 
+@pytest.mark.parametrize("plane", (0, 1, 2))
+@pytest.mark.parametrize("turns", (1.0, -2.5, 3.0))
+def test_helices_of_several_turns_count_turn_by_turn(plane: int, turns: float) -> None:
+    """In parts of other lengths, one of which lies 30 um aside at the height of another turn."""
+    first, second, third = [(0, 1, 2), (2, 0, 1), (1, 2, 0)][plane]
+
+    def at(share: float, radius: float = 20.0) -> tuple[float, ...]:
+        place, angle = np.zeros(3), 0.4 + 2 * math.pi * turns * share
+        place[[first, second, third]] = radius * math.cos(angle), radius * math.sin(angle), 12 * share
+        return tuple(place.tolist())
+
+    def part(begin: float, end: float) -> Move:
+        centre = np.zeros(3)
+        centre[third] = 12 * begin
+        sweep = 2 * math.pi * turns * (end - begin)
+        return arc(*at(end, 20.03 if end == 0.6 else 20.0), centre=tuple(centre), sweep=sweep, plane=plane)
+
+    nominal = toolpath(rapid(*at(0)), part(0, 1), line(*at(0)), start=at(0))
+    shares = (0, 0.15, 0.35, 0.6, 1)
+    parts = [part(a, b) for a, b in itertools.pairwise(shares)]
+    corrected = toolpath(rapid(*at(0)), *parts, line(*at(0)), start=at(0))
+    model = wave(third, first, 0.01, 70.0)
+    groups = [0, 4, 5]
+    got = of(nominal, model, corrected, groups)
+    largest = farthest(nominal, np.zeros(3), corrected, np.array(groups), model)
+    assert got.path == pytest.approx(largest, rel=0.01, abs=2e-4)
+    assert got.path[1] > 0.03
+
+
 @pytest.mark.parametrize("block", (1, 2, 3))
 def test_blocks_of_a_path_with_an_unknown_axis_do_not_matter(
     block: int, monkeypatch: pytest.MonkeyPatch
@@ -525,3 +555,13 @@ def test_a_trace_has_the_tool_and_the_play_of_each_move() -> None:
     assert move.tolist() == [0, 1, 1, 2, 2]
     assert tip[:, 0] == pytest.approx([0.0, 1.995, 3.995, 2.005, 0.005], abs=1e-9)
     assert tip[:, 2] == pytest.approx([0.0, 0.001, 0.001, 0.0, 0.0], abs=1e-9)
+
+
+def test_a_trace_of_a_helix_is_as_long_as_its_turn_or_its_chord() -> None:
+    """A quarter of a turn of 4 mm that rises by 30 mm, and one that rises by 1 mm."""
+    steep = arc(0, 4, 30, centre=(0, 0, 0), sweep=math.pi / 2)
+    path = toolpath(steep, arc(-4, 0, 31, centre=(0, 0, 30), sweep=math.pi / 2), start=(4.0, 0.0, 0.0))
+    tip, move = Tracer.trace(path, Known(), 3.0)
+    # sqrt(900 + 32) = 30.53 mm, and 6.28 mm, which is longer than its chord
+    assert np.bincount(move).tolist() == [11, 3]
+    assert tip[:, 2] == pytest.approx([*(30 * np.arange(1, 12) / 11), *(30 + np.arange(1, 4) / 3)])

@@ -378,3 +378,34 @@ def test_a_measured_line_above_is_above_whatever_was_predicted() -> None:
     assert got["measured_um"] == pytest.approx([NAN, 6.0, 9.0, NAN], nan_ok=True)
     assert got["measured_state"].tolist() == [SHOWN, SHOWN, SHOWN, SHOWN]
     assert got["state"].tolist() == [WITHIN, SHOWN, ABOVE, SHOWN]
+
+
+def test_exactly_what_is_allowed_is_within() -> None:
+    one = table((3, Counts.FEED, 1.5, 1.5))
+    exact = replace(one, allowed_mm=float(one.corrected[0]))
+    below = replace(one, allowed_mm=float(one.corrected[0]) * (1 - 1e-6))
+    for judged, over in ((exact, False), (below, True)):
+        assert judged.over.tolist() == [over]
+        states = judged.by_line()
+        assert [states[f"{name}state"][0] for name in ("", "uncorrected_", "corrected_")] == [int(over)] * 3
+        assert judged.groups(judged.operation)[0]["holds"] is not over
+        assert verdict(judged)["numerical"]["holds"] is not over
+
+
+def test_states_take_one_byte_a_line() -> None:
+    runs = Measured(("a",), MIXED.line, MIXED.tool, MIXED.operation, (np.arange(6.0),), 5.0)
+    columns = MIXED.with_measured(runs).by_line()
+    assert {columns[name].dtype for name in columns if name.endswith("state")} == {np.dtype(np.uint8)}
+    assert runs.by_line()["state"].dtype == np.uint8
+
+
+@pytest.mark.parametrize("name", ("corrected", "uncorrected"))
+def test_a_cut_without_a_figure_is_not_above(name: str) -> None:
+    """A stroke of a hole above its bottom."""
+    one = replace(table((3, Counts.HOLE, 0.5, 0.5)), **{name: np.array([NAN], np.float32)})
+    assert not one.over.any()
+    assert one.by_line()[f"{name}_state"].tolist() == [WITHIN]
+    assert math.isnan(one.by_line()[f"{name}_um"][0])
+    expected = {"corrected_um": 0.5, "uncorrected_um": 0.5} | {f"{name}_um": 0.0}
+    (group,) = one.groups(one.operation)
+    assert {key: group[key] for key in expected} == pytest.approx(expected)
