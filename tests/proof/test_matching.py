@@ -226,6 +226,12 @@ def test_parts_of_lines_and_arcs_in_all_planes_are_in_no_doubt(seed: int) -> Non
     assert ends(nominal, corrected) == groups
 
 
+@pytest.mark.usefixtures("at_once")
+def test_a_move_ends_with_the_first_that_is_near() -> None:
+    """Not with the step behind it, which is as near."""
+    assert ends(toolpath(*CUTS), toolpath(*STEPS)) == [0, 1, 3, 6, 7]
+
+
 @pytest.mark.usefixtures("plain")
 def test_the_tip_is_compared_with_where_the_part_lies() -> None:
     """An error of 0.2 mm and a zero that lies 0.2 mm off: the commands are as they were."""

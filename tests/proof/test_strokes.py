@@ -187,6 +187,14 @@ def test_a_stroke_counts_where_it_has_taken_up_its_backlash() -> None:
     assert got == pytest.approx(10.0 * (1 - 0.01 / 15), abs=0.001)
 
 
+def test_a_stroke_that_is_shorter_than_its_backlash_takes_up_a_part_of_it() -> None:
+    """8 um of 10 um: the tip is 8 um aside at its end."""
+    moves = [rapid(0, 0, -20), rapid(0, 0, 5, flag=CYCLE), line(0, 0, 4.992, flag=CYCLE)]
+    got = stated(moves, Leaning(backlash_mm=(0.0, 0.0, 0.01)), z=4.992)[1]
+    # and 3 um above the bottom, where the play is 0.6 of its range
+    assert got == pytest.approx(math.hypot(8.0, 3.0), abs=0.01)
+
+
 # -- what has no figure ----------------------------------------------------------------------------------
 
 
