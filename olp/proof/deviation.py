@@ -289,20 +289,15 @@ class Tracer:
         width = self.model.backlash_at(begin)
         assert width is not None
         needed = np.abs(new - old) / 2 * np.maximum(np.nan_to_num(width), 0.0)
-        found = _Inner(part[:0], early[:0], begin[:0])
-        for axis in range(3):
-            with np.errstate(divide="ignore", invalid="ignore"):
-                of_span = needed[:, axis] / np.abs(moved[:, axis])
-            rows = np.flatnonzero((new[:, axis] != old[:, axis]) & (of_span < 1.0))
-            if not rows.size:
-                continue
-            where = early[rows] + of_span[rows] * span[rows]
-            point = self._at(start, end, arc, part[rows], where)
-            play = play_after(old[rows], point - begin[rows], width[rows])
-            play[:, axis] = new[rows, axis]
-            error = self.model.error(point, tool if tool.ndim == 1 else tool[part[rows]], play)
-            found = found.with_more(_Inner(part[rows], where, point + error))
-        return found
+        with np.errstate(divide="ignore", invalid="ignore"):
+            of_span = needed / np.abs(moved)
+        rows, axis = np.nonzero((new != old) & (of_span < 1.0))
+        where = early[rows] + of_span[rows, axis] * span[rows]
+        point = self._at(start, end, arc, part[rows], where)
+        play = play_after(old[rows], point - begin[rows], width[rows])
+        play[np.arange(len(rows)), axis] = new[rows, axis]
+        error = self.model.error(point, tool if tool.ndim == 1 else tool[part[rows]], play)
+        return _Inner(part[rows], where, point + error)
 
     def _at(self, start: Array, end: Array, arc: Index, part: Index, share: Array) -> Array:
         """(m, 3) positions on moves at shares of them."""

@@ -376,9 +376,7 @@ def _groups(target: Array, mine: _Units, tip: Array, theirs: _Units, ends: Index
 def _first_stroke(target: Array, tip: Array) -> int:
     """With how many moves the corrected hole begins before the first of the nominal one: a rapid to the hole
     that the nominal program does not need."""
-    extra = len(tip) - len(target)
-    if extra <= 0:
-        return 0
-    few = min(2, len(target))
+    extra = max(len(tip) - len(target), 0)
+    few = min(2, len(target), len(tip))
     away = [np.abs(tip[k : k + few] - target[:few]).sum() for k in range(extra + 1)]
     return int(np.argmin(away))

@@ -197,6 +197,12 @@ def test_the_first_cut_begins_where_the_path_does() -> None:
     assert of(path, wave(1, 0, 0.01, 100.0, phase=math.pi / 2)).path == pytest.approx([0.01, 0.0], abs=1e-8)
 
 
+@pytest.mark.parametrize(("error_um", "um"), [(10.0, 0.0), (-10.0, 10.0)])
+def test_a_first_cut_that_begins_along_its_line_is_not_off(error_um: float, um: float) -> None:
+    model = Known(lambda axis_mm: 1e-3 * error_um * np.outer(1 - axis_mm[:, 0] / 25, (1.0, 0.0, 0.0)))
+    assert 1e3 * of(toolpath(line(25, 0, 0)), model).path == pytest.approx([um], abs=1e-5)
+
+
 def test_a_group_without_moves_has_the_end_before_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """A hole with a peck less: its last stroke ends where the one before it did."""
     nominal = toolpath(rapid(0, 0, 0), line(0, 0, -5), line(0, 0, -7), line(0, 9, -7))

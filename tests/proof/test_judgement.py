@@ -58,6 +58,11 @@ MIXED = table(
 )
 
 
+def test_the_kinds_of_counting_are_numbered_without_gaps() -> None:
+    """As they are in files of arrays."""
+    assert [int(kind) for kind in Counts] == list(range(7)) == sorted(judgement.REASONS)
+
+
 def test_what_cuts_counts_and_the_rest_is_shown() -> None:
     assert [bool(table((1, kind, 0.0, 0.0)).judged[0]) for kind in Counts] == [True] * 4 + [False] * 3
     assert MIXED.over.tolist() == [False, False, False, True, False, False]
