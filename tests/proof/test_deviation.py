@@ -257,19 +257,19 @@ def test_a_cut_with_two_unknown_axes_counts_along_the_third() -> None:
 
 
 def test_an_unknown_place_within_a_program_counts_too() -> None:
-    """Y is lost before line 4, at X 10: with its play, its tool, and where the zero lies."""
+    """Y is lost before line 4, as X goes back to 4 mm: with its play, its tool, and where the zero lies."""
     frames = (Frame(), Frame(tool_mm=(200.0, 0.0, 0.0)))
-    lost = rapid(10, NAN, 0, flag=int(Flag.CONTROL))
-    moves = (rapid(0, 0, 0), line(10, 0, 0), lost, line(10, 30, 0, frame=1), line(10, 40, 0, frame=1))
+    lost = rapid(4, NAN, 0, flag=int(Flag.CONTROL))
+    moves = (rapid(0, 0, 0), line(10, 0, 0), lost, line(4, 30, 0, frame=1), line(4, 40, 0, frame=1))
     path = toolpath(*moves, frames=frames)
     model = wave(0, 1, 0.02, 400.0)
     model.backlash_mm = (0.006, 0.0, 0.0)
-    # 20 um at the end of the box, 3 um behind, 2 um of the tool, and 5 um the zero
+    # 20 um at an end of the box, 3 um behind, 2 um of the tool, and 5 um the zero
     shift = np.array([-0.005, 0.0, 0.0])
     got = of(path, model, shift=shift)
-    assert got.path[3] == pytest.approx(0.02 - 0.003 + 0.002 + 0.005, abs=1e-5)
+    assert got.path[3] == pytest.approx(0.02 + 0.003 + 0.002 + 0.005, abs=1e-5)
     other = of(path, model, shift=-shift)
-    assert other.path[3] == pytest.approx(0.02 + 0.003 - 0.002 + 0.005, abs=1e-5)
+    assert other.path[3] == pytest.approx(0.02 + 0.003 + 0.002 - 0.005, abs=1e-5)
 
 
 def test_what_is_worse_than_the_box_remains() -> None:

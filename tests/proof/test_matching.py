@@ -226,6 +226,19 @@ def test_parts_of_lines_and_arcs_in_all_planes_are_in_no_doubt(seed: int) -> Non
     assert ends(nominal, corrected) == groups
 
 
+@pytest.mark.usefixtures("plain")
+def test_a_whole_circle_of_another_length_does_not_end_as_it_begins() -> None:
+    """Its parts go in both directions, so that the length of the path tells nothing."""
+    whole = arc(50, 0, 0, centre=(59, 0, 0), sweep=2 * math.pi)
+    parts = [
+        line(59 - 9 * math.cos(angle), -9 * math.sin(angle), 0) for angle in (1, 2, 1, 2, 1, 2, 1, 2, 3, 4)
+    ]
+    ahead, behind = (rapid(0, 0, 0), line(50, 0, 0)), line(50, 9, 0)
+    nominal = toolpath(*ahead, whole, behind)
+    corrected = toolpath(*ahead, line(50.003, 0, 0), *parts, whole, behind)
+    assert ends(nominal, corrected) == [0, 1, 13, 14]
+
+
 @pytest.mark.usefixtures("at_once")
 def test_a_move_ends_with_the_first_that_is_near() -> None:
     """Not with the step behind it, which is as near."""
