@@ -414,3 +414,18 @@ def test_a_cut_without_a_figure_is_not_above(name: str) -> None:
     expected = {"corrected_um": 0.5, "uncorrected_um": 0.5} | {f"{name}_um": 0.0}
     (group,) = one.groups(one.operation)
     assert {key: group[key] for key in expected} == pytest.approx(expected)
+
+
+def test_tool_zero_is_a_tool() -> None:
+    one = replace(table((3, Counts.FEED, 1.0, 1.0)), tool=np.array([0]))
+    assert [group["tool"] for group in one.groups(one.tool)] == [0]
+
+
+def test_a_tool_without_a_number_is_none_in_its_frames() -> None:
+    """Of a path without frames, and of one without moves."""
+    none = toolpath(frames=())
+    assert [len(part) for part in judgement.groups_of(none)] == [0, 0]
+    assert [len(part) for part in judgement.groups_of(toolpath())] == [0, 0]
+    tool, operation = judgement.groups_of(toolpath(line(1, 0, 0), line(2, 0, 0)))
+    assert (tool.tolist(), operation.tolist()) == ([-1, -1], [0, 0])
+    assert tool.dtype == operation.dtype == np.int64

@@ -309,3 +309,12 @@ def test_each_axis_of_a_move_left_uncorrected_has_its_end_or_its_distance() -> N
     assert checked(nominal, written, [0, 1, 2, 3]) is None
     written = (START, line(9.5, 0.5, 5), line(20.25, 20.5, 5, flag=PASS), GONE)
     assert checked(nominal, written, [0, 1, 2, 3]) == (3, f"line 3 {MOVED}")
+
+
+def test_exactly_so_many_digits_are_none() -> None:
+    digit_mm = 0.5 / 0.6
+    assert 0.6 * digit_mm == 0.5
+    nominal = (START, CUT, line(9, 9, 9, flag=PASS), GONE)
+    for off_mm, refused in ((0.5, None), (0.5000001, (3, f"line 3 {MOVED}"))):
+        written = (START, CUT, line(9, 9 + off_mm, 9, flag=PASS), GONE)
+        assert checked(nominal, written, [0, 1, 2, 3], digit_mm=digit_mm) == refused
