@@ -101,7 +101,7 @@ def _from_unknown(
             command[at][axis : axis + 1] if known[axis] else np.linspace(low, high, steps + 1)
             for axis, (low, high) in enumerate(box.tolist())
         ]
-        point = np.stack(np.meshgrid(*ranges, indexing="ij"), axis=-1).reshape(-1, 3)
+        point = np.stack(np.meshgrid(*ranges), axis=-1).reshape(-1, 3)
         meant = start[i] + target[i] - nominal.end_mm[i]
         play = None if play_of is None else np.broadcast_to(play_of[max(at - 1, 0)], point.shape)
         away = point + model.error(point, tool, play) - meant
@@ -218,10 +218,10 @@ class Tracer:
         owner = np.searchsorted(self.groups[a:b], np.arange(first, last))
         tool = path.tool_mm(first, last)
         delta = np.where(np.isnan(end), 0.0, end - start)
-        steps = np.ones(last - first, np.int64)
+        steps = np.ones(len(end), np.int64)
         known = np.asarray(np.isfinite(delta).all(axis=1))
         arc = self.path_arc[first:last]
-        cut = known & (path.kind[first:last] != Kind.RAPID) & (arc < 0)
+        cut = known & (path.kind[first:last] != Kind.RAPID)
         which = longer(delta, self.clear_mm)
         which = which[cut[which]]
         if which.size:
@@ -234,7 +234,7 @@ class Tracer:
             steps[curved] = self._arc_steps(arc[curved], start[curved], delta[curved], tool, curved)
         reached, inner = self._samples(start, end, arc, steps, known, tool, path.kind[first:last])
         # ends of parts inside a nominal move lie along it, too
-        cuts = np.setdiff1d(np.arange(last - first), ends)
+        cuts = np.setdiff1d(np.arange(len(end)), ends)
         tips = np.concatenate((self.before[None], reached))
         self._ends(a, b, tips, ends, waypoint)
         worst[:] = waypoint
