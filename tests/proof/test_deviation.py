@@ -128,6 +128,16 @@ def test_a_cut_begins_where_the_move_before_it_left_the_tip() -> None:
     assert got.path == pytest.approx([0.003, 0.003, 0.003, 0.0], abs=1e-8)
 
 
+def test_a_cut_begins_where_it_was_left_along_the_axes_that_are_known() -> None:
+    """The rapid to it ends 10 um aside, and Z is not known yet."""
+    tail = line(20, 0, NAN), rapid(20, 0, 5), line(0, 0, 5)
+    start = (0.0, 0.0, NAN)
+    nominal = toolpath(rapid(0, 0, NAN), *tail, start=start)
+    corrected = toolpath(rapid(0, 0.01, NAN), *tail, start=start)
+    got = of(nominal, Known(), corrected, [0, 1, 2, 3])
+    assert got.path == pytest.approx([0.01, 0.01, 0.0, 0.0], abs=1e-8)
+
+
 def test_steps_between_moves_belong_to_the_later_one() -> None:
     """A step of 2 um beside its line and one of 4 um beyond its end count at the ends of their parts."""
     nominal = toolpath(rapid(0, 0, 0), line(20, 0, 0), line(20, 30, 0))
@@ -567,7 +577,7 @@ def test_a_trace_of_a_helix_is_as_long_as_its_turn_or_its_chord() -> None:
     """A quarter of a turn of 4 mm that rises by 30 mm, and one that rises by 1 mm."""
     steep = arc(0, 4, 30, centre=(0, 0, 0), sweep=math.pi / 2)
     path = toolpath(steep, arc(-4, 0, 31, centre=(0, 0, 30), sweep=math.pi / 2), start=(4.0, 0.0, 0.0))
-    tip, move = Tracer.trace(path, Known(), 3.0)
+    tip, move = Tracer.trace(path, Known(), 2.0)
     # sqrt(900 + 32) = 30.53 mm, and 6.28 mm, which is longer than its chord
-    assert np.bincount(move).tolist() == [11, 3]
-    assert tip[:, 2] == pytest.approx([*(30 * np.arange(1, 12) / 11), *(30 + np.arange(1, 4) / 3)])
+    assert np.bincount(move).tolist() == [16, 4]
+    assert tip[:, 2] == pytest.approx([*(30 * np.arange(1, 17) / 16), *(30 + np.arange(1, 5) / 4)])
