@@ -19,17 +19,26 @@ CHECK = Page.of(
     "[back](../index.md), [out](https://example.org/a.md), [here](#its-end-x-now), [a.md.txt](b.mdx)\n\n"
     "| a | b |\n|---|---|\n| <1 | 2 |\n",
 )
-PAGES = {page.name: page for page in (INDEX, CHECK)}
+VIEW = Page.of("howto/view", "# View\n\nLast.\n")
+PAGES = {page.name: page for page in (INDEX, CHECK, VIEW)}
 FILES = site(PAGES, {"a.png": b"PNG"})
-FIRST, SECOND = (FILES[f"{name}.html"].decode() for name in PAGES)
+FIRST, SECOND, THIRD = (FILES[f"{name}.html"].decode() for name in PAGES)
 TITLES = (
     "The <code>olp</code> &amp; &lt;its&gt; &quot;papers&quot;",
     "Check a <code>&lt;program&gt;</code> &amp; <code>more</code>",
+    "View",
 )
 
 
 def test_a_site_has_a_page_each_its_pictures_its_style_and_a_search() -> None:
-    assert set(FILES) == {"style.css", "search.js", "index.html", "howto/check.html", "pictures/a.png"}
+    assert set(FILES) == {
+        "style.css",
+        "search.js",
+        "index.html",
+        "howto/check.html",
+        "howto/view.html",
+        "pictures/a.png",
+    }
     assert FILES["pictures/a.png"] == b"PNG"
 
 
@@ -41,12 +50,12 @@ def test_the_title_of_a_page_is_text(text: str, title: str) -> None:
     assert re.findall(r"<title>(.*)</title>", text) == [f"{title} - olp"]
 
 
-@pytest.mark.parametrize(("text", "up", "current"), [(FIRST, "", 0), (SECOND, "../", 1)])
+@pytest.mark.parametrize(("text", "up", "current"), [(FIRST, "", 0), (SECOND, "../", 1), (THIRD, "../", 2)])
 def test_a_page_links_all_others_by_group(text: str, up: str, current: int) -> None:
     """From its own folder, itself as the current one; titles are text, and code in them is code."""
-    mark = [" aria-current=page" * (k == current) for k in range(2)]
+    mark = [" aria-current=page" * (k == current) for k in range(3)]
     links = [f'<li><a href="{up}{name}.html"{mark[k]}>{TITLES[k]}</a></li>' for k, name in enumerate(PAGES)]
-    groups = [("Start", links[0]), ("Tutorials", ""), ("How to", links[1])]
+    groups = [("Start", links[0]), ("Tutorials", ""), ("How to", links[1] + links[2])]
     groups += [(title, "") for title in ("Reference", "Background", "Contributing")]
     expected = "".join(f"<h2>{title}</h2><ul>{link}</ul>" for title, link in groups)
     assert text.split("<summary>Pages</summary>\n")[1].split("\n</details>")[0] == expected
@@ -76,5 +85,6 @@ def test_the_search_holds_the_sections() -> None:
         ("index", "the-olp-its-papers", 'The `olp` & <its> "papers"'),
         ("howto/check", "check-a-program-more", "Check a `<program>` & `more`"),
         ("howto/check", "its-end-x-now", "Its end: `x` *now*"),
+        ("howto/view", "view", "View"),
     ]
-    assert {e["of"] for e in entries[1:]} == {"Check a `<program>` & `more`"}
+    assert {e["of"] for e in entries[1:3]} == {"Check a `<program>` & `more`"}
