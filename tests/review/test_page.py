@@ -148,7 +148,9 @@ def test_a_page_is_its_template_with_every_mark_filled(
     monkeypatch.setattr(pages, "_asset", texts.__getitem__)
     monkeypatch.setattr(pages, "_bundle", lambda: ("mesh<cat", "main.min.js"))
     monkeypatch.setattr(pages, "_licence", lambda: "<free> & 'open'")
-    parts = list(pages.page({"title": "<a>", "b": "<"}, b"DA@@TA", live=live))
+    # a page is not live unless it is asked for
+    more = {"live": True} if live else {}
+    parts = list(pages.page({"title": "<a>", "b": "<"}, b"DA@@TA", **more))
     assert b"".join(parts).decode() == (
         f"A&lt;a&gt;B{connect}C@@DATA@@äDmesh<catE&lt;free&gt; &amp; &#x27;open&#x27;F"
         '{"title":"\\u003ca>","b":"\\u003c"}GDA@@TAH<script>1<2</script>\n<script>@@CSS@@</script>I'
