@@ -87,7 +87,7 @@ def _radial(lap: Array, radius: float) -> Array:
     """(n,) distance from the centre of the least-squares circle, minus the nominal radius."""
     system = np.column_stack((2.0 * lap, np.ones(len(lap))))
     x, y, _ = np.linalg.lstsq(system, (lap * lap).sum(axis=1), rcond=None)[0]
-    return np.asarray(np.hypot(lap[:, 0] - x, lap[:, 1] - y) - radius, float)
+    return np.asarray(np.hypot(lap[:, 0] - x, lap[:, 1] - y) - radius)
 
 
 def _diagonals(model: ErrorModel, tool: Array, digit: float) -> dict[str, Any]:
@@ -97,9 +97,10 @@ def _diagonals(model: ErrorModel, tool: Array, digit: float) -> dict[str, Any]:
     box = np.asarray(model.box_mm, float)
     rows = []
     worst: dict[str, dict[str, float]] = {}
-    for name, signs in (("PPP", (1, 1, 1)), ("NPP", (-1, 1, 1)), ("PNP", (1, -1, 1)), ("NNP", (-1, -1, 1))):
-        low = np.where(np.array(signs) > 0, box[:, 0], box[:, 1])
-        high = np.where(np.array(signs) > 0, box[:, 1], box[:, 0])
+    for name in ("PPP", "NPP", "PNP", "NNP"):
+        # each axis goes in its positive or in its negative direction
+        positive = np.array([direction == "P" for direction in name])
+        low, high = np.where(positive, box[:, 0], box[:, 1]), np.where(positive, box[:, 1], box[:, 0])
         share = np.linspace(0.02, 0.98, (_TARGETS - 1) * _STEPS + 1)
         target = low + np.concatenate((share, share[-2::-1]))[:, None] * (high - low)
         along = (high - low) / np.linalg.norm(high - low)

@@ -32,4 +32,4 @@ def check_contours(nominal: Toolpath, written: Toolpath, groups: Index) -> None:
 def _new(nominal: Toolpath, written: Toolpath, groups: Index, seen: bool) -> Index:
     """Nominal moves that can be cut, but not as written."""
     mine = np.unique(np.searchsorted(groups, np.flatnonzero(gouging(written, seen=seen))))
-    return np.asarray(mine[~gouging(nominal, seen=seen)[mine]], np.int64)
+    return np.asarray(mine[~gouging(nominal, seen=seen)[mine]])

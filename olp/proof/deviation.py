@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Array, Index, Mask
-from olp.core.geometry import arc_distance, arc_points, segment_distance
+from olp.core.geometry import arc_distance, arc_points, arms, segment_distance
 from olp.core.toolpath import Flag, Kind, Toolpath
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.reversal import play_after, play_interval, play_states, plays
@@ -26,8 +26,9 @@ Single = npt.NDArray[np.float32]
 _BLOCK = 1 << 15
 #: steps over the box at most in which an unknown axis is tried, and two of them
 _MOST_PROBES = (1 << 10, 1 << 7)
-#: samples of an arc move at the least
+#: samples of an arc move at the least, and of a move at the most
 _ARC_STEPS = 8
+_MOST_STEPS = 1 << 12
 #: rad between samples of an arc at most. What is off in one direction counts across the arc, and the largest
 #: of it is then missed by 0.12 %.
 _ARC_ANGLE_RAD = 0.1
@@ -50,7 +51,7 @@ def cutting_moves(path: Toolpath) -> Mask:
     nor to a touch whose path the control chooses."""
     own = (path.kind == Kind.PROBE) & ((path.flag & np.uint8(Flag.WHOLE)) != 0)
     cutting = (path.kind != Kind.RAPID) & ((path.flag & np.uint8(Flag.CYCLE)) == 0)
-    return np.asarray(cutting & ~own, bool)
+    return np.asarray(cutting & ~own)
 
 
 def measure(
@@ -100,7 +101,7 @@ def _from_unknown(
             command[at][axis : axis + 1] if known[axis] else np.linspace(low, high, steps + 1)
             for axis, (low, high) in enumerate(box.tolist())
         ]
-        point = np.stack(np.meshgrid(*ranges, indexing="ij"), axis=-1).reshape(-1, 3)
+        point = np.stack(np.meshgrid(*ranges), axis=-1).reshape(-1, 3)
         meant = start[i] + target[i] - nominal.end_mm[i]
         play = None if play_of is None else np.broadcast_to(play_of[max(at - 1, 0)], point.shape)
         away = point + model.error(point, tool, play) - meant
@@ -116,7 +117,7 @@ def _unknown_side(path: Toolpath, groups: Index, model: ErrorModel) -> Array:
     low, high = play_interval(path.end_mm, width)
     half = (high - low) / 2
     half[np.isnan(path.end_mm)] = 0.0
-    rows = np.flatnonzero((half > 0.0).any(axis=1) & (np.nan_to_num(width) > 0.0).any(axis=1))
+    rows = np.flatnonzero((half > 0.0).any(axis=1))
     unknown = np.zeros(len(path))
     if rows.size:
         tool = path.tool_mm()
@@ -131,7 +132,7 @@ def _unknown_side(path: Toolpath, groups: Index, model: ErrorModel) -> Array:
     largest = np.maximum(unknown, np.concatenate((unknown[:1], unknown[:-1])))
     first = np.concatenate(([0], groups[:-1] + 1))
     result = np.maximum(largest[groups], largest[np.minimum(first, len(path) - 1)])
-    return np.asarray(result, float)
+    return np.asarray(result)
 
 
 class Tracer:
@@ -162,35 +163,46 @@ class Tracer:
         tracer = Tracer(path, path.end_mm, path, np.arange(len(path)), model, 1.0)
         start, end, tool = path.starts_mm(), path.end_mm, path.tool_mm()
         length = np.nan_to_num(np.sqrt(((end - start) ** 2).sum(axis=1)))
-        arc = tracer.path_arc if tracer.path_arc is not None else np.full(len(path), -1)
+        arc = tracer.path_arc
         rows = np.flatnonzero(arc >= 0)
         if rows.size:
             radius = np.sqrt(np.nansum((start[rows] - path.arcs.centre_mm) ** 2, axis=1))
             length[rows] = np.maximum(length[rows], radius * np.abs(path.arcs.sweep_rad))
         steps = np.maximum(np.ceil(length / step_mm), 1).astype(np.int64)
-        point, part, _ = tracer.points(start, end, arc, steps, np.isfinite(length))
+        point, part, _ = tracer.points(start, end, arc, steps)
         return tracer.actual(point, tool if tool.ndim == 1 else tool[part]), part
 
     def points(
-        self, start: Array, end: Array, arc: Index, steps: Index, known: Mask
+        self, start: Array, end: Array, arc: Index, steps: Index, turns: Mask | None = None
     ) -> tuple[Array, Index, Array]:
-        """Sample moves at equal steps: positions, the move of each sample, and its share of the move."""
+        """Sample moves at equal steps, and the arcs `turns` where an axis turns round, too: positions, the
+        move of each sample, and its share of the move."""
         part = np.repeat(np.arange(len(steps)), steps)
         offset = np.cumsum(steps) - steps
         share = (np.arange(len(part)) - offset[part] + 1) / steps[part]
+        if turns is not None and turns.any():
+            of, more = self._quarters(start, arc, np.flatnonzero(turns))
+            part, share = np.concatenate((part, of)), np.concatenate((share, more))
+            order = np.lexsort((share, part))
+            part, share = part[order], share[order]
         if len(part) == len(steps):
             return end, part, share
-        point = start[part] + share[:, None] * (end - start)[part]
-        point[offset + steps - 1] = end
-        curved = np.flatnonzero(arc[part] >= 0)
-        curved = curved[(share[curved] < 1) & known[part[curved]]]
-        if curved.size:
-            arcs, which = self.path.arcs, arc[part[curved]]
-            point[curved] = arc_points(
-                start[part[curved]], end[part[curved]], arcs.centre_mm[which], arcs.plane[which],
-                arcs.sweep_rad[which], share[curved],
-            )  # fmt: skip
+        point = self._at(start, end, arc, part, share)
+        point[share == 1.0] = end
         return point, part, share
+
+    def _quarters(self, start: Array, arc: Index, rows: Index) -> tuple[Index, Array]:
+        """The arcs among moves `rows` that pass a quadrant between their ends, and the shares of them."""
+        arcs, which = self.path.arcs, arc[rows]
+        size, sign = np.abs(arcs.sweep_rad[which]), np.sign(arcs.sweep_rad[which])
+        along, across = arms(start[rows], arcs.centre_mm[which], arcs.plane[which])
+        first = np.mod(-sign * np.arctan2(across, along), np.pi / 2)
+        count = np.maximum(np.ceil((size - first) / (np.pi / 2)), 0).astype(np.int64)
+        of = np.repeat(np.arange(len(rows)), count)
+        quarter = np.arange(len(of)) - (np.cumsum(count) - count)[of]
+        share = (first[of] + quarter * np.pi / 2) / size[of]
+        within = (share > 0.0) & (share < 1.0)
+        return rows[of[within]], share[within]
 
     def block(self, a: int, b: int, waypoint: Single, worst: Single, bend: Single) -> None:
         """Fill the columns of nominal moves a..b."""
@@ -206,29 +218,28 @@ class Tracer:
         owner = np.searchsorted(self.groups[a:b], np.arange(first, last))
         tool = path.tool_mm(first, last)
         delta = np.where(np.isnan(end), 0.0, end - start)
-        steps = np.ones(last - first, np.int64)
+        steps = np.ones(len(end), np.int64)
         known = np.asarray(np.isfinite(delta).all(axis=1))
+        arc = self.path_arc[first:last]
         cut = known & (path.kind[first:last] != Kind.RAPID)
         which = longer(delta, self.clear_mm)
         which = which[cut[which]]
         if which.size:
             steps[which] = steps_needed(
-                self.model, delta[which], tool if tool.ndim == 1 else tool[which], self.bend, at_most=1 << 12
-            )
-        arc = self.path_arc[first:last] if self.path_arc is not None else np.full(last - first, -1)
-        steps[(arc >= 0) & known] = np.maximum(steps[(arc >= 0) & known], _ARC_STEPS)
-        if arc.max(initial=-1) >= 0:
-            self._arc_steps(arc, known, steps, start, tool)
+                self.model, delta[which], tool if tool.ndim == 1 else tool[which], self.bend,
+                at_most=_MOST_STEPS,
+            )  # fmt: skip
+        curved = np.flatnonzero((arc >= 0) & known)
+        if curved.size:
+            steps[curved] = self._arc_steps(arc[curved], start[curved], delta[curved], tool, curved)
         reached, inner = self._samples(start, end, arc, steps, known, tool, path.kind[first:last])
         # ends of parts inside a nominal move lie along it, too
-        last_part = np.zeros(last - first, bool)
-        last_part[ends[ends >= 0]] = True
-        cuts = np.flatnonzero(~last_part)
+        cuts = np.setdiff1d(np.arange(len(end)), ends)
         tips = np.concatenate((self.before[None], reached))
         self._ends(a, b, tips, ends, waypoint)
         worst[:] = waypoint
         if len(inner.part) or len(cuts):
-            self._bend(a, reached, inner, owner, arc >= 0, bend)
+            self._bend(a, tips, inner, owner, arc >= 0, bend)
             self._along(a, b, first, owner, inner.with_ends(cuts, reached), worst)
         self._starts(a, b, first, owner, tips, waypoint, worst)
 
@@ -244,7 +255,8 @@ class Tracer:
     ) -> tuple[Array, _Inner]:  # fmt: skip
         """Where the tip really is at the end of each part, and at samples inside parts."""
         long = np.arange(len(end)) if self.has_play else np.flatnonzero(steps > 1)
-        point, part, share = self.points(start[long], end[long], arc[long], steps[long], known[long])
+        turns = (arc[long] >= 0) & known[long] if self.has_play else None
+        point, part, share = self.points(start[long], end[long], arc[long], steps[long], turns)
         part = long[part]
         inside = share < 1.0
         if self.has_play:
@@ -252,24 +264,24 @@ class Tracer:
             before = self.play
             actual = self.actual(point, tool if tool.ndim == 1 else tool[part])
             plays = self.plays
-            if before is None:
-                before = plays[0] if len(plays) else np.zeros(3)
+            before = plays[0] if before is None else before
             samples = _Inner(part[inside], share[inside], actual[inside])
-            turns = self._turns(start, end, arc, steps, part, share, np.vstack((before, plays)), tool, kind)
-            return actual[~inside], samples.with_more(turns)
+            taken_up = self._turns(start, end, arc, part, share, np.vstack((before, plays)), tool, kind)
+            return actual[~inside], samples.with_more(taken_up)
         part, share, point = part[inside], share[inside], point[inside]
         reached = self.actual(end, tool)
         return reached, _Inner(part, share, self.actual(point, tool if tool.ndim == 1 else tool[part]))
 
     def _turns(
-        self, start: Array, end: Array, arc: Index, steps: Index, part: Index, share: Array, plays: Array,
-        tool: Array, kind: npt.NDArray[np.uint8],
+        self, start: Array, end: Array, arc: Index, part: Index, share: Array, plays: Array, tool: Array,
+        kind: npt.NDArray[np.uint8],
     ) -> _Inner:  # fmt: skip
         """Samples where an axis that turned round has taken up its backlash: from there on the tip is off by
         all of it. `plays` are those before and at each of the samples `share` of `part`."""
         turned = np.flatnonzero((plays[1:] != plays[:-1]).any(axis=1) & (kind[part] != Kind.RAPID))
-        part, early = part[turned], share[turned] - 1.0 / steps[part[turned]]
-        span = share[turned] - early
+        # a move ends with its sample at 1, and the next one begins at 0
+        early = (np.concatenate(([1.0], share[:-1])) % 1.0)[turned]
+        part, span = part[turned], share[turned] - early
         old, new = plays[:-1][turned], plays[1:][turned]
         begin = self._at(start, end, arc, part, early)
         stop = self._at(start, end, arc, part, share[turned])
@@ -277,20 +289,15 @@ class Tracer:
         width = self.model.backlash_at(begin)
         assert width is not None
         needed = np.abs(new - old) / 2 * np.maximum(np.nan_to_num(width), 0.0)
-        found = _Inner(part[:0], early[:0], begin[:0])
-        for axis in range(3):
-            with np.errstate(divide="ignore", invalid="ignore"):
-                of_span = needed[:, axis] / np.abs(moved[:, axis])
-            rows = np.flatnonzero((new[:, axis] != old[:, axis]) & (of_span < 1.0))
-            if not rows.size:
-                continue
-            where = early[rows] + of_span[rows] * span[rows]
-            point = self._at(start, end, arc, part[rows], where)
-            play = play_after(old[rows], point - begin[rows], width[rows])
-            play[:, axis] = new[rows, axis]
-            error = self.model.error(point, tool if tool.ndim == 1 else tool[part[rows]], play)
-            found = found.with_more(_Inner(part[rows], where, point + error))
-        return found
+        with np.errstate(divide="ignore", invalid="ignore"):
+            of_span = needed / np.abs(moved)
+        rows, axis = np.nonzero((new != old) & (of_span < 1.0))
+        where = early[rows] + of_span[rows, axis] * span[rows]
+        point = self._at(start, end, arc, part[rows], where)
+        play = play_after(old[rows], point - begin[rows], width[rows])
+        play[np.arange(len(rows)), axis] = new[rows, axis]
+        error = self.model.error(point, tool if tool.ndim == 1 else tool[part[rows]], play)
+        return _Inner(part[rows], where, point + error)
 
     def _at(self, start: Array, end: Array, arc: Index, part: Index, share: Array) -> Array:
         """(m, 3) positions on moves at shares of them."""
@@ -308,7 +315,7 @@ class Tracer:
         """(3,) where the tip is before the first move."""
         start = np.array(self.path.start_mm)[None]
         tool = self.path.tool_mm(0, 1) if len(self.path) else np.zeros(3)
-        return np.asarray((start + self.model.error(start, tool))[0], float)
+        return np.asarray((start + self.model.error(start, tool))[0])
 
     def _starts(
         self, a: int, b: int, first: int, owner: Index, tips: Array, waypoint: Single, worst: Single
@@ -326,19 +333,18 @@ class Tracer:
             starts = _Inner(begin[rows], np.zeros(len(rows)), tips[begin[rows]])
             self._along(a, b, first, owner, starts, worst)
 
-    def _arc_steps(self, arc: Index, known: Mask, steps: Index, start: Array, tool: Array) -> None:
-        rows = np.flatnonzero((arc >= 0) & known)
+    def _arc_steps(self, arc: Index, start: Array, delta: Array, tool: Array, rows: Index) -> Index:
+        """Steps of the moves `rows`, which are arcs."""
         arcs = self.path.arcs
-        centre = arcs.centre_mm[arc[rows]]
-        radius = np.sqrt(np.nansum((start[rows] - centre) ** 2, axis=1))
-        reach = np.minimum(radius * np.abs(arcs.sweep_rad[arc[rows]]), 2 * radius)
-        delta = np.repeat(reach[:, None], 3, axis=1)
-        part = tool if tool.ndim == 1 else tool[rows]
-        turns = np.ceil(np.abs(arcs.sweep_rad[arc[rows]]) / _ARC_ANGLE_RAD).astype(np.int64)
-        steps[rows] = np.maximum(
-            np.maximum(steps[rows], turns),
-            steps_needed(self.model, delta, part, self.bend, at_least=_ARC_STEPS, at_most=1 << 10),
-        )
+        radius = np.sqrt(np.nansum((start - arcs.centre_mm[arc]) ** 2, axis=1))
+        sweep = np.abs(arcs.sweep_rad[arc])
+        # no axis moves farther than the arc is long and wide, or than the helix rises
+        reach = np.maximum(np.minimum(radius * sweep, 2 * radius)[:, None], np.abs(delta))
+        needed = steps_needed(
+            self.model, reach, tool if tool.ndim == 1 else tool[rows], self.bend, at_least=_ARC_STEPS,
+            at_most=_MOST_STEPS,
+        )  # fmt: skip
+        return np.maximum(needed, np.ceil(sweep / _ARC_ANGLE_RAD).astype(np.int64))
 
     def actual(self, point: Array, tool: Array) -> Array:
         """Where the tip really is; keeps the play of the axes from call to call."""
@@ -365,9 +371,9 @@ class Tracer:
         of = owner[inner.part]
         actual = self._known(a + of, inner.actual)
         distance = segment_distance(actual, self._known(a + of, begin[of]), self._known(a + of, goal[of]))
-        arc = self.nominal_arc[a:b] if self.nominal_arc is not None else None
-        if arc is not None and arc.max(initial=-1) >= 0:
-            rows = np.flatnonzero(arc[of] >= 0)
+        arc = self.nominal_arc[a:b]
+        rows = np.flatnonzero(arc[of] >= 0)
+        if rows.size:
             which = arc[of[rows]]
             arcs = nominal.arcs
             shift = goal[of[rows]] - nominal.end_mm[a:b][of[rows]]
@@ -383,22 +389,22 @@ class Tracer:
     def _near(self, owner: Index, first: int, part: Index, share: Array, of: Index) -> Array:
         """Roughly where on its nominal arc each sample lies: by the angles of the arcs that it became."""
         turn = np.zeros(len(owner))
-        if self.path_arc is not None:
-            arc = self.path_arc[first : first + len(owner)]
-            turn[arc >= 0] = np.abs(self.path.arcs.sweep_rad[arc[arc >= 0]])
+        arc = self.path_arc[first : first + len(owner)]
+        turn[arc >= 0] = np.abs(self.path.arcs.sweep_rad[arc[arc >= 0]])
         total = np.bincount(owner, turn)
         before = np.cumsum(turn) - turn
         begin = np.cumsum(total) - total
         place = before[part] - begin[of] + share * turn[part]
-        return np.asarray(place / np.maximum(total[of], 1e-12), float)
+        return np.asarray(place / np.maximum(total[of], 1e-12))
 
-    def _bend(self, a: int, reached: Array, inner: _Inner, owner: Index, curved: Mask, bend: Single) -> None:
-        """How far the samples of straight parts leave the chord between the actual ends of their part."""
-        straight = (inner.part > 0) & ~curved[inner.part]
+    def _bend(self, a: int, tips: Array, inner: _Inner, owner: Index, curved: Mask, bend: Single) -> None:
+        """How far the samples of straight parts leave the chord between the actual ends of their part, which
+        are `tips` and the ones behind them."""
+        straight = ~curved[inner.part]
         part, actual = inner.part[straight], inner.actual[straight]
         of = a + owner[part]
         departure = segment_distance(
-            *(self._known(of, some) for some in (actual, reached[part - 1], reached[part]))
+            *(self._known(of, some) for some in (actual, tips[part], tips[part + 1]))
         )
         np.fmax.at(bend, owner[part], departure)
 
@@ -424,10 +430,8 @@ class _Inner:
         return self.with_more(_Inner(cuts, np.ones(len(cuts)), reached[cuts]))
 
 
-def _arc_index(path: Toolpath) -> npt.NDArray[np.int64] | None:
+def _arc_index(path: Toolpath) -> Index:
     """(n,) index into the arcs of each move, -1 where it is none."""
-    if not len(path.arcs):
-        return None
     index = np.full(len(path), -1, np.int64)
     index[path.arcs.move] = np.arange(len(path.arcs))
     return index

@@ -73,12 +73,12 @@ class Judgements:
     @property
     def judged(self) -> Mask:
         """(n,) moves that count."""
-        return np.asarray(self.counts <= Counts.LEFT, bool)
+        return np.asarray(self.counts <= Counts.LEFT)
 
     @property
     def over(self) -> Mask:
         """(n,) moves that count and are above what is allowed."""
-        return np.asarray(self.judged & (np.nan_to_num(self.corrected) > self.allowed_mm), bool)
+        return np.asarray(self.judged & (np.nan_to_num(self.corrected) > self.allowed_mm))
 
     def largest_mm(self, which: Mask | None = None) -> float:
         """The largest deviation of the corrected program that counts, of all moves or of some."""

@@ -78,10 +78,10 @@ def _moved(nominal: Program, corrected: Program, groups: Index, owner: Index, di
     """(m,) moves of the corrected program that command neither the end nor the distance that the nominal one
     has for an axis of a move that is never corrected."""
     path, written = nominal.toolpath, corrected.toolpath
-    away = np.asarray((path.flag[owner] & _AWAY) != 0, bool)
+    away = np.asarray((path.flag[owner] & _AWAY) != 0)
     if not away.any():
         return away
     end = np.abs(written.end_mm - path.end_mm[owner])
     begin = written.starts_mm()[np.concatenate(([0], groups[:-1] + 1))][owner]
     distance = np.abs((written.end_mm - begin) - (path.end_mm - path.starts_mm())[owner])
-    return np.asarray(away & (np.fmin(end, distance) > _DIGITS * digit_mm).any(axis=1), bool)
+    return np.asarray(away & (np.fmin(end, distance) > _DIGITS * digit_mm).any(axis=1))

@@ -114,14 +114,14 @@ class _Alignment:
         self.begin = np.empty_like(self.target)
         self.begin[1:], self.begin[0] = self.target[:-1], np.array(nominal.start_mm)
         free = (nominal.flag[mine.last] & _FREE) != 0
-        self.unknown = np.asarray(np.isnan(self.target).all(axis=1), bool)
-        self.loose = np.asarray(free | self.unknown, bool)
+        self.unknown = np.asarray(np.isnan(self.target).all(axis=1))
+        self.loose = free | self.unknown
         #: what is left uncorrected is known by its commands
         self.said, self.written = nominal.end_mm[mine.last], path.end_mm[theirs.last]
         # a rapid with an unknown axis is left uncorrected
         partly = np.isnan(self.target).any(axis=1) & (mine.kind == Kind.RAPID)
         self.reach = np.where(partly, _FAR_MM / 2, near_mm)
-        self.lost = np.asarray(np.isnan(self.tip).all(axis=1), bool)
+        self.lost = np.asarray(np.isnan(self.tip).all(axis=1))
         index = np.full(len(nominal), -1, np.int64)
         index[nominal.arcs.move] = np.arange(len(nominal.arcs))
         self.arc = index[mine.last]
@@ -129,7 +129,7 @@ class _Alignment:
         move = self.arcs.move
         #: the centres move with the waypoints, by the shift of the zero
         self.centre = self.arcs.centre_mm + np.nan_to_num(target[move] - nominal.end_mm[move])
-        #: the length of the path up to the end of each unit
+        #: the length of the path before each unit, and all of it
         self.length = _lengths(nominal, mine, self.begin, self.target)
         start = np.vstack((path.starts_mm()[:1], self.tip[:-1]))
         self.gone = _lengths(path, theirs, start, self.tip)
@@ -138,7 +138,7 @@ class _Alignment:
         turning = np.flatnonzero(self.arc >= 0)
         sweep = np.abs(self.arcs.sweep_rad[self.arc[turning]])
         turning, sweep = turning[sweep > 2 * np.pi - _WHOLE], sweep[sweep > 2 * np.pi - _WHOLE]
-        self.least[turning] = np.diff(self.length, prepend=0.0)[turning] * (1.0 - np.pi / sweep)
+        self.least[turning] = np.diff(self.length)[turning] * (1.0 - np.pi / sweep)
         self.tries = 0
 
     def ends(self) -> Index:
@@ -167,14 +167,15 @@ class _Alignment:
 
     def _near(self, i: Index, j: Index) -> Mask:
         """Whether nominal units end at units of the corrected program, beyond doubt."""
-        away = _apart(self.tip[j], self.target[i]).max(axis=1, initial=0.0)
+        away = _apart(self.tip[j], self.target[i]).max(axis=1)
         unknown = self.loose[i] & (self.lost[j] | self.unknown[i])
-        good = np.asarray((away < self.reach[i]) | unknown, bool)
+        good: Mask = (away < self.reach[i]) | unknown
         free = np.flatnonzero(self.loose[i])
         if free.size:
             same = _apart(self.written[j[free]], self.said[i[free]]).max(axis=1) < self.near
             good[free] |= same
-        return np.asarray(good & (self.mine.kind[i] == self.theirs.kind[j]), bool)
+        good &= self.mine.kind[i] == self.theirs.kind[j]
+        return good
 
     def _stretch(self, i: int, j: int, size: int) -> Index:
         """The ends of the next units, `size` at most, up to the first that is in any doubt.
@@ -182,15 +183,14 @@ class _Alignment:
         Parts are as long together as the whole. So the length of the path tells about where each unit ends.
         """
         rows = np.arange(i, min(i + size, len(self.mine)))
-        length = self.length[rows] - (self.length[i - 1] if i else 0.0)
-        about = np.searchsorted(self.gone, length + (self.gone[j - 1] if j else 0.0))
+        before = self.length[rows] - self.length[i] + self.gone[j]
+        about = np.searchsorted(self.gone[1:], before + np.diff(self.length[i : i + len(rows) + 1]))
         choice = np.clip(about[:, None] + _BESIDE, j, len(self.theirs) - 1)
         near = self._near(np.repeat(rows, len(_BESIDE)), choice.ravel()).reshape(choice.shape)
-        behind = np.concatenate(([0.0], length[:-1])) + (self.gone[j - 1] if j else 0.0)
-        near &= self.gone[choice] - behind[:, None] >= self.least[rows][:, None]
-        ends = choice[np.arange(len(rows)), near.argmax(axis=1)]
-        before = np.concatenate(([j - 1], ends[:-1]))
-        inserted = ends - before - 1
+        near &= self.gone[choice + 1] - before[:, None] >= self.least[rows][:, None]
+        ends: Index = choice[np.arange(len(rows)), near.argmax(axis=1)]
+        begin = np.concatenate(([j], ends[:-1] + 1))
+        inserted = ends - begin
         good = near.any(axis=1) & (inserted >= 0) & (inserted <= _SPARE)
         good &= ends - rows <= len(self.theirs) - len(self.mine)
         count = len(good) if good.all() else int(np.argmin(good))
@@ -198,20 +198,20 @@ class _Alignment:
         if inserted.any():
             owner = np.repeat(np.arange(count), inserted)
             first = np.cumsum(inserted) - inserted
-            part = before[owner] + 1 + np.arange(len(owner)) - first[owner]
+            part = begin[owner] + np.arange(len(owner)) - first[owner]
             of = rows[owner]
             # one that ends as the unit does leaves a choice
-            gone = self.gone[part] - np.where(before < 0, 0.0, self.gone[before])[owner]
+            gone = self.gone[part + 1] - self.gone[begin[owner]]
             astray = self._unlike(of, part) | (self._near(of, part) & (gone >= self.least[of]))
-            astray |= np.asarray(self._along(of, part) >= self.near, bool)
+            astray |= self._along(of, part) >= self.near
             count = int(owner[int(np.argmax(astray))]) if astray.any() else count
-        return np.asarray(ends[:count], np.int64)
+        return ends[:count]
 
     def _plain_split(self, i: int, j: int) -> int | None:
         """The number of moves inserted before the end of unit i where they all lie along it, None where that
         is not plain."""
         ahead = np.arange(j, j + min(self._room(i, j), _SPARE) + 1)
-        gone = self.gone[ahead] - (self.gone[j - 1] if j else 0.0)
+        gone = self.gone[ahead + 1] - self.gone[j]
         end = np.flatnonzero(self._near(np.full(len(ahead), i), ahead) & (gone >= self.least[i]))
         if not end.size:
             return None
@@ -222,7 +222,8 @@ class _Alignment:
 
     def _unlike(self, i: Index, j: Index) -> Mask:
         """Whether units j are no parts of nominal units i: a part of a rapid is a rapid, and of no other."""
-        return np.asarray((self.mine.kind[i] == Kind.RAPID) != (self.theirs.kind[j] == Kind.RAPID), bool)
+        unlike: Mask = (self.mine.kind[i] == Kind.RAPID) != (self.theirs.kind[j] == Kind.RAPID)
+        return unlike
 
     def _along(self, i: Index, j: Index) -> Array:
         """(m,) mm, how far the ends of units j (m,) are from nominal units i (m,) as lines or arcs."""
@@ -230,14 +231,14 @@ class _Alignment:
         begin, end, point = (
             np.where(known, some, 0.0) for some in (self.begin[i], self.target[i], self.tip[j])
         )
-        nowhere = np.asarray(np.isnan(begin).any(axis=1), bool)
+        nowhere = np.asarray(np.isnan(begin).any(axis=1))
         begin = np.where(nowhere[:, None], end, begin)
-        away = np.asarray(segment_distance(point, begin, end), float)
+        away = segment_distance(point, begin, end)
         curved = np.flatnonzero(self.arc[i] >= 0)
         for plane in np.unique(self.arcs.plane[self.arc[i[curved]]]).tolist():
             some = curved[self.arcs.plane[self.arc[i[curved]]] == plane]
             away[some] = self._from_arcs(self.arc[i[some]], begin[some], end[some], point[some], plane)
-        return np.asarray(np.nan_to_num(away, nan=_FAR_MM), float)
+        return np.nan_to_num(away, nan=_FAR_MM)
 
     def _from_arcs(self, arc: Index, begin: Array, end: Array, point: Array, plane: int) -> Array:
         """(m,) distances of points from nominal arcs of a plane: across them, and beyond their ends."""
@@ -256,7 +257,8 @@ class _Alignment:
         low = np.minimum(begin[:, third], end[:, third])
         high = np.maximum(begin[:, third], end[:, third])
         level = np.maximum(np.maximum(low - point[:, third], point[:, third] - high), 0.0)
-        return np.asarray(np.sqrt(across**2 + beyond**2 + level**2), float)
+        away: Array = np.sqrt(across**2 + beyond**2 + level**2)
+        return away
 
     def _window(self, i: int, j: int) -> Index:
         """The ends of the next units, by the least squares of all distances.
@@ -278,7 +280,7 @@ class _Alignment:
 
     def _far(self, i: Index, j: Index) -> bool:
         """Whether some nominal unit would end far from its waypoint."""
-        away = _apart(self.tip[j], self.target[i]).max(axis=1, initial=0.0)
+        away = _apart(self.tip[j], self.target[i]).max(axis=1)
         return bool(((away >= _FAR_MM) & ~self.loose[i]).any())
 
     def _aligned(self, i: int, j: int, rows: int, width: int) -> Index:
@@ -297,9 +299,8 @@ class _Alignment:
             back[r] = np.maximum.accumulate(np.where(lower, np.arange(width + 1), 0))[:width]
             best = np.full(width + 1, np.inf)
             best[1:] = least[:width] + total[:width] + end
-        column = width - 1 if i + rows == len(self.mine) and j + width == len(self.theirs) else -1
-        if column < 0:
-            column = int(np.argmin(best[1:]))
+        whole = i + rows == len(self.mine) and j + width == len(self.theirs)
+        column = width - 1 if whole else int(np.argmin(best[1:]))
         ends = np.zeros(rows, np.int64)
         for r in range(rows - 1, -1, -1):
             ends[r] = j + column
@@ -315,11 +316,11 @@ class _Alignment:
         of = np.full(len(j), i)
         part = np.minimum(self._along(of, j), _FAR_MM) ** 2
         part += np.where(self._unlike(of, j), _OTHER_KIND_MM2, 0.0)
-        return np.asarray(end, float), part
+        return end, part
 
 
 def _lengths(path: Toolpath, units: _Units, begin: Array, end: Array) -> Array:
-    """(u,) mm, the length of the path up to the end of each unit; 0 for what is not known."""
+    """(u + 1,) mm, the length of the path before each unit, and all of it; 0 for what is not known."""
     own = np.nan_to_num(np.sqrt(((end - begin) ** 2).sum(axis=1)))
     if len(path.arcs):
         unit = np.searchsorted(units.last, path.arcs.move)
@@ -331,7 +332,7 @@ def _lengths(path: Toolpath, units: _Units, begin: Array, end: Array) -> Array:
             radius[some] = np.hypot(arm[:, first], arm[:, second])
             rise[some] = (end - begin)[unit[some], third]
         own[unit] = np.nan_to_num(np.hypot(radius * path.arcs.sweep_rad, rise))
-    return np.cumsum(own)
+    return np.concatenate(([0.0], np.cumsum(own)))
 
 
 def _apart(tip: Array, target: Array) -> Array:
@@ -345,8 +346,8 @@ def _refuse_others(program: Program, target: Array, mine: _Units, tip: Array) ->
     """Raise ProgramError where most waypoints are far off: this is another job."""
     nominal = program.toolpath
     counted = ((nominal.flag[mine.last] & _FREE) == 0) & ~np.isnan(target[mine.last]).all(axis=1)
-    near = np.asarray(_apart(tip, target[mine.last]).max(axis=1, initial=0.0) < _FAR_MM, bool)
-    far = np.asarray(counted & ~near, bool)
+    near = _apart(tip, target[mine.last]).max(axis=1) < _FAR_MM
+    far = counted & ~near
     if counted.any() and far.sum() > _MOST_FAR * counted.sum():
         stated = program.in_original()
         line = stated.place(int(stated.toolpath.line[mine.last[np.argmax(far)]]))
@@ -375,9 +376,7 @@ def _groups(target: Array, mine: _Units, tip: Array, theirs: _Units, ends: Index
 def _first_stroke(target: Array, tip: Array) -> int:
     """With how many moves the corrected hole begins before the first of the nominal one: a rapid to the hole
     that the nominal program does not need."""
-    extra = len(tip) - len(target)
-    if extra <= 0:
-        return 0
-    few = min(2, len(target))
+    extra = max(len(tip) - len(target), 0)
+    few = min(2, len(target), len(tip))
     away = [np.abs(tip[k : k + few] - target[:few]).sum() for k in range(extra + 1)]
     return int(np.argmin(away))

@@ -64,7 +64,7 @@ class Measured:
         """(n,) moves with a measured point above the part tolerance."""
         if self.tolerance_um is None:
             return np.zeros(len(self.line), bool)
-        return np.asarray(np.nan_to_num(self.size_um()) > self.tolerance_um, bool)
+        return np.asarray(np.nan_to_num(self.size_um()) > self.tolerance_um)
 
     def by_line(self, run: int | None = None) -> dict[str, npt.NDArray[Any]]:
         """Of each `line` with points that count: `measured_um`, the largest deviation, and `state`: 0 within

@@ -78,7 +78,7 @@ class Proof:
     @property
     def judged(self) -> Mask:
         """(n,) moves that count."""
-        return np.asarray(self.counts <= Counts.LEFT, bool)
+        return np.asarray(self.counts <= Counts.LEFT)
 
     def size_mm(self) -> Array:
         """(n,) the deviation per nominal move, 0 where the move does not count."""
@@ -118,7 +118,7 @@ def uncorrected_starts(path: Toolpath, uncorrected: Mask) -> Mask:
     """(n,) feed moves after an uncorrected move or after a canned cycle."""
     loose = uncorrected | ((path.flag & np.uint8(Flag.PASS | Flag.MACHINE | Flag.CYCLE)) != 0)
     before = np.concatenate(([False], loose[:-1]))
-    return np.asarray(before & cutting_moves(path), bool)
+    return np.asarray(before & cutting_moves(path))
 
 
 def prove(
@@ -169,7 +169,7 @@ def corrections_mm(nominal: Program, corrected: Program, proof: Proof) -> Array:
     for mine, other in zip(nominal.holes, corrected.holes, strict=False):
         moved = [b - a for a, b in zip(mine.place_mm, other.place_mm, strict=True)]
         correction[mine.last - 1, PLANES[mine.plane]] = (*moved, other.z_mm - mine.z_mm)
-    return np.asarray(correction, float)
+    return np.asarray(correction)
 
 
 def largest_correction_mm(nominal: Program, corrected: Program, proof: Proof) -> float:

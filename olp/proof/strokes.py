@@ -49,8 +49,8 @@ def strokes_mm(
     hole_of = which[of]
     away = segment_distance(tip, top[hole_of], bottom[hole_of])
     along = bottom - top
-    size = np.maximum(np.sqrt((along * along).sum(axis=1)), 1e-12)
-    depth = ((tip - top[hole_of]) * along[hole_of]).sum(axis=1) / size[hole_of]
+    # in no unit, but in order
+    depth = ((tip - top[hole_of]) * along[hole_of]).sum(axis=1)
     deepest = np.full(count, -np.inf)
     np.fmax.at(deepest, hole_of, depth)
     # the deepest of a hole counts to its bottom

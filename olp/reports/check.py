@@ -180,7 +180,7 @@ def to_junit(report: Report, fail_on: str) -> str:
     )  # fmt: skip
     properties = ElementTree.SubElement(suite, "properties")
     for number_of, sentence in enumerate((report["verdict"] or {}).get("sentences", ()), 1):
-        ElementTree.SubElement(properties, "property", name=f"verdict {number_of}", value=sentence)
+        ElementTree.SubElement(properties, "property", name=f"verdict {number_of}", value=printable(sentence))
     mild = []
     for code in report["rules"]:
         case = ElementTree.SubElement(
@@ -225,7 +225,13 @@ def to_csv(rows: Iterable[Mapping[str, Any]]) -> bytes:
         names = map(cell, (row["part"], row["mesh"], row["role"], row["frame"]))
         lengths = (f"{v:.6f}" for v in row["point_mm"])
         writer.writerow(
-            [row["line"], f"{row['clearance_mm']:.6f}", *names, *lengths, *[row.get("file", "")] * files]
+            [
+                row["line"],
+                f"{row['clearance_mm']:.6f}",
+                *names,
+                *lengths,
+                *[cell(row.get("file", ""))] * files,
+            ]
         )
     return buffer.getvalue().encode()
 

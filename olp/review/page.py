@@ -24,7 +24,7 @@ def page(manifest: Mapping[str, Any], data: bytes, *, live: bool = False) -> Ite
     """The page in parts. `data` is the base64 of the arrays; with `live` the page may ask its own server, and
     no other, for changes."""
     values: dict[str, bytes] = {
-        "TITLE": html.escape(str(manifest["title"])).encode("utf-8", "replace"),
+        "TITLE": html.escape(str(manifest["title"])).encode(errors="replace"),
         "CONNECT": b"'self'" if live else b"'none'",
         "CSS": _asset("review.css").encode(),
         "MESHCAT": _script(*_bundle()),
@@ -47,7 +47,7 @@ def as_json(value: Mapping[str, Any]) -> bytes:
     """JSON for a script element: it has no `<`, so that no text can end the element. Bytes of a name that are
     no UTF-8 become `?`."""
     text = json.dumps(value, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
-    return text.replace("<", "\\u003c").encode("utf-8", "replace")
+    return text.replace("<", "\\u003c").encode(errors="replace")
 
 
 def _modules() -> Iterator[bytes]:

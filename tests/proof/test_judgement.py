@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases.paths import PASS, Known, Move, line, program, rapid, toolpath
 
 from olp.core.toolpath import Frame
 from olp.findings.catalogue import Finding
 from olp.proof import judgement
 from olp.proof.judgement import Judgements
 from olp.proof.measured import ABOVE, SHOWN, WITHIN, Measured
-from olp.proof.proof import Counts
+from olp.proof.proof import Counts, prove
 
 NAN = math.nan
 #: um, of the table: 1 um, and 0.1 um of rounding.
@@ -55,6 +56,11 @@ MIXED = table(
     (5, Counts.LEFT, 30.0, 0.25),
     (6, Counts.UNKNOWN, NAN, NAN),
 )
+
+
+def test_the_kinds_of_counting_are_numbered_without_gaps() -> None:
+    """As they are in files of arrays."""
+    assert [int(kind) for kind in Counts] == list(range(7)) == sorted(judgement.REASONS)
 
 
 def test_what_cuts_counts_and_the_rest_is_shown() -> None:
@@ -253,3 +259,173 @@ def test_two_verdicts_are_one_that_fails_where_either_does(a: bool, b: bool, ok:
     predicted = {"ok": a, "sentences": ["p"], "part": 1}
     both = judgement.with_measured(predicted, {"ok": b, "sentences": ["m"], "measured": 2})
     assert both == {"ok": ok, "sentences": ["p", "m"], "part": 1, "measured": 2}
+
+
+# -- of a proof -----------------------------------------------------------------------------------------
+
+
+def test_a_proof_as_a_table() -> None:
+    """Half a wave of 10 um along the cuts, 4 um aside at all ends; the corrected program is 4 um aside in the
+    other direction, which leaves the wave alone."""
+
+    def error(axis_mm: np.ndarray) -> np.ndarray:
+        wave = 0.01 * np.sin(np.pi * axis_mm[:, 0] / 50)
+        return np.stack((0 * wave, wave, 0 * wave + 0.004), axis=1)
+
+    frames = (Frame(tool=3, work_offset="G54"), Frame(work_offset="G54"))
+    none = (NAN, NAN, NAN)
+    tail = (rapid(0, 0, 0, flag=PASS, frame=1, line=8), line(*none, frame=1, line=8))
+
+    def moves(z: float) -> tuple[Move, ...]:
+        return (
+            rapid(0, 0, z, line=5), line(50, 0, z, line=6), line(0, 0, 0, flag=PASS, line=7), *tail,
+            rapid(0, 0, z, line=9),
+        )  # fmt: skip
+
+    paths = (toolpath(*moves(z), frames=frames) for z in (0.0, -0.004))
+    proof = prove(
+        *(program(path) for path in paths), Known(error, 4e-5), tolerance_mm=2e-3, digit_mm=1e-3,
+        uncorrected=np.array([5]),
+    )  # fmt: skip
+    table = Judgements.of(proof)
+    assert table.counts.tolist() == [
+        Counts.RAPID, Counts.FEED, Counts.LEFT, Counts.UNCORRECTED, Counts.UNKNOWN, Counts.UNCORRECTED
+    ]  # fmt: skip
+    assert table.line.tolist() == [5, 6, 7, 8, 8, 9]
+    assert table.tool.tolist() == [3, 3, 3, -1, -1, 3]
+    assert table.operation.tolist() == [0, 0, 0, 1, 1, 2]
+    both = math.hypot(10, 4)
+    assert 1e3 * table.uncorrected == pytest.approx([4, both, both, 4, NAN, 4], abs=0.15, nan_ok=True)
+    # what is left uncorrected begins where the corrected cut ended, so in its middle it is 2 um aside
+    assert 1e3 * table.corrected == pytest.approx(
+        [0, 10, math.hypot(10, 2), 4, NAN, 0], abs=0.15, nan_ok=True
+    )
+    assert table.uncorrected.dtype == table.corrected.dtype == np.float32
+    assert (table.tolerance_mm, table.allowed_mm) == (2e-3, pytest.approx(2.87e-3))
+    assert table.measured is None
+
+
+def test_another_error_is_named_once_and_fails_the_verdict() -> None:
+    good = table((3, Counts.FEED, 20.0, 0.75))
+    findings = (
+        Finding("OLP510", "m"),
+        Finding("OLP402", "m"),
+        Finding("OLP402", "m"),
+        Finding("OLP101", "m"),
+    )
+    result = verdict(good, findings=findings)
+    assert result["ok"] is False
+    assert result["errors"] == ["OLP402", "OLP510"]
+    assert result["sentences"][1:] == ["Not to be run as it is: OLP402, OLP510."]
+    # also where nothing could be judged
+    assert verdict(table((3, Counts.RAPID, 20.0, 20.0)), findings=findings)["ok"] is False
+
+
+def test_a_line_is_put_into_words() -> None:
+    left = table((4, Counts.LEFT, 30.0, 30.0))
+    result = judgement.verdict(left, None, None, (), lambda line: f"{line} of sub.nc")
+    assert "where line 4 of sub.nc is left uncorrected;" in result["sentences"][0]
+
+
+def test_values_of_the_part() -> None:
+    one = table((3, Counts.FEED, 20.0, 0.75), (4, Counts.RAPID, 90.0, 90.0))
+    assert verdict(one, 0.5, 0.97)["part"] == {
+        "tolerance_um": 0.5, "largest_um": pytest.approx(0.75), "probability": 0.97, "probable": True,
+        "holds": False,
+    }  # fmt: skip
+    assert verdict(one, 2.0)["part"] == {
+        "tolerance_um": 2.0, "largest_um": pytest.approx(0.75), "probability": None, "probable": None,
+        "holds": True,
+    }  # fmt: skip
+    # an uncertainty without a probability
+    assert judgement.verdict(one, 2.0, {"within": None}, ())["part"]["probability"] is None
+
+
+def test_exactly_the_part_tolerance_is_within() -> None:
+    one = table((3, Counts.FEED, 20.0, 0.5))
+    exact = one.largest_mm() * 1e3
+    assert verdict(one, exact)["part"]["holds"] is True
+    assert verdict(one, exact * (1 - 1e-9))["part"]["holds"] is False
+
+
+def test_values_of_measured_runs() -> None:
+    result = judgement.measured((("a", 4.0), ("b", None), ("c", 5.0)), 4.5)
+    assert result["measured"] == {"largest_um": 5.0, "tolerance_um": 4.5, "not_verified": ["b"]}
+    assert result["ok"] is False
+    nothing = judgement.measured((("a", None), ("b", None)), None)
+    assert nothing["measured"] == {"largest_um": None, "tolerance_um": None, "not_verified": ["a", "b"]}
+    assert (nothing["ok"], nothing["sentences"]) == (
+        None,
+        ["Not verified: no measured point of a, b counts."],
+    )
+
+
+def test_a_table_without_moves() -> None:
+    none = table()
+    assert none.largest_mm() == 0.0
+    assert none.by_line()["line"].tolist() == []
+    assert none.groups(none.operation) == []
+    assert none.report()["shown_um"] == {}
+    assert verdict(none)["ok"] is None
+
+
+def test_the_report_holds_the_measured_layer() -> None:
+    runs = Measured(("a",), MIXED.line, MIXED.tool, MIXED.operation, (np.arange(6.0),), 5.0)
+    report = MIXED.with_measured(runs).report()
+    assert report["measured"] == runs.report()
+
+
+def test_a_measured_line_above_is_above_whatever_was_predicted() -> None:
+    """Of a rapid it is shown alone, of a cut it is judged; a run may know lines of its own order."""
+    sizes = np.array([NAN, NAN, 6.0, 1.0, 9.0, NAN])
+    runs = Measured(("a",), MIXED.line, MIXED.tool, MIXED.operation, (sizes,), None)
+    got = MIXED.with_measured(runs).by_line()
+    assert got["measured_um"] == pytest.approx([NAN, 6.0, 9.0, NAN], nan_ok=True)
+    assert got["measured_state"].tolist() == [SHOWN, SHOWN, SHOWN, SHOWN]
+    assert got["state"].tolist() == [WITHIN, SHOWN, ABOVE, SHOWN]
+
+
+def test_exactly_what_is_allowed_is_within() -> None:
+    one = table((3, Counts.FEED, 1.5, 1.5))
+    exact = replace(one, allowed_mm=float(one.corrected[0]))
+    below = replace(one, allowed_mm=float(one.corrected[0]) * (1 - 1e-6))
+    for judged, over in ((exact, False), (below, True)):
+        assert judged.over.tolist() == [over]
+        states = judged.by_line()
+        assert [states[f"{name}state"][0] for name in ("", "uncorrected_", "corrected_")] == [int(over)] * 3
+        assert judged.groups(judged.operation)[0]["holds"] is not over
+        assert verdict(judged)["numerical"]["holds"] is not over
+
+
+def test_states_take_one_byte_a_line() -> None:
+    runs = Measured(("a",), MIXED.line, MIXED.tool, MIXED.operation, (np.arange(6.0),), 5.0)
+    columns = MIXED.with_measured(runs).by_line()
+    assert {columns[name].dtype for name in columns if name.endswith("state")} == {np.dtype(np.uint8)}
+    assert runs.by_line()["state"].dtype == np.uint8
+
+
+@pytest.mark.parametrize("name", ("corrected", "uncorrected"))
+def test_a_cut_without_a_figure_is_not_above(name: str) -> None:
+    """A stroke of a hole above its bottom."""
+    one = replace(table((3, Counts.HOLE, 0.5, 0.5)), **{name: np.array([NAN], np.float32)})
+    assert not one.over.any()
+    assert one.by_line()[f"{name}_state"].tolist() == [WITHIN]
+    assert math.isnan(one.by_line()[f"{name}_um"][0])
+    expected = {"corrected_um": 0.5, "uncorrected_um": 0.5} | {f"{name}_um": 0.0}
+    (group,) = one.groups(one.operation)
+    assert {key: group[key] for key in expected} == pytest.approx(expected)
+
+
+def test_tool_zero_is_a_tool() -> None:
+    one = replace(table((3, Counts.FEED, 1.0, 1.0)), tool=np.array([0]))
+    assert [group["tool"] for group in one.groups(one.tool)] == [0]
+
+
+def test_a_tool_without_a_number_is_none_in_its_frames() -> None:
+    """Of a path without frames, and of one without moves."""
+    none = toolpath(frames=())
+    assert [len(part) for part in judgement.groups_of(none)] == [0, 0]
+    assert [len(part) for part in judgement.groups_of(toolpath())] == [0, 0]
+    tool, operation = judgement.groups_of(toolpath(line(1, 0, 0), line(2, 0, 0)))
+    assert (tool.tolist(), operation.tolist()) == ([-1, -1], [0, 0])
+    assert tool.dtype == operation.dtype == np.int64

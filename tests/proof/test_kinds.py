@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from cases.acceptance import TRUE_ZERO, machine
 from cases.gate import known
+from cases.paths import CONTROL, CYCLE, NAN, OF_MACHINE, PASS, Move, hole, line, program, rapid, toolpath
 
 import olp
 from olp.core.errors import ProgramError
+from olp.core.toolpath import Kind
+from olp.program.program import Hole
 from olp.proof import deviation
 from olp.proof.judgement import Judgements
+from olp.proof.kinds import check_kinds
 from olp.proof.proof import Counts
 
 #: X is 10 um long in 100 mm
@@ -189,3 +194,127 @@ def test_a_contour_that_changes_its_side_is_refused(tmp_path: Path) -> None:
         olp.correct(text, path, contour=True)
     assert refused.value.line == 6
     olp.correct(text.replace(b"G42 D1 X60", b"G40 X90\nG42 D1 X60"), path, contour=True)
+
+
+# -- paths without a text --------------------------------------------------------------------------------
+
+DRILL = (rapid(0, 0, 5, flag=CYCLE), line(0, 0, -5, flag=CYCLE), rapid(0, 0, 5, flag=CYCLE))
+DRILLED = (hole(1, 4, r=5.0, z=-5.0),)
+START, CUT, GONE = rapid(0, 0, 20), line(9, 0, 5, line=20), rapid(9, 9, 9, line=30)
+TOUCH = Move(Kind.PROBE, (9.0, 0.0, 5.0), line=20)
+FEEDS = "cuts or touches where the nominal program moves rapidly"
+RAPIDS = "moves rapidly where the nominal program cuts or touches"
+KNOWN = "ends where another axis is known than in the nominal program"
+MOVED = "changes a move that is left uncorrected"
+NO_DRILL, NO_TOUCH = "drills where the nominal program does not", "touches where the nominal program does not"
+
+
+def checked(
+    nominal: tuple[Move, ...], written: tuple[Move, ...], groups: list[int], *,
+    holes: tuple[tuple[Hole, ...], tuple[Hole, ...]] = ((), ()), digit_mm: float = 0.001,
+) -> tuple[int, str] | None:  # fmt: skip
+    """The nominal line and the words of what is refused, or None."""
+    mine, other = program(toolpath(*nominal), *holes[0]), program(toolpath(*written), *holes[1])
+    try:
+        check_kinds(mine, other, np.array(groups), digit_mm)
+    except ProgramError as error:
+        assert error.code == "OLP562"
+        assert error.line is not None
+        head = "of the corrected program "
+        tail = "; it is not a correction of this program; correct the nominal program again"
+        assert error.message.endswith(tail)
+        return error.line, error.message.removesuffix(tail).replace(head, "")
+    return None
+
+
+@pytest.mark.parametrize(
+    ("nominal", "written", "groups", "refused"),
+    [
+        ((START, CUT, GONE), (START, line(4, 0, 9), CUT, GONE), [0, 2, 3], None),
+        ((START, CUT, GONE), (START, CUT, rapid(9, 5, 9), GONE), [0, 1, 3], None),
+        ((START, CUT, GONE), (START, CUT, line(9, 5, 9), GONE), [0, 1, 3], (30, f"line 3 {FEEDS}")),
+        ((START, CUT, GONE), (START, CUT, line(9, 9, 9)), [0, 1, 2], (30, f"line 3 {FEEDS}")),
+        ((START, CUT, GONE), (START, rapid(4, 0, 9), CUT, GONE), [0, 2, 3], (20, f"line 2 {RAPIDS}")),
+        ((START, CUT, GONE), (START, CUT, TOUCH, GONE), [0, 2, 3], (20, f"line 20 {NO_TOUCH}")),
+        ((START, TOUCH, GONE), (START, TOUCH, GONE), [0, 1, 2], None),
+        ((START, TOUCH, GONE), (START, line(9, 0, 5), GONE), [0, 1, 2], None),
+        ((START, TOUCH, GONE), (START, rapid(9, 0, 5), GONE), [0, 1, 2], (20, f"line 2 {RAPIDS}")),
+        ((START, CUT, GONE), (START, line(9, NAN, 5), GONE), [0, 1, 2], (20, f"line 2 {KNOWN}")),
+        ((START, line(9, NAN, 5), GONE), (START, CUT, GONE), [0, 1, 2], (2, f"line 20 {KNOWN}")),
+        # parts may be anywhere
+        ((START, CUT, GONE), (START, line(4, NAN, 5), CUT, GONE), [0, 2, 3], None),
+        # behind a move of the control it depends on the words
+        (
+            (START, rapid(9, NAN, 5, flag=CONTROL), GONE),
+            (START, rapid(9, 0, 5, flag=CONTROL), GONE), [0, 1, 2], None,
+        ),
+        ((START, rapid(9, NAN, 5, flag=PASS), GONE), (START, rapid(9, 0, 5), GONE), [0, 1, 2],
+         (2, f"line 2 {KNOWN}")),
+    ],
+)  # fmt: skip
+def test_each_kind_of_change_is_refused_with_both_lines(
+    nominal: tuple[Move, ...], written: tuple[Move, ...], groups: list[int], refused: tuple[int, str] | None
+) -> None:
+    assert checked(nominal, written, groups) == refused
+
+
+@pytest.mark.parametrize(
+    ("nominal", "written", "groups", "holes", "refused"),
+    [
+        ((START, *DRILL, GONE), (START, *DRILL, GONE), [0, 1, 2, 3, 4], (DRILLED, DRILLED), None),
+        # other moves of a hole are compared as one
+        ((START, *DRILL, GONE), (START, *DRILL, *DRILL[1:], GONE), [0, 1, 2, 5, 6],
+         (DRILLED, (hole(1, 6, r=5.0, z=-5.0),)), None),
+        ((START, *DRILL, GONE), (START, *DRILL, GONE), [0, 1, 2, 3, 4],
+         ((hole(2, 4, r=5.0, z=-5.0),), DRILLED), (2, f"line 2 {NO_DRILL}")),
+        ((START, *DRILL, GONE), (START, *DRILL, GONE), [0, 1, 2, 3, 4],
+         (DRILLED, (hole(1, 3, r=5.0, z=-5.0),)), None),
+        ((START, *DRILL, GONE), (START, CUT, *DRILL, GONE), [0, 2, 3, 4, 5],
+         (DRILLED, (hole(2, 5, r=5.0, z=-5.0),)), (2, f"line 20 {FEEDS}")),
+        # without holes in one of them every move counts
+        ((START, *DRILL, GONE), (START, *DRILL, GONE), [0, 1, 2, 3, 4], ((), DRILLED), None),
+        ((START, *DRILL, GONE), (START, *DRILL, DRILL[1], GONE), [0, 1, 2, 4, 5], ((), DRILLED),
+         (4, f"line 5 {FEEDS}")),
+    ],
+)  # fmt: skip
+def test_holes_are_drilled_where_they_were(
+    nominal: tuple[Move, ...], written: tuple[Move, ...], groups: list[int], holes: Any,
+    refused: tuple[int, str] | None,
+) -> None:  # fmt: skip
+    assert checked(nominal, written, groups, holes=holes) == refused
+
+
+@pytest.mark.parametrize("flag", (PASS, CONTROL, OF_MACHINE))
+@pytest.mark.parametrize(("off_mm", "refused"), [(0.0059, False), (0.0061, True), (-0.0061, True)])
+def test_a_move_left_uncorrected_has_its_end_or_its_distance(flag: int, off_mm: float, refused: bool) -> None:
+    """Up to 0.6 digits; where it starts elsewhere, the same words as distances end elsewhere."""
+    left = line(9, 9, 9, flag=flag)
+    nominal = (START, CUT, left, GONE)
+    expected = (3, f"line 3 {MOVED}") if refused else None
+    moved = line(9, 9 + off_mm, 9, flag=flag)
+    assert checked(nominal, (START, CUT, moved, GONE), [0, 1, 2, 3], digit_mm=0.01) == expected
+    # the same distance from a start that is 1 mm off along Y, in two parts
+    begin, split = line(9, 1, 5, line=20), line(9, 7, 7)
+    far = line(9, 10 + off_mm, 9, flag=flag)
+    expected = (3, f"line 4 {MOVED}") if refused else None
+    assert checked(nominal, (START, begin, split, far, GONE), [0, 1, 3, 4], digit_mm=0.01) == expected
+    # a corrected move may end elsewhere
+    assert checked((START, CUT, GONE), (START, line(9, off_mm, 5), GONE), [0, 1, 2], digit_mm=0.01) is None
+
+
+def test_each_axis_of_a_move_left_uncorrected_has_its_end_or_its_distance() -> None:
+    """X as its end, Y as its distance; neither would do for both."""
+    nominal = (START, CUT, line(20, 20, 5, flag=PASS), GONE)
+    written = (START, line(9.5, 0.5, 5), line(20, 20.5, 5, flag=PASS), GONE)
+    assert checked(nominal, written, [0, 1, 2, 3]) is None
+    written = (START, line(9.5, 0.5, 5), line(20.25, 20.5, 5, flag=PASS), GONE)
+    assert checked(nominal, written, [0, 1, 2, 3]) == (3, f"line 3 {MOVED}")
+
+
+def test_exactly_so_many_digits_are_none() -> None:
+    digit_mm = 0.5 / 0.6
+    assert 0.6 * digit_mm == 0.5
+    nominal = (START, CUT, line(9, 9, 9, flag=PASS), GONE)
+    for off_mm, refused in ((0.5, None), (0.5000001, (3, f"line 3 {MOVED}"))):
+        written = (START, CUT, line(9, 9 + off_mm, 9, flag=PASS), GONE)
+        assert checked(nominal, written, [0, 1, 2, 3], digit_mm=digit_mm) == refused

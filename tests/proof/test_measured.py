@@ -79,3 +79,40 @@ def test_the_report_by_runs_operations_and_tools() -> None:
     nothing = measured(runs=(np.full(4, NAN),) * 2).report()
     assert nothing["runs"][0] == {"name": "a", "largest_um": None, "line": None}
     assert nothing["operations"] == []
+
+
+def test_groups_of_runs_have_their_lines_and_their_worst() -> None:
+    """The tools 2 and 1 in order of appearance; the worst is the first of equal ones."""
+    lines = np.array([9, 5, 7, 8, 3, 4])
+    sizes = np.array([1.0, 6.0, 2.0, 6.0, NAN, 3.0])
+    tools = np.array([2, 1, 2, 1, 2, 1])
+    report = Measured(("a",), lines, tools, np.zeros(6, int), (sizes,), 6.0).report()
+    assert report["tools"] == [
+        {"first_line": 7, "last_line": 9, "tool": 2, "measured_um": 2.0, "worst_line": 7, "holds": True},
+        {"first_line": 4, "last_line": 8, "tool": 1, "measured_um": 6.0, "worst_line": 5, "holds": True},
+    ]
+    (operation,) = report["operations"]
+    assert (operation["first_line"], operation["last_line"], operation["tool"]) == (4, 9, 1)
+    assert report["runs"] == [{"name": "a", "largest_um": 6.0, "line": 5}]
+
+
+def test_tool_zero_is_a_tool() -> None:
+    report = Measured(("a",), np.array([3]), np.array([0]), np.array([0]), (np.array([1.0]),), None).report()
+    assert report["tools"][0]["tool"] == 0
+
+
+def test_no_runs_and_no_points() -> None:
+    none = Measured((), LINE, np.ones(4, int), np.zeros(4, int), (), 3.5)
+    assert none.largest_um() is None
+    assert np.isnan(none.size_um()).all()
+    assert (none.by_line()["line"].tolist(), none.worst(), none.lines_over()) == ([], [], [])
+    assert none.over.tolist() == [False] * 4
+    assert none.report()["tools"] == []
+    assert none.by_line()["state"].dtype == np.uint8
+
+
+def test_the_states_of_one_run_are_its_own() -> None:
+    runs = measured(3.5)
+    assert runs.by_line(1)["state"].tolist() == [WITHIN]
+    assert runs.by_line(0)["state"].tolist() == [ABOVE, WITHIN]
+    assert runs.by_line(0)["measured_um"].tolist() == [4.0, 2.0]

@@ -94,6 +94,13 @@ def test_a_table_says_the_kind_of_its_columns() -> None:
     ]  # fmt: skip
 
 
+def test_the_rows_of_a_table_follow_each_other() -> None:
+    grid = Grid(("a", "b"), (("1", "2"), ("3", "4")))
+    rows = [f'<tr><td class="l">{a}</td><td class="r">{b}</td></tr>' for a, b in grid.rows]
+    assert body(of(grid))[0].split("<tbody>")[1] == "".join(rows) + "</tbody></table>"
+    assert lines(of(grid))[2:] == ["| 1 | 2 |", "| 3 | 4 |"]
+
+
 @pytest.mark.parametrize(("count", "kind"), [(1, "short"), (12, "short"), (13, "long")])
 def test_a_table_of_more_than_twelve_rows_may_break(count: int, kind: str) -> None:
     assert body(of(Grid(("a",), (("1",),) * count)))[0].startswith(f"<table class='{kind}'>")

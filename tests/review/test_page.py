@@ -130,6 +130,41 @@ def test_the_title_is_text_and_the_data_cannot_end_their_element() -> None:
         pages.as_json({"a": float("nan")})
 
 
+def test_a_name_that_is_no_utf_8_has_question_marks() -> None:
+    assert pages.as_json({"a": "b\udce9", "c": [1, "<"]}) == b'{"a":"b?","c":[1,"\\u003c"]}'
+    assert b"<title>b?</title>" in b"".join(pages.page({"title": "b\udce9"}, b""))
+
+
+@pytest.mark.parametrize(("live", "connect"), [(False, "'none'"), (True, "'self'")])
+def test_a_page_is_its_template_with_every_mark_filled(
+    live: bool, connect: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In the order of the template, and nothing that is put in is searched for marks."""
+    texts = {
+        "review.html": "A@@TITLE@@B@@CONNECT@@C@@CSS@@D@@MESHCAT@@E@@LICENCE@@F@@MANIFEST@@"
+        "G@@DATA@@H@@MODULES@@I",
+        "review.css": "@@DATA@@ä", "modules.txt": "one.js\ntwo.js\n", "one.js": "1<2", "two.js": "@@CSS@@",
+    }  # fmt: skip
+    monkeypatch.setattr(pages, "_asset", texts.__getitem__)
+    monkeypatch.setattr(pages, "_bundle", lambda: ("mesh<cat", "main.min.js"))
+    monkeypatch.setattr(pages, "_licence", lambda: "<free> & 'open'")
+    # a page is not live unless it is asked for
+    more = {"live": True} if live else {}
+    parts = list(pages.page({"title": "<a>", "b": "<"}, b"DA@@TA", **more))
+    assert b"".join(parts).decode() == (
+        f"A&lt;a&gt;B{connect}C@@DATA@@äDmesh<catE&lt;free&gt; &amp; &#x27;open&#x27;F"
+        '{"title":"\\u003ca>","b":"\\u003c"}GDA@@TAH<script>1<2</script>\n<script>@@CSS@@</script>I'
+    )
+
+
+def test_a_module_that_would_end_its_element_is_refused_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    asset = pages._asset
+    monkeypatch.setattr(pages, "_asset", lambda name: "<!--" if name.endswith(".js") else asset(name))
+    first = asset("modules.txt").split()[0]
+    with pytest.raises(CannotCompute, match=f"^{re.escape(first)}: contains the end of a script element"):
+        b"".join(pages.page({"title": "a"}, b""))
+
+
 @pytest.mark.parametrize("text", ("</script", "</SCRIPT>", "a <!-- b"))
 def test_a_script_that_would_end_its_element_is_refused(monkeypatch: pytest.MonkeyPatch, text: str) -> None:
     monkeypatch.setattr(pages, "_bundle", lambda: (text, "main.min.js"))
