@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Callable, Iterable
+from typing import Any, TypeVar
 
 import pytest
+
+Case = TypeVar("Case")
 
 
 def some_fast(cases: Iterable[Any], each: int) -> list[Any]:
@@ -14,3 +16,22 @@ def some_fast(cases: Iterable[Any], each: int) -> list[Any]:
     return [
         pytest.param(*value, marks=pytest.mark.slow if k % each else ()) for k, value in enumerate(values)
     ]
+
+
+def in_each(cases: Iterable[Case], name: Callable[[Case], str]) -> Callable[[Callable[[Case], None]], Any]:
+    """One test for a law of many cases that takes no time each: what broke it, by the name of its case."""
+
+    def decorated(function: Callable[[Case], None]) -> Callable[[], None]:
+        def test() -> None:
+            wrong = []
+            for case in cases:
+                try:
+                    function(case)
+                except AssertionError as error:
+                    wrong.append(f"{name(case)}: {error}")
+            assert wrong == []
+
+        test.__name__, test.__doc__ = function.__name__, function.__doc__
+        return test
+
+    return decorated

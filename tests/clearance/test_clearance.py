@@ -120,6 +120,7 @@ def test_distances_worked_by_hand(corner: tuple[float, float, float], expected: 
 # -- many parts and a mesh -------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @settings(max_examples=6)
 @given(SEEDS, st.integers(1, 400))
 def test_the_search_finds_what_looking_at_all_finds(seed: int, count: int) -> None:

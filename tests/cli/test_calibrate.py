@@ -151,6 +151,7 @@ def test_a_fine_sweep_beside_an_aliased_line_is_used(tmp_path: Path) -> None:
     assert part["cyclic"][0]["phase_rad"] == pytest.approx(0.5, abs=0.02)
 
 
+@pytest.mark.slow
 def test_ballbar(tmp_path: Path) -> None:
     target = tmp_path / "s.toml"
     text = good("ballbar", CHECKS / "ballbar-xy.csv", "-o", target, "--plot", tmp_path / "c.svg")

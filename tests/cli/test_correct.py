@@ -302,6 +302,7 @@ def test_inspect_of_a_program_and_of_a_point() -> None:
     assert run("inspect", "-j", job, "--at", "-300", "-100", "-200").exit_code == 0
 
 
+@pytest.mark.slow
 def test_correct_imports_no_more_than_it_needs(tmp_path: Path) -> None:
     imported = imported_by("correct", "-j", str(JOB), "-o", str(tmp_path / "out.ngc"))
     assert "numpy" in imported

@@ -171,6 +171,7 @@ def test_correct_writes_all_files_or_none(job: Path) -> None:
     assert run("correct", "-j", job / "job.toml", "-o", target, "--review", "-", "-q").exit_code == 2
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="paths of the other kind")
 def test_imports_stay_light(job: Path) -> None:
     assert imported_by("view", "--help") & HEAVY == set()

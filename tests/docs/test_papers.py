@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 from benchmarks import figures
+from cases.fast import in_each
 from click.testing import CliRunner
 from docs import write_reference
 from docs.blocks import DOCS, README, ROOT
@@ -46,7 +47,7 @@ def anchor(title: str) -> str:
 # -- sentences and words -------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("path", [*PAGES, *modules()], ids=name_of)
+@in_each([*PAGES, *modules()], name_of)
 def test_no_sentence_is_too_long(path: Path) -> None:
     sentences = of_paper(path) if path.suffix == ".md" else of_module(path)
     assert [f"line {s.line}: {s.text}" for s in sentences if s.words > LONGEST] == []
@@ -67,7 +68,7 @@ def test_messages_are_short_in_the_mean() -> None:
     assert mean(sentence for path in modules() for sentence in of_module(path)) <= MEAN
 
 
-@pytest.mark.parametrize("path", sorted({*PAGES, *modules()} - HISTORY), ids=name_of)
+@in_each(sorted({*PAGES, *modules()} - HISTORY), name_of)
 def test_words_are_those_of_the_field(path: Path) -> None:
     lines = path.read_text("utf-8").splitlines()
     banned = [

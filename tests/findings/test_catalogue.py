@@ -65,6 +65,7 @@ def test_a_row_that_explains_nothing_is_found() -> None:
     assert unexplained(rule) == ["why", "remedy", "example"]
 
 
+@pytest.mark.slow
 def test_the_catalogue_holds_the_codes_of_the_program_and_no_others() -> None:
     modules = [path for path in PACKAGE.rglob("*.py") if path.parent != TABLES]
     used = {code for path in modules for code in codes_in(path.read_text("utf-8"))}

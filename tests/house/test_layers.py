@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import pytest
+from cases.fast import in_each
 from house.write_page import PAGE, WHERE, page, purpose
 
 import olp
@@ -66,13 +67,14 @@ def test_every_room_is_in_the_list_and_nothing_lies_loose() -> None:
     assert {path.stem for path in PACKAGE.glob("*.py")} == FRONT
 
 
+@pytest.mark.slow
 def test_the_page_of_the_house_is_the_house() -> None:
     """Stale: run python tests/house/write_page.py."""
     assert PAGE.read_text("utf-8") == page(ROOMS)
     assert [path for path in WHERE.values() if not (PACKAGE / path).is_file()] == []
 
 
-@pytest.mark.parametrize("path", MODULES, ids=lambda path: path.relative_to(PACKAGE).as_posix())
+@in_each(MODULES, lambda path: path.relative_to(PACKAGE).as_posix())
 def test_every_module_says_what_it_holds(path: Path) -> None:
     assert purpose(path)
 
@@ -90,6 +92,7 @@ def files_imported(modules: Mapping[str, ast.Module]) -> dict[str, set[str]]:
     return graph
 
 
+@pytest.mark.slow
 def test_there_is_no_circle_of_files() -> None:
     modules = {
         ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts): parsed(path)
@@ -107,7 +110,7 @@ def test_a_circle_would_be_found() -> None:
         graphlib.TopologicalSorter(files_imported(modules)).prepare()
 
 
-@pytest.mark.parametrize("path", MODULES, ids=lambda path: path.relative_to(PACKAGE).as_posix())
+@in_each(MODULES, lambda path: path.relative_to(PACKAGE).as_posix())
 def test_imports_go_one_way(path: Path) -> None:
     if top(path) not in FRONT:
         assert violations(top(path), parsed(path)) == []
@@ -136,7 +139,7 @@ LATE_ITSELF = {"trajectory": {"ruckig", "scipy"}}
 OPENERS = {"open", "read_bytes", "read_text", "write_bytes", "write_text"}
 
 
-@pytest.mark.parametrize("path", MODULES, ids=lambda path: path.relative_to(PACKAGE).as_posix())
+@in_each(MODULES, lambda path: path.relative_to(PACKAGE).as_posix())
 def test_large_libraries_are_imported_late_and_files_opened_in_one_layer(path: Path) -> None:
     tree = parsed(path)
     inside = {id(n) for f in ast.walk(tree) if isinstance(f, ast.FunctionDef) for n in ast.walk(f)}

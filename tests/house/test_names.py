@@ -8,6 +8,7 @@ from importlib import import_module
 from pathlib import Path
 
 import pytest
+from cases.fast import in_each
 
 import olp
 from olp.program import registry
@@ -93,7 +94,7 @@ def questions(source: str) -> list[int]:
     return sorted({node.lineno for node in ast.walk(ast.parse(source)) if _asks(node)})  # type: ignore[attr-defined]
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: path.relative_to(PACKAGE).as_posix())
+@in_each(FILES, lambda path: path.relative_to(PACKAGE).as_posix())
 def test_no_name_of_a_dialect_decides(path: Path) -> None:
     assert questions(path.read_text("utf-8")) == []
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cases.fast import some_fast
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from judge import linuxcnc, machines, programs
@@ -156,7 +157,7 @@ def test_constant_and_zero_machines(tmp_path: Path) -> None:
     assert not zero.error_mm(points, (5, 0, -120)).any()
 
 
-@pytest.mark.parametrize("chain", machines.CHAINS)
+@pytest.mark.parametrize("chain", some_fast(machines.CHAINS, 4))
 def test_random_machines_are_as_large_as_asked_and_repeat(tmp_path: Path, chain: str) -> None:
     recipe = Recipe(chain=chain, off_datum=True, cyclic=False)
     first = machines.random_machine(tmp_path / "a", 5, recipe)

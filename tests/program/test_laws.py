@@ -98,6 +98,7 @@ def test_l1_text_in_a_comment_is_opaque(zero: dict[str, Path], dialect: str, noi
     assert olp.correct(data, zero[dialect]).data == data
 
 
+@pytest.mark.slow
 @given(
     seed=st.integers(0, 2**20),
     cuts=st.lists(st.tuples(st.integers(0, 4000), st.binary(max_size=4)), max_size=6),
@@ -174,6 +175,7 @@ def commanded(nominal_mm: np.ndarray, text: bytes, path: Path) -> np.ndarray:
     return np.asarray(own[match(own, want)] - want)
 
 
+@pytest.mark.slow
 @given(seed=st.integers(0, 2**16), digits=st.sampled_from([2, 3, 4]))
 @settings(max_examples=12)
 def test_l4_absolute_words_within_half_a_digit(bent: Path, seed: int, digits: int) -> None:

@@ -319,6 +319,7 @@ def test_a_number_written_again_is_the_same_text(text: str) -> None:
         assert again == text.encode()
 
 
+@pytest.mark.slow
 @given(st.binary(max_size=300))
 def test_any_bytes_are_read_or_refused(data: bytes) -> None:
     for reader in (read_dmis, lambda d: read_table(d, detected_layout(["X_mm,Y_mm,Z_mm"]))):  # type: ignore[arg-type]

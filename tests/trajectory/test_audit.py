@@ -155,6 +155,7 @@ def test_a_search_finds_no_less_than_the_known_segments(seed, count):
     assert path_deviation(parts.motion, route).max() <= 0.05 * (1 + 1e-6)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=40)
 @given(st.integers(0, 10**6), st.integers(3, 60))
 def test_no_place_is_farther_than_the_bound(seed, count):

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cases.fast import some_fast
 from hypothesis import given
 from hypothesis import strategies as st
 from program.feeds.test_timing import reading, setup_of
@@ -305,7 +306,7 @@ def test_incremental_drives_the_same_route(points: list[tuple[float, ...]]) -> N
 # -- the programs that the project ships ---------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", JOBS)
+@pytest.mark.parametrize("name", some_fast(JOBS, 3))
 def test_shipped_programs_and_their_corrections_give_routes(name: str) -> None:
     path = FOLDER / name
     machine, job = path.with_name("machine.toml"), path.with_name(JOBS[name])

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 from cases.acceptance import ROUNDING, TOLERANCE_UM, judged
+from cases.fast import some_fast
 from judge.model import JudgeModel
 
 import olp
@@ -53,7 +54,7 @@ def test_every_program_has_its_job() -> None:
         assert ((FOLDER / name).with_name(text["program"])).is_file()
 
 
-@pytest.mark.parametrize("name", [name for name in JOBS if name not in REFUSED])
+@pytest.mark.parametrize("name", some_fast([name for name in JOBS if name not in REFUSED], 3))
 def test_the_job_is_corrected(name: str) -> None:
     nominal, result = run(name)
     deviation = result.report["deviation"]

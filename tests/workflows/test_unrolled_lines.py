@@ -296,7 +296,7 @@ LAW = (
 )
 
 
-@pytest.mark.parametrize(("text", "control"), some_fast(product(LAW, ("linuxcnc", "fanuc", "haas")), 5))
+@pytest.mark.parametrize(("text", "control"), some_fast(product(LAW, ("linuxcnc", "fanuc", "haas")), 10))
 def test_correcting_an_unrolled_program_is_unrolling_and_correcting(
     control: str, text: str, controls: Mapping[str, Path]
 ) -> None:
@@ -397,6 +397,7 @@ def _index(*numbers: int) -> Any:
     return np.array(numbers, np.int64)
 
 
+@pytest.mark.slow
 def test_feeds_and_times_are_told_by_lines_of_the_original(folder: Path) -> None:
     silent, machine = "#1 = 0\n" * SILENT, folder / "machine.toml"
     text = silent + "G21 G90 G54\nG0 X10 Y10 Z5\n" + LOOP.format("G93\nG1 X[20 * #1] F10\nG94\n")

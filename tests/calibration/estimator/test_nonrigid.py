@@ -66,6 +66,7 @@ def test_a_sag_is_found_and_the_residual_falls_with_tools_not_measured_with(
         assert both < 6.5
 
 
+@pytest.mark.slow
 def test_its_uncertainty_is_that_of_its_residual(bent: tuple[simulated.Machine, Fit, NonRigid]) -> None:
     machine, _, result = bent
     position, tool = positions(200), np.array(FRESH[0])

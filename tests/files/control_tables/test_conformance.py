@@ -150,6 +150,7 @@ def test_what_is_no_table_is_refused(form: Format, data: bytes) -> None:
         form.read(Path(f"folder/g{form.ending}"), given_for(form), lambda path: data)
 
 
+@pytest.mark.slow
 def test_no_other_module_names_a_format() -> None:
     """Names that are dialects too are not checked."""
     names = set(FORMATS) - set(DIALECTS)

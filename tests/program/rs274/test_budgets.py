@@ -86,6 +86,7 @@ def test_unrolling_is_bounded_by_the_bytes_of_visited_blocks(
     assert caught.value.line is not None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("expand", some_fast([False, True], 2))
 def test_strokes_of_unrolled_cycles_are_bounded(expand: bool) -> None:
     text = HEAD + "o1 repeat [99]\nG91 G81 X0.001 Z-1 R1 L19999\no1 endrepeat\nM2\n"

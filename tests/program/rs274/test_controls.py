@@ -100,7 +100,7 @@ CYCLES: dict[str, tuple[str, dict[str, str]]] = {
     ),
     "feeds_home": (
         "G0 X0. Y0. Z9.\nG98 G89 X1. Y1. Z-2. R3. P1. F60.\nG80",
-        {LINUXCNC: "G4 P1|G1 Z9|"} | dict.fromkeys(_ISO, "G4 P1|G1 Z3.|G0 Z9."),
+        {LINUXCNC: "G4 P1|G1 Z9|"} | dict.fromkeys(_ISO, "G4 P1000|G1 Z3.|G0 Z9."),
     ),
     "taps_in_any_plane": (
         "G18 M3 S100\nG0 X0. Y9. Z0.\nG84 X1. Z1. Y-2. R3. F60.",
