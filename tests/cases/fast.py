@@ -29,7 +29,8 @@ def in_each(cases: Iterable[Case], name: Callable[[Case], str]) -> Callable[[Cal
                     function(case)
                 except AssertionError as error:
                     wrong.append(f"{name(case)}: {error}")
-            assert wrong == []
+            if wrong:
+                pytest.fail("\n".join(wrong))
 
         test.__name__, test.__doc__ = function.__name__, function.__doc__
         return test

@@ -339,6 +339,7 @@ def test_an_expansion_that_states_nothing_expands_nothing() -> None:
         ({"position_mm": []}, "curve of axis X: 0 positions; expected at least 2"),
         ({"position_mm": [[0.0, 1.0], [2.0, 3.0]]}, "curve of axis X: 4 positions; expected at least 2"),
         ({"position_mm": [0.0, 50.0, math.inf]}, "curve of axis X: positions do not strictly increase"),
+        ({"position_mm": [0.0, 50.0, 1.01e9]}, "curve of axis X: a position is beyond 1e+09 mm"),
         ({"position_mm": [0.0, 50.0, 49.0]}, "curve of axis X: positions do not strictly increase"),
         ({"columns": {"EXX": [0, 0]}}, "curve of axis X: column EXX is not a finite number at each of 3"),
         (

@@ -44,6 +44,10 @@ Interpolation = Literal["linear", "pchip"]
 CELLS = 16
 
 
+#: mm; no machine is as long, and powers of such lengths are still numbers.
+_FARTHEST_MM = 1e9
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Curve:
     """Component errors of one axis along one measuring line.
@@ -83,6 +87,8 @@ class Curve:
             problems.append(
                 f"{label}: positions do not strictly increase; sort them and average repeated ones"
             )
+        elif np.abs(x).max() > _FARTHEST_MM:
+            problems.append(f"{label}: a position is beyond {_FARTHEST_MM:g} mm; check the numbers")
         if bool(self.columns) == bool(self.forward) or set(self.forward) != set(self.backward):
             problems.append(f"{label}: expected columns of the mean, or the same columns in both directions")
         for name, values in (*self.columns.items(), *self.forward.items(), *self.backward.items()):
