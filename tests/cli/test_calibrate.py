@@ -215,6 +215,7 @@ def test_squareness_of_a_check_goes_into_a_fit(tmp_path: Path) -> None:
     assert sigma[0] < 0.5 * sigma[1]
 
 
+@pytest.mark.slow
 def test_go_return(tmp_path: Path) -> None:
     target = tmp_path / "b.toml"
     good("go-return", *sorted(CHECKS.glob("go-return-*.csv")), "-o", target, "--plot", tmp_path / "b.svg")
@@ -258,6 +259,7 @@ def test_squareness_in_all_conventions() -> None:
     assert call("squareness", "C0Y").exit_code == 2
 
 
+@pytest.mark.slow
 def test_report_of_a_fit(tmp_path: Path) -> None:
     page, target = tmp_path / "fit.md", tmp_path / "calibration.toml"
     good("fit", LINES, "-m", LINES / "machine.toml", "-o", target, "--report", page, "-q")

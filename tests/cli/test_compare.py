@@ -100,6 +100,7 @@ def test_points_left_out(nominal: Path) -> None:
     assert codes(compared(nominal, points)[1]) == set()
 
 
+@pytest.mark.slow
 def test_part_not_measured(nominal: Path) -> None:
     points = bent(2000)
     assert codes(compared(nominal, np.concatenate((points[:800], points[900:])))[1]) == {"OLP603"}

@@ -47,6 +47,7 @@ def anchor(title: str) -> str:
 # -- sentences and words -------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @in_each([*PAGES, *modules()], name_of)
 def test_no_sentence_is_too_long(path: Path) -> None:
     sentences = of_paper(path) if path.suffix == ".md" else of_module(path)
@@ -68,6 +69,7 @@ def test_messages_are_short_in_the_mean() -> None:
     assert mean(sentence for path in modules() for sentence in of_module(path)) <= MEAN
 
 
+@pytest.mark.slow
 @in_each(sorted({*PAGES, *modules()} - HISTORY), name_of)
 def test_words_are_those_of_the_field(path: Path) -> None:
     lines = path.read_text("utf-8").splitlines()

@@ -8,6 +8,7 @@ import tokenize
 from collections.abc import Iterator
 from pathlib import Path
 
+import pytest
 from cases.fast import in_each
 
 import olp
@@ -62,11 +63,13 @@ def broken_strings(source: str) -> Iterator[int]:
             held = None
 
 
+@pytest.mark.slow
 @in_each(MODULES, lambda path: path.relative_to(PACKAGE).as_posix())
 def test_a_constant_stands_on_a_line_of_its_own(path: Path) -> None:
     assert list(several_in_a_line(ast.parse(path.read_text("utf-8")))) == []
 
 
+@pytest.mark.slow
 @in_each(MODULES, lambda path: path.relative_to(PACKAGE).as_posix())
 def test_no_sentence_is_broken_into_single_words(path: Path) -> None:
     assert list(broken_strings(path.read_text("utf-8"))) == []

@@ -56,6 +56,7 @@ def brute(motion: Motion, count: int):
     return [np.abs(x).max(axis=0) for x in derivatives], np.sqrt((derivatives[0] ** 2).sum(axis=1)).max()
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=200)
 @given(motions(composed=False))
 def test_cubics_are_measured_exactly(motion):

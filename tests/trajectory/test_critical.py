@@ -137,6 +137,7 @@ def test_what_is_reached_is_reached_in_the_length(v0: float, length: float, a: f
         assert need >= length * (1.0 - 1e-6 - known)
 
 
+@pytest.mark.slow
 @settings(max_examples=300, deadline=None)
 @given(_SPEED, _SPEED, st.floats(0.0, 8.0), _POSITIVE, _POSITIVE, st.floats(0.0, 1.0))
 def test_ramps_fit_under_the_peak(

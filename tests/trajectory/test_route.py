@@ -290,6 +290,7 @@ def test_inches_drive_the_same_route(points: list[tuple[float, ...]], mode: str)
         np.testing.assert_array_equal(a.tolerance_mm, b.tolerance_mm)
 
 
+@pytest.mark.slow
 @given(corners)
 def test_incremental_drives_the_same_route(points: list[tuple[float, ...]]) -> None:
     rows, here = ["G91 F60"], (0, 0, 0)

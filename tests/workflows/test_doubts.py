@@ -383,6 +383,7 @@ def test_every_verb_tells_it(verb: str, name: str, tmp_path: Path) -> None:
     assert re.search(rf"{code}", output)
 
 
+@pytest.mark.slow
 def test_what_was_accepted_is_in_stamp_and_report_and_holds_for_the_corrected_program(tmp_path: Path) -> None:
     folder = written(tmp_path / "slip")
     swap(C, "C0Y_urad = .*", "C0Y_urad = 9000.0")(folder)

@@ -189,6 +189,7 @@ def test_tables_name_the_file_beside_the_line(folder: Path, monkeypatch: pytest.
     assert Path("flat.csv").read_text().splitlines()[1] == "X_mm,Y_mm,Z_mm,line"
 
 
+@pytest.mark.slow
 def test_the_lines_of_a_loop_are_added_up(folder: Path) -> None:
     used = olp.retime(folder / "part.ngc", folder / "machine.toml", flatten=True)
     flat = olp.retime(folder / "flat.ngc", folder / "machine.toml")

@@ -77,6 +77,7 @@ def test_its_uncertainty_is_that_of_its_residual(bent: tuple[simulated.Machine, 
     assert np.mean(np.abs(z) < 2.0) > 0.88
 
 
+@pytest.mark.slow
 def test_held_out_readings_are_predicted_better(bent: tuple[simulated.Machine, Fit, NonRigid]) -> None:
     figures = bent[2].figures
     assert figures is not None

@@ -54,6 +54,7 @@ def rewritten(change: Callable[[zipfile.ZipInfo, bytes], bytes], **settings: Any
     return stream.getvalue()
 
 
+@pytest.mark.slow
 def test_every_cut_and_many_flips_of_bits_are_refused_or_read() -> None:
     draw = random.Random(8)
     cuts = [GOOD[:k] for k in range(0, len(GOOD), 7)]
