@@ -298,7 +298,7 @@ def _uncertainty(
     if loaded.uncertainty is None:
         return None
     unknowns, _, _ = unknowns_of(loaded, loaded.uncertainty, date)
-    points = Points(samples.move, samples.axis_mm, samples.uncorrected, samples.result, samples.play)
+    points = Points(samples.move, samples.axis_mm, samples.uncorrected, samples.corrected, samples.play)
     covariance = covariances(unknowns, nominal.toolpath, points)
     band = bands(covariance).astype(np.float32)
     if part_tolerance_um is None:
@@ -306,7 +306,7 @@ def _uncertainty(
     radius = part_tolerance_um * MM_PER_UM
     beyond = {
         name: np.asarray(1.0 - within(covariance, deviation, radius), np.float32)
-        for name, deviation in (("uncorrected", points.before_mm), ("result", points.after_mm))
+        for name, deviation in (("uncorrected", points.before_mm), ("corrected", points.after_mm))
     }
     return TipUncertainty(radius, band, beyond)
 

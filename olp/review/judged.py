@@ -31,14 +31,14 @@ def judged_lines(scene: Scene, arrays: Arrays) -> dict[str, Any]:
     and, where there are runs, measured), and of each layer deviation and state."""
     table = scene.table.by_line()
     columns = {
-        "uncorrected": _line_column(scene, arrays, "error_um", table["line"], table["uncorrected_um"]),
-        "result": _line_column(scene, arrays, "result_um", table["line"], table["corrected_um"]),
+        "uncorrected": _line_column(scene, arrays, "uncorrected_um", table["line"], table["uncorrected_um"]),
+        "corrected": _line_column(scene, arrays, "corrected_um", table["line"], table["corrected_um"]),
     }
     states = {
         "uncorrected": _line_states(scene, arrays, "uncorrected", table["line"], table["uncorrected_state"]),
-        "result": _line_states(scene, arrays, "result", table["line"], table["corrected_state"]),
+        "corrected": _line_states(scene, arrays, "corrected", table["line"], table["corrected_state"]),
     }
-    shown = {"error_um": columns["uncorrected"], "result_um": columns["result"], "measured_um": None}
+    shown = {"uncorrected_um": columns["uncorrected"], "corrected_um": columns["corrected"], "measured_um": None}
     runs = scene.table.measured
     if runs is not None:
         shown["measured_um"] = _line_column(scene, arrays, "measured_um", table["line"], table["measured_um"])
@@ -74,9 +74,9 @@ def statistics(scene: Scene) -> Iterator[dict[str, Any]]:
     deviation, table = scene.report["deviation"], scene.table
     largest = {
         "uncorrected": float(np.nan_to_num(table.uncorrected[table.judged]).max(initial=0.0)) * UM_PER_MM,
-        "result": table.largest_mm() * UM_PER_MM,
+        "corrected": table.largest_mm() * UM_PER_MM,
     }
-    for side, layer in (("before", "uncorrected"), ("after", "result")):
+    for side, layer in (("before", "uncorrected"), ("after", "corrected")):
         yield {"label": "largest", "value": largest[layer], "unit": "um", "layer": layer}
         rms, waypoints = deviation[side]["between"]["rms_um"], deviation[side]["waypoints"]["max_um"]
         yield {"label": "rms", "value": float(rms), "unit": "um", "layer": layer}
@@ -98,7 +98,7 @@ def callouts(scene: Scene) -> Iterator[dict[str, Any]]:
     """The worst line, uncorrected and corrected, of the moves that count."""
     table = scene.table
     for layer, words, values in (
-        ("uncorrected", "uncorrected", table.uncorrected), ("result", "corrected", table.corrected),
+        ("uncorrected", "uncorrected", table.uncorrected), ("corrected", "corrected", table.corrected),
     ):  # fmt: skip
         size = np.where(table.judged, np.nan_to_num(values), -1.0)
         if not len(size) or size.max() < 0.0:

@@ -22,8 +22,8 @@ from olp.review.scene import Scene
 LAYERS = (
     ("nominal", "nominal path", "#4477aa", 1.5),
     ("uncorrected", "uncompensated machine", "#ee7733", 2.0),
-    ("corrected", "command, corrected", "#009988", 2.0),
-    ("result", "corrected, predicted", "#33bbee", 2.0),
+    ("command", "corrected command", "#009988", 2.0),
+    ("corrected", "corrected, predicted", "#33bbee", 2.0),
 )
 #: Colours of measured runs.
 MEASURED = ("#cc3377", "#ddaa33", "#997700", "#bbbbbb")
@@ -36,8 +36,6 @@ _PARTS = (
     ("along", "along the path", "diverging"),
     ("normal", "across the path", "sequential"),
 )
-#: The part that is judged.
-_JUDGED = "magnitude"
 #: The part that is judged.
 _JUDGED = "magnitude"
 #: Fewest steps of an error source over its range: colours show no more.
@@ -114,9 +112,9 @@ def _layers(scene: Scene, arrays: Arrays, origin: Array) -> list[dict[str, Any]]
     deltas = {
         "nominal": None,
         "uncorrected": arrays.quantised("d_uncorrected", samples.uncorrected, DEVIATION_MM, keep=True),
-        "corrected": arrays.quantised("d_corrected", samples.correction, DEVIATION_MM, keep=True),
-        "result": arrays.quantised(
-            "d_result", samples.result, DEVIATION_MM, plus=["d_uncorrected", "d_corrected"]
+        "command": arrays.quantised("d_command", samples.correction, DEVIATION_MM, keep=True),
+        "corrected": arrays.quantised(
+            "d_corrected", samples.corrected, DEVIATION_MM, plus=["d_uncorrected", "d_command"]
         ),
     }
     layers = [
@@ -139,12 +137,12 @@ def _layer(
 ) -> dict[str, Any]:
     return {
         "name": name, "label": label, "base": base, "delta": delta, "index": index, "colour": colour,
-        "width": width, "visible": name != "corrected", "exaggerate": True,
+        "width": width, "visible": name != "command", "exaggerate": True,
     }  # fmt: skip
 
 
 def _metrics(scene: Scene, arrays: Arrays) -> list[dict[str, Any]]:
-    names = ["uncorrected", "corrected", "result", *measured_names(scene)]
+    names = ["uncorrected", "command", "corrected", *measured_names(scene)]
     metrics: list[dict[str, Any]] = [
         {
             "name": part, "label": label, "unit": "um", "kind": kind, "of": part,
@@ -176,7 +174,7 @@ def _uncertainty(scene: Scene, arrays: Arrays) -> Iterator[dict[str, Any]]:
     array = arrays.quantised("band", band, step)
     yield {
         "name": "band", "label": "uncertainty (k = 2)", "unit": "um", "kind": "sequential",
-        "by_layer": dict.fromkeys(("uncorrected", "result"), array), "judged": False,
+        "by_layer": dict.fromkeys(("uncorrected", "corrected"), array), "judged": False,
     }  # fmt: skip
     if uncertainty.within_mm is None:
         return

@@ -33,8 +33,8 @@ def add_layers(visualizer: Any, review: Review, *, exaggeration: float = 1000.0,
     deltas = {
         "nominal": np.zeros((1, 3)),
         "uncorrected": scene.samples.uncorrected,
-        "corrected": scene.samples.correction,
-        "result": scene.samples.result,
+        "command": scene.samples.correction,
+        "corrected": scene.samples.corrected,
     }
     for name, _, colour, _ in LAYERS:
         points = scene.position_mm - centre + exaggeration * deltas[name]

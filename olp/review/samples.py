@@ -45,7 +45,7 @@ class Samples:
 
     (n,) nominal `move` and `share` of it. (n,) `part`, the move of the corrected program, and `within`, the
     share of it. (n, 3) `axis_mm` and `command_mm`, nominal and corrected axis positions. (n, 3) `uncorrected`
-    and `result`, deviations of the tip from its nominal point in mm. (n,) `joined`, whether the path leads
+    and `corrected`, deviations of the tip from its nominal point in mm. (n,) `joined`, whether the path leads
     here from the sample before. (n,) `arc_mm` along the path. `play` (n, 3) is that of the nominal commands,
     None where no axis has backlash.
     """
@@ -57,7 +57,7 @@ class Samples:
     axis_mm: Array
     command_mm: Array
     uncorrected: Array
-    result: Array
+    corrected: Array
     joined: Mask
     arc_mm: Array
     play: Array | None
@@ -69,7 +69,7 @@ class Samples:
         """Some of the samples, each once or several times."""
         return Samples(
             self.move[which], self.share[which], self.part[which], self.within[which], self.axis_mm[which],
-            self.command_mm[which], self.uncorrected[which], self.result[which], self.joined[which],
+            self.command_mm[which], self.uncorrected[which], self.corrected[which], self.joined[which],
             self.arc_mm[which], None if self.play is None else self.play[which],
         )  # fmt: skip
 

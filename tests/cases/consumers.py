@@ -185,7 +185,7 @@ def _page_and_table(page: Page, table: Judgements) -> None:
     row = {int(n): k for k, n in enumerate(numbers.tolist()) if n}
     where = [row[int(line)] for line in rows["line"]]
     for layer, column, key in (
-        ("uncorrected", "error_um", "uncorrected"), ("result", "result_um", "corrected"),
+        ("uncorrected", "uncorrected_um", "uncorrected"), ("corrected", "corrected_um", "corrected"),
     ):  # fmt: skip
         own = listing["by_layer"][layer]
         assert own["um"] == listing[column]
@@ -212,7 +212,7 @@ def _named_rows(page: Page, rows: dict[str, Any]) -> None:
     """The rows of an unrolled text, whose lines were made from one of the program, say together what the
     table says of that: the largest of what counts, else of what is shown."""
     listing, made = page.manifest["listing"], _rows_of_lines(page)
-    for layer, key in (("uncorrected", "uncorrected"), ("result", "corrected")):
+    for layer, key in (("uncorrected", "uncorrected"), ("corrected", "corrected")):
         own = listing["by_layer"][layer]
         shown, state = page.array(own["um"]), page.array(own["state"]).astype(int)
         for line, value, verdict in zip(rows["line"], rows[f"{key}_um"], rows[f"{key}_state"], strict=True):
@@ -230,14 +230,14 @@ def _page_and_report(page: Page, stated: dict[str, Any]) -> None:
     assert page.manifest["tolerance_um"] == numerical["allowed_um"]
     figures = {(s["layer"], s["label"]): s["value"] for s in page.manifest["statistics"] if s["layer"]}
     largest = max((row["uncorrected_um"] for row in stated["judgement"]["tools"]), default=0.0)
-    assert figures["result", "largest"] == (numerical["largest_um"] or 0.0)
+    assert figures["corrected", "largest"] == (numerical["largest_um"] or 0.0)
     assert figures["uncorrected", "largest"] == largest
-    for side, layer in (("before", "uncorrected"), ("after", "result")):
+    for side, layer in (("before", "uncorrected"), ("after", "corrected")):
         assert figures[layer, "rms"] == deviation[side]["between"]["rms_um"]
         assert figures[layer, "at waypoints"] == deviation[side]["waypoints"]["max_um"]
     told = {c["layer"]: c["text"] for c in page.manifest["callouts"]}
     if numerical["line"] is not None:
-        assert told["result"] == (
+        assert told["corrected"] == (
             f"largest, corrected: {numerical['largest_um']:.2f} µm, line {numerical['line']}"
         )
     assert [f["message"] for f in page.manifest["findings"]][: len(stated["findings"])] == [

@@ -117,14 +117,14 @@ def test_positions_deviations_and_times_unpack_to_what_was_packed(page: Any, rev
     for name, truth, step in (
         ("P", scene.position_mm - origin, 1e-4),
         ("d_uncorrected", scene.samples.uncorrected, 1e-6),
-        ("d_corrected", scene.samples.correction, 1e-6),
-        ("d_result", scene.samples.result, 1e-6),
+        ("d_command", scene.samples.correction, 1e-6),
+        ("d_corrected", scene.samples.corrected, 1e-6),
         ("t", scene.time_s[:, None], 1e-6),
         ("s", scene.samples.arc_mm[:, None], 1e-3),
     ):
         unpacked = array(page, name, truth.shape[1]).reshape(truth.shape)
-        # "result" is a sum of three roundings
-        share = 1.5 if name == "d_result" else 0.5
+        # "corrected" is a sum of three roundings
+        share = 1.5 if name == "d_corrected" else 0.5
         assert np.abs(unpacked - truth).max() <= share * step * (1 + 1e-6), name
 
 
@@ -205,16 +205,16 @@ def test_layers_come_and_go(page: Any) -> None:
     before = colourful(browser.picture(page))
     assert before > 500
     drawn = page.evaluate("olp.drawn")
-    assert drawn["nominal"] > 0 and drawn["result"] > 0 and drawn["corrected"] == 0
-    for name in ("nominal", "uncorrected", "result", "rapids", "tool", "machine"):
+    assert drawn["nominal"] > 0 and drawn["corrected"] > 0 and drawn["command"] == 0
+    for name in ("nominal", "uncorrected", "corrected", "rapids", "tool", "machine"):
         page.uncheck(f"#layer-{name}")
     page.evaluate("() => { olp.state.callouts = []; olp.app.overlay.draw(); }")
     still(page)
     assert not any(page.evaluate("olp.drawn").values())
     assert colourful(browser.picture(page)) < before / 2
-    page.check("#layer-corrected")
+    page.check("#layer-command")
     still(page)
-    assert page.evaluate("olp.drawn.corrected") > 0
+    assert page.evaluate("olp.drawn.command") > 0
 
 
 def test_what_is_drawn_is_base_plus_k_times_deviation(page: Any, review: Review) -> None:
@@ -273,7 +273,7 @@ def parts_of(review: Review, delta: np.ndarray) -> dict[str, np.ndarray]:
 def test_metrics_are_the_parts_of_the_deviation(page: Any, review: Review) -> None:
     scene = review.scene
     rapid = array(page, "rapid") != 0
-    for layer, delta in (("uncorrected", scene.samples.uncorrected), ("result", scene.samples.result)):
+    for layer, delta in (("uncorrected", scene.samples.uncorrected), ("corrected", scene.samples.corrected)):
         for name, truth in parts_of(review, delta).items():
             page.evaluate("name => olp.set_metric(name)", name)
             shown = np.array(
@@ -302,11 +302,11 @@ def test_the_path_is_coloured_by_band_and_by_probability(chromium: Any, tmp_path
     review.write(tmp_path / "sure.html")
     with browser.opened(chromium, tmp_path / "sure.html") as page:
         rapid = array(page, "rapid") != 0
-        for name, truth in (("band", 1e3 * sure.band_mm), ("beyond", 100.0 * sure.beyond["result"])):
+        for name, truth in (("band", 1e3 * sure.band_mm), ("beyond", 100.0 * sure.beyond["corrected"])):
             page.select_option("#metric", name)
             shown = np.array(
                 page.evaluate(
-                    "Array.from(olp.app.metrics.values(olp.app.metrics.find(olp.state.metric), 'result'),"
+                    "Array.from(olp.app.metrics.values(olp.app.metrics.find(olp.state.metric), 'corrected'),"
                     " v => Number.isNaN(v) ? null : v)"
                 ), float,
             )  # fmt: skip
@@ -323,7 +323,7 @@ def test_the_scale_is_round_symmetric_where_signed_and_takes_numbers(page: Any) 
     page.select_option("#metric", "magnitude")
     low, high = float(page.input_value("#scale-min")), float(page.input_value("#scale-max"))
     largest = page.evaluate(
-        "Math.max(...['uncorrected', 'corrected', 'result']"
+        "Math.max(...['uncorrected', 'command', 'corrected']"
         ".map(n => olp.app.metrics.summary(olp.app.plot_metric(), n, 1).largest))"
     )
     assert low == 0 and largest <= high <= 1.7 * largest
@@ -332,12 +332,12 @@ def test_the_scale_is_round_symmetric_where_signed_and_takes_numbers(page: Any) 
     page.fill("#scale-max", "7.5")
     page.press("#scale-max", "Enter")
     assert float(page.input_value("#scale-min")) == -7.5
-    assert page.evaluate("olp.app.scene.lines.get('result').uniforms.high.value") == 7.5
+    assert page.evaluate("olp.app.scene.lines.get('corrected').uniforms.high.value") == 7.5
     page.click("#scale-auto")
     assert float(page.input_value("#scale-max")) != 7.5
     page.select_option("#metric", "")
     assert page.is_hidden("#legend")
-    assert page.evaluate("olp.app.scene.lines.get('result').uniforms.coloured.value") == 0
+    assert page.evaluate("olp.app.scene.lines.get('corrected').uniforms.coloured.value") == 0
 
 
 def lightness(rgb: np.ndarray) -> np.ndarray:
@@ -387,7 +387,7 @@ def test_pass_and_fail_are_the_states_of_the_table(page: Any, review: Review) ->
     table = review.scene.table.by_line()
     path, samples = review.scene.nominal.toolpath, review.scene.samples
     rapid = array(page, "rapid") != 0
-    for layer, key in (("uncorrected", "uncorrected_state"), ("result", "corrected_state")):
+    for layer, key in (("uncorrected", "uncorrected_state"), ("corrected", "corrected_state")):
         state = dict(zip(table["line"].tolist(), table[key].tolist(), strict=True))
         truth = np.array([state[line] for line in path.line[samples.move].tolist()])
         shown = page.evaluate(
@@ -395,7 +395,7 @@ def test_pass_and_fail_are_the_states_of_the_table(page: Any, review: Review) ->
         )
         judged = [None if r or s > 1 else s + 1 for s, r in zip(truth.tolist(), rapid.tolist(), strict=True)]
         assert shown == judged
-    assert page.evaluate("olp.app.layers.get('corrected').values") is None
+    assert page.evaluate("olp.app.layers.get('command').values") is None
     assert page.evaluate("document.getElementById('legend-title').textContent") == "line"
     # what the table does not judge has no pass and no fail
     page.select_option("#metric", "z")
@@ -519,7 +519,7 @@ PLACE = "path => olp.app.scene.viewer.scene_tree.find(['olp', ...path]).object.p
 
 def test_scrubbing_moves_tool_and_machine(page: Any, review: Review) -> None:
     scene = review.scene
-    page.evaluate("olp.set_layer('result', false)")
+    page.evaluate("olp.set_layer('corrected', false)")
     nodes = page.evaluate("olp.manifest.nodes")
     axes = array(page, "Q", 3)
     assert len(nodes) == 3
@@ -770,7 +770,7 @@ def test_notes_survive_in_the_saved_file(chromium: Any, file: Path, tmp_path: Pa
 def test_a_view_can_be_sent_in_the_address(chromium: Any, file: Path) -> None:
     with browser.opened(chromium, file) as page:
         page.evaluate(
-            "() => { olp.set_exaggeration(321); olp.set_metric('y'); olp.set_layer('corrected', true);"
+            "() => { olp.set_exaggeration(321); olp.set_metric('y'); olp.set_layer('command', true);"
             " olp.set_time(4.5); olp.app.set_view('front'); olp.app.set_theme('dark');"
             " olp.app.scale.set_range(-3, 3); }"
         )
@@ -882,7 +882,7 @@ def synthetic(rows: int, samples: int) -> tuple[dict[str, Any], bytes]:
         "metrics": [{"name": "magnitude", "label": "deviation", "unit": "um", "kind": "sequential",
                      "of": "magnitude", "by_layer": {"uncorrected": None}, "judged": True}],
         "listing": {"nominal": "text", "corrected": None, "row_nominal": "number", "row_corrected": None,
-                    "error_um": "error", "result_um": None},
+                    "uncorrected_um": "error", "corrected_um": None},
         "statistics": [], "findings": [], "callouts": [], "frame": "machine", "tool_radius_mm": 3,
         "arrays": arrays.specs,
     }  # fmt: skip
@@ -945,7 +945,7 @@ def test_measured_paths_and_workpieces_stand_beside_the_rest(chromium: Any, tmp_
         )
         # across the path the measured points are those of the uncompensated machine
         assert 0.2 * uncorrected < measured < 1.2 * uncorrected
-        for name in ("nominal", "uncorrected", "result", "rapids"):
+        for name in ("nominal", "uncorrected", "corrected", "rapids"):
             page.evaluate("name => olp.set_layer(name, false)", name)
         page.click("#view-top")
         x, y = page.evaluate("(n => olp.project(olp.app.samples >> 1, n))('measured')")

@@ -99,7 +99,7 @@ def test_a_line_is_never_farther_off_its_path_than_its_samples_are_off_their_poi
     machine = random_machine(tmp_path / "m", 3, Recipe())
     page = Page(olp.view(TEXT.encode(), machine, time=False).html())
     row = page.array("line").astype(int)
-    for name, layer in (("error_um", "uncorrected"), ("result_um", "result")):
+    for name, layer in (("uncorrected_um", "uncorrected"), ("corrected_um", "corrected")):
         size = np.linalg.norm(page.array(page.layer(layer)["delta"]), axis=1) * 1e3
         stated = page.array(page.manifest["listing"][name])
         # below 0: not known

@@ -172,7 +172,7 @@ def test_several_measurements_are_layers_each(tmp_path: Path) -> None:
     other = written(tmp_path, path.read_bytes(), "second.csv")
     page = Page(olp.view(TEXT.encode(), machine, measured=[path, other], time=False).html())
     names = [layer["name"] for layer in page.manifest["layers"]]
-    assert names == ["nominal", "uncorrected", "corrected", "result", "measured-1", "measured-2"]
+    assert names == ["nominal", "uncorrected", "command", "corrected", "measured-1", "measured-2"]
     assert {"measured-1", "measured-2"} <= set(page.manifest["metrics"][0]["by_layer"])
 
 

@@ -48,13 +48,13 @@ def test_layers_are_drawn_where_their_deviations_lead_to(review: Review) -> None
     olp.add_layers(vis, review, exaggeration=100.0, under="job")
     names = {name for name in vis.held if "/bodies/" not in name}
     assert names == {
-        f"/job/{layer}" for layer in ("nominal", "uncorrected", "corrected", "result", "measured-1")
+        f"/job/{layer}" for layer in ("nominal", "uncorrected", "command", "corrected", "measured-1")
     }
     nominal = points(vis.held["/job/nominal"])
     # metres
     away = points(vis.held["/job/uncorrected"]) - nominal
     np.testing.assert_allclose(away, np.tile([3e-3, -2e-3, 1e-3], (len(nominal), 1)), atol=1e-7)
-    np.testing.assert_allclose(points(vis.held["/job/result"]), nominal, atol=1e-7)
+    np.testing.assert_allclose(points(vis.held["/job/corrected"]), nominal, atol=1e-7)
     assert nominal[:, 0].max() - nominal[:, 0].min() == pytest.approx(0.1)
     bodies = {name.rpartition("/")[2] for name in vis.held if "/bodies/" in name}
     assert bodies == {body.name for body in review.scene.bodies}

@@ -237,8 +237,8 @@ def test_layers_are_the_samples_to_a_nanometre(machine: Path) -> None:
     axes = page.array("Q") + np.array(page.manifest["axes_origin_mm"])
     assert np.abs(axes - scene.samples.axis_mm).max() <= 0.5e-4 + 1e-10
     deltas = {
-        "uncorrected": scene.samples.uncorrected, "corrected": scene.samples.correction,
-        "result": scene.samples.result,
+        "uncorrected": scene.samples.uncorrected, "command": scene.samples.correction,
+        "corrected": scene.samples.corrected,
     }  # fmt: skip
     for name, delta in deltas.items():
         assert np.abs(page.array(page.layer(name)["delta"]) - delta).max() <= 0.5e-6 + 1e-12
@@ -314,10 +314,10 @@ def test_a_corrected_program_is_shown_as_it_is(machine: Path) -> None:
     result = olp.correct(TEXT, machine)
     ours = olp.view(TEXT, machine, correction=result, time=False).scene
     theirs = olp.view(TEXT, machine, corrected=result.data, time=False).scene
-    np.testing.assert_array_equal(ours.samples.result, theirs.samples.result)
+    np.testing.assert_array_equal(ours.samples.corrected, theirs.samples.corrected)
     raw = olp.view(TEXT, machine, corrected=TEXT, time=False).scene
     ends = raw.samples.share == 1.0
-    np.testing.assert_allclose(raw.samples.result[ends], raw.samples.uncorrected[ends], atol=1e-12)
+    np.testing.assert_allclose(raw.samples.corrected[ends], raw.samples.uncorrected[ends], atol=1e-12)
     assert raw.report["deviation"]["holds"] is False
 
 
@@ -339,7 +339,7 @@ def test_a_correction_of_an_unrolled_program_is_shown_beside_it(
 
         monkeypatch.setattr(where, key, counted)
     theirs = olp.view(text, machine, corrected=corrected.data, flatten=True, time=False).scene
-    np.testing.assert_array_equal(ours.samples.result, theirs.samples.result)
+    np.testing.assert_array_equal(ours.samples.corrected, theirs.samples.corrected)
     assert theirs.report["deviation"] == ours.report["deviation"]
     # each text is read once
     assert sorted(calls) == ["load", "read", "read"]
@@ -392,15 +392,15 @@ def test_the_page_colours_by_band_and_by_probability(tmp_path: Path) -> None:
     sure, page = review.scene.uncertainty, Page(review.html())
     assert sure is not None
     metrics: dict[str, Any] = {m["name"]: m for m in page.manifest["metrics"]}
-    band = page.array(metrics["band"]["by_layer"]["result"])
+    band = page.array(metrics["band"]["by_layer"]["corrected"])
     assert sure.band_mm.max() > 1e-3
     assert np.abs(band - sure.band_mm * 1e3).max() <= max(sure.band_mm.max() * 5.0, 0.001)
     assert metrics["beyond"]["label"] == "probability beyond 3 µm"
-    for layer in ("uncorrected", "result"):
+    for layer in ("uncorrected", "corrected"):
         shown = page.array(metrics["beyond"]["by_layer"][layer])
         assert np.abs(shown - 100.0 * sure.beyond[layer]).max() <= 0.051
     # points far off are beyond the tolerance with probability 1
     away = np.linalg.norm(review.scene.samples.uncorrected, axis=1) > 3e-3 + 3.0 * sure.band_mm
     assert away.any() and (sure.beyond["uncorrected"][away] > 0.99).all()
     # at the touch-off, or where a sure path is right, nothing is beyond
-    assert (sure.beyond["result"][sure.band_mm < 1e-3] < 0.01).all()
+    assert (sure.beyond["corrected"][sure.band_mm < 1e-3] < 0.01).all()

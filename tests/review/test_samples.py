@@ -70,7 +70,7 @@ def test_what_is_left_is_what_the_proof_says(name: str) -> None:
         pytest.skip("the proof leaves out moves that are shown")
     plain = (path.kind != Kind.RAPID) & ((path.flag & np.uint8(Flag.CYCLE | Flag.WHOLE | Flag.PASS)) == 0)
     feed = plain[samples.move]
-    after, before = (size_um(delta)[feed] for delta in (samples.result, samples.uncorrected))
+    after, before = (size_um(delta)[feed] for delta in (samples.corrected, samples.uncorrected))
     deviation = scene.report["deviation"]
     assert after.max(initial=0.0) <= deviation["allowed_um"] + 1e-3
     ends = (samples.share == 1.0)[feed]
@@ -94,12 +94,12 @@ def test_the_uncorrected_machine_is_the_judges(name: str, tmp_path: Path) -> Non
         error = judge.error_mm(samples.axis_mm[mine], np.array(path.frames[frame].tool_mm))
         np.testing.assert_allclose(samples.uncorrected[mine], error, atol=1e-7)
         command = judge.error_mm(samples.command_mm[mine], np.array(path.frames[frame].tool_mm))
-        np.testing.assert_allclose(samples.result[mine], samples.correction[mine] + command, atol=1e-7)
+        np.testing.assert_allclose(samples.corrected[mine], samples.correction[mine] + command, atol=1e-7)
 
 
 def test_no_error_no_deviation(tmp_path: Path) -> None:
     scene = viewed(tmp_path, zero_machine(tmp_path / "m"), "G1 X100 Y50 F600\nG2 X140 Y90 I40 J0\nM2\n").scene
-    for delta in (scene.samples.uncorrected, scene.samples.correction, scene.samples.result):
+    for delta in (scene.samples.uncorrected, scene.samples.correction, scene.samples.corrected):
         assert np.abs(delta).max() == 0.0
     assert scene.sources == ()
 
@@ -113,7 +113,7 @@ def test_a_machine_that_is_off_everywhere(tmp_path: Path) -> None:
     np.testing.assert_allclose(
         scene.samples.correction * 1e3, np.tile([-30.0, 20.0, -10.0], (len(scene.samples), 1))
     )
-    assert np.abs(scene.samples.result).max() < 1e-9
+    assert np.abs(scene.samples.corrected).max() < 1e-9
     assert [name for name, _ in scene.sources] == ["EXX", "EYY", "EZZ"]
     assert [float(part.max()) * 1e3 for _, part in scene.sources] == pytest.approx([30.0, 20.0, 10.0])
 
@@ -141,11 +141,11 @@ def test_between_way_points_the_tip_is_beside_the_path(tmp_path: Path) -> None:
         (path.kind[samples.move[inner]] != Kind.RAPID) & (samples.move[inner] == samples.move[inner - 1])
     ]
     step = samples.axis_mm[inner + 1] - samples.axis_mm[inner - 1]
-    along = np.einsum("ij,ij->i", samples.result[inner], step) / np.linalg.norm(step, axis=1)
+    along = np.einsum("ij,ij->i", samples.corrected[inner], step) / np.linalg.norm(step, axis=1)
     # except for the rounding of waypoints
-    ends = np.linalg.norm(samples.result[samples.within == 1.0], axis=1)
+    ends = np.linalg.norm(samples.corrected[samples.within == 1.0], axis=1)
     assert np.abs(along).max() < min(ends.max() + 1e-5, 0.87e-3)
-    assert size_um(samples.result[inner]).max() > 0.05
+    assert size_um(samples.corrected[inner]).max() > 0.05
 
 
 def test_a_program_that_is_left_as_it_is_deviates_as_before(tmp_path: Path) -> None:
@@ -153,7 +153,7 @@ def test_a_program_that_is_left_as_it_is_deviates_as_before(tmp_path: Path) -> N
     machine = shift_machine(tmp_path / "m", (30.0, -20.0, 10.0))
     text = HEAD + "G1 X100 Y50 F600\nG2 X140 Y90 I40 J0\nM2\n"
     samples = olp.view(text.encode(), machine, corrected=text.encode(), time=False).scene.samples
-    np.testing.assert_allclose(samples.result, samples.uncorrected, atol=1e-9)
+    np.testing.assert_allclose(samples.corrected, samples.uncorrected, atol=1e-9)
     assert not samples.correction.any()
 
 

@@ -7,7 +7,7 @@
 
   const AXES = {light: ["#c8500a", "#00805d", "#0068a8"], dark: ["#ff9a5c", "#4fd0a5", "#6cbcf5"]};
   OLP.NEUTRAL = "#77818d";
-  const JUDGED = ["measured", "result", "uncorrected", "corrected"];
+  const JUDGED = ["measured", "corrected", "uncorrected", "command"];
   const RANKED = 500;
 
   class App {
@@ -225,7 +225,7 @@
     // Layer of the tool, and the position of the tool (mm, enlarged).
     tool_layer() {
       return (
-        ["result", "corrected", "nominal"].map(n => this.layers.get(n)).find(l => l?.visible) ?? this.layers.values().next().value
+        ["corrected", "command", "nominal"].map(n => this.layers.get(n)).find(l => l?.visible) ?? this.layers.values().next().value
       );
     }
     tool_point() {

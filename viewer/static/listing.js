@@ -15,7 +15,7 @@
       this.texts = [get(listing.nominal), get(listing.corrected)];
       this.numbers = [get(listing.row_nominal), get(listing.row_corrected)];
       this.names = get(listing.names); // of the nominal lines, where they were unrolled from others
-      this.errors = [listing.error_um, listing.result_um, listing.measured_um].map(get); // below 0: not known
+      this.errors = [listing.uncorrected_um, listing.corrected_um, listing.measured_um].map(get); // below 0: not known
       this.state = get(listing.state); // of each row: 0 within, 1 above, 2 shown and not judged, 3 no move
       this.n = this.numbers[0].length;
       this.box = document.getElementById("listing");
