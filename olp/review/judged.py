@@ -38,7 +38,7 @@ def judged_lines(scene: Scene, arrays: Arrays) -> dict[str, Any]:
         "uncorrected": _line_states(scene, arrays, "uncorrected", table["line"], table["uncorrected_state"]),
         "corrected": _line_states(scene, arrays, "corrected", table["line"], table["corrected_state"]),
     }
-    shown = {"uncorrected_um": columns["uncorrected"], "corrected_um": columns["corrected"], "measured_um": None}
+    shown = {f"{name}_um": column for name, column in columns.items()} | {"measured_um": None}
     runs = scene.table.measured
     if runs is not None:
         shown["measured_um"] = _line_column(scene, arrays, "measured_um", table["line"], table["measured_um"])
