@@ -35,6 +35,8 @@ MOST = 6
 _ROUND = (1.0, 2.0, 2.5, 5.0, 10.0)
 #: Share of a value within which it is equal but for rounding.
 _ROUNDING = 1e-9
+#: Smallest step above the tolerance, as a share of it.
+_LEAST_STEP = 0.25
 #: A ratio that is not smaller: bands of nothing.
 _LEAST = 1e-6
 
@@ -49,7 +51,7 @@ def bands(largest: float, tolerance: float | None) -> list[float]:
     if tolerance is None or ratio <= 1.0 + _ROUNDING:
         return [unit * edge for edge in (0.0, *_multiples(0.0, ratio, _step(ratio / MOST)))]
     within = (0.0, 1.0) if ratio > 2.0 * MOST else (0.0, 0.5, 1.0)
-    above = _multiples(1.0, ratio, _step((ratio - 1.0) / MOST))
+    above = _multiples(1.0, ratio, _step(max((ratio - 1.0) / MOST, _LEAST_STEP)))
     return [unit * edge for edge in (*within, *above)]
 
 
