@@ -187,24 +187,26 @@ def verdict(
     what the model asks. `part`: is the part good as far as that is known, None without a part tolerance.
     `ok` is False where either fails, or another finding is an error. It is None where nothing could be
     judged, a feed move could not, or the part is good with a probability that is too low. `place` puts a line
-    into words."""
+    into words. `questions` are the questions that were asked, each with its answer `ok` and `sentence`."""
     numerical = _numerical(table)
     part = None if part_tolerance_um is None else _part(table, part_tolerance_um, uncertainty)
     errors = sorted({f.code for f in findings if f.severity >= Severity.ERROR} - _OWN)
-    sentences = [_numerical_sentence(numerical, place)]
+    known = None if numerical["unknown"] else True
+    sentence = _numerical_sentence(numerical, place)
+    questions = [_question("program", _all((numerical["holds"], known)), sentence)]
+    sentences = [sentence]
     if numerical["unknown"]:
         sentences.append(f"{numerical['unknown']} feed moves to unknown positions are not judged.")
     if part is not None:
         sentences.append(_part_sentence(part))
+        questions.append(_question("part", _part_answer(part), sentences[-1]))
     if errors:
         sentences.append(f"Not to be run as it is: {', '.join(errors)}.")
-    answers = [numerical["holds"], not errors]
-    if numerical["unknown"]:
-        answers.append(None)
-    if part is not None:
-        answers += [part["holds"], part["probable"] or (None if part["probability"] is not None else True)]
-    ok = False if False in answers else None if None in answers else True
-    return {"ok": ok, "numerical": numerical, "part": part, "errors": errors, "sentences": sentences}
+    ok = _all((*(question["ok"] for question in questions), not errors))
+    return {
+        "ok": ok, "numerical": numerical, "part": part, "errors": errors, "sentences": sentences,
+        "questions": questions,
+    }  # fmt: skip
 
 
 def measured(runs: Sequence[tuple[str, float | None]], tolerance_um: float | None) -> dict[str, Any]:
@@ -225,15 +227,33 @@ def measured(runs: Sequence[tuple[str, float | None]], tolerance_um: float | Non
         names = f" of {', '.join(missing)}" if missing else ""
         sentences.append(f"Not verified: no measured point{names} counts.")
     ok = None if tolerance_um is None else holds and not missing
-    return {"ok": ok, "measured": result, "sentences": sentences}
+    questions = [_question("measured", ok, " ".join(sentences))]
+    return {"ok": ok, "measured": result, "sentences": sentences, "questions": questions}
 
 
 def with_measured(predicted: dict[str, Any], runs: dict[str, Any]) -> dict[str, Any]:
     """One verdict of a prediction and of what was measured: it fails where either does, and is open where
     either is."""
-    answers = predicted["ok"], runs["ok"]
-    ok = False if False in answers else None if None in answers else True
-    return predicted | runs | {"ok": ok, "sentences": [*predicted["sentences"], *runs["sentences"]]}
+    both = {key: [*predicted[key], *runs[key]] for key in ("sentences", "questions")}
+    return predicted | runs | both | {"ok": _all((predicted["ok"], runs["ok"]))}
+
+
+#: The questions that a verdict answers.
+QUESTIONS = {
+    "program": "Does the written program do what the model asks?",
+    "part": "Is the part good, as far as the calibration knows?",
+    "measured": "Is the measured path good?",
+}
+
+
+def _question(name: str, ok: bool | None, sentence: str) -> dict[str, Any]:
+    return {"name": name, "question": QUESTIONS[name], "ok": ok, "sentence": sentence}
+
+
+def _all(answers: Iterable[bool | None]) -> bool | None:
+    """False where one of the answers is, else None where one is open."""
+    known = list(answers)
+    return False if False in known else None if None in known else True
 
 
 #: Findings that say what the verdict says already.
@@ -267,6 +287,11 @@ def _part(table: Judgements, tolerance_um: float, uncertainty: dict[str, Any] | 
         "probable": None if probability is None else probability >= ENOUGH,
         "holds": largest_um <= tolerance_um,
     }
+
+
+def _part_answer(part: dict[str, Any]) -> bool | None:
+    """Whether the part is good: open where that is not probable enough."""
+    return _all((part["holds"], part["probability"] is None or part["probable"] or None))
 
 
 def _um(value: float) -> str:

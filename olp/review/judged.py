@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from olp.core.arrays import Array
 from olp.core.units import UM_PER_MM
 from olp.review.pack import Arrays
 from olp.review.scene import Scene
@@ -94,34 +95,79 @@ def statistics(scene: Scene) -> Iterator[dict[str, Any]]:
     yield {"label": "lines", "value": scene.nominal.lines, "unit": "", "layer": None}
 
 
-def callouts(scene: Scene) -> Iterator[dict[str, Any]]:
-    """The worst line, uncorrected and corrected, of the moves that count."""
-    table = scene.table
-    for layer, words, values in (
-        ("uncorrected", "uncorrected", table.uncorrected), ("corrected", "corrected", table.corrected),
+def pictures(scene: Scene) -> Iterator[dict[str, Any]]:
+    """The pictures of a page: uncorrected, corrected and, where there are runs, measured. Each has its
+    `layers`, the `tolerance_um` that it is judged by, the largest deviation of what counts, its rms, and as
+    `flag` the place of the largest."""
+    table, deviation = scene.table, scene.report["deviation"]
+    allowed_um = table.allowed_mm * UM_PER_MM
+    for layer, side, values in (
+        ("uncorrected", "before", table.uncorrected), ("corrected", "after", table.corrected),
     ):  # fmt: skip
-        size = np.where(table.judged, np.nan_to_num(values), -1.0)
-        if not len(size) or size.max() < 0.0:
-            continue
-        move = int(size.argmax())
-        own = np.flatnonzero(scene.samples.move == move)
-        if not own.size:
-            continue
-        away = np.linalg.norm(getattr(scene.samples, layer)[own], axis=1)
-        text = f"largest, {words}: {size[move] * UM_PER_MM:.2f} µm, line {scene.place(int(table.line[move]))}"
-        yield {"sample": int(own[away.argmax()]), "text": text, "layer": layer}
-    yield from _measured_callout(scene)
+        yield {
+            "name": layer, "label": layer, "layers": [layer], "tolerance_um": allowed_um, "basis": "allowed",
+            "rms_um": float(deviation[side]["between"]["rms_um"]), **_largest(scene, layer, values),
+        }  # fmt: skip
+    if table.measured is not None:
+        across = scene.report["measured"]["across_um"]
+        yield {
+            "name": "measured", "label": "measured", "layers": measured_names(scene),
+            "tolerance_um": table.measured.tolerance_um, "basis": "part tolerance",
+            "rms_um": across["rms"] if across else None, **_largest_measured(scene),
+        }  # fmt: skip
 
 
-def _measured_callout(scene: Scene) -> Iterator[dict[str, Any]]:
-    """The worst line of the measured runs."""
+def removed(scene: Scene) -> dict[str, float | None]:
+    """What the correction removes of the largest deviation that counts, in um and in percent of it."""
+    table = scene.table
+    before = _size(table.uncorrected, table.judged).max(initial=0.0) * UM_PER_MM
+    after = table.largest_mm() * UM_PER_MM
+    percent = 100.0 * (1.0 - after / before) if before > 0.0 else None
+    return {"before_um": float(before), "after_um": float(after), "percent": percent}
+
+
+def _size(values: npt.NDArray[np.float32], judged: npt.NDArray[np.bool_]) -> npt.NDArray[np.float64]:
+    """(n,) deviations of moves that count, -1 for others."""
+    return np.where(judged, np.nan_to_num(values), -1.0).astype(float)
+
+
+def _largest(scene: Scene, layer: str, values: npt.NDArray[np.float32]) -> dict[str, Any]:
+    """The largest deviation of the moves that count, and its place."""
+    size = _size(values, scene.table.judged)
+    if not len(size) or size.max() < 0.0:
+        return {"largest_um": None, "flag": None}
+    move = int(size.argmax())
+    largest_um = float(size[move]) * UM_PER_MM
+    own = np.flatnonzero(scene.samples.move == move)
+    if not own.size:
+        return {"largest_um": largest_um, "flag": None}
+    delta = getattr(scene.samples, layer)[own]
+    worst = int(np.linalg.norm(delta, axis=1).argmax())
+    line = scene.place(int(scene.table.line[move]))
+    return {
+        "largest_um": largest_um, "flag": _flag(int(own[worst]), layer, largest_um, line, delta[worst])
+    }  # fmt: skip
+
+
+def _largest_measured(scene: Scene) -> dict[str, Any]:
+    """The largest deviation of the measured runs, and its place."""
     runs = scene.table.measured
-    sizes = [] if runs is None else [runs.largest_um(k) or -1.0 for k in range(len(runs.names))]
-    if runs is None or max(sizes) < 0.0:
-        return
-    k = int(np.argmax(sizes))
-    shown = scene.measured[k]
-    away = np.where(shown.counted, np.linalg.norm(shown.delta_mm, axis=1), -1.0)
-    worst = runs.worst(1)[0]
-    text = f"largest, measured: {worst['max_um']:.2f} µm, line {scene.place(worst['line'])}"
-    yield {"sample": int(shown.index[away.argmax()]), "text": text, "layer": measured_names(scene)[k]}
+    sizes = [] if runs is None else [runs.largest_um(k) for k in range(len(runs.names))]
+    known = [size for size in sizes if size is not None]
+    if runs is None or not known:
+        return {"largest_um": None, "flag": None}
+    k = sizes.index(max(known))
+    shown, worst = scene.measured[k], runs.worst(1)[0]
+    row = int(np.where(shown.counted, np.linalg.norm(shown.delta_mm, axis=1), -1.0).argmax())
+    flag = _flag(
+        int(shown.index[row]), measured_names(scene)[k], worst["max_um"], scene.place(worst["line"]),
+        shown.delta_mm[row],
+    )  # fmt: skip
+    return {"largest_um": max(known), "flag": flag}
+
+
+def _flag(sample: int, layer: str, size_um: float, line: str, delta_mm: Array) -> dict[str, Any]:
+    """A flag at a sample: the stated deviation, its line, and its direction (3,) as a unit vector."""
+    length = float(np.linalg.norm(delta_mm))
+    direction = (delta_mm / length if length > 0.0 else np.zeros(3)).round(4).tolist()
+    return {"sample": sample, "layer": layer, "um": size_um, "line": line, "direction": direction}

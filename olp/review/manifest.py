@@ -13,20 +13,21 @@ from olp.core.toolpath import Kind
 from olp.core.units import AXES, UM_PER_MM
 from olp.findings.catalogue import RULES
 from olp.reports.report import place
-from olp.review.judged import callouts, judged_lines, measured_names, statistics
+from olp.review.judged import judged_lines, measured_names, pictures, removed, statistics
 from olp.review.meshes import nodes
 from olp.review.pack import ARC_MM, DEVIATION_MM, POSITION_MM, TIME_S, Arrays, resolution
+from olp.review.palette import COLOURS
 from olp.review.scene import Scene
 
-#: Name, label, colour and width in pixels of layers; the colours differ also for red-green colour blindness.
-LAYERS = (
-    ("nominal", "nominal path", "#4477aa", 1.5),
-    ("uncorrected", "uncompensated machine", "#ee7733", 2.0),
-    ("command", "corrected command", "#009988", 2.0),
-    ("corrected", "corrected, predicted", "#33bbee", 2.0),
+#: Name, label, width in pixels and dashes (drawn, left out, in pixels) of layers: colours are for errors.
+LAYERS: tuple[tuple[str, str, float, tuple[int, int]], ...] = (
+    ("nominal", "nominal path", 1.2, (1, 0)),
+    ("uncorrected", "uncorrected machine", 2.5, (14, 4)),
+    ("command", "corrected command", 1.2, (4, 4)),
+    ("corrected", "corrected, predicted", 2.5, (1, 0)),
 )
-#: Colours of measured runs.
-MEASURED = ("#cc3377", "#ddaa33", "#997700", "#bbbbbb")
+#: Width and dashes of measured runs.
+MEASURED = (3.0, (3, 3))
 #: Name, label and kind of scale of the parts of a deviation.
 _PARTS = (
     ("magnitude", "distance", "sequential"),
@@ -34,7 +35,9 @@ _PARTS = (
     ("y", "Y", "diverging"),
     ("z", "Z", "diverging"),
     ("along", "along the path", "diverging"),
-    ("normal", "across the path", "sequential"),
+    ("normal", "normal, to the left", "diverging"),
+    ("binormal", "binormal, upwards", "diverging"),
+    ("across", "across the path", "sequential"),
 )
 #: The part that is judged.
 _JUDGED = "magnitude"
@@ -72,7 +75,7 @@ def manifest_of(scene: Scene) -> tuple[dict[str, Any], Arrays]:
         "origin_mm": origin.tolist(),
         "samples": len(scene.samples),
         "tolerance_um": scene.tolerance_um,
-        "part_tolerance_um": None if scene.table.measured is None else scene.table.measured.tolerance_um,
+        "part_tolerance_um": _part_tolerance_um(scene),
         "base": base,
         "line": "line",
         "rapid": "rapid",
@@ -91,7 +94,10 @@ def manifest_of(scene: Scene) -> tuple[dict[str, Any], Arrays]:
         "axes_origin_mm": axes_origin.tolist(),
         "statistics": list(statistics(scene)),
         "findings": _findings(scene),
-        "callouts": list(callouts(scene)),
+        "notes": [],
+        "pictures": list(pictures(scene)),
+        "removed": removed(scene),
+        "palette": COLOURS,
         "verdict": _verdict(scene),
         "frame": scene.frame.label,
         "tool_radius_mm": scene.tool_radius_mm,
@@ -118,26 +124,27 @@ def _layers(scene: Scene, arrays: Arrays, origin: Array) -> list[dict[str, Any]]
         ),
     }
     layers = [
-        _layer(name, label, "P", deltas[name], None, colour, width) for name, label, colour, width in LAYERS
+        _layer(name, label, "P", deltas[name], None, width, dashes) for name, label, width, dashes in LAYERS
     ]
-    for k, (name, measured) in enumerate(zip(measured_names(scene), scene.measured, strict=True)):
+    for name, measured in zip(measured_names(scene), scene.measured, strict=True):
         base = arrays.quantised(f"P_{name}", measured.base_mm - origin, POSITION_MM)
         delta = arrays.quantised(f"d_{name}", measured.delta_mm, DEVIATION_MM)
         index = arrays.quantised(f"i_{name}", measured.index, 1.0)
         kind = arrays.raw(f"kind_{name}", np.where(measured.counted, 0, 1).astype(np.uint8), "u1")
         label = "measured" if len(scene.measured) == 1 else f"measured: {measured.label}"
         layers.append(
-            _layer(name, label, base, delta, index, MEASURED[k % len(MEASURED)], 2.0) | {"kind": kind}
+            _layer(name, label, base, delta, index, *MEASURED) | {"kind": kind}
         )
     return layers
 
 
 def _layer(
-    name: str, label: str, base: str, delta: str | None, index: str | None, colour: str, width: float
+    name: str, label: str, base: str, delta: str | None, index: str | None, width: float,
+    dashes: tuple[int, int],
 ) -> dict[str, Any]:
     return {
-        "name": name, "label": label, "base": base, "delta": delta, "index": index, "colour": colour,
-        "width": width, "visible": name != "command", "exaggerate": True,
+        "name": name, "label": label, "base": base, "delta": delta, "index": index, "width": width,
+        "dashes": list(dashes),
     }  # fmt: skip
 
 
@@ -286,5 +293,16 @@ def _findings(scene: Scene) -> list[dict[str, Any]]:
 
 
 def _verdict(scene: Scene) -> dict[str, Any]:
+    """The answer, the questions with theirs, and the sentences beside those."""
     verdict = scene.report["verdict"]
-    return {"ok": verdict["ok"], "text": " ".join(verdict["sentences"])}
+    said = " ".join(question["sentence"] for question in verdict["questions"])
+    remarks = [sentence for sentence in verdict["sentences"] if sentence not in said]
+    return {"ok": verdict["ok"], "questions": verdict["questions"], "remarks": remarks}
+
+
+def _part_tolerance_um(scene: Scene) -> float | None:
+    """The part tolerance that was stated."""
+    part, runs = scene.report["verdict"]["part"], scene.table.measured
+    if part is not None:
+        return float(part["tolerance_um"])
+    return None if runs is None else runs.tolerance_um

@@ -9,7 +9,7 @@ import numpy as np
 from olp.core.arrays import Array, Mask
 from olp.core.errors import UsageError
 from olp.review.job import Review
-from olp.review.manifest import LAYERS, MEASURED
+from olp.review.manifest import LAYERS
 
 #: Metres per mm: meshcat's camera and lights are made for metres.
 _METRE = 1e-3

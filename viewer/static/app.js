@@ -5,10 +5,8 @@
   OLP.on = (event, call) => listeners.set(event, [...(listeners.get(event) ?? []), call]);
   OLP.emit = event => (listeners.get(event) ?? []).forEach(call => call());
 
-  const AXES = {light: ["#c8500a", "#00805d", "#0068a8"], dark: ["#ff9a5c", "#4fd0a5", "#6cbcf5"]};
-  OLP.NEUTRAL = "#77818d";
-  const JUDGED = ["measured", "corrected", "uncorrected", "command"];
   const RANKED = 500;
+  const NONE = [];
 
   class App {
     constructor(manifest, arrays) {
@@ -42,18 +40,18 @@
         sample_at: 0,
         sample: 0,
         row: this.rows[0],
-        exaggeration: 1,
         metric: "",
-        layers: {},
+        layers: {nominal: true, whiskers: true, rapids: true},
         theme: "light",
         view: "iso",
         playing: false,
-        rapids: true,
-        span: [-1, -1],
-        callouts: (manifest.callouts ?? []).map(c => ({...c})),
+        chosen: NONE, // ranges [first, last] of samples
+        notes: (manifest.notes ?? []).map(n => ({...n})),
         worst: -1,
       };
+      this.mask = null; // by sample: 1 where it passes the filter
       this.runs();
+      this.compose();
     }
 
     // First sample of each row of the listing, -1 where a row has no move.
@@ -61,6 +59,27 @@
       const rows = this.manifest.arrays[this.manifest.listing.row_nominal].n;
       this.first = new Int32Array(rows).fill(-1);
       for (let i = this.samples - 1; i > 0; i--) if (this.rows[i] >= 0) this.first[this.rows[i]] = i;
+    }
+
+    // How the segment that ends in each sample is drawn.
+    compose() {
+      const {kind, mask} = this,
+        look = (this.look ??= new Uint8Array(this.samples));
+      look.set(kind);
+      if (mask) for (let i = 0; i < look.length; i++) if (!mask[i] && kind[i] !== OLP.GAP) look[i] = OLP.DIM;
+      for (const [a, b] of this.state.chosen)
+        for (let i = Math.max(0, a); i <= b && i < look.length; i++) look[i] += OLP.CHOSEN;
+      for (const layer of this.layers.values()) {
+        if (!layer.index && layer.n === look.length) {
+          layer.look = look;
+          continue;
+        }
+        layer.look ??= new Uint8Array(layer.n);
+        for (let i = 0; i < layer.n; i++) {
+          const at = layer.index ? layer.index[i] : Math.min(i, look.length - 1);
+          layer.look[i] = layer.kind?.[i] ? OLP.RAPID : mask && !mask[at] ? OLP.DIM : look[at] & OLP.CHOSEN;
+        }
+      }
     }
 
     // Samples [a, b] of the run of a row that holds `near`, or else of its first run; null where it has no move.
@@ -93,7 +112,7 @@
       state.sample_at = sample ?? this.sample_of(state.time);
       state.sample = Math.ceil(state.sample_at - 1e-9);
       state.row = this.rows[state.sample];
-      if (state.sample <= state.span[0] || state.sample > state.span[1]) this.set_span([-1, -1]);
+      if (state.chosen.length && !state.chosen.some(([a, b]) => state.sample >= a && state.sample <= b)) this.choose(NONE);
       this.place();
       OLP.emit("time");
     }
@@ -105,13 +124,21 @@
       return this.rows[this.state.sample];
     }
 
-    set_span(span) {
-      if (span[0] === this.state.span[0] && span[1] === this.state.span[1]) return;
-      this.state.span = span;
-      this.scene.set_uniform("first", span[0]);
-      this.scene.set_uniform("last", span[1]);
+    // Marks ranges [first, last] of samples.
+    choose(ranges) {
+      if (!ranges.length && !this.state.chosen.length) return;
+      this.state.chosen = ranges;
+      this.compose();
       this.scene.schedule(30);
-      OLP.emit("span");
+      OLP.emit("chosen");
+    }
+
+    // Draws faintly what is outside a filter; null is none.
+    set_mask(mask) {
+      this.mask = mask;
+      this.compose();
+      this.scene.schedule(30);
+      OLP.emit("filter");
     }
 
     // Marks the moves of a row; the tool goes to their end, without `stay`.
@@ -119,10 +146,10 @@
       const run = this.run(row, this.state.sample);
       if (run) {
         if (!stay) this.set_sample(run[1]);
-        this.set_span([run[0] - 1, run[1]]);
+        this.choose([run]);
         if (!stay) this.camera.reveal(this.tool_point());
       } else {
-        this.set_span([-1, -1]);
+        this.choose(NONE);
         this.state.row = row;
       }
       OLP.emit("row");
@@ -140,37 +167,20 @@
       OLP.emit("row");
     }
 
-    set_exaggeration(k) {
-      this.state.exaggeration = Math.max(1, Math.min(1e5, k || 1));
-      for (const {path, uniforms} of this.scene.lines.values()) uniforms.k.value = path.D ? this.state.exaggeration : 0;
-      this.place();
-      this.scene.schedule();
-      OLP.emit("exaggeration");
-    }
-
+    // Shows or hides a layer that belongs to no picture, whiskers, rapids, or bodies of a role.
     set_layer(name, on) {
       const layer = this.layers.get(name);
-      if (layer) {
-        layer.visible = this.state.layers[name] = Boolean(on);
-        this.scene.viewer.set_property(["olp", name], "visible", layer.visible);
-        this.show_rapids();
-        this.scene.schedule(0);
-        this.state.worst = -1;
-        OLP.emit("layers");
-      } else if (name === "rapids") {
-        this.state.rapids = this.state.layers.rapids = Boolean(on);
-        this.show_rapids();
-        OLP.emit("layers");
-      } else if (this.meshes.shown[name]) {
-        this.state.layers[name] = Boolean(on);
-        this.meshes.set_visible(name, Boolean(on));
-        OLP.emit("layers");
-      }
+      if (layer && this.pictures.of_layer(name)) return;
+      if (!layer && !["rapids", "whiskers"].includes(name) && !Object.hasOwn(this.meshes.shown, name)) return;
+      this.state.layers[name] = Boolean(on);
+      if (Object.hasOwn(this.meshes.shown, name)) this.meshes.set_visible(name, Boolean(on));
+      else this.pictures.draw();
+      OLP.emit("layers");
     }
 
     // Draws rapids of one layer only: several would hide the path.
     show_rapids() {
-      let free = this.state.rapids;
+      let free = this.state.layers.rapids;
       for (const {path, uniforms} of this.scene.lines.values()) {
         uniforms.rapids.value = free && path.visible && path.kind ? 1 : 0;
         if (uniforms.rapids.value) free = false;
@@ -178,64 +188,31 @@
       this.scene.viewer.set_dirty();
     }
 
-    set_metric(name) {
-      this.state.metric = this.metrics.find(name) ? name : "";
-      this.state.worst = -1;
-      const metric = this.metrics.find(this.state.metric);
-      this.metrics.keep([metric, this.plot_metric()]);
-      this.scale.use(metric);
-      this.scene.schedule(0);
-      OLP.emit("metric");
+    // The quantity that colours show.
+    get metric() {
+      return this.metrics.find(this.state.metric);
     }
-
-    // Gives the lines the values of the metric, or with `judges` their states in the table of judgements.
-    colour_lines(judges) {
-      const metric = this.metrics.find(this.state.metric);
-      for (const {path, uniforms} of this.scene.lines.values()) {
-        path.values = judges ? this.metrics.states(path.name) : this.metrics.values(metric, path.name);
-        uniforms.coloured.value = path.values ? 1 : 0;
-      }
-      this.paint();
-      this.scene.schedule(0);
-    }
-
-    // What a deviation is judged by: of the corrected program, and of what was measured.
-    limits() {
-      return [
-        [this.manifest.tolerance_um, "corrected"],
-        [this.manifest.part_tolerance_um, "measured"],
-      ]
-        .filter(([value]) => value > 0)
-        .map(([value, label]) => ({value, label}));
-    }
-
-    // Without a metric layers have their own colours; with one, layers without values are grey.
-    paint() {
-      const metric = this.metrics.find(this.state.metric);
-      for (const {path, uniforms} of this.scene.lines.values())
-        uniforms.colour.value.set(metric && !path.values ? OLP.colour.readable(OLP.NEUTRAL, this.state.theme) : path.colour);
-      this.scene.viewer.set_dirty();
-    }
-
-    // The metric of the plots while paths have the colours of their layers.
-    plot_metric() {
+    // The deviation that is judged.
+    get distance() {
       return this.metrics.find("magnitude") ?? this.manifest.metrics[0] ?? null;
     }
 
-    // Layer of the tool, and the position of the tool (mm, enlarged).
-    tool_layer() {
-      return (
-        ["corrected", "command", "nominal"].map(n => this.layers.get(n)).find(l => l?.visible) ?? this.layers.values().next().value
-      );
+    set_metric(name) {
+      this.state.metric = this.metrics.find(name) ? name : (this.distance?.name ?? "");
+      this.metrics.keep([this.metric, this.distance]);
+      this.pictures.rescale();
+      OLP.emit("metric");
     }
+
+    // Position of the tool (mm, enlarged).
     tool_point() {
-      const layer = this.tool_layer();
-      return layer.at(layer.own(this.state.sample_at), this.state.exaggeration);
+      const {layer} = this.pictures;
+      return layer.at(layer.own(this.state.sample_at), this.pictures.k_of(layer));
     }
 
     point_of(sample, name) {
-      const layer = this.layers.get(name) ?? this.tool_layer();
-      return layer.at(layer.own(sample), this.state.exaggeration);
+      const layer = this.layers.get(name) ?? this.pictures.layer;
+      return layer.at(layer.own(sample), this.pictures.k_of(layer));
     }
 
     place() {
@@ -249,21 +226,14 @@
       this.scene.set_uniform("cut", on ? this.state.sample_at : 1e9);
     }
 
-    axis_colour(i) {
-      return AXES[this.state.theme][i % 3];
-    }
-
-    // Layer whose values are ranked and counted: the last state that is shown.
-    judged(metric) {
-      const names = this.metrics.layers(metric).filter(n => this.layers.get(n).visible);
-      return JUDGED.map(p => names.find(n => n.startsWith(p))).find(Boolean) ?? names[0] ?? null;
-    }
-
-    // The next line of the table of judgements by its deviation, in a circle; returns {rank, count, sample, value, layer}
-    // or null.
+    // The next line of the table of judgements by its deviation in the current picture, in a circle; returns
+    // {rank, count, sample, row, value, layer} or null.
     worst(step = 1) {
-      const name = this.judged(this.plot_metric());
-      if (this.ranking?.name !== name) this.ranking = {name, list: this.rank(name)};
+      const name = this.pictures.layer.name;
+      if (this.ranking?.name !== name) {
+        this.ranking = {name, list: this.rank(name)};
+        this.state.worst = -1;
+      }
       const {list} = this.ranking;
       if (!list.length) return null;
       this.state.worst =
@@ -276,20 +246,21 @@
       return {rank: this.state.worst + 1, count: list.length, sample, row, value, layer: name};
     }
 
-    // The rows that count, the one with the largest deviation of the layer first; measured ones count all.
+    // The rows that are judged, or where none is those that are shown, the one with the largest deviation first.
     rank(name) {
       const own = this.manifest.listing.by_layer?.[name];
       if (!own) return [];
       const [um, state] = [own.um, own.state].map(n => this.arrays.get(n)),
+        most = state.some(code => code < 2) ? 1 : 2,
         rows = [];
       for (let row = 0; row < um.length; row++)
-        if (um[row] > 0 && this.first[row] >= 0 && (state[row] < 2 || name.startsWith("measured"))) rows.push({row, value: um[row]});
+        if (um[row] > 0 && this.first[row] >= 0 && state[row] <= most) rows.push({row, value: um[row]});
       return rows.sort((p, q) => q.value - p.value || p.row - q.row).slice(0, RANKED);
     }
 
     // The sample of a row where the layer is shown farthest off.
     largest_of(row, name) {
-      const values = this.metrics.values(this.plot_metric(), name),
+      const values = this.metrics.values(this.distance, name),
         layer = this.layers.get(name);
       let sample = this.first[row],
         most = -1;
@@ -302,4 +273,5 @@
   }
 
   OLP.App = App;
+  OLP.NONE = NONE;
 })();

@@ -4,8 +4,17 @@
   const T = MeshCat.THREE,
     FOV = 30,
     MARGIN = 1.1;
-  const KEPT = {left: 122, right: 10, top: 44, bottom: 84}; // px at the edges of the picture that panels cover
-  const VIEWS = {iso: [-1, -1.5, 1.05], top: [0, -1e-4, 1], front: [0, -1, 1e-4], side: [1, 0, 1e-4]};
+  const KEPT = {left: 24, right: 24, top: 46, bottom: 40}; // px at the edges of the picture that buttons cover
+  // Directions from which the six standard views and the isometric one look.
+  const VIEWS = {
+    iso: [-1, -1.5, 1.05],
+    top: [0, -1e-4, 1],
+    bottom: [0, -1e-4, -1],
+    front: [0, -1, 1e-4],
+    back: [0, 1, 1e-4],
+    left: [-1, 0, 1e-4],
+    right: [1, 0, 1e-4],
+  };
   // The viewer turns its scene: machine (x, y, z) mm is world (x, z, -y) m.
   const world = ([x, y, z]) => new T.Vector3(x, z, -y).multiplyScalar(0.001);
 
@@ -98,10 +107,10 @@
       this.app.scene.refill();
     }
 
-    // Shows the box from a named direction, or from the present one.
-    fit(name = null) {
+    // Shows a box, by default that of the job, from a named direction or from the present one.
+    fit(name = null, box = this.box) {
       const controls = this.viewer.controls,
-        target = world(this.middle);
+        target = world([0, 1, 2].map(j => (box[0][j] + box[1][j]) / 2));
       const from = name ? world(VIEWS[name]).normalize() : this.active.position.clone().sub(controls.target).normalize();
       const right = new T.Vector3().crossVectors(new T.Vector3(0, 1, 0), from).normalize(),
         up = new T.Vector3().crossVectors(from, right);
@@ -109,7 +118,7 @@
         high = 0,
         deep = 0;
       for (let corner = 0; corner < 8; corner++) {
-        const offset = world([0, 1, 2].map(j => this.box[(corner >> j) & 1][j])).sub(target);
+        const offset = world([0, 1, 2].map(j => box[(corner >> j) & 1][j])).sub(target);
         wide = Math.max(wide, Math.abs(offset.dot(right)));
         high = Math.max(high, Math.abs(offset.dot(up)));
         deep = Math.max(deep, Math.abs(offset.dot(from)));
@@ -122,6 +131,19 @@
       this.active.position.copy(target).addScaledVector(from, distance);
       controls.target.copy(target);
       if (name) this.name = name;
+      this.refresh();
+    }
+
+    // Turns by angles (rad) about the vertical and the horizontal of the view, and comes nearer by a factor.
+    turn(about, over, nearer = 1) {
+      const controls = this.viewer.controls,
+        away = this.active.position.clone().sub(controls.target),
+        polar = new T.Spherical().setFromVector3(away);
+      polar.theta += about;
+      polar.phi = Math.min(Math.PI - 1e-3, Math.max(1e-3, polar.phi + over));
+      if (this.ortho) this.parallel.zoom *= nearer;
+      else polar.radius /= nearer;
+      this.active.position.copy(controls.target).add(away.setFromSpherical(polar));
       this.refresh();
     }
 
@@ -153,9 +175,13 @@
       };
     }
 
+    // A camera from an address; one that cannot be is left out.
     restore({ortho, position, target, half, zoom, name}) {
+      const three = v => Array.isArray(v) && v.length === 3 && v.every(Number.isFinite);
+      if (!three(position) || !three(target) || !(half > 0) || !(zoom > 0) || position.every((v, j) => v === target[j])) return;
+      ortho = Boolean(ortho);
       if (ortho !== this.ortho) this.use(ortho ? this.parallel : this.perspective);
-      Object.assign(this, {half, name});
+      Object.assign(this, {half, name: Object.hasOwn(VIEWS, name) ? name : "iso"});
       this.parallel.zoom = zoom;
       this.active.position.fromArray(position);
       this.viewer.controls.target.fromArray(target);
@@ -174,4 +200,5 @@
   }
 
   OLP.Camera = Camera;
+  OLP.VIEWS = Object.keys(VIEWS);
 })();

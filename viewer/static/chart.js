@@ -1,8 +1,9 @@
 "use strict";
-// A line chart on a canvas: any number of points as one minimum and maximum per pixel column, so no peak is lost.
+// Line charts on a canvas, in lanes one above the other: any number of points as one minimum and maximum per pixel column,
+// so no peak is lost. Series tell themselves apart by their dashes.
 (() => {
-  const CORNER = 130; // px of the select at the top right
-  const EDGE = {left: 54, right: 12, top: 24, bottom: 22};
+  const EDGE = {left: 54, right: 12, top: 22, bottom: 20},
+    GAP = 6; // px between lanes
 
   // Index of the first x that is not below `value`, in an ascending array.
   function lower(x, value) {
@@ -22,21 +23,30 @@
       this.host = host;
       this.events = events;
       [this.top, this.base] = [0, 1].map(() => document.createElement("canvas"));
+      this.base.setAttribute("role", "img");
+      this.top.setAttribute("aria-hidden", "true");
       host.prepend(this.base, this.top);
-      Object.assign(this, {series: [], limits: [], range: null, extent: [0, 1], marks: {now: null, hover: null}, readout: null});
+      Object.assign(this, {lanes: [], range: null, extent: [0, 1], marks: {now: null, hover: null}, bands: []});
       new ResizeObserver(() => this.draw()).observe(host);
       OLP.zoom(this, events);
     }
 
-    // series: [{label, colour, x, y}], limits: [{value, label, colour}]; x ascending, NaN in y is a gap
-    set({extent, title, unit, x_label, series, limits, include = false}) {
-      Object.assign(this, {extent, title, unit, x_label, series, limits, include});
+    // lanes: [{title, unit, series: [{label, dashes, x, y}], limits: [{value}], include}]; x ascending, NaN in y is a gap.
+    // Lanes of one unit have one scale with `alike`.
+    set({extent, x_label, lanes, alike = false}) {
+      Object.assign(this, {extent, x_label, lanes, alike});
       if (!(this.extent[1] > this.extent[0])) this.extent[1] = this.extent[0] + 1;
       this.draw();
     }
 
     set_range(range) {
       this.range = range;
+      this.draw();
+    }
+
+    // Ranges [a, b] of x that are marked.
+    set_bands(bands) {
+      this.bands = bands;
       this.draw();
     }
 
@@ -52,8 +62,8 @@
     px(x) {
       return EDGE.left + ((x - this.window[0]) / (this.window[1] - this.window[0])) * this.wide;
     }
-    py(y) {
-      return EDGE.top + (1 - (y - this.low) / (this.up - this.low)) * this.high;
+    py(lane, y) {
+      return lane.at + (1 - (y - lane.low) / (lane.up - lane.low)) * lane.high;
     }
     x_at(px) {
       return this.window[0] + ((px - EDGE.left) / this.wide) * (this.window[1] - this.window[0]);
@@ -70,7 +80,7 @@
       c.clearRect(0, 0, w, h);
       const style = getComputedStyle(document.documentElement),
         get = name => style.getPropertyValue(name).trim();
-      this.look = {ink: get("--ink"), soft: get("--soft"), rule: get("--rule"), panel: get("--panel"), accent: get("--accent")};
+      this.look = {ink: get("--ink"), soft: get("--soft"), rule: get("--rule"), panel: get("--panel"), mark: get("--mark"), fail: get("--fail")};
       c.font = "11px " + get("--font");
       return c;
     }
@@ -106,55 +116,60 @@
     }
 
     draw() {
-      if (!this.host.clientWidth || !this.host.clientHeight) return;
+      if (!this.host.clientWidth || !this.host.clientHeight || !this.lanes.length) return;
       const c = this.prepare(this.base),
-        drawn = this.series.map(s => this.columns(s));
+        each = (this.high - GAP * (this.lanes.length - 1)) / this.lanes.length;
+      this.lanes.forEach((lane, k) => {
+        lane.at = EDGE.top + k * (each + GAP);
+        lane.high = Math.max(1, each);
+        lane.drawn = lane.series.map(s => this.columns(s));
+        this.fit(lane);
+      });
+      if (this.alike) {
+        const low = Math.min(...this.lanes.map(l => l.low)),
+          up = Math.max(...this.lanes.map(l => l.up));
+        for (const lane of this.lanes) Object.assign(lane, {low, up});
+      }
+      this.abscissa(c);
+      for (const lane of this.lanes) this.lane(c, lane);
+      this.heading(c);
+      this.base.setAttribute("aria-label", this.text());
+      this.draw_marks();
+    }
+
+    // The range of a lane: its values, zero, and the limits near them.
+    fit(lane) {
       let low = 0,
         up = 0;
-      for (const columns of drawn)
+      for (const columns of lane.drawn)
         for (const [, a, b] of columns) {
           if (a < low) low = a;
           if (b > up) up = b;
         }
-      for (const {value} of this.limits)
-        if (this.include || (value <= 1.6 * up && value >= 1.6 * low)) {
+      lane.range = [low, up];
+      for (const {value} of lane.limits ?? [])
+        if (lane.include || (value <= 1.6 * up && value >= 1.6 * low)) {
           low = Math.min(low, value);
           up = Math.max(up, value);
         }
       if (!(up > low)) up = low + 1;
-      Object.assign(this, {low: low - (low < 0 ? 0.06 * (up - low) : 0), up: up + 0.08 * (up - low)});
-      this.axes(c);
-      c.save();
-      c.beginPath();
-      c.rect(EDGE.left, EDGE.top, this.wide, this.high);
-      c.clip();
-      this.limit_lines(c);
-      drawn.forEach((columns, i) => this.line(c, columns, this.series[i].colour));
-      c.restore();
-      this.heading(c);
-      this.draw_marks();
+      Object.assign(lane, {low: low - (low < 0 ? 0.06 * (up - low) : 0), up: up + 0.08 * (up - low)});
     }
 
-    axes(c) {
+    // The chart in words.
+    text() {
+      const {number} = OLP.colour;
+      return this.lanes
+        .map(l => `${l.title}${l.unit ? ", " + l.unit : ""}: from ${number(l.range[0])} to ${number(l.range[1])} over ${this.x_label}`)
+        .join("; ");
+    }
+
+    abscissa(c) {
       const {ticks, number} = OLP.colour,
         bottom = EDGE.top + this.high;
-      Object.assign(c, {
-        strokeStyle: this.look.rule,
-        fillStyle: this.look.soft,
-        lineWidth: 1,
-        textAlign: "right",
-        textBaseline: "middle",
-      });
-      for (const y of ticks(this.low, this.up, this.high / 28)) {
-        const at = Math.round(this.py(y)) + 0.5;
-        c.beginPath();
-        c.moveTo(EDGE.left, at);
-        c.lineTo(EDGE.left + this.wide, at);
-        c.stroke();
-        c.fillText(number(y), EDGE.left - 6, at);
-      }
-      Object.assign(c, {textAlign: "center", textBaseline: "top"});
+      Object.assign(c, {strokeStyle: this.look.rule, fillStyle: this.look.soft, lineWidth: 1, textBaseline: "top"});
       const right = EDGE.left + this.wide - c.measureText(this.x_label).width - 14;
+      c.textAlign = "center";
       for (const x of ticks(...this.window, this.wide / 80)) {
         const at = Math.round(this.px(x)) + 0.5;
         c.beginPath();
@@ -165,54 +180,92 @@
       }
       c.textAlign = "right";
       c.fillText(this.x_label, EDGE.left + this.wide, bottom + 6);
+      c.fillStyle = this.look.mark;
+      for (const [a, b] of this.bands) {
+        const [from, to] = [a, b].map(x => Math.min(EDGE.left + this.wide, Math.max(EDGE.left, this.px(x))));
+        c.fillRect(from, EDGE.top, Math.max(1.5, to - from), this.high);
+      }
     }
 
-    limit_lines(c) {
-      c.setLineDash([5, 4]);
-      for (const {value, colour} of this.limits) {
-        if (value > this.up || value < this.low) continue;
-        c.strokeStyle = colour ?? this.look.soft;
+    lane(c, lane) {
+      const {ticks, number} = OLP.colour;
+      Object.assign(c, {strokeStyle: this.look.rule, fillStyle: this.look.soft, lineWidth: 1, textAlign: "right", textBaseline: "middle"});
+      for (const y of ticks(lane.low, lane.up, Math.max(2, lane.high / 26))) {
+        const at = Math.round(this.py(lane, y)) + 0.5;
         c.beginPath();
-        c.moveTo(EDGE.left, this.py(value));
-        c.lineTo(EDGE.left + this.wide, this.py(value));
+        c.moveTo(EDGE.left, at);
+        c.lineTo(EDGE.left + this.wide, at);
+        c.stroke();
+        c.fillText(number(y), EDGE.left - 6, at);
+      }
+      c.save();
+      c.beginPath();
+      c.rect(EDGE.left, lane.at - 1, this.wide, lane.high + 2);
+      c.clip();
+      c.strokeStyle = this.look.fail;
+      for (const {value} of lane.limits ?? []) {
+        const at = Math.round(this.py(lane, value)) + 0.5;
+        c.setLineDash([6, 3]);
+        c.beginPath();
+        c.moveTo(EDGE.left, at);
+        c.lineTo(EDGE.left + this.wide, at);
         c.stroke();
       }
-      c.setLineDash([]);
+      lane.drawn.forEach((columns, i) => this.line(c, lane, columns, lane.series[i]));
+      c.restore();
+      if (this.lanes.length > 1) {
+        Object.assign(c, {fillStyle: this.look.ink, textAlign: "left", textBaseline: "top"});
+        Object.assign(c, {strokeStyle: this.look.panel, lineWidth: 4, lineJoin: "round"});
+        c.strokeText(lane.title, EDGE.left + 5, lane.at + 1);
+        c.fillText(lane.title, EDGE.left + 5, lane.at + 1);
+      }
     }
 
-    line(c, columns, colour) {
-      Object.assign(c, {strokeStyle: colour, lineWidth: 1.3, lineJoin: "round"});
+    line(c, lane, columns, {dashes}) {
+      Object.assign(c, {strokeStyle: this.look.ink, lineWidth: 1.25, lineJoin: "round"});
+      c.setLineDash(dashes?.[1] ? dashes : []);
       c.beginPath();
       let pen = false;
       for (const [x, a, b] of columns) {
-        if (Number.isNaN(a)) {
+        if (a !== a) {
           pen = false;
           continue;
         }
-        if (pen) c.lineTo(x, this.py(a));
-        else c.moveTo(x, this.py(a));
-        if (b > a) c.lineTo(x, this.py(b));
+        if (pen) c.lineTo(x, this.py(lane, a));
+        else c.moveTo(x, this.py(lane, a));
+        if (b > a) c.lineTo(x, this.py(lane, b));
         pen = true;
       }
       c.stroke();
+      c.setLineDash([]);
     }
 
     heading(c) {
+      const choices = this.host.querySelector(".choices"),
+        room = this.host.clientWidth - (choices?.offsetWidth ?? 0) - 16,
+        [first] = this.lanes,
+        bold = c.font;
       Object.assign(c, {textAlign: "left", textBaseline: "middle", fillStyle: this.look.ink});
-      const bold = c.font;
       c.font = "600 " + bold;
-      const title = this.unit ? `${this.title}, ${this.unit}` : this.title;
-      c.fillText(title, 10, 12);
-      let x = Math.ceil(10 + c.measureText(title).width) + 16;
+      const name = this.lanes.length > 1 ? this.title : first.title,
+        title = first.unit ? `${name}, ${first.unit}` : name;
+      c.fillText(title, 10, 11, room - 10);
+      let x = Math.ceil(10 + c.measureText(title).width) + 14;
       c.font = bold;
-      for (const {label, colour} of this.series) {
+      if (first.series.length < 2) return;
+      for (const {label, dashes} of first.series) {
         const wide = c.measureText(label).width;
-        if (x + wide + 30 > this.host.clientWidth - CORNER) break;
-        c.fillStyle = colour;
-        c.fillRect(x, 11, 12, 3);
+        if (x + wide + 30 > room) break;
+        c.strokeStyle = this.look.ink;
+        c.setLineDash(dashes?.[1] ? dashes : []);
+        c.beginPath();
+        c.moveTo(x, 11.5);
+        c.lineTo(x + 18, 11.5);
+        c.stroke();
+        c.setLineDash([]);
         c.fillStyle = this.look.soft;
-        c.fillText(label, x + 16, 12);
-        x += Math.ceil(wide) + 30;
+        c.fillText(label, x + 22, 11);
+        x += Math.ceil(wide) + 34;
       }
     }
 
@@ -223,11 +276,11 @@
     }
 
     draw_marks() {
-      if (!this.host.clientWidth || this.up === undefined) return;
+      if (!this.host.clientWidth || !this.lanes.length || this.lanes[0].up === undefined) return;
       const c = this.prepare(this.top),
         {now, hover} = this.marks;
       for (const [x, colour, dash] of [
-        [now, this.look.accent, []],
+        [now, this.look.ink, []],
         [hover, this.look.soft, [3, 3]],
       ]) {
         if (x === null || x < this.window[0] || x > this.window[1]) continue;
@@ -243,13 +296,23 @@
       if (hover !== null) this.values(c, hover);
     }
 
+    // Labels and values of all series at x.
+    at(x) {
+      return this.lanes.flatMap(lane =>
+        lane.series
+          .map(s => [
+            this.lanes.length > 1 ? lane.title : s.label,
+            s.y[Math.max(0, Math.min(s.x.length - 1, OLP.find(s.x, x)))],
+          ])
+          .filter(r => r[1] !== undefined),
+      );
+    }
+
     values(c, x) {
       const {number} = OLP.colour,
-        rows = this.series
-          .map(s => [s.label, s.y[Math.max(0, Math.min(s.x.length - 1, OLP.find(s.x, x)))], s.colour])
-          .filter(r => r[1] !== undefined);
+        rows = this.at(x);
       if (!rows.length) return;
-      const wide = Math.max(...rows.map(r => c.measureText(`${r[0]}  ${number(r[1], 4)}`).width)) + 28,
+      const wide = Math.max(...rows.map(r => c.measureText(`${r[0]}  ${number(r[1], 4)}`).width)) + 20,
         high = 15 * rows.length + 8,
         at = this.px(x);
       const left = at + 10 + wide > this.host.clientWidth ? at - wide - 10 : at + 10;
@@ -258,12 +321,11 @@
       c.roundRect(left, EDGE.top + 2, wide, high, 4);
       c.fill();
       c.stroke();
-      rows.forEach(([label, value, colour], i) => {
+      c.fillStyle = this.look.ink;
+      rows.forEach(([label, value], i) => {
         const y = EDGE.top + 14 + 15 * i;
-        c.fillStyle = colour;
-        c.fillRect(left + 7, y - 1, 8, 3);
-        Object.assign(c, {fillStyle: this.look.ink, textAlign: "left"});
-        c.fillText(label, left + 19, y);
+        c.textAlign = "left";
+        c.fillText(label, left + 7, y);
         c.textAlign = "right";
         c.fillText(number(value, 4), left + wide - 7, y);
       });

@@ -2,7 +2,7 @@
 // Draws the scene: WebGL, or without it (remote desktops, locked-down computers) a 2-D canvas with the same camera.
 (() => {
   const T = MeshCat.THREE,
-    SHADES = 24;
+    FAINT = 0.5; // opacity of what is outside the filter
 
   // Kind of WebGL: "none", "software" or "hardware".
   OLP.graphics = () => {
@@ -63,16 +63,35 @@
     };
   }
 
+  // How a segment is stroked: [key, colour, width, dashes, opacity].
+  function stroke_of(path, u, value, look) {
+    const chosen = look >= OLP.CHOSEN,
+      kind = look % OLP.CHOSEN,
+      css = c => `#${c.getHexString()}`;
+    if (kind === OLP.RAPID) return ["rapid", css(u.faint.value), 1, [5, 4], 1];
+    if (kind === OLP.DIM) return ["dim", css(u.faint.value), 1, [], FAINT];
+    const count = u.bands.value;
+    let band = 0;
+    while (band < count - 1 && value > u.edges.value[band]) band++;
+    const unknown = count && value !== value,
+      colour = unknown ? u.unknown.value : count ? u.shades.value[band] : u.colour.value,
+      name = unknown ? "unknown" : count ? band : "plain";
+    if (kind === OLP.WHISKER) return [`whisker ${name}`, css(colour), 1, [], FAINT];
+    if (chosen) return [`chosen ${name}`, css(colour), path.width + 3, [], 1];
+    return [name, css(colour), path.width, path.dashes[1] ? path.dashes : [], 1];
+  }
+
   function draw_path(context, path, u, origin, e, w, h, ratio) {
     const point = [0, 0],
       project = projector(e, w, h, point),
       k = u.k.value,
       b = path.buffer,
+      {x: nx, y: ny, z: nz, w: beyond} = u.plane.value,
       strokes = new Map();
     for (let i = 0, o = 0; i < path.drawn; i++, o += 4 * OLP.FLOATS) {
-      const sample = b[o + 14],
-        rapid = b[o + 15] > 0;
-      if (sample >= u.cut.value || (rapid && !u.rapids.value)) continue;
+      const look = b[o + 15];
+      if (b[o + 14] >= u.cut.value || (look === OLP.RAPID && !u.rapids.value)) continue;
+      if (nx * (b[o] + b[o + 3]) + ny * (b[o + 1] + b[o + 4]) + nz * (b[o + 2] + b[o + 5]) > 2 * beyond) continue;
       if (!project(origin[0] + b[o] + k * b[o + 6], origin[1] + b[o + 1] + k * b[o + 7], origin[2] + b[o + 2] + k * b[o + 8]))
         continue;
       const [x, y] = point;
@@ -80,40 +99,23 @@
         !project(origin[0] + b[o + 3] + k * b[o + 9], origin[1] + b[o + 4] + k * b[o + 10], origin[2] + b[o + 5] + k * b[o + 11])
       )
         continue;
-      const chosen = sample >= u.first.value && sample < u.last.value,
-        share = (b[o + 13] - u.low.value) / (u.high.value - u.low.value);
-      const key = chosen
-        ? "chosen"
-        : rapid
-          ? "rapid"
-          : !u.coloured.value
-            ? "plain"
-            : Number.isNaN(share)
-              ? SHADES + 1
-              : Math.round(SHADES * Math.min(1, Math.max(0, share)));
+      const [key, ...style] = stroke_of(path, u, b[o + 13], look);
       let stroke = strokes.get(key);
-      if (!stroke) strokes.set(key, (stroke = new Path2D()));
-      stroke.moveTo(x, y);
-      stroke.lineTo(...point);
+      if (!stroke) strokes.set(key, (stroke = {line: new Path2D(), style}));
+      stroke.line.moveTo(x, y);
+      stroke.line.lineTo(...point);
     }
-    const {data} = u.colours.value.image,
-      css = c => `#${c.getHexString()}`;
-    const last = ["rapid", "plain", ...Array(SHADES + 2).keys(), "chosen"];
-    for (const [key, stroke] of [...strokes].sort((p, q) => last.indexOf(p[0]) - last.indexOf(q[0]))) {
-      const entry = 4 * (key > SHADES ? OLP.colour.SIZE : Math.round((key / SHADES) * (OLP.colour.SIZE - 1)));
-      context.strokeStyle =
-        key === "chosen"
-          ? css(u.accent.value)
-          : key === "rapid"
-            ? css(u.faint.value)
-            : key === "plain"
-              ? css(u.colour.value)
-              : `rgb(${data[entry]},${data[entry + 1]},${data[entry + 2]})`;
-      context.lineWidth = (key === "chosen" ? path.width + 3 : key === "rapid" ? 1 : path.width) * ratio;
-      context.setLineDash(key === "rapid" ? [5 * ratio, 4 * ratio] : []);
-      context.stroke(stroke);
+    const late = key => (String(key).startsWith("chosen") ? 2 : key === "rapid" || key === "dim" ? 0 : 1);
+    for (const [, {line, style}] of [...strokes].sort((p, q) => late(p[0]) - late(q[0]))) {
+      const [colour, width, dashes, opacity] = style;
+      context.strokeStyle = colour;
+      context.lineWidth = width * ratio;
+      context.globalAlpha = opacity * u.opacity.value;
+      context.setLineDash(dashes.map(d => d * ratio));
+      context.stroke(line);
     }
     context.setLineDash([]);
+    context.globalAlpha = 1;
   }
 
   // Meshes as their sharp edges.

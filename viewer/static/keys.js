@@ -1,7 +1,9 @@
 "use strict";
-// The keyboard, the search box, the panels that fold, the theme.
+// The keyboard, and the search box.
 (() => {
   const $ = id => document.getElementById(id);
+  const TURN = Math.PI / 12, // rad
+    NEARER = 1.25;
 
   class Keys {
     constructor(app) {
@@ -16,34 +18,46 @@
         [["ArrowDown"], "row below", () => app.select_row(Math.min(app.listing.n - 1, app.state.row + 1))],
         [["w"], "next worst line", () => this.worst(1)],
         [["W"], "previous worst line", () => this.worst(-1)],
-        [["+", "="], "exaggerate more", () => this.exaggerate(1)],
-        [["-"], "exaggerate less", () => this.exaggerate(-1)],
-        [["1"], "isometric", press("view-iso")],
-        [["2"], "top", press("view-top")],
-        [["3"], "front", press("view-front")],
-        [["4"], "side", press("view-side")],
+        ...app.pictures.list.slice(0, 3).map((p, k) => [["qer"[k]], `picture: ${p.label}`, () => app.pictures.show(k)]),
+        [["b"], "blend to the next picture", () => this.blend()],
+        [["g"], "go to the worst place of the picture", () => app.go_to_flag()],
+        [["+", "="], "enlarge deviations more", () => this.enlarge(1)],
+        [["-"], "enlarge deviations less", () => this.enlarge(-1)],
+        ...OLP.VIEWS.map((name, k) => [[String(k + 1)], `view: ${name}`, () => app.set_view(name)]),
         [["f"], "show everything", press("fit")],
         [["o"], "orthographic or perspective", press("ortho")],
+        [["Shift ArrowLeft"], "turn to the left", () => app.camera.turn(-TURN, 0)],
+        [["Shift ArrowRight"], "turn to the right", () => app.camera.turn(TURN, 0)],
+        [["Shift ArrowUp"], "turn up", () => app.camera.turn(0, -TURN)],
+        [["Shift ArrowDown"], "turn down", () => app.camera.turn(0, TURN)],
+        [["PageUp"], "nearer", () => app.camera.turn(0, 0, NEARER)],
+        [["PageDown"], "farther", () => app.camera.turn(0, 0, 1 / NEARER)],
         [["m"], "measure", press("measure")],
+        [["Enter"], "measure: take the current point", () => app.pointer.take_current()],
+        [["x"], "section plane: next axis", () => this.section()],
+        [["i"], "save the view as a picture", press("picture")],
         [["c"], "note on the current point", press("callout")],
         [["t"], "travelled path only", press("trail")],
         [
           ["/"],
           "go to line, search",
           () => {
+            app.layout.open("program");
             $("find").focus();
             $("find").select();
           },
         ],
-        [["["], "layers and colours", press("toggle-left")],
-        [["]"], "program", press("toggle-right")],
+        [["["], "parts", () => app.layout.open("parts")],
+        [["]"], "program", () => app.layout.open("program")],
+        [["\\"], "display", () => app.layout.open("display")],
+        [["n"], "findings and notes", () => app.layout.open("findings")],
         [["p"], "plots", press("toggle-plots")],
         [["d"], "dark or light", press("theme")],
         [
           ["Escape"],
           "clear the selection",
           () => {
-            app.set_span([-1, -1]);
+            app.choose(OLP.NONE);
             app.pointer.set_measuring(false);
           },
         ],
@@ -62,9 +76,10 @@
         e.target.closest("input:not([type=checkbox],[type=range]),select,textarea,dialog")
       )
         return;
-      if (e.key === " " && e.target.closest("button,summary,[type=checkbox]")) return;
-      if (e.key.startsWith("Arrow") && e.target.closest("[type=range]")) return;
-      const entry = this.table.find(([keys]) => keys.includes(e.key));
+      if ((e.key === " " || e.key === "Enter") && e.target.closest("button,summary,[type=checkbox]")) return;
+      if (/^(Arrow|Page|Home|End)/.test(e.key) && e.target.closest("[type=range]")) return;
+      const key = e.shiftKey && e.key.startsWith("Arrow") ? `Shift ${e.key}` : e.key,
+        entry = this.table.find(([keys]) => keys.includes(key));
       if (!entry) return;
       e.preventDefault();
       entry[2]();
@@ -72,23 +87,23 @@
 
     wire() {
       const {app} = this;
-      for (const name of ["iso", "top", "front", "side"]) $("view-" + name).onclick = () => app.set_view(name);
+      $("view-iso").onclick = () => app.set_view("iso");
+      $("view-six").onchange = e => {
+        if (e.target.value) app.set_view(e.target.value);
+        e.target.value = "";
+      };
       $("fit").onclick = () => app.camera.fit();
       $("ortho").onclick = () => {
         app.camera.set_ortho(!app.camera.ortho);
         $("ortho").setAttribute("aria-pressed", app.camera.ortho);
       };
-      $("theme").onclick = () => app.set_theme(app.state.theme === "dark" ? "light" : "dark");
       $("help-open").onclick = () => $("help").showModal();
-      for (const side of ["left", "right", "plots"])
-        $("toggle-" + side).onclick = () => document.body.classList.toggle("no-" + side);
       $("worst").onclick = () => this.worst(1);
       $("find").onkeydown = e => {
         if (e.key === "Enter") this.find();
         if (e.key === "Escape") $("listing").focus();
       };
       $("find-next").onclick = () => this.find();
-      this.grip();
     }
 
     find() {
@@ -112,20 +127,34 @@
         );
     }
 
-    exaggerate(direction) {
-      const {state} = this.app,
-        power = Math.floor(Math.log10(state.exaggeration) + 1e-9),
+    // From the current picture half of the way to the next, and on.
+    blend() {
+      const {pictures} = this.app,
+        last = pictures.list.length - 1;
+      pictures.show(pictures.at >= last ? 0 : Math.min(last, Math.floor(pictures.at * 2 + 1e-9) / 2 + 0.5));
+    }
+
+    section() {
+      const {display} = this.app,
+        axes = ["", "X", "Y", "Z"];
+      display.set_section({axis: axes[(axes.indexOf(display.section.axis) + 1) % axes.length], at: null});
+    }
+
+    enlarge(direction) {
+      const {pictures} = this.app,
+        now = pictures.exaggeration(),
+        power = Math.floor(Math.log10(now) + 1e-9),
         steps = [1, 2, 5, 10, 20].map(m => m * 10 ** power),
         before = [0.5, ...steps.slice(0, 3)].map(m => (m < 1 ? 0.5 * 10 ** power : m));
-      this.app.set_exaggeration(
-        direction > 0
-          ? steps.find(m => m > state.exaggeration * 1.001)
-          : (before.findLast(m => m < state.exaggeration * 0.999) ?? 1),
+      pictures.set_exaggeration(
+        direction > 0 ? steps.find(m => m > now * 1.001) : (before.findLast(m => m < now * 0.999) ?? 1),
       );
     }
 
     help() {
-      const names = {" ": "space", ArrowLeft: "←", ArrowRight: "→", ArrowUp: "↑", ArrowDown: "↓", Escape: "esc"};
+      const arrows = {ArrowLeft: "←", ArrowRight: "→", ArrowUp: "↑", ArrowDown: "↓"},
+        names = {" ": "space", Escape: "esc", ...arrows};
+      for (const [key, sign] of Object.entries(arrows)) names[`Shift ${key}`] = `shift ${sign}`;
       $("help-keys").append(
         ...this.table.map(([keys, what]) =>
           OLP.make(
@@ -136,21 +165,6 @@
           ),
         ),
       );
-    }
-
-    grip() {
-      const grip = $("grip");
-      grip.onpointerdown = e => {
-        grip.setPointerCapture(e.pointerId);
-        e.preventDefault();
-      };
-      grip.onpointermove = e => {
-        if (grip.hasPointerCapture(e.pointerId))
-          $("app").style.setProperty(
-            "--right",
-            `${Math.round(Math.min(innerWidth * 0.6, Math.max(240, innerWidth - e.clientX)))}px`,
-          );
-      };
     }
   }
 

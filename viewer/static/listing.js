@@ -2,10 +2,11 @@
 // Program text, nominal beside corrected, with the line numbers of the files. Only visible rows exist, and the scroll is
 // scaled where a million rows would be higher than a browser can lay out. Text enters by textContent alone.
 (() => {
-  const ROW = 19,
-    TALLEST = 8e6,
-    SHOWN = 400, // px, px, characters of a line in the list
-    WIDEST = 16; // characters of a line's name
+  const LINE = 19,
+    TALLEST = 8e6, // px
+    WIDEST = 16, // characters of a line's name
+    LOOKED = 4000, // lines whose length decides on the layout
+    USUAL = 0.9; // of them are to fit
 
   class Listing {
     constructor(app) {
@@ -21,26 +22,64 @@
       this.box = document.getElementById("listing");
       this.inner = document.getElementById("listing-inner");
       this.host = document.getElementById("listing-rows");
-      this.height = Math.min(this.n * ROW, TALLEST);
-      this.inner.style.height = this.height + "px";
       this.top = 0; // first visible row, may be a part
       this.rows = [];
       this.current = this.selected = -1;
       const longest = String(Math.max(this.texts[0].n, this.texts[1]?.n ?? 0)).length,
         digits = Math.max(longest, Math.min(listing.names_width ?? 0, WIDEST));
-      document.getElementById("right").style.setProperty("--number", `${12 + 7 * Math.max(3, digits)}px`);
-      this.box.classList.toggle("single", !this.texts[1]);
-      document.getElementById("right").classList.toggle("measured", Boolean(this.errors[2]));
-      this.heading();
+      this.panel = document.getElementById("panel-program");
+      this.panel.style.setProperty("--number", `${12 + 7 * Math.max(3, digits)}px`);
+      this.panel.classList.toggle("measured", Boolean(this.errors[2]));
+      const ruler = this.box.appendChild(Object.assign(document.createElement("span"), {textContent: "0".repeat(50)}));
+      this.ruler = ruler;
+      ruler.style.cssText = "position:absolute;visibility:hidden";
+      this.usual = this.usual_length();
+      this.lay_out();
       this.listen();
-      new ResizeObserver(() => this.paint()).observe(this.box);
+      new ResizeObserver(() => this.lay_out()).observe(this.box);
+    }
+
+    // Length of line that most lines do not exceed.
+    usual_length() {
+      const step = Math.max(1, Math.floor(this.n / LOOKED)),
+        lengths = [];
+      for (let row = 0; row < this.n; row += step) lengths.push(this.text(row, 0).length);
+      return lengths.sort((p, q) => p - q)[Math.floor(USUAL * (lengths.length - 1))] ?? 0;
+    }
+
+    // Both texts side by side where usual lines fit, else one above the other.
+    lay_out() {
+      const digit = this.ruler.getBoundingClientRect().width / 50;
+      if (!digit || !this.box.clientWidth) return;
+      const number = parseFloat(getComputedStyle(this.panel).getPropertyValue("--number")),
+        error = this.errors[2] ? 138 : 92,
+        wide = this.box.clientWidth - error - 10;
+      const beside = Math.floor((wide - 2 * number) / 2 / digit) - 2,
+        one = Math.floor((wide - number) / digit) - 2;
+      this.layout = !this.texts[1] ? "single" : this.usual <= beside ? "beside" : "stacked";
+      this.characters = Math.max(8, this.layout === "beside" ? beside : one);
+      this.more = this.layout === "stacked" ? Math.floor(error / digit) : 0; // the lower line has the whole width
+      this.row_height = this.layout === "stacked" ? 2 * LINE + 1 : LINE;
+      this.height = Math.min(this.n * this.row_height, TALLEST);
+      this.inner.style.height = this.height + "px";
+      for (const name of ["single", "stacked"]) this.box.classList.toggle(name, this.layout === name);
+      this.heading();
+      this.repaint();
+    }
+
+    // A text that fits: whole words, and a mark where there is more.
+    fit(text, characters) {
+      if (text.length <= characters) return text;
+      const cut = text.slice(0, characters - 1),
+        end = cut.search(/\s+\S*$/);
+      return (end > characters / 3 ? cut.slice(0, end) : cut) + " …";
     }
 
     get scaled() {
-      return this.n * ROW > TALLEST;
+      return this.n * this.row_height > TALLEST;
     }
     get room() {
-      return this.box.clientHeight / ROW;
+      return this.box.clientHeight / this.row_height;
     }
     get highest() {
       return Math.max(0, this.n - this.room);
@@ -49,10 +88,14 @@
     heading() {
       const head = document.getElementById("listing-head"),
         two = Boolean(this.texts[1]);
-      head.classList.toggle("single", !two);
-      const titles = two
-        ? ["line", this.app.manifest.program, "line", this.app.manifest.corrected || "corrected", "µm"]
-        : ["line", this.app.manifest.program, "µm"];
+      for (const name of ["single", "stacked"]) head.classList.toggle(name, this.layout === name);
+      const {program, corrected} = this.app.manifest;
+      const titles =
+        this.layout === "stacked"
+          ? [`${program}, below it ${corrected || "the corrected program"}`, "µm"]
+          : two
+            ? ["line", program, "line", corrected || "corrected", "µm"]
+            : ["line", program, "µm"];
       head.replaceChildren(
         ...titles.map(text => Object.assign(document.createElement("span"), {textContent: text, title: text})),
       );
@@ -90,6 +133,7 @@
     }
 
     paint() {
+      if (!this.row_height) return;
       const first = Math.max(0, Math.floor(this.top)),
         count = Math.min(this.n - first, Math.ceil(this.room) + 1);
       while (this.rows.length < count) this.rows.push(this.make_row());
@@ -98,27 +142,31 @@
         if (row.hidden) return;
         const k = first + i,
           [a, b, c, d, e] = row.cells;
-        row.style.transform = `translateY(${(k - this.top) * ROW}px)`;
+        row.style.transform = `translateY(${(k - this.top) * this.row_height}px)`;
+        row.style.height = this.row_height + "px";
         if (row.k !== k) {
           row.k = k;
           row.dataset.row = k;
+          row.id = `row-${k}`;
           const nominal = this.text(k, 0),
             corrected = this.texts[1] ? this.text(k, 1) : "";
           a.textContent = this.number(k, 0);
-          b.textContent = nominal.slice(0, SHOWN);
+          b.textContent = this.fit(nominal, this.characters);
           if (this.texts[1]) {
             c.textContent = this.number(k, 1);
             this.show_change(d, nominal, corrected);
           }
           e.textContent = this.error(k);
           e.classList.toggle("over", this.state?.[k] === 1);
-          e.classList.toggle("aside", this.state?.[k] === 2);
+          e.title = ["within", "above", "shown, not judged", ""][this.state?.[k] ?? 3];
           row.classList.toggle("inserted", !this.number(k, 0));
         }
         row.classList.toggle("selected", k === this.selected);
         row.classList.toggle("current", k === this.current);
         row.setAttribute("aria-selected", k === this.selected);
       });
+      if (this.selected >= first && this.selected < first + count) this.box.setAttribute("aria-activedescendant", `row-${this.selected}`);
+      else this.box.removeAttribute("aria-activedescendant");
     }
 
     repaint() {
@@ -128,14 +176,14 @@
 
     // The corrected line with its differences from the nominal one marked.
     show_change(cell, nominal, corrected) {
-      const old = nominal.slice(0, SHOWN),
-        text = corrected.slice(0, SHOWN);
+      const text = this.fit(corrected, this.characters + this.more);
       cell.textContent = "";
-      if (old === text || !old) {
+      cell.classList.toggle("same", nominal === corrected);
+      if (nominal === corrected || !nominal) {
         cell.textContent = text;
         return;
       }
-      const words = new Set(old.split(/(?<=\S)\s+|(?=[A-Z(;])/).map(w => w.trim()));
+      const words = new Set(nominal.split(/(?<=\S)\s+|(?=[A-Z(;])/).map(w => w.trim()));
       for (const part of text.split(/(?=\s)|(?=[A-Z(;])/)) {
         const changed = part.trim() && !words.has(part.trim());
         cell.append(changed ? Object.assign(document.createElement("b"), {textContent: part}) : part);
@@ -145,7 +193,7 @@
     scroll_to(top) {
       this.top = Math.max(0, Math.min(this.highest, top));
       const span = this.height - this.box.clientHeight;
-      this.scrolled = this.scaled ? (this.top / Math.max(1e-9, this.highest)) * span : this.top * ROW;
+      this.scrolled = this.scaled ? (this.top / Math.max(1e-9, this.highest)) * span : this.top * this.row_height;
       this.box.scrollTop = this.scrolled;
       this.scrolled = this.box.scrollTop;
       this.paint();
@@ -153,6 +201,7 @@
 
     // Makes a row visible.
     show(row) {
+      if (!this.row_height) return;
       if (row < this.top + 1 || row > this.top + this.room - 2) this.scroll_to(row - this.room / 2 + 0.5);
       else this.paint();
     }
@@ -161,7 +210,7 @@
       this.box.addEventListener("scroll", () => {
         if (this.box.scrollTop === this.scrolled) return;
         const span = this.height - this.box.clientHeight;
-        this.top = this.scaled ? (this.box.scrollTop / Math.max(1, span)) * this.highest : this.box.scrollTop / ROW;
+        this.top = this.scaled ? (this.box.scrollTop / Math.max(1, span)) * this.highest : this.box.scrollTop / this.row_height;
         this.paint();
       });
       this.box.addEventListener(
@@ -169,7 +218,7 @@
         e => {
           if (!this.scaled) return; // a scaled scroll would skip thousands of rows
           e.preventDefault();
-          this.scroll_to(this.top + e.deltaY / ROW);
+          this.scroll_to(this.top + e.deltaY / this.row_height);
         },
         {passive: false},
       );

@@ -2,7 +2,6 @@
 // Puts the page together; errors are shown in the page itself.
 (() => {
   const $ = id => document.getElementById(id);
-  const SHARE = 0.03; // size of the largest deviation, enlarged, as a share of the size of the job
 
   // Corners of the box of the feed moves of the base path, and the radius about its middle that contains all else.
   function extent(app) {
@@ -42,18 +41,6 @@
     return {box, size, reach: Math.max(far, ...meshes, size) * 1.5};
   }
 
-  // A round factor at which the largest deviation shown is a small share of the job's size.
-  function exaggeration(app, size) {
-    let largest = 0;
-    const metric = app.plot_metric();
-    for (const name of app.metrics.layers(metric))
-      if (app.layers.get(name).visible) largest = Math.max(largest, app.metrics.summary(metric, name)?.largest ?? 0);
-    if (!(largest > 0)) return 1;
-    const wanted = (SHARE * size) / (1e-3 * largest),
-      unit = 10 ** Math.floor(Math.log10(wanted));
-    return Math.max(1, Math.min(1e5, [5, 2, 1].find(m => m * unit <= wanted) * unit));
-  }
-
   function extend(app) {
     let timer = 0;
     // A message at the bottom of the picture; kind "lost" is shown until it is removed.
@@ -73,14 +60,15 @@
     };
     app.set_theme = theme => {
       app.state.theme = document.documentElement.dataset.theme = theme;
-      const style = getComputedStyle(document.documentElement);
-      for (const path of app.layers.values()) path.colour = OLP.colour.readable(path.given, theme);
-      app.paint();
-      for (const {uniforms} of app.scene.lines.values()) {
-        uniforms.faint.value.set(style.getPropertyValue("--rapid").trim());
-        uniforms.accent.value.set(style.getPropertyValue("--accent").trim());
+      const style = getComputedStyle(document.documentElement),
+        get = name => style.getPropertyValue(name).trim();
+      for (const {uniforms: u} of app.scene.lines.values()) {
+        u.faint.value.set(get("--rapid"));
+        for (const name of ["colour", "unknown"]) u[name].value.set(get("--nominal"));
+        u.ink.value.set(get("--ink"));
       }
-      app.scale.apply();
+      $("theme").setAttribute("aria-pressed", theme === "dark");
+      app.pictures.rescale();
       OLP.emit("theme");
     };
     app.set_view = name => {
@@ -91,23 +79,38 @@
       const row = app.listing.row_of_line(line);
       if (row >= 0) app.select_row(row);
     };
-    app.hover_sample = sample => {
-      const layer = app.tool_layer();
-      app.overlay.hover = sample === null ? null : {layer: layer.name, at: layer.own(sample)};
-      app.overlay.draw();
+    app.go_to_flag = (picture = app.pictures.current) => {
+      if (!picture?.flag) return;
+      app.set_sample(picture.flag.sample);
+      app.select_row(app.row_at(), true);
+      app.camera.reveal(app.tool_point());
     };
+    app.hover_sample = sample => {
+      const {layer} = app.pictures;
+      app.overlay.hover = sample === null ? null : {layer: layer.name, at: layer.own(sample)};
+      app.overlay.show();
+    };
+    // The picture in words.
+    app.text = () => {
+      const {current} = app.pictures,
+        {um} = OLP.colour,
+        drawn = `Seen from ${app.state.view}, deviations enlarged ${app.legend.factor()} times.`;
+      if (!current) return `The nominal path. ${drawn}`;
+      const place = current.flag ? ` at line ${current.flag.line}, towards ${OLP.direction(current.flag.direction)}` : "";
+      return `Picture ${current.label}: the largest deviation is ${um(current.largest_um)} µm${place}. ${drawn}`;
+    };
+    for (const event of ["picture", "exaggeration", "scale"]) OLP.on(event, () => app.scene.pane.setAttribute("aria-label", app.text()));
   }
 
   function follow_listing(app) {
     const {listing} = app;
-    let kept = [-2, -2];
+    let kept = -2;
     const show = () => {
-      const [a] = app.state.span;
       listing.selected = app.state.row;
       listing.current = app.row_at();
       listing.show(app.state.row);
-      if (kept[0] === app.state.row && kept[1] === a) return;
-      kept = [app.state.row, a];
+      if (kept === app.state.row) return;
+      kept = app.state.row;
       const line = (side, name) => {
         const n = listing.number(app.state.row, side);
         return n
@@ -123,40 +126,40 @@
       };
       $("detail").replaceChildren(...line(0, "nominal"), ...(listing.texts[1] ? line(1, "corrected") : []));
     };
-    for (const event of ["time", "row", "span"]) OLP.on(event, show);
-    OLP.on("metric", () => listing.repaint());
+    for (const event of ["time", "row", "chosen"]) OLP.on(event, show);
   }
 
   async function start() {
     const manifest = JSON.parse($("olp-manifest").textContent);
     const app = new OLP.App(manifest, await OLP.unpack(manifest, $("olp-data").textContent.trim()));
     app.scene = new OLP.Scene(app, $("pane"));
-    [...app.layers.values()].forEach((path, order) => {
-      path.given = path.D ? path.colour : OLP.NEUTRAL; // colours belong to the palette
-      app.state.layers[path.name] = path.visible;
-      app.scene.add_path(path, order);
-    });
+    [...app.layers.values()].forEach((path, order) => app.scene.add_path(path, order));
     app.meshes = new OLP.Meshes(app);
     const {box, size, reach} = extent(app);
     app.camera = new OLP.Camera(app, box, reach);
+    app.pictures = new OLP.Pictures(app, size);
     extend(app);
-    app.scale = new OLP.Scale(app);
-    app.panels = new OLP.Panels(app);
+    app.legend = new OLP.Legend(app);
     app.listing = new OLP.Listing(app);
+    app.panels = new OLP.Panels(app);
+    app.display = new OLP.Display(app);
     app.overlay = new OLP.Overlay(app);
     app.timeline = new OLP.Timeline(app);
     app.plots = new OLP.Plots(app);
+    app.tree = new OLP.Tree(app);
     app.pointer = new OLP.Pointer(app);
     app.notes = new OLP.Notes(app);
+    app.layout = new OLP.Layout(app);
     app.keys = new OLP.Keys(app);
+    OLP.reports(app);
     follow_listing(app);
     if (app.scene.flat) app.scene.viewer.renderer.draw = OLP.flat_drawing(app.scene);
     app.scene.viewer.set_3d_pane_size();
+    app.state.metric = app.distance?.name ?? "";
     app.set_theme(matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
-    app.show_rapids();
-    app.set_exaggeration(exaggeration(app, size));
-    app.set_metric(app.plot_metric()?.name ?? "");
+    app.set_metric(app.state.metric);
     app.set_view("iso");
+    app.pictures.show(app.pictures.at);
     app.set_time(app.time[0]);
     app.plots.draw();
     app.notes.restore();
@@ -180,7 +183,8 @@
       arrays: app.arrays,
       state: app.state,
       set_time: t => app.set_time(t),
-      set_exaggeration: k => app.set_exaggeration(k),
+      set_exaggeration: k => app.pictures.set_exaggeration(k),
+      show_picture: at => app.pictures.show(at),
       set_metric: name => app.set_metric(name),
       set_layer: (name, on) => app.set_layer(name, on),
       select_row: row => app.select_row(row),

@@ -1,14 +1,27 @@
 "use strict";
 // Values of a metric for each layer: packed ones, and those that follow from a layer's deviation.
 (() => {
+  const UPRIGHT = 1e-6; // a direction nearer to the tool's axis than this has no side
+
   class Metrics {
     constructor(app) {
       this.app = app;
       this.known = new Map();
+      // The verdict of the line, as the table of judgements has it, is a way to colour as well.
+      this.list = [...app.manifest.metrics];
+      const layers = Object.keys(app.manifest.listing.by_layer ?? {});
+      if (layers.length)
+        this.list.push({
+          name: "state",
+          label: "verdict of the line",
+          unit: "",
+          kind: "state",
+          by_layer: Object.fromEntries(layers.map(n => [n, null])),
+        });
     }
 
     find(name) {
-      return this.app.manifest.metrics.find(m => m.name === name) ?? null;
+      return this.list.find(m => m.name === name) ?? null;
     }
 
     layers(metric) {
@@ -22,9 +35,14 @@
       const key = metric.name + "\n" + name;
       if (!this.known.has(key)) {
         const packed = metric.by_layer[name],
-          {kind} = this.app.layers.get(name);
+          layer = this.app.layers.get(name);
         const values =
-          packed === null ? this.derive(metric.of, this.app.layers.get(name)) : Float32Array.from(this.app.arrays.get(packed));
+          metric.kind === "state"
+            ? this.states(layer)
+            : packed === null
+              ? this.derive(metric.of, layer)
+              : Float32Array.from(this.app.arrays.get(packed));
+        const {kind} = layer;
         if (kind) for (let i = 0; i < values.length; i++) if (kind[i]) values[i] = NaN;
         this.known.set(key, values);
       }
@@ -32,16 +50,15 @@
     }
 
     // (n) states of a layer in the table of judgements, by the line of each sample: 1 within, 2 above, NaN for what is
-    // not judged and in rapids; null where the table has none of the layer.
-    states(name) {
-      const own = this.app.manifest.listing.by_layer?.[name],
-        layer = this.app.layers.get(name);
-      if (!own || !layer) return null;
-      const state = this.app.arrays.get(own.state),
-        {index, kind} = layer;
+    // not judged.
+    states(layer) {
+      const own = this.app.manifest.listing.by_layer[layer.name],
+        state = this.app.arrays.get(own.state),
+        {rows} = this.app,
+        {index} = layer;
       return Float32Array.from({length: layer.n}, (_, i) => {
-        const code = state[this.app.rows[index ? index[i] : i]];
-        return code > 1 || kind?.[i] ? NaN : code + 1;
+        const code = state[rows[index ? index[i] : i]];
+        return code > 1 ? NaN : code + 1;
       });
     }
 
@@ -60,27 +77,43 @@
           out[i] = 1e3 * Math.sqrt(D[k] * D[k] + D[k + 1] * D[k + 1] + D[k + 2] * D[k + 2]);
       else if (part === "x" || part === "y" || part === "z")
         for (let i = 0, k = "xyz".indexOf(part); i < n; i++, k += 3) out[i] = 1e3 * D[k];
-      else if (part === "along" || part === "normal") this.split(part, layer, out);
-      else throw new Error(`unknown metric part ${part}`);
+      else this.split(part, layer, out);
       return out;
     }
 
-    // Parts along and across the direction of the nominal segment that ends in the sample.
+    // Parts by the direction of the nominal segment that ends in the sample: along it; normal, to its left in the plane
+    // across Z; binormal, which completes the two (up on a level path); across, the size of the last two.
     split(part, {n, D, index}, out) {
-      const P = this.app.base;
-      for (let i = 0, k = 0, u = [0, 0, 0]; i < n; i++, k += 3) {
+      const P = this.app.base,
+        u = [1, 0, 0],
+        side = [0, 1, 0];
+      for (let i = 0, k = 0; i < n; i++, k += 3) {
         const s = index ? index[i] : i,
           a = 3 * s;
         if (s > 0) {
           const x = P[a] - P[a - 3],
             y = P[a + 1] - P[a - 2],
             z = P[a + 2] - P[a - 1],
-            length = Math.hypot(x, y, z);
-          if (length > 0) u = [x / length, y / length, z / length];
+            length = Math.sqrt(x * x + y * y + z * z);
+          if (length > 0) {
+            u[0] = x / length;
+            u[1] = y / length;
+            u[2] = z / length;
+            const flat = Math.hypot(u[0], u[1]);
+            side[0] = flat > UPRIGHT ? -u[1] / flat : 0;
+            side[1] = flat > UPRIGHT ? u[0] / flat : 1;
+          }
         }
-        const along = D[k] * u[0] + D[k + 1] * u[1] + D[k + 2] * u[2];
-        out[i] =
-          1e3 * (part === "along" ? along : Math.hypot(D[k] - along * u[0], D[k + 1] - along * u[1], D[k + 2] - along * u[2]));
+        const along = D[k] * u[0] + D[k + 1] * u[1] + D[k + 2] * u[2],
+          normal = D[k] * side[0] + D[k + 1] * side[1];
+        let value;
+        if (part === "along") value = along;
+        else if (part === "normal") value = normal;
+        else if (part === "binormal")
+          value = -D[k] * u[2] * side[1] + D[k + 1] * u[2] * side[0] + D[k + 2] * (u[0] * side[1] - u[1] * side[0]);
+        else if (part === "across") value = Math.hypot(D[k] - along * u[0], D[k + 1] - along * u[1], D[k + 2] - along * u[2]);
+        else throw new Error(`unknown metric part ${part}`);
+        out[i] = 1e3 * value;
       }
     }
 
@@ -95,7 +128,7 @@
         high = -Infinity;
       for (let i = 0; i < values.length; i++) {
         const v = values[i];
-        if (Number.isNaN(v)) continue;
+        if (v !== v) continue;
         count++;
         sum += v;
         squares += v * v;

@@ -16,7 +16,6 @@
       });
       window.addEventListener("hashchange", () => this.restore());
       this.list();
-      $("callouts-box").open = app.state.callouts.length > 0;
     }
 
     ask() {
@@ -29,27 +28,25 @@
     }
 
     add(text) {
-      this.app.state.callouts.push({sample: Math.round(this.app.state.sample_at), text, layer: this.app.tool_layer().name});
+      this.app.state.notes.push({sample: Math.round(this.app.state.sample_at), text, layer: this.app.pictures.layer.name});
       this.changed();
     }
 
     remove(i) {
-      this.app.state.callouts.splice(i, 1);
+      this.app.state.notes.splice(i, 1);
       this.changed();
     }
 
     changed() {
       this.list();
-      $("callouts-box").open = true;
-      this.app.overlay.draw();
+      this.app.overlay.show();
     }
 
     list() {
       const {app} = this,
-        {callouts} = app.state;
-      $("callouts-count").textContent = callouts.length || "";
-      $("callouts").replaceChildren(
-        ...callouts.map((note, i) => {
+        {notes} = app.state;
+      $("notes").replaceChildren(
+        ...notes.map((note, i) => {
           const go = make(
             "button",
             {
@@ -71,8 +68,8 @@
           );
         }),
       );
-      if (!callouts.length)
-        $("callouts").append(
+      if (!notes.length)
+        $("notes").append(
           make("p", {
             className: "empty",
             textContent: "None yet. C writes one on the current point; Save keeps them in the file.",
@@ -84,7 +81,7 @@
     html() {
       const {head, body} = OLP.shell,
         scripts = [...document.querySelectorAll("body > script")].slice(1);
-      const manifest = JSON.stringify({...this.app.manifest, callouts: this.app.state.callouts}).replaceAll("<", "\\u003c");
+      const manifest = JSON.stringify({...this.app.manifest, notes: this.app.state.notes}).replaceAll("<", "\\u003c");
       const open = '<script type="application/json" id="olp-manifest">';
       const parts = scripts.map(s => (s.id === "olp-manifest" ? open + manifest + "</" + "script>" : s.outerHTML));
       return `<!DOCTYPE html>\n<html lang="en">\n${head}\n<body>${body}\n${parts.join("\n")}\n</body>\n</html>\n`;
@@ -100,17 +97,22 @@
     }
 
     view() {
-      const {state, scale, camera} = this.app;
+      const {state, pictures, camera, section, plots} = this.app;
       return {
         time: state.time,
-        span: state.span,
-        exaggeration: state.exaggeration,
+        chosen: state.chosen,
         metric: state.metric,
         layers: state.layers,
         theme: state.theme,
-        callouts: state.callouts,
+        notes: state.notes,
         camera: camera.save(),
-        scale: {min: scale.min, max: scale.max, mode: scale.mode, map: scale.map},
+        picture: pictures.at,
+        basis: pictures.basis,
+        display_um: pictures.display_um,
+        same: pictures.same,
+        enlargement: pictures.list.map(p => p.chosen ?? null),
+        section,
+        strip: plots.kind,
       };
     }
 
@@ -143,20 +145,41 @@
         this.app.toast("The view in the address cannot be read", 4000);
         return false;
       }
-      const {app} = this;
+      if (view === null || typeof view !== "object") return false;
+      this.apply(view);
+      return true;
+    }
+
+    // Takes of a view what can be; the rest stays as it is.
+    apply(view) {
+      const {app} = this,
+        {pictures} = app,
+        list = v => (Array.isArray(v) ? v : []),
+        last = app.samples - 1,
+        whole = v => Number.isInteger(v) && v >= 0 && v <= last;
       app.set_theme(view.theme === "dark" ? "dark" : "light");
       for (const [name, on] of Object.entries(view.layers ?? {})) app.set_layer(name, on);
+      list(view.enlargement).forEach((k, i) => {
+        if (pictures.list[i]) pictures.list[i].chosen = Number.isFinite(k) && k >= 1 ? Math.min(1e5, k) : null;
+      });
+      pictures.same = view.same === true;
+      pictures.set_basis(view.basis, view.display_um);
       app.set_metric(String(view.metric ?? ""));
-      Object.assign(app.scale, view.scale);
-      app.scale.apply();
-      app.set_exaggeration(+view.exaggeration);
-      app.state.callouts = (view.callouts ?? []).map(c => ({sample: +c.sample || 0, text: String(c.text), layer: c.layer}));
+      pictures.show(view.picture);
+      app.state.notes = list(view.notes)
+        .filter(n => n && whole(n.sample))
+        .map(n => ({sample: n.sample, text: String(n.text).slice(0, 500), layer: String(n.layer)}));
       this.list();
-      app.set_time(+view.time || 0);
-      if (view.span) app.set_span(view.span);
-      if (view.camera) app.camera.restore(view.camera);
+      app.set_time(Number.isFinite(view.time) ? view.time : 0);
+      app.choose(list(view.chosen).filter(r => Array.isArray(r) && whole(r[0]) && whole(r[1]) && r[0] <= r[1]));
+      if (view.camera && typeof view.camera === "object") app.camera.restore(view.camera);
+      if (view.section && typeof view.section === "object") {
+        const {axis, at, flip} = view.section;
+        app.display.set_section({axis: ["X", "Y", "Z"].includes(axis) ? axis : "", at: Number.isFinite(at) ? at : null, flip: flip === true});
+      }
+      app.plots.set_strip(view.strip);
       OLP.emit("row");
-      return true;
+      OLP.emit("picture");
     }
   }
 

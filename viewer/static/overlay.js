@@ -1,8 +1,10 @@
 "use strict";
-// The overlay of the picture: tool ring, current points, triad, scale, notes and measured lines, redrawn with it.
+// The overlay of the picture: the flag of the worst place, lines above, tool ring, current points, notes and measured lines.
 (() => {
-  const KEEP_OFF = ["legend", "readout", "views"],
-    WIDEST = 40;
+  const KEEP_OFF = ["switch", "views", "readout"],
+    WIDEST = 40,
+    MOST_MARKS = 200, // lines above that are marked; of more the colours tell
+    PLAIN = 0.35; // part of a direction that is worth a word
 
   // Lines of at most WIDEST characters, broken at spaces where there are some.
   function wrapped(text) {
@@ -14,44 +16,54 @@
     return lines;
   }
 
+  // A direction in words: the axes along which it mainly leads.
+  OLP.direction = unit =>
+    unit
+      .map((v, j) => [Math.abs(v), (v < 0 ? "−" : "+") + "XYZ"[j]])
+      .filter(([size]) => size > PLAIN)
+      .sort((p, q) => q[0] - p[0])
+      .map(([, name]) => name)
+      .join(" ");
+
   class Overlay {
     constructor(app) {
       this.app = app;
       this.canvas = document.getElementById("overlay");
-      this.context = this.canvas.getContext("2d");
-      this.measured = []; // up to two {point, label}
+      this.measured = []; // up to two {point, true_point}
       this.hover = null; // {layer, at}
-      OLP.on("drawn", () => this.draw());
+      OLP.on("drawn", () => this.show());
     }
 
-    draw() {
-      const {app, canvas, context: c} = this,
-        {clientWidth: w, clientHeight: h} = app.scene.pane,
+    show() {
+      const {clientWidth: w, clientHeight: h} = this.app.scene.pane,
         ratio = window.devicePixelRatio || 1;
       if (!w || !h) return;
-      if (canvas.width !== Math.round(w * ratio) || canvas.height !== Math.round(h * ratio))
-        Object.assign(canvas, {width: Math.round(w * ratio), height: Math.round(h * ratio)});
+      if (this.canvas.width !== Math.round(w * ratio) || this.canvas.height !== Math.round(h * ratio))
+        Object.assign(this.canvas, {width: Math.round(w * ratio), height: Math.round(h * ratio)});
+      const c = this.canvas.getContext("2d"),
+        box = this.canvas.getBoundingClientRect();
       c.setTransform(ratio, 0, 0, ratio, 0, 0);
       c.clearRect(0, 0, w, h);
-      const style = getComputedStyle(document.documentElement),
-        colour = name => style.getPropertyValue(name).trim();
-      this.ink = colour("--ink");
-      this.paper = colour("--panel");
-      this.accent = colour("--accent");
-      c.font = "12px " + colour("--font");
+      const taken = KEEP_OFF.map(id => document.getElementById(id))
+        .filter(e => !e.hidden)
+        .map(e => e.getBoundingClientRect())
+        .map(r => [r.left - box.left, r.top - box.top, r.right - box.left, r.bottom - box.top]);
+      this.draw(c, taken);
+    }
+
+    // Draws into a context whose unit is a pixel of the pane; boxes `taken` are kept free.
+    draw(c, taken) {
+      const {app} = this,
+        style = getComputedStyle(document.documentElement),
+        get = name => style.getPropertyValue(name).trim();
+      Object.assign(this, {context: c, taken, ink: get("--ink"), paper: get("--panel"), above: get("--fail")});
+      c.font = "12px " + get("--font");
       this.view = app.scene.view(0);
-      const box = canvas.getBoundingClientRect();
-      this.taken = KEEP_OFF.map(id => document.getElementById(id).getBoundingClientRect()).map(r => [
-        r.left - box.left,
-        r.top - box.top,
-        r.right - box.left,
-        r.bottom - box.top,
-      ]);
       this.points();
+      this.lines_above();
+      this.flag();
       this.notes();
       this.measure();
-      this.triad(w, h);
-      if (this.view.ortho) this.scale(w, h);
     }
 
     at(point) {
@@ -60,37 +72,104 @@
 
     points() {
       const {app, context: c} = this,
-        {state} = app;
+        {state, pictures} = app;
       for (const layer of app.layers.values()) {
         if (!layer.visible) continue;
-        const p = this.at(layer.at(layer.own(state.sample_at), state.exaggeration));
-        if (p) this.dot(p, 3.5, layer.colour);
+        const p = this.at(layer.at(layer.own(state.sample_at), pictures.k_of(layer)));
+        if (p) this.dot(p, 3, this.paper, this.ink);
       }
       const tool = this.at(app.tool_point());
-      if (tool) {
+      if (tool)
         for (const [width, stroke] of [
-          [4, this.paper],
-          [2, this.accent],
+          [4.5, this.paper],
+          [2, this.ink],
         ]) {
           c.beginPath();
           c.arc(...tool, 9, 0, 7);
           Object.assign(c, {lineWidth: width, strokeStyle: stroke});
           c.stroke();
         }
-      }
       if (this.hover) {
-        const p = this.at(app.layers.get(this.hover.layer).at(this.hover.at, state.exaggeration));
-        if (p) this.dot(p, 4.5, this.ink);
+        const layer = app.layers.get(this.hover.layer),
+          p = this.at(layer.at(this.hover.at, pictures.k_of(layer)));
+        if (p) this.dot(p, 4.5, this.ink, this.paper);
       }
     }
 
-    dot([x, y], radius, fill) {
+    dot([x, y], radius, fill, stroke = this.paper) {
       const c = this.context;
       c.beginPath();
       c.arc(x, y, radius, 0, 7);
-      Object.assign(c, {fillStyle: fill, strokeStyle: this.paper, lineWidth: 1.5});
+      Object.assign(c, {fillStyle: fill, strokeStyle: stroke, lineWidth: 1.5});
       c.fill();
       c.stroke();
+    }
+
+    // Lines that the table of judgements says are above, as small flags without words.
+    lines_above() {
+      const {app, context: c} = this,
+        layer = app.pictures.layer,
+        own = app.manifest.listing.by_layer?.[layer.name];
+      if (!own) return;
+      const state = app.arrays.get(own.state);
+      this.marks ??= new Map();
+      if (!this.marks.has(layer.name)) {
+        const rows = [];
+        for (let row = 0; row < state.length && rows.length <= MOST_MARKS; row++)
+          if (state[row] === 1 && app.first[row] >= 0) rows.push(app.first[row]);
+        this.marks.set(layer.name, rows.length > MOST_MARKS ? [] : rows);
+      }
+      for (const sample of this.marks.get(layer.name)) {
+        const p = this.at(app.point_of(sample, layer.name));
+        if (!p) continue;
+        c.beginPath();
+        c.moveTo(p[0], p[1]);
+        c.lineTo(p[0] - 4, p[1] - 8);
+        c.lineTo(p[0] + 4, p[1] - 8);
+        c.closePath();
+        Object.assign(c, {fillStyle: this.above, strokeStyle: this.paper, lineWidth: 1});
+        c.fill();
+        c.stroke();
+      }
+    }
+
+    // The worst place of the picture: value, line, direction, and the deviation as an arrow.
+    flag() {
+      const {app, context: c} = this,
+        {flag, label} = app.pictures.current ?? {};
+      if (!flag) return;
+      const layer = app.layers.get(flag.layer),
+        own = layer.own(flag.sample),
+        from = this.at(layer.at(own, 0)),
+        to = this.at(layer.at(own, app.pictures.k_of(layer)));
+      if (!from || !to) return;
+      const length = Math.hypot(to[0] - from[0], to[1] - from[1]);
+      if (length > 8) {
+        const [ux, uy] = [(to[0] - from[0]) / length, (to[1] - from[1]) / length];
+        for (const [width, stroke] of [
+          [4, this.paper],
+          [2, this.ink],
+        ]) {
+          Object.assign(c, {lineWidth: width, strokeStyle: stroke});
+          c.beginPath();
+          c.moveTo(...from);
+          c.lineTo(...to);
+          c.moveTo(to[0] - 7 * ux + 4 * uy, to[1] - 7 * uy - 4 * ux);
+          c.lineTo(...to);
+          c.lineTo(to[0] - 7 * ux - 4 * uy, to[1] - 7 * uy + 4 * ux);
+          c.stroke();
+        }
+      }
+      const text = `▲ ${OLP.colour.um(flag.um)} µm  ·  line ${flag.line}\nlargest, ${label}${flag.direction.some(v => v) ? ", towards " + OLP.direction(flag.direction) : ""}`;
+      this.taken.push([to[0] - 14, to[1] - 14, to[0] + 14, to[1] + 14]);
+      this.label(text, ...this.outwards(to, text), this.ink, to);
+      this.dot(to, 4, this.ink);
+    }
+
+    // Where a label of a point begins: away from the middle of the picture.
+    outwards([x, y], text) {
+      const wide = 7 * Math.min(WIDEST, Math.max(...text.split("\n").map(s => s.length)));
+      return [x < this.view.w / 2 ? x - wide - 30 : x + 30, y < this.view.h / 2 ? y - 60 : y + 30];
     }
 
     // Corner nearest to (x, y) for a box that hides neither a panel nor another label.
@@ -134,17 +213,14 @@
 
     notes() {
       const {app} = this,
-        ends = app.state.callouts.map(note => this.at(app.point_of(note.sample, note.layer))),
+        ends = app.state.notes.map(note => this.at(app.point_of(note.sample, note.layer))),
         tool = this.at(app.tool_point());
       for (const p of [...ends, tool]) if (p) this.taken.push([p[0] - 10, p[1] - 10, p[0] + 10, p[1] + 10]);
-      app.state.callouts.forEach((note, i) => {
+      app.state.notes.forEach((note, i) => {
         const p = ends[i];
         if (!p) return;
-        // Outwards, away from the path.
-        const left = p[0] < this.view.w / 2,
-          above = p[1] < this.view.h / 2;
-        this.label(`${i + 1}  ${note.text}`, left ? p[0] - 250 : p[0] + 30, above ? p[1] - 75 : p[1] + 35, this.accent, p);
-        this.dot(p, 4, this.accent);
+        this.label(`${i + 1}  ${note.text}`, ...this.outwards(p, note.text), this.ink, p);
+        this.dot(p, 4, this.ink);
       });
     }
 
@@ -164,47 +240,6 @@
       ends.forEach(p => this.dot(p, 5, this.ink));
       if (ends.length === 2)
         this.label(this.app.measure_text(), (ends[0][0] + ends[1][0]) / 2 + 12, (ends[0][1] + ends[1][1]) / 2 + 8, this.ink);
-    }
-
-    triad(w, h) {
-      const {context: c} = this,
-        x = w - 46,
-        y = h - 46;
-      Object.assign(c, {textAlign: "center", textBaseline: "middle", lineWidth: 2});
-      const axes = this.app.camera
-        .axes()
-        .map((a, i) => [...a, "XYZ"[i], this.app.axis_colour(i)])
-        .sort((p, q) => p[2] - q[2]);
-      for (const [dx, dy, , name, colour] of axes) {
-        if (Math.hypot(dx, dy) < 0.08) continue;
-        c.strokeStyle = c.fillStyle = colour;
-        c.beginPath();
-        c.moveTo(x, y);
-        c.lineTo(x + 26 * dx, y + 26 * dy);
-        c.stroke();
-        c.fillText(name, x + 36 * dx, y + 36 * dy);
-      }
-    }
-
-    // A round length, and the deviation of that length at this exaggeration.
-    scale(w, h) {
-      const {context: c} = this,
-        length = OLP.colour.round_up(90 / this.view.scale / 2.5),
-        px = length * this.view.scale,
-        x = w - 90 - px,
-        y = h - 20;
-      const enlarged = length / this.app.state.exaggeration,
-        number = OLP.colour.number;
-      Object.assign(c, {strokeStyle: this.ink, fillStyle: this.ink, lineWidth: 1.5, textAlign: "center", textBaseline: "bottom"});
-      c.beginPath();
-      c.moveTo(x, y - 4);
-      c.lineTo(x, y);
-      c.lineTo(x + px, y);
-      c.lineTo(x + px, y - 4);
-      c.stroke();
-      c.fillText(`${number(length)} mm`, x + px / 2, y - 4);
-      c.textBaseline = "top";
-      c.fillText(enlarged < 1 ? `error ${number(enlarged * 1e3)} µm` : `error ${number(enlarged)} mm`, x + px / 2, y + 3);
     }
   }
 

@@ -1,5 +1,6 @@
 "use strict";
-// Panels at the left: layers, statistics, findings; the verdict in the heading; the readout over the picture.
+// The verdict with its questions and figures, findings, statistics, and the readout over the picture. What is said here is
+// what the table of judgements says; this page computes no verdict.
 (() => {
   const $ = id => document.getElementById(id);
   const make = (tag, properties = {}, ...children) => {
@@ -7,96 +8,123 @@
     element.append(...children);
     return element;
   };
-  const ROLES = {workpiece: "Workpiece", fixture: "Fixture", machine: "Machine", tool: "Tool"};
+  const ANSWER = new Map([
+    [true, ["pass", "yes"]],
+    [false, ["fail", "NO"]],
+    [null, ["open", "open"]],
+  ]);
+  const WORD = new Map([
+    [true, ["pass", "PASS"]],
+    [false, ["fail", "FAIL"]],
+    [null, ["open", "NOT JUDGED"]],
+  ]);
+  const MOST_FINDINGS = 500;
+  // Sentences of the proof are in ASCII, for terminals.
+  const micrometres = text => text.replace(/\bum\b/g, "µm");
 
   class Panels {
     constructor(app) {
       this.app = app;
-      $("title").textContent = app.manifest.title;
+      const {manifest} = app;
+      $("title").textContent = manifest.title;
       $("subtitle").textContent = [
-        app.manifest.program,
-        app.manifest.corrected && `→ ${app.manifest.corrected}`,
-        app.manifest.machine && `· ${app.manifest.machine}`,
-        app.manifest.frame && `· frame ${app.manifest.frame}`,
-        app.manifest.digest && `· ${app.manifest.digest}`,
+        manifest.program,
+        manifest.corrected && `→ ${manifest.corrected}`,
+        manifest.machine && `· ${manifest.machine}`,
+        manifest.frame && `· frame ${manifest.frame}`,
+        manifest.digest && `· ${manifest.digest}`,
       ]
         .filter(Boolean)
         .join(" ");
       $("subtitle").title = $("subtitle").textContent;
-      this.layers();
+      this.card();
       this.findings();
-      this.verdict();
-      OLP.on("metric", () => this.statistics());
-      OLP.on("layers", () => {
-        this.tick();
-        this.statistics();
-        this.readout();
+      for (const event of ["metric", "picture"]) OLP.on(event, () => this.statistics());
+      for (const event of ["time", "picture", "row"]) OLP.on(event, () => this.readout());
+    }
+
+    // Verdict, questions, the largest deviation of each picture with its place, and what the correction removed.
+    card() {
+      const {verdict} = this.app.manifest,
+        box = $("verdict");
+      box.hidden = !verdict;
+      if (verdict) {
+        const [name, word] = WORD.get(verdict.ok);
+        box.className = name;
+        box.textContent = word;
+      }
+      const questions = (verdict?.questions ?? []).map(q => {
+        const [name, word] = ANSWER.get(q.ok);
+        return make(
+          "dl",
+          {className: "question"},
+          make("span", {className: `answer ${name}`, textContent: word}),
+          make("dt", {textContent: q.question}),
+          make("dd", {textContent: micrometres(q.sentence)}),
+        );
       });
-      OLP.on("time", () => this.readout());
-      OLP.on("theme", () => {
-        this.swatches();
-        this.readout();
+      const remarks = (verdict?.remarks ?? []).map(text => make("p", {className: "remark", textContent: micrometres(text)}));
+      $("card").replaceChildren(...questions, ...remarks, this.figures(), ...this.removed());
+    }
+
+    figures() {
+      const {um} = OLP.colour,
+        {app} = this,
+        table = make("table");
+      table.append(
+        make("tr", {}, ...["µm", "largest", "rms", "line"].map(t => make("th", {textContent: t, scope: "col"}))),
+      );
+      app.pictures.list.forEach((picture, k) => {
+        const line = make("button", {className: "line", textContent: picture.flag?.line ?? "–", title: "Go there"});
+        line.disabled = !picture.flag;
+        line.onclick = () => {
+          app.pictures.show(k);
+          app.go_to_flag(picture);
+        };
+        table.append(
+          make(
+            "tr",
+            {},
+            make("th", {textContent: picture.label, scope: "row"}),
+            make("td", {}, make("b", {textContent: um(picture.largest_um)})),
+            make("td", {textContent: um(picture.rms_um)}),
+            make("td", {}, line),
+          ),
+        );
       });
+      return table;
     }
 
-    layers() {
-      const {app} = this,
-        entries = [...app.layers.values()].map(l => [l.name, l.label, l.visible, "line"]);
-      entries.push(["rapids", "Rapid moves", true, "dashes"]);
-      for (const [role, {labels}] of Object.entries(app.meshes.shown))
-        entries.push([
-          role,
-          role === "tool" ? "Tool" : labels.length === 1 && labels[0] ? labels[0] : (ROLES[role] ?? role),
-          true,
-          "solid",
-        ]);
-      for (const [name, label, on, kind] of entries) {
-        app.state.layers[name] = on;
-        const box = make("input", {
-          type: "checkbox",
-          id: "layer-" + name,
-          checked: on,
-          onchange: () => app.set_layer(name, box.checked),
-        });
-        const swatch = make("span", {className: "swatch " + kind});
-        swatch.dataset.layer = name;
-        $("layers").append(make("label", {title: label}, box, swatch, make("span", {textContent: label, className: "name"})));
-      }
-    }
-
-    swatches() {
-      const {app} = this;
-      for (const swatch of $("layers").querySelectorAll(".swatch")) {
-        const layer = app.layers.get(swatch.dataset.layer);
-        if (layer) swatch.style.background = layer.colour;
-        const mesh = app.meshes.shown[swatch.dataset.layer];
-        if (mesh) swatch.style.background = `#${mesh.objects[0].material.color.getHexString()}`;
-      }
-    }
-
-    tick() {
-      for (const [name, on] of Object.entries(this.app.state.layers)) {
-        const box = $("layer-" + name);
-        if (box) box.checked = on;
-      }
+    removed() {
+      const {removed} = this.app.manifest,
+        {um} = OLP.colour;
+      if (!removed || removed.percent === null) return [];
+      const less = removed.percent >= 0;
+      return [
+        make("p", {
+          id: "removed",
+          textContent: `The correction ${less ? "removes" : "ADDS"} ${Math.abs(removed.percent).toFixed(1)} % of the largest: ${um(removed.before_um)} → ${um(removed.after_um)} µm`,
+        }),
+      ];
     }
 
     // Of the deviation the figures of the proof and of the comparison, of other metrics those of the points shown.
     statistics() {
       const {app} = this,
-        metric = app.metrics.find(app.state.metric) ?? app.plot_metric(),
-        names = app.metrics.layers(metric).filter(n => app.layers.get(n).visible),
+        metric = app.metric,
+        names = app.metrics.layers(metric).filter(n => app.pictures.of_layer(n)),
         unit = OLP.colour.unit_label(metric?.unit),
-        proved = metric === app.plot_metric(),
-        what = proved ? "moves that count" : "points shown";
+        proved = Boolean(metric?.judged);
       const table = make(
         "table",
         {},
-        make("caption", {textContent: metric ? `${metric.label}${unit ? ", " + unit : ""}, ${what}` : ""}),
-        make("tr", {}, make("th"), ...names.map(n => make("th", {}, this.key(app.layers.get(n))))),
+        make("caption", {
+          textContent: metric ? `${metric.label}${unit ? ", " + unit : ""}, ${proved ? "moves that count" : "points shown"}` : "",
+        }),
+        make("thead", {}, make("tr", {}, make("th"), ...names.map(n => make("th", {textContent: n, scope: "col"})))),
       );
-      if (proved) this.packed_rows(table, names);
-      else this.shown_rows(table, metric, names);
+      if (proved) this.proved_rows(table, names);
+      else if (metric?.kind !== "state") this.shown_rows(table, metric, names);
       $("statistics").replaceChildren(table, ...this.facts());
     }
 
@@ -113,31 +141,22 @@
         );
     }
 
-    key(layer) {
-      const mark = make("span", {className: "key", title: layer.label, textContent: layer.name});
-      mark.style.borderColor = layer.colour;
-      return mark;
-    }
-
     // The file's own figures of layers: one row per label.
-    packed_rows(table, names) {
+    proved_rows(table, names) {
       const rows = new Map(),
         {um} = OLP.colour;
       for (const s of this.app.manifest.statistics ?? [])
         if (s.layer) rows.set(s.label, {...rows.get(s.label), [s.layer]: s});
-      for (const [label, by] of rows) {
-        if (!names.some(n => by[n])) continue;
-        table.append(
-          make(
-            "tr",
-            {},
-            make("th", {textContent: label}),
-            ...names.map(n =>
-              make("td", {textContent: by[n] ? um(by[n].value) : "–"}),
+      for (const [label, by] of rows)
+        if (names.some(n => by[n]))
+          table.append(
+            make(
+              "tr",
+              {},
+              make("th", {textContent: label}),
+              ...names.map(n => make("td", {textContent: by[n] ? um(by[n].value) : "–"})),
             ),
-          ),
-        );
-      }
+          );
     }
 
     // Figures of the whole job.
@@ -164,70 +183,58 @@
         list = app.manifest.findings ?? [],
         order = ["error", "warning", "info"];
       $("findings-count").textContent = list.length || "";
-      $("findings-box").open = list.some(f => f.severity === "error");
       if (!list.length) $("findings").append(make("p", {className: "empty", textContent: "None."}));
-      for (const f of [...list].sort((p, q) => order.indexOf(p.severity) - order.indexOf(q.severity)).slice(0, 500)) {
+      for (const f of [...list]
+        .sort((p, q) => order.indexOf(p.severity) - order.indexOf(q.severity))
+        .slice(0, MOST_FINDINGS)) {
         const entry = make(
           "button",
           {className: `finding ${order.includes(f.severity) ? f.severity : "info"}`},
           make("b", {textContent: f.code}),
-          make("span", {textContent: f.line ? `${f.message} (line ${f.place ?? f.line})` : f.message}),
+          make("span", {
+            textContent: `${f.severity}: ${micrometres(f.message)}${f.line ? ` (line ${f.place ?? f.line})` : ""}`,
+          }),
         );
         entry.disabled = !f.line;
         entry.onclick = () => app.go_to_line(app.listing.names ? f.place : f.line);
         $("findings").append(entry);
       }
+      if (list.length > MOST_FINDINGS)
+        $("findings").append(make("p", {className: "empty", textContent: `${list.length - MOST_FINDINGS} more are in the report.`}));
     }
 
-    // The verdict of the file; this page computes none.
-    verdict() {
-      const box = $("verdict"),
-        {verdict} = this.app.manifest;
-      box.hidden = !verdict;
-      if (!verdict) return;
-      const [name, word] = verdict.ok === null ? ["open", "NOT JUDGED"] : verdict.ok ? ["pass", "PASS"] : ["fail", "FAIL"];
-      box.className = name;
-      box.replaceChildren(make("b", {textContent: word}), make("span", {textContent: verdict.text}));
-      box.title = verdict.text;
-    }
-
+    // Where the tool is, and by how much it is off in each picture; nothing while it is where it began.
     readout() {
       const {app} = this,
-        {state, manifest} = app,
-        nominal = app.layers.get("nominal") ?? app.layers.values().next().value,
+        {state, manifest} = app;
+      $("readout").hidden = state.sample_at === 0;
+      const nominal = app.layers.get("nominal") ?? app.layers.values().next().value,
         p = nominal.at(state.sample_at, 0),
-        number = v => (v <= -0.05 ? "−" : "") + Math.abs(v).toFixed(1);
+        number = v => (v <= -0.005 ? "−" : "") + Math.abs(v).toFixed(2);
       const line = app.listing?.number(state.row, 0),
-        table = make("table");
+        table = make("table"),
+        row = (head, cells) => table.append(make("tr", {}, make("th", {textContent: head}), ...cells.map(t => make("td", {textContent: t}))));
       table.append(
         make(
           "tr",
           {},
           make("th", {textContent: line ? `line ${line}` : ""}),
-          ...["X", "Y", "Z", ""].map(a => make("th", {textContent: a})),
+          ...["X", "Y", "Z", "size"].map(a => make("th", {textContent: a})),
         ),
       );
-      table.append(
-        make(
-          "tr",
-          {},
-          make("th", {textContent: "nominal, mm"}),
-          ...p.map((v, j) => make("td", {textContent: (v + manifest.origin_mm[j]).toFixed(3).replace("-", "−")})),
-          make("td"),
-        ),
-      );
+      row("nominal, mm", [...p.map((v, j) => (v + manifest.origin_mm[j]).toFixed(3).replace("-", "−")), ""]);
       for (const layer of app.layers.values()) {
-        if (!layer.D || !layer.visible) continue;
+        if (!layer.D || !app.pictures.of_layer(layer.name)) continue;
         const at = layer.own(state.sample_at),
           a = layer.at(at, 0),
-          d = layer.at(at, 1).map((v, j) => 1e3 * (v - a[j])),
-          cells = [...d.map(number), number(Math.hypot(...d))];
-        table.append(make("tr", {}, make("th", {}, this.key(layer), ", µm"), ...cells.map(t => make("td", {textContent: t}))));
+          d = layer.at(at, 1).map((v, j) => 1e3 * (v - a[j]));
+        row(`${layer.name}, µm`, [...d.map(number), number(Math.hypot(...d))]);
       }
       $("readout").replaceChildren(table);
     }
   }
 
   OLP.make = make;
+  Object.assign(OLP, {WORD, micrometres});
   OLP.Panels = Panels;
 })();

@@ -2,26 +2,33 @@
 // One path: base + k * deviation. All of it is on the CPU in blocks; the part for the view goes to the drawing buffer.
 (() => {
   const BLOCK = 256,
-    FLOATS = 16; // floats of one vertex: a0 a1 d0 d1 (3 each), side, scalar, sample, kind
+    FLOATS = 16, // floats of one vertex: a0 a1 d0 d1 (3 each), side, value, sample, look
+    SIDES = [-1, 1, -2, 2]; // of the corners: -1, 1 at the start, -2, 2 at the end
   const RAPID = 1,
-    GAP = 2;
+    GAP = 2,
+    WHISKER = 3,
+    DIM = 4, // outside the filter
+    CHOSEN = 8; // added to the look of what is selected
   const CHORD = 2; // least length of a drawn segment, px
+  const WHISKERS = {apart: 14, most: 2500}; // px between whiskers; of a layer
 
   class Path {
-    // spec: the manifest's layer; P (n,3) mm; D (n,3) mm or null; index (n) nominal samples or null; kind (N) of the segment ending in a sample
+    // spec: the manifest's layer; P (n,3) mm; D (n,3) mm or null; index (n) nominal samples or null; kind (n) of the
+    // segment that ends in a point. `look` (n) is how that is drawn: its kind, outside the filter, selected.
     constructor(spec, P, D, index, kind) {
       Object.assign(this, {
         name: spec.name,
         label: spec.label,
-        colour: spec.colour,
         width: spec.width || 2,
+        dashes: spec.dashes ?? [1, 0],
         P,
         D,
         index,
-        kind: kind,
+        kind,
         n: P.length / 3,
       });
-      this.visible = spec.visible !== false;
+      this.visible = true;
+      this.look = null;
       this.values = null; // scalar of the present metric, or null
       this.blocks = Math.ceil(Math.max(0, this.n - 1) / BLOCK);
       [this.centre, this.radius, this.spread, this.length, this.need] = [3, 1, 1, 1, 1].map(
@@ -108,39 +115,70 @@
     }
 
     // Fills the buffer with at most `cap` segments; positions are minus `origin`, so that float32 suffices at any zoom.
-    // A run of skipped samples never crosses a change of kind or an end of the selection, and keeps its largest value.
-    fill(cap, total, origin, selection) {
-      const {P, D, kind, index, values, n, need} = this,
-        thin = total > cap ? total / (cap * 0.92) : 1;
-      this.reserve(Math.min(cap, n - 1));
+    // A run of skipped samples never crosses a change of look, and keeps its largest value. Whiskers lead from the nominal
+    // path to the drawn one, `apart` mm from each other.
+    fill(cap, total, origin, apart) {
+      const {D, look, index, values, n, need} = this,
+        thin = total > cap ? total / (cap * 0.92) : 1,
+        spare = D && apart ? Math.min(WHISKERS.most, n) : 0;
+      this.reserve(Math.min(cap, n - 1) + spare);
       const out = this.buffer,
-        room = out.length / (4 * FLOATS),
-        [s0, s1] = selection;
-      let c = 0;
+        room = out.length / (4 * FLOATS) - spare,
+        whiskers = [];
+      let c = 0,
+        way = apart;
       for (let b = 0; b < this.blocks && c < room; b++) {
         if (!need[b]) continue;
         const first = b * BLOCK,
           last = Math.min(n - 1, first + BLOCK),
           stride = Math.max(1, Math.ceil((last - first) / Math.max(1, need[b] / thin)));
         for (let i = first; i < last && c < room;) {
-          const sample = index ? index[i] : i,
-            what = kind ? kind[index ? index[i + 1] : i + 1] : 0,
+          const what = look[i + 1],
             end = Math.min(last, i + stride);
-          const stop = sample < s0 ? s0 : sample < s1 ? s1 : Infinity;
           let j = i + 1,
             value = values ? values[j] : 0;
-          for (; j < end; j++) {
-            const s = index ? index[j] : j;
-            if (s >= stop || (kind && kind[index ? index[j + 1] : j + 1] !== what)) break;
-            if (values && !(Math.abs(values[j + 1]) <= Math.abs(value)))
-              value = Number.isNaN(values[j + 1]) ? value : values[j + 1];
+          for (; j < end && look[j + 1] === what; j++) {
+            const next = values ? values[j + 1] : 0;
+            if (next === next && !(Math.abs(next) <= Math.abs(value))) value = next;
           }
-          if (what !== GAP) this.put(c++, i, j, value, sample, what, origin);
+          const kind = what % CHOSEN;
+          if (kind !== GAP) this.put(c++, i, j, value, index ? index[i] : i, what, origin);
+          if (spare && kind === 0) {
+            const {P} = this;
+            way += Math.hypot(P[3 * j] - P[3 * i], P[3 * j + 1] - P[3 * i + 1], P[3 * j + 2] - P[3 * i + 2]);
+            if (way >= apart && whiskers.length < spare) {
+              whiskers.push(j);
+              way = 0;
+            }
+          }
           i = j;
         }
       }
+      for (const j of whiskers) this.whisker(c++, j, origin);
       this.drawn = c;
       this.thin = thin;
+    }
+
+    // Distance between whiskers in mm for a picture of `px` pixels per mm.
+    apart(px) {
+      let length = 0;
+      for (let b = 0; b < this.blocks; b++) if (this.need[b]) length += this.length[b];
+      return Math.max(WHISKERS.apart / px, length / WHISKERS.most);
+    }
+
+    whisker(c, j, origin) {
+      const {P, D, buffer: out, index, values} = this;
+      for (let v = 0, o = c * 4 * FLOATS; v < 4; v++, o += FLOATS) {
+        for (let k = 0; k < 3; k++) {
+          out[o + k] = out[o + 3 + k] = P[3 * j + k] - origin[k];
+          out[o + 6 + k] = 0;
+          out[o + 9 + k] = D[3 * j + k];
+        }
+        out[o + 12] = SIDES[v];
+        out[o + 13] = values ? values[j] : 0;
+        out[o + 14] = index ? index[j] : j;
+        out[o + 15] = WHISKER;
+      }
     }
 
     reserve(count) {
@@ -167,7 +205,7 @@
           out[o + 10] = D[z + 1];
           out[o + 11] = D[z + 2];
         }
-        out[o + 12] = v < 2 ? (v ? 1 : -1) : v === 3 ? 2 : -2;
+        out[o + 12] = SIDES[v];
         out[o + 13] = value;
         out[o + 14] = sample;
         out[o + 15] = what;
@@ -175,9 +213,9 @@
     }
 
     // Nearest drawn point to the pixel (px, py) of the pane within `limit` pixels: {layer, at, distance} or null. Exact for any k.
-    pick(view, px, py, limit, cut, rapids) {
+    pick(view, px, py, limit, cut, rapids, plane) {
       const {clip: e, w, h, scale, k, ortho} = view,
-        {P, D, kind, index, n} = this;
+        {P, D, look, index, n} = this;
       let best = null,
         nearest = limit * limit;
       for (let b = 0; b < this.blocks; b++) {
@@ -206,8 +244,12 @@
           }
           const sx = (((e[0] * x + e[4] * y + e[8] * z + e[12]) / v + 1) / 2) * w,
             sy = ((1 - (e[1] * x + e[5] * y + e[9] * z + e[13]) / v) / 2) * h,
-            what = kind ? kind[s] : 0;
-          if (joined && what !== GAP && (rapids || what !== RAPID) && s <= cut) {
+            what = look[i] % CHOSEN;
+          if (plane && plane[0] * P[j] + plane[1] * P[j + 1] + plane[2] * P[j + 2] > plane[3]) {
+            joined = false;
+            continue;
+          }
+          if (joined && what !== GAP && what !== DIM && (rapids || what !== RAPID) && s <= cut) {
             const dx = sx - px0,
               dy = sy - py0,
               q = dx * dx + dy * dy,
@@ -238,5 +280,5 @@
     }
     return hi > lo && array[hi] <= x ? hi : lo;
   };
-  Object.assign(OLP, {Path, BLOCK, FLOATS, RAPID, GAP});
+  Object.assign(OLP, {Path, BLOCK, FLOATS, RAPID, GAP, WHISKER, DIM, CHOSEN});
 })();

@@ -1,6 +1,13 @@
 "use strict";
-// The two linked plots: deviation along the path, and the motion of each axis against its limits.
+// The linked charts: the strip of the error along the path, and the motion of each axis against its limits.
 (() => {
+  const $ = id => document.getElementById(id);
+  // [name, metrics of the lanes, text of the choice]; without metrics the lanes are the pictures, each with its own scale
+  const STRIPS = [
+    ["frame", ["normal", "binormal", "along"], "normal, binormal, along"],
+    ["axes", ["x", "y", "z"], "X, Y, Z"],
+    ["pictures", null, "size, by picture"],
+  ];
   // [name, title, unit, text of the choice]
   const MOTIONS = [
     ["speed", "Speed", "mm/s", "path and feed"],
@@ -9,11 +16,17 @@
     ["jerk", "Jerk", "mm/s³", "jerk"],
     ["share", "Use of limits", "%", "use of limits"],
   ];
+  const DASHES = [
+    [1, 0],
+    [8, 3],
+    [2, 3],
+  ];
 
   class Plots {
     constructor(app) {
       this.app = app;
-      this.abscissa = "time";
+      this.abscissa = "way";
+      this.kind = "frame";
       this.motion = app.manifest.motion ? "speed" : null;
       this.cache = new Map();
       const hosts = document.querySelectorAll("#plots .plot");
@@ -25,27 +38,30 @@
         },
         zoom: range => this.charts.forEach(c => c.set_range(range)),
       };
-      this.deviation = new OLP.Chart(hosts[0], events);
-      this.charts = [this.deviation];
-      const select = document.getElementById("motion");
+      this.strip = new OLP.Chart(hosts[0], events);
+      this.charts = [this.strip];
+      for (const [value, metrics, label] of STRIPS)
+        if (!metrics || metrics.every(n => app.metrics.find(n))) $("strip").append(new Option(label, value));
+      $("strip").onchange = e => this.set_strip(e.target.value);
+      this.set_strip($("strip").options[0].value);
       if (this.motion) {
         this.movement = new OLP.Chart(hosts[1], events);
         this.charts.push(this.movement);
-        for (const [value, , , label] of MOTIONS) select.append(new Option(label, value));
-        select.value = this.motion;
-        select.onchange = () => {
-          this.motion = select.value;
+        for (const [value, , , label] of MOTIONS) $("motion").append(new Option(label, value));
+        $("motion").value = this.motion;
+        $("motion").onchange = e => {
+          this.motion = e.target.value;
           this.draw_motion();
         };
       } else hosts[1].hidden = true;
-      document.getElementById("abscissa").onchange = e => {
+      $("abscissa").onchange = e => {
         this.abscissa = e.target.value;
         this.draw();
       };
       OLP.on("time", () => this.mark());
       OLP.on("theme", () => this.draw());
-      OLP.on("metric", () => this.draw_deviation());
-      OLP.on("layers", () => this.draw_deviation());
+      for (const event of ["picture", "scale"]) OLP.on(event, () => this.draw_strip());
+      for (const event of ["chosen", "filter"]) OLP.on(event, () => this.draw_chosen());
     }
 
     // Ascending abscissa of the nominal samples.
@@ -85,31 +101,56 @@
       this.charts.forEach(c => {
         c.range = null;
       });
-      this.draw_deviation();
+      this.draw_strip();
       this.draw_motion();
+      this.draw_chosen();
       this.mark();
     }
 
-    draw_deviation() {
-      const {app} = this,
-        metric = app.metrics.find(app.state.metric) ?? app.plot_metric(),
-        series = [];
-      for (const name of app.metrics.layers(metric)) {
-        const layer = app.layers.get(name);
-        if (!layer.visible) continue;
-        const x = layer.index
-          ? this.cached(`${name} ${this.abscissa}`, () => Float64Array.from(layer.index, i => this.axis[i]))
-          : this.axis;
-        series.push({label: name, colour: layer.colour, x, y: app.metrics.values(metric, name)});
-      }
-      this.deviation.set({
-        extent: this.extent,
-        title: metric?.label ?? "Deviation",
-        unit: OLP.colour.unit_label(metric?.unit),
-        x_label: this.x_label,
-        series,
-        limits: metric?.judged ? app.limits() : [],
+    set_strip(kind) {
+      this.kind = STRIPS.some(([name]) => name === kind) ? kind : "frame";
+      $("strip").value = this.kind;
+      this.cache.clear();
+      this.draw_strip();
+    }
+
+    abscissa_of(layer) {
+      return layer.index
+        ? this.cached(`${layer.name} ${this.abscissa}`, () => Float64Array.from(layer.index, i => this.axis[i]))
+        : this.axis;
+    }
+
+    // Series of the layers of a picture in a metric.
+    series(picture, metric) {
+      const {app} = this;
+      return picture.layers.flatMap((name, k) => {
+        const layer = app.layers.get(name),
+          y = this.cached(`${metric.name} ${name}`, () => app.metrics.values(metric, name));
+        return y ? [{label: name, dashes: DASHES[k % 3], x: this.abscissa_of(layer), y}] : [];
       });
+    }
+
+    // Of the current picture the parts of the error, or of every picture its size.
+    draw_strip() {
+      const {app} = this,
+        {pictures, metrics} = app,
+        names = STRIPS.find(([name]) => name === this.kind)[1],
+        {current} = pictures;
+      if (!current || !app.scene) return;
+      const limits = picture => {
+        const value = pictures.tolerance(picture);
+        return value === null ? [] : [{value}];
+      };
+      const lane = (title, picture, metric, limit) => ({title, unit: OLP.colour.unit_label(metric.unit), series: this.series(picture, metric), limits: limit});
+      const lanes = names
+        ? names.map(name => {
+            const metric = metrics.find(name);
+            return lane(metric.label, current, metric, limits(current).flatMap(({value}) => [{value}, {value: -value}]));
+          })
+        : pictures.list.map(picture => lane(picture.label, picture, app.distance, limits(picture)));
+      metrics.keep([app.metric, app.distance]);
+      this.strip.title = names ? `Error, ${current.label}` : "Size of the error";
+      this.strip.set({extent: this.extent, x_label: this.x_label, lanes, alike: Boolean(names)});
     }
 
     draw_motion() {
@@ -123,29 +164,24 @@
       let series,
         limits = [];
       if (kind === "speed") {
-        series = [{label: "path", colour: this.app.axis_colour(2), x, y: arrays.get(motion.speed)}];
-        if (motion.feed) series.push({label: "programmed", colour: this.app.axis_colour(0), x, y: arrays.get(motion.feed)});
+        series = [{label: "path", dashes: DASHES[0], x, y: arrays.get(motion.speed)}];
+        if (motion.feed) series.push({label: "programmed", dashes: DASHES[1], x, y: arrays.get(motion.feed)});
       } else if (kind === "share") {
         series = motion.axes.map((axis, i) => ({
           label: axis.name,
-          colour: this.app.axis_colour(i),
+          dashes: DASHES[i % 3],
           x,
           y: this.cached("share " + axis.name, () => this.share(axis)),
         }));
         limits = [{value: 100}];
       } else {
-        series = motion.axes.map((axis, i) => ({
-          label: axis.name,
-          colour: this.app.axis_colour(i),
-          x,
-          y: arrays.get(axis[kind]),
-        }));
+        series = motion.axes.map((axis, i) => ({label: axis.name, dashes: DASHES[i % 3], x, y: arrays.get(axis[kind])}));
         limits = motion.axes
-          .flatMap((axis, i) => [1, -1].map(sign => ({value: sign * axis[kind + "_limit"], colour: this.app.axis_colour(i)})))
+          .flatMap(axis => [1, -1].map(sign => ({value: sign * axis[kind + "_limit"]})))
           .filter(l => Number.isFinite(l.value));
       }
       const [, title, unit] = MOTIONS.find(m => m[0] === kind);
-      this.movement.set({extent: this.extent, title, unit, x_label: this.x_label, series, limits, include: true});
+      this.movement.set({extent: this.extent, x_label: this.x_label, lanes: [{title, unit, series, limits, include: true}]});
     }
 
     // Largest of velocity, acceleration and jerk of an axis as a share of its limits, %.
@@ -166,6 +202,12 @@
     mark() {
       const x = this.x_of(this.app.state.time);
       this.charts.forEach(c => c.set_mark("now", x));
+    }
+
+    // Marks what is selected.
+    draw_chosen() {
+      const bands = this.app.state.chosen.map(([a, b]) => [this.axis[Math.max(0, a - 1)], this.axis[b]]);
+      this.charts.forEach(c => c.set_bands(bands));
     }
 
     hover(x) {

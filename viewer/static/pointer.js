@@ -40,20 +40,25 @@
         return;
       }
       if (!hit) {
-        app.set_span([-1, -1]);
+        app.choose(OLP.NONE);
         return;
       }
       app.set_sample(hit.sample);
       app.select_row(app.row_at(), true);
     }
 
+    // While measuring, the current point of the tool is taken.
+    take_current() {
+      const {layer} = this.app.pictures;
+      if (this.measuring) this.mark({layer: layer.name, at: layer.own(this.app.state.sample_at)});
+    }
+
     mark({layer, at}) {
-      const {overlay} = this.app,
-        k = this.app.state.exaggeration,
-        path = this.app.layers.get(layer);
+      const {overlay, pictures, layers} = this.app,
+        path = layers.get(layer);
       if (overlay.measured.length === 2) overlay.measured = [];
-      overlay.measured.push({point: path.at(at, k), true_point: path.at(at, 1), k});
-      overlay.draw();
+      overlay.measured.push({point: path.at(at, pictures.k_of(path)), true_point: path.at(at, path.D ? 1 : 0)});
+      overlay.show();
       if (overlay.measured.length === 2) this.app.toast(this.text().replace("\n", "   "), 8000);
     }
 
@@ -70,8 +75,8 @@
       this.app.overlay.measured = [];
       $("measure").setAttribute("aria-pressed", on);
       this.pane.classList.toggle("measuring", on);
-      if (on) this.app.toast("Click two points on the paths", 3000);
-      this.app.overlay.draw();
+      if (on) this.app.toast("Click two points on the paths, or take current points with Enter", 3000);
+      this.app.overlay.show();
     }
 
     move(e) {
@@ -92,7 +97,7 @@
         row = app.rows[sample],
         number = OLP.colour.number;
       const line = app.listing.number(row, 0),
-        metric = app.metrics.find(app.state.metric) ?? app.plot_metric(),
+        {metric} = app,
         values = app.metrics.values(metric, hit.layer),
         box = this.pane.getBoundingClientRect();
       const text = [
@@ -100,14 +105,16 @@
         line ? `line ${line}:  ${app.listing.text(row, 0).slice(0, 60)}` : "",
         `${app.time_of(hit.sample).toFixed(3)} s,  ${app.kind[sample] === OLP.RAPID ? "rapid" : "feed"}`,
       ];
-      if (values) text.push(`${metric.label}  ${number(values[Math.round(hit.at)], 4)} ${OLP.colour.unit_label(metric.unit)}`);
+      const value = values?.[Math.round(hit.at)];
+      if (values && metric.kind === "state") text.push(value === 2 ? "line above" : value === 1 ? "line within" : "not judged");
+      else if (values) text.push(`${metric.label}  ${number(value, 4)} ${OLP.colour.unit_label(metric.unit)}`);
       const tip = $("tip");
       tip.textContent = text.filter(Boolean).join("\n");
       tip.hidden = false;
       tip.style.left = Math.min(e.clientX - box.left + 16, box.width - tip.offsetWidth - 6) + "px";
       tip.style.top = Math.min(e.clientY - box.top + 16, box.height - tip.offsetHeight - 6) + "px";
       app.overlay.hover = {layer: hit.layer, at: hit.at};
-      app.overlay.draw();
+      app.overlay.show();
       app.plots.charts.forEach(c => c.set_mark("hover", app.plots.x_of(app.time_of(hit.sample))));
       this.tipped = true;
     }
@@ -117,7 +124,7 @@
       this.tipped = false;
       $("tip").hidden = true;
       this.app.overlay.hover = null;
-      this.app.overlay.draw();
+      this.app.overlay.show();
       this.app.plots.charts.forEach(c => c.set_mark("hover", null));
     }
   }

@@ -29,9 +29,7 @@
       this.lines = new Map();
       this.origin = [0, 0, 0];
       this.budget = BUDGET.start;
-      const table = new T.DataTexture(new Uint8Array(4 * (OLP.colour.SIZE + 1)), OLP.colour.SIZE + 1, 1, T.RGBAFormat);
-      table.minFilter = table.magFilter = T.NearestFilter;
-      this.colours = {value: table};
+      this.plane = null; // of the section: [x, y, z, distance], mm; what is beyond is left out
       this.size_by_pane();
       const render = this.viewer.render;
       this.viewer.render = () => {
@@ -61,8 +59,7 @@
     }
 
     add_path(path, order) {
-      const lines = new OLP.Lines(path, order, this.colours.value);
-      lines.uniforms.colours = this.colours;
+      const lines = new OLP.Lines(path, order);
       this.lines.set(path.name, lines);
       this.viewer.set_object(["olp", path.name], lines.mesh);
       this.viewer.set_property(["olp", path.name], "visible", path.visible);
@@ -73,10 +70,33 @@
       this.viewer.set_dirty();
     }
 
-    set_colours(bytes) {
-      this.colours.value.image.data.set(bytes);
-      this.colours.value.needsUpdate = true;
+    // Leaves out what is beyond a plane, or with null nothing.
+    set_plane(plane) {
+      this.plane = plane;
+      const far = plane && new T.Plane(new T.Vector3(-plane[0], -plane[1], -plane[2]), plane[3] * MM);
+      if (far) far.applyMatrix4(new T.Matrix4().makeRotationX(-Math.PI / 2));
+      this.viewer.renderer.localClippingEnabled = Boolean(plane);
+      this.root.traverse(o => {
+        if (o.material && !o.material.uniforms) o.material.clippingPlanes = far ? [far] : null;
+      });
+      this.place_plane();
+    }
+
+    // The plane in the coordinates of the buffers, which are about `origin`.
+    place_plane() {
+      const [x, y, z, w] = this.plane ?? [0, 0, 0, 1],
+        [a, b, c] = this.origin;
+      for (const {uniforms} of this.lines.values()) uniforms.plane.value.set(x, y, z, w - x * a - y * b - z * c);
       this.viewer.set_dirty();
+    }
+
+    // What is drawn now, as a picture of its own: the drawing buffer is not kept after a frame.
+    still() {
+      this.viewer.render();
+      const source = this.viewer.renderer.domElement,
+        copy = Object.assign(document.createElement("canvas"), {width: source.width, height: source.height});
+      copy.getContext("2d").drawImage(source, 0, 0);
+      return copy;
     }
 
     // The projection of a point (mm) to the pane: clip matrix, pane size, px per (mm / depth), exaggeration.
@@ -113,8 +133,8 @@
       let best = null;
       for (const lines of [...this.lines.values()].reverse()) {
         const {path, uniforms: u} = lines;
-        if (!path.visible) continue;
-        const hit = path.pick(this.view(u.k.value), x, y, best ? best.distance - 0.25 : limit, u.cut.value, u.rapids.value > 0.5);
+        if (!path.visible || u.opacity.value < 0.3) continue;
+        const hit = path.pick(this.view(u.k.value), x, y, best ? best.distance - 0.25 : limit, u.cut.value, u.rapids.value > 0.5, this.plane);
         if (hit) best = hit;
         if (best && best.distance <= 0.25) break;
       }
@@ -134,11 +154,15 @@
       const shown = [...this.lines.values()].filter(l => l.path.visible);
       const wanted = shown.map(l => l.path.demand(this.view(l.uniforms.k.value))),
         all = wanted.reduce((a, b) => a + b, 0);
+      const {ortho, scale} = this.view(0),
+        px = ortho ? scale : scale / this.app.camera.distance; // of a mm at the target
       shown.forEach((lines, i) => {
         const cap = Math.max(256, all > this.budget ? Math.floor((this.budget * wanted[i]) / all) : Math.ceil(wanted[i] * 1.1));
-        lines.path.fill(cap, wanted[i], this.origin, this.app.state.span);
+        const apart = this.app.state.layers.whiskers && lines.path.D ? lines.path.apart(px) : 0;
+        lines.path.fill(cap, wanted[i], this.origin, apart);
         lines.send(this.origin);
       });
+      this.place_plane();
       this.refilled = true;
       this.viewer.set_dirty();
     }
