@@ -17,16 +17,16 @@ Family = Literal["within", "above", "open", "minus"]
 #: theme, and grows in contrast with the value, also for colour-blind eyes.
 COLOURS: dict[Theme, dict[Family, tuple[str, ...]]] = {
     "light": {
-        "within": ("#2a98af", "#0a8fb2", "#0785b3", "#007ab5", "#066bb0", "#0459a4", "#01459d", "#0a2f94"),
-        "above": ("#d2760b", "#ce6709", "#cc5601", "#c94101", "#be2602", "#a31713", "#890717", "#6d0318"),
-        "open": ("#a87db1", "#9a6ea9", "#8c60a2", "#7e529a", "#704392", "#62358b", "#552683", "#47137c"),
-        "minus": ("#629a82", "#548e75", "#478368", "#39775c", "#2b6c4f", "#1b6143", "#055638", "#014a2e"),
+        "within": ("#2192a8", "#0b8aac", "#0c82af", "#0879b3", "#066bb0", "#0459a4", "#01459d", "#0a2f94"),
+        "above": ("#cb7202", "#ca6400", "#c85401", "#c84001", "#be2602", "#a31713", "#890717", "#6d0318"),
+        "open": ("#a177ab", "#9569a4", "#885c9d", "#7b4e96", "#6e4190", "#613389", "#542583", "#47137c"),
+        "minus": ("#5b927a", "#4e886f", "#417d63", "#357358", "#27694d", "#185f42", "#035537", "#014a2e"),
     },
     "dark": {
-        "within": ("#4b67a3", "#4b77b5", "#4888c7", "#4199d8", "#3eabe2", "#49bde5", "#5ccee7", "#73dee9"),
+        "within": ("#5572ae", "#527fbd", "#4d8ccc", "#439ada", "#3eabe2", "#49bde5", "#5ccee7", "#73dee9"),
         "above": ("#e14d28", "#e96321", "#f07820", "#f58c27", "#f8a136", "#f8b64b", "#f8ca63", "#f7dd7d"),
-        "open": ("#7d5fad", "#8c6cb7", "#9c78c2", "#ab84cc", "#bb91d7", "#cb9ee1", "#dbabec", "#ebb9f7"),
-        "minus": ("#448061", "#4e8d6e", "#589b7a", "#62a987", "#6cb794", "#77c6a2", "#81d4b0", "#8ce3be"),
+        "open": ("#8467b5", "#9372be", "#a17dc8", "#b089d1", "#bf94da", "#cea0e4", "#dcaced", "#ebb9f7"),
+        "minus": ("#4a8667", "#539373", "#5ca07f", "#65ad8b", "#6fba97", "#79c7a4", "#82d5b0", "#8ce3be"),
     },
 }  # fmt: skip
 #: Most bands of one family, about.

@@ -190,7 +190,7 @@
     lane(c, lane) {
       const {ticks, number} = OLP.colour;
       Object.assign(c, {strokeStyle: this.look.rule, fillStyle: this.look.soft, lineWidth: 1, textAlign: "right", textBaseline: "middle"});
-      for (const y of ticks(lane.low, lane.up, Math.max(2, lane.high / 26))) {
+      for (const y of ticks(lane.low, lane.up, Math.max(3, lane.high / 26))) {
         const at = Math.round(this.py(lane, y)) + 0.5;
         c.beginPath();
         c.moveTo(EDGE.left, at);

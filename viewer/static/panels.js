@@ -64,7 +64,7 @@
         );
       });
       const remarks = (verdict?.remarks ?? []).map(text => make("p", {className: "remark", textContent: micrometres(text)}));
-      $("card").replaceChildren(...questions, ...remarks, this.figures(), ...this.removed());
+      $("card").replaceChildren(this.figures(), ...this.removed(), ...questions, ...remarks);
     }
 
     figures() {
