@@ -79,7 +79,11 @@ def predicted(job: Job, *, plots: bool = False) -> tuple[dict[str, Any], Path]:
     shown = run("view", job.program, *job.words("--corrected", out, "--no-time", "-o", html, "--force"))
     assert shown.exit_code == 0, shown.stderr
     page = Page(html.read_bytes())
-    assert (page.manifest["verdict"]["ok"], page.manifest["verdict"]["text"]) == (verdict["ok"], words)
+    shown_verdict = page.manifest["verdict"]
+    assert shown_verdict["ok"] == verdict["ok"]
+    assert shown_verdict["questions"] == verdict["questions"]
+    said = [*(question["sentence"] for question in verdict["questions"]), *shown_verdict["remarks"]]
+    assert sorted(said) == sorted(verdict["sentences"])
     _page_and_table(page, table)
     _page_and_report(page, stated)
     return stated, out
@@ -235,11 +239,19 @@ def _page_and_report(page: Page, stated: dict[str, Any]) -> None:
     for side, layer in (("before", "uncorrected"), ("after", "corrected")):
         assert figures[layer, "rms"] == deviation[side]["between"]["rms_um"]
         assert figures[layer, "at waypoints"] == deviation[side]["waypoints"]["max_um"]
-    told = {c["layer"]: c["text"] for c in page.manifest["callouts"]}
-    if numerical["line"] is not None:
-        assert told["corrected"] == (
-            f"largest, corrected: {numerical['largest_um']:.2f} µm, line {numerical['line']}"
-        )
+    pictures = {picture["name"]: picture for picture in page.manifest["pictures"]}
+    shown = pictures["corrected"]
+    assert shown["largest_um"] == numerical["largest_um"]
+    if numerical["line"] is not None and shown["flag"] is not None:
+        assert (shown["flag"]["um"], shown["flag"]["line"]) == (
+            numerical["largest_um"], str(numerical["line"]),
+        )  # fmt: skip
+        assert pictures["uncorrected"]["flag"]["um"] == pictures["uncorrected"]["largest_um"] == largest
+    for side, layer in (("before", "uncorrected"), ("after", "corrected")):
+        assert pictures[layer]["tolerance_um"] == numerical["allowed_um"]
+        assert pictures[layer]["rms_um"] == deviation[side]["between"]["rms_um"]
+    removed = page.manifest["removed"]
+    assert (removed["before_um"], removed["after_um"]) == (largest, numerical["largest_um"] or 0.0)
     assert [f["message"] for f in page.manifest["findings"]][: len(stated["findings"])] == [
         f["message"] for f in stated["findings"]
     ]
@@ -331,7 +343,8 @@ def _points(target: Path, stated: dict[str, Any]) -> None:
 def _page_and_comparison(page: Page, stated: dict[str, Any]) -> None:
     manifest, verdict = page.manifest, stated["verdict"]
     shown = manifest["verdict"]
-    assert shown["text"].endswith(" ".join(verdict["sentences"]))
+    assert shown["questions"][-1:] == verdict["questions"]
+    assert shown["questions"][-1]["sentence"] == " ".join(verdict["sentences"])
     assert shown["ok"] is False if verdict["ok"] is False else shown["ok"] in (verdict["ok"], False, None)
     assert manifest["part_tolerance_um"] == verdict["measured"]["tolerance_um"]
     names = list(_layers(stated))
@@ -345,9 +358,13 @@ def _page_and_comparison(page: Page, stated: dict[str, Any]) -> None:
     assert figures == expected
     codes = {(f["code"], f["message"]) for f in manifest["findings"]}
     assert {(f["code"], f["message"]) for f in stated["findings"]} <= codes
-    told = [c["text"] for c in manifest["callouts"] if c["layer"].startswith("measured")]
-    worst = stated["worst"]
-    assert told == [f"largest, measured: {w['max_um']:.2f} µm, line {w['line']}" for w in worst[:1]]
+    (picture,) = [p for p in manifest["pictures"] if p["name"] == "measured"]
+    assert picture["layers"] == names
+    assert picture["tolerance_um"] == verdict["measured"]["tolerance_um"]
+    assert picture["largest_um"] == verdict["measured"]["largest_um"]
+    assert picture["rms_um"] == (stated["after"]["across_um"] or {}).get("rms")
+    for worst in stated["worst"][:1]:
+        assert (picture["flag"]["um"], picture["flag"]["line"]) == (worst["max_um"], str(worst["line"]))
     _measured_lines(page, stated, names)
 
 

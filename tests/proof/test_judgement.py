@@ -256,9 +256,10 @@ def test_a_measured_verdict_needs_every_run(
      (None, None, None)],
 )  # fmt: skip
 def test_two_verdicts_are_one_that_fails_where_either_does(a: bool, b: bool, ok: bool | None) -> None:
-    predicted = {"ok": a, "sentences": ["p"], "part": 1}
-    both = judgement.with_measured(predicted, {"ok": b, "sentences": ["m"], "measured": 2})
-    assert both == {"ok": ok, "sentences": ["p", "m"], "part": 1, "measured": 2}
+    predicted = {"ok": a, "sentences": ["p"], "questions": [1], "part": 1}
+    runs = {"ok": b, "sentences": ["m"], "questions": [2], "measured": 2}
+    both = judgement.with_measured(predicted, runs)
+    assert both == {"ok": ok, "sentences": ["p", "m"], "questions": [1, 2], "part": 1, "measured": 2}
 
 
 # -- of a proof -----------------------------------------------------------------------------------------
