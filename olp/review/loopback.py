@@ -131,12 +131,14 @@ class _Handler(BaseHTTPRequestHandler):
         end = time.monotonic() + REQUEST_S
         head = b""
         part: bytes
-        while len(head) < MOST_BYTES and (left := end - time.monotonic()) > 0:
+        while (left := end - time.monotonic()) > 0:
             self.connection.settimeout(left)
             part = self.connection.recv(MOST_BYTES - len(head))
             head += part
+            # the end may have come in two parts
             if head.find(b"\r\n\r\n", max(0, len(head) - len(part) - 3)) >= 0:
                 return head
+            # the client has gone, or may send no more
             if not part:
                 break
         return b""

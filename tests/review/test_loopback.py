@@ -132,7 +132,14 @@ def test_nothing_is_answered_without_the_secret(served: Served) -> None:
     paths = ("/", "/version", f"/{token}", f"/{token}/other", f"/{token}/?", f"/{token}/version/")
     paths += (f"/{other}/", f"/{token[:-1]}/", f"/{token}a/", f"/{token.swapcase()}/", f"/x/{token}/", "/x/")
     paths += (f"/%{ord(token[0]):x}{token[1:]}/", f"/x/../{token}/", f"{token}/", "*", "/\xff\xe9/", "/./")
-    paths += (f"http://{served.host}/{token}/", f"/?{token}", f"/#/{token}/", "/review.css", "/../etc/passwd")
+    paths += (
+        f"x/{token}/",
+        f"http://{served.host}/{token}/",
+        f"/?{token}",
+        f"/#/{token}/",
+        "/review.css",
+        "/../etc/passwd",
+    )
     for path in paths:
         served.refused(404, path)
         served.refused(404, path, method="HEAD")
@@ -287,14 +294,16 @@ def test_a_long_request_is_dropped(served: Served) -> None:
 
 def test_a_request_may_arrive_in_parts(served: Served) -> None:
     request = f"GET /{served.token}/ HTTP/1.1\r\nHost: {served.host}\r\n\r\n".encode()
-    with served.connect() as client:
-        client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        for byte in request:
-            client.sendall(bytes([byte]))
-        answer = b""
-        while part := client.recv(4096):
-            answer += part
-    assert answer.endswith(SECRET)
+    for cut in (1, 2, 3, 4, 30):
+        with served.connect() as client:
+            client.sendall(request[:-cut])
+            until(lambda: served.free() < MOST_REQUESTS)
+            time.sleep(0.05)
+            client.sendall(request[-cut:])
+            answer = b""
+            while part := client.recv(4096):
+                answer += part
+        assert answer.endswith(SECRET)
 
 
 def test_a_request_that_never_arrives_is_dropped(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -303,6 +312,16 @@ def test_a_request_that_never_arrives_is_dropped(served: Served, monkeypatch: py
         with served.connect() as client:
             client.sendall(start)
             assert client.recv(9) == b""
+
+
+def test_a_client_that_will_send_no_more_is_dropped_at_once(
+    served: Served, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(loopback, "REQUEST_S", 1000.0)
+    with served.connect() as client:
+        client.sendall(b"GET /")
+        client.shutdown(socket.SHUT_WR)
+        assert client.recv(9) == b""
 
 
 def test_a_request_that_drips_is_dropped(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -322,6 +341,7 @@ def test_a_request_that_drips_is_dropped(served: Served, monkeypatch: pytest.Mon
 
 
 def test_a_client_that_does_not_read_is_dropped(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(loopback, "REQUEST_S", 1000.0)
     monkeypatch.setattr(loopback, "ANSWER_S", 0.05)
     served.http.contents = {"": ("text/html", b"x" * 50_000_000)}
     with served.connect() as client:
