@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -63,9 +63,9 @@ class Review:
     scene: Scene
     _packed: list[tuple[dict[str, Any], bytes]] = field(default_factory=list, init=False, repr=False)
 
-    def parts(self, live: str | None = None) -> Iterator[bytes]:
-        """The page in parts; `live` is the address, relative to the page, that answers with the digest of the
-        current inputs."""
+    def parts(self, live: Mapping[str, str] | None = None) -> Iterator[bytes]:
+        """The page in parts. In `live`, `address`, relative to the page, answers with `proof`, a blank and
+        the digest of the current inputs."""
         if not self._packed:
             manifest, arrays = manifest_of(self.scene)
             self._packed.append((manifest, arrays.encoded()))

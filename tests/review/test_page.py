@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import json
 import re
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -62,14 +65,44 @@ def policy(page: Page) -> dict[str, str]:
 # -- one file, no network -------------------------------------------------------------------------------
 
 
-def test_the_policy_lets_nothing_in_or_out(html: bytes) -> None:
+def hashed(text: str) -> str:
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
+
+
+def test_the_policy_lets_nothing_in_or_out_and_runs_these_scripts_alone(html: bytes) -> None:
     page = Page(html)
-    assert policy(page) == {
-        "default-src": "'none'", "script-src": "'unsafe-inline'", "style-src": "'unsafe-inline'",
-        "img-src": "data: blob:", "connect-src": "'none'",
+    rules = policy(page)
+    assert rules.pop("script-src").split() == [hashed(script) for script in page.scripts]
+    # that of the page, those that meshcat's bundle adds, and no other
+    ours, *added = rules.pop("style-src").split()
+    (style,) = re.findall("<style>(.*?)</style>", html.decode(), re.DOTALL)
+    assert ours == hashed(style)
+    (bundle,) = [script for script in page.scripts if "MeshCat" in script and ".dg ul{" in script]
+    sheet = bundle[bundle.index('".dg ul{') :]
+    assert added == [hashed(json.loads(sheet[: sheet.index('"))') + 1])), hashed("")]
+    assert rules == {
+        "default-src": "'none'", "img-src": "data: blob:", "connect-src": "'none'", "base-uri": "'none'",
+        "form-action": "'none'",
     }  # fmt: skip
     before = html[: html.index(b"Content-Security-Policy")]
     assert b"<script" not in before and b"<style" not in before and b"<link" not in before
+
+
+def test_the_page_has_no_script_or_style_in_an_attribute(html: bytes) -> None:
+    """The policy has no hash for them."""
+    for tag, attributes in Page(html).tags:
+        assert not any(name == "style" or name.startswith("on") for name in attributes), (tag, attributes)
+
+
+def test_line_ends_of_the_files_do_not_change_the_page(html: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A browser reads every line end as one character, before it hashes."""
+    ends = iter(["\r\n", "\r"] * 99)
+    read = pages.read_bytes
+    monkeypatch.setattr(pages, "read_bytes", lambda path: read(path).replace(b"\n", next(ends).encode()))
+    monkeypatch.setattr(pages, "_licence", lambda: "")
+    changed = Page(b"".join(pages.page({"title": "a"}, base64.b64encode(zlib.compress(b"")))))
+    assert changed.scripts == Page(html).scripts
+    assert policy(changed) == policy(Page(html))
 
 
 def test_the_page_names_no_other_file(html: bytes) -> None:
@@ -84,17 +117,17 @@ def test_the_page_is_whole(html: bytes) -> None:
     assert not re.search(r"@@[A-Z]+@@", page.text)
     assert any("MeshCat" in script for script in page.scripts)
     names = (ROOT / "viewer" / "static" / "modules.txt").read_text().split()
-    for name in names:
+    for name in ("shell.js", *names):
         assert (ROOT / "viewer" / "static" / name).read_text() in page.scripts
     assert b"Permission is hereby granted" in html
 
 
 def test_only_a_live_page_may_ask_and_only_its_own_server(machine: Path) -> None:
     review = olp.view(TEXT, machine, time=False)
-    page = Page(b"".join(review.parts(live="version")))
-    assert policy(page)["connect-src"] == "'self'"
-    assert page.manifest["live"] == "version"
-    assert Page(review.html()).manifest["live"] is None
+    page, still = Page(b"".join(review.parts(live={"address": "version", "proof": "p"}))), Page(review.html())
+    assert policy(page) == policy(still) | {"connect-src": "'self'"}
+    assert page.manifest["live"] == {"address": "version", "proof": "p"}
+    assert still.manifest["live"] is None
 
 
 def test_the_same_job_gives_the_same_page(machine: Path, html: bytes) -> None:
@@ -141,27 +174,36 @@ def test_a_page_is_its_template_with_every_mark_filled(
 ) -> None:
     """In the order of the template, and nothing that is put in is searched for marks."""
     texts = {
-        "review.html": "A@@TITLE@@B@@CONNECT@@C@@CSS@@D@@MESHCAT@@E@@LICENCE@@F@@MANIFEST@@"
-        "G@@DATA@@H@@MODULES@@I",
+        "review.html": "A@@TITLE@@B@@SCRIPTS@@|@@STYLES@@|@@CONNECT@@C@@CSS@@D@@SHELL@@&@@MESHCAT@@E"
+        "@@LICENCE@@F@@MANIFEST@@G@@DATA@@H@@MODULES@@I",
         "review.css": "@@DATA@@ä", "modules.txt": "one.js\ntwo.js\n", "one.js": "1<2", "two.js": "@@CSS@@",
+        "shell.js": "keep",
     }  # fmt: skip
+    # a style element that it adds, as the minified bundle of meshcat does it
+    bundle = r"""mesh<cat(function(e){document.head.appendChild(t),e}}(".a\"b\n"))"""
     monkeypatch.setattr(pages, "_asset", texts.__getitem__)
-    monkeypatch.setattr(pages, "_bundle", lambda: ("mesh<cat", "main.min.js"))
+    monkeypatch.setattr(pages, "_bundle", lambda: (bundle, "main.min.js"))
     monkeypatch.setattr(pages, "_licence", lambda: "<free> & 'open'")
     # a page is not live unless it is asked for
     more = {"live": True} if live else {}
     parts = list(pages.page({"title": "<a>", "b": "<"}, b"DA@@TA", **more))
+    scripts = " ".join(map(hashed, ("keep", bundle, "1<2", "@@CSS@@")))
+    styles = " ".join(map(hashed, ("@@DATA@@ä", '.a"b\n', "")))
     assert b"".join(parts).decode() == (
-        f"A&lt;a&gt;B{connect}C@@DATA@@äDmesh<catE&lt;free&gt; &amp; &#x27;open&#x27;F"
-        '{"title":"\\u003ca>","b":"\\u003c"}GDA@@TAH<script>1<2</script>\n<script>@@CSS@@</script>I'
+        f"A&lt;a&gt;B{scripts}|{styles}|{connect}C@@DATA@@äDkeep&{bundle}E"
+        "&lt;free&gt; &amp; &#x27;open&#x27;F"
+        '{"title":"\\u003ca>","b":"\\u003c"}'
+        "GDA@@TAH<script>1<2</script>\n<script>@@CSS@@</script>I"
     )
 
 
-def test_a_module_that_would_end_its_element_is_refused_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("wanted", ["shell.js", "unpack.js", "main.js"])
+def test_a_script_of_ours_that_would_end_its_element_is_refused_by_name(
+    wanted: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     asset = pages._asset
-    monkeypatch.setattr(pages, "_asset", lambda name: "<!--" if name.endswith(".js") else asset(name))
-    first = asset("modules.txt").split()[0]
-    with pytest.raises(CannotCompute, match=f"^{re.escape(first)}: contains the end of a script element"):
+    monkeypatch.setattr(pages, "_asset", lambda name: "<!--" if name == wanted else asset(name))
+    with pytest.raises(CannotCompute, match=f"^{re.escape(wanted)}: contains the end of a script element"):
         b"".join(pages.page({"title": "a"}, b""))
 
 

@@ -6,10 +6,14 @@
   OLP.watch = app => {
     const {live, digest} = app.manifest;
     if (!live) return;
+    app.manifest.live = null; // a saved page has no server
     const ask = async () => {
       try {
-        const answer = (await (await fetch(live, {cache: "no-store"})).text()).trim();
-        if (answer && answer !== digest) {
+        const answer = await fetch(live.address, {cache: "no-store", credentials: "omit", redirect: "error"}),
+          [proof, newest] = (await answer.text()).split(" ");
+        // whoever has taken the port of a server that has ended does not know the proof
+        if (proof !== live.proof) throw new Error("another server");
+        if (newest !== digest) {
           history.replaceState(null, "", app.notes.hash());
           location.reload();
           return;
