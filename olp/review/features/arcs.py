@@ -18,8 +18,9 @@ from olp.review.features.ground import Ground
 
 #: Arcs are whole circles where less than this is missing, in rad.
 _WHOLE = np.radians(0.5)
-#: Least angle of an arc with a fitted circle, in rad.
-_QUARTER = np.pi / 2
+#: Least angle of an arc with a fitted circle, in rad. The centre of half a circle may be off by 2.8 times the
+#: largest deviation, and that of a quarter by 9.7 times, which says little of the part.
+_HALF = np.pi - np.radians(0.5)
 #: Points over at least this share of the angle of an arc are enough for a circle.
 _COVERED = 0.75
 #: Fewest points of a circle.
@@ -88,7 +89,7 @@ class _Circles(FeatureKind):
         # chords and rounded numbers are no deviation of the machine
         dx, dy = deviations.delta_mm @ shape.first, deviations.delta_mm @ shape.second
         x, y = shape.radius_mm * np.cos(angle) + dx, shape.radius_mm * np.sin(angle) + dy
-        if shape.covered < _QUARTER:
+        if shape.covered < _HALF:
             radial = dx * np.cos(angle) + dy * np.sin(angle)
             return {"position": deviations.mean(radial), "form": spread(radial)}
         if len(deviations) < _POINTS or _span(angle) < _COVERED * min(shape.covered, 1.5 * np.pi):
@@ -128,12 +129,12 @@ class Arc(_Circles):
     figures: ClassVar[Mapping[str, Figure]] = {
         "position": Figure(
             "position",
-            f"from 90° on, {_CENTRE}; of shorter arcs, mean of the radial deviations, plus is away from the "
+            f"from 180° on, {_CENTRE}; of shorter arcs, mean of the radial deviations, plus is away from the "
             "centre",
         ),
-        "size": Figure("diameter", f"from 90° on, {_SIZE}"),
+        "size": Figure("diameter", f"from 180° on, {_SIZE}"),
         "form": Figure(
-            "roundness", f"from 90° on, {_ROUND}; of shorter arcs, range of the radial deviations"
+            "roundness", f"from 180° on, {_ROUND}; of shorter arcs, range of the radial deviations"
         ),
     }
 

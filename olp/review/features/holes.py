@@ -75,7 +75,8 @@ class Hole(FeatureKind):
         edges = np.flatnonzero(np.diff(stays.astype(np.int8), prepend=0, append=0))
         feeds = np.cumsum(down)
         for a, b in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
-            if feeds[b - 1] > (feeds[a - 1] if a else 0):
+            # in and out again are two moves at least
+            if b - a > 1 and feeds[b - 1] > (feeds[a - 1] if a else 0):
                 stay = np.arange(a, b)
                 # a change of the tool at one place ends a stroke
                 for own in np.split(stay, np.flatnonzero(np.diff(moves.operation[stay])) + 1):

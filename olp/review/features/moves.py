@@ -26,6 +26,8 @@ _BLOCK = 1 << 16
 SAME_MM = 1e-6
 #: Positions closer than this are equal, in mm, and never less than half a digit of the program.
 _NEAR_MM = 2e-3
+#: The last digit of most programs in mm.
+_DIGIT_MM = 1e-3
 #: A stretch of feed moves with more inclined lines than this may be a freeform surface.
 _INCLINED = 12
 
@@ -50,7 +52,8 @@ _APART = (Does.RAPID, Does.UNKNOWN)
 
 class Moves:
     """The moves of a scene, n of them. (n,) `does`, `length_mm` and `stretch` of each move: a stretch is
-    a run of feed moves of an operation, between rapids. `near_mm` is the distance of equal positions."""
+    a run of feed moves of an operation, between rapids. `near_mm` is the distance of equal positions,
+    `digit_mm` the last digit of the coordinates."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
@@ -64,7 +67,8 @@ class Moves:
         self.length_mm = lengths_mm(self.path)
         self.does, self._staying = self._looked_at()
         self.stretch = self._stretches()
-        self.near_mm = max(_NEAR_MM, 0.5 * _digit_mm(scene))
+        self.digit_mm = _digit_mm(scene)
+        self.near_mm = max(_NEAR_MM, 0.5 * self.digit_mm)
 
     @cached_property
     def freeform(self) -> Mask:
@@ -86,7 +90,7 @@ class Moves:
     def feeds(self, rows: Index) -> Index:
         """Those of some moves that are feed moves with known positions."""
         does = self.does[rows]
-        return rows[(does != Does.RAPID) & (does != Does.UNKNOWN)]
+        return np.asarray(rows[(does != Does.RAPID) & (does != Does.UNKNOWN)], np.int64)
 
     def before(self, rows: Index) -> Index:
         """(m,) the last move with a length before each move, -1 where there is none."""
@@ -208,10 +212,10 @@ def _turned(frame: Frame) -> Array:
 
 
 def _digit_mm(scene: Scene) -> float:
-    """The last digit of the coordinates of a program in mm, 0 where it is not known."""
+    """The last digit of the coordinates of a program in mm; where it is not known, that of most programs."""
     program = scene.nominal
     used = program.slot[program.slot >= 0] if program.words is not None else np.zeros(0, np.int32)
     if program.words is None or not used.size:
-        return 0.0
+        return _DIGIT_MM
     unit_mm = max(f.unit_mm for f in program.toolpath.frames)
     return float(unit_mm * 10.0 ** -int(program.words.decimals[used].max()))

@@ -126,14 +126,15 @@ class _Told:
         ranges = self._layers.ranges(node.feeds)
         if len(ranges) > _RANGES:
             ranges = np.array([[ranges[0, 0], ranges[-1, 1]]])
-        tools = np.unique(scene.table.tool[node.feeds])
+        tools = scene.table.tool[node.feeds]
+        tool = int(tools.min())
         return {
             "label": node.label,
             "detail": node.detail,
             "first_line": int(lines.min()),
             "last_line": int(lines.max()),
             "place": scene.place(int(lines.min())),
-            "tool": int(tools[0]) if len(tools) == 1 and tools[0] >= 0 else None,
+            "tool": tool if tool >= 0 and tool == tools.max() else None,
             "moves": len(node.feeds),
             "samples": ranges.tolist(),
             "centre_mm": self._centre(node, ranges),

@@ -169,8 +169,10 @@ def _grouped(nodes: list[Node]) -> Iterator[Node]:
 
 def _commented(ground: Ground, operation: Node) -> None:
     """Add to details what the program says between features, on lines of its own."""
+    if not operation.children:
+        return
     line = ground.moves.path.line
-    rows = np.unique(np.concatenate([node.feeds for node in operation.children] or [operation.feeds]))
+    rows = np.unique(np.concatenate([node.feeds for node in operation.children]))
     for node in operation.children:
         place = int(np.searchsorted(rows, node.feeds[0]))
         # the comment before the first feature is that of the operation

@@ -25,7 +25,7 @@ _CHORDS = 4
 #: ... of which none is this many times as long as those beside it.
 _LONG = 5.0
 #: Digits by which the direction of a line between rounded points may be off, over its length.
-_DIGITS_MM = 1.5e-3
+_DIGITS = 1.5
 #: A direction along an axis, in rad: no second digit of a degree tells it apart.
 _ALIGNED = np.radians(0.005)
 #: A wall is at least so many times as long as equal positions may be apart: else its direction is not known.
@@ -89,11 +89,8 @@ class Wall(FeatureKind):
 
     def find(self, ground: Ground) -> Iterable[Feature]:
         chains = ground.chains
-        lines = _lines(
-            chains,
-            ground.outer & ~ground.chords & chains.straight & ~ground.touches[chains.chain],
-            ground.moves.near_mm,
-        )
+        usable = ground.outer & ~ground.chords & chains.straight & ~ground.touches[chains.chain]
+        lines = _lines(ground, usable)
         if not len(lines.first):
             return
         row = chains.row[lines.first]
@@ -152,13 +149,14 @@ def _direction(vector: Array, *, sign: bool = False) -> str:
     return f"{np.degrees(np.arctan2(vector[1], vector[0])):.2f}°"
 
 
-def _lines(chains: Chains, usable: Mask, near_mm: float) -> _Lines:
+def _lines(ground: Ground, usable: Mask) -> _Lines:
     """The straight lines of chains, collinear moves joined, without the chords of curves."""
+    chains, near_mm, digit_mm = ground.chains, ground.moves.near_mm, ground.moves.digit_mm
     every = np.arange(len(chains.row))
     single = _Lines.between(chains, every, every)
     joint = chains.linked()[:-1] & usable[:-1] & usable[1:]
     cross, dot = _turns(single)
-    noise = _DIGITS_MM / np.maximum(single.length_mm, 1e-9)
+    noise = _DIGITS * digit_mm / np.maximum(single.length_mm, 1e-9)
     joint &= (dot > 0.0) & (np.abs(cross) <= noise[:-1] + noise[1:])
     new = np.concatenate(([True], ~joint))
     first = np.flatnonzero(new)
@@ -173,7 +171,7 @@ def _lines(chains: Chains, usable: Mask, near_mm: float) -> _Lines:
     farthest = np.zeros(len(first))
     np.maximum.at(farthest, owner, off)
     good = usable[first] & (farthest <= near_mm) & (lines.length_mm >= _LEAST * near_mm)
-    return lines.take(good & ~_curves(chains, lines))
+    return lines.take(good & ~_curves(ground, lines))
 
 
 def _turns(lines: _Lines) -> tuple[Array, Array]:
@@ -182,10 +180,12 @@ def _turns(lines: _Lines) -> tuple[Array, Array]:
     return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (a * b).sum(axis=1)
 
 
-def _curves(chains: Chains, lines: _Lines) -> Mask:
-    """(k,) lines that are chords of a curve."""
+def _curves(ground: Ground, lines: _Lines) -> Mask:
+    """(k,) lines that are chords of a curve; other chords of it may be those of a circle, or short arcs."""
+    chains = ground.chains
+    pieces = chains.straight | ~np.isin(chains.row, ground.circular.row)
     cross, dot = _turns(lines)
-    straight = chains.straight[lines.first]
+    straight = pieces[lines.first]
     same = (chains.chain[lines.last[:-1]] == chains.chain[lines.first[1:]]) & straight[:-1] & straight[1:]
     smooth = same & (np.arctan2(np.abs(cross), dot) <= _SMOOTH)
     run = np.cumsum(np.concatenate(([True], ~smooth))) - 1
