@@ -61,8 +61,8 @@ class _Circles(FeatureKind):
 
     def _feature(self, ground: Ground, own: Circular, normal: Array, covered: float) -> Feature:
         radius = float(own.radius_mm.mean())
-        ends = ground.moves.shown(own.row, ground.moves.path.end_mm[own.row])
-        heights = ends @ normal
+        low, high = (points @ normal for points in ground.moves.tips(own.row))
+        heights = np.concatenate((low, high))
         centre = own.centre.mean(axis=0)
         centre += (0.5 * (heights.min() + heights.max()) - centre @ normal) * normal
         shape = _Shape(centre, own.first[0], own.second[0], radius, covered)
@@ -71,7 +71,7 @@ class _Circles(FeatureKind):
         axis = int(np.argmax(np.abs(normal)))
         if np.abs(normal[axis]) > 1.0 - 1e-9 and axis != 2:
             detail.append(f"in the plane {('YZ', 'ZX')[axis]}")
-        level = heights[~own.rise]
+        level = high[~own.rise]
         if level.size:
             levels = len(np.unique(alike((level,), (ground.moves.near_mm,))))
             detail.append(counted(levels, "level"))

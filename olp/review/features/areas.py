@@ -1,9 +1,10 @@
 """Areas that coplanar feed moves cover: faced surfaces and floors of pockets.
 
-The plane of a level is divided into square cells. Where passes lie no farther apart than a cell is wide, they
-meet every cell of the area; single passes meet rows of cells. An area is where whole blocks of cells are met:
-three by three cells as wide as the tool, or, for small areas, five by five of half that width. Where the
-radius of the tool is not stated, what it covers is not known, so that no area is found.
+The plane of a level is divided into square cells, three to the width of the tool. What a pass meets, and the
+cells around, is covered: passes that lie no farther apart than the tool is wide leave no gap. An area is
+where whole blocks of seven by seven cells are covered, which a pass and its neighbour alone do not. Where the
+radius of the tool is not stated, what it covers is not known, so that no area is found; nor is one in a level
+that has too many cells.
 """
 
 from __future__ import annotations
@@ -12,24 +13,27 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from olp.core.arrays import Array, Index, Mask
 from olp.review.features.alike import alike, members
 from olp.review.features.chains import Chains
 from olp.review.features.moves import Moves
 
-#: Width of a cell in diameters of the tool, and how many cells a block has on each side of its middle. A cell
-#: is a little wider than the diameter, as passes that lie just that far apart touch each other.
-_SCALES = ((1.01, 1), (0.505, 2))
+#: Width of a cell in radii of the tool: a little more than a third of its diameter, as passes that lie a
+#: diameter apart touch each other.
+_CELL = 0.674
+#: Cells on a side of a block.
+_BLOCK_CELLS = 7
+#: Fewest moves of an area: two rings alone are a wall cut twice.
+_FEWEST = 5
+#: Most cells of a level.
+_MOST_CELLS = 16_000_000
 #: Points of paths in a cell, along it.
-_POINTS = 3
+_POINTS = 2
 #: Points that are looked at at once.
 _BLOCK = 1 << 18
-#: Cells are numbered so that those of one row follow each other.
-_ROW = 1 << 31
-#: The cells around one, itself too.
-_AROUND = np.array([a * _ROW + b for a in (-1, 0, 1) for b in (-1, 0, 1)])
-#: Of a chain in an area at least this share is in it.
+#: Of a chain, or of a move, in an area at least this share is in it.
 _INSIDE = 0.5
 
 
@@ -51,46 +55,52 @@ def areas_of(moves: Moves, chains: Chains) -> Areas:
     count = 0
     for rows in members(group):
         radius = moves.scene.tool_radii_mm.get(int(tool[rows[0]]), 0.0)
-        for width, reach in _SCALES if radius > 0.0 else ():
-            free = rows[area[rows] < 0]
-            for some in _covered(chains, free, width * 2.0 * radius, reach):
-                area[some] = count
-                count += 1
+        for some in _covered(chains, rows, _CELL * radius) if radius > 0.0 else ():
+            area[some] = count
+            count += 1
     return Areas(area, _inner(moves, chains, area))
 
 
-def _covered(chains: Chains, rows: Index, cell_mm: float, reach: int) -> Iterator[Index]:
+def _covered(chains: Chains, rows: Index, cell_mm: float) -> Iterator[Index]:
     """The moves in each area of one level."""
-    # the cells of a block are met by a path of that many cells
-    least_mm = (2 * reach + 1) ** 2 * cell_mm
+    from scipy.ndimage import label, maximum_filter, minimum_filter
+
+    # two passes of a block
+    least_mm = 2 * _BLOCK_CELLS * cell_mm
     if chains.length_mm[rows].sum() < least_mm:
         return
-    met = np.unique(np.concatenate([np.unique(cell) for _, cell in _cells(chains, rows, cell_mm)]))
-    cell = met
-    for _ in range(reach):
-        cell = cell[np.logical_and.reduce([_among(cell, cell + step) for step in _AROUND.tolist()])]
-    if not len(cell):
+    ends = np.concatenate((chains.start[rows, :2], chains.end[rows, :2]))
+    # arcs leave the box around their ends by half of their length at most
+    bulge = float(np.where(chains.straight[rows], 0.0, chains.length_mm[rows] / 2.0).max())
+    low = ends.min(axis=0) - bulge - _BLOCK_CELLS * cell_mm
+    size = np.ceil((ends.max(axis=0) + bulge - low) / cell_mm).astype(np.int64) + _BLOCK_CELLS
+    if size.prod() > _MOST_CELLS:
         return
-    for _ in range(reach):
-        cell = np.unique(cell[:, None] + _AROUND)
-    owner = _components(cell)
-    hits = np.zeros((len(rows), 2))
-    best = np.full(len(rows), -1, np.int64)
-    for move, met_by in _cells(chains, rows, cell_mm):
-        place = np.minimum(np.searchsorted(cell, met_by), len(cell) - 1)
-        inside = _among(cell, met_by)
-        hits[:, 0] += np.bincount(move, minlength=len(rows))
-        hits[:, 1] += np.bincount(move[inside], minlength=len(rows))
-        best[move[inside]] = owner[place[inside]]
-    own = (best >= 0) & (hits[:, 1] >= _INSIDE * hits[:, 0])
-    for k in np.unique(best[own]).tolist():
-        some = rows[own & (best == k)]
-        if chains.length_mm[some].sum() >= least_mm:
+    met = np.zeros(size, np.uint8)
+    for _, cell in _cells(chains, rows, low, cell_mm):
+        met[cell[:, 0], cell[:, 1]] = 1
+    whole = minimum_filter(maximum_filter(met, 3, mode="constant"), _BLOCK_CELLS, mode="constant")
+    owner, count = label(maximum_filter(whole, _BLOCK_CELLS, mode="constant"), np.ones((3, 3)))
+    if not count:
+        return
+    hits = np.zeros((2, len(rows)))
+    best = np.zeros(len(rows), np.int64)
+    for move, cell in _cells(chains, rows, low, cell_mm):
+        own = owner[cell[:, 0], cell[:, 1]]
+        hits[0] += np.bincount(move, minlength=len(rows))
+        hits[1] += np.bincount(move[own > 0], minlength=len(rows))
+        best[move[own > 0]] = own[own > 0]
+    inside = hits[1] >= _INSIDE * hits[0]
+    for k in range(1, count + 1):
+        some = rows[inside & (best == k)]
+        if len(some) >= _FEWEST and chains.length_mm[some].sum() >= least_mm:
             yield some
 
 
-def _cells(chains: Chains, rows: Index, cell_mm: float) -> Iterator[tuple[Index, Index]]:
-    """(k,) moves, counted among `rows`, and (k,) the cells that points along them are in."""
+def _cells(
+    chains: Chains, rows: Index, low: Array, cell_mm: float
+) -> Iterator[tuple[Index, npt.NDArray[np.int64]]]:
+    """(k,) moves, counted among `rows`, and (k, 2) the cells that points along them are in."""
     count = np.ceil(chains.length_mm[rows] / cell_mm * _POINTS).astype(np.int64) + 1
     ends = np.cumsum(count)
     cuts: Index = np.searchsorted(ends, np.arange(_BLOCK, ends[-1] + _BLOCK, _BLOCK)) + 1
@@ -98,32 +108,7 @@ def _cells(chains: Chains, rows: Index, cell_mm: float) -> Iterator[tuple[Index,
         move = np.repeat(part, count[part])
         within = np.arange(len(move)) - np.repeat(np.cumsum(count[part]) - count[part], count[part])
         share = within / np.maximum(count[move] - 1, 1)
-        point = chains.points(rows[move], share)
-        # an offset that no digit of a program has keeps points off the edges of cells
-        number = np.floor(point / cell_mm + np.sqrt(0.5)).astype(np.int64)
-        yield move, number[:, 0] * _ROW + number[:, 1]
-
-
-def _among(sorted_values: Index, values: Index) -> Mask:
-    if not len(sorted_values):
-        return np.zeros(len(values), bool)
-    place = np.minimum(np.searchsorted(sorted_values, values), len(sorted_values) - 1)
-    return np.asarray(sorted_values[place] == values)
-
-
-def _components(cell: Index) -> Index:
-    """(k,) the component of each of the cells (k,), rising: cells that touch each other."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    pairs = []
-    for step in (1, _ROW - 1, _ROW, _ROW + 1):
-        there = np.minimum(np.searchsorted(cell, cell + step), len(cell) - 1)
-        mine = np.flatnonzero(cell[there] == cell + step)
-        pairs.append((mine, there[mine]))
-    first, second = (np.concatenate([pair[k] for pair in pairs]) for k in (0, 1))
-    graph = coo_array((np.ones(len(first), np.int8), (first, second)), shape=(len(cell), len(cell)))
-    return np.asarray(connected_components(graph, directed=False)[1], np.int64)
+        yield move, np.floor((chains.points(rows[move], share) - low) / cell_mm).astype(np.int64)
 
 
 def _inner(moves: Moves, chains: Chains, area: Index) -> Mask:

@@ -9,6 +9,9 @@ import numpy as np
 from olp.core.arrays import Array, Index, Mask
 from olp.review.features.moves import Does, Moves
 
+#: Shares of arcs at which the box around them is taken.
+_SHARES = np.linspace(0.0, 1.0, 17)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Chains:
@@ -50,6 +53,13 @@ class Chains:
         radius = np.hypot(*arm.T) + share[turned] * (np.hypot(*last.T) - np.hypot(*arm.T))
         point[turned] = self.centre[arc] + radius[:, None] * np.stack((np.cos(angle), np.sin(angle)), axis=1)
         return point
+
+    def box(self, which: Index) -> tuple[Array, Array]:
+        """(3,) lowest and highest coordinates of some of the moves, arcs at steps of a sixteenth."""
+        flat = [self.points(which, np.full(len(which), share)) for share in _SHARES]
+        level = self.start[which, 2]
+        low, high = np.min(flat, axis=(0, 1)), np.max(flat, axis=(0, 1))
+        return np.append(low, level.min()), np.append(high, level.max())
 
     def sums(self, values: Array) -> Array:
         """(c,) sums of values (m,) by chain."""

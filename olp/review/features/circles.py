@@ -73,7 +73,7 @@ def arcs_of(moves: Moves) -> Circular:
     row = arcs.move[usable]
     axes = np.array(PLANES)[arcs.plane[usable]]
     unit = np.eye(3)
-    start = np.where((row > 0)[:, None], path.end_mm[np.maximum(row - 1, 0)], path.start_mm)
+    start = moves.starts_mm(row)
     arm = start - arcs.centre_mm[usable]
     every = np.arange(len(row))
     x, y = arm[every, axes[:, 0]], arm[every, axes[:, 1]]

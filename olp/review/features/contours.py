@@ -14,12 +14,10 @@ from olp.review.features.alike import alike, members
 from olp.review.features.base import Deviations, Feature, FeatureKind, Figure
 from olp.review.features.chains import Chains
 from olp.review.features.figures import counted, number, unit
-from olp.review.features.ground import Ground, middle
+from olp.review.features.ground import Ground
 
 #: Nodes and weights of Gauss over 0..1: exact for moments of lines, and far below a digit for arcs.
 _GAUSS = np.polynomial.legendre.leggauss(6)
-#: Shares of arcs at which the box around a contour is taken.
-_SHARES = np.linspace(0.0, 1.0, 17)[1:-1]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,11 +60,9 @@ class Contour(FeatureKind):
         own = np.concatenate([np.arange(chains.first[k], chains.first[k + 1]) for k in which.tolist()])
         row = chains.row[own]
         turn = ground.moves.turn(int(row[0]))
-        points = np.concatenate((chains.start[own], chains.end[own]))
-        inside = [chains.points(own, np.full(len(own), share)) for share in _SHARES]
-        box = np.concatenate((points[:, :2], *inside))
-        size = np.ptp(box, axis=0)
-        levels = np.unique(alike((points[:, 2],), (ground.moves.near_mm,)))
+        low, high = chains.box(own)
+        size = high - low
+        levels = np.unique(alike((chains.end[own, 2],), (ground.moves.near_mm,)))
         detail = [f"path {number(float(size[0]))} x {number(float(size[1]))} mm"]
         detail.append("closed" if _closed(chains, int(which[0]), ground.moves.near_mm) else "open")
         level = ground.moves.level(int(row[0]), turn[:, 2]) or "1 level"
@@ -74,8 +70,7 @@ class Contour(FeatureKind):
         step = (chains.end - chains.start)[own]
         centre = np.concatenate((chains.centre[own], chains.start[own, 2:]), axis=1)
         shape = _Shape(turn, row, unit(step) @ turn.T, centre @ turn.T, chains.sweep[own] != 0.0)
-        heights = points[:, 2]
-        place = turn @ np.array((*middle(box), (heights.min() + heights.max()) / 2.0))
+        place = turn @ ((low + high) / 2.0)
         return Feature(self.name, row, shape, self.label, ", ".join(detail), tuple(place.tolist()))
 
     def measure(self, feature: Feature, deviations: Deviations) -> Mapping[str, float | None]:

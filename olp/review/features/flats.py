@@ -12,7 +12,7 @@ from olp.review.features.alike import members
 from olp.review.features.base import Deviations, Feature, FeatureKind, Figure
 from olp.review.features.figures import counted, number, spread
 from olp.review.features.fits import plane_residuals
-from olp.review.features.ground import Ground, middle
+from olp.review.features.ground import Ground
 
 #: Fewest points of a plane.
 _POINTS = 4
@@ -41,16 +41,12 @@ class Flat(FeatureKind):
             own = inside[some]
             rows = chains.row[own]
             turn = ground.moves.turn(int(rows[0]))
-            points = np.concatenate((chains.start[own], chains.end[own]))
-            size = np.ptp(points[:, :2], axis=0)
-            detail = ", ".join(
-                (
-                    ground.moves.level(int(rows[0]), turn[:, 2]),
-                    f"path {number(float(size[0]))} x {number(float(size[1]))} mm",
-                    counted(len(rows), "move"),
-                )
-            )
-            centre = turn @ np.array(middle(points))
+            low, high = chains.box(own)
+            size = high - low
+            path = f"path {number(float(size[0]))} x {number(float(size[1]))} mm"
+            level = ground.moves.level(int(rows[0]), turn[:, 2])
+            detail = ", ".join(part for part in (level, path, counted(len(rows), "move")) if part)
+            centre = turn @ ((low + high) / 2.0)
             yield Feature(self.name, rows, turn, self.label, detail, tuple(centre.tolist()))
 
     def measure(self, feature: Feature, deviations: Deviations) -> Mapping[str, float | None]:

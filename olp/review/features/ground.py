@@ -55,11 +55,7 @@ class Ground:
 
     def centre(self, rows: Index) -> tuple[float, ...]:
         """The middle of the box around moves, in the frame shown."""
-        ends = self.moves.shown(rows, self.moves.path.end_mm[rows])
-        before = np.maximum(rows - 1, 0)
-        starts = np.where((rows > 0)[:, None], self.moves.path.end_mm[before], self.moves.path.start_mm)
-        every = np.concatenate((ends, self.moves.shown(rows, starts)))
-        return middle(every)
+        return middle(np.concatenate(self.moves.tips(rows)))
 
 
 def middle(points: Array) -> tuple[float, ...]:

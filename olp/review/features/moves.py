@@ -26,8 +26,9 @@ _BLOCK = 1 << 16
 SAME_MM = 1e-6
 #: Positions closer than this are equal, in mm, and never less than half a digit of the program.
 _NEAR_MM = 2e-3
-#: The last digit of most programs in mm.
+#: The last digit of most programs in mm, and the coarsest one: numbers with fewer decimals are round ones.
 _DIGIT_MM = 1e-3
+_COARSE_MM = 1e-2
 #: A stretch of feed moves with more inclined lines than this may be a freeform surface.
 _INCLINED = 12
 
@@ -110,10 +111,18 @@ class Moves:
         """(m, 3) axis positions of moves, as tips in the frame shown."""
         return np.asarray(axis_mm - self._zero[self.path.frame[rows]])
 
+    def starts_mm(self, rows: Index) -> Array:
+        """(m, 3) axis positions at the starts of moves."""
+        before = self.path.end_mm[np.maximum(rows - 1, 0)]
+        return np.where((rows > 0)[:, None], before, self.path.start_mm)
+
+    def tips(self, rows: Index) -> tuple[Array, Array]:
+        """(m, 3) starts and ends of moves in the frame shown."""
+        return self.shown(rows, self.starts_mm(rows)), self.shown(rows, self.path.end_mm[rows])
+
     def ends(self, rows: Index) -> tuple[Array, Array]:
         """(m, 3) starts and ends of moves in coordinates across and along the tool axis."""
-        start = np.where((rows > 0)[:, None], self.path.end_mm[np.maximum(rows - 1, 0)], self.path.start_mm)
-        return self.placed(rows, start), self.placed(rows, self.path.end_mm[rows])
+        return self.placed(rows, self.starts_mm(rows)), self.placed(rows, self.path.end_mm[rows])
 
     def sense(self, rows: Index, plane: Index) -> Array:
         """(m,) 1 where arcs of these planes turn the same way in the coordinates of the moves, else -1."""
@@ -218,4 +227,4 @@ def _digit_mm(scene: Scene) -> float:
     if program.words is None or not used.size:
         return _DIGIT_MM
     unit_mm = max(f.unit_mm for f in program.toolpath.frames)
-    return float(unit_mm * 10.0 ** -int(program.words.decimals[used].max()))
+    return min(float(unit_mm * 10.0 ** -int(program.words.decimals[used].max())), _COARSE_MM)
