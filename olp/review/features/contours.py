@@ -19,6 +19,9 @@ from olp.review.features.ground import Ground
 #: Nodes and weights of Gauss over 0..1: exact for moments of lines, and far below a digit for arcs.
 _GAUSS = np.polynomial.legendre.leggauss(6)
 
+#: Least part of the normals of a contour, by their squares, in a direction in which its shift is known.
+_KNOWN = 0.1
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Shape:
@@ -38,7 +41,11 @@ class Contour(FeatureKind):
     name = "contour"
     label = "contour"
     figures: ClassVar[Mapping[str, Figure]] = {
-        "position": Figure("position", "size of the mean deviation in the plane of the contour"),
+        "position": Figure(
+            "position",
+            "size of the shift in the plane that fits the deviations normal to the contour best "
+            "(least squares)",
+        ),
         "form": Figure(
             "profile",
             "largest deviation normal to the contour in its plane, with nothing removed: half of the width "
@@ -76,15 +83,24 @@ class Contour(FeatureKind):
     def measure(self, feature: Feature, deviations: Deviations) -> Mapping[str, float | None]:
         shape: _Shape = feature.shape
         level = deviations.delta_mm @ shape.turn[:, :2]
-        mean = [deviations.mean(level[:, k]) for k in (0, 1)]
         which = np.searchsorted(shape.row, deviations.move)
         arm = (deviations.nominal_mm - shape.centre[which]) @ shape.turn[:, :2]
         along = shape.along[which] @ shape.turn[:, :2]
         normal = np.where(shape.curved[which, None], unit(arm), np.stack((-along[:, 1], along[:, 0]), axis=1))
+        away = (level * normal).sum(axis=1)
         return {
-            "position": float(np.hypot(mean[0], mean[1])),
-            "form": float(np.abs((level * normal).sum(axis=1)).max()),
+            "position": _shift_mm(normal, away, deviations.weight),
+            "form": float(np.abs(away).max()),
         }
+
+
+def _shift_mm(normal: Array, away: Array, weight: Array) -> float:
+    """The size of the shift (2,) whose parts along unit normals (k, 2) are nearest to the deviations `away`
+    (k,) along them. What a measured path is off along itself is not known, so that only these count. In a
+    direction in which hardly a normal points the shift is not known, and taken as 0."""
+    share, axes = np.linalg.eigh((normal * weight[:, None]).T @ normal / weight.sum())
+    part = axes.T @ ((normal * weight[:, None]).T @ away / weight.sum())
+    return float(np.linalg.norm(np.where(share > _KNOWN, part / np.maximum(share, _KNOWN), 0.0)))
 
 
 def _closed(chains: Chains, chain: int, near_mm: float) -> bool:

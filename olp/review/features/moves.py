@@ -227,4 +227,6 @@ def _digit_mm(scene: Scene) -> float:
     if program.words is None or not used.size:
         return _DIGIT_MM
     unit_mm = max(f.unit_mm for f in program.toolpath.frames)
-    return min(float(unit_mm * 10.0 ** -int(program.words.decimals[used].max())), _COARSE_MM)
+    # zeros at the end may be left out, and single numbers may have more digits
+    decimals = int(np.percentile(program.words.decimals[used], 75.0, method="lower"))
+    return min(float(unit_mm * 10.0**-decimals), _COARSE_MM)
