@@ -103,6 +103,10 @@ class Dialect:
         """The lines of a text with their ends, as errors count them."""
         return split(data)
 
+    def comment_marks(self) -> tuple[tuple[bytes, bytes], ...]:
+        """The marks around all comments that a program may have; an empty second one is the end of a line."""
+        return ((self.comment[0].strip(), self.comment[1]),)
+
     def continues(self, line: bytes) -> bool:
         """Whether the statement of a line goes on in the next line."""
         return False

@@ -278,6 +278,7 @@ def _scene(
         table=_as_shown(table, nominal),
         tolerance_um=report["verdict"]["numerical"]["allowed_um"],
         tool_radius_mm=_radius(setup, nominal),
+        tool_radii_mm=_radii(setup, nominal),
         uncertainty=_uncertainty(loaded, nominal, samples, part_um, options.date),
     )
 
@@ -345,6 +346,11 @@ def _bodies(
 
 
 def _radius(setup: Setup, nominal: Program) -> float:
-    numbers = [f.tool for f in nominal.toolpath.frames if f.tool is not None]
-    tools = [setup.tool(number) for number in numbers]
-    return max((tool.radius_mm for tool in tools if tool is not None), default=0.0)
+    return max(_radii(setup, nominal).values(), default=0.0)
+
+
+def _radii(setup: Setup, nominal: Program) -> dict[int, float]:
+    """The radii of the tools of a program in mm, of those that have one."""
+    numbers = {f.tool for f in nominal.toolpath.frames if f.tool is not None}
+    tools = {number: setup.tool(number) for number in sorted(numbers)}
+    return {k: tool.radius_mm for k, tool in tools.items() if tool is not None and tool.radius_mm > 0.0}

@@ -13,6 +13,7 @@ from olp.core.toolpath import Kind
 from olp.core.units import AXES, UM_PER_MM
 from olp.findings.catalogue import RULES
 from olp.reports.report import place
+from olp.review.features.nodes import plain
 from olp.review.judged import judged_lines, measured_names, pictures, removed, statistics
 from olp.review.meshes import nodes
 from olp.review.pack import ARC_MM, DEVIATION_MM, POSITION_MM, TIME_S, Arrays, resolution
@@ -99,6 +100,7 @@ def manifest_of(scene: Scene) -> tuple[dict[str, Any], Arrays]:
         "removed": removed(scene),
         "palette": COLOURS,
         "verdict": _verdict(scene),
+        "tree": plain(scene),
         "frame": scene.frame.label,
         "tool_radius_mm": scene.tool_radius_mm,
         "live": None,

@@ -76,6 +76,9 @@ class UserDialect(Dialect):
                 words |= {word.upper().translate(_NO_DIGITS) for word, *_ in either}
         return frozenset(words)
 
+    def comment_marks(self) -> tuple[tuple[bytes, bytes], ...]:
+        return tuple((mark.encode(), b"") for mark in self.comments)
+
     def continues(self, line: bytes) -> bool:
         return bool(self.continuation) and line.rstrip().endswith(self.continuation.encode())
 

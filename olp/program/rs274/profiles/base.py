@@ -94,6 +94,9 @@ class Profile(Dialect):
     cycles: CycleRules
     language: Language
 
+    def comment_marks(self) -> tuple[tuple[bytes, bytes], ...]:
+        return ((b"(", b")"), (b";", b""))
+
     def dwell_s(self, number: float, *, pointed: bool) -> float:
         """Seconds of a P word; Fanuc and Haas count milliseconds where it has no decimal point."""
         return number / 1000.0 if self.increments_without_point and not pointed else number
