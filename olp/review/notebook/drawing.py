@@ -11,8 +11,6 @@ from olp.core.arrays import Array
 from olp.review.notebook.framing import WINDOW, View
 from olp.review.notebook.legend import Image
 
-#: three.js' linear filter without smaller copies of a texture: letters stay sharp.
-_LINEAR = 1006
 #: three.js' number for the front side of faces.
 _FRONT = 0
 #: Order of drawing of what is in front of all else; 0 is that of bodies.
@@ -68,9 +66,7 @@ def put_image(node: Any, image: Image, place_mm: Array, view: View) -> None:
     """Put an image with its middle at a place (3,). It faces the camera, and keeps its size in the window."""
     from meshcat import geometry
 
-    texture = geometry.ImageTexture(
-        geometry.PngImage(image.png), minFilter=_LINEAR, magFilter=_LINEAR, generateMipmaps=False
-    )
+    texture = geometry.ImageTexture(geometry.PngImage(image.png))
     material = geometry.MeshBasicMaterial(
         map=texture, transparent=True, sizeAttenuation=False, depthTest=False, depthWrite=False
     )

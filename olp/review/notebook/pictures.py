@@ -111,8 +111,8 @@ class Picture:
         return np.concatenate((points, self.enlarged_mm[alone])), np.concatenate((band[which], own))
 
     def whiskers(self, job_mm: float, most: int) -> Index:
-        """(w,) the samples with a whisker from the nominal to the enlarged path: where a path begins, and then
-        at equal distances along it; at most `most`. `job_mm` is the size of the job."""
+        """(w,) the samples with a whisker from the nominal to the enlarged path: where a path begins, and
+        then at equal distances along it; at most `most`. `job_mm` is the size of the job."""
         length = float(np.ptp(self.arc_mm)) if len(self.arc_mm) else 0.0
         cell = np.floor(self.arc_mm / max(_WHISKER_STEP * job_mm, length / _MOST_WHISKERS))
         which = np.flatnonzero(self.shown)
