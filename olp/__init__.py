@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     from olp.findings.catalogue import Finding as Finding
     from olp.review.job import Review as Review
     from olp.review.job import view as view
-    from olp.review.notebook import add_layers as add_layers
+    from olp.review.notebook.layers import Layers as Layers
+    from olp.review.notebook.layers import add_layers as add_layers
     from olp.workflows.calibrate_ballbar import fit_ballbar as fit_ballbar
     from olp.workflows.calibrate_diagonals import fit_diagonals as fit_diagonals
     from olp.workflows.calibrate_doctor import CalibrationDiagnosis as CalibrationDiagnosis
@@ -92,7 +93,8 @@ _HOME = {
     "retime": "olp.workflows.retime",
     "Review": "olp.review.job",
     "view": "olp.review.job",
-    "add_layers": "olp.review.notebook",
+    "Layers": "olp.review.notebook.layers",
+    "add_layers": "olp.review.notebook.layers",
     "Retiming": "olp.workflows.retime",
     "ResultCorrection": "olp.workflows.results",
     "correct_results": "olp.workflows.results",

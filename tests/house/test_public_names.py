@@ -16,7 +16,7 @@ LARGE = ("scipy", "trimesh", "meshcat", "ruckig", "matplotlib")
 PUBLIC = {
     *("correct", "verify", "simulate", "retime", "check", "compare", "inspect", "error_at", "flatten"),
     *("Correction", "Verification", "Simulation", "Retiming", "Check", "Comparison", "Finding", "load_setup"),
-    *("view", "Review", "add_layers", "fit_calibration", "FittedCalibration"),
+    *("view", "Review", "add_layers", "Layers", "fit_calibration", "FittedCalibration"),
     *("diagnose_calibration", "CalibrationDiagnosis", "plan_measurements", "MeasurementPlan"),
     *("refine_calibration", "RefinedCalibration"),
     *("import_table", "export_table", "compare_tables", "TableImport", "TableExport"),

@@ -71,8 +71,10 @@ def opened(
     size: tuple[int, int] = (1280, 720),
     theme: str = "light",
     view: str = "",
+    ready: str = "html[data-ready],html[data-error]",
 ) -> Iterator[Any]:
-    """The page of a file, ready, with the network off, or that of a server; `view` follows its address.
+    """The page of a file, ready, with the network off, or that of a server; `view` follows its address. It is
+    ready when an element matches `ready`.
 
     Fails at the end where the console showed an error, a script failed, or anything but the file or the
     server itself was asked for.
@@ -92,7 +94,7 @@ def opened(
     page.on("dialog", lambda dialog: (trouble.append(f"dialog: {dialog.message}"), dialog.dismiss()))
     page.on("request", lambda request: asked.append(request.url))
     page.goto((source.as_uri() if isinstance(source, Path) else source) + view)
-    page.wait_for_selector("html[data-ready],html[data-error]", state="attached", timeout=120_000)
+    page.wait_for_selector(ready, state="attached", timeout=120_000)
     assert page.evaluate("document.documentElement.dataset.error ?? null") is None, trouble
     try:
         yield page
