@@ -134,14 +134,17 @@ def _layers(scene: Scene, arrays: Arrays, origin: Array) -> list[dict[str, Any]]
         index = arrays.quantised(f"i_{name}", measured.index, 1.0)
         kind = arrays.raw(f"kind_{name}", np.where(measured.counted, 0, 1).astype(np.uint8), "u1")
         label = "measured" if len(scene.measured) == 1 else f"measured: {measured.label}"
-        layers.append(
-            _layer(name, label, base, delta, index, *MEASURED) | {"kind": kind}
-        )
+        layers.append(_layer(name, label, base, delta, index, *MEASURED) | {"kind": kind})
     return layers
 
 
 def _layer(
-    name: str, label: str, base: str, delta: str | None, index: str | None, width: float,
+    name: str,
+    label: str,
+    base: str,
+    delta: str | None,
+    index: str | None,
+    width: float,
     dashes: tuple[int, int],
 ) -> dict[str, Any]:
     return {

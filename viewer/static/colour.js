@@ -92,7 +92,11 @@
 
   // A deviation in µm as every report prints it.
   const um = v =>
-    v === null || v === undefined || Number.isNaN(v) ? "–" : v > 0 && v < 0.005 ? "<0.01" : v.toFixed(2).replace("-", "−");
+    v === null || v === undefined || Number.isNaN(v)
+      ? "–"
+      : v !== 0 && Math.abs(v) < 0.005
+        ? "<0.01"
+        : v.toFixed(2).replace("-", "−");
 
   const unit_label = unit =>
     unit === "um"

@@ -142,7 +142,8 @@
         own = layer.own(flag.sample),
         from = this.at(layer.at(own, 0)),
         to = this.at(layer.at(own, app.pictures.k_of(layer)));
-      if (!from || !to) return;
+      const {w, h} = this.view;
+      if (!from || !to || to[0] < 0 || to[1] < 0 || to[0] > w || to[1] > h) return;
       const length = Math.hypot(to[0] - from[0], to[1] - from[1]);
       if (length > 8) {
         const [ux, uy] = [(to[0] - from[0]) / length, (to[1] - from[1]) / length];

@@ -39,6 +39,7 @@
 
     draw() {
       const rows = [...this.visible()].map(([node, depth]) => this.row(node, depth));
+      if (rows.length) rows.unshift(make("p", {className: "empty", textContent: `${this.app.pictures.list.map(p => p.label).join(" → ")}, µm`}));
       if (!rows.length) rows.push(make("p", {className: "empty", textContent: this.nodes.length ? "Nothing passes the filter." : "No features are listed."}));
       if (this.unlisted) rows.push(make("p", {className: "empty", textContent: `${this.unlisted} more features are not listed.`}));
       this.host.replaceChildren(...rows);
@@ -61,10 +62,10 @@
       const mark = make("span", {className: holds === false ? "flagged" : "", textContent: SYMBOL[holds], title: WORDS[holds]});
       mark.setAttribute("role", "img");
       mark.setAttribute("aria-label", WORDS[holds]);
-      const size = make("span", {className: "size", title: "largest deviation, µm"}, `${sizes.map(um).join(" → ")} `, mark);
+      const size = make("span", {className: "figures"}, make("span", {title: "largest deviation of what counts"}, `largest ${sizes.map(um).join(" → ")}`));
+      size.append(...this.figures(node));
       const fold = make("span", {className: "fold", textContent: node.children.length ? (node.open ? "▾" : "▸") : ""});
-      row.append(fold, label, size);
-      if (node.figures?.length) row.append(make("span", {className: "figures"}, ...this.figures(node)));
+      row.append(fold, label, mark, size);
       row.onclick = e => {
         if (e.target === fold) this.fold(node, !node.open);
         else this.go(node);
@@ -81,11 +82,11 @@
     figures(node) {
       const {um} = OLP.colour,
         layers = this.app.pictures.list.flatMap(p => p.layers);
-      return node.figures.flatMap((figure, k) => {
+      return (node.figures ?? []).flatMap(figure => {
         const values = layers.filter(n => figure.by_layer[n] !== undefined && figure.by_layer[n] !== null).map(n => um(figure.by_layer[n]));
         if (!values.length) return [];
         const meaning = this.kinds[node.kind]?.figures?.[figure.name] ?? "";
-        return [make("span", {title: meaning, textContent: `${k ? " · " : ""}${figure.label} ${values.join(" → ")}`})];
+        return [make("span", {title: meaning, textContent: ` · ${figure.label} ${values.join(" → ")}`})];
       });
     }
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -12,8 +13,8 @@ import numpy.typing as npt
 from olp.core.arrays import Array, Index, Mask
 from olp.core.toolpath import Kind
 from olp.core.units import UM_PER_MM
-from olp.review import palette
-from olp.review.judged import callouts, measured_names
+from olp.review import judged, palette
+from olp.review.judged import measured_names
 from olp.review.scene import Scene
 
 #: Most samples of a layer, as it is one message to the browser; of longer paths every k-th is drawn.
@@ -127,19 +128,22 @@ def names_of(scene: Scene) -> list[str]:
 
 def pictures_of(scene: Scene, job_mm: float, exaggeration: float | None) -> Iterator[Picture]:
     """The pictures of a scene; without `exaggeration` each has a factor of its own."""
-    samples, flags = scene.samples, {item["layer"]: item for item in callouts(scene)}
+    samples, stated = scene.samples, list(judged.pictures(scene))
+    of_layer = {name: picture for picture in stated for name in picture["layers"]}
+    flags = {item["flag"]["layer"]: item for item in stated if item["flag"] is not None}
     feed = samples.joined & ~rapids(scene)
 
-    def factor(delta_mm: Array, shown: Mask) -> float:
+    def factor(name: str, delta_mm: Array, shown: Mask) -> float:
         largest = np.linalg.norm(delta_mm[shown], axis=1).max(initial=0.0)
+        largest = max(largest, (of_layer[name]["largest_um"] or 0.0) / UM_PER_MM)
         return factor_of(float(largest), job_mm) if exaggeration is None else exaggeration
 
     shown, allowed_um = touched(feed), scene.table.allowed_mm * UM_PER_MM
     for name, delta in (("uncorrected", samples.uncorrected), ("corrected", samples.corrected)):
-        worst, flag = (flags[name]["sample"], flags[name]["text"]) if name in flags else (None, "")
+        worst, flag = (flags[name]["flag"]["sample"], _words(flags[name])) if name in flags else (None, "")
         yield Picture(
             name, _TITLES[name], scene.position_mm, delta, feed, shown, samples.arc_mm, "allowed",
-            allowed_um, factor(delta, shown), worst, flag,
+            allowed_um, factor(name, delta, shown), worst, flag,
         )  # fmt: skip
     runs, breaks = scene.table.measured, np.cumsum(~feed)
     for name, run in zip(measured_names(scene), scene.measured, strict=True):
@@ -147,12 +151,18 @@ def pictures_of(scene: Scene, job_mm: float, exaggeration: float | None) -> Iter
         # between two points there may be a rapid that was not measured
         drawn = run.counted & (np.diff(breaks[run.index], prepend=-1) == 0)
         shown = run.counted | touched(drawn)
-        worst, flag = (int(size.argmax()), flags[name]["text"]) if name in flags else (None, "")
+        worst, flag = (int(size.argmax()), _words(flags[name])) if name in flags else (None, "")
         yield Picture(
             name, f"Measured: {run.label}", run.base_mm, run.delta_mm, drawn, shown,
             samples.arc_mm[run.index], "part tolerance", None if runs is None else runs.tolerance_um,
-            factor(run.delta_mm, shown), worst, flag,
+            factor(name, run.delta_mm, shown), worst, flag,
         )  # fmt: skip
+
+
+def _words(picture: dict[str, Any]) -> str:
+    """The flag of a picture in words."""
+    flag = picture["flag"]
+    return f"largest, {picture['label']}: {flag['um']:.2f} µm, line {flag['line']}"
 
 
 def rapids(scene: Scene) -> Mask:
