@@ -24,7 +24,9 @@ from olp.review.notebook.framing import View
 pytestmark = pytest.mark.filterwarnings("ignore")
 
 TEXT = b"G21 G90 G54\nG43 H1\nG0 X0 Y0 Z20\nG1 X100 F600\nT2 M6\nG43 H2\nG0 X0 Y50 Z20\nG1 X100\nM2\n"
-WAVY = b"G21 G90 G54\nT1 M6\nG43 H1\nG0 X0 Y0 Z20\nG1 Z0 F900\nG1 X300\nG2 X400 Y100 I0 J100\nG1 Y200 Z-30\nG0 Z20\nG0 X0\nG1 X5\nM2\n"
+WAVY = (
+    b"G21 G90 G54\nT1 M6\nG43 H1\nG0 X0 Y0 Z20\nG1 Z0 F900\nG1 X300\nG2 X400 Y100 I0 J100\nG1 Y200 Z-30\nM2\n"
+)
 MEASURED = "# frame=G54\nX_mm,Y_mm,Z_mm\n0,0,20.01\n50,0,20.02\n100,0,20.01\n0,50,20.01\n100,50,20.01\n"
 PREDICTED = ("uncorrected", "corrected")
 
@@ -133,6 +135,15 @@ def test_the_measured_run_is_a_picture_from_its_nominal_points(
     np.testing.assert_allclose(both[:, 1, 2] - both[:, 0, 2], [10.0, 20.0, 10.0, 10.0, 10.0], atol=1e-2)
     assert layers.legends["measured"].tolerance_um == 15.0
     assert len(pairs(window, "measured/path")) == 3
+
+
+def test_rapids_are_in_no_picture(tmp_path: Path) -> None:
+    text = b"G21 G90 G54\nT1 M6\nG43 H1\nG0 X0 Y0 Z20\nG1 X50 F900\nG0 X90\nG1 X100\nM2\n"
+    scene = olp.view(text, shift_machine(tmp_path / "m", (30.0, 0.0, 0.0)), time=False).scene
+    for picture in pictures.pictures_of(scene, 100.0, 1.0):
+        x = scene.position_mm[picture.path(1000)[0], 0]
+        assert np.abs(x[:, 1] - x[:, 0]).sum() == pytest.approx(60.0)
+        assert not ((x > 50.0) & (x < 90.0)).any()
 
 
 def test_no_measured_line_crosses_a_rapid_that_was_not_measured(shifted: Review) -> None:
