@@ -134,8 +134,24 @@ def test_the_measured_run_is_a_picture_from_its_nominal_points(
     np.testing.assert_allclose(both[:, 0, 2], 20.0, atol=1e-3)
     np.testing.assert_allclose(both[:, 1, 2] - both[:, 0, 2], [10.0, 20.0, 10.0, 10.0, 10.0], atol=1e-2)
     assert layers.legends["measured"].tolerance_um == 15.0
-    # no segment crosses the rapid and the tool change
     assert len(pairs(window, "measured/path")) == 3
+
+
+def test_rapids_are_in_no_picture(tmp_path: Path) -> None:
+    text = b"G21 G90 G54\nT1 M6\nG43 H1\nG0 X0 Y0 Z20\nG1 X50 F900\nG0 X90\nG1 X100\nM2\n"
+    scene = olp.view(text, shift_machine(tmp_path / "m", (30.0, 0.0, 0.0)), time=False).scene
+    for picture in pictures.pictures_of(scene, 100.0, 1.0):
+        x = scene.position_mm[picture.path(1000)[0], 0]
+        assert np.abs(x[:, 1] - x[:, 0]).sum() == pytest.approx(60.0)
+        assert not ((x > 50.0) & (x < 90.0)).any()
+
+
+def test_no_measured_line_crosses_a_rapid_that_was_not_measured(shifted: Review) -> None:
+    run = shifted.scene.measured[0]
+    every = dataclasses.replace(run, counted=np.ones(len(run.counted), bool))
+    scene = dataclasses.replace(shifted.scene, measured=(every,))
+    *_, picture = pictures.pictures_of(scene, 100.0, 1.0)
+    assert picture.path(1000)[0].tolist() == [[0, 1], [1, 2], [3, 4]]
 
 
 @pytest.mark.parametrize("most", [200_000, 50])
