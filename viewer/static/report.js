@@ -78,7 +78,7 @@
           const own = OLP.find(l.index, i);
           return l.index[own] === i ? [0, 1, 2].map(j => (1e3 * l.D[3 * own + j]).toFixed(3)) : ["", "", ""];
         });
-      rows.push([String(line), app.arc[i].toFixed(3), app.time[i].toFixed(6), ["feed", "rapid", "start"][app.kind[i]], ...p, ...away].map(cell).join(","));
+      rows.push([cell(String(line)), app.arc[i].toFixed(3), app.time[i].toFixed(6), ["feed", "rapid", "start"][app.kind[i]], ...p, ...away].join(","));
     };
     const {chosen} = app.state;
     if (chosen.length) for (const [a, b] of chosen) for (let i = Math.max(0, a); i <= b; i++) put(i);
@@ -90,10 +90,12 @@
 
   // -- print -----------------------------------------------------------------------------------------------------------
 
-  function table(head, rows) {
+  // A table with columns of these shares of the width, in %.
+  function table(head, rows, shares = head.map(() => 100 / head.length)) {
     return make(
       "table",
       {},
+      make("colgroup", {}, ...shares.map(share => make("col", {width: `${share}%`}))),
       make("thead", {}, make("tr", {}, ...head.map(t => make("th", {textContent: t})))),
       make("tbody", {}, ...rows.map(row => make("tr", {}, ...row.map(t => make("td", {textContent: t}))))),
     );
@@ -154,13 +156,13 @@
     if ($("removed")) parts.push(make("p", {textContent: $("removed").textContent}));
     parts.push(...prints(app));
     const listed = features(app);
-    if (listed.length) parts.push(make("h2", {textContent: "Operations and features"}), table(["feature", "lines", "largest, µm", "figures, µm", "verdict"], listed));
+    if (listed.length) parts.push(make("h2", {textContent: "Operations and features"}), table(["feature", "lines", "largest, µm", "figures, µm", "verdict"], listed, [27, 11, 20, 32, 10]));
     if (app.tree.nodes.length > MOST_FEATURES) parts.push(make("p", {textContent: `${app.tree.nodes.length - MOST_FEATURES} more are on the page.`}));
     const lines = worst_lines(app);
-    if (lines.length) parts.push(make("h2", {textContent: `Largest deviations, ${pictures.current.label}`}), table(["line", "µm", "text"], lines));
+    if (lines.length) parts.push(make("h2", {textContent: `Largest deviations, ${pictures.current.label}`}), table(["line", "µm", "text"], lines, [12, 12, 76]));
     const findings = manifest.findings ?? [];
     if (findings.length)
-      parts.push(make("h2", {textContent: "Findings"}), table(["code", "finding", "line"], findings.slice(0, 50).map(f => [f.code, OLP.micrometres(f.message), f.place ?? "–"])));
+      parts.push(make("h2", {textContent: "Findings"}), table(["code", "finding", "line"], findings.slice(0, 50).map(f => [f.code, OLP.micrometres(f.message), f.place ?? "–"]), [12, 74, 14]));
     if (app.state.notes.length)
       parts.push(
         make("h2", {textContent: "Notes"}),
