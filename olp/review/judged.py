@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from olp.core.arrays import Array
 from olp.core.units import UM_PER_MM
+from olp.proof.proof import Counts
 from olp.review.pack import Arrays
 from olp.review.scene import Scene
 
@@ -100,13 +101,16 @@ def pictures(scene: Scene) -> Iterator[dict[str, Any]]:
     `layers`, the `tolerance_um` that it is judged by, the largest deviation of what counts, its rms, and as
     `flag` the place of the largest."""
     table, deviation = scene.table, scene.report["deviation"]
+    along = (table.judged & (table.counts != Counts.POINT)).any()
     allowed_um = table.allowed_mm * UM_PER_MM
     for layer, side, values in (
         ("uncorrected", "before", table.uncorrected), ("corrected", "after", table.corrected),
     ):  # fmt: skip
+        # points have no path between them
+        rms_um = float(deviation[side]["between"]["rms_um"]) if along else None
         yield {
             "name": layer, "label": layer, "layers": [layer], "tolerance_um": allowed_um, "basis": "allowed",
-            "rms_um": float(deviation[side]["between"]["rms_um"]), **_largest(scene, layer, values),
+            "rms_um": rms_um, **_largest(scene, layer, values),
         }  # fmt: skip
     if table.measured is not None:
         across = scene.report["measured"]["across_um"]

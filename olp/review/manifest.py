@@ -12,6 +12,7 @@ from olp.core.arrays import Array
 from olp.core.toolpath import Kind
 from olp.core.units import AXES, UM_PER_MM
 from olp.findings.catalogue import RULES
+from olp.proof.proof import Counts
 from olp.reports.report import place
 from olp.review.features.nodes import plain
 from olp.review.judged import judged_lines, measured_names, pictures, removed, statistics
@@ -109,8 +110,11 @@ def manifest_of(scene: Scene) -> tuple[dict[str, Any], Arrays]:
 
 
 def _rapid(scene: Scene) -> npt.NDArray[np.uint8]:
+    """(n,) 1 where the path does not count: rapids, and the way to a point that counts alone."""
     samples = scene.samples
-    rapid = np.where(scene.nominal.toolpath.kind[samples.move] == Kind.RAPID, np.uint8(1), np.uint8(0))
+    aside = scene.nominal.toolpath.kind[samples.move] == Kind.RAPID
+    aside |= (scene.table.counts[samples.move] == Counts.POINT) & (samples.share < 1.0)
+    rapid = np.where(aside, np.uint8(1), np.uint8(0))
     rapid[~samples.joined] = 2
     return np.asarray(rapid)
 

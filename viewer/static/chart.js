@@ -176,7 +176,7 @@
         c.moveTo(at, bottom);
         c.lineTo(at, bottom + 4);
         c.stroke();
-        if (at < right && at > EDGE.left - 1) c.fillText(number(x, 5), at, bottom + 6);
+        if (at + c.measureText(number(x, 5)).width / 2 < right && at > EDGE.left - 1) c.fillText(number(x, 5), at, bottom + 6);
       }
       c.textAlign = "right";
       c.fillText(this.x_label, EDGE.left + this.wide, bottom + 6);
@@ -231,8 +231,14 @@
           pen = false;
           continue;
         }
-        if (pen) c.lineTo(x, this.py(lane, a));
-        else c.moveTo(x, this.py(lane, a));
+        const y = this.py(lane, a);
+        if (pen) c.lineTo(x, y);
+        else {
+          // a point alone is seen as well
+          c.moveTo(x, y - 0.75);
+          c.lineTo(x, y + 0.75);
+          c.moveTo(x, y);
+        }
         if (b > a) c.lineTo(x, this.py(lane, b));
         pen = true;
       }

@@ -6,7 +6,8 @@
     TALLEST = 8e6, // px
     WIDEST = 16, // characters of a line's name
     LOOKED = 4000, // lines whose length decides on the layout
-    USUAL = 0.9; // of them are to fit
+    USUAL = 0.9, // of them are to fit
+    MORE = " …";
 
   class Listing {
     constructor(app) {
@@ -71,8 +72,8 @@
     fit(text, characters) {
       if (text.length <= characters) return text;
       const cut = text.slice(0, characters - 1),
-        end = cut.search(/\s+\S*$/);
-      return (end > characters / 3 ? cut.slice(0, end) : cut) + " …";
+        end = cut.search(/[\s,]+[^\s,]*$/);
+      return (end > characters / 3 ? cut.slice(0, end) : cut) + MORE;
     }
 
     get scaled() {
@@ -183,11 +184,10 @@
         cell.textContent = text;
         return;
       }
-      const words = new Set(nominal.split(/(?<=\S)\s+|(?=[A-Z(;])/).map(w => w.trim()));
-      for (const part of text.split(/(?=\s)|(?=[A-Z(;])/)) {
-        const changed = part.trim() && !words.has(part.trim());
+      const whole = text !== corrected ? text.slice(0, -MORE.length) : text;
+      for (const [part, changed] of OLP.difference(nominal, whole))
         cell.append(changed ? Object.assign(document.createElement("b"), {textContent: part}) : part);
-      }
+      cell.append(text.slice(whole.length));
     }
 
     scroll_to(top) {

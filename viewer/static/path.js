@@ -126,7 +126,8 @@
         room = out.length / (4 * FLOATS) - spare,
         whiskers = [];
       let c = 0,
-        way = apart;
+        way = apart,
+        before = GAP;
       for (let b = 0; b < this.blocks && c < room; b++) {
         if (!need[b]) continue;
         const first = b * BLOCK,
@@ -143,6 +144,8 @@
           }
           const kind = what % CHOSEN;
           if (kind !== GAP) this.put(c++, i, j, value, index ? index[i] : i, what, origin);
+          if (kind !== before) way = apart; // each stretch has one at its beginning
+          before = kind;
           if (spare && kind === 0) {
             const {P} = this;
             way += Math.hypot(P[3 * j] - P[3 * i], P[3 * j + 1] - P[3 * i + 1], P[3 * j + 2] - P[3 * i + 2]);

@@ -1,7 +1,7 @@
 """Circular moves with their centres: arcs of the program, and circles that it states as short chords.
 
-A run of at least twelve chords is a part of a circle where its vertices lie on one circle, and the chords
-turn evenly one way.
+A run of at least twelve chords is a part of a circle where its vertices lie on one circle, the chords turn
+evenly one way, and the path leaves the circle at both ends: any smooth curve is near a circle for a while.
 """
 
 from __future__ import annotations
@@ -15,17 +15,26 @@ import numpy as np
 from olp.core.arrays import Array, Index, Mask
 from olp.core.geometry import PLANES
 from olp.review.features.chains import Chains
-from olp.review.features.fits import circle
+from olp.review.features.fits import circle_of_powers
 from olp.review.features.moves import Does, Moves
 
 #: Fewest chords of a circle.
 CHORDS = 12
 #: Chords turn by at most this, in rad.
 _TURN = np.pi / 6
-#: No chord is longer than this many of the others; the first and the last one may be shorter.
-_EVEN = 2.0
+#: No chord is longer than this many of the usual ones.
+_EVEN = 3.0
 #: A circle through three of the vertices is at most so many times as far from the others as the best one.
 _LOOSE = 4.0
+#: Beyond the ends of a circle the path is off it by this many times what its vertices may be. An eighth of
+#: its length beyond a part of a curve with evenly changing curvature, that curve is off by four times as much.
+_LEAVES = 5.0
+#: So many chords before twelve on a circle the path is off it, by this many times what they are. A curve with
+#: evenly changing curvature is off by sixteen times as much there.
+_BEFORE = 6
+_DRIFTS = 20.0
+#: The chords that a circle is found in bend by at least so many times what their vertices may be off.
+_BENT = 10.0
 #: Runs of twelve chords that are looked at at once.
 _BLOCK = 1 << 12
 #: Arcs of a spline turn by less than this, in rad, and are no longer than this many of the moves beside them.
@@ -127,48 +136,75 @@ class _Run:
         vertices = np.concatenate((chains.start[a:b, :2], chains.end[b - 1 : b, :2]))
         return _Run(vertices, chains.length_mm[a:b], moves.near_mm)
 
-    def likely(self) -> Index:
-        """The chords from which twelve may lie on a circle: on that through three of their vertices."""
-        rows = np.arange(len(self.length) - CHORDS + 1)
+    def likely(self) -> list[tuple[int, int]]:
+        """Chords with which a circle may begin, and how many of them to begin with, rising."""
+        found: list[tuple[int, int]] = []
+        stride = 1
+        while CHORDS * stride <= len(self.length):
+            found += [(begin, CHORDS * stride) for begin in self._bent(stride).tolist()]
+            stride *= 4
+        return sorted(found)
+
+    def _bent(self, stride: int) -> Index:
+        """The chords at which twelve times `stride` chords begin that lie on the circle through three of
+        their vertices, bend well, and before which the path is off that circle."""
+        rows = np.arange(len(self.length) - CHORDS * stride + 1)
         found = []
         for part in np.array_split(rows, 1 + len(rows) // _BLOCK):
-            points = self.vertices[part[:, None] + np.arange(CHORDS + 1)]
-            points = points - points[:, :1]
-            p, q = points[:, CHORDS // 2], points[:, CHORDS]
+            points = self.vertices[part[:, None] + stride * np.arange(CHORDS + 1)]
+            begin = points[:, 0]
+            p, q = points[:, CHORDS // 2] - begin, points[:, CHORDS] - begin
             with np.errstate(invalid="ignore", divide="ignore"):
                 p2, q2 = (p**2).sum(axis=1), (q**2).sum(axis=1)
                 twice = 2.0 * (p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0])
-                x = (q[:, 1] * p2 - p[:, 1] * q2) / twice
-                y = (p[:, 0] * q2 - q[:, 0] * p2) / twice
+                x = begin[:, 0] + (q[:, 1] * p2 - p[:, 1] * q2) / twice
+                y = begin[:, 1] + (p[:, 0] * q2 - q[:, 0] * p2) / twice
+                radius = np.hypot(begin[:, 0] - x, begin[:, 1] - y)
                 away = np.hypot(points[:, :, 0] - x[:, None], points[:, :, 1] - y[:, None])
+                # how far the middle is from the line through the ends
+                bend = np.abs(twice) / 2.0 / np.sqrt(q2)
+            ripple = np.abs(away - radius[:, None]).max(axis=1)
             # this circle is not the best one
-            off = np.abs(away - away[:, :1]).max(axis=1)
-            found.append(part[off <= _LOOSE * self.near_mm])
+            on = (ripple <= _LOOSE * self.near_mm) & ~(bend < _BENT * self.near_mm)
+            before = part - _BEFORE * stride
+            there = self.vertices[np.maximum(before, 0)]
+            off = np.abs(np.hypot(there[:, 0] - x, there[:, 1] - y) - radius)
+            leaves = off > np.maximum(_LEAVES * self.near_mm, _DRIFTS * ripple)
+            found.append(part[on & ((before < 0) | leaves)])
         return np.concatenate(found)
 
     def on_circle(self, a: int, b: int) -> tuple[float, float, float] | None:
         """Centre and radius of the circle of chords a..b; None where they lie on none, or are uneven."""
-        inner, length = self.length[a + 1 : b - 1], self.length[a:b]
-        if length.max() > _EVEN * inner.min():
+        length = self.length[a:b]
+        if length.max() > _EVEN * np.median(length):
             return None
         points = self.vertices[a : b + 1]
         middle = points.mean(axis=0)
-        x, y = (points - middle).T
-        fitted = circle(x, y, np.ones(len(x)))
-        if np.abs(fitted.residuals).max() > self.near_mm:
-            return None
-        return middle[0] + fitted.x_mm, middle[1] + fitted.y_mm, fitted.radius_mm
+        x, y, radius = circle_of_powers(*(points - middle).T)
+        found = (float(middle[0]) + x, float(middle[1]) + y, radius)
+        return found if self._away(points, found).max() <= self.near_mm else None
+
+    def ends(self, a: int, b: int, circle: tuple[float, float, float]) -> bool:
+        """Whether the path is off a circle an eighth of its chords before a and behind b: a curve of changing
+        curvature goes on near it."""
+        beyond = max((b - a) // 8, 1)
+        there = self.vertices[[k for k in (a - beyond, b + beyond) if 0 <= k < len(self.vertices)]]
+        return bool((self._away(there, circle) > _LEAVES * self.near_mm).all())
+
+    @staticmethod
+    def _away(points: Array, circle: tuple[float, float, float]) -> Array:
+        x, y, radius = circle
+        return np.asarray(np.abs(np.hypot(points[:, 0] - x, points[:, 1] - y) - radius))
 
 
 def _fitted(moves: Moves, chains: Chains, a: int, b: int) -> Iterator[Circular]:
     """The parts of lines a..b that lie on one circle each, as long as possible, one after the other."""
     run = _Run.of(moves, chains, a, b)
     done, count = 0, b - a
-    for begin in run.likely().tolist():
-        if begin < done or run.on_circle(begin, begin + CHORDS) is None:
+    for begin, chords in run.likely():
+        if begin < done or run.on_circle(begin, begin + chords) is None:
             continue
-        low, high = begin + CHORDS, count + 1
-        step = CHORDS
+        low, step = begin + chords, chords
         while low < count and run.on_circle(begin, min(low + step, count)) is not None:
             low = min(low + step, count)
             step *= 2
@@ -179,10 +215,11 @@ def _fitted(moves: Moves, chains: Chains, a: int, b: int) -> Iterator[Circular]:
                 high = middle
             else:
                 low = middle
-        done = low
         fitted = run.on_circle(begin, low)
         assert fitted is not None
-        yield _chords(moves, chains, a + begin, a + low, fitted)
+        done = low
+        if run.ends(begin, low, fitted):
+            yield _chords(moves, chains, a + begin, a + low, fitted)
 
 
 def _chords(moves: Moves, chains: Chains, a: int, b: int, fitted: tuple[float, float, float]) -> Circular:

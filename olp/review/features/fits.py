@@ -40,11 +40,10 @@ class Circle:
     residuals: Array
 
 
-def circle(x: Array, y: Array, weight: Array, near: tuple[float, float, float] | None = None) -> Circle:
-    """The circle through points (k,) with the smallest sum of squares of radial distances. It is sought from
-    `near`, a centre and a radius, else from the circle with the smallest sum of squares of the powers of the
-    points (Kasa), which needs points on more than a line."""
-    centre_x, centre_y, radius = _of_powers(x, y, weight) if near is None else near
+def circle(x: Array, y: Array, weight: Array, near: tuple[float, float, float]) -> Circle:
+    """The circle through points (k,) with the smallest sum of squares of radial distances, sought from
+    `near`, a centre and a radius."""
+    centre_x, centre_y, radius = near
     for _ in range(_STEPS):
         dx, dy = x - centre_x, y - centre_y
         away = np.maximum(np.hypot(dx, dy), _ENOUGH_MM)
@@ -57,9 +56,11 @@ def circle(x: Array, y: Array, weight: Array, near: tuple[float, float, float] |
     return Circle(float(centre_x), float(centre_y), float(radius), residuals)
 
 
-def _of_powers(x: Array, y: Array, weight: Array) -> tuple[float, float, float]:
+def circle_of_powers(x: Array, y: Array) -> tuple[float, float, float]:
+    """Centre and radius of the circle about which the powers of points (k,) have the smallest sum of squares
+    (Kasa, IEEE Trans. Instrum. Meas. 25, 1976). Of points within micrometres of a circle it is that one."""
     columns = np.stack((2.0 * x, 2.0 * y, np.ones_like(x)), axis=1)
-    a, b, c = _solution(columns, x**2 + y**2, weight).tolist()
+    a, b, c = _solution(columns, x**2 + y**2, np.ones_like(x)).tolist()
     return a, b, max(c + a**2 + b**2, 0.0) ** 0.5
 
 

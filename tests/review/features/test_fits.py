@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from olp.review.features.fits import circle, line_residuals, plane_residuals
+from olp.review.features.fits import circle, circle_of_powers, line_residuals, plane_residuals
 
 
 def by_lstsq(columns: np.ndarray, values: np.ndarray, weight: np.ndarray) -> np.ndarray:
@@ -28,8 +28,7 @@ def test_lines_and_planes_are_those_of_numpy(seed: int) -> None:
 
 
 @pytest.mark.parametrize("sweep_deg", [90.0, 180.0, 360.0])
-@pytest.mark.parametrize("near", [True, False])
-def test_circles_are_those_of_scipy(sweep_deg: float, near: bool) -> None:
+def test_circles_are_those_of_scipy(sweep_deg: float) -> None:
     rng = np.random.default_rng(int(sweep_deg))
     angle = np.radians(np.sort(rng.uniform(0.0, sweep_deg, 80)))
     radius = 25.0 + rng.normal(0.0, 0.05, 80)
@@ -40,9 +39,15 @@ def test_circles_are_those_of_scipy(sweep_deg: float, near: bool) -> None:
         return np.asarray(np.sqrt(weight) * (np.hypot(x - p[0], y - p[1]) - p[2]))
 
     judged = least_squares(residuals, (0.0, 0.0, 25.0), xtol=1e-15, ftol=1e-15, gtol=1e-15).x
-    found = circle(x, y, weight, (0.0, 0.0, 25.0) if near else None)
+    found = circle(x, y, weight, (0.0, 0.0, 25.0))
     np.testing.assert_allclose((found.x_mm, found.y_mm, found.radius_mm), judged, atol=1e-7)
     np.testing.assert_allclose(found.residuals, np.hypot(x - judged[0], y - judged[1]) - judged[2], atol=1e-7)
+
+
+def test_a_circle_of_powers_is_exact_for_its_own_points() -> None:
+    angle = np.linspace(0.3, 0.9, 13)
+    found = circle_of_powers(-7.0 + 12.0 * np.cos(angle), 5.0 + 12.0 * np.sin(angle))
+    np.testing.assert_allclose(found, (-7.0, 5.0, 12.0), atol=1e-9)
 
 
 def test_a_plane_through_points_of_a_line_has_no_slope_across_it() -> None:
