@@ -20,6 +20,7 @@ from olp.files.described import described
 from olp.files.json_schema import KINDS, json_schema
 from olp.findings.catalogue import RULES
 from olp.program import registry
+from olp.review.features.registry import KINDS as KINDS_OF_FEATURES
 
 FOLDER = Path(__file__).resolve().parents[2] / "olp" / "docs" / "reference"
 #: Values of a key that are listed in full.
@@ -161,7 +162,22 @@ def dialects() -> str:
     return "".join(parts)
 
 
-PAGES = {"verbs.md": verbs, "findings.md": findings, "keys.md": keys, "dialects.md": dialects}
+def features() -> str:
+    """The kinds of features of the page, and what their figures mean."""
+    parts = [
+        "# Features\n\nThe features that the page of [`olp view`](../howto/view.md) finds in a program, and "
+        f"what is said of each.\nDeviations are in um, of the moves that count.\n{_GENERATED}\n"
+    ]
+    for kind in KINDS_OF_FEATURES:
+        rows = ((figure.label, figure.meaning) for figure in kind.figures.values())
+        parts.append(f"## {kind.label}\n\n" + table(("figure", "what it means"), rows))
+    return "".join(parts)
+
+
+PAGES = {
+    "verbs.md": verbs, "findings.md": findings, "keys.md": keys, "dialects.md": dialects,
+    "features.md": features,
+}  # fmt: skip
 
 if __name__ == "__main__":
     FOLDER.mkdir(parents=True, exist_ok=True)

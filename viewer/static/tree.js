@@ -14,6 +14,7 @@
       this.nodes = tree.nodes.map(node => ({...node, children: [], open: false, shown: true}));
       this.kinds = tree.kinds ?? {};
       this.unlisted = tree.unlisted ?? 0;
+      this.tools = tree.tools ?? [];
       const by_id = new Map(this.nodes.map(n => [n.id, n]));
       for (const node of this.nodes) by_id.get(node.parent)?.children.push(node);
       this.roots = this.nodes.filter(n => !by_id.has(n.parent));
@@ -41,6 +42,7 @@
       const rows = [...this.visible()].map(([node, depth]) => this.row(node, depth));
       if (rows.length) rows.unshift(make("p", {className: "empty", textContent: `${this.app.pictures.list.map(p => p.label).join(" → ")}, µm`}));
       if (!rows.length) rows.push(make("p", {className: "empty", textContent: this.nodes.length ? "Nothing passes the filter." : "No features are listed."}));
+      rows.push(...this.tools.map(tool => this.tool(tool)));
       if (this.unlisted) rows.push(make("p", {className: "empty", textContent: `${this.unlisted} more features are not listed.`}));
       this.host.replaceChildren(...rows);
     }
@@ -48,7 +50,6 @@
     row(node, depth) {
       const {um} = OLP.colour,
         sizes = this.app.pictures.list.map(p => this.largest(node, p)).filter(v => v !== undefined),
-        holds = node.measured_holds === false ? false : node.holds,
         row = make("div", {className: "node"});
       row.setAttribute("role", "treeitem");
       row.setAttribute("aria-level", depth + 1);
@@ -59,18 +60,38 @@
       row.dataset.id = node.id;
       const label = make("span", {className: "label", title: `${node.label} ${node.detail ?? ""}, lines ${node.place}`}, `${node.label} `);
       label.append(make("small", {textContent: node.detail ?? ""}));
-      const mark = make("span", {className: holds === false ? "flagged" : "", textContent: SYMBOL[holds], title: WORDS[holds]});
-      mark.setAttribute("role", "img");
-      mark.setAttribute("aria-label", WORDS[holds]);
       const size = make("span", {className: "figures"}, make("span", {title: "largest deviation of what counts"}, `largest ${sizes.map(um).join(" → ")}`));
       size.append(...this.figures(node));
       const fold = make("span", {className: "fold", textContent: node.children.length ? (node.open ? "▾" : "▸") : ""});
-      row.append(fold, label, mark, size);
+      row.append(fold, label, this.mark(node), size);
       row.onclick = e => {
         if (e.target === fold) this.fold(node, !node.open);
         else this.go(node);
       };
       return row;
+    }
+
+    // A tool with what the table says of it; a click keeps its moves.
+    tool(tool) {
+      const sizes = this.app.pictures.list.map(p => this.largest(tool, p)).filter(v => v !== undefined),
+        row = make("button", {className: "tool", title: "Keep the moves of this tool"}, make("span", {textContent: `Tool: ${tool.label}`}));
+      row.append(make("small", {textContent: `largest ${sizes.map(OLP.colour.um).join(" → ")}`}), this.mark(tool));
+      row.disabled = tool.tool === null;
+      row.onclick = () => {
+        $("filter").open = true;
+        $("filter-tool").value = String(tool.tool);
+        this.apply();
+      };
+      return row;
+    }
+
+    // The verdict of a node or a tool.
+    mark(node) {
+      const holds = node.measured_holds === false ? false : node.holds,
+        mark = make("span", {className: holds === false ? "flagged" : "", textContent: SYMBOL[holds], title: WORDS[holds]});
+      mark.setAttribute("role", "img");
+      mark.setAttribute("aria-label", WORDS[holds]);
+      return mark;
     }
 
     largest(node, picture) {
