@@ -271,7 +271,7 @@ def _scene(
         motion=None if plan is None else motion_table(plan.trajectories, plan.routes),
         duration_s=float(moment[-1]) if plan is None else plan.duration_s,
         sources=tuple(by_source(nominal.toolpath, samples, loaded.model)),
-        listing=aligned(nominal, texts.second, texts.proved.groups),
+        listing=aligned(nominal, texts.second, texts.proved.groups, samples),
         bodies=bodies,
         measured=shown_runs,
         report=report,

@@ -14,6 +14,7 @@ from olp.core.units import AXES, UM_PER_MM
 from olp.findings.catalogue import RULES
 from olp.reports.report import place
 from olp.review.judged import callouts, judged_lines, measured_names, statistics
+from olp.review.listing import pictured
 from olp.review.meshes import nodes
 from olp.review.pack import ARC_MM, DEVIATION_MM, POSITION_MM, TIME_S, Arrays, resolution
 from olp.review.scene import Scene
@@ -223,14 +224,11 @@ def _motion(scene: Scene, arrays: Arrays) -> dict[str, Any] | None:
 
 def _listing(scene: Scene, arrays: Arrays) -> dict[str, Any]:
     listing = scene.listing
-    arrays.text("text_nominal", listing.nominal)
-    lines = listing.row_corrected > 0
-    like = np.full(int(listing.row_corrected.max(initial=0)), -1, np.int64)
-    like[listing.row_corrected[lines] - 1] = listing.row_nominal[lines].astype(np.int64) - 1
-    arrays.patch("text_corrected", listing.corrected, "text_nominal", listing.nominal, _resembled(like))
     return {
-        "nominal": "text_nominal",
-        "corrected": "text_corrected",
+        "nominal": arrays.lines("text_nominal", listing.nominal, ["P"], listing.sample_nominal),
+        "corrected": arrays.lines(
+            "text_corrected", listing.corrected, ["P", "d_command"], listing.sample_corrected
+        ),
         "row_nominal": arrays.quantised("row_nominal", listing.row_nominal, 1.0),
         "row_corrected": arrays.quantised("row_corrected", listing.row_corrected, 1.0),
         **_names(scene, arrays),
@@ -243,16 +241,8 @@ def _names(scene: Scene, arrays: Arrays) -> dict[str, Any]:
     name."""
     if scene.nominal.origin is None:
         return {"names": None, "names_width": 0}
-    names = [scene.place(line + 1) for line in range(scene.nominal.lines)]
-    return {"names": arrays.text("line_names", "\n".join(names)), "names_width": max(map(len, names))}
-
-
-def _resembled(like: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
-    """An inserted block resembles the nominal line of the block that it was split from, which comes after
-    it."""
-    known = np.where(like >= 0, np.arange(len(like)), len(like) - 1)
-    after = np.minimum.accumulate(known[::-1])[::-1]
-    return np.asarray(like[after])
+    names = [pictured(scene.place(line + 1)) for line in range(scene.nominal.lines)]
+    return {"names": arrays.lines("line_names", "\n".join(names)), "names_width": max(map(len, names))}
 
 
 def _meshes(scene: Scene, arrays: Arrays, origin: Array) -> Iterator[dict[str, Any]]:
