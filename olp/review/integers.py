@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zlib
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -19,24 +20,29 @@ _LARGEST = 1 << 48
 _TRIED, _BLOCKS = 2048, 8
 
 
-def coded(name: str, column: Whole) -> tuple[int, int, list[bytes]]:
-    """How often an (n,) column is differenced, and the planes of that: plane k has byte k of each row.
+@dataclass(frozen=True, slots=True)
+class Coded:
+    """A column that was differenced `order` times, in `planes`: plane k has byte k of each row. A number r is
+    stored as 2 r, a negative one as -2 r - 1, in as many bytes as the largest one needs. A `wide` column does
+    not fit int32."""
 
-    A number r is stored as 2 r, a negative one as -2 r - 1, in as many bytes as the largest one needs. Raises
-    CannotCompute for numbers of 2^48 or more.
-    """
-    if len(column) and max(int(column.max()), -int(column.min())) >= _LARGEST:
-        raise CannotCompute(f"values of {name!r} are too large to be stored; they must be below 2^48 steps")
-    order = _cheapest(column)
-    planes = _planes(differenced(column, order))
-    return order, len(planes), planes
+    order: int
+    wide: bool
+    planes: list[bytes]
 
-
-def differenced(column: Whole, order: int) -> Whole:
-    """(n,) differences of a column, `order` times, each less the one before; before the first one is 0."""
-    for _ in range(order):
-        column = np.diff(column, prepend=0)
-    return column
+    @staticmethod
+    def of(name: str, column: Whole) -> Coded:
+        """The (n,) column `name`. Raises CannotCompute for numbers of 2^48 or more."""
+        largest = max(int(column.max()), -int(column.min())) if len(column) else 0
+        if largest >= _LARGEST:
+            raise CannotCompute(
+                f"values of {name!r} are too large to be stored; they must be below 2^48 steps"
+            )
+        order = _cheapest(column)
+        change = column
+        for _ in range(order):
+            change = np.diff(change, prepend=0)
+        return Coded(order, largest >= 1 << 31, _planes(change))
 
 
 def _planes(change: Whole) -> list[bytes]:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from olp.review.integers import Whole, coded
+from olp.review.integers import Coded
 from olp.review.lines import FIRST_STYLE, NM_PER_MM, Lines, Positions
 from olp.review.tokens import MARK, Small
 
@@ -59,7 +59,7 @@ class Arrays:
         """
         rows = _rows(np.asarray(values))
         spec: dict[str, Any] = {"enc": "qd", "q": step, "n": len(rows), "c": rows.shape[1]}
-        columns: list[tuple[int, int, list[bytes]]] = []
+        columns: list[Coded] = []
         kept: list[npt.NDArray[Any]] = []
         for j in range(rows.shape[1]):
             whole = np.rint(rows[:, j].astype(float) * round(1.0 / step)).astype(np.int64)
@@ -67,12 +67,15 @@ class Arrays:
                 kept.append(_small(whole))
             for other in plus:
                 whole = whole - self._kept[other][0][:, j]
-            columns.append(coded(name, whole))
+            columns.append(Coded.of(name, whole))
         if keep:
             self._kept[name] = np.stack(kept, axis=1), step
-        orders, widths = ([column[k] for column in columns] for k in (0, 1))
-        spec |= {"order": orders, "width": widths} | ({"plus": list(plus)} if plus else {})
-        self._put(name, spec, [plane for _, _, planes in columns for plane in planes])
+        spec |= {
+            "order": [column.order for column in columns],
+            "width": [len(column.planes) for column in columns],
+            "wide": any(column.wide for column in columns),
+        } | ({"plus": list(plus)} if plus else {})
+        self._put(name, spec, [plane for column in columns for plane in column.planes])
         return name
 
     def raw(self, name: str, values: npt.ArrayLike, dtype: str) -> str:
@@ -137,7 +140,7 @@ def _deflated(data: bytes) -> bytes:
     return stream.compress(data) + stream.flush(zlib.Z_FULL_FLUSH)
 
 
-def _small(whole: Whole) -> Small | Whole:
+def _small(whole: npt.NDArray[np.int64]) -> npt.NDArray[Any]:
     """Whole numbers in half the memory, where they fit."""
     small = whole.astype(np.int32)
     return small if (small == whole).all() else whole

@@ -15,37 +15,36 @@
     return new Uint8Array(await new Response(stream).arrayBuffer());
   }
 
-  // The column j of whole numbers as they are stored: planes of bytes, the lowest first, from `at`. 2 r stands for r, and
-  // -2 r - 1 for a negative one. Sums are integers in float64: exact, also beyond the range of int32.
+  // The column j of whole numbers: planes of bytes from `at`, the lowest first. 2 r stands for r, and -2 r - 1 for a negative
+  // one. Sums are integers in float64: exact, also beyond the range of int32.
   function undifference(out, j, {n, c}, bytes, at, width, order) {
-    const [p0, p1, p2, p3] = [0, 1, 2, 3].map(k => (k < width ? bytes.subarray(at + k * n, at + (k + 1) * n) : null));
+    const [p0, p1, p2, p3] = [0, 1, 2, 3].map(k => bytes.subarray(at + k * n, at + (k + 1) * n));
     let first = 0,
       second = 0,
       third = 0;
     for (let i = 0, o = j; i < n; i++, o += c) {
-      let z = width ? p0[i] : 0;
+      let z = width ? p0[i] : 0,
+        r;
       if (width > 1) z |= p1[i] << 8;
       if (width > 2) z |= p2[i] << 16;
-      let r;
       if (width < 4) r = (z >>> 1) ^ -(z & 1);
       else {
-        let wide = (z | (p3[i] << 24)) >>> 0;
-        for (let k = 4; k < width; k++) wide += bytes[at + k * n + i] * 2 ** (8 * k);
-        r = wide % 2 ? -(wide + 1) / 2 : wide / 2;
+        z = (z | (p3[i] << 24)) >>> 0;
+        for (let k = 4; k < width; k++) z += bytes[at + k * n + i] * 2 ** (8 * k);
+        r = z % 2 ? -(z + 1) / 2 : z / 2;
       }
       out[o] =
         order === 0 ? r : order === 1 ? (first += r) : order === 2 ? (first += second += r) : (first += second += third += r);
     }
-    return at + width * n;
   }
 
-  // Whole numbers of steps `q`; `plus` are arrays whose values are added.
+  // (n, c) values in steps `q`, row by row; `plus` are arrays whose values are added. Numbers of things are an Int32Array.
   function quantised(spec, bytes, plus) {
     const {n, c, q, order, width} = spec,
       m = n * c,
-      out = new Float64Array(m);
-    for (let j = 0, at = spec.off; j < c; j++) at = undifference(out, j, spec, bytes, at, width[j], order[j]);
-    const steps = Math.round(1 / q); // a power of ten: dividing by it gives the double nearest the decimal value
+      steps = Math.round(1 / q), // a power of ten: dividing by it gives the double nearest the decimal value
+      out = steps > 1 || plus.length || spec.wide ? new Float64Array(m) : new Int32Array(m);
+    for (let j = 0, at = spec.off; j < c; at += width[j++] * n) undifference(out, j, spec, bytes, at, width[j], order[j]);
     for (const other of plus) for (let k = 0; k < m; k++) out[k] += Math.round(other[k] * steps);
     if (steps > 1) for (let k = 0; k < m; k++) out[k] /= steps;
     return out;
