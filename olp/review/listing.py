@@ -95,8 +95,7 @@ def _picture(match: re.Match[str]) -> str:
 def aligned(nominal: Program, corrected: Program, groups: Index, samples: Samples) -> Listing:
     """Both texts, their lines paired: by the moves that they make, and between those by their text."""
     first, second = shown(nominal.data), shown(corrected.data)
-    mine, theirs = _anchors(nominal, corrected, groups)
-    rows = _pairs(first, second, mine, theirs, nominal.lines, corrected.lines)
+    rows = _pairs(nominal, corrected, *_anchors(nominal, corrected, groups))
     last = _last(nominal.toolpath.line[samples.move], first)
     return Listing(first, second, *rows, last, _last(corrected.toolpath.line[samples.part], second))
 
@@ -122,41 +121,27 @@ def _anchors(nominal: Program, corrected: Program, groups: Index) -> tuple[Index
     return mine[rising], theirs[rising]
 
 
-def _pairs(
-    first: str, second: str, mine: Index, theirs: Index, count: int, other: int
-) -> tuple[Small, Small]:
+def _pairs(nominal: Program, corrected: Program, mine: Index, theirs: Index) -> tuple[Small, Small]:
     """Rows of line numbers from 1: lines between anchors are paired where both texts have as many."""
+    count, other = len(nominal.line_start), len(corrected.line_start)
     begin = np.concatenate(([0], mine + 1))
     begin_other = np.concatenate(([0], theirs + 1))
     gap = np.append(mine, count) - begin
     gap_other = np.append(theirs, other) - begin_other
     inserted: list[int] = []
     left_out: list[int] = []
-    uneven = np.flatnonzero(gap != gap_other).tolist()
-    if uneven:
-        lines, others = _Cut(first), _Cut(second)
-        for k in uneven:
-            a, b = int(begin[k]), int(begin_other[k])
-            some, more = lines.take(a, int(gap[k])), others.take(b, int(gap_other[k]))
-            inserted += (b + i for i in _without_partner(some, more))
-            left_out += (a + i for i in _without_partner(more, some))
+    for k in np.flatnonzero(gap != gap_other).tolist():
+        a, b = int(begin[k]), int(begin_other[k])
+        some, more = _lines(nominal, a, int(gap[k])), _lines(corrected, b, int(gap_other[k]))
+        inserted += (b + i for i in _without_partner(some, more))
+        left_out += (a + i for i in _without_partner(more, some))
     return _woven(count, other, np.array(inserted, np.int64), np.array(left_out, np.int64))
 
 
-class _Cut:
-    """A text of which some lines are wanted."""
-
-    def __init__(self, text: str) -> None:
-        self.data = text.encode()
-        feeds = np.flatnonzero(np.frombuffer(self.data, np.uint8) == _LINE_FEED)
-        self.ends = np.append(feeds, len(self.data))
-
-    def take(self, first: int, count: int) -> list[bytes]:
-        """Some lines, the first counted from 0."""
-        if not count:
-            return []
-        begin = int(self.ends[first - 1]) + 1 if first else 0
-        return self.data[begin : int(self.ends[first + count - 1])].split(b"\n")
+def _lines(program: Program, first: int, count: int) -> list[bytes]:
+    """Some lines of a text, the first counted from 0."""
+    begin, end = (some[first : first + count].tolist() for some in (program.line_start, program.line_end))
+    return [bytes(program.data[a:b]) for a, b in zip(begin, end, strict=True)]
 
 
 def _without_partner(some: list[bytes], more: list[bytes]) -> Iterator[int]:
@@ -171,20 +156,19 @@ def _without_partner(some: list[bytes], more: list[bytes]) -> Iterator[int]:
 
 
 def _woven(count: int, other: int, inserted: Index, left_out: Index) -> tuple[Small, Small]:
-    """Rows of all lines: one per pair, and one per line without a partner."""
-    single = np.zeros(count, bool)
-    single[left_out] = True
-    single_other = np.zeros(other, bool)
-    single_other[inserted] = True
-    # the order of rows is that of the pairs before them
-    key = np.cumsum(~single) - ~single
-    key_other = np.cumsum(~single_other) - ~single_other
-    own = np.flatnonzero(single)
-    place = np.concatenate((key[~single], key[own], key_other[inserted]))
-    kind = np.concatenate(
-        (np.full(int((~single).sum()), 2), np.zeros(len(own), int), np.ones(len(inserted), int))
-    )
-    line = np.concatenate((np.flatnonzero(~single) + 1, own + 1, np.zeros(len(inserted), int)))
-    line_other = np.concatenate((np.flatnonzero(~single_other) + 1, np.zeros(len(own), int), inserted + 1))
-    order = np.lexsort((kind, place))
-    return line[order].astype(np.int32), line_other[order].astype(np.int32)
+    """Rows of all lines: one per pair, and one per line without a partner. Before a pair are first the lines
+    that were left out since the pair before it, then those that were inserted."""
+    paired = np.ones(count, bool)
+    paired[left_out] = False
+    paired_other = np.ones(other, bool)
+    paired_other[inserted] = False
+    # how many pairs are before each single line
+    before, before_other = left_out - np.arange(len(left_out)), inserted - np.arange(len(inserted))
+    pair = np.arange(count - len(left_out))
+    row = pair + np.searchsorted(before, pair, "right") + np.searchsorted(before_other, pair, "right")
+    line, line_other = np.zeros((2, count + len(inserted)), np.int32)
+    line[row] = np.flatnonzero(paired) + 1
+    line_other[row] = np.flatnonzero(paired_other) + 1
+    line[left_out + np.searchsorted(before_other, before, "left")] = left_out + 1
+    line_other[inserted + np.searchsorted(before, before_other, "right")] = inserted + 1
+    return line, line_other

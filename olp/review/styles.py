@@ -43,11 +43,16 @@ class Written:
 
     def styles(self, column: int) -> tuple[list[Style], Whole]:
         """Styles of a column, the usual one first, and (k,) the style of each number."""
-        usual = self._usual(column)
-        own = np.column_stack((self.decimals, self._least(), self.point))[~self._as(usual)]
+        natural, kept = self._natural(), self._kept()
+        # a number that tells how many digits its column has before the point
+        telling = (self.whole > natural) | (natural == 0)
+        usual = self._usual(column, kept, self.whole[telling])
+        odd = np.flatnonzero(~self._as(usual, natural, kept))
+        least = np.where(telling[odd], self.whole[odd], 1)
+        own = np.column_stack((self.decimals[odd], least, self.point[odd]))
         forms, which = np.unique(own, axis=0, return_inverse=True)
         style = np.zeros(len(self.value), np.int64)
-        style[~self._as(usual)] = 1 + which.reshape(-1)
+        style[odd] = 1 + which.reshape(-1)
         others = [Style(column, d, least, False, bool(point)) for d, least, point in forms.tolist()]
         return [usual, *others], style
 
@@ -56,34 +61,28 @@ class Written:
         before = np.abs(self.value) // 10**self.most
         return np.asarray(np.searchsorted(10 ** np.arange(DIGITS_MOST), before, "right"))
 
-    def _least(self) -> Whole:
-        """(k,) the least digits before the point that a number of its form has."""
-        natural = self._natural()
-        return np.where((self.whole > natural) | (natural == 0), self.whole, 1)
-
     def _kept(self) -> Whole:
         """(k,) decimals without the zeros at the end."""
         kept = np.full(len(self.value), self.most)
+        rows = np.arange(len(self.value))
         for k in range(1, self.most + 1):
-            kept[self.value % 10**k == 0] = self.most - k
+            rows = rows[self.value[rows] % 10**k == 0]
+            kept[rows] = self.most - k
         return kept
 
-    def _usual(self, column: int) -> Style:
-        """The style of most of the numbers."""
-        kept = self._kept()
+    def _usual(self, column: int, kept: Whole, telling: Whole) -> Style:
+        """The style of most of the numbers; `telling` are digits before the point."""
         trim = int((self.decimals == kept).sum()) > int((self.decimals == self.most).sum())
         bare = self.decimals == 0
         point = bool(bare.any() and 2 * self.point[bare].sum() > bare.sum())
-        natural = self._natural()
-        telling = (self.whole > natural) | (natural == 0)
-        least = int(np.bincount(self.whole[telling]).argmax()) if telling.any() else 1
+        least = int(np.bincount(telling).argmax()) if telling.size else 1
         return Style(column, self.most, least, trim, point)
 
-    def _as(self, style: Style) -> Mask:
+    def _as(self, style: Style, natural: Whole, kept: Whole) -> Mask:
         """(k,) whether a number is written in a style."""
-        decimals = self._kept() if style.trim else np.full(len(self.value), style.decimals)
-        whole = np.maximum(self._natural(), style.least)
+        decimals = kept if style.trim else np.full(len(self.value), style.decimals)
+        whole = np.maximum(natural, style.least)
         # a number has a digit
-        whole = np.where((whole == 0) & (decimals == 0), 1, whole)
+        whole[(whole == 0) & (decimals == 0)] = 1
         point = (decimals > 0) | style.point
         return np.asarray((self.decimals == decimals) & (self.whole == whole) & (self.point == point))
