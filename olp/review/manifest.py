@@ -155,7 +155,7 @@ def _metrics(scene: Scene, arrays: Arrays) -> list[dict[str, Any]]:
     for name, size in scene.sources:
         value = size * UM_PER_MM
         step = resolution(float(value.max(initial=0.0)), _FINEST_UM, _SOURCE_LEVELS)
-        array = arrays.quantised(f"source:{name}", value, step)
+        array = arrays.bent(f"source:{name}", value, step)
         metrics.append(
             {
                 "name": f"source:{name}", "label": f"share of {name}", "unit": "um", "kind": "sequential",
@@ -172,7 +172,7 @@ def _uncertainty(scene: Scene, arrays: Arrays) -> Iterator[dict[str, Any]]:
         return
     band = uncertainty.band_mm * UM_PER_MM
     step = resolution(float(band.max(initial=0.0)), _FINEST_UM, _SOURCE_LEVELS)
-    array = arrays.quantised("band", band, step)
+    array = arrays.bent("band", band, step)
     yield {
         "name": "band", "label": "uncertainty (k = 2)", "unit": "um", "kind": "sequential",
         "by_layer": dict.fromkeys(("uncorrected", "corrected"), array), "judged": False,

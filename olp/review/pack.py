@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.review.integers import Coded
+from olp.review.knots import knots
 from olp.review.lines import FIRST_STYLE, NM_PER_MM, Lines, Positions
 from olp.review.tokens import MARK, Small
 
@@ -52,8 +53,7 @@ class Arrays:
         self, name: str, values: npt.ArrayLike, step: float, *, plus: Sequence[str] = (), keep: bool = False
     ) -> str:
         """Store (n,) or (n, c) finite values in integer steps (a power of ten), minus the values of the
-        arrays `plus`. With `keep` the array can be named in a later `plus`, or predict a text. Returns the
-        name.
+        arrays `plus`. With `keep` a later array can name it, and it can predict a text. Returns the name.
 
         Raises CannotCompute for values of 2^48 steps or more.
         """
@@ -76,6 +76,16 @@ class Arrays:
             "wide": any(column.wide for column in columns),
         } | ({"plus": list(plus)} if plus else {})
         self._put(name, spec, [plane for column in columns for plane in column.planes])
+        return name
+
+    def bent(self, name: str, values: npt.ArrayLike, step: float) -> str:
+        """Store (n,) finite values by knots in steps, straight between them over the rows, within a step."""
+        rows = np.asarray(values, float)
+        at = knots(rows, step)
+        self.specs[name] = {
+            "enc": "bent", "n": len(rows), "at": self.quantised(f"{name}_at", at, 1.0),
+            "knots": self.quantised(f"{name}_knots", rows[at], step),
+        }  # fmt: skip
         return name
 
     def raw(self, name: str, values: npt.ArrayLike, dtype: str) -> str:

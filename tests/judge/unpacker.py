@@ -74,6 +74,9 @@ def decoded(specs: dict[str, Any], raw: bytes, name: str) -> Any:
     spec = specs[name]
     if spec["enc"] == "lines":
         return _filled_in(specs, raw, spec)
+    if spec["enc"] == "bent":
+        at, knots = (decoded(specs, raw, spec[key]) for key in ("at", "knots"))
+        return np.interp(np.arange(spec["n"]), at, knots) if spec["n"] else np.zeros(0)
     if spec["enc"] == "text":
         lines = raw[spec["off"] : spec["off"] + spec["bytes"]].decode().split("\n")
         assert len(lines) == spec["n"]

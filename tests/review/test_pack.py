@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from judge.unpacker import decoded
 
 from olp.core.errors import CannotCompute
+from olp.review import knots
 from olp.review.pack import DEVIATION_MM, POSITION_MM, TIME_S, Arrays, resolution
 
 TEN_METRES = 10_000.0
@@ -84,6 +85,34 @@ def test_what_is_smooth_is_stored_in_few_bytes() -> None:
     assert arrays.specs["v"]["order"][1] == 2 or arrays.specs["v"]["order"][1] == 1
     assert arrays.specs["v"]["width"] == [1, 1, 0]
     assert len(arrays.deflated()) < 200
+
+
+#: Straight stretches, with jumps between them
+CURVES = st.lists(
+    st.builds(np.linspace, st.floats(-1e3, 1e3), st.floats(-1e3, 1e3), st.integers(1, 400)),
+    min_size=1,
+    max_size=12,
+).map(np.concatenate)
+
+
+@given(CURVES, st.sampled_from([1e-3, 0.1, 1.0]), st.integers(1, 300))
+def test_a_curve_by_its_knots_is_within_a_step(values: np.ndarray, step: float, band: int) -> None:
+    arrays = Arrays()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(knots, "_APART", 16)
+        patch.setattr(knots, "_BAND", 16 * band)
+        arrays.bent("v", values, step)
+    assert np.abs(unpacked(arrays, "v") - values).max() <= step * (1 + 1e-9)
+
+
+def test_a_straight_curve_has_a_knot_every_256_rows() -> None:
+    arrays = Arrays()
+    arrays.bent("v", np.arange(1000.0), 1.0)
+    assert unpacked(arrays, "v_at").tolist() == [0, 256, 512, 768, 999]
+    arrays.bent("spike", np.where(np.arange(1000) == 300, 50.0, 0.0), 1.0)
+    assert unpacked(arrays, "spike")[299:302].tolist() == [0.0, 50.0, 0.0]
+    arrays.bent("nothing", [], 1.0)
+    assert unpacked(arrays, "nothing").tolist() == []
 
 
 @given(TEXTS)

@@ -30,7 +30,7 @@ UNPACK = """async ([specs, text]) => {
   const arrays = await OLP.unpack({schema: "olp-review-1", arrays: specs}, text);
   const all = name => Array.from({length: arrays.get(name).n}, (_, i) => arrays.get(name).line(i));
   return Object.fromEntries(Object.entries(specs).filter(([, s]) => s.enc !== "raw").map(
-    ([name, s]) => [name, s.enc === "qd" ? Array.from(arrays.get(name)) : all(name)]));
+    ([name, s]) => [name, ["qd", "bent"].includes(s.enc) ? Array.from(arrays.get(name)) : all(name)]));
 }"""
 
 
@@ -72,6 +72,19 @@ def test_quantised_values_come_back_exactly(page: Any) -> None:
     result = unpacked(page, arrays)
     for name, values, digits in (("P", base, 4), ("d", delta, 6), ("sum", delta + 1e-3, 6)):
         assert result[name] == [float(f"{v:.{digits}f}") + 0.0 for v in values.ravel()]
+
+
+def test_curves_come_back_from_their_knots(page: Any) -> None:
+    x = np.arange(3000)
+    curve = 40.0 * np.sin(x / 90.0) + np.where(x == 1234, 7.0, 0.0)
+    arrays = Arrays()
+    arrays.bent("curve", curve, 0.01)
+    arrays.bent("one", [3.0], 0.01)
+    arrays.bent("none", [], 0.01)
+    result = unpacked(page, arrays)
+    assert np.abs(np.array(result["curve"]) - curve).max() <= 0.01
+    assert len(result["curve_at"]) < 1500
+    assert (result["one"], result["none"]) == ([3.0], [])
 
 
 def test_every_line_of_every_dialect_comes_back(page: Any, monkeypatch: pytest.MonkeyPatch) -> None:

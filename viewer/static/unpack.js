@@ -50,6 +50,16 @@
     return out;
   }
 
+  // n values by knots at some rows, straight between them.
+  function straight(n, at, knots) {
+    const out = new Float64Array(n);
+    for (let k = 0; k + 1 < at.length; k++)
+      for (let i = at[k]; i < at[k + 1]; i++)
+        out[i] = knots[k] + ((i - at[k]) / (at[k + 1] - at[k])) * (knots[k + 1] - knots[k]);
+    if (n) out[n - 1] = knots[at.length - 1];
+    return out;
+  }
+
   // Lines of a text, decoded one at a time: a listing of a million lines never becomes a million strings.
   class Lines {
     constructor(bytes, n) {
@@ -135,6 +145,7 @@
           (spec.plus ?? []).map(name => this.get(name)),
         );
       if (spec.enc === "raw") return new TYPES[spec.dtype](this.bytes.buffer, this.bytes.byteOffset + spec.off, spec.n * spec.c);
+      if (spec.enc === "bent") return straight(spec.n, this.get(spec.at), this.get(spec.knots));
       if (spec.enc === "lines") return new Coded(this, spec);
       if (spec.enc === "text") return new Lines(this.bytes.subarray(spec.off, spec.off + spec.bytes), spec.n);
       throw new Error(`unknown encoding ${spec.enc}`);
