@@ -59,8 +59,8 @@ def manifest_of(scene: Scene) -> tuple[dict[str, Any], Arrays]:
     row = scene.listing.row_of(scene.nominal.toolpath.line[scene.samples.move].astype(np.int64))
     arrays.quantised("line", row, 1.0)
     arrays.raw("rapid", _rapid(scene), "u1")
-    arrays.quantised("t", scene.time_s, TIME_S)
-    arrays.quantised("s", scene.samples.arc_mm, ARC_MM)
+    arrays.along("t", scene.time_s, TIME_S, "P")
+    arrays.along("s", scene.samples.arc_mm, ARC_MM, "P")
     manifest = {
         "schema": "olp-review-1",
         "title": f"{scene.name} on {scene.machine.name}",

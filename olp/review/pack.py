@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.review.integers import Coded
-from olp.review.knots import knots
+from olp.review.knots import knots, lengths, straight
 from olp.review.lines import FIRST_STYLE, NM_PER_MM, Lines, Positions
 from olp.review.tokens import MARK, Small
 
@@ -34,6 +34,8 @@ ARC_MM = 1e-3
 _ALIGN = 8
 #: Types of arrays that are stored as they are.
 _TYPES = {"f4": "<f4", "u4": "<u4", "u1": "u1"}
+#: Steps within which values are straight between two knots over the length of a path.
+_NEAR = 20
 #: Level of zlib: bytes of differences gain little from more.
 _LEVEL = 6
 
@@ -81,10 +83,25 @@ class Arrays:
     def bent(self, name: str, values: npt.ArrayLike, step: float) -> str:
         """Store (n,) finite values by knots in steps, straight between them over the rows, within a step."""
         rows = np.asarray(values, float)
-        at = knots(rows, step)
+        at = knots(rows, np.rint(rows / step) * step, np.arange(len(rows), dtype=float), step)
         self.specs[name] = {
             "enc": "bent", "n": len(rows), "at": self.quantised(f"{name}_at", at, 1.0),
             "knots": self.quantised(f"{name}_knots", rows[at], step),
+        }  # fmt: skip
+        return name
+
+    def along(self, name: str, values: npt.ArrayLike, step: float, path: str) -> str:
+        """As `quantised`, for (n,) values that are almost straight over the length of the kept array `path`
+        (n, 3): their differences from what is straight between knots."""
+        whole = np.rint(np.asarray(values, float) * round(1.0 / step))
+        length = lengths(self._kept[path][0])
+        at = knots(whole, whole, length, _NEAR)
+        rest = whole - np.floor(straight(whole[at], at, length) + 0.5)
+        self.specs[name] = {
+            "enc": "along", "n": len(whole), "q": step, "path": path,
+            "at": self.quantised(f"{name}_at", at, 1.0),
+            "knots": self.quantised(f"{name}_knots", whole[at], 1.0),
+            "rest": self.quantised(f"{name}_rest", rest, 1.0),
         }  # fmt: skip
         return name
 

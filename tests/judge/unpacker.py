@@ -6,9 +6,10 @@ import base64
 import json
 import math
 import zlib
+from bisect import bisect_right
 from decimal import Decimal
 from html.parser import HTMLParser
-from itertools import accumulate
+from itertools import accumulate, pairwise
 from typing import Any
 
 import numpy as np
@@ -77,6 +78,8 @@ def decoded(specs: dict[str, Any], raw: bytes, name: str) -> Any:
     if spec["enc"] == "bent":
         at, knots = (decoded(specs, raw, spec[key]) for key in ("at", "knots"))
         return np.interp(np.arange(spec["n"]), at, knots) if spec["n"] else np.zeros(0)
+    if spec["enc"] == "along":
+        return np.array(_along(specs, raw, spec)) / round(1 / spec["q"])
     if spec["enc"] == "text":
         lines = raw[spec["off"] : spec["off"] + spec["bytes"]].decode().split("\n")
         assert len(lines) == spec["n"]
@@ -90,6 +93,26 @@ def decoded(specs: dict[str, Any], raw: bytes, name: str) -> Any:
         whole = np.array(integers(specs, raw, spec), dtype=object).reshape(c, n).T
         column = np.array(whole / round(1 / spec["q"]), float).reshape(n, c)
     return column[:, 0] if c == 1 else column
+
+
+def _along(specs: dict[str, Any], raw: bytes, spec: dict[str, Any]) -> list[float]:
+    """Whole steps by knots over the length of a path, row by row."""
+    at, knots, rest = (integers(specs, raw, specs[spec[key]]) for key in ("at", "knots", "rest"))
+    n, place = spec["n"], integers(specs, raw, specs[spec["path"]])
+    points = list(zip(place[:n], place[n : 2 * n], place[2 * n :], strict=True))
+    steps = [
+        math.sqrt(sum(float(b - a) ** 2 for a, b in zip(p, q, strict=True))) for p, q in pairwise(points)
+    ]
+    length = list(accumulate(steps, initial=0.0))
+    values = []
+    for i in range(n):
+        k = bisect_right(at, i) - 1
+        guess = float(knots[k])
+        if k + 1 < len(at) and length[at[k + 1]] > length[at[k]]:
+            share = (length[i] - length[at[k]]) / (length[at[k + 1]] - length[at[k]])
+            guess += share * (knots[k + 1] - knots[k])
+        values.append(math.floor(guess + 0.5) + float(rest[i]))
+    return values
 
 
 def integers(specs: dict[str, Any], raw: bytes, spec: dict[str, Any]) -> list[int]:

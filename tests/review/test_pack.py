@@ -115,6 +115,33 @@ def test_a_straight_curve_has_a_knot_every_256_rows() -> None:
     assert unpacked(arrays, "nothing").tolist() == []
 
 
+@given(st.integers(0, 2**32), st.integers(1, 400), st.sampled_from([0.0, 1e-3, 10.0]))
+def test_values_over_the_length_of_a_path_come_out_to_half_a_step(seed: int, n: int, wild: float) -> None:
+    """Also where the path rests, and where they are not straight at all."""
+    rng = np.random.default_rng(seed)
+    path = np.cumsum(rng.normal(0.0, 2.0, (n, 3)) * rng.integers(0, 2, (n, 1)), axis=0)
+    size = np.linalg.norm(np.diff(path, axis=0, prepend=path[:1]), axis=1)
+    values = np.cumsum(size / rng.choice([20.0, 50.0])) + np.cumsum(wild * rng.random(n))
+    arrays = Arrays()
+    arrays.quantised("P", path, POSITION_MM, keep=True)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(knots, "_APART", 16)
+        patch.setattr(knots, "_BAND", 64)
+        arrays.along("t", values, TIME_S, "P")
+    assert np.abs(unpacked(arrays, "t") - values).max() <= TIME_S / 2 + 1e-9
+
+
+def test_times_at_a_constant_feed_cost_nothing() -> None:
+    rng = np.random.default_rng(1)
+    path = np.round(np.cumsum(rng.normal(0.0, 2.0, (5000, 3)), axis=0), 4)
+    size = np.linalg.norm(np.diff(path, axis=0, prepend=path[:1]), axis=1)
+    arrays = Arrays()
+    arrays.quantised("P", path, POSITION_MM, keep=True)
+    arrays.along("t", np.cumsum(size) / 20.0, TIME_S, "P")
+    assert np.abs(unpacked(arrays, "t_rest")).max() <= 1.0
+    assert len(unpacked(arrays, "t_at")) == 21
+
+
 @given(TEXTS)
 def test_texts_come_out_to_the_letter(text: str) -> None:
     arrays = Arrays()

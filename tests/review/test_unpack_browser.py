@@ -29,8 +29,9 @@ LINES = """name => {
 UNPACK = """async ([specs, text]) => {
   const arrays = await OLP.unpack({schema: "olp-review-1", arrays: specs}, text);
   const all = name => Array.from({length: arrays.get(name).n}, (_, i) => arrays.get(name).line(i));
-  return Object.fromEntries(Object.entries(specs).filter(([, s]) => s.enc !== "raw").map(
-    ([name, s]) => [name, ["qd", "bent"].includes(s.enc) ? Array.from(arrays.get(name)) : all(name)]));
+  const written = spec => ["text", "lines"].includes(spec.enc);
+  return Object.fromEntries(Object.entries(specs).map(
+    ([name, spec]) => [name, written(spec) ? all(name) : Array.from(arrays.get(name))]));
 }"""
 
 
@@ -72,6 +73,17 @@ def test_quantised_values_come_back_exactly(page: Any) -> None:
     result = unpacked(page, arrays)
     for name, values, digits in (("P", base, 4), ("d", delta, 6), ("sum", delta + 1e-3, 6)):
         assert result[name] == [float(f"{v:.{digits}f}") + 0.0 for v in values.ravel()]
+
+
+def test_times_over_the_length_of_a_path_come_back_exactly(page: Any) -> None:
+    rng = np.random.default_rng(7)
+    path = np.cumsum(rng.normal(0.0, 2.0, (5000, 3)) * rng.integers(0, 2, (5000, 1)), axis=0)
+    size = np.linalg.norm(np.diff(path, axis=0, prepend=path[:1]), axis=1)
+    times = np.cumsum(size / 30.0) + np.cumsum(rng.random(5000) * rng.integers(0, 2, 5000) * 1e-3)
+    arrays = Arrays()
+    arrays.quantised("P", path, POSITION_MM, keep=True)
+    arrays.along("t", times, 1e-6, "P")
+    assert unpacked(page, arrays)["t"] == [float(f"{t:.6f}") for t in times]
 
 
 def test_curves_come_back_from_their_knots(page: Any) -> None:

@@ -50,13 +50,37 @@
     return out;
   }
 
-  // n values by knots at some rows, straight between them.
-  function straight(n, at, knots) {
+  // n values by knots at some rows, straight between them over x; where x rests they are those of the knot before.
+  function straight(n, at, knots, x) {
     const out = new Float64Array(n);
-    for (let k = 0; k + 1 < at.length; k++)
-      for (let i = at[k]; i < at[k + 1]; i++)
-        out[i] = knots[k] + ((i - at[k]) / (at[k + 1] - at[k])) * (knots[k + 1] - knots[k]);
+    for (let k = 0; k + 1 < at.length; k++) {
+      const [a, b] = [at[k], at[k + 1]],
+        span = x(b) - x(a);
+      for (let i = a; i < b; i++) out[i] = knots[k] + (span > 0 ? (x(i) - x(a)) / span : 0) * (knots[k + 1] - knots[k]);
+    }
     if (n) out[n - 1] = knots[at.length - 1];
+    return out;
+  }
+
+  // (n) lengths along a path of whole steps of size q, in steps.
+  function lengths(P, q) {
+    const steps = Math.round(1 / q),
+      n = P.length / 3,
+      out = new Float64Array(n);
+    for (let i = 1, k = 3, sum = 0; i < n; i++, k += 3) {
+      const x = Math.round(P[k] * steps) - Math.round(P[k - 3] * steps),
+        y = Math.round(P[k + 1] * steps) - Math.round(P[k - 2] * steps),
+        z = Math.round(P[k + 2] * steps) - Math.round(P[k - 1] * steps);
+      out[i] = sum += Math.sqrt(x * x + y * y + z * z);
+    }
+    return out;
+  }
+
+  // Values in steps that are almost straight over the length of a path: `rest` is what they are beyond that.
+  function along({n, q}, at, knots, rest, length) {
+    const out = straight(n, at, knots, i => length[i]),
+      steps = Math.round(1 / q);
+    for (let i = 0; i < n; i++) out[i] = (Math.floor(out[i] + 0.5) + rest[i]) / steps;
     return out;
   }
 
@@ -137,6 +161,11 @@
       if (!this.known.has(name)) this.known.set(name, this.decode(this.specs[name]));
       return this.known.get(name);
     }
+    length(path) {
+      const key = path + "\n"; // no array has such a name
+      if (!this.known.has(key)) this.known.set(key, lengths(this.get(path), this.specs[path].q));
+      return this.known.get(key);
+    }
     decode(spec) {
       if (spec.enc === "qd")
         return quantised(
@@ -145,7 +174,9 @@
           (spec.plus ?? []).map(name => this.get(name)),
         );
       if (spec.enc === "raw") return new TYPES[spec.dtype](this.bytes.buffer, this.bytes.byteOffset + spec.off, spec.n * spec.c);
-      if (spec.enc === "bent") return straight(spec.n, this.get(spec.at), this.get(spec.knots));
+      if (spec.enc === "bent") return straight(spec.n, this.get(spec.at), this.get(spec.knots), i => i);
+      if (spec.enc === "along")
+        return along(spec, this.get(spec.at), this.get(spec.knots), this.get(spec.rest), this.length(spec.path));
       if (spec.enc === "lines") return new Coded(this, spec);
       if (spec.enc === "text") return new Lines(this.bytes.subarray(spec.off, spec.off + spec.bytes), spec.n);
       throw new Error(`unknown encoding ${spec.enc}`);
