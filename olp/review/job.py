@@ -26,7 +26,7 @@ from olp.review.listing import aligned
 from olp.review.manifest import manifest_of
 from olp.review.measured import Matched, Matcher, refuse_unplaced, with_measured
 from olp.review.meshes import Body, of_job, of_machine
-from olp.review.motion import by_feed, retimed
+from olp.review.motion import by_feed, feed_seconds, retimed
 from olp.review.motion import table as motion_table
 from olp.review.page import page
 from olp.review.samples import Samples, by_source, sample
@@ -151,59 +151,50 @@ def run(
         text, nominal = refusals.read(
             session.sources, program, loaded.setup, loaded.dialect, reading, options
         )
-        data = text.data
+        # the words of a long program are large: after this they are not needed
+        seconds = None if options.time else feed_seconds(nominal, loaded.setup.machine)
     if corrected is not None:
         corrected.load()
-        other, corrected_name = corrected.data, corrected.name
+        second: Source | Correction | Run = corrected
+        corrected_name = corrected.name
+    elif correction is not None:
+        second = correction
     else:
-        if correction is None:
-            with program.errors():
-                correction = Correction.of(_corrected(session, data, loaded, options, tell))
-        other = correction.data
-    name = program.name
-    with naming(corrected_name or (f"{name} (corrected)" if name else "")):
-        second = read(other, loaded.setup, loaded.dialect, reading)
-        if correction is not None:
-            proved = _Proved(correction.report, correction.table, correction.groups)
-        else:
-            texts_read = (nominal, name), (second, corrected_name)
-            run = verify_programs(*texts_read, loaded, options, outside="OLP403")
-            proved = _Proved(placed(run.report, nominal.origin), run.table, run.proof.groups)
-        texts = _Texts(program, data, corrected_name, other, nominal, second, proved)
-        shown = _shown(session, texts, loaded, options, progress)
+        # the correction reads the program itself
+        del nominal
+        with program.errors():
+            done = _corrected(session, text.data, loaded, options, tell)
+        second, nominal = done, done.nominal
+        del done
+    with naming(corrected_name or (f"{program.name} (corrected)" if program.name else "")):
+        texts = _proved(program, nominal, second, corrected_name, loaded, options)
+        del second, nominal
+        shown = _shown(session, texts, seconds, loaded, options, progress)
     tell("pack", 0.0)
     return Review(_scene(session, texts, shown, loaded, options, measured))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Proved:
-    """What the correction or its verification says: the report, the table of judgements, and the last
-    corrected move of each nominal one."""
+class _Texts:
+    """The nominal program as shown, unrolled where the call asks for it, and the corrected one, as read; and
+    what the correction or its verification says: the report, the table of judgements, and the last corrected
+    move of each nominal one."""
 
+    source: Source
+    nominal: Program
+    corrected_name: str
+    second: Program
     report: dict[str, Any]
     table: Judgements
     groups: Index
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Texts:
-    """The nominal program as shown, unrolled where the call asks for it, and the corrected one, as bytes and
-    as read, and the proof."""
-
-    source: Source
-    data: bytes
-    corrected_name: str
-    corrected: bytes
-    nominal: Program
-    second: Program
-    proved: _Proved
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class _Shown:
-    """Points along both paths, and the motion where it is planned."""
+    """Points along both paths, (n,) s at which they are reached, and the motion where it is planned."""
 
     samples: Samples
+    moment: Array
     plan: Retiming | None
 
 
@@ -212,35 +203,53 @@ def _corrected(session: Session, data: bytes, loaded: Loaded, options: ViewOptio
     return correct_program(session.sources, session.sources.source(data), loaded, correcting, tell)
 
 
+def _proved(
+    program: Source, nominal: Program, corrected: Source | Correction | Run, name: str, loaded: Loaded,
+    options: ViewOptions,
+) -> _Texts:  # fmt: skip
+    """Both programs with their correction, or with the verification of the corrected one, `name`."""
+    if isinstance(corrected, Run):
+        report = placed(corrected.report, nominal.origin)
+        groups = corrected.proof.groups
+        return _Texts(program, nominal, name, corrected.corrected, report, corrected.table, groups)
+    second = read(corrected.data, loaded.setup, loaded.dialect, Options(contour=options.contour))
+    if isinstance(corrected, Correction):
+        report, table, groups = corrected.report, corrected.table, corrected.groups
+        return _Texts(program, nominal, name, second, report, table, groups)
+    run = verify_programs((nominal, program.name), (second, name), loaded, options, outside="OLP403")
+    report, groups = placed(run.report, nominal.origin), run.proof.groups
+    return _Texts(program, nominal, name, second, report, run.table, groups)
+
+
 def _shown(
-    session: Session, texts: _Texts, loaded: Loaded, options: ViewOptions, progress: Progress | None
-) -> _Shown:
+    session: Session, texts: _Texts, seconds: Array | None, loaded: Loaded, options: ViewOptions,
+    progress: Progress | None,
+) -> _Shown:  # fmt: skip
+    """Samples, with the motion, or with the times at the programmed feed of moves that take `seconds`."""
     (progress or silent)("sample", 0.0)
-    samples = sample(texts.nominal, texts.second, texts.proved.groups, loaded.model, options.step_mm)
-    plan = None
-    if options.time:
-        other = session.sources.source(texts.corrected)
-        # what the proof accepts holds for the motion, also where its stamp is that of sure components alone
-        accept = tuple(texts.proved.report["accepted"])
-        timing = RetimeOptions(contour=options.contour, date=options.date, accept=accept)
-        plan = retime.run(session.of(loaded.setup), other, timing, progress=progress)
-    return _Shown(samples, plan)
+    samples = sample(texts.nominal, texts.second, texts.groups, loaded.model, options.step_mm)
+    if seconds is not None:
+        return _Shown(samples, by_feed(seconds, samples), None)
+    other = session.sources.source(texts.second.data)
+    # what the proof accepts holds for the motion, also where its stamp is that of sure components alone
+    accept = tuple(texts.report["accepted"])
+    timing = RetimeOptions(contour=options.contour, date=options.date, accept=accept)
+    plan = retime.run(session.of(loaded.setup), other, timing, progress=progress)
+    samples, moment = _resting(samples, *retimed(texts.second.toolpath, samples, plan.trajectories))
+    return _Shown(samples, moment, plan)
 
 
 def _scene(
     session: Session, texts: _Texts, shown: _Shown, loaded: Loaded, options: ViewOptions,
     measured: Sequence[PathLike],
 ) -> Scene:  # fmt: skip
-    setup, nominal, plan, samples = loaded.setup, texts.nominal, shown.plan, shown.samples
-    if plan is None:
-        moment = by_feed(nominal, samples, setup.machine)
-    else:
-        samples, moment = _resting(samples, *retimed(texts.second.toolpath, samples, plan.trajectories))
+    setup, nominal, plan = loaded.setup, texts.nominal, shown.plan
+    samples, moment = shown.samples, shown.moment
     frame = Frame.of(nominal.toolpath)
     position = frame.positions(nominal.toolpath, samples.move, samples.axis_mm)
-    report = texts.proved.report
+    report = texts.report
     part_um = loaded.part_tolerance_um(options.part_tolerance_um)
-    table = texts.proved.table
+    table = texts.table
     shown_runs: tuple[Matched, ...] = ()
     digests: tuple[str, ...] = ()
     if measured:
@@ -271,7 +280,7 @@ def _scene(
         motion=None if plan is None else motion_table(plan.trajectories, plan.routes),
         duration_s=float(moment[-1]) if plan is None else plan.duration_s,
         sources=tuple(by_source(nominal.toolpath, samples, loaded.model)),
-        listing=aligned(nominal, texts.second, texts.proved.groups),
+        listing=aligned(nominal, texts.second, texts.groups, samples),
         bodies=bodies,
         measured=shown_runs,
         report=report,
@@ -324,7 +333,7 @@ def _resting(samples: Samples, arrival: Array, leaving: Array) -> tuple[Samples,
 
 def _digest(texts: _Texts, loaded: Loaded, measured: Sequence[str], sources: Sources) -> str:
     """12 digits that change with every input of the page; `measured` are the digests of those files."""
-    parts = (texts.data, texts.corrected, loaded.digest.encode(), repr(loaded.setup).encode())
+    parts = (texts.nominal.data, texts.second.data, loaded.digest.encode(), repr(loaded.setup).encode())
     combined = hashlib.sha256(b"\0".join(parts))
     for digest in measured:
         combined.update(bytes.fromhex(digest))

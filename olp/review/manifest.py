@@ -16,6 +16,7 @@ from olp.proof.proof import Counts
 from olp.reports.report import place
 from olp.review.features.nodes import plain
 from olp.review.judged import judged_lines, measured_names, pictures, removed, statistics
+from olp.review.listing import pictured
 from olp.review.meshes import nodes
 from olp.review.pack import ARC_MM, DEVIATION_MM, POSITION_MM, TIME_S, Arrays, resolution
 from olp.review.palette import COLOURS
@@ -63,8 +64,8 @@ def manifest_of(scene: Scene) -> tuple[dict[str, Any], Arrays]:
     row = scene.listing.row_of(scene.nominal.toolpath.line[scene.samples.move].astype(np.int64))
     arrays.quantised("line", row, 1.0)
     arrays.raw("rapid", _rapid(scene), "u1")
-    arrays.quantised("t", scene.time_s, TIME_S)
-    arrays.quantised("s", scene.samples.arc_mm, ARC_MM)
+    arrays.along("t", scene.time_s, TIME_S, "P")
+    arrays.along("s", scene.samples.arc_mm, ARC_MM, "P")
     manifest = {
         "schema": "olp-review-1",
         "title": f"{scene.name} on {scene.machine.name}",
@@ -170,7 +171,7 @@ def _metrics(scene: Scene, arrays: Arrays) -> list[dict[str, Any]]:
     for name, size in scene.sources:
         value = size * UM_PER_MM
         step = resolution(float(value.max(initial=0.0)), _FINEST_UM, _SOURCE_LEVELS)
-        array = arrays.quantised(f"source:{name}", value, step)
+        array = arrays.bent(f"source:{name}", value, step)
         metrics.append(
             {
                 "name": f"source:{name}", "label": f"share of {name}", "unit": "um", "kind": "sequential",
@@ -187,7 +188,7 @@ def _uncertainty(scene: Scene, arrays: Arrays) -> Iterator[dict[str, Any]]:
         return
     band = uncertainty.band_mm * UM_PER_MM
     step = resolution(float(band.max(initial=0.0)), _FINEST_UM, _SOURCE_LEVELS)
-    array = arrays.quantised("band", band, step)
+    array = arrays.bent("band", band, step)
     yield {
         "name": "band", "label": "uncertainty (k = 2)", "unit": "um", "kind": "sequential",
         "by_layer": dict.fromkeys(("uncorrected", "corrected"), array), "judged": False,
@@ -239,14 +240,11 @@ def _motion(scene: Scene, arrays: Arrays) -> dict[str, Any] | None:
 
 def _listing(scene: Scene, arrays: Arrays) -> dict[str, Any]:
     listing = scene.listing
-    arrays.text("text_nominal", listing.nominal)
-    lines = listing.row_corrected > 0
-    like = np.full(int(listing.row_corrected.max(initial=0)), -1, np.int64)
-    like[listing.row_corrected[lines] - 1] = listing.row_nominal[lines].astype(np.int64) - 1
-    arrays.patch("text_corrected", listing.corrected, "text_nominal", listing.nominal, _resembled(like))
     return {
-        "nominal": "text_nominal",
-        "corrected": "text_corrected",
+        "nominal": arrays.lines("text_nominal", listing.nominal, ["P"], listing.sample_nominal),
+        "corrected": arrays.lines(
+            "text_corrected", listing.corrected, ["P", "d_command"], listing.sample_corrected
+        ),
         "row_nominal": arrays.quantised("row_nominal", listing.row_nominal, 1.0),
         "row_corrected": arrays.quantised("row_corrected", listing.row_corrected, 1.0),
         **_names(scene, arrays),
@@ -259,16 +257,8 @@ def _names(scene: Scene, arrays: Arrays) -> dict[str, Any]:
     name."""
     if scene.nominal.origin is None:
         return {"names": None, "names_width": 0}
-    names = [scene.place(line + 1) for line in range(scene.nominal.lines)]
-    return {"names": arrays.text("line_names", "\n".join(names)), "names_width": max(map(len, names))}
-
-
-def _resembled(like: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
-    """An inserted block resembles the nominal line of the block that it was split from, which comes after
-    it."""
-    known = np.where(like >= 0, np.arange(len(like)), len(like) - 1)
-    after = np.minimum.accumulate(known[::-1])[::-1]
-    return np.asarray(like[after])
+    names = [pictured(scene.place(line + 1)) for line in range(scene.nominal.lines)]
+    return {"names": arrays.lines("line_names", "\n".join(names)), "names_width": max(map(len, names))}
 
 
 def _meshes(scene: Scene, arrays: Arrays, origin: Array) -> Iterator[dict[str, Any]]:

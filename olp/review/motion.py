@@ -189,9 +189,9 @@ def _filled(time: Array) -> Array:
     return np.maximum.accumulate(np.nan_to_num(time, nan=0.0))
 
 
-def by_feed(program: Program, samples: Samples, machine: Machine) -> Array:
-    """(n,) s at which the nominal program reaches each sample, without accelerations: at the programmed feed,
-    or in rapids and without feed at the limits of velocity."""
+def feed_seconds(program: Program, machine: Machine) -> Array:
+    """(n,) s that each move takes without accelerations: at the programmed feed, or in rapids and without
+    feed at the limits of velocity. The program was read with its words."""
     path = program.toolpath
     try:
         feed = timing(program).feed_mm_s
@@ -201,7 +201,11 @@ def by_feed(program: Program, samples: Samples, machine: Machine) -> Array:
     step = np.abs(np.nan_to_num(path.end_mm - path.starts_mm()))
     least = (step / axis_limits(machine).velocity).max(axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
-        seconds = np.fmax(length / feed, least)
+        return np.asarray(np.fmax(length / feed, least))
+
+
+def by_feed(seconds: Array, samples: Samples) -> Array:
+    """(n,) s at which the nominal program reaches each sample, where each move takes as long."""
     before = np.concatenate(([0.0], np.cumsum(seconds)))
     return _filled(before[samples.move] + samples.share * seconds[samples.move])
 

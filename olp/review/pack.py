@@ -1,4 +1,4 @@
-"""Arrays and texts in the encoding of the page: quantised, differenced, in byte planes, deflated, base64.
+"""Arrays and texts in the encoding of the page: whole numbers and templates, deflated, base64.
 
 Positions are exact to half of 0.1 um and deviations to half of 1 nm everywhere on the axis, as integers are
 summed, not floats.
@@ -9,14 +9,17 @@ from __future__ import annotations
 import base64
 import zlib
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.errors import CannotCompute
+from olp.review.integers import Coded
+from olp.review.knots import knots, lengths, straight
+from olp.review.lines import FIRST_STYLE, NM_PER_MM, Lines, Positions
+from olp.review.tokens import MARK, Small
 
 #: Step of stored positions in mm.
 POSITION_MM = 1e-4
@@ -31,150 +34,148 @@ ARC_MM = 1e-3
 _ALIGN = 8
 #: Types of arrays that are stored as they are.
 _TYPES = {"f4": "<f4", "u4": "<u4", "u1": "u1"}
-#: Bytes that one thread deflates at a time, without matches in earlier ones.
-_CHUNK = 1 << 22
-#: Level of zlib: half the time of its default, and 7 % more bytes.
-_LEVEL = 5
+#: Steps within which values are straight between two knots over the length of a path.
+_NEAR = 20
+#: Level of zlib: bytes of differences gain little from more.
+_LEVEL = 6
 
 
 class Arrays:
-    """Named arrays for a page. `specs` states for each how and where it is stored."""
+    """Named arrays for a page, deflated as they come. `specs` states for each how and where it is stored."""
 
     def __init__(self) -> None:
         self.specs: dict[str, dict[str, Any]] = {}
-        self._chunks: list[bytes] = []
         self._size = 0
-        self._integers: dict[str, npt.NDArray[np.int64]] = {}
+        self._sum = 1
+        self._parts: list[Future[bytes]] = []
+        self._threads = ThreadPoolExecutor()
+        self._kept: dict[str, tuple[npt.NDArray[Any], float]] = {}
 
     def quantised(
         self, name: str, values: npt.ArrayLike, step: float, *, plus: Sequence[str] = (), keep: bool = False
     ) -> str:
         """Store (n,) or (n, c) finite values in integer steps (a power of ten), minus the values of the
-        arrays `plus`. With `keep` the array can be named in a later `plus`. Returns the name.
+        arrays `plus`. With `keep` a later array can name it, and it can predict a text. Returns the name.
 
-        Raises CannotCompute where neighbours are so far apart that their difference does not fit.
+        Raises CannotCompute for values of 2^48 steps or more.
         """
-        rows = _rows(np.asarray(values, float))
-        whole = np.rint(rows * round(1.0 / step)).astype(np.int64)
+        rows = _rows(np.asarray(values))
+        spec: dict[str, Any] = {"enc": "qd", "q": step, "n": len(rows), "c": rows.shape[1]}
+        columns: list[Coded] = []
+        kept: list[npt.NDArray[Any]] = []
+        for j in range(rows.shape[1]):
+            whole = np.rint(rows[:, j].astype(float) * round(1.0 / step)).astype(np.int64)
+            if keep:
+                kept.append(_small(whole))
+            for other in plus:
+                whole = whole - self._kept[other][0][:, j]
+            columns.append(Coded.of(name, whole))
         if keep:
-            self._integers[name] = whole
-        for other in plus:
-            whole = whole - self._integers[other]
-        change = np.diff(whole, axis=0, prepend=0)
-        small = change.T.astype("<i4")
-        if (change != small.T).any():
-            raise CannotCompute(
-                f"neighbouring values of {name!r} are too far apart to be stored in steps of {step:g}"
-            )
-        planes = np.ascontiguousarray(small.reshape(-1).view(np.uint8).reshape(-1, 4).T)
-        spec = {"enc": "qd", "q": step, "n": len(rows), "c": rows.shape[1]}
-        self._put(name, spec | ({"plus": list(plus)} if plus else {}), planes.tobytes())
+            self._kept[name] = np.stack(kept, axis=1), step
+        spec |= {
+            "order": [column.order for column in columns],
+            "width": [len(column.planes) for column in columns],
+            "wide": any(column.wide for column in columns),
+        } | ({"plus": list(plus)} if plus else {})
+        self._put(name, spec, [plane for column in columns for plane in column.planes])
+        return name
+
+    def bent(self, name: str, values: npt.ArrayLike, step: float) -> str:
+        """Store (n,) finite values by knots in steps, straight between them over the rows, within a step."""
+        rows = np.asarray(values, float)
+        at = knots(rows, np.rint(rows / step) * step, np.arange(len(rows), dtype=float), step)
+        self.specs[name] = {
+            "enc": "bent", "n": len(rows), "at": self.quantised(f"{name}_at", at, 1.0),
+            "knots": self.quantised(f"{name}_knots", rows[at], step),
+        }  # fmt: skip
+        return name
+
+    def along(self, name: str, values: npt.ArrayLike, step: float, path: str) -> str:
+        """As `quantised`, for (n,) values that are almost straight over the length of the kept array `path`
+        (n, 3): their differences from what is straight between knots."""
+        whole = np.rint(np.asarray(values, float) * round(1.0 / step))
+        length = lengths(self._kept[path][0])
+        at = knots(whole, whole, length, _NEAR)
+        rest = whole - np.floor(straight(whole[at], at, length) + 0.5)
+        self.specs[name] = {
+            "enc": "along", "n": len(whole), "q": step, "path": path,
+            "at": self.quantised(f"{name}_at", at, 1.0),
+            "knots": self.quantised(f"{name}_knots", whole[at], 1.0),
+            "rest": self.quantised(f"{name}_rest", rest, 1.0),
+        }  # fmt: skip
         return name
 
     def raw(self, name: str, values: npt.ArrayLike, dtype: str) -> str:
         """Store (n,) or (n, c) values unchanged."""
         rows = _rows(np.asarray(values))
         data = np.ascontiguousarray(rows, _TYPES[dtype]).tobytes()
-        self._put(name, {"enc": "raw", "dtype": dtype, "n": len(rows), "c": rows.shape[1]}, data)
+        self._put(name, {"enc": "raw", "dtype": dtype, "n": len(rows), "c": rows.shape[1]}, [data])
         return name
 
     def text(self, name: str, text: str) -> str:
         """Store a text of lines."""
         data = text.encode()
-        self._put(name, {"enc": "text", "n": text.count("\n") + 1, "bytes": len(data)}, data)
+        self._put(name, {"enc": "text", "n": text.count("\n") + 1, "bytes": len(data)}, [data])
         return name
 
-    def patch(self, name: str, text: str, of: str, original: str, line: npt.NDArray[np.int64]) -> str:
-        """Store a text as its differences from the text `original`, stored as `of`; (n,) `line` is the line
-        there, counted from 0, that each of its lines resembles, -1 for none."""
-        lines, others = text.split("\n"), original.split("\n")
-        old = ["" if i < 0 else others[i] for i in line.tolist()]
-        prefix, suffix = _in_common(lines, old)
-        middle = "\n".join(
-            [s[p : len(s) - q] for s, p, q in zip(lines, prefix.tolist(), suffix.tolist(), strict=True)]
-        )
-        spec = {
-            "enc": "patch", "n": len(lines), "of": of,
-            "from": self.quantised(f"{name}_from", line, 1.0),
-            "prefix": self.quantised(f"{name}_prefix", prefix, 1.0),
-            "suffix": self.quantised(f"{name}_suffix", suffix, 1.0),
-            "middle": self.text(f"{name}_middle", middle),
+    def lines(self, name: str, text: str, of: Sequence[str] = (), at: Small | None = None) -> str:
+        """Store a text of lines by their templates and numbers. The sum of the arrays `of`, (s, 3) mm, at the
+        samples `at` of its n lines predicts them."""
+        predicted = None
+        if at is not None:
+            terms = tuple((whole, round(step * NM_PER_MM)) for whole, step in map(self._kept.__getitem__, of))
+            predicted = Positions(terms, at)
+        lines = Lines.of(text, predicted)
+        columns = [
+            {"decimals": decimals, "axis": None} if guess is None else {"decimals": decimals, **asdict(guess)}
+            for decimals, guess in zip(lines.decimals, lines.predictions, strict=True)
+        ]
+        self.specs[name] = {
+            "enc": "lines", "n": len(lines.template), "styles": [style.spec() for style in lines.styles],
+            "columns": columns, "of": list(of), "mark": MARK.decode(), "first": FIRST_STYLE,
+            "templates": self.text(f"{name}_templates", "\n".join(lines.templates)),
+            "template": self.quantised(f"{name}_template", lines.template, 1.0),
+            "rest": self.quantised(f"{name}_rest", lines.rest, 1.0),
+            "at": None if at is None else self.quantised(f"{name}_at", at, 1.0),
         }  # fmt: skip
-        self.specs[name] = spec
         return name
 
     def deflated(self) -> bytes:
-        """All arrays as one zlib stream, deflated by several threads."""
-        raw = b"".join(self._chunks)
-        parts = [raw[a : a + _CHUNK] for a in range(0, len(raw), _CHUNK)] or [b""]
-
-        def deflate(k: int) -> bytes:
-            stream = zlib.compressobj(_LEVEL, zlib.DEFLATED, -zlib.MAX_WBITS)
-            last = k == len(parts) - 1
-            return stream.compress(parts[k]) + stream.flush(zlib.Z_FINISH if last else zlib.Z_FULL_FLUSH)
-
-        with ThreadPoolExecutor() as threads:
-            body = b"".join(threads.map(deflate, range(len(parts))))
+        """All arrays as one zlib stream."""
+        stream = zlib.compressobj(_LEVEL, zlib.DEFLATED, -zlib.MAX_WBITS)
+        body = b"".join(part.result() for part in self._parts)
         # RFC 1950: deflate with a window of 32 kB, no dictionary
-        return b"\x78\x9c" + body + zlib.adler32(raw).to_bytes(4, "big")
+        return b"\x78\x9c" + body + stream.flush() + self._sum.to_bytes(4, "big")
 
     def encoded(self) -> bytes:
         """The stream in base64."""
         return base64.b64encode(self.deflated())
 
-    def _put(self, name: str, spec: dict[str, Any], data: bytes) -> None:
+    def _put(self, name: str, spec: dict[str, Any], parts: Sequence[bytes]) -> None:
         self.specs[name] = spec | {"off": self._size}
-        pad = -len(data) % _ALIGN
-        self._chunks.append(data + bytes(pad))
-        self._size += len(data) + pad
+        size = sum(map(len, parts))
+        for part in (*parts, bytes(-size % _ALIGN)):
+            if part:
+                self._sum = zlib.adler32(part, self._sum)
+                self._parts.append(self._threads.submit(_deflated, part))
+        self._size += size + -size % _ALIGN
+
+
+def _deflated(data: bytes) -> bytes:
+    """A part of a stream, without matches in others, that another can follow."""
+    stream = zlib.compressobj(_LEVEL, zlib.DEFLATED, -zlib.MAX_WBITS)
+    return stream.compress(data) + stream.flush(zlib.Z_FULL_FLUSH)
+
+
+def _small(whole: npt.NDArray[np.int64]) -> npt.NDArray[Any]:
+    """Whole numbers in half the memory, where they fit."""
+    small = whole.astype(np.int32)
+    return small if (small == whole).all() else whole
 
 
 def _rows(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
     """(n, c) also of (n,)."""
     return values if values.ndim == 2 else values[:, None]
-
-
-def _in_common(lines: list[str], others: list[str]) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """(n,) numbers of characters that pairs of lines share at the beginning, and at the end without those."""
-    a, b = _Table.of(lines), _Table.of(others)
-    most = np.minimum(a.length, b.length)
-    prefix = np.zeros(len(lines), np.int64)
-    suffix = np.zeros(len(lines), np.int64)
-    for count, backwards in ((prefix, False), (suffix, True)):
-        room = most - prefix
-        active = np.flatnonzero(room > 0)
-        k = 0
-        while active.size:
-            same = a.at(active, k, backwards=backwards) == b.at(active, k, backwards=backwards)
-            active = active[same]
-            count[active] = k = k + 1
-            active = active[room[active] > k]
-    return prefix, suffix
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Table:
-    """Lines as one array of code points; (n,) `start` and `length` of each."""
-
-    code: npt.NDArray[np.uint8] | npt.NDArray[np.uint32]
-    start: npt.NDArray[np.int64]
-    length: npt.NDArray[np.int64]
-
-    @staticmethod
-    def of(lines: list[str]) -> _Table:
-        joined = "".join(lines)
-        if joined.isascii():
-            code = np.frombuffer(joined.encode("ascii"), np.uint8)
-        else:
-            code = np.frombuffer(joined.encode("utf-32-le"), np.uint32)
-        length = np.fromiter(map(len, lines), np.int64, len(lines))
-        return _Table(code, np.cumsum(length) - length, length)
-
-    def at(
-        self, rows: npt.NDArray[np.int64], k: int, *, backwards: bool
-    ) -> npt.NDArray[np.unsignedinteger[Any]]:
-        """(n,) code points number k of lines, from their beginning or from their end."""
-        return np.asarray(self.code[self.start[rows] + (self.length[rows] - 1 - k if backwards else k)])
 
 
 def resolution(peak: float, finest: float, levels: int) -> float:

@@ -25,7 +25,6 @@ class Ends:
     """The moves of a path from end to end; (n,) `arc` index or -1, (n,) `length` in mm."""
 
     path: Toolpath
-    start: Array
     arc: Index
     length: Array
 
@@ -33,12 +32,25 @@ class Ends:
     def of(path: Toolpath) -> Ends:
         arc = np.full(len(path), -1, np.int64)
         arc[path.arcs.move] = np.arange(len(path.arcs))
-        return Ends(path, path.starts_mm(), arc, lengths_mm(path))
+        return Ends(path, arc, lengths_mm(path))
+
+    def start(self, move: Index) -> Array:
+        """(m, 3) axis positions at the start of moves."""
+        start = self.path.end_mm[np.maximum(move - 1, 0)]
+        start[move == 0] = self.path.start_mm
+        return start
 
     def at(self, move: Index, share: Array) -> Array:
         """(m, 3) axis positions at shares of moves; a share of 1 is the end, also with an unknown start."""
+        position = np.empty((len(move), 3))
+        for a in range(0, len(move), BLOCK):
+            rows = slice(a, a + BLOCK)
+            position[rows] = self._at(move[rows], share[rows])
+        return position
+
+    def _at(self, move: Index, share: Array) -> Array:
         end = self.path.end_mm[move]
-        start = self.start[move]
+        start = self.start(move)
         position = start + share[:, None] * (end - start)
         curved = np.flatnonzero((self.arc[move] >= 0) & (share < 1.0))
         if curved.size:
@@ -96,7 +108,8 @@ def _cuts(ends: Ends, other: Ends, owner: Index, groups: Index, shift: Array, mo
     error = error_mm(model, command, tool, move, None if play is None else play[rows])
     nothing = np.zeros(len(rows))
     tip = command + error - held_mm(nominal, shift, move, nothing)
-    start, along = ends.start[move], nominal.end_mm[move] - ends.start[move]
+    start = ends.start(move)
+    along = nominal.end_mm[move] - start
     along += held_mm(nominal, shift, move, nothing + 1.0) - held_mm(nominal, shift, move, nothing)
     with np.errstate(invalid="ignore", divide="ignore"):
         share = np.einsum("ij,ij->i", tip - start, along) / np.einsum("ij,ij->i", along, along)
@@ -122,7 +135,7 @@ def _arc_share(ends: Ends, move: Index, tip: Array, guess: Array) -> Array:
     arcs, which = ends.path.arcs, ends.arc[move]
     rows = np.arange(len(move))
     axes = np.array(PLANES)[arcs.plane[which]]
-    centre, sweep, start = arcs.centre_mm[which], arcs.sweep_rad[which], ends.start[move]
+    centre, sweep, start = arcs.centre_mm[which], arcs.sweep_rad[which], ends.start(move)
 
     def angle(point: Array) -> Array:
         first, second = (point[rows, axes[:, i]] - centre[rows, axes[:, i]] for i in (0, 1))
@@ -136,14 +149,17 @@ def _arc_share(ends: Ends, move: Index, tip: Array, guess: Array) -> Array:
 def set_beside(
     ends: Ends, other: Ends, parts: Parts, move: Index, share: Array, part: Index, within: Array,
     command: Array, result: Array,
-) -> None:  # fmt: skip
+) -> Index:  # fmt: skip
     """Shift commands (n, 3) along their moves, and `within` with them, until the tip is beside its sample.
+    Returns which were shifted.
 
     Equal shares of a move and of its corrected parts are not at the same position. Deviations `result` (n, 3)
     change evenly from the beginning of a part to its end; a difference from that along the path is not a
     deviation of the path.
     """
     rows = np.flatnonzero((within < 1.0) & (within > 0.0) & np.isfinite(other.length[part]))
+    if not rows.size:
+        return rows
     which = part[rows]
     # the last sample of a part is its end
     last = result[np.searchsorted(part, np.arange(len(parts.cut)), "right") - 1]
@@ -157,14 +173,16 @@ def set_beside(
     step = np.nan_to_num(ahead) / np.maximum(other.length[which], 1e-9)
     within[rows] = np.clip(within[rows] - step, 0.0, 1.0)
     command[rows] = other.at(which, within[rows])
+    return rows
 
 
-def set_in_holes(nominal: Program, corrected: Program, move: Index, axis: Array, command: Array) -> None:
+def set_in_holes(nominal: Program, corrected: Program, move: Index, axis: Array, command: Array) -> Index:
     """Strokes of canned cycles: a corrected hole may need one peck more or less, so pecks have no partners;
-    the partner of a point of the stroke is the same point of the corrected hole."""
+    the partner of a point of the stroke is the same point of the corrected hole. Returns the samples of
+    which the command was set."""
     holes = nominal.holes
     if not holes or len(holes) != len(corrected.holes):
-        return
+        return np.zeros(0, np.int64)
     path = nominal.toolpath
     of = np.full(len(path), -1, np.int64)
     for k, hole in enumerate(holes):
@@ -187,6 +205,7 @@ def set_in_holes(nominal: Program, corrected: Program, move: Index, axis: Array,
     there[index, second] += change[:, 1]
     there[index, third] += change[:, 2] + share * (change[:, 3] - change[:, 2])
     command[rows[on]] = there[on]
+    return np.asarray(rows[on])
 
 
 def held_mm(path: Toolpath, shift: Array, move: Index, share: Array) -> Array:

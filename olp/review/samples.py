@@ -94,17 +94,15 @@ def sample(
     parts = Parts.of(ends, other, groups, shift, model)
     steps = _steps(path, model, step_mm)
     move, share, part, within = _merged(steps, parts, start=bool(np.isfinite(path.start_mm).all()))
-    axis = ends.at(move, share)
-    tool = path.tool_mm()
-    held = held_mm(path, shift, move, share)
-    play = plays(model, axis)
-    uncorrected = error_mm(model, axis, tool, move, play) - held
-    command = other.at(part, within)
-    play_there = plays(model, command)
-    result = error_mm(model, command, tool, move, play_there) - held + (command - axis)
-    set_beside(ends, other, parts, move, share, part, within, command, result)
-    set_in_holes(nominal, corrected, move, axis, command)
-    result = error_mm(model, command, tool, move, play_there) - held + (command - axis)
+    axis, command = ends.at(move, share), other.at(part, within)
+    tip = _Tip(model, path, shift)
+    play, play_there = plays(model, axis), plays(model, command)
+    uncorrected = tip.deviation(move, share, axis, axis, play)
+    result = tip.deviation(move, share, axis, command, play_there)
+    beside = set_beside(ends, other, parts, move, share, part, within, command, result)
+    rows = np.union1d(beside, set_in_holes(nominal, corrected, move, axis, command))
+    own = None if play_there is None else play_there[rows]
+    result[rows] = tip.deviation(move[rows], share[rows], axis[rows], command[rows], own)
     # of several samples at one point the last is used: the moves before it took up backlash
     keep = np.ones(len(move), bool)
     keep[:-1] = (np.diff(move) != 0) | (np.diff(share) > 1e-12)
@@ -118,9 +116,28 @@ def sample(
     length = np.nan_to_num(ends.length)
     arc_mm = np.concatenate(([0.0], np.cumsum(length)))[move] + share * length[move]
     every = Samples(move, share, part, within, axis, command, uncorrected, result, started, arc_mm, play)
-    every = every.take(np.flatnonzero(keep))
+    if not keep.all():
+        every = every.take(np.flatnonzero(keep))
     every.joined[0] = False
     return every
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Tip:
+    """The tip of a machine on a path whose part is shifted by `shift` (k, 3) in each frame."""
+
+    model: ErrorModel
+    path: Toolpath
+    shift: Array
+
+    def deviation(self, move: Index, share: Array, axis: Array, command: Array, play: Array | None) -> Array:
+        """(n, 3) distance of the tip at axis positions `command` from its nominal point at `axis`."""
+        tip = error_mm(self.model, command, self.path.tool_mm(), move, play)
+        for a in range(0, len(move), BLOCK):
+            rows = slice(a, a + BLOCK)
+            tip[rows] -= held_mm(self.path, self.shift, move[rows], share[rows])
+            tip[rows] += command[rows] - axis[rows]
+        return tip
 
 
 def by_source(

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import base64
 import json
+import math
 import zlib
+from bisect import bisect_right
+from decimal import Decimal
 from html.parser import HTMLParser
-from itertools import accumulate
+from itertools import accumulate, pairwise
 from typing import Any
 
 import numpy as np
@@ -70,8 +73,13 @@ class Page:
 def decoded(specs: dict[str, Any], raw: bytes, name: str) -> Any:
     """One array of a deflated block, as its entry says."""
     spec = specs[name]
-    if spec["enc"] == "patch":
-        return _patched(specs, raw, spec)
+    if spec["enc"] == "lines":
+        return _filled_in(specs, raw, spec)
+    if spec["enc"] == "bent":
+        at, knots = (decoded(specs, raw, spec[key]) for key in ("at", "knots"))
+        return np.interp(np.arange(spec["n"]), at, knots) if spec["n"] else np.zeros(0)
+    if spec["enc"] == "along":
+        return np.array(_along(specs, raw, spec)) / round(1 / spec["q"])
     if spec["enc"] == "text":
         lines = raw[spec["off"] : spec["off"] + spec["bytes"]].decode().split("\n")
         assert len(lines) == spec["n"]
@@ -82,33 +90,86 @@ def decoded(specs: dict[str, Any], raw: bytes, name: str) -> Any:
         size = np.dtype(_TYPES[spec["dtype"]]).itemsize
         column = np.frombuffer(raw[offset : offset + n * c * size], _TYPES[spec["dtype"]]).reshape(n, c)
     else:
-        whole = np.array(_integers(specs, raw, spec), dtype=object).reshape(c, n).T
+        whole = np.array(integers(specs, raw, spec), dtype=object).reshape(c, n).T
         column = np.array(whole / round(1 / spec["q"]), float).reshape(n, c)
     return column[:, 0] if c == 1 else column
 
 
-def _integers(specs: dict[str, Any], raw: bytes, spec: dict[str, Any]) -> list[int]:
-    """Columns one after the other, summed in Python's own integers."""
-    n, c, offset = spec["n"], spec["c"], spec["off"]
-    planes = [raw[offset + k * n * c : offset + (k + 1) * n * c] for k in range(4)]
-    steps = [int.from_bytes(four, "little", signed=True) for four in zip(*planes, strict=True)]
-    values: list[int] = []
-    for column in range(c):
-        values += accumulate(steps[column * n : (column + 1) * n])
-    for other in spec.get("plus", ()):
-        more = specs[other]
-        assert (more["q"], more["n"], more["c"]) == (spec["q"], n, c)
-        assert "plus" not in more
-        values = [a + b for a, b in zip(values, _integers(specs, raw, more), strict=True)]
+def _along(specs: dict[str, Any], raw: bytes, spec: dict[str, Any]) -> list[float]:
+    """Whole steps by knots over the length of a path, row by row."""
+    at, knots, rest = (integers(specs, raw, specs[spec[key]]) for key in ("at", "knots", "rest"))
+    n, place = spec["n"], integers(specs, raw, specs[spec["path"]])
+    points = list(zip(place[:n], place[n : 2 * n], place[2 * n :], strict=True))
+    steps = [
+        math.sqrt(sum(float(b - a) ** 2 for a, b in zip(p, q, strict=True))) for p, q in pairwise(points)
+    ]
+    length = list(accumulate(steps, initial=0.0))
+    values = []
+    for i in range(n):
+        k = bisect_right(at, i) - 1
+        guess = float(knots[k])
+        if k + 1 < len(at) and length[at[k + 1]] > length[at[k]]:
+            share = (length[i] - length[at[k]]) / (length[at[k + 1]] - length[at[k]])
+            guess += share * (knots[k + 1] - knots[k])
+        values.append(math.floor(guess + 0.5) + float(rest[i]))
     return values
 
 
-def _patched(specs: dict[str, Any], raw: bytes, spec: dict[str, Any]) -> list[str]:
-    of = decoded(specs, raw, spec["of"])
-    columns = [decoded(specs, raw, spec[key]) for key in ("from", "prefix", "suffix", "middle")]
-    rows = []
-    for line, prefix, suffix, middle in zip(*columns, strict=True):
-        old = of[int(line)] if line >= 0 else ""
-        rows.append(old[: int(prefix)] + middle + old[len(old) - int(suffix) :])
-    assert len(rows) == spec["n"]
-    return rows
+def integers(specs: dict[str, Any], raw: bytes, spec: dict[str, Any]) -> list[int]:
+    """Columns one after the other, summed in Python's own integers."""
+    n, at = spec["n"], spec["off"]
+    values: list[int] = []
+    for order, width in zip(spec["order"], spec["width"], strict=True):
+        planes = [raw[at + k * n : at + (k + 1) * n] for k in range(width)]
+        stored = [int.from_bytes(few, "little") for few in zip(*planes, strict=True)] if width else [0] * n
+        column = [-(z + 1) // 2 if z % 2 else z // 2 for z in stored]
+        for _ in range(order):
+            column = list(accumulate(column))
+        values += column
+        at += width * n
+    for other in spec.get("plus", ()):
+        more = specs[other]
+        assert (more["q"], more["n"], more["c"]) == (spec["q"], n, spec["c"])
+        assert "plus" not in more
+        values = [a + b for a, b in zip(values, integers(specs, raw, more), strict=True)]
+    return values
+
+
+def _filled_in(specs: dict[str, Any], raw: bytes, spec: dict[str, Any]) -> list[str]:
+    """Lines from templates, styles, and numbers that positions in whole nm predict."""
+    n, mark, columns = spec["n"], spec["mark"], spec["columns"]
+    templates = decoded(specs, raw, spec["templates"])
+    which = integers(specs, raw, specs[spec["template"]])
+    rest = integers(specs, raw, specs[spec["rest"]])
+    at = integers(specs, raw, specs[spec["at"]]) if spec["at"] else []
+    place = [_nanometres(specs, raw, specs[name]) for name in spec["of"]]
+    samples = len(place[0]) // 3 if place else 0
+
+    def position(line: int, axis: int) -> int:
+        return sum(values[axis * samples + at[line]] for values in place)
+
+    def number(line: int, style: str) -> str:
+        column, decimals, least, trim, point = spec["styles"][ord(style) - spec["first"]]
+        rule = columns[column]
+        value = rest[column * n + line]
+        if rule["axis"] is not None:
+            nm = position(line, rule["axis"])
+            if rule["relative"]:
+                nm -= position(max(line - 1, 0), rule["axis"])
+            value += math.floor(nm / rule["nm"] + 0.5)
+        text = f"{Decimal(abs(value)).scaleb(-rule['decimals']):.{decimals}f}"
+        whole, _, behind = text.partition(".")
+        behind = behind.rstrip("0") if trim else behind
+        whole = whole.lstrip("0").zfill(least) or ("" if behind else "0")
+        return "-" * (value < 0) + whole + "." * bool(behind or point) + behind
+
+    lines = []
+    for line in range(n):
+        first, *parts = templates[which[line]].split(mark)
+        lines.append(first + "".join(number(line, part[0]) + part[1:] for part in parts))
+    return lines
+
+
+def _nanometres(specs: dict[str, Any], raw: bytes, spec: dict[str, Any]) -> list[int]:
+    step = Decimal(repr(spec["q"])) * 1_000_000
+    return [int(value * step) for value in integers(specs, raw, spec)]

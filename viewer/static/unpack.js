@@ -15,25 +15,72 @@
     return new Uint8Array(await new Response(stream).arrayBuffer());
   }
 
-  // Quantised, differenced along each column, byte planes; `plus` are arrays whose values are added. Sums are integers in
-  // float64: exact, also beyond the range of int32.
-  function undifference({n, c, q, off}, bytes, plus) {
-    const m = n * c,
-      out = new Float64Array(m);
-    const p0 = bytes.subarray(off, off + m),
-      p1 = bytes.subarray(off + m, off + 2 * m);
-    const p2 = bytes.subarray(off + 2 * m, off + 3 * m),
-      p3 = bytes.subarray(off + 3 * m, off + 4 * m);
-    const steps = Math.round(1 / q); // a power of ten: dividing by it gives the double nearest the decimal value
-    for (let j = 0, k = 0; j < c; j++) {
-      let sum = 0;
-      for (let i = 0, o = j; i < n; i++, k++, o += c) {
-        sum += p0[k] | (p1[k] << 8) | (p2[k] << 16) | (p3[k] << 24);
-        let whole = sum;
-        for (const other of plus) whole += Math.round(other[o] * steps);
-        out[o] = whole / steps;
+  // The column j of whole numbers: planes of bytes from `at`, the lowest first. 2 r stands for r, and -2 r - 1 for a negative
+  // one. Sums are integers in float64: exact, also beyond the range of int32.
+  function undifference(out, j, {n, c}, bytes, at, width, order) {
+    const [p0, p1, p2, p3] = [0, 1, 2, 3].map(k => bytes.subarray(at + k * n, at + (k + 1) * n));
+    let first = 0,
+      second = 0,
+      third = 0;
+    for (let i = 0, o = j; i < n; i++, o += c) {
+      let z = width ? p0[i] : 0,
+        r;
+      if (width > 1) z |= p1[i] << 8;
+      if (width > 2) z |= p2[i] << 16;
+      if (width < 4) r = (z >>> 1) ^ -(z & 1);
+      else {
+        z = (z | (p3[i] << 24)) >>> 0;
+        for (let k = 4; k < width; k++) z += bytes[at + k * n + i] * 2 ** (8 * k);
+        r = z % 2 ? -(z + 1) / 2 : z / 2;
       }
+      out[o] =
+        order === 0 ? r : order === 1 ? (first += r) : order === 2 ? (first += second += r) : (first += second += third += r);
     }
+  }
+
+  // (n, c) values in steps `q`, row by row; `plus` are arrays whose values are added. Numbers of things are an Int32Array.
+  function quantised(spec, bytes, plus) {
+    const {n, c, q, order, width} = spec,
+      m = n * c,
+      steps = Math.round(1 / q), // a power of ten: dividing by it gives the double nearest the decimal value
+      out = steps > 1 || plus.length || spec.wide ? new Float64Array(m) : new Int32Array(m);
+    for (let j = 0, at = spec.off; j < c; at += width[j++] * n) undifference(out, j, spec, bytes, at, width[j], order[j]);
+    for (const other of plus) for (let k = 0; k < m; k++) out[k] += Math.round(other[k] * steps);
+    if (steps > 1) for (let k = 0; k < m; k++) out[k] /= steps;
+    return out;
+  }
+
+  // n values by knots at some rows, straight between them over x; where x rests they are those of the knot before.
+  function straight(n, at, knots, x) {
+    const out = new Float64Array(n);
+    for (let k = 0; k + 1 < at.length; k++) {
+      const [a, b] = [at[k], at[k + 1]],
+        span = x(b) - x(a);
+      for (let i = a; i < b; i++) out[i] = knots[k] + (span > 0 ? (x(i) - x(a)) / span : 0) * (knots[k + 1] - knots[k]);
+    }
+    if (n) out[n - 1] = knots[at.length - 1];
+    return out;
+  }
+
+  // (n) lengths along a path of whole steps of size q, in steps.
+  function lengths(P, q) {
+    const steps = Math.round(1 / q),
+      n = P.length / 3,
+      out = new Float64Array(n);
+    for (let i = 1, k = 3, sum = 0; i < n; i++, k += 3) {
+      const x = Math.round(P[k] * steps) - Math.round(P[k - 3] * steps),
+        y = Math.round(P[k + 1] * steps) - Math.round(P[k - 2] * steps),
+        z = Math.round(P[k + 2] * steps) - Math.round(P[k - 1] * steps);
+      out[i] = sum += Math.sqrt(x * x + y * y + z * z);
+    }
+    return out;
+  }
+
+  // Values in steps that are almost straight over the length of a path: `rest` is what they are beyond that.
+  function along({n, q}, at, knots, rest, length) {
+    const out = straight(n, at, knots, i => length[i]),
+      steps = Math.round(1 / q);
+    for (let i = 0; i < n; i++) out[i] = (Math.floor(out[i] + 0.5) + rest[i]) / steps;
     return out;
   }
 
@@ -53,23 +100,50 @@
     }
   }
 
-  const points = text => (/[\ud800-\udfff]/.test(text) ? Array.from(text) : text);
-  const joined = part => (typeof part === "string" ? part : part.join(""));
-
-  // Lines of a second text as changes to the lines of a first.
-  class Patch {
+  // Lines of a text by their templates and numbers. A number is what is stored of it and what the positions of samples
+  // predict: the sum of the arrays `of`, in whole steps of 1 nm.
+  class Coded {
     constructor(arrays, spec) {
-      this.n = spec.n;
-      this.base = arrays.get(spec.of);
-      [this.from, this.prefix, this.suffix, this.middle] = [spec.from, spec.prefix, spec.suffix, spec.middle].map(a =>
-        arrays.get(a),
-      );
+      Object.assign(this, {n: spec.n, spec, known: new Map()});
+      [this.templates, this.template, this.rest] = [spec.templates, spec.template, spec.rest].map(name => arrays.get(name));
+      this.at = spec.at === null ? null : arrays.get(spec.at);
+      this.of = spec.of.map(name => arrays.get(name));
     }
+
     line(i) {
       if (i < 0 || i >= this.n) return "";
-      if (this.from[i] < 0) return this.middle.line(i);
-      const old = points(this.base.line(this.from[i]));
-      return joined(old.slice(0, this.prefix[i])) + this.middle.line(i) + joined(old.slice(old.length - this.suffix[i]));
+      const [first, ...parts] = this.parts(this.template[i]);
+      return parts.reduce((text, [style, part]) => text + this.number(i, style) + part, first);
+    }
+
+    // The text of a template before its first number; and for each number its style and the text after it.
+    parts(k) {
+      if (!this.known.has(k)) {
+        const [first, ...parts] = this.templates.line(k).split(this.spec.mark);
+        this.known.set(k, [first, ...parts.map(part => [this.spec.styles[part.charCodeAt(0) - this.spec.first], part.slice(1)])]);
+      }
+      return this.known.get(k);
+    }
+
+    number(i, [k, decimals, least, trim, point]) {
+      const column = this.spec.columns[k],
+        value = this.rest[i * this.spec.columns.length + k] + (column.axis === null ? 0 : this.predicted(i, column)),
+        digits = String(Math.abs(value)).padStart(column.decimals + 1, "0"),
+        before = digits.length - column.decimals;
+      let whole = digits.slice(0, before).replace(/^0+/, "").padStart(least, "0"),
+        rest = digits.slice(before, before + decimals);
+      if (trim) rest = rest.replace(/0+$/, "");
+      if (!whole && !rest) whole = "0";
+      return (value < 0 ? "-" : "") + whole + (rest || point ? "." : "") + rest;
+    }
+
+    predicted(i, {axis, nm, relative}) {
+      const here = this.position(i, axis);
+      return Math.floor((relative ? here - this.position(Math.max(0, i - 1), axis) : here) / nm + 0.5);
+    }
+
+    position(i, axis) {
+      return this.of.reduce((sum, values) => sum + Math.round(values[3 * this.at[i] + axis] * 1e6), 0);
     }
   }
 
@@ -87,15 +161,23 @@
       if (!this.known.has(name)) this.known.set(name, this.decode(this.specs[name]));
       return this.known.get(name);
     }
+    length(path) {
+      const key = path + "\n"; // no array has such a name
+      if (!this.known.has(key)) this.known.set(key, lengths(this.get(path), this.specs[path].q));
+      return this.known.get(key);
+    }
     decode(spec) {
       if (spec.enc === "qd")
-        return undifference(
+        return quantised(
           spec,
           this.bytes,
           (spec.plus ?? []).map(name => this.get(name)),
         );
       if (spec.enc === "raw") return new TYPES[spec.dtype](this.bytes.buffer, this.bytes.byteOffset + spec.off, spec.n * spec.c);
-      if (spec.enc === "patch") return new Patch(this, spec);
+      if (spec.enc === "bent") return straight(spec.n, this.get(spec.at), this.get(spec.knots), i => i);
+      if (spec.enc === "along")
+        return along(spec, this.get(spec.at), this.get(spec.knots), this.get(spec.rest), this.length(spec.path));
+      if (spec.enc === "lines") return new Coded(this, spec);
       if (spec.enc === "text") return new Lines(this.bytes.subarray(spec.off, spec.off + spec.bytes), spec.n);
       throw new Error(`unknown encoding ${spec.enc}`);
     }
