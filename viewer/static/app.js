@@ -252,9 +252,11 @@
       if (!own) return [];
       const [um, state] = [own.um, own.state].map(n => this.arrays.get(n)),
         most = state.some(code => code < 2) ? 1 : 2,
+        counts = row => um[row] > 0 && this.first[row] >= 0 && state[row] <= most,
+        sizes = Float64Array.from(um, (value, row) => (counts(row) ? value : 0)).sort(),
+        least = sizes[Math.max(0, sizes.length - RANKED)],
         rows = [];
-      for (let row = 0; row < um.length; row++)
-        if (um[row] > 0 && this.first[row] >= 0 && state[row] <= most) rows.push({row, value: um[row]});
+      for (let row = 0; row < um.length; row++) if (um[row] >= least && counts(row)) rows.push({row, value: um[row]});
       return rows.sort((p, q) => q.value - p.value || p.row - q.row).slice(0, RANKED);
     }
 

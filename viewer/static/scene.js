@@ -3,7 +3,7 @@
 (() => {
   const T = MeshCat.THREE,
     MM = 0.001; // the viewer's scene is in metres
-  const BUDGET = {start: 90000, least: 20000, most: 400000, slow: 140, fast: 40}; // segments of all layers; ms of a frame
+  const BUDGET = {start: {hardware: 200000, software: 45000, none: 45000}, least: 20000, most: 400000, slow: 140, fast: 40}; // segments of all layers; ms of a frame
 
   class Scene {
     constructor(app, pane) {
@@ -28,7 +28,7 @@
       this.root = this.viewer.scene_tree.find(["olp"]).object;
       this.lines = new Map();
       this.origin = [0, 0, 0];
-      this.budget = BUDGET.start;
+      this.budget = BUDGET.start[graphics];
       this.plane = null; // of the section: [x, y, z, distance], mm; what is beyond is left out
       this.size_by_pane();
       const render = this.viewer.render;
