@@ -45,8 +45,8 @@ _LONG = 5.0
 @dataclass(frozen=True, slots=True, eq=False)
 class Circular:
     """The k circular moves of a program: (k,) `row` and `radius_mm`. In rad (k,) `begin` is the angle at
-    which each begins, and `sweep` by how much it goes on. (k, 3) `centre` and the unit vectors `first` and `second`
-    of the plane are in the frame shown. (k,) `rise`: it changes its level on the way."""
+    which each begins, and `sweep` by how much it goes on. (k, 3) `centre` and the unit vectors `first` and
+    `second` of the plane are in the frame shown. (k,) `rise`: it changes its level on the way."""
 
     row: Index
     centre: Array
