@@ -65,8 +65,8 @@ class Scene:
     """`position_mm` (n, 3) are the samples in `frame`; `time_s` (n,) are their times on the re-timed motion,
     where there is one, else at the feed. `sources` are (name, (n,) mm) by size; `report` is that of the
     correction or verification ("olp-report-1"), `table` its judgements with lines of the nominal text as
-    shown; `tool_radii_mm` has the tools of the program that have a radius; `uncertainty` is None
-    where the calibration states none."""
+    shown. `tool_radii_mm` has the tools of the program that have a radius; `uncertainty` is None where the
+    calibration states none."""
 
     name: str
     corrected_name: str

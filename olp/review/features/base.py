@@ -21,9 +21,9 @@ class Figure:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Deviations:
-    """Deviations of a layer at k points of a feature: (k,) `move`, the feature's move of each; (k, 3)
-    `nominal_mm`, in the frame shown, and `delta_mm`; (k,) `weight`, the length of path of each point in mm,
-    or 1 where points are measured. A point at which two moves meet is there for both."""
+    """Deviations of a layer at k points of a feature. (k,) `move` is the move of the feature that each is on.
+    (k, 3) `nominal_mm`, in the frame shown, and `delta_mm`. (k,) `weight` is the length of path of each point
+    in mm, or 1 where points are measured. A point at which two moves meet is there for both."""
 
     move: Index
     nominal_mm: Array
@@ -40,10 +40,10 @@ class Deviations:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Feature:
-    """A feature of a program: `moves`, the rows of its feed moves, rising; `shape`, what its kind needs to
-    measure it; `label`, what it is called; `detail`, what the program states of it in plain words;
-    `centre_mm` in the frame shown. Features with one text `alike` are listed below one node; an empty one is
-    no group."""
+    """A feature of a program. `moves` are the rows of its feed moves, rising, and `shape` is what its kind
+    needs to measure it. `label` is what it is called, `detail` what the program states of it in plain words.
+    `centre_mm` is in the frame shown. Features with one text `alike` are listed below one node; an empty one
+    is no group."""
 
     kind: str
     moves: Index

@@ -1,7 +1,7 @@
 """Circular moves with their centres: arcs of the program, and circles that it states as short chords.
 
-A run of at least twelve chords is a part of a circle where its vertices lie on one circle, the chords turn
-evenly one way, and the path leaves the circle at both ends: any smooth curve is near a circle for a while.
+A run of at least twelve chords is a part of a circle where its vertices lie on one circle and the chords turn
+evenly one way. The path leaves the circle at both ends: any smooth curve is near a circle for a while.
 """
 
 from __future__ import annotations
@@ -26,8 +26,13 @@ _TURN = np.pi / 6
 _EVEN = 3.0
 #: A circle through three of the vertices is at most so many times as far from the others as the best one.
 _LOOSE = 4.0
+<<<<<<< HEAD
 #: Beyond the ends of a circle the path is off it by this many times what its vertices may be. An eighth of
 #: its length beyond a part of a curve with evenly changing curvature, it is off by four times as much.
+=======
+#: Beyond the ends of a circle the path is off it by this many times what its vertices may be. A curve with
+#: evenly changing curvature is off by four times as much an eighth of the length beyond.
+>>>>>>> p-parts
 _LEAVES = 5.0
 #: So many chords before twelve on a circle the path is off it, by this many times what they are. A curve with
 #: evenly changing curvature is off by sixteen times as much there.
@@ -44,9 +49,9 @@ _LONG = 5.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Circular:
-    """The k circular moves of a program: (k,) `row`, `radius_mm`, `begin`, the angle at which each begins,
-    and `sweep`, by which it goes on, in rad; (k, 3) `centre` and unit vectors `first`, `second` of the plane,
-    in the frame shown. (k,) `rise`: it changes its level on the way."""
+    """The k circular moves of a program: (k,) `row` and `radius_mm`. In rad (k,) `begin` is the angle at
+    which each begins, and `sweep` by how much it goes on. (k, 3) `centre` and the unit vectors `first` and
+    `second` of the plane are in the frame shown. (k,) `rise`: it changes its level on the way."""
 
     row: Index
     centre: Array
@@ -170,6 +175,8 @@ class _Run:
             there = self.vertices[np.maximum(before, 0)]
             off = np.abs(np.hypot(there[:, 0] - x, there[:, 1] - y) - radius)
             leaves = off > np.maximum(_LEAVES * self.near_mm, _DRIFTS * ripple)
+            # a chord that is too long is none of the circle, though its ends may be on it
+            leaves |= self.length[np.maximum(part - 1, 0)] > _EVEN * self.length[part]
             found.append(part[on & ((before < 0) | leaves)])
         return np.concatenate(found)
 
@@ -185,11 +192,16 @@ class _Run:
         return found if self._away(points, found).max() <= self.near_mm else None
 
     def ends(self, a: int, b: int, circle: tuple[float, float, float]) -> bool:
-        """Whether the path is off a circle an eighth of its chords before a and behind b: a curve of changing
-        curvature goes on near it."""
+        """Whether the path is off a circle an eighth of its chords before a and behind b, or goes on with a
+        chord that is too long. A curve of changing curvature goes on near it."""
         beyond = max((b - a) // 8, 1)
-        there = self.vertices[[k for k in (a - beyond, b + beyond) if 0 <= k < len(self.vertices)]]
-        return bool((self._away(there, circle) > _LEAVES * self.near_mm).all())
+        usual = _EVEN * float(np.median(self.length[a:b]))
+        for there, chord in ((a - beyond, a - 1), (b + beyond, b)):
+            if not 0 <= there < len(self.vertices) or self.length[chord] > usual:
+                continue
+            if self._away(self.vertices[there : there + 1], circle)[0] <= _LEAVES * self.near_mm:
+                return False
+        return True
 
     @staticmethod
     def _away(points: Array, circle: tuple[float, float, float]) -> Array:

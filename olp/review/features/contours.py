@@ -25,8 +25,9 @@ _KNOWN = 0.1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Shape:
-    """(3, 3) columns: the directions across and along the tool axis; of each move, by `row` (rising): its
-    direction (m, 3) at its start, `centre` (m, 3) and whether it is `curved` (m,), in the frame shown."""
+    """`turn` (3, 3) has the directions across and along the tool axis as columns. Of each move, by `row`
+    (rising): (m, 3) `along`, its direction at its start, (m, 3) `centre`, and (m,) whether it is `curved`.
+    All are in the frame shown."""
 
     turn: Array
     row: Index

@@ -17,6 +17,8 @@ from olp.review.scene import Scene
 
 #: Most ranges of samples of a node; more become one that holds them all.
 _RANGES = 200
+#: Decimals of figures in um and of positions in mm: the rest would only make pages longer.
+_DECIMALS = 4
 #: What kinds of nodes that are no features are called.
 _LABELS = {OPERATION: "operation", GROUP: "equal holes", REST: "not listed"}
 _GROUPED = "the figure of that hole whose figure is largest in size"
@@ -142,13 +144,13 @@ class _Told:
 
     def _centre(self, node: Node, ranges: Array) -> list[float] | None:
         if node.feature is not None:
-            return [float(value) for value in node.feature.centre_mm]
+            return [round(float(value), _DECIMALS) for value in node.feature.centre_mm]
         parts = [self._scene.position_mm[a : b + 1] for a, b in ranges.tolist()]
         if not parts:
             return None
         low = np.min([part.min(axis=0) for part in parts], axis=0)
         high = np.max([part.max(axis=0) for part in parts], axis=0)
-        return [float(value) for value in (low + high) / 2.0]
+        return [round(float(value), _DECIMALS) for value in (low + high) / 2.0]
 
     def _figures(self, node: Node) -> list[dict[str, Any]]:
         feature = node.feature
@@ -168,7 +170,7 @@ class _Told:
 
 
 def _um(value: float | None) -> float | None:
-    return None if value is None else value * UM_PER_MM
+    return None if value is None else round(value * UM_PER_MM, _DECIMALS)
 
 
 def _largest(below: list[list[dict[str, Any]]]) -> list[dict[str, Any]]:

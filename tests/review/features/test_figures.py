@@ -130,6 +130,13 @@ def test_a_tilted_axis_moves_the_tip_of_a_hole_most_at_its_end(scenes: dict[str,
         assert figures(hole) == {"position": approx(14.0, 0.01), "depth": approx(2.0)}
 
 
+def test_the_depth_of_a_hole_is_that_of_its_bottom(scenes: dict[str, Scene]) -> None:
+    stretched = bent(
+        scenes["hole"], lambda p: np.stack((0 * p[:, 0], 0 * p[:, 0], 1e-3 * (p[:, 2] + 13)), axis=1)
+    )
+    assert [figures(hole)["depth"] for hole in nodes_of(stretched, "hole")] == [approx(1.0), approx(1.0)]
+
+
 def test_a_short_arc_has_its_mean_radial_deviation(machine: Path) -> None:
     scene = scene_of("G0 X70 Y40\nG1 Z-1\nG3 X40 Y70 I-30", machine)
 
@@ -155,6 +162,13 @@ def test_the_profile_of_a_contour_is_normal_to_its_arcs(machine: Path) -> None:
         return np.concatenate((flat, 0.0 * flat[:, :1]), axis=1)
 
     assert figures(one(bent(scene, swollen), "contour"))["form"] == approx(3.0)
+
+    def along_the_arc(p: np.ndarray) -> np.ndarray:
+        arm = p[:, :2] - np.array((50.0, 20.0))
+        ahead = np.stack((-arm[:, 1], arm[:, 0], 0.0 * arm[:, 0]), axis=1) / 10.0
+        return np.where((arm[:, :1] > 1e-6), 0.05 * ahead, 0.0)
+
+    assert figures(one(bent(scene, along_the_arc), "contour"))["form"] == approx(0.0)
 
     def along(p: np.ndarray) -> np.ndarray:
         return np.where((p[:, :1] > 11.0) & (p[:, :1] < 49.0), np.array((0.05, 0.0, 0.0)), 0.0)

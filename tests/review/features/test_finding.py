@@ -320,3 +320,56 @@ def test_a_program_in_a_rotated_frame_speaks_its_own_directions(machine: Path) -
 def test_moves_without_length_separate_nothing(machine: Path) -> None:
     text = "G0 X10 Y10\nG1 Z-1\nX10 Y10\nX50\nF500\nX50\nY40"
     assert kinds(scene_of(text, machine)) == {"contour": 1, "wall": 2}
+
+
+def test_three_quarters_of_a_circle_are_an_arc(machine: Path) -> None:
+    scene = scene_of("G0 X50 Y40\nG1 Z-1\nG3 X40 Y30 I-10\nG0 Z5", machine)
+    assert (kinds(scene), one(scene, "arc")["detail"]) == ({"arc": 1}, "R 10 mm, 270°, 1 level")
+    # both halves go beyond the whole
+    over = "G0 X50 Y40\nG1 Z-1\nG3 X30 Y40 I-10\nG3 X40 Y50 I10\nG0 Z5"
+    assert kinds(scene_of(over, machine)) == {"circle": 1}
+
+
+def test_a_rapid_to_the_bottom_drills_no_hole(machine: Path) -> None:
+    assert kinds(scene_of("G0 X20 Y30 Z2\nG1 Z0\nG0 Z-5\nG0 Z5", machine)) == {}
+
+
+def test_the_rings_about_an_island_are_a_wall(machine: Path) -> None:
+    outer = "".join(ring(size) for size in (40.0, 35.0, 30.0, 25.0))
+    island = "G0 X40 Y40\nG1 Z-3\nY60\nX60\nY40\nX40\nG0 Z5\nG0 X35 Y35\nG1 Z-3\nY65\nX65\nY35\nX35\nG0 Z5\n"
+    scene = scene_of(outer + island, machine)
+    contours = [n["detail"] for n in nodes_of(scene, "contour")]
+    assert contours == ["path 80 x 80 mm, closed, Z -3 mm", "path 30 x 30 mm, closed, Z -3 mm"]
+
+
+def test_the_last_turn_of_a_helix_is_no_contour(machine: Path) -> None:
+    turns = "G3 Z-2 I-12\nG3 Z-4 I-12\nG3 X26 I-12\nG3 X50 I12"
+    assert kinds(scene_of(f"G0 X50 Y40\nG1 Z0\n{turns}", machine)) == {"circle": 1}
+
+
+def test_a_flat_on_a_shaft_is_no_part_of_its_circle(machine: Path) -> None:
+    """A chord of 28 degrees among such of 2: its ends are on the circle."""
+    lines = chords(180).split("\n")
+    scene = scene_of("\n".join(lines[:60] + lines[73:]), machine)
+    assert one(scene, "arc")["detail"] == "R 20 mm, 332°, 1 level"
+    assert len(nodes_of(scene, "wall")) == 1
+
+
+def test_parts_of_a_wall_at_other_levels_are_the_wall(machine: Path) -> None:
+    lines = ("X10 Z-1 X110", "X20 Z-2 X30", "X60 Z-3 X70")
+    parts = [line.split() for line in lines]
+    text = "\n".join(f"G0 {a} Y40\nG1 {z}\n{b}\nG0 Z5" for a, z, b in parts)
+    scene = scene_of(text, machine)
+    assert one(scene, "wall")["detail"] == "100 mm along X, normal +Y, 3 levels"
+
+
+def test_the_tool_says_where_out_of_the_material_is(machine: Path) -> None:
+    """A tool that points along Y: a stroke in Y drills, one in Z is a touch across it."""
+    scene = scene_of("G0 X20 Y2 Z-5\nG1 Y12\nG0 Y2\nG0 X40\nG1 Y12\nX60\nG0 Y2", machine)
+    path = scene.nominal.toolpath
+    frames = tuple(replace(frame, tool_mm=(0.0, 120.0, 0.0)) for frame in path.frames)
+    drilled = replace(scene, nominal=replace(scene.nominal, toolpath=replace(path, frames=frames)))
+    assert kinds(drilled) == {"hole": 1, "wall": 1}
+    assert one(drilled, "hole")["detail"] == "tool Ø 10 mm, to Y 12 mm, stroke of 10 mm"
+    in_y = bent(drilled, lambda p: np.tile((0.0, -0.002, 0.0), (len(p), 1)))
+    assert figures(one(in_y, "hole"))["depth"] == pytest.approx(2.0)

@@ -207,6 +207,11 @@ def test_comments_name_operations_and_features(machine: Path) -> None:
     assert details["2 holes"] == "tool Ø 10 mm, to Z -8 mm, stroke of 10 mm"
     assert [t["label"] for t in tree["tools"]] == ["T1", "T2"]
     assert [t["nodes"] for t in tree["tools"]] == [[n["id"]] for n in tree["nodes"] if n["parent"] is None]
+    # one on a line of its own comes before one behind a statement
+    text = "(facing)\nM8 (coolant)\nG0 X10 Y10\nG1 Z-1\nX20"
+    assert plain(scene_of(text, machine))["nodes"][0]["label"] == "T1, G54: facing"
+    behind = text.replace("(facing)\n", "")
+    assert plain(scene_of(behind, machine))["nodes"][0]["label"] == "T1, G54: coolant"
     # without comments there are none
     bare = "\n".join(line for line in TEXT.replace(" (6 mm)", "").split("\n") if not line.startswith("("))
     assert [n["label"] for n in plain(scene_of(bare, machine))["nodes"] if n["parent"] is None] == [
