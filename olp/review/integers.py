@@ -16,8 +16,10 @@ Whole = npt.NDArray[np.int64]
 _MOST = 3
 #: A difference of a number below this is a whole number that a double holds, also in zigzag order.
 _LARGEST = 1 << 48
-#: Rows of a column on which the number of differences is tried, in blocks.
-_TRIED, _BLOCKS = 2048, 8
+#: Rows of a block on which the number of differences is tried.
+_TRIED = 2048
+#: Blocks of a column that are tried.
+_BLOCKS = 8
 
 
 @dataclass(frozen=True, slots=True)

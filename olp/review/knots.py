@@ -9,8 +9,10 @@ import numpy.typing as npt
 
 from olp.core.arrays import Array, Index
 
-#: Most rows between two knots, and rows that are worked on at once.
-_APART, _BAND = 256, 1 << 16
+#: Most rows between two knots.
+_APART = 256
+#: Rows that are worked on at once; a multiple of the above.
+_BAND = 1 << 16
 
 
 def knots(values: Array, stored: Array, along: Array, tolerance: float) -> Index:

@@ -30,12 +30,16 @@ _SPARSE = 256
 _STYLES = 400
 #: What follows a mark in a template: this plus the number of the style.
 FIRST_STYLE = 0x20
-#: Rows on which a prediction is tried, in blocks.
-_TRIED, _BLOCKS = 1024, 8
+#: Rows of a block on which a prediction is tried.
+_TRIED = 1024
+#: Blocks of a column that are tried.
+_BLOCKS = 8
 #: nm per mm.
 NM_PER_MM = 1_000_000
-#: Bits of a value, and of digits, in the name of a number that belongs to its template.
-_VALUE_BITS, _DIGIT_BITS = 32, 4
+#: Bits of a value in the name of a number that belongs to its template.
+_VALUE_BITS = 32
+#: Bits of a number of digits in that name.
+_DIGIT_BITS = 4
 
 #: The last letter before a number, since the number before it.
 _LETTER = re.compile(rb"[A-Za-z][^A-Za-z]*\Z")

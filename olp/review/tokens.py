@@ -24,7 +24,9 @@ DIGITS = 9
 #: Bytes of a text that are searched at once, so that temporaries are small.
 _BAND = 1 << 21
 
-_MINUS, _POINT, _ZERO, _LINE_FEED = b"-"[0], b"."[0], b"0"[0], b"\n"[0]
+_MINUS = b"-"[0]
+_POINT = b"."[0]
+_ZERO = b"0"[0]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -126,15 +126,17 @@
     }
 
     number(i, [k, decimals, least, trim, point]) {
-      const column = this.spec.columns[k],
-        value = this.rest[i * this.spec.columns.length + k] + (column.axis === null ? 0 : this.predicted(i, column)),
+      const {columns} = this.spec,
+        column = columns[k],
+        value = this.rest[i * columns.length + k] + (column.axis === null ? 0 : this.predicted(i, column)),
         digits = String(Math.abs(value)).padStart(column.decimals + 1, "0"),
         before = digits.length - column.decimals;
-      let whole = digits.slice(0, before).replace(/^0+/, "").padStart(least, "0"),
-        rest = digits.slice(before, before + decimals);
-      if (trim) rest = rest.replace(/0+$/, "");
-      if (!whole && !rest) whole = "0";
-      return (value < 0 ? "-" : "") + whole + (rest || point ? "." : "") + rest;
+      let whole = digits.slice(0, before),
+        end = before + decimals;
+      if (trim) while (end > before && digits[end - 1] === "0") end--;
+      if (whole === "0" && !least && end > before) whole = "";
+      else if (whole.length < least) whole = whole.padStart(least, "0");
+      return (value < 0 ? "-" : "") + whole + (end > before || point ? "." : "") + digits.slice(before, end);
     }
 
     predicted(i, {axis, nm, relative}) {
