@@ -7,8 +7,8 @@ where the reader of programs ends them.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass
+from difflib import SequenceMatcher
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +20,8 @@ from olp.review.samples import Samples
 
 Small = npt.NDArray[np.int32]
 
+#: Most lines between two moves that are compared one with another.
+_MOST_COMPARED = 500
 #: Most characters of a line; a longer one is cut, as browsers are slow with it.
 LONGEST = 2000
 
@@ -133,8 +135,9 @@ def _pairs(nominal: Program, corrected: Program, mine: Index, theirs: Index) -> 
     for k in np.flatnonzero(gap != gap_other).tolist():
         a, b = int(begin[k]), int(begin_other[k])
         some, more = _lines(nominal, a, int(gap[k])), _lines(corrected, b, int(gap_other[k]))
-        inserted += (b + i for i in _without_partner(some, more))
-        left_out += (a + i for i in _without_partner(more, some))
+        mine_alone, theirs_alone = _without_partner(some, more)
+        left_out += (a + i for i in mine_alone)
+        inserted += (b + i for i in theirs_alone)
     return _woven(count, other, np.array(inserted, np.int64), np.array(left_out, np.int64))
 
 
@@ -144,15 +147,28 @@ def _lines(program: Program, first: int, count: int) -> list[bytes]:
     return [bytes(program.data[a:b]) for a, b in zip(begin, end, strict=True)]
 
 
-def _without_partner(some: list[bytes], more: list[bytes]) -> Iterator[int]:
-    """The lines of `more` without a partner: those between the equal ones at the beginning and at the end."""
-    spare = len(more) - len(some)
-    if spare <= 0:
-        return
+def _without_partner(some: list[bytes], more: list[bytes]) -> tuple[list[int], list[int]]:
+    """The lines of either text of a gap without a partner in the other. Equal lines are partners; of the
+    others between them the last ones are, as what is inserted comes before the line that it was split
+    from."""
     same = 0
-    while same < len(some) and some[same] == more[same]:
+    while same < min(len(some), len(more)) and some[same] == more[same]:
         same += 1
-    yield from range(same, same + spare)
+    first, second = some[same:], more[same:]
+    equal: list[tuple[int, int, int]] = [(len(first), len(second), 0)]
+    if first and second and max(len(first), len(second)) <= _MOST_COMPARED:
+        blocks = SequenceMatcher(None, first, second, False).get_matching_blocks()
+        equal = [(block.a, block.b, block.size) for block in blocks]
+    mine: list[int] = []
+    theirs: list[int] = []
+    a = b = 0
+    for begin, begin_other, size in equal:
+        gap, other = begin - a, begin_other - b
+        both = min(gap, other)
+        mine += range(same + a, same + begin - both)
+        theirs += range(same + b, same + begin_other - both)
+        a, b = begin + size, begin_other + size
+    return mine, theirs
 
 
 def _woven(count: int, other: int, inserted: Index, left_out: Index) -> tuple[Small, Small]:

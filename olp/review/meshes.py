@@ -26,7 +26,7 @@ MOST_FACES = 150_000
 #: Colour by role.
 _COLOURS = {"workpiece": "#9aa7b5", "fixture": "#7d8f69", "machine": "#5f7a96", "tool": "#b0803a"}
 #: Opacity by role.
-_OPACITY = {"workpiece": 0.55, "fixture": 0.5, "machine": 0.25, "tool": 0.8}
+_OPACITY = {"workpiece": 0.55, "fixture": 0.5, "machine": 0.25, "tool": 0.4}
 #: Triangles of a box, by the indices of its corners.
 _FACES = np.array(
     [[0, 2, 1], [1, 2, 3], [4, 5, 6], [5, 7, 6], [0, 1, 4], [1, 5, 4], [2, 6, 3], [3, 6, 7], [0, 4, 2],

@@ -138,3 +138,23 @@ def test_a_line_without_end_is_cut_and_says_so() -> None:
     assert (first, last) == ("G21", "M2")
     assert long == "(" + "x" * (LONGEST - 1) + " … (1000002 characters)"
     assert shown(b"x" * LONGEST) == "x" * LONGEST
+
+
+@pytest.mark.parametrize("name", ["creo.ncl", "catia.aptsource", "nx.cls", "solidworks.apt"])
+def test_lines_that_are_not_changed_stand_beside_themselves(name: str) -> None:
+    """Blocks are inserted at two places before the first cut: at the top, and where backlash is taken up."""
+    folder = ROOT / "programs" / "apt-flavours"
+    job = folder / "job.toml"
+    review = olp.view(folder / name, folder.parent / "gantry-plate" / "machine.toml", job, time=False)
+    page = Page(review.html())
+    listing = page.manifest["listing"]
+    texts = [page.array(listing[key]) for key in ("nominal", "corrected")]
+    rows = zip(
+        *(page.array(listing[f"row_{key}"]).astype(int) for key in ("nominal", "corrected")), strict=True
+    )
+    beside = {a: b for a, b in rows if a}
+    single = [line for line in texts[0] if texts[0].count(line) == texts[1].count(line) == 1]
+    assert len(single) > 5
+    for line in single:
+        number = beside[texts[0].index(line) + 1]
+        assert number and texts[1][number - 1] == line

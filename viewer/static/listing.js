@@ -7,7 +7,8 @@
     WIDEST = 16, // characters of a line's name
     LOOKED = 4000, // lines whose length decides on the layout
     USUAL = 0.9, // of them are to fit
-    MORE = " …";
+    MORE = " …",
+    ERROR = [104, 156]; // px for the deviations of two and of three pictures
 
   class Listing {
     constructor(app) {
@@ -30,7 +31,7 @@
         digits = Math.max(longest, Math.min(listing.names_width ?? 0, WIDEST));
       this.panel = document.getElementById("panel-program");
       this.panel.style.setProperty("--number", `${12 + 7 * Math.max(3, digits)}px`);
-      this.panel.classList.toggle("measured", Boolean(this.errors[2]));
+      this.panel.style.setProperty("--error", `${ERROR[this.errors[2] ? 1 : 0]}px`);
       const ruler = this.box.appendChild(Object.assign(document.createElement("span"), {textContent: "0".repeat(50)}));
       this.ruler = ruler;
       ruler.style.cssText = "position:absolute;visibility:hidden";
@@ -44,7 +45,7 @@
     usual_length() {
       const step = Math.max(1, Math.floor(this.n / LOOKED)),
         lengths = [];
-      for (let row = 0; row < this.n; row += step) lengths.push(this.text(row, 0).length);
+      for (let row = 0; row < this.n; row += step) lengths.push(Math.max(this.text(row, 0).length, this.text(row, 1).length));
       return lengths.sort((p, q) => p - q)[Math.floor(USUAL * (lengths.length - 1))] ?? 0;
     }
 
@@ -53,7 +54,7 @@
       const digit = this.ruler.getBoundingClientRect().width / 50;
       if (!digit || !this.box.clientWidth) return;
       const number = parseFloat(getComputedStyle(this.panel).getPropertyValue("--number")),
-        error = this.errors[2] ? 138 : 92,
+        error = ERROR[this.errors[2] ? 1 : 0],
         wide = this.box.clientWidth - error - 10;
       const beside = Math.floor((wide - 2 * number) / 2 / digit) - 2,
         one = Math.floor((wide - number) / digit) - 2;

@@ -76,7 +76,7 @@
         new T.CylinderGeometry(radius * 0.6, radius * 0.6, radius * 6, 20).rotateX(Math.PI / 2).translate(0, 0, radius * 3),
       ];
       parts.forEach((geometry, i) => {
-        const object = new T.Mesh(geometry, new T.MeshLambertMaterial({color: "#c8a24a", transparent: true, opacity: 0.75}));
+        const object = new T.Mesh(geometry, new T.MeshLambertMaterial({color: "#c8a24a", transparent: true, opacity: 0.4}));
         object.userData.solid = true;
         viewer.set_object(["olp", "tool", `part-${i}`], object);
         objects.push(object);

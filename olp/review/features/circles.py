@@ -26,13 +26,8 @@ _TURN = np.pi / 6
 _EVEN = 3.0
 #: A circle through three of the vertices is at most so many times as far from the others as the best one.
 _LOOSE = 4.0
-<<<<<<< HEAD
-#: Beyond the ends of a circle the path is off it by this many times what its vertices may be. An eighth of
-#: its length beyond a part of a curve with evenly changing curvature, it is off by four times as much.
-=======
 #: Beyond the ends of a circle the path is off it by this many times what its vertices may be. A curve with
 #: evenly changing curvature is off by four times as much an eighth of the length beyond.
->>>>>>> p-parts
 _LEAVES = 5.0
 #: So many chords before twelve on a circle the path is off it, by this many times what they are. A curve with
 #: evenly changing curvature is off by sixteen times as much there.
