@@ -98,6 +98,12 @@ def test_texts_come_back_whatever_is_predicted(seed: int, moving: bool) -> None:
     assert "\n".join(unpacked(arrays)) == text
 
 
+def test_long_numbers_stay_in_the_text_where_others_have_many_decimals() -> None:
+    """In units of the last decimal they would be more than a double counts."""
+    text = "\n".join(f"X0.{k:09d}\nX{k + 987_654_000}" for k in range(1, 100))
+    assert returned(text) == text
+
+
 def test_a_text_with_the_mark_of_numbers_is_refused() -> None:
     with pytest.raises(ValueError, match="contains the mark"):
         Lines.of("X1\x01\nX2")

@@ -59,7 +59,12 @@ def test_whole_numbers_of_any_size_and_order_come_back(page: Any) -> None:
     arrays = Arrays()
     arrays.quantised("all", np.column_stack(columns), 1.0)
     assert set(arrays.specs["all"]["width"]) == set(range(7))
-    assert unpacked(page, arrays)["all"] == np.column_stack(columns).ravel().tolist()
+    for bits in (30, 31, 32):
+        arrays.quantised(f"{bits}", [2**bits, -(2**bits), 2**bits - 1, -(2**bits) - 1], 1.0)
+    result = unpacked(page, arrays)
+    assert result["all"] == np.column_stack(columns).ravel().tolist()
+    for bits in (30, 31, 32):
+        assert result[f"{bits}"] == [2**bits, -(2**bits), 2**bits - 1, -(2**bits) - 1]
 
 
 def test_quantised_values_come_back_exactly(page: Any) -> None:
