@@ -12,6 +12,7 @@ from olp.core.arrays import Array
 from olp.core.toolpath import Kind
 from olp.core.units import AXES, UM_PER_MM
 from olp.findings.catalogue import RULES
+from olp.proof.judgement import QUESTIONS
 from olp.proof.proof import Counts
 from olp.reports.report import place
 from olp.review.features.nodes import plain
@@ -292,11 +293,15 @@ def _findings(scene: Scene) -> list[dict[str, Any]]:
 
 
 def _verdict(scene: Scene) -> dict[str, Any]:
-    """The answer, the questions with theirs, and the sentences beside those."""
+    """The answer, the questions with theirs, the sentences beside those, and the questions that nobody asked:
+    without a part tolerance nothing is said of the part."""
     verdict = scene.report["verdict"]
     said = " ".join(question["sentence"] for question in verdict["questions"])
     remarks = [sentence for sentence in verdict["sentences"] if sentence not in said]
-    return {"ok": verdict["ok"], "questions": verdict["questions"], "remarks": remarks}
+    unasked = [] if verdict["part"] is not None else [QUESTIONS["part"]]
+    return {
+        "ok": verdict["ok"], "questions": verdict["questions"], "remarks": remarks, "unasked": unasked
+    }  # fmt: skip
 
 
 def _part_tolerance_um(scene: Scene) -> float | None:

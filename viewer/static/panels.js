@@ -63,6 +63,16 @@
           make("dd", {textContent: micrometres(q.sentence)}),
         );
       });
+      for (const question of verdict?.unasked ?? [])
+        questions.push(
+          make(
+            "dl",
+            {className: "question"},
+            make("span", {className: "answer open", textContent: "not asked"}),
+            make("dt", {textContent: question}),
+            make("dd", {textContent: "No part tolerance is stated."}),
+          ),
+        );
       const remarks = (verdict?.remarks ?? []).map(text => make("p", {className: "remark", textContent: micrometres(text)}));
       $("card").replaceChildren(this.figures(), ...this.removed(), ...questions, ...remarks);
     }

@@ -29,7 +29,7 @@ def main() -> None:
             browser.launched(play, *browser.SOFTWARE_GL) as chromium,
             browser.opened(chromium, file, size=SIZE) as page,
         ):
-            page.evaluate("() => { olp.set_time(olp.app.end * 0.62); olp.app.scene.refill(); }")
+            page.evaluate("olp.app.scene.refill()")
             page.wait_for_timeout(1000)
             shot = Image.open(io.BytesIO(page.screenshot()))
     shot.convert("RGB").save(ROOT / "viewer" / "pictures" / "review.png", optimize=True)
