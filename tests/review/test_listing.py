@@ -129,6 +129,17 @@ def test_rows_are_those_of_a_walk_along_both_texts(pairs: int, left: set[int], m
     assert list(zip(line.tolist(), line_other.tolist(), strict=True)) == rows
 
 
+def test_both_texts_are_coded_by_the_samples_of_their_lines(tmp_path: Path) -> None:
+    """What is left of the numbers is the zero of the positions, on every line."""
+    lines = [f"G1 X{k * 0.7:.4f} Y{k * k * 0.003:.4f} Z{20 - k * 0.01:.4f} F900" for k in range(200)]
+    data = "\n".join([*TEXT.split("\n")[:4], "G43 H1", *lines, "M2", ""]).encode()
+    page = Page(olp.view(data, random_machine(tmp_path / "m", 3), time=False).html())
+    for name in ("text_nominal", "text_corrected"):
+        rest = page.array(f"{name}_rest")
+        assert rest.shape[1] == 3
+        assert not np.diff(rest[20:], axis=0).any()
+
+
 # -- texts ----------------------------------------------------------------------------------------------
 
 
