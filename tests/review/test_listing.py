@@ -13,6 +13,7 @@ from judge.machines import Recipe, random_machine
 from judge.unpacker import Page
 
 import olp
+from olp.review import listing
 from olp.review.job import Review
 from olp.review.listing import LONGEST, shown
 
@@ -37,13 +38,13 @@ def lines_of(data: bytes) -> list[str]:
 def checked(review: Review, nominal: bytes, corrected: bytes) -> Page:
     """Rows hold every line of both files once and in order, and texts are the lines of the files."""
     page = Page(review.html())
-    listing = page.manifest["listing"]
+    shown_as = page.manifest["listing"]
     for key, data in (("nominal", nominal), ("corrected", corrected)):
-        rows = page.array(listing[f"row_{key}"])
+        rows = page.array(shown_as[f"row_{key}"])
         lines = lines_of(data)
         assert rows[rows > 0].tolist() == list(range(1, len(lines) + 1))
-        assert page.array(listing[key]) == lines
-    assert ((page.array(listing["row_nominal"]) > 0) | (page.array(listing["row_corrected"]) > 0)).all()
+        assert page.array(shown_as[key]) == lines
+    assert ((page.array(shown_as["row_nominal"]) > 0) | (page.array(shown_as["row_corrected"]) > 0)).all()
     return page
 
 
@@ -106,6 +107,37 @@ def test_a_line_is_never_farther_off_its_path_than_its_samples_are_off_their_poi
         assert np.flatnonzero(stated >= 0.0).tolist() == np.unique(row).tolist()
         for k in np.unique(row):
             assert stated[k] <= size[row == k].max() + 0.006
+
+
+@given(st.integers(0, 30), st.sets(st.integers(0, 40)), st.sets(st.integers(0, 40)))
+def test_rows_are_those_of_a_walk_along_both_texts(pairs: int, left: set[int], more: set[int]) -> None:
+    """Lines that were left out come before those that were inserted at the same place."""
+    left_out, inserted = (
+        sorted(line for line in some if line < pairs + len([i for i in some if i <= line]))
+        for some in (left, more)
+    )
+    count, other = pairs + len(left_out), pairs + len(inserted)
+    rows, i, j = [], 0, 0
+    while i < count or j < other:
+        if i in left_out:
+            rows.append((i := i + 1, 0))
+        elif j in inserted:
+            rows.append((0, j := j + 1))
+        else:
+            rows.append((i := i + 1, j := j + 1))
+    line, line_other = listing._woven(count, other, np.array(inserted, int), np.array(left_out, int))
+    assert list(zip(line.tolist(), line_other.tolist(), strict=True)) == rows
+
+
+def test_both_texts_are_coded_by_the_samples_of_their_lines(tmp_path: Path) -> None:
+    """What is left of the numbers is the zero of the positions, on every line."""
+    lines = [f"G1 X{k * 0.7:.4f} Y{k * k * 0.003:.4f} Z{20 - k * 0.01:.4f} F900" for k in range(200)]
+    data = "\n".join([*TEXT.split("\n")[:4], "G43 H1", *lines, "M2", ""]).encode()
+    page = Page(olp.view(data, random_machine(tmp_path / "m", 3), time=False).html())
+    for name in ("text_nominal", "text_corrected"):
+        rest = page.array(f"{name}_rest")
+        assert rest.shape[1] == 3
+        assert not np.diff(rest[20:], axis=0).any()
 
 
 # -- texts ----------------------------------------------------------------------------------------------
