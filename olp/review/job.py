@@ -176,9 +176,9 @@ def run(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Texts:
-    """The nominal program as shown, unrolled where the call asks for it, and the corrected one, as read; and
-    what the correction or its verification says: the report, the table of judgements, and the last corrected
-    move of each nominal one."""
+    """The nominal program as shown, unrolled where the call asks for it, and the corrected one, as read. Also
+    what the correction or its verification says: report, table of judgements, and the last corrected move of
+    each nominal one."""
 
     source: Source
     nominal: Program

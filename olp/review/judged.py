@@ -81,7 +81,8 @@ def statistics(scene: Scene) -> Iterator[dict[str, Any]]:
     for side, layer in (("before", "uncorrected"), ("after", "corrected")):
         yield {"label": "largest", "value": largest[layer], "unit": "um", "layer": layer}
         rms, waypoints = deviation[side]["between"]["rms_um"], deviation[side]["waypoints"]["max_um"]
-        yield {"label": "rms", "value": float(rms), "unit": "um", "layer": layer}
+        if _along(scene):
+            yield {"label": "rms", "value": float(rms), "unit": "um", "layer": layer}
         yield {"label": "at waypoints", "value": float(waypoints), "unit": "um", "layer": layer}
     runs = scene.report["measured"]["runs"] if scene.measured else ()
     for name, run in zip(measured_names(scene), runs, strict=bool(runs)):
@@ -101,13 +102,11 @@ def pictures(scene: Scene) -> Iterator[dict[str, Any]]:
     `layers`, the `tolerance_um` that it is judged by, the largest deviation of what counts, its rms, and as
     `flag` the place of the largest."""
     table, deviation = scene.table, scene.report["deviation"]
-    along = (table.judged & (table.counts != Counts.POINT)).any()
     allowed_um = table.allowed_mm * UM_PER_MM
     for layer, side, values in (
         ("uncorrected", "before", table.uncorrected), ("corrected", "after", table.corrected),
     ):  # fmt: skip
-        # points have no path between them
-        rms_um = float(deviation[side]["between"]["rms_um"]) if along else None
+        rms_um = float(deviation[side]["between"]["rms_um"]) if _along(scene) else None
         yield {
             "name": layer, "label": layer, "layers": [layer], "tolerance_um": allowed_um, "basis": "allowed",
             "rms_um": rms_um, **_largest(scene, layer, values),
@@ -119,6 +118,11 @@ def pictures(scene: Scene) -> Iterator[dict[str, Any]]:
             "tolerance_um": table.measured.tolerance_um, "basis": "part tolerance",
             "rms_um": across["rms"] if across else None, **_largest_measured(scene),
         }  # fmt: skip
+
+
+def _along(scene: Scene) -> bool:
+    """Whether a path counts, and not points alone: those have nothing between them."""
+    return bool((scene.table.judged & (scene.table.counts != Counts.POINT)).any())
 
 
 def removed(scene: Scene) -> dict[str, float | None]:
@@ -142,15 +146,11 @@ def _largest(scene: Scene, layer: str, values: npt.NDArray[np.float32]) -> dict[
         return {"largest_um": None, "flag": None}
     move = int(size.argmax())
     largest_um = float(size[move]) * UM_PER_MM
-    own = np.flatnonzero(scene.samples.move == move)
-    if not own.size:
+    worst = scene.worst_sample(layer, move)
+    if worst is None:
         return {"largest_um": largest_um, "flag": None}
-    delta = getattr(scene.samples, layer)[own]
-    worst = int(np.linalg.norm(delta, axis=1).argmax())
-    line = scene.place(int(scene.table.line[move]))
-    return {
-        "largest_um": largest_um, "flag": _flag(int(own[worst]), layer, largest_um, line, delta[worst])
-    }  # fmt: skip
+    line, delta = scene.place(int(scene.table.line[move])), getattr(scene.samples, layer)[worst]
+    return {"largest_um": largest_um, "flag": _flag(worst, layer, largest_um, line, delta)}
 
 
 def _largest_measured(scene: Scene) -> dict[str, Any]:

@@ -78,8 +78,8 @@ class Prediction:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lines:
-    """A text of n lines: `templates`, in which a mark and a style stand for each number of a column; (n,)
-    `template` of each line; `styles`; of c columns the `decimals` of a unit, the `predictions`, and (n, c)
+    """A text of n lines. In `templates` a mark and a style stand for each number of a column; (n,) `template`
+    is that of each line. Of c columns there are the `decimals` of a unit, the `predictions`, and (n, c)
     `rest`, the numbers less those."""
 
     templates: list[str]
@@ -116,8 +116,8 @@ class Lines:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Column:
-    """Numbers that are stored as a column: the (k,) `rows` of the numbers of the text, `value` in units of
-    the last of `decimals`, and (k,) `style`, an index of all styles, of which `styles` are new."""
+    """Numbers that are stored as a column: the (k,) `rows` of the numbers of the text, and `value` in units
+    of the last of `decimals`. (k,) `style` is an index of all styles, of which `styles` are new."""
 
     rows: Index
     value: Whole
@@ -153,7 +153,7 @@ def _few(values: Small) -> bool:
 def _predicted(
     column: _Column, line: Small, lines: int, positions: Positions | None
 ) -> tuple[Prediction | None, Whole]:
-    """The best prediction of a column, and (n,) what is left of it; a line without a number has the one
+    """The best prediction of a column, and (n,) the rest; a line without a number has the one
     before it."""
     choices: list[Prediction | None] = [None]
     if positions is not None:

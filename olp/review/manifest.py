@@ -26,7 +26,7 @@ from olp.review.scene import Scene
 #: Name, label, width in pixels and dashes (drawn, left out, in pixels) of layers: colours are for errors.
 LAYERS: tuple[tuple[str, str, float, tuple[int, int]], ...] = (
     ("nominal", "nominal path", 1.2, (1, 0)),
-    ("uncorrected", "uncorrected machine", 2.5, (14, 4)),
+    ("uncorrected", "uncorrected path", 2.5, (14, 4)),
     ("command", "corrected command", 1.2, (4, 4)),
     ("corrected", "corrected, predicted", 2.5, (1, 0)),
 )
@@ -65,6 +65,7 @@ def manifest_of(scene: Scene) -> tuple[dict[str, Any], Arrays]:
     row = scene.listing.row_of(scene.nominal.toolpath.line[scene.samples.move].astype(np.int64))
     arrays.quantised("line", row, 1.0)
     arrays.raw("rapid", _rapid(scene), "u1")
+    arrays.raw("waypoint", (scene.samples.share == 1.0).astype(np.uint8), "u1")
     arrays.along("t", scene.time_s, TIME_S, "P")
     arrays.along("s", scene.samples.arc_mm, ARC_MM, "P")
     manifest = {
@@ -83,6 +84,7 @@ def manifest_of(scene: Scene) -> tuple[dict[str, Any], Arrays]:
         "base": base,
         "line": "line",
         "rapid": "rapid",
+        "waypoint": "waypoint",
         "time": "t",
         "way": "s",
         "time_source": "retimed" if scene.motion is not None else "feed",
@@ -293,8 +295,8 @@ def _findings(scene: Scene) -> list[dict[str, Any]]:
 
 
 def _verdict(scene: Scene) -> dict[str, Any]:
-    """The answer, the questions with theirs, the sentences beside those, and the questions that nobody asked:
-    without a part tolerance nothing is said of the part."""
+    """The answer, the questions with theirs, and the sentences beside those. Without a part tolerance the
+    question of the part is not asked."""
     verdict = scene.report["verdict"]
     said = " ".join(question["sentence"] for question in verdict["questions"])
     remarks = [sentence for sentence in verdict["sentences"] if sentence not in said]

@@ -1,7 +1,7 @@
 """Colours of deviations: bands in units of a tolerance, for the page and for live views.
 
-A colour has one meaning: blue is within what the picture is judged by, orange to red is above it, and what
-is judged by nothing is violet, or where it has a sign violet for plus and green for minus.
+A colour has one meaning: blue is within what the picture is judged by, orange to red is above it. What is
+judged by nothing is violet. Where that has a sign, minus is green.
 """
 
 from __future__ import annotations

@@ -90,6 +90,24 @@ class Scene:
     tool_radii_mm: Mapping[int, float]
     uncertainty: TipUncertainty | None = None
 
+    def worst_sample(self, layer: str, move: int) -> int | None:
+        """The sample of a move where a layer ("uncorrected" or "corrected") is off by what the table states
+        of the move, as nearly as it is sampled; None where the move has no sample. As in the proof, the
+        distance from the nominal point counts at the end of the move, and that from the path before it."""
+        samples = self.samples
+        a, b = np.searchsorted(samples.move, [move, move + 1]).tolist()
+        if a == b:
+            return None
+        delta = getattr(samples, layer)[a:b]
+        before = self.position_mm[max(a - 1, 0)]
+        step = np.diff(self.position_mm[a:b], axis=0, prepend=before[None])
+        length = np.linalg.norm(step, axis=1)
+        unit = step / np.maximum(length, 1e-12)[:, None]
+        along = np.where(samples.share[a:b] == 1.0, 0.0, np.einsum("ij,ij->i", delta, unit))
+        size = np.sqrt(np.maximum((delta * delta).sum(axis=1) - along * along, 0.0))
+        stated = float(getattr(self.table, layer)[move])
+        return int(a) + int(np.abs(size - stated).argmin())
+
     def place(self, line: int) -> str:
         """A line of the nominal text in words: the line that it was unrolled from, where it was."""
         origin = self.nominal.origin

@@ -17,7 +17,7 @@ DIGITS_MOST = 13
 @dataclass(frozen=True, slots=True)
 class Style:
     """The form of numbers of a column: `decimals` digits behind the point, fewer by the zeros at the end with
-    `trim`; at least `least` digits before it; `point` keeps the point also where nothing is behind it."""
+    `trim`, and at least `least` digits before it. `point` keeps the point also where nothing is behind it."""
 
     column: int
     decimals: int

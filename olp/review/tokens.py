@@ -91,7 +91,7 @@ def _numbers(code: Byte) -> tuple[tuple[Small, Byte, Byte, npt.NDArray[np.bool_]
     decimals = np.zeros(len(start), np.int64)
     decimals[point] = stop[point] - 1 - np.flatnonzero(is_point)[points[start[point]]]
     value = _values(code, start, digits, decimals, point)
-    # a minus before 0 stays in the text, as -0 is no whole number
+    # a minus before 0 stays in the text, as -0 is not an integer
     minus = (start > 0) & (value != 0)
     minus[minus] = code[start[minus] - 1] == _MINUS
     value[minus] *= -1

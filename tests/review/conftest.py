@@ -13,14 +13,14 @@ from judge import browser
 from olp.review.job import Review, view
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def play() -> Iterator[Any]:
     browser.require()
     with browser.driver() as driver:
         yield driver
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def chromium(play: Any) -> Iterator[Any]:
     with browser.launched(play, *browser.SOFTWARE_GL) as launched:
         yield launched

@@ -120,7 +120,10 @@ def parts_of(review: Review, delta: np.ndarray) -> dict[str, np.ndarray]:
     binormal = np.einsum("ij,ij->i", delta, np.cross(unit, side))
     across = np.linalg.norm(delta - along[:, None] * unit, axis=1)
     assert np.allclose(np.hypot(normal, binormal)[1:], across[1:], equal_nan=True)
-    parts = (np.linalg.norm(delta, axis=1), *delta.T, along, normal, binormal, across)
+    # what counts: at waypoints the distance from the nominal point, between them that from the path
+    waypoint = review.scene.samples.share == 1.0
+    distance = np.where(waypoint, np.linalg.norm(delta, axis=1), across)
+    parts = (distance, *delta.T, along, normal, binormal, across)
     return dict(zip(PARTS, parts, strict=True))
 
 

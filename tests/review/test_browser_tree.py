@@ -189,7 +189,7 @@ def test_csv_has_the_points_that_are_selected(tree: Any, drilled: Review) -> Non
     assert download.value.suggested_filename == "bracket-points.csv"
     text = download.value.path().read_bytes().decode("utf-8")
     head, body = text.split("\r\n", 1)
-    assert head.startswith("# ") and "frame=" in head
+    assert head.startswith('"# ') and "frame=" in head
     found = list(csv.DictReader(io.StringIO(body)))
     index = np.concatenate([np.arange(a, b + 1) for a, b in node["samples"]])
     assert len(found) == len(index)

@@ -15,6 +15,7 @@
       this.base = get(manifest.base);
       this.rows = get(manifest.line);
       this.kind = get(manifest.rapid);
+      this.waypoint = manifest.waypoint ? get(manifest.waypoint) : null;
       this.time = get(manifest.time);
       this.arc = get(manifest.way); // arc length, mm
       this.samples = this.time.length;
@@ -58,7 +59,7 @@
     runs() {
       const rows = this.manifest.arrays[this.manifest.listing.row_nominal].n;
       this.first = new Int32Array(rows).fill(-1);
-      for (let i = this.samples - 1; i > 0; i--) if (this.rows[i] >= 0) this.first[this.rows[i]] = i;
+      for (let i = this.samples - 1; i >= 0; i--) if (this.rows[i] >= 0 && (i > 0 || this.first[this.rows[0]] < 0)) this.first[this.rows[i]] = i;
     }
 
     // How the segment that ends in each sample is drawn.
@@ -84,7 +85,7 @@
 
     // Samples [a, b] of the run of a row that holds `near`, or else of its first run; null where it has no move.
     run(row, near = -1) {
-      let a = near > 0 && this.rows[near] === row ? near : (this.first[row] ?? -1);
+      let a = near >= 0 && this.rows[near] === row ? near : (this.first[row] ?? -1);
       if (a < 0) return null;
       let b = a;
       while (a > 1 && this.rows[a - 1] === row) a--;
@@ -136,6 +137,7 @@
     // Draws faintly what is outside a filter; null is none.
     set_mask(mask) {
       this.mask = mask;
+      this.mask_number = (this.mask_number ?? 0) + 1;
       this.compose();
       this.scene.schedule(30);
       OLP.emit("filter");
@@ -239,7 +241,7 @@
       this.state.worst =
         this.state.worst < 0 ? (step > 0 ? 0 : list.length - 1) : (this.state.worst + step + list.length) % list.length;
       const {row, value} = list[this.state.worst],
-        sample = this.largest_of(row, name);
+        sample = this.place_of(row, name, value);
       this.set_sample(sample);
       this.select_row(row, true);
       this.camera.reveal(this.tool_point());
@@ -260,15 +262,15 @@
       return rows.sort((p, q) => q.value - p.value || p.row - q.row).slice(0, RANKED);
     }
 
-    // The sample of a row where the layer is shown farthest off.
-    largest_of(row, name) {
+    // The sample of a row where the layer is off by what the table states, as nearly as it is shown.
+    place_of(row, name, value) {
       const values = this.metrics.values(this.distance, name),
         layer = this.layers.get(name);
       let sample = this.first[row],
-        most = -1;
+        least = Infinity;
       for (let i = 0; i < values.length; i++) {
         const at = layer.index ? layer.index[i] : i;
-        if (this.rows[at] === row && values[i] > most) [sample, most] = [at, values[i]];
+        if (this.rows[at] === row && Math.abs(values[i] - value) < least) [sample, least] = [at, Math.abs(values[i] - value)];
       }
       return sample;
     }

@@ -4,6 +4,7 @@
   const T = MeshCat.THREE,
     FOV = 30,
     MARGIN = 1.1;
+  const LEAST = 0.02; // half height of a view, as a share of the reach of the job
   const KEPT = {left: 24, right: 24, top: 46, bottom: 40}; // px at the edges of the picture that buttons cover
   // Directions from which the six standard views and the isometric one look.
   const VIEWS = {
@@ -21,7 +22,7 @@
   class Camera {
     // box: [low, high] corners (mm) of what a view shows; reach: radius (mm) round its middle that nothing drawn leaves
     constructor(app, box, reach) {
-      Object.assign(this, {app, viewer: app.scene.viewer, box, reach, name: "iso"});
+      Object.assign(this, {app, viewer: app.scene.viewer, box, reach});
       this.middle = [0, 1, 2].map(j => (box[0][j] + box[1][j]) / 2);
       this.perspective = new T.PerspectiveCamera(FOV, 1, 0.01, 100);
       this.parallel = new T.OrthographicCamera(-1, 1, 1, -1, 0, 100);
@@ -59,6 +60,7 @@
       controls.rotateSpeed = 0.8;
       controls.zoomSpeed = 1.2;
       controls.addEventListener("change", () => this.app.scene.schedule(120));
+      controls.addEventListener("start", () => this.turned());
       this.resized();
     }
 
@@ -125,13 +127,18 @@
       }
       const {clientWidth: w, clientHeight: h} = this.app.scene.pane,
         free = [w - KEPT.left - KEPT.right, h - KEPT.top - KEPT.bottom].map(v => Math.max(v, h / 4));
-      this.half = Math.max((high * h) / free[1], (wide * h) / free[0], 1e-6) * MARGIN;
+      this.half = Math.max((high * h) / free[1], (wide * h) / free[0], LEAST * this.reach * 0.001) * MARGIN;
       this.parallel.zoom = 1;
       const distance = this.half / Math.tan(((FOV / 2) * Math.PI) / 180) + deep;
       this.active.position.copy(target).addScaledVector(from, distance);
       controls.target.copy(target);
-      if (name) this.name = name;
       this.refresh();
+    }
+
+    // The view is none of the standard ones any more.
+    turned() {
+      this.app.state.view = "";
+      OLP.emit("view");
     }
 
     // Turns by angles (rad) about the vertical and the horizontal of the view, and comes nearer by a factor.
@@ -144,6 +151,7 @@
       if (this.ortho) this.parallel.zoom *= nearer;
       else polar.radius /= nearer;
       this.active.position.copy(controls.target).add(away.setFromSpherical(polar));
+      this.turned();
       this.refresh();
     }
 
@@ -171,21 +179,22 @@
         target: this.viewer.controls.target.toArray(),
         half: this.half,
         zoom: this.parallel.zoom,
-        name: this.name,
       };
     }
 
     // A camera from an address; one that cannot be is left out.
-    restore({ortho, position, target, half, zoom, name}) {
+    restore({ortho, position, target, half, zoom}) {
       const three = v => Array.isArray(v) && v.length === 3 && v.every(Number.isFinite);
-      if (!three(position) || !three(target) || !(half > 0) || !(zoom > 0) || position.every((v, j) => v === target[j])) return;
+      if (!three(position) || !three(target) || ![half, zoom].every(v => Number.isFinite(v) && v > 0) || position.every((v, j) => v === target[j])) return;
       ortho = Boolean(ortho);
       if (ortho !== this.ortho) this.use(ortho ? this.parallel : this.perspective);
-      Object.assign(this, {half, name: Object.hasOwn(VIEWS, name) ? name : "iso"});
+      this.half = half;
       this.parallel.zoom = zoom;
       this.active.position.fromArray(position);
       this.viewer.controls.target.fromArray(target);
       this.refresh();
+      this.app.state.view = "";
+      document.getElementById("ortho").setAttribute("aria-pressed", this.ortho);
     }
 
     // Unit vectors of the machine axes on the screen (x right, y down).

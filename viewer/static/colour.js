@@ -57,8 +57,6 @@
     return k;
   }
 
-  const hex_rgb = text => [1, 3, 5].map(i => parseInt(text.slice(i, i + 2), 16));
-
   // Smallest round number that is not below x.
   function round_up(x) {
     if (!(x > 0)) return 1;
@@ -108,14 +106,16 @@
           .replace("mm/s3", "mm/s³");
 
   // A number as people write it: thousands in commas or spaces, a multiplication sign in front.
+  // A decimal comma is none: what it means is not known.
   const parse = text => {
     const plain = String(text)
-      .replace(/[×x\s,']/g, "")
-      .replace("−", "-");
+      .replace(/[×x\s']/g, "")
+      .replace("−", "-")
+      .replace(/,(?=\d{3}(?:[,.]|$))/g, "");
     return plain === "" ? NaN : Number(plain);
   };
 
   Object.assign(OLP, {
-    colour: {bands, signed_bands, shades, band_of, round_up, ticks, number, um, unit_label, hex_rgb, parse},
+    colour: {bands, signed_bands, shades, band_of, round_up, ticks, number, um, unit_label, parse},
   });
 })();

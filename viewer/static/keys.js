@@ -76,7 +76,9 @@
         e.target.closest("input:not([type=checkbox],[type=range]),select,textarea,dialog")
       )
         return;
-      if ((e.key === " " || e.key === "Enter") && e.target.closest("button,summary,[type=checkbox]")) return;
+      if ((e.key === " " || e.key === "Enter") && e.target.closest("a,button,summary,[type=checkbox]")) return;
+      // keys that scroll a page do so where nothing of the picture has the focus
+      if (/^(Arrow|Page| )/.test(e.key) && document.scrollingElement.scrollHeight > innerHeight && !e.target.closest("#centre,#listing")) return;
       if (/^(Arrow|Page|Home|End)/.test(e.key) && e.target.closest("[type=range]")) return;
       const key = e.shiftKey && e.key.startsWith("Arrow") ? `Shift ${e.key}` : e.key,
         entry = this.table.find(([keys]) => keys.includes(key));

@@ -49,7 +49,9 @@
       const {pictures, metric} = this.app,
         {current} = pictures,
         scale = current?.scale;
-      if (!metric || !scale) return "No colours";
+      if (!metric) return "No colours";
+      if (!scale) return `${this.title()}: not known for this picture`;
+      if (metric.kind === "state") return `${this.title()}: within or above; enlarged ${this.factor()} times`;
       const unit = OLP.colour.unit_label(metric.unit),
         ends = `${OLP.colour.number(scale.edges[0])} to ${OLP.colour.number(scale.edges.at(-1))} ${unit}`;
       return `${this.title()}: ${scale.shades.length} bands from ${ends}${this.unit_text()}; enlarged ${this.factor()} times`;
@@ -66,7 +68,7 @@
       const {pictures, metric, manifest} = this.app,
         {current} = pictures;
       if (!metric?.judged || !current) return "";
-      const tolerance = pictures.tolerance(current),
+      const tolerance = current.scale?.tolerance ?? null,
         own = tolerance === current.tolerance_um && pictures.basis !== "display";
       if (tolerance === null) return "; no part tolerance is stated";
       const what = own
@@ -101,7 +103,11 @@
       const titled = Math.min(wide, c.measureText(this.title()).width);
       c.font = `11px ${look.font}`;
       c.fillStyle = look.soft;
-      if (!metric || !scale) return;
+      if (!metric) return;
+      if (!scale) {
+        c.fillText("not known for this picture", x + titled + 12, y + 7);
+        return;
+      }
       c.fillText(this.unit_text().replace(/^; /, ""), x + titled + 12, y + 7, Math.max(1, wide - titled - 12));
       const {edges, shades, tolerance} = scale,
         each = Math.min(96, (wide - 56) / shades.length),
@@ -138,7 +144,7 @@
       const {app} = this,
         {current} = app.pictures,
         {edges, shades} = current.scale,
-        key = [current.name, app.state.metric, edges.join(), app.mask ? (app.mask_number ?? 0) : -1].join("|");
+        key = [current.name, app.state.metric, edges.join(), app.mask_number ?? 0].join("|");
       if (this.key === key) return this.known;
       const sum = new Float64Array(shades.length);
       for (const name of current.layers) {

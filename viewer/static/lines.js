@@ -155,5 +155,4 @@ void main() {
   }
 
   OLP.Lines = Lines;
-  OLP.BANDS = BANDS;
 })();

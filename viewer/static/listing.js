@@ -252,7 +252,7 @@
     // Row of a 1-based line of the nominal (0) or corrected (1) file, or -1.
     row_of_line(line, side = 0) {
       if (side === 0 && this.names) return this.row_named(String(line));
-      return this.numbers[side] ? this.numbers[side].indexOf(line) : -1;
+      return line > 0 && this.numbers[side] ? this.numbers[side].indexOf(line) : -1;
     }
 
     // Next row after `from` with the text on either side, in a circle; -1 where there is none.

@@ -72,8 +72,9 @@
       OLP.emit("theme");
     };
     app.set_view = name => {
-      app.state.view = name;
       app.camera.fit(name);
+      app.state.view = name;
+      OLP.emit("view");
     };
     app.go_to_line = line => {
       const row = app.listing.row_of_line(line);
@@ -94,12 +95,13 @@
     app.text = () => {
       const {current} = app.pictures,
         {um} = OLP.colour,
-        drawn = `Seen from ${app.state.view}, deviations enlarged ${app.legend.factor()} times.`;
+        drawn = `${app.state.view ? `Seen from ${app.state.view}, d` : "D"}eviations enlarged ${app.legend.factor()} times.`;
       if (!current) return `The nominal path. ${drawn}`;
-      const place = current.flag ? ` at line ${current.flag.line}, towards ${OLP.direction(current.flag.direction)}` : "";
+      const towards = current.flag && OLP.direction(current.flag.direction),
+        place = current.flag ? ` at line ${current.flag.line}${towards ? `, towards ${towards}` : ""}` : "";
       return `Picture ${current.label}: the largest deviation is ${um(current.largest_um)} µm${place}. ${drawn}`;
     };
-    for (const event of ["picture", "exaggeration", "scale"]) OLP.on(event, () => app.scene.pane.setAttribute("aria-label", app.text()));
+    for (const event of ["picture", "exaggeration", "scale", "view"]) OLP.on(event, () => app.scene.pane.setAttribute("aria-label", app.text()));
   }
 
   function follow_listing(app) {

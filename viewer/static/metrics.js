@@ -72,13 +72,22 @@
       const {n, D} = layer,
         out = new Float32Array(n);
       if (!D) return out;
-      if (part === "magnitude")
-        for (let i = 0, k = 0; i < n; i++, k += 3)
-          out[i] = 1e3 * Math.sqrt(D[k] * D[k] + D[k + 1] * D[k + 1] + D[k + 2] * D[k + 2]);
+      if (part === "magnitude") this.distance(layer, out);
       else if (part === "x" || part === "y" || part === "z")
         for (let i = 0, k = "xyz".indexOf(part); i < n; i++, k += 3) out[i] = 1e3 * D[k];
       else this.split(part, layer, out);
       return out;
+    }
+
+    // What counts, as in the proof: at waypoints the distance from the nominal point, between them the distance from the
+    // path; of measured points the distance.
+    distance(layer, out) {
+      const {n, D, index} = layer,
+        {waypoint} = this.app;
+      if (!index && waypoint) this.split("across", layer, out);
+      for (let i = 0, k = 0; i < n; i++, k += 3)
+        if (index || !waypoint || waypoint[i])
+          out[i] = 1e3 * Math.sqrt(D[k] * D[k] + D[k + 1] * D[k + 1] + D[k + 2] * D[k + 2]);
     }
 
     // Parts by the direction of the nominal segment that ends in the sample: along it; normal, to its left in the plane

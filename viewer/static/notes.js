@@ -157,20 +157,21 @@
         list = v => (Array.isArray(v) ? v : []),
         last = app.samples - 1,
         whole = v => Number.isInteger(v) && v >= 0 && v <= last;
-      app.set_theme(view.theme === "dark" ? "dark" : "light");
+      if (["dark", "light"].includes(view.theme)) app.set_theme(view.theme);
       for (const [name, on] of Object.entries(view.layers ?? {})) app.set_layer(name, on);
       list(view.enlargement).forEach((k, i) => {
         if (pictures.list[i]) pictures.list[i].chosen = Number.isFinite(k) && k >= 1 ? Math.min(1e5, k) : null;
       });
       pictures.same = view.same === true;
       pictures.set_basis(view.basis, view.display_um);
-      app.set_metric(String(view.metric ?? ""));
+      app.set_metric(String(view.metric ?? app.state.metric));
       pictures.show(view.picture);
-      app.state.notes = list(view.notes)
-        .filter(n => n && whole(n.sample))
-        .map(n => ({sample: n.sample, text: String(n.text).slice(0, 500), layer: String(n.layer)}));
+      if (Array.isArray(view.notes))
+        app.state.notes = view.notes
+          .filter(n => n && whole(n.sample))
+          .map(n => ({sample: n.sample, text: String(n.text).slice(0, 500), layer: String(n.layer)}));
       this.list();
-      app.set_time(Number.isFinite(view.time) ? view.time : 0);
+      if (Number.isFinite(view.time)) app.set_time(view.time);
       app.choose(list(view.chosen).filter(r => Array.isArray(r) && whole(r[0]) && whole(r[1]) && r[0] <= r[1]));
       if (view.camera && typeof view.camera === "object") app.camera.restore(view.camera);
       if (view.section && typeof view.section === "object") {

@@ -29,7 +29,7 @@
     constructor(app) {
       this.app = app;
       this.canvas = document.getElementById("overlay");
-      this.measured = []; // up to two {point, true_point}
+      this.measured = []; // up to two {layer, at, true_point}
       this.hover = null; // {layer, at}
       OLP.on("drawn", () => this.show());
     }
@@ -74,7 +74,7 @@
       const {app, context: c} = this,
         {state, pictures} = app;
       for (const layer of app.layers.values()) {
-        if (!layer.visible) continue;
+        if (!layer.visible || !layer.knows(state.sample_at)) continue;
         const p = this.at(layer.at(layer.own(state.sample_at), pictures.k_of(layer)));
         if (p) this.dot(p, 3, this.paper, this.ink);
       }
@@ -227,7 +227,8 @@
 
     measure() {
       const {context: c, measured} = this,
-        ends = measured.map(m => this.at(m.point));
+        {layers, pictures} = this.app,
+        ends = measured.map(({layer, at}) => this.at(layers.get(layer).at(at, pictures.k_of(layers.get(layer)))));
       if (ends.some(p => !p)) return;
       if (ends.length === 2) {
         Object.assign(c, {strokeStyle: this.ink, lineWidth: 1.5});

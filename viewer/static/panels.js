@@ -229,16 +229,21 @@
           "tr",
           {},
           make("th", {textContent: line ? `line ${line}` : ""}),
-          ...["X", "Y", "Z", "size"].map(a => make("th", {textContent: a})),
+          ...["X", "Y", "Z", app.distance?.label ?? ""].map(a => make("th", {textContent: a})),
         ),
       );
       row("nominal, mm", [...p.map((v, j) => (v + manifest.origin_mm[j]).toFixed(3).replace("-", "−")), ""]);
       for (const layer of app.layers.values()) {
         if (!layer.D || !app.pictures.of_layer(layer.name)) continue;
+        if (!layer.knows(state.sample_at)) {
+          row(`${layer.name}, µm`, ["–", "–", "–", "–"]);
+          continue;
+        }
         const at = layer.own(state.sample_at),
           a = layer.at(at, 0),
-          d = layer.at(at, 1).map((v, j) => 1e3 * (v - a[j]));
-        row(`${layer.name}, µm`, [...d.map(number), number(Math.hypot(...d))]);
+          d = layer.at(at, 1).map((v, j) => 1e3 * (v - a[j])),
+          size = app.metrics.values(app.distance, layer.name)?.[Math.ceil(at - 1e-9)] ?? NaN;
+        row(`${layer.name}, µm`, [...d.map(number), size === size ? number(size) : "–"]);
       }
       $("readout").replaceChildren(table);
     }

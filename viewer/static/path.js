@@ -64,10 +64,6 @@
       }
     }
 
-    sample(i) {
-      return this.index ? this.index[Math.min(i, this.n - 1)] : i;
-    }
-
     // Position of the own index i (may be between two) at exaggeration k, mm.
     at(i, k, out = [0, 0, 0]) {
       const a = Math.max(0, Math.min(this.n - 1, Math.floor(i))),
@@ -79,6 +75,16 @@
         out[j] = p + f * (q - p);
       }
       return out;
+    }
+
+    // Whether the layer is known at a nominal sample: a measured one within its run, and not in a gap of it.
+    knows(sample) {
+      const {index} = this;
+      if (!index) return true;
+      if (!(sample >= index[0] && sample <= index[this.n - 1])) return false;
+      const i = OLP.find(index, sample),
+        j = Math.min(this.n - 1, i + 1);
+      return !(index[i] < sample && this.kind?.[j]);
     }
 
     // Own index (may be between two) of a nominal sample.

@@ -35,7 +35,8 @@
     // Shows picture number `at`, or a blend of the two beside it.
     show(at) {
       this.at = Math.max(0, Math.min(this.list.length - 1, Number.isFinite(+at) ? +at : this.at));
-      this.draw();
+      if (this.same) this.rescale();
+      else this.draw();
       OLP.emit("picture");
     }
 
@@ -79,7 +80,7 @@
       this.list.forEach((picture, k) => {
         picture.automatic = this.enlargement(this.same ? Math.max(...sizes) : sizes[k]);
         const tolerance = metric?.judged ? this.tolerance(this.same ? this.current : picture) : null;
-        if (!metric) picture.scale = null;
+        if (!metric || !picture.layers.some(name => name in metric.by_layer)) picture.scale = null;
         else if (metric.kind === "state")
           picture.scale = {edges: [0, 1.5, 2.5], tolerance: 1.5, shades: [palette.within[5], palette.above[4]]};
         else {

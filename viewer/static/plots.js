@@ -138,8 +138,8 @@
         {current} = pictures;
       if (!current || !app.scene) return;
       const limits = picture => {
-        const value = pictures.tolerance(picture);
-        return value === null ? [] : [{value}];
+        const value = app.metric?.judged ? picture.scale?.tolerance : pictures.tolerance(picture);
+        return value ? [{value}] : [];
       };
       const lane = (title, picture, metric, limit) => ({title, unit: OLP.colour.unit_label(metric.unit), series: this.series(picture, metric), limits: limit});
       const lanes = names

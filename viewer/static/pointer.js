@@ -54,10 +54,10 @@
     }
 
     mark({layer, at}) {
-      const {overlay, pictures, layers} = this.app,
+      const {overlay, layers} = this.app,
         path = layers.get(layer);
       if (overlay.measured.length === 2) overlay.measured = [];
-      overlay.measured.push({point: path.at(at, pictures.k_of(path)), true_point: path.at(at, path.D ? 1 : 0)});
+      overlay.measured.push({layer, at, true_point: path.at(at, path.D ? 1 : 0)});
       overlay.show();
       if (overlay.measured.length === 2) this.app.toast(this.text().replace("\n", "   "), 8000);
     }
@@ -103,7 +103,7 @@
       const text = [
         path.label,
         line ? `line ${line}:  ${app.listing.text(row, 0).slice(0, 60)}` : "",
-        `${app.time_of(hit.sample).toFixed(3)} s,  ${app.kind[sample] === OLP.RAPID ? "rapid" : "feed"}`,
+        `${app.time_of(hit.sample).toFixed(3)} s,  ${app.kind[sample] === OLP.RAPID ? "does not count" : "counts"}`,
       ];
       const value = values?.[Math.round(hit.at)];
       if (values && metric.kind === "state") text.push(value === 2 ? "line above" : value === 1 ? "line within" : "not judged");

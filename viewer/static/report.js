@@ -60,7 +60,8 @@
 
   // A cell of CSV; text that a spreadsheet would take for a formula is quoted by an apostrophe.
   const cell = value => {
-    const text = typeof value === "string" && /^[=+\-@\t\r]/.test(value) ? `'${value}` : String(value);
+    const plain = String(value).replace(/[\x00-\x1f\x7f]/g, " "),
+      text = /^[=+\-@]/.test(plain) ? `'${plain}` : plain;
     return /[",\n\r]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
   };
 
@@ -68,8 +69,8 @@
   OLP.csv = app => {
     const layers = [...app.layers.values()].filter(l => l.D && app.pictures.of_layer(l.name)),
       {origin_mm: origin, frame} = app.manifest,
-      heads = ["line", "distance_mm", "time_s", "move", "X_mm", "Y_mm", "Z_mm", ...layers.flatMap(l => ["X", "Y", "Z"].map(a => `${l.name}_D${a}_um`))],
-      rows = [`# ${app.manifest.title}, frame=${frame}`, heads.map(cell).join(",")];
+      heads = ["line", "distance_mm", "time_s", "kind", "X_mm", "Y_mm", "Z_mm", ...layers.flatMap(l => ["X", "Y", "Z"].map(a => `${l.name}_D${a}_um`))],
+      rows = [cell(`# ${app.manifest.title}; frame=${frame}`), heads.map(cell).join(",")];
     const put = i => {
       const line = app.listing.number(app.rows[i], 0),
         p = [0, 1, 2].map(j => (app.base[3 * i + j] + origin[j]).toFixed(4)),
@@ -78,7 +79,7 @@
           const own = OLP.find(l.index, i);
           return l.index[own] === i ? [0, 1, 2].map(j => (1e3 * l.D[3 * own + j]).toFixed(3)) : ["", "", ""];
         });
-      rows.push([cell(String(line)), app.arc[i].toFixed(3), app.time[i].toFixed(6), ["feed", "rapid", "start"][app.kind[i]], ...p, ...away].join(","));
+      rows.push([cell(String(line)), app.arc[i].toFixed(3), app.time[i].toFixed(6), ["counts", "does not count", "start"][app.kind[i]], ...p, ...away].join(","));
     };
     const {chosen} = app.state;
     if (chosen.length) for (const [a, b] of chosen) for (let i = Math.max(0, a); i <= b; i++) put(i);
@@ -130,10 +131,10 @@
       layers = pictures.list.flatMap(p => p.layers);
     return tree.nodes.slice(0, MOST_FEATURES).map(node => [
       `${node.label} ${node.detail ?? ""}`.trim(),
-      node.place,
+      OLP.lines_of(node),
       pictures.list.map(p => um(tree.largest(node, p))).join(" → "),
       (node.figures ?? []).map(f => `${f.label} ${layers.filter(n => f.by_layer[n] !== undefined && f.by_layer[n] !== null).map(n => um(f.by_layer[n])).join(" → ")}`).join("; "),
-      node.holds === null ? "–" : node.holds && node.measured_holds !== false ? "within" : "ABOVE",
+      node.ok === null ? "–" : node.ok ? "within" : "ABOVE",
     ]);
   }
 

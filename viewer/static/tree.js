@@ -7,6 +7,9 @@
   const SYMBOL = {true: "●", false: "▲", null: "○"},
     WORDS = {true: "within", false: "above", null: "not judged"};
 
+  // The lines of a node, as the listing names them.
+  const lines_of = node => (node.first_line === node.last_line ? node.place : `${node.place} to ${node.last_place ?? node.last_line}`);
+
   class Tree {
     constructor(app) {
       this.app = app;
@@ -24,7 +27,6 @@
       this.host.addEventListener("keydown", e => this.key(e));
       this.filter();
       this.draw();
-      OLP.on("picture", () => this.draw());
       for (const event of ["chosen", "filter"]) OLP.on(event, () => this.summary());
       this.summary();
     }
@@ -39,11 +41,16 @@
     }
 
     draw() {
-      const rows = [...this.visible()].map(([node, depth]) => this.row(node, depth));
-      if (rows.length) rows.unshift(make("p", {className: "empty", textContent: `${this.app.pictures.list.map(p => p.label).join(" → ")}, µm`}));
-      if (!rows.length) rows.push(make("p", {className: "empty", textContent: this.nodes.length ? "Nothing passes the filter." : "No features are listed."}));
-      rows.push(...this.tools.map(tool => this.tool(tool)));
-      if (this.unlisted) rows.push(make("p", {className: "empty", textContent: `${this.unlisted} more features are not listed.`}));
+      const rows = [...this.visible()].map(([node, depth]) => this.row(node, depth)),
+        here = rows.find(row => row.getAttribute("aria-selected") === "true") ?? rows[0];
+      if (here) here.tabIndex = 0;
+      $("tree-head").textContent = rows.length
+        ? `${this.app.pictures.list.map(p => p.label).join(" → ")}, µm`
+        : this.nodes.length
+          ? "Nothing passes the filter."
+          : "No features are listed.";
+      $("tree-foot").replaceChildren(...this.tools.map(tool => this.tool(tool)));
+      if (this.unlisted) $("tree-foot").append(make("p", {className: "empty", textContent: `${this.unlisted} more features are not listed.`}));
       this.host.replaceChildren(...rows);
     }
 
@@ -55,10 +62,10 @@
       row.setAttribute("aria-level", depth + 1);
       row.setAttribute("aria-selected", node === this.current);
       if (node.children.length) row.setAttribute("aria-expanded", node.open);
-      row.tabIndex = node === (this.current ?? this.roots[0]) ? 0 : -1;
+      row.tabIndex = -1;
       row.style.paddingLeft = `${4 + 12 * depth}px`;
       row.dataset.id = node.id;
-      const label = make("span", {className: "label", title: `${node.label} ${node.detail ?? ""}, lines ${node.place}`}, `${node.label} `);
+      const label = make("span", {className: "label", title: `${node.label} ${node.detail ?? ""}, lines ${lines_of(node)}`}, `${node.label} `);
       label.append(make("small", {textContent: node.detail ?? ""}));
       const size = make("span", {className: "figures"}, make("span", {title: "largest deviation of what counts"}, `largest ${sizes.map(um).join(" → ")}`));
       size.append(...this.figures(node));
@@ -87,10 +94,9 @@
 
     // The verdict of a node or a tool.
     mark(node) {
-      const holds = node.measured_holds === false ? false : node.holds,
-        mark = make("span", {className: holds === false ? "flagged" : "", textContent: SYMBOL[holds], title: WORDS[holds]});
+      const mark = make("span", {className: node.ok === false ? "flagged" : "", textContent: SYMBOL[node.ok], title: WORDS[node.ok]});
       mark.setAttribute("role", "img");
-      mark.setAttribute("aria-label", WORDS[holds]);
+      mark.setAttribute("aria-label", WORDS[node.ok]);
       return mark;
     }
 
@@ -250,7 +256,7 @@
     keep_chosen() {
       const {app} = this;
       if (!app.state.chosen.length) {
-        app.toast("Select a feature, a line or a part of the strip first", 3000);
+        app.toast("Select a feature or a line first", 3000);
         return;
       }
       const mask = new Uint8Array(app.samples);
@@ -282,7 +288,7 @@
           if (!by[name]) continue;
           const values = app.arrays.get(by[name].um),
             states = app.arrays.get(by[name].state);
-          for (let row = 0; row < rows.length; row++) if (rows[row] && states[row] < 3 && values[row] > most) most = values[row];
+          for (let row = 0; row < rows.length; row++) if (rows[row] && states[row] < 2 && values[row] > most) most = values[row];
         }
         return most < 0 ? null : `${picture.label} ${um(most)}`;
       });
@@ -293,5 +299,5 @@
     }
   }
 
-  OLP.Tree = Tree;
+  Object.assign(OLP, {Tree, lines_of});
 })();

@@ -59,14 +59,6 @@ class Layers:
         new = np.concatenate(([True], first[1:] > last[:-1] + 1))
         return np.stack((first[new], last[np.append(np.flatnonzero(new)[1:] - 1, len(last) - 1)]), axis=1)
 
-    def worst_sample(self, layer: str, row: int) -> int | None:
-        """The sample of a move with the largest deviation."""
-        a, b = int(self.begin[row]), int(self.begin[row + 1])
-        if b <= a:
-            return None
-        delta = getattr(self._scene.samples, layer)[a:b]
-        return a + int((delta**2).sum(axis=1).argmax())
-
     def _along(self, rows: Index) -> tuple[Index, Index, Array]:
         """Samples of moves with their starts: (k,) the sample, the move, and the length of path in mm that
         the sample stands for."""

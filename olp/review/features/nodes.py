@@ -85,7 +85,7 @@ class _Told:
                 worst = int(judged[np.nan_to_num(values[judged]).argmax()])
                 sizes[layer] = float(np.nan_to_num(values[worst])) * UM_PER_MM
                 lines[layer] = self._scene.place(int(table.line[worst]))
-                samples[layer] = self._layers.worst_sample(layer, worst)
+                samples[layer] = self._scene.worst_sample(layer, worst)
         measured = np.zeros(len(moves), bool)
         for layer, size in zip(self._layers.names[len(MODEL) :], self._sizes, strict=True):
             known = moves[np.isfinite(size[moves])]
@@ -95,12 +95,16 @@ class _Told:
                 sizes[layer] = float(size[worst])
                 lines[layer] = self._scene.place(int(table.line[worst]))
         over = self._measured_over
+        holds = not bool(self._over[judged].any()) if len(judged) else None
+        runs = not bool(over[moves].any()) if over is not None and measured.any() else None
+        answers = [answer for answer in (holds, runs) if answer is not None]
         return {
             "largest_um": sizes,
             "worst_line": lines,
             "worst_sample": samples,
-            "holds": not bool(self._over[judged].any()) if len(judged) else None,
-            "measured_holds": not bool(over[moves].any()) if over is not None and measured.any() else None,
+            "holds": holds,
+            "measured_holds": runs,
+            "ok": all(answers) if answers else None,
         }
 
     def tools(self, rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:

@@ -11,8 +11,8 @@ MOST = 20_000
 
 
 def key_frames(time_s: Array, value: Array, tolerance: float, most: int = MOST) -> Index:
-    """The samples to keep of (n,) times in order and (n, c) values, so that between them straight lines in
-    time are within `tolerance` of every sample; at most `most`, the worst first, from coarse to fine."""
+    """The samples to keep of (n,) times in order and (n, c) values: between them straight lines in time are
+    within `tolerance` of every sample. At most `most` are kept, the worst first, from coarse to fine."""
     keep = np.zeros(len(time_s), bool)
     keep[[0, -1]] = True
     while True:

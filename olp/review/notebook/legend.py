@@ -38,7 +38,9 @@ _HIGHEST = 0.96
 _COLUMNS = (0.078, 0.272)
 #: Comes with matplotlib.
 _FONT = "DejaVu Sans"
-_INK, _SOFT, _RULE = "#17202b", "#56616f", "#d8dee6"
+_INK = "#17202b"
+_SOFT = "#56616f"
+_RULE = "#d8dee6"
 #: No colour, in matplotlib and in HTML.
 _NONE = "none"
 #: Colour of a verdict that is not good.
@@ -119,9 +121,9 @@ class Legend:
     def _repr_html_(self) -> str:
         """The legend for a notebook."""
         said, cell = html.escape, '<td style="text-align:left">'
+        band = '<td style="background:{};width:3em"></td>'
         rows = "".join(
-            f'<tr><td style="background:{colour};width:3em"></td>{cell}{said(text)}</td>'
-            f"{cell}{said(share)}</td></tr>"
+            f"<tr>{band.format(colour)}{cell}{said(text)}</td>{cell}{said(share)}</td></tr>"
             for colour, text, share in self.rows
         )
         return (

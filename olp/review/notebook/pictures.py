@@ -95,8 +95,8 @@ class Picture:
 
     def dots(self, job_mm: float, most: int) -> tuple[Array, Index]:
         """(d, 3) points in mm, close enough along the enlarged path to look like a wide line, at most about
-        `most`, and those of samples that no segment leads to, such as probed points; (d,) the band of each.
-        `job_mm` is the size of the job."""
+        `most`; (d,) the band of each. Samples that no segment leads to, such as probed points, are there,
+        too. `job_mm` is the size of the job."""
         ends, band = self.path(most)
         begin, end = self.enlarged_mm[ends[:, 0]], self.enlarged_mm[ends[:, 1]]
         length = np.linalg.norm(end - begin, axis=1)
