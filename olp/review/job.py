@@ -22,6 +22,7 @@ from olp.files.write import write_bytes
 from olp.program.program import Program
 from olp.program.registry import Options, read
 from olp.proof.judgement import Judgements
+from olp.review.features.moves import digit_mm
 from olp.review.listing import aligned
 from olp.review.manifest import manifest_of
 from olp.review.measured import Matched, Matcher, refuse_unplaced, with_measured
@@ -153,6 +154,7 @@ def run(
         )
         # the words of a long program are large: after this they are not needed
         seconds = None if options.time else feed_seconds(nominal, loaded.setup.machine)
+        digit = digit_mm(nominal)
     if corrected is not None:
         corrected.load()
         second: Source | Correction | Run = corrected
@@ -171,7 +173,7 @@ def run(
         del second, nominal
         shown = _shown(session, texts, seconds, loaded, options, progress)
     tell("pack", 0.0)
-    return Review(_scene(session, texts, shown, loaded, options, measured))
+    return Review(_scene(session, texts, shown, loaded, options, measured, digit))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -241,7 +243,7 @@ def _shown(
 
 def _scene(
     session: Session, texts: _Texts, shown: _Shown, loaded: Loaded, options: ViewOptions,
-    measured: Sequence[PathLike],
+    measured: Sequence[PathLike], digit: float,
 ) -> Scene:  # fmt: skip
     setup, nominal, plan = loaded.setup, texts.nominal, shown.plan
     samples, moment = shown.samples, shown.moment
@@ -288,6 +290,7 @@ def _scene(
         tolerance_um=report["verdict"]["numerical"]["allowed_um"],
         tool_radius_mm=_radius(setup, nominal),
         tool_radii_mm=_radii(setup, nominal),
+        digit_mm=digit,
         uncertainty=_uncertainty(loaded, nominal, samples, part_um, options.date),
     )
 

@@ -65,7 +65,8 @@ class Scene:
     """`position_mm` (n, 3) are the samples in `frame`; `time_s` (n,) are their times on the re-timed motion,
     where there is one, else at the feed. `sources` are (name, (n,) mm) by size; `report` is that of the
     correction or verification ("olp-report-1"), `table` its judgements with lines of the nominal text as
-    shown. `tool_radii_mm` has the tools of the program that have a radius; `uncertainty` is None where the
+    shown. `digit_mm` is the last digit of its coordinates.
+    `tool_radii_mm` has the tools of the program that have a radius; `uncertainty` is None where the
     calibration states none."""
 
     name: str
@@ -88,6 +89,7 @@ class Scene:
     tolerance_um: float
     tool_radius_mm: float
     tool_radii_mm: Mapping[int, float]
+    digit_mm: float
     uncertainty: TipUncertainty | None = None
 
     def worst_sample(self, layer: str, move: int) -> int | None:

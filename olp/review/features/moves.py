@@ -17,6 +17,7 @@ from olp.core.arrays import Array, Index, Mask
 from olp.core.geometry import PLANES
 from olp.core.toolpath import Flag, Frame, Kind, Toolpath
 from olp.program.feeds.moves import lengths_mm
+from olp.program.program import Program
 from olp.review.features.figures import number
 from olp.review.scene import Scene
 
@@ -68,7 +69,7 @@ class Moves:
         self.length_mm = lengths_mm(self.path)
         self.does, self._staying = self._looked_at()
         self.stretch = self._stretches()
-        self.digit_mm = _digit_mm(scene)
+        self.digit_mm = scene.digit_mm
         self.near_mm = max(_NEAR_MM, 0.5 * self.digit_mm)
 
     @cached_property
@@ -220,9 +221,8 @@ def _turned(frame: Frame) -> Array:
     return np.asarray(columns, float)
 
 
-def _digit_mm(scene: Scene) -> float:
+def digit_mm(program: Program) -> float:
     """The last digit of the coordinates of a program in mm; where it is not known, that of most programs."""
-    program = scene.nominal
     used = program.slot[program.slot >= 0] if program.words is not None else np.zeros(0, np.int32)
     if program.words is None or not used.size:
         return _DIGIT_MM

@@ -86,9 +86,7 @@ def samples_are_its_own(scene: Scene, tree: Tree) -> None:
             assert (lines <= node["last_line"]).all()
         for layer, sample in node["worst_sample"].items():
             assert scene.place(int(path.line[move[sample]])) == node["worst_line"][layer]
-            own = np.flatnonzero(move == move[sample])
-            size = np.linalg.norm(getattr(scene.samples, layer), axis=1)
-            assert size[sample] == size[own].max()
+            assert sample == scene.worst_sample(layer, int(move[sample]))
 
 
 def figures_do_not_contradict_the_table(tree: Tree) -> None:
