@@ -254,8 +254,8 @@ def test_the_page_shows_the_unrolled_text_with_the_lines_of_the_files(
     (left,) = (f for f in page.manifest["findings"] if f["code"] == "OLP102")
     assert left["place"] == "124 of other.ngc"
     assert shown[names.index(left["place"])] == "G53 G0 Z0"
-    for callout in page.manifest["callouts"]:
-        line, file = re.search(r"line (\d+)(?: of (.*))?$", callout["text"]).groups()  # type: ignore[union-attr]
+    for flag in filter(None, (picture["flag"] for picture in page.manifest["pictures"])):
+        line, file = re.search(r"(\d+)(?: of (.*))?$", flag["line"]).groups()  # type: ignore[union-attr]
         assert_moves({(file or "", int(line))})
 
 
