@@ -21,12 +21,15 @@ if TYPE_CHECKING:
     from olp.core.errors import OlpError as OlpError
     from olp.core.errors import ProgramError as ProgramError
     from olp.core.errors import Refused as Refused
+    from olp.errormodel.known import KnownErrors as KnownErrors
     from olp.files.config import load_setup as load_setup
     from olp.findings.catalogue import Finding as Finding
     from olp.review.job import Review as Review
     from olp.review.job import view as view
     from olp.review.notebook.layers import Layers as Layers
     from olp.review.notebook.layers import add_layers as add_layers
+    from olp.workflows.batch import Batch as Batch
+    from olp.workflows.batch import batch as batch
     from olp.workflows.calibrate_ballbar import fit_ballbar as fit_ballbar
     from olp.workflows.calibrate_diagonals import fit_diagonals as fit_diagonals
     from olp.workflows.calibrate_doctor import CalibrationDiagnosis as CalibrationDiagnosis
@@ -69,6 +72,8 @@ _HOME = {
     "Check": "olp.workflows.check",
     "Correction": "olp.workflows.correct",
     "check": "olp.workflows.check",
+    "Batch": "olp.workflows.batch",
+    "batch": "olp.workflows.batch",
     "Simulation": "olp.workflows.simulate",
     "Verification": "olp.workflows.verify",
     "compare": "olp.workflows.compare",
@@ -109,6 +114,7 @@ _HOME = {
     "ProgramError": "olp.core.errors",
     "Refused": "olp.core.errors",
     "Finding": "olp.findings.catalogue",
+    "KnownErrors": "olp.errormodel.known",
     "load_setup": "olp.files.config",
     "evaluate_lines": "olp.workflows.calibrate_evaluate",
     "fit_ballbar": "olp.workflows.calibrate_ballbar",

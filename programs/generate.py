@@ -82,7 +82,7 @@ def raster(lines: int) -> Iterator[str]:
 def centre(p: complex, q: complex, r: complex) -> complex:
     """Centre of the circle through three points of the plane."""
     a, b = q - p, r - p
-    return p + (abs(a) ** 2 * b - abs(b) ** 2 * a) * 1j / (2 * (a.real * b.imag - a.imag * b.real))
+    return p + (abs(b) ** 2 * a - abs(a) ** 2 * b) * 1j / (2 * (a.real * b.imag - a.imag * b.real))
 
 
 def contour(lines: int) -> Iterator[str]:

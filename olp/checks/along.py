@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 
 import numpy as np
 
-from olp.core.arrays import Array, Index
+from olp.core.arrays import Array, Index, distinct
 from olp.core.geometry import arc_points
 from olp.core.toolpath import Flag, Toolpath
+from olp.core.values import dataclass
 from olp.proof.deviation import cutting_moves
 
 #: waypoints that are sampled at most
@@ -18,6 +18,8 @@ _WAYPOINTS = 4096
 _BETWEEN = 8192
 #: the largest samples of each size, around which more are taken
 _LARGEST = 8
+#: moves that are looked at together
+_BLOCK = 1 << 14
 #: more samples on either side of each of them
 _AROUND = 8
 #: fraction of the golden section: samples so spread keep no step with the period of a cyclic error
@@ -52,10 +54,9 @@ def figures(path: Toolpath, sizes: Sizes) -> list[Figure]:
     Both are of waypoints and of samples between them, which are even over the length of what cuts. Around the
     largest samples more are taken. A rapid counts with its end alone.
     """
-    known = np.flatnonzero(np.isfinite(path.end_mm).all(axis=1))
-    if not len(known):
+    pick = _waypoints(path)
+    if not len(pick):
         return []
-    pick = known[np.linspace(0, len(known) - 1, min(len(known), _WAYPOINTS)).astype(np.int64)]
     length = _lengths(path)
     between, step_mm = _between(length)
     places = _Places(
@@ -85,19 +86,38 @@ def _named(pairs: Iterable[tuple[str, Array]]) -> dict[tuple[str, int], Array]:
     return values
 
 
+def _waypoints(path: Toolpath) -> Index:
+    """Some moves that end at a known position, evenly among all of them."""
+    known = np.ones(len(path), bool)
+    for axis in range(3):
+        known &= np.isfinite(path.end_mm[:, axis])
+    count = int(np.count_nonzero(known))
+    pick = np.linspace(0, count - 1, min(count, _WAYPOINTS)).astype(np.int64)
+    return pick if count == len(path) else np.flatnonzero(known)[pick]
+
+
 def _lengths(path: Toolpath) -> Array:
     """(n,) length in mm of each move that cuts, 0 for others."""
-    start = path.starts_mm()
-    away = path.end_mm - start
-    length = np.sqrt(np.einsum("ij,ij->i", away, away))
+    length = np.empty(len(path))
+    for a in range(0, len(path), _BLOCK):
+        b = min(a + _BLOCK, len(path))
+        away = path.end_mm[a:b] - path.starts_mm(a, b)
+        length[a:b] = np.sqrt(np.einsum("ij,ij->i", away, away))
     arcs = path.arcs
     if len(arcs):
-        begin = start[arcs.move] - arcs.centre_mm
+        begin = _starts(path, arcs.move) - arcs.centre_mm
         begin[np.arange(len(arcs)), (arcs.plane + 2) % 3] = 0.0
         radius = np.sqrt(np.einsum("ij,ij->i", begin, begin))
         length[arcs.move] = np.maximum(length[arcs.move], radius * np.abs(arcs.sweep_rad))
     cuts = cutting_moves(path) & ((path.flag & _AWAY) == 0)
-    return np.where(cuts, np.nan_to_num(length), 0.0)
+    np.nan_to_num(length, copy=False)
+    length[~cuts] = 0.0
+    return length
+
+
+def _starts(path: Toolpath, move: Index) -> Array:
+    """(m, 3) axis positions at the start of moves (m,)."""
+    return np.where((move > 0)[:, None], path.end_mm[np.maximum(move - 1, 0)], np.array(path.start_mm))
 
 
 def _between(length: Array) -> tuple[_Places, float]:
@@ -108,15 +128,17 @@ def _between(length: Array) -> tuple[_Places, float]:
         return _Places(np.zeros(0, np.int64), np.zeros(0)), 0.0
     part = np.arange(_BETWEEN)
     place_mm = (part + np.mod(part * _GOLDEN, 1.0)) * (ends[-1] / _BETWEEN)
-    move = np.minimum(np.searchsorted(ends, place_mm, side="right"), int(np.flatnonzero(length)[-1]))
-    share = (place_mm - (ends - length)[move]) / length[move]
+    move = np.minimum(
+        np.searchsorted(ends, place_mm, side="right"), len(length) - 1 - int((length[::-1] > 0.0).argmax())
+    )
+    share = (place_mm - (ends[move] - length[move])) / length[move]
     return _Places(move, np.clip(share, 0.0, 1.0)), float(ends[-1]) / _BETWEEN
 
 
 def _near(places: _Places, values: dict[tuple[str, int], Array], length: Array, step_mm: float) -> _Places:
     """More places within two steps of the largest values, on the same moves."""
     tops = [np.argpartition(value, -min(_LARGEST, len(value)))[-_LARGEST:] for value in values.values()]
-    top = np.unique(np.concatenate([np.zeros(0, np.int64), *tops]))
+    top = distinct(np.concatenate([np.zeros(0, np.int64), *tops]))
     top = top[length[places.move[top]] > 0.0]
     offset_mm = np.linspace(-2.0, 2.0, 4 * _AROUND + 1) * step_mm
     move = np.repeat(places.move[top], len(offset_mm))
@@ -129,7 +151,7 @@ def _points(path: Toolpath, places: _Places) -> Array:
     points = path.end_mm[places.move].copy()
     inside = np.flatnonzero(places.share < 1.0)
     move, share = places.move[inside], places.share[inside]
-    start, end = path.starts_mm()[move], path.end_mm[move]
+    start, end = _starts(path, move), path.end_mm[move]
     points[inside] = start + share[:, None] * (end - start)
     arcs = path.arcs
     if len(arcs):

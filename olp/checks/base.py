@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
-from olp.core.arrays import Array, Index, Mask
+from olp.core.arrays import Array, Index, Mask, distinct
 from olp.core.toolpath import Toolpath
 from olp.findings.catalogue import Finding
 
@@ -26,6 +24,12 @@ def finding(code: str, message: str, lines: Sequence[int] = (), count: int | Non
     )
 
 
+def first_line(path: Toolpath, moves: Mask) -> list[int]:
+    """The first line of moves; none where there is no move."""
+    return [int(path.line[moves].min())] if moves.any() else []
+
+
 def lines_of(path: Toolpath, moves: Mask | Array | Index) -> list[int]:
     """The line numbers of moves, each once."""
-    return [int(v) for v in np.unique(path.line[moves]).tolist()]
+    lines: list[int] = distinct(path.line[moves]).tolist()
+    return lines

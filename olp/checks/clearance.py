@@ -11,7 +11,6 @@ surface that it cuts. There it is taken smaller by `SLACK_MM`, and only contact 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,10 +20,11 @@ from olp.clearance.search import CONTACT_MM, Best, search
 from olp.clearance.sweep import CHORD_MM, Segments, segments_of
 from olp.clearance.tree import Tree
 from olp.compensation.plan import zero_shifts
-from olp.core.arrays import Array, Index, Mask
+from olp.core.arrays import Array, Index, Mask, distinct
 from olp.core.geometry import rotation_matrix
 from olp.core.machine import Mesh, Setup, WorkOffset
 from olp.core.toolpath import Flag, Kind, Toolpath
+from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.reversal import plays
 from olp.findings.catalogue import Finding
@@ -247,7 +247,7 @@ def _by_line(
     labels = tuple(dict.fromkeys(names))
     index = np.array([labels.index(name) for name in names] or [0])
     moving = (path.flag & np.uint8(Flag.CONTROL)) == 0
-    unknown = np.unique(path.line[moving & ~checked]).tolist() if solids else []
+    unknown = distinct(path.line[moving & ~checked]).tolist() if solids else []
     return Clearances(
         path.line[first].astype(np.int64), distance[first], point, index[part], solid, labels, tuple(solids),
         tuple(int(line) for line in unknown),

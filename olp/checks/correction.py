@@ -216,7 +216,7 @@ def orientation(path: Toolpath, model: ErrorModel) -> dict[str, float]:
 
 def worst_blocks(program: Program, table: Judgements) -> list[dict[str, Any]]:
     """The blocks farthest from the nominal path once corrected, and their uncorrected deviation."""
-    rows = table.by_line()
+    rows = table.on_lines(table.worst_lines(_WORST)).by_line()
     size = np.where(rows["state"] == SHOWN, 0.0, np.nan_to_num(rows["corrected_um"]))
     return [
         {

@@ -4,14 +4,15 @@ computed from them. A doubt is a finding; as an error it stops the run unless it
 from __future__ import annotations
 
 import datetime
-from dataclasses import dataclass
 
+from olp.checks.doubt_assumed import assumption_findings
 from olp.checks.doubt_calibration import calibration_doubts
 from olp.checks.doubt_program import program_doubts
 from olp.checks.doubt_setup import setup_doubts
 from olp.checks.doubt_size import size_doubts
 from olp.checks.state import calibration_findings
 from olp.core.machine import Machine, Setup
+from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.calibration import Calibration
 from olp.findings.catalogue import Finding
@@ -21,20 +22,27 @@ from olp.program.program import Program
 @dataclass(frozen=True, slots=True, eq=False)
 class Inputs:
     """What a run is given: machine and job, the program as read, and the day of the run. Calibration and
-    model are None for a run without them."""
+    model are None for a run without them. Where the call states the errors in place of files, `assumed` is
+    what it assumes, and `by_height` whether they depend on Z."""
 
     setup: Setup
     program: Program
     calibration: Calibration | None
     model: ErrorModel | None
     date: datetime.date | None
+    assumed: tuple[str, ...] = ()
+    by_height: bool = False
 
 
 def doubts(inputs: Inputs) -> tuple[Finding, ...]:
     """Every doubt about the inputs of a run."""
     setup, path = inputs.setup, inputs.program.toolpath
     findings = [*program_doubts(inputs.program, setup), *setup_doubts(path, setup, inputs.calibration)]
-    if inputs.calibration is not None:
+    if inputs.assumed:
+        assert inputs.calibration is not None
+        findings += assumption_findings(path, inputs.assumed, by_height=inputs.by_height)
+        findings += calibration_doubts(inputs.calibration, setup.machine, None, made=False)
+    elif inputs.calibration is not None:
         findings += stated_doubts(inputs.calibration, setup.machine, inputs.date)
     if inputs.calibration is not None and inputs.model is not None:
         findings += size_doubts(path, inputs.model, inputs.calibration, setup.machine)

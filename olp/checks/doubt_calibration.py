@@ -62,12 +62,14 @@ _WORKPIECE_PER_K = (0.03e-6, 300e-6)
 
 
 def calibration_doubts(
-    calibration: Calibration, machine: Machine, date: datetime.date | None
+    calibration: Calibration, machine: Machine, date: datetime.date | None, *, made: bool = True
 ) -> Iterator[Finding]:
-    """All doubts that a calibration and its machine raise, without a program."""
+    """All doubts that a calibration and its machine raise, without a program; what only one that is `made`
+    from readings states is not missed in others."""
     yield from list(_zeros(calibration)) or zero_curves(calibration)
     yield from _dates(calibration, date)
-    yield from _quality(calibration)
+    if made:
+        yield from _quality(calibration)
     yield from _angles(calibration)
     yield from _backlash(calibration, machine)
     yield from _cyclic(calibration, machine)

@@ -6,8 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from olp.checks.base import finding, lines_of
+from olp.checks.base import finding, first_line
 from olp.checks.state import tool_findings
+from olp.core.arrays import distinct
 from olp.core.machine import Machine, Setup, Vector
 from olp.core.toolpath import Frame, Toolpath
 from olp.errormodel.calibration import Calibration
@@ -43,7 +44,7 @@ _HEAVY_KG = 20_000.0
 
 def setup_doubts(path: Toolpath, setup: Setup, calibration: Calibration | None) -> list[Finding]:
     """Doubts about the tools and offsets that a path uses, and about what the job states."""
-    used = np.unique(path.frame).tolist() if len(path) else []
+    used = distinct(path.frame).tolist() if len(path) else []
     frames = {number: path.frames[number] for number in used}
     findings = [*_axes(setup.machine), *_temperatures(setup, calibration), *_start(setup)]
     findings += _payloads(frames, calibration)
@@ -71,7 +72,7 @@ def _tools(
             continue
         seen.add(frame.tool_mm)
         size = float(np.linalg.norm(frame.tool_mm))
-        lines = lines_of(path, path.frame == number)[:1]
+        lines = first_line(path, path.frame == number)
         what = f"{_name(frame)}: its tip is {size:g} mm from the gauge point"
         mirrored = _mirrored(frame, known, setup)
         inches = [tool for tool in known if _in_inches(frame.tool_mm, tool)]
@@ -129,7 +130,7 @@ def _axes(machine: Machine) -> Iterator[Finding]:
             what = f"axes.{name}.least_increment_mm = {axis.least_increment_mm:g}"
             yield finding("OLP465", f"{what}; expected at most {_INCREMENT_MM:g} mm")
         least = float(np.ptp(axis.travel_mm)) / _ACROSS_S
-        if not least <= axis.velocity_mm_s <= _FAST_MM_S:
+        if axis.velocity_mm_s is not None and not least <= axis.velocity_mm_s <= _FAST_MM_S:
             what = f"axes.{name}.velocity_mm_s = {axis.velocity_mm_s:g}"
             yield finding("OLP465", f"{what}; expected {least:.3g} to {_FAST_MM_S:g} mm/s")
 
@@ -147,7 +148,7 @@ def _offsets(path: Toolpath, frames: dict[int, Frame], setup: Setup) -> Iterator
             slack = _BEYOND * (high - low) + longest
             if not low - slack <= place <= high + slack:
                 what = f"work_offsets.{frame.work_offset}.{axis}_mm = {place:g} is outside the travel"
-                lines = lines_of(path, path.frame == number)[:1]
+                lines = first_line(path, path.frame == number)
                 yield finding("OLP456", f"{what}; expected {low:g} to {high:g} mm", lines)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from olp.checks.base import finding, lines_of
 from olp.checks.doubt_units import UNMEASURABLE
-from olp.core.arrays import Array
+from olp.core.arrays import Array, distinct_rows
 from olp.core.machine import Machine
 from olp.core.toolpath import Flag, Toolpath
 from olp.core.units import UM_PER_MM
@@ -27,7 +27,7 @@ _UNTOUCHED = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE)
 #: Positions along each axis of the box at which the error is computed.
 _NODES = 5
 #: Waypoints that are evaluated at once.
-_CHUNK = 1 << 16
+_CHUNK = 1 << 14
 
 
 def largest_mm(machine: Machine) -> float:
@@ -65,7 +65,7 @@ def box_doubts(
     expected = f"at most {limit * UM_PER_MM:.0f} um are expected of this machine"
     points = _box_points(model.box_mm)
     # a program may change between few tools ten thousand times
-    tools = np.unique(tools_mm, axis=0)
+    tools = distinct_rows(tools_mm)
     error = np.nan_to_num(np.stack([model.error(points, tool) for tool in tools]))
     in_box = np.linalg.norm(error, axis=2).max(axis=0)
     worst, largest = int(in_box.argmax()), float(in_box.max())

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from olp.checks.base import finding
-from olp.core.arrays import Array
+from olp.core.arrays import Array, median
 from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM
 from olp.errormodel.calibration import Calibration, Curve
 from olp.findings.catalogue import Finding
@@ -96,7 +96,7 @@ def _columns_of_other_unit(sizes: Mapping[str, float], tiny: float) -> Iterator[
         others = [value for other, value in sizes.items() if other != name]
         if size >= tiny or len(others) < _OTHERS:
             continue
-        ratio = float(np.median(others)) / size
+        ratio = median(np.array(others)) / size
         if _OTHER_UNIT < ratio < _MOST_OTHER_UNIT:
             text = f"calibration: largest {stated(name, size)}, {ratio:.0f} times smaller than other columns"
             yield finding("OLP450", f"{text}; {_EXPECTED}")
@@ -146,7 +146,7 @@ def zero_curves(calibration: Calibration) -> Iterator[Finding]:
 def _offsets(calibration: Calibration) -> Iterator[Finding]:
     for curve in calibration.curves:
         for name, values in columns(curve):
-            middle = float(np.median(values))
+            middle = median(values)
             limit = _OFFSET_MM if name[1] in AXES else _OFFSET_RAD
             varies = float(np.abs(values - middle).max())
             if len(values) >= _FEW and abs(middle) > max(limit, _OFFSET_SHARE * varies):

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from olp.checks.base import finding, lines_of
+from olp.checks.base import finding, first_line, lines_of
+from olp.core.arrays import distinct
 from olp.core.machine import Sanity
 from olp.core.toolpath import Kind, Toolpath
 from olp.core.units import UM_PER_MM
@@ -48,7 +49,7 @@ def _structure(calibration: Calibration) -> list[Finding]:
 
 def _map_tools(path: Toolpath, calibration: Calibration, sanity: Sanity) -> list[Finding]:
     findings = []
-    numbers = np.unique(path.frame).tolist() if calibration.maps else []
+    numbers = distinct(path.frame).tolist() if calibration.maps else []
     for described in calibration.maps:
         within = _SAME_TOOL_MM if described.kind == "total" else sanity.tool_within_mm
         away = {
@@ -66,7 +67,7 @@ def _map_tools(path: Toolpath, calibration: Calibration, sanity: Sanity) -> list
             f"10 urad of an axis' rotation are {far[worst] * 1e-5 * UM_PER_MM:.3g} um there, which the map "
             "does not include"
         )
-        findings.append(finding("OLP420", what, lines_of(path, np.isin(path.frame, list(far)))[:1]))
+        findings.append(finding("OLP420", what, first_line(path, np.isin(path.frame, list(far)))))
     return findings
 
 
@@ -75,7 +76,7 @@ def _payloads(path: Toolpath, calibration: Calibration) -> list[Finding]:
         return []
     other = {
         number: path.frames[number].payload_kg
-        for number in np.unique(path.frame).tolist()
+        for number in distinct(path.frame).tolist()
         if path.frames[number].payload_kg != calibration.payload_kg
     }
     if not any(other.values()):
@@ -84,7 +85,7 @@ def _payloads(path: Toolpath, calibration: Calibration) -> list[Finding]:
         f"a payload of {max(other.values()):g} kg is stated; the calibration is for "
         f"{calibration.payload_kg:g} kg and has no compliance"
     )
-    return [finding("OLP422", what, lines_of(path, np.isin(path.frame, list(other)))[:1])]
+    return [finding("OLP422", what, first_line(path, np.isin(path.frame, list(other))))]
 
 
 def _jumps(path: Toolpath, model: ErrorModel, tolerance_mm: float) -> list[Finding]:

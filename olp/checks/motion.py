@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from olp.checks.base import finding, lines_of
@@ -13,6 +11,7 @@ from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES, quarter_shares
 from olp.core.machine import Machine
 from olp.core.toolpath import Flag, Kind, Toolpath
+from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
 from olp.findings.catalogue import Finding
 from olp.program.feeds.moves import Scan, lengths_mm
@@ -33,6 +32,8 @@ _CHANGED = 0.05
 _ON_LIMIT = 1.0 + 1e-6
 #: where a move is sampled for its lowest Z, as shares of its length
 _SHARES = np.linspace(0.125, 1.0, 8)
+#: the key of the limit that no finding asks for
+_JERK = "jerk_mm_s3"
 #: ten times the G code of feeds in inverse time (G93)
 _INVERSE = 930
 #: ten times the G code of feeds per turn of the spindle (G95)
@@ -75,23 +76,28 @@ class Feeds:
 
 
 def demand_findings(path: Toolpath, feed_mm_s: Array, machine: Machine) -> list[Finding]:
-    """Velocities and accelerations of an axis that the programmed feed asks for, beyond its limits.
+    """Velocities and accelerations of an axis that the programmed feed asks for, beyond its limits; or that
+    the machine file leaves limits out.
 
     The acceleration is v^2 / r towards the centre of arcs. At joints of feed moves that turn by less than 20
     degrees, it is the change of velocity over half the time of both moves."""
     axes = [machine.axes[name] for name in "XYZ"]
     velocity, acceleration = _demands(path, feed_mm_s)
+    unlimited = [key for key in machine.missing_limits if not key.endswith(_JERK)]
     findings = []
+    if unlimited:
+        findings.append(finding("OLP207", f"the machine file leaves out {', '.join(unlimited)}"))
     for code, asked, limit, unit, what in (
         ("OLP205", velocity, [a.velocity_mm_s for a in axes], "mm/s", "velocity"),
         ("OLP206", acceleration, [a.acceleration_mm_s2 for a in axes], "mm/s2", "acceleration"),
     ):
-        beyond: Mask = asked > np.array(limit) * _ON_LIMIT
+        bound = np.array([np.inf if most is None else most for most in limit])
+        beyond: Mask = asked > bound * _ON_LIMIT
         moves: Mask = np.asarray(beyond.any(axis=1))
         if bool(moves.any()):
-            share = np.where(beyond, asked / np.array(limit), 0.0)
+            share = np.where(beyond, asked / bound, 0.0)
             move, axis = np.unravel_index(int(share.argmax()), share.shape)
-            most = f"{asked[move, axis]:.4g} {unit} of {'XYZ'[axis]}, whose limit is {limit[axis]:g} {unit}"
+            most = f"{asked[move, axis]:.4g} {unit} of {'XYZ'[axis]}, whose limit is {bound[axis]:g} {unit}"
             text = f"{int(moves.sum())} moves need more {what} than an axis has, at most {most}"
             findings.append(finding(code, text, lines_of(path, moves)))
     return findings

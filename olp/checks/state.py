@@ -6,8 +6,8 @@ import datetime
 
 import numpy as np
 
-from olp.checks.base import finding, lines_of
-from olp.core.arrays import Array
+from olp.checks.base import finding, first_line, lines_of
+from olp.core.arrays import Array, Mask, distinct
 from olp.core.machine import Job, Machine, Sanity, Setup
 from olp.core.toolpath import Flag, Toolpath
 from olp.errormodel.calibration import Calibration
@@ -19,17 +19,20 @@ _ON_LIMIT_MM = 1e-6
 #: times tool_within_mm, from the gauge point: a calibration that states no tool holds there, and every tool
 #: is farther than that from it
 _AT_GAUGE_POINT = 2.0
+#: moves that are looked at together
+_BLOCK = 1 << 14
 #: moves that are not corrected
 _UNTOUCHED = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE)
 
 
 def travel_findings(path: Toolpath, machine: Machine) -> list[Finding]:
     """Commands beyond the travel of an axis, arcs between their ends included."""
-    low, high = path.reach_mm()
+    travel_mm = np.array([machine.axes[name].travel_mm for name in "XYZ"])
+    outside = _outside(path, travel_mm)
     findings = []
     for i, name in enumerate("XYZ"):
-        least, most = machine.axes[name].travel_mm
-        beyond = (low[:, i] < least - _ON_LIMIT_MM) | (high[:, i] > most + _ON_LIMIT_MM)
+        least, most = travel_mm[i].tolist()
+        beyond = outside[:, i]
         if beyond.any():
             what = f"{name} is commanded beyond its travel of {least:g} to {most:g} mm"
             findings.append(finding("OLP402", what, lines_of(path, beyond)))
@@ -39,14 +42,23 @@ def travel_findings(path: Toolpath, machine: Machine) -> list[Finding]:
 def box_findings(path: Toolpath, box_mm: Array, code: str) -> list[Finding]:
     """Commands outside the calibrated box (3, 2), arcs between their ends included. `code` is OLP405, or
     OLP403 with --outside-box hold."""
-    low, high = path.reach_mm()
-    outside = (low < box_mm[:, 0] - _ON_LIMIT_MM) | (high > box_mm[:, 1] + _ON_LIMIT_MM)
+    outside = _outside(path, box_mm)
     moves = outside.any(axis=1) & ((path.flag & _UNTOUCHED) == 0)
     if not moves.any():
         return []
     axes = " and ".join("XYZ"[i] for i in np.flatnonzero(outside[moves].any(axis=0)))
     what = f"{int(moves.sum())} commands lie outside the calibrated box in {axes}"
     return [finding(code, what, lines_of(path, moves))]
+
+
+def _outside(path: Toolpath, box_mm: Array) -> Mask:
+    """(n, 3) moves that leave a box (3, 2) along an axis, arcs between their ends too."""
+    outside = np.empty((len(path), 3), bool)
+    for a in range(0, len(path), _BLOCK):
+        low, high = path.part(a, min(a + _BLOCK, len(path))).reach_mm()
+        beyond = (low < box_mm[:, 0] - _ON_LIMIT_MM) | (high > box_mm[:, 1] + _ON_LIMIT_MM)
+        outside[a : a + _BLOCK] = beyond
+    return outside
 
 
 def calibration_findings(calibration: Calibration, date: datetime.date | None, days: int) -> list[Finding]:
@@ -72,7 +84,7 @@ def tool_findings(path: Toolpath, calibration: Calibration, sanity: Sanity) -> l
         return findings
     allowed = np.where(known.any(axis=1), 1.0, _AT_GAUGE_POINT) * sanity.tool_within_mm
     seen: set[tuple[int | None, tuple[float, float, float]]] = set()
-    for number in np.unique(path.frame).tolist():
+    for number in distinct(path.frame).tolist():
         frame = path.frames[number]
         distance = np.abs(known - np.array(frame.tool_mm)).max(axis=1)
         key = (frame.tool, frame.tool_mm)
@@ -80,11 +92,11 @@ def tool_findings(path: Toolpath, calibration: Calibration, sanity: Sanity) -> l
             continue
         away = float(distance.min())
         seen.add(key)
-        lines = lines_of(path, path.frame == number)
+        lines = first_line(path, path.frame == number)
         name = "no tool" if frame.tool is None else f"tool {frame.tool}"
         what = f"the tip of {name} is {away:g} mm from that of every tool of the calibration"
         text = f"{what}; expected at most {float(allowed[distance.argmin()]):g} mm"
-        findings.append(finding("OLP406", text, lines[:1]))
+        findings.append(finding("OLP406", text, lines))
     return findings
 
 

@@ -9,11 +9,10 @@ Source: IEEE Journal of Robotics and Automation 4, 1988, 193-203.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from olp.core.arrays import Array, Index, Mask
+from olp.core.values import dataclass
 
 #: mm; bounds this close have met
 MET_MM = 1e-5

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from olp.core.machine import Tool
+from olp.core.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

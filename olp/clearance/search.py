@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from olp.clearance.distance import Swept, nearest
 from olp.clearance.tree import LEAF, Tree, box_distance
 from olp.core.arrays import Array, Index
+from olp.core.values import dataclass
 
 #: mm; triangles nearer than the nearest so far by less than this are not searched for
 CLOSE_MM = 1e-4

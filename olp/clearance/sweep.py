@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from olp.clearance.distance import Swept
@@ -11,6 +9,7 @@ from olp.clearance.parts import Part
 from olp.core.arrays import Array, Index, Mask
 from olp.core.geometry import PLANES, arc_points
 from olp.core.toolpath import Toolpath
+from olp.core.values import dataclass
 
 #: mm; how far a chord may be from its arc
 CHORD_MM = 5e-4

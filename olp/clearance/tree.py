@@ -3,11 +3,10 @@ above."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from olp.core.arrays import Array, Index
+from olp.core.values import dataclass
 
 #: triangles of a leaf
 LEAF = 4

@@ -6,7 +6,9 @@ Every exception becomes `olp: error: ...` on stderr and an exit code in `endings
 from __future__ import annotations
 
 import contextlib
+import difflib
 import os
+import re
 from collections.abc import Iterator
 from typing import IO, Any
 
@@ -22,6 +24,7 @@ VERBS = {
     "init": "Write the first files of a new machine into a folder.",
     "inspect": "Show what a program does, or what a machine's calibration holds.",
     "correct": "Correct a program with the machine's calibrated errors, and prove it.",
+    "batch": "Correct all programs of folders; do again what changes, release, judge releases.",
     "results": "Correct what a measuring machine reported.",
     "verify": "Prove a corrected program from the nominal and the corrected text alone.",
     "simulate": "Write the path that the machine would take with its errors, as CSV.",
@@ -31,11 +34,13 @@ VERBS = {
     "view": "Show a job in the browser: paths, enlarged errors, time, program text.",
     "compare": "Compare measured runs with a nominal path: deviations, ISO 9283 figures.",
     "calibrate": "Make a calibration from measurements; read and write the tables of controls.",
-    "schema": "Print the JSON Schema of a file that people write.",
+    "schema": "Write the JSON Schema of a file that people write.",
     "explain": "Explain the code of a finding or a term, or list all codes.",
     "help": "Show the documentation on a topic, or answer a question.",
 }
 
+#: What click says of words that a verb does not take.
+_EXTRA = re.compile(r"Got unexpected extra arguments? \((.*)\)")
 #: Key under which a call keeps its words.
 _WORDS = "olp.words"
 
@@ -62,11 +67,29 @@ def _wrong_calls() -> Iterator[None]:
         # A group without a verb shows its help, which click raises as an error of its own.
         if type(error).show is not click.UsageError.show:
             raise
-        message = error.format_message()
-        takes = [] if error.ctx is None else [name for p in error.ctx.command.params for name in p.opts]
-        if message.startswith("Got unexpected extra argument") and "--machine" in takes:
-            message += "; name the machine file with -m, and the job file with -j"
-        raise _WrongCall(message, error.ctx) from None
+        raise _WrongCall(_plain(error), error.ctx) from None
+
+
+def _plain(error: click.UsageError) -> str:
+    """The message of click in the words of the others: what is wrong, and what to do."""
+    message = error.format_message()
+    path = "olp" if error.ctx is None else error.ctx.command_path
+    takes = [] if error.ctx is None else [name for p in error.ctx.command.params for name in p.opts]
+    if isinstance(error, click.NoSuchOption):
+        wanted = error.option_name.replace("_", "-")
+        near = difflib.get_close_matches(wanted, takes, 1)
+        hint = f"did you mean {near[0]}?" if near else f"{path} --help lists the options"
+        return f"there is no option {error.option_name}; {hint}"
+    if isinstance(error, click.BadOptionUsage) and message.endswith("requires an argument."):
+        return f"the option {error.option_name} needs a value after it; give one, or leave the option out"
+    extra = _EXTRA.match(message)
+    if extra is None:
+        return message
+    words = extra[1]
+    if words.startswith("/"):
+        return f"{words} is one word too many; options begin with - or --, as in -q"
+    files = "; name the machine file with -m, and the job file with -j" if "--machine" in takes else ""
+    return f"{words} is one word too many{files or f'; {path} --help says what it takes'}"
 
 
 class _Verbs(LateGroup):

@@ -34,7 +34,7 @@ def command(
     # centre_mm, # tool_mm. Squareness needs both directions of rotation."""
     from olp.calibration.iso230.ballbar import readings_of
     from olp.calibration.iso230.squareness import readings_toml
-    from olp.cli.outline import outline
+    from olp.reports.outline import outline
     from olp.reports.plots import calibration as plots_calibration
     from olp.workflows.calibrate_ballbar import fit_ballbar
 

@@ -33,7 +33,7 @@ def command(
     FILES are CSV: target_mm,run,direction,value_um (the distance from the start), below comments
     # start_mm, # end_mm, # tool_mm, # sense."""
     from olp.calibration.iso230.squareness import readings_toml
-    from olp.cli.outline import outline
+    from olp.reports.outline import outline
     from olp.workflows.calibrate_diagonals import fit_diagonals
 
     fitted = fit_diagonals(files, dict(_known(item) for item in known))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from olp.cli.common import STREAM, diagnostic, exit_for, files_of, put_report, refuse_early
+from olp.cli.common import STREAM, diagnostic, exit_for, files_of, put_result, refuse_early
 from olp.cli.options import (
     fail_on_option,
     force_option,
@@ -13,6 +13,7 @@ from olp.cli.options import (
     machine_option,
     output_option,
     quiet_option,
+    units_option,
 )
 from olp.core.errors import UsageError
 
@@ -24,6 +25,7 @@ from olp.core.errors import UsageError
 @output_option("NEW.toml", "Write the calibration with the decided mistakes corrected.")
 @instrument_options
 @json_option()
+@units_option
 @fail_on_option
 @quiet_option("No table; only the exit code.")
 @force_option("the new calibration and its curves")
@@ -62,6 +64,5 @@ def command(
         files = diagnosis.files(output)
         write_files(files, force=force, inputs=inputs)
         diagnostic(f"wrote {output} and {len(files) - 1} files beside it")
-    report = {**diagnosis.report, "findings": [finding.as_dict() for finding in diagnosis.findings]}
-    put_report(report, as_json=as_json, quiet=quiet)
+    put_result(diagnosis, as_json=as_json, quiet=quiet)
     exit_for(diagnosis.findings, fail_on)

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import datetime
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import click
 
-from olp.cli.common import STREAM, diagnostic, exit_for, files_of, put, refuse_early
+from olp.cli.common import STREAM, diagnostic, exit_for, files_of, put_result, refuse_early
 from olp.cli.options import (
-    NUMBER,
+    MM,
     day_option,
     fail_on_option,
     force_option,
@@ -20,6 +18,7 @@ from olp.cli.options import (
     output_option,
     quiet_option,
     report_option,
+    units_option,
 )
 from olp.cli.progress import progress
 from olp.core.errors import UsageError
@@ -30,7 +29,7 @@ from olp.core.errors import UsageError
 @output_option("calibration.toml", "Where to write; curves go beside it.")
 @machine_option("The machine file: chain, travel, tools.")
 @click.option(
-    "--datum", type=(NUMBER, NUMBER, NUMBER), metavar="X Y Z",
+    "--datum", type=(MM, MM, MM), metavar="X Y Z",
     help="Axis position where the curves are zero. Default: the position in the box nearest to zero.",
 )  # fmt: skip
 @day_option("The last day of the calibration's validity.", "--valid-until")
@@ -40,6 +39,7 @@ from olp.core.errors import UsageError
 )  # fmt: skip
 @report_option()
 @json_option("Print the result as JSON.")
+@units_option
 @fail_on_option
 @quiet_option("No table and no progress.")
 @force_option("the calibration and its curves")
@@ -70,7 +70,6 @@ def command(
     refuse_early(files_of(output, report_file), inputs, force=force)
 
     from olp.files.write import write_files
-    from olp.reports.report import to_json
     from olp.workflows.calibrate_fit import fit_calibration
 
     with progress(quiet) as show:
@@ -94,27 +93,5 @@ def command(
         diagnostic(f"wrote {output} and {curves} files of {kinds} beside it")
     if report_file is not None:
         diagnostic(f"wrote {report_file}")
-    report = {**fitted.report, "findings": [finding.as_dict() for finding in fitted.findings]}
-    if as_json:
-        put(to_json(report))
-    elif not quiet:
-        from olp.cli.outline import outline
-
-        put(outline(_shown(report)))
+    put_result(fitted, as_json=as_json, quiet=quiet)
     exit_for(fitted.findings, fail_on)
-
-
-def _shown(report: Mapping[str, Any]) -> dict[str, Any]:
-    """The report as people read it: lines by the names of their files."""
-
-    def named(row: Any) -> Any:
-        if not isinstance(row, Mapping) or "name" not in row:
-            return row
-        words = [row["name"], *([row["file"]] if "file" in row else [])]
-        name = " ".join([*words[:-1], Path(words[-1]).name])
-        return {"name": name} | {k: value for k, value in row.items() if k not in ("name", "file")}
-
-    return {
-        key: [named(row) for row in value] if isinstance(value, list) else value
-        for key, value in report.items()
-    }

@@ -53,8 +53,8 @@ def command(
         raise UsageError("no DATA is given; name the readings, or write the test with --program")
 
     from olp.calibration.iso230.go_return import backlash_toml, findings_of
-    from olp.cli.outline import outline
     from olp.files.measurements.reader import files_of_measurements
+    from olp.reports.outline import outline
     from olp.reports.plots import calibration as plots_calibration
     from olp.workflows.calibrate_go_return import go_return
 

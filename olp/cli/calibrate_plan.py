@@ -6,9 +6,9 @@ import datetime
 
 import click
 
-from olp.cli.common import diagnostic, exit_for, files_of, put_report, refuse_early
+from olp.cli.common import diagnostic, exit_for, files_of, put_result, refuse_early
 from olp.cli.options import (
-    NUMBER,
+    MM,
     Count,
     Length,
     day_option,
@@ -20,6 +20,7 @@ from olp.cli.options import (
     quiet_option,
     reflector_option,
     sigma_option,
+    units_option,
 )
 from olp.core.errors import UsageError
 
@@ -35,7 +36,7 @@ METHODS = ("lines", "tracker", "lines-and-tracker", "pods", "multilateration")
 @click.option("--instrument", type=click.Choice(METHODS), help="Default: the quickest that reaches it.")
 @click.option("--points", type=Count(min=8), help="Number of points. Default: the fewest.")
 @click.option(
-    "--box", type=(NUMBER, NUMBER, NUMBER, NUMBER, NUMBER, NUMBER), metavar="X X Y Y Z Z",
+    "--box", type=(MM, MM, MM, MM, MM, MM), metavar="X X Y Y Z Z",
     help="Axis positions between which to measure. Default: the travel less 1 % at each end.",
 )  # fmt: skip
 @reflector_option(
@@ -50,6 +51,7 @@ METHODS = ("lines", "tracker", "lines-and-tracker", "pods", "multilateration")
 @output_option("FOLDER", "Write the plan, CSV files to fill in, and programs.")
 @day_option("Day of measuring, for the plan.")
 @json_option()
+@units_option
 @fail_on_option
 @quiet_option("No table.")
 @force_option("files in FOLDER")
@@ -103,6 +105,5 @@ def command(
         refuse_early([str(name) for name in files], files_of(machine), force=force)
         write_files(files, force=force, inputs=files_of(machine))
         diagnostic(f"wrote {len(files)} files to {output}")
-    report = {**plan.report, "findings": [finding.as_dict() for finding in plan.findings]}
-    put_report(report, as_json=as_json, quiet=quiet)
+    put_result(plan, as_json=as_json, quiet=quiet)
     exit_for(plan.findings, fail_on)

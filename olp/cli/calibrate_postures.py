@@ -40,7 +40,7 @@ def command(
     FILE is CSV: X_mm,Y_mm,Z_mm,tool[,TX_mm,TY_mm,TZ_mm][,A_deg,B_deg,C_deg], axis positions with the tool
     point on the one point, one row per posture."""
     from olp.calibration.iso230 import postures
-    from olp.cli.outline import outline
+    from olp.reports.outline import outline
     from olp.workflows.calibrate_postures import fit_postures
 
     if program is not None:

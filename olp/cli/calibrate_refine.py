@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from olp.cli.common import STREAM, diagnostic, exit_for, files_of, put_report, refuse_early
+from olp.cli.common import STREAM, diagnostic, exit_for, files_of, put_result, refuse_early
 from olp.cli.options import (
     day_option,
     fail_on_option,
@@ -17,6 +17,7 @@ from olp.cli.options import (
     output_option,
     program_options,
     quiet_option,
+    units_option,
 )
 from olp.core.errors import UsageError
 
@@ -32,6 +33,7 @@ from olp.core.errors import UsageError
 @instrument_options
 @day_option("Day of the run: the new calibration's date of measuring. Default: the old one's.")
 @json_option()
+@units_option
 @fail_on_option
 @quiet_option("No table; only the exit code.")
 @force_option("the new calibration and its files")
@@ -81,6 +83,5 @@ def command(
     files = refined.files(output)
     write_files(files, force=force, inputs=inputs)
     diagnostic(f"wrote {output} and {len(files) - 1} files beside it")
-    report = {**refined.report, "findings": [finding.as_dict() for finding in refined.findings]}
-    put_report(report, as_json=as_json, quiet=quiet)
+    put_result(refined, as_json=as_json, quiet=quiet)
     exit_for(refined.findings, fail_on)

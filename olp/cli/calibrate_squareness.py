@@ -31,7 +31,7 @@ def command(values: tuple[str, ...], convention: str, frames: tuple[str, ...], a
     squareness from the lengths of a drawn frame. Without either, the conventions are listed."""
     from olp.calibration.iso230.conventions import CONVENTIONS, angle_words, from_iso, to_iso
     from olp.calibration.iso230.squareness import from_frame
-    from olp.cli.outline import outline
+    from olp.reports.outline import outline
     from olp.reports.report import to_json
 
     given: dict[str, float] = {}

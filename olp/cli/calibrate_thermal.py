@@ -8,7 +8,14 @@ from typing import Any
 import click
 
 from olp.cli.common import STREAM, diagnostic, exit_for, files_of, machine_given, put, refuse_early
-from olp.cli.options import fail_on_option, force_option, json_option, machine_option, output_option
+from olp.cli.options import (
+    fail_on_option,
+    force_option,
+    json_option,
+    machine_option,
+    output_option,
+    units_option,
+)
 from olp.core.errors import UsageError
 
 
@@ -23,6 +30,7 @@ from olp.core.errors import UsageError
 @click.option("--sensor", "sensors", multiple=True, metavar="NAME", help="Take only these sensors.")
 @fail_on_option
 @json_option()
+@units_option
 @force_option("the output")
 def command(
     logs: tuple[str, ...], machine: str, output: str | None, reference: tuple[str, ...],

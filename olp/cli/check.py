@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import click
 
 from olp.cli.common import (
     STREAM,
+    Given,
     diagnostic,
     exit_for,
     files_of,
@@ -19,6 +21,7 @@ from olp.cli.common import (
     refuse_twice,
     source,
 )
+from olp.cli.endings import show_error
 from olp.cli.options import (
     codes,
     confidence_options,
@@ -28,19 +31,22 @@ from olp.cli.options import (
     file_option,
     force_option,
     json_option,
+    known_options,
     output_option,
     outside_box_option,
     program_options,
     quiet_option,
     tolerance_option,
+    units_option,
 )
 from olp.cli.progress import progress
-from olp.core.errors import UsageError, naming
+from olp.core.errors import OlpError, UsageError, naming
 
 
 @click.command("check")
-@click.argument("program", required=False)
+@click.argument("programs", nargs=-1, metavar="[PROGRAM]...")
 @program_options
+@known_options
 @click.option("--nominal", metavar="NOMINAL", help="The nominal program, where PROGRAM is a corrected one.")
 @click.option(
     "--select", multiple=True, callback=codes, metavar="CODES", help="Only these codes, such as OLP4,OLP701."
@@ -56,6 +62,7 @@ from olp.core.errors import UsageError, naming
     help="SARIF 2.1.0 and JUnit XML are for pipelines.",
 )
 @json_option("The same as --format json.")
+@units_option
 @output_option("OUT", "Default: stdout.", default=STREAM)
 @doubt_options
 @tolerance_option
@@ -65,28 +72,54 @@ from olp.core.errors import UsageError, naming
 @contour_option
 @quiet_option("No report and no progress; only the exit code.")
 @force_option("the output file")
-def command(
-    program: str | None,
-    machine: str | None,
-    job: str | None,
+def command(programs: tuple[str, ...], machine: str | None, job: str | None, **words: Any) -> None:
+    """May this program run on this machine? A gate before deployment.
+
+    A nominal PROGRAM is corrected first, and the result is checked. A corrected PROGRAM is checked unchanged,
+    and against NOMINAL where that is given. Several programs are checked one after the other; the exit code
+    is the worst of them."""
+    if words["as_json"] and words["form"] not in ("text", "json"):
+        raise UsageError(f"--json and --format {words['form']} exclude each other; leave one of them out")
+    form = "json" if words.pop("as_json") else words.pop("form")
+    words |= {"form": form}
+    if len(programs) < 2:
+        _one(given(programs[0] if programs else None, machine, job), **words)
+        return
+    alone = {"-o": words["output"] != STREAM, "--clearances": words["clearances"], "--nominal":
+             words["nominal"], f"--format {form}": form != "text", "-": STREAM in programs}  # fmt: skip
+    for name in (name for name, is_given in alone.items() if is_given):
+        raise UsageError(f"{name} is for one program, and {len(programs)} are named; check them one by one")
+    _several(programs, machine, job, words)
+
+
+def _several(programs: Sequence[str], machine: str | None, job: str | None, words: Mapping[str, Any]) -> None:
+    """Check all, also after one that is refused, and end with the worst exit code."""
+    worst = 0
+    for number, program in enumerate(programs):
+        if number and not words["quiet"]:
+            put("\n")
+        try:
+            _one(given(program, machine, job), **words)
+        except OlpError as error:
+            show_error(str(error))
+            worst = max(worst, error.exit_code)
+        except click.exceptions.Exit as end:
+            worst = max(worst, end.exit_code)
+    click.get_current_context().exit(worst)
+
+
+def _one(
+    call: Given,
     nominal: str | None,
     form: str,
     fail_on: str,
     output: str,
     clearances: str | None,
-    as_json: bool,
     quiet: bool,
     force: bool,
     **words: Any,
 ) -> None:
-    """May this program run on this machine? A gate before deployment.
-
-    A nominal PROGRAM is corrected first, and the result is checked. A corrected PROGRAM is checked unchanged,
-    and against NOMINAL where that is given."""
-    if as_json and form not in ("text", "json"):
-        raise UsageError(f"--json and --format {form} exclude each other; leave one of them out")
-    form = "json" if as_json else form
-    call = given(program, machine, job)
+    """Check one program."""
     if nominal == call.program == STREAM:
         raise UsageError("PROGRAM and NOMINAL cannot both come from stdin; name one of the files")
     inputs = (*call.inputs, *files_of(nominal))
@@ -110,7 +143,8 @@ def command(
         parts[clearances] = to_csv(list(result.rows()))
     write_files({Path(name): parts[name] for name in files_of(*parts)}, force=force, inputs=inputs)
     if STREAM in parts and not (quiet and form == "text" and output == STREAM):
-        put(parts[STREAM])
+        # text for people is in the coding of the console, the other formats in their own
+        put(parts[STREAM].decode() if form == "text" else parts[STREAM])
     if not quiet:
         for name in files_of(*parts):
             diagnostic(f"wrote {name}")

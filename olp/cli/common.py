@@ -2,37 +2,40 @@
 
 from __future__ import annotations
 
-import inspect
 import os
 import sys
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import fields
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO, TypeVar
 
 import click
 
 from olp.core.errors import InputError, OlpError, UsageError
+from olp.core.optional import require_matplotlib
+from olp.core.values import dataclass
+from olp.files.write import is_page
 from olp.findings.catalogue import Finding, worst
 from olp.findings.rule import Severity
 
 if TYPE_CHECKING:
     from olp.core.machine import Setup
+    from olp.errormodel.known import KnownErrors
     from olp.files.sources import Source, Sources
     from olp.workflows.session import Session
+    from olp.workflows.shown import Shown
 
 #: Name of stdin and stdout on the command line.
 STREAM = "-"
 #: Exit code of a run with findings at or above --fail-on.
 FINDINGS_EXIT = 1
-#: Endings of files that browsers open as pages, and whose scripts they run.
-_PAGES = frozenset(
-    (".htm", ".html", ".xht", ".xhtml", ".shtml", ".svg", ".svgz", ".mht", ".mhtml", ".hta", ".xsl", ".xslt")
-)
 PLOT_ENDINGS = (".svg", ".png")
 
 #: Key under which a call keeps the value of --dialect.
 DIALECT = "olp.dialect"
+#: Key under which a call keeps the values of --skew, --scale and --backlash.
+KNOWN = "olp.known"
 
 T = TypeVar("T")
 
@@ -65,11 +68,37 @@ def given(program: str | None, machine: str | None, job: str | None) -> Given:
             "job file with -j",
             file=program,
         )
-    session, inputs = machine_given(machine, job)
+    if program is not None and program != STREAM and Path(program).is_dir():
+        raise InputError("is a folder; expected a program in it", file=program)
+    known = known_errors(machine, job)
+    session, inputs = machine_given(machine, job) if known is None else (_stated(known), ())
     program = program if program is not None else session.setup.job.program
     if program is None:
         raise UsageError("no program is given; name it, or set the key program of the job file (-j)")
     return Given(program, source(session.sources, program), session, (*files_of(program), *inputs))
+
+
+def known_errors(machine: str | None, job: str | None) -> KnownErrors | None:
+    """The errors that the call states in place of machine and job file, None where it states none. Raises
+    UsageError."""
+    known: dict[str, tuple[str, ...]] = click.get_current_context().meta.get(KNOWN, {})
+    if not known:
+        return None
+    if machine is not None or job is not None:
+        raise UsageError(
+            "--skew, --scale and --backlash stand in place of a machine file; leave out -m and -j, or put "
+            "the numbers into the calibration file of the machine"
+        )
+    from olp.errormodel.known import KnownErrors
+
+    return KnownErrors.of(**known)
+
+
+def _stated(known: KnownErrors) -> Session:
+    """A session of the errors that the call states. Raises UsageError, InputError."""
+    from olp.workflows.session import Session
+
+    return Session.start(known, dialect=click.get_current_context().meta.get(DIALECT))
 
 
 def machine_given(machine: str | None, job: str | None) -> tuple[Session, tuple[str, ...]]:
@@ -77,10 +106,7 @@ def machine_given(machine: str | None, job: str | None) -> tuple[Session, tuple[
     from olp.workflows.session import Session
 
     session = Session.start(machine, job, dialect=click.get_current_context().meta.get(DIALECT))
-    setup = session.setup
-    meshes = (mesh.file for mesh in setup.job.meshes)
-    named = (machine, job, setup.job.machine, setup.machine.calibration, setup.job.sensor_log)
-    return session, (*files_of(*named, *meshes), *session.beside_calibration())
+    return session, session.inputs()
 
 
 def source(sources: Sources, name: str) -> Source:
@@ -101,7 +127,8 @@ def _read_stdin() -> bytes:
 
 def options_of(kind: type[T], words: Mapping[str, Any]) -> T:
     """A value, such as the options of a workflow, of those words of a call that are its parameters."""
-    return kind(**{key: words[key] for key in inspect.signature(kind).parameters if key in words})
+    names = [field.name for field in fields(kind)]  # type: ignore[arg-type]
+    return kind(**{name: words[name] for name in names if name in words})
 
 
 def files_of(*names: str | None) -> list[str]:
@@ -120,7 +147,7 @@ def default_output(program: str) -> str:
 def no_page(name: str) -> str:
     """The name of a file that is no page. Raises UsageError where it ends as one: a browser would run what
     its text holds."""
-    if Path(name).suffix.lower() in _PAGES:
+    if is_page(name):
         raise UsageError("ends as a page, which a browser would run; give it another ending", file=name)
     return name
 
@@ -134,9 +161,9 @@ def refuse_early(targets: Iterable[str], inputs: Iterable[str], *, force: bool) 
 
 def refuse_twice(names: Iterable[str]) -> None:
     """Raise where two outputs are one file."""
-    seen: set[Path] = set()
+    seen: set[str] = set()
     for name in names:
-        path = Path(os.path.realpath(name))
+        path = os.path.normcase(os.path.realpath(name))
         if path in seen:
             raise UsageError("is named as output twice; name two files", file=name)
         seen.add(path)
@@ -154,6 +181,7 @@ def plot_ending(name: str) -> None:
     """Raise UsageError for a picture whose ending names no format."""
     if Path(name).suffix.lower() not in PLOT_ENDINGS:
         raise UsageError(f"the plot {name!r} ends in no known format; expected .svg or .png")
+    require_matplotlib()
 
 
 def diagnostic(message: str) -> None:
@@ -204,6 +232,16 @@ def is_terminal(stream: TextIO | None) -> bool:
     return stream is not None and stream.isatty()
 
 
+def takes_colour(stream: TextIO | None) -> bool:
+    """Whether people read the stream in colours. A console of Windows is told to obey them."""
+    if not is_terminal(stream):
+        return False
+    if os.name == "nt":
+        # comes with click there
+        import_module("colorama").just_fix_windows_console()
+    return True
+
+
 def silence(stream: TextIO | None) -> None:
     """Discard what is still to be flushed, so that the interpreter does not complain at its end."""
     if stream is not None:
@@ -212,16 +250,14 @@ def silence(stream: TextIO | None) -> None:
         os.close(devnull)
 
 
-def put_report(report: Mapping[str, Any], *, as_json: bool, quiet: bool) -> None:
-    """Write a report to stdout: as JSON, else as text unless `quiet`."""
+def put_result(result: Shown, *, as_json: bool, quiet: bool) -> None:
+    """Write the report of a result to stdout: as JSON, else as text unless `quiet`."""
     if as_json:
         from olp.reports.report import to_json
 
-        put(to_json(report))
+        put(to_json(result.full_report()))
     elif not quiet:
-        from olp.cli.outline import outline
-
-        put(outline(report))
+        put(result.to_text())
 
 
 def exit_for(findings: Iterable[Finding], fail_on: str) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import datetime
 from collections.abc import Iterable
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -39,9 +38,11 @@ from olp.cli.options import (
     quiet_option,
     renamed_option,
     report_option,
+    units_option,
 )
 from olp.cli.progress import progress
 from olp.core.errors import UsageError
+from olp.core.values import dataclass
 
 if TYPE_CHECKING:
     from olp.files.point_profile import PointProfile
@@ -93,6 +94,7 @@ _LAYOUT = ("profile", "columns", "unit", "delimiter", "positions")
 @contour_option
 @partial(doubt_options, of="measurement")
 @json_option()
+@units_option
 @fail_on_option
 @quiet_option("No report and no progress; only the exit code.")
 @force_option()
@@ -113,7 +115,6 @@ def command(
     _refuse(outputs, inputs, poses=words["poses"])
 
     from olp.files.write import write_files
-    from olp.reports import compare as report_compare
     from olp.reports.report import to_json
     from olp.workflows import compare
 
@@ -127,7 +128,7 @@ def command(
     if outputs.as_json or outputs.report_file == STREAM:
         put(to_json(result.report))
     elif not outputs.quiet:
-        put(report_compare.to_text(result.report))
+        put(result.to_text())
     if not outputs.quiet:
         for path in written:
             diagnostic(f"wrote {path}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,16 +19,17 @@ from olp.cli.common import (
     exit_for,
     files_of,
     given,
-    is_terminal,
     options_of,
     put,
     refuse_early,
     refuse_twice,
+    takes_colour,
 )
 from olp.cli.layouts import layout_options, with_layout_of
 from olp.cli.options import (
     confidence_options,
     force_option,
+    known_options,
     output_option,
     outside_box_option,
     program_options,
@@ -39,6 +40,7 @@ from olp.cli.options import (
 )
 from olp.cli.progress import Report, progress
 from olp.core.errors import ProgramError, UsageError
+from olp.core.values import dataclass
 
 if TYPE_CHECKING:
     from olp.core.machine import Machine
@@ -52,6 +54,7 @@ LAST_DIGITS_UM = 10.0
 @click.command("correct")
 @click.argument("program", required=False)
 @program_options
+@known_options
 @output_option("OUT", "Default: PROGRAM.corrected.SUFFIX beside PROGRAM.")
 @proof_options
 @confidence_options
@@ -162,7 +165,7 @@ def _say(call: Given, result: Correction, outputs: _Outputs, written: Iterable[P
     if outputs.as_json:
         put(report.to_json(result.report))
     elif not outputs.quiet:
-        put(report.to_text(result.report), err=on_stderr)
+        put(result.to_text(), err=on_stderr)
     if not outputs.quiet:
         for path in written:
             diagnostic(f"wrote {path}")
@@ -185,5 +188,5 @@ def _diff(result: Correction, machine: Machine, on_stderr: bool) -> str:
         bare_mm=partial(profile.bare_mm, machine) if profile else None,
         statements=profile is None,
         place=str if origin is None else lambda line: origin.place(origin.line_of(line)),
-        colour=is_terminal(sys.stderr if on_stderr else sys.stdout),
+        colour=takes_colour(sys.stderr if on_stderr else sys.stdout),
     )

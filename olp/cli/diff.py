@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 from olp.core.units import AXES
+from olp.core.values import dataclass
 from olp.program.text.line_ends import LINE_END_TEXT
 from olp.reports.report import printable, shortened
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import sys
 import traceback
@@ -19,6 +20,8 @@ from olp.core.errors import INTERRUPTED, OlpError
 UNEXPECTED = 4
 #: Where this variable of the environment is set, a defect also shows its traceback.
 TRACEBACK = "OLP_TRACEBACK"
+#: what the loader of libraries says where memory is short
+_NO_ROOM = ("failed to map segment", "annot allocate memory")
 #: letters of the text of an exception that is not ours
 _MOST_LETTERS = 200
 
@@ -32,7 +35,8 @@ def with_exit_code(words: Sequence[str]) -> Iterator[None]:
     except (click.ClickException, click.exceptions.Exit, click.Abort):
         raise
     except OlpError as error:
-        _end(str(error), error.exit_code)
+        show_error(str(error))
+        raise click.exceptions.Exit(error.exit_code) from None
     except KeyboardInterrupt:
         diagnostic("olp: interrupted")
         raise click.exceptions.Exit(INTERRUPTED) from None
@@ -41,10 +45,15 @@ def with_exit_code(words: Sequence[str]) -> Iterator[None]:
         silence(sys.stdout)
         raise click.exceptions.Exit(0) from None
     except MemoryError:
-        _end(
-            _headed(words, "needs more memory than there is; give a smaller file, or part of it"), UNEXPECTED
-        )
+        _end_memory(words)
+    except ImportError as error:
+        # a library that finds no room to be loaded
+        if not any(sign in str(error) for sign in _NO_ROOM):
+            _end_defect(words, error)
+        _end_memory(words)
     except OSError as error:
+        if error.errno == errno.ENOMEM:
+            _end_memory(words)
         if error.strerror is None:
             _end_defect(words, error)
         if error.filename is not None:
@@ -65,10 +74,19 @@ def keep_streams() -> None:
             os.open(os.devnull, os.O_RDWR)
 
 
-def _end(message: str, code: int) -> NoReturn:
+def show_error(message: str) -> None:
+    """Write the lines of an error to stderr."""
     for line in message.split("\n"):
         diagnostic(f"olp: error: {line}")
+
+
+def _end(message: str, code: int) -> NoReturn:
+    show_error(message)
     raise click.exceptions.Exit(code) from None
+
+
+def _end_memory(words: Sequence[str]) -> NoReturn:
+    _end(_headed(words, "needs more memory than there is; give a smaller file, or part of it"), UNEXPECTED)
 
 
 def _end_defect(words: Sequence[str], error: Exception) -> NoReturn:

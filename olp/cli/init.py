@@ -2,71 +2,77 @@
 
 from __future__ import annotations
 
+import datetime
 import os
+import sys
 from pathlib import Path
 
 import click
 
-from olp.cli.common import diagnostic
-from olp.cli.options import NUMBER, force_option
-from olp.core.errors import UsageError
-
-#: Travel of a small machine in mm, to be replaced by that of the real one.
-TRAVEL_MM = {"X": (0.0, 500.0), "Y": (0.0, 400.0), "Z": (-300.0, 0.0)}
+from olp.cli.common import KNOWN, diagnostic, is_terminal
+from olp.cli.options import MM, day_option, force_option, known_errors, renamed_option
 
 Travel = tuple[tuple[str, float, float], ...]
 
 
 @click.command("init")
 @click.argument("folder", metavar="DIR")
-@click.option("--name", help="Name of the machine. Default: the folder's name.")
-@click.option("--chain", default="FXYZ", show_default=True, help="Axes from workpiece to tool, F the frame.")
+@click.option("--from", "settings_file", metavar="FILE", help="Settings of the control: LinuxCNC, Grbl ...")
+@click.option("--name", help="Name of the machine. Default: that in FILE, or the folder's name.")
+@click.option("--chain", help="Axes from workpiece to tool, F the frame. Default: FXYZ.")
 @click.option("--controller", help="Dialect of the control, such as linuxcnc, fanuc, haas or grbl.")
 @click.option(
     "--travel",
-    type=(click.Choice("XYZ"), NUMBER, NUMBER),
+    type=(click.Choice("XYZ"), MM, MM),
     multiple=True,
     metavar="AXIS MIN MAX",
-    help="Travel of an axis in mm, such as --travel X 0 2000; once per axis.",
+    help="Travel of an axis in mm, such as --travel X 0 2000 or X 0 80in; once per axis.",
 )
-@click.option("--from-linuxcnc", "ini", metavar="INI", help="Take the machine from a LinuxCNC configuration.")
+@click.option(
+    "--zero", type=(MM, MM, MM), metavar="X Y Z",
+    help="Axis positions of the program's zero (G54). Default: the middle of the travel.",
+)  # fmt: skip
+@known_errors("Known error: ")
+@day_option("When these were measured, or today.", "--measured")
+@renamed_option("--from-linuxcnc", "--from")
 @force_option("files in DIR")
 def command(
     folder: str,
+    settings_file: str | None,
     name: str | None,
-    chain: str,
+    chain: str | None,
     controller: str | None,
     travel: Travel,
-    ini: str | None,
+    zero: tuple[float, float, float] | None,
+    measured: datetime.date | None,
     force: bool,
 ) -> None:
-    """Write the first files of a new machine into DIR: machine, calibration of zeros, curves, job."""
-    from dataclasses import replace
+    """Write the first files of a new machine into DIR: machine, calibration, job, a first program.
 
-    from olp.files import starter
-    from olp.files.write import make_folder, write_files
+    FILE is the INI file of LinuxCNC, the answer of Grbl to $$ or of Marlin to M503, the printer.cfg of
+    Klipper, or machine data of a Sinumerik or a TNC as text. What neither FILE nor an option states is asked
+    on a terminal, and else noted in the files.
+    """
+    from olp.errormodel.known import KnownErrors
+    from olp.files.write import check_targets, make_folder, write_files
+    from olp.workflows import init
 
-    notes: tuple[str, ...] = ()
-    if ini is not None:
-        if travel or controller:
-            raise UsageError("--from-linuxcnc states travel and control; leave out --travel and --controller")
-        imported = starter.from_linuxcnc(ini, chain)
-        notes = imported.notes
-        machine = replace(
-            imported.machine, name=name or imported.machine.name, calibration="calibration.toml"
-        )
-    else:
-        limits = TRAVEL_MM | {axis: (low, high) for axis, low, high in travel}
-        machine = starter.starter_machine(
-            name or Path(os.path.realpath(folder)).name or "machine", chain, limits, controller or "linuxcnc"
-        )
-    texts = starter.starter_set(machine)
-    if notes:
-        texts["machine.toml"] = starter.machine_toml(machine, notes)
-    make_folder(Path(folder))
-    files = {Path(folder) / file: text.encode() for file, text in texts.items()}
-    write_files(files, force=force)
+    settings = None if settings_file is None else init.settings_in(settings_file)
+    limits = {axis: (low, high) for axis, low, high in travel}
+    known = KnownErrors.of(**click.get_current_context().meta.get(KNOWN, {}))
+    options = init.InitOptions(name, chain, controller, limits, zero, known, measured)
+    if is_terminal(sys.stdin) and is_terminal(sys.stderr):
+        from olp.cli.asking import asked
+
+        options = asked(options, settings)
+    result = init.run(Path(os.path.realpath(folder)).name, options, settings)
+    files = {Path(folder) / file: data for file, data in result.files.items()}
+    inputs = [] if settings_file is None else [settings_file]
+    check_targets(files, inputs, force=force, new_folders=True)
+    for place in dict.fromkeys(path.parent for path in files):
+        make_folder(place)
+    write_files(files, force=force, inputs=inputs)
     for path in files:
         diagnostic(f"wrote {path}")
-    for note in notes:
+    for note in result.notes:
         diagnostic(f"note: {note}")

@@ -18,7 +18,7 @@ from olp.cli.common import (
     refuse_early,
     source,
 )
-from olp.cli.options import NUMBER, Integer, force_option, json_option, plot_option, program_options
+from olp.cli.options import MM, Integer, force_option, json_option, plot_option, program_options, units_option
 from olp.core.errors import UsageError
 
 if TYPE_CHECKING:
@@ -30,12 +30,11 @@ if TYPE_CHECKING:
 @click.command("inspect")
 @click.argument("file", metavar="PROGRAM|machine.toml", required=False)
 @program_options
-@click.option(
-    "--at", type=(NUMBER, NUMBER, NUMBER), metavar="X Y Z", help="Show the error at an axis position in mm."
-)
+@click.option("--at", type=(MM, MM, MM), metavar="X Y Z", help="Show the error at an axis position in mm.")
 @click.option("--tool", type=Integer(), help="Tool number for --at. Default: the tool at the start.")
 @plot_option("Draw the curves of the calibration, as .svg or .png.")
 @json_option("Print as JSON.")
+@units_option
 @force_option("the plot")
 def command(
     file: str | None,
@@ -72,9 +71,10 @@ def command(
     if plot is not None:
         _plot(session, plot, inputs, force)
     if at is not None:
+        from olp.reports.report import plain
         from olp.workflows.inspect import error_of
 
-        values = shown = error_of(session, at, tool)
+        values = shown = plain(error_of(session, at, tool))
     elif plot is not None:
         return
     elif file is None:
@@ -84,7 +84,7 @@ def command(
 
         values = _program(session, file, options_of(UnrollOptions, words), as_json=as_json)
         shown = values | {"support": _by_support(values.get("support") or ())}
-    from olp.cli.outline import outline
+    from olp.reports.outline import outline
     from olp.reports.report import to_json
 
     put(to_json(values) if as_json else outline(shown))

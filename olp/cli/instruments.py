@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from olp.cli.common import diagnostic, exit_for, files_of, put, refuse_early, refuse_twice
-from olp.cli.options import fail_on_option, force_option, json_option
+from olp.cli.options import fail_on_option, force_option, json_option, units_option
 from olp.core.errors import UsageError
+from olp.core.optional import require_matplotlib
 from olp.findings.catalogue import Finding
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -22,6 +23,7 @@ def ending_options(function: F) -> F:
         force_option(),
         fail_on_option,
         json_option("Print the result as JSON."),
+        units_option,
     ):  # fmt: skip
         function = option(function)
     return function
@@ -34,6 +36,7 @@ def plot_kind(name: str | None) -> str:
     ending = Path(name).suffix.lower()
     if ending not in PLOTS:
         raise UsageError(f"the plot {name!r} ends in no known format; expected .svg or .png")
+    require_matplotlib()
     return ending[1:]
 
 

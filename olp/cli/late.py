@@ -5,9 +5,13 @@ from __future__ import annotations
 import difflib
 import importlib
 from collections.abc import Mapping
+from pathlib import PurePath
 from typing import Any
 
 import click
+
+#: The verb that a call without one most likely means.
+_FIRST = "correct"
 
 
 class LateGroup(click.Group):
@@ -35,6 +39,8 @@ class LateGroup(click.Group):
         if name not in self._verbs and not name.startswith("-"):
             near = difflib.get_close_matches(name, self._verbs, 1)
             hint = f"did you mean {near[0]}?" if near else f"see {ctx.command_path} --help"
+            if _FIRST in self._verbs and PurePath(name).suffix:
+                hint = f"name the verb before the file, such as {ctx.command_path} {_FIRST} {name}"
             ctx.fail(f"there is no verb {name!r}; {hint}")
         return super().resolve_command(ctx, args)
 

@@ -4,16 +4,23 @@ from __future__ import annotations
 
 import datetime
 import math
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
 import click
 
-from olp.cli.common import DIALECT, STREAM, no_page
+from olp.cli.common import DIALECT, KNOWN, STREAM, diagnostic, no_page
 from olp.core.errors import UsageError
+from olp.core.optional import has_matplotlib
 
 F = TypeVar("F", bound=Callable[..., Any])
+
+
+#: A number with a decimal comma, and one with a unit.
+_COMMA = re.compile(r"[-+]?\d*,\d+")
+_UNIT = re.compile(r"[-+]?[\d.]+\s*[A-Za-z\u00b5\u03bc/%]+")
 
 
 def renamed_option(old: str, new: str, *, flag: bool = False, values: int = 1) -> Callable[[F], F]:
@@ -34,22 +41,52 @@ def _readable(value: Any, read: type[int] | type[float], what: str) -> Any:
     try:
         read(value)
     except ValueError:
-        raise click.BadParameter(f"{value!r} is not {what}; expected {what}, such as 5") from None
+        text = str(value)
+        hint = "; write a decimal point" if _COMMA.fullmatch(text) else ""
+        hint = "; leave the unit out, which the name of the option states" if _UNIT.fullmatch(text) else hint
+        raise click.BadParameter(f"{value!r} is not {what}; expected {what}, such as 5{hint}") from None
     return value
 
 
+def number_in(value: Any, unit: str | None) -> Any:
+    """The value, if it is a number, or a text such as "0.002 in" as a number of a unit. Raises
+    click.BadParameter."""
+    if unit is None or not isinstance(value, str):
+        return _readable(value, float, "a number")
+    try:
+        return float(value)
+    except ValueError:
+        from olp.core.quantities import quantity
+
+        try:
+            return quantity(value, unit)
+        except ValueError as error:
+            raise click.BadParameter(f"{value!r} is not a number in {unit}; {error}") from None
+
+
+def _unit(param: click.Parameter | None) -> str | None:
+    """The unit in which the name of an option ends."""
+    from olp.core.quantities import unit_of_key
+
+    return None if param is None or param.name is None else unit_of_key(param.name)
+
+
 class Number(click.types.FloatParamType):
-    """Any number."""
+    """Any number; with a unit also a text such as "0.002 in"."""
+
+    def __init__(self, unit: str | None = None) -> None:
+        super().__init__()
+        self.unit = unit
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        return float(super().convert(_readable(value, float, "a number"), param, ctx))
+        return float(super().convert(number_in(value, self.unit or _unit(param)), param, ctx))
 
 
 class Range(click.FloatRange):
     """A number within limits."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        return float(super().convert(_readable(value, float, "a number"), param, ctx))
+        return float(super().convert(number_in(value, _unit(param)), param, ctx))
 
 
 class Integer(click.types.IntParamType):
@@ -80,6 +117,8 @@ class Length(Range):
 
 
 NUMBER = Number()
+#: A length in mm.
+MM = Number("mm")
 
 
 def machine_option(help: str = "The machine file.", *, required: bool = False) -> Callable[[F], F]:
@@ -107,6 +146,43 @@ def _keep_dialect(context: click.Context, _: click.Parameter, value: str | None)
     context.meta[DIALECT] = value
 
 
+def _keep_known(context: click.Context, parameter: click.Parameter, values: tuple[str, ...]) -> None:
+    if values:
+        assert parameter.name is not None
+        context.meta.setdefault(KNOWN, {})[parameter.name] = values
+
+
+#: --skew, --scale and --backlash: name, metavar, and what a value says.
+_KNOWN_ERRORS = (
+    ("--backlash", "AXIS=LENGTH", "backlash of an axis, such as X=0.05mm."),
+    ("--scale", "AXIS=RATIO", "an axis moves too far, such as X=0.2mm/m."),
+    (
+        "--skew", "AXES=RATIO",
+        "XY=1.4mm/m where Y leans toward +X by 1.4 mm per m; likewise XZ and YZ of Z. Or C0Y, B0Z, A0Z with "
+        "the sign of ISO 230-1.",
+    ),
+)  # fmt: skip
+
+
+def known_errors(says: str) -> Callable[[F], F]:
+    """--skew, --scale and --backlash: errors stated in the call; their help begins with what `says`."""
+
+    def decorate(function: F) -> F:
+        for name, metavar, help in _KNOWN_ERRORS:
+            option = click.option(
+                name, multiple=True, metavar=metavar, expose_value=False, callback=_keep_known,
+                help=says + help,
+            )  # fmt: skip
+            function = option(function)
+        return function
+
+    return decorate
+
+
+#: The same for verbs that need no more of a machine.
+known_options = known_errors("Without a machine file: ")
+
+
 class Day(click.DateTime):
     """A day such as 2026-05-14, or `today`: nothing else reads the system clock."""
 
@@ -116,7 +192,12 @@ class Day(click.DateTime):
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> datetime.datetime:
-        return datetime.datetime.now() if value == "today" else super().convert(value, param, ctx)
+        if value == "today":
+            return datetime.datetime.now()
+        try:
+            return super().convert(value, param, ctx)
+        except click.BadParameter:
+            self.fail(f"{value!r} is not a day; expected one such as 2026-05-14, or today", param, ctx)
 
 
 def _day(
@@ -178,6 +259,21 @@ def json_option(help: str = "Print the report as JSON.") -> Callable[[F], F]:
     return click.option("--json", "as_json", is_flag=True, help=help)
 
 
+def _units(context: click.Context, _: click.Parameter, value: str | None) -> None:
+    if value is not None:
+        from olp.reports.shown import shown_in
+
+        context.with_resource(shown_in(value))
+
+
+def units_option(function: F) -> F:
+    """--units, of every verb that prints a report for people."""
+    return click.option(
+        "--units", type=click.Choice(["mm", "inch"]), expose_value=False, callback=_units,
+        help="Units of lengths in reports for people; JSON and findings keep theirs. Default: mm.",
+    )(function)  # fmt: skip
+
+
 def quiet_option(help: str) -> Callable[[F], F]:
     """-q; its help says what is left out."""
     return click.option("-q", "--quiet", is_flag=True, help=help)
@@ -195,9 +291,7 @@ def plot_option(help: str) -> Callable[[F], F]:
 
 def reflector_option(help: str, *, several: bool = False) -> Callable[[F], F]:
     """--reflector."""
-    return click.option(
-        "--reflector", multiple=several, type=(NUMBER, NUMBER, NUMBER), metavar="X Y Z", help=help
-    )
+    return click.option("--reflector", multiple=several, type=(MM, MM, MM), metavar="X Y Z", help=help)
 
 
 def sigma_option(help: str) -> Callable[[F], F]:
@@ -220,6 +314,8 @@ def report_option(endings: Sequence[str] = (".html", ".json", ".md")) -> Callabl
     def check(_: click.Context, __: click.Parameter, name: str | None) -> str | None:
         if name not in (None, STREAM) and Path(name).suffix.lower() not in endings:
             raise UsageError(f"is not a form of this report; expected {', '.join(endings)}", file=name)
+        if name is not None and name.lower().endswith(".html") and not has_matplotlib():
+            diagnostic("note: the report has no plots: matplotlib is not installed (pip install matplotlib)")
         return name
 
     return click.option(
@@ -304,6 +400,13 @@ def confidence_options(function: F) -> F:
 
 def proof_options(function: F) -> F:
     """Options of `correct` and `verify`."""
-    for option in (fail_on_option, json_option(), doubt_options, contour_option, tolerance_option):
+    for option in (
+        fail_on_option,
+        json_option(),
+        units_option,
+        doubt_options,
+        contour_option,
+        tolerance_option,
+    ):
         function = option(function)
     return function

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -34,8 +33,10 @@ from olp.cli.options import (
     quiet_option,
     report_option,
     setup_options,
+    units_option,
 )
 from olp.core.errors import UsageError
+from olp.core.values import dataclass
 
 if TYPE_CHECKING:
     from olp.workflows.session import Outside
@@ -79,6 +80,7 @@ class _Asked:
 @doubt_options
 @report_option()
 @json_option()
+@units_option
 @fail_on_option
 @quiet_option("No report; only the exit code.")
 @force_option()
@@ -101,7 +103,6 @@ def command(results: str, machine: str | None, job: str | None, **words: Any) ->
 
     from olp.files.write import Content, write_files
     from olp.reports import report
-    from olp.reports import results as report_results
     from olp.workflows import results as workflow
 
     layout = layout_of(asked.profile, asked.columns, asked.unit, call.source, call.session.sources)
@@ -123,7 +124,7 @@ def command(results: str, machine: str | None, job: str | None, **words: Any) ->
     if as_json:
         put(report.to_json(result.report))
     elif not asked.quiet:
-        put(report_results.to_text(result.report), err=on_stderr)
+        put(result.to_text(), err=on_stderr)
     if not asked.quiet:
         for path in written:
             diagnostic(f"wrote {path}")

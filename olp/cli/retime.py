@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -38,9 +37,11 @@ from olp.cli.options import (
     program_options,
     quiet_option,
     report_option,
+    units_option,
 )
 from olp.cli.progress import Report, progress
 from olp.core.errors import InputError, UsageError, naming
+from olp.core.values import dataclass
 
 if TYPE_CHECKING:
     from olp.files.sources import Sources
@@ -95,6 +96,7 @@ FORMATS = ("csv", "npz", "parquet", "ros", "pvt")
 @click.option("--block-delete", is_flag=True, help="Leave / blocks out; they count as executed otherwise.")
 @report_option((".json",))
 @json_option()
+@units_option
 @fail_on_option
 @quiet_option("No report and no progress.")
 @force_option()
@@ -203,7 +205,6 @@ def _files(
 
 def _say(result: Retiming, outputs: _Outputs, written: Iterable[Path]) -> None:
     from olp.reports import report
-    from olp.reports import retime as report_time
 
     if not outputs.quiet:
         for path in written:
@@ -211,7 +212,7 @@ def _say(result: Retiming, outputs: _Outputs, written: Iterable[Path]) -> None:
     if outputs.as_json:
         put(report.to_json(result.report))
     elif not outputs.quiet:
-        put(report_time.to_text(result.report), err=bool(outputs.on_stdout))
+        put(result.to_text(), err=bool(outputs.on_stdout))
 
 
 def _json(name: str, sources: Sources) -> dict[str, Any]:

@@ -4,18 +4,28 @@ from __future__ import annotations
 
 import click
 
-from olp.cli.common import put
+from olp.cli.common import STREAM, diagnostic, put
+from olp.cli.options import force_option, output_option
 
 
 @click.command("schema")
 @click.argument(
     "kind", type=click.Choice(["machine", "calibration", "job", "measurements", "points", "dialect"])
 )
-def command(kind: str) -> None:
-    """Print the JSON Schema of a file that people write.
+@output_option("FILE", "Default: stdout.", default=STREAM)
+@force_option("the output file")
+def command(kind: str, output: str, force: bool) -> None:
+    """Write the JSON Schema of a file that people write.
 
     With it, editors complete and check TOML.
     """
     from olp.files.json_schema import json_schema_text
 
-    put(json_schema_text(kind))
+    text = json_schema_text(kind)
+    if output == STREAM:
+        put(text)
+        return
+    from olp.files.write import write_bytes
+
+    write_bytes(output, text.encode(), force=force)
+    diagnostic(f"wrote {output}")

@@ -13,6 +13,7 @@ from olp.cli.options import (
     doubt_options,
     force_option,
     json_option,
+    known_options,
     output_option,
     program_options,
     quiet_option,
@@ -24,6 +25,7 @@ from olp.findings.rule import Severity
 @click.command("simulate")
 @click.argument("program", required=False)
 @program_options
+@known_options
 @output_option("measured.csv", "Default: stdout; with --json no points.")
 @click.option(
     "--step-mm", type=Length(), default=1.0, show_default=True, help="Distance between points on a move."

@@ -9,6 +9,7 @@ import click
 from olp.cli.common import STREAM, exit_for, given, options_of, put, source
 from olp.cli.options import (
     confidence_options,
+    known_options,
     outside_box_option,
     program_options,
     proof_options,
@@ -21,6 +22,7 @@ from olp.core.errors import UsageError
 @click.argument("nominal")
 @click.argument("corrected")
 @program_options
+@known_options
 @proof_options
 @confidence_options
 @outside_box_option("refuse the program", "take the error at the box's face", default="hold")
@@ -47,5 +49,5 @@ def command(
     if as_json:
         put(report.to_json(result.report))
     elif not quiet:
-        put(report.to_text(result.report))
+        put(result.to_text())
     exit_for(result.findings, fail_on)

@@ -16,6 +16,7 @@ from olp.cli.options import (
     contour_option,
     doubt_options,
     force_option,
+    known_options,
     output_option,
     outside_box_option,
     program_options,
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 @click.command("view")
 @click.argument("program", required=False)
 @program_options
+@known_options
 @click.option("--corrected", metavar="FILE", help="The corrected program. Default: correct PROGRAM.")
 @click.option(
     "--measured", multiple=True, metavar="FILE.csv", help="Measured positions of the tip; may be repeated."
@@ -87,6 +89,12 @@ def command(
     from olp.review import job as review
 
     options = options_of(review.ViewOptions, words | {"time": not no_time})
+
+    missing = call.setup.machine.missing_limits
+    if missing and not no_time and not quiet:
+        diagnostic(
+            f"note: without {', '.join(missing)} the motion is not planned; times are those of the feed"
+        )
 
     def make() -> Review:
         # files may have changed since the last call

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,6 +10,7 @@ from olp.comparison.pairing import FAR, Order, Pairing, coarse, pair, thinned
 from olp.comparison.path import Path
 from olp.core.arrays import Array
 from olp.core.rigid_fit import Rigid, fit_path, fit_points
+from olp.core.values import dataclass
 
 #: points that the search uses
 _FEW = 1536

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from olp.comparison.pairing import Order, Pairing
 from olp.comparison.path import Path, Split, split
 from olp.core.arrays import Array, Index, Mask
 from olp.core.units import UM_PER_MM
+from olp.core.values import dataclass
 
 #: stations along the path at which runs are compared
 STATIONS = 2000

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from olp.compensation.plan import zero_shifts
@@ -11,6 +9,7 @@ from olp.core.arrays import Array
 from olp.core.errors import ConfigError
 from olp.core.machine import Setup
 from olp.core.toolpath import Toolpath
+from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
 
 

@@ -5,11 +5,10 @@ All figures come from equal cycles; the standard requires 30 cycles for poses an
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from olp.core.arrays import Array
+from olp.core.values import dataclass
 
 #: cycles that the standard requires for poses
 POSE_CYCLES = 30

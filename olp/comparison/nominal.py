@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -12,6 +12,7 @@ from olp.compensation.plan import targets, zero_shifts
 from olp.core.arrays import Array, Index, Mask
 from olp.core.geometry import arc_points
 from olp.core.toolpath import Flag, Kind, Toolpath
+from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
 from olp.proof.deviation import cutting_moves
 

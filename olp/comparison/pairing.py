@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -10,6 +9,7 @@ import numpy as np
 from olp.comparison.order import banded, whole
 from olp.comparison.path import Path
 from olp.core.arrays import Array, Index, Mask
+from olp.core.values import dataclass
 
 Order = Literal["forward", "backward", "free"]
 
@@ -155,6 +155,21 @@ def _project(path: Path, points: Array, s: Array, step: float) -> Pairing:
     distance = np.sqrt(square)
     s_mm = path.s_mm[segment] + share * (path.s_mm[segment + 1] - path.s_mm[segment])
     return Pairing(segment, foot, distance, s_mm, _beyond(path, segment, share, distance), np.zeros(m, bool))
+
+
+def beside(path: Path, points: Array, segment: Index) -> Pairing:
+    """Pair points (m, 3) with the nearest position about segments (m,) of the path that they are known to
+    belong to."""
+    m = len(points)
+    nearest, foot = np.empty(m, np.int64), np.empty((m, 3))
+    square, share = np.full(m, np.inf), np.empty(m)
+    rows = np.arange(m)
+    _nearer(path, points, segment, rows, nearest, foot, square, share)
+    for side in (1, -1):
+        _walk(path, points, rows, side, nearest, foot, square, share)
+    s_mm = path.s_mm[nearest] + share * (path.s_mm[nearest + 1] - path.s_mm[nearest])
+    nothing = np.zeros(m, bool)
+    return Pairing(nearest, foot, np.sqrt(square), s_mm, nothing, nothing)
 
 
 def _nearer(

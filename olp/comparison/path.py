@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import CannotCompute
+from olp.core.values import dataclass
 
 #: Above this share of Z in its direction, a segment counts as upright: it has no left and right.
 _UPRIGHT = 0.999

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -16,6 +15,7 @@ from olp.core.arrays import Array
 from olp.core.errors import CannotCompute
 from olp.core.rigid_fit import Rigid, fit_path
 from olp.core.units import UM_PER_MM
+from olp.core.values import dataclass
 from olp.findings.catalogue import Finding
 
 Align = Literal["auto", "none", "fit", "each"]

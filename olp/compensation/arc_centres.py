@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 
@@ -14,6 +12,7 @@ from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES, arms
 from olp.core.toolpath import Flag
+from olp.core.values import dataclass
 
 #: (3, 3) axes of each plane: first, second, third.
 _AXES = np.array(PLANES)
@@ -46,7 +45,7 @@ class ArcRows:
     sweep: Array
     plane: npt.NDArray[np.int8]
 
-    def pick(self, which: Mask) -> ArcRows:
+    def pick(self, which: Mask | Index) -> ArcRows:
         return ArcRows(*(getattr(self, name)[which] for name in ArcRows.__slots__))
 
     def one(self, i: int) -> Arc:

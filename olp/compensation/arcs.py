@@ -7,18 +7,17 @@ samples least. Where it leaves them by more than the tolerance, the piece is div
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
 from olp.compensation.invert import bent
 from olp.compensation.lines import Cuts, no_cuts
-from olp.core.arrays import Array, Index, Mask
+from olp.core.arrays import Array, Index, Mask, distinct
 from olp.core.errors import CannotCompute
-from olp.core.geometry import PLANES, arc_directions, arc_points, arms
-from olp.core.toolpath import Arcs, Toolpath
+from olp.core.geometry import PLANES, ArcShapes, arc_directions, arc_points, arms
+from olp.core.toolpath import Toolpath
+from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.sampling import steps_needed
 
@@ -51,11 +50,6 @@ class Pieces:
 
     def pick(self, which: npt.NDArray[np.generic]) -> Pieces:
         return Pieces(self.arc[which], self.begin[which], self.end[which])
-
-
-def _points(start: Array, end: Array, arcs: Arcs, which: Index, share: Array) -> Array:
-    """(n, 3) points of arcs `which` at shares of their sweep."""
-    return arc_points(start, end, arcs.centre_mm[which], arcs.plane[which], arcs.sweep_rad[which], share)
 
 
 def subdivide_arcs(
@@ -99,7 +93,8 @@ def subdivide_arcs(
     inner = end < 1.0
     arc, end = arc[inner], end[inner]
     starts, ends = _ends(path, target, arc)
-    return arcs.move[arc], end, _points(starts, ends, _shifted(arcs, path, target), arc, end)
+    centre = arcs.centre_mm[arc] + (ends - path.end_mm[arcs.move[arc]])
+    return arcs.move[arc], end, arc_points(starts, ends, centre, arcs.plane[arc], arcs.sweep_rad[arc], end)
 
 
 def _divided(pieces: Pieces, count: Index) -> Pieces:
@@ -111,12 +106,6 @@ def _divided(pieces: Pieces, count: Index) -> Pieces:
     last = k == count[which] - 1
     end = np.where(last, pieces.end[which], pieces.begin[which] + (k + 1) * step[which])
     return Pieces(pieces.arc[which], begin, end)
-
-
-def _shifted(arcs: Arcs, path: Toolpath, target: Array) -> Arcs:
-    """The arcs where the part really lies: centres moved with their end points."""
-    shift = target[arcs.move] - path.end_mm[arcs.move]
-    return Arcs(arcs.move, arcs.centre_mm + shift, arcs.plane, arcs.sweep_rad)
 
 
 def _ends(path: Toolpath, target: Array, arc: Index) -> tuple[Array, Array]:
@@ -162,7 +151,7 @@ def sample_groups(
         delta[rows, axes[:, i]] = np.minimum(radius * np.abs(arcs.sweep_rad[pieces.arc]) * share, 2 * radius)
     tool = tools if tools.ndim == 1 else tools[arcs.move[pieces.arc]]
     count = steps_needed(model, delta, tool, tolerance / 4, at_least=8, at_most=256)
-    for steps in np.unique(count).tolist():
+    for steps in distinct(count).tolist():
         group = np.flatnonzero(count == steps)
         size = max(1, _BATCH // steps)
         for a in range(0, len(group), size):
@@ -173,27 +162,26 @@ def sampled(
     path: Toolpath, model: ErrorModel, target: Array, pieces: Pieces, tools: Array, count: int
 ) -> Bend:
     """Sample pieces at `count` equal steps."""
-    arcs = _shifted(path.arcs, path, target)
+    arcs, move = path.arcs, path.arcs.move[pieces.arc]
     start, end = _ends(path, target, pieces.arc)
-    axes = _AXES[arcs.plane[pieces.arc]]
-    rows = np.arange(len(pieces))
-    move = arcs.move[pieces.arc]
+    plane, sweep = arcs.plane[pieces.arc], arcs.sweep_rad[pieces.arc]
+    # where the part really lies: the centres are moved with the end points
+    centre = arcs.centre_mm[pieces.arc] + (target[move] - path.end_mm[move])
+    axes, rows = _AXES[plane], np.arange(len(pieces))
     tool = tools if tools.ndim == 1 else tools[move]
     share = np.linspace(0.0, 1.0, count + 1)
     spread = (pieces.begin[:, None] + share * (pieces.end - pieces.begin)[:, None]).reshape(-1)
     which = np.repeat(np.arange(len(pieces)), len(share))
-    point = _points(start[which], end[which], arcs, pieces.arc[which], spread)
+    point = ArcShapes.of(start, end, centre, plane, sweep).at(which, spread)
     play = None
     if model.backlash_at(point[:1]) is not None:
         play = arc_directions(
-            start[which], end[which], arcs.centre_mm[pieces.arc[which]], arcs.plane[pieces.arc[which]],
-            arcs.sweep_rad[pieces.arc[which]], spread,
+            start[which], end[which], centre[which], plane[which], sweep[which], spread
         )  # fmt: skip
         play = _inside(play.reshape(len(pieces), len(share), 3)).reshape(-1, 3)
     command = bent(model, point, tool if tool.ndim == 1 else tool[which], play)
     shape = (len(pieces), len(share), 3)
     point, command = point.reshape(shape), command.reshape(shape)
-    centre = arcs.centre_mm[pieces.arc]
     away = command - point
     r0, r1 = (
         np.hypot(*(point[rows, k, axes[:, i]] - centre[rows, axes[:, i]] for i in (0, 1))) for k in (0, -1)
@@ -284,20 +272,21 @@ def _at_quadrants(path: Toolpath, pieces: Pieces, turning: Mask, band: float) ->
     along, across = arms(start, arcs.centre_mm[pieces.arc], arcs.plane[pieces.arc])
     angle, radius = np.arctan2(across, along), np.hypot(along, across)
     sweep = arcs.sweep_rad[pieces.arc]
-    arc, begin, end = [], [], []
-    for i in range(len(pieces)):
-        shares = {0.0, 1.0}
-        # the first axis turns at multiples of pi, the second half-way between
-        for which, phase in ((0, 0.0), (1, np.pi / 2)):
-            if not turning[axes[i, which]]:
-                continue
-            low, high = sorted((angle[i], angle[i] + sweep[i]))
-            k = np.arange(np.ceil((low - phase) / np.pi), np.floor((high - phase) / np.pi) + 1)
-            shares.update(((phase + k * np.pi - angle[i]) / sweep[i]).tolist())
-        least = min(np.sqrt(2 * band / radius[i]) / abs(sweep[i]), 0.25)
-        edges = sorted(s for s in shares if s in (0.0, 1.0) or least < s < 1 - least)
-        for low, high in pairwise(edges):
-            arc.append(pieces.arc[i])
-            begin.append(low)
-            end.append(high)
-    return Pieces(np.array(arc, np.int64), np.array(begin), np.array(end))
+    owners, shares = [np.arange(len(pieces))], [np.zeros(len(pieces))]
+    least = np.minimum(np.sqrt(2 * band / radius) / np.abs(sweep), 0.25)
+    low, high = np.minimum(angle, angle + sweep), np.maximum(angle, angle + sweep)
+    # the first axis turns at multiples of pi, the second half-way between
+    for which, phase in ((0, 0.0), (1, np.pi / 2)):
+        first, last = np.ceil((low - phase) / np.pi), np.floor((high - phase) / np.pi)
+        count = np.where(turning[axes[:, which]], np.maximum(last - first + 1, 0), 0).astype(np.int64)
+        owner = np.repeat(np.arange(len(pieces)), count)
+        k = first[owner] + np.arange(len(owner)) - (np.cumsum(count) - count)[owner]
+        share = (phase + k * np.pi - angle[owner]) / sweep[owner]
+        inner = (least[owner] < share) & (share < 1 - least[owner])
+        owners.append(owner[inner])
+        shares.append(share[inner])
+    owner, begin = np.concatenate(owners), np.concatenate(shares)
+    order = np.lexsort((begin, owner))
+    owner, begin = owner[order], begin[order]
+    goes_on = np.append(owner[1:] == owner[:-1], False)
+    return Pieces(pieces.arc[owner], begin, np.where(goes_on, np.append(begin[1:], 1.0), 1.0))

@@ -2,188 +2,216 @@
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Iterator
 
-from olp.compensation.arc_centres import Arc, ArcRows, solve
+import numpy as np
+import numpy.typing as npt
+
+from olp.compensation.arc_centres import ArcRows, solve
+from olp.compensation.digits import INT10
 from olp.compensation.rows import Rows
 from olp.compensation.writer import Writer
-from olp.core.arrays import Mask
-from olp.core.geometry import PLANES
+from olp.core.arrays import Array, Index, Mask, distinct
+from olp.core.geometry import PLANES, arms
 from olp.core.toolpath import Flag, Kind
-from olp.program.text.edits import EditList, Edits
+from olp.program.text.edits import Edits
 
 #: (3, 3) axes of each plane: first, second, third.
 _AXES = np.array(PLANES)
+#: share of the tolerance by which an R word may put a centre off
+_OFF_SHARE = 0.1
 
 
 def arc_edits(writer: Writer, rows: Rows) -> list[Edits]:
     """Edits of I, J, K, R and P for the arc rows of a chunk, and whole blocks for their later parts."""
     if not rows.arc.any():
         return []
-    solved = solve(writer, rows)
-    plain = _is_plain(writer, rows, solved)
-    edits = EditList(writer.prefixes)
-    for i in np.flatnonzero(~plain).tolist():
-        arc = solved.one(i)
-        (_head if rows.head[arc.row] else _tail)(writer, rows, arc, edits)
-    return [edits.done(), *_plain_words(writer, solved.pick(plain))]
-
-
-def _is_plain(writer: Writer, rows: Rows, arcs: ArcRows) -> Mask:
-    """Arcs that keep their block and both its centre words: nearly all arcs."""
-    index = np.searchsorted(writer.path.arcs.move, arcs.move)
-    slots = writer.program.arc_slots.word[index]
-    lone = np.arange(len(arcs.row))
-    both = (slots[lone, _AXES[arcs.plane][:, 0]] >= 0) & (slots[lone, _AXES[arcs.plane][:, 1]] >= 0)
+    arcs = solve(writer, rows)
+    stated = np.searchsorted(writer.path.arcs.move, arcs.move)
+    slots = writer.program.arc_slots.word[stated]
+    absolute = writer.program.arc_slots.absolute[stated]
+    head, radius = rows.head[arcs.row], slots[:, 3] >= 0
     following = np.minimum(arcs.row + 1, len(rows.move) - 1)
     split = (following > arcs.row) & (rows.move[following] == arcs.move)
-    plain = (
-        both & (slots[:, 3] < 0) & ~split & rows.head[arcs.row] & ~writer.program.arc_slots.absolute[index]
-    )
-    return np.asarray(plain, bool)
+    turned = head & split & (slots[:, 4] >= 0)
+    by_centre, by_radius = head & ~radius, head & radius
+    return [
+        _turn_words(writer, arcs.pick(turned), slots[turned, 4]),
+        *_centre_words(writer, arcs.pick(by_centre), slots[by_centre], absolute[by_centre]),
+        *_radius_words(writer, arcs.pick(by_radius), slots[by_radius, 3]),
+        *_tails(writer, rows, arcs.pick(~head), absolute[~head]),
+    ]
 
 
-def _plain_words(writer: Writer, arcs: ArcRows) -> list[Edits]:
-    """Centre words of many arcs at once."""
-    words, style = writer.words, writer.style
-    index = np.searchsorted(writer.path.arcs.move, arcs.move)
-    unit = writer.frame_unit_mm[writer.path.frame[arcs.move]]
-    edits = []
-    for k in (0, 1):
-        for axis in range(3):
-            mine = np.flatnonzero(_AXES[arcs.plane][:, k] == axis)
-            if not mine.size:
-                continue
-            slot = writer.program.arc_slots.word[index[mine], axis]
-            own = style.decimals(slot, axis, unit[mine])
-            fewest = {u: style.centre(axis, u) for u in np.unique(unit[mine]).tolist()}
-            decimals = np.maximum(own, np.array([fewest[u] for u in unit[mine].tolist()]))
-            away = (arcs.centre[mine, axis] - arcs.start[mine, axis]) / unit[mine]
-            mantissa = np.rint(away * 10.0**decimals).astype(np.int64)
-            new = np.flatnonzero(mantissa != words.mantissa[slot] * 10 ** (decimals - own))
-            zero = np.zeros(len(new), np.int32)
-            edits.append(
-                Edits(
-                    words.number[slot[new]].astype(np.int64), words.end[slot[new]].astype(np.int64),
-                    mantissa[new], decimals[new].astype(np.int8), zero, zero,
-                )
-            )  # fmt: skip
-            writer.tally.changed_words += len(new)
-    return edits
+def _turns(arcs: ArcRows) -> Index:
+    """(m,) the P words that arcs of these sweeps need."""
+    return np.floor_divide(np.abs(arcs.sweep) - 1e-6, 2 * np.pi).astype(np.int64) + 1
+
+
+def _turn_words(writer: Writer, arcs: ArcRows, slot: npt.NDArray[np.int32]) -> Edits:
+    """P words of arcs of which only a part stays in the block."""
+    return Edits.of(writer.words.number[slot], writer.words.end[slot], _turns(arcs), 0)
+
+
+def _units(writer: Writer, arcs: ArcRows) -> Array:
+    """(m,) mm of a program unit."""
+    return np.asarray(writer.frame_unit_mm[writer.path.frame[arcs.move]])
+
+
+def _digits(writer: Writer, which: str, axis: int, unit: Array) -> Index:
+    """(m,) digits that the style has for words of an axis in these units: "centre" or "usual" ones."""
+    units, index = np.unique(unit, return_inverse=True)
+    return np.array([getattr(writer.style, which)(axis, u) for u in units.tolist()], np.int64)[index]
+
+
+def _centres(
+    writer: Writer, arcs: ArcRows, axis: int, absolute: Mask, own: Index | int
+) -> tuple[Index, Index]:
+    """(m,) mantissa and decimals of centre words of an axis, with at least `own` digits."""
+    unit = _units(writer, arcs)
+    offset = writer.frame_offset_mm[writer.path.frame[arcs.move], axis]
+    base = np.where(absolute, offset, arcs.start[:, axis])
+    decimals = np.maximum(_digits(writer, "centre", axis, unit), own)
+    mantissa = np.rint((arcs.centre[:, axis] - base) / unit * INT10[decimals]).astype(np.int64)
+    return mantissa, decimals
+
+
+def _by_axis(arcs: ArcRows, k: int) -> Iterator[tuple[int, Index]]:
+    """Each axis that is the first (0) or second (1) one of the planes of some arcs, and these."""
+    for axis in range(3):
+        mine = np.flatnonzero(_AXES[arcs.plane][:, k] == axis)
+        if mine.size:
+            yield axis, mine
 
 
 def _centre_words(
-    writer: Writer, arc: Arc, absolute: bool, own: dict[int, int]
-) -> list[tuple[int, int, int]]:
-    """(axis, mantissa, decimals) of both centre words, with at least the digits of the program's `own`
-    words."""
-    frame = writer.frame_of(arc.move)
-    words = []
-    for axis in PLANES[arc.plane][:2]:
-        base = frame.offset_mm[axis] if absolute else arc.start[axis]
-        decimals = max(writer.style.centre(axis, frame.unit_mm), own.get(axis, 0))
-        mantissa = round((arc.centre[axis] - base) / frame.unit_mm * 10**decimals)
-        words.append((axis, mantissa, decimals))
-    return words
-
-
-def _head(writer: Writer, rows: Rows, arc: Arc, edits: EditList) -> None:
-    """The part that keeps the block's own line: its centre words replaced, or inserted where omitted."""
-    program, words, style = writer.program, writer.words, writer.style
-    index = int(np.searchsorted(writer.path.arcs.move, arc.move))
-    slots = program.arc_slots.word[index].tolist()
-    absolute = bool(program.arc_slots.absolute[index])
-    split = arc.row + 1 < len(rows.move) and rows.move[arc.row + 1] == arc.move
-    if split and slots[4] >= 0:
-        edits.add(int(words.number[slots[4]]), int(words.end[slots[4]]), _turns(arc), 0)
-    if slots[3] >= 0:
-        _radius_word(writer, arc, slots[3], edits)
-        return
-    unit = writer.frame_of(arc.move).unit_mm
-    own = {axis: style.decimals_of(slots[axis], axis, unit) for axis in range(3) if slots[axis] >= 0}
-    for axis, mantissa, decimals in _centre_words(writer, arc, absolute, own):
-        slot = slots[axis]
-        if slot >= 0:
-            if mantissa != int(words.mantissa[slot]) * 10 ** (decimals - own[axis]):
-                edits.add(int(words.number[slot]), int(words.end[slot]), mantissa, decimals)
-                writer.tally.changed_words += 1
-        elif abs(mantissa) > 10 ** (decimals - style.usual(axis, unit)) // 2:
-            present = [s for s in slots[:3] if s >= 0]
-            anchor = max(present) if present else style.last_word(arc.line)
-            place = int(words.end[anchor])
-            prefix = style.lead(anchor) + style.cased(anchor, b"IJK"[axis : axis + 1])
-            edits.add(place, place, mantissa, decimals, prefix, 5 + axis)
-            writer.tally.inserted_words += 1
-
-
-def _turns(arc: Arc) -> int:
-    """The P word that an arc of this sweep needs."""
-    return int((abs(arc.sweep) - 1e-6) // (2 * np.pi)) + 1
-
-
-def _radius_word(writer: Writer, arc: Arc, slot: int, edits: EditList) -> None:
-    """R of the corrected arc; where R is too coarse (near half circles), I, J, K in its place."""
+    writer: Writer, arcs: ArcRows, slots: npt.NDArray[np.int32], absolute: Mask
+) -> Iterator[Edits]:
+    """Centre words of arcs that keep their own blocks: replaced, or inserted where omitted."""
     words, style = writer.words, writer.style
-    first, second, _ = PLANES[arc.plane]
-    unit = writer.frame_of(arc.move).unit_mm
-    radius = float(np.hypot(arc.start[first] - arc.centre[first], arc.start[second] - arc.centre[second]))
-    half = float(np.hypot(arc.end[first] - arc.start[first], arc.end[second] - arc.start[second])) / 2
-    own = style.decimals_of(slot, first, unit)
-    decimals = max(own, style.centre(first, unit))
-    sign = -1 if abs(arc.sweep) > np.pi else 1
-    mantissa = sign * round(radius / unit * 10**decimals)
-    size = abs(mantissa) / 10**decimals * unit
-    start, end = int(words.start[slot]), int(words.end[slot])
-    writer.tally.changed_words += 1
-    if size > half:
-        # how far R as written puts the centre from where it should be
-        dx, dy = arc.end[first] - arc.start[first], arc.end[second] - arc.start[second]
-        lean = (
-            (1.0 if (arc.sweep > 0) == (sign > 0) else -1.0) * np.sqrt(size * size - half * half) / (2 * half)
-        )
-        off = np.hypot(
-            arc.start[first] + dx / 2 - lean * dy - arc.centre[first],
-            arc.start[second] + dy / 2 + lean * dx - arc.centre[second],
-        )
-        if off < 0.5 * 10.0**-decimals * unit + 0.1 * writer.tolerance_mm:
-            if mantissa == int(words.mantissa[slot]) * 10 ** (decimals - own):
-                writer.tally.changed_words -= 1
-            else:
-                edits.add(int(words.number[slot]), end, mantissa, decimals)
-            return
-    letters = style.cased(slot, b"IJK")
-    (a, first_value, first_digits), (b, second_value, second_digits) = _centre_words(writer, arc, False, {})
-    edits.add(start, end, first_value, first_digits, letters[a : a + 1], 0)
-    edits.add(end, end, second_value, second_digits, style.lead(slot) + letters[b : b + 1], 1)
+    present = slots[:, :3].max(axis=1, initial=-1)
+    last = words.first_word[arcs.line] - 1
+    anchor = np.where(present >= 0, present, last)
+    for k in (0, 1):
+        for axis, mine in _by_axis(arcs, k):
+            part, slot = arcs.pick(mine), slots[mine, axis]
+            given, unit = slot >= 0, _units(writer, part)
+            own = np.where(given, style.decimals(slot, axis, unit), 0)
+            mantissa, decimals = _centres(writer, part, axis, absolute[mine], own)
+            stated = words.mantissa[slot] * INT10[decimals - own]
+            changed = np.flatnonzero(given & (mantissa != stated))
+            yield Edits.of(
+                words.number[slot[changed]], words.end[slot[changed]], mantissa[changed], decimals[changed]
+            )
+            usual = _digits(writer, "usual", axis, unit)
+            new = np.flatnonzero(~given & (np.abs(mantissa) > INT10[decimals - usual] // 2))
+            at = anchor[mine[new]]
+            place, prefix = words.end[at], _prefixes(writer, at, b"IJK"[axis : axis + 1])
+            yield Edits.of(place, place, mantissa[new], decimals[new], prefix, 5 + axis)
+            writer.tally.changed_words += len(changed)
+            writer.tally.inserted_words += len(new)
 
 
-def _tail(writer: Writer, rows: Rows, arc: Arc, edits: EditList) -> None:
-    """A later part: a new block with both end words, the third axis where it moves, and the centre."""
-    place = int(writer.program.line_end[arc.line - 1])
-    index = int(np.searchsorted(writer.path.arcs.move, arc.move))
-    absolute = bool(writer.program.arc_slots.absolute[index])
-    order = rows.serial(arc.row)
-    lead = writer.style.block_start(arc.line)
-    if arc.row and rows.take_up[arc.row - 1]:
-        lead += b"G2 " if writer.path.kind[arc.move] == Kind.ARC_CW else b"G3 "
-    third = PLANES[arc.plane][2]
+def _prefixes(
+    writer: Writer, anchor: npt.NDArray[np.int32], letter: bytes, *, spaced: bool = True
+) -> npt.NDArray[np.int32]:
+    """(m,) prefixes of words with a letter, in the case of the words `anchor`, and `spaced` as these."""
+    style = writer.style.separators(anchor, writer.program)
+    prefix = np.zeros(len(anchor), np.int32)
+    for which in distinct(style).tolist():
+        text = writer.style.separator(which, letter)
+        prefix[style == which] = writer.prefixes(text if spaced else text[-1:])
+    return prefix
+
+
+def _radius_words(writer: Writer, arcs: ArcRows, slot: npt.NDArray[np.int32]) -> Iterator[Edits]:
+    """R of corrected arcs; where R is too coarse (near half circles), I, J, K in its place."""
+    words = writer.words
+    no = np.zeros(len(slot), bool)
+    for first, mine in _by_axis(arcs, 0):
+        part, own_slot = arcs.pick(mine), slot[mine]
+        second = (first + 1) % 3
+        unit = _units(writer, part)
+        own = writer.style.decimals(own_slot, first, unit)
+        decimals = np.maximum(own, _digits(writer, "centre", first, unit))
+        mantissa, good = _radii(writer, part, decimals, unit)
+        new = np.flatnonzero(good & (mantissa != words.mantissa[own_slot] * INT10[decimals - own]))
+        at = own_slot[new]
+        yield Edits.of(words.number[at], words.end[at], mantissa[new], decimals[new])
+        coarse = np.flatnonzero(~good)
+        part, at = part.pick(coarse), own_slot[coarse]
+        writer.tally.changed_words += len(new) + len(coarse)
+        begin, end = words.start[at], words.end[at]
+        value, digits = _centres(writer, part, first, no[mine[coarse]], 0)
+        letter = _prefixes(writer, at, b"IJK"[first : first + 1], spaced=False)
+        yield Edits.of(begin, end, value, digits, letter, 0)
+        value, digits = _centres(writer, part, second, no[mine[coarse]], 0)
+        yield Edits.of(end, end, value, digits, _prefixes(writer, at, b"IJK"[second : second + 1]), 1)
+
+
+def _radii(writer: Writer, arcs: ArcRows, decimals: Index, unit: Array) -> tuple[Index, Mask]:
+    """(m,) mantissa of the R words of arcs, and whether R as written puts the centre where it should be."""
+    scale = INT10[decimals]
+    to_start = np.hypot(*arms(arcs.start, arcs.centre, arcs.plane))
+    dx, dy = arms(arcs.end, arcs.start, arcs.plane)
+    half = np.hypot(dx, dy) / 2
+    sign = np.where(np.abs(arcs.sweep) > np.pi, -1, 1)
+    mantissa = sign * np.rint(to_start / unit * scale).astype(np.int64)
+    size = np.abs(mantissa) / scale * unit
+    with np.errstate(divide="ignore", invalid="ignore"):
+        height = np.sqrt(np.maximum(size * size - half * half, 0.0)) / (2 * half)
+        lean = np.where((arcs.sweep > 0) == (sign > 0), height, -height)
+        x, y = arms(arcs.start, arcs.centre, arcs.plane)
+        off = np.hypot(x + dx / 2 - lean * dy, y + dy / 2 + lean * dx)
+    allowed = 0.5 / scale * unit + _OFF_SHARE * writer.tolerance_mm
+    return mantissa, np.asarray((size > half) & (off < allowed))
+
+
+def _tails(writer: Writer, rows: Rows, arcs: ArcRows, absolute: Mask) -> Iterator[Edits]:
+    """Later parts: new blocks with both end words, the third axis where it moves, and the centre."""
+    if not len(arcs.row):
+        return
+    row, place = arcs.row, writer.program.line_end[arcs.line - 1]
+    order = row * 8 + 16
+    lead, third = _leads(writer, rows, arcs), _AXES[arcs.plane, 2]
+    begun = np.zeros(len(row), bool)
     for axis in range(3):
-        if axis == third and not rows.write[arc.row, axis]:
-            continue
-        mantissa, decimals = _number(writer, rows, arc.row, axis)
-        edits.add(place, place, mantissa, decimals, lead + b"XYZ"[axis : axis + 1], order + axis)
-        lead = b" "
-    for i, (axis, mantissa, decimals) in enumerate(_centre_words(writer, arc, absolute, {})):
-        edits.add(place, place, mantissa, decimals, b" " + b"IJK"[axis : axis + 1], order + 3 + i)
-    if _turns(arc) > 1:
-        edits.add(place, place, _turns(arc), 0, b" P", order + 5)
+        mine = np.flatnonzero((third != axis) | rows.write[row, axis])
+        mantissa, decimals = _numbers(writer, rows, row[mine], axis)
+        letter = b"XYZ"[axis : axis + 1]
+        prefix = np.full(len(mine), writer.prefixes(b" " + letter), np.int32)
+        opens = ~begun[mine]
+        for which in distinct(lead[mine[opens]]).tolist():
+            text = writer.prefixes.table[which] + letter
+            prefix[opens & (lead[mine] == which)] = writer.prefixes(text)
+        begun[mine] = True
+        yield Edits.of(place[mine], place[mine], mantissa, decimals, prefix, order[mine] + axis)
+    for k in (0, 1):
+        for axis, mine in _by_axis(arcs, k):
+            mantissa, decimals = _centres(writer, arcs.pick(mine), axis, absolute[mine], 0)
+            lone = writer.prefixes(b" " + b"IJK"[axis : axis + 1])
+            yield Edits.of(place[mine], place[mine], mantissa, decimals, lone, order[mine] + 3 + k)
+    turns = _turns(arcs)
+    some = np.flatnonzero(turns > 1)
+    yield Edits.of(place[some], place[some], turns[some], 0, writer.prefixes(b" P"), order[some] + 5)
 
 
-def _number(writer: Writer, rows: Rows, row: int, axis: int) -> tuple[int, int]:
-    """Mantissa and decimals of the position of an axis after a row, whether or not it changes."""
-    if rows.write[row, axis] or rows.flag[row] & np.uint8(Flag.INCREMENTAL):
-        return int(rows.mantissa[row, axis]), int(rows.decimals[row, axis])
-    frame = writer.frame_of(int(rows.move[row]))
-    decimals = writer.style.usual(axis, frame.unit_mm)
-    value = (rows.emitted[row, axis] - frame.offset_mm[axis]) / frame.unit_mm
-    return round(value * 10**decimals), decimals
+def _leads(writer: Writer, rows: Rows, arcs: ArcRows) -> npt.NDArray[np.int32]:
+    """(m,) prefixes before the first letter of each new block: line end, `/` and, behind a step that takes up
+    backlash, the code of the arc."""
+    starts, of = writer.style.block_starts(arcs.line)
+    table = np.array([[writer.prefixes(s + code) for code in (b"", b"G2 ", b"G3 ")] for s in starts])
+    taken_up = (arcs.row > 0) & rows.take_up[np.maximum(arcs.row - 1, 0)]
+    code = np.where(writer.path.kind[arcs.move] == Kind.ARC_CW, 1, 2)
+    return table[of, np.where(taken_up, code, 0)].astype(np.int32)
+
+
+def _numbers(writer: Writer, rows: Rows, row: Index, axis: int) -> tuple[Index, Index]:
+    """(m,) mantissa and decimals of the positions of an axis after rows, whether or not it changes."""
+    frame = writer.path.frame[rows.move[row]]
+    unit = writer.frame_unit_mm[frame]
+    usual = _digits(writer, "usual", axis, unit)
+    value = (rows.emitted[row, axis] - writer.frame_offset_mm[frame, axis]) / unit
+    stated = rows.write[row, axis] | ((rows.flag[row] & np.uint8(Flag.INCREMENTAL)) != 0)
+    mantissa = np.where(stated, rows.mantissa[row, axis], np.rint(value * INT10[usual]).astype(np.int64))
+    return mantissa, np.where(stated, rows.decimals[row, axis], usual)

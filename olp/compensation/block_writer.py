@@ -3,19 +3,24 @@ nothing else."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
 from olp.compensation.block_arcs import arc_edits
-from olp.compensation.digits import AxisRows, absolute, incremental
+from olp.compensation.digits import AxisRows, Places, part_of
 from olp.compensation.holes import HoleWords
 from olp.compensation.inserted_blocks import block_edits
+from olp.compensation.plan import Plan
 from olp.compensation.rows import Rows
-from olp.compensation.writer import Task, Writer
-from olp.core.arrays import Index, Mask
+from olp.compensation.stretches import Decimals, Stretches, digits_of
+from olp.compensation.writer import Writer
+from olp.core.arrays import Array, Index, Mask, distinct
+from olp.core.progress import Progress, silent
 from olp.core.toolpath import Flag
+from olp.program.bands import Band
 from olp.program.text.edits import EditList, Edits
 
 #: Moves whose words are not those of their end point.
@@ -25,10 +30,10 @@ _BYPASS = np.uint8(Flag.CYCLE | Flag.CONTROL)
 class BlockWriter(Writer):
     """A writer of blocks, whose words may be omitted: per axis, what is written and what is inserted."""
 
-    def __init__(self, task: Task) -> None:
-        super().__init__(task)
-        self._hole_words = HoleWords(self.program.holes)
+    def add(self, band: Band, plan: Plan, tell: Progress = silent) -> None:
+        self._hole_words = HoleWords(band.program.holes)
         self._next_capture = 0
+        super().add(band, plan, tell)
 
     def _rewritten(self, rows: Rows, begin: int, end: int) -> bytes | None:
         edits: list[Edits] = []
@@ -43,13 +48,9 @@ class BlockWriter(Writer):
         return self._spliced(edits, begin, end)
 
     def _breaks(self, rows: Rows) -> list[int]:
-        """Rows at which the meaning of words changes: G90 and G91, units, canned cycles."""
-        key = (rows.flag & np.uint8(Flag.INCREMENTAL | Flag.CYCLE)).astype(np.int64)
-        key += (self.frame_unit_mm[self.path.frame[rows.move]] > 2) * 256
+        """Rows at which the blocks of canned cycles begin and end."""
         cycle = (rows.flag & np.uint8(Flag.CYCLE)) != 0
-        if cycle.any():
-            key = np.where(cycle, -1 - self.path.line[rows.move].astype(np.int64), key)
-        changes = np.flatnonzero(key[1:] != key[:-1]) + 1
+        changes = np.flatnonzero(cycle[1:] != cycle[:-1]) + 1
         return [0, *changes.tolist(), len(rows.move)]
 
     def _columns(self, rows: Rows) -> list[AxisRows]:
@@ -59,6 +60,7 @@ class BlockWriter(Writer):
         frame = path.frame[rows.move]
         one = len(frame) > 0 and bool((frame == frame[0]).all())
         unit = self.frame_unit_mm[frame[:1]] if one else self.frame_unit_mm[frame]
+        same_unit = bool((unit == unit[:1]).all())
         control = (rows.flag & np.uint8(Flag.CONTROL)) != 0
         offset = self.frame_offset_mm[frame[0]] if one else self.frame_offset_mm[frame]
         columns = []
@@ -76,23 +78,23 @@ class BlockWriter(Writer):
                     word=np.where(given, words.mantissa[slot], 0),
                     decimals=np.where(given, self.style.decimals(slot, axis, unit), 0).astype(np.int8),
                     offset=float(offset[axis]) if one else offset[:, axis],
-                    unit=1.0,
+                    unit=float(unit[0]) if same_unit else unit,
                 )
             )
         return columns
 
     def _digits(self, rows: Rows, columns: list[AxisRows], a: int, b: int) -> None:
-        """Digits of rows a..b, which are all G90 or all G91 and have one unit."""
-        unit = float(self.frame_unit_mm[self.path.frame[rows.move[a]]])
-        counting = bool(rows.flag[a] & np.uint8(Flag.INCREMENTAL))
+        """Digits of rows a..b, which no canned cycle makes."""
+        counting = (rows.flag[a:b] & np.uint8(Flag.INCREMENTAL)) != 0
+        stretches = Stretches.of(counting, part_of(columns[0].unit, slice(a, b)))
         for axis, column in enumerate(columns):
             before = float(rows.emitted[a - 1, axis]) if a else float(rows.entry[axis])
-            part = column.part(a, b, unit)
-            if counting:
-                digits = incremental(part, before, self.style.grid(axis, unit))
-            else:
-                digits = absolute(part, before, self.style.least(axis, unit), self.style.usual(axis, unit))
-            rows.put(a, b, axis, digits)
+            part = column.part(slice(a, b))
+            decimals = Decimals(*(
+                _by_unit(places, axis, part.unit)
+                for places in (self.style.least, self.style.usual, self.style.grid)
+            ))  # fmt: skip
+            rows.put(a, b, axis, digits_of(part, stretches, before, decimals))
 
     def _after_block_delete(self, rows: Rows) -> None:
         """The first block after `/` blocks must not rely on a word that was inserted in them."""
@@ -175,9 +177,9 @@ class BlockWriter(Writer):
         style = self.style.separators(last, self.program)
         edits = []
         for axis in range(3):
-            for which in np.unique(style[missing[:, axis]]).tolist():
+            for which in distinct(style[missing[:, axis]]).tolist():
                 chosen = np.flatnonzero(missing[:, axis] & (style == which))
-                prefix = self.prefixes(self.style.separator(which, axis))
+                prefix = self.prefixes(self.style.separator(which, b"XYZ"[axis : axis + 1]))
                 count = len(chosen)
                 order = np.full(count, axis + 1, np.int32)
                 edits.append(
@@ -213,3 +215,11 @@ class BlockWriter(Writer):
                 edits.add(start, end, new, digits)
                 self.tally.changed_words += 1
         return [edits.done()]
+
+
+def _by_unit(places: Callable[[int, float], int], axis: int, unit: Array | float) -> Places:
+    """Decimals of an axis in the unit of all rows, or of each."""
+    if not isinstance(unit, np.ndarray):
+        return places(axis, unit)
+    units, which = np.unique(unit, return_inverse=True)
+    return np.array([places(axis, u) for u in units.tolist()], np.int8)[which]

@@ -8,7 +8,7 @@ an axis that the program does not move would drive the cutter into the contour.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -18,6 +18,7 @@ from olp.core.arrays import Index, Mask
 from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES
 from olp.core.toolpath import Kind, Toolpath
+from olp.core.values import dataclass
 
 
 @dataclass(frozen=True, slots=True, eq=False)

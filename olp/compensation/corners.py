@@ -8,7 +8,6 @@ can the inside of an arc with a smaller radius than the cutter, and the first mo
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -16,6 +15,7 @@ import numpy as np
 from olp.core.arrays import Array, Index, Mask
 from olp.core.geometry import PLANES, arms
 from olp.core.toolpath import CutterCompensation, Toolpath
+from olp.core.values import dataclass
 
 #: rad; LinuxCNC takes a smaller change of direction for none
 _SMOOTH = 0.05

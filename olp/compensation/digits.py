@@ -7,12 +7,18 @@ rounded positions on one grid, so that nothing drifts.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Array, Index, Mask
+from olp.core.values import dataclass
+
+#: one value for all rows, or (n,) of each
+_Value = TypeVar("_Value", "Array | float", "Places", Index)
+#: decimals of words: of all rows, or (n,) of each
+Places = int | npt.NDArray[np.int8]
 
 #: powers of ten up to the digits of a mantissa, as doubles
 POW10 = 10.0 ** np.arange(19)
@@ -41,16 +47,19 @@ class AxisRows:
     word: Index
     decimals: npt.NDArray[np.int8]
     offset: Array | float
-    unit: float
+    unit: Array | float
 
-    def part(self, a: int, b: int, unit: float) -> AxisRows:
-        """Rows a..b, which have one unit."""
-        cut = slice(a, b)
+    def part(self, rows: slice | Index) -> AxisRows:
+        """Some of the rows."""
         return AxisRows(
-            self.command[cut], self.nominal[cut], self.given[cut], self.raw[cut], self.reset[cut],
-            self.word[cut], self.decimals[cut],
-            self.offset if isinstance(self.offset, float) else self.offset[cut], unit,
+            self.command[rows], self.nominal[rows], self.given[rows], self.raw[rows], self.reset[rows],
+            self.word[rows], self.decimals[rows], part_of(self.offset, rows), part_of(self.unit, rows),
         )  # fmt: skip
+
+
+def part_of(value: _Value, rows: slice | Index) -> _Value:
+    """The values of some rows, or the one of all rows."""
+    return value[rows] if isinstance(value, np.ndarray) else value
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,67 +73,137 @@ class Digits:
     write: Mask
 
 
-def absolute(rows: AxisRows, before: float, least: int, usual: int) -> Digits:
+@dataclass(frozen=True, slots=True, eq=False)
+class Starts:
+    """Where stretches of rows begin: (k,) `first` row, and of each of `count` rows its stretch."""
+
+    first: Index
+    count: int
+
+    @staticmethod
+    def one(count: int) -> Starts:
+        return Starts(np.zeros(min(count, 1), np.int64), count)
+
+    def spread(self, values: _Value) -> _Value:
+        """(n,) per row from (k,) per stretch; one value is that of all."""
+        if not isinstance(values, np.ndarray):
+            return values
+        return np.repeat(values, np.diff(self.first, append=self.count))
+
+    def last(self, which: Mask) -> Index:
+        """(n,) the last row of `which` up to each row in its own stretch; less than its first one, where
+        there is none."""
+        rows = np.maximum.accumulate(np.where(which, np.arange(self.count), -1))
+        if len(self.first) > 1:
+            rows = np.maximum(rows, self.spread(self.first) - 1)
+        return np.asarray(rows, np.int64)
+
+    def has(self, last: Index) -> Mask:
+        """(n,) whether `last` found a row."""
+        return np.asarray(last >= (self.spread(self.first) if len(self.first) > 1 else 0), np.bool_)
+
+    def previous(self, values: Array, before: Array | float) -> Array:
+        """(n,) the value one row before, `before` a stretch begins."""
+        shifted = np.concatenate((values[:1], values[:-1]))
+        shifted[self.first] = before
+        return shifted
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Absolute:
+    """G90, as far as it does not depend on where the axis was: (n,) what would be written at each row. Some
+    rows state a position, others are `fixed` by a changed word, or are `free` to hold or to move on. `half`
+    is half a digit."""
+
+    starts: Starts
+    decimals: npt.NDArray[np.int64]
+    scale: Array
+    mantissa: Index
+    written: Array
+    stated: Array
+    fixed: Mask
+    sets: Mask
+    free: Mask
+    half: Array
+
+    @staticmethod
+    def of(rows: AxisRows, starts: Starts, least: Places, usual: Places) -> Absolute:
+        decimals = np.where(rows.given, np.maximum(rows.decimals, least), usual)
+        # mostly all words have the same number of digits, which is cheap
+        same_all = starts.count > 0 and bool((decimals == decimals[0]).all())
+        scale = POW10[decimals[:1]] if same_all else POW10[decimals]
+        with np.errstate(invalid="ignore"):
+            wanted = np.rint((rows.command - rows.offset) / rows.unit * scale)
+            unknown = np.isnan(wanted)
+            written = wanted / scale * rows.unit + rows.offset
+            if unknown.any():
+                wanted[unknown] = 0.0
+            mantissa = wanted.astype(np.int64)
+        fixed = rows.given & ~rows.raw
+        sets = rows.given | rows.reset
+        return Absolute(
+            starts, decimals, np.asarray(scale, float), mantissa, np.asarray(written, float),
+            np.where(fixed, written, rows.nominal), fixed, sets, ~sets & ~rows.raw & ~unknown,
+            np.asarray(0.5 * rows.unit / scale * _SLACK, float),
+        )  # fmt: skip
+
+    def follow(self, rows: AxisRows, before: Array | float) -> tuple[Array, Mask]:
+        """(n,) positions as written, and where an omitted axis moves. It holds until its rounded command
+        changes; `before` is where it is as a stretch begins."""
+        source = self.starts.last(self.sets)
+        entry = self.starts.spread(before)
+        anchor = np.where(self.starts.has(source), self.stated[source], entry)
+        with np.errstate(invalid="ignore"):
+            leaves = self.free & (np.abs(rows.command - anchor) > self.half)
+        moves = self.free & (self.starts.last(leaves) > source)
+        emitted = np.where(moves, self.written, self.stated)
+        last = self.starts.last(self.sets | moves)
+        return np.where(self.starts.has(last), emitted[last], entry), moves
+
+    def digits(self, rows: AxisRows, before: Array | float) -> Digits:
+        """What is written from `before` on."""
+        emitted, moves = self.follow(rows, before)
+        decimals, mantissa = self.decimals, self.mantissa
+        with np.errstate(invalid="ignore"):
+            insert = moves & ~(np.abs(emitted - self.starts.previous(emitted, before)) < 1e-9)
+        more = decimals - np.minimum(rows.decimals, decimals)
+        same = (rows.word * INT10[more] if more.any() else rows.word) == mantissa
+        if len(decimals) and int(decimals.max()) > _EXACT:
+            same |= np.abs(mantissa - rows.word * INT10[more]) <= NO_CHANGE * self.scale
+        return Digits(emitted, mantissa, decimals.astype(np.int8), (self.fixed & ~same) | insert)
+
+
+def absolute(rows: AxisRows, before: float, least: Places, usual: Places) -> Digits:
     """G90: `before` is the position as written on entry, `least` the fewest decimals, `usual` those of an
     inserted word."""
-    count = len(rows.command)
-    order = np.arange(count)
-    fix = rows.given & ~rows.raw
-    decimals = np.where(rows.given, np.maximum(rows.decimals, least), usual)
-    # mostly all words have the same number of digits, which is cheap
-    same_all = count > 0 and bool((decimals == decimals[0]).all())
-    scale = POW10[decimals[:1]] if same_all else POW10[decimals]
-    with np.errstate(invalid="ignore"):
-        wanted = np.rint((rows.command - rows.offset) / rows.unit * scale)
-        unknown = np.isnan(wanted)
-        written = wanted / scale * rows.unit + rows.offset
-        if unknown.any():
-            wanted[unknown] = 0.0
-        mantissa = wanted.astype(np.int64)
-    sets = rows.given | rows.reset
-    emitted = np.where(fix, written, rows.nominal)
-    # an omitted axis holds until its rounded command changes
-    source = np.maximum.accumulate(np.where(sets, order, -1))
-    anchor = np.where(source >= 0, emitted[source], before)
-    free = ~sets & ~rows.raw & ~unknown
-    half = 0.5 * rows.unit / scale * _SLACK
-    with np.errstate(invalid="ignore"):
-        leaves = free & (np.abs(rows.command - anchor) > half)
-    started = np.maximum.accumulate(np.where(leaves, order, -1)) > source
-    moves = free & started
-    emitted = np.where(moves, written, emitted)
-    last = np.maximum.accumulate(np.where(sets | moves, order, -1))
-    emitted = np.where(last >= 0, emitted[last], before)
-    previous = np.concatenate(([before], emitted[:-1]))
-    with np.errstate(invalid="ignore"):
-        insert = moves & ~(np.abs(emitted - previous) < 1e-9)
-    more = decimals - np.minimum(rows.decimals, decimals)
-    same = (rows.word * INT10[more] if more.any() else rows.word) == mantissa
-    if count and int(decimals.max()) > _EXACT:
-        same |= np.abs(mantissa - rows.word * INT10[more]) <= NO_CHANGE * scale
-    return Digits(emitted, mantissa, decimals.astype(np.int8), (fix & ~same) | insert)
+    return Absolute.of(rows, Starts.one(len(rows.command)), least, usual).digits(rows, before)
 
 
-def incremental(rows: AxisRows, before: float, grid: int) -> Digits:
-    """G91: words are differences of positions rounded to `grid` decimals from `before` on."""
-    unit = rows.unit
-    decimals = np.full(len(rows.command), grid, np.int8)
-    own = rows.word * INT10[np.maximum(grid - rows.decimals, 0)]
-    fine = rows.decimals > grid
+def incremental(rows: AxisRows, before: Array | float, grid: Places, starts: Starts | None = None) -> Digits:
+    """G91: words are differences of positions rounded to `grid` decimals from `before` on, in each of the
+    stretches."""
+    starts = starts or Starts.one(len(rows.command))
+    unit, entry = rows.unit, starts.spread(before)
     with np.errstate(invalid="ignore"):
-        place = np.rint((rows.command - before) / unit * POW10[grid])
+        place = np.rint((rows.command - entry) / unit * POW10[grid])
     known = ~np.isnan(place) & ~rows.raw
+    own = rows.word * INT10[np.maximum(grid - rows.decimals, 0)]
     if not known.all():
+        assert isinstance(before, float) and isinstance(unit, float) and isinstance(grid, int)
         return _incremental_raw(rows, before, unit, grid, own, known)
     steps = place.astype(np.int64)
-    mantissa = np.diff(steps, prepend=0)
+    mantissa = steps.copy()
+    mantissa[1:] -= steps[:-1]
+    mantissa[starts.first] = steps[starts.first]
     write = np.where(rows.given, mantissa != own, mantissa != 0)
+    fine = rows.decimals > grid
     if fine.any():
-        step = np.diff(rows.command, prepend=before) / unit
+        step = (rows.command - starts.previous(rows.command, before)) / unit
         write = np.where(
             fine & rows.given, np.abs(step - rows.word / POW10[rows.decimals]) > NO_CHANGE, write
         )
-    return Digits(before + steps / POW10[grid] * unit, mantissa, decimals, write)
+    decimals = np.broadcast_to(np.asarray(grid, np.int8), len(steps))
+    return Digits(np.asarray(entry + steps / POW10[grid] * unit), mantissa, decimals, write)
 
 
 def _incremental_raw(

@@ -6,8 +6,6 @@ is exact, along the tool axis where its bottom and its R level are.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from olp.compensation.invert import invert
@@ -15,15 +13,20 @@ from olp.compensation.plan import Plan
 from olp.core.arrays import Array
 from olp.core.geometry import PLANES
 from olp.core.toolpath import Flag
+from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
-from olp.program.program import Hole, Program
+from olp.program.holes import Holes
+from olp.program.program import Program
+
+#: (3, 3) axes of each plane: first, second, third.
+_AXES = np.array(PLANES)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HolePlan:
     """(h, 3) commands at the R level and at the bottom of each hole, in mm."""
 
-    holes: tuple[Hole, ...]
+    holes: Holes
     level_mm: Array
     bottom_mm: Array
 
@@ -32,22 +35,18 @@ class HolePlan:
         path, holes = program.toolpath, program.holes
         count = len(holes)
         level, bottom = np.zeros((count, 3)), np.zeros((count, 3))
-        tools = path.tools_mm()
-        tool, shift = np.zeros((count, tools.shape[1])), np.zeros((count, 3))
-        for i, hole in enumerate(holes):
-            first, second, third = PLANES[hole.plane]
-            for point, depth in ((level, hole.r_mm), (bottom, hole.z_mm)):
-                point[i, first], point[i, second], point[i, third] = *hole.place_mm, depth
-            frame = int(path.frame[hole.first])
-            tool[i], shift[i] = tools[frame], plan.shift_mm[frame]
         if not count:
             return HolePlan(holes, level, bottom)
+        axes, row = _AXES[holes.plane], np.arange(count)
+        for point, depth in ((level, holes.r_mm), (bottom, holes.z_mm)):
+            point[row[:, None], axes] = np.column_stack((holes.place_mm, depth))
+        frame = path.frame[holes.first]
+        tool, shift = path.tools_mm()[frame], plan.shift_mm[frame]
         level_play, bottom_play = _play(program, plan)
         c_level = invert(model, level + shift, tool, level_play)
         c_bottom = invert(model, bottom + shift, tool, bottom_play)
-        for i, hole in enumerate(holes):
-            if path.flag[hole.first] & np.uint8(Flag.PASS):
-                c_level[i], c_bottom[i] = level[i], bottom[i]
+        left = (path.flag[holes.first] & np.uint8(Flag.PASS)) != 0
+        c_level[left], c_bottom[left] = level[left], bottom[left]
         return HolePlan(holes, c_level, c_bottom)
 
 
@@ -55,12 +54,12 @@ def _play(program: Program, plan: Plan) -> tuple[Array | None, Array | None]:
     """(h, 3) play of the axes when a hole's R level and its bottom are reached."""
     if plan.play is None:
         return None, None
-    path = program.toolpath
-    rows = np.zeros((2, len(program.holes)), np.int64)
-    for i, hole in enumerate(program.holes):
-        depth = path.end_mm[hole.first : hole.last, PLANES[hole.plane][2]]
-        level = np.flatnonzero(depth == hole.r_mm)
-        bottom = np.flatnonzero(depth == hole.z_mm)
-        moves = hole.first + (level[:1] if level.size else bottom[:1]), hole.first + bottom[-1:]
-        rows[:, i] = [int(np.searchsorted(plan.move, m[0])) if m.size else 0 for m in moves]
-    return plan.play[rows[0]], plan.play[rows[1]]
+    holes = program.holes
+    move, hole = holes.moves()
+    depth = program.toolpath.end_mm[move, _AXES[holes.plane[hole], 2]]
+    level, _ = holes.ends(depth == holes.r_mm[hole])
+    bottom, last_bottom = holes.ends(depth == holes.z_mm[hole])
+    # a hole without its R level, or without its bottom, takes what is there
+    reached = (np.where(level >= 0, level, bottom), last_bottom)
+    level_row, bottom_row = (np.where(m >= 0, np.searchsorted(plan.move, m), 0) for m in reached)
+    return plan.play[level_row], plan.play[bottom_row]

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from olp.compensation.rows import Rows
 from olp.compensation.writer import Writer
-from olp.core.arrays import Index, Mask
+from olp.core.arrays import Index, Mask, distinct
 from olp.core.errors import ProgramError
 from olp.core.toolpath import Flag, Kind
 from olp.program.rs274.codes import (
@@ -50,7 +50,7 @@ def block_edits(writer: Writer, rows: Rows, tails: Index) -> list[Edits]:
         prefix = np.full(len(chosen), writer.prefixes(b" " + letter), np.int32)
         starts = {
             int(p): writer.prefixes(writer.prefixes.table[int(p)] + letter)
-            for p in np.unique(lead[chosen[begins]])
+            for p in distinct(lead[chosen[begins]])
         }
         prefix[begins] = [starts[int(p)] for p in lead[chosen[begins]]]
         row = tails[chosen]
@@ -81,11 +81,10 @@ def _leads(writer: Writer, line_no: npt.NDArray[np.int32], turning: Mask, before
     """Prefix of the first word of each inserted block: line end, `/` and, to take up backlash at an
     arc, G1."""
     prefixes = writer.prefixes
-    lines, which = np.unique(line_no, return_inverse=True)
-    table = np.zeros((len(lines), 3), np.int64)
-    for i, line in enumerate(lines.tolist()):
-        start = writer.style.block_start(line)
-        deleted = start[len(writer.program.eol(line)) :]
+    starts, which = writer.style.block_starts(line_no)
+    table = np.zeros((len(starts), 3), np.int64)
+    for i, start in enumerate(starts):
+        deleted = b"/" if start.endswith(b"/") else b""
         table[i] = (prefixes(start), prefixes(start + b"G1 "), prefixes(deleted + b"G1 "))
     return np.asarray(table[which, np.where(before, 2, np.where(turning, 1, 0))], np.int64)
 
@@ -139,7 +138,7 @@ def _arc_word(writer: Writer, rows: Rows, row: int, edits: EditList) -> None:
 def _inverse_time(writer: Writer, rows: Rows, tails: Index, edits: EditList) -> None:
     """In G93 every part of a block gets its share of the time: F grows by what its path shrinks."""
     timed = np.flatnonzero((rows.flag[tails] & np.uint8(Flag.INVERSE_TIME)) != 0)
-    for move in np.unique(rows.move[tails[timed]]).tolist():
+    for move in distinct(rows.move[tails[timed]]).tolist():
         part = np.flatnonzero(rows.move == move)
         line = int(writer.path.line[move])
         index = writer.style.word(line, "F")
@@ -167,17 +166,21 @@ def _inverse_time(writer: Writer, rows: Rows, tails: Index, edits: EditList) -> 
 
 def _end_words(writer: Writer, rows: Rows, tails: Index, edits: EditList) -> None:
     """M words that end a block (M0 M5 M9 M30 …) go from the first part to the last."""
-    for move in np.unique(rows.move[tails]).tolist():
-        line = int(writer.path.line[move])
-        moved = [
-            i for i in writer.words.of_line(line)
-            if writer.words.letter[i] == 77 and not writer.words.decimals[i]
-            and int(writer.words.mantissa[i]) in _END_M
-        ]  # fmt: skip
-        if not moved:
+    if not tails.size:
+        return
+    words = writer.words
+    lines = distinct(writer.path.line[rows.move[tails]])
+    first, last = int(words.first_word[lines[0] - 1]), int(words.first_word[lines[-1]])
+    part = slice(first, last)
+    ending = (words.letter[part] == ord("M")) & (words.decimals[part] == 0)
+    index = first + np.flatnonzero(ending & np.isin(words.mantissa[part], list(_END_M)))
+    line = np.searchsorted(words.first_word, index, "right")
+    for i, number in zip(index.tolist(), line.tolist(), strict=True):
+        if lines[min(np.searchsorted(lines, number), len(lines) - 1)] != number:
             continue
-        place = int(writer.program.line_end[line - 1])
-        for k, i in enumerate(moved):
-            start, end = int(writer.words.start[i]), int(writer.words.end[i])
-            edits.add(start, end, BARE, 0)
-            edits.add(place, place, BARE, 0, b" " + writer.program.data[start:end], 2**30 + k)
+        place = int(writer.program.line_end[number - 1])
+        start, end = int(words.start[i]), int(words.end[i])
+        edits.add(start, end, BARE, 0)
+        # behind all other words, in their order
+        order = 2**30 + i - int(words.first_word[number - 1])
+        edits.add(place, place, BARE, 0, b" " + writer.program.data[start:end], order)

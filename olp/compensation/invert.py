@@ -34,28 +34,39 @@ def invert(model: ErrorModel, target_mm: Array, tool_mm: Array, play: Array | No
         state = None if play is None else play[part]
         target = target_mm[part]
         guess = target
-        previous = np.zeros(1)
-        step = 0.0
+        previous, step = np.zeros((1, 3)), np.zeros(len(target))
+        # each point ends with its own last step, whatever the points beside it are
+        good = np.zeros(len(target), bool)
         for i in range(_ITERATIONS):
             e = model.error(guess, tool, state)
             unknown = np.isnan(e)
             if unknown.any():
                 e[unknown] = 0.0
-            change = float(np.abs(e - previous).max(initial=0.0))
-            if i and change < TOLERANCE_MM:
-                break
-            guess = target - e
-            # the next change will be this one times the rate at which the error grows
-            if i and change * max(_LEAST_RATE, 10.0 * change / step) < TOLERANCE_MM:
-                break
+            change = _largest(e - previous)
+            if i:
+                good |= change < TOLERANCE_MM
+                if good.all():
+                    break
+            guess = np.where(good[:, None], guess, target - e) if good.any() else target - e
+            if i:
+                # the next change will be this one times the rate at which the error grows
+                good |= change * np.maximum(_LEAST_RATE * step, 10.0 * change) < TOLERANCE_MM * step
+                if good.all():
+                    break
             previous, step = e, change
         else:
             raise NotInvertible(
                 f"the error model cannot be inverted to {TOLERANCE_MM:g} mm: its errors grow as fast as the "
-                f"position (the last step was {change:.3g} mm); check the values of the calibration"
+                f"position (the last step was {change.max():.3g} mm); check the values of the calibration"
             )
         command[part] = guess
     return command
+
+
+def _largest(vectors: Array) -> Array:
+    """(n,) the largest size of a component of each vector (n, 3)."""
+    size = np.abs(vectors)
+    return np.asarray(np.maximum(np.maximum(size[:, 0], size[:, 1]), size[:, 2]))
 
 
 def bent(model: ErrorModel, target_mm: Array, tool_mm: Array, play: Array | None = None) -> Array:

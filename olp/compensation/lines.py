@@ -36,9 +36,11 @@ def no_cuts() -> Cuts:
     return np.zeros(0, np.int64), np.zeros(0), np.zeros((0, 3))
 
 
-def subdivide_lines(path: Toolpath, model: ErrorModel, target: Array, free: Mask, tolerance: float) -> Cuts:
+def subdivide_lines(
+    path: Toolpath, model: ErrorModel, begin: Array, target: Array, free: Mask, tolerance: float
+) -> Cuts:
     """Cuts (move, share, target) of the moves that are `free` to be split, so that no chord leaves its line
-    by more than `tolerance` mm."""
+    by more than `tolerance` mm. `begin` (3,) is the target before the first move."""
     tools = path.tool_mm()
     clear = clear_length_mm(model, path.tools_mm(), tolerance)
     bending: list[tuple[Index, Array, Array]] = []
@@ -47,7 +49,7 @@ def subdivide_lines(path: Toolpath, model: ErrorModel, target: Array, free: Mask
         b = min(a + block, len(path))
         start = np.zeros((b - a, 3))
         start[1:] = target[a : b - 1]
-        start[0] = target[a - 1] if a else np.array(path.start_mm)
+        start[0] = target[a - 1] if a else begin
         delta = target[a:b] - start
         long = longer(delta, clear)
         long = long[free[a:b][long] & np.isfinite(delta[long]).all(axis=1)]
@@ -86,17 +88,23 @@ def _cut(model: ErrorModel, move: Index, start: Array, delta: Array, tool: Array
 def _cut_batch(
     model: ErrorModel, move: Index, start: Array, delta: Array, tool: Array, count: Index, tolerance: float
 ) -> Cuts:
-    first = np.concatenate(([0], np.cumsum(count + 1)[:-1]))
-    owner = np.repeat(np.arange(len(move)), count + 1)
-    share = (np.arange(len(owner)) - first[owner]) / count[owner]
-    point = start[owner] + share[:, None] * delta[owner]
+    samples = count + 1
+    first = np.cumsum(samples) - samples
+    owner = np.repeat(np.arange(len(move)), samples)
+    share = (np.arange(len(owner)) - np.repeat(first, samples)) / np.repeat(count, samples)
+    step = delta.take(owner, axis=0)
+    point = share[:, None] * step
+    point += start.take(owner, axis=0)
     tools = tool if tool.ndim == 1 else tool[owner]
-    play = np.sign(delta)[owner] if model.backlash_at(point[:1]) is not None else None
-    error = point - bent(model, point, tools, play)
+    play = np.sign(step) if model.backlash_at(point[:1]) is not None else None
+    across = np.ascontiguousarray((point - bent(model, point, tools, play)).T)
     length2 = np.maximum((delta * delta).sum(axis=1), 1e-30)
-    along = (error * delta[owner]).sum(axis=1) / length2[owner]
-    error -= along[:, None] * delta[owner]
-    across = np.ascontiguousarray(error.T)
+    along = across[0] * step[:, 0]
+    for axis in (1, 2):
+        along += across[axis] * step[:, axis]
+    along /= np.repeat(length2, samples)
+    for axis in range(3):
+        across[axis] -= along * step[:, axis]
     last = count * _FINE
     cut_move, cut_place = [], []
     begin = np.zeros(len(move), np.int64)
@@ -105,7 +113,9 @@ def _cut_batch(
     while active.size:
         reach = _longest(across, first[active], begin[active], last[active], stride[active], tolerance, _FEW)
         # the search tests few samples of a long chord; its result is tested at all of them
-        wrong = np.flatnonzero(~_fits(across, first[active], begin[active], reach, tolerance, _ALL))
+        long = np.flatnonzero(reach - begin[active] > _FINE * _FEW)
+        some = active[long]
+        wrong = long[~_fits(across, first[some], begin[some], reach[long], tolerance, _ALL)]
         if wrong.size:
             again = active[wrong]
             reach[wrong] = _longest(
@@ -157,24 +167,31 @@ def _fits(across: Array, first: Index, begin: Index, end: Index, tolerance: floa
         return fits
     first, begin, end, low, inner = first[wide], begin[wide], end[wide], low[wide], inner[wide]
     looked = np.minimum(inner, most)
-    offset = np.concatenate(([0], np.cumsum(looked)[:-1]))
-    owner = np.repeat(np.arange(len(wide)), looked)
-    nth = np.arange(len(owner)) - offset[owner]
-    sample = low[owner] + (2 * nth + 1) * inner[owner] // (2 * looked)[owner]
-    share = (_FINE * sample - begin[owner]) / (end - begin)[owner]
-    sample += first[owner]
-    square = np.zeros(len(owner))
+    offset = np.cumsum(looked) - looked
+    nth = np.arange(int(offset[-1] + looked[-1])) - np.repeat(offset, looked)
+    if (inner > most).any():
+        nth = (2 * nth + 1) * np.repeat(inner, looked) // np.repeat(2 * looked, looked)
+    sample = nth + np.repeat(low, looked)
+    share = (_FINE * sample - np.repeat(begin, looked)) / np.repeat(end - begin, looked)
+    sample += np.repeat(first, looked)
+    square = np.zeros(len(sample))
+    begins, ends = (_places(first, place) for place in (begin, end))
     for values in across:
-        a, b = _between(values, first, begin), _between(values, first, end)
-        departure = values[sample] - a[owner] - share * (b - a)[owner]
+        a, b = _between(values, *begins), _between(values, *ends)
+        departure = values[sample] - np.repeat(a, looked) - share * np.repeat(b - a, looked)
         square += departure * departure
     fits[wide] = np.maximum.reduceat(square, offset) <= tolerance * tolerance
     return fits
 
 
-def _between(values: Array, first: Index, place: Index) -> Array:
-    """Values at positions, linear between two samples."""
+def _places(first: Index, place: Index) -> tuple[Index, Index, Array]:
+    """The samples before and behind positions, and how far between them these are."""
     sample = first + place // _FINE
     part = place % _FINE
-    interpolated: Array = values[sample] + (values[sample + (part > 0)] - values[sample]) * (part / _FINE)
+    return sample, sample + (part > 0), part / _FINE
+
+
+def _between(values: Array, before: Index, behind: Index, part: Array) -> Array:
+    """Values at positions, linear between two samples."""
+    interpolated: Array = values[before] + (values[behind] - values[before]) * part
     return interpolated

@@ -5,7 +5,7 @@ A plan holds no text. `planning` makes it, and the writers put it into the text 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +13,7 @@ import numpy.typing as npt
 from olp.core.arrays import Array, Index, Mask
 from olp.core.machine import Vector
 from olp.core.toolpath import Frame, Toolpath, Touch
+from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
 
 
@@ -74,6 +75,25 @@ def zero_shifts(frames: tuple[Frame, ...], model: ErrorModel) -> Array:
             set_mm = 0.0 if length.touched is None else float(error_at(length.touched)[2])
             shifts[i] += np.array(length.along) * (set_mm - length.constant_mm)
     return shifts
+
+
+class TargetRows(Protocol):
+    """Rows (n, 3) of which some are asked for at a time."""
+
+    def __getitem__(self, rows: Index | slice | int, /) -> Array: ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Targets:
+    """(n, 3) where the tip has to be at the end of each move of a path, as `targets` has it, made when some
+    are asked for. `shift_mm` are those of its frames."""
+
+    path: Toolpath
+    shift_mm: Array
+
+    def __getitem__(self, rows: Index | slice | int, /) -> Array:
+        end = self.path.end_mm[rows]
+        return end + self.shift_mm[self.path.frame[rows]] if self.shift_mm.any() else end
 
 
 def targets(path: Toolpath, shift_mm: Array) -> Array:

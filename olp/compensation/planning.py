@@ -1,25 +1,31 @@
 """Where every move of a program has to be commanded so that the tip follows the nominal path.
 
-`plan` inverts the error model at the waypoints, subdivides what would bend (`lines`, `arcs`), and follows
-the play of axes with backlash (`reversal`). The result knows nothing of text.
+A `Planning` inverts the error model at the waypoints, subdivides what would bend (`lines`, `arcs`), and
+follows the play of axes with backlash (`reversal`), band by band. The result knows nothing of text.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
-from olp.compensation.approach import with_approaches
+from olp.compensation.approach import Known, with_approaches
 from olp.compensation.arcs import subdivide_arcs
 from olp.compensation.contour import Contour
 from olp.compensation.corners import away_from_corners
 from olp.compensation.invert import invert
 from olp.compensation.lines import Cuts, subdivide_lines
 from olp.compensation.plan import Limits, Plan, targets, zero_shifts
-from olp.compensation.reversal import Reversal, carry_play
-from olp.core.arrays import Array, Index, Mask
+from olp.compensation.reversal import Carried, Reversal, carry_play
+from olp.core.arrays import Array, Index, Mask, distinct
 from olp.core.errors import OutsideBox, ProgramError
+from olp.core.progress import Progress, part, silent
 from olp.core.toolpath import Flag, Kind, Toolpath
+from olp.core.units import MM_PER_INCH
 from olp.errormodel.base import ErrorModel
+from olp.program.bands import Band, bands
+from olp.program.program import Program
 
 #: share of the tolerance that chords may use; the search's own steps need the other 5 %
 CHORD_SHARE = 0.95
@@ -34,41 +40,93 @@ _UNTOUCHED = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE)
 _UNSPLIT = np.uint8(Flag.CYCLE | Flag.WHOLE)
 
 
+def plans(
+    program: Program, model: ErrorModel, limits: Limits, tell: Progress = silent
+) -> Iterator[tuple[Band, Plan]]:
+    """The bands of a program with the plan of each. `tell` is told the first half of each band; the other is
+    that of who takes it. Raises as `Planning.rows`."""
+    planning = Planning(model, limits)
+    for band in bands(program):
+        told = part(tell, band.share, band.middle)
+        yield band, planning.rows(band.program.toolpath, band.ahead_mm, told)
+
+
+def uncorrected_moves(program: Program, model: ErrorModel, limits: Limits) -> Index:
+    """The moves of a program that are left uncorrected for want of a position. Raises as
+    `Planning.rows`."""
+    parts = [band.first + rows.uncorrected for band, rows in plans(program, model, limits)]
+    return np.concatenate(parts)
+
+
 def plan(path: Toolpath, model: ErrorModel, limits: Limits) -> Plan:
-    """Commands for a whole path. Raises ProgramError for a feed move whose error cannot be known, OutsideBox,
-    NotInvertible."""
-    shift = zero_shifts(path.frames, model) if path.frames else np.zeros((0, 3))
-    target = targets(path, shift)
-    raw, uncorrected = _untouched(path, model)
-    command = _waypoints(path, model, target, raw)
-    reversal = Reversal.of(model, limits.tolerance_mm * DEAD_BAND_SHARE)
-    chord = limits.tolerance_mm * (CHORD_SHARE - (DEAD_BAND_SHARE if reversal is not None else 0.0))
-    contour = Contour.of(path)
-    whole = ((path.flag & _UNSPLIT) != 0) | raw.any(axis=1)
-    if contour is not None:
-        whole |= contour.whole
-        uncorrected = np.union1d(uncorrected, contour.beside)
-    kinds = (Kind.LINE, Kind.RAPID) if limits.split_rapids else (Kind.LINE,)
-    free = np.isin(path.kind, kinds) & ~whole
-    # behind a `/` block the start depends on the switch, so no cut can be right for both
-    free[1:] &= ~(((path.flag[:-1] & ~path.flag[1:]) & np.uint8(Flag.DELETED)) != 0)
-    cuts_line = subdivide_lines(path, model, target, free, chord)
-    chord_arc = max(chord - ARC_DIGIT_SHARE * limits.digit_mm, 0.3 * limits.tolerance_mm)
-    turning, band = (None, 0.0) if reversal is None else (reversal.axes, reversal.band_mm)
-    cuts_arc = subdivide_arcs(path, model, target, ~whole, chord_arc, turning, band)
-    cuts = [cuts_line, cuts_arc]
-    if contour is not None:
-        cuts = [_pick(c, away_from_corners(path, c[0], c[1])) for c in cuts]
-    rows = _expand(path, target, command, raw, uncorrected, shift, cuts, model, reversal is not None)
-    if contour is not None:
-        rows = contour.hold(rows)
-    if reversal is not None:
-        steady = None if contour is None else contour.steady
-        rows = with_approaches(path, model, rows, reversal.axes, limits, steady)
-        rows = carry_play(path, model, rows, reversal, contour, insert=limits.insert)
-    if limits.refuse_outside:
-        _check_box(path, model, rows)
-    return rows
+    """Commands for a whole path. Raises as `Planning.rows`."""
+    return Planning(model, limits).rows(path, np.zeros((0, 3)))
+
+
+class Planning:
+    """Plans a path band by band; what is known of the play of the axes goes on from each to the next."""
+
+    def __init__(self, model: ErrorModel, limits: Limits) -> None:
+        self.model, self.limits = model, limits
+        self.reversal = Reversal.of(model, limits.tolerance_mm * DEAD_BAND_SHARE)
+        self._known, self._carried = Known(), Carried()
+        #: (3,) where the tip has to be at the end of the last band, None before the first one
+        self._target: Array | None = None
+
+    def rows(self, path: Toolpath, ahead_mm: Array, tell: Progress = silent) -> Plan:
+        """Commands for the next band, behind which moves end at `ahead_mm` (k, 3). Raises ProgramError for a
+        feed move whose error cannot be known, OutsideBox, NotInvertible."""
+        model, limits, reversal = self.model, self.limits, self.reversal
+        shift = zero_shifts(path.frames, model) if path.frames else np.zeros((0, 3))
+        target = targets(path, shift)
+        begin = np.array(path.start_mm) if self._target is None else self._target
+        raw, uncorrected = _untouched(path, model)
+        command = _waypoints(path, model, target, raw)
+        tell("correct", 0.3)
+        chord = limits.tolerance_mm * (CHORD_SHARE - (DEAD_BAND_SHARE if reversal is not None else 0.0))
+        contour = Contour.of(path)
+        whole = ((path.flag & _UNSPLIT) != 0) | raw.any(axis=1)
+        if contour is not None:
+            whole |= contour.whole
+            uncorrected = distinct(np.concatenate((uncorrected, contour.beside)))
+        kinds = (Kind.LINE, Kind.RAPID) if limits.split_rapids else (Kind.LINE,)
+        free = np.isin(path.kind, kinds) & ~whole
+        # behind a `/` block the start depends on the switch, so no cut can be right for both
+        free[1:] &= ~(((path.flag[:-1] & ~path.flag[1:]) & np.uint8(Flag.DELETED)) != 0)
+        cuts_line = subdivide_lines(path, model, begin, target, free, chord)
+        tell("correct", 0.5)
+        chord_arc = max(chord - ARC_DIGIT_SHARE * limits.digit_mm, 0.3 * limits.tolerance_mm)
+        turning, band = (None, 0.0) if reversal is None else (reversal.axes, reversal.band_mm)
+        cuts_arc = subdivide_arcs(path, model, target, ~whole, chord_arc, turning, band)
+        tell("correct", 0.7)
+        cuts = [cuts_line, cuts_arc]
+        if contour is not None:
+            cuts = [_pick(c, away_from_corners(path, c[0], c[1])) for c in cuts]
+        rows = _expand(path, target, command, raw, uncorrected, shift, cuts, model, reversal is not None)
+        if contour is not None:
+            rows = contour.hold(rows)
+        if reversal is not None:
+            rows = self._with_play(path, rows, reversal, contour, ahead_mm, part(tell, 0.7, 1.0))
+        if limits.refuse_outside:
+            _check_box(path, model, rows)
+        if len(path):
+            self._target = target[-1].copy()
+        return rows
+
+    def _with_play(
+        self, path: Toolpath, rows: Plan, reversal: Reversal, contour: Contour | None, ahead_mm: Array,
+        tell: Progress,
+    ) -> Plan:  # fmt: skip
+        """The plan of a band with the rows that take up backlash."""
+        limits, steady = self.limits, None if contour is None else contour.steady
+        rows = with_approaches(
+            path, self.model, rows, reversal.axes, limits, steady, self._known, ahead_mm
+        )  # fmt: skip
+        tell("correct", 0.3)
+        return carry_play(
+            path, self.model, rows, reversal, contour, self._carried, insert=limits.insert,
+            tell=part(tell, 0.3, 1.0),
+        )  # fmt: skip
 
 
 def _untouched(path: Toolpath, model: ErrorModel) -> tuple[Mask, Index]:
@@ -99,7 +157,7 @@ def _untouched(path: Toolpath, model: ErrorModel) -> tuple[Mask, Index]:
         raw[some] |= blind | unknown[some]
         uncorrected = wanting
     held = _hold_after_machine_moves(path, raw)
-    return raw, np.union1d(uncorrected, held)
+    return raw, distinct(np.concatenate((uncorrected, held)))
 
 
 def _hold_after_machine_moves(path: Toolpath, raw: Mask) -> Index:
@@ -185,9 +243,11 @@ def _check_box(path: Toolpath, model: ErrorModel, rows: Plan) -> None:
     if outside.any():
         row = int(np.flatnonzero(outside.any(axis=1))[0])
         axis = int(np.flatnonzero(outside[row])[0])
+        unit = path.frames[int(path.frame[rows.move[row]])].unit_mm
+        inches = "; the program counts in inches there" if unit == MM_PER_INCH else ""
         raise OutsideBox(
             f"axis {'XYZ'[axis]} would be commanded to {rows.command_mm[row, axis]:.3f} mm, outside the "
             f"calibrated box {box[axis, 0]:g} to {box[axis, 1]:g} mm; move the part, calibrate there, or "
-            "accept the error at the box face with --outside-box hold",
+            f"accept the error at the box face with --outside-box hold{inches}",
             line=int(path.line[rows.move[row]]),
         )

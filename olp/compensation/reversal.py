@@ -7,17 +7,20 @@ band keeps it where it is instead.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import field, replace
 from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from olp.compensation.contour import Contour
+from olp.compensation.dead_band import UNKNOWN, Rest, follow
 from olp.compensation.invert import invert
 from olp.compensation.plan import Plan
 from olp.core.arrays import Array, Index, Mask
+from olp.core.progress import Progress, silent
 from olp.core.toolpath import Flag, Kind, Toolpath
+from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
 
 _Scalar = TypeVar("_Scalar", bound=np.generic)
@@ -26,6 +29,8 @@ _Scalar = TypeVar("_Scalar", bound=np.generic)
 _NO_TOOL = np.zeros(3)
 #: Iterations of the play states, at most.
 _PASSES = 6
+#: Change of the play, 2 from side to side, that is none.
+_SAME_PLAY = 1e-3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,56 +55,91 @@ class Reversal:
         return Reversal(axes, band_mm) if axes.any() else None
 
 
+@dataclass(slots=True, eq=False)
+class Carried:
+    """What a plan with play passes on to the one behind it: where each axis rests in each of the `passes` of
+    the iteration. Of its last row (3,) each: the target, the command, and by how much the load is `held` from
+    the target."""
+
+    passes: list[tuple[Rest, ...]] = field(default_factory=lambda: [(UNKNOWN,) * 3])
+    target_mm: Array = field(default_factory=lambda: np.full(3, np.nan))
+    command_mm: Array = field(default_factory=lambda: np.full(3, np.nan))
+    held_mm: Array = field(default_factory=lambda: np.zeros(3))
+
+
 def carry_play(
     path: Toolpath,
     model: ErrorModel,
     rows: Plan,
     reversal: Reversal,
     contour: Contour | None,
+    carried: Carried,
     *,
     insert: bool,
+    tell: Progress = silent,
 ) -> Plan:
     """The plan with play: commands lead by half the backlash. Where an axis turns round in a feed move, a row
     that only takes it up comes first; without `insert` not before moves that are never split, and never along
-    a `contour` under cutter compensation.
+    a `contour` under cutter compensation. `carried` is that of the rows before, and becomes that of these.
 
     Where one axis turns, the straightness of another may jump with it, so that one turns too. The states are
     iterated until they agree.
     """
+    if not len(rows):
+        return rows
     tools = path.tool_mm()
     tool = tools if tools.ndim == 1 else tools[rows.move]
     play = np.zeros((len(rows), 3))
     turns = np.zeros((len(rows), 3), bool)
     command, held = rows.command_mm, np.zeros((len(rows), 3))
+    passes: list[tuple[Rest, ...]] = []
     source = None if contour is None else contour.source(rows)
     still = _still(path, rows, source)
-    for _ in range(_PASSES):
-        backlash = model.backlash_at(command)
-        assert backlash is not None
-        backlash = np.maximum(np.nan_to_num(backlash), 0.0)
-        # where the load is: the command without its lead, and without the hold of the iteration before
-        wanted = np.where(rows.raw, rows.target_mm, command - backlash / 2 * play - held)
-        if still is not None:
-            wanted = np.take_along_axis(wanted, still, axis=0)
-        before = play.copy()
+    for turn in range(_PASSES):
+        every_backlash = model.backlash_at(command)
+        assert every_backlash is not None
+        change = 0.0
+        # that of the same pass: a later one has seen more than this one
+        rests = list(carried.passes[min(turn, len(carried.passes) - 1)])
+        # one axis at a time, so that memory is small
         for axis in np.flatnonzero(reversal.axes).tolist():
-            play[:, axis], load, turns[:, axis] = _follow(
-                wanted[:, axis], backlash[:, axis], reversal.band_mm
-            )
+            backlash = np.maximum(np.nan_to_num(every_backlash[:, axis]), 0.0)
+            # where the load is: the command without its lead, and without the hold of the iteration before
+            wanted = command[:, axis] - backlash / 2 * play[:, axis] - held[:, axis]
+            wanted = np.where(rows.raw[:, axis], rows.target_mm[:, axis], wanted)
+            if still is not None:
+                wanted = wanted[still[:, axis]]
+            after, load, turns[:, axis], rests[axis] = follow(wanted, backlash, reversal.band_mm, rests[axis])
+            change = max(change, float(np.abs(after - play[:, axis]).max(initial=0.0)))
+            play[:, axis] = after
             # a held axis aims at where its load is held, not at where it should be
-            held[:, axis] = np.nan_to_num(load - wanted[:, axis])
+            held[:, axis] = np.nan_to_num(load - wanted)
+        del every_backlash
         command = invert(model, rows.target_mm + held, tool, play)
         command[rows.raw] = rows.command_mm[rows.raw]
         if source is not None:
             command = np.take_along_axis(command, source, axis=0)
-        if np.abs(play - before).max(initial=0.0) < 1e-3:
+        passes.append(tuple(rests))
+        tell("correct", (turn + 1) / _PASSES)
+        if change < _SAME_PLAY and turn + 1 >= len(carried.passes):
             break
     rows = replace(rows, command_mm=command, play=play)
-    may = _may_turn(path, rows, insert=insert)
+    may = _may_turn(path, rows, carried.command_mm, insert=insert)
     if contour is not None:
         may &= ~contour.steady[rows.move]
     turns &= may[:, None]
-    return _take_up(model, rows, tool, held, turns) if turns.any() else rows
+    before, carried.passes = replace(carried), _different(passes)
+    carried.target_mm, carried.command_mm = rows.target_mm[-1].copy(), command[-1].copy()
+    carried.held_mm = held[-1].copy()
+    return _take_up(model, rows, tool, held, turns, before) if turns.any() else rows
+
+
+def _different(passes: list[tuple[Rest, ...]]) -> list[tuple[Rest, ...]]:
+    """The passes up to the first one from which on nothing changes any more."""
+    count = len(passes)
+    while count > 1 and all(a.like(b) for a, b in zip(passes[count - 2], passes[-1], strict=True)):
+        count -= 1
+    return [*passes[: count - 1], passes[-1]]
 
 
 def _still(path: Toolpath, rows: Plan, source: Index | None) -> Index | None:
@@ -119,68 +159,37 @@ def _still(path: Toolpath, rows: Plan, source: Index | None) -> Index | None:
     return np.asarray(np.maximum.accumulate(np.where(stays, 0, order), axis=0), np.int64)
 
 
-def _may_turn(path: Toolpath, rows: Plan, *, insert: bool) -> Mask:
-    """(r,) rows before which a step may be put: feed moves that are corrected and start at a known position.
-    Without `insert` not before those that are never split."""
+def _may_turn(path: Toolpath, rows: Plan, command_mm: Array, *, insert: bool) -> Mask:
+    """(r,) rows before which a step may be put: feed moves that are corrected and start at a known position,
+    the first one at `command_mm` (3,). Without `insert` not before those that are never split."""
     may = ~rows.raw.any(axis=1) & (path.kind[rows.move] != Kind.RAPID)
     may &= (path.flag[rows.move] & np.uint8(Flag.CYCLE)) == 0
     if not insert:
         may &= (path.flag[rows.move] & np.uint8(Flag.WHOLE)) == 0
-    may[:1] = False
-    may[1:] &= ~np.isnan(rows.command_mm[:-1]).any(axis=1)
+    may &= ~np.isnan(_before(command_mm, rows.command_mm)).any(axis=1)
     return np.asarray(may, bool)
 
 
-def _follow(position: Array, backlash: Array, band: float) -> tuple[Array, Array, Mask]:
-    """Play (n,) of one axis that has to bring its load to `position` with backlash `lost`, where the load
-    then is, and the rows before which the drive has to turn.
-
-    The play is known as an interval of the lag, in which its middle is taken: at the start it is anything
-    between its two sides, and each motion narrows it. The axis turns only when it would be off by more than
-    the band.
-    """
-    plays, loads, turns = [], [], []
-    load = low = high = float("nan")
-    for wanted, width in zip(position.tolist(), backlash.tolist(), strict=True):
-        half = max(width, 0.0) / 2
-        turn = False
-        if wanted != wanted or load != load:
-            load, low, high = wanted, -1.0, 1.0
-        elif wanted != load:
-            sign = 1.0 if wanted > load else -1.0
-            step = abs(wanted - load)
-            # play that has to be taken up before the middle of the load moves, and until it is known
-            first = 1.0 - (high if sign > 0 else -low)
-            last = 1.0 - (low if sign > 0 else -high)
-            turn = first > 1e-9
-            if turn and step <= band:
-                turn = False
-            else:
-                load = wanted
-                if half == 0.0 or step >= half * (last - first) / 2:
-                    low = high = sign
-                else:
-                    # while the interval narrows the middle of the load goes half as far as the drive
-                    rest = last - first - 2 * step / half
-                    low, high = (1.0 - rest, 1.0) if sign > 0 else (-1.0, -1.0 + rest)
-        plays.append((low + high) / 2)
-        loads.append(load)
-        turns.append(turn)
-    return np.array(plays), np.array(loads), np.array(turns)
+def _before(first: Array, rows: Array) -> Array:
+    """(r, 3) the row before each of rows, that before the first one (3,) among them."""
+    return np.vstack((first, rows[:-1]))
 
 
-def _take_up(model: ErrorModel, rows: Plan, tool: Array, held: Array, turns: Mask) -> Plan:
-    """Insert rows that turn the drive round before the load moves."""
+def _take_up(model: ErrorModel, rows: Plan, tool: Array, held: Array, turns: Mask, before: Carried) -> Plan:
+    """Insert rows that turn the drive round before the load moves; `before` is of the row before the first
+    one."""
     assert rows.play is not None
     where = np.flatnonzero(turns.any(axis=1))
-    target = rows.target_mm[where - 1]
+    target = _before(before.target_mm, rows.target_mm)[where]
+    start = _before(before.command_mm, rows.command_mm)[where]
     play = rows.play[where]
-    command = invert(model, target + held[where - 1], tool if tool.ndim == 1 else tool[where], play)
+    held = _before(before.held_mm, held)[where]
+    command = invert(model, target + held, tool if tool.ndim == 1 else tool[where], play)
     # an axis that does not turn must not leave its side of the backlash here
-    step = command - rows.command_mm[where - 1]
+    step = command - start
     stay = ~turns[where] & (step * play < 0)
-    command[stay] = rows.command_mm[where - 1][stay]
-    same = rows.move[where] == rows.move[where - 1]
+    command[stay] = start[stay]
+    same = (where > 0) & (rows.move[where] == rows.move[where - 1])
 
     def insert(column: npt.NDArray[_Scalar], new: npt.NDArray[_Scalar]) -> npt.NDArray[_Scalar]:
         return np.insert(column, where, new, axis=0)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 
@@ -11,6 +9,7 @@ from olp.compensation.digits import Digits
 from olp.compensation.plan import Plan
 from olp.core.arrays import Array, Index, Mask
 from olp.core.toolpath import Kind, Toolpath
+from olp.core.values import dataclass
 
 
 @dataclass(slots=True, eq=False)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -11,10 +10,13 @@ import numpy.typing as npt
 from olp.core.machine import Vector
 from olp.core.toolpath import Flag
 from olp.core.units import MM_PER_INCH
+from olp.core.values import dataclass
 from olp.program.program import Program
 
 #: Digits behind the point, at most.
 _MOST_DECIMALS = 9
+#: Bytes that are blanks at the start of a line.
+_BLANK = np.array([chr(byte).isspace() for byte in range(256)])
 #: The space before a word, by style number modulo 3.
 _SPACE = (b"", b" ", b"\t")
 
@@ -114,6 +116,19 @@ class Style:
         deleted = self.program.text(line).lstrip().startswith("/")
         return self.program.eol(line) + (b"/" if deleted else b"")
 
+    def block_starts(self, line: Slots) -> tuple[list[bytes], npt.NDArray[np.int64]]:
+        """The different `block_start` of lines (n,), and (n,) which of them each has."""
+        text, program = np.frombuffer(self.program.data, np.uint8), self.program
+        begin, end = program.line_start[line - 1], program.line_end[line - 1]
+        gap = np.minimum(np.append(program.line_start, len(text))[line] - end, 7)
+        last = len(text) - 1
+        first, ending = (text[np.minimum(place, last)].astype(np.int64) for place in (begin, end))
+        # lines that begin and end alike; those that may begin with a blank are looked at one by one
+        own = np.where((first <= 32) | (first >= 128), line, 0).astype(np.int64)
+        key = ((own * 256 + first) * 8 + gap) * 256 + ending
+        _, example, which = np.unique(key, return_index=True, return_inverse=True)
+        return [self.block_start(int(n)) for n in np.asarray(line)[example].tolist()], which
+
     def word(self, line: int, letter: str) -> int | None:
         """Index of the first word with a letter in a line."""
         words = self.program.words
@@ -138,7 +153,6 @@ class Style:
         lower = (text[start] & 32) != 0
         return np.asarray(space + 3 * lower.astype(np.int64), np.int64)
 
-    def separator(self, which: int, axis: int) -> bytes:
-        """Text before an inserted number: space and letter."""
-        letter = b"xyz" if which >= 3 else b"XYZ"
-        return _SPACE[which % 3] + letter[axis : axis + 1]
+    def separator(self, which: int, letter: bytes) -> bytes:
+        """Text before an inserted number, in the style of this number: space and letter."""
+        return _SPACE[which % 3] + (letter.lower() if which >= 3 else letter)

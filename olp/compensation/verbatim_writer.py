@@ -49,9 +49,9 @@ class VerbatimWriter(PointWriter):
         for word, (row, axis, _) in new.items():
             if rows.write[row, axis]:
                 start, end = int(self.words.number[word]), int(self.words.end[word])
-                changes.append(placing.place(start, end, self._number(rows, row, axis, word)))
+                changes.append((start, end, self._number(rows, row, axis, word)))
         self.tally.changed_words = len(changes)
-        return changes
+        return placing.placed(changes)
 
     def _insertions(self, rows: Rows) -> list[Replacement]:
         """Later parts of a move that was split: its statement again, with other numbers."""

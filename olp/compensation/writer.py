@@ -1,18 +1,18 @@
 """What all writers of corrected programs have in common.
 
 A writer puts the rows of a plan into the program's own text: numbers are changed, words, blocks or statements
-inserted, nothing else. It takes the rows in chunks, so that memory is small: digits, then edits, then one
-splice per chunk of text.
+inserted, nothing else. It takes the program band by band, and the rows of a band in chunks, so that memory is
+small: digits, then edits, then one splice per chunk of text.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
+import numpy.typing as npt
 
 from olp.compensation.hole_plan import HolePlan
 from olp.compensation.plan import Plan, targets
@@ -20,21 +20,24 @@ from olp.compensation.rows import Rows
 from olp.compensation.stamp import stamped
 from olp.compensation.style import Style
 from olp.compensation.tally import Tally
+from olp.core.arrays import Array
 from olp.core.machine import Vector
+from olp.core.progress import Progress, silent
 from olp.core.toolpath import Flag, Frame
+from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
+from olp.program.bands import Band
 from olp.program.program import Program
 from olp.program.text.edits import Edits, Prefixes, splice
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Task:
-    """What is to be written: the `plan` of a `program` that was read with its words, by a `model`. Also the
-    numerical tolerance of the correction, the least increment of each axis, and the `stamp`, empty for
+    """What is to be written: the corrections of a `program` that was read with its words, by a `model`. Also
+    the numerical tolerance of the correction, the least increment of each axis, and the `stamp`, empty for
     none; with `stamp_always` a text of which nothing changes bears it too."""
 
     program: Program
-    plan: Plan
     model: ErrorModel
     tolerance_mm: float
     increments_mm: Vector
@@ -43,50 +46,60 @@ class Task:
 
 
 class Writer(ABC):
-    """One writing of one program. `text()` gives the corrected bytes; `parts` (moves,) then holds how many
-    moves the corrected text has for each of the nominal path, and `tally` what was changed."""
+    """One writing of one program, of which `program`, `path`, `plan`, `targets`, `holes` and `parts` are
+    those of the present band. (n,) `parts` is how many moves the corrected text has for each of its moves.
+    `tally` is what was changed so far."""
 
     #: Rows at a time.
     chunk: ClassVar[int] = 1 << 15
 
+    plan: Plan
+    targets: Array
+    parts: npt.NDArray[np.int32]
+    holes: HolePlan
+
     def __init__(self, task: Task) -> None:
-        program, plan, model = task.program, task.plan, task.model
+        program = task.program
         assert program.words is not None
-        self.program, self.plan, self.model = program, plan, model
+        self.program, self.path, self.model = program, program.toolpath, task.model
         self.words = program.words
-        self.tolerance_mm, self.stamp = task.tolerance_mm, task.stamp
-        self.stamp_always = task.stamp_always
+        self.tolerance_mm, self.stamp, self.stamp_always = task.tolerance_mm, task.stamp, task.stamp_always
         self.style = Style.of(program, task.increments_mm)
         self.prefixes = Prefixes()
         self.tally = Tally()
-        self.path = program.toolpath
-        self.targets = targets(self.path, plan.shift_mm)
-        self.parts = np.zeros(len(self.path), np.int32)
-        self.holes = HolePlan.of(program, plan, model)
         self.frame_offset_mm = np.array([f.offset_mm for f in self.path.frames]).reshape(-1, 3)
         self.frame_unit_mm = np.array([f.unit_mm for f in self.path.frames])
+        self._pieces: list[bytes] = []
+        self._begin, self._changed = 0, False
+        self._entry = np.array(self.path.start_mm, float)
 
-    def text(self) -> bytes:
-        """The corrected text; the program's own bytes where nothing is written. Raises ProgramError where the
-        plan cannot be written in the dialect."""
-        data, move = self.program.data, self.plan.move
-        pieces: list[bytes] = []
-        begin, changed = 0, False
-        entry = np.array(self.path.start_mm, float)
+    def add(self, band: Band, plan: Plan, tell: Progress = silent) -> None:
+        """Write the next band; `tell` is told what share of it is written. Raises ProgramError where the plan
+        cannot be written in the dialect."""
+        self.program, self.path, self.plan = band.program, band.program.toolpath, plan
+        self.targets = targets(self.path, plan.shift_mm)
+        self.parts = np.zeros(len(self.path), np.int32)
+        self.holes = HolePlan.of(self.program, plan, self.model)
+        data, move = self.program.data, plan.move
         for first, last in self._spans():
-            end = len(data) if last == len(move) else self._start_of(int(move[last]))
-            rows = Rows.of(self.plan, self.path, first, last, entry)
+            end = band.end if last == len(move) else self._start_of(int(move[last]))
+            rows = Rows.of(plan, self.path, first, last, self._entry)
             low, high = int(rows.move[0]), int(rows.move[-1])
             self.parts[low : high + 1] += np.bincount(rows.move - low).astype(np.int32)
-            text = self._rewritten(rows, begin, end)
-            changed |= text is not None
-            pieces.append(data[begin:end] if text is None else text)
-            begin, entry = end, rows.emitted[-1].copy()
-        if not (changed or (self.stamp and self.stamp_always)):
-            return data
-        pieces.append(data[begin:])
+            text = self._rewritten(rows, self._begin, end)
+            self._changed |= text is not None
+            self._pieces.append(data[self._begin : end] if text is None else text)
+            self._begin, self._entry = end, rows.emitted[-1].copy()
+            tell("correct", last / len(move))
+
+    def text(self) -> bytes | None:
+        """The corrected text, None where nothing is written. It is given once."""
+        program, pieces = self.program, self._pieces
+        if not (self._changed or (self.stamp and self.stamp_always)):
+            return None
+        pieces.append(program.data[self._begin :])
         if self.stamp:
-            pieces[0] = stamped(pieces[0], self.stamp, self.program.eol(1), self.program.dialect.first)
+            pieces[0] = stamped(pieces[0], self.stamp, program.eol(1), program.dialect.first)
         return b"".join(pieces)
 
     def _spans(self) -> list[tuple[int, int]]:

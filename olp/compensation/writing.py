@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
 
 import numpy as np
 import numpy.typing as npt
@@ -10,44 +10,41 @@ import numpy.typing as npt
 from olp.compensation.block_writer import BlockWriter
 from olp.compensation.digits import INT10
 from olp.compensation.plan import Plan
-from olp.compensation.statement_writer import StatementWriter
 from olp.compensation.tally import Tally
-from olp.compensation.verbatim_writer import VerbatimWriter
 from olp.compensation.writer import Task, Writer
-from olp.core.machine import Vector
+from olp.core.arrays import Index, distinct
+from olp.core.progress import Progress, part, silent
 from olp.core.units import MM_PER_INCH
-from olp.errormodel.base import ErrorModel
+from olp.core.values import dataclass
+from olp.program.bands import Band
 from olp.program.program import Program
 from olp.program.text.numbers import Placing
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Written:
-    """The corrected bytes, and whether anything is `changed`; (n,) `parts`, how many moves
-    they have for each nominal one; and what was changed."""
+    """The corrected bytes, None where nothing is changed, and what was changed. `uncorrected` are moves that
+    are left so, (n,) `parts` how many moves the text has for each nominal one."""
 
-    text: bytes
-    changed: bool
+    text: bytes | None
+    uncorrected: Index
     parts: npt.NDArray[np.int32]
     tally: Tally
 
 
-def write(
-    program: Program,
-    plan: Plan,
-    model: ErrorModel,
-    *,
-    tolerance_mm: float,
-    increments_mm: Vector,
-    stamp: bytes,
-    stamp_always: bool = False,
-) -> Written:
-    """Write a plan. The program is one that was read with its words; with `stamp_always` it is stamped also
-    where nothing changes. Raises ProgramError where the plan cannot be written in the dialect."""
-    task = Task(program, plan, model, tolerance_mm, increments_mm, stamp, stamp_always)
-    writer = _writer(program, plan)(task)
-    text = writer.text()
-    return Written(text, text is not program.data, writer.parts, writer.tally)
+def write(task: Task, plans: Iterable[tuple[Band, Plan]], tell: Progress = silent) -> Written:
+    """Write the bands of a program, each with its plan, as they come; `tell` is told the second half of each.
+    Raises ProgramError where a plan cannot be written in the dialect."""
+    writer: Writer | None = None
+    uncorrected, parts = [], []
+    for band, rows in plans:
+        if writer is None:
+            writer = _writer(band.program, rows)(task)
+        writer.add(band, rows, part(tell, band.middle, band.until))
+        uncorrected.append(band.first + rows.uncorrected)
+        parts.append(writer.parts)
+    assert writer is not None
+    return Written(writer.text(), np.concatenate(uncorrected), np.concatenate(parts), writer.tally)
 
 
 def _writer(program: Program, plan: Plan) -> type[Writer]:
@@ -55,7 +52,11 @@ def _writer(program: Program, plan: Plan) -> type[Writer]:
     if program.statements is None:
         return BlockWriter
     if program.statements.decimal and not _plain(program, plan):
+        from olp.compensation.verbatim_writer import VerbatimWriter
+
         return VerbatimWriter
+    from olp.compensation.statement_writer import StatementWriter
+
     return StatementWriter
 
 
@@ -65,7 +66,7 @@ def _plain(program: Program, plan: Plan) -> bool:
     words, statements = program.words, program.statements
     if words is None or statements is None or not len(words.start):
         return False
-    split = np.unique(plan.move[1:][plan.move[1:] == plan.move[:-1]])
+    split = distinct(plan.move[1:][plan.move[1:] == plan.move[:-1]])
     if not np.isin(statements.end[split], program.line_end).all():
         return False
     units = {frame.unit_mm for frame in program.toolpath.frames}

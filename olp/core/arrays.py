@@ -1,6 +1,11 @@
-"""Types of the arrays that values hold."""
+"""Types of the arrays that values hold, and what NumPy does not do without its masked arrays.
+
+Those are a tenth of NumPy's start: `np.unique`, `np.union1d` and `np.median` load them.
+"""
 
 from __future__ import annotations
+
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -8,3 +13,36 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
+
+Scalar = TypeVar("Scalar", bound=np.generic)
+
+
+def read_only(values: npt.NDArray[Scalar]) -> npt.NDArray[Scalar]:
+    """The same values as an array that refuses to be changed; the given one is as it was."""
+    view = values.view()
+    view.setflags(write=False)
+    return view
+
+
+def distinct(values: npt.NDArray[Scalar]) -> npt.NDArray[Scalar]:
+    """(m,) the distinct values of an array without NaN, ascending, as `np.unique` gives them. It is fast
+    where they are in order already, as lines are."""
+    ordered = np.sort(values, axis=None, kind="stable")
+    first = np.ones(len(ordered), bool)
+    first[1:] = ordered[1:] != ordered[:-1]
+    return ordered[first]
+
+
+def distinct_rows(rows: npt.NDArray[Scalar]) -> npt.NDArray[Scalar]:
+    """(m, k) the distinct rows (n, k) without NaN, in ascending order, as `np.unique` gives them."""
+    ordered = rows[np.lexsort(rows.T[::-1])]
+    first = np.ones(len(ordered), bool)
+    first[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    return ordered[first]
+
+
+def median(values: Array) -> float:
+    """The median of numbers (n,), n > 0, without NaN, as `np.median` gives it."""
+    half, odd = divmod(len(values), 2)
+    ordered = np.sort(values)
+    return float(ordered[half] if odd else (ordered[half - 1] + ordered[half]) / 2.0)

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from olp.core.errors import ProgramError
+from olp.core.values import dataclass
 
 
 @dataclass(slots=True)
@@ -20,6 +19,11 @@ class Budget:
     def of(cls, size: int, *, least: int, per_byte: float, message: str) -> Budget:
         """For an input of `size` bytes: `least`, or so much for each byte where that is more."""
         return cls(max(least, int(per_byte * size)), message)
+
+    @property
+    def left(self) -> int:
+        """What may still be spent."""
+        return self.limit - self.spent
 
     def spend(self, amount: int) -> None:
         """Take an amount. Raises ProgramError, without a line, where the budget is exceeded."""

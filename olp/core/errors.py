@@ -21,7 +21,8 @@ from __future__ import annotations
 import contextlib
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+
+from olp.core.values import dataclass
 
 #: What a message states of its statement: quoted text, and numbers.
 _OWN = re.compile(r"`[^`]*`|'[^']*'|-?\d+(?:\.\d+)?")

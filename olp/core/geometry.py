@@ -3,10 +3,13 @@ mm."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Array
+from olp.core.arrays import Array, Index, distinct
+from olp.core.values import dataclass
 
 Plane = npt.NDArray[np.int8] | npt.NDArray[np.int64]
 
@@ -16,24 +19,98 @@ PLANES = ((0, 1, 2), (2, 0, 1), (1, 2, 0))
 _AXES = np.array(PLANES)
 
 
-def arc_points(start: Array, end: Array, centre: Array, plane: Plane, sweep: Array, share: Array) -> Array:
-    """(n, 3) points at shares (n,) of arcs from `start` to `end` about `centre`.
+@dataclass(frozen=True, slots=True, eq=False)
+class ArcShapes:
+    """(m,) arcs by what does not change along them, so that many points of each are cheap.
 
-    Where the radii at both ends differ the radius goes linearly with the angle, as LinuxCNC interpolates; the
-    third axis goes linearly too.
+    `centre_first` and `centre_second` are along the first and second axis of `plane`. From the start the
+    `angle` goes by `sweep`, the `radius` by `wider` and the position along the third axis, `level`, by
+    `rise`. Where the radii at both ends differ the radius goes linearly with the angle, as LinuxCNC
+    interpolates; the third axis goes linearly too.
     """
-    rows = np.arange(len(start))
-    first, second, third = (_AXES[plane][:, i] for i in range(3))
-    c0, c1 = centre[rows, first], centre[rows, second]
-    s0, s1 = start[rows, first] - c0, start[rows, second] - c1
-    radius = np.hypot(s0, s1)
-    radius = radius + (np.hypot(end[rows, first] - c0, end[rows, second] - c1) - radius) * share
-    angle = np.arctan2(s1, s0) + share * sweep
-    points = np.empty((len(start), 3))
-    points[rows, first] = c0 + radius * np.cos(angle)
-    points[rows, second] = c1 + radius * np.sin(angle)
-    points[rows, third] = start[rows, third] + share * (end[rows, third] - start[rows, third])
-    return points
+
+    plane: Plane
+    centre_first: Array
+    centre_second: Array
+    radius: Array
+    wider: Array
+    angle: Array
+    sweep: Array
+    level: Array
+    rise: Array
+
+    @staticmethod
+    def of(start: Array, end: Array, centre: Array, plane: Plane, sweep: Array) -> ArcShapes:
+        """Arcs from `start` (m, 3) to `end` about `centre`."""
+        c0, c1, _ = _in_planes(centre, plane)
+        (s0, s1, s2), (e0, e1, e2) = _in_planes(start, plane), _in_planes(end, plane)
+        s0, s1 = s0 - c0, s1 - c1
+        radius = np.hypot(s0, s1)
+        wider = np.hypot(e0 - c0, e1 - c1) - radius
+        return ArcShapes(plane, c0, c1, radius, wider, np.arctan2(s1, s0), sweep, s2, e2 - s2)
+
+    def at(self, which: Index, share: Array) -> Array:
+        """(n, 3) points at shares (n,) of arcs `which` (n,)."""
+        radius = self.radius[which] + self.wider[which] * share
+        angle = self.angle[which] + share * self.sweep[which]
+        columns = (
+            self.centre_first[which] + radius * np.cos(angle),
+            self.centre_second[which] + radius * np.sin(angle),
+            self.level[which] + share * self.rise[which],
+        )
+        points = np.empty((len(which), 3))
+        for plane, mine in _by_plane(self.plane, which):
+            for axis, column in zip(PLANES[plane], columns, strict=True):
+                points[mine, axis] = column[mine]
+        return points
+
+    def distance(self, point: Array, which: Index, near: Array) -> Array:
+        """(n,) distances of points (n, 3) from arcs `which` (n,), across the path and beyond its ends, for
+        points that lie near share `near` of it."""
+        p0, p1, p2 = _in_planes(point, self.plane[which])
+        p0, p1 = p0 - self.centre_first[which], p1 - self.centre_second[which]
+        sweep, radius = self.sweep[which], self.radius[which]
+        angle = np.arctan2(p1, p0) - self.angle[which]
+        # the point lies on the turn of share `near`
+        guess = near * sweep
+        angle = angle + 2 * np.pi * np.rint((guess - angle) / (2 * np.pi))
+        size = np.abs(sweep)
+        turned = angle * np.sign(sweep)
+        place = np.clip(turned, 0.0, size)
+        # beyond the end that is nearer, whatever the turn
+        wrapped = np.mod(turned, 2 * np.pi)
+        beyond = np.maximum(np.minimum(wrapped - size, 2 * np.pi - wrapped), 0.0)
+        beyond = np.where(size >= 2 * np.pi, np.abs(turned - place), beyond) * np.sign(turned - place)
+        wider, lead = self.wider[which] / size, self.rise[which] / size
+        level = p2 - self.level[which]
+        # a helix rises by `lead` per radian: the nearest point is a little ahead, unless it ends before
+        mean = radius + wider * place
+        ahead = (beyond * mean**2 + (level - place * lead) * lead) / np.maximum(mean**2 + lead**2, 1e-24)
+        nearest = np.clip(place + ahead, 0.0, size)
+        across = np.hypot(p0, p1) - radius - wider * nearest
+        along = (place + beyond - nearest) * mean
+        return np.asarray(np.sqrt(across**2 + along**2 + (level - nearest * lead) ** 2), float)
+
+
+def _by_plane(plane: Plane, which: Index) -> Iterator[tuple[int, slice | Index]]:
+    """Each plane of arcs `which`, and these; mostly there is one."""
+    present = distinct(plane).tolist()
+    for one in present:
+        yield one, slice(None) if len(present) == 1 else np.flatnonzero(plane[which] == one)
+
+
+def _in_planes(point: Array, plane: Plane) -> tuple[Array, Array, Array]:
+    """(m,) coordinates of points (m, 3) along the first, second and third axis of their planes."""
+    if len(plane) and (plane == plane[0]).all():
+        first, second, third = PLANES[int(plane[0])]
+        return point[:, first], point[:, second], point[:, third]
+    rows, axes = np.arange(len(point)), _AXES[plane]
+    return point[rows, axes[:, 0]], point[rows, axes[:, 1]], point[rows, axes[:, 2]]
+
+
+def arc_points(start: Array, end: Array, centre: Array, plane: Plane, sweep: Array, share: Array) -> Array:
+    """(n, 3) points at shares (n,) of arcs (n,) as in `ArcShapes`."""
+    return ArcShapes.of(start, end, centre, plane, sweep).at(np.arange(len(start)), share)
 
 
 def arms(point: Array, centre: Array, plane: Plane) -> tuple[Array, Array]:
@@ -64,40 +141,6 @@ def segment_distance(point: Array, start: Array, end: Array) -> Array:
     share = np.clip(np.where(length2 > 0, share, 0.0), 0.0, 1.0)
     away -= share[:, None] * along
     return np.asarray(np.sqrt(np.einsum("ij,ij->i", away, away)), float)
-
-
-def arc_distance(
-    point: Array, start: Array, end: Array, centre: Array, plane: Plane, sweep: Array, near: Array
-) -> Array:
-    """(n,) distances of points from arcs, across the path and beyond its ends, for points that lie near share
-    `near` of it."""
-    rows = np.arange(len(point))
-    first, second, third = (_AXES[plane][:, i] for i in range(3))
-    c0, c1 = centre[rows, first], centre[rows, second]
-    s0, s1 = start[rows, first] - c0, start[rows, second] - c1
-    p0, p1 = point[rows, first] - c0, point[rows, second] - c1
-    angle = np.arctan2(p1, p0) - np.arctan2(s1, s0)
-    # the point lies on the turn of share `near`
-    guess = near * sweep
-    angle = angle + 2 * np.pi * np.rint((guess - angle) / (2 * np.pi))
-    size = np.abs(sweep)
-    turned = angle * np.sign(sweep)
-    place = np.clip(turned, 0.0, size)
-    # beyond the end that is nearer, whatever the turn
-    wrapped = np.mod(turned, 2 * np.pi)
-    beyond = np.maximum(np.minimum(wrapped - size, 2 * np.pi - wrapped), 0.0)
-    beyond = np.where(size >= 2 * np.pi, np.abs(turned - place), beyond) * np.sign(turned - place)
-    radius = np.hypot(s0, s1)
-    wider = (np.hypot(end[rows, first] - c0, end[rows, second] - c1) - radius) / size
-    lead = (end[rows, third] - start[rows, third]) / size
-    level = point[rows, third] - start[rows, third]
-    # a helix rises by `lead` per radian: the nearest point is a little ahead, unless it ends before
-    mean = radius + wider * place
-    ahead = (beyond * mean**2 + (level - place * lead) * lead) / np.maximum(mean**2 + lead**2, 1e-24)
-    nearest = np.clip(place + ahead, 0.0, size)
-    across = np.hypot(p0, p1) - radius - wider * nearest
-    along = (place + beyond - nearest) * mean
-    return np.asarray(np.sqrt(across**2 + along**2 + (level - nearest * lead) ** 2), float)
 
 
 def arc_directions(

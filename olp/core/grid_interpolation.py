@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import product
 from typing import Literal
 
@@ -19,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Array
+from olp.core.values import dataclass
 
 Index = npt.NDArray[np.intp]
 Kind = Literal["linear", "cubic"]

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Array
+from olp.core.values import dataclass
 
 Column = Array | float
 Kind = Literal["linear", "pchip"]

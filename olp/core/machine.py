@@ -8,8 +8,11 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Literal
+
+from olp.core.errors import ConfigError
+from olp.core.values import dataclass
 
 Vector = tuple[float, float, float]
 #: No tool, no offset: mm.
@@ -26,7 +29,7 @@ SQUARENESS = ("C0Y", "B0Z", "A0Z")
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """Limits of one linear axis: travel (min, max) in mm; mm/s, mm/s2, mm/s3.
+    """Limits of one linear axis: travel (min, max) in mm; mm/s, mm/s2, mm/s3, None where they are not stated.
 
     `compliance_um_per_m_s2` is the displacement (X, Y, Z) of the tool relative to the workpiece, actual minus
     commanded, while the axis is accelerated by 1 m/s2.
@@ -34,9 +37,9 @@ class Axis:
 
     travel_mm: tuple[float, float]
     least_increment_mm: float
-    velocity_mm_s: float
-    acceleration_mm_s2: float
-    jerk_mm_s3: float
+    velocity_mm_s: float | None = None
+    acceleration_mm_s2: float | None = None
+    jerk_mm_s3: float | None = None
     compliance_um_per_m_s2: Vector = ZERO
 
 
@@ -125,7 +128,8 @@ class Machine:
     read as increments.
     `styli` are end of the ram to centre of the tip of sensors by label.
     `path_mode` is the mode at the start of a program, `blend_mm` the tolerance where the program names none
-    (None: not stated).
+    (None: not stated). `located` says whether positions in machine coordinates are known; where they are not,
+    only distances are.
     """
 
     name: str
@@ -144,11 +148,34 @@ class Machine:
     path_mode: Literal["blend", "exact-stop"] = "blend"
     blend_mm: float | None = None
     sanity: Sanity = Sanity()
+    located: bool = True
 
     @property
     def least_increment_mm(self) -> Vector:
         x, y, z = (self.axes[a].least_increment_mm for a in "XYZ")
         return (x, y, z)
+
+    @property
+    def missing_limits(self) -> tuple[str, ...]:
+        """The keys of the limits of motion that the machine file leaves out, such as "axes.X.jerk_mm_s3"."""
+        keys = ("velocity_mm_s", "acceleration_mm_s2", "jerk_mm_s3")
+        return tuple(f"axes.{a}.{k}" for a in "XYZ" for k in keys if getattr(self.axes[a], k) is None)
+
+    def motion_limits(self) -> dict[str, Vector]:
+        """Velocity, acceleration and jerk of each axis: mm/s, mm/s2, mm/s3. Raises ConfigError that names the
+        keys which the machine file leaves out."""
+        limits = {}
+        for name, axis in self.axes.items():
+            v, a, j = axis.velocity_mm_s, axis.acceleration_mm_s2, axis.jerk_mm_s3
+            if v is not None and a is not None and j is not None:
+                limits[name] = (v, a, j)
+        missing = self.missing_limits
+        if missing:
+            raise ConfigError(
+                f"machine {self.name!r} does not state {', '.join(missing)}, which a motion in time needs; "
+                "give these keys in the machine file"
+            )
+        return limits
 
 
 @dataclass(frozen=True, slots=True)

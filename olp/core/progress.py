@@ -10,3 +10,13 @@ Progress = Callable[[str, float], None]
 
 def silent(what: str, share: float) -> None:
     """Report no progress."""
+
+
+def part(tell: Progress, begin: float, end: float, name: str = "") -> Progress:
+    """What a step of a run is given to report to: its shares are from `begin` to `end` of the whole, under
+    its own `name` where one is given."""
+
+    def told(what: str, share: float) -> None:
+        tell(name or what, begin + share * (end - begin))
+
+    return told

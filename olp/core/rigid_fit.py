@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from olp.core.arrays import Array
 from olp.core.errors import CannotCompute
+from olp.core.values import dataclass
 
 #: A motion that moves the points across their path by less than this share of it is not determined: noise
 #: would be amplified a hundredfold.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import IntEnum, IntFlag
 
 import numpy as np
@@ -12,6 +12,7 @@ import numpy.typing as npt
 from olp.core.arrays import Array, Index, Mask
 from olp.core.geometry import arc_points, quarter_shares
 from olp.core.machine import ZERO, Vector
+from olp.core.values import dataclass
 
 #: A tool vector in mm, and the payload in kg behind it where there is one.
 Tool = tuple[float, ...]
@@ -135,6 +136,15 @@ class Arcs:
     def __len__(self) -> int:
         return len(self.move)
 
+    def within(self, first: int, last: int) -> slice:
+        """The arcs among moves `first`..`last`."""
+        return slice(*np.searchsorted(self.move, (first, last)).tolist())
+
+    def part(self, first: int, last: int) -> Arcs:
+        """The same, with their moves counted from `first`."""
+        some = self.within(first, last)
+        return Arcs(self.move[some] - first, self.centre_mm[some], self.plane[some], self.sweep_rad[some])
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Toolpath:
@@ -160,6 +170,17 @@ class Toolpath:
             starts[1:] = self.end_mm[first : last - 1]
             starts[0] = self.end_mm[first - 1] if first else self.start_mm
         return starts
+
+    def part(self, first: int, last: int) -> Toolpath:
+        """Moves `first`..`last` as a path that starts where the moves before it end."""
+        some, start = slice(first, last), self.start_mm
+        if first:
+            x, y, z = self.end_mm[first - 1].tolist()
+            start = (x, y, z)
+        return Toolpath(
+            self.kind[some], self.flag[some], self.line[some], self.frame[some], self.end_mm[some],
+            self.frames, self.arcs.part(first, last), start,
+        )  # fmt: skip
 
     def compensated(self) -> Mask:
         """(n,) moves along a contour that the control offsets by the cutter radius."""

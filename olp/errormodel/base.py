@@ -62,5 +62,5 @@ class ErrorModel(Protocol):
     def chord_bound(self, delta_mm: Array, tool_mm: Array) -> Array:
         """(n,) upper bound in mm, anywhere in the box, of how far the error along a straight move by delta_mm
         (n, 3) departs from the straight line between its values at both ends. It also holds for every move
-        that is shorter along each axis."""
+        that is shorter along each axis, and does not depend on the moves and tools beside it."""
         ...

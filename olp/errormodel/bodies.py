@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from olp.core.arrays import Array
 from olp.core.errors import ConfigError
 from olp.core.machine import CHAINS, Vector
 from olp.core.units import AXES
+from olp.core.values import dataclass
 from olp.errormodel.calibration import Calibration
 from olp.errormodel.components import ActingTerm, AxisComponents
 from olp.errormodel.lever_arms import LeverArms, lever_arms_of, measured_as
@@ -36,6 +37,7 @@ class Body:
     sine_terms: int
 
 
+@lru_cache(maxsize=1)  # a run builds the model that refuses what is outside the box, and that which holds
 def build_bodies(
     calibration: Calibration, chain: str, skip: frozenset[str], *, tool_terms: bool = True
 ) -> tuple[Body, ...]:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 
-from olp.core.arrays import Array, Mask
+from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import UsageError
+from olp.core.values import dataclass
 
 
 def as_points(axis_mm: object, name: str = "axis_mm") -> Array:
@@ -35,6 +37,20 @@ def payload_of(tool_mm: object) -> Array | float:
     if tool.shape[-1] < 4:
         return 0.0
     return float(tool[3]) if tool.ndim == 1 else np.ascontiguousarray(tool[:, 3])
+
+
+def by_tool(tool_mm: Array) -> Iterator[tuple[slice | Index, Array]]:
+    """The rows of each tool vector of tool rows (3,) or (n, 3), and the vector (3,)."""
+    if tool_mm.ndim == 1:
+        yield slice(None), tool_mm
+    elif (tool_mm == tool_mm[:1]).all():
+        yield slice(None), tool_mm[0] if len(tool_mm) else np.zeros(3)
+    else:
+        order = np.lexsort(tool_mm.T)
+        ordered = tool_mm[order]
+        first = np.flatnonzero((ordered[1:] != ordered[:-1]).any(axis=1)) + 1
+        for a, b in pairwise((0, *first.tolist(), len(order))):
+            yield order[a:b], ordered[a]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import datetime
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from types import MappingProxyType
 from typing import Any, Literal
 
@@ -17,6 +17,7 @@ import numpy as np
 from olp.core.arrays import Array
 from olp.core.machine import SQUARENESS, ZERO, Vector
 from olp.core.units import AXES
+from olp.core.values import dataclass
 from olp.errormodel.gridded import COVER_MM, ComponentTable, cover_problems, frozen, refuse
 from olp.errormodel.quality import Quality
 from olp.errormodel.sources.base import ErrorSource, Frame

@@ -8,22 +8,23 @@ coordinate too. Only departures from the nominal position are summed, so no digi
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
 from olp.core.arrays import Array, Mask
 from olp.core.interpolation import Column
+from olp.core.values import dataclass
 from olp.errormodel.bodies import Body
-from olp.errormodel.boxed import Boxed, as_points, as_tool
+from olp.errormodel.boxed import Boxed, as_points, as_tool, by_tool
 from olp.errormodel.chain_bound import AxisBound, axis_bounds, chord_bound
 from olp.errormodel.components import Six
 from olp.errormodel.lever_arms import CROSS
 
 #: Points at a time: about the size of the second-level cache (1 MB); measured best of 2k to 32k.
 BLOCK = 16384
-#: Bounds of the chord are kept for so many spans of tool vectors.
-_KEPT = 64
+#: Bounds of the chord are kept for so many tool vectors.
+_KEPT = 1 << 10
 
 #: A turn about axis a moves coordinate p toward q: (p, q) by axis.
 _PLANES = ((1, 2), (2, 0), (0, 1))
@@ -118,17 +119,16 @@ class RigidBody(Boxed):
 
     def chord_bound(self, delta_mm: Array, tool_mm: Array) -> Array:
         delta = as_points(delta_mm, "delta_mm")
-        tool = np.atleast_2d(as_tool(tool_mm, len(delta)))
-        if not self.tool_terms or not len(tool):
-            tool = np.zeros((1, 3))
-        span = np.stack([tool.min(axis=0), tool.max(axis=0)])
-        bounds = self._bounds.get(span.tobytes())
-        if bounds is None:
-            if len(self._bounds) > _KEPT:
-                self._bounds.clear()
-            bounds = axis_bounds(self.bodies, self.box_mm, span, second_order=self.exact)
-            self._bounds[span.tobytes()] = bounds
-        return chord_bound(bounds, delta)
+        bound = np.zeros(len(delta))
+        for rows, tool in by_tool(as_tool(tool_mm, len(delta)) if self.tool_terms else np.zeros(3)):
+            bounds = self._bounds.get(tool.tobytes())
+            if bounds is None:
+                if len(self._bounds) > _KEPT:
+                    self._bounds.clear()
+                bounds = axis_bounds(self.bodies, self.box_mm, tool[None], second_order=self.exact)
+                self._bounds[tool.tobytes()] = bounds
+            bound[rows] = chord_bound(bounds, delta[rows])
+        return bound
 
     def _positions(self, points: Array) -> tuple[list[Array], Mask | None]:
         """Finite columns of positions, and (n, 3) where they are unknown; None where all are known."""

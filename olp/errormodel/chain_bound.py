@@ -16,11 +16,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from olp.core.arrays import Array
+from olp.core.values import dataclass
 from olp.errormodel.bodies import Body
 from olp.errormodel.chord import Variation, bins
 

@@ -12,13 +12,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Array
 from olp.core.interpolation import Interpolant
+from olp.core.values import dataclass
 from olp.errormodel.sources.cyclic import Cyclic
 
 #: A binary64 shifted by so many bits keeps its exponent and 3 bits of mantissa: eight bins an octave.
@@ -99,16 +99,32 @@ class Variation:
         return cls(peak, slope, curvature, smooth, np.zeros(_COUNT), change)
 
 
+def distinct_bins(ends_mm: Array) -> slice:
+    """The bins whose windows hold different numbers of the pieces between ascending `ends_mm`: what the
+    first bin's holds all shorter windows hold, and what the last bin's holds all longer ones."""
+    if len(ends_mm) < 2:
+        return slice(0, 1)
+    shortest, longest = float(np.diff(ends_mm).min()), float(ends_mm[-1] - ends_mm[0])
+    # well below the shortest piece and above the whole, so that rounding cannot move an end
+    first = max(int(np.searchsorted(UPPER_MM, 0.999 * shortest)) - 1, 0)
+    last = min(int(np.searchsorted(UPPER_MM, 1.001 * longest)), _COUNT - 1)
+    return slice(first, max(first, last) + 1)
+
+
+def in_all_bins(values: Array, of: slice) -> Array:
+    """(bins, ...) of the values (m, ...) of distinct bins."""
+    return np.asarray(values[np.clip(np.arange(_COUNT), of.start, of.stop - 1) - of.start])
+
+
 def _kink_windows(curve: Interpolant, column: int) -> Array:
     """(bins,) largest sum of |jumps of slope| that a window of a bin's upper length can hold."""
     jumps = np.abs(np.diff(np.diff(curve.y[:, column]) / np.diff(curve.x)))
     if not len(jumps):
         return np.zeros(_COUNT)
     kinks_mm, total = curve.x[1:-1], np.concatenate([[0.0], np.cumsum(jumps)])
-    last = np.searchsorted(kinks_mm, (kinks_mm[:, None] + UPPER_MM[None, :]).ravel(), side="right").reshape(
-        len(kinks_mm), _COUNT
-    )
-    return np.asarray((total[last] - total[:-1, None]).max(axis=0))
+    some = distinct_bins(kinks_mm)
+    last = np.searchsorted(kinks_mm, kinks_mm[:, None] + UPPER_MM[some], side="right")
+    return in_all_bins((total[last] - total[:-1, None]).max(axis=0), some)
 
 
 def _smooth_windows(curve: Interpolant, column: int) -> Array:
@@ -124,6 +140,6 @@ def _smooth_windows(curve: Interpolant, column: int) -> Array:
     pieces = (0.5 * width * (second[:, :-1] + second[:, 1:])).ravel()
     position_mm = np.concatenate([(curve.x[:-1, None] + width * np.arange(_WINDOWS)).ravel(), curve.x[-1:]])
     total = np.concatenate([[0.0], np.cumsum(pieces)])
-    stops = (position_mm[1:, None] + UPPER_MM[None, :]).ravel()
-    ends = np.searchsorted(position_mm, stops, side="left").reshape(len(pieces), _COUNT)
-    return np.asarray((total[np.minimum(ends, len(pieces))] - total[:-1, None]).max(axis=0))
+    some = distinct_bins(position_mm)
+    ends = np.searchsorted(position_mm, position_mm[1:, None] + UPPER_MM[some], side="left")
+    return in_all_bins((total[np.minimum(ends, len(pieces))] - total[:-1, None]).max(axis=0), some)

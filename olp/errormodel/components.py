@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
-from olp.core.arrays import Array
+from olp.core.arrays import Array, distinct
 from olp.core.interpolation import ON_GRID_MM, Column, DenseTable, Interpolant, dense_table
 from olp.core.units import AXES
+from olp.core.values import dataclass
 from olp.errormodel.calibration import Calibration
 from olp.errormodel.chord import Variation
 from olp.errormodel.lever_arms import CROSS, DIRECTIONS, LeverArms
@@ -177,7 +177,7 @@ class _Columns:
             return DenseTable(0.0, 1.0, 1, None, ())
         low = max(float(f.x[0]) for f in self._interpolants)
         high = min(float(f.x[-1]) for f in self._interpolants)
-        knots = np.unique(np.concatenate([f.x for f in self._interpolants]))
+        knots = distinct(np.concatenate([f.x for f in self._interpolants]))
         curvature = np.concatenate([f.max_curvature() for f in self._interpolants])
         tolerance = [TABLE_RAD if name[1] in "ABC" else TABLE_MM for _, name in self._keys]
 

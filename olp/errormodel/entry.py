@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Array
 from olp.core.interpolation import Column
+from olp.core.values import dataclass
 
 Index = npt.NDArray[np.int32]
 #: The number and the weight of one unknown at each of n positions.

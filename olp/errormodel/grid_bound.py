@@ -9,7 +9,6 @@ over the move departs by no more than L/2, and never by more than its whole span
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import combinations_with_replacement
 
 import numpy as np
@@ -17,7 +16,8 @@ import numpy as np
 from olp.core.arrays import Array
 from olp.core.grid_interpolation import Grid
 from olp.core.units import AXES
-from olp.errormodel.chord import UPPER_MM, bins
+from olp.core.values import dataclass
+from olp.errormodel.chord import UPPER_MM, bins, distinct_bins, in_all_bins
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,5 +74,6 @@ def _windows(knots: Array, jumps: Array) -> Array | None:
         return None
     inner = knots[1:-1]
     total = np.concatenate([np.zeros((1, jumps.shape[1])), np.cumsum(jumps, axis=0)])
-    last = np.searchsorted(inner, inner[:, None] + UPPER_MM[None, :], side="right")
-    return np.asarray(0.25 * (total[last] - total[:-1, None]).max(axis=0))
+    some = distinct_bins(inner)
+    last = np.searchsorted(inner, inner[:, None] + UPPER_MM[some], side="right")
+    return in_all_bins(0.25 * (total[last] - total[:-1, None]).max(axis=0), some)

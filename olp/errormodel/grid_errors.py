@@ -8,7 +8,6 @@ angles with other errors are left out (60 urad times 0.1 mm are 6 nm).
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,7 +15,8 @@ from olp.core.arrays import Array, Mask
 from olp.core.grid_interpolation import Grid
 from olp.core.machine import Vector
 from olp.core.units import AXES
-from olp.errormodel.boxed import Boxed, as_points, as_tool, payload_of
+from olp.core.values import dataclass
+from olp.errormodel.boxed import Boxed, as_points, as_tool, by_tool, payload_of
 from olp.errormodel.grid_bound import GridBound
 from olp.errormodel.gridded import ComponentTable
 from olp.errormodel.lever_arms import CROSS, DIRECTIONS, LeverArms, lever_arms_of
@@ -217,12 +217,10 @@ class GridErrors(Boxed):
         delta = as_points(delta_mm, "delta_mm")
         tool, payload = as_tool(tool_mm, len(delta)), payload_of(tool_mm)
         total = np.zeros((len(delta), 3))
-        if not len(delta):
-            return np.zeros(0)
         for body in self.bodies:
-            arms = np.atleast_2d(self._arms(body, tool))
-            span = np.stack([arms.min(axis=0), arms.max(axis=0)])
-            total += body.chord_bound(delta, span, payload, self.box_mm)
+            for rows, arm in by_tool(self._arms(body, tool)):
+                load = payload[rows] if isinstance(payload, np.ndarray) else payload
+                total[rows] += body.chord_bound(delta[rows], arm[None], load, self.box_mm)
         return np.asarray(np.sqrt(np.einsum("ij,ij->i", total, total)))
 
     @staticmethod

@@ -7,7 +7,7 @@ Base units: mm, rad, kg, degC. error = actual - commanded, tool relative to work
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import product
 from types import MappingProxyType
 from typing import Literal
@@ -20,6 +20,7 @@ from olp.core.grid_interpolation import KINDS
 from olp.core.grid_interpolation import Kind as Interpolation
 from olp.core.machine import COMPONENTS, ZERO, Vector
 from olp.core.units import AXES, in_unit_text
+from olp.core.values import dataclass
 
 #: mm; a table may miss a face of the box by the rounding of its file, no more.
 COVER_MM = 1e-6

@@ -9,7 +9,7 @@ returns its measured value at its own node, and each row has its own lever arm.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -18,6 +18,7 @@ from olp.core.arrays import Array
 from olp.core.interpolation import Column
 from olp.core.machine import ZERO, Vector
 from olp.core.units import AXES
+from olp.core.values import dataclass
 
 #: Component errors of an axis in this order.
 DIRECTIONS = "XYZABC"

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+
+from olp.core.values import dataclass
 
 #: Standard deviations of noise above which a misfit is real: about 3 in 10 million by chance.
 _BEYOND = 5.0

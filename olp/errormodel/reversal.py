@@ -19,6 +19,9 @@ from olp.core.errors import UsageError
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.boxed import as_points
 
+#: A move longer than the backlash by this factor ends on one side of it, whatever is rounded.
+_LONGER = 1.0 + 1e-9
+
 
 def plays(model: ErrorModel, axis_mm: Array) -> Array | None:
     """(n, 3) play at successive commands (n, 3) from an unknown start; None where no axis has backlash."""
@@ -50,61 +53,71 @@ def play_states(axis_mm: Array, backlash_mm: Array, start: Array | None = None) 
 def play_interval(axis_mm: Array, backlash_mm: Array, start: Array | None = None) -> tuple[Array, Array]:
     """Least and greatest possible play, both (n, 3); equal once the backlash has been taken up.
 
-    A NaN command (an axis whose position is not known) makes the state unknown there and at the next one; a
-    NaN backlash counts as none.
+    `start` is as in `play_states`, or (2, 3): the least and the greatest play at the first command. A NaN
+    command (an axis whose position is not known) makes the state unknown there and at the next one; a NaN
+    backlash counts as none.
     """
     commands = as_points(axis_mm)
     width = np.asarray(backlash_mm, dtype=np.float64)
     if width.shape not in ((3,), commands.shape):
         raise UsageError(f"backlash_mm has shape {width.shape}; expected (3,) or {commands.shape}")
     state = np.full(3, np.nan) if start is None else np.asarray(start, dtype=np.float64)
-    if state.shape != (3,):
-        raise UsageError(f"start has shape {state.shape}; expected (3,)")
+    if state.shape not in ((3,), (2, 3)):
+        raise UsageError(f"start has shape {state.shape}; expected (3,) or (2, 3)")
+    state = np.broadcast_to(state, (2, 3))
     low, high = np.zeros(commands.shape), np.zeros(commands.shape)
     if len(commands):
         for j in range(3):
             one_width = np.full(len(commands), width[j]) if width.ndim == 1 else width[:, j].copy()
             command = np.ascontiguousarray(commands[:, j])
             one_width[np.isnan(one_width)] = 0.0
-            low[:, j], high[:, j] = _interval(command, one_width, float(state[j]))
+            low[:, j], high[:, j] = _interval(command, one_width, float(state[0, j]), float(state[1, j]))
     return low, high
 
 
-def _interval(command: Array, width: Array, start: float) -> tuple[Array, Array]:
-    """Least and greatest play (n,) of one axis."""
+def _interval(command: Array, width: Array, least: float, greatest: float) -> tuple[Array, Array]:
+    """Least and greatest play (n,) of one axis, from these two at its first command."""
     motion = np.diff(command)
     lost = np.isnan(motion)
     same = (motion == 0.0) & ((width[1:] == width[:-1]) | (width[1:] <= 0.0))
     # Commands that leave the axis alone repeat the state before them.
     kept = np.concatenate([[0], np.flatnonzero(~same) + 1])
     moved = kept[1:] - 1
-    low, high = np.empty(len(kept)), np.empty(len(kept))
-    gain, shift = np.ones(len(kept)), np.zeros(len(kept))
-    if len(moved):
-        _maps(motion[moved], width[moved], width[moved + 1], gain[1:], shift[1:], low[1:], high[1:])
+    whole = len(kept) == len(command)
+    rows = slice(None) if whole else moved
+    step, before, now = motion[rows], width[:-1][rows], width[1:][rows]
+    low, gain, shift = np.empty(len(kept)), np.ones(len(kept)), np.zeros(len(kept))
+    low[1:] = np.sign(step)
+    high = low.copy()
+    # a move longer than the backlash, or without any, leads to one state from all
+    both = np.where(now > 0.0, now + np.where(before > 0.0, before, now), 0.0)
+    short = np.flatnonzero(~(2.0 * np.abs(step) > _LONGER * both)) + 1
+    if len(short):
+        maps = _maps(step[short - 1], before[short - 1], now[short - 1])
+        gain[short], shift[short], low[short], high[short] = maps
     sources = np.concatenate([[True], lost[moved]])
     low[sources], high[sources] = -1.0, 1.0
     _scan(gain, shift, low, high, sources)
-    if not np.isnan(start) and not np.isnan(command[0]):
+    if not np.isnan(least) and not np.isnan(command[0]):
         # Until the first loss of position the maps run from the given state.
         known = slice(0, int(np.flatnonzero(sources)[1]) if sources.sum() > 1 else len(kept))
-        low[known] = np.clip(gain[known] * start + shift[known], low[known], high[known])
-        high[known] = low[known]
+        own_gain, own_shift, own = gain[known], shift[known], (low[known].copy(), high[known].copy())
+        low[known] = np.clip(own_gain * least + own_shift, *own)
+        high[known] = np.clip(own_gain * greatest + own_shift, *own)
+    if whole:
+        return low, high
     repeats = np.diff(np.concatenate([kept, [len(command)]]))
     return np.repeat(low, repeats), np.repeat(high, repeats)
 
 
-def _maps(
-    motion: Array, before: Array, width: Array, gain: Array, shift: Array, low: Array, high: Array
-) -> None:
-    """Fill in the map of each motion; low and high are the image of [-1, 1]."""
+def _maps(motion: Array, before: Array, width: Array) -> tuple[Array, Array, Array, Array]:
+    """The map of each motion: gain, shift, and the image of [-1, 1]."""
     slack = width > 0.0
     safe = np.where(slack, width, 1.0)
-    gain[:] = np.where(slack & (before > 0.0), before / safe, 1.0)
+    gain = np.where(slack & (before > 0.0), before / safe, 1.0)
     end = np.where(motion > 0.0, np.inf, np.where(motion < 0.0, -np.inf, 0.0))
-    shift[:] = np.where(slack, 2.0 * motion / safe, end)
-    low[:] = np.clip(shift - gain, -1.0, 1.0)
-    high[:] = np.clip(shift + gain, -1.0, 1.0)
+    shift = np.where(slack, 2.0 * motion / safe, end)
+    return gain, shift, np.clip(shift - gain, -1.0, 1.0), np.clip(shift + gain, -1.0, 1.0)
 
 
 def _scan(gain: Array, shift: Array, low: Array, high: Array, sources: npt.NDArray[np.bool_]) -> None:

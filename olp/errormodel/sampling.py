@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Array
+from olp.core.arrays import Array, distinct_rows
 from olp.errormodel.base import ErrorModel
 
 #: Steps of one move, at most.
@@ -17,9 +17,10 @@ _LENGTHS = 2.0 ** np.arange(-12.0, 14.0, 0.25)
 def clear_length_mm(model: ErrorModel, tools_mm: Array, bend_mm: float) -> float:
     """A length up to which the error bends by no more than `bend_mm` over a move, along each axis at once and
     with any of the tools (k, 3); 0 where there is none."""
-    span = np.stack([tools_mm.min(axis=0), tools_mm.max(axis=0)])
-    bound = model.chord_bound(np.repeat(_LENGTHS, 2)[:, None] * np.ones(3), np.tile(span, (len(_LENGTHS), 1)))
-    short = np.flatnonzero(bound.reshape(-1, 2).max(axis=1) > bend_mm)
+    tools = distinct_rows(tools_mm)
+    length = np.repeat(_LENGTHS, len(tools))
+    bound = model.chord_bound(length[:, None] * np.ones(3), np.tile(tools, (len(_LENGTHS), 1)))
+    short = np.flatnonzero(bound.reshape(-1, len(tools)).max(axis=1) > bend_mm)
     clear = int(short[0]) if short.size else len(_LENGTHS)
     return float(_LENGTHS[clear - 1]) if clear else 0.0
 

@@ -7,7 +7,6 @@ of an uncertainty.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +16,7 @@ from olp.core.arrays import Array
 from olp.core.interpolation import Column
 from olp.core.machine import Vector
 from olp.core.units import AXES
+from olp.core.values import dataclass
 from olp.errormodel.bodies import Body, build_bodies
 from olp.errormodel.boxed import as_points
 from olp.errormodel.calibration import Calibration, Thermal

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from olp.core.arrays import Array, Mask
 from olp.core.errors import UsageError
+from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.boxed import as_points
 

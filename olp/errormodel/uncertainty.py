@@ -10,10 +10,11 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from olp.core.errors import ConfigError
 from olp.core.machine import ZERO, Vector
+from olp.core.values import dataclass
 from olp.errormodel.calibration import Calibration
 from olp.errormodel.entry import Entry
 from olp.errormodel.sources.base import Sigmas, digits

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from olp.core.arrays import Array, Index
 from olp.core.errors import InputError
+from olp.core.values import dataclass
 from olp.files.fields import nearest
 from olp.files.problems import Problem, config_error
 from olp.program.text import rows

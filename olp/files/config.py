@@ -6,7 +6,7 @@ ConfigError with all problems of the file where it is wrong; both end the comman
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path as FilePath
 
 from olp.core.errors import UsageError
@@ -18,7 +18,14 @@ from olp.files.schemas import JobFile, MachineFile, Tools, WorkOffsets
 from olp.files.toml_text import Path, dotted, line_of, read_toml
 from olp.files.write import PathLike, Reader, read_bytes
 
+#: Says whether a file is there, as `Sources.exists` does.
+Exists = Callable[[PathLike], bool]
+
 __all__ = ["load_calibration", "load_job", "load_machine", "load_setup"]
+
+
+def _is_file(path: PathLike) -> bool:
+    return FilePath(path).is_file()
 
 
 def load_machine(path: PathLike) -> Machine:
@@ -40,9 +47,11 @@ def load_setup(machine_path: PathLike | None = None, job_path: PathLike | None =
     return read_setup(machine_path, job_path, read_bytes)
 
 
-def read_setup(machine_path: PathLike | None, job_path: PathLike | None, read: Reader) -> Setup:
-    """As `load_setup`, from the bytes that `read` gives for a path."""
-    job, job_lines = _read_job(job_path, read) if job_path is not None else (Job(), {})
+def read_setup(
+    machine_path: PathLike | None, job_path: PathLike | None, read: Reader, exists: Exists = _is_file
+) -> Setup:
+    """As `load_setup`, from the bytes that `read` gives for a path; `exists` says whether a file is there."""
+    job, job_lines = _read_job(job_path, read, exists) if job_path is not None else (Job(), {})
     machine_path = machine_path if machine_path is not None else job.machine
     if machine_path is None:
         what = f"{job_path} names no machine" if job_path is not None else "no machine file is given"
@@ -121,7 +130,7 @@ def _compliance(stated: float | Vector, axis: int) -> Vector:
     return (own[0], own[1], own[2])
 
 
-def _read_job(path: PathLike, read: Reader) -> tuple[Job, Mapping[Path, int]]:
+def _read_job(path: PathLike, read: Reader, exists: Exists = _is_file) -> tuple[Job, Mapping[Path, int]]:
     values, lines = read_toml(read(path), str(path))
     file = validate(JobFile, values, lines, str(path))
     missing: list[Problem] = []
@@ -129,7 +138,7 @@ def _read_job(path: PathLike, read: Reader) -> tuple[Job, Mapping[Path, int]]:
     for index, mesh in enumerate(file.meshes):
         where = str(beside(path, mesh.file))
         meshes.append(Mesh(where, mesh.role, mesh.frame, mesh.unit_mm))
-        if not FilePath(where).is_file():
+        if not exists(where):
             key: Path = ("meshes", index, "file")
             sentence = (
                 f'{dotted(key)} = "{mesh.file}" does not exist; expected a path relative to the job file'

@@ -142,7 +142,8 @@ def described(name: str, path: PathLike | None = None, read: Reader = read_bytes
     """The dialect of a name, where a file describes it: a dialect that comes with `olp`, or a path. `path` is
     where the file is read from instead. None for other names. Raises InputError."""
     if name in SHIPPED:
-        return load_described(FOLDER / f"{name}.toml", read)
+        # a part of olp itself, and no input of a run
+        return load_described(FOLDER / f"{name}.toml", read_bytes)
     return load_described(path or name, read) if name.endswith(".toml") else None
 
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import functools
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from importlib import resources
 from importlib.resources.abc import Traversable
+
+from olp.core.values import dataclass
 
 #: The page whose links are the reading order of the others.
 INDEX = "index"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from typing import Any
+from typing import Any, get_args
 
 from olp.core.errors import UsageError
 from olp.core.schema import Table
@@ -11,6 +11,7 @@ from olp.files.described import DialectFile
 from olp.files.measurements.schemas import MeasurementsFile
 from olp.files.point_profile import PointProfile
 from olp.files.schemas import FILES
+from olp.files.stated_units import with_quantities
 
 #: The model of each kind of file.
 KINDS: dict[str, type[Table]] = {
@@ -19,6 +20,8 @@ KINDS: dict[str, type[Table]] = {
     "points": PointProfile,
     "dialect": DialectFile,
 }
+#: What the identifiers of schemas begin with. They are names, and no addresses: nothing is fetched.
+PREFIX = "urn:olp-corrector:schema:"
 #: The version of JSON Schema that is written.
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
@@ -28,7 +31,23 @@ def json_schema(kind: str) -> dict[str, Any]:
     if kind not in KINDS:
         raise UsageError(f'there is no schema "{kind}"; expected one of {", ".join(KINDS)}')
     schema = _cleaned(KINDS[kind].model_json_schema(by_alias=True, mode="validation"))
-    return {"$schema": DIALECT, "title": f"olp {kind} file", **schema}
+    return {
+        "$schema": DIALECT,
+        "$id": schema_id(kind),
+        "title": f"olp {kind} file",
+        **with_quantities(schema),
+    }
+
+
+def schema_id(kind: str) -> str:
+    """The `$id` of the schema of a kind of file: a name, and no address that anything would be read from."""
+    return f"{PREFIX}{_format(KINDS[kind])}"
+
+
+def _format(model: type[Table]) -> str:
+    """What the key schema of such a file says, such as "olp-machine-1"."""
+    field = model.model_fields["schema_"]
+    return str(get_args(field.annotation)[0])
 
 
 def json_schema_text(kind: str) -> str:

@@ -7,13 +7,13 @@ import io
 import itertools
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Array
 from olp.core.errors import InputError
+from olp.core.values import dataclass
 from olp.files.columns import place_in
 from olp.files.point_profile import MEASURED, PointProfile, looked_at
 from olp.files.write import PathLike, Reader, read_bytes

@@ -10,6 +10,7 @@ from pydantic import ValidationError
 from olp.core.errors import ConfigError
 from olp.core.schema import Table, is_table
 from olp.files.fields import nearest, shown
+from olp.files.stated_units import in_units_of_keys, not_a_quantity
 from olp.files.toml_text import Path, dotted, line_of
 
 #: A line, where it is known, and a message.
@@ -50,11 +51,12 @@ _WANTED = {
 
 
 def validate(model: type[T], values: Mapping[str, object], lines: Mapping[Path, int], file: str) -> T:
-    """The typed file. Raises one ConfigError that lists every problem in the order of lines; of a file of
-    another kind that is the only one."""
+    """The typed file; texts such as "0.002 in" become numbers in the unit of their key. Raises one
+    ConfigError that lists every problem in the order of lines; of a file of another kind that is the only
+    one."""
     _refuse_other_kind(model, values, lines, file)
     try:
-        return model.model_validate(values)
+        return model.model_validate(in_units_of_keys(model, values))
     except ValidationError as error:
         items: list[dict[str, Any]] = [dict(item) for item in error.errors(include_url=False)]
     # A misspelt key is one problem, not also a missing one.
@@ -103,6 +105,9 @@ def _problem(model: type[Table], error: dict[str, Any], lines: Mapping[Path, int
     if kind == "olp":
         return line, f"{key} {error['ctx']['sentence']}"
     value = shown(error["input"])
+    wrong = not_a_quantity(path, error["input"]) if kind == "float_type" else None
+    if wrong is not None:
+        return line, f"{key} = {value}; {wrong}; it is {description}"
     wanted = _wanted(kind, error.get("ctx", {}))
     if kind == "literal_error" and wanted in description:
         return line, f"{key} = {value}; expected {description}"

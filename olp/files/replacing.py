@@ -8,7 +8,7 @@ import re
 import secrets
 import stat
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from olp.core.errors import OlpError
@@ -17,6 +17,13 @@ from olp.core.errors import OlpError
 _NAME_LENGTH = 40
 #: s; a temporary file that has not changed for so long is of no run, whatever runs under its number
 _STALE_S = 86_400.0
+
+#: s; how long another program, such as a scanner for viruses, may hold a file on Windows
+PATIENCE_S = 2.0
+#: s between two tries
+_PAUSE_S = 0.05
+#: Errors of Windows where another program holds a file: access denied, sharing violation, lock violation.
+HELD = frozenset((5, 32, 33))
 
 #: Names of the temporary files of this process that are not replaced yet.
 _own: set[str] = set()
@@ -44,10 +51,11 @@ class Replacement:
             stream.writelines([data] if isinstance(data, bytes) else data)
             stream.flush()
             os.fsync(stream.fileno())
-        if self._before is not None:
+        if self._before is not None and hasattr(os, "chown"):
             self._keep_owner(self.final.stat())
 
     def _keep_owner(self, old: os.stat_result) -> None:
+        """On Windows the folder decides who may read the file, and a read-only file cannot be removed."""
         new = self._temporary.stat()
         if hasattr(os, "chown") and (new.st_uid, new.st_gid) != (old.st_uid, old.st_gid):
             try:
@@ -68,7 +76,7 @@ class Replacement:
         if self._before is None and not force:
             self._create()
         else:
-            self._temporary.replace(self.final)
+            _patiently(lambda: self._temporary.replace(self.final))
         _own.discard(self._temporary.name)
 
     def _create(self) -> None:
@@ -79,9 +87,9 @@ class Replacement:
             raise self._changed() from None
         except OSError:
             # a file system without links
-            self._temporary.replace(self.final)
+            _patiently(lambda: self._temporary.replace(self.final))
         else:
-            self._temporary.unlink()
+            _patiently(self._temporary.unlink)
 
     def _changed(self) -> OlpError:
         return OlpError(
@@ -93,6 +101,20 @@ class Replacement:
         """Remove what is written so far."""
         self._temporary.unlink(missing_ok=True)
         _own.discard(self._temporary.name)
+
+
+def _patiently(action: Callable[[], object]) -> None:
+    """Try again while another program holds the file. Raises OSError where it holds it too long."""
+    end = time.monotonic() + PATIENCE_S
+    while True:
+        try:
+            action()
+        except PermissionError as error:
+            if getattr(error, "winerror", None) not in HELD or time.monotonic() > end:
+                raise
+            time.sleep(_PAUSE_S)
+        else:
+            return
 
 
 def remove_stale(final: Path) -> None:

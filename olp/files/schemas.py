@@ -28,9 +28,16 @@ from olp.files.fields import (
 class AxisTable(Table):
     travel_mm: Interval = Field(description="the lowest and highest axis position, [min, max] in mm")
     least_increment_mm: Positive = Field(description="the smallest step that the control takes, in mm")
-    velocity_mm_s: Positive = Field(description="the largest velocity of the axis, in mm/s")
-    acceleration_mm_s2: Positive = Field(description="the largest acceleration of the axis, in mm/s2")
-    jerk_mm_s3: Positive = Field(description="the largest jerk of the axis, in mm/s3")
+    velocity_mm_s: Positive | None = Field(
+        default=None, description="the largest velocity of the axis, in mm/s; only a motion in time needs it"
+    )
+    acceleration_mm_s2: Positive | None = Field(
+        default=None,
+        description="the largest acceleration of the axis, in mm/s2; only a motion in time needs it",
+    )
+    jerk_mm_s3: Positive | None = Field(
+        default=None, description="the largest jerk of the axis, in mm/s3; only a motion in time needs it"
+    )
     compliance_um_per_m_s2: Compliance = Field(
         default=0.0,
         description="the lag of the tool while the axis is accelerated, in um per m/s2; or [X, Y, Z], actual "

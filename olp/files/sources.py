@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import functools
 import hashlib
-from collections.abc import Callable, Iterator
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 
-from olp.core.errors import OlpError, naming
+from olp.core.errors import InputError, OlpError, naming
+from olp.core.values import dataclass
 from olp.files.write import PathLike, read_bytes
 
 
@@ -18,18 +19,44 @@ class Sources:
 
     def __init__(self) -> None:
         self._bytes: dict[Path, bytes] = {}
+        self._opened: dict[str, None] = {}
+        self._there: set[Path] = set()
+        self._absent: set[Path] = set()
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """The paths from the root of the files that were opened so far, in that order."""
+        return tuple(self._opened)
 
     def read(self, path: PathLike) -> bytes:
         """The bytes of a file, opened the first time only. Raises InputError where it cannot be read."""
         key = Path(path)
         if key not in self._bytes:
+            self._opened[str(Path(path).absolute())] = None
             self._bytes[key] = read_bytes(path)
         return self._bytes[key]
 
     def read_last(self, path: PathLike) -> bytes:
         """As `read`, for a large file that is not read again: its bytes are no longer kept."""
+        self._opened[str(Path(path).absolute())] = None
         known = self._bytes.pop(Path(path), None)
         return read_bytes(path) if known is None else known
+
+    def exists(self, path: PathLike) -> bool:
+        """Whether a file is there."""
+        there = Path(path) in self._bytes or Path(path).is_file()
+        (self._there if there else self._absent).add(Path(path))
+        return there
+
+    def there(self) -> frozenset[str]:
+        """The names in a parcel of files that are there and were not read."""
+        return frozenset(in_parcel(path) for path in self._there - self._bytes.keys())
+
+    def parcel(self) -> dict[str, bytes | None]:
+        """What was read by now, under the names that a parcel has for it; None for files that were asked for
+        and are not there."""
+        read: dict[str, bytes | None] = {in_parcel(path): data for path, data in self._bytes.items()}
+        return {in_parcel(path): None for path in self._absent} | read
 
     def digest(self, path: PathLike) -> bytes:
         """SHA-256 of a file. Raises as `read`."""
@@ -42,6 +69,54 @@ class Sources:
         if isinstance(given, bytes):
             return Source("", lambda: given)
         return Source(str(given), functools.partial(self.read, given))
+
+
+def in_parcel(path: PathLike) -> str:
+    """The name of a file in a parcel: its path without detours."""
+    return os.path.normpath(path)
+
+
+class Wanted(Exception):
+    """A parcel lacks the file `path`: whoever made it knows whether the file is there."""
+
+    def __init__(self, path: str) -> None:
+        super().__init__(path)
+        self.path = path
+
+
+class Parcel(Sources):
+    """Files that have travelled as bytes: nothing is read from a disk. None stands for a file that is not
+    there; files of `there` are, and were not sent. A file that is not in the parcel raises Wanted where it is
+    needed. `used` are those that were asked for."""
+
+    def __init__(self, files: Mapping[str, bytes | None], there: Iterable[str] = ()) -> None:
+        super().__init__()
+        self._files = files
+        self._known = frozenset(there)
+        self.used: set[str] = set()
+
+    def read(self, path: PathLike) -> bytes:
+        """The bytes of a file. Raises InputError where it is not there, Wanted where that is not known."""
+        data = self._look(path)
+        if data is None:
+            raise InputError("no such file; check the path", file=str(path))
+        return data
+
+    def read_last(self, path: PathLike) -> bytes:
+        """As `read`."""
+        return self.read(path)
+
+    def exists(self, path: PathLike) -> bool:
+        """Whether a file is there. Raises Wanted where that is not known."""
+        return in_parcel(path) in self._known or self._look(path) is not None
+
+    def _look(self, path: PathLike) -> bytes | None:
+        name = in_parcel(path)
+        self.used.add(name)
+        try:
+            return self._files[name]
+        except KeyError:
+            raise Wanted(name) from None
 
 
 @dataclass(frozen=True, slots=True)

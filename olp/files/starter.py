@@ -2,27 +2,31 @@
 
 from __future__ import annotations
 
-import datetime
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
 
 from olp.core.errors import UsageError
-from olp.core.machine import CHAINS, COMPONENTS, ZERO, Axis, Job, Machine, Tool, WorkOffset
+from olp.core.machine import CHAINS, COMPONENTS, ZERO, Axis, Job, Machine, Tool, Vector, WorkOffset
 from olp.core.units import AXES, in_unit
-from olp.errormodel.calibration import PLACEHOLDER_DATE
+from olp.errormodel.calibration import PLACEHOLDER_DATE, Calibration
+from olp.files.calibration.writer import calibration_files
 from olp.files.fields import CONTROLLER_NAMES, unknown_dialect
-from olp.files.linuxcnc import Imported, from_linuxcnc
+from olp.files.json_schema import json_schema_text
+from olp.files.machine_settings.base import AxisSettings, Settings
 from olp.files.toml_text import comment, toml_key, toml_lines, toml_value
-from olp.files.write import PathLike, write_files
-
-__all__ = ["Imported", "from_linuxcnc", "machine_toml", "starter_machine", "starter_set", "write_starter"]
+from olp.files.write import PathLike, check_targets, make_folder, write_files
 
 Travel = Mapping[str, tuple[float, float]]
 
 #: Rows of each curve file.
 _POINTS = 11
+#: The folder of the schemas beside the files, so that editors check them without a network.
+SCHEMAS = "schemas"
+#: In mm: where no one states it.
+_LEAST_INCREMENT_MM = 0.001
 
 
 def machine_toml(machine: Machine, notes: Iterable[str] = ()) -> str:
@@ -37,10 +41,13 @@ def machine_toml(machine: Machine, notes: Iterable[str] = ()) -> str:
     lines += toml_lines({"controller": machine.controller, "calibration": machine.calibration})
     lines += comment("What the control corrects now and did not correct while measuring, by ISO 230-1 name.")
     lines += toml_lines({"compensated_by_controller": "all" if compensated == ["all"] else compensated})
+    if machine.missing_limits:
+        keys = "velocity_mm_s, acceleration_mm_s2 and jerk_mm_s3"
+        lines += ["", *comment(f"Only a motion in time (olp retime) needs {keys} of each axis.")]
     for name in AXES:
         axis = machine.axes[name]
         lines += ["", f"[axes.{name}]"]
-        stated = {key: getattr(axis, key) for key in Axis.__dataclass_fields__}
+        stated = {key: getattr(axis, key) for key in (field.name for field in fields(Axis))}
         if axis.compliance_um_per_m_s2 == ZERO:
             del stated["compliance_um_per_m_s2"]
         lines += toml_lines(stated)
@@ -86,9 +93,18 @@ def _tool(tool: Tool) -> Iterator[str]:
     yield from toml_lines({"setter": tool.setter, "k_um": constant_um})
 
 
-def starter_machine(name: str, chain: str, travel_mm: Travel, controller: str = "linuxcnc") -> Machine:
-    """A machine with plausible limits, one work offset at the middle of the travel, and one tool. Raises
-    UsageError for a chain, a travel or a control that no machine has."""
+def starter_machine(
+    name: str,
+    chain: str,
+    travel_mm: Travel,
+    controller: str = "linuxcnc",
+    *,
+    settings: Settings | None = None,
+    zero_mm: Vector | None = None,
+) -> Machine:
+    """A machine with what `settings` state, the program's zero (G54) at `zero_mm` or in the middle of the
+    travel, and one tool where none is stated. Raises UsageError for a chain, a travel or a control that no
+    machine has."""
     if controller not in CONTROLLER_NAMES:
         raise UsageError(f"controller {unknown_dialect(controller)}")
     if chain not in CHAINS:
@@ -98,60 +114,98 @@ def starter_machine(name: str, chain: str, travel_mm: Travel, controller: str = 
         if not (np.isfinite([low, high]).all() and low < high):
             raise UsageError(f"travel of {axis} is [{low:g}, {high:g}] mm; expected min below max")
     axes = {
-        axis: Axis(
-            travel_mm=(float(travel_mm[axis][0]), float(travel_mm[axis][1])),
-            least_increment_mm=0.001,
-            velocity_mm_s=250.0,
-            acceleration_mm_s2=1000.0,
-            jerk_mm_s3=20000.0,
-        )
+        axis: _axis(travel_mm[axis], AxisSettings() if settings is None else settings.axes[axis])
         for axis in AXES
     }
     x, y, z = (sum(axes[axis].travel_mm) / 2 for axis in AXES)
+    offsets = {} if settings is None else dict(settings.work_offsets)
+    if zero_mm is not None or not offsets:
+        offsets["G54"] = WorkOffset("G54", offset_mm=zero_mm or (x, y, z))
+    tools = {} if settings is None else dict(settings.tools)
+    named = settings is not None and settings.work_offset in offsets
     return Machine(
         name=name,
         chain=chain,
         controller=controller,
         axes=axes,
         calibration="calibration.toml",
-        work_offsets={"G54": WorkOffset("G54", offset_mm=(x, y, z))},
-        tools={1: Tool(1, length_mm=(0.0, 0.0, 100.0), radius_mm=5.0)},
-        default_tool=1,
+        compensated_by_controller=frozenset() if settings is None else settings.compensated,
+        work_offsets=offsets,
+        tools=tools or {1: Tool(1, length_mm=(0.0, 0.0, 100.0), radius_mm=5.0)},
+        default_tool=None if tools else 1,
+        default_work_offset=settings.work_offset if settings is not None and named else "G54",
     )
 
 
-def starter_set(machine: Machine, measured: datetime.date = PLACEHOLDER_DATE) -> dict[str, str]:
-    """Texts by file name: machine, calibration with one curve file per axis (all errors zero), and job."""
-    notes = [
-        f"Machine {machine.name}. Replace travel, limits, offsets and tools by those of your machine.",
-        "G54 is the middle of the travel: put the offsets there that your control shows.",
-    ]
-    files = {
-        "machine.toml": machine_toml(machine, notes),
-        "calibration.toml": _calibration_toml(machine, measured),
-        "job.toml": _job_toml(machine),
-    }
-    return files | {f"{axis.lower()}.csv": _curve_csv(axis, machine.axes[axis]) for axis in AXES}
+def _axis(travel_mm: tuple[float, float], stated: AxisSettings) -> Axis:
+    return Axis(
+        travel_mm=(float(travel_mm[0]), float(travel_mm[1])),
+        least_increment_mm=stated.least_increment_mm or _LEAST_INCREMENT_MM,
+        velocity_mm_s=stated.velocity_mm_s,
+        acceleration_mm_s2=stated.acceleration_mm_s2,
+        jerk_mm_s3=stated.jerk_mm_s3,
+    )
 
 
-def write_starter(
-    folder: PathLike, machine: Machine, *, measured: datetime.date = PLACEHOLDER_DATE, force: bool = False
-) -> list[Path]:
-    """Write the starter set into an existing folder, all files or none. Raises as `write_files`."""
-    files = {Path(folder) / name: text.encode() for name, text in starter_set(machine, measured).items()}
+#: What the head of a machine file says that is still to be completed.
+NOTES = (
+    "Replace travel, offsets and tools by those of your machine.",
+    "G54 is the middle of the travel: put the offsets there that your control shows.",
+)
+
+
+def starter_set(
+    machine: Machine, known: Calibration | None = None, notes: Iterable[str] = NOTES, program: str = "part.nc"
+) -> dict[str, str]:
+    """Texts by file name: machine, calibration, job, and the schemas of the three, which they name.
+
+    Errors that are `known` as numbers become the calibration. Without them it has one curve file per axis,
+    all errors are zero, and it has a date by which every verb knows that it is not completed.
+    """
+    if known is None:
+        calibration = {"calibration.toml": _calibration_toml(machine)}
+        calibration |= {f"{axis.lower()}.csv": _curve_csv(axis, machine.axes[axis]) for axis in AXES}
+    else:
+        calibration = _known(known)
+    files = {"machine.toml": machine_toml(machine, [f"Machine {machine.name}.", *notes]), **calibration}
+    files["job.toml"] = _job_toml(machine, program)
+    for kind in ("machine", "calibration", "job"):
+        files[f"{kind}.toml"] = f"#:schema ./{SCHEMAS}/{kind}.json\n" + files[f"{kind}.toml"]
+        files[f"{SCHEMAS}/{kind}.json"] = json_schema_text(kind)
+    return files
+
+
+def write_starter(folder: PathLike, machine: Machine, *, force: bool = False) -> list[Path]:
+    """Write the starter set of a machine that was not measured into a folder, all files or none. Raises as
+    `write_files`."""
+    files = {Path(folder) / name: text.encode() for name, text in starter_set(machine).items()}
+    check_targets(files, force=force, new_folders=True)
+    make_folder(Path(folder) / SCHEMAS)
     write_files(files, force=force)
     return list(files)
 
 
-def _calibration_toml(machine: Machine, measured: datetime.date) -> str:
+def _known(calibration: Calibration) -> dict[str, str]:
+    notes = [
+        "The errors that are known as single numbers: actual minus commanded, of the tool relative to the "
+        "workpiece.",
+        "temperature_degC is assumed; it counts only beside a table [thermal].",
+    ]
+    files = calibration_files(calibration, Path("calibration.toml"), notes=notes)
+    return {path.name: data.decode() for path, data in files.items()}
+
+
+def _calibration_toml(machine: Machine) -> str:
     box = [list(machine.axes[axis].travel_mm) for axis in AXES]
     lines = [
         *comment(
             "Errors of the machine: actual minus commanded, of the tool relative to the workpiece. The curves"
         ),
         *comment("hold zeros, which correct nothing. Put measured values there, then set dates and box."),
-        *toml_lines({"schema": "olp-calibration-1", "machine": machine.name, "measured": measured}),
-        *toml_lines({"valid_until": measured, "temperature_degC": 20.0, "sign": "actual-minus-commanded"}),
+        *toml_lines({"schema": "olp-calibration-1", "machine": machine.name, "measured": PLACEHOLDER_DATE}),
+        *toml_lines(
+            {"valid_until": PLACEHOLDER_DATE, "temperature_degC": 20.0, "sign": "actual-minus-commanded"}
+        ),
         *toml_lines({"model": "rigid-body", "datum_mm": ZERO}),
         *comment(
             "Calibrated axis positions [min, max] of X, Y, Z. A program that leaves the box is refused, or "
@@ -185,8 +239,8 @@ def _curve_csv(axis: str, limits: Axis) -> str:
     return "\n".join([title, ",".join(columns), *rows]) + "\n"
 
 
-def _job_toml(machine: Machine) -> str:
-    job = Job(program="part.nc", machine="machine.toml")
+def _job_toml(machine: Machine, program: str) -> str:
+    job = Job(program=program, machine="machine.toml")
     lines = [
         *comment("What changes from job to job. Offsets and tools here override the machine's, one by one."),
         *toml_lines({"schema": "olp-job-1", "program": job.program, "machine": job.machine}),

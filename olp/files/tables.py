@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -14,6 +13,7 @@ from olp.core.arrays import Array
 from olp.core.errors import ConfigError
 from olp.core.machine import COMPONENTS
 from olp.core.units import AXES, shifted
+from olp.core.values import dataclass
 from olp.files.columns import Row, Wanted, names, read_sheet, unknown
 from olp.files.problems import Problem, config_error
 from olp.files.write import PathLike, Reader, read_bytes

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import datetime
 import re
 import tomllib
@@ -22,11 +23,14 @@ _SHOWN = 120
 _DEEPEST = 16
 _PART = r"(?:[A-Za-z0-9_-]++|\"[^\"\n]*+\"|'[^'\n]*+')[ \t]*+"
 _DEEP_KEY = re.compile(rf"(?m)(?:^|[\[{{,])[ \t]*+(?:{_PART}\.[ \t]*+){{{_DEEPEST}}}")
+_BLANKS = re.compile(r"[A-Za-z]\w*(?: +\w+)+\s*(?==)")
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def read_toml(data: bytes, file: str) -> tuple[dict[str, object], dict[Path, int]]:
     """Values and key lines of a TOML file. Raises ConfigError with the line where the text is not TOML."""
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        raise ConfigError("the text is UTF-16; expected a text file saved as UTF-8", file=file)
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -35,6 +39,10 @@ def read_toml(data: bytes, file: str) -> tuple[dict[str, object], dict[Path, int
             f"line {line}: byte 0x{data[error.start]:02x} is not UTF-8; expected a text file saved as UTF-8"
         )
         raise ConfigError(problem, file=file, line=line) from None
+    if not text.strip():
+        raise ConfigError(
+            "the file is empty; expected keys and values; olp init writes first files", file=file
+        )
     deep = _DEEP_KEY.search(text)
     if deep is not None:
         line = text.count("\n", 0, deep.end()) + 1
@@ -61,6 +69,8 @@ def _syntax_error(message: str, text: str, file: str) -> ConfigError:
     value = _STRING_OR_COMMENT.sub("", written).partition("=")[2]
     if "[" not in value and re.search(r"\d,\d", value):
         hint = "write a decimal point instead of the comma"
+    elif blanks := _BLANKS.match(written):
+        hint = f"a key has no blanks; did you mean {blanks[0].strip().replace(' ', '_')}?"
     elif written.count('"') % 2:
         hint = "close the quotes"
     elif "Invalid value" in what or "'\\'" in what:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 from olp.core.errors import InputError, OlpError, UsageError
-from olp.files.replacing import Replacement, remove_stale
+from olp.files import names
+from olp.files.names import not_found
+from olp.files.replacing import HELD, Replacement, remove_stale
 
 PathLike = str | os.PathLike[str]
 #: A whole file, or its parts in order.
@@ -15,13 +18,23 @@ Content = bytes | Iterable[bytes]
 #: Reads a whole file, as `read_bytes` does. `Sources.read` keeps the bytes and opens each file once.
 Reader = Callable[[PathLike], bytes]
 
+#: Endings of files that browsers open as pages, and whose scripts they run.
+_PAGES = frozenset(
+    (".htm", ".html", ".xht", ".xhtml", ".shtml", ".svg", ".svgz", ".mht", ".mhtml", ".hta", ".xsl", ".xslt")
+)
+
+
+def is_page(name: PathLike) -> bool:
+    """Whether a browser would open a file of this name as a page, and run what it holds."""
+    return Path(name).suffix.lower() in _PAGES
+
 
 def read_bytes(path: PathLike) -> bytes:
     """The bytes of a file. Raises InputError where it cannot be read."""
     try:
         return Path(path).read_bytes()
     except FileNotFoundError:
-        raise InputError("no such file; check the path", file=str(path)) from None
+        raise InputError(not_found(str(path)), file=str(path)) from None
     except IsADirectoryError:
         raise InputError("is a folder; expected a file in it", file=str(path)) from None
     except PermissionError:
@@ -51,8 +64,9 @@ def write_files(
     Each file is first written beside its target under a temporary name and synced, with the owner and mode of
     the file that it replaces. Then all replace their targets. Temporary files of killed runs are removed. A
     device such as the null device is written to directly. Raises UsageError where a target is one of `inputs`
-    (also with `force`), exists without `force`, or has no folder. Raises OlpError where the system refuses to
-    write, or where another program has changed a target meanwhile.
+    (also with `force`), exists without `force`, has no folder, or has a name that Windows would take for
+    another. Raises OlpError where the system refuses to write, or where another program holds a target or has
+    changed it meanwhile.
     """
     check_targets(files, inputs, force=force)
     waiting: list[Replacement] = []
@@ -70,7 +84,7 @@ def write_files(
             waiting[0].replace(force=force)
             remove_stale(waiting.pop(0).final)
     except OSError as error:
-        raise OlpError(f"cannot be written ({_reason(error)})", file=str(current)) from error
+        raise OlpError(_unwritten(error), file=str(current)) from error
     finally:
         for replacement in waiting:
             replacement.discard()
@@ -98,7 +112,19 @@ def make_folder(folder: Path) -> None:
         raise OlpError(f"cannot be created ({error.strerror})", file=str(folder)) from error
 
 
+def _unwritten(error: OSError) -> str:
+    reason = f"cannot be written ({_reason(error)})"
+    held = getattr(error, "winerror", None) in HELD
+    if held:
+        return f"{reason}; close it in other programs, and call again"
+    denied = isinstance(error, PermissionError) and error.errno == errno.EACCES
+    return f"{reason}; name another folder, or let your user write there" if denied else reason
+
+
 def _check(target: Path, force: bool, sources: Iterable[Path], new_folders: bool) -> None:
+    wrong = names.wrong_on_windows(str(target)) if names.WINDOWS else ""
+    if wrong:
+        raise UsageError(wrong, file=str(target))
     if not (new_folders or target.parent.is_dir()):
         raise UsageError(f"there is no folder {str(target.parent)!r}; create it first", file=str(target))
     if target.is_dir():

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import pkgutil
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib import import_module
 
+from olp.core.values import dataclass
 from olp.findings import codes
 from olp.findings.rule import Rule, Severity
 

@@ -11,10 +11,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import field
 from enum import Enum
 from typing import Any
 
+from olp.core.progress import Progress, silent
+from olp.core.values import dataclass
 from olp.program.origin import Unrolled
 from olp.program.text.line_ends import split
 
@@ -22,10 +24,11 @@ from olp.program.text.line_ends import split
 @dataclass(frozen=True, slots=True)
 class Options:
     """How a program is to be read: `block_delete` leaves `/` blocks out; `contour` takes the contour under
-    cutter compensation (G41/G42, CUTCOM) as the tool path."""
+    cutter compensation (G41/G42, CUTCOM) as the tool path. `tell` is told what share of the text is read."""
 
     block_delete: bool = False
     contour: bool = False
+    tell: Progress = field(default=silent, repr=False)
 
 
 class Support(Enum):
@@ -69,8 +72,9 @@ class Dialect:
     marks around a comment. `first` are the beginnings of lines, in capitals, that stay before all others, in
     this order; `|` separates alternatives.
 
-    `endings` are endings of files, in small letters, that only this dialect has. `sign` matches what only its
-    texts say at the start of a line, `shared_sign` what texts of other dialects say too. With
+    `endings` are endings of files, in small letters, that only this dialect has. `folder_endings` are those
+    by which a file in a folder is known as a program, also where several dialects have them. `sign` matches
+    what only its texts say at the start of a line, `shared_sign` what texts of other dialects say too. With
     `payload_comments` the payload may change inside a program. `path_tolerance`: programs state how far the
     control may leave the path (G64 P), and without it the control has no bound. `axes_at_ram`: axis positions
     count at the end of the ram, whatever stylus or tool is active. `points`: programs state points, and all
@@ -83,6 +87,7 @@ class Dialect:
     reader: Callable[..., Any]
     unroller: Callable[..., Unrolled] | None = None
     endings: tuple[str, ...] = ()
+    folder_endings: tuple[str, ...] = ()
     sign: re.Pattern[bytes] | None = None
     shared_sign: re.Pattern[bytes] | None = None
     payload_comments: bool = False

@@ -7,9 +7,9 @@ for one of these.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 
 from olp.core.errors import ProgramError
+from olp.core.values import dataclass
 
 #: Bytes of a text that are searched.
 LOOKED_AT = 1 << 16

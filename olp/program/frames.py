@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from olp.core.errors import ConfigError, ProgramError
 from olp.core.machine import ZERO, Setup, Vector, WorkOffset
 from olp.core.toolpath import CutterCompensation, Frame, LengthError, Touch, carried
 from olp.core.units import UM_PER_MM
+from olp.core.values import dataclass
 
 Turn = tuple[Vector, Vector, Vector]
 

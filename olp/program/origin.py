@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ import numpy as np
 
 from olp.core.arrays import Index
 from olp.core.errors import OlpError, ProgramError
+from olp.core.values import dataclass
 
 
 @dataclass(frozen=True, slots=True, eq=False)

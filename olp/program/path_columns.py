@@ -13,12 +13,12 @@ from olp.program.text.columns import Columns
 
 
 class PathColumns:
-    """Without `keep_words` the columns that only writing needs are left out. `moves` counts the moves so far;
-    `expected` is how many there may be."""
+    """Without `keep_words` the columns that only writing needs are left out. `moves` counts the moves
+    so far."""
 
-    def __init__(self, expected: int, *, keep_words: bool) -> None:
+    def __init__(self, *, keep_words: bool) -> None:
         self.keep_words = keep_words
-        self.columns = Columns(expected)
+        self.columns = Columns()
         self.moves = 0
 
     def put_moves(

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Index
 from olp.core.toolpath import Toolpath
+from olp.core.values import dataclass
 from olp.program.dialect import Dialect
+from olp.program.holes import Holes
 from olp.program.origin import Origin, in_original, origin_of
 from olp.program.rs274.profiles.base import Profile
 from olp.program.rs274.state import Capture, PathMode
@@ -46,33 +48,6 @@ class ArcSlots:
 
     word: Small
     absolute: npt.NDArray[np.bool_]
-
-
-@dataclass(frozen=True, slots=True)
-class Hole:
-    """One hole of a canned cycle: its moves `first`..`last` of the toolpath and its block's words by letter.
-
-    `place_mm` (first and second axis of the plane), `r_mm` and `z_mm` are axis positions. `series` counts
-    contiguous cycles; a block of one series inherits R and Z of the block before. `repeat` counts the
-    `repeats` holes of one block from 0. `rests` says where the motion rests, as (number of its moves before,
-    seconds): dwells and reversals of the spindle.
-    """
-
-    line: int
-    first: int
-    last: int
-    words: Mapping[str, int]
-    plane: int
-    place_mm: tuple[float, float]
-    r_mm: float
-    z_mm: float
-    initial_mm: float
-    incremental: bool
-    repeat: int
-    repeats: int
-    series: int
-    code: int
-    rests: tuple[tuple[int, float], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,7 +127,7 @@ class Program:
     line_end: Small
     captures: tuple[Capture, ...] = ()
     path_modes: tuple[PathMode, ...] = ()
-    holes: tuple[Hole, ...] = ()
+    holes: Holes = field(default_factory=Holes.none)
     remarks: tuple[tuple[str, int, str], ...] = field(default=())
     end_line: int = 0
     calculator: bool = True
@@ -181,7 +156,7 @@ class Program:
             self,
             toolpath=replace(path, line=self.original_lines(path.line).astype(np.int32)),
             path_modes=tuple(replace(mode, line=line_of(mode.line)) for mode in self.path_modes),
-            holes=tuple(replace(hole, line=line_of(hole.line)) for hole in self.holes),
+            holes=replace(self.holes, line=self.original_lines(self.holes.line).astype(np.int32)),
             remarks=tuple((name, line_of(line), text) for name, line, text in self.remarks),
             by_original=True,
         )

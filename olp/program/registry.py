@@ -101,6 +101,16 @@ def named(name: str) -> Dialect:
     return dialect
 
 
+def folder_endings() -> frozenset[str]:
+    """The endings of files, in small letters, by which a folder shows its programs."""
+    return frozenset(ending for dialect in DIALECTS.values() for ending in dialect.folder_endings)
+
+
+def ending_of(file: str) -> str:
+    """The ending of a file in small letters. That of a version (`.ncl.3`) does not count."""
+    return _VERSION.sub("", file).rpartition(".")[2].lower()
+
+
 def dialect_of(name: str | None, control: Dialect, data: bytes, file: str) -> Dialect:
     """The dialect of a program: the one that is named, else what its text and the ending of its file show,
     else that of the control. Raises UsageError for an unknown name, ProgramError where text and ending
@@ -132,8 +142,8 @@ def dialect_of(name: str | None, control: Dialect, data: bytes, file: str) -> Di
 
 
 def _by_ending(file: str) -> str | None:
-    """The dialect that alone has the ending of a file. The ending of a version (`.ncl.3`) does not count."""
-    ending = _VERSION.sub("", file).rpartition(".")[2].lower()
+    """The dialect that alone has the ending of a file."""
+    ending = ending_of(file)
     return next((name for name, dialect in DIALECTS.items() if ending in dialect.endings), None)
 
 

@@ -4,13 +4,13 @@ the whole text, and at the end the `Program`."""
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Array, Index, Mask
 from olp.core.toolpath import Flag, Frame, Kind
+from olp.core.values import dataclass
 from olp.program.dialect import Dialect
 from olp.program.path_columns import PathColumns
 from olp.program.program import ArcSlots, ArcText, Program, StatedFeeds, Statements, Words
@@ -58,7 +58,7 @@ class StatementCollector(PathColumns):
     out."""
 
     def __init__(self, data: bytes, dialect: Dialect, *, keep_words: bool) -> None:
-        super().__init__(len(data) // 12, keep_words=keep_words)
+        super().__init__(keep_words=keep_words)
         self.data, self.dialect = data, dialect
         self.words = self._base = 0
         self._lone: list[tuple[int, int, bool, int, int]] = []

@@ -15,13 +15,13 @@ from __future__ import annotations
 import re
 from bisect import bisect_left
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 from olp.core.errors import ConfigError, ProgramError, Reason, Refused
 from olp.core.machine import ZERO, Setup, Tool, WorkOffset
+from olp.core.values import dataclass
 from olp.findings.catalogue import RULES
 from olp.program.dialect import Dialect, Options
-from olp.program.foreign import recognised
 from olp.program.origin import Unrolled
 from olp.program.program import Program
 from olp.program.registry import read
@@ -62,6 +62,12 @@ COMMENT = "OLP514"
 _KEPT = "--flatten does not unroll it; write plain blocks"
 
 
+#: Bytes of a file that show whether it is a text.
+_HEAD = 1024
+#: A text has fewer zero bytes than one in so many; in UTF-16 it is every second one.
+_ZERO_SHARE = 4
+
+
 def as_it_is(file: str | None, text: bytes) -> bytes:
     """Changes nothing."""
     return text
@@ -85,8 +91,12 @@ def read_all(
     options = options or Options()
     try:
         text = data if unroll is None else unroll(as_it_is, None)
-        return read(text, setup, dialect, options, words=words)
+        program = read(text, setup, dialect, options, words=words)
+        _refuse_foreign(data, program)
+        return program
     except ProgramError as error:
+        from olp.program.foreign import recognised
+
         certain = dialect.sign is not None or setup.job.described is not None
         other = recognised(data, languages=not certain)
         if other is not None:
@@ -105,6 +115,20 @@ def read_all(
         if unroll is None:
             survey.judge_hints(subprograms)
         raise survey.error(complete=complete) from None
+
+
+def _refuse_foreign(data: bytes, program: Program) -> None:
+    """Raise ProgramError for a file of another kind that happens to be readable.
+
+    It has no move, as a document that begins with %. Or it has bytes of no text, as UTF-16 without its mark.
+    """
+    head = data[:_HEAD]
+    if not len(program.toolpath) or head.count(b"\0") * _ZERO_SHARE > len(head):
+        from olp.program.foreign import recognised
+
+        other = recognised(data, languages=False)
+        if other is not None:
+            raise other
 
 
 def _plain(survey: _Survey) -> ProgramError | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ import numpy.typing as npt
 from olp.core.arrays import Index
 from olp.core.machine import Setup
 from olp.core.toolpath import Arcs, Frame, Kind, Toolpath
+from olp.core.values import dataclass
 from olp.program.dialect import Dialect
 from olp.program.pointlist.columns import plain_numbers
 from olp.program.program import ArcSlots, Program, StatedFeeds, Statements, Words

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from olp.compensation.corners import gouging
-from olp.core.arrays import Index
+from olp.core.arrays import Index, distinct
 from olp.core.errors import ProgramError
 from olp.core.toolpath import Toolpath
 
@@ -15,7 +15,7 @@ def check_contours(nominal: Toolpath, written: Toolpath, groups: Index) -> None:
     of the nominal one. `groups` (n,) is the last written move of each nominal one."""
     if not gouging(written).any():
         return
-    new = np.union1d(*(_new(nominal, written, groups, seen) for seen in (False, True)))
+    new = distinct(np.concatenate([_new(nominal, written, groups, seen) for seen in (False, True)]))
     if not new.size:
         return
     compensation = nominal.frames[int(nominal.frame[new[0]])].compensation
@@ -31,5 +31,5 @@ def check_contours(nominal: Toolpath, written: Toolpath, groups: Index) -> None:
 
 def _new(nominal: Toolpath, written: Toolpath, groups: Index, seen: bool) -> Index:
     """Nominal moves that can be cut, but not as written."""
-    mine = np.unique(np.searchsorted(groups, np.flatnonzero(gouging(written, seen=seen))))
+    mine = distinct(np.searchsorted(groups, np.flatnonzero(gouging(written, seen=seen))))
     return np.asarray(mine[~gouging(nominal, seen=seen)[mine]])

@@ -7,25 +7,29 @@ the program belong to which nominal move.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
+from olp.compensation.plan import TargetRows
 from olp.core.arrays import Array, Index, Mask
-from olp.core.geometry import arc_distance, arc_points, arms, segment_distance
+from olp.core.geometry import ArcShapes, arms, segment_distance
+from olp.core.progress import Progress, silent
 from olp.core.toolpath import Flag, Kind, Toolpath
+from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
-from olp.errormodel.reversal import play_after, play_interval, play_states, plays
+from olp.errormodel.reversal import play_after, play_interval
 from olp.errormodel.sampling import clear_length_mm, longer, steps_needed
+from olp.proof.unknown_sides import UnknownSides
+from olp.proof.unknown_starts import UnknownStarts
 
 #: enough for deviations, which are small, and half the memory
 Single = npt.NDArray[np.float32]
 
-#: nominal moves at a time, so that memory is small
-_BLOCK = 1 << 15
-#: steps over the box at most in which an unknown axis is tried, and two of them
-_MOST_PROBES = (1 << 10, 1 << 7)
+#: nominal moves at a time, and moves that they became, so that memory is small
+_BLOCK = 1 << 13
 #: samples of an arc move at the least, and of a move at the most
 _ARC_STEPS = 8
 _MOST_STEPS = 1 << 12
@@ -55,8 +59,9 @@ def cutting_moves(path: Toolpath) -> Mask:
 
 
 def measure(
-    nominal: Toolpath, target_mm: Array, path: Toolpath, groups: Index, model: ErrorModel, bend_mm: float
-) -> Deviation:
+    nominal: Toolpath, target_mm: TargetRows, path: Toolpath, groups: Index, model: ErrorModel,
+    bend_mm: float, tell: Progress = silent,
+) -> Deviation:  # fmt: skip
     """Compare the actual path of `path` with the nominal one.
 
     `target_mm` (n, 3) are the nominal waypoints where the part really lies; `groups` (n,) is the index of
@@ -66,84 +71,40 @@ def measure(
     waypoint = np.full(count, np.nan, np.float32)
     worst = np.full(count, np.nan, np.float32)
     bend = np.zeros(count, np.float32)
+    side = np.zeros(count)
     tracer = Tracer(nominal, target_mm, path, groups, model, bend_mm)
-    for a in range(0, count, _BLOCK):
-        b = min(a + _BLOCK, count)
+    starts = UnknownStarts(nominal, target_mm, path, groups, model, bend_mm)
+    sides = UnknownSides(path, model) if tracer.has_play else None
+    a = 0
+    while a < count:
+        parts = int(groups[a - 1]) + _BLOCK if a else _BLOCK
+        b = min(max(int(np.searchsorted(groups, parts)), a + 1), a + _BLOCK, count)
         tracer.block(a, b, waypoint[a:b], worst[a:b], bend[a:b])
-    _from_unknown(nominal, target_mm, path, groups, model, bend_mm, worst)
-    return Deviation(waypoint, worst, bend, _unknown_side(path, groups, model))
-
-
-def _from_unknown(
-    nominal: Toolpath, target: Array, path: Toolpath, groups: Index, model: ErrorModel, bend_mm: float,
-    worst: Single,
-) -> None:  # fmt: skip
-    """A feed move may start where an axis is unknown. How far the tip may be off there in the others: the
-    largest over the box of the unknown axis. What an unknown play changes is in `side`."""
-    start = nominal.starts_mm()
-    first = np.concatenate(([0], groups[:-1] + 1)) if len(groups) else groups
-    some = (np.isnan(start) & ~np.isnan(target)).any(axis=1) & np.isfinite(start).any(axis=1)
-    some &= nominal.kind != Kind.RAPID
-    command = path.starts_mm()
-    play_of: Array | None = None
-    for i in np.flatnonzero(some).tolist():
-        known, at = np.isfinite(start[i]), int(first[i])
-        if at >= len(path) or not np.isfinite(command[at][known]).all():
-            continue
-        if play_of is None:
-            play_of = plays(model, path.end_mm)
-        box, tool = np.array(model.box_mm), path.tool_mm(at, at + 1)
-        most = _MOST_PROBES[int((~known).sum()) - 1]
-        span = np.where(known, 0.0, box[:, 1] - box[:, 0])
-        # where the error bends, and not only at the corners of the box
-        steps = int(steps_needed(model, span[None], tool, bend_mm, at_least=8, at_most=most)[0])
-        ranges = [
-            command[at][axis : axis + 1] if known[axis] else np.linspace(low, high, steps + 1)
-            for axis, (low, high) in enumerate(box.tolist())
-        ]
-        point = np.stack(np.meshgrid(*ranges), axis=-1).reshape(-1, 3)
-        meant = start[i] + target[i] - nominal.end_mm[i]
-        play = None if play_of is None else np.broadcast_to(play_of[max(at - 1, 0)], point.shape)
-        away = point + model.error(point, tool, play) - meant
-        worst[i] = np.fmax(worst[i], np.sqrt(np.nansum(away[:, known] ** 2, axis=1)).max())
-
-
-def _unknown_side(path: Toolpath, groups: Index, model: ErrorModel) -> Array:
-    """(n,) mm: what the unknown play changes at most at the start or at the end of each group of moves. It
-    shrinks with the range that an axis has moved, and is 0 once that range is the backlash."""
-    width = model.backlash_at(path.end_mm) if len(groups) else None
-    if width is None:
-        return np.zeros(len(groups))
-    low, high = play_interval(path.end_mm, width)
-    half = (high - low) / 2
-    half[np.isnan(path.end_mm)] = 0.0
-    rows = np.flatnonzero((half > 0.0).any(axis=1))
-    unknown = np.zeros(len(path))
-    if rows.size:
-        tool = path.tool_mm()
-        tool = tool if tool.ndim == 1 else tool[rows]
-        for axis in range(3):
-            ahead = np.zeros((len(rows), 3))
-            ahead[:, axis] = half[rows, axis]
-            change = model.error(path.end_mm[rows], tool, ahead) - model.error(
-                path.end_mm[rows], tool, -ahead
-            )
-            unknown[rows] += np.linalg.norm(np.nan_to_num(change), axis=1) / 2
-    largest = np.maximum(unknown, np.concatenate((unknown[:1], unknown[:-1])))
-    first = np.concatenate(([0], groups[:-1] + 1))
-    result = np.maximum(largest[groups], largest[np.minimum(first, len(path) - 1)])
-    return np.asarray(result)
+        starts.block(a, b, worst[a:b])
+        if sides is not None:
+            side[a:b] = sides.of(int(groups[a - 1]) + 1 if a else 0, groups[a:b])
+        tell("prove", b / count)
+        a = b
+    return Deviation(waypoint, worst, bend, side)
 
 
 class Tracer:
     """Goes through the nominal moves in blocks, and keeps the play of the axes from block to block."""
 
     def __init__(
-        self, nominal: Toolpath, target: Array, path: Toolpath, groups: Index, model: ErrorModel, bend: float
+        self,
+        nominal: Toolpath,
+        target: TargetRows,
+        path: Toolpath,
+        groups: Index,
+        model: ErrorModel,
+        bend: float,
     ) -> None:
         self.nominal, self.target, self.path, self.groups = nominal, target, path, groups
         self.model, self.bend = model, bend
+        #: the play, and the least and the greatest that are possible
         self.play: Array | None = None
+        self.between: Array | None = None
         self.last: Array | None = None
         self.plays = np.zeros((0, 3))
         #: where the tip is, and how far off, at the end of the moves before
@@ -152,25 +113,34 @@ class Tracer:
         self.clear_mm = clear_length_mm(model, path.tools_mm(), bend)
         self.has_play = model.backlash_at(np.array(model.box_mm).mean(axis=1)[None]) is not None
         #: (n, 3) axes that are unknown at the end of a nominal move, None where there are none
-        blind = np.isnan(target)
+        blind = np.isnan(nominal.end_mm)
         self.blind = blind if blind.any() else None
-        self.nominal_arc = _arc_index(nominal)
-        self.path_arc = _arc_index(path)
 
     @staticmethod
     def trace(path: Toolpath, model: ErrorModel, step_mm: float) -> tuple[Array, Index]:
         """Where the tip really is (m, 3) along a path, every `step_mm`, and the move of each (m,)."""
+        parts = list(Tracer.traced(path, model, step_mm))
+        if not parts:
+            return np.zeros((0, 3)), np.zeros(0, np.int64)
+        return np.concatenate([tip for tip, _ in parts]), np.concatenate([move for _, move in parts])
+
+    @staticmethod
+    def traced(path: Toolpath, model: ErrorModel, step_mm: float) -> Iterator[tuple[Array, Index]]:
+        """The same in parts of whole moves, so that memory is small."""
         tracer = Tracer(path, path.end_mm, path, np.arange(len(path)), model, 1.0)
-        start, end, tool = path.starts_mm(), path.end_mm, path.tool_mm()
-        length = np.nan_to_num(np.sqrt(((end - start) ** 2).sum(axis=1)))
-        arc = tracer.path_arc
+        start, arc = path.starts_mm(), _arc_index(path, 0, len(path))
+        length = np.nan_to_num(np.sqrt(((path.end_mm - start) ** 2).sum(axis=1)))
         rows = np.flatnonzero(arc >= 0)
         if rows.size:
             radius = np.sqrt(np.nansum((start[rows] - path.arcs.centre_mm) ** 2, axis=1))
             length[rows] = np.maximum(length[rows], radius * np.abs(path.arcs.sweep_rad))
         steps = np.maximum(np.ceil(length / step_mm), 1).astype(np.int64)
-        point, part, _ = tracer.points(start, end, arc, steps)
-        return tracer.actual(point, tool if tool.ndim == 1 else tool[part]), part
+        # every part has the moves whose last sample is in the next _BLOCK ones
+        parts = np.flatnonzero(np.diff(np.cumsum(steps) // _BLOCK, prepend=-1))
+        for a, b in pairwise((*parts.tolist(), len(path))):
+            point, part, _ = tracer.points(start[a:b], path.end_mm[a:b], arc[a:b], steps[a:b])
+            tool = path.tool_mm(a, b)
+            yield tracer.actual(point, tool if tool.ndim == 1 else tool[part]), part + a
 
     def points(
         self, start: Array, end: Array, arc: Index, steps: Index, turns: Mask | None = None
@@ -220,7 +190,7 @@ class Tracer:
         delta = np.where(np.isnan(end), 0.0, end - start)
         steps = np.ones(len(end), np.int64)
         known = np.asarray(np.isfinite(delta).all(axis=1))
-        arc = self.path_arc[first:last]
+        arc = _arc_index(path, first, last)
         cut = known & (path.kind[first:last] != Kind.RAPID)
         which = longer(delta, self.clear_mm)
         which = which[cut[which]]
@@ -234,7 +204,9 @@ class Tracer:
             steps[curved] = self._arc_steps(arc[curved], start[curved], delta[curved], tool, curved)
         reached, inner = self._samples(start, end, arc, steps, known, tool, path.kind[first:last])
         # ends of parts inside a nominal move lie along it, too
-        cuts = np.setdiff1d(np.arange(len(end)), ends)
+        inside = np.ones(len(end), bool)
+        inside[ends[ends >= 0]] = False
+        cuts = np.flatnonzero(inside)
         tips = np.concatenate((self.before[None], reached))
         self._ends(a, b, tips, ends, waypoint)
         worst[:] = waypoint
@@ -301,15 +273,18 @@ class Tracer:
 
     def _at(self, start: Array, end: Array, arc: Index, part: Index, share: Array) -> Array:
         """(m, 3) positions on moves at shares of them."""
-        point = start[part] + share[:, None] * (end - start)[part]
-        curved = np.flatnonzero(arc[part] >= 0)
-        if curved.size:
-            arcs, which = self.path.arcs, arc[part[curved]]
-            point[curved] = arc_points(
-                start[part[curved]], end[part[curved]], arcs.centre_mm[which], arcs.plane[which],
-                arcs.sweep_rad[which], share[curved],
-            )  # fmt: skip
-        return np.asarray(point)
+        rows = np.flatnonzero(arc >= 0)
+        if not rows.size:
+            return _between(start, end, part, share)
+        arcs, which = self.path.arcs, arc[rows]
+        shapes = ArcShapes.of(
+            start[rows], end[rows], arcs.centre_mm[which], arcs.plane[which], arcs.sweep_rad[which]
+        )
+        straight, curved, of = _kinds(arc >= 0, part)
+        point = np.empty((len(part), 3))
+        point[curved] = shapes.at(of, share[curved])
+        point[straight] = _between(start, end, part[straight], share[straight])
+        return point
 
     def _start(self) -> Array:
         """(3,) where the tip is before the first move."""
@@ -353,7 +328,9 @@ class Tracer:
             chain = point if self.last is None else np.concatenate((self.last, point))
             width = self.model.backlash_at(chain)
             assert width is not None
-            play = play_states(chain, width, self.play)[len(chain) - len(point) :]
+            low, high = play_interval(chain, width, self.between)
+            self.between = np.stack((low[-1], high[-1]))
+            play = ((low + high) * 0.5)[len(chain) - len(point) :]
             self.last, self.play, self.plays = point[-1:], play[-1], play
         return point + self.model.error(point, tool, play)
 
@@ -370,26 +347,31 @@ class Tracer:
         begin[0] = self.target[a - 1] if a else np.array(nominal.start_mm)
         of = owner[inner.part]
         actual = self._known(a + of, inner.actual)
-        distance = segment_distance(actual, self._known(a + of, begin[of]), self._known(a + of, goal[of]))
-        arc = self.nominal_arc[a:b]
-        rows = np.flatnonzero(arc[of] >= 0)
-        if rows.size:
-            which = arc[of[rows]]
-            arcs = nominal.arcs
-            shift = goal[of[rows]] - nominal.end_mm[a:b][of[rows]]
-            distance[rows] = arc_distance(
-                actual[rows], self._known(a + of[rows], nominal.starts_mm(a, b)[of[rows]] + shift),
-                self._known(a + of[rows], goal[of[rows]]),
-                self._known(a + of[rows], arcs.centre_mm[which] + shift), arcs.plane[which],
-                arcs.sweep_rad[which],
-                self._near(owner, first, inner.part[rows], inner.share[rows], of[rows]),
+        arc = _arc_index(nominal, a, b)
+        rows = np.flatnonzero(arc >= 0)
+        straight, curved, which = _kinds(arc >= 0, of)
+        line = of[straight]
+        distance = np.empty(len(of))
+        distance[straight] = segment_distance(
+            actual[straight], self._known(a + line, begin[line]), self._known(a + line, goal[line])
+        )
+        if curved.size:
+            arcs, move = nominal.arcs, a + rows
+            shift = goal[rows] - nominal.end_mm[move]
+            shapes = ArcShapes.of(
+                self._known(move, nominal.starts_mm(a, b)[rows] + shift), self._known(move, goal[rows]),
+                self._known(move, arcs.centre_mm[arc[rows]] + shift), arcs.plane[arc[rows]],
+                arcs.sweep_rad[arc[rows]],
             )  # fmt: skip
-        np.fmax.at(worst, of, distance)
+            near = self._near(owner, first, inner.part[curved], inner.share[curved], of[curved])
+            distance[curved] = shapes.distance(actual[curved], which, near)
+        # of one kind with the column: else numpy takes ten times as long
+        np.fmax.at(worst, of, distance.astype(np.float32))
 
     def _near(self, owner: Index, first: int, part: Index, share: Array, of: Index) -> Array:
         """Roughly where on its nominal arc each sample lies: by the angles of the arcs that it became."""
         turn = np.zeros(len(owner))
-        arc = self.path_arc[first : first + len(owner)]
+        arc = _arc_index(self.path, first, first + len(owner))
         turn[arc >= 0] = np.abs(self.path.arcs.sweep_rad[arc[arc >= 0]])
         total = np.bincount(owner, turn)
         before = np.cumsum(turn) - turn
@@ -406,7 +388,7 @@ class Tracer:
         departure = segment_distance(
             *(self._known(of, some) for some in (actual, tips[part], tips[part + 1]))
         )
-        np.fmax.at(bend, owner[part], departure)
+        np.fmax.at(bend, owner[part], departure.astype(np.float32))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -430,8 +412,25 @@ class _Inner:
         return self.with_more(_Inner(cuts, np.ones(len(cuts)), reached[cuts]))
 
 
-def _arc_index(path: Toolpath) -> Index:
-    """(n,) index into the arcs of each move, -1 where it is none."""
-    index = np.full(len(path), -1, np.int64)
-    index[path.arcs.move] = np.arange(len(path.arcs))
+def _kinds(on_arc: Mask, of: Index) -> tuple[Index, Index, Index]:
+    """Which samples of moves `of` are on straight moves, which are on arcs, and the index of the arc of these
+    among the moves that are arcs."""
+    mine = on_arc[of]
+    curved = np.flatnonzero(mine)
+    return np.flatnonzero(~mine), curved, (np.cumsum(on_arc) - 1)[of[curved]]
+
+
+def _arc_index(path: Toolpath, first: int, last: int) -> Index:
+    """(m,) index into the arcs of each of moves `first`..`last`, -1 where it is none."""
+    index = np.full(last - first, -1, np.int64)
+    some = path.arcs.within(first, last)
+    index[path.arcs.move[some] - first] = np.arange(some.start, some.stop)
     return index
+
+
+def _between(start: Array, end: Array, part: Index, share: Array) -> Array:
+    """(m, 3) points at shares of straight parts."""
+    point = (end - start).take(part, axis=0)
+    point *= share[:, None]
+    point += start.take(part, axis=0)
+    return np.asarray(point)

@@ -7,16 +7,17 @@ program are groups of rows. Nothing else decides whether a program is within tol
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Array, Index, Mask
+from olp.core.arrays import Array, Index, Mask, distinct
 from olp.core.toolpath import Toolpath
 from olp.core.units import UM_PER_MM
+from olp.core.values import dataclass
 from olp.findings.catalogue import Finding
 from olp.findings.rule import Severity
 from olp.proof.measured import ABOVE, SHOWN, WITHIN, Measured
@@ -26,6 +27,10 @@ Single = npt.NDArray[np.float32]
 
 #: A probability from here on is enough: two standard deviations on both sides.
 ENOUGH = 0.95
+#: Moves that are looked at together.
+_BLOCK = 1 << 14
+#: Moves that are looked at for each line that is wanted, and so many times more where they are on few lines.
+_FEW = 16
 #: What the reasons of rows are called.
 REASONS = {
     Counts.FEED: "feed", Counts.POINT: "point", Counts.HOLE: "hole", Counts.RAPID: "rapid",
@@ -85,6 +90,27 @@ class Judgements:
         rows = self.judged if which is None else self.judged & which
         return float(np.nan_to_num(self.corrected[rows]).max(initial=0.0))
 
+    def worst_lines(self, count: int) -> Index:
+        """So many lines, or some more, with moves that count: those that are farthest off when corrected are
+        among them. All where there are fewer."""
+        rows = np.flatnonzero(self.judged)
+        size = -np.nan_to_num(self.corrected[rows])
+        some = _FEW * count
+        while some < len(rows):
+            lines = distinct(self.line[rows[size <= np.partition(size, some)[some]]])
+            if len(lines) >= count:
+                return lines
+            some *= _FEW
+        return distinct(self.line[rows])
+
+    def on_lines(self, lines: Index) -> Judgements:
+        """The rows of these lines alone, without measured runs."""
+        rows = np.flatnonzero(np.isin(self.line, lines))
+        return Judgements(
+            self.line[rows], self.tool[rows], self.operation[rows], self.counts[rows],
+            self.uncorrected[rows], self.corrected[rows], self.tolerance_mm, self.allowed_mm,
+        )  # fmt: skip
+
     def by_line(self) -> dict[str, npt.NDArray[Any]]:
         """Of each line that moves: `line`, and of each layer the largest deviation of what counts on it, else
         of what is shown, and its state: 0 within, 1 above, 2 shown and not judged. `uncorrected_um` and
@@ -109,19 +135,24 @@ class Judgements:
     def groups(self, of: Index) -> list[dict[str, Any]]:
         """Largest deviations and verdict of the moves that count of each value of `of` (n,), in order of
         appearance."""
-        rows = np.flatnonzero(self.judged)
-        values, begin, group = np.unique(of[rows], return_index=True, return_inverse=True)
-        worst = np.zeros(len(values), np.int64)
-        # the last of each group is the one with the largest deviation, the first of them where several are
-        ranked = np.lexsort((-rows, np.nan_to_num(self.corrected[rows]), group))
-        worst[group[ranked]] = rows[ranked]
-        line = self.line[rows]
-        first, last = np.full(len(values), line.max(initial=0)), np.zeros(len(values), np.int64)
-        np.minimum.at(first, group, line)
-        np.maximum.at(last, group, line)
-        uncorrected = np.zeros(len(values))
-        np.fmax.at(uncorrected, group, self.uncorrected[rows])
-        over = np.bincount(group, self.over[rows], len(values)) > 0
+        values = distinct(of[self.judged])
+        count = len(values)
+        begin, worst = np.full(count, len(of)), np.full(count, len(of))
+        first, last = np.full(count, self.line.max(initial=0)), np.zeros(count, np.int64)
+        largest, uncorrected, over = np.zeros(count, np.float32), np.zeros(count), np.zeros(count, bool)
+        for rows in self._judged_rows():
+            group = np.searchsorted(values, of[rows])
+            np.minimum.at(begin, group, rows)
+            np.maximum.at(largest, group, np.nan_to_num(self.corrected[rows]))
+            np.minimum.at(first, group, self.line[rows])
+            np.maximum.at(last, group, self.line[rows])
+            np.fmax.at(uncorrected, group, self.uncorrected[rows])
+        for rows in self._judged_rows():
+            group, size = np.searchsorted(values, of[rows]), np.nan_to_num(self.corrected[rows])
+            # the first of each group with the largest deviation
+            top = size == largest[group]
+            np.minimum.at(worst, group[top], rows[top])
+            over[group[size > self.allowed_mm]] = True
         return [
             {
                 "first_line": int(first[k]),
@@ -134,6 +165,11 @@ class Judgements:
             }
             for k in np.argsort(begin).tolist()
         ]
+
+    def _judged_rows(self) -> Iterator[Index]:
+        """The rows of moves that count, in blocks."""
+        for a in range(0, len(self.line), _BLOCK):
+            yield a + np.flatnonzero(self.judged[a : a + _BLOCK])
 
     def report(self) -> dict[str, Any]:
         """The table by groups, as plain data."""
@@ -158,9 +194,10 @@ def groups_of(path: Toolpath) -> tuple[Index, Index]:
     keys = list(zip(numbers.tolist(), offsets, strict=True))
     # frames of the same key have the number of the first of them
     first = {key: k for k, key in reversed(list(enumerate(keys)))}
-    number = np.array([first[key] for key in keys])[path.frame] if len(path.frames) else path.frame
-    operation = np.cumsum(np.diff(number, prepend=number[:1]) != 0) if len(number) else number
-    return numbers[path.frame].astype(np.int64), operation.astype(np.int64)
+    number = np.array([first[key] for key in keys], np.int32)[path.frame] if len(path.frames) else path.frame
+    operation = np.zeros(len(number), np.int64)
+    np.cumsum(number[1:] != number[:-1], out=operation[1:])
+    return np.asarray(numbers[path.frame], np.int64), operation
 
 
 def _measured_columns(

@@ -11,11 +11,13 @@ import numpy as np
 
 from olp.core.arrays import Index, Mask
 from olp.core.errors import ProgramError
-from olp.core.toolpath import Flag, Kind
+from olp.core.toolpath import Flag, Kind, Toolpath
 from olp.program.program import Program
 
 #: Moves that the program or you leave as they are.
 _AWAY = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE)
+#: Nominal moves that are looked at together.
+_BLOCK = 1 << 14
 #: Digits by which a command that is left alone may differ: offsets and inches may round otherwise.
 _DIGITS = 0.6
 
@@ -24,29 +26,37 @@ def check_kinds(nominal: Program, corrected: Program, groups: Index, digit_mm: f
     """Raise ProgramError with the line of the nominal program where a move of the corrected one is not what
     the nominal one has there. `groups` (n,) is the last corrected move of each nominal one, `digit_mm` the
     coarsest last digit of the corrected program."""
-    for wrong, text in _changes(nominal, corrected, groups, digit_mm):
-        if not wrong.any():
-            continue
-        other = int(np.argmax(wrong))
-        move = int(np.searchsorted(groups, other))
-        raise ProgramError(
-            f"line {int(corrected.toolpath.line[other])} of the corrected program {text}; it is not a "
-            "correction of this program; correct the nominal program again",
-            line=int(nominal.toolpath.line[move]),
-            code="OLP562",
-        )
+    # the strokes of a hole are compared as one where both programs have the same holes
+    whole = len(nominal.holes) == len(corrected.holes)
+    drilled = [p.holes.inside(len(p.toolpath)) & whole for p in (nominal, corrected)]
+    begin = 0
+    for a in range(0, len(groups), _BLOCK):
+        here = groups[a : a + _BLOCK]
+        end = int(here[-1]) + 1
+        path, written = nominal.toolpath.part(a, a + len(here)), corrected.toolpath.part(begin, end)
+        holes = drilled[0][a : a + len(here)], drilled[1][begin:end]
+        for wrong, text in _changes(path, written, here - begin, *holes, digit_mm):
+            if wrong.any():
+                _refuse(path, written, here - begin, int(np.argmax(wrong)), text)
+        begin = end
+
+
+def _refuse(path: Toolpath, written: Toolpath, groups: Index, move: int, text: str) -> None:
+    raise ProgramError(
+        f"line {int(written.line[move])} of the corrected program {text}; it is not a correction of this "
+        "program; correct the nominal program again",
+        line=int(path.line[np.searchsorted(groups, move)]),
+        code="OLP562",
+    )
 
 
 def _changes(
-    nominal: Program, corrected: Program, groups: Index, digit_mm: float
+    path: Toolpath, written: Toolpath, groups: Index, drilled: Mask, in_hole: Mask, digit_mm: float
 ) -> Iterator[tuple[Mask, str]]:
-    """(m,) moves of the corrected program that are not allowed, and what is wrong with them."""
-    path, written = nominal.toolpath, corrected.toolpath
+    """(m,) moves `written` that are not allowed, and what is wrong with them. (n,) `drilled` and (m,)
+    `in_hole` are moves of holes that are compared as one."""
     owner = np.searchsorted(groups, np.arange(len(written)))
-    # the strokes of a hole are compared as one where both programs have the same holes
-    whole = len(nominal.holes) == len(corrected.holes)
-    in_hole = _in_holes(corrected) if whole else np.zeros(len(written), bool)
-    of_hole = _in_holes(nominal)[owner] if whole else in_hole
+    of_hole = drilled[owner]
     yield in_hole & ~of_hole, "drills where the nominal program does not"
     rapid, was_rapid = written.kind == Kind.RAPID, path.kind[owner] == Kind.RAPID
     feed = "cuts or touches where the nominal program moves rapidly"
@@ -56,32 +66,25 @@ def _changes(
     touches = written.kind == Kind.PROBE
     yield touches & (path.kind[owner] != Kind.PROBE), "touches where the nominal program does not"
     last = np.zeros(len(written), bool)
-    last[groups] = True
+    # one without moves ends with those before
+    last[groups[groups >= 0]] = True
     known, was_known = np.isfinite(written.end_mm), np.isfinite(path.end_mm[owner])
     # where an axis is after a move of the control alone depends on the words behind it
     own = (path.flag[owner] & np.uint8(Flag.CONTROL)) != 0
     unlike = (known != was_known).any(axis=1) & ~in_hole & ~own
     yield last & unlike, "ends where another axis is known than in the nominal program"
-    moved = _moved(nominal, corrected, groups, owner, digit_mm)
+    moved = _moved(path, written, groups, owner, digit_mm)
     yield last & moved, "changes a move that is left uncorrected"
 
 
-def _in_holes(program: Program) -> Mask:
-    """(m,) the moves of canned cycles for holes."""
-    inside = np.zeros(len(program.toolpath), bool)
-    for hole in program.holes:
-        inside[hole.first : hole.last] = True
-    return inside
-
-
-def _moved(nominal: Program, corrected: Program, groups: Index, owner: Index, digit_mm: float) -> Mask:
+def _moved(path: Toolpath, written: Toolpath, groups: Index, owner: Index, digit_mm: float) -> Mask:
     """(m,) moves of the corrected program that command neither the end nor the distance that the nominal one
     has for an axis of a move that is never corrected."""
-    path, written = nominal.toolpath, corrected.toolpath
     away = np.asarray((path.flag[owner] & _AWAY) != 0)
     if not away.any():
         return away
     end = np.abs(written.end_mm - path.end_mm[owner])
-    begin = written.starts_mm()[np.concatenate(([0], groups[:-1] + 1))][owner]
+    first = np.minimum(np.concatenate(([0], groups[:-1] + 1)), len(written) - 1)
+    begin = written.starts_mm()[first][owner]
     distance = np.abs((written.end_mm - begin) - (path.end_mm - path.starts_mm())[owner])
     return np.asarray(away & (np.fmin(end, distance) > _DIGITS * digit_mm).any(axis=1))

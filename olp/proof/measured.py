@@ -7,13 +7,13 @@ operation or tool comes from here.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Array, Index, Mask
+from olp.core.values import dataclass
 
 #: Number of lines with the largest deviations in a report.
 _WORST = 10

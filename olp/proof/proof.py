@@ -3,18 +3,19 @@ the nominal path, at and between the waypoints."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
 import numpy.typing as npt
 
-from olp.compensation.plan import targets, zero_shifts
+from olp.compensation.plan import Targets, zero_shifts
 from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES
+from olp.core.progress import Progress, part, silent
 from olp.core.toolpath import Flag, Kind, Toolpath
 from olp.core.units import UM_PER_MM
+from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
 from olp.program.program import Program
 from olp.proof.contour import check_contours
@@ -31,6 +32,10 @@ ROUNDING_SHARE = 0.87
 _NEAR_DIGITS = 0.6
 #: ... and within this share of the tolerance beyond, the band in which an axis may lag, is its partner.
 _NEAR_SHARE = 0.25
+#: Moves that are looked at together.
+_BLOCK = 1 << 14
+#: (3, 3) axes of each plane: first, second, third.
+_AXES = np.array(PLANES)
 #: Moves that the program or you leave as they are.
 _AWAY = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE)
 
@@ -92,6 +97,14 @@ class Proof:
         """(m,) the nominal move that each move of the corrected program belongs to."""
         return np.searchsorted(self.groups, np.arange(len(self.written)))
 
+    def nominal_lines(self) -> npt.NDArray[np.int32]:
+        """(m,) the nominal line of each move of the corrected program."""
+        line = np.empty(len(self.written), np.int32)
+        for a in range(0, len(line), _BLOCK):
+            part = line[a : a + _BLOCK]
+            part[:] = self.nominal.line[np.searchsorted(self.groups, np.arange(a, a + len(part)))]
+        return line
+
     @property
     def holds(self) -> bool:
         return self.largest_mm <= self.allowed_mm
@@ -129,24 +142,26 @@ def prove(
     tolerance_mm: float,
     digit_mm: float,
     uncorrected: Index,
+    tell: Progress = silent,
 ) -> Proof:
     """Compare the corrected path with the nominal one, from the two programs alone. `uncorrected` are nominal
     moves that are left uncorrected. Raises ProgramError where the second is not a correction of the first, or
     where the control would refuse it."""
     path, written = nominal.toolpath, corrected.toolpath
-    target = targets(path, zero_shifts(path.frames, model))
+    target = Targets(path, zero_shifts(path.frames, model))
     exempt = np.zeros(len(path), bool)
     exempt[uncorrected] = True
     near = _NEAR_DIGITS * digit_mm + _NEAR_SHARE * tolerance_mm
-    groups = match(nominal, target, corrected, model, near)
+    groups = match(nominal, target, corrected, model, near, part(tell, 0.1, 0.4))
     check_kinds(nominal, corrected, groups, digit_mm)
     check_contours(path, written, groups)
     bend = tolerance_mm * _BEND_SHARE
-    how = _how(nominal, target)
+    how = _how(nominal)
     counts = _counts(path, how, exempt)
     sides = []
-    for program, ends in ((nominal, np.arange(len(path))), (corrected, groups)):
-        deviation = measure(path, target, program.toolpath, ends, model, bend)
+    for begin, program, ends in ((0.4, nominal, np.arange(len(path))), (0.7, corrected, groups)):
+        told = part(tell, begin, begin + 0.3)
+        deviation = measure(path, target, program.toolpath, ends, model, bend, told)
         strokes = strokes_mm(nominal, target, program.toolpath, program.holes, model, bend)
         size = np.where(counts <= Counts.LEFT, _sizes(deviation, how, *strokes), np.float32(np.nan))
         sides.append((deviation, size))
@@ -164,21 +179,40 @@ def prove(
 def corrections_mm(nominal: Program, corrected: Program, proof: Proof) -> Array:
     """(n, 3) how far each waypoint was moved, 0 where that is not known; of canned cycles the position and
     the bottom of each hole, as a corrected depth may need other pecks."""
-    correction = np.nan_to_num(proof.written.end_mm[proof.groups] - proof.nominal.end_mm)
-    correction[(proof.nominal.flag & np.uint8(Flag.CYCLE | Flag.CONTROL)) != 0] = 0.0
-    for mine, other in zip(nominal.holes, corrected.holes, strict=False):
-        moved = [b - a for a, b in zip(mine.place_mm, other.place_mm, strict=True)]
-        correction[mine.last - 1, PLANES[mine.plane]] = (*moved, other.z_mm - mine.z_mm)
-    return np.asarray(correction)
+    correction = _moved(proof, 0, len(proof.nominal))
+    mine, moved = nominal.holes, _holes_moved(nominal, corrected)
+    some = slice(len(moved))
+    correction[mine.last[some, None] - 1, _AXES[mine.plane[some]]] = moved
+    return correction
 
 
 def largest_correction_mm(nominal: Program, corrected: Program, proof: Proof) -> float:
     """The largest distance of the commands from the nominal path."""
-    away = corrections_mm(nominal, corrected, proof)
-    return float(np.sqrt(np.einsum("ij,ij->i", away, away).max(initial=0.0)))
+    count = len(proof.nominal)
+    parts = (_longest(_moved(proof, a, min(a + _BLOCK, count))) for a in range(0, count, _BLOCK))
+    return max(_longest(_holes_moved(nominal, corrected)), max(parts, default=0.0))
 
 
-def _how(program: Program, target: Array) -> npt.NDArray[np.uint8]:
+def _longest(vectors: Array) -> float:
+    return float(np.sqrt(np.einsum("ij,ij->i", vectors, vectors).max(initial=0.0)))
+
+
+def _moved(proof: Proof, a: int, b: int) -> Array:
+    """(b - a, 3) how far the waypoints of nominal moves a..b were moved, 0 of canned cycles."""
+    correction = np.nan_to_num(proof.written.end_mm[proof.groups[a:b]] - proof.nominal.end_mm[a:b])
+    correction[(proof.nominal.flag[a:b] & np.uint8(Flag.CYCLE | Flag.CONTROL)) != 0] = 0.0
+    return np.asarray(correction)
+
+
+def _holes_moved(nominal: Program, corrected: Program) -> Array:
+    """(h, 3) how far the position and the bottom of each hole were moved, along the axes of its plane."""
+    mine, other = nominal.holes, corrected.holes
+    some = slice(min(len(mine), len(other)))
+    moved = other.place_mm[some] - mine.place_mm[some], (other.z_mm[some] - mine.z_mm[some])[:, None]
+    return np.asarray(np.hstack(moved))
+
+
+def _how(program: Program) -> npt.NDArray[np.uint8]:
     """(n,) how each nominal move would count if it were corrected."""
     path = program.toolpath
     cutting = cutting_moves(path)
@@ -188,7 +222,7 @@ def _how(program: Program, target: Array) -> npt.NDArray[np.uint8]:
     how[~cutting & (points | (path.kind != Kind.RAPID))] = Counts.POINT
     cycle = (path.flag & np.uint8(Flag.CYCLE)) != 0
     how[cycle] = np.where(path.kind[cycle] == Kind.RAPID, Counts.RAPID, Counts.HOLE)
-    unknown = np.isnan(target)
+    unknown = np.isnan(path.end_mm)
     how[unknown.all(axis=1) & (how <= Counts.HOLE)] = Counts.UNKNOWN
     how[unknown.any(axis=1) & (how == Counts.HOLE)] = Counts.UNKNOWN
     return how
@@ -199,7 +233,10 @@ def _counts(path: Toolpath, how: npt.NDArray[np.uint8], exempt: Mask) -> npt.NDA
     away = ((path.flag & _AWAY) != 0) | exempt
     own = (path.flag & np.uint8(Flag.CONTROL)) != 0
     left = (how <= Counts.HOLE) & (path.kind != Kind.RAPID) & ~own
-    return np.where(away, np.where(left, Counts.LEFT, Counts.UNCORRECTED), how).astype(np.uint8)
+    counts = how.copy()
+    counts[away & left] = Counts.LEFT
+    counts[away & ~left] = Counts.UNCORRECTED
+    return counts
 
 
 def _refuse_blind(path: Toolpath, blind: Mask) -> None:

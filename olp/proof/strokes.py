@@ -10,14 +10,18 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from olp.compensation.plan import TargetRows
 from olp.core.arrays import Array, Index
 from olp.core.geometry import PLANES, segment_distance
 from olp.core.toolpath import Kind, Toolpath
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.reversal import play_after, plays
 from olp.errormodel.sampling import steps_needed
-from olp.program.program import Hole, Program
+from olp.program.holes import Holes
+from olp.program.program import Program
 
+#: (3, 3) axes of each plane: first, second, third.
+_AXES = np.array(PLANES)
 Single = npt.NDArray[np.float32]
 #: Most steps of a stroke: an error that bends more often than that along a hole is no error of an axis.
 _MOST_STEPS = 1 << 8
@@ -26,21 +30,17 @@ _PAST_MM = 1e-6
 
 
 def strokes_mm(
-    nominal: Program, target_mm: Array, path: Toolpath, holes: tuple[Hole, ...], model: ErrorModel,
+    nominal: Program, target_mm: TargetRows, path: Toolpath, holes: Holes, model: ErrorModel,
     bend_mm: float,
 ) -> tuple[Index, Single]:  # fmt: skip
     """(h,) the nominal move that reaches the bottom of each hole, and (h,) mm, the largest deviation of the
     feed strokes of `holes` of `path` from the nominal hole; NaN where a position is unknown."""
     count = len(nominal.holes)
     worst = np.full(count, np.nan, np.float32)
-    move = np.zeros(count, np.int64)
     if not count or len(holes) != count:
-        return move[:0], worst[:0]
-    top, bottom = np.zeros((count, 3)), np.zeros((count, 3))
-    for k, hole in enumerate(nominal.holes):
-        move[k], top[k], bottom[k] = _axis(nominal.toolpath, target_mm, hole)
-    which = np.repeat(np.arange(count), [h.last - h.first for h in holes])
-    rows = np.concatenate([np.arange(h.first, h.last) for h in holes])
+        return np.zeros(0, np.int64), worst[:0]
+    move, top, bottom = _axes(nominal.toolpath, target_mm, nominal.holes)
+    rows, which = holes.moves()
     feed = path.kind[rows] != Kind.RAPID
     which, rows = which[feed], rows[feed]
     if not rows.size:
@@ -60,20 +60,24 @@ def strokes_mm(
     return move, worst
 
 
-def _axis(path: Toolpath, target: Array, hole: Hole) -> tuple[int, Array, Array]:
-    """The move that reaches the bottom, and the ends of the hole's axis where its strokes are, targets."""
-    axis = PLANES[hole.plane][2]
-    some = np.arange(hole.first, hole.last)
-    strokes = some[path.kind[some] != Kind.RAPID]
+def _axes(path: Toolpath, target: TargetRows, holes: Holes) -> tuple[Index, Array, Array]:
+    """(h,) the move that reaches the bottom of each hole, and (h, 3) the ends of the hole's axis where its
+    strokes are, targets."""
+    count = len(holes)
+    axis = _AXES[holes.plane, 2]
+    move, hole = holes.moves()
+    feed = path.kind[move] != Kind.RAPID
     # the rapid before the first stroke may end at the bottom, too
-    at_bottom = strokes[np.abs(path.end_mm[strokes, axis] - hole.z_mm) < 1e-9]
-    move = int(at_bottom[0]) if at_bottom.size else int(some[-1])
-    bottom = target[move].copy()
-    top = bottom.copy()
-    side = 1.0 if hole.r_mm >= hole.z_mm else -1.0
-    levels = np.append(target[strokes, axis], bottom[axis] + hole.r_mm - hole.z_mm)
-    top[axis] = side * np.nanmax(side * levels)
-    return move, top, bottom
+    at_bottom, _ = holes.ends(feed & (np.abs(path.end_mm[move, axis[hole]] - holes.z_mm[hole]) < 1e-9))
+    reached = np.where(at_bottom >= 0, at_bottom, holes.last - 1)
+    bottom = target[reached]
+    top, row = bottom.copy(), np.arange(count)
+    side = np.where(holes.r_mm >= holes.z_mm, 1.0, -1.0)
+    highest = side * (bottom[row, axis] + holes.r_mm - holes.z_mm)
+    of = hole[feed]
+    np.fmax.at(highest, of, side[of] * target[move[feed]][np.arange(len(of)), axis[of]])
+    top[row, axis] = side * highest
+    return reached, top, bottom
 
 
 def _tips(path: Toolpath, rows: Index, model: ErrorModel, bend_mm: float) -> tuple[Array, Index]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import datetime
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -17,6 +16,7 @@ from olp.calibration.iso230.positioning import Evaluation, scale_of
 from olp.calibration.observations.lines import Line, LineState
 from olp.core.arrays import Array
 from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM
+from olp.core.values import dataclass
 from olp.errormodel.calibration import Calibration
 from olp.findings.catalogue import RULES, Finding
 from olp.reports.document import Block, Document, Grid, Notice, Pairs, Paragraph, Plot, Section

@@ -6,7 +6,6 @@ import csv
 import io
 import json
 import os
-import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import PurePath
 from typing import Any
@@ -17,9 +16,9 @@ from olp.core.errors import InputError
 from olp.core.version import __version__
 from olp.findings.catalogue import GATE_CODES, RULES
 from olp.findings.rule import Rule, Severity
+from olp.reports import shown
 from olp.reports.refusals import refusals_text
 from olp.reports.report import (
-    WIDTH,
     Report,
     cell,
     findings_text,
@@ -29,6 +28,7 @@ from olp.reports.report import (
     printable,
     table,
     to_json,
+    wrapped,
 )
 
 #: Level of SARIF by severity.
@@ -71,7 +71,7 @@ def _clearance(report: Report) -> Iterator[str]:
     blocks = report.get("clearance") or ()
     if not blocks:
         return
-    yield "Least clearance in mm, point in the frame of the mesh"
+    yield shown.title("Least clearance in mm, point in the frame of the mesh")
     rows = [
         [
             place(b), b["part"], printable(b["mesh"]), number(b["clearance_mm"], 3),
@@ -79,12 +79,11 @@ def _clearance(report: Report) -> Iterator[str]:
         ]
         for b in sorted(blocks, key=lambda b: b["clearance_mm"])[:_NEAREST]
     ]  # fmt: skip
-    yield from table(["line", "part", "mesh", "clearance", "point"], rows, text_columns=3)
+    yield from table(["line", "part", "mesh", "clearance", "point"], rows, text_columns=3, unit="mm")
 
 
 def _verdict(report: Report, fail_on: str) -> Iterator[str]:
-    for sentence in (report.get("verdict") or {}).get("sentences") or ():
-        yield from textwrap.wrap(sentence, WIDTH)
+    yield from wrapped((report.get("verdict") or {}).get("sentences") or ())
     failing = failures(report, fail_on)
     if report.get("refused"):
         yield "NO GO: the program is refused, so nothing else was checked."
@@ -117,6 +116,8 @@ def to_sarif(report: Report, fail_on: str) -> str:
             }
         },
         "columnKind": "unicodeCodePoints",
+        # one id a program: services merge or refuse runs of one tool that have the same
+        "automationDetails": {"id": f"olp check/{_uri(path)}/"},
         "results": [_sarif_result(f, report["rules"], path) for f in report["findings"]],
         "invocations": [{"executionSuccessful": not refused, "exitCode": _exit_code(report, fail_on)}],
     }

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-import textwrap
 from collections.abc import Iterator
 from typing import Any
 
+from olp.reports import shown
 from olp.reports.report import (
     MEASURED_BOTH,
-    WIDTH,
     Report,
     findings_text,
     measured_sides,
@@ -19,6 +18,7 @@ from olp.reports.report import (
     printable,
     shortened,
     table,
+    wrapped,
 )
 
 #: Titles of figures across the path of a group of runs, with their keys in the report.
@@ -106,14 +106,13 @@ def _frame(report: Report) -> Iterator[str]:
     x, y, z = frame["shift_mm"]
     a, b, c = frame["angles_deg"]
     yield "Best-fit frame, measured to nominal"
-    yield f"  shift in mm {x:.4f}, {y:.4f}, {z:.4f}; turn A, B, C in deg {a:.6f}, {b:.6f}, {c:.6f}"
+    yield shown.prose(f"  shift {x:.4f}, {y:.4f}, {z:.4f} mm; turn A, B, C in deg {a:.6f}, {b:.6f}, {c:.6f}")
     if absorbed := absorbed_by_fit(frame):
-        yield from textwrap.wrap(absorbed, WIDTH, initial_indent="  ", subsequent_indent="  ")
+        yield from wrapped([absorbed], "  ", "  ")
 
 
 def _verdict(report: Report) -> Iterator[str]:
-    for sentence in (report.get("verdict") or {}).get("sentences") or ():
-        yield from textwrap.wrap(sentence, WIDTH)
+    yield from wrapped((report.get("verdict") or {}).get("sentences") or ())
 
 
 def _before_after(report: Report) -> Iterator[str]:
@@ -121,12 +120,12 @@ def _before_after(report: Report) -> Iterator[str]:
     if not rows:
         return
     if report.get("before"):
-        yield "Uncorrected and corrected, in um"
+        yield shown.title("Uncorrected and corrected, in um")
         cells = [[title, number(a), number(b), change(a, b)] for title, a, b in rows]
-        yield from table(["", *MEASURED_BOTH.values(), ""], cells)
+        yield from table(["", *MEASURED_BOTH.values(), ""], cells, unit="um")
     else:
-        yield "Measured, in um"
-        yield from table(["", ""], [[title, number(b)] for title, _, b in rows])
+        yield shown.title("Measured, in um")
+        yield from table(["", ""], [[title, number(b)] for title, _, b in rows], unit="um")
 
 
 def _runs(report: Report) -> Iterator[str]:
@@ -142,9 +141,11 @@ def _runs(report: Report) -> Iterator[str]:
         for row in (report.get(name) or {}).get("runs") or ()
     ]  # fmt: skip
     if rows:
-        yield "Runs, in um; normal is level and to the left of travel, binormal points up from it"
+        yield shown.title(
+            "Runs, in um; normal is level and to the left of travel, binormal points up from it"
+        )
         header = ["", "", "points", "max", "rms", "normal", "binormal", "n rms", "b rms"]
-        yield from table(header, rows, text_columns=2)
+        yield from table(header, rows, text_columns=2, unit="um")
 
 
 def _poses(report: Report) -> Iterator[str]:
@@ -152,12 +153,12 @@ def _poses(report: Report) -> Iterator[str]:
         poses = (report.get(name) or {}).get("poses") or ()
         if not poses:
             continue
-        yield f"Poses, {side}, in um"
+        yield shown.title(f"Poses, {side}, in um")
         rows = [
             [printable(str(p["name"])), number(p["AP_um"]), number(p["RP_um"]), *map(number, p["bias_um"])]
             for p in poses[:_MAX_ROWS]
         ]
-        yield from table(["", "AP", "RP", "X", "Y", "Z"], rows)
+        yield from table(["", "AP", "RP", "X", "Y", "Z"], rows, unit="um")
         if len(poses) > _MAX_ROWS:
             yield f"  and {len(poses) - _MAX_ROWS} more"
 
@@ -167,9 +168,10 @@ def _worst(report: Report) -> Iterator[str]:
     if not worst:
         return
     texts = {place(row): printable(row["text"]) for row in report.get("worst") or ()}
-    yield "Lines with the largest deviation, in um"
+    yield shown.title("Lines with the largest deviation, in um")
     rows = [
         [place(row), number(row["max_um"]), shortened(texts.get(place(row), ""), 60)] for row in worst[:5]
     ]
-    for line in table(["line", "max", ""], [[a, b, ""] for a, b, _ in rows], text_columns=0):
+    cells = [[a, b, ""] for a, b, _ in rows]
+    for line in table(["line", "max", ""], cells, text_columns=0, unit="um"):
         yield f"{line}  {rows.pop(0)[2]}".rstrip() if line.split()[0] != "line" else line

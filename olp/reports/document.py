@@ -7,11 +7,14 @@ from __future__ import annotations
 
 import html
 import re
+import urllib.parse
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field, replace
 from itertools import zip_longest
 from pathlib import Path
 
+from olp.core.values import dataclass
+from olp.reports import shown
 from olp.reports.report import printable
 
 
@@ -28,11 +31,24 @@ class Pairs:
 
 
 @dataclass(frozen=True, slots=True)
+class Link:
+    """The text of a cell, and the file that it leads to: a path from the folder of the document, with `/`."""
+
+    text: str
+    path: str
+
+    @property
+    def address(self) -> str:
+        """The path as an address."""
+        return urllib.parse.quote(self.path, errors="surrogateescape")
+
+
+@dataclass(frozen=True, slots=True)
 class Grid:
     """A table; the first `text_columns` columns are text."""
 
     header: Sequence[str]
-    rows: Sequence[Sequence[str]]
+    rows: Sequence[Sequence[str | Link]]
     text_columns: int = 1
     code: int | None = None  # a column that holds text of a program
     aside: int | None = None  # a column that begins a second table beside the first
@@ -109,6 +125,7 @@ td { border-bottom: .5pt solid var(--line); }
 th.l, td.l { text-align: left; } th.aside, td.aside { padding-left: 12mm; } th:first-child,
   td:first-child { padding-left: 0; }
 tr, table.short { break-inside: avoid; }
+a { color: inherit; }
 td.code, dd.code { font: 7.5pt/1.6 "DejaVu Sans Mono", Consolas, monospace; overflow-wrap: anywhere; }
 dd.code { padding-top: .4mm; }
 p.lead { break-after: avoid; }
@@ -130,6 +147,7 @@ footer { color: var(--soft); font-size: 8pt; border-top: .5pt solid var(--line);
 
 def to_html(document: Document) -> bytes:
     """One page that loads nothing: its policy forbids it to the browser."""
+    document = as_shown(document)
     policy = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
     parts = [
         "<!DOCTYPE html>", '<html lang="en"><head><meta charset="utf-8">',
@@ -151,6 +169,44 @@ def to_html(document: Document) -> bytes:
     return ("\n".join(parts) + "\n").encode()
 
 
+def as_shown(document: Document) -> Document:
+    """The document in the units that are shown. Plots and findings keep theirs."""
+    verdict = document.verdict
+    return replace(
+        document,
+        verdict=None if verdict is None else (verdict[0], shown.prose(verdict[1])),
+        sections=[_shown(section) for section in document.sections],
+    )
+
+
+def _shown(section: Section) -> Section:
+    blocks: list[Block] = []
+    unit = shown.unit_in(section.title)
+    for block in section.blocks:
+        if isinstance(block, Paragraph):
+            unit = shown.unit_in(block.text.rstrip(":")) or shown.unit_in(section.title)
+            blocks.append(Paragraph(shown.title(shown.prose(block.text))))
+        elif isinstance(block, Pairs):
+            rows = [(shown.title(a), shown.value(b, shown.unit_in(a))) for a, b in block.rows]
+            blocks.append(Pairs(rows))
+        elif isinstance(block, Grid):
+            blocks.append(_grid(block, unit))
+        else:
+            blocks.append(block)
+    return Section(shown.title(section.title), blocks, section.level)
+
+
+def _grid(grid: Grid, unit: str | None) -> Grid:
+    texts = [[cell.text if isinstance(cell, Link) else cell for cell in row] for row in grid.rows]
+    header, lengths = shown.cells(grid.header, texts, unit, grid.text_columns)
+    rows: list[list[str | Link]] = []
+    for before, row in zip(grid.rows, lengths, strict=True):
+        # a link is a name, and the text of a program is no sentence
+        kept = (isinstance(cell, Link) or k == grid.code for k, cell in enumerate(before))
+        rows.append([a if keep else b for a, b, keep in zip(before, row, kept, strict=True)])
+    return replace(grid, header=header, rows=rows)
+
+
 def in_form(document: Document, name: str) -> bytes:
     """As HTML or as Markdown, by the ending of the file's name."""
     return to_html(document) if Path(name).suffix.lower() == ".html" else to_markdown(document)
@@ -158,6 +214,7 @@ def in_form(document: Document, name: str) -> bytes:
 
 def to_markdown(document: Document) -> bytes:
     """The same without plots and their captions."""
+    document = as_shown(document)
     lines = [f"# {_mark(document.title)}", "", _mark(document.subtitle), ""]
     if document.verdict is not None:
         lines += [f"**{_mark(document.verdict[1])}**", ""]
@@ -204,18 +261,28 @@ def _html(block: Block, after: Block | None) -> str:
             f"<span>({severity})</span><br>{message}<br><span>{remedy}</span></div>"
         )
 
-    def row(cells: Sequence[str], tag: str) -> str:
+    def row(cells: Sequence[str | Link], tag: str) -> str:
         html_cells = []
         for column, cell in enumerate(cells):
             kind = "l" if column < block.text_columns or column in (block.code, block.aside) else "r"
             kind += " aside" if column == block.aside else ""
             kind += " code" if column == block.code else ""
-            html_cells.append(f'<{tag} class="{kind}">{_text(cell)}</{tag}>')
+            html_cells.append(f'<{tag} class="{kind}">{_cell(cell)}</{tag}>')
         return "<tr>" + "".join(html_cells) + "</tr>"
 
     body = "".join(row(cells, "td") for cells in block.rows)
     short = "short" if len(block.rows) <= _SHORT else "long"
     return f"<table class='{short}'><thead>{row(block.header, 'th')}</thead><tbody>{body}</tbody></table>"
+
+
+def _cell(cell: str | Link) -> str:
+    if isinstance(cell, Link):
+        return f'<a href="{html.escape(cell.address)}">{_text(cell.text)}</a>'
+    return _text(cell)
+
+
+def _mark_cell(cell: str | Link) -> str:
+    return f"[{_mark(cell.text)}]({cell.address})" if isinstance(cell, Link) else _mark(cell)
 
 
 def _mark(text: str) -> str:
@@ -237,5 +304,5 @@ def _markdown(block: Block) -> Iterator[str]:
         rule = ("---" if column in words else "---:" for column in range(len(block.header)))
         yield "| " + " | ".join(map(_mark, block.header)) + " |"
         yield "| " + " | ".join(rule) + " |"
-        yield from ("| " + " | ".join(map(_mark, row)) + " |" for row in block.rows)
+        yield from ("| " + " | ".join(map(_mark_cell, row)) + " |" for row in block.rows)
         yield ""

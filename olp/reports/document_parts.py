@@ -73,7 +73,8 @@ def date_text(value: object) -> str:
 def path_plot_blocks(plots: Plots) -> Iterator[Block]:
     """The plots along the path that there are."""
     captions = {
-        "picture": "The path in plan view, coloured by its distance from the nominal one.",
+        "picture": "The path in plan view; each place has the colour of its largest distance from the "
+        "nominal path.",
         "along": "Distance from the nominal path along it; rapids and gaps are left out.",
         "histogram": "Distances of points of the path from the nominal one.",
         "components": "Deviation normal (level, to the left of travel) and binormal (up) along the path.",

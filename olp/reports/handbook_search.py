@@ -6,9 +6,10 @@ import math
 import re
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
+
+from olp.core.values import dataclass
 
 if TYPE_CHECKING:
     from olp.files.handbook import Section
@@ -77,6 +78,11 @@ SUBJECTS = (
         r"\brotary\b|\b(4|5|four|five)[ -]?ax[ie]s\b|\btilting\b|\brobots?\b",
         "rotary five-axis refused built",
         ("background/limits",),
+    ),
+    Subject(
+        r"\b(many|all|several) (programs|files|parts)\b|\bfolders?\b|\bplants?\b|\bdask\b|\bcluster\b",
+        "folder batch",
+        ("howto/batch",),
     ),
     Subject(r"\bsinumerik\b|\bsiemens\b", "sinumerik table control", ("reference/control-tables",)),
     Subject(r"\bmach ?[34]\b|\bmarlin\b|\buccnc\b", "control dialect", ("howto/machine",)),

@@ -13,6 +13,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from olp.findings.catalogue import RULES
+from olp.reports import shown
 
 #: Columns of a text report.
 #: A cell that begins with one of these is a formula to a spreadsheet.
@@ -45,7 +46,7 @@ def measured_sides(groups: Mapping[str, Any]) -> Mapping[str, str]:
 
 def to_json(report: Report) -> bytes:
     """UTF-8 JSON with sorted keys; numbers that are not finite become null, dates ISO 8601."""
-    return (json.dumps(_plain(report), indent=2, sort_keys=True, allow_nan=False) + "\n").encode()
+    return (json.dumps(plain(report), indent=2, sort_keys=True, allow_nan=False) + "\n").encode()
 
 
 def to_text(report: Report) -> str:
@@ -66,9 +67,13 @@ def to_text(report: Report) -> str:
     return "\n\n".join("\n".join(lines) for lines in map(list, sections) if lines) + "\n"
 
 
-def table(header: Sequence[str], rows: Iterable[Sequence[str]], text_columns: int = 1) -> Iterator[str]:
-    """Lines of a table; the first `text_columns` columns are aligned to the left, the others to the right."""
-    body = [list(header), *(list(row) for row in rows)]
+def table(
+    header: Sequence[str], rows: Iterable[Sequence[str]], text_columns: int = 1, unit: str | None = None
+) -> Iterator[str]:
+    """Lines of a table; the first `text_columns` columns are aligned to the left, the others to the right.
+    `unit` is that of its numbers, where the title states it and no head does."""
+    heads, inner = shown.cells(header, rows, unit, text_columns)
+    body = [heads, *inner]
     widths = [max(len(row[column]) for row in body) for column in range(len(header))]
     for row in body:
         cells = (
@@ -78,9 +83,14 @@ def table(header: Sequence[str], rows: Iterable[Sequence[str]], text_columns: in
         yield ("  " + "  ".join(cells)).rstrip()
 
 
-def pairs(values: Iterable[tuple[str, str]]) -> Iterator[str]:
-    """Lines of `name  value`, aligned and wrapped; empty values are left out."""
-    kept = [(name, value) for name, value in values if value]
+def pairs(values: Iterable[tuple[str, str]], unit: str | None = None) -> Iterator[str]:
+    """Lines of `name  value`, aligned and wrapped; empty values are left out. `unit` is that of numbers whose
+    name states none."""
+    kept = [
+        (shown.title(name), shown.value(value, shown.unit_in(name) or unit))
+        for name, value in values
+        if value
+    ]
     width = max((len(name) for name, _ in kept), default=0) + 2
     for name, value in kept:
         yield from textwrap.wrap(
@@ -113,15 +123,15 @@ def shortened(text: str, width: int) -> str:
     return text if len(text) <= width else text[: width - 2] + ".."
 
 
-def _plain(value: Any) -> Any:
-    """The value with types of JSON only; arrays and their scalars have `tolist`."""
+def plain(value: Any) -> Any:
+    """A value with types of JSON only; arrays and their scalars have `tolist`."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {str(key): plain(item) for key, item in value.items()}
     if hasattr(value, "tolist"):
         value = value.tolist()
     if isinstance(value, list | tuple | set | frozenset):
         items = sorted(value, key=str) if isinstance(value, set | frozenset) else value
-        return [_plain(item) for item in items]
+        return [plain(item) for item in items]
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, datetime.date):
@@ -189,8 +199,15 @@ def _degrees(value: object) -> str:
 
 
 def _verdict(report: Report) -> Iterator[str]:
-    for sentence in _part(report, "verdict").get("sentences") or ():
-        yield from textwrap.wrap(sentence, WIDTH)
+    yield from wrapped(_part(report, "verdict").get("sentences") or ())
+
+
+def wrapped(sentences: Iterable[str], first: str = "", further: str = "") -> Iterator[str]:
+    """Lines of sentences, behind `first` in their first line and `further` in the others."""
+    for sentence in sentences:
+        yield from textwrap.wrap(
+            shown.prose(sentence), WIDTH, initial_indent=first, subsequent_indent=further
+        )
 
 
 def _deviation(report: Report) -> Iterator[str]:
@@ -204,8 +221,9 @@ def _deviation(report: Report) -> Iterator[str]:
         if any(_part(deviation, side, key) for side in sides)
     ]
     if rows:
-        yield "Deviation from the nominal path in um"
-        yield from table(["", *(f"{SIDES[side]} {name}" for side in sides for name in ("max", "rms"))], rows)
+        yield shown.title("Deviation from the nominal path in um")
+        header = ["", *(f"{SIDES[side]} {name}" for side in sides for name in ("max", "rms"))]
+        yield from table(header, rows, unit="um")
 
 
 def _budget(report: Report) -> Iterator[str]:
@@ -223,8 +241,8 @@ def _budget(report: Report) -> Iterator[str]:
     names = (name for name in (*titles, *others) if name in budget)
     rows = [[titles.get(name, name.replace("_", " ")), number(budget[name])] for name in names]
     if rows:
-        yield "Residual after correction, largest in um"
-        yield from table(["", "max"], rows)
+        yield shown.title("Residual after correction, largest in um")
+        yield from table(["", "max"], rows, unit="um")
     angle = _part(report, "orientation")
     if angle:
         yield (
@@ -264,12 +282,12 @@ def _sources(report: Report) -> Iterator[str]:
     sources = report.get("sources") or ()
     if not sources:
         return
-    yield "Uncorrected error by source in um, largest first"
+    yield shown.title("Uncorrected error by source in um, largest first")
     rows = (
         [source.get("name", ""), number(source.get("max_um")), number(source.get("rms_um"))]
         for source in sources[:MAX_SOURCES]
     )
-    yield from table(["", "max", "rms"], rows)
+    yield from table(["", "max", "rms"], rows, unit="um")
     if len(sources) > MAX_SOURCES:
         yield f"  and {len(sources) - MAX_SOURCES} smaller ones"
 
@@ -278,12 +296,12 @@ def _worst(report: Report) -> Iterator[str]:
     blocks = report.get("worst") or ()
     if not blocks:
         return
-    yield "Worst blocks in um"
+    yield shown.title("Worst blocks in um")
     rows = (
         [place(block), number(block.get("before_um")), number(block.get("after_um"))]
         for block in blocks[:MAX_WORST]
     )
-    lines = list(table(["line", UNCORRECTED, CORRECTED], rows, text_columns=0))
+    lines = list(table(["line", UNCORRECTED, CORRECTED], rows, text_columns=0, unit="um"))
     room = WIDTH - max(map(len, lines)) - 2
     yield lines[0] + "  text"
     for line, block in zip(lines[1:], blocks, strict=False):
@@ -387,5 +405,4 @@ def _place(finding: Report) -> str:
 def sentences(title: str, sentences: Sequence[str]) -> Iterator[str]:
     if sentences:
         yield title
-    for sentence in sentences:
-        yield from textwrap.wrap(sentence, WIDTH, initial_indent="  - ", subsequent_indent="    ")
+        yield from wrapped(sentences, "  - ", "    ")

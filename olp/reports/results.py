@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import datetime
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from olp.findings.catalogue import RULES
+from olp.reports import shown
 from olp.reports.document import Block, Document, Grid, Notice, Pairs, Paragraph, Section
 from olp.reports.report import WIDTH, Report, findings_text, number, pairs, printable, sentences, table
 
@@ -19,14 +20,20 @@ def to_text(report: Report) -> str:
     """Plain text of at most 100 columns."""
     sections = (
         list(pairs(_head(report))),
-        ["Error added to the points, in um", *table(("", "max", "rms"), _figures(report))],
-        ["By source, in um", *table(("", "max", "rms"), _sources(report))],
-        ["Largest, in um", *table(_WORST, _worst(report), text_columns=2)],
+        _in_um("Error added to the points, in um", ("", "max", "rms"), _figures(report)),
+        _in_um("By source, in um", ("", "max", "rms"), _sources(report)),
+        _in_um("Largest, in um", _WORST, _worst(report), text_columns=2),
         list(findings_text(report["findings"])),
         list(sentences("Why", report["why"])),
         list(sentences("What it does not prove", report["does_not_prove"])),
     )
     return "\n\n".join("\n".join(line[:WIDTH] for line in lines) for lines in sections if lines) + "\n"
+
+
+def _in_um(
+    title: str, header: Sequence[str], rows: Sequence[Sequence[str]], text_columns: int = 1
+) -> list[str]:
+    return [shown.title(title), *table(header, rows, text_columns, "um")]
 
 
 def to_document(report: Report, version: str, date: datetime.date | None) -> Document:
@@ -75,8 +82,7 @@ def _sources(report: Report) -> list[tuple[str, str, str]]:
 
 
 def _worst(report: Report) -> list[tuple[str, ...]]:
-    worst = sorted(report["points"], key=lambda p: -p["size_um"])[:_ROWS]
-    return [tuple(_row(point)) for point in worst]
+    return [tuple(_row(point)) for point in report["points"].largest(_ROWS)]
 
 
 def _row(point: Report) -> Iterator[str]:

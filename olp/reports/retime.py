@@ -6,6 +6,7 @@ import textwrap
 from collections.abc import Iterator
 from typing import Any
 
+from olp.reports import shown
 from olp.reports.report import (
     WIDTH,
     Report,
@@ -17,6 +18,7 @@ from olp.reports.report import (
     printable,
     shortened,
     table,
+    wrapped,
 )
 
 #: Most rows of a table.
@@ -117,13 +119,13 @@ def _budget(report: Report) -> Iterator[str]:
         "inertial": "inertial: the machine deflects under acceleration",
     }
     proof = report.get("proof")
-    yield "Deviation from the programmed path, largest in um"
+    yield shown.title("Deviation from the programmed path, largest in um")
     rows = [(titles.get(k, k), number(v)) for k, v in budget.items() if v]
     if proof:
         axes = f"axis errors, by the proof of {shortened(printable(proof['program']), _NAME)}"
         rows.insert(0, (axes, number(proof["path_max_um"])))
         rows.append(("sum of all, at most", number(proof["at_most_um"])))
-    yield from table(("", "max"), rows)
+    yield from table(("", "max"), rows, unit="um")
     path = report["path"]
     stated = ", ".join(f"{v:g}" for v in path["stated_um"][:6])
     parts = [f"{stated} um from the program" if stated else ""]
@@ -133,7 +135,7 @@ def _budget(report: Report) -> Iterator[str]:
         parts.append("exact stop from the start, by the machine file")
     tolerances = "; ".join(filter(None, parts)) or "none: the program asks for the exact path everywhere"
     text = f"Path tolerance: {tolerances}"
-    yield from textwrap.wrap(text, WIDTH, initial_indent="  ", subsequent_indent="    ")
+    yield from wrapped([text], "  ", "    ")
     inertial = report.get("inertial")
     if inertial:
         allowed = inertial["allowed_um"]
@@ -145,9 +147,10 @@ def _budget(report: Report) -> Iterator[str]:
         )
         text = (
             f"Inertial deviation: {inertial['max_um']:.2f} um max in line {place(inertial)}, "
-            f"{inertial['rms_um']:.2f} rms, {inertial['across_path_max_um']:.2f} max across the path{bound}"
+            f"{inertial['rms_um']:.2f} um rms, "
+            f"{inertial['across_path_max_um']:.2f} um max across the path{bound}"
         )
-        yield from textwrap.wrap(text, WIDTH, initial_indent="  ", subsequent_indent="    ")
+        yield from wrapped([text], "  ", "    ")
 
 
 def _use(report: Report) -> Iterator[str]:
@@ -176,7 +179,9 @@ def _slow(report: Report) -> Iterator[str]:
         for w in slow["worst"][:_ROWS]
     ]  # fmt: skip
     yield from _cut(
-        table(("line", "axis X mm", "Y mm", "Z mm", "feed mm/min", "slowest", "lost s", "limit"), rows),
+        table(
+            ("line", "axis X mm", "Y mm", "Z mm", "feed mm/min", "slowest mm/min", "lost s", "limit"), rows
+        ),
         slow["places"],
     )
 
@@ -193,7 +198,7 @@ def _lines(report: Report) -> Iterator[str]:
         )  # fmt: skip
     if rows:
         yield "Lines that take longest"
-        yield from table(("line", "seconds", "feed mm/min", "achieved", "limit"), rows)
+        yield from table(("line", "seconds", "feed mm/min", "achieved mm/min", "limit"), rows)
 
 
 def _feeds_written(report: Report) -> Iterator[str]:

@@ -12,12 +12,14 @@ from typing import NoReturn, TypeVar
 
 import numpy as np
 
+from olp.core.arrays import Array, Index
 from olp.core.errors import InputError
 from olp.program.dmis.dialect import DIALECT as DMIS
 from olp.program.dmis.events import MACHINE_FRAME
 from olp.program.text.numbers import Number, number
 from olp.program.text.statements import Comment, Statement, chunks
-from olp.results.reported import Reported, Stated, Unchanged
+from olp.results.dmis_columns import PlainPoints, plain_points
+from olp.results.reported import Names, PointColumns, Reported, Stated, Unchanged, index_type, missing
 from olp.results.table import stated_in
 
 #: mm per unit of length
@@ -62,15 +64,7 @@ class _Reader:
         self.approach = float("nan")
         self.frames: list[str] = []
         self.tools: list[str | None] = []
-        self.lines: list[int] = []
-        self.spans: list[list[tuple[int, int]]] = []
-        self.forms: list[tuple[Number, ...]] = []
-        self.normals: list[list[float]] = []
-        self.frame_of: list[int] = []
-        self.tool_of: list[int] = []
-        self.units: list[float] = []
-        self.approaches: list[float] = []
-        self.names: list[str] = []
+        self.points = PointColumns()
         self.unchanged: list[Unchanged] = []
         self.stated: list[Stated] = []
 
@@ -122,14 +116,6 @@ class _Reader:
         elif major in _MOTION:
             _refuse_motion(major, statement.line)
 
-    def remarks(self) -> None:
-        """Collect what comments say of compensation that was active."""
-        for line, raw in enumerate(self.data.splitlines(), 1):
-            mark = raw.find(b"$$")
-            stated = stated_in(line, raw[mark + 2 :].decode("latin-1").strip()) if mark >= 0 else None
-            if stated is not None:
-                self.stated.append(stated)
-
     def _actual(self, statement: Statement, label: str, rest: bytes, offset: int) -> None:
         name = f"FA({label})"
         kind, _, tail = rest.partition(b",")
@@ -147,12 +133,7 @@ class _Reader:
                 "points (CART) are read; have the machine write them in CART",
                 line=statement.line,
             )
-        if self.unit_mm is None:
-            raise InputError(
-                f"{name} comes before any UNITS statement, so its unit is not known; "
-                "put a statement such as UNITS/MM,ANGDEC before it",
-                line=statement.line,
-            )
+        self._check_unit(name, statement.line)
         offset += len(system) + 1
         spans: list[tuple[int, int]] = []
         values: list[Number] = []
@@ -173,16 +154,42 @@ class _Reader:
             offset += len(word) + 1
         if len(values) < 3:
             raise InputError(f"{name} has {len(values)} coordinates; expected x, y, z", line=statement.line)
-        self.lines.append(statement.line)
-        self.spans.append(spans[:3])
-        self.forms.append(tuple(values[:3]))
         normal = [v.value for v in values[3:6]]
-        self.normals.append(normal if len(normal) == 3 else [float("nan")] * 3)
-        self.frame_of.append(_index(self.frames, self.frame))
-        self.tool_of.append(_index(self.tools, self.tool))
-        self.units.append(self.unit_mm)
-        self.approaches.append(self.approach)
-        self.names.append(name)
+        span = np.array([spans[:3]])
+        self._put(
+            Names.of([name]), np.array([statement.line]), span[:, :, 0], span[:, :, 1],
+            np.array([[v.value for v in values[:3]]]),
+            np.array([normal]) if len(normal) == 3 else missing(1, 3),
+        )  # fmt: skip
+
+    def plain(self, points: PlainPoints, first_line: int) -> None:
+        """Points of a chunk whose lines come after so many."""
+        if not len(points.line):
+            return
+        line = points.line + first_line + 1
+        self._check_unit(points.names[0], int(line[0]))
+        names = Names.of(points.names)
+        self._put(names, line, points.start, points.end, points.value, points.normal)
+
+    def _check_unit(self, name: str, line: int) -> None:
+        """Raise InputError where the unit of a point is not known."""
+        if self.unit_mm is None:
+            raise InputError(
+                f"{name} comes before any UNITS statement, so its unit is not known; "
+                "put a statement such as UNITS/MM,ANGDEC before it",
+                line=line,
+            )
+
+    def _put(self, names: Names, line: Index, start: Index, end: Index, value: Array, normal: Array) -> None:
+        """Points in the state of the reader: lines (n,), and (n, 3) of the others."""
+        count, small = len(names), index_type(len(self.data))
+        self.points.put(
+            names, line=line.astype(np.int32), start=start.astype(small), end=end.astype(small), value=value,
+            normal=normal, unit=np.full(count, self.unit_mm),
+            frame=np.full(count, _index(self.frames, self.frame), np.int32),
+            tool=np.full(count, _index(self.tools, self.tool), np.int32),
+            approach=np.full(count, self.approach),
+        )  # fmt: skip
 
 
 def _index(known: list[T], value: T) -> int:
@@ -194,12 +201,16 @@ def _index(known: list[T], value: T) -> int:
 def read_dmis(data: bytes) -> Reported:
     """The points of DMIS output. Raises InputError with the line of what is wrong."""
     reader = _Reader(data)
-    reader.remarks()
     for chunk in chunks(data):
         if len(chunk.point):
             _refuse_motion(b"GOTO", chunk.first_line + int(chunk.point[0]) + 1)
+        plain, done = plain_points(chunk), 0
+        chunk.others = np.setdiff1d(chunk.others, plain.line, assume_unique=True)
         goes_on = 0
         for statement in chunk.statements(_NO_TEXT):
+            before = int(np.searchsorted(plain.line, statement.line - chunk.first_line - 1))
+            reader.plain(plain.part(done, before), chunk.first_line)
+            done = before
             if isinstance(statement, Comment):
                 text = statement.text.rstrip()
                 goes_on = statement.line + 1 if text.endswith(b"$") and text.strip() != b"$$" else 0
@@ -211,32 +222,32 @@ def read_dmis(data: bytes) -> Reported:
                     line=statement.line,
                 )
             reader.statement(statement)
-    if not reader.lines:
+        reader.plain(plain.part(done, len(plain.line)), chunk.first_line)
+    points = reader.points
+    if not points.count:
         why = f" ({reader.unchanged[0].name} {reader.unchanged[0].reason})" if reader.unchanged else ""
         raise InputError(f"holds no points (FA(..)=FEAT/POINT or PTDATA){why}")
-    span = np.array(reader.spans, np.int64)
-    unit = np.array(reader.units)
+    remarks = ((match.start(), match[1]) for match in re.finditer(rb"\$\$([^\r\n]*)", data))
     return Reported(
         data=data,
         dialect=DMIS.name,
         axes_at_ram=DMIS.axes_at_ram,
-        line=np.array(reader.lines, np.int64),
-        start=span[:, :, 0],
-        end=span[:, :, 1],
-        form=tuple((row[0], row[1], row[2]) for row in reader.forms),
-        value_mm=np.array([[n.value for n in row] for row in reader.forms]) * unit[:, None],
-        unit_mm=unit,
-        normal=np.array(reader.normals),
-        frame=np.array(reader.frame_of, np.int64),
+        line=points.take("line"),
+        start=points.take("start"),
+        end=points.take("end"),
+        value=points.take("value"),
+        unit_mm=points.take("unit"),
+        normal=points.take("normal"),
+        frame=points.take("frame"),
         frames=tuple(reader.frames),
-        tool=np.array(reader.tool_of, np.int64),
+        tool=points.take("tool"),
         tools=tuple(reader.tools),
-        stylus_mm=np.full((len(unit), 3), np.nan),
-        approach_mm=np.array(reader.approaches),
-        names=tuple(reader.names),
+        stylus_mm=missing(points.count, 3),
+        approach_mm=points.take("approach"),
+        names=points.names(),
         comment=(b"$$ ", b""),
         point="surface",
         unchanged=tuple(reader.unchanged),
-        stated=tuple(reader.stated),
+        stated=(*stated_in(data, remarks), *reader.stated),
         assumed=("DMIS output: points lie on the surface, their directions point out of it",),
     )

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import zlib
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from olp.core.errors import CannotCompute
+from olp.core.values import dataclass
 
 Whole = npt.NDArray[np.int64]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -16,6 +16,8 @@ from olp.core.errors import naming
 from olp.core.machine import Setup
 from olp.core.progress import Progress, silent
 from olp.core.units import MM_PER_UM
+from olp.core.values import dataclass
+from olp.errormodel.known import KnownErrors
 from olp.files.points import read_points
 from olp.files.sources import Source, Sources
 from olp.files.write import write_bytes
@@ -30,7 +32,7 @@ from olp.review.meshes import Body, of_job, of_machine
 from olp.review.motion import by_feed, feed_seconds, retimed
 from olp.review.motion import table as motion_table
 from olp.review.page import page
-from olp.review.samples import Samples, by_source, sample
+from olp.review.samples import Samples, by_source, sample, with_starts
 from olp.review.scene import Frame, Scene, TipUncertainty
 from olp.uncertainty.probability import within
 from olp.uncertainty.spread import Points, bands, covariances
@@ -84,7 +86,7 @@ class Review:
 
 def view(
     program: PathLike | bytes,
-    machine: PathLike | Setup,
+    machine: PathLike | Setup | KnownErrors,
     job: PathLike | None = None,
     *,
     corrected: PathLike | bytes | None = None,
@@ -111,10 +113,10 @@ def view(
     where `flatten` or `expand_cycles` ask for it. Without it the program is corrected
     as in `correct`, or `correction` is the result of that, under the name `corrected_name`. `measured` are
     files of tip positions, read and placed on the path as in `olp.compare`; the findings of that are added
-    to the others. Without `time` the motion is not planned: times are those of the
-    programmed feed. `step_mm` is the distance between samples. `part_tolerance_um`,
-    `only_sure_components`, `date` and `accept` are those of `correct`. Raises InputError (ProgramError with
-    its line, ConfigError, Doubtful) and CannotCompute.
+    to the others. Without `time`, or without limits of motion in the machine file, the motion is not
+    planned: times are those of the programmed feed. `step_mm` is the distance between samples.
+    `part_tolerance_um`, `only_sure_components`, `date` and `accept` are those of `correct`. Raises InputError
+    (ProgramError with its line, ConfigError, Doubtful) and CannotCompute.
     """
     session, source = opened(program, machine, job)
     options = ViewOptions(
@@ -153,7 +155,8 @@ def run(
             session.sources, program, loaded.setup, loaded.dialect, reading, options
         )
         # the words of a long program are large: after this they are not needed
-        seconds = None if options.time else feed_seconds(nominal, loaded.setup.machine)
+        planned = options.time and not loaded.setup.machine.missing_limits
+        seconds = None if planned else feed_seconds(nominal, loaded.setup.machine)
         digit = digit_mm(nominal)
     if corrected is not None:
         corrected.load()
@@ -229,7 +232,9 @@ def _shown(
 ) -> _Shown:  # fmt: skip
     """Samples, with the motion, or with the times at the programmed feed of moves that take `seconds`."""
     (progress or silent)("sample", 0.0)
+    path, table = texts.nominal.toolpath, texts.table
     samples = sample(texts.nominal, texts.second, texts.groups, loaded.model, options.step_mm)
+    samples = with_starts(samples, path, {"uncorrected": table.uncorrected, "corrected": table.corrected})
     if seconds is not None:
         return _Shown(samples, by_feed(seconds, samples), None)
     other = session.sources.source(texts.second.data)

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from olp.core.arrays import Array
 from olp.core.units import UM_PER_MM
+from olp.proof.measured import ABOVE
 from olp.proof.proof import Counts
 from olp.review.pack import Arrays
 from olp.review.scene import Scene
@@ -20,12 +21,18 @@ NO_MOVE = 3
 _LISTED_UM = 0.01
 #: What stands for a deviation that is not known.
 _UNKNOWN_UM = -1.0
+_NOT_JUDGED = "no point of it is on a move that counts: it is shown and not judged."
 
 
 def measured_names(scene: Scene) -> list[str]:
     """Names of the layers of measured runs."""
     count = len(scene.measured)
     return ["measured"] if count == 1 else [f"measured-{k + 1}" for k in range(count)]
+
+
+def measured_label(scene: Scene, k: int) -> str:
+    """What measured run k is called: by its file where there are several."""
+    return "measured" if len(scene.measured) == 1 else f"measured: {scene.measured[k].label}"
 
 
 def judged_lines(scene: Scene, arrays: Arrays) -> dict[str, Any]:
@@ -98,26 +105,35 @@ def statistics(scene: Scene) -> Iterator[dict[str, Any]]:
 
 
 def pictures(scene: Scene) -> Iterator[dict[str, Any]]:
-    """The pictures of a page: uncorrected, corrected and, where there are runs, measured. Each has its
-    `layers`, the `tolerance_um` that it is judged by, the largest deviation of what counts, its rms, and as
-    `flag` the place of the largest."""
+    """The pictures of a page: uncorrected, corrected and each measured run. Each has its `layers`, the
+    `tolerance_um` that it is judged by, the largest deviation of what counts and its rms. `flag` is the place
+    of the largest, `lines_above` how many there are (None where nothing judges them), `note` a remark."""
     table, deviation = scene.table, scene.report["deviation"]
     allowed_um = table.allowed_mm * UM_PER_MM
     for layer, side, values in (
         ("uncorrected", "before", table.uncorrected), ("corrected", "after", table.corrected),
     ):  # fmt: skip
         rms_um = float(deviation[side]["between"]["rms_um"]) if _along(scene) else None
+        above = table.judged & (np.nan_to_num(values) > table.allowed_mm)
         yield {
             "name": layer, "label": layer, "layers": [layer], "tolerance_um": allowed_um, "basis": "allowed",
-            "rms_um": rms_um, **_largest(scene, layer, values),
+            "rms_um": rms_um, "lines_above": len(np.unique(table.line[above])), "note": None,
+            **_largest(scene, layer, values),
         }  # fmt: skip
-    if table.measured is not None:
-        across = scene.report["measured"]["across_um"]
-        yield {
-            "name": "measured", "label": "measured", "layers": measured_names(scene),
-            "tolerance_um": table.measured.tolerance_um, "basis": "part tolerance",
-            "rms_um": across["rms"] if across else None, **_largest_measured(scene),
-        }  # fmt: skip
+    runs = table.measured
+    if runs is not None:
+        figures = scene.report["measured"]["runs"]
+        for k, (name, figure) in enumerate(zip(measured_names(scene), figures, strict=True)):
+            across, state = figure["across_um"], runs.by_line(k)["state"]
+            judged = runs.tolerance_um is not None and len(state) > 0
+            yield {
+                "name": name, "label": measured_label(scene, k), "layers": [name],
+                "tolerance_um": runs.tolerance_um, "basis": "part tolerance",
+                "rms_um": across["rms"] if across else None,
+                "lines_above": int((state == ABOVE).sum()) if judged else None,
+                "note": None if scene.measured[k].counted.any() else _NOT_JUDGED,
+                **_largest_measured(scene, k),
+            }  # fmt: skip
 
 
 def _along(scene: Scene) -> bool:
@@ -153,21 +169,17 @@ def _largest(scene: Scene, layer: str, values: npt.NDArray[np.float32]) -> dict[
     return {"largest_um": largest_um, "flag": _flag(worst, layer, largest_um, line, delta)}
 
 
-def _largest_measured(scene: Scene) -> dict[str, Any]:
-    """The largest deviation of the measured runs, and its place."""
-    runs = scene.table.measured
-    sizes = [] if runs is None else [runs.largest_um(k) for k in range(len(runs.names))]
-    known = [size for size in sizes if size is not None]
-    if runs is None or not known:
+def _largest_measured(scene: Scene, k: int) -> dict[str, Any]:
+    """The largest deviation of measured run k, and its place."""
+    runs, shown = scene.table.measured, scene.measured[k]
+    largest_um = None if runs is None else runs.largest_um(k)
+    if runs is None or largest_um is None:
         return {"largest_um": None, "flag": None}
-    k = sizes.index(max(known))
-    shown, worst = scene.measured[k], runs.worst(1)[0]
+    own = runs.by_line(k)
+    line = scene.place(int(own["line"][own["measured_um"].argmax()]))
     row = int(np.where(shown.counted, np.linalg.norm(shown.delta_mm, axis=1), -1.0).argmax())
-    flag = _flag(
-        int(shown.index[row]), measured_names(scene)[k], worst["max_um"], scene.place(worst["line"]),
-        shown.delta_mm[row],
-    )  # fmt: skip
-    return {"largest_um": max(known), "flag": flag}
+    flag = _flag(int(shown.index[row]), measured_names(scene)[k], largest_um, line, shown.delta_mm[row])
+    return {"largest_um": largest_um, "flag": flag}
 
 
 def _flag(sample: int, layer: str, size_um: float, line: str, delta_mm: Array) -> dict[str, Any]:

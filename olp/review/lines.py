@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,6 +16,7 @@ import numpy.typing as npt
 
 from olp.core.arrays import Index
 from olp.core.units import MM_PER_INCH
+from olp.core.values import dataclass
 from olp.review.styles import DIGITS_MOST, Style, Whole, Written
 from olp.review.tokens import MARK, Small, Tokens
 

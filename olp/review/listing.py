@@ -7,13 +7,13 @@ where the reader of programs ends them.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from difflib import SequenceMatcher
 
 import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Index
+from olp.core.values import dataclass
 from olp.program.program import Program
 from olp.program.text.line_ends import LINE_END_TEXT
 from olp.review.samples import Samples

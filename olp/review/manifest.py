@@ -16,7 +16,7 @@ from olp.proof.judgement import QUESTIONS
 from olp.proof.proof import Counts
 from olp.reports.report import place
 from olp.review.features.nodes import plain
-from olp.review.judged import judged_lines, measured_names, pictures, removed, statistics
+from olp.review.judged import judged_lines, measured_label, measured_names, pictures, removed, statistics
 from olp.review.listing import pictured
 from olp.review.meshes import nodes
 from olp.review.pack import ARC_MM, DEVIATION_MM, POSITION_MM, TIME_S, Arrays, resolution
@@ -105,7 +105,7 @@ def manifest_of(scene: Scene) -> tuple[dict[str, Any], Arrays]:
         "removed": removed(scene),
         "palette": COLOURS,
         "verdict": _verdict(scene),
-        "tree": plain(scene),
+        "tree": _tree(scene, arrays),
         "frame": scene.frame.label,
         "tool_radius_mm": scene.tool_radius_mm,
         "live": None,
@@ -136,13 +136,13 @@ def _layers(scene: Scene, arrays: Arrays, origin: Array) -> list[dict[str, Any]]
     layers = [
         _layer(name, label, "P", deltas[name], None, width, dashes) for name, label, width, dashes in LAYERS
     ]
-    for name, measured in zip(measured_names(scene), scene.measured, strict=True):
+    for k, (name, measured) in enumerate(zip(measured_names(scene), scene.measured, strict=True)):
         base = arrays.quantised(f"P_{name}", measured.base_mm - origin, POSITION_MM)
         delta = arrays.quantised(f"d_{name}", measured.delta_mm, DEVIATION_MM)
         index = arrays.quantised(f"i_{name}", measured.index, 1.0)
         kind = arrays.raw(f"kind_{name}", np.where(measured.counted, 0, 1).astype(np.uint8), "u1")
-        label = "measured" if len(scene.measured) == 1 else f"measured: {measured.label}"
-        layers.append(_layer(name, label, base, delta, index, *MEASURED) | {"kind": kind})
+        layer = _layer(name, measured_label(scene, k), base, delta, index, *MEASURED)
+        layers.append(layer | {"kind": kind, "judged": bool(measured.counted.any())})
     return layers
 
 
@@ -218,8 +218,9 @@ def _motion(scene: Scene, arrays: Arrays) -> dict[str, Any] | None:
         return arrays.quantised(f"m_{name}", values, step)
 
     axes = []
+    stated = scene.machine.motion_limits()
     for i, axis in enumerate(AXES):
-        limits = scene.machine.axes[axis]
+        most_velocity, most_acceleration, most_jerk = stated[axis]
         axes.append(
             {
                 "name": axis,
@@ -227,9 +228,9 @@ def _motion(scene: Scene, arrays: Arrays) -> dict[str, Any] | None:
                 "velocity": column(f"V{axis}", table.velocity[:, i]),
                 "acceleration": column(f"A{axis}", table.acceleration[:, i]),
                 "jerk": column(f"J{axis}", table.jerk[:, i]),
-                "velocity_limit": limits.velocity_mm_s,
-                "acceleration_limit": limits.acceleration_mm_s2,
-                "jerk_limit": limits.jerk_mm_s3,
+                "velocity_limit": most_velocity,
+                "acceleration_limit": most_acceleration,
+                "jerk_limit": most_jerk,
             }
         )
     return {
@@ -276,6 +277,18 @@ def _meshes(scene: Scene, arrays: Arrays, origin: Array) -> Iterator[dict[str, A
             "opacity": body.opacity,
             "path": list(body.path),
         }
+
+
+def _tree(scene: Scene, arrays: Arrays) -> dict[str, Any]:
+    """The tree of features; ranges of samples are rows of one array, `samples`, from the first to before the
+    last of the `ranges` of a node."""
+    tree = plain(scene)
+    samples = [node.pop("samples") for node in tree["nodes"]]
+    ends = np.cumsum([len(ranges) for ranges in samples], dtype=np.int64).tolist()
+    for node, begin, end in zip(tree["nodes"], [0, *ends], ends, strict=False):
+        node["ranges"] = [begin, end]
+    every = np.concatenate(samples) if samples else np.zeros((0, 2), np.int64)
+    return tree | {"samples": arrays.quantised("tree", every, 1.0)}
 
 
 def _findings(scene: Scene) -> list[dict[str, Any]]:

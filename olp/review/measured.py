@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from olp.comparison.pairing import Order
 from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import InputError
 from olp.core.machine import Setup
+from olp.core.values import dataclass
 from olp.files.points import Points, row_line
 from olp.proof import judgement
 from olp.proof.judgement import Judgements

@@ -8,7 +8,6 @@ positions.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +17,7 @@ from olp.core.arrays import Array
 from olp.core.geometry import rotation_matrix
 from olp.core.machine import Machine, Mesh, Setup
 from olp.core.units import AXES
+from olp.core.values import dataclass
 from olp.files.meshes import read_mesh
 from olp.files.write import Reader
 

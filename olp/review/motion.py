@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -13,11 +12,13 @@ from olp.core.arrays import Array, Index
 from olp.core.errors import ProgramError
 from olp.core.machine import Machine
 from olp.core.toolpath import Toolpath
+from olp.core.units import AXES
+from olp.core.values import dataclass
 from olp.program.feeds.moves import lengths_mm
 from olp.program.feeds.timing import timing
 from olp.program.program import Program
 from olp.review.samples import Samples
-from olp.trajectory.from_program import SHORTEST_MM, axis_limits
+from olp.trajectory.from_program import SHORTEST_MM
 from olp.trajectory.motion import Motion
 from olp.trajectory.plan import Trajectory
 from olp.trajectory.route import Route
@@ -191,7 +192,8 @@ def _filled(time: Array) -> Array:
 
 def feed_seconds(program: Program, machine: Machine) -> Array:
     """(n,) s that each move takes without accelerations: at the programmed feed, or in rapids and without
-    feed at the limits of velocity. The program was read with its words."""
+    feed at the limits of velocity; rapids of an axis without such a limit take no time. The program was read
+    with its words."""
     path = program.toolpath
     try:
         feed = timing(program).feed_mm_s
@@ -199,7 +201,8 @@ def feed_seconds(program: Program, machine: Machine) -> Array:
         feed = np.full(len(path), np.inf)
     length = np.nan_to_num(lengths_mm(path))
     step = np.abs(np.nan_to_num(path.end_mm - path.starts_mm()))
-    least = (step / axis_limits(machine).velocity).max(axis=1)
+    stated = [machine.axes[name].velocity_mm_s for name in AXES]
+    least = (step / np.array([np.inf if v is None else v for v in stated])).max(axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.asarray(np.fmax(length / feed, least))
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from olp.core.arrays import Array, Index
 from olp.core.geometry import PLANES, arc_points
 from olp.core.toolpath import Kind, Toolpath
+from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.reversal import plays
 from olp.program.feeds.moves import lengths_mm
@@ -180,17 +179,15 @@ def set_in_holes(nominal: Program, corrected: Program, move: Index, axis: Array,
     """Strokes of canned cycles: a corrected hole may need one peck more or less, so pecks have no partners;
     the partner of a point of the stroke is the same point of the corrected hole. Returns the samples of
     which the command was set."""
-    holes = nominal.holes
-    if not holes or len(holes) != len(corrected.holes):
+    holes, others = nominal.holes, corrected.holes
+    if not len(holes) or len(holes) != len(others):
         return np.zeros(0, np.int64)
     path = nominal.toolpath
     of = np.full(len(path), -1, np.int64)
-    for k, hole in enumerate(holes):
-        of[hole.first : hole.last] = k
-    axes = np.array([PLANES[h.plane] for h in holes])
-    mine, theirs = (
-        np.array([(*h.place_mm, h.r_mm, h.z_mm) for h in some]) for some in (holes, corrected.holes)
-    )
+    strokes, hole = holes.moves()
+    of[strokes] = hole
+    axes = np.array(PLANES)[holes.plane]
+    mine, theirs = (np.column_stack((some.place_mm, some.r_mm, some.z_mm)) for some in (holes, others))
     rows = np.flatnonzero(of[move] >= 0)
     which = of[move[rows]]
     first, second, third = (axes[which, i] for i in range(3))

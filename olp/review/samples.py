@@ -6,8 +6,7 @@ point, so that a deviation is the distance from the nominal point.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +15,7 @@ from olp.compensation.plan import zero_shifts
 from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import CannotCompute
 from olp.core.toolpath import Kind, Toolpath
+from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.reversal import plays
 from olp.errormodel.sampling import clear_length_mm, longer, steps_needed
@@ -37,6 +37,10 @@ _TURN = np.pi / 36
 _SAGITTA_MM = 0.01
 #: Most steps of a move.
 _MOST_STEPS = 1 << 12
+#: A cut gets a sample at its start where that is farther off than the others by more than this share of it,
+_LESS = 0.005
+#: and by more than this, in mm.
+_LESS_MM = 2e-5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -120,6 +124,49 @@ def sample(
         every = every.take(np.flatnonzero(keep))
     every.joined[0] = False
     return every
+
+
+def away_mm(position_mm: Array, share: Array, delta_mm: Array) -> Array:
+    """(n,) mm: how far the tip is off at samples, as in the proof. At the end of a move that is from the
+    nominal point, before it from the path. At its start it is from the path ahead, or from the nominal point
+    where the tip is behind that. `position_mm` and `delta_mm` are (n, 3), `share` (n,)."""
+    step = np.diff(position_mm, axis=0, prepend=position_mm[:1])
+    begins = (share == 0.0) & (step == 0.0).all(axis=1)
+    # the tangent of arcs: from the sample before to the one behind
+    inner = np.flatnonzero(share[:-1] != 1.0)
+    step[inner] += step[inner + 1]
+    length = np.sqrt(np.einsum("ij,ij->i", step, step))
+    along = np.einsum("ij,ij->i", delta_mm, step) / np.maximum(length, 1e-12)
+    along[(share == 1.0) | (begins & (along < 0.0))] = 0.0
+    squares = np.einsum("ij,ij->i", delta_mm, delta_mm) - along * along
+    return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
+
+
+def with_starts(samples: Samples, path: Toolpath, stated: Mapping[str, npt.NDArray[np.float32]]) -> Samples:
+    """The samples, and the start of each cut that is farther off than its other samples by more than `_LESS`
+    or `_LESS_MM`; of long programs those with the most. `stated` has (n,) mm of the moves by layer, as in the
+    table of judgements."""
+    first = np.flatnonzero(np.diff(samples.move, prepend=-1))
+    first = first[1:] if len(first) else first
+    move = samples.move[first]
+    starts = (samples.share[first] > 0.0) & samples.joined[first] & (path.kind[move] != Kind.RAPID)
+    starts &= (samples.move[first - 1] == move - 1) & (path.frame[move] == path.frame[move - 1])
+    first, move = first[starts], move[starts]
+    more = np.zeros(len(first))
+    for layer, largest in stated.items():
+        away = away_mm(samples.axis_mm, samples.share, getattr(samples, layer))
+        drawn = np.zeros(len(path))
+        np.maximum.at(drawn, samples.move, away)
+        missed = largest[move] - drawn[move]
+        more = np.fmax(more, np.where(missed > np.maximum(_LESS_MM, _LESS * largest[move]), missed, 0.0))
+    spare = max(SAMPLES - len(samples), SAMPLES // 10)
+    chosen = np.sort(np.argsort(-more, kind="stable")[: min(spare, np.count_nonzero(more))])
+    first, move = first[chosen], move[chosen]
+    order = np.sort(np.concatenate((np.arange(len(samples)), first - 1)), kind="stable")
+    twice = samples.take(order)
+    begins = np.flatnonzero(np.diff(order, prepend=-1) == 0)
+    twice.move[begins], twice.share[begins], twice.joined[begins] = move, 0.0, True
+    return twice
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,13 +11,14 @@ import numpy.typing as npt
 from olp.core.arrays import Array
 from olp.core.machine import Machine
 from olp.core.toolpath import Toolpath
+from olp.core.values import dataclass
 from olp.program.program import Program
 from olp.proof.judgement import Judgements
 from olp.review.listing import Listing
 from olp.review.measured import Matched
 from olp.review.meshes import Body
 from olp.review.motion import MotionTable
-from olp.review.samples import Samples
+from olp.review.samples import Samples, away_mm
 
 Single = npt.NDArray[np.float32]
 
@@ -94,19 +94,14 @@ class Scene:
 
     def worst_sample(self, layer: str, move: int) -> int | None:
         """The sample of a move where a layer ("uncorrected" or "corrected") is off by what the table states
-        of the move, as nearly as it is sampled; None where the move has no sample. As in the proof, the
-        distance from the nominal point counts at the end of the move, and that from the path before it."""
+        of the move, as nearly as it is sampled; None where the move has no sample."""
         samples = self.samples
         a, b = np.searchsorted(samples.move, [move, move + 1]).tolist()
         if a == b:
             return None
-        delta = getattr(samples, layer)[a:b]
-        before = self.position_mm[max(a - 1, 0)]
-        step = np.diff(self.position_mm[a:b], axis=0, prepend=before[None])
-        length = np.linalg.norm(step, axis=1)
-        unit = step / np.maximum(length, 1e-12)[:, None]
-        along = np.where(samples.share[a:b] == 1.0, 0.0, np.einsum("ij,ij->i", delta, unit))
-        size = np.sqrt(np.maximum((delta * delta).sum(axis=1) - along * along, 0.0))
+        rows = slice(max(a - 1, 0), b + 1)
+        size = away_mm(self.position_mm[rows], samples.share[rows], getattr(samples, layer)[rows])
+        size = size[a - rows.start :][: b - a]
         stated = float(getattr(self.table, layer)[move])
         return int(a) + int(np.abs(size - stated).argmin())
 
@@ -114,3 +109,19 @@ class Scene:
         """A line of the nominal text in words: the line that it was unrolled from, where it was."""
         origin = self.nominal.origin
         return str(line) if origin is None else origin.place(origin.line_of(line))
+
+    def places(self, lines: npt.NDArray[Any]) -> str:
+        """Lines (k,) of the nominal text in words, from the first to the last of those that they were
+        unrolled from: "4", "4 to 9", or "4 to 9 of FILE"."""
+        origin = self.nominal.origin
+        if origin is None:
+            first, last = str(lines.min()), str(lines.max())
+            return first if first == last else f"{first} to {last}"
+        written = origin.lines_of(lines)
+        (file, first_line), (other, last_line) = (
+            origin.file_of(int(line)) for line in (written.min(), written.max())
+        )
+        last = origin.place(int(written.max()))
+        if (file, first_line) == (other, last_line):
+            return last
+        return f"{first_line if file == other else origin.place(int(written.min()))} to {last}"

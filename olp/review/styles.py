@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass
+from dataclasses import astuple
 
 import numpy as np
 import numpy.typing as npt
+
+from olp.core.values import dataclass
 
 Whole = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]

@@ -7,12 +7,12 @@ form give its characters back, so that a text is its skeleton and its numbers.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Index
+from olp.core.values import dataclass
 
 Small = npt.NDArray[np.int32]
 Byte = npt.NDArray[np.uint8]

@@ -8,12 +8,11 @@ above a limit, branch and bound finds the largest values.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from olp.core.arrays import Array, Mask
 from olp.core.errors import UsageError
+from olp.core.values import dataclass
 from olp.trajectory.extremes import largest as extreme
 from olp.trajectory.extremes import nodes
 from olp.trajectory.motion import Motion

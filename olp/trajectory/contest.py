@@ -6,13 +6,14 @@ A candidate that exceeds a limit is slowed down as a whole. One that leaves the 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
 from olp.core.arrays import Array, Index
 from olp.core.errors import CannotCompute
+from olp.core.values import dataclass
 from olp.trajectory.audit import Ratios, ratios, slowing
 from olp.trajectory.critical import seconds
 from olp.trajectory.deviation import deviation_bound

@@ -9,11 +9,10 @@ Source: bidirectional scan with jerk, Dong, Ferreira, Stori 2007; pruned to the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from olp.core.arrays import Array, Index, Mask
+from olp.core.values import dataclass
 from olp.trajectory import ramps
 from olp.trajectory.ceilings import ceilings
 from olp.trajectory.growing import Growing

@@ -6,14 +6,13 @@ rounding of their corners the rest.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from olp.core.arrays import Array, Index, Mask
 from olp.core.geometry import PLANES, arc_points
 from olp.core.machine import Machine
 from olp.core.toolpath import Toolpath
+from olp.core.values import dataclass
 from olp.program.feeds.moves import lengths_mm
 from olp.program.feeds.timing import BLEND_MM, PathControl, Timing, timing
 from olp.program.program import Program
@@ -34,13 +33,10 @@ _LARGEST_TURN = np.pi / 8
 
 
 def axis_limits(machine: Machine) -> AxisLimits:
-    """The limits of X, Y and Z that the machine file states."""
-    axes = [machine.axes[name] for name in "XYZ"]
-    return AxisLimits(
-        velocity=np.array([a.velocity_mm_s for a in axes]),
-        acceleration=np.array([a.acceleration_mm_s2 for a in axes]),
-        jerk=np.array([a.jerk_mm_s3 for a in axes]),
-    )
+    """The limits of X, Y and Z that the machine file states. Raises ConfigError where it leaves one out."""
+    stated = machine.motion_limits()
+    velocity, acceleration, jerk = np.array([stated[name] for name in "XYZ"]).T
+    return AxisLimits(velocity=velocity, acceleration=acceleration, jerk=jerk)
 
 
 def routes(program: Program, *, blend_mm: float = BLEND_MM, block_delete: bool = False) -> tuple[Route, ...]:

@@ -7,12 +7,13 @@ the shifts of the axes add. This is static compliance only; vibration is not inc
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from olp.core.arrays import Array, Index, Mask
 from olp.core.machine import Machine
+from olp.core.values import dataclass
 from olp.trajectory.motion import Motion
 from olp.trajectory.route import AxisLimits
 

@@ -13,12 +13,11 @@ jerk only the part that keeps the matrix positive enters it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.linalg import LinAlgError, solveh_banded
 
 from olp.core.arrays import Array, Index
+from olp.core.values import dataclass
 from olp.trajectory.route import AxisLimits
 
 #: three-point Gauss rule on [0, 1] for the time of a cell

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import numpy as np
 
 from olp.core.arrays import Array, Index
+from olp.core.values import dataclass
 from olp.trajectory.growing import Growing
 
 

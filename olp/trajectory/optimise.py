@@ -8,13 +8,14 @@ power 2/3, which no spline of its square follows. So windows launch from rest an
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 from scipy.linalg import LinAlgError
 
 from olp.core.arrays import Array, Index
+from olp.core.values import dataclass
 from olp.trajectory.critical import Profile, Timeline
 from olp.trajectory.interior import Rows, Spline, fits, least_time
 from olp.trajectory.motion import Motion

@@ -12,12 +12,11 @@ Int. J. Machine Tools and Manufacture 108 (2016).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from olp.core.arrays import Array, Index
 from olp.core.errors import UsageError
+from olp.core.values import dataclass
 from olp.trajectory.growing import Growing
 from olp.trajectory.motion import Motion
 from olp.trajectory.route import AxisLimits, Route

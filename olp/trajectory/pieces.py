@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from math import comb
 
 import numpy as np
 
 from olp.core.arrays import Array, Index, Mask
+from olp.core.values import dataclass
 from olp.trajectory.motion import Motion, derivatives
 
 #: pieces per block, so that its columns fit into the cache

@@ -9,7 +9,7 @@ waypoint are always possible.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -17,6 +17,7 @@ import numpy as np
 from olp.core.arrays import Array, Index
 from olp.core.errors import CannotCompute
 from olp.core.progress import Progress
+from olp.core.values import dataclass
 from olp.trajectory.audit import Audit, Ratios, with_jumps
 from olp.trajectory.contest import contest, fastest, stops_of
 from olp.trajectory.motion import Motion

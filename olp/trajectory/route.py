@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from olp.core.arrays import Array, Index
+from olp.core.values import dataclass
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,13 +10,12 @@ States", RSS 2021.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import ruckig
 
 from olp.core.arrays import Array, Mask
 from olp.core.errors import CannotCompute, UsageError
+from olp.core.values import dataclass
 from olp.trajectory.scurve import PHASES, rest_to_rest_s, states, through_peak
 
 #: factor on limits: without it, Ruckig fails in up to 9 % of the cases where a state is on a limit

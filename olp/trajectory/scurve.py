@@ -9,11 +9,10 @@ Source: Biagiotti, Melchiorri, "Trajectory Planning for Automatic Machines and R
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from olp.core.arrays import Array, Mask
+from olp.core.values import dataclass
 
 #: columns of a move: 2 to reach an allowed state, 3 up, the cruise, 3 down, 1 to leave with acceleration
 PHASES = 10

@@ -15,12 +15,12 @@ kernel meet to the last digit, however long the path and short the kernel.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import CannotCompute
+from olp.core.values import dataclass
 from olp.trajectory.kernels import deviations, least_over
 from olp.trajectory.route import AxisLimits, Route
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from olp.core.arrays import Array
+from olp.core.values import dataclass
 from olp.trajectory.critical import Profile, best_profile, driven
 from olp.trajectory.forecast import expected_s
 from olp.trajectory.motion import Motion

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
 from olp.core.arrays import Array, Index
+from olp.core.values import dataclass
 from olp.trajectory.contest import stops_of
 from olp.trajectory.route import AxisLimits, Route
 from olp.trajectory.solvers import SOLVERS, Candidate

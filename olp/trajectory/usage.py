@@ -6,12 +6,13 @@ Each piece is sampled in the middle and at both ends, weighted by the trapezoida
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Array, Index, Mask
+from olp.core.values import dataclass
 from olp.trajectory.motion import Motion
 from olp.trajectory.plan import Trajectory
 from olp.trajectory.route import Route

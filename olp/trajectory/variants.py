@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -13,6 +13,7 @@ from olp.core.arrays import Array
 from olp.core.errors import CannotCompute, OlpError, UsageError
 from olp.core.machine import Setup
 from olp.core.progress import Progress
+from olp.core.values import dataclass
 from olp.program.feeds.moves import lengths_mm
 from olp.program.feeds.timing import PathControl, path_modes
 from olp.program.feeds.words import Shared, check_feeds, write_feeds

@@ -9,11 +9,11 @@ avoids a possible loss.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
 from olp.core.arrays import Array
+from olp.core.values import dataclass
 from olp.errormodel.calibration import Calibration
 from olp.errormodel.entry import Entry
 from olp.errormodel.sensitivity import value_rows

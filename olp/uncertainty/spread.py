@@ -8,7 +8,6 @@ waypoint has the uncertainty of the difference from there; "true" work offsets c
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,6 +17,7 @@ from olp.core.arrays import Array, Index
 from olp.core.machine import Vector
 from olp.core.progress import Progress
 from olp.core.toolpath import Flag, Frame, Kind, Toolpath, Touch
+from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.reversal import plays
 from olp.errormodel.sensitivity import Rows, Sensitivity
@@ -99,7 +99,8 @@ class Chances:
     """Probabilities of being within a part tolerance. (n,) `before` and `after`: that the tip is within
     `limit_mm` of its nominal position at each waypoint. `lines` (l,) of the program have those that all their
     waypoints are within, `program_before` and `program_after` are those of the whole program, from so many
-    `draws`."""
+    `draws`. (n,) `nearer` are probabilities that correction brings the tip nearer to its nominal position,
+    and `gain` that the corrected program is better than the nominal one, by the mean square of deviations."""
 
     limit_mm: float
     before: Array
@@ -110,23 +111,21 @@ class Chances:
     program_before: float
     program_after: float
     draws: int
+    nearer: Array
+    gain: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Confidence:
     """The uncertainty of n waypoints in program order, in mm; see `Points`. `sigma_mm` (n, 3) are standard
-    uncertainties along X, Y, Z; `band_mm` (n,) is 2 sigma in the direction where it is longest. (n,)
-    `nearer` are probabilities that correction brings the tip nearer to its nominal position, and `gain` that
-    the corrected program is better than the nominal one, by the mean square of deviations. `expansion_mm` is
-    the largest standard uncertainty from temperatures. `chances` are None without a part tolerance.
-    """
+    uncertainties along X, Y, Z; `band_mm` (n,) is 2 sigma in the direction where it is longest.
+    `expansion_mm` is the largest standard uncertainty from temperatures. `chances` are None without a part
+    tolerance."""
 
     points: Points
     line: Index
     sigma_mm: Array
     band_mm: Array
-    nearer: Array
-    gain: float
     expansion_mm: float
     chances: Chances | None
 
@@ -173,15 +172,8 @@ def waypoints(
 
 def _bottoms(program: Program) -> Index:
     """The last feed move into each hole of a canned cycle; -1 where there is none."""
-    kind = program.toolpath.kind
-    feeds = [np.flatnonzero(kind[hole.first : hole.last] != Kind.RAPID) for hole in program.holes]
-    return np.array(
-        [
-            hole.first + int(own[-1]) if len(own) else -1
-            for hole, own in zip(program.holes, feeds, strict=True)
-        ],
-        np.int64,
-    )
+    feed = program.toolpath.kind[program.holes.moves()[0]] != Kind.RAPID
+    return program.holes.ends(feed)[1]
 
 
 def covariances(unknowns: Unknowns, path: Toolpath, points: Points) -> Array:
@@ -216,8 +208,6 @@ def confidence(
     line = path.line[points.move].astype(np.int64)
     covariance = np.zeros((n, 3, 3))
     touch, count = unknowns.touches(path.frames)
-    change = points.before_mm - points.after_mm
-    share = np.zeros(unknowns.sensitivity.columns)
     expands, expansion = unknowns.sensitivity.expansion is not None, 0.0
     joint = None if limit_mm is None else _Joint(unknowns, path, points, touch, count, limit_mm, seed)
     order = np.argsort(line, kind="stable")
@@ -228,19 +218,12 @@ def confidence(
             covariance[part] = _covariance(rows)
             if expands:
                 expansion = max(expansion, float((rows[:, :, -4:] ** 2).sum(axis=(0, 2)).max(initial=0.0)))
-            share += np.einsum("ink,ni->k", rows, change[part], optimize=True)
     covariance += _scatter(unknowns, count, path, points)
-    mean = (points.before_mm**2).sum(axis=1) - (points.after_mm**2).sum(axis=1)
-    spread = 2.0 * np.sqrt(np.maximum(np.einsum("ni,nij,nj->n", change, covariance, change), 0.0))
-    loose = _scatter_of_sum(unknowns, count, path, points, change)
-    total = 2.0 * float(np.sqrt(share @ share + loose))
     return Confidence(
         points=points,
         line=line,
         sigma_mm=np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)),
         band_mm=bands(covariance),
-        nearer=_positive(mean, spread),
-        gain=float(_positive(np.array([mean.sum()]), np.array([total]))[0]),
         expansion_mm=expansion**0.5,
         chances=None if joint is None else joint.chances(covariance),
     )
@@ -268,7 +251,7 @@ def _blocks(
         if touch.any():
             rows -= touch[path.frame[move]].transpose(1, 0, 2)
         if joint is not None:
-            joint.add(part, weights)
+            joint.add(part, weights, rows)
         yield part, rows
 
 
@@ -310,6 +293,10 @@ class _Joint:
         drawn = self.random.standard_normal((sensitivity.columns, self.draws), dtype=np.float32)
         self.values = sensitivity.table @ drawn
         self.scatter = np.array(unknowns.repeatability_mm)
+        #: what correction changes, and how the sum of its products with deviations depends on the unknowns
+        self.change = points.before_mm - points.after_mm
+        self.share = np.zeros(sensitivity.columns)
+        self.loose = _scatter_of_sum(unknowns, count, path, points, self.change)
         self.held = touch @ drawn
         if self.scatter.any() and count.any():
             noise = self.random.standard_normal(self.held.shape, dtype=np.float32)
@@ -319,10 +306,11 @@ class _Joint:
         self.lines: list[int] = []
         self.good: tuple[list[float], list[float]] = ([], [])
         self.worst = np.zeros((2, self.draws))
-        self.last: tuple[int, Array] | None = None
+        self.last: tuple[int, Rows] | None = None
 
-    def add(self, part: Index, weights: Sequence[csr_array]) -> None:
-        """The next waypoints, in the order of lines."""
+    def add(self, part: Index, weights: Sequence[csr_array], rows: Rows) -> None:
+        """The next waypoints, in the order of lines, with their `rows` (3, b, columns)."""
+        self.share += np.einsum("ink,ni->k", rows, self.change[part], optimize=True)
         sides = (self.points.before_mm[part], self.points.after_mm[part])
         square = np.zeros((2, len(part), self.draws), np.float32)
         frame = self.path.frame[self.points.move[part]]
@@ -338,7 +326,7 @@ class _Joint:
                 square[k] += away * away
         line = self.path.line[self.points.move[part]]
         starts = np.flatnonzero(np.concatenate(([True], line[1:] != line[:-1])))
-        worst = np.maximum.reduceat(square, starts, axis=1)
+        worst = _largest_of_runs(square, starts)
         np.maximum(self.worst, worst.max(axis=1), out=self.worst)
         numbers = line[starts].tolist()
         if self.last is not None and self.last[0] == numbers[0]:
@@ -355,7 +343,10 @@ class _Joint:
     def chances(self, covariance: Array) -> Chances:
         """The probabilities, with the (n, 3, 3) covariance of the waypoints."""
         self.end()
-        points = self.points
+        points, change = self.points, self.change
+        mean = (points.before_mm**2).sum(axis=1) - (points.after_mm**2).sum(axis=1)
+        variance = np.einsum("ni,nij,nj->n", change, covariance, change)
+        total = 2.0 * float(np.sqrt(self.share @ self.share + self.loose))
         return Chances(
             limit_mm=self.limit_mm,
             before=within(covariance, points.before_mm, self.limit_mm),
@@ -366,6 +357,8 @@ class _Joint:
             program_before=float((self.worst[0] <= self.limit).mean()),
             program_after=float((self.worst[1] <= self.limit).mean()),
             draws=self.draws,
+            nearer=_positive(mean, 2.0 * np.sqrt(np.maximum(variance, 0.0))),
+            gain=float(_positive(np.array([mean.sum()]), np.array([total]))[0]),
         )
 
     def end(self) -> None:
@@ -375,3 +368,16 @@ class _Joint:
             for side, worst in zip(self.good, self.last[1], strict=True):
                 side.append(float((worst <= self.limit).mean()))
             self.last = None
+
+
+def _largest_of_runs(values: Rows, starts: Index) -> Rows:
+    """(2, runs, draws) the largest of (2, n, draws) in each run of rows from one start to the next."""
+    if len(starts) == values.shape[1]:
+        return values
+    # ufunc.reduceat along a middle axis is several times slower
+    length = np.diff(starts, append=values.shape[1])
+    largest = values[:, starts]
+    for k in range(1, int(length.max())):
+        longer = np.flatnonzero(length > k)
+        largest[:, longer] = np.maximum(largest[:, longer], values[:, starts[longer] + k])
+    return largest

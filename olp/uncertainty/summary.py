@@ -67,7 +67,7 @@ def summary(
         "expected": {
             "before_rms_um": _expected(points.before_mm, variance),
             "after_rms_um": _expected(points.after_mm, variance),
-            "probability_better": None if chances is None else confidence.gain,
+            "probability_better": None if chances is None else chances.gain,
         },
         "within": None if chances is None else {
             "tolerance_um": chances.limit_mm * UM_PER_MM,
@@ -105,18 +105,18 @@ def findings(
 
 def _of_chances(confidence: Confidence, chances: Chances, expansion: Expansion | None) -> list[Finding]:
     results = []
-    weak = (confidence.nearer < PROBABLE_GAIN) & (chances.before < GOOD)
+    weak = (chances.nearer < PROBABLE_GAIN) & (chances.before < GOOD)
     if weak.any():
         lines = _numbers(confidence.line[weak])
         what = f"{int(weak.sum())} of {len(confidence)} waypoints: the correction is within its uncertainty"
         results.append(_finding("OLP431", what, lines))
-    if len(confidence) and confidence.gain < PROBABLE_GAIN:
+    if len(confidence) and chances.gain < PROBABLE_GAIN:
         before, after = (
             _expected(side, (confidence.sigma_mm**2).sum(axis=1))
             for side in (confidence.points.before_mm, confidence.points.after_mm)
         )
         what = (
-            f"the corrected program is better with a probability of {100 * confidence.gain:.0f} %: expected "
+            f"the corrected program is better with a probability of {100 * chances.gain:.0f} %: expected "
             f"rms deviation {before:.2f} um uncorrected, {after:.2f} um corrected"
         )
         results.append(_finding("OLP432", what))
@@ -190,7 +190,7 @@ def _lines(confidence: Confidence, chances: Chances) -> list[dict[str, Any]]:
                 ),
                 "within_before": float(chances.line_before[k]),
                 "within_after": float(chances.line_after[k]),
-                "nearer": float(confidence.nearer[own].min()),
+                "nearer": float(chances.nearer[own].min()),
             }
         )
     return rows

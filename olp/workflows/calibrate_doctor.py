@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,27 +13,31 @@ from olp.calibration.observations.points import Points
 from olp.core.errors import ConfigError
 from olp.core.machine import Setup, Vector
 from olp.core.units import UM_PER_MM
+from olp.core.values import dataclass
 from olp.errormodel.calibration import Calibration
 from olp.errormodel.uncertainty import Uncertainty
 from olp.files.calibration.covariance import load_uncertainty
 from olp.files.calibration.reader import load_calibration
 from olp.files.calibration.writer import calibration_files
 from olp.files.measurements.checkpoints import load_checkpoints
+from olp.files.measurements.reader import files_of_measurements
 from olp.files.sources import Sources
 from olp.findings.catalogue import Finding
 from olp.workflows.session import PathLike, Session
+from olp.workflows.shown import Filed
 
 #: Most rows of points that a finding names.
 _LISTED = 10
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CalibrationDiagnosis:
+class CalibrationDiagnosis(Filed):
     """The check of a calibration by points: the report ("olp-doctor-1") as a mapping, and findings.
 
     `diagnosis` holds verdicts and estimates, `corrected` the calibration with all decided mistakes corrected,
     `advice` the points that would decide the rest (None where nothing is undecided). `uncertainty` is that of
     the corrected calibration: None where the old one states none, or where curves were swapped.
+    `inputs` are the files that were read, which `write` never overwrites.
     """
 
     diagnosis: Diagnosis
@@ -42,6 +45,7 @@ class CalibrationDiagnosis:
     report: dict[str, Any]
     findings: tuple[Finding, ...]
     uncertainty: Uncertainty | None = None
+    inputs: tuple[str, ...] = ()
 
     @property
     def corrected(self) -> Calibration:
@@ -97,7 +101,9 @@ def diagnose_calibration(
         corrected_uncertainty, note = _uncertainty(diagnosis, calibration, stated, session.sources)
     report = _report(diagnosis, advice) | {"uncertainty": note}
     findings = tuple(_findings(diagnosis, advice))
-    return CalibrationDiagnosis(diagnosis, advice, report, findings, corrected_uncertainty)
+    measured = () if isinstance(points, Points) else files_of_measurements([points])
+    inputs = (*session.sources.files, *measured)
+    return CalibrationDiagnosis(diagnosis, advice, report, findings, corrected_uncertainty, inputs)
 
 
 def _uncertainty(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ from olp.calibration.control_tables.residuals import (
 from olp.core.errors import InputError, OlpError, UsageError
 from olp.core.machine import Machine, Setup
 from olp.core.progress import silent
+from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration, Reference

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import datetime
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,21 +20,24 @@ from olp.calibration.observations.measurements import MapWish, Measurements
 from olp.core.errors import ConfigError
 from olp.core.machine import Setup, Vector
 from olp.core.progress import Progress
+from olp.core.values import dataclass
 from olp.errormodel.calibration import Calibration
 from olp.files.calibration.writer import calibration_files
-from olp.files.measurements.reader import load_measurements
+from olp.files.measurements.reader import files_of_measurements, load_measurements
 from olp.findings.catalogue import Finding
 from olp.workflows.session import PathLike, Session
+from olp.workflows.shown import Filed
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FittedCalibration:
+class FittedCalibration(Filed):
     """A calibration with what it was made from.
 
     `fit` holds all parameters with their covariance (`fit.sigma(axis_mm, tool_mm)` is the uncertainty of the
     error of the curves anywhere), `report` the results as a mapping ("olp-fit-1"), `findings` what to know
     about them. `nonrigid` is the error beyond rigid bodies, where a map was asked for;
-    `nonrigid.sigma(axis_mm, tool_mm)` is the uncertainty with the map.
+    `nonrigid.sigma(axis_mm, tool_mm)` is the uncertainty with the map. `inputs` are the files that were
+    read, which `write` never overwrites.
     """
 
     calibration: Calibration
@@ -43,6 +45,13 @@ class FittedCalibration:
     report: dict[str, Any]
     findings: tuple[Finding, ...]
     nonrigid: NonRigid | None = None
+    inputs: tuple[str, ...] = ()
+
+    def to_text(self) -> str:
+        """The report as `olp calibrate fit` prints it."""
+        from olp.reports.outline import by_file, outline
+
+        return outline(by_file(self.full_report()))
 
     def files(self, target: PathLike) -> dict[Path, bytes]:
         """The bytes of the calibration file `target` and of its curves beside it."""
@@ -72,10 +81,12 @@ def fit_calibration(
     Raises InputError, ConfigError with every problem of the files, and CannotCompute.
     """
     described = None if machine is None else Session.start(machine).setup.machine
+    inputs: tuple[str, ...] = ()
     if isinstance(data, Measurements):
         measurements = data
     else:
         sources = [data] if isinstance(data, str | Path) else list(data)
+        inputs = files_of_measurements(sources)
         measurements = load_measurements(sources, None if described is None else described.chain)
     chain = described.chain if described is not None else measurements.chain
     if chain is None:
@@ -112,7 +123,7 @@ def fit_calibration(
     if beyond is not None:
         report["map"] = map_summary(beyond, mapped)
         findings = (*findings, *map_findings(beyond, mapped))
-    return FittedCalibration(calibration, fitted, report, findings, beyond)
+    return FittedCalibration(calibration, fitted, report, findings, beyond, inputs)
 
 
 __all__ = ["FittedCalibration", "fit_calibration"]

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import datetime
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from olp.core.errors import UsageError
 from olp.core.machine import Setup
+from olp.core.values import dataclass
 from olp.errormodel.calibration import Calibration, Reference
 from olp.files.calibration.writer import calibration_files
 from olp.files.control_tables.base import Imported, Sense

@@ -6,7 +6,6 @@ from __future__ import annotations
 import datetime
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -24,12 +23,14 @@ from olp.core.arrays import Array
 from olp.core.errors import CannotCompute, UsageError
 from olp.core.machine import Machine, Setup, Vector
 from olp.core.units import AXES, MM_PER_UM, UM_PER_MM
+from olp.core.values import dataclass
 from olp.files.measurements.plan_files import Pass, plan_files
 from olp.findings.catalogue import Finding
 from olp.program.registry import read
 from olp.program.rs274.positions import positions_program
 from olp.program.rs274.profiles.base import Profile
 from olp.workflows.session import PathLike, Session
+from olp.workflows.shown import Filed
 
 Instrument = Literal["lines", "tracker", "lines-and-tracker", "pods", "multilateration"]
 INSTRUMENTS: tuple[Instrument, ...] = ("lines", "tracker", "lines-and-tracker", "pods", "multilateration")
@@ -72,7 +73,7 @@ class Method:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class MeasurementPlan:
+class MeasurementPlan(Filed):
     """A plan: `chosen` of all `methods` that were compared, the report ("olp-plan-1") as a mapping, findings.
 
     `files(folder)` are a plan to be filled in (measurements.toml), its CSV files, and programs of the points.
@@ -84,6 +85,7 @@ class MeasurementPlan:
     report: dict[str, Any]
     findings: tuple[Finding, ...]
     dwell_s: float
+    inputs: tuple[str, ...] = ()
 
     def files(self, folder: PathLike, date: datetime.date | None = None) -> dict[Path, bytes]:
         """Bytes by path. Raises CannotCompute for a control whose programs cannot be written."""
@@ -112,8 +114,10 @@ def plan_measurements(
     uncertainty of a tracker's coordinate, `periods_mm` the periods of screws and scales by axis. Raises
     UsageError, ConfigError and CannotCompute.
     """
-    setup = Session.start(machine).setup
+    session = Session.start(machine)
+    setup = session.setup
     described = setup.machine
+    described.motion_limits()
     box = _box(described, box_mm)
     reflectors = list(tools) or _reflectors(described)
     tool_vectors = [tool.tool_vector_mm for tool in described.tools.values()]
@@ -136,9 +140,8 @@ def plan_measurements(
     chosen = min(good, key=lambda m: m.hours) if good else min(methods, key=lambda m: m.prediction.rms_mm)
     used = (DWELL_S[chosen.instrument] if dwell_s is None else dwell_s) + settle_s
     report = _report(described, box, chosen, methods, uncertainty_um, reflectors, judged)
-    return MeasurementPlan(
-        setup, chosen, tuple(methods), report, tuple(_findings(chosen, uncertainty_um)), used
-    )
+    findings = tuple(_findings(chosen, uncertainty_um))
+    return MeasurementPlan(setup, chosen, tuple(methods), report, findings, used, session.sources.files)
 
 
 def _box(machine: Machine, box_mm: Sequence[tuple[float, float]] | None) -> Array:
@@ -212,7 +215,7 @@ def _passes(planned: Planned, machine: Machine, wait_s: float, box: Array) -> It
         vectors = list(dict.fromkeys(map(tuple, cloud.tool_mm.tolist())))
         for number, vector in enumerate(vectors, start=1):
             rows = np.flatnonzero((cloud.tool_mm == np.array(vector)).all(axis=1))
-            rows = rows[order(cloud.axis_mm[rows], machine.axes)]
+            rows = rows[order(cloud.axis_mm[rows], machine.motion_limits())]
             label = "stations" if rays else cloud.source
             yield Pass(
                 f"{label}-{number}", _approached(cloud.axis_mm[rows], box), _waits(len(rows), wait_s),
@@ -254,7 +257,7 @@ def _waits(n: int, wait_s: float) -> list[float]:
 
 
 def _seconds(run: Pass, machine: Machine) -> float:
-    once = float(move_s(np.diff(run.places_mm, axis=0), machine.axes).sum()) + sum(run.wait_s)
+    once = float(move_s(np.diff(run.places_mm, axis=0), machine.motion_limits()).sum()) + sum(run.wait_s)
     return once * run.repeats
 
 

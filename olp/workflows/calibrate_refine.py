@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import datetime
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +18,7 @@ from olp.core.arrays import Array
 from olp.core.errors import CannotCompute, ConfigError
 from olp.core.machine import Setup, Vector
 from olp.core.units import MM_PER_UM, RAD_PER_URAD, UM_PER_MM
+from olp.core.values import dataclass
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration
 from olp.errormodel.reversal import plays
@@ -27,11 +27,13 @@ from olp.files.calibration.covariance import load_uncertainty
 from olp.files.calibration.reader import load_calibration
 from olp.files.calibration.writer import calibration_files
 from olp.files.measurements.checkpoints import load_checkpoints
+from olp.files.measurements.reader import files_of_measurements
 from olp.files.sources import Source
 from olp.findings.catalogue import Finding
 from olp.workflows import compare, refusals
 from olp.workflows.flatten import UnrollOptions
 from olp.workflows.session import PathLike, Session
+from olp.workflows.shown import Filed
 
 #: A run with a reduced chi-square above this does not agree with the covariance.
 MISFIT = 1.5
@@ -44,10 +46,11 @@ _MOVES = 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RefinedCalibration:
+class RefinedCalibration(Filed):
     """A calibration updated within its covariance by a measured run, and its new covariance.
 
     `refinement` holds figures in mm and rad, `report` the same as a mapping ("olp-refinement-1").
+    `inputs` are the files that were read, which `write` never overwrites.
     """
 
     calibration: Calibration
@@ -55,6 +58,7 @@ class RefinedCalibration:
     refinement: Refinement
     report: dict[str, Any]
     findings: tuple[Finding, ...]
+    inputs: tuple[str, ...] = ()
 
     def files(self, target: PathLike) -> dict[Path, bytes]:
         """The bytes of the new calibration file `target`, its curves and its covariance beside it."""
@@ -125,8 +129,10 @@ def refine_calibration(
     uncertainty = done.uncertainty
     if date is not None:
         uncertainty = dataclasses.replace(uncertainty, fingerprint=fingerprint(new))
+    read = () if isinstance(measured, Points) else files_of_measurements([measured])
+    inputs = (*session.sources.files, *read)
     return RefinedCalibration(
-        new, uncertainty, done, _report(new, done, len(points.axis_mm)), tuple(_findings(done))
+        new, uncertainty, done, _report(new, done, len(points.axis_mm)), tuple(_findings(done)), inputs
     )
 
 

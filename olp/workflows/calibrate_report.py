@@ -7,6 +7,7 @@ from pathlib import Path as FilePath
 
 from olp.calibration.iso230.evaluation import Evaluated, evaluate_all
 from olp.core.errors import ConfigError
+from olp.core.optional import takes_plots
 from olp.core.version import __version__
 from olp.reports import calibration as report_calibration
 from olp.reports.calibration import FitSummary
@@ -20,14 +21,14 @@ def evaluation(evaluated: Evaluated, name: str, date: datetime.date | None) -> b
     ending = FilePath(name).suffix.lower()
     if ending == ".json":
         return to_json(evaluated.as_dict())
-    plots = report_calibration.plots_of(evaluated) if ending == ".html" else {}
+    plots = report_calibration.plots_of(evaluated) if takes_plots(name) else {}
     return in_form(report_calibration.evaluation(evaluated, plots, __version__, date), name)
 
 
 def fit(fitted: FittedCalibration, name: str, date: datetime.date | None) -> bytes:
     """The report of `olp calibrate fit` in the form that `name` ends in."""
     ending = FilePath(name).suffix.lower()
-    report = {**fitted.report, "findings": [finding.as_dict() for finding in fitted.findings]}
+    report = fitted.full_report()
     if ending == ".json":
         return to_json(report)
     measurements = fitted.fit.measurements
@@ -38,6 +39,6 @@ def fit(fitted: FittedCalibration, name: str, date: datetime.date | None) -> byt
         evaluated = Evaluated(measurements, (), (), (), (), (), ())
     summary = FitSummary(fitted.fit, fitted.calibration, report, fitted.findings)
     plots: dict[str, bytes] = {}
-    if ending == ".html":
+    if takes_plots(name):
         plots = report_calibration.fit_plots(summary) | report_calibration.plots_of(evaluated)
     return in_form(report_calibration.calibration(evaluated, summary, plots, __version__, date), name)

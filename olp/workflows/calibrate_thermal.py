@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,15 +12,17 @@ from olp.calibration.thermal.drift import ThermalFit, findings, identify
 from olp.core.errors import ConfigError
 from olp.core.machine import Setup
 from olp.core.units import RAD_PER_URAD, UM_PER_MM
+from olp.core.values import dataclass
 from olp.errormodel.sources.structure import Structure
 from olp.files.calibration.reader import load_calibration
 from olp.files.calibration.structure import read_drift_log, structure_text
 from olp.findings.catalogue import Finding
 from olp.workflows.session import PathLike, Session
+from olp.workflows.shown import Shown
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ThermalFitting:
+class ThermalFitting(Shown):
     """The identified `structure`, its file (`data`, olp-thermal-1), the report ("olp-thermal-fit-1") and the
     findings."""
 

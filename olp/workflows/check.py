@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -20,6 +20,8 @@ from olp.core.errors import ProgramError, UsageError
 from olp.core.machine import Setup
 from olp.core.progress import Progress, silent
 from olp.core.units import MM_PER_UM, RAD_PER_URAD
+from olp.core.values import dataclass
+from olp.errormodel.known import KnownErrors
 from olp.files.meshes import read_mesh
 from olp.files.sources import Source, Sources
 from olp.findings.catalogue import GATE_CODES, RULES, Finding
@@ -36,6 +38,7 @@ from olp.workflows.flatten import AS_IT_IS
 from olp.workflows.original import placed, placed_findings
 from olp.workflows.proof import ProofOptions, Run, last_digit_mm, verify_programs
 from olp.workflows.session import Loaded, Outside, PathLike, Session
+from olp.workflows.shown import Shown
 
 #: Number of blocks with the least clearance in a report.
 _NEAREST = 20
@@ -56,7 +59,7 @@ class CheckOptions(ProofOptions):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Check:
+class Check(Shown):
     """The findings of a gate, its report ("olp-check-1"), and the clearance of every block where the job has
     meshes. `refused` is the error of a program that is refused; the findings are its reasons then."""
 
@@ -65,6 +68,12 @@ class Check:
     clearances: Clearances | None = None
     refused: ProgramError | None = None
     origin: Origin | None = None
+
+    def to_text(self) -> str:
+        """The report as `olp check` prints it."""
+        from olp.reports.check import to_text
+
+        return to_text(self.report, "error")
 
     def rows(self) -> Iterator[dict[str, Any]]:
         """The clearance of every block as plain data."""
@@ -106,7 +115,7 @@ class _Case:
 
 def check(
     program: PathLike | bytes,
-    machine: PathLike | Setup,
+    machine: PathLike | Setup | KnownErrors,
     job: PathLike | None = None,
     *,
     nominal: PathLike | bytes | None = None,

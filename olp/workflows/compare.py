@@ -4,23 +4,28 @@ from __future__ import annotations
 
 import datetime
 import hashlib
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, Literal
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path as FilePath
+from typing import Any, Literal, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from olp.checks.state import calibration_findings
 from olp.comparison import figures, runs
 from olp.comparison.pairing import Order
 from olp.comparison.path import Path
+from olp.core.arrays import Array, Index, Mask, read_only
 from olp.core.errors import InputError, UsageError
 from olp.core.machine import Setup
 from olp.core.progress import Progress, silent
 from olp.core.units import UM_PER_MM
+from olp.core.values import dataclass
 from olp.files.point_profile import PointProfile
 from olp.files.points import Points, layout_of, parse_points, read_points
 from olp.files.sources import Source, Sources
+from olp.files.write import write_bytes
 from olp.findings.catalogue import Finding
 from olp.program.origin import Files, Origin, original_of, quoted
 from olp.program.program import Program
@@ -35,6 +40,9 @@ from olp.workflows.doubt import acceptable, with_accepted
 from olp.workflows.flatten import UnrollOptions
 from olp.workflows.original import placed, placed_findings
 from olp.workflows.session import Loaded, PathLike, Session
+from olp.workflows.shown import Shown
+
+S = TypeVar("S", bound=np.generic)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,11 +64,14 @@ class CompareOptions(UnrollOptions):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Comparison:
+class Comparison(Shown):
     """The result of a comparison: the report ("olp-comparison-1") as a mapping and the findings.
 
     `path` is the nominal path, `runs` and `before` are the measured runs on it, in the nominal frame; all of
     them are None and empty for poses. `part_frame` is a table for the job file, of poses, where asked for.
+    `inputs` are the files that were read, which `write` never overwrites.
+
+    Arrays hold one row per measured point of `runs`, one run after the other; `run` (n,) says which.
     """
 
     report: dict[str, Any]
@@ -71,6 +82,66 @@ class Comparison:
     before: tuple[figures.Run, ...] = ()
     part_frame: str | None = None
     origin: Origin | None = None
+    inputs: tuple[str, ...] = ()
+
+    @property
+    def run(self) -> Index:
+        """(n,) the index in `runs` of the run of each point."""
+        return read_only(np.repeat(np.arange(len(self.runs)), [len(r.points_mm) for r in self.runs]))
+
+    @property
+    def line(self) -> Index:
+        """(n,) the line of the nominal program or file that each point belongs to."""
+        path = self.path
+        return _joined([] if path is None else [r.line(path) for r in self.runs], np.zeros(0, np.int64))
+
+    @property
+    def counted(self) -> Mask:
+        """(n,) whether the point counts in the figures."""
+        return _joined([r.counted for r in self.runs], np.zeros(0, bool))
+
+    @property
+    def measured_mm(self) -> Array:
+        """(n, 3) the measured points, in the nominal frame."""
+        return _joined([r.points_mm for r in self.runs], np.zeros((0, 3)))
+
+    @property
+    def nominal_mm(self) -> Array:
+        """(n, 3) the points of the nominal path that belong to them."""
+        return _joined([r.nominal_mm for r in self.runs], np.zeros((0, 3)))
+
+    @property
+    def deviation_um(self) -> Array:
+        """(n,) the distance from the nominal path that is judged, in um."""
+        return _joined([r.size_mm * UM_PER_MM for r in self.runs], np.zeros(0))
+
+    @property
+    def along_um(self) -> Array:
+        """(n,) the deviation along the path, in um."""
+        return _joined([r.deviation.along * UM_PER_MM for r in self.runs], np.zeros(0))
+
+    @property
+    def normal_um(self) -> Array:
+        """(n,) the deviation that is level and to the left of travel, in um."""
+        return _joined([r.deviation.normal * UM_PER_MM for r in self.runs], np.zeros(0))
+
+    @property
+    def binormal_um(self) -> Array:
+        """(n,) the deviation upward from the path, in um."""
+        return _joined([r.deviation.binormal * UM_PER_MM for r in self.runs], np.zeros(0))
+
+    def to_text(self) -> str:
+        """The report as `olp compare` prints it."""
+        from olp.reports.compare import to_text
+
+        return to_text(self.report)
+
+    def write(self, path: PathLike, *, force: bool = False) -> FilePath:
+        """Write `to_csv` as `Correction.write` does. Raises UsageError for poses, which have none."""
+        if self.path is None:
+            raise UsageError("poses have no deviations along a path; write the report (to_text, report)")
+        write_bytes(path, self.to_csv(), force=force, inputs=self.inputs)
+        return FilePath(path)
 
     def to_csv(self) -> Iterator[bytes]:
         """One row per measured point: run, arc length, line, nominal point, deviations from there, whether it
@@ -94,6 +165,11 @@ class Comparison:
                     f"{name},{s:.6f},{files.cells(line)},{x:.6f},{y:.6f},{z:.6f},{t:.4f},{n:.4f},{b:.4f},{good},{size:.4f}\n"
                     for s, line, x, y, z, t, n, b, good, size in rows
                 ).encode()
+
+
+def _joined(parts: Iterable[npt.NDArray[S]], none: npt.NDArray[S]) -> npt.NDArray[S]:
+    """The rows of all parts; `none` where there are no parts."""
+    return read_only(np.concatenate([none, *parts]))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -171,7 +247,8 @@ def run(
     if side.loaded is not None:
         part_um = side.loaded.part_tolerance_um(options.part_tolerance_um)
         options = replace(options, part_tolerance_um=part_um)
-    return _poses(side, sets, options) if options.poses else _paths(side, sets, options, tell)
+    done = _poses(side, sets, options) if options.poses else _paths(side, sets, options, tell)
+    return replace(done, inputs=sources.files if session is None else session.inputs())
 
 
 def _poses(side: _Side, sets: Sequence[Sequence[Points]], options: CompareOptions) -> Comparison:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -17,6 +17,7 @@ from olp.comparison.pairing import Order
 from olp.comparison.path import Path
 from olp.core.arrays import Array, Index
 from olp.core.units import UM_PER_MM
+from olp.core.values import dataclass
 from olp.files.points import Points
 from olp.findings.catalogue import Finding
 from olp.program.program import Program

@@ -22,6 +22,7 @@ Assessment = tuple[Confidence, dict[str, Any], list[Finding]]
 
 def assess(
     loaded: Loaded,
+    uncertainty: Uncertainty,
     nominal: Program,
     corrected: Program,
     groups: Index,
@@ -29,12 +30,9 @@ def assess(
     part_tolerance_um: float | None,
     date: datetime.date | None,
     tell: Progress,
-) -> Assessment | None:
+) -> Assessment:
     """Bands of a proved program, with a part tolerance its probabilities, its part of the report, and its
-    findings; None where the calibration states no uncertainty."""
-    uncertainty = loaded.uncertainty
-    if uncertainty is None:
-        return None
+    findings."""
     unknowns, growth, expansion = unknowns_of(loaded, uncertainty, date)
     points = waypoints(nominal, corrected, groups, uncorrected, loaded.full)
     limit = None if part_tolerance_um is None else part_tolerance_um * MM_PER_UM

@@ -4,32 +4,40 @@ from __future__ import annotations
 
 import datetime
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any, Literal
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from olp.checks import correction as checks
-from olp.compensation.planning import plan
+from olp.compensation.planning import plans
 from olp.compensation.stamp import find_stamp, stamp_line
 from olp.compensation.tally import Tally
+from olp.compensation.writer import Task
 from olp.compensation.writing import write
-from olp.core.arrays import Index
+from olp.core.arrays import Array, Index, read_only
 from olp.core.errors import AlreadyCorrected, UsageError
 from olp.core.machine import Setup
-from olp.core.progress import Progress, silent
+from olp.core.progress import Progress, part, silent
+from olp.core.values import dataclass
+from olp.errormodel.known import KnownErrors
 from olp.files.sources import Source, Sources
+from olp.files.write import write_bytes
 from olp.findings.catalogue import Finding
 from olp.program.program import Program
 from olp.program.registry import Options, read
 from olp.proof.judgement import Judgements
-from olp.uncertainty.spread import Confidence
 from olp.workflows import refusals
 from olp.workflows.doubt import accepted_of, doubted
 from olp.workflows.original import placed, placed_findings
 from olp.workflows.proof import Pair, ProofOptions, Run, limits_of, proved
 from olp.workflows.session import Loaded, Outside, PathLike, Session, opened
+from olp.workflows.shown import Judged
+
+if TYPE_CHECKING:
+    from olp.uncertainty.spread import Confidence
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,12 +49,14 @@ class CorrectOptions(ProofOptions):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Correction:
+class Correction(Judged):
     """A corrected program: its bytes, the report as a mapping ("olp-report-1"), and the findings;
     `confidence` has bands and probabilities by waypoint where a part tolerance is stated and the calibration
     states uncertainties. `table` has the judgement of every nominal move, and (n,) `groups` the last move of
     the corrected program that belongs to each. `nominal` is the text that was corrected, unrolled where the
-    call asks for it; lines of the table are then those of its original, which count through its files."""
+    call asks for it; lines of the table are then those of its original, which count through its files.
+    (n, 3) `position_mm` are the nominal axis positions at the ends of the moves, NaN where unknown. `inputs`
+    are the files that were read, which `write` never overwrites."""
 
     data: bytes
     report: dict[str, Any]
@@ -54,20 +64,36 @@ class Correction:
     table: Judgements
     groups: Index
     nominal: bytes
+    position_mm: Array
     confidence: Confidence | None = None
+    inputs: tuple[str, ...] = ()
 
     @staticmethod
-    def of(run: Run) -> Correction:
+    def of(run: Run, inputs: tuple[str, ...] = ()) -> Correction:
         origin = run.nominal.origin
         return Correction(
             run.text, placed(run.report, origin), placed_findings(run.findings, origin), run.table,
-            run.proof.groups, run.nominal.data, run.confidence,
+            read_only(run.proof.groups), run.nominal.data, read_only(run.proof.nominal.end_mm),
+            run.confidence, inputs,
         )  # fmt: skip
+
+    def to_text(self) -> str:
+        """The report as `olp correct` prints it."""
+        from olp.reports.report import to_text
+
+        return to_text(self.report)
+
+    def write(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write the corrected program, whole or not at all, also where it is above tolerance: look at
+        `report["verdict"]["ok"]` first. An existing file is overwritten with `force` only, an input never.
+        Returns the path. Raises as `olp.files.write.write_files`."""
+        write_bytes(path, self.data, force=force, inputs=self.inputs)
+        return Path(path)
 
 
 def correct(
     program: PathLike | bytes,
-    machine: PathLike | Setup,
+    machine: PathLike | Setup | KnownErrors,
     job: PathLike | None = None,
     *,
     tolerance_um: float = 1.0,
@@ -114,7 +140,7 @@ def run(
     with program.errors():
         loaded = session.loaded(options.outside_box, only_sure=options.only_sure_components)
         done = corrected(session.sources, program, loaded, options, progress or silent)
-    return Correction.of(done)
+    return Correction.of(done, session.inputs())
 
 
 def corrected(
@@ -128,11 +154,11 @@ def corrected(
     done = _rewritten(sources, program, loaded, options, refuse_doubts, tell)
     data = done.source.data
     tell("prove", 0.7)
-    reading = Options(contour=options.contour)
+    reading = Options(contour=options.contour, tell=part(tell, 0.7, 0.78, "prove"))
     second = read(done.text, loaded.setup, loaded.dialect, reading, words=False)
     pair = Pair(done.nominal, data, program.name, second, done.text, "", done.uncorrected)
     held = outside if options.outside_box == "hold" else None
-    run = proved(pair, loaded.held(), options, done.doubts, outside=held, tell=tell)
+    run = proved(pair, loaded.held(), options, done.doubts, outside=held, tell=part(tell, 0.78, 1.0))
     return replace(run, report=run.report | _written_report(done))
 
 
@@ -168,7 +194,7 @@ def _rewritten(
 ) -> _Rewritten:  # fmt: skip
     """Read, plan and write. Words and plan of a long program are large: this function releases them."""
     tell("read", 0.0)
-    reading = Options(contour=options.contour)
+    reading = Options(contour=options.contour, tell=part(tell, 0.0, 0.2))
     source, program = refusals.read(sources, source, loaded.setup, loaded.dialect, reading, options)
     if options.split_rapids and program.verbatim:
         raise UsageError(
@@ -178,24 +204,20 @@ def _rewritten(
     doubts = doubted(program, loaded, options.accept, options.date, name=source.name, refuse=refuse_doubts)
     accepted = accepted_of(doubts)
     tell("correct", 0.2)
+    told = part(tell, 0.2, 0.7)
     with program.errors():
         limits = limits_of(
             program, loaded, options, refuse_outside=options.outside_box == "refuse",
             split_rapids=options.split_rapids,
         )  # fmt: skip
-        rows = plan(program.toolpath, loaded.model, limits)
-        tell("write", 0.5)
-        marked = loaded.dialect.marks
-        written = write(
-            program, rows, loaded.model, tolerance_mm=limits.tolerance_mm,
-            increments_mm=loaded.setup.machine.least_increment_mm,
-            stamp=stamp_line(loaded.digest, loaded.dialect.comment, accepted) if marked else b"",
-            stamp_always=bool(accepted),
-        )  # fmt: skip
-    nominal = replace(program, words=None, slot=program.slot[:0])
+        stamp = stamp_line(loaded.digest, loaded.dialect.comment, accepted) if loaded.dialect.marks else b""
+        increments_mm = loaded.setup.machine.least_increment_mm
+        task = Task(program, loaded.model, limits.tolerance_mm, increments_mm, stamp, bool(accepted))
+        written = write(task, plans(program, loaded.model, limits, told), told)
+    nominal = replace(program, words=None, slot=np.zeros((0, 3), np.int32))
     # the corrected text has lines of its own
-    text = written.text if written.changed else bytes(source.data)
-    return _Rewritten(source, nominal, text, rows.uncorrected, written.parts, written.tally, doubts)
+    text = bytes(source.data) if written.text is None else written.text
+    return _Rewritten(source, nominal, text, written.uncorrected, written.parts, written.tally, doubts)
 
 
 def _written_report(done: _Rewritten) -> dict[str, Any]:

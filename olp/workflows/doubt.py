@@ -39,7 +39,11 @@ def doubted(
     With `refuse`, one that is an error and not accepted raises Doubtful; UsageError as `acceptable`. `name`
     is that of the program."""
     program = program.in_original()
-    inputs = Inputs(loaded.setup, program, loaded.calibration, loaded.model, date)
+    stated = loaded.stated
+    inputs = Inputs(
+        loaded.setup, program, loaded.calibration, loaded.model, date,
+        assumed=stated.assumed if stated else (), by_height=stated is not None and stated.by_height,
+    )  # fmt: skip
     accepted = acceptable(accept) | accepted_in(stamped, loaded.digest)
     return with_accepted(doubts(inputs), accepted, name=name, origin=program.origin, refuse=refuse)
 
@@ -78,6 +82,8 @@ def accepted_of(findings: Sequence[Finding]) -> list[str]:
 
 def _calibrated(session: Session) -> bool:
     machine = session.setup.machine
+    if session.stated is not None:
+        return True
     if machine.calibration is None or "all" in machine.compensated_by_controller:
         return False
     try:

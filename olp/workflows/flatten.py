@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from olp.core.errors import ProgramError, UsageError
 from olp.core.machine import Setup
+from olp.core.values import dataclass
 from olp.files.sources import Source, Sources
 from olp.program.dialect import Dialect
 from olp.program.origin import Origin, Unrolled
@@ -131,7 +132,7 @@ def beside(sources: Sources, program: Source) -> Callable[[str], tuple[str, byte
             return None
         for ending in _ENDINGS:
             candidate = Path(program.name).parent / f"{wanted}{ending}"
-            if candidate.is_file():
+            if sources.exists(candidate):
                 return str(candidate), sources.read(candidate)
         return None
 

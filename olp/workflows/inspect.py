@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from olp.checks import correction as checks
 from olp.compensation.stamp import find_stamp
-from olp.core.errors import ConfigError, ProgramError
+from olp.core.arrays import Array, read_only
+from olp.core.errors import ConfigError, ProgramError, UsageError
 from olp.core.machine import Setup
 from olp.core.toolpath import Kind, carried
+from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM
+from olp.errormodel.base import ErrorModel
 from olp.files.sources import Source
 from olp.workflows import refusals
 from olp.workflows.flatten import UnrollOptions
 from olp.workflows.original import placed
-from olp.workflows.session import PathLike, Session, opened
+from olp.workflows.session import Outside, PathLike, Session, opened
 
 
 def inspect(
@@ -87,43 +92,80 @@ def run(session: Session, program: Source, options: UnrollOptions) -> dict[str, 
 
 def error_at(
     machine: PathLike | Setup,
-    position_mm: tuple[float, float, float],
-    tool: int | tuple[float, float, float] | None = None,
+    position_mm: npt.ArrayLike,
+    tool: int | Sequence[float] | None = None,
     job: PathLike | None = None,
+    *,
+    outside_box: Outside = "refuse",
 ) -> dict[str, Any]:
-    """The error at one axis position: actual minus commanded at the tip, and its parts by source.
+    """The error at axis positions: actual minus commanded at the tip, and its parts by source.
 
-    `tool` is a tool number or a tool vector in mm (gauge point to tip); the default is the tool in the
-    spindle at the start.
+    `position_mm` is one position (3,) or many (n, 3), in the order X, Y, Z. `error_um` and `rotation_urad` of
+    the result are read-only arrays of the same shape, and so is `error_um` of each of its `sources`. `tool`
+    is a tool number or a tool vector in mm (gauge point to tip); the default is the tool in the spindle at
+    the start. Outside the calibrated box it raises ConfigError; with `outside_box="hold"` the error is that
+    at the face of the box. Raises UsageError for positions of another shape, or that are not finite.
     """
-    return error_of(Session.start(machine, job), position_mm, tool)
+    return error_of(Session.start(machine, job), position_mm, tool, outside_box)
 
 
 def error_of(
     session: Session,
-    position_mm: tuple[float, float, float],
-    tool: int | tuple[float, float, float] | None = None,
+    position_mm: npt.ArrayLike,
+    tool: int | Sequence[float] | None = None,
+    outside_box: Outside = "refuse",
 ) -> dict[str, Any]:
     """As `error_at`, in a session."""
-    loaded = session.loaded("refuse")
-    position = np.array([position_mm], float)
-    inside = loaded.model.inside(position)
-    if not inside.all():
-        axis = "XYZ"[int(np.flatnonzero(~inside[0])[0])]
-        raise ConfigError(
-            f"{axis} = {position[0]['XYZ'.index(axis)]:g} mm is outside the calibrated box; choose one inside"
-        )
+    position = _positions(position_mm)
+    rows = position.reshape(-1, 3)
+    loaded = session.loaded(outside_box)
+    if outside_box == "refuse":
+        _refuse_outside(rows, loaded.model)
     vector = session.tool_vector(tool)
     payload = loaded.setup.job.payload_kg
     tool_vector = np.array(carried(vector, payload))
+
+    def of_all(values: Array, unit: float) -> Array:
+        return read_only((values * unit).reshape(position.shape))
+
     return {
-        "position_mm": [float(v) for v in position_mm],
+        "position_mm": read_only(position),
         "tool_mm": [float(v) for v in vector],
         "payload_kg": payload,
-        "error_um": (loaded.model.error(position, tool_vector)[0] * 1e3).tolist(),
-        "rotation_urad": (loaded.model.rotation(position, None, payload)[0] * 1e6).tolist(),
+        "error_um": of_all(loaded.model.error(rows, tool_vector), UM_PER_MM),
+        "rotation_urad": of_all(loaded.model.rotation(rows, None, payload), 1.0 / RAD_PER_URAD),
         "sources": [
-            {"name": source, "error_um": (part[0] * 1e3).tolist()}
-            for source, part in loaded.model.contributions(position, tool_vector)
+            {"name": source, "error_um": of_all(part, UM_PER_MM)}
+            for source, part in loaded.model.contributions(rows, tool_vector)
         ],
     }
+
+
+def _positions(position_mm: npt.ArrayLike) -> Array:
+    """The positions as a copy. Raises UsageError where they are no positions."""
+    try:
+        position = np.array(position_mm, np.float64)
+    except (TypeError, ValueError):
+        raise UsageError("position_mm holds no numbers; expected X, Y, Z in mm, or rows of them") from None
+    if position.ndim not in (1, 2) or position.shape[-1] != 3:
+        raise UsageError(
+            f"position_mm has the shape {position.shape}; expected (3,) for one position, or (n, 3) with X, "
+            "Y, Z in each row"
+        )
+    if not np.isfinite(position).all():
+        raise UsageError("position_mm has a value that is not finite; leave such rows out")
+    return position
+
+
+def _refuse_outside(rows: Array, model: ErrorModel) -> None:
+    """Raise ConfigError for the first row outside the calibrated box."""
+    inside = model.inside(rows)
+    if inside.all():
+        return
+    row, axis = (int(k) for k in np.argwhere(~inside)[0])
+    low, high = model.box_mm[axis]
+    place = f" in row {row}" if len(rows) > 1 else ""
+    raise ConfigError(
+        f"{AXES[axis]} = {rows[row, axis]:g} mm{place} is outside the calibrated box, {low:g} to {high:g} "
+        "mm; choose one inside"
+    )

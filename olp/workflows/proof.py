@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import datetime
 import hashlib
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,26 +16,28 @@ from olp.checks.base import finding
 from olp.checks.model import model_findings
 from olp.compensation.invert import TOLERANCE_MM
 from olp.compensation.plan import Limits
-from olp.compensation.planning import plan
+from olp.compensation.planning import uncorrected_moves
 from olp.compensation.stamp import find_stamp
 from olp.compensation.style import fewest_decimals
 from olp.core.arrays import Index
 from olp.core.errors import ProgramError, naming
 from olp.core.machine import Setup
-from olp.core.progress import Progress, silent
+from olp.core.progress import Progress, part, silent
 from olp.core.toolpath import Flag, Toolpath
 from olp.core.units import MM_PER_UM, UM_PER_MM
+from olp.core.values import dataclass
 from olp.findings.catalogue import Finding
 from olp.program.origin import original_of
 from olp.program.program import Program
 from olp.program.registry import Options, read
 from olp.proof.judgement import Judgements, verdict
 from olp.proof.proof import ROUNDING_SHARE, Counts, Proof, largest_correction_mm, prove
-from olp.uncertainty.spread import Confidence
-from olp.workflows.confidence import assess
 from olp.workflows.doubt import accepted_of, doubted
 from olp.workflows.flatten import UnrollOptions
 from olp.workflows.session import Loaded
+
+if TYPE_CHECKING:
+    from olp.uncertainty.spread import Confidence
 
 _PROVES = (
     "the written text, read back from its bytes, commands what was computed (syntax, digits, modal words)",
@@ -119,8 +121,8 @@ def verify_programs(
         with naming(name or "<nominal>"):
             with first.errors():
                 limits = limits_of(first, loaded, options, refuse_outside=outside is None)
-                rows = plan(first.toolpath, loaded.model, limits)
-            pair = Pair(first, first.data, name, second, second.data, other, rows.uncorrected)
+                uncorrected = uncorrected_moves(first, loaded.model, limits)
+            pair = Pair(first, first.data, name, second, second.data, other, uncorrected)
             return proved(pair, loaded.held(), options, doubts, outside=outside)
     except ProgramError as error:
         raise error.in_file(other or "<corrected>") from None
@@ -148,15 +150,21 @@ def proved(
     tolerance_mm = options.tolerance_um * MM_PER_UM
     proof = _prove(
         pair.nominal, pair.corrected, loaded, pair.uncorrected, tolerance_mm,
-        last_digit_mm(pair.corrected, loaded.setup),
+        last_digit_mm(pair.corrected, loaded.setup), part(tell, 0.0, 0.8),
     )  # fmt: skip
     table = Judgements.of(proof)
     _prove_without_deleted(pair, loaded, options, proof, table)
     part_um = loaded.part_tolerance_um(options.part_tolerance_um)
     first = pair.nominal.in_original()
-    assessment = assess(
-        loaded, first, pair.corrected, proof.groups, pair.uncorrected, part_um, options.date, tell
-    )
+    assessment = None
+    if loaded.uncertainty is not None:
+        from olp.workflows.confidence import assess
+
+        assessment = assess(
+            loaded, loaded.uncertainty, first, pair.corrected, proof.groups, pair.uncorrected, part_um,
+            options.date, part(tell, 0.8, 0.95),
+        )  # fmt: skip
+    tell("report", 0.95)
     largest_mm = largest_correction_mm(first, pair.corrected, proof)
     findings = (
         *doubts,
@@ -186,13 +194,13 @@ def proved(
 
 def _prove(
     nominal: Program, corrected: Program, loaded: Loaded, uncorrected: Index, tolerance_mm: float,
-    digit_mm: float,
+    digit_mm: float, tell: Progress = silent,
 ) -> Proof:  # fmt: skip
     """The proof of two programs, whose nominal lines are those of the original."""
     with nominal.errors():
         proof = prove(
             nominal, corrected, loaded.model, tolerance_mm=tolerance_mm, digit_mm=digit_mm,
-            uncorrected=uncorrected,
+            uncorrected=uncorrected, tell=tell,
         )  # fmt: skip
     return replace(proof, nominal=nominal.in_original().toolpath)
 
@@ -211,9 +219,10 @@ def _prove_without_deleted(
     with naming(pair.other or "<corrected>"):
         other = read(pair.text, loaded.setup, loaded.dialect, reading, words=False)
     try:
-        rows = plan(nominal.toolpath, loaded.model, limits_of(nominal, loaded, options, refuse_outside=False))
+        limits = limits_of(nominal, loaded, options, refuse_outside=False)
+        uncorrected = uncorrected_moves(nominal, loaded.model, limits)
         without = Judgements.of(
-            _prove(nominal, other, loaded, rows.uncorrected, proof.tolerance_mm, proof.digit_mm)
+            _prove(nominal, other, loaded, uncorrected, proof.tolerance_mm, proof.digit_mm)
         )
         good = bool(np.isin(without.line[without.over], table.line[table.over]).all())
     except ProgramError:
@@ -241,7 +250,7 @@ def _unstamped(doubts: tuple[Finding, ...], loaded: Loaded) -> list[Finding]:
 def position_findings(proof: Proof, loaded: Loaded, outside: str | None) -> list[Finding]:
     """Findings on the travel, and on the calibrated box under the code `outside`, of the corrected path, with
     the nominal lines."""
-    path = replace(proof.written, line=proof.nominal.line[proof.owner()])
+    path = replace(proof.written, line=proof.nominal_lines())
     findings = state.travel_findings(path, loaded.setup.machine)
     if outside is not None:
         findings = [*findings, *state.box_findings(path, loaded.model.box_mm, outside)]

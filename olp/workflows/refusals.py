@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,8 @@ _LINES = 10
 #: What of a reason names a file.
 _FILES = ("file", "follows_file")
 
+#: The code of refused statements that a control may have and another not.
+_NO_SUCH_CODE = "OLP512"
 REFUSALS = tuple(code for code, rule in RULES.items() if rule.topic == "refusal")
 
 
@@ -38,19 +40,35 @@ def read(
     `block_delete` as in `as_asked`. Raises Refused with all the reasons where there are several, ProgramError
     where there is one; lines are those of the original."""
     unroll = unroller(sources, program, setup, dialect, unrolling, block_delete=block_delete)
-    parsed = read_all(
-        program.data,
-        setup,
-        dialect,
-        options,
-        words=words,
-        subprograms=beside(sources, program),
-        unroll=unroll,
-        expands=unrolling.expand_cycles,
-    )
+    try:
+        parsed = read_all(
+            program.data,
+            setup,
+            dialect,
+            options,
+            words=words,
+            subprograms=beside(sources, program),
+            unroll=unroll,
+            expands=unrolling.expand_cycles,
+        )
+    except ProgramError as error:
+        raise error if setup.machine.located else _with_control(error, dialect) from None
     if not program.data.strip():
         raise ProgramError("the file is empty; expected a program of at least one block", code="OLP501")
     return program if unroll is None else program.holding(parsed.data), parsed
+
+
+def _with_control(error: ProgramError, dialect: Dialect) -> ProgramError:
+    """The refusal of a program whose control no file states: with that of the first code, how to name it."""
+    way_on = f"; no file says which control this is for, {dialect.name} is taken: name yours with --dialect"
+    if isinstance(error, Refused):
+        for i, reason in enumerate(error.reasons):
+            if reason.code == _NO_SUCH_CODE:
+                named = replace(reason, message=reason.message + way_on)
+                return Refused((*error.reasons[:i], named, *error.reasons[i + 1 :]), complete=error.complete)
+    elif error.code == _NO_SUCH_CODE:
+        error.message += way_on
+    return error
 
 
 def reasons_of(error: ProgramError, name: str) -> tuple[Reason, ...]:

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import datetime
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path as FilePath
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from olp.comparison.figures import Run
-from olp.comparison.nominal import nominal_of
-from olp.comparison.pairing import pair
+from olp.comparison.nominal import Nominal, counting, nominal_of
+from olp.comparison.pairing import beside
 from olp.comparison.path import Path
+from olp.core.arrays import Index, Mask
 from olp.core.errors import CannotCompute
-from olp.core.toolpath import carried
+from olp.core.optional import takes_plots
+from olp.core.toolpath import Toolpath, carried
 from olp.core.version import __version__
+from olp.errormodel.base import ErrorModel
 from olp.files.sources import Source
 from olp.program.registry import Options, read
 from olp.proof.acceptance_tests import predicted
@@ -25,9 +28,12 @@ from olp.workflows.compare import Comparison
 from olp.workflows.correct import Correction, CorrectOptions
 from olp.workflows.results import ResultCorrection
 from olp.workflows.session import Session
-from olp.workflows.simulate import SimulateOptions, simulated
+from olp.workflows.simulate import tips
 
-#: Most points of a predicted path in a picture.
+if TYPE_CHECKING:
+    from olp.reports.plots.thinned import Thinned
+
+#: Points of a predicted path at equal steps, at most.
 _POINTS = 120_000
 #: Least distance between them, in mm.
 _STEP_MM = 0.5
@@ -37,6 +43,7 @@ def comparison(result: Comparison, session: Session | None, name: str, date: dat
     """The report of a comparison in the form that `name` ends in."""
     from olp.reports import document_comparison as report_document
     from olp.reports.plots import path as plots_path
+    from olp.reports.plots.thinned import thinned
 
     report = dict(result.report)
     if session is not None:
@@ -45,14 +52,10 @@ def comparison(result: Comparison, session: Session | None, name: str, date: dat
         return to_json(report)
     plots: dict[str, bytes] = {}
     runs = {"before": result.before, "after": result.runs}
-    if (
-        FilePath(name).suffix.lower() == ".html"
-        and result.path is not None
-        and any(r.counted.any() for r in result.runs)
-    ):
+    if takes_plots(name) and result.path is not None and any(r.counted.any() for r in result.runs):
         tolerance = report.get("tolerance_um")
         sides = measured_sides(runs)
-        plots = _path_plots(result.path, runs, tolerance, sides) | {
+        plots = _path_plots(result.path, thinned(result.path, runs), tolerance, sides) | {
             "components": plots_path.components(result.path, runs, sides)
         }
     return in_form(
@@ -70,25 +73,25 @@ def results(result: ResultCorrection, name: str, date: datetime.date | None) -> 
 
 
 def correction(
-    result: Correction, nominal: Source, session: Session, options: CorrectOptions, name: str
-) -> bytes:
+    result: Correction, nominal: Source, session: Session, options: CorrectOptions, name: str,
+    *, plots: bool = True,
+) -> bytes:  # fmt: skip
     """The report of a correction in the form that `name` ends in; `nominal` is the program that was
-    corrected, unrolled where the call asks for it."""
+    corrected, unrolled where the call asks for it. Only a page has `plots`."""
     from olp.reports import document_correction as report_document
 
-    report = dict(result.report) | {"test_paths": _tests(session)}
+    tests = session.once("test_paths", lambda: _tests(session))
+    report = dict(result.report) | {"test_paths": tests}
     if FilePath(name).suffix.lower() == ".json":
         return to_json(report)
-    plots: dict[str, bytes] = {}
-    if FilePath(name).suffix.lower() == ".html":
-        plots = _predicted_plots(result, nominal, session, options)
+    drawn: dict[str, bytes] = {}
+    if plots and takes_plots(name):
+        drawn = _predicted_plots(result, nominal, session, options) | _test_plots(report, name)
         if result.confidence is not None and len(result.confidence):
             from olp.reports.plots import path as plots_path
 
-            plots = plots | {"bands": plots_path.bands(result.confidence)}
-    return in_form(
-        report_document.correction(report, plots | _test_plots(report, name), __version__, options.date), name
-    )
+            drawn = drawn | {"bands": plots_path.bands(result.confidence)}
+    return in_form(report_document.correction(report, drawn, __version__, options.date), name)
 
 
 def _tests(session: Session) -> dict[str, Any]:
@@ -102,7 +105,7 @@ def _test_plots(report: Mapping[str, Any], name: str) -> dict[str, bytes]:
     from olp.reports.plots import path as plots_path
 
     tests = report.get("test_paths")
-    if not tests or FilePath(name).suffix.lower() != ".html":
+    if not tests or not takes_plots(name):
         return {}
     return {
         "circles": plots_path.circles(tests["circles"]),
@@ -111,14 +114,14 @@ def _test_plots(report: Mapping[str, Any], name: str) -> dict[str, bytes]:
 
 
 def _path_plots(
-    path: Path, runs: Mapping[str, Sequence[Run]], tolerance: float | None, sides: Mapping[str, str]
+    path: Path, groups: Mapping[str, Thinned], tolerance: float | None, sides: Mapping[str, str]
 ) -> dict[str, bytes]:
     from olp.reports.plots import path as plots_path
 
     return {
-        "picture": plots_path.picture(path, runs, sides),
-        "along": plots_path.along(path, runs, tolerance, sides),
-        "histogram": plots_path.histogram(runs, tolerance, sides),
+        "picture": plots_path.picture(path, groups, sides),
+        "along": plots_path.along(path, groups, tolerance, sides),
+        "histogram": plots_path.histogram(groups, tolerance, sides),
     }
 
 
@@ -126,23 +129,47 @@ def _predicted_plots(
     result: Correction, nominal: Source, session: Session, options: CorrectOptions
 ) -> dict[str, bytes]:
     """Plots of where the tip would go, with the nominal and with the corrected program."""
+    from olp.reports.plots.thinned import Canvas, Thinned
+
     loaded = session.loaded("hold").reading(nominal)
-    program = read(nominal.data, loaded.setup, loaded.dialect, Options(contour=options.contour), words=False)
+    reading = Options(contour=options.contour)
+    program = read(nominal.data, loaded.setup, loaded.dialect, reading, words=False)
     try:
-        path = nominal_of(program.toolpath, loaded.model, "tip", points=program.dialect.points).path
+        way = nominal_of(program.toolpath, loaded.model, "tip", points=program.dialect.points)
     except CannotCompute:
         return {}
-    step = max(_STEP_MM, path.length_mm / _POINTS)
-    runs: dict[str, Sequence[Run]] = {}
-    simulating = SimulateOptions(
-        step_mm=step, contour=options.contour, date=options.date, accept=options.accept
-    )
-    corrected = session.sources.source(result.data)
-    for side, text in (("before", session.sources.source(nominal.data)), ("after", corrected)):
-        points = simulated(session.sources, text, loaded, simulating).points_mm
-        # points farther away are no part of the path, such as those of a tool change
-        reach = 10.0 * float(result.report["deviation"]["before"]["between"]["max_um"]) * 1e-3 + 0.1
-        runs[side] = (Run.of(side, path, points, pair(path, points, "forward"), reach),)
-    if not all(run.counted.any() for group in runs.values() for run in group):
+    corrected = read(result.data, loaded.setup, loaded.dialect, reading, words=False)
+    # points farther away are no part of the path, such as those of a tool change
+    reach_mm = 10.0 * float(result.report["deviation"]["before"]["between"]["max_um"]) * 1e-3 + 0.1
+    along, at_end = counting(program.toolpath, points=program.dialect.points)
+    counts, canvas, groups = along | at_end, Canvas(way.path), {}
+    for side, path, last in (
+        ("before", program.toolpath, np.arange(len(program.toolpath))),
+        ("after", corrected.toolpath, result.groups),
+    ):
+        groups[side] = Thinned(way.path, canvas)
+        for run in _runs(way, counts, path, last, loaded.model, reach_mm):
+            groups[side].add(run)
+    if not all(group.points for group in groups.values()):
         return {}
-    return _path_plots(path, runs, float(result.report["verdict"]["numerical"]["allowed_um"]), SIDES)
+    return _path_plots(way.path, groups, float(result.report["verdict"]["numerical"]["allowed_um"]), SIDES)
+
+
+def _runs(
+    nominal: Nominal, counts: Mask, path: Toolpath, last: Index, model: ErrorModel, reach_mm: float
+) -> Iterator[Run]:
+    """Where the tip goes along a path, part by part, set beside the nominal one, on nominal moves that count
+    (n,). `last` (n,) is the last move of the path that belongs to each of them."""
+    way = nominal.path
+    owner = np.minimum(np.searchsorted(last, np.arange(len(path))), len(last) - 1)
+    step_mm = max(_STEP_MM, way.length_mm / _POINTS)
+    for points, move in tips(path, model, step_mm):
+        rows = np.flatnonzero(counts[owner[move]] & np.isfinite(points).all(axis=1))
+        points, of = points[rows], owner[move[rows]]
+        # of several chords of an arc the one that is as far along as the point
+        first, behind = (np.searchsorted(nominal.move, of, side) for side in ("left", "right"))
+        begin = np.maximum.accumulate(np.where(np.diff(of, prepend=-1) != 0, np.arange(len(of)), 0))
+        share = (np.arange(len(of)) - begin + 1) / np.bincount(of)[of]
+        segment = first + np.ceil(share * (behind - first)).astype(np.int64) - 1
+        segment = np.clip(segment, 0, len(way) - 1)
+        yield Run.of("", way, points, beside(way, points, segment), reach_mm, "free")

@@ -5,30 +5,33 @@ from __future__ import annotations
 
 import datetime
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
 from olp.checks.doubt import stated_doubts
 from olp.checks.doubt_size import box_doubts
-from olp.compensation.stamp import find_stamp, stamp_line, stamped
-from olp.core.arrays import Array
+from olp.compensation.stamp import find_stamp, stamp_line
 from olp.core.errors import AlreadyCorrected, InputError, UsageError
 from olp.core.machine import Setup
 from olp.core.units import UM_PER_MM
+from olp.core.values import dataclass
 from olp.files.point_profile import load_profile
 from olp.files.sources import Source
+from olp.files.write import write_bytes
 from olp.findings.catalogue import Finding
 from olp.program.text.delimited import Layout, detected_layout, first_lines
-from olp.program.text.numbers import Placing, number, spliced, written
 from olp.results.forward import Forward, forward
 from olp.results.frames import frame_of, stylus_of
-from olp.results.reported import Reported, Stated
+from olp.results.reported import Reported, Stated, missing
 from olp.results.table import read_table
+from olp.results.writing import write
 from olp.workflows.doubt import acceptable, accepted_of, with_accepted
 from olp.workflows.results_report import report_of
 from olp.workflows.session import Loaded, Outside, PathLike, Session, opened
+from olp.workflows.shown import Shown
 
 #: Rounding above this, in mm, is a finding: the bar of the corrections themselves.
 _ROUNDING_MM = 2e-4
@@ -58,12 +61,25 @@ class ResultOptions:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ResultCorrection:
-    """Corrected results: their bytes, the report as a mapping ("olp-results-1"), and the findings."""
+class ResultCorrection(Shown):
+    """Corrected results: their bytes, the report as a mapping ("olp-results-1"), and the findings. `inputs`
+    are the files that were read, which `write` never overwrites."""
 
     data: bytes
     report: dict[str, Any]
     findings: tuple[Finding, ...]
+    inputs: tuple[str, ...] = ()
+
+    def to_text(self) -> str:
+        """The report as `olp results` prints it."""
+        from olp.reports.results import to_text
+
+        return to_text(self.report)
+
+    def write(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write the corrected results as `Correction.write` does."""
+        write_bytes(path, self.data, force=force, inputs=self.inputs)
+        return Path(path)
 
 
 def correct_results(
@@ -105,7 +121,8 @@ def run(session: Session, results: Source, options: ResultOptions) -> ResultCorr
         profile = load_profile(profile, session.sources.read).layout
     results.load()
     with results.errors("<results>"):
-        return _corrected(results, loaded, options, profile)
+        done = _corrected(results, loaded, options, profile)
+    return replace(done, inputs=session.inputs())
 
 
 def _corrected(
@@ -132,13 +149,15 @@ def _corrected(
     axes = _axes(reported, loaded)
     reported = replace(reported, assumed=(*reported.assumed, _COUNTED[axes]))
     findings = _already(reported, loaded)
-    own = bool(np.isfinite(reported.stylus_mm).all())
+    own = bool(reported.own_stylus.all())
     frames = [frame_of(setup, n) for n in reported.frames]
     styli = [stylus_of(setup, t, own) for t in reported.tools]
     result = forward(
         reported, frames, styli, loaded.model, axes=axes, hold=options.outside_box == "hold",
         payload_kg=setup.job.payload_kg,
     )  # fmt: skip
+    # the directions are large, and were needed for that alone
+    reported = replace(reported, normal=missing(len(reported), 3))
     if radius is None and any(s.radius_mm == 0.0 and any(s.tool_vector_mm) for s in styli):
         findings.append(
             Finding("OLP623", "no radius of the tip is known; give --tip-radius-mm, 0 for centres")
@@ -147,7 +166,7 @@ def _corrected(
     mark = b""
     if reported.comment is not None:
         mark = stamp_line(loaded.digest, reported.comment, accepted_of(doubts))
-    text, rounding = _write(reported, result.added_mm, mark, options.decimals)
+    text, rounding = write(reported, result.added_mm, mark, options.decimals)
     turned = sorted(
         {f.name for f in frames if f.touched is not None and not np.allclose(f.rotation, np.eye(3))}
     )
@@ -245,32 +264,6 @@ def _refuse_twice(statement: Stated, active: bool, thermal: bool) -> None:
             "it",
             line=statement.line,
         )
-
-
-def _write(reported: Reported, added_mm: Array, stamp: bytes, decimals: int | None) -> tuple[bytes, float]:
-    """The corrected text, and the largest rounding error, in mm."""
-    placing = Placing(reported.data, reported.start, reported.end)
-    edits: list[tuple[int, int, bytes]] = []
-    rounding = 0.0
-    added = added_mm / reported.unit_mm[:, None]
-    for i, row in enumerate(reported.form):
-        for j, form in enumerate(row):
-            value = form.value + float(added[i, j])
-            start, end = int(reported.start[i, j]), int(reported.end[i, j])
-            text, old = written(form, value, decimals, reported.decimal), reported.data[start:end]
-            rounded = number(text, reported.decimal)
-            kept = form.value if rounded is None else rounded.value
-            if kept != form.value and b"$" in old:
-                # a number that is continued in the next line now ends in the first
-                edits.append((start, end, text + old[old.index(b"$") : -len(old.split(b"\n")[-1].lstrip())]))
-            elif kept != form.value:
-                edits.append(placing.place(start, end, text))
-            rounding = max(rounding, abs(kept - value) * float(reported.unit_mm[i]))
-    text = spliced(reported.data, edits)
-    if stamp and edits:
-        eol = b"\r\n" if b"\r\n" in reported.data[:4096] else b"\n"
-        text = stamped(text, stamp, eol, ())
-    return text, rounding
 
 
 def _finding(code: str, message: str, lines: Sequence[int]) -> Finding:

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 
 from olp.core.arrays import Array
 from olp.core.units import UM_PER_MM
+from olp.core.values import dataclass
+from olp.errormodel.base import ErrorModel
 from olp.findings.catalogue import Finding
 from olp.results.forward import Forward
-from olp.results.reported import Reported
+from olp.results.reported import BAND, Reported
 from olp.workflows.doubt import accepted_of
 from olp.workflows.session import Loaded
 
@@ -41,12 +43,7 @@ def report_of(
     findings: Sequence[Finding],
 ) -> dict[str, Any]:
     """The report ("olp-results-1")."""
-    added = result.added_mm * UM_PER_MM
-    size = np.sqrt((added * added).sum(axis=1))
-    sources = [
-        {"name": source, **_size(part * UM_PER_MM)}
-        for source, part in loaded.model.contributions(result.axis_mm, result.tool_vector_mm, result.play)
-    ]
+    size_um = _size_um(result.added_mm)
     return {
         "schema": "olp-results-1",
         "results": {
@@ -58,21 +55,16 @@ def report_of(
         },
         **loaded.heads(),
         "correction": {
-            **_size(added),
-            "max_by_axis_um": np.abs(added).max(axis=0, initial=0.0).tolist(),
+            "max_um": float(size_um.max(initial=0.0)),
+            "rms_um": float(np.sqrt(np.mean(size_um * size_um))),
+            "max_by_axis_um": [float(np.abs(column).max()) * UM_PER_MM for column in result.added_mm.T],
             "rounding_um": rounding_mm * UM_PER_MM,
         },
-        "sources": sorted(sources, key=lambda s: -float(s["max_um"])),
+        "sources": _sources(result, loaded.model),
         "carried": [
             {"line": item.line, "name": item.name, "reason": item.reason} for item in reported.unchanged
         ],
-        "points": [
-            {"line": line, "name": label, "axis_mm": axis, "added_um": row, "size_um": away}
-            for line, label, axis, row, away in zip(
-                reported.line.tolist(), reported.names, result.axis_mm.tolist(), added.tolist(),
-                size.tolist(), strict=True,
-            )
-        ],
+        "points": Points(reported, result),
         "corrected": {"sha256": hashlib.sha256(text).hexdigest()},
         "accepted": accepted_of(findings),
         "findings": [f.as_dict() for f in findings],
@@ -81,6 +73,78 @@ def report_of(
     }  # fmt: skip
 
 
-def _size(rows_um: Array) -> dict[str, float]:
-    size = np.sqrt((rows_um * rows_um).sum(axis=1))
-    return {"max_um": float(size.max(initial=0.0)), "rms_um": float(np.sqrt(np.mean(size * size)))}
+@dataclass(frozen=True, slots=True, eq=False)
+class Points(Sequence[dict[str, Any]]):
+    """The points of a report, each as plain data only when it is asked for."""
+
+    reported: Reported
+    result: Forward
+
+    def __len__(self) -> int:
+        return len(self.reported)
+
+    @overload
+    def __getitem__(self, index: int) -> dict[str, Any]: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[dict[str, Any]]: ...
+    def __getitem__(self, index: int | slice) -> dict[str, Any] | list[dict[str, Any]]:
+        if not isinstance(index, slice):
+            k = range(len(self))[index]
+            return self[k : k + 1][0]
+        result = self.result
+        return [
+            {"line": line, "name": label, "axis_mm": axis, "added_um": row, "size_um": away}
+            for line, label, axis, row, away in zip(
+                self.reported.line[index].tolist(), self.reported.names[index],
+                result.axis_mm[index].tolist(), (result.added_mm[index] * UM_PER_MM).tolist(),
+                _size_um(result.added_mm[index]).tolist(), strict=True,
+            )
+        ]  # fmt: skip
+
+    def tolist(self) -> list[dict[str, Any]]:
+        """All of them."""
+        return self[:]
+
+    def largest(self, count: int) -> list[dict[str, Any]]:
+        """Those to which most was added, the largest first."""
+        order = np.argsort(-_size_um(self.result.added_mm), kind="stable")[:count]
+        return [self[k] for k in order.tolist()]
+
+
+def _size_um(rows_mm: Array) -> Array:
+    """(n,) the size of vectors (n, 3)."""
+    square = np.zeros(len(rows_mm))
+    for j in range(3):
+        column = rows_mm[:, j] * UM_PER_MM
+        column *= column
+        square += column
+    return np.asarray(np.sqrt(square, out=square), float)
+
+
+def _sources(result: Forward, model: ErrorModel) -> list[dict[str, Any]]:
+    """The name of each source of error, and the largest and the rms of its part, the largest first."""
+    largest_um: dict[str, float] = {}
+
+    def squares(a: int, b: int) -> dict[str, float]:
+        """Sums over the points a..b of the squares of parts, in um; in pairs, as numpy sums a column."""
+        if b - a > BAND:
+            half = a + (b - a) // 16 * 8
+            first, second = squares(a, half), squares(half, b)
+            return {name: first.get(name, 0.0) + second.get(name, 0.0) for name in first | second}
+        sums = {}
+        tool = result.tool_vector_mm
+        play = None if result.play is None else result.play[a:b]
+        for name, part in model.contributions(
+            result.axis_mm[a:b], tool if tool.ndim == 1 else tool[a:b], play
+        ):
+            size_um = _size_um(part)
+            largest_um[name] = max(largest_um.get(name, 0.0), float(size_um.max(initial=0.0)))
+            sums[name] = float((size_um * size_um).sum())
+        return sums
+
+    count = len(result.axis_mm)
+    rows = [
+        {"name": name, "max_um": largest_um[name], "rms_um": float(np.sqrt(total / count))}
+        for name, total in squares(0, count).items()
+    ]
+    return sorted(rows, key=lambda row: -row["max_um"])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -12,6 +12,7 @@ from olp.checks.state import travel_findings
 from olp.core.errors import CannotCompute, UsageError
 from olp.core.machine import Setup
 from olp.core.progress import Progress, silent
+from olp.core.values import dataclass
 from olp.files import trajectory as files
 from olp.files.sources import Source
 from olp.files.write import write_files
@@ -34,6 +35,7 @@ from olp.workflows.flatten import UnrollOptions
 from olp.workflows.original import placed, placed_findings
 from olp.workflows.retime_report import against, proved, report_of
 from olp.workflows.session import PathLike, Session
+from olp.workflows.shown import Shown
 
 Format = Literal["csv", "npz", "parquet", "ros", "pvt"]
 #: Format of a trajectory, by suffix.
@@ -62,7 +64,7 @@ class RetimeOptions(UnrollOptions):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Retiming:
+class Retiming(Shown):
     """A trajectory for each stretch of the program between moves of the control itself, as `plan`; the report
     ("olp-retime-1"), and the findings: doubts about the inputs, and axes
     commanded beyond their travel. `by_original` is the plan with the lines of the text that the program was
@@ -72,6 +74,12 @@ class Retiming:
     report: dict[str, Any]
     findings: tuple[Finding, ...]
     by_original: Plan
+
+    def to_text(self) -> str:
+        """The report as `olp retime` prints it."""
+        from olp.reports.retime import to_text
+
+        return to_text(self.report)
 
     @property
     def trajectories(self) -> tuple[Trajectory, ...]:

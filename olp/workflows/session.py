@@ -3,34 +3,40 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator, Sequence, Sized
+from contextlib import contextmanager
+from dataclasses import field, replace
+from operator import index
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
-from olp.core.errors import ConfigError
+from olp.core.errors import ConfigError, InputError, UsageError
 from olp.core.machine import Setup
+from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration
+from olp.errormodel.known import KnownErrors
 from olp.errormodel.uncertainty import Uncertainty
 from olp.files.calibration.covariance import load_uncertainty
 from olp.files.calibration.reader import files_beside, load_calibration
-from olp.files.calibration.structure import read_drift_log, sensors_of
 from olp.files.config import read_setup
 from olp.files.sources import Source, Sources
 from olp.program.dialect import Dialect
 from olp.program.registry import DIALECTS, dialect_of, find
-from olp.uncertainty.components import improbable
+from olp.workflows.known import Stated, described_by
 
 PathLike = str | Path
 Outside = Literal["refuse", "hold"]
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Loaded:
     """Everything loaded that a run needs. `dialect` is that of the control until a program is read
     (`reading`). `skip` are components that the control corrects. `left_out` are those that are not corrected
-    because they are within their own uncertainty; `model` has neither."""
+    because they are within their own uncertainty; `model` has neither. `stated` is what the call states in
+    place of files, None where files do."""
 
     setup: Setup
     dialect: Dialect
@@ -40,6 +46,7 @@ class Loaded:
     uncertainty: Uncertainty | None
     skip: frozenset[str]
     left_out: frozenset[str] = frozenset()
+    stated: Stated | None = None
 
     @property
     def full(self) -> ErrorModel:
@@ -82,42 +89,66 @@ class Loaded:
 @dataclass(frozen=True, slots=True, eq=False)
 class Session:
     """Machine and job of a run, and the files that it reads, each opened once. The calibration is loaded when
-    it is first asked for."""
+    it is first asked for, unless it is `stated` by the call."""
 
     setup: Setup
     sources: Sources = field(default_factory=Sources)
-    _loaded: dict[tuple[Outside, bool], Loaded] = field(default_factory=dict, init=False, repr=False)
-    _calibrations: list[Calibration] = field(default_factory=list, init=False, repr=False)
+    stated: Stated | None = None
+    _loaded: dict[tuple[Outside, bool], Loaded] = field(default_factory=dict, repr=False)
+    _calibrations: list[Calibration] = field(default_factory=list, repr=False)
+    _once: dict[str, Any] = field(default_factory=dict, repr=False)
 
     @staticmethod
     def start(
-        machine: PathLike | Setup | None,
+        machine: PathLike | Setup | KnownErrors | None,
         job: PathLike | None = None,
         *,
         dialect: str | None = None,
         sources: Sources | None = None,
     ) -> Session:
-        """The setup that a caller has, or that of a machine file and a job file; `dialect` is the name of the
-        program's dialect, or the file that describes it. Raises InputError, ConfigError, UsageError."""
+        """The setup that a caller has, that of a machine file and a job file, or that of a machine of which
+        only some errors are known. `dialect` is the name of the program's dialect, or the file that describes
+        it. Raises InputError, ConfigError, UsageError."""
         sources = sources or Sources()
         if isinstance(machine, Setup):
             return Session(machine, sources)
-        setup = read_setup(machine, job, sources.read)
+        if isinstance(machine, KnownErrors):
+            if job is not None:
+                raise UsageError(
+                    "goes with no errors that are stated without files; leave it out", file=str(job)
+                )
+            setup, stated = described_by(machine, None if dialect is None else find(dialect))
+        else:
+            setup, stated = read_setup(machine, job, sources.read, sources.exists), None
         if dialect is not None:
             from olp.files.described import described
 
             own = described(dialect, read=sources.read)
             setup = replace(setup, job=replace(setup.job, dialect=dialect, described=own))
-        return Session(setup, sources)
+        return Session(setup, sources, stated)
 
     def of(self, setup: Setup) -> Session:
         """A session of another setup that reads the same files."""
-        return Session(setup, self.sources)
+        return Session(setup, self.sources, self.stated)
+
+    def reading_from(self, sources: Sources) -> Session:
+        """The same session with its calibration as it is loaded; further files come from other sources."""
+        return replace(self, sources=sources)
 
     def beside_calibration(self) -> list[str]:
         """The files that the calibration file names. Raises InputError where that cannot be read."""
         path = self.setup.machine.calibration
-        return [] if path is None else [str(file) for file in files_beside(path, self.sources.read)]
+        with _named_by_the_machine(path):
+            return [] if path is None else [str(file) for file in files_beside(path, self.sources.read)]
+
+    def inputs(self) -> tuple[str, ...]:
+        """The paths from the root of the files that were read, and of those that machine, job and calibration
+        name: none is ever overwritten. Raises as `beside_calibration`."""
+        job = self.setup.job
+        meshes = (mesh.file for mesh in job.meshes)
+        named = (job.machine, self.setup.machine.calibration, job.sensor_log, *meshes)
+        every = (*self.sources.files, *filter(None, named), *self.beside_calibration())
+        return tuple(dict.fromkeys(str(Path(path).absolute()) for path in every))
 
     def control(self) -> Dialect:
         """The dialect of the machine's control."""
@@ -140,6 +171,8 @@ class Session:
     def calibration(self) -> Calibration:
         """The calibration of the machine, as its file states it. Raises ConfigError where there is none, or
         it is wrong."""
+        if self.stated is not None:
+            return self.stated.calibration
         if not self._calibrations:
             machine, job = self.setup.machine, self.setup.job
             if machine.calibration is None:
@@ -147,9 +180,10 @@ class Session:
                     f"machine {machine.name!r} names no calibration; give the key calibration in its file"
                 )
             temperatures = dict(job.temperatures_degC)
-            self._calibrations.append(
-                load_calibration(machine.calibration, machine, temperatures, read=self.sources.read)
-            )
+            with _named_by_the_machine(machine.calibration):
+                self._calibrations.append(
+                    load_calibration(machine.calibration, machine, temperatures, read=self.sources.read)
+                )
         return self._calibrations[0]
 
     def loaded(self, outside: Outside, *, only_sure: bool = False) -> Loaded:
@@ -161,7 +195,7 @@ class Session:
         return self._loaded[key]
 
     def _load(self, outside: Outside, only_sure: bool) -> Loaded:
-        machine = self.setup.machine
+        machine, stated = self.setup.machine, self.stated
         if machine.calibration is not None and "all" in machine.compensated_by_controller:
             raise ConfigError(
                 'compensated_by_controller = "all": the control corrects everything already, so a corrected '
@@ -169,9 +203,10 @@ class Session:
                 "tables off"
             )
         calibration = self._at_temperatures(self.calibration())
-        assert machine.calibration is not None
         skip = frozenset(machine.compensated_by_controller - calibration.active_during_measurement)
-        uncertainty = load_uncertainty(machine.calibration, calibration, read=self.sources.read)
+        uncertainty = None
+        if machine.calibration is not None:
+            uncertainty = load_uncertainty(machine.calibration, calibration, read=self.sources.read)
         left_out: frozenset[str] = frozenset()
         if only_sure:
             if uncertainty is None:
@@ -180,11 +215,13 @@ class Session:
                     "[covariance] or sigma columns, or leave --only-sure-components out",
                     file=machine.calibration,
                 )
+            from olp.uncertainty.components import improbable
+
             left_out = improbable(calibration, uncertainty) - skip
         model = build(calibration, machine.chain, outside=outside, skip_components=skip | left_out)
-        digest = self._digest(machine.calibration, left_out)
+        digest = self._digest(left_out)
         control = self.control()
-        return Loaded(self.setup, control, calibration, model, digest, uncertainty, skip, left_out)
+        return Loaded(self.setup, control, calibration, model, digest, uncertainty, skip, left_out, stated)
 
     def _at_temperatures(self, calibration: Calibration) -> Calibration:
         """The calibration with its thermal structure at the temperatures of the job. Raises ConfigError where
@@ -200,28 +237,44 @@ class Session:
         if job.sensors_degC is not None:
             structure = structure.at(job.sensors_degC)
         elif job.sensor_log is not None:
+            from olp.files.calibration.structure import read_drift_log, sensors_of
+
             log = read_drift_log(job.sensor_log, read=self.sources.read)
             sensors = sensors_of(log, dict.fromkeys(s.name for s in structure.sensors))
             structure = structure.settled(log.time_s, sensors, job.sensor_log_at_s)
         return replace(calibration, structure=structure)
 
-    def _digest(self, calibration: str, left_out: frozenset[str]) -> str:
+    def _digest(self, left_out: frozenset[str]) -> str:
         """Hash of the calibration file, the files that it names and the machine values that decide the
-        model."""
-        digest = hashlib.sha256(self.sources.read(calibration))
-        for file in files_beside(calibration, self.sources.read):
-            digest.update(self.sources.read(file))
+        model; of a stated calibration its statement."""
+        calibration = self.setup.machine.calibration
+        if calibration is None:
+            digest = hashlib.sha256(self.stated.statement.encode() if self.stated else b"")
+        else:
+            digest = hashlib.sha256(self.sources.read(calibration))
+            for file in files_beside(calibration, self.sources.read):
+                digest.update(self.sources.read(file))
         digest.update(repr(self.setup.machine.chain).encode())
         if left_out:
             digest.update(repr(sorted(left_out)).encode())
         return digest.hexdigest()
 
-    def tool_vector(self, tool: int | tuple[float, float, float] | None) -> tuple[float, float, float]:
+    def once(self, name: str, make: Callable[[], T]) -> T:
+        """What `make` gives, which depends on machine, job and calibration alone; it is made once."""
+        if name not in self._once:
+            self._once[name] = make()
+        value: T = self._once[name]
+        return value
+
+    def tool_vector(self, tool: int | Sequence[float] | None) -> tuple[float, float, float]:
         """Gauge point to tip in mm of a tool number, of a vector, or of the tool in the spindle at the start.
-        Raises ConfigError for a tool without vector."""
-        if isinstance(tool, tuple):
-            return tool
-        number = self.setup.machine.default_tool if tool is None else tool
+        Raises ConfigError for a tool without vector, UsageError for a vector that is none."""
+        if isinstance(tool, Sized):
+            if len(tool) != 3:
+                raise UsageError(f"tool has {len(tool)} values; expected a tool number, or X, Y, Z in mm")
+            x, y, z = map(float, tool)
+            return x, y, z
+        number = self.setup.machine.default_tool if tool is None else index(tool)
         if not number:
             return (0.0, 0.0, 0.0)
         described = self.setup.tool(number)
@@ -233,8 +286,22 @@ class Session:
         return described.tool_vector_mm
 
 
+@contextmanager
+def _named_by_the_machine(calibration: str | None) -> Iterator[None]:
+    """Says of a calibration that cannot be read where its name comes from."""
+    try:
+        yield
+    except InputError as error:
+        if type(error) is InputError and error.file == calibration:
+            error.message += "; the key calibration of the machine file names it"
+        raise
+
+
 def opened(
-    program: PathLike | bytes, machine: PathLike | Setup, job: PathLike | None, role: str | None = None
+    program: PathLike | bytes,
+    machine: PathLike | Setup | KnownErrors,
+    job: PathLike | None,
+    role: str | None = None,
 ) -> tuple[Session, Source]:
     """Session and program of a call from Python; the program is read first. `role` as in `Source.errors`.
     Raises InputError, ConfigError, UsageError."""

@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import datetime
 import hashlib
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
 from olp.compensation.plan import zero_shifts
-from olp.core.arrays import Array
+from olp.core.arrays import Array, Index, read_only
 from olp.core.machine import Setup
+from olp.core.toolpath import Toolpath
+from olp.core.values import dataclass
+from olp.errormodel.base import ErrorModel
+from olp.errormodel.known import KnownErrors
 from olp.files.sources import Source, Sources
+from olp.files.write import write_bytes
 from olp.findings.catalogue import Finding
 from olp.program.origin import Files, Origin, original_of
 from olp.program.program import Program
@@ -24,6 +30,7 @@ from olp.workflows.doubt import accepted_of, doubted
 from olp.workflows.flatten import UnrollOptions
 from olp.workflows.original import placed, placed_findings
 from olp.workflows.session import Loaded, Outside, PathLike, Session, opened
+from olp.workflows.shown import Shown
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,24 +45,31 @@ class SimulateOptions(UnrollOptions):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Simulation:
+class Simulation(Shown):
     """(n, 3) tip positions of the machine with its errors, in the program's first work frame, and the line of
     each. Lines count through the files of an unrolled program (`origin`). The findings are doubts about the
-    inputs. The report ("olp-simulation-1") is a mapping; it judges nothing, as only one program is known."""
+    inputs. The report ("olp-simulation-1") is a mapping; it judges nothing, as only one program is known.
+    `inputs` are the files that were read, which `write` never overwrites."""
 
     points_mm: Array
-    line: Array
+    line: Index
     frame: str
     report: dict[str, Any]
     findings: tuple[Finding, ...] = ()
     origin: Origin | None = None
+    inputs: tuple[str, ...] = ()
+
+    def write(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write `to_csv` as `Correction.write` does."""
+        write_bytes(path, self.to_csv(), force=force, inputs=self.inputs)
+        return Path(path)
 
     def to_csv(self) -> bytes:
         """`X_mm,Y_mm,Z_mm,line` with the frame named in a comment; `file` too where lines are of several."""
         files = Files(self.origin)
         rows = [f"# frame={printable(self.frame)}", f"X_mm,Y_mm,Z_mm,line{files.head}"]
         rows += [
-            f"{x:.6f},{y:.6f},{z:.6f},{files.cells(int(n))}"
+            f"{x:.6f},{y:.6f},{z:.6f},{files.cells(n)}"
             for (x, y, z), n in zip(self.points_mm.tolist(), self.line.tolist(), strict=True)
         ]
         return ("\n".join(rows) + "\n").encode()
@@ -63,7 +77,7 @@ class Simulation:
 
 def simulate(
     program: PathLike | bytes,
-    machine: PathLike | Setup,
+    machine: PathLike | Setup | KnownErrors,
     job: PathLike | None = None,
     *,
     step_mm: float = 1.0,
@@ -92,13 +106,12 @@ def run(session: Session, program: Source, options: SimulateOptions) -> Simulati
     """As `simulate`, in a session."""
     with program.errors("<program>"):
         loaded = session.loaded(options.outside_box).reading(program)
-    return simulated(session.sources, program, loaded, options)
+    done = simulated(session.sources, program, loaded, options)
+    return replace(done, inputs=session.inputs())
 
 
 def simulated(sources: Sources, program: Source, loaded: Loaded, options: SimulateOptions) -> Simulation:
     """As `simulate`, of a program whose dialect is settled in `loaded`."""
-    from olp.proof.deviation import Tracer
-
     with program.errors("<program>"):
         reading = Options(contour=options.contour)
         program, parsed = refusals.read(
@@ -109,20 +122,31 @@ def simulated(sources: Sources, program: Source, loaded: Loaded, options: Simula
         )
         parsed = parsed.in_original()
         path = parsed.toolpath
-        shift = zero_shifts(path.frames, loaded.model)
-    if not len(path):
+        parts = list(tips(path, loaded.model, options.step_mm))
+    if not parts:
         points_mm = np.zeros((0, 3))
         report = _report(program, parsed, loaded, options, points_mm, "", doubts)
-        return Simulation(points_mm, np.zeros(0), "", *report, parsed.origin)
-    actual, move = Tracer.trace(path, loaded.model, options.step_mm)
+        return Simulation(read_only(points_mm), read_only(np.zeros(0, np.int64)), "", *report, parsed.origin)
+    actual, move = (np.concatenate(columns) for columns in zip(*parts, strict=True))
     home = path.frames[int(path.frame[0])]
-    lengths = path.per_frame([f.length_mm for f in path.frames])
-    tip = actual - shift[int(path.frame[0])] - (lengths if lengths.ndim == 1 else lengths[move])
-    actual = home.tip_mm(tip)
     known = np.isfinite(actual).all(axis=1)
-    line = path.line[move[known]].astype(np.float64)
+    line = path.line[move[known]].astype(np.int64)
     report = _report(program, parsed, loaded, options, actual[known], home.work_offset, doubts)
-    return Simulation(actual[known], line, home.work_offset, *report, parsed.origin)
+    points_mm = read_only(actual[known])
+    return Simulation(points_mm, read_only(line), home.work_offset, *report, parsed.origin)
+
+
+def tips(path: Toolpath, model: ErrorModel, step_mm: float) -> Iterator[tuple[Array, Index]]:
+    """Where the tip of the uncompensated machine is (m, 3) along a path, every `step_mm`, in its first work
+    frame; NaN where a position is unknown. And the move of each point (m,). It comes in parts."""
+    from olp.proof.deviation import Tracer
+
+    shift = zero_shifts(path.frames, model)
+    lengths = path.per_frame([f.length_mm for f in path.frames])
+    for actual, move in Tracer.traced(path, model, step_mm):
+        first = int(path.frame[0])
+        tip = actual - shift[first] - (lengths if lengths.ndim == 1 else lengths[move])
+        yield path.frames[first].tip_mm(tip), move
 
 
 def _report(

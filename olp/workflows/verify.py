@@ -4,21 +4,26 @@ from __future__ import annotations
 
 import datetime
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
+from olp.core.arrays import Array, read_only
 from olp.core.machine import Setup
 from olp.core.progress import Progress, silent
+from olp.core.values import dataclass
+from olp.errormodel.known import KnownErrors
 from olp.files.sources import Source
 from olp.findings.catalogue import Finding
 from olp.program.registry import Options
 from olp.proof.judgement import Judgements
-from olp.uncertainty.spread import Confidence
 from olp.workflows import refusals
 from olp.workflows.flatten import AS_IT_IS
 from olp.workflows.original import placed, placed_findings
 from olp.workflows.proof import ProofOptions, verify_programs
 from olp.workflows.session import Outside, PathLike, Session
+from olp.workflows.shown import Judged
+
+if TYPE_CHECKING:
+    from olp.uncertainty.spread import Confidence
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,19 +34,27 @@ class VerifyOptions(ProofOptions):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Verification:
-    """The proof of a corrected program from two texts alone; `table` and `confidence` as in Correction."""
+class Verification(Judged):
+    """The proof of a corrected program from two texts alone; `table`, `position_mm` and `confidence` as in
+    Correction."""
 
     report: dict[str, Any]
     findings: tuple[Finding, ...]
     table: Judgements
+    position_mm: Array
     confidence: Confidence | None = None
+
+    def to_text(self) -> str:
+        """The report as `olp verify` prints it."""
+        from olp.reports.report import to_text
+
+        return to_text(self.report)
 
 
 def verify(
     nominal: PathLike | bytes,
     corrected: PathLike | bytes,
-    machine: PathLike | Setup,
+    machine: PathLike | Setup | KnownErrors,
     job: PathLike | None = None,
     *,
     tolerance_um: float = 1.0,
@@ -107,4 +120,5 @@ def run(
     )
     origin = done.nominal.origin
     report, findings = placed(done.report, origin), placed_findings(done.findings, origin)
-    return Verification(report, findings, done.table, done.confidence)
+    position_mm = read_only(done.proof.nominal.end_mm)
+    return Verification(report, findings, done.table, position_mm, done.confidence)

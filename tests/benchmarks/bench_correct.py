@@ -2,7 +2,8 @@
 
     python tests/benchmarks/bench_correct.py [lines [python]]
 
-Prints user CPU seconds of whole commands (the least of three), their ratio, and the peak memory. Peers are
+Prints user CPU seconds of whole commands (the least of three), their ratio, and the peak memory. First come a
+program of ten lines and one of 1e4 lines as multiples of `python -c "import numpy"`, taken in turn. Peers are
 timed where that python has them (pip install gcode-lib pygcode). Needs LinuxCNC's rs274 for the ratio.
 """
 
@@ -12,6 +13,7 @@ import argparse
 import os
 import resource
 import shutil
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -23,6 +25,18 @@ import numpy as np
 import olp
 
 ROOT = Path(__file__).resolve().parents[2]
+_PAIRS = 9
+TEN_LINES = """G21 G90 G17 G54
+T1 M6
+G43 H1
+S12000 M3
+G0 X10 Y10 Z5
+G1 Z-1 F600
+G1 X100 Y20
+G2 X120 Y40 I0 J20
+G0 Z5
+M30
+"""
 BOX = {"X": (-10.0, 1250.0), "Y": (-10.0, 1000.0), "Z": (-60.0, 130.0)}
 
 
@@ -80,6 +94,30 @@ def user_seconds(command: list[str], times: int = 3) -> tuple[float, int]:
     return best, peak
 
 
+def start_up(folder: Path, described: Path) -> None:
+    """User CPU of short runs as multiples of that of `import numpy`: the median of pairs."""
+    ten, many = folder / "ten.ngc", folder / "raster_1e4.ngc"
+    ten.write_text(TEN_LINES)
+    generate = [str(ROOT / "programs" / "generate.py"), "raster", "1e4", "-o", str(many)]
+    subprocess.run([sys.executable, *generate], check=True, capture_output=True)
+    output = ["-m", str(described), "-o", str(folder / "out.ngc"), "--force", "--quiet"]
+    runs = {
+        "olp --help": ["--help"],
+        "10 lines": ["correct", str(ten), *output],
+        "1e4 lines": ["correct", str(many), *output],
+    }
+    for name, words in runs.items():
+        command = [sys.executable, "-m", "olp", *words]
+        user_seconds(command, 1)
+        pairs = [
+            (user_seconds(command, 1)[0], user_seconds([sys.executable, "-c", "import numpy"], 1)[0])
+            for _ in range(_PAIRS)
+        ]
+        ratio = statistics.median(own / numpy_own for own, numpy_own in pairs)
+        least = min(own for own, _ in pairs)
+        print(f"{name}: {least:.3f} s user CPU, {ratio:.2f} x `python -c 'import numpy'`")
+
+
 def stages(program: Path, described: Path) -> None:
     """CPU of the parts of one run, in this process."""
     marks: list[tuple[str, float]] = []
@@ -90,10 +128,12 @@ def stages(program: Path, described: Path) -> None:
     start = resource.getrusage(resource.RUSAGE_SELF).ru_utime
     olp.correct(program, described, progress=tell)
     tell("end", 1.0)
-    print(f"  load {marks[0][1] - start:.2f}", end="")
+    parts: dict[str, float] = {}
     for (name, since), (_, until) in pairwise(marks):
-        print(f", {name} {until - since:.2f}", end="")
-    print(" s")
+        parts[name] = parts.get(name, 0.0) + until - since
+    print(
+        f"  load {marks[0][1] - start:.2f}", *(f"{k} {v:.2f}" for k, v in parts.items()), sep=", ", end=" s\n"
+    )
 
 
 def peers(program: Path, number: int, python: str) -> None:
@@ -119,6 +159,7 @@ def main() -> None:
         folder = Path(name)
         described = machine(folder)
         ENVIRONMENT["PYTHONPYCACHEPREFIX"] = str(folder / "bytecode")
+        start_up(folder, described)
         for count in ("1e4", options.lines):
             program = folder / f"raster_{count}.ngc"
             generate = [str(ROOT / "programs" / "generate.py"), "raster", count, "-o", str(program)]
@@ -129,9 +170,6 @@ def main() -> None:
             number = program.read_bytes().count(b"\n")
             memory = f"peak {peak / 1024:.0f} MB, {peak * 1024 / number:.0f} B/line"
             print(f"{number} lines: olp correct {cpu:.2f} s user CPU, {memory}")
-            if count == "1e4":
-                numpy_cpu, _ = user_seconds([sys.executable, "-c", "import numpy"])
-                print(f"  {cpu / numpy_cpu:.2f} x `python -c 'import numpy'` ({numpy_cpu:.3f} s)")
             if shutil.which("rs274"):
                 table = folder / "tool.tbl"
                 table.write_text("T1 P1 Z60\nT2 P2 Z60\n")

@@ -29,6 +29,11 @@ TURN = b"GOTO/10,0,0\nCIRCLE/0,0,0,0,0,1,10,0.06,0.5,10,0\nGOTO/0,10,0\nFINI\n"
 TOUCH = "[work_offsets.G54]\n"
 LIST = b"# frame=G54\nX_mm,Y_mm,Z_mm\n"
 TURNED = b"# frame=G54\nX_mm,Y_mm,Z_mm,C_deg\n"
+#: errors of a machine without files: one that does not depend on Z, and one that does
+SKEWED, LEANING = (olp.KnownErrors.of([f"{axes}=1mm/m"]) for axes in ("XY", "XZ"))
+PLAIN = b"G21 G90 G54\nG0 X0 Y0 Z0\nF600\n"
+#: two tools of lengths that nothing states
+TOOLS = b"T1 M6\nG0 X0 Y0 Z5\nG1 Z0\nT2 M6\nG0 X0 Y0 Z5\nG1 Z0\n"
 LISTED = 'dialect = "layout.toml"\n'
 LAYOUT = {
     "layout.toml": b'schema = "olp-points-1"\ndelimiter = "comma"\ndecimal = "point"\nheader = true\n'
@@ -54,6 +59,7 @@ class Call:
     files: Mapping[str, bytes] = field(default_factory=dict)
     swap: Mapping[str, str] = field(default_factory=dict)
     options: Mapping[str, Any] = field(default_factory=dict)
+    known: olp.KnownErrors | None = None
 
     def machine(self, folder: Path) -> Path:
         job = f"start_mm = {{ {self.start} }}\n{self.job}"
@@ -72,6 +78,8 @@ class Call:
         return self.head + self.body
 
     def run(self, folder: Path) -> olp.Check:
+        if self.known is not None:
+            return olp.check(self.program(), self.known, date=DAY)
         path = self.machine(folder)
         nominal = None if self.nominal is None else self.head + self.nominal
         options = {"date": DAY, **self.options}
@@ -261,6 +269,10 @@ CASES: dict[str, tuple[Call, Call]] = {
     "OLP205": (Call(b"G1 X100 F30001\n"), Call(b"G1 X100 F30000\n")),
     # 2000 mm/s2 at a radius of 5 mm: 100 mm/s
     "OLP206": (Call(b"G1 X100\nG2 I5 F6010\n"), Call(b"G1 X100\nG2 I5 F5990\n")),
+    "OLP207": (
+        Call(b"G1 X100\n", swap={"velocity_mm_s = 500.0\n": ""}),
+        Call(b"G1 X100\n", swap={"jerk_mm_s3 = 20000.0\n": ""}),
+    ),
     "OLP301": (
         Call(head=b"G90 G54 G64 P0.0001 Q0\nG0 X0 Y0 Z0\nF600\n"),
         Call(head=b"G21 G90 G54 G64 P0.0001 Q0\nG0 X0 Y0 Z0\nF600\n"),
@@ -446,6 +458,8 @@ CASES: dict[str, tuple[Call, Call]] = {
         Call(swap={"velocity_mm_s = 500.0": "velocity_mm_s = 5500.0"}),
     ),
     "OLP466": (Call(**with_square(0.0)), Call(**with_square(0.1))),
+    "OLP470": (Call(head=PLAIN, known=SKEWED), Call(**valued(0.0, 0.1))),
+    "OLP471": (Call(TOOLS, PLAIN, known=LEANING), Call(TOOLS, PLAIN, known=SKEWED)),
     "OLP701": (
         Call(OVER, tables=tool(50.0), **clamp(10.0)),
         Call(OVER, tables=tool(50.0), **clamp(9.999)),

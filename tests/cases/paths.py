@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,8 @@ from olp.core.arrays import Array, Index
 from olp.core.geometry import PLANES
 from olp.core.toolpath import Arcs, Flag, Frame, Kind, Toolpath
 from olp.program.dialect import Dialect
-from olp.program.program import ArcSlots, Hole, Program
+from olp.program.holes import Hole, Holes
+from olp.program.program import ArcSlots, Program
 from olp.program.registry import DIALECTS
 
 NAN = float("nan")
@@ -69,14 +70,34 @@ def toolpath(
 def hole(first: int, last: int, *, plane: int = 0, r: float, z: float, **more: Any) -> Hole:
     """A hole of the moves `first`..`last`, with what only its text says left out."""
     place = more.pop("place", (0.0, 0.0))
-    return Hole(0, first, last, {}, plane, place, r, z, r, False, 0, 1, 0, 81, **more)
+    return Hole(0, first, last, {}, -1, -1, plane, place, r, z, r, False, 0, 1, 0, 81, **more)
+
+
+def columns(*holes: Hole) -> Holes:
+    """Holes in columns."""
+    if not holes:
+        return Holes.none()
+    none = np.full(len(holes), -1, np.int32)
+    rests = [(k, *rest) for k, hole in enumerate(holes) for rest in hole.rests]
+    of, after, seconds = np.array(rests, float).reshape(-1, 3).T
+    own = {
+        f.name: np.array([getattr(hole, f.name) for hole in holes])
+        for f in fields(Holes)
+        if f.name not in ("word", "rest_hole", "rest_after", "rest_s")
+    }
+    word = np.tile(none[:, None], (1, 4))
+    return Holes(
+        **own, word=word, rest_hole=of.astype(np.int64), rest_after=after.astype(np.int64), rest_s=seconds
+    )
 
 
 def program(path: Toolpath, *holes: Hole, dialect: Dialect = DIALECTS["linuxcnc"]) -> Program:
     """A program of a path without a text."""
     none = np.zeros(0, np.int32)
     slots = ArcSlots(np.zeros((0, 5), np.int32), np.zeros(0, bool))
-    return Program(b"", dialect, path, None, np.full((len(path), 3), -1), slots, none, none, holes=holes)
+    return Program(
+        b"", dialect, path, None, np.full((len(path), 3), -1), slots, none, none, holes=columns(*holes)
+    )
 
 
 def drawn(seed: int, count: int = 9) -> tuple[Toolpath, Toolpath, list[int]]:

@@ -223,11 +223,11 @@ def test_init_writes_a_set_that_loads_and_never_replaces_it(tmp_path: Path) -> N
     assert summary["machine"]["name"] == "mill"
     assert (summary["machine"]["chain"], summary["machine"]["controller"]) == ("YFXZ", "fanuc")
     assert summary["axes"]["X"]["travel_mm"] == [-5.0, 2000.0]
-    before = {path: path.read_bytes() for path in folder.iterdir()}
+    before = {path: path.read_bytes() for path in folder.rglob("*.*")}
     again = run("init", folder)
     assert again.exit_code == 2
     assert "exists already" in again.stderr
-    assert {path: path.read_bytes() for path in folder.iterdir()} == before
+    assert {path: path.read_bytes() for path in folder.rglob("*.*")} == before
     assert run("init", folder, "--force").exit_code == 0
     assert run("init", folder / "machine.toml").exit_code == 2
     assert run("init", tmp_path / "bad", "--travel", "X", "5", "5").exit_code == 2
@@ -276,16 +276,17 @@ KINEMATICS = trivkins
 def test_init_takes_a_machine_from_linuxcnc_with_its_notes(tmp_path: Path) -> None:
     ini = tmp_path / "mill.ini"
     ini.write_text(INI)
-    result = run("init", tmp_path / "out", "--from-linuxcnc", ini, "--name", "router")
+    result = run("init", tmp_path / "out", "--from", ini, "--name", "router", "--travel", "X", "0", "1ft")
     assert result.exit_code == 0, result.stderr
     summary = json.loads(run("inspect", tmp_path / "out" / "machine.toml", "--json").stdout)
     assert summary["machine"]["name"] == "router"
     assert summary["axes"]["Z"]["travel_mm"] == [-10.0, 300.0]
     assert "note: [EMCIO] TOOL_TABLE is not given" in result.stderr
     assert "# [EMCIO] TOOL_TABLE is not given" in (tmp_path / "out" / "machine.toml").read_text()
-    both = run("init", tmp_path / "x", "--from-linuxcnc", ini, "--travel", "X", "0", "1")
-    assert both.exit_code == 2
-    assert run("init", tmp_path / "x", "--from-linuxcnc", tmp_path / "none.ini").exit_code == 3
+    assert summary["axes"]["X"]["travel_mm"] == pytest.approx([0.0, 304.8])
+    old = run("init", tmp_path / "x", "--from-linuxcnc", ini)
+    assert (old.exit_code, "--from-linuxcnc is now --from" in old.stderr) == (2, True)
+    assert run("init", tmp_path / "x", "--from", tmp_path / "none.ini").exit_code == 3
 
 
 def test_inspect_of_a_machine_states_the_size_of_its_errors() -> None:
@@ -324,13 +325,13 @@ def test_inspect_wants_one_machine() -> None:
 @pytest.mark.parametrize(
     ("call", "expected"),
     [
-        ("--frob", "No such option"),
-        ("correct --frob", "No such option"),
-        ("correct --tolerance-um 5um", "'5um' is not a number; expected a number, such as 5"),
+        ("--frob", "there is no option"),
+        ("correct --frob", "there is no option"),
+        ("correct --tolerance-um 5kg", "'5kg' is not a number in um; \"kg\" is not a unit of length"),
         ("correct --tolerance-um -1", "is not in the range"),
-        ("inspect --at 1 2 z", "'z' is not a number; expected a number, such as 5"),
+        ("inspect --at 1 2 z", "'z' is not a number in mm; expected a number in mm, or a text with its unit"),
         ("inspect --tool 1.5", "'1.5' is not an integer; expected an integer, such as 5"),
-        ("init x --travel X 0 2m", "'2m' is not a number"),
+        ("init x --travel X 0 2s", "'2s' is not a number in mm; \"s\" is not a unit of length"),
         ("calibrate frob", "there is no verb 'frob'"),
         ("inspect", "no machine file is given"),
     ],

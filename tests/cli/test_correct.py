@@ -17,6 +17,7 @@ from olp.cli import main
 from olp.core.errors import NotInvertible, OutsideBox, ProgramError
 from olp.files.sources import Source
 from olp.findings.catalogue import Finding
+from olp.reports.report import to_text
 from olp.workflows.session import Session
 
 ABOVE = Finding("OLP101", "2.50 um in line 3", 3)
@@ -43,6 +44,9 @@ class Fake:
         if self.raises is not None:
             raise self.raises
         return self
+
+    def to_text(self) -> str:
+        return to_text(self.report)
 
 
 @pytest.fixture

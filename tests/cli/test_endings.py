@@ -40,7 +40,9 @@ def one_sentence(stderr: str) -> str:
     return stderr
 
 
-@pytest.mark.parametrize("raised", [ZeroDivisionError("division by\nzero"), RecursionError(), KeyError("X")])
+@pytest.mark.parametrize(
+    "raised", [ZeroDivisionError("division by\nzero"), RecursionError(), KeyError("X"), ImportError("no x")]
+)
 def test_a_defect_is_one_sentence_with_the_file_and_what_to_send(
     folder: Path, raised: Exception, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -62,6 +64,8 @@ def test_a_defect_is_one_sentence_with_the_file_and_what_to_send(
     ("raised", "expected"),
     [
         (MemoryError(), "part.ngc: needs more memory than there is"),
+        (OSError(12, "Cannot allocate memory"), "part.ngc: needs more memory than there is"),
+        (ImportError("x.so: failed to map segment from shared object"), "part.ngc: needs more memory"),
         (OSError(36, "File name too long", "long"), "long: cannot be used (File name too long)"),
         (OSError(5, "Input/output error"), "the system refuses (Input/output error)"),
     ],
@@ -158,3 +162,27 @@ def test_an_interrupt_while_modules_are_imported_ends_as_any_other(folder: Path,
     done = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True, check=False)
     assert (done.returncode, "Traceback" in done.stderr) == (130, False), done.stderr
     assert not (folder / "part.corrected.ngc").exists()
+
+
+@pytest.fixture(scope="module")
+def large(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a program that needs more memory than its test gives."""
+    folder = tmp_path_factory.mktemp("large")
+    machine(folder, tables=TRUE_ZERO, job="start_mm = { X = 0.0, Y = 0.0, Z = 0.0 }\n")
+    (folder / "part.ngc").write_text(PROGRAM.replace("Y40\n", "Y40\nX41\n" * 200_000))
+    return folder
+
+
+@POSIX
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "words",
+    ["correct part.ngc -j job.toml", "inspect part.ngc -j job.toml", "check part.ngc -j job.toml",
+     "verify part.ngc part.ngc -j job.toml", "simulate part.ngc -j job.toml",
+     "flatten part.ngc -j job.toml"],
+)  # fmt: skip
+def test_too_little_memory_is_one_sentence_of_every_verb(large: Path, words: str) -> None:
+    """But `view`: the OpenBLAS of its motion asks for memory for ever where there is none."""
+    done = shell(large, f"ulimit -v 180000; olp {words} >/dev/null")
+    assert done.returncode == 4, done.stderr
+    assert "part.ngc: needs more memory than there is" in one_sentence(done.stderr)

@@ -3,7 +3,6 @@ to go on."""
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -165,16 +164,6 @@ CASES = [
     Case("opposite sign", ("calibration.toml: line 6", "sign", "multiply curve columns"),
          changed("calibration.toml", "actual-minus-commanded", "commanded-minus-actual")),
 ]  # fmt: skip
-
-
-@pytest.fixture
-def shop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder as a user has it: machine, job, calibration and a program, all of them right."""
-    for path in MILL.iterdir():
-        shutil.copy(path, tmp_path)
-    (tmp_path / "part.nc").write_bytes(PLAIN)
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
 
 
 def test_without_a_mistake_the_program_is_corrected(shop: Path) -> None:

@@ -454,3 +454,41 @@ def test_a_quarter_of_a_tiny_arc_is_a_turn_whatever_the_band() -> None:
         )
         got = cuts(path, NONE, turning=X, band=0.01)
         assert got.get(1, []) == pytest.approx(expected)
+
+
+def cut_one_by_one(path: Toolpath, turning: np.ndarray, band: float) -> list[tuple[int, float, float]]:
+    """Arcs cut where an axis turns round, the plain way: index, begin and end of each piece."""
+    cut = []
+    start = path.starts_mm()
+    for i, move in enumerate(path.arcs.move.tolist()):
+        first, second, _ = ORDER[path.arcs.plane[i]]
+        arm = start[move] - path.arcs.centre_mm[i]
+        angle, radius = math.atan2(arm[second], arm[first]), math.hypot(arm[first], arm[second])
+        sweep = float(path.arcs.sweep_rad[i])
+        inner = []
+        for axis, phase in ((first, 0.0), (second, math.pi / 2)):
+            shares = [(phase + k * math.pi - angle) / sweep for k in range(-20, 21)]
+            inner += [share for share in shares if turning[axis]]
+        least = min(math.sqrt(2 * band / radius) / abs(sweep), 0.25)
+        edges = [0.0, *sorted(share for share in inner if least < share < 1 - least), 1.0]
+        cut += [(i, low, high) for low, high in pairwise(edges)]
+    return cut
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_quadrants_are_those_of_the_plain_way(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    moves = [rapid(0, 0, 0)]
+    for _ in range(20):
+        end, centre = rng.uniform(-50, 50, 3), rng.uniform(-50, 50, 3)
+        degrees, plane = float(rng.uniform(-900, 900)), int(rng.integers(3))
+        moves.append(arc(*end.tolist(), centre=tuple(centre.tolist()), degrees=degrees, plane=plane))
+    path = toolpath(*moves)
+    count = len(path.arcs)
+    whole = Pieces(np.arange(count), np.zeros(count), np.ones(count))
+    turning = rng.random(3) < 0.6
+    pieces = arcs._at_quadrants(path, whole, turning, 0.02)
+    expected = cut_one_by_one(path, turning, 0.02)
+    assert pieces.arc.tolist() == [i for i, _, _ in expected]
+    assert pieces.begin == pytest.approx([low for _, low, _ in expected], abs=1e-12)
+    assert pieces.end == pytest.approx([high for _, _, high in expected], abs=1e-12)

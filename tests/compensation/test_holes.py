@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import random
 from pathlib import Path
 
 import pytest
@@ -9,6 +11,8 @@ from cases.acceptance import TRUE_ZERO, machine, unstamped
 
 import olp
 from olp.compensation.writer import Writer
+from olp.program.rs274 import reader
+from olp.program.rs274.lexer import chunks
 
 CURVE = '[[curves]]\nfile = "{}.csv"\ninterpolation = "linear"\n'
 #: 10.001 becomes 10.000 in X, Y and Z
@@ -120,3 +124,38 @@ def test_words_of_holes(name: str, chunk: int, tmp_path: Path, monkeypatch: pyte
     assert unstamped(result.data).decode() == f"{head}{expected}G80\nM2\n"
     moves = result.report["moves"]
     assert (moves["changed_words"], moves["inserted_words"], moves["inserted_blocks"]) == counts
+
+
+def drilled(seed: int) -> str:
+    """A series of holes, some with depths, levels, returns and repeats, the last ones in G91."""
+    draw = random.Random(seed)
+    lines = ["G0 X0 Y0 Z5", f"G99 G8{draw.choice('123')} X10 Y20 Z-10 R2 Q3 P1 F100"]
+    lines[1] = lines[1].replace(" Q3", "" if "G83" not in lines[1] else " Q3")
+    lines[1] = lines[1].replace(" P1", "" if "G82" not in lines[1] else " P1")
+    for _ in range(30):
+        words = [f"{a}{draw.uniform(0, 300):.3f}" for a in "XY" if draw.random() < 0.7] or ["X5"]
+        words += [f"Z{draw.uniform(-20, -5):.2f}"] * (draw.random() < 0.2)
+        words += [f"R{draw.uniform(0, 9):.2f}"] * (draw.random() < 0.2)
+        words += ["L2"] * (draw.random() < 0.1)
+        words[:0] = [draw.choice(["G98", "G99"])] * (draw.random() < 0.1)
+        if draw.random() < 0.1:
+            lines += [draw.choice(["(c)", "G80\nG0 Z9\nG81 Z-3 R1 X4", "M8"])]
+        lines.append(" ".join(words))
+    return "\n".join(lines) + "\nG91 X1 L3\nX2 Y2\n"
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("of", MACHINES)
+def test_a_series_is_written_the_same_at_once_and_block_by_block(
+    seed: int, of: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calibration, curves = MACHINES[of]
+    path = machine(tmp_path, calibration, curves, tables=TRUE_ZERO)
+    data = f"G21 G90 G54\n{drilled(seed)}G80\nM2\n".encode()
+    whole = olp.correct(data, path)
+    monkeypatch.setattr(Writer, "chunk", 1)
+    monkeypatch.setattr(reader, "chunks", functools.partial(chunks, size=1))
+    single = olp.correct(data, path)
+    assert single.data == whole.data
+    assert single.report["deviation"] == whole.report["deviation"]
+    assert single.report["moves"] == whole.report["moves"]

@@ -114,3 +114,12 @@ def test_many_points_are_inverted_as_each_alone() -> None:
     command = invert(model, target, tools)
     assert command[:, 0] == pytest.approx(target[:, 0] / 1.001, abs=1e-9)
     assert invert(model, target[:0], tools[:0]).shape == (0, 3)
+
+
+def test_a_point_is_inverted_as_it_is_alone() -> None:
+    """To the last bit, whatever the points beside it are."""
+    model = rough_machine(3, 1e-3, 0.02)
+    target = np.random.default_rng(3).uniform(BOX[:, 0], BOX[:, 1], (40, 3))
+    together = invert(model, target, np.zeros(3))
+    alone = [invert(model, one[None], np.zeros(3))[0] for one in target]
+    np.testing.assert_array_equal(together, alone)

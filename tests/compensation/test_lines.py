@@ -27,7 +27,7 @@ WHOLE, PART = (LENGTH_MM, 0.0, 0.0), (55.0, 0.0, 0.0)
 
 def cut(path: Toolpath, model: Toy, free: list[bool] | None = None) -> Cuts:
     chosen = np.ones(len(path), bool) if free is None else np.array(free)
-    return subdivide_lines(path, model, path.end_mm, chosen, TOLERANCE_MM)
+    return subdivide_lines(path, model, np.array(path.start_mm), path.end_mm, chosen, TOLERANCE_MM)
 
 
 def test_each_chord_is_as_long_as_it_can_be() -> None:
@@ -54,7 +54,8 @@ def test_targets_count_not_ends() -> None:
     """The targets of the same path lie at other positions."""
     path = toolpath(rapid(0.0, 0.0, 0.0), feed(*WHOLE))
     target = path.end_mm + np.array([100.0, -3.0, 4.0])
-    got = subdivide_lines(path, parabola(TWICE), target, np.array([False, True]), TOLERANCE_MM)
+    begin, free = np.array(path.start_mm), np.array([False, True])
+    got = subdivide_lines(path, parabola(TWICE), begin, target, free, TOLERANCE_MM)
     assert got[2].tolist() == [[155.0, -3.0, 4.0]]
 
 
@@ -167,7 +168,8 @@ def test_chords_of_a_wave_fit_and_could_be_no_longer(tolerance: float, way: int)
     """Up to the 1/32 within which the search ends, and the fineness of the positions."""
     model = Toy(wave, lambda delta, tool: (0.05 / 49.0 + 2e-5) * delta[:, 0] ** 2 / 8)
     path = toolpath(feed(way * 300.0, 0.0, 0.0))
-    move, share, target = subdivide_lines(path, model, path.end_mm, np.ones(1, bool), tolerance)
+    begin, free = np.array(path.start_mm), np.ones(1, bool)
+    move, share, target = subdivide_lines(path, model, begin, path.end_mm, free, tolerance)
     order = np.argsort(share)
     ends = [np.zeros(3), *target[order], path.end_mm[0]]
     assert len(ends) > 8

@@ -14,7 +14,7 @@ import pytest
 from cases.toy import Move, Toy, arc, constant_backlash, feed, linear, parabola, rapid, toolpath
 
 from olp.compensation.plan import Limits, Plan
-from olp.compensation.planning import plan
+from olp.compensation.planning import Planning, plan
 from olp.compensation.reversal import Reversal
 from olp.core.toolpath import Flag, Frame
 
@@ -285,3 +285,25 @@ def test_the_strokes_of_a_hole_move_no_axis_across_them() -> None:
     rows = planned(rapid(0.0, 0.0, 0.0), rapid(5.0, 0.0, 0.0, line=2), *apart, model=model)
     assert rows.play is not None
     assert rows.play[:, 0].tolist() == [0.0, 1.0, 1.0, -1.0]
+
+
+@pytest.mark.parametrize("cut", (3, 4))
+def test_a_plan_in_two_parts_is_that_of_the_whole(cut: int) -> None:
+    """Y never moves, so its side stays unknown. It is taken up before the first cut alone."""
+    model = Toy(backlash=constant_backlash(0.006, 0.004, 0.0))
+    moves = (
+        rapid(0.0, 0.0, 0.0),
+        *along_x(10.0, 20.0, 15.0, 30.0),
+        rapid(40.0, 0.0, 0.0),
+        *along_x(50.0, 45.0),
+    )
+    path = toolpath(*moves)
+    whole = plan(path, model, LIMITS)
+    assert np.bincount(whole.move).tolist() == [2, 1, 1, 2, 2, 1, 1, 2]
+    planning = Planning(model, LIMITS)
+    parts = [planning.rows(path.part(0, cut), path.end_mm[cut:])]
+    parts.append(planning.rows(path.part(cut, len(path)), np.zeros((0, 3))))
+    np.testing.assert_array_equal(np.concatenate((parts[0].move, parts[1].move + cut)), whole.move)
+    for name in ("target_mm", "command_mm", "raw", "reach", "take_up", "play"):
+        joined = np.concatenate([getattr(part, name) for part in parts])
+        np.testing.assert_array_equal(joined, getattr(whole, name))

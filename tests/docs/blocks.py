@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import re
 import shutil
@@ -26,6 +27,10 @@ _FENCE = re.compile(
 )
 #: First line of a block that is a file to be written.
 _PATH = re.compile(r"[#;] ([\w./-]+\.\w+)\n")
+#: Comment before a block of Python that goes on where the one before it ended.
+_CONTINUES = "continues"
+#: Printed between two such blocks.
+_END = "-- the next block --"
 #: End of a command that is meant to fail.
 _EXITS = re.compile(r"\s+# exits with (\d)$")
 
@@ -107,16 +112,13 @@ def problems(parts: list[Block], folder: Path) -> Iterator[str]:
             target = folder / block.file
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_text(block.body, "utf-8")
-    for block in parts:
+    for number, block in enumerate(parts):
         if block.kind == "sh" and not block.set_up:
             yield from _shell(block, folder)
-        elif block.kind == "python":
-            call = [sys.executable, "-W", "error", "-c", block.body]
-            done = subprocess.run(
-                call, cwd=folder, env=environment(), capture_output=True, text=True, timeout=300
-            )
-            if done.returncode:
-                yield f"{block.page}: python: {done.stderr[-500:]}"
+        elif block.kind == "python" and _CONTINUES not in block.mark:
+            following = [b for b in parts[number + 1 :] if b.kind == "python"]
+            going_on = itertools.takewhile(lambda b: _CONTINUES in b.mark, following)
+            yield from _python([block, *going_on], folder)
 
 
 def _shell(block: Block, folder: Path) -> Iterator[str]:
@@ -127,6 +129,25 @@ def _shell(block: Block, folder: Path) -> Iterator[str]:
         output += text
         if code != (int(wanted[1]) if wanted else 0):
             yield f"{block.page}: `{command}` exits with {code}: {text[-500:]}"
+    yield from _missing(block, output)
+
+
+def _python(session: list[Block], folder: Path) -> Iterator[str]:
+    """Run blocks one after the other in one process, as a notebook does."""
+    body = f"\nprint({_END!r}, flush=True)\n".join(block.body for block in session)
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", body], cwd=folder, env=environment(), capture_output=True,
+        text=True, timeout=300,
+    )  # fmt: skip
+    if done.returncode:
+        yield f"{session[0].page}: python: {done.stderr[-500:]}"
+        return
+    for block, output in zip(session, done.stdout.split(_END), strict=True):
+        yield from _missing(block, output)
+
+
+def _missing(block: Block, output: str) -> Iterator[str]:
+    """What a page shows as output, and is not in it."""
     rest = masked(output)
     for part in block.output.split("...\n") if block.output else ():
         if masked(part) not in rest:

@@ -155,19 +155,21 @@ def options() -> frozenset[str]:
     "path", [p for p in PAGES if p not in HISTORY and p.name != "measured.md"], ids=name_of
 )
 def test_every_option_that_is_named_exists(path: Path) -> None:
-    others = r"(apt-get|pip|pytest|halsampler|mypy|ruff|python tests|run\.py)[^`\n]*"
+    others = r"(apt-get|pip|pytest|halsampler|mypy|ruff|python tests|run\.py|--post=)[^`\n]*"
     ours = re.sub(others, "", path.read_text("utf-8"))
     assert set(re.findall(r"(?<![\w-])--[a-z][a-z-]+", ours)) <= options()
 
 
 def test_every_dependency_has_its_reason() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
-    ours, tests = (
+    extras = project["optional-dependencies"]
+    ours, plots, tests = (
         {re.split("[>=]", item)[0] for item in items}
-        for items in (project["dependencies"], project["optional-dependencies"]["test"])
+        for items in (project["dependencies"], extras["plots"], extras["test"])
     )
     page = DOCS / "contributing" / "dependencies.md"
     assert {row[0].strip("`") for row in rows_below(page, "# ")} == ours
+    assert {row[0].strip("`") for row in rows_below(page, "## On request")} == plots <= tests
     assert {name for name in tests if name not in page.read_text("utf-8")} == set()
 
 
@@ -197,7 +199,7 @@ QUESTIONS = {
     "can it read Heidenhain programs": "olp help background/limits",
     "how do I stop a bad program before it runs": "olp check",
     "how do I correct CMM results": "olp results",
-    "out of square": "five minutes to a corrected program",
+    "out of square": "one number to a corrected program",
     "sign of C0Y": "positive",
     "is a 5 axis machine corrected": "three linear axes",
     "rotary table": "three linear axes",
@@ -219,9 +221,19 @@ ANSWERS = {
     "why no changes": "howto/correct",
     "how do I add my control": "contributing/add-a-dialect",
     "windows": "howto/windows",
+    "correct many programs": "howto/batch",
+    "a folder of parts": "howto/batch",
     "is my calibration still good": "howto/still-good",
     "inches": "howto/correct",
     "G20": "howto/correct",
+    "FreeCAD": "howto/cam",
+    "post processor of Fusion": "howto/cam",
+    "Mastercam": "howto/cam",
+    "install without network": "howto/offline",
+    "pre-commit": "howto/ci",
+    "SARIF": "howto/check",
+    "JSON schema for my editor": "howto/editors",
+    "numpy arrays": "howto/python",
 }
 
 

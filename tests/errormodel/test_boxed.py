@@ -9,6 +9,7 @@ from olp.core.errors import UsageError
 from olp.errormodel.boxed import Boxed, as_points, as_tool, payload_of
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration, Curve, Thermal
+from olp.errormodel.chain import RigidBody
 from olp.errormodel.gridded import ComponentTable
 from olp.errormodel.sources.maps import DeviationMap
 
@@ -83,3 +84,15 @@ def test_wrong_rows_are_named(chain: str) -> None:
     ):
         with pytest.raises(UsageError, match="play has shape"):
             call()
+
+
+def test_the_model_that_holds_has_the_bodies_of_the_one_that_refuses() -> None:
+    calibration = Calibration(machine="m", box_mm=BOX)
+    refusing, holding = (build(calibration, "FXYZ", outside=outside) for outside in ("refuse", "hold"))
+    assert isinstance(refusing, RigidBody)
+    assert isinstance(holding, RigidBody)
+    assert refusing.bodies is holding.bodies
+    other = build(calibration, "YFXZ")
+    assert isinstance(other, RigidBody)
+    assert other.bodies[0].axis == 2
+    assert other.bodies is not holding.bodies

@@ -113,8 +113,13 @@ def test_second_order_terms_widen_arms_slopes_and_translations(angle: float) -> 
     expected = 0.25 * (math.hypot(*rows) + stretch * (10.0 + 7.0) + (change + stretch) * 30.0)
     lengths = [np.array([10.0]), np.array([7.0]), np.array([30.0])]
     assert bound.at(lengths)[0] == pytest.approx(10.0 * expected, rel=1e-12)
+    # of one tool it is less than between two of them
+    bodies = build_bodies(calibration, "FXYZ", frozenset())
+    own = [axis_bounds(bodies, BOX, tool[None], second_order=True)[0].at(lengths)[0] for tool in TOOLS]
+    assert max(own) < 10.0 * expected
     model = build(calibration, "FXYZ")
-    np.testing.assert_allclose(model.chord_bound(np.array([[-10.0, 7.0, 30.0]] * 2), TOOLS), 10.0 * expected)
+    got = model.chord_bound(np.array([[-10.0, 7.0, 30.0]] * len(TOOLS)), TOOLS)
+    np.testing.assert_allclose(got, own, rtol=1e-12)
 
 
 def test_two_turns_on_one_moving_arm_join_as_one_length() -> None:

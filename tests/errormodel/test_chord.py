@@ -14,7 +14,7 @@ from olp.core.interpolation import Interpolant
 from olp.core.machine import CHAINS, SQUARENESS
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration, Curve, Cyclic, Thermal
-from olp.errormodel.chord import LOWER_MM, UPPER_MM, Variation, bins
+from olp.errormodel.chord import LOWER_MM, UPPER_MM, Variation, bins, distinct_bins, in_all_bins
 
 BOX = np.array([[0.0, 800.0], [-300.0, 300.0], [-400.0, 0.0]])
 TOOL = np.array([10.0, -30.0, -150.0])
@@ -119,11 +119,13 @@ def test_a_still_axis_adds_nothing(chain: str) -> None:
     assert not model.chord_bound(np.zeros((4, 3)), TOOL).any()
 
 
-def test_the_farthest_of_many_tools_counts() -> None:
+def test_of_many_tools_that_of_the_move_counts() -> None:
     model = build(calibration(4, "pchip", 40e-6, 0.02, False), "FXYZ")
     _, delta = random_moves(2, 50, "XYZ")
     tools = np.vstack([np.zeros((25, 3)), np.tile(TOOL, (25, 1))])
-    assert np.all(model.chord_bound(delta, tools) >= np.maximum(model.chord_bound(delta, TOOL), 0.0))
+    own = np.concatenate((model.chord_bound(delta[:25], tools[0]), model.chord_bound(delta[25:], TOOL)))
+    np.testing.assert_array_equal(model.chord_bound(delta, tools), own)
+    assert not np.array_equal(own, model.chord_bound(delta, TOOL))
 
 
 @pytest.mark.parametrize("direction", [-1.0, 0.5, 1.0])
@@ -262,3 +264,28 @@ def test_bounds_of_a_sum_add() -> None:
     nothing = Variation.total([])
     assert (nothing.peak, nothing.slope, nothing.curvature, nothing.varies) == (0.0, 0.0, 0.0, False)
     assert nothing.smooth.shape == nothing.kinks.shape == nothing.change.shape == (320,)
+
+
+positions = st.lists(st.integers(0, 4000), min_size=2, max_size=40, unique=True).map(sorted)
+
+
+@given(positions, st.sampled_from([2.0**-9, 0.001, 0.1, 1.0, 25.4]), st.floats(-1e3, 1e3))
+def test_the_distinct_bins_hold_what_every_bin_holds(steps: list[int], unit: float, begin: float) -> None:
+    ends = begin + unit * np.array(steps, float)
+    some = distinct_bins(ends)
+    for side in ("left", "right"):
+        every = np.searchsorted(ends, ends + UPPER_MM[:, None], side)  # type: ignore[call-overload]
+        held = np.searchsorted(ends, ends + UPPER_MM[some, None], side)  # type: ignore[call-overload]
+        assert np.array_equal(in_all_bins(held, some), every)
+
+
+def test_a_curve_of_equal_pieces_is_searched_in_the_octaves_between_piece_and_whole() -> None:
+    # 128 pieces are 7 octaves of 8 bins; one bin more at either end, and those that the ends fall in
+    some = distinct_bins(np.linspace(0.0, 1280.0, 129))
+    assert some.stop - some.start <= 7 * 8 + 3
+    assert UPPER_MM[some.start] < 10.0
+    assert UPPER_MM[some.stop - 1] >= 1280.0
+
+
+def test_a_single_end_has_one_bin() -> None:
+    assert distinct_bins(np.zeros(1)) == slice(0, 1)

@@ -98,9 +98,8 @@ def test_a_load_departs_with_its_mass_its_lever_arms_and_their_change() -> None:
     # with less than while measuring it departs as far the other way
     lighter = np.array([30.0, 0.0, -150.0, -15.0])
     np.testing.assert_allclose(model.chord_bound(delta, lighter), expected, rtol=1e-12)
-    # payloads per move, and the farthest of several tools
-    rows = np.array([[0.0, 0.0, -150.0, 25.0], [30.0, 0.0, -150.0, 25.0]])
-    np.testing.assert_allclose(model.chord_bound(delta, rows), expected, rtol=1e-12)
-    rows[:, 3] = 15.0, 25.0
-    np.testing.assert_allclose(model.chord_bound(delta[[0, 0]], rows)[0], 0.5 * expected[0], rtol=1e-12)
+    # payload and tool of each move
+    rows = np.array([[0.0, 0.0, -150.0, 15.0], [30.0, 0.0, -150.0, 25.0]])
+    own = [10.0 * math.hypot(of_x, 0.25 * 100.0 * 2e-6), expected[0]]
+    np.testing.assert_allclose(model.chord_bound(delta[[0, 0]], rows), own, rtol=1e-12)
     assert model.chord_bound(np.zeros((0, 3)), tool).shape == (0,)

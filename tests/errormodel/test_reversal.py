@@ -236,3 +236,17 @@ def test_the_start_holds_until_the_position_is_lost() -> None:
     low, high = play_interval(lost, np.full(3, 4.0), np.zeros(3))
     np.testing.assert_array_equal(low[:, 0], [-1.0, -1.0, -0.5])
     np.testing.assert_array_equal(high[:, 0], [1.0, 1.0, 1.0])
+
+
+@settings(max_examples=100, deadline=None)
+@given(seed=st.integers(0, 10**6), n=st.integers(2, 60), cut=st.integers(1, 59), holes=st.booleans())
+def test_the_interval_goes_on_from_any_command(seed: int, n: int, cut: int, holes: bool) -> None:
+    rng = np.random.default_rng(seed)
+    command = np.cumsum(rng.normal(size=(n, 3)) * rng.integers(0, 2, (n, 3)), axis=0)
+    width = rng.uniform(-1.0, 6.0, (n, 3))
+    if holes:
+        command[rng.random((n, 3)) < 0.1] = np.nan
+    low, high = play_interval(command, width)
+    k = min(cut, n) - 1
+    there = play_interval(command[k:], width[k:], np.stack((low[k], high[k])))
+    np.testing.assert_allclose(there, (low[k:], high[k:]), rtol=0, atol=1e-12)

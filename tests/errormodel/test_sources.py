@@ -201,6 +201,19 @@ def test_a_move_departs_from_its_chord_by_no_more_than_the_budget(
 
 @CHAIN
 @each
+def test_the_bound_of_a_chord_is_that_of_its_own_tool(key: str, chain: str, tmp_path: Path) -> None:
+    """Whatever the tools of the moves beside it."""
+    model = build(calibration_of(tmp_path, key), chain)
+    delta = RANDOM.permutation(POINTS) - POINTS
+    tools = np.array([TOOL, [0.0, 30.0, -200.0, 5.0], [-40.0, 0.0, -80.0, 0.0]])
+    alone = np.stack([model.chord_bound(delta, tool) for tool in tools])
+    which = np.arange(len(delta)) % len(tools)
+    mixed = model.chord_bound(delta, tools[which])
+    np.testing.assert_array_equal(mixed, alone[which, np.arange(len(delta))])
+
+
+@CHAIN
+@each
 def test_its_uncertainty_acts_as_a_difference_of_its_values_does(
     key: str, chain: str, tmp_path: Path
 ) -> None:

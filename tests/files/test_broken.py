@@ -416,7 +416,7 @@ def test_a_fault_of_a_whole_table_names_the_file(title: str, tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize(
-    "key", ["schema", "name", "chain", "controller", "axes.X.travel_mm", "axes.Z.jerk_mm_s3"]
+    "key", ["schema", "name", "chain", "controller", "axes.X.travel_mm", "axes.Z.least_increment_mm"]
 )
 def test_a_missing_key_is_named_with_what_was_expected(key: str, tmp_path: Path) -> None:
     table, _, name = key.rpartition(".")

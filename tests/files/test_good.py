@@ -174,7 +174,7 @@ def test_controllers_are_the_profiles_that_programs_are_read_with() -> None:
 def test_starter_set_loads_for_every_chain(chain: str, tmp_path: Path) -> None:
     machine = starter_machine("mill", chain, TRAVEL)
     paths = write_starter(tmp_path, machine)
-    assert {path.name for path in paths} == {path.name for path in tmp_path.iterdir()}
+    assert set(paths) == {path for path in tmp_path.rglob("*") if path.is_file()}
     setup = load_setup(job_path=tmp_path / "job.toml")
     assert setup.machine.chain == chain
     assert {name: axis.travel_mm for name, axis in setup.machine.axes.items()} == TRAVEL

@@ -23,9 +23,9 @@ TYPES: dict[str, Any] = {
     "number": (int, float),
 }  # fmt: skip
 KNOWN = {
-    "$defs", "$ref", "$schema", "additionalProperties", "anyOf", "const", "default", "description", "enum",
-    "exclusiveMinimum", "format", "items", "maxItems", "minItems", "minLength", "minimum",
-    "patternProperties", "prefixItems", "properties", "propertyNames", "required", "title", "type",
+    "$defs", "$id", "$ref", "$schema", "additionalProperties", "anyOf", "const", "default", "description",
+    "enum", "exclusiveMinimum", "format", "items", "maxItems", "minItems", "minLength", "minimum",
+    "pattern", "patternProperties", "prefixItems", "properties", "propertyNames", "required", "title", "type",
 }  # fmt: skip
 
 
@@ -51,6 +51,8 @@ def faults(value: Any, schema: dict[str, Any], root: dict[str, Any], path: str =
     ):
         yield path
     if isinstance(value, str) and len(value) < schema.get("minLength", 0):
+        yield path
+    if isinstance(value, str) and not re.search(schema.get("pattern", ""), value):
         yield path
     if isinstance(value, list):
         if not schema.get("minItems", 0) <= len(value) <= schema.get("maxItems", len(value)):

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from cases.control_settings import SAMPLES
 from cases.dialects import CASES, FRAMES, RS274
 from cases.gate import block
 from judge.machines import Recipe, random_machine
@@ -24,7 +25,7 @@ from olp.files.config import load_setup, read_setup
 from olp.files.control_tables import registry as control_tables
 from olp.files.control_tables.base import Given
 from olp.files.described import FOLDER, described, load_described
-from olp.files.linuxcnc import from_linuxcnc
+from olp.files.machine_settings.registry import read_settings
 from olp.files.measurements.line_profile import load_line_profile
 from olp.files.measurements.postures import read_postures
 from olp.files.measurements.reader import load_measurements
@@ -246,12 +247,9 @@ def _tables(folder: Path) -> Iterator[Target]:
                 # some of the files are notes beside the tables
                 call(data)
                 yield Target(f"table {key}", (data,), call, 0.5)
-    ini = folder / "mill.ini"
-    text = b"[TRAJ]\nCOORDINATES = XYZ\nLINEAR_UNITS = mm\n[KINS]\nKINEMATICS = trivkins\n" + b"".join(
-        b"[AXIS_%s]\nMIN_LIMIT = -10\nMAX_LIMIT = 300\nMAX_VELOCITY = 50\nMAX_ACCELERATION = 400\n" % axis
-        for axis in (b"X", b"Y", b"Z")
-    )
-    yield Target("linuxcnc ini", (text,), _in_file(ini, from_linuxcnc), 0.5)
+    for sample in SAMPLES:
+        file = _in_file(folder / sample.name, read_settings)
+        yield Target(f"settings {sample.name}", (sample.text.encode(),), file, 0.5)
 
 
 def _points(folder: Path) -> Iterator[Target]:

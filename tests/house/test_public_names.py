@@ -16,9 +16,10 @@ LARGE = ("scipy", "trimesh", "meshcat", "ruckig", "matplotlib")
 PUBLIC = {
     *("correct", "verify", "simulate", "retime", "check", "compare", "inspect", "error_at", "flatten"),
     *("Correction", "Verification", "Simulation", "Retiming", "Check", "Comparison", "Finding", "load_setup"),
+    "KnownErrors",
     *("view", "Review", "add_layers", "Layers", "fit_calibration", "FittedCalibration"),
     *("diagnose_calibration", "CalibrationDiagnosis", "plan_measurements", "MeasurementPlan"),
-    *("refine_calibration", "RefinedCalibration"),
+    *("refine_calibration", "RefinedCalibration", "batch", "Batch"),
     *("import_table", "export_table", "compare_tables", "TableImport", "TableExport"),
     *("evaluate_lines", "fit_ballbar", "fit_diagonals", "fit_postures", "go_return"),
     *("fit_thermal", "ThermalFitting", "correct_results", "ResultCorrection"),
@@ -75,3 +76,45 @@ def test_a_correction_needs_no_large_library(tmp_path: Path) -> None:
     words = ["correct", "-j", "programs/bridge-cmm/job.toml", "-o", str(tmp_path / "out.ngc"), "--force"]
     assert loaded_by(RUN.format(words), *LARGE) == set()
     assert (tmp_path / "out.ngc").stat().st_size > 0
+
+
+#: modules and packages that the correction of a plain program for LinuxCNC does without
+NEEDLESS = (
+    "numpy.ma", "rich", "statistics", "asyncio", "pydantic.v1", "pydantic.dataclasses",
+    "olp.calibration", "olp.clearance", "olp.comparison", "olp.results", "olp.review", "olp.trajectory",
+    "olp.uncertainty", "olp.compensation.statement_writer", "olp.compensation.verbatim_writer",
+    "olp.workflows.confidence", "olp.files.archive", "olp.files.control_tables", "olp.files.described",
+    "olp.files.json_schema", "olp.files.measurements", "olp.program.apt.reader",
+    "olp.program.described", "olp.program.dmis.reader", "olp.program.foreign",
+    "olp.program.pointlist.reader", "olp.program.statement_rows", "olp.program.verbatim",
+    "olp.program.rs274.flatten.run", "olp.program.rs274.flatten.unroll", "olp.reports.document",
+    "olp.reports.plots",
+)  # fmt: skip
+
+
+@pytest.mark.slow
+def test_a_plain_correction_loads_what_it_needs(tmp_path: Path) -> None:
+    words = ["correct", "-j", "programs/gantry-plate/job.toml", "-o", str(tmp_path / "out.ngc")]
+    ask = f"{RUN.format(words)}\nimport sys; print(*sorted(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", ask], capture_output=True, text=True, check=True, cwd=ROOT)
+    loaded = done.stdout.splitlines()[-1].split()
+    assert "olp.proof.proof" in loaded
+    needless = tuple(f"{name}." for name in (*NEEDLESS, *LARGE))
+    assert [name for name in loaded if f"{name}.".startswith(needless)] == []
+
+
+@pytest.mark.slow
+def test_a_run_seldom_looks_for_unreachable_objects(tmp_path: Path) -> None:
+    words = ["olp", "correct", "-j", "programs/gantry-plate/job.toml", "-o", str(tmp_path / "out.ngc")]
+    ask = (
+        f"import gc, sys\nfrom olp.__main__ import run\nsys.argv = {words!r}\n"
+        "count = lambda: sum(generation['collections'] for generation in gc.get_stats())\n"
+        "before = count()\ntry: run()\nexcept SystemExit as end: assert end.code == 0\n"
+        "print(count() - before, gc.get_freeze_count())"
+    )
+    done = subprocess.run([sys.executable, "-c", ask], capture_output=True, text=True, check=True, cwd=ROOT)
+    collections, left_alone = map(int, done.stdout.splitlines()[-1].split())
+    # with Python's own threshold there are some hundred
+    assert collections <= 4
+    # those that the end of the interpreter does not look through
+    assert left_alone > 10_000

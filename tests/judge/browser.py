@@ -72,9 +72,10 @@ def opened(
     theme: str = "light",
     view: str = "",
     ready: str = "html[data-ready],html[data-error]",
+    before: str = "",
 ) -> Iterator[Any]:
     """The page of a file, ready, with the network off, or that of a server; `view` follows its address. It is
-    ready when an element matches `ready`.
+    ready when an element matches `ready`. `before` is a script that runs before those of the page.
 
     Fails at the end where the console showed an error, a script failed, or anything but the file or the
     server itself was asked for.
@@ -87,6 +88,8 @@ def opened(
         accept_downloads=True,
     )
     page = context.new_page()
+    if before:
+        page.add_init_script(before)
     trouble: list[str] = []
     asked: list[str] = []
     page.on("pageerror", lambda error: trouble.append(str(error)))

@@ -430,3 +430,45 @@ def test_a_tool_without_a_number_is_none_in_its_frames() -> None:
     tool, operation = judgement.groups_of(toolpath(line(1, 0, 0), line(2, 0, 0)))
     assert (tool.tolist(), operation.tolist()) == ([-1, -1], [0, 0])
     assert tool.dtype == operation.dtype == np.int64
+
+
+@pytest.mark.parametrize("block", (1, 7))
+@pytest.mark.parametrize("seed", range(4))
+def test_groups_do_not_depend_on_blocks(seed: int, block: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    judgements, of = drawn_table(seed)
+    whole = judgements.groups(of)
+    assert len(whole) > 2
+    monkeypatch.setattr(judgement, "_BLOCK", block)
+    assert judgements.groups(of) == whole
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_worst_lines_are_found_without_all_lines(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Many rows of few lines have the same deviation, so that more and more of them are looked at."""
+    judgements, _ = drawn_table(seed)
+    rows = judgements.by_line()
+    counted = rows["state"] != SHOWN
+    order = np.lexsort((rows["line"][counted], -np.nan_to_num(rows["corrected_um"][counted])))
+    expected = rows["line"][counted][order][:5]
+    monkeypatch.setattr(judgement, "_FEW", 2)
+    lines = judgements.worst_lines(5)
+    assert set(expected.tolist()) <= set(lines.tolist()) and len(lines) < len(rows["line"])
+    part = judgements.on_lines(lines).by_line()
+    some = np.isin(rows["line"], lines)
+    for name, values in part.items():
+        np.testing.assert_array_equal(values, rows[name][some])
+
+
+def drawn_table(seed: int) -> tuple[Judgements, np.ndarray]:
+    """A table of many rows on few lines, and what they are grouped by."""
+    rng = np.random.default_rng(seed)
+    count = 200
+    kinds = rng.choice(
+        [Counts.FEED, Counts.RAPID, Counts.LEFT, Counts.UNKNOWN], count, p=[0.7, 0.1, 0.1, 0.1]
+    )
+    sizes = rng.choice([0.2, 0.4, 1.0, 1.3, 2.0], (2, count))
+    lines = np.sort(rng.integers(1, 60, count))
+    rows = [
+        (int(line), Counts(int(kind)), *pair) for line, kind, pair in zip(lines, kinds, sizes.T, strict=True)
+    ]
+    return table(*rows), rng.integers(-1, 4, count)

@@ -15,7 +15,7 @@ from cases.paths import CONTROL, CYCLE, NAN, OF_MACHINE, PASS, Move, hole, line,
 import olp
 from olp.core.errors import ProgramError
 from olp.core.toolpath import Kind
-from olp.program.program import Hole
+from olp.program.holes import Hole
 from olp.proof import deviation
 from olp.proof.judgement import Judgements
 from olp.proof.kinds import check_kinds

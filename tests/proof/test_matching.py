@@ -33,9 +33,10 @@ from olp.core.toolpath import Kind, Toolpath
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration
 from olp.files.config import load_setup
-from olp.program.program import Hole, Program
+from olp.program.holes import Hole
+from olp.program.program import Program
 from olp.program.registry import DIALECTS, read
-from olp.proof import matching
+from olp.proof import alignment, matching
 from olp.proof.matching import match
 
 BOX = np.tile([-1000.0, 2000.0], (3, 1))
@@ -131,7 +132,7 @@ def test_whole_circles_on_a_shifted_zero_leave_no_doubt(
     nominal = program("G0 X0\n" + 30 * "G2 I9 F500\n", folder)
     half = "G1 X1.003 F500\nG2 X19 I9\nG1 X18.997\nG2 X1 I-9\n"
     corrected = program("G0 X1\n" + 30 * half, folder)
-    monkeypatch.setattr("olp.proof.matching._Alignment._window", None)
+    monkeypatch.setattr("olp.proof.alignment.Alignment._window", None)
     target = nominal.toolpath.end_mm.copy()
     target[1:, 0] += 1.0
     ends = match(nominal, target, corrected, MODEL, NEAR_MM)
@@ -202,13 +203,13 @@ def in_doubt(*_: Any) -> None:
 @pytest.fixture
 def plain(monkeypatch: pytest.MonkeyPatch) -> None:
     """A search for the least squares fails."""
-    monkeypatch.setattr(matching._Alignment, "_window", in_doubt)
+    monkeypatch.setattr(alignment.Alignment, "_window", in_doubt)
 
 
 @pytest.fixture
 def at_once(plain: None, monkeypatch: pytest.MonkeyPatch) -> None:
     """So does a search for the end of one move alone."""
-    monkeypatch.setattr(matching._Alignment, "_plain_split", in_doubt)
+    monkeypatch.setattr(alignment.Alignment, "_plain_split", in_doubt)
 
 
 #: A step before each cut, and the last one split.
@@ -224,6 +225,20 @@ CUTS = (rapid(0, 0, 0), line(10, 0, 0), line(20, 0, 0), line(20, 20, 0), rapid(2
 def test_parts_of_lines_and_arcs_in_all_planes_are_in_no_doubt(seed: int) -> None:
     nominal, corrected, groups = drawn(seed, 40)
     assert ends(nominal, corrected) == groups
+
+
+@pytest.mark.parametrize("page", (12, 17, 100))
+@pytest.mark.parametrize("seed", range(3))
+def test_pages_do_not_matter(seed: int, page: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither where all is plain nor where it is searched."""
+    nominal, corrected, groups = drawn(seed, 60)
+    monkeypatch.setattr(matching, "_PAGE", page)
+    assert ends(nominal, corrected) == groups
+    doubtful, other, shift = in_doubt_at_random(seed)
+    monkeypatch.setattr(matching, "_MOST_FAR", 1.0)
+    got = ends(doubtful, other, shift=shift, near_mm=0.0)
+    monkeypatch.setattr(matching, "_PAGE", 1 << 14)
+    assert got == ends(doubtful, other, shift=shift, near_mm=0.0)
 
 
 @pytest.mark.usefixtures("plain")
@@ -264,7 +279,7 @@ def test_near_is_near_at_ends_and_along_moves(
     off_mm: float, doubt: bool, k: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Of the end of a move and of a part beside it."""
-    monkeypatch.setattr(matching._Alignment, "_window", in_doubt)
+    monkeypatch.setattr(alignment.Alignment, "_window", in_doubt)
     moves = list(STEPS)
     x, y, z = moves[k].end
     moves[k] = line(x + off_mm * (k == 5), y, z + off_mm * (k == 3))
@@ -297,7 +312,7 @@ def test_a_move_that_is_corrected_is_not_known_by_its_command(plain: None) -> No
 def test_a_rapid_with_an_unknown_axis_may_be_half_a_millimetre_off(
     error_mm: float, doubt: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(matching._Alignment, "_window", in_doubt)
+    monkeypatch.setattr(alignment.Alignment, "_window", in_doubt)
     model = Known(lambda axis_mm: np.where(np.isnan(axis_mm[:, :1]), [0.0, 0.0, error_mm], 0.0))
     head = rapid(NAN, NAN, 40)
     if not doubt:
@@ -351,7 +366,7 @@ def test_a_part_of_an_arc_lies_near_it(
 ) -> None:  # fmt: skip
     """An arc of 2 rad about (7, 3) with a radius of 20 mm from 0.7 rad on: across it, along its third axis,
     and along it before its start and beyond its end."""
-    monkeypatch.setattr(matching._Alignment, "_window", in_doubt)
+    monkeypatch.setattr(alignment.Alignment, "_window", in_doubt)
     roll = [(0, 1, 2), (2, 0, 1), (1, 2, 0)][plane]
 
     def at(turned: float, radius: float = 20.0, level: float = 0.0) -> tuple[float, ...]:
@@ -373,13 +388,36 @@ def test_a_part_of_an_arc_lies_near_it(
         ends(nominal, corrected)
 
 
+@pytest.mark.parametrize("turns", (0, 2))
+@pytest.mark.parametrize(("off", "doubt"), [(0.0, False), (0.04, False), (0.06, True), (-0.06, True)])
+def test_the_radius_of_an_arc_goes_linearly_from_its_start_to_its_end(
+    off: float, doubt: bool, turns: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As rounded words have it: here from 20 mm to 20.8 mm, and a part ends half-way."""
+    monkeypatch.setattr(alignment.Alignment, "_window", in_doubt)
+    sweep = 2.0 + 2 * math.pi * turns
+
+    def at(turned: float, radius: float) -> tuple[float, float, float]:
+        return 7 + radius * math.cos(turned), 3 + radius * math.sin(turned), 0.0
+
+    head = rapid(*at(0.0, 20.0))
+    whole = arc(*at(sweep, 20.8), centre=(7, 3, 0), sweep=sweep)
+    part = arc(*at(sweep / 2, 20.4 + off), centre=(7, 3, 0), sweep=sweep / 2)
+    nominal, corrected = toolpath(head, whole), toolpath(head, part, whole)
+    if not doubt:
+        assert ends(nominal, corrected) == [0, 2]
+        return
+    with pytest.raises(AssertionError, match="searched"):
+        ends(nominal, corrected)
+
+
 @pytest.mark.parametrize(
     ("level", "doubt"), [(0.0, False), (3.0, False), (6.04, False), (6.06, True), (-0.06, True)]
 )
 def test_a_part_of_a_helix_lies_between_its_levels(
     level: float, doubt: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(matching._Alignment, "_window", in_doubt)
+    monkeypatch.setattr(alignment.Alignment, "_window", in_doubt)
     for low, high in ((0.0, 6.0), (6.0, 0.0)):
         head = rapid(10, 0, low)
         whole = arc(-10, 0, high, centre=(0, 0, 0), sweep=math.pi)
@@ -392,7 +430,7 @@ def test_a_part_of_a_helix_lies_between_its_levels(
 
 
 def test_a_part_of_a_rapid_is_a_rapid_and_of_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(matching._Alignment, "_window", in_doubt)
+    monkeypatch.setattr(alignment.Alignment, "_window", in_doubt)
     for move, other in ((rapid, line), (line, rapid)):
         nominal = toolpath(rapid(0, 0, 0), move(30, 0, 0), line(30, 9, 0))
         same = toolpath(rapid(0, 0, 0), move(10, 0, 0), move(30, 0, 0), line(30, 9, 0))
@@ -447,7 +485,7 @@ def test_the_length_of_a_helix_is_that_of_its_turn_and_its_rise(plane: int, low:
 def test_an_axis_that_is_unknown_in_one_of_them_is_far_off(
     written: Move, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(matching._Alignment, "_window", in_doubt)
+    monkeypatch.setattr(alignment.Alignment, "_window", in_doubt)
     meant = rapid(10, NAN, 0)
     tail = rapid(0, 0, 0), line(5, 0, 0), line(9, 0, 0)
     nominal = toolpath(meant, tail[0], tail[2])
@@ -457,7 +495,7 @@ def test_an_axis_that_is_unknown_in_one_of_them_is_far_off(
 
 
 def test_what_is_exactly_so_far_off_is_in_doubt(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(matching._Alignment, "_window", in_doubt)
+    monkeypatch.setattr(alignment.Alignment, "_window", in_doubt)
     nominal = toolpath(rapid(0, 0, 0), line(16, 0, 0), line(16, 16, 0))
     for part, end in ((line(8, 0.0625, 0), line(16, 0, 0)), (line(8, 0, 0), line(16, 0, 0.0625))):
         corrected = toolpath(rapid(0, 0, 0), part, end, line(16, 16, 0))
@@ -471,13 +509,13 @@ def test_what_is_exactly_so_far_off_is_in_doubt(monkeypatch: pytest.MonkeyPatch)
 
 def test_blocks_double_while_nothing_is_in_doubt(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[tuple[int, int, int]] = []
-    stretch = matching._Alignment._stretch
+    stretch = alignment.Alignment._stretch
 
     def noted(self: Any, i: int, j: int, size: int) -> Any:
         asked.append((i, j, size))
         return stretch(self, i, j, size)
 
-    monkeypatch.setattr(matching._Alignment, "_stretch", noted)
+    monkeypatch.setattr(alignment.Alignment, "_stretch", noted)
     zigzag = [line(10.0 * k, 5.0 * (k % 2), 0) for k in range(1, 300)]
     split = [
         move

@@ -17,6 +17,7 @@ from cases.paths import (
     WHOLE,
     Known,
     Move,
+    columns,
     hole,
     line,
     program,
@@ -27,7 +28,8 @@ from cases.paths import (
 from olp.core.arrays import Array
 from olp.core.errors import ProgramError
 from olp.core.toolpath import Frame, Kind
-from olp.program.program import Hole, Program
+from olp.program.holes import Hole
+from olp.program.program import Program
 from olp.program.registry import DIALECTS
 from olp.proof import proof as module
 from olp.proof.deviation import Deviation
@@ -176,7 +178,7 @@ def test_a_hole_counts_at_the_move_to_its_bottom() -> None:
     assert got.counts[1:].tolist() == [Counts.RAPID, Counts.HOLE, Counts.RAPID, Counts.HOLE, Counts.RAPID]
     assert np.isnan(got.after_mm).tolist() == [True, True, True, True, False, True]
     assert 1e3 * got.after_mm[4] == pytest.approx(2.0, rel=1e-4)
-    alone = proved(replace(mine, holes=()), replace(other, holes=()), Known(aside))
+    alone = proved(replace(mine, holes=columns()), replace(other, holes=columns()), Known(aside))
     assert 1e3 * alone.after_mm[[2, 4]] == pytest.approx([1000.0, 2.0], rel=1e-3)
     assert 1e3 * alone.before_mm[[2, 4]] == pytest.approx([2.0, 2.0], rel=1e-3)
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from cases.paths import CYCLE, NAN, PER_TOOL_MM, Known, Move, hole, line, program, rapid, toolpath
+from cases.paths import CYCLE, NAN, PER_TOOL_MM, Known, Move, columns, hole, line, program, rapid, toolpath
 
 from olp.core.arrays import Array
 from olp.core.toolpath import Frame, Toolpath
-from olp.program.program import Hole
+from olp.program.holes import Hole
 from olp.proof.strokes import strokes_mm
 
 BEND_MM = 1e-4
@@ -58,7 +58,7 @@ def stated(
     other = path if theirs is None else toolpath(*theirs, frames=frames)
     r, z = more.get("r", 5.0), more.get("z", -10.0)
     mine = program(path, hole(1, len(path), plane=plane, r=r, z=z))
-    holes = (hole(1, len(other), plane=plane, r=r, z=z),)
+    holes = columns(hole(1, len(other), plane=plane, r=r, z=z))
     move, worst = strokes_mm(mine, path.end_mm + np.array(shift), other, holes, model, BEND_MM)
     return int(move[0]), 1e3 * float(worst[0])
 
@@ -215,9 +215,12 @@ def test_a_hole_without_strokes_has_none() -> None:
 def test_other_numbers_of_holes_are_not_compared(holes: tuple[Hole, ...]) -> None:
     path = toolpath(*drilled(-10.0))
     mine = program(path, hole(1, 4, r=5.0, z=-10.0))
-    assert [len(part) for part in strokes_mm(mine, path.end_mm, path, holes, Known(), BEND_MM)] == [0, 0]
+    assert [len(part) for part in strokes_mm(mine, path.end_mm, path, columns(*holes), Known(), BEND_MM)] == [
+        0,
+        0,
+    ]
     none = program(path)
-    assert [len(part) for part in strokes_mm(none, path.end_mm, path, (), Known(), BEND_MM)] == [0, 0]
+    assert [len(part) for part in strokes_mm(none, path.end_mm, path, columns(), Known(), BEND_MM)] == [0, 0]
 
 
 def both(first: list[Move], second: list[Move]) -> tuple[Toolpath, tuple[Hole, ...]]:
@@ -232,9 +235,17 @@ def test_each_hole_has_its_own_figure_and_its_own_bottom() -> None:
     mine = program(path, *holes)
     model = off(0.003, 0.0, 0.0, between=(20.0, 40.0), axis=0)
     other, theirs = both(drilled(-3.0, -10.0), drilled(-6.0, x=30.0))
-    move, worst = strokes_mm(mine, path.end_mm, other, theirs, model, BEND_MM)
+    move, worst = strokes_mm(mine, path.end_mm, other, columns(*theirs), model, BEND_MM)
     assert move.tolist() == [2, 8]
     assert 1e3 * worst == pytest.approx([0.0, 3.0], abs=1e-5)
+
+
+def test_a_rapid_at_the_bottom_is_no_stroke_to_it() -> None:
+    start = rapid(0, 0, -10, flag=CYCLE)
+    path = toolpath(rapid(0, 0, 20), start, rapid(0, 0, 5, flag=CYCLE), line(0, 0, -10, flag=CYCLE))
+    mine = program(path, hole(1, 4, r=5.0, z=-10.0))
+    move, _ = strokes_mm(mine, path.end_mm, path, mine.holes, Known(), BEND_MM)
+    assert move.tolist() == [3]
 
 
 def test_a_hole_that_misses_its_bottom_ends_with_its_last_move() -> None:

@@ -12,9 +12,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from olp.cli.outline import outline
 from olp.files.config import load_calibration, load_setup
 from olp.findings.catalogue import RULES, Finding
+from olp.reports.outline import outline
 from olp.reports.report import WIDTH, number, printable, shortened, to_json, to_text
 
 REPORT: dict[str, Any] = {

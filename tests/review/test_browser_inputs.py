@@ -123,7 +123,7 @@ def test_measured_paths_and_workpieces_stand_beside_the_rest(chromium: Any, tmp_
         assert page.evaluate("olp.app.pictures.current.name") == "measured"
         assert page.evaluate("olp.drawn.measured") > 100
         uncorrected, measured = page.evaluate(
-            "['uncorrected', 'measured'].map(n => olp.app.metrics.summary(olp.app.distance, n, 1).largest)"
+            "['uncorrected', 'measured'].map(n => olp.app.metrics.summary(olp.app.distance, n).largest)"
         )
         # across the path the measured points are those of the uncompensated machine
         assert 0.2 * uncorrected < measured < 1.2 * uncorrected

@@ -108,7 +108,11 @@ PARTS = ("magnitude", "x", "y", "z", "along", "normal", "binormal", "across")
 
 
 def parts_of(review: Review, delta: np.ndarray) -> dict[str, np.ndarray]:
-    step = np.diff(review.scene.position_mm, axis=0, prepend=np.nan)
+    position = review.scene.position_mm
+    step = np.diff(position, axis=0, prepend=np.nan)
+    waypoint = review.scene.samples.share == 1.0
+    for i in np.flatnonzero(~waypoint[1:-1]) + 1:
+        step[i] = position[i + 1] - position[i - 1]
     length = np.linalg.norm(step, axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
         along = np.einsum("ij,ij->i", delta, step) / length
@@ -120,9 +124,10 @@ def parts_of(review: Review, delta: np.ndarray) -> dict[str, np.ndarray]:
     binormal = np.einsum("ij,ij->i", delta, np.cross(unit, side))
     across = np.linalg.norm(delta - along[:, None] * unit, axis=1)
     assert np.allclose(np.hypot(normal, binormal)[1:], across[1:], equal_nan=True)
-    # what counts: at waypoints the distance from the nominal point, between them that from the path
-    waypoint = review.scene.samples.share == 1.0
-    distance = np.where(waypoint, np.linalg.norm(delta, axis=1), across)
+    # what counts: at waypoints the distance from the nominal point, between them that from the path ahead
+    begins = np.concatenate(([False], waypoint[:-1] & (np.diff(position, axis=0) == 0.0).all(axis=1)))
+    behind = waypoint | (begins & (along < 0.0))
+    distance = np.where(behind, np.linalg.norm(delta, axis=1), across)
     parts = (distance, *delta.T, along, normal, binormal, across)
     return dict(zip(PARTS, parts, strict=True))
 

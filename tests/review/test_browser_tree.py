@@ -65,7 +65,9 @@ def open_all(page: Any) -> None:
 
 def test_the_tree_says_what_the_table_says(tree: Any, drilled: Review) -> None:
     stated = drilled.scene.report["judgement"]["operations"]
-    nodes = {node["id"]: node for node in tree.evaluate("olp.manifest.tree.nodes")}
+    nodes = {
+        node["id"]: node for node in tree.evaluate("olp.app.tree.nodes.map(({children, ...node}) => node)")
+    }
     open_all(tree)
     shown = rows(tree)
     assert [row["id"] for row in shown] == list(nodes)
@@ -89,7 +91,7 @@ def test_the_tree_says_what_the_table_says(tree: Any, drilled: Review) -> None:
 
 def test_a_click_on_a_feature_goes_there(tree: Any) -> None:
     open_all(tree)
-    nodes = tree.evaluate("olp.manifest.tree.nodes")
+    nodes = tree.evaluate("olp.app.tree.nodes.map(({children, ...node}) => node)")
     for node in [n for n in nodes if n["parent"] is not None and n["samples"]][::7][:6]:
         tree.evaluate("id => document.querySelector(`.node[data-id='${id}']`).click()", node["id"])
         assert tree.evaluate("olp.state.chosen") == node["samples"]
@@ -180,7 +182,7 @@ def test_the_largest_of_a_selection_is_that_of_its_lines(tree: Any, drilled: Rev
 
 def test_csv_has_the_points_that_are_selected(tree: Any, drilled: Review) -> None:
     samples = drilled.scene.samples
-    nodes = tree.evaluate("olp.manifest.tree.nodes")
+    nodes = tree.evaluate("olp.app.tree.nodes.map(({children, ...node}) => node)")
     node = next(n for n in nodes if n["kind"] == "hole")
     tree.evaluate("id => olp.app.tree.go(olp.app.tree.nodes.find(n => n.id === id))", node["id"])
     tree.evaluate("document.getElementById('filter').open = true")

@@ -104,7 +104,7 @@ def test_points_against_the_order_are_shown_in_its_order(tmp_path: Path) -> None
 def test_the_page_pairs_as_compare_does_and_says_what_that_found(tmp_path: Path) -> None:
     machine = random_machine(tmp_path / "m", 3, Recipe())
     program = written(tmp_path, TEXT, "part.ngc")
-    rows = olp.simulate(program, machine, step_mm=1.0).points_mm
+    rows = olp.simulate(program, machine, step_mm=1.0).points_mm.copy()
     rows[200] += (0.0, 0.0, 3.0)
     turned = rows @ np.array(((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0))) + np.array(
         (500.0, 9.0, 0.0)

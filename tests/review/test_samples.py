@@ -16,6 +16,7 @@ import olp
 from olp.core.errors import CannotCompute
 from olp.core.toolpath import Flag, Kind
 from olp.review.job import Review
+from olp.review.samples import away_mm
 
 ROOT = Path(__file__).resolve().parents[2]
 NASTY = ROOT / "programs" / "nasty"
@@ -199,3 +200,36 @@ def test_a_program_without_positions_has_nothing_to_show(tmp_path: Path) -> None
     path.write_text("G21 G90 G54\nG0 Z20\nM2\n")
     with pytest.raises(CannotCompute, match="nothing to show"):
         olp.view(path, machine, time=False)
+
+
+@pytest.mark.parametrize(
+    ("folder", "program"), [("nasty", "modal.ngc"), ("nasty", "planes.ngc"), ("gantry-plate", "plate.ngc")]
+)
+def test_what_is_drawn_of_a_cut_is_what_the_table_states(folder: str, program: str) -> None:
+    """But for what an unknown side of the backlash may change, 3 um on the plate, and for holes, of which
+    the table judges the stroke and not the retraction."""
+    where = ROOT / "programs" / folder
+    scene = olp.view(where / program, where / "machine.toml", time=False).scene
+    path, samples = scene.nominal.toolpath, scene.samples
+    cuts = (path.kind != Kind.RAPID) & ((path.flag & np.uint8(Flag.CYCLE)) == 0)
+    cuts &= np.isin(np.arange(len(path)), samples.move)
+    for layer in ("uncorrected", "corrected"):
+        away = away_mm(scene.position_mm, samples.share, getattr(samples, layer))
+        drawn = np.zeros(len(path))
+        np.maximum.at(drawn, samples.move, away)
+        more = (getattr(scene.table, layer) - drawn)[cuts] * 1e3
+        size = drawn[cuts] * 1e3
+        assert (more > -0.03 - 0.005 * size).all(), layer
+        known = more < 0.03 + 0.01 * size
+        assert known.mean() > 0.97 and (more < 3.03 + 0.01 * size).all(), layer
+
+
+def test_how_far_a_sample_is_off_by_its_place_in_the_move() -> None:
+    """On a path to the right, then up: the deviation is (-3, 4) at the end of the first move, at the start of
+    the second one, within it and at its end."""
+    position = np.array([[0.0, 0, 0], [1, 0, 0], [1, 0, 0], [1, 1, 0], [1, 2, 0]])
+    share = np.array([0.0, 1.0, 0.0, 0.5, 1.0])
+    delta = np.tile([-3.0, 4.0, 0.0], (5, 1))
+    # the start of the path lies behind the nominal point, that of the second move ahead of it
+    assert away_mm(position, share, delta).tolist() == [5.0, 5.0, 3.0, 3.0, 5.0]
+    assert away_mm(position, share, -delta).tolist() == [4.0, 5.0, 5.0, 3.0, 5.0]

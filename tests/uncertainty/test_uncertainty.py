@@ -36,7 +36,15 @@ from olp.files.calibration.writer import calibration_files
 from olp.reports.report import to_text
 from olp.uncertainty.components import components, improbable
 from olp.uncertainty.probability import within
-from olp.uncertainty.spread import Confidence, Points, Unknowns, bands, confidence, covariances
+from olp.uncertainty.spread import (
+    Confidence,
+    Points,
+    Unknowns,
+    _largest_of_runs,
+    bands,
+    confidence,
+    covariances,
+)
 
 KNOTS = {axis: np.linspace(*simulated.BOX[k], 6 + k) for k, axis in enumerate("XYZ")}
 TOOL = np.array([40.0, -60.0, -150.0])
@@ -227,7 +235,7 @@ def test_lines_do_not_depend_on_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     assert second.lines.tolist() == first.lines.tolist()
     assert second.line_after == pytest.approx(first.line_after, abs=2e-3)
     assert second.program_after == pytest.approx(first.program_after, abs=2e-3)
-    assert parts.gain == pytest.approx(whole.gain)
+    assert second.gain == pytest.approx(first.gain)
 
 
 def test_the_gain_of_one_number_is_probable_beyond_two_sigma() -> None:
@@ -237,7 +245,8 @@ def test_the_gain_of_one_number_is_probable_beyond_two_sigma() -> None:
     before = np.array([[4.0e-3, 0.0, 0.0], [1.0e-3, 0.0, 0.0]])
     result = confidence(unknowns(known), path_of(position), points_of(position, before), 0.005, tell=silent)
     # the tip gets nearer unless the true error is below half of what is corrected: Phi(v / 2 sigma)
-    assert result.nearer == pytest.approx([0.8413, 0.5987], abs=1e-4)
+    assert result.chances is not None
+    assert result.chances.nearer == pytest.approx([0.8413, 0.5987], abs=1e-4)
     assert result.band_mm == pytest.approx([4e-3, 4e-3])
 
 
@@ -509,3 +518,19 @@ def test_two_sigma_cover_the_errors_of_fresh_machines() -> None:
         count += off.size
     # ten machines: a squareness or two out of 30 beyond 2 sigma is 5 % of all (the benchmark takes 200)
     assert 0.85 <= inside / count <= 1.0
+
+
+def test_the_largest_of_each_run_of_rows_is_that_of_its_rows() -> None:
+    values = np.random.default_rng(4).normal(size=(2, 40, 3)).astype(np.float32)
+    for starts in ([0], [0, 1, 2, 17, 39], list(range(40)), [0, 30]):
+        expected = np.maximum.reduceat(values, starts, axis=1)
+        assert np.array_equal(_largest_of_runs(values, np.array(starts)), expected)
+
+
+def test_without_a_part_tolerance_nothing_but_bands_is_computed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("olp.uncertainty.spread.normal", None)
+    known = of_sigmas(flat(), {"curves": {"EXX": np.full(6, 2e-3)}})
+    assert known is not None
+    position = np.full((2, 3), [1500.0, 0.0, 0.0])
+    path, points = path_of(position), points_of(position, np.full((2, 3), 1e-3))
+    assert confidence(unknowns(known), path, points, None, tell=silent).chances is None

@@ -23,7 +23,6 @@ from olp.calibration.observations.measurements import Measurements
 from olp.calibration.observations.points import Points
 from olp.cli import main
 from olp.core.errors import CannotCompute, UsageError
-from olp.core.machine import Axis
 from olp.files.config import load_setup
 from olp.files.measurements.reader import load_measurements
 from olp.program.registry import DIALECTS
@@ -56,8 +55,10 @@ def slow_time(way: float, v: float, a: float, j: float) -> float:
 
 @given(st.floats(0.01, 5000), st.floats(10, 1000), st.floats(50, 5000), st.floats(100, 50000))
 def test_time_of_a_move(way: float, v: float, a: float, j: float) -> None:
-    axes = {k: Axis((0.0, 1.0), 0.001, v, a, j) for k in "XYZ"}
-    assert move_s(np.array([[0.0, way, 0.5 * way]]), axes)[0] == pytest.approx(slow_time(way, v, a, j), 1e-6)
+    limits = dict.fromkeys("XYZ", (v, a, j))
+    assert move_s(np.array([[0.0, way, 0.5 * way]]), limits)[0] == pytest.approx(
+        slow_time(way, v, a, j), 1e-6
+    )
 
 
 @settings(max_examples=15)
@@ -65,10 +66,10 @@ def test_time_of_a_move(way: float, v: float, a: float, j: float) -> None:
 @example(6, 64)
 def test_an_order_visits_all_and_is_no_slower_than_the_rows(n: int, seed: int) -> None:
     places = np.random.default_rng(seed).uniform(0, 1000, (n, 3))
-    axes = load_setup(MACHINE).machine.axes
-    ordered = order(places, axes)
+    limits = load_setup(MACHINE).machine.motion_limits()
+    ordered = order(places, limits)
     assert sorted(ordered.tolist()) == list(range(n))
-    took = [float(move_s(np.diff(places[k], axis=0), axes).sum()) for k in (ordered, np.arange(n))]
+    took = [float(move_s(np.diff(places[k], axis=0), limits).sum()) for k in (ordered, np.arange(n))]
     assert took[0] <= took[1] * (1.0 + 1e-9)
 
 

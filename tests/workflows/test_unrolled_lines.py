@@ -106,8 +106,8 @@ CALLS: Mapping[str, tuple[str, ...]] = {
     "check": ("part.ngc", "--json", "--date", "2026-03-01"),
     "compare": ("part.ngc", "measured.csv", "--json"),
 }
-#: The others: `view` has a page, `flatten` the text, `calibrate` figures without lines.
-OTHERS = {"view", "flatten", "calibrate refine", "calibrate export"}
+#: The others: `view` has a page, `batch` reports of `correct`, `flatten` the text, `calibrate` no lines.
+OTHERS = {"view", "batch", "flatten", "calibrate refine", "calibrate export"}
 
 
 def test_no_verb_is_left_out() -> None:

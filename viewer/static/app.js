@@ -49,6 +49,7 @@
         chosen: NONE, // ranges [first, last] of samples
         notes: (manifest.notes ?? []).map(n => ({...n})),
         worst: -1,
+        trail: false, // only the path up to the current time is drawn
       };
       this.mask = null; // by sample: 1 where it passes the filter
       this.runs();
@@ -78,7 +79,7 @@
         layer.look ??= new Uint8Array(layer.n);
         for (let i = 0; i < layer.n; i++) {
           const at = layer.index ? layer.index[i] : Math.min(i, look.length - 1);
-          layer.look[i] = layer.kind?.[i] ? OLP.RAPID : mask && !mask[at] ? OLP.DIM : look[at] & OLP.CHOSEN;
+          layer.look[i] = layer.judged && layer.kind?.[i] ? OLP.RAPID : mask && !mask[at] ? OLP.DIM : look[at] & OLP.CHOSEN;
         }
       }
     }
@@ -141,6 +142,53 @@
       this.compose();
       this.scene.schedule(30);
       OLP.emit("filter");
+    }
+
+    // By sample 1 where it is selected, else where it passes the filter; null where there is neither.
+    kept() {
+      const {chosen} = this.state;
+      if (!chosen.length) return this.mask;
+      const kept = new Uint8Array(this.samples);
+      for (const [a, b] of chosen) kept.fill(1, Math.max(0, a), b + 1);
+      return kept;
+    }
+
+    // How many points are kept, and by row of the listing 1 where one of them is.
+    rows_of(kept) {
+      const rows = new Uint8Array(this.first.length);
+      let points = 0;
+      for (let i = 0; i < kept.length; i++) {
+        if (!kept[i]) continue;
+        points++;
+        if (this.rows[i] >= 0) rows[this.rows[i]] = 1;
+      }
+      return {points, rows};
+    }
+
+    // The largest deviation that the table states of a layer on rows that count; -1 where none does.
+    largest_of(rows, name) {
+      const own = this.manifest.listing.by_layer?.[name];
+      if (!own) return -1;
+      const [um, state] = [own.um, own.state].map(n => this.arrays.get(n)),
+        shown = this.layers.get(name).index ? 2 : 1; // measured points count also where nothing judges them
+      let most = -1;
+      for (let row = 0; row < rows.length; row++) if (rows[row] && state[row] <= shown && um[row] > most) most = um[row];
+      return most;
+    }
+
+    // How many of the rows the table says are above.
+    above_of(rows, name) {
+      const own = this.manifest.listing.by_layer?.[name],
+        state = own ? this.arrays.get(own.state) : [];
+      let count = 0;
+      for (let row = 0; row < state.length; row++) if (rows[row] && state[row] === 1) count++;
+      return count;
+    }
+
+    // Of what may be anything the ranges [first, last] of samples.
+    ranges(value) {
+      const whole = v => Number.isInteger(v) && v >= 0 && v < this.samples;
+      return (Array.isArray(value) ? value : []).filter(r => Array.isArray(r) && whole(r[0]) && whole(r[1]) && r[0] <= r[1]);
     }
 
     // Marks the moves of a row; the tool goes to their end, without `stay`.
@@ -224,7 +272,7 @@
     }
 
     set_trail(on) {
-      this.state.trail = on;
+      this.state.trail = document.getElementById("trail").checked = on;
       this.scene.set_uniform("cut", on ? this.state.sample_at : 1e9);
     }
 

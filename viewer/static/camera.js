@@ -59,7 +59,7 @@
       controls.target.copy(target);
       controls.rotateSpeed = 0.8;
       controls.zoomSpeed = 1.2;
-      controls.addEventListener("change", () => this.app.scene.schedule(120));
+      controls.addEventListener("change", () => this.app.scene.moved());
       controls.addEventListener("start", () => this.turned());
       this.resized();
     }

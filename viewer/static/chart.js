@@ -18,12 +18,15 @@
   }
 
   class Chart {
-    // events: {hover(x or null), click(x), zoom([low, high] or null)}
+    // events: {hover(x or null), click(x), zoom([low, high] or null), span([x, x] or null, whether it is the last one),
+    // extend(1 or -1)}
     constructor(host, events) {
       this.host = host;
       this.events = events;
       [this.top, this.base] = [0, 1].map(() => document.createElement("canvas"));
       this.base.setAttribute("role", "img");
+      this.base.tabIndex = 0;
+      this.base.setAttribute("aria-keyshortcuts", "+ - Home ArrowLeft ArrowRight Shift+ArrowLeft Shift+ArrowRight Escape");
       this.top.setAttribute("aria-hidden", "true");
       host.prepend(this.base, this.top);
       Object.assign(this, {lanes: [], range: null, extent: [0, 1], marks: {now: null, hover: null}, bands: []});
@@ -182,6 +185,7 @@
       c.fillText(this.x_label, EDGE.left + this.wide, bottom + 6);
       c.fillStyle = this.look.mark;
       for (const [a, b] of this.bands) {
+        if (b < this.window[0] || a > this.window[1]) continue;
         const [from, to] = [a, b].map(x => Math.min(EDGE.left + this.wide, Math.max(EDGE.left, this.px(x))));
         c.fillRect(from, EDGE.top, Math.max(1.5, to - from), this.high);
       }

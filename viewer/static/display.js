@@ -32,8 +32,8 @@
         button.setAttribute("role", "radio");
         button.id = `picture-${pictures.list[k].name}`;
         button.onkeydown = e => {
-          const step = {ArrowRight: 1, ArrowLeft: -1}[e.key];
-          if (!step) return;
+          const step = {ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1}[e.key];
+          if (!step || e.shiftKey || e.ctrlKey || e.metaKey || e.altKey) return;
           e.preventDefault();
           e.stopPropagation();
           const to = (k + step + this.buttons.length) % this.buttons.length;

@@ -27,7 +27,8 @@
   OLP.flat_renderer = pane => {
     const canvas = document.createElement("canvas"),
       context = canvas.getContext("2d");
-    let ratio = 1;
+    let ratio = 1,
+      size = [0, 0];
     pane.append(canvas);
     const renderer = {
       domElement: canvas,
@@ -36,9 +37,11 @@
       draw: null,
       setPixelRatio(value) {
         ratio = value;
+        renderer.setSize(...size);
       },
       getPixelRatio: () => ratio,
       setSize(w, h) {
+        size = [w, h];
         canvas.width = Math.round(w * ratio);
         canvas.height = Math.round(h * ratio);
         Object.assign(canvas.style, {width: w + "px", height: h + "px"});

@@ -3,7 +3,10 @@
 (() => {
   const $ = id => document.getElementById(id),
     TABS = ["parts", "program", "display", "findings"],
-    WIDE = matchMedia("(min-width: 1200px)");
+    WIDE = matchMedia("(min-width: 1200px)"),
+    NARROWEST = 240, // px of the program
+    STEP = 16, // px of a key
+    widest = () => 0.6 * innerWidth;
 
   class Layout {
     constructor(app) {
@@ -51,17 +54,38 @@
       $("toggle-plots").textContent = on ? "▾" : "▴";
     }
 
+    // The edge of the program: dragged, or moved by keys; its value is the width of the program in px.
     grip() {
       const grip = $("grip");
       grip.onpointerdown = e => {
         grip.setPointerCapture(e.pointerId);
         e.preventDefault();
+        grip.focus();
       };
       grip.onpointermove = e => {
-        if (!grip.hasPointerCapture(e.pointerId)) return;
-        const width = Math.min(innerWidth * 0.6, Math.max(240, innerWidth - e.clientX));
-        document.documentElement.style.setProperty("--right", `${Math.round(width)}px`);
+        if (grip.hasPointerCapture(e.pointerId)) this.widen(innerWidth - e.clientX);
       };
+      grip.onkeydown = e => {
+        if (e.ctrlKey || e.metaKey || e.altKey) return;
+        const width = $("panel-program").offsetWidth,
+          to = {ArrowLeft: width + STEP, ArrowRight: width - STEP, Home: NARROWEST, End: widest()}[e.key];
+        if (to === undefined) return;
+        e.preventDefault();
+        e.stopPropagation();
+        this.widen(to);
+      };
+      new ResizeObserver(() => this.say_width()).observe($("panel-program"));
+    }
+
+    widen(width) {
+      const to = Math.round(Math.min(widest(), Math.max(NARROWEST, width)));
+      document.documentElement.style.setProperty("--right", `${to}px`);
+      this.say_width();
+    }
+
+    say_width() {
+      for (const [name, value] of [["now", $("panel-program").offsetWidth], ["min", NARROWEST], ["max", Math.round(widest())]])
+        $("grip").setAttribute(`aria-value${name}`, value);
     }
   }
 

@@ -12,6 +12,7 @@
       this.app = app;
       this.canvas = document.getElementById("legend-canvas");
       this.box = document.getElementById("legend");
+      this.fit(); // the picture has what it leaves
       for (const event of ["drawn", "scale", "picture", "exaggeration", "theme", "filter"]) OLP.on(event, () => this.later());
       new ResizeObserver(() => this.later()).observe(this.box);
     }
@@ -29,17 +30,25 @@
       return width < NARROW ? 112 : 56;
     }
 
-    show() {
+    // Gives the canvas its size; returns the width.
+    fit() {
       const {clientWidth: w} = this.box;
-      if (!w) return;
+      if (!w) return 0;
       const h = Legend.height(w),
         ratio = window.devicePixelRatio || 1;
       if (this.canvas.width !== Math.round(w * ratio) || this.canvas.height !== Math.round(h * ratio))
         Object.assign(this.canvas, {width: Math.round(w * ratio), height: Math.round(h * ratio)});
       Object.assign(this.canvas.style, {width: w + "px", height: h + "px"});
-      const c = this.canvas.getContext("2d");
+      return w;
+    }
+
+    show() {
+      const w = this.fit();
+      if (!w) return;
+      const c = this.canvas.getContext("2d"),
+        ratio = window.devicePixelRatio || 1;
       c.setTransform(ratio, 0, 0, ratio, 0, 0);
-      c.clearRect(0, 0, w, h);
+      c.clearRect(0, 0, w, Legend.height(w));
       this.draw(c, w);
       this.canvas.setAttribute("aria-label", this.text());
     }

@@ -13,8 +13,8 @@ uniform float width, k, cut, lift, rapids;
 uniform float edges[${BANDS}];      // upper edges of the bands
 uniform vec3 shades[${BANDS}];
 uniform int bands;                  // 0: not coloured
-uniform vec3 colour, faint, ink, unknown;
-flat out vec3 shade, edge;
+uniform vec3 colour, faint, unknown;
+flat out vec3 shade;
 flat out vec4 style;                // dashes along x (1) or y (2); half width, half width of the core, px; opacity
 flat out vec2 dash;
 out vec2 place;                     // px from the middle line; distance beyond the section, mm
@@ -50,13 +50,13 @@ void main() {
   dash = rapid ? vec2(5.0, 4.0) : chosen || whisker || dim ? vec2(1.0, 0.0) : dashes;
   style = vec4(abs(dir.x) > abs(dir.y) ? 1.0 : 2.0, wide * 0.5, chosen ? core * 0.5 : wide, whisker ? 0.55 : dim ? 0.5 : 1.0);
   shade = rapid || dim ? faint : coded(aux.y);
-  edge = ink;
 }`;
   // Edges fade over a pixel: smooth without multisampling, which would double the time of software GL. Dashes counted
   // along the longer screen axis join up over any number of short segments.
   const FRAGMENT = `
 uniform float ratio, opacity;
-flat in vec3 shade, edge;
+uniform vec3 ink;
+flat in vec3 shade;
 flat in vec4 style;
 flat in vec2 dash;
 in vec2 place;
@@ -65,7 +65,7 @@ void main() {
   float across = abs(place.x), alpha = clamp(style.y + 0.5 - across, 0.0, 1.0) * style.w * opacity;
   if (alpha <= 0.0 || place.y > 0.0) discard;
   if (dash.y > 0.0 && mod(style.x > 1.5 ? gl_FragCoord.y : gl_FragCoord.x, (dash.x + dash.y) * ratio) > dash.x * ratio) discard;
-  result = vec4(mix(shade, edge, clamp(across - style.z + 0.5, 0.0, 1.0)), alpha);
+  result = vec4(mix(shade, ink, clamp(across - style.z + 0.5, 0.0, 1.0)), alpha);
   gl_FragDepth = gl_FragCoord.z + 0.02 * (1.0 - clamp(style.y + 0.5 - across, 0.0, 1.0)); // a faint edge hides no line behind it
 }`;
 
@@ -99,8 +99,7 @@ void main() {
         glslVersion: T.GLSL3,
         vertexShader: VERTEX,
         fragmentShader: FRAGMENT,
-        uniforms: u,
-        side: T.DoubleSide,
+        uniforms: u, // one side: its corners always turn the same way, and three draws transparent bodies with two sides twice
         transparent: true,
       });
       this.mesh = new T.Mesh(new T.BufferGeometry(), this.material);

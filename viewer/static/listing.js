@@ -39,6 +39,7 @@
       this.lay_out();
       this.listen();
       new ResizeObserver(() => this.lay_out()).observe(this.box);
+      OLP.on("filter", () => this.paint());
     }
 
     // Length of line that most lines do not exceed.
@@ -165,6 +166,7 @@
         }
         row.classList.toggle("selected", k === this.selected);
         row.classList.toggle("current", k === this.current);
+        row.classList.toggle("kept", this.app.filter?.rows?.[k] === 1);
         row.setAttribute("aria-selected", k === this.selected);
       });
       if (this.selected >= first && this.selected < first + count) this.box.setAttribute("aria-activedescendant", `row-${this.selected}`);

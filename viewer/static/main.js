@@ -10,19 +10,22 @@
         [-Infinity, -Infinity, -Infinity],
       ],
       cut = structuredClone(whole);
-    const widen = (box, i) => {
-      for (let j = 0; j < 3; j++) {
-        const v = app.base[3 * i + j];
-        if (v < box[0][j]) box[0][j] = v;
-        if (v > box[1][j]) box[1][j] = v;
+    for (let j = 0; j < 3; j++) {
+      let [low, high, first, last] = [Infinity, -Infinity, Infinity, -Infinity],
+        before = NaN;
+      for (let i = 0, k = j; i < app.samples; i++, k += 3) {
+        const v = app.base[k];
+        if (v < low) low = v;
+        if (v > high) high = v;
+        if (i > 0 && app.kind[i] === 0) {
+          if (v < first) first = v;
+          if (v > last) last = v;
+          if (before < first) first = before;
+          if (before > last) last = before;
+        }
+        before = v;
       }
-    };
-    for (let i = 0; i < app.samples; i++) {
-      widen(whole, i);
-      if (i > 0 && app.kind[i] === 0) {
-        widen(cut, i - 1);
-        widen(cut, i);
-      }
+      [whole[0][j], whole[1][j], cut[0][j], cut[1][j]] = [low, high, first, last];
     }
     const box = cut[0][0] <= cut[1][0] ? cut : whole,
       size = Math.hypot(...box[0].map((v, j) => box[1][j] - v)) || 10;
@@ -149,6 +152,7 @@
     app.timeline = new OLP.Timeline(app);
     app.plots = new OLP.Plots(app);
     app.tree = new OLP.Tree(app);
+    app.filter = new OLP.Filter(app);
     app.pointer = new OLP.Pointer(app);
     app.notes = new OLP.Notes(app);
     app.layout = new OLP.Layout(app);
@@ -166,8 +170,7 @@
     app.plots.draw();
     app.notes.restore();
     expose(app);
-    app.scene.refill();
-    app.scene.viewer.render();
+    app.scene.begin();
     OLP.watch(app);
     document.documentElement.dataset.ready = "1";
   }

@@ -7,6 +7,7 @@
     constructor(app) {
       this.app = app;
       this.known = new Map();
+      this.summaries = new Map();
       // The verdict of the line, as the table of judgements has it, is a way to colour as well.
       this.list = [...app.manifest.metrics];
       const layers = Object.keys(app.manifest.listing.by_layer ?? {});
@@ -65,7 +66,10 @@
     // Metrics other than these are dropped from memory.
     keep(metrics) {
       const names = new Set(metrics.filter(Boolean).map(m => m.name));
-      for (const key of this.known.keys()) if (!names.has(key.split("\n")[0])) this.known.delete(key);
+      for (const key of this.known.keys()) if (!names.has(key.split("\n")[0])) {
+          this.known.delete(key);
+          this.summaries.delete(key);
+        }
     }
 
     derive(part, layer) {
@@ -80,11 +84,12 @@
     }
 
     // What counts, as in the proof: at waypoints the distance from the nominal point, between them the distance from the
-    // path; of measured points the distance.
+    // path, which at the start of a move is that from the nominal point where the tip is behind it; of measured points
+    // the distance.
     distance(layer, out) {
       const {n, D, index} = layer,
         {waypoint} = this.app;
-      if (!index && waypoint) this.split("across", layer, out);
+      if (!index && waypoint) this.split("path", layer, out);
       for (let i = 0, k = 0; i < n; i++, k += 3)
         if (index || !waypoint || waypoint[i])
           out[i] = 1e3 * Math.sqrt(D[k] * D[k] + D[k + 1] * D[k + 1] + D[k + 2] * D[k + 2]);
@@ -92,23 +97,33 @@
 
     // Parts by the direction of the nominal segment that ends in the sample: along it; normal, to its left in the plane
     // across Z; binormal, which completes the two (up on a level path); across, the size of the last two.
+    // Path: across, or the distance from the nominal point where the tip is behind the start of the move.
     split(part, {n, D, index}, out) {
       const P = this.app.base,
+        {waypoint} = this.app,
         u = [1, 0, 0],
         side = [0, 1, 0];
       for (let i = 0, k = 0; i < n; i++, k += 3) {
         const s = index ? index[i] : i,
           a = 3 * s;
+        let start = false;
         if (s > 0) {
-          const x = P[a] - P[a - 3],
+          let x = P[a] - P[a - 3],
             y = P[a + 1] - P[a - 2],
-            z = P[a + 2] - P[a - 1],
-            length = Math.sqrt(x * x + y * y + z * z);
+            z = P[a + 2] - P[a - 1];
+          // between waypoints from the sample before to the one behind, which on arcs is the tangent
+          if (waypoint && !waypoint[s] && a + 5 < P.length) {
+            start = x === 0 && y === 0 && z === 0 && waypoint[s - 1];
+            x = P[a + 3] - P[a - 3];
+            y = P[a + 4] - P[a - 2];
+            z = P[a + 5] - P[a - 1];
+          }
+          const length = Math.sqrt(x * x + y * y + z * z);
           if (length > 0) {
             u[0] = x / length;
             u[1] = y / length;
             u[2] = z / length;
-            const flat = Math.hypot(u[0], u[1]);
+            const flat = Math.sqrt(u[0] * u[0] + u[1] * u[1]);
             side[0] = flat > UPRIGHT ? -u[1] / flat : 0;
             side[1] = flat > UPRIGHT ? u[0] / flat : 1;
           }
@@ -120,16 +135,30 @@
         else if (part === "normal") value = normal;
         else if (part === "binormal")
           value = -D[k] * u[2] * side[1] + D[k + 1] * u[2] * side[0] + D[k + 2] * (u[0] * side[1] - u[1] * side[0]);
-        else if (part === "across") value = Math.hypot(D[k] - along * u[0], D[k + 1] - along * u[1], D[k + 2] - along * u[2]);
-        else throw new Error(`unknown metric part ${part}`);
+        else {
+          if (part !== "across" && part !== "path") throw new Error(`unknown metric part ${part}`);
+          const off = part === "path" && start && along < 0 ? 0 : along,
+            x = D[k] - off * u[0],
+            y = D[k + 1] - off * u[1],
+            z = D[k + 2] - off * u[2];
+          value = Math.sqrt(x * x + y * y + z * z);
+        }
         out[i] = 1e3 * value;
       }
     }
 
-    // Largest |value|, mean and rms of the points of a layer.
-    summary(metric, name) {
+    // Largest |value|, mean and rms of the points of a layer, of all or of those of the samples that are kept.
+    summary(metric, name, kept = null) {
       const values = this.values(metric, name);
       if (!values) return null;
+      const {index} = this.app.layers.get(name);
+      if (kept) return this.summarise(values, i => kept[index ? index[i] : i]);
+      const key = metric.name + "\n" + name;
+      if (!this.summaries.has(key)) this.summaries.set(key, this.summarise(values, null));
+      return this.summaries.get(key);
+    }
+
+    summarise(values, keeps) {
       let count = 0,
         sum = 0,
         squares = 0,
@@ -137,7 +166,7 @@
         high = -Infinity;
       for (let i = 0; i < values.length; i++) {
         const v = values[i];
-        if (v !== v) continue;
+        if (v !== v || (keeps && !keeps(i))) continue;
         count++;
         sum += v;
         squares += v * v;

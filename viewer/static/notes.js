@@ -2,7 +2,8 @@
 // Notes on points of the path; saving the page with them; a view in the address.
 (() => {
   const $ = id => document.getElementById(id),
-    make = (...a) => OLP.make(...a);
+    make = (...a) => OLP.make(...a),
+    MOST_RANGES = 2000; // of a selection in a link
 
   class Notes {
     constructor(app) {
@@ -96,11 +97,18 @@
       this.app.toast(`Saved as ${name}`, 4000);
     }
 
+    // What a link holds. Of a selection of very many parts an address is too short.
     view() {
-      const {state, pictures, camera, section, plots} = this.app;
+      const {state, pictures, camera, section, plots, filter} = this.app,
+        short = ranges => (ranges && ranges.length <= MOST_RANGES ? ranges : null),
+        kept = filter.view();
       return {
         time: state.time,
-        chosen: state.chosen,
+        chosen: short(state.chosen) ?? [],
+        filter: {...kept, only: short(kept.only)},
+        trail: state.trail,
+        abscissa: plots.abscissa,
+        motion: plots.motion,
         metric: state.metric,
         layers: state.layers,
         theme: state.theme,
@@ -120,7 +128,7 @@
       const bytes = new TextEncoder().encode(JSON.stringify(this.view()));
       return (
         "#view=" +
-        btoa(String.fromCharCode(...bytes))
+        btoa(Array.from(bytes, code => String.fromCharCode(code)).join(""))
           .replaceAll("+", "-")
           .replaceAll("/", "_")
           .replaceAll("=", "")
@@ -130,7 +138,9 @@
     share() {
       history.replaceState(null, "", this.hash());
       navigator.clipboard?.writeText(location.href).catch(() => {});
-      this.app.toast("The address now holds this view and its notes", 4000);
+      const {state, filter} = this.app,
+        whole = [state.chosen, filter.only ?? []].every(ranges => ranges.length <= MOST_RANGES);
+      this.app.toast(`The address now holds this view and its notes${whole ? "" : ", but the selection has too many parts for it"}`, 4000);
     }
 
     // Restores the view in the address; one that cannot be read is ignored.
@@ -156,7 +166,8 @@
         {pictures} = app,
         list = v => (Array.isArray(v) ? v : []),
         last = app.samples - 1,
-        whole = v => Number.isInteger(v) && v >= 0 && v <= last;
+        whole = v => Number.isInteger(v) && v >= 0 && v <= last,
+        text = (v, other) => (typeof v === "string" ? v : other);
       if (["dark", "light"].includes(view.theme)) app.set_theme(view.theme);
       for (const [name, on] of Object.entries(view.layers ?? {})) app.set_layer(name, on);
       list(view.enlargement).forEach((k, i) => {
@@ -164,21 +175,25 @@
       });
       pictures.same = view.same === true;
       pictures.set_basis(view.basis, view.display_um);
-      app.set_metric(String(view.metric ?? app.state.metric));
-      pictures.show(view.picture);
+      app.set_metric(text(view.metric, app.state.metric));
+      if (Number.isFinite(view.picture)) pictures.show(view.picture);
       if (Array.isArray(view.notes))
         app.state.notes = view.notes
           .filter(n => n && whole(n.sample))
-          .map(n => ({sample: n.sample, text: String(n.text).slice(0, 500), layer: String(n.layer)}));
+          .map(n => ({sample: n.sample, text: text(n.text, "").slice(0, 500), layer: text(n.layer, "")}));
       this.list();
       if (Number.isFinite(view.time)) app.set_time(view.time);
-      app.choose(list(view.chosen).filter(r => Array.isArray(r) && whole(r[0]) && whole(r[1]) && r[0] <= r[1]));
+      if (view.filter && typeof view.filter === "object") app.filter.restore(view.filter);
+      app.choose(app.ranges(view.chosen));
+      if (typeof view.trail === "boolean") app.set_trail(view.trail);
       if (view.camera && typeof view.camera === "object") app.camera.restore(view.camera);
       if (view.section && typeof view.section === "object") {
         const {axis, at, flip} = view.section;
         app.display.set_section({axis: ["X", "Y", "Z"].includes(axis) ? axis : "", at: Number.isFinite(at) ? at : null, flip: flip === true});
       }
       app.plots.set_strip(view.strip);
+      app.plots.set_motion(view.motion);
+      app.plots.set_abscissa(view.abscissa);
       OLP.emit("row");
       OLP.emit("picture");
     }

@@ -22,6 +22,10 @@
   // Sentences of the proof are in ASCII, for terminals.
   const micrometres = text => text.replace(/\bum\b/g, "µm");
 
+  // What is to be said of pictures beside their figures.
+  OLP.notes_of = app =>
+    app.pictures.list.filter(p => p.note).map(p => make("p", {className: "empty note-of", textContent: `${p.label}: ${p.note}`}));
+
   class Panels {
     constructor(app) {
       this.app = app;
@@ -39,7 +43,7 @@
       $("subtitle").title = $("subtitle").textContent;
       this.card();
       this.findings();
-      for (const event of ["metric", "picture"]) OLP.on(event, () => this.statistics());
+      for (const event of ["metric", "picture", "chosen", "filter"]) OLP.on(event, () => this.statistics());
       for (const event of ["time", "picture", "row"]) OLP.on(event, () => this.readout());
     }
 
@@ -74,15 +78,16 @@
           ),
         );
       const remarks = (verdict?.remarks ?? []).map(text => make("p", {className: "remark", textContent: micrometres(text)}));
-      $("card").replaceChildren(this.figures(), ...this.removed(), ...questions, ...remarks);
+      $("card").replaceChildren(this.figures(), ...OLP.notes_of(this.app), ...this.removed(), ...questions, ...remarks);
     }
 
     figures() {
       const {um} = OLP.colour,
         {app} = this,
-        table = make("table");
+        longest = Math.max(...app.pictures.list.map(p => `${p.flag?.line ?? ""}${p.lines_above ?? ""}`.length)),
+        table = make("table", {className: longest > 9 ? "tight" : ""});
       table.append(
-        make("tr", {}, ...["µm", "largest", "rms", "line"].map(t => make("th", {textContent: t, scope: "col"}))),
+        make("tr", {}, ...["µm", "largest", "rms", "line", "above"].map(t => make("th", {textContent: t, scope: "col"}))),
       );
       app.pictures.list.forEach((picture, k) => {
         const line = make("button", {className: "line", textContent: picture.flag?.line ?? "–", title: "Go there"});
@@ -99,6 +104,7 @@
             make("td", {}, make("b", {textContent: um(picture.largest_um)})),
             make("td", {textContent: um(picture.rms_um)}),
             make("td", {}, line),
+            make("td", {textContent: picture.lines_above ?? "–", title: "lines above what they are judged by"}),
           ),
         );
       });
@@ -118,28 +124,47 @@
       ];
     }
 
-    // Of the deviation the figures of the proof and of the comparison, of other metrics those of the points shown.
+    // Of the deviation the figures of the proof and of the comparison, of other metrics those of the points shown; of what
+    // is selected or passes the filter those of the table and of its points.
     statistics() {
       const {app} = this,
         metric = app.metric,
         names = app.metrics.layers(metric).filter(n => app.pictures.of_layer(n)),
         unit = OLP.colour.unit_label(metric?.unit),
-        proved = Boolean(metric?.judged);
+        proved = Boolean(metric?.judged),
+        kept = app.kept(),
+        part = kept ? (app.state.chosen.length ? ", selected" : ", filtered") : "";
       const table = make(
         "table",
         {},
         make("caption", {
-          textContent: metric ? `${metric.label}${unit ? ", " + unit : ""}, ${proved ? "moves that count" : "points shown"}` : "",
+          textContent: metric ? `${metric.label}${unit ? ", " + unit : ""}, ${proved ? "moves that count" : "points shown"}${part}` : "",
         }),
-        make("thead", {}, make("tr", {}, make("th"), ...names.map(n => make("th", {textContent: n, scope: "col"})))),
+        make("thead", {}, make("tr", {}, make("th"), ...names.map(n => make("th", {textContent: app.pictures.of_layer(n).label, scope: "col"})))),
       );
-      if (proved) this.proved_rows(table, names);
-      else if (metric?.kind !== "state") this.shown_rows(table, metric, names);
+      if (proved && kept) this.kept_rows(table, names, kept);
+      else if (proved) this.proved_rows(table, names);
+      else if (metric?.kind !== "state") this.shown_rows(table, metric, names, kept);
       $("statistics").replaceChildren(table, ...this.facts());
     }
 
-    shown_rows(table, metric, names) {
-      const parts = names.map(n => this.app.metrics.summary(metric, n)),
+    // What the table says of the lines that are kept.
+    kept_rows(table, names, kept) {
+      const {app} = this,
+        {rows} = app.rows_of(kept),
+        row = (label, cells) => table.append(make("tr", {}, make("th", {textContent: label}), ...cells.map(t => make("td", {textContent: t}))));
+      row(
+        "largest",
+        names.map(n => app.largest_of(rows, n)).map(v => (v < 0 ? "–" : OLP.colour.um(v))),
+      );
+      row(
+        "lines above",
+        names.map(n => app.above_of(rows, n)),
+      );
+    }
+
+    shown_rows(table, metric, names, kept) {
+      const parts = names.map(n => this.app.metrics.summary(metric, n, kept)),
         {number} = OLP.colour;
       for (const [label, show] of [
         ["largest", p => number(p.largest)],
@@ -234,16 +259,17 @@
       );
       row("nominal, mm", [...p.map((v, j) => (v + manifest.origin_mm[j]).toFixed(3).replace("-", "−")), ""]);
       for (const layer of app.layers.values()) {
-        if (!layer.D || !app.pictures.of_layer(layer.name)) continue;
+        const label = app.pictures.of_layer(layer.name)?.label;
+        if (!layer.D || !label) continue;
         if (!layer.knows(state.sample_at)) {
-          row(`${layer.name}, µm`, ["–", "–", "–", "–"]);
+          row(`${label}, µm`, ["–", "–", "–", "–"]);
           continue;
         }
         const at = layer.own(state.sample_at),
           a = layer.at(at, 0),
           d = layer.at(at, 1).map((v, j) => 1e3 * (v - a[j])),
           size = app.metrics.values(app.distance, layer.name)?.[Math.ceil(at - 1e-9)] ?? NaN;
-        row(`${layer.name}, µm`, [...d.map(number), size === size ? number(size) : "–"]);
+        row(`${label}, µm`, [...d.map(number), size === size ? number(size) : "–"]);
       }
       $("readout").replaceChildren(table);
     }

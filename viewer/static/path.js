@@ -12,6 +12,8 @@
   const CHORD = 2; // least length of a drawn segment, px
   const WHISKERS = {apart: 14, most: 2500}; // px between whiskers; of a layer
 
+  const BOXES = new WeakMap(); // of the blocks of a base
+
   class Path {
     // spec: the manifest's layer; P (n,3) mm; D (n,3) mm or null; index (n) nominal samples or null; kind (n) of the
     // segment that ends in a point. `look` (n) is how that is drawn: its kind, outside the filter, selected.
@@ -25,43 +27,60 @@
         D,
         index,
         kind,
+        judged: spec.judged !== false, // of a measured run that is not judged everything is drawn
         n: P.length / 3,
       });
       this.visible = true;
       this.look = null;
       this.values = null; // scalar of the present metric, or null
       this.blocks = Math.ceil(Math.max(0, this.n - 1) / BLOCK);
-      [this.centre, this.radius, this.spread, this.length, this.need] = [3, 1, 1, 1, 1].map(
-        c => new Float64Array(c * this.blocks),
-      );
+      [this.spread, this.need] = [0, 1].map(() => new Float64Array(this.blocks));
       this.bound();
       this.buffer = new Float32Array(0);
       this.drawn = 0;
     }
 
+    // Boxes of the blocks and how far deviations go. Layers of one base have the same boxes.
     bound() {
-      const {P, D, n} = this;
+      const {D, n, spread} = this;
+      Object.assign(this, this.boxes());
+      if (!D) return;
+      for (let b = 0; b < this.blocks; b++) {
+        const last = Math.min(n - 1, (b + 1) * BLOCK);
+        let most = 0;
+        for (let k = 3 * b * BLOCK; k <= 3 * last; k += 3) {
+          const size = D[k] * D[k] + D[k + 1] * D[k + 1] + D[k + 2] * D[k + 2];
+          if (size > most) most = size;
+        }
+        spread[b] = Math.sqrt(most);
+      }
+    }
+
+    boxes() {
+      const {P, n} = this,
+        known = BOXES.get(P);
+      if (known) return known;
+      const [centre, radius, length] = [3, 1, 1].map(c => new Float64Array(c * this.blocks));
       for (let b = 0; b < this.blocks; b++) {
         const first = b * BLOCK,
           last = Math.min(n - 1, first + BLOCK),
           lo = [Infinity, Infinity, Infinity],
           hi = [-Infinity, -Infinity, -Infinity];
-        let spread = 0,
-          length = 0;
+        let way = 0;
         for (let i = first, k = 3 * first; i <= last; i++, k += 3) {
           for (let j = 0; j < 3; j++) {
             const v = P[k + j];
             if (v < lo[j]) lo[j] = v;
             if (v > hi[j]) hi[j] = v;
           }
-          if (D) spread = Math.max(spread, D[k] * D[k] + D[k + 1] * D[k + 1] + D[k + 2] * D[k + 2]);
-          if (i > first) length += Math.sqrt((P[k] - P[k - 3]) ** 2 + (P[k + 1] - P[k - 2]) ** 2 + (P[k + 2] - P[k - 1]) ** 2);
+          if (i > first) way += Math.sqrt((P[k] - P[k - 3]) ** 2 + (P[k + 1] - P[k - 2]) ** 2 + (P[k + 2] - P[k - 1]) ** 2);
         }
-        for (let j = 0; j < 3; j++) this.centre[3 * b + j] = (lo[j] + hi[j]) / 2;
-        this.radius[b] = Math.hypot(hi[0] - lo[0], hi[1] - lo[1], hi[2] - lo[2]) / 2;
-        this.spread[b] = Math.sqrt(spread);
-        this.length[b] = length;
+        for (let j = 0; j < 3; j++) centre[3 * b + j] = (lo[j] + hi[j]) / 2;
+        radius[b] = Math.hypot(hi[0] - lo[0], hi[1] - lo[1], hi[2] - lo[2]) / 2;
+        length[b] = way;
       }
+      BOXES.set(P, {centre, radius, length});
+      return BOXES.get(P);
     }
 
     // Position of the own index i (may be between two) at exaggeration k, mm.
@@ -84,7 +103,7 @@
       if (!(sample >= index[0] && sample <= index[this.n - 1])) return false;
       const i = OLP.find(index, sample),
         j = Math.min(this.n - 1, i + 1);
-      return !(index[i] < sample && this.kind?.[j]);
+      return !(this.judged && index[i] < sample && this.kind?.[j]);
     }
 
     // Own index (may be between two) of a nominal sample.

@@ -49,7 +49,7 @@
 
     set_basis(basis, display_um = this.display_um) {
       this.basis = ["own", "part", "display"].includes(basis) ? basis : "own";
-      this.display_um = display_um > 0 && Number.isFinite(display_um) ? display_um : null;
+      this.display_um = Number.isFinite(display_um) && display_um > 0 ? display_um : null;
       if (this.basis === "display" && this.display_um === null) this.basis = "own";
       this.rescale();
     }
@@ -68,6 +68,12 @@
       return Math.max(0, metric?.judged ? (picture.largest_um ?? 0) : 0, ...values);
     }
 
+    // The largest deviation that is drawn of a layer, um.
+    size_of(name) {
+      const layer = this.app.layers.get(name);
+      return layer.judged ? (this.app.metrics.summary(this.app.distance, name)?.largest ?? 0) : 1e3 * Math.max(0, ...layer.spread);
+    }
+
     // Bands and enlargement of every picture for the present metric.
     rescale() {
       const {app} = this,
@@ -75,7 +81,7 @@
         palette = app.manifest.palette[app.state.theme],
         metric = app.metric;
       const largest = this.list.map(p => this.largest(p)),
-        sizes = this.list.map(p => Math.max(p.largest_um ?? 0, ...p.layers.map(n => app.metrics.summary(app.distance, n)?.largest ?? 0))),
+        sizes = this.list.map(p => Math.max(p.largest_um ?? 0, ...p.layers.map(n => this.size_of(n)))),
         all = Math.max(0, ...largest);
       this.list.forEach((picture, k) => {
         picture.automatic = this.enlargement(this.same ? Math.max(...sizes) : sizes[k]);

@@ -22,6 +22,8 @@
     [2, 3],
   ];
 
+  const STEP = 0.02; // of the window, by which a key moves the end of a range
+
   class Plots {
     constructor(app) {
       this.app = app;
@@ -37,6 +39,8 @@
           app.select_row(app.row_at(), true);
         },
         zoom: range => this.charts.forEach(c => c.set_range(range)),
+        span: (range, last) => this.span(range, last),
+        extend: direction => this.extend(direction),
       };
       this.strip = new OLP.Chart(hosts[0], events);
       this.charts = [this.strip];
@@ -49,15 +53,9 @@
         this.charts.push(this.movement);
         for (const [value, , , label] of MOTIONS) $("motion").append(new Option(label, value));
         $("motion").value = this.motion;
-        $("motion").onchange = e => {
-          this.motion = e.target.value;
-          this.draw_motion();
-        };
+        $("motion").onchange = e => this.set_motion(e.target.value);
       } else hosts[1].hidden = true;
-      $("abscissa").onchange = e => {
-        this.abscissa = e.target.value;
-        this.draw();
-      };
+      $("abscissa").onchange = e => this.set_abscissa(e.target.value);
       OLP.on("time", () => this.mark());
       OLP.on("theme", () => this.draw());
       for (const event of ["picture", "scale"]) OLP.on(event, () => this.draw_strip());
@@ -107,9 +105,22 @@
       this.mark();
     }
 
+    // What the page does not have changes nothing.
+    set_abscissa(name) {
+      if (name !== "way" && name !== "time") return;
+      $("abscissa").value = this.abscissa = name;
+      this.draw();
+    }
+
+    set_motion(name) {
+      if (!this.movement || !MOTIONS.some(([known]) => known === name)) return;
+      $("motion").value = this.motion = name;
+      this.draw_motion();
+    }
+
     set_strip(kind) {
-      this.kind = STRIPS.some(([name]) => name === kind) ? kind : "frame";
-      $("strip").value = this.kind;
+      if (![...$("strip").options].some(o => o.value === kind)) return;
+      $("strip").value = this.kind = kind;
       this.cache.clear();
       this.draw_strip();
     }
@@ -126,7 +137,7 @@
       return picture.layers.flatMap((name, k) => {
         const layer = app.layers.get(name),
           y = this.cached(`${metric.name} ${name}`, () => app.metrics.values(metric, name));
-        return y ? [{label: name, dashes: DASHES[k % 3], x: this.abscissa_of(layer), y}] : [];
+        return y ? [{label: picture.label, dashes: DASHES[k % 3], x: this.abscissa_of(layer), y}] : [];
       });
     }
 
@@ -204,10 +215,87 @@
       this.charts.forEach(c => c.set_mark("now", x));
     }
 
-    // Marks what is selected.
+    // Marks what is selected, else the lines that are kept.
     draw_chosen() {
-      const bands = this.app.state.chosen.map(([a, b]) => [this.axis[Math.max(0, a - 1)], this.axis[b]]);
+      const {app} = this,
+        {chosen} = app.state,
+        bands = (chosen.length ? chosen : this.lines()).map(([a, b]) => [this.axis[Math.max(0, a - 1)], this.axis[b]]);
       this.charts.forEach(c => c.set_bands(bands));
+    }
+
+    // The range of samples of the lines that are kept, in a list; none where all are.
+    lines() {
+      const {app} = this,
+        [first, last] = app.filter?.lines ?? [null, null];
+      if (first === null && last === null) return [];
+      let a = -1,
+        b = -1;
+      for (let i = 0; i < app.samples; i++)
+        if (app.rows[i] >= (first ?? 0) && app.rows[i] <= (last ?? Infinity)) {
+          if (a < 0) a = i;
+          b = i;
+        }
+      return a < 0 ? [] : [[a, b]];
+    }
+
+    // Marks a range of the abscissa while it is dragged, and at its end keeps the lines that are in it; null keeps all.
+    span(range, last) {
+      const {app} = this;
+      if (!last && range) {
+        const [a, b] = [...range].sort((p, q) => p - q);
+        this.charts.forEach(c => c.set_bands([[a, b]]));
+        return;
+      }
+      if (last) {
+        const [first, end] = range ? this.rows_between(range) : [null, null];
+        this.keep(first, end);
+        this.ends = first === null ? null : [first, end];
+      }
+      this.draw_chosen();
+    }
+
+    keep(first, last) {
+      const {app} = this;
+      app.choose(OLP.NONE);
+      app.filter.set_lines(first, last);
+      if (first === null) return;
+      $("filter").open = true;
+      app.listing.show(first);
+    }
+
+    // First and last row of the listing with a move in a range of the abscissa.
+    rows_between(range) {
+      const {app} = this,
+        [a, b] = [...range].sort((p, q) => p - q).map(x => Math.ceil(app.sample_of(this.time_at(x)) - 1e-9));
+      let first = null,
+        last = null;
+      for (let i = Math.max(0, a); i <= Math.min(app.samples - 1, b); i++) {
+        const row = app.rows[i];
+        if (row < 0) continue;
+        if (first === null || row < first) first = row;
+        if (last === null || row > last) last = row;
+      }
+      return [first, last];
+    }
+
+    // Moves the end of the range of lines from the current one to the next line with a move, or by a small part of the
+    // window where that is farther.
+    extend(direction) {
+      const {app} = this,
+        [low, high] = app.filter.lines,
+        same = this.ends && Math.min(...this.ends) === low && Math.max(...this.ends) === high,
+        [fixed, end] = same ? this.ends : [app.row_at(), app.row_at()],
+        run = app.run(end);
+      if (!run) return;
+      let to = end + direction;
+      while (to >= 0 && to < app.first.length && app.first[to] < 0) to += direction;
+      if (to < 0 || to >= app.first.length) to = end;
+      const [a, b] = this.strip.window,
+        x = this.axis[run[direction > 0 ? 1 : 0]] + direction * STEP * (b - a),
+        [far] = this.rows_between([x, x]);
+      if (far !== null && (far - to) * direction > 0) to = far;
+      this.ends = [fixed, to];
+      this.keep(Math.min(fixed, to), Math.max(fixed, to));
     }
 
     hover(x) {

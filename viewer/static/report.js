@@ -5,7 +5,8 @@
     make = (...a) => OLP.make(...a);
   const HEAD = 44, // height of the title of a saved picture, px
     MOST_FEATURES = 60,
-    MOST_LINES = 20;
+    MOST_LINES = 20,
+    KINDS = ["counts", "does not count", "start"];
 
   // A picture as it is in the view: title, paths, overlay and legend, in `ratio` pixels per pixel of the page.
   function picture_of(app) {
@@ -13,7 +14,7 @@
       w = pane.clientWidth,
       h = pane.clientHeight,
       legend = OLP.Legend.height(w),
-      ratio = app.scene.viewer.renderer.getPixelRatio(),
+      ratio = window.devicePixelRatio || 1,
       canvas = Object.assign(document.createElement("canvas"), {width: Math.round(w * ratio), height: Math.round((HEAD + h + legend) * ratio)}),
       c = canvas.getContext("2d"),
       style = getComputedStyle(document.documentElement),
@@ -65,25 +66,32 @@
     return /[",\n\r]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
   };
 
-  // The points that are selected, else those that pass the filter, with the deviation of each layer at them.
+  // The points of the program that are selected, else those that pass the filter, with the deviation of each layer at them;
+  // and after each of them the measured points next to it, each with its own nominal point.
   OLP.csv = app => {
-    const layers = [...app.layers.values()].filter(l => l.D && app.pictures.of_layer(l.name)),
+    const drawn = [...app.layers.values()].filter(l => l.D && app.pictures.of_layer(l.name)),
+      [model, measured] = [drawn.filter(l => !l.index), drawn.filter(l => l.index)],
+      names = [...model.map(l => l.name), ...(measured.length ? ["measured"] : [])],
       {origin_mm: origin, frame} = app.manifest,
-      heads = ["line", "distance_mm", "time_s", "kind", "X_mm", "Y_mm", "Z_mm", ...layers.flatMap(l => ["X", "Y", "Z"].map(a => `${l.name}_D${a}_um`))],
-      rows = [cell(`# ${app.manifest.title}; frame=${frame}`), heads.map(cell).join(",")];
-    const put = i => {
+      heads = ["line", "distance_mm", "time_s", "kind", "X_mm", "Y_mm", "Z_mm", ...names.flatMap(n => ["X", "Y", "Z"].map(a => `${n}_D${a}_um`))],
+      rows = [cell(`# ${app.manifest.title}; frame=${frame}`), [...heads, "of"].map(cell).join(",")],
+      next = measured.map(() => 0); // the first point of each run that is not passed
+    const put = (i, of, kind, base, at, deviations) => {
       const line = app.listing.number(app.rows[i], 0),
-        p = [0, 1, 2].map(j => (app.base[3 * i + j] + origin[j]).toFixed(4)),
-        away = layers.flatMap(l => {
-          if (!l.index) return [0, 1, 2].map(j => (1e3 * l.D[3 * i + j]).toFixed(3));
-          const own = OLP.find(l.index, i);
-          return l.index[own] === i ? [0, 1, 2].map(j => (1e3 * l.D[3 * own + j]).toFixed(3)) : ["", "", ""];
-        });
-      rows.push([cell(String(line)), app.arc[i].toFixed(3), app.time[i].toFixed(6), ["counts", "does not count", "start"][app.kind[i]], ...p, ...away].join(","));
+        p = [0, 1, 2].map(j => (base[3 * at + j] + origin[j]).toFixed(4));
+      rows.push([cell(String(line)), app.arc[i].toFixed(3), app.time[i].toFixed(6), KINDS[kind], ...p, ...deviations, cell(of)].join(","));
     };
-    const {chosen} = app.state;
-    if (chosen.length) for (const [a, b] of chosen) for (let i = Math.max(0, a); i <= b; i++) put(i);
-    else for (let i = 0; i < app.samples; i++) if (!app.mask || app.mask[i]) put(i);
+    const away = (layer, at) => [0, 1, 2].map(j => (1e3 * layer.D[3 * at + j]).toFixed(3)),
+      blank = list => list.flatMap(() => ["", "", ""]),
+      kept = app.kept();
+    for (let i = 0; i < app.samples; i++) {
+      const on = !kept || kept[i];
+      if (on) put(i, "program", app.kind[i], app.base, i, [...model.flatMap(l => away(l, i)), ...blank(measured.slice(0, 1))]);
+      measured.forEach((layer, k) => {
+        for (; next[k] < layer.n && layer.index[next[k]] <= i; next[k]++)
+          if (on) put(i, layer.label, layer.kind[next[k]], layer.P, next[k], [...blank(model), ...away(layer, next[k])]);
+      });
+    }
     return rows.join("\r\n") + "\r\n";
   };
 
@@ -131,7 +139,7 @@
       layers = pictures.list.flatMap(p => p.layers);
     return tree.nodes.slice(0, MOST_FEATURES).map(node => [
       `${node.label} ${node.detail ?? ""}`.trim(),
-      OLP.lines_of(node),
+      node.lines,
       pictures.list.map(p => um(tree.largest(node, p))).join(" → "),
       (node.figures ?? []).map(f => `${f.label} ${layers.filter(n => f.by_layer[n] !== undefined && f.by_layer[n] !== null).map(n => um(f.by_layer[n])).join(" → ")}`).join("; "),
       node.ok === null ? "–" : node.ok ? "within" : "ABOVE",
@@ -151,9 +159,17 @@
       ...(manifest.verdict?.unasked ?? []).map(text => make("p", {}, make("b", {textContent: text}), " Not asked: no part tolerance is stated.")),
       ...(manifest.verdict?.remarks ?? []).map(text => make("p", {textContent: OLP.micrometres(text)})),
       table(
-        ["deviation, µm", "largest", "rms", "line", "towards"],
-        pictures.list.map(p => [p.label, um(p.largest_um), um(p.rms_um), p.flag?.line ?? "–", p.flag ? OLP.direction(p.flag.direction) : "–"]),
+        ["deviation, µm", "largest", "rms", "line", "towards", "lines above"],
+        pictures.list.map(p => [
+          p.label,
+          um(p.largest_um),
+          um(p.rms_um),
+          p.flag?.line ?? "–",
+          p.flag ? OLP.direction(p.flag.direction) : "–",
+          String(p.lines_above ?? "–"),
+        ]),
       ),
+      ...OLP.notes_of(app),
     ];
     if ($("removed")) parts.push(make("p", {textContent: $("removed").textContent}));
     parts.push(...prints(app));

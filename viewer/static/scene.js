@@ -3,7 +3,8 @@
 (() => {
   const T = MeshCat.THREE,
     MM = 0.001; // the viewer's scene is in metres
-  const BUDGET = {start: {hardware: 200000, software: 45000, none: 45000}, least: 20000, most: 400000, slow: 140, fast: 40}; // segments of all layers; ms of a frame
+  const BUDGET = {start: {hardware: 200000, software: 25000, none: 45000}, least: 20000, most: 400000, slow: 140, fast: 40}; // segments of all layers; ms of a frame
+  const MOVING = 0.5; // pixels each way while the view moves, where a frame is not fast
 
   class Scene {
     constructor(app, pane) {
@@ -12,7 +13,7 @@
       const graphics = OLP.graphics();
       this.viewer = new MeshCat.Viewer(
         pane,
-        true,
+        false, // draws from `begin` on
         graphics === "none" ? OLP.flat_renderer(pane) : OLP.gl_renderer(pane, graphics === "hardware"),
       );
       this.flat = Boolean(this.viewer.renderer.flat);
@@ -29,6 +30,8 @@
       this.lines = new Map();
       this.origin = [0, 0, 0];
       this.budget = BUDGET.start[graphics];
+      this.ms = 0; // that the last frame took that was measured
+      this.begun = false;
       this.plane = null; // of the section: [x, y, z, distance], mm; what is beyond is left out
       this.size_by_pane();
       const render = this.viewer.render;
@@ -45,17 +48,42 @@
     size_by_pane() {
       const resize = this.viewer.set_3d_pane_size;
       this.viewer.set_3d_pane_size = () => {
-        const {clientWidth: w, clientHeight: h} = this.pane;
-        if (!w || !h) return;
+        const {clientWidth: w, clientHeight: h} = this.pane,
+          {x, y} = this.size ?? {};
+        if (!w || !h || (x === w && y === h)) return;
+        this.size = {x: w, y: h};
         resize.call(this.viewer, w, h);
         this.app.camera?.resized();
-        for (const {uniforms} of this.lines.values()) {
-          uniforms.size.value.set(w, h);
-          uniforms.ratio.value = this.viewer.renderer.getPixelRatio();
-        }
+        for (const {uniforms} of this.lines.values()) uniforms.size.value.set(w, h);
+        this.sharpen(1);
         this.schedule(60);
       };
       new ResizeObserver(() => this.viewer.set_3d_pane_size()).observe(this.pane);
+    }
+
+    // Draws the first picture, and from then on what has changed.
+    begin() {
+      this.begun = true;
+      this.refill();
+      this.viewer.render();
+      this.viewer.animate();
+    }
+
+    // Draws a share of the pixels of the screen each way.
+    sharpen(share) {
+      const {renderer} = this.viewer,
+        ratio = (window.devicePixelRatio || 1) * share;
+      for (const {uniforms} of this.lines.values()) uniforms.ratio.value = ratio;
+      if (renderer.getPixelRatio() === ratio) return;
+      renderer.setPixelRatio(ratio);
+      this.viewer.set_dirty();
+    }
+
+    // The view moves: fewer pixels until it rests.
+    moved() {
+      if (!this.begun) return;
+      if (!this.flat && this.ms > BUDGET.fast) this.sharpen(MOVING);
+      this.schedule(120);
     }
 
     add_path(path, order) {
@@ -92,6 +120,7 @@
 
     // What is drawn now, as a picture of its own: the drawing buffer is not kept after a frame.
     still() {
+      this.sharpen(1);
       this.viewer.render();
       const source = this.viewer.renderer.domElement,
         copy = Object.assign(document.createElement("canvas"), {width: source.width, height: source.height});
@@ -143,13 +172,15 @@
 
     schedule(ms = 120) {
       clearTimeout(this.timer);
+      if (!this.begun) return;
       this.timer = setTimeout(() => this.refill(), ms);
     }
 
     // Chooses again which part of each path is drawn, for the current camera.
     refill() {
       clearTimeout(this.timer);
-      if (!this.pane.clientWidth || !this.app.camera) return;
+      if (!this.pane.clientWidth || !this.begun) return;
+      this.sharpen(1);
       this.origin = this.app.camera.target_mm();
       const shown = [...this.lines.values()].filter(l => l.path.visible);
       const wanted = shown.map(l => l.path.demand(this.view(l.uniforms.k.value))),
@@ -172,7 +203,7 @@
       this.refilled = false;
       const thinned = [...this.lines.values()].some(l => l.path.visible && l.path.thin > 1);
       this.finish();
-      const ms = performance.now() - start;
+      const ms = (this.ms = performance.now() - start);
       if (ms > BUDGET.slow && thinned && this.budget > BUDGET.least) this.budget = Math.max(BUDGET.least, this.budget * 0.75);
       else if (ms < BUDGET.fast && thinned && this.budget < BUDGET.most) this.budget = Math.min(BUDGET.most, this.budget * 1.6);
     }

@@ -1,20 +1,17 @@
 "use strict";
-// The part in its own terms: operations and features with their deviations and verdicts, which the file states; what is
-// filtered and selected; its points as CSV.
+// The part in its own terms: operations and features with their deviations and verdicts, which the file states.
 (() => {
   const $ = id => document.getElementById(id),
     make = (...a) => OLP.make(...a);
   const SYMBOL = {true: "●", false: "▲", null: "○"},
     WORDS = {true: "within", false: "above", null: "not judged"};
 
-  // The lines of a node, as the listing names them.
-  const lines_of = node => (node.first_line === node.last_line ? node.place : `${node.place} to ${node.last_place ?? node.last_line}`);
-
   class Tree {
     constructor(app) {
       this.app = app;
       const tree = app.manifest.tree ?? {nodes: [], kinds: {}, unlisted: 0};
-      this.nodes = tree.nodes.map(node => ({...node, children: [], open: false, shown: true}));
+      this.ranges = tree.samples ? app.arrays.get(tree.samples) : [];
+      this.nodes = tree.nodes.map(node => ({...node, samples: this.samples(node), children: [], open: false, shown: true, wanted: true}));
       this.kinds = tree.kinds ?? {};
       this.unlisted = tree.unlisted ?? 0;
       this.tools = tree.tools ?? [];
@@ -25,10 +22,12 @@
       this.current = null;
       this.host = $("tree");
       this.host.addEventListener("keydown", e => this.key(e));
-      this.filter();
       this.draw();
-      for (const event of ["chosen", "filter"]) OLP.on(event, () => this.summary());
-      this.summary();
+    }
+
+    // Ranges [first, last] of the samples of a node, from those of all nodes.
+    samples({ranges: [begin, end]}) {
+      return Array.from({length: end - begin}, (_, k) => [this.ranges[2 * (begin + k)], this.ranges[2 * (begin + k) + 1]]);
     }
 
     // Nodes in the order in which they are shown, those in closed ones left out.
@@ -65,7 +64,7 @@
       row.tabIndex = -1;
       row.style.paddingLeft = `${4 + 12 * depth}px`;
       row.dataset.id = node.id;
-      const label = make("span", {className: "label", title: `${node.label} ${node.detail ?? ""}, lines ${lines_of(node)}`}, `${node.label} `);
+      const label = make("span", {className: "label", title: `${node.label} ${node.detail ?? ""}, lines ${node.lines}`}, `${node.label} `);
       label.append(make("small", {textContent: node.detail ?? ""}));
       const size = make("span", {className: "figures"}, make("span", {title: "largest deviation of what counts"}, `largest ${sizes.map(um).join(" → ")}`));
       size.append(...this.figures(node));
@@ -86,8 +85,7 @@
       row.disabled = tool.tool === null;
       row.onclick = () => {
         $("filter").open = true;
-        $("filter-tool").value = String(tool.tool);
-        this.apply();
+        this.app.filter.set_tool(tool.tool);
       };
       return row;
     }
@@ -127,7 +125,7 @@
       const {app} = this;
       this.current = node;
       if (!node.open && node.children.length) node.open = true;
-      const ranges = node.samples.map(([a, b]) => [a, b]);
+      const ranges = node.samples;
       const layer = app.pictures.layer.name,
         worst = node.worst_sample?.[layer] ?? ranges[0]?.[1];
       if (worst !== undefined && worst !== null) app.set_sample(worst);
@@ -177,127 +175,26 @@
       this.host.querySelector(`[data-id="${(to ?? node).id}"]`)?.focus();
     }
 
-    // -- filter ------------------------------------------------------------------------------------------------------
-
-    filter() {
-      const tools = [...new Set(this.nodes.map(n => n.tool).filter(t => t !== null && t !== undefined))].sort((p, q) => p - q);
-      $("filter-tool").append(new Option("all", ""), ...tools.map(t => new Option(`T${t}`, t)));
-      $("filter-operation").append(new Option("all", ""), ...this.roots.map(n => new Option(n.label, n.id)));
-      for (const id of ["filter-tool", "filter-operation", "filter-first", "filter-last", "filter-kind"]) $(id).onchange = () => this.apply();
-      $("filter-text").oninput = () => this.apply();
-      $("filter-clear").onclick = () => this.clear();
-      $("filter-chosen").onclick = () => this.keep_chosen();
-      $("export").onclick = () => OLP.save_csv(this.app);
-    }
-
-    clear() {
-      for (const id of ["filter-tool", "filter-operation", "filter-first", "filter-last", "filter-kind", "filter-text"]) $(id).value = "";
-      this.apply();
-    }
-
-    // The rows of the listing of lines from the first to the last that are named.
-    rows_of_lines() {
-      const {listing} = this.app,
-        end = (id, last) => {
-          const text = $(id).value.trim();
-          if (!text) return last ? Infinity : -Infinity;
-          let row = listing.row_of_line(listing.names ? text : +text);
-          if (row < 0) this.app.toast(`No line ${text}`, 2500);
-          if (last && row >= 0 && listing.names) while (row + 1 < listing.n && String(listing.number(row + 1, 0)) === text) row++;
-          return row < 0 ? (last ? Infinity : -Infinity) : row;
-        };
-      return [end("filter-first", false), end("filter-last", true)];
-    }
-
-    apply() {
-      const {app} = this,
-        text = $("filter-text").value.trim().toLowerCase(),
-        tool = $("filter-tool").value,
-        operation = $("filter-operation").value,
-        kind = $("filter-kind").value,
-        [first, last] = this.rows_of_lines();
+    // Shows the nodes that pass the filter, those above them, and all below an operation that does.
+    narrow(text, tool, operation) {
       const wanted = node =>
         (!tool || String(node.tool) === tool) &&
         (!text || `${node.label} ${node.detail ?? ""}`.toLowerCase().includes(text));
       const show = (node, under) => {
-        const own = under && (!operation || String(node.id) === operation || node.parent !== null),
-          children = node.children.map(n => show(n, own)).some(Boolean);
-        node.shown = children || (own && wanted(node));
+        const children = node.children.map(n => show(n, under)).some(Boolean);
+        node.wanted = under && wanted(node);
+        node.shown = children || node.wanted;
         if (text && children) node.open = true;
         return node.shown;
       };
       for (const root of this.roots) show(root, !operation || String(root.id) === operation);
-      const by_node = Boolean(tool || operation || text),
-        by_line = first > -Infinity || last < Infinity;
-      if (!by_node && !by_line && !kind) app.set_mask(null);
-      else {
-        const mask = new Uint8Array(app.samples);
-        if (by_node) {
-          for (const node of this.nodes)
-            if (node.shown && wanted(node) && this.under(node, operation))
-              for (const [a, b] of node.samples) mask.fill(1, a, b + 1);
-        } else mask.fill(1);
-        for (let i = 0; i < mask.length; i++) {
-          const row = app.rows[i];
-          if (by_line && (row < first || row > last)) mask[i] = 0;
-          if ((kind === "feed" && app.kind[i]) || (kind === "rapid" && app.kind[i] !== OLP.RAPID)) mask[i] = 0;
-        }
-        app.set_mask(mask);
-      }
-      this.draw();
     }
 
-    under(node, operation) {
-      for (let at = node; at; at = this.nodes.find(n => n.id === at.parent)) if (!operation || String(at.id) === operation) return true;
-      return false;
-    }
-
-    // Keeps what is selected.
-    keep_chosen() {
-      const {app} = this;
-      if (!app.state.chosen.length) {
-        app.toast("Select a feature or a line first", 3000);
-        return;
-      }
-      const mask = new Uint8Array(app.samples);
-      for (const [a, b] of app.state.chosen) mask.fill(1, Math.max(0, a), b + 1);
-      app.set_mask(mask);
-    }
-
-    // What is selected or passes the filter, by the table's figures of its lines.
-    summary() {
-      const {app} = this,
-        {chosen} = app.state,
-        {um} = OLP.colour;
-      if (!chosen.length && !app.mask) {
-        $("selection").textContent = "Click a feature to go there.";
-        return;
-      }
-      const rows = new Uint8Array(app.first.length);
-      let count = 0;
-      const take = i => {
-        if (app.rows[i] >= 0) rows[app.rows[i]] = 1;
-        count++;
-      };
-      if (chosen.length) for (const [a, b] of chosen) for (let i = Math.max(0, a); i <= b; i++) take(i);
-      else for (let i = 0; i < app.mask.length; i++) if (app.mask[i]) take(i);
-      const by = app.manifest.listing.by_layer ?? {};
-      const parts = app.pictures.list.map(picture => {
-        let most = -1;
-        for (const name of picture.layers) {
-          if (!by[name]) continue;
-          const values = app.arrays.get(by[name].um),
-            states = app.arrays.get(by[name].state);
-          for (let row = 0; row < rows.length; row++) if (rows[row] && states[row] < 2 && values[row] > most) most = values[row];
-        }
-        return most < 0 ? null : `${picture.label} ${um(most)}`;
-      });
-      const lines = rows.reduce((a, b) => a + b, 0);
-      $("selection").textContent =
-        `${chosen.length ? "Selected" : "Filtered"}: ${count.toLocaleString("en")} points of ${lines.toLocaleString("en")} ${lines === 1 ? "line" : "lines"}; ` +
-        `largest, µm: ${parts.filter(Boolean).join(" → ") || "–"}`;
+    // The nodes that pass the filter themselves.
+    named() {
+      return this.nodes.filter(n => n.wanted);
     }
   }
 
-  Object.assign(OLP, {Tree, lines_of});
+  OLP.Tree = Tree;
 })();

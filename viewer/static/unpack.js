@@ -15,27 +15,27 @@
     return new Uint8Array(await new Response(stream).arrayBuffer());
   }
 
-  // The column j of whole numbers: planes of bytes from `at`, the lowest first. 2 r stands for r, and -2 r - 1 for a negative
-  // one. Sums are integers in float64: exact, also beyond the range of int32.
-  function undifference(out, j, {n, c}, bytes, at, width, order) {
-    const [p0, p1, p2, p3] = [0, 1, 2, 3].map(k => bytes.subarray(at + k * n, at + (k + 1) * n));
-    let first = 0,
-      second = 0,
-      third = 0;
-    for (let i = 0, o = j; i < n; i++, o += c) {
-      let z = width ? p0[i] : 0,
-        r;
-      if (width > 1) z |= p1[i] << 8;
-      if (width > 2) z |= p2[i] << 16;
-      if (width < 4) r = (z >>> 1) ^ -(z & 1);
-      else {
-        z = (z | (p3[i] << 24)) >>> 0;
-        for (let k = 4; k < width; k++) z += bytes[at + k * n + i] * 2 ** (8 * k);
-        r = z % 2 ? -(z + 1) / 2 : z / 2;
+  // The numbers of a column: planes of bytes from `at`, the lowest first. 2 r stands for r, and -2 r - 1 for a negative one.
+  function signed(n, bytes, at, width, out) {
+    const [p0, p1, p2] = [0, 1, 2].map(k => bytes.subarray(at + k * n, at + (k + 1) * n));
+    if (width === 0) out.fill(0);
+    else if (width === 1) for (let i = 0; i < n; i++) out[i] = (p0[i] >>> 1) ^ -(p0[i] & 1);
+    else if (width === 2) for (let i = 0; i < n; i++) out[i] = ((p0[i] | (p1[i] << 8)) >>> 1) ^ -(p0[i] & 1);
+    else if (width === 3) for (let i = 0; i < n; i++) out[i] = ((p0[i] | (p1[i] << 8) | (p2[i] << 16)) >>> 1) ^ -(p0[i] & 1);
+    else
+      for (let i = 0; i < n; i++) {
+        let z = 0;
+        for (let k = width - 1; k >= 0; k--) z = 256 * z + bytes[at + k * n + i];
+        out[i] = z % 2 ? -(z + 1) / 2 : z / 2;
       }
-      out[o] =
-        order === 0 ? r : order === 1 ? (first += r) : order === 2 ? (first += second += r) : (first += second += third += r);
-    }
+  }
+
+  // The column j of whole numbers. Sums are integers in float64: exact, also beyond the range of int32. Each loop does one
+  // thing: a page opens before the browser has compiled much of it.
+  function undifference(out, j, {n, c}, bytes, at, width, order, values) {
+    signed(n, bytes, at, width, values);
+    for (let k = 0; k < order; k++) for (let i = 0, sum = 0; i < n; i++) values[i] = sum += values[i];
+    for (let i = 0, o = j; i < n; i++, o += c) out[o] = values[i];
   }
 
   // (n, c) values in steps `q`, row by row; `plus` are arrays whose values are added. Numbers of things are an Int32Array.
@@ -44,7 +44,8 @@
       m = n * c,
       steps = Math.round(1 / q), // a power of ten: dividing by it gives the double nearest the decimal value
       out = steps > 1 || plus.length || spec.wide ? new Float64Array(m) : new Int32Array(m);
-    for (let j = 0, at = spec.off; j < c; at += width[j++] * n) undifference(out, j, spec, bytes, at, width[j], order[j]);
+    const values = new Float64Array(n);
+    for (let j = 0, at = spec.off; j < c; at += width[j++] * n) undifference(out, j, spec, bytes, at, width[j], order[j], values);
     for (const other of plus) for (let k = 0; k < m; k++) out[k] += Math.round(other[k] * steps);
     if (steps > 1) for (let k = 0; k < m; k++) out[k] /= steps;
     return out;

@@ -7,13 +7,13 @@ the tests.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from olp.core.arrays import Array
 from olp.core.units import AXES
+from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.calibration import Calibration
 

@@ -7,7 +7,6 @@ turn; and points along a program, where the directions are those of its motion.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from olp.core.arrays import Array
 from olp.core.rigid_fit import fit_points
 from olp.core.toolpath import Kind, Toolpath
 from olp.core.units import UM_PER_MM
+from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration

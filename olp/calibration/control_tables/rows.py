@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from decimal import ROUND_CEILING, Decimal
 from itertools import pairwise
 
@@ -14,6 +14,7 @@ from olp.core.arrays import Array
 from olp.core.interpolation import Interpolant
 from olp.core.machine import COMPONENTS, ZERO
 from olp.core.units import AXES
+from olp.core.values import dataclass
 from olp.errormodel.bodies import build_bodies
 from olp.errormodel.calibration import Calibration, Curve, Cyclic, Reference
 from olp.errormodel.lever_arms import LeverArm

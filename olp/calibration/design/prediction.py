@@ -4,7 +4,6 @@ the adjustment for its geometry, with curves of the size and smoothness that mac
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -22,6 +21,7 @@ from olp.calibration.observations.measurements import Measurements
 from olp.core.arrays import Array
 from olp.core.machine import COMPONENTS, Vector
 from olp.core.units import AXES
+from olp.core.values import dataclass
 
 #: Positions in the box where the uncertainty is computed, for each tool.
 _POSITIONS = 150

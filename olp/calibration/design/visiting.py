@@ -8,22 +8,22 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Array
-from olp.core.machine import Axis
+from olp.core.machine import Vector
 from olp.core.units import AXES
 
 #: Exchanges of two legs are tried at most so often over all positions.
 _ROUNDS = 6
 
 
-def move_s(distance_mm: Array, axes: Mapping[str, Axis]) -> Array:
+def move_s(distance_mm: Array, limits: Mapping[str, Vector]) -> Array:
     """(n,) seconds of straight moves by (n, 3) from rest to rest: the slowest axis, jerk, acceleration and
-    velocity limited."""
-    times = [_rest_to_rest(np.abs(distance_mm[:, k]), axes[a]) for k, a in enumerate(AXES)]
+    velocity limited. `limits` are those of `Machine.motion_limits`."""
+    times = [_rest_to_rest(np.abs(distance_mm[:, k]), limits[a]) for k, a in enumerate(AXES)]
     return np.asarray(np.max(times, axis=0))
 
 
-def _rest_to_rest(distance: Array, axis: Axis) -> Array:
-    v, a, j = axis.velocity_mm_s, axis.acceleration_mm_s2, axis.jerk_mm_s3
+def _rest_to_rest(distance: Array, limits: Vector) -> Array:
+    v, a, j = limits
     # ramps of constant jerk that reach neither a nor v; that reach a; that reach v
     corner = min(a * a / j, v)
     ramp = v / a + a / j if v > a * a / j else 2.0 * np.sqrt(v / j)
@@ -36,14 +36,14 @@ def _rest_to_rest(distance: Array, axis: Axis) -> Array:
     return np.asarray(np.where(distance >= v * ramp, distance / v + ramp, time))
 
 
-def order(places_mm: Array, axes: Mapping[str, Axis]) -> npt.NDArray[np.intp]:
+def order(places_mm: Array, limits: Mapping[str, Vector]) -> npt.NDArray[np.intp]:
     """(n,) an order of visiting positions (n, 3) that takes little time, and no more than theirs: nearest
     first, then legs exchanged where that is shorter (2-opt)."""
     n = len(places_mm)
     if n < 3:
         return np.arange(n)
     first, second = np.divmod(np.arange(n * n), n)
-    cost = move_s(places_mm[first] - places_mm[second], axes).reshape(n, n)
+    cost = move_s(places_mm[first] - places_mm[second], limits).reshape(n, n)
     tour = [int(np.argmin(places_mm[:, 0]))]
     waiting = np.ones(n, bool)
     waiting[tour[0]] = False

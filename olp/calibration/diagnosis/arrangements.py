@@ -5,13 +5,14 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import combinations
 
 import numpy as np
 
 from olp.core.arrays import Array
 from olp.core.units import AXES
+from olp.core.values import dataclass
 from olp.errormodel.calibration import Calibration, Curve
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,6 +10,7 @@ from olp.calibration.diagnosis.doctor import Diagnosis
 from olp.calibration.diagnosis.factors import DECIDED_Z, contributions_of, design_of
 from olp.core.arrays import Array
 from olp.core.machine import Vector
+from olp.core.values import dataclass
 from olp.errormodel.build import build
 
 #: Positions that are tried.

@@ -6,7 +6,6 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -25,6 +24,7 @@ from olp.calibration.observations.points import Points
 from olp.core.arrays import Array
 from olp.core.machine import COMPONENTS, SQUARENESS
 from olp.core.units import AXES
+from olp.core.values import dataclass
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration
 from olp.errormodel.uncertainty import Uncertainty, fingerprint

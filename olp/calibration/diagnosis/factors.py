@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,6 +17,7 @@ from olp.calibration.estimator.parameters import LEVER_ARM_MM, frame_columns
 from olp.calibration.observations.points import Points, deviations
 from olp.core.arrays import Array
 from olp.core.machine import COMPONENTS, SQUARENESS
+from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
 
 #: Prior probability that a curve is as stated.

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,6 +18,7 @@ from olp.core.arrays import Array
 from olp.core.machine import Vector
 from olp.core.rigid_fit import fit_frame
 from olp.core.units import AXES
+from olp.core.values import dataclass
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration, Curve, Cyclic
 from olp.errormodel.entry import Entry

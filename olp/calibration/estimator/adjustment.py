@@ -8,7 +8,6 @@ covariance of all of it, so that it also shows what is not observable from these
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -24,6 +23,7 @@ from olp.calibration.observations.measurements import Measurements
 from olp.core.machine import Vector
 from olp.core.progress import Progress, silent
 from olp.core.units import AXES
+from olp.core.values import dataclass
 
 #: Cells of the curves of an axis that has points or lengths but no lines. They double while the fit is bad.
 POINT_CELLS = 12

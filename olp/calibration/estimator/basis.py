@@ -6,11 +6,10 @@ prior on the second differences of the coefficients in place of a choice of knot
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from olp.core.arrays import Array
+from olp.core.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,12 +9,12 @@ are, and its covariance between any two positions follows directly.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 
 from olp.core.arrays import Array
+from olp.core.values import dataclass
 
 #: Where the sines vanish, in half lengths of the box: well outside, as they hold the process to zero there.
 REACH = 2.0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from olp.calibration.observations.base import Outlier, Result, S, ScatteredState
 from olp.calibration.observations.measurements import Measurements
 from olp.core.arrays import Array
 from olp.core.units import AXES
+from olp.core.values import dataclass
 from olp.errormodel.quality import Fitted, Quality
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -13,6 +12,7 @@ import numpy as np
 from olp.calibration.estimator.field import LONGEST, REACH, SHORTEST, Modes
 from olp.calibration.estimator.widened import Reduced
 from olp.core.arrays import Array
+from olp.core.values import dataclass
 
 Noise = Literal["learnt", "stated"]
 

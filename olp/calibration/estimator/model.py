@@ -4,7 +4,6 @@ terms, and where displacements were measured. Most of it follows from lines, as 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,6 +20,7 @@ from olp.core.errors import CannotCompute
 from olp.core.machine import COMPONENTS, ZERO, Vector
 from olp.core.progress import Progress
 from olp.core.units import AXES
+from olp.core.values import dataclass
 
 #: Cells of the spline of a curve, at least; else as many as a line has targets.
 FEWEST = 6

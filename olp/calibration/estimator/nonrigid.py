@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -22,6 +21,7 @@ from olp.calibration.estimator.widened import FOLDS, Adjustment, Reduced, solver
 from olp.core.arrays import Array
 from olp.core.progress import Progress, silent
 from olp.core.units import AXES
+from olp.core.values import dataclass
 
 #: A process is accepted where its log evidence is above this: odds of 3000 to 1, far above what its four free
 #: numbers gain from noise alone.

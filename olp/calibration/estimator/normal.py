@@ -7,12 +7,12 @@ the Schur complement. So a hundred thousand readings need one matrix of the size
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Array
+from olp.core.values import dataclass
 
 Index = npt.NDArray[np.intp]
 

@@ -8,7 +8,7 @@ positions P with tool t is E_j(q) + eps_j(q) x [L_j(P, t) - L_j(line)], see `olp
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Protocol
 
 import numpy as np
@@ -17,6 +17,7 @@ from olp.calibration.estimator.basis import CurveSpace, Wave
 from olp.core.arrays import Array
 from olp.core.machine import COMPONENTS, SQUARENESS, ZERO, Vector
 from olp.core.units import AXES
+from olp.core.values import dataclass
 
 #: An angle about a adds sign * angle * lever arm k to row i: (i, a, k, sign).
 CROSS = ((0, 1, 2, 1.0), (0, 2, 1, -1.0), (1, 2, 0, 1.0), (1, 0, 2, -1.0), (2, 0, 1, 1.0), (2, 1, 0, -1.0))

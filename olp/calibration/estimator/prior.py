@@ -4,7 +4,7 @@ there are some, else by class."""
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from olp.calibration.estimator.smoothing import AMPLITUDE, FEATURE, HALF, Shape
 from olp.calibration.observations.points import FRAME_MM
 from olp.core.arrays import Array
 from olp.core.machine import COMPONENTS, SQUARENESS
+from olp.core.values import dataclass
 
 #: Standard deviation of a squareness, rad.
 SQUARE = 1e-3

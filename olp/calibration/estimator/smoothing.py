@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -18,6 +17,7 @@ from olp.calibration.estimator.normal import Block, Chunk, Normal
 from olp.calibration.observations.base import Noise
 from olp.calibration.observations.lines import Line, drift_ramps, targets_of
 from olp.core.arrays import Array
+from olp.core.values import dataclass
 
 #: Candidates for the standard deviation of second differences (mm, rad).
 ROUGHNESS = np.geomspace(1e-7, 1e-1, 37), np.geomspace(1e-10, 1e-4, 37)

@@ -7,7 +7,6 @@ stored by folds, so that any fold may be held out.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -20,6 +19,7 @@ from olp.calibration.observations.base import Result, ScatteredState, residual_a
 from olp.core.arrays import Array, Index
 from olp.core.machine import SQUARENESS
 from olp.core.units import AXES
+from olp.core.values import dataclass
 
 #: Parts into which the points fall for the held-out figure.
 FOLDS = 5

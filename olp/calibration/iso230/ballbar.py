@@ -13,7 +13,6 @@ In one direction alone g and the servo mismatch are one column: such a circle gi
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -24,6 +23,7 @@ from olp.calibration.observations.squareness import SquarenessReading
 from olp.core.arrays import Array, Index
 from olp.core.errors import ConfigError
 from olp.core.units import RAD_PER_URAD, UM_PER_MM
+from olp.core.values import dataclass
 from olp.findings.catalogue import Finding
 
 #: Angles of the circle at which both directions are compared.

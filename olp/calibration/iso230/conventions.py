@@ -8,11 +8,11 @@ angle between the positive axes larger than 90 degrees, B0Z > 0 makes it smaller
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
 
 from olp.core.errors import UsageError
 from olp.core.machine import SQUARENESS
+from olp.core.values import dataclass
 
 #: The two axes of each squareness, the earlier one first.
 AXES_OF: Mapping[str, tuple[int, int]] = MappingProxyType({"C0Y": (0, 1), "B0Z": (0, 2), "A0Z": (1, 2)})

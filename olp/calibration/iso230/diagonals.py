@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from types import MappingProxyType
 from typing import Any
 
@@ -23,6 +23,7 @@ from olp.core.arrays import Array
 from olp.core.errors import ConfigError
 from olp.core.machine import SQUARENESS
 from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM
+from olp.core.values import dataclass
 from olp.findings.catalogue import Finding
 
 SCALES = ("SX", "SY", "SZ")

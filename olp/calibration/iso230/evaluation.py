@@ -4,7 +4,6 @@ squareness of straightness pairs, and what is wrong with how they were taken."""
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,6 +20,7 @@ from olp.calibration.observations.measurements import Measurements
 from olp.calibration.observations.squareness import SquarenessReading
 from olp.core.errors import ConfigError
 from olp.core.units import RAD_PER_URAD
+from olp.core.values import dataclass
 from olp.findings.catalogue import Finding
 
 #: A line shorter than this share of the longest one of its component, on an axis with periods, is a sweep.

@@ -8,7 +8,6 @@ is -b.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,6 +18,7 @@ from olp.core.arrays import Array, Index
 from olp.core.errors import ConfigError, UsageError
 from olp.core.machine import Machine
 from olp.core.units import AXES, UM_PER_MM
+from olp.core.values import dataclass
 from olp.findings.catalogue import Finding
 
 #: A reversal depends on position where chance explains the differences with less than this probability.

@@ -10,7 +10,6 @@ both directions, M the means of the two, A all x + 2 s to x - 2 s, B is the larg
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, Literal
 
@@ -20,6 +19,7 @@ from olp.calibration.observations.lines import Line
 from olp.core.arrays import Array, Index
 from olp.core.errors import ConfigError
 from olp.core.units import RAD_PER_URAD, UM_PER_MM
+from olp.core.values import dataclass
 from olp.findings.catalogue import Finding
 
 Zone = Literal["least-squares", "minimum-zone"]

@@ -10,7 +10,6 @@ then only the differences between tools are determined.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,6 +18,7 @@ from olp.core.arrays import Array
 from olp.core.errors import ConfigError
 from olp.core.machine import Vector
 from olp.core.units import AXES, UM_PER_MM
+from olp.core.values import dataclass
 from olp.findings.catalogue import Finding
 
 #: Share of an unknown in the null space from which on it is not determined.

@@ -9,7 +9,6 @@ a smooth curve at the targets is refused by the same numbers that would have est
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -20,6 +19,7 @@ from olp.calibration.iso230.positioning import scale_of, targets_of
 from olp.calibration.observations.lines import Line
 from olp.core.arrays import Array
 from olp.core.errors import ConfigError
+from olp.core.values import dataclass
 from olp.errormodel.calibration import Cyclic
 from olp.findings.catalogue import Finding
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,6 +18,7 @@ from olp.calibration.observations.squareness import SquarenessReading
 from olp.core.errors import ConfigError, UsageError
 from olp.core.machine import ZERO, Vector
 from olp.core.units import AXES, RAD_PER_URAD
+from olp.core.values import dataclass
 
 #: Positions and tool vectors of the two lines of a pair are equal within this.
 SAME_PLACE_MM = 1.0

@@ -10,7 +10,6 @@ from __future__ import annotations
 import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, ClassVar, Generic, TypeVar
 
 import numpy as np
@@ -19,6 +18,7 @@ from olp.calibration.estimator.normal import Block, Normal, residuals_of
 from olp.calibration.estimator.parameters import Parameters, Unknowns
 from olp.core.arrays import Array, Index
 from olp.core.units import RAD_PER_URAD, UM_PER_MM
+from olp.core.values import dataclass
 
 #: A reading is left out where its residual is more than so many standard deviations.
 OUTLIER = 6.0

@@ -6,8 +6,6 @@ servo mismatch and squareness are one column, so squareness is then not observab
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from olp.calibration.estimator.normal import Block
@@ -18,6 +16,7 @@ from olp.core.arrays import Array, Index
 from olp.core.errors import ConfigError
 from olp.core.machine import ZERO, Vector
 from olp.core.units import AXES
+from olp.core.values import dataclass
 
 #: First and second axis of each plane, counter-clockwise seen from + of the third, and its squareness.
 PLANES = {"XY": (0, 1, "C0Y"), "YZ": (1, 2, "A0Z"), "ZX": (2, 0, "B0Z")}

@@ -5,8 +5,6 @@ The laser has an unknown zero, drift and scale, and the backlash of the diagonal
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from olp.calibration.estimator.normal import Block
@@ -19,6 +17,7 @@ from olp.core.arrays import Array, Index
 from olp.core.errors import ConfigError
 from olp.core.machine import ZERO, Vector
 from olp.core.units import UM_PER_MM
+from olp.core.values import dataclass
 
 
 @dataclass(frozen=True, slots=True, eq=False)

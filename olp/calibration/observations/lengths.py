@@ -7,7 +7,7 @@ first guess is the linear solution of 2 Q.S + 2 L d + (d^2 - |S|^2) = |Q|^2 - L^
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,7 @@ from olp.calibration.observations.base import (
 from olp.core.arrays import Array, Index
 from olp.core.errors import CannotCompute, ConfigError
 from olp.core.units import UM_PER_MM
+from olp.core.values import dataclass
 
 #: Readings whose rows are built at once, to limit memory.
 CHUNK = 4000

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Literal
 
 import numpy as np
@@ -33,6 +33,7 @@ from olp.core.arrays import Array, Index
 from olp.core.errors import ConfigError
 from olp.core.machine import COMPONENTS, ZERO, Vector
 from olp.core.units import AXES
+from olp.core.values import dataclass
 
 Reference = Literal["functional-point", "table"]
 #: Targets this close are one.

@@ -9,11 +9,11 @@ from __future__ import annotations
 import dataclasses
 import datetime
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Literal, TypeVar
 
 from olp.calibration.observations.base import Observation, Scattered
 from olp.calibration.observations.lines import Line, Square
+from olp.core.values import dataclass
 
 T = TypeVar("T", bound=Observation)
 

@@ -8,7 +8,6 @@ points and are iterated by Gauss-Newton.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
@@ -27,6 +26,7 @@ from olp.core.arrays import Array, Index
 from olp.core.errors import CannotCompute, ConfigError
 from olp.core.rigid_fit import fit_points, rotation_of
 from olp.core.units import RAD_PER_URAD
+from olp.core.values import dataclass
 
 #: Points whose rows are built at once, to limit memory.
 CHUNK = 2000

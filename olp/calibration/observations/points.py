@@ -9,7 +9,7 @@ probed are such points too: commanded is where the machine touched them, measure
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
@@ -30,6 +30,7 @@ from olp.core.arrays import Array, Index
 from olp.core.errors import ConfigError
 from olp.core.rigid_fit import Rigid, fit_frame
 from olp.core.units import UM_PER_MM
+from olp.core.values import dataclass
 
 #: Points in the frame of the machine are nearer than this to where they were commanded.
 FRAME_MM = 10.0

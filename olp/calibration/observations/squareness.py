@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from olp.calibration.estimator.normal import Block, Chunk
@@ -12,6 +10,7 @@ from olp.calibration.observations.base import Noise, Observation, State
 from olp.core.arrays import Array
 from olp.core.errors import ConfigError
 from olp.core.machine import SQUARENESS, ZERO, Vector
+from olp.core.values import dataclass
 
 #: No value is more accurate than this: 10 nrad.
 LEAST_RAD = 1e-8

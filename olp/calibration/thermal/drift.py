@@ -14,7 +14,6 @@ the model is.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,6 +22,7 @@ from olp.calibration.thermal.drift_problem import Problem, rms, thinned
 from olp.core.arrays import Array
 from olp.core.errors import CannotCompute, ConfigError
 from olp.core.units import AXES
+from olp.core.values import dataclass
 from olp.errormodel.distortion import SHAPES
 from olp.errormodel.sources.structure import Distortion, Sensor, Structure
 from olp.findings.catalogue import Finding

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +12,7 @@ from olp.core.arrays import Array
 from olp.core.errors import CannotCompute, ConfigError
 from olp.core.machine import ZERO, Vector
 from olp.core.units import AXES
+from olp.core.values import dataclass
 from olp.errormodel.distortion import SHAPES, lagged, shapes
 
 Index = npt.NDArray[np.intp]

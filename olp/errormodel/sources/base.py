@@ -9,7 +9,7 @@ it writes goes through `Writing`.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
@@ -18,6 +18,7 @@ from olp.core.arrays import Array
 from olp.core.machine import Vector
 from olp.core.schema import Position, Table
 from olp.core.units import AXES
+from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.entry import Entry, Numbers
 from olp.errormodel.gridded import ComponentTable

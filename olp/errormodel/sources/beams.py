@@ -11,7 +11,6 @@ support) are:
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
@@ -22,6 +21,7 @@ from olp.core.errors import ConfigError
 from olp.core.machine import ZERO, Vector
 from olp.core.schema import Positive, refusal
 from olp.core.units import AXES
+from olp.core.values import dataclass
 from olp.errormodel.gridded import COVER_MM, ComponentTable
 from olp.errormodel.sources.base import (
     ErrorSource,

@@ -6,7 +6,7 @@ Their model is the exact product of the bodies (`olp.errormodel.chain`, `compone
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import product
 from types import MappingProxyType
 from typing import Any, Literal
@@ -20,6 +20,7 @@ from olp.core.interpolation import Column
 from olp.core.machine import COMPONENTS, ZERO, Vector
 from olp.core.schema import Position, Table, Text, Triple
 from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM, in_unit_text
+from olp.core.values import dataclass
 from olp.errormodel.entry import AxisState, Entry, Numbers, Slot, alone, component_acts
 from olp.errormodel.gridded import frozen, refuse
 from olp.errormodel.sources.base import (

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -20,6 +19,7 @@ from olp.core.interpolation import Column
 from olp.core.machine import COMPONENTS, Vector
 from olp.core.schema import Position, Positive, Table, Triple, refusal
 from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM, in_unit, shifted
+from olp.core.values import dataclass
 from olp.errormodel.entry import AxisState, Entry, Numbers, Slot, component_acts
 from olp.errormodel.gridded import refuse
 from olp.errormodel.sources.base import (

@@ -8,7 +8,6 @@ tools of all lengths find one place of the part where it is.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from pydantic import Field
@@ -18,6 +17,7 @@ from olp.core.errors import ConfigError
 from olp.core.machine import ZERO, Vector
 from olp.core.schema import Table, Text, Triple
 from olp.core.units import AXES, in_unit, shifted
+from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.boxed import Boxed, as_points, as_tool
 from olp.errormodel.sources.base import ErrorSource, Example, Frame, Reading, Schema, Writing, floats, vector

@@ -6,7 +6,6 @@ A map does not hold the orientation. So it holds for no tool but the one with wh
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from itertools import product
 from typing import Any, Literal
 
@@ -19,6 +18,7 @@ from olp.core.grid_interpolation import Kind as Interpolation
 from olp.core.machine import ZERO, Vector
 from olp.core.schema import Table, Text, Triple
 from olp.core.units import AXES, UM_PER_MM, in_unit_text
+from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.boxed import Boxed, as_points
 from olp.errormodel.grid_bound import GridBound

@@ -9,7 +9,7 @@ growth, and a bow. (Indirect compensation: see J. Mayr et al., Thermal issues in
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
@@ -21,6 +21,7 @@ from olp.core.errors import ConfigError
 from olp.core.machine import COMPONENTS, ZERO, Vector
 from olp.core.schema import Interval, Position, Table, Text, Triple, refusal
 from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM, in_unit, shifted
+from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.distortion import lagged, shapes
 from olp.errormodel.grid_errors import GridErrors

@@ -20,7 +20,6 @@ from olp.errormodel.calibration import Calibration
 from olp.errormodel.entry import Entry
 from olp.errormodel.sources.registry import NUMBERS, SOURCES
 from olp.errormodel.uncertainty import Uncertainty, fingerprint, of_sigmas
-from olp.files.archive import read_arrays
 from olp.files.calibration.reader import CalibrationReading
 from olp.files.calibration.schema import covariance_of
 from olp.files.write import PathLike, Reader, read_bytes
@@ -95,6 +94,8 @@ def covariance_bytes(uncertainty: Uncertainty) -> bytes:
 
 def parse_covariance(data: bytes, file: str) -> Uncertainty:
     """As written by `covariance_bytes`. Raises ConfigError."""
+    from olp.files.archive import read_arrays
+
     wanted = f'expected a file "{SCHEMA}" as olp calibrate fit writes it'
     try:
         arrays = read_arrays(data, _ARRAYS)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from olp.core.arrays import Array, Index
 from olp.core.machine import COMPONENTS
 from olp.core.units import AXES
+from olp.core.values import dataclass
 from olp.files.columns import Row, names, read_sheet
 from olp.files.fields import nearest
 from olp.files.problems import Problem, config_error

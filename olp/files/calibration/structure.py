@@ -8,9 +8,8 @@ import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
-from olp.calibration.thermal.drift import DriftLog
 from olp.core.arrays import Array
 from olp.core.errors import ConfigError
 from olp.core.machine import COMPONENTS, ZERO, Vector
@@ -22,6 +21,9 @@ from olp.files.problems import Problem, config_error, validate
 from olp.files.toml_text import comment, line_of, read_toml, toml_document
 from olp.files.write import PathLike, Reader, read_bytes
 from olp.program.text.rows import LOOSE_CSV
+
+if TYPE_CHECKING:
+    from olp.calibration.thermal.drift import DriftLog
 
 T = TypeVar("T", bound=Table)
 
@@ -69,6 +71,8 @@ def read_drift_log(path: PathLike, read: Reader = read_bytes) -> DriftLog:
 
 def parse_drift_log(data: bytes, file: str) -> DriftLog:
     """As `read_drift_log`, from the bytes of the file."""
+    from olp.calibration.thermal.drift import DriftLog
+
     sheet = read_sheet(data, file, _LOG)
     vectors, wrong = _stated_vectors(sheet.text)
     problems = [*sheet.problems, *_time_problems(sheet.rows), *wrong]

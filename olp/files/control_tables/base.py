@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import field, fields, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Literal
@@ -18,6 +18,7 @@ from olp.core.arrays import Array
 from olp.core.errors import ConfigError, UsageError
 from olp.core.machine import SQUARENESS, ZERO, Vector
 from olp.core.units import AXES
+from olp.core.values import dataclass
 from olp.errormodel.calibration import Calibration, Curve, Reference
 from olp.errormodel.sources.registry import SOURCES
 from olp.files.problems import Problem, config_error

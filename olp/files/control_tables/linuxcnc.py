@@ -23,7 +23,7 @@ from olp.core.units import AXES
 from olp.errormodel.calibration import Calibration, Curve
 from olp.files.control_tables import base
 from olp.files.control_tables.base import Exported, Format, Given, Imported, Load
-from olp.files.linuxcnc import Reading, joints_of, sections_of, unit_mm
+from olp.files.machine_settings.linuxcnc import Reading, joints_of, sections_of, unit_mm
 from olp.files.problems import Problem
 from olp.findings.catalogue import Finding
 

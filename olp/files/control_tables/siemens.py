@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from decimal import ROUND_HALF_EVEN, Decimal
 from pathlib import Path
 
@@ -32,6 +32,7 @@ from olp.calibration.control_tables.rows import (
 from olp.core.errors import ConfigError
 from olp.core.machine import COMPONENTS, SQUARENESS
 from olp.core.units import AXES
+from olp.core.values import dataclass
 from olp.errormodel.calibration import Calibration, Curve
 from olp.files.control_tables import base
 from olp.files.control_tables.base import Exported, Format, Given, Imported, Load

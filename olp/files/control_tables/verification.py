@@ -7,11 +7,11 @@ instrument.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from olp.calibration.control_tables.rows import Rows
+from olp.core.values import dataclass
 
 #: Pairs of axes that a program checks, those with the largest difference first.
 _PAIRS = 3

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
@@ -12,6 +11,7 @@ import numpy.typing as npt
 
 from olp.core.arrays import Array
 from olp.core.schema import Table
+from olp.core.values import dataclass
 from olp.files.columns import Wanted, decoded, finite, missing, read_sheet
 from olp.files.fields import nearest
 from olp.files.measurements.stated import stated_as, stated_keys

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,7 @@ from olp.calibration.observations.base import State
 from olp.core.arrays import Array, Index
 from olp.core.machine import Machine
 from olp.core.units import AXES, RAD_PER_URAD
+from olp.core.values import dataclass
 from olp.errormodel.calibration import PLACEHOLDER_DATE
 from olp.files.measurements.instruments.registry import planner_of
 from olp.files.toml_text import comment, toml_lines

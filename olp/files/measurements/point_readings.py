@@ -14,13 +14,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Array
 from olp.core.units import AXES
+from olp.core.values import dataclass
 from olp.files.columns import Wanted, finite, missing, names, read_sheet, unknown
 from olp.files.measurements.stated import stated_keys
 from olp.files.problems import Problem, config_error

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -19,6 +19,7 @@ from olp.calibration.observations.lines import Line, Square
 from olp.calibration.observations.measurements import MapWish, Measurements
 from olp.core.errors import ConfigError, InputError
 from olp.core.units import AXES, MM_PER_UM, RAD_PER_URAD
+from olp.core.values import dataclass
 from olp.files.columns import decoded
 from olp.files.measurements.instruments.base import Plan
 from olp.files.measurements.instruments.registry import INSTRUMENTS, rank_of

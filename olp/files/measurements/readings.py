@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from types import MappingProxyType
 
 import numpy as np
@@ -26,6 +26,7 @@ import numpy as np
 from olp.core.arrays import Array, Index
 from olp.core.errors import ConfigError
 from olp.core.units import MM_PER_UM, RAD_PER_URAD
+from olp.core.values import dataclass
 from olp.files.columns import Wanted, finite, missing, names, read_sheet, unknown
 from olp.files.measurements.stated import stated_keys
 from olp.files.problems import Problem, config_error

@@ -8,7 +8,6 @@ a profile has to state both.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Annotated, Literal
 
@@ -18,6 +17,7 @@ from pydantic import Field
 from olp.core.arrays import Array
 from olp.core.errors import InputError
 from olp.core.schema import Table
+from olp.core.values import dataclass
 from olp.files.measurements.readings import ANGULAR, UNITS, Readings
 from olp.files.write import PathLike, read_bytes
 

@@ -255,4 +255,21 @@ RULES = (
         "Put measured values into the file, or remove this curve from the calibration.",
         "z.csv as `olp init` wrote it, beside x.csv and y.csv that were measured.",
     ),
+    _rule(
+        "OLP470",
+        "stated without files",
+        Severity.INFO,
+        "The errors are stated in the call, and no machine file says the rest. This is what is taken for it.",
+        "Compare it with your machine. Where it is otherwise, write the files with `olp init`.",
+        "`olp correct part.nc --skew XY=1.414mm/m`.",
+    ),
+    _rule(
+        "OLP471",
+        "lengths of tools not known",
+        Severity.ERROR,
+        "The error depends on the position of Z, which depends on the length of the tool, and the program "
+        "uses several tools. With one tool the length cancels out, as only distances count.",
+        "Give the lengths in the tool table of a machine file; `olp init` writes one.",
+        "`--skew XZ=1mm/m` for a program with two tools.",
+    ),
 )

@@ -38,6 +38,15 @@ RULES = (
         "`G2 I0.5 F6000`: 100 mm/s about a radius of 0.5 mm asks for 20 m/s2.",
     ),
     _rule(
+        "OLP207",
+        "feeds not checked against an axis",
+        Severity.INFO,
+        "The machine file does not state the velocity or the acceleration of an axis. Whether the axis can "
+        "follow the programmed feed was not checked there.",
+        "Give velocity_mm_s and acceleration_mm_s2 of the axis in the machine file.",
+        "`[axes.X]` without velocity_mm_s, as `olp init` writes it where it was not stated.",
+    ),
+    _rule(
         "OLP307",
         "no feed",
         Severity.ERROR,

@@ -12,13 +12,14 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from olp.core.arrays import Array, Index
 from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES
+from olp.core.values import dataclass
 from olp.program.program import ArcText
 from olp.program.rs274.motion import SPIRAL_ABSOLUTE_MM, SPIRAL_RELATIVE, arc_geometry
 from olp.program.statement_rows import StatementCollector

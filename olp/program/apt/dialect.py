@@ -10,6 +10,9 @@ from olp.program.dialect import Dialect, Options, StatementDialect
 from olp.program.program import Program
 from olp.program.text.signs import POINTS_BY_SLASH
 
+#: endings of files, in small letters
+_ENDINGS = ("apt", "aptsource", "ncl", "cls", "cl", "clt", "cldata", "clf")
+
 
 def _read(data: bytes, setup: Setup, dialect: Dialect, options: Options, *, words: bool) -> Program:
     from olp.program.apt.reader import read
@@ -23,7 +26,8 @@ DIALECT = StatementDialect(
     title="APT and cutter-location data (ISO 4343, ISO 3592)",
     path_mode="the post-processor's",
     reader=_read,
-    endings=("apt", "aptsource", "ncl", "cls", "cl", "clt", "cldata", "clf"),
+    endings=_ENDINGS,
+    folder_endings=_ENDINGS,
     sign=re.compile(
         rb"(?im)^[ \t]*(PARTNO|LOADTL|LOAD[ \t]*/|SPINDL|FINI[ \t]*\r?$|CUTTER|TOOL PATH|CUTCOM|MULTAX|"
         rb"TLAXIS|RAPID[ \t]*/?[ \t]*\r?$|FEDRAT[ \t]*/[ \t]*(?:[\d.]|[IM]P?M)|GODLTA|INDIRV|MOVARC|"

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from olp.core.errors import ProgramError
 from olp.core.machine import ZERO, Setup, Vector
 from olp.core.toolpath import CutterCompensation, Flag, Kind
 from olp.core.units import MM_PER_INCH
+from olp.core.values import dataclass
 from olp.program.apt.arcs import ArcForm, circle, directed, movarc
 from olp.program.dialect import Dialect, Options
 from olp.program.frames import UP, FrameTable, tool_vector_of, turn_of, turned

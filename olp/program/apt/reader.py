@@ -17,6 +17,7 @@ import numpy.typing as npt
 from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import ProgramError
 from olp.core.machine import Setup
+from olp.core.progress import Progress
 from olp.core.toolpath import Flag, Kind
 from olp.program.apt.arcs import ArcForm, Resolved, joints, resolved, tlon
 from olp.program.apt.events import UNIT, Cycle, Events, axis_of
@@ -40,14 +41,14 @@ _RAPID = frozenset((b"RAPID", b"RAPID/"))
 def read(data: bytes, setup: Setup, dialect: Dialect, options: Options, *, words: bool = True) -> Program:
     """Read a whole program. Raises ProgramError with the line of the first statement that cannot be read
     correctly."""
-    return _Reader(data, setup, dialect, options, words).run()
+    return _Reader(data, setup, dialect, options, words).run(options.tell)
 
 
 class _Reader(Events):
     """Reads one program."""
 
-    def run(self) -> Program:
-        for chunk in chunks(self.data):
+    def run(self, tell: Progress) -> Program:
+        for chunk in chunks(self.data, tell=tell):
             self._chunk(chunk)
         self._judge_turns()
         x, y, z = self.start
@@ -143,7 +144,7 @@ class _Reader(Events):
         if label or text[:2] == b"$$":
             return None
         support, why = TABLE.get(
-            first, (Support.REFUSED, "is not a statement that olp knows, and may move the machine")
+            first, (Support.REFUSED, "is not a statement that olp knows in APT, and may move the machine")
         )
         if support is not Support.REFUSED:
             return None

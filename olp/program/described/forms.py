@@ -8,9 +8,9 @@ and an optional part in brackets. Blanks are free around marks; between words th
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 
 from olp.core.errors import ConfigError
+from olp.core.values import dataclass
 
 NUMBERS = ("x", "y", "z", "a", "b", "c", "speed", "blend", "time", "tool", "number")
 NAMES = ("target", "frame", "word")

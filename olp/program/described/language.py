@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from olp.core.values import dataclass
 from olp.program.described.forms import Form
 from olp.program.dialect import Dialect, Row, Support
 

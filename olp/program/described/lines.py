@@ -7,12 +7,12 @@ others state with other numbers. So a program of many moves is matched with its 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Index, Mask
+from olp.core.values import dataclass
 from olp.program.described.forms import NUMBERS
 from olp.program.described.language import Rule, UserDialect
 from olp.program.rs274.lexer import Bytes, numbers, runs

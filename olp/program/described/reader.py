@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,7 @@ from olp.core.arrays import Array, Index
 from olp.core.errors import ProgramError
 from olp.core.machine import ZERO, Setup
 from olp.core.toolpath import Flag, Kind
+from olp.core.values import dataclass
 from olp.program.described.language import Rule, UserDialect
 from olp.program.described.lines import Line, SameForm, Text, same_form_of
 from olp.program.dialect import Dialect, Options

@@ -10,6 +10,9 @@ from olp.program.dmis.table import TABLE
 from olp.program.program import Program
 from olp.program.text.signs import POINTS_BY_SLASH
 
+#: endings of files, in small letters
+_ENDINGS = ("dmi", "dms", "dmis")
+
 
 def _read(data: bytes, setup: Setup, dialect: Dialect, options: Options, *, words: bool) -> Program:
     from olp.program.dmis.reader import read
@@ -23,7 +26,8 @@ DIALECT = StatementDialect(
     title="DMIS part programs of coordinate measuring machines (ISO 22093)",
     path_mode="the control's own approach and retract",
     reader=_read,
-    endings=("dmi", "dms", "dmis"),
+    endings=_ENDINGS,
+    folder_endings=_ENDINGS,
     sign=re.compile(
         rb"(?im)^[ \t]*(DMISMN|FILNAM|SNSLCT|SNSET|PTMEAS|MEAS[ \t]*/|ENDMES|ENDFIL|WKPLAN|TECOMP|"
         rb"UNITS[ \t]*/[ \t]*\w+[ \t]*,|GOTO[ \t]*/[ \t]*CART|"

@@ -12,6 +12,7 @@ import numpy as np
 
 from olp.core.errors import ProgramError
 from olp.core.machine import Setup
+from olp.core.progress import Progress
 from olp.core.toolpath import Flag, Kind
 from olp.program.dialect import Dialect, Options, Support
 from olp.program.dmis.events import Events
@@ -29,14 +30,14 @@ _NO_TEXT = re.compile(rb"(?!)")
 def read(data: bytes, setup: Setup, dialect: Dialect, options: Options, *, words: bool = True) -> Program:
     """Read a whole program. Raises ProgramError with the line of the first statement that cannot be read
     correctly."""
-    return _Reader(data, setup, dialect, words).run()
+    return _Reader(data, setup, dialect, words).run(options.tell)
 
 
 class _Reader(Events):
     """Reads one program."""
 
-    def run(self) -> Program:
-        for chunk in chunks(self.data):
+    def run(self, tell: Progress) -> Program:
+        for chunk in chunks(self.data, tell=tell):
             self._chunk(chunk)
         if self.nesting and not self.ended:
             raise ProgramError(
@@ -148,7 +149,7 @@ class _Reader(Events):
         if label and b"/" not in statement.text:
             return None
         support, why = TABLE.get(
-            first, (Support.REFUSED, "is not a statement that olp knows, and may move the machine")
+            first, (Support.REFUSED, "is not a statement that olp knows in DMIS, and may move the machine")
         )
         if support is not Support.REFUSED:
             return None

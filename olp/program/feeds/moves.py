@@ -6,15 +6,14 @@ of feed mode forgets F; LinuxCNC forgets it at each G94 and G95.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from olp.core.arrays import Array, Index, Mask
+from olp.core.arrays import Array, Index, Mask, distinct
 from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES
 from olp.core.toolpath import Flag, Kind, Toolpath
 from olp.core.units import MM_PER_INCH
+from olp.core.values import dataclass
 from olp.program.program import Program, Words
 
 #: Powers of ten by their exponent: those of the decimals of a number.
@@ -72,7 +71,7 @@ def deleted_lines(program: Program) -> Index:
     start = program.line_start[line - 1]
     pairs = zip(start.tolist(), slash.tolist(), strict=True)
     blank = [not program.data[a:b].strip() for a, b in pairs]
-    return np.unique(line[np.array(blank, bool)])
+    return distinct(line[np.array(blank, bool)])
 
 
 def lengths_mm(path: Toolpath) -> Array:
@@ -133,7 +132,7 @@ def feeds(scan: Scan) -> Array:
     # RS-274 takes F before a G20 or G21 of the same block
     unit = _unit(scan, f_line, before=program.rs274.feed_before_unit)
     inverse = mode == _INVERSE
-    used = np.unique(latest)
+    used = distinct(latest)
     _check_values(scan, modes, f_line[used], value[used], pointed[used], unit[used])
     feed = value[latest] * unit[latest] / 60.0
     turning = mode == _PER_TURN

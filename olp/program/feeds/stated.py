@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from olp.core.arrays import Array, Index
 from olp.core.errors import ProgramError, UsageError
 from olp.core.toolpath import Flag, Kind
+from olp.core.values import dataclass
 from olp.program.feeds.moves import Scan, feeds, governing
 from olp.program.program import Program, Statements, Words
 

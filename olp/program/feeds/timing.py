@@ -8,7 +8,6 @@ differs there.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
@@ -17,6 +16,7 @@ import numpy.typing as npt
 from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import ProgramError, UsageError
 from olp.core.toolpath import Kind
+from olp.core.values import dataclass
 from olp.program.feeds.moves import Scan, numbers
 from olp.program.feeds.stated import programmed
 from olp.program.program import Program, Statements
@@ -91,10 +91,10 @@ def timing(program: Program, *, blend_mm: float = BLEND_MM, block_delete: bool =
         # in-position check of G0 on both sides, whatever the mode
         rapids = np.flatnonzero(path.kind == Kind.RAPID)
         rest[rapids] = rest[rapids + 1] = True
-    for hole in program.holes:
-        for moves, seconds in hole.rests:
-            rest[hole.first + moves] = True
-            dwell[hole.first + moves] += seconds
+    holes = program.holes
+    place = holes.first[holes.rest_hole] + holes.rest_after
+    rest[place] = True
+    np.add.at(dwell, place, holes.rest_s)
     for column in (feed, control, blend, rest, dwell):
         column.setflags(write=False)
     return Timing(feed, control, blend, rest, dwell)

@@ -7,13 +7,13 @@ time, or the least share of them, which a single short block can make very low.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
-from olp.core.arrays import Array, Index
+from olp.core.arrays import Array, Index, distinct
 from olp.core.errors import CannotCompute, ProgramError
+from olp.core.values import dataclass
 from olp.program.feeds.moves import lengths_mm, numbers
 from olp.program.feeds.stated import feed_words, programmed
 from olp.program.program import Program, Words
@@ -105,7 +105,7 @@ def write_feeds(
         parts += [program.data[begin:start], text]
         begin, changed, several = end, changed + 1, several + int(count[k] > 1)
     data = b"".join([*parts, program.data[begin:]])
-    return FeedsWritten(data, len(word), changed, several, slower, tuple(np.unique(word_line[kept]).tolist()))
+    return FeedsWritten(data, len(word), changed, several, slower, tuple(distinct(word_line[kept]).tolist()))
 
 
 def _written(program: Program, words: Words, word: int, share: float, line: int) -> bytes | None:

@@ -5,12 +5,11 @@ Other tables are read row by row (`reader`), which also says what is wrong with 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Index, Mask
+from olp.core.values import dataclass
 from olp.program.rs274.lexer import Bytes, blanked, numbers, runs
 from olp.program.text.delimited import DELIMITERS, Layout
 from olp.program.text.numbers import LONGEST
@@ -23,7 +22,7 @@ _POW10 = 10.0 ** np.arange(19)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Columns:
-    """(n,) `line` from 1 and bytes `begin`..`end` of each row; (n, 3) bytes `start`..`stop` of X, Y and Z,
+    """(n,) `line` from 1 and bytes `begin`..`end` of each row; (n, m) bytes `start`..`stop` of its numbers,
     their `mantissa` / 10**`decimals`. `cells` (n, k, 2) are the bytes of the other columns that were asked
     for."""
 
@@ -38,24 +37,27 @@ class Columns:
 
     @property
     def value(self) -> npt.NDArray[np.float64]:
-        """(n, 3) the numbers."""
+        """(n, m) the numbers."""
         return np.asarray(self.mantissa / _POW10[self.decimals], float)
 
 
 def columns(
-    data: bytes, layout: Layout, header_line: int, xyz: list[int], others: list[int]
+    data: bytes, layout: Layout, header_line: int, places: list[int], others: list[int]
 ) -> Columns | None:
-    """The rows of a table after its header, by the indices of its columns; None where it is not plain."""
+    """The rows of a table after its header, by the indices of its columns of numbers and of others; None
+    where it is not plain."""
     if b'"' in data or data.count(b"\r") != data.count(b"\r\n") or not data:
         return None
     if data[:3] == b"\xef\xbb\xbf":
         data = b"   " + data[3:]
     text = np.frombuffer(data, np.uint8)
+    if ((text < 32) & (text != 9) & (text != 10) & (text != 13)).any():
+        return None
     newline = np.flatnonzero(text == 10)
     ends = newline if newline.size and newline[-1] == len(text) - 1 else np.append(newline, len(text))
     starts = np.concatenate(([0], ends[:-1] + 1))
     content = ends - ((ends > starts) & (text[np.maximum(ends - 1, 0)] == 13))
-    lead = _forward(text, starts, content)
+    lead = forward(text, starts, content)
     row = (lead < content) & (np.arange(len(starts)) >= header_line)
     for mark in {b"#", layout.comment.encode()}:
         row &= ~_begins(text, lead, mark)
@@ -63,15 +65,16 @@ def columns(
     if not chosen.size:
         return None
     begin, end = starts[chosen], content[chosen]
-    spans = _cells(text, begin, end, layout, [*xyz, *others])
+    count = len(places)
+    spans = _cells(text, begin, end, layout, [*places, *others], count)
     if spans is None:
         return None
-    start, stop = spans[:, :3, 0], spans[:, :3, 1]
+    start, stop = spans[:, :count, 0], spans[:, :count, 1]
     parsed = plain_numbers(text, start, stop, layout.decimal == "comma")
     if parsed is None:
         return None
     mantissa, decimals = parsed
-    return Columns(chosen + 1, begin, end, start, stop, mantissa, decimals, spans[:, 3:])
+    return Columns(chosen + 1, begin, end, start, stop, mantissa, decimals, spans[:, count:])
 
 
 def _begins(text: Bytes, first: Index, mark: bytes) -> Mask:
@@ -82,7 +85,7 @@ def _begins(text: Bytes, first: Index, mark: bytes) -> Mask:
     return same
 
 
-def _forward(text: Bytes, position: Index, stop: Index) -> Index:
+def forward(text: Bytes, position: Index, stop: Index) -> Index:
     """The first byte from `position` that is no blank, `stop` where all are."""
     position = position.copy()
     todo = np.arange(len(position))
@@ -94,7 +97,7 @@ def _forward(text: Bytes, position: Index, stop: Index) -> Index:
         position[todo] += 1
 
 
-def _backward(text: Bytes, position: Index, start: Index) -> Index:
+def backward(text: Bytes, position: Index, start: Index) -> Index:
     """The byte after the last one before `position` that is no blank, `start` where all are."""
     position = position.copy()
     todo = np.arange(len(position))
@@ -106,9 +109,11 @@ def _backward(text: Bytes, position: Index, start: Index) -> Index:
         position[todo] -= 1
 
 
-def _cells(text: Bytes, begin: Index, end: Index, layout: Layout, places: list[int]) -> Index | None:
-    """(n, k, 2) the bytes of cells, without blanks around them; None where a row has too few, or empty
-    ones."""
+def _cells(
+    text: Bytes, begin: Index, end: Index, layout: Layout, places: list[int], filled: int
+) -> Index | None:
+    """(n, k, 2) the bytes of cells, without blanks around them; None where a row has too few, or one of the
+    first `filled` is empty."""
     mark = DELIMITERS[layout.delimiter]
     spans = np.zeros((len(begin), len(places), 2), np.int64)
     if mark is None:
@@ -130,9 +135,9 @@ def _cells(text: Bytes, begin: Index, end: Index, layout: Layout, places: list[i
     for k, place in enumerate(places):
         a = begin if place == 0 else marks[base + place - 1] + 1
         b = np.where(place < count, marks[np.minimum(base + place, len(marks) - 1)], end)
-        spans[:, k, 0] = first_ = _forward(text, a, b)
-        spans[:, k, 1] = last_ = _backward(text, b, first_)
-        if k < 3 and (first_ >= last_).any():
+        spans[:, k, 0] = first_ = forward(text, a, b)
+        spans[:, k, 1] = last_ = backward(text, b, first_)
+        if k < filled and (first_ >= last_).any():
             return None
     return spans
 

@@ -4,15 +4,25 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from olp.program.pointlist.reader import PointList, read_list
+from olp.core.machine import Setup
+from olp.program.dialect import Dialect, Options
+from olp.program.pointlist.base import PointList
+from olp.program.program import Program
 from olp.program.text.delimited import Layout
+
+
+def _read(data: bytes, setup: Setup, dialect: Dialect, options: Options, *, words: bool) -> Program:
+    from olp.program.pointlist.reader import read_list
+
+    return read_list(data, setup, dialect, options, words=words)
+
 
 DIALECT = PointList(
     name="list",
     title="list of positions (CSV, TXT)",
     path_mode="not stated",
     points=True,
-    reader=read_list,
+    reader=_read,
     endings=("csv", "tsv"),
     comment=(b"# ", b""),
 )

@@ -7,7 +7,7 @@ judged only where the layout states that straight lines join them. Only X, Y and
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
@@ -17,9 +17,11 @@ from olp.core.arrays import Array
 from olp.core.errors import InputError, ProgramError
 from olp.core.machine import Setup
 from olp.core.toolpath import Flag, Frame, Kind
-from olp.program.dialect import Dialect, Options, Row, Support
+from olp.core.values import dataclass
+from olp.program.dialect import Dialect, Options
 from olp.program.frame_index import frame_index
 from olp.program.frames import FrameTable
+from olp.program.pointlist.base import PointList
 from olp.program.pointlist.columns import columns
 from olp.program.program import Program
 from olp.program.text.delimited import AXES, MM_S, Layout, detected_layout, first_lines, stated_frame
@@ -28,36 +30,6 @@ from olp.program.text.rows import Cells
 from olp.program.verbatim import Moves
 
 _TURNING = ("A", "B", "C", "I", "J", "K")
-_SUPPORT = {
-    "X": (Support.CORRECTED, ""),
-    "Y": (Support.CORRECTED, ""),
-    "Z": (Support.CORRECTED, ""),
-    "tool": (Support.READ, "the tool of the row: its tool vector"),
-    "A": (Support.UNCHANGED, "three linear axes cannot turn the tool"),
-    "B": (Support.UNCHANGED, "three linear axes cannot turn the tool"),
-    "C": (Support.UNCHANGED, "three linear axes cannot turn the tool"),
-    "I": (Support.UNCHANGED, "three linear axes cannot turn the tool"),
-    "J": (Support.UNCHANGED, "three linear axes cannot turn the tool"),
-    "K": (Support.UNCHANGED, "three linear axes cannot turn the tool"),
-    "speed": (Support.UNCHANGED, ""),
-    "blend": (Support.UNCHANGED, ""),
-    "t": (Support.UNCHANGED, "with a column of time no row is inserted"),
-    "name": (Support.UNCHANGED, ""),
-    "line": (Support.UNCHANGED, ""),
-    "any other column": (Support.UNCHANGED, ""),
-    "comment": (Support.UNCHANGED, ""),
-    "a row without numbers": (Support.REFUSED, "it may be a waypoint"),
-}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PointList(Dialect):
-    """A list of positions; `layout` None: detected from its first rows."""
-
-    layout: Layout | None = None
-
-    def rows(self) -> Sequence[Row]:
-        return [Row(f"column {k}" if len(k) < 6 else k, what, why) for k, (what, why) in _SUPPORT.items()]
 
 
 @dataclass(slots=True)

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 from olp.core.errors import ProgramError
 from olp.core.machine import ZERO, Setup, Vector, WorkOffset
 from olp.core.toolpath import CutterCompensation, Frame, LengthError, Touch
+from olp.core.values import dataclass
 from olp.program.frames import length_errors_of, tool_vector_of, touch_of, touch_tool_of
 from olp.program.rs274.codes import (
     COMPENSATION_BY_DIAMETER,
@@ -42,6 +43,9 @@ from olp.program.rs274.state import NAN, Capture, PathMode, State
 TOOL_CHANGE = 60
 #: M61, as ten times its number.
 SET_TOOL = 610
+
+#: L of a G10 that stores the present position.
+STORES_POSITION = 20
 
 #: What changes or uses offsets beside the move of a block.
 _OFFSET_CODES = LENGTHS | HOMES | SHIFTS | WORK_OFFSETS | FURTHER_OFFSETS | {MACHINE, WRITE_OFFSET}
@@ -400,14 +404,14 @@ class AxisState(State):
         self, line: int, by_letter: dict[str, Word], axis_words: list[tuple[int, Word]], moves: int
     ) -> None:
         kind = round(by_letter["L"].value) if "L" in by_letter else -1
-        if kind not in (2, 20):
+        if kind not in (2, STORES_POSITION):
             what = f"G10 L{kind}" if kind >= 0 else "G10 without L"
             raise ProgramError(
                 f"{what} writes tables of the control, which is not read; expected L2 or L20",
                 line=line,
                 code="OLP526",
             )
-        if "R" in by_letter and (kind == 20 or by_letter["R"].value != 0):
+        if "R" in by_letter and (kind == STORES_POSITION or by_letter["R"].value != 0):
             raise ProgramError(
                 "G10 R rotates the work offset, which is not read; leave R out", line=line, code="OLP526"
             )
@@ -418,6 +422,13 @@ class AxisState(State):
             )
         name = self.offsets.name if number == 0 else f"G{53 + number}" if number < 7 else f"G59.{number - 6}"
         base = self._work_mm(name)
+        if kind == 2 and not self.setup.machine.located:
+            raise ProgramError(
+                "G10 L2 states machine coordinates, which are not known without a machine file; write one "
+                "with olp init, or store the position with G10 L20",
+                line=line,
+                code="OLP526",
+            )
         for i, word in axis_words:
             value = self.length_mm(word)
             if kind == 2:

@@ -7,13 +7,14 @@ block is refused here, many lines at a time.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Index, Mask
+from olp.core.arrays import Index, Mask, distinct
 from olp.core.errors import ProgramError
+from olp.core.values import dataclass
 from olp.program.rs274.codes import (
     AXIS_VALUES,
     COMPENSATION_OFF,
@@ -151,7 +152,7 @@ class _Tables:
         place = line[some] * 64 + group[some]
         order = np.argsort(place, kind="stable")
         place, some = place[order], some[order]
-        for twice in np.unique(place[1:][place[1:] == place[:-1]]).tolist():
+        for twice in distinct(place[1:][place[1:] == place[:-1]]).tolist():
             mine = some[slice(*np.searchsorted(place, (twice, twice + 1)))]
             names = " and ".join(_name(k) for k in key[mine].tolist())
             yield (
@@ -175,10 +176,10 @@ class _Tables:
         moves = (present & _AXES) != 0
         arcs = np.isin(motion, sorted(_ARCS))
         moves |= arcs & ((present & _CENTRE) != 0)
-        moves[line[np.isin(key, _STATING)]] = False
+        moves[line[np.isin(key, _STATING, kind="table")]] = False
         allowed[moves] |= self.allowed[np.maximum(motion[moves], 0)]
         # a code of this block moves without words, too
-        moves[line[np.isin(key, _MOTIONS)]] = True
+        moves[line[np.isin(key, _MOTIONS, kind="table")]] = True
         outside = np.zeros(len(present), np.int32)
         radius = (present & _bits("R")) != 0
         for code, letters in _IN_PLANE.items():
@@ -209,8 +210,10 @@ class _Tables:
                 why = f"{_name(code)} takes {one}, or words of axes; expected one of the two"
                 yield where, why, "OLP518", ""
         if self.rules.one_use_of_axes:
-            both = np.intersect1d(line[np.isin(key, _STATING)], line[np.isin(key, _MOTIONS)])
-            for where in both.tolist():
+            stating, moving = np.zeros((2, len(present)), bool)
+            stating[line[np.isin(key, _STATING, kind="table")]] = True
+            moving[line[np.isin(key, _MOTIONS, kind="table")]] = True
+            for where in np.flatnonzero(stating & moving).tolist():
                 why = "two G codes of this block use its axis words; give each its own block"
                 yield where, why, "OLP518", ""
 

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 
 from olp.core.errors import ProgramError
-from olp.program.text.line_ends import LINE_END, LONE_CR
+from olp.core.values import dataclass
+from olp.program.text.line_ends import LINE_END, STRAY_CR
 
 #: Bytes of an unclosed comment that are shown.
 _SHOWN = 40
 #: Bytes of a line that are shown.
 _SHOWN_OF_LINE = 60
+#: Bytes that are good on every control.
+PLAIN = b"\t\n" + bytes(range(0x20, 0x7F))
 #: Control characters but tab and those of line ends.
 CONTROL = re.compile(rb"[\x00-\x08\x0b\x0c\x0e-\x1f]")
 _COMMENTS = re.compile(rb"\([^)]*\)?|;.*", re.DOTALL)
@@ -30,7 +32,7 @@ class BlockText:
     - `longest`: bytes of a line at most, without its line feed (None: no limit).
     """
 
-    odd_bytes: re.Pattern[bytes] | None = LONE_CR
+    odd_bytes: re.Pattern[bytes] | None = STRAY_CR
     skips_control: bool = True
     cr_ends_line: bool = False
     open_comments: bool = False

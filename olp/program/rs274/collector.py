@@ -9,8 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from olp.core.arrays import Array, Index, Mask
+from olp.program.holes import Holes
 from olp.program.path_columns import PathColumns
-from olp.program.program import ArcSlots, Hole, Program, Words
+from olp.program.program import ArcSlots, Program, Words
 from olp.program.rs274.axis_state import AxisState
 from olp.program.rs274.lexer import WordChunk
 
@@ -24,11 +25,11 @@ class Collector(PathColumns):
     """
 
     def __init__(self, data: bytes, start: tuple[float, float, float], *, keep_words: bool) -> None:
-        super().__init__(len(data) // 3, keep_words=keep_words)
+        super().__init__(keep_words=keep_words)
         self.data = data
         self.start = start
         self.word_count = 0
-        self.holes: list[Hole] = []
+        self.holes: list[Holes] = []
         self.remarks: dict[str, tuple[int, str]] = {}
 
     def put_words(self, chunk: WordChunk) -> None:
@@ -66,7 +67,7 @@ class Collector(PathColumns):
             line_end=self.columns.take("line_end", np.int32),
             captures=tuple(state.captures),
             path_modes=tuple(state.path_modes),
-            holes=tuple(self.holes),
+            holes=Holes.join(self.holes),
             remarks=tuple((name, line, text) for name, (line, text) in self.remarks.items()),
             end_line=end_line,
             calculator=not state.bare_increments,

@@ -9,13 +9,15 @@ reported, so that the interpreter can decide whether the line may stay unchanged
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Index, Mask
-from olp.program.rs274.block_text import CONTROL, BlockText
+from olp.core.arrays import Index, Mask, distinct
+from olp.core.progress import Progress, silent
+from olp.core.values import dataclass
+from olp.program.rs274.block_text import CONTROL, PLAIN, BlockText
 from olp.program.text.line_ends import LONE_CR
 
 Bytes = npt.NDArray[np.uint8]
@@ -60,13 +62,14 @@ class WordChunk:
     first_line: int
 
 
-def chunks(data: bytes, rules: BlockText, size: int = CHUNK) -> Iterator[WordChunk]:
+def chunks(data: bytes, rules: BlockText, size: int = CHUNK, tell: Progress = silent) -> Iterator[WordChunk]:
     """Lex a whole text, chunk by chunk, each ending at a line end. Lines that the `rules` refuse are odd."""
     if rules.cr_ends_line and b"\r" in data:
         data = LONE_CR.sub(b"\n", data)
-    places = [] if rules.odd_bytes is None else [match.start() for match in rules.odd_bytes.finditer(data)]
-    strange = np.array(places, np.int64)
-    if not rules.skips_control and not CONTROL.search(data):
+    plain = not data.translate(None, PLAIN)
+    odd = () if plain or rules.odd_bytes is None else rules.odd_bytes.finditer(data)
+    strange = np.array([match.start() for match in odd], np.int64)
+    if not rules.skips_control and (plain or not CONTROL.search(data)):
         rules = replace(rules, skips_control=True)
     text = np.frombuffer(data, np.uint8)
     start = line = 0
@@ -75,11 +78,12 @@ def chunks(data: bytes, rules: BlockText, size: int = CHUNK) -> Iterator[WordChu
         if start + size < len(data):
             newline = data.find(b"\n", start + size)
             cut = newline + 1 if newline >= 0 else cut
-        here = strange[slice(*np.searchsorted(strange, (start, cut)))] if places else strange
+        here = strange[slice(*np.searchsorted(strange, (start, cut)))]
         chunk = lex(text[start:cut], rules, start, line, strange=here - start)
         line += len(chunk.line_start)
         start = cut
         yield chunk
+        tell("read", cut / len(data))
 
 
 def lex(
@@ -131,7 +135,7 @@ def lex(
     first_word[1:] = np.searchsorted(begin, line_breaks)
     line = np.repeat(np.arange(lines), np.diff(first_word))
     odd = np.searchsorted(line_breaks, bad) if bad.size else _NONE
-    odd = np.unique(np.append(odd, np.searchsorted(ends, strange))) if odd.size or strange.size else odd
+    odd = distinct(np.append(odd, np.searchsorted(ends, strange))) if odd.size or strange.size else odd
     if odd.size:
         good = ~np.isin(line, odd)
         begin, stop, letter, line = begin[good], stop[good], letter[good], line[good]
@@ -184,26 +188,22 @@ def runs(text: Bytes) -> tuple[Bytes, Index, Index]:
 
 def _line_heads(text: Bytes, starts: Index, ends: Index, keep: Mask, deleted: Mask) -> Index:
     """Take `/` and `%` at the start of lines out of `keep`; returns the lines with a tape mark."""
-    heads = np.flatnonzero((text == 47) | (text == 37))
-    if not heads.size:
+    if not ((text == 47) | (text == 37)).any():
         return np.zeros(0, np.int64)
-    marks = []
-    lines = np.searchsorted(ends, heads)
-    previous = -1
-    for head, line in zip(heads.tolist(), lines.tolist(), strict=True):
-        if line == previous or keep[starts[line] : head].any():
-            continue
-        previous = line
-        if text[head] == 37:
-            marks.append(line)
-            keep[head : ends[line]] = False
-        else:
-            deleted[line] = True
-            keep[head] = False
-            # "/2": an optional switch number, only where a word follows it
-            if head + 1 < ends[line] and 49 <= text[head + 1] <= 57:
-                keep[head + 1] = False
-    return np.array(marks, np.int64)
+    kept = np.flatnonzero(keep)
+    head = kept[np.minimum(np.searchsorted(kept, starts), len(kept) - 1)]
+    head_of = np.where(head < ends, text[head], 0)
+    lines = np.flatnonzero(head_of == 47)
+    deleted[lines] = True
+    keep[head[lines]] = False
+    # "/2": an optional switch number, only where a word follows it
+    switch = head[lines] + 1
+    switch = switch[switch < ends[lines]]
+    keep[switch[(text[switch] >= 49) & (text[switch] <= 57)]] = False
+    marks = np.flatnonzero(head_of == 37)
+    for line in marks.tolist():
+        keep[head[line] : ends[line]] = False
+    return marks
 
 
 def _drop_comments(text: Bytes, ends: Index, keep: Mask, rules: BlockText) -> tuple[Index, Index]:

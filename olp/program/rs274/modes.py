@@ -8,13 +8,14 @@ A whole chunk is read at once. Refused here are lines with more than words, word
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Array, Index, Mask
+from olp.core.arrays import Array, Index, Mask, distinct
 from olp.core.errors import ProgramError
+from olp.core.values import dataclass
 from olp.program.rs274.axis_state import AxisState
 from olp.program.rs274.block_rules import M
 from olp.program.rs274.codes import (
@@ -289,7 +290,7 @@ def scaled(context: Context, state: AxisState, remarks: dict[str, tuple[int, str
     if not bare.size:
         return context.value
     numbers = context.value.copy()
-    for letter in np.unique(chunk.letter[bare]).tolist():
+    for letter in distinct(chunk.letter[bare]).tolist():
         mine = bare[chunk.letter[bare] == letter]
         numbers[mine] *= state.increment(chr(letter))
     # 0 is 0 either way, and K counts the holes of a cycle too

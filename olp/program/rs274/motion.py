@@ -6,14 +6,13 @@ into positions. An omitted axis keeps its position: that is a forward fill.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES
+from olp.core.values import dataclass
 from olp.program.rs274.lexer import WordChunk
 
 #: Powers of ten by their exponent: those of the decimals of a number.
@@ -131,10 +130,10 @@ def fill(
     value: Array,
     incremental: Mask | None,
     offset: Array,
-    unit: float,
+    unit: Array | float,
     start: list[float],
 ) -> Array:
-    """(n, 3) axis positions of consecutive blocks from `start`; offsets (3,) or (n, 3)."""
+    """(n, 3) axis positions of consecutive blocks from `start`; offsets (3,) or (n, 3), units one or (n,)."""
     count = len(slot)
     end = np.empty((count, 3))
     order = np.arange(count)
@@ -177,80 +176,106 @@ def arc_geometry(
     `words` (m, 5) are I, J, K, R in mm and P, NaN where absent. RS-274: IJK from the start (or absolute in
     G90.1), R > 0 the shorter arc, P whole turns. Raises ProgramError for arcs that the control would refuse.
     """
-    rows = np.arange(len(start))
-    axes = np.array(PLANES)[plane]
+    _check_stated(start, end, words, plane, absolute, line)
+    rows, axes = np.arange(len(start)), np.array(PLANES)[plane]
     first, second = axes[:, 0], axes[:, 1]
-
-    def refuse(bad: Mask, message: str, code: str = "OLP530") -> None:
-        if bad.any():
-            raise ProgramError.together(
-                ProgramError(
-                    message.format(r0=r0[i], r1=r1[i], chord=2 * half[i]), line=int(line[i]), code=code
-                )
-                for i in np.flatnonzero(bad).tolist()
-            )
-
-    r0 = r1 = half = np.zeros(len(start))
-    refuse(
-        ~np.asarray(np.isfinite(start).all(axis=1) & np.isfinite(end).all(axis=1)),
-        "an arc starts or ends where an axis has not been commanded yet; "
-        "command X, Y and Z first, or give start_mm in the job file",
-        "OLP524",
-    )
     s0, s1, e0, e1 = start[rows, first], start[rows, second], end[rows, first], end[rows, second]
-    c0, c1, radius, turns = words[rows, first], words[rows, second], words[:, 3], words[:, 4]
-    by_radius = ~np.isnan(radius)
-    refuse(
-        ~by_radius & np.isnan(c0) & np.isnan(c1),
-        "an arc has neither centre words of its plane nor a radius; expected I, J, K or R",
-        "OLP516",
-    )
-    refuse(
-        ~by_radius & absolute & (np.isnan(c0) | np.isnan(c1)),
-        "in G90.1 an arc needs both centre words of its plane",
-        "OLP516",
-    )
-    turns = np.where(np.isnan(turns), 1.0, turns)
-    refuse(
-        (turns != np.rint(turns)) | (turns < 1),
-        "P of an arc is its number of turns; expected an integer from 1",
-        "OLP516",
-    )
-    refuse(turns > MOST_TURNS, f"P of an arc is its number of turns; expected at most {MOST_TURNS}")
     base0, base1 = (np.where(absolute, offset[rows, f], s) for f, s in ((first, s0), (second, s1)))
-    centre0, centre1 = np.nan_to_num(c0) + base0, np.nan_to_num(c1) + base1
-    if by_radius.any():
-        dx, dy, half = e0 - s0, e1 - s1, np.hypot(e0 - s0, e1 - s1) / 2
-        refuse(
-            by_radius & (half == 0),
-            "an arc with R ends where it starts, so its centre is not known; use I, J, K",
+    centre0 = np.nan_to_num(words[rows, first]) + base0
+    centre1 = np.nan_to_num(words[rows, second]) + base1
+    by_radius = np.flatnonzero(~np.isnan(words[:, 3]))
+    if by_radius.size:
+        ends = (s0[by_radius], s1[by_radius]), (e0[by_radius], e1[by_radius])
+        centre0[by_radius], centre1[by_radius] = _centres_of_radii(
+            *ends, words[by_radius, 3], clockwise[by_radius], line[by_radius]
         )
-        size = np.abs(radius)
-        refuse(
-            by_radius & (half > size + SPIRAL_ABSOLUTE_MM / 2) & (half > size * (1 + SPIRAL_RELATIVE / 2)),
-            "the radius of an arc is too small to reach its end, {chord:.4f} mm away",
-        )
-        height = np.sqrt(np.maximum(size * size - half * half, 0.0))
-        # left of the chord where the arc is short and counter-clockwise, or long and clockwise
-        lean = np.where(clockwise == (radius < 0), 1.0, -1.0) * height / np.where(half > 0, 2 * half, 1.0)
-        centre0 = np.where(by_radius, s0 + dx / 2 - lean * dy, centre0)
-        centre1 = np.where(by_radius, s1 + dy / 2 + lean * dx, centre1)
-    r0, r1 = np.hypot(s0 - centre0, s1 - centre1), np.hypot(e0 - centre0, e1 - centre1)
-    refuse((r0 < 1e-9) | (r1 < 1e-9), "an arc has zero radius")
-    refuse(
-        np.maximum(r0, r1) > LARGEST_RADIUS_MM,
-        "the radius of an arc is {r0:.4g} mm; expected at most "
-        f"{LARGEST_RADIUS_MM:g} mm, as its centre has too few digits; write a straight move",
-    )
-    refuse(
-        np.abs(r0 - r1) > np.maximum(SPIRAL_ABSOLUTE_MM, SPIRAL_RELATIVE * r1),
-        "the radius of an arc is {r0:.4f} mm at its start and {r1:.4f} mm at its end; "
-        "a control does not accept this difference",
-    )
-    sweep = np.arctan2(e1 - centre1, e0 - centre0) - np.arctan2(s1 - centre1, s0 - centre0)
+    (x0, y0), (x1, y1) = (s0 - centre0, s1 - centre1), (e0 - centre0, e1 - centre1)
+    _check_radii(np.hypot(x0, y0), np.hypot(x1, y1), line)
+    sweep = np.arctan2(y1, x1) - np.arctan2(y0, x0)
     sweep = np.where(clockwise, -sweep, sweep) % (2 * np.pi)
     sweep = np.where((sweep < 1e-9) | (2 * np.pi - sweep < 1e-12), 2 * np.pi, sweep)
-    sweep += 2 * np.pi * (turns - 1)
+    turns = words[:, 4]
+    sweep += 2 * np.pi * np.where(np.isnan(turns), 0.0, turns - 1)
     centre = start.copy()
     centre[rows, first], centre[rows, second] = centre0, centre1
     return centre, np.where(clockwise, -sweep, sweep)
+
+
+def _refuse(bad: Mask, line: Index, message: str, code: str = "OLP530", **figures: Array) -> None:
+    """Refuse the arcs that are `bad`; `figures` (m,) are put into the message."""
+    if bad.any():
+        raise ProgramError.together(
+            ProgramError(
+                message.format(**{name: column[i] for name, column in figures.items()}),
+                line=int(line[i]),
+                code=code,
+            )
+            for i in np.flatnonzero(bad).tolist()
+        )
+
+
+def _check_stated(start: Array, end: Array, words: Array, plane: Index, absolute: Mask, line: Index) -> None:
+    """Refuse arcs without known ends, without the words of a centre or a radius, or with a wrong P."""
+    known = np.isfinite(start).all(axis=1) & np.isfinite(end).all(axis=1)
+    _refuse(
+        np.asarray(~known), line,
+        "an arc starts or ends where an axis has not been commanded yet; "
+        "command X, Y and Z first, or give start_mm in the job file",
+        "OLP524",
+    )  # fmt: skip
+    rows, axes = np.arange(len(start)), np.array(PLANES)[plane]
+    lacks0, lacks1 = np.isnan(words[rows, axes[:, 0]]), np.isnan(words[rows, axes[:, 1]])
+    no_radius, turns = np.isnan(words[:, 3]), words[:, 4]
+    _refuse(
+        no_radius & lacks0 & lacks1, line,
+        "an arc has neither centre words of its plane nor a radius; expected I, J, K or R",
+        "OLP516",
+    )  # fmt: skip
+    _refuse(
+        no_radius & absolute & (lacks0 | lacks1), line,
+        "in G90.1 an arc needs both centre words of its plane",
+        "OLP516",
+    )  # fmt: skip
+    turned = np.where(np.isnan(turns), 1.0, turns)
+    _refuse(
+        (turned != np.rint(turned)) | (turned < 1), line,
+        "P of an arc is its number of turns; expected an integer from 1",
+        "OLP516",
+    )  # fmt: skip
+    most = f"P of an arc is its number of turns; expected at most {MOST_TURNS}"
+    _refuse(turned > MOST_TURNS, line, most)
+
+
+def _centres_of_radii(
+    start: tuple[Array, Array], end: tuple[Array, Array], radius: Array, clockwise: Mask, line: Index
+) -> tuple[Array, Array]:
+    """(k,) both coordinates of the centres of arcs in their planes that state a `radius`."""
+    (s0, s1), (e0, e1) = start, end
+    dx, dy = e0 - s0, e1 - s1
+    chord, size = np.hypot(dx, dy), np.abs(radius)
+    half = chord / 2
+    _refuse(half == 0, line, "an arc with R ends where it starts, so its centre is not known; use I, J, K")
+    small = (half > size + SPIRAL_ABSOLUTE_MM / 2) & (half > size * (1 + SPIRAL_RELATIVE / 2))
+    too_small = "the radius of an arc is too small to reach its end, {chord:.4f} mm away"
+    _refuse(small, line, too_small, chord=2 * half)
+    height = np.sqrt(np.maximum(size * size - half * half, 0.0))
+    # left of the chord where the arc is short and counter-clockwise, or long and clockwise
+    lean = np.where(clockwise == (radius < 0), 1.0, -1.0) * height / (2 * half)
+    return s0 + dx / 2 - lean * dy, s1 + dy / 2 + lean * dx
+
+
+def _check_radii(r0: Array, r1: Array, line: Index) -> None:
+    """Refuse arcs whose radii `r0` at the start and `r1` at the end no control accepts."""
+    _refuse((r0 < 1e-9) | (r1 < 1e-9), line, "an arc has zero radius")
+    _refuse(
+        np.maximum(r0, r1) > LARGEST_RADIUS_MM, line,
+        "the radius of an arc is {r0:.4g} mm; expected at most "
+        f"{LARGEST_RADIUS_MM:g} mm, as its centre has too few digits; write a straight move",
+        r0=r0,
+    )  # fmt: skip
+    _refuse(
+        np.abs(r0 - r1) > np.maximum(SPIRAL_ABSOLUTE_MM, SPIRAL_RELATIVE * r1), line,
+        "the radius of an arc is {r0:.4f} mm at its start and {r1:.4f} mm at its end; "
+        "a control does not accept this difference",
+        r0=r0, r1=r1,
+    )  # fmt: skip

@@ -6,9 +6,10 @@ axis position = program position + work offset + shift (G92) + local (G52) + too
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from olp.core.machine import ZERO, Vector
+from olp.core.values import dataclass
 
 
 def _zeros() -> list[float]:

@@ -1,14 +1,12 @@
 """Reads RS-274 and ISO 6983 text: bytes to a nominal toolpath and the words that can be edited.
 
 A chunk of lines is read in steps: lexer columns, modal codes per line (`modes`), motion lines, and stretches
-between events, each resolved in bulk (`motion`). Blocks that change frames (`axis_state`) or need the present
-position (`special_blocks`) are carried out one by one. `collector` takes the results. Nothing here knows an
-error model.
+between events, each resolved in bulk (`motion`). So are runs of canned cycles (`cycle_blocks`). Blocks that
+change frames (`axis_state`) or need the present position (`special_blocks`) are carried out one by one.
+`collector` takes the results. Nothing here knows an error model.
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -17,16 +15,19 @@ from olp.core.arrays import Array
 from olp.core.errors import ProgramError
 from olp.core.machine import Setup
 from olp.core.toolpath import Flag, Kind
+from olp.core.values import dataclass
 from olp.program.dialect import Options
 from olp.program.directives import Directives, with_payloads
 from olp.program.program import Program
-from olp.program.rs274.axis_state import AxisState, Effect
+from olp.program.rs274.axis_state import STORES_POSITION, AxisState, Effect, Word
 from olp.program.rs274.codes import (
     CYCLES,
+    DWELL,
     HOMES,
     INCREMENTAL,
     INVERSE_TIME,
     MACHINE,
+    PATH_MODES,
     PLANE_OF,
     PRESET,
     PROBES,
@@ -34,6 +35,8 @@ from olp.program.rs274.codes import (
     WRITE_OFFSET,
 )
 from olp.program.rs274.collector import Collector
+from olp.program.rs274.cycle_blocks import CycleBlocks
+from olp.program.rs274.cycle_runs import runs
 from olp.program.rs274.cycles import stroke_budget
 from olp.program.rs274.lexer import WordChunk, chunks
 from olp.program.rs274.modes import Context, Modes, check_odd, scaled
@@ -45,8 +48,11 @@ from olp.program.rs274.special_blocks import SpecialBlocks, check_codes, event_b
 _KIND = np.full(1001, 255, np.uint8)
 _KIND[[0, 10, 20, 30]] = (Kind.RAPID, Kind.LINE, Kind.ARC_CW, Kind.ARC_CCW)
 _ALONE = np.array(sorted(CYCLES | PROBES))
-#: Events that need the present position, or change the unit of the numbers behind them
-_APART = HOMES | {WRITE_OFFSET, MACHINE, PRESET, *UNITS}
+_PROBES = np.array(sorted(PROBES))
+#: Events that need the present position
+_APART = HOMES | {MACHINE, PRESET}
+#: Events that change no frame
+_KEEPS_FRAME = frozenset({DWELL, MACHINE, *HOMES, *PATH_MODES})
 
 
 def read(
@@ -64,10 +70,12 @@ def read(
 @dataclass(slots=True, eq=False)
 class _Rows:
     """The motion lines of a chunk while they are read: how many have a frame, how many a position. `present`
-    is the index of the frame in force, None after what may have changed it."""
+    is the index of the frame in force, None after what may have changed it. `runs` leads from the first row
+    of each run of canned cycles to the row behind it."""
 
     blocks: Blocks
     frame: npt.NDArray[np.int32]
+    runs: dict[int, int]
     assigned: int = 0
     resolved: int = 0
     present: int | None = None
@@ -85,9 +93,8 @@ class _Reader:
         self.modes = Modes(self.state, block_delete=options.block_delete, contour=options.contour)
         self.switches = Directives(data)
         self.payloads: dict[int, float] = {}
-        self.special_blocks = SpecialBlocks(
-            self.state, self.collector, self.switches, stroke_budget(len(data))
-        )
+        self.special_blocks = SpecialBlocks(self.state, self.collector)
+        self.cycle_blocks = CycleBlocks(self.state, self.collector, self.switches, stroke_budget(len(data)))
         self.end_line = 0
 
     def run(self) -> Program:
@@ -101,7 +108,7 @@ class _Reader:
         if data[:3] == b"\xef\xbb\xbf":
             # the lexer reads a byte order mark as blanks; it stays in the text
             data = b"   " + data[3:]
-        for chunk in chunks(data, self.state.profile.text):
+        for chunk in chunks(data, self.state.profile.text, tell=self.options.tell):
             self._chunk(chunk)
         self.modes.check_end()
         return self.collector.program(self.state, self.end_line)
@@ -129,16 +136,18 @@ class _Reader:
         context.event[[line for line in self.payloads if active[line]]] = True
         self._stretches(context, gather(chunk, context.motion, context.consumed))
         self.modes.leave(context, last - 1)
-        self.special_blocks.leave(context, last - 1)
+        self.cycle_blocks.leave(context, last - 1)
 
     # -- stretches between events ------------------------------------------------------------------
 
     def _stretches(self, context: Context, blocks: Blocks) -> None:
         chunk, state, event = context.chunk, self.state, context.event
-        rows = _Rows(blocks, np.zeros(len(blocks), np.int32))
-        alone = np.isin(context.motion[blocks.line], _ALONE)
+        rows = _Rows(blocks, np.zeros(len(blocks), np.int32), runs(context, blocks.line))
+        motion = context.motion[blocks.line]
+        alone, first = np.isin(motion, _ALONE), np.isin(motion, _PROBES)
+        first[list(rows.runs)] = True
         special = event.copy()
-        special[blocks.line[alone]] = True
+        special[blocks.line[first]] = True
         for line in np.flatnonzero(special).tolist():
             upto = int(np.searchsorted(blocks.line, line))
             here = upto < len(blocks) and blocks.line[upto] == line
@@ -146,11 +155,13 @@ class _Reader:
             if not event[line]:
                 self._alone(context, rows, upto, Effect())
                 continue
-            rows.present = None
             number, deleted = context.number(line), bool(chunk.deleted[line])
             words, codes = event_block(context, line, state.profile)
+            tool = any(w.letter in "MT" for w in words)
+            if tool or line in self.payloads or not _KEEPS_FRAME.issuperset(codes):
+                rows.present = None
             moved = any(state.may_move(round(w.value * 10)) for w in words if w.letter == "M")
-            if moved or any(c in _APART for c in codes):
+            if moved or self._needs_position(words, codes):
                 self._resolve(context, rows, upto)
             state.distance, state.plane = int(context.distance[line]), int(context.plane[line])
             state.payload_kg = self.payloads.get(line, state.payload_kg)
@@ -165,13 +176,24 @@ class _Reader:
         self._assign(context, rows, len(blocks))
         self._resolve(context, rows, len(blocks))
 
+    def _needs_position(self, words: list[Word], codes: list[int]) -> bool:
+        """Whether an event needs the present position, or the numbers before it count by another unit."""
+        if WRITE_OFFSET in codes:
+            return any(w.letter == "L" and round(w.value) == STORES_POSITION for w in words)
+        counted = self.state.bare_increments and not set(UNITS).isdisjoint(codes)
+        return counted or not _APART.isdisjoint(codes)
+
     def _alone(self, context: Context, rows: _Rows, row: int, effect: Effect) -> None:
-        """Carry out one row singly, after those before it."""
+        """Carry out one row singly, or a run of canned cycles, after the rows before it."""
         self._resolve(context, rows, row)
-        self._assign(context, rows, row + 1)
-        rows.resolved = row + 1
-        slot = rows.blocks.slot[row : row + 1]
-        self.special_blocks.run(context, int(rows.blocks.line[row]), slot, int(rows.frame[row]), effect)
+        stop = rows.runs.get(row, row + 1)
+        self._assign(context, rows, stop)
+        rows.resolved = stop
+        line, frame = rows.blocks.line[row:stop], int(rows.frame[row])
+        if row in rows.runs and not effect.home and not effect.machine:
+            self.cycle_blocks.run(context, line, frame)
+        else:
+            self.special_blocks.run(context, int(line[0]), rows.blocks.slot[row : row + 1], frame, effect)
 
     def _assign(self, context: Context, rows: _Rows, upto: int) -> None:
         """Give the present frame to the rows since the last event."""
@@ -185,7 +207,7 @@ class _Reader:
             rows.assigned = upto
 
     def _resolve(self, context: Context, rows: _Rows, upto: int) -> None:
-        """Positions, kinds and arcs of the plain rows up to `upto`, which are in one unit."""
+        """Positions, kinds and arcs of the plain rows up to `upto`."""
         a, rows.resolved = rows.resolved, max(upto, rows.resolved)
         if upto <= a:
             return
@@ -199,7 +221,7 @@ class _Reader:
             raise ProgramError.together(_no_motion(int(number[i])) for i in rows_without)
         incremental = context.distance[line] == INCREMENTAL
         frame = rows.frame[a:upto]
-        offset, unit = self._offsets(frame), state.frames[int(frame[0])].unit_mm
+        offset, unit = self._offsets(frame)
         value = scaled(context, state, self.collector.remarks)
         slot = blocks.slot[a:upto]
         end = fill(slot, value, incremental if incremental.any() else None, offset, unit, state.position)
@@ -226,7 +248,7 @@ class _Reader:
         end: Array,
         value: Array,
         offset: Array,
-        unit: float,
+        unit: Array | float,
     ) -> None:
         blocks = rows.blocks
         row = blocks.arc_row[arcs] - a
@@ -234,7 +256,7 @@ class _Reader:
         line = blocks.line[blocks.arc_row[arcs]]
         start = np.where(row[:, None] > 0, end[np.maximum(row - 1, 0)], np.array(self.state.position))
         size = np.where(words >= 0, value[words], np.nan)
-        size[:, :4] *= unit
+        size[:, :4] *= unit if isinstance(unit, float) else unit[row, None]
         absolute = context.arc_distance[line] == 901
         plane = np.array([PLANE_OF[p] for p in (170, 180, 190)])[(context.plane[line] - 170) // 10]
         cw = context.motion[line] == 20
@@ -251,12 +273,15 @@ class _Reader:
         slot = np.where(words >= 0, words + context.base, -1)
         self.collector.put_worded_arcs(row + self.collector.moves, centre, plane, sweep, slot, absolute)
 
-    def _offsets(self, frame: npt.NDArray[np.int32]) -> Array:
-        """(3,) where it is the same for all rows, else (n, 3)."""
+    def _offsets(self, frame: npt.NDArray[np.int32]) -> tuple[Array, Array | float]:
+        """Offsets and units in mm: (3,) and one where they are the same for all rows, else (n, 3), (n,)."""
         frames = self.state.frames
         if (frame == frame[0]).all():
-            return np.array(frames[int(frame[0])].offset_mm)
-        return np.array([f.offset_mm for f in frames])[frame]
+            one = frames[int(frame[0])]
+            return np.array(one.offset_mm), one.unit_mm
+        used, which = np.unique(frame, return_inverse=True)
+        table = np.array([(*frames[i].offset_mm, frames[i].unit_mm) for i in used.tolist()])[which]
+        return table[:, :3], table[:, 3]
 
 
 def _no_motion(line: int) -> ProgramError:

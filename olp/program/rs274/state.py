@@ -8,9 +8,10 @@ coordinates in program units, which need no offsets (`flatten.state`).
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from olp.core.units import MM_PER_INCH
+from olp.core.values import dataclass
 from olp.program.rs274.codes import ABSOLUTE, GROUPS, INCH, INVERSE_TIME, RETRACT_TO_R
 from olp.program.rs274.profiles.base import Profile
 

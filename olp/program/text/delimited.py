@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from types import MappingProxyType
 from typing import Literal
 
 from olp.core.errors import InputError
+from olp.core.values import dataclass
 
 Delimiter = Literal["comma", "semicolon", "tab", "space"]
 

@@ -6,19 +6,23 @@ a stretch are rendered and spliced at once, in columns.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Index
+from olp.core.arrays import Index, distinct
+from olp.core.values import dataclass
 
 Bytes = npt.NDArray[np.uint8]
+Whole = TypeVar("Whole", np.int8, np.int32, np.int64)
 
 #: Powers of ten by their exponent: those of the decimals of a number.
 _POW10 = 10 ** np.arange(19, dtype=np.int64)
 #: four digits of text at a time
-_DIGITS = np.frombuffer("".join(f"{i:04d}" for i in range(10_000)).encode(), np.uint32).copy()
+_DIGITS = (
+    (np.arange(10_000)[:, None] // [1000, 100, 10, 1] % 10 + ord("0")).astype(np.uint8).view(np.uint32)[:, 0]
+)
 #: mantissa of an edit that has a prefix and no number
 BARE = np.iinfo(np.int64).min
 
@@ -34,6 +38,23 @@ class Edits:
     decimals: npt.NDArray[np.int8]
     prefix: npt.NDArray[np.int32]
     order: npt.NDArray[np.int32]
+
+    @staticmethod
+    def of(
+        start: npt.ArrayLike, end: npt.ArrayLike, mantissa: npt.ArrayLike, decimals: npt.ArrayLike,
+        prefix: npt.ArrayLike = 0, order: npt.ArrayLike = 0,
+    ) -> Edits:  # fmt: skip
+        """Edits of columns (n,), `start` for one; single numbers hold for all."""
+        count = len(np.asarray(start))
+
+        def column(value: npt.ArrayLike, kind: type[Whole]) -> npt.NDArray[Whole]:
+            array = np.asarray(value, kind)
+            return array if array.ndim else np.full(count, array)
+
+        return Edits(
+            column(start, np.int64), column(end, np.int64), column(mantissa, np.int64),
+            column(decimals, np.int8), column(prefix, np.int32), column(order, np.int32),
+        )  # fmt: skip
 
     @staticmethod
     def join(parts: list[Edits]) -> Edits:
@@ -89,7 +110,12 @@ def splice(source: Bytes, offset: int, edits: Edits, prefixes: Prefixes, *, lead
     if not len(edits):
         return source
     text, length = render(edits, prefixes, leading_zero=leading_zero)
-    start, end = edits.start - offset, edits.end - offset
+    return replaced(source, edits.start - offset, edits.end - offset, text, length)
+
+
+def replaced(source: Bytes, start: Index, end: Index, text: Bytes, length: Index) -> Bytes:
+    """`source` with its bytes `start`..`end` (n,) replaced by runs of `text` that are `length` (n,) long, in
+    the order of the text. At least one."""
     count = len(start)
     grow = np.cumsum(length - (end - start))
     total = len(source) + int(grow[-1])
@@ -158,7 +184,7 @@ def render(edits: Edits, prefixes: Prefixes, *, leading_zero: bool) -> tuple[Byt
     rows = np.flatnonzero(negative)
     text[rows, begin[rows]] = 45
     with_prefix = np.flatnonzero(edits.prefix)
-    for which in np.unique(edits.prefix[with_prefix]).tolist():
+    for which in distinct(edits.prefix[with_prefix]).tolist():
         chosen = with_prefix[edits.prefix[with_prefix] == which]
         for i, byte in enumerate(reversed(prefixes.table[which])):
             text[chosen, begin[chosen] - 1 - i] = byte

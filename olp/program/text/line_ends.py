@@ -11,8 +11,10 @@ import re
 LINE_END = re.compile(rb"\r*\n|\r")
 #: The same in text.
 LINE_END_TEXT = re.compile(r"\r*\n|\r")
-#: A carriage return that belongs to no line feed and not to the end of the text.
-LONE_CR = re.compile(rb"\r(?!\r*(?:\n|\Z))")
+#: A carriage return that belongs to no line feed and is not the last byte of the text.
+LONE_CR = re.compile(rb"\r(?!\r*\n|\Z)")
+#: A carriage return within a line, for controls that end a line at a line feed alone.
+STRAY_CR = re.compile(rb"\r(?!\r*(?:\n|\Z))")
 
 
 def split(data: bytes, ending: re.Pattern[bytes] = LINE_END) -> list[bytes]:
@@ -24,3 +26,10 @@ def split(data: bytes, ending: re.Pattern[bytes] = LINE_END) -> list[bytes]:
     if begin < len(data):
         rows.append(data[begin:])
     return rows
+
+
+def ends_in(data: bytes, begin: int, stop: int) -> int:
+    """How many lines end in the bytes `begin`..`stop`."""
+    if data.find(b"\r", begin, stop) < 0:
+        return data.count(b"\n", begin, stop)
+    return sum(1 for _ in LINE_END.finditer(data, begin, stop))

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+
+from olp.core.arrays import Index, Mask
+from olp.core.values import dataclass
 
 Spans = npt.NDArray[np.int64] | npt.NDArray[np.int32]
 
@@ -16,9 +18,13 @@ MOST_DECIMALS = 10
 #: Characters of a number at most.
 LONGEST = 40
 #: Positions are smaller than this in any unit.
-_MOST = 1e8
+LARGEST = 1e8
 _NUMBER = re.compile(rb"([-+]?)(\d*)([.,]?)(\d*)(?:([eEdD])([-+]?\d+))?")
-_BLANKS = b" \t"
+#: Blanks as bytes.
+_SPACE = 32
+_TAB = 9
+#: Numbers whose surroundings are looked at together, to limit memory.
+_BLOCK = 1 << 16
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +59,7 @@ def number(text: bytes, decimal: bytes = b".") -> Number | None:
     if abs(power) > 99 or len(text) > LONGEST:
         return None
     value = float(sign + (whole or b"0") + b"." + (fraction or b"0") + b"e%d" % power)
-    if abs(value) >= _MOST:
+    if abs(value) >= LARGEST:
         return None
     return Number(
         value=value, digit=10.0 ** (power - len(fraction)), plus=sign == b"+", whole=len(whole),
@@ -98,40 +104,70 @@ class Placing:
     """Where new numbers go so that columns of a text keep their edges.
 
     A text is padded where numbers come after two blanks or more. Then a shorter number gets blanks before it,
-    and a longer one replaces blanks, but not the last one.
+    and a longer one replaces blanks, but not the last one. `start` and `end` are the bytes of all numbers, in
+    any order and shape.
     """
 
     def __init__(self, data: bytes, start: Spans, end: Spans) -> None:
-        self.data = data
-        text = np.concatenate(([0, 0], np.frombuffer(data, np.uint8), [0, 0]))
-        blank = (text == 32) | (text == 9)
-        first, last = np.ravel(start) + 2, np.ravel(end) + 2
-        self.padded = bool((blank[first - 1] & blank[first - 2]).any())
+        self.text = np.frombuffer(data, np.uint8)
+        first: Spans = start.ravel()
+        last: Spans = end.ravel()
+        blocks = [slice(a, a + _BLOCK) for a in range(0, len(first), _BLOCK)]
+        self.padded = any((self._blank(first[k] - 1) & self._blank(first[k] - 2)).any() for k in blocks)
         # numbers before two blanks are in a column with a left edge
-        self.trailing = not self.padded and bool(((text[last] == 32) & (text[last + 1] == 32)).any())
+        self.trailing = not self.padded and any(
+            (self._is(last[k], _SPACE) & self._is(last[k] + 1, _SPACE)).any() for k in blocks
+        )
 
-    def place(self, start: int, end: int, text: bytes) -> tuple[int, int, bytes]:
-        """Start, end and text of the edit that replaces a number by another."""
-        more = len(text) - (end - start)
-        if self.padded and more > 0:
-            taken = min(more, max(self._gap(start) - 1, 0))
-            return start - taken, end, text
-        if self.padded and more < 0:
-            return start, end, b" " * -more + text
-        if self.trailing and more > 0:
-            after = 0
-            while after < more and self.data[end + after : end + after + 2].strip(_BLANKS) == b"":
-                after += 1
-            return start, min(end + after, len(self.data)), text
-        if self.trailing and more < 0 and self.data[end : end + 1] in (b" ", b"\t"):
-            return start, end, text + b" " * -more
-        return start, end, text
+    def places(self, start: Index, end: Index, length: Index) -> tuple[Index, Index, Index, Index]:
+        """Of edits that replace numbers (n,) by others of `length` (n,) bytes: start, end, and how many
+        blanks come before and behind the new number."""
+        more = length - (end - start)
+        start, end = start.copy(), end.copy()
+        before, after = np.zeros_like(more), np.zeros_like(more)
+        if self.padded:
+            before = np.maximum(-more, 0)
+            longer = np.flatnonzero(more > 0)
+            # the last blank of a gap stays
+            gap = self._blanks(start[longer] - 1, -1, more[longer] + 1)
+            start[longer] -= np.minimum(more[longer], np.maximum(gap - 1, 0))
+        elif self.trailing:
+            shorter = (more < 0) & self._blank(end)
+            after = np.where(shorter, -more, 0)
+            longer = np.flatnonzero(more > 0)
+            gap = self._blanks(end[longer], 1, more[longer] + 1)
+            # where the text ends in blanks all of them go
+            at_end = end[longer] + gap == len(self.text)
+            taken = np.minimum(more[longer], np.maximum(gap - ~at_end, 0))
+            end[longer] += taken
+        return start, end, before, after
 
-    def _gap(self, start: int) -> int:
-        position = start
-        while position and self.data[position - 1] in _BLANKS:
-            position -= 1
-        return start - position
+    def placed(self, edits: list[tuple[int, int, bytes]]) -> list[tuple[int, int, bytes]]:
+        """Edits (start, end, new number) with the bytes that they replace, and with their blanks."""
+        start, end = np.array([edit[:2] for edit in edits], np.int64).reshape(-1, 2).T
+        length = np.array([len(text) for _, _, text in edits], np.int64)
+        columns = (column.tolist() for column in self.places(start, end, length))
+        return [
+            (first, last, b" " * before + text + b" " * after)
+            for (_, _, text), first, last, before, after in zip(edits, *columns, strict=True)
+        ]
+
+    def _is(self, at: Spans, byte: int) -> Mask:
+        """Whether the bytes at positions, in the text or not, are this one."""
+        inside = (at >= 0) & (at < len(self.text))
+        return np.asarray(inside & (self.text[np.where(inside, at, 0)] == byte))
+
+    def _blank(self, at: Spans) -> Mask:
+        return self._is(at, _SPACE) | self._is(at, _TAB)
+
+    def _blanks(self, at: Index, step: int, most: Index) -> Index:
+        """How many blanks come one after the other from positions on, `most` (n,) at most."""
+        count = np.zeros_like(at)
+        rows = np.arange(len(at))
+        while rows.size:
+            rows = rows[(count[rows] < most[rows]) & self._blank(at[rows] + step * count[rows])]
+            count[rows] += 1
+        return count
 
 
 def spliced(data: bytes, edits: list[tuple[int, int, bytes]]) -> bytes:

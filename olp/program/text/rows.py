@@ -11,15 +11,16 @@ import csv
 import io
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 from olp.core.errors import InputError
-from olp.program.foreign import recognised
+from olp.core.values import dataclass
 from olp.program.text.delimited import DELIMITERS, Layout
-from olp.program.text.line_ends import LINE_END
+from olp.program.text.line_ends import LINE_END, ends_in
 from olp.program.text.numbers import Number, number
 
 Span = tuple[int, int]
+#: Line and cells of a row.
+Row = tuple[int, list[Span]]
 #: Bytes that show whether a file is binary.
 _HEAD = 1024
 
@@ -28,6 +29,8 @@ def decoded(data: bytes) -> str:
     """The text of a file. Raises InputError with the line of the first byte that is not UTF-8, and for a
     binary file with the name of what it is."""
     if b"\0" in data[:_HEAD]:
+        from olp.program.foreign import recognised
+
         other = recognised(data, languages=False)
         if other is not None:
             raise InputError(other.message, line=1)
@@ -137,12 +140,23 @@ class Cells:
             )
         return place
 
-    def rows(self) -> Iterator[tuple[int, list[Span]]]:
-        """Line (from 1) and cells of each row of data."""
-        for line, start, end in self._lines():
+    def rows(self, begin: int = 0, stop: int | None = None, before: int = 0) -> Iterator[Row]:
+        """Line (from 1) and cells of each row of data; of the lines in the bytes `begin`..`stop` alone, which
+        come after so many `before`."""
+        for line, start, end in self._lines(begin, stop, before):
             if line > self.header_line:
                 self.bounds = (start, end)
                 yield line, self.split(start, end)
+
+    def bands(self, size: int) -> Iterator[tuple[int, int, int]]:
+        """The text in parts of about `size` bytes and whole lines: where each begins and stops, and how many
+        lines come before it."""
+        data, begin, before = self.data, 0, 0
+        while begin < len(data):
+            stop = data.find(b"\n", begin + size) + 1 or len(data)
+            yield begin, stop, before
+            before += ends_in(data, begin, stop)
+            begin = stop
 
     def number(self, row: Sequence[Span], place: int) -> Number | str:
         """The number in a cell of a row, or what is wrong with it."""
@@ -197,16 +211,19 @@ class Cells:
             return self._bare(start + 1, end - 1)
         return start, end
 
-    def _lines(self) -> Iterator[tuple[int, int, int]]:
-        """Number, start and end of the lines that are neither empty nor comments."""
+    def _lines(
+        self, begin: int = 0, stop: int | None = None, number: int = 0
+    ) -> Iterator[tuple[int, int, int]]:
+        """Number, start and end of the lines that are neither empty nor comments, in the bytes
+        `begin`..`stop`, which come after `number` others."""
         data = self.data
-        begin = 3 if data[:3] == b"\xef\xbb\xbf" else 0
-        number = 0
-        while begin < len(data):
+        stop = len(data) if stop is None else stop
+        begin = 3 if begin == 0 and data[:3] == b"\xef\xbb\xbf" else begin
+        while begin < stop:
             number += 1
-            match = LINE_END.search(data, begin)
-            stop, following = (len(data), len(data)) if match is None else match.span()
-            held = data[begin:stop].strip()
+            match = LINE_END.search(data, begin, stop)
+            end, following = (stop, stop) if match is None else match.span()
+            held = data[begin:end].strip()
             if held and not held.startswith(self._comments):
-                yield number, begin, stop
+                yield number, begin, end
             begin = following

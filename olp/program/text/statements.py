@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -18,6 +17,8 @@ import numpy.typing as npt
 
 from olp.core.arrays import Index, Mask
 from olp.core.errors import ProgramError
+from olp.core.progress import Progress, silent
+from olp.core.values import dataclass
 from olp.program.rs274.lexer import CHUNK, blanked, numbers, runs, slow_number, without_cr
 from olp.program.text.line_ends import LONE_CR
 
@@ -281,7 +282,7 @@ def is_cards(data: bytes) -> bool:
     return len(numbers) > 1 and all(_SEQUENCE.match(number) for number in numbers)
 
 
-def chunks(data: bytes, size: int = CHUNK) -> Iterator[Chunk]:
+def chunks(data: bytes, size: int = CHUNK, tell: Progress = silent) -> Iterator[Chunk]:
     """Lex a whole text, chunk by chunk, each ending at the end of a statement. The numbers of cards are
     read as blanks. Raises ProgramError for a text of two bytes per character."""
     if is_cards(data):
@@ -310,6 +311,7 @@ def chunks(data: bytes, size: int = CHUNK) -> Iterator[Chunk]:
         line += len(chunk.line_start)
         begin = cut
         yield chunk
+        tell("read", cut / len(data))
 
 
 def _lex(data: bytes, text: Bytes, offset: int, first_line: int) -> Chunk:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from olp.core.interpolation import Interpolant
+from olp.core.optional import require_matplotlib
 from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM
 from olp.errormodel.calibration import Calibration
 
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Format = Literal["svg", "png"]
+#: Inches at the left, below, at the right and above.
+Edges = tuple[float, float, float, float]
 
 #: Prefix and colour of a component by its letter, the same for every axis.
 _KINDS = {
@@ -32,12 +35,15 @@ _POINTS = 400
 
 
 def drawn(
-    name: str, size: tuple[float, float], draw: Callable[[Figure], None], kind: Format = "svg"
-) -> bytes:
-    """The bytes of a figure; an SVG is the element alone, for a page or a file.
+    name: str, size: tuple[float, float], draw: Callable[[Figure], None], kind: Format = "svg",
+    edges: Edges | None = None,
+) -> bytes:  # fmt: skip
+    """The bytes of a figure of `size` inches; an SVG is the element alone, for a page or a file. Its plots
+    leave the `edges` free; without them the labels are drawn a second time to find what they need.
 
     The same data give the same bytes; ids of two plots in a page differ by their name.
     """
+    require_matplotlib()
     import matplotlib
     from matplotlib.figure import Figure
 
@@ -47,7 +53,10 @@ def drawn(
         "xtick.color": "0.3", "ytick.color": "0.3",
     }  # fmt: skip
     with matplotlib.rc_context(style):
-        figure = Figure(figsize=size, layout="constrained")
+        figure = Figure(figsize=size, layout=None if edges else "constrained")
+        if edges:
+            (left, bottom, right, top), (width, height) = edges, size
+            figure.subplots_adjust(left / width, bottom / height, 1.0 - right / width, 1.0 - top / height)
         draw(figure)
         buffer = io.BytesIO()
         metadata = {"Date": None} if kind == "svg" else {"Software": None}
@@ -62,6 +71,7 @@ def calibration_curves(calibration: Calibration, kind: Format = "svg") -> bytes:
     The lines are what the model interpolates; where both directions were measured, forward is solid and
     backward dashed. The same calibration gives the same bytes.
     """
+    require_matplotlib()
     import matplotlib
     from matplotlib.figure import Figure
 

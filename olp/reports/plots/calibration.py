@@ -4,7 +4,6 @@ squareness pairs, reversal, circles, and residuals of a fit."""
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +18,7 @@ from olp.calibration.iso230.squareness import slope_of
 from olp.calibration.observations.lines import Line
 from olp.core.arrays import Array, Index
 from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM
+from olp.core.values import dataclass
 from olp.reports.plots.base import Format, drawn
 
 if TYPE_CHECKING:

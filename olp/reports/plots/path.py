@@ -9,117 +9,91 @@ import numpy as np
 
 from olp.comparison.figures import Run
 from olp.comparison.path import Path
-from olp.core.arrays import Array
 from olp.core.units import UM_PER_MM
 from olp.reports.plots.base import drawn
+from olp.reports.plots.thinned import COLUMNS, EDGES_UM, FLOOR_UM, Groups, painted, widened
 from olp.reports.report import SIDES
 from olp.uncertainty.spread import Confidence
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 #: Colour of a group of runs.
 COLOURS = {"before": "#c0453a", "after": "#1f6fb2"}
 #: Colour of the nominal path.
 _NOMINAL = "#9aa3ab"
-#: Columns of a plot along the path.
-_COLUMNS = 900
+#: Width of a figure, in inches.
+_WIDTH = 7.4
+#: Inches that labels need at the left, below, at the right and above.
+_EDGES = (0.6, 0.42, 0.12, 0.28)
 #: Most points that are drawn.
 _DRAWN = 30_000
-#: Smallest deviation that a logarithmic axis shows, in um.
-_FLOOR_UM = 1e-2
 
 Runs = Mapping[str, Sequence[Run]]
 
 
-def picture(path: Path, runs: Runs, sides: Mapping[str, str]) -> bytes:
-    """The path in plan view, coloured by its distance from the nominal one; `sides` labels the groups."""
+def picture(path: Path, groups: Groups, sides: Mapping[str, str]) -> bytes:
+    """The path in plan view; each pixel has the colour of its largest distance from the nominal path. `sides`
+    labels the groups."""
 
     def draw(figure: Figure) -> None:
-        from matplotlib.collections import LineCollection
-        from matplotlib.colors import LogNorm
+        from matplotlib import colormaps
+        from matplotlib.cm import ScalarMappable
+        from matplotlib.colors import LogNorm, to_rgb
 
-        names = [name for name in ("before", "after") if runs.get(name)]
-        plots = figure.subplots(1, len(names), squeeze=False)[0]
-        sizes = [run.size_mm[run.counted] * UM_PER_MM for name in names for run in runs[name]]
-        top = max((float(size.max()) for size in sizes if len(size)), default=1.0)
-        norm = LogNorm(max(top / 300.0, _FLOOR_UM), max(top, 10 * _FLOOR_UM))
-        pieces = None
-        for plot, name in zip(plots, names, strict=True):
-            _nominal(plot, path)
-            for run in runs[name][:1]:
-                xy, size = _sampled(run)
-                ends = np.stack((xy[:-1], xy[1:]), axis=1)
-                near = np.sqrt(((xy[1:] - xy[:-1]) ** 2).sum(axis=1)) < 12 * _usual(xy)
-                pieces = LineCollection(
-                    list(ends[near]), array=np.maximum(size[1:][near], _FLOOR_UM), norm=norm, cmap="viridis",
-                    linewidths=1.1, rasterized=True,
-                )  # fmt: skip
-                plot.add_collection(pieces)
+        plots = figure.subplots(1, len(groups), squeeze=False)[0]
+        top = max(group.largest_um for group in groups.values())
+        norm = LogNorm(max(top / 300.0, FLOOR_UM), max(top, 10 * FLOOR_UM))
+        canvas = next(iter(groups.values())).canvas
+        ground = np.zeros((*canvas.shape, 4))
+        ground[painted(path, canvas)] = (*to_rgb(_NOMINAL), 1.0)
+        for plot, (name, group) in zip(plots, groups.items(), strict=True):
+            image = ground.copy()
+            pixels = widened(group.pixels)
+            shown = pixels > 0.0
+            image[shown] = colormaps["viridis"](norm(pixels[shown]))
+            plot.imshow(image, extent=canvas.extent_mm, origin="lower", interpolation="nearest")
             plot.set(aspect="equal", title=sides[name], xlabel="X in mm", ylabel="Y in mm")
-            plot.autoscale_view()
-        if pieces is not None:
-            figure.colorbar(pieces, ax=list(plots), label="distance from the nominal path in um", shrink=0.8)
+        beside = figure.add_axes((6.75 / _WIDTH, 0.2, 0.1 / _WIDTH, 0.65))
+        bar = figure.colorbar(ScalarMappable(norm, "viridis"), cax=beside)
+        bar.set_label("distance from the nominal path in um")
+        _plain_decades(bar.ax.yaxis)
 
     span = np.ptp(path.vertex_mm[:, :2], axis=0)
-    count = sum(bool(runs.get(name)) for name in ("before", "after"))
-    height = (6.0 / max(count, 1)) * float(span[1] / max(span[0], 1e-9)) + 0.7
-    return drawn("picture", (7.4, min(max(height, 1.8), 5.0)), draw)
+    height = (6.0 / len(groups)) * float(span[1] / max(span[0], 1e-9)) + 0.7
+    return drawn("picture", (_WIDTH, min(max(height, 1.8), 5.0)), draw, edges=(0.55, 0.4, 0.85, 0.25))
 
 
-def _usual(xy: Array) -> float:
-    step = np.sqrt((np.diff(xy, axis=0) ** 2).sum(axis=1))
-    return max(float(np.quantile(step, 0.9)), 1e-6) if len(step) else 1.0
+def _plain_decades(axis: Axis) -> None:
+    """Numbers of a logarithmic axis as people write them."""
+    from matplotlib.ticker import FuncFormatter, NullFormatter
+
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
-def _nominal(plot: Axes, path: Path) -> None:
-    from matplotlib.collections import LineCollection
-
-    xy = path.vertex_mm[:, :2]
-    step = max(len(path) // _DRAWN, 1)
-    kept = np.flatnonzero(path.cutting)[::step]
-    lines = np.stack((xy[kept], xy[kept + 1]), axis=1)
-    plot.add_collection(LineCollection(list(lines), colors=_NOMINAL, linewidths=0.5, rasterized=True))
-
-
-def _sampled(run: Run) -> tuple[Array, Array]:
-    rows = np.flatnonzero(run.counted)
-    rows = rows[:: max(len(rows) // _DRAWN, 1)]
-    return run.nominal_mm[rows][:, :2], run.size_mm[rows] * UM_PER_MM
-
-
-def along(path: Path, runs: Runs, tolerance_um: float | None, sides: Mapping[str, str]) -> bytes:
-    """Distance from the nominal path along it; bands from least to most where points are many."""
+def along(path: Path, groups: Groups, tolerance_um: float | None, sides: Mapping[str, str]) -> bytes:
+    """Distance from the nominal path along it, from least to most in each column."""
 
     def draw(figure: Figure) -> None:
         plot = figure.subplots()
-        edges = np.linspace(0.0, path.length_mm, _COLUMNS + 1)
-        for name in ("before", "after"):
-            group = [run for run in runs.get(name, ()) if run.counted.any()]
-            if not group:
-                continue
-            low, high = np.full(_COLUMNS, np.inf), np.full(_COLUMNS, -np.inf)
-            for run in group:
-                column = np.clip(np.searchsorted(edges, run.pairing.s_mm[run.counted]) - 1, 0, _COLUMNS - 1)
-                size = run.size_mm[run.counted] * UM_PER_MM
-                np.minimum.at(low, column, size)
-                np.maximum.at(high, column, size)
-            filled = np.isfinite(low)
-            bands = (
-                np.maximum(np.where(filled, low, np.nan), _FLOOR_UM),
-                np.maximum(np.where(filled, high, np.nan), _FLOOR_UM),
+        middle = (np.arange(COLUMNS) + 0.5) * (path.length_mm / COLUMNS) / 1e3
+        for name, group in groups.items():
+            colour = COLOURS[name]
+            plot.fill_between(
+                middle, group.low, group.high, color=colour, alpha=0.35, linewidth=0, step="mid"
             )
-            middle = (edges[1:] + edges[:-1]) / 2e3
-            plot.fill_between(middle, *bands, color=COLOURS[name], alpha=0.35, linewidth=0, step="mid")
-            plot.plot(middle, bands[1], color=COLOURS[name], linewidth=0.7, label=f"{sides[name]}, largest")
+            plot.plot(middle, group.high, color=colour, linewidth=0.7, label=f"{sides[name]}, largest")
         _tolerance(plot, tolerance_um)
         plot.set_yscale("log")
+        _plain_decades(plot.yaxis)
         plot.set(xlabel="along the path in m", ylabel="distance in um", xlim=(0.0, path.length_mm / 1e3))
         plot.grid(color="0.92", linewidth=0.5)
         plot.legend(frameon=False, ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0))
 
-    return drawn("along", (7.4, 2.4), draw)
+    return drawn("along", (_WIDTH, 2.4), draw, edges=_EDGES)
 
 
 def _tolerance(plot: Axes, tolerance_um: float | None) -> None:
@@ -127,30 +101,25 @@ def _tolerance(plot: Axes, tolerance_um: float | None) -> None:
         plot.axhline(tolerance_um, color="0.25", linewidth=0.8, linestyle=(0, (5, 3)), label="allowed")
 
 
-def histogram(runs: Runs, tolerance_um: float | None, sides: Mapping[str, str]) -> bytes:
+def histogram(groups: Groups, tolerance_um: float | None, sides: Mapping[str, str]) -> bytes:
     """Histogram of the distances from the nominal path, by groups of runs."""
 
     def draw(figure: Figure) -> None:
         plot = figure.subplots()
-        sizes = {
-            name: np.concatenate([run.size_mm[run.counted] * UM_PER_MM for run in group])
-            for name, group in runs.items()
-            if any(run.counted.any() for run in group)
-        }
-        top = max((float(size.max()) for size in sizes.values()), default=1.0)
-        edges = np.geomspace(_FLOOR_UM, max(top, 10 * _FLOOR_UM) * 1.01, 61)
-        for name, size in sizes.items():
-            count, _ = np.histogram(np.maximum(size, _FLOOR_UM * 1.001), edges)
-            plot.stairs(count / len(size) * 100, edges, fill=True, alpha=0.35, color=COLOURS[name])
-            plot.stairs(count / len(size) * 100, edges, color=COLOURS[name], linewidth=0.8, label=sides[name])
+        last = max(int(np.flatnonzero(group.count)[-1]) for group in groups.values()) + 1
+        for name, group in groups.items():
+            share, edges = group.count[:last] / group.points * 100, EDGES_UM[: last + 1]
+            plot.stairs(share, edges, fill=True, alpha=0.35, color=COLOURS[name])
+            plot.stairs(share, edges, color=COLOURS[name], linewidth=0.8, label=sides[name])
         if tolerance_um is not None:
             plot.axvline(tolerance_um, color="0.25", linewidth=0.8, linestyle=(0, (5, 3)), label="allowed")
         plot.set_xscale("log")
+        _plain_decades(plot.xaxis)
         plot.set(xlabel="distance from the nominal path in um", ylabel="share of points in %")
         plot.grid(color="0.92", linewidth=0.5)
         plot.legend(frameon=False, loc="upper left")
 
-    return drawn("histogram", (7.4, 2.2), draw)
+    return drawn("histogram", (_WIDTH, 2.2), draw, edges=_EDGES)
 
 
 def bands(confidence: Confidence) -> bytes:
@@ -164,7 +133,7 @@ def bands(confidence: Confidence) -> bytes:
         plot, bottom = parts[0], parts[-1]
         step = np.sqrt((np.diff(confidence.points.axis_mm, axis=0) ** 2).sum(axis=1))
         arc_m = np.concatenate(([0.0], np.cumsum(step))) / 1e3
-        column = np.unique(np.linspace(0, len(arc_m), _COLUMNS + 1).astype(int)[:-1])
+        column = np.unique(np.linspace(0, len(arc_m), COLUMNS + 1).astype(int)[:-1])
         middle = arc_m[column]
         for name, deviation in (
             ("before", confidence.points.before_mm), ("after", confidence.points.after_mm)
@@ -190,7 +159,7 @@ def bands(confidence: Confidence) -> bytes:
             part.grid(color="0.92", linewidth=0.5)
         plot.legend(frameon=False, ncols=3, loc="lower right", bbox_to_anchor=(1.0, 0.98))
 
-    return drawn("bands", (7.4, 3.4), draw)
+    return drawn("bands", (_WIDTH, 3.4), draw, edges=_EDGES)
 
 
 def components(path: Path, runs: Runs, sides: Mapping[str, str]) -> bytes:
@@ -211,14 +180,16 @@ def components(path: Path, runs: Runs, sides: Mapping[str, str]) -> bytes:
         plots[0].legend(frameon=False, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 0.97))
         plots[1].set(xlabel="along the path in m", xlim=(0.0, path.length_mm / 1e3))
 
-    return drawn("components", (7.4, 3.2), draw)
+    return drawn("components", (_WIDTH, 3.2), draw, edges=_EDGES)
 
 
 def circles(rows: Sequence[Mapping[str, Any]]) -> bytes:
     """Predicted radial deviations of circles, counter-clockwise, magnified about a common circle."""
 
     def draw(figure: Figure) -> None:
-        plots = figure.subplots(1, len(rows), subplot_kw={"projection": "polar"}, squeeze=False)[0]
+        plots = figure.subplots(
+            1, len(rows), subplot_kw={"projection": "polar"}, gridspec_kw={"wspace": 0.4}, squeeze=False
+        )[0]
         for plot, row in zip(plots, rows, strict=True):
             top = max(float(np.abs(row["before"]["radial_um"]).max()), 1.0)
             for name in ("before", "after"):
@@ -240,7 +211,7 @@ def circles(rows: Sequence[Mapping[str, Any]]) -> bytes:
             plot.set_title(f"{row['plane']}, radius {row['radius_mm']:g} mm", fontsize=8)
         plots[0].legend(frameon=False, loc="lower left", bbox_to_anchor=(-0.15, -0.12), fontsize=7)
 
-    return drawn("circles", (7.4, 2.7), draw)
+    return drawn("circles", (_WIDTH, 2.7), draw, edges=(0.3, 0.3, 0.1, 0.4))
 
 
 def diagonals(rows: Sequence[Mapping[str, Any]]) -> bytes:
@@ -262,4 +233,4 @@ def diagonals(rows: Sequence[Mapping[str, Any]]) -> bytes:
         plots[0].set_ylabel("deviation in um")
         plots[0].legend(frameon=False, fontsize=7)
 
-    return drawn("diagonals", (7.4, 2.0), draw)
+    return drawn("diagonals", (_WIDTH, 2.0), draw, edges=(0.55, 0.4, 0.1, 0.25))

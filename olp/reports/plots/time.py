@@ -10,6 +10,7 @@ import numpy as np
 
 from olp.core.arrays import Array, Index
 from olp.core.errors import UsageError
+from olp.core.optional import require_matplotlib
 from olp.core.units import AXES
 from olp.reports.plots.base import Format
 from olp.trajectory.plan import Trajectory
@@ -41,6 +42,7 @@ def motion_plot(
 
     The same trajectory gives the same bytes.
     """
+    require_matplotlib()
     import matplotlib
     from matplotlib.figure import Figure
 

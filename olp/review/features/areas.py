@@ -10,12 +10,12 @@ that has too many cells.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Array, Index, Mask
+from olp.core.values import dataclass
 from olp.review.features.alike import alike, members
 from olp.review.features.chains import Chains
 from olp.review.features.moves import Moves

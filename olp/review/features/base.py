@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from olp.core.arrays import Array, Index
+from olp.core.values import dataclass
 from olp.review.features.ground import Ground
 
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from olp.core.arrays import Array, Index, Mask
+from olp.core.values import dataclass
 from olp.review.features.moves import Does, Moves
 
 #: Shares of arcs at which the box around them is taken.

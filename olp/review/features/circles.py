@@ -7,13 +7,13 @@ evenly one way. The path leaves the circle at both ends: any smooth curve is nea
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from olp.core.arrays import Array, Index, Mask
 from olp.core.geometry import PLANES
+from olp.core.values import dataclass
 from olp.review.features.chains import Chains
 from olp.review.features.fits import circle_of_powers
 from olp.review.features.moves import Does, Moves

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
 from olp.core.arrays import Array, Index
 from olp.core.geometry import segment_distance
+from olp.core.values import dataclass
 from olp.review.features.alike import alike, members
 from olp.review.features.base import Deviations, Feature, FeatureKind, Figure
 from olp.review.features.chains import Chains

@@ -7,11 +7,10 @@ so that neither the density of samples nor the split of a line into parts change
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from olp.core.arrays import Array
+from olp.core.values import dataclass
 
 #: Most steps of Gauss and Newton: deviations are small beside radii, so that each squares the error.
 _STEPS = 12

@@ -9,13 +9,13 @@ program does not say whether a stroke drills, so that it is called a stroke.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
 from olp.core.arrays import Array, Index
 from olp.core.geometry import PLANES
+from olp.core.values import dataclass
 from olp.review.features.base import Deviations, Feature, FeatureKind, Figure
 from olp.review.features.figures import number
 from olp.review.features.ground import Ground
@@ -67,9 +67,7 @@ class Hole(FeatureKind):
 
     def _of_strokes(self, ground: Ground) -> Iterator[Feature]:
         moves = ground.moves
-        in_cycle = np.zeros(len(moves.path), bool)
-        for hole in ground.scene.nominal.holes:
-            in_cycle[hole.first : hole.last] = True
+        in_cycle = ground.scene.nominal.holes.inside(len(moves.path))
         down = (moves.does == Does.ALONG_TOOL) & ~in_cycle
         stays = moves.staying & ~in_cycle
         edges = np.flatnonzero(np.diff(stays.astype(np.int8), prepend=0, append=0))

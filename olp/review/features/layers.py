@@ -49,7 +49,7 @@ class Layers:
             delta = matched.delta_mm[mine]
             yield name, Deviations(move, matched.base_mm[mine], delta, weight) if len(mine) else None
 
-    def ranges(self, rows: Index) -> Array:
+    def ranges(self, rows: Index) -> Index:
         """(k, 2) the samples of moves, rows rising: first and last of each run."""
         first, last = self.begin[rows], self.begin[rows + 1] - 1
         some = last >= first
@@ -72,7 +72,7 @@ class Layers:
         started = reached & self._judged[samples.move[before]]
         begin = first - started
         count = end - begin
-        which = _spread(begin, count)
+        which = spread(begin, count)
         move = np.repeat(rows, count)
         step = np.diff(samples.arc_mm[which], prepend=0.0)
         # the first sample of a move stands for the way from its start, where that is no sample of it
@@ -92,9 +92,9 @@ def _taken(rows: Index, of: Index) -> tuple[Index, Index]:
     """The points, whose moves `of` rise, on some moves: (k,) which points, and (k,) the move of each."""
     low, high = np.searchsorted(of, rows, "left"), np.searchsorted(of, rows, "right")
     count = high - low
-    return _spread(low, count), np.repeat(rows, count)
+    return spread(low, count), np.repeat(rows, count)
 
 
-def _spread(begin: Index, count: Index) -> Index:
+def spread(begin: Index, count: Index) -> Index:
     """The numbers from each of `begin` on, so many of each."""
     return np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count) + np.repeat(begin, count)

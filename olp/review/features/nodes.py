@@ -10,13 +10,11 @@ import numpy as np
 from olp.core.arrays import Array, Index
 from olp.core.units import UM_PER_MM
 from olp.review.features.base import Figure
-from olp.review.features.layers import MODEL, Layers
+from olp.review.features.layers import MODEL, Layers, spread
 from olp.review.features.registry import BY_NAME, KINDS
 from olp.review.features.tree import GROUP, MOST, OPERATION, REST, Node, tree_of
 from olp.review.scene import Scene
 
-#: Most ranges of samples of a node; more become one that holds them all.
-_RANGES = 200
 #: Decimals of figures in um and of positions in mm: the rest would only make pages longer.
 _DECIMALS = 4
 #: What kinds of nodes that are no features are called.
@@ -25,8 +23,11 @@ _GROUPED = "the figure of that hole whose figure is largest in size"
 
 
 def plain(scene: Scene, most: int = MOST) -> dict[str, Any]:
-    """The tree for the manifest: `nodes` depth first, the `tools` with the verdict of the table, what the
-    `kinds` of nodes and their figures are, and how many features are `unlisted`."""
+    """The tree: `nodes` depth first, the `tools` with the verdict of the table, what the `kinds` of nodes and
+    their figures are, and how many features are `unlisted`.
+
+    `samples` of a node are (k, 2), the first and last sample of each run of its feed moves. `spans` of tools
+    and operations are the same with their rapids, as lists."""
     tops, unlisted = tree_of(scene, most)
     told = _Told(scene)
     rows: list[dict[str, Any]] = []
@@ -119,9 +120,11 @@ class _Told:
                 "tool": number,
                 "label": "no tool stated" if number is None else f"T{number}",
                 "nodes": own,
-                **self.verdict(np.flatnonzero(tool == (-1 if number is None else number))),
+                "spans": self._layers.ranges(moves).tolist(),
+                **self.verdict(moves),
             }
             for number, own in nodes.items()
+            for moves in [np.flatnonzero(tool == (-1 if number is None else number))]
         ]
 
     def _about(self, node: Node) -> dict[str, Any]:
@@ -130,8 +133,6 @@ class _Told:
         counting = node.moves[self._judged[node.moves]]
         lines = line[counting if len(counting) else node.feeds]
         ranges = self._layers.ranges(node.feeds)
-        if len(ranges) > _RANGES:
-            ranges = np.array([[ranges[0, 0], ranges[-1, 1]]])
         tools = scene.table.tool[node.feeds]
         tool = int(tools.min())
         return {
@@ -139,21 +140,20 @@ class _Told:
             "detail": node.detail,
             "first_line": int(lines.min()),
             "last_line": int(lines.max()),
-            "place": scene.place(int(lines.min())),
+            "lines": scene.places(lines),
             "tool": tool if tool >= 0 and tool == tools.max() else None,
             "moves": len(node.feeds),
-            "samples": ranges.tolist(),
+            "samples": ranges,
             "centre_mm": self._centre(node, ranges),
-        }
+        } | ({"spans": self._layers.ranges(node.moves).tolist()} if node.kind == OPERATION else {})
 
-    def _centre(self, node: Node, ranges: Array) -> list[float] | None:
+    def _centre(self, node: Node, ranges: Index) -> list[float] | None:
         if node.feature is not None:
             return [round(float(value), _DECIMALS) for value in node.feature.centre_mm]
-        parts = [self._scene.position_mm[a : b + 1] for a, b in ranges.tolist()]
-        if not parts:
+        if not len(ranges):
             return None
-        low = np.min([part.min(axis=0) for part in parts], axis=0)
-        high = np.max([part.max(axis=0) for part in parts], axis=0)
+        position = self._scene.position_mm[spread(ranges[:, 0], ranges[:, 1] - ranges[:, 0] + 1)]
+        low, high = position.min(axis=0), position.max(axis=0)
         return [round(float(value), _DECIMALS) for value in (low + high) / 2.0]
 
     def _figures(self, node: Node) -> list[dict[str, Any]]:

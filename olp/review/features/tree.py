@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Index
 from olp.core.toolpath import Kind
+from olp.core.values import dataclass
 from olp.review.features.base import Feature
 from olp.review.features.comments import comment_between
 from olp.review.features.figures import counted

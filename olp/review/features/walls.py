@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
 from olp.core.arrays import Array, Index, Mask
+from olp.core.values import dataclass
 from olp.review.features.alike import alike, joined, members
 from olp.review.features.base import Deviations, Feature, FeatureKind, Figure
 from olp.review.features.chains import Chains

@@ -7,11 +7,11 @@ Lengths of the window are in units of its height, as its width is not known.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from olp.core.arrays import Array
+from olp.core.values import dataclass
 from olp.review.notebook.pictures import rapids, touched
 from olp.review.scene import Scene
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from numbers import Real
 from typing import Any
 
 import numpy as np
 
 from olp.core.errors import UsageError
+from olp.core.values import dataclass
 from olp.review.job import Review
 from olp.review.notebook import drawing
 from olp.review.notebook.framing import LEGEND, SHIFT, View

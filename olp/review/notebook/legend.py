@@ -5,9 +5,10 @@ from __future__ import annotations
 import html
 import io
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from olp.core.optional import require_matplotlib
+from olp.core.values import dataclass
 from olp.review.notebook.pictures import Picture
 from olp.review.scene import Scene
 
@@ -228,6 +229,7 @@ def _wrapped(text: str, width: float, bold: bool = False) -> list[str]:
 
 def _width(text: str, bold: bool = False) -> float:
     """The width of a line of text in window heights."""
+    require_matplotlib()
     from matplotlib.font_manager import FontProperties
     from matplotlib.textpath import text_to_path
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ import numpy.typing as npt
 from olp.core.arrays import Array, Index, Mask
 from olp.core.toolpath import Kind
 from olp.core.units import UM_PER_MM
+from olp.core.values import dataclass
 from olp.review import judged, palette
 from olp.review.judged import measured_names
 from olp.review.scene import Scene

@@ -20,6 +20,7 @@ from olp.errormodel.calibration import Calibration, Curve
 from olp.files import control_tables
 from olp.files.control_tables.base import Exported, Format, Given, Imported, Sense
 from olp.files.control_tables.registry import FORMATS, MODULES
+from olp.files.machine_settings.registry import FORMATS as SETTINGS
 from olp.program.registry import DIALECTS
 
 PACKAGE = Path(olp.__file__).parent
@@ -152,8 +153,8 @@ def test_what_is_no_table_is_refused(form: Format, data: bytes) -> None:
 
 @pytest.mark.slow
 def test_no_other_module_names_a_format() -> None:
-    """Names that are dialects too are not checked."""
-    names = set(FORMATS) - set(DIALECTS)
+    """Names that are dialects or formats of settings too are not checked."""
+    names = set(FORMATS) - set(DIALECTS) - set(SETTINGS)
     for path in PACKAGE.rglob("*.py"):
         if path.parent.name == "control_tables":
             continue

@@ -668,7 +668,7 @@ def test_a_text_says_the_same_in_pieces(size: int, setup: Setup, monkeypatch: py
     """Long texts are read in pieces of whole lines: what holds for the next point goes on in the next one."""
     whole = said(program(WHOLE, setup, head=""))
     assert len(whole["kind"]) == 19
-    monkeypatch.setattr(reader, "chunks", lambda data: chunks(data, size))
+    monkeypatch.setattr(reader, "chunks", lambda data, **told: chunks(data, size, **told))
     assert said(program(WHOLE, setup, head="")) == whole
 
 
@@ -676,7 +676,7 @@ def test_a_text_in_pieces_is_refused_alike(setup: Setup, monkeypatch: pytest.Mon
     for text in ("GOTO/1,2,3\nGOTO/1,2,3\nROTABL/1\n", "GOTO/1,2,3\nGOTO/1,2,3,0,0,2\n"):
         outcomes = []
         for size in (1, 1000):
-            monkeypatch.setattr(reader, "chunks", lambda data, size=size: chunks(data, size))
+            monkeypatch.setattr(reader, "chunks", lambda data, size=size, **told: chunks(data, size, **told))
             with pytest.raises(ProgramError) as caught:
                 program(text, setup)
             outcomes.append((str(caught.value), caught.value.code))

@@ -511,7 +511,7 @@ def test_a_text_says_the_same_in_pieces(size: int, setup: Setup, monkeypatch: py
     """Long texts are read in pieces of whole lines: what holds for the next point goes on in the next one."""
     whole = said(program(WHOLE, setup, head=""))
     assert len(whole["kind"]) == 13
-    monkeypatch.setattr(reader, "chunks", lambda data: chunks(data, size))
+    monkeypatch.setattr(reader, "chunks", lambda data, **told: chunks(data, size, **told))
     assert said(program(WHOLE, setup, head="")) == whole
 
 

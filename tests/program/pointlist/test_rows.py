@@ -18,9 +18,9 @@ from olp.files.config import load_setup
 from olp.files.point_profile import PointProfile
 from olp.program.dialect import Support
 from olp.program.pointlist import reader
+from olp.program.pointlist.base import PointList
 from olp.program.pointlist.columns import Columns, columns, plain_numbers
 from olp.program.pointlist.dialect import DIALECT, with_layout
-from olp.program.pointlist.reader import PointList
 from olp.program.program import Program
 from olp.program.registry import read
 from olp.program.text.delimited import detected_layout

@@ -5,9 +5,11 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 from types import FrameType
+from typing import Any
 
 import pytest
 from cases.acceptance import TRUE_ZERO, machine
+from cases.event_lines import KINDS, program
 from cases.fast import some_fast
 
 import olp
@@ -145,6 +147,10 @@ REPEATED = {
     "whole circles": "G2 I9\n",
     "arcs with a radius": "G3 X2 R5\nG3 X1 R5\n",
     "canned cycles": "G81 X1 Z-1 R1\nX2\n",
+    "holes of a series": "G81 X1 Z-1 R1\n" + "X2\nY3\n" * 4,
+    "pecks": "G83 X1 Z-1 R1 Q0.4\n" + "X2 Q0.3\nY3\n" * 4,
+    "holes in G91": "G91 G81 X1 Z-1 R1 L2\n" + "X-2 L2\n" * 4 + "G90\nG0 X1 Z3\n",
+    "arcs with a centre": "G2 X2 I.5\nG2 X1 I-.5\n",
     "cycles that end": "G81 X1 Z-1 R1\nG80\nG0 Z9\n",
     "offsets": "G92 X3\nG0 X4\nG92.1\n",
     "tools": "T1 M6\nG0 X1 Y1 Z1\n",
@@ -152,6 +158,61 @@ REPEATED = {
     "machine positions": "G53 G0 X300\nG0 X2\n",
     "comments": "(a)\nX1\n",
 }
+
+
+#: a machine for them, and for those of `event_lines`
+TABLES = TRUE_ZERO + '[work_offsets.G55]\nset_by = "true"\nX_mm = 2.0\n'
+TABLES += "[tools.1]\nZ_mm = 100.0\n[tools.2]\nZ_mm = 90.0\n"
+
+
+def work(text: str, place: Path) -> int:
+    """How many steps of Python a correction of the text takes, and how many functions of C it calls."""
+    count = 0
+
+    def stepped(frame: FrameType, event: str, _: object) -> Any:
+        nonlocal count
+        frame.f_trace_lines, frame.f_trace_opcodes = False, True
+        count += event == "opcode"
+        return stepped
+
+    def called(frame: FrameType, event: str, _: object) -> None:
+        nonlocal count
+        count += event == "c_call"
+
+    before = sys.gettrace()
+    sys.settrace(stepped)
+    sys.setprofile(called)
+    try:
+        olp.correct(text.encode(), place)
+    finally:
+        sys.setprofile(None)
+        sys.settrace(before)
+    return count
+
+
+def check_growth(texts: list[str], place: Path) -> None:
+    """Each text has as many more lines than the one before: the second growth costs no more than the
+    first, but for one more block of points."""
+    one, two, three = (work(text, place) for text in texts)
+    assert three - two < 1.05 * (two - one) + 10_000
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", REPEATED)
+def test_work_grows_with_the_text_and_no_faster(name: str, tmp_path: Path) -> None:
+    texts = [HEAD + REPEATED[name] * count + "M2\n" for count in (1, 150, 300, 450)]
+    place = machine(tmp_path, tables=TABLES)
+    work(texts[0], place)
+    check_growth(texts[1:], place)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_work_grows_with_lines_of_a_kind_and_no_faster(kind: str, tmp_path: Path) -> None:
+    place = machine(tmp_path, "[squareness]\nC0Y_urad = 20.0\n", tables=TABLES)
+    texts = [program(kind, lines) for lines in (3, 400, 800, 1200)]
+    work(texts[0], place)
+    check_growth(texts[1:], place)
 
 
 def calls(text: str, place: Path) -> int:
@@ -170,10 +231,31 @@ def calls(text: str, place: Path) -> int:
     return count
 
 
+#: a head, and lines of which many are carried out at once
+AT_ONCE = {
+    "drilled": ("G81 X1 Z-1 R1\n", "X{k}\nY{k}\n"),
+    "with a depth each": ("G83 X1 Z-1 R1 Q1.4\n", "X{k} Z-2.{k}\nG98 Y{k} R3\n"),
+    "with dwells": ("G82 X1 Z-1 R1 P0.5\n", "X{k} Y{k}\nG99 Y{k} P1\n"),
+    "arcs with a centre": ("G1 X1\n", "G2 X2 I0.5 J0.{k}\nG2 X1 I-0.5 J-0.{k}\n"),
+    "arcs with a radius": ("G1 X1\n", "G3 X2 R5.{k}\nG2 X1 R-5.{k}\n"),
+    "helices": ("G1 X1\n", "G2 X2 Z{k} I0.5\nG2 X1 Z3 I-0.5\n"),
+}
+LEANING = '[[curves]]\nfile = "{}.csv"\ninterpolation = "linear"\n'
+CURVES = {
+    f"{a}.csv": f"{a.upper()}_mm,EXX_um\n-1000,-9\n2000,20\n".replace("EXX", f"E{a.upper()}{a.upper()}")
+    for a in "xyz"
+}
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("name", REPEATED)
-def test_work_grows_with_the_text_and_no_faster(name: str, tmp_path: Path) -> None:
-    place = machine(tmp_path, tables=TRUE_ZERO + "[tools.1]\nZ_mm = 100.0\n")
-    calls(REPEATED[name], place)
-    one, two, three = (calls(REPEATED[name] * count, place) for count in (200, 400, 600))
-    assert three - two < 1.2 * (two - one) + 2000
+@pytest.mark.parametrize("name", AT_ONCE)
+def test_holes_and_arcs_are_carried_out_many_at_once(name: str, tmp_path: Path) -> None:
+    """With errors that change their words. What is done for each hole or arc alone calls ten functions and
+    more; blocks of points of the error model and bands are few."""
+    place = machine(tmp_path, "".join(LEANING.format(a) for a in "xyz"), CURVES, tables=TRUE_ZERO)
+    head, lines = AT_ONCE[name]
+    few, some, many = (
+        head + "".join(lines.format(k=10 + k % 80) for k in range(count)) for count in (9, 300, 900)
+    )
+    calls(few, place)
+    assert calls(many, place) - calls(some, place) < 3 * (many.count("\n") - some.count("\n"))

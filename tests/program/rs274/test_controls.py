@@ -14,7 +14,7 @@ from olp.files.config import load_setup
 from olp.files.sources import Source, Sources
 from olp.program.dialect import Row, Support
 from olp.program.registry import DIALECTS, read
-from olp.program.rs274.cycles import CycleRules
+from olp.program.rs274.cycle_rules import CycleRules
 from olp.program.rs274.profiles.base import Act, Profile, increment
 from olp.workflows.flatten import UnrollOptions, as_asked
 
@@ -141,7 +141,8 @@ OF_TIME = {
     "m_with_motion",
 }  # fmt: skip
 #: Tables and texts, which have tests of their own.
-TABLES = {"codes", "refusals", "harmless_m", "text", "rules", "cycles", "language", "written_ending"}
+TABLES = {"codes", "refusals", "harmless_m", "text", "rules", "cycles", "language", "written_ending",
+          "program_number"}  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -351,14 +352,21 @@ def test_a_code_without_a_reason_is_not_of_the_control() -> None:
 def test_how_programs_of_a_control_are_written() -> None:
     """Names, endings of files, decimals of inches and of centres, and bounds of feeds, by the manuals."""
     written = {
-        d.name: (d.written_ending, d.inch_decimals, d.free_digits, d.path_tolerance, d.least_inverse_feed)
+        d.name: (
+            d.written_ending,
+            d.inch_decimals,
+            d.free_digits,
+            d.path_tolerance,
+            d.least_inverse_feed,
+            d.program_number,
+        )
         for d in PROFILES
     }
     assert written == {
-        LINUXCNC: ("ngc", 5, 1, True, 0.1),
-        FANUC: ("nc", 4, 0, False, 0.0),
-        HAAS: ("nc", 4, 0, False, 0.0),
-        GRBL: ("nc", 5, 1, False, 0.0),
+        LINUXCNC: ("ngc", 5, 1, True, 0.1, False),
+        FANUC: ("nc", 4, 0, False, 0.0, True),
+        HAAS: ("nc", 4, 0, False, 0.0, True),
+        GRBL: ("nc", 5, 1, False, 0.0, False),
     }
     for profile in PROFILES:
         assert profile.title.startswith({GRBL: "Grbl 1.1 and", HAAS: "Haas mills"}.get(profile.name, ""))

@@ -8,26 +8,25 @@ import shutil
 import subprocess
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from olp.core.errors import ProgramError
+from olp.program.rs274.cycle_rules import ISO_CYCLES, NGC_CYCLES, CycleRules
 from olp.program.rs274.cycles import (
-    CODES,
-    ISO_CYCLES,
     LCNC_CLEARANCE_INCH,
     LCNC_CLEARANCE_MM,
-    NGC_CYCLES,
+    MOST_REPEATS,
     PLANES,
-    CycleRules,
     Stroke,
-    check_repeats,
     cycle_moves,
-    hole_moves,
     levels,
     stroke_budget,
 )
+from olp.program.rs274.strokes import CODES, Drilling, Step, Strokes
+from olp.program.rs274.strokes import strokes as strokes_of
 
 HOLE = {"start": (0.0, 0.0, 5.0), "xy": (1.0, 2.0), "r": 1.0, "z": -2.0, "initial_z": 5.0}
 
@@ -37,42 +36,51 @@ def _path(strokes: tuple[Stroke, ...]) -> list[tuple[object, ...]]:
     return [(s.kind, *s.point) if s.kind in moves else (s.kind, s.spindle or s.seconds) for s in strokes]
 
 
+def one_hole(
+    code: int, words: tuple[float, float, float], clearance: float, scale: tuple[float, float],
+    start: tuple[float, float, float],
+) -> Strokes:  # fmt: skip
+    """A hole at 1, 2 from these numbers R, Z and Q, whose levels are scaled and shifted."""
+    r, z, q = (np.array([word]) for word in words)
+    drilling = Drilling(code, 0, r, z, q, q, clearance, *scale, NGC_CYCLES)
+    return strokes_of(drilling, start, np.array([[1.0, 2.0]]), np.array([True]), start[2])
+
+
 def test_drill_goes_over_the_hole_down_and_home() -> None:
-    assert _path(hole_moves(810, **HOLE, retract_to_r=False)) == [
+    assert _path(cycle_moves(810, **HOLE, retract_to_r=False)) == [
         ("rapid", 1.0, 2.0, 5.0),
         ("rapid", 1.0, 2.0, 1.0),
         ("feed", 1.0, 2.0, -2.0),
         ("rapid", 1.0, 2.0, 5.0),
     ]
-    assert hole_moves(810, **HOLE, retract_to_r=True)[-1].z == 1.0
+    assert cycle_moves(810, **HOLE, retract_to_r=True)[-1].z == 1.0
 
 
 def test_start_below_r_rises_first_on_linuxcnc_only() -> None:
     hole = {**HOLE, "start": (0.0, 0.0, 0.5), "initial_z": 0.5}
-    assert _path(hole_moves(810, **hole, retract_to_r=False))[0] == ("rapid", 0.0, 0.0, 1.0)
-    assert _path(hole_moves(810, **hole, retract_to_r=False, rules=ISO_CYCLES))[:2] == [
+    assert _path(cycle_moves(810, **hole, retract_to_r=False))[0] == ("rapid", 0.0, 0.0, 1.0)
+    assert _path(cycle_moves(810, **hole, retract_to_r=False, rules=ISO_CYCLES))[:2] == [
         ("rapid", 1.0, 2.0, 0.5),
         ("rapid", 1.0, 2.0, 1.0),
     ]
 
 
 def test_deep_hole_leaves_the_clearance_above_every_peck() -> None:
-    z = [s.z for s in hole_moves(830, **HOLE, q=2.0, retract_to_r=True)]
+    z = [s.z for s in cycle_moves(830, **HOLE, q=2.0, retract_to_r=True)]
     assert z == pytest.approx([5.0, 1.0, -1.0, 1.0, -1.0 + LCNC_CLEARANCE_MM, -2.0, 1.0])
-    z = [s.z for s in hole_moves(730, **HOLE, q=2.0, retract_to_r=True, clearance=0.5)]
+    z = [s.z for s in cycle_moves(730, **HOLE, q=2.0, retract_to_r=True, clearance=0.5)]
     assert z == pytest.approx([5.0, 1.0, -1.0, -0.5, -2.0, 1.0])
 
 
 def test_pecks_are_counted_in_numbers_of_the_program() -> None:
     """6.57 - 3 is greater than 3.57 by one bit, which makes one more peck; in mm with an offset it is not."""
-    hole = {"start": (1.0, 2.0, -10.0), "xy": (1.0, 2.0), "initial_z": -10.0, "q": 3.0, "retract_to_r": True}
-    strokes = hole_moves(730, r=6.57, z=3.57, ground=-17.0, **hole)  # type: ignore[arg-type]
-    assert [s.kind for s in strokes].count("feed") == 2
-    assert strokes[-1].z == 6.57 - 17.0
+    made = one_hole(730, (6.57, 3.57, 3.0), 0.254, (1.0, -17.0), (1.0, 2.0, -10.0))
+    assert made.step.tolist().count(Step.FEED) == 2
+    assert made.point[-1, 2] == 6.57 - 17.0
 
 
 def test_tapping_feeds_home_and_turns_the_spindle_twice() -> None:
-    strokes = hole_moves(840, **HOLE, p=0.5, retract_to_r=False)
+    strokes = cycle_moves(840, **HOLE, p=0.5, retract_to_r=False)
     assert _path(strokes)[2:] == [
         ("feed", 1.0, 2.0, -2.0),
         ("spindle", "stop"),
@@ -82,7 +90,7 @@ def test_tapping_feeds_home_and_turns_the_spindle_twice() -> None:
         ("spindle", "stop"),
         ("spindle", "restore"),
     ]
-    fanuc = _path(hole_moves(840, **HOLE, retract_to_r=False, rules=ISO_CYCLES))
+    fanuc = _path(cycle_moves(840, **HOLE, retract_to_r=False, rules=ISO_CYCLES))
     assert fanuc[-1] == ("rapid", 1.0, 2.0, 5.0)
     assert ("feed", 1.0, 2.0, 1.0) in fanuc
 
@@ -134,7 +142,7 @@ def _spelled(strokes: tuple[Stroke, ...], tool: int = 2) -> str:
 def test_each_cycle_has_its_strokes(code: int, linuxcnc: bool, retract_to_r: bool, expected: str) -> None:
     rules = NGC_CYCLES if linuxcnc else ISO_CYCLES
     words = {"q": 2.0, "p": 0.5, "retract_to_r": retract_to_r, "rules": rules}
-    strokes = hole_moves(code, **HOLE, **words)  # type: ignore[arg-type]
+    strokes = cycle_moves(code, **HOLE, **words)  # type: ignore[arg-type]
     assert _spelled(strokes) == expected
     assert {(s.x, s.y) for s in strokes} == {(1.0, 2.0)}
     # in another plane the same strokes go along another axis
@@ -142,7 +150,7 @@ def test_each_cycle_has_its_strokes(code: int, linuxcnc: bool, retract_to_r: boo
         first, second, tool = PLANES[plane]
         start = [0.0, 0.0, 0.0]
         start[tool] = 5.0
-        turned = hole_moves(code, **{**HOLE, "start": tuple(start)}, **words, plane=plane)  # type: ignore[arg-type]
+        turned = cycle_moves(code, **{**HOLE, "start": tuple(start)}, **words, plane=plane)  # type: ignore[arg-type]
         assert _spelled(turned, tool) == expected
         assert {(s.point[first], s.point[second]) for s in turned} == {(1.0, 2.0)}
 
@@ -168,15 +176,15 @@ def test_the_level_before_a_hole_is_left_as_the_control_leaves_it(
     start: tuple[float, float, float], initial_z: float, retract_to_r: bool, linuxcnc: str, iso: str
 ) -> None:
     hole = {**HOLE, "start": start, "initial_z": initial_z, "retract_to_r": retract_to_r}
-    assert _spelled(hole_moves(810, **hole)) == linuxcnc  # type: ignore[arg-type]
-    assert _spelled(hole_moves(810, **hole, rules=ISO_CYCLES)) == iso  # type: ignore[arg-type]
+    assert _spelled(cycle_moves(810, **hole)) == linuxcnc  # type: ignore[arg-type]
+    assert _spelled(cycle_moves(810, **hole, rules=ISO_CYCLES)) == iso  # type: ignore[arg-type]
 
 
 def test_levels_of_the_program_are_put_into_axis_positions() -> None:
     """In inches, program zero at 100 mm; places and the level before it are axis positions."""
-    hole = {"start": (0.0, 0.0, 200.0), "xy": (10.0, 20.0), "initial_z": 200.0, "retract_to_r": True}
-    strokes = hole_moves(830, r=1.0, z=-1.0, q=1.0, clearance=0.01, unit=25.4, ground=100.0, **hole)  # type: ignore[arg-type]
-    assert _spelled(strokes) == "r200 r125.4 f100 r125.4 r100.254 f74.6 r125.4"
+    made = one_hole(830, (1.0, -1.0, 1.0), 0.01, (25.4, 100.0), (0.0, 0.0, 200.0))
+    assert made.point[:, 2].tolist() == pytest.approx([200, 125.4, 100, 125.4, 100.254, 74.6, 125.4])
+    assert made.step.tolist() == [0, 0, 1, 0, 0, 1, 0]
 
 
 def test_holes_of_a_block_follow_one_another() -> None:
@@ -248,21 +256,21 @@ def test_a_cycle_is_refused_in_these_words(
     code: int, change: dict[str, float], why: str, refused: str
 ) -> None:
     with pytest.raises(ProgramError) as caught:
-        hole_moves(code, **{**HOLE, **change}, retract_to_r=True)  # type: ignore[arg-type]
+        cycle_moves(code, **{**HOLE, **change}, retract_to_r=True)  # type: ignore[arg-type]
     assert (caught.value.message, caught.value.code) == (why, refused)
 
 
 def test_bounds_of_a_hole_are_within_them() -> None:
     """R at the bottom, no dwell, and as many holes as there may be."""
-    assert _spelled(hole_moves(810, **{**HOLE, "z": 1.0}, retract_to_r=True)) == "r5 r1 f1"  # type: ignore[arg-type]
-    assert "d0" in _spelled(hole_moves(820, **HOLE, p=0.0, retract_to_r=True))
-    assert hole_moves(840, **HOLE, retract_to_r=True)[4].seconds == 0.0
+    assert _spelled(cycle_moves(810, **{**HOLE, "z": 1.0}, retract_to_r=True)) == "r5 r1 f1"  # type: ignore[arg-type]
+    assert "d0" in _spelled(cycle_moves(820, **HOLE, p=0.0, retract_to_r=True))
+    assert cycle_moves(840, **HOLE, retract_to_r=True)[4].seconds == 0.0
     deep = {**HOLE, "r": 100_000.0, "z": 0.0, "start": (0.0, 0.0, 2e5), "initial_z": 2e5}
     with pytest.raises(ProgramError, match="more than 100000 pecks"):
-        hole_moves(730, **{**deep, "r": 100_000.5}, q=1.0, retract_to_r=True)  # type: ignore[arg-type]
-    check_repeats(20_000)
+        cycle_moves(730, **{**deep, "r": 100_000.5}, q=1.0, retract_to_r=True)  # type: ignore[arg-type]
+    assert MOST_REPEATS == 20_000
     with pytest.raises(ProgramError) as caught:
-        check_repeats(20_001)
+        cycle_moves(810, **HOLE, repeats=20_001, retract_to_r=True)
     assert caught.value.message == "the block makes 20001 holes; expected at most 20000"
     assert caught.value.code == "OLP543"
     with pytest.raises(ProgramError) as caught:
@@ -318,7 +326,7 @@ def test_every_hole_is_fed_at_its_place_and_left_at_its_level(
 ) -> None:  # fmt: skip
     z = r - depth
     assume(plane == 17 or rules is ISO_CYCLES or code not in (740, 840))
-    strokes = hole_moves(
+    strokes = cycle_moves(
         code, start=start, xy=xy, r=r, z=z, q=0.7, p=0.1, retract_to_r=retract_to_r,
         initial_z=initial_z, plane=plane, rules=rules,  # type: ignore[arg-type]
     )  # fmt: skip

@@ -9,7 +9,7 @@ import pytest
 
 from olp.program.rs274.block_text import BlockText
 from olp.program.rs274.lexer import WordChunk, chunks, lex, slow_number
-from olp.program.text.line_ends import LONE_CR
+from olp.program.text.line_ends import STRAY_CR
 
 FREE = BlockText()
 STRICT = BlockText(odd_bytes=None, skips_control=False, nested_comments=False, open_comments=False)
@@ -301,7 +301,7 @@ def columns(parts: Iterator[WordChunk]) -> dict[str, list[object]]:
     [
         FREE,
         STRICT,
-        BlockText(odd_bytes=LONE_CR, marks_in_pairs=True, longest=20),
+        BlockText(odd_bytes=STRAY_CR, marks_in_pairs=True, longest=20),
         BlockText(odd_bytes=None, cr_ends_line=True, open_comments=True),
     ],
 )

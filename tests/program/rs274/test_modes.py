@@ -265,7 +265,7 @@ def outcome(text: str, setup: Setup, control: str) -> object:
     except OlpError:
         return None
     arcs = read.toolpath.arcs
-    columns = [moves(read), read.holes, read.captures, read.path_modes, read.end_line]
+    columns = [moves(read), list(read.holes), read.captures, read.path_modes, read.end_line]
     columns += [arcs.move.tolist(), arcs.centre_mm.tolist(), arcs.sweep_rad.tolist(), arcs.plane.tolist()]
     columns += [read.arc_slots.word.tolist(), read.toolpath.frame.tolist(), read.toolpath.frames]
     columns += [

@@ -246,7 +246,7 @@ def test_each_spot_of_a_program_may_end_a_chunk(setup: Setup, monkeypatch: pytes
         monkeypatch.setattr(reader, "chunks", functools.partial(chunks, size=size))
         cut = read(text.encode(), there, DIALECTS["linuxcnc"])
         assert moves(cut) == moves(whole)
-        assert cut.holes == whole.holes
+        assert list(cut.holes) == list(whole.holes)
         assert cut.toolpath.arcs.move.tolist() == whole.toolpath.arcs.move.tolist()
         assert cut.toolpath.arcs.centre_mm.tolist() == whole.toolpath.arcs.centre_mm.tolist()
         assert cut.arc_slots.word.tolist() == whole.arc_slots.word.tolist()
@@ -262,3 +262,57 @@ def test_rests_of_holes_are_dwells_and_reversals(setup: Setup) -> None:
         ((1, 0.0),),
         (),
     ]
+
+
+#: blocks of a series that are refused, and what the refusal says
+WRONG = {
+    "X2 A5": "moves A too",
+    "X3 L0": "zero repeats only stores values",
+    "X4 L20001": "makes 20001 holes",
+    "X5 Z5": "has R 2 below the bottom 5",
+    "X6 P-1": "negative dwell P -1",
+}
+
+
+@pytest.mark.parametrize("first", WRONG)
+@pytest.mark.parametrize("second", WRONG)
+def test_of_the_wrong_blocks_of_a_series_the_first_is_refused(first: str, second: str, setup: Setup) -> None:
+    text = f"G82 X1 Z1 R2 P1\nX9\n{first}\nX8\n{second}\nM2\n"
+    with pytest.raises(ProgramError, match=WRONG[first]) as caught:
+        path(text, setup)
+    assert caught.value.line == 5
+
+
+def test_each_hole_begins_where_the_one_before_ended_however_many_there_are(setup: Setup) -> None:
+    """The numbers of blocks of a series, in G90 and in G91, against a plain loop over them."""
+    rng = np.random.default_rng(7)
+    for absolute in (True, False):
+        x = np.round(rng.uniform(-5, 5, 50), 3)
+        y = np.where(rng.random(50) < 0.5, np.round(rng.uniform(-5, 5, 50), 3), np.nan)
+        blocks = [f"X{a}" + ("" if math.isnan(b) else f" Y{b}") for a, b in zip(x, y, strict=True)]
+        code = "G90" if absolute else "G91"
+        text = f"{code} G99 G81 Z-1 R{2 if absolute else -1} {blocks[0]}\n" + "\n".join(blocks[1:])
+        read_ = read((START + text + "\nG80\nM2\n").encode(), setup, DIALECTS["linuxcnc"])
+        place = [1.0, 2.0]
+        expected = []
+        for a, b in zip(x.tolist(), y.tolist(), strict=True):
+            place[0] = a if absolute else place[0] + a
+            if not math.isnan(b):
+                place[1] = b if absolute else place[1] + b
+            expected.append((100 + place[0], 200 + place[1]))
+        assert np.array([hole.place_mm for hole in read_.holes]) == pytest.approx(np.array(expected))
+        assert [hole.last - hole.first for hole in read_.holes] == [4, *[3] * 49]
+        assert {hole.r_mm for hole in read_.holes} == {302.0}
+
+
+@pytest.mark.parametrize("block", ["G4 P1 T1 M6", "G4 P1\nT1 M6", "T1\nG64 P0.01\nM6\nG4 P1"])
+def test_a_tool_changes_the_frame_whatever_else_its_block_does(block: str, with_tool: Setup) -> None:
+    got = path(f"G0 X1 Y2 Z3\n{block}\nX2 Y2 Z3\n", with_tool)
+    assert got.frames[got.frame[-1]].tool == 1
+    assert got.frames[got.frame[0]].tool != 1
+
+
+def test_what_changes_no_frame_makes_none(setup: Setup) -> None:
+    got = path("G0 X1 Y2 Z3\nG4 P1\nX2\nG64 P0.01\nX3\nG53 G0 Z1\nX4 Y4 Z4\n", setup)
+    assert len(got.frames) == 1
+    assert got.line.tolist() == [2, 3, 5, 7, 8, 9]

@@ -8,10 +8,10 @@ import pytest
 
 from olp.program import registry
 from olp.program.rs274 import codes
-from olp.program.rs274.cycles import CODES
 from olp.program.rs274.offsets import Offsets
 from olp.program.rs274.profiles.base import Act, Profile
 from olp.program.rs274.state import State
+from olp.program.rs274.strokes import CODES
 
 PROFILES = [d for d in registry.DIALECTS.values() if isinstance(d, Profile)]
 ACTS = {

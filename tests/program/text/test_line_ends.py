@@ -1,12 +1,10 @@
-"""Lines of a text with their ends, and columns that grow."""
+"""Lines of a text with their ends."""
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
-from olp.program.text.columns import Columns
-from olp.program.text.line_ends import LINE_END, LINE_END_TEXT, LONE_CR, split
+from olp.program.text.line_ends import LINE_END, LINE_END_TEXT, LONE_CR, STRAY_CR, split
 
 
 @pytest.mark.parametrize(
@@ -32,21 +30,7 @@ def test_another_line_end_may_be_given() -> None:
     assert split(b"a\rb\r\nc\r\r\nd\r", LONE_CR) == [b"a\r", b"b\r\nc\r\r\nd\r"]
 
 
-def test_columns_are_appended_to_and_taken_once() -> None:
-    columns = Columns(3)
-    parts = [np.arange(start, stop) for start, stop in ((0, 1), (1, 64), (64, 65), (65, 400), (400, 400))]
-    for part in parts:
-        columns.put("a", part, np.int32)
-        columns.put("b", np.column_stack([part, -part]), float)
-    a, b = columns.take("a", np.int32), columns.take("b", float, 2)
-    assert (a.dtype, b.dtype) == (np.int32, float)
-    np.testing.assert_array_equal(a, np.arange(400))
-    np.testing.assert_array_equal(b, np.column_stack([np.arange(400), -np.arange(400)]))
-    assert not a.flags.writeable
-    assert not b.flags.writeable
-    assert columns.take("a", np.int8, 3).shape == (0, 3)
-    assert columns.take("c", np.int8).shape == (0,)
-    assert columns.take("c", np.int8).dtype == np.int8
-    # what was taken is empty again
-    columns.put("a", [7], np.int64)
-    assert columns.take("a", np.int64).tolist() == [7]
+def test_carriage_returns_at_the_end_of_the_text_are_lines_but_not_within_one() -> None:
+    assert len(LONE_CR.findall(b"a\r\r")) == 1
+    assert len(STRAY_CR.findall(b"a\r\r")) == 0
+    assert len(STRAY_CR.findall(b"a\rb\r\n\r")) == 1

@@ -107,7 +107,7 @@ def placed(line: bytes, old: bytes, new: bytes, *others: bytes) -> bytes:
     spans = [(line.index(text), line.index(text) + len(text)) for text in (old, *others)]
     start, end = zip(*spans, strict=True)
     placing = Placing(line, np.array(start), np.array(end))
-    return spliced(line, [placing.place(*spans[0], new)])
+    return spliced(line, placing.placed([(*spans[0], new)]))
 
 
 @pytest.mark.parametrize(

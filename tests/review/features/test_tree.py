@@ -11,11 +11,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from cases.part_features import bent, figures, nodes_of, one, scene_of
+from cases.part_features import HEAD, bent, figures, nodes_of, one, scene_of
 from judge.machines import Recipe, random_machine, zero_machine
+from judge.unpacker import Page
 
 import olp
 from olp.core.toolpath import Kind
+from olp.program.origin import Origin, Unrolled
 from olp.proof.proof import Counts
 from olp.review.features.nodes import plain
 from olp.review.features.registry import KINDS
@@ -64,7 +66,7 @@ def groups_are_those_of_the_table(scene: Scene, tree: Tree) -> None:
             assert node["holds"] == group["holds"]
     for node, group in zip(judged, table.groups(table.operation), strict=True):
         assert (node["first_line"], node["last_line"]) == (group["first_line"], group["last_line"])
-        assert node["place"] == scene.place(group["first_line"])
+        assert node["lines"].split(" to ")[0] == scene.place(group["first_line"])
 
 
 def samples_are_its_own(scene: Scene, tree: Tree) -> None:
@@ -105,7 +107,7 @@ def figures_do_not_contradict_the_table(tree: Tree) -> None:
 def test_the_tree_of_a_shipped_job_is_its_table(name: str) -> None:
     scene = shipped(name)
     tree = plain(scene)
-    json.dumps(tree, allow_nan=False)
+    json.dumps(tree, allow_nan=False, default=np.ndarray.tolist)
     groups_are_those_of_the_table(scene, tree)
     samples_are_its_own(scene, tree)
     figures_do_not_contradict_the_table(tree)
@@ -269,7 +271,11 @@ def test_the_tree_is_bounded_and_loses_no_deviation(machine: Path, most: int) ->
 def test_the_manifest_has_the_tree_and_what_its_figures_mean(machine: Path) -> None:
     scene = scene_of(TEXT, machine)
     manifest, _ = manifest_of(scene)
-    assert manifest["tree"] == plain(scene)
+    tree = plain(scene)
+    for node, packed in zip(tree["nodes"], manifest["tree"]["nodes"], strict=True):
+        begin, end = packed.pop("ranges")
+        assert end - begin == len(node.pop("samples"))
+    assert manifest["tree"] == tree | {"samples": "tree"}
     kinds = manifest["tree"]["kinds"]
     for kind in KINDS:
         assert kinds[kind.name]["label"] == kind.label
@@ -297,3 +303,67 @@ def test_figures_are_of_what_counts_only(machine: Path) -> None:
 
     assert figures(one(bent(half, step), "wall"))["position"] == pytest.approx(1.0)
     assert nodes_of(half, "wall")[0]["moves"] == 2
+
+
+def test_any_number_of_ranges_is_exact(machine: Path) -> None:
+    """300 plunges with rapids between them: neither the tree nor the page takes rapids with them."""
+    text = "\n".join(f"G0 X{k} Z2\nG1 Z-{1 + k % 7}\nG0 Z2" for k in range(300))
+    review = olp.view(f"{HEAD}{text}\nM2\n".encode(), machine, time=False)
+    scene, page = review.scene, Page(review.html())
+    feed = scene.nominal.toolpath.kind[scene.samples.move] != Kind.RAPID
+    every = page.array(page.manifest["tree"]["samples"]).astype(int)
+    nodes = plain(scene)["nodes"]
+    assert len(nodes[0]["samples"]) == 300
+    for node, packed in zip(nodes, page.manifest["tree"]["nodes"], strict=True):
+        begin, end = packed["ranges"]
+        assert np.array_equal(every[begin:end], node["samples"])
+        inside = np.zeros(len(feed), bool)
+        for a, b in every[begin:end].tolist():
+            inside[a : b + 1] = True
+        assert feed[inside].all() and len(np.unique(scene.samples.move[inside])) == node["moves"]
+    samples_are_its_own(scene, plain(scene))
+
+
+def test_spans_of_tools_and_operations_hold_their_rapids(machine: Path) -> None:
+    scene = scene_of("G0 X10 Y10\nG1 Z-1\nX50\nG0 Z9\nT2 M6\nG43 H2\nG0 X0 Y0 Z5\nG1 Z-1\nX9", machine)
+    tree, move = plain(scene), scene.samples.move
+    for own, of in (
+        ([node for node in tree["nodes"] if node["kind"] == "operation"], scene.table.operation),
+        (tree["tools"], scene.table.tool),
+    ):
+        assert len(own) == 2
+        for entry in own:
+            inside = np.zeros(len(move), bool)
+            for a, b in entry["spans"]:
+                inside[a : b + 1] = True
+            values = set(of[move[inside]].tolist())
+            assert len(values) == 1 and np.array_equal(inside, of[move] == values.pop())
+            kinds = scene.nominal.toolpath.kind[move[inside]]
+            assert (kinds == Kind.RAPID).any() and (kinds != Kind.RAPID).any()
+
+
+def test_the_lines_of_a_node_are_those_that_were_written(machine: Path) -> None:
+    """In a loop a line that comes later in the unrolled text may come earlier in the program."""
+    loop = "#1 = 0\no1 while [#1 lt 2]\nG1 X10 Y0 Z-1\nX50\nY[40 + #1]\nX10\n#1 = [#1 + 1]\no1 endwhile"
+    scene = scene_of(loop, machine, flatten=True)
+    origin, path, move = scene.nominal.origin, scene.nominal.toolpath, scene.samples.move
+    assert origin is not None
+    several = 0
+    for node in plain(scene)["nodes"]:
+        inside = np.concatenate([np.arange(a, b + 1) for a, b in node["samples"]])
+        written = origin.line[path.line[np.unique(move[inside])] - 1]
+        first, last = int(written.min()), int(written.max())
+        assert node["lines"] == (str(first) if first == last else f"{first} to {last}")
+        unrolled = path.line[np.unique(move[inside])]
+        several += origin.line[unrolled.max() - 1] != last or origin.line[unrolled.min() - 1] != first
+    assert several, "no node begins at a later line of the loop than it ends"
+
+
+def test_lines_of_files_of_subprograms_are_named_with_them(machine: Path) -> None:
+    scene = scene_of("G1 X10", machine)
+    origin = Origin(("/sub/drill.ngc",), np.array([20]), (b"",) * 30, np.array([3, 22, 24, 22, 7]))
+    called = replace(scene, nominal=replace(scene.nominal, data=Unrolled.of(scene.nominal.data, origin)))
+    assert called.places(np.array([1, 5])) == "3 to 7"
+    assert called.places(np.array([2, 3, 4])) == "2 to 4 of drill.ngc"
+    assert called.places(np.array([2, 4])) == "2 of drill.ngc"
+    assert called.places(np.array([5, 2])) == "7 to 2 of drill.ngc"

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar, Generic, TypeVar
 
@@ -20,6 +19,7 @@ from olp.core.arrays import Array, Index
 from olp.core.errors import ConfigError
 from olp.core.machine import Vector
 from olp.core.schema import Table
+from olp.core.values import dataclass
 from olp.files.measurements.line_keys import LineKeys
 from olp.files.measurements.point_readings import AXIS, TOOL, PointReadings
 

@@ -15,10 +15,10 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Protocol
 
 from olp.core.errors import ProgramError
+from olp.core.values import dataclass
 
 #: LinuxCNC takes two numbers as equal, and a number as an integer, within this.
 EQUAL_WITHIN = 1e-4

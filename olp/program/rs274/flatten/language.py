@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from olp.core.values import dataclass
 from olp.program.rs274.flatten import expressions
 from olp.program.rs274.flatten.expressions import Arithmetic
 

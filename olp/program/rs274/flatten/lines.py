@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from olp.core.errors import ProgramError
+from olp.core.values import dataclass
 from olp.program.rs274.flatten.expressions import Expression, Parameters, Reader, plain_number
 from olp.program.rs274.flatten.language import Language
 

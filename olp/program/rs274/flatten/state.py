@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from olp.core.errors import ProgramError
 from olp.core.units import AXES, MM_PER_INCH
+from olp.core.values import dataclass
 from olp.program.rs274.codes import (
     CUTTER_COMPENSATION,
     CYCLES,

@@ -6,9 +6,10 @@ import bisect
 import contextlib
 import itertools
 import re
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from olp.core.errors import ProgramError
+from olp.core.values import dataclass
 from olp.program.rs274.flatten.lines import Flow, Line, compile_line
 from olp.program.rs274.profiles.base import Profile
 from olp.program.text.line_ends import split

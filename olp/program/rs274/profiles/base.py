@@ -8,18 +8,23 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence, Set
-from dataclasses import dataclass
 from enum import IntEnum, auto
+from typing import TypeVar
 
+from olp.core.arrays import Array
 from olp.core.machine import Machine
 from olp.core.units import AXES
+from olp.core.values import dataclass
 from olp.program.dialect import Dialect, Row, Support
 from olp.program.rs274.block_rules import OTHER_RULES, BlockRules
 from olp.program.rs274.block_text import BlockText
 from olp.program.rs274.codes import CYCLES, PROBES
-from olp.program.rs274.cycles import CycleRules
+from olp.program.rs274.cycle_rules import CycleRules
 from olp.program.rs274.flatten.language import Language
 from olp.program.text.line_ends import split
+
+#: One number, or an array of them.
+Number = TypeVar("Number", float, Array)
 
 
 class Act(IntEnum):
@@ -62,12 +67,14 @@ class Profile(Dialect):
       carried out along with the motion, without a rest.
     - `text`, `rules`, `cycles`, `language`: what may be in a line and in a block, how canned cycles are made,
       and how parametric programs are written.
-    - `written_ending`: the ending of files that are written for the control.
+    - `written_ending`: the ending of files that are written for the control. `program_number`: a program
+      begins with % and an O number, and ends with %.
     """
 
     first: tuple[bytes, ...] = (b"%", b"O|:")
     payload_comments: bool = True
     written_ending: str = "nc"
+    program_number: bool = False
     codes: Mapping[int, Act]
     refusals: Mapping[int, str]
     harmless_m: frozenset[int]
@@ -97,8 +104,8 @@ class Profile(Dialect):
     def comment_marks(self) -> tuple[tuple[bytes, bytes], ...]:
         return ((b"(", b")"), (b";", b""))
 
-    def dwell_s(self, number: float, *, pointed: bool) -> float:
-        """Seconds of a P word; Fanuc and Haas count milliseconds where it has no decimal point."""
+    def dwell_s(self, number: Number, *, pointed: bool) -> Number:
+        """Seconds of P words; Fanuc and Haas count milliseconds where it has no decimal point."""
         return number / 1000.0 if self.increments_without_point and not pointed else number
 
     def counts_increments(self, machine: Machine) -> bool:

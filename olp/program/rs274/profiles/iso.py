@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from olp.program.rs274.block_text import BlockText
-from olp.program.rs274.cycles import ISO_CYCLES
+from olp.program.rs274.cycle_rules import ISO_CYCLES
 from olp.program.rs274.entry import read_blocks, unroll_blocks
 from olp.program.rs274.flatten.language import MACRO_B
 from olp.program.rs274.profiles.base import ISO_M, REFUSALS, Act, Profile
@@ -18,12 +18,14 @@ ISO = Profile(
     name="iso",
     title="ISO controls of mills",
     reader=read_blocks,
+    folder_endings=("nc", "tap", "cnc", "eia"),
     unroller=unroll_blocks,
     codes={},
     refusals=REFUSALS,
     harmless_m=ISO_M,
     initial_retract=980,
     increments_without_point=True,
+    program_number=True,
     g10_adds=True,
     cycles_apart=True,
     axis_dwell=True,

@@ -6,11 +6,11 @@ import re
 
 from olp.program.rs274.block_rules import NGC_RULES
 from olp.program.rs274.block_text import BlockText
-from olp.program.rs274.cycles import NGC_CYCLES
+from olp.program.rs274.cycle_rules import NGC_CYCLES
 from olp.program.rs274.entry import read_blocks, unroll_blocks
 from olp.program.rs274.flatten.language import NGC
 from olp.program.rs274.profiles.base import ARC_DISTANCE, ISO_M, REFUSALS, Act, Profile, g_codes
-from olp.program.text.line_ends import LONE_CR
+from olp.program.text.line_ends import STRAY_CR
 
 _EVENTS = dict.fromkeys((431, 432, 591, 592, 593, 611, 921, 922, 923), Act.EVENT)
 
@@ -18,6 +18,7 @@ DIALECT = Profile(
     name="linuxcnc",
     title="LinuxCNC and other RS274/NGC interpreters",
     reader=read_blocks,
+    folder_endings=("ngc", "nc", "tap", "cnc", "gcode"),
     unroller=unroll_blocks,
     codes=g_codes(unchanged={80}, extra={**_EVENTS, **ARC_DISTANCE}),
     refusals=REFUSALS,
@@ -33,7 +34,7 @@ DIALECT = Profile(
     least_inverse_feed=0.1,
     m_with_motion=frozenset({62, 63, 67}),
     text=BlockText(
-        odd_bytes=re.compile(rb"\x00|" + LONE_CR.pattern),
+        odd_bytes=re.compile(rb"\x00|" + STRAY_CR.pattern),
         skips_control=False,
         nested_comments=False,
         marks_in_pairs=True,

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import PurePath
 from typing import Any
 
 from olp.core.units import AXES
 from olp.reports.report import findings_text, pairs, printable, table
+from olp.reports.shown import title as shown_title
+from olp.reports.shown import unit_in
 
 Summary = Mapping[str, Any]
 
@@ -23,12 +26,28 @@ def outline(values: Summary) -> str:
     return "\n\n".join(part.strip("\n") for part in parts if part) + "\n"
 
 
+def by_file(values: Summary) -> dict[str, Any]:
+    """The same with the names of files, in place of their paths, in rows that are of files."""
+    return {
+        key: [_by_file(row) for row in value] if isinstance(value, list) else value
+        for key, value in values.items()
+    }
+
+
+def _by_file(row: Any) -> Any:
+    if not isinstance(row, Mapping) or "name" not in row:
+        return row
+    words = [row["name"], *([row["file"]] if "file" in row else [])]
+    name = " ".join([*words[:-1], PurePath(words[-1]).name])
+    return {"name": name} | {k: v for k, v in row.items() if k not in ("name", "file")}
+
+
 def _section(title: str, values: Summary) -> Iterator[str]:
     plain = {key: item for key, item in values.items() if not _is_group(item)}
     groups = {key: item for key, item in values.items() if _is_group(item) and item}
-    lines = list(pairs((_title(key), _text(item)) for key, item in plain.items()))
+    lines = list(pairs(((_title(key), _text(item)) for key, item in plain.items()), unit_in(title)))
     if title and lines:
-        yield title
+        yield shown_title(title)
     yield from (("  " + line if title else line) for line in lines)
     for key, item in groups.items():
         name = f"{title}, {_title(key)}" if title else _title(key).capitalize()
@@ -37,8 +56,8 @@ def _section(title: str, values: Summary) -> Iterator[str]:
         if records is None:
             yield from _section(name, item)
         else:
-            yield name
-            yield from _table(*records)
+            yield shown_title(name)
+            yield from _table(*records, unit_in(name))
 
 
 def _is_group(value: object) -> bool:
@@ -58,7 +77,7 @@ def _records(value: Summary | Sequence[Summary]) -> tuple[list[str], list[Summar
     return None
 
 
-def _table(names: Sequence[str], rows: Sequence[Summary]) -> Iterator[str]:
+def _table(names: Sequence[str], rows: Sequence[Summary], unit: str | None) -> Iterator[str]:
     keys = list(dict.fromkeys(key for row in rows for key in row))
     # Words to the left, numbers to the right.
     keys.sort(key=lambda key: not any(isinstance(row.get(key), str) for row in rows))
@@ -72,7 +91,7 @@ def _table(names: Sequence[str], rows: Sequence[Summary]) -> Iterator[str]:
         else:
             header.append(_title(key))
             columns.append([_text(value) for value in values])
-    yield from table(header, zip(*columns, strict=True), text_columns=1 + words)
+    yield from table(header, zip(*columns, strict=True), text_columns=1 + words, unit=unit)
 
 
 def _title(key: object) -> str:

@@ -1,4 +1,4 @@
-"""Imports the machine from a LinuxCNC configuration: INI file, tool table and stored work offsets.
+"""LinuxCNC: the INI file with its tool table and stored work offsets.
 
 Sources: the LinuxCNC integrator manual (INI configuration, tool table) and the parameter list of its G-code
 manual. Parameter 5220 holds the active offset. Parameters 5221 to 5390 hold G54 to G59.3, nine axes and a
@@ -8,17 +8,26 @@ rotation each, in machine units.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
+from dataclasses import field
 from pathlib import Path
 
 from olp.core.errors import InputError
-from olp.core.machine import Axis, Machine, Tool, Vector, WorkOffset
+from olp.core.machine import Tool, Vector, WorkOffset
 from olp.core.units import AXES, MM_PER_INCH
-from olp.files.write import PathLike, read_bytes
+from olp.core.values import dataclass
+from olp.files.machine_settings.base import (
+    NUMBER,
+    AxisSettings,
+    Load,
+    Settings,
+    SettingsFormat,
+    backlash_note,
+    interval,
+    touched_note,
+)
+from olp.files.write import read_bytes
 
-#: In s: where the configuration states no jerk, full acceleration is reached within this time.
-JERK_TIME_S = 0.05
 #: In mm. LinuxCNC takes any number of decimals; programs commonly have four.
 LEAST_INCREMENT_MM = 0.0001
 
@@ -27,21 +36,11 @@ OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 
 _UNITS_MM = {"mm": 1.0, "metric": 1.0, "in": MM_PER_INCH, "inch": MM_PER_INCH, "imperial": MM_PER_INCH}
 _CARTESIAN = ("trivkins", "corexykins")
-_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-_TOOL_WORD = re.compile(rf"([A-Z])\s*({_NUMBER})", re.IGNORECASE)
+_TOOL_WORD = re.compile(rf"([A-Z])\s*({NUMBER})", re.IGNORECASE)
 #: Depth of nested `#INCLUDE` files.
 _MAX_INCLUDES = 20
 
 Sections = dict[str, dict[str, str]]
-Load = Callable[[Path], bytes]
-
-
-@dataclass(frozen=True, slots=True)
-class Imported:
-    """A machine, and notes on what you must know or decide about it, one sentence each."""
-
-    machine: Machine
-    notes: tuple[str, ...]
 
 
 @dataclass(slots=True)
@@ -60,7 +59,7 @@ class Reading:
         text = self.text(section, key)
         if text is None:
             return None
-        match = re.match(_NUMBER, text)
+        match = re.match(NUMBER, text)
         if match is None:
             raise InputError(f'[{section}] {key} = "{text}" is not a number', file=self.file)
         return float(match[0])
@@ -70,32 +69,17 @@ class Reading:
         return None if number is None else number * self.mm
 
 
-def from_linuxcnc(ini_path: PathLike, chain: str = "FXYZ") -> Imported:
-    """The machine that a LinuxCNC INI file describes. The file does not state the chain, so the call does.
-
-    Raises InputError where a file cannot be read, or where units, limits or one of the axes X, Y, Z are
-    missing in the INI file.
-    """
-    path = Path(ini_path)
-    reading = Reading(str(path), sections_of(path))
+def _read(path: Path, load: Load) -> Settings:
+    """Raises InputError where a file cannot be read, or where units or one of X, Y, Z are missing."""
+    reading = Reading(str(path), sections_of(path, load))
     reading.mm = unit_mm(reading)
     joints = joints_of(reading)
     axes = {letter: _axis(reading, letter, joints[letter]) for letter in AXES}
     compensated = _compensated(reading, joints)
-    tools = _tools(reading, path)
-    offsets, active = _offsets(reading, path)
+    tools = _tools(reading, path, load)
+    offsets, active = _offsets(reading, path, load)
     name = reading.text("EMC", "MACHINE") or path.stem
-    machine = Machine(
-        name=name,
-        chain=chain,
-        controller="linuxcnc",
-        axes=axes,
-        compensated_by_controller=compensated,
-        work_offsets=offsets,
-        tools=tools,
-        default_work_offset=active,
-    )
-    return Imported(machine, (f"The INI file does not state the chain; {chain} is assumed.", *reading.notes))
+    return Settings(name, "linuxcnc", axes, compensated, tools, offsets, active, tuple(reading.notes))
 
 
 def unit_mm(reading: Reading) -> float:
@@ -103,7 +87,7 @@ def unit_mm(reading: Reading) -> float:
     units = (reading.text("TRAJ", "LINEAR_UNITS") or "").casefold()
     if units in _UNITS_MM:
         return _UNITS_MM[units]
-    if re.fullmatch(_NUMBER, units) and float(units) > 0:
+    if re.fullmatch(NUMBER, units) and float(units) > 0:
         return 1.0 / float(units)
     stated = f'"{units}"' if units else "missing"
     raise InputError(f"[TRAJ] LINEAR_UNITS is {stated}; expected mm or inch", file=reading.file)
@@ -162,7 +146,7 @@ def joints_of(reading: Reading) -> dict[str, list[str]]:
     return joints
 
 
-def _axis(reading: Reading, letter: str, joints: list[str]) -> Axis:
+def _axis(reading: Reading, letter: str, joints: list[str]) -> AxisSettings:
     """The tightest of what the sections of an axis and its joints state."""
     sections = [f"AXIS_{letter}", *joints]
 
@@ -175,27 +159,17 @@ def _axis(reading: Reading, letter: str, joints: list[str]) -> Axis:
         return min((value for value in values if value > 0), default=None)
 
     low, high = max(all_of("MIN_LIMIT"), default=None), min(all_of("MAX_LIMIT"), default=None)
-    if low is None or high is None or not low < high:
+    if low is not None and high is not None and not low < high:
         raise InputError(
             f"axis {letter} has no travel; expected MIN_LIMIT below MAX_LIMIT in [AXIS_{letter}]",
             file=reading.file,
         )
-    velocity = least("MAX_VELOCITY", "MAX_LINEAR_VELOCITY", "MAX_VELOCITY")
-    acceleration = least("MAX_ACCELERATION", "MAX_LINEAR_ACCELERATION", "MAX_ACCELERATION")
-    if velocity is None or acceleration is None:
-        key = "MAX_VELOCITY" if velocity is None else "MAX_ACCELERATION"
-        raise InputError(f"axis {letter} has no {key}; expected it in [AXIS_{letter}]", file=reading.file)
-    jerk = least("MAX_JERK", "MAX_LINEAR_JERK")
-    if jerk is None:
-        jerk = acceleration / JERK_TIME_S
-        note = f"The INI file states no jerk; full acceleration within {JERK_TIME_S:g} s is assumed."
-        reading.notes.extend([note] if note not in reading.notes else [])
-    return Axis(
-        travel_mm=(low, high),
+    return AxisSettings(
+        travel_mm=interval(low, high),
         least_increment_mm=LEAST_INCREMENT_MM,
-        velocity_mm_s=velocity,
-        acceleration_mm_s2=acceleration,
-        jerk_mm_s3=jerk,
+        velocity_mm_s=least("MAX_VELOCITY", "MAX_LINEAR_VELOCITY", "MAX_VELOCITY"),
+        acceleration_mm_s2=least("MAX_ACCELERATION", "MAX_LINEAR_ACCELERATION", "MAX_ACCELERATION"),
+        jerk_mm_s3=least("MAX_JERK", "MAX_LINEAR_JERK"),
     )
 
 
@@ -213,14 +187,11 @@ def _compensated(reading: Reading, joints: Mapping[str, list[str]]) -> frozenset
                     "active while measuring, list it in active_during_measurement of the calibration instead."
                 )
             elif backlash := reading.length(section, "BACKLASH"):
-                reading.notes.append(
-                    f"[{section}] BACKLASH = {backlash:g} mm is compensated by the control. Measure with it "
-                    f"active, or leave {letter}_um out of [backlash] in the calibration."
-                )
+                reading.notes.append(backlash_note(letter, f"[{section}] BACKLASH", backlash))
     return frozenset(names)
 
 
-def _tools(reading: Reading, ini: Path) -> dict[int, Tool]:
+def _tools(reading: Reading, ini: Path, load: Load) -> dict[int, Tool]:
     name = reading.text("EMCIO", "TOOL_TABLE")
     if name is None:
         reading.notes.append("[EMCIO] TOOL_TABLE is not given: add [tools.N] by hand.")
@@ -230,7 +201,7 @@ def _tools(reading: Reading, ini: Path) -> dict[int, Tool]:
         reading.notes.append(f"The tool table {name} does not exist: add [tools.N] by hand.")
         return {}
     tools: dict[int, Tool] = {}
-    for line in read_bytes(path).decode("utf-8", "replace").splitlines():
+    for line in load(path).decode("utf-8", "replace").splitlines():
         words = {
             letter.upper(): float(number) for letter, number in _TOOL_WORD.findall(line.partition(";")[0])
         }
@@ -250,16 +221,17 @@ def _tools(reading: Reading, ini: Path) -> dict[int, Tool]:
     return tools
 
 
-def _offsets(reading: Reading, ini: Path) -> tuple[dict[str, WorkOffset], str]:
+def _offsets(reading: Reading, ini: Path, load: Load) -> tuple[dict[str, WorkOffset], str]:
     """Work offsets G54 to G59.3 and the name of the active one."""
     name = reading.text("RS274NGC", "PARAMETER_FILE")
     path = ini.parent / name if name else None
     if path is None or not path.is_file():
-        reading.notes.append(f"The parameter file {name or ''} does not exist: set the work offsets by hand.")
-        return {"G54": WorkOffset("G54")}, "G54"
+        what = f"The parameter file {name} does not exist" if name else "No PARAMETER_FILE is given"
+        reading.notes.append(f"{what}: set the work offsets by hand.")
+        return {}, "G54"
     values: dict[int, float] = {}
-    for line in read_bytes(path).decode("utf-8", "replace").splitlines():
-        row = re.match(rf"\s*(\d+)\s+({_NUMBER})\s*$", line)
+    for line in load(path).decode("utf-8", "replace").splitlines():
+        row = re.match(rf"\s*(\d+)\s+({NUMBER})\s*$", line)
         if row:
             values[int(row[1])] = float(row[2])
     if values.get(5210) and any(values.get(5211 + i) for i in range(3)):
@@ -270,9 +242,20 @@ def _offsets(reading: Reading, ini: Path) -> tuple[dict[str, WorkOffset], str]:
         x, y, z = (values.get(first + i, 0.0) * reading.mm for i in range(3))
         rotation: Vector = (0.0, 0.0, values.get(first + 9, 0.0))
         offsets[offset] = WorkOffset(offset, offset_mm=(x, y, z), rotation_deg=rotation)
-    reading.notes.append(
-        'The work offsets count as touched off on the uncompensated machine (set_by = "touch"). Name the '
-        'tool in touch_tool, or write set_by = "true" where they were located by other means.'
-    )
+    reading.notes.append(touched_note())
     active = int(values.get(5220, 1.0))
     return offsets, OFFSETS[active - 1] if 1 <= active <= len(OFFSETS) else "G54"
+
+
+def _recognises(text: str) -> bool:
+    sections = set(re.findall(r"^\[(\w+)\]", text, re.MULTILINE))
+    return "TRAJ" in sections and bool(sections & {"KINS", "EMC", "RS274NGC", "AXIS_X", "AXIS_0", "JOINT_0"})
+
+
+FORMAT = SettingsFormat(
+    "linuxcnc",
+    "the INI file of LinuxCNC",
+    "integrator manual of LinuxCNC",
+    _recognises,
+    _read,
+)

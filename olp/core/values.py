@@ -1,0 +1,159 @@
+"""Value types: dataclasses with slots, whose constructor is written when the first value is made.
+
+The standard decorator compiles up to six methods per class while a module is imported, half a millisecond
+each class, and a run makes values of a few classes only. Here all classes share what can be shared, and only
+the constructor is compiled. `dataclasses.fields`, `replace` and the like work as on any dataclass, and type
+checkers see the standard decorator.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import threading
+from collections.abc import Callable, Iterable, Mapping
+from typing import TYPE_CHECKING, Any, TypeVar
+
+T = TypeVar("T")
+
+_LOCK = threading.RLock()
+_FIELDS = "__dataclass_fields__"
+_STATED = "__stated_class__"
+
+
+def _stated(cls: type) -> dict[str, Any]:
+    """What a class states of each field of its own: a default, a `Field`, or that there is none."""
+    kinds: dict[str, str] = inspect.get_annotations(cls)
+    names = [name for name, kind in kinds.items() if not kind.startswith("ClassVar")]
+    return {name: vars(cls).get(name, dataclasses.MISSING) for name in names}
+
+
+def _slotted(cls: type[T], names: Iterable[str], added: Mapping[str, Any]) -> type[T]:
+    """The class with a slot for each field of its own, without their defaults, which would hide them, and
+    with those methods that it does not define."""
+    left_out = {*names, "__dict__", "__weakref__"}
+    body = {name: value for name, value in vars(cls).items() if name not in left_out}
+    kind: Any = type(cls)
+    made: type[T] = kind(cls.__name__, cls.__bases__, {**added, **body, "__slots__": tuple(names)})
+    made.__qualname__ = cls.__qualname__
+    return made
+
+
+def _declared(cls: type) -> dict[str, tuple[Any, bool]]:
+    """The fields of a class and its bases as the standard library's `Field`, and whether calls name each."""
+    fields: dict[str, tuple[Any, bool]] = {}
+    for base in reversed(cls.__mro__):
+        stated, kw_only = vars(base).get(_STATED, ({}, False))
+        for name, value in stated.items():
+            field = value if isinstance(value, dataclasses.Field) else dataclasses.field(default=value)
+            fields[name] = (field, kw_only)
+    return fields
+
+
+def _constructor(cls: type) -> Callable[..., None]:
+    """The `__init__` of a class: defaults, factories, then `__post_init__`."""
+    known: dict[str, Any] = {"_set": object.__setattr__, "_MADE": dataclasses.MISSING}
+    positional: list[str] = []
+    named: list[str] = []
+    lines: list[str] = []
+    for name, (field, kw_only) in _declared(cls).items():
+        value = parameter = name
+        if field.default is not dataclasses.MISSING:
+            known[f"_default_{name}"] = field.default
+            parameter = f"{name}=_default_{name}"
+        elif field.default_factory is not dataclasses.MISSING:
+            known[f"_make_{name}"] = field.default_factory
+            parameter = f"{name}=_MADE"
+            value = f"_make_{name}() if {name} is _MADE else {name}" if field.init else f"_make_{name}()"
+        if field.init:
+            (named if kw_only else positional).append(parameter)
+        if field.init or parameter != name:
+            lines.append(f"    _set(self, {name!r}, {value})")
+    if hasattr(cls, "__post_init__"):
+        lines.append("    self.__post_init__()")
+    parameters = ", ".join(("self", *positional, *(["*", *named] if named else [])))
+    exec(f"def __init__({parameters}):\n" + "\n".join(lines or ["    pass"]), known)
+    made: Callable[..., None] = known["__init__"]
+    made.__qualname__ = f"{cls.__qualname__}.__init__"
+    return made
+
+
+def _state(self: Any) -> tuple[Any, ...]:
+    return tuple([getattr(self, field.name) for field in dataclasses.fields(self)])
+
+
+def _set_state(self: Any, state: tuple[Any, ...]) -> None:
+    for field, value in zip(dataclasses.fields(self), state, strict=True):
+        object.__setattr__(self, field.name, value)
+
+
+def _repr(self: Any) -> str:
+    shown = (f"{f.name}={getattr(self, f.name)!r}" for f in dataclasses.fields(self) if f.repr)
+    return f"{type(self).__qualname__}({', '.join(shown)})"
+
+
+def _eq(self: Any, other: object) -> bool:
+    return _state(self) == _state(other) if type(other) is type(self) else NotImplemented
+
+
+def _hash(self: Any) -> int:
+    return hash(_state(self))
+
+
+def _refuse_set(self: Any, name: str, value: object) -> None:
+    raise dataclasses.FrozenInstanceError(f"cannot assign to field {name!r}")
+
+
+def _refuse_delete(self: Any, name: str) -> None:
+    raise dataclasses.FrozenInstanceError(f"cannot delete field {name!r}")
+
+
+class _Fields:
+    """Stands for the fields until they are asked for."""
+
+    def __init__(self, complete: Callable[[], None]) -> None:
+        self.complete = complete
+
+    def __get__(self, value: object, owner: type) -> object:
+        self.complete()
+        return getattr(owner, _FIELDS)
+
+
+def _value_type(
+    *, slots: bool, frozen: bool = False, eq: bool = True, kw_only: bool = False
+) -> Callable[[type[T]], type[T]]:
+    """As `dataclasses.dataclass`. Raises ValueError without slots."""
+    if not slots:
+        raise ValueError("a value type has slots; expected slots=True")
+    shared: dict[str, Any] = {"__repr__": _repr, "__getstate__": _state, "__setstate__": _set_state}
+    if eq:
+        shared |= {"__eq__": _eq, "__hash__": _hash if frozen else None}
+    if frozen:
+        shared |= {"__setattr__": _refuse_set, "__delattr__": _refuse_delete}
+
+    def decorated(cls: type[T]) -> type[T]:
+        def complete() -> None:
+            with _LOCK:
+                if _FIELDS not in vars(cls):  # no other thread was first
+                    dataclasses.dataclass(init=False, repr=False, eq=False, frozen=frozen, kw_only=kw_only)(
+                        cls
+                    )
+                    for name in (_FIELDS, "__dataclass_params__", "__match_args__"):
+                        setattr(made, name, vars(cls)[name])
+
+        def __init__(self: Any, *args: Any, **words: Any) -> None:
+            made.__init__ = _constructor(made)  # type: ignore[method-assign]
+            self.__init__(*args, **words)
+
+        stated = _stated(cls)
+        own = {"__init__": __init__, _STATED: (stated, kw_only), _FIELDS: _Fields(complete)}
+        made = _slotted(cls, stated, {**shared, **own})
+        return made
+
+    return decorated
+
+
+if TYPE_CHECKING:
+    from dataclasses import dataclass as dataclass
+else:
+    dataclass = _value_type

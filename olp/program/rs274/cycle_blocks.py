@@ -1,0 +1,280 @@
+"""Blocks of canned cycles, carried out many at once: those of one cycle, in one frame, one behind the other.
+
+What a series keeps goes over from one such run to the next. The strokes of holes are in `strokes`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from olp.core.arrays import Array, Index
+from olp.core.budget import Budget
+from olp.core.errors import ProgramError
+from olp.core.geometry import PLANES
+from olp.core.toolpath import Flag, Kind
+from olp.program.directives import Directives
+from olp.program.holes import CHANGED, Holes
+from olp.program.rs274.axis_state import AxisState
+from olp.program.rs274.codes import CYCLES, INVERSE_TIME, RETRACT_TO_R
+from olp.program.rs274.collector import Collector
+from olp.program.rs274.cycle_runs import CycleRun, Refused
+from olp.program.rs274.cycles import HOLE_STROKES, LCNC_CLEARANCE_MM, MOST_REPEATS, levels, repeats_error
+from olp.program.rs274.modes import Context, scaled
+from olp.program.rs274.state import BROKEN_SERIES, NAN
+from olp.program.rs274.strokes import Drilling, Step, Strokes, strokes
+
+#: Words of a further axis.
+_OTHERS = np.frombuffer(b"ABCUVW", np.uint8)
+
+
+class CycleBlocks:
+    """Carries blocks of canned cycles out from the position in `state`, and puts their moves and holes into
+    `collector`."""
+
+    def __init__(self, state: AxisState, collector: Collector, switches: Directives, budget: Budget) -> None:
+        self._state = state
+        self._collector = collector
+        self._switches = switches
+        self._budget = budget
+        # of the last block of a series its line, from 0 (-1 where none goes on), frame and cycle, and the
+        # number of moves after it
+        self._line = self._frame = self._code = self._moves = -1
+
+    def leave(self, context: Context, line: int) -> None:
+        """Keep for the next chunk whether a series of cycles has ended up to this line, the last one read."""
+        if self._line >= 0 and self._ended(context, line + 1):
+            self._line = -1
+
+    def _ended(self, context: Context, row: int) -> bool:
+        """Whether another motion code came into force between the last block of a cycle and this line."""
+        first = max(self._line + 1 - context.chunk.first_line, 0)
+        return self._line < 0 or not CYCLES.issuperset(context.motion[first:row].tolist())
+
+    def run(self, context: Context, line: Index, frame: int) -> None:
+        """Carry out the blocks on lines (n,) of the chunk, in this frame, which are one run of `runs`. Raises
+        ProgramError for the first that cannot be carried out."""
+        state, collector = self._state, self._collector
+        run = CycleRun.of(context, line, scaled(context, state, collector.remarks))
+        refused = Refused(context, line)
+        self._check_modes(context, run, refused)
+        self._begin(context, run, frame, refused)
+        drilling = self._drilling(context, run, frame, refused)
+        times = self._times(context, run, refused)
+        if np.isnan(state.position).any():
+            refused.all(
+                "a canned cycle starts where an axis has not been commanded yet; "
+                "command X, Y and Z first, or give start_mm in the job file",
+                "OLP524",
+            )
+        for bad, why in drilling.faults():
+            refused.where(bad, why)
+        # a block that makes too many holes is not laid out
+        count = min(refused.row, self._affordable(np.where(times > 0, times, 0) * HOLE_STROKES))
+        of = np.repeat(np.arange(count), times[:count])
+        of = of[: self._affordable(HOLE_STROKES + drilling.pecks[of])] if refused.row else of[:0]
+        place = self._places(run, frame, of)
+        made = self._strokes(context, run, drilling.pick(of), place, of) if of.size else None
+        if made is not None:
+            self._spend(made, of, refused)
+        refused.raise_first()
+        assert made is not None
+        self._put(context, run, frame, drilling.pick(of), place, of, times, made)
+
+    # -- what a block says -------------------------------------------------------------------------
+
+    def _check_modes(self, context: Context, run: CycleRun, refused: Refused) -> None:
+        """Refuse modes in which the control makes no cycle."""
+        state, code, line = self._state, run.code, run.line
+        turning = state.profile.cycles.turning.get(code)
+        other = np.zeros(len(line), np.uint8)
+        if not state.profile.cycles.other_axes:
+            mine = np.flatnonzero(np.isin(run.letter, _OTHERS))[::-1]
+            other[run.owner[mine]] = 255
+            np.minimum.at(other, run.owner[mine], run.letter[mine])
+        name = f"the cycle G{code / 10:g}"
+        refused.where(
+            other > 0,
+            lambda i: ProgramError(
+                f"{name} moves {chr(other[i])} too, which the control refuses; move it in a block of its own",
+                code="OLP518",
+            ),
+        )
+        inverse = np.asarray(context.feed_mode[line] == INVERSE_TIME)
+        refused.where(inverse, f"{name} is in inverse time (G93); give G94 before it", "OLP518")
+        if state.compensation is not None:
+            refused.all(f"{name} is in cutter compensation; give G40 before it", "OLP518")
+        if turning is not None:
+            spindle = " or ".join(f"M{m}" for m in turning)
+            still = ~np.isin(context.spindle[line], turning)
+            refused.where(still, f"{name} needs a turning spindle; give {spindle} before it", "OLP518")
+
+    def _begin(self, context: Context, run: CycleRun, frame_index: int, refused: Refused) -> None:
+        """Begin a series with the first of the blocks, or go on with one."""
+        state, series, rules = self._state, self._state.series, self._state.profile.cycles
+        frame, third = state.frames[frame_index], PLANES[run.plane][2]
+        ground, unit = frame.offset_mm[third], frame.unit_mm
+        if self._ended(context, int(run.line[0])):
+            series.begin((state.position[third] - ground) / unit)
+        else:
+            before = state.frames[self._frame]
+            series.broken |= (before.offset_mm[third], before.unit_mm) != (ground, unit)
+            series.broken |= self._moves != self._collector.moves
+            if series.broken and not rules.keeps_numbers:
+                refused.all(BROKEN_SERIES, "OLP518")
+            if self._code != run.code and rules.new_code_forgets:
+                series.held = {}
+        self._line, self._frame = context.chunk.first_line + int(run.line[-1]), frame_index
+        self._code = run.code
+
+    def _drilling(self, context: Context, run: CycleRun, frame_index: int, refused: Refused) -> Drilling:
+        """The numbers of the blocks and those inherited from their series."""
+        state, frame, third = self._state, self._state.frames[frame_index], PLANES[run.plane][2]
+        depth = "XYZ"[third]
+        dwell, pointed = run.number("P"), context.chunk.pointed[run.slot["P"]]
+        for bare in (False, True):
+            mine = pointed != bare
+            dwell[mine] = state.profile.dwell_s(dwell[mine], pointed=not bare)
+        r, z, q, p = (
+            self._inherited(letter, given)
+            for letter, given in (
+                ("R", run.number("R")), (depth, run.number(depth)), ("Q", run.number("Q")),
+                ("P", dwell),
+            )
+        )  # fmt: skip
+        lacking = [("R", np.isnan(r)), (depth, np.isnan(z))]
+        refused.where(
+            np.isnan(r) | np.isnan(z),
+            lambda i: ProgramError(
+                f"the cycle G{run.code / 10:g} has no "
+                f"{' and no '.join(letter for letter, lacks in lacking if lacks[i])} word",
+                code="OLP531",
+            ),
+        )
+        r, z = levels(r, z, absolute=not run.incremental, initial_z=self._initial)
+        unit = frame.unit_mm
+        return Drilling(
+            run.code, run.plane, r, z, q, p, LCNC_CLEARANCE_MM / unit, unit, frame.offset_mm[third],
+            state.profile.cycles,
+        )  # fmt: skip
+
+    @property
+    def _initial(self) -> float:
+        """The program coordinate of the tool axis before the series."""
+        initial = self._state.series.initial
+        return NAN if initial is None else initial
+
+    def _inherited(self, letter: str, given: Array) -> Array:
+        """(n,) the numbers of a word, those of the blocks before where a block has none; NaN where none."""
+        held = self._state.series.held
+        source = np.maximum.accumulate(np.where(np.isnan(given), -1, np.arange(len(given))))
+        before = held.get(letter)
+        number = np.where(source >= 0, given[source], NAN if before is None else before)
+        if source[-1] >= 0:
+            held[letter] = float(number[-1])
+        return number
+
+    def _times(self, context: Context, run: CycleRun, refused: Refused) -> Index:
+        """(n,) how many holes each block makes: its L word, or K on ISO controls."""
+        slot = self._counter(run)
+        times = np.where(slot >= 0, np.rint(context.value[slot]), 1.0)
+        refused.where(
+            times < 1,
+            "a canned cycle with zero repeats only stores values, which is not read; give one or more",
+            "OLP531",
+        )
+        refused.where(times > MOST_REPEATS, lambda i: repeats_error(int(times[i])))
+        return np.clip(times, 0, 1e9).astype(np.int64)
+
+    def _counter(self, run: CycleRun) -> Index:
+        """(n,) the word of each block that counts its holes, -1 where there is none."""
+        slot = np.full(len(run.line), -1, np.int64)
+        for letter in reversed(self._state.profile.cycles.repeat_words):
+            slot = np.where(run.slot[letter] >= 0, run.slot[letter], slot)
+        return slot
+
+    # -- the holes ---------------------------------------------------------------------------------
+
+    def _affordable(self, cost: Array | Index) -> int:
+        """How many of the first that may be paid for, and one more, which is refused then."""
+        return int(np.searchsorted(np.cumsum(cost), self._budget.left, "right")) + 1
+
+    def _places(self, run: CycleRun, frame_index: int, of: Index) -> Array:
+        """(h, 2) where holes of blocks (h,) are, along the first and second axis of the plane."""
+        frame = self._state.frames[frame_index]
+        place = np.empty((len(of), 2))
+        for column, axis in enumerate(PLANES[run.plane][:2]):
+            to = run.number("XYZ"[axis])[of] * frame.unit_mm
+            before = self._state.position[axis]
+            if run.incremental:
+                place[:, column] = np.cumsum(np.concatenate(([before], np.nan_to_num(to))))[1:]
+            else:
+                source = np.maximum.accumulate(np.where(np.isnan(to), -1, np.arange(len(of))))
+                place[:, column] = np.where(source >= 0, to[source] + frame.offset_mm[axis], before)
+        return place
+
+    def _strokes(
+        self, context: Context, run: CycleRun, drilling: Drilling, place: Array, of: Index
+    ) -> Strokes:
+        x, y, z = self._state.position
+        initial = self._initial * drilling.unit + drilling.ground
+        to_r = np.asarray(context.retract[run.line[of]] == RETRACT_TO_R)
+        return strokes(drilling, (x, y, z), place, to_r, initial)
+
+    def _spend(self, made: Strokes, of: Index, refused: Refused) -> None:
+        """Take the work of the holes from the budget, of one after the other."""
+        cost = np.cumsum(HOLE_STROKES + np.bincount(made.hole, minlength=len(of)))
+        over = int(np.searchsorted(cost, self._budget.left, "right"))
+        try:
+            self._budget.spend(int(cost[-1]))
+        except ProgramError as error:
+            refused.where(np.arange(refused.row) == of[over], error.message, error.code)
+
+    def _put(
+        self, context: Context, run: CycleRun, frame: int, drilling: Drilling, place: Array, of: Index,
+        times: Index, made: Strokes,
+    ) -> None:  # fmt: skip
+        """Put the moves and the holes into the collector, and take over the position behind them."""
+        collector, line = self._collector, context.chunk.first_line + 1 + run.line
+        moving = made.step <= Step.FEED
+        hole = made.hole[moving]
+        flag = np.full(len(line), np.uint8(Flag.CYCLE))
+        flag[context.chunk.deleted[run.line]] |= np.uint8(Flag.DELETED)
+        flag[self._switches.off(line)] |= np.uint8(Flag.PASS)
+        moves = np.bincount(hole, minlength=len(of))
+        last = collector.moves + np.cumsum(moves)
+        rest = np.flatnonzero(~moving)
+        word = np.stack([run.slot[letter][of] for letter in CHANGED], axis=1)
+        counter = self._counter(run)[of]
+        ones = np.ones(len(of), np.int32)
+        begin = np.cumsum(times) - times
+        collector.holes.append(
+            Holes(
+                line=line[of].astype(np.int32),
+                first=last - moves,
+                last=last,
+                word=np.where(word >= 0, word + context.base, -1).astype(np.int32),
+                counter=np.where(counter >= 0, counter + context.base, -1).astype(np.int32),
+                last_word=(context.chunk.first_word[run.line[of] + 1] - 1 + context.base).astype(np.int32),
+                plane=np.full(len(of), run.plane, np.int8),
+                place_mm=place,
+                r_mm=drilling.level(drilling.r),
+                z_mm=drilling.level(drilling.z),
+                initial_mm=np.full(len(of), self._initial * drilling.unit + drilling.ground),
+                incremental=np.full(len(of), run.incremental),
+                repeat=(np.arange(len(of)) - begin[of]).astype(np.int32),
+                repeats=times[of].astype(np.int32),
+                series=ones * self._state.series.count,
+                code=ones * run.code,
+                rest_hole=made.hole[rest],
+                rest_after=(np.cumsum(moving) - (np.cumsum(moves) - moves)[made.hole])[rest],
+                rest_s=made.seconds[rest],
+            )
+        )
+        count = len(hole)
+        collector.put_moves(
+            np.where(made.step[moving] == Step.FEED, Kind.LINE, Kind.RAPID).astype(np.uint8),
+            flag[of][hole], line[of][hole], np.full(count, frame), made.point[moving],
+            np.full((count, 3), -1),
+        )  # fmt: skip
+        self._moves = collector.moves
+        self._state.position[:] = made.point[-1].tolist()

@@ -1,0 +1,98 @@
+"""Runs of blocks of canned cycles, which are carried out at once: where they are, and what they say."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.core.arrays import Array, Index, Mask
+from olp.core.errors import ProgramError
+from olp.core.values import dataclass
+from olp.program.rs274.codes import CYCLES, INCREMENTAL, PLANE_OF
+from olp.program.rs274.modes import Context
+from olp.program.rs274.state import NAN
+
+_READ = "XYZRQPLK"
+_CYCLES = np.array(sorted(CYCLES))
+
+
+def runs(context: Context, line: Index) -> dict[int, int]:
+    """The runs of blocks of canned cycles that are carried out at once, among blocks on lines (n,) of the
+    chunk: from the first block of each to the one behind it. A run has no event, and no change of cycle,
+    plane or distance mode."""
+    row = np.flatnonzero(np.isin(context.motion[line], _CYCLES))
+    if not row.size:
+        return {}
+    line = line[row]
+    breaks = np.cumsum(context.event) + np.cumsum(~np.isin(context.motion, _CYCLES))
+    same = (breaks[line[1:]] == breaks[line[:-1]]) & ~context.event[line[:-1]]
+    for mode in (context.motion, context.plane, context.distance):
+        same &= mode[line[1:]] == mode[line[:-1]]
+    cuts = np.flatnonzero(~same)
+    first, last = row[np.append(0, cuts + 1)], row[np.append(cuts, len(row) - 1)]
+    return dict(zip(first.tolist(), (last + 1).tolist(), strict=True))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CycleRun:
+    """A run: blocks (n,) on lines of a chunk in the same modes. `slot` leads from a letter to the indices
+    (n,) of its words, -1 where omitted; (w,) `letter` and `owner` are all their words and the block of
+    each."""
+
+    line: Index
+    code: int
+    plane: int
+    incremental: bool
+    value: Array
+    slot: dict[str, Index]
+    letter: npt.NDArray[np.uint8]
+    owner: Index
+
+    @staticmethod
+    def of(context: Context, line: Index, value: Array) -> CycleRun:
+        chunk, first = context.chunk, int(line[0])
+        begin, count = chunk.first_word[line], chunk.first_word[line + 1] - chunk.first_word[line]
+        owner = np.repeat(np.arange(len(line)), count)
+        word = np.arange(len(owner)) + (begin - np.cumsum(count) + count)[owner]
+        letter = chunk.letter[word]
+        slot = {}
+        for name in _READ:
+            mine = np.flatnonzero(letter == ord(name))
+            slot[name] = np.full(len(line), -1, np.int64)
+            slot[name][owner[mine]] = word[mine]
+        return CycleRun(
+            line, int(context.motion[first]), PLANE_OF[int(context.plane[first])],
+            bool(context.distance[first] == INCREMENTAL), value, slot, letter, owner,
+        )  # fmt: skip
+
+    def number(self, letter: str) -> Array:
+        """(n,) the number of a word in each block, NaN where it has none."""
+        slot = self.slot[letter]
+        return np.where(slot >= 0, self.value[slot], NAN)
+
+
+class Refused:
+    """The first of the blocks that is refused, and why: `row`, all of them where none is."""
+
+    def __init__(self, context: Context, line: Index) -> None:
+        self._context, self._line = context, line
+        self.row = len(line)
+        self._error: ProgramError | None = None
+
+    def where(self, bad: Mask, why: str | Callable[[int], ProgramError], code: str = "") -> None:
+        """Refuse blocks (n,) that are `bad`, unless one before them is refused."""
+        rows = np.flatnonzero(bad[: self.row])
+        if rows.size:
+            self.row = int(rows[0])
+            self._error = ProgramError(why, code=code) if isinstance(why, str) else why(self.row)
+
+    def all(self, why: str, code: str) -> None:
+        """Refuse the first block."""
+        self.where(np.ones(self.row, bool), why, code)
+
+    def raise_first(self) -> None:
+        if self._error is not None:
+            number = self._context.number(int(self._line[self.row]))
+            raise ProgramError(self._error.message, line=number, code=self._error.code)

@@ -1,0 +1,65 @@
+"""The first program of a new machine: a square and a circle in the air, in the middle of the travel."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from olp.core.machine import Machine
+from olp.core.units import AXES
+from olp.program.rs274.profiles.base import Profile
+
+#: mm/min; slow enough to follow by eye.
+_FEED = 600.0
+#: Share of the travel on either side of its middle that the square takes.
+_SHARE = 0.5
+#: mm; half a side, and height: more is not needed to see that it works.
+_MOST_HALF_MM = 50.0
+_MOST_HEIGHT_MM = 20.0
+#: mm; less room shows nothing.
+_LEAST_MM = 1.0
+
+
+def first_program(profile: Profile, machine: Machine, offset: str = "G54") -> bytes | None:
+    """A program that runs along a square and a circle in it, in the middle of the travel. None where the
+    travel is too short, or the work offset is turned. No tool length and no spindle is switched on."""
+    frame = machine.work_offsets[offset]
+    travel = [machine.axes[axis].travel_mm for axis in AXES]
+    half = _round(min(_SHARE * 0.5 * (high - low) for low, high in travel[:2]), _MOST_HALF_MM)
+    height = _round(_SHARE * 0.5 * (travel[2][1] - travel[2][0]), _MOST_HEIGHT_MM)
+    if half is None or height is None or any(frame.rotation_deg):
+        return None
+    middle = [
+        round(0.5 * (low + high) - zero) for (low, high), zero in zip(travel, frame.offset_mm, strict=True)
+    ]
+    opening, closing = (mark.decode() for mark in profile.comment)
+    lines = ["%", "O0001"] if profile.program_number else []
+    lines += [f"{opening}square of {2 * half:g} mm and circle in the air{closing}", "G21 G90 G94 G17"]
+    lines += ["G64 P0.01"] if profile.path_tolerance else []
+    lines += _moves(middle, half, height, offset)
+    return ("\n".join([*lines, *(["%"] if profile.program_number else [])]) + "\n").encode()
+
+
+def _moves(middle: Sequence[float], half: float, height: float, offset: str) -> list[str]:
+    """A square and a circle that touches its sides."""
+    left, right = _word(middle[0] - half), _word(middle[0] + half)
+    near, far = _word(middle[1] - half), _word(middle[1] + half)
+    low, high = _word(middle[2] + 0.5 * height), _word(middle[2] + height)
+    begin = [offset, f"G0 Z{high}", f"G0 X{left} Y{near}", f"G1 Z{low} F{_word(_FEED)}"]
+    square = [f"G1 X{right}", f"G1 Y{far}", f"G1 X{left}", f"G1 Y{near}"]
+    circle = [f"G0 X{right} Y{_word(middle[1])}", f"G1 Z{low}", f"G2 I{_word(-half)}"]
+    return [*begin, *square, f"G0 Z{high}", *circle, f"G0 Z{high}", "M30"]
+
+
+def _word(value: float) -> str:
+    """A number with its decimal point, which some controls need."""
+    return f"{value + 0.0:.3f}".rstrip("0")
+
+
+def _round(value: float, most: float) -> float | None:
+    """The largest of 1, 2, 5 times a power of ten that is not above a length or `most`; None if it is too
+    short."""
+    if value < _LEAST_MM:
+        return None
+    power = 10.0 ** math.floor(math.log10(value) + 1e-9)
+    return min(most, max(step * power for step in (1.0, 2.0, 5.0) if step * power <= value * (1.0 + 1e-9)))

@@ -1,0 +1,247 @@
+"""Strokes of the holes of canned cycles, in columns: the holes of one block, or of many of one series.
+
+Lengths and positions are in program units, or in millimetres where `Levels` leads from one to the other.
+Codes are integers, ten times the G number (810 is G81). How controls differ is in `cycle_rules`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from enum import IntEnum
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.core.arrays import Array, Index, Mask
+from olp.core.errors import ProgramError
+from olp.core.geometry import PLANES
+from olp.core.values import dataclass
+from olp.program.rs274.cycle_rules import CycleRules
+
+_TAPPING = frozenset({740, 840})
+#: pecking cycles, and whether each peck comes back to R
+_PECKING = {730: False, 830: True}
+_DWELL_NEEDED = frozenset({820, 860, 890})
+#: pecks of a hole at most: a step far below the resolution of the numbers would never end
+_MAX_PECKS = 100_000
+
+
+class Step(IntEnum):
+    """What one step of a cycle does. Those up to FEED are moves."""
+
+    RAPID = 0
+    FEED = 1
+    DWELL = 2
+    STOP = 3
+    REVERSE = 4
+    RESTORE = 5
+
+
+_Recipe = tuple[tuple[Step, str], ...]
+_DRILL: _Recipe = ((Step.FEED, "z"), (Step.RAPID, "clear"))
+_DRILL_DWELL: _Recipe = ((Step.FEED, "z"), (Step.DWELL, "z"), (Step.RAPID, "clear"))
+_TAP: _Recipe = (
+    (Step.FEED, "z"), (Step.STOP, "z"), (Step.REVERSE, "z"), (Step.DWELL, "z"), (Step.FEED, "home"),
+    (Step.STOP, "home"), (Step.RESTORE, "home"), (Step.RAPID, "clear"),
+)  # fmt: skip
+_BORE: _Recipe = ((Step.FEED, "z"), (Step.FEED, "r"), (Step.RAPID, "clear"))
+_BORE_STOP: _Recipe = (
+    (Step.FEED, "z"), (Step.DWELL, "z"), (Step.STOP, "z"), (Step.RAPID, "clear"), (Step.RESTORE, "clear"),
+)  # fmt: skip
+_BORE_DWELL: _Recipe = ((Step.FEED, "z"), (Step.DWELL, "z"), (Step.FEED, "home"), (Step.RAPID, "clear"))
+
+#: From the R level on, behind the pecks: each step and the level that it ends at.
+_RECIPES: dict[int, _Recipe] = {
+    730: _DRILL,
+    740: _TAP,
+    810: _DRILL,
+    820: _DRILL_DWELL,
+    830: _DRILL,
+    840: _TAP,
+    850: _BORE,
+    860: _BORE_STOP,
+    890: _BORE_DWELL,
+}
+
+#: The cycles whose strokes are known.
+CODES = frozenset(_RECIPES)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Drilling:
+    """What (h,) holes of one cycle have in common, and the numbers of each of them.
+
+    `r`, `z`, `q` and `clearance` are in program units, and a level n lies at n * `unit` + `ground` of the
+    positions. NaN stands for a `q` (peck) or a `p` (dwell in s) that is not there. `plane` is 0 to 2 as in
+    `geometry.PLANES`. `clearance` is kept above the last peck (G83), or drawn back after it (G73).
+    """
+
+    code: int
+    plane: int
+    r: Array
+    z: Array
+    q: Array
+    p: Array
+    clearance: float
+    unit: float
+    ground: float
+    rules: CycleRules
+
+    def pick(self, which: slice | Index) -> Drilling:
+        """Some of the holes, or some of them several times."""
+        return Drilling(
+            self.code, self.plane, self.r[which], self.z[which], self.q[which], self.p[which],
+            self.clearance, self.unit, self.ground, self.rules,
+        )  # fmt: skip
+
+    def level(self, number: Array) -> Array:
+        """Positions along the tool axis of numbers in program units."""
+        return np.asarray(number * self.unit + self.ground)
+
+    @property
+    def pecks(self) -> Array:
+        """(h,) about how many pecks each hole has, or a few fewer; 0 where the cycle has none."""
+        if self.code not in _PECKING:
+            return np.zeros(len(self.r))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.nan_to_num(np.maximum((self.r - self.z) / self.q - 2.0, 0.0))
+
+    def faults(self) -> Iterator[tuple[Mask, Callable[[int], ProgramError]]]:
+        """(h,) holes that have no known strokes, and why one of them has not, in the order of the checks."""
+        name, r, z, q, p = f"G{self.code / 10:g}", self.r, self.z, self.q, self.p
+        everywhere = np.ones(len(r), bool)
+        if self.code not in CODES:
+            yield (
+                everywhere,
+                lambda _: _error(
+                    f"{name} has no geometry that is known offline; expected one of "
+                    f"{', '.join(f'G{known / 10:g}' for known in sorted(CODES))}; "
+                    "write the hole as plain moves",
+                    "OLP544",
+                ),
+            )
+        yield (
+            ~(np.isfinite(r) & np.isfinite(z)),
+            lambda _: _error(f"{name} without a finite R and Z; give both on the first block of the cycle"),
+        )
+        yield (
+            r < z,
+            lambda i: _error(f"{name} has R {r[i]:g} below the bottom {z[i]:g}; R must not be below it"),
+        )
+        if self.code in _PECKING:
+            yield (
+                ~(q > 0),
+                lambda i: _error(
+                    f"{name} needs a peck Q greater than zero, found {None if np.isnan(q[i]) else q[i]}"
+                ),
+            )
+            with np.errstate(divide="ignore", invalid="ignore"):
+                yield (
+                    (r - z) / q > _MAX_PECKS,
+                    lambda i: _error(
+                        f"{name} with Q {q[i]:g} makes more than {_MAX_PECKS} pecks; give a larger Q",
+                        "OLP543",
+                    ),
+                )
+        if self.code in _DWELL_NEEDED:
+            yield np.isnan(p), lambda _: _error(f"{name} needs a dwell P; give P0 for none")
+        yield p < 0, lambda i: _error(f"{name} has a negative dwell P {p[i]:g}; expected zero or more")
+        if not self.rules.taps_in_any_plane and self.code in _TAPPING and self.plane:
+            yield (
+                everywhere,
+                lambda _: _error(
+                    f"{name} in plane G{17 + self.plane}: LinuxCNC 2.9 taps along the wrong axes outside "
+                    "G17; use G17"
+                ),
+            )
+
+
+def _error(message: str, code: str = "OLP531") -> ProgramError:
+    return ProgramError(message, code=code)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Strokes:
+    """(n,) steps in order: the `hole` of each, what it does, the position (n, 3) after it, and the seconds of
+    dwells."""
+
+    hole: Index
+    step: npt.NDArray[np.uint8]
+    point: Array
+    seconds: Array
+
+    def __len__(self) -> int:
+        return len(self.hole)
+
+
+def strokes(
+    drilling: Drilling, start: tuple[float, float, float], place: Array, to_r: Mask, initial: float
+) -> Strokes:
+    """Strokes of holes one behind the other, which have no `faults`; rapids of zero length are left out, a
+    feed of zero length is not.
+
+    `start` is the position before the first of them, `place` (h, 2) where they are along the first and second
+    axis of the plane. `to_r` (h,) return to R only, and others to `initial`, the position on the tool axis
+    before the series, where that is above R. Pecks are counted in numbers of the program, as the control does
+    it: the last one may hang on the last bit.
+    """
+    rules, recipe = drilling.rules, _RECIPES[drilling.code]
+    first, second, third = PLANES[drilling.plane]
+    r, z = drilling.level(drilling.r), drilling.level(drilling.z)
+    clear = np.where(to_r | (r > initial), r, initial)
+    before = np.concatenate(([start[third]], clear[:-1]))
+    owner, depth = _depths(drilling)
+    full = _PECKING.get(drilling.code, False)
+    width = 3 if full else 2
+    count = np.bincount(owner, minlength=len(r))
+    size = 3 + width * count + len(recipe)
+    stop = np.cumsum(size)
+    begin = stop - size
+    hole = np.repeat(np.arange(len(r)), size)
+    step = np.zeros(len(hole), np.uint8)
+    level = np.empty(len(hole))
+    # a level below R is left before the move to the hole, or on it
+    below = initial < r if rules.rises_first else np.zeros(len(r), bool)
+    rises = below | (before <= r) if rules.rises_first else below
+    level[begin], level[begin + 1], level[begin + 2] = (
+        np.where(below, r, before), np.where(rises, clear, before), r,
+    )  # fmt: skip
+    peck = begin[owner] + 3 + width * (np.arange(len(owner)) - (np.cumsum(count) - count)[owner])
+    step[peck], level[peck] = Step.FEED, drilling.level(depth)
+    if full:
+        level[peck + 1] = r[owner]
+    level[peck + width - 1] = drilling.level(depth + drilling.clearance)
+    ends = {"z": z, "r": r, "clear": clear, "home": clear if rules.feeds_home else r}
+    for i, (what, where) in enumerate(recipe):
+        step[stop - len(recipe) + i], level[stop - len(recipe) + i] = what, ends[where]
+    came = np.vstack(([start[first], start[second]], place[:-1]))
+    keep = (step != Step.RAPID) | (level != np.concatenate(([start[third]], level[:-1])))
+    keep[begin + 1] |= (place != came).any(axis=1)
+    point = np.empty((len(hole), 3))
+    for axis, here, there in ((first, came[:, 0], place[:, 0]), (second, came[:, 1], place[:, 1])):
+        point[:, axis] = there[hole]
+        point[begin, axis] = here
+    point[:, third] = level
+    seconds = np.where(step == Step.DWELL, np.nan_to_num(drilling.p)[hole], 0.0)
+    return Strokes(hole[keep], step[keep], point[keep], seconds[keep])
+
+
+def _depths(drilling: Drilling) -> tuple[Index, Array]:
+    """(k,) the hole of each peck but the last of a hole, in order, and its depth as a number of the program.
+
+    Repeated subtraction, as the control does it: a closed form may differ by one peck through rounding.
+    """
+    if drilling.code not in _PECKING:
+        return np.zeros(0, np.int64), np.zeros(0)
+    holes, depths = [], []
+    hole = np.arange(len(drilling.r))
+    depth = drilling.r - drilling.q
+    while hole.size:
+        more = depth > drilling.z[hole]
+        hole, depth = hole[more], depth[more]
+        holes.append(hole)
+        depths.append(depth)
+        depth = depth - drilling.q[hole]
+    owner = np.concatenate(holes) if holes else hole
+    order = np.argsort(owner, kind="stable")
+    return owner[order], np.concatenate(depths)[order] if depths else depth

@@ -1,0 +1,43 @@
+"""What stands in for NumPy's functions of sets gives the same; NumPy itself is the judge."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+
+from olp.core.arrays import distinct, distinct_rows, median
+
+finite = st.one_of(st.sampled_from([0.0, -0.0, 1.0]), st.floats(-1e6, 1e6))
+numbers = arrays.arrays(np.float64, st.integers(1, 40), elements=finite)
+whole = arrays.arrays(st.sampled_from([np.int32, np.int64, np.uint8]), arrays.array_shapes(max_dims=2))
+rows = arrays.arrays(np.float64, st.tuples(st.integers(0, 20), st.just(3)), elements=finite)
+
+
+@given(st.one_of(numbers, whole))
+def test_distinct_values_are_those_of_numpy(values: npt.NDArray[np.generic]) -> None:
+    ours, judged = distinct(values), np.unique(values)
+    assert ours.dtype == judged.dtype
+    assert np.array_equal(ours, judged)
+
+
+def test_nothing_has_no_distinct_values() -> None:
+    assert distinct(np.zeros(0, np.int64)).shape == (0,)
+
+
+@given(rows)
+def test_distinct_rows_are_those_of_numpy(values: npt.NDArray[np.float64]) -> None:
+    assert np.array_equal(distinct_rows(values), np.unique(values, axis=0))
+
+
+@given(numbers)
+def test_the_median_is_that_of_numpy_to_the_last_bit(values: npt.NDArray[np.float64]) -> None:
+    assert median(values) == np.median(values)
+
+
+@pytest.mark.parametrize(("values", "middle"), [([3.0], 3.0), ([4.0, 1.0], 2.5), ([9.0, 1.0, 2.0], 2.0)])
+def test_the_median_by_hand(values: list[float], middle: float) -> None:
+    assert median(np.array(values)) == middle
