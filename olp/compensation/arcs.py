@@ -30,6 +30,10 @@ _PIECES = 20_000
 _PIECES_PER_ARC = 16
 #: rad; arcs beyond this sweep need not have equal radii at both ends
 WIDE = 0.95 * np.pi
+#: rad; a piece that sweeps more may be a whole turn whose ends nearly meet
+_NEARLY_WHOLE = 1.9 * np.pi
+#: digits that rounding moves the two ends of a turn apart at most, and one to spare
+_CLOSE_DIGITS = 3.0
 #: samples at a time, so that memory is small
 _BATCH = 1 << 16
 #: (3, 3) axes of each plane: first, second, third
@@ -60,9 +64,11 @@ def subdivide_arcs(
     tolerance: float,
     turning: Mask | None,
     band: float,
+    digit: float = 0.0,
 ) -> Cuts:
     """Cuts (move, share, target) of the arcs that are `free` to be split and that one arc does not fit within
-    `tolerance` mm; where an axis has backlash (`turning`), also where that axis turns round."""
+    `tolerance` mm; where an axis has backlash (`turning`), also where that axis turns round. A whole turn
+    that does not come back to its start is cut too, as its last `digit` (mm) would decide about a turn."""
     arcs = path.arcs
     arc = np.flatnonzero(free[arcs.move])
     if not arc.size:
@@ -88,6 +94,7 @@ def subdivide_arcs(
             "this arc exceeds the tolerance however finely it is divided into arcs; raise --tolerance-um",
             line=int(path.line[arcs.move[pieces.arc[0]]]),
         )
+    done = [_opened(path, model, target, p, tools, digit) for p in done]
     arc = np.concatenate([p.arc for p in done])
     end = np.concatenate([p.end for p in done])
     inner = end < 1.0
@@ -95,6 +102,38 @@ def subdivide_arcs(
     starts, ends = _ends(path, target, arc)
     centre = arcs.centre_mm[arc] + (ends - path.end_mm[arcs.move[arc]])
     return arcs.move[arc], end, arc_points(starts, ends, centre, arcs.plane[arc], arcs.sweep_rad[arc], end)
+
+
+def _opened(
+    path: Toolpath, model: ErrorModel, target: Array, pieces: Pieces, tools: Array, digit: float
+) -> Pieces:
+    """The same pieces, and half a turn cut off at the end of those that are whole turns, or nearly, and whose
+    commands do not meet: as written they could end before their start or behind it."""
+    arcs = path.arcs
+    sweep = np.abs(arcs.sweep_rad[pieces.arc]) * (pieces.end - pieces.begin)
+    whole = np.flatnonzero(sweep > _NEARLY_WHOLE)
+    if not whole.size:
+        return pieces
+    part = pieces.pick(whole)
+    bend = sampled(path, model, target, part, tools, 2)
+    plane = arcs.plane[part.arc]
+    first, last = bend.command[:, 0], bend.command[:, -1]
+    gap = np.hypot(*arms(last, first, plane))
+    radius = np.hypot(*arms(bend.point[:, 0], bend.centre, plane))
+    turns = sweep[whole] / (2 * np.pi)
+    short = np.abs(turns - np.rint(turns)) * 2 * np.pi * radius
+    moved = np.hypot(*arms(last - bend.point[:, -1], first - bend.point[:, 0], plane))
+    odd = np.flatnonzero((short < 2 * moved + _CLOSE_DIGITS * digit) & (np.maximum(gap, moved) > 1e-9))
+    cut = part.pick(odd)
+    middle = cut.end - np.pi / np.abs(arcs.sweep_rad[cut.arc])
+    kept = np.ones(len(pieces), bool)
+    kept[whole[odd]] = False
+    rest = pieces.pick(kept)
+    return Pieces(
+        np.concatenate((rest.arc, cut.arc, cut.arc)),
+        np.concatenate((rest.begin, cut.begin, middle)),
+        np.concatenate((rest.end, middle, cut.end)),
+    )
 
 
 def _divided(pieces: Pieces, count: Index) -> Pieces:

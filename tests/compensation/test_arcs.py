@@ -318,6 +318,19 @@ def test_parts_of_one_round_are_equal_and_lie_on_the_arc() -> None:
     assert moved[2] == pytest.approx(target + np.array([1.0, 2.0, 3.0]))
 
 
+def test_a_whole_turn_that_does_not_come_back_is_cut_half_a_turn_before_its_end() -> None:
+    climb = linear(np.array([[0.0, 0.0, 1e-4], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]))
+    for degrees in (360.0, -360.0, 3 * 360.0):
+        helix = arc(20.0, 0.0, 10.0, centre=(0.0, 0.0, 0.0), degrees=degrees)
+        path = toolpath(feed(20.0, 0.0, 0.0), helix)
+        assert cuts(path, climb) == {1: pytest.approx([1 - 180 / abs(degrees)])}
+        # nothing leads its ends apart
+        assert cuts(path, linear(np.diag([1e-4, 1e-4, 1e-4]))) == {}
+    most = arc(*(20 * np.array([math.cos(-0.2), math.sin(-0.2)])), 10.0, centre=(0.0, 0.0, 0.0),
+               degrees=360.0 - math.degrees(0.2))  # fmt: skip
+    assert cuts(toolpath(feed(20.0, 0.0, 0.0), most), climb) == {}
+
+
 def test_an_arc_that_stays_an_arc_is_not_cut() -> None:
     path = toolpath(*CIRCLE, QUARTER)
     assert cuts(path, linear(np.diag([1e-3, 1e-3, 5e-3]))) == {}

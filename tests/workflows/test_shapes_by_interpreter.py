@@ -91,6 +91,17 @@ def helices(rng: np.random.Generator) -> str:
     )
 
 
+def threads(rng: np.random.Generator) -> str:
+    """Threads of whole turns in every plane, both ways, with P and without, and in G91; and nearly whole
+    ones."""
+    r, lead = rng.uniform(2, 40), rng.uniform(0.5, 12)
+    turns = f"G3 X0 Y0 Z{10 - lead:.3f} I{r:.3f}\nG2 X0 Y0 Z10 I{r:.3f} J-{r / 2:.3f}\nG3 Z2 I{r:.3f} P4\n"
+    counted = f"G91\nG3 Z{lead:.3f} I{r:.3f}\nX0 Y0 Z{lead:.3f} I{r:.3f}\nG2 Z-{lead:.3f} J{r:.3f} P3\nG90\n"
+    others = f"G18 G3 Y{lead:.3f} K{r:.3f}\nG2 Y0 I{r:.3f} K1 P2\nG19 G3 X{lead:.3f} J{r:.3f}\nG17\n"
+    nearly = f"G1 X0 Y0 Z5\nG3 X0 Y-0.002 Z2 I{r:.3f}\nG2 X0 Y0 Z5 I{r:.3f}\n"
+    return turns + counted + others + nearly
+
+
 def deleted(rng: np.random.Generator) -> str:
     return (
         f"G1 X{at(rng, 50, 90)} Y5 Z1\n/G1 X90 Y{at(rng, 5, 9)} Z2\n/X-150 Y-150\nG1 X4 Y4 Z4\n"
@@ -139,6 +150,9 @@ SHAPES = {
     "bent G91": Shape(incremental, {"waves": 6.0}, {}, True),
     "helices": Shape(helices),
     "helices with backlash": Shape(helices, {"backlash_um": PLAY}, {}, True),
+    "threads": Shape(threads, {"increment_mm": 0.0001, "peak_um": (5.0, 10.0), "waves": 0.3}, {}, True),
+    "threads in coarse digits": Shape(threads, {}, {}, True),
+    "threads with backlash": Shape(threads, {"backlash_um": PLAY}, {}, True),
     "holes": Shape(holes),
     "holes with backlash": Shape(holes, {"backlash_um": PLAY}),
     "holes expanded": Shape(holes, {}, {"expand_cycles": True}),
