@@ -133,10 +133,10 @@ CASES = {
     ),
     "nearly a whole circle": (
         "scale",
-        # both ends become 5.000
+        # both ends become 5.000, so half a turn is cut off
         "G1 X5.000 F100\nG3 X5.001 Y0 I0.0005 J-10\n",
-        "G1 X5.000 F100\nG3 X5.000 Y0 I0.0000 J-9.9990\n",
-        (3, 0, 0),
+        "G1 X5.000 F100\nG3 X5.000 Y-19.998 I0.0000 J-9.9990\nX5.000 Y0.000 I0.0000 J9.9990\n",
+        (4, 0, 1),
     ),
     "as many digits as most words have": (
         "leans",
