@@ -70,9 +70,11 @@ def _largest(vectors: Array) -> Array:
 
 
 def bent(model: ErrorModel, target_mm: Array, tool_mm: Array, play: Array | None = None) -> Array:
-    """Commands for samples between waypoints: one step of the iteration where errors are small (then it is
-    right to a few nanometres), two elsewhere."""
+    """Commands for samples between waypoints: one step of the iteration where the error is small (then it is
+    right to a few nanometres), two elsewhere; whatever the samples beside it are."""
     error = model.error(target_mm, tool_mm, play)
-    if np.abs(error).max(initial=0.0) > _SMALL_MM:
-        error = model.error(target_mm - error, tool_mm, play)
+    some = np.flatnonzero(_largest(error) > _SMALL_MM)
+    if some.size:
+        tool = tool_mm if tool_mm.ndim == 1 else tool_mm[some]
+        error[some] = model.error((target_mm - error)[some], tool, None if play is None else play[some])
     return np.asarray(target_mm - error, float)

@@ -119,6 +119,15 @@ def test_any_size_of_bands_gives_the_same_of_contours(machine: Path, monkeypatch
     check(monkeypatch, text, machine, contour=True)
 
 
+@pytest.mark.parametrize("seed", some_fast(range(6), 2))
+def test_any_size_of_bands_gives_the_same_where_errors_are_large(
+    seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Samples between waypoints take a second step where the error is large, whatever is beside them."""
+    machine = random_machine(tmp_path, seed, Recipe(peak_um=(400.0, 600.0), waves=8.0))
+    check(monkeypatch, random_program(seed, features=FEATURES, blocks=8), machine, sizes=(1, 7))
+
+
 def coil(count: int) -> Iterator[str]:
     for k in range(count):
         yield f"G1 X{50 + 0.02 * math.cos(k / 9) + 0.01 * k:.4f} Y{50 + 0.03 * math.sin(k / 9):.4f}"
