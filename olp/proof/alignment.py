@@ -134,19 +134,21 @@ class Alignment:
 
         Parts are as long together as the whole. So the length of the path tells about where each unit ends.
         """
-        rows = np.arange(i, min(i + size, len(self.mine)))
+        # what comes behind a unit has to be on the page
+        rows = np.arange(i, min(i + size, len(self.mine) - (not self.mine.final)))
         before = self.length[rows] - self.length[i] + self.gone[j]
         about = np.searchsorted(self.gone[1:], before + np.diff(self.length[i : i + len(rows) + 1]))
         choice = np.clip(about[:, None] + _BESIDE, j, len(self.theirs) - 1)
         near = self._near(np.repeat(rows, len(_BESIDE)), choice.ravel()).reshape(choice.shape)
         near &= self.gone[choice + 1] - before[:, None] >= self.least[rows][:, None]
+        near &= ~self._goes_on(np.repeat(rows, len(_BESIDE)), choice.ravel()).reshape(choice.shape)
         ends: Index = choice[np.arange(len(rows)), near.argmax(axis=1)]
         begin = np.concatenate(([j], ends[:-1] + 1))
         inserted = ends - begin
         good = near.any(axis=1) & (inserted >= 0) & (inserted <= _SPARE)
         good &= ends - rows <= self._room(0, 0)
         if not self.theirs.final:
-            good &= about + _BESIDE[-1] < len(self.theirs)
+            good &= about + _BESIDE[-1] + 1 < len(self.theirs)
         count = len(good) if good.all() else int(np.argmin(good))
         inserted = inserted[:count]
         if inserted.any():
@@ -166,11 +168,12 @@ class Alignment:
         is not plain."""
         ahead = np.arange(j, j + min(self._room(i, j), _SPARE) + 1)
         gone = self.gone[ahead + 1] - self.gone[j]
-        end = np.flatnonzero(self._near(np.full(len(ahead), i), ahead) & (gone >= self.least[i]))
+        of = np.full(len(ahead), i)
+        end = np.flatnonzero(self._near(of, ahead) & (gone >= self.least[i]) & ~self._goes_on(of, ahead))
         if not end.size:
             return None
         count = int(end[0])
-        of = np.full(count, i)
+        of = of[:count]
         astray = (self._along(of, ahead[:count]) >= self.near) | self._unlike(of, ahead[:count])
         return None if astray.any() else count
 
@@ -178,6 +181,16 @@ class Alignment:
         """Whether units j are no parts of nominal units i: a part of a rapid is a rapid, and of no other."""
         unlike: Mask = (self.mine.kind[i] == Kind.RAPID) != (self.theirs.kind[j] == Kind.RAPID)
         return unlike
+
+    def _goes_on(self, i: Index, j: Index) -> Mask:
+        """Whether units i go on behind units j: what comes there ends as they do, and is no part of the next
+        unit. Such is a step that takes up backlash within a short move."""
+        on: Mask = (i + 1 < len(self.mine)) & (j + 1 < len(self.theirs))
+        some = np.flatnonzero(on)
+        on[some] = self._unlike(i[some] + 1, j[some] + 1)
+        some = np.flatnonzero(on)
+        on[some] = self._near(i[some], j[some] + 1)
+        return on
 
     def _along(self, i: Index, j: Index) -> Array:
         """(m,) mm, how far the ends of units j (m,) are from nominal units i (m,) as lines or arcs."""

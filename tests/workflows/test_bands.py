@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import random
 import runpy
 from collections.abc import Iterator, Sequence
 from itertools import chain
@@ -137,6 +138,26 @@ def test_the_play_goes_on_from_band_to_band(monkeypatch: pytest.MonkeyPatch, mac
     """In a slow coil both axes turn round again and again, and most moves are shorter than the dead band."""
     text = "\n".join(["G21 G90 G54 G61", "G0 X50 Y50 Z0", "F600", *coil(120), "M2"]) + "\n"
     check(monkeypatch, text.encode(), machine, sizes=(5,))
+
+
+def tiny(seed: int) -> Iterator[str]:
+    """Feeds and rapids that are often shorter than what the proof takes for one place."""
+    rng = random.Random(seed)
+    at = [50.0, 50.0]
+    digits, size = rng.choice((3, 4)), rng.choice((0.001, 0.003, 0.01))
+    for _ in range(20):
+        step = rng.choice((size, size, size * rng.random(), 3.0))
+        at = [value + rng.choice((-step, step, 0.0)) for value in at]
+        yield f"{rng.choice(('G0', 'G1', 'G1'))} X{at[0]:.{digits}f} Y{at[1]:.{digits}f}"
+
+
+@pytest.mark.parametrize("seed", some_fast(range(1, 60, 7), 2))
+def test_steps_within_short_moves_beside_rapids_are_their_own(
+    seed: int, machine: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = "\n".join(["G21 G90 G54 G61", "G0 X50 Y50 Z0", "F600", *tiny(seed), "M2"]) + "\n"
+    assert isinstance(corrected(text.encode(), machine), tuple)
+    check(monkeypatch, text.encode(), machine, sizes=(1, 5))
 
 
 def test_a_refusal_in_a_later_band_names_its_line(monkeypatch: pytest.MonkeyPatch) -> None:
