@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
+import sqlite3
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
-from olp.core.errors import InputError, OlpError
+from olp.core.errors import CannotCompute, InputError, OlpError, UsageError
 from olp.core.values import dataclass
 from olp.files.folders import digest_of, from_root
 from olp.files.write import PathLike, make_folder, write_bytes
@@ -47,14 +49,49 @@ class ReleaseLine:
     programs: Mapping[str, str]
 
 
+@contextmanager
+def writing(folder: PathLike) -> Iterator[None]:
+    """The time in which this process alone writes into `folder` and its history. Raises CannotCompute where
+    another one does.
+
+    The lock is that of an SQLite file, which the system takes back however a process ends.
+    """
+    place = _named(folder)
+    path = place.with_name(f"{place.name}.history.lock")
+    make_folder(path.parent)
+    with closing(_locked(path, place)):
+        yield
+
+
+def _named(folder: PathLike) -> Path:
+    """The path of an output folder. Raises UsageError where it has no name."""
+    place = from_root(folder)
+    if not place.name:
+        raise UsageError("has no name, so no history lies beside it", file=str(folder))
+    return place
+
+
+def _locked(path: Path, place: Path) -> sqlite3.Connection:
+    try:
+        lock = sqlite3.connect(path, timeout=0.0, isolation_level=None)
+        lock.execute("BEGIN EXCLUSIVE")
+    except sqlite3.Error as error:
+        why = "another olp batch is writing there; call again when it has ended"
+        if error.sqlite_errorname != "SQLITE_BUSY":
+            why = f"the lock {path.name} beside it cannot be taken ({error})"
+        raise CannotCompute(why, file=str(place)) from None
+    return lock
+
+
 class History:
     """The history of an output folder, read once and appended to.
 
     `last` is the last record of each output, `releases` are in the order of their lines."""
 
     def __init__(self, folder: PathLike) -> None:
-        """Read the history of `folder`; there may be none. Raises InputError where it is damaged."""
-        self.folder = from_root(folder)
+        """Read the history of `folder`; there may be none. Raises InputError where it is damaged,
+        UsageError for a folder without a name."""
+        self.folder = _named(folder)
         self.path = self.folder.with_name(f"{self.folder.name}.history.jsonl")
         self.last: dict[str, Record] = {}
         self.releases: dict[str, ReleaseLine] = {}
@@ -90,6 +127,13 @@ class History:
     def unchanged(self, record: Record) -> bool:
         """Whether all that was written with a record is there, and is as it was written."""
         return all(digest_of(self.folder / name) == digest for name, digest in record.outputs.items())
+
+    def remove_older(self, record: Record, names: Iterable[str]) -> None:
+        """Remove what was written with an older record and is none of the `names` written now. What was
+        changed since stays. Raises OSError where the system refuses."""
+        for name in record.outputs.keys() - set(names):
+            if self.owns(name):
+                (self.folder / name).unlink(missing_ok=True)
 
     def gone(self, record: Record) -> bool:
         """Whether neither the program nor its output is there: nothing is to be said of it any more."""

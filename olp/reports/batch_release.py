@@ -72,6 +72,8 @@ def _change_sentence(report: Report) -> str:
     total, outside, others = len(report["programs"]), report["outside"], len(report["other_machines"])
     machine = report["calibration"]["machine"]
     text = f"{outside} of {total} released programs of {machine} are outside tolerance with this calibration."
+    if not total:
+        text = f"Nothing is judged: no released program is for {machine}; give another calibration."
     return text + (f" Not judged, as they are for other machines: {others}." if others else "")
 
 

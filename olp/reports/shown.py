@@ -34,8 +34,8 @@ _DECIMALS_OF_SMALL = 6
 _NAMES = "um|mm/min|mm/s3|mm/s2|mm/s|mm"
 _NUMBER = r"[<>]?[-+]*\d+(?:\.\d+)?(?:e[-+]?\d+)?"
 _PART = rf"(?:[XYZ] )?{_NUMBER}(?: to {_NUMBER})?"
-#: Numbers before a unit: `0.20 um`, `0 to 600 mm`, `X 0 to 600, Y 0 to 400 mm`.
-_QUANTITY = re.compile(rf"(?<!line )(?<!lines )(?<![\w.])({_PART}(?:, {_PART})*) ({_NAMES})(?![\w/])")
+#: Numbers before a unit: `0.20 um`, `0 to 600 mm`, `X 0 to 600, Y 0 to 400 mm`; not in `plate 300 mm.ngc`.
+_QUANTITY = re.compile(rf"(?<!line )(?<!lines )(?<![\w.])({_PART}(?:, {_PART})*) ({_NAMES})(?![\w/]|\.\w)")
 #: The unit of a column or a title: its last word, or after "in".
 _OF_COLUMN = re.compile(rf"(?:^|[ ,])({_NAMES})(?= [XYZ]$|$)")
 _IN = re.compile(rf"\bin ({_NAMES})\b")

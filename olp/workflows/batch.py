@@ -15,7 +15,7 @@ from olp.core.values import dataclass
 from olp.core.version import __version__
 from olp.errormodel.known import KnownErrors
 from olp.files.folders import digest_of
-from olp.files.history import History, Record
+from olp.files.history import History, Record, writing
 from olp.files.sources import in_parcel
 from olp.files.write import make_folder, read_bytes, write_files
 from olp.findings.rule import Severity
@@ -105,7 +105,11 @@ def batch(
 
 def run(where: Where, options: BatchOptions, opener: Opener, progress: Progress | None = None) -> Batch:
     """As `batch`. `opener` gives the workers where there is work to do; they are closed at the end."""
-    tell = progress or silent
+    with writing(where.output):
+        return _run(where, options, opener, progress or silent)
+
+
+def _run(where: Where, options: BatchOptions, opener: Opener, tell: Progress) -> Batch:
     tell("look for programs", 0.0)
     found = find(where)
     plant = _Plant(where, options, found)
@@ -200,6 +204,7 @@ class _Plant:
         if written and self._is_foreign(case):
             self._settle(case, self._foreign(case))
             return
+        before = self._history.last.get(case.output)
         if outcome.lasting:
             inputs = {self._history.named(name): digest(data) for name, data in files.items()}
             outputs = {name: hashlib.sha256(data).hexdigest() for name, data in written.items()}
@@ -210,8 +215,11 @@ class _Plant:
             for target in targets:
                 make_folder(target.parent)
             write_files(targets, force=True, inputs=[case.program])
-        except OlpError as error:
-            self._settle(case, {"message": str(error), "exit_code": error.exit_code})
+            if written and before is not None:
+                self._history.remove_older(before, written)
+        except (OlpError, OSError) as error:
+            code = error.exit_code if isinstance(error, OlpError) else OlpError.exit_code
+            self._settle(case, {"message": str(error), "exit_code": code})
             self._halted = not self._options.keep_going
             return
         self._settle(case, outcome.row, "written")

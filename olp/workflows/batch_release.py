@@ -14,8 +14,8 @@ from olp.core.errors import CannotCompute, InputError, UsageError
 from olp.core.progress import Progress, silent
 from olp.core.values import dataclass
 from olp.files.calibration.reader import files_beside
-from olp.files.folders import digest_of, from_root
-from olp.files.history import History, Record, ReleaseLine
+from olp.files.folders import digest_of
+from olp.files.history import History, Record, ReleaseLine, writing
 from olp.files.releases import Release, check_name, packed, read_release
 from olp.files.sources import Sources, in_parcel
 from olp.files.write import make_folder, read_bytes, write_files
@@ -37,7 +37,11 @@ def release(
     is no history.
     """
     check_name(name)
-    history = _history(output)
+    with writing(output):
+        return _marked(_history(output), name, date, keep_going=keep_going)
+
+
+def _marked(history: History, name: str, date: datetime.date | None, *, keep_going: bool) -> dict[str, Any]:
     # names differ by their case on some systems only
     if name.casefold() in map(str.casefold, history.releases):
         raise UsageError(f"--release {name}: there is such a release already; take another name")
@@ -119,7 +123,7 @@ def what_if(
         "programs": sorted(rows, key=_rank),
         "other_machines": sorted(others),
         "outside": len(outside),
-        "exit_code": max([1 if outside else 0, *codes]),
+        "exit_code": max([1 if outside or not rows else 0, *codes]),
     }  # fmt: skip
 
 
@@ -136,8 +140,6 @@ class _Case:
 
 
 def _history(output: PathLike) -> History:
-    if not from_root(output).name:
-        raise UsageError("has no name, so no history lies beside it", file=str(output))
     history = History(output)
     if not history.last:
         raise InputError(

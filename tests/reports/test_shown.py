@@ -27,6 +27,8 @@ PLATE = ("correct", "-j", PROGRAMS / "gantry-plate" / "job.toml")
         ("in line 12, 254.00 um max", "in line 12, 0.01000 in max"),
         ("11.5 um/m/K and 20 urad", "11.5 um/m/K and 20 urad"),
         ("3 maximum, 12 moves, 20 degC", "3 maximum, 12 moves, 20 degC"),
+        ("plate 300 mm.ngc is 254 mm long.", "plate 300 mm.ngc is 10 in long."),
+        ("It is off by 254 um.", "It is off by 0.01000 in."),
     ],
 )  # fmt: skip
 def test_prose(text: str, inches: str) -> None:

@@ -11,12 +11,14 @@ import pytest
 from cases.plants import START, contents, correct_all, moved, plant, program, states
 
 import olp
-from olp.core.errors import InputError, UsageError
+from olp.core.errors import CannotCompute, InputError, UsageError
 from olp.errormodel.known import KnownErrors
+from olp.files.history import writing
 from olp.workflows import report as reports
 from olp.workflows.batch import BatchOptions, batch, run
 from olp.workflows.batch_find import Where
 from olp.workflows.batch_pool import Here, opened
+from olp.workflows.batch_release import release
 from olp.workflows.correct import CorrectOptions
 from olp.workflows.session import Session
 
@@ -391,6 +393,26 @@ def test_a_subprogram_is_an_input(folder: Path) -> None:
     assert states(correct_all(folder, options=options, **words))["calling.ngc"] == "written"
     alone = olp.correct(folder / "parts" / "calling.ngc", folder / "mill" / "machine.toml", flatten=True)
     assert (folder / "out" / "calling.ngc").read_bytes() == alone.data
+
+
+def test_a_report_that_is_not_asked_for_any_more_goes(folder: Path) -> None:
+    """A report of the last correction beside the program of this one would tell of another program."""
+    correct_all(folder, reports="html")
+    kept = folder / "out" / "brackets" / "two.ngc.report.html"
+    kept.write_bytes(b"my notes")
+    correct_all(folder)
+    assert not (folder / "out" / "one.ngc.report.html").exists()
+    assert kept.read_bytes() == b"my notes"
+
+
+def test_two_calls_do_not_write_into_one_folder_at_once(folder: Path) -> None:
+    with writing(folder / "out"):
+        with pytest.raises(CannotCompute, match="another olp batch is writing there"):
+            correct_all(folder)
+        assert not (folder / "out").exists()
+    correct_all(folder)
+    with writing(folder / "out"), pytest.raises(CannotCompute, match="another olp batch"):
+        release(folder / "out", "first")
 
 
 # -- workers -------------------------------------------------------------------------------------

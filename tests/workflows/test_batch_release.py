@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import json
+import re
 import zipfile
 from pathlib import Path
 
@@ -14,6 +15,7 @@ import olp
 from olp.core.errors import InputError, UsageError
 from olp.files.history import History
 from olp.files.releases import check_name, read_release
+from olp.reports.batch_release import changed
 from olp.workflows.batch import BatchOptions
 from olp.workflows.batch_find import Where
 from olp.workflows.batch_pool import Here, Pool
@@ -142,6 +144,17 @@ def test_a_new_calibration_says_what_verify_says(folder: Path) -> None:
     # 30 urad more over 100 mm
     assert row["largest_um"] == pytest.approx(3.0, abs=0.9)
     assert report["exit_code"] == 1
+
+
+def test_a_calibration_of_another_machine_judges_nothing(folder: Path) -> None:
+    correct_all(folder)
+    release(folder / "out", "may")
+    new = new_calibration(folder, 233.3)
+    new.write_text(re.sub(r'(?m)^machine = ".*"', 'machine = "lathe"', new.read_text()))
+    report = what_if(folder / "out", new, here)
+    assert not report["programs"] and len(report["other_machines"]) == 3
+    assert report["exit_code"] == 1
+    assert "no released program is for lathe" in changed(report)
 
 
 def test_a_part_tolerance_decides_where_it_is_given(folder: Path) -> None:
