@@ -23,6 +23,8 @@ from olp.proof.judgement import Judgements
 from olp.proof.measured import SHOWN
 from olp.proof.proof import Counts, Proof
 
+#: codes of remarks of readers
+_REMARKS = {"thermal": "OLP412", "arcs": "OLP413", "transform": "OLP414"}
 #: blocks that the report lists
 _WORST = 5
 
@@ -35,10 +37,8 @@ def program_findings(program: Program, setup: Setup, *, contour: bool) -> list[F
         if name == "unit":
             which = "the program has neither G20 nor G21 before the first move" if text == "mm" else text
             findings.append(finding("OLP301", f"{which}; millimetres assumed", [line]))
-        elif name == "thermal":
-            findings.append(finding("OLP412", text, [line]))
-        elif name == "arcs":
-            findings.append(finding("OLP413", text, [line]))
+        elif name in _REMARKS:
+            findings.append(finding(_REMARKS[name], text, [line]))
     findings += remark_findings(program)
     whole = ((path.flag & np.uint8(Flag.WHOLE)) != 0) & (path.kind != Kind.PROBE)
     if whole.any() and not program.verbatim:

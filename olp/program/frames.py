@@ -40,6 +40,23 @@ def turned(turn: Turn | None, vector: Vector) -> Vector:
     return (x, y, z)
 
 
+def product(outer: Turn | None, inner: Turn | None) -> Turn | None:
+    """The rows of one rotation after another, `inner` first."""
+    if outer is None or inner is None:
+        return outer if inner is None else inner
+    a, b, c = ((float(x), float(y), float(z)) for x, y, z in (np.array(outer) @ np.array(inner)).tolist())
+    return (a, b, c)
+
+
+@dataclass(frozen=True, slots=True)
+class Placement:
+    """Where points of a program lie in its work offset: `turn` p + `shift_mm`; `turn` is None where nothing
+    turns."""
+
+    turn: Turn | None
+    shift_mm: Vector
+
+
 def tool_vector_of(setup: Setup, number: int, line: int) -> Vector:
     """Gauge point to tip of a tool. Raises ProgramError where it is not defined."""
     tool = setup.tool(number)
@@ -207,6 +224,7 @@ class FrameTable:
         work: WorkOffset,
         line: int,
         *,
+        inner: Placement | None = None,
         unit_mm: float,
         tool: int | None = None,
         length: Vector = ZERO,
@@ -216,18 +234,24 @@ class FrameTable:
         compensation: CutterCompensation | None = None,
     ) -> int:
         """The number of a frame: a work offset, and a tool that points along `axis`, a direction of the
-        machine from tip to gauge point. Raises ProgramError for a tilted tool with X or Y in its vector, and
-        ConfigError where the constant of a setter of lengths is not known."""
+        machine from tip to gauge point. `inner` places the points of the program in the work offset. Raises
+        ProgramError for a tilted tool with X or Y in its vector, and ConfigError where the constant of a
+        setter of lengths is not known."""
         if axis != UP:
             length, tool_vector = (_tilted(v, axis, tool, line) for v in (length, tool_vector))
-        x, y, z = (o + n for o, n in zip(work.offset_mm, length, strict=True))
+        turn, offset = turn_of(work.rotation_deg), work.offset_mm
+        if inner is not None:
+            shift = turned(turn, inner.shift_mm)
+            turn = product(turn, inner.turn)
+            offset = (offset[0] + shift[0], offset[1] + shift[1], offset[2] + shift[2])
+        x, y, z = (o + n for o, n in zip(offset, length, strict=True))
         lengths: tuple[LengthError, ...] = ()
         if length_active and tool is not None:
             lengths = length_errors_of(self.setup, tool, touch_tool_of(work), axis)
         frame = Frame(
             unit_mm=unit_mm, offset_mm=(x, y, z), length_mm=length, tool_mm=tool_vector, tool=tool,
             work_offset=work.name, touched=touch_of(self.setup, work, line), lengths=lengths,
-            turn=turn_of(work.rotation_deg), payload_kg=self.setup.job.payload_kg, compensation=compensation,
+            turn=turn, payload_kg=self.setup.job.payload_kg, compensation=compensation,
         )  # fmt: skip
         return self._known(frame)
 

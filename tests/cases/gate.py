@@ -360,6 +360,10 @@ CASES: dict[str, tuple[Call, Call]] = {
         Call(b"GOTO/5,1,0\n" + TURN, APT, controller="apt"),
         Call(b"GOTO/10,-10,0\n" + TURN, APT, controller="apt"),
     ),
+    "OLP414": (
+        Call(b"TRANS/5,0,0\nGOTO/5,1,0\nFINI\n", APT, controller="apt"),
+        Call(b"TRANS/0,0,0\nGOTO/5,1,0\nFINI\n", APT, controller="apt"),
+    ),
     "OLP420": (Call(tables=tool(151.1), **total_map()), Call(tables=tool(150.9), **total_map())),
     "OLP421": (
         Call(b"G1 X100\n(olp payload 30)\nG1 X90\n", **load(0.11)),

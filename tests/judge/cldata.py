@@ -21,13 +21,22 @@ TEXT = ("PARTNO", "PPRINT", "INSERT", "REMARK", "TITLE")
 QUIET = re.compile(
     r"(UNITS?|PARTNO|PPRINT|INSERT|REMARK|TITLE|SPINDL|COOLNT|CUTTER|SELECT|SETUP|TRNTYP|CSI_\w+|MACHIN|FEDRAT"
     r"|CUTCOM|PAINT|TOOL PATH|MULTAX|DELAY|STOP|OPSTOP|MSYS|CSYS|LOAD|LOADTL|CYCLE|INTOL|OUTTOL|END-OF-PATH"
-    r"|SEQNO|DISPLY|FROM)\b"
+    r"|SEQNO|DISPLY|FROM|SET/MODE|BOX|AUXFUN|PREFUN|CATPROCESS|TLAXIS|TPRINT|OPNAME|APPLY|DRESS|REWIND|OPSKIP"
+    r"|ROTATE/\w+,ATANGL,0|STOCK|SELCTL|CLEARP|LEADER|MODE|TLDATA|INDEX|END)\b"
 )
 
 
 def at(frame: Frame, point: Sequence[float], unit: float, length: np.ndarray) -> np.ndarray:
     rotation, origin = frame
     return np.asarray(rotation @ (unit * np.array(point, float)) + origin + length)
+
+
+def moved(frame: Frame, around: Sequence[Sequence[float]], lift: Sequence[float], unit: float) -> Frame:
+    """The frame of points that a 3x4 matrix moves first, and a shift then."""
+    rotation, origin = frame
+    turn = np.array([row[:3] for row in around]) if around else np.eye(3)
+    shift = np.array([row[3] for row in around]) if around else np.zeros(3)
+    return rotation @ turn, origin + rotation @ (unit * (shift + np.array(lift)))
 
 
 def numbers(text: str) -> list[float]:
@@ -109,11 +118,13 @@ def read_apt(
     tall = tools.get(tool, 0.0)
     arc: tuple[np.ndarray, np.ndarray, int] | None = None
     direction, size = None, 0.0
+    around: list[Sequence[float]] = []
+    lift: Sequence[float] = (0.0, 0.0, 0.0)
     for line, text in joined(data):
         major = text.partition("/")[0].strip()
         value = numbers(text.partition("/")[2]) if not text.startswith(TEXT) else []
         place = systems.index(system) + 1
-        frame = frames[first if place == 1 else f"CSYS{place}"]
+        frame = moved(frames[first if place == 1 else f"CSYS{place}"], around, lift, unit)
         rotation = frame[0]
         if major == "RAPID":
             rapid = True
@@ -164,6 +175,15 @@ def read_apt(
         elif major in ("LOADTL", "LOAD"):
             tool, size = int(value[0]), 1.0
             tall = tools[tool]
+        elif major == "TRACUT":
+            around = [value[0:4], value[4:8], value[8:12]] if len(value) == 12 else []
+            if not around and "NOMORE" not in text:
+                raise KeyError(f"line {line}: {text}")
+        elif major == "TRANS":
+            lift = value
+        elif major == "GOHOME":
+            here = at(frame, value[:3], unit, length)
+            moves.add(line, RAPID, here, length, tool, -tall * aim)
         elif major in ("UNITS", "UNIT"):
             unit = 25.4 if "INCH" in text else 1.0
         elif major in ("CSYS", "MSYS"):

@@ -140,4 +140,15 @@ RULES = (
         "Compare one arc with the simulation of the CAM system (olp view), or have it write GOTOs for arcs.",
         "`CIRCLE/0,0,0,0,0,-1,5,0.06,0.5,10,0` behind a corner.",
     ),
+    _rule(
+        "OLP414",
+        "transform of points assumed",
+        Severity.WARNING,
+        "TRACUT or TRANS moves points. The points after it are read as not moved yet, so that the "
+        "post-processor moves them. Some CAM systems write points that are moved already and only repeat the "
+        "statement.",
+        "Compare one point with the simulation of the CAM system (olp view). If it is moved already, take "
+        "the statement out.",
+        "`TRACUT/1,0,0,250,0,1,0,0,0,0,1,0`.",
+    ),
 )

@@ -14,8 +14,10 @@ from olp.core.toolpath import CutterCompensation, Flag, Kind
 from olp.core.units import MM_PER_INCH
 from olp.core.values import dataclass
 from olp.program.apt.arcs import ArcForm, circle, directed, movarc
+from olp.program.apt.controls import changes_tool, check_prefun, check_set, check_turn, numbers_of
+from olp.program.apt.transforms import NOTHING, Rigid, rigid
 from olp.program.dialect import Dialect, Options
-from olp.program.frames import UP, FrameTable, tool_vector_of, turn_of, turned
+from olp.program.frames import UP, FrameTable, Placement, product, tool_vector_of, turn_of, turned
 from olp.program.statement_rows import Points, StatementCollector
 from olp.program.text.statements import Field, Statement, shown
 
@@ -63,6 +65,9 @@ class Events:
         self.up: Vector = UP
         self.systems: list[tuple[object, object]] = []
         self.system: tuple[object, object] = (None, None)
+        self.transform: Rigid = NOTHING
+        self.shift: Vector = ZERO
+        self.skipped = 0
         self.home: list[float] | None = None
         self.compensation: CutterCompensation | None = None
         self.cycle: Cycle | None = None
@@ -88,7 +93,9 @@ class Events:
             b"CSYS": self._csys, b"MSYS": self._csys, b"ORIGIN": self._csys, b"TRACUT": self._tracut,
             b"FROM": self._from, b"GOHOME": self._gohome, b"SPINDL": self._spindle, b"DELAY": self._delay,
             b"STOP": self._rest, b"OPSTOP": self._rest, b"RETRCT": self._unknown, b"GOCLER": self._unknown,
-            b"INSERT": self._insert, b"INDIRV": self._indirv, b"FINI": self._fini,
+            b"INSERT": self._insert, b"INDIRV": self._indirv, b"FINI": self._fini, b"TRANS": self._trans,
+            b"UNLOAD": self._unknown, b"AUXFUN": self._auxfun, b"PREFUN": self._prefun, b"SET": self._set,
+            b"OPSKIP": self._opskip, b"ROTABL": self._turn, b"ROTATE": self._turn, b"ROTHED": self._turn,
         }  # fmt: skip
 
     def _move(self, row: int) -> int:
@@ -131,13 +138,21 @@ class Events:
                 tool = self.setup.tool(self.tool)
                 assert tool is not None
                 length = tool.length_mm
+        inner = self._placement()
         # an axis that was never stated is the Z axis of the machine
-        self.up = UP if self.axis == UP else turned(turn_of(work.rotation_deg), self.axis)
+        turn = product(turn_of(work.rotation_deg), inner.turn)
+        self.up = UP if self.axis == UP else turned(turn, self.axis)
         return self.table.index(
-            work, line, unit_mm=self.unit_mm, tool=self.tool, length=length, tool_vector=tool_vector,
-            axis=self.up, length_active=self.length_active and bool(self.tool),
+            work, line, inner=inner, unit_mm=self.unit_mm, tool=self.tool, length=length,
+            tool_vector=tool_vector, axis=self.up, length_active=self.length_active and bool(self.tool),
             compensation=self.compensation,
         )  # fmt: skip
+
+    def _placement(self) -> Placement:
+        """The transforms in force: TRACUT first, then TRANS."""
+        stated = zip(self.transform.shift, self.shift, strict=True)
+        x, y, z = ((a + b) * self.unit_mm for a, b in stated)
+        return Placement(self.transform.turn, (x, y, z))
 
     def _feed(self, statement: Statement, row: int) -> None:
         self.feed_mm_s = feed_of(statement, self.unit_mm, self.turns_s)
@@ -283,20 +298,43 @@ class Events:
             self.system = system
 
     def _tracut(self, statement: Statement, row: int) -> None:
+        self._resolve(row)
         words = [f.text for f in statement.fields()]
-        if words not in ([], [b"NOMORE"], [b"OFF"]):
+        if words in ([], [b"NOMORE"], [b"OFF"]):
+            self.transform = NOTHING
+            return
+        self.transform = rigid(words, statement)
+        self._transformed(statement)
+
+    def _trans(self, statement: Statement, row: int) -> None:
+        self._resolve(row)
+        words = [f.text for f in statement.fields()]
+        numbers = numbers_of(statement)
+        if words in ([b"NOMORE"], [b"OFF"]):
+            numbers = [0.0] * 3
+        elif len(numbers) != 3 or len(words) != 3:
             raise ProgramError(
-                "TRACUT transforms points in the APT processor; "
-                "send its output (CLDATA), or state the transform as a frame of the job",
+                "TRANS is read with three numbers: the shift of the points after it",
                 line=statement.line,
-                code="OLP512",
+                code="OLP516",
             )
+        x, y, z = numbers
+        self.shift = (x, y, z)
+        if any(numbers):
+            self._transformed(statement)
+
+    def _transformed(self, statement: Statement) -> None:
+        name = shown(statement.head()[1])
+        self.collector.remarks.setdefault(
+            "transform", (statement.line, f"{name} is taken as applied to the points after it")
+        )
 
     def _from(self, statement: Statement, row: int) -> None:
         self._resolve(row)
         numbers = [f.number for f in statement.fields()][:3]
         if len(numbers) != 3 or None in numbers:
-            raise ProgramError("FROM needs three numbers", line=statement.line, code="OLP516")
+            what = f"{shown(statement.head()[1])} needs three numbers"
+            raise ProgramError(what, line=statement.line, code="OLP516")
         point = np.array([n[0] / 10.0 ** n[1] for n in numbers if n is not None]) * self.unit_mm
         number = self._frame(statement.line)
         frame = self.table.frames[number]
@@ -309,6 +347,11 @@ class Events:
             self.start = list(self.position)
 
     def _gohome(self, statement: Statement, row: int) -> None:
+        if len(numbers_of(statement)) >= 3:
+            home = self.home
+            self._from(statement, row)
+            self.home = home
+            return
         if self.home is None:
             self._unknown(statement, row)
             return
@@ -345,6 +388,23 @@ class Events:
                 line=statement.line,
                 code="OLP512",
             )
+
+    def _auxfun(self, statement: Statement, row: int) -> None:
+        if changes_tool(statement):
+            self._unknown(statement, row)
+
+    def _prefun(self, statement: Statement, row: int) -> None:
+        check_prefun(statement, self.setup.machine.default_work_offset)
+
+    def _set(self, statement: Statement, row: int) -> None:
+        check_set(statement)
+
+    def _turn(self, statement: Statement, row: int) -> None:
+        check_turn(statement)
+
+    def _opskip(self, statement: Statement, row: int) -> None:
+        self._resolve(row)
+        self.skipped = 0 if any(f.text in _OFF for f in statement.fields()) else statement.line
 
     def _fini(self, statement: Statement, row: int) -> None:
         self._resolve(row)

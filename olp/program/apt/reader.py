@@ -193,6 +193,13 @@ class _Reader(Events):
         points, count = self.points, upto - a
         part = slice(a, upto)
         line = points.line[part]
+        if self.skipped:
+            raise ProgramError(
+                f"OPSKIP of line {self.skipped} is in force, so a switch at the control decides whether the "
+                "machine goes to this point; end it before the point with OPSKIP/OFF",
+                line=int(line[0]),
+                code="OLP525",
+            )
         if not self.unit_stated:
             self.collector.remarks.setdefault("unit", (int(line[0]), "the program states no unit"))
         frame, tilting, up = self._frames(points, part)

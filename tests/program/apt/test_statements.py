@@ -116,10 +116,9 @@ def test_a_second_coordinate_system_has_an_offset_of_its_own(setup: Setup) -> No
     assert refused("CSYS/PART\n", setup, "given by the name PART; expected its numbers") == 2
 
 
-def test_a_transform_of_the_processor_is_refused_unless_it_ends(setup: Setup) -> None:
-    for ending in ("TRACUT\n", "TRACUT/NOMORE\n", "TRACUT/OFF\n"):
-        assert x_of(ending + "GOTO/1,0,0\n", setup) == [101.0]
-    assert refused("TRACUT/MATRIX1\n", setup, "transforms points in the APT processor") == 2
+def test_a_transform_without_numbers_is_refused_unless_it_ends(setup: Setup) -> None:
+    assert x_of("TRACUT/NOMORE\nTRACUT/OFF\nTRACUT\nGOTO/1,0,0\n", setup) == [101.0]
+    assert refused("TRACUT/MATRIX1\n", setup, "TRACUT does not state its transform in numbers") == 2
 
 
 def test_the_axis_of_the_tool_is_a_direction(setup: Setup) -> None:
@@ -265,8 +264,25 @@ def test_two_arcs_need_a_point_between_them(setup: Setup) -> None:
         ("TLAXIS/0,0,1.002", 2, "OLP516", r"TLAXIS has length 1\.002; expected"),
         ("TLAXIS/0,0,.998", 2, "OLP516", r"TLAXIS has length 0\.998; expected"),
         ("CSYS/PART", 2, "OLP523", "given by the name PART"),
-        ("TRACUT/M1", 2, "OLP512", "TRACUT transforms points"),
-        ("TRACUT/NOMORE,5", 2, "OLP512", "TRACUT transforms points"),
+        ("TRACUT/M1", 2, "OLP523", "TRACUT does not state its transform in numbers"),
+        ("TRACUT/NOMORE,5", 2, "OLP523", "TRACUT does not state its transform in numbers"),
+        ("TRACUT/1,0,0,0,1,0,0,0,1", 2, "OLP523", "expected 12 numbers of a matrix"),
+        ("TRACUT/-1,0,0,0,0,1,0,0,0,0,1,0", 2, "OLP523", "the matrix of TRACUT mirrors"),
+        ("TRACUT/2,0,0,0,0,2,0,0,0,0,2,0", 2, "OLP523", "the matrix of TRACUT scales or shears"),
+        ("TRANS/1,2", 2, "OLP516", "TRANS is read with three numbers"),
+        ("TRANS/1,2,A", 2, "OLP516", "TRANS is read with three numbers"),
+        ("GOHOME/1,2,3\nFROM/1,2", 3, "OLP516", "FROM needs three numbers"),
+        ("PREFUN/91", 2, "OLP512", "PREFUN/91 gives the control a G code"),
+        ("PREFUN/ON", 2, "OLP512", "PREFUN without a number"),
+        ("PREFUN/55", 2, "OLP523", "PREFUN/55 selects a work offset, and the job counts from G54"),
+        ("AUXFUN/98", 2, "OLP512", "AUXFUN/98 is M98, which calls another program"),
+        ("SET/HOLDER,SETOOL,0,0,100", 2, "OLP512", "SET/HOLDER puts a head between"),
+        ("SET/LOCK,AAXIS,ON", 2, "OLP512", "SET/LOCK holds an axis"),
+        ("SET/ADJUST,ON", 2, "OLP512", "SET/ADJUST is read as SET/MODE only"),
+        ("SET", 2, "OLP512", "SET/nothing is read as SET/MODE only"),
+        ("OPSKIP/ON\nGOTO/1,2,3", 3, "OLP525", "OPSKIP of line 2 is in force"),
+        ("ROTATE/AAXIS,ATANGL,0.5", 2, "OLP512", "only an angle of 0 is read"),
+        ("ROTATE/AAXIS", 2, "OLP512", "only an angle of 0 is read"),
         ("FROM/1,A,3", 2, "OLP516", "FROM needs three numbers"),
         ("DELAY/REV", 2, "OLP516", "DELAY needs a number"),
         ("INSERT/X1", 2, "OLP512", "INSERT gives the control a block"),
@@ -747,18 +763,20 @@ def test_words_of_statements_have_no_letters(setup: Setup) -> None:
 WORDS = {
     Support.CORRECTED: "GOTO GODLTA CIRCLE MOVARC TLON",
     Support.READ: "INDIRV FROM GOHOME RAPID FEDRAT UNITS UNIT LOADTL LOAD TOOLNO TURRET CYCLE CUTCOM MULTAX "
-    "TLAXIS CSYS MSYS ORIGIN TRACUT SPINDL DELAY STOP OPSTOP RETRCT GOCLER FINI",
+    "TLAXIS CSYS MSYS ORIGIN TRACUT TRANS SPINDL DELAY STOP OPSTOP RETRCT GOCLER UNLOAD AUXFUN PREFUN SET "
+    "OPSKIP ROTABL ROTATE ROTHED FINI",
     Support.UNCHANGED: "INSERT PARTNO PPRINT REMARK REM TITLE TPRINT DISPLY PRINT PAINT END-OF-PATH END "
     "MACHIN "
-    "INTOL OUTTOL TOLER CUTTER TOOL SELECT SELCTL COOLNT CLEARP CLRSRF AUXFUN PREFUN SEQNO SETUP TRNTYP "
+    "INTOL OUTTOL TOLER CUTTER TOOL SELECT SELCTL COOLNT CLEARP CLRSRF SEQNO SETUP TRNTYP "
     "ARCSLP "
     "LEADER NOPOST CLPRNT PITCH MCHTOL DPMULTAX INDEX TLDATA CSI_SET_FLUTE_LENGTH CSI_SET_EXTENSION_LENGTH "
-    "TOOL_OFFSET CLAMP CHKPTS MAXIPM LINTOL",
+    "TOOL_OFFSET CLAMP CHKPTS MAXIPM LINTOL CATPROCESS BOX STOCK MODE DRESS REWIND PLABEL TMARK LPRINT CHECK "
+    "SLOWDN AIR LETTER OVPLOT PENDWN PENUP PPLOT DRAFT TLSPEC OPNAME OPTYPE APPLY TLNAME MFGNO",
     Support.REFUSED: "COPY GOLFT GORGT GOFWD GOBACK GOUP GODOWN GO TLLFT TLRGT TLNDON TLOFPS TLONPS INDIRP "
     "AUTOPS CONTUR PROFIL POCKET SCURV NOPS POINT LINE PLANE VECTOR MATRIX CYLNDR SPHERE PATERN TABCYL "
     "ELLIPS "
     "REFSYS ZSURF OBTAIN MACRO TERMAC CALL LOOPST LOOPND JUMPTO IF TRANTO CALSUB BREAK RESERV READ REPEAT DO "
-    "ROTABL ROTATE ROTHED TILT PALLET THREAD NURBS SPLINE BSPLIN POLYLN PIERCE TRANS MIRROR",
+    "TILT PALLET HEAD THREAD NURBS SPLINE BSPLIN POLYLN PIERCE MIRROR",
 }  # fmt: skip
 OF_TWO_WORDS = {b"TOOL PATH": Support.UNCHANGED, b"$$-> CSYS": Support.READ}
 
