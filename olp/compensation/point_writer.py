@@ -27,6 +27,9 @@ class PointWriter(Writer):
         assert task.program.statements is not None
         self.statements = task.program.statements
         frames = self.path.frames
+        stated = self.statements.restated
+        self._restated = np.array(sorted(stated), np.int64)
+        self._relative = np.array([stated[m] for m in self._restated.tolist()], bool)
         self.turn = None
         if any(f.turn is not None for f in frames):
             self.turn = np.array([np.eye(3) if f.turn is None else f.turn for f in frames])
@@ -73,10 +76,31 @@ class PointWriter(Writer):
         rows.write[:] = ~same & ~held[:, None]
         tails = ~rows.head & ~held
         rows.write[tails] = True
+        self._restate(rows, wanted, decimals, held)
         changes = np.flatnonzero(counting[1:] != counting[:-1]) + 1
         for a, b in pairwise([0, *changes.tolist(), len(move)]):
             if counting[a]:
                 self._counted(rows, a, b, local, word, own, given, held)
+
+    def _restate(self, rows: Rows, wanted: Array, decimals: Index, held: Mask) -> None:
+        """Points that their statements do not state as x, y, z: all three are written, or none."""
+        if not self._restated.size:
+            return
+        move = rows.move
+        known = np.minimum(np.searchsorted(self._restated, move), len(self._restated) - 1)
+        which = (self._restated[known] == move) & rows.head & ~held
+        nominal = self.path.end_mm[move]
+        alike = (wanted == np.rint(self.local(nominal, self.path.frame[move]) * POW10[decimals])).all(axis=1)
+        for i in np.flatnonzero(which).tolist():
+            same = bool(alike[i])
+            if same and self._relative[known[i]]:
+                # it counts from the point before, which is written already
+                before = rows.emitted[i - 1] if i else rows.entry
+                start = self.path.starts_mm(int(move[i]), int(move[i]) + 1)[0]
+                same = bool((before == start).all())
+            rows.write[i] = not same
+            if same:
+                rows.emitted[i] = nominal[i]
 
     def _middled(self, rows: Rows, command: Array) -> Array:
         """Commands with the positions of holes corrected as the middle of their strokes needs it."""

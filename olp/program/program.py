@@ -91,7 +91,9 @@ class Statements:
 
     `rapid` is the line that makes the next statement a rapid. `mark` joins lines, none of which becomes
     longer than `width` bytes (0: no limit). `cards` have their numbers after that width, in the last eight
-    columns. `strokes` (k, 2): the moves to the hole and to its bottom. `decimal` is the decimal mark of texts
+    columns. `strokes` (k, 2): the moves to the hole and to its bottom. `restated` are moves whose statements
+    have other numbers than x, y, z, so that all three replace them where one changes: true where the
+    statement counts from the point before. `decimal` is the decimal mark of texts
     whose numbers keep their own form and column, empty for others.
     """
 
@@ -109,6 +111,7 @@ class Statements:
     mark: bytes = b"$"
     width: int = 0
     decimal: bytes = b""
+    restated: Mapping[int, bool] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -26,7 +26,9 @@ _WIDTHS = (72, 80)
 @dataclass(frozen=True, slots=True)
 class Point:
     """A point that was read singly: its line, the bytes of its statement, the fields of its coordinates and
-    of its direction. `incremental`: the coordinates are distances, and a single one is along Z."""
+    of its direction. `incremental`: the coordinates are distances, and a single one is along Z. A `form`
+    other than 0, a number of the reader, has other numbers, `values`. Where such a point moves, the text
+    `lead` and x, y, z replace the bytes of `fields`."""
 
     line: int
     begin: int
@@ -34,12 +36,16 @@ class Point:
     fields: Sequence[Field]
     direction: Sequence[Field] = ()
     incremental: bool = False
+    form: int = 0
+    values: tuple[float, ...] = ()
+    lead: bytes = b""
 
 
 @dataclass(slots=True, eq=False)
 class Points:
     """The points of a chunk in order: (m,) `line` from 1, `begin` and `end` of their statements, (m, 3)
-    `slot` word or -1, `value` as written, `direction` (NaN where none is stated), (m,) `incremental`."""
+    `slot` word or -1, `value` as written, `direction` (NaN where none is stated), (m,) `incremental` and
+    `form`: those of another form than 0 have their numbers in `value` and `direction`."""
 
     line: Index
     begin: Index
@@ -48,6 +54,7 @@ class Points:
     value: Array
     direction: Array
     incremental: Mask
+    form: Index
 
     def __len__(self) -> int:
         return len(self.line)
@@ -65,6 +72,7 @@ class StatementCollector(PathColumns):
         self.arcs: dict[int, ArcText] = {}
         self.broken: dict[int, bytes] = {}
         self.strokes: list[tuple[int, int]] = []
+        self.restated: dict[int, bool] = {}
         self.remarks: dict[str, tuple[int, str]] = {}
         self._feeds: list[tuple[int, float, int, int]] = [(0, float("nan"), 0, -1)]
         self.pauses: list[tuple[int, float]] = []
@@ -103,10 +111,13 @@ class StatementCollector(PathColumns):
             value=value[slot],
             direction=direction,
             incremental=np.zeros(len(slot), bool),
+            form=np.zeros(len(slot), np.int64),
         )
         return _merged(points, [self._alone(p) for p in alone]) if alone else points
 
     def _alone(self, point: Point) -> tuple[Point, tuple[int, ...], Array, Array]:
+        if point.form:
+            return self._of_another_form(point)
         slot = tuple(self.word(f) for f in point.fields)
         value = np.array([_value(f) for f in point.fields])
         if len(slot) == 1:
@@ -114,19 +125,30 @@ class StatementCollector(PathColumns):
         direction = np.array([_value(f) for f in point.direction] or [np.nan] * 3)
         return point, slot, value, direction
 
+    def _of_another_form(self, point: Point) -> tuple[Point, tuple[int, ...], Array, Array]:
+        """Three words without a number, and the numbers of the statement."""
+        decimals = max((f.number[1] for f in point.fields if f.number is not None), default=0)
+        slot = tuple(self._put_word(0, decimals, f.start, f.end) for f in point.fields)
+        if slot[0] >= 0:
+            self.broken[slot[0]] = self.broken.get(slot[0], b"") + point.lead
+        values = np.array((*point.values, *[np.nan] * 6)[:6])
+        return point, slot, values[:3], values[3:]
+
     def word(self, field: Field) -> int:
         """Add a word for a number; returns its index."""
         pair = field.number
         assert pair is not None
+        return self._put_word(*pair, field.start, field.end)
+
+    def _put_word(self, mantissa: int, decimals: int, start: int, end: int) -> int:
         if not self.keep_words:
             return -1
-        mantissa, decimals = pair
-        text = self.data[field.start : field.end]
+        text = self.data[start:end]
         if b"$" in text:
             mark = text.index(b"$")
             stop = max(text.rfind(b"\n"), text.rfind(b"\r")) + 1
             self.broken[self.words] = text[mark:stop]
-        self._lone.append((mantissa, decimals, b"." in text, field.start, field.end))
+        self._lone.append((mantissa, decimals, b"." in text, start, end))
         self.words += 1
         return self.words - 1
 
@@ -205,7 +227,7 @@ class StatementCollector(PathColumns):
             begin=take("begin_byte", np.int32), end=take("end_byte", np.int32),
             feed_mm_s=self._feed(path.kind, path.flag), rest=rest, dwell_s=dwell, arcs=self.arcs,
             broken=self.broken, strokes=np.array(self.strokes, np.int64).reshape(-1, 2),
-            feeds=feeds, rapid=rapid,
+            feeds=feeds, rapid=rapid, restated=self.restated,
             cards=cards,
             width=72 if cards else next((w for w in _WIDTHS if longest <= w), 0),
         )  # fmt: skip
@@ -264,6 +286,7 @@ def _merged(points: Points, alone: Sequence[tuple[Point, tuple[int, ...], Array,
         value=np.array([v for _, _, v, _ in alone]),
         direction=np.array([d for *_, d in alone]),
         incremental=np.array([p.incremental for p, *_ in alone]),
+        form=np.array([p.form for p, *_ in alone], np.int64),
     )
     order = np.argsort(np.concatenate((points.line, more.line)), kind="stable")
     columns = (

@@ -364,6 +364,15 @@ CASES: dict[str, tuple[Call, Call]] = {
         Call(b"TRANS/5,0,0\nGOTO/5,1,0\nFINI\n", APT, controller="apt"),
         Call(b"TRANS/0,0,0\nGOTO/5,1,0\nFINI\n", APT, controller="apt"),
     ),
+    "OLP415": (
+        Call(
+            PROBED.replace(b"PTMEAS/CART,10,10,0,0,0,1", b"PAMEAS/DISTANCE,0.5,P(A)"),
+            DMIS,
+            tables=MCS,
+            controller="dmis",
+        ),
+        Call(b"P(A)=PATH/LINE,CART,0,0,0,9,0,0\nSCNMOD/ON\n" + PROBED, DMIS, tables=MCS, controller="dmis"),
+    ),
     "OLP420": (Call(tables=tool(151.1), **total_map()), Call(tables=tool(150.9), **total_map())),
     "OLP421": (
         Call(b"G1 X100\n(olp payload 30)\nG1 X90\n", **load(0.11)),

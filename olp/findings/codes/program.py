@@ -151,4 +151,13 @@ RULES = (
         "the statement out.",
         "`TRACUT/1,0,0,250,0,1,0,0,0,0,1,0`.",
     ),
+    _rule(
+        "OLP415",
+        "scans left uncorrected",
+        Severity.WARNING,
+        "The control follows the surface along a path (PATH, PAMEAS). The surface decides where the probe "
+        "goes, so the points of the path are kept as written.",
+        "Correct what the scan reports: olp results. Or measure with PTMEAS points.",
+        "`PAMEAS/DISTANCE,0.5,P(PATH1)`.",
+    ),
 )

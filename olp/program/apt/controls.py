@@ -79,9 +79,9 @@ def check_turn(statement: Statement) -> None:
     numbers = numbers_of(statement)
     if not numbers or any(numbers):
         raise ProgramError(
-            f"{shown(statement.head()[1])} turns the part or the head, and where the part is afterwards is not "
-            "known; only an angle of 0 is read. Send a program for each position of the part, and state its "
-            "frame in the job",
+            f"{shown(statement.head()[1])} turns the part or the head, and where the part is afterwards is "
+            "not known; only an angle of 0 is read. Send a program for each position of the part, and state "
+            "its frame in the job",
             line=statement.line,
             code="OLP512",
         )

@@ -10,6 +10,7 @@ from olp.core.machine import ZERO, Setup, Vector
 from olp.core.toolpath import Flag, Kind
 from olp.core.units import MM_PER_INCH
 from olp.program.dialect import Dialect
+from olp.program.dmis.points import ANGLES, WORKING_PLANES
 from olp.program.frames import FrameTable, tool_vector_of
 from olp.program.statement_rows import Points, StatementCollector
 from olp.program.text.statements import Statement, shown
@@ -20,6 +21,8 @@ _UNITS = {b"MM": 1.0, b"CM": 10.0, b"M": 1000.0, b"INCH": MM_PER_INCH}
 #: mm/s per unit of speed
 _SPEEDS = {b"MMPS": 1.0, b"MPM": 1000.0 / 60.0, b"IPS": MM_PER_INCH, b"IPM": MM_PER_INCH / 60.0,
            b"MPMM": 1000.0 / 60.0, b"MMPM": 1.0 / 60.0}  # fmt: skip
+#: words of DMESW that run nothing
+_SOFTWARE = frozenset((b"CONTIN", b"PAUSE"))
 _LABEL = re.compile(rb"(?i)\A\s*([A-Z]+)\s*\(\s*([^()]*?)\s*\)\s*\Z")
 #: the frame of a program before its first datum: axis positions of the machine, as the control counts them
 MACHINE_FRAME = "MCS"
@@ -35,6 +38,11 @@ class Events:
         self.table = FrameTable(setup)
         self.start = [NAN if p is None else p for p in setup.job.start_mm]
         self.unit_mm, self.unit_stated = 1.0, False
+        self.angle_rad = ANGLES[b"ANGDEC"]
+        #: number of the working plane, None for one that is not of two axes
+        self.plane: int | None = 0
+        #: where the machine is, NaN where only the control knows
+        self.position = list(self.start)
         self.datum = MACHINE_FRAME
         self.sensor: str | None = None
         self.defined: dict[str, Vector | None] = {}
@@ -59,6 +67,8 @@ class Events:
             b"IF": self._branch, b"ELSE": self._branch, b"ELSEIF": self._branch, b"ENDIF": self._branch,
             b"DO": self._branch, b"ENDDO": self._branch, b"MACRO": self._macro, b"ENDMAC": self._endmac,
             b"CALL": self._call, b"ENDFIL": self._endfil, b"DECL": self._unchanged, b"RAPID": self._unchanged,
+            b"WKPLAN": self._workplane, b"CALIB": self._calib, b"PAMEAS": self._scan,
+            b"DMESW": self._software,
         }  # fmt: skip
 
     def _frame(self, line: int) -> int:
@@ -101,6 +111,7 @@ class Events:
     def _unknown(self, statement: Statement, row: int) -> None:
         """After this statement the position of the machine is not known."""
         self._resolve(row)
+        self.position = [NAN] * 3
         if self.collector.moves:
             self.collector.put_lone(
                 Kind.RAPID, Flag.PASS | Flag.CONTROL, statement.line, len(self.table.frames) - 1, [NAN] * 3
@@ -130,6 +141,13 @@ class Events:
             what = "UNITS names a unit that is not read; expected MM, CM, M or INCH"
             raise ProgramError(what, line=statement.line, code="OLP512")
         self.unit_mm, self.unit_stated = unit, True
+        self.angle_rad = next((ANGLES[f.text] for f in fields if f.text in ANGLES), self.angle_rad)
+
+    def _workplane(self, statement: Statement, label: bytes, row: int) -> None:
+        self._settled(statement)
+        self._resolve(row)
+        fields = statement.fields()
+        self.plane = WORKING_PLANES.get(fields[0].text) if fields else None
 
     def _snsdef(self, statement: Statement, label: bytes, row: int) -> None:
         fields = statement.fields()
@@ -212,6 +230,41 @@ class Events:
                 "MEAS is inside MEAS; expected ENDMES before it", line=statement.line, code="OLP532"
             )
         self.feature = (statement.line, False)
+
+    def _calib(self, statement: Statement, label: bytes, row: int) -> None:
+        """A stylus is calibrated at touches, as a feature is measured."""
+        fields = statement.fields()
+        if not fields or fields[0].text != b"SENS":
+            what = shown(fields[0].text) if fields else "nothing"
+            raise ProgramError(
+                f"CALIB/{what} is not read; expected CALIB/SENS, or a program without the calibration",
+                line=statement.line,
+                code="OLP512",
+            )
+        self._meas(statement, label, row)
+
+    def _scan(self, statement: Statement, label: bytes, row: int) -> None:
+        """The control follows the surface along a path: no position of it is corrected."""
+        if self.feature is None:
+            raise ProgramError(
+                "PAMEAS is outside MEAS and ENDMES; expected MEAS before it",
+                line=statement.line,
+                code="OLP532",
+            )
+        self._unknown(statement, row)
+        self.feature = (self.feature[0], True)
+        self.collector.remarks.setdefault(
+            "scan", (statement.line, "PAMEAS scans along a path, which is left uncorrected")
+        )
+
+    def _software(self, statement: Statement, label: bytes, row: int) -> None:
+        fields = statement.fields()
+        if not fields or fields[0].text not in _SOFTWARE:
+            raise ProgramError(
+                "DMESW hands a command to the software of the machine, which may move it; take it out",
+                line=statement.line,
+                code="OLP512",
+            )
 
     def _endmes(self, statement: Statement, label: bytes, row: int) -> None:
         if self.feature is None:

@@ -10,12 +10,14 @@ import re
 
 import numpy as np
 
+from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import ProgramError
 from olp.core.machine import Setup
 from olp.core.progress import Progress
 from olp.core.toolpath import Flag, Kind
 from olp.program.dialect import Dialect, Options, Support
 from olp.program.dmis.events import Events
+from olp.program.dmis.points import FORMS, INCREMENT, POLAR, POLAR_DEGREES, cartesian, restated
 from olp.program.dmis.table import TABLE
 from olp.program.program import Program
 from olp.program.statement_rows import Point
@@ -161,12 +163,15 @@ class _Reader(Events):
         fields = statement.fields()
         if fields and fields[-1].text == b"":
             fields = fields[:-1]
+        if fields and fields[0].text in FORMS:
+            return restated(statement, major, fields)
         if fields and fields[0].text == b"CART":
             fields = fields[1:]
         elif major == b"PTMEAS" or (fields and fields[0].number is None):
             first = shown(fields[0].text) if fields else "nothing"
             raise ProgramError(
-                f"{shown(major)}/{first} is not read; expected CART and x,y,z as numbers",
+                f"{shown(major)}/{first} is not read; expected CART and x,y,z, or POL and r,angle,height, as "
+                "numbers",
                 line=statement.line,
                 code="OLP512",
             )
@@ -194,7 +199,7 @@ class _Reader(Events):
             return
         part = slice(a, upto)
         line = self.points.line[part]
-        wide = ~np.isnan(self.points.direction[part][:, 0])
+        wide = ~np.isnan(self.points.direction[part][:, 0]) & (self.points.form[part] == 0)
         if wide.any():
             raise ProgramError(
                 "GOTO has 6 numbers; expected x,y,z", line=int(line[np.flatnonzero(wide)[0]]), code="OLP516"
@@ -207,10 +212,13 @@ class _Reader(Events):
             )
         number = self._frame(int(line[0]))
         frame = self.table.frames[number]
-        value = self.points.value[part] * self.unit_mm
+        value = self._cartesian(part) * self.unit_mm
         if frame.turn is not None:
             value = value @ np.array(frame.turn).T
-        end = value + np.array(frame.offset_mm)
+        relative = self.points.form[part] == INCREMENT
+        end = value + np.where(relative[:, None], 0.0, np.array(frame.offset_mm))
+        if relative.any():
+            self._add_up(end, relative, line)
         touch = np.array([n in self.touches for n in line.tolist()])
         kind = np.where(touch, np.uint8(Kind.PROBE), np.uint8(Kind.RAPID))
         flag = np.where(touch, np.uint8(Flag.WHOLE), np.uint8(0))
@@ -218,7 +226,38 @@ class _Reader(Events):
             flag |= np.uint8(Flag.PASS)
         if not self.unit_stated:
             self.collector.remarks.setdefault("unit", (int(line[0]), "the program states no UNITS"))
+        for row in np.flatnonzero(self.points.form[part]).tolist():
+            self.collector.restated[self.collector.moves + row] = bool(relative[row])
+        # where the probe is after a touch, only the control knows
+        self.position = [NAN] * 3 if touch[-1] or self.manual else end[-1].tolist()
         self.collector.put_stated_moves(
             kind, flag, line, np.full(len(line), number), end, self.points.slot[part],
             self.points.begin[part], self.points.end[part],
         )  # fmt: skip
+
+    def _cartesian(self, part: slice) -> Array:
+        """(n, 3) x, y, z of points in the unit of the program, or distances of those that are increments."""
+        value, form = self.points.value[part], self.points.form[part]
+        polar = np.isin(form, (POLAR, POLAR_DEGREES))
+        if polar.any() and self.plane is None:
+            raise ProgramError(
+                "POL counts in the working plane, and WKPLAN names another than XYPLAN, YZPLAN or ZXPLAN; "
+                "write the point as CART",
+                line=int(self.points.line[part][np.flatnonzero(polar)[0]]),
+                code="OLP518",
+            )
+        return cartesian(value, form, self.plane or 0, self.angle_rad)
+
+    def _add_up(self, end: Array, relative: Mask, line: Index) -> None:
+        """Points that count from the one before them, in place."""
+        touch = np.array([n in self.touches for n in line.tolist()])
+        for i in np.flatnonzero(relative).tolist():
+            before = np.array(self.position) if i == 0 else end[i - 1]
+            if np.isnan(before).any() or self.manual or (i and touch[i - 1]):
+                raise ProgramError(
+                    "GOTO/INCR counts from a position that only the control knows, as after a touch; "
+                    "write it as GOTO/CART, or put a GOTO/CART before it",
+                    line=int(line[i]),
+                    code="OLP524",
+                )
+            end[i] += before

@@ -15,11 +15,23 @@ _X = Support.UNCHANGED
 _NO = Support.REFUSED
 
 _FEATURE = "nominals, tolerances and actuals are never edited"
-_RUN_TIME = "goes to a position that only the run of the program decides"
+_RUN_TIME = (
+    "goes to a position that only the run of the program decides; align with MEAS and DATSET, "
+    "and write the points after that"
+)
+_JUMP = (
+    "jumps, so which statements run is known at run time only; "
+    "write them in the order in which they run, or between IF and ENDIF"
+)
+_SCAN = "scans in a form that is not known; write PTMEAS points, or MEAS with PATH and PAMEAS"
 
 TABLE: Mapping[bytes, tuple[Support, str]] = {
-    b"GOTO": (_C, "x,y,z or CART,x,y,z; POL and INCR are refused"),
-    b"PTMEAS": (_C, "CART,x,y,z, with or without a direction, inside MEAS or RMEAS"),
+    b"GOTO": (_C, "x,y,z, CART, POL,r,angle,height, and INCR,distance,i,j,k; POL and INCR become CART"),
+    b"PTMEAS": (_C, "CART,x,y,z or POL,r,angle,height, with or without a direction, inside MEAS or RMEAS"),
+    b"PAMEAS": (_R, "scans along a PATH, inside MEAS: the control follows the surface; left uncorrected"),
+    b"CALIB": (_R, "CALIB/SENS: as MEAS; others are refused"),
+    b"WKPLAN": (_R, "the plane of POL: XYPLAN, YZPLAN or ZXPLAN"),
+    b"DMESW": (_R, "CONTIN and PAUSE; other commands may move the machine and are refused"),
     b"MEAS": (_R, "a feature is measured; without a PTMEAS the control makes its own points"),
     b"RMEAS": (_R, "as MEAS; its points are corrected at their nominal positions"),
     b"ENDMES": (_R, ""),
@@ -54,7 +66,8 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     **dict.fromkeys(
         (
             b"FILNAM", b"DMISMN", b"DMISMD", b"DVPOFT", b"DECPL", b"TEXT", b"SNSET", b"ACLRAT", b"FLY",
-            b"PRCOMP", b"WKPLAN", b"SAVE", b"DISPLY", b"DISPLAY", b"VFORM", b"OPEN", b"CLOSE", b"WRITE",
+            b"PRCOMP", b"SAVE", b"DMEID", b"DMESWI", b"DMESWV", b"MATDEF", b"GECOMP",
+            b"DISPLY", b"DISPLAY", b"VFORM", b"OPEN", b"CLOSE", b"WRITE",
             b"REPORT", b"GEOALG", b"ALGDEF", b"LITDEF", b"FILDEF", b"CZSLCT", b"CZONE", b"PIEZOWFP",
             b"POINTDIST", b"SCANFILTER", b"SPLINESCAN3D", b"W3D", b"DELETE", b"DEVICE", b"DID", b"FINPOS",
             b"MFGDEV", b"PARTID", b"PARTREV", b"PARTSER", b"QISDEF", b"OPERID", b"PLANID", b"LOTID", b"DATE",
@@ -66,14 +79,14 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
         (_X, ""),
     ),
     **dict.fromkeys(
-        (b"PATH", b"PAMEAS", b"SCNMOD", b"SCNSET", b"SCNPLN", b"SCAN"),
-        (_NO, "scans along a path that is not read; measure with PTMEAS, or correct the results"),
+        (b"PATH", b"SCNMOD", b"SCNSET", b"SCNPLN"),
+        (_X, "of scans, which are left uncorrected: the surface decides where the probe goes"),
     ),
-    **dict.fromkeys(
-        (b"JUMPTO", b"XTERN", b"INCLUD", b"LOCATE", b"ITERAT", b"BFSET",
-         b"PTBUFF", b"CALIB", b"RESUME"),
-        (_NO, _RUN_TIME),
-    ),
+    b"SCAN": (_NO, _SCAN),
+    **dict.fromkeys((b"JUMPTO", b"SELECT", b"CASE", b"ENDCAS", b"DFTCAS", b"ENDSEL"), (_NO, _JUMP)),
+    **dict.fromkeys((b"XTERN", b"INCLUD"), (_NO, "runs another file; put its statements into this program")),
+    **dict.fromkeys((b"LOCATE", b"ITERAT", b"BFSET", b"PTBUFF", b"RESUME"), (_NO, _RUN_TIME)),
+    **dict.fromkeys((b"GOTARG", b"ENDGO"), (_NO, "leaves the way to the control; write its points as GOTO")),
     **dict.fromkeys(
         (b"ASSIGN", b"OBTAIN", b"PROMPT"), (_X, "a motion that uses the value is refused")
     ),

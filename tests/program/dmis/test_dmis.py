@@ -163,10 +163,8 @@ def test_units(zero: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "line", "words"),
     [
-        ("GOTO/POL,1,2,3\n", 5, "POL"),
-        ("GOTO/INCR,5,0,0,1\n", 5, "INCR"),
+        ("GOTO/INCR,5,0,0,1\n", 5, "counts from a position that only the control knows"),
         ("GOTO/X1,2,3\n", 5, "X1"),
-        ("MEAS/POINT,F(A),1\nPTMEAS/POL,1,2,3\nENDMES\n", 6, "POL"),
         ("PTMEAS/CART,1,2,3,0,0,1\n", 5, "outside MEAS"),
         ("SNSLCT/S(GONE)\nGOTO/1,2,3\n", 6, "GONE"),
         ("D(OTHER)=TRANS/XORIG,FA(H1)\nGOTO/1,2,3\n", 6, "OTHER"),
@@ -175,7 +173,7 @@ def test_units(zero: Path) -> None:
         ("M(A)=MACRO/\nGOTO/1,2,3\nENDMAC\n", 6, "macro A"),
         ("CALL/EXTERN,DMIS,M(B)\n", 5, "CALL"),
         ("JUMPTO/(L1)\n", 5, "JUMPTO"),
-        ("P(1)=PATH/LINE,BND,CART,0,0,0,1,0,0,0,0,1\n", 5, "PATH"),
+        ("PAMEAS/DISTANCE,.5,P(1)\n", 5, "PAMEAS is outside MEAS"),
         ("ROTAB/RT(1),INCR,90\n", 5, "ROTAB"),
         ("FROBNICATE/ON\n", 5, "FROBNICATE"),
         ("MEAS/POINT,F(A),1\nMEAS/POINT,F(B),1\n", 6, "inside MEAS"),

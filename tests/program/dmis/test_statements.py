@@ -176,11 +176,13 @@ def test_measuring_speeds_have_units(speed: str, mm_s: float, setup: Setup) -> N
         ("GOTO/1,2", "GOTO has 2 numbers; expected x,y,z"),
         ("GOTO/1,2,3,0,0,1", "GOTO has 6 numbers; expected x,y,z"),
         ("GOTO/CART,1,A,3", "GOTO has A where a number is expected"),
-        ("GOTO/POL,1,2,3", "GOTO/POL is not read"),
+        ("GOTO/PROBCS,1,2,3", "GOTO/PROBCS is not read"),
         ("MEAS/POINT,F(P),1\nPTMEAS/1,2,3", "PTMEAS/1 is not read; expected CART"),
         ("MEAS/POINT,F(P),1\nPTMEAS/CART,1,2,3,4", "PTMEAS has 4 numbers; expected x,y,z and a direction"),
-        ("SCAN/A", "scans along a path that is not read"),
-        ("CALIB/SENS,S(LONG)", "only the run of the program decides"),
+        ("SCAN/A", "scans in a form that is not known"),
+        ("CALIB/RTAB,RT(1)", "expected CALIB/SENS"),
+        ("JUMPTO/(L1)", "JUMPTO jumps, so which statements run"),
+        ("LOCATE/XYDIR", "only the run of the program decides"),
         ("ROTAB/A", "moves an axis that is not read"),
         ("WHATEVER/1", "is not a statement that olp knows"),
         ("A=5", "is assigned, and its effect is known at run time only"),
@@ -237,9 +239,26 @@ FIXED = "PROBE,FIXED,CART,0,4,-20"
         ("ROTAB/1", 3, "OLP512", "ROTAB moves an axis that is not read"),
         ("UNITS A/MM", 3, "OLP512", "UNITS A is not a statement that olp knows"),
         ("TEXT (A)/MM", 3, "OLP512", r"TEXT \(A\) is not a statement that olp knows"),
-        ("S(A)=CALIB/1", 3, "OLP512", "CALIB goes to a position that only the run of the program decides"),
+        ("S(A)=LOCATE/1", 3, "OLP512", "LOCATE goes to a position that only the run of the program decides"),
+        ("CALIB", 3, "OLP512", "CALIB/nothing is not read"),
+        ("DMESW/COMAND,'X'", 3, "OLP512", "DMESW hands a command to the software of the machine"),
+        ("DMESW", 3, "OLP512", "DMESW hands a command to the software of the machine"),
+        ("PAMEAS/DISTANCE,1,P(A)", 3, "OLP532", "PAMEAS is outside MEAS"),
+        ("CALIB/SENS,S(A)\nMEAS/POINT,F(A),1", 4, "OLP532", "MEAS is inside MEAS"),
+        ("GOTO/POL,1,2", 3, "OLP516", "GOTO/POL has 2 numbers; expected r,angle,height$"),
+        ("PTMEAS/POL,1,2,3,4", 3, "OLP516", "PTMEAS/POL has 4 numbers; expected r,angle,height and a dir"),
+        ("GOTO/INCR,1,0,0", 3, "OLP516", "GOTO/INCR has 3 numbers; expected a distance and i,j,k in a GOTO"),
+        ("PTMEAS/INCR,1,0,0,1", 3, "OLP516", "PTMEAS/INCR has 4 numbers; expected a distance"),
+        ("GOTO/POL,1,A,3", 3, "OLP511", "GOTO has A where a number is expected"),
+        ("GOTO/INCR,1,0,0,.99", 3, "OLP516", r"the direction of GOTO/INCR has length 0\.99; expected"),
+        ("GOTO/INCR,1,0,0,1", 3, "OLP524", "GOTO/INCR counts from a position"),
+        ("GOTO/1,2,3\nGOHOME\nGOTO/INCR,1,0,0,1", 5, "OLP524", "GOTO/INCR counts from a position"),
+        ("GOTO/1,2,3\nIF/(A)\nGOTO/INCR,1,0,0,1\nENDIF", 5, "OLP524", "GOTO/INCR counts from a position"),
+        ("MODE/MAN\nGOTO/1,2,3\nGOTO/INCR,1,0,0,1", 5, "OLP524", "GOTO/INCR counts from a position"),
+        ("MEAS/POINT,F(A),1\nPTMEAS/CART,1,2,3\nGOTO/INCR,1,0,0,1", 5, "OLP524", "as after a touch"),
+        ("MEAS/POINT,F(A),1\nPTMEAS/CART,1,2,3\nENDMES\nGOTO/INCR,1,0,0,1", 6, "OLP524", "after a touch"),
+        ("WKPLAN/NONE\nGOTO/POL,1,2,3", 4, "OLP518", "POL counts in the working plane"),
         ("$$ a $\nGOTO/1,2,3", 4, "OLP510", "the comment before ends with `\\$`"),
-        ("GOTO/POL,1,2,3", 3, "OLP512", "GOTO/POL is not read; expected CART"),
         ("PTMEAS/", 3, "OLP512", "PTMEAS/nothing is not read; expected CART"),
         ("PTMEAS/1,2,3", 3, "OLP512", "PTMEAS/1 is not read; expected CART"),
         ("GOTO/1,,3", 3, "OLP511", "GOTO has nothing where a number is expected"),
@@ -270,12 +289,12 @@ def test_what_is_missing_in_the_files_is_named(setup: Setup, tmp_path: Path) -> 
 
 def test_refusals_of_the_table_are_named_together(setup: Setup) -> None:
     """Those that other statements may put right are not among them, nor is what is behind the end."""
-    text = "ROTAB/1\nA=5\nSCAN/1\nTEXT/A\nIF/1\nMEAS/A\n(B)\nIF (C)\nXTERN/1\nS(D)=PATH/1\nENDFIL\nJUMPTO/1\n"
+    text = "ROTAB/1\nA=5\nSCAN/1\nTEXT/A\nIF/1\nMEAS/A\n(B)\nIF (C)\nXTERN/1\nS(D)=CASE/1\nENDFIL\nJUMPTO/1\n"
     with pytest.raises(ProgramError, match="ROTAB") as caught:
         program(text, setup)
     others = caught.value.others
     assert [(e.line, e.code) for e in others] == [(5, "OLP512"), (11, "OLP512"), (12, "OLP512")]
-    assert [str(e)[:9] for e in others] == ["5: SCAN s", "11: XTERN", "12: PATH "]
+    assert [str(e)[:9] for e in others] == ["5: SCAN s", "11: XTERN", "12: CASE "]
     with pytest.raises(ProgramError) as caught:
         program("A=5\nSCAN/1\n", setup)
     assert caught.value.others == ()
@@ -521,11 +540,13 @@ def test_a_text_says_the_same_in_pieces(size: int, setup: Setup, monkeypatch: py
 WORDS = {
     Support.CORRECTED: "GOTO PTMEAS",
     Support.READ: "MEAS RMEAS ENDMES FROM GOHOME RAPID UNITS SNSDEF SNSLCT TRANS ROTATE DATSET RECALL "
-    "MODE TECOMP "
+    "MODE TECOMP PAMEAS CALIB WKPLAN DMESW "
     "TEMPR FEDRAT IF ELSE ELSEIF ENDIF DO ENDDO MACRO ENDMAC CALL ENDFIL",
     Support.UNCHANGED: "FEAT TOL CONST DATDEF DATTRG OUTPUT EVAL REFMNT BOUND FILNAM DMISMN DMISMD "
     "DVPOFT DECPL "
-    "TEXT SNSET ACLRAT FLY PRCOMP WKPLAN SAVE DISPLY DISPLAY VFORM OPEN CLOSE WRITE REPORT GEOALG "
+    "TEXT SNSET ACLRAT FLY PRCOMP SAVE DMEID "
+    "DMESWI DMESWV MATDEF GECOMP PATH SCNMOD "
+    "SCNSET SCNPLN DISPLY DISPLAY VFORM OPEN CLOSE WRITE REPORT GEOALG "
     "ALGDEF LITDEF "
     "FILDEF CZSLCT CZONE PIEZOWFP POINTDIST SCANFILTER SPLINESCAN3D W3D DELETE DEVICE DID FINPOS MFGDEV "
     "PARTID "
@@ -534,8 +555,8 @@ WORDS = {
     "CLMPSN FIXTID FIXTSN PREVOP PROCID ROTDEF CRGDEF ERROR BADTST ALGOR LOTNUM KEYCHAR QUERY VALUE "
     "LIGHTOPTION "
     "SIMREQT UNCERTSET UNCERTALG ENDXTN DECL PSTHRU ASSIGN OBTAIN PROMPT",
-    Support.REFUSED: "PATH PAMEAS SCNMOD SCNSET SCNPLN SCAN JUMPTO XTERN INCLUD LOCATE ITERAT BFSET "
-    "PTBUFF CALIB "
+    Support.REFUSED: "SCAN JUMPTO SELECT CASE ENDCAS DFTCAS ENDSEL XTERN INCLUD LOCATE ITERAT BFSET PTBUFF "
+    "GOTARG ENDGO "
     "RESUME ROTSET ROTAB CRSLCT CRMODE THLCHG",
 }  # fmt: skip
 
@@ -543,7 +564,9 @@ WORDS = {
 def test_each_word_has_its_row_in_the_table() -> None:
     want = {word.encode(): support for support, words in WORDS.items() for word in words.split()}
     assert {word: support for word, (support, _) in TABLE.items()} == want
-    feature = "FEAT TOL CONST DATDEF DATTRG OUTPUT EVAL REFMNT BOUND ASSIGN OBTAIN PROMPT"
+    feature = (
+        "FEAT TOL CONST DATDEF DATTRG OUTPUT EVAL REFMNT BOUND ASSIGN OBTAIN PROMPT PATH SCNMOD SCNSET SCNPLN"
+    )
     clear = {*WORDS[Support.UNCHANGED].split()} - {*feature.split()}
     clear |= {"ENDMES", "ELSE", "ELSEIF", "ENDIF", "ENDDO", "ENDMAC"}
     assert {word.decode() for word, (_, why) in TABLE.items() if why == ""} == clear
