@@ -183,7 +183,7 @@ def _diff(result: Correction, machine: Machine, on_stderr: bool) -> str:
     origin = origin_of(result.nominal)
     return render(
         result.nominal,
-        result.data,
+        result.plain,
         near_um=1.1 * largest_um + LAST_DIGITS_UM,
         bare_mm=partial(profile.bare_mm, machine) if profile else None,
         statements=profile is None,

@@ -20,7 +20,7 @@ from olp.compensation.rows import Rows
 from olp.compensation.stamp import stamped
 from olp.compensation.style import Style
 from olp.compensation.tally import Tally
-from olp.core.arrays import Array
+from olp.core.arrays import Array, Index
 from olp.core.machine import Vector
 from olp.core.progress import Progress, silent
 from olp.core.toolpath import Flag, Frame
@@ -28,14 +28,15 @@ from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
 from olp.program.bands import Band
 from olp.program.program import Program
-from olp.program.text.edits import Edits, Prefixes, splice
+from olp.program.text.edits import Edits, Prefixes, render, splice
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Task:
     """What is to be written: the corrections of a `program` that was read with its words, by a `model`. Also
     the numerical tolerance of the correction, the least increment of each axis, and the `stamp`, empty for
-    none; with `stamp_always` a text of which nothing changes bears it too."""
+    none; with `stamp_always` a text of which nothing changes bears it too. With `located` the writer says
+    where each line of the program begins in the text."""
 
     program: Program
     model: ErrorModel
@@ -43,6 +44,7 @@ class Task:
     increments_mm: Vector
     stamp: bytes
     stamp_always: bool
+    located: bool = False
 
 
 class Writer(ABC):
@@ -70,6 +72,8 @@ class Writer(ABC):
         self.frame_offset_mm = np.array([f.offset_mm for f in self.path.frames]).reshape(-1, 3)
         self.frame_unit_mm = np.array([f.unit_mm for f in self.path.frames])
         self._pieces: list[bytes] = []
+        # where the text grows, and by how much, if that is asked for
+        self._grown: list[tuple[Index, Index]] | None = [] if task.located else None
         self._begin, self._changed = 0, False
         self._entry = np.array(self.path.start_mm, float)
 
@@ -101,6 +105,19 @@ class Writer(ABC):
         if self.stamp:
             pieces[0] = stamped(pieces[0], self.stamp, program.eol(1), program.dialect.first)
         return b"".join(pieces)
+
+    def starts(self) -> Index | None:
+        """(lines,) where each line of the program, with the blocks that are put before it, begins in the
+        text without its stamp; None where it was not asked for."""
+        if self._grown is None:
+            return None
+        starts = self.program.line_start.astype(np.int64)
+        if not self._grown:
+            return starts
+        place, grown = (np.concatenate(column) for column in zip(*self._grown, strict=True))
+        total = np.append(0, np.cumsum(grown))
+        moved: Index = starts + total[np.searchsorted(place, starts, "left")]
+        return moved
 
     def _spans(self) -> list[tuple[int, int]]:
         """Chunks of rows that end between lines, and not behind a deleted block: words of the next one depend
@@ -134,4 +151,7 @@ class Writer(ABC):
             return None
         source = np.frombuffer(self.program.data, np.uint8)[begin:end]
         joined = Edits.join(edits)
+        if self._grown is not None:
+            _, length = render(joined, self.prefixes, leading_zero=self.style.leading_zero)
+            self._grown.append((joined.start, length - (joined.end - joined.start)))
         return splice(source, begin, joined, self.prefixes, leading_zero=self.style.leading_zero).tobytes()

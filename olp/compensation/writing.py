@@ -24,12 +24,14 @@ from olp.program.text.numbers import Placing
 @dataclass(frozen=True, slots=True, eq=False)
 class Written:
     """The corrected bytes, None where nothing is changed, and what was changed. `uncorrected` are moves that
-    are left so, (n,) `parts` how many moves the text has for each nominal one."""
+    are left so, (n,) `parts` how many moves the text has for each nominal one. `starts` as
+    `Writer.starts`."""
 
     text: bytes | None
     uncorrected: Index
     parts: npt.NDArray[np.int32]
     tally: Tally
+    starts: Index | None = None
 
 
 def write(task: Task, plans: Iterable[tuple[Band, Plan]], tell: Progress = silent) -> Written:
@@ -44,7 +46,8 @@ def write(task: Task, plans: Iterable[tuple[Band, Plan]], tell: Progress = silen
         uncorrected.append(band.first + rows.uncorrected)
         parts.append(writer.parts)
     assert writer is not None
-    return Written(writer.text(), np.concatenate(uncorrected), np.concatenate(parts), writer.tally)
+    starts = writer.starts()
+    return Written(writer.text(), np.concatenate(uncorrected), np.concatenate(parts), writer.tally, starts)
 
 
 def _writer(program: Program, plan: Plan) -> type[Writer]:

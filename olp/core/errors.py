@@ -113,6 +113,11 @@ class ProgramError(InputError):
         self.hint = hint
         self.word = word
 
+    @property
+    def hinted(self) -> bool:
+        """Whether it, or another that was found with it, has a hint."""
+        return any(error.hint for error in (self, *self.others))
+
     @staticmethod
     def together(errors: Iterable[ProgramError]) -> ProgramError:
         """Refusals that were found at the same time, as the one of the first line with the others."""

@@ -17,6 +17,7 @@ from typing import Any
 
 from olp.core.progress import Progress, silent
 from olp.core.values import dataclass
+from olp.program.kept import Kept
 from olp.program.origin import Unrolled
 from olp.program.text.line_ends import split
 
@@ -64,7 +65,9 @@ class Dialect:
     `reader` reads a text. Called with data, setup, this dialect, options, and `words` by keyword, it returns
     a `Program` (`olp.program.registry.read`). `unroller` writes loops, calls and expressions out. It is
     called with data, this dialect, and by keyword what `olp.program.rs274.flatten.unroll.flatten` takes. It
-    is None where the dialect has none.
+    is None where the dialect has none. `keeper` puts the corrections of an unrolled text into the program
+    that it was made from. It is called with that text, the corrected one, where each line begins in it, and
+    this dialect, and returns a `Kept`.
 
     `path_mode` is how the control goes from move to move where a program does not say it. `inch_decimals` are
     the decimals of inch programs for a least increment of 0.001 mm, `free_digits` those that centres of arcs
@@ -86,6 +89,7 @@ class Dialect:
     path_mode: str
     reader: Callable[..., Any]
     unroller: Callable[..., Unrolled] | None = None
+    keeper: Callable[..., Kept] | None = None
     endings: tuple[str, ...] = ()
     folder_endings: tuple[str, ...] = ()
     sign: re.Pattern[bytes] | None = None

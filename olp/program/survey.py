@@ -83,9 +83,11 @@ def read_all(
     subprograms: Subprograms | None = None,
     unroll: Unroll | None = None,
     expands: bool = False,
+    early: bool = False,
 ) -> Program:
     """As `olp.program.registry.read`, and a refusal has all reasons. With `unroll` the program is unrolled
     first, and lines are those of the original; `expands` says that its canned cycles are plain moves then.
+    With `early` a first refusal that unrolling may help with is raised without the others.
     Else `subprograms` gives the file of one, to see whether unrolling would help. Raises Refused where there
     are several reasons, ProgramError where there is one."""
     options = options or Options()
@@ -95,6 +97,8 @@ def read_all(
         _refuse_foreign(data, program)
         return program
     except ProgramError as error:
+        if early and unroll is None and error.hinted:
+            raise
         from olp.program.foreign import recognised
 
         certain = dialect.sign is not None or setup.job.described is not None

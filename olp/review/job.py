@@ -41,6 +41,7 @@ from olp.workflows.compare_runs import Ground, How, judged
 from olp.workflows.confidence import unknowns_of
 from olp.workflows.correct import Correction, CorrectOptions
 from olp.workflows.correct import corrected as correct_program
+from olp.workflows.kept import unrolling_of_corrected
 from olp.workflows.original import placed, placed_findings
 from olp.workflows.proof import ProofOptions, Run, verify_programs
 from olp.workflows.retime import RetimeOptions, Retiming
@@ -152,7 +153,7 @@ def run(
         tell("read", 0.0)
         reading = Options(contour=options.contour)
         text, nominal = refusals.read(
-            session.sources, program, loaded.setup, loaded.dialect, reading, options
+            session.sources, program, loaded.setup, loaded.dialect, reading, options, kept=True
         )
         # the words of a long program are large: after this they are not needed
         planned = options.time and not loaded.setup.machine.missing_limits
@@ -172,7 +173,7 @@ def run(
         second, nominal = done, done.nominal
         del done
     with naming(corrected_name or (f"{program.name} (corrected)" if program.name else "")):
-        texts = _proved(program, nominal, second, corrected_name, loaded, options)
+        texts = _proved(session.sources, program, nominal, second, corrected_name, loaded, options)
         del second, nominal
         shown = _shown(session, texts, seconds, loaded, options, progress)
     tell("pack", 0.0)
@@ -209,18 +210,21 @@ def _corrected(session: Session, data: bytes, loaded: Loaded, options: ViewOptio
 
 
 def _proved(
-    program: Source, nominal: Program, corrected: Source | Correction | Run, name: str, loaded: Loaded,
-    options: ViewOptions,
+    sources: Sources, program: Source, nominal: Program, corrected: Source | Correction | Run, name: str,
+    loaded: Loaded, options: ViewOptions,
 ) -> _Texts:  # fmt: skip
     """Both programs with their correction, or with the verification of the corrected one, `name`."""
     if isinstance(corrected, Run):
         report = placed(corrected.report, nominal.origin)
         groups = corrected.proof.groups
         return _Texts(program, nominal, name, corrected.corrected, report, corrected.table, groups)
-    second = read(corrected.data, loaded.setup, loaded.dialect, Options(contour=options.contour))
+    reading = Options(contour=options.contour)
     if isinstance(corrected, Correction):
+        second = read(corrected.plain, loaded.setup, loaded.dialect, reading)
         report, table, groups = corrected.report, corrected.table, corrected.groups
         return _Texts(program, nominal, name, second, report, table, groups)
+    unrolling = unrolling_of_corrected(nominal)
+    _, second = refusals.read(sources, corrected, loaded.setup, loaded.dialect, reading, unrolling)
     run = verify_programs((nominal, program.name), (second, name), loaded, options, outside="OLP403")
     report, groups = placed(run.report, nominal.origin), run.proof.groups
     return _Texts(program, nominal, name, second, report, run.table, groups)

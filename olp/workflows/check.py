@@ -34,7 +34,7 @@ from olp.proof.proof import Proof, corrections_mm
 from olp.workflows import refusals
 from olp.workflows.correct import CorrectOptions, corrected
 from olp.workflows.doubt import accepted_of, doubted
-from olp.workflows.flatten import AS_IT_IS
+from olp.workflows.kept import unrolling_of_corrected
 from olp.workflows.original import placed, placed_findings
 from olp.workflows.proof import ProofOptions, Run, last_digit_mm, verify_programs
 from olp.workflows.session import Loaded, Outside, PathLike, Session
@@ -259,21 +259,27 @@ def _case(
         path = replace(run.proof.written, line=run.proof.nominal.line[run.proof.owner()])
         proof = replace(run.proof, written=path)
         return _Case(name, data, run.corrected, run, proof, loaded, reading, what, corrected_here=True)
-    unrolling = options if nominal is None else AS_IT_IS
-    program, written = refusals.read(sources, program, loaded.setup, loaded.dialect, reading, unrolling)
     if nominal is None:
+        program, written = refusals.read(
+            sources, program, loaded.setup, loaded.dialect, reading, options, kept=True
+        )
         what = "the corrected program; checks that need the nominal one are left out (give --nominal)"
         return _Case(name, data, written, None, None, loaded, reading, what)
     nominal.load()
     with nominal.errors("<nominal>"):
-        nominal, first = refusals.read(sources, nominal, loaded.setup, loaded.dialect, reading, options)
+        nominal, first = refusals.read(
+            sources, nominal, loaded.setup, loaded.dialect, reading, options, kept=True
+        )
+    unrolling = unrolling_of_corrected(first)
+    program, written = refusals.read(sources, program, loaded.setup, loaded.dialect, reading, unrolling)
     run = verify_programs(
         (first, nominal.name), (written, name), loaded, options,
         outside=options.outside_code, refuse_doubts=False,
     )  # fmt: skip
     what = f"the corrected program against the nominal one ({nominal.short or 'stdin'})"
     proof = replace(
-        run.proof, nominal=replace(run.proof.nominal, line=written.toolpath.line[run.proof.groups])
+        run.proof,
+        nominal=replace(run.proof.nominal, line=written.in_original().toolpath.line[run.proof.groups]),
     )
     return _Case(name, data, written, run, proof, loaded, reading, what)
 

@@ -13,12 +13,12 @@ import numpy.typing as npt
 
 from olp.checks import correction as checks
 from olp.compensation.planning import plans
-from olp.compensation.stamp import find_stamp, stamp_line
+from olp.compensation.stamp import find_stamp, stamp_line, stamped
 from olp.compensation.tally import Tally
 from olp.compensation.writer import Task
 from olp.compensation.writing import write
 from olp.core.arrays import Array, Index, read_only
-from olp.core.errors import AlreadyCorrected, UsageError
+from olp.core.errors import AlreadyCorrected, ProgramError, UsageError
 from olp.core.machine import Setup
 from olp.core.progress import Progress, part, silent
 from olp.core.values import dataclass
@@ -26,11 +26,13 @@ from olp.errormodel.known import KnownErrors
 from olp.files.sources import Source, Sources
 from olp.files.write import write_bytes
 from olp.findings.catalogue import Finding
+from olp.program.kept import Kept
 from olp.program.program import Program
 from olp.program.registry import Options, read
 from olp.proof.judgement import Judgements
 from olp.workflows import refusals
 from olp.workflows.doubt import accepted_of, doubted
+from olp.workflows.kept import finding_of, unrolled_again, unrolled_unasked, with_flow
 from olp.workflows.original import placed, placed_findings
 from olp.workflows.proof import Pair, ProofOptions, Run, limits_of, proved
 from olp.workflows.session import Loaded, Outside, PathLike, Session, opened
@@ -54,11 +56,13 @@ class Correction(Judged):
     `confidence` has bands and probabilities by waypoint where a part tolerance is stated and the calibration
     states uncertainties. `table` has the judgement of every nominal move, and (n,) `groups` the last move of
     the corrected program that belongs to each. `nominal` is the text that was corrected, unrolled where the
-    call asks for it; lines of the table are then those of its original, which count through its files.
+    call asks for it, or where its loops and subprograms are kept. Lines of the table are then those of its
+    original, which count through its files. `plain` is the corrected text, unrolled where those are kept.
     (n, 3) `position_mm` are the nominal axis positions at the ends of the moves, NaN where unknown. `inputs`
     are the files that were read, which `write` never overwrites."""
 
     data: bytes
+    plain: bytes
     report: dict[str, Any]
     findings: tuple[Finding, ...]
     table: Judgements
@@ -72,8 +76,8 @@ class Correction(Judged):
     def of(run: Run, inputs: tuple[str, ...] = ()) -> Correction:
         origin = run.nominal.origin
         return Correction(
-            run.text, placed(run.report, origin), placed_findings(run.findings, origin), run.table,
-            read_only(run.proof.groups), run.nominal.data, read_only(run.proof.nominal.end_mm),
+            run.text, run.corrected.data, placed(run.report, origin), placed_findings(run.findings, origin),
+            run.table, read_only(run.proof.groups), run.nominal.data, read_only(run.proof.nominal.end_mm),
             run.confidence, inputs,
         )  # fmt: skip
 
@@ -155,10 +159,23 @@ def corrected(
     data = done.source.data
     tell("prove", 0.7)
     reading = Options(contour=options.contour, tell=part(tell, 0.7, 0.78, "prove"))
-    second = read(done.text, loaded.setup, loaded.dialect, reading, words=False)
+    text = done.text
+    notes: tuple[Finding, ...] = ()
+    if done.kept is not None:
+        text = unrolled_again(sources, program, text, loaded).data
+        notes = (finding_of(done.kept),)
+    second = read(text, loaded.setup, loaded.dialect, reading, words=False)
     pair = Pair(done.nominal, data, program.name, second, done.text, "", done.uncorrected)
     held = outside if options.outside_box == "hold" else None
-    run = proved(pair, loaded.held(), options, done.doubts, outside=held, tell=part(tell, 0.78, 1.0))
+    told = part(tell, 0.78, 1.0)
+    run = proved(pair, loaded.held(), options, done.doubts, outside=held, notes=notes, tell=told)
+    if done.kept is not None and not run.proof.holds:
+        raise ProgramError(
+            "with its loops and subprograms kept the program is above the tolerance; unroll the program with "
+            "--flatten",
+            line=1,
+            code="OLP511",
+        )
     return replace(run, report=run.report | _written_report(done))
 
 
@@ -177,7 +194,7 @@ def _refuse_stamped(data: bytes) -> None:
 class _Rewritten:
     """A program written with its corrections. `source` is the text that was read, `nominal` what it says,
     without its words. `uncorrected` are moves that are left so, (n,) `parts` the number of moves of each
-    nominal one."""
+    nominal one. `kept` is there where the text keeps the flow of a program that was unrolled to be read."""
 
     source: Source
     nominal: Program
@@ -186,6 +203,7 @@ class _Rewritten:
     parts: npt.NDArray[np.int32]
     tally: Tally
     doubts: tuple[Finding, ...]
+    kept: Kept | None = None
 
 
 def _rewritten(
@@ -195,7 +213,9 @@ def _rewritten(
     """Read, plan and write. Words and plan of a long program are large: this function releases them."""
     tell("read", 0.0)
     reading = Options(contour=options.contour, tell=part(tell, 0.0, 0.2))
-    source, program = refusals.read(sources, source, loaded.setup, loaded.dialect, reading, options)
+    source, program = refusals.read(
+        sources, source, loaded.setup, loaded.dialect, reading, options, kept=True
+    )
     if options.split_rapids and program.verbatim:
         raise UsageError(
             "--split-rapids does not go with this dialect: it does not state the path between its points; "
@@ -212,12 +232,25 @@ def _rewritten(
         )  # fmt: skip
         stamp = stamp_line(loaded.digest, loaded.dialect.comment, accepted) if loaded.dialect.marks else b""
         increments_mm = loaded.setup.machine.least_increment_mm
-        task = Task(program, loaded.model, limits.tolerance_mm, increments_mm, stamp, bool(accepted))
+        unrolled = unrolled_unasked(source, options)
+        own_stamp = stamp if unrolled is None else b""
+        task = Task(
+            program, loaded.model, limits.tolerance_mm, increments_mm, own_stamp, bool(accepted),
+            located=unrolled is not None,
+        )  # fmt: skip
         written = write(task, plans(program, loaded.model, limits, told), told)
     nominal = replace(program, words=None, slot=np.zeros((0, 3), np.int32))
     # the corrected text has lines of its own
     text = bytes(source.data) if written.text is None else written.text
-    return _Rewritten(source, nominal, text, written.uncorrected, written.parts, written.tally, doubts)
+    kept = None
+    if unrolled is not None:
+        assert written.starts is not None
+        kept = with_flow(unrolled, text, written.starts, loaded)
+        assert kept.text is not None
+        text = kept.text
+        if stamp and (kept.changed or accepted):
+            text = stamped(text, stamp, program.eol(1), loaded.dialect.first)
+    return _Rewritten(source, nominal, text, written.uncorrected, written.parts, written.tally, doubts, kept)
 
 
 def _written_report(done: _Rewritten) -> dict[str, Any]:

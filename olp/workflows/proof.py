@@ -87,7 +87,8 @@ class Run:
 @dataclass(frozen=True, slots=True, eq=False)
 class Pair:
     """A nominal program and its correction as read, with the bytes and the names of both, and the moves of
-    the nominal one that are left uncorrected."""
+    the nominal one that are left uncorrected. `text` keeps the loops and subprograms that `corrected` has
+    unrolled."""
 
     nominal: Program
     data: bytes
@@ -141,12 +142,12 @@ def limits_of(
 
 def proved(
     pair: Pair, loaded: Loaded, options: ProofOptions, doubts: tuple[Finding, ...], *,
-    outside: str | None = None, tell: Progress = silent,
+    outside: str | None = None, notes: tuple[Finding, ...] = (), tell: Progress = silent,
 ) -> Run:  # fmt: skip
     """The proof of a pair of programs with all that is said of it; `correct` and `verify` are the same here.
-    `doubts` are those about the inputs. `outside` is the code of findings outside the calibrated box, None
-    where nothing is outside. Raises ProgramError where the second is not a correction of the first, or not
-    with the block-delete switch on."""
+    `doubts` are those about the inputs, `notes` further findings. `outside` is the code of findings outside
+    the calibrated box, None where nothing is outside. Raises ProgramError where the second is not a
+    correction of the first, or not with the block-delete switch on."""
     tolerance_mm = options.tolerance_um * MM_PER_UM
     proof = _prove(
         pair.nominal, pair.corrected, loaded, pair.uncorrected, tolerance_mm,
@@ -169,6 +170,7 @@ def proved(
     findings = (
         *doubts,
         *_unstamped(doubts, loaded),
+        *notes,
         *checks.proof_findings(proof, pair.uncorrected, first.place),
         *checks.part_findings(table, part_um),
         *checks.between_findings(first, proof, loaded.model),
@@ -217,7 +219,7 @@ def _prove_without_deleted(
     reading = Options(block_delete=True, contour=options.contour)
     nominal = read(pair.data, loaded.setup, loaded.dialect, reading, words=False)
     with naming(pair.other or "<corrected>"):
-        other = read(pair.text, loaded.setup, loaded.dialect, reading, words=False)
+        other = read(pair.corrected.data, loaded.setup, loaded.dialect, reading, words=False)
     try:
         limits = limits_of(nominal, loaded, options, refuse_outside=False)
         uncorrected = uncorrected_moves(nominal, loaded.model, limits)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from olp.findings.catalogue import RULES, Finding
 from olp.program.dialect import Dialect, Options
 from olp.program.program import Program
 from olp.program.survey import read_all
-from olp.workflows.flatten import AS_IT_IS, UnrollOptions, beside, unroller
+from olp.workflows.flatten import AS_IT_IS, UnrollOptions, as_asked, beside, unroller
 
 #: Lines that a finding names.
 _LINES = 10
@@ -35,27 +36,44 @@ def read(
     *,
     words: bool = True,
     block_delete: bool | None = None,
+    kept: bool = False,
 ) -> tuple[Source, Program]:
     """Read a program, unrolled where that is asked for; the text that was read, and what it says.
-    `block_delete` as in `as_asked`. Raises Refused with all the reasons where there are several, ProgramError
-    where there is one; lines are those of the original."""
+    `block_delete` as in `as_asked`. With `kept` a program that needs it is unrolled unasked. Raises Refused
+    with all the reasons where there are several, ProgramError where there is one; lines are those of the
+    original."""
     unroll = unroller(sources, program, setup, dialect, unrolling, block_delete=block_delete)
+    survey = partial(
+        read_all, program.data, setup, dialect, options, words=words, subprograms=beside(sources, program),
+        unroll=unroll, expands=unrolling.expand_cycles,
+    )  # fmt: skip
     try:
-        parsed = read_all(
-            program.data,
-            setup,
-            dialect,
-            options,
-            words=words,
-            subprograms=beside(sources, program),
-            unroll=unroll,
-            expands=unrolling.expand_cycles,
-        )
+        try:
+            parsed = survey(early=kept)
+        except ProgramError as error:
+            if not kept:
+                raise
+            if error.hinted and _can_be_unrolled(sources, program, setup, dialect):
+                flat = replace(unrolling, flatten=True)
+                return read(
+                    sources, program, setup, dialect, options, flat, words=words, block_delete=block_delete
+                )
+            parsed = survey()
     except ProgramError as error:
         raise error if setup.machine.located else _with_control(error, dialect) from None
     if not program.data.strip():
         raise ProgramError("the file is empty; expected a program of at least one block", code="OLP501")
     return program if unroll is None else program.holding(parsed.data), parsed
+
+
+def _can_be_unrolled(sources: Sources, program: Source, setup: Setup, dialect: Dialect) -> bool:
+    if dialect.unroller is None:
+        return False
+    try:
+        as_asked(sources, program, setup, dialect, UnrollOptions(flatten=True))
+    except ProgramError:
+        return False
+    return True
 
 
 def _with_control(error: ProgramError, dialect: Dialect) -> ProgramError:

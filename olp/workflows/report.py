@@ -138,7 +138,7 @@ def _predicted_plots(
         way = nominal_of(program.toolpath, loaded.model, "tip", points=program.dialect.points)
     except CannotCompute:
         return {}
-    corrected = read(result.data, loaded.setup, loaded.dialect, reading, words=False)
+    corrected = read(result.plain, loaded.setup, loaded.dialect, reading, words=False)
     # points farther away are no part of the path, such as those of a tool change
     reach_mm = 10.0 * float(result.report["deviation"]["before"]["between"]["max_um"]) * 1e-3 + 0.1
     along, at_end = counting(program.toolpath, points=program.dialect.points)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 from collections.abc import Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
 from olp.core.arrays import Array, read_only
@@ -16,7 +17,7 @@ from olp.findings.catalogue import Finding
 from olp.program.registry import Options
 from olp.proof.judgement import Judgements
 from olp.workflows import refusals
-from olp.workflows.flatten import AS_IT_IS
+from olp.workflows.kept import unrolling_of_corrected
 from olp.workflows.original import placed, placed_findings
 from olp.workflows.proof import ProofOptions, verify_programs
 from olp.workflows.session import Outside, PathLike, Session
@@ -102,22 +103,16 @@ def run(
         source.load()
     with nominal.errors():
         loaded = loaded.reading(nominal)
-    programs = []
+    read = partial(refusals.read, session.sources, setup=loaded.setup, dialect=loaded.dialect)
     reading = Options(contour=options.contour)
-    for source, role, unrolling in (
-        (nominal, "<nominal>", options),
-        (corrected, "<corrected>", AS_IT_IS),
-    ):
-        tell("read", 0.0)
-        with source.errors(role):
-            _, parsed = refusals.read(
-                session.sources, source, loaded.setup, loaded.dialect, reading, unrolling
-            )
-            programs.append(parsed)
+    tell("read", 0.0)
+    with nominal.errors("<nominal>"):
+        _, first = read(nominal, options=reading, unrolling=options, kept=True)
+    tell("read", 0.0)
+    with corrected.errors("<corrected>"):
+        _, second = read(corrected, options=reading, unrolling=unrolling_of_corrected(first))
     outside = "OLP403" if options.outside_box == "hold" else None
-    done = verify_programs(
-        (programs[0], nominal.name), (programs[1], corrected.name), loaded, options, outside=outside
-    )
+    done = verify_programs((first, nominal.name), (second, corrected.name), loaded, options, outside=outside)
     origin = done.nominal.origin
     report, findings = placed(done.report, origin), placed_findings(done.findings, origin)
     position_mm = read_only(done.proof.nominal.end_mm)

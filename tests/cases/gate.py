@@ -258,6 +258,7 @@ CASES: dict[str, tuple[Call, Call]] = {
         Call(b"G1 X100.001\n", nominal=b"G1 X100\n", options={"part_tolerance_um": 0.9}),
         Call(b"G1 X100.001\n", nominal=b"G1 X100\n", options={"part_tolerance_um": 1.1}),
     ),
+    "OLP109": (Call(b"o1 repeat [1]\nG1 X100\no1 endrepeat\nM2\n"), Call(b"G1 X100\nM2\n")),
     "OLP201": (Call(b"G64\nG1 X100\n"), Call(b"G64 P0.0001 Q0\nG1 X100\n")),
     "OLP202": (
         Call(b"G64 P0.0101 Q0\nG1 X100\n", **scaled(10.0)),

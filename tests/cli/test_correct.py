@@ -32,6 +32,7 @@ class Fake:
     raises: Exception | None = None
     calls: list[tuple[tuple[Any, ...], dict[str, Any]]] = field(default_factory=list)
     data: bytes = CORRECTED
+    plain: bytes = CORRECTED
     nominal: bytes = b"G21\r\nG1 X1. F100\r\n"
     report: dict[str, Any] = field(default_factory=lambda: dict(REPORT))
 

@@ -112,7 +112,7 @@ def test_depths_of_cycles_are_corrected(tmp_path: Path) -> None:
     assert z[2] == pytest.approx(-11.0, abs=1e-3)
 
 
-@pytest.mark.parametrize("block", [b"#1=5\n", b"G1 X#1\n", b"G1 X[1+2]\n", b"o100 call\n"])
+@pytest.mark.parametrize("block", [b"G1 X#1 Y50\n", b"G1 X[1+2] Y50\n", b"o100 call\n"])
 def test_expressions_are_refused_with_their_line(skewed: Path, block: bytes) -> None:
     assert refusal(b"G21 G90\nG0 X0. Y0. Z0.\n" + block, skewed).line == 3
 

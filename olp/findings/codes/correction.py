@@ -85,6 +85,15 @@ RULES = (
         "`--part-tolerance-um 1` for a program with a hole whose stroke is off by 3 um.",
     ),
     _rule(
+        "OLP109",
+        "loops and subprograms kept",
+        Severity.INFO,
+        "The program has loops, subprograms or expressions. All passes of each line need the same numbers. "
+        "So the lines were corrected in their places, and the flow is as you wrote it.",
+        "Nothing needs to be done. Give --flatten to have every pass written out instead.",
+        "A subprogram that M98 calls with L2, for a spring pass.",
+    ),
+    _rule(
         "OLP401",
         "calibration expired",
         Severity.ERROR,

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from olp.core.arrays import Index
 from olp.core.machine import Setup
 from olp.program.dialect import Options
+from olp.program.kept import Kept
 from olp.program.origin import Unrolled
 from olp.program.program import Program
 from olp.program.rs274.profiles.base import Profile
@@ -23,3 +25,10 @@ def unroll_blocks(data: bytes, profile: Profile, **options: Any) -> Unrolled:
     from olp.program.rs274.flatten.unroll import flatten
 
     return flatten(data, profile, **options)
+
+
+def keep_blocks(unrolled: Unrolled, corrected: bytes, starts: Index, profile: Profile) -> Kept:
+    """`olp.program.rs274.flatten.kept.kept`."""
+    from olp.program.rs274.flatten.kept import kept
+
+    return kept(unrolled, corrected, starts, profile)

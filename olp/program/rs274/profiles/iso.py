@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from olp.program.rs274.block_text import BlockText
 from olp.program.rs274.cycle_rules import ISO_CYCLES
-from olp.program.rs274.entry import read_blocks, unroll_blocks
+from olp.program.rs274.entry import keep_blocks, read_blocks, unroll_blocks
 from olp.program.rs274.flatten.language import MACRO_B
 from olp.program.rs274.profiles.base import ISO_M, REFUSALS, Act, Profile
 
@@ -20,6 +20,7 @@ ISO = Profile(
     reader=read_blocks,
     folder_endings=("nc", "tap", "cnc", "eia"),
     unroller=unroll_blocks,
+    keeper=keep_blocks,
     codes={},
     refusals=REFUSALS,
     harmless_m=ISO_M,

@@ -7,7 +7,7 @@ import re
 from olp.program.rs274.block_rules import NGC_RULES
 from olp.program.rs274.block_text import BlockText
 from olp.program.rs274.cycle_rules import NGC_CYCLES
-from olp.program.rs274.entry import read_blocks, unroll_blocks
+from olp.program.rs274.entry import keep_blocks, read_blocks, unroll_blocks
 from olp.program.rs274.flatten.language import NGC
 from olp.program.rs274.profiles.base import ARC_DISTANCE, ISO_M, REFUSALS, Act, Profile, g_codes
 from olp.program.text.line_ends import STRAY_CR
@@ -20,6 +20,7 @@ DIALECT = Profile(
     reader=read_blocks,
     folder_endings=("ngc", "nc", "tap", "cnc", "gcode"),
     unroller=unroll_blocks,
+    keeper=keep_blocks,
     codes=g_codes(unchanged={80}, extra={**_EVENTS, **ARC_DISTANCE}),
     refusals=REFUSALS,
     harmless_m=ISO_M | {50, 51, 52, 53} | frozenset(range(62, 69)),
