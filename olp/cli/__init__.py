@@ -44,10 +44,9 @@ _EXTRA = re.compile(r"Got unexpected extra arguments? \((.*)\)")
 #: Key under which a call keeps its words.
 _WORDS = "olp.words"
 
-# Read when numpy and pydantic are imported, which a verb does. The matrices here are 3 x 3: threads for them
-# would only spin, and a search for plug-ins reads the metadata of every installed package.
+# Read when numpy is imported, which a verb does. The matrices here are 3 x 3: threads for them would only
+# spin.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 
 
 class _WrongCall(click.UsageError):

@@ -181,6 +181,7 @@ def _layout(
     first: str, sources: Sources, profile: str | None, columns: tuple[str, ...], **values: str | None
 ) -> PointProfile | None:
     """The profile that the call asks for, None where it is detected from the files."""
+    from olp.core.schema import copied
     from olp.files.point_profile import BUILT_IN, load_profile, with_options
     from olp.files.points import layout_of
 
@@ -191,5 +192,5 @@ def _layout(
     else:
         start = layout_of(sources.read(first)) or BUILT_IN["olp"]
     if profile is None and columns and all(item.partition("=")[2].isdigit() for item in columns):
-        start = start.model_copy(update={"header": False})
+        start = copied(start, header=False)
     return with_options(start, columns, **values)

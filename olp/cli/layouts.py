@@ -38,6 +38,7 @@ def layout_of(
     profile: str | None, columns: tuple[str, ...], unit: str | None, table: Source, sources: Sources
 ) -> Layout | None:
     """The layout that a call asks for, None where it is detected from the table."""
+    from olp.core.schema import copied
     from olp.files.point_profile import BUILT_IN, from_layout, load_profile, with_options
     from olp.program.text.delimited import detected_layout, first_lines
 
@@ -55,7 +56,7 @@ def layout_of(
         return replace(layout, unit=unit or layout.unit)
     start = BUILT_IN["olp"] if layout is None else from_layout(layout)
     if layout is None and all(item.partition("=")[2].isdigit() for item in columns):
-        start = start.model_copy(update={"header": False})
+        start = copied(start, header=False)
     stated = unit or (layout.unit if layout else None)
     return replace(with_options(start, columns).layout, unit=stated)
 

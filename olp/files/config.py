@@ -11,6 +11,7 @@ from pathlib import Path as FilePath
 
 from olp.core.errors import UsageError
 from olp.core.machine import Axis, HolderPart, Job, Machine, Mesh, Sanity, Setup, Tool, Vector, WorkOffset
+from olp.core.schema import stated_values
 from olp.core.units import AXES, MM_PER_UM, shifted
 from olp.files.calibration.reader import load_calibration
 from olp.files.problems import Problem, config_error, validate
@@ -161,9 +162,11 @@ def _read_job(path: PathLike, read: Reader, exists: Exists = _is_file) -> tuple[
         start_mm=file.start_mm.values,
         payload_kg=file.payload_kg,
         payloads={entry.line: entry.payload_kg for entry in file.payloads},
-        temperatures_degC=file.temperatures_degC.model_dump(
-            exclude_none=True, exclude={"sensors", "sensor_log", "sensor_log_at_s"}
-        ),
+        temperatures_degC={
+            name: value
+            for name, value in stated_values(file.temperatures_degC).items()
+            if name not in ("sensors", "sensor_log", "sensor_log_at_s")
+        },
         sensors_degC=file.temperatures_degC.sensors,
         sensor_log=beside(path, file.temperatures_degC.sensor_log),
         sensor_log_at_s=file.temperatures_degC.sensor_log_at_s,

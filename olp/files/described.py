@@ -7,10 +7,9 @@ import re
 from pathlib import Path
 from typing import Literal
 
-from pydantic import Field
-
 from olp.core.errors import ConfigError
 from olp.core.schema import Table, Text
+from olp.core.schema_keys import Field
 from olp.files.fields import SHIPPED
 from olp.files.point_profile import PointProfile
 from olp.files.problems import Problem, config_error, validate

@@ -10,10 +10,8 @@ import re
 from collections.abc import Iterable
 from typing import Annotated
 
-from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator, WithJsonSchema
-
 from olp.core.machine import CHAINS, COMPONENTS, SQUARENESS
-from olp.core.schema import refusal
+from olp.core.schema_keys import After, Before, Field, Instead, Shown, refusal
 from olp.program.registry import DESCRIBED, DIALECTS
 
 #: Dialects that are built in.
@@ -135,12 +133,12 @@ def _tool_number(name: str) -> str:
 
 Compliance = Annotated[
     float | tuple[float, float, float],
-    PlainValidator(_compliance),
-    WithJsonSchema(
+    Instead(_compliance),
+    Shown(
         {
             "anyOf": [
-                {"type": "number", "minimum": 0},
-                {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3},
+                {"minimum": 0, "type": "number"},
+                {"items": {"type": "number"}, "maxItems": 3, "minItems": 3, "type": "array"},
             ],
             "default": 0.0,
         }
@@ -148,22 +146,18 @@ Compliance = Annotated[
 ]
 IsoNames = Annotated[
     frozenset[str],
-    PlainValidator(_iso_names),
-    WithJsonSchema(
-        {"anyOf": [{"type": "array", "items": {"enum": list(ISO_NAMES)}}, {"const": "all"}], "default": []}
+    Instead(_iso_names),
+    Shown(
+        {"anyOf": [{"items": {"enum": list(ISO_NAMES)}, "type": "array"}, {"const": "all"}], "default": []}
     ),
 ]
-ToolNumber = Annotated[
-    str, AfterValidator(_tool_number), WithJsonSchema({"type": "string", "pattern": f"^{_TOOL_NUMBER}$"})
-]
-OffsetName = Annotated[str, Field(min_length=1), AfterValidator(_offset_name)]
-Chain = Annotated[str, BeforeValidator(_chain), Field(json_schema_extra={"enum": sorted(CHAINS)})]
-Controller = Annotated[
-    str, BeforeValidator(_controller), Field(json_schema_extra={"enum": [*CONTROLLER_NAMES]})
-]
+ToolNumber = Annotated[str, After(_tool_number), Shown({"type": "string", "pattern": f"^{_TOOL_NUMBER}$"})]
+OffsetName = Annotated[str, Field(min_length=1), After(_offset_name)]
+Chain = Annotated[str, Before(_chain), Field(shown={"enum": sorted(CHAINS)})]
+Controller = Annotated[str, Before(_controller), Field(shown={"enum": [*CONTROLLER_NAMES]})]
 ProgramDialect = Annotated[
     str,
-    BeforeValidator(_dialect),
-    Field(json_schema_extra={"anyOf": [{"enum": [*CONTROLLER_NAMES]}, {"pattern": r"\.toml$"}]}),
+    Before(_dialect),
+    Field(shown={"anyOf": [{"enum": [*CONTROLLER_NAMES]}, {"pattern": r"\.toml$"}]}),
 ]
-Sign = Annotated[str, BeforeValidator(_sign), Field(json_schema_extra={"const": SIGN})]
+Sign = Annotated[str, Before(_sign), Field(shown={"const": SIGN})]

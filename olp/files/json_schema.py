@@ -6,8 +6,9 @@ import json
 from typing import Any, get_args
 
 from olp.core.errors import UsageError
-from olp.core.schema import Table
+from olp.core.schema import Table, fields_of
 from olp.files.described import DialectFile
+from olp.files.json_types import table_schema
 from olp.files.measurements.schemas import MeasurementsFile
 from olp.files.point_profile import PointProfile
 from olp.files.schemas import FILES
@@ -30,7 +31,7 @@ def json_schema(kind: str) -> dict[str, Any]:
     """The JSON Schema of a kind of file, one of KINDS. Raises UsageError for any other kind."""
     if kind not in KINDS:
         raise UsageError(f'there is no schema "{kind}"; expected one of {", ".join(KINDS)}')
-    schema = _cleaned(KINDS[kind].model_json_schema(by_alias=True, mode="validation"))
+    schema = table_schema(KINDS[kind])
     return {
         "$schema": DIALECT,
         "$id": schema_id(kind),
@@ -46,25 +47,10 @@ def schema_id(kind: str) -> str:
 
 def _format(model: type[Table]) -> str:
     """What the key schema of such a file says, such as "olp-machine-1"."""
-    field = model.model_fields["schema_"]
+    field = fields_of(model)["schema_"]
     return str(get_args(field.annotation)[0])
 
 
 def json_schema_text(kind: str) -> str:
     """The schema as JSON text. Raises as `json_schema`."""
     return json.dumps(json_schema(kind), indent=2) + "\n"
-
-
-def _cleaned(node: Any) -> Any:
-    """Without titles that only repeat a key, and without null, which TOML does not have."""
-    if isinstance(node, list):
-        return [_cleaned(item) for item in node]
-    if not isinstance(node, dict):
-        return node
-    kept = {k: _cleaned(v) for k, v in node.items() if k != "title" and (k, v) != ("default", None)}
-    if "patternProperties" in kept:
-        kept["additionalProperties"] = False
-    options = [option for option in kept.pop("anyOf", []) if option != {"type": "null"}]
-    if len(options) == 1:
-        return options[0] | kept
-    return kept | ({"anyOf": options} if options else {})

@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Annotated, Any, Literal
 
-from pydantic import Field
-
 from olp.core.errors import UsageError
-from olp.core.schema import NotNegative, Positive, Table, Text
+from olp.core.schema import NotNegative, Positive, Table, Text, copied, stated_values
+from olp.core.schema_keys import Field
 from olp.files.fields import nearest
 from olp.files.problems import validate
 from olp.files.toml_text import read_toml, toml_lines
@@ -124,8 +123,8 @@ class PointProfile(Table):
 
     def to_toml(self) -> str:
         """The text of a profile file."""
-        values = self.model_dump(by_alias=True, exclude_none=True)
-        columns = values.pop("columns")
+        values = stated_values(self)
+        columns = stated_values(values.pop("columns"))
         return "\n".join((*toml_lines(values), "", "[columns]", *toml_lines(columns))) + "\n"
 
 
@@ -167,7 +166,7 @@ def with_options(profile: PointProfile, columns: Sequence[str], **values: str | 
         table[key] = column if number is None else number
     changed: dict[str, Any] = {key: value for key, value in values.items() if value is not None}
     changed["columns"] = ColumnsTable(**table)
-    return profile.model_copy(update=changed)
+    return copied(profile, **changed)
 
 
 def looked_at(lines: Sequence[str]) -> PointProfile | None:

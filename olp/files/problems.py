@@ -1,14 +1,13 @@
-"""Messages for what pydantic finds wrong in a file: the key, its line, and what was expected."""
+"""Messages for what is wrong in a file: the key, its line, and what was expected."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, TypeVar, get_args, get_origin
 
-from pydantic import ValidationError
-
 from olp.core.errors import ConfigError
-from olp.core.schema import Table, is_table
+from olp.core.schema import Table, fields_of, is_table
+from olp.core.schema_keys import Wrong, WrongTable
 from olp.files.fields import nearest, shown
 from olp.files.stated_units import in_units_of_keys, not_a_quantity
 from olp.files.toml_text import Path, dotted, line_of
@@ -33,20 +32,23 @@ KINDS = {
 }
 
 _WANTED = {
-    "float_type": "a number",
-    "finite_number": "a finite number",
-    "int_type": "an integer",
-    "bool_type": "true or false",
-    "bool_parsing": "true or false",
-    "string_type": "text in quotes",
-    "string_too_short": "text that is not empty",
-    "tuple_type": "a list in brackets",
-    "list_type": "an array of tables, written with [[ ]]",
-    "dict_type": "a table",
-    "model_type": "a table",
-    "model_attributes_type": "a table",
-    "date_type": "a date without quotes, such as 2026-05-14",
-    "date_from_datetime_inexact": "a date without a time",
+    "float": "a number",
+    "finite": "a finite number",
+    "int": "an integer",
+    "bool": "true or false",
+    "str": "text in quotes",
+    "short": "text that is not empty",
+    "tuple": "a list in brackets",
+    "array": "an array of tables, written with [[ ]]",
+    "dict": "a table",
+    "table": "a table",
+    "date": "a date without quotes, such as 2026-05-14",
+}
+_LIMITS = {
+    "gt": "a number above {:g}",
+    "ge": "a number of {:g} or above",
+    "le": "a number of {:g} or below",
+    "long": "{} values",
 }
 
 
@@ -56,13 +58,13 @@ def validate(model: type[T], values: Mapping[str, object], lines: Mapping[Path, 
     one."""
     _refuse_other_kind(model, values, lines, file)
     try:
-        return model.model_validate(in_units_of_keys(model, values))
-    except ValidationError as error:
-        items: list[dict[str, Any]] = [dict(item) for item in error.errors(include_url=False)]
+        return model(**in_units_of_keys(model, values))
+    except WrongTable as error:
+        wrongs = error.wrongs
     # A misspelt key is one problem, not also a missing one.
-    meant = {_meant(model, item["loc"]) for item in items if item["type"] == "extra_forbidden"}
-    kept = [item for item in items if item["type"] != "missing" or item["loc"] not in meant]
-    raise config_error([_problem(model, item, lines) for item in kept], file)
+    meant = {_meant(model, path) for kind, path, _, _ in wrongs if kind == "unknown"}
+    kept = [wrong for wrong in wrongs if wrong[0] != "missing" or wrong[1] not in meant]
+    raise config_error([_problem(model, wrong, lines) for wrong in kept], file)
 
 
 def _refuse_other_kind(
@@ -70,7 +72,7 @@ def _refuse_other_kind(
 ) -> None:
     """Raises ConfigError where a file says that it is of another kind than the one expected."""
     stated = values.get("schema")
-    field = model.model_fields.get("schema_")
+    field = fields_of(model).get("schema_")
     expected = next((name for name in get_args(field.annotation) if name in KINDS), None) if field else None
     if expected is None or stated == expected or not isinstance(stated, str) or stated not in KINDS:
         return
@@ -92,39 +94,37 @@ def config_error(problems: Iterable[Problem], file: str | None) -> ConfigError:
     return ConfigError("; ".join(sentences), file=file, line=ordered[0][0], problems=sentences)
 
 
-def _problem(model: type[Table], error: dict[str, Any], lines: Mapping[Path, int]) -> Problem:
-    kind, path = error["type"], tuple(part for part in error["loc"] if part != "[key]")
+def _problem(model: type[Table], wrong: Wrong, lines: Mapping[Path, int]) -> Problem:
+    kind, path, stated, limit = wrong
     owner, description = _field(model, path)
     key = dotted(path)
     line = line_of(path, lines)
     if kind == "missing":
         wanted = _list_wanted(path, description) or description
         return line, f"{key} is missing; expected {wanted}"
-    if kind == "extra_forbidden":
-        return line, _unknown(owner, path, key, error["input"])
-    if kind == "olp":
-        return line, f"{key} {error['ctx']['sentence']}"
-    value = shown(error["input"])
-    wrong = not_a_quantity(path, error["input"]) if kind == "float_type" else None
-    if wrong is not None:
-        return line, f"{key} = {value}; {wrong}; it is {description}"
-    wanted = _wanted(kind, error.get("ctx", {}))
-    if kind == "literal_error" and wanted in description:
+    if kind == "unknown":
+        return line, _unknown(owner, path, key, stated)
+    if kind == "refused":
+        return line, f"{key} {limit}"
+    value = shown(stated)
+    unfit = not_a_quantity(path, stated) if kind == "float" else None
+    if unfit is not None:
+        return line, f"{key} = {value}; {unfit}; it is {description}"
+    wanted = _wanted(kind, limit)
+    if kind == "literal" and wanted in description:
         return line, f"{key} = {value}; expected {description}"
     return line, f"{key} = {value}; expected {wanted}: {description}"
 
 
-def _wanted(kind: str, context: Mapping[str, Any]) -> str:
-    if kind == "literal_error":
-        names = str(context["expected"]).replace("'", '"')
-        return f"one of {names}" if " or " in names else names
-    if kind == "greater_than":
-        return f"a number above {context['gt']:g}"
-    if kind == "greater_than_equal":
-        return f"a number of {context['ge']:g} or above"
-    if kind == "too_long":
-        return f"{context['max_length']} values"
-    return _WANTED.get(kind, kind.replace("_", " "))
+def _wanted(kind: str, limit: Any) -> str:
+    if kind == "literal":
+        *most, last = [f'"{name}"' for name in limit]
+        return f"one of {', '.join(most)} or {last}" if most else last
+    if kind == "any":
+        return " or ".join(_WANTED[one] for one in limit)
+    if kind in _LIMITS:
+        return _LIMITS[kind].format(limit)
+    return _WANTED[kind]
 
 
 def _list_wanted(path: Path, description: str) -> str:
@@ -140,7 +140,7 @@ def _field(model: type[Table], path: Path) -> tuple[type[Table], str]:
     for part in path:
         if is_table(inside):
             owner = inside
-            field = {f.alias or name: f for name, f in owner.model_fields.items()}.get(str(part))
+            field = {f.alias or name: f for name, f in fields_of(owner).items()}.get(str(part))
             if field is None:
                 break
             description = field.description or ""
@@ -177,7 +177,7 @@ def _unknown(owner: type[Table], path: Path, key: str, value: object) -> str:
 
 
 def _keys(table: type[Table]) -> list[str]:
-    return [field.alias or name for name, field in table.model_fields.items()]
+    return [field.alias or name for name, field in fields_of(table).items()]
 
 
 def _meant(model: type[Table], path: Path) -> Path:

@@ -1,4 +1,4 @@
-"""The keys of machine, calibration and job files, as pydantic models.
+"""The keys of machine, calibration and job files, as tables.
 
 One class per TOML table. A key that no class names is refused. Every description completes the sentence
 "expected ...", states the unit, and is part of the exported JSON Schema.
@@ -9,9 +9,8 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import Annotated, Literal
 
-from pydantic import Field, ValidationInfo, field_validator
-
-from olp.core.schema import Interval, NotNegative, Position, Positive, Table, Text, Triple, refusal
+from olp.core.schema import Interval, NotNegative, Position, Positive, Table, Text, Triple
+from olp.core.schema_keys import Field, Known, refusal, rule
 from olp.files.calibration.schema import CalibrationFile
 from olp.files.fields import (
     CONTROLLERS,
@@ -87,10 +86,10 @@ class WorkOffsetTable(Table):
         default=None, description="the payload at the touch, in kg; payload_kg of the job if left out"
     )
 
-    @field_validator("touched_at_mm", "touch_tool", "touched_payload_kg")
-    @classmethod
-    def _only_if_touched(cls, value: object, info: ValidationInfo) -> object:
-        if info.data.get("set_by") == "true" and value is not None:
+    @rule("touched_at_mm", "touch_tool", "touched_payload_kg")
+    @staticmethod
+    def _only_if_touched(value: object, known: Known) -> object:
+        if known.get("set_by") == "true" and value is not None:
             raise refusal('contradicts set_by = "true"; expected set_by = "touch", or this key left out')
         return value
 
@@ -118,7 +117,7 @@ class ToolTable(Table):
     )
     touched_at_mm: Position | None = Field(
         default=None,
-        validate_default=True,
+        check_default=True,
         description="the axis positions in mm where the length was set, { X = .., Y = .., Z = .. }",
     )
     setter: Text | None = Field(
@@ -141,11 +140,11 @@ class ToolTable(Table):
         "gauge point",
     )
 
-    @field_validator("holder")
-    @classmethod
-    def _shorter_than_tool(cls, value: list[HolderTable], info: ValidationInfo) -> list[HolderTable]:
-        tool_vector = info.data.get("gauge_to_tip_mm")
-        reach = abs(tool_vector[2]) if tool_vector is not None else abs(info.data.get("Z_mm", 0.0))
+    @rule("holder")
+    @staticmethod
+    def _shorter_than_tool(value: list[HolderTable], known: Known) -> list[HolderTable]:
+        tool_vector = known.get("gauge_to_tip_mm")
+        reach = abs(tool_vector[2]) if tool_vector is not None else abs(known.get("Z_mm", 0.0))
         total = sum(part.length_mm for part in value)
         if value and total >= reach:
             raise refusal(
@@ -154,19 +153,19 @@ class ToolTable(Table):
             )
         return value
 
-    @field_validator("k_um")
-    @classmethod
-    def _of_a_setter(cls, value: float | None, info: ValidationInfo) -> float | None:
-        if value is not None and info.data.get("set_by") == "true" and info.data.get("setter") is None:
+    @rule("k_um")
+    @staticmethod
+    def _of_a_setter(value: float | None, known: Known) -> float | None:
+        if value is not None and known.get("set_by") == "true" and known.get("setter") is None:
             raise refusal(
                 'is that of a setter; expected setter = "..", set_by = "touch", or this key left out'
             )
         return value
 
-    @field_validator("touched_at_mm")
-    @classmethod
-    def _with_touch(cls, value: Position | None, info: ValidationInfo) -> Position | None:
-        set_by = info.data.get("set_by")
+    @rule("touched_at_mm")
+    @staticmethod
+    def _with_touch(value: Position | None, known: Known) -> Position | None:
+        set_by = known.get("set_by")
         if set_by == "true" and value is not None:
             raise refusal('is given, but set_by is "true"; expected set_by = "touch", or this key left out')
         if set_by == "touch" and (value is None or value.complete is None):
@@ -287,16 +286,16 @@ class TemperaturesTable(Table):
     )
     sensor_log_at_s: float | None = Field(
         default=None,
-        validate_default=True,
+        check_default=True,
         description="the time in that log, in s; its last time if left out",
     )
 
-    @field_validator("sensor_log_at_s")
-    @classmethod
-    def _one_way(cls, value: float | None, info: ValidationInfo) -> float | None:
-        if info.data.get("sensors") is not None and info.data.get("sensor_log") is not None:
+    @rule("sensor_log_at_s")
+    @staticmethod
+    def _one_way(value: float | None, known: Known) -> float | None:
+        if known.get("sensors") is not None and known.get("sensor_log") is not None:
             raise refusal("or sensors: both sensors and sensor_log are given; expected one of the two")
-        if value is not None and info.data.get("sensor_log") is None:
+        if value is not None and known.get("sensor_log") is None:
             raise refusal("is given without sensor_log; expected the path of the log, or this key left out")
         return value
 
@@ -361,9 +360,9 @@ class JobFile(Table):
     styli: Styli = Field(default={}, description="tables [styli.LABEL], which override the machine's")
     meshes: list[MeshTable] = Field(default=[], description="tables [[meshes]]")
 
-    @field_validator("payloads")
-    @classmethod
-    def _ascending_lines(cls, value: list[PayloadTable]) -> list[PayloadTable]:
+    @rule("payloads")
+    @staticmethod
+    def _ascending_lines(value: list[PayloadTable], _: Known) -> list[PayloadTable]:
         for before, after in pairwise(value):
             if after.line <= before.line:
                 raise refusal(

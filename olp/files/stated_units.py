@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from typing import Any, get_args, get_origin
 
 from olp.core.quantities import pattern, quantity, unit_of_key
-from olp.core.schema import Table, is_table
+from olp.core.schema import Table, fields_of, is_table
 
 
 def in_units_of_keys(model: type[Table], values: Mapping[str, object]) -> dict[str, object]:
     """The values of a table with each text that is a quantity as a number in the unit of its key. Any other
     text is unchanged, and so refused by the model."""
-    fields = {field.alias or name: field.annotation for name, field in model.model_fields.items()}
+    fields = {field.alias or name: field.annotation for name, field in fields_of(model).items()}
     return {key: _value(key, value, fields.get(key)) for key, value in values.items()}
 
 

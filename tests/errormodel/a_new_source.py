@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from pydantic import Field
 
 from olp.core.arrays import Array, Mask
 from olp.core.interpolation import Column
 from olp.core.machine import Vector
 from olp.core.schema import NotNegative, Table
+from olp.core.schema_keys import Field
 from olp.core.units import UM_PER_MM, in_unit, shifted
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.boxed import Boxed, as_points

@@ -13,6 +13,7 @@ import pytest
 from olp.cli.inspect import machine_summary
 from olp.compensation.invert import invert
 from olp.core.machine import CHAINS
+from olp.core.schema import fields_of
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration
@@ -120,7 +121,7 @@ def plain(value: Any) -> Any:
 def test_it_is_a_key_of_the_file_and_has_a_place_in_a_calibration(key: str) -> None:
     source = NAMES[key]
     assert len(NAMES) == len(SOURCES)
-    assert source.schema is None or key in CalibrationFile.model_fields
+    assert source.schema is None or key in fields_of(CalibrationFile)
     assert not source.field or source.field in {f.name for f in dataclasses.fields(Calibration)}
     assert type(source).__doc__
 

@@ -80,7 +80,7 @@ def test_a_correction_needs_no_large_library(tmp_path: Path) -> None:
 
 #: modules and packages that the correction of a plain program for LinuxCNC does without
 NEEDLESS = (
-    "numpy.ma", "rich", "statistics", "asyncio", "pydantic.v1", "pydantic.dataclasses",
+    "numpy.ma", "rich", "statistics", "asyncio", "pydantic", "importlib.metadata",
     "olp.calibration", "olp.clearance", "olp.comparison", "olp.results", "olp.review", "olp.trajectory",
     "olp.uncertainty", "olp.compensation.statement_writer", "olp.compensation.verbatim_writer",
     "olp.workflows.confidence", "olp.files.archive", "olp.files.control_tables", "olp.files.described",

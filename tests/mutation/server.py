@@ -19,7 +19,7 @@ from mutation.sites import Mutant
 
 #: Imported before the fork: none of them is changed.
 LIBRARIES = (
-    *("numpy", "scipy.optimize", "scipy.spatial", "scipy.interpolate", "pydantic", "click", "hypothesis"),
+    *("numpy", "scipy.optimize", "scipy.spatial", "scipy.interpolate", "click", "hypothesis"),
     *("matplotlib.figure", "trimesh", "markdown_it", "rich.progress"),
 )
 #: s; a test that hangs is a test that notices. Generous, as other work may take the machine.

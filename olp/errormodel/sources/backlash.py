@@ -6,11 +6,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from pydantic import Field
-
 from olp.core.interpolation import Column
 from olp.core.machine import Vector
 from olp.core.schema import NotNegative, Table
+from olp.core.schema_keys import Field
 from olp.core.units import AXES, UM_PER_MM, in_unit, shifted
 from olp.errormodel.entry import AxisState, Entry, Numbers, alone
 from olp.errormodel.sources.base import ErrorSource, Example, Reading, Schema, Sigmas, Writing, digits, vector

@@ -29,7 +29,7 @@ Values = TypeVar("Values")
 T = TypeVar("T", bound=Table)
 F = TypeVar("F", bound="NamesFile")
 V = TypeVar("V")
-#: The type of a key of calibration.toml, and its pydantic field.
+#: The type of a key of calibration.toml, and its `Field`.
 Schema = tuple[Any, Any]
 #: Standard uncertainties in mm or rad by name: of a component at each position, or one number.
 Sigmas = Mapping[str, Array | float]
@@ -162,7 +162,7 @@ class Example:
 class ErrorSource(Generic[Stated, Values]):
     """One kind of error. A method that a source leaves out does nothing.
 
-    `key` is its key in calibration.toml and `schema` that key's type and pydantic field; `field` the field of
+    `key` is its key in calibration.toml and `schema` that key's type and `Field`; `field` the field of
     `Calibration` that holds its values, "" for `Calibration.more`. `correctable` is False for a random error:
     it has no model. `covered` is False where no covariance holds its numbers. Then they are no part of the
     fingerprint, and a covariance holds whatever their values are. `numbers` are the kinds of numbers that a

@@ -11,15 +11,15 @@ support) are:
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Literal
 
 import numpy as np
-from pydantic import Field, ValidationInfo, field_validator
 
 from olp.core.arrays import Array
 from olp.core.errors import ConfigError
 from olp.core.machine import ZERO, Vector
-from olp.core.schema import Positive, refusal
+from olp.core.schema import Positive
+from olp.core.schema_keys import Field, Known, refusal, rule
 from olp.core.units import AXES
 from olp.core.values import dataclass
 from olp.errormodel.gridded import COVER_MM, ComponentTable
@@ -132,46 +132,46 @@ class BeamTable(OnLine):
         description='"simple" (rests on both ends), "fixed" (clamped at both ends), or "cantilever" '
         "(clamped at the first end of span_mm; a ram that comes out farther)"
     )
-    span_mm: Annotated[tuple[float, float], Field(strict=False)] = Field(
+    span_mm: tuple[float, float] = Field(
         description="the axis positions at which the load stands over the two supports, [first, second] in mm"
     )
     youngs_modulus_GPa: Positive = Field(description="Young's modulus of the beam, in GPa: 210 for steel")
     second_moment_mm4: Positive | None = Field(
         default=None, description="the second moment of area of the section, in mm4"
     )
-    section_mm: Annotated[tuple[Positive, Positive, Positive], Field(strict=False)] | None = Field(
+    section_mm: tuple[Positive, Positive, Positive] | None = Field(
         default=None,
-        validate_default=True,
+        check_default=True,
         description="a rectangular tube instead: [width, height in the direction of bending, wall] in mm",
     )
     direction: Literal["+X", "-X", "+Y", "-Y", "+Z", "-Z"] = Field(
         default="-Z", description='the direction of the weight, "-Z" if left out'
     )
 
-    @field_validator("span_mm")
-    @classmethod
-    def _not_empty(cls, value: tuple[float, float]) -> tuple[float, float]:
+    @rule("span_mm")
+    @staticmethod
+    def _not_empty(value: tuple[float, float], known: Known) -> tuple[float, float]:
         if value[0] == value[1]:
             raise refusal("= is empty; expected the axis positions of two different ends, in mm")
         return value
 
-    @field_validator("section_mm")
-    @classmethod
+    @rule("section_mm")
+    @staticmethod
     def _one_of_two(
-        cls, value: tuple[float, float, float] | None, info: ValidationInfo
+        value: tuple[float, float, float] | None, known: Known
     ) -> tuple[float, float, float] | None:
-        if "second_moment_mm4" not in info.data:
+        if "second_moment_mm4" not in known:
             return value
-        if (value is None) == (info.data["second_moment_mm4"] is None):
+        if (value is None) == (known["second_moment_mm4"] is None):
             raise refusal("or second_moment_mm4: expected exactly one of the two")
         if value is not None and 2.0 * value[2] > min(value[:2]):
             raise refusal(f"has a wall of {value[2]:g} mm; expected at most half of width and height")
         return value
 
-    @field_validator("direction")
-    @classmethod
-    def _across(cls, value: str, info: ValidationInfo) -> str:
-        if value[1] == info.data.get("axis"):
+    @rule("direction")
+    @staticmethod
+    def _across(value: str, known: Known) -> str:
+        if value[1] == known.get("axis"):
             raise refusal(f'= "{value}" is along the beam; expected a direction across it')
         return value
 

@@ -10,9 +10,9 @@ from itertools import product
 from typing import Any, Literal
 
 import numpy as np
-from pydantic import Field
 
 from olp.core.schema import Position, Table, Text, Triple
+from olp.core.schema_keys import Field
 from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM, in_unit_text
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.grid_errors import GridErrors

@@ -12,13 +12,13 @@ from types import MappingProxyType
 from typing import Any, Literal
 
 import numpy as np
-from pydantic import Field
 
 from olp.core.arrays import Array
 from olp.core.errors import ConfigError
 from olp.core.interpolation import Column
 from olp.core.machine import COMPONENTS, ZERO, Vector
 from olp.core.schema import Position, Table, Text, Triple
+from olp.core.schema_keys import Field
 from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM, in_unit_text
 from olp.core.values import dataclass
 from olp.errormodel.entry import AxisState, Entry, Numbers, Slot, alone, component_acts

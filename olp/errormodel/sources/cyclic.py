@@ -12,12 +12,12 @@ from collections.abc import Iterator
 from typing import Any, Literal
 
 import numpy as np
-from pydantic import Field, ValidationInfo, field_validator
 
 from olp.core.arrays import Array
 from olp.core.interpolation import Column
 from olp.core.machine import COMPONENTS, Vector
-from olp.core.schema import Position, Positive, Table, Triple, refusal
+from olp.core.schema import Position, Positive, Table, Triple
+from olp.core.schema_keys import Field, Known, refusal, rule
 from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM, in_unit, shifted
 from olp.core.values import dataclass
 from olp.errormodel.entry import AxisState, Entry, Numbers, Slot, component_acts
@@ -90,7 +90,7 @@ class CyclicTable(Table):
         default=None, description="the amplitude (peak) of a linear error, in um"
     )
     amplitude_urad: float | None = Field(
-        default=None, validate_default=True, description="the amplitude (peak) of an angular error, in urad"
+        default=None, check_default=True, description="the amplitude (peak) of an angular error, in urad"
     )
     phase_rad: float = Field(default=0.0, description="the phase at axis position 0, in rad")
     line_mm: Position | None = Field(
@@ -108,10 +108,10 @@ class CyclicTable(Table):
         '"functional-point"',
     )
 
-    @field_validator("line_mm", "tool_mm", "reference")
-    @classmethod
-    def _only_of_angles(cls, value: object, info: ValidationInfo) -> object:
-        component = info.data.get("component")
+    @rule("line_mm", "tool_mm", "reference")
+    @staticmethod
+    def _only_of_angles(value: object, known: Known) -> object:
+        component = known.get("component")
         if value is not None and component is not None and component[1] not in "ABC":
             raise refusal(
                 f"does not fit component {component}, which has no lever arm; expected this key left out, or "
@@ -119,13 +119,13 @@ class CyclicTable(Table):
             )
         return value
 
-    @field_validator("amplitude_urad")
-    @classmethod
-    def _unit_fits(cls, urad: float | None, info: ValidationInfo) -> float | None:
-        component = info.data.get("component")
-        if component is None or "amplitude_um" not in info.data:
+    @rule("amplitude_urad")
+    @staticmethod
+    def _unit_fits(urad: float | None, known: Known) -> float | None:
+        component = known.get("component")
+        if component is None or "amplitude_um" not in known:
             return urad
-        um = info.data["amplitude_um"]
+        um = known["amplitude_um"]
         angular = component[1] in "ABC"
         if (um if angular else urad) is not None or (urad if angular else um) is None:
             wanted = "amplitude_urad, in urad" if angular else "amplitude_um, in um"

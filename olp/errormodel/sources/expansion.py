@@ -10,12 +10,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from pydantic import Field
 
 from olp.core.arrays import Array, Mask
 from olp.core.errors import ConfigError
 from olp.core.machine import ZERO, Vector
 from olp.core.schema import Table, Text, Triple
+from olp.core.schema_keys import Field
 from olp.core.units import AXES, in_unit, shifted
 from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel

@@ -10,13 +10,13 @@ from itertools import product
 from typing import Any, Literal
 
 import numpy as np
-from pydantic import Field
 
 from olp.core.arrays import Array, Mask
 from olp.core.grid_interpolation import KINDS, Grid
 from olp.core.grid_interpolation import Kind as Interpolation
 from olp.core.machine import ZERO, Vector
 from olp.core.schema import Table, Text, Triple
+from olp.core.schema_keys import Field
 from olp.core.units import AXES, UM_PER_MM, in_unit_text
 from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel

@@ -5,10 +5,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from pydantic import Field
-
 from olp.core.machine import Vector
 from olp.core.schema import NotNegative, Table
+from olp.core.schema_keys import Field
 from olp.core.units import AXES, UM_PER_MM, in_unit, shifted
 from olp.errormodel.sources.base import ErrorSource, Example, Frame, Reading, Schema, Writing, vector
 

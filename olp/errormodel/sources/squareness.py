@@ -8,11 +8,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from pydantic import Field
-
 from olp.core.interpolation import Column
 from olp.core.machine import SQUARENESS, ZERO, Vector
 from olp.core.schema import NotNegative, Table
+from olp.core.schema_keys import Field
 from olp.core.units import RAD_PER_URAD, in_unit, shifted
 from olp.errormodel.entry import AxisState, Entry, Numbers, alone
 from olp.errormodel.sources.base import ErrorSource, Example, Frame, Reading, Schema, Sigmas, Writing, digits

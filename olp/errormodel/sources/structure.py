@@ -11,15 +11,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field, replace
 from types import MappingProxyType
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
-from pydantic import Field, ValidationInfo, field_validator
 
 from olp.core.arrays import Array
 from olp.core.errors import ConfigError
 from olp.core.machine import COMPONENTS, ZERO, Vector
-from olp.core.schema import Interval, Position, Table, Text, Triple, refusal
+from olp.core.schema import Interval, Position, Table, Text, Triple
+from olp.core.schema_keys import Field, Known, refusal, rule
 from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM, in_unit, shifted
 from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
@@ -185,7 +185,7 @@ class Structure:
         return sorted({d.component for d in self.distortions})
 
 
-Range = Annotated[tuple[float, float], Field(strict=False)]
+Range = tuple[float, float]
 
 
 class SensorTable(Table):
@@ -221,7 +221,7 @@ class DistortionTable(Table):
     )
     bow_urad_K: float | None = Field(
         default=None,
-        validate_default=True,
+        check_default=True,
         description="a parabola, 0 at both ends of the span, its middle in urad per K",
     )
     line_mm: Position | None = Field(
@@ -231,14 +231,14 @@ class DistortionTable(Table):
         default=(0.0, 0.0, 0.0), description="the tool vector while measuring, [X, Y, Z] in mm"
     )
 
-    @field_validator("bow_urad_K")
-    @classmethod
-    def _unit_fits(cls, value: float | None, info: ValidationInfo) -> float | None:
-        component = info.data.get("component")
+    @rule("bow_urad_K")
+    @staticmethod
+    def _unit_fits(value: float | None, known: Known) -> float | None:
+        component = known.get("component")
         if component is None:
             return value
         angular = component[1] in "ABC"
-        stated = {**info.data, "bow_urad_K": value}
+        stated = {**known, "bow_urad_K": value}
         wrong = [
             key
             for key, number in stated.items()

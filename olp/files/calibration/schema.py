@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import datetime
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
-from pydantic import Field, ValidationInfo, create_model, field_validator
-
-from olp.core.schema import Interval, NotNegative, Table, Text, Triple, refusal
+from olp.core.schema import Interval, NotNegative, Table, Text, Triple, with_keys
+from olp.core.schema_keys import Field, Known, refusal, rule
 from olp.errormodel.quality import Fitted, Quality
 from olp.errormodel.sources.registry import SOURCES
 from olp.files.fields import SIGN, IsoNames, Sign
@@ -63,7 +62,7 @@ class CalibrationHead(Table):
     sign: Sign = Field(description=f'the sign of all values, "{SIGN}"')
     model: Literal["rigid-body", "huddersfield"] = Field(description='"rigid-body" or "huddersfield"')
     datum_mm: Triple = Field(description="the axis positions from which lever arms count, [X, Y, Z] in mm")
-    box_mm: Annotated[tuple[Interval, Interval, Interval], Field(strict=False)] = Field(
+    box_mm: tuple[Interval, Interval, Interval] = Field(
         description="the calibrated axis positions, [[min, max], [min, max], [min, max]] of X, Y, Z in mm"
     )
     active_during_measurement: IsoNames = Field(
@@ -74,10 +73,10 @@ class CalibrationHead(Table):
         default=0.0, description="the payload on the machine while measuring, in kg; 0 if left out"
     )
 
-    @field_validator("valid_until")
-    @classmethod
-    def _not_before_measured(cls, value: datetime.date | None, info: ValidationInfo) -> datetime.date | None:
-        measured = info.data.get("measured")
+    @rule("valid_until")
+    @staticmethod
+    def _not_before_measured(value: datetime.date | None, known: Known) -> datetime.date | None:
+        measured = known.get("measured")
         if value is not None and measured is not None and value < measured:
             raise refusal(f"= {value} is before measured = {measured}; expected a later date")
         return value
@@ -97,12 +96,12 @@ _TABLES["quality"] = (
 )
 
 #: A calibration file: its head, and a key of every registered source.
-CalibrationFile: type[CalibrationHead] = create_model(
+CalibrationFile: type[CalibrationHead] = with_keys(
     "CalibrationFile",
-    __base__=CalibrationHead,
-    __module__=__name__,
-    __doc__="olp-calibration-1: the measured errors of one machine, actual minus commanded.",
-    **_TABLES,
+    CalibrationHead,
+    _TABLES,
+    words="olp-calibration-1: the measured errors of one machine, actual minus commanded.",
+    module=__name__,
 )
 
 

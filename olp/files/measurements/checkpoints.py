@@ -14,12 +14,12 @@ from pathlib import Path as FilePath
 from typing import Literal
 
 import numpy as np
-from pydantic import Field
 
 from olp.calibration.observations.points import Points
 from olp.core.errors import ConfigError
 from olp.core.machine import Vector
-from olp.core.schema import NotNegative, Positive, Table, Triple
+from olp.core.schema import NotNegative, Positive, Table, Triple, fields_of
+from olp.core.schema_keys import Field
 from olp.core.units import MM_PER_UM
 from olp.files.measurements.instruments.base import PER_UNIT
 from olp.files.measurements.point_readings import DEVIATION, MEASURED, parse_point_readings
@@ -69,7 +69,7 @@ def load_checkpoints(
     header = next((line for line in data.splitlines() if line.strip() and not line.startswith(b"#")), b"")
     deviates = b"deviation_" in header
     readings = parse_point_readings(data, str(path), DEVIATION if deviates else MEASURED)
-    keys = {key: value for key, value in readings.keys.items() if key in StatedOfPoints.model_fields}
+    keys = {key: value for key, value in readings.keys.items() if key in fields_of(StatedOfPoints)}
     stated = stated_as(keys, StatedOfPoints, readings.file, bare=False)
     problems = []
     if stated.sigma_um is not None and sigma_um is not None and stated.sigma_um != sigma_um:

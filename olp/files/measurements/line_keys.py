@@ -5,10 +5,9 @@ from __future__ import annotations
 import datetime
 from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, Field
-
 from olp.core.machine import COMPONENTS
-from olp.core.schema import NotNegative, Position, Positive, Table, Text, Triple, refusal
+from olp.core.schema import NotNegative, Position, Positive, Table, Text, Triple
+from olp.core.schema_keys import Before, Field, refusal
 from olp.files.fields import IsoNames, shown
 from olp.files.measurements.readings import SENSES
 
@@ -22,7 +21,7 @@ def _sense(value: object) -> object:
     return value
 
 
-Sense = Annotated[str, Field(json_schema_extra={"enum": list(SENSES)}), BeforeValidator(_sense)]
+Sense = Annotated[str, Field(shown={"enum": list(SENSES)}), Before(_sense)]
 Instrument = Literal["laser", "level", "autocollimator", "straightedge", "other"]
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from olp.calibration.observations.lines import Line
 from olp.core.errors import ConfigError
-from olp.core.schema import Position
+from olp.core.schema import Position, fields_of, made, stated_keys
 from olp.core.units import AXES, MM_PER_UM, RAD_PER_URAD
 from olp.files.measurements.instruments.base import PER_UNIT
 from olp.files.measurements.line_keys import LineKeys, LineTable, Stated
@@ -16,7 +16,7 @@ from olp.files.measurements.readings import Readings
 from olp.files.measurements.stated import Written, stated_as
 from olp.files.problems import Problem, config_error
 
-_KEYS = tuple(LineKeys.model_fields)
+_KEYS = tuple(fields_of(LineKeys))
 
 
 def stated_of(keys: Mapping[str, Written], file: str) -> tuple[Stated, dict[str, int]]:
@@ -32,7 +32,7 @@ def merged(
     problems: list[Problem] = []
     values: dict[str, Any] = {}
     for key in _KEYS:
-        given = [getattr(part, key) for part in (table, stated) if key in part.model_fields_set]
+        given = [getattr(part, key) for part in (table, stated) if key in stated_keys(part)]
         if key == "line_mm" and given:
             given = [together(given)]
         if len(given) == 2 and given[0] != given[1]:
@@ -40,13 +40,13 @@ def merged(
             problems.append((lines.get(key), sentence))
         if given:
             values[key] = given[0]
-        elif key in defaults.model_fields_set:
+        elif key in stated_keys(defaults):
             values[key] = getattr(defaults, key)
-    if "line_mm" in values and "line_mm" in defaults.model_fields_set:
+    if "line_mm" in values and "line_mm" in stated_keys(defaults):
         values["line_mm"] = together([values["line_mm"], defaults.line_mm])
     if problems:
         raise config_error(problems, file)
-    return LineKeys.model_construct(set(values), **values)
+    return made(LineKeys, values, frozenset(values))
 
 
 def together(positions: Sequence[Any]) -> Any:
@@ -54,7 +54,7 @@ def together(positions: Sequence[Any]) -> Any:
     values = {
         axis: next((v for p in positions if (v := getattr(p, axis)) is not None), None) for axis in AXES
     }
-    return type(positions[0]).model_construct(set(values), **values)
+    return made(type(positions[0]), values, frozenset(values))
 
 
 def as_line(

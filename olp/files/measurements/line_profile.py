@@ -23,11 +23,11 @@ from types import MappingProxyType
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, ValidationInfo, field_validator
 
 from olp.core.errors import InputError
 from olp.core.machine import COMPONENTS
-from olp.core.schema import Table, Text, refusal
+from olp.core.schema import Table, Text
+from olp.core.schema_keys import Field, Known, refusal, rule
 from olp.files.columns import decoded, place_in
 from olp.files.measurements.line_runs import columns_as_runs, counted, trend, turns
 from olp.files.measurements.readings import ANGULAR, SENSES, UNITS, Readings, parse_readings
@@ -132,21 +132,21 @@ class LineProfile(Table):
         default=None, description="the table [recording], for dynamic recordings (.rtx)"
     )
 
-    @field_validator("sense")
-    @classmethod
-    def _known_sense(cls, value: str | None) -> str | None:
+    @rule("sense")
+    @staticmethod
+    def _known_sense(value: str | None, known: Known) -> str | None:
         if value is not None and value not in SENSES:
             raise refusal(f'= "{value}" is not a sign convention; expected one of {", ".join(SENSES)}')
         return value
 
-    @field_validator("component")
-    @classmethod
-    def _known_component(cls, value: str | None, info: ValidationInfo) -> str | None:
+    @rule("component")
+    @staticmethod
+    def _known_component(value: str | None, known: Known) -> str | None:
         if value is None:
             return None
         if value not in COMPONENTS:
             raise refusal(f'= "{value}" is not an ISO 230-1 name; expected a name such as EXX, EYX or EBX')
-        unit = info.data.get("unit")
+        unit = known.get("unit")
         if unit is not None and (unit in ANGULAR) != (value[1] in "ABC"):
             kind = "an angle" if value[1] in "ABC" else "a length"
             raise refusal(
@@ -154,30 +154,29 @@ class LineProfile(Table):
             )
         return value
 
-    @field_validator("columns", "recording")
-    @classmethod
-    def _fits(cls, value: LineColumns | RecordingTable | None, info: ValidationInfo) -> object:
-        data = info.data
-        if data.get("decimal") == "comma" and data.get("delimiter") == "comma":
+    @rule("columns", "recording")
+    @staticmethod
+    def _fits(value: LineColumns | RecordingTable | None, known: Known) -> object:
+        if known.get("decimal") == "comma" and known.get("delimiter") == "comma":
             raise refusal(
                 "cannot be read, because commas are both between columns and in numbers; expected another "
                 "delimiter"
             )
-        if data.get("thousands") == data.get("decimal"):
+        if known.get("thousands") == known.get("decimal"):
             raise refusal("cannot be read, because decimal and thousands are the same; expected two marks")
-        if data.get("holds") == "position" and data.get("unit") in ANGULAR:
+        if known.get("holds") == "position" and known.get("unit") in ANGULAR:
             raise refusal('does not fit holds = "position" with a unit of angle; expected holds = "error"')
-        if data.get("holds") == "position" and "commanded-minus-actual" in (data.get("sense") or ""):
+        if known.get("holds") == "position" and "commanded-minus-actual" in (known.get("sense") or ""):
             raise refusal(
                 'contradicts sense, because a position minus its target is "actual-minus-commanded"; '
                 "expected that, or sense left out"
             )
         if isinstance(value, LineColumns):
-            several, signs = isinstance(value.value, list), data.get("directions")
+            several, signs = isinstance(value.value, list), known.get("directions")
             count = len(value.value) if isinstance(value.value, list) else 1
             if several and (signs is None or len(signs) != count or 0 in signs):
                 raise refusal("names several columns of readings; expected directions, 1 or -1 for each")
-            if data.get("runs") == "column" and value.run is None and not several:
+            if known.get("runs") == "column" and value.run is None and not several:
                 raise refusal('lacks run, but runs = "column"; name the column, or change the value of runs')
         return value
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from pydantic import Field
 
 from olp.calibration.iso230.postures import Postures, turn_of
 from olp.core.errors import ConfigError
 from olp.core.machine import Tool
 from olp.core.schema import NotNegative, Table, Text
+from olp.core.schema_keys import Field
 from olp.core.units import MM_PER_UM
 from olp.files.measurements.columns import read_columns
 from olp.files.problems import config_error

@@ -12,11 +12,11 @@ from types import MappingProxyType
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field
 
 from olp.core.arrays import Array
 from olp.core.errors import InputError
 from olp.core.schema import Table
+from olp.core.schema_keys import Field
 from olp.core.values import dataclass
 from olp.files.measurements.readings import ANGULAR, UNITS, Readings
 from olp.files.write import PathLike, read_bytes

@@ -5,9 +5,8 @@ from __future__ import annotations
 import datetime
 from typing import TYPE_CHECKING, Any, Literal
 
-from pydantic import Field, create_model
-
-from olp.core.schema import Positive, Table, Text
+from olp.core.schema import Positive, Table, Text, fields_of, with_keys
+from olp.core.schema_keys import Field
 from olp.files.fields import Chain, IsoNames
 from olp.files.measurements.instruments.registry import INSTRUMENTS
 from olp.files.measurements.line_keys import LineKeys
@@ -73,7 +72,7 @@ class PlanFile(Table):
 
 def _tables() -> dict[str, Any]:
     """The lists of tables, those of instruments without a file of readings first."""
-    ordered = sorted(INSTRUMENTS, key=lambda instrument: "file" in instrument.table.model_fields)
+    ordered = sorted(INSTRUMENTS, key=lambda instrument: "file" in fields_of(instrument.table))
     return {
         instrument.key: (list[instrument.table], Field(default=[], description=instrument.words))  # type: ignore[name-defined]
         for instrument in ordered
@@ -85,7 +84,7 @@ if TYPE_CHECKING:
     class _Tables(PlanFile): ...
 
 else:
-    _Tables = create_model("_Tables", __base__=PlanFile, **_tables())
+    _Tables = with_keys("_Tables", PlanFile, _tables(), words=PlanFile.__doc__ or "", module=__name__)
 
 
 class MeasurementsFile(_Tables):

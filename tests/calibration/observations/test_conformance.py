@@ -17,6 +17,7 @@ from olp.calibration.estimator.summary import TALLIES
 from olp.calibration.observations.base import OUTLIER, Observation, Result, ScatteredState, State
 from olp.core.arrays import Array
 from olp.core.machine import COMPONENTS
+from olp.core.schema import fields_of
 from olp.core.units import AXES
 from olp.files.measurements.instruments.registry import INSTRUMENTS, planner_of, rank_of
 from olp.files.measurements.reader import load_measurements
@@ -75,7 +76,7 @@ def test_it_is_registered_whole(key: str) -> None:
     """A list of its tables in a plan, readings for this suite, and a position in the order of the report."""
     (instrument,) = (i for i in INSTRUMENTS if i.key == key)
     assert key in EXAMPLES, f"no readings for {key}; add them to tests/cases/instruments.py"
-    assert instrument.words.startswith(f"tables [[{key}]]") and key in MeasurementsFile.model_fields
+    assert instrument.words.startswith(f"tables [[{key}]]") and key in fields_of(MeasurementsFile)
     for taken in EXAMPLES[key](machine(NONE)):
         assert type(taken) is instrument.gives
         assert INSTRUMENTS[rank_of(taken)].gives is instrument.gives

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-from pydantic import Field
 
 from olp.calibration.observations.circles import Circles
 from olp.core.schema import NotNegative, Positive, Table, Triple
+from olp.core.schema_keys import Field
 from olp.core.units import MM_PER_UM
 from olp.files.measurements.columns import read_columns
 from olp.files.measurements.instruments.base import Instrument, Plan

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from pydantic import Field
 
 from olp.calibration.observations.diagonals import Diagonal
 from olp.core.schema import NotNegative, Table, Triple
+from olp.core.schema_keys import Field
 from olp.core.units import MM_PER_UM
 from olp.files.measurements.columns import read_columns
 from olp.files.measurements.instruments.base import PER_UNIT, Instrument, Plan

@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Annotated
 
 import numpy as np
-from pydantic import Field
 
 from olp.calibration.observations.pods import Pods
 from olp.core.arrays import Index
 from olp.core.errors import ConfigError
 from olp.core.schema import Positive, Table, Text, Triple
+from olp.core.schema_keys import Field
 from olp.core.units import MM_PER_UM, RAD_PER_URAD, UM_PER_MM
 from olp.files.measurements.instruments.base import Instrument, Plan, points_to_fill, tools_of
 from olp.files.measurements.point_readings import directions, read_point_readings
@@ -19,7 +19,7 @@ from olp.files.toml_text import toml_lines
 
 class BaselineTable(Table):
     between: tuple[Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)]] = Field(
-        strict=False, description="the numbers of two pods, such as [1, 2]"
+        description="the numbers of two pods, such as [1, 2]"
     )
     length_mm: Positive = Field(description="the distance between their centres, in mm")
     sigma_um: Positive = Field(description="its standard uncertainty, in um")

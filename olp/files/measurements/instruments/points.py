@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import Field
-
 from olp.calibration.observations.points import Points
 from olp.core.arrays import Index
 from olp.core.schema import NotNegative, Positive, Table, Text, Triple
+from olp.core.schema_keys import Field
 from olp.core.units import MM_PER_UM, UM_PER_MM
 from olp.files.measurements.instruments.base import PER_UNIT, Instrument, Plan, points_to_fill, tools_of
 from olp.files.measurements.point_readings import MEASURED, read_point_readings

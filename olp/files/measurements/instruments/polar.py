@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from pydantic import Field
 
 from olp.calibration.observations.points import Points, polar_points
 from olp.core.schema import NotNegative, Positive, Table, Text, Triple
+from olp.core.schema_keys import Field
 from olp.core.units import MM_PER_UM, RAD_PER_URAD
 from olp.files.measurements.instruments.base import PER_UNIT, Instrument, Plan, tools_of
 from olp.files.measurements.point_readings import POLAR, read_point_readings

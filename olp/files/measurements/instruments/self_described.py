@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from pydantic import Field
-
 from olp.core.schema import Table, Text
+from olp.core.schema_keys import Field
 
 
 class InstrumentTable(Table):

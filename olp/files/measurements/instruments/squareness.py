@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import Field
-
 from olp.calibration.observations.squareness import SquarenessReading
 from olp.core.errors import ConfigError
 from olp.core.machine import Vector
 from olp.core.schema import Interval, Position, Positive, Table, Triple
+from olp.core.schema_keys import Field
 from olp.core.units import AXES, RAD_PER_URAD
 from olp.files.measurements.instruments.base import Instrument, Plan
 from olp.files.measurements.line_merging import together

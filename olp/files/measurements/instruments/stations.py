@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from pydantic import Field
 
 from olp.calibration.observations.lengths import Lengths
 from olp.core.arrays import Index
 from olp.core.schema import NotNegative, Positive, Table, Text, Triple
+from olp.core.schema_keys import Field
 from olp.core.units import MM_PER_UM, UM_PER_MM
 from olp.files.measurements.instruments.base import PER_UNIT, UM_M, Instrument, Plan, points_to_fill, tools_of
 from olp.files.measurements.point_readings import LENGTH, read_point_readings
