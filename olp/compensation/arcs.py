@@ -32,6 +32,8 @@ _PIECES_PER_ARC = 16
 WIDE = 0.95 * np.pi
 #: rad; a piece that sweeps more may be a whole turn whose ends nearly meet
 _NEARLY_WHOLE = 1.9 * np.pi
+#: mm; ends that are moved alike meet as they did
+_ALIKE_MM = 1e-9
 #: digits that rounding moves the two ends of a turn apart at most, and one to spare
 _CLOSE_DIGITS = 3.0
 #: samples at a time, so that memory is small
@@ -118,12 +120,11 @@ def _opened(
     bend = sampled(path, model, target, part, tools, 2)
     plane = arcs.plane[part.arc]
     first, last = bend.command[:, 0], bend.command[:, -1]
-    gap = np.hypot(*arms(last, first, plane))
     radius = np.hypot(*arms(bend.point[:, 0], bend.centre, plane))
     turns = sweep[whole] / (2 * np.pi)
     short = np.abs(turns - np.rint(turns)) * 2 * np.pi * radius
     moved = np.hypot(*arms(last - bend.point[:, -1], first - bend.point[:, 0], plane))
-    odd = np.flatnonzero((short < 2 * moved + _CLOSE_DIGITS * digit) & (np.maximum(gap, moved) > 1e-9))
+    odd = np.flatnonzero((short < 2 * moved + _CLOSE_DIGITS * digit) & (moved > _ALIKE_MM))
     cut = part.pick(odd)
     middle = cut.end - np.pi / np.abs(arcs.sweep_rad[cut.arc])
     kept = np.ones(len(pieces), bool)

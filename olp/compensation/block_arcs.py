@@ -13,7 +13,7 @@ from olp.compensation.rows import Rows
 from olp.compensation.writer import Writer
 from olp.core.arrays import Array, Index, Mask, distinct
 from olp.core.geometry import PLANES, arms
-from olp.core.toolpath import Flag, Kind
+from olp.core.toolpath import Flag
 from olp.program.text.edits import Edits
 
 #: (3, 3) axes of each plane: first, second, third.
@@ -69,10 +69,13 @@ def _centres(
 ) -> tuple[Index, Index]:
     """(m,) mantissa and decimals of centre words of an axis, with at least `own` digits."""
     unit = _units(writer, arcs)
-    offset = writer.frame_offset_mm[writer.path.frame[arcs.move], axis]
-    base = np.where(absolute, offset, arcs.start[:, axis])
+    frame = writer.path.frame[arcs.move]
+    base = np.where(absolute[:, None], writer.frame_offset_mm[frame], arcs.start)
+    away = arcs.centre - base
+    if writer.turns is not None:
+        away = writer.turns.words(away, writer.turns.of_frame[frame])
     decimals = np.maximum(_digits(writer, "centre", axis, unit), own)
-    mantissa = np.rint((arcs.centre[:, axis] - base) / unit * INT10[decimals]).astype(np.int64)
+    mantissa = np.rint(away[:, axis] / unit * INT10[decimals]).astype(np.int64)
     return mantissa, decimals
 
 
@@ -134,7 +137,8 @@ def _radius_words(writer: Writer, arcs: ArcRows, slot: npt.NDArray[np.int32]) ->
         unit = _units(writer, part)
         own = writer.style.decimals(own_slot, first, unit)
         decimals = np.maximum(own, _digits(writer, "centre", first, unit))
-        mantissa, good = _radii(writer, part, decimals, unit)
+        size = np.asarray(unit * writer.sizes(part.move, part.plane), float)
+        mantissa, good = _radii(writer, part, decimals, size)
         new = np.flatnonzero(good & (mantissa != words.mantissa[own_slot] * INT10[decimals - own]))
         at = own_slot[new]
         yield Edits.of(words.number[at], words.end[at], mantissa[new], decimals[new])
@@ -202,7 +206,7 @@ def _leads(writer: Writer, rows: Rows, arcs: ArcRows) -> npt.NDArray[np.int32]:
     starts, of = writer.style.block_starts(arcs.line)
     table = np.array([[writer.prefixes(s + code) for code in (b"", b"G2 ", b"G3 ")] for s in starts])
     taken_up = (arcs.row > 0) & rows.take_up[np.maximum(arcs.row - 1, 0)]
-    code = np.where(writer.path.kind[arcs.move] == Kind.ARC_CW, 1, 2)
+    code = np.where(writer.clockwise(arcs.move, arcs.plane), 1, 2)
     return table[of, np.where(taken_up, code, 0)].astype(np.int32)
 
 
@@ -211,7 +215,10 @@ def _numbers(writer: Writer, rows: Rows, row: Index, axis: int) -> tuple[Index, 
     frame = writer.path.frame[rows.move[row]]
     unit = writer.frame_unit_mm[frame]
     usual = _digits(writer, "usual", axis, unit)
-    value = (rows.emitted[row, axis] - writer.frame_offset_mm[frame, axis]) / unit
+    away = rows.emitted[row] - writer.frame_offset_mm[frame]
+    if writer.turns is not None:
+        away = writer.turns.words(away, writer.turns.of_frame[frame])
+    value = away[:, axis] / unit
     stated = rows.write[row, axis] | ((rows.flag[row] & np.uint8(Flag.INCREMENTAL)) != 0)
     mantissa = np.where(stated, rows.mantissa[row, axis], np.rint(value * INT10[usual]).astype(np.int64))
     return mantissa, np.where(stated, rows.decimals[row, axis], usual)

@@ -20,6 +20,7 @@ from olp.compensation.writer import Writer
 from olp.core.arrays import Array, Index, Mask, distinct
 from olp.core.progress import Progress, silent
 from olp.core.toolpath import Flag
+from olp.core.turns import Turns
 from olp.program.bands import Band
 from olp.program.text.edits import EditList, Edits
 
@@ -48,13 +49,17 @@ class BlockWriter(Writer):
         return self._spliced(edits, begin, end)
 
     def _breaks(self, rows: Rows) -> list[int]:
-        """Rows at which the blocks of canned cycles begin and end."""
+        """Rows at which the blocks of canned cycles begin and end, and words turn otherwise."""
         cycle = (rows.flag & np.uint8(Flag.CYCLE)) != 0
-        changes = np.flatnonzero(cycle[1:] != cycle[:-1]) + 1
+        changed = cycle[1:] != cycle[:-1]
+        if self.turns is not None:
+            turn = self.turn_of(rows)
+            changed |= turn[1:] != turn[:-1]
+        changes = np.flatnonzero(changed) + 1
         return [0, *changes.tolist(), len(rows.move)]
 
     def _columns(self, rows: Rows) -> list[AxisRows]:
-        """Per axis, what its digits are made from."""
+        """Per axis of the words, what its digits are made from."""
         path, words = self.path, self.words
         part = slice(rows.first, rows.first + len(rows.move))
         frame = path.frame[rows.move]
@@ -62,15 +67,18 @@ class BlockWriter(Writer):
         unit = self.frame_unit_mm[frame[:1]] if one else self.frame_unit_mm[frame]
         same_unit = bool((unit == unit[:1]).all())
         control = (rows.flag & np.uint8(Flag.CONTROL)) != 0
-        offset = self.frame_offset_mm[frame[0]] if one else self.frame_offset_mm[frame]
-        columns = []
+        offset = self.word_offset_mm[frame[0]] if one else self.word_offset_mm[frame]
+        command, ends, columns = self.plan.command_mm[part], path.end_mm[rows.move], []
+        if self.turns is not None:
+            turn = self.turn_of(rows)
+            command, ends = self.turns.words(command, turn), self.turns.words(ends, turn)
         for axis in range(3):
-            nominal = path.end_mm[rows.move, axis]
+            nominal = ends[:, axis]
             slot = np.where(rows.head, self.program.slot[rows.move, axis], -1)
             given = slot >= 0
             columns.append(
                 AxisRows(
-                    command=self.plan.command_mm[part, axis],
+                    command=command[:, axis],
                     nominal=nominal,
                     given=given,
                     raw=self.plan.raw[part, axis],
@@ -87,14 +95,18 @@ class BlockWriter(Writer):
         """Digits of rows a..b, which no canned cycle makes."""
         counting = (rows.flag[a:b] & np.uint8(Flag.INCREMENTAL)) != 0
         stretches = Stretches.of(counting, part_of(columns[0].unit, slice(a, b)))
+        turn = int(self.turn_of(rows)[a]) if self.turns is not None else 0
+        entry = self.along_words((rows.emitted[a - 1] if a else rows.entry)[None], turn)[0]
         for axis, column in enumerate(columns):
-            before = float(rows.emitted[a - 1, axis]) if a else float(rows.entry[axis])
+            before = float(entry[axis])
             part = column.part(slice(a, b))
             decimals = Decimals(*(
                 _by_unit(places, axis, part.unit)
                 for places in (self.style.least, self.style.usual, self.style.grid)
             ))  # fmt: skip
             rows.put(a, b, axis, digits_of(part, stretches, before, decimals))
+        if turn:
+            rows.emitted[a:b] = self.along_axes(rows.emitted[a:b], turn)
 
     def _after_block_delete(self, rows: Rows) -> None:
         """The first block after `/` blocks must not rely on a word that was inserted in them."""
@@ -107,26 +119,30 @@ class BlockWriter(Writer):
             while begin >= 0 and deleted[begin]:
                 begin -= 1
             before = rows.emitted[begin] if begin >= 0 else rows.entry
+            places = np.array([before, rows.emitted[row - 1], rows.emitted[row]])
+            before, after, place = self.along_words(places, int(self.turn_of(rows)[row]))
+            nominal_moved = self._nominal_moved(rows, begin, row)
             for axis in range(3):
-                moved = not abs(rows.emitted[row - 1, axis] - before[axis]) < 1e-9
+                moved = not abs(after[axis] - before[axis]) < 1e-9
                 given = rows.head[row] and self.program.slot[rows.move[row], axis] >= 0
-                nominal_moved = self._nominal_moved(rows, begin, row, axis)
-                if not moved or given or np.isnan(rows.emitted[row, axis]):
+                if not moved or given or np.isnan(place[axis]):
                     continue
-                if nominal_moved or rows.flag[row] & np.uint8(Flag.INCREMENTAL):
+                if nominal_moved[axis] or rows.flag[row] & np.uint8(Flag.INCREMENTAL):
                     continue
-                self._force(rows, row, axis)
+                self._force(rows, row, axis, float(place[axis]))
 
-    def _nominal_moved(self, rows: Rows, begin: int, row: int, axis: int) -> bool:
+    def _nominal_moved(self, rows: Rows, begin: int, row: int) -> list[bool]:
+        """Which words would be others behind the deleted blocks before a row, as the program says."""
         end, first = self.path.end_mm, int(rows.move[begin + 1])
-        before = end[first - 1, axis] if first else self.path.start_mm[axis]
-        return not abs(end[rows.move[row - 1], axis] - before) < 1e-9
+        places = np.array([end[first - 1] if first else self.path.start_mm, end[rows.move[row - 1]]])
+        before, after = self.along_words(places, int(self.turn_of(rows)[row]))
+        return [not abs(b - a) < 1e-9 for a, b in zip(before.tolist(), after.tolist(), strict=True)]
 
-    def _force(self, rows: Rows, row: int, axis: int) -> None:
+    def _force(self, rows: Rows, row: int, axis: int, place: float) -> None:
         frame = int(self.path.frame[rows.move[row]])
-        unit, offset = float(self.frame_unit_mm[frame]), float(self.frame_offset_mm[frame, axis])
+        unit, offset = float(self.frame_unit_mm[frame]), float(self.word_offset_mm[frame, axis])
         decimals = self.style.usual(axis, unit)
-        rows.mantissa[row, axis] = round((rows.emitted[row, axis] - offset) / unit * 10**decimals)
+        rows.mantissa[row, axis] = round((place - offset) / unit * 10**decimals)
         rows.decimals[row, axis] = decimals
         rows.write[row, axis] = True
 
@@ -201,10 +217,16 @@ class BlockWriter(Writer):
             if capture.moves > int(rows.move[-1]) + 1 and not final:
                 break
             self._next_capture += 1
-            nominal = self.path.end_mm[capture.moves - 1, capture.axis] if capture.moves else None
+            nominal = self.path.end_mm[capture.moves - 1] if capture.moves else None
             row = int(np.searchsorted(rows.move, capture.moves, "left")) - 1
-            emitted = rows.emitted[row, capture.axis] if row >= 0 else rows.entry[capture.axis]
-            delta = 0.0 if nominal is None else (emitted - nominal) / capture.unit_mm
+            emitted = rows.emitted[row] if row >= 0 else rows.entry
+            delta = 0.0
+            if nominal is not None:
+                away: Array = np.asarray(emitted - nominal, float)
+                turns = Turns.of([capture.turn])
+                if turns is not None:
+                    away = turns.words(away[None], 1)[0]
+                delta = float(away[capture.axis]) / capture.unit_mm
             grid = self.style.grid(capture.axis, capture.unit_mm)
             written = self.style.decimals_of(capture.word, capture.axis, capture.unit_mm)
             digits = max(grid, written)

@@ -6,13 +6,16 @@ is exact, along the tool axis where its bottom and its R level are.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from olp.compensation.invert import invert
 from olp.compensation.plan import Plan
 from olp.core.arrays import Array
 from olp.core.geometry import PLANES
-from olp.core.toolpath import Flag
+from olp.core.toolpath import Flag, Toolpath
+from olp.core.turns import Turns
 from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
 from olp.program.holes import Holes
@@ -24,7 +27,8 @@ _AXES = np.array(PLANES)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HolePlan:
-    """(h, 3) commands at the R level and at the bottom of each hole, in mm."""
+    """(h, 3) commands at the R level and at the bottom of each hole, in mm: axis positions as they are made,
+    then positions along the words."""
 
     holes: Holes
     level_mm: Array
@@ -48,6 +52,15 @@ class HolePlan:
         left = (path.flag[holes.first] & np.uint8(Flag.PASS)) != 0
         c_level[left], c_bottom[left] = level[left], bottom[left]
         return HolePlan(holes, c_level, c_bottom)
+
+    def along_words(self, path: Toolpath, turns: Turns | None) -> HolePlan:
+        """The same along the words of each hole."""
+        if turns is None or not len(self.holes):
+            return self
+        which = turns.of_frame[path.frame[self.holes.first]]
+        return replace(
+            self, level_mm=turns.words(self.level_mm, which), bottom_mm=turns.words(self.bottom_mm, which)
+        )
 
 
 def _play(program: Program, plan: Plan) -> tuple[Array | None, Array | None]:

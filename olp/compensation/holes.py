@@ -93,7 +93,8 @@ class HoleWords:
         first, second, third = PLANES[holes.plane[i]]
         frame = writer.frame_of(int(holes.first[i]))
         offset, unit = frame.offset_mm[third], frame.unit_mm
-        before = rows.emitted[row - 1] if row else rows.entry
+        turn = writer.turn_of(rows)[row]
+        before = writer.along_words((rows.emitted[row - 1] if row else rows.entry)[None], turn)[0]
         middle = (plan.level_mm[some] + plan.bottom_mm[some]) / 2
         columns = {
             "XYZ"[axis]: _digits(writer, some, "XYZ"[axis], axis, middle[:, axis], float(before[axis]))
@@ -113,6 +114,7 @@ class HoleWords:
         for axis in (first, second):
             emitted[:, axis] = columns["XYZ"[axis]].emitted
         emitted[:, third] = np.where(to_r | (level > initial), level, initial)
+        emitted = writer.along_axes(emitted, turn)
         # rows of all strokes of all repeats of a block
         count = np.add.reduceat(holes.last[i:j] - holes.first[i:j], some - i)
         rows.emitted[row : row + int(count.sum())] = np.repeat(emitted, count, axis=0)
@@ -135,7 +137,7 @@ def _digits(writer: Writer, some: Index, letter: str, axis: int, command: Array,
             reset=none,
             word=np.where(given, writer.words.mantissa[slot], 0),
             decimals=np.where(given, style.decimals(slot, axis, frame.unit_mm), 0).astype(np.int8),
-            offset=float(frame.offset_mm[axis]),
+            offset=float(writer.word_offset_mm[writer.path.frame[holes.first[some[0]]], axis]),
             unit=frame.unit_mm,
         ),
         before,

@@ -44,7 +44,8 @@ def incremental_block(
         if step is None:
             _hole(writer, rows, series, i, row, edits)
         else:
-            rows.emitted[row : row + int(holes.last[i] - holes.first[i])] = rows.emitted[row - 1] + step
+            place = rows.emitted[row - 1] + writer.along_axes(step[None], writer.turn_of(rows)[row])[0]
+            rows.emitted[row : row + int(holes.last[i] - holes.first[i])] = place
 
 
 def _hole(
@@ -56,7 +57,8 @@ def _hole(
     hole = plan.holes[index]
     first, second, third = PLANES[hole.plane]
     frame = writer.frame_of(hole.first)
-    before = rows.emitted[a - 1].copy() if a else rows.entry.copy()
+    turn = writer.turn_of(rows)[a]
+    before = writer.along_words((rows.emitted[a - 1] if a else rows.entry)[None], turn)[0]
     initial = series.initial * frame.unit_mm + frame.offset_mm[third]
     words = _Words(writer, hole, frame.unit_mm, edits)
     command = (plan.level_mm[index] + plan.bottom_mm[index]) / 2
@@ -75,7 +77,7 @@ def _hole(
     words.finish()
     retract_to_r = abs(writer.path.end_mm[hole.last - 1, third] - hole.r_mm) < 1e-9
     emitted[third] = r_place if retract_to_r else max(initial, r_place)
-    rows.emitted[a : a + hole.last - hole.first] = emitted
+    rows.emitted[a : a + hole.last - hole.first] = writer.along_axes(emitted[None], turn)[0]
     return step
 
 

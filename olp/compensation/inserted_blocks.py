@@ -12,7 +12,7 @@ from olp.compensation.rows import Rows
 from olp.compensation.writer import Writer
 from olp.core.arrays import Index, Mask, distinct
 from olp.core.errors import ProgramError
-from olp.core.toolpath import Flag, Kind
+from olp.core.toolpath import Flag
 from olp.program.rs274.codes import (
     ABSOLUTE,
     FURTHER_OFFSETS,
@@ -122,7 +122,8 @@ def _arc_word(writer: Writer, rows: Rows, row: int, edits: EditList) -> None:
     """G2 or G3 for an arc block that relied on the modal code which the block before it changed."""
     move = int(rows.move[row])
     line = int(writer.path.line[move])
-    code = 2 if writer.path.kind[move] == Kind.ARC_CW else 3
+    arc = np.searchsorted(writer.path.arcs.move, [move])
+    code = 2 if writer.clockwise(np.array([move]), writer.path.arcs.plane[arc])[0] else 3
     index = writer.words.of_line(line)
     if any(
         writer.words.letter[i] == 71 and writer.words.mantissa[i] == code and not writer.words.decimals[i]

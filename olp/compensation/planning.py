@@ -157,7 +157,18 @@ def _untouched(path: Toolpath, model: ErrorModel) -> tuple[Mask, Index]:
         raw[some] |= blind | unknown[some]
         uncorrected = wanting
     held = _hold_after_machine_moves(path, raw)
+    _mix_turned(path, raw)
     return raw, distinct(np.concatenate((uncorrected, held)))
+
+
+def _mix_turned(path: Toolpath, raw: Mask) -> None:
+    """In a turned frame one word moves several axes: where one of these keeps the program's words, all do."""
+    turns = path.turns()
+    some = np.flatnonzero(raw.any(axis=1) & ~raw.all(axis=1))
+    if turns is not None and some.size:
+        mixes = turns.mixes(turns.of_frame[path.frame[some]])
+        words = np.any(mixes & raw[some][:, :, None], axis=1)
+        raw[some] = np.any(mixes & words[:, None, :], axis=2)
 
 
 def _hold_after_machine_moves(path: Toolpath, raw: Mask) -> Index:

@@ -20,10 +20,11 @@ from olp.compensation.rows import Rows
 from olp.compensation.stamp import stamped
 from olp.compensation.style import Style
 from olp.compensation.tally import Tally
-from olp.core.arrays import Array, Index
+from olp.core.arrays import Array, Index, Mask
+from olp.core.geometry import Plane
 from olp.core.machine import Vector
 from olp.core.progress import Progress, silent
-from olp.core.toolpath import Flag, Frame
+from olp.core.toolpath import Flag, Frame, Kind
 from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
 from olp.program.bands import Band
@@ -71,6 +72,11 @@ class Writer(ABC):
         self.tally = Tally()
         self.frame_offset_mm = np.array([f.offset_mm for f in self.path.frames]).reshape(-1, 3)
         self.frame_unit_mm = np.array([f.unit_mm for f in self.path.frames])
+        self.turns = self.path.turns()
+        #: (frames, 3) offsets along the words, mm
+        self.word_offset_mm = self.frame_offset_mm
+        if self.turns is not None:
+            self.word_offset_mm = self.turns.words(self.frame_offset_mm, self.turns.of_frame)
         self._pieces: list[bytes] = []
         # where the text grows, and by how much, if that is asked for
         self._grown: list[tuple[Index, Index]] | None = [] if task.located else None
@@ -83,7 +89,7 @@ class Writer(ABC):
         self.program, self.path, self.plan = band.program, band.program.toolpath, plan
         self.targets = targets(self.path, plan.shift_mm)
         self.parts = np.zeros(len(self.path), np.int32)
-        self.holes = HolePlan.of(self.program, plan, self.model)
+        self.holes = HolePlan.of(self.program, plan, self.model).along_words(self.path, self.turns)
         data, move = self.program.data, plan.move
         for first, last in self._spans():
             end = band.end if last == len(move) else self._start_of(int(move[last]))
@@ -135,6 +141,34 @@ class Writer(ABC):
     def _start_of(self, move: int) -> int:
         """Where the text of a move begins, at the start of a line."""
         return int(self.program.line_start[self.path.line[move] - 1])
+
+    def turn_of(self, rows: Rows) -> Index:
+        """(r,) which matrix of `turns` leads from the words of rows to the axes; 0: none."""
+        if self.turns is None:
+            return np.zeros(len(rows.move), np.int64)
+        machine = (rows.flag & np.uint8(Flag.MACHINE)) != 0
+        return np.where(machine, 0, self.turns.of_frame[self.path.frame[rows.move]])
+
+    def along_words(self, axes: Array, turn: Index | int) -> Array:
+        """(n, 3) axis positions along the words, of each row or all by the matrix `turn`."""
+        return axes if self.turns is None else self.turns.words(axes, turn)
+
+    def along_axes(self, words: Array, turn: Index | int) -> Array:
+        """(n, 3) the other way round."""
+        return words if self.turns is None else self.turns.axes(words, turn)
+
+    def clockwise(self, move: Index, plane: Plane) -> Mask:
+        """(m,) whether words state arcs in these planes clockwise: mirrored ones turn the other way."""
+        clockwise = np.asarray(self.path.kind[move] == Kind.ARC_CW)
+        if self.turns is None:
+            return clockwise
+        return np.asarray(clockwise != self.turns.mirrors(self.turns.of_frame[self.path.frame[move]], plane))
+
+    def sizes(self, move: Index, plane: Plane) -> Array:
+        """(m,) how much longer lengths in planes are on the machine than their words say."""
+        if self.turns is None:
+            return np.ones(len(move))
+        return self.turns.sizes(self.turns.of_frame[self.path.frame[move]], plane)
 
     def frame_of(self, move: int) -> Frame:
         return self.path.frames[int(self.path.frame[move])]

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from olp.core.arrays import Array, Index, Mask
 from olp.core.geometry import arc_points, quarter_shares
 from olp.core.machine import ZERO, Vector
+from olp.core.turns import Turn, Turns
 from olp.core.values import dataclass
 
 #: A tool vector in mm, and the payload in kg behind it where there is one.
@@ -81,8 +82,9 @@ class Frame:
     `length_mm`). `tool_mm` is the tool vector, gauge point to tip; `payload_kg` is what the machine carries.
     `touched` is (axis position, tool vector and payload) of the touch-off of the work offset on the
     uncompensated machine, None where it was located by other means. `lengths` are errors of the lengths of
-    tools that are not common to touch-off and cut. In a rotated frame the words are turned first, by the rows
-    of `turn`, None where nothing turns: axis position = `turn` (word x `unit_mm`) + `offset_mm`. `lift_mm` is
+    tools that are not common to touch-off and cut. In a rotated, mirrored or scaled frame the words are
+    turned first, by the rows of `turn`, None where nothing turns: axis position = `turn` (word x `unit_mm`)
+    + `offset_mm`. `lift_mm` is
     the part of the offset by which the tip keeps off the programmed point, as over a hole. `compensation` is
     that of the cutter, where the contour was taken as the path of the tool.
     """
@@ -96,7 +98,7 @@ class Frame:
     touched: Touch | None = None
     lengths: tuple[LengthError, ...] = ()
     payload_kg: float = 0.0
-    turn: tuple[Vector, Vector, Vector] | None = None
+    turn: Turn | None = None
     lift_mm: Vector = ZERO
     compensation: CutterCompensation | None = None
 
@@ -116,7 +118,7 @@ class Frame:
     def tip_mm(self, point: Array) -> Array:
         """Positions of the tip (n, 3) in this frame, from axis positions less the length."""
         away = point - np.array(self.origin_mm())
-        return away if self.turn is None else np.asarray(away @ np.array(self.turn), float)
+        return away if self.turn is None else np.asarray(away @ np.linalg.inv(self.turn).T, float)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -199,6 +201,10 @@ class Toolpath:
             point = arc_points(start, self.end_mm[move], arcs.centre_mm, arcs.plane, arcs.sweep_rad, share)
             low[move], high[move] = np.fmin(low[move], point), np.fmax(high[move], point)
         return low, high
+
+    def turns(self) -> Turns | None:
+        """How words of the frames lie to the axes; None where no frame turns."""
+        return Turns.of([frame.turn for frame in self.frames])
 
     def tool_mm(self, first: int = 0, last: int | None = None) -> Array:
         """Tool vectors of moves `first`..`last`: (3,) where it is one and the same, else (m, 3); with

@@ -9,10 +9,9 @@ import numpy as np
 from olp.core.errors import ConfigError, ProgramError
 from olp.core.machine import ZERO, Setup, Vector, WorkOffset
 from olp.core.toolpath import CutterCompensation, Frame, LengthError, Touch, carried
+from olp.core.turns import Turn
 from olp.core.units import UM_PER_MM
 from olp.core.values import dataclass
-
-Turn = tuple[Vector, Vector, Vector]
 
 UP: Vector = (0.0, 0.0, 1.0)
 DOWN: Vector = (0.0, 0.0, -1.0)

@@ -81,8 +81,20 @@ def draw(seed: int) -> tuple[Recipe, list[str]]:
     return recipe, features
 
 
-def check(seed: int, folder: Path) -> None:
+def turned(recipe: Recipe, rng: np.random.Generator) -> Recipe:
+    """The machine with its work offsets turned about Z."""
+    frames = {name: dict(entry) for name, entry in recipe.work_offsets.items()}
+    for entry in frames.values():
+        entry["C_deg"] = float(rng.choice([90.0, -180.0, round(rng.uniform(-180.0, 180.0), 3)]))
+    return replace(recipe, work_offsets=frames)
+
+
+def check(seed: int, folder: Path, *, turn: bool = False) -> None:
     recipe, features = draw(seed)
+    if turn:
+        recipe = turned(recipe, np.random.default_rng(seed))
+        # arcs and holes of other planes would leave them, and a stored position is not read
+        features = [name for name in features if name not in {"planes", "g10"}] + ["lines"]
     path = machines.random_machine(folder, seed, recipe)
     nominal = programs.random_program(seed, features=features, blocks=3 + seed % 17)
     whole = seed % 4 == 3 and "tools" not in features and not recipe.backlash_um and not recipe.directed
@@ -103,6 +115,11 @@ def check(seed: int, folder: Path) -> None:
 @pytest.mark.parametrize("seed", range(1000, 1040))
 def test_the_corrected_path_is_the_nominal_one(tmp_path: Path, seed: int) -> None:
     check(seed, tmp_path)
+
+
+@pytest.mark.parametrize("seed", range(1200, 1224))
+def test_the_corrected_path_is_the_nominal_one_in_turned_work_offsets(tmp_path: Path, seed: int) -> None:
+    check(seed, tmp_path, turn=True)
 
 
 @pytest.mark.parametrize("seed", range(1100, 1106))

@@ -22,6 +22,7 @@ from olp.program.rs274.cycles import HOLE_STROKES, LCNC_CLEARANCE_MM, MOST_REPEA
 from olp.program.rs274.modes import Context, scaled
 from olp.program.rs274.state import BROKEN_SERIES, NAN
 from olp.program.rs274.strokes import Drilling, Step, Strokes, strokes
+from olp.program.rs274.turned import Turning
 
 #: Words of a further axis.
 _OTHERS = np.frombuffer(b"ABCUVW", np.uint8)
@@ -36,6 +37,7 @@ class CycleBlocks:
         self._collector = collector
         self._switches = switches
         self._budget = budget
+        self._turning: Turning | None = None
         # of the last block of a series its line, from 0 (-1 where none goes on), frame and cycle, and the
         # number of moves after it
         self._line = self._frame = self._code = self._moves = -1
@@ -56,6 +58,7 @@ class CycleBlocks:
         state, collector = self._state, self._collector
         run = CycleRun.of(context, line, scaled(context, state, collector.remarks))
         refused = Refused(context, line)
+        self._turning = Turning.of(state.frames[frame].turn)
         self._check_modes(context, run, refused)
         self._begin(context, run, frame, refused)
         drilling = self._drilling(context, run, frame, refused)
@@ -103,6 +106,11 @@ class CycleBlocks:
         refused.where(inverse, f"{name} is in inverse time (G93); give G94 before it", "OLP518")
         if state.compensation is not None:
             refused.all(f"{name} is in cutter compensation; give G40 before it", "OLP518")
+        if self._turning is not None and not self._turning.keeps_axis(PLANES[run.plane][2]):
+            refused.all(
+                f"{name} is in a frame that turns, mirrors or scales its tool axis; end that before it",
+                "OLP518",
+            )
         if turning is not None:
             spindle = " or ".join(f"M{m}" for m in turning)
             still = ~np.isin(context.spindle[line], turning)
@@ -201,21 +209,26 @@ class CycleBlocks:
     def _places(self, run: CycleRun, frame_index: int, of: Index) -> Array:
         """(h, 2) where holes of blocks (h,) are, along the first and second axis of the plane."""
         frame = self._state.frames[frame_index]
-        place = np.empty((len(of), 2))
+        offset, place = self._along(np.array(frame.offset_mm)), np.empty((len(of), 2))
+        position = self._along(np.array(self._state.position))
         for column, axis in enumerate(PLANES[run.plane][:2]):
             to = run.number("XYZ"[axis])[of] * frame.unit_mm
-            before = self._state.position[axis]
+            before = float(position[axis])
             if run.incremental:
                 place[:, column] = np.cumsum(np.concatenate(([before], np.nan_to_num(to))))[1:]
             else:
                 source = np.maximum.accumulate(np.where(np.isnan(to), -1, np.arange(len(of))))
-                place[:, column] = np.where(source >= 0, to[source] + frame.offset_mm[axis], before)
+                place[:, column] = np.where(source >= 0, to[source] + offset[axis], before)
         return place
+
+    def _along(self, point: Array) -> Array:
+        """A point (3,) of the axes along the words."""
+        return point if self._turning is None else self._turning.words(point)
 
     def _strokes(
         self, context: Context, run: CycleRun, drilling: Drilling, place: Array, of: Index
     ) -> Strokes:
-        x, y, z = self._state.position
+        x, y, z = self._along(np.array(self._state.position)).tolist()
         initial = self._initial * drilling.unit + drilling.ground
         to_r = np.asarray(context.retract[run.line[of]] == RETRACT_TO_R)
         return strokes(drilling, (x, y, z), place, to_r, initial)
@@ -235,7 +248,12 @@ class CycleBlocks:
     ) -> None:  # fmt: skip
         """Put the moves and the holes into the collector, and take over the position behind them."""
         collector, line = self._collector, context.chunk.first_line + 1 + run.line
-        moving = made.step <= Step.FEED
+        moving, point = made.step <= Step.FEED, made.point
+        if self._turning is not None:
+            point = self._turning.axes(point)
+            there = np.zeros((len(place), 3))
+            there[:, list(PLANES[run.plane][:2])] = place
+            place = self._turning.axes(there)[:, list(PLANES[run.plane][:2])]
         hole = made.hole[moving]
         flag = np.full(len(line), np.uint8(Flag.CYCLE))
         flag[context.chunk.deleted[run.line]] |= np.uint8(Flag.DELETED)
@@ -273,8 +291,8 @@ class CycleBlocks:
         count = len(hole)
         collector.put_moves(
             np.where(made.step[moving] == Step.FEED, Kind.LINE, Kind.RAPID).astype(np.uint8),
-            flag[of][hole], line[of][hole], np.full(count, frame), made.point[moving],
+            flag[of][hole], line[of][hole], np.full(count, frame), point[moving],
             np.full((count, 3), -1),
         )  # fmt: skip
         self._moves = collector.moves
-        self._state.position[:] = made.point[-1].tolist()
+        self._state.position[:] = point[-1].tolist()

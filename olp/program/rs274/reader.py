@@ -15,11 +15,12 @@ from olp.core.arrays import Array
 from olp.core.errors import ProgramError
 from olp.core.machine import Setup
 from olp.core.toolpath import Flag, Kind
+from olp.core.turns import Turn
 from olp.core.values import dataclass
 from olp.program.dialect import Options
 from olp.program.directives import Directives, with_payloads
 from olp.program.program import Program
-from olp.program.rs274.axis_state import STORES_POSITION, AxisState, Effect, Word
+from olp.program.rs274.axis_state import AxisState, Effect
 from olp.program.rs274.codes import (
     CYCLES,
     DWELL,
@@ -41,8 +42,10 @@ from olp.program.rs274.cycles import stroke_budget
 from olp.program.rs274.lexer import WordChunk, chunks
 from olp.program.rs274.modes import Context, Modes, check_odd, scaled
 from olp.program.rs274.motion import Blocks, arc_geometry, fill, gather
+from olp.program.rs274.offset_state import STORES_POSITION, Word
 from olp.program.rs274.profiles.base import Profile
 from olp.program.rs274.special_blocks import SpecialBlocks, check_codes, event_block
+from olp.program.rs274.turned import Turning, along_words
 
 #: motion code to kind of move; 255 where it is not plain motion, the last entry is for "none yet"
 _KIND = np.full(1001, 255, np.uint8)
@@ -96,6 +99,8 @@ class _Reader:
         self.special_blocks = SpecialBlocks(self.state, self.collector)
         self.cycle_blocks = CycleBlocks(self.state, self.collector, self.switches, stroke_budget(len(data)))
         self.end_line = 0
+        # that of the rows which have a frame and no position yet
+        self.turn: Turn | None = None
 
     def run(self) -> Program:
         data = self.data
@@ -201,6 +206,10 @@ class _Reader:
             line = context.number(int(rows.blocks.line[rows.assigned]))
             if rows.present is None:
                 rows.present = self.state.frame(line)
+                if self.state.frames[rows.present].turn != self.turn:
+                    # what is resolved at once has one turn
+                    self._resolve(context, rows, rows.assigned)
+                    self.turn = self.state.frames[rows.present].turn
             rows.frame[rows.assigned : upto] = rows.present
             if self.state.unit is None:
                 self.collector.remarks.setdefault("unit", (line, "mm"))
@@ -224,7 +233,11 @@ class _Reader:
         offset, unit = self._offsets(frame)
         value = scaled(context, state, self.collector.remarks)
         slot = blocks.slot[a:upto]
-        end = fill(slot, value, incremental if incremental.any() else None, offset, unit, state.position)
+        turning = Turning.of(self.turn)
+        start = along_words(turning, state.position)
+        if turning is not None:
+            offset = turning.words(offset)
+        end = fill(slot, value, incremental if incremental.any() else None, offset, unit, start)
         flag = np.where(incremental, np.uint8(Flag.INCREMENTAL), np.uint8(0))
         flag[blocks.other[a:upto]] |= np.uint8(Flag.WHOLE)
         flag[chunk.deleted[line]] |= np.uint8(Flag.DELETED)
@@ -235,7 +248,9 @@ class _Reader:
             flag[self.switches.off(number)] |= np.uint8(Flag.PASS)
         arcs = slice(*np.searchsorted(blocks.arc_row, (a, upto)))
         if arcs.stop > arcs.start:
-            self._arcs(context, rows, arcs, a, end, value, offset, unit)
+            kind = self._arcs(context, rows, arcs, a, kind, np.vstack((start, end)), value, offset, unit)
+        if turning is not None:
+            end = turning.axes(end)
         self.collector.put_moves(kind, flag, number, frame, end, np.where(slot >= 0, slot + context.base, -1))
         state.position[:] = end[-1].tolist()
 
@@ -245,33 +260,39 @@ class _Reader:
         rows: _Rows,
         arcs: slice,
         a: int,
-        end: Array,
+        kind: npt.NDArray[np.uint8],
+        point: Array,
         value: Array,
         offset: Array,
         unit: Array | float,
-    ) -> None:
+    ) -> npt.NDArray[np.uint8]:
+        """Put the arcs among moves that lead from point to point (n + 1, 3) along the words; returns the
+        kinds of all moves for the axes."""
         blocks = rows.blocks
         row = blocks.arc_row[arcs] - a
         words = blocks.arc_slot[arcs]
         line = blocks.line[blocks.arc_row[arcs]]
-        start = np.where(row[:, None] > 0, end[np.maximum(row - 1, 0)], np.array(self.state.position))
+        number = line + (context.chunk.first_line + 1)
         size = np.where(words >= 0, value[words], np.nan)
         size[:, :4] *= unit if isinstance(unit, float) else unit[row, None]
         absolute = context.arc_distance[line] == 901
         plane = np.array([PLANE_OF[p] for p in (170, 180, 190)])[(context.plane[line] - 170) // 10]
-        cw = context.motion[line] == 20
         centre, sweep = arc_geometry(
-            start,
-            end[row],
+            point[row],
+            point[row + 1],
             size,
-            clockwise=cw,
+            clockwise=context.motion[line] == 20,
             plane=plane,
             absolute=absolute,
-            offset=np.broadcast_to(offset, end.shape)[row],
-            line=line + (context.chunk.first_line + 1),
+            offset=np.broadcast_to(offset, (len(point) - 1, 3))[row],
+            line=number,
         )
+        turning = Turning.of(self.turn)
+        if turning is not None:
+            kind, centre, sweep = turning.arcs(kind, row, centre, sweep, plane, number)
         slot = np.where(words >= 0, words + context.base, -1)
         self.collector.put_worded_arcs(row + self.collector.moves, centre, plane, sweep, slot, absolute)
+        return kind
 
     def _offsets(self, frame: npt.NDArray[np.int32]) -> tuple[Array, Array | float]:
         """Offsets and units in mm: (3,) and one where they are the same for all rows, else (n, 3), (n,)."""

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from olp.core.arrays import Index, distinct
 from olp.core.errors import ProgramError
 from olp.core.toolpath import Flag, Kind
-from olp.program.rs274.axis_state import AxisState, Effect, Word
+from olp.program.rs274.axis_state import AxisState, Effect
 from olp.program.rs274.codes import (
     CUTTER_COMPENSATION,
     DWELL,
@@ -24,8 +24,10 @@ from olp.program.rs274.codes import (
 from olp.program.rs274.collector import Collector
 from olp.program.rs274.modes import UNROLL, Context, scaled
 from olp.program.rs274.motion import fill
+from olp.program.rs274.offset_state import Word
 from olp.program.rs274.profiles.base import Act, Profile
 from olp.program.rs274.state import NAN
+from olp.program.rs274.turned import Turning, along_words
 
 _M_REFUSED = {
     700: "saves modal codes", 710: "forgets saved modal codes", 720: "restores modal codes",
@@ -161,7 +163,12 @@ class SpecialBlocks:
         before = list(state.position)
         relative = np.array([True]) if incremental else None
         value = scaled(context, state, self._collector.remarks)
-        end = fill(slot, value, relative, offset, frame.unit_mm, before)
+        turning = None if effect.machine else Turning.of(frame.turn)
+        start = along_words(turning, before)
+        offset = offset if turning is None else turning.words(offset)
+        end = fill(slot, value, relative, offset, frame.unit_mm, start)
+        if turning is not None:
+            end = turning.axes(end)
         if effect.machine and not state.setup.machine.located:
             end[slot >= 0] = NAN
         if kind == Kind.PROBE and end[0].tolist() == before:

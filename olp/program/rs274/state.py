@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import field
 
+from olp.core.turns import Turn
 from olp.core.units import MM_PER_INCH
 from olp.core.values import dataclass
 from olp.program.rs274.codes import ABSOLUTE, GROUPS, INCH, INVERSE_TIME, RETRACT_TO_R
@@ -22,13 +23,14 @@ _GROUP_OF = tuple((code, group) for group, codes in GROUPS.items() for code in c
 @dataclass(frozen=True, slots=True)
 class Capture:
     """A word that stores the present position (G92, G10 L20): `axis`, its `word`, the unit it is in, and
-    the number of moves before it."""
+    the number of moves before it. `turn` is how words lie to the axes, None where alike."""
 
     word: int
     axis: int
     unit_mm: float
     moves: int
     line: int
+    turn: Turn | None = None
 
 
 @dataclass(frozen=True, slots=True)

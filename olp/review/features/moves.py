@@ -218,6 +218,8 @@ def _turned(frame: Frame) -> Array:
     turn = np.eye(3) if frame.turn is None else np.array(frame.turn)
     columns = turn[:, list(order)].copy()
     columns[:, 2] *= out[axis]
+    # a scaled frame has longer or shorter ones
+    columns /= np.linalg.norm(columns, axis=0)
     return np.asarray(columns, float)
 
 

@@ -40,6 +40,13 @@ PLACES: dict[tuple[str, str], Vector] = {
     # work offsets
     ("linuxcnc", "G55\nX1"): (11, 202, 303),
     ("linuxcnc", "G59.3\nX1 Z1"): (2, 202, 4),
+    # turned offsets: words that are left out keep their coordinates in the program
+    ("linuxcnc", "G56\nX1"): (101, 1, 303),
+    ("linuxcnc", "G10 L2 P1 R90\nX1"): (101, 201, 303),
+    ("linuxcnc", "G10 L2 P1 R-90\nG91\nX1 Y2"): (103, 201, 303),
+    ("linuxcnc", "G10 L2 P1 R90 X10 Y20\nG92 X2 Y3\nX3"): (101, 203, 303),
+    ("linuxcnc", "G10 L2 P1 R90\nG53 G0 X1"): (1, 202, 303),
+    ("linuxcnc", "G10 L2 P1 R180\nG43 H2\nX1 Y2 Z3"): (100, 200, 363),
     ("fanuc", "G54.1 P7\nX1. Y1."): (8, 9, 303),
     ("haas", "G154 P2\nX1. Y1."): (5, 6, 303),
     ("haas", "G112\nX1. Y1."): (3, 5, 303),
@@ -282,6 +289,10 @@ POSITION = (
     "is stored as the present position, but the axis has not been commanded yet; "
     "give start_mm in the job file or command the axis first"
 )
+LOST = (
+    "with G92 in force, which the control does not count there: it loses the position in this block; "
+    "give G92.1 before it"
+)
 #: Control and blocks behind `HEAD`: what is said of them.
 REFUSED: dict[tuple[str, str], dict[str, object]] = {
     ("linuxcnc", "G58 X1"): {
@@ -299,8 +310,20 @@ REFUSED: dict[tuple[str, str], dict[str, object]] = {
         "job file",
         "code": "OLP520", "missing": ("work_offsets", "G54.1P9"),
     },
-    ("linuxcnc", "G56\nX1"): {
-        "why": "work offset G56 is rotated, which is not read in this dialect; "
+    ("linuxcnc", "G92 X5\nG10 L2 P1 R5"): {
+        "why": f"a work offset is turned {LOST}", "code": "OLP518", "line": 4,
+    },
+    ("linuxcnc", "G56\nG92 Y5\nG53 G0 X1"): {
+        "why": f"G53 is used in a turned work offset {LOST}", "code": "OLP518",
+        "line": 5,
+    },
+    ("linuxcnc", "G56\nG10 L20 P1 X5"): {
+        "why": "G10 L20 stores a position in a work offset that is turned, which is not read; state the "
+        "offset with G10 L2",
+        "code": "OLP526", "line": 4,
+    },
+    ("fanuc", "G56\nX1."): {
+        "why": "work offset G56 is rotated, which this control does not do so; "
         "state it with A_deg = B_deg = C_deg = 0",
         "code": "OLP523", "line": 4,
     },
@@ -361,11 +384,13 @@ REFUSED: dict[tuple[str, str], dict[str, object]] = {
     ("fanuc", "G10 L0 P1 X5."): {
         "why": "G10 L0 writes tables of the control, which is not read; expected L2 or L20", "code": "OLP526",
     },
-    ("linuxcnc", "G10 L2 P1 R5"): {
-        "why": "G10 R rotates the work offset, which is not read; leave R out", "code": "OLP526",
+    ("fanuc", "G10 L2 P1 R5"): {
+        "why": "G10 R turns the work offset, which this control does not do here; leave R out",
+        "code": "OLP526",
     },
     ("linuxcnc", "G10 L20 P1 X5 R0"): {
-        "why": "G10 R rotates the work offset, which is not read; leave R out", "code": "OLP526",
+        "why": "G10 R turns the work offset, which this control does not do here; leave R out",
+        "code": "OLP526",
     },
     ("linuxcnc", "G10 L2 X5"): {"why": NUMBER, "code": "OLP516"},
     ("linuxcnc", "G10 L2 P10 X5"): {"why": NUMBER, "code": "OLP516"},

@@ -57,6 +57,11 @@ READINGS: dict[str, tuple[str, dict[str, Outcome], Any]] = {
         {LINUXCNC: (3, 0, 0), GRBL: (3, 0, 0), FANUC: (8, 0, 0), HAAS: (8, 0, 0)},
         "not",
     ),
+    "turns_offsets": (
+        "G10 L2 P1 X5. R90\nG0 X1. Y0. Z0.",
+        {LINUXCNC: (5, 1, 0)} | dict.fromkeys((FANUC, HAAS, GRBL), "G10 R turns the work offset"),
+        "not",
+    ),
     "cycles_apart": (
         "G1 X0. Y0. Z9. F60.\nG80\nX2.",
         {FANUC: (2, 0, 9), HAAS: (2, 0, 9), LINUXCNC: "no motion code is in force"},

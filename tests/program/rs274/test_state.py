@@ -61,12 +61,19 @@ def test_forgetting_takes_the_named_axes_only() -> None:
 def test_g92_and_g10_make_the_present_position_the_value_given() -> None:
     offsets = Offsets("G54", length=(0.0, 0.0, 50.0), local=[1.0, 2.0, 4.0])
     work = [100.0, 200.0, -300.0]
-    for axis, position in enumerate((7.0, -8.0, 9.0)):
-        offsets.preset(axis, position, work, 5.0)
-    total = offsets.total(work)
+    for axis in range(3):
+        offsets.preset({axis: 5.0}, (7.0, -8.0, 9.0), work, 0.0)
+    total = offsets.total(work, 0.0)
     assert [p - t for p, t in zip((7.0, -8.0, 9.0), total, strict=True)] == [5.0, 5.0, 5.0]
     again = [offsets.work_at(axis, p, 5.0) for axis, p in enumerate((7.0, -8.0, 9.0))]
     assert again == work
+
+
+def test_a_turned_offset_turns_the_shift_and_not_the_length() -> None:
+    offsets = Offsets("G54", shift=[1.0, 2.0, 3.0], length=(10.0, 20.0, 30.0))
+    assert offsets.total((100.0, 200.0, 300.0), 90.0) == (108.0, 221.0, 333.0)
+    offsets.preset({0: 7.0}, (108.0, 221.0, 333.0), (100.0, 200.0, 300.0), 90.0)
+    assert offsets.shift == [-6.0, 2.0, 3.0]
 
 
 def test_g92_2_leaves_the_stored_shift_and_g92_1_does_not() -> None:
@@ -190,13 +197,13 @@ def test_offsets_of_a_fresh_program_are_zero_and_of_their_own() -> None:
     a.written["G55"] = [1.0, 2.0, 3.0]
     assert b.shift == b.saved == b.local == [0.0, 0.0, 0.0]
     assert b.written == {}
-    assert (b.length, b.total([1.0, 2.0, 3.0])) == ((0.0, 0.0, 0.0), (1.0, 2.0, 3.0))
+    assert (b.length, b.total([1.0, 2.0, 3.0], 0.0)) == ((0.0, 0.0, 0.0), (1.0, 2.0, 3.0))
 
 
 def test_an_axis_position_is_the_sum_of_its_offsets() -> None:
     offsets = Offsets("G54", shift=[1.0, 2.0, 3.0], local=[10.0, 20.0, 30.0], length=(0.5, 0.25, 0.125))
-    assert offsets.total([100.0, 200.0, 300.0]) == (111.5, 222.25, 333.125)
+    assert offsets.total([100.0, 200.0, 300.0], 0.0) == (111.5, 222.25, 333.125)
     # G10 L20 and G92 make an axis position the program position 7
     assert [offsets.work_at(i, 50.0, 7.0) for i in range(3)] == [31.5, 20.75, 9.875]
-    offsets.preset(1, 50.0, [100.0, 200.0, 300.0], 7.0)
+    offsets.preset({1: 7.0}, [50.0] * 3, [100.0, 200.0, 300.0], 0.0)
     assert offsets.shift == [1.0, 50.0 - 200.0 - 0.25 - 20.0 - 7.0, 3.0]

@@ -54,7 +54,8 @@ class Profile(Dialect):
     - `increments_without_point`: X100 means 100 least increments, not 100 mm. `feed_without_point`: F100 is
       100 mm/min all the same.
     - `g52_is_g92`: G52 writes the same offset as G92. `g10_offsets`: the largest P of G10 L2 and L20.
-      `g10_adds`: in G91 G10 L2 adds to the offset.
+      `g10_adds`: in G91 G10 L2 adds to the offset. `turns_offsets`: a work offset may be turned about Z,
+      which R of G10 L2 states too.
     - `cycles_apart`: canned cycles and G80 are a separate modal group.
     - `axis_dwell`: G4 takes its time from X and U, too, and counts milliseconds where it has no point.
     - `exact_stop`: G61 stops at the end of each block, as G9 does in one, and G62 and G63 end it as G64 does.
@@ -85,6 +86,7 @@ class Profile(Dialect):
     g52_is_g92: bool = False
     g10_offsets: int = 6
     g10_adds: bool = False
+    turns_offsets: bool = False
     cycles_apart: bool = False
     axis_dwell: bool = False
     exact_stop: bool = False

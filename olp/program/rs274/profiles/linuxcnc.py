@@ -27,6 +27,7 @@ DIALECT = Profile(
     initial_retract=990,
     g52_is_g92=True,
     g10_offsets=9,
+    turns_offsets=True,
     m61_sets_tool=True,
     length_of_spindle_tool=True,
     lengths_keep_unit=True,

@@ -1,0 +1,267 @@
+"""The offsets and tool lengths of the state, and the blocks that change them: G43, G49, G54, G10, G52, G92.
+
+Lengths become mm here. How offsets add up is in `offsets`, what becomes of them as a frame in `axis_state`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import field
+
+from olp.core.errors import ProgramError
+from olp.core.machine import ZERO, Setup, Vector, WorkOffset
+from olp.core.toolpath import Touch
+from olp.core.turns import Turn
+from olp.core.values import dataclass
+from olp.program.frames import touch_of
+from olp.program.rs274.codes import LOCAL_OFFSET, METRIC
+from olp.program.rs274.offsets import Offsets
+from olp.program.rs274.profiles.base import increment
+from olp.program.rs274.state import NAN, Capture, State
+from olp.program.rs274.turned import Turning, along_words
+
+#: L of a G10 that stores the present position.
+STORES_POSITION = 20
+
+
+@dataclass(frozen=True, slots=True)
+class Word:
+    """One word of a block: upper-case letter, number as written, index in the program's word table."""
+
+    letter: str
+    value: float
+    index: int
+    pointed: bool = True
+
+
+@dataclass(slots=True, kw_only=True)
+class OffsetState(State):
+    """The state with the offsets and lengths in force."""
+
+    setup: Setup
+    offsets: Offsets
+    inherited: dict[str, Touch | None] = field(default_factory=dict)
+    located: dict[str, str] = field(default_factory=dict)
+    length_tool: int | None = None
+    spindle: int | None = None
+    length_unit: int = METRIC
+    captures: list[Capture] = field(default_factory=list)
+
+    def length_mm(self, word: Word) -> float:
+        """A length word in mm; without a decimal point it counts least increments on some controls."""
+        return word.value * self.word_scale(word.letter, word.pointed)
+
+    def word_scale(self, letter: str, pointed: bool) -> float:
+        """mm per unit of the number as written."""
+        return self.unit_mm if pointed else self.profile.bare_mm(self.setup.machine, letter, self.unit_mm)
+
+    @property
+    def bare_increments(self) -> bool:
+        """Whether a length without a decimal point counts least increments."""
+        return self.profile.counts_increments(self.setup.machine)
+
+    def increment(self, letter: str) -> float:
+        """Least increment in program units."""
+        return increment(self.setup.machine, letter, self.unit_mm)
+
+    def _work_offset(self, name: str) -> WorkOffset | None:
+        return self.setup.work_offset(name) or self.setup.work_offset(name.replace("P", " P"))
+
+    def _angle_deg(self, name: str, line: int) -> float:
+        """By how much a work offset is turned about Z, as the program has written it, else as the setup has
+        it. Raises ProgramError where the control cannot turn it so."""
+        if name in self.offsets.turned_deg:
+            return self.offsets.turned_deg[name]
+        work = self._work_offset(name)
+        a, b, c = ZERO if work is None else work.rotation_deg
+        if a or b or (c and not self.profile.turns_offsets):
+            own = self.profile.turns_offsets
+            how = "A_deg = B_deg = 0" if own else "A_deg = B_deg = C_deg = 0"
+            raise ProgramError(
+                f"work offset {name} is rotated, which this control does not do so; state it with {how}",
+                line=line,
+                code="OLP523",
+            )
+        return c
+
+    def _touch(self, name: str, base: Sequence[float], line: int) -> Touch | None:
+        """Where a work offset was touched off. One that G10 L20 sets takes over the point of the offset in
+        force; one that G10 L2 changes keeps its own point."""
+        if name in self.inherited:
+            return self.inherited[name]
+        work = self._work_offset(name) or WorkOffset(name, (base[0], base[1], base[2]))
+        return touch_of(self.setup, work, line)
+
+    def _tool(self, number: int, line: int, what: str) -> Vector:
+        if number == 0:
+            return ZERO
+        tool = self.setup.tool(number)
+        if tool is None:
+            raise ProgramError(
+                f"{what} uses tool {number}, which is not defined; give [tools.{number}] in the machine or "
+                "job file",
+                line=line,
+                code="OLP521",
+                missing=("tools", str(number)),
+            )
+        return tool.length_mm
+
+    def _tool_length(self, code: int, line: int, by_letter: dict[str, Word]) -> None:
+        if code == 490:
+            self._set_length(ZERO)
+            self.length_tool = None
+            return
+        name = f"G{code / 10:g}"
+        number = self._integer(by_letter["H"], line) if "H" in by_letter else None
+        if not number and self.profile.length_of_spindle_tool and (number is not None or code != 432):
+            number = self.spindle
+            if number is None:
+                raise ProgramError(
+                    f"{name} takes the length of the tool in the spindle, which is not known; give T and M6 "
+                    "before it, or `tool` in the job file",
+                    line=line,
+                    code="OLP532",
+                )
+        if number is None:
+            raise ProgramError(
+                f"{name} needs an H word with the number of the tool length", line=line, code="OLP516"
+            )
+        if self.spindle is None and number:
+            # only the length that is called up shows which tool is in the spindle
+            self.length_tool = number
+        vector = self._tool(number, line, name)
+        if self.profile.lengths_along_z:
+            vector = (0.0, 0.0, vector[2])
+        if code == 440:
+            vector = (-vector[0], -vector[1], -vector[2])
+        if code == 432:
+            vector = self._sum(self.offsets.length, vector)
+        self._set_length(vector)
+        self.length_tool = number or None
+
+    def _set_length(self, vector: Vector) -> None:
+        self.offsets.length, self.length_unit = vector, self.unit or METRIC
+
+    def _select_offset(self, code: int, line: int, by_letter: dict[str, Word]) -> None:
+        if code in (541, 1540):
+            if "P" not in by_letter:
+                raise ProgramError(
+                    f"G{code / 10:g} needs a P word with the number of the work offset",
+                    line=line,
+                    code="OLP516",
+                )
+            name = f"G{code / 10:g}P{self._integer(by_letter['P'], line)}"
+        else:
+            name = f"G{code / 10:g}"
+        self.offsets.name = name
+
+    def _write_offset(
+        self, line: int, by_letter: dict[str, Word], axis_words: list[tuple[int, Word]], moves: int
+    ) -> None:
+        kind = round(by_letter["L"].value) if "L" in by_letter else -1
+        if kind not in (2, STORES_POSITION):
+            what = f"G10 L{kind}" if kind >= 0 else "G10 without L"
+            raise ProgramError(
+                f"{what} writes tables of the control, which is not read; expected L2 or L20",
+                line=line,
+                code="OLP526",
+            )
+        turns = self.profile.turns_offsets and kind == 2
+        if "R" in by_letter and not turns and (kind == STORES_POSITION or by_letter["R"].value != 0):
+            raise ProgramError(
+                "G10 R turns the work offset, which this control does not do here; leave R out",
+                line=line,
+                code="OLP526",
+            )
+        number = self._integer(by_letter["P"], line) if "P" in by_letter else -1
+        if not 0 <= number <= self.profile.g10_offsets:
+            raise ProgramError(
+                "G10 needs a P word with the number of a work offset, 1 for G54", line=line, code="OLP516"
+            )
+        name = self.offsets.name if number == 0 else f"G{53 + number}" if number < 7 else f"G59.{number - 6}"
+        base = self._work_mm(name)
+        if kind == 2 and not self.setup.machine.located:
+            raise ProgramError(
+                "G10 L2 states machine coordinates, which are not known without a machine file; write one "
+                "with olp init, or store the position with G10 L20",
+                line=line,
+                code="OLP526",
+            )
+        if kind == STORES_POSITION and any(self._angle_deg(n, line) for n in (name, self.offsets.name)):
+            raise ProgramError(
+                "G10 L20 stores a position in a work offset that is turned, which is not read; state the "
+                "offset with G10 L2",
+                line=line,
+                code="OLP526",
+            )
+        if "R" in by_letter and turns:
+            self.offsets.turned_deg[name] = by_letter["R"].value
+        for i, word in axis_words:
+            value = self.length_mm(word)
+            if kind == 2:
+                adds = not self.absolute and self.profile.g10_adds
+                base[i] = base[i] + value if adds else value
+            else:
+                self._capture(i, word, line, moves)
+                active = self.offsets.name
+                self.inherited[name] = self._touch(active, self._work_mm(active), line)
+                self.located[name] = self.located.get(active, active)
+                base[i] = self.offsets.work_at(i, self.position[i], value)
+        self.offsets.written[name] = base
+
+    def _shift(self, code: int, line: int, axis_words: list[tuple[int, Word]], moves: int) -> None:
+        offsets = self.offsets
+        if code in (921, 922):
+            offsets.clear_shift(save=code == 922)
+        elif code == 923:
+            offsets.restore_shift()
+        elif code == LOCAL_OFFSET:
+            target = offsets.shift if self.profile.g52_is_g92 else offsets.local
+            for i, word in axis_words:
+                target[i] = self.length_mm(word)
+            if self.profile.g52_is_g92:
+                offsets.store_shift()
+        else:
+            work, angle_deg = self._work_mm(offsets.name), self._angle_deg(offsets.name, line)
+            for i, word in axis_words:
+                self._capture(i, word, line, moves, offsets.turn(angle_deg))
+            values = {i: self.length_mm(word) for i, word in axis_words}
+            offsets.preset(values, self.position, work, angle_deg)
+            offsets.store_shift()
+
+    def _work_mm(self, name: str) -> list[float]:
+        """A work offset as the program has written it, else that of the setup (a copy), else NaN."""
+        work = self._work_offset(name)
+        return self.offsets.written.get(name) or (list(work.offset_mm) if work is not None else [NAN] * 3)
+
+    def _capture(self, axis: int, word: Word, line: int, moves: int, turn: Turn | None = None) -> None:
+        if math.isnan(along_words(Turning.of(turn), self.position)[axis]):
+            raise ProgramError(
+                f"{word.letter} is stored as the present position, but the axis has not been commanded yet; "
+                "give start_mm in the job file or command the axis first",
+                line=line,
+                code="OLP524",
+            )
+        self.captures.append(Capture(word.index, axis, self.unit_mm, moves, line, turn))
+
+    @staticmethod
+    def _integer(word: Word, line: int) -> int:
+        if word.value != round(word.value) or word.value < 0:
+            raise ProgramError(
+                f"{word.letter}{word.value:g} is not a number of a table; expected an integer from 0",
+                line=line,
+                code="OLP516",
+            )
+        return round(word.value)
+
+    @staticmethod
+    def _sum(a: Vector, b: Vector) -> Vector:
+        return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
+
+    @staticmethod
+    def _merged(old: Vector, new: list[tuple[int, float]]) -> Vector:
+        values = list(old)
+        for i, value in new:
+            values[i] = value
+        return (values[0], values[1], values[2])
