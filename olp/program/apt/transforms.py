@@ -13,8 +13,8 @@ import numpy as np
 from olp.core.arrays import Array
 from olp.core.errors import ProgramError
 from olp.core.machine import Vector
+from olp.core.turns import Turn
 from olp.core.values import dataclass
-from olp.program.frames import Turn
 from olp.program.text.statements import Statement, number_of, shown
 
 #: how far a stated matrix may be from a rotation: numbers of four decimals
