@@ -193,7 +193,8 @@ class Mesh:
 class Job:
     """What changes per job. `part_tolerance_um` holds where a call gives none. `work_offsets` and `tools`
     override the machine's, one by one. `payloads` leads from a line of the program, counted from 1, to the
-    payload from there on. Temperatures of the structure's sensors come from `sensors_degC`, settled, or from
+    payload from there on. `parameters` are values of parameters of the program, by names such as "#100".
+    Temperatures of the structure's sensors come from `sensors_degC`, settled, or from
     `sensor_log` at a time in it. `dialect` is that of the program; None: it is detected from the text and the
     ending of the file. `described` is a dialect that a file describes (`olp.program.dialect.Dialect`)."""
 
@@ -203,6 +204,7 @@ class Job:
     start_mm: tuple[float | None, float | None, float | None] = (None, None, None)
     payload_kg: float = 0.0
     payloads: Mapping[int, float] = field(default_factory=dict)
+    parameters: Mapping[str, float] = field(default_factory=dict)
     temperatures_degC: Mapping[str, float] = field(default_factory=dict)
     sensors_degC: Mapping[str, float] | None = None
     sensor_log: str | None = None

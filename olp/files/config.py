@@ -162,6 +162,7 @@ def _read_job(path: PathLike, read: Reader, exists: Exists = _is_file) -> tuple[
         start_mm=file.start_mm.values,
         payload_kg=file.payload_kg,
         payloads={entry.line: entry.payload_kg for entry in file.payloads},
+        parameters=file.parameters,
         temperatures_degC={
             name: value
             for name, value in stated_values(file.temperatures_degC).items()

@@ -6,6 +6,7 @@ One class per TOML table. A key that no class names is refused. Every descriptio
 
 from __future__ import annotations
 
+import re
 from itertools import pairwise
 from typing import Annotated, Literal
 
@@ -227,6 +228,8 @@ class StylusTable(Table):
     )
 
 
+#: A parameter of a program, by its number or its name.
+_PARAMETER = re.compile(r"#(\d{1,5}|<[^<>]+>)")
 Styli = dict[Text, StylusTable]
 WorkOffsets = dict[OffsetName, WorkOffsetTable]
 Tools = dict[ToolNumber, ToolTable]
@@ -350,6 +353,11 @@ class JobFile(Table):
         description="tables [[payloads]], the payload from a line of the program on; or the program holds "
         "comments such as (OLP PAYLOAD 30 kg)",
     )
+    parameters: dict[Text, float] = Field(
+        default={},
+        description="the table [parameters]: values that parameters of the program have in the control, such "
+        'as "#100" = 5.0 or "#<depth>" = 2.5, wherever the program does not set them',
+    )
     temperatures_degC: TemperaturesTable = Field(
         default_factory=TemperaturesTable, description="the table [temperatures_degC], in degC"
     )
@@ -359,6 +367,14 @@ class JobFile(Table):
     tools: Tools = Field(default={}, description="tables [tools.NUMBER], which override the machine's")
     styli: Styli = Field(default={}, description="tables [styli.LABEL], which override the machine's")
     meshes: list[MeshTable] = Field(default=[], description="tables [[meshes]]")
+
+    @rule("parameters")
+    @staticmethod
+    def _named(value: dict[str, float], _: Known) -> dict[str, float]:
+        for name in value:
+            if not _PARAMETER.fullmatch(name):
+                raise refusal(f'has the key "{name}"; expected a parameter, such as "#100" or "#<depth>"')
+        return value
 
     @rule("payloads")
     @staticmethod

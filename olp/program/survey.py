@@ -281,7 +281,9 @@ class _Survey:
                 text[error.line - 1] = _NO_LINE_END.sub(b" ", text[error.line - 1])
         beside = {} if subprograms is None else {"subprograms": subprograms}
         try:
-            unrolled = self.dialect.unroller(b"".join(text), self.dialect, limit=UNROLLED, **beside)
+            unrolled = self.dialect.unroller(
+                b"".join(text), self.dialect, limit=UNROLLED, parameters=self.setup.job.parameters, **beside
+            )
         except ProgramError as error:
             if error.code == TOO_LONG:
                 return

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 from olp.core.errors import ProgramError, UsageError
@@ -16,7 +17,9 @@ from olp.program.survey import Change, Unroll, as_it_is
 from olp.workflows.session import PathLike, Session, opened
 
 #: Endings of files of subprograms.
-_ENDINGS = ("", ".ngc", ".nc")
+_ENDINGS = ("", ".ngc", ".nc", ".NC")
+#: Digits of O numbers in names of files.
+_DIGITS = (1, 4, 5)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,7 +115,8 @@ def unroller(
         text = unrolled(
             with_payloads(given, setup.job.payloads, dialect.comment), dialect, subprograms=changed,
             expand_cycles=options.expand_cycles, block_delete=block_delete,
-            peck_clearance=options.peck_clearance_mm, **({} if limit is None else {"limit": limit}),
+            peck_clearance=options.peck_clearance_mm, parameters=setup.job.parameters,
+            **({} if limit is None else {"limit": limit}),
         )  # fmt: skip
         _refuse_payloads_not_reached(setup, text.origin)
         if setup.job.payloads:
@@ -130,8 +134,10 @@ def beside(sources: Sources, program: Source) -> Callable[[str], tuple[str, byte
     def in_folder(wanted: str) -> tuple[str, bytes] | None:
         if not program.name:
             return None
-        for ending in _ENDINGS:
-            candidate = Path(program.name).parent / f"{wanted}{ending}"
+        number = (wanted, *(f"{o}{wanted.zfill(n)}" for o in "Oo" for n in _DIGITS))
+        names = number if wanted.isdigit() else (wanted,)
+        for name, ending in product(names, _ENDINGS):
+            candidate = Path(program.name).parent / f"{name}{ending}"
             if sources.exists(candidate):
                 return str(candidate), sources.read(candidate)
         return None

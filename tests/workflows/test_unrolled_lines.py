@@ -420,7 +420,7 @@ def test_feeds_and_times_are_told_by_lines_of_the_original(folder: Path) -> None
 #: Blocks that need no unrolling, refused for many reasons, by line and by what stands before.
 PLAIN = (
     "G21 G90 G54 G17 F100\nG0 X1. Y1. Z1.\nG68 X1 R30\nG1 X1,5\nT77 M6\nG1 X1 R5\n(a (b) c)\n"
-    "G1 X2 X3\nG0 G1 X4\nG2 X20. Y0. I4. J0.\nG58 X5\nG81 X6 Z-1\nG80\nG1 X7 &1\nG66 P1\nM2\n"
+    "G1 X2 X3\nG0 G1 X4\nG2 X20. Y0. I4. J0.\nG58 X5\nG81 X6 Z-1\nG80\nG1 X7 &1\nG66.1 P1\nM2\n"
 )
 
 

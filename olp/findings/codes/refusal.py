@@ -233,7 +233,8 @@ RULES = (
         "value is not known off line",
         why="The value is in the control: a probe result, an offset, a setting, or a "
         "parameter that another program has set.",
-        remedy="Assign the value in the program, before it is used.",
+        remedy="Assign the value in the program, before it is used. Or give it in [parameters] of the job "
+        "file.",
         example="`X#5061` (the last probe result).",
         follows=True,
     ),
@@ -258,7 +259,7 @@ RULES = (
         "cannot be unrolled",
         why="Plain blocks cannot have the effect of this statement.",
         remedy="Write the path as plain blocks, as the message says.",
-        example="`G66 P9000`, a macro after every move.",
+        example="`G66.1 P9000`, a macro with the words of every block.",
     ),
     _rule(
         "OLP550",

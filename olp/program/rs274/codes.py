@@ -58,6 +58,7 @@ PATH_MODES = frozenset({610, 611, 640})
 DWELL = 40
 #: G65, a macro call.
 MACRO = 650
+MACROS = frozenset({MACRO, 660})
 #: G10, which writes offsets.
 WRITE_OFFSET = 100
 #: G52, a local offset.

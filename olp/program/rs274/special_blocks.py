@@ -19,7 +19,7 @@ from olp.program.rs274.codes import (
     HOMES,
     INCREMENTAL,
     MACHINE,
-    MACRO,
+    MACROS,
 )
 from olp.program.rs274.collector import Collector
 from olp.program.rs274.modes import UNROLL, Context, scaled
@@ -76,10 +76,10 @@ def _checked(
             raise ProgramError(
                 why or f"{name} is not known to the {profile.name} profile and may move the machine",
                 line=line,
-                code="OLP513" if c in CUTTER_COMPENSATION else "OLP511" if c == MACRO else "OLP512",
-                hint=UNROLL if c == MACRO else "",
+                code="OLP513" if c in CUTTER_COMPENSATION else "OLP511" if c in MACROS else "OLP512",
+                hint=UNROLL if c in MACROS else "",
                 # the other words of a macro call are its arguments
-                word="" if c == MACRO else name,
+                word="" if c in MACROS else name,
             )
     for word in words:
         m = round(word.value * 10)

@@ -16,7 +16,7 @@ class Language:
     - `saved_modes`: M70 to M73 save and restore modal codes. `profile_cycles`: G70 to G72 name a subprogram.
     - `splines`: G5 to G5.3 are modal motion.
     - `counts_in_p`: P of M98 has the count in front of four digits of the number. `shared_locals`: M98 keeps
-      the local variables of its caller.
+      the local variables of its caller. `calls_none`: L0 of M98 calls nothing.
     - `increments_open`: the unit of a number without a point is not known off line, nor what ROUND in a word
       rounds to.
     - Numbers are written with at most `decimals`, or with `all_digits` where that is needed; `counts` are
@@ -30,6 +30,7 @@ class Language:
     splines: bool
     counts_in_p: bool
     shared_locals: bool
+    calls_none: bool
     increments_open: bool
     decimals: int
     all_digits: bool
@@ -39,11 +40,11 @@ class Language:
 
 NGC = Language(
     arithmetic=expressions.NGC, macro_b=False, saved_modes=True, profile_cycles=True, splines=True,
-    counts_in_p=False, shared_locals=False, increments_open=False, decimals=12, all_digits=True,
-    counts=frozenset(), points=False,
+    counts_in_p=False, shared_locals=False, calls_none=True, increments_open=False, decimals=12,
+    all_digits=True, counts=frozenset(), points=False,
 )  # fmt: skip
 MACRO_B = Language(
     arithmetic=expressions.MACRO_B, macro_b=True, saved_modes=False, profile_cycles=False, splines=False,
-    counts_in_p=True, shared_locals=True, increments_open=True, decimals=4, all_digits=False,
-    counts=frozenset("gmnpltdhos"), points=True,
+    counts_in_p=True, shared_locals=True, calls_none=False, increments_open=True, decimals=4,
+    all_digits=False, counts=frozenset("gmnpltdhos"), points=True,
 )  # fmt: skip

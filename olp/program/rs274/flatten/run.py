@@ -6,8 +6,10 @@ from collections.abc import Callable
 
 from olp.core.budget import Budget
 from olp.core.errors import ProgramError
+from olp.program.rs274.flatten.branches import Branches
 from olp.program.rs274.flatten.expressions import filled, whole
 from olp.program.rs274.flatten.lines import Flow, Line
+from olp.program.rs274.flatten.modal import Modal, moves
 from olp.program.rs274.flatten.unit import Frame, Unit
 from olp.program.rs274.flatten.values import Variables, macro_arguments
 
@@ -25,7 +27,12 @@ WriteBlock = Callable[[Line, Frame, frozenset[int]], bool]
 
 
 #: Codes of subprogram calls and returns.
-_CALLS = {("m", 97.0), ("m", 98.0), ("m", 99.0), ("g", 65.0)}
+_CALLS = {("m", 97.0), ("m", 98.0), ("m", 99.0), ("g", 65.0), ("g", 66.0)}
+
+
+def _indices(line: Line, codes: set[tuple[str, float]]) -> frozenset[int]:
+    """The words of a line that are these codes."""
+    return frozenset(i for i, word in enumerate(line.words) if (word.letter, word.number) in codes)
 
 
 def _refuse_by_switch(line: Line) -> None:
@@ -39,7 +46,7 @@ def _refuse_by_switch(line: Line) -> None:
         )
 
 
-class Walk:
+class Walk(Branches):
     """Runs a program; gives every executed line to `write`."""
 
     def __init__(
@@ -61,6 +68,7 @@ class Walk:
         self._subprograms = subprograms
         self._files: dict[str, Unit] = {}
         self._frames = [Frame(main, 0, "", variables.locals, variables.names)]
+        self._modal: Modal | None = None
         self._headers = 0
         self._percents = 0
 
@@ -117,7 +125,17 @@ class Walk:
             return called
         if len(self._frames) == 1 and any(word.letter != "n" for word in line.words):
             self._headers += 1
-        return self.write(line, frame, frozenset())
+        ended = self.write(line, frame, frozenset())
+        if self._modal is not None and not any(level.modal for level in self._frames):
+            modal = self._modal
+            if moves(line, self.variables):
+                self._enter(
+                    Frame(
+                        modal.unit, modal.start, modal.label, modal.called(), {}, start=modal.start,
+                        repeats=modal.repeats, modal=True,
+                    )
+                )  # fmt: skip
+        return ended
 
     # --- flow -----------------------------------------------------------------------------------------------
 
@@ -145,112 +163,6 @@ class Walk:
             return True
         self._headers += 1
         return self.write(line, frame, frozenset())
-
-    def _true(self, flow: Flow) -> bool:
-        return filled(flow.values[0](self.variables)) != 0
-
-    def _do_sub(self, flow: Flow, frame: Frame, index: int) -> None:
-        frame.next_index = frame.unit.following(index, flow.label, frozenset({"endsub"})) + 1
-
-    def _do_if(self, flow: Flow, frame: Frame, index: int) -> None:
-        frame.taken.discard(flow.label)
-        while not self._true(flow):
-            index = frame.unit.following(index, flow.label, frozenset({"elseif", "else", "endif"}))
-            frame.next_index = index + 1
-            next_flow = frame.unit.line(index).flow
-            if next_flow is None or next_flow.keyword != "elseif":
-                break
-            flow = next_flow
-        frame.taken.add(flow.label)
-
-    def _do_elseif(self, flow: Flow, frame: Frame, index: int) -> None:
-        if flow.label not in frame.taken:
-            raise ProgramError(f"{flow.keyword.upper()} without an IF with label {flow.label}", code="OLP542")
-        frame.next_index = frame.unit.following(index, flow.label, frozenset({"endif"}))
-
-    _do_else = _do_elseif
-
-    def _do_endif(self, flow: Flow, frame: Frame, index: int) -> None:
-        frame.taken.discard(flow.label)
-
-    def _do_do(self, flow: Flow, frame: Frame, index: int) -> None:
-        if self.language.macro_b:
-            frame.loops[flow.label] = index
-        else:
-            frame.dos[flow.label] = index
-
-    def _do_while(self, flow: Flow, frame: Frame, index: int) -> None:
-        if flow.label in frame.dos:
-            if self._true(flow):
-                frame.next_index = frame.dos[flow.label] + 1
-            else:
-                del frame.dos[flow.label]
-        elif self._true(flow):
-            frame.loops[flow.label] = index
-        else:
-            frame.loops.pop(flow.label, None)
-            frame.next_index = frame.unit.following(index, flow.label, frozenset({"endwhile"})) + 1
-
-    def _do_endwhile(self, flow: Flow, frame: Frame, index: int) -> None:
-        frame.next_index = self._open(frame.loops, flow)
-
-    def _do_repeat(self, flow: Flow, frame: Frame, index: int) -> None:
-        count = int(filled(flow.values[0](self.variables)) + 0.5)
-        if count > 0:
-            frame.counts[flow.label] = count
-            frame.loops[flow.label] = index
-        else:
-            frame.next_index = frame.unit.following(index, flow.label, frozenset({"endrepeat"})) + 1
-
-    def _do_endrepeat(self, flow: Flow, frame: Frame, index: int) -> None:
-        start = self._open(frame.loops, flow)
-        frame.counts[flow.label] -= 1
-        if frame.counts[flow.label] > 0:
-            frame.next_index = start + 1
-        else:
-            del frame.counts[flow.label], frame.loops[flow.label]
-
-    def _do_break(self, flow: Flow, frame: Frame, index: int) -> None:
-        frame.next_index = frame.unit.following(index, flow.label, self._loop_end(flow, frame)) + 1
-        for table in (frame.dos, frame.loops, frame.counts):
-            table.pop(flow.label, None)
-
-    def _do_continue(self, flow: Flow, frame: Frame, index: int) -> None:
-        if flow.label in frame.dos:
-            raise ProgramError(
-                "CONTINUE within DO ... WHILE ends the loop in LinuxCNC 2.9; use IF", code="OLP544"
-            )
-        frame.next_index = frame.unit.following(index, flow.label, self._loop_end(flow, frame))
-
-    def _loop_end(self, flow: Flow, frame: Frame) -> frozenset[str]:
-        if flow.label in frame.dos:
-            return frozenset({"while"})
-        self._open(frame.loops, flow)
-        return frozenset({"endrepeat" if flow.label in frame.counts else "endwhile"})
-
-    def _open(self, table: dict[str, int], flow: Flow) -> int:
-        if flow.label not in table:
-            raise ProgramError(
-                f"{flow.keyword.upper()} with label {flow.label} has no open loop", code="OLP542"
-            )
-        return table[flow.label]
-
-    def _do_while_do(self, flow: Flow, frame: Frame, index: int) -> None:
-        if self._true(flow):
-            frame.loops[flow.label] = index
-        else:
-            frame.next_index = frame.unit.following(index, flow.label, frozenset({"end"})) + 1
-
-    def _do_end(self, flow: Flow, frame: Frame, index: int) -> None:
-        frame.next_index = self._open(frame.loops, flow)
-
-    def _do_goto(self, flow: Flow, frame: Frame, index: int) -> None:
-        number = whole(filled(flow.values[-1](self.variables)), "the block number of GOTO")
-        frame.next_index = frame.unit.block_number(number, index)
-
-    def _do_when_goto(self, flow: Flow, frame: Frame, index: int) -> None:
-        if self._true(flow):
-            self._do_goto(flow, frame, index)
 
     # --- subprograms ----------------------------------------------------------------------------------------
 
@@ -322,13 +234,19 @@ class Walk:
                 "G70 to G72 take their profile from a subprogram, which plain blocks do not have",
                 code="OLP544",
             )
-        if ("g", 66.0) in codes or ("g", 66.1) in codes:
+        if ("g", 66.1) in codes:
             raise ProgramError(
-                "G66 calls a macro after every move, which is not unrolled; call it with G65", code="OLP544"
+                "G66.1 calls a macro with the words of every block, which is not unrolled; call it with G65",
+                code="OLP544",
             )
-        if ("g", 65.0) in codes:
-            self._macro(line, frame)
+        if self._modal is not None and codes & (_CALLS | {("g", 67.0)}):
+            self._refuse_in_modal(line, codes)
+        if ("g", 65.0) in codes or ("g", 66.0) in codes:
+            self._macro(line, frame, modal=("g", 66.0) in codes)
             return False
+        if ("g", 67.0) in codes and self._modal is not None:
+            self._modal = None
+            return self.write(line, frame, _indices(line, {("g", 67.0)}))
         if ("m", 99.0) in codes:
             return self._return_m99(line, frame)
         for code in (98.0, 97.0):
@@ -352,7 +270,8 @@ class Walk:
         repeats = 1 if count is None else whole(count, "the repeat count L")
         if self.language.counts_in_p and count is None and number > 9999 and not local:
             repeats, number = divmod(number, 10_000)
-        if repeats < 1:
+        none = repeats == 0 and self.language.calls_none
+        if repeats < 1 and not none:
             raise ProgramError(f"a subprogram is called {repeats} times; expected one or more", code="OLP516")
         without = frozenset(
             i
@@ -360,6 +279,8 @@ class Walk:
             if w.letter in ("p", "l") or (w.letter == "m" and w.number in (97, 98))
         )
         self.write(line, frame, without)
+        if none:
+            return
         if local:
             unit, start = frame.unit, frame.unit.block_number(number, index) - 1
         else:
@@ -397,16 +318,30 @@ class Walk:
             )
         return False
 
-    def _macro(self, line: Line, frame: Frame) -> None:
+    def _refuse_in_modal(self, line: Line, codes: set[tuple[str, float]]) -> None:
+        """Raise ProgramError for what is not known under G66."""
+        if any(level.modal for level in self._frames) and codes & {("g", 66.0), ("g", 67.0)}:
+            why = "G66 or G67 inside of a macro of G66 is not unrolled; give them in the program around it"
+        elif ("g", 66.0) in codes:
+            why = "a second G66 before the G67 of the first is not unrolled; end the first with G67"
+        elif not codes & {("g", 65.0)} and any(word.letter in "xyzabcuvw" for word in line.words):
+            why = "under G66 this block moves, and calls or returns; put the move into a block of its own"
+        else:
+            return
+        raise ProgramError(why, code="OLP544")
+
+    def _macro(self, line: Line, frame: Frame, *, modal: bool) -> None:
         number = self._word(line, "p")
         if number is None:
-            raise ProgramError("G65 has no P word", code="OLP516")
+            raise ProgramError(f"{'G66' if modal else 'G65'} has no P word", code="OLP516")
         count = self._word(line, "l")
         repeats = 1 if count is None else whole(count, "the repeat count L")
         arguments = dict(macro_arguments(line, self.variables))
         self.write(line, frame, frozenset(range(len(line.words))))
         label = str(whole(number, "the program number P"))
         unit, start = self._find(label, "program", frame.unit)
-        self._enter(
-            Frame(unit, start + 1, label, arguments, {}, start=start + 1, repeats=max(repeats, 1) - 1)
-        )
+        repeats = max(repeats, 1) - 1
+        if modal:
+            self._modal = Modal(unit, start + 1, label, repeats, arguments)
+        else:
+            self._enter(Frame(unit, start + 1, label, arguments, {}, start=start + 1, repeats=repeats))

@@ -63,7 +63,7 @@ _UNSETTING = (
 _ODD_FRAME = frozenset({70, 71, 121, 160, 434, 510, 511, 680, 682})
 _EVEN_FRAME = frozenset({80, 130, 131, 150, 490, 500, 501, 690})
 #: Codes whose axis words are no motion, or a motion to another position.
-_NO_AXES = HOMES | {DWELL, WRITE_OFFSET, LOCAL_OFFSET, PRESET, MACHINE, MACRO}
+NO_AXES = HOMES | {DWELL, WRITE_OFFSET, LOCAL_OFFSET, PRESET, MACHINE, MACRO}
 _STOPS = frozenset({0, 1, 2, 30, 60, 98, 99})
 #: Words that belong to a cycle.
 CYCLE_WORDS = frozenset({"x", "y", "z", "r", "q", "p", "l", "k"})
@@ -102,7 +102,7 @@ class ProgramState(State):
         motion = codes & _MOTION
         if motion:
             return bool(motion & CYCLES)
-        return self.motion in CYCLES and not codes & _NO_AXES and any(letter in "xyz" for letter, _ in words)
+        return self.motion in CYCLES and not codes & NO_AXES and any(letter in "xyz" for letter, _ in words)
 
     def apply(self, words: Sequence[Value]) -> None:
         """Follow one block that is not a cycle."""
@@ -121,13 +121,13 @@ class ProgramState(State):
                 self.position[axis] = NAN if value is None else value
         elif MACHINE in codes:
             self.forget(given)
-        elif not codes & _NO_AXES and given:
+        elif not codes & NO_AXES and given:
             self._move(given)
         if any(letter in "@^" for letter, _ in words):
             self.forget()
         reached = [self.position[a] if a in given else NAN for a in range(3)]
         self._after(codes)
-        if self.absolute and not codes & (_NO_AXES | _UNSETTING - _FRAMES) and not self.odd_frame:
+        if self.absolute and not codes & (NO_AXES | _UNSETTING - _FRAMES) and not self.odd_frame:
             self.position = [r if math.isnan(p) else p for p, r in zip(self.position, reached, strict=True)]
 
     def _modes(self, words: Sequence[Value]) -> set[int]:

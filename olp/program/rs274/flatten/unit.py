@@ -138,6 +138,7 @@ class Frame:
     names: dict[str, float]
     start: int = 0
     repeats: int = 0
+    modal: bool = False
     taken: set[str] = field(default_factory=set)
     loops: dict[str, int] = field(default_factory=dict)
     dos: dict[str, int] = field(default_factory=dict)

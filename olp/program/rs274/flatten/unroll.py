@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from decimal import Decimal
 
 import numpy as np
@@ -56,6 +56,7 @@ def flatten(
     expand_cycles: bool = False,
     file: str | None = None,
     peck_clearance: float | None = None,
+    parameters: Mapping[str, float] | None = None,
     limit: int = UNROLLED_BYTES,
 ) -> Unrolled:
     """Plain blocks of a program, with the origin of each; see the module for what is kept.
@@ -64,17 +65,37 @@ def flatten(
     lower-case name. `block_delete`: blocks with `/` are left out (switch on), or executed (off). With
     None both positions of the switch have to give the same program. `expand_cycles` writes canned cycles as
     G0, G1, G4 and spindle blocks. `peck_clearance` (program units) is the clearance of G73 and G83, needed
-    where a parameter of the control sets it. `limit` is the work that a short program may cause, in bytes of
+    where a parameter of the control sets it. `parameters` are values that parameters such as "#100" have in
+    the control. `limit` is the work that a short program may cause, in bytes of
     visited blocks; a long one may cause `UNROLLED_PER_BYTE` for each of its bytes. Raises ProgramError with
     the line in the source, or with the line in the subprogram and its file.
     """
     strokes = stroke_budget(len(data))
-    writer = _Flattener(profile, strokes, expand_cycles=expand_cycles, peck_clearance=peck_clearance)
+    writer = _Flattener(
+        profile, strokes, expand_cycles=expand_cycles, peck_clearance=peck_clearance, parameters=parameters
+    )
     main = Unit(data, profile, file)
     visit = writer.block
     budget = Budget.of(len(data), least=limit, per_byte=UNROLLED_PER_BYTE, message=_TOO_LONG)
     Walk(main, writer.variables, subprograms, visit, block_delete=block_delete, budget=budget).run()
+    if not writer.moves:
+        _refuse_library(main)
     return Unrolled.of(writer.text(main), writer.origin(main))
+
+
+def _refuse_library(main: Unit) -> None:
+    """Raise ProgramError for a text of subprograms that calls none of them, and moves nothing by itself."""
+    names = [(index, flow.label) for index, flow in main.flows() if flow.keyword == "sub"]
+    if names:
+        index, first = names[0]
+        label = first if first.isdigit() else f"<{first}>"
+        one = len(names) == 1
+        what = f"subprogram {label}" if one else f"{len(names)} subprograms, the first is {label},"
+        raise ProgramError(
+            f"nothing moves here: the file defines {what} and calls none; give the program that calls it, "
+            f"which may be one line such as `o{label} call` in a file beside this one",
+            file=main.file, line=index + 1, code="OLP542",
+        )  # fmt: skip
 
 
 def number_text(value: float, letter: str, language: Language, exact: bool = False) -> str:
@@ -103,12 +124,15 @@ class _Flattener:
     """Writes the blocks that a walk visits and follows the state of the control."""
 
     def __init__(
-        self, profile: Profile, strokes: Budget, *, expand_cycles: bool, peck_clearance: float | None
-    ) -> None:
+        self, profile: Profile, strokes: Budget, *, expand_cycles: bool, peck_clearance: float | None,
+        parameters: Mapping[str, float] | None = None,
+    ) -> None:  # fmt: skip
         self.language, self.cycles = profile.language, profile.cycles
         self.state = ProgramState(profile)
-        self.variables = Variables(self.state)
+        self.variables = Variables(self.state, parameters)
         self.strokes = strokes
+        #: whether a block has words of axes
+        self.moves = False
         self.expand_cycles = expand_cycles
         self.peck_clearance = peck_clearance
         self._seen: set[tuple[int, int]] = set()
@@ -162,6 +186,7 @@ class _Flattener:
                 cut.add(i)
         kept = (i for i in range(len(line.words)) if i not in cut)
         active: list[Value] = [(values[i][0], self._tracked(line.words[i], values[i][1])) for i in kept]
+        self.moves |= any(letter in "xyz" for letter, _ in active)
         strokes: tuple[Stroke, ...] | None = None
         before = (self.state.absolute, self.state.path, tuple(self.state.position))
         if self.state.is_cycle(active):

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 
 from olp.core.errors import ProgramError
-from olp.program.rs274.codes import METRIC
+from olp.program.rs274.codes import INVERSE_TIME, METRIC
 from olp.program.rs274.flatten.expressions import filled
 from olp.program.rs274.flatten.lines import Line
 from olp.program.rs274.flatten.state import ProgramState
@@ -22,21 +22,42 @@ _DEBUG_SWITCH = 5599
 _MACRO_B_LOCAL = 33
 #: common variables are below this
 _MACRO_B_COMMON = 1000
+_FEED_MODES = {"_inverse_time": INVERSE_TIME, "_units_per_minute": 940, "_units_per_rev": 950}
 _ARGUMENT_NUMBERS = (1, 2, 3, 4, 5, 6, 7, 8, 9, 11, 13, *range(17, 27))
 _ARGUMENTS = dict(zip("abcijkdefhmqrstuvwxyz", _ARGUMENT_NUMBERS, strict=True))
 _NOT_ARGUMENTS = frozenset("glnop")
 _COUNT_ARGUMENTS = frozenset("dhmst")
 
 
-class Variables:
-    """Parameters of the run. Values that only the control knows raise ProgramError."""
+#: The value of a local variable that differs from control to control.
+UNSETTLED = float("nan")
 
-    def __init__(self, state: ProgramState) -> None:
+
+def _bare(name: str) -> str:
+    """A parameter as expressions name it: its number, or its name in small letters."""
+    text = name.lower().removeprefix("#").strip("<>")
+    return str(int(text)) if text.isdigit() else text.replace(" ", "")
+
+
+def _way_on(name: str) -> str:
+    return f'give it in the job file: [parameters] "{name}" = ...'
+
+
+class Variables:
+    """Parameters of the run. `given` are values that the control has, by "#number" or "#<name>"; they hold
+    until the program sets the parameter. Other values that only the control knows raise ProgramError."""
+
+    def __init__(self, state: ProgramState, given: Mapping[str, float] | None = None) -> None:
         self.state = state
+        names = {_bare(name): value for name, value in (given or {}).items()}
+        self.given = {int(name): value for name, value in names.items() if name.isdigit()}
+        self.given_names = {name: value for name, value in names.items() if not name.isdigit()}
         self.common: dict[int, float | None] = {}
         self.globals: dict[str, float] = {"_value": 0.0, "_value_returned": 0.0}
-        self.locals: dict[int, float | None] = {}
-        self.names: dict[str, float] = {}
+        most = _MACRO_B_LOCAL if state.profile.language.macro_b else _NGC_LOCAL
+        #: those of the program itself
+        self.locals: dict[int, float | None] = {i: v for i, v in self.given.items() if i <= most}
+        self.names = {name: value for name, value in self.given_names.items() if not name.startswith("_")}
 
     def number(self, index: int) -> float | None:
         if self.state.profile.language.macro_b:
@@ -46,12 +67,14 @@ class Variables:
         if index <= _NGC_LOCAL:
             return self.locals.get(index, 0.0)
         if index <= _NGC_FREE:
-            return self.common.get(index, 0.0)
+            return self.common.get(index, self.given.get(index, 0.0))
         if 5420 <= index <= 5422:
             return self.state.position_of(index - 5420)
+        if index in self.given:
+            return self.given[index]
         raise ProgramError(
             f"#{index} is kept by the control (probe result, offset, tool or position) and not known "
-            "off line; use a free parameter (#31 to #5060)",
+            f"off line; {_way_on(f'#{index}')}",
             code="OLP541",
         )
 
@@ -59,14 +82,24 @@ class Variables:
         if index == 0:
             return None
         if 0 < index <= _MACRO_B_LOCAL:
-            return self.locals.get(index)
+            value = self.locals.get(index)
+            if value is UNSETTLED:
+                raise ProgramError(
+                    f"#{index} was changed by the last call of this macro of G66, and whether the next call "
+                    "has its argument again is not known; assign it in the macro first",
+                    code="OLP541",
+                )
+            return value
         if index in self.common:
             return self.common[index]
         for base in (5001, 5041):
             if base <= index <= base + 2:
                 return self.state.position_of(index - base)
+        if index in self.given:
+            return self.given[index]
         raise ProgramError(
-            f"#{index} is not set before in the program and not known off line; assign it in the program",
+            f"#{index} is not set before in the program and not known off line; assign it there, or "
+            f"{_way_on(f'#{index}')}",
             code="OLP541",
         )
 
@@ -75,15 +108,19 @@ class Variables:
         if known is not None:
             return known()
         table = self.globals if name.startswith("_") else self.names
-        if name not in table:
-            raise ProgramError(
-                f"#<{name}> is not set before in the program and not known off line; "
-                "assign it in the program",
-                code="OLP541",
-            )
-        return table[name]
+        if name in table:
+            return table[name]
+        if name.startswith("_") and name in self.given_names:
+            return self.given_names[name]
+        raise ProgramError(
+            f"#<{name}> is not set before in the program and not known off line; assign it there, or "
+            f"{_way_on(f'#<{name}>')}",
+            code="OLP541",
+        )
 
     def exists(self, name: str) -> bool:
+        if name.startswith("_") and name in self.given_names:
+            return True
         if name.startswith(("_ini[", "_hal[")):
             raise ProgramError(f"#<{name}> belongs to the control and is not known off line", code="OLP541")
         table = self.globals if name.startswith("_") else self.names
@@ -99,6 +136,13 @@ class Variables:
             return lambda: float(state.absolute is (name == "_absolute"))
         if name == "_plane":
             return lambda: float(state.plane)
+        if name == "_motion_mode":
+            return lambda: float(self._set(state.motion, name))
+        if name in _FEED_MODES:
+            return lambda: float(state.feed_mode == _FEED_MODES[name])
+        if name in ("_spindle_on", "_spindle_cw"):
+            codes = (3,) if name == "_spindle_cw" else (3, 4)
+            return lambda: float(self._set(state.spindle, name) in codes)
         if name in ("_feed", "_rpm"):
             return lambda: float(self._set(state.feed if name == "_feed" else state.speed, name))
         return None

@@ -215,8 +215,12 @@ def test_the_count_stands_in_p_only_without_l_and_only_on_some_controls() -> Non
         ("G65", "OLP516", "G65 has no P word"),
         ("G65 P2.5", "OLP540", "the program number P is 2.5; expected an integer"),
         ("G65 P2 L1.5", "OLP540", "the repeat count L is 1.5; expected an integer"),
-        ("G66 P2", "OLP544", "G66 calls a macro after every move, which is not unrolled; call it with G65"),
-        ("G66.1 P2", "OLP544", "G66 calls a macro after every move, which is not unrolled; call it with G65"),
+        ("G66", "OLP516", "G66 has no P word"),
+        (
+            "G66.1 P2",
+            "OLP544",
+            "G66.1 calls a macro with the words of every block, which is not unrolled; call it with G65",
+        ),
     ],
 )
 def test_calls_that_are_refused(block: str, code: str, message: str) -> None:

@@ -6,11 +6,9 @@ import pytest
 from cases.unrolling import fanuc, lcnc, refused
 
 _BY_CONTROL = "and no plain block has the effect of setting it"
-_KEPT = (
-    "is kept by the control (probe result, offset, tool or position) and not known off line; use a free "
-    "parameter (#31 to #5060)"
-)
-_NOT_SET = "is not set before in the program and not known off line; assign it in the program"
+_WAY_ON = 'give it in the job file: [parameters] "{}" = ...'
+_KEPT = "is kept by the control (probe result, offset, tool or position) and not known off line"
+_NOT_SET = "is not set before in the program and not known off line; assign it there, or"
 
 
 def test_parameters_up_to_30_are_local_to_a_subprogram() -> None:
@@ -27,12 +25,13 @@ def test_parameters_up_to_30_are_local_to_a_subprogram() -> None:
     [
         ("X#0", "OLP540", "#0 is out of range; parameters are #1 to #5602"),
         ("X#5603", "OLP540", "#5603 is out of range; parameters are #1 to #5602"),
-        *((f"X#{n}", "OLP541", f"#{n} {_KEPT}") for n in (5061, 5419, 5423, 5599, 5602)),
+        *((f"X#{n}", "OLP541", f"#{n} {_KEPT}; {_WAY_ON.format(f'#{n}')}")
+          for n in (5061, 5419, 5423, 5599, 5602)),
         *((f"#{n}=1", "OLP544", f"#{n} belongs to the control, {_BY_CONTROL}") for n in (0, 5061, 5420,
           5600)),
         ("#<_x>=1", "OLP544", "#<_x> belongs to the control and cannot be set"),
-        ("X#<a>", "OLP541", f"#<a> {_NOT_SET}"),
-        ("#<a>=1\nX#<_a>", "OLP541", f"#<_a> {_NOT_SET}"),
+        ("X#<a>", "OLP541", f"#<a> {_NOT_SET} {_WAY_ON.format('#<a>')}"),
+        ("#<a>=1\nX#<_a>", "OLP541", f"#<_a> {_NOT_SET} {_WAY_ON.format('#<_a>')}"),
         ("X[EXISTS[#<_ini[AXIS]NAME>]]", "OLP541",
          "#<_ini[axis]name> belongs to the control and is not known off line"),
         ("X[EXISTS[#<_hal[pin]>]]", "OLP541",
@@ -60,7 +59,10 @@ def test_positions_by_number_and_by_name() -> None:
         ("G90", "_absolute", 1), ("G91", "_absolute", 0), ("G90", "_incremental", 0),
         ("G91", "_incremental", 1), ("", "_absolute", 1), ("", "_plane", 170), ("G18", "_plane", 180),
         ("F250", "_feed", 250), ("S900", "_rpm", 900), ("F1 S2", "_feed", 1), ("F1 S2", "_rpm", 2),
-        ("", "_value", 0), ("", "_value_returned", 0),
+        ("", "_value", 0), ("", "_value_returned", 0), ("G1", "_motion_mode", 10),
+        ("G94", "_units_per_minute", 1), ("G95", "_units_per_minute", 0), ("G93", "_inverse_time", 1),
+        ("G95", "_units_per_rev", 1), ("M3", "_spindle_on", 1), ("M4", "_spindle_cw", 0),
+        ("M5", "_spindle_on", 0),
     ],
 )  # fmt: skip
 def test_predefined_names(before: str, name: str, value: int) -> None:
@@ -89,6 +91,18 @@ def test_a_returned_value_is_0_again_after_a_call_without_one() -> None:
     assert lcnc(f"{source}o1 call\n{value}o2 call\n{value}M2\n") == "X3 Y1\nX0 Y0\nM2\n"
 
 
+def test_values_that_the_job_gives_hold_until_the_program_sets_them() -> None:
+    given = {"#5063": -1.5, "#3": 4.0, "#31": 5.0, "#<depth>": 6.0, "#<_hal[a.b-c]>": 7.0}
+    source = "X#5063 Y#3 Z#31 A#<depth> B#<_hal[a.b-c]>\n"
+    inside = "o1 sub\nX#3 Y#31 Z[EXISTS[#<depth>]]\no1 endsub\n"
+    assert lcnc(f"{inside}{source}#3=1 #31=2 #<depth>=3\n{source}o1 call\nM2\n", parameters=given) == (
+        "X-1.5 Y4 Z5 A6 B7\nX-1.5 Y1 Z2 A3 B7\nX0 Y2 Z0\nM2\n"
+    )
+    assert fanuc("O1\nG1 X#5 Y#500 Z#2001\nM30\n", parameters={"#5": 1, "#500": 2, "#02001": 3}) == (
+        "O1\nG1 X1. Y2. Z3.\nM30\n"
+    )
+
+
 # --- Macro B ----------------------------------------------------------------------------------------------
 
 
@@ -103,7 +117,8 @@ def test_variables_of_macro_b_are_local_up_to_33() -> None:
 @pytest.mark.parametrize(
     ("block", "code", "message"),
     [
-        *((f"X#{n}", "OLP541", f"#{n} {_NOT_SET}") for n in (34, 99, 100, 5000, 5004, 5040, 5044)),
+        *((f"X#{n}", "OLP541", f"#{n} {_NOT_SET} {_WAY_ON.format(f'#{n}')}")
+          for n in (34, 99, 100, 5000, 5004, 5040, 5044)),
         *((f"#{n}=1", "OLP544", f"#{n} belongs to the control, {_BY_CONTROL}")
           for n in (0, 34, 99, 1000, 2999, 3001, 3002, 3005)),
         ("#3000=1", "OLP544", "the program stops here with its own alarm (#3000)"),
