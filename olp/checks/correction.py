@@ -24,7 +24,13 @@ from olp.proof.measured import SHOWN
 from olp.proof.proof import Counts, Proof
 
 #: codes of remarks of readers
-_REMARKS = {"thermal": "OLP412", "arcs": "OLP413", "transform": "OLP414", "scan": "OLP415"}
+_REMARKS = {
+    "thermal": "OLP412",
+    "arcs": "OLP413",
+    "transform": "OLP414",
+    "scan": "OLP415",
+    "chords": "OLP416",
+}
 #: blocks that the report lists
 _WORST = 5
 

@@ -30,6 +30,12 @@ class PointWriter(Writer):
         stated = self.statements.restated
         self._restated = np.array(sorted(stated), np.int64)
         self._relative = np.array([stated[m] for m in self._restated.tolist()], bool)
+        chords = self.statements.chords
+        self._chords = np.array([(c.first, c.last, c.bare) for c in chords], np.int64).reshape(-1, 3)
+        #: chords without a statement of their own
+        self.chorded = np.concatenate(
+            [np.arange(c.first, c.bare + 1) for c in chords] or [np.zeros(0, np.int64)]
+        )
         self.turn = None
         if any(f.turn is not None for f in frames):
             self.turn = np.array([np.eye(3) if f.turn is None else f.turn for f in frames])
@@ -39,6 +45,10 @@ class PointWriter(Writer):
         self.fewest = np.array(
             [[max(self._least(axis, f.unit_mm), finest) for axis in range(3)] for f in frames], np.int64
         ).reshape(-1, 3)
+
+    def template(self, move: int) -> tuple[bytes, bytes, bytes, bytes]:
+        """The statement of a move without its three numbers: the text before, between and behind them."""
+        raise NotImplementedError
 
     def _least(self, axis: int, unit_mm: float) -> int:
         """The fewest decimals that the machine needs."""
@@ -65,7 +75,8 @@ class PointWriter(Writer):
             np.rint(word / POW10[np.maximum(-more, 0)]).astype(np.int64),
         )  # fmt: skip
         counting = (rows.flag & np.uint8(Flag.INCREMENTAL)) != 0
-        held = np.asarray(raw.any(axis=1) | (self.program.slot[move] < 0).all(axis=1), bool)
+        without = (self.program.slot[move] < 0).all(axis=1) & ~np.isin(move, self.chorded)
+        held = np.asarray(raw.any(axis=1) | without, bool)
         written = np.where(unknown, local, mantissa / POW10[decimals])
         # a number that is kept is the program's own, to the last bit
         nominal = self.path.end_mm[move]
@@ -76,21 +87,21 @@ class PointWriter(Writer):
         rows.write[:] = ~same & ~held[:, None]
         tails = ~rows.head & ~held
         rows.write[tails] = True
-        self._restate(rows, wanted, decimals, held)
+        alike = (wanted == np.rint(self.local(nominal, frame) * POW10[decimals])).all(axis=1)
+        self._restate(rows, alike, held)
+        self._keep_arcs(rows, alike)
         changes = np.flatnonzero(counting[1:] != counting[:-1]) + 1
         for a, b in pairwise([0, *changes.tolist(), len(move)]):
             if counting[a]:
                 self._counted(rows, a, b, local, word, own, given, held)
 
-    def _restate(self, rows: Rows, wanted: Array, decimals: Index, held: Mask) -> None:
+    def _restate(self, rows: Rows, alike: Mask, held: Mask) -> None:
         """Points that their statements do not state as x, y, z: all three are written, or none."""
         if not self._restated.size:
             return
         move = rows.move
         known = np.minimum(np.searchsorted(self._restated, move), len(self._restated) - 1)
         which = (self._restated[known] == move) & rows.head & ~held
-        nominal = self.path.end_mm[move]
-        alike = (wanted == np.rint(self.local(nominal, self.path.frame[move]) * POW10[decimals])).all(axis=1)
         for i in np.flatnonzero(which).tolist():
             same = bool(alike[i])
             if same and self._relative[known[i]]:
@@ -100,7 +111,20 @@ class PointWriter(Writer):
                 same = bool((before == start).all())
             rows.write[i] = not same
             if same:
-                rows.emitted[i] = nominal[i]
+                rows.emitted[i] = self.path.end_mm[move[i]]
+
+    def _keep_arcs(self, rows: Rows, alike: Mask) -> None:
+        """Arcs that are read as chords: all chords are written, or the statement of the arc is kept."""
+        low, high = np.searchsorted(self._chords[:, 0], (rows.move[0], rows.move[-1] + 1))
+        for first, last, bare in self._chords[low:high].tolist():
+            a, b, c = np.searchsorted(rows.move, (first, bare + 1, last + 1)).tolist()
+            before = rows.emitted[a - 1] if a else rows.entry
+            start = self.path.starts_mm(first, first + 1)[0]
+            kept = bool(alike[a:b].all() and rows.head[a:b].all() and (before == start).all())
+            kept = kept and not rows.write[b:c].any()
+            rows.write[a:b] = not kept
+            if kept:
+                rows.emitted[a:b] = self.path.end_mm[rows.move[a:b]]
 
     def _middled(self, rows: Rows, command: Array) -> Array:
         """Commands with the positions of holes corrected as the middle of their strokes needs it."""

@@ -8,6 +8,7 @@ import numpy as np
 from olp.compensation.point_writer import PointWriter
 from olp.compensation.rows import Rows
 from olp.compensation.statement_arcs import ROW, arc_edits
+from olp.compensation.statement_chords import chord_edits
 from olp.compensation.wrapping import carded, wrapped
 from olp.compensation.writer import Task
 from olp.core.arrays import Index
@@ -22,18 +23,21 @@ class StatementWriter(PointWriter):
     def __init__(self, task: Task) -> None:
         super().__init__(task)
         self._broken = np.array(sorted(self.statements.broken), np.int64)
+        self._begins = {arc.first: arc.begin for arc in self.statements.chords}
         if self.statements.cards:
             self.stamp = self.stamp.ljust(self.statements.width + 8)
 
     def _start_of(self, move: int) -> int:
         """What states an arc comes before its end point, and belongs to the move too."""
         arc = self.statements.arcs.get(move)
-        begin = super()._start_of(move)
+        begin = min(super()._start_of(move), self._begins.get(move, len(self.program.data)))
         return begin if arc is None else min(begin, arc.begin)
 
     def _rewritten(self, rows: Rows, begin: int, end: int) -> bytes | None:
         self._digits(rows)
         edits = [*self._changes(rows), *self._insertions(rows), *arc_edits(self, rows)]
+        if self.chorded.size:
+            edits += chord_edits(self, rows)
         text = self._spliced(edits, begin, end)
         if text is None:
             return None
@@ -81,14 +85,15 @@ class StatementWriter(PointWriter):
 
     def _insertions(self, rows: Rows) -> list[Edits]:
         """Later parts of straight moves: the statement again, with other numbers."""
-        tails = np.flatnonzero(~rows.head & rows.write.any(axis=1) & (~rows.arc | rows.take_up))
+        some = ~rows.head & rows.write.any(axis=1) & (~rows.arc | rows.take_up)
+        tails = np.flatnonzero(some & ~np.isin(rows.move, self.chorded))
         if not tails.size:
             return []
         moves, which = np.unique(rows.move[tails], return_inverse=True)
         pieces = np.zeros((len(moves), 4), np.int64)
         place = np.zeros((len(moves), 2), np.int64)
         for i, move in enumerate(moves.tolist()):
-            lead, between, last, trail = self._template(move)
+            lead, between, last, trail = self.template(move)
             eol = self.program.eol(int(self.path.line[move]))
             pieces[i] = [self.prefixes(p) for p in (eol + lead, between, last, trail)]
             place[i] = self.statements.end[move], self._start_of(move)
@@ -126,7 +131,7 @@ class StatementWriter(PointWriter):
         self.tally.inserted_blocks += len(tails)
         return edits
 
-    def _template(self, move: int) -> tuple[bytes, bytes, bytes, bytes]:
+    def template(self, move: int) -> tuple[bytes, bytes, bytes, bytes]:
         """The statement of a move without its three numbers: the text before, between and behind them.
         A comment at its end, and marks of continuation inside its words, are left out."""
         data, statements = self.program.data, self.statements

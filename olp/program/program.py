@@ -70,6 +70,23 @@ class ArcText:
     long: tuple[int, int] | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class ChordText:
+    """An arc in no plane of two axes: its chords are the moves `first`..`last`, and the bytes `begin`..`end`
+    state it. The last chord has a statement of its own unless these bytes are the `whole` arc."""
+
+    first: int
+    last: int
+    begin: int
+    end: int
+    whole: bool
+
+    @property
+    def bare(self) -> int:
+        """The last chord without a statement of its own."""
+        return self.last if self.whole else self.last - 1
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class StatedFeeds:
     """(k,) feeds as stated: the first `move` of each, its `line`, and the `word` of its number, -1
@@ -93,8 +110,8 @@ class Statements:
     longer than `width` bytes (0: no limit). `cards` have their numbers after that width, in the last eight
     columns. `strokes` (k, 2): the moves to the hole and to its bottom. `restated` are moves whose statements
     have other numbers than x, y, z, so that all three replace them where one changes: true where the
-    statement counts from the point before. `decimal` is the decimal mark of texts
-    whose numbers keep their own form and column, empty for others.
+    statement counts from the point before. `chords` are arcs that are read as chords. `decimal` is the
+    decimal mark of texts whose numbers keep their own form and column, empty for others.
     """
 
     begin: Small
@@ -112,6 +129,7 @@ class Statements:
     width: int = 0
     decimal: bytes = b""
     restated: Mapping[int, bool] = field(default_factory=dict)
+    chords: tuple[ChordText, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,7 +13,7 @@ from olp.core.toolpath import Flag, Frame, Kind
 from olp.core.values import dataclass
 from olp.program.dialect import Dialect
 from olp.program.path_columns import PathColumns
-from olp.program.program import ArcSlots, ArcText, Program, StatedFeeds, Statements, Words
+from olp.program.program import ArcSlots, ArcText, ChordText, Program, StatedFeeds, Statements, Words
 from olp.program.text.statements import Chunk, Field, Statement, is_cards
 
 #: Powers of ten by their exponent: those of the decimals of a number.
@@ -73,6 +73,7 @@ class StatementCollector(PathColumns):
         self.broken: dict[int, bytes] = {}
         self.strokes: list[tuple[int, int]] = []
         self.restated: dict[int, bool] = {}
+        self.chords: list[ChordText] = []
         self.remarks: dict[str, tuple[int, str]] = {}
         self._feeds: list[tuple[int, float, int, int]] = [(0, float("nan"), 0, -1)]
         self.pauses: list[tuple[int, float]] = []
@@ -227,7 +228,7 @@ class StatementCollector(PathColumns):
             begin=take("begin_byte", np.int32), end=take("end_byte", np.int32),
             feed_mm_s=self._feed(path.kind, path.flag), rest=rest, dwell_s=dwell, arcs=self.arcs,
             broken=self.broken, strokes=np.array(self.strokes, np.int64).reshape(-1, 2),
-            feeds=feeds, rapid=rapid, restated=self.restated,
+            feeds=feeds, rapid=rapid, restated=self.restated, chords=tuple(self.chords),
             cards=cards,
             width=72 if cards else next((w for w in _WIDTHS if longest <= w), 0),
         )  # fmt: skip

@@ -374,6 +374,10 @@ CASES: dict[str, tuple[Call, Call]] = {
         ),
         Call(b"P(A)=PATH/LINE,CART,0,0,0,9,0,0\nSCNMOD/ON\n" + PROBED, DMIS, tables=MCS, controller="dmis"),
     ),
+    "OLP416": (
+        Call(APT + b"GOTO/10,0,0\nCIRCLE/0,0,0,0,-.6,.8,10\nGOTO/0,8,6\n", APT, controller="apt"),
+        Call(APT + b"GOTO/10,0,0\nCIRCLE/0,0,0,0,0,1,10\nGOTO/0,10,0\n", APT, controller="apt"),
+    ),
     "OLP420": (Call(tables=tool(151.1), **total_map()), Call(tables=tool(150.9), **total_map())),
     "OLP421": (
         Call(b"G1 X100\n(olp payload 30)\nG1 X90\n", **load(0.11)),

@@ -160,4 +160,14 @@ RULES = (
         "Correct what the scan reports: olp results. Or measure with PTMEAS points.",
         "`PAMEAS/DISTANCE,0.5,P(PATH1)`.",
     ),
+    _rule(
+        "OLP416",
+        "arcs read as chords",
+        Severity.INFO,
+        "An arc in no plane of two axes of the machine is read as chords within 0.2 um of it. Where the "
+        "correction changes it, these chords are written as GOTO statements in its place.",
+        "Nothing has to be done. Where the program becomes too long for the post-processor, have the CAM "
+        "system write such arcs as points.",
+        "`CIRCLE/10,0,10,0,0.6,0.8,10`.",
+    ),
 )

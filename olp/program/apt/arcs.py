@@ -28,8 +28,8 @@ from olp.program.text.statements import Field, Statement
 _GROUP = re.compile(rb"(?i)\(\s*(CIRCLE|CYLNDR|LINE)\s*/([^()]*)\)")
 _AGAIN = re.compile(rb"(?i)2\s*,\s*INTOF\s*,")
 _TOKEN = re.compile(rb"[^\s,]+")
-#: a normal is an axis of the machine where the sine between them is below this
-_SQUARE = 1e-6
+#: a normal is an axis of the machine where one less the cosine between them is at most this
+LEAN = 0.5e-12
 _N = rb"\s*([+-]?(?:\d{1,12}\.?\d{0,12}|\.\d{1,12}))\s*"
 #: CIRCLE of six numbers, seven, or more
 _PLAIN = re.compile(
@@ -202,8 +202,8 @@ def resolved(
     forms: Sequence[ArcForm], start: Array, end: Array, line: Index, unit_mm: float, offset: Array,
     turn: Array | None,
 ) -> Resolved:  # fmt: skip
-    """Arcs on the machine, from points `start` to `end` (m, 3). Raises ProgramError for an arc that is not in
-    a plane of two axes, and for one whose words contradict each other."""
+    """Arcs on the machine, from points `start` to `end` (m, 3), whose normals are axes of it. Raises
+    ProgramError for an arc without a normal, and for one whose words contradict each other."""
     centre = np.array([f.centre for f in forms]) * unit_mm
     normal = np.array([f.normal for f in forms])
     if turn is not None:
@@ -213,12 +213,11 @@ def resolved(
     axis = np.abs(normal).argmax(axis=1)
     rows = np.arange(len(forms))
     along = normal[rows, axis]
-    for i in np.flatnonzero(~(size - np.abs(along) <= 0.5 * _SQUARE**2 * size) | ~(size > 0)).tolist():
+    for i in np.flatnonzero(~(size > 0)).tolist():
         raise ProgramError(
-            "an arc is not in a plane of two axes of the machine, which is not read; "
-            "have the CAM system write it as GOTOs",
+            "the normal of an arc has no length; expected the direction about which it turns",
             line=forms[i].line,
-            code="OLP512",
+            code="OLP516",
         )
     plane = _PLANE_OF[axis]
     axes = np.array(PLANES)[plane]

@@ -14,6 +14,7 @@ from olp.core.toolpath import CutterCompensation, Flag, Kind
 from olp.core.units import MM_PER_INCH
 from olp.core.values import dataclass
 from olp.program.apt.arcs import ArcForm, circle, directed, movarc
+from olp.program.apt.chords import leaning
 from olp.program.apt.controls import changes_tool, check_prefun, check_set, check_turn, numbers_of
 from olp.program.apt.transforms import NOTHING, Rigid, rigid
 from olp.program.dialect import Dialect, Options
@@ -68,6 +69,11 @@ class Events:
         self.transform: Rigid = NOTHING
         self.shift: Vector = ZERO
         self.skipped = 0
+        #: whether an arc may lie in no plane of two axes
+        self.may_lean = any(
+            any(work.rotation_deg)
+            for work in (*setup.machine.work_offsets.values(), *setup.job.work_offsets.values())
+        )
         self.home: list[float] | None = None
         self.compensation: CutterCompensation | None = None
         self.cycle: Cycle | None = None
@@ -100,7 +106,7 @@ class Events:
 
     def _move(self, row: int) -> int:
         """The number of the move that a point becomes."""
-        if self.cycle is not None:
+        if self.cycle is not None or any(arc_row < row for arc_row, _ in self.arcs if self.may_lean):
             self._resolve(row)
         return self.collector.moves + row - self.done
 
@@ -181,7 +187,7 @@ class Events:
                 line=statement.line,
                 code="OLP532",
             )
-        self.arcs.append((row, form))
+        self._put_arc(row, form)
 
     def _tlon(self, statement: Statement, row: int) -> None:
         if self.direction is None:
@@ -192,6 +198,10 @@ class Events:
             )
         form = directed(self.driven.pop(statement.line), self.direction, self.collector)
         self.direction = None
+        self._put_arc(row, form)
+
+    def _put_arc(self, row: int, form: ArcForm) -> None:
+        self.may_lean |= bool(leaning([form], None)[0])
         self.arcs.append((row, form))
 
     def _indirv(self, statement: Statement, row: int) -> None:
@@ -304,6 +314,7 @@ class Events:
             self.transform = NOTHING
             return
         self.transform = rigid(words, statement)
+        self.may_lean |= self.transform.turn is not None
         self._transformed(statement)
 
     def _trans(self, statement: Statement, row: int) -> None:

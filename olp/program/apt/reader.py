@@ -12,15 +12,15 @@ from bisect import bisect_left
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import ProgramError
 from olp.core.machine import Setup
 from olp.core.progress import Progress
 from olp.core.toolpath import Flag, Kind
-from olp.program.apt.arcs import ArcForm, Resolved, joints, resolved, tlon
-from olp.program.apt.events import UNIT, Cycle, Events, axis_of
+from olp.program.apt.arc_moves import ArcMoves, Part
+from olp.program.apt.arcs import tlon
+from olp.program.apt.events import UNIT, Cycle, axis_of
 from olp.program.apt.table import FREE, TABLE
 from olp.program.dialect import Dialect, Options, Support
 from olp.program.frames import UP
@@ -33,8 +33,6 @@ NAN = float("nan")
 NOT_READ = "OLP512"
 _FREE = re.compile(rb"(?i)(?:" + b"|".join(FREE) + rb")(?![A-Z])")
 _CREO = re.compile(rb"\$\$->\s*([A-Z_]+)\s*/?")
-#: so many joints in the opposite direction are no coincidence
-_SEVERAL = 3
 _RAPID = frozenset((b"RAPID", b"RAPID/"))
 
 
@@ -44,7 +42,7 @@ def read(data: bytes, setup: Setup, dialect: Dialect, options: Options, *, words
     return _Reader(data, setup, dialect, options, words).run(options.tell)
 
 
-class _Reader(Events):
+class _Reader(ArcMoves):
     """Reads one program."""
 
     def run(self, tell: Progress) -> Program:
@@ -229,60 +227,11 @@ class _Reader(Events):
                 )
             self._holes(self.cycle, line, frame, end, slot, begin, stop, up)
         else:
+            path = Part(kind, flag, line, frame, end, slot, begin, stop)
             if arcs:
-                rows = np.array([row for row, _ in arcs])
-                if (kind[rows] == Kind.RAPID).any() or (flag[rows] & ~np.uint8(Flag.INCREMENTAL)).any():
-                    bad = rows[(kind[rows] == Kind.RAPID) | (flag[rows] != 0)][0]
-                    raise ProgramError(
-                        "an arc is at rapid, or its tool axis changes, which is not read",
-                        line=int(line[bad]),
-                        code="OLP518",
-                    )
-                start = np.where(rows[:, None] > 0, end[np.maximum(rows - 1, 0)], np.array(self.position))
-                geometry = resolved(
-                    [form for _, form in arcs], start, end[rows], line[rows], self.unit_mm,
-                    offset if offset.ndim == 1 else offset[rows], turn,
-                )  # fmt: skip
-                self._check_turns(arcs, geometry, start, end, rows, kind)
-                kind[rows] = np.where(geometry.sweep > 0, Kind.ARC_CCW, Kind.ARC_CW)
-                self.collector.put_arcs(
-                    rows + self.collector.moves, geometry.centre, geometry.plane, geometry.sweep
-                )
-                for row, form in arcs:
-                    self.collector.arcs[row + self.collector.moves] = form.text
-            self.collector.put_stated_moves(kind, flag, line, frame, end, slot, begin, stop)
+                path = self._with_arcs(arcs, path, offset, turn)
+            self.collector.put_stated_moves(*path)
         self.position = end[-1].tolist()
-
-    def _check_turns(
-        self, arcs: Sequence[tuple[int, ArcForm]], geometry: Resolved, start: Array, end: Array, rows: Index,
-        kind: npt.NDArray[np.uint8],
-    ) -> None:  # fmt: skip
-        """What the joints of arcs with straight moves before them show of the direction of turning."""
-        before = np.where(rows[:, None] > 1, end[np.maximum(rows - 2, 0)], np.array(self.position))
-        straight = (rows > 0) & (kind[np.maximum(rows - 1, 0)] == Kind.LINE) & ~np.isin(rows - 1, rows)
-        directions = np.where(straight, joints(geometry, start, before), 0)
-        for (_, form), direction in zip(arcs, directions.tolist(), strict=True):
-            if form.begins is not None or form.angle_rad is not None:
-                continue
-            if not form.confirmed and self.unconfirmed is None:
-                self.unconfirmed = form.line
-            if direction > 0:
-                self.onward += 1
-            elif direction < 0:
-                self.back.append(form.line)
-
-    def _judge_turns(self) -> None:
-        """Refuse a program whose arcs turn back where they should go on; remark one that shows neither."""
-        if len(self.back) >= _SEVERAL and len(self.back) > 2 * self.onward:
-            raise ProgramError(
-                "the arc begins in the direction opposite to the move before it: its normal seems to be "
-                "left-handed, which is not read",
-                line=self.back[0],
-                code="OLP530",
-            )
-        doubt = self.unconfirmed if self.unconfirmed is not None else next(iter(self.back), None)
-        if doubt is not None and not self.onward:
-            self.collector.remarks["arcs"] = (doubt, "arcs are taken as right-handed about their normals")
 
     def _frames(self, points: Points, part: slice) -> tuple[Index, Mask, Array]:
         """Of each point: the number of its frame, whether the tool turns on the move to it, and the direction

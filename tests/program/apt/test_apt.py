@@ -301,7 +301,11 @@ def test_tools_frames_and_offsets_have_to_be_defined(zero: Path) -> None:
         ("COPY/1,TRANSL,10,0,0,2\n", 1, "COPY"),
         ("FROBNICATE/1\n", 1, "FROBNICATE"),
         ("GOTO/0,0,0\nINSERT/G0 G53 Z0\n", 2, "INSERT"),
-        ("GOTO/1,0,0\nCIRCLE/0,0,0,0,.6,.8,1\nGOTO/0,1,0\n", 2, "not in a plane of two axes"),
+        (
+            "GOTO/1,0,0\nCIRCLE/0,0,0,0,.6,.8,1\nGOTO/0,1,0\n",
+            2,
+            "the radius of an arc is 1.0000 mm at its start",
+        ),
         ("GOTO/1,0,0\nCIRCLE/0,0,0,0,0,1,5\nGOTO/0,1,0\n", 2, "radius"),
         ("GOTO/1,0,0\nCIRCLE/0,0,0,0,0,1\nGOTO/0,2,0\n", 2, "radius"),
         ("GOTO/1,0,0\nMOVARC/0,0,0,0,0,1,1,ANGLE,270\nGOTO/0,1,0\n", 2, "angle"),
