@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from olp.compensation.rows import Rows
 from olp.compensation.writer import Writer
-from olp.core.arrays import Index, Mask, distinct
+from olp.core.arrays import Index, Mask, distinct, is_in
 from olp.core.errors import ProgramError
 from olp.core.toolpath import Flag
 from olp.program.rs274.codes import (
@@ -174,7 +174,7 @@ def _end_words(writer: Writer, rows: Rows, tails: Index, edits: EditList) -> Non
     first, last = int(words.first_word[lines[0] - 1]), int(words.first_word[lines[-1]])
     part = slice(first, last)
     ending = (words.letter[part] == ord("M")) & (words.decimals[part] == 0)
-    index = first + np.flatnonzero(ending & np.isin(words.mantissa[part], list(_END_M)))
+    index = first + np.flatnonzero(ending & is_in(words.mantissa[part], list(_END_M)))
     line = np.searchsorted(words.first_word, index, "right")
     for i, number in zip(index.tolist(), line.tolist(), strict=True):
         if lines[min(np.searchsorted(lines, number), len(lines) - 1)] != number:

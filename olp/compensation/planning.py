@@ -18,7 +18,7 @@ from olp.compensation.invert import invert
 from olp.compensation.lines import Cuts, subdivide_lines
 from olp.compensation.plan import Limits, Plan, targets, zero_shifts
 from olp.compensation.reversal import Carried, Reversal, carry_play
-from olp.core.arrays import Array, Index, Mask, distinct
+from olp.core.arrays import Array, Index, Mask, distinct, is_in
 from olp.core.errors import OutsideBox, ProgramError
 from olp.core.progress import Progress, part, silent
 from olp.core.toolpath import Flag, Kind, Toolpath
@@ -90,7 +90,7 @@ class Planning:
             whole |= contour.whole
             uncorrected = distinct(np.concatenate((uncorrected, contour.beside)))
         kinds = (Kind.LINE, Kind.RAPID) if limits.split_rapids else (Kind.LINE,)
-        free = np.isin(path.kind, kinds) & ~whole
+        free = is_in(path.kind, kinds) & ~whole
         # behind a `/` block the start depends on the switch, so no cut can be right for both
         free[1:] &= ~(((path.flag[:-1] & ~path.flag[1:]) & np.uint8(Flag.DELETED)) != 0)
         cuts_line = subdivide_lines(path, model, begin, target, free, chord)

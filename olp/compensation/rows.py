@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from olp.compensation.digits import Digits
 from olp.compensation.plan import Plan
-from olp.core.arrays import Array, Index, Mask
+from olp.core.arrays import Array, Index, Mask, is_in
 from olp.core.toolpath import Kind, Toolpath
 from olp.core.values import dataclass
 
@@ -47,7 +47,7 @@ class Rows:
             head=np.concatenate(([True], move[1:] != move[:-1])),
             before=np.zeros(count, bool),
             take_up=plan.take_up[first:last],
-            arc=np.isin(path.kind[move], (Kind.ARC_CW, Kind.ARC_CCW)),
+            arc=is_in(path.kind[move], (Kind.ARC_CW, Kind.ARC_CCW)),
             emitted=np.empty((count, 3)),
             entry=entry,
             write=np.zeros((count, 3), bool),

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from olp.core.arrays import is_in
 from olp.core.machine import Vector
 from olp.core.toolpath import Flag
 from olp.core.units import MM_PER_INCH
@@ -63,7 +64,7 @@ class Style:
                 leading_zero = False
         index = np.arange(1, min(len(words.start), 4000))
         inner = index[words.number[index - 1] >= 0]
-        inner = inner[~np.isin(inner, words.first_word[:4001])]
+        inner = inner[~is_in(inner, words.first_word[:4001])]
         spaced = int(inner.size == 0 or np.mean(text[words.start[inner] - 1] == 32) >= 0.5)
         bare = [3 if step >= 0.0005 else 4 for step in increments_mm]
         return Style(

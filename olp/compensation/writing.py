@@ -12,7 +12,7 @@ from olp.compensation.digits import INT10
 from olp.compensation.plan import Plan
 from olp.compensation.tally import Tally
 from olp.compensation.writer import Task, Writer
-from olp.core.arrays import Index, distinct
+from olp.core.arrays import Index, distinct, is_in
 from olp.core.progress import Progress, part, silent
 from olp.core.units import MM_PER_INCH
 from olp.core.values import dataclass
@@ -70,7 +70,7 @@ def _plain(program: Program, plan: Plan) -> bool:
     if words is None or statements is None or not len(words.start):
         return False
     split = distinct(plan.move[1:][plan.move[1:] == plan.move[:-1]])
-    if not np.isin(statements.end[split], program.line_end).all():
+    if not is_in(statements.end[split], program.line_end).all():
         return False
     units = {frame.unit_mm for frame in program.toolpath.frames}
     if statements.decimal != b"." or not units <= {1.0, MM_PER_INCH}:

@@ -1,11 +1,13 @@
 """Types of the arrays that values hold, and what NumPy does not do without its masked arrays.
 
-Those are a tenth of NumPy's start: `np.unique`, `np.union1d` and `np.median` load them.
+Those are a tenth of NumPy's start: `np.unique`, `np.union1d`, `np.median` and, for short arrays, `np.isin`
+load them.
 """
 
 from __future__ import annotations
 
-from typing import TypeVar
+from collections.abc import Collection
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +15,9 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
+
+#: So many values are compared one by one.
+_FEW = 12
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 
@@ -31,6 +36,17 @@ def distinct(values: npt.NDArray[Scalar]) -> npt.NDArray[Scalar]:
     first = np.ones(len(ordered), bool)
     first[1:] = ordered[1:] != ordered[:-1]
     return ordered[first]
+
+
+def is_in(values: npt.NDArray[Scalar], some: Collection[float] | npt.NDArray[Any]) -> Mask:
+    """Whether each value, of any shape, is one of `some`, as `np.isin` says."""
+    wanted = np.asarray(list(some) if isinstance(some, set | frozenset) else some).ravel()
+    if len(wanted) > _FEW:
+        return np.isin(values, wanted)
+    found = np.zeros(np.shape(values), bool)
+    for one in wanted:
+        found |= values == one
+    return found
 
 
 def distinct_rows(rows: npt.NDArray[Scalar]) -> npt.NDArray[Scalar]:

@@ -1,9 +1,9 @@
-"""Value types: dataclasses with slots, whose constructor is written when the first value is made.
+"""Value types: dataclasses with slots, whose constructor is written when it has made a few values.
 
 The standard decorator compiles up to six methods per class while a module is imported, half a millisecond
 each class, and a run makes values of a few classes only. Here all classes share what can be shared, and only
-the constructor is compiled. `dataclasses.fields`, `replace` and the like work as on any dataclass, and type
-checkers see the standard decorator.
+the constructor is compiled, where a class has more than a few values. `dataclasses.fields`, `replace` and the
+like work as on any dataclass, and type checkers see the standard decorator.
 """
 
 from __future__ import annotations
@@ -15,6 +15,9 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any, TypeVar
 
 T = TypeVar("T")
+
+#: So many values of a class are made without its constructor: to compile that takes as long as some twenty.
+_FEW = 6
 
 _LOCK = threading.RLock()
 _FIELDS = "__dataclass_fields__"
@@ -78,6 +81,33 @@ def _constructor(cls: type) -> Callable[..., None]:
     return made
 
 
+def _filled(self: Any, args: tuple[Any, ...], words: dict[str, Any]) -> bool:
+    """Gives a value its fields as the constructor does; False, and nothing done, where a call does not fit:
+    the constructor says why."""
+    declared = _declared(type(self))
+    positional = [name for name, (field, kw_only) in declared.items() if field.init and not kw_only]
+    given = dict(zip(positional, args, strict=False)) | words
+    if len(given) < len(args) + len(words):
+        return False
+    values: dict[str, Any] = {}
+    for name, (field, _) in declared.items():
+        if field.init and name in given:
+            values[name] = given.pop(name)
+        elif field.default is not dataclasses.MISSING:
+            values[name] = field.default
+        elif field.default_factory is not dataclasses.MISSING:
+            values[name] = field.default_factory()
+        elif field.init:
+            return False
+    if given:
+        return False
+    for name, value in values.items():
+        object.__setattr__(self, name, value)
+    if hasattr(self, "__post_init__"):
+        self.__post_init__()
+    return True
+
+
 def _state(self: Any) -> tuple[Any, ...]:
     return tuple([getattr(self, field.name) for field in dataclasses.fields(self)])
 
@@ -135,15 +165,22 @@ def _value_type(
         def complete() -> None:
             with _LOCK:
                 if _FIELDS not in vars(cls):  # no other thread was first
+                    # else the standard library writes one, from the signature
+                    cls.__doc__ = cls.__doc__ or cls.__name__
                     dataclasses.dataclass(init=False, repr=False, eq=False, frozen=frozen, kw_only=kw_only)(
                         cls
                     )
                     for name in (_FIELDS, "__dataclass_params__", "__match_args__"):
                         setattr(made, name, vars(cls)[name])
 
+        made_values = 0
+
         def __init__(self: Any, *args: Any, **words: Any) -> None:
-            made.__init__ = _constructor(made)  # type: ignore[method-assign]
-            self.__init__(*args, **words)
+            nonlocal made_values
+            made_values += 1
+            if made_values > _FEW or not _filled(self, args, words):
+                made.__init__ = _constructor(made)  # type: ignore[method-assign]
+                self.__init__(*args, **words)
 
         stated = _stated(cls)
         own = {"__init__": __init__, _STATED: (stated, kw_only), _FIELDS: _Fields(complete)}

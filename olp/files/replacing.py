@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import os
 import re
-import secrets
 import stat
 import time
 from collections.abc import Callable, Iterable
@@ -41,7 +40,7 @@ class Replacement:
         self.target = target
         self.final = Path(os.path.realpath(target))
         self._before = _stamp(self.final)
-        token = f"{os.getpid()}-{secrets.token_hex(4)}"
+        token = f"{os.getpid()}-{os.urandom(4).hex()}"
         self._temporary = self.final.with_name(f"{_prefix(self.final)}{token}.tmp")
 
     def write(self, data: bytes | Iterable[bytes]) -> None:

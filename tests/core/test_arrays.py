@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from olp.core.arrays import distinct, distinct_rows, median
+from olp.core.arrays import distinct, distinct_rows, is_in, median
 
 finite = st.one_of(st.sampled_from([0.0, -0.0, 1.0]), st.floats(-1e6, 1e6))
 numbers = arrays.arrays(np.float64, st.integers(1, 40), elements=finite)
@@ -26,6 +26,13 @@ def test_distinct_values_are_those_of_numpy(values: npt.NDArray[np.generic]) -> 
 
 def test_nothing_has_no_distinct_values() -> None:
     assert distinct(np.zeros(0, np.int64)).shape == (0,)
+
+
+@given(whole, arrays.arrays(np.int64, st.integers(0, 30), elements=st.integers(-3, 300)))
+def test_membership_is_that_of_numpy(values: npt.NDArray[np.int64], some: npt.NDArray[np.int64]) -> None:
+    judged = np.isin(values, some)
+    for given_as in (some, some.tolist(), set(some.tolist())):
+        assert np.array_equal(is_in(values, given_as), judged)
 
 
 @given(rows)

@@ -195,7 +195,14 @@ def test_threads_that_ask_at_once_get_the_same_fields() -> None:
     assert seen == [6] * 8
 
 
-def test_a_class_compiles_nothing_until_its_first_value(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture(autouse=True, params=[0, 6], ids=["constructor", "first values"])
+def few(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """All that is true of values that a constructor made is true of the first ones too."""
+    monkeypatch.setattr(values, "_FEW", request.param)
+
+
+def test_a_class_compiles_nothing_until_it_has_a_few_values(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(values, "_FEW", 2)
     compiled: list[str] = []
     write = values._constructor
     monkeypatch.setattr(values, "_constructor", lambda made: compiled.append(made.__name__) or write(made))
@@ -203,6 +210,10 @@ def test_a_class_compiles_nothing_until_its_first_value(monkeypatch: pytest.Monk
     assert compiled == []
     named(1, name="n")
     named(2, name="n")
+    point(1)
+    assert compiled == []
+    point(1, 3)
+    assert named(3, name="m").x == 30.0
     point(1)
     assert compiled == ["Named", "Point"]
 

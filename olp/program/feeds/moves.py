@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from olp.core.arrays import Array, Index, Mask, distinct
+from olp.core.arrays import Array, Index, Mask, distinct, is_in
 from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES
 from olp.core.toolpath import Flag, Kind, Toolpath
@@ -46,7 +46,7 @@ class Scan:
         line = np.searchsorted(words.first_word, word, "right")
         active = line <= program.end_line
         if block_delete:
-            active &= ~np.isin(line, deleted_lines(program))
+            active &= ~is_in(line, deleted_lines(program))
         word, line = word[active], line[active]
         g = words.letter[word] == ord("G")
         code = np.rint(numbers(words, word[g]) * 10).astype(np.int64)
@@ -160,7 +160,7 @@ class _Modes:
 
 
 def _modes(scan: Scan) -> _Modes:
-    chosen = np.isin(scan.code, (_PER_MINUTE, _PER_TURN, _INVERSE))
+    chosen = is_in(scan.code, (_PER_MINUTE, _PER_TURN, _INVERSE))
     line = np.concatenate(([0], scan.code_line[chosen]))
     code = np.concatenate(([_PER_MINUTE], scan.code[chosen]))
     changed = np.append(True, code[1:] != code[:-1])
@@ -172,7 +172,7 @@ def _modes(scan: Scan) -> _Modes:
 
 def _unit(scan: Scan, line: Index, *, before: bool = False) -> Array:
     """mm per unit on these lines, or `before` what their own G20 and G21 say."""
-    chosen = np.isin(scan.code, (200, 210))
+    chosen = is_in(scan.code, (200, 210))
     place = np.searchsorted(scan.code_line[chosen], line, side="left" if before else "right")
     inch = np.concatenate(([False], scan.code[chosen] == 200))[place]
     return np.asarray(np.where(inch, MM_PER_INCH, 1.0), float)
@@ -191,7 +191,7 @@ def _spindle(scan: Scan, line: Index) -> Array:
             line=int(line[np.flatnonzero(bad)[0]]),
             code="OLP551",
         )
-    surface = np.isin(scan.code, (960, 970))
+    surface = is_in(scan.code, (960, 970))
     if (scan.code == 960).any():
         mode = np.concatenate(([False], scan.code[surface] == 960))
         constant = mode[np.searchsorted(scan.code_line[surface], line, "right")]

@@ -13,7 +13,7 @@ from enum import IntEnum
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Array, Index, Mask
+from olp.core.arrays import Array, Index, Mask, is_in
 from olp.core.errors import ProgramError, UsageError
 from olp.core.toolpath import Kind
 from olp.core.values import dataclass
@@ -137,7 +137,7 @@ def _modes(program: Program, scan: Scan) -> tuple[Mode, ...]:
             modes.append(Mode(mode.line, PathControl.EXACT_STOP if stop else PathControl.EXACT_PATH))
     if program.rs274.exact_stop:
         # G62 and G63 end exact stop as G64 does
-        lines = scan.code_line[np.isin(scan.code, (620, 630))].tolist()
+        lines = scan.code_line[is_in(scan.code, (620, 630))].tolist()
         modes += [Mode(line, PathControl.BLEND) for line in lines]
     return tuple(sorted(modes, key=lambda mode: mode.line))
 
@@ -161,9 +161,9 @@ def _rests(program: Program, scan: Scan) -> tuple[Mask, Array]:
     dwell = np.zeros(len(line) + 1)
     word, m_line = scan.of_letter(b"M")
     code = np.rint(numbers(scan.words, word) * 10).astype(np.int64)
-    along = np.isin(code, [10 * m for m in program.rs274.m_with_motion])
+    along = is_in(code, [10 * m for m in program.rs274.m_with_motion])
     m_line, code = m_line[~along], code[~along]
-    late = np.isin(code, _AFTER + _AFTER_EXACT if program.rs274.exact_stop else _AFTER)
+    late = is_in(code, _AFTER + _AFTER_EXACT if program.rs274.exact_stop else _AFTER)
     rest[np.searchsorted(line, m_line[late], "right")] = True
     rest[np.searchsorted(line, m_line[~late])] = True
     rest[np.searchsorted(line, scan.of_letter(b"S")[1])] = True
@@ -184,7 +184,7 @@ def _dwell_seconds(program: Program, scan: Scan, pauses: Index) -> Array:
     count = words.first_word[pauses] - first
     owner = np.repeat(np.arange(len(pauses)), count)
     word = np.repeat(first - np.cumsum(count) + count, count) + np.arange(int(count.sum()))
-    time = np.isin(words.letter[word], list(b"PXU" if axis_dwell else b"P"))
+    time = is_in(words.letter[word], list(b"PXU" if axis_dwell else b"P"))
     owner, word = owner[time], word[time]
     stated = np.bincount(owner, minlength=len(pauses))
     if (stated > 1).any():

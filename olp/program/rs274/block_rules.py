@@ -12,7 +12,7 @@ from dataclasses import field
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Index, Mask, distinct
+from olp.core.arrays import Index, Mask, distinct, is_in
 from olp.core.errors import ProgramError
 from olp.core.values import dataclass
 from olp.program.rs274.codes import (
@@ -166,7 +166,7 @@ class _Tables:
         self, active: Mask, codes: tuple[Index, Index], present: Bits, motion: Codes, plane: Codes
     ) -> Iterator[Refusal]:
         bound = np.where(active, present & self.bound, 0)
-        probes = np.isin(motion, sorted(PROBES)) if self.bound else np.zeros(0, bool)
+        probes = is_in(motion, sorted(PROBES)) if self.bound else np.zeros(0, bool)
         if not (bound.any() or probes.any()):
             return
         line, key = codes
@@ -174,7 +174,7 @@ class _Tables:
         using = self.allowed[key] != 0
         np.bitwise_or.at(allowed, line[using], self.allowed[key[using]])
         moves = (present & _AXES) != 0
-        arcs = np.isin(motion, sorted(_ARCS))
+        arcs = is_in(motion, sorted(_ARCS))
         moves |= arcs & ((present & _CENTRE) != 0)
         moves[line[np.isin(key, _STATING, kind="table")]] = False
         allowed[moves] |= self.allowed[np.maximum(motion[moves], 0)]
@@ -247,7 +247,7 @@ class _Tables:
             yield where, why, "OLP505", letter
 
     def _broken(self, chunk: WordChunk, active: Mask) -> Iterator[Refusal]:
-        whole = np.isin(chunk.letter, list(self.rules.whole.encode()))
+        whole = is_in(chunk.letter, list(self.rules.whole.encode()))
         words = np.flatnonzero(whole & (chunk.decimals > 0))
         words = words[active[chunk.line[words]]]
         words = words[chunk.mantissa[words] % 10 ** chunk.decimals[words].astype(np.int64) != 0]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from olp.core.arrays import Array, Index
+from olp.core.arrays import Array, Index, is_in
 from olp.core.budget import Budget
 from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES
@@ -91,7 +91,7 @@ class CycleBlocks:
         turning = state.profile.cycles.turning.get(code)
         other = np.zeros(len(line), np.uint8)
         if not state.profile.cycles.other_axes:
-            mine = np.flatnonzero(np.isin(run.letter, _OTHERS))[::-1]
+            mine = np.flatnonzero(is_in(run.letter, _OTHERS))[::-1]
             other[run.owner[mine]] = 255
             np.minimum.at(other, run.owner[mine], run.letter[mine])
         name = f"the cycle G{code / 10:g}"
@@ -113,7 +113,7 @@ class CycleBlocks:
             )
         if turning is not None:
             spindle = " or ".join(f"M{m}" for m in turning)
-            still = ~np.isin(context.spindle[line], turning)
+            still = ~is_in(context.spindle[line], turning)
             refused.where(still, f"{name} needs a turning spindle; give {spindle} before it", "OLP518")
 
     def _begin(self, context: Context, run: CycleRun, frame_index: int, refused: Refused) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Array, Index, Mask
+from olp.core.arrays import Array, Index, Mask, is_in
 from olp.core.errors import ProgramError
 from olp.core.values import dataclass
 from olp.program.rs274.codes import CYCLES, INCREMENTAL, PLANE_OF
@@ -22,11 +22,11 @@ def runs(context: Context, line: Index) -> dict[int, int]:
     """The runs of blocks of canned cycles that are carried out at once, among blocks on lines (n,) of the
     chunk: from the first block of each to the one behind it. A run has no event, and no change of cycle,
     plane or distance mode."""
-    row = np.flatnonzero(np.isin(context.motion[line], _CYCLES))
+    row = np.flatnonzero(is_in(context.motion[line], _CYCLES))
     if not row.size:
         return {}
     line = line[row]
-    breaks = np.cumsum(context.event) + np.cumsum(~np.isin(context.motion, _CYCLES))
+    breaks = np.cumsum(context.event) + np.cumsum(~is_in(context.motion, _CYCLES))
     same = (breaks[line[1:]] == breaks[line[:-1]]) & ~context.event[line[:-1]]
     for mode in (context.motion, context.plane, context.distance):
         same &= mode[line[1:]] == mode[line[:-1]]

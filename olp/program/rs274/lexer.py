@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Index, Mask, distinct
+from olp.core.arrays import Index, Mask, distinct, is_in
 from olp.core.progress import Progress, silent
 from olp.core.values import dataclass
 from olp.program.rs274.block_text import CONTROL, PLAIN, BlockText
@@ -137,7 +137,7 @@ def lex(
     odd = np.searchsorted(line_breaks, bad) if bad.size else _NONE
     odd = distinct(np.append(odd, np.searchsorted(ends, strange))) if odd.size or strange.size else odd
     if odd.size:
-        good = ~np.isin(line, odd)
+        good = ~is_in(line, odd)
         begin, stop, letter, line = begin[good], stop[good], letter[good], line[good]
         mantissa, decimals, pointed = mantissa[good], decimals[good], pointed[good]
         first_word = np.searchsorted(line, np.arange(lines + 1))

@@ -13,7 +13,7 @@ from dataclasses import field
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Array, Index, Mask, distinct
+from olp.core.arrays import Array, Index, Mask, distinct, is_in
 from olp.core.errors import ProgramError
 from olp.core.values import dataclass
 from olp.program.rs274.axis_state import AxisState
@@ -109,7 +109,7 @@ class Modes:
         last = 0 if self._ended else len(chunk.line_start)
         codes = np.flatnonzero(chunk.letter == 77)
         value = chunk.mantissa[codes] / 10.0 ** chunk.decimals[codes]
-        ends = chunk.line[codes[np.isin(value, (2.0, 30.0))]]
+        ends = chunk.line[codes[is_in(value, (2.0, 30.0))]]
         if self._block_delete:
             ends = ends[~chunk.deleted[ends]]
         if ends.size and ends[0] < last:
@@ -197,7 +197,7 @@ class Modes:
         return Codes(chunk.line[g], code, self._act[code])
 
     def _spindle(self, chunk: WordChunk, value: Array, usable: Mask) -> Modal:
-        m = (chunk.letter == 77) & usable & np.isin(value, (3, 4, 5, 6, 19))
+        m = (chunk.letter == 77) & usable & is_in(value, (3, 4, 5, 6, 19))
         line, code = chunk.line[m], value[m]
         # a tool change and an oriented stop end it, the change before its start in one block
         order = np.lexsort((code != 6, line))
@@ -223,14 +223,14 @@ class Modes:
 
     def _consumed(self, codes: Codes, active: Mask) -> Mask:
         consumed = ~active
-        consumed[codes.line[(codes.act == Act.EVENT) & np.isin(codes.code, self._claims)]] = True
+        consumed[codes.line[(codes.act == Act.EVENT) & is_in(codes.code, self._claims)]] = True
         return consumed
 
     def _motion(self, chunk: WordChunk, codes: Codes) -> Modal:
         chosen = codes.act == Act.MOTION
         line, code = codes.line[chosen], codes.code[chosen]
         # G80 may be beside another motion code, which then holds
-        beside = (code == END_OF_CYCLES) & np.isin(line, line[1:][line[1:] == line[:-1]])
+        beside = (code == END_OF_CYCLES) & is_in(line, line[1:][line[1:] == line[:-1]])
         line, code = line[~beside], code[~beside]
         if self._cycles_apart:
             # cycles are a separate group: after G80 alone the last of G0 to G3 is in force again

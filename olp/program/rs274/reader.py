@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Array
+from olp.core.arrays import Array, is_in
 from olp.core.errors import ProgramError
 from olp.core.machine import Setup
 from olp.core.toolpath import Flag, Kind
@@ -149,7 +149,7 @@ class _Reader:
         chunk, state, event = context.chunk, self.state, context.event
         rows = _Rows(blocks, np.zeros(len(blocks), np.int32), runs(context, blocks.line))
         motion = context.motion[blocks.line]
-        alone, first = np.isin(motion, _ALONE), np.isin(motion, _PROBES)
+        alone, first = is_in(motion, _ALONE), is_in(motion, _PROBES)
         first[list(rows.runs)] = True
         special = event.copy()
         special[blocks.line[first]] = True
