@@ -174,7 +174,8 @@ def _travel(motion: Motion) -> tuple[Array, Array, Index]:
     travelled = np.empty(len(piece))
     for a in range(0, len(motion), _BLOCK):
         some = np.arange(a, min(a + _BLOCK, len(motion)))
-        position = motion.of(np.repeat(some, len(_INSTANTS)), (seconds[some, None] * _INSTANTS).ravel())[0]
+        instants = (seconds[some, None] * _INSTANTS).ravel()
+        position = motion.positions(np.repeat(some, len(_INSTANTS)), instants)
         step = np.diff(position.reshape(len(some), len(_INSTANTS), 3), axis=1)
         travelled[a * count : (a + len(some)) * count] = np.sqrt((step * step).sum(axis=2)).ravel()
     time = motion.start_s[piece] - motion.start_s[0] + u

@@ -17,6 +17,8 @@ from olp.core.arrays import Array, Index
 _NO_CHANGE = 1e-10
 #: half the Newton steps at most
 _FEW = 24
+#: ramps at a time: columns of so many stay in the cache
+_BLOCK = 1 << 13
 
 
 def phases(v0: Array, v1: Array, acceleration: Array, jerk: Array) -> tuple[Array, Array]:
@@ -77,10 +79,16 @@ def reach_one(v0: float, length: float, acceleration: float, jerk: float) -> flo
 
 
 def peak(v0: Array, v1: Array, length: Array, top: Array, acceleration: Array, jerk: Array) -> Array:
-    """The largest speed <= `top` at which both ramps, from v0 and to v1, fit into `length`.
+    """The largest speed <= `top` at which both ramps, from v0 and to v1, fit into `length`."""
+    result = np.empty_like(v0)
+    for a in range(0, len(v0), _BLOCK):
+        some = slice(a, a + _BLOCK)
+        result[some] = _peak(v0[some], v1[some], length[some], top[some], acceleration[some], jerk[some])
+    return result
 
-    Bracketed Newton; the lower bracket is returned, so the ramps always fit.
-    """
+
+def _peak(v0: Array, v1: Array, length: Array, top: Array, acceleration: Array, jerk: Array) -> Array:
+    """Bracketed Newton; the lower bracket is returned, so the ramps always fit."""
     low = np.maximum(v0, v1)
     high = np.maximum(top, low)
 

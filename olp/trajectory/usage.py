@@ -215,7 +215,7 @@ def feeds_of_pieces(motion: Motion, route: Route) -> Array:
             continue
         piece = by_line[a:b]
         width = motion.start_s[piece + 1] - motion.start_s[piece]
-        begin, end = motion.of(piece, np.zeros(len(piece)))[0], motion.of(piece, width)[0]
+        begin, end = motion.positions(piece, np.zeros(len(piece))), motion.positions(piece, width)
         length = np.sqrt(((end - begin) ** 2).sum(axis=1))
         done = (np.cumsum(length) - 0.5 * length) / max(float(length.sum()), 1e-300)
         own = slice(int(first[k]), int(stop[k]))
