@@ -128,8 +128,9 @@ class Machine:
     read as increments.
     `styli` are end of the ram to centre of the tip of sensors by label.
     `path_mode` is the mode at the start of a program, `blend_mm` the tolerance where the program names none
-    (None: not stated). `located` says whether positions in machine coordinates are known; where they are not,
-    only distances are.
+    (None: not stated). `tool_change_moves`: M6 may move the axes. `scaling_unit` is what 1 of a factor of G51
+    is, None where it is not stated. `located` says whether positions in machine coordinates are known; where
+    they are not, only distances are.
     """
 
     name: str
@@ -147,6 +148,8 @@ class Machine:
     decimal_point: Literal["increment", "calculator"] | None = None
     path_mode: Literal["blend", "exact-stop"] = "blend"
     blend_mm: float | None = None
+    tool_change_moves: bool = True
+    scaling_unit: float | None = None
     sanity: Sanity = Sanity()
     located: bool = True
 

@@ -108,6 +108,11 @@ class Frame:
         x, y, z = (offset - length - lift for offset, length, lift in parts)
         return (x, y, z)
 
+    @property
+    def stretch(self) -> float:
+        """How much farther the axes go than words say, at most; 1 where nothing is scaled."""
+        return 1.0 if self.turn is None else float(np.linalg.norm(self.turn, axis=0).max())
+
     def placed_mm(self, words: Sequence[float]) -> tuple[float, ...]:
         """The axis position of three words."""
         position_mm = [w * self.unit_mm for w in words]

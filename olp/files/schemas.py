@@ -248,6 +248,15 @@ class MachineFile(Table):
         description="what a length without a decimal point means to a Fanuc or Haas control: X100 is 100 "
         "least increments, or 100 units as on a pocket calculator; increments, with a doubt, if left out",
     )
+    tool_change_moves: bool = Field(
+        default=True,
+        description="whether M6 may move the axes; if not, their positions are known after it",
+    )
+    scaling_unit: Positive | None = Field(
+        default=None,
+        description="what 1 of a factor of G51 is to a Fanuc control, whose parameter sets it: 0.001 or "
+        "0.00001",
+    )
     controller: Controller = Field(description="the dialect of the programs: " + ", ".join(CONTROLLERS))
     calibration: Text | None = Field(
         default=None, description="the path of the calibration file, relative to this file"

@@ -336,10 +336,10 @@ def _multiple(length_mm: float, of_mm: float) -> bool:
 
 def last_digit_mm(program: Program, setup: Setup) -> float:
     """The coarsest last digit of the corrected program, in mm."""
-    units = {f.unit_mm for f in program.toolpath.frames} or {1.0}
+    units = {(f.unit_mm, round(f.stretch, 9)) for f in program.toolpath.frames} or {(1.0, 1.0)}
     inch = program.dialect.inch_decimals
     return max(
-        10.0 ** -fewest_decimals(least, unit, inch) * unit
+        10.0 ** -fewest_decimals(least, unit, inch) * unit * stretch
         for least in setup.machine.least_increment_mm
-        for unit in units
+        for unit, stretch in units
     )

@@ -16,7 +16,7 @@ from olp.findings.catalogue import RULES
 
 MACHINE = PROGRAMS / "haas-mill" / "machine.toml"
 HEAD = b"%\nG21 G90 G54 G17\nT1 M6\nG0 X0. Y0. Z20.\n"
-PART = HEAD + b"G68 R30.\n&X1,5\nT77 M6\n" + b"G51 P2.\n" * 40 + b"M30\n%\n"
+PART = HEAD + b"G68.2 R30.\n&X1,5\nT77 M6\n" + b"G12 D2.\n" * 40 + b"M30\n%\n"
 
 
 @pytest.fixture
@@ -53,7 +53,7 @@ def test_all_reasons_are_listed(part: Path, verb: str) -> None:
     assert "and 22 others" in result.stdout
     assert max(map(len, result.stdout.splitlines())) <= 100
     (line,) = result.stderr.splitlines()
-    assert line.startswith(f"olp: error: {part}:5: G68 (rotation)")
+    assert line.startswith(f"olp: error: {part}:5: G68.2 (tilted plane)")
     assert "43 statements are refused in all" in line
 
 

@@ -76,7 +76,7 @@ RULES = (
         why="Its effect is made inside the control, needs axes that are not modelled, or is not known.",
         remedy="Have the CAM system write plain moves for it. If another control is meant, state it in the "
         "machine file (controller), or with --dialect.",
-        example="`G68 X0 Y0 R30`, a rotation.",
+        example="`G68.2 X0 Y0 Z0 I30`, a tilted plane.",
     ),
     _rule(
         "OLP513",

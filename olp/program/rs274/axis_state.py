@@ -28,7 +28,10 @@ from olp.program.rs274.codes import (
     METRIC,
     PATH_MODES,
     PLANE_OF,
+    ROTATION,
     SHIFTS,
+    TRANSFORMS,
+    UNDONE_BY,
     UNITS,
     WORK_OFFSETS,
     WRITE_OFFSET,
@@ -37,6 +40,7 @@ from olp.program.rs274.offset_state import OffsetState, Word
 from olp.program.rs274.offsets import Offsets
 from olp.program.rs274.profiles.base import Profile
 from olp.program.rs274.state import NAN, PathMode
+from olp.program.rs274.transforms import change
 
 #: M6, as ten times its number.
 TOOL_CHANGE = 60
@@ -59,10 +63,12 @@ _RANK = {
 @dataclass(frozen=True, slots=True)
 class Effect:
     """What the axis words of a block mean after its events: `machine` coordinates (G53), or `home`, the axes
-    that G28/G30 send home after the intermediate point."""
+    that G28/G30 send home after the intermediate point. The positions of the axes `lost` are not known any
+    more in the program, as it is turned otherwise."""
 
     machine: bool = False
     home: tuple[int, ...] = ()
+    lost: tuple[int, ...] = ()
 
 
 @dataclass(slots=True, kw_only=True)
@@ -199,6 +205,8 @@ class AxisState(OffsetState):
         are."""
         if m10 == SET_TOOL and self.profile.m61_sets_tool:
             return False
+        if m10 == TOOL_CHANGE and not self.setup.machine.tool_change_moves:
+            return False
         return m10 % 10 != 0 or m10 // 10 not in self.profile.harmless_m
 
     def _event(
@@ -235,6 +243,10 @@ class AxisState(OffsetState):
             self._write_offset(line, by_letter, axis_words, moves)
         elif code in SHIFTS:
             self._shift(code, line, axis_words, moves)
+        elif code in TRANSFORMS:
+            lost = change(self, code, line, by_letter, axis_words)
+            self.forget(lost)
+            return replace(effect, lost=lost)
         return effect
 
     def _dwell(self, line: int, by_letter: dict[str, Word]) -> None:
@@ -262,7 +274,23 @@ class AxisState(OffsetState):
                 line=line,
                 code="OLP518",
             )
-        if self.compensation is not None and (_OFFSET_CODES - LENGTHS).intersection(codes):
+        transform = self.offsets.transform
+        if transform is not None and (_OFFSET_CODES - LENGTHS).intersection(codes):
+            raise ProgramError(
+                "offsets, machine coordinates and reference positions are used in a turned, scaled or "
+                "mirrored program, which the control refuses or takes in its own way; give "
+                f"{UNDONE_BY[transform.code]} before",
+                line=line,
+                code="OLP518",
+            )
+        if transform is not None and transform.code != ROTATION and CUTTER_COMPENSATION.intersection(codes):
+            raise ProgramError(
+                "cutter compensation changes its side in a mirrored or scaled program, which is not read; "
+                f"give {UNDONE_BY[transform.code]} before",
+                line=line,
+                code="OLP518",
+            )
+        if self.compensation is not None and (_OFFSET_CODES - LENGTHS | TRANSFORMS).intersection(codes):
             raise ProgramError(
                 "offsets and reference positions are used in cutter compensation; give G40 before",
                 line=line,

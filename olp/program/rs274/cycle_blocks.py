@@ -63,7 +63,7 @@ class CycleBlocks:
         self._begin(context, run, frame, refused)
         drilling = self._drilling(context, run, frame, refused)
         times = self._times(context, run, refused)
-        if np.isnan(state.position).any():
+        if self._wanting(run):
             refused.all(
                 "a canned cycle starts where an axis has not been commanded yet; "
                 "command X, Y and Z first, or give start_mm in the job file",
@@ -82,6 +82,14 @@ class CycleBlocks:
         refused.raise_first()
         assert made is not None
         self._put(context, run, frame, drilling.pick(of), place, of, times, made)
+
+    def _wanting(self, run: CycleRun) -> bool:
+        """Whether a position is not known and the first block does not state it: in G90 it may state a place
+        in the plane."""
+        first, second, third = PLANES[run.plane]
+        unknown = np.isnan(self._along(np.array(self._state.position)))
+        stated = [not run.incremental and run.slot["XYZ"[axis]][0] >= 0 for axis in (first, second)]
+        return bool(unknown[third] or (unknown[[first, second]] & ~np.array(stated)).any())
 
     # -- what a block says -------------------------------------------------------------------------
 

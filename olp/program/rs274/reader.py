@@ -32,6 +32,7 @@ from olp.program.rs274.codes import (
     PLANE_OF,
     PRESET,
     PROBES,
+    TRANSFORMS,
     UNITS,
     WRITE_OFFSET,
 )
@@ -53,7 +54,7 @@ _KIND[[0, 10, 20, 30]] = (Kind.RAPID, Kind.LINE, Kind.ARC_CW, Kind.ARC_CCW)
 _ALONE = np.array(sorted(CYCLES | PROBES))
 _PROBES = np.array(sorted(PROBES))
 #: Events that need the present position
-_APART = HOMES | {MACHINE, PRESET}
+_APART = HOMES | TRANSFORMS | {MACHINE, PRESET}
 #: Events that change no frame
 _KEEPS_FRAME = frozenset({DWELL, MACHINE, *HOMES, *PATH_MODES})
 
@@ -171,7 +172,7 @@ class _Reader:
             state.distance, state.plane = int(context.distance[line]), int(context.plane[line])
             state.payload_kg = self.payloads.get(line, state.payload_kg)
             effect = state.run(number, words, codes, self.collector.moves)
-            if moved:
+            if moved or effect.lost:
                 self.special_blocks.control_move(number, deleted=deleted)
             if here and (alone[upto] or effect.home or effect.machine):
                 self._alone(context, rows, upto, effect)

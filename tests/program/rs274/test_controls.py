@@ -62,6 +62,16 @@ READINGS: dict[str, tuple[str, dict[str, Outcome], Any]] = {
         {LINUXCNC: (5, 1, 0)} | dict.fromkeys((FANUC, HAAS, GRBL), "G10 R turns the work offset"),
         "not",
     ),
+    "scales_axes": (
+        "G51 X0. Y0. Z0. I2. J1. K3.\nG0 X1. Y1. Z1.",
+        {FANUC: "has a decimal point", HAAS: "without its factors"},
+        "not",
+    ),
+    "scales_by_parameter": (
+        "G51 X0. Y0. Z0. P2.\nG0 X1. Y1. Z1.",
+        {FANUC: "has a decimal point", HAAS: (2, 2, 2)},
+        "not",
+    ),
     "cycles_apart": (
         "G1 X0. Y0. Z9. F60.\nG80\nX2.",
         {FANUC: (2, 0, 9), HAAS: (2, 0, 9), LINUXCNC: "no motion code is in force"},
@@ -270,11 +280,12 @@ def test_m_codes_that_move_no_axis(control: str) -> None:
 
 _MILLING = "G0-G3 G38.2-G38.5 G80"
 _DRILLING = "G73 G74 G81-G86 G89"
-_FAMILY_REFUSED = "G5.2 G5.3 G6 G7 G7.1 G10.1 G12 G12.1 G13 G16 G31 G43.4 G51 G51.1 G65 G66 G68 G68.2"
+_FAMILY_REFUSED = "G5.2 G5.3 G6 G7 G7.1 G10.1 G12 G12.1 G13 G16 G31 G43.4 G65 G66 G68.2"
+_TRANSFORMS = "G51 G51.1 G68"
 _REFUSED = f"G5 {_FAMILY_REFUSED} G28.1 G30.1 G33 G33.1 G41 G41.1 G42 G42.1 G76 G87 G88"
 _EVENTS = "G4 G10 G20 G21 G28 G49 G53-G59 G61 G92"
-_ISO_EVENTS = f"{_EVENTS} G30 G43 G44 G52 G54.1 G64"
-_ISO_UNCHANGED = "G8 G9 G13.1 G15 G23.1 G25 G40 G50 G50.1 G62 G63 G67 G69 G69.1 G96 G97"
+_ISO_EVENTS = f"{_EVENTS} G30 G43 G44 G50 G51 G52 G54.1 G64 G68 G69"
+_ISO_UNCHANGED = "G8 G9 G13.1 G15 G23.1 G25 G40 G62 G63 G67 G69.1 G96 G97"
 #: What becomes of the G codes of each control; other codes are refused as not known.
 CODES: dict[str, dict[Act, str]] = {
     LINUXCNC: {
@@ -284,23 +295,23 @@ CODES: dict[str, dict[Act, str]] = {
         Act.FEED: "G93-G95",
         Act.RETRACT: "G98 G99",
         Act.EVENT: f"{_EVENTS} G30 G43 G43.1 G43.2 G52 G59.1-G59.3 G61.1 G64 G92.1-G92.3",
-        Act.REFUSE: f"{_REFUSED} G5.1",
+        Act.REFUSE: f"{_REFUSED} {_TRANSFORMS} G5.1",
     },
     FANUC: {
         Act.UNCHANGED: f"{_ISO_UNCHANGED} G5.1 G11",
         Act.MOTION: f"{_MILLING} {_DRILLING}",
         Act.FEED: "G93-G95",
         Act.RETRACT: "G98 G99",
-        Act.EVENT: _ISO_EVENTS,
+        Act.EVENT: f"{_ISO_EVENTS} G50.1 G51.1",
         Act.REFUSE: f"{_REFUSED} G92.1",
     },
     HAAS: {
-        Act.UNCHANGED: f"{_ISO_UNCHANGED} G103 G187",
+        Act.UNCHANGED: f"{_ISO_UNCHANGED} G50.1 G103 G187",
         Act.MOTION: f"{_MILLING} {_DRILLING}",
         Act.FEED: "G93-G95",
         Act.RETRACT: "G98 G99",
         Act.EVENT: f"{_ISO_EVENTS} G110-G129 G154",
-        Act.REFUSE: f"{_REFUSED} G5.1 G92.1",
+        Act.REFUSE: f"{_REFUSED} G5.1 G51.1 G92.1",
     },
     GRBL: {
         Act.UNCHANGED: "G40",
@@ -308,7 +319,7 @@ CODES: dict[str, dict[Act, str]] = {
         Act.ARC_DISTANCE: "G91.1",
         Act.FEED: "G93 G94",
         Act.EVENT: f"{_EVENTS} G43.1 G92.1",
-        Act.REFUSE: f"G5 {_FAMILY_REFUSED} G5.1 G61.1",
+        Act.REFUSE: f"G5 {_FAMILY_REFUSED} {_TRANSFORMS} G5.1 G61.1",
     },
 }
 

@@ -327,7 +327,7 @@ REFUSED: dict[tuple[str, str], dict[str, object]] = {
         "take the contour as tool path with --contour",
         "code": "OLP513", "word": "G42.1",
     },
-    ("fanuc", "M98 P1\nM3\nG68\nM99"): {
+    ("fanuc", "M98 P1\nM3\nG68.2\nM99"): {
         "why": f"M98 calls a subprogram; {UNROLL}", "code": "OLP511", "hint": UNROLL, "word": "M98",
         "others": (5, 6),
     },

@@ -55,7 +55,8 @@ class Profile(Dialect):
       100 mm/min all the same.
     - `g52_is_g92`: G52 writes the same offset as G92. `g10_offsets`: the largest P of G10 L2 and L20.
       `g10_adds`: in G91 G10 L2 adds to the offset. `turns_offsets`: a work offset may be turned about Z,
-      which R of G10 L2 states too.
+      which R of G10 L2 states too. `scales_axes`: G51 takes a factor for each axis, too.
+      `scales_by_parameter`: a parameter of the control sets the unit of these factors, which have no point.
     - `cycles_apart`: canned cycles and G80 are a separate modal group.
     - `axis_dwell`: G4 takes its time from X and U, too, and counts milliseconds where it has no point.
     - `exact_stop`: G61 stops at the end of each block, as G9 does in one, and G62 and G63 end it as G64 does.
@@ -87,6 +88,8 @@ class Profile(Dialect):
     g10_offsets: int = 6
     g10_adds: bool = False
     turns_offsets: bool = False
+    scales_axes: bool = False
+    scales_by_parameter: bool = False
     cycles_apart: bool = False
     axis_dwell: bool = False
     exact_stop: bool = False

@@ -11,7 +11,12 @@ DIALECT = replace(
     ISO,
     name="fanuc",
     title="Fanuc and compatible ISO controls (system A words of mills)",
-    codes=g_codes(unchanged={*ISO_UNCHANGED, 51, 110}, extra={**ISO_EXTRA, 51: Act.UNCHANGED}),
+    codes=g_codes(
+        unchanged={*ISO_UNCHANGED, 51, 110},
+        extra={**ISO_EXTRA, 51: Act.UNCHANGED, 501: Act.EVENT, 511: Act.EVENT},
+    ),
+    scales_axes=True,
+    scales_by_parameter=True,
     refusals={**ISO.refusals, 921: "G92.1 presets offsets that are not known off line"},
     harmless_m=ISO.harmless_m | {10, 11, 29, 13, 88, 89},
     feed_without_point=True,
