@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -87,7 +86,7 @@ REFUSED = {
     ("fanuc", "G68 X1. Y1. R30.\nG53 G0 X1."): ("give G69 before", "OLP518"),
     ("fanuc", "G68 X1. Y1. R30.\nG28 Z1."): ("give G69 before", "OLP518"),
     ("fanuc", "G68 X1. Y1. R30.\nG92 X1."): ("give G69 before", "OLP518"),
-    ("fanuc", "G68 X1. Y1. R30.\nG1 Z1. F100.\nG18 X1. Y1.\nG2 X2. Z1. R5."): ("turned out of that", "OLP530"),
+    ("fanuc", "G68 X1. Y1. R30.\nG1 Z1. F100.\nG18 X1. Y1.\nG2 X2. Z1. R5."): ("turned out of", "OLP530"),
     ("fanuc", "G51.1 Z1.\nZ1.\nG81 X1. Y1. Z-1. R1. F100."): ("turns, mirrors or scales its tool", "OLP518"),
     ("fanuc", f"{FACTORS} P2000"): ("give scaling_unit in the machine file", "OLP541"),
     ("scaled", f"{FACTORS} P2."): ("has a decimal point", "OLP518"),
