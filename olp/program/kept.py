@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from olp.core.values import dataclass
+from olp.program.origin import Unrolled
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,9 +17,13 @@ class Difference:
 @dataclass(frozen=True, slots=True, eq=False)
 class Kept:
     """The corrected program with its flow, None where some lines cannot be kept; these are `differences`.
-    `changed` are the lines that were changed, `repeated` those of them that run more than once."""
+    `changed` are the lines that were changed, `repeated` those of them that run more than once.
+
+    `apart` is the program with the `calls` in some of its lines written out, where that may help."""
 
     text: bytes | None
     differences: tuple[Difference, ...]
     changed: tuple[int, ...]
     repeated: tuple[int, ...]
+    apart: Unrolled | None = None
+    calls: tuple[int, ...] = ()

@@ -56,6 +56,16 @@ class Origin:
         for name, first in zip(self.files, self.first.tolist(), strict=True):
             yield {"name": Path(name).name, "lines_from": first + 1}
 
+    def through(self, outer: Origin) -> Origin:
+        """The origin of a text whose program was itself made from another one, of which `outer` is the
+        origin. Files are those of `outer`, which has them all."""
+        shift = {name: int(first) for name, first in zip(outer.files, outer.first.tolist(), strict=True)}
+        lines = []
+        for line in self.line.tolist():
+            file, number = self.file_of(line)
+            lines.append(int(outer.line[number - 1]) if file is None else shift[file] + number)
+        return Origin(outer.files, outer.first, outer.texts, np.array(lines, np.int64))
+
     def place(self, line: int) -> str:
         """A line in words: its number, with the name of its file where that is not the program's."""
         file, number = self.file_of(line)
@@ -101,15 +111,27 @@ def quoted(cell: str) -> str:
     return '"' + cell.replace('"', '""') + '"' if any(c in cell for c in ',"\r\n') else cell
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Within:
+    """(n,) the line of the program itself that each line of an unrolled text runs in, such as that of a call,
+    and the number of that run."""
+
+    line: Index
+    run: Index
+
+
 class Unrolled(bytes):
-    """A text that was unrolled, with the origin of its lines."""
+    """A text that was unrolled, with the origin of its lines. `within` has no rows where it is not known."""
 
     origin: Origin
+    within: Within
 
     @staticmethod
-    def of(text: bytes, origin: Origin) -> Unrolled:
+    def of(text: bytes, origin: Origin, within: Within | None = None) -> Unrolled:
+        none = np.zeros(0, np.int64)
         unrolled = Unrolled(text)
         unrolled.origin = origin
+        unrolled.within = within or Within(none, none)
         return unrolled
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -26,13 +27,22 @@ from olp.errormodel.known import KnownErrors
 from olp.files.sources import Source, Sources
 from olp.files.write import write_bytes
 from olp.findings.catalogue import Finding
-from olp.program.kept import Kept
+from olp.program.origin import Unrolled
 from olp.program.program import Program
 from olp.program.registry import Options, read
 from olp.proof.judgement import Judgements
 from olp.workflows import refusals
 from olp.workflows.doubt import accepted_of, doubted
-from olp.workflows.kept import finding_of, unrolled_again, unrolled_unasked, with_flow
+from olp.workflows.kept import (
+    Flow,
+    findings_of,
+    provably_kept,
+    refused,
+    through,
+    unrolled_again,
+    unrolled_unasked,
+    with_flow,
+)
 from olp.workflows.original import placed, placed_findings
 from olp.workflows.proof import Pair, ProofOptions, Run, limits_of, proved
 from olp.workflows.session import Loaded, Outside, PathLike, Session, opened
@@ -159,23 +169,23 @@ def corrected(
     data = done.source.data
     tell("prove", 0.7)
     reading = Options(contour=options.contour, tell=part(tell, 0.7, 0.78, "prove"))
-    text = done.text
-    notes: tuple[Finding, ...] = ()
-    if done.kept is not None:
-        text = unrolled_again(sources, program, text, loaded).data
-        notes = (finding_of(done.kept),)
-    second = read(text, loaded.setup, loaded.dialect, reading, words=False)
-    pair = Pair(done.nominal, data, program.name, second, done.text, "", done.uncorrected)
     held = outside if options.outside_box == "hold" else None
     told = part(tell, 0.78, 1.0)
-    run = proved(pair, loaded.held(), options, done.doubts, outside=held, notes=notes, tell=told)
-    if done.kept is not None and not run.proof.holds:
-        raise ProgramError(
-            "with its loops and subprograms kept the program is above the tolerance; unroll the program with "
-            "--flatten",
-            line=1,
-            code="OLP511",
-        )
+
+    def prove(text: bytes, notes: tuple[Finding, ...] = ()) -> Run:
+        second = read(text, loaded.setup, loaded.dialect, reading, words=False)
+        pair = Pair(done.nominal, data, program.name, second, done.text or b"", "", done.uncorrected)
+        return proved(pair, loaded.held(), options, done.doubts, outside=held, notes=notes, tell=told)
+
+    assert done.text is not None
+    if done.flow is None:
+        run = prove(done.text)
+    else:
+        with provably_kept():
+            text = unrolled_again(sources, program, done.text, loaded).data
+            run = prove(text, findings_of(done.flow))
+            if not run.proof.holds:
+                raise ProgramError("it is above the tolerance then", code="OLP511")
     return replace(run, report=run.report | _written_report(done))
 
 
@@ -194,33 +204,66 @@ def _refuse_stamped(data: bytes) -> None:
 class _Rewritten:
     """A program written with its corrections. `source` is the text that was read, `nominal` what it says,
     without its words. `uncorrected` are moves that are left so, (n,) `parts` the number of moves of each
-    nominal one. `kept` is there where the text keeps the flow of a program that was unrolled to be read."""
+    nominal one. `flow` is there where the text keeps the flow of a program that was unrolled to be read; the
+    text is None where it cannot."""
 
     source: Source
     nominal: Program
-    text: bytes
+    text: bytes | None
     uncorrected: Index
     parts: npt.NDArray[np.int32]
     tally: Tally
     doubts: tuple[Finding, ...]
-    kept: Kept | None = None
+    flow: Flow | None = None
 
 
 def _rewritten(
     sources: Sources, source: Source, loaded: Loaded, options: CorrectOptions, refuse_doubts: bool,
     tell: Progress,
 ) -> _Rewritten:  # fmt: skip
-    """Read, plan and write. Words and plan of a long program are large: this function releases them."""
+    """Read, plan and write. Where a program cannot keep its flow, calls whose passes need other numbers are
+    written out, and it is read again."""
+    read_kept = partial(
+        refusals.read, sources, setup=loaded.setup, dialect=loaded.dialect,
+        options=Options(contour=options.contour, tell=part(tell, 0.0, 0.2)), unrolling=options, kept=True,
+    )  # fmt: skip
     tell("read", 0.0)
-    reading = Options(contour=options.contour, tell=part(tell, 0.0, 0.2))
-    source, program = refusals.read(
-        sources, source, loaded.setup, loaded.dialect, reading, options, kept=True
-    )
+    source, program = read_kept(source)
     if options.split_rapids and program.verbatim:
         raise UsageError(
             "--split-rapids does not go with this dialect: it does not state the path between its points; "
             'set joined = "lines" and insert = true in the profile'
         )
+    inner = unrolled_unasked(source, options)
+    done = _written(source, program, inner, loaded, options, refuse_doubts, tell)
+    if done.text is not None:
+        return done
+    assert inner is not None
+    assert done.flow is not None
+    first = done.flow.kept
+    assert first is not None
+    refusal, outer = refused(first, inner.origin), first.apart
+    if outer is None:
+        raise refusal
+    del done, program
+    source, program = read_kept(source.holding(bytes(outer)))
+    inner = unrolled_unasked(source, options)
+    data = outer if inner is None else through(inner, outer)
+    program = replace(program, data=data)
+    done = _written(source.holding(data), program, inner, loaded, options, refuse_doubts, tell)
+    if done.text is None:
+        raise refusal
+    kept = None if done.flow is None else done.flow.kept
+    return replace(done, flow=Flow(kept, outer, first.calls))
+
+
+def _written(
+    source: Source, program: Program, unrolled: Unrolled | None, loaded: Loaded, options: CorrectOptions,
+    refuse_doubts: bool, tell: Progress,
+) -> _Rewritten:  # fmt: skip
+    """Plan and write a program that was read; with `unrolled`, a text that was unrolled only to be read, into
+    the program that it was made from. Words and plan of a long program are large: this function releases
+    them."""
     doubts = doubted(program, loaded, options.accept, options.date, name=source.name, refuse=refuse_doubts)
     accepted = accepted_of(doubts)
     tell("correct", 0.2)
@@ -232,25 +275,23 @@ def _rewritten(
         )  # fmt: skip
         stamp = stamp_line(loaded.digest, loaded.dialect.comment, accepted) if loaded.dialect.marks else b""
         increments_mm = loaded.setup.machine.least_increment_mm
-        unrolled = unrolled_unasked(source, options)
-        own_stamp = stamp if unrolled is None else b""
         task = Task(
-            program, loaded.model, limits.tolerance_mm, increments_mm, own_stamp, bool(accepted),
-            located=unrolled is not None,
+            program, loaded.model, limits.tolerance_mm, increments_mm, b"" if unrolled is not None else stamp,
+            bool(accepted), located=unrolled is not None,
         )  # fmt: skip
         written = write(task, plans(program, loaded.model, limits, told), told)
     nominal = replace(program, words=None, slot=np.zeros((0, 3), np.int32))
     # the corrected text has lines of its own
-    text = bytes(source.data) if written.text is None else written.text
-    kept = None
+    text: bytes | None = bytes(source.data) if written.text is None else written.text
+    flow = None
     if unrolled is not None:
+        assert text is not None
         assert written.starts is not None
         kept = with_flow(unrolled, text, written.starts, loaded)
-        assert kept.text is not None
-        text = kept.text
-        if stamp and (kept.changed or accepted):
+        flow, text = Flow(kept), kept.text
+        if text is not None and stamp and (kept.changed or accepted):
             text = stamped(text, stamp, program.eol(1), loaded.dialect.first)
-    return _Rewritten(source, nominal, text, written.uncorrected, written.parts, written.tally, doubts, kept)
+    return _Rewritten(source, nominal, text, written.uncorrected, written.parts, written.tally, doubts, flow)
 
 
 def _written_report(done: _Rewritten) -> dict[str, Any]:

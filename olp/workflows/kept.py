@@ -6,8 +6,12 @@ again and proved as any other program.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 from olp.core.arrays import Index
 from olp.core.errors import ProgramError, Reason, Refused
+from olp.core.values import dataclass
 from olp.files.sources import Source, Sources
 from olp.findings.catalogue import Finding
 from olp.program.kept import Kept
@@ -16,9 +20,23 @@ from olp.program.program import Program
 from olp.workflows.flatten import AS_IT_IS, UnrollOptions, as_asked
 from olp.workflows.session import Loaded
 
+#: Lines that a finding names.
+_LINES = 10
 #: Characters of a statement that a reason shows.
 _SHOWN = 60
-_WAY_ON = "so its loops and subprograms cannot be kept; unroll the program with --flatten"
+_UNROLL = "unroll the program with --flatten"
+_WAY_ON = f"so its loops and subprograms cannot be kept; {_UNROLL}"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Flow:
+    """How the flow of a program was kept. `kept` is None where nothing was left to keep, as all `calls` are
+    written out; these are lines of the program. `outer` is the program with them, None where there are
+    none."""
+
+    kept: Kept | None
+    outer: Unrolled | None = None
+    calls: tuple[int, ...] = ()
 
 
 def unrolled_unasked(program: Source, options: UnrollOptions) -> Unrolled | None:
@@ -29,13 +47,16 @@ def unrolled_unasked(program: Source, options: UnrollOptions) -> Unrolled | None
 
 def with_flow(unrolled: Unrolled, text: bytes, starts: Index, loaded: Loaded) -> Kept:
     """The program that was unrolled, with the corrections of the unrolled `text`, whose lines begin at
-    `starts`. Raises ProgramError, or Refused with all the lines whose passes need other numbers."""
+    `starts`. Raises ProgramError where the dialect keeps none."""
     origin, keeper = unrolled.origin, loaded.dialect.keeper
     if keeper is None or loaded.setup.job.payloads:
         raise _refusal(1, "payloads of the job belong to lines that run in turn, " + _WAY_ON, origin)
     kept: Kept = keeper(unrolled, text, starts, loaded.dialect)
-    if kept.text is not None:
-        return kept
+    return kept
+
+
+def refused(kept: Kept, origin: Origin) -> ProgramError:
+    """Why a program cannot keep its flow: all the lines whose passes need other numbers."""
     reasons = []
     for each in kept.differences:
         file, line = origin.file_of(each.line)
@@ -43,8 +64,8 @@ def with_flow(unrolled: Unrolled, text: bytes, starts: Index, loaded: Loaded) ->
         message = f"`{statement}` cannot be corrected in its place: {each.why}, {_WAY_ON}"
         reasons.append(Reason(line, "OLP511", message, statement, file=file))
     if len(reasons) == 1:
-        raise _refusal(kept.differences[0].line, reasons[0].message, origin)
-    raise Refused(tuple(reasons), complete=True)
+        return _refusal(kept.differences[0].line, reasons[0].message, origin)
+    return Refused(tuple(reasons), complete=True)
 
 
 def _refusal(line: int, message: str, origin: Origin) -> ProgramError:
@@ -63,12 +84,38 @@ def unrolled_again(sources: Sources, program: Source, text: bytes, loaded: Loade
     return as_asked(sources, program.holding(text), loaded.setup, loaded.dialect, flat)
 
 
-def finding_of(kept: Kept) -> Finding:
-    """What is said of a program whose flow was kept; lines are those that the origin counts."""
+@contextmanager
+def provably_kept() -> Iterator[None]:
+    """Why a program that kept its flow is not proved, with the way on."""
+    try:
+        yield
+    except ProgramError as error:
+        why = f"with its loops and subprograms kept the program is not proved ({error.message}); {_UNROLL}"
+        raise ProgramError(why, line=error.line or 1, code="OLP511") from None
+
+
+def through(unrolled: Unrolled, outer: Unrolled) -> Unrolled:
+    """A text that was unrolled from `outer`, with the lines of the program that `outer` was made from."""
+    return Unrolled.of(unrolled, unrolled.origin.through(outer.origin), unrolled.within)
+
+
+def findings_of(flow: Flow) -> tuple[Finding, ...]:
+    """What is said of a program whose flow was kept, in lines that its origin counts."""
+    found: list[Finding] = []
+    if flow.calls:
+        count = len(flow.calls)
+        which = "a call is" if count == 1 else f"{count} calls are"
+        what = f"{which} written out, as other numbers are needed there than in the other calls"
+        found.append(Finding("OLP110", what, flow.calls[0], flow.calls[:_LINES], len(flow.calls)))
+    if flow.kept is None:
+        return tuple(found)
     what = "loops and subprograms are kept; "
-    if kept.repeated:
-        what += f"{len(kept.repeated)} corrected lines run more than once, with the same numbers in each pass"
+    if flow.kept.repeated:
+        count = len(flow.kept.repeated)
+        what += f"{count} corrected lines run more than once, with the same numbers in each pass"
     else:
         what += "no corrected line runs more than once"
-    lines = kept.repeated or kept.changed
-    return Finding("OLP109", what, lines[0] if lines else None, lines[:10], len(lines))
+    lines = flow.kept.repeated or flow.kept.changed
+    if flow.outer is not None:
+        lines = tuple(flow.outer.origin.lines_of(lines).tolist())
+    return (*found, Finding("OLP109", what, lines[0] if lines else None, lines[:_LINES], len(lines)))

@@ -29,6 +29,7 @@ TURN = b"GOTO/10,0,0\nCIRCLE/0,0,0,0,0,1,10,0.06,0.5,10,0\nGOTO/0,10,0\nFINI\n"
 TOUCH = "[work_offsets.G54]\n"
 LIST = b"# frame=G54\nX_mm,Y_mm,Z_mm\n"
 TURNED = b"# frame=G54\nX_mm,Y_mm,Z_mm,C_deg\n"
+CALLED = b"M98 P1 L2\nM2\nO1\nG1 X100\nX0\nM99\n"
 #: errors of a machine without files: one that does not depend on Z, and one that does
 SKEWED, LEANING = (olp.KnownErrors.of([f"{axes}=1mm/m"]) for axes in ("XY", "XZ"))
 PLAIN = b"G21 G90 G54\nG0 X0 Y0 Z0\nF600\n"
@@ -259,6 +260,10 @@ CASES: dict[str, tuple[Call, Call]] = {
         Call(b"G1 X100.001\n", nominal=b"G1 X100\n", options={"part_tolerance_um": 1.1}),
     ),
     "OLP109": (Call(b"o1 repeat [1]\nG1 X100\no1 endrepeat\nM2\n"), Call(b"G1 X100\nM2\n")),
+    "OLP110": (
+        Call(CALLED.replace(b"L2", b"\nG52 X500\nM98 P1"), **valued(0.0, 90.0)),
+        Call(CALLED, **valued(0.0, 90.0)),
+    ),
     "OLP201": (Call(b"G64\nG1 X100\n"), Call(b"G64 P0.0001 Q0\nG1 X100\n")),
     "OLP202": (
         Call(b"G64 P0.0101 Q0\nG1 X100\n", **scaled(10.0)),

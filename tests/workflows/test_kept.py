@@ -78,22 +78,62 @@ def test_an_expression_that_has_to_change_is_refused_with_the_way_on(machine: Pa
     assert caught.value.message.endswith("unroll the program with --flatten")
 
 
-def test_passes_that_need_other_numbers_are_refused_and_shown(machine: Path) -> None:
-    body = "G90 G54\nM98 P100\nG55\nM98 P100\nM2\nO100\nG1 X50 Y40\nX0\nM99\n"
+TWO_PLACES = "G54\nM98 P100 (left)\nG55\nM98 P100 (right)\nG54\nG0 X10 Y10 Z5\nM98 P100\nM2\nO100\n"
+TWO_PLACES = HEAD + TWO_PLACES + "N1 G1 X50 Y40 Z-1\nX10 Y10 Z5\nM99\n"
+
+
+def test_calls_that_need_other_numbers_are_written_out(machine: Path) -> None:
+    result = olp.correct(TWO_PLACES.encode(), machine)
+    assert result.report["verdict"]["ok"]
+    text = result.data.decode().splitlines()
+    assert [line for line in text if "M98" in line] == ["M98 P100 (left)", "M98 P100"]
+    second = text.index("(right)")
+    assert text[second + 1].startswith("G1 X")
+    assert len([line for line in text if line.startswith("N1 G1")]) == 1
+    found = {finding.code: finding for finding in result.findings}
+    assert (found["OLP110"].lines, found["OLP109"].lines) == ((7,), (13, 14))
+    worst = result.report["worst"]
+    assert {row["line"] for row in worst} <= {13, 14}
+    assert olp.verify(TWO_PLACES.encode(), result.data, machine).report["verdict"]["ok"]
+
+
+def test_a_loop_whose_passes_need_other_numbers_is_refused_and_shown(machine: Path) -> None:
+    text = HEAD + "G91\no1 repeat [3]\nG1 X150 Y40\nX-100\no1 endrepeat\nM2\n"
     with pytest.raises(Refused) as caught:
-        olp.correct((HEAD + body).encode(), machine)
+        olp.correct(text.encode(), machine)
     reasons = caught.value.reasons
-    assert {reason.line for reason in reasons} == {10, 11}
+    assert {reason.line for reason in reasons} == {6, 7}
     assert "its passes need" in reasons[0].message
-    assert olp.correct((HEAD + body).encode(), machine, flatten=True).report["verdict"]["ok"]
+    assert olp.correct(text.encode(), machine, flatten=True).report["verdict"]["ok"]
 
 
-def test_a_subprogram_in_a_file_of_its_own_is_not_changed(machine: Path, tmp_path: Path) -> None:
+def test_a_subprogram_in_a_file_of_its_own_is_written_out(machine: Path, tmp_path: Path) -> None:
     (tmp_path / "p.ngc").write_text(HEAD + "o<side> call\nM2\n")
     (tmp_path / "side.ngc").write_text("o<side> sub\nG1 X50\no<side> endsub\n")
+    result = olp.correct(tmp_path / "p.ngc", machine)
+    assert b"call" not in result.data
+    assert b"\nG1 X49.9" in result.data
+    (found,) = (finding for finding in result.findings if finding.code == "OLP110")
+    assert found.lines == (4,)
+    assert result.report["worst"][0]["file"] == "side.ngc"
+    (tmp_path / "out.ngc").write_bytes(result.data)
+    assert olp.verify(tmp_path / "p.ngc", tmp_path / "out.ngc", machine).report["verdict"]["ok"]
+
+
+def test_one_that_has_parameters_is_not(machine: Path, tmp_path: Path) -> None:
+    (tmp_path / "p.ngc").write_text(HEAD + "o<side> call [50]\nM2\n")
+    (tmp_path / "side.ngc").write_text("o<side> sub\nG1 X#1\no<side> endsub\n")
     with pytest.raises(ProgramError, match="in a file of its own") as caught:
         olp.correct(tmp_path / "p.ngc", machine)
     assert (caught.value.line, Path(caught.value.file or "").name) == (2, "side.ngc")
+
+
+def test_what_cannot_be_proved_is_not_kept(machine: Path) -> None:
+    """The flow depends on where the tool is, which the correction changes."""
+    text = HEAD + "G1 X20 Y10\no1 if [#<_x> eq 20]\nG1 Y20\no1 endif\nM2\n"
+    with pytest.raises(ProgramError, match=r"is not proved .*--flatten"):
+        olp.correct(text.encode(), machine)
+    assert olp.correct(text.encode(), machine, flatten=True).report["verdict"]["ok"]
 
 
 def test_no_error_no_edit(zero: Path) -> None:
@@ -165,11 +205,35 @@ def ends(text: bytes, folder: Path) -> np.ndarray:
     return np.asarray(axis[~still])
 
 
+def in_places(seed: int) -> str:
+    """A program without parameters whose subprograms are called at several places, twice at some of them."""
+    rng = random.Random(seed)
+    subs = []
+    for number in (100, 200):
+        x, y = (f"{rng.uniform(10, 90):.3f}" for _ in range(2))
+        inner = "M98 P200\n" if number == 100 and rng.random() < 0.5 else ""
+        subs.append(f"O{number}\nN7 G1 X{x} Y{y} Z-1.\nX20.000\n{inner}G1 X10. Y10. Z5.\nM99\n")
+    calls = [
+        f"{rng.choice(['G54', 'G55', 'G52 X30 Y40', 'G52 X0 Y0'])}\nG0 X10 Y10 Z5\n"
+        f"M98 P{rng.choice([100, 200])} L{rng.randint(1, 2)}"
+        for _ in range(rng.randint(2, 5))
+    ]
+    two = [f"{frame}\nG0 X10 Y10 Z5\nM98 P200" for frame in ("G52 X0 Y0\nG54", "G55")]
+    return HEAD + "\n".join([*calls, *two, "M2", ""]) + "".join(subs)
+
+
+def same_way(text: bytes, kept: olp.Correction, machine: Path) -> None:
+    unrolled = olp.correct(text, machine, flatten=True)
+    one, other = ends(kept.data, machine.parent), ends(unrolled.data, machine.parent)
+    assert one.shape == other.shape
+    np.testing.assert_allclose(one, other, rtol=0, atol=SAME)
+    np.testing.assert_allclose(ends(kept.plain, machine.parent), one, rtol=0, atol=1e-9)
+
+
 @pytest.mark.oracle
 @pytest.mark.parametrize("seed", range(24))
 def test_kept_and_unrolled_go_the_same_way(machine: Path, seed: int) -> None:
     text = drawn(seed).encode()
-    unrolled = olp.correct(text, machine, flatten=True)
     try:
         kept = olp.correct(text, machine)
     except ProgramError as refusal:
@@ -178,7 +242,16 @@ def test_kept_and_unrolled_go_the_same_way(machine: Path, seed: int) -> None:
         return
     assert kept.report["verdict"]["ok"]
     assert kept.data.count(b"call") == text.count(b"call")
-    one, other = ends(kept.data, machine.parent), ends(unrolled.data, machine.parent)
-    assert one.shape == other.shape
-    np.testing.assert_allclose(one, other, rtol=0, atol=SAME)
-    np.testing.assert_allclose(ends(kept.plain, machine.parent), one, rtol=0, atol=1e-9)
+    same_way(text, kept, machine)
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize("seed", range(12))
+def test_calls_at_several_places_go_the_same_way(machine: Path, seed: int) -> None:
+    text = in_places(seed).encode()
+    kept = olp.correct(text, machine)
+    assert kept.report["verdict"]["ok"]
+    same_way(text, kept, machine)
+    lines = {line for finding in kept.findings if finding.code == "OLP110" for line in finding.lines}
+    assert kept.data.count(b"M98") <= text.count(b"M98") - len(lines)
+    assert lines

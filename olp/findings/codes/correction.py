@@ -94,6 +94,15 @@ RULES = (
         "A subprogram that M98 calls with L2, for a spring pass.",
     ),
     _rule(
+        "OLP110",
+        "calls written out",
+        Severity.INFO,
+        "The passes of these calls need other numbers than the others. They were written out in the place of "
+        "the call; the other calls keep the subprogram.",
+        "Nothing needs to be done. The written program is longer by the blocks of these calls.",
+        "`M98 P1000` in G54 and in G55, where the machine has other errors.",
+    ),
+    _rule(
         "OLP401",
         "calibration expired",
         Severity.ERROR,

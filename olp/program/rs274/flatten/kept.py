@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from olp.core.arrays import Index
 from olp.core.errors import ProgramError
 from olp.program.kept import Difference, Kept
 from olp.program.origin import Unrolled
+from olp.program.rs274.flatten.apart import apart, can_be_apart, runs_once
 from olp.program.rs274.flatten.lines import Line, Word, compile_line
 from olp.program.rs274.profiles.base import Profile
 from olp.program.text.line_ends import split
@@ -36,16 +37,19 @@ def kept(unrolled: Unrolled, corrected: bytes, starts: Index, profile: Profile) 
     (n,) `starts` are where the lines of the unrolled text begin in the `corrected` one, which has no stamp.
     """
     origin = unrolled.origin
-    visits: dict[int, Counter[_Visit]] = {}
     bounds = [*starts.tolist(), len(corrected)]
-    for i, (line, raw) in enumerate(zip(origin.line.tolist(), profile.lines(unrolled), strict=True)):
-        written = corrected[bounds[i] : bounds[i + 1]]
-        visits.setdefault(line, Counter())[_bare(raw), _bare(written)] += 1
+    texts = profile.lines(unrolled)
+    visits: dict[int, dict[int, Counter[_Visit]]] = {}
+    rows = zip(origin.line.tolist(), unrolled.within.line.tolist(), texts, strict=True)
+    for i, (line, within, raw) in enumerate(rows):
+        visit = _bare(raw), _bare(corrected[bounds[i] : bounds[i + 1]])
+        visits.setdefault(line, {}).setdefault(within, Counter())[visit] += 1
     lines = list(origin.texts[: origin.lines])
     differences: list[Difference] = []
     changed: list[int] = []
     repeated: list[int] = []
-    for line, counts in sorted(visits.items()):
+    for line, runs in sorted(visits.items()):
+        counts = sum(runs.values(), Counter[_Visit]())
         if all(raw == written for raw, written in counts):
             continue
         try:
@@ -59,8 +63,34 @@ def kept(unrolled: Unrolled, corrected: bytes, starts: Index, profile: Profile) 
         changed.append(line)
         if counts.total() > 1:
             repeated.append(line)
-    text_of_all = None if differences else b"".join(lines)
-    return Kept(text_of_all, tuple(differences), tuple(changed), tuple(repeated))
+    if not differences:
+        return Kept(b"".join(lines), (), tuple(changed), tuple(repeated))
+    calls = _calls(unrolled, {d.line: visits[d.line] for d in differences}, profile)
+    program = apart(unrolled, calls, texts) if calls else None
+    return Kept(None, tuple(differences), tuple(changed), tuple(repeated), program, tuple(sorted(calls)))
+
+
+def _calls(
+    unrolled: Unrolled, lines: Mapping[int, Mapping[int, Counter[_Visit]]], profile: Profile
+) -> frozenset[int]:
+    """The calls to write out, so that what is left of each of these lines has the same numbers; empty where
+    that does not help. `lines` are the visits of each by the line of the program that they run in."""
+    origin, chosen = unrolled.origin, set[int]()
+    if not can_be_apart(unrolled):
+        return frozenset()
+    for line, runs in lines.items():
+        same = Counter[_Visit]()
+        for within, counts in runs.items():
+            try:
+                if line > origin.lines:
+                    raise _cannot("it is in a file of its own")
+                _of_visits(origin.texts[line - 1], same + counts, profile)
+                same += counts
+            except ProgramError:
+                if within == line:
+                    return frozenset()
+                chosen.add(within)
+    return frozenset(chosen) if chosen <= runs_once(unrolled) else frozenset()
 
 
 def _cannot(why: str) -> ProgramError:

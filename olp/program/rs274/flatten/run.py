@@ -84,6 +84,8 @@ class Walk(Branches):
                             f"subprogram {frame.label} has no end (ENDSUB or M99)", code="OLP542"
                         )
                     return
+                if len(self._frames) == 1:
+                    frame.run += 1
                 self.budget.spend(_VISIT + len(frame.unit.lines[index]))
                 line = frame.unit.line(index)
                 frame.next_index += 1
@@ -210,6 +212,8 @@ class Walk(Branches):
             raise ProgramError(
                 f"subprograms call one another more than {MAX_LEVEL} levels deep", code="OLP543"
             )
+        caller = self._frames[-1]
+        frame.within, frame.run = caller.within or caller.next_index, self._frames[0].run
         self._frames.append(frame)
         self.variables.locals, self.variables.names = frame.locals, frame.names
 

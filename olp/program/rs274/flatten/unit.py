@@ -139,6 +139,9 @@ class Frame:
     start: int = 0
     repeats: int = 0
     modal: bool = False
+    #: the line of the program itself that this level runs in, 0 for the program, and the number of that run
+    within: int = 0
+    run: int = 0
     taken: set[str] = field(default_factory=set)
     loops: dict[str, int] = field(default_factory=dict)
     dos: dict[str, int] = field(default_factory=dict)

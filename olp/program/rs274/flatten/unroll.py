@@ -22,7 +22,7 @@ import numpy as np
 from olp.core.budget import Budget
 from olp.core.errors import ProgramError
 from olp.core.units import AXES
-from olp.program.origin import Origin, Unrolled
+from olp.program.origin import Origin, Unrolled, Within
 from olp.program.rs274.cycles import Stroke, stroke_budget
 from olp.program.rs274.flatten.expressions import filled, whole
 from olp.program.rs274.flatten.language import Language
@@ -80,7 +80,7 @@ def flatten(
     Walk(main, writer.variables, subprograms, visit, block_delete=block_delete, budget=budget).run()
     if not writer.moves:
         _refuse_library(main)
-    return Unrolled.of(writer.text(main), writer.origin(main))
+    return Unrolled.of(writer.text(main), writer.origin(main), writer.within())
 
 
 def _refuse_library(main: Unit) -> None:
@@ -140,6 +140,9 @@ class _Flattener:
         # the unit and the line that each block was made from, and those of the present line
         self._sources: list[tuple[int, int]] = []
         self._present = (0, 0)
+        # the line of the program itself that each block runs in, with the number of that run
+        self._within: list[tuple[int, int]] = []
+        self._running = (0, 0)
         self._units: dict[int, Unit] = {}
 
     def text(self, main: Unit) -> bytes:
@@ -163,14 +166,21 @@ class _Flattener:
             np.array([before[key] + number for key, number in self._sources], np.int64),
         )  # fmt: skip
 
+    def within(self) -> Within:
+        """The line of the program itself that every block runs in."""
+        rows = np.array(self._within, np.int64).reshape(-1, 2)
+        return Within(rows[:, 0], rows[:, 1])
+
     def _put(self, raw: bytes, eol: bytes) -> None:
         """Write a block of the present line."""
         self._blocks.append((raw, eol))
         self._sources.append(self._present)
+        self._within.append(self._running)
 
     def block(self, line: Line, frame: Frame, without: frozenset[int]) -> bool:
         """Write one executed line, its words at indices `without` left out; True where the program ends."""
         self._present = (frame.unit.key, line.number)
+        self._running = (frame.within or line.number, frame.run)
         self._units[frame.unit.key] = frame.unit
         seen = self._present in self._seen
         self._seen.add(self._present)
