@@ -67,7 +67,7 @@ def read(
 
 
 def _can_be_unrolled(sources: Sources, program: Source, setup: Setup, dialect: Dialect) -> bool:
-    if dialect.unroller is None:
+    if dialect.unroller is None or dialect.keeper is None:
         return False
     try:
         as_asked(sources, program, setup, dialect, UnrollOptions(flatten=True))

@@ -159,7 +159,8 @@ def test_what_each_dialect_of_statements_says_of_itself() -> None:
     assert (apt.points, apt.axes_at_ram, dmis.points, dmis.axes_at_ram) == (False, False, True, True)
     for dialect in (apt, dmis, DIALECTS["list"]):
         assert (dialect.marks, dialect.payload_comments, dialect.path_tolerance) == (True, False, False)
-        assert (dialect.inch_decimals, dialect.free_digits, dialect.unroller) == (5, 1, None)
+        assert (dialect.inch_decimals, dialect.free_digits, dialect.keeper) == (5, 1, None)
+        assert (dialect.unroller is None) == (dialect is not apt)
         assert dialect.straightened(b"G2 X1\n") == b"G2 X1\n"
         assert dialect.lines(b"a\r\nb\rc") == [b"a\r\n", b"b\r", b"c"]
     assert not DIALECTS["list"].continues(b"a $")

@@ -93,8 +93,9 @@ def test_a_statement_of_several_lines_goes_whole() -> None:
     assert stated(text, "apt") == [(4, "OLP512", None), (8, "OLP512", None)]
 
 
-def test_what_a_table_refuses_is_refused_behind_text_words_too() -> None:
-    assert stated(b"PARTNO A\nUNITS/MM\nCATPROCESS A\nGOTO/1,2,3\n", "apt") == [(3, "OLP512", None)]
+def test_a_text_word_is_no_statement_that_a_table_refuses() -> None:
+    text = b"PARTNO A\nUNITS/MM\nPOINT/1\nCATPROCESS A=POINT/1\nPPRINT POINT/1\nGOTO/1,2,3\n"
+    assert stated(text, "apt") == [(3, "OLP512", None)]
 
 
 def test_a_hint_to_unroll_is_given_where_that_helps() -> None:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
+from typing import Any
 
 from olp.core.machine import Setup
 from olp.program.apt.table import TABLE
 from olp.program.dialect import Dialect, Options, StatementDialect
+from olp.program.origin import Unrolled
 from olp.program.program import Program
 from olp.program.text.signs import POINTS_BY_SLASH
 
@@ -20,12 +22,19 @@ def _read(data: bytes, setup: Setup, dialect: Dialect, options: Options, *, word
     return read(data, setup, dialect, options, words=words)
 
 
+def _unroll(data: bytes, dialect: Dialect, **options: Any) -> Unrolled:
+    from olp.program.apt.unroll import unroll
+
+    return unroll(data, dialect, **options)
+
+
 DIALECT = StatementDialect(
     name="apt",
     table=TABLE,
     title="APT and cutter-location data (ISO 4343, ISO 3592)",
     path_mode="the post-processor's",
     reader=_read,
+    unroller=_unroll,
     endings=_ENDINGS,
     folder_endings=_ENDINGS,
     sign=re.compile(

@@ -9,16 +9,16 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from olp.core.errors import ProgramError
-from olp.core.machine import ZERO, Setup, Vector
+from olp.core.machine import Setup
 from olp.core.toolpath import CutterCompensation, Flag, Kind
 from olp.core.units import MM_PER_INCH
 from olp.core.values import dataclass
 from olp.program.apt.arcs import ArcForm, circle, directed, movarc
 from olp.program.apt.chords import leaning
 from olp.program.apt.controls import changes_tool, check_prefun, check_set, check_turn, numbers_of
-from olp.program.apt.transforms import NOTHING, Rigid, rigid
+from olp.program.apt.placing import OFF, Placing
 from olp.program.dialect import Dialect, Options
-from olp.program.frames import UP, FrameTable, Placement, product, tool_vector_of, turn_of, turned
+from olp.program.frames import tool_vector_of
 from olp.program.statement_rows import Points, StatementCollector
 from olp.program.text.statements import Field, Statement, shown
 
@@ -26,12 +26,8 @@ NAN = float("nan")
 #: text of INSERT that is a block of words, one of which may move
 _BLOCK = re.compile(rb"(?i)\s*(?:[A-Z]\s*[=+-]?\s*[\d.]+\s*|\([^)]*\)\s*)+\Z")
 _MOVING = re.compile(rb"(?i)[GXYZUVWABC]\s*[=+-]?\s*[\d.]|M\s*(?:98|6|06)\b|[PL]\s*\d")
-_OFF = frozenset((b"OFF", b"NOMORE"))
 #: words of CYCLE that set values and begin no cycle
 _CYCLE_MESSAGE = frozenset((b"INIT", b"CLEAR", b"PARAM", b"AVOID"))
-#: how far the length of a direction may be from 1
-UNIT = 1e-3
-_IDENTITY = (1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)
 #: mm per minute of one unit of a feed per minute
 _PER_MINUTE = {b"MMPM": 1.0, b"IPM": MM_PER_INCH, b"PERMIN": 1.0}
 #: mm per turn of one unit of a feed per turn
@@ -49,33 +45,17 @@ class Cycle:
     feed_mm_s: float
 
 
-class Events:
+class Events(Placing):
     """The state while one program is read, and a handler for each statement that changes it. `_resolve`,
     which the reader defines, turns the points before an event into positions."""
 
     def __init__(self, data: bytes, setup: Setup, dialect: Dialect, options: Options, words: bool) -> None:
-        self.data, self.setup, self.options = data, setup, options
-        self.collector = StatementCollector(data, dialect, keep_words=words)
-        self.table = FrameTable(setup)
+        super().__init__(setup, StatementCollector(data, dialect, keep_words=words))
+        self.data, self.options = data, options
         self.start = [NAN if p is None else p for p in setup.job.start_mm]
         self.position = list(self.start)
-        self.unit_mm, self.unit_stated = 1.0, False
-        self.tool = setup.machine.default_tool
-        self.length_active = setup.machine.length_active
-        self.axis: Vector = UP
-        self.up: Vector = UP
-        self.systems: list[tuple[object, object]] = []
-        self.system: tuple[object, object] = (None, None)
-        self.transform: Rigid = NOTHING
-        self.shift: Vector = ZERO
         self.skipped = 0
-        #: whether an arc may lie in no plane of two axes
-        self.may_lean = any(
-            any(work.rotation_deg)
-            for work in (*setup.machine.work_offsets.values(), *setup.job.work_offsets.values())
-        )
         self.home: list[float] | None = None
-        self.compensation: CutterCompensation | None = None
         self.cycle: Cycle | None = None
         self.last_cycle: Cycle | None = None
         self.turns_s = 0.0
@@ -100,6 +80,7 @@ class Events:
             b"FROM": self._from, b"GOHOME": self._gohome, b"SPINDL": self._spindle, b"DELAY": self._delay,
             b"STOP": self._rest, b"OPSTOP": self._rest, b"RETRCT": self._unknown, b"GOCLER": self._unknown,
             b"INSERT": self._insert, b"INDIRV": self._indirv, b"FINI": self._fini, b"TRANS": self._trans,
+            b"COPY": self._copy,
             b"UNLOAD": self._unknown, b"AUXFUN": self._auxfun, b"PREFUN": self._prefun, b"SET": self._set,
             b"OPSKIP": self._opskip, b"ROTABL": self._turn, b"ROTATE": self._turn, b"ROTHED": self._turn,
         }  # fmt: skip
@@ -124,41 +105,6 @@ class Events:
             )
         else:
             self.start = [NAN] * 3
-
-    def _frame(self, line: int) -> int:
-        """The number of the present frame."""
-        name = self.setup.machine.default_work_offset
-        if self.system not in self.systems:
-            self.systems.append(self.system)
-        count = self.systems.index(self.system) + 1
-        own = f"CSYS{count}"
-        if count > 1 or self.setup.work_offset(own) is not None:
-            name = own
-        work = self.table.work_offset(
-            name, line, "the program" if count == 1 else f"coordinate system {count} of the program"
-        )
-        length = tool_vector = ZERO
-        if self.tool:
-            tool_vector = tool_vector_of(self.setup, self.tool, line)
-            if self.length_active:
-                tool = self.setup.tool(self.tool)
-                assert tool is not None
-                length = tool.length_mm
-        inner = self._placement()
-        # an axis that was never stated is the Z axis of the machine
-        turn = product(turn_of(work.rotation_deg), inner.turn)
-        self.up = UP if self.axis == UP else turned(turn, self.axis)
-        return self.table.index(
-            work, line, inner=inner, unit_mm=self.unit_mm, tool=self.tool, length=length,
-            tool_vector=tool_vector, axis=self.up, length_active=self.length_active and bool(self.tool),
-            compensation=self.compensation,
-        )  # fmt: skip
-
-    def _placement(self) -> Placement:
-        """The transforms in force: TRACUT first, then TRANS."""
-        stated = zip(self.transform.shift, self.shift, strict=True)
-        x, y, z = ((a + b) * self.unit_mm for a, b in stated)
-        return Placement(self.transform.turn, (x, y, z))
 
     def _feed(self, statement: Statement, row: int) -> None:
         self.feed_mm_s = feed_of(statement, self.unit_mm, self.turns_s)
@@ -226,7 +172,7 @@ class Events:
         self._resolve(row)
         fields = statement.fields()
         word = fields[0].text if fields else b""
-        if word in _OFF:
+        if word in OFF:
             self.cycle = None
         elif word == b"ON":
             self.cycle = self.last_cycle
@@ -265,80 +211,6 @@ class Events:
             self.compensation = None
         elif words & {b"LEFT", b"RIGHT"}:
             self.compensation = CutterCompensation(plane=0, left=b"LEFT" in words)
-
-    def _tlaxis(self, statement: Statement, row: int) -> None:
-        self._resolve(row)
-        numbers = [f.number for f in statement.fields()]
-        if len(numbers) != 3 or None in numbers:
-            raise ProgramError(
-                "TLAXIS is read with three numbers only: the direction from tip to gauge point",
-                line=statement.line,
-                code="OLP516",
-            )
-        x, y, z = (n[0] / 10.0 ** n[1] for n in numbers if n is not None)
-        size = (x * x + y * y + z * z) ** 0.5
-        if not abs(size - 1.0) < UNIT:
-            raise ProgramError(
-                f"TLAXIS has length {size:.6g}; expected a direction of length 1",
-                line=statement.line,
-                code="OLP516",
-            )
-        self.axis = axis_of(x / size, y / size, z / size)
-
-    def _csys(self, statement: Statement, row: int) -> None:
-        values = []
-        for field in statement.fields():
-            pair = field.number
-            if pair is None:
-                if field.text in _OFF:
-                    continue
-                raise ProgramError(
-                    f"the coordinate system is given by the name {shown(field.text)}; expected its numbers",
-                    line=statement.line,
-                    code="OLP523",
-                )
-            values.append(round(pair[0] / 10.0 ** pair[1], 9))
-        key: object = tuple(values)
-        if key == _IDENTITY or not any(values) or key == (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0):
-            key = None
-        csys, origin = self.system
-        system = (csys, key) if statement.head()[1] == b"ORIGIN" else (key, origin)
-        if system != self.system:
-            self._resolve(row)
-            self.system = system
-
-    def _tracut(self, statement: Statement, row: int) -> None:
-        self._resolve(row)
-        words = [f.text for f in statement.fields()]
-        if words in ([], [b"NOMORE"], [b"OFF"]):
-            self.transform = NOTHING
-            return
-        self.transform = rigid(words, statement)
-        self.may_lean |= self.transform.turn is not None
-        self._transformed(statement)
-
-    def _trans(self, statement: Statement, row: int) -> None:
-        self._resolve(row)
-        words = [f.text for f in statement.fields()]
-        numbers = numbers_of(statement)
-        if words in ([b"NOMORE"], [b"OFF"]):
-            numbers = [0.0] * 3
-        elif len(numbers) != 3 or len(words) != 3:
-            raise ProgramError(
-                "TRANS is read with three numbers: the shift of the points after it",
-                line=statement.line,
-                code="OLP516",
-            )
-        x, y, z = numbers
-        self.shift = (x, y, z)
-        if any(numbers):
-            self._transformed(statement)
-
-    def _transformed(self, statement: Statement) -> None:
-        name = shown(statement.head()[1])
-        self.collector.remarks.setdefault(
-            "transform", (statement.line, f"{name} is taken as applied to the points after it")
-        )
 
     def _from(self, statement: Statement, row: int) -> None:
         self._resolve(row)
@@ -410,19 +282,22 @@ class Events:
     def _set(self, statement: Statement, row: int) -> None:
         check_set(statement)
 
+    def _copy(self, statement: Statement, row: int) -> None:
+        raise ProgramError(
+            "COPY repeats the moves since INDEX", hint="unroll the program with --flatten",
+            line=statement.line, code="OLP511",
+        )  # fmt: skip
+
     def _turn(self, statement: Statement, row: int) -> None:
         check_turn(statement)
 
     def _opskip(self, statement: Statement, row: int) -> None:
         self._resolve(row)
-        self.skipped = 0 if any(f.text in _OFF for f in statement.fields()) else statement.line
+        self.skipped = 0 if any(f.text in OFF for f in statement.fields()) else statement.line
 
     def _fini(self, statement: Statement, row: int) -> None:
         self._resolve(row)
         self.ended = statement.line
-
-    def _resolve(self, upto: int) -> None:
-        raise NotImplementedError
 
 
 def feed_of(statement: Statement, unit_mm: float, turns_s: float) -> float:
@@ -441,7 +316,3 @@ def feed_of(statement: Statement, unit_mm: float, turns_s: float) -> float:
         if name in words:
             return value * (unit_mm if name == b"PERREV" else scale) * turns_s if turns_s else NAN
     return NAN if words & {b"INVERSE", b"INVERS"} else value * unit_mm / 60.0
-
-
-def axis_of(x: float, y: float, z: float) -> Vector:
-    return (x, y, z) if (x, y) != (0.0, 0.0) or z < 0 else UP

@@ -20,7 +20,8 @@ from olp.core.progress import Progress
 from olp.core.toolpath import Flag, Kind
 from olp.program.apt.arc_moves import ArcMoves, Part
 from olp.program.apt.arcs import tlon
-from olp.program.apt.events import UNIT, Cycle, axis_of
+from olp.program.apt.events import Cycle
+from olp.program.apt.placing import UNIT, axis_of
 from olp.program.apt.table import FREE, TABLE
 from olp.program.dialect import Dialect, Options, Support
 from olp.program.frames import UP

@@ -47,7 +47,7 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"$$-> CSYS": (_R, "Creo's coordinate system, in a comment: a frame of the job"),
     b"TRACUT": (_R, "a rotation and shift in numbers, for the points after it; NOMORE ends it"),
     b"TRANS": (_R, "a shift of the points after it, in numbers"),
-    b"COPY": (_NO, "repeats moves at other positions; send the output of the APT processor (CLDATA)"),
+    b"COPY": (_R, "repeats the moves since INDEX: where --flatten writes them out, else refused"),
     b"SPINDL": (_R, "the spindle, for feeds per turn"),
     b"DELAY": (_R, "a dwell in seconds"),
     b"STOP": (_R, "the motion rests"),

@@ -13,8 +13,9 @@ import numpy as np
 from olp.core.arrays import Array
 from olp.core.errors import ProgramError
 from olp.core.machine import Vector
-from olp.core.turns import Turn
+from olp.core.turns import Turn, rows_of
 from olp.core.values import dataclass
+from olp.program.frames import product
 from olp.program.text.statements import Statement, number_of, shown
 
 #: how far a stated matrix may be from a rotation: numbers of four decimals
@@ -39,6 +40,11 @@ class Rigid:
     def directed(self, direction: Array) -> Array:
         """(n, 3) directions after the transform."""
         return direction if self.turn is None else np.asarray(direction @ np.array(self.turn).T, float)
+
+    def then(self, other: Rigid) -> Rigid:
+        """This transform, and another after it."""
+        x, y, z = other.placed(np.array([self.shift]))[0].tolist()
+        return Rigid(product(other.turn, self.turn), (x, y, z))
 
 
 NOTHING = Rigid(None, (0.0, 0.0, 0.0))
@@ -80,12 +86,6 @@ def about(axis: int, degrees: float) -> Turn:
     matrix[a, a] = matrix[b, b] = cosine
     matrix[a, b], matrix[b, a] = -sine, sine
     return rows_of(matrix)
-
-
-def rows_of(matrix: Array) -> Turn:
-    """A matrix as a value."""
-    a, b, c = ((float(x), float(y), float(z)) for x, y, z in matrix.tolist())
-    return (a, b, c)
 
 
 def _rotation(matrix: Array, statement: Statement) -> Rigid:
