@@ -201,11 +201,12 @@ def _tails(writer: Writer, rows: Rows, arcs: ArcRows, absolute: Mask) -> Iterato
 
 
 def _leads(writer: Writer, rows: Rows, arcs: ArcRows) -> npt.NDArray[np.int32]:
-    """(m,) prefixes before the first letter of each new block: line end, `/` and, behind a step that takes up
-    backlash, the code of the arc."""
+    """(m,) prefixes before the first letter of each new block: line end, `/` and the code of the arc behind a
+    step that takes up backlash, and where no code holds from line to line."""
     starts, of = writer.style.block_starts(arcs.line)
     table = np.array([[writer.prefixes(s + code) for code in (b"", b"G2 ", b"G3 ")] for s in starts])
     taken_up = (arcs.row > 0) & rows.take_up[np.maximum(arcs.row - 1, 0)]
+    taken_up |= writer.program.rs274.commands is not None
     code = np.where(writer.clockwise(arcs.move, arcs.plane), 1, 2)
     return table[of, np.where(taken_up, code, 0)].astype(np.int32)
 

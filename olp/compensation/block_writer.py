@@ -15,6 +15,7 @@ from olp.compensation.holes import HoleWords
 from olp.compensation.inserted_blocks import block_edits
 from olp.compensation.plan import Plan
 from olp.compensation.rows import Rows
+from olp.compensation.shared_words import shared_edits
 from olp.compensation.stretches import Decimals, Stretches, digits_of
 from olp.compensation.writer import Writer
 from olp.core.arrays import Array, Index, Mask, distinct
@@ -45,7 +46,8 @@ class BlockWriter(Writer):
             else:
                 self._digits(rows, columns, a, b)
         self._after_block_delete(rows)
-        edits += [*self._word_edits(rows), *arc_edits(self, rows), *self._captures(rows)]
+        edits += [*self._word_edits(rows), *arc_edits(self, rows), *shared_edits(self, rows)]
+        edits += self._captures(rows)
         return self._spliced(edits, begin, end)
 
     def _breaks(self, rows: Rows) -> list[int]:

@@ -12,7 +12,7 @@ from olp.compensation.rows import Rows
 from olp.compensation.writer import Writer
 from olp.core.arrays import Index, Mask, distinct, is_in
 from olp.core.errors import ProgramError
-from olp.core.toolpath import Flag
+from olp.core.toolpath import Flag, Kind
 from olp.program.rs274.codes import (
     ABSOLUTE,
     FURTHER_OFFSETS,
@@ -39,7 +39,8 @@ def block_edits(writer: Writer, rows: Rows, tails: Index) -> list[Edits]:
     place = np.where(
         before, writer.program.line_start[line_no - 1], writer.program.line_end[line_no - 1]
     ).astype(np.int64)
-    lead = _leads(writer, line_no, arc & straight, before)
+    rapid = writer.path.kind[rows.move[tails]] == Kind.RAPID
+    lead = _leads(writer, line_no, arc & straight, before, rapid)
     write = rows.write[tails]
     first_axis = np.where(write.any(axis=1), write.argmax(axis=1), -1)
     columns: list[Edits] = []
@@ -77,16 +78,19 @@ def block_edits(writer: Writer, rows: Rows, tails: Index) -> list[Edits]:
     return [*columns, edits.done()]
 
 
-def _leads(writer: Writer, line_no: npt.NDArray[np.int32], turning: Mask, before: Mask) -> Index:
-    """Prefix of the first word of each inserted block: line end, `/` and, to take up backlash at an
-    arc, G1."""
+def _leads(writer: Writer, line_no: npt.NDArray[np.int32], turning: Mask, before: Mask, rapid: Mask) -> Index:
+    """Prefix of the first word of each inserted block: line end, `/` and the code of the move, where that in
+    force is another one or none holds from line to line."""
+    commands = writer.program.rs274.commands is not None
     prefixes = writer.prefixes
     starts, which = writer.style.block_starts(line_no)
-    table = np.zeros((len(starts), 3), np.int64)
+    table = np.zeros((len(starts), 4), np.int64)
     for i, start in enumerate(starts):
         deleted = b"/" if start.endswith(b"/") else b""
-        table[i] = (prefixes(start), prefixes(start + b"G1 "), prefixes(deleted + b"G1 "))
-    return np.asarray(table[which, np.where(before, 2, np.where(turning, 1, 0))], np.int64)
+        leads = (start, start + b"G1 ", deleted + b"G1 ", start + b"G0 ")
+        table[i] = [prefixes(lead) for lead in leads]
+    plain = np.where(rapid, 3, 1) if commands else np.where(turning, 1, 0)
+    return np.asarray(table[which, np.where(before, 2, plain)], np.int64)
 
 
 def _check_take_up(writer: Writer, rows: Rows, row: int) -> None:

@@ -257,6 +257,15 @@ class MachineFile(Table):
         description="what 1 of a factor of G51 is to a Fanuc control, whose parameter sets it: 0.001 or "
         "0.00001",
     )
+    arc_centres: Literal["incremental", "absolute"] | None = Field(
+        default=None,
+        description="what I, J and K of arcs are before any G90.1 or G91.1, by a setting of Mach3 and Mach4: "
+        "distances from the start of the arc, or positions",
+    )
+    still_macros: list[Text] = Field(
+        default=[],
+        description="the macros of a Klipper printer that move no axis and change no mode, by their names",
+    )
     controller: Controller = Field(description="the dialect of the programs: " + ", ".join(CONTROLLERS))
     calibration: Text | None = Field(
         default=None, description="the path of the calibration file, relative to this file"

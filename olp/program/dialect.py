@@ -77,11 +77,12 @@ class Dialect:
 
     `endings` are endings of files, in small letters, that only this dialect has. `folder_endings` are those
     by which a file in a folder is known as a program, also where several dialects have them. `sign` matches
-    what only its texts say at the start of a line, `shared_sign` what texts of other dialects say too. With
-    `payload_comments` the payload may change inside a program. `path_tolerance`: programs state how far the
-    control may leave the path (G64 P), and without it the control has no bound. `axes_at_ram`: axis positions
-    count at the end of the ram, whatever stylus or tool is active. `points`: programs state points, and all
-    of them count, however the machine goes there.
+    what only its texts say at the start of a line, `shared_sign` what texts of other dialects say too.
+    `languages` are those of `olp.program.foreign` that its own texts look like. With `payload_comments` the
+    payload may change inside a program. `path_tolerance`: programs state how far the control may leave the
+    path (G64 P), and without it the control has no bound. `axes_at_ram`: axis positions count at the end of
+    the ram, whatever stylus or tool is active. `points`: programs state points, and all of them count,
+    however the machine goes there.
     """
 
     name: str
@@ -94,6 +95,7 @@ class Dialect:
     folder_endings: tuple[str, ...] = ()
     sign: re.Pattern[bytes] | None = None
     shared_sign: re.Pattern[bytes] | None = None
+    languages: frozenset[str] = frozenset()
     payload_comments: bool = False
     path_tolerance: bool = False
     axes_at_ram: bool = False

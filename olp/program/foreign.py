@@ -15,6 +15,9 @@ from olp.core.values import dataclass
 LOOKED_AT = 1 << 16
 
 _OTHER_POST = "post-process the part for the control of the machine file, or give the CAM system's APT CLDATA"
+_OSP = (
+    "plain moves of it are read with --dialect okuma; else post-process for the control of the machine file"
+)
 _ROBOT = (
     "robots are not corrected from their own language; give a list of positions in the frame of the machine "
     "(CSV), or the CAM system's APT CLDATA"
@@ -145,7 +148,7 @@ FOREIGN = (
     Foreign(
         "Okuma OSP",
         _line(rb"\$[\w-]+\.(?:MIN|SSB|SUB)\b|(?:N\d+[ \t]*)?(?:CALL[ \t]+O\w+|V[CT]\w+[ \t]*=)"),
-        _OTHER_POST,
+        _OSP,
         language=True,
     ),
     Foreign(
@@ -161,12 +164,12 @@ BINARY_SHARE = 50
 _BINARY = re.compile(rb"[\x00-\x08\x0e-\x10\x15-\x19\x1c-\x1f]")
 
 
-def recognised(data: bytes, *, languages: bool) -> ProgramError | None:
+def recognised(data: bytes, *, languages: bool, own: frozenset[str] = frozenset()) -> ProgramError | None:
     """Why a text is no program that is read, by the name of what it is; None where it is not recognised.
-    With `languages` those of other controls are looked for too."""
+    With `languages` those of other controls are looked for too, but not the `own` ones of its dialect."""
     start = data[:LOOKED_AT]
     for kind in FOREIGN:
-        if kind.language and not languages:
+        if kind.language and (not languages or kind.name in own):
             continue
         matches = [match for match, _ in zip(kind.sign.finditer(start), range(kind.least), strict=False)]
         if len(matches) == kind.least:

@@ -50,6 +50,21 @@ class ArcSlots:
     absolute: npt.NDArray[np.bool_]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class SharedWords:
+    """Per line of the text the `word` that belongs to its whole move and is shared out where that is split,
+    as that of an extruder: its index or -1, its value `before` the move, and whether it is a `distance`. All
+    are empty where a program has no such words."""
+
+    word: Small
+    before: npt.NDArray[np.float64]
+    distance: npt.NDArray[np.bool_]
+
+    @staticmethod
+    def none() -> SharedWords:
+        return SharedWords(np.zeros(0, np.int32), np.zeros(0), np.zeros(0, bool))
+
+
 @dataclass(frozen=True, slots=True)
 class ArcText:
     """How a program of statements states an arc: bytes `begin`..`end` of what states it beside its end point.
@@ -153,6 +168,7 @@ class Program:
     end_line: int = 0
     calculator: bool = True
     statements: Statements | None = None
+    shared: SharedWords = field(default_factory=SharedWords.none)
     by_original: bool = False
 
     @property

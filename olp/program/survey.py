@@ -102,7 +102,7 @@ def read_all(
         from olp.program.foreign import recognised
 
         certain = dialect.sign is not None or setup.job.described is not None
-        other = recognised(data, languages=not certain)
+        other = recognised(data, languages=not certain, own=dialect.languages)
         if other is not None:
             raise other from None
         # an unrolled text has no statements of its own

@@ -215,12 +215,12 @@ SAMPLES = (
         notes=("$160 = 0.04 mm is compensated",),
     ),
     Sample(
-        "klipper", "printer.cfg", KLIPPER, "grbl", of((-5.0, 235.0), (0.0, 240.0), (-2.0, 248.5)),
+        "klipper", "printer.cfg", KLIPPER, "klipper", of((-5.0, 235.0), (0.0, 240.0), (-2.0, 248.5)),
         (300.0, 300.0, 15.0), (3000.0, 3000.0, 3000.0), offsets={"G54": (0.0, 0.0, 0.0)},
-        notes=("[skew_correction bed] corrects squareness", "take out M117", "no jerk"),
+        notes=("[skew_correction bed] corrects squareness", "G54 stands for the bed", "no jerk"),
     ),
     Sample(
-        "marlin", "m503.txt", MARLIN, "grbl", of((0.0, 220.0), (-4.0, 225.0), (0.0, 250.0)),
+        "marlin", "m503.txt", MARLIN, "marlin", of((0.0, 220.0), (-4.0, 225.0), (0.0, 250.0)),
         (500.0, 400.0, 5.0), (500.0, 450.0, 100.0), compensated=frozenset({"C0Y"}),
         offsets={"G54": (0.0, 0.0, 0.0)},
         notes=("M852 corrects C0Y", "M425 X = 0.08 mm", "no jerk"),

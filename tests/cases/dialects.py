@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from olp.program import registry
-from olp.program.rs274.profiles.base import Profile
+from olp.program.rs274.profiles.base import Act, Profile
 
 NUMBER = rb"[+-]?(?:\d+\.?\d*|\.\d+)"
 Lines = list[str]
@@ -61,12 +61,17 @@ def _karel(values: Sequence[float], digits: int) -> str:
     return f"{name} = POS({_list(values, digits)},0,180,0,config)\nMOVE TO {name}"
 
 
-def _rs274(name: str) -> Case:
+def _rs274(name: str, profile: Profile) -> Case:
+    opening, closing = profile.comment
+    head = ["G21 G90 G17 G54 G94 F600"] if profile.codes.get(540) is Act.EVENT else ["G21 G90 G17 G94 F600"]
+    between = " "
+    if profile.commands is not None:
+        head, between = ["G21", "G90", "G0 F600"], "\n"
     return Case(
-        name, name, "GXYZIJKRFMTNSPQHLDO%/;()[]#=+-. 0123456789\r\n\t:<>\"'^!",
-        ["G21 G90 G17 G54 G94 F600"], ["M2"],
-        lambda p, d: f"G1 {_words(p, d)}", lambda p, d: f"G91 G1 {_words(p, d)}",
-        lambda text: f"({text})",
+        name, name, "GXYZIJKRFMTNSPQHLDOE%/;()[]#=+-. 0123456789\r\n\t:<>\"'^!_*",
+        head, ["M2"] if profile.commands is None else [],
+        lambda p, d: f"G1 {_words(p, d)}", lambda p, d: f"G91{between}G1 {_words(p, d)}",
+        lambda text: f"{opening.decode()}{text}{closing.decode()}",
         re.compile(rb"(?m)^G1 X(" + NUMBER + rb") Y(" + NUMBER + rb") Z(" + NUMBER + rb")"),
         ("gcode_cncjs/*",) if name == "linuxcnc" else ("gcode_fanuc*/*",) if name == "fanuc" else (),
         (b"%\n%\n", b"\xef\xbb\xbfG21\nG0 X1\n"),
@@ -74,9 +79,9 @@ def _rs274(name: str) -> Case:
 
 
 #: A control of this family needs no case of its own.
-RS274 = tuple(name for name, d in registry.DIALECTS.items() if isinstance(d, Profile))
+RS274 = {name: d for name, d in registry.DIALECTS.items() if isinstance(d, Profile)}
 CASES = {
-    **{name: _rs274(name) for name in RS274},
+    **{name: _rs274(name, profile) for name, profile in RS274.items()},
     "apt": Case(
         "apt", "apt", "GOTDLAFRMCIEUNSP/,.+-$ 0123456789\r\n\t=()'",
         ["PARTNO TEST", "UNITS/MM", "FEDRAT/600,MMPM"], ["FINI"],

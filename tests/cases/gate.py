@@ -288,6 +288,15 @@ CASES: dict[str, tuple[Call, Call]] = {
         Call(b"G1 X1000.\n", head=FANUC, controller="fanuc"),
     ),
     "OLP303": (Call(tables=TOUCH), Call(tables=TRUE_ZERO)),
+    "OLP334": (
+        Call(b"LIGHTS\nG0 X0 Y0 Z0\nG1 X100 E5\n", b"G21\nG90\nG0 X0 Y0 Z0\n", controller="klipper"),
+        Call(
+            b"LIGHTS\nG1 X100 E5\n",
+            b"G21\nG90\nG0 X0 Y0 Z0\n",
+            controller="klipper",
+            keys='still_macros = ["lights"]\n',
+        ),
+    ),
     "OLP304": (Call(b"/G1 X100 Y0 Z0\nG1 X100 Y0 Z0\n"), Call(b"G1 X100 Y0 Z0\n")),
     "OLP305": (
         Call(b"G41 D1\nG1 X100\nG40\n", tables=tool(50.0), options={"contour": True}),

@@ -216,8 +216,8 @@ def test_the_starter_calibration_says_what_happens_outside_the_box() -> None:
 
 
 def test_starter_machine_refuses_a_control_without_dialect() -> None:
-    with pytest.raises(UsageError, match='"mach3" is not a dialect that olp knows; expected one of linuxcnc'):
-        starter_machine("mill", "FXYZ", TRAVEL, "mach3")
+    with pytest.raises(UsageError, match='"fadal" is not a dialect that olp knows; expected one of linuxcnc'):
+        starter_machine("mill", "FXYZ", TRAVEL, "fadal")
     with pytest.raises(UsageError, match="did you mean grbl"):
         starter_machine("mill", "FXYZ", TRAVEL, "GRBL")
 

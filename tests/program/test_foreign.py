@@ -51,6 +51,7 @@ def test_what_is_no_program_is_named(tmp_path: Path, name: str) -> None:
 
 
 OTHER_POST = "post-process the part for the control of the machine file, or give the CAM system's APT CLDATA"
+OSP = "plain moves of it are read with --dialect okuma; else post-process for the control of the machine file"
 ROBOT = (
     "robots are not corrected from their own language; give a list of positions in the frame of the machine "
     "(CSV), or the CAM system's APT CLDATA"
@@ -133,7 +134,7 @@ SIGNS = {
         b"S1=500", b"G0 Z= +5",
         b"X1=5", b"G1 F=(1)",
     ),
-    ("Okuma OSP", OTHER_POST, "OLP501"): (
+    ("Okuma OSP", OSP, "OLP501"): (
         b"$A-1.MIN%", b"$B.SSB", b" $C.SUB", b"CALL O1", b"N10 call\tOA", b"VC1=5", b"N5VTOFX = 1",
     ),
     ("HPGL", PROGRAM, "OLP501"): (

@@ -19,6 +19,7 @@ from judge.path import match
 
 import olp
 from olp.core.errors import OlpError
+from olp.program.registry import DIALECTS
 
 ALPHABET = "GXYZIJKRFMTNSPQHLDO%/;()[]#=+-. 0123456789\r\n\t:<>\"'^!"
 #: 1 nm, within which the two independent models agree
@@ -94,7 +95,9 @@ def test_l1_any_bytes_come_back_or_are_refused(zero: dict[str, Path], dialect: s
 @settings(max_examples=15)
 def test_l1_text_in_a_comment_is_opaque(zero: dict[str, Path], dialect: str, noise: bytes) -> None:
     noise = re.sub(rb"[\0\r\n()]", b"", noise).replace(b"olp", b"")
-    data = b"G21 G90\n(" + noise + b")\nG0 X1. Y2. Z3. (" + noise + b")\nM30\n"
+    opening, closing = DIALECTS[dialect].comment
+    comment = opening + noise + closing
+    data = b"G21\nG90\n" + comment + b"\nG0 X1. Y2. Z3. " + comment + b"\n"
     assert olp.correct(data, zero[dialect]).data == data
 
 

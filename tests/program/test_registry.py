@@ -26,7 +26,7 @@ def test_names() -> None:
     assert find("has") is None
     with pytest.raises(UsageError, match="'HASS'; did you mean haas"):
         named("HASS")
-    with pytest.raises(UsageError, match="expected one of linuxcnc, fanuc, grbl, haas, apt"):
+    with pytest.raises(UsageError, match="expected one of linuxcnc, fanuc, grbl, haas, mach3, mach4, mazak"):
         named("?")
 
 
@@ -148,7 +148,10 @@ def test_a_contradiction_has_its_code() -> None:
 
 def test_what_each_dialect_of_statements_says_of_itself() -> None:
     apt, dmis = DIALECTS["apt"], DIALECTS["dmis"]
-    assert list(DIALECTS) == ["linuxcnc", "fanuc", "grbl", "haas", "apt", "dmis", "list"]
+    assert list(DIALECTS) == [
+        "linuxcnc", "fanuc", "grbl", "haas", "mach3", "mach4", "mazak", "okuma", "siemens-iso", "marlin",
+        "klipper", "apt", "dmis", "list",
+    ]  # fmt: skip
     assert apt.title == "APT and cutter-location data (ISO 4343, ISO 3592)"
     assert dmis.title == "DMIS part programs of coordinate measuring machines (ISO 22093)"
     assert (apt.path_mode, dmis.path_mode) == (

@@ -129,12 +129,9 @@ def corrected_note(key: str, names: list[str]) -> str:
     )
 
 
-def printer_note(firmware: str) -> str:
-    """The note on programs of printers, which have no dialect of their own."""
-    return (
-        f"Programs of {firmware} are read as those of Grbl: take out M117 and G29, and put a rapid in X, Y "
-        "and Z behind each M code that olp does not know. G54 stands for the bed, all zeros."
-    )
+def bed_note() -> str:
+    """The note on the zero of printers."""
+    return "G54 stands for the bed, all zeros: programs of printers state no work offset."
 
 
 def touched_note() -> str:

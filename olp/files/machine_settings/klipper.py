@@ -23,11 +23,11 @@ from olp.files.machine_settings.base import (
     Load,
     Settings,
     SettingsFormat,
+    bed_note,
     decoded,
     finite,
     interval,
     positive,
-    printer_note,
 )
 
 #: Kinematics whose X, Y and Z are linear and at right angles.
@@ -52,7 +52,7 @@ def _read(path: Path, load: Load) -> Settings:
     if kinematics not in _CARTESIAN:
         what = f'[printer] kinematics is "{kinematics}"; olp corrects machines of three linear axes'
         raise InputError(f"{what}; expected one of {', '.join(_CARTESIAN)}", file=str(path))
-    notes = [printer_note("Klipper")]
+    notes = [bed_note()]
     notes += [f"The included file {name} does not exist; what it states is missing here." for name in missing]
     axes = {axis: _axis(axis, sections) for axis in AXES}
     skews = [name for name in sections if name.startswith("skew_correction")]
@@ -61,7 +61,7 @@ def _read(path: Path, load: Load) -> Settings:
             f"[{skews[0]}] corrects squareness where a macro loads it: then list C0Y, B0Z and A0Z in "
             "compensated_by_controller. olp calibrate import --format klipper reads it."
         )
-    return Settings("", "grbl", axes, work_offsets=BED, notes=tuple(notes))
+    return Settings("", "klipper", axes, work_offsets=BED, notes=tuple(notes))
 
 
 def _axis(axis: str, sections: Sections) -> AxisSettings:

@@ -23,11 +23,11 @@ from olp.files.machine_settings.base import (
     Settings,
     SettingsFormat,
     backlash_note,
+    bed_note,
     corrected_note,
     decoded,
     interval,
     positive,
-    printer_note,
     times,
     words,
 )
@@ -58,8 +58,8 @@ def _read(path: Path, load: Load) -> Settings:
     }
     skew = commands.get("M852", {})
     skewed = [name for letter, name in zip("IJK", SQUARENESS, strict=True) if skew.get(letter)]
-    notes = (printer_note("Marlin"), *_notes(commands, mm, skewed))
-    return Settings("", "grbl", axes, frozenset(skewed), work_offsets=BED, notes=notes)
+    notes = (bed_note(), *_notes(commands, mm, skewed))
+    return Settings("", "marlin", axes, frozenset(skewed), work_offsets=BED, notes=notes)
 
 
 def _notes(commands: dict[str, dict[str, float]], mm: float, skewed: list[str]) -> Iterator[str]:

@@ -121,6 +121,16 @@ RULES = (
         "Two tag points 2 m apart on a machine whose straightness is 5 um.",
     ),
     _rule(
+        "OLP334",
+        "macro of the machine",
+        Severity.WARNING,
+        "A name that is no command of the control is a macro of the machine, which is not read. No position "
+        "is known after it. The modes G90, G91, M82 and M83 are taken to be those before it.",
+        "State the modes again behind a macro that changes them. Name macros that move nothing in "
+        "still_macros of the machine file.",
+        "`START_PRINT BED=60` in a program for Klipper.",
+    ),
+    _rule(
         "OLP412",
         "thermal compensation in the program",
         Severity.WARNING,

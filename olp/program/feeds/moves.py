@@ -15,9 +15,13 @@ from olp.core.toolpath import Flag, Kind, Toolpath
 from olp.core.units import MM_PER_INCH
 from olp.core.values import dataclass
 from olp.program.program import Program, Words
+from olp.program.rs274.codes import DWELL
+from olp.program.rs274.profiles.base import Profile
 
 #: Powers of ten by their exponent: those of the decimals of a number.
 _POW10 = 10.0 ** np.arange(19)
+#: G0 to G3.
+_LAST_MOTION = 3
 #: G94, feed per minute, as ten times its number.
 _PER_MINUTE = 940
 #: G95, feed per turn of the spindle, as ten times its number.
@@ -48,14 +52,33 @@ class Scan:
         if block_delete:
             active &= ~is_in(line, deleted_lines(program))
         word, line = word[active], line[active]
+        word, line = _carried_out(program.rs274, words, word, line)
         g = words.letter[word] == ord("G")
         code = np.rint(numbers(words, word[g]) * 10).astype(np.int64)
+        for alias, meant in program.rs274.aliases.items():
+            code[np.rint(numbers(words, word[g]) * 10) == alias] = meant
         return Scan(program, words, word, line, code, line[g])
 
     def of_letter(self, letter: bytes) -> tuple[Index, Index]:
         """Indices and lines of the words of a letter."""
         mine = self.words.letter[self.word] == ord(letter)
         return self.word[mine], self.line[mine]
+
+
+def _carried_out(profile: Profile, words: Words, word: Index, line: Index) -> tuple[Index, Index]:
+    """Of words and their lines those that a control carries out: all words of blocks but an F that is the
+    time of a dwell, of commands the code that comes first and the feed of a move."""
+    if "F" in profile.dwell_words:
+        dwells = line[(words.letter[word] == ord("G")) & (numbers(words, word) == DWELL / 10)]
+        mine = (words.letter[word] != ord("F")) | ~is_in(line, dwells)
+        word, line = word[mine], line[mine]
+    if profile.commands is None or not len(word):
+        return word, line
+    first = words.first_word[line - 1]
+    first = np.minimum(first + (words.letter[first] == ord("N")), len(words.letter) - 1)
+    moves = (words.letter[first] == ord("G")) & (words.mantissa[first] <= _LAST_MOTION)
+    mine = (word == first) | (moves & (words.letter[word] == ord("F")))
+    return word[mine], line[mine]
 
 
 def numbers(words: Words, word: Index) -> Array:

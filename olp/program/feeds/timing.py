@@ -179,12 +179,12 @@ def _rests(program: Program, scan: Scan) -> tuple[Mask, Array]:
 
 def _dwell_seconds(program: Program, scan: Scan, pauses: Index) -> Array:
     """Seconds of each G4 block: of P, and of X or U where the control takes these too."""
-    words, axis_dwell = scan.words, program.rs274.axis_dwell
+    words, profile = scan.words, program.rs274
     first = words.first_word[pauses - 1].astype(np.int64)
     count = words.first_word[pauses] - first
     owner = np.repeat(np.arange(len(pauses)), count)
     word = np.repeat(first - np.cumsum(count) + count, count) + np.arange(int(count.sum()))
-    time = is_in(words.letter[word], list(b"PXU" if axis_dwell else b"P"))
+    time = is_in(words.letter[word], list(profile.dwell_words.encode()))
     owner, word = owner[time], word[time]
     stated = np.bincount(owner, minlength=len(pauses))
     if (stated > 1).any():
@@ -193,9 +193,10 @@ def _dwell_seconds(program: Program, scan: Scan, pauses: Index) -> Array:
             line=int(pauses[np.flatnonzero(stated > 1)[0]]),
             code="OLP551",
         )
-    if not axis_dwell and (stated == 0).any():
+    if len(profile.dwell_words) == 1 and (stated == 0).any():
+        letter = profile.dwell_words
         raise ProgramError(
-            "a dwell G4 has no P word with its time; give P",
+            f"a dwell G4 has no {letter} word with its time; give {letter}",
             line=int(pauses[np.flatnonzero(stated == 0)[0]]),
             code="OLP551",
         )
@@ -204,7 +205,8 @@ def _dwell_seconds(program: Program, scan: Scan, pauses: Index) -> Array:
     seconds = np.zeros(len(pauses))
     # P counts milliseconds where it has no point; X and U do where lengths count increments
     bare = ~pointed & ((words.letter[word] == ord("P")) | (not program.calculator))
-    seconds[owner] = np.where(bare & axis_dwell, number / 1000.0, number)
+    bare = words.letter[word] == ord("P") if profile.dwell_ms else bare & profile.increments_without_point
+    seconds[owner] = np.where(bare, number / 1000.0, number)
     if (seconds < 0).any():
         raise ProgramError(
             "a dwell is negative; expected zero or more",

@@ -88,6 +88,12 @@ class AxisState(OffsetState):
         start = [NAN if p is None else p for p in setup.job.start_mm]
         state = AxisState(profile, start, setup=setup, offsets=Offsets(setup.machine.default_work_offset))
         state.motion = None if profile.motion is None else profile.motion * 10
+        if profile.arc_distance is not None:
+            state.arc_distance = profile.arc_distance
+        elif setup.machine.arc_centres is not None:
+            state.arc_distance = {"incremental": 911, "absolute": 901}[setup.machine.arc_centres]
+        else:
+            state.arc_distance = -1
         state.spindle = setup.machine.default_tool
         state.payload_kg = setup.job.payload_kg
         if state.spindle is not None and setup.machine.length_active:
@@ -156,7 +162,7 @@ class AxisState(OffsetState):
         axis_words = [(i, by_letter[a]) for i, a in enumerate("XYZ") if a in by_letter]
         m_codes = [round(w.value * 10) for w in words if w.letter == "M"]
         if "T" in by_letter:
-            self.selected = self._integer(by_letter["T"], line)
+            self._select_tool(line, [w for w in words if w.letter == "T"])
         if TOOL_CHANGE in m_codes:
             if self.selected is None:
                 raise ProgramError(
@@ -200,6 +206,34 @@ class AxisState(OffsetState):
                 code="OLP518",
             )
 
+    def _select_tool(self, line: int, words: list[Word]) -> None:
+        """T words: the tool that M6 changes to, with the next one behind it on some controls. A command T
+        changes the tool by itself, and its length holds at once."""
+        self.selected = self._integer(words[0], line)
+        if len(words) > 1 and not self.profile.tools_in_block:
+            raise ProgramError(
+                "the word T is twice in this block; expected it once", line=line, code="OLP515", word="T"
+            )
+        if self.changes_nozzle(words):
+            self.spindle = self.length_tool = self.selected
+            self._set_length(self._tool(self.selected, line, f"T{self.selected}"))
+
+    def changes_nozzle(self, words: Sequence[Word]) -> bool:
+        """Whether a command T changes to another tool, by which the machine may move."""
+        commands = self.profile.commands is not None
+        return commands and any(w.letter == "T" and w.value != self.spindle for w in words)
+
+    def lose(self, line: int) -> None:
+        """The control moves by itself, and no position is known after it."""
+        if any(self.offsets.shift):
+            raise ProgramError(
+                "the control moves by itself while G92 of X, Y or Z is in force, and what it keeps of that "
+                "is not known; go back to the zero of the bed before it",
+                line=line,
+                code="OLP518",
+            )
+        self.forget()
+
     def may_move(self, m10: int) -> bool:
         """Whether an M code may move axes: M6, and codes that are not known to leave the axes where they
         are."""
@@ -207,7 +241,7 @@ class AxisState(OffsetState):
             return False
         if m10 == TOOL_CHANGE and not self.setup.machine.tool_change_moves:
             return False
-        return m10 % 10 != 0 or m10 // 10 not in self.profile.harmless_m
+        return m10 not in self.profile.still_m
 
     def _event(
         self,

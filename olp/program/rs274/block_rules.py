@@ -56,8 +56,6 @@ _CENTRE = _bits("IJK")
 _IN_PLANE = {170: _bits("IJ"), 180: _bits("IK"), 190: _bits("JK")}
 #: Words of their ends.
 _ENDS = {170: _bits("XY"), 180: _bits("XZ"), 190: _bits("YZ")}
-#: Letters of which a block may have several.
-_FREE = _bits("GM")
 _MOTION = frozenset({0, 10, *_ARCS, *CYCLES, *PROBES})
 _MOTIONS = np.array(sorted(_MOTION))
 #: Codes that take the axis words of their block for something else.
@@ -73,9 +71,9 @@ class BlockRules:
     - `groups`: codes of which a block may have one.
     - `needs`: codes that need one of these letters.
     - `excludes`: codes that take one of two kinds of letters. `positive`: letters without a negative number.
-    - `whole`: letters with integers. `alone`: a letter that is first in a block of its own. `number_first`: N
-      is the first word of its line. `one_use_of_axes`: no motion code may be beside a code that uses the axis
-      words for something else.
+    - `several`: letters of which a block may have several. `whole`: letters with integers. `alone`: a letter
+      that is first in a block of its own. `number_first`: N is the first word of its line. `one_use_of_axes`:
+      no motion code may be beside a code that uses the axis words for something else.
     """
 
     users: Mapping[str, frozenset[int]] = field(default_factory=dict)
@@ -83,6 +81,7 @@ class BlockRules:
     needs: Mapping[int, str] = field(default_factory=dict)
     excludes: Mapping[int, tuple[str, str]] = field(default_factory=dict)
     positive: str = ""
+    several: str = "GM"
     whole: str = ""
     alone: str = ""
     number_first: bool = False
@@ -136,12 +135,15 @@ class _Tables:
             raise ProgramError.together(errors.values())
 
     def _twice(self, chunk: WordChunk, active: Mask, present: Bits) -> Iterator[Refusal]:
-        free = chunk.line[(chunk.letter == ord("G")) | (chunk.letter == ord("M"))]
+        several_of = list(self.rules.several.encode())
+        letters_free = np.zeros(256, bool)
+        letters_free[several_of] = True
+        free = chunk.line[letters_free[chunk.letter]]
         words = np.diff(chunk.first_word) - np.bincount(free, minlength=len(present))
-        several = active & (np.bitwise_count(present & ~_FREE) != words)
+        several = active & (np.bitwise_count(present & ~_bits(self.rules.several)) != words)
         for line in np.flatnonzero(several).tolist():
             mine = chunk.letter[chunk.first_word[line] : chunk.first_word[line + 1]]
-            letters = [chr(letter) for letter in mine.tolist() if letter not in b"GM"]
+            letters = [chr(letter) for letter in mine.tolist() if letter not in several_of]
             letter = next(x for x in letters if letters.count(x) > 1)
             yield line, f"the word {letter} is twice in this block; expected it once", "OLP515", ""
 

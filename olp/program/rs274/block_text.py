@@ -28,6 +28,7 @@ class BlockText:
     - `skips_control`: control characters mean nothing, as blanks; else they are refused outside comments.
     - `cr_ends_line`: a lone carriage return ends a line.
     - `open_comments`: a comment that is not closed ends with its line. `nested_comments`: `(` may be in one.
+    - `brackets`: `(` opens a comment; else a line with one is refused.
     - `marks_in_pairs`: `%` is the first line and the last one, alone in its line, or not there.
     - `longest`: bytes of a line at most, without its line feed (None: no limit).
     """
@@ -37,6 +38,7 @@ class BlockText:
     cr_ends_line: bool = False
     open_comments: bool = False
     nested_comments: bool = True
+    brackets: bool = True
     marks_in_pairs: bool = False
     longest: int | None = None
 

@@ -11,8 +11,9 @@ import numpy as np
 from olp.core.arrays import Array, Index, Mask
 from olp.program.holes import Holes
 from olp.program.path_columns import PathColumns
-from olp.program.program import ArcSlots, Program, Words
+from olp.program.program import ArcSlots, Program, SharedWords, Words
 from olp.program.rs274.axis_state import AxisState
+from olp.program.rs274.extrusion import Extruder
 from olp.program.rs274.lexer import WordChunk
 
 
@@ -51,6 +52,14 @@ class Collector(PathColumns):
         self.columns.put("arc_words", words, np.int32)
         self.columns.put("arc_absolute", absolute, np.bool_)
 
+    def put_shared(self, extruder: Extruder, base: int) -> None:
+        """The words of the extruder on the next lines, whose first word is the program's `base`th."""
+        if self.keep_words:
+            word = extruder.word
+            self.columns.put("shared_word", np.where(word >= 0, word + base, -1), np.int32)
+            self.columns.put("shared_before", extruder.before, np.float64)
+            self.columns.put("shared_distance", extruder.distance, np.bool_)
+
     def program(self, state: AxisState, end_line: int) -> Program:
         """The whole program, with the frames and path modes of the final `state`. Takes the columns: call it
         once only."""
@@ -71,6 +80,11 @@ class Collector(PathColumns):
             remarks=tuple((name, line, text) for name, (line, text) in self.remarks.items()),
             end_line=end_line,
             calculator=not state.bare_increments,
+            shared=SharedWords(
+                self.columns.take("shared_word", np.int32),
+                self.columns.take("shared_before", np.float64),
+                self.columns.take("shared_distance", np.bool_),
+            ),
         )
 
     def _words(self) -> Words:

@@ -20,7 +20,7 @@ from olp.program.rs274.collector import Collector
 from olp.program.rs274.cycle_runs import CycleRun, Refused
 from olp.program.rs274.cycles import HOLE_STROKES, LCNC_CLEARANCE_MM, MOST_REPEATS, levels, repeats_error
 from olp.program.rs274.modes import Context, scaled
-from olp.program.rs274.state import BROKEN_SERIES, NAN
+from olp.program.rs274.state import BROKEN_SERIES, NAN, OPEN_RETRACT
 from olp.program.rs274.strokes import Drilling, Step, Strokes, strokes
 from olp.program.rs274.turned import Turning
 
@@ -119,6 +119,7 @@ class CycleBlocks:
                 f"{name} is in a frame that turns, mirrors or scales its tool axis; end that before it",
                 "OLP518",
             )
+        refused.where(np.asarray(context.retract[line] < 0), OPEN_RETRACT, "OLP532")
         if turning is not None:
             spindle = " or ".join(f"M{m}" for m in turning)
             still = ~is_in(context.spindle[line], turning)

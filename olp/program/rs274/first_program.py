@@ -7,8 +7,11 @@ from collections.abc import Sequence
 
 from olp.core.machine import Machine
 from olp.core.units import AXES
-from olp.program.rs274.profiles.base import Profile
+from olp.program.rs274.profiles.base import Act, Profile
 
+#: Modes that the program states, and their codes.
+_MODES = (("G21", 210), ("G90", 900), ("G94", 940), ("G17", 170))
+_G54 = 540
 #: mm/min; slow enough to follow by eye.
 _FEED = 600.0
 #: Share of the travel on either side of its middle that the square takes.
@@ -34,21 +37,27 @@ def first_program(profile: Profile, machine: Machine, offset: str = "G54") -> by
     ]
     opening, closing = (mark.decode() for mark in profile.comment)
     lines = ["%", "O0001"] if profile.program_number else []
-    lines += [f"{opening}square of {2 * half:g} mm and circle in the air{closing}", "G21 G90 G94 G17"]
+    lines += [f"{opening}square of {2 * half:g} mm and circle in the air{closing}"]
+    # codes that the control has, each in its own line where lines are commands
+    modes = [word for word, code in _MODES if code in profile.codes]
+    modes += ["G91.1"] if profile.arc_distance is None else []
+    lines += modes if profile.commands is not None else [" ".join(modes)]
     lines += ["G64 P0.01"] if profile.path_tolerance else []
-    lines += _moves(middle, half, height, offset)
+    lines += [offset] if profile.codes.get(_G54) is Act.EVENT else []
+    lines += _moves(middle, half, height)
+    lines += ["M30"] if profile.commands is None else []
     return ("\n".join([*lines, *(["%"] if profile.program_number else [])]) + "\n").encode()
 
 
-def _moves(middle: Sequence[float], half: float, height: float, offset: str) -> list[str]:
+def _moves(middle: Sequence[float], half: float, height: float) -> list[str]:
     """A square and a circle that touches its sides."""
     left, right = _word(middle[0] - half), _word(middle[0] + half)
     near, far = _word(middle[1] - half), _word(middle[1] + half)
     low, high = _word(middle[2] + 0.5 * height), _word(middle[2] + height)
-    begin = [offset, f"G0 Z{high}", f"G0 X{left} Y{near}", f"G1 Z{low} F{_word(_FEED)}"]
+    begin = [f"G0 Z{high}", f"G0 X{left} Y{near}", f"G1 Z{low} F{_word(_FEED)}"]
     square = [f"G1 X{right}", f"G1 Y{far}", f"G1 X{left}", f"G1 Y{near}"]
     circle = [f"G0 X{right} Y{_word(middle[1])}", f"G1 Z{low}", f"G2 I{_word(-half)}"]
-    return [*begin, *square, f"G0 Z{high}", *circle, f"G0 Z{high}", "M30"]
+    return [*begin, *square, f"G0 Z{high}", *circle, f"G0 Z{high}"]
 
 
 def _word(value: float) -> str:

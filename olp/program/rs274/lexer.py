@@ -230,6 +230,8 @@ def _drop_comments(text: Bytes, ends: Index, keep: Mask, rules: BlockText) -> tu
         opening, stop = opening[real], stop[real]
         if not rules.nested_comments:
             refused.append(np.array(inner, np.int64))
+    if not rules.brackets:
+        refused.append(opening[text[opening] == 40])
     if not rules.open_comments:
         refused.append(opening[(text[opening] == 40) & (text[stop - 1] != 41)])
     lengths = np.zeros(2 * len(opening) + 1, np.int64)

@@ -26,6 +26,7 @@ from olp.program.rs274.codes import (
     END_OF_CYCLES,
     GROUPS,
 )
+from olp.program.rs274.commands import Reading, check_lines, own_words, sorted_line
 from olp.program.rs274.lexer import WordChunk
 from olp.program.rs274.motion import modal, values
 from olp.program.rs274.profiles.base import Act, Profile
@@ -81,6 +82,14 @@ class Context:
         return self.chunk.first_line + line + 1
 
 
+@dataclass(frozen=True, slots=True)
+class Odd:
+    """A line of the chunk after which no position is known, and the `macro` that it calls, empty for none."""
+
+    line: int
+    macro: str
+
+
 class Modes:
     """The codes in force, from chunk to chunk; those at the end of a chunk are kept in the `state`."""
 
@@ -91,22 +100,31 @@ class Modes:
         self._cycles_apart = profile.cycles_apart
         self._claims = sorted(AXIS_VALUES | {DWELL} if profile.axis_dwell else AXIS_VALUES)
         # the last entry is of codes that no control has
-        self._act = np.full(2000, Act.REFUSE, np.int8)
+        self._act = np.full(3000, Act.REFUSE, np.int8)
         for code, act in profile.codes.items():
             self._act[code] = act
+        # the last entry stays that of no code
+        self._code_of = np.arange(len(self._act))
+        for alias, code in profile.aliases.items():
+            self._code_of[alias] = code
         if contour:
             self._act[[COMPENSATION_OFF, *CUTTER_COMPENSATION]] = Act.EVENT
         self._m_event = np.ones(10_001, bool)
-        self._m_event[[m * 10 for m in profile.harmless_m]] = False
+        self._m_event[list(profile.still_m)] = False
         self._rules = profile.rules.tables()
         self._linear_motion = state.motion
+        self._commands = profile.commands
         self._ended = False
         # the line of the first tape mark, from 1
         self._tape = 0
 
     def program_end(self, chunk: WordChunk) -> int:
-        """The number of lines up to the end of the program: M2, M30, or the second tape mark."""
+        """The number of lines up to the end of the program: M2, M30, or the second tape mark; the lines of a
+        program of commands have no such end."""
         last = 0 if self._ended else len(chunk.line_start)
+        if self._commands is not None:
+            # neither M2 and M30 nor tape marks end a program
+            return last
         codes = np.flatnonzero(chunk.letter == 77)
         value = chunk.mantissa[codes] / 10.0 ** chunk.decimals[codes]
         ends = chunk.line[codes[is_in(value, (2.0, 30.0))]]
@@ -146,6 +164,8 @@ class Modes:
         is the program's `base`th."""
         value, state = values(chunk), self._state
         usable = active[chunk.line]
+        if self._commands is not None:
+            usable &= own_words(chunk)
         codes = self._codes(chunk, value, usable)
         context = Context(
             chunk,
@@ -163,13 +183,20 @@ class Modes:
             consumed=self._consumed(codes, active),
             active=active,
         )
+        if self._commands is not None:
+            np.logical_or(context.consumed, context.motion < 0, out=context.consumed)
+            arcs = (context.motion == 20) | (context.motion == 30)
+            check_lines(chunk, own_words(chunk), active, arcs, self._commands)
         _check_deleted(context, state)
         return context
 
     def check_rules(self, context: Context) -> None:
         """Refuse the blocks of a chunk with words that may not be together, all at once."""
         chunk, active = context.chunk, context.active
-        keys = self._keys(chunk, context.value, context.codes, active[chunk.line])
+        usable = active[chunk.line]
+        if self._commands is not None:
+            usable &= own_words(chunk)
+        keys = self._keys(chunk, context.value, context.codes, usable)
         self._rules.check(chunk, active, keys, context.motion, context.plane)
 
     def check_end(self) -> None:
@@ -193,7 +220,7 @@ class Modes:
         tenths = value[g] * 10
         code = np.rint(tenths)
         listed = (np.abs(code - tenths) < 1e-6) & (code >= 0) & (code < len(self._act))
-        code = np.where(listed, code, -1).astype(np.int64)
+        code = self._code_of[np.where(listed, code, -1).astype(np.int64)]
         return Codes(chunk.line[g], code, self._act[code])
 
     def _spindle(self, chunk: WordChunk, value: Array, usable: Mask) -> Modal:
@@ -215,7 +242,7 @@ class Modes:
         """The lines with a G word that is an event, an M word not known as harmless, or a T word."""
         letter, line = chunk.letter, chunk.line
         event = np.zeros(len(chunk.line_start), bool)
-        event[codes.line[codes.act == Act.EVENT]] = True
+        event[codes.line[(codes.act == Act.EVENT) | (codes.act == Act.CONTROL)]] = True
         m = np.flatnonzero((letter == 77) & usable)
         event[line[m[self._m_event[np.clip(np.rint(value[m] * 10), 0, 10_000).astype(np.int64)]]]] = True
         event[line[(letter == 84) & usable]] = True
@@ -229,6 +256,10 @@ class Modes:
     def _motion(self, chunk: WordChunk, codes: Codes) -> Modal:
         chosen = codes.act == Act.MOTION
         line, code = codes.line[chosen], codes.code[chosen]
+        if self._commands is not None:
+            own = np.full(len(chunk.line_start), -1, np.int16)
+            own[line] = code
+            return own
         # G80 may be beside another motion code, which then holds
         beside = (code == END_OF_CYCLES) & is_in(line, line[1:][line[1:] == line[:-1]])
         line, code = line[~beside], code[~beside]
@@ -242,20 +273,53 @@ class Modes:
         return _in_force(chunk, line, code, self._state.motion)
 
 
-def check_odd(data: bytes, chunk: WordChunk, before_end: Mask, active: Mask, profile: Profile) -> None:
+def check_odd(data: bytes, chunk: WordChunk, before_end: Mask, active: Mask, state: AxisState) -> list[Odd]:
     """Refuse active lines with more than words, all of the chunk at once; of those `before_end` that block
-    delete skips the ones whose bytes are refused, as the control reads these all the same."""
+    delete skips the ones whose bytes are refused, as the control reads these all the same. Of commands the
+    lines after which no position is known."""
+    profile = state.profile
     lines = chunk.odd[before_end[chunk.odd]].tolist()
+    if profile.commands is not None:
+        return _odd_commands(data, chunk, lines, state)
     errors = [_odd(data, chunk, line, profile, words=bool(active[line])) for line in lines]
     some = [error for error in errors if error is not None]
     if some:
         raise ProgramError.together(some)
+    return []
+
+
+def _odd_commands(data: bytes, chunk: WordChunk, lines: list[int], state: AxisState) -> list[Odd]:
+    """The lines of more than words after which no position is known. Raises ProgramError for all that cannot
+    be read correctly."""
+    profile, known = state.profile, state.setup.machine.still_macros
+    assert profile.commands is not None
+    moving, errors = [], []
+    for line in lines:
+        text = data[int(chunk.line_start[line]) : int(chunk.line_end[line])]
+        try:
+            reading = sorted_line(
+                text, profile.commands, profile.still_m, profile.codes_of(Act.CONTROL),
+                profile.codes_of(Act.UNCHANGED), known,
+            )  # fmt: skip
+        except ProgramError as error:
+            error.line = chunk.first_line + line + 1
+            errors.append(error)
+            continue
+        if reading is not Reading.STILL:
+            name = text.split()[0].decode("latin-1") if reading is Reading.UNKNOWN else ""
+            moving.append(Odd(line, name))
+    if errors:
+        raise ProgramError.together(errors)
+    return moving
 
 
 def _odd(data: bytes, chunk: WordChunk, line: int, profile: Profile, *, words: bool) -> ProgramError | None:
     """Why a line with more than words is refused, by its bytes, or by its `words` too."""
     number = chunk.first_line + line + 1
     start = int(chunk.line_start[line])
+    inert = profile.inert
+    if inert is not None and inert.fullmatch(data[start : chunk.line_end[line]]):
+        return None
     newline = data.find(b"\n", start)
     error = profile.text.refusal(data[start : newline if newline >= 0 else len(data)])
     if error is not None:
@@ -267,7 +331,10 @@ def _odd(data: bytes, chunk: WordChunk, line: int, profile: Profile, *, words: b
     shown = text[:60].decode("latin-1")
     if _FLOW.search(text):
         return ProgramError(
-            f"`{shown}` uses parameters, expressions or flow control", hint=UNROLL, line=number, code="OLP511"
+            f"`{shown}` uses parameters, expressions or flow control",
+            hint=UNROLL if profile.unroller is not None else "post the program without them",
+            line=number,
+            code="OLP511",
         )
     comma = "; write a decimal point instead of the comma" if _COMMA.search(text) else ""
     return ProgramError(

@@ -20,9 +20,8 @@ _POW10 = 10.0 ** np.arange(19)
 _AXIS_OF = np.full(256, -1, np.int8)
 for _i, _letter in enumerate(b"XYZ"):
     _AXIS_OF[_letter] = _i
-#: A B C U V W (and E of printers): axes whose words stay unchanged
-_OTHER = np.zeros(256, bool)
-_OTHER[list(b"ABCUVWE")] = True
+#: A B C U V W, and E: axes whose words stay unchanged.
+OTHER = b"ABCUVWE"
 _ARC_OF = np.full(256, -1, np.int8)
 for _i, _letter in enumerate(b"IJKRP"):
     _ARC_OF[_letter] = _i
@@ -67,15 +66,20 @@ class Blocks:
         return len(self.line)
 
 
-def gather(chunk: WordChunk, motion: npt.NDArray[np.int16], consumed: Mask) -> Blocks:
-    """Find the motion lines: those with an axis word that no other word of the line claims."""
+def gather(
+    chunk: WordChunk, motion: npt.NDArray[np.int16], consumed: Mask, other_axes: bytes = OTHER
+) -> Blocks:
+    """Find the motion lines: those with an axis word, or one of `other_axes`, that no other word of the line
+    claims."""
     lines = len(chunk.line_start)
     axis = _AXIS_OF[chunk.letter]
     words = np.flatnonzero(axis >= 0)
     moving = np.zeros(lines, bool)
     moving[chunk.line[words]] = True
     other = np.zeros(lines, bool)
-    others = np.flatnonzero(_OTHER[chunk.letter])
+    is_other = np.zeros(256, bool)
+    is_other[list(other_axes)] = True
+    others = np.flatnonzero(is_other[chunk.letter])
     if others.size:
         other[chunk.line[others]] = True
         moving |= other

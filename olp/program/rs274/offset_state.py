@@ -6,6 +6,7 @@ Lengths become mm here. How offsets add up is in `offsets`, what becomes of them
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import field
 
@@ -23,6 +24,9 @@ from olp.program.rs274.turned import Turning, along_words
 
 #: L of a G10 that stores the present position.
 STORES_POSITION = 20
+#: P of a G10 L20 that writes an offset G54.1 P, at most.
+_FURTHER = 300
+_SPACED = re.compile(r"([\d.])([A-Z])")
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +70,7 @@ class OffsetState(State):
         return increment(self.setup.machine, letter, self.unit_mm)
 
     def _work_offset(self, name: str) -> WorkOffset | None:
-        return self.setup.work_offset(name) or self.setup.work_offset(name.replace("P", " P"))
+        return self.setup.work_offset(name) or self.setup.work_offset(_SPACED.sub(r"\1 \2", name))
 
     def _angle_deg(self, name: str, line: int) -> float:
         """By how much a work offset is turned about Z, as the program has written it, else as the setup has
@@ -144,16 +148,15 @@ class OffsetState(State):
         self.offsets.length, self.length_unit = vector, self.unit or METRIC
 
     def _select_offset(self, code: int, line: int, by_letter: dict[str, Word]) -> None:
-        if code in (541, 1540):
-            if "P" not in by_letter:
-                raise ProgramError(
-                    f"G{code / 10:g} needs a P word with the number of the work offset",
-                    line=line,
-                    code="OLP516",
-                )
-            name = f"G{code / 10:g}P{self._integer(by_letter['P'], line)}"
-        else:
-            name = f"G{code / 10:g}"
+        name = f"G{code / 10:g}"
+        letter = self.profile.offset_words.get(code, "")
+        if letter in by_letter:
+            name = self.profile.offset_names.get(code, name)
+            name += f"{letter}{self._integer(by_letter[letter], line)}"
+        elif letter and code not in self.profile.offsets_alone:
+            article = "an" if letter in "FHLMNRSX" else "a"
+            what = f"{name} needs {article} {letter} word with the number of the work offset"
+            raise ProgramError(what, line=line, code="OLP516")
         self.offsets.name = name
 
     def _write_offset(
@@ -175,11 +178,17 @@ class OffsetState(State):
                 code="OLP526",
             )
         number = self._integer(by_letter["P"], line) if "P" in by_letter else -1
-        if not 0 <= number <= self.profile.g10_offsets:
+        further = kind == STORES_POSITION and not self.profile.g10_stores
+        if not further <= number <= (_FURTHER if further else self.profile.g10_offsets):
             raise ProgramError(
                 "G10 needs a P word with the number of a work offset, 1 for G54", line=line, code="OLP516"
             )
-        name = self.offsets.name if number == 0 else f"G{53 + number}" if number < 7 else f"G59.{number - 6}"
+        if further:
+            name, kind = f"G54.1P{number}", 2
+        elif number == 0:
+            name = self.offsets.name
+        else:
+            name = f"G{53 + number}" if number < 7 else f"G59.{number - 6}"
         base = self._work_mm(name)
         if kind == 2 and not self.setup.machine.located:
             raise ProgramError(
@@ -200,6 +209,13 @@ class OffsetState(State):
         for i, word in axis_words:
             value = self.length_mm(word)
             if kind == 2:
+                if not self.absolute and self.profile.g10_adds is None:
+                    raise ProgramError(
+                        "G10 L2 is in G91, and whether this control adds to the offset then is not known; "
+                        "give G90 before it",
+                        line=line,
+                        code="OLP518",
+                    )
                 adds = not self.absolute and self.profile.g10_adds
                 base[i] = base[i] + value if adds else value
             else:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Array, is_in
+from olp.core.arrays import Array, Index, is_in
 from olp.core.errors import ProgramError
 from olp.core.machine import Setup
 from olp.core.toolpath import Flag, Kind
@@ -37,14 +37,16 @@ from olp.program.rs274.codes import (
     WRITE_OFFSET,
 )
 from olp.program.rs274.collector import Collector
+from olp.program.rs274.commands import own_words
 from olp.program.rs274.cycle_blocks import CycleBlocks
 from olp.program.rs274.cycle_runs import runs
 from olp.program.rs274.cycles import stroke_budget
+from olp.program.rs274.extrusion import Extrusion
 from olp.program.rs274.lexer import WordChunk, chunks
-from olp.program.rs274.modes import Context, Modes, check_odd, scaled
-from olp.program.rs274.motion import Blocks, arc_geometry, fill, gather
+from olp.program.rs274.modes import Context, Modes, Odd, check_odd, scaled
+from olp.program.rs274.motion import OTHER, Blocks, arc_geometry, fill, gather
 from olp.program.rs274.offset_state import STORES_POSITION, Word
-from olp.program.rs274.profiles.base import Profile
+from olp.program.rs274.profiles.base import Act, Profile
 from olp.program.rs274.special_blocks import SpecialBlocks, check_codes, event_block
 from olp.program.rs274.turned import Turning, along_words
 
@@ -102,6 +104,11 @@ class _Reader:
         self.end_line = 0
         # that of the rows which have a frame and no position yet
         self.turn: Turn | None = None
+        self.lost: set[int] = set()
+        commands = profile.commands
+        self.others = OTHER if commands is None else OTHER.replace(commands.extruder.encode(), b"")
+        self.extrusion = None if commands is None or not commands.feeds(data) else Extrusion(commands)
+        self.feeding = self.whole = np.zeros(0, bool)
 
     def run(self) -> Program:
         data = self.data
@@ -133,16 +140,43 @@ class _Reader:
         before_end = active.copy()
         if self.options.block_delete:
             active &= ~chunk.deleted
-        check_odd(self.data, chunk, before_end, active, self.state.profile)
+        odd = check_odd(self.data, chunk, before_end, active, self.state)
         context = self.modes.read(chunk, base, active)
         # a code that is not read says more than its words, which no other code uses
         check_codes(context, self.state.profile)
         self.modes.check_rules(context)
         # a payload makes a new frame, from the motion of its own line on
         context.event[[line for line in self.payloads if active[line]]] = True
-        self._stretches(context, gather(chunk, context.motion, context.consumed))
+        self.lost = self._lost(context, odd)
+        if self.extrusion is not None:
+            self._extrude(context)
+        self._stretches(context, gather(chunk, context.motion, context.consumed, self.others))
         self.modes.leave(context, last - 1)
         self.cycle_blocks.leave(context, last - 1)
+
+    def _lost(self, context: Context, odd: list[Odd]) -> set[int]:
+        """The lines of a chunk after which no position is known, which are events."""
+        codes = context.codes
+        lines = {*(each.line for each in odd), *codes.line[codes.act == Act.CONTROL].tolist()}
+        context.event[list(lines)] = True
+        for each in odd:
+            if each.macro:
+                macro = (
+                    f"{each.macro} is a macro of the machine: no position is known after it, and modes stay"
+                )
+                self.collector.remarks.setdefault("macro", (context.number(each.line), macro))
+        return lines
+
+    def _extrude(self, context: Context) -> None:
+        """Follow the extruder: which lines of a chunk feed material, and how its words are shared out."""
+        assert self.extrusion is not None
+        chunk = context.chunk
+        tools = chunk.line[(chunk.letter == ord("T")) & own_words(chunk)]
+        lost = np.array(sorted({*self.lost, *tools.tolist()}), np.int64)
+        homes = context.codes.line[context.codes.act == Act.CONTROL]
+        extruder = self.extrusion.follow(context, lost[~is_in(lost, homes)])
+        self.feeding, self.whole = extruder.feeding, np.isnan(extruder.before) & (extruder.word >= 0)
+        self.collector.put_shared(extruder, context.base)
 
     # -- stretches between events ------------------------------------------------------------------
 
@@ -167,12 +201,15 @@ class _Reader:
             if tool or line in self.payloads or not _KEEPS_FRAME.issuperset(codes):
                 rows.present = None
             moved = any(state.may_move(round(w.value * 10)) for w in words if w.letter == "M")
-            if moved or self._needs_position(words, codes):
+            lost = line in self.lost or state.changes_nozzle(words)
+            if moved or lost or self._needs_position(words, codes):
                 self._resolve(context, rows, upto)
             state.distance, state.plane = int(context.distance[line]), int(context.plane[line])
             state.payload_kg = self.payloads.get(line, state.payload_kg)
             effect = state.run(number, words, codes, self.collector.moves)
-            if moved or effect.lost:
+            if lost:
+                state.lose(number)
+            if moved or lost or effect.lost:
                 self.special_blocks.control_move(number, deleted=deleted)
             if here and (alone[upto] or effect.home or effect.machine):
                 self._alone(context, rows, upto, effect)
@@ -185,7 +222,8 @@ class _Reader:
     def _needs_position(self, words: list[Word], codes: list[int]) -> bool:
         """Whether an event needs the present position, or the numbers before it count by another unit."""
         if WRITE_OFFSET in codes:
-            return any(w.letter == "L" and round(w.value) == STORES_POSITION for w in words)
+            stores = any(w.letter == "L" and round(w.value) == STORES_POSITION for w in words)
+            return stores and self.state.profile.g10_stores
         counted = self.state.bare_increments and not set(UNITS).isdisjoint(codes)
         return counted or not _APART.isdisjoint(codes)
 
@@ -242,6 +280,11 @@ class _Reader:
         flag = np.where(incremental, np.uint8(Flag.INCREMENTAL), np.uint8(0))
         flag[blocks.other[a:upto]] |= np.uint8(Flag.WHOLE)
         flag[chunk.deleted[line]] |= np.uint8(Flag.DELETED)
+        if self.extrusion is not None:
+            # a straight move that feeds nothing is a travel
+            kind = np.where(kind > Kind.LINE, kind, np.where(self.feeding[line], Kind.LINE, Kind.RAPID))
+            kind = kind.astype(np.uint8)
+            flag[self.whole[line]] |= np.uint8(Flag.WHOLE)
         inverse = context.feed_mode[line] == INVERSE_TIME
         if inverse.any():
             flag[inverse] |= np.uint8(Flag.INVERSE_TIME)
@@ -276,6 +319,7 @@ class _Reader:
         number = line + (context.chunk.first_line + 1)
         size = np.where(words >= 0, value[words], np.nan)
         size[:, :4] *= unit if isinstance(unit, float) else unit[row, None]
+        _check_centres(context, line, words)
         absolute = context.arc_distance[line] == 901
         plane = np.array([PLANE_OF[p] for p in (170, 180, 190)])[(context.plane[line] - 170) // 10]
         centre, sweep = arc_geometry(
@@ -304,6 +348,18 @@ class _Reader:
         used, which = np.unique(frame, return_inverse=True)
         table = np.array([(*frames[i].offset_mm, frames[i].unit_mm) for i in used.tolist()])[which]
         return table[:, :3], table[:, 3]
+
+
+def _check_centres(context: Context, line: Index, words: Index) -> None:
+    """Refuse arcs with centre words where a setting of the control, which is not stated, decides of them."""
+    open_ones = (context.arc_distance[line] < 0) & (words[:, :3] >= 0).any(axis=1)
+    if open_ones.any():
+        raise ProgramError(
+            "I, J and K of this arc are distances or positions by a setting of the control; give G91.1 or "
+            'G90.1 before it, or state arc_centres = "incremental" or "absolute" in the machine file',
+            line=context.number(int(line[np.argmax(open_ones)])),
+            code="OLP532",
+        )
 
 
 def _no_motion(line: int) -> ProgramError:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Index, distinct
+from olp.core.arrays import Index, distinct, is_in
 from olp.core.errors import ProgramError
 from olp.core.toolpath import Flag, Kind
 from olp.program.rs274.axis_state import AxisState, Effect
@@ -29,13 +29,6 @@ from olp.program.rs274.profiles.base import Act, Profile
 from olp.program.rs274.state import NAN
 from olp.program.rs274.turned import Turning, along_words
 
-_M_REFUSED = {
-    700: "saves modal codes", 710: "forgets saved modal codes", 720: "restores modal codes",
-    730: "saves modal codes", 960: "branches", 970: "calls a subprogram", 980: "calls a subprogram",
-    990: "repeats the program",
-}  # fmt: skip
-_M_CODES = np.array(list(_M_REFUSED))
-
 
 def event_block(context: Context, line: int, profile: Profile) -> tuple[list[Word], list[int]]:
     """The words and event codes of a line of the chunk; refuses what cannot be read correctly."""
@@ -46,6 +39,14 @@ def event_block(context: Context, line: int, profile: Profile) -> tuple[list[Wor
         Word(chr(letter), value, context.base + a + i, pointed)
         for i, (letter, value, pointed) in enumerate(zip(*(c.tolist() for c in columns), strict=True))
     ]
+    if profile.commands is not None:
+        # letters behind a command are its parameters
+        own = next((k for k, word in enumerate(words) if word.letter != "N"), len(words))
+        words = [w for k, w in enumerate(words) if k == own or (k > own and w.letter not in "GMT")]
+        still = profile.commands.still_with
+        if words and words[0].letter != "G":
+            letter = still.get(round(words[0].value), "") if words[0].letter == "M" else ""
+            words = [] if letter and any(w.letter == letter for w in words) else words[:1]
     mine = slice(codes.line.searchsorted(line), codes.line.searchsorted(line, "right"))
     number = context.number(line)
     events = _checked(codes.code[mine], codes.act[mine], words, profile, number)
@@ -66,6 +67,7 @@ def _checked(
     code: Index, act: npt.NDArray[np.int8], words: list[Word], profile: Profile, line: int
 ) -> list[int]:
     """The event codes of a block; refuses those that cannot be read correctly."""
+    unroll = UNROLL if profile.unroller is not None else ""
     numbers = [word.value for word in words if word.letter == "G"]
     for c, a, number in zip(code.tolist(), act.tolist(), numbers, strict=True):
         if a == Act.REFUSE:
@@ -77,18 +79,18 @@ def _checked(
                 why or f"{name} is not known to the {profile.name} profile and may move the machine",
                 line=line,
                 code="OLP513" if c in CUTTER_COMPENSATION else "OLP511" if c in MACROS else "OLP512",
-                hint=UNROLL if c in MACROS else "",
+                hint=unroll if c in MACROS else "",
                 # the other words of a macro call are its arguments
                 word="" if c in MACROS else name,
             )
     for word in words:
         m = round(word.value * 10)
-        if word.letter == "M" and m in _M_REFUSED:
+        if word.letter == "M" and m in profile.m_refusals:
             raise ProgramError(
-                f"M{m / 10:g} {_M_REFUSED[m]}",
-                hint=UNROLL,
+                f"M{m / 10:g} {profile.m_refusals[m]}",
+                hint=unroll,
                 line=line,
-                code="OLP511",
+                code="OLP511" if unroll else "OLP512",
                 word=f"M{m / 10:g}",
             )
     return [c for c, a in zip(code.tolist(), act.tolist(), strict=True) if a == Act.EVENT]
@@ -98,7 +100,7 @@ def check_codes(context: Context, profile: Profile) -> None:
     """Refuse the codes of a chunk that need no state to be refused, all at once."""
     chunk, codes = context.chunk, context.codes
     m = np.flatnonzero((chunk.letter == ord("M")) & context.active[chunk.line])
-    m = m[np.isin(np.rint(context.value[m] * 10), _M_CODES)]
+    m = m[is_in(np.rint(context.value[m] * 10), list(profile.m_refusals))]
     lines = distinct(np.concatenate((codes.line[codes.act == Act.REFUSE], chunk.line[m])))
     errors = []
     for line in lines.tolist():

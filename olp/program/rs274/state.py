@@ -20,6 +20,11 @@ NAN = float("nan")
 _GROUP_OF = tuple((code, group) for group, codes in GROUPS.items() for code in codes)
 
 
+def _none(code: int | None) -> int:
+    """A code in force, -1 where there is none or a setting of the control decides."""
+    return -1 if code is None else code
+
+
 @dataclass(frozen=True, slots=True)
 class Capture:
     """A word that stores the present position (G92, G10 L20): `axis`, its `word`, the unit it is in, and
@@ -47,6 +52,13 @@ class PathMode:
 BROKEN_SERIES = (
     "an offset, the tool length, the unit or another move comes within a series of canned cycles; what this "
     "control keeps then is not known; end the series with G80"
+)
+
+
+#: Why a cycle is refused where it may end at two levels.
+OPEN_RETRACT = (
+    "whether this cycle returns to its initial level or to R is a setting of the control; give G98 or G99 "
+    "before it"
 )
 
 
@@ -96,7 +108,7 @@ class State:
     series: Series = field(default_factory=Series)
 
     def __post_init__(self) -> None:
-        self.retract = self.profile.initial_retract
+        self.retract = _none(self.profile.initial_retract)
 
     @property
     def absolute(self) -> bool:

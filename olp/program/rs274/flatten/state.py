@@ -44,7 +44,7 @@ from olp.program.rs274.cycles import (
     levels,
 )
 from olp.program.rs274.flatten.expressions import whole
-from olp.program.rs274.state import BROKEN_SERIES, NAN, State
+from olp.program.rs274.state import BROKEN_SERIES, NAN, OPEN_RETRACT, State
 
 #: A word with its value; None is a value whose unit is not known (`Language.increments_open`).
 Value = tuple[str, float | None]
@@ -94,7 +94,8 @@ class ProgramState(State):
         return value
 
     def codes(self, words: Sequence[Value]) -> set[int]:
-        return {round(value * 10) for letter, value in words if letter == "g" and value is not None}
+        codes = {round(value * 10) for letter, value in words if letter == "g" and value is not None}
+        return {self.profile.aliases.get(code, code) for code in codes}
 
     def is_cycle(self, words: Sequence[Value]) -> bool:
         """Whether a block with these words makes a canned cycle."""
@@ -254,6 +255,8 @@ class ProgramState(State):
         if repeats == 0:
             return ()
         xy, step = self._hole_and_step(given, first, second)
+        if self.retract < 0:
+            raise ProgramError(OPEN_RETRACT, code="OLP532")
         r, z = levels(self._needed("R"), self._needed(depth), absolute=self.absolute, initial_z=initial)
         self.position_of(tool)
         strokes = cycle_moves(

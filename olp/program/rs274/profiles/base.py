@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence, Set
+from dataclasses import field
 from enum import IntEnum, auto
 from typing import TypeVar
 
@@ -19,6 +20,7 @@ from olp.program.dialect import Dialect, Row, Support
 from olp.program.rs274.block_rules import OTHER_RULES, BlockRules
 from olp.program.rs274.block_text import BlockText
 from olp.program.rs274.codes import CYCLES, PROBES
+from olp.program.rs274.commands import Commands
 from olp.program.rs274.cycle_rules import CycleRules
 from olp.program.rs274.flatten.language import Language
 from olp.program.text.line_ends import split
@@ -37,6 +39,7 @@ class Act(IntEnum):
     ARC_DISTANCE = auto()
     FEED = auto()
     RETRACT = auto()
+    CONTROL = auto()  #: the control moves by itself: no position is known after it
     EVENT = auto()  #: changes frames, units, tools or path mode; handled block by block
     REFUSE = auto()
 
@@ -48,25 +51,40 @@ _SUPPORT = {Act.UNCHANGED: Support.UNCHANGED, Act.REFUSE: Support.REFUSED, Act.M
 class Profile(Dialect):
     """One control's reading of word-address text.
 
-    - `codes` and `refusals`: what becomes of each G code, and why it is refused; `harmless_m` are the M codes
-      that move no axis.
-    - `motion`, `initial_retract`: G codes that are in force at the start (None: none).
+    - `codes` and `refusals`: what becomes of each G code, and why it is refused. `aliases`: codes that do
+      here what another code does elsewhere; one that leads to `NO_CODE` is none of this control.
+    - `harmless_m` are the M codes that move no axis; `harmless_m_tenths` those with a decimal, ten times
+      their number. `m_refusals`: M codes that are refused, ten times their number, and what they do.
+    - `motion`, `initial_retract`: G codes that are in force at the start (None: none, or a setting of the
+      control). `arc_distance`: whether
+      centres are absolute (901) or distances (911) at the start; None is a setting of the control, which the
+      machine file states as `arc_centres`.
     - `increments_without_point`: X100 means 100 least increments, not 100 mm. `feed_without_point`: F100 is
       100 mm/min all the same.
     - `g52_is_g92`: G52 writes the same offset as G92. `g10_offsets`: the largest P of G10 L2 and L20.
-      `g10_adds`: in G91 G10 L2 adds to the offset. `turns_offsets`: a work offset may be turned about Z,
-      which R of G10 L2 states too. `scales_axes`: G51 takes a factor for each axis, too.
-      `scales_by_parameter`: a parameter of the control sets the unit of these factors, which have no point.
+      `g10_adds`: in G91 G10 L2 adds to the offset; None is not known, and refused. `g10_stores`: G10 L20
+      stores the present position, else it writes the offset G54.1 P. `offset_words`: the letter of the number
+      of a work offset beside a code, which the code may go without where it is in `offsets_alone`.
+      `offset_names`: the name of these offsets where it is not that of the code. `turns_offsets`: a work
+      offset may be turned about Z, which R of G10 L2 states too. `scales_axes`: G51 takes a factor for each
+      axis, too. `scales_by_parameter`: a parameter of the control sets the unit of these factors, which have
+      no point.
     - `cycles_apart`: canned cycles and G80 are a separate modal group.
     - `axis_dwell`: G4 takes its time from X and U, too, and counts milliseconds where it has no point.
     - `exact_stop`: G61 stops at the end of each block, as G9 does in one, and G62 and G63 end it as G64 does.
       A G0 begins and ends at rest, and M5 and M9 come after the motion of their block.
-    - `m61_sets_tool`: M61 Q says which tool is in the spindle. `length_of_spindle_tool`: G43 without H, and
+    - `m61_sets_tool`: M61 Q says which tool is in the spindle. `tools_in_block`: a block may have two T
+      words, the tool to change to and the one to make ready. `length_of_spindle_tool`: G43 without H, and
       with H0, takes the length of that tool. `lengths_along_z`: a tool length counts along Z alone.
       `lengths_keep_unit`: a change of unit does not convert the length in force.
     - `feed_words_end`: each G94 and G95 forgets F. `feed_before_unit`: F of a block counts before its G20 or
       G21. `least_inverse_feed`: units per minute, the least feed of a block in G93. `m_with_motion`: M codes
       carried out along with the motion, without a rest.
+    - `dwell_words`: the letters that state the time of G4. `dwell_ms`: P counts milliseconds, whatever its
+      form.
+    - `commands`: each line is a command with parameters, and no code holds for the next line. None: lines are
+      blocks of words.
+    - `inert`: whole lines that are no words and move nothing, such as names of programs and labels.
     - `text`, `rules`, `cycles`, `language`: what may be in a line and in a block, how canned cycles are made,
       and how parametric programs are written.
     - `written_ending`: the ending of files that are written for the control. `program_number`: a program
@@ -79,14 +97,22 @@ class Profile(Dialect):
     program_number: bool = False
     codes: Mapping[int, Act]
     refusals: Mapping[int, str]
+    aliases: Mapping[int, int] = field(default_factory=dict)
     harmless_m: frozenset[int]
+    harmless_m_tenths: frozenset[int] = frozenset()
+    m_refusals: Mapping[int, str] = field(default_factory=lambda: M_REFUSALS)
     motion: int | None = None
-    initial_retract: int
+    initial_retract: int | None
+    arc_distance: int | None = 911
     increments_without_point: bool = False
     feed_without_point: bool = False
     g52_is_g92: bool = False
     g10_offsets: int = 6
-    g10_adds: bool = False
+    g10_adds: bool | None = False
+    g10_stores: bool = True
+    offset_words: Mapping[int, str] = field(default_factory=lambda: {541: "P", 1540: "P"})
+    offset_names: Mapping[int, str] = field(default_factory=dict)
+    offsets_alone: frozenset[int] = frozenset()
     turns_offsets: bool = False
     scales_axes: bool = False
     scales_by_parameter: bool = False
@@ -94,6 +120,7 @@ class Profile(Dialect):
     axis_dwell: bool = False
     exact_stop: bool = False
     m61_sets_tool: bool = False
+    tools_in_block: bool = False
     length_of_spindle_tool: bool = False
     lengths_along_z: bool = False
     lengths_keep_unit: bool = False
@@ -101,17 +128,32 @@ class Profile(Dialect):
     feed_before_unit: bool = False
     least_inverse_feed: float = 0.0
     m_with_motion: frozenset[int] = frozenset()
+    dwell_ms: bool = False
+    dwell_words: str = "P"
+    commands: Commands | None = None
+    inert: re.Pattern[bytes] | None = None
     text: BlockText
     rules: BlockRules = OTHER_RULES
     cycles: CycleRules
     language: Language
 
+    @property
+    def still_m(self) -> frozenset[int]:
+        """The M codes that move no axis, ten times their number."""
+        return frozenset(10 * m for m in self.harmless_m) | self.harmless_m_tenths
+
+    def codes_of(self, act: Act) -> frozenset[int]:
+        """The G codes that do something, ten times their number."""
+        return frozenset(code for code, own in self.codes.items() if own is act)
+
     def comment_marks(self) -> tuple[tuple[bytes, bytes], ...]:
-        return ((b"(", b")"), (b";", b""))
+        return ((b"(", b")"), (b";", b"")) if self.text.brackets else ((b";", b""),)
 
     def dwell_s(self, number: Number, *, pointed: bool) -> Number:
-        """Seconds of P words; Fanuc and Haas count milliseconds where it has no decimal point."""
-        return number / 1000.0 if self.increments_without_point and not pointed else number
+        """Seconds of P words; Fanuc and Haas count milliseconds where it has no decimal point, printers
+        always."""
+        in_ms = self.dwell_ms or (self.increments_without_point and not pointed)
+        return number / 1000.0 if in_ms else number
 
     def counts_increments(self, machine: Machine) -> bool:
         """Whether a length without a decimal point counts least increments."""
@@ -202,6 +244,14 @@ def g_codes(*, unchanged: set[int], extra: dict[int, Act], without: Set[int] = f
     return {code: act for code, act in codes.items() if code not in without}
 
 
+#: M codes that are refused, ten times their number, and what they do.
+M_REFUSALS: Mapping[int, str] = {
+    700: "saves modal codes", 710: "forgets saved modal codes", 720: "restores modal codes",
+    730: "saves modal codes", 960: "branches", 970: "calls a subprogram", 980: "calls a subprogram",
+    990: "repeats the program",
+}  # fmt: skip
+#: What an alias leads to where the control does not have the code.
+NO_CODE = -1
 #: M codes of ISO 6983 that move no axis.
 ISO_M = frozenset({0, 1, 2, 3, 4, 5, 7, 8, 9, 19, 30, 48, 49})
 ARC_DISTANCE: Mapping[int, Act] = dict.fromkeys((901, 911), Act.ARC_DISTANCE)

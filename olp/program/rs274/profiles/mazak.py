@@ -1,0 +1,33 @@
+"""Mazak mills, EIA/ISO programs.
+
+Differs from Fanuc: `T1 T2 M6` changes to the first tool and makes the second one ready. G5 is a high-speed
+mode and no spline. G61.1 keeps shapes and does not stop between blocks.
+
+Source: programming manuals "EIA/ISO program" of Mazatrol Matrix and Smooth controls.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from olp.program.rs274.profiles.base import Act, g_codes
+from olp.program.rs274.profiles.iso import ISO, ISO_EXTRA, ISO_UNCHANGED
+
+#: Scaling and rotation take other words than those of Fanuc.
+_OWN = dict.fromkeys((510, 680), Act.REFUSE) | dict.fromkeys((50, 500, 690), Act.UNCHANGED)
+
+DIALECT = replace(
+    ISO,
+    name="mazak",
+    title="Mazak mills, EIA/ISO programs",
+    codes=g_codes(unchanged={*ISO_UNCHANGED, 611}, extra={**ISO_EXTRA, **_OWN}),
+    refusals={
+        **ISO.refusals,
+        921: "G92.1 presets offsets that are not known off line",
+        51: "G5.1 is a spline of this control",
+    },
+    harmless_m=ISO.harmless_m | {10, 11, 50, 51},
+    tools_in_block=True,
+    rules=replace(ISO.rules, several="GMT"),
+    path_mode="cutting mode G64 of the control, unless G5 P2 or G61.1 is on",
+)
