@@ -35,6 +35,8 @@ from olp.program.rs274.profiles.base import Profile
 
 _COMMENT = re.compile(rb"\([^)]*\)")
 _ENDS = frozenset({2, 30})
+#: Strokes that are moves, with their codes.
+_MOVES = {"rapid": 0, "feed": 10}
 
 #: bytes of visited blocks, each with some for the visit itself: of a short program, and for each byte
 UNROLLED_BYTES = 12_000_000
@@ -133,6 +135,8 @@ class _Flattener:
         self.strokes = strokes
         #: whether a block has words of axes
         self.moves = False
+        # the motion that the moves of a cycle have brought into force
+        self._of_strokes: int | None = None
         self.expand_cycles = expand_cycles
         self.peck_clearance = peck_clearance
         self._seen: set[tuple[int, int]] = set()
@@ -207,7 +211,14 @@ class _Flattener:
             cut |= {i for i, w in enumerate(line.words) if self._of_cycle(w, values[i][1])}
             self._write(line, values, cut, exact=False)
             self._write_strokes(strokes, line, before)
+            self._of_strokes = next((_MOVES[s.kind] for s in reversed(strokes) if s.kind in _MOVES), None)
         else:
+            if self._of_strokes is not None and self.state.ends_cycles(self.state.codes(active)):
+                # the moves of the cycle may have brought another motion into force
+                beneath = self.state.beneath
+                if beneath is not None and beneath != self._of_strokes:
+                    self._put(b"G%d" % (beneath // 10), line.eol)
+                self._of_strokes = None
             self._write(line, values, cut, exact=frame.unit.radius_arcs)
         for target, value in settings:
             self.variables.assign(target, value)
