@@ -23,6 +23,7 @@ from olp.core.budget import Budget
 from olp.core.errors import ProgramError
 from olp.core.units import AXES
 from olp.program.origin import Origin, Unrolled, Within
+from olp.program.rs274.codes import FINE_BORING
 from olp.program.rs274.cycles import Stroke, stroke_budget
 from olp.program.rs274.flatten.expressions import filled, whole
 from olp.program.rs274.flatten.language import Language
@@ -254,6 +255,11 @@ class _Flattener:
         if self.cycles.taps_by_control and self.state.codes(active) & {740, 840}:
             raise ProgramError(
                 "G74 and G84 are synchronised by the control: plain moves cannot replace them", code="OLP544"
+            )
+        if FINE_BORING in self.state.codes(active):
+            raise ProgramError(
+                "G76 stops the spindle at an angle and shifts the tool: plain moves cannot replace it",
+                code="OLP544",
             )
         strokes = self.state.cycle(active, self.peck_clearance)
         self.strokes.spend(len(strokes))
