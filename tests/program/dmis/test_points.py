@@ -104,16 +104,13 @@ def test_points_that_are_no_round_numbers_are_kept_on_a_machine_without_errors(z
     assert olp.correct(data, zero).data == data
 
 
-def test_an_increment_after_a_moved_point_is_written_although_its_own_place_needs_no_change(
-    tmp_path: Path,
-) -> None:
-    path = machines.random_machine(tmp_path, 11, RECIPE)
-    data = b"UNITS/MM,ANGDEC\nRECALL/D(PART)\n" + b"".join(
-        b"GOTO/CART,%d,0,0\nGOTO/INCR,%d,-1,0,0\n" % (x, x) for x in range(5, 300, 7)
-    )
-    result = olp.correct(data, path)
-    points = read_points(result.data)
-    assert np.abs(points[1::2] - points[1]).max() < 1e-9
+def test_an_increment_after_a_moved_point_is_written_although_its_own_place_needs_no_change() -> None:
+    data = b"UNITS/MM,ANGDEC\nGOTO/CART,0,100,0\nGOTO/INCR,100,0,-1,0\nGOTO/INCR,10,1,0,0\nENDFIL\n"
+    skewed = olp.KnownErrors.of(["XY=1mm/m"])
+    written = unstamped(olp.correct(data, skewed).data).split(b"\n")
+    assert written[2] == b"GOTO/CART,0.000,0.000,0.000"
+    assert written[3] == b"GOTO/INCR,10,1,0,0"
+    assert read_points(b"\n".join(written))[1:] == pytest.approx(np.array([[0.0, 0, 0], [10, 0, 0]]))
 
 
 SCAN = (
