@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
-import operator
 import threading
 from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -19,10 +18,6 @@ T = TypeVar("T")
 
 #: So many values of a class are made without its constructor: to compile that takes as long as some twenty.
 _FEW = 6
-
-#: Of classes whose values were compared or hashed, what gives the fields of a value. Frames are looked up by
-#: their values on every line that changes one.
-_STATES: dict[type, Callable[[Any], tuple[Any, ...]]] = {}
 
 _LOCK = threading.RLock()
 _FIELDS = "__dataclass_fields__"
@@ -114,18 +109,7 @@ def _filled(self: Any, args: tuple[Any, ...], words: dict[str, Any]) -> bool:
 
 
 def _state(self: Any) -> tuple[Any, ...]:
-    state = _STATES.get(type(self))
-    if state is None:
-        state = _STATES[type(self)] = _reader(type(self))
-    return state(self)
-
-
-def _reader(cls: type) -> Callable[[Any], tuple[Any, ...]]:
-    """A function that gives the fields of a value of a class."""
-    names = [field.name for field in dataclasses.fields(cls)]
-    if len(names) > 1:
-        return operator.attrgetter(*names)
-    return lambda value: tuple(getattr(value, name) for name in names)
+    return tuple([getattr(self, field.name) for field in dataclasses.fields(self)])
 
 
 def _set_state(self: Any, state: tuple[Any, ...]) -> None:

@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from olp.calibration.diagnosis.agreement import compared
+from olp.calibration.diagnosis.agreement_report import agreement_findings, agreement_rows
 from olp.calibration.estimator.adjustment import fit
 from olp.calibration.estimator.covariance import covariance_of
 from olp.calibration.estimator.curves import calibration_of, sigmas_of
@@ -16,6 +18,7 @@ from olp.calibration.estimator.fitted import Fit
 from olp.calibration.estimator.nonrigid import NonRigid, nonrigid
 from olp.calibration.estimator.residual_map import map_findings, map_summary, residual_map
 from olp.calibration.estimator.summary import summary
+from olp.calibration.observations.base import ScatteredState, State
 from olp.calibration.observations.measurements import MapWish, Measurements
 from olp.core.errors import ConfigError
 from olp.core.machine import Setup, Vector
@@ -27,6 +30,11 @@ from olp.files.measurements.reader import files_of_measurements, load_measuremen
 from olp.findings.catalogue import Finding
 from olp.workflows.session import PathLike, Session
 from olp.workflows.shown import Filed
+
+#: Reduced chi-square above which nothing that may be wrong with one source explains the readings.
+ABSURD = 1e3
+#: Findings that say what is wrong with the readings.
+_CAUSES = ("OLP810", "OLP811")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -117,13 +125,40 @@ def fit_calibration(
     )
     if mapped is not None:
         calibration = dataclasses.replace(calibration, maps=(mapped,))
+    found = compared(fitted, _alone(fitted, beyond))
     tools = [] if described is None else [tool.tool_vector_mm for tool in described.tools.values()]
     tool_vectors = [tool_vector for tool_vector in tools if tool_vector is not None]
-    report, findings = summary(fitted, calibration, tool_vectors), findings_of(fitted, tool_vectors, travel)
+    findings = (
+        *findings_of(fitted, tool_vectors, travel), *agreement_findings(found, fitted, tool_vectors)
+    )  # fmt: skip
+    _refuse_absurd(fitted, findings)
+    report = summary(fitted, calibration, tool_vectors) | {"agreement": agreement_rows(found)}
     if beyond is not None:
         report["map"] = map_summary(beyond, mapped)
         findings = (*findings, *map_findings(beyond, mapped))
     return FittedCalibration(calibration, fitted, report, findings, beyond, inputs)
+
+
+def _alone(fitted: Fit, beyond: NonRigid | None) -> list[State]:
+    """The states that are compared: a map describes what curves leave of scattered readings, so these are
+    left out."""
+    mapped = beyond is not None and beyond.processes
+    states = [result.state for result in fitted.results]
+    return [state for state in states if not (mapped and isinstance(state, ScatteredState))]
+
+
+def _refuse_absurd(fitted: Fit, findings: Sequence[Finding]) -> None:
+    """Raise ConfigError where the readings are not those of a machine."""
+    total = fitted.quality.total
+    if not (total.failed and total.reduced > ABSURD):
+        return
+    causes = tuple(f"{finding.code}: {finding.message}" for finding in findings if finding.code in _CAUSES)
+    worst = max(fitted.quality.sources, key=lambda one: one.reduced, default=total)
+    raise ConfigError(
+        f"these readings are not those of one machine: reduced chi-square is {total.reduced:.3g}, "
+        f"{worst.reduced:.3g} of {worst.source}; expected about 1. "
+        + ("; ".join(causes) if causes else "Check units, signs and frames of what is read"),
+    )
 
 
 __all__ = ["FittedCalibration", "fit_calibration"]

@@ -21,8 +21,7 @@ TEXT = ("PARTNO", "PPRINT", "INSERT", "REMARK", "TITLE")
 QUIET = re.compile(
     r"(UNITS?|PARTNO|PPRINT|INSERT|REMARK|TITLE|SPINDL|COOLNT|CUTTER|SELECT|SETUP|TRNTYP|CSI_\w+|MACHIN|FEDRAT"
     r"|CUTCOM|PAINT|TOOL PATH|MULTAX|DELAY|STOP|OPSTOP|MSYS|CSYS|LOAD|LOADTL|CYCLE|INTOL|OUTTOL|END-OF-PATH"
-    r"|SEQNO|DISPLY|DRAFT|TOOLNO|TLNAME|ARCSLP|SLOWDN|CHECK|RETRCT|CLAMP|TLSPEC|CLRSRF|TOLER|MCHTOL|LINTOL|ORIGIN"
-    r"|PITCH|TMARK|PLABEL|PENUP|AIR|UNLOAD|SET/MODE|BOX|AUXFUN|PREFUN|CATPROCESS|TLAXIS|TPRINT|OPNAME|APPLY|DRESS|REWIND|OPSKIP"
+    r"|SEQNO|DISPLY|FROM|SET/MODE|BOX|AUXFUN|PREFUN|CATPROCESS|TLAXIS|TPRINT|OPNAME|APPLY|DRESS|REWIND|OPSKIP"
     r"|ROTATE/\w+,ATANGL,0|STOCK|SELCTL|CLEARP|LEADER|MODE|TLDATA|INDEX|END)\b"
 )
 
@@ -120,7 +119,6 @@ def read_apt(
     arc: tuple[np.ndarray, np.ndarray, int] | None = None
     direction, size = None, 0.0
     around: list[Sequence[float]] = []
-    home = here
     lift: Sequence[float] = (0.0, 0.0, 0.0)
     for line, text in joined(data):
         major = text.partition("/")[0].strip()
@@ -184,10 +182,8 @@ def read_apt(
         elif major == "TRANS":
             lift = value
         elif major == "GOHOME":
-            here = at(frame, value[:3], unit, length) if value else home
+            here = at(frame, value[:3], unit, length)
             moves.add(line, RAPID, here, length, tool, -tall * aim)
-        elif major == "FROM":
-            home = at(frame, value[:3], unit, length)
         elif major in ("UNITS", "UNIT"):
             unit = 25.4 if "INCH" in text else 1.0
         elif major in ("CSYS", "MSYS"):

@@ -10,7 +10,6 @@ import numpy as np
 from olp.calibration.estimator.adjustment import POINT_CELLS
 from olp.calibration.estimator.basis import CurveSpace, Spline
 from olp.calibration.estimator.fitted import Fit
-from olp.calibration.estimator.model import mean_slopes
 from olp.calibration.estimator.normal import Normal, solve
 from olp.calibration.estimator.parameters import MeasuringLine, Parameters, frame_columns
 from olp.calibration.estimator.prior import POSE, Prior
@@ -70,10 +69,7 @@ def predict(planned: Planned, chain: str, box_mm: Array, tools: Sequence[Vector]
         normal.add(state.block(parameters, theta))
     precision, logdet = prior.precision()
     solved = solve(normal, precision, logdet)
-    predicted = Fit(
-        taken, parameters, theta, solved.covariance, prior, (), (), box_mm,
-        mean_slopes(parameters), 0.0, 1.0, {},
-    )  # fmt: skip
+    predicted = Fit(taken, parameters, theta, solved.covariance, prior, (), (), box_mm, 0.0, 1.0, {})
     after, worst = _spread(parameters, solved.covariance, box_mm, tools)
     return Prediction(after, worst, (*unobservable(predicted), *squareness_unobservable(predicted)))
 

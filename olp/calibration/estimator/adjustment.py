@@ -13,7 +13,7 @@ import numpy as np
 
 from olp.calibration.estimator.basis import Wave
 from olp.calibration.estimator.fitted import Fit
-from olp.calibration.estimator.model import MOST, Model, mean_slopes, squares_of
+from olp.calibration.estimator.model import MOST, Model, squares_of
 from olp.calibration.estimator.normal import Block, Normal, Solved, solve
 from olp.calibration.estimator.parameters import Parameters
 from olp.calibration.estimator.prior import Prior
@@ -156,7 +156,7 @@ def _finish(start: _Start, end: _Settled) -> Fit:
     parameters = end.prior.parameters
     return Fit(
         start.measurements, parameters, theta, covariance, end.prior, tuple(results), tuple(end.outliers),
-        model.box_mm, mean_slopes(parameters), chi_square, freedom, model.unobservable,
+        model.box_mm, chi_square, freedom, model.unobservable,
     )  # fmt: skip
 
 

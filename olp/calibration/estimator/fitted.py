@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from olp.calibration.estimator.basis import Step
-from olp.calibration.estimator.parameters import CROSS, LEVER_ARM_MM, Parameters, frame_columns
+from olp.calibration.estimator.parameters import CROSS, LEVER_ARM_MM, Parameters, frame_columns, turned_by
 from olp.calibration.estimator.prior import Prior
 from olp.calibration.observations.base import Outlier, Result, S, ScatteredState
 from olp.calibration.observations.measurements import Measurements
@@ -23,8 +23,8 @@ class Fit:
     """theta with its covariance and layout; see `error`, `sigma`, `design`. `results` are those of all
     observations.
 
-    `slopes` are the mean slopes of the straightness curves on lines through the datum, as functionals of
-    theta: the gauge takes them as squareness. `box_mm` (3, 2) is what the lines covered.
+    The gauge takes the mean slopes of straightness on lines through the datum as squareness. `box_mm` (3, 2)
+    is what the lines covered.
     `cyclic_unobservable` says by component why a period was not fitted.
     """
 
@@ -36,7 +36,6 @@ class Fit:
     results: tuple[Result[Any], ...]
     outliers: tuple[Outlier, ...]
     box_mm: Array
-    slopes: Mapping[str, Array]
     chi_square: float
     freedom: float
     cyclic_unobservable: Mapping[tuple[str, float], str]
@@ -73,17 +72,8 @@ class Fit:
         table = self.parameters.design(position, np.asarray(tool_mm, float), play)
         if self.parameters.framed:
             return table
-        turn = self.turn
-        arm = position - np.array(self.parameters.datum_mm)
-        for row in range(3):
-            k, m = (row + 1) % 3, (row + 2) % 3
-            table[:, row] += arm[:, m, None] * turn[k] - arm[:, k, None] * turn[m]
-        return table
-
-    @property
-    def turn(self) -> Array:
-        """(3, size) rotation of the frame that the gauge asks for, as functionals of theta."""
-        return np.stack([-self.slopes["EZY"], self.slopes["EZX"], -self.slopes["EYX"]])
+        arm = position + tool_mm - np.array(self.parameters.datum_mm)
+        return np.asarray(table + turned_by(self.parameters.turn, arm))
 
     def error(self, axis_mm: Array, tool_mm: Array, play: Array | None = None) -> Array:
         """(n, 3) estimated error in mm, to first order."""
@@ -124,9 +114,9 @@ class Fit:
         terms, as functionals of theta."""
         rows = np.zeros((len(q), self.parameters.size))
         rows[:, self.parameters.slices[name]] = self.parameters.spaces[name].values(q)
-        if name in self.slopes:
+        if name in self.parameters.slopes:
             axis = AXES.index(name[2])
-            rows -= (q - self.parameters.datum_mm[axis])[:, None] * self.slopes[name]
+            rows -= (q - self.parameters.datum_mm[axis])[:, None] * self.parameters.slopes[name]
         if self.parameters.framed:
             rows += self._of_frame(name, q)
         return rows
@@ -151,7 +141,7 @@ class Fit:
             # the turn that the gauge removed is added again
             k = 3 - row - axis
             sign = 1.0 if (axis - k) % 3 == 1 else -1.0
-            turn = -self.turn[k]
+            turn = -self.parameters.turn[k]
             turn[start + 3 + k] += 1.0 / LEVER_ARM_MM
             rows += sign * (q - self.parameters.datum_mm[axis])[:, None] * turn
         return rows
@@ -165,4 +155,6 @@ class Fit:
             "B0Z": ("EXZ", "EZX", 1.0),
             "A0Z": ("EYZ", "EZY", -1.0),
         }[name]
-        return np.asarray(functional + sign * (self.slopes[first] + self.slopes[second]))
+        return np.asarray(
+            functional + sign * (self.parameters.slopes[first] + self.parameters.slopes[second])
+        )

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from olp.calibration.estimator.basis import CurveSpace, Spline, Step, Wave, slope_grid, slope_weights
+from olp.calibration.estimator.basis import CurveSpace, Spline, Step, Wave
 from olp.calibration.estimator.parameters import MeasuringLine, Parameters
 from olp.calibration.estimator.prior import POSE
 from olp.calibration.estimator.smoothing import Shape, shape_of
@@ -208,21 +208,3 @@ def _measuring_line(line: Line) -> MeasuringLine:
     line_mm = list(line.line_mm)
     line_mm[line.axis] = 0.0
     return MeasuringLine((line_mm[0], line_mm[1], line_mm[2]), line.tool_mm)
-
-
-def mean_slopes(parameters: Parameters) -> dict[str, Array]:
-    """Mean slopes of the straightness curves on lines through the datum with no tool."""
-    slopes: dict[str, Array] = {}
-    for name in COMPONENTS:
-        if name[1] not in AXES or name[1] == name[2]:
-            continue
-        axis, row = AXES.index(name[2]), AXES.index(name[1])
-        spline = parameters.spaces[name].spline
-        position = np.tile(np.array(parameters.datum_mm), (len(slope_grid(spline)), 1))
-        position[:, axis] = slope_grid(spline)
-        functional = np.zeros(parameters.size)
-        for part, values in parameters.displacement(row, axis, position, np.zeros(3)):
-            if part != parameters.slices.get(f"wave {name}"):
-                functional[part] += slope_weights(spline) @ values
-        slopes[name] = functional
-    return slopes

@@ -13,7 +13,7 @@ from typing import Protocol
 
 import numpy as np
 
-from olp.calibration.estimator.basis import CurveSpace, Wave
+from olp.calibration.estimator.basis import CurveSpace, Wave, slope_grid, slope_weights
 from olp.core.arrays import Array
 from olp.core.machine import COMPONENTS, SQUARENESS, ZERO, Vector
 from olp.core.units import AXES
@@ -55,6 +55,10 @@ class Parameters:
     "EXX", "half EXX", "wave EXX", "C0Y" and the names of shared nuisances. With `framed` some points were
     measured in the machine's frame. Theta then has a part "frame" of nine numbers: shift (mm) and turn of the
     axes in that frame, and turn of the tool vectors. Turns are in rad times LEVER_ARM_MM.
+
+    `slopes` are the mean slopes of the straightness curves on lines through the datum with no tool, as
+    functionals of theta. Curves are straight on their own lines. Tool vectors count from the axes as they
+    are on lines through the datum. So the frame of the curves is turned against tool vectors, by `turn`.
     """
 
     chain: str
@@ -67,6 +71,7 @@ class Parameters:
     framed: bool = False
     slices: Mapping[str, slice] = field(init=False)
     size: int = field(init=False)
+    slopes: Mapping[str, Array] = field(init=False)
 
     def __post_init__(self) -> None:
         slices: dict[str, slice] = {}
@@ -81,6 +86,25 @@ class Parameters:
             offset += size
         object.__setattr__(self, "slices", slices)
         object.__setattr__(self, "size", offset)
+        names = [name for name in COMPONENTS if name[1] in AXES and name[1] != name[2]]
+        object.__setattr__(self, "slopes", {name: self._mean_slope(name) for name in names})
+
+    @property
+    def turn(self) -> Array:
+        """(3, size) rotation of the frame that the gauge of the datum asks for, as functionals of theta."""
+        return np.stack([-self.slopes["EZY"], self.slopes["EZX"], -self.slopes["EYX"]])
+
+    def _mean_slope(self, name: str) -> Array:
+        axis, row = AXES.index(name[2]), AXES.index(name[1])
+        spline = self.spaces[name].spline
+        grid, weights = slope_grid(spline), slope_weights(spline)
+        position = np.tile(np.array(self.datum_mm), (len(grid), 1))
+        position[:, axis] = grid
+        functional = np.zeros(self.size)
+        for part, values in self.displacement(row, axis, position, np.zeros(3)):
+            if part != self.slices.get(f"wave {name}"):
+                functional[part] += weights @ values
+        return functional
 
     def after(self, axis: int) -> tuple[int, ...]:
         """The axes that `axis` carries toward the tool."""
@@ -147,7 +171,18 @@ class Parameters:
             table[:, :, start : start + 6] = frame_columns(position - np.array(self.datum_mm))
             turned = frame_columns(np.broadcast_to(tool, position.shape))[:, :, 3:]
             table[:, :, start + 6 : start + 9] = turned
+        elif tool.any():
+            table -= turned_by(self.turn, np.broadcast_to(tool, position.shape))
         return table
+
+
+def turned_by(turn: Array, arm: Array) -> Array:
+    """(n, 3, size) by how much a rotation `turn` (3, size) moves the ends of arms (n, 3)."""
+    table = np.empty((len(arm), 3, turn.shape[1]))
+    for row in range(3):
+        k, m = (row + 1) % 3, (row + 2) % 3
+        table[:, row] = arm[:, m, None] * turn[k] - arm[:, k, None] * turn[m]
+    return table
 
 
 def frame_columns(arm: Array, *, scale: bool = False) -> Array:

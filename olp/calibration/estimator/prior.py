@@ -4,7 +4,7 @@ there are some, else by class."""
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import field, replace
 
 import numpy as np
 
@@ -82,6 +82,11 @@ class Prior:
         if p.framed:
             precision[p.slices["frame"], p.slices["frame"]] = np.eye(9) / FRAME_MM**2
         return precision, logdet
+
+    def roughest(self) -> Prior:
+        """The same with curves as rough as their lines do not exclude."""
+        shapes = {name: replace(shape, roughness=shape.roughest) for name, shape in self.shapes.items()}
+        return replace(self, shapes=shapes)
 
     def push(self, normal: Normal) -> None:
         """Add the prior means to the right side."""

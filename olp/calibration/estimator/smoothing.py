@@ -31,6 +31,8 @@ HALF = 0.02, 20e-6
 GAIN = 2.0
 #: The same of a step where another error of the axis has one, nats.
 SHARED_GAIN = 0.0
+#: Nats below the best evidence at which a roughness is excluded: odds of 20 to 1.
+EXCLUDED = 3.0
 #: Features of a curve, at most.
 MOST = 8
 #: Steps and kinks are tried between so many targets at most.
@@ -42,12 +44,13 @@ Half = Literal["none", "constant", "curve"]
 @dataclass(frozen=True, slots=True, eq=False)
 class Shape:
     """The shape of a curve from its lines: standard deviation of second differences, features, dependence on
-    direction and its roughness."""
+    direction and its roughness. `roughest` is the largest roughness that the readings do not exclude."""
 
     roughness: float
     features: tuple[Feature, ...]
     half: Half
     half_roughness: float
+    roughest: float
 
 
 def shape_of(
@@ -96,7 +99,8 @@ def shape_of(
     half_roughness = 0.0
     if halves:
         half, half_roughness = choice.direction(chosen, roughness, best, half_spline, m + c)
-    return Shape(roughness, tuple(candidates[i] for i in sorted(chosen)), half, half_roughness)
+    features = tuple(candidates[i] for i in sorted(chosen))
+    return Shape(roughness, features, half, half_roughness, choice.roughest(chosen))
 
 
 def _is_joint(feature: Feature, joints: Sequence[Step]) -> bool:
@@ -142,6 +146,11 @@ class _Choice:
         values = self._values([chosen] * len(self.roughness), self.roughness)
         k = int(np.argmax(values))
         return float(values[k]), float(self.roughness[k])
+
+    def roughest(self, chosen: Sequence[int]) -> float:
+        """The largest roughness whose evidence is not much below the best."""
+        values = self._values([chosen] * len(self.roughness), self.roughness)
+        return float(self.roughness[np.flatnonzero(values > values.max() - EXCLUDED)[-1]])
 
     def with_one_more(self, chosen: Sequence[int], rest: Sequence[int], roughness: float) -> Array:
         """(len(rest),) best evidence with each of `rest` in addition, at this roughness or a lower one."""

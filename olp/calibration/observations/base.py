@@ -72,6 +72,17 @@ class Advance:
 STILL = Advance(np.zeros(0))
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Alternative:
+    """What may be wrong with an observation: its `kind` in a word, in `words`, and the observation put right.
+    `factor` is by how much its values are multiplied for that."""
+
+    kind: str
+    words: str
+    observation: Observation
+    factor: float = 1.0
+
+
 class Observation(ABC):
     """Readings of one instrument in one set-up. A frozen value with the file that it came from."""
 
@@ -86,6 +97,10 @@ class Observation(ABC):
     def screened(self) -> Screened:
         """Without the readings that are far from their repetitions. Raises ConfigError."""
         return Screened(self)
+
+    def alternatives(self) -> Sequence[Alternative]:
+        """What may be wrong with it, each put right."""
+        return ()
 
     @abstractmethod
     def reach(self, axis: int) -> Array:

@@ -10,7 +10,9 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from dataclasses import field
+import math
+from collections.abc import Sequence
+from dataclasses import field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -20,6 +22,7 @@ from olp.calibration.estimator.parameters import SHEAR, Parameters, gathered
 from olp.calibration.observations.base import (
     OUTLIER,
     SHARE,
+    Alternative,
     Noise,
     Observation,
     Outlier,
@@ -40,6 +43,31 @@ Reference = Literal["functional-point", "table"]
 SAME_MM = 0.05
 #: No instrument reads better than this (mm, rad): 10 nm, 10 nrad.
 LEAST = 1e-5, 1e-8
+#: urad per second of arc.
+ARCSEC_URAD = math.pi / 0.648
+#: Standard deviation of a scale of its own that a line may have by mistake: 5 K of steel.
+OWN_SCALE = 6e-5
+_DOUBLE = (
+    ("factor 2", 2.0, "its values are half of what they should be"),
+    ("factor 2", 0.5, "its values are twice what they should be"),
+)
+#: What else the unit of lengths, and of angles, may be: the factor that puts it right, and words.
+_UNITS = (
+    (
+        ("unit", 25.4, "its values are in thousandths of an inch, taken as 0.001 mm"),
+        ("unit", 1 / 25.4, "its values are in 0.001 mm, taken as thousandths of an inch"),
+        ("unit", 1e3, "its values are in mm, taken as um"),
+        ("unit", 1e-3, "its values are in nm, taken as um"),
+        *_DOUBLE,
+    ),
+    (
+        ("unit", ARCSEC_URAD, "its values are in arcsec, taken as urad"),
+        ("unit", 1 / ARCSEC_URAD, "its values are in urad, taken as arcsec"),
+        ("unit", 1e3, "its values are in mm/m, taken as um/m"),
+        ("unit", 1e-3, "its values are in um/m, taken as mm/m"),
+        *_DOUBLE,
+    ),
+)
 #: Drift of an instrument over a run, assumed where there is one run only (mm, rad): 2 um, 2 urad.
 DRIFT = 2e-3, 2e-6
 
@@ -121,6 +149,24 @@ class Line(Observation):
         """Without readings far outside the spread of their repetitions, and the noise of the others. Raises
         ConfigError where neither repetitions nor the line give the noise."""
         return _screened(self)
+
+    def alternatives(self) -> Sequence[Alternative]:
+        """Sign, unit, order of the targets, and a scale of its own."""
+        factors = [("sign", -1.0, "the sign of its values is reversed"), *_UNITS[self.quantity == "angle"]]
+        found = [
+            Alternative(
+                kind, words, replace(self, value=factor * self.value, sigma=abs(factor) * self.sigma), factor
+            )
+            for kind, factor, words in factors
+        ]
+        ends = float(self.target_mm.min() + self.target_mm.max())
+        turned = replace(self, target_mm=ends - self.target_mm, direction=-self.direction)
+        found.append(Alternative("order", "its targets run the other way", turned))
+        if self.quantity == "positioning":
+            scaled = replace(self, sigma_scale=math.hypot(self.sigma_scale, OWN_SCALE))
+            words = "it has a scale of its own (temperature, expansion, wavelength)"
+            found.append(Alternative("scale", words, scaled))
+        return found
 
     def start(self, noise: Noise | None = None) -> LineState:
         return LineState(self, noise or noise_of(self))

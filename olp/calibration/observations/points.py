@@ -9,7 +9,7 @@ probed are such points too: commanded is where the machine touched them, measure
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import field
+from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from olp.calibration.estimator.normal import Block, Chunk
 from olp.calibration.estimator.parameters import LEVER_ARM_MM, Unknowns, frame_columns
 from olp.calibration.observations.base import (
     Advance,
+    Alternative,
     Noise,
     Outlier,
     Scattered,
@@ -104,6 +105,14 @@ class Points(Scattered):
     @property
     def framed(self) -> bool:
         return self.known_frame
+
+    def alternatives(self) -> Sequence[Alternative]:
+        """A left-handed frame."""
+        mirror = np.array((1.0, 1.0, -1.0))
+        turned = None if self.covariance_mm2 is None else self.covariance_mm2 * np.outer(mirror, mirror)
+        other = replace(self, measured_mm=self.measured_mm * mirror, covariance_mm2=turned)
+        words = "its coordinates are left-handed: one of them has the other sign"
+        return () if self.known_frame else (Alternative("handedness", words, other),)
 
     def start(self, noise: Noise | None = None) -> PointsState:
         return PointsState(self)

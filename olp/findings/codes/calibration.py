@@ -95,6 +95,35 @@ RULES = (
         "Two theodolites, one offset of the reflector and no baseline.",
     ),
     _rule(
+        "OLP810",
+        "a source of readings is wrong",
+        Severity.ERROR,
+        "All other readings predict this source, and what it says is far off. With one mistake put right, "
+        "such as its sign or unit, it agrees with them. The mistake is in the calibration as it is.",
+        "Correct the entry of the file in the plan, such as sense or unit, and fit again.",
+        "A level whose + is up where the plan says down.",
+    ),
+    _rule(
+        "OLP811",
+        "a source of readings contradicts all others",
+        Severity.ERROR,
+        "All other readings predict this source, and what it says is far off. No single mistake of sign, "
+        "unit, order or scale explains it. It may be of another machine or day, or read at another place or "
+        "with another reflector. Or the machine bends.",
+        "Check place, reflector, machine and date of this file. Fit without it, or with --map where points "
+        "show that the machine bends.",
+        "A line of Z taken on the sister machine.",
+    ),
+    _rule(
+        "OLP812",
+        "no other reading checks the sign of a source",
+        Severity.INFO,
+        "If the sign of such a source is wrong, the fit is as good, and programs get worse by the stated "
+        "amount. It is twice what the source says, at the longest lever arm in the box.",
+        "Measure some points or diagonals that depend on it, or check the sign once with a measured program.",
+        "A laser line along X, and no other reading that shows the scale of X.",
+    ),
+    _rule(
         "OLP841",
         "errors beyond the rigid-body model",
         Severity.INFO,

@@ -155,11 +155,9 @@ class AxisState(OffsetState):
 
     # -- events ------------------------------------------------------------------------------------
 
-    def run(
-        self, line: int, words: Sequence[Word], codes: Sequence[int], moves: int, *, deleted: bool = False
-    ) -> Effect:
+    def run(self, line: int, words: Sequence[Word], codes: Sequence[int], moves: int) -> Effect:
         """Carry out the events of one block in the order of the control; returns what its axis words mean
-        then. A `deleted` block counts only one way of the block-delete switch."""
+        then."""
         by_letter = {w.letter: w for w in words}
         axis_words = [(i, by_letter[a]) for i, a in enumerate("XYZ") if a in by_letter]
         m_codes = [round(w.value * 10) for w in words if w.letter == "M"]
@@ -190,8 +188,6 @@ class AxisState(OffsetState):
         angle_deg = self._angle_deg(self.offsets.name, line) if self.profile.turns_offsets else 0.0
         self.unit = next((code for code in codes if code in UNITS), self.unit)
         self._check_modes(codes, line)
-        if PATH_MODES.intersection(codes):
-            self._path_mode(max(PATH_MODES.intersection(codes)), line, by_letter, deleted=deleted)
         for code in sorted(codes, key=lambda code: _RANK.get(code, len(_RANK))):
             effect = self._event(code, line, by_letter, axis_words, moves, effect)
         if self.profile.turns_offsets:
@@ -265,6 +261,8 @@ class AxisState(OffsetState):
             self._tool_length(code, line, by_letter)
         elif code in WORK_OFFSETS or code in FURTHER_OFFSETS:
             self._select_offset(code, line, by_letter)
+        elif code in PATH_MODES:
+            self._path_mode(code, line, by_letter)
         elif code == COMPENSATION_OFF:
             self.compensation = None
         elif code in CUTTER_COMPENSATION:
@@ -348,9 +346,7 @@ class AxisState(OffsetState):
         left = (code in COMPENSATION_LEFT) == (radius_mm >= 0)
         self.compensation = CutterCompensation(PLANE_OF[self.plane], left, abs(radius_mm))
 
-    def _path_mode(self, code: int, line: int, by_letter: dict[str, Word], *, deleted: bool) -> None:
-        """Note a path mode; under block delete only one that lets the control leave the path farther than the
-        mode before, as it may be in force or not."""
+    def _path_mode(self, code: int, line: int, by_letter: dict[str, Word]) -> None:
         name = f"G{code / 10:g}"
         tolerance, merges = None, False
         if code == 640 and self.profile.path_tolerance:
@@ -362,6 +358,4 @@ class AxisState(OffsetState):
                 name += f" Q{by_letter['Q'].value:g}"
         elif code != 640:
             tolerance = 0.0
-        before = self.path_modes[-1].tolerance_mm if self.path_modes else None
-        if not deleted or tolerance is None or (before is not None and tolerance > before):
-            self.path_modes.append(PathMode(line, name, tolerance, merges))
+        self.path_modes.append(PathMode(line, name, tolerance, merges))

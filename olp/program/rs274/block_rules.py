@@ -21,7 +21,6 @@ from olp.program.rs274.codes import (
     CUTTER_COMPENSATION,
     CYCLES,
     DWELL,
-    FINE_BORING,
     GROUPS,
     HOMES,
     LENGTHS,
@@ -291,8 +290,6 @@ _OUTPUTS = _m(66, 67, 68)
 #: What any control takes one of in a block: motion, and the modal codes that the reader follows.
 _GROUPS = (frozenset({*_MOTION, 330, 331, 760, 870, 880}), *map(frozenset, GROUPS.values()))
 
-#: The cycles of LinuxCNC, whose G76 cuts threads.
-_NGC_CYCLES = CYCLES - {FINE_BORING}
 #: LinuxCNC 2.9, found by asking its interpreter code by code and letter by letter.
 NGC_RULES = BlockRules(
     users={
@@ -302,11 +299,11 @@ NGC_RULES = BlockRules(
         "I": frozenset({*_ARCS, 50, 51, 52, 760, 870}),
         "J": frozenset({*_ARCS, 50, 51, 52, 760, 870}),
         "K": frozenset({*_ARCS, 330, 331, 760, 870}),
-        "L": frozenset({*(_NGC_CYCLES - {740}), WRITE_OFFSET, 760}) | _m(66, 98),
+        "L": frozenset({*(CYCLES - {740}), WRITE_OFFSET, 760}) | _m(66, 98),
         "P": frozenset({*_ARCS, DWELL, WRITE_OFFSET, 640, 50, 51, 52, 760, 820, 840, 860, 880, 890, 740})
         | _SYNCHRONOUS | _m(50, 51, 52, 53, 66, 19, 98) | _OWN_M,
         "Q": frozenset({50, WRITE_OFFSET, 640, 730, 760, 830}) | _m(19, 61) | _OUTPUTS | _OWN_M,
-        "R": frozenset({*_ARCS, *_NGC_CYCLES, WRITE_OFFSET, 760}) | _m(19),
+        "R": frozenset({*_ARCS, *CYCLES, WRITE_OFFSET, 760}) | _m(19),
     },
     groups=(
         *_GROUPS,
@@ -329,7 +326,7 @@ NGC_RULES = BlockRules(
     ),
     needs={
         **dict.fromkeys((520, 920), "XYZABCUVW"),
-        **dict.fromkeys(sorted(_NGC_CYCLES | PROBES), "XYZABCUVW"),
+        **dict.fromkeys(sorted(CYCLES | PROBES), "XYZABCUVW"),
         **dict.fromkeys(sorted(_ARCS), "IJKR"),
         DWELL: "P",
         432: "HXYZ",

@@ -5,10 +5,8 @@ The reader and the unroller use the same sets. The profile of a control says whi
 
 from __future__ import annotations
 
-#: G76: fine boring on mills of ISO controls, threads on others.
-FINE_BORING = 760
-#: Canned cycles: G73, G74, G76, G81 to G89.
-CYCLES = frozenset({730, 740, FINE_BORING, 810, 820, 830, 840, 850, 860, 890})
+#: Canned cycles: G73, G74, G81 to G89.
+CYCLES = frozenset({730, 740, 810, 820, 830, 840, 850, 860, 890})
 #: Probing moves: G38.2 to G38.5.
 PROBES = frozenset({382, 383, 384, 385})
 #: Splines and NURBS: G5, G5.1, G5.2, G5.3.

@@ -1,4 +1,4 @@
-"""How controls make the canned cycles G73, G74, G76, G81-G86 and G89.
+"""How controls make the canned cycles G73, G74, G81-G86 and G89.
 
 The sequence is that of RS-274/NGC (NIST IR 6556, section 3.5.16) as LinuxCNC carries it out (`NGC_CYCLES`).
 `ISO_CYCLES` are those of Fanuc and Haas controls, which differ here:
@@ -13,11 +13,9 @@ The sequence is that of RS-274/NGC (NIST IR 6556, section 3.5.16) as LinuxCNC ca
   (5114, 5115) and Haas (settings 22, 52). Where it is not known the end points of the hole hold and the
   pecks between them do not.
 
-G76 of ISO controls bores down, stops the spindle at an angle, and shifts the tool by Q off the wall before
-it comes up. That shift cuts nothing and ends above the hole, so it is left out. Grbl has no canned cycles.
-G87 (which bores upwards beside a shift) and G88 (an operator moves the axes by hand) are refused. So is
-tapping outside G17 on LinuxCNC: its release 2.9 makes the feed strokes of G84 and G74 there along the wrong
-axes.
+Grbl has no canned cycles. G76 and G87 (orientation and shift of the spindle) and G88 (an operator moves
+the axes by hand) are refused. So is tapping outside G17 on LinuxCNC: its release 2.9 makes the feed strokes
+of G84 and G74 there along the wrong axes.
 """
 
 from __future__ import annotations

@@ -206,7 +206,7 @@ class _Reader:
                 self._resolve(context, rows, upto)
             state.distance, state.plane = int(context.distance[line]), int(context.plane[line])
             state.payload_kg = self.payloads.get(line, state.payload_kg)
-            effect = state.run(number, words, codes, self.collector.moves, deleted=deleted)
+            effect = state.run(number, words, codes, self.collector.moves)
             if lost:
                 state.lose(number)
             if moved or lost or effect.lost:

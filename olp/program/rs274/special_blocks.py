@@ -20,7 +20,6 @@ from olp.program.rs274.codes import (
     INCREMENTAL,
     MACHINE,
     MACROS,
-    PATH_MODES,
 )
 from olp.program.rs274.collector import Collector
 from olp.program.rs274.modes import UNROLL, Context, scaled
@@ -51,13 +50,13 @@ def event_block(context: Context, line: int, profile: Profile) -> tuple[list[Wor
     mine = slice(codes.line.searchsorted(line), codes.line.searchsorted(line, "right"))
     number = context.number(line)
     events = _checked(codes.code[mine], codes.act[mine], words, profile, number)
-    changes = set(events) - {DWELL, *HOMES, MACHINE, *PATH_MODES} or any(
+    changes = set(events) - {DWELL, *HOMES, MACHINE} or any(
         w.letter == "M" and w.value in (6, 61) for w in words
     )
     if chunk.deleted[line] and changes:
         raise ProgramError(
-            "a block under block delete changes offsets, units, the tool or its compensation, so "
-            "later blocks depend on the switch; remove the `/`",
+            "a block under block delete changes offsets, units, path mode, the tool or its compensation, "
+            "so later blocks depend on the switch; remove the `/`",
             line=number,
             code="OLP525",
         )

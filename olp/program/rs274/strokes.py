@@ -54,7 +54,6 @@ _BORE_DWELL: _Recipe = ((Step.FEED, "z"), (Step.DWELL, "z"), (Step.FEED, "home")
 _RECIPES: dict[int, _Recipe] = {
     730: _DRILL,
     740: _TAP,
-    760: _BORE_STOP,
     810: _DRILL,
     820: _DRILL_DWELL,
     830: _DRILL,

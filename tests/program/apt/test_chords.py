@@ -16,14 +16,11 @@ from judge.model import JudgeModel
 from scipy.spatial import cKDTree
 
 import olp
-from olp.compensation.writer import Writer
 from olp.core.errors import ProgramError
 from olp.core.toolpath import Kind
 from olp.files.config import load_setup
-from olp.program.apt import reader
 from olp.program.program import Program
 from olp.program.registry import DIALECTS, Options, read
-from olp.program.text.statements import chunks
 
 ORIGIN = np.array([250.0, 200.0, -300.0])
 LENGTHS = {1: 120.0}
@@ -222,15 +219,3 @@ def test_refusals(arc: str, line: int, code: str, words: str, zero: Path) -> Non
     with pytest.raises(ProgramError, match=words) as caught:
         program(ROUND.format(arc=arc), zero)
     assert (caught.value.line, caught.value.code) == (line, code)
-
-
-def test_the_result_does_not_depend_on_the_size_of_chunks(
-    bent: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    steps = posts.job(5, count=5, reach=60.0)
-    data = posts.apt(steps, "creo").replace(b"SPINDL", b"TRACUT/YZROT,20\nSPINDL", 1)
-    whole = olp.correct(data, bent).data
-    assert b"CIRCLE" not in whole
-    monkeypatch.setattr(Writer, "chunk", 3)
-    monkeypatch.setattr(reader, "chunks", lambda text, tell: chunks(text, 150, tell))
-    assert olp.correct(data, bent).data == whole

@@ -257,8 +257,6 @@ FIXED = "PROBE,FIXED,CART,0,4,-20"
         ("MODE/MAN\nGOTO/1,2,3\nGOTO/INCR,1,0,0,1", 5, "OLP524", "GOTO/INCR counts from a position"),
         ("MEAS/POINT,F(A),1\nPTMEAS/CART,1,2,3\nGOTO/INCR,1,0,0,1", 5, "OLP524", "as after a touch"),
         ("MEAS/POINT,F(A),1\nPTMEAS/CART,1,2,3\nENDMES\nGOTO/INCR,1,0,0,1", 6, "OLP524", "after a touch"),
-        ("MEAS/POINT,F(A),1\nPTMEAS/CART,1,2,3\nENDMES\nWKPLAN/XYPLAN\nGOTO/INCR,1,0,0,1", 7, "OLP524",
-         "after a touch"),
         ("WKPLAN/NONE\nGOTO/POL,1,2,3", 4, "OLP518", "POL counts in the working plane"),
         ("$$ a $\nGOTO/1,2,3", 4, "OLP510", "the comment before ends with `\\$`"),
         ("PTMEAS/", 3, "OLP512", "PTMEAS/nothing is not read; expected CART"),

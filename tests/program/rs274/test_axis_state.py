@@ -505,29 +505,3 @@ def test_the_job_states_where_the_axes_and_which_tool_are_at_the_start(
         "code": "OLP521",
         "missing": ("tools", "9"),
     }
-
-
-@pytest.mark.parametrize(
-    ("text", "modes"),
-    [
-        ("G64 P.1\n/G61.1", ["G64 P0.1"]), ("/G61", []), ("G61\n/G64 P.1", ["G61", "G64 P0.1"]),
-        ("G64 P.1\n/G64", ["G64 P0.1", "G64"]), ("G64\n/G64 P9", ["G64"]), ("G64 P1\n/G64 P1", ["G64 P1"]),
-    ],
-)  # fmt: skip
-def test_a_path_mode_under_block_delete_counts_where_it_leaves_the_path_farther(
-    text: str, modes: list[str], setups: dict[str, Setup]
-) -> None:
-    read = program(f"{HEAD}{text}\nM2\n", setups["linuxcnc"], "linuxcnc")
-    assert [mode.name for mode in read.path_modes] == modes
-
-
-def test_a_tool_change_that_leaves_the_axes_leaves_their_positions(setups: dict[str, Setup]) -> None:
-    for control in ("linuxcnc", "fanuc"):
-        setup = setups[control]
-        still = replace(setup, machine=replace(setup.machine, tool_change_moves=False))
-        for asked, known in ((setup, False), (still, True)):
-            read = program(f"{HEAD}T2 M6\nX5.\nM2\n", asked, control)
-            assert (last(read) == (105, 202, 303)) is known
-            assert frame(read).tool == 2
-            # other codes may still move
-            assert math.isnan(last(program(f"{HEAD}M100\nX5.\nM2\n", asked, control))[1])

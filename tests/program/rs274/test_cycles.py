@@ -120,9 +120,6 @@ STROKES: list[tuple[int, bool, bool, str]] = [
     (850, False, True, "r5 r1 f-2 f1"),
     (860, True, False, "r5 r1 f-2 d0.5 stop r5 restore"),
     (860, False, True, "r5 r1 f-2 d0.5 stop r1 restore"),
-    # G76 shifts the tool off the wall, which cuts nothing
-    (760, False, False, "r5 r1 f-2 d0.5 stop r5 restore"),
-    (760, False, True, "r5 r1 f-2 d0.5 stop r1 restore"),
     (890, True, False, "r5 r1 f-2 d0.5 f5"),
     (890, True, True, "r5 r1 f-2 d0.5 f1"),
     (890, False, False, "r5 r1 f-2 d0.5 f1 r5"),
@@ -207,7 +204,7 @@ def test_holes_of_a_block_follow_one_another() -> None:
     assert _spelled(turned, 0) == "r5 r1 f-2 d0.25 r1"
 
 
-_ALL = "G73, G74, G76, G81, G82, G83, G84, G85, G86, G89"
+_ALL = "G73, G74, G81, G82, G83, G84, G85, G86, G89"
 
 
 @pytest.mark.parametrize(
@@ -226,7 +223,7 @@ _ALL = "G73, G74, G76, G81, G82, G83, G84, G85, G86, G89"
                 "write the hole as plain moves",
                 "OLP544",
             )
-            for code in (880,)
+            for code in (760, 880)
         ),
         (890, {"p": -1.0}, "G89 has a negative dwell P -1; expected zero or more", "OLP531"),
         (810, {"plane": 20}, "G81 in plane G20; expected G17, G18 or G19", "OLP531"),

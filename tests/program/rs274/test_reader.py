@@ -245,8 +245,8 @@ MODAL = (
     "restate the code in the next block or remove the `/`"
 )
 STATE = (
-    "a block under block delete changes offsets, units, the tool or its compensation, so later blocks depend "
-    "on the switch; remove the `/`"
+    "a block under block delete changes offsets, units, path mode, the tool or its compensation, "
+    "so later blocks depend on the switch; remove the `/`"
 )
 PERCENT = (
     "`%` is in the middle of the program, or not alone in its line; expected it as the first "
@@ -295,6 +295,7 @@ REFUSED: dict[tuple[str, str], dict[str, object]] = {
     ("linuxcnc", "/G20"): {"why": STATE, "code": "OLP525"},
     ("linuxcnc", "/T1 M6"): {"why": STATE, "code": "OLP525"},
     ("linuxcnc", "/M61 Q1"): {"why": STATE, "code": "OLP525"},
+    ("linuxcnc", "/G61"): {"why": STATE, "code": "OLP525"},
     ("linuxcnc", "%"): {"why": PERCENT, "code": "OLP505"},
     ("linuxcnc", "G68 X1 R2"): {"why": "G68 (rotation) is not read", "code": "OLP512", "word": "G68"},
     ("linuxcnc", "G2.5"): {

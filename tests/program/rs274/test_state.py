@@ -91,7 +91,7 @@ def test_g92_2_leaves_the_stored_shift_and_g92_1_does_not() -> None:
 
 #: Sets of codes by their names, as the manuals have them.
 NAMED = {
-    "CYCLES": "G73 G74 G76 G81 G82 G83 G84 G85 G86 G89",
+    "CYCLES": "G73 G74 G81 G82 G83 G84 G85 G86 G89",
     "PROBES": "G38.2 G38.3 G38.4 G38.5",
     "SPLINES": "G5 G5.1 G5.2 G5.3",
     "LINEAR": "G0 G1 G2 G3 G33",
@@ -111,7 +111,7 @@ NAMED = {
 }
 ALONE = {
     "COMPENSATION_OFF": "G40", "INCH": "G20", "METRIC": "G21", "ABSOLUTE": "G90", "INCREMENTAL": "G91",
-    "ROTATION": "G68", "FINE_BORING": "G76", "SCALING": "G51", "MIRROR": "G51.1",
+    "ROTATION": "G68", "SCALING": "G51", "MIRROR": "G51.1",
     "INVERSE_TIME": "G93", "RETRACT_TO_INITIAL": "G98", "RETRACT_TO_R": "G99", "END_OF_CYCLES": "G80",
     "DWELL": "G4", "MACRO": "G65", "WRITE_OFFSET": "G10", "LOCAL_OFFSET": "G52", "PRESET": "G92",
     "MACHINE": "G53", "LENGTH_FROM_WORDS": "G43.1",

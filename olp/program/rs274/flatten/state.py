@@ -7,7 +7,7 @@ only where the program needs the position.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence, Set
+from collections.abc import Sequence
 
 from olp.core.errors import ProgramError
 from olp.core.units import AXES, MM_PER_INCH
@@ -81,8 +81,6 @@ class ProgramState(State):
     speed: float | None = None
     saved: tuple[int | None, set[int], str] | None = None
     held_absolute: bool = True
-    #: the last of G0 to G3
-    beneath: int | None = None
 
     def position_of(self, axis: int) -> float:
         """Program position of an axis; ProgramError where it is not known."""
@@ -107,10 +105,6 @@ class ProgramState(State):
             return bool(motion & CYCLES)
         return self.motion in CYCLES and not codes & NO_AXES and any(letter in "xyz" for letter, _ in words)
 
-    def ends_cycles(self, codes: Set[int]) -> bool:
-        """Whether a block with these codes brings the motion back that was in force before a cycle."""
-        return self.profile.cycles_apart and codes & _MOTION == {END_OF_CYCLES}
-
     def apply(self, words: Sequence[Value]) -> None:
         """Follow one block that is not a cycle."""
         codes = self._modes(words)
@@ -122,10 +116,6 @@ class ProgramState(State):
         if motion:
             # G80 beside another motion ends the cycle, and the other code is the motion
             self.motion = next(iter(motion - {END_OF_CYCLES} or motion))
-            if self.motion in LINEAR:
-                self.beneath = self.motion
-            elif self.ends_cycles(codes):
-                self.motion = self.beneath
         given = {AXES.lower().index(letter): value for letter, value in words if letter in ("x", "y", "z")}
         if PRESET in codes:
             for axis, value in given.items():

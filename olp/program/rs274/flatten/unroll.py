@@ -23,7 +23,6 @@ from olp.core.budget import Budget
 from olp.core.errors import ProgramError
 from olp.core.units import AXES
 from olp.program.origin import Origin, Unrolled, Within
-from olp.program.rs274.codes import FINE_BORING
 from olp.program.rs274.cycles import Stroke, stroke_budget
 from olp.program.rs274.flatten.expressions import filled, whole
 from olp.program.rs274.flatten.language import Language
@@ -36,8 +35,6 @@ from olp.program.rs274.profiles.base import Profile
 
 _COMMENT = re.compile(rb"\([^)]*\)")
 _ENDS = frozenset({2, 30})
-#: Strokes that are moves, with their codes.
-_MOVES = {"rapid": 0, "feed": 10}
 
 #: bytes of visited blocks, each with some for the visit itself: of a short program, and for each byte
 UNROLLED_BYTES = 12_000_000
@@ -136,8 +133,6 @@ class _Flattener:
         self.strokes = strokes
         #: whether a block has words of axes
         self.moves = False
-        # the motion that the moves of a cycle have brought into force
-        self._of_strokes: int | None = None
         self.expand_cycles = expand_cycles
         self.peck_clearance = peck_clearance
         self._seen: set[tuple[int, int]] = set()
@@ -212,14 +207,7 @@ class _Flattener:
             cut |= {i for i, w in enumerate(line.words) if self._of_cycle(w, values[i][1])}
             self._write(line, values, cut, exact=False)
             self._write_strokes(strokes, line, before)
-            self._of_strokes = next((_MOVES[s.kind] for s in reversed(strokes) if s.kind in _MOVES), None)
         else:
-            if self._of_strokes is not None and self.state.ends_cycles(self.state.codes(active)):
-                # the moves of the cycle may have brought another motion into force
-                beneath = self.state.beneath
-                if beneath is not None and beneath != self._of_strokes:
-                    self._put(b"G%d" % (beneath // 10), line.eol)
-                self._of_strokes = None
             self._write(line, values, cut, exact=frame.unit.radius_arcs)
         for target, value in settings:
             self.variables.assign(target, value)
@@ -255,11 +243,6 @@ class _Flattener:
         if self.cycles.taps_by_control and self.state.codes(active) & {740, 840}:
             raise ProgramError(
                 "G74 and G84 are synchronised by the control: plain moves cannot replace them", code="OLP544"
-            )
-        if FINE_BORING in self.state.codes(active):
-            raise ProgramError(
-                "G76 stops the spindle at an angle and shifts the tool: plain moves cannot replace it",
-                code="OLP544",
             )
         strokes = self.state.cycle(active, self.peck_clearance)
         self.strokes.spend(len(strokes))

@@ -97,25 +97,11 @@ class Variables:
                 return self.state.position_of(index - base)
         if index in self.given:
             return self.given[index]
-        modal = self._modal(index)
-        if modal is not None:
-            return modal
         raise ProgramError(
             f"#{index} is not set before in the program and not known off line; assign it there, or "
             f"{_way_on(f'#{index}')}",
             code="OLP541",
         )
-
-    def _modal(self, index: int) -> float | None:
-        """The modal code of a group, the feed or the speed in force; None for others, or before any."""
-        state = self.state
-        values: dict[int, float | None] = {
-            4002: state.plane / 10, 4003: state.distance / 10, 4005: state.feed_mode / 10,
-            4010: state.retract / 10, 4109: state.feed, 4119: state.speed,
-            4001: None if state.motion is None or state.motion > 30 else state.motion / 10,
-            4006: None if state.unit is None else state.unit / 10,
-        }  # fmt: skip
-        return values.get(index)
 
     def named(self, name: str) -> float:
         known = self._predefined(name)

@@ -216,7 +216,7 @@ REFUSALS: Mapping[int, str] = {
     660: "G66 calls a macro",
     680: "G68 (rotation) is not read",
     682: "G68.2 (tilted plane) is not read",
-    760: "G76 cuts a thread, which a correction would distort",
+    760: "G76 threads or fine-bores, which a correction would distort",
     870: "G87 (back boring) moves off axis inside the control",
     880: "G88 waits for the operator inside the cycle",
     281: "G28.1 stores the present position, and no word of it can be edited",

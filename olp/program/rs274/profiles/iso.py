@@ -10,8 +10,8 @@ from olp.program.rs274.profiles.base import ISO_M, REFUSALS, Act, Profile
 
 #: G codes without effect on the path on these controls.
 ISO_UNCHANGED = frozenset({80, 90, 150, 501, 620, 630, 670, 691, 131, 231, 250})
-#: G44, G54.1, rotation, scaling and fine boring; G92.1 needs offsets that are not known off line.
-ISO_EXTRA = dict.fromkeys((440, 541, 500, 510, 680, 690), Act.EVENT) | {760: Act.MOTION, 921: Act.REFUSE}
+#: G44, G54.1, rotation and scaling; G92.1 needs offsets that are not known off line.
+ISO_EXTRA = dict.fromkeys((440, 541, 500, 510, 680, 690), Act.EVENT) | {921: Act.REFUSE}
 
 #: What they have in common; each control states its name, its codes, and where it differs.
 ISO = Profile(

@@ -19,8 +19,7 @@ from pathlib import Path
 
 from judge import linuxcnc, machines
 
-from olp.core.errors import OlpError, ProgramError
-from olp.program.registry import Options
+from olp.core.errors import OlpError
 from olp.workflows import refusals
 from olp.workflows.flatten import UnrollOptions
 from olp.workflows.session import Session
@@ -28,14 +27,9 @@ from olp.workflows.session import Session
 INSTALLED = (Path("/usr/share/linuxcnc/ncfiles"), Path("/usr/share/doc/linuxcnc/examples"))
 CORPUS = {"gcode_cncjs": "grbl", "gcode_fanuc": "fanuc", "gcode_fanuc_haas_nist": "haas"}
 LARGEST = 300_000
-#: What only the control knows, as a job gives it: that it runs, and the feed of a plasma torch.
-PARAMETERS = '[parameters]\n"#<_task>" = 1.0\n"#<_hal[plasmac.cut-feed-rate]>" = 1000.0\n"#5063" = 0.0\n'
-#: Codes of refusals for parameters and flow.
-UNROLLING = {"OLP511", "OLP540", "OLP541", "OLP542", "OLP543", "OLP544"}
 TOOLS = dict.fromkeys(range(1, 100), (0.0, 0.0, 0.0))
 _COMMENT = re.compile(rb"\([^)]*\)|;[^\r\n]*")
-_FLOW = rb"(?:<[^>]*>|\d+|\[.*\])[ \t]*[a-z]|m\s*0*9[78](?!\d)|g\s*0*6[56](?!\d)"
-_PARAMETRIC = re.compile(rb"(?im)#|^\s*(?:n\d+)?\s*o\s*" + _FLOW + rb"|goto|while")
+_PARAMETRIC = re.compile(rb"(?im)#|^\s*(?:n\d+)?\s*o\s*[<\d\[]|\bm\s*0*9[78]\b|\bg\s*0*6[56]\b|goto|while")
 
 
 def installed() -> list[tuple[Path, str]]:
@@ -66,29 +60,22 @@ def setup(folder: Path, control: str) -> Path:
     recipe = machines.Recipe(controller=control, travel=((-9e4, 9e4),) * 3, tools=tools, work_offsets=offsets)
     machine = machines.zero_machine(folder / control, recipe)
     job = machine.with_name("job.toml")
-    start = "start_mm = { X = 0.0, Y = 0.0, Z = 0.0 }\n" + PARAMETERS
+    start = "start_mm = { X = 0.0, Y = 0.0, Z = 0.0 }\n"
     job.write_text(f'schema = "olp-job-1"\nmachine = "machine.toml"\n{start}')
     return job
 
 
-def reading(path: Path, job: Path) -> tuple[str, str]:
-    """What becomes of a program, and why: "read", "library" without a call, "not unrolled", or "refused" for
-    what is no matter of parameters and flow."""
+def reading(path: Path, job: Path, *, flatten: bool = True) -> str:
+    """Why a program is refused, with its code; empty where it is read."""
     session = Session.start(job.with_name("machine.toml"), job)
     source = session.sources.source(path)
     try:
         source.load()
-        options = UnrollOptions(flatten=True, expand_cycles=True)
-        contour = Options(contour=True)
-        refusals.read(session.sources, source, *session.reading(source), contour, options, words=False)
-    except ProgramError as error:
-        if "nothing moves here" in error.message:
-            return "library", ""
-        codes = {reason.code for reason in refusals.reasons_of(error, source.name)}
-        return ("not unrolled" if codes & UNROLLING else "refused"), str(error)
+        options = UnrollOptions(flatten=flatten, expand_cycles=True)
+        refusals.read(session.sources, source, *session.reading(source), None, options, words=False)
     except OlpError as error:
-        return "refused", str(error)
-    return "read", ""
+        return str(error)
+    return ""
 
 
 def runs(path: Path) -> bool:
@@ -113,10 +100,10 @@ def main(folders: list[str]) -> None:
             if not parametric(path.read_bytes()):
                 continue
             kind = "run by LinuxCNC" if control == "linuxcnc" and runs(path) else f"{control}, not judged"
-            state, why = reading(path, jobs[control])
-            counted[kind, state] += 1
+            why = reading(path, jobs[control])
+            counted[kind, "refused" if why else "read"] += 1
             if why:
-                print(f"[{kind}, {state}] {path.name}: {why}"[:400], flush=True)
+                print(f"[{kind}] {path.name}: {why}"[:400], flush=True)
     for (kind, state), count in sorted(counted.items()):
         print(f"{kind}: {count} {state}")
 

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import pytest
-from cases.blocks import setup_of
 from cases.unrolling import fanuc, flatten, lcnc, refusal
 from hypothesis import given
 from hypothesis import strategies as st
 
 from olp.core.errors import ProgramError, UsageError
-from olp.core.toolpath import Kind
-from olp.program.registry import named, read
 from olp.program.rs274.flatten.language import MACRO_B, NGC
 from olp.program.rs274.flatten.unroll import number_text
 
@@ -222,23 +218,6 @@ def test_macro_b_refusals(source: str, line: int, message: str) -> None:
     error = refusal(source, "fanuc", limit=500)
     assert error.line == line
     assert message in str(error)
-
-
-@pytest.mark.parametrize("profile", ["fanuc", "haas"])
-@pytest.mark.parametrize("code", ["G0", "G1"])
-@pytest.mark.parametrize("end", ["G80\nX8.", "G80 X8.", "G80 Z5.\nX8."])
-def test_the_motion_before_a_cycle_is_in_force_behind_it(
-    profile: str, code: str, end: str, tmp_path: Path
-) -> None:
-    source = f"O1\nG21 G90 G54 G94\nG0 X0. Y0. Z9.\n{code} X5. F100.\nG99 G81 X6. Z-1. R2. F20.\n{end}\nM30\n"
-    plain = flatten(source.encode(), profile=profile, expand_cycles=True)
-    setup = setup_of(tmp_path, profile)
-    paths = [read(text, setup, named(profile)).toolpath for text in (source.encode(), plain)]
-    assert [path.kind[-1] == Kind.RAPID for path in paths] == [code == "G0"] * 2
-    assert paths[0].end_mm[-1].tolist() == paths[1].end_mm[-1].tolist()
-    # the position is known behind it, without the cycle written out too
-    again = f"{source.removesuffix('M30' + chr(10))}#100=#5041\nG0 X#100\nM30\n"
-    assert b"G0 X8." in flatten(again.encode(), profile=profile)
 
 
 def test_cycles_of_a_fanuc_are_written_out() -> None:

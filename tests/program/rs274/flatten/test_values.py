@@ -139,17 +139,6 @@ def test_positions_of_macro_b(base: int) -> None:
     assert fanuc(f"{start}{words}M30\n") == f"{start}A1. B2. C3.\nM30\n"
 
 
-def test_modal_codes_of_macro_b_are_saved_and_restored() -> None:
-    source = "O1\nG21 G90 G18 G94\nG1 X1. F250. S900\nG65 P2\nM30\nO2\n"
-    saved = "#1=#4001\n#2=#4002\n#3=#4003\n#4=#4006\n#5=#4109\n#6=#4119\nG17 G91 G0 F1. S1\n"
-    assert fanuc(f"{source}{saved}G#1 G#2 G#3 G#4 F#5 S#6\nM99\n") == (
-        "O1\nG21 G90 G18 G94\nG1 X1. F250. S900\nG17 G91 G0 F1. S1\nG1 G18 G90 G21 F250. S900\nM30\n"
-    )
-    # before any motion, and in a cycle, the control has a code that is not known here
-    for before in ("", "G0 Z9.\nG81 X1. Z-1. R1. F9.\n"):
-        assert refused(f"O1\n{before}#1=#4001\n", "fanuc")[0] == "OLP541"
-
-
 def test_a_vacant_variable_stays_vacant_when_it_is_copied() -> None:
     # a word with it is left out; in arithmetic it is 0
     assert fanuc("O1\n#100=#5\nG1 X#100 Y#0 Z1.\nX[#100+1]\n#100=[#100+0]\nX#100\nM30\n") == (

@@ -1,0 +1,122 @@
+"""Each source against all others: planted mistakes are found and named, and nothing is found without one."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from cases.calibration import case, cloud, rays, residual_of
+from cases.fast import some_fast
+from judge.simulated import OFFSETS
+
+from olp.calibration.diagnosis.agreement import Compared, compared
+from olp.calibration.diagnosis.agreement_report import agreement_findings, agreement_rows
+from olp.calibration.estimator.adjustment import fit
+from olp.calibration.observations.lines import Line
+from olp.calibration.observations.measurements import Measurements
+from olp.core.errors import ConfigError
+from olp.workflows.calibrate_fit import fit_calibration
+
+#: file, factor on its values, part of the words that name the mistake, and machines whose readings tell it
+PLANTED = (
+    ("ezz.csv", -1.0, "sign", (103, 107, 109)),
+    ("eyx.csv", 0.5, "half of what", (103, 107, 109)),
+    ("exz.csv", 2.0, "twice what", (103, 107, 109)),
+    ("exx.csv", 1 / 25.4, "thousandths of an inch, taken as 0.001 mm", (103, 107, 109)),
+    ("ebx.csv", -1.0, "sign", (103, 109)),
+    ("ecx.csv", 4.8481368, "urad, taken as arcsec", (107,)),
+)
+CASES = [(seed, *planted[:3]) for planted in PLANTED for seed in planted[3]]
+
+
+def measured(
+    seed: int, family: str, kinds: str, change: Callable[[Line], Line] | None = None
+) -> Measurements:
+    """A machine's lines, with 150 points of a tracker (p) or four stations (r), and some lines changed."""
+    machine, taken = case(seed, family)
+    observations = [line if change is None else change(line) for line in taken.lines]
+    if "p" in kinds:
+        observations.append(cloud(machine, seed, 150, 4.0))
+    if "r" in kinds:
+        observations += rays(machine, seed, 4, 60)
+    return dataclasses.replace(taken, observations=tuple(observations))
+
+
+def found(seed: int, family: str, kinds: str, change: Callable[[Line], Line] | None = None) -> Compared:
+    machine, _ = case(seed, family)
+    return compared(fit(measured(seed, family, kinds, change), machine.chain))
+
+
+def times(file: str, factor: float) -> Callable[[Line], Line]:
+    return lambda line: dataclasses.replace(line, value=factor * line.value) if line.source == file else line
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kinds", ["", "p", "r"], ids=["lines", "with points", "with stations"])
+@pytest.mark.parametrize("family", ["rough", "smooth"])
+@pytest.mark.parametrize("seed", range(205, 213))
+def test_without_a_mistake_nothing_is_found(family: str, seed: int, kinds: str) -> None:
+    outcome = found(seed, family, kinds)
+    assert not outcome.wrong and not outcome.unlike
+
+
+@pytest.mark.parametrize(("seed", "file", "factor", "words"), some_fast(CASES, len(CASES)))
+def test_a_planted_mistake_is_named(seed: int, file: str, factor: float, words: str) -> None:
+    outcome = found(seed, "rough", "p", times(file, factor))
+    assert [one.label for one in outcome.wrong] == [file]
+    assert outcome.wrong[0].named is not None and words in outcome.wrong[0].named.words
+    assert not outcome.unlike
+
+
+@pytest.mark.slow
+def test_two_mistakes_are_named() -> None:
+    change = times("ezz.csv", -1.0)
+    outcome = found(103, "rough", "p", lambda line: times("exz.csv", 2.0)(change(line)))
+    assert {one.label for one in outcome.wrong} == {"ezz.csv", "exz.csv"}
+
+
+@pytest.mark.slow
+def test_a_line_of_another_machine_contradicts_without_a_cause() -> None:
+    _, other = case(305, "rough", case(103, "rough")[0].chain)
+    lines = {line.source: line for line in other.lines}
+    outcome = found(103, "rough", "p", lambda line: lines[line.source] if line.source == "exx.csv" else line)
+    assert [one.label for one in outcome.unlike] == ["exx.csv"]
+    assert not outcome.wrong
+
+
+@pytest.mark.slow
+def test_what_nothing_else_measures_is_said_to_be_unchecked() -> None:
+    """With lines alone nothing tells the sign of a scale, and points do."""
+    outcome = found(106, "smooth", "")
+    possible = {one.label: one.possible for one in outcome.sources}
+    assert {"sign", "unit"} <= set(possible["exx.csv"])
+    machine, _ = case(106, "smooth")
+    fitted = fit(measured(106, "smooth", ""), machine.chain)
+    (finding,) = agreement_findings(outcome, fitted, [(0.0, 0.0, -200.0)])
+    assert finding.code == "OLP812" and "exx.csv (EXX)" in finding.message
+    with_points = {one.label: one.possible for one in found(106, "smooth", "p").sources}
+    assert "sign" not in with_points["exx.csv"]
+    rows = {row["file"]: row for row in agreement_rows(outcome)}
+    assert "sign" in rows["exx.csv"]["not_excluded"]
+
+
+def test_a_left_handed_frame_is_no_machine() -> None:
+    machine, taken = case(106, "smooth")
+    points = cloud(machine, 106, 40, 8.0)
+    mirrored = dataclasses.replace(points, measured_mm=points.measured_mm * np.array((1.0, -1.0, 1.0)))
+    whole = dataclasses.replace(taken, observations=(*taken.lines, mirrored), chain=machine.chain)
+    with pytest.raises(ConfigError, match=r"not those of one machine.*points\.csv.*left-handed"):
+        fit_calibration(whole)
+
+
+@pytest.mark.parametrize("seed", some_fast((211, 215, 204, 205), 4))
+def test_lines_and_readings_with_several_tools_agree(seed: int) -> None:
+    """Lines off the datum turn the frame of the curves against tool vectors: tools show that turn."""
+    machine, _ = case(seed, "smooth")
+    fitted = fit(measured(seed, "smooth", "r"), machine.chain)
+    assert fitted.chi_square / fitted.freedom < 1.2
+    assert not fitted.outliers
+    for tool in OFFSETS:
+        assert residual_of(machine, fitted, tool).after < 2.0
