@@ -14,7 +14,7 @@ from olp.compensation.writer import Writer
 from olp.core.arrays import Array, Index, Mask, distinct
 from olp.core.geometry import PLANES, arms
 from olp.core.toolpath import Flag
-from olp.program.text.edits import Edits
+from olp.program.text.edits import BARE, Edits
 
 #: (3, 3) axes of each plane: first, second, third.
 _AXES = np.array(PLANES)
@@ -50,7 +50,25 @@ def _turns(arcs: ArcRows) -> Index:
 
 def _turn_words(writer: Writer, arcs: ArcRows, slot: npt.NDArray[np.int32]) -> Edits:
     """P words of arcs of which only a part stays in the block."""
-    return Edits.of(writer.words.number[slot], writer.words.end[slot], _turns(arcs), 0)
+    return Edits.of(writer.words.number[slot], writer.words.end[slot], _turns(arcs) - _first(writer), 0)
+
+
+def _first(writer: Writer) -> int:
+    """What the word of turns does not count: the first part, where it counts those beyond."""
+    return int(bool(writer.program.rs274.further_turns))
+
+
+def _opening(writer: Writer) -> bytes:
+    """What opens an absolute coordinate of a centre, behind its letter."""
+    call = writer.program.rs274.absolute_centre
+    return b"=" + call + b"(" if call else b""
+
+
+def _closing(writer: Writer, place: npt.NDArray[np.integer], order: npt.NDArray[np.integer]) -> Edits:
+    """What closes absolute coordinates of centres that were put at these places."""
+    count = len(place) if _opening(writer) else 0
+    at, closes = place[:count], writer.prefixes(b")")
+    return Edits.of(at, at, np.full(count, BARE), 0, closes, order[:count])
 
 
 def _units(writer: Writer, arcs: ArcRows) -> Array:
@@ -108,9 +126,13 @@ def _centre_words(
             )
             usual = _digits(writer, "usual", axis, unit)
             new = np.flatnonzero(~given & (np.abs(mantissa) > INT10[decimals - usual] // 2))
-            at = anchor[mine[new]]
-            place, prefix = words.end[at], _prefixes(writer, at, b"IJK"[axis : axis + 1])
+            at, inside = anchor[mine[new]], absolute[mine[new]]
+            place, letter = words.end[at], b"IJK"[axis : axis + 1]
+            prefix = np.where(
+                inside, _prefixes(writer, at, letter + _opening(writer)), _prefixes(writer, at, letter)
+            )
             yield Edits.of(place, place, mantissa[new], decimals[new], prefix, 5 + axis)
+            yield _closing(writer, place[inside], np.full(int(inside.sum()), 5 + axis))
             writer.tally.changed_words += len(changed)
             writer.tally.inserted_words += len(new)
 
@@ -193,11 +215,16 @@ def _tails(writer: Writer, rows: Rows, arcs: ArcRows, absolute: Mask) -> Iterato
     for k in (0, 1):
         for axis, mine in _by_axis(arcs, k):
             mantissa, decimals = _centres(writer, arcs.pick(mine), axis, absolute[mine], 0)
-            lone = writer.prefixes(b" " + b"IJK"[axis : axis + 1])
-            yield Edits.of(place[mine], place[mine], mantissa, decimals, lone, order[mine] + 3 + k)
+            letter, inside = b" " + b"IJK"[axis : axis + 1], absolute[mine]
+            opened = writer.prefixes(letter + _opening(writer))
+            prefix = np.where(inside, opened, writer.prefixes(letter))
+            yield Edits.of(place[mine], place[mine], mantissa, decimals, prefix, order[mine] + 3 + k)
+            yield _closing(writer, place[mine[inside]], order[mine[inside]] + 3 + k)
     turns = _turns(arcs)
     some = np.flatnonzero(turns > 1)
-    yield Edits.of(place[some], place[some], turns[some], 0, writer.prefixes(b" P"), order[some] + 5)
+    word = writer.prefixes(b" " + (writer.program.rs274.further_turns or b"P"))
+    number = turns[some] - _first(writer)
+    yield Edits.of(place[some], place[some], number, 0, word, order[some] + 5)
 
 
 def _leads(writer: Writer, rows: Rows, arcs: ArcRows) -> npt.NDArray[np.int32]:

@@ -166,6 +166,9 @@ def _may_turn(path: Toolpath, rows: Plan, command_mm: Array, *, insert: bool) ->
     may &= (path.flag[rows.move] & np.uint8(Flag.CYCLE)) == 0
     if not insert:
         may &= (path.flag[rows.move] & np.uint8(Flag.WHOLE)) == 0
+    # a step in front of a block that calls a cycle would call it too
+    calls = (path.line[1:] == path.line[:-1]) & ((path.flag[1:] & np.uint8(Flag.PASS)) != 0)
+    may &= ~np.append(calls, False)[rows.move]
     may &= ~np.isnan(_before(command_mm, rows.command_mm)).any(axis=1)
     return np.asarray(may, bool)
 

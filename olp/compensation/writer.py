@@ -8,6 +8,7 @@ small: digits, then edits, then one splice per chunk of text.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from dataclasses import replace
 from itertools import pairwise
 from typing import ClassVar
 
@@ -184,8 +185,20 @@ class Writer(ABC):
         if not edits:
             return None
         source = np.frombuffer(self.program.data, np.uint8)[begin:end]
-        joined = Edits.join(edits)
+        joined = Edits.join(_outside(edits, self.program.closings))
         if self._grown is not None:
             _, length = render(joined, self.prefixes, leading_zero=self.style.leading_zero)
             self._grown.append((joined.start, length - (joined.end - joined.start)))
         return splice(source, begin, joined, self.prefixes, leading_zero=self.style.leading_zero).tobytes()
+
+
+def _outside(edits: list[Edits], closings: Index) -> list[Edits]:
+    """Edits in which what is inserted behind a number comes behind the bracket that closes there too."""
+    if not len(closings):
+        return edits
+    moved = []
+    for edit in edits:
+        place = np.minimum(np.searchsorted(closings, edit.start), len(closings) - 1)
+        inside = ((edit.start == edit.end) & (closings[place] == edit.start)).astype(np.int64)
+        moved.append(replace(edit, start=edit.start + inside, end=edit.end + inside))
+    return moved

@@ -90,7 +90,8 @@ class Tool:
     """A row of the control's tool table, and the tool vector on which angular errors act.
 
     `length_mm` enters axis positions where the program activates it. `gauge_to_tip_mm` defaults to minus the
-    length; a negative Z length is a touch-off value and gives no tool vector. `set_by` "touch" means that the
+    length; a negative Z length is a touch-off value and gives no tool vector. `name` is that of programs
+    which call tools by name. `set_by` "touch" means that the
     length was set on the uncompensated machine at axis position `touched_at_mm`. Lengths of one `setter` are
     too long by one constant, `constant_mm` where it is known. `cutting_length_mm` counts from the tip up,
     None: all that the holder leaves free. `holder` is stacked upwards and ends at the gauge
@@ -107,6 +108,7 @@ class Tool:
     constant_mm: float | None = None
     cutting_length_mm: float | None = None
     holder: tuple[HolderPart, ...] = ()
+    name: str = ""
 
     @property
     def tool_vector_mm(self) -> Vector | None:

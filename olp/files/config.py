@@ -202,6 +202,7 @@ def _tools(tables: Tools) -> dict[int, Tool]:
     return {
         int(number): Tool(
             number=int(number),
+            name=table.name or "",
             length_mm=(table.X_mm, table.Y_mm, table.Z_mm),
             radius_mm=table.radius_mm,
             gauge_to_tip_mm=table.gauge_to_tip_mm,

@@ -27,7 +27,7 @@ SIGN = "actual-minus-commanded"
 
 _TOOL_NUMBER = "(0|[1-9][0-9]*)"
 # Frames of other languages may have any name, but no program would ever select a misspelt G-code.
-_G_OFFSET = re.compile(r"G(5[4-9](\.\d)?|1[12]\d|154)( ?P\d{1,3})?|G15 ?H\d{1,3}")
+_G_OFFSET = re.compile(r"G(5[4-9](\.\d)?|1[12]\d|154)( ?P\d{1,3})?|G15 ?H\d{1,3}|G50[05-9]|G5[1-9]\d")
 
 
 def shown(value: object) -> str:

@@ -104,6 +104,9 @@ class HolderTable(Table):
 
 
 class ToolTable(Table):
+    name: Text | None = Field(
+        default=None, description='the name by which programs call the tool, as in T="MILL 10", where they do'
+    )
     X_mm: float = Field(default=0.0, description="the tool offset in X as in the control's tool table, in mm")
     Y_mm: float = Field(default=0.0, description="the tool offset in Y as in the control's tool table, in mm")
     Z_mm: float = Field(default=0.0, description="the tool length as in the control's tool table, in mm")

@@ -10,6 +10,7 @@ import re
 
 from olp.core.errors import ProgramError
 from olp.core.values import dataclass
+from olp.program.text.signs import SINUMERIK
 
 #: Bytes of a text that are searched.
 LOOKED_AT = 1 << 16
@@ -18,6 +19,7 @@ _OTHER_POST = "post-process the part for the control of the machine file, or giv
 _OSP = (
     "plain moves of it are read with --dialect okuma; else post-process for the control of the machine file"
 )
+_NAME_IT = "name its dialect with --dialect sinumerik, or with the key dialect of the job file"
 _ROBOT = (
     "robots are not corrected from their own language; give a list of positions in the frame of the machine "
     "(CSV), or the CAM system's APT CLDATA"
@@ -135,14 +137,8 @@ FOREIGN = (
     ),
     Foreign(
         "Sinumerik (Siemens)",
-        _line(
-            rb"(?:N\d+[ \t]*)?(?:;?%_N_|;\$PATH=|TRAORI\b|TRAFOOF\b|CYCLE\d+[ \t]*\(|MCALL\b|"
-            rb"(?:DEF|PROC)[ \t]+\w+|POCKET\d[ \t]*\(|HOLES\d[ \t]*\(|MSG[ \t]*\(|"
-            rb"(?:A?TRANS|A?ROT|A?MIRROR|A?SCALE)\b|"
-            rb"R\d+[ \t]*=|(?:EXTERN|SUPA|FFWON|SOFT|COMPCAD|COMPON|G64[12])\b|WORKPIECE[ \t]*\(|"
-            rb"[^;(\r\n]*\b[XYZIJKFS]1?=[ \t]*[-+R\d(])"
-        ),
-        _OTHER_POST,
+        _line(SINUMERIK + rb"|(?:N\d+[ \t]*)?(?:DEF|PROC)[ \t]+\w+"),
+        _NAME_IT,
         language=True,
     ),
     Foreign(

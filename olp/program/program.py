@@ -150,8 +150,9 @@ class Statements:
 @dataclass(frozen=True, slots=True, eq=False)
 class Program:
     """`slot` (n, 3): index of the X, Y, Z word of each move, -1 where omitted. `calculator`: lengths without
-    a decimal point are whole units. `statements` is None for blocks of words. `by_original`: lines are those
-    of the text that this one was unrolled from (`in_original`)."""
+    a decimal point are whole units. `statements` is None for blocks of words. `closings` are
+    brackets that close behind a number, sorted. `by_original`: lines are those of the text that this one was
+    unrolled from (`in_original`)."""
 
     data: bytes
     dialect: Dialect
@@ -169,6 +170,7 @@ class Program:
     calculator: bool = True
     statements: Statements | None = None
     shared: SharedWords = field(default_factory=SharedWords.none)
+    closings: Index = field(default_factory=lambda: np.zeros(0, np.int64))
     by_original: bool = False
 
     @property

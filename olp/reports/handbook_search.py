@@ -84,7 +84,9 @@ SUBJECTS = (
         "folder batch",
         ("howto/batch",),
     ),
-    Subject(r"\bsinumerik\b|\bsiemens\b", "sinumerik table control", ("reference/control-tables",)),
+    Subject(
+        r"\bsinumerik\b|\bsiemens\b", "sinumerik table control", ("howto/sinumerik", "reference/control-tables")
+    ),
     Subject(r"\bmach ?[34]\b|\bmarlin\b|\buccnc\b", "control dialect", ("howto/machine",)),
     Subject(
         r"still (good|right|valid|true)|out of date|expired?|too old", "still good", ("howto/still-good",)

@@ -78,10 +78,29 @@ def _rs274(name: str, profile: Profile) -> Case:
     )  # fmt: skip
 
 
-#: A control of this family needs no case of its own.
-RS274 = {name: d for name, d in registry.DIALECTS.items() if isinstance(d, Profile)}
+#: A control of this family whose texts are words alone needs no case of its own.
+RS274 = {
+    name: d for name, d in registry.DIALECTS.items() if isinstance(d, Profile) and d.translator is None
+}
+#: Dialects whose words may be omitted.
+BLOCKS = (*RS274, "sinumerik")
 CASES = {
     **{name: _rs274(name, profile) for name, profile in RS274.items()},
+    "sinumerik": Case(
+        "sinumerik", "sinumerik", "GXYZIJKRFMTNSPDACL%_/;()[]$=+-.,\" 0123456789\r\n\t:<>*",
+        ["%_N_TEST_MPF", ";$PATH=/_N_MPF_DIR", "G71 G90 G17 G54 G94 F600"], ["M30"],
+        lambda p, d: f"G1 {_words(p, d)}", lambda p, d: f"G91 G1 {_words(p, d)}",
+        lambda text: f"; {text}",
+        re.compile(rb"(?m)^G1 X(" + NUMBER + rb") Y(" + NUMBER + rb") Z(" + NUMBER + rb")"),
+        ("gcode_sinumerik/*",),
+        (
+            b"G1 X=5 Y=AC(3) Z1\nX=IC(1)\n", b'MSG("a;(b")\nG0 X1', b"G2 X10 Y0 I=AC(5) J=AC(0) TURN=2",
+            b"T=\"A\" M6\nD1\nSUPA Z0 D0", b"MCALL CYCLE81(5,0,1,-3)\nX1 Y2\nMCALL",
+            b"R1=5\nX=R1", b"G4 F2\nG4 S3", b"TRANS X1\nATRANS Y2\nG0 X0",
+            b"G500 G505 G641 ADIS=0.1 G0 X1", b"L\xf6\xff", b'MSG("', b"X=AC(",
+            b"N10 LABEL: G0 X1\nGOTOB LABEL", b"C25.815\nC2=5\n:10 X1", b"/2 N5 G0 X1\n/TRANS X1",
+        ),
+    ),
     "apt": Case(
         "apt", "apt", "GOTDLAFRMCIEUNSP/,.+-$ 0123456789\r\n\t=()'",
         ["PARTNO TEST", "UNITS/MM", "FEDRAT/600,MMPM"], ["FINI"],

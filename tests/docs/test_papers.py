@@ -216,7 +216,7 @@ ANSWERS = {
     "renishaw": "howto/instrument-files",
     "XL-80": "howto/instrument-files",
     "ballbar": "tutorials/laser-and-ball-bar",
-    "sinumerik": "reference/control-tables",
+    "sinumerik": "howto/sinumerik",
     "will my program get longer": "howto/correct",
     "why no changes": "howto/correct",
     "how do I add my control": "contributing/add-a-dialect",

@@ -35,8 +35,8 @@ MACHINE = {
     "chain a list": ('"FXYZ"', '["F", "X"]', ["chain", "24 orders"]),
     "controller not built": (
         '"linuxcnc"',
-        '"sinumerik"',
-        ["controller", "sinumerik", "linuxcnc, fanuc, grbl, haas"],
+        '"fidia"',
+        ["controller", "fidia", "linuxcnc, fanuc, grbl, haas"],
     ),
     "controller in capitals": ('"linuxcnc"', '"GRBL"', ["controller", '"GRBL"', "did you mean grbl?"]),
     "key misspelt": (

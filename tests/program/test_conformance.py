@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cases.acceptance import points, unstamped
-from cases.dialects import CASES, FRAMES, RS274, Case
+from cases.dialects import BLOCKS, CASES, FRAMES, Case
 from cases.fast import some_fast
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
@@ -230,7 +230,7 @@ def test_l4_points_within_half_a_digit(bent: dict[str, Path], name: str, seed: i
     nominal = np.round(rng.uniform((-60, -50, -20), (60, 50, 40), (15, 3)), digits)
     case = CASES[name]
     text = olp.correct(case.program(nominal, digits), pinned(bent[name], case)).data
-    own = points(text) if case.name in RS274 else None
+    own = points(text) if case.name in BLOCKS else None
     assert commanded(nominal, text, bent[name], case, own) <= 0.5 * 10.0 ** -max(digits, 3) + SLACK_MM
 
 

@@ -14,8 +14,6 @@ TEXTS = {
     "Heidenhain": (b"0 BEGIN PGM TEST MM\n"
                    b"1 TOOL CALL 1 Z S1000\n2 L X+10 Y+5 R0 FMAX\n3 END PGM TEST MM\n", 1),
     "Heidenhain conversational": (b"1 TOOL CALL 1 Z S1000\n2 L X+10 Y+5 R0 FMAX\n3 L Z-5 F500\n", 2),
-    "Sinumerik": (b"G54 G90\nG0 X0\nCYCLE800(1,\"TABLE\",0,57,0,0,0)\nX10\n", 3),
-    "Sinumerik (Siemens)": (b"G54\nN20 R1=5\nN30 G1 X=R1 F100\n", 2),
     "KUKA KRL": (b"&ACCESS RVP\nDEF part()\nPTP {X 10, Y 0, Z 5}\nLIN P2\nEND\n", 1),
     "ABB RAPID": (b"MODULE M\n PROC main()\n MoveL p1, v100, fine, tool0;\n ENDPROC\nENDMODULE\n", 1),
     "FANUC TP": (b"/PROG TEST\n/ATTR\n/MN\n 1:J P[1] 100% FINE ;\n/POS\n/END\n", 1),
@@ -59,6 +57,7 @@ ROBOT = (
 PROGRAM = "give the program that the CAM system writes for the control"
 PLAIN = "save it as plain text (ASCII or UTF-8), and give that file"
 UNPACK = "unpack it, and give the program in it"
+NAMED = "name its dialect with --dialect sinumerik, or with the key dialect of the job file"
 TOML = "give the program first, and the machine file with -m, the job file with -j"
 #: Name, remedy and code of what is recognised; texts that only its own sign recognises.
 SIGNS = {
@@ -123,7 +122,7 @@ SIGNS = {
     ("Yaskawa INFORM (JBI)", ROBOT, "OLP501"): (
         b"/JOB\n", b"//NAME A", b"//pos\n", b"//INST", b"MOVJ C00001", b" MOVL  C1", b"movc\tC2",
     ),
-    ("Sinumerik (Siemens)", OTHER_POST, "OLP501"): (
+    ("Sinumerik (Siemens)", NAMED, "OLP501"): (
         b"%_N_A_MPF", b";%_N_A", b";$PATH=/_N_", b"TRAORI\n", b"N10 TRAFOOF", b"CYCLE81(1", b"N5CYCLE832 (",
         b"MCALL\n",
         b"DEF REAL A", b"N10 PROC A", b"POCKET3(", b"HOLES1 (", b'MSG("a")', b"TRANS X1", b"ATRANS Y1",

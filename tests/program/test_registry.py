@@ -150,7 +150,7 @@ def test_what_each_dialect_of_statements_says_of_itself() -> None:
     apt, dmis = DIALECTS["apt"], DIALECTS["dmis"]
     assert list(DIALECTS) == [
         "linuxcnc", "fanuc", "grbl", "haas", "mach3", "mach4", "mazak", "okuma", "siemens-iso", "marlin",
-        "klipper", "apt", "dmis", "list",
+        "klipper", "sinumerik", "apt", "dmis", "list",
     ]  # fmt: skip
     assert apt.title == "APT and cutter-location data (ISO 4343, ISO 3592)"
     assert dmis.title == "DMIS part programs of coordinate measuring machines (ISO 22093)"

@@ -81,6 +81,8 @@ class AxisState(OffsetState):
     compensation: CutterCompensation | None = None
     frames: list[Frame] = field(default_factory=list)
     path_modes: list[PathMode] = field(default_factory=list)
+    #: the frame of the last plain motion, -1 before any
+    last_frame: int = -1
     _index: dict[Frame, int] = field(default_factory=dict)
 
     @staticmethod

@@ -60,7 +60,7 @@ class Collector(PathColumns):
             self.columns.put("shared_before", extruder.before, np.float64)
             self.columns.put("shared_distance", extruder.distance, np.bool_)
 
-    def program(self, state: AxisState, end_line: int) -> Program:
+    def program(self, state: AxisState, end_line: int, closings: Index) -> Program:
         """The whole program, with the frames and path modes of the final `state`. Takes the columns: call it
         once only."""
         return Program(
@@ -85,6 +85,7 @@ class Collector(PathColumns):
                 self.columns.take("shared_before", np.float64),
                 self.columns.take("shared_distance", np.bool_),
             ),
+            closings=closings,
         )
 
     def _words(self) -> Words:

@@ -10,7 +10,7 @@ from olp.core.units import AXES
 from olp.program.rs274.profiles.base import Act, Profile
 
 #: Modes that the program states, and their codes.
-_MODES = (("G21", 210), ("G90", 900), ("G94", 940), ("G17", 170))
+_MODES = (("G90", 900), ("G94", 940), ("G17", 170))
 _G54 = 540
 #: mm/min; slow enough to follow by eye.
 _FEED = 600.0
@@ -39,7 +39,8 @@ def first_program(profile: Profile, machine: Machine, offset: str = "G54") -> by
     lines = ["%", "O0001"] if profile.program_number else []
     lines += [f"{opening}square of {2 * half:g} mm and circle in the air{closing}"]
     # codes that the control has, each in its own line where lines are commands
-    modes = [word for word, code in _MODES if code in profile.codes]
+    modes = [profile.metric] if 210 in profile.codes else []
+    modes += [word for word, code in _MODES if code in profile.codes]
     modes += ["G91.1"] if profile.arc_distance is None else []
     lines += modes if profile.commands is not None else [" ".join(modes)]
     lines += ["G64 P0.01"] if profile.path_tolerance else []

@@ -14,8 +14,6 @@ from olp.program.rs274.profiles.base import Profile
 
 #: Characters of a comment line at most: some controls take no more.
 _WIDTH = 68
-#: What every program sets first: mm, absolute, no cycle, no tool length, no cutter compensation.
-_MODES = "G21 G90 G94 G80 G40 G49"
 
 
 def positions_program(
@@ -31,7 +29,7 @@ def positions_program(
         raise CannotCompute(f"{profile.title} has no G53; take the points from the CSV file")
     opening, closing = (mark.decode() for mark in profile.comment)
     lines = [f"{opening}{line}{closing}" for note in notes for line in textwrap.wrap(_plain(note), _WIDTH)]
-    lines.append(_MODES)
+    lines.append(f"{profile.metric} G90 G94 {profile.cleared}")
     before: list[str] = []
     for position, wait in zip(np.round(positions_mm, digits).tolist(), dwell_s, strict=True):
         words = [f"{axis}{value + 0.0:.{digits}f}" for axis, value in zip(AXES, position, strict=True)]
@@ -42,7 +40,7 @@ def positions_program(
         before = words
         if wait > 0.0:
             count = profile.increments_without_point
-            lines.append(f"G4 P{round(1000.0 * wait)}" if count else f"G4 P{wait:.3f}")
+            lines.append(f"G4 {profile.dwell}" + (f"{round(1000.0 * wait)}" if count else f"{wait:.3f}"))
     lines.append("M30")
     return ("\n".join(lines) + "\n").encode()
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Array, Index, is_in
+from olp.core.arrays import Array, Index, Mask, is_in
 from olp.core.errors import ProgramError
 from olp.core.machine import Setup
 from olp.core.toolpath import Flag, Kind
@@ -48,6 +48,8 @@ from olp.program.rs274.motion import OTHER, Blocks, arc_geometry, fill, gather
 from olp.program.rs274.offset_state import STORES_POSITION, Word
 from olp.program.rs274.profiles.base import Act, Profile
 from olp.program.rs274.special_blocks import SpecialBlocks, check_codes, event_block
+from olp.program.rs274.translated import Beside, check_frames
+from olp.program.rs274.translation import Translation
 from olp.program.rs274.turned import Turning, along_words
 
 #: motion code to kind of move; 255 where it is not plain motion, the last entry is for "none yet"
@@ -77,11 +79,13 @@ def read(
 class _Rows:
     """The motion lines of a chunk while they are read: how many have a frame, how many a position. `present`
     is the index of the frame in force, None after what may have changed it. `runs` leads from the first row
-    of each run of canned cycles to the row behind it."""
+    of each run of canned cycles to the row behind it. `calls` (lines of the chunk,) are those whose motion
+    calls a cycle, so no block may be put behind them."""
 
     blocks: Blocks
     frame: npt.NDArray[np.int32]
     runs: dict[int, int]
+    calls: Mask
     assigned: int = 0
     resolved: int = 0
     present: int | None = None
@@ -109,9 +113,11 @@ class _Reader:
         self.others = OTHER if commands is None else OTHER.replace(commands.extruder.encode(), b"")
         self.extrusion = None if commands is None or not commands.feeds(data) else Extrusion(commands)
         self.feeding = self.whole = np.zeros(0, bool)
+        translator = profile.translator
+        self.translation = Translation(data) if translator is None else translator(data)
 
     def run(self) -> Program:
-        data = self.data
+        data = self.translation.text
         if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
             raise ProgramError(
                 "the text is UTF-16; expected one byte per character; save it as plain text",
@@ -124,7 +130,7 @@ class _Reader:
         for chunk in chunks(data, self.state.profile.text, tell=self.options.tell):
             self._chunk(chunk)
         self.modes.check_end()
-        return self.collector.program(self.state, self.end_line)
+        return self.collector.program(self.state, self.end_line, self.translation.closings)
 
     # -- one chunk ---------------------------------------------------------------------------------
 
@@ -150,7 +156,15 @@ class _Reader:
         self.lost = self._lost(context, odd)
         if self.extrusion is not None:
             self._extrude(context)
-        self._stretches(context, gather(chunk, context.motion, context.consumed, self.others))
+        beside = Beside(self.translation, context, self.state, last)
+        central = beside.central
+        if central.size:
+            # for these lines alone, whatever the mode is
+            mode = context.arc_distance.copy()
+            context.arc_distance[central] = 901
+        self._stretches(context, gather(chunk, context.motion, context.consumed, self.others), beside)
+        if central.size:
+            context.arc_distance[:] = mode
         self.modes.leave(context, last - 1)
         self.cycle_blocks.leave(context, last - 1)
 
@@ -180,19 +194,19 @@ class _Reader:
 
     # -- stretches between events ------------------------------------------------------------------
 
-    def _stretches(self, context: Context, blocks: Blocks) -> None:
+    def _stretches(self, context: Context, blocks: Blocks, beside: Beside) -> None:
         chunk, state, event = context.chunk, self.state, context.event
-        rows = _Rows(blocks, np.zeros(len(blocks), np.int32), runs(context, blocks.line))
+        rows = _Rows(blocks, np.zeros(len(blocks), np.int32), runs(context, blocks.line), beside.calls)
         motion = context.motion[blocks.line]
         alone, first = is_in(motion, _ALONE), is_in(motion, _PROBES)
         first[list(rows.runs)] = True
-        special = event.copy()
+        special = event | beside.lines
         special[blocks.line[first]] = True
         for line in np.flatnonzero(special).tolist():
             upto = int(np.searchsorted(blocks.line, line))
-            here = upto < len(blocks) and blocks.line[upto] == line
+            here = upto < len(blocks) and bool(blocks.line[upto] == line)
             self._assign(context, rows, upto)
-            if not event[line]:
+            if not event[line] and not beside.lines[line]:
                 self._alone(context, rows, upto, Effect())
                 continue
             number, deleted = context.number(line), bool(chunk.deleted[line])
@@ -202,13 +216,16 @@ class _Reader:
                 rows.present = None
             moved = any(state.may_move(round(w.value * 10)) for w in words if w.letter == "M")
             lost = line in self.lost or state.changes_nozzle(words)
-            if moved or lost or self._needs_position(words, codes):
+            if moved or lost or beside.lines[line] or self._needs_position(words, codes):
                 self._resolve(context, rows, upto)
             state.distance, state.plane = int(context.distance[line]), int(context.plane[line])
             state.payload_kg = self.payloads.get(line, state.payload_kg)
             effect = state.run(number, words, codes, self.collector.moves)
             if lost:
                 state.lose(number)
+            if beside.act(line):
+                rows.present = None
+                moved |= beside.forgets(line)
             if moved or lost or effect.lost:
                 self.special_blocks.control_move(number, deleted=deleted)
             if here and (alone[upto] or effect.home or effect.machine):
@@ -216,6 +233,8 @@ class _Reader:
             if effect.home:
                 state.forget(effect.home)
                 self.special_blocks.control_move(number, deleted=deleted)
+            if beside.lines[line]:
+                self._call(context, rows, upto + here, beside, line)
         self._assign(context, rows, len(blocks))
         self._resolve(context, rows, len(blocks))
 
@@ -238,6 +257,15 @@ class _Reader:
             self.cycle_blocks.run(context, line, frame)
         else:
             self.special_blocks.run(context, int(line[0]), rows.blocks.slot[row : row + 1], frame, effect)
+
+    def _call(self, context: Context, rows: _Rows, upto: int, beside: Beside, line: int) -> None:
+        """Make the hole of a cycle that is called behind the motion of its block."""
+        drilling = beside.drilling(line, moves=upto > rows.resolved)
+        if drilling is None:
+            return
+        self._assign(context, rows, upto)
+        self._resolve(context, rows, upto)
+        self.special_blocks.drill(context.number(line), drilling, deleted=bool(context.chunk.deleted[line]))
 
     def _assign(self, context: Context, rows: _Rows, upto: int) -> None:
         """Give the present frame to the rows since the last event."""
@@ -269,6 +297,7 @@ class _Reader:
             raise ProgramError.together(_no_motion(int(number[i])) for i in rows_without)
         incremental = context.distance[line] == INCREMENTAL
         frame = rows.frame[a:upto]
+        check_frames(state, number, incremental, context.plane[line], frame)
         offset, unit = self._offsets(frame)
         value = scaled(context, state, self.collector.remarks)
         slot = blocks.slot[a:upto]
@@ -278,7 +307,7 @@ class _Reader:
             offset = turning.words(offset)
         end = fill(slot, value, incremental if incremental.any() else None, offset, unit, start)
         flag = np.where(incremental, np.uint8(Flag.INCREMENTAL), np.uint8(0))
-        flag[blocks.other[a:upto]] |= np.uint8(Flag.WHOLE)
+        flag[blocks.other[a:upto] | rows.calls[line]] |= np.uint8(Flag.WHOLE)
         flag[chunk.deleted[line]] |= np.uint8(Flag.DELETED)
         if self.extrusion is not None:
             # a straight move that feeds nothing is a travel
@@ -318,6 +347,7 @@ class _Reader:
         line = blocks.line[blocks.arc_row[arcs]]
         number = line + (context.chunk.first_line + 1)
         size = np.where(words >= 0, value[words], np.nan)
+        size[:, 4] += bool(self.state.profile.further_turns)
         size[:, :4] *= unit if isinstance(unit, float) else unit[row, None]
         _check_centres(context, line, words)
         absolute = context.arc_distance[line] == 901

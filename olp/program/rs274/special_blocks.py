@@ -27,6 +27,7 @@ from olp.program.rs274.motion import fill
 from olp.program.rs274.offset_state import Word
 from olp.program.rs274.profiles.base import Act, Profile
 from olp.program.rs274.state import NAN
+from olp.program.rs274.translation import Drilling
 from olp.program.rs274.turned import Turning, along_words
 
 
@@ -155,7 +156,8 @@ class SpecialBlocks:
                 )
             kind = Kind(motion // 10)
             flag |= Flag.PASS | Flag.MACHINE
-            offset = np.zeros_like(offset)
+            kept = state.profile.machine_moves_keep_length
+            offset = np.array(frame.length_mm) if kept else np.zeros_like(offset)
         elif effect.home:
             flag |= Flag.PASS
         else:
@@ -188,6 +190,27 @@ class SpecialBlocks:
                 if state.position[i] != before[i]:
                     state.position[i] = NAN
             self.control_move(line, deleted=deleted)
+
+
+    def drill(self, line: int, drilling: Drilling, *, deleted: bool) -> None:
+        """The strokes of a cycle that is called at the present position."""
+        state = self._state
+        number = state.frame(line)
+        frame = state.frames[number]
+        if frame.turn is not None and frame.turn[2] != (0.0, 0.0, 1.0):
+            raise ProgramError(
+                f"{drilling.name} is in a frame that scales or mirrors Z, which is not read; write the hole "
+                "as plain moves",
+                line=line,
+                code="OLP512",
+            )
+        kind, end = drilling.moves(state, np.array(frame.offset_mm), frame.unit_mm)
+        count = len(kind)
+        self._collector.put_moves(
+            kind, np.full(count, Flag.PASS | _deleted(deleted), np.uint8), np.full(count, line),
+            np.full(count, number), end, np.full((count, 3), -1),
+        )  # fmt: skip
+        state.position[:] = end[-1].tolist()
 
 
 def _deleted(deleted: bool) -> Flag:

@@ -7,10 +7,10 @@ profile. G codes are keyed by ten times their number (G5.1 is 51).
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import field
 from enum import IntEnum, auto
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from olp.core.arrays import Array
 from olp.core.machine import Machine
@@ -85,14 +85,24 @@ class Profile(Dialect):
     - `commands`: each line is a command with parameters, and no code holds for the next line. None: lines are
       blocks of words.
     - `inert`: whole lines that are no words and move nothing, such as names of programs and labels.
+    - `translator` turns a text with statements of its own into words of this family (`translation`).
+      `machine_moves_keep_length`: the tool length counts in G53 too. `increments_take_offsets`: an increment
+      behind a change of offsets moves by that change as well. `lengths_follow_plane`: lengths count along the
+      tool axis of the plane. `further_turns` is the word of the turns of an arc beyond its first part, where
+      P does not count them all, `absolute_centre` the function around an absolute coordinate of a centre.
     - `text`, `rules`, `cycles`, `language`: what may be in a line and in a block, how canned cycles are made,
       and how parametric programs are written.
+    - `metric`: the word of lengths in mm. `cleared`: modes without cycle, tool length and cutter
+      compensation. `dwell`: the letter of a time in seconds.
     - `written_ending`: the ending of files that are written for the control. `program_number`: a program
       begins with % and an O number, and ends with %.
     """
 
     first: tuple[bytes, ...] = (b"%", b"O|:")
     payload_comments: bool = True
+    metric: str = "G21"
+    cleared: str = "G80 G40 G49"
+    dwell: str = "P"
     written_ending: str = "nc"
     program_number: bool = False
     codes: Mapping[int, Act]
@@ -132,6 +142,12 @@ class Profile(Dialect):
     dwell_words: str = "P"
     commands: Commands | None = None
     inert: re.Pattern[bytes] | None = None
+    translator: Callable[[bytes], Any] | None = None
+    machine_moves_keep_length: bool = False
+    increments_take_offsets: bool = False
+    lengths_follow_plane: bool = False
+    further_turns: bytes = b""
+    absolute_centre: bytes = b""
     text: BlockText
     rules: BlockRules = OTHER_RULES
     cycles: CycleRules

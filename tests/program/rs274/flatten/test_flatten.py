@@ -147,8 +147,8 @@ def test_refusals_name_the_line(source: str, line: int, message: str) -> None:
 
 
 def test_unknown_profile() -> None:
-    with pytest.raises(UsageError, match="sinumerik"):
-        flatten(b"", profile="sinumerik")
+    with pytest.raises(UsageError, match="sinumeric"):
+        flatten(b"", profile="sinumeric")
 
 
 # --- Macro B ----------------------------------------------------------------------------------------------

@@ -1,0 +1,121 @@
+"""What a translation says beside the words of a chunk, carried out while it is read (`translation`)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.core.arrays import Index, Mask
+from olp.core.errors import ProgramError
+from olp.program.rs274.axis_state import AxisState
+from olp.program.rs274.codes import INCREMENTAL
+from olp.program.rs274.modes import UNROLL, Context
+from olp.program.rs274.translation import Drilling, Translation
+
+#: Plane code of the plane across Z.
+_XY = 170
+
+
+class Beside:
+    """Actions and cycles of one chunk. `lines` (lines of the chunk,) are those that have some, `calls` those
+    whose motion calls a cycle."""
+
+    def __init__(self, translation: Translation, context: Context, state: AxisState, last: int) -> None:
+        self._translation, self._context, self._state = translation, context, state
+        self.lines = np.zeros(len(context.active), bool)
+        self.calls = self.lines.copy()
+        if not (translation.refused or translation.actions or translation.drillings or translation.counted):
+            return
+        first = context.chunk.first_line
+        refused = self._active(translation.refused, first, last)
+        if refused.size:
+            raise ProgramError.together(translation.refused[n] for n in (refused + first + 1).tolist())
+        self.lines[self._active(translation.actions, first, last)] = True
+        self.calls[self._active(translation.drillings, first, last)] = True
+        self.lines |= self.calls
+        self._counted(self._active(translation.counted, first, last).tolist())
+
+    def _active(self, table: Mapping[int, Any], first: int, last: int) -> Index:
+        """The lines of the chunk, from 0, that count and are in a table by line."""
+        line = np.sort(np.fromiter(table, np.int64, len(table))) - (first + 1)
+        line = line[slice(*np.searchsorted(line, (0, last)))]
+        return line[self._context.active[line]]
+
+    def act(self, line: int) -> bool:
+        """Carry out the actions of a line of the chunk; whether it has any."""
+        number = self._context.number(line)
+        actions = self._translation.actions.get(number, ())
+        for action in actions:
+            action.run(self._state, number)
+        return bool(actions)
+
+    def forgets(self, line: int) -> bool:
+        """Whether an action of a line lets the control move axes by itself."""
+        actions = self._translation.actions.get(self._context.number(line), ())
+        return any(action.moves(self._state) for action in actions)
+
+    def drilling(self, line: int, *, moves: bool) -> Drilling | None:
+        """The cycle that a line calls, where it `moves` or calls it always."""
+        drilling = self._translation.drillings.get(self._context.number(line))
+        return drilling if drilling is not None and (moves or drilling.always) else None
+
+    @property
+    def central(self) -> Index:
+        """The lines of the chunk whose centres are absolute, whatever the mode."""
+        central = self._translation.central
+        first = self._context.chunk.first_line + 1
+        return central[slice(*np.searchsorted(central, (first, first + len(self.lines))))] - first
+
+    def _counted(self, active: list[int]) -> None:
+        """Blocks whose words say themselves whether they are distances: this has to be what the mode says, as
+        the blocks that are inserted behind them follow the mode."""
+        context, first = self._context, self._context.chunk.first_line
+        for line in active:
+            relative, absolute = self._translation.counted[first + line + 1]
+            incremental = bool(context.distance[line] == INCREMENTAL)
+            if absolute if incremental else relative:
+                what = f"{relative[:1]} is a distance in G90"
+                if incremental:
+                    what = f"{absolute[:1]} is a position in G91"
+                raise ProgramError(
+                    what,
+                    hint=UNROLL,
+                    line=context.number(line),
+                    code="OLP511",
+                )
+
+
+def check_frames(
+    state: AxisState,
+    number: Index,
+    incremental: Mask,
+    plane: npt.NDArray[np.int16],
+    frame: npt.NDArray[np.int32],
+) -> None:
+    """Refuse rows whose meaning depends on machine data of the control, as its profile says. (n,) the lines
+    of the rows, whether they are distances, their planes and frames."""
+    profile = state.profile
+    if profile.lengths_follow_plane and (plane != _XY).any():
+        long = np.array([any(f.length_mm) for f in state.frames])[frame]
+        bad = np.flatnonzero((plane != _XY) & long)
+        if bad.size:
+            raise ProgramError(
+                "a tool length is in force outside of G17, and machine data say along which axis it counts; "
+                "give the tool Z_mm = 0 with its gauge_to_tip_mm, and put the length into the work offset",
+                line=int(number[bad[0]]),
+                code="OLP518",
+            )
+    if profile.increments_take_offsets and incremental.any():
+        before = np.concatenate(([state.last_frame], frame[:-1]))
+        for row in np.flatnonzero(incremental & (before != frame) & (before >= 0)).tolist():
+            if state.frames[int(before[row])].offset_mm != state.frames[int(frame[row])].offset_mm:
+                raise ProgramError(
+                    "a distance comes behind a change of offsets, and machine data say whether it counts "
+                    "that change too; program a position first",
+                    line=int(number[row]),
+                    code="OLP518",
+                )
+    state.last_frame = int(frame[-1])

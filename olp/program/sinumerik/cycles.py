@@ -1,0 +1,66 @@
+"""Drilling cycles of Sinumerik controls: the strokes of CYCLE81 to CYCLE89 behind the motion of a block.
+
+Pecks are not made one by one: they lie on the line of the stroke. Source: Siemens, Programming Manual Cycles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from olp.core.errors import ProgramError
+from olp.core.toolpath import Kind
+from olp.program.rs274.modes import UNROLL
+from olp.program.rs274.translation import Drilling
+from olp.program.sinumerik.blocks import NUMBER
+
+#: Cycles that come back to the safety distance at a feed.
+_FEED_BACK = frozenset({"CYCLE84", "CYCLE840", "CYCLE85", "CYCLE89"})
+#: CYCLE86: arguments RPA, RPO and RPAP, by which the tool leaves the wall of the hole.
+_LIFT_OFF = slice(7, 10)
+
+
+def drilling(name: str, arguments: Sequence[bytes], *, always: bool = False) -> Drilling:
+    """The strokes of a cycle. Raises ProgramError, without a line, for arguments that are no numbers, and for
+    cycles whose strokes they do not give."""
+    values = [_number(name, text) for text in arguments[:5]]
+    rtp, rfp, sdis, dp, dpr = [*values, *[None] * 5][:5]
+    if rtp is None or rfp is None or (dp is None and dpr is None):
+        raise ProgramError(
+            f"{name} needs RTP, RFP, and DP or DPR as its first, second, fourth and fifth argument",
+            code="OLP531",
+        )
+    if name == "CYCLE86" and any(_number(name, text) for text in arguments[_LIFT_OFF]):
+        raise ProgramError(
+            "CYCLE86 moves the tool off the wall of the hole inside the control; program it without RPA, RPO "
+            "and RPAP",
+            code="OLP544",
+        )
+    if dpr is not None:
+        bottom = rfp - abs(dpr) if dp is None or dp < rfp else rfp + abs(dpr)
+        if dp is not None and abs(bottom - dp) > 1e-9:
+            raise ProgramError(
+                f"{name} states its depth twice: DP {dp:g} and DPR {dpr:g} from RFP {rfp:g}; give one",
+                code="OLP531",
+            )
+    else:
+        assert dp is not None
+        bottom = dp
+    if bottom == rfp:
+        raise ProgramError(f"{name} has no depth: its bottom is at RFP {rfp:g}", code="OLP531")
+    clear = rfp + abs(sdis or 0.0) * (1.0 if bottom < rfp else -1.0)
+    strokes = [(Kind.RAPID, clear), (Kind.LINE, bottom)]
+    if name in _FEED_BACK:
+        strokes.append((Kind.LINE, clear))
+    if rtp != strokes[-1][1]:
+        strokes.append((Kind.RAPID, rtp))
+    return Drilling(name, tuple(strokes), always)
+
+
+def _number(name: str, text: bytes) -> float | None:
+    if not text:
+        return None
+    if NUMBER.fullmatch(text) is None:
+        raise ProgramError(
+            f"`{text.decode('latin-1')}` of {name} uses parameters or expressions", hint=UNROLL, code="OLP511"
+        )
+    return float(text.replace(b" ", b""))

@@ -1,0 +1,84 @@
+"""The dialect of Sinumerik 840D programs."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from types import MappingProxyType
+
+from olp.core.values import dataclass
+from olp.program.dialect import Row, Support
+from olp.program.rs274.block_text import BlockText
+from olp.program.rs274.cycle_rules import ISO_CYCLES
+from olp.program.rs274.entry import read_blocks
+from olp.program.rs274.flatten.language import MACRO_B
+from olp.program.rs274.profiles.base import ISO_M, REFUSALS, Act, Profile
+from olp.program.sinumerik.entry import translate_text
+from olp.program.sinumerik.table import HARMLESS_G, ROUNDING_G, statements
+from olp.program.text.signs import SINUMERIK
+
+_CODES = {
+    **dict.fromkeys((0, 10, 20, 30), Act.MOTION),
+    **dict.fromkeys((170, 180, 190), Act.PLANE),
+    **dict.fromkeys((900, 910), Act.DISTANCE),
+    **dict.fromkeys((930, 940, 950), Act.FEED),
+    **dict.fromkeys((40, 200, 210, 530, 540, 550, 560, 570, 610, 640), Act.EVENT),
+    **dict.fromkeys((90, 400, 960, 970), Act.UNCHANGED),
+    **dict.fromkeys((410, 420), Act.REFUSE),
+}
+#: Codes of the words of this family that programs write otherwise.
+_WRITTEN = {200: "G70", 210: "G71", 610: "G60"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sinumerik(Profile):
+    """The profile with the table of its own statements."""
+
+    def comment_marks(self) -> tuple[tuple[bytes, bytes], ...]:
+        return ((b";", b""),)
+
+    def rows(self) -> Sequence[Row]:
+        support = {
+            Act.MOTION: Support.CORRECTED,
+            Act.UNCHANGED: Support.UNCHANGED,
+            Act.REFUSE: Support.REFUSED,
+        }
+        words = [
+            Row(_WRITTEN.get(c, f"G{c // 10}"), support.get(act, Support.READ), self.refusals.get(c, ""))
+            for c, act in sorted(self.codes.items())
+        ]
+        words += [Row(f"G{code}", Support.UNCHANGED) for code in sorted(HARMLESS_G)]
+        words += [Row(f"G{code}", Support.READ) for code in sorted({700, 710} | ROUNDING_G - {64})]
+        return [*words, *(Row(name, kind, why) for name, (kind, why) in statements().items())]
+
+
+DIALECT = Sinumerik(
+    name="sinumerik",
+    title="Sinumerik 840D",
+    reader=read_blocks,
+    translator=translate_text,
+    endings=("mpf", "spf"),
+    folder_endings=("mpf", "spf", "arc"),
+    sign=re.compile(rb"(?im)^[ \t]*(?:" + SINUMERIK + rb")"),
+    comment=(b"; ", b""),
+    first=(b"%_N_", b";$PATH"),
+    metric="G71",
+    cleared="G40 D0",
+    dwell="F",
+    written_ending="mpf",
+    codes=MappingProxyType(_CODES),
+    refusals=MappingProxyType({code: REFUSALS[code] for code in (410, 420)}),
+    harmless_m=ISO_M | {17, *range(40, 46)},
+    motion=1,
+    initial_retract=980,
+    exact_stop=True,
+    machine_moves_keep_length=True,
+    increments_take_offsets=True,
+    lengths_follow_plane=True,
+    further_turns=b"TURN=",
+    absolute_centre=b"AC",
+    text=BlockText(),
+    cycles=ISO_CYCLES,
+    language=MACRO_B,
+    path_mode="G64 of the control, with its own tolerance",
+)

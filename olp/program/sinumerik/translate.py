@@ -1,0 +1,116 @@
+"""Sinumerik text in words of the RS-274 family: the same bytes where a line is words, other words of the same
+length where it is not, and actions beside it.
+
+Lines of plain words, most of those that CAM systems write, are found in columns and are left as they are.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.core.arrays import Index, Mask, distinct
+from olp.core.errors import ProgramError
+from olp.program.rs274.translation import Drilling, Translation
+from olp.program.sinumerik.blocks import Block, block_of, without_comment
+from olp.program.sinumerik.words import Words, parametric
+
+Bytes = npt.NDArray[np.uint8]
+
+#: Letters of words that mean the same in both languages.
+_PLAIN = b"NGXYZFIJKMSTABCUVW"
+_LETTER = np.zeros(256, bool)
+_LETTER[65:91] = _LETTER[97:123] = True
+#: Bytes that make a line more than words.
+_OTHER = np.ones(256, bool)
+_OTHER[list(b"0123456789+-. \t\r\n;/" + _PLAIN + _PLAIN.lower())] = False
+#: G and M codes of a plain line, by their number.
+_SAME_G = np.isin(
+    np.arange(100), [0, 1, 2, 3, 9, 17, 18, 19, 40, 41, 42, *range(53, 58), 90, 91, 93, 94, 95, 96, 97]
+)
+_SAME_M = ~np.isin(np.arange(100), [6, 17, 70, 97, 98, 99])
+
+
+def translate(data: bytes) -> Translation:
+    """A whole text. Lines that cannot be read are `refused` in the result; nothing is raised."""
+    text = np.frombuffer(data, np.uint8)
+    starts, ends = _line_spans(text)
+    lines = _special(text, starts)
+    if not lines.size:
+        return Translation(data)
+    out = bytearray(data)
+    words = Words()
+    for line in lines.tolist():
+        start = int(starts[line])
+        code = without_comment(data[start : int(ends[line])])
+        if not code.strip() or code.lstrip().startswith(b"%"):
+            continue
+        number = line + 1
+        block: Block | None = None
+        try:
+            block = block_of(code)
+        except ProgramError as error:
+            words.refuse(parametric(code) or error, number)
+        canon = words.line(code, block, start, number)
+        out[start : start + len(code)] = canon
+    refused, actions = words.refused, words.actions
+    return Translation(
+        text=bytes(out),
+        refused=refused,
+        actions=actions,
+        drillings=_by_line(words, len(starts)),
+        counted=words.counted,
+        central=np.array(words.central, np.int64),
+        closings=np.array(words.closings, np.int64),
+    )
+
+
+def _by_line(words: Words, lines: int) -> dict[int, Drilling]:
+    """The cycle that each line calls behind its motion, or by itself."""
+    table: dict[int, Drilling] = {}
+    changes = [*words.modal, (lines + 1, None)]
+    for (line, drilling), (stop, _) in pairwise(changes):
+        if drilling is not None:
+            table |= dict.fromkeys(range(line + 1, stop), drilling)
+    return table | words.calls
+
+
+def _line_spans(text: Bytes) -> tuple[Index, Index]:
+    newline = np.flatnonzero(text == 10)
+    ends = newline if newline.size and newline[-1] == len(text) - 1 else np.append(newline, len(text))
+    return np.concatenate(([0], ends[:-1] + 1)), ends
+
+
+def _special(text: Bytes, starts: Index) -> Index:
+    """The lines, from 0, that are more than plain words before their comment."""
+    letter = _LETTER[text]
+    special = _OTHER[text]
+    special[:-1] |= letter[:-1] & letter[1:]
+    at = np.flatnonzero(special)
+    at = np.concatenate((at, _codes(text, ord("g"), _SAME_G, 9), _codes(text, ord("m"), _SAME_M, 99)))
+    if not at.size:
+        return at
+    lines = np.searchsorted(starts, at, "right") - 1
+    comments = np.flatnonzero(text == 59)
+    if comments.size:
+        owner = np.searchsorted(starts, comments, "right") - 1
+        first = np.full(len(starts), len(text), np.int64)
+        first[owner[::-1]] = comments[::-1]
+        lines = lines[at < first[lines]]
+    return distinct(lines)
+
+
+def _codes(text: Bytes, letter: int, same: Mask, longest: int) -> Index:
+    """Where words of a letter are that mean something else here, or more than `longest` says by digits."""
+    at = np.flatnonzero((text | 32) == letter)
+    if not at.size:
+        return at
+    last = len(text) - 1
+    a, b, c = (text[np.minimum(at + k, last)].astype(np.int64) - 48 for k in (1, 2, 3))
+    one, two, three = ((d >= 0) & (d <= 9) for d in (a, b, c))
+    number = np.where(two, a * 10 + b, a)
+    good = one & same[np.clip(number, 0, 99)] & (b != -2) & ~(two & (c == -2))
+    good &= ~(two & three) if letter == ord("g") else ~(two & three) | (a > 0)
+    return np.asarray(at[~good])

@@ -1,0 +1,233 @@
+"""What a Sinumerik makes of its words, by hand: where a program ends, or why it is refused."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cases.acceptance import TRUE_ZERO, machine
+
+import olp
+from olp.core.errors import ProgramError
+from olp.core.machine import Setup
+from olp.core.toolpath import Flag, Kind
+from olp.files.config import load_setup
+from olp.program.feeds.stated import programmed
+from olp.program.program import Program
+from olp.program.registry import DIALECTS, dialect_of, read
+from olp.program.sinumerik.translate import translate
+
+SINUMERIK = DIALECTS["sinumerik"]
+#: Two offsets, and a tool that programs call by its name.
+TABLES = (
+    TRUE_ZERO
+    + '[work_offsets.G505]\nX_mm = 1000.0\nset_by = "true"\n'
+    + '[tools.7]\nname = "MILL 8"\nZ_mm = 70.0\ngauge_to_tip_mm = [0.0, 0.0, -70.0]\n'
+    + "[tools.2]\nZ_mm = 20.0\ngauge_to_tip_mm = [0.0, 0.0, -20.0]\n"
+)
+
+
+@pytest.fixture(scope="module")
+def setup(tmp_path_factory: pytest.TempPathFactory) -> Setup:
+    return load_setup(machine(tmp_path_factory.mktemp("m"), tables=TABLES, controller="sinumerik"))
+
+
+def program(text: str, setup: Setup) -> Program:
+    return read(text.encode(), setup, SINUMERIK)
+
+
+def end(text: str, setup: Setup) -> list[float]:
+    return [round(v, 9) for v in program(text, setup).toolpath.end_mm[-1].tolist()]
+
+
+ZERO = "G0 X0 Y0 Z0\n"
+#: A program, and where it ends.
+ENDS: dict[str, tuple[float, float, float]] = {
+    # words with `=`, and functions around numbers
+    "X=5 Y = -3.5 Z0": (5, -3.5, 0),
+    ZERO + "G91 X1\nX=IC(2) Y3": (3, 3, 0),
+    ZERO + "X=AC(4) Y1": (4, 1, 0),
+    # one letter takes its number directly: an axis C, and not an axis C25
+    ZERO + "X1 C25.815": (1, 0, 0),
+    # a numbered spindle ends no program, and turns nothing else
+    ZERO + "M2=3\nX1": (1, 0, 0),
+    ZERO + "X1\nM17\nX2": (1, 0, 0),
+    ZERO + "X1\nRET\nX2": (1, 0, 0),
+    # strings and comments with marks of the other kind
+    ZERO + 'MSG("X5; (Y6")\nX1 ; (X9': (1, 0, 0),
+    ZERO + "N10 X1\n:20 Y2": (1, 2, 0),
+    # inches of lengths, and of lengths and feeds
+    ZERO + "G70 X1": (25.4, 0, 0),
+    ZERO + "G700 X1\nG71 Y1": (25.4, 1, 0),
+    ZERO + "G710 X1": (1, 0, 0),
+    # settable offsets
+    ZERO + "G505 X1": (1001, 0, 0),
+    ZERO + "G500 X1": (1, 0, 0),
+    # the programmable frame: TRANS replaces all of it, ATRANS adds, unprogrammed axes stay
+    "TRANS X10 Y5\nG0 X1 Y1 Z0": (11, 6, 0),
+    ZERO + "X5\nTRANS X10\nY1": (5, 1, 0),
+    "TRANS X10\nATRANS X5 Y2\nG0 X0 Y0 Z0": (15, 2, 0),
+    "TRANS X10\nTRANS Y2\nG0 X0 Y0 Z0": (0, 2, 0),
+    "TRANS X10\nTRANS\nG0 X0 Y0 Z0": (0, 0, 0),
+    "ROT Z90\nG0 X1 Y0 Z0": (0, 1, 0),
+    "ROT RPL=90\nTRANS X3\nG0 X1 Y0 Z0": (4, 0, 0),
+    "TRANS X10\nAROT Z90\nG0 X1 Y0 Z0": (10, 1, 0),
+    "ROT Z90\nATRANS X10\nG0 X1 Y0 Z0": (0, 11, 0),
+    "TRANS X10\nROT Z90\nG0 X1 Y0 Z0": (0, 1, 0),
+    "MIRROR X0\nG0 X1 Y2 Z0": (-1, 2, 0),
+    "SCALE X2 Y2 Z2\nATRANS X1\nG0 X1 Y0 Z0": (4, 0, 0),
+    "TRANS X1\nROT\nG0 X1 Y0 Z0": (1, 0, 0),
+    # machine coordinates keep the length of the tool, D0 ends it
+    'T="MILL 8" M6\nG0 X0 Y0 Z0': (0, 0, 70),
+    'T="MILL 8" M6\nG0 X0 Y0 Z0\nSUPA Z5': (0, 0, 75),
+    'T="MILL 8" M6\nG0 X0 Y0 Z0 D0': (0, 0, 0),
+    "T2 M6\nD0\nG0 X0 Y0 Z0\nD1 Z1": (0, 0, 21),
+    "T2 M6\nG0 X0 Y0 Z0\nG153 Z1 D0": (0, 0, 1),
+    # arcs
+    ZERO + "G2 X10 Y0 CR=5": (10, 0, 0),
+    ZERO + "G2 X10 Y0 I=AC(5) J=AC(0)": (10, 0, 0),
+    # times, speeds and limits are no motion
+    ZERO + "G4 F5\nX1": (1, 0, 0),
+    ZERO + "G26 X5 S1000\nX1": (1, 0, 0),
+    ZERO + "S1=500 M1=3 H5 LIMS=2000 SPOS=90\nX1": (1, 0, 0),
+    ZERO + "CYCLE800()\nTRAFOOF\nX1": (1, 0, 0),
+    # a cycle behind every block with motion, and behind no other
+    ZERO + "Z9\nMCALL CYCLE81(7,0,2,-5)\nX1\nMCALL\nX2": (2, 0, 7),
+    ZERO + "Z9\nX1\nCYCLE82(4,0,2,,5,1)": (1, 0, 4),
+}
+
+
+@pytest.mark.parametrize("text", ENDS, ids=lambda t: t.replace("\n", " | "))
+def test_a_program_ends_where_the_manual_says(text: str, setup: Setup) -> None:
+    assert end(text, setup) == [float(v) for v in ENDS[text]]
+
+
+#: A program whose last line is refused, what is said, and the code.
+REFUSED: dict[str, tuple[str, str]] = {
+    ZERO + "X=IC(2)": ("X is a distance in G90; unroll", "OLP511"),
+    ZERO + "G91\nX=AC(2)": ("X is a position in G91; unroll", "OLP511"),
+    "R1=5": ("--flatten", "OLP511"),
+    "X=R1": ("--flatten", "OLP511"),
+    "X=2*3": ("--flatten", "OLP511"),
+    "IF R1==1 GOTOF A": ("--flatten", "OLP511"),
+    "DEF REAL A, B": ("--flatten", "OLP511"),
+    "MYSUB": ("subprogram or a statement that is not known", "OLP511"),
+    "L100 P2": ("`L100` uses", "OLP511"),
+    "TRAORI": ("rotary axes", "OLP512"),
+    'CYCLE800(0,"T",0,57,0,0,0,30,0,0)': ("rotary axes", "OLP512"),
+    "G33 Z-10 K1": ("thread", "OLP512"),
+    # no work offset, as on other controls
+    "G58 X5": ("programmable offset", "OLP512"),
+    "G59 X5": ("programmable offset", "OLP512"),
+    "G21": ("not known to the sinumerik profile", "OLP512"),
+    "G43 H1": ("not known to the sinumerik profile", "OLP512"),
+    "G291": ("ISO mode", "OLP512"),
+    "ROT X30": ("tilts the plane", "OLP512"),
+    "G110 X5": ("polar", "OLP512"),
+    "X1 RND=2": ("corner", "OLP512"),
+    "POCKET3(1,2,3)": ("inside the control", "OLP512"),
+    "X1 ?": ("is not understood", "OLP510"),
+    "X=AC(1": ("not closed", "OLP510"),
+    "X1Y": ("is not understood", "OLP510"),
+    'T="NONE"': ("name of 0 tools", "OLP521"),
+    "T2 M6\nD2": ("another edge", "OLP521"),
+    "D1": ("tool in the spindle, which is not known", "OLP532"),
+    "/TRANS X1": ("block delete", "OLP525"),
+    "T2 M6\nG0 X0 Y0 Z0\nG18 X1": ("outside of G17", "OLP518"),
+    ZERO + "G91 X1\nG505 X1": ("behind a change of offsets", "OLP518"),
+    "MCALL CYCLE81(7,0,2)": ("DP or DPR", "OLP531"),
+    "MCALL CYCLE81(7,0,2,-5,6)": ("depth twice", "OLP531"),
+    "MCALL CYCLE86(7,0,2,-5,,1,3,1,1,1,45)": ("wall of the hole", "OLP544"),
+    "MCALL POCKET3(7)": ("inside the control", "OLP512"),
+    "MCALL CYCLE81(7,0,2,R5)": ("--flatten", "OLP511"),
+    "NaN": ("not known", "OLP511"),
+}
+
+
+@pytest.mark.parametrize("text", REFUSED, ids=lambda t: t.replace("\n", " | "))
+def test_what_is_not_read_is_refused_with_its_line_and_a_way(text: str, setup: Setup) -> None:
+    message, code = REFUSED[text]
+    with pytest.raises(ProgramError) as caught:
+        program(text, setup)
+    assert message in str(caught.value)
+    assert (caught.value.code, caught.value.line) == (code, text.count("\n") + 1)
+
+
+def test_all_refusals_of_a_text_are_told_together(setup: Setup) -> None:
+    with pytest.raises(ProgramError) as caught:
+        program("TRAORI\nX1\nR1=2\nM30\nR3=4", setup)
+    assert [e.line for e in (caught.value, *caught.value.others)] == [1, 3]
+
+
+def test_a_hole_goes_down_behind_the_motion_of_its_block(setup: Setup) -> None:
+    """To RFP + SDIS as a rapid, to the bottom at the feed, and to RTP."""
+    path = program(ZERO + "Z9\nMCALL CYCLE85(7,1,2,-5)\nX1\nF200\nY1\nMCALL", setup).toolpath
+    rows = [(k, *p) for k, p in zip(path.kind[2:].tolist(), path.end_mm[2:].tolist(), strict=True)]
+    hole = [(Kind.RAPID, 3), (Kind.LINE, -5), (Kind.LINE, 3), (Kind.RAPID, 7)]
+    first = [(Kind.RAPID, 1, 0, 9), *((k, 1, 0, z) for k, z in hole)]
+    assert rows == [*first, (Kind.RAPID, 1, 1, 7), *((k, 1, 1, z) for k, z in hole)]
+    # no block may come behind a motion that calls a cycle, and its strokes have no words
+    flags = path.flag[2:].tolist()
+    assert flags == [Flag.WHOLE, *[Flag.PASS] * 4] * 2
+
+
+def test_turns_beyond_the_first_part_of_an_arc(setup: Setup) -> None:
+    path = program(ZERO + "G2 X10 Y0 I5 J0 TURN=2 Z-3", setup).toolpath
+    assert path.arcs.sweep_rad.tolist() == pytest.approx([-5 * np.pi])
+
+
+def test_feeds_in_metric_units_beside_lengths_in_inches(setup: Setup) -> None:
+    feeds = [programmed(program(f"{g} G0 X0 Y0 Z0\nG1 F120 X1", setup))[-1] for g in ("G70", "G700", "G71")]
+    assert feeds == pytest.approx([2.0, 2.0 * 25.4, 2.0])
+
+
+@pytest.mark.parametrize(
+    ("file", "text", "name"),
+    [
+        ("a.mpf", b"G0 X1", "sinumerik"), ("A.SPF", b"", "sinumerik"),
+        ("a.nc", b"%_N_A_MPF\nG0 X1", "sinumerik"),
+        ("a.nc", b"N10 MCALL CYCLE81(1,2,3)", "sinumerik"), ("a.nc", b"G0 X1", "haas"),
+    ],
+)  # fmt: skip
+def test_texts_are_known_by_their_ending_and_their_signs(file: str, text: bytes, name: str) -> None:
+    assert dialect_of(None, DIALECTS["haas"], text, file).name == name
+
+
+def test_plain_lines_stay_byte_for_byte(setup: Setup) -> None:
+    """Their translation is themselves, of the same length."""
+    text = b"N10 G1 X1.5 Y-.5 F100 ; CYCLE81(\nG17 G90 M3 S100\n/1 N5 g0z5\r\nT1\n"
+    assert translate(text).text is text
+    other = text + b"X=1 CR=5 (\n" + b'MSG("a;b") ; X=5\n'
+    assert len(translate(other).text) == len(other)
+
+
+def test_numbers_in_brackets_are_edited_inside_of_them(tmp_path: Path) -> None:
+    """Words that are inserted come behind the bracket; centres of later parts are written as positions."""
+    path = machine(tmp_path, "[squareness]\nC0Y_urad = 2000.0\nB0Z_urad = 1000.0\n", tables=TRUE_ZERO,
+                   controller="sinumerik")  # fmt: skip
+    text = (
+        b"G71 G90 G54 F600\nG0 X0 Y0 Z0\nG1 X=AC(10) Y=AC(20)\nZ5\nG2 X60 Y20 I=AC(35) J=AC(20) TURN=1\nM30\n"
+    )
+    written = olp.correct(text, load_setup(path)).data
+    assert re.search(rb"G1 X=AC\(\d+\.\d+\) Y=AC\(\d+\.?\d*\)\n", written)
+    tails = [line for line in written.splitlines() if line.startswith(b"X") and b"I" in line]
+    assert tails and all(re.fullmatch(rb"X\S+ Y\S+( Z\S+)? I=AC\(\S+\) J=AC\(\S+\)", line) for line in tails)
+    assert not re.search(rb"\bP\d", written)
+
+
+def test_no_block_comes_between_a_motion_and_its_hole(tmp_path: Path) -> None:
+    """Each hole of the corrected text is made once, also where play has to be taken up."""
+    path = machine(tmp_path, "[squareness]\nC0Y_urad = 900.0\n[backlash]\nX_um = 20.0\nY_um = 20.0\n",
+                   tables=TRUE_ZERO, controller="sinumerik")  # fmt: skip
+    setup = load_setup(path)
+    body = "".join(
+        f"{g} X{x} Y{y}\n" for g, x, y in [("G0", 0, 0), ("G1", 90, 7), ("G0", 20, 80), ("G1", 5, 5)]
+    )
+    head = "G71 G90 G54 F600\nG0 X0 Y0 Z9\nG1 Z8\nMCALL CYCLE81(9,0,2,-5)\n"
+    text = f"{head}{body}MCALL\nG1 X1 Y1\nM30\n".encode()
+    written = olp.correct(text, setup).data
+    assert written != text
+    counts = [int((read(t, setup, SINUMERIK).toolpath.flag == Flag.PASS).sum()) for t in (text, written)]
+    assert counts == [12, 12]
