@@ -85,7 +85,9 @@ SUBJECTS = (
         ("howto/batch",),
     ),
     Subject(
-        r"\bsinumerik\b|\bsiemens\b", "sinumerik table control", ("howto/sinumerik", "reference/control-tables")
+        r"\bsinumerik\b|\bsiemens\b",
+        "sinumerik table control",
+        ("howto/sinumerik", "reference/control-tables"),
     ),
     Subject(r"\bmach ?[34]\b|\bmarlin\b|\buccnc\b", "control dialect", ("howto/machine",)),
     Subject(
