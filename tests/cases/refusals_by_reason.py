@@ -1,0 +1,108 @@
+"""Every real program of the corpus in RS-274 and APT, read as a user does after following the remedies.
+
+    python tests/cases/refusals_by_reason.py CORPUS        # prints the table
+
+Tools and offsets are given, zero where nothing is known of them. The axes have a start, contours are taken as
+tool paths, and what is parametric is unrolled.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+from judge import machines
+from judge.machines import Recipe
+
+import olp
+from olp.core.errors import OlpError, ProgramError
+
+#: The control that each folder of the corpus was written for.
+FOLDERS = {
+    "gcode_cncjs": "grbl",
+    "gcode_fanuc": "fanuc",
+    "gcode_fanuc_haas_nist": "haas",
+    "apt_cldata": "apt",
+}
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a program: `code` and `line` of its refusal, empty and 0 where it was read."""
+
+    folder: str
+    name: str
+    code: str = ""
+    line: int = 0
+    why: str = ""
+
+    @property
+    def family(self) -> str:
+        return "APT" if self.folder == "apt_cldata" else "RS-274"
+
+
+def machine(folder: Path, control: str) -> tuple[Path, Path]:
+    """A machine without errors, and the job that says where the axes start."""
+    names = [*(f"G{n}" for n in range(54, 60)), *(f"CSYS{n}" for n in range(1, 10)), "MCS"]
+    offsets = {name: {"set_by": "true"} for name in names}
+    recipe = Recipe(
+        controller=control,
+        travel=((-5000.0, 5000.0),) * 3,
+        tools={n: {"Z_mm": 0.0, "radius_mm": 3.0} for n in range(1, 100)},
+        work_offsets=offsets,
+    )
+    path = machines.zero_machine(folder, recipe)
+    # `X0Y50` is beside `X50.Y0` in these
+    text = path.read_text().replace('decimal_point = "increment"', 'decimal_point = "calculator"')
+    path.write_text(text)
+    job = folder / "job.toml"
+    start = "start_mm = { X = 0.0, Y = 0.0, Z = 100.0 }"
+    job.write_text(f'schema = "olp-job-1"\nmachine = "machine.toml"\n{start}\n')
+    return path, job
+
+
+def outcomes(corpus: Path) -> list[Outcome]:
+    """What becomes of every program."""
+    every = []
+    for folder, control in FOLDERS.items():
+        with tempfile.TemporaryDirectory() as place:
+            where, job = machine(Path(place), control)
+            for path in sorted(p for p in (corpus / folder).iterdir() if p.is_file()):
+                every.append(_outcome(path, where, job))
+    return every
+
+
+def _outcome(path: Path, where: Path, job: Path) -> Outcome:
+    error: OlpError | None = None
+    for flatten in (False, True):
+        try:
+            olp.correct(path, where, job, contour=True, flatten=flatten)
+            return Outcome(path.parent.name, path.name)
+        except OlpError as refusal:
+            error = error or refusal
+            if isinstance(refusal, ProgramError) and not (refusal.hinted and not flatten):
+                error = refusal
+                break
+    code = getattr(error, "code", "") or type(error).__name__
+    line = getattr(error, "line", None) or 0
+    return Outcome(path.parent.name, path.name, code, line, getattr(error, "message", str(error)))
+
+
+def table(every: list[Outcome]) -> str:
+    """Counts by reason, and each refusal."""
+    lines = []
+    for family in ("RS-274", "APT"):
+        mine = [each for each in every if each.family == family]
+        read = sum(not each.code for each in mine)
+        lines.append(f"{family}: {read} of {len(mine)} programs are read")
+        for code, count in Counter(each.code for each in mine if each.code).most_common():
+            lines.append(f"  {code}: {count}")
+            lines += [f"    {e.folder}/{e.name}:{e.line}: {e.why}" for e in mine if e.code == code]
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    print(table(outcomes(Path(sys.argv[1]))))
