@@ -417,7 +417,7 @@ def test_what_becomes_of_each_g_code(control: str) -> None:
         own.setdefault(act, set()).add(code)
     assert own == {act: listed_codes(text) for act, text in wanted.items()}
     # the table for people says the same
-    rows = profile.rows()
+    rows = [row for row in profile.rows() if re.fullmatch(r"G[\d.]+", row.statement)]
     assert [round(10 * float(row.statement[1:])) for row in rows] == sorted(profile.codes)
     support = {Act.UNCHANGED: Support.UNCHANGED, Act.REFUSE: Support.REFUSED, Act.MOTION: Support.CORRECTED}
     for row, (_, act) in zip(rows, sorted(profile.codes.items()), strict=True):
@@ -429,6 +429,26 @@ def test_what_becomes_of_each_g_code(control: str) -> None:
         HAAS: "G92.1 is not a code of this control",
     }
     assert profile.refusals.get(921) == of_g92_1.get(control)
+
+
+@pytest.mark.parametrize("profile", PROFILES, ids=lambda profile: profile.name)
+def test_the_table_says_of_every_m_code_what_the_reader_does(
+    profile: Profile, setups: dict[str, Setup]
+) -> None:
+    """Each alone behind a known position: unchanged, refused, or behind it nothing is known."""
+    rows = {row.statement: row for row in profile.rows()}
+    still = {f"M{m / 10:g}" for m in profile.still_m}
+    head = "G0 X1. Y2. Z3.\n"
+    for m in (0, 3, 9, 30, 47, 73, 98, 99, 104, 206, 600, 999):
+        name = f"M{m}"
+        got = outcome(f"{head}{name}\nG0 Y5.\n", setups[profile.name], profile)
+        if name in rows and rows[name].support is Support.REFUSED:
+            assert isinstance(got, str) and f"2: {name} " in got
+        elif name in still:
+            assert isinstance(got, tuple) and got[0] == 1.0
+        else:
+            assert rows["any other M"].support is Support.READ
+            assert isinstance(got, tuple) and np.isnan(got[0])
 
 
 def test_a_code_without_a_reason_is_not_of_the_control() -> None:

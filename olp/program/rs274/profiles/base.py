@@ -7,7 +7,7 @@ profile. G codes are keyed by ten times their number (G5.1 is 51).
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence, Set
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from dataclasses import field
 from enum import IntEnum, auto
 from typing import Any, TypeVar
@@ -23,6 +23,7 @@ from olp.program.rs274.codes import CYCLES, PROBES
 from olp.program.rs274.commands import Commands
 from olp.program.rs274.cycle_rules import CycleRules
 from olp.program.rs274.flatten.language import Language
+from olp.program.rs274.profiles.words import word_rows
 from olp.program.text.line_ends import split
 
 #: One number, or an array of them.
@@ -187,14 +188,20 @@ class Profile(Dialect):
         return b"G1 " + _OF_ARC.sub(b" ", line)
 
     def rows(self) -> Sequence[Row]:
-        return [
-            Row(
-                f"G{code / 10:g}",
-                _SUPPORT.get(act, Support.READ),
-                self.refusals.get(code, "is not a code of this control") if act is Act.REFUSE else "",
-            )
-            for code, act in sorted(self.codes.items())
-        ]
+        return [*self._g_rows(), *word_rows(self)]
+
+    def _g_rows(self) -> Iterator[Row]:
+        """What becomes of each G code, those that do here what another code does elsewhere among them."""
+        there = {code: (act, "") for code, act in self.codes.items() if self.aliases.get(code) != NO_CODE}
+        for alias, code in self.aliases.items():
+            if code != NO_CODE:
+                there[alias] = (self.codes[code], f"as G{code / 10:g} of other controls")
+        for code, (act, why) in sorted(there.items()):
+            if act is Act.REFUSE:
+                why = self.refusals.get(code, "is not a code of this control")
+            elif act is Act.CONTROL:
+                why = "the control moves by itself: no position is known behind it"
+            yield Row(f"G{code / 10:g}", _SUPPORT.get(act, Support.READ), why)
 
 
 def increment(machine: Machine, letter: str, unit_mm: float) -> float:

@@ -1,0 +1,81 @@
+"""The support matrix of a control beside its G codes: M codes, other words, and lines that are no words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from olp.program.dialect import Row, Support
+
+if TYPE_CHECKING:
+    from olp.program.rs274.profiles.base import Profile
+
+_LOST = "may move the axes: no position is known behind it, until X, Y and Z have been commanded"
+_UNROLL = "unroll the program with --flatten"
+
+
+def word_rows(profile: Profile) -> Iterator[Row]:
+    """What becomes of M codes, words and lines."""
+    yield from _m_codes(profile)
+    yield Row("X Y Z", Support.CORRECTED, "the ends of moves")
+    yield Row("I J K R", Support.CORRECTED, "centres and radii of arcs; levels of canned cycles")
+    yield Row("A B C U V W", Support.UNCHANGED, "other axes: a block that moves one is never split")
+    yield Row("F S N", Support.UNCHANGED, "F changes with retime --write-feed alone")
+    if profile.commands is None:
+        yield Row("T", Support.READ, "the tool for M6; give [tools.N] in the machine or job file")
+        yield Row("H D", Support.READ, "lengths and radii from [tools.N] of the machine or job file")
+    yield Row("(comment) or ;comment" if profile.text.brackets else ";comment", Support.UNCHANGED)
+    yield from _lines_of_commands(profile) if profile.commands is not None else _lines(profile)
+    yield Row("any other line", Support.REFUSED, "is not understood and may move the machine")
+
+
+def _m_codes(profile: Profile) -> Iterator[Row]:
+    still = sorted(profile.still_m - {60})
+    yield Row(_ranges([m for m in still if m % 10 == 0]), Support.UNCHANGED, "move no axis")
+    for m in (m for m in still if m % 10):
+        yield Row(f"M{m / 10:g}", Support.UNCHANGED, "moves no axis")
+    if profile.commands is None:
+        yield Row("M6", Support.READ, f"changes to the tool of T; {_LOST}")
+    if profile.m61_sets_tool:
+        yield Row("M61 Q", Support.READ, "Q is the tool in the spindle")
+    for m, why in sorted(profile.m_refusals.items()):
+        remedy = f"; {_UNROLL}" if profile.unroller is not None else ""
+        yield Row(f"M{m / 10:g}", Support.REFUSED, f"{why}{remedy}")
+    yield Row("any other M", Support.READ, _LOST)
+
+
+def _ranges(codes: list[int]) -> str:
+    """M codes, ten times their numbers, in few words: `M0-M5, M7`."""
+    parts: list[list[int]] = []
+    for m in (code // 10 for code in codes):
+        if parts and m == parts[-1][-1] + 1:
+            parts[-1].append(m)
+        else:
+            parts.append([m])
+    return ", ".join(f"M{p[0]}" if len(p) == 1 else f"M{p[0]}-M{p[-1]}" for p in parts)
+
+
+def _lines(profile: Profile) -> Iterator[Row]:
+    yield Row("/ (block delete)", Support.READ, "counts as carried out; proved with it and without")
+    yield Row("% and O with a number", Support.UNCHANGED)
+    if profile.inert is not None:
+        yield Row("names of programs, labels alone in a line", Support.UNCHANGED)
+    if profile.unroller is not None:
+        yield Row("# [ ] IF WHILE GOTO O-words", Support.REFUSED, f"parameters and flow; {_UNROLL}")
+    else:
+        yield Row("variables, CALL, IF, GOTO", Support.REFUSED, "are not read; post the program without them")
+
+
+def _lines_of_commands(profile: Profile) -> Iterator[Row]:
+    commands = profile.commands
+    assert commands is not None
+    yield Row(commands.extruder, Support.CORRECTED, "shared out where its move is split, else unchanged")
+    yield Row("T", Support.READ, f"changes the nozzle, whose offset is that of [tools.N]; {_LOST}")
+    yield Row("a checksum (*71)", Support.REFUSED, "no corrected line would keep it; save without checksums")
+    if commands.named:
+        for name in sorted(commands.still):
+            yield Row(name.decode(), Support.UNCHANGED, "moves no axis")
+        for name, why in sorted(commands.refused.items()):
+            yield Row(name.decode(), Support.REFUSED, why)
+        why = "a macro of the machine: behind it no position is known, modes hold; or list it in still_macros"
+        yield Row("any other name", Support.READ, why)
