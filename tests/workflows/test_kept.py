@@ -109,7 +109,7 @@ def test_a_loop_whose_passes_need_other_numbers_is_refused_and_shown(machine: Pa
 
 def test_a_subprogram_in_a_file_of_its_own_is_written_out(machine: Path, tmp_path: Path) -> None:
     (tmp_path / "p.ngc").write_text(HEAD + "o<side> call\nM2\n")
-    (tmp_path / "side.ngc").write_text("o<side> sub\nG1 X50\no<side> endsub\n")
+    (tmp_path / "side.ngc").write_text("o<side> sub\nN5 G1 X50\no<side> endsub\n")
     result = olp.correct(tmp_path / "p.ngc", machine)
     assert b"call" not in result.data
     assert b"\nG1 X49.9" in result.data
@@ -126,6 +126,13 @@ def test_one_that_has_parameters_is_not(machine: Path, tmp_path: Path) -> None:
     with pytest.raises(ProgramError, match="in a file of its own") as caught:
         olp.correct(tmp_path / "p.ngc", machine)
     assert (caught.value.line, Path(caught.value.file or "").name) == (2, "side.ngc")
+
+
+def test_a_call_that_runs_in_a_loop_is_not_written_out(machine: Path) -> None:
+    text = HEAD + "G91\no1 repeat [2]\nM98 P100\no1 endrepeat\nM2\nO100\nG1 X150 Y40\nM99\n"
+    with pytest.raises(ProgramError, match="cannot be corrected in its place") as caught:
+        olp.correct(text.encode(), machine)
+    assert caught.value.line == 10
 
 
 def test_what_cannot_be_proved_is_not_kept(machine: Path) -> None:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from olp.program.rs274.block_text import BlockText
 from olp.program.rs274.cycle_rules import CycleRules
-from olp.program.rs274.entry import read_blocks, unroll_blocks
+from olp.program.rs274.entry import keep_blocks, read_blocks, unroll_blocks
 from olp.program.rs274.flatten.language import NGC
 from olp.program.rs274.profiles.base import (
     ARC_DISTANCE,
@@ -33,6 +33,7 @@ DIALECT = Profile(
     reader=read_blocks,
     folder_endings=("tap", "nc"),
     unroller=unroll_blocks,
+    keeper=keep_blocks,
     codes=g_codes(
         unchanged={150, 500, 690},
         extra={**ARC_DISTANCE, **dict.fromkeys((921, 922, 923), Act.EVENT)},
