@@ -14,13 +14,17 @@ from olp.files.config import load_setup
 
 #: Files that feed right behind G28.
 PRIMED = frozenset({"prusaslicer-mk3s.gcode"})
+#: Controls whose programs name their dialect in the job.
+NAMED = frozenset({"siemens-iso"})
 #: Where the axes are at the start of programs that store that place.
 START = "start_mm = { X = 0.0, Y = 0.0, Z = 50.0 }\n"
 
 
-def with_start(machine: Path) -> Setup:
+def with_start(machine: Path, control: str) -> Setup:
     job = machine.with_name("job.toml")
-    job.write_text(f'schema = "olp-job-1"\nmachine = "machine.toml"\n{START}')
+    # the ending of these files is that of another language of the control
+    named = f'dialect = "{control}"\n' if control in NAMED else ""
+    job.write_text(f'schema = "olp-job-1"\nmachine = "machine.toml"\n{named}{START}')
     return load_setup(machine, job)
 
 
@@ -29,8 +33,10 @@ def setups(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, bool], S
     made = {}
     for control in set(CONTROLS.values()):
         folder = tmp_path_factory.mktemp(control)
-        made[control, False] = with_start(machines.random_machine(folder / "bent", 5, recipe(control)))
-        made[control, True] = with_start(machines.zero_machine(folder / "zero", recipe(control)))
+        made[control, False] = with_start(
+            machines.random_machine(folder / "bent", 5, recipe(control)), control
+        )
+        made[control, True] = with_start(machines.zero_machine(folder / "zero", recipe(control)), control)
     return made
 
 

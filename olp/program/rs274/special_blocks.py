@@ -191,7 +191,6 @@ class SpecialBlocks:
                     state.position[i] = NAN
             self.control_move(line, deleted=deleted)
 
-
     def drill(self, line: int, drilling: Drilling, *, deleted: bool) -> None:
         """The strokes of a cycle that is called at the present position."""
         state = self._state
