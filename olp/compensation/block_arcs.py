@@ -160,7 +160,7 @@ def _radius_words(writer: Writer, arcs: ArcRows, slot: npt.NDArray[np.int32]) ->
         own = writer.style.decimals(own_slot, first, unit)
         decimals = np.maximum(own, _digits(writer, "centre", first, unit))
         size = np.asarray(unit * writer.sizes(part.move, part.plane), float)
-        mantissa, good = _radii(writer, part, decimals, size)
+        mantissa, good = radii(writer, part, decimals, size)
         new = np.flatnonzero(good & (mantissa != words.mantissa[own_slot] * INT10[decimals - own]))
         at = own_slot[new]
         yield Edits.of(words.number[at], words.end[at], mantissa[new], decimals[new])
@@ -175,7 +175,7 @@ def _radius_words(writer: Writer, arcs: ArcRows, slot: npt.NDArray[np.int32]) ->
         yield Edits.of(end, end, value, digits, _prefixes(writer, at, b"IJK"[second : second + 1]), 1)
 
 
-def _radii(writer: Writer, arcs: ArcRows, decimals: Index, unit: Array) -> tuple[Index, Mask]:
+def radii(writer: Writer, arcs: ArcRows, decimals: Index, unit: Array) -> tuple[Index, Mask]:
     """(m,) mantissa of the R words of arcs, and whether R as written puts the centre where it should be."""
     scale = INT10[decimals]
     to_start = np.hypot(*arms(arcs.start, arcs.centre, arcs.plane))

@@ -30,7 +30,10 @@ _BYPASS = np.uint8(Flag.CYCLE | Flag.CONTROL)
 
 
 class BlockWriter(Writer):
-    """A writer of blocks, whose words may be omitted: per axis, what is written and what is inserted."""
+    """A writer of blocks, whose words may be omitted: per axis, what is written and what is inserted.
+    `letters` are those of inserted words."""
+
+    letters = (b"X", b"Y", b"Z")
 
     def add(self, band: Band, plan: Plan, tell: Progress = silent) -> None:
         self._hole_words = HoleWords(band.program.holes)
@@ -178,8 +181,12 @@ class BlockWriter(Writer):
             edits += self._insertions(rows, head[incomplete], slot[incomplete], missing[incomplete])
         tails = np.flatnonzero(~rows.head & ((rows.flag & _BYPASS) == 0))
         if tails.size:
-            edits += block_edits(self, rows, tails)
+            edits += self._blocks(rows, tails)
         return edits
+
+    def _blocks(self, rows: Rows, tails: Index) -> list[Edits]:
+        """New blocks for the later parts of moves."""
+        return block_edits(self, rows, tails)
 
     def _insertions(self, rows: Rows, row: Index, slot: npt.NDArray[np.int32], missing: Mask) -> list[Edits]:
         """Words of axes that a block omits, behind its last coordinate word, in that word's style."""
@@ -197,7 +204,7 @@ class BlockWriter(Writer):
         for axis in range(3):
             for which in distinct(style[missing[:, axis]]).tolist():
                 chosen = np.flatnonzero(missing[:, axis] & (style == which))
-                prefix = self.prefixes(self.style.separator(which, b"XYZ"[axis : axis + 1]))
+                prefix = self.prefixes(self.style.separator(which, self.letters[axis]))
                 count = len(chosen)
                 order = np.full(count, axis + 1, np.int32)
                 edits.append(

@@ -141,7 +141,7 @@ class Writer(ABC):
 
     def _start_of(self, move: int) -> int:
         """Where the text of a move begins, at the start of a line."""
-        return int(self.program.line_start[self.path.line[move] - 1])
+        return self.program.text_of(move)
 
     def turn_of(self, rows: Rows) -> Index:
         """(r,) which matrix of `turns` leads from the words of rows to the axes; 0: none."""

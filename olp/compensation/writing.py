@@ -54,6 +54,10 @@ def _writer(program: Program, plan: Plan) -> type[Writer]:
     """What a program needs: a writer of blocks of words, of whole statements, or of verbatim numbers."""
     if program.statements is None:
         return BlockWriter
+    if program.in_blocks:
+        from olp.compensation.conversational_writer import ConversationalWriter
+
+        return ConversationalWriter
     if program.statements.decimal and not _plain(program, plan):
         from olp.compensation.verbatim_writer import VerbatimWriter
 

@@ -243,3 +243,9 @@ class Setup:
 
     def tool(self, number: int) -> Tool | None:
         return self.job.tools.get(number) or self.machine.tools.get(number)
+
+    def tool_named(self, name: str) -> int | None:
+        """The number of the tool of this name, in any case of letters; None where there is none."""
+        tools = {**self.machine.tools, **self.job.tools}.values()
+        wanted = name.casefold()
+        return next((t.number for t in tools if t.name and t.name.casefold() == wanted), None)

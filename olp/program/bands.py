@@ -15,7 +15,7 @@ import numpy.typing as npt
 from olp.core.arrays import Array, Mask
 from olp.core.toolpath import Flag, Kind, Toolpath
 from olp.core.values import dataclass
-from olp.program.program import ArcSlots, Program
+from olp.program.program import Program
 
 #: Moves of a band, at least.
 SIZE = 1 << 15
@@ -52,8 +52,8 @@ def bands(program: Program) -> Iterator[Band]:
     omitted, is one band."""
     path = program.toolpath
     count = max(len(path), 1)
-    for first, last in spans(path, SIZE) if program.statements is None else [(0, len(path))]:
-        end = len(program.data) if last == len(path) else int(program.line_start[path.line[last] - 1])
+    for first, last in spans(path, SIZE) if program.in_blocks else [(0, len(path))]:
+        end = len(program.data) if last == len(path) else program.text_of(last)
         ahead = path.end_mm[last : last + AHEAD]
         yield Band(_part(program, first, last), first, end, first / count, last / count, ahead)
 
@@ -107,7 +107,7 @@ def _part(program: Program, first: int, last: int) -> Program:
     if first == 0 and last == len(path):
         return program
     arcs = path.arcs.within(first, last)
-    arc_slots = ArcSlots(slots.word[arcs], slots.absolute[arcs]) if len(slots.word) else slots
+    arc_slots = slots.part(arcs) if len(slots.word) else slots
     # a position that is stored before the first move belongs to the first band
     captures = tuple(
         replace(capture, moves=capture.moves - first)

@@ -82,22 +82,6 @@ FOREIGN = (
     ),
     Foreign("JSON", re.compile(rb'\A\s*[{\[]\s*["{\[]'), _PROGRAM),
     Foreign(
-        "Heidenhain conversational",
-        _line(rb"(?:\d+[ \t]+)?(?:BEGIN|END)[ \t]+PGM\b"),
-        _OTHER_POST,
-        language=True,
-    ),
-    Foreign(
-        "Heidenhain conversational",
-        _line(
-            rb"\d+[ \t]+(?:L|CC?|CR|CT|LBL|TOOL[ \t]+CALL|CYCL[ \t]+DEF)"
-            rb"[ \t]+[^\r\n]*(?:R[0LR]|F[ \t]*MAX|[XYZ][+-]\d|DEF)"
-        ),
-        _OTHER_POST,
-        2,
-        language=True,
-    ),
-    Foreign(
         "KUKA KRL",
         _line(
             rb"&(?:ACCESS|REL|PARAM)\b|DEF(?:DAT|FCT)?[ \t]+[A-Z_]\w*[ \t]*\([^:\r\n]*\r?$|"

@@ -260,6 +260,12 @@ class FrameTable:
         x, y, z = (o + v for o, v in zip(frame.offset_mm, lift, strict=True))
         return self._known(replace(frame, offset_mm=(x, y, z), lift_mm=lift))
 
+    def moved(self, number: int, shift: Vector) -> int:
+        """A frame whose origin is moved by this much, as by a datum shift."""
+        frame = self.frames[number]
+        x, y, z = (o + v for o, v in zip(frame.offset_mm, shift, strict=True))
+        return self._known(replace(frame, offset_mm=(x, y, z)))
+
     def _known(self, frame: Frame) -> int:
         known = self._index.get(frame)
         if known is None:

@@ -42,12 +42,39 @@ class Words:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Poles:
+    """Per arc of the toolpath, where blocks of their own state the centres. `form` is that of the block of
+    the arc, and `begin` the byte where the block of its centre begins, -1 where its words cannot be edited.
+    `taken` is `AS_BEFORE` where the centre is that of the arc before, and `STATED` where a block states it.
+    Else that block takes the present position over, and it is the number of moves before it."""
+
+    form: npt.NDArray[np.uint8]
+    begin: Small
+    taken: Small
+
+    def part(self, arcs: slice) -> Poles:
+        """Those of some arcs."""
+        return Poles(self.form[arcs], self.begin[arcs], self.taken[arcs])
+
+
+#: what `Poles.taken` says beside numbers of moves
+AS_BEFORE, STATED = -1, -2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class ArcSlots:
     """Per arc of the toolpath: (m, 5) indices of its I, J, K, R, P words or -1, and whether I, J, K are
-    absolute."""
+    absolute. Where blocks of their own state the centres, the words of these for I, J, K, and `poles`."""
 
     word: Small
     absolute: npt.NDArray[np.bool_]
+    poles: Poles | None = None
+
+    def part(self, arcs: slice) -> ArcSlots:
+        """Those of some arcs."""
+        return ArcSlots(
+            self.word[arcs], self.absolute[arcs], None if self.poles is None else self.poles.part(arcs)
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -172,6 +199,21 @@ class Program:
     shared: SharedWords = field(default_factory=SharedWords.none)
     closings: Index = field(default_factory=lambda: np.zeros(0, np.int64))
     by_original: bool = False
+
+    @property
+    def in_blocks(self) -> bool:
+        """Whether it is written in blocks, whose words may be omitted."""
+        return self.statements is None or self.arc_slots.poles is not None
+
+    def text_of(self, move: int) -> int:
+        """Where the text of a move begins: its line, or that of the centre of its arc."""
+        line = int(self.line_start[self.toolpath.line[move] - 1])
+        poles, arcs = self.arc_slots.poles, self.toolpath.arcs
+        if poles is None:
+            return line
+        arc = int(np.searchsorted(arcs.move, move))
+        own = arc < len(arcs.move) and arcs.move[arc] == move and poles.begin[arc] >= 0
+        return min(line, int(poles.begin[arc])) if own else line
 
     @property
     def lines(self) -> int:

@@ -33,6 +33,7 @@ _MODULES = (
     "olp.program.rs274.profiles.marlin",
     "olp.program.rs274.profiles.klipper",
     "olp.program.sinumerik.dialect",
+    "olp.program.heidenhain.dialect",
     "olp.program.apt.dialect",
     "olp.program.dmis.dialect",
     "olp.program.pointlist.dialect",

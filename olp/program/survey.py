@@ -336,6 +336,9 @@ def _defined(setup: Setup, table: str, name: str) -> Setup:
     job = setup.job
     if table == "tools":
         job = replace(job, tools={**job.tools, int(name): Tool(int(name))})
+    elif table == "tool_names":
+        number = max((*job.tools, *setup.machine.tools), default=0) + 1
+        job = replace(job, tools={**job.tools, number: Tool(number, name=name)})
     elif table == "styli":
         job = replace(job, styli={**job.styli, name: ZERO})
     else:

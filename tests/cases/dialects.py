@@ -117,6 +117,28 @@ CASES = {
             b"$$-> CSYS / 1,0,0,0, $\n0,1,0,0, $\n0,0,1,0\nGOTO/1,2,3\n", b"GOTO/99999999999999999999,1,2",
         ),
     ),
+    "heidenhain": Case(
+        "heidenhain", "heidenhain", "LXYZICRDFMAQBEGNPTOS+-=.~;:/\" 0123456789\r\n\t",
+        ["0 BEGIN PGM T MM", "1 L F600"], ["9 END PGM T MM"],
+        lambda p, d: f"L {_words(p, d)}", lambda p, d: f"L I{_words(p, d).replace(' ', ' I')}",
+        lambda text: f"; {text}",
+        re.compile(rb"(?m)^L X(" + NUMBER + rb") Y(" + NUMBER + rb") Z(" + NUMBER + rb")"),
+        ("heidenhain/*",),
+        (
+            b"BEGIN PGM A MM\nL X+1 Y+2 Z+3 R0 FMAX M3\nX5\nEND PGM A MM\n",
+            b"L X1 Y2 Z3 F100\nCC X0 Y2\nC X-1 Y2 DR+\nC DR-\nCC\nL X5\nCP IPA+360 IZ-1 DR+\n",
+            b"L X1 Y2 Z3 F MAX\nCR X2 Y3 R1 DR-\nCC IX1 Y0\nCP PA90 DR-\n"
+            b"CYCL DEF 200 ~\n Q200=1 ~\n Q201=-2~\n"
+            b" Q203=0\nL X4 M99\nCYCL CALL\n",
+            b"TOOL CALL 1 Z S100 DL+0.1\nL X1 Y2 Z3 M91\nM140 MB MAX\nL X1 Y2 Z3\nCYCL DEF 7.0\n"
+            b"CYCL DEF 7.1 IX5\n",
+            b"CYCL DEF 1.0\nCYCL DEF 1.1 DIST2\nCYCL DEF 1.2 DEPTH-3\nL X1 Y1 Z1 M99\n", b"/81 M30\nL X1\n",
+            b"\xef\xbb\xbfL X1 Y2 Z3\r\nL IX1\r\n",
+            b"CALL LBL 1\nLBL 1\nM127\nLBL 0\nL X1 Y1 Z1 FQ2",
+            b"L X+Q5", b"C X1 DR+", b"L X99999999999999999999", b"~", b"L X1 ~\nY5", b"CC",
+            b"TOOL CALL \"A\" Z", b"L  X5 ;~\nY",
+        ),
+    ),
     "dmis": Case(
         "dmis", "dmis", "GOTPMEASCRDUNI/,.+-$ 0123456789\r\n\t=()'F",
         ["DMISMN/'TEST',05.2", "UNITS/MM,ANGDEC", "MODE/PROG,MAN"], ["ENDFIL"],

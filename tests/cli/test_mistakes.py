@@ -129,8 +129,8 @@ CASES = [
          changed("calibration.toml", "mill-30-16", "mill-2")),
     Case("calibration of zeros", ("OLP440", "every value is zero", "Put measured values"), fresh,
          args=("correct", "part.nc", "-m", "new/machine.toml")),
-    Case("program of Heidenhain", ("part.nc:1: this is Heidenhain", "post-process the part"),
-         written("part.nc", b"BEGIN PGM 1 MM\nL X+10 Y+5 R0 FMAX\nEND PGM 1 MM\n")),
+    Case("program of Mazak", ("part.nc:1: this is Mazatrol", "post-process the part"),
+         written("part.nc", b"MAZATROL MATRIX\nX+10\n")),
     Case("calibration that has expired", ("OLP401", "valid until 2026-10-01", "Measure the machine again"),
          expired, args=(*CORRECT, "--date", "2026-11-21")),
 ]  # fmt: skip

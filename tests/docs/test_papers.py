@@ -196,7 +196,7 @@ QUESTIONS = {
     "how certain is the correction": "uncertainty",
     "my program has loops and subprograms": "--flatten",
     "which exit codes are there": "exit code 0",
-    "can it read Heidenhain programs": "olp help background/limits",
+    "can it read Heidenhain programs": "olp help howto/heidenhain",
     "how do I stop a bad program before it runs": "olp check",
     "how do I correct CMM results": "olp results",
     "out of square": "one number to a corrected program",

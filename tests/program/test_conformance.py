@@ -244,8 +244,8 @@ def test_l6_distances_do_not_drift(bent: dict[str, Path], name: str) -> None:
     statements = [case.distance(s, 3) for s in steps.tolist()]
     text = "\n".join([*case.head, case.point((0.0, 0.0, 0.0), 3), *statements, *case.tail]) + "\n"
     written = olp.correct(text.encode(), pinned(bent[name], case)).data
-    three = rb"X?([^,\s]+)[,\s]Y?([^,\s]+)[,\s]Z?([^,\s)]+)"
-    begins = rb"(?m)^(?:G91 )?(?:G1 |GODLTA/|GOTO/|DRAW |LMOVE TRANS\(|MOVES TRANS\()"
+    three = rb"I?X?([^,\s]+)[,\s]I?Y?([^,\s]+)[,\s]I?Z?([^,\s)]+)"
+    begins = rb"(?m)^(?:G91 )?(?:G1 |L |GODLTA/|GOTO/|DRAW |LMOVE TRANS\(|MOVES TRANS\()"
     rows = re.findall(begins + three, written)
     own = np.cumsum([[float(n) for n in row] for row in rows], axis=0)
     nominal = np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])

@@ -11,9 +11,6 @@ from olp.program.foreign import FOREIGN, LOOKED_AT, recognised
 
 MILL = PROGRAMS / "haas-mill"
 TEXTS = {
-    "Heidenhain": (b"0 BEGIN PGM TEST MM\n"
-                   b"1 TOOL CALL 1 Z S1000\n2 L X+10 Y+5 R0 FMAX\n3 END PGM TEST MM\n", 1),
-    "Heidenhain conversational": (b"1 TOOL CALL 1 Z S1000\n2 L X+10 Y+5 R0 FMAX\n3 L Z-5 F500\n", 2),
     "KUKA KRL": (b"&ACCESS RVP\nDEF part()\nPTP {X 10, Y 0, Z 5}\nLIN P2\nEND\n", 1),
     "ABB RAPID": (b"MODULE M\n PROC main()\n MoveL p1, v100, fine, tool0;\n ENDPROC\nENDMODULE\n", 1),
     "FANUC TP": (b"/PROG TEST\n/ATTR\n/MN\n 1:J P[1] 100% FINE ;\n/POS\n/END\n", 1),
@@ -92,12 +89,6 @@ SIGNS = {
         b"name\t=\t7",
     ),
     ("JSON", PROGRAM, "OLP501"): (b'{"a": 1}', b' [\n{"a": 1}]', b'["a"]', b"[[1]]", b"{{", b"{["),
-    ("Heidenhain conversational", OTHER_POST, "OLP501"): (
-        b"BEGIN PGM A MM", b"12 end  pgm", b"0\tBegin\tPGM", b"1 L X+1 R0\n2 L X+2 RL\n",
-        b"1 L X+1 RR\n2 L Y-2 F MAX\n",
-        b"1 CC Z-0 \n2 C X+1 FMAX\n", b"1 CR X+1 R0\n2 CT Y-5 RL\n", b"1 LBL 1 DEF\n2 TOOL  CALL 1 DEF\n",
-        b"1 CYCL DEF 200 DEF\n2 L Z-1 FMAX\n",
-    ),
     ("KUKA KRL", ROBOT, "OLP501"): (
         b"&ACCESS RV\n", b" &rel 1\n", b"&PARAM A\n", b"DEF part()\n", b"DEFDAT part (x)\n",
         b"DEFFCT a_1 (b)\r\n",
@@ -141,7 +132,7 @@ SIGNS = {
     ),
 }  # fmt: skip
 LANGUAGES = (
-    "Heidenhain conversational", "KUKA KRL", "ABB RAPID", "FANUC TP", "Stäubli VAL 3", "Mazatrol",
+    "KUKA KRL", "ABB RAPID", "FANUC TP", "Stäubli VAL 3", "Mazatrol",
     "UR script",
     "Yaskawa INFORM (JBI)", "Sinumerik (Siemens)", "Okuma OSP", "HPGL",
 )  # fmt: skip
@@ -188,7 +179,7 @@ def test_texts_that_are_nearly_another(text: bytes) -> None:
 
 
 def test_the_line_is_that_of_what_was_recognised() -> None:
-    for text, line in ((b"\n\n  <html>", 3), (b"G0\nX1\n \t&REL 1\n", 3), (b"1 L X+1 R0\n2 L X+2 R0\n", 1),
+    for text, line in ((b"\n\n  <html>", 3), (b"G0\nX1\n \t&REL 1\n", 3),
                        (b"a\nb\nbegin\n movej(a)", 3), (b"SP1;\nPU1,1;", 2)):  # fmt: skip
         error = recognised(text, languages=True)
         assert error is not None and error.line == line, text

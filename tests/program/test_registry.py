@@ -133,6 +133,8 @@ def test_more_signs_decide_and_as_many_do_not() -> None:
     [
         *((f"part.{e}", "apt") for e in ("apt", "aptsource", "ncl", "cls", "cl", "clt", "cldata", "clf")),
         *((f"part.{e}", "dmis") for e in ("dmi", "dms", "dmis")), ("part.csv", "list"), ("PART.TSV", "list"),
+
+        ("part.h", "heidenhain"), ("PART.H", "heidenhain"),
         ("part.ncl.12", "apt"), ("part.12", "haas"), ("part.ncl.x", "haas"), ("", "haas"), ("part", "haas"),
     ],
 )  # fmt: skip
@@ -150,7 +152,7 @@ def test_what_each_dialect_of_statements_says_of_itself() -> None:
     apt, dmis = DIALECTS["apt"], DIALECTS["dmis"]
     assert list(DIALECTS) == [
         "linuxcnc", "fanuc", "grbl", "haas", "mach3", "mach4", "mazak", "okuma", "siemens-iso", "marlin",
-        "klipper", "sinumerik", "apt", "dmis", "list",
+        "klipper", "sinumerik", "heidenhain", "apt", "dmis", "list",
     ]  # fmt: skip
     assert apt.title == "APT and cutter-location data (ISO 4343, ISO 3592)"
     assert dmis.title == "DMIS part programs of coordinate measuring machines (ISO 22093)"

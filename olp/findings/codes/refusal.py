@@ -22,7 +22,7 @@ RULES = (
         why="The text is in a language of another control, or it is another kind of file.",
         remedy="Give the program for the control of the machine file, or what the CAM system writes "
         "before its post-processor (APT CLDATA).",
-        example="`BEGIN PGM 12 MM` at the start: Heidenhain conversational.",
+        example="`MAZATROL` at the start: a program of Mazatrol.",
     ),
     _rule(
         "OLP502",

@@ -1,0 +1,220 @@
+"""Motion blocks of Heidenhain conversational text in columns.
+
+The lexer of word-address text reads them, once what is no word is blanked in a copy of the text: block
+numbers, the names of blocks, comments, and whole statements. What says more than a letter becomes a letter
+that the language does not use, at its own place: `IX` the letter D, `DR+` the word K+1, `FMAX` the word F-1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from enum import IntEnum
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.core.arrays import Array, Index, Mask
+from olp.core.progress import Progress
+from olp.core.values import dataclass
+from olp.program.rs274.block_text import BlockText
+from olp.program.rs274.lexer import CHUNK, WordChunk, lex
+
+Bytes = npt.NDArray[np.uint8]
+
+_TEXT = BlockText()
+_POW10 = 10.0 ** np.arange(19)
+
+
+class Block(IntEnum):
+    """What a line is."""
+
+    EMPTY = 0  #: no statement: blank, or a comment
+    LINE = 1  #: L, and blocks of bare words
+    ARC = 2  #: C
+    RADIUS = 3  #: CR
+    POLAR = 4  #: CP
+    POLE = 5  #: CC
+    STATEMENT = 6  #: any other
+    MORE = 7  #: goes on with the statement of the line before
+
+
+#: the letters that stand for words of several: incremental X, Y, Z, and an incremental rotary axis
+_STEP_OF = {ord("X"): ord("D"), ord("Y"): ord("E"), ord("Z"): ord("H")}
+_OTHER_STEP = ord("T")
+#: the letters of what is no axis
+TURN, STEP_ANGLE, ANGLE, PARAMETER_FEED = b"KPOQ"
+_LONGEST_NAME = 2
+
+
+def _table(letters: bytes) -> Mask:
+    table = np.zeros(256, bool)
+    table[list(letters)] = True
+    return table
+
+
+_LETTER = _table(b"ABCDEFGHIJKLMNOPQRSTUVWXYZ")
+_NUMERIC = _table(b"+-.0123456789")
+_VALUE = _table(b"+-.0123456789Q")
+_AXIS = _table(b"XYZABCUVW")
+_SKIPPED = _table(bytes(range(33)) + b"0123456789")
+_UPPER = np.arange(256, dtype=np.uint8)
+_UPPER[97:123] -= 32
+_STEPS = np.full(256, _OTHER_STEP, np.uint8)
+for _axis, _letter in _STEP_OF.items():
+    _STEPS[_axis] = _letter
+_PLAIN = np.arange(256, dtype=np.uint8)
+for _axis, _letter in _STEP_OF.items():
+    _PLAIN[_letter] = _axis
+_IS_STEP = _table(bytes(_STEP_OF.values()))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Blocks:
+    """Lines of a text: the words of their motion blocks, (lines,) `block`, what each is, and (words,) `value`
+    and whether it is a `step` (IX, IY, IZ). Its letters are X, Y, Z for these too."""
+
+    words: WordChunk
+    letter: Bytes
+    block: npt.NDArray[np.uint8]
+    value: Array
+    step: Mask
+
+    def number(self, line: int) -> int:
+        """The line of the text, from 1."""
+        return self.words.first_line + line + 1
+
+
+def blocks(data: bytes, tell: Progress, size: int = CHUNK) -> Iterator[Blocks]:
+    """A whole text, chunk by chunk, each ending at the end of a statement."""
+    text = np.frombuffer(data, np.uint8)
+    start = line = 0
+    while start < len(data):
+        cut = len(data)
+        if start + size < len(data):
+            cut = _statement_end(data, start + size)
+        chunk = read(text[start:cut], start, line)
+        line += len(chunk.block)
+        start = cut
+        yield chunk
+        tell("read", cut / len(data))
+
+
+def _statement_end(data: bytes, position: int) -> int:
+    """Behind the line of a byte, and behind those in which its statement goes on."""
+    begin = position
+    while True:
+        newline = data.find(b"\n", begin)
+        if newline < 0:
+            return len(data)
+        line = data.rfind(b"\n", 0, newline) + 1
+        if not data[line:newline].rstrip().endswith(b"~"):
+            return newline + 1
+        begin = newline + 1
+
+
+def read(text: Bytes, offset: int = 0, first_line: int = 0) -> Blocks:
+    """Whole lines; `offset` and `first_line` are where they begin in the text."""
+    work = np.append(_UPPER[text], np.full(4, 10, np.uint8))
+    newline = np.flatnonzero(text == 10)
+    ends = newline if newline.size and newline[-1] == len(text) - 1 else np.append(newline, len(text))
+    starts = np.concatenate(([0], ends[:-1] + 1))
+    goes_on = _continued(work, starts, ends)
+    _blank(work, *_comments(work, starts, ends))
+    block, content = _named(work, starts, ends)
+    block[1:][goes_on[:-1]] = Block.MORE
+    motion = (block >= Block.LINE) & (block <= Block.POLE)
+    _blank(work, starts, np.where(motion, content, ends))
+    body = work[: len(text)]
+    _spelled(body, work)
+    strange = np.flatnonzero((body == ord("(")) | (body == ord(")")))
+    words = lex(body, _TEXT, offset, first_line, strange=strange)
+    letter = _PLAIN[words.letter]
+    step = _IS_STEP[words.letter]
+    if step.any():
+        # a word of a step begins with its I
+        words.start[step] -= 1
+    value = np.asarray(words.mantissa / _POW10[words.decimals], float)
+    return Blocks(words, letter, block, value, step)
+
+
+def _continued(work: Bytes, starts: Index, ends: Index) -> Mask:
+    """(lines,) whether the statement of a line goes on in the next one: the line ends with `~`."""
+    if not (work == ord("~")).any():
+        return np.zeros(len(starts), bool)
+    solid = np.flatnonzero(work > 32)
+    last = solid[np.maximum(np.searchsorted(solid, ends) - 1, 0)]
+    return np.asarray((last >= starts) & (last < ends) & (work[last] == ord("~")))
+
+
+def _comments(work: Bytes, starts: Index, ends: Index) -> tuple[Index, Index]:
+    """Where comments begin and end."""
+    marks = np.flatnonzero(work == ord(";"))
+    line = np.searchsorted(ends, marks)
+    first = np.ones(len(marks), bool)
+    first[1:] = line[1:] != line[:-1]
+    return marks[first], ends[line[first]]
+
+
+def _blank(work: Bytes, begin: Index, end: Index) -> None:
+    """Blank stretches that do not overlap."""
+    if not begin.size:
+        return
+    edge = np.zeros(len(work) + 1, np.int8)
+    np.add.at(edge, begin, 1)
+    np.add.at(edge, end, -1)
+    work[np.cumsum(edge[:-1], dtype=np.int8) > 0] = 32
+
+
+def _named(work: Bytes, starts: Index, ends: Index) -> tuple[npt.NDArray[np.uint8], Index]:
+    """(lines,) what each line is, and where its words begin, behind its number and its name."""
+    solid = np.flatnonzero(~_SKIPPED[work])
+    solid = np.append(solid, len(work) - 1)
+    head = solid[np.searchsorted(solid, starts)]
+    some = head < ends
+    head = np.minimum(head, len(work) - 4)
+    a, b, c = (work[head + k] for k in range(3))
+    block = np.where(some, np.uint8(Block.STATEMENT), np.uint8(Block.EMPTY))
+    block[some & (a == ord("*"))] = Block.EMPTY
+    bare = (_AXIS[a] & _VALUE[b]) | ((a == ord("I")) & _AXIS[b]) | ((a == ord("M")) & _NUMERIC[b])
+    bare |= (a == ord("F")) & (_VALUE[b] | (b <= 32) | ((b == ord("M")) & (c == ord("A"))))
+    length = np.zeros(len(starts), np.int64)
+    for name, kind in ((b"L", Block.LINE), (b"C", Block.ARC)):
+        mine = some & (a == name[0]) & (b <= 32)
+        block[mine], length[mine] = kind, 1
+    for second, kind in ((b"R", Block.RADIUS), (b"P", Block.POLAR), (b"C", Block.POLE)):
+        mine = some & (a == ord("C")) & (b == second[0]) & ~_LETTER[c]
+        block[mine], length[mine] = kind, _LONGEST_NAME
+    block[some & bare] = Block.LINE
+    return block, head + length
+
+
+def _spelled(body: Bytes, work: Bytes) -> None:
+    """Put one letter for each word of several."""
+    following, third = work[1 : len(body) + 1], work[2 : len(body) + 2]
+    at = np.flatnonzero((body == ord("D")) & (following == ord("R")) & np.isin(third, (43, 45)))
+    if at.size:
+        body[at], body[at + 1], body[at + 2] = TURN, body[at + 2], ord("1")
+    polar = np.flatnonzero((body == ord("P")) & (following == ord("A")))
+    for i in polar.tolist():
+        stepped = i > 0 and body[i - 1] == ord("I")
+        body[i - stepped : i + 2] = 32
+        body[i + 1] = STEP_ANGLE if stepped else ANGLE
+    step = np.flatnonzero((body == ord("I")) & _AXIS[following])
+    if step.size:
+        body[step + 1] = _STEPS[body[step + 1]]
+        body[step] = 32
+    rapid = np.flatnonzero((body == ord("M")) & (following == ord("A")) & (third == ord("X")))
+    if rapid.size:
+        joined = body[np.maximum(rapid - 1, 0)] == ord("F")
+        spaced = (
+            ~joined & (body[np.maximum(rapid - 1, 0)] <= 32) & (body[np.maximum(rapid - 2, 0)] == ord("F"))
+        )
+        near, far = rapid[joined], rapid[spaced]
+        body[near], body[near + 1], body[near + 2] = ord("-"), ord("1"), 32
+        body[far - 2], body[far - 1] = 32, ord("F")
+        body[far], body[far + 1], body[far + 2] = ord("-"), ord("1"), 32
+    by_parameter = np.flatnonzero((body == ord("F")) & (following == PARAMETER_FEED))
+    body[by_parameter] = 32
+
+
+__all__ = ["ANGLE", "PARAMETER_FEED", "STEP_ANGLE", "TURN", "Block", "Blocks", "blocks", "read"]

@@ -1,0 +1,49 @@
+"""The dialect of Heidenhain conversational programs: how its texts are detected, read and marked."""
+
+from __future__ import annotations
+
+import re
+
+from olp.core.machine import Setup
+from olp.core.values import dataclass
+from olp.program.dialect import Dialect, Options, StatementDialect
+from olp.program.heidenhain.table import TABLE
+from olp.program.program import Program
+
+_ARC = re.compile(rb"(?i)^([ \t]*\d*[ \t]*)C[RP]?\b|DR[ \t]*[-+]")
+
+
+def _read(data: bytes, setup: Setup, dialect: Dialect, options: Options, *, words: bool) -> Program:
+    from olp.program.heidenhain.reader import read
+
+    return read(data, setup, dialect, options, words=words)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Conversational(StatementDialect):
+    """Statements that go on in the next line where a line ends with `~`."""
+
+    def continues(self, line: bytes) -> bool:
+        return line.rstrip().endswith(b"~")
+
+    def straightened(self, line: bytes) -> bytes:
+        return _ARC.sub(lambda m: b"" if m[1] is None else m[1] + b"L", line)
+
+
+DIALECT = Conversational(
+    name="heidenhain",
+    table=TABLE,
+    title="Heidenhain conversational",
+    path_mode="not stated",
+    reader=_read,
+    endings=("h", "hnc"),
+    folder_endings=("h", "hnc"),
+    sign=re.compile(
+        rb"(?im)^[ \t]*(?:\d+[ \t]+)?(?:(?:BEGIN|END)[ \t]+PGM\b|TOOL[ \t]+CALL\b|CYCLE?[ \t]+DEF\b|"
+        rb"BLK[ \t]+FORM\b|CALL[ \t]+LBL\b|LBL[ \t]+[\d\"]|"
+        rb"L[ \t]+[^\r\n;]*(?:\bR[0LR]\b|\bF[ \t]*MAX\b)|CC?[ \t]+[XYZ][^\r\n;]*[-+\d.])"
+    ),
+    inch_decimals=4,
+    comment=(b"; ", b""),
+    first=(b"BEGIN PGM|0 BEGIN PGM|0  BEGIN PGM",),
+)

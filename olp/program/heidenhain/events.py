@@ -1,0 +1,300 @@
+"""Statements of a Heidenhain program that are no motion blocks: what each changes, and which are refused."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+
+from olp.core.errors import ProgramError
+from olp.core.units import MM_PER_INCH
+from olp.program.dialect import Options, Support
+from olp.program.heidenhain.chunk import harmless
+from olp.program.heidenhain.collector import Collected
+from olp.program.heidenhain.cycles import AT_ONCE, Cycle
+from olp.program.heidenhain.modes import Modes
+from olp.program.heidenhain.statements import CycleText, Statement, cycle_of, of_lines
+from olp.program.heidenhain.table import TABLE, UNROLL
+
+_NUMBER = rb"[-+]?(?:\d+\.?\d*|\.\d+)"
+_ASSIGN = re.compile(rb"(?:FN[ \t]*0[ \t]*:[ \t]*)?(Q[LR]?\d+)[ \t]*=[ \t]*(.*)", re.I | re.S)
+_VALUE = re.compile(rb"(" + _NUMBER + rb"|[-+]?Q[LR]?\d+)\Z", re.I)
+_SET_BY = re.compile(rb"FN[ \t]*18[ \t]*:.*?\b(Q[LR]?\d+)[ \t]*=", re.I | re.S)
+_FN = re.compile(rb"FN[ \t]*(\d+)\b", re.I)
+_LABEL = re.compile(rb'LBL[ \t]*("[^"]*"|\d+)', re.I)
+_SECTION_END = re.compile(rb"(?im)^[ \t]*\d*[ \t]*LBL[ \t]*0(?![\d.])")
+_CALL = re.compile(rb'CALL[ \t]+LBL[ \t]*("[^"]*"|\d+)[ \t]*(REP.*)?\Z', re.I | re.S)
+_ANGLE = re.compile(rb"\bSP([ABC])[ \t]*(" + _NUMBER + rb")", re.I)
+_TURN = re.compile(rb"\b(?:ROT|[ABC])[ \t]*(" + _NUMBER + rb")", re.I)
+_SCALE = re.compile(rb"\b(?:SCL|[XYZ])[ \t]*(" + _NUMBER + rb")", re.I)
+_FUNCTIONS = re.compile(rb"(?:L[ \t]+)?(?:M\d+[ \t]*)+")
+_PRESET = 339
+_NAMES = sorted(TABLE, key=len, reverse=True)
+_NAME = re.compile(
+    rb"(?:" + b"|".join(re.escape(n).replace(rb"\ ", rb"[ \t]*") for n in _NAMES) + rb")(?![A-Z])"
+)
+_MOTION = re.compile(rb"(?:L|CC?|CR|CP)[ \t]|[XYZABC][-+.\d]|I[XYZ]|[MF][ \t]*[-+.\dM]")
+_SHIFT, _MIRROR, _DWELL, _ROTATION, _SCALING, _TILT, _SCALINGS, _SELECT = 7, 8, 9, 10, 11, 19, 26, 247
+
+
+class Events:
+    """Takes statements over into `modes`, in their order; `ended` is the line of the end of the program."""
+
+    def __init__(self, modes: Modes, collector: Collected, options: Options) -> None:
+        self.modes, self.collector, self.options = modes, collector, options
+        self.cycle: Cycle | None = None
+        self.definition: Cycle | None = None
+        self.ended = 0
+        #: the statements of sections that are called, by label
+        self.sections: dict[bytes, list[Statement] | None] = {}
+        self._depth = 0
+        self._handlers: Sequence[tuple[bytes, Callable[[Statement], None]]] = (
+            (b"BEGIN PGM", self._begin), (b"END PGM", self._end), (b"TOOL CALL", self._tool),
+            (b"CYCL CALL", self._cycle_call), (b"CALL LBL", self._call), (b"LBL", self._label),
+            (b"PLANE", self._plane), (b"STOP", self._stop), (b"FN 18", self._unknown), (b"Q", self._assign),
+            (b"FN 0", self._assign),
+        )  # fmt: skip
+        self._by_name = dict(self._handlers)
+
+    def take(self, statement: Statement) -> None:
+        """Take over one statement. Raises ProgramError where it is refused."""
+        upper = statement.upper
+        if not upper:
+            return
+        if statement.deleted:
+            self._deleted(statement, upper)
+            return
+        cycle = cycle_of(statement)
+        if cycle is not None:
+            self._define(cycle, statement)
+            return
+        name = name_of(upper)
+        handler = self._by_name.get(name)
+        if handler is not None:
+            handler(statement)
+            return
+        self._by_table(name, statement)
+
+    def _by_table(self, name: bytes, statement: Statement) -> None:
+        support, why = TABLE.get(
+            name,
+            (Support.REFUSED, "is not a statement that olp knows in this dialect, and may move the machine"),
+        )
+        if support is Support.REFUSED:
+            shown = name.decode("latin-1") if name in TABLE else statement.shown
+            code = "OLP511" if UNROLL in why else "OLP512"
+            if name in (b"RL", b"RR"):
+                code = "OLP513"
+            hint = UNROLL if why.endswith(UNROLL) else ""
+            message = f"{shown} {why.removesuffix(UNROLL).rstrip(': ')}"
+            raise ProgramError(message, line=statement.line, code=code, hint=hint)
+
+    def _deleted(self, statement: Statement, upper: bytes) -> None:
+        if self.options.block_delete:
+            return
+        if re.fullmatch(rb"M0*(?:2|30)", upper):
+            self.ended = statement.line
+            return
+        raise ProgramError(
+            f"{statement.shown} is under block delete, and later blocks may depend on it; remove the `/`",
+            line=statement.line,
+            code="OLP525",
+        )
+
+    # -- the program ---------------------------------------------------------------------------------
+
+    def _begin(self, statement: Statement) -> None:
+        words = statement.upper.split()
+        modes = self.modes
+        if modes.unit_stated:
+            return
+        modes.unit_stated = True
+        modes.unit_mm = MM_PER_INCH if words[-1] == b"INCH" else 1.0
+        if words[-1] not in (b"INCH", b"MM"):
+            modes.unit_stated = False
+
+    def _end(self, statement: Statement) -> None:
+        self.ended = statement.line
+
+    def _stop(self, statement: Statement) -> None:
+        self.collector.pauses.append((self.collector.moves, 0.0))
+
+    def _tool(self, statement: Statement) -> None:
+        if self.modes.tool_call(statement) and self.modes.setup.machine.tool_change_moves:
+            self.control_move(statement.line, (0, 1, 2))
+
+    def control_move(self, line: int, axes: Sequence[int]) -> None:
+        """A move that the control makes by itself: the position of some axes is not known after it."""
+        raise NotImplementedError
+
+    # -- parameters ----------------------------------------------------------------------------------
+
+    def _assign(self, statement: Statement) -> None:
+        match = _ASSIGN.match(statement.text)
+        if match is None:
+            raise ProgramError(
+                f"{statement.shown} is no assignment that is read; expected Q and a number",
+                line=statement.line,
+                code="OLP510",
+            )
+        name, known = match[1].upper().decode(), self.modes.parameters
+        value = _VALUE.match(match[2].strip())
+        known.pop(name, None)
+        if value is None:
+            return
+        text = value[1].upper()
+        other = text.lstrip(b"+-").decode()
+        if not other.startswith("Q"):
+            known[name] = float(text)
+        elif other in known:
+            known[name] = -known[other] if text.startswith(b"-") else known[other]
+
+    def _unknown(self, statement: Statement) -> None:
+        match = _SET_BY.match(statement.text)
+        if match is not None:
+            self.modes.parameters.pop(match[1].upper().decode(), None)
+
+    # -- labels --------------------------------------------------------------------------------------
+
+    def _label(self, statement: Statement) -> None:
+        if _LABEL.match(statement.text) is None:
+            raise ProgramError("LBL has no number and no name", line=statement.line, code="OLP510")
+
+    def _call(self, statement: Statement) -> None:
+        """CALL LBL of a section that only sets modes: these are set here too."""
+        match = _CALL.match(statement.text)
+        section = None if match is None or match[2] else self._section(match[1].upper())
+        if section is None or self._depth or any(_moves(s) for s in section):
+            self._by_table(b"CALL LBL", statement)
+            return
+        self._depth = 1
+        for inner in section:
+            if not _FUNCTIONS.fullmatch(inner.upper):
+                self.take(inner)
+        self._depth = 0
+
+    def _section(self, label: bytes) -> list[Statement] | None:
+        if label not in self.sections:
+            self.sections[label] = section_of(self.collector.data, label)
+        return self.sections[label]
+
+    # -- cycles --------------------------------------------------------------------------------------
+
+    def _define(self, text: CycleText, statement: Statement) -> None:
+        number, part = text.number, text.part
+        current = self.definition
+        if part and current is not None and current.number == number:
+            current.parts[part] = text.rest
+        else:
+            current = self.definition = Cycle.of(text, statement)
+            if number not in AT_ONCE:
+                self.cycle = current
+        if number in AT_ONCE:
+            self._at_once(text, statement)
+        elif not part and number > 299:
+            raise ProgramError(
+                f"CYCL DEF {number} is a cycle of the builder of the machine, and may move it",
+                line=statement.line,
+                code="OLP512",
+            )
+
+    def _at_once(self, text: CycleText, statement: Statement) -> None:
+        number, part, rest = text.number, text.part, text.rest
+        name = b"CYCL DEF %d" % number
+        if number == _SHIFT and part:
+            self.modes.datum_shift(statement)
+        elif number == _SELECT:
+            value = text.values.get(_PRESET)
+            if value is None:
+                raise ProgramError("CYCL DEF 247 has no Q339; give it", line=statement.line, code="OLP516")
+            self.modes.select_preset(round(self.modes.value(value, statement)), statement.line)
+        elif number == _DWELL and part:
+            seconds = re.search(rb"(" + _NUMBER + rb")\s*\Z", rest)
+            self.collector.pauses.append((self.collector.moves, float(seconds[1]) if seconds else 0.0))
+        elif part and (
+            (number == _MIRROR and rest)
+            or (
+                number in (_ROTATION, _TILT)
+                and (any(float(v) for v in _TURN.findall(rest)) or b"Q" in rest.upper())
+            )
+            or (
+                number in (_SCALING, _SCALINGS)
+                and (any(float(v) != 1.0 for v in _SCALE.findall(rest)) or b"Q" in rest.upper())
+            )
+        ):
+            self._by_table(name if name in TABLE else b"CYCL DEF 11", statement)
+
+    def _cycle_call(self, statement: Statement) -> None:
+        rest = statement.upper[len(b"CYCL CALL") :].strip()
+        if rest.startswith((b"POS", b"PAT")):
+            raise ProgramError(
+                f"CYCL CALL {rest[:3].decode()} states where the holes are",
+                line=statement.line,
+                code="OLP511",
+                hint=UNROLL,
+            )
+        self.hole(statement.line)
+
+    def hole(self, line: int) -> None:
+        """The strokes of the cycle in force, where the tool is."""
+        raise NotImplementedError
+
+    # -- tilted planes -------------------------------------------------------------------------------
+
+    def _plane(self, statement: Statement) -> None:
+        upper = statement.upper
+        if re.match(rb"PLANE[ \t]+RESET\b", upper) and b"MOVE" not in upper and b"TURN" not in upper:
+            return
+        angles = _ANGLE.findall(upper)
+        still = b"MOVE" not in upper and b"TURN" not in upper
+        spatial = re.match(rb"PLANE[ \t]+SPATIAL\b", upper) and len(angles) == 3
+        if spatial and still and not any(float(a) for _, a in angles):
+            return
+        self._by_table(b"PLANE", statement)
+
+
+def name_of(upper: bytes) -> bytes:
+    """The name of a statement as the table has it, else its first word."""
+    match = _NAME.match(upper)
+    if upper.startswith(b"Q") and b"=" in upper:
+        return b"Q"
+    fn = _FN.match(upper)
+    if fn is not None:
+        return b"FN " + str(int(fn[1])).encode()
+    if match is not None:
+        return (
+            b" ".join(re.sub(rb"([A-Z])(\d)", rb"\1 \2", match[0]).split())
+            if match[0] not in TABLE
+            else match[0]
+        )
+    return upper.split()[0]
+
+
+def _moves(statement: Statement) -> bool:
+    """Whether a statement of a section may move the machine."""
+    upper = statement.upper
+    if upper.startswith((b"CYCL CALL", b"TOOL CALL", b"CALL")):
+        return True
+    if _FUNCTIONS.fullmatch(upper):
+        return not all(harmless(int(m)) for m in re.findall(rb"M(\d+)", upper))
+    return cycle_of(statement) is None and _MOTION.match(upper) is not None
+
+
+def section_of(data: bytes, label: bytes) -> list[Statement] | None:
+    """The statements of a label up to its LBL 0, in the order of the text; None unless it is there once."""
+    begins = list(re.finditer(rb"(?im)^[ \t]*\d*[ \t]*LBL[ \t]*" + re.escape(label) + rb"(?![\d.])", data))
+    if len(begins) != 1:
+        return None
+    begin = begins[0].end()
+    end = _SECTION_END.search(data, begin)
+    lines = data[begin : len(data) if end is None else end.start()].split(b"\n")[1:]
+    return statements_of(lines, data.count(b"\n", 0, begin) + 2)
+
+
+def statements_of(lines: Sequence[bytes], first: int) -> list[Statement]:
+    """The statements of lines, the first of which has this number."""
+    statements, begin = [], 0
+    for k, line in enumerate(lines):
+        if not line.rstrip().endswith(b"~"):
+            statements.append(of_lines(list(lines[begin : k + 1]), first + begin))
+            begin = k + 1
+    return [s for s in statements if s.text]

@@ -1,0 +1,179 @@
+"""The running state of the reading of a Heidenhain program: presets, shifts, tools, parameters, frames."""
+
+from __future__ import annotations
+
+import re
+
+from olp.core.errors import ProgramError
+from olp.core.machine import ZERO, Setup, Vector
+from olp.core.units import MM_PER_INCH
+from olp.program.frames import FrameTable, tool_vector_of
+from olp.program.heidenhain.statements import Statement
+from olp.program.heidenhain.table import UNROLL
+
+NAN = float("nan")
+_TOOL = re.compile(
+    rb'TOOL[ \t]+CALL(?:[ \t]*(?:"(?P<name>[^"]*)"|(?P<number>\d+)\b(?![.\d]))?)(?P<rest>.*)', re.I | re.S
+)
+_DELTA = re.compile(rb"\bDL[ \t]*=?[ \t]*([-+]?(?:\d+\.?\d*|\.\d+|Q\w*))", re.I)
+_AXIS = re.compile(rb"^[ \t]*([XYZUVW])\b", re.I)
+#: a Heidenhain control counts feeds of inch programs in tenths of an inch
+_INCH_FEED = MM_PER_INCH / 10.0
+
+
+class Modes:
+    """State from statement to statement; positions are axis positions in mm, NaN where not known."""
+
+    def __init__(self, setup: Setup) -> None:
+        self.setup = setup
+        self.table = FrameTable(setup)
+        self.position = [NAN if p is None else p for p in setup.job.start_mm]
+        self.unit_mm = 1.0
+        self.unit_stated = False
+        self.tool = setup.machine.default_tool
+        self.length_active = setup.machine.length_active and self.tool is not None
+        self.delta_mm = 0.0
+        self.shift: Vector = ZERO
+        self.preset = setup.machine.default_work_offset
+        self.selected: tuple[int, str] | None = None
+        #: parameters with known numbers
+        self.parameters: dict[str, float] = {}
+        self.remarks: dict[str, tuple[int, str]] = {}
+        self._frame: int | None = None
+
+    @property
+    def feed_scale(self) -> float:
+        """mm/s of a feed of 1."""
+        return (1.0 if self.unit_mm == 1.0 else _INCH_FEED) / 60.0
+
+    def changed(self) -> None:
+        """Forget the present frame: what it is made from has changed."""
+        self._frame = None
+
+    def frame(self, line: int) -> int:
+        """Index of the present frame. Raises ProgramError for a tool or a work offset that is not defined."""
+        if self._frame is None:
+            work = self.table.work_offset(self.preset, line, "the program")
+            if any(work.rotation_deg):
+                raise ProgramError(
+                    f"work offset {work.name} is rotated, which is not read in this dialect; state it with "
+                    "A_deg = B_deg = C_deg = 0",
+                    line=line,
+                    code="OLP523",
+                )
+            length = vector = ZERO
+            if self.tool:
+                x, y, z = tool_vector_of(self.setup, self.tool, line)
+                vector = (x, y, z - self.delta_mm)
+                tool = self.setup.tool(self.tool)
+                assert tool is not None
+                if self.length_active:
+                    length = (*tool.length_mm[:2], tool.length_mm[2] + self.delta_mm)
+            index = self.table.index(
+                work, line, unit_mm=self.unit_mm, tool=self.tool, length=length, tool_vector=vector,
+                length_active=self.length_active and bool(self.tool),
+            )  # fmt: skip
+            self._frame = self.table.moved(index, self.shift) if any(self.shift) else index
+        return self._frame
+
+    def tool_call(self, statement: Statement) -> bool:
+        """Take over a TOOL CALL; returns whether the tool is changed."""
+        match = _TOOL.match(statement.text)
+        assert match is not None
+        number = self.tool
+        if match["name"] is not None:
+            number = self._named(match["name"].decode("latin-1"), statement.line)
+        elif match["number"] is not None:
+            number = int(match["number"])
+        elif re.match(rb"[ \t]*Q", match["rest"], re.I):
+            raise ProgramError(
+                "TOOL CALL takes the number of the tool from a parameter; state its number",
+                line=statement.line,
+                code="OLP511",
+            )
+        axis = _AXIS.match(match["rest"])
+        if axis is not None and axis[1].upper() != b"Z":
+            raise ProgramError(
+                f"TOOL CALL has the tool along {axis[1].decode()}, which is not read; expected Z",
+                line=statement.line,
+                code="OLP512",
+            )
+        delta = _DELTA.search(match["rest"])
+        changes = number != self.tool or not self.length_active
+        if delta is not None or match["name"] or match["number"]:
+            value = b"0" if delta is None else delta[1]
+            if value.upper().startswith((b"Q", b"+Q", b"-Q")):
+                raise ProgramError(
+                    "TOOL CALL takes DL from a parameter; state its number",
+                    line=statement.line,
+                    code="OLP511",
+                )
+            self.delta_mm = float(value) * self.unit_mm
+        moved = number != self.tool
+        self.tool, self.length_active = number, True
+        if changes or delta is not None:
+            self.changed()
+        return moved
+
+    def _named(self, name: str, line: int) -> int:
+        number = self.setup.tool_named(name)
+        if number is None:
+            raise ProgramError(
+                f'tool "{name}" is called but not defined; give name = "{name}" in a table [tools.N] of the '
+                "machine or job file",
+                line=line,
+                code="OLP521",
+                missing=("tool_names", name),
+            )
+        return number
+
+    def select_preset(self, number: int, line: int) -> None:
+        """CYCL DEF 247. A preset that is not defined by its number is that of the job, where the program has
+        no other."""
+        name = str(number)
+        if self.setup.work_offset(name) is None:
+            before = self.selected
+            if before is not None and before[1] != name:
+                self.table.work_offset(name, line, "CYCL DEF 247")
+            self.selected = (line, name)
+            self.remarks.setdefault(
+                "preset",
+                (line, f"preset {name} is taken as work offset {self.setup.machine.default_work_offset}"),
+            )
+            name = self.setup.machine.default_work_offset
+        self.preset = name
+        self.shift = ZERO
+        self.changed()
+
+    def datum_shift(self, statement: Statement) -> None:
+        """An axis of CYCL DEF 7: replaces the shift along it, or adds to it with I."""
+        if b"#" in statement.text:
+            raise ProgramError(
+                "CYCL DEF 7 takes its shift from a table of the control; state it with numbers",
+                line=statement.line,
+                code="OLP526",
+            )
+        shift = list(self.shift)
+        for letter, (adds, value) in statement.numbers().items():
+            axis = b"XYZ".find(letter)
+            if axis >= 0:
+                shift[axis] = value * self.unit_mm + (shift[axis] if adds else 0.0)
+        self.shift = (shift[0], shift[1], shift[2])
+        self.changed()
+
+    def value(self, text: bytes, statement: Statement) -> float:
+        """The number of a value as written, which may name a parameter."""
+        upper = text.upper().lstrip(b"+")
+        sign = -1.0 if upper.startswith(b"-") else 1.0
+        name = upper.lstrip(b"-").decode("latin-1")
+        if not name.startswith("Q"):
+            return float(text)
+        known = self.parameters.get(name)
+        if known is None:
+            raise ProgramError(
+                f"{statement.shown} takes {name}, whose value is not known here",
+                line=statement.line,
+                code="OLP511",
+                hint=UNROLL,
+            )
+        return sign * known

@@ -1,0 +1,215 @@
+"""Heidenhain conversational programs: random jobs under an independent reader, and their rules."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cases.conversational import program as random_program
+from cases.fast import some_fast
+from judge import heidenhain, machines
+from judge.linuxcnc import CanonMoves
+from judge.machines import Recipe
+from judge.model import JudgeModel
+from judge.path import Deviation, deviation
+
+import olp
+from olp.core.errors import ProgramError
+from olp.core.toolpath import Flag, Kind
+from olp.files.config import load_setup
+from olp.program.program import Program
+from olp.program.registry import DIALECTS, Options, read
+
+ORIGIN = np.array([250.0, 200.0, -300.0])
+LENGTHS = {1: 120.0, 2: 85.5}
+TRAVEL = ((-300.0, 900.0), (-300.0, 800.0), (-500.0, 100.0))
+RECIPE = Recipe(controller="heidenhain", increment_mm=0.0001, travel=TRAVEL)
+STILL = {"G54": np.zeros(3)}
+#: tolerance, and what rounding to 0.1 um may add
+ALLOWED_UM = 1.0 + 0.2
+JUDGED = ("feed", "arc")
+HEAD = "BEGIN PGM A MM\nTOOL CALL 1 Z S100\nL X+0 Y+0 Z+5 R0 FMAX\nF500\n"
+
+
+@pytest.fixture(scope="module")
+def bent(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return machines.random_machine(tmp_path_factory.mktemp("bent"), 7, RECIPE)
+
+
+@pytest.fixture(scope="module")
+def zero(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return machines.zero_machine(tmp_path_factory.mktemp("zero"), RECIPE)
+
+
+def canon(data: bytes) -> CanonMoves:
+    return heidenhain.read(data, ORIGIN, LENGTHS).canon()
+
+
+def judged(nominal: bytes, corrected: bytes, path: Path) -> Deviation:
+    return deviation(canon(corrected), canon(nominal), JudgeModel(path), shift_by_frame=STILL, kinds=JUDGED)
+
+
+def program(text: str, path: Path, **options: bool) -> Program:
+    return read(text.encode(), load_setup(path), DIALECTS["heidenhain"], Options(**options))
+
+
+def refused(text: str, path: Path, line: int, words: str) -> ProgramError:
+    with pytest.raises(ProgramError, match=words) as caught:
+        program(text, path)
+    assert caught.value.line == line
+    return caught.value
+
+
+def ends(text: str, path: Path) -> np.ndarray:
+    """Ends of the moves in numbers of the program, tool 1 active."""
+    return program(text, path).toolpath.end_mm - ORIGIN - [0, 0, 120.0]
+
+
+# -- whole jobs under the judge ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", some_fast(range(24), 6))
+def test_random_jobs_follow_their_path(bent: Path, zero: Path, seed: int) -> None:
+    data = random_program(seed)
+    own = program(data.decode(), bent).toolpath
+    assert own.end_mm == pytest.approx(np.array(canon(data).axis), abs=1e-6)
+    assert olp.correct(data, zero).data == data
+    result = olp.correct(data, bent)
+    errors = judged(data, result.data, bent)
+    assert errors.before.max_um > 10
+    assert errors.max_um <= ALLOWED_UM
+    assert result.report["deviation"]["path_max_um"] == pytest.approx(errors.max_um, abs=0.15)
+    assert olp.verify(data, result.data, bent).report["deviation"]["holds"]
+
+
+# -- what blocks say -----------------------------------------------------------------------------------
+
+
+def test_words_are_held_and_blocks_of_bare_words_go_on(bent: Path) -> None:
+    text = HEAD + "10 L X+10 Y-2.5\n11 Z-1\nL IX-4 R0\nY7.\nl x1 fmax\n  L\tX.5 ;X9\nEND PGM A MM\nL X+99\n"
+    moves = program(text, bent)
+    assert ends(text, bent).tolist() == pytest.approx(
+        np.array(
+            [[0, 0, 5], [10, -2.5, 5], [10, -2.5, -1], [6, -2.5, -1], [6, 7, -1], [1, 7, -1], [0.5, 7, -1]]
+        )
+    )
+    kinds = [Kind.RAPID, Kind.LINE, Kind.LINE, Kind.LINE, Kind.LINE, Kind.RAPID, Kind.LINE]
+    assert moves.toolpath.kind.tolist() == kinds
+    assert moves.toolpath.line.tolist() == [3, 5, 6, 7, 8, 9, 10]
+    assert moves.end_line == 11
+
+
+def test_fmax_holds_in_its_block_alone(bent: Path) -> None:
+    moves = program(HEAD + "L X1\nL X2 F MAX\nL X3\nL X4 F250\nL X5 FMAX\nX6\n", bent)
+    assert moves.statements is not None
+    feeds = np.array([np.inf, 500, np.inf, 500, 250, np.inf, 250]) / 60
+    assert moves.statements.feed_mm_s.tolist() == pytest.approx(feeds.tolist())
+
+
+def test_feeds_of_inch_programs_count_in_tenths(bent: Path) -> None:
+    moves = program("BEGIN PGM A INCH\nL X1 Y1 Z1 F100\n", bent)
+    assert moves.statements is not None
+    assert moves.statements.feed_mm_s[0] == pytest.approx(10 * 25.4 / 60)
+    assert moves.toolpath.end_mm[0] == pytest.approx(ORIGIN + 25.4)
+
+
+def test_feeds_may_be_parameters(bent: Path) -> None:
+    moves = program(HEAD + "FN 0: Q2=+120\nL X1 FQ2\nQ2 = 60\nX2 FQ2\nX3\nL X4 FQ9\n", bent)
+    assert moves.statements is not None
+    assert moves.statements.feed_mm_s[1:4].tolist() == pytest.approx([2, 1, 1])
+    assert np.isnan(moves.statements.feed_mm_s[4])
+
+
+def test_the_pole_may_be_the_position_or_a_distance_from_it(bent: Path) -> None:
+    arcs = program(
+        HEAD + "CC X10 Y0\nC X20 DR+\nC DR-\nCC IX-5 IY0\nC X10 DR+\nCC\nL X13\nCP IPA+90 IZ-2 DR+\n"
+        "CC Y5 Z5\nCP PA0 DR-\n", bent,
+    ).toolpath.arcs  # fmt: skip
+    assert arcs.sweep_rad == pytest.approx(np.pi * np.array([1, -2, 1, 0.5, -1.25]))
+    assert arcs.plane.tolist() == [0, 0, 0, 0, 2]
+    assert arcs.centre_mm[:3, :2] - ORIGIN[:2] == pytest.approx(np.array([[10, 0], [10, 0], [15, 0]]))
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "words"),
+    [
+        ("L X+Q5\n", 5, "takes numbers from parameters"), ("C X1 DR+\n", 5, "no pole"),
+        ("CC X1\n", 5, "two axes of a plane"), ("CC X1 Y1\nC X2\n", 6, "no DR"),
+        ("L X1 RL\n", 5, "offsets the contour"), ("L M128\n", 5, "rotary axes"),
+        ("PLANE SPATIAL SPA+30 SPB+0 SPC+0 STAY\n", 5, "tilts"), ("L X1 IY2\n", 5, "distances"),
+        ("FN 9: IF Q1 EQU 0 GOTO LBL 2\n", 5, "branches"), ("LP PR5 PA90\n", 5, "polar"),
+        ("TOOL CALL 99 Z\nL X1\n", 6, "tool 99"), ('TOOL CALL "ABC" Z\n', 5, 'name = "ABC"'),
+        ("CYCL DEF 10.0\nCYCL DEF 10.1 ROT+30\n", 6, "rotates"),
+        ("CYCL DEF 7.1 #3\n", 5, "table of the control"),
+        ("L X1 M99\n", 5, "none is defined"), ("CYCL DEF 252 ~\n Q203=0\nL X1 M99\n", 7, "CYCL DEF 252"),
+        ("L X1 M89\n", 5, "at the end of each block"), ("CYCL CALL POS X1\n", 5, "where the holes are"),
+        ("CC X0 Y5\nCP IPA+90 DR-\n", 6, "opposite"), ("/L X5\n", 5, "block delete"),
+        ("CYCL DEF 371 X\n", 5, "builder"), ("L X1 M112\n", 5, "M112"), ("HOPP X1\n", 5, "not a statement"),
+        ("L X1 G1\n", 5, "the word G"), ("TCH PROBE 400\n", 5, "only the control knows"),
+        ("TOOL CALL 2 Y S5\n", 5, "along Y"), ("L X1\rL X2\n", 5, "carriage return"),
+    ],
+)  # fmt: skip
+def test_what_is_refused_and_where(bent: Path, text: str, line: int, words: str) -> None:
+    refused(HEAD + text, bent, line, words)
+
+
+def test_sections_that_only_set_modes_may_be_called(bent: Path) -> None:
+    text = (
+        HEAD
+        + "CYCL DEF 7.1 X+100\nL X1\nCALL LBL 1 ; RESET\nL X1\nM30\nLBL 1\nCYCL DEF 7.0\nCYCL DEF 7.1 X0\n"
+    )
+    assert ends(text + "M127\nLBL 0\nEND PGM A MM\n", bent)[1:, 0].tolist() == pytest.approx([101, 1])
+    refused(text + "L X5\nLBL 0\n", bent, 7, "CALL LBL")
+
+
+def test_a_preset_is_a_work_offset_or_that_of_the_job(bent: Path, tmp_path: Path) -> None:
+    text = "CYCL DEF 247 DATUM~\n  Q339=+2 ;N\nL X1 Y1 Z1 F9\n"
+    own = program(text, bent)
+    assert own.toolpath.end_mm[0] == pytest.approx(ORIGIN + 1)
+    assert [name for name, _, _ in own.remarks if name == "preset"] == ["preset"]
+    refused(text + "CYCL DEF 247 Q339=3\n", bent, 4, "frame 3")
+    frames = {**machines.WORK_OFFSETS, "2": {"X_mm": 5.0, "Y_mm": 6.0, "Z_mm": 7.0, "set_by": "true"}}
+    path = machines.random_machine(tmp_path, 3, Recipe(controller="heidenhain", work_offsets=frames))
+    assert program(text, path).toolpath.end_mm[0].tolist() == pytest.approx([6, 7, 8])
+
+
+def test_tools_are_called_by_number_or_name_with_their_delta(tmp_path: Path) -> None:
+    tools = {1: {"Z_mm": 120.0}, 7: {"Z_mm": 80.0, "name": "Mill_D10"}}
+    path = machines.random_machine(tmp_path, 3, Recipe(controller="heidenhain", tools=tools))
+    moves = program('L X0 Y0 Z0\nTOOL CALL "MILL_D10" Z S1 DL+0.5\nL X0 Y0 Z0\nTOOL CALL S2000\nL X1\n', path)
+    z = moves.toolpath.end_mm[:, 2] - ORIGIN[2]
+    assert z[[0, 2, 3]].tolist() == pytest.approx([0, 80.5, 80.5])
+    # a tool change, but not another speed, leaves the axes unknown
+    assert np.isnan(moves.toolpath.end_mm[1]).all()
+    assert moves.toolpath.frames[-1].tool_mm == (0, 0, -80.5)
+
+
+def test_m91_takes_axis_positions_and_m92_is_not_known(bent: Path) -> None:
+    path = program(HEAD + "L Z-10 R0 FMAX M91\nL X1\nL Y5 Z0 FMAX M92\nL X2\n", bent).toolpath
+    assert path.end_mm[1, 2] == -10.0
+    assert path.flag[1] == Flag.PASS | Flag.MACHINE
+    assert path.end_mm[2, 2] == -10.0
+    assert np.isnan(path.end_mm[3:, 1:]).all()
+    assert path.end_mm[4, 0] == ORIGIN[0] + 2
+
+
+def test_a_split_block_repeats_r0_and_fmax_and_its_late_functions_come_last(bent: Path) -> None:
+    text = b"BEGIN PGM A MM\n1 L X-150 Y-100 Z5 R0 FMAX\n12 L X+200 R0 F500 M8 M9\nEND PGM A MM\n"
+    blocks = olp.correct(text, bent).data.splitlines()[3:-1]
+    assert len(blocks) > 2
+    assert all(block.startswith(b"12 L ") and b" R0" in block for block in blocks)
+    assert [b"M8" in block for block in blocks] == [True] + [False] * (len(blocks) - 1)
+    assert [b"M9" in block for block in blocks] == [False] * (len(blocks) - 1) + [True]
+    split = olp.correct(text.replace(b"F500", b"F MAX"), bent, split_rapids=True).data.splitlines()[3:-1]
+    assert len(split) > 2
+    assert all(block.endswith(b" R0 F MAX") for block in split[1:-1])
+
+
+def test_corrected_text_is_read_band_by_band_alike(bent: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    data = b"".join(
+        random_program(seed, 40).split(b"FMAX M30")[0].rsplit(b"\n", 1)[0] + b"\n" for seed in (1, 2)
+    )
+    whole = olp.correct(data, bent).data
+    monkeypatch.setattr("olp.program.bands.SIZE", 7)
+    assert olp.correct(data, bent).data == whole
