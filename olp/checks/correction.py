@@ -36,7 +36,7 @@ _REMARKS = {
 _WORST = 5
 
 
-def program_findings(program: Program, setup: Setup, *, contour: bool) -> list[Finding]:
+def program_findings(program: Program, setup: Setup) -> list[Finding]:
     """Findings from the text of the program."""
     findings = []
     path = program.toolpath
@@ -74,24 +74,31 @@ def program_findings(program: Program, setup: Setup, *, contour: bool) -> list[F
                 "OLP303", f"{name} is taken as touched off on the uncompensated machine, at its own position"
             )
         )
-    if contour:
-        findings.append(_contour_finding(path))
+    findings += _contour_findings(program)
     if setup.machine.compensated_by_controller:
         names = ", ".join(sorted(setup.machine.compensated_by_controller))
         findings.append(finding("OLP404", f"the control corrects {names}, so the program does not"))
     return findings
 
 
-def _contour_finding(path: Toolpath) -> Finding:
-    text = "contours under G41/G42 were taken as the path of the tool"
-    unknown = [f.compensation is not None and not f.compensation.radius_mm for f in path.frames]
-    lines = lines_of(path, np.array(unknown, bool)[path.frame]) if any(unknown) else []
-    if lines:
-        text += (
-            "; a cutter radius is not known, so their corners were not checked: give radius_mm of the tool "
-            "in the machine or job file"
-        )
-    return finding("OLP305", text, lines)
+def _contour_findings(program: Program) -> list[Finding]:
+    """Findings on contours under cutter compensation."""
+    path, found = program.toolpath, []
+    on = path.compensated()
+    if on.any():
+        radii = sorted({c.radius_mm for f in path.frames if (c := f.compensation) is not None})
+        shown = ", ".join(f"{radius:g} mm" for radius in radii[:5]) + (", ..." if len(radii) > 5 else "")
+        begins = on & (path.contour_number() != np.concatenate(([-1], path.contour_number()[:-1])))
+        what = f"contours were followed with cutter radii of {shown}"
+        if program.dialect.contours_assumed:
+            found.append(finding("OLP313", program.dialect.contours_assumed, lines_of(path, begins)))
+        if any(radii) or not program.dialect.contours_assumed:
+            found.insert(0, finding("OLP305", what, lines_of(path, begins)))
+    for name, line, _ in program.remarks:
+        if name == "path":
+            text = "contours were replaced by the path of the tool; wear at the control does not act on it"
+            found.append(finding("OLP314", text, [line]))
+    return found
 
 
 def path_mode_findings(program: Program, correction_mm: float) -> list[Finding]:

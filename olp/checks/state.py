@@ -125,7 +125,7 @@ def orientation_findings(
 ) -> list[Finding]:
     """Does the tool lean so far that the rim of its face is off by more than the tolerance?"""
     tools = {frame.tool for frame in path.frames if frame.tool is not None}
-    radius = max((t.radius_mm for n in tools if (t := setup.tool(n)) is not None), default=0.0)
+    radius = max((t.radius_mm or 0.0 for n in tools if (t := setup.tool(n)) is not None), default=0.0)
     off = largest_rad * radius
     if off <= tolerance_mm:
         return []

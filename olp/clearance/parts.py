@@ -33,9 +33,10 @@ def parts_of(tool: Tool) -> tuple[Part, ...]:
     length = -tool_vector[2]
     free = length - sum(part.length_mm for part in tool.holder)
     cuts = min(tool.cutting_length_mm or free, free)
-    parts = [Part("tool", (0.0, cuts), (tool.radius_mm, tool.radius_mm), True)]
+    radius = tool.radius_mm or 0.0
+    parts = [Part("tool", (0.0, cuts), (radius, radius), True)]
     if cuts < free:
-        parts.append(Part("shank", (cuts, free), (tool.radius_mm, tool.radius_mm), False))
+        parts.append(Part("shank", (cuts, free), (radius, radius), False))
     level = free
     for holder in tool.holder:
         ends = (level, level + holder.length_mm)

@@ -25,7 +25,6 @@ from olp.cli.endings import show_error
 from olp.cli.options import (
     codes,
     confidence_options,
-    contour_option,
     doubt_options,
     fail_on_option,
     file_option,
@@ -69,7 +68,6 @@ from olp.core.errors import OlpError, UsageError, naming
 @outside_box_option("an error (OLP405)", "a warning (OLP403) and the error at the face")
 @confidence_options
 @file_option("--clearances", "FILE.csv", "Also write the clearance of every block as CSV.")
-@contour_option
 @quiet_option("No report and no progress; only the exit code.")
 @force_option("the output file")
 def command(programs: tuple[str, ...], machine: str | None, job: str | None, **words: Any) -> None:

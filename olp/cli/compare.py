@@ -26,7 +26,6 @@ from olp.cli.common import (
 from olp.cli.layouts import layout_options
 from olp.cli.options import (
     Length,
-    contour_option,
     doubt_options,
     fail_on_option,
     file_option,
@@ -91,7 +90,6 @@ _LAYOUT = ("profile", "columns", "unit", "delimiter", "positions")
 @file_option("--part-frame", "FILE.toml", "Write the work offset from three or more poses, for the job file.")
 @click.option("--frame-name", default="G54", show_default=True, help="Name of that work offset.")
 @report_option()
-@contour_option
 @partial(doubt_options, of="measurement")
 @json_option()
 @units_option

@@ -28,6 +28,7 @@ from olp.cli.common import (
 from olp.cli.layouts import layout_options, with_layout_of
 from olp.cli.options import (
     confidence_options,
+    contour_option,
     force_option,
     known_options,
     output_option,
@@ -59,6 +60,7 @@ LAST_DIGITS_UM = 10.0
 @proof_options
 @confidence_options
 @outside_box_option("refuse the program", "take the error at the box's face")
+@contour_option
 @click.option("--split-rapids", is_flag=True, help="Split rapids like feed moves.")
 @report_option()
 @click.option("--review", "review_file", metavar="review.html", help="Also write the page of olp view.")

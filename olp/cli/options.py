@@ -343,7 +343,11 @@ fail_on_option = click.option(
     help="Exit with 1 where a finding is at least this severe.",
 )
 contour_option = click.option(
-    "--contour", is_flag=True, help="Take a contour under G41/G42 as the path of the tool."
+    "--contour",
+    type=click.Choice(["contour", "path"]),
+    default="contour",
+    show_default=True,
+    help="Write contours under G41/G42 as contours, or as the path of the tool without compensation.",
 )
 tolerance_option = click.option(
     "--tolerance-um",
@@ -405,7 +409,6 @@ def proof_options(function: F) -> F:
         json_option(),
         units_option,
         doubt_options,
-        contour_option,
         tolerance_option,
     ):
         function = option(function)

@@ -26,7 +26,6 @@ from olp.cli.options import (
     NUMBER,
     Count,
     Length,
-    contour_option,
     doubt_options,
     fail_on_option,
     file_option,
@@ -92,7 +91,6 @@ FORMATS = ("csv", "npz", "parquet", "ros", "pvt")
     help="Value of an F word for several blocks: the mean (same total time) or the least planned feed.",
 )
 @doubt_options
-@contour_option
 @click.option("--block-delete", is_flag=True, help="Leave / blocks out; they count as executed otherwise.")
 @report_option((".json",))
 @json_option()

@@ -9,7 +9,6 @@ import click
 from olp.cli.common import STREAM, diagnostic, files_of, given, options_of, put, refuse_early
 from olp.cli.options import (
     Length,
-    contour_option,
     doubt_options,
     force_option,
     json_option,
@@ -31,7 +30,6 @@ from olp.findings.rule import Severity
     "--step-mm", type=Length(), default=1.0, show_default=True, help="Distance between points on a move."
 )
 @doubt_options
-@contour_option
 @json_option()
 @quiet_option("No messages.")
 @force_option("the output file")

@@ -13,7 +13,6 @@ from olp.cli.options import (
     Count,
     Length,
     confidence_options,
-    contour_option,
     doubt_options,
     force_option,
     known_options,
@@ -46,7 +45,6 @@ if TYPE_CHECKING:
 @tolerance_option
 @outside_box_option("refuse the program", "take the error at the box's face")
 @doubt_options
-@contour_option
 @confidence_options
 @click.option("--no-time", is_flag=True, help="Do not plan the motion; times come from the programmed feed.")
 @click.option(

@@ -73,7 +73,15 @@ def solve(writer: Writer, rows: Rows) -> ArcRows:
     centre = np.zeros((len(arc_row), 3))
     kept = np.zeros(len(arc_row), bool)
     tools = path.tool_mm()
-    for part, count in sample_groups(path, writer.model, writer.targets, pieces, tools, writer.tolerance_mm):
+    given = _given(writer, rows, arc_row)
+    free = np.flatnonzero(np.isnan(given[:, 0]))
+    told = np.flatnonzero(~np.isnan(given[:, 0]))
+    centre[told], kept[told] = _told(writer, arc[told], start[told], end[told], given[told], sweep[told])
+    groups = sample_groups(
+        path, writer.model, writer.targets, pieces.pick(free), tools, writer.tolerance_mm
+    )  # fmt: skip
+    for group, count in groups:
+        part = free[group]
         bend = sampled(path, writer.model, writer.targets, pieces.pick(part), tools, count)
         best, _ = fit(bend, plane[part], start[part], end[part], sweep[part])
         equal = (np.abs(sweep[part]) <= WIDE) & (np.abs(bend.mismatch) < 1e-6) & ~bend.rigid
@@ -87,6 +95,33 @@ def solve(writer: Writer, rows: Rows) -> ArcRows:
     _check_sweep(start, end, centre, sweep, plane, path.line[move])
     solved = ArcRows(arc_row, move.astype(np.int64), path.line[move], start, end, centre, sweep, plane)
     return solved.pick(~kept)
+
+
+def _given(writer: Writer, rows: Rows, arc_row: Index) -> Array:
+    """(m, 3) the centres that the plan states, NaN where it states none."""
+    stated = writer.plan.centre_mm
+    return np.full((len(arc_row), 3), np.nan) if stated is None else stated[rows.first + arc_row]
+
+
+def _told(
+    writer: Writer, arc: Index, start: Array, end: Array, given: Array, sweep: Array
+) -> tuple[Array, Mask]:
+    """Centres that the plan states, between ends as written; and arcs that are only shifted."""
+    path, arcs = writer.path, writer.path.arcs
+    move, plane = arcs.move[arc], arcs.plane[arc]
+    first = np.where((move > 0)[:, None], path.end_mm[np.maximum(move - 1, 0)], np.array(path.start_mm))
+    last = path.end_mm[move]
+    radii = [np.hypot(*arms(point, arcs.centre_mm[arc], plane)) for point in (first, last)]
+    equal = (np.abs(sweep) <= WIDE) & (np.abs(radii[1] - radii[0]) < 1e-6)
+    shift = start - first
+    off = np.maximum(
+        np.abs(end - last - shift).max(axis=1, initial=0.0),
+        np.hypot(*arms(given - arcs.centre_mm[arc] - shift, np.zeros_like(given), plane)),
+    )
+    alike = off < 1e-7
+    absolute = writer.program.arc_slots.absolute[arc]
+    kept = alike & (~absolute | (np.abs(shift).max(axis=1, initial=0.0) < 1e-9))
+    return _on_bisector(start, end, given, plane, equal & ~alike), kept
 
 
 def _on_bisector(start: Array, end: Array, centre: Array, plane: npt.NDArray[np.int8], short: Mask) -> Array:

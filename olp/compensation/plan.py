@@ -38,7 +38,8 @@ class Plan:
     the row. (r,) `take_up` rows only take up backlash.
 
     `uncorrected` are moves that are left as they are for want of a position, `shift_mm` (frames, 3) the
-    error that the touch-off of each frame holds.
+    error that the touch-off of each frame holds. (r, 3) `centre_mm` are the centres of arcs that are not
+    found from their ends alone, NaN elsewhere.
     """
 
     move: npt.NDArray[np.int32]
@@ -50,6 +51,7 @@ class Plan:
     uncorrected: Index
     shift_mm: Array
     play: Array | None
+    centre_mm: Array | None = None
 
     def __len__(self) -> int:
         return len(self.move)

@@ -12,11 +12,11 @@ import numpy as np
 
 from olp.compensation.approach import Known, with_approaches
 from olp.compensation.arcs import subdivide_arcs
-from olp.compensation.contour import Contour
-from olp.compensation.corners import away_from_corners
+from olp.compensation.contour import Contour, in_arcs, long_parts
 from olp.compensation.invert import invert
 from olp.compensation.lines import Cuts, subdivide_lines
 from olp.compensation.plan import Limits, Plan, targets, zero_shifts
+from olp.compensation.programmed import programmed
 from olp.compensation.reversal import Carried, Reversal, carry_play
 from olp.core.arrays import Array, Index, Mask, distinct, is_in
 from olp.core.errors import OutsideBox, ProgramError
@@ -49,6 +49,15 @@ def plans(
     for band in bands(program):
         told = part(tell, band.share, band.middle)
         yield band, planning.rows(band.program.toolpath, band.ahead_mm, told)
+
+
+def written_plans(
+    program: Program, model: ErrorModel, limits: Limits, tell: Progress = silent
+) -> Iterator[tuple[Band, Plan]]:
+    """As `plans`, of what is programmed: contours where there is cutter compensation. Raises as `plans`, and
+    ProgramError where the control would refuse a contour."""
+    for band, rows in plans(program, model, limits, tell):
+        yield programmed(band, rows, model, limits)
 
 
 def uncorrected_moves(program: Program, model: ErrorModel, limits: Limits) -> Index:
@@ -88,7 +97,6 @@ class Planning:
         whole = ((path.flag & _UNSPLIT) != 0) | raw.any(axis=1)
         if contour is not None:
             whole |= contour.whole
-            uncorrected = distinct(np.concatenate((uncorrected, contour.beside)))
         kinds = (Kind.LINE, Kind.RAPID) if limits.split_rapids else (Kind.LINE,)
         free = is_in(path.kind, kinds) & ~whole
         # behind a `/` block the start depends on the switch, so no cut can be right for both
@@ -101,7 +109,7 @@ class Planning:
         tell("correct", 0.7)
         cuts = [cuts_line, cuts_arc]
         if contour is not None:
-            cuts = [_pick(c, away_from_corners(path, c[0], c[1])) for c in cuts]
+            cuts = [long_parts(path, cuts_line), in_arcs(path, model, cuts_arc)]
         rows = _expand(path, target, command, raw, uncorrected, shift, cuts, model, reversal is not None)
         if contour is not None:
             rows = contour.hold(rows)
@@ -187,11 +195,6 @@ def _hold_after_machine_moves(path: Toolpath, raw: Mask) -> Index:
                 held.append(j)
                 j += 1
     return np.array(sorted(set(held)), np.int64)
-
-
-def _pick(cuts: Cuts, which: Mask) -> Cuts:
-    move, share, target = cuts
-    return move[which], share[which], target[which]
 
 
 def _waypoints(path: Toolpath, model: ErrorModel, target: Array, raw: Mask) -> Array:

@@ -89,6 +89,8 @@ class Sanity:
 class Tool:
     """A row of the control's tool table, and the tool vector on which angular errors act.
 
+    The control offsets contours by `radius_mm`, None where it is not known, and `wear_mm`.
+
     `length_mm` enters axis positions where the program activates it. `gauge_to_tip_mm` defaults to minus the
     length; a negative Z length is a touch-off value and gives no tool vector. `name` is that of programs
     which call tools by name. `set_by` "touch" means that the
@@ -100,7 +102,8 @@ class Tool:
 
     number: int
     length_mm: Vector = ZERO
-    radius_mm: float = 0.0
+    radius_mm: float | None = None
+    wear_mm: float = 0.0
     gauge_to_tip_mm: Vector | None = None
     set_by: Literal["touch", "true"] = "true"
     touched_at_mm: Vector | None = None

@@ -61,12 +61,15 @@ class Flag(IntFlag):
 
 @dataclass(frozen=True, slots=True)
 class CutterCompensation:
-    """G41 or G42: the control offsets the contour to the `left` or to the right, in a plane (0..2). The
-    `radius_mm` is 0 where neither the program nor the tool table states it."""
+    """G41 or G42: the control offsets the contour to the `left` or to the right by `radius_mm`, in a plane
+    (0..2). `number` counts the contours of a program. `corner` moves are made by the control, round an
+    outside corner."""
 
     plane: int
     left: bool
     radius_mm: float = 0.0
+    number: int = 0
+    corner: bool = False
 
 
 def carried(tool_mm: Vector, payload_kg: float) -> Tool:
@@ -192,6 +195,16 @@ class Toolpath:
     def compensated(self) -> Mask:
         """(n,) moves along a contour that the control offsets by the cutter radius."""
         return np.array([f.compensation is not None for f in self.frames], bool)[self.frame]
+
+    def compensated_radius_mm(self) -> Array:
+        """(n,) radius by which the control offsets each move, 0 where it does not."""
+        radii = [0.0 if (c := f.compensation) is None else c.radius_mm for f in self.frames]
+        return np.array(radii or [0.0], float)[self.frame]
+
+    def contour_number(self) -> Index:
+        """(n,) number of the contour that each move belongs to, -1 where it belongs to none."""
+        numbers = [-1 if (c := f.compensation) is None else c.number for f in self.frames]
+        return np.array(numbers or [-1], np.int64)[self.frame]
 
     def reach_mm(self) -> tuple[Array, Array]:
         """(n, 3) lowest and highest axis positions at the end of each move and, on arcs, along it; NaN where

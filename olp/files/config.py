@@ -205,6 +205,7 @@ def _tools(tables: Tools) -> dict[int, Tool]:
             name=table.name or "",
             length_mm=(table.X_mm, table.Y_mm, table.Z_mm),
             radius_mm=table.radius_mm,
+            wear_mm=table.wear_mm,
             gauge_to_tip_mm=table.gauge_to_tip_mm,
             set_by=table.set_by,
             touched_at_mm=table.touched_at_mm.complete if table.touched_at_mm else None,

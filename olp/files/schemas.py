@@ -110,7 +110,13 @@ class ToolTable(Table):
     X_mm: float = Field(default=0.0, description="the tool offset in X as in the control's tool table, in mm")
     Y_mm: float = Field(default=0.0, description="the tool offset in Y as in the control's tool table, in mm")
     Z_mm: float = Field(default=0.0, description="the tool length as in the control's tool table, in mm")
-    radius_mm: NotNegative = Field(default=0.0, description="the tool radius, in mm")
+    radius_mm: NotNegative | None = Field(
+        default=None, description="the tool radius, in mm; cutter compensation (G41, G42) needs it"
+    )
+    wear_mm: float = Field(
+        default=0.0,
+        description="what the control adds to radius_mm in cutter compensation, in mm; below 0 for wear",
+    )
     gauge_to_tip_mm: Triple | None = Field(
         default=None,
         description="the vector from gauge point to tip, [X, Y, Z] in mm; [-X, -Y, -Z] if left out",

@@ -85,6 +85,7 @@ def _work_offset(offset: WorkOffset) -> Iterator[str]:
 def _tool(tool: Tool) -> Iterator[str]:
     x, y, z = tool.length_mm
     yield from toml_lines({"X_mm": x or None, "Y_mm": y or None, "Z_mm": z, "radius_mm": tool.radius_mm})
+    yield from toml_lines({"wear_mm": tool.wear_mm or None})
     yield from toml_lines({"gauge_to_tip_mm": tool.gauge_to_tip_mm})
     if tool.touched_at_mm is not None:
         touched = dict(zip(AXES, tool.touched_at_mm, strict=True))

@@ -114,7 +114,12 @@ def _part(program: Program, first: int, last: int) -> Program:
         for capture in program.captures
         if first < capture.moves <= last or first == 0 == capture.moves
     )
+    programmed, blocks = program.programmed, program.blocks
+    if programmed is not None and blocks is not None:
+        begin, end = int(blocks[first]), int(blocks[last - 1]) + 1
+        programmed, blocks = _part(programmed, begin, end), blocks[first:last] - begin
     return replace(
-        program, toolpath=path.part(first, last), slot=program.slot[first:last], arc_slots=arc_slots,
+        program, programmed=programmed, blocks=blocks, toolpath=path.part(first, last),
+        slot=program.slot[first:last], arc_slots=arc_slots,
         captures=captures, holes=program.holes.part(first, last),
     )  # fmt: skip

@@ -24,11 +24,10 @@ from olp.program.text.line_ends import split
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """How a program is to be read: `block_delete` leaves `/` blocks out; `contour` takes the contour under
-    cutter compensation (G41/G42, CUTCOM) as the tool path. `tell` is told what share of the text is read."""
+    """How a program is to be read: `block_delete` leaves `/` blocks out. `tell` is told what share of
+    the text is read."""
 
     block_delete: bool = False
-    contour: bool = False
     tell: Progress = field(default=silent, repr=False)
 
 
@@ -82,7 +81,8 @@ class Dialect:
     payload may change inside a program. `path_tolerance`: programs state how far the control may leave the
     path (G64 P), and without it the control has no bound. `axes_at_ram`: axis positions count at the end of
     the ram, whatever stylus or tool is active. `points`: programs state points, and all of them count,
-    however the machine goes there.
+    however the machine goes there. `contours_assumed` says what is assumed of contours under cutter
+    compensation, empty where nothing is.
     """
 
     name: str
@@ -105,6 +105,7 @@ class Dialect:
     comment: tuple[bytes, bytes] = (b"(", b")")
     first: tuple[bytes, ...] = ()
     marks: bool = True
+    contours_assumed: str = ""
 
     def rows(self) -> Sequence[Row]:
         """The support matrix, from the table that the reader uses."""

@@ -176,10 +176,16 @@ class Statements:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Program:
-    """`slot` (n, 3): index of the X, Y, Z word of each move, -1 where omitted. `calculator`: lengths without
+    """A program as read.
+
+    `slot` (n, 3): index of the X, Y, Z word of each move, -1 where omitted. `calculator`: lengths without
     a decimal point are whole units. `statements` is None for blocks of words. `closings` are
     brackets that close behind a number, sorted. `by_original`: lines are those of the text that this one was
-    unrolled from (`in_original`)."""
+    unrolled from (`in_original`).
+
+    Along contours under cutter compensation `toolpath` is that of the tool. `programmed` is then the program
+    with the contour in its place, and (n,) `blocks` the move of it that each move belongs to.
+    """
 
     data: bytes
     dialect: Dialect
@@ -199,6 +205,8 @@ class Program:
     shared: SharedWords = field(default_factory=SharedWords.none)
     closings: Index = field(default_factory=lambda: np.zeros(0, np.int64))
     by_original: bool = False
+    programmed: Program | None = None
+    blocks: Index | None = None
 
     @property
     def in_blocks(self) -> bool:

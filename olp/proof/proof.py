@@ -18,7 +18,6 @@ from olp.core.units import UM_PER_MM
 from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
 from olp.program.program import Program
-from olp.proof.contour import check_contours
 from olp.proof.deviation import Deviation, Single, cutting_moves, measure
 from olp.proof.kinds import check_kinds
 from olp.proof.matching import match
@@ -154,7 +153,6 @@ def prove(
     near = _NEAR_DIGITS * digit_mm + _NEAR_SHARE * tolerance_mm
     groups = match(nominal, target, corrected, model, near, part(tell, 0.1, 0.4))
     check_kinds(nominal, corrected, groups, digit_mm)
-    check_contours(path, written, groups)
     bend = tolerance_mm * _BEND_SHARE
     how = _how(nominal)
     counts = _counts(path, how, exempt)

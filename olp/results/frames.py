@@ -44,7 +44,7 @@ def stylus_of(setup: Setup, label: str | int | None, by_row: bool) -> Stylus:
     tool_vector = setup.stylus(str(label)) if label is not None else None
     if tool_vector is not None:
         x, y, z = tool_vector
-        return Stylus((0.0 - x, 0.0 - y, 0.0 - z), tool_vector, usual.radius_mm if usual else 0.0)
+        return Stylus((0.0 - x, 0.0 - y, 0.0 - z), tool_vector, (usual.radius_mm or 0.0) if usual else 0.0)
     number = setup.machine.default_tool if label is None else label
     if number is None and by_row:
         return Stylus(ZERO, ZERO, 0.0)
@@ -65,4 +65,4 @@ def stylus_of(setup: Setup, label: str | int | None, by_row: bool) -> Stylus:
         )
     if tool.tool_vector_mm is None and not by_row:
         raise ConfigError(f"stylus {number} has no tool vector; give tools.{number}.Z_mm or gauge_to_tip_mm")
-    return Stylus(tool.length_mm, tool.tool_vector_mm or ZERO, tool.radius_mm)
+    return Stylus(tool.length_mm, tool.tool_vector_mm or ZERO, tool.radius_mm or 0.0)

@@ -96,7 +96,6 @@ def view(
     corrected_name: str = "",
     tolerance_um: float = 1.0,
     outside_box: Literal["refuse", "hold"] = "refuse",
-    contour: bool = False,
     flatten: bool = False,
     expand_cycles: bool = False,
     peck_clearance_mm: float | None = None,
@@ -121,7 +120,7 @@ def view(
     """
     session, source = opened(program, machine, job)
     options = ViewOptions(
-        tolerance_um=tolerance_um, outside_box=outside_box, contour=contour, flatten=flatten,
+        tolerance_um=tolerance_um, outside_box=outside_box, flatten=flatten,
         expand_cycles=expand_cycles, peck_clearance_mm=peck_clearance_mm, part_tolerance_um=part_tolerance_um,
         only_sure_components=only_sure_components, date=date, accept=tuple(accept), time=time,
         step_mm=step_mm,
@@ -151,7 +150,7 @@ def run(
     with program.errors():
         loaded = session.loaded(outside, only_sure=options.only_sure_components).reading(program)
         tell("read", 0.0)
-        reading = Options(contour=options.contour)
+        reading = Options()
         text, nominal = refusals.read(
             session.sources, program, loaded.setup, loaded.dialect, reading, options, kept=True
         )
@@ -218,7 +217,7 @@ def _proved(
         report = placed(corrected.report, nominal.origin)
         groups = corrected.proof.groups
         return _Texts(program, nominal, name, corrected.corrected, report, corrected.table, groups)
-    reading = Options(contour=options.contour)
+    reading = Options()
     if isinstance(corrected, Correction):
         second = read(corrected.plain, loaded.setup, loaded.dialect, reading)
         report, table, groups = corrected.report, corrected.table, corrected.groups
@@ -244,7 +243,7 @@ def _shown(
     other = session.sources.source(texts.second.data)
     # what the proof accepts holds for the motion, also where its stamp is that of sure components alone
     accept = tuple(texts.report["accepted"])
-    timing = RetimeOptions(contour=options.contour, date=options.date, accept=accept)
+    timing = RetimeOptions(date=options.date, accept=accept)
     plan = retime.run(session.of(loaded.setup), other, timing, progress=progress)
     samples, moment = _resting(samples, *retimed(texts.second.toolpath, samples, plan.trajectories))
     return _Shown(samples, moment, plan)
@@ -374,4 +373,5 @@ def _radii(setup: Setup, nominal: Program) -> dict[int, float]:
     """The radii of the tools of a program in mm, of those that have one."""
     numbers = {f.tool for f in nominal.toolpath.frames if f.tool is not None}
     tools = {number: setup.tool(number) for number in sorted(numbers)}
-    return {k: tool.radius_mm for k, tool in tools.items() if tool is not None and tool.radius_mm > 0.0}
+    radii = {k: tool.radius_mm or 0.0 for k, tool in tools.items() if tool is not None}
+    return {k: radius for k, radius in radii.items() if radius > 0.0}

@@ -44,12 +44,11 @@ class Case:
     blend_mm: float
     blend_from: str
     block_delete: bool
-    contour: bool
     legs: tuple[Route, ...]
 
     def rewritten(self, data: bytes) -> Case:
         """The case of another text, read with the same options. Raises ProgramError."""
-        options = Options(block_delete=self.block_delete, contour=self.contour)
+        options = Options(block_delete=self.block_delete)
         program = read(data, self.setup, self.program.dialect, options)
         # the machine's mode at the start is not in the text
         modes = (*(m for m in self.program.path_modes if m.line == 0), *program.path_modes)

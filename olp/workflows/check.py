@@ -121,7 +121,6 @@ def check(
     nominal: PathLike | bytes | None = None,
     tolerance_um: float = 1.0,
     outside_box: Literal["refuse", "hold"] = "refuse",
-    contour: bool = False,
     flatten: bool = False,
     expand_cycles: bool = False,
     peck_clearance_mm: float | None = None,
@@ -147,7 +146,7 @@ def check(
     (ProgramError with its line), and CannotCompute.
     """
     options = CheckOptions(
-        tolerance_um=tolerance_um, outside_box=outside_box, contour=contour, flatten=flatten,
+        tolerance_um=tolerance_um, outside_box=outside_box, flatten=flatten,
         expand_cycles=expand_cycles, peck_clearance_mm=peck_clearance_mm,
         part_tolerance_um=part_tolerance_um, only_sure_components=only_sure_components,
         date=date, accept=tuple(accept), select=tuple(select), ignore=tuple(ignore),
@@ -250,7 +249,7 @@ def _case(
     tell: Progress,
 ) -> _Case:  # fmt: skip
     tell("read", 0.0)
-    reading = Options(contour=options.contour)
+    reading = Options()
     name, data = program.name, program.data
     if nominal is None and find_stamp(data) is None:
         correcting = CorrectOptions(**options.proof(), outside_box="hold")
@@ -306,7 +305,7 @@ def _findings(case: _Case, options: CheckOptions) -> list[Finding]:
         findings += state.box_findings(path, loaded.model.box_mm, options.outside_code)
         if run is None:
             findings += doubted(case.written, loaded, options.accept, date, stamped=case.data, refuse=False)
-        findings += checks.program_findings(written, loaded.setup, contour=options.contour)
+        findings += checks.program_findings(written, loaded.setup)
         findings += model_findings(path, loaded.calibration, loaded.model, sanity, tolerance_mm)
         if run is not None and proof is not None:
             findings += checks.proof_findings(proof, run.uncorrected)

@@ -58,7 +58,6 @@ class CompareOptions(UnrollOptions):
     part_tolerance_um: float | None = None
     add_errors: bool = False
     part_frame: str | None = None
-    contour: bool = False
     date: datetime.date | None = None
     accept: tuple[str, ...] = ()
 
@@ -197,7 +196,6 @@ def compare(
     part_tolerance_um: float | None = None,
     add_errors: bool = False,
     part_frame: str | None = None,
-    contour: bool = False,
     flatten: bool = False,
     expand_cycles: bool = False,
     peck_clearance_mm: float | None = None,
@@ -220,7 +218,7 @@ def compare(
     options = CompareOptions(
         before=tuple(before), poses=poses, profile=profile, align=align, order=order, reach_mm=reach_mm,
         part_tolerance_um=part_tolerance_um, add_errors=add_errors, part_frame=part_frame,
-        contour=contour, flatten=flatten, expand_cycles=expand_cycles, peck_clearance_mm=peck_clearance_mm,
+        flatten=flatten, expand_cycles=expand_cycles, peck_clearance_mm=peck_clearance_mm,
         date=date, accept=tuple(accept),
     )  # fmt: skip
     return run(sources, session, sources.source(nominal), measured, options, progress)
@@ -346,7 +344,7 @@ def _nominal_side(nominal: Source, session: Session | None, options: CompareOpti
         return _Side(nominal, parse_points(data, name or "<stdin>"), None, loaded)
     with nominal.errors("<stdin>"):
         sources = session.sources if session is not None else Sources()
-        reading = Options(contour=options.contour)
+        reading = Options()
         nominal, program = refusals.read(sources, nominal, loaded.setup, loaded.dialect, reading, options)
     return _Side(nominal, None, program.in_original(), loaded)
 

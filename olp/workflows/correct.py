@@ -13,9 +13,10 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.checks import correction as checks
-from olp.compensation.planning import plans
+from olp.compensation.planning import written_plans
 from olp.compensation.stamp import find_stamp, stamp_line, stamped
 from olp.compensation.tally import Tally
+from olp.compensation.tool_path_text import as_tool_path, with_exact_path
 from olp.compensation.writer import Task
 from olp.compensation.writing import write
 from olp.core.arrays import Array, Index, read_only
@@ -54,10 +55,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CorrectOptions(ProofOptions):
-    """The options of `correct`."""
+    """The options of `correct`. Under cutter compensation a `contour` is written as one, or as the path of
+    the tool without compensation."""
 
     outside_box: Outside = "refuse"
     split_rapids: bool = False
+    contour: Literal["contour", "path"] = "contour"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -115,7 +118,7 @@ def correct(
     flatten: bool = False,
     expand_cycles: bool = False,
     peck_clearance_mm: float | None = None,
-    contour: bool = False,
+    contour: Literal["contour", "path"] = "contour",
     split_rapids: bool = False,
     part_tolerance_um: float | None = None,
     only_sure_components: bool = False,
@@ -129,7 +132,8 @@ def correct(
     in the program's own dialect; only coordinate words differ, and words and blocks are inserted. With
     `flatten` loops, subprograms and expressions are unrolled first, with `expand_cycles` canned cycles are
     written out. `peck_clearance_mm` is the clearance above the last peck, for controls where it is a
-    parameter.
+    parameter. Under cutter compensation (G41, G42) a contour is written from which the control makes the
+    corrected path of the tool; with `contour` "path" that path is written, without compensation.
 
     Where the calibration states uncertainties, the report gives the probability that the tip is within
     `part_tolerance_um` (default: the job's; without any there is no probability). With
@@ -168,12 +172,15 @@ def corrected(
     done = _rewritten(sources, program, loaded, options, refuse_doubts, tell)
     data = done.source.data
     tell("prove", 0.7)
-    reading = Options(contour=options.contour, tell=part(tell, 0.7, 0.78, "prove"))
+    reading = Options(tell=part(tell, 0.7, 0.78, "prove"))
     held = outside if options.outside_box == "hold" else None
     told = part(tell, 0.78, 1.0)
 
     def prove(text: bytes, notes: tuple[Finding, ...] = ()) -> Run:
-        second = read(text, loaded.setup, loaded.dialect, reading, words=False)
+        try:
+            second = read(text, loaded.setup, loaded.dialect, reading, words=False)
+        except ProgramError as error:
+            raise _refused_contour(error, done) if error.code == "OLP528" else error from None
         pair = Pair(done.nominal, data, program.name, second, done.text or b"", "", done.uncorrected)
         return proved(pair, loaded.held(), options, done.doubts, outside=held, notes=notes, tell=told)
 
@@ -225,7 +232,7 @@ def _rewritten(
     written out, and it is read again."""
     read_kept = partial(
         refusals.read, sources, setup=loaded.setup, dialect=loaded.dialect,
-        options=Options(contour=options.contour, tell=part(tell, 0.0, 0.2)), unrolling=options, kept=True,
+        options=Options(tell=part(tell, 0.0, 0.2)), unrolling=options, kept=True,
     )  # fmt: skip
     tell("read", 0.0)
     source, program = read_kept(source)
@@ -235,6 +242,10 @@ def _rewritten(
             'set joined = "lines" and insert = true in the profile'
         )
     inner = unrolled_unasked(source, options)
+    if options.contour == "path" and program.toolpath.compensated().any():
+        # the path of the tool is made from what is unrolled
+        source, program = _as_path(source, program, loaded, Options(tell=part(tell, 0.0, 0.2)))
+        inner = None
     done = _written(source, program, inner, loaded, options, refuse_doubts, tell)
     if done.text is not None:
         return done
@@ -276,11 +287,11 @@ def _written(
         stamp = stamp_line(loaded.digest, loaded.dialect.comment, accepted) if loaded.dialect.marks else b""
         increments_mm = loaded.setup.machine.least_increment_mm
         task = Task(
-            program, loaded.model, limits.tolerance_mm, increments_mm, b"" if unrolled is not None else stamp,
-            bool(accepted), located=unrolled is not None,
+            program.programmed or program, loaded.model, limits.tolerance_mm, increments_mm,
+            b"" if unrolled is not None else stamp, bool(accepted), located=unrolled is not None,
         )  # fmt: skip
-        written = write(task, plans(program, loaded.model, limits, told), told)
-    nominal = replace(program, words=None, slot=np.zeros((0, 3), np.int32))
+        written = write(task, written_plans(program, loaded.model, limits, told), told)
+    nominal = replace(program, words=None, slot=np.zeros((0, 3), np.int32), programmed=None, blocks=None)
     # the corrected text has lines of its own
     text: bytes | None = bytes(source.data) if written.text is None else written.text
     flow = None
@@ -291,7 +302,45 @@ def _written(
         flow, text = Flow(kept), kept.text
         if text is not None and stamp and (kept.changed or accepted):
             text = stamped(text, stamp, program.eol(1), loaded.dialect.first)
-    return _Rewritten(source, nominal, text, written.uncorrected, written.parts, written.tally, doubts, flow)
+    parts = written.parts if program.blocks is None else written.parts[program.blocks]
+    return _Rewritten(source, nominal, text, written.uncorrected, parts, written.tally, doubts, flow)
+
+
+def _refused_contour(error: ProgramError, done: _Rewritten) -> ProgramError:
+    """The refusal of a contour that the control would take but for the digits of its correction."""
+    path, line = done.nominal.toolpath, error.line or 1
+    own = np.array([(c := f.compensation) is None or not c.corner for f in path.frames], bool)[path.frame]
+    move = np.flatnonzero(own)
+    behind = path.line[move] + np.cumsum(done.parts[move] - 1)
+    more = (done.text or b"").count(b"\n") - done.source.data.count(b"\n")
+    stamp = more - int(behind[-1] - path.line[move[-1]])
+    at = min(int(np.searchsorted(behind + stamp, line)), len(move) - 1)
+    return ProgramError(
+        "the control would refuse this block once corrected: rounded to its digits, the cutter does not fit "
+        "into it any more; make the move longer, or have the path of the tool written with --contour path",
+        line=int(path.line[move[at]]),
+        code="OLP561",
+    )
+
+
+def _as_path(source: Source, program: Program, loaded: Loaded, reading: Options) -> tuple[Source, Program]:
+    """The program with its contours written as the path of the tool. Raises UsageError
+    for programs that are not written in blocks."""
+    if program.statements is not None:
+        raise UsageError(
+            "--contour path goes with programs of blocks (G41, G42) only; points under CUTCOM are corrected "
+            "where they are stated"
+        )
+    with program.errors():
+        text = as_tool_path(program, loaded.setup.machine.least_increment_mm)
+        try:
+            written = read(text, loaded.setup, loaded.dialect, reading)
+        except ProgramError as error:
+            error.message = (
+                f"the path of the tool cannot be written as blocks of this program: {error.message}"
+            )
+            raise
+        return source.holding(text), with_exact_path(written, program)
 
 
 def _written_report(done: _Rewritten) -> dict[str, Any]:

@@ -67,7 +67,7 @@ def run(session: Session, program: Source, options: UnrollOptions) -> dict[str, 
         axis: [float(known[:, i].min()), float(known[:, i].max())] if len(known) else None
         for i, axis in enumerate("XYZ")
     }
-    findings = checks.program_findings(parsed, setup, contour=False)
+    findings = checks.program_findings(parsed, setup)
     origin = parsed.origin
     return {
         "name": program.short,

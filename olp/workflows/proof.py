@@ -56,7 +56,6 @@ class ProofOptions(UnrollOptions):
     unrolled is the nominal program."""
 
     tolerance_um: float = 1.0
-    contour: bool = False
     part_tolerance_um: float | None = None
     only_sure_components: bool = False
     date: datetime.date | None = None
@@ -176,7 +175,7 @@ def proved(
         *checks.between_findings(first, proof, loaded.model),
         *position_findings(proof, loaded, outside),
         *checks.path_mode_findings(first, largest_mm),
-        *checks.program_findings(first, loaded.setup, contour=options.contour),
+        *checks.program_findings(first, loaded.setup),
         *(assessment[2] if assessment else ()),
         *findings_of_model(first.toolpath, loaded, tolerance_mm),
     )
@@ -216,7 +215,7 @@ def _prove_without_deleted(
     deleted = (path.flag & np.uint8(Flag.DELETED)) != 0
     if not deleted.any():
         return
-    reading = Options(block_delete=True, contour=options.contour)
+    reading = Options(block_delete=True)
     nominal = read(pair.data, loaded.setup, loaded.dialect, reading, words=False)
     with naming(pair.other or "<corrected>"):
         other = read(pair.corrected.data, loaded.setup, loaded.dialect, reading, words=False)

@@ -132,7 +132,7 @@ def _predicted_plots(
     from olp.reports.plots.thinned import Canvas, Thinned
 
     loaded = session.loaded("hold").reading(nominal)
-    reading = Options(contour=options.contour)
+    reading = Options()
     program = read(nominal.data, loaded.setup, loaded.dialect, reading, words=False)
     try:
         way = nominal_of(program.toolpath, loaded.model, "tip", points=program.dialect.points)

@@ -57,7 +57,6 @@ class RetimeOptions(UnrollOptions):
     blend_mm: float | None = None
     study_blend: bool = False
     max_inertial_um: float | None = None
-    contour: bool = False
     block_delete: bool = False
     date: datetime.date | None = None
     accept: tuple[str, ...] = ()
@@ -238,7 +237,6 @@ def retime(
     blend_mm: float | None = None,
     study_blend: bool = False,
     max_inertial_um: float | None = None,
-    contour: bool = False,
     block_delete: bool = False,
     flatten: bool = False,
     expand_cycles: bool = False,
@@ -263,7 +261,7 @@ def retime(
     """
     session = Session.start(machine, job)
     options = RetimeOptions(
-        blend_mm=blend_mm, study_blend=study_blend, max_inertial_um=max_inertial_um, contour=contour,
+        blend_mm=blend_mm, study_blend=study_blend, max_inertial_um=max_inertial_um,
         block_delete=block_delete, flatten=flatten, expand_cycles=expand_cycles,
         peck_clearance_mm=peck_clearance_mm, date=date, accept=tuple(accept),
     )  # fmt: skip
@@ -320,7 +318,7 @@ def _case(session: Session, program: Source, options: RetimeOptions) -> Case:
     """A program ready for planning. Raises ProgramError with its file and line; CannotCompute where no move
     can be timed."""
     blend_mm, stated = options.blend_mm, session.setup.machine.blend_mm
-    reading = Options(block_delete=options.block_delete, contour=options.contour)
+    reading = Options(block_delete=options.block_delete)
     program.load()
     with program.errors():
         setup, dialect = session.reading(program)
@@ -335,7 +333,7 @@ def _case(session: Session, program: Source, options: RetimeOptions) -> Case:
                 program.short, setup, parsed,
                 next(v for v in (blend_mm, stated, BLEND_MM) if v is not None),
                 "the call" if blend_mm is not None else "the machine file" if stated else "the default",
-                options.block_delete, options.contour, (),
+                options.block_delete, (),
             ).driven()  # fmt: skip
     if not case.legs and case.untimed()["moves"]:
         raise CannotCompute(

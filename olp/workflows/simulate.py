@@ -39,7 +39,6 @@ class SimulateOptions(UnrollOptions):
 
     step_mm: float = 1.0
     outside_box: Outside = "hold"
-    contour: bool = False
     date: datetime.date | None = None
     accept: tuple[str, ...] = ()
 
@@ -82,7 +81,6 @@ def simulate(
     *,
     step_mm: float = 1.0,
     outside_box: Literal["refuse", "hold"] = "hold",
-    contour: bool = False,
     flatten: bool = False,
     expand_cycles: bool = False,
     peck_clearance_mm: float | None = None,
@@ -96,7 +94,7 @@ def simulate(
     """
     session, source = opened(program, machine, job, "<program>")
     options = SimulateOptions(
-        step_mm=step_mm, outside_box=outside_box, contour=contour, flatten=flatten,
+        step_mm=step_mm, outside_box=outside_box, flatten=flatten,
         expand_cycles=expand_cycles, peck_clearance_mm=peck_clearance_mm, date=date, accept=tuple(accept),
     )  # fmt: skip
     return run(session, source, options)
@@ -113,7 +111,7 @@ def run(session: Session, program: Source, options: SimulateOptions) -> Simulati
 def simulated(sources: Sources, program: Source, loaded: Loaded, options: SimulateOptions) -> Simulation:
     """As `simulate`, of a program whose dialect is settled in `loaded`."""
     with program.errors("<program>"):
-        reading = Options(contour=options.contour)
+        reading = Options()
         program, parsed = refusals.read(
             sources, program, loaded.setup, loaded.dialect, reading, options, words=False
         )

@@ -63,7 +63,6 @@ def verify(
     flatten: bool = False,
     expand_cycles: bool = False,
     peck_clearance_mm: float | None = None,
-    contour: bool = False,
     part_tolerance_um: float | None = None,
     only_sure_components: bool = False,
     date: datetime.date | None = None,
@@ -81,7 +80,7 @@ def verify(
     session = Session.start(machine, job)
     options = VerifyOptions(
         tolerance_um=tolerance_um, outside_box=outside_box, flatten=flatten, expand_cycles=expand_cycles,
-        peck_clearance_mm=peck_clearance_mm, contour=contour,
+        peck_clearance_mm=peck_clearance_mm,
         part_tolerance_um=part_tolerance_um, only_sure_components=only_sure_components, date=date,
         accept=tuple(accept),
     )  # fmt: skip
@@ -104,7 +103,7 @@ def run(
     with nominal.errors():
         loaded = loaded.reading(nominal)
     read = partial(refusals.read, session.sources, setup=loaded.setup, dialect=loaded.dialect)
-    reading = Options(contour=options.contour)
+    reading = Options()
     tell("read", 0.0)
     with nominal.errors("<nominal>"):
         _, first = read(nominal, options=reading, unrolling=options, kept=True)

@@ -299,7 +299,7 @@ CASES: dict[str, tuple[Call, Call]] = {
     ),
     "OLP304": (Call(b"/G1 X100 Y0 Z0\nG1 X100 Y0 Z0\n"), Call(b"G1 X100 Y0 Z0\n")),
     "OLP305": (
-        Call(b"G41 D1\nG1 X100\nG40\n", tables=tool(50.0), options={"contour": True}),
+        Call(b"G41 D1\nG1 X100\nG40\n", tables=tool(50.0)),
         Call(b"G1 X100\nG40\n", tables=tool(50.0)),
     ),
     "OLP306": (
@@ -321,6 +321,10 @@ CASES: dict[str, tuple[Call, Call]] = {
     ),
     "OLP311": (Call(b"G1 X1\n" + STAMP * 2), Call(b"G1 X1\n" + STAMP)),
     "OLP312": (Call(b"G1 X1\n" + STAMP), Call(b"G1 X1\n")),
+    "OLP313": (
+        Call(b"CUTCOM/LEFT\nGOTO/5,1,0\nFINI\n", APT, controller="apt"),
+        Call(b"CUTCOM/OFF\nGOTO/5,1,0\nFINI\n", APT, controller="apt"),
+    ),
     "OLP401": (
         Call(swap=UNTIL, options={"date": datetime.date(2027, 6, 2)}),
         Call(swap=UNTIL, options={"date": datetime.date(2027, 6, 1)}),

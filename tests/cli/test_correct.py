@@ -100,7 +100,7 @@ def test_what_is_missing_is_asked_for(args: list[str | Path]) -> None:
 
 
 def test_options_reach_the_library(mill: Path, library: Fake) -> None:
-    flags = ["--flatten", "--expand-cycles", "--contour", "--split-rapids"]
+    flags = ["--flatten", "--expand-cycles", "--contour", "path", "--split-rapids"]
     flags += ["--only-sure-components", "--part-tolerance-um", "7.5"]
     options = ["--tolerance-um", "2.5", "--outside-box", "hold", "--date", "2027-01-31"]
     options += ["--accept", "OLP409,OLP401", "--accept", "OLP440"]
@@ -108,7 +108,7 @@ def test_options_reach_the_library(mill: Path, library: Fake) -> None:
     passed = dict(library.calls[0][1])
     assert passed.pop("date").isoformat() == "2027-01-31"
     assert passed == {
-        "tolerance_um": 2.5, "outside_box": "hold", "flatten": True, "expand_cycles": True, "contour": True,
+        "tolerance_um": 2.5, "outside_box": "hold", "flatten": True, "expand_cycles": True, "contour": "path",
         "split_rapids": True, "peck_clearance_mm": None, "progress": None, "part_tolerance_um": 7.5,
         "only_sure_components": True, "accept": ("OLP409", "OLP401", "OLP440"),
     }  # fmt: skip

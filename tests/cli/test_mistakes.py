@@ -121,8 +121,8 @@ CASES = [
     # machine, calibration, dialect
     Case("length of a tool is not defined", ("part.nc:4", "tool 99", "give [tools.99]"),
          program(b"H1", b"H99")),
-    Case("cutter compensation", ("part.nc:7: G41 (cutter compensation)", "with --contour"),
-         program(b"X50.", b"G41 D1 X50.")),
+    Case("cutter compensation", ("part.nc:7", "radius of tool 99, which is not known", "give radius_mm"),
+         program(b"X50.", b"G41 D99 X50.")),
     Case("statements of another dialect", ("part.nc:1", "is not a statement that olp knows in APT"),
          args=(*CORRECT, "--dialect", "apt")),
     Case("calibration of another machine", ("calibration.toml: line 2", '"mill-2"', 'expected "mill-30-16"'),

@@ -8,7 +8,7 @@ import pytest
 from cases.acceptance import TRUE_ZERO, machine, unstamped
 
 import olp
-from olp.core.errors import ProgramError
+from olp.core.errors import ProgramError, UsageError
 
 HEAD = b"G21 G90 G54 G64 P0.001 Q0\nG0 X0 Y0 Z10\nG1 Z0 F600\n"
 #: a rectangle, entered and left
@@ -27,7 +27,7 @@ def tool(radius_mm: float) -> str:
 
 def corrected(folder: Path, body: bytes, calibration: str = "", **options: object) -> olp.Correction:
     path = machine(folder, calibration, BENT, tables=tool(5.0))
-    return olp.correct(HEAD + body + b"M2\n", path, contour=True, **options)  # type: ignore[arg-type]
+    return olp.correct(HEAD + body + b"M2\n", path, **options)  # type: ignore[arg-type]
 
 
 def body(result: olp.Correction) -> list[bytes]:
@@ -51,30 +51,25 @@ def test_the_proof_counts_what_a_turn_without_a_step_leaves(tmp_path: Path) -> N
     assert 1.0 < deviation["path_max_um"] < 7.0
 
 
-@pytest.mark.parametrize("off", [b"G40\n", b"G40 "])
-def test_an_axis_that_the_program_leaves_beside_the_contour_gets_no_word(tmp_path: Path, off: bytes) -> None:
-    text = b"G41 D1 X20 Y20\nX100\nZ-20\nY80\n" + off + b"G0 Z50\nX0\nG1 Z40\nY0\n"
+def test_a_block_along_the_tool_axis_gets_no_word_of_the_plane(tmp_path: Path) -> None:
+    text = b"G41 D1 X20 Y20\nX100\nZ-20\nY80\nG40 G0 X0\nG0 Z50\n"
     lines = body(corrected(tmp_path, text, LEANING))
-    assert lines[2] == b"Z-20" and lines[3].startswith(b"Y79.990 X100.010")
-    assert lines[-5].endswith(b"Z50") and b"X" not in lines[-5]
-    assert not [line for line in lines[-5:-2] if b"Y" in line]
-    assert lines[-4].startswith(b"X-0.0") and b"X" in lines[-3] and lines[-2].startswith(b"Y0.0")
+    assert lines[2] == b"Z-20"
 
 
-def test_the_first_and_the_last_move_are_not_split(tmp_path: Path) -> None:
+def test_a_move_to_the_contour_is_not_split_and_one_behind_it_is(tmp_path: Path) -> None:
     text = b"G41 D1 X20 Y110\nX100 Y20\nX200 Y110\nG40 G1 X20 Y0\n"
     lines = body(corrected(tmp_path, text, CURVE_Y))
     assert lines[0].startswith(b"G41") and lines[1].startswith(b"X")
-    assert b"G40" in lines[-2] and lines[-1] == b"M2"
-    assert len(lines) > 5
+    assert b"G40" in lines[-5] and lines[-1] == b"M2"
 
 
-def test_no_part_ends_near_a_concave_corner(tmp_path: Path) -> None:
-    """Half as far from the corners as a radius of 5 mm cuts off, the chords bend at Y = 90 all the same."""
-    inside = b"G41 D1 X20 Y20\nX100\nY91\nX20\nG40 G0 X0 Y0\n"
-    outside = inside.replace(b"G41", b"G42")
-    assert b"Y90" not in corrected(tmp_path, inside, CURVE_Y).data
-    assert b"Y90" in corrected(tmp_path, outside, CURVE_Y).data
+@pytest.mark.parametrize("code", [b"G41", b"G42"])
+def test_no_part_is_shorter_than_the_cutter_radius(tmp_path: Path, code: bytes) -> None:
+    """The chords bend at Y = 90."""
+    near = b"G41 D1 X20 Y20\nX100\nY101\nX20\nG40 G0 X0 Y0\n".replace(b"G41", code)
+    text = near.replace(b"Y101", b"Y93")
+    assert len(body(corrected(tmp_path, near, CURVE_Y))) == 1 + len(body(corrected(tmp_path, text, CURVE_Y)))
 
 
 @pytest.mark.parametrize(
@@ -89,23 +84,73 @@ def test_what_the_control_would_refuse_is_refused_with_its_line(
     path = machine(tmp_path, CURVE_Y.replace("y.csv", "x.csv"), stretch, tables=tool(5.0))
     text = HEAD + entry + b"Y30\nG40 G0 X0 Y0\nM2\n"
     with pytest.raises(ProgramError, match="control would refuse") as caught:
-        olp.correct(text, path, contour=True)
+        olp.correct(text, path)
     assert caught.value.line == line
     assert olp.correct(text.replace(b"G41 D1", b"G1"), path).report["deviation"]["holds"]
+    assert olp.correct(text, path, contour="path").report["deviation"]["holds"]
 
 
-def test_an_unknown_radius_is_said(tmp_path: Path) -> None:
-    known = corrected(tmp_path, RECTANGLE).findings
-    unknown = corrected(tmp_path, RECTANGLE.replace(b"D1", b"D7")).findings
-    (one,), (other,) = ([f for f in some if f.code == "OLP305"] for some in (known, unknown))
-    assert not one.lines and "radius" not in one.message
-    assert other.lines and "radius_mm" in other.message
+def test_an_outside_corner_that_would_be_lost_is_refused(tmp_path: Path) -> None:
+    """A control that takes 0.05 rad for no corner makes an arc about one that is just above."""
+    stretch = {"x.csv": "X_mm,EXX_um\n-1000,10000\n2000,-20000\n"}
+    path = machine(tmp_path, CURVE_Y.replace("y.csv", "x.csv"), stretch, tables=tool(5.0))
+    text = HEAD + b"G42 D1 X20 Y5\nX60 Y5\nX100 Y7.0025\nG40 G0 X0 Y0\nM2\n"
+    with pytest.raises(ProgramError, match="none any more") as caught:
+        olp.correct(text, path, accept=("OLP445",))
+    assert caught.value.line == 6
+    done = olp.correct(text, path, contour="path", accept=("OLP445",))
+    assert done.report["deviation"]["holds"]
+
+
+def test_a_contour_states_its_radius_and_the_path_what_it_lacks(tmp_path: Path) -> None:
+    result = corrected(tmp_path, RECTANGLE)
+    (one,) = [f for f in result.findings if f.code == "OLP305"]
+    assert "radii of 5 mm" in one.message
+    assert one.lines == (4,)
+    (other,) = [f for f in corrected(tmp_path, RECTANGLE, contour="path").findings if f.code == "OLP314"]
+    assert other.lines == (4,)
+    with pytest.raises(ProgramError, match=r"give radius_mm, and wear_mm, in \[tools\.7\]"):
+        corrected(tmp_path, RECTANGLE.replace(b"D1", b"D7"))
 
 
 def test_points_under_cutcom_get_no_step(tmp_path: Path) -> None:
     path = machine(tmp_path, PLAY, tables=tool(5.0))
     text = b"UNITS/MM\nRAPID\nGOTO/0,0,0\nFEDRAT/600,MMPM\n%sGOTO/50,0,0\nGOTO/20,30,0\n%sGOTO/0,0,0\nFINI\n"
-    on = olp.correct(text % (b"CUTCOM/LEFT\n", b"CUTCOM/OFF\n"), path, contour=True)
+    on = olp.correct(text % (b"CUTCOM/LEFT\n", b"CUTCOM/OFF\n"), path)
     off = olp.correct(text % (b"", b""), path)
-    # one of them takes it up in the rapid before the contour
-    assert on.data.count(b"GOTO") == 5 < off.data.count(b"GOTO")
+    assert on.data.count(b"GOTO") < off.data.count(b"GOTO")
+    assert [f.lines for f in on.findings if f.code == "OLP313"] == [(6,)]
+    with pytest.raises(UsageError, match="programs of blocks"):
+        olp.correct(text % (b"CUTCOM/LEFT\n", b"CUTCOM/OFF\n"), path, contour="path")
+
+
+def test_a_path_is_written_with_its_corners_and_without_compensation(tmp_path: Path) -> None:
+    """About the upper right corner of a square, and away; worked by hand."""
+    text = b"G1 X20 Y5\nN1 G42 D1 X40 Y0 (in)\nX100 F300\nN3 Y80 M8\nG40 G0 X120 Y90\n"
+    lines = body(corrected(tmp_path, text, contour="path"))
+    end = 40 - 5 * 5 / 425**0.5, -5 * 20 / 425**0.5
+    assert lines[1] == b"N1 X%.3f Y%.3f (in)" % end
+    away = end[0] - 40, end[1]
+    assert lines[2] == b"G3 X40.000 Y-5.000 I%.4f J%.4f" % (-round(away[0], 3), -round(away[1], 3))
+    assert lines[3:] == [
+        b"G1 X100.000 F300", b"G3 X105.000 Y0.000 I0.0000 J5.0000",
+        b"N3 G1 Y80.000 M8", b"G40 G0 X120.000 Y90.000", b"M2",
+    ]  # fmt: skip
+
+
+def test_a_path_keeps_distances_centres_and_units(tmp_path: Path) -> None:
+    """The same tool path from absolute words, distances, inches, R words and absolute centres."""
+    absolute = b"G1 X20 Y-10\nG42 D1 X40 Y0\nX80\nG3 X90 Y10 I0 J10\nG1 Y50\nX40\nY0\nG40 X20 Y-10\n"
+    same = {
+        "G91": b"G1 X20 Y-10\nG91 G42 D1 X20 Y10\nX40\nG3 X10 Y10 J10\nG1 Y40\nX-50\nY-50\n"
+        b"G40 X-20 Y-10\nG90\n",
+        "R": absolute.replace(b"I0 J10", b"R10"),
+    }
+    wanted = corrected(tmp_path, absolute, contour="path")
+    for name, text in same.items():
+        result = corrected(tmp_path, text, contour="path")
+        assert b"G42" not in result.data
+        assert result.position_mm == pytest.approx(wanted.position_mm, abs=1e-9), name
+        assert result.report["deviation"]["holds"], name
+    with pytest.raises(ProgramError, match="cannot be written as blocks"):
+        corrected(tmp_path, b"G90.1\n" + absolute.replace(b"G3 X90 Y10 I0 J10", b"X90 Y10"), contour="path")

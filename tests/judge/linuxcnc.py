@@ -195,7 +195,7 @@ def _setup(
     table: dict[int, tuple[float, float, float, float]] = {}
     for number, entry in text.get("tools", {}).items():
         x, y, z = (float(entry.get(f"{a}_mm", 0.0)) for a in "XYZ")
-        table[int(number)] = (x, y, z, 2.0 * float(entry.get("radius_mm", 0.0)))
+        table[int(number)] = (x, y, z, 2.0 * float(entry.get("radius_mm", 0.0) + entry.get("wear_mm", 0.0)))
     for tool, (x, y, z) in tools.items():
         table[tool] = (x, y, z, 0.0)
     defaults = text.get("job_defaults", {})

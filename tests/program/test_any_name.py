@@ -136,7 +136,7 @@ def reading(text: bytes, setup: Setup, dialect: Dialect, options: Options) -> li
         return [program, str(error)]
 
 
-@pytest.mark.parametrize("options", [Options(), Options(block_delete=True, contour=True)], ids=str)
+@pytest.mark.parametrize("options", [Options(), Options(block_delete=True)], ids=str)
 @pytest.mark.parametrize("name", some_fast(NAMES, 8))
 def test_programs_are_read_and_timed_alike(pairs: Mapping[str, Pair], name: str, options: Options) -> None:
     outcomes = [alike(lambda s, d: reading(text, s, d, options), pairs[name]) for text in texts_of(name)]  # noqa: B023
@@ -161,7 +161,7 @@ def test_programs_are_unrolled_alike(pairs: Mapping[str, Pair], name: str) -> No
 @pytest.mark.parametrize("name", some_fast(NAMES, 8))
 def test_programs_are_corrected_and_judged_alike(pairs: Mapping[str, Pair], name: str) -> None:
     def corrected(text: bytes, setup: Setup) -> tuple[bytes, object, object]:
-        result = olp.correct(text, setup, contour=True)
+        result = olp.correct(text, setup)
         return result.data, result.report, [finding.as_dict() for finding in result.findings]
 
     pair, good = pairs[name], 0

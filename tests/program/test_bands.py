@@ -123,7 +123,7 @@ def test_what_is_quiet(text: str, expected: list[int] | None, folder: Path) -> N
 def test_behind_a_contour_no_place_is_quiet(folder: Path) -> None:
     text = HEAD + "G1 X1\nX2\nG41 D1\nX20\nX40\nG40\nX60\nX70\nX80\n"
     setup = load_setup(folder, None)
-    whole = read(text.encode(), setup, DIALECTS["linuxcnc"], Options(contour=True))
+    whole = read(text.encode(), setup, DIALECTS["linuxcnc"], Options())
     on = int(np.argmax(whole.toolpath.compensated()))
     assert on > 0
     *before, last = list(spans(whole.toolpath, 1))

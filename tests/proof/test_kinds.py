@@ -190,10 +190,10 @@ def test_a_contour_that_changes_its_side_is_refused(tmp_path: Path) -> None:
         tmp_path, CURVE, SCALE, tables=tables, controller="fanuc", keys='decimal_point = "calculator"\n'
     )
     text = b"G21 G90 G54\nG0 X0 Y0 Z0\nG41 D1 G1 X20 Y20 F500\nX100\nY80\nG42 D1 X60\nY40\nG40 G0 X0 Y0\nM2\n"
-    with pytest.raises(ProgramError, match="without G40") as refused:
-        olp.correct(text, path, contour=True)
+    with pytest.raises(ProgramError, match="is on already") as refused:
+        olp.correct(text, path)
     assert refused.value.line == 6
-    olp.correct(text.replace(b"G42 D1 X60", b"G40 X90\nG42 D1 X60"), path, contour=True)
+    olp.correct(text.replace(b"G42 D1 X60", b"G40 X90\nG42 D1 X60"), path)
 
 
 # -- paths without a text --------------------------------------------------------------------------------

@@ -116,8 +116,8 @@ CONTOUR = (
 
 def test_any_size_of_bands_gives_the_same_of_contours(machine: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     text = CONTOUR.format("G41 D1", "G40").encode()
-    assert isinstance(corrected(text, machine, contour=True), tuple)
-    check(monkeypatch, text, machine, contour=True)
+    assert isinstance(corrected(text, machine), tuple)
+    check(monkeypatch, text, machine)
 
 
 @pytest.mark.parametrize("seed", some_fast(range(6), 2))

@@ -2,78 +2,88 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import numpy as np
 import pytest
 from judge import linuxcnc, machines
+from judge.contours import contour, worn
+from judge.linuxcnc import ARC
 from judge.machines import Recipe
+from judge.path import judge_programs
 
 import olp
-from olp.compensation.corners import gouging
 from olp.core.errors import ProgramError
+from olp.core.geometry import PLANES
 from olp.files.config import load_setup
-from olp.program.dialect import Options
-from olp.program.registry import DIALECTS
-from olp.program.rs274.reader import read
+from olp.program.registry import DIALECTS, read
 
 pytestmark = pytest.mark.oracle
 
-RECIPE = {"work_offsets": {"G54": {"X_mm": 300.0, "Y_mm": 300.0, "Z_mm": -200.0, "set_by": "true"}}}
+OFFSETS = {"G54": {"X_mm": 300.0, "Y_mm": 300.0, "Z_mm": -200.0, "set_by": "true"}}
+#: a new cutter, worn ones, and one that is worn to less than nothing, as where the program has its path
+TOOLS = {
+    1: {"Z_mm": 0.0, "radius_mm": 5.0, "wear_mm": -0.03},
+    2: {"Z_mm": 0.0, "radius_mm": 3.0, "wear_mm": 0.02},
+    3: {"Z_mm": 0.0, "radius_mm": 0.0, "wear_mm": -0.35},
+    4: {"Z_mm": 0.0, "radius_mm": 0.0, "wear_mm": 0.8},
+}
+RECIPE = Recipe(work_offsets=OFFSETS)
+WORN = Recipe(work_offsets=OFFSETS, tools=TOOLS, peak_um=(10.0, 30.0), increment_mm=0.0001)
 PLAY = {"X": 6.0, "Y": 4.0, "Z": 3.0}
-
-
-def contour(seed: int) -> bytes:
-    """Lines and arcs of 0.03 to 30 mm with corners of all sizes, in G17 or G18; many cannot be cut."""
-    rng = np.random.default_rng(seed)
-    plane = "G18" if seed % 5 == 0 else "G17"
-    (a, i), (b, j), third = (("Z", "K"), ("X", "I"), "Y") if plane == "G18" else (("X", "I"), ("Y", "J"), "Z")
-    side = rng.choice(["G41", "G42"])
-    on = side + rng.choice(
-        [" D1", " D2", "", f".1 D{rng.uniform(1, 12):.3f}", f".1 D{rng.uniform(1, 12):.3f}"]
-    )
-    place = rng.uniform(8, 20, 2)
-    lines = [f"G21 G90 {plane} G94 G54 F1000", "G0 X0 Y0 Z10", "G1 Z0"]
-    lines.append(f"{on} G1 {a}{place[0]:.3f} {b}{place[1]:.3f}")
-    heading = math.atan2(place[1], place[0])
-    for _ in range(rng.integers(2, 7)):
-        heading += rng.choice([0, rng.normal() * 0.02, rng.normal() * 0.3, rng.uniform(-1.8, 1.8)])
-        if seed % 2 and rng.random() < 0.5:
-            radius, sweep = 10 ** rng.uniform(0, 1.5), rng.uniform(0.1, 2.5) * rng.choice([-1, 1])
-            away = radius * np.sign(sweep) * np.array([-math.sin(heading), math.cos(heading)])
-            end = math.atan2(-away[1], -away[0]) + sweep
-            place = place + away + radius * np.array([math.cos(end), math.sin(end)])
-            code = "G3" if sweep > 0 else "G2"
-            words = f"{i}{away[0]:.5f} {j}{away[1]:.5f}"
-            lines.append(f"{code} {a}{place[0]:.5f} {b}{place[1]:.5f} {words}")
-            heading += sweep
-        else:
-            place = place + 10 ** rng.uniform(-1.5, 1.5) * np.array([math.cos(heading), math.sin(heading)])
-            lines.append(f"G1 {a}{place[0]:.5f} {b}{place[1]:.5f}")
-            if rng.random() < 0.2:
-                lines.append(f"G1 {third}{rng.uniform(-5, 5):.2f}")
-    return "\n".join([*lines, "G40 G0 X0 Y0", "G0 Z50", "M2", ""]).encode()
+CUTTING = ("feed", "arc")
+#: um: numerical tolerance and the last digit; digits turn a block by their share of its length
+ALLOWED_UM = 1.0 + 0.2
 
 
 @pytest.mark.parametrize("block", range(4))
-def test_what_the_interpreter_refuses_is_found(tmp_path: Path, block: int) -> None:
-    """The rule finds more: the interpreter does not look at the end of a contour. At arcs it counts along
-    their tangents, so that one contour in a hundred may be judged otherwise."""
-    path = machines.zero_machine(tmp_path, Recipe(**RECIPE))
+def test_the_path_of_the_tool_is_the_interpreters(tmp_path: Path, block: int) -> None:
+    """Every move of it, or a refusal by both."""
+    path = machines.zero_machine(tmp_path, RECIPE)
     setup = load_setup(path)
-    taken, refused, missed, too_strict = 0, 0, [], 0
-    for seed in range(60 * block, 60 * block + 60):
+    taken, refused, differ = 0, 0, []
+    for seed in range(100 * block, 100 * block + 100):
         text = contour(seed)
-        found = gouging(read(text, setup, DIALECTS["linuxcnc"], Options(contour=True)).toolpath).any()
-        if linuxcnc.accepts(text, path):
-            taken, too_strict = taken + 1, too_strict + bool(found)
-        else:
+        try:
+            moves = linuxcnc.interpret(text, path, find_known=False)
+        except linuxcnc.InterpreterError:
+            moves = None
+        try:
+            mine = read(text, setup, DIALECTS["linuxcnc"]).toolpath
+        except ProgramError:
+            mine = None
+        if moves is None or mine is None:
             refused += 1
-            missed += [] if found else [seed]
-    assert len(missed) <= 1
-    assert taken > 20 and refused > 10
-    assert too_strict <= 0.25 * taken
+            differ += [seed] if (moves is None) != (mine is None) else []
+            continue
+        taken += 1
+        same = len(mine) == len(moves) and np.abs(mine.end_mm - moves.axis).max() < 1e-6
+        for arc, move in enumerate(mine.arcs.move if same else ()):
+            axes = list(PLANES[mine.arcs.plane[arc]][:2])
+            off = np.abs(mine.arcs.centre_mm[arc] - moves.centre[move])[axes].max()
+            same &= bool(off < 1e-6 and moves.kind[move] == ARC)
+        differ += [] if same else [seed]
+    assert not differ
+    assert taken > 40 and refused > 20
+
+
+@pytest.mark.parametrize("form", ["contour", "path"])
+@pytest.mark.parametrize("block", range(4))
+def test_the_tool_goes_where_it_should_with_a_worn_cutter(tmp_path: Path, block: int, form: str) -> None:
+    """Along 100 contours: the interpreter's path of the corrected program, on the judge's machine."""
+    path = machines.random_machine(tmp_path, block, WORN)
+    off, taken = {}, 0
+    for seed in range(25 * block, 25 * block + 25):
+        nominal = worn(seed)
+        result = olp.correct(nominal, path, contour=form)  # type: ignore[arg-type]
+        verdict = judge_programs(nominal, result.data, path, kinds=CUTTING)
+        taken += verdict.after.judged > 0
+        if verdict.max_um > ALLOWED_UM:
+            off[seed] = verdict.max_um
+        assert (b"G41" in result.data or b"G42" in result.data) == (form == "contour")
+        assert olp.verify(nominal, result.data, path).report["deviation"]["holds"]
+    assert not off
+    assert taken == 25
 
 
 @pytest.mark.parametrize("play", [{}, PLAY])
@@ -81,14 +91,14 @@ def test_what_the_interpreter_refuses_is_found(tmp_path: Path, block: int) -> No
 def test_a_contour_that_was_taken_is_taken_once_corrected(
     tmp_path: Path, block: int, play: dict[str, float]
 ) -> None:
-    path = machines.random_machine(tmp_path, block, Recipe(backlash_um=play, waves=4.0, **RECIPE))
+    path = machines.random_machine(tmp_path, block, Recipe(backlash_um=play, waves=4.0, work_offsets=OFFSETS))
     wrong, taken, refused = [], 0, 0
     for seed in range(50 * block, 50 * block + 50):
         nominal = contour(seed)
         if not linuxcnc.accepts(nominal, path):
             continue
         try:
-            result = olp.correct(nominal, path, contour=True)
+            result = olp.correct(nominal, path)
         except ProgramError as error:
             assert error.line is not None
             refused += 1
@@ -98,3 +108,21 @@ def test_a_contour_that_was_taken_is_taken_once_corrected(
     assert not wrong
     assert taken > 15
     assert refused <= 4
+
+
+def test_nothing_changes_without_errors(tmp_path: Path) -> None:
+    path = machines.zero_machine(tmp_path, WORN)
+    for seed in range(60):
+        assert olp.correct(worn(seed), path).data == worn(seed)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_with_backlash_a_path_turns_by_steps(tmp_path: Path, seed: int) -> None:
+    recipe = Recipe(
+        work_offsets=OFFSETS, tools=TOOLS, peak_um=(10.0, 30.0), increment_mm=0.0001, backlash_um=PLAY
+    )
+    path = machines.random_machine(tmp_path, seed, recipe)
+    contours = olp.correct(worn(seed), path).report["deviation"]
+    paths = olp.correct(worn(seed), path, contour="path").report["deviation"]
+    assert paths["holds"]
+    assert paths["path_max_um"] <= contours["path_max_um"]

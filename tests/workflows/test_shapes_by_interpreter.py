@@ -127,7 +127,7 @@ def crossings(rng: np.random.Generator) -> str:
     return reversals(rng) + before_arcs(rng) + "G61\n" + reversals(rng) + "M1\nG4 P.1\nG1 X9 Y9 M9\n"
 
 
-CONTOUR = {"contour": True}
+CONTOUR = {"contour": "contour"}
 SHAPES = {
     "contour by tool number": Shape(lambda r: rectangle(r, "G41 D1"), {}, CONTOUR),
     "contour by spindle tool": Shape(lambda r: rectangle(r, "G42"), {}, CONTOUR),

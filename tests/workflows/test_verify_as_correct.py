@@ -99,7 +99,7 @@ def test_errors_of_verify_name_the_text_that_has_the_line(tmp_path: Path) -> Non
     assert error(good, HEAD + b"M2\n") == (str(other), None)
 
 
-def test_a_refused_contour_is_named_by_its_nominal_line(tmp_path: Path) -> None:
+def test_a_refused_contour_is_named_by_its_own_line(tmp_path: Path) -> None:
     tables = TRUE_ZERO + "[tools.1]\nZ_mm = 0.0\nradius_mm = 5.0\n[job_defaults]\ntool = 1\n"
     path = made(tmp_path, tables=tables)
     nominal, other = tmp_path / "a.ngc", tmp_path / "b.ngc"
@@ -107,9 +107,9 @@ def test_a_refused_contour_is_named_by_its_nominal_line(tmp_path: Path) -> None:
     nominal.write_bytes(HEAD + body % b"")
     other.write_bytes(b"(one line more)\n" + HEAD + body % b"Y20.4\nX100.4\n")
     with pytest.raises(ProgramError) as caught:
-        olp.verify(nominal, other, path, contour=True)
-    assert "control would refuse this block" in caught.value.message
-    assert (caught.value.file, caught.value.line) == (str(nominal), 6)
+        olp.verify(nominal, other, path)
+    assert "does not fit into the corners of this move" in caught.value.message
+    assert (caught.value.file, caught.value.line) == (str(other), 7)
 
 
 def test_doubts_of_a_run_name_the_program_of_their_line(tmp_path: Path) -> None:

@@ -73,13 +73,33 @@ RULES = (
     ),
     _rule(
         "OLP305",
-        "contour taken as tool path",
+        "contour under cutter compensation",
+        Severity.INFO,
+        "Under G41/G42 the control makes the path of the tool from the contour and the cutter radius. The "
+        "correction is computed on that path. It holds for the radius of the tool table, and well enough "
+        "for a wear that is small beside it. No step takes up backlash along a contour.",
+        "Keep radius_mm and wear_mm as the control has them. Have the path of the tool written (--contour "
+        "path) where an axis with backlash turns round on the contour.",
+        "`G41 D1` in a program for LinuxCNC.",
+    ),
+    _rule(
+        "OLP313",
+        "how the control makes a contour is assumed",
         Severity.WARNING,
-        "Under G41/G42 the control offsets the contour by the tool radius. The correction was computed on "
-        "the contour. No step takes up backlash there, because the control would refuse it.",
-        "Program the tool path where the error changes noticeably over the tool radius, or where an axis "
-        "with backlash turns round.",
-        "`olp correct part.nc --contour` with `G41 D1` in the program.",
+        "How a contour begins, and how the tool goes round its outside corners, is a parameter of this "
+        "control. The correction and its proof hold for what the message says.",
+        "Compare it with the parameters of the control. Or have the path of the tool written (--contour "
+        "path), which leaves nothing to them.",
+        "`G41 D1` in a program for Fanuc: start-up of type A is assumed.",
+    ),
+    _rule(
+        "OLP314",
+        "path of the tool written without compensation",
+        Severity.WARNING,
+        "The contour was replaced by the path of the tool, so the control adds no radius and no wear.",
+        "Correct the nominal program again when the wear has changed.",
+        "`olp correct part.ngc --contour path` with `G41 D1` in the program.",
+        gate=False,
     ),
     _rule(
         "OLP306",

@@ -80,11 +80,11 @@ RULES = (
     ),
     _rule(
         "OLP513",
-        "cutter compensation",
+        "cutter radius is not known",
         why="The control makes the path of the tool itself, from a radius in its tables.",
-        remedy="Have the CAM system write the path of the tool centre, or take the contour as "
-        "the path of the tool (--contour).",
-        example="`G41 D1`.",
+        remedy="Give radius_mm, and wear_mm, of the tool in the machine or job file, as the control has "
+        "them.",
+        example="`G41 D7` without radius_mm in `[tools.7]`.",
     ),
     _rule(
         "OLP514",
@@ -186,6 +186,15 @@ RULES = (
         "writes there is not read.",
         remedy="State the values in the machine or job file, and take the block out.",
         example="`G10 L1 P1 Z100`.",
+    ),
+    _rule(
+        "OLP528",
+        "contour that the control refuses",
+        why="Under G41/G42 the control makes the path of the tool from the contour. Where the cutter does "
+        "not fit into it, the control stops or cuts what it should not.",
+        remedy="Use a smaller cutter, make the move longer, or enter the contour by a straight move that is "
+        "longer than the cutter radius.",
+        example="A pocket corner between two moves of 3 mm with a cutter radius of 5 mm.",
     ),
     _rule(
         "OLP530",

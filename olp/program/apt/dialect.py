@@ -46,4 +46,6 @@ DIALECT = StatementDialect(
     shared_sign=POINTS_BY_SLASH,
     comment=(b"$$ ", b""),
     first=(b"%", b"$$*", b"PARTNO"),
+    contours_assumed="points under CUTCOM are corrected where they are stated: that the tool is there, or no "
+    "farther from there than its wear, is assumed",
 )

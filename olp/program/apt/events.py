@@ -199,13 +199,6 @@ class Events(Placing):
 
     def _cutcom(self, statement: Statement, row: int) -> None:
         words = {f.text for f in statement.fields()}
-        if words & {b"LEFT", b"RIGHT", b"ON"} and not self.options.contour:
-            raise ProgramError(
-                "CUTCOM (cutter compensation) makes the path inside the control; "
-                "send the path of the tool's centre, or take the points as that path with --contour",
-                line=statement.line,
-                code="OLP513",
-            )
         self._resolve(row)
         if b"OFF" in words:
             self.compensation = None

@@ -15,8 +15,6 @@ from olp.core.toolpath import CutterCompensation, Frame, LengthError
 from olp.core.values import dataclass
 from olp.program.frames import length_errors_of, tool_vector_of, touch_tool_of
 from olp.program.rs274.codes import (
-    COMPENSATION_BY_DIAMETER,
-    COMPENSATION_LEFT,
     COMPENSATION_OFF,
     CUTTER_COMPENSATION,
     DWELL,
@@ -27,7 +25,6 @@ from olp.program.rs274.codes import (
     MACHINE,
     METRIC,
     PATH_MODES,
-    PLANE_OF,
     ROTATION,
     SHIFTS,
     TRANSFORMS,
@@ -36,6 +33,7 @@ from olp.program.rs274.codes import (
     WORK_OFFSETS,
     WRITE_OFFSET,
 )
+from olp.program.rs274.cutter import check_block, switched_on
 from olp.program.rs274.offset_state import OffsetState, Word
 from olp.program.rs274.offsets import Offsets
 from olp.program.rs274.profiles.base import Profile
@@ -79,6 +77,7 @@ class AxisState(OffsetState):
     turning: int = -1
     payload_kg: float = 0.0
     compensation: CutterCompensation | None = None
+    contours: int = 0
     frames: list[Frame] = field(default_factory=list)
     path_modes: list[PathMode] = field(default_factory=list)
     #: the frame of the last plain motion, -1 before any
@@ -190,6 +189,8 @@ class AxisState(OffsetState):
         angle_deg = self._angle_deg(self.offsets.name, line) if self.profile.turns_offsets else 0.0
         self.unit = next((code for code in codes if code in UNITS), self.unit)
         self._check_modes(codes, line)
+        changes_tool = TOOL_CHANGE in m_codes or (SET_TOOL in m_codes and self.profile.m61_sets_tool)
+        check_block(self, codes, line, changes_tool=changes_tool)
         for code in sorted(codes, key=lambda code: _RANK.get(code, len(_RANK))):
             effect = self._event(code, line, by_letter, axis_words, moves, effect)
         if self.profile.turns_offsets:
@@ -268,7 +269,7 @@ class AxisState(OffsetState):
         elif code == COMPENSATION_OFF:
             self.compensation = None
         elif code in CUTTER_COMPENSATION:
-            self._cutter_compensation(code, line, by_letter)
+            self.compensation = switched_on(self, code, line, by_letter)
         elif code in HOMES:
             if not axis_words:
                 return replace(effect, home=(0, 1, 2))
@@ -332,21 +333,6 @@ class AxisState(OffsetState):
                 line=line,
                 code="OLP518",
             )
-
-    def _cutter_compensation(self, code: int, line: int, by_letter: dict[str, Word]) -> None:
-        """G41 and G42: D is the number of a tool, or a diameter; without it the tool in the spindle counts on
-        controls that take its length too."""
-        radius_mm = 0.0
-        if code in COMPENSATION_BY_DIAMETER:
-            radius_mm = self.length_mm(by_letter["D"]) / 2 if "D" in by_letter else 0.0
-        else:
-            number = self._integer(by_letter["D"], line) if "D" in by_letter else 0
-            if not number and self.profile.length_of_spindle_tool:
-                number = self.spindle or 0
-            tool = self.setup.tool(number)
-            radius_mm = 0.0 if tool is None else tool.radius_mm
-        left = (code in COMPENSATION_LEFT) == (radius_mm >= 0)
-        self.compensation = CutterCompensation(PLANE_OF[self.plane], left, abs(radius_mm))
 
     def _path_mode(self, code: int, line: int, by_letter: dict[str, Word]) -> None:
         name = f"G{code / 10:g}"

@@ -14,10 +14,11 @@ from olp.program.rs274.profiles.base import Profile
 
 
 def read_blocks(data: bytes, setup: Setup, profile: Profile, options: Options, *, words: bool) -> Program:
-    """`olp.program.rs274.reader.read`."""
+    """`olp.program.rs274.reader.read`, with the path of the tool along contours."""
+    from olp.program.contours.program import with_tool_path
     from olp.program.rs274.reader import read
 
-    return read(data, setup, profile, options, words=words)
+    return with_tool_path(read(data, setup, profile, options, words=words), profile.contours)
 
 
 def unroll_blocks(data: bytes, profile: Profile, **options: Any) -> Unrolled:

@@ -20,8 +20,6 @@ from olp.program.rs274.axis_state import AxisState
 from olp.program.rs274.block_rules import M
 from olp.program.rs274.codes import (
     AXIS_VALUES,
-    COMPENSATION_OFF,
-    CUTTER_COMPENSATION,
     DWELL,
     END_OF_CYCLES,
     GROUPS,
@@ -93,7 +91,7 @@ class Odd:
 class Modes:
     """The codes in force, from chunk to chunk; those at the end of a chunk are kept in the `state`."""
 
-    def __init__(self, state: AxisState, *, block_delete: bool, contour: bool) -> None:
+    def __init__(self, state: AxisState, *, block_delete: bool) -> None:
         self._state = state
         self._block_delete = block_delete
         profile = state.profile
@@ -107,8 +105,6 @@ class Modes:
         self._code_of = np.arange(len(self._act))
         for alias, code in profile.aliases.items():
             self._code_of[alias] = code
-        if contour:
-            self._act[[COMPENSATION_OFF, *CUTTER_COMPENSATION]] = Act.EVENT
         self._m_event = np.ones(10_001, bool)
         self._m_event[list(profile.still_m)] = False
         self._rules = profile.rules.tables()

@@ -100,7 +100,7 @@ class _Reader:
         self.state = AxisState.at_start(setup, profile)
         x, y, z = self.state.position
         self.collector = Collector(data, (x, y, z), keep_words=words)
-        self.modes = Modes(self.state, block_delete=options.block_delete, contour=options.contour)
+        self.modes = Modes(self.state, block_delete=options.block_delete)
         self.switches = Directives(data)
         self.payloads: dict[int, float] = {}
         self.special_blocks = SpecialBlocks(self.state, self.collector)

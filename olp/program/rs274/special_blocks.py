@@ -14,7 +14,6 @@ from olp.core.errors import ProgramError
 from olp.core.toolpath import Flag, Kind
 from olp.program.rs274.axis_state import AxisState, Effect
 from olp.program.rs274.codes import (
-    CUTTER_COMPENSATION,
     DWELL,
     HOMES,
     INCREMENTAL,
@@ -74,12 +73,10 @@ def _checked(
         if a == Act.REFUSE:
             why = profile.refusals.get(c)
             name = f"G{number:g}"
-            if c in CUTTER_COMPENSATION:
-                why = f"{why}; program the tool path, or take the contour as tool path with --contour"
             raise ProgramError(
                 why or f"{name} is not known to the {profile.name} profile and may move the machine",
                 line=line,
-                code="OLP513" if c in CUTTER_COMPENSATION else "OLP511" if c in MACROS else "OLP512",
+                code="OLP511" if c in MACROS else "OLP512",
                 hint=unroll if c in MACROS else "",
                 # the other words of a macro call are its arguments
                 word="" if c in MACROS else name,
@@ -130,10 +127,16 @@ class SpecialBlocks:
             np.array([Kind.RAPID], np.uint8),
             np.array([Flag.PASS | Flag.CONTROL | _deleted(deleted)], np.uint8),
             np.array([line]),
-            np.array([len(self._state.frames) - 1]),
+            np.array([self._loose_frame()]),
             np.array([self._state.position]),
             np.full((1, 3), -1),
         )
+
+    def _loose_frame(self) -> int:
+        """The last frame without cutter compensation, which is of no contour."""
+        frames = self._state.frames
+        loose = (i for i in range(len(frames) - 1, -1, -1) if frames[i].compensation is None)
+        return next(loose, len(frames) - 1)
 
     def run(self, context: Context, row: int, slot: Index, frame_index: int, effect: Effect) -> None:
         """Carry out a probe, a G53 move or the move to the intermediate point of G28 on line `row` of the

@@ -12,7 +12,7 @@ from olp.program.rs274.block_text import BlockText
 from olp.program.rs274.cycle_rules import ISO_CYCLES
 from olp.program.rs274.entry import read_blocks
 from olp.program.rs274.flatten.language import MACRO_B
-from olp.program.rs274.profiles.base import ISO_M, REFUSALS, Act, Profile
+from olp.program.rs274.profiles.base import ISO_M, Act, Profile
 from olp.program.sinumerik.entry import translate_text
 from olp.program.sinumerik.table import HARMLESS_G, ROUNDING_G, statements
 from olp.program.text.signs import SINUMERIK
@@ -67,7 +67,12 @@ DIALECT = Sinumerik(
     dwell="F",
     written_ending="mpf",
     codes=MappingProxyType(_CODES),
-    refusals=MappingProxyType({code: REFUSALS[code] for code in (410, 420)}),
+    refusals=MappingProxyType(
+        {
+            code: f"G{code // 10} (cutter compensation) has its radius in a cutting edge, which is not read"
+            for code in (410, 420)
+        }
+    ),
     harmless_m=ISO_M | {17, *range(40, 46)},
     motion=1,
     initial_retract=980,

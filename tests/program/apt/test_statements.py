@@ -214,10 +214,9 @@ def test_a_delay_has_a_time(setup: Setup) -> None:
 
 
 @pytest.mark.parametrize("side", ("LEFT", "RIGHT", "ON"))
-def test_cutter_compensation_is_a_contour_or_refused(side: str, setup: Setup) -> None:
+def test_points_under_cutter_compensation_keep_their_side(side: str, setup: Setup) -> None:
     text = f"GOTO/0,0,0\nCUTCOM/{side}\nGOTO/9,0,0\nCUTCOM/OFF\nGOTO/9,9,0\n"
-    assert refused(text, setup, "makes the path inside the control") == 3
-    path = program(text, setup, contour=True).toolpath
+    path = program(text, setup).toolpath
     kept = [path.frames[int(k)].compensation for k in path.frame]
     assert [c if c is None else c.left for c in kept] == [
         None,
@@ -258,7 +257,6 @@ def test_two_arcs_need_a_point_between_them(setup: Setup) -> None:
         ("GOTO/10,0,0\nCIRCLE/0,0,0,0,0,1\nCIRCLE/0,0,0,0,0,1", 4, "OLP532", "an arc follows an arc"),
         ("LOADTL/3.5", 2, "OLP516", "LOADTL needs the number of a tool"),
         ("TURRET/3.05", 2, "OLP516", "TURRET needs the number of a tool"),
-        ("CUTCOM/LEFT", 2, "OLP513", "CUTCOM"),
         ("TLAXIS/0,0,1,0", 2, "OLP516", "TLAXIS is read with three numbers only"),
         ("TLAXIS/0,A,1", 2, "OLP516", "TLAXIS is read with three numbers only"),
         ("TLAXIS/0,0,1.002", 2, "OLP516", r"TLAXIS has length 1\.002; expected"),
@@ -620,7 +618,7 @@ def test_compensation_of_the_cutter_is_in_the_frame(setup: Setup) -> None:
     text = (
         "CUTCOM/LEFT\nGOTO/0,0,0\nCUTCOM/ON\nGOTO/1,0,0\nCUTCOM/RIGHT\nGOTO/2,0,0\nCUTCOM/OFF\nGOTO/3,0,0\n"
     )
-    path = program(text, setup, contour=True).toolpath
+    path = program(text, setup).toolpath
     left, right = CutterCompensation(0, True), CutterCompensation(0, False)
     assert [path.frames[k].compensation for k in path.frame.tolist()] == [left, left, right, None]
 

@@ -240,36 +240,84 @@ def test_words_that_store_the_present_position_are_kept(setups: dict[str, Setup]
     assert isinstance(read.captures[0], Capture)
 
 
-#: Blocks behind `HEAD`, and the cutter compensation of the last move, the contour taken as tool path. Tool 1
-#: has the radius 4, tool 3 the radius -3, tool 2 none.
+#: Blocks behind `HEAD`, and the cutter compensation of the last move. Tool 1 has the radius 4, tool 3 the
+#: radius -3, tool 2 none.
 COMPENSATED: dict[tuple[str, str], CutterCompensation | None] = {
-    ("linuxcnc", "G41 D1\nG1 X5 F60"): CutterCompensation(0, True, 4.0),
-    ("linuxcnc", "G42 D1\nG1 X5 F60"): CutterCompensation(0, False, 4.0),
-    ("linuxcnc", "G41 D3\nG1 X5 F60"): CutterCompensation(0, False, 3.0),
-    ("linuxcnc", "G42 D3\nG1 X5 F60"): CutterCompensation(0, True, 3.0),
-    ("linuxcnc", "G41 D2\nG1 X5 F60"): CutterCompensation(0, True, 0.0),
-    ("linuxcnc", "G41 D9\nG1 X5 F60"): CutterCompensation(0, True, 0.0),
-    ("linuxcnc", "G41\nG1 X5 F60"): CutterCompensation(0, True, 0.0),
-    ("linuxcnc", "T1 M6\nG41\nG1 X5 Y5 Z5 F60"): CutterCompensation(0, True, 4.0),
-    ("linuxcnc", "T1 M6\nG41 D0\nG1 X5 Y5 Z5 F60"): CutterCompensation(0, True, 4.0),
-    ("linuxcnc", "T1 M6\nG42 D3\nG1 X5 Y5 Z5 F60"): CutterCompensation(0, True, 3.0),
-    ("fanuc", "T1 M6\nG41\nG1 X5. Y5. Z5. F60."): CutterCompensation(0, True, 0.0),
-    ("fanuc", "G18 G41 D1\nG1 X5. F60."): CutterCompensation(1, True, 4.0),
-    ("fanuc", "G19 G42 D1\nG1 Y5. F60."): CutterCompensation(2, False, 4.0),
-    ("linuxcnc", "G41.1 D5\nG1 X5 F60"): CutterCompensation(0, True, 2.5),
-    ("linuxcnc", "G42.1 D5\nG1 X5 F60"): CutterCompensation(0, False, 2.5),
-    ("linuxcnc", "G41.1 D-5\nG1 X5 F60"): CutterCompensation(0, False, 2.5),
-    ("linuxcnc", "G41.1\nG1 X5 F60"): CutterCompensation(0, True, 0.0),
-    ("linuxcnc", "G20 G41.1 D1\nG1 X5 F60"): CutterCompensation(0, True, 12.7),
-    ("linuxcnc", "G41 D1\nG1 X5 F60\nG40\nX9"): None,
-    ("linuxcnc", "G1 X5 F60"): None,
+    ("linuxcnc", "G41 D1\nG1 X50 F60"): CutterCompensation(0, True, 4.0, 1),
+    ("linuxcnc", "G42 D1\nG1 X50 F60"): CutterCompensation(0, False, 4.0, 1),
+    ("linuxcnc", "G41 D3\nG1 X50 F60"): CutterCompensation(0, False, 3.0, 1),
+    ("linuxcnc", "G42 D3\nG1 X50 F60"): CutterCompensation(0, True, 3.0, 1),
+    ("linuxcnc", "T1 M6\nG0 X1 Y1 Z1\nG41\nG1 X50 Y50 Z5 F60"): CutterCompensation(0, True, 4.0, 1),
+    ("linuxcnc", "T1 M6\nG0 X1 Y1 Z1\nG41 D0\nG1 X50 Y50 Z5 F60"): CutterCompensation(0, True, 4.0, 1),
+    ("linuxcnc", "T1 M6\nG0 X1 Y1 Z1\nG42 D3\nG1 X50 Y50 Z5 F60"): CutterCompensation(0, True, 3.0, 1),
+    ("fanuc", "G18 G41 D1\nG1 X50. F60."): CutterCompensation(1, True, 4.0, 1),
+    ("fanuc", "G19 G42 D1\nG1 Y50. F60."): CutterCompensation(2, False, 4.0, 1),
+    ("linuxcnc", "G41.1 D5\nG1 X50 F60"): CutterCompensation(0, True, 2.5, 1),
+    ("linuxcnc", "G42.1 D5\nG1 X50 F60"): CutterCompensation(0, False, 2.5, 1),
+    ("linuxcnc", "G41.1 D-5\nG1 X50 F60"): CutterCompensation(0, False, 2.5, 1),
+    ("linuxcnc", "G20 G41.1 D1\nG1 X50 F60"): CutterCompensation(0, True, 12.7, 1),
+    ("linuxcnc", "G41 D1\nG1 X50 F60\nG40\nX9"): None,
+    ("linuxcnc", "T0 M6\nG0 X1 Y1 Z1\nG41\nG1 X50 Y50 Z5 F60"): CutterCompensation(0, True, 0.0, 1),
+    ("fanuc", "G41 D0\nG1 X50. F60."): CutterCompensation(0, True, 0.0, 1),
+    ("linuxcnc", "G41 D1\nG1 X50 F60\nG40\nX9\nG42 D1\nX99"): CutterCompensation(0, False, 4.0, 2),
+    ("linuxcnc", "G1 X50 F60"): None,
 }
 
 
 @pytest.mark.parametrize(("control", "text"), COMPENSATED)
 def test_the_contour_is_compensated_by_the_radius(control: str, text: str, setups: dict[str, Setup]) -> None:
-    read = program(f"{HEAD}{text}\nM2\n", setups[control], control, contour=True)
+    read = program(f"{HEAD}{text}\nM2\n", setups[control], control)
     assert frame(read).compensation == COMPENSATED[control, text]
+
+
+UNKNOWN = "the control makes the path of the tool from the radius of tool {0}, which is not known; give "
+UNKNOWN += "radius_mm, and wear_mm, in [tools.{0}] of the machine or job file"
+NO_D = "G41 has no D word, and the tool in the spindle is not known; give D, or T and M6 before it"
+IN_COMPENSATION = "in cutter compensation; give G40 before"
+#: Control and blocks behind `HEAD`: line, code and sentence.
+NOT_COMPENSATED: dict[tuple[str, str], tuple[int, str, str]] = {
+    ("linuxcnc", "G41 D2\nG1 X5 F60"): (3, "OLP513", UNKNOWN.format(2)),
+    ("linuxcnc", "G41 D9\nG1 X5 F60"): (3, "OLP513", UNKNOWN.format(9)),
+    ("linuxcnc", "G41\nG1 X5 F60"): (3, "OLP513", NO_D),
+    ("fanuc", "T1 M6\nG41\nG1 X5. Y5. Z5. F60."): (4, "OLP513", NO_D),
+    ("linuxcnc", "G41 D1.5\nG1 X5 F60"): (
+        3, "OLP516", "D1.5 is not a number of a table; expected an integer from 0"
+    ),
+    ("linuxcnc", "G41.1\nG1 X5 F60"): (
+        3, "OLP516", "G41.1 needs a D word with the diameter of the cutter"
+    ),
+    ("linuxcnc", "G19 G41 D1\nG1 Y5 F60"): (
+        3, "OLP518", "this control has no cutter compensation in this plane; program the path of the tool"
+    ),
+    ("linuxcnc", "G41 D1\nG1 X9 F60\nG42 D1 X99"): (
+        5, "OLP528", "cutter compensation is on already, and how the control goes over is not known; program "
+        "G40 between the two contours",
+    ),
+    ("linuxcnc", "G41 D1\nG1 X9 F60\nT1 M6"): (5, "OLP518", f"a tool change is {IN_COMPENSATION}"),
+    ("linuxcnc", "G41 D1\nG1 X9 F60\nG20"): (
+        5, "OLP518", f"units, probing or machine positions are {IN_COMPENSATION}"
+    ),
+    ("linuxcnc", "G41 D1\nG1 X9 F60\nG18 G61"): (5, "OLP518", f"a change of plane is {IN_COMPENSATION}"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("control", "text"), NOT_COMPENSATED)
+def test_what_compensation_cannot_be_or_hold_is_said(
+    control: str, text: str, setups: dict[str, Setup]
+) -> None:
+    line, code, why = NOT_COMPENSATED[control, text]
+    said = refusal(f"{HEAD}{text}\nM2\n", setups[control], control)
+    assert (said["line"], said["code"], said["why"]) == (line, code, why)
+
+
+def test_wear_is_added_to_the_radius(setups: dict[str, Setup]) -> None:
+    setup = setups["linuxcnc"]
+    for wear, left, radius in ((-0.5, True, 3.5), (0.25, True, 4.25), (-5.0, False, 1.0)):
+        worn = {**setup.machine.tools, 1: replace(setup.machine.tools[1], wear_mm=wear)}
+        read = program(
+            f"{HEAD}G41 D1\nG1 X9 F60\nM2\n", replace(setup, machine=replace(setup.machine, tools=worn))
+        )
+        assert frame(read).compensation == CutterCompensation(0, left, radius, 1)
 
 
 MIXED = (
@@ -419,12 +467,12 @@ def test_what_changes_offsets_and_tools_is_refused_in_these_words(
 )
 def test_offsets_are_refused_in_cutter_compensation(text: str, setups: dict[str, Setup]) -> None:
     before = f"{HEAD}G41 D1\n"
-    said = refusal(f"{before}{text}\nM2\n", setups["linuxcnc"], contour=True)
+    said = refusal(f"{before}{text}\nM2\n", setups["linuxcnc"])
     assert said == {"line": 4, "why": CUTTING, "code": "OLP518"}
-    said = refusal(f"{before}G81 X5 Z1 R2\nM2\n", setups["linuxcnc"], contour=True)
+    said = refusal(f"{before}G81 X5 Z1 R2\nM2\n", setups["linuxcnc"])
     assert said["why"] == "the cycle G81 is in cutter compensation; give G40 before it"
-    program(f"{before}G40\n{text}\nM2\n", setups["linuxcnc"], contour=True)
-    program(f"{before}G43 H2\nG4 P1\nG61\nM2\n", setups["linuxcnc"], contour=True)
+    program(f"{before}G40\n{text}\nM2\n", setups["linuxcnc"])
+    program(f"{before}G43 H2\nG4 P1\nG61\nM2\n", setups["linuxcnc"])
 
 
 @pytest.mark.parametrize(

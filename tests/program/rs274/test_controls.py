@@ -218,8 +218,8 @@ OF_TIME = {
     "m_with_motion", "dwell_ms", "dwell_words",
 }  # fmt: skip
 #: Tables and texts, which have tests of their own.
-TABLES = {"codes", "refusals", "harmless_m", "text", "rules", "cycles", "language", "written_ending",
-          "program_number"}  # fmt: skip
+TABLES = {"codes", "refusals", "harmless_m", "text", "rules", "cycles", "contours", "language",
+          "written_ending", "program_number"}  # fmt: skip
 #: What controls with statements of their own do, which `tests/program/sinumerik` reads.
 OF_STATEMENTS = {"translator", "machine_moves_keep_length", "increments_take_offsets", "lengths_follow_plane",
                  "further_turns", "absolute_centre", "metric", "cleared", "dwell"}  # fmt: skip
@@ -355,19 +355,20 @@ _MILLING = "G0-G3 G38.2-G38.5 G80"
 _DRILLING = "G73 G74 G81-G86 G89"
 _FAMILY_REFUSED = "G5.2 G5.3 G6 G7 G7.1 G10.1 G12 G12.1 G13 G16 G31 G43.4 G65 G66 G68.2"
 _TRANSFORMS = "G51 G51.1 G68"
-_REFUSED = f"G5 {_FAMILY_REFUSED} G28.1 G30.1 G33 G33.1 G41 G41.1 G42 G42.1 G76 G87 G88"
+_REFUSED = f"G5 {_FAMILY_REFUSED} G28.1 G30.1 G33 G33.1 G76 G87 G88"
 _EVENTS = "G4 G10 G20 G21 G28 G49 G53-G59 G61 G92"
-_ISO_EVENTS = f"{_EVENTS} G30 G43 G44 G50 G51 G52 G54.1 G64 G68 G69"
-_ISO_UNCHANGED = "G8 G9 G13.1 G15 G23.1 G25 G40 G62 G63 G67 G69.1 G96 G97"
+_ISO_EVENTS = f"{_EVENTS} G40 G41 G42 G30 G43 G44 G50 G51 G52 G54.1 G64 G68 G69"
+_ISO_UNCHANGED = "G8 G9 G13.1 G15 G23.1 G25 G62 G63 G67 G69.1 G96 G97"
 #: What becomes of the G codes of each control; other codes are refused as not known.
 CODES: dict[str, dict[Act, str]] = {
     LINUXCNC: {
-        Act.UNCHANGED: "G8 G40 G96 G97",
+        Act.UNCHANGED: "G8 G96 G97",
         Act.MOTION: f"{_MILLING} {_DRILLING}",
         Act.ARC_DISTANCE: "G90.1 G91.1",
         Act.FEED: "G93-G95",
         Act.RETRACT: "G98 G99",
-        Act.EVENT: f"{_EVENTS} G30 G43 G43.1 G43.2 G52 G59.1-G59.3 G61.1 G64 G92.1-G92.3",
+        Act.EVENT: f"{_EVENTS} G40 G41 G41.1 G42 G42.1 G30 G43 G43.1 G43.2 G52 G59.1-G59.3 G61.1 G64 "
+        "G92.1-G92.3",
         Act.REFUSE: f"{_REFUSED} {_TRANSFORMS} G5.1",
     },
     FANUC: {
@@ -376,7 +377,7 @@ CODES: dict[str, dict[Act, str]] = {
         Act.FEED: "G93-G95",
         Act.RETRACT: "G98 G99",
         Act.EVENT: f"{_ISO_EVENTS} G50.1 G51.1",
-        Act.REFUSE: f"{_REFUSED} G92.1",
+        Act.REFUSE: f"{_REFUSED} G41.1 G42.1 G92.1",
     },
     HAAS: {
         Act.UNCHANGED: f"{_ISO_UNCHANGED} G50.1 G103 G187",
@@ -384,7 +385,7 @@ CODES: dict[str, dict[Act, str]] = {
         Act.FEED: "G93-G95",
         Act.RETRACT: "G98 G99",
         Act.EVENT: f"{_ISO_EVENTS} G110-G129 G154",
-        Act.REFUSE: f"{_REFUSED} G5.1 G51.1 G92.1",
+        Act.REFUSE: f"{_REFUSED} G41.1 G42.1 G5.1 G51.1 G92.1",
     },
     GRBL: {
         Act.UNCHANGED: "G40",

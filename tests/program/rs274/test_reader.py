@@ -317,15 +317,8 @@ REFUSED: dict[tuple[str, str], dict[str, object]] = {
     ("fanuc", "G65 P2 A1."): {
         "why": f"G65 calls a macro; {UNROLL}", "code": "OLP511", "hint": UNROLL,
     },
-    ("fanuc", "G41 D1"): {
-        "why": "G41 (cutter compensation) makes the path inside the control; program the tool path, or take "
-        "the contour as tool path with --contour",
-        "code": "OLP513", "word": "G41",
-    },
-    ("linuxcnc", "G42.1 D1"): {
-        "why": "G42.1 (cutter compensation) makes the path inside the control; program the tool path, or "
-        "take the contour as tool path with --contour",
-        "code": "OLP513", "word": "G42.1",
+    ("fanuc", "G41.1"): {
+        "why": "G41.1 (normal direction control) turns a rotary axis", "code": "OLP512", "word": "G41.1",
     },
     ("fanuc", "M98 P1\nM3\nG68.2\nM99"): {
         "why": f"M98 calls a subprogram; {UNROLL}", "code": "OLP511", "hint": UNROLL, "word": "M98",

@@ -16,10 +16,11 @@ from olp.core.arrays import Array
 from olp.core.machine import Machine
 from olp.core.units import AXES
 from olp.core.values import dataclass
+from olp.program.contours.rules import NGC_CONTOURS, ContourRules
 from olp.program.dialect import Dialect, Row, Support
 from olp.program.rs274.block_rules import OTHER_RULES, BlockRules
 from olp.program.rs274.block_text import BlockText
-from olp.program.rs274.codes import CYCLES, PROBES
+from olp.program.rs274.codes import COMPENSATION_OFF, CUTTER_COMPENSATION, CYCLES, PROBES
 from olp.program.rs274.commands import Commands
 from olp.program.rs274.cycle_rules import CycleRules
 from olp.program.rs274.flatten.language import Language
@@ -91,8 +92,8 @@ class Profile(Dialect):
       behind a change of offsets moves by that change as well. `lengths_follow_plane`: lengths count along the
       tool axis of the plane. `further_turns` is the word of the turns of an arc beyond its first part, where
       P does not count them all, `absolute_centre` the function around an absolute coordinate of a centre.
-    - `text`, `rules`, `cycles`, `language`: what may be in a line and in a block, how canned cycles are made,
-      and how parametric programs are written.
+    - `text`, `rules`, `cycles`, `contours`, `language`: what may be in a line and in a block, how canned
+      cycles and the tool's path along contours are made, and how parametric programs are written.
     - `metric`: the word of lengths in mm. `cleared`: modes without cycle, tool length and cutter
       compensation. `dwell`: the letter of a time in seconds.
     - `written_ending`: the ending of files that are written for the control. `program_number`: a program
@@ -151,6 +152,7 @@ class Profile(Dialect):
     absolute_centre: bytes = b""
     text: BlockText
     rules: BlockRules = OTHER_RULES
+    contours: ContourRules = NGC_CONTOURS
     cycles: CycleRules
     language: Language
 
@@ -244,10 +246,6 @@ REFUSALS: Mapping[int, str] = {
     880: "G88 waits for the operator inside the cycle",
     281: "G28.1 stores the present position, and no word of it can be edited",
     301: "G30.1 stores the present position, and no word of it can be edited",
-    410: "G41 (cutter compensation) makes the path inside the control",
-    411: "G41.1 (cutter compensation) makes the path inside the control",
-    420: "G42 (cutter compensation) makes the path inside the control",
-    421: "G42.1 (cutter compensation) makes the path inside the control",
 }
 
 
@@ -261,7 +259,8 @@ def g_codes(*, unchanged: set[int], extra: dict[int, Act], without: Set[int] = f
     codes |= dict.fromkeys((980, 990), Act.RETRACT)
     codes |= dict.fromkeys((40, 100, 200, 210, 280, 300, 430, 490, 520, 530, 610, 640, 920), Act.EVENT)
     codes |= dict.fromkeys(range(540, 600, 10), Act.EVENT)
-    codes |= dict.fromkeys((400, 960, 970, *unchanged), Act.UNCHANGED)
+    codes |= dict.fromkeys((COMPENSATION_OFF, *CUTTER_COMPENSATION), Act.EVENT)
+    codes |= dict.fromkeys((960, 970, *unchanged), Act.UNCHANGED)
     codes |= dict.fromkeys(REFUSALS, Act.REFUSE)
     codes |= extra
     return {code: act for code, act in codes.items() if code not in without}

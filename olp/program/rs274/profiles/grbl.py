@@ -11,7 +11,7 @@ from olp.program.rs274.entry import keep_blocks, read_blocks, unroll_blocks
 from olp.program.rs274.flatten.language import NGC
 from olp.program.rs274.profiles.base import ISO_M, REFUSALS, Act, Profile, g_codes
 
-_EXTRA = {431: Act.EVENT, 911: Act.ARC_DISTANCE, 921: Act.EVENT, 611: Act.REFUSE}
+_EXTRA = {400: Act.UNCHANGED, 431: Act.EVENT, 911: Act.ARC_DISTANCE, 921: Act.EVENT, 611: Act.REFUSE}
 _LACKING = {
     *(281, 300, 301, 330, 331, 410, 411, 420, 421, 430, 520, 640, 760, 870, 880, 950, 960, 970, 980, 990),
     *CYCLES,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from olp.program.contours.rules import ISO_CONTOURS
 from olp.program.rs274.block_text import BlockText
 from olp.program.rs274.cycle_rules import ISO_CYCLES
 from olp.program.rs274.entry import keep_blocks, read_blocks, unroll_blocks
@@ -11,7 +12,10 @@ from olp.program.rs274.profiles.base import ISO_M, REFUSALS, Act, Profile
 #: G codes without effect on the path on these controls.
 ISO_UNCHANGED = frozenset({80, 90, 150, 501, 620, 630, 670, 691, 131, 231, 250})
 #: G44, G54.1, rotation and scaling; G92.1 needs offsets that are not known off line.
-ISO_EXTRA = dict.fromkeys((440, 541, 500, 510, 680, 690), Act.EVENT) | {921: Act.REFUSE}
+ISO_EXTRA = {
+    **dict.fromkeys((440, 541, 500, 510, 680, 690), Act.EVENT),
+    **dict.fromkeys((411, 421, 921), Act.REFUSE),
+}
 
 #: What they have in common; each control states its name, its codes, and where it differs.
 ISO = Profile(
@@ -22,7 +26,11 @@ ISO = Profile(
     unroller=unroll_blocks,
     keeper=keep_blocks,
     codes={},
-    refusals=REFUSALS,
+    refusals={
+        **REFUSALS,
+        411: "G41.1 (normal direction control) turns a rotary axis",
+        421: "G42.1 (normal direction control) turns a rotary axis",
+    },
     harmless_m=ISO_M,
     initial_retract=980,
     increments_without_point=True,
@@ -36,8 +44,11 @@ ISO = Profile(
     lengths_along_z=True,
     text=BlockText(),
     cycles=ISO_CYCLES,
+    contours=ISO_CONTOURS,
     language=MACRO_B,
     path_mode="not stated",
+    contours_assumed="start-up of type A is assumed, with the tool beside the begin of the second move, and "
+    "that outside corners are extended",
     inch_decimals=4,
     free_digits=0,
 )

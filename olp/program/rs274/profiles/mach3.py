@@ -62,5 +62,6 @@ DIALECT = Profile(
     ),
     language=NGC,
     path_mode="constant velocity G64 of the control, unless exact stop is its setting",
+    contours_assumed="that contours are made as LinuxCNC makes them is assumed: arcs about outside corners",
     written_ending="tap",
 )  # fmt: skip

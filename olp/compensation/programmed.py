@@ -1,0 +1,175 @@
+"""From a plan of the tool's path to the contour that makes the control move there.
+
+The plan says where the tool is commanded. Each of its moves is a line or an arc beside the contour. So the
+contour's line or arc lies at the distance of the cutter radius from it, and the contour's corners are where
+these meet. Nothing is iterated but the direction of entries, which depends on their own ends.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from olp.compensation.parts import Parts
+from olp.compensation.plan import Limits, Plan
+from olp.core.arrays import Array
+from olp.core.errors import ProgramError
+from olp.errormodel.base import ErrorModel
+from olp.program.bands import Band
+from olp.program.contours.elements import AXES, Elements
+from olp.program.contours.joints import Corner, corners, joints, refuse
+from olp.program.contours.meeting import meeting
+from olp.program.program import Program
+
+#: passes for the direction of entries
+_PASSES = 4
+
+
+def programmed(band: Band, rows: Plan, model: ErrorModel, limits: Limits) -> tuple[Band, Plan]:
+    """A band whose path is what is programmed, and the plan for it. Raises ProgramError where the control
+    would refuse the contour, or would make other moves of it."""
+    program = band.program
+    if program.programmed is None:
+        return band, rows
+    contour = program.programmed
+    elements = Elements.of(contour.toolpath)
+    if not len(elements):
+        return replace(band, program=contour), rows
+    return replace(band, program=contour), _Contour(program, contour, elements, rows, model, limits).plan()
+
+
+class _Contour:
+    """One band while its contours are found. `parts` are the rows that go along elements."""
+
+    def __init__(
+        self, program: Program, contour: Program, elements: Elements, rows: Plan, model: ErrorModel,
+        limits: Limits,
+    ) -> None:  # fmt: skip
+        assert program.blocks is not None
+        self.rows, self.path, self.elements = rows, contour.toolpath, elements
+        self.rules = program.rs274.contours
+        corner = np.array([(c := f.compensation) is not None and c.corner for f in program.toolpath.frames])
+        move = program.blocks[rows.move]
+        self.kept = np.flatnonzero(~corner[program.toolpath.frame[rows.move]])
+        self.move = move[self.kept].astype(np.int32)
+        self.nominal, self.parts = Parts.of(
+            program.toolpath, rows, self.kept, self.path, self.move, elements, model, limits
+        )  # fmt: skip
+
+    def plan(self) -> Plan:
+        """The rows of the programmed path."""
+        parts, rows, kept = self.parts, self.rows, self.kept
+        # what rounded words of arcs leave between the contour and the tool's path is in both
+        stated = self._points(self.nominal)
+        last = np.append(parts.head[1:], True)
+        point = np.where(last[:, None], self.elements.end[parts.element], stated)
+        point = point + self._points(parts) - stated
+        made = self._made(point)
+        self._check(made)
+        command = rows.command_mm[kept].copy()
+        raw = rows.raw[kept]
+        self._put(command, point)
+        command[raw] = self.path.end_mm[self.move][raw]
+        centre = np.full((len(kept), 3), np.nan)
+        arcs = np.flatnonzero(parts.arc)
+        axes = AXES[parts.plane[arcs]]
+        centre[parts.row[arcs]] = command[parts.row[arcs]]
+        for i in (0, 1):
+            centre[parts.row[arcs], axes[:, i]] = parts.centre[arcs, i]
+        reach = rows.reach[kept].copy()
+        reach[parts.row[arcs]] = self._reach(made)[arcs]
+        return Plan(
+            self.move, rows.target_mm[kept] if len(rows.target_mm) else rows.target_mm, command, raw, reach,
+            rows.take_up[kept], rows.uncorrected, rows.shift_mm,
+            None if rows.play is None else rows.play[kept], centre,
+        )  # fmt: skip
+
+    def _corner(self) -> Array:
+        """(p,) the corner before each part."""
+        parts = self.parts
+        corner, _ = corners(self.elements, self.rules)
+        return np.where(parts.head, corner[parts.element], Corner.SMOOTH)
+
+    def _points(self, parts: Parts) -> Array:
+        """(p, 2) the points of the contour at the ends of parts."""
+        elements = self.elements
+        begins, ends = parts.begins.copy(), parts.ends.copy()
+        behind = np.append(self._corner()[1:], Corner.ENTRY)
+        last = np.append(elements.first[parts.element[1:]] & parts.head[1:], True)
+        behind[last] = Corner.ENTRY
+        following = np.minimum(np.arange(len(parts)) + 1, len(parts) - 1)
+        guess = parts.guess
+        entry = np.flatnonzero(elements.first[parts.element])
+        own = elements.end[parts.element[entry]] - elements.begin[parts.element[entry]]
+        nominal = np.arctan2(own[:, 1], own[:, 0])
+        point = guess
+        for _ in range(_PASSES):
+            now = point[entry] - parts.begin[entry]
+            ends[entry] = begins[entry] = (
+                elements.begins[parts.element[entry]] + np.arctan2(now[:, 1], now[:, 0]) - nominal
+            )
+            turned = replace(parts, begins=begins, ends=ends)
+            point = parts.end - parts.normal(ends)
+            entered = np.flatnonzero(behind == Corner.ENTERED)
+            after = following[entered]
+            point[entered] = parts.begin[after] - parts.normal(begins)[after]
+            met = np.flatnonzero((behind == Corner.INSIDE) | (behind == Corner.OUTSIDE))
+            one, other = turned.carriers(met, ends=True), turned.carriers(following[met], ends=False)
+            found = meeting(one, other, guess[met])
+            point[met] = np.where(np.isnan(found), guess[met], found)
+        return np.asarray(point)
+
+    def _put(self, command: Array, point: Array) -> None:
+        """Put the points into commands, where rows end beside the contour."""
+        parts = self.parts
+        last = np.searchsorted(parts.row, np.arange(len(command)), "right") - 1
+        for k in range(3):
+            off = parts.beside[:, k] & (last >= 0)
+            of = last[off]
+            axes = AXES[parts.plane[of]]
+            value = np.where(axes[:, 0] == k, point[of, 0], point[of, 1])
+            in_plane = (axes[:, 0] == k) | (axes[:, 1] == k)
+            command[np.flatnonzero(off)[in_plane], k] = value[in_plane]
+
+    def _made(self, point: Array) -> Elements:
+        """The contour as it will be programmed, its parts being elements."""
+        parts = self.parts
+        before = np.maximum(np.arange(len(parts)) - 1, 0)
+        first = self.elements.first[parts.element] & parts.head
+        return parts.made(np.where(first[:, None], parts.begin, point[before]), point, first)
+
+    def _reach(self, made: Elements) -> Array:
+        """(p,) the share of the programmed arc where each part of one ends."""
+        parts = self.parts
+        gone = np.cumsum(made.sweep)
+        heads = np.flatnonzero(parts.head)
+        which = np.cumsum(parts.head) - 1
+        before = (gone - made.sweep)[heads][which]
+        whole = np.append(gone[heads[1:] - 1], gone[-1])[which] - before
+        last = np.append(parts.head[1:], True)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(last, 1.0, (gone - before) / whole)
+
+    def _check(self, made: Elements) -> None:
+        """Raise ProgramError where the control would refuse this contour, or round off another corner."""
+        parts, elements, rules = self.parts, self.elements, self.rules
+        line = self.path.line[elements.move[parts.element]]
+        now, _ = corners(made, rules)
+        lost = (self._corner() == Corner.OUTSIDE) & (now != Corner.OUTSIDE)
+        way = "; have the path of the tool written instead, with --contour path"
+        if lost.any():
+            raise ProgramError(
+                "corrected, the outside corner before this move is none any more for the control" + way,
+                line=int(line[np.argmax(lost)]),
+                code="OLP561",
+            )
+        try:
+            refuse(made, joints(made, rules), rules, line)
+        except ProgramError as error:
+            raise ProgramError(
+                f"the control would refuse this block once corrected, and uncorrected it only just takes it: "
+                f"{error.message.partition(';')[0]}{way}",
+                line=error.line,
+                code="OLP561",
+            ) from None

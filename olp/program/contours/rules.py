@@ -1,0 +1,34 @@
+"""How a control makes the path of the tool's centre from a contour under cutter compensation."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from olp.core.values import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class ContourRules:
+    """What controls do in their own way.
+
+    - `entry`: the first move ends beside its programmed end, across its own direction ("own") or across that
+      of the next move ("next").
+    - `outside`: round an outside corner the tool goes along an arc about it ("arc"), or along both sides,
+      extended until they meet ("extended").
+    - `smooth_rad`: a smaller change of direction is none: the next move begins where the last one ended.
+    - `returns`: the first move after the contour goes to all that is programmed, whatever its words; else a
+      move across the plane leaves the tool beside the contour.
+    - `planes`: planes (0..2) in which the control compensates.
+    """
+
+    entry: Literal["own", "next"]
+    outside: Literal["arc", "extended"]
+    smooth_rad: float
+    returns: bool
+    planes: tuple[int, ...]
+
+
+#: LinuxCNC, as its interpreter does it.
+NGC_CONTOURS = ContourRules("own", "arc", 0.05, returns=True, planes=(0, 1))
+#: Fanuc and Haas with start-up of type A and linear corners, as they are delivered.
+ISO_CONTOURS = ContourRules("next", "extended", 0.05, returns=False, planes=(0, 1, 2))

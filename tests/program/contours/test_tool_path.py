@@ -1,0 +1,144 @@
+"""The path of the tool along contours, worked by hand, and of what no interpreter here can judge."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cases.acceptance import TRUE_ZERO, machine
+
+from olp.core.errors import ProgramError
+from olp.core.toolpath import Frame, Kind
+from olp.files.config import load_setup
+from olp.program.contours.rules import ISO_CONTOURS, NGC_CONTOURS
+from olp.program.contours.tool_path import follow
+from olp.program.program import Program
+from olp.program.registry import DIALECTS, read
+
+HEAD = b"G21 G90 G54 F600\nG0 X0 Y0 Z10\n"
+TOOL = f"{TRUE_ZERO}[tools.1]\nZ_mm = 0.0\nradius_mm = 4.5\nwear_mm = 0.5\n[job_defaults]\ntool = 1\n"
+
+
+def program(folder: Path, text: bytes, control: str = "linuxcnc") -> Program:
+    keys = "" if control == "linuxcnc" else 'decimal_point = "calculator"\n'
+    path = machine(folder, tables=TOOL, controller=control, keys=keys)
+    return read(HEAD + text + b"M2\n", load_setup(path), DIALECTS[control])
+
+
+def moves(read_program: Program) -> list[tuple[str, float, float, float]]:
+    path = read_program.toolpath
+    return [
+        (Kind(int(kind)).name, *(round(float(v), 4) for v in end))
+        for kind, end in zip(path.kind, path.end_mm, strict=True)
+    ]  # fmt: skip
+
+
+def refused(folder: Path, text: bytes, control: str = "linuxcnc") -> tuple[int | None, str]:
+    with pytest.raises(ProgramError) as caught:
+        program(folder, text, control)
+    return caught.value.line, caught.value.message
+
+
+def test_round_a_square_and_in_it(tmp_path: Path) -> None:
+    """Right of a square that is gone round to the left: arcs about its corners; left of it, inside."""
+    text = b"G42 D1 G1 X20 Y0\nX50\nY30\nX20\nY0\nG40 G1 X0\n"
+    around = moves(program(tmp_path, text))
+    assert around[1:] == [
+        ("LINE", 20, -5, 10), ("LINE", 50, -5, 10), ("ARC_CCW", 55, 0, 10), ("LINE", 55, 30, 10),
+        ("ARC_CCW", 50, 35, 10), ("LINE", 20, 35, 10), ("ARC_CCW", 15, 30, 10), ("LINE", 15, 0, 10),
+        ("LINE", 0, 0, 10),
+    ]  # fmt: skip
+    within = moves(program(tmp_path, text.replace(b"G42", b"G41").replace(b"X50\nY30", b"X50 (a)\nY30")))
+    assert within[1:] == [
+        ("LINE", 20, 5, 10), ("LINE", 45, 5, 10), ("LINE", 45, 25, 10), ("LINE", 25, 25, 10),
+        ("LINE", 25, 0, 10), ("LINE", 0, 0, 10),
+    ]  # fmt: skip
+
+
+def test_controls_of_the_other_kind_extend_corners_and_begin_beside_the_next_move(tmp_path: Path) -> None:
+    within = moves(program(tmp_path, b"G42 D1 G1 X20. Y-1.\nY30.\nX50.\nG40 X60.\n", "fanuc"))
+    assert within[1:] == [
+        ("LINE", 25, -1, 10), ("LINE", 25, 25, 10), ("LINE", 50, 25, 10), ("LINE", 60, 30, 10),
+    ]  # fmt: skip
+    right = moves(program(tmp_path, b"G41 D1 G1 X20. Y0.\nY30.\nX50.\nG40 X60.\n", "haas"))
+    assert right[1:] == [
+        ("LINE", 15, 0, 10), ("LINE", 15, 30, 10), ("LINE", 15, 35, 10), ("LINE", 15, 35, 10),
+        ("LINE", 20, 35, 10), ("LINE", 50, 35, 10), ("LINE", 60, 30, 10),
+    ]  # fmt: skip
+    # beyond a sharp corner both sides are extended by the radius
+    sharp = moves(program(tmp_path, b"G41 D1 G1 X20. Y0.\nY30.\nX50. Y0.\nG40 X60.\n", "haas"))
+    assert sharp[3:6] == [
+        ("LINE", 15, 35, 10), ("LINE", 20, 37.0711, 10), ("LINE", 23.5355, 33.5355, 10)
+    ]  # fmt: skip
+
+
+def test_the_first_move_behind_a_contour_goes_to_all_that_is_programmed_on_some_controls(
+    tmp_path: Path,
+) -> None:
+    text = b"G41 D1 G1 X20 Y0\nX50\nG40\nZ20\nG1 X0 Y0\n"
+    assert moves(program(tmp_path, text))[-2:] == [("LINE", 50, 0, 20), ("LINE", 0, 0, 20)]
+    assert moves(program(tmp_path, text, "fanuc"))[-2:] == [("LINE", 50, 5, 20), ("LINE", 0, 0, 20)]
+
+
+def test_each_move_knows_its_block_and_its_words(tmp_path: Path) -> None:
+    done = program(tmp_path, b"G42 D1 G1 X20 Y0\nX50\nG3 X60 Y10 J10\nG1 X20\nG40 G1 X0\n")
+    assert done.programmed is not None
+    assert done.blocks is not None
+    assert done.blocks.tolist() == [0, 1, 2, 3, 4, 4, 5]
+    assert (done.slot[4] == -1).all() and (done.slot[5] == done.programmed.slot[4]).all()
+    assert done.arc_slots.word[:, 1].tolist() == [done.programmed.arc_slots.word[0, 1], -1]
+    assert done.toolpath.arcs.move.tolist() == [3, 4]
+    assert done.toolpath.arcs.sweep_rad == pytest.approx([np.pi / 2, np.pi / 2])
+    plain = program(tmp_path, b"G1 X20 Y0\nX50\n")
+    assert plain.programmed is None and plain.blocks is None
+
+
+REFUSED = {
+    b"G41 D1 G1 X4 Y3\nX60\n": (3, "first move of a contour is not longer than the cutter radius of 5 mm"),
+    b"G41 D1 G2 X20 Y0 I10\nG1 X60\n": (3, "an arc is the first move of a contour"),
+    b"G41 D1 G1 X20 Y0\nX60\nG3 X60 Y8 J4\nG1 X20\n": (5, "does not fit into this arc"),
+    b"G41 D1 G1 X20 Y0\nX60\nY4\nX20\nY40\n": (5, "does not fit into the corners of this move"),
+    b"G41 D1 G1 X20 Y0\nX60\nG40 G2 X70 Y10 I10\n": (5, "the move behind a contour"),
+}
+
+
+@pytest.mark.parametrize("text", REFUSED)
+def test_what_a_control_refuses_is_refused_with_its_line(tmp_path: Path, text: bytes) -> None:
+    line, why = refused(tmp_path, text)
+    assert (line, REFUSED[text][1] in why) == (REFUSED[text][0], True)
+
+
+def test_a_contour_from_an_unknown_position_is_refused(tmp_path: Path) -> None:
+    line, why = refused(tmp_path, b"M6 T1\nG41 D1 G1 X20\nX60 Y0\n")
+    assert line == 4
+    assert "has not been commanded yet" in why
+
+
+@pytest.mark.parametrize(
+    ("turn", "good"),
+    [
+        (((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)), True),
+        (((-1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), False),
+        (((2.0, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, 0.0, 2.0)), False),
+        (((1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0)), False),
+    ],
+)
+def test_a_frame_that_is_more_than_turned_in_its_plane_is_refused(
+    tmp_path: Path, turn: tuple[tuple[float, float, float], ...], good: bool
+) -> None:
+    from dataclasses import replace
+
+    done = program(tmp_path, b"G41 D1 G1 X20 Y0\nX60\n")
+    assert done.programmed is not None
+    path = done.programmed.toolpath
+
+    def turned(frame: Frame) -> Frame:
+        return replace(frame, turn=turn)  # type: ignore[arg-type]
+
+    path = replace(path, frames=tuple(turned(frame) for frame in path.frames))
+    if good:
+        assert len(follow(path, NGC_CONTOURS).path) == 3
+        return
+    with pytest.raises(ProgramError, match="scaled, mirrored or turned"):
+        follow(path, ISO_CONTOURS)
