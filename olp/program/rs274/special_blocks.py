@@ -19,6 +19,7 @@ from olp.program.rs274.codes import (
     INCREMENTAL,
     MACHINE,
     MACROS,
+    POLAR,
 )
 from olp.program.rs274.collector import Collector
 from olp.program.rs274.modes import UNROLL, Context, scaled
@@ -73,11 +74,12 @@ def _checked(
         if a == Act.REFUSE:
             why = profile.refusals.get(c)
             name = f"G{number:g}"
+            unrolled = c in MACROS or (c == POLAR and profile.polar)
             raise ProgramError(
                 why or f"{name} is not known to the {profile.name} profile and may move the machine",
                 line=line,
-                code="OLP511" if c in MACROS else "OLP512",
-                hint=unroll if c in MACROS else "",
+                code="OLP511" if unrolled else "OLP512",
+                hint=unroll if unrolled else "",
                 # the other words of a macro call are its arguments
                 word="" if c in MACROS else name,
             )

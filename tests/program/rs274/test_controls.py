@@ -124,6 +124,7 @@ READINGS: dict[str, tuple[str, dict[str, Outcome], Any]] = {
         {LINUXCNC: (5, 1, 0)} | dict.fromkeys((FANUC, HAAS, GRBL), "G10 R turns the work offset"),
         "not",
     ),
+    "polar": ("G16\nG0 X1. Y90.", {FANUC: "unroll the program with --flatten"}, "not"),
     "scales_axes": (
         "G51 X0. Y0. Z0. I2. J1. K3.\nG0 X1. Y1. Z1.",
         {FANUC: "has a decimal point", HAAS: "without its factors"},

@@ -118,6 +118,10 @@ def _restored(line: Line, source: bytes, raw: bytes, written: bytes, profile: Pr
         return written
     if line.flow is not None or line.opaque:
         raise _cannot("its flow is in the block that has to change; put it into a block of its own")
+    stated = {word.letter: word.number for word in line.words if word.letter in "xy" and word.value is None}
+    unrolled = {word.letter: word.number for word in compile_line(raw, 0, profile.language).words}
+    if any(unrolled.get(letter) != number for letter, number in stated.items()):
+        raise _cannot("its radius and angle are written as X and Y")
     language = profile.language
     visited = compile_line(raw, 0, language)
     partner = _partners(line.words, visited.words)

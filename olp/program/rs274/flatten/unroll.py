@@ -27,6 +27,7 @@ from olp.program.rs274.cycles import Stroke, stroke_budget
 from olp.program.rs274.flatten.expressions import filled, whole
 from olp.program.rs274.flatten.language import Language
 from olp.program.rs274.flatten.lines import Line, Word
+from olp.program.rs274.flatten.polar import as_xy
 from olp.program.rs274.flatten.run import Walk
 from olp.program.rs274.flatten.state import CYCLE_WORDS, ProgramState, Value
 from olp.program.rs274.flatten.unit import Frame, Unit
@@ -80,6 +81,7 @@ def flatten(
     Walk(main, writer.variables, subprograms, visit, block_delete=block_delete, budget=budget).run()
     if not writer.moves:
         _refuse_library(main)
+    writer.write_polar(main)
     return Unrolled.of(writer.text(main), writer.origin(main), writer.within())
 
 
@@ -153,6 +155,16 @@ class _Flattener:
         return (
             whole_text[: -len(eol)] if self._blocks and not last[1] and not main.ends_with_eol else whole_text
         )
+
+    def write_polar(self, main: Unit) -> None:
+        """Write polar positions as X and Y. Raises ProgramError with the line in the source."""
+        profile = self.state.profile
+        try:
+            self._blocks = as_xy(self._blocks, profile, lambda value: number_text(value, "x", self.language))
+        except ProgramError as error:
+            key, error.line = self._sources[(error.line or 1) - 1]
+            error.file = self._units[key].file
+            raise
 
     def origin(self, main: Unit) -> Origin:
         """The source line of every block."""

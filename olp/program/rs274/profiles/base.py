@@ -71,6 +71,8 @@ class Profile(Dialect):
       offset may be turned about Z, which R of G10 L2 states too. `scales_axes`: G51 takes a factor for each
       axis, too. `scales_by_parameter`: a parameter of the control sets the unit of these factors, which have
       no point.
+    - `polar`: X and Y between G16 and G15 are radius and angle about program zero, which the unroller writes
+      as X and Y.
     - `cycles_apart`: canned cycles and G80 are a separate modal group.
     - `axis_dwell`: G4 takes its time from X and U, too, and counts milliseconds where it has no point.
     - `exact_stop`: G61 stops at the end of each block, as G9 does in one, and G62 and G63 end it as G64 does.
@@ -126,6 +128,7 @@ class Profile(Dialect):
     offset_names: Mapping[int, str] = field(default_factory=dict)
     offsets_alone: frozenset[int] = frozenset()
     turns_offsets: bool = False
+    polar: bool = False
     scales_axes: bool = False
     scales_by_parameter: bool = False
     cycles_apart: bool = False
@@ -230,7 +233,7 @@ REFUSALS: Mapping[int, str] = {
     120: "G12 (circular pocket or polar interpolation) is a cycle of the control",
     121: "G12.1 (polar interpolation) moves a rotary axis",
     130: "G13 is a cycle of the control",
-    160: "G16 (polar coordinates) is not read",
+    160: "G16 takes X and Y as radius and angle, which are read only where they are written as X and Y",
     310: "G31 (skip) ends where a signal arrives",
     330: "G33 cuts a thread, which a correction would distort",
     331: "G33.1 (rigid tapping) is synchronous with the spindle",

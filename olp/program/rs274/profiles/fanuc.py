@@ -15,6 +15,7 @@ DIALECT = replace(
         unchanged={*ISO_UNCHANGED, 51, 110},
         extra={**ISO_EXTRA, 51: Act.UNCHANGED, 501: Act.EVENT, 511: Act.EVENT},
     ),
+    polar=True,
     scales_axes=True,
     scales_by_parameter=True,
     refusals={**ISO.refusals, 921: "G92.1 presets offsets that are not known off line"},
