@@ -26,7 +26,7 @@ IS_HARMLESS = np.zeros(1000, bool)
 IS_HARMLESS[list(_HARMLESS)] = True
 #: letters of words in motion blocks, and the axis of a letter
 KNOWN_LETTERS = np.zeros(256, bool)
-KNOWN_LETTERS[list(b"XYZABCUVWFMRKPQOT")] = True
+KNOWN_LETTERS[list(b"XYZABCUVWFMRKPQOTS")] = True
 AXIS = np.full(256, -1, np.int8)
 AXIS[list(b"XYZ")] = (0, 1, 2)
 

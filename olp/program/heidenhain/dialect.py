@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
+from typing import Any
 
 from olp.core.machine import Setup
 from olp.core.values import dataclass
 from olp.program.dialect import Dialect, Options, StatementDialect
 from olp.program.heidenhain.table import TABLE
+from olp.program.origin import Unrolled
 from olp.program.program import Program
 
 _ARC = re.compile(rb"(?i)^([ \t]*\d*[ \t]*)C[RP]?\b|DR[ \t]*[-+]")
@@ -17,6 +19,12 @@ def _read(data: bytes, setup: Setup, dialect: Dialect, options: Options, *, word
     from olp.program.heidenhain.reader import read
 
     return read(data, setup, dialect, options, words=words)
+
+
+def _unroll(data: bytes, dialect: Dialect, **options: Any) -> Unrolled:
+    from olp.program.heidenhain.unroll import unroll
+
+    return unroll(data, dialect, **options)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,6 +44,7 @@ DIALECT = Conversational(
     title="Heidenhain conversational",
     path_mode="not stated",
     reader=_read,
+    unroller=_unroll,
     endings=("h", "hnc"),
     folder_endings=("h", "hnc"),
     sign=re.compile(

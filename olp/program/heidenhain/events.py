@@ -227,10 +227,9 @@ class Events:
         rest = statement.upper[len(b"CYCL CALL") :].strip()
         if rest.startswith((b"POS", b"PAT")):
             raise ProgramError(
-                f"CYCL CALL {rest[:3].decode()} states where the holes are",
+                f"CYCL CALL {rest[:3].decode()} states where the holes are; write L blocks with M99",
                 line=statement.line,
-                code="OLP511",
-                hint=UNROLL,
+                code="OLP512",
             )
         self.hole(statement.line)
 

@@ -213,3 +213,94 @@ def test_corrected_text_is_read_band_by_band_alike(bent: Path, monkeypatch: pyte
     whole = olp.correct(data, bent).data
     monkeypatch.setattr("olp.program.bands.SIZE", 7)
     assert olp.correct(data, bent).data == whole
+
+
+# -- loops, calls and parameters -----------------------------------------------------------------------
+
+
+def unrolled(text: str, **options: object) -> list[str]:
+    return (
+        DIALECTS["heidenhain"].unroller(text.encode(), DIALECTS["heidenhain"], **options).decode().split("\n")
+    )  # type: ignore[misc]
+
+
+LOOP = """0 BEGIN PGM Q MM
+1 FN 0: Q1 = +3 ; COUNT
+2 Q2 = 10 * COS 60 + SQRT ( 16 )
+3 LBL 1
+4 L X+Q2 Y-Q1 FQ1 ; Q1
+5 FN 2: Q1 = +Q1 - +1
+6 FN 11: IF +Q1 GT +1 GOTO LBL 1
+7 CALL LBL "SUB"
+8 LBL 7
+9 L IX+1
+10 CALL LBL 7 REP 2/2
+11 M30
+12 LBL "SUB"
+13 L Z-1
+14 LBL 0
+15 END PGM Q MM
+"""
+
+
+def test_loops_calls_and_parameters_are_written_out() -> None:
+    assert unrolled(LOOP)[:-1] == [
+        "0 BEGIN PGM Q MM", "4 L X+9 Y-3 F3 ; Q1", "4 L X+9 Y-2 F2 ; Q1", "13 L Z-1", "9 L IX+1", "9 L IX+1",
+        "9 L IX+1", "11 M30", "15 END PGM Q MM",
+    ]  # fmt: skip
+
+
+def test_an_unrolled_program_is_corrected_and_named_by_its_lines(bent: Path) -> None:
+    text = LOOP.replace("3 LBL 1", "L X+0 Y+0 Z+0 R0 FMAX\n3 LBL 1").encode()
+    result = olp.correct(text, bent, flatten=True)
+    assert result.report["deviation"]["holds"]
+    with pytest.raises(ProgramError, match="--flatten") as caught:
+        olp.correct(text, bent)
+    assert caught.value.line == 6
+
+
+@pytest.mark.parametrize(
+    ("formula", "value"),
+    [
+        ("Q1 = 2 + 3 * 4", 14), ("Q1 = ( 2 + 3 ) * 4", 20), ("Q1 = -2 ^ 2", 4), ("Q1 = 7 / 2 - 1", 2.5),
+        ("Q1 = SIN 30 + SQ 3", 9.5), ("Q1 = INT -2.7", -2), ("Q1 = FRAC 2.5", 0.5), ("Q1 = SGN -4", -1),
+        ("Q1 = ATAN 1", 45), ("Q1 = ABS NEG 3", 3), ("Q1 = PI", np.pi), ("FN 1: Q1 = -2 + -5", -7),
+        ("FN 2: Q1 = +5 - -2", 7), ("FN 3: Q1 = +3 * +3", 9), ("FN 4: Q1 = +4 DIV +8", 0.5),
+        ("FN 5: Q1 = SQRT 4", 2), ("FN 6: Q1 = SIN-90", -1), ("FN 7: Q1 = COS+0", 1),
+        ("FN 8: Q1 = +3 LEN +4", 5), ("FN 13: Q1 = +10 ANG -10", 135), ("FN0: Q1=.5", 0.5),
+        ("QL1 = 3\nQ1 = QL1 * 2", 6),
+    ],
+)  # fmt: skip
+def test_formulas(formula: str, value: float) -> None:
+    (block,) = [line for line in unrolled(formula + "\nL X+Q1\n") if line]
+    assert float(block.removeprefix("L X")) == pytest.approx(value, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("L X+Q5\n", "Q5 is used before"), ("Q1 = 1 / 0\n", "has no value"), ("Q1 = ( 2\n", "not closed"),
+        ("Q1 = FOO 2\n", "not read in formulas"), ("FN 9: IF +1 EQU +1 GOTO LBL 9\n", "no LBL 9"),
+        ("CALL PGM TNC:\\\\OTHER.H\n", "no such file"), ("LBL 1\nCALL LBL 1\n", "nested deeper"),
+        ("FN 0: Q1=1\nFN 18: SYSREAD Q1 = ID1 NR2\nL X+Q1\n", "Q1 is used before"),
+        ("LBL 1\nL X1\nFN 9: IF +1 EQU +1 GOTO LBL 1\n", "more than 3280 bytes"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_unrolled(text: str, words: str) -> None:
+    with pytest.raises(ProgramError, match=words) as caught:
+        unrolled(text, limit=400)
+    assert caught.value.line is not None
+
+
+def test_programs_beside_are_called(bent: Path, tmp_path: Path) -> None:
+    (tmp_path / "MAIN.H").write_text(
+        "BEGIN PGM MAIN MM\nQ1=5\nCALL PGM TNC:\\A\\SUB.H\nL Y+Q2\nEND PGM MAIN MM\n"
+    )
+    (tmp_path / "sub.h").write_text("BEGIN PGM SUB MM\nL X+Q1 Y0 Z0 F50\nQ2=7\nEND PGM SUB MM\n")
+    text = olp.flatten(tmp_path / "MAIN.H", bent)
+    assert text.split(b"\n")[1:3] == [b"L X+5 Y0 Z0 F50", b"L Y+7"]
+
+
+def test_values_of_the_control_may_be_stated_in_the_job() -> None:
+    text = "FN 18: SYSREAD Q13 = ID270 NR1 IDX1\nL X+Q13\n"
+    assert unrolled(text, parameters={"Q13": 2.25})[0] == "L X+2.25"
