@@ -238,7 +238,7 @@ class StylusTable(Table):
 
 
 #: A parameter of a program, by its number or its name.
-_PARAMETER = re.compile(r"#(\d{1,5}|<[^<>]+>)|Q[LR]?\d{1,5}")
+_PARAMETER = re.compile(r"#(\d{1,5}|<[^<>]+>)|(?:Q[LR]?|R)\d{1,5}")
 Styli = dict[Text, StylusTable]
 WorkOffsets = dict[OffsetName, WorkOffsetTable]
 Tools = dict[ToolNumber, ToolTable]
@@ -383,7 +383,7 @@ class JobFile(Table):
     parameters: dict[Text, float] = Field(
         default={},
         description="the table [parameters]: values that parameters of the program have in the control, such "
-        'as "#100" = 5.0, "#<depth>" = 2.5 or Q13 = 1.0, wherever the program does not set them',
+        'as "#100" = 5.0, "#<depth>" = 2.5, Q13 = 1.0 or R1 = 3.0, wherever the program does not set them',
     )
     temperatures_degC: TemperaturesTable = Field(
         default_factory=TemperaturesTable, description="the table [temperatures_degC], in degC"
@@ -400,7 +400,7 @@ class JobFile(Table):
     def _named(value: dict[str, float], _: Known) -> dict[str, float]:
         for name in value:
             if not _PARAMETER.fullmatch(name):
-                raise refusal(f'has the key "{name}"; expected a parameter, such as "#100" or "#<depth>"')
+                raise refusal(f'has the key "{name}"; expected one such as "#100", "#<depth>" or "R1"')
         return value
 
     @rule("payloads")

@@ -17,7 +17,7 @@ from olp.program.survey import Change, Unroll, as_it_is
 from olp.workflows.session import PathLike, Session, opened
 
 #: Endings of files of subprograms.
-_ENDINGS = ("", ".ngc", ".nc", ".NC", ".h", ".H")
+_ENDINGS = ("", ".ngc", ".nc", ".NC", ".h", ".H", ".spf", ".SPF", ".mpf", ".MPF")
 #: Digits of O numbers in names of files.
 _DIGITS = (1, 4, 5)
 

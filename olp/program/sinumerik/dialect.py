@@ -13,7 +13,7 @@ from olp.program.rs274.cycle_rules import ISO_CYCLES
 from olp.program.rs274.entry import read_blocks
 from olp.program.rs274.flatten.language import MACRO_B
 from olp.program.rs274.profiles.base import ISO_M, Act, Profile
-from olp.program.sinumerik.entry import translate_text
+from olp.program.sinumerik.entry import translate_text, unroll_text
 from olp.program.sinumerik.table import HARMLESS_G, ROUNDING_G, statements
 from olp.program.text.signs import SINUMERIK
 
@@ -56,6 +56,7 @@ DIALECT = Sinumerik(
     name="sinumerik",
     title="Sinumerik 840D",
     reader=read_blocks,
+    unroller=unroll_text,
     translator=translate_text,
     endings=("mpf", "spf"),
     folder_endings=("mpf", "spf", "arc"),

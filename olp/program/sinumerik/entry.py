@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+from olp.program.origin import Unrolled
 from olp.program.rs274.translation import Translation
 
 
@@ -10,3 +13,10 @@ def translate_text(data: bytes) -> Translation:
     from olp.program.sinumerik.translate import translate
 
     return translate(data)
+
+
+def unroll_text(data: bytes, dialect: Any, **options: Any) -> Unrolled:
+    """`olp.program.sinumerik.flatten.unroll.flatten`."""
+    from olp.program.sinumerik.flatten.unroll import flatten
+
+    return flatten(data, dialect, **options)

@@ -1,0 +1,1 @@
+"""Parametric Sinumerik programs unrolled into plain blocks: R-parameters, variables, loops, subprograms."""

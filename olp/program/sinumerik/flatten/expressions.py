@@ -1,0 +1,200 @@
+"""Expressions of Sinumerik programs: R-parameters, variables, functions and operators.
+
+Source: Siemens, Programming Manual Job Planning, sections on arithmetic functions and on the priority of
+operations. Comparisons come last there, so AND and OR of comparisons need brackets.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping, MutableMapping
+
+from olp.core.errors import ProgramError
+
+Value = float | bool | str
+#: Names of variables by their capitals, an index in brackets among them.
+Variables = MutableMapping[str, Value]
+
+_TOKEN = re.compile(
+    r"[ \t]*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:EX[+-]?\d+)?)|(?P<text>\"[^\"]*\")"
+    r"|(?P<name>[$A-Z_][$A-Z0-9_]*)|(?P<sign><<|<>|==|<=|>=|[-+*/<>()\[\],]))",
+    re.IGNORECASE,
+)
+#: Operators by their priority, the first bind closest.
+_LEVELS: tuple[tuple[str, ...], ...] = (
+    ("==", "<>", "<", ">", "<=", ">="), ("OR",), ("XOR",), ("AND",), ("+", "-"), ("*", "/", "DIV", "MOD"),
+)  # fmt: skip
+_LOGICAL = frozenset({"OR", "XOR", "AND"})
+
+
+def _degrees(function: Callable[[float], float]) -> Callable[[float], float]:
+    return lambda angle: function(math.radians(angle))
+
+
+_FUNCTIONS: Mapping[str, tuple[int, Callable[..., float]]] = {
+    "SIN": (1, _degrees(math.sin)), "COS": (1, _degrees(math.cos)), "TAN": (1, _degrees(math.tan)),
+    "ASIN": (1, lambda v: math.degrees(math.asin(v))), "ACOS": (1, lambda v: math.degrees(math.acos(v))),
+    "ATAN2": (2, lambda y, x: math.degrees(math.atan2(y, x))), "SQRT": (1, math.sqrt), "ABS": (1, abs),
+    "POT": (1, lambda v: v * v), "TRUNC": (1, math.trunc), "ROUND": (1, lambda v: math.floor(v + 0.5)),
+    "LN": (1, math.log), "EXP": (1, math.exp), "MINVAL": (2, min), "MAXVAL": (2, max),
+    "BOUND": (3, lambda low, high, v: min(max(v, low), high)),
+}  # fmt: skip
+_NAMED: Mapping[str, Value] = {"TRUE": True, "FALSE": False, "$PI": math.pi}
+
+
+def evaluate(text: str, variables: Variables) -> Value:
+    """The value of an expression. Raises ProgramError, without a line, for what cannot be computed here."""
+    reading = _Reading(text, variables)
+    value = reading.level(0)
+    if reading.kind:
+        raise reading.error("is not an expression")
+    return value
+
+
+def number(text: str, variables: Variables) -> float:
+    """The value of an expression that is a number."""
+    value = evaluate(text, variables)
+    if isinstance(value, str) or not math.isfinite(value):
+        raise ProgramError(f"`{text.strip()}` has no value that is a number", code="OLP540")
+    return float(value)
+
+
+class _Reading:
+    """One expression while it is read: the present token, its kind empty behind the last one."""
+
+    def __init__(self, text: str, variables: Variables) -> None:
+        self.text, self.variables = text, variables
+        self.place, self.kind, self.token = 0, "", ""
+        self.next()
+
+    def error(self, what: str, code: str = "OLP540") -> ProgramError:
+        return ProgramError(f"`{self.text.strip()}` {what}", code=code)
+
+    def next(self) -> None:
+        """Go on to the next token."""
+        match = _TOKEN.match(self.text, self.place)
+        if match is None:
+            if self.text[self.place :].strip():
+                raise self.error("is not an expression")
+            self.kind = self.token = ""
+            return
+        self.place, self.kind = match.end(), match.lastgroup or ""
+        self.token = match[match.lastgroup or 0]
+        if self.kind != "text":
+            self.token = self.token.upper()
+
+    def level(self, depth: int) -> Value:
+        """A value made by the operators of this priority and closer ones."""
+        if depth == len(_LEVELS):
+            return self._signed()
+        value = self.level(depth + 1)
+        while self.kind in ("sign", "name") and self.token in _LEVELS[depth]:
+            operator = self.token
+            self.next()
+            value = self._applied(operator, value, self.level(depth + 1))
+        return value
+
+    def _applied(self, operator: str, left: Value, right: Value) -> Value:
+        if operator in _LOGICAL:
+            if not isinstance(left, bool) or not isinstance(right, bool):
+                raise self.error(f"joins numbers with {operator}; put each comparison into brackets")
+            return {"OR": left or right, "AND": left and right, "XOR": left != right}[operator]
+        if isinstance(left, str) or isinstance(right, str):
+            if operator in ("==", "<>") and isinstance(left, str) and isinstance(right, str):
+                return (left == right) == (operator == "==")
+            raise self.error("mixes text and numbers")
+        same = math.isclose(left, right, rel_tol=1e-12, abs_tol=1e-12)
+        if operator in _LEVELS[0]:
+            less = left < right and not same
+            return {"==": same, "<>": not same, "<": less, "<=": less or same, ">": not (less or same),
+                    ">=": not less}[operator]  # fmt: skip
+        if operator in ("/", "DIV", "MOD") and not right:
+            raise self.error("divides by zero")
+        if operator == "DIV":
+            return float(math.trunc(left / right))
+        if operator == "MOD":
+            return math.fmod(left, right)
+        return {"+": left + right, "-": left - right, "*": left * right}.get(operator, left / (right or 1.0))
+
+    def _signed(self) -> Value:
+        if self.token in ("-", "+", "NOT") and self.kind != "text":
+            sign = self.token
+            self.next()
+            value = self._signed()
+            if (sign == "NOT") != isinstance(value, bool) or isinstance(value, str):
+                raise self.error(f"has {sign} in front of a value that takes none")
+            return not value if sign == "NOT" else -value if sign == "-" else value
+        return self._operand()
+
+    def _operand(self) -> Value:
+        kind, token = self.kind, self.token
+        self.next()
+        if kind == "number":
+            body, _, power = token.partition("EX")
+            return float(body) * 10.0 ** int(power or 0)
+        if kind == "text":
+            return token[1:-1]
+        if (kind, token) == ("sign", "("):
+            value = self.level(0)
+            self._expect(")")
+            return value
+        if kind != "name":
+            raise self.error("is not an expression")
+        if (self.kind, self.token) == ("sign", "("):
+            return self._called(token)
+        if (self.kind, self.token) == ("sign", "["):
+            self.next()
+            index = [self._index()]
+            while self.token == ",":
+                self.next()
+                index.append(self._index())
+            self._expect("]")
+            token = indexed(token, index)
+        return self._value(token)
+
+    def _index(self) -> int:
+        value = self.level(0)
+        if isinstance(value, str) or value != round(value):
+            raise self.error("has an index that is not an integer")
+        return round(value)
+
+    def _called(self, name: str) -> Value:
+        if name not in _FUNCTIONS:
+            raise self.error(f"calls {name}, whose value only the control knows", "OLP541")
+        count, function = _FUNCTIONS[name]
+        self.next()
+        values = [self.level(0)]
+        while self.token == "," and self.kind == "sign":
+            self.next()
+            values.append(self.level(0))
+        self._expect(")")
+        if len(values) != count or any(isinstance(value, str) for value in values):
+            raise self.error(f"gives {name} other arguments than {count} numbers")
+        try:
+            return float(function(*values))
+        except (ValueError, OverflowError):
+            raise self.error(f"has no value of {name}") from None
+
+    def _value(self, name: str) -> Value:
+        if name in _NAMED:
+            return _NAMED[name]
+        if name not in self.variables:
+            raise ProgramError(
+                f"{name} has no value that the program sets; give it in the table [parameters] of the job "
+                "file, or set it in the program",
+                code="OLP541",
+            )
+        return self.variables[name]
+
+    def _expect(self, sign: str) -> None:
+        if (self.kind, self.token) != ("sign", sign):
+            raise self.error(f"lacks a `{sign}`")
+        self.next()
+
+
+def indexed(name: str, index: list[int]) -> str:
+    """The name of an element of an array; R[5] is R5."""
+    if name == "R" and len(index) == 1:
+        return f"R{index[0]}"
+    return f"{name}[{','.join(map(str, index))}]"

@@ -1,0 +1,167 @@
+"""Parametric programs unrolled: against a judge that runs them as Python, and by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from cases.acceptance import TRUE_ZERO, machine
+from judge import sinumerik as judge
+
+from olp.core.errors import ProgramError
+from olp.core.machine import Setup
+from olp.files.config import load_setup
+from olp.program.registry import DIALECTS, read
+from olp.program.sinumerik.flatten.unroll import flatten
+
+SINUMERIK = DIALECTS["sinumerik"]
+HEAD = "G71 G90 G17 G54 G94 F600\nG0 X0 Y0 Z0\n"
+
+
+@pytest.fixture(scope="module")
+def setup(tmp_path_factory: pytest.TempPathFactory) -> Setup:
+    return load_setup(machine(tmp_path_factory.mktemp("m"), tables=TRUE_ZERO, controller="sinumerik"))
+
+
+def unrolled(text: str, **options: object) -> str:
+    return flatten(text.encode(), SINUMERIK, **options).decode()  # type: ignore[arg-type]
+
+
+def random_program(rng: np.random.Generator) -> str:
+    """Blocks, assignments and structures inside one another; loops end."""
+    rows: list[str] = [f"R{i}={rng.integers(-9, 9)}" for i in range(1, 5)] + ["DEF REAL V1=2.5"]
+    counter = 10
+
+    def expression() -> str:
+        first = [f"R{rng.integers(1, 5)}", "V1", f"{rng.integers(0, 99) / 10}"][rng.integers(3)]
+        other = [f"ABS(R{rng.integers(1, 5)})", f"SIN({rng.integers(0, 90)})", "(R1+2)", "V1"][
+            rng.integers(4)
+        ]
+        return f"{first}{'+-*'[rng.integers(3)]}{other}"
+
+    def block(depth: int) -> None:
+        nonlocal counter
+        for _ in range(rng.integers(1, 5)):
+            kind = rng.integers(10)
+            counter += 1
+            if kind < 4:
+                axis = "XYZ"[rng.integers(3)]
+                value = [expression(), f"IC({expression()})", f"AC({expression()})", "7.25"][rng.integers(4)]
+                rows.append(f"N{len(rows)} {['G1', 'G90 G0', 'G91', ''][rng.integers(4)]} {axis}={value}")
+            elif kind < 6:
+                rows.append(f"R{rng.integers(1, 5)}=TRUNC({expression()})/4")
+            elif depth > 2:
+                rows.append(f"G90 X={expression()} Y{rng.integers(9)}")
+            elif kind == 6:
+                rows.append(f"IF (R1>{rng.integers(-3, 3)}) AND (R2<={rng.integers(-3, 9)})")
+                block(depth + 1)
+                rows.append("ELSE")
+                block(depth + 1)
+                rows.append("ENDIF")
+            elif kind == 7:
+                rows.append(f"FOR R{counter}=1 TO {rng.integers(0, 4)}")
+                block(depth + 1)
+                rows.append("ENDFOR")
+            elif kind == 8:
+                own = counter
+                rows.append(f"R{own}=0")
+                rows.append(f"WHILE R{own}<{rng.integers(1, 4)}")
+                rows.append(f"R{own}=R{own}+1")
+                block(depth + 1)
+                rows.append("ENDWHILE")
+            else:
+                own = counter
+                rows.append(f"R{own}=0")
+                rows.append("REPEAT")
+                rows.append(f"R{own}=R{own}+1")
+                block(depth + 1)
+                rows.append(f"UNTIL R{own}>={rng.integers(1, 3)}")
+
+    for _ in range(3):
+        block(0)
+    return HEAD + "\n".join([*rows, "G90 G1 X0 Y0 Z0"]) + "\n"
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_random_programs_go_where_the_judge_goes(seed: int, setup: Setup) -> None:
+    program = random_program(np.random.default_rng(seed))
+    want = np.array(judge.ends(program))
+    got = read(unrolled(program + "M30\n").encode(), setup, SINUMERIK).toolpath.end_mm
+    assert got.shape == want.shape
+    assert np.abs(got - want).max() < 1e-6
+
+
+def test_what_is_plain_stays_byte_for_byte() -> None:
+    text = 'N10 G1  X5.00 Y=3 ; a\r\nMSG("R1=5")\r\nN20 R1=4 ; b\r\nN30 X=R1 Z-1.50\r\nN40 M30\r\nX9\r\n'
+    want = 'N10 G1  X5.00 Y=3 ; a\r\nMSG("R1=5")\r\nN30 X=4 Z-1.50\r\nN40 M30\r\n'
+    assert unrolled(text) == want
+
+
+#: A program behind the head, and its blocks when unrolled.
+WRITTEN = {
+    "AA:\nN5 X=IC(5)\nR1=R1+1\nIF R1<2 GOTOB AA\n": "N5 X5\nX10\n",
+    "GOTOF N20\nX1\nN20 X2\n": "N20 X2\n",
+    "CASE R1 OF 1 GOTOF A1 0 GOTOF A2 DEFAULT GOTOF A3\nA1: X1\nA2: X2\nA3: X3\n": "X2\nX3\n",
+    "LOOP\nR1=R1+1\nIF R1>2 GOTOF OUT\nX=R1\nENDLOOP\nOUT: Y1\n": "X=1\nX=2\nY1\n",
+    "R[2]=3\nX=R2*POT(2) Y=5 DIV 2 Z=5 MOD 3\n": "X=12 Y=2 Z=2\n",
+    "DEF INT A[3]\nA[1]=4\nX=A[1]+A[2]\n": "X=4\n",
+    "G91 X=AC(4)\n": "G91 X=4\n",
+    "R3=2\nMCALL CYCLE81(5,0,1,-R3)\nX1\nMCALL\n": "MCALL CYCLE81(5,0,1,-2)\nX1\nMCALL\n",
+    "SUB1(2)\nL7 P2\n": "X=4\nY1\nY1\n",
+    "TRANS X=R1+1\n": "TRANS X=1\n",
+    # a variable of the control
+    "GUD=2\nX=GUD\n": "X=2\n",
+}
+FILES = {"SUB1": b"PROC SUB1(REAL A, REAL B=2)\nX=A*B\nRET\n", "L7": b"Y1\nM17\n"}
+
+
+@pytest.mark.parametrize("text", WRITTEN, ids=lambda t: t.replace("\n", " | "))
+def test_unrolled_by_hand(text: str) -> None:
+    def beside(name: str) -> tuple[str, bytes] | None:
+        return (f"{name}.SPF", FILES[name]) if name in FILES else None
+
+    got = unrolled(HEAD + "R1=0\n" + text + "M30\n", subprograms=beside)
+    want = HEAD + WRITTEN[text] + "M30\n"
+    lines = [" ".join(line.replace("X=IC", "").split()) for line in got.splitlines()]
+    assert [line.replace("=", "") for line in lines] == [line.replace("=", "") for line in want.splitlines()]
+
+
+def test_cycles_are_written_out_as_moves() -> None:
+    text = HEAD + "Z9\nMCALL CYCLE82(5,0,1,-2,,0.5)\nX1 Y2\nHOLES1(10,0,0,5,10,2)\nMCALL\nM30\n"
+    hole = "G0 Z1\nG1 Z-2\nG4 F0.5\nG0 Z5\nG0\n"
+    want = HEAD + f"Z9\nX1 Y2\n{hole}G0 X15 Y0\n{hole}G0 X25 Y0\n{hole}G0\nM30\n"
+    assert unrolled(text, expand_cycles=True) == want
+
+
+def test_subprograms_of_an_archive_have_the_lines_of_the_file() -> None:
+    text = "%_N_A_MPF\n;$PATH=/_N_A\nBB1\nM30\n%_N_BB1_SPF\nG0 X1\nRET\n"
+    done = flatten(text.encode(), SINUMERIK)
+    assert done.decode() == "%_N_A_MPF\n;$PATH=/_N_A\nG0 X1\nM30\n"
+    assert done.origin.lines_of([3, 4]).tolist() == [6, 4]
+
+
+REFUSED = {
+    "X=R9": ("R9 has no value", "OLP541"),
+    "X=$AA_IM[X]": ("has no value", "OLP541"),
+    "NOSUB": ("NOSUB.SPF", "OLP542"),
+    "IF R1>1 AND R1<2 GOTOF A": ("put each comparison into brackets", "OLP540"),
+    "GOTOF NONE": ("not in its direction", "OLP542"),
+    "X=R1/0": ("divides by zero", "OLP540"),
+    "REPEAT AA P=3": ("write the part out", "OLP542"),
+    "ENDIF": ("closes nothing", "OLP542"),
+    "AA:\nGOTOB AA": ("endless loop", "OLP543"),
+    "GUD=2.5": ("DEF REAL", "OLP542"),
+    "TRANS X1\nX=IC(1)": ("program it in G90 first", "OLP524"),
+}
+
+
+@pytest.mark.parametrize("text", REFUSED, ids=lambda t: t.replace("\n", " | "))
+def test_what_is_not_run_is_refused_with_its_line(text: str) -> None:
+    message, code = REFUSED[text]
+    with pytest.raises(ProgramError) as caught:
+        unrolled(f"R1=0\nG90 G0 X0 Y0\n{text}", limit=20_000)
+    assert message in str(caught.value)
+    assert caught.value.code.startswith(code) and caught.value.line in (3, 4)
+
+
+def test_values_of_the_control_come_from_the_job() -> None:
+    assert unrolled("X=R9\n", parameters={"R9": 2.5}) == "X=2.5\n"
