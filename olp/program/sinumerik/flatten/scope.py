@@ -105,8 +105,8 @@ class Scope(MutableMapping[str, Value]):
         else:
             if not isinstance(value, bool | str) and value != round(value):
                 raise ProgramError(
-                    f"{name} is not defined in the program, so it is not known whether it is rounded; give DEF REAL "
-                    "in front of it",
+                    f"{name} is not defined in the program, so it may be rounded; give DEF REAL in front "
+                    "of it",
                     code="OLP542",
                 )
             self._shared[name] = value
