@@ -17,10 +17,13 @@ from olp.core.arrays import Array, Index, Mask, distinct
 from olp.core.progress import Progress, silent
 from olp.core.toolpath import Flag
 from olp.program.bands import Band
+from olp.program.program import Definitions
 from olp.program.text.edits import BARE, EditList, Edits
 
 #: M functions that act when their block has ended
 _LATE_M = frozenset({0, 1, 2, 5, 9, 30, 99})
+#: mm; a surface that is off by less is the same
+_SAME_MM = 1e-9
 _NUMBER = re.compile(rb"[ \t]*\d*[ \t]*")
 #: words that show whether numbers are written with a plus
 _LOOKED_AT = 4000
@@ -34,6 +37,9 @@ class ConversationalWriter(PoleWriter):
     def __init__(self, task: Task) -> None:
         super().__init__(task)
         self._arcs = PoleArcs()
+        #: the definition of the cycle in force, where it begins, and its surface as written
+        self._surface = (-1, 0.0)
+        self._defined = EditList(self.prefixes)
         slot = self.program.slot[self.program.slot >= 0][:_LOOKED_AT]
         first = np.frombuffer(self.program.data, np.uint8)[self.words.number[slot]]
         self._signed = bool((first == ord("+")).sum() > ((first != ord("+")) & (first != ord("-"))).sum())
@@ -56,6 +62,7 @@ class ConversationalWriter(PoleWriter):
         return joined
 
     def _rewritten(self, rows: Rows, begin: int, end: int) -> bytes | None:
+        self._defined = EditList(self.prefixes)
         columns, polar = self._columns(rows), self._arcs.polar(self, rows)
         for a, b in pairwise(self._breaks(rows)):
             if rows.flag[a] & np.uint8(Flag.CYCLE):
@@ -65,7 +72,7 @@ class ConversationalWriter(PoleWriter):
             else:
                 self._digits(rows, columns, a, b)
         self._arcs.lift(self, rows)
-        edits = [*self._word_edits(rows), *self._arcs.edits(self, rows)]
+        edits = [*self._word_edits(rows), *self._arcs.edits(self, rows), self._defined.done()]
         return self._spliced(edits, begin, end)
 
     def _breaks(self, rows: Rows) -> list[int]:
@@ -75,28 +82,77 @@ class ConversationalWriter(PoleWriter):
         return [0, *changes.tolist(), len(rows.move)]
 
     def _columns(self, rows: Rows) -> list[AxisRows]:
-        """The columns of `BlockWriter`, with positions of holes as the middle of their strokes needs them."""
+        """The columns of `BlockWriter`, with positions of holes as the middle of their strokes needs them. A
+        cycle that counts from the present height begins where its bottom is right."""
         columns = super()._columns(rows)
-        assert self.program.statements is not None
-        strokes = self.program.statements.strokes - self.moves_before
-        low, high = np.searchsorted(strokes[:, 0], (rows.move[0], rows.move[-1] + 1))
-        if high == low:
+        strokes, which, definitions = self._strokes(rows)
+        if not len(which):
             return columns
         # the last row of the move to the hole
-        top, bottom = (np.searchsorted(rows.move, strokes[low:high, k], "right") - 1 for k in (0, 1))
-        for axis in (0, 1):
+        top, bottom = (np.searchsorted(rows.move, strokes[:, k], "right") - 1 for k in (0, 1))
+        by_height = np.isnan(definitions.surface[which])
+        for axis in range(3):
             command, nominal = columns[axis].command, columns[axis].nominal
-            away = command - nominal
+            away = np.nan_to_num(command - nominal)
+            # the stroke begins at the row before its bottom
+            middle = (away[bottom - 1] + away[bottom]) / 2 if axis < 2 else away[bottom]
             middled = command.copy()
-            middled[top] += np.nan_to_num(away[bottom] - away[top]) / 2
+            middled[top] += (middle - away[top]) * (by_height if axis == 2 else 1.0)
             columns[axis] = replace(columns[axis], command=middled)
         return columns
 
+    def _strokes(self, rows: Rows) -> tuple[Index, Index, Definitions]:
+        """(k, 2) the strokes among rows as moves of the band, their numbers, and all definitions."""
+        statements = self.program.statements
+        assert statements is not None and statements.definitions is not None
+        strokes = statements.strokes - self.moves_before
+        low, high = np.searchsorted(strokes[:, 0], (rows.move[0], rows.move[-1] + 1))
+        return strokes[low:high], np.arange(low, high), statements.definitions
+
     def _cycles(self, rows: Rows, a: int, b: int) -> None:
-        """Strokes a..b are where the move before them left the tool; their heights are those of the cycle."""
-        before = rows.emitted[a - 1] if a else rows.entry
-        rows.emitted[a:b] = self.path.end_mm[rows.move[a:b]]
+        """Strokes a..b are where the move before them left the tool. Their heights are those of the cycle,
+        which is defined again where its surface has to be another one."""
+        before, path = rows.emitted[a - 1] if a else rows.entry, self.path
+        last = int(rows.move[a - 1]) if a else int(rows.move[a]) - 1
+        nominal = path.end_mm[last, 2] if last >= 0 else path.start_mm[2]
+        rows.emitted[a:b] = path.end_mm[rows.move[a:b]]
         rows.emitted[a:b, :2] = before[:2]
+        strokes, which, definitions = self._strokes(rows)
+        for (_, bottom), k in zip(strokes.tolist(), which.tolist(), strict=True):
+            row = int(rows.move.searchsorted(bottom))
+            if not a < row < b:
+                continue
+            if np.isnan(definitions.surface[k]):
+                # it begins at the height where the tool is
+                lift = float(before[2] - nominal)
+            else:
+                lift = self._surfaced(rows, row, k, definitions)
+            rows.emitted[row - 1 : row + 2, 2] += lift
+
+    def _surfaced(self, rows: Rows, row: int, stroke: int, definitions: Definitions) -> float:
+        """How much higher a hole is than the program says; defines its cycle again where that changes."""
+        begin, end = definitions.text[stroke].tolist()
+        surface, move = float(definitions.surface[stroke]), int(rows.move[row])
+        unit = float(self.frame_unit_mm[self.path.frame[move]])
+        if begin < 0:
+            return 0.0
+        if self._surface[0] != begin:
+            self._surface = (begin, surface)
+        away = float(self.plan.command_mm[rows.first + row, 2] - self.path.end_mm[move, 2])
+        decimals = self.style.usual(2, unit)
+        wanted = surface
+        if abs(away) > _SAME_MM:
+            wanted = round((surface + away / unit) * 10**decimals) / 10**decimals
+        if wanted != self._surface[1]:
+            self._surface = (begin, wanted)
+            line = int(self.path.line[move])
+            place = int(self.program.line_start[line - 1])
+            number, stop = definitions.number[stroke].tolist()
+            data, mantissa = self.program.data, round(wanted * 10**decimals)
+            self._defined.add(place, place, mantissa, decimals, data[begin:number], 1)
+            self._defined.add(place, place, BARE, 0, data[stop:end] + self.program.eol(line), 2)
+            self.tally.inserted_blocks += 1
+        return (wanted - surface) * unit
 
     def _spliced(self, edits: list[Edits], begin: int, end: int) -> bytes | None:
         """Numbers that stay positive keep their plus, and new ones get one where the program writes it."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import field, replace
 
@@ -140,6 +140,23 @@ class StatedFeeds:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Definitions:
+    """Of each stroke, what defines its cycle: (k, 2) the bytes of the `text`, and of the `number` of the
+    surface in it, -1 where these are not known; (k,) the `surface` in numbers of the program, NaN where the
+    cycle counts from the present height."""
+
+    text: npt.NDArray[np.int64]
+    number: npt.NDArray[np.int64]
+    surface: npt.NDArray[np.float64]
+
+    @staticmethod
+    def of(rows: Sequence[tuple[int, int, int, int, float]]) -> Definitions:
+        """Of strokes in order: text, number and surface."""
+        table = np.array(rows, float).reshape(-1, 5)
+        return Definitions(table[:, :2].astype(np.int64), table[:, 2:4].astype(np.int64), table[:, 4])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Statements:
     """What a program of whole statements has beside its words.
 
@@ -153,7 +170,8 @@ class Statements:
     columns. `strokes` (k, 2): the moves to the hole and to its bottom. `restated` are moves whose statements
     have other numbers than x, y, z, so that all three replace them where one changes: true where the
     statement counts from the point before. `chords` are arcs that are read as chords. `decimal` is the
-    decimal mark of texts whose numbers keep their own form and column, empty for others.
+    decimal mark of texts whose numbers keep their own form and column, empty for others. `definitions` are
+    those of the cycles of strokes, None where no cycle has any.
     """
 
     begin: Small
@@ -172,6 +190,7 @@ class Statements:
     decimal: bytes = b""
     restated: Mapping[int, bool] = field(default_factory=dict)
     chords: tuple[ChordText, ...] = ()
+    definitions: Definitions | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,7 +13,7 @@ from olp.core.arrays import Array, Index, Mask
 from olp.core.toolpath import Flag, Frame, Kind
 from olp.program.dialect import Dialect
 from olp.program.heidenhain.columns import Blocks
-from olp.program.program import ArcSlots, Poles, Program, StatedFeeds, Statements
+from olp.program.program import ArcSlots, Definitions, Poles, Program, StatedFeeds, Statements
 from olp.program.rs274.collector import Collector
 
 #: M functions that act when their block has ended
@@ -53,6 +53,7 @@ class Collected(Collector):
     def __init__(self, data: bytes, start: tuple[float, float, float], *, keep_words: bool) -> None:
         super().__init__(data, start, keep_words=keep_words)
         self.strokes: list[tuple[int, int]] = []
+        self.definitions: list[tuple[int, int, int, int, float]] = []
         self.pauses: list[tuple[int, float]] = []
 
     def put_blocks(self, blocks: Blocks) -> None:
@@ -112,6 +113,7 @@ class Collected(Collector):
                 begin=line_start[path.line - 1], end=line_end[path.line - 1],
                 feed_mm_s=take("feed", np.float64), rest=rest, dwell_s=dwell, arcs={}, broken={},
                 strokes=np.array(self.strokes, np.int64).reshape(-1, 2), feeds=self._feeds(path.line),
+                definitions=Definitions.of(self.definitions),
             ),
         )  # fmt: skip
 

@@ -17,6 +17,7 @@ _BY_HEIGHT = frozenset({1, 2, 17})
 AT_ONCE = frozenset({7, 8, 9, 10, 11, 13, 19, 26, 32, 239, 247, 332, 392})
 _TAPS = frozenset({2, 17, 206, 207, 209})
 _CENTRED = 240
+_SURFACE = re.compile(rb"Q203[ \t]*=[ \t]*([-+]?[\w.]+)", re.I)
 _NUMBER = re.compile(rb"([-+]?(?:\d+\.?\d*|\.\d+))\s*\Z")
 
 
@@ -95,6 +96,18 @@ class Cycle:
     def _is_number(self, modes: Modes, number: int) -> bool:
         text = self.values[number].upper().lstrip(b"+-")
         return not text.startswith(b"Q") or text.decode("latin-1") in modes.parameters
+
+    def definition(self, modes: Modes, data: bytes) -> tuple[int, int, int, int, float]:
+        """The bytes that define the cycle, those of its surface, and that in numbers of the program. Bytes
+        are -1 where none states it, the surface NaN where the cycle has none."""
+        if self.number not in _BY_SURFACE:
+            return -1, -1, -1, -1, NAN
+        begin, end = self.statement.span
+        stated = _SURFACE.search(data, begin, end) if begin >= 0 else None
+        surface = self._value(modes, 203)
+        if stated is None:
+            return -1, -1, -1, -1, surface
+        return begin, end, *stated.span(1), surface
 
     def _by_height(self, modes: Modes, z_mm: float, line: int) -> Stroke | None:
         if z_mm != z_mm:

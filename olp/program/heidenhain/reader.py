@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -103,7 +104,8 @@ class _Reader(Arcs):
         while stop < len(blocks.block) and blocks.block[stop] == Block.MORE:
             stop += 1
         start, end = blocks.words.line_start, blocks.words.line_end
-        return of_lines([self.data[start[k] : end[k]] for k in range(line, stop)], blocks.number(line))
+        statement = of_lines([self.data[start[k] : end[k]] for k in range(line, stop)], blocks.number(line))
+        return replace(statement, span=(int(start[line]), int(end[stop - 1])))
 
     # -- blocks one by one ---------------------------------------------------------------------------
 
@@ -324,6 +326,7 @@ class _Reader(Arcs):
             feed = stroke.feed_mm_s if kind == Kind.LINE else np.inf
             if kind == Kind.LINE and collector.moves > 1:
                 collector.strokes.append((collector.moves - 2, collector.moves))
+                collector.definitions.append(self.cycle.definition(modes, collector.data))
             collector.put_one(kind, Flag.CYCLE, line, frame, (x, y, z), feed)
         modes.position[2] = stroke.retract
         self.last_line = line

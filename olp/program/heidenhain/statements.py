@@ -17,11 +17,12 @@ _WORD = re.compile(rb"(I?)([XYZABCUVW])[ \t]*([-+]?(?:\d+\.?\d*|\.\d+))", re.I)
 @dataclass(frozen=True, slots=True)
 class Statement:
     """A statement with its `line` from 1, its `text` with the case that it has, and in capitals as `upper`.
-    `deleted`: it begins with `/`."""
+    `deleted`: it begins with `/`. `span` are the bytes of its lines, where it is known."""
 
     line: int
     text: bytes
     deleted: bool
+    span: tuple[int, int] = (-1, -1)
 
     @property
     def upper(self) -> bytes:

@@ -29,10 +29,10 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"BEGIN PGM": (_R, "MM or INCH"),
     b"END PGM": (_R, "the end"),
     b"TOOL CALL": (_R, "the tool, by number or name, and DL; its length is active from here on"),
-    b"CYCL DEF 1": (_R, "pecking from the present height: holes are corrected in the working plane"),
+    b"CYCL DEF 1": (_R, "pecking from the present height, which is corrected"),
     b"CYCL DEF 2": (_R, "as CYCL DEF 1"),
     b"CYCL DEF 17": (_R, "as CYCL DEF 1"),
-    b"CYCL DEF 200": (_R, "holes are corrected in the working plane"),
+    b"CYCL DEF 200": (_R, "holes are corrected in the plane, and in depth by a CYCL DEF with another Q203"),
     **dict.fromkeys(
         (b"CYCL DEF 201", b"CYCL DEF 202", b"CYCL DEF 203", b"CYCL DEF 205", b"CYCL DEF 206",
          b"CYCL DEF 207", b"CYCL DEF 208", b"CYCL DEF 209", b"CYCL DEF 240", b"CYCL DEF 241"),

@@ -215,6 +215,51 @@ def test_corrected_text_is_read_band_by_band_alike(bent: Path, monkeypatch: pyte
     assert olp.correct(data, bent).data == whole
 
 
+DRILLED = """BEGIN PGM D MM
+TOOL CALL 1 Z S100
+L X-40 Y-30 Z+50 R0 FMAX
+CYCL DEF 200 DRILLING ~
+  Q200=+2 ;CLEAR ~
+  Q201=-20 ~
+  Q206=+150 ~
+  Q203=+0 ;SURFACE ~
+  Q204=+10
+L X-40 Y-30 R0 FMAX M99
+L X+50 FMAX M99
+L Y+45 R0 FMAX
+CYCL CALL
+L Z+60 FMAX
+END PGM D MM
+"""
+
+
+def test_holes_are_right_across_and_along_the_tool(bent: Path, zero: Path) -> None:
+    assert olp.correct(DRILLED.encode(), zero).data == DRILLED.encode()
+    own = program(DRILLED, bent).toolpath
+    assert own.end_mm == pytest.approx(np.array(canon(DRILLED.encode()).axis), abs=1e-9)
+    result = olp.correct(DRILLED.encode(), bent)
+    # each hole has a surface of its own, and no other number of the cycle changes
+    assert result.data.count(b"CYCL DEF 200") == 4
+    assert result.data.count(b"Q201=-20 ~") == 4
+    nominal, written = canon(DRILLED.encode()), canon(result.data)
+    bottoms = [m.axis[np.abs(m.axis[:, 2] + 200) < 0.5] for m in (nominal, written)]
+    tip = JudgeModel(bent).error_mm(bottoms[1], np.array([0.0, 0.0, -120.0])) + bottoms[1]
+    assert np.abs((tip - bottoms[0])[:, 2]).max() < 0.1e-3
+    assert np.hypot(*(tip - bottoms[0])[:, :2].T).max() < 5e-3
+
+
+def test_cycles_that_count_from_the_present_height_begin_where_their_bottom_is_right(bent: Path) -> None:
+    text = (
+        "CYCL DEF 1.0 PECKING\nCYCL DEF 1.1 DIST2\nCYCL DEF 1.2 DEPTH-12\nCYCL DEF 1.5 F120\n"
+        "L X-40 Y-30 Z+2 FMAX M99\nL X+50 FMAX M99\n"
+    )
+    result = olp.correct((HEAD + text).encode(), bent)
+    bottom = program(result.data.decode(), bent).toolpath.end_mm
+    at = bottom[np.abs(bottom[:, 2] - (ORIGIN[2] + 120 - 12)) < 0.5]
+    tip = JudgeModel(bent).error_mm(at, np.array([0.0, 0.0, -120.0])) + at
+    assert np.abs(tip[:, 2] - (ORIGIN[2] + 120 - 12)).max() < 0.1e-3
+
+
 # -- loops, calls and parameters -----------------------------------------------------------------------
 
 
