@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,8 @@ from olp.files.config import load_setup
 from olp.program.feeds.stated import programmed
 from olp.program.program import Program
 from olp.program.registry import DIALECTS, dialect_of, read
+from olp.program.rs274 import reader
+from olp.program.rs274.lexer import chunks
 from olp.program.sinumerik.translate import translate
 
 SINUMERIK = DIALECTS["sinumerik"]
@@ -124,6 +127,7 @@ REFUSED: dict[str, tuple[str, str]] = {
     "G21": ("not known to the sinumerik profile", "OLP512"),
     "G43 H1": ("not known to the sinumerik profile", "OLP512"),
     "G291": ("ISO mode", "OLP512"),
+    "G18\nROT RPL=30": ("tilts the plane", "OLP512"),
     "ROT X30": ("tilts the plane", "OLP512"),
     "G110 X5": ("polar", "OLP512"),
     "X1 RND=2": ("corner", "OLP512"),
@@ -208,9 +212,13 @@ def test_numbers_in_brackets_are_edited_inside_of_them(tmp_path: Path) -> None:
     path = machine(tmp_path, "[squareness]\nC0Y_urad = 2000.0\nB0Z_urad = 1000.0\n", tables=TRUE_ZERO,
                    controller="sinumerik")  # fmt: skip
     text = (
-        b"G71 G90 G54 F600\nG0 X0 Y0 Z0\nG1 X=AC(10) Y=AC(20)\nZ5\nG2 X60 Y20 I=AC(35) J=AC(20) TURN=1\nM30\n"
+        b"G71 G90 G54 F600\nG0 X0 Y0 Z0\nG1 X=AC(10) Y=AC(20)\nY=AC(60)\nY=AC(20)\nZ5\n"
+        b"G2 X60 Y20 I=AC(35) J=AC(20) TURN=1\nM30\n"
     )
     written = olp.correct(text, load_setup(path)).data
+    assert re.search(rb"\nY=AC\(60\.?\d*\) X[\d.]+\n", written)
+    sweep = read(written, load_setup(path), SINUMERIK).toolpath.arcs.sweep_rad
+    assert sweep.sum() == pytest.approx(-3 * np.pi, abs=1e-3)
     assert re.search(rb"G1 X=AC\(\d+\.\d+\) Y=AC\(\d+\.?\d*\)\n", written)
     tails = [line for line in written.splitlines() if line.startswith(b"X") and b"I" in line]
     assert tails and all(re.fullmatch(rb"X\S+ Y\S+( Z\S+)? I=AC\(\S+\) J=AC\(\S+\)", line) for line in tails)
@@ -231,3 +239,21 @@ def test_no_block_comes_between_a_motion_and_its_hole(tmp_path: Path) -> None:
     assert written != text
     counts = [int((read(t, setup, SINUMERIK).toolpath.flag == Flag.PASS).sum()) for t in (text, written)]
     assert counts == [12, 12]
+
+
+@pytest.mark.parametrize("size", [1, 40, 200])
+def test_the_reading_does_not_depend_on_the_chunks(
+    size: int, setup: Setup, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = "".join(
+        t.replace(ZERO, "") + f"\nG0 X{i} Y1 Z2\n"
+        for i, t in enumerate(ENDS)
+        if "M17" not in t and "G2 " not in t
+    )
+    text = f"T2 M6\n{ZERO}{text.replace('RET', '')}"
+    text = text.replace("G91 X1\nX=IC(2) Y3", "G91 X1\nX=IC(2) Y3\nG90")
+    whole = program(text, setup).toolpath
+    monkeypatch.setattr(reader, "chunks", partial(chunks, size=size))
+    parts = program(text, setup).toolpath
+    for name in ("kind", "flag", "line", "end_mm"):
+        assert np.array_equal(getattr(whole, name), getattr(parts, name), equal_nan=name == "end_mm")
