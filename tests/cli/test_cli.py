@@ -232,7 +232,7 @@ def test_init_writes_a_set_that_loads_and_never_replaces_it(tmp_path: Path) -> N
     assert run("init", folder / "machine.toml").exit_code == 2
     assert run("init", tmp_path / "bad", "--travel", "X", "5", "5").exit_code == 2
     assert not (tmp_path / "bad").exists()
-    assert run("init", tmp_path / "bad", "--controller", "mach3").exit_code == 2
+    assert run("init", tmp_path / "bad", "--controller", "mach9").exit_code == 2
     assert not (tmp_path / "bad").exists()
 
 

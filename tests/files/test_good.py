@@ -42,7 +42,7 @@ def test_machine_file_fills_every_value() -> None:
             "G59.1": WorkOffset("G59.1", (0.0, 50.0, 0.0), (0.0, 0.0, 1.5), set_by="true"),
         },
         tools={
-            1: Tool(1, (0.0, 0.0, 120.0), 5.0, (0.0, 0.0, -121.0)),
+            1: Tool(1, (0.0, 0.0, 120.0), 5.0, gauge_to_tip_mm=(0.0, 0.0, -121.0)),
             2: Tool(2, (1.0, 0.0, 80.0), set_by="touch", touched_at_mm=(10.0, 20.0, -400.0)),
         },
         default_tool=1,

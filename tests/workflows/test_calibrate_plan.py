@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import dataclasses
+import itertools
 import json
 from pathlib import Path
 
@@ -138,18 +139,29 @@ def test_more_points_and_better_ones_are_never_worse() -> None:
 # -- programs --------------------------------------------------------------------------------------------
 
 
+#: controls whose G53 is another code, or an option of the firmware
+WITHOUT_MACHINE_POSITIONS = ("okuma", "marlin", "klipper")
+
+
 @pytest.mark.parametrize("control", sorted(name for name, d in DIALECTS.items() if isinstance(d, Profile)))
 def test_programs_stop_where_they_are_meant_to(control: str) -> None:
     setup = load_setup(MACHINE)
     setup = dataclasses.replace(setup, machine=dataclasses.replace(setup.machine, controller=control))
     places = np.array([[10.0, 20.0, -30.0], [10.0, 20.0, -200.125], [700.5, 3.25, -4.0]])
-    text = positions_program(DIALECTS[control], places, [0.0, 2.5, 4.0], 3, ["a (note) " * 12])
+    arguments = (DIALECTS[control], places, [0.0, 2.5, 4.0], 3, ["a (note) " * 12])
+    if control in WITHOUT_MACHINE_POSITIONS:
+        with pytest.raises(CannotCompute, match="has no G53"):
+            positions_program(*arguments)
+        return
+    text = positions_program(*arguments)
     path = read(text, setup, DIALECTS[control]).toolpath
     assert np.array_equal(path.end_mm[0], [np.nan, np.nan, -30.0], equal_nan=True)
     assert np.array_equal(path.end_mm[1:], places)
     words = text.decode().split()
-    dwell = [float(w[1:]) for w in words if w.startswith("P")]
-    pointed = ["." in w for w in words if w.startswith("P")]
+    waits_of = [w for before, w in itertools.pairwise(words) if before == "G4"]
+    assert {w[0] for w in waits_of} == {DIALECTS[control].dwell}
+    dwell = [float(w[1:]) for w in waits_of]
+    pointed = ["." in w for w in waits_of]
     waits = [DIALECTS[control].dwell_s(d, pointed=p) for d, p in zip(dwell, pointed, strict=True)]
     assert waits == [2.5, 4.0]
     assert max(map(len, text.decode().splitlines())) <= 72

@@ -213,9 +213,7 @@ def _tools(reading: Reading, ini: Path, load: Load) -> dict[int, Tool]:
             reading.notes.append(f"Tool {number} is defined twice in {name}; the last row is used.")
         radius = words.get("D", 0.0) * reading.mm / 2
         # a diameter below 0 offsets contours to the other side
-        tools[number] = Tool(
-            number, length_mm=(x, y, z), radius_mm=max(radius, 0.0), wear_mm=min(radius, 0.0)
-        )
+        tools[number] = Tool(number, length_mm=(x, y, z), radius_mm=abs(radius), wear_mm=radius - abs(radius))
     negative = [str(number) for number, tool in tools.items() if tool.tool_vector_mm is None]
     if negative:
         reading.notes.append(

@@ -10,7 +10,8 @@ import numpy as np
 from olp.core.arrays import Array
 from olp.core.errors import CannotCompute
 from olp.core.units import AXES
-from olp.program.rs274.profiles.base import Profile
+from olp.program.rs274.codes import MACHINE
+from olp.program.rs274.profiles.base import Act, Profile
 
 #: Characters of a comment line at most: some controls take no more.
 _WIDTH = 68
@@ -25,7 +26,7 @@ def positions_program(
     become comments. At first Z alone goes to the height of the first position, which has to be a clear one.
     Raises CannotCompute for a control that is not of this family.
     """
-    if 530 not in profile.codes:
+    if profile.codes.get(MACHINE) != Act.EVENT or MACHINE in profile.aliases:
         raise CannotCompute(f"{profile.title} has no G53; take the points from the CSV file")
     opening, closing = (mark.decode() for mark in profile.comment)
     lines = [f"{opening}{line}{closing}" for note in notes for line in textwrap.wrap(_plain(note), _WIDTH)]

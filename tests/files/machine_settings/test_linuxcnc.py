@@ -113,7 +113,9 @@ def test_tool_table_and_offsets_come_in_mm(tmp_path: Path) -> None:
     machine = from_linuxcnc(write_set(tmp_path)).machine
     assert machine.tools[1].length_mm == pytest.approx((0.0, 0.0, 50.8)), "the last row of a tool counts"
     assert machine.tools[2].length_mm == pytest.approx((2.54, 0.0, -76.2))
+    # a negative diameter offsets to the other side, and the cutter has its size all the same
     assert machine.tools[2].radius_mm == pytest.approx(6.35)
+    assert machine.tools[2].wear_mm == pytest.approx(-12.7)
     assert machine.tools[2].tool_vector_mm is None
     assert list(machine.work_offsets) == ["G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3"]
     assert machine.work_offsets["G54"].offset_mm == pytest.approx((25.4, -50.8, 7.62))
