@@ -108,6 +108,8 @@ WRITTEN = {
     "R3=2\nMCALL CYCLE81(5,0,1,-R3)\nX1\nMCALL\n": "MCALL CYCLE81(5,0,1,-2)\nX1\nMCALL\n",
     "SUB1(2)\nL7 P2\n": "X=4\nY1\nY1\n",
     "TRANS X=R1+1\n": "TRANS X=1\n",
+    # arguments that are names stay
+    "CYCLE832(0.05,_SEMIFIN,1)\nX=R1+1\n": "CYCLE832(0.05,_SEMIFIN,1)\nX=1\n",
     # a variable of the control
     "GUD=2\nX=GUD\n": "X=2\n",
 }

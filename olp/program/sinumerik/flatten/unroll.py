@@ -23,7 +23,10 @@ from olp.program.sinumerik.flatten.run import Stop, Walk
 from olp.program.sinumerik.flatten.scope import Scope
 from olp.program.sinumerik.flatten.text import shown
 from olp.program.sinumerik.flatten.unit import Line, Unit, programs
+from olp.program.sinumerik.table import DRILLING
 
+#: Calls whose arguments are numbers; those of others are names and texts too, and stay.
+_COMPUTED = DRILLING | {"HOLES1", "HOLES2"}
 _LABEL = re.compile(rb"\A([ \t]*/?\d?[ \t]*(?:N\d+[ \t]*)?)(?:[A-Z_][A-Z0-9_]+[ \t]*:[ \t]*)+", re.IGNORECASE)
 _NUMBER = re.compile(rb"\A([ \t]*/?\d?[ \t]*)(?:N|:)[ \t]*\d+[ \t]*", re.IGNORECASE)
 #: bytes of visited blocks: of a short program, and for each byte
@@ -156,7 +159,7 @@ def _numbers(line: Line, piece: Piece, scope: Scope) -> list[tuple[int, int, byt
         else:
             value = shown(number(text, scope))
         return [(piece.value, piece.value_end, value.encode())]
-    if piece.form is Form.NAME and piece.called and piece.name != "MSG":
+    if piece.form is Form.NAME and piece.called and piece.name in _COMPUTED:
         parts = [_argument(part, scope) for part in _arguments(text)]
         if parts != _arguments(text):
             return [(piece.value, piece.value_end, ",".join(parts).encode("latin-1"))]
