@@ -88,6 +88,10 @@ class Parts:
         own = np.where(last[:, None], elements.end[element], ought - _normals(elements, element, ends))
         # moves along the tool axis keep beside it, and so do those behind it on some controls
         beside = path.end_mm[rows.move[kept]] != contour.end_mm[move]
+        # both axes of the plane, also where one of them happens to be the same
+        off = np.flatnonzero(beside.any(axis=1))
+        before = np.maximum(np.searchsorted(row, off, "right") - 1, 0)
+        beside[off[:, None], AXES[plane[before]][:, :2]] = True
         beside[row[:, None], AXES[plane][:, :2]] = True
         stated = Parts(
             row, element, head, plane, was, ought, *_tangents(elements, element, was, ought), arc,

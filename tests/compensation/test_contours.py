@@ -57,6 +57,14 @@ def test_a_block_along_the_tool_axis_gets_no_word_of_the_plane(tmp_path: Path) -
     assert lines[2] == b"Z-20"
 
 
+def test_a_plunge_at_an_outside_corner_stays_at_the_corner(tmp_path: Path) -> None:
+    """Beside a side along Y the tool has the Y of the contour; corrected, the corner has another one."""
+    text = b"G42 D1 X20 Y20\nX100\nY80\nZ-20\nX70 Y90\nG40 G0 X0\nG0 Z50\n"
+    lines = body(corrected(tmp_path, text, f"{LEANING}C0Y_urad = 800.0\n{CURVE_Y}"))
+    plunge = next(line for line in lines if line.startswith(b"Z-20"))
+    assert b"X" not in plunge and b"Y" not in plunge
+
+
 def test_a_move_to_the_contour_is_not_split_and_one_behind_it_is(tmp_path: Path) -> None:
     text = b"G41 D1 X20 Y110\nX100 Y20\nX200 Y110\nG40 G1 X20 Y0\n"
     lines = body(corrected(tmp_path, text, CURVE_Y))

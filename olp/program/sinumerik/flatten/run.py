@@ -218,18 +218,21 @@ class Walk:
         assert line.block is not None
         others = line.block.pieces[1:]
         code = line.code
-        runs = 1
+        runs = "1"
         if first.form is Form.WORD and first.name == "P" and others:
-            runs, first, others = int(code[first.value : first.value_end]), others[0], others[1:]
+            runs, first, others = code[first.value : first.value_end], others[0], others[1:]
         if others and others[-1].name == "P" and others[-1].form in (Form.WORD, Form.EQUAL):
-            runs = int(code[others[-1].value : others[-1].value_end])
+            runs = code[others[-1].value : others[-1].value_end]
             others = others[:-1]
+        if not runs.strip().isdecimal():
+            return None
         if first.form is Form.WORD and first.name == "L":
-            return (code[first.start : first.end].upper().replace(" ", ""), [], runs) if not others else None
+            name = code[first.start : first.end].upper().replace(" ", "")
+            return None if others else (name, [], int(runs))
         if first.form is not Form.NAME or others or first.name in _KNOWN:
             return None
         given = [a.decode("latin-1") for a in arguments(line.raw, first)]
-        return first.name, given, runs
+        return first.name, given, int(runs)
 
     def _call(self, name: str, given: list[str], runs: int, line: Line, scope: Scope, depth: int) -> None:
         unit = self._find(name)
