@@ -30,6 +30,7 @@ _REMARKS = {
     "transform": "OLP414",
     "scan": "OLP415",
     "chords": "OLP416",
+    "preset": "OLP417",
     "macro": "OLP334",
 }
 #: blocks that the report lists

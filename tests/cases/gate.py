@@ -26,6 +26,10 @@ PROBED = b"GOTO/10,10,10\nMEAS/POINT,F(A),1\nPTMEAS/CART,10,10,0,0,0,1\nENDMES\n
 APT = b"UNITS/MM\nRAPID\nGOTO/-5,-10,0\nFEDRAT/600,MMPM\n"
 #: an arc of NX that begins upwards in Y
 TURN = b"GOTO/10,0,0\nCIRCLE/0,0,0,0,0,1,10,0.06,0.5,10,0\nGOTO/0,10,0\nFINI\n"
+HEIDENHAIN = b"BEGIN PGM A MM\n"
+PRESET = b"CYCL DEF 247 Q339=1\nL X+0 Y+0 Z+0 FMAX\nL X+100 F600\nEND PGM A MM\n"
+#: the preset 1 is stated
+PRESETS = f'{TRUE_ZERO}[work_offsets.1]\nX_mm = 0.0\nY_mm = 0.0\nZ_mm = 0.0\nset_by = "true"\n'
 TOUCH = "[work_offsets.G54]\n"
 LIST = b"# frame=G54\nX_mm,Y_mm,Z_mm\n"
 TURNED = b"# frame=G54\nX_mm,Y_mm,Z_mm,C_deg\n"
@@ -395,6 +399,10 @@ CASES: dict[str, tuple[Call, Call]] = {
     "OLP416": (
         Call(APT + b"GOTO/10,0,0\nCIRCLE/0,0,0,0,-.6,.8,10\nGOTO/0,8,6\n", APT, controller="apt"),
         Call(APT + b"GOTO/10,0,0\nCIRCLE/0,0,0,0,0,1,10\nGOTO/0,10,0\n", APT, controller="apt"),
+    ),
+    "OLP417": (
+        Call(PRESET.replace(b"=1", b"=2"), HEIDENHAIN, controller="heidenhain", tables=PRESETS),
+        Call(PRESET, HEIDENHAIN, controller="heidenhain", tables=PRESETS),
     ),
     "OLP420": (Call(tables=tool(151.1), **total_map()), Call(tables=tool(150.9), **total_map())),
     "OLP421": (

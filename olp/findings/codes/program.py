@@ -200,4 +200,13 @@ RULES = (
         "system write such arcs as points.",
         "`CIRCLE/10,0,10,0,0.6,0.8,10`.",
     ),
+    _rule(
+        "OLP417",
+        "preset taken as the work offset of the job",
+        Severity.WARNING,
+        "The program selects a preset of the control that neither machine nor job states. The work offset of "
+        "the job is taken for it. If the preset is elsewhere, the part is corrected for another place.",
+        "State the preset, such as [work_offsets.2] for Q339=2, in the machine or job file.",
+        "`CYCL DEF 247` with Q339=2, and [work_offsets.G54] alone.",
+    ),
 )
