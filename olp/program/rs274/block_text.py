@@ -30,6 +30,7 @@ class BlockText:
     - `open_comments`: a comment that is not closed ends with its line. `nested_comments`: `(` may be in one.
     - `brackets`: `(` opens a comment; else a line with one is refused.
     - `marks_in_pairs`: `%` is the first line and the last one, alone in its line, or not there.
+    - `unread`: words that mean nothing for the path and have no letter, such as the number of a spindle.
     - `longest`: bytes of a line at most, without its line feed (None: no limit).
     """
 
@@ -40,6 +41,7 @@ class BlockText:
     nested_comments: bool = True
     brackets: bool = True
     marks_in_pairs: bool = False
+    unread: re.Pattern[bytes] | None = None
     longest: int | None = None
 
     @property

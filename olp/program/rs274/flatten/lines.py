@@ -15,9 +15,9 @@ from olp.program.rs274.flatten.expressions import Expression, Parameters, Reader
 from olp.program.rs274.flatten.language import Language
 
 _SKIP = re.compile(r"\([^)]*\)?|;.*|[\x00-\x20]+")
-_LETTER = re.compile(r",?[a-z@^]")
+_LETTER = re.compile(r",?[a-z@^$]")
 _LITERAL = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)")
-_PLAIN_END = re.compile(r"[a-z@^,]|$|#")
+_PLAIN_END = re.compile(r"[a-z@^$,]|$|#")
 _LABEL = re.compile(r"\d+|<[^>]*>")
 _KEYWORD = re.compile(
     r"endsub|sub|call|return|elseif|else|endif|if|endwhile|while|do|endrepeat|repeat|break|continue"

@@ -40,6 +40,7 @@ DIALECT = Profile(
         skips_control=False,
         nested_comments=False,
         marks_in_pairs=True,
+        unread=re.compile(rb"\$[ \t]*-?\d+"),
         longest=252,
     ),
     rules=NGC_RULES,
