@@ -44,7 +44,9 @@ def with_exit_code(words: Sequence[str]) -> Iterator[None]:
         # The reader of stdout has closed it, such as `head`: no error.
         silence(sys.stdout)
         raise click.exceptions.Exit(0) from None
-    except MemoryError:
+    except MemoryError as error:
+        # the calls that it ended hold what filled the memory
+        traceback.clear_frames(error.__traceback__)
         _end_memory(words)
     except ImportError as error:
         # a library that finds no room to be loaded

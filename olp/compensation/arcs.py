@@ -110,7 +110,7 @@ def _opened(
     path: Toolpath, model: ErrorModel, target: Array, pieces: Pieces, tools: Array, digit: float
 ) -> Pieces:
     """The same pieces, and half a turn cut off at the end of those that are whole turns, or nearly, and whose
-    commands do not meet: as written they could end before their start or behind it."""
+    commands do not meet. As written they could end before their start or behind it."""
     arcs = path.arcs
     sweep = np.abs(arcs.sweep_rad[pieces.arc]) * (pieces.end - pieces.begin)
     whole = np.flatnonzero(sweep > _NEARLY_WHOLE)

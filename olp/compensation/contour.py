@@ -79,8 +79,10 @@ def long_parts(path: Toolpath, cuts: Cuts) -> Cuts:
 
 
 def in_arcs(path: Toolpath, model: ErrorModel, cuts: Cuts) -> Cuts:
-    """The cuts of arcs, and further ones of contours: a control takes the radius at the end of an arc for
-    that of all of it, which a bent arc of more than half a circle does not have."""
+    """The cuts of arcs, and further ones of contours.
+
+    A control takes the radius at the end of an arc for that of all of it. A bent arc of more than half a
+    circle does not have it."""
     arcs = path.arcs
     size = np.abs(arcs.sweep_rad)
     some = np.flatnonzero((size > WIDE) & (path.compensated_radius_mm()[arcs.move] > 0))

@@ -46,7 +46,7 @@ class PoleWriter(BlockWriter):
 @dataclass(frozen=True, slots=True)
 class _Part:
     """One part of an arc as it will be written: its row, its move and line, what states it, and in mm its
-    centre and its ends; `solved` where it is another arc than the program's, `lifted` where it becomes CP."""
+    centre and its ends. `solved`: it is another arc than the program's; `lifted`: it becomes CP."""
 
     row: int
     move: int

@@ -1,7 +1,7 @@
 """Whether a value of a file is of the type that its table states: each type as a function on one value.
 
-Such a function takes a value and its path, adds what is wrong to a list, and returns the value as it is kept:
-an integer as float where a float is expected, a list as tuple where a tuple is.
+Such a function takes a value and its path, adds what is wrong to a list, and returns the value as it is kept.
+An integer is kept as float where a float is expected, a list as tuple where a tuple is.
 """
 
 from __future__ import annotations

@@ -57,8 +57,10 @@ class Poles:
         return Poles(self.form[arcs], self.begin[arcs], self.taken[arcs])
 
 
-#: what `Poles.taken` says beside numbers of moves
-AS_BEFORE, STATED = -1, -2
+#: `Poles.taken`: the pole is that of the arc before.
+AS_BEFORE = -1
+#: `Poles.taken`: the pole is stated by the arc itself.
+STATED = -2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,9 +81,10 @@ class ArcSlots:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SharedWords:
-    """Per line of the text the `word` that belongs to its whole move and is shared out where that is split,
-    as that of an extruder: its index or -1, its value `before` the move, and whether it is a `distance`. All
-    are empty where a program has no such words."""
+    """Per line of the text a word that is shared out where its move is split, as that of an extruder.
+
+    `word` is its index or -1, `before` its value before the move, and `distance` whether it is one. All are
+    empty where a program has no such words."""
 
     word: Small
     before: npt.NDArray[np.float64]
@@ -141,9 +144,10 @@ class StatedFeeds:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Definitions:
-    """Of each stroke, what defines its cycle: (k, 2) the bytes of the `text`, and of the `number` of the
-    surface in it, -1 where these are not known; (k,) the `surface` in numbers of the program, NaN where the
-    cycle counts from the present height."""
+    """Of each stroke, what defines its cycle.
+
+    (k, 2) the bytes of the `text`, and of the `number` of the surface in it, -1 where these are not known.
+    (k,) the `surface` in numbers of the program, NaN where the cycle counts from the present height."""
 
     text: npt.NDArray[np.int64]
     number: npt.NDArray[np.int64]

@@ -43,9 +43,11 @@ class Point:
 
 @dataclass(slots=True, eq=False)
 class Points:
-    """The points of a chunk in order: (m,) `line` from 1, `begin` and `end` of their statements, (m, 3)
-    `slot` word or -1, `value` as written, `direction` (NaN where none is stated), (m,) `incremental` and
-    `form`: those of another form than 0 have their numbers in `value` and `direction`."""
+    """The points of a chunk in order.
+
+    (m,) `line` from 1, `begin` and `end` of their statements, `incremental` and `form`. (m, 3) `slot` word or
+    -1, `value` as written, `direction` (NaN where none is stated). Those of another form than 0 have their
+    numbers in `value` and `direction`."""
 
     line: Index
     begin: Index

@@ -316,8 +316,8 @@ def _refused_contour(error: ProgramError, done: _Rewritten) -> ProgramError:
     stamp = more - int(behind[-1] - path.line[move[-1]])
     at = min(int(np.searchsorted(behind + stamp, line)), len(move) - 1)
     return ProgramError(
-        "the control would refuse this block once corrected: rounded to its digits, the cutter does not fit "
-        "into it any more; make the move longer, or have the path of the tool written with --contour path",
+        "the control would refuse this block once corrected: rounded to its digits, it is too narrow for the "
+        "cutter; make the move longer, or have the path of the tool written with --contour path",
         line=int(path.line[move[at]]),
         code="OLP561",
     )

@@ -169,7 +169,7 @@ def large(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a program that needs more memory than its test gives."""
     folder = tmp_path_factory.mktemp("large")
     machine(folder, tables=TRUE_ZERO, job="start_mm = { X = 0.0, Y = 0.0, Z = 0.0 }\n")
-    (folder / "part.ngc").write_text(PROGRAM.replace("Y40\n", "Y40\nX41\n" * 200_000))
+    (folder / "part.ngc").write_text(PROGRAM.replace("Y40\n", "Y40\nX41\n" * 600_000))
     return folder
 
 

@@ -246,9 +246,16 @@ touched_offsets = st.builds(
     st.tuples(*[st.none() | lengths] * 3),
     st.none() | st.integers(0, 999),
 )
-tools = st.builds(Tool, st.integers(0, 9999), vectors, st.floats(0.0, 1e4), st.none() | vectors)
+tools = st.builds(
+    Tool,
+    number=st.integers(0, 9999),
+    length_mm=vectors,
+    radius_mm=st.none() | st.floats(0.0, 1e4),
+    wear_mm=st.floats(-10.0, 10.0),
+    gauge_to_tip_mm=st.none() | vectors,
+)
 touched_tools = st.builds(
-    Tool, st.integers(0, 9999), vectors, st.just(0.0), st.none(), st.just("touch"), vectors
+    Tool, number=st.integers(0, 9999), length_mm=vectors, set_by=st.just("touch"), touched_at_mm=vectors
 )
 machines = st.builds(
     Machine,

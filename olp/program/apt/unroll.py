@@ -1,7 +1,7 @@
 """Writes the copies of COPY out: the statements between INDEX and COPY again, moved as it says.
 
 `INDEX/n` begins a range, and `COPY/n,…,k` ends it and repeats it k times: SAME as it is, TRANSL, XYROT, YZROT
-and ZXROT moved once more each time, MODIFY by a matrix. Numbers that move are written anew, all else is
+and ZXROT moved once more each time, MODIFY by a matrix. Numbers that move are written again, all else is
 copied byte for byte. INDEX and COPY themselves are left out.
 """
 

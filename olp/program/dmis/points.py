@@ -17,8 +17,12 @@ from olp.core.geometry import PLANES
 from olp.program.statement_rows import Point
 from olp.program.text.statements import Field, Statement, shown
 
-#: numbers of the forms; the angle of a polar point is in the unit of angles, or in degrees
-POLAR, POLAR_DEGREES, INCREMENT = 1, 2, 3
+#: The form of a polar point whose angle is in the unit of angles.
+POLAR = 1
+#: The form of a polar point whose angle is in degrees.
+POLAR_DEGREES = 2
+#: The form of a point that counts from the one before.
+INCREMENT = 3
 FORMS = (b"POL", b"INCR")
 #: planes of WKPLAN by their word, as in `PLANES`
 WORKING_PLANES = {b"XYPLAN": 0, b"ZXPLAN": 1, b"YZPLAN": 2}

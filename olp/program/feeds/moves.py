@@ -66,8 +66,10 @@ class Scan:
 
 
 def _carried_out(profile: Profile, words: Words, word: Index, line: Index) -> tuple[Index, Index]:
-    """Of words and their lines those that a control carries out: all words of blocks but an F that is the
-    time of a dwell, of commands the code that comes first and the feed of a move."""
+    """Of words and their lines those that a control carries out.
+
+    Of blocks all words, but an F that is the time of a dwell; of commands the code that comes first, and the
+    feed of a move."""
     if "F" in profile.dwell_words:
         dwells = line[(words.letter[word] == ord("G")) & (numbers(words, word) == DWELL / 10)]
         mine = (words.letter[word] != ord("F")) | ~is_in(line, dwells)

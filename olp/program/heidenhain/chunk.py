@@ -22,11 +22,11 @@ _HARMLESS = (
     | {118, 120, 124, 126, 127, 129, 134, 135, 137, 138, 141, 143, 144, 145, 148, 149, 150}
     | set(range(10, 30)) | set(range(31, 60))
 )  # fmt: skip
-IS_HARMLESS = np.zeros(1000, bool)
-IS_HARMLESS[list(_HARMLESS)] = True
-#: letters of words in motion blocks, and the axis of a letter
-KNOWN_LETTERS = np.zeros(256, bool)
-KNOWN_LETTERS[list(b"XYZABCUVWFMRKPQOTS")] = True
+#: `_HARMLESS` by number.
+IS_HARMLESS = np.isin(np.arange(1000), sorted(_HARMLESS))
+#: Letters of words in motion blocks.
+KNOWN_LETTERS = np.isin(np.arange(256), list(b"XYZABCUVWFMRKPQOTS"))
+#: The axis of a letter, or -1.
 AXIS = np.full(256, -1, np.int8)
 AXIS[list(b"XYZ")] = (0, 1, 2)
 

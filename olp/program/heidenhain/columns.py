@@ -41,8 +41,14 @@ class Block(IntEnum):
 #: the letters that stand for words of several: incremental X, Y, Z, and an incremental rotary axis
 _STEP_OF = {ord("X"): ord("D"), ord("Y"): ord("E"), ord("Z"): ord("H")}
 _OTHER_STEP = ord("T")
-#: the letters of what is no axis
-TURN, STEP_ANGLE, ANGLE, PARAMETER_FEED = b"KPOQ"
+#: The letter of a turn of the coordinates.
+TURN = ord("K")
+#: The letter of an incremental angle.
+STEP_ANGLE = ord("P")
+#: The letter of an angle.
+ANGLE = ord("O")
+#: The letter of a feed that is a parameter.
+PARAMETER_FEED = ord("Q")
 _LONGEST_NAME = 2
 
 

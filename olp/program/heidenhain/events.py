@@ -33,7 +33,14 @@ _NAME = re.compile(
     rb"(?:" + b"|".join(re.escape(n).replace(rb"\ ", rb"[ \t]*") for n in _NAMES) + rb")(?![A-Z])"
 )
 _MOTION = re.compile(rb"(?:L|CC?|CR|CP)[ \t]|[XYZABC][-+.\d]|I[XYZ]|[MF][ \t]*[-+.\dM]")
-_SHIFT, _MIRROR, _DWELL, _ROTATION, _SCALING, _TILT, _SCALINGS, _SELECT = 7, 8, 9, 10, 11, 19, 26, 247
+_SHIFT = 7
+_MIRROR = 8
+_DWELL = 9
+_ROTATION = 10
+_SCALING = 11
+_TILT = 19
+_SCALINGS = 26
+_SELECT = 247
 
 
 class Events:

@@ -30,8 +30,13 @@ from olp.program.rs274.motion import fill
 from olp.program.text.line_ends import STRAY_CR
 
 _ENDS = (2, 30)
-_MACHINE, _DATUM, _CALL, _MODAL_CALL, _PER_TURN, _RETRACT = 91, 92, 99, 89, 136, 140
-_TIPPED, _TILTED = 128, (104, 112, 114, 130)
+_MACHINE = 91
+_DATUM = 92
+_CALL = 99
+_MODAL_CALL = 89
+_PER_TURN = 136
+_TIPPED = 128
+_TILTED = (104, 112, 114, 130)
 #: M functions that are read one by one
 _READ = frozenset({*_ENDS, _MACHINE, _DATUM, _CALL, _MODAL_CALL, _PER_TURN})
 _ROTARY = re.compile(rb"\bI?[ABCUVW][ \t]*[-+]?Q[LR]?\d+", re.I)

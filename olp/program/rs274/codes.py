@@ -54,8 +54,10 @@ UNITS = (INCH, METRIC)
 #: How the control moves from block to block: G61, G61.1, G64.
 PATH_MODES = frozenset({610, 611, 640})
 
-#: G16 and G15: X is a radius and Y an angle between them.
-POLAR, POLAR_OFF = 160, 150
+#: G16: X is a radius and Y an angle from here.
+POLAR = 160
+#: G15: to here.
+POLAR_OFF = 150
 #: G4, a dwell.
 DWELL = 40
 #: G65, a macro call.

@@ -15,15 +15,19 @@ from olp.program.rs274.commands import Commands, last_of_line, own_words
 from olp.program.rs274.modes import Context
 from olp.program.rs274.motion import modal
 
-#: M82 and M83: positions of the extruder are absolute, or distances.
-_ABSOLUTE_M, _RELATIVE_M = 82, 83
+#: M82: positions of the extruder are absolute.
+_ABSOLUTE_M = 82
+#: M83: they are distances.
+_RELATIVE_M = 83
 _NAN = float("nan")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Extruder:
-    """Of the lines of a chunk: (lines,) whether they feed material or hold it, the index of the `word` of the
-    extruder in the chunk or -1, its position `before`, and whether the word is a `distance`."""
+    """Of the lines of a chunk, what they say of the extruder.
+
+    (lines,) whether they feed material or hold it, the index of its `word` in the chunk or -1, its position
+    `before`, and whether the word is a `distance`."""
 
     feeding: Mask
     word: Index

@@ -157,7 +157,7 @@ def _mirrored(axes: set[int], about: Sequence[float]) -> Transform | None:
 
 
 def _less(now: Transform, axes: Sequence[int]) -> Transform | None:
-    """What is left of a transform that is switched off, for some axes where it is a mirror image."""
+    """The transform once it is switched off, for some axes where it is a mirror image."""
     if now.code != MIRROR or not axes:
         return None
     return _mirrored(set(now.axes) - set(axes), now.about)

@@ -6,6 +6,7 @@ Lines of plain words, most of those that CAM systems write, are found in columns
 
 from __future__ import annotations
 
+import string
 from itertools import pairwise
 
 import numpy as np
@@ -21,11 +22,9 @@ Bytes = npt.NDArray[np.uint8]
 
 #: Letters of words that mean the same in both languages.
 _PLAIN = b"NGXYZFIJKMSTABCUVW"
-_LETTER = np.zeros(256, bool)
-_LETTER[65:91] = _LETTER[97:123] = True
+_LETTER = np.isin(np.arange(256), list(string.ascii_letters.encode()))
 #: Bytes that make a line more than words.
-_OTHER = np.ones(256, bool)
-_OTHER[list(b"0123456789+-. \t\r\n;/" + _PLAIN + _PLAIN.lower())] = False
+_OTHER = ~np.isin(np.arange(256), list(b"0123456789+-. \t\r\n;/" + _PLAIN + _PLAIN.lower()))
 #: G and M codes of a plain line, by their number.
 _SAME_G = np.isin(
     np.arange(100), [0, 1, 2, 3, 9, 17, 18, 19, 40, 41, 42, *range(53, 58), 90, 91, 93, 94, 95, 96, 97]

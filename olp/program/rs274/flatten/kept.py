@@ -73,8 +73,9 @@ def kept(unrolled: Unrolled, corrected: bytes, starts: Index, profile: Profile) 
 def _calls(
     unrolled: Unrolled, lines: Mapping[int, Mapping[int, Counter[_Visit]]], profile: Profile
 ) -> frozenset[int]:
-    """The calls to write out, so that what is left of each of these lines has the same numbers; empty where
-    that does not help. `lines` are the visits of each by the line of the program that they run in."""
+    """The calls to write out, so that all other passes of each of these lines have the same numbers.
+
+    Empty where that does not help. `lines` are the visits of each by the line that they run in."""
     origin, chosen = unrolled.origin, set[int]()
     if not can_be_apart(unrolled):
         return frozenset()

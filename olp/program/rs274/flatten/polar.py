@@ -65,7 +65,7 @@ def as_xy(
 
 
 def _block(line: Line, state: _State, profile: Profile, number: Callable[[float], str]) -> bytes:
-    """One block, written anew where it is polar."""
+    """One block, with X and Y in place of what is polar."""
     codes = {round(10 * word.number) for word in line.words if word.letter == "g" and word.value is None}
     _follow(codes, state)
     cut = [

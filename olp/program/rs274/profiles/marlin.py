@@ -1,7 +1,7 @@
 """Marlin 2, on printers, and on routers and lasers that run it.
 
-Differs from Klipper: G90 and G91 hold for the extruder too, until M82 or M83; arcs may have R, and P counts
-turns before the arc, which is not read; G18 and G19 are options of the firmware, as RS-274 has them.
+Differs from Klipper: G90 and G91 hold for the extruder too, until M82 or M83. Arcs may have R; their P
+counts turns before the arc and is not read. G18 and G19 are options of the firmware, as RS-274 has them.
 """
 
 from __future__ import annotations

@@ -2,19 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING
+import re
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, Protocol
 
 from olp.program.dialect import Row, Support
-
-if TYPE_CHECKING:
-    from olp.program.rs274.profiles.base import Profile
+from olp.program.rs274.block_text import BlockText
+from olp.program.rs274.commands import Commands
 
 _LOST = "may move the axes: no position is known behind it, until X, Y and Z have been commanded"
 _UNROLL = "unroll the program with --flatten"
 
 
-def word_rows(profile: Profile) -> Iterator[Row]:
+class Control(Protocol):
+    """What of a profile is told here."""
+
+    @property
+    def still_m(self) -> frozenset[int]: ...
+    @property
+    def m_refusals(self) -> Mapping[int, str]: ...
+    @property
+    def m61_sets_tool(self) -> bool: ...
+    @property
+    def text(self) -> BlockText: ...
+    @property
+    def commands(self) -> Commands | None: ...
+    @property
+    def inert(self) -> re.Pattern[bytes] | None: ...
+    @property
+    def unroller(self) -> Callable[..., Any] | None: ...
+
+
+def word_rows(profile: Control) -> Iterator[Row]:
     """What becomes of M codes, words and lines."""
     yield from _m_codes(profile)
     yield Row("X Y Z", Support.CORRECTED, "the ends of moves")
@@ -29,7 +48,7 @@ def word_rows(profile: Profile) -> Iterator[Row]:
     yield Row("any other line", Support.REFUSED, "is not understood and may move the machine")
 
 
-def _m_codes(profile: Profile) -> Iterator[Row]:
+def _m_codes(profile: Control) -> Iterator[Row]:
     still = sorted(profile.still_m - {60})
     yield Row(_ranges([m for m in still if m % 10 == 0]), Support.UNCHANGED, "move no axis")
     for m in (m for m in still if m % 10):
@@ -55,7 +74,7 @@ def _ranges(codes: list[int]) -> str:
     return ", ".join(f"M{p[0]}" if len(p) == 1 else f"M{p[0]}-M{p[-1]}" for p in parts)
 
 
-def _lines(profile: Profile) -> Iterator[Row]:
+def _lines(profile: Control) -> Iterator[Row]:
     yield Row("/ (block delete)", Support.READ, "counts as carried out; proved with it and without")
     yield Row("% and O with a number", Support.UNCHANGED)
     if profile.inert is not None:
@@ -66,7 +85,7 @@ def _lines(profile: Profile) -> Iterator[Row]:
         yield Row("variables, CALL, IF, GOTO", Support.REFUSED, "are not read; post the program without them")
 
 
-def _lines_of_commands(profile: Profile) -> Iterator[Row]:
+def _lines_of_commands(profile: Control) -> Iterator[Row]:
     commands = profile.commands
     assert commands is not None
     yield Row(commands.extruder, Support.CORRECTED, "shared out where its move is split, else unchanged")
