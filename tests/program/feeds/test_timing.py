@@ -496,7 +496,7 @@ def test_feeds_of_samples_are_linuxcncs(tmp_path: Path) -> None:
             refused.append((sample.name, str(refusal)))
             continue
         compared += 1
-    assert compared >= 40, refused
+    assert compared >= 30, refused
     assert feeds >= 1000
 
 
