@@ -27,6 +27,9 @@ FOLDERS = {
     "gcode_fanuc_haas_nist": "haas",
     "apt_cldata": "apt",
 }
+#: Radius of all tools: that of the smallest cutter with which a program of the corpus cuts a contour, 1/8 inch
+#: in diameter. A larger one does not fit into its arcs, and the control stops there.
+RADIUS_MM = 1.5875
 
 
 @dataclass(frozen=True)
@@ -51,7 +54,7 @@ def machine(folder: Path, control: str) -> tuple[Path, Path]:
     recipe = Recipe(
         controller=control,
         travel=((-5000.0, 5000.0),) * 3,
-        tools={n: {"Z_mm": 0.0, "radius_mm": 3.0} for n in range(1, 100)},
+        tools={n: {"Z_mm": 0.0, "radius_mm": RADIUS_MM} for n in range(1, 100)},
         work_offsets=offsets,
     )
     path = machines.zero_machine(folder, recipe)
