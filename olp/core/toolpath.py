@@ -52,7 +52,7 @@ class Flag(IntFlag):
     PASS = 1  #: never corrected: G53, G28, G30, a section switched off
     DELETED = 2  #: in a block that the block-delete switch removes
     CYCLE = 4  #: made by a canned cycle: has no words
-    WHOLE = 8  #: never split: the block moves a rotary axis too
+    WHOLE = 8  #: never split: the block moves a rotary axis too, or follows the spindle
     INCREMENTAL = 16  #: its words are distances
     MACHINE = 32  #: G53: its words are axis positions
     INVERSE_TIME = 64  #: G93: its F word is one over its time

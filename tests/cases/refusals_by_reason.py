@@ -27,8 +27,8 @@ FOLDERS = {
     "gcode_fanuc_haas_nist": "haas",
     "apt_cldata": "apt",
 }
-#: Radius of all tools: that of the smallest cutter with which a program of the corpus cuts a contour, 1/8 inch
-#: in diameter. A larger one does not fit into its arcs, and the control stops there.
+#: Radius of all tools in mm: that of the smallest cutter that cuts a contour in the corpus, which is 1/8 inch
+#: wide. A larger one does not fit into the arcs, and the control stops there.
 RADIUS_MM = 1.5875
 
 

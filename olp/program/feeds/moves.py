@@ -15,7 +15,7 @@ from olp.core.toolpath import Flag, Kind, Toolpath
 from olp.core.units import MM_PER_INCH
 from olp.core.values import dataclass
 from olp.program.program import Program, Words
-from olp.program.rs274.codes import DWELL
+from olp.program.rs274.codes import DWELL, THREAD
 from olp.program.rs274.profiles.base import Profile
 
 #: Powers of ten by their exponent: those of the decimals of a number.
@@ -144,6 +144,13 @@ def feeds(scan: Scan) -> Array:
     where the time of G93 has no length. Raises ProgramError for a feed move without a feed, or with one that
     cannot be read correctly."""
     program, path = scan.program, scan.program.toolpath
+    threads = scan.code_line[scan.code == THREAD]
+    if threads.size:
+        raise ProgramError(
+            "G33 moves in time with the spindle, whose turns are not known, so it has no feed",
+            line=int(threads[0]),
+            code="OLP551",
+        )
     feed_mm_s = np.full(len(path), np.inf)
     feed_mm_s[(path.flag & np.uint8(Flag.CONTROL)) != 0] = np.nan
     move, latest = governing(scan)

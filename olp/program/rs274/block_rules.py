@@ -28,6 +28,7 @@ from olp.program.rs274.codes import (
     PATH_MODES,
     PROBES,
     SHIFTS,
+    THREAD,
     UNITS,
     WORK_OFFSETS,
     WRITE_OFFSET,
@@ -56,7 +57,7 @@ _CENTRE = _bits("IJK")
 _IN_PLANE = {170: _bits("IJ"), 180: _bits("IK"), 190: _bits("JK")}
 #: Words of their ends.
 _ENDS = {170: _bits("XY"), 180: _bits("XZ"), 190: _bits("YZ")}
-_MOTION = frozenset({0, 10, *_ARCS, *CYCLES, *PROBES})
+_MOTION = frozenset({0, 10, THREAD, *_ARCS, *CYCLES, *PROBES})
 _MOTIONS = np.array(sorted(_MOTION))
 #: Codes that take the axis words of their block for something else.
 _STATING = np.array(sorted(AXIS_VALUES | HOMES))
@@ -288,7 +289,7 @@ _SYNCHRONOUS = _m(62, 63, 64, 65)
 _OUTPUTS = _m(66, 67, 68)
 
 #: What any control takes one of in a block: motion, and the modal codes that the reader follows.
-_GROUPS = (frozenset({*_MOTION, 330, 331, 760, 870, 880}), *map(frozenset, GROUPS.values()))
+_GROUPS = (frozenset({*_MOTION, 331, 760, 870, 880}), *map(frozenset, GROUPS.values()))
 
 #: LinuxCNC 2.9, found by asking its interpreter code by code and letter by letter.
 NGC_RULES = BlockRules(
@@ -298,7 +299,7 @@ NGC_RULES = BlockRules(
         "H": frozenset({430, 432, 760}),
         "I": frozenset({*_ARCS, 50, 51, 52, 760, 870}),
         "J": frozenset({*_ARCS, 50, 51, 52, 760, 870}),
-        "K": frozenset({*_ARCS, 330, 331, 760, 870}),
+        "K": frozenset({*_ARCS, THREAD, 331, 760, 870}),
         "L": frozenset({*(CYCLES - {740}), WRITE_OFFSET, 760}) | _m(66, 98),
         "P": frozenset({*_ARCS, DWELL, WRITE_OFFSET, 640, 50, 51, 52, 760, 820, 840, 860, 880, 890, 740})
         | _SYNCHRONOUS | _m(50, 51, 52, 53, 66, 19, 98) | _OWN_M,
@@ -329,6 +330,7 @@ NGC_RULES = BlockRules(
         **dict.fromkeys(sorted(CYCLES | PROBES), "XYZABCUVW"),
         **dict.fromkeys(sorted(_ARCS), "IJKR"),
         DWELL: "P",
+        THREAD: "K",
         432: "HXYZ",
         MACHINE: "XYZABCUVW",
         960: "S",

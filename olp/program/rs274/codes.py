@@ -11,8 +11,10 @@ CYCLES = frozenset({730, 740, 810, 820, 830, 840, 850, 860, 890})
 PROBES = frozenset({382, 383, 384, 385})
 #: Splines and NURBS: G5, G5.1, G5.2, G5.3.
 SPLINES = frozenset({50, 51, 52, 53})
+#: G33, a straight move in time with the spindle.
+THREAD = 330
 #: Motion that ends where its axis words say.
-LINEAR = frozenset({0, 10, 20, 30, 330})
+LINEAR = frozenset({0, 10, 20, 30, THREAD})
 #: Cutter compensation: G41, G41.1, G42, G42.1.
 CUTTER_COMPENSATION = frozenset({410, 411, 420, 421})
 #: Cutter compensation to the left; the others are to the right.

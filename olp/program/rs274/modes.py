@@ -32,6 +32,7 @@ from olp.program.rs274.profiles.base import Act, Profile
 Modal = npt.NDArray[np.int16]
 
 _FLOW = re.compile(rb"[#\[=<]|^/?\s*O|^\W*N?\d*\s*(IF|WHILE|GOTO|END|DO)", re.IGNORECASE)
+_POLAR = re.compile(rb"[@^]")
 #: What to do where the unroller helps.
 UNROLL = "unroll the program with --flatten"
 _COMMA = re.compile(rb"\d,\d")
@@ -332,6 +333,8 @@ def _odd(data: bytes, chunk: WordChunk, line: int, profile: Profile, *, words: b
             line=number,
             code="OLP511",
         )
+    if profile.unroller is not None and profile.language.splines and _POLAR.search(text):
+        return ProgramError(f"`{shown}` states a radius or an angle", hint=UNROLL, line=number, code="OLP511")
     comma = "; write a decimal point instead of the comma" if _COMMA.search(text) else ""
     return ProgramError(
         f"`{shown}` is not understood and may move the machine; expected words of a letter and a number"

@@ -32,6 +32,7 @@ from olp.program.rs274.codes import (
     PLANE_OF,
     PRESET,
     PROBES,
+    THREAD,
     TRANSFORMS,
     UNITS,
     WRITE_OFFSET,
@@ -54,7 +55,7 @@ from olp.program.rs274.turned import Turning, along_words
 
 #: motion code to kind of move; 255 where it is not plain motion, the last entry is for "none yet"
 _KIND = np.full(1001, 255, np.uint8)
-_KIND[[0, 10, 20, 30]] = (Kind.RAPID, Kind.LINE, Kind.ARC_CW, Kind.ARC_CCW)
+_KIND[[0, 10, 20, 30, THREAD]] = (Kind.RAPID, Kind.LINE, Kind.ARC_CW, Kind.ARC_CCW, Kind.LINE)
 _ALONE = np.array(sorted(CYCLES | PROBES))
 _PROBES = np.array(sorted(PROBES))
 #: Events that need the present position
@@ -307,7 +308,8 @@ class _Reader:
             offset = turning.words(offset)
         end = fill(slot, value, incremental if incremental.any() else None, offset, unit, start)
         flag = np.where(incremental, np.uint8(Flag.INCREMENTAL), np.uint8(0))
-        flag[blocks.other[a:upto] | rows.calls[line]] |= np.uint8(Flag.WHOLE)
+        # a second block would wait for the spindle to come round
+        flag[blocks.other[a:upto] | rows.calls[line] | (motion == THREAD)] |= np.uint8(Flag.WHOLE)
         flag[chunk.deleted[line]] |= np.uint8(Flag.DELETED)
         if self.extrusion is not None:
             # a straight move that feeds nothing is a travel

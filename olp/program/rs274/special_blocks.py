@@ -20,6 +20,7 @@ from olp.program.rs274.codes import (
     MACHINE,
     MACROS,
     POLAR,
+    SPLINES,
 )
 from olp.program.rs274.collector import Collector
 from olp.program.rs274.modes import UNROLL, Context, scaled
@@ -74,7 +75,8 @@ def _checked(
         if a == Act.REFUSE:
             why = profile.refusals.get(c)
             name = f"G{number:g}"
-            unrolled = c in MACROS or (c == POLAR and profile.polar)
+            spline = c in SPLINES and profile.language.splines and bool(unroll)
+            unrolled = c in MACROS or (c == POLAR and profile.polar) or spline
             raise ProgramError(
                 why or f"{name} is not known to the {profile.name} profile and may move the machine",
                 line=line,

@@ -63,7 +63,7 @@ GROUPS = (
 COMMON = GROUPS[:6]
 #: Codes that need one of these letters in their block.
 NEEDS = {
-    "G2": "IJKR", "G3": "IJKR", "G4": "P", "G43.2": "HXYZ", "G96": "S", "G52": AXES, "G92": AXES,
+    "G2": "IJKR", "G3": "IJKR", "G4": "P", "G33": "K", "G43.2": "HXYZ", "G96": "S", "G52": AXES, "G92": AXES,
     **dict.fromkeys(f"{DRILLING} G74 G38.2 G38.3 G38.4 G38.5 G53".split(), AXES),
     **dict.fromkeys(["M62", "M63", "M64", "M65"], "P"), "M66": "PE", "M67": "E", "M68": "E",
 }  # fmt: skip

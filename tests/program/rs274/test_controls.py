@@ -364,13 +364,13 @@ _ISO_UNCHANGED = "G8 G9 G13.1 G15 G23.1 G25 G62 G63 G67 G69.1 G96 G97"
 CODES: dict[str, dict[Act, str]] = {
     LINUXCNC: {
         Act.UNCHANGED: "G8 G96 G97",
-        Act.MOTION: f"{_MILLING} {_DRILLING}",
+        Act.MOTION: f"{_MILLING} {_DRILLING} G33",
         Act.ARC_DISTANCE: "G90.1 G91.1",
         Act.FEED: "G93-G95",
         Act.RETRACT: "G98 G99",
         Act.EVENT: f"{_EVENTS} G40 G41 G41.1 G42 G42.1 G30 G43 G43.1 G43.2 G52 G59.1-G59.3 G61.1 G64 "
         "G92.1-G92.3",
-        Act.REFUSE: f"{_REFUSED} {_TRANSFORMS} G5.1",
+        Act.REFUSE: f"{_REFUSED} {_TRANSFORMS} G5.1".replace(" G33 ", " "),
     },
     FANUC: {
         Act.UNCHANGED: f"{_ISO_UNCHANGED} G5.1 G11",

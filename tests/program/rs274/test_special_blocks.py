@@ -44,6 +44,17 @@ def refused(text: str, setup: Setup) -> str:
     return str(caught.value)
 
 
+def test_a_thread_is_a_straight_move_that_is_never_split(setup: Setup) -> None:
+    read_path = path("G33 X5 Z-4 K1\nZ-6 K1.5\nG0 Z9\n", setup)
+    assert read_path.kind[1:].tolist() == [Kind.LINE, Kind.LINE, Kind.RAPID]
+    assert read_path.end_mm[1:].tolist() == [[105, 202, 296], [105, 202, 294], [105, 202, 309]]
+    assert ((read_path.flag & Flag.WHOLE) != 0).tolist() == [False, True, True, False]
+
+
+def test_a_thread_needs_its_lead(setup: Setup) -> None:
+    assert "G33 needs K" in refused("G33 Z-4\n", setup)
+
+
 @pytest.mark.parametrize(("code", "kind"), [("G0", Kind.RAPID), ("G1", Kind.LINE)])
 def test_g53_takes_axis_positions(code: str, kind: Kind, setup: Setup) -> None:
     text = f"F60\nG53 {code} X7\nG0 Y5\n"

@@ -15,6 +15,7 @@ from olp.core.arrays import Index
 from olp.core.errors import ProgramError
 from olp.program.kept import Difference, Kept
 from olp.program.origin import Unrolled
+from olp.program.rs274.codes import SPLINES
 from olp.program.rs274.flatten.apart import apart, can_be_apart, runs_once
 from olp.program.rs274.flatten.lines import Line, Word, compile_line
 from olp.program.rs274.profiles.base import Profile
@@ -119,6 +120,10 @@ def _restored(line: Line, source: bytes, raw: bytes, written: bytes, profile: Pr
         return written
     if line.flow is not None or line.opaque:
         raise _cannot("its flow is in the block that has to change; put it into a block of its own")
+    if any(word.letter == "g" and round(10 * word.number) in SPLINES for word in line.words):
+        raise _cannot("its spline is written as chords")
+    if any(word.letter in "@^" for word in line.words):
+        raise _cannot("its radius and angle are written as X and Y")
     stated = {word.letter: word.number for word in line.words if word.letter in "xy" and word.value is None}
     unrolled = {word.letter: word.number for word in compile_line(raw, 0, profile.language).words}
     if any(unrolled.get(letter) != number for letter, number in stated.items()):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from olp.core.values import dataclass
 from olp.program.rs274.flatten import expressions
 from olp.program.rs274.flatten.expressions import Arithmetic
@@ -14,7 +16,7 @@ class Language:
     - `macro_b`: IF, WHILE, DO, END and GOTO control the run without O-words, and the right side of an
       assignment needs no brackets. Variables are numbered as in Macro B: #1 to #33 local, vacant until set.
     - `saved_modes`: M70 to M73 save and restore modal codes. `profile_cycles`: G70 to G72 name a subprogram.
-    - `splines`: G5 to G5.3 are modal motion.
+    - `splines`: G5 to G5.3 are splines, and `@` and `^` radius and angle.
     - `counts_in_p`: P of M98 has the count in front of four digits of the number. `shared_locals`: M98 keeps
       the local variables of its caller. `calls_none`: L0 of M98 calls nothing.
     - `increments_open`: the unit of a number without a point is not known off line, nor what ROUND in a word
@@ -43,6 +45,8 @@ NGC = Language(
     counts_in_p=False, shared_locals=False, calls_none=True, increments_open=False, decimals=12,
     all_digits=True, counts=frozenset(), points=False,
 )  # fmt: skip
+#: Without splines, radius and angle, as other controls have the words of RS-274.
+PLAIN_NGC = replace(NGC, splines=False)
 MACRO_B = Language(
     arithmetic=expressions.MACRO_B, macro_b=True, saved_modes=False, profile_cycles=False, splines=False,
     counts_in_p=True, shared_locals=True, calls_none=False, increments_open=True, decimals=4,

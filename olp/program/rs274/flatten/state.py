@@ -49,7 +49,8 @@ from olp.program.rs274.state import BROKEN_SERIES, NAN, OPEN_RETRACT, State
 #: A word with its value; None is a value whose unit is not known (`Language.increments_open`).
 Value = tuple[str, float | None]
 
-_MOTION = LINEAR | CYCLES | PROBES | {331, 760, END_OF_CYCLES, 870, 880}
+#: Codes of motion, without splines.
+MOTIONS = LINEAR | CYCLES | PROBES | {331, 760, END_OF_CYCLES, 870, 880}
 #: Codes that change the frame and hold already for the move of their own block.
 _FRAMES = LENGTHS | WORK_OFFSETS
 #: After these the position is not known in program coordinates; G92 states it.
@@ -100,7 +101,7 @@ class ProgramState(State):
     def is_cycle(self, words: Sequence[Value]) -> bool:
         """Whether a block with these words makes a canned cycle."""
         codes = self.codes(words)
-        motion = codes & _MOTION
+        motion = codes & MOTIONS
         if motion:
             return bool(motion & CYCLES)
         return self.motion in CYCLES and not codes & NO_AXES and any(letter in "xyz" for letter, _ in words)
@@ -108,7 +109,7 @@ class ProgramState(State):
     def apply(self, words: Sequence[Value]) -> None:
         """Follow one block that is not a cycle."""
         codes = self._modes(words)
-        motion = codes & _MOTION
+        motion = codes & MOTIONS
         if self.profile.language.splines:
             motion |= codes & SPLINES
         if motion:

@@ -12,26 +12,26 @@ and refused on a Fanuc (#100 and up keep values of earlier runs).
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable, Mapping
-from decimal import Decimal
 
 import numpy as np
 
 from olp.core.budget import Budget
 from olp.core.errors import ProgramError
-from olp.core.units import AXES
 from olp.program.origin import Origin, Unrolled, Within
+from olp.program.rs274.codes import ABSOLUTE, INCREMENTAL, SPLINES
 from olp.program.rs274.cycles import Stroke, stroke_budget
+from olp.program.rs274.flatten import radius_angle
 from olp.program.rs274.flatten.expressions import filled, whole
-from olp.program.rs274.flatten.language import Language
 from olp.program.rs274.flatten.lines import Line, Word
 from olp.program.rs274.flatten.polar import as_xy
 from olp.program.rs274.flatten.run import Walk
+from olp.program.rs274.flatten.splines import SPLINE_WORDS, Splines
 from olp.program.rs274.flatten.state import CYCLE_WORDS, ProgramState, Value
 from olp.program.rs274.flatten.unit import Frame, Unit
 from olp.program.rs274.flatten.values import Variables
+from olp.program.rs274.flatten.written import number_text, stroke_blocks
 from olp.program.rs274.profiles.base import Profile
 
 _COMMENT = re.compile(rb"\([^)]*\)")
@@ -100,28 +100,6 @@ def _refuse_library(main: Unit) -> None:
         )  # fmt: skip
 
 
-def number_text(value: float, letter: str, language: Language, exact: bool = False) -> str:
-    """A number from an expression: 10 significant digits, and no more decimals than the control takes.
-
-    `exact` gives all digits: the centre of an arc with R is the square root of a difference of its ends,
-    which loses half of them. Where a number without a point counts least increments, lengths get one.
-    """
-    if letter in language.counts and letter != "g":
-        return str(whole(value, f"the value of {letter.upper()}"))
-    if not math.isfinite(value):
-        raise ProgramError(f"the value of {letter.upper()} is not finite", code="OLP540")
-    most = language.decimals
-    decimals = 0 if value == 0 else min(most, max(0, 9 - math.floor(math.log10(abs(value)))))
-    text = f"{Decimal(repr(value)):f}" if exact and language.all_digits else f"{value:.{decimals}f}"
-    if "." in text:
-        text = text.rstrip("0")
-    if not language.points or letter == "g":
-        text = text.rstrip(".")
-    elif "." not in text:
-        text += "."
-    return text[1:] if text in ("-0", "-0.") else text
-
-
 class _Flattener:
     """Writes the blocks that a walk visits and follows the state of the control."""
 
@@ -132,6 +110,7 @@ class _Flattener:
         self.language, self.cycles = profile.language, profile.cycles
         self.state = ProgramState(profile)
         self.variables = Variables(self.state, parameters)
+        self.splines = Splines(self.state)
         self.strokes = strokes
         #: whether a block has words of axes
         self.moves = False
@@ -206,11 +185,29 @@ class _Flattener:
         for i, word in enumerate(line.words):
             if self._vacant(word, values[i][1]) or (word.letter == "n" and seen):
                 cut.add(i)
-        kept = (i for i in range(len(line.words)) if i not in cut)
+        for _ in range(self._polar_repeats(line, values, cut)):
+            active = self._carry_out(line, values, frozenset(cut), exact=frame.unit.radius_arcs)
+        for target, value in settings:
+            self.variables.assign(target, value)
+        return any(letter == "m" and value in _ENDS for letter, value in active)
+
+    def _carry_out(
+        self, line: Line, values: list[Value], without: frozenset[int], *, exact: bool
+    ) -> list[Value]:
+        """Write a block and follow it; its words with their values."""
+        cut = set(without)
+        kept = [i for i in range(len(line.words)) if i not in cut]
         active: list[Value] = [(values[i][0], self._tracked(line.words[i], values[i][1])) for i in kept]
+        before = (self.state.absolute, self.state.path, tuple(self.state.position))
+        texts: dict[int, str] = {}
+        if self.language.splines:
+            if radius_angle.is_polar(active):
+                texts, active = self._as_xy(kept, active, cut)
+            if self.splines.takes(active):
+                self._spline(line, values, active, cut)
+                return active
         self.moves |= any(letter in "xyz" for letter, _ in active)
         strokes: tuple[Stroke, ...] | None = None
-        before = (self.state.absolute, self.state.path, tuple(self.state.position))
         if self.state.is_cycle(active):
             strokes = self._cycle(active)
         else:
@@ -220,10 +217,58 @@ class _Flattener:
             self._write(line, values, cut, exact=False)
             self._write_strokes(strokes, line, before)
         else:
-            self._write(line, values, cut, exact=frame.unit.radius_arcs)
-        for target, value in settings:
-            self.variables.assign(target, value)
-        return any(letter == "m" and value in _ENDS for letter, value in active)
+            self._write(line, values, cut, texts, exact=exact)
+        return active
+
+    def _polar_repeats(self, line: Line, values: list[Value], cut: set[int]) -> int:
+        """How often a block is written by itself: each hole of a polar cycle in G91 has another position."""
+        active = [value for i, value in enumerate(values) if i not in cut]
+        if not (self.language.splines and radius_angle.is_polar(active)):
+            return 1
+        codes = self.state.codes(active)
+        absolute = ABSOLUTE in codes or (self.state.absolute and INCREMENTAL not in codes)
+        count = next((i for i, (letter, _) in enumerate(values) if letter == "l"), None)
+        if absolute or count is None or not self.state.is_cycle([*active, ("x", 0.0)]):
+            return 1
+        cut.add(count)
+        return whole(filled(values[count][1]), "the repeat count L")
+
+    def _as_xy(
+        self, kept: list[int], active: list[Value], cut: set[int]
+    ) -> tuple[dict[int, str], list[Value]]:
+        """A block with `@` or `^` as one with X and Y: the text in the place of its first polar word, and its
+        words."""
+        self.state.take(self.state.codes(active))
+        numbers = [number_text(v, "x", self.language) for v in radius_angle.target(active, self.state)]
+        polar = [i for i, (letter, _) in zip(kept, active, strict=True) if letter in "@^"]
+        cut |= set(polar[1:])
+        plain = [(letter, value) for letter, value in active if letter not in "@^"]
+        return {polar[0]: f"X{numbers[0]} Y{numbers[1]}"}, [
+            *plain, *zip("xy", map(float, numbers), strict=True)
+        ]  # fmt: skip
+
+    def _spline(self, line: Line, values: list[Value], active: list[Value], cut: set[int]) -> None:
+        """Write the block of a spline as chords, behind its other words."""
+        self.state.apply([word for word in active if word[0] not in SPLINE_WORDS])
+        ends = self.splines.chords(active)
+        self.moves |= bool(ends)
+        cut |= {
+            i for i, word in enumerate(line.words)
+            if word.letter in SPLINE_WORDS | {"@", "^"}
+            or (word.letter == "g" and round(10 * filled(values[i][1])) in SPLINES)
+        }  # fmt: skip
+        self._write(line, values, cut, exact=False)
+        self.strokes.spend(len(ends))
+        blocks = ["G1 " + " ".join(
+            letter + number_text(v, "x", self.language) for letter, v in zip("XY", end, strict=True)
+        ) for end in ends]  # fmt: skip
+        if ends:
+            self.state.position[:2] = ends[-1]
+        if ends and not self.state.absolute:
+            blocks = ["G90", *blocks, "G91"]
+        mark = b"/" if line.deleted else b""
+        for text in blocks:
+            self._put(mark + text.encode(), line.eol)
 
     def _value(self, word: Word) -> float | None:
         return word.number if word.value is None else word.value(self.variables)
@@ -263,12 +308,20 @@ class _Flattener:
     def _of_cycle(self, word: Word, value: float | None) -> bool:
         if word.letter == "g":
             return self.state.is_cycle([("g", value)]) and round(filled(value) * 10) == self.state.motion
-        return word.letter in CYCLE_WORDS
+        return word.letter in CYCLE_WORDS or word.letter in "@^"
 
     def _write(
-        self, line: Line, values: list[tuple[str, float | None]], cut: set[int], *, exact: bool
+        self,
+        line: Line,
+        values: list[Value],
+        cut: set[int],
+        texts: Mapping[int, str] | None = None,
+        *,
+        exact: bool,
     ) -> None:
-        if line.plain and not cut and line.flow is None:
+        """Write a line without the words in `cut`, `texts` in the place of others."""
+        texts = texts or {}
+        if line.plain and not cut and not texts and line.flow is None:
             self._put(line.raw, line.eol)
             return
         # A flow statement has no words: only comments and assignments are in the line.
@@ -281,6 +334,8 @@ class _Flattener:
         for i, (word, (letter, value)) in enumerate(zip(line.words, values, strict=True)):
             if i in cut:
                 splices.append((word.start, word.end, b""))
+            elif i in texts:
+                splices.append((word.start, word.end, texts[i].encode()))
             elif word.value is not None:
                 text = number_text(filled(value), letter, self.language, exact)
                 splices.append((word.value_start, word.end, text.encode()))
@@ -300,40 +355,13 @@ class _Flattener:
         self, strokes: tuple[Stroke, ...], line: Line, before: tuple[bool, str, tuple[float, ...]]
     ) -> None:
         """Blocks of a cycle."""
-        exact = self.cycles.exact_corners and self.state.path != "G61"
-        lines: list[str] = []
-        position = list(before[2])
-        spindle = self.state.spindle
-        for stroke in strokes:
-            if stroke.kind in ("rapid", "feed"):
-                words = [
-                    AXES[i] + number_text(v, "x", self.language)
-                    for i, v in enumerate(stroke.point)
-                    if not math.isnan(v) and v != position[i]
-                ]
-                position = list(stroke.point)
-                if words:
-                    lines.append(" ".join(["G0" if stroke.kind == "rapid" else "G1", *words]))
-            elif stroke.kind == "dwell":
-                if stroke.seconds > 0:
-                    lines.append("G4 P" + number_text(stroke.seconds, "p", self.language))
-            elif stroke.spindle == "stop":
-                lines.append("M5")
-            else:
-                if spindle not in (3, 4):
-                    raise ProgramError(
-                        "the cycle reverses the spindle, whose direction is not set; give M3 or M4 before",
-                        code="OLP532",
-                    )
-                lines.append(f"M{spindle if stroke.spindle == 'restore' else 7 - spindle}")
+        lines = stroke_blocks(strokes, list(before[2]), self.state.spindle, self.language)
         if not lines:
             return
         if not self.state.absolute:
-            lines.insert(0, "G90")
-            lines.append("G91")
-        if exact:
-            lines.insert(0, "G61")
-            lines.append(self.state.path)
+            lines = ["G90", *lines, "G91"]
+        if self.cycles.exact_corners and self.state.path != "G61":
+            lines = ["G61", *lines, self.state.path]
         mark = b"/" if line.deleted else b""
         for text in lines:
             self._put(mark + text.encode(), line.eol)

@@ -8,7 +8,7 @@ from olp.program.rs274.block_text import BlockText
 from olp.program.rs274.codes import CYCLES
 from olp.program.rs274.cycle_rules import NGC_CYCLES
 from olp.program.rs274.entry import keep_blocks, read_blocks, unroll_blocks
-from olp.program.rs274.flatten.language import NGC
+from olp.program.rs274.flatten.language import PLAIN_NGC
 from olp.program.rs274.profiles.base import ISO_M, REFUSALS, Act, Profile, g_codes
 
 _EXTRA = {400: Act.UNCHANGED, 431: Act.EVENT, 911: Act.ARC_DISTANCE, 921: Act.EVENT, 611: Act.REFUSE}
@@ -31,6 +31,6 @@ DIALECT = Profile(
     initial_retract=990,
     text=BlockText(odd_bytes=None, cr_ends_line=True, open_comments=True),
     cycles=replace(NGC_CYCLES, exact_corners=False),
-    language=NGC,
+    language=PLAIN_NGC,
     path_mode="junction deviation of the control ($11)",
 )

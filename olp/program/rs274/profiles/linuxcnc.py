@@ -6,6 +6,7 @@ import re
 
 from olp.program.rs274.block_rules import NGC_RULES
 from olp.program.rs274.block_text import BlockText
+from olp.program.rs274.codes import THREAD
 from olp.program.rs274.cycle_rules import NGC_CYCLES
 from olp.program.rs274.entry import keep_blocks, read_blocks, unroll_blocks
 from olp.program.rs274.flatten.language import NGC
@@ -21,7 +22,7 @@ DIALECT = Profile(
     folder_endings=("ngc", "nc", "tap", "cnc", "gcode"),
     unroller=unroll_blocks,
     keeper=keep_blocks,
-    codes=g_codes(unchanged={80}, extra={**_EVENTS, **ARC_DISTANCE}),
+    codes=g_codes(unchanged={80}, extra={**_EVENTS, **ARC_DISTANCE, THREAD: Act.MOTION}),
     refusals=REFUSALS,
     harmless_m=ISO_M | {50, 51, 52, 53} | frozenset(range(62, 69)),
     initial_retract=990,

@@ -13,7 +13,7 @@ from __future__ import annotations
 from olp.program.rs274.block_text import BlockText
 from olp.program.rs274.cycle_rules import CycleRules
 from olp.program.rs274.entry import keep_blocks, read_blocks, unroll_blocks
-from olp.program.rs274.flatten.language import NGC
+from olp.program.rs274.flatten.language import PLAIN_NGC
 from olp.program.rs274.profiles.base import (
     ARC_DISTANCE,
     ISO_M,
@@ -60,7 +60,7 @@ DIALECT = Profile(
         levels_follow_distance=True, keeps_numbers=False, exact_corners=False,
         other_axes=True, turning={},
     ),
-    language=NGC,
+    language=PLAIN_NGC,
     path_mode="constant velocity G64 of the control, unless exact stop is its setting",
     contours_assumed="that contours are made as LinuxCNC makes them is assumed: arcs about outside corners",
     written_ending="tap",

@@ -13,7 +13,7 @@ from olp.program.rs274.block_text import BlockText
 from olp.program.rs274.commands import Commands
 from olp.program.rs274.cycle_rules import NGC_CYCLES
 from olp.program.rs274.entry import read_blocks
-from olp.program.rs274.flatten.language import NGC
+from olp.program.rs274.flatten.language import PLAIN_NGC
 from olp.program.rs274.profiles.base import Act, Profile
 
 #: What printers make of G codes. G10 and G11 retract, G60 stores a position, G80 ends a mode.
@@ -87,7 +87,7 @@ PRINTER = Profile(
     rules=BlockRules(needs={920: "XYZE"}),
     commands=Commands(text=TEXTS, extruder_follows=True, arc_words="IJ"),
     cycles=NGC_CYCLES,
-    language=NGC,
+    language=PLAIN_NGC,
     comment=(b"; ", b""),
     first=(b";FLAVOR|; HEADER|;GENERATED|; GENERATED",),
     shared_sign=re.compile(

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from olp.core.errors import ProgramError, UsageError
 from olp.program.rs274.flatten.language import MACRO_B, NGC
-from olp.program.rs274.flatten.unroll import number_text
+from olp.program.rs274.flatten.written import number_text
 
 
 @pytest.mark.parametrize(
