@@ -17,7 +17,7 @@ from olp.calibration.observations.lengths import Lengths
 from olp.calibration.observations.pods import Pods
 from olp.calibration.observations.points import Points
 from olp.cli import main
-from olp.core.errors import ConfigError
+from olp.core.errors import CannotCompute, ConfigError
 from olp.files.measurements.reader import files_of_measurements, load_measurements
 
 PROGRAMS = Path(__file__).resolve().parents[2] / "programs"
@@ -184,6 +184,77 @@ def test_directions_from_pods(tmp_path: Path) -> None:
     planned(tmp_path, pods.format(3) + "sigma_um = 10.0\n")
     with pytest.raises(ConfigError, match="two of the pods 1 to 2"):
         load_measurements([tmp_path])
+
+
+THEODOLITES = "X_mm,Y_mm,Z_mm,azimuth_1_deg,elevation_1_deg\n"
+PLACES = np.array([(x, y, z) for x in (0, 700, 1500) for y in (0, 600, 900) for z in (-400, 0)], float)
+
+
+def theodolite(folder: Path, keys: str, azimuth: float = 1.0, zenith: bool = False) -> None:
+    """A plan of one theodolite, 900, 700 and 80 mm from zero, which counts as stated."""
+    x, y, z = (PLACES - (-900.0, -700.0, 200.0)).T
+    around = azimuth * np.degrees(np.arctan2(y, x))
+    up = np.degrees(np.arctan2(z, np.hypot(x, y)))
+    up = 90.0 - up if zenith else up
+    rows = [
+        f"{p[0]},{p[1]},{p[2]},{a!r},{b!r}\n"
+        for p, a, b in zip(PLACES.tolist(), around.tolist(), up.tolist(), strict=True)
+    ]
+    (folder / "p.csv").write_text(THEODOLITES + "".join(rows))
+    planned(folder, f'[[pods]]\nfile = "p.csv"\npods = 1\nsigma_urad = 10.0\n{keys}')
+
+
+@pytest.mark.parametrize(
+    ("keys", "azimuth", "zenith"),
+    [
+        ("", 1.0, False),
+        ('azimuth = "clockwise"\n', -1.0, False),
+        ('vertical = "zenith"\n', 1.0, True),
+        ('azimuth = "clockwise"\nvertical = "zenith"\n', -1.0, True),
+    ],
+)
+def test_theodolites_count_as_the_plan_states(
+    tmp_path: Path, keys: str, azimuth: float, zenith: bool
+) -> None:
+    theodolite(tmp_path, "")
+    (plain,) = load_measurements([tmp_path]).of(Pods)
+    theodolite(tmp_path, keys, azimuth, zenith)
+    (other,) = load_measurements([tmp_path]).of(Pods)
+    assert np.allclose(other.azimuth_rad, plain.azimuth_rad, atol=1e-12)
+    assert np.allclose(other.elevation_rad, plain.elevation_rad, atol=1e-12)
+    assert np.allclose(other.start().poses[0].place_mm, (-900.0, -700.0, 80.0), atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("azimuth", "zenith", "words"),
+    [
+        (-1.0, False, "azimuths counted the other way round;"),
+        (1.0, True, "vertical angles counted from the other zero;"),
+        (-1.0, True, "other way round and vertical angles counted from the other zero;"),
+    ],
+)
+def test_another_convention_of_theodolites_is_asked_for(
+    tmp_path: Path, azimuth: float, zenith: bool, words: str
+) -> None:
+    theodolite(tmp_path, "", azimuth, zenith)
+    (pods,) = load_measurements([tmp_path]).of(Pods)
+    with pytest.raises(CannotCompute) as caught:
+        pods.start()
+    assert words in str(caught.value) and "state azimuth" in str(caught.value)
+
+
+def test_a_polar_station_counts_as_the_plan_states(tmp_path: Path) -> None:
+    head = "X_mm,Y_mm,Z_mm,distance_mm,azimuth_deg,elevation_deg\n"
+    rows = "".join(f"{x},{y},0,{900 + x},{x / 50},{60 + y / 50}\n" for x in (0, 500, 900) for y in (0, 300))
+    (tmp_path / "s.csv").write_text(head + rows)
+    keys = '[[polar]]\nfile = "s.csv"\nsigma_distance_um = 10.0\nsigma_angle_urad = 10.0\n'
+    planned(tmp_path, keys)
+    plain = load_measurements([tmp_path]).of(Points)[0].measured_mm
+    planned(tmp_path, keys + 'azimuth = "clockwise"\nvertical = "zenith"\n')
+    other = load_measurements([tmp_path]).of(Points)[0].measured_mm
+    x, y, z = plain.T
+    flat = np.hypot(x, y)
+    assert np.allclose(other, np.column_stack([x * z / flat, -y * z / flat, flat]))
 
 
 @pytest.mark.parametrize(

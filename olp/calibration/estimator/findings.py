@@ -33,6 +33,12 @@ MOST_PAIRS = 8
 SQUARE_OFF = 4.0
 #: Offsets of the reflector that differ by less than this are one.
 ONE_OFFSET_MM = 1.0
+#: A negative backlash is told where it is so many standard deviations below zero.
+REVERSED = 4.0
+#: A smaller negative backlash than this harms no part (0.2 um).
+REVERSED_MM = 2e-4
+#: Positions over which the mean backlash of an axis is taken.
+_REVERSALS = 9
 #: Readings that one finding lists, at most.
 _LISTED = 10
 
@@ -47,6 +53,7 @@ def findings_of(
         *_outlier_findings(fit),
         *_scatter_findings(fit),
         *_step_findings(fit),
+        *_reversal_findings(fit),
         *_correlation_findings(fit),
         *_box_findings(fit, travel_mm),
         *_misfit_findings(fit),
@@ -139,6 +146,26 @@ def _step_findings(fit: Fit) -> Iterator[Finding]:
                 "OLP804",
                 f"{name} jumps by {height * scale:+.1f} {unit} between {name[2]} {step.low_mm:g} and "
                 f"{step.high_mm:g} mm",
+            )
+
+
+def _reversal_findings(fit: Fit) -> Iterator[Finding]:
+    """Axes that go farther where they reverse, which no backlash does."""
+    for axis, letter in enumerate(AXES):
+        name = f"E{letter}{letter}"
+        space = fit.parameters.halves.get(name)
+        if space is None:
+            continue
+        low, high = fit.box_mm[axis].tolist()
+        rows = space.values(np.linspace(low, high, _REVERSALS)).mean(axis=0)
+        part = fit.parameters.slices[f"half {name}"]
+        backlash = -2.0 * float(rows @ fit.theta[part])
+        sigma = 2.0 * math.sqrt(max(float(rows @ fit.covariance[part, part] @ rows), 0.0))
+        if backlash < -max(REVERSED * sigma, REVERSED_MM):
+            yield Finding(
+                "OLP855",
+                f"{letter}: {backlash * UM_PER_MM:.2f} +- {sigma * UM_PER_MM:.2g} um in the mean; after a "
+                "reversal the axis goes farther, not less far",
             )
 
 

@@ -108,10 +108,10 @@ def _ranges(
         own = [line for line in lines if line.axis == axis]
         reached = [q for q in (taken.reach(axis) for taken in observations) if len(q)]
         if not reached:
-            raise CannotCompute(
-                f"no line along {AXES[axis]}; expected at least the positioning E{AXES[axis]}{AXES[axis]} of "
-                "every axis, or points"
-            )
+            # nothing is known of this axis: all its errors are zero over its travel, with their uncertainty
+            ranges.append(_travel_of(axis, observations, travel_mm))
+            box[axis] = ranges[-1]
+            continue
         low = min(float(q.min()) for q in reached)
         high = max(float(q.max()) for q in reached)
         ranges.append((low, high))
@@ -132,6 +132,23 @@ def _ranges(
                 "of them over one range"
             )
     return ranges, box
+
+
+def _travel_of(
+    axis: int, observations: Sequence[Observation], travel_mm: Sequence[tuple[float, float]] | None
+) -> tuple[float, float]:
+    """The travel of an axis without readings. Raises CannotCompute where it is not known, or where no axis
+    has readings."""
+    letter = AXES[axis]
+    if not any(len(taken.reach(other)) for taken in observations for other in range(3)):
+        raise CannotCompute("no reading was taken along any axis; expected lines or points")
+    if travel_mm is None:
+        raise CannotCompute(
+            f"no line along {letter}, and its travel is not known; give the machine file (-m), or at least "
+            f"the positioning E{letter}{letter}"
+        )
+    low, high = travel_mm[axis]
+    return float(low), float(high)
 
 
 def _spline(lines: Sequence[Line], axis: int, span: tuple[float, float], cells: int) -> Spline:

@@ -154,9 +154,36 @@ class PodsState(ScatteredState):
 
 
 def first_poses(pods: Pods) -> tuple[Pose, ...]:
-    """Poses from the nominal points, as if the machine had no errors. Raises CannotCompute."""
+    """Poses from the nominal points, as if the machine had no errors. Raises CannotCompute, with the
+    conventions of angles that would fit."""
     tip = pods.axis_mm + pods.tool_mm
-    return tuple(_resected(tip, pods, k) for k in range(pods.count))
+    poses = []
+    for k in range(pods.count):
+        miss, pose = _resected(tip, pods.azimuth_rad[:, k], pods.elevation_rad[:, k])
+        if miss > _LARGEST_MISS_RAD:
+            raise CannotCompute(
+                f"pod {k + 1} of {pods.source or 'the pods'}: no pose fits its angles to the points"
+                + _conventions(tip, pods.azimuth_rad[:, k], pods.elevation_rad[:, k])
+            )
+        poses.append(pose)
+    return tuple(poses)
+
+
+def _conventions(tip: Array, azimuth: Array, elevation: Array) -> str:
+    """What to state so that a pose fits, or to check where no convention of angles makes one fit."""
+    clockwise = "azimuths counted the other way round"
+    zenith = "vertical angles counted from the other zero"
+    for words, turned, up in (
+        (clockwise, -azimuth, elevation),
+        (zenith, azimuth, 0.5 * np.pi - elevation),
+        (f"{clockwise} and {zenith}", -azimuth, 0.5 * np.pi - elevation),
+    ):
+        if _resected(tip, turned, up)[0] < 0.1 * _LARGEST_MISS_RAD:
+            return (
+                f", and one fits with {words}; state azimuth (clockwise, counter-clockwise) and vertical "
+                "(zenith, elevation) as the instrument counts them"
+            )
+    return "; check the angles, and that their rows are those of the points"
 
 
 def pods_block(pods: Pods, parameters: Unknowns, theta: Array, poses: Sequence[Pose]) -> Block:
@@ -171,7 +198,8 @@ def pods_block(pods: Pods, parameters: Unknowns, theta: Array, poses: Sequence[P
             design = parameters.design(pods.axis_mm[part], pods.tool_mm[part])
             shift = design @ theta
             for k, pose in enumerate(poses):
-                misses, rows, local = _linear(tip[part] + shift, pods, k, part, pose)
+                seen = pods.azimuth_rad[part, k], pods.elevation_rad[part, k]
+                misses, rows, local = _linear(tip[part] + shift, *seen, pose)
                 on_theta = np.einsum("nai,nij->naj", rows, design).reshape(-1, size)
                 table = np.zeros((len(on_theta), unknowns))
                 table[:, 6 * k : 6 * k + 6] = local.reshape(-1, 6)
@@ -188,7 +216,7 @@ def pods_block(pods: Pods, parameters: Unknowns, theta: Array, poses: Sequence[P
     return Block(np.arange(size), np.zeros(unknowns), chunks, pods.source or "pods")
 
 
-def _linear(tip: Array, pods: Pods, k: int, part: slice, pose: Pose) -> tuple[Array, Array, Array]:
+def _linear(tip: Array, azimuth: Array, elevation: Array, pose: Pose) -> tuple[Array, Array, Array]:
     """(n, 2) measured less expected azimuth and elevation, (n, 2, 3) what a shift of the tip does to them,
     and (n, 2, 6) what the pod's unknowns do."""
     ray = tip - pose.place_mm
@@ -197,8 +225,8 @@ def _linear(tip: Array, pods: Pods, k: int, part: slice, pose: Pose) -> tuple[Ar
     square = flat**2 + z**2
     misses = np.stack(
         [
-            _small(pods.azimuth_rad[part, k] - np.arctan2(y, x)),
-            pods.elevation_rad[part, k] - np.arctan2(z, flat),
+            _small(azimuth - np.arctan2(y, x)),
+            elevation - np.arctan2(z, flat),
         ],
         axis=1,
     )
@@ -211,9 +239,9 @@ def _linear(tip: Array, pods: Pods, k: int, part: slice, pose: Pose) -> tuple[Ar
     return misses, rows, np.concatenate([-rows, turned / LEVER_ARM_MM], axis=2)
 
 
-def _resected(tip: Array, pods: Pods, k: int) -> Pose:
-    """The pose whose angles to the nominal points fit the readings best, from starts all around them."""
-    azimuth, elevation = pods.azimuth_rad[:, k], pods.elevation_rad[:, k]
+def _resected(tip: Array, azimuth: Array, elevation: Array) -> tuple[float, Pose]:
+    """The pose whose angles to the nominal points fit the readings best, from starts all around them, and by
+    how much they miss (rad, rms)."""
     flat = np.cos(elevation)
     seen = np.column_stack([flat * np.cos(azimuth), flat * np.sin(azimuth), np.sin(elevation)])
     low, span = tip.min(axis=0), np.ptp(tip, axis=0)
@@ -225,7 +253,7 @@ def _resected(tip: Array, pods: Pods, k: int) -> Pose:
         pose = Pose(place, _turn(direction, seen))
         cost = np.inf
         for _ in range(_STEPS):
-            misses, _, local = _linear(tip, pods, k, slice(None), pose)
+            misses, _, local = _linear(tip, azimuth, elevation, pose)
             cost = float(np.sqrt(np.mean(misses**2)))
             step, *_ = np.linalg.lstsq(local.reshape(-1, 6), misses.reshape(-1), rcond=1e-10)
             limit = max(1.0, float(np.abs(step).max()) / 1000.0)
@@ -236,12 +264,8 @@ def _resected(tip: Array, pods: Pods, k: int) -> Pose:
             best = cost, pose
         if cost < 0.1 * _LARGEST_MISS_RAD:
             break
-    if best is None or best[0] > _LARGEST_MISS_RAD:
-        raise CannotCompute(
-            f"pod {k + 1} of {pods.source or 'the pods'}: no pose fits its angles to the points; check the "
-            "angles, and that their rows are those of the points"
-        )
-    return best[1]
+    assert best is not None, "there are starts"
+    return best
 
 
 def _turn(direction: Array, seen: Array) -> Array:

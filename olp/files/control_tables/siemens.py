@@ -46,8 +46,10 @@ MOST_ROWS = 200
 TRANSLATIONS = tuple(name for name in COMPONENTS if name[1] in AXES)
 _VALUE = re.compile(r"\$AN_CEC\[\s*(\d+)\s*,\s*(\d+)\s*\]\s*=\s*(\S+)", re.IGNORECASE)
 _KEY = re.compile(r"\$AN_CEC_([A-Z_]+)\[\s*(\d+)\s*\]\s*=\s*(\S+)", re.IGNORECASE)
-_FRAME = re.compile(r"%.*|N?\d*\s*(CHANDATA\(\d+\)|M17|M30|M2|M02)", re.IGNORECASE)
+_FRAME = re.compile(r"%.*|N?\d*\s*(CHANDATA\(\d+\)|RET|M0?[012]|M17|M30)", re.IGNORECASE)
 _KEYS = ("INPUT_AXIS", "OUTPUT_AXIS", "STEP", "MIN", "MAX", "DIRECTION", "MULT_BY_TABLE", "IS_MODULO")
+#: What some programs write for "no modulo axis". From MIN to MAX a table with and without modulo is the same.
+_NO_MODULO = -1
 #: The highest row number that is read: a higher one is a mistake.
 _MOST_NUMBER = 100_000
 
@@ -136,7 +138,7 @@ def _one(
     if len(problems) > before:
         return None
     for key, what in (("MULT_BY_TABLE", "a product of tables"), ("IS_MODULO", "a modulo axis")):
-        if numbers[key]:
+        if numbers[key] and not (key == "IS_MODULO" and numbers[key] == _NO_MODULO):
             problems.append((table.keys[key][0], f"{key} makes {what}, which a calibration cannot hold"))
     if numbers["DIRECTION"] not in (-1, 0, 1):
         problems.append((table.keys["DIRECTION"][0], "DIRECTION is wrong; expected 0, 1 or -1"))

@@ -32,6 +32,7 @@ from olp.files.columns import decoded, place_in
 from olp.files.measurements.line_runs import columns_as_runs, counted, trend, turns
 from olp.files.measurements.readings import ANGULAR, SENSES, UNITS, Readings, parse_readings
 from olp.files.measurements.renishaw import MARK, RTX, RecordingTable, line_of_recording, parse_rtx, read_rtx
+from olp.files.measurements.rtl import is_stored_line, parse_rtl
 from olp.files.problems import Problem, config_error, validate
 from olp.files.toml_text import read_toml
 from olp.files.write import PathLike, read_bytes
@@ -44,11 +45,10 @@ Direction = Annotated[int, Field(ge=-1, le=1)]
 #: Marks between groups of three digits, by name.
 _THOUSANDS = {"none": "", "point": ".", "comma": ",", "space": " ", "apostrophe": "'"}
 
+#: Endings of measured lines in sections of text, each read by `parse_rtl`.
+STORED_LINES = (".rtl", ".rta", ".rts")
 #: Endings of files of instruments whose format is not public. Their programs export text.
 WITHOUT_GRAMMAR = {
-    ".rtl": "a Renishaw linear measurement",
-    ".rta": "a Renishaw angular measurement",
-    ".rts": "a Renishaw straightness measurement",
     ".pos": "a positioning measurement of Renishaw or Wyler",
     ".b5r": "a Renishaw ball-bar measurement",
     ".b20": "a Renishaw ball-bar measurement",
@@ -190,8 +190,8 @@ def load_line_profile(path: PathLike) -> LineProfile:
 def read_line(path: PathLike, profile: LineProfile | None = None) -> Readings:
     """The readings of one file, as `profile` describes it. Without a profile, native CSV.
 
-    Raises InputError where the file is of an instrument whose format is not public, and ConfigError with
-    every problem and its line.
+    A measured line in sections (.rtl) is read without one. Raises InputError where the file is of an
+    instrument whose format is not public, and ConfigError with every problem and its line.
     """
     if profile is not None:
         return read_profiled(path, profile)
@@ -204,7 +204,8 @@ def read_line(path: PathLike, profile: LineProfile | None = None) -> Readings:
             "as text and describe its columns with a profile (--profile)",
             file=str(path),
         )
-    return parse_readings(read_bytes(path), str(path))
+    data = read_bytes(path)
+    return parse_rtl(data, str(path)) if ending in STORED_LINES else parse_readings(data, str(path))
 
 
 def read_profiled(path: PathLike, profile: LineProfile) -> Readings:
@@ -215,7 +216,9 @@ def read_profiled(path: PathLike, profile: LineProfile) -> Readings:
         return _in_sense(
             line_of_recording(recording, profile.recording, profile.unit, profile.holds), profile
         )
-    if data.startswith(MARK):
+    if profile.columns is None and is_stored_line(data):
+        return _in_sense(parse_rtl(data, str(path), profile.unit), profile)
+    if data.startswith(MARK) and not is_stored_line(data):
         return read_rtx(path)
     return parse_line(data, str(path), profile)
 

@@ -14,11 +14,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Array
+from olp.core.schema import Table
+from olp.core.schema_keys import Field
 from olp.core.units import AXES
 from olp.core.values import dataclass
 from olp.files.columns import Wanted, finite, missing, names, read_sheet, unknown
@@ -38,6 +42,30 @@ TOOL = tuple(f"tool_{axis}_mm" for axis in AXES)
 def directions(pods: int) -> tuple[str, ...]:
     """The columns of angles of a number of pods."""
     return tuple(f"{angle}_{k + 1}_deg" for k in range(pods) for angle in ("azimuth", "elevation"))
+
+
+#: How an instrument counts its azimuths, seen from above, each with its factor.
+AZIMUTHS: Mapping[str, float] = MappingProxyType({"counter-clockwise": 1.0, "clockwise": -1.0})
+
+
+class AngleKeys(Table):
+    """How the angles of an instrument count. Every table of directions has these keys."""
+
+    azimuth: Literal["counter-clockwise", "clockwise"] = Field(
+        default="counter-clockwise",
+        description="how azimuths count, seen from above; most theodolites count clockwise",
+    )
+    vertical: Literal["elevation", "zenith"] = Field(
+        default="elevation",
+        description='what the column of elevations holds: "elevation" from the horizontal, + up, or "zenith" '
+        "from straight up",
+    )
+
+
+def conventional(angles: AngleKeys, azimuth: Array, vertical: Array) -> tuple[Array, Array]:
+    """Azimuths counter-clockwise and elevations in rad, from angles in rad as the instrument counts them."""
+    up = 0.5 * math.pi - vertical if angles.vertical == "zenith" else vertical
+    return np.asarray(AZIMUTHS[angles.azimuth] * azimuth), np.asarray(up)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

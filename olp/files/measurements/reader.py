@@ -20,13 +20,12 @@ from olp.calibration.observations.measurements import MapWish, Measurements
 from olp.core.errors import ConfigError, InputError
 from olp.core.units import AXES, MM_PER_UM, RAD_PER_URAD
 from olp.core.values import dataclass
-from olp.files.columns import decoded
 from olp.files.measurements.instruments.base import Plan
 from olp.files.measurements.instruments.registry import INSTRUMENTS, rank_of
 from olp.files.measurements.line_merging import as_line, stated_of, word
-from olp.files.measurements.readings import check_component, parse_readings
+from olp.files.measurements.line_profile import read_line
+from olp.files.measurements.readings import check_component
 from olp.files.measurements.schemas import MeasurementsFile, SquareTable
-from olp.files.measurements.stated import stated_keys
 from olp.files.problems import Problem, config_error, validate
 from olp.files.toml_text import Path, dotted, line_of, read_toml
 from olp.files.write import PathLike, read_bytes
@@ -195,15 +194,14 @@ def _folder(folder: FilePath, gathered: _Gathered) -> None:
 
 def _alone(path: FilePath, gathered: _Gathered) -> None:
     try:
-        data = read_bytes(path)
-        keys = dict(stated_keys(decoded(data, str(path))))
-        readings = parse_readings(data, str(path))
-        stated, key_lines = stated_of(keys, str(path))
-        if stated.component is None:
+        readings = read_line(path)
+        stated, key_lines = stated_of(readings.keys, str(path))
+        component = stated.component or readings.component
+        if component is None:
             sentence = 'states no component; expected a comment such as # component = "EXX", or a plan'
             raise ConfigError(sentence, file=str(path))
-        check_component(readings, stated.component)
-        line = as_line(readings, stated.component, stated, "Z", gathered.chain, str(path))
+        check_component(readings, component)
+        line = as_line(readings, component, stated, "Z", gathered.chain, str(path))
     except ConfigError as error:
         gathered.errors.append(error)
         return
@@ -211,7 +209,7 @@ def _alone(path: FilePath, gathered: _Gathered) -> None:
     for key in ("machine", "measured", "temperature_degC", "active_during_measurement"):
         if getattr(stated, key) is not None:
             gathered.state(key, getattr(stated, key), str(path), key_lines.get(key))
-    gathered.periods[stated.component[2]].update(stated.period_mm)
+    gathered.periods[component[2]].update(stated.period_mm)
     if stated.square is not None and stated.square_sigma_urad is not None:
         deviation = (stated.square_error_urad or 0.0) * RAD_PER_URAD
         square = Square(stated.square, deviation, stated.square_sigma_urad * RAD_PER_URAD)

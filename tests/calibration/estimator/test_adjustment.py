@@ -378,6 +378,36 @@ def test_an_axis_without_lines_has_no_answer() -> None:
         fit(without(measurements, *(f"E{d}Z" for d in "XYZABC")), "FXYZ")
 
 
+TRAVEL = [(0.0, 3000.0), (0.0, 2000.0), (-1000.0, 0.0)]
+
+
+@pytest.mark.parametrize("names", [("EXX",), ("EXX", "EYY")])
+def test_one_axis_alone_is_corrected_along_itself(names: tuple[str, ...]) -> None:
+    """What no reading shows is zero over the travel, and stated with its uncertainty and cost."""
+    machine, measurements = case(0, "smooth", "FXYZ")
+    lines = tuple(line for line in measurements.lines if line.component in names)
+    fitted = fit(measurements.with_lines(lines), "FXYZ", travel_mm=TRAVEL)
+    calibration = calibration_of(fitted)
+    model = build(calibration, "FXYZ")
+    for line in lines:
+        axis = line.axis
+        position = np.tile(np.array(line.line_mm), (60, 1))
+        position[:, axis] = np.linspace(*fitted.box_mm[axis], 60)
+        tool = np.array(line.tool_mm)
+        true = machine.error(position, tool)[:, axis]
+        rest = true - model.error(position, tool)[:, axis]
+        assert np.std(true) > 5.0 * UM > 5.0 * np.std(rest)
+        along = np.diff(fitted.design(position[[0, -1]], tool)[:, axis], axis=0)[0]
+        assert np.sqrt(along @ fitted.covariance @ along) < 3.0 * UM
+    dark = [k for k, letter in enumerate("XYZ") if f"E{letter}{letter}" not in names]
+    assert [tuple(side) for side in fitted.box_mm[dark].tolist()] == [TRAVEL[k] for k in dark]
+    told = {finding.message.split()[0] for finding in findings_with(fitted, "OLP801")}
+    assert told == {f"E{a}{b}" for a in "XYZABC" for b in "XYZ"} - set(names)
+    middle = fitted.box_mm.mean(axis=1)
+    far = np.array(middle + 0.4 * np.ptp(fitted.box_mm, axis=1))
+    assert np.all(fitted.sigma(far[None], np.array([0.0, 0.0, -120.0]))[0, dark] > 3.0 * UM)
+
+
 # -- directions, noise, slips ----------------------------------------------------------------------------
 
 
@@ -388,6 +418,20 @@ def test_backlash_that_is_constant(one: tuple[simulated.Machine, Measurements, F
         true = -2.0 * machine.half[f"E{letter}{letter}"]
         assert calibration.backlash_mm[axis] == pytest.approx(true, abs=0.2 * UM)
     assert not any(curve.forward for curve in calibration.curves)
+
+
+def test_an_axis_that_goes_farther_after_a_reversal_is_told() -> None:
+    """As with a control that takes up more than there is, or with directions that were swapped."""
+    _, measurements = case(0, "smooth", "FXYZ")
+    swapped = [
+        dataclasses.replace(line, direction=-line.direction) if line.component == "EYY" else line
+        for line in measurements.lines
+    ]
+    assert not findings_with(fit(measurements, "FXYZ"), "OLP855")
+    fitted = fit(measurements.with_lines(swapped), "FXYZ")
+    (finding,) = findings_with(fitted, "OLP855")
+    told = calibration_of(fitted).backlash_mm[1] / UM
+    assert told < -0.5 and finding.message.startswith(f"Y: {told:.2f} +- ")
 
 
 def test_backlash_that_is_not_constant_becomes_a_direction_column(

@@ -245,6 +245,21 @@ def test_siemens_tables() -> None:
     assert curve.backward["EZX"].tolist() == [0.0, 0.0, 0.0]
 
 
+@pytest.mark.parametrize("end", ["M17", "M0\n\nM17", "M00\nM30", "N990 RET", "m02"])
+@pytest.mark.parametrize("modulo", ["0", "-1"])
+def test_siemens_tables_as_programs_write_them(end: str, modulo: str) -> None:
+    """Blank lines, a stop before the end, and -1 for a table without modulo change no value."""
+    text = CEC.replace("M17", end).replace("MODULO[0]=0", f"MODULO[0]={modulo}").replace("\n$AN", "\n\n$AN")
+    state = stated("siemens-cec", names={"X": "AX1", "Y": "AX2", "Z": "AX3"})
+    curves = [
+        read_table(
+            Path("a.spf"), "siemens-cec", state, lambda path, data=data: data.encode()
+        ).calibration.curves
+        for data in (CEC, text)
+    ]
+    assert [c.forward["EZX"].tolist() for c in curves[1]] == [c.forward["EZX"].tolist() for c in curves[0]]
+
+
 COM = """BEGIN X.COM MM
 NR  AXISPOS   X        Z      BACKLASH
 0   0         +0.001   0.002  0.003
@@ -311,6 +326,7 @@ def test_klipper_factors_of_its_own_manual() -> None:
         ("klipper", "[skew_correction a]\nxy_skew=1\n[skew_correction b]\nxy_skew=1\n", "sections a, b"),
         ("siemens-cec", CEC.replace("[0,1]", "[0,4]"), "row 1 is missing"),
         ("siemens-cec", CEC.replace("=58", "=57"), "steps; expected an integer"),
+        ("siemens-cec", CEC.replace("MODULO[0]=0", "MODULO[0]=1"), "line 13: IS_MODULO makes a modulo axis"),
         ("siemens-cec", CEC.replace("TABLE[0]=0", "TABLE[0]=2"), "line 12: MULT_BY_TABLE"),
         ("siemens-cec", CEC.replace("MODULO[0]=0", "MODULO[0]=1"), "line 13: IS_MODULO"),
         ("siemens-cec", CEC.replace("(AX1)", "(C1)"), "line 6: .*--axis-name"),

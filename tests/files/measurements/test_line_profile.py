@@ -193,9 +193,9 @@ def test_a_broken_recording_is_refused(change: object, message: str) -> None:
 
 
 def test_instruments_without_a_grammar_are_named_and_refused(tmp_path: Path) -> None:
-    (tmp_path / "x.rtl").write_bytes(b"whatever")
-    with pytest.raises(InputError, match=r"Renishaw linear .* profile"):
-        read_line(tmp_path / "x.rtl")
+    (tmp_path / "x.wyl").write_bytes(b"whatever")
+    with pytest.raises(InputError, match=r"Wyler level .* profile"):
+        read_line(tmp_path / "x.wyl")
 
 
 def test_the_command_shows_what_is_understood(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from olp.core.schema import Positive, Table, Text, Triple
 from olp.core.schema_keys import Field
 from olp.core.units import MM_PER_UM, RAD_PER_URAD, UM_PER_MM
 from olp.files.measurements.instruments.base import Instrument, Plan, points_to_fill, tools_of
-from olp.files.measurements.point_readings import directions, read_point_readings
+from olp.files.measurements.point_readings import AngleKeys, conventional, directions, read_point_readings
 from olp.files.toml_text import toml_lines
 
 
@@ -25,7 +25,7 @@ class BaselineTable(Table):
     sigma_um: Positive = Field(description="its standard uncertainty, in um")
 
 
-class PodsTable(Table):
+class PodsTable(AngleKeys):
     file: Text = Field(
         description="the path of a CSV file with columns X_mm, Y_mm, Z_mm (axis positions) and "
         "azimuth_1_deg, elevation_1_deg, azimuth_2_deg ..., relative to this file"
@@ -58,11 +58,12 @@ class PodFiles(Instrument[PodsTable, Pods]):
             raise ConfigError(
                 f"baselines between {list(wrong[0])}; expected two of the pods 1 to {table.pods}"
             )
+        azimuth, elevation = conventional(table, angles[:, 0::2], angles[:, 1::2])
         return Pods(
             axis_mm=readings.axis_mm,
             tool_mm=tools_of(readings, table.tool_mm, plan.defaults),
-            azimuth_rad=angles[:, 0::2],
-            elevation_rad=angles[:, 1::2],
+            azimuth_rad=azimuth,
+            elevation_rad=elevation,
             sigma=table.sigma_urad * RAD_PER_URAD,
             baselines=tuple(
                 (b.between[0] - 1, b.between[1] - 1, b.length_mm, b.sigma_um * MM_PER_UM)

@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from olp.calibration.observations.points import Points, polar_points
-from olp.core.schema import NotNegative, Positive, Table, Text, Triple
+from olp.core.schema import NotNegative, Positive, Text, Triple
 from olp.core.schema_keys import Field
 from olp.core.units import MM_PER_UM, RAD_PER_URAD
 from olp.files.measurements.instruments.base import PER_UNIT, Instrument, Plan, tools_of
-from olp.files.measurements.point_readings import POLAR, read_point_readings
+from olp.files.measurements.point_readings import POLAR, AngleKeys, conventional, read_point_readings
 from olp.files.problems import config_error
 
 
-class PolarTable(Table):
+class PolarTable(AngleKeys):
     file: Text = Field(
         description="the path of a CSV file with columns X_mm, Y_mm, Z_mm (axis positions) and distance_mm, "
         "azimuth_deg, elevation_deg, relative to this file"
@@ -52,12 +52,13 @@ class PolarFiles(Instrument[PolarTable, Points]):
                 readings.file,
             )
         angles = np.radians(readings.measured[:, 1:])
+        azimuth, elevation = conventional(table, angles[:, 0], angles[:, 1])
         return polar_points(
             readings.axis_mm,
             tools_of(readings, table.tool_mm, plan.defaults),
             distance,
-            angles[:, 0],
-            angles[:, 1],
+            azimuth,
+            elevation,
             sigma_mm=table.sigma_distance_um * MM_PER_UM + table.sigma_um_m * PER_UNIT * distance,
             sigma_rad=table.sigma_angle_urad * RAD_PER_URAD,
             sigma_scale=table.sigma_scale_um_m * PER_UNIT,
