@@ -32,3 +32,5 @@ class ContourRules:
 NGC_CONTOURS = ContourRules("own", "arc", 0.05, returns=True, planes=(0, 1))
 #: Fanuc and Haas with start-up of type A and linear corners, as they are delivered.
 ISO_CONTOURS = ContourRules("next", "extended", 0.05, returns=False, planes=(0, 1, 2))
+#: Sinumerik 840D with NORM and G450, as it is delivered.
+SINUMERIK_CONTOURS = ContourRules("next", "arc", 0.05, returns=False, planes=(0, 1, 2))

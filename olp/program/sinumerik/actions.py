@@ -12,6 +12,8 @@ from olp.core.machine import ZERO, Vector
 from olp.core.turns import Turn, rows_of
 from olp.core.values import dataclass
 from olp.program.rs274.axis_state import AxisState
+from olp.program.rs274.codes import COMPENSATION_LEFT
+from olp.program.rs274.cutter import switched_on
 from olp.program.rs274.offsets import Transform
 from olp.program.rs274.state import PathMode
 from olp.program.rs274.translation import Action
@@ -24,6 +26,7 @@ class SelectOffset(Action):
     name: str
 
     def run(self, state: AxisState, line: int) -> None:
+        _outside_contours(state, "a change of offsets is", line)
         state.offsets.name = self.name
         if self.name == NO_OFFSET and state.setup.work_offset(self.name) is None:
             state.offsets.written.setdefault(self.name, [0.0, 0.0, 0.0])
@@ -42,6 +45,7 @@ class SetUnit(Action):
     code: int
 
     def run(self, state: AxisState, line: int) -> None:
+        _outside_contours(state, "a change of units is", line)
         state.unit = self.code
 
 
@@ -56,6 +60,7 @@ class ChangeFrame(Action):
     in_plane: bool = False
 
     def run(self, state: AxisState, line: int) -> None:
+        _outside_contours(state, "a change of the frame is", line)
         if self.in_plane and state.plane != _XY:
             raise ProgramError(
                 "RPL outside of G17 tilts the plane, which is not read; post the operation for three axes",
@@ -105,6 +110,7 @@ class ChangeTool(Action):
         return state.setup.machine.tool_change_moves
 
     def run(self, state: AxisState, line: int) -> None:
+        _outside_contours(state, "a tool change is", line)
         if state.selected is None:
             raise ProgramError(
                 "M6 changes to a tool, but no T word comes before it; give T", line=line, code="OLP516"
@@ -122,6 +128,7 @@ class Edge(Action):
     number: int
 
     def run(self, state: AxisState, line: int) -> None:
+        _outside_contours(state, "another edge is", line)
         offsets = state.offsets
         if self.number == 0:
             offsets.length, state.length_tool = ZERO, None
@@ -148,6 +155,35 @@ class Edge(Action):
 
 
 @dataclass(frozen=True, slots=True)
+class Compensate(Action):
+    """G41 or G42, as ten times its number, with the radius of the edge in force. `ways` are modes in which
+    the path of the tool is not known."""
+
+    code: int
+    ways: tuple[str, ...] = ()
+
+    def run(self, state: AxisState, line: int) -> None:
+        if self.ways:
+            raise ProgramError(
+                f"G{self.code // 10} comes with {', '.join(self.ways)}, and the path of the tool is known with "
+                "NORM, G450, DISC=0 and G460 only; program these, or post the path of the tool",
+                line=line,
+                code="OLP518",
+            )
+        if state.length_tool is None:
+            raise ProgramError(
+                f"G{self.code // 10} takes the radius of the edge in force, and none is; program D1 before it",
+                line=line,
+                code="OLP532",
+            )
+        if state.compensation is not None and state.compensation.left == (self.code in COMPENSATION_LEFT):
+            return
+        tool, state.spindle = state.spindle, state.length_tool
+        state.compensation = switched_on(state, self.code, line, {})
+        state.spindle = tool
+
+
+@dataclass(frozen=True, slots=True)
 class GoHome(Action):
     """G74 and G75: the control moves these axes to a point of its own."""
 
@@ -157,6 +193,7 @@ class GoHome(Action):
     axes: tuple[int, ...]
 
     def run(self, state: AxisState, line: int) -> None:
+        _outside_contours(state, "a move of the control's own is", line)
         state.forget(self.axes)
 
 
@@ -169,6 +206,12 @@ class Tolerate(Action):
 
     def run(self, state: AxisState, line: int) -> None:
         state.path_modes.append(PathMode(line, "G64", self.tolerance * state.unit_mm, merges=False))
+
+
+def _outside_contours(state: AxisState, what: str, line: int) -> None:
+    """Refuse what changes in the midst of a contour under cutter compensation."""
+    if state.compensation is not None:
+        raise ProgramError(f"{what} in cutter compensation; give G40 before", line=line, code="OLP518")
 
 
 def _length(state: AxisState, number: int, line: int) -> Vector:

@@ -7,8 +7,10 @@ from collections.abc import Sequence
 from types import MappingProxyType
 
 from olp.core.values import dataclass
+from olp.program.contours.rules import SINUMERIK_CONTOURS
 from olp.program.dialect import Row, Support
 from olp.program.rs274.block_text import BlockText
+from olp.program.rs274.codes import CUTTER_COMPENSATION
 from olp.program.rs274.cycle_rules import ISO_CYCLES
 from olp.program.rs274.entry import read_blocks
 from olp.program.rs274.flatten.language import MACRO_B
@@ -22,9 +24,9 @@ _CODES = {
     **dict.fromkeys((170, 180, 190), Act.PLANE),
     **dict.fromkeys((900, 910), Act.DISTANCE),
     **dict.fromkeys((930, 940, 950), Act.FEED),
-    **dict.fromkeys((40, 200, 210, 530, 540, 550, 560, 570, 610, 640), Act.EVENT),
-    **dict.fromkeys((90, 400, 960, 970), Act.UNCHANGED),
-    **dict.fromkeys((410, 420), Act.REFUSE),
+    **dict.fromkeys((40, 200, 210, 400, 530, 540, 550, 560, 570, 610, 640), Act.EVENT),
+    # what G41 and G42 do needs the edge of their block, which is an action
+    **dict.fromkeys((90, 410, 420, 960, 970), Act.UNCHANGED),
 }
 #: Codes of the words of this family that programs write otherwise.
 _WRITTEN = {200: "G70", 210: "G71", 610: "G60"}
@@ -38,14 +40,11 @@ class Sinumerik(Profile):
         return ((b";", b""),)
 
     def rows(self) -> Sequence[Row]:
-        support = {
-            Act.MOTION: Support.CORRECTED,
-            Act.UNCHANGED: Support.UNCHANGED,
-            Act.REFUSE: Support.REFUSED,
-        }
+        support = {Act.MOTION: Support.CORRECTED, Act.UNCHANGED: Support.UNCHANGED}
         words = [
-            Row(_WRITTEN.get(c, f"G{c // 10}"), support.get(act, Support.READ), self.refusals.get(c, ""))
+            Row(_WRITTEN.get(c, f"G{c // 10}"), support.get(act, Support.READ))
             for c, act in sorted(self.codes.items())
+            if c not in CUTTER_COMPENSATION
         ]
         words += [Row(f"G{code}", Support.UNCHANGED) for code in sorted(HARMLESS_G)]
         words += [Row(f"G{code}", Support.READ) for code in sorted({700, 710} | ROUNDING_G - {64})]
@@ -68,12 +67,7 @@ DIALECT = Sinumerik(
     dwell="F",
     written_ending="mpf",
     codes=MappingProxyType(_CODES),
-    refusals=MappingProxyType(
-        {
-            code: f"G{code // 10} (cutter compensation) has its radius in a cutting edge, which is not read"
-            for code in (410, 420)
-        }
-    ),
+    refusals=MappingProxyType({}),
     harmless_m=ISO_M | {17, *range(40, 46)},
     motion=1,
     initial_retract=980,
@@ -85,6 +79,10 @@ DIALECT = Sinumerik(
     absolute_centre=b"AC",
     text=BlockText(),
     cycles=ISO_CYCLES,
+    contours=SINUMERIK_CONTOURS,
+    contours_assumed="NORM and G450 are in force, as the control is delivered: the tool begins beside the begin "
+    "of the second move, and goes round outside corners on arcs",
+    length_of_spindle_tool=True,
     language=MACRO_B,
     path_mode="G64 of the control, with its own tolerance",
 )

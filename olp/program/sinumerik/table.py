@@ -19,8 +19,8 @@ _WITHOUT_PATH = (
     "MSG", "STOPRE", "SETMS", "FNORM", "FLIN", "FCUB", "FPO", "FFWON", "FFWOF", "SOFT", "SOFTA",
     "BRISK", "BRISKA", "DRIVE", "DRIVEA", "JERKLIM", "VELOLIM", "ACCLIMA", "VELOLIMA", "JERKLIMA",
     "FGROUP", "FGREF", "WORKPIECE", "EXTERN", "GROUP_BEGIN", "GROUP_END", "GROUP_ADDEND", "STARTFIFO",
-    "STOPFIFO", "FIFOCTRL", "WAITS", "UPATH", "SPATH", "CFC", "CFTCP", "CFIN", "NORM", "KONT", "KONTC",
-    "KONTT", "CUT2D", "CUT2DF", "CUT2DD", "CUTCONON", "CUTCONOF", "CDON", "CDOF", "CDOF2", "DIAMOF",
+    "STOPFIFO", "FIFOCTRL", "WAITS", "UPATH", "SPATH", "CFC", "CFTCP", "CFIN", 
+    "CUT2D", "CUT2DF", "CUT2DD", "CDON", "CDOF", "CDOF2", "DIAMOF",
     "TRAFOOF", "TOFRAMEOF", "TOROTOF", "PAROTOF", "TCOFR", "DISPLON", "DISPLOF", "ACTBLOCNO", "SAVE",
     "ORIWKS", "ORIMKS", "ORIAXES", "ORIVECT", "ORIEULER", "ORIRPY", "ORIRPY2", "ORIVIRT1", "ORIVIRT2",
     "OSOF", "OSC", "OSS", "OSSE", "OSD", "OST", "PROC", "SETPIECE", "SPCON", "SPCOF", "ISD", "FENDNORM",
@@ -34,6 +34,15 @@ HARMLESS: Mapping[str, str] = {
     **dict.fromkeys(_WITHOUT_PATH, _NO_PATH),
     **dict.fromkeys(("COMPON", "COMPCURV", "COMPCAD", "COMPSURF", "COMPOF"), _REFIT),
 }
+
+#: How contours under G41 and G42 are approached, go round corners and are left: what each is in, and whether
+#: contours are read with it.
+CONTOUR_WAYS: Mapping[str, tuple[str, bool]] = {
+    "NORM": ("approach", True), "KONT": ("approach", False), "KONTC": ("approach", False),
+    "KONTT": ("approach", False), "G450": ("corner", True), "G451": ("corner", False),
+    "G460": ("end", True), "G461": ("end", False), "G462": ("end", False), "DISC": ("disc", False),
+    "OFFN": ("allowance", False), "CUTCONON": ("pause", False), "CUTCONOF": ("pause", True),
+}  # fmt: skip
 
 #: Statements that change how later blocks are understood.
 READ: Mapping[str, str] = {
@@ -56,7 +65,10 @@ READ: Mapping[str, str] = {
     "G75": "to a fixed point: the axes are not known behind it",
     "M17": "the end of the program, as RET",
     "RET": "the end of the program",
-}
+    **dict.fromkeys(("G41", "G42"), "cutter compensation with the radius of the edge in force"),
+    **dict.fromkeys(CONTOUR_WAYS, "how contours are approached and go round corners: G41 and G42 are read with "
+                    "NORM, G450, DISC=0 and G460"),
+}  # fmt: skip
 
 _UNROLLED = "goes through --flatten"
 _PARAMETRIC = """
@@ -115,7 +127,7 @@ DRILLING = frozenset({"CYCLE81", "CYCLE82", "CYCLE83", "CYCLE84", "CYCLE840", "C
                       "CYCLE88", "CYCLE89"})  # fmt: skip
 
 #: G codes that have no effect on the path.
-HARMLESS_G = frozenset({601, 602, 603, 140, 141, 142, 143, 290, 340, 341, 450, 451, 460, 461, 462, 621})
+HARMLESS_G = frozenset({601, 602, 603, 140, 141, 142, 143, 290, 340, 341, 621})
 #: Path modes with rounding; G60 stops at the end of each block.
 ROUNDING_G = frozenset({64, 641, 642, 643, 644, 645})
 

@@ -27,7 +27,7 @@ _LETTER = np.isin(np.arange(256), list(string.ascii_letters.encode()))
 _OTHER = ~np.isin(np.arange(256), list(b"0123456789+-. \t\r\n;/" + _PLAIN + _PLAIN.lower()))
 #: G and M codes of a plain line, by their number.
 _SAME_G = np.isin(
-    np.arange(100), [0, 1, 2, 3, 9, 17, 18, 19, 40, 41, 42, *range(53, 58), 90, 91, 93, 94, 95, 96, 97]
+    np.arange(100), [0, 1, 2, 3, 9, 17, 18, 19, 40, *range(53, 58), 90, 91, 93, 94, 95, 96, 97]
 )
 _SAME_M = ~np.isin(np.arange(100), [6, 17, 70, 97, 98, 99])
 

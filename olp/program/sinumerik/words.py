@@ -9,17 +9,26 @@ from olp.program.rs274.codes import INCH
 from olp.program.rs274.modes import UNROLL
 from olp.program.rs274.translation import Action, Drilling
 from olp.program.sinumerik import cycles
-from olp.program.sinumerik.actions import ChangeTool, Edge, GoHome, NameTool, SelectOffset, SetUnit, Tolerate
+from olp.program.sinumerik.actions import (
+    ChangeTool,
+    Compensate,
+    Edge,
+    GoHome,
+    NameTool,
+    SelectOffset,
+    SetUnit,
+    Tolerate,
+)
 from olp.program.sinumerik.blocks import NUMBER, Block, Form, Piece, arguments, unknown
 from olp.program.sinumerik.frames import STATEMENTS, frame_of
-from olp.program.sinumerik.table import DRILLING, HARMLESS, HARMLESS_G, REFUSED, ROUNDING_G, UNROLLED
+from olp.program.sinumerik.table import CONTOUR_WAYS, DRILLING, HARMLESS, HARMLESS_G, REFUSED, ROUNDING_G, UNROLLED
 
 _AXES = "XYZ"
 _CENTRES = "IJK"
 _COUNTED = re.compile(rb"(AC|IC)[ \t]*\([ \t]*([+-]?(?:\d+\.?\d*|\.\d+))[ \t]*\)", re.IGNORECASE)
 _ADDRESS = re.compile(r"([A-Z])(\d*)")
 _KEYWORD = re.compile(rb"[ \t]*(?:N\d+)?[ \t]*([A-Z]+)", re.IGNORECASE)
-_SAME = frozenset({0, 1, 2, 3, 9, 17, 18, 19, 40, 41, 42, *range(53, 58), 90, 91, 93, 94, 95, 96, 97})
+_SAME = frozenset({0, 1, 2, 3, 9, 17, 18, 19, 40, *range(53, 58), 90, 91, 93, 94, 95, 96, 97})
 #: G codes by the one of this family with the same meaning
 _RENAMED = {60: 61, 71: 21, 700: 20, 710: 21, 153: 53, 961: 96, 962: 96, 971: 97, 972: 97, 973: 97,
             **dict.fromkeys(ROUNDING_G, 64)}  # fmt: skip
@@ -38,6 +47,8 @@ class Words:
         self.closings: list[int] = []
         self.modal: list[tuple[int, Drilling | None]] = []
         self.calls: dict[int, Drilling] = {}
+        #: by what it is in, the statement that contours are not read with
+        self.ways: dict[str, str] = {}
 
     def refuse(self, error: ProgramError, line: int) -> None:
         """Note why a line is refused; the first reason counts."""
@@ -64,6 +75,7 @@ class _Line:
         self.out = bytearray(b" " * len(code))
         self.acts: list[Action] = []
         self.relative = self.absolute = ""
+        self.side = 0
 
     def run(self) -> None:
         """Raises ProgramError, without a line, for the first piece that cannot be read."""
@@ -74,6 +86,9 @@ class _Line:
         if not whole:
             for piece in pieces:
                 self._piece(piece, pieces)
+        if self.side:
+            # the edge of the same block counts, wherever it is in it
+            self.acts.append(Compensate(self.side * 10, tuple(sorted(self.words.ways.values()))))
         if (self.acts or whole) and self.block.deleted:
             raise ProgramError(
                 "a block under block delete changes frames, offsets or the tool, so later blocks depend on "
@@ -234,6 +249,8 @@ class _Line:
             pass
         elif address and address[1] == "T" and address[2]:
             self._tool(piece)
+        elif base in CONTOUR_WAYS:
+            self._way(base, read=self._number(piece) == 0.0)
         elif base in HARMLESS or base.startswith(("$AC_", "$A_OUT", "$A_DBB", "$A_DBW")):
             pass
         elif base in REFUSED:
@@ -260,6 +277,8 @@ class _Line:
             raise _refused(name)
         elif name == "RET":
             self._write(piece.start, b"M2")
+        elif name in CONTOUR_WAYS:
+            self._way(name)
         elif name in HARMLESS:
             pass
         else:
@@ -278,6 +297,11 @@ class _Line:
         name = f"G{code}"
         if code in _SAME:
             self._word(piece, b"G")
+        elif code in (41, 42):
+            self._word(piece, b"G")
+            self.side = code
+        elif name in CONTOUR_WAYS:
+            self._way(name)
         elif code in _RENAMED:
             self._write(piece.start, b"G%d" % _RENAMED[code])
         elif code == 70:
@@ -296,6 +320,13 @@ class _Line:
                 code="OLP512",
                 word=name,
             )
+
+    def _way(self, name: str, *, read: bool = False) -> None:
+        """How contours are made from here on."""
+        kind, always = CONTOUR_WAYS[name]
+        self.words.ways.pop(kind, None)
+        if not (always or read):
+            self.words.ways[kind] = name
 
     def _m(self, piece: Piece) -> None:
         code = self._integer(piece)
