@@ -165,14 +165,14 @@ class Compensate(Action):
     def run(self, state: AxisState, line: int) -> None:
         if self.ways:
             raise ProgramError(
-                f"G{self.code // 10} comes with {', '.join(self.ways)}, and the path of the tool is known with "
+                f"G{self.code // 10} comes with {', '.join(self.ways)}, and the tool's path is known with "
                 "NORM, G450, DISC=0 and G460 only; program these, or post the path of the tool",
                 line=line,
                 code="OLP518",
             )
         if state.length_tool is None:
             raise ProgramError(
-                f"G{self.code // 10} takes the radius of the edge in force, and none is; program D1 before it",
+                f"G{self.code // 10} takes the radius of the edge in force, and none is; give D1 before it",
                 line=line,
                 code="OLP532",
             )

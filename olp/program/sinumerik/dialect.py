@@ -80,8 +80,8 @@ DIALECT = Sinumerik(
     text=BlockText(),
     cycles=ISO_CYCLES,
     contours=SINUMERIK_CONTOURS,
-    contours_assumed="NORM and G450 are in force, as the control is delivered: the tool begins beside the begin "
-    "of the second move, and goes round outside corners on arcs",
+    contours_assumed="NORM and G450 are in force, as the control is delivered: the tool begins beside the "
+    "begin of the second move, and goes round outside corners on arcs",
     length_of_spindle_tool=True,
     language=MACRO_B,
     path_mode="G64 of the control, with its own tolerance",

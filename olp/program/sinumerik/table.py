@@ -66,14 +66,14 @@ READ: Mapping[str, str] = {
     "M17": "the end of the program, as RET",
     "RET": "the end of the program",
     **dict.fromkeys(("G41", "G42"), "cutter compensation with the radius of the edge in force"),
-    **dict.fromkeys(CONTOUR_WAYS, "how contours are approached and go round corners: G41 and G42 are read with "
+    **dict.fromkeys(CONTOUR_WAYS, "how contours begin, end and go round corners: G41 and G42 are read with "
                     "NORM, G450, DISC=0 and G460"),
 }  # fmt: skip
 
 _UNROLLED = "goes through --flatten"
 _PARAMETRIC = """
     R DEF IF ELSE ENDIF FOR ENDFOR WHILE ENDWHILE REPEAT UNTIL LOOP ENDLOOP REPEATB GOTO GOTOF GOTOB
-    GOTOC GOTOS CASE CALL L P CIP CT I1 J1 K1 HOLES1 HOLES2
+    GOTOC GOTOS CASE CALL L P CIP CT I1 J1 K1 HOLES1 HOLES2 AP RP G110 G111 G112 ANG CHF CHR RND RNDM
 """
 #: Statements that need the unroller.
 UNROLLED: Mapping[str, str] = dict.fromkeys(_PARAMETRIC.split(), _UNROLLED)
@@ -81,11 +81,9 @@ UNROLLED: Mapping[str, str] = dict.fromkeys(_PARAMETRIC.split(), _UNROLLED)
 _ROTARY = "needs the kinematics of rotary axes, which are not read; post the operation for three axes"
 _THREAD = "cuts a thread, which a correction would distort; leave the thread to an uncorrected program"
 _SPLINE = "is a curve of the control, which is not read; post the path in G1, G2 and G3"
-_POLAR = "is a polar position, which is not read; post X and Y"
 _MEASURES = "ends where a probe meets the part; leave it to an uncorrected program"
 _FRAME = "turns or scales the frame, which is not read; post the path without it"
 _SYNCHRONOUS = "acts at any time, also on axes, which is not read; take it out"
-_CORNER = "rounds a corner inside the control; post it as G2 or G3"
 _LATHE = "belongs to lathes"
 _CYCLE = "makes its path inside the control; post the operation as plain moves"
 
@@ -97,13 +95,13 @@ REFUSED: Mapping[str, str] = {
                      "ORIPATH", "ORICONCW", "ORICONCCW", "PTP"), _ROTARY),
     **dict.fromkeys(("G33", "G34", "G35", "G331", "G332", "G63", "CYCLE97", "CYCLE99"), _THREAD),
     **dict.fromkeys(("ASPLINE", "BSPLINE", "CSPLINE", "POLY", "PO", "PW", "INVCW", "INVCCW", "SPN"), _SPLINE),
-    **dict.fromkeys(("AP", "RP", "G110", "G111", "G112", "AR", "ANG"), _POLAR),
+    "AR": "is the angle of an arc, which is not read; post I, J and K, or CR",
     **dict.fromkeys(("MEAS", "MEAW", "MEASA", "MEAWA", "CYCLE971", "CYCLE976", "CYCLE977", "CYCLE978",
                      "CYCLE979", "CYCLE998"), _MEASURES),
     **dict.fromkeys(("ROTS", "AROTS", "CROTS",
                      "$P_UIFR", "$P_PFRAME", "$P_IFRAME"), _FRAME),
     **dict.fromkeys(("WHEN", "WHENEVER", "FROM", "EVERY", "DO", "ID", "IDS"), _SYNCHRONOUS),
-    **dict.fromkeys(("CHF", "CHR", "RND", "RNDM", "FRC", "FRCM"), _CORNER),
+    **dict.fromkeys(("FRC", "FRCM"), "is a feed of corners that the control makes; post them as blocks"),
     **dict.fromkeys(("DIAMON", "DIAM90", "DIAMCYCOF", "CYCLE93", "CYCLE95"), _LATHE),
     **dict.fromkeys(("G147", "G148", "G247", "G248", "G347", "G348"), "approaches on a curve of the control; "
                     "post the approach as G1, G2 and G3"),

@@ -16,7 +16,8 @@ from olp.core.arrays import Index, Mask, distinct
 from olp.core.errors import ProgramError
 from olp.program.rs274.translation import Drilling, Translation
 from olp.program.sinumerik.blocks import Block, block_of, without_comment
-from olp.program.sinumerik.words import Words, parametric
+from olp.program.sinumerik.refusals import parametric
+from olp.program.sinumerik.words import Words
 
 Bytes = npt.NDArray[np.uint8]
 
@@ -26,9 +27,7 @@ _LETTER = np.isin(np.arange(256), list(string.ascii_letters.encode()))
 #: Bytes that make a line more than words.
 _OTHER = ~np.isin(np.arange(256), list(b"0123456789+-. \t\r\n;/" + _PLAIN + _PLAIN.lower()))
 #: G and M codes of a plain line, by their number.
-_SAME_G = np.isin(
-    np.arange(100), [0, 1, 2, 3, 9, 17, 18, 19, 40, *range(53, 58), 90, 91, 93, 94, 95, 96, 97]
-)
+_SAME_G = np.isin(np.arange(100), [0, 1, 2, 3, 9, 17, 18, 19, 40, *range(53, 58), 90, 91, 93, 94, 95, 96, 97])
 _SAME_M = ~np.isin(np.arange(100), [6, 17, 70, 97, 98, 99])
 
 

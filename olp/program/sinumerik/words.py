@@ -6,7 +6,6 @@ import re
 
 from olp.core.errors import ProgramError
 from olp.program.rs274.codes import INCH
-from olp.program.rs274.modes import UNROLL
 from olp.program.rs274.translation import Action, Drilling
 from olp.program.sinumerik import cycles
 from olp.program.sinumerik.actions import (
@@ -21,13 +20,21 @@ from olp.program.sinumerik.actions import (
 )
 from olp.program.sinumerik.blocks import NUMBER, Block, Form, Piece, arguments, unknown
 from olp.program.sinumerik.frames import STATEMENTS, frame_of
-from olp.program.sinumerik.table import CONTOUR_WAYS, DRILLING, HARMLESS, HARMLESS_G, REFUSED, ROUNDING_G, UNROLLED
+from olp.program.sinumerik.refusals import refused, statement, unroll
+from olp.program.sinumerik.table import (
+    CONTOUR_WAYS,
+    DRILLING,
+    HARMLESS,
+    HARMLESS_G,
+    REFUSED,
+    ROUNDING_G,
+    UNROLLED,
+)
 
 _AXES = "XYZ"
 _CENTRES = "IJK"
 _COUNTED = re.compile(rb"(AC|IC)[ \t]*\([ \t]*([+-]?(?:\d+\.?\d*|\.\d+))[ \t]*\)", re.IGNORECASE)
 _ADDRESS = re.compile(r"([A-Z])(\d*)")
-_KEYWORD = re.compile(rb"[ \t]*(?:N\d+)?[ \t]*([A-Z]+)", re.IGNORECASE)
 _SAME = frozenset({0, 1, 2, 3, 9, 17, 18, 19, 40, *range(53, 58), 90, 91, 93, 94, 95, 96, 97})
 #: G codes by the one of this family with the same meaning
 _RENAMED = {60: 61, 71: 21, 700: 20, 710: 21, 153: 53, 961: 96, 962: 96, 971: 97, 972: 97, 973: 97,
@@ -82,7 +89,7 @@ class _Line:
         self._head()
         pieces = list(self.block.pieces)
         names = {piece.name for piece in pieces}
-        whole = self._whole_statement(pieces, names)
+        whole = self._whole(pieces, names)
         if not whole:
             for piece in pieces:
                 self._piece(piece, pieces)
@@ -117,7 +124,7 @@ class _Line:
 
     # -- statements that take the whole block --------------------------------------------------------
 
-    def _whole_statement(self, pieces: list[Piece], names: set[str]) -> bool:
+    def _whole(self, pieces: list[Piece], names: set[str]) -> bool:
         """Whether the block is one statement whose other words are its arguments."""
         if not pieces:
             return False
@@ -133,11 +140,11 @@ class _Line:
             )
         elif first.name == "PROC":
             if any(piece.called and self.code[piece.value : piece.value_end].strip() for piece in pieces):
-                raise _unroll("a subprogram with parameters")
+                raise unroll("a subprogram with parameters")
         elif first.name in ("RET",):
             self._write(first.start, b"M2")
         elif first.name in UNROLLED and first.form is Form.NAME:
-            raise _unroll(f"`{first.name}`")
+            raise unroll(f"`{first.name}`")
         elif any(
             piece.form is Form.WORD and piece.name == "G" and self._int(piece) in (25, 26) for piece in pieces
         ):
@@ -178,7 +185,7 @@ class _Line:
         drilling = None
         if pieces and pieces[0].name != "CYCLE80":
             if pieces[0].name not in DRILLING:
-                raise _statement(pieces[0])
+                raise statement(pieces[0])
             self._alone(pieces)
             drilling = cycles.drilling(pieces[0].name, arguments(self.code, pieces[0]))
         self.words.modal.append((self.number, drilling))
@@ -254,11 +261,11 @@ class _Line:
         elif base in HARMLESS or base.startswith(("$AC_", "$A_OUT", "$A_DBB", "$A_DBW")):
             pass
         elif base in REFUSED:
-            raise _refused(base)
+            raise refused(base)
         elif base in UNROLLED or (piece.form is Form.EQUAL and (not address or address[1] == "R")):
-            raise _unroll(f"`{self.code[piece.start : piece.end].decode('latin-1')}`")
+            raise unroll(f"`{self.code[piece.start : piece.end].decode('latin-1')}`")
         elif piece.form is Form.WORD and piece.name in "LP":
-            raise _unroll("a call of a subprogram")
+            raise unroll("a call of a subprogram")
         else:
             raise unknown(self.code[piece.start : piece.end])
 
@@ -274,7 +281,7 @@ class _Line:
         elif name == "CYCLE800":
             self._tilt(arguments(self.code, piece))
         elif name == "TRAORI" or name in REFUSED:
-            raise _refused(name)
+            raise refused(name)
         elif name == "RET":
             self._write(piece.start, b"M2")
         elif name in CONTOUR_WAYS:
@@ -282,13 +289,13 @@ class _Line:
         elif name in HARMLESS:
             pass
         else:
-            raise _statement(piece)
+            raise statement(piece)
 
     def _tilt(self, given: list[bytes]) -> None:
         """CYCLE800 without a tilt ends one. It may retract, and then the axes are not known."""
         rest = given[4:13]
         if any(text and (not NUMBER.fullmatch(text) or float(text)) for text in rest):
-            raise _refused("CYCLE800")
+            raise refused("CYCLE800")
         if given and given[0] not in (b"", b"0"):
             self.acts.append(GoHome((0, 1, 2)))
 
@@ -311,8 +318,10 @@ class _Line:
             self.acts.append(SelectOffset(name))
         elif code in HARMLESS_G:
             pass
+        elif name in UNROLLED:
+            raise unroll(name)
         elif name in REFUSED:
-            raise _refused(name)
+            raise refused(name)
         else:
             raise ProgramError(
                 f"{name} is not known to the sinumerik profile and may move the machine; take it out, or "
@@ -367,7 +376,7 @@ class _Line:
     def _word(self, piece: Piece, letter: bytes) -> None:
         """A word of one letter with the number of a piece."""
         if NUMBER.fullmatch(self.code, piece.value, piece.value_end) is None:
-            raise _unroll(f"`{self.code[piece.start : piece.end].decode('latin-1')}`")
+            raise unroll(f"`{self.code[piece.start : piece.end].decode('latin-1')}`")
         self._write(piece.start, letter)
         self._write(piece.value, self.code[piece.value : piece.value_end])
 
@@ -380,7 +389,7 @@ class _Line:
             return None
         text = self.code[piece.value : piece.value_end].replace(b" ", b"").replace(b"\t", b"")
         if NUMBER.fullmatch(text) is None:
-            raise _unroll(f"`{self.code[piece.start : piece.end].decode('latin-1')}`")
+            raise unroll(f"`{self.code[piece.start : piece.end].decode('latin-1')}`")
         return float(text)
 
     def _number(self, piece: Piece) -> float:
@@ -401,34 +410,3 @@ class _Line:
         """The number of a word as an integer, -1 where it is none."""
         text = self.code[piece.value : piece.value_end].strip()
         return int(text) if text.isdigit() else -1
-
-
-def _unroll(what: str) -> ProgramError:
-    return ProgramError(
-        f"{what} uses parameters, expressions, flow control or calls", hint=UNROLL, code="OLP511"
-    )
-
-
-def _refused(name: str) -> ProgramError:
-    return ProgramError(f"{name} {REFUSED[name]}", code="OLP512", word=name)
-
-
-def _statement(piece: Piece) -> ProgramError:
-    """Why a keyword or a call is refused."""
-    if piece.name in REFUSED:
-        return _refused(piece.name)
-    if piece.name in UNROLLED:
-        return _unroll(f"`{piece.name}`")
-    return ProgramError(
-        f"`{piece.name}` is a subprogram or a statement that is not known, and may move the machine",
-        hint=UNROLL,
-        code="OLP511",
-        word=piece.name,
-    )
-
-
-def parametric(code: bytes) -> ProgramError | None:
-    """Why a line that is not cut into pieces is refused, where it begins as flow control does."""
-    found = _KEYWORD.match(code)
-    name = found[1].decode().upper() if found else ""
-    return _unroll(f"`{name}`") if name in UNROLLED else None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -142,3 +143,56 @@ def test_a_frame_that_is_more_than_turned_in_its_plane_is_refused(
         return
     with pytest.raises(ProgramError, match="scaled, mirrored or turned"):
         follow(path, ISO_CONTOURS)
+
+
+def test_sinumerik_begins_beside_the_next_move_and_goes_round_corners_on_arcs(tmp_path: Path) -> None:
+    text = b"G41 D1 G1 X20 Y0\nY30\nX50\nG40 X60\n"
+    path = machine(tmp_path, tables=TOOL, controller="sinumerik")
+    head = b"G71 G90 G54 F600\nT1 M6\nG0 X0 Y0 Z10\n"
+    done = moves(read(head + text + b"M2\n", load_setup(path), DIALECTS["sinumerik"]))
+    assert done[-5:] == [
+        ("LINE", 15, 0, 10), ("LINE", 15, 30, 10), ("ARC_CW", 20, 35, 10), ("LINE", 50, 35, 10),
+        ("LINE", 60, 30, 10),
+    ]  # fmt: skip
+    # a move along the tool axis alone leaves the tool beside the contour, as one axis of the plane does not
+    behind = moves(
+        read(
+            head + text.replace(b"G40 X60", b"G40 Z20\nX60") + b"M2\n",
+            load_setup(path),
+            DIALECTS["sinumerik"],
+        )
+    )
+    assert behind[-2:] == [("LINE", 50, 35, 20), ("LINE", 60, 30, 20)]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_every_point_of_a_sinumerik_contour_is_the_radius_away_from_it(tmp_path: Path, seed: int) -> None:
+    """On the side that G41 and G42 say: the path of the tool as a place, whatever made it."""
+    rng = np.random.default_rng(seed)
+    angle = np.sort(rng.uniform(0, 2 * np.pi, 7))[:: int(rng.choice([-1, 1]))]
+    if np.abs(np.diff(angle)).min() < 0.3:
+        angle = np.linspace(0, 5.5, 7)
+    corner = rng.uniform(60, 100, (7, 1)) * np.column_stack((np.cos(angle), np.sin(angle)))
+    rows = "".join(f"X{x:.4f} Y{y:.4f}\n" for x, y in corner)
+    x, y = corner[0] * 1.5
+    away = f"X{x:.4f} Y{y:.4f}"
+    text = f"G71 G90 G54 F600\nT1 M6\nG0 {away} Z0\nG1 G{41 + seed % 2} D1\n{rows}G40 {away}\nM2\n"
+    path = machine(tmp_path, tables=TOOL, controller="sinumerik")
+    tool = read(text.encode(), load_setup(path), DIALECTS["sinumerik"]).toolpath
+    points = [np.linspace(a, b, 50) for a, b in pairwise(tool.end_mm[1:-1, :2])]
+    for arc, centre, sweep in zip(tool.arcs.move, tool.arcs.centre_mm, tool.arcs.sweep_rad, strict=True):
+        away = tool.end_mm[arc - 1, :2] - centre[:2]
+        turn = np.linspace(0, sweep, 50)[:, None]
+        points[arc - 2] = centre[:2] + np.cos(turn) * away + np.sin(turn) * np.array([-away[1], away[0]])
+    every = np.concatenate(points)
+    a, d = corner[:-1], np.diff(corner, axis=0)
+    share = np.clip(((every[:, None] - a) * d).sum(axis=2) / (d**2).sum(axis=1), 0, 1)
+    gap = every[:, None] - (a + share[:, :, None] * d)
+    size = np.hypot(gap[..., 0], gap[..., 1])
+    assert np.abs(size.min(axis=1) - 5.0).max() < 1e-3
+    nearest = size.argmin(axis=1)
+    cross = (
+        d[nearest, 0] * gap[np.arange(len(every)), nearest, 1]
+        - d[nearest, 1] * gap[np.arange(len(every)), nearest, 0]
+    )
+    assert (cross > -1e-6).all() if seed % 2 == 0 else (cross < 1e-6).all()

@@ -148,7 +148,7 @@ REFUSED = {
     "IF R1>1 AND R1<2 GOTOF A": ("put each comparison into brackets", "OLP540"),
     "GOTOF NONE": ("not in its direction", "OLP542"),
     "X=R1/0": ("divides by zero", "OLP540"),
-    "REPEAT AA P=3": ("write the part out", "OLP542"),
+    "REPEAT AA P=3": ("0 times", "OLP542"),
     "ENDIF": ("closes nothing", "OLP542"),
     "AA:\nGOTOB AA": ("endless loop", "OLP543"),
     "GUD=2.5": ("DEF REAL", "OLP542"),

@@ -27,7 +27,7 @@ SINUMERIK = DIALECTS["sinumerik"]
 TABLES = (
     TRUE_ZERO
     + '[work_offsets.G505]\nX_mm = 1000.0\nset_by = "true"\n'
-    + '[tools.7]\nname = "MILL 8"\nZ_mm = 70.0\ngauge_to_tip_mm = [0.0, 0.0, -70.0]\n'
+    + '[tools.7]\nname = "MILL 8"\nZ_mm = 70.0\nradius_mm = 4.0\ngauge_to_tip_mm = [0.0, 0.0, -70.0]\n'
     + "[tools.2]\nZ_mm = 20.0\ngauge_to_tip_mm = [0.0, 0.0, -20.0]\n"
 )
 
@@ -96,6 +96,9 @@ ENDS: dict[str, tuple[float, float, float]] = {
     ZERO + "G26 X5 S1000\nX1": (1, 0, 0),
     ZERO + "S1=500 M1=3 H5 LIMS=2000 SPOS=90\nX1": (1, 0, 0),
     ZERO + "CYCLE800()\nTRAFOOF\nX1": (1, 0, 0),
+    # the side, with the radius of the edge in force, and off again
+    "T7 M6\nNORM G450 DISC=0\nG0 X0 Y0 Z0\nG1 G41 D1 X10 Y10\nX20\nG41 X30": (30, 14, 70),
+    "T7 M6\nKONT\nNORM\nG0 X0 Y0 Z0\nG1 G42 X10 Y10\nX20\nG40 X30": (30, 10, 70),
     # a cycle behind every block with motion, and behind no other
     ZERO + "Z9\nMCALL CYCLE81(7,0,2,-5)\nX1\nMCALL\nX2": (2, 0, 7),
     ZERO + "Z9\nX1\nCYCLE82(4,0,2,,5,1)": (1, 0, 4),
@@ -129,8 +132,17 @@ REFUSED: dict[str, tuple[str, str]] = {
     "G291": ("ISO mode", "OLP512"),
     "G18\nROT RPL=30": ("tilts the plane", "OLP512"),
     "ROT X30": ("tilts the plane", "OLP512"),
-    "G110 X5": ("polar", "OLP512"),
-    "X1 RND=2": ("corner", "OLP512"),
+    "G110 X5": ("G110 uses", "OLP511"),
+    "X1 RND=2": ("`RND=2` uses", "OLP511"),
+    "G41 X1": ("edge in force", "OLP532"),
+    "T2 M6\nG41 X1": ("radius of tool 2, which is not known", "OLP513"),
+    "T7 M6\nKONT\nG41 X1": ("comes with KONT", "OLP518"),
+    "T7 M6\nG451\nDISC=50 OFFN=1\nG42 X1": ("comes with DISC, G451, OFFN", "OLP518"),
+    "T7 M6\nG41 X1\nG42 X2": ("on already", "OLP528"),
+    "T7 M6\nG41 X1\nTRANS X2": ("frame is in cutter compensation", "OLP518"),
+    "T7 M6\nG41 X1\nD0": ("another edge is in cutter compensation", "OLP518"),
+    "T7 M6\nG41 X1\nT2\nM6": ("tool change is in cutter compensation", "OLP518"),
+    "T7 M6\nG41 X1\nG505": ("offsets is in cutter compensation", "OLP518"),
     "POCKET3(1,2,3)": ("inside the control", "OLP512"),
     "X1 ?": ("is not understood", "OLP510"),
     "X=AC(1": ("not closed", "OLP510"),
@@ -246,9 +258,9 @@ def test_the_reading_does_not_depend_on_the_chunks(
     size: int, setup: Setup, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     text = "".join(
-        t.replace(ZERO, "") + f"\nG0 X{i} Y1 Z2\n"
+        t.replace(ZERO, "") + f"\nG40 G0 X{i} Y1 Z2\n"
         for i, t in enumerate(ENDS)
-        if "M17" not in t and "G2 " not in t
+        if "M17" not in t and "G2 " not in t and "G41" not in t and "G42" not in t
     )
     text = f"T2 M6\n{ZERO}{text.replace('RET', '')}"
     text = text.replace("G91 X1\nX=IC(2) Y3", "G91 X1\nX=IC(2) Y3\nG90")

@@ -10,11 +10,12 @@ from olp.core.errors import ProgramError
 from olp.core.toolpath import Kind
 from olp.program.sinumerik import cycles
 from olp.program.sinumerik.blocks import Form, Piece, arguments, block_of, without_comment
+from olp.program.sinumerik.flatten.elements import AXES, CENTRES, Element, Words
+from olp.program.sinumerik.flatten.shapes import Shapes
 from olp.program.sinumerik.flatten.text import shown
 from olp.program.sinumerik.frames import STATEMENTS
 from olp.program.sinumerik.table import DRILLING, HARMLESS_G, ROUNDING_G
 
-_AXES = "XYZ"
 _CALL = re.compile(rb"(AC|IC)[ \t]*\(([^()]*)\)", re.IGNORECASE)
 #: Tapping cannot be written as plain moves.
 _KEPT = frozenset({"CYCLE84", "CYCLE840"})
@@ -34,13 +35,21 @@ class Places:
         self._position: dict[str, float] = {}
         self._motion, self._incremental, self._plane = 1, False, 17
         self._modal: tuple[str, list[bytes]] | None = None
+        self._shapes = Shapes()
 
     def follow(self, deleted: bool, raw: bytes) -> Iterator[bytes]:
         """The blocks that one block becomes."""
         code = without_comment(raw)
         pieces = list(block_of(code).pieces)
-        names = {piece.name for piece in pieces}
         self._modes(code, pieces)
+        plain = self._shapes.written(raw, self._position, (self._motion, self._plane, self._incremental))
+        if plain is None:
+            return
+        if plain is not raw:
+            raw, code = plain, without_comment(plain)
+            pieces = list(block_of(code).pieces)
+            self._modes(code, pieces)
+        names = {piece.name for piece in pieces}
         if pieces and pieces[0].name == "MCALL":
             keeps = self._call(code, pieces)
             if not keeps:
@@ -54,13 +63,18 @@ class Places:
         codes = {self._code(code, p) for p in pieces if p.name == "G" and p.form is Form.WORD}
         if names & _FRAMES or any(c > _LAST_MODE and c not in _MODES for c in codes):
             self._position.clear()
+            self._shapes.forget()
             if pieces[0].name in STATEMENTS:
                 yield raw
                 return
         if names & {"T", "M"} and any(p.name == "M" and self._code(code, p) == 6 for p in pieces):
             self._position.clear()
+        before = dict(self._position)
         yield self._placed(raw, code, pieces, deleted)
-        if self._modal is not None and names & {*_AXES} and pieces[0].name not in _FRAMES:
+        if names & {*AXES, *CENTRES}:
+            words = Words(code, pieces, self._plane)
+            self._shapes.last = Element.of(words, before, self._position, self._motion)
+        if self._modal is not None and names & {*AXES} and pieces[0].name not in _FRAMES:
             yield from self._hole(*self._modal)
 
     @staticmethod
@@ -84,7 +98,7 @@ class Places:
         """The block with IC and AC in the sense of the mode, and the position after it."""
         edits = []
         for piece in pieces:
-            if piece.name not in _AXES or piece.form is Form.NAME:
+            if piece.name not in AXES or piece.form is Form.NAME:
                 continue
             call = _CALL.fullmatch(code[piece.value : piece.value_end].strip())
             text = call[2] if call else code[piece.value : piece.value_end]

@@ -17,7 +17,6 @@ from olp.program.sinumerik.flatten.scope import Scope
 from olp.program.sinumerik.flatten.unit import Line, Unit
 from olp.program.sinumerik.table import DRILLING, HARMLESS, READ, REFUSED
 
-_PART = "REPEAT of a part of the program is not run; write the part out"
 #: Subprograms inside one another at most.
 _DEEPEST = 16
 _JUMP = re.compile(r"(.*?)\b(GOTO[FB]?)[ \t]+([A-Z_][A-Z0-9_]*|\d+)[ \t]*$", re.IGNORECASE)
@@ -25,7 +24,10 @@ _RANGE = re.compile(r"([A-Z_][A-Z0-9_\[\]]*)[ \t]*=(.*?)\bTO\b(.*)$", re.IGNOREC
 _ARMS = re.compile(r"(.*?)[ \t]+(GOTO[FB]?)[ \t]+([A-Z_][A-Z0-9_]*)[ \t]*", re.IGNORECASE)
 _CASE = re.compile(r"(.*?)\bOF\b(.*)$", re.IGNORECASE)
 _KNOWN = frozenset({*DRILLING, *HARMLESS, *READ, *REFUSED, "HOLES1", "HOLES2", "CYCLE80", "CIP", "CT"})
-_NUMBERED = re.compile(r"L(\d+)")
+_REPEATED = re.compile(
+    r"[ \t]*([A-Z_][A-Z0-9_]*)(?:[ \t]+(?!P[ \t]*=)([A-Z_][A-Z0-9_]*))?[ \t]*(?:P[ \t]*=?(.*))?$",
+    re.IGNORECASE,
+)
 
 
 @dataclass(slots=True, eq=False)
@@ -119,6 +121,8 @@ class Walk:
             return self._case(unit, index, rest, scope, loops)
         elif word == "ELSE":
             return next(e[-1] for e in unit.closing.values() if index in e) + 1
+        elif word == "REPEATB" or (word == "REPEAT" and rest.strip()):
+            self._part(unit, index, word, rest, scope, depth)
         elif word in ("FOR", "WHILE", "LOOP", "REPEAT"):
             return self._begin(unit, index, word, rest, scope, loops)
         elif word in ("ENDFOR", "ENDWHILE", "ENDLOOP", "UNTIL"):
@@ -129,8 +133,52 @@ class Walk:
                 raise ProgramError("CALL needs the name of a subprogram as text", code="OLP540")
             self._call(name.upper(), [], 1, line, scope, depth)
         elif word != "ENDIF":
-            raise ProgramError(_PART, code="OLP542")
+            raise ProgramError(f"{word} is not run; write GOTOF or GOTOB", code="OLP542")
         return index + 1
+
+    def _part(self, unit: Unit, index: int, word: str, rest: str, scope: Scope, depth: int) -> None:
+        """REPEAT and REPEATB: a part of the program, or one block of it, again."""
+        stated = _REPEATED.match(rest)
+        if stated is None or (word == "REPEATB" and stated[2]):
+            raise ProgramError(f"{word} needs a label, and P= for the number of its runs", code="OLP542")
+        runs = number(stated[3], scope) if stated[3] else 1.0
+        if runs != round(runs) or runs < 0:
+            raise ProgramError(f"{word} runs {runs:g} times; expected an integer", code="OLP542")
+        begin = self._labelled(unit, stated[1])
+        if word == "REPEATB":
+            stop = begin
+        elif stated[2]:
+            stop = self._labelled(unit, stated[2])
+        else:
+            ends = [k for k in unit.labels.get("ENDLABEL", []) if k > begin and not begin < index < k]
+            stop = ends[0] if ends else index - 1
+        if stop < begin or begin <= index <= stop or depth >= _DEEPEST:
+            raise ProgramError(f"{word} does not end before its own block; write the part out", code="OLP542")
+        for _ in range(round(runs)):
+            self._section(unit, begin, stop, scope, depth)
+
+    def _section(self, unit: Unit, begin: int, stop: int, scope: Scope, depth: int) -> None:
+        """The lines of a part, once, with the lines of their own in a message."""
+        loops: list[_Loop] = []
+        index = begin
+        while index <= stop:
+            line = unit.line(index)
+            self._budget.spend(len(line.raw) + 16)
+            try:
+                index = self._step(unit, line, index, scope, loops, depth + 1)
+            except ProgramError as error:
+                if error.line is None:
+                    error.line, error.file = unit.first + index + 1, unit.file
+                raise
+            if not begin <= index <= stop + 1:
+                raise ProgramError("a jump leaves the part of REPEAT; write the part out", code="OLP542")
+
+    @staticmethod
+    def _labelled(unit: Unit, label: str) -> int:
+        places = unit.labels.get(label.upper(), [])
+        if len(places) != 1:
+            raise ProgramError(f"the label {label} of REPEAT is there {len(places)} times", code="OLP542")
+        return places[0]
 
     def _if(self, unit: Unit, index: int, rest: str, scope: Scope, loops: list[_Loop]) -> int:
         jump = _JUMP.match(rest)
@@ -174,8 +222,6 @@ class Walk:
         return target[0]
 
     def _begin(self, unit: Unit, index: int, word: str, rest: str, scope: Scope, loops: list[_Loop]) -> int:
-        if index not in unit.closing:
-            raise ProgramError(_PART, code="OLP542")
         loop = _Loop(index, unit.closing[index][-1])
         if word == "WHILE" and not self._true(rest, scope):
             return loop.end + 1

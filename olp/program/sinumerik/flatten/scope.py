@@ -7,11 +7,12 @@ from collections.abc import Iterator, Mapping, MutableMapping
 
 from olp.core.errors import ProgramError
 from olp.program.sinumerik.flatten.expressions import Value, evaluate, indexed
-from olp.program.sinumerik.table import HARMLESS, READ, REFUSED
+from olp.program.sinumerik.table import HARMLESS, READ, REFUSED, UNROLLED
 
 _R = re.compile(r"R\d+")
-_GLOBAL = re.compile(r"[A-Z_]{2}[A-Z0-9_]*")
-_WORDS = frozenset({*HARMLESS, *READ, *REFUSED, "CR", "TURN", "ADIS", "ADISPOS"})
+#: names that are not those of an axis, as machines have them: AX4, XA, SP1
+_GLOBAL = re.compile(r"_[A-Z0-9_]*|(?!AX\d)[A-Z][A-Z_]{2}[A-Z0-9_]*")
+_WORDS = frozenset({*HARMLESS, *READ, *REFUSED, *UNROLLED, "CR", "TURN", "ADIS", "ADISPOS"})
 _TYPE = re.compile(r"(INT|REAL|BOOL|CHAR|STRING(?:[ \t]*\[[^\]]*\])?|AXIS)[ \t]+", re.IGNORECASE)
 _NAME = re.compile(r"[ \t]*([A-Z_][A-Z0-9_]*)[ \t]*(?:\[([^\]]*)\])?[ \t]*(?:=(.*))?$", re.IGNORECASE)
 _ELEMENT = re.compile(r"([A-Z_][A-Z0-9_]*|R)\[(.*)\]", re.IGNORECASE)
@@ -36,13 +37,13 @@ class Scope(MutableMapping[str, Value]):
         """The variables of a subprogram that is called here."""
         return Scope(self._shared)
 
-    def is_variable(self, name: str) -> bool:
-        """Whether an assignment to a name sets a variable."""
+    def is_variable(self, name: str, *, alone: bool = True) -> bool:
+        """Whether an assignment to a name sets a variable; `alone`: in a block of assignments only."""
         base = name.partition("[")[0]
         if base in self.defined or bool(_R.fullmatch(base)) or base == "R" or base in self._shared:
             return True
-        # a variable that is defined in the control, for all programs
-        return bool(_GLOBAL.fullmatch(name)) and base not in _WORDS
+        # a variable that is defined in the control, for all programs; beside other words it may be an axis
+        return alone and bool(_GLOBAL.fullmatch(name)) and base not in _WORDS
 
     def define(self, text: str) -> None:
         """DEF: a type, and names with or without a value or a size."""

@@ -17,6 +17,7 @@ import numpy as np
 from olp.core.budget import Budget
 from olp.program.origin import Origin, Unrolled
 from olp.program.sinumerik.blocks import NUMBER, Form, Piece
+from olp.program.sinumerik.flatten.corners import SIGN, with_corners
 from olp.program.sinumerik.flatten.expressions import evaluate, number
 from olp.program.sinumerik.flatten.places import Places
 from olp.program.sinumerik.flatten.run import Stop, Walk
@@ -71,6 +72,7 @@ def flatten(
     unit = Unit.of(main, None)
     with contextlib.suppress(Stop):
         Walk(writer.visit, find, budget, block_delete=block_delete).run(unit, Scope.of(parameters))
+    writer.finish()
     return Unrolled.of(b"".join(writer.blocks), writer.origin(data, list(known.values())))
 
 
@@ -81,6 +83,7 @@ class _Writer:
         self.blocks: list[bytes] = []
         self._sources: list[tuple[str | None, int]] = []
         self._seen: set[tuple[str | None, int]] = set()
+        self.corners = False
         self._places = Places(expand_cycles=expand_cycles)
 
     def origin(self, data: bytes, units: list[Unit | None]) -> Origin:
@@ -99,7 +102,19 @@ class _Writer:
             raw = _NUMBER.sub(rb"\1", raw)
         self._seen.add(key)
         self.blocks.append(raw + (line.eol or b"\n"))
+        self.corners |= SIGN.search(raw) is not None
         self._sources.append(key)
+
+    def finish(self) -> None:
+        """Write the corners that the control makes."""
+        if not self.corners:
+            return
+        ends = [len(raw) - len(raw.rstrip(b"\r\n")) for raw in self.blocks]
+        eol = next((raw[-n:] for raw, n in zip(self.blocks, ends, strict=True) if n), b"\n")
+        texts = [raw[: len(raw) - n] for raw, n in zip(self.blocks, ends, strict=True)]
+        done = with_corners(list(zip(texts, self._sources, strict=True)))
+        self.blocks = [raw + eol for raw, _ in done]
+        self._sources = [source for _, source in done]
 
     def visit(self, unit: Unit, line: Line, scope: Scope) -> bool:
         """Write one line; True where the program ends."""
@@ -126,8 +141,9 @@ class _Writer:
         assert line.block is not None
         edits: list[tuple[int, int, bytes]] = []
         left = False
+        alone = all(piece.form is Form.EQUAL for piece in line.block.pieces)
         for piece in line.block.pieces:
-            if piece.form is Form.EQUAL and scope.is_variable(piece.name):
+            if piece.form is Form.EQUAL and scope.is_variable(piece.name, alone=alone):
                 scope[scope.name_of(piece.name)] = evaluate(_value(line, piece), scope)
                 edits.append((piece.start, piece.end, b""))
                 continue

@@ -1,0 +1,133 @@
+"""One block of a contour in its plane: a straight line or a circle between two points."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+
+from olp.core.errors import ProgramError
+from olp.core.values import dataclass
+from olp.program.sinumerik.blocks import Piece
+
+AXES = "XYZ"
+CENTRES = "IJK"
+#: First, second and third axis of each plane.
+PLANES: Mapping[int, tuple[str, str, str]] = {17: ("X", "Y", "Z"), 18: ("Z", "X", "Y"), 19: ("Y", "Z", "X")}
+_COUNTED = re.compile(rb"(AC|IC)[ \t]*\(([^()]*)\)", re.IGNORECASE)
+#: mm below which points are the same
+SAME = 1e-9
+
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Element:
+    """A line, or a circle where `centre` is given; `left` circles turn to the left. Points are along the
+    first and second axis of the plane, in units of the program."""
+
+    begin: Point
+    end: Point
+    centre: Point | None = None
+    left: bool = False
+
+    @staticmethod
+    def of(
+        words: Words, before: Mapping[str, float], after: Mapping[str, float], motion: int
+    ) -> Element | None:
+        """The element of a block with G0 to G3 between two positions; None where it is not known, or where
+        nothing moves in the plane."""
+        a, b, _ = PLANES[words.plane]
+        if not {a, b} <= set(before) or not {a, b} <= set(after):
+            return None
+        begin, end = (before[a], before[b]), (after[a], after[b])
+        if motion in (0, 1):
+            return None if math.dist(begin, end) < SAME else Element(begin, end)
+        radius = words.number("CR")
+        if radius is None:
+            i, j = (words.centre(axis, start) for axis, start in ((a, begin[0]), (b, begin[1])))
+            if i is None and j is None:
+                return None
+            centre = (begin[0] if i is None else i, begin[1] if j is None else j)
+            return Element(begin, end, centre, motion == 3)
+        half = math.dist(begin, end) / 2
+        if half < SAME or abs(radius) < half * (1 - 1e-6):
+            return None
+        high = math.sqrt(max(radius * radius - half * half, 0.0)) * (
+            1 if (motion == 3) == (radius > 0) else -1
+        )
+        d = ((end[0] - begin[0]) / (2 * half), (end[1] - begin[1]) / (2 * half))
+        middle = ((begin[0] + end[0]) / 2, (begin[1] + end[1]) / 2)
+        return Element(begin, end, (middle[0] - d[1] * high, middle[1] + d[0] * high), motion == 3)
+
+    def direction(self, point: Point) -> Point:
+        """The direction of travel at a point of the element, of length 1."""
+        if self.centre is None:
+            d = (self.end[0] - self.begin[0], self.end[1] - self.begin[1])
+        else:
+            r = (point[0] - self.centre[0], point[1] - self.centre[1])
+            d = (-r[1], r[0]) if self.left else (r[1], -r[0])
+        size = math.hypot(*d)
+        return d[0] / size, d[1] / size
+
+    @property
+    def radius(self) -> float:
+        assert self.centre is not None
+        return math.dist(self.begin, self.centre)
+
+    def share(self, point: Point) -> float:
+        """How far along the element a point of its line or circle is: 0 at the begin, 1 at the end."""
+        if self.centre is None:
+            d = (self.end[0] - self.begin[0], self.end[1] - self.begin[1])
+            p = (point[0] - self.begin[0], point[1] - self.begin[1])
+            return (p[0] * d[0] + p[1] * d[1]) / (d[0] ** 2 + d[1] ** 2)
+        whole = self._turn(self.end) or 2 * math.pi
+        turn = self._turn(point)
+        # just before the begin is not nearly a whole turn behind it
+        return (turn if turn < math.pi + whole / 2 else turn - 2 * math.pi) / whole
+
+    def _turn(self, point: Point) -> float:
+        assert self.centre is not None
+        c = self.centre
+        first = math.atan2(self.begin[1] - c[1], self.begin[0] - c[0])
+        turn = math.atan2(point[1] - c[1], point[0] - c[0]) - first
+        return (turn if self.left else -turn) % (2 * math.pi)
+
+
+class Words:
+    """The numbers of a block, by the names of its words."""
+
+    def __init__(self, code: bytes, pieces: Sequence[Piece], plane: int) -> None:
+        self.code, self.plane, self.pieces = code, plane, {piece.name: piece for piece in pieces}
+
+    def counted(self, name: str) -> tuple[float, str] | None:
+        """The number of a word, and AC, IC or nothing; None where it is not there."""
+        piece = self.pieces.get(name)
+        if piece is None:
+            return None
+        text = self.code[piece.value : piece.value_end].strip()
+        call = _COUNTED.fullmatch(text)
+        number = (call[2] if call else text).replace(b" ", b"").replace(b"\t", b"")
+        return float(number), call[1].decode().upper() if call else ""
+
+    def number(self, name: str) -> float | None:
+        """The number of a word, however it counts."""
+        found = self.counted(name)
+        return None if found is None else found[0]
+
+    def centre(self, axis: str, start: float) -> float | None:
+        """The coordinate of a centre along an axis, from the start of its circle."""
+        found = self.counted(CENTRES[AXES.index(axis)])
+        if found is None:
+            return None
+        return found[0] if found[1] == "AC" else start + found[0]
+
+
+def refused(message: str) -> ProgramError:
+    """Why a shape is not written out."""
+    return ProgramError(message, code="OLP544")
+
+
+def unknown(what: str) -> ProgramError:
+    """A shape counts from what is not known."""
+    return ProgramError(f"{what} is not known; program a position in G90 first", code="OLP524")

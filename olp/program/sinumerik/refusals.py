@@ -1,0 +1,45 @@
+"""Why statements of Sinumerik programs are refused."""
+
+from __future__ import annotations
+
+import re
+
+from olp.core.errors import ProgramError
+from olp.program.rs274.modes import UNROLL
+from olp.program.sinumerik.blocks import Piece
+from olp.program.sinumerik.table import REFUSED, UNROLLED
+
+_KEYWORD = re.compile(rb"[ \t]*(?:N\d+)?[ \t]*([A-Z]+)", re.IGNORECASE)
+
+
+def unroll(what: str) -> ProgramError:
+    """What is read once the program is unrolled."""
+    return ProgramError(
+        f"{what} uses parameters, expressions, flow control or calls", hint=UNROLL, code="OLP511"
+    )
+
+
+def refused(name: str) -> ProgramError:
+    """A statement of the table of those that are refused."""
+    return ProgramError(f"{name} {REFUSED[name]}", code="OLP512", word=name)
+
+
+def statement(piece: Piece) -> ProgramError:
+    """Why a keyword or a call is refused."""
+    if piece.name in REFUSED:
+        return refused(piece.name)
+    if piece.name in UNROLLED:
+        return unroll(f"`{piece.name}`")
+    return ProgramError(
+        f"`{piece.name}` is a subprogram or a statement that is not known, and may move the machine",
+        hint=UNROLL,
+        code="OLP511",
+        word=piece.name,
+    )
+
+
+def parametric(code: bytes) -> ProgramError | None:
+    """Why a line that is not cut into pieces is refused, where it begins as flow control does."""
+    found = _KEYWORD.match(code)
+    name = found[1].decode().upper() if found else ""
+    return unroll(f"`{name}`") if name in UNROLLED else None
