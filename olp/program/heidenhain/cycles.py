@@ -10,9 +10,9 @@ from olp.program.heidenhain.modes import NAN, Modes
 from olp.program.heidenhain.statements import CycleText, Statement
 
 #: cycles with a surface (Q203), a depth (Q201), and two clearances (Q200, Q204)
-_BY_SURFACE = frozenset({200, 201, 202, 203, 205, 206, 207, 208, 209, 240, 241})
+BY_SURFACE = frozenset({200, 201, 202, 203, 205, 206, 207, 208, 209, 240, 241})
 #: old cycles, which begin at their clearance above the surface
-_BY_HEIGHT = frozenset({1, 2, 17})
+BY_HEIGHT = frozenset({1, 2, 17})
 #: cycles that act where they are defined, and move nothing
 AT_ONCE = frozenset({7, 8, 9, 10, 11, 13, 19, 26, 32, 239, 247, 332, 392})
 _TAPS = frozenset({2, 17, 206, 207, 209})
@@ -49,9 +49,9 @@ class Cycle:
     def stroke(self, modes: Modes, z_mm: float, line: int) -> Stroke | None:
         """The stroke of a hole with the tool at `z_mm`; None where the cycle makes none. Raises ProgramError
         for a cycle that is not read."""
-        if self.number in _BY_SURFACE:
+        if self.number in BY_SURFACE:
             return self._by_surface(modes, line)
-        if self.number in _BY_HEIGHT:
+        if self.number in BY_HEIGHT:
             return self._by_height(modes, z_mm, line)
         raise ProgramError(
             f"CYCL DEF {self.number} of line {self.line} is called, and its path is not read; have the CAM "
@@ -100,7 +100,7 @@ class Cycle:
     def definition(self, modes: Modes, data: bytes) -> tuple[int, int, int, int, float]:
         """The bytes that define the cycle, those of its surface, and that in numbers of the program. Bytes
         are -1 where none states it, the surface NaN where the cycle has none."""
-        if self.number not in _BY_SURFACE:
+        if self.number not in BY_SURFACE:
             return -1, -1, -1, -1, NAN
         begin, end = self.statement.span
         stated = _SURFACE.search(data, begin, end) if begin >= 0 else None

@@ -234,9 +234,10 @@ class Events:
         rest = statement.upper[len(b"CYCL CALL") :].strip()
         if rest.startswith((b"POS", b"PAT")):
             raise ProgramError(
-                f"CYCL CALL {rest[:3].decode()} states where the holes are; write L blocks with M99",
+                f"CYCL CALL {rest[:3].decode()} states where the holes are",
                 line=statement.line,
                 code="OLP512",
+                hint=UNROLL,
             )
         self.hole(statement.line)
 

@@ -153,10 +153,11 @@ class _Reader(Arcs):
                 raise ProgramError(f"M{m} {why}, which is not read", line=line, code="OLP512", word=f"M{m}")
             if m == _MODAL_CALL:
                 raise ProgramError(
-                    "M89 calls a cycle at the end of each block; write M99 in these blocks",
+                    "M89 calls a cycle at the end of each block",
                     line=line,
                     code="OLP512",
                     word="M89",
+                    hint=UNROLL,
                 )
 
     def _check_letters(self, blocks: Blocks, words: range, line: int) -> None:
@@ -312,9 +313,10 @@ class _Reader(Arcs):
         mixed = np.flatnonzero(step.any(axis=1) & ((slot >= 0) & ~step).any(axis=1))
         if mixed.size:
             raise ProgramError(
-                "a block has distances (I) and positions; write both as positions",
+                "a block has distances (I) and positions",
                 line=int(number[mixed[0]]),
                 code="OLP518",
+                hint=UNROLL,
             )
 
     def hole(self, line: int) -> None:

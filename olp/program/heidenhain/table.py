@@ -15,7 +15,7 @@ _NO = Support.REFUSED
 #: what --flatten writes out
 UNROLL = "write it out with --flatten"
 _FLOW = f"branches, repeats or calls: {UNROLL}"
-_PATH = "is a path that follows from the blocks beside it; have the CAM system write L, C or CR"
+_PATH = f"follows from the blocks beside it: {UNROLL}"
 _CONTROL = "is a path that the control makes itself"
 _TILT = "tilts the working plane; only angles of 0 are read"
 _KNOWN_AT_RUN = "takes values that only the control knows"
@@ -38,23 +38,24 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
          b"CYCL DEF 207", b"CYCL DEF 208", b"CYCL DEF 209", b"CYCL DEF 240", b"CYCL DEF 241"),
         (_R, "as CYCL DEF 200"),
     ),
-    b"CYCL CALL": (_R, "one hole where the tool is, as M99; POS and PAT are refused"),
+    b"CYCL CALL": (_R, f"one hole where the tool is, as M99; POS and PAT: {UNROLL}"),
     b"CYCL DEF 7": (_R, "datum shift with numbers"),
     b"CYCL DEF 9": (_R, "a dwell"),
     b"CYCL DEF 247": (_R, "the preset: a work offset with its number as name, else the one of the job"),
-    b"CYCL DEF 8": (_NO, "mirrors, which is not read"),
-    b"CYCL DEF 10": (_NO, "rotates; only ROT+0 is read"),
+    b"CYCL DEF 8": (_NO, f"mirrors X or Y: {UNROLL}"),
+    b"CYCL DEF 10": (_NO, f"rotates: {UNROLL}"),
     b"CYCL DEF 11": (_NO, "scales; only SCL 1 is read"),
     b"CYCL DEF 19": (_NO, _TILT),
-    b"CYCL DEF 220": (_NO, "a pattern of holes on a circle, which is not read"),
-    b"CYCL DEF 221": (_NO, "a pattern of holes on lines, which is not read"),
+    b"CYCL DEF 220": (_NO, f"a pattern of holes on a circle: {UNROLL}"),
+    b"CYCL DEF 221": (_NO, f"a pattern of holes on lines: {UNROLL}"),
     b"PLANE": (_NO, _TILT),
     b"FUNCTION TCPM": (_NO, "needs rotary axes"),
     b"M128": (_NO, "needs rotary axes"),
     b"M91": (_R, "axis positions; left uncorrected"),
     b"M92": (_R, "a position that is not known"),
     b"M99": (_R, "one hole at the end of the block"),
-    b"M89": (_NO, "a hole at the end of each block, which is not read"),
+    b"PATTERN DEF": (_NO, f"a pattern of holes: {UNROLL}"),
+    b"M89": (_NO, f"a hole at the end of each block: {UNROLL}"),
     b"LBL": (_R, "labels; those whose section only sets modes may be called"),
     b"CALL LBL": (_NO, _FLOW),
     b"CALL PGM": (_NO, _FLOW),
@@ -67,7 +68,7 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"FN 18": (_R, "the parameter is not known afterwards"),
     b"FN 17": (_NO, "writes into tables of the control"),
     b"STOP": (_R, "the motion rests"),
-    b"LP": (_NO, "polar coordinates are read in CP alone"),
+    b"LP": (_NO, f"a polar position: {UNROLL}"),
     b"CT": (_NO, _PATH),
     b"CTP": (_NO, _PATH),
     b"RND": (_NO, _PATH),

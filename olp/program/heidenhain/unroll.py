@@ -1,7 +1,8 @@
 """Writes loops, calls and parameters of a Heidenhain program out: the result has numbers in their places.
 
 The program is run here. Each block that is executed is written, with numbers for its parameters. All
-assignments, labels, jumps and calls are gone. A parameter that the program never sets is refused, except in
+assignments, labels, jumps and calls are gone; `plain` then writes out what the control makes of several
+blocks. A parameter that the program never sets is refused, except in
 words of rotary axes and in feeds, whose bytes stay as they are.
 """
 
@@ -17,6 +18,7 @@ from olp.core.errors import ProgramError
 from olp.core.values import dataclass
 from olp.program.dialect import Dialect
 from olp.program.heidenhain.formulas import Parameters, assignment
+from olp.program.heidenhain.plain.writing import written_out
 from olp.program.heidenhain.statements import Statement, cycle_of, of_lines
 from olp.program.origin import Origin, Unrolled
 
@@ -104,6 +106,7 @@ def unroll(
     run.parameters.update({name.upper(): value for name, value in (parameters or {}).items()})
     run.stated = frozenset(run.parameters)
     run.visit(_Unit.of(data, "", dialect), 0, 0, main=True)
+    run.write_out()
     return Unrolled.of(b"".join(run.blocks), run.origin())
 
 
@@ -129,6 +132,16 @@ class _Run:
             tuple(line for unit in self.units for line in unit.lines),
             np.array([int(first[unit]) + line for unit, line in self._sources], np.int64),
         )  # fmt: skip
+
+    def write_out(self) -> None:
+        """Write motion that follows from several statements as plain blocks."""
+        try:
+            self.blocks, self._sources = written_out(self.blocks, self._sources)
+        except ProgramError as error:
+            if error.line is not None:
+                unit, error.line = self._sources[min(error.line, len(self._sources)) - 1]
+                error.file = self.units[unit].name or None
+            raise
 
     def visit(self, unit: _Unit, place: int, depth: int, *, main: bool = False, label: bool = False) -> bool:
         """Run the statements of a unit from a place on; a section up to its LBL 0. Returns whether the

@@ -1,0 +1,168 @@
+"""What a control makes of several blocks, written out by --flatten: under a judge, and by hand."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cases.conversational_contours import contour
+from cases.fast import some_fast
+from judge import heidenhain_contours, machines
+from judge.machines import Recipe
+
+import olp
+from olp.core.errors import ProgramError
+from olp.files.config import load_setup
+from olp.program.registry import DIALECTS, Options, read
+
+DIALECT = DIALECTS["heidenhain"]
+ORIGIN = np.array([250.0, 200.0, -300.0 + 120.0])
+RECIPE = Recipe(
+    controller="heidenhain", increment_mm=0.0001, travel=((-900.0, 1400.0), (-900.0, 1400.0), (-500.0, 100.0))
+)
+HEAD = "L X+0 Y+0 Z+5 R0 FMAX\nF500\n"
+CYCLE = "CYCL DEF 200 DRILL ~\nQ200=2 ~\nQ201=-5 ~\nQ203=+0 ~\nQ204=20\n"
+
+
+@pytest.fixture(scope="module")
+def bent(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return machines.random_machine(tmp_path_factory.mktemp("bent"), 5, RECIPE)
+
+
+def flat(text: str) -> str:
+    assert DIALECT.unroller is not None
+    return DIALECT.unroller((HEAD + text).encode(), DIALECT).decode().removeprefix(HEAD)
+
+
+@pytest.mark.parametrize("seed", some_fast(range(40), 8))
+def test_random_contours_are_what_the_control_makes_of_them(bent: Path, seed: int) -> None:
+    data = contour(seed)
+    assert DIALECT.unroller is not None
+    text = bytes(DIALECT.unroller(data, DIALECT))
+    path = read(text, load_setup(bent), DIALECT, Options()).toolpath
+    steps = heidenhain_contours.read(data)
+    ends = np.array([[s.end.real, s.end.imag, s.z] for s in steps])
+    assert path.end_mm[1:] - ORIGIN == pytest.approx(ends[1:], abs=2e-6)
+    arcs = [s for s in steps if s.sweep]
+    assert path.arcs.sweep_rad == pytest.approx(np.array([s.sweep for s in arcs]), abs=1e-5)
+    centres = np.array([[s.centre.real, s.centre.imag] for s in arcs]).reshape(-1, 2)
+    assert path.arcs.centre_mm[:, :2] - ORIGIN[:2] == pytest.approx(centres, abs=2e-5)
+
+
+@pytest.mark.parametrize("seed", some_fast(range(6), 2))
+def test_contours_that_are_written_out_are_corrected(bent: Path, seed: int) -> None:
+    result = olp.correct(contour(seed), bent, flatten=True)
+    assert result.report["deviation"]["holds"]
+    with pytest.raises(ProgramError, match="--flatten"):
+        olp.correct(contour(seed), bent)
+
+
+# -- by hand -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "plain"),
+    [
+        # I and positions in one block
+        ("7 L IX+4 Y+2 R0 F50 ; A\n", "7 L X+4 Y+2 R0 F50 ; A\n"),
+        # polar positions about the pole, the angle being counted on
+        ("CC X+10 Y+0\nLP PR+5 PA+90\nLP IPA-90 IZ+1\n", "CC X+10 Y+0\nL X+10 Y+5\nL X+15 Y+0 Z+6\n"),
+        # both sides of a corner give up the length of the chamfer; its feed is its own
+        ("L X+20\nCHF 5 F90\nL Y+20\n", "L X+15 Y+0\nL X+20 Y+5 F90\nL X+20 Y+20 F500\n"),
+        ("L X+20\nRND R5\nL Y+20 F80\n", "L X+15 Y+0\nCC X+15 Y+5\nC X+20 Y+5 DR+\nL X+20 Y+20 F80\n"),
+        # a distance counts from the corner as it is programmed
+        ("L X+20\nRND R5\nL IY+20\n", "L X+15 Y+0\nCC X+15 Y+5\nC X+20 Y+5 DR+\nL X+20 Y+20\n"),
+        ("L X+10\nCT X+10 Y+8\n", "L X+10\nCC X+10 Y+4\nC X+10 Y+8 DR+\n"),
+        ("L X+10\nCC X+10 Y+0\nCTP PR+8 PA+90\n", "L X+10\nCC X+10 Y+0\nCC X+10 Y+4\nC X+10 Y+8 DR+\n"),
+        # turned by 90 degrees, then back
+        ("CYCL DEF 10.1 ROT+90\nL X+10\nCYCL DEF 10.1 IROT-90\nL X+3\n", "L X+0 Y+10\nL X+3\n"),
+        # a mirror turns arcs and the side of the contour
+        (
+            "CYCL DEF 8.0\nCYCL DEF 8.1 X\nL X+10 Y+0 RL\nCC X+5 Y+0\nC X+0 Y+0 DR+\nCYCL DEF 8.1\nL X+3\n",
+            "L X-10 Y+0 RR\nCC X-5 Y+0\nC X+0 Y+0 DR-\nL X+3\n",
+        ),
+        # the shift stays in the text; a rotation is about it
+        (
+            "CYCL DEF 7.0\nCYCL DEF 7.1 X+100\nCYCL DEF 10.0\nCYCL DEF 10.1 ROT+180\nL X+1 Y+2\n",
+            "CYCL DEF 7.0\nCYCL DEF 7.1 X+100\nL X-1 Y-2\n",
+        ),
+        # behind DEP there is no compensation
+        (
+            "APPR LT X+20 Y+0 LEN5 RL F9\nL X+50\nDEP LT LEN10\nL Y+9\n",
+            "L X+15 Y+0 RL\nL X+20 Y+0 F9\nL X+50\nL X+60 Y+0\nL Y+9 R0\n",
+        ),
+        # modal calls, up to M99
+        (CYCLE + "L X+1 FMAX M89\nL X+2 FMAX\nL X+3 M99\nL X+4\n",
+         CYCLE + "L X+1 FMAX M99\nL X+2 FMAX M99\nL X+3 M99\nL X+4\n"),
+        (CYCLE + "CYCL CALL POS X+1 Y+2 Z+3 FMAX M8\nL X+9 M99\n",
+         CYCLE + CYCLE.replace("Q203=+0", "Q203=+3") + "L X+1 Y+2 R0 FMAX M8 M99\n" + CYCLE + "L X+9 M99\n"),
+    ],
+)  # fmt: skip
+def test_what_is_written(text: str, plain: str) -> None:
+    assert flat(text) == plain
+
+
+def places(text: str) -> list[tuple[float, float]]:
+    """X and Y of the blocks with M99."""
+    blocks = [line.split() for line in flat(text).split("\n") if line.endswith("M99")]
+    return [(float(b[1][1:]), float(b[2][1:])) for b in blocks]
+
+
+def test_patterns_of_holes() -> None:
+    surface = "Q200=2 Q203=+1 Q204=30 Q301=0\n"
+    circle = "CYCL DEF 220 Q216=+50 Q217=+10 Q244=80 Q245=+0 Q246=+360 Q247=+0 Q241=4 "
+    assert places(CYCLE + circle + surface) == [(90, 10), (50, 50), (10, 10), (50, -30)]
+    part = circle.replace("Q246=+360", "Q246=+90").replace("Q241=4", "Q241=3")
+    assert places(CYCLE + part + surface)[1:] == [(78.284271, 38.284271), (50, 50)]
+    stepped = circle.replace("Q247=+0", "Q247=-90").replace("Q241=4", "Q241=2")
+    assert places(CYCLE + stepped + surface) == [(90, 10), (50, -30)]
+    lines = "CYCL DEF 221 Q225=+1 Q226=+2 Q237=10 Q238=5 Q242=2 Q243=2 Q224=+0 "
+    assert places(CYCLE + lines + surface) == [(1, 2), (11, 2), (11, 7), (1, 7)]
+    assert places(CYCLE + lines.replace("Q224=+0", "Q224=+90") + surface)[1:3] == [(1, 12), (-4, 12)]
+    # between the holes the tool is at the clearance of the pattern, behind the last one at the second
+    text = flat(CYCLE + lines + surface)
+    assert text.count("Q203=+1") == 2
+    assert [part.split("\n")[0] for part in text.split("Q204=")[1:]] == ["20", "+0", "+30"]
+
+
+def test_a_pattern_definition_adds_to_the_surface_and_keeps_the_height() -> None:
+    pattern = "PATTERN DEF ~\nPOS1 (X+25 Y+33.5 Z+0) ~\nROW1 (X+1 Y+2 D+10 NUM2 ROT+90 Z+2) ~\n"
+    pattern += "CIRC1 (X+0 Y+0 D+20 START+90 NUM2 Z+0)\n"
+    text = CYCLE + "L Z+60\n" + pattern + "CYCL CALL PAT F500 M3\n"
+    assert places(text) == [(25, 33.5), (1, 2), (1, 12), (0, 10), (0, -10)]
+    assert flat(text).count("L Z+60 R0 FMAX") == 4
+    assert flat(text).count("M3") == 1
+    assert [part[:2] for part in flat(text).split("Q203=+")[2:]] == ["0\n"[:1] + " ", "2 ", "2 ", "0 ", "0 "]
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "words"),
+    [
+        ("RND R5\nL X+1\n", 3, "directly before it"), ("L X+9\nRND R5\nL Z+1\n", 5, "directly behind it"),
+        ("L X+9\nRND R50\nL Y+9\n", 4, "does not fit"), ("L X+9\nCHF 10\nL Y+20\n", 4, "does not fit"),
+        ("L X+9 Z+3\nRND R1\nL Y+9\n", 4, "along Z"), ("L Z-1\nCT X+5 Y+5\n", 4, "goes on from"),
+        ("LP PR+5 PA+5\n", 3, "no pole"), ("TOOL CALL 2 Z\nL IX+5 Y+1\n", 4, "present position"),
+        ("CYCL DEF 10.0\nCYCL DEF 10.1 ROT+5\nCYCL DEF 7.0\nCYCL DEF 7.1 X+5\n", 6, "shift it before"),
+        ("CYCL DEF 10.0\nCYCL DEF 10.1 ROT+5\nCYCL DEF 8.0\nCYCL DEF 8.1 X\n", 6, "mirror it before"),
+        ("CYCL DEF 8.0\nCYCL DEF 8.1 Z\n", 4, "another axis"),
+        ("L M89\nCYCL DEF 11.0\nCYCL DEF 11.1 SCL 2\n", 5, "scales"),
+        ("L X+20 Y+3\nAPPR CT X+9 Y+9 R5 CCA90 RL\nL X+20\n", 4, "radius of the tool"),
+        ("APPR LCT X+1 Y+1 R5 R0\nL X+20\n", 3, "inside the arc"),
+        ("APPR LT X+9 Y+9 R0\nL X+20\n", 3, "needs LEN"),
+        ("CYCL CALL PAT\nLP\n", 3, "no PATTERN DEF"),
+        ("PATTERN DEF PAT1 (X+1 Y+1 DX+1 DY+1)\n", 3, "not read"),
+        ("CYCL CALL POS X+1 Y+1 Z+0\n", 3, "no cycle with Q203"), ("L X+5 X+6\nLP\n", 3, "states X twice"),
+        ("CYCL DEF 221 Q225=+1\n", 3, "has 0 holes"),
+        ("CYCL DEF 10.0\nCYCL DEF 10.1 ROT+5\n/L X1\n", 5, "block delete"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_written_out(text: str, line: int, words: str) -> None:
+    with pytest.raises(ProgramError, match=words) as caught:
+        flat(text)
+    assert caught.value.line == line
+
+
+def test_plain_blocks_keep_their_bytes() -> None:
+    text = "5 L IX+4  R0 F MAX ; A\n CC X+1 Y+1\n6 C X+2 Y+0 DR-\nL C+30\nX+5 M3\n~\n* - B\nCC IX+1 Y+1\n"
+    assert flat(text + "LP PR+1 PA+0\n").startswith(text.rsplit("CC IX", 1)[0])
