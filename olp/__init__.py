@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from olp.workflows.batch import Batch as Batch
     from olp.workflows.batch import batch as batch
     from olp.workflows.calibrate_ballbar import fit_ballbar as fit_ballbar
+    from olp.workflows.calibrate_compare_methods import ComparedMethods as ComparedMethods
+    from olp.workflows.calibrate_compare_methods import compare_methods as compare_methods
     from olp.workflows.calibrate_diagonals import fit_diagonals as fit_diagonals
     from olp.workflows.calibrate_doctor import CalibrationDiagnosis as CalibrationDiagnosis
     from olp.workflows.calibrate_doctor import diagnose_calibration as diagnose_calibration
@@ -81,6 +83,8 @@ _HOME = {
     "FittedCalibration": "olp.workflows.calibrate_fit",
     "fit_calibration": "olp.workflows.calibrate_fit",
     "CalibrationDiagnosis": "olp.workflows.calibrate_doctor",
+    "compare_methods": "olp.workflows.calibrate_compare_methods",
+    "ComparedMethods": "olp.workflows.calibrate_compare_methods",
     "diagnose_calibration": "olp.workflows.calibrate_doctor",
     "RefinedCalibration": "olp.workflows.calibrate_refine",
     "refine_calibration": "olp.workflows.calibrate_refine",

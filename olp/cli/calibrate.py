@@ -8,6 +8,7 @@ from olp.cli.late import LateGroup
 VERBS: dict[str, str] = {
     "fit": "Make a calibration from lines, points, lengths and directions.",
     "doctor": "Check sign, unit and column of every curve of a calibration with independent points.",
+    "compare-methods": "Judge equation (1), a map of two pods and the adjustment on your own readings.",
     "plan": "Propose what to measure for a wanted uncertainty, and write the programs for it.",
     "refine": "Update a calibration within its covariance by a measured run.",
     "read": "Show what the program reads in the file of an instrument.",

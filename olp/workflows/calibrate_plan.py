@@ -13,12 +13,7 @@ import numpy as np
 
 from olp.calibration.design import layout
 from olp.calibration.design.prediction import Planned, Prediction, predict
-from olp.calibration.design.visiting import move_s, order
 from olp.calibration.diagnosis.deciding import offsets
-from olp.calibration.observations.lengths import Lengths
-from olp.calibration.observations.lines import Line
-from olp.calibration.observations.pods import Pods
-from olp.calibration.observations.points import Points
 from olp.core.arrays import Array
 from olp.core.errors import CannotCompute, UsageError
 from olp.core.machine import Machine, Setup, Vector
@@ -29,6 +24,7 @@ from olp.findings.catalogue import Finding
 from olp.program.registry import read
 from olp.program.rs274.positions import positions_program
 from olp.program.rs274.profiles.base import Profile
+from olp.workflows.measuring_time import DWELL_S, passes_of, seconds_of, set_up_min
 from olp.workflows.session import PathLike, Session
 from olp.workflows.shown import Filed
 
@@ -42,12 +38,6 @@ BESIDE = 40
 STATIONS = 6
 #: Default standard uncertainty of a tracker's coordinate in mm.
 TRACKER = 8e-3
-#: Minutes to set up a line, an instrument at a station, and another reflector.
-SET_UP_MIN = {"line": 30.0, "station": 45.0, "reflector": 5.0}
-#: Seconds of a reading, by instrument.
-DWELL_S = {"lines": 3.0, "tracker": 3.0, "lines-and-tracker": 3.0, "pods": 5.0, "multilateration": 2.0}
-#: Lines overrun their first and last target by this, in mm, so that backlash is taken up.
-OVERRUN_MM = 5.0
 #: A program read back must stop at its points within this, in mm: rounding of floating point only.
 _SAME_MM = 1e-9
 #: Seed of random positions.
@@ -133,9 +123,10 @@ def plan_measurements(
         dwell = DWELL_S[name] if dwell_s is None else dwell_s
         for title, planned in _candidates(name, described.name, box, reflectors, sigma, periods_mm, points):
             prediction = predict(planned, described.chain, box, judged)
-            passes = tuple(_passes(planned, described, dwell + settle_s, box))
-            seconds = sum(_seconds(run, described) for run in passes)
-            methods.append(Method(name, title, planned, prediction, passes, seconds, _set_up(planned)))
+            passes = tuple(passes_of(planned.measurements, described, dwell + settle_s, box))
+            seconds = sum(seconds_of(run, described) for run in passes)
+            by_hand = set_up_min(planned.measurements)
+            methods.append(Method(name, title, planned, prediction, passes, seconds, by_hand))
     good = [m for m in methods if m.prediction.rms_mm <= uncertainty_um * MM_PER_UM]
     chosen = min(good, key=lambda m: m.hours) if good else min(methods, key=lambda m: m.prediction.rms_mm)
     used = (DWELL_S[chosen.instrument] if dwell_s is None else dwell_s) + settle_s
@@ -197,78 +188,6 @@ def _candidates(
             )
         for n in counts:
             yield words.format(n), make(n)
-
-
-def _passes(planned: Planned, machine: Machine, wait_s: float, box: Array) -> Iterator[Pass]:
-    """Runs of the machine, each with one instrument at one station and one reflector."""
-    measurements = planned.measurements
-    for axis in AXES:
-        own = [line for line in measurements.lines if line.component[2] == axis]
-        if own:
-            k, line = AXES.index(axis), own[0]
-            yield _line_pass(axis, k, line, machine, wait_s, box, len(own))
-    rays = measurements.of(Lengths)
-    for cloud in measurements.scattered:
-        if any(cloud is later for later in rays[1:]):
-            # stations measure the same points one after the other
-            continue
-        vectors = list(dict.fromkeys(map(tuple, cloud.tool_mm.tolist())))
-        for number, vector in enumerate(vectors, start=1):
-            rows = np.flatnonzero((cloud.tool_mm == np.array(vector)).all(axis=1))
-            rows = rows[order(cloud.axis_mm[rows], machine.motion_limits())]
-            label = "stations" if rays else cloud.source
-            yield Pass(
-                f"{label}-{number}", _approached(cloud.axis_mm[rows], box), _waits(len(rows), wait_s),
-                f"reflector at X {vector[0]:g} Y {vector[1]:g} Z {vector[2]:g} from the gauge point",
-                cloud.source, rows, max(1, len(rays)),
-            )  # fmt: skip
-
-
-def _line_pass(
-    axis: str, k: int, line: Line, machine: Machine, wait_s: float, box: Array, lines: int
-) -> Pass:
-    target, run = line.target_mm, line.run
-    low, high = machine.axes[axis].travel_mm
-    first, last = float(target.min()), float(target.max())
-    ends = max(first - OVERRUN_MM, low), min(last + OVERRUN_MM, high)
-    stops: list[tuple[float, float]] = []
-    for number in np.unique(run):
-        own = target[run == number]
-        half = len(own) // 2
-        stops += [(ends[0], 0.0), *((q, wait_s) for q in own[:half].tolist())]
-        stops += [(ends[1], 0.0), *((q, wait_s) for q in own[half:].tolist())]
-    points = np.tile(np.array(line.line_mm, float), (len(stops), 1))
-    points[:, k] = [q for q, _ in stops]
-    waits = [0.0, *(wait for _, wait in stops)]
-    runs = len(np.unique(run))
-    words = f"lines along {axis}: {runs} runs in both directions, once for each error of {axis}"
-    return Pass(f"line-{axis.lower()}", _approached(points, box), waits, words, f"line {axis}", repeats=lines)
-
-
-def _approached(points: Array, box: Array) -> Array:
-    """The points, with a first one above them, from which the program descends."""
-    above = points[:1].copy()
-    above[0, 2] = box[2, 1]
-    return np.concatenate([above, points])
-
-
-def _waits(n: int, wait_s: float) -> list[float]:
-    return [0.0, *([wait_s] * n)]
-
-
-def _seconds(run: Pass, machine: Machine) -> float:
-    once = float(move_s(np.diff(run.places_mm, axis=0), machine.motion_limits()).sum()) + sum(run.wait_s)
-    return once * run.repeats
-
-
-def _set_up(planned: Planned) -> float:
-    measurements = planned.measurements
-    minutes = SET_UP_MIN["line"] * len(measurements.lines)
-    minutes += SET_UP_MIN["station"] * (len(measurements.of(Points)) + len(measurements.of(Lengths)))
-    minutes += sum(SET_UP_MIN["station"] * pods.count for pods in measurements.of(Pods))
-    for cloud in measurements.scattered:
-        minutes += SET_UP_MIN["reflector"] * len(np.unique(cloud.tool_mm, axis=0))
-    return minutes
 
 
 def _report(
