@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zlib
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -45,6 +46,12 @@ class Coded:
         for _ in range(order):
             change = np.diff(change, prepend=0)
         return Coded(order, largest >= 1 << 31, _planes(change))
+
+
+def small(whole: Whole) -> npt.NDArray[Any]:
+    """Whole numbers in half the memory, where they fit."""
+    small = whole.astype(np.int32)
+    return small if (small == whole).all() else whole
 
 
 def _planes(change: Whole) -> list[bytes]:

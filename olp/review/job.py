@@ -7,7 +7,7 @@ import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -26,7 +26,7 @@ from olp.program.registry import Options, read
 from olp.proof.judgement import Judgements
 from olp.review.features.moves import digit_mm
 from olp.review.listing import aligned
-from olp.review.manifest import manifest_of
+from olp.review.manifest import curve_um, manifest_of
 from olp.review.measured import Matched, Matcher, refuse_unplaced, with_measured
 from olp.review.meshes import Body, of_job, of_machine
 from olp.review.motion import by_feed, feed_seconds, retimed
@@ -36,7 +36,7 @@ from olp.review.samples import Samples, by_source, sample, with_starts
 from olp.review.scene import Frame, Scene, TipUncertainty
 from olp.uncertainty.probability import within
 from olp.uncertainty.spread import Points, bands, covariances
-from olp.workflows import refusals, retime
+from olp.workflows import refusals
 from olp.workflows.compare_runs import Ground, How, judged
 from olp.workflows.confidence import unknowns_of
 from olp.workflows.correct import Correction, CorrectOptions
@@ -44,8 +44,10 @@ from olp.workflows.correct import corrected as correct_program
 from olp.workflows.kept import unrolling_of_corrected
 from olp.workflows.original import placed, placed_findings
 from olp.workflows.proof import ProofOptions, Run, verify_programs
-from olp.workflows.retime import RetimeOptions, Retiming
 from olp.workflows.session import Loaded, Outside, PathLike, Session, opened
+
+if TYPE_CHECKING:
+    from olp.workflows.retime import Retiming
 
 #: Shortest rest at a sample that counts, in s.
 _REST_S = 1e-3
@@ -240,10 +242,12 @@ def _shown(
     samples = with_starts(samples, path, {"uncorrected": table.uncorrected, "corrected": table.corrected})
     if seconds is not None:
         return _Shown(samples, by_feed(seconds, samples), None)
+    from olp.workflows import retime
+
     other = session.sources.source(texts.second.data)
     # what the proof accepts holds for the motion, also where its stamp is that of sure components alone
     accept = tuple(texts.report["accepted"])
-    timing = RetimeOptions(date=options.date, accept=accept)
+    timing = retime.RetimeOptions(date=options.date, accept=accept)
     plan = retime.run(session.of(loaded.setup), other, timing, progress=progress)
     samples, moment = _resting(samples, *retimed(texts.second.toolpath, samples, plan.trajectories))
     return _Shown(samples, moment, plan)
@@ -289,7 +293,9 @@ def _scene(
         time_s=moment,
         motion=None if plan is None else motion_table(plan.trajectories, plan.routes),
         duration_s=float(moment[-1]) if plan is None else plan.duration_s,
-        sources=tuple(by_source(nominal.toolpath, samples, loaded.model)),
+        sources=tuple(
+            (name, curve_um(size)) for name, size in by_source(nominal.toolpath, samples, loaded.model)
+        ),
         listing=aligned(nominal, texts.second, texts.groups, samples),
         bodies=bodies,
         measured=shown_runs,
@@ -319,7 +325,8 @@ def _uncertainty(
     if loaded.uncertainty is None:
         return None
     unknowns, _, _ = unknowns_of(loaded, loaded.uncertainty, date)
-    points = Points(samples.move, samples.axis_mm, samples.uncorrected, samples.corrected, samples.play)
+    before, after = samples.uncorrected.astype(float), samples.corrected.astype(float)
+    points = Points(samples.move, samples.axis_mm, before, after, samples.play)
     covariance = covariances(unknowns, nominal.toolpath, points)
     band = bands(covariance).astype(np.float32)
     if part_tolerance_um is None:

@@ -8,11 +8,36 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Array, Index
+from olp.core.values import dataclass
 
 #: Most rows between two knots.
 _APART = 256
 #: Rows that are worked on at once; a multiple of the above.
 _BAND = 1 << 16
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Curve:
+    """`count` values over their rows by knots: (k,) rows `at` and `knot` there. It is within a `step` of each
+    of the values; the `largest` of them is known."""
+
+    at: npt.NDArray[np.int32]
+    knot: npt.NDArray[Any]
+    step: float
+    count: int
+    largest: float
+
+    @staticmethod
+    def of(values: npt.ArrayLike, step: float) -> Curve:
+        """The curve of (n,) finite values; its knots are stored in steps."""
+        rows = np.asarray(values, float)
+        at = knots(rows, np.rint(rows / step) * step, np.arange(len(rows), dtype=float), step)
+        knot = np.asarray(values)[at]
+        return Curve(at.astype(np.int32), knot, step, len(rows), float(rows.max(initial=0.0)))
+
+    def values(self) -> Array:
+        """(n,) the values, straight between knots."""
+        return straight(self.knot.astype(float), self.at, np.arange(self.count, dtype=float))
 
 
 def knots(values: Array, stored: Array, along: Array, tolerance: float) -> Index:
@@ -28,7 +53,7 @@ def knots(values: Array, stored: Array, along: Array, tolerance: float) -> Index
     return np.flatnonzero(keep)
 
 
-def straight(knot: Array, at: Index, along: Array) -> Array:
+def straight(knot: Array, at: npt.NDArray[np.integer[Any]], along: Array) -> Array:
     """(n,) values over `along` (n,), which are straight between knots in rows `at`; the page computes the
     same doubles. Where `along` rests, they are those of the knot before."""
     row = np.arange(len(along))

@@ -17,6 +17,7 @@ import numpy.typing as npt
 from olp.core.arrays import Index
 from olp.core.units import MM_PER_INCH
 from olp.core.values import dataclass
+from olp.review.integers import small
 from olp.review.styles import DIGITS_MOST, Style, Whole, Written
 from olp.review.tokens import MARK, Small, Tokens
 
@@ -34,6 +35,10 @@ FIRST_STYLE = 0x20
 _TRIED = 1024
 #: Blocks of a column that are tried.
 _BLOCKS = 8
+#: Rows that are worked on at once, so that temporaries are small.
+_BAND = 1 << 16
+#: Powers of ten by their exponents.
+_POWERS = 10 ** np.arange(DIGITS_MOST, dtype=np.int64)
 #: nm per mm.
 NM_PER_MM = 1_000_000
 #: Bits of a value in the name of a number that belongs to its template.
@@ -87,19 +92,19 @@ class Lines:
     styles: list[Style]
     decimals: list[int]
     predictions: list[Prediction | None]
-    rest: Whole
+    rest: npt.NDArray[Any]
 
     @staticmethod
     def of(text: str, positions: Positions | None = None) -> Lines:
         tokens = Tokens.of(text.encode())
         slots = _Slots.of(tokens)
-        code = np.full(len(tokens.value), -1, np.int64)
+        code = np.full(len(tokens.value), -1, np.int32)
         styles: list[Style] = []
         decimals: list[int] = []
         predictions: list[Prediction | None] = []
-        rest: list[Whole] = []
+        rest: list[npt.NDArray[Any]] = []
         for key in range(slots.columns):
-            rows = np.flatnonzero(slots.column == key)
+            rows = np.flatnonzero(slots.column == key).astype(np.int32)
             column = _column(tokens, rows, len(styles), len(rest), len(tokens.skeleton))
             if column is None:
                 continue
@@ -110,7 +115,7 @@ class Lines:
             predictions.append(guess)
             rest.append(left)
         templates, template = slots.templates(tokens, code)
-        columns = np.column_stack(rest) if rest else np.zeros((len(template), 0), np.int64)
+        columns = np.column_stack(rest) if rest else np.zeros((len(template), 0), np.int32)
         return Lines(templates, template, styles, decimals, predictions, columns)
 
 
@@ -119,23 +124,24 @@ class _Column:
     """Numbers that are stored as a column: the (k,) `rows` of the numbers of the text, and `value` in units
     of the last of `decimals`. (k,) `style` is an index of all styles, of which `styles` are new."""
 
-    rows: Index
+    rows: Small
     value: Whole
     decimals: int
-    style: Whole
+    style: Small
     styles: list[Style]
 
 
-def _column(tokens: Tokens, rows: Index, first_style: int, number: int, lines: int) -> _Column | None:
+def _column(tokens: Tokens, rows: Small, first_style: int, number: int, lines: int) -> _Column | None:
     """The numbers in `rows` as column `number`; None where they belong to the templates."""
     if len(rows) * _SPARSE < lines or _few(tokens.value[rows]):
         return None
-    decimals = tokens.decimals[rows].astype(np.int64)
+    decimals = tokens.decimals[rows]
     most = int(decimals.max())
     value = tokens.value[rows].astype(np.int64)
-    fits = np.abs(value) < 10 ** (DIGITS_MOST - 1 - most + decimals)
-    rows, value, decimals = rows[fits], value[fits] * 10 ** (most - decimals[fits]), decimals[fits]
-    written = Written(value, most, tokens.whole[rows].astype(np.int64), decimals, tokens.point[rows])
+    fits = np.abs(value) < _POWERS[DIGITS_MOST - 1 - most + decimals]
+    rows, value, decimals = rows[fits], value[fits], decimals[fits]
+    value *= _POWERS[most - decimals]
+    written = Written(value, most, tokens.whole[rows], decimals, tokens.point[rows])
     styles, style = written.styles(number)
     room = max(_STYLES - first_style, 0)
     known = style < room
@@ -152,7 +158,7 @@ def _few(values: Small) -> bool:
 
 def _predicted(
     column: _Column, line: Small, lines: int, positions: Positions | None
-) -> tuple[Prediction | None, Whole]:
+) -> tuple[Prediction | None, npt.NDArray[Any]]:
     """The best prediction of a column, and (n,) the rest; a line without a number has the one
     before it."""
     choices: list[Prediction | None] = [None]
@@ -160,15 +166,21 @@ def _predicted(
         units = [unit * NM_PER_MM / 10**column.decimals for unit in (1.0, MM_PER_INCH)]
         choices += [Prediction(a, nm, r) for r in (False, True) for nm in units for a in range(3)]
 
-    def rest(choice: Prediction | None, rows: Index) -> Whole:
+    def rest(choice: Prediction | None, rows: Index | slice) -> Whole:
         guess = 0 if choice is None or positions is None else choice.of(positions, line[rows])
         return np.asarray(column.value[rows] - guess)
 
     tried = _tried(len(line))
     best = min(choices, key=lambda c: float(np.log2(1.0 + np.abs(np.diff(rest(c, tried)))).sum()))
-    before = np.zeros(lines, np.int64)
+    before = np.zeros(lines, np.int32)
     before[line] = np.arange(len(line))
-    return best, rest(best, np.arange(len(line)))[np.maximum.accumulate(before)]
+    left = small(np.concatenate([rest(best, rows) for rows in _bands(len(line))]))
+    return best, left[np.maximum.accumulate(before)]
+
+
+def _bands(count: int) -> Iterator[slice]:
+    """Rows of a column, some at once."""
+    return (slice(a, a + _BAND) for a in range(0, count, _BAND))
 
 
 def _tried(count: int) -> Index:
@@ -201,32 +213,40 @@ class _Slots:
         count = np.diff(begin)[tokens.skeleton]
         line = np.repeat(np.arange(len(count), dtype=np.int32), count)
         done = np.cumsum(count, dtype=np.int32) - count
-        slot = np.arange(len(line), dtype=np.int32) + (begin[:-1][tokens.skeleton] - done)[line]
-        return _Slots(line, slot, np.array(flat, np.int32)[slot], len(known))
+        slot = np.arange(len(line), dtype=np.int32)
+        slot += np.repeat(begin[:-1][tokens.skeleton] - done, count)
+        column, of = np.empty(len(slot), np.int32), np.array(flat, np.int32)
+        for rows in _bands(len(slot)):
+            column[rows] = of[slot[rows]]
+        return _Slots(line, slot, column, len(known))
 
-    def templates(self, tokens: Tokens, code: Whole) -> tuple[list[str], Small]:
+    def templates(self, tokens: Tokens, code: Small) -> tuple[list[str], Small]:
         """Templates and (n,) the template of each line; `code` (k,) is the style of each number, -1 for one
         that belongs to its template."""
         inline = np.flatnonzero(code < 0)
-        code[inline] = -1 - _names(tokens, inline)
+        code[inline] = -1 - _numbered(_names(tokens, inline))[1]
         template = tokens.skeleton.copy()
         # a skeleton's own template is that of its first line; lines unlike it have others
-        usual = np.zeros(int(self.slot.max(initial=-1)) + 1, np.int64)
-        usual[self.slot[::-1]] = code[::-1]
+        usual = np.zeros(int(self.slot.max(initial=-1)) + 1, np.int32)
+        for rows in reversed(list(_bands(len(code)))):
+            usual[self.slot[rows][::-1]] = code[rows][::-1]
         other = np.zeros(len(template), bool)
-        other[self.line[code != usual[self.slot]]] = True
+        for rows in _bands(len(code)):
+            other[self.line[rows][code[rows] != usual[self.slot[rows]]]] = True
         mine = np.flatnonzero(other)
-        begin = np.searchsorted(self.line, np.arange(len(template) + 1))
-        first, which = _alike(tokens.skeleton[mine], begin[mine], begin[mine + 1] - begin[mine], code)
+        begin, end = (np.searchsorted(self.line, (mine + i).astype(np.int32)) for i in (0, 1))
+        first, which = _alike(tokens.skeleton[mine], begin, end - begin, code)
         template[mine] = len(tokens.skeletons) + which
         examples = np.zeros(len(tokens.skeletons), np.int64)
         own = np.flatnonzero(~other)
         examples[tokens.skeleton[own][::-1]] = own[::-1]
-        rows = np.concatenate((examples, mine[first])).tolist()
-        return [_template(tokens, code, row, int(begin[row])) for row in rows], template
+        lines = np.concatenate((examples, mine[first]))
+        begin = np.searchsorted(self.line, lines.astype(np.int32))
+        pairs = zip(lines.tolist(), begin.tolist(), strict=True)
+        return [_template(tokens, code, line, at) for line, at in pairs], template
 
 
-def _alike(skeleton: Small, begin: Index, count: Index, code: Whole) -> tuple[Index, Index]:
+def _alike(skeleton: Small, begin: Index, count: Index, code: Small) -> tuple[Index, Index]:
     """Groups of lines with the same skeleton and the same codes: a line of each, and (m,) the group."""
     group = skeleton.astype(np.int64)
     most = int(count.max(initial=0))
@@ -238,7 +258,7 @@ def _alike(skeleton: Small, begin: Index, count: Index, code: Whole) -> tuple[In
     return _numbered(group * (most + 1) + count)
 
 
-def _numbered(names: Whole) -> tuple[Index, Index]:
+def _numbered(names: npt.NDArray[np.integer[Any]]) -> tuple[Index, Index]:
     """A row of each name, and (n,) the number of the name of each row."""
     _, first, which = np.unique(names, return_index=True, return_inverse=True)
     return first, which.reshape(-1)
@@ -252,7 +272,7 @@ def _names(tokens: Tokens, rows: Index) -> Whole:
     return np.asarray(name)
 
 
-def _template(tokens: Tokens, code: Whole, line: int, begin: int) -> str:
+def _template(tokens: Tokens, code: Small, line: int, begin: int) -> str:
     """The skeleton of a line with its numbers, those from `begin`, or what stands for them."""
     parts = tokens.skeletons[tokens.skeleton[line]].decode().split(MARK.decode())
     text = [parts[0]]

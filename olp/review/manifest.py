@@ -17,6 +17,7 @@ from olp.proof.proof import Counts
 from olp.reports.report import place
 from olp.review.features.nodes import plain
 from olp.review.judged import judged_lines, measured_label, measured_names, pictures, removed, statistics
+from olp.review.knots import Curve
 from olp.review.listing import pictured
 from olp.review.meshes import nodes
 from olp.review.pack import ARC_MM, DEVIATION_MM, POSITION_MM, TIME_S, Arrays, resolution
@@ -53,6 +54,12 @@ _FINEST_UM = 0.001
 _PERCENT = 0.1
 #: Fewest steps of a column of the motion over its range.
 _MOTION_LEVELS = 20_000
+
+
+def curve_um(size_mm: npt.NDArray[Any]) -> Curve:
+    """(n,) sizes, in um, as finely as colours show them."""
+    value = size_mm * UM_PER_MM
+    return Curve.of(value, resolution(float(value.max(initial=0.0)), _FINEST_UM, _SOURCE_LEVELS))
 
 
 def manifest_of(scene: Scene) -> tuple[dict[str, Any], Arrays]:
@@ -172,9 +179,7 @@ def _metrics(scene: Scene, arrays: Arrays) -> list[dict[str, Any]]:
     ]  # fmt: skip
     metrics += _uncertainty(scene, arrays)
     for name, size in scene.sources:
-        value = size * UM_PER_MM
-        step = resolution(float(value.max(initial=0.0)), _FINEST_UM, _SOURCE_LEVELS)
-        array = arrays.bent(f"source:{name}", value, step)
+        array = arrays.bent(f"source:{name}", size)
         metrics.append(
             {
                 "name": f"source:{name}", "label": f"share of {name}", "unit": "um", "kind": "sequential",
@@ -189,9 +194,7 @@ def _uncertainty(scene: Scene, arrays: Arrays) -> Iterator[dict[str, Any]]:
     uncertainty = scene.uncertainty
     if uncertainty is None:
         return
-    band = uncertainty.band_mm * UM_PER_MM
-    step = resolution(float(band.max(initial=0.0)), _FINEST_UM, _SOURCE_LEVELS)
-    array = arrays.bent("band", band, step)
+    array = arrays.bent("band", curve_um(uncertainty.band_mm))
     yield {
         "name": "band", "label": "uncertainty (k = 2)", "unit": "um", "kind": "sequential",
         "by_layer": dict.fromkeys(("uncorrected", "corrected"), array), "judged": False,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -18,10 +19,12 @@ from olp.program.feeds.moves import lengths_mm
 from olp.program.feeds.timing import timing
 from olp.program.program import Program
 from olp.review.samples import Samples
-from olp.trajectory.from_program import SHORTEST_MM
-from olp.trajectory.motion import Motion
-from olp.trajectory.plan import Trajectory
-from olp.trajectory.route import Route
+
+if TYPE_CHECKING:
+    # a page without a planned motion does not load what plans one
+    from olp.trajectory.motion import Motion
+    from olp.trajectory.plan import Trajectory
+    from olp.trajectory.route import Route
 
 #: Most rows of a table of motion, about.
 MOST_ROWS = 20_000
@@ -88,6 +91,8 @@ def retimed(corrected: Toolpath, samples: Samples, trajectories: Sequence[Trajec
     The time of a sample is that of its distance along the line, as a motion that rounds corners does not
     reach the waypoints.
     """
+    from olp.trajectory.from_program import SHORTEST_MM
+
     length = lengths_mm(corrected)
     moving = ~(length <= SHORTEST_MM)
     driven = np.isfinite(length) & moving

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from olp.review.integers import Coded
-from olp.review.knots import knots, lengths, straight
+from olp.review.integers import Coded, small
+from olp.review.knots import Curve, knots, lengths, straight
 from olp.review.lines import FIRST_STYLE, NM_PER_MM, Lines, Positions
 from olp.review.tokens import MARK, Small
 
@@ -66,7 +66,7 @@ class Arrays:
         for j in range(rows.shape[1]):
             whole = np.rint(rows[:, j].astype(float) * round(1.0 / step)).astype(np.int64)
             if keep:
-                kept.append(_small(whole))
+                kept.append(small(whole))
             for other in plus:
                 whole = whole - self._kept[other][0][:, j]
             columns.append(Coded.of(name, whole))
@@ -80,13 +80,11 @@ class Arrays:
         self._put(name, spec, [plane for column in columns for plane in column.planes])
         return name
 
-    def bent(self, name: str, values: npt.ArrayLike, step: float) -> str:
-        """Store (n,) finite values by knots in steps, straight between them over the rows, within a step."""
-        rows = np.asarray(values, float)
-        at = knots(rows, np.rint(rows / step) * step, np.arange(len(rows), dtype=float), step)
+    def bent(self, name: str, curve: Curve) -> str:
+        """Store a curve by its knots in steps."""
         self.specs[name] = {
-            "enc": "bent", "n": len(rows), "at": self.quantised(f"{name}_at", at, 1.0),
-            "knots": self.quantised(f"{name}_knots", rows[at], step),
+            "enc": "bent", "n": curve.count, "at": self.quantised(f"{name}_at", curve.at, 1.0),
+            "knots": self.quantised(f"{name}_knots", curve.knot, curve.step),
         }  # fmt: skip
         return name
 
@@ -165,12 +163,6 @@ def _deflated(data: bytes) -> bytes:
     """A part of a stream, without matches in others, that another can follow."""
     stream = zlib.compressobj(_LEVEL, zlib.DEFLATED, -zlib.MAX_WBITS)
     return stream.compress(data) + stream.flush(zlib.Z_FULL_FLUSH)
-
-
-def _small(whole: npt.NDArray[np.int64]) -> npt.NDArray[Any]:
-    """Whole numbers in half the memory, where they fit."""
-    small = whole.astype(np.int32)
-    return small if (small == whole).all() else whole
 
 
 def _rows(values: npt.NDArray[Any]) -> npt.NDArray[Any]:

@@ -23,6 +23,8 @@ from olp.program.feeds.moves import lengths_mm
 from olp.program.program import Program
 from olp.review.parts import BLOCK, Ends, Parts, error_mm, held_mm, set_beside, set_in_holes
 
+Single = npt.NDArray[np.float32]
+
 #: Number of samples of a path, about, within the steps below.
 SAMPLES = 100_000
 #: Shortest step between samples in mm.
@@ -60,8 +62,8 @@ class Samples:
     within: Array
     axis_mm: Array
     command_mm: Array
-    uncorrected: Array
-    corrected: Array
+    uncorrected: Single
+    corrected: Single
     joined: Mask
     arc_mm: Array
     play: Array | None
@@ -119,7 +121,10 @@ def sample(
     started = np.isfinite(ends.length)[move]
     length = np.nan_to_num(ends.length)
     arc_mm = np.concatenate(([0.0], np.cumsum(length)))[move] + share * length[move]
-    every = Samples(move, share, part, within, axis, command, uncorrected, result, started, arc_mm, play)
+    # half the memory, and finer than the page shows
+    deviations = uncorrected.astype(np.float32), result.astype(np.float32)
+    every = Samples(move, share, part, within, axis, command, *deviations, started, arc_mm, play)
+    del uncorrected, result
     if not keep.all():
         every = every.take(np.flatnonzero(keep))
     every.joined[0] = False
@@ -200,7 +205,8 @@ def by_source(
         for name, value in model.contributions(samples.axis_mm[rows], tool_vector, play):
             size = sizes.setdefault(name, np.zeros(len(samples), np.float32))
             size[rows] = np.sqrt(np.einsum("ij,ij->i", value, value))
-    yield from sorted(sizes.items(), key=lambda item: -float(item[1].max(initial=0.0)))
+    for name in sorted(sizes, key=lambda name: -float(sizes[name].max(initial=0.0))):
+        yield name, sizes.pop(name)
 
 
 def _steps(path: Toolpath, model: ErrorModel, step_mm: float | None) -> Index:

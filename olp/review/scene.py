@@ -14,6 +14,7 @@ from olp.core.toolpath import Toolpath
 from olp.core.values import dataclass
 from olp.program.program import Program
 from olp.proof.judgement import Judgements
+from olp.review.knots import Curve
 from olp.review.listing import Listing
 from olp.review.measured import Matched
 from olp.review.meshes import Body
@@ -63,7 +64,7 @@ class TipUncertainty:
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
     """`position_mm` (n, 3) are the samples in `frame`; `time_s` (n,) are their times on the re-timed motion,
-    where there is one, else at the feed. `sources` are (name, (n,) mm) by size; `report` is that of the
+    where there is one, else at the feed. `sources` are (name, (n,) um) by size; `report` is that of the
     correction or verification ("olp-report-1"), `table` its judgements with lines of the nominal text as
     shown. `digit_mm` is the last digit of its coordinates.
     `tool_radii_mm` has the tools of the program that have a radius; `uncertainty` is None where the
@@ -80,7 +81,7 @@ class Scene:
     time_s: Array
     motion: MotionTable | None
     duration_s: float
-    sources: tuple[tuple[str, Single], ...]
+    sources: tuple[tuple[str, Curve], ...]
     listing: Listing
     bodies: tuple[Body, ...]
     measured: tuple[Matched, ...]

@@ -10,10 +10,14 @@ import numpy.typing as npt
 from olp.core.values import dataclass
 
 Whole = npt.NDArray[np.int64]
+Small = npt.NDArray[np.int32]
+Byte = npt.NDArray[np.uint8]
 Mask = npt.NDArray[np.bool_]
 
 #: A value has fewer digits than this.
 DIGITS_MOST = 13
+#: Numbers that are worked on at once, so that temporaries are small.
+_BAND = 1 << 16
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,11 +43,11 @@ class Written:
 
     value: Whole
     most: int
-    whole: Whole
-    decimals: Whole
+    whole: Byte
+    decimals: Byte
     point: Mask
 
-    def styles(self, column: int) -> tuple[list[Style], Whole]:
+    def styles(self, column: int) -> tuple[list[Style], Small]:
         """Styles of a column, the usual one first, and (k,) the style of each number."""
         natural, kept = self._natural(), self._kept()
         # a number that tells how many digits its column has before the point
@@ -53,26 +57,29 @@ class Written:
         least = np.where(telling[odd], self.whole[odd], 1)
         own = np.column_stack((self.decimals[odd], least, self.point[odd]))
         forms, which = np.unique(own, axis=0, return_inverse=True)
-        style = np.zeros(len(self.value), np.int64)
+        style = np.zeros(len(self.value), np.int32)
         style[odd] = 1 + which.reshape(-1)
         others = [Style(column, d, least, False, bool(point)) for d, least, point in forms.tolist()]
         return [usual, *others], style
 
-    def _natural(self) -> Whole:
+    def _natural(self) -> Byte:
         """(k,) digits before the point without zeros before them."""
-        before = np.abs(self.value) // 10**self.most
-        return np.asarray(np.searchsorted(10 ** np.arange(DIGITS_MOST), before, "right"))
+        natural = np.empty(len(self.value), np.uint8)
+        for a in range(0, len(natural), _BAND):
+            before = np.abs(self.value[a : a + _BAND]) // 10**self.most
+            natural[a : a + _BAND] = np.searchsorted(10 ** np.arange(DIGITS_MOST), before, "right")
+        return natural
 
-    def _kept(self) -> Whole:
+    def _kept(self) -> Byte:
         """(k,) decimals without the zeros at the end."""
-        kept = np.full(len(self.value), self.most)
-        rows = np.arange(len(self.value))
+        kept = np.full(len(self.value), self.most, np.uint8)
+        rows = np.arange(len(self.value), dtype=np.int32)
         for k in range(1, self.most + 1):
             rows = rows[self.value[rows] % 10**k == 0]
             kept[rows] = self.most - k
         return kept
 
-    def _usual(self, column: int, kept: Whole, telling: Whole) -> Style:
+    def _usual(self, column: int, kept: Byte, telling: Byte) -> Style:
         """The style of most of the numbers; `telling` are digits before the point."""
         trim = int((self.decimals == kept).sum()) > int((self.decimals == self.most).sum())
         bare = self.decimals == 0
@@ -80,9 +87,9 @@ class Written:
         least = int(np.bincount(telling).argmax()) if telling.size else 1
         return Style(column, self.most, least, trim, point)
 
-    def _as(self, style: Style, natural: Whole, kept: Whole) -> Mask:
+    def _as(self, style: Style, natural: Byte, kept: Byte) -> Mask:
         """(k,) whether a number is written in a style."""
-        decimals = kept if style.trim else np.full(len(self.value), style.decimals)
+        decimals = kept if style.trim else np.full(len(self.value), style.decimals, np.uint8)
         whole = np.maximum(natural, style.least)
         # a number has a digit
         whole[(whole == 0) & (decimals == 0)] = 1

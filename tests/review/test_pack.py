@@ -14,6 +14,7 @@ from judge.unpacker import decoded
 
 from olp.core.errors import CannotCompute
 from olp.review import knots
+from olp.review.knots import Curve
 from olp.review.pack import DEVIATION_MM, POSITION_MM, TIME_S, Arrays, resolution
 
 TEN_METRES = 10_000.0
@@ -101,17 +102,17 @@ def test_a_curve_by_its_knots_is_within_a_step(values: np.ndarray, step: float, 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(knots, "_APART", 16)
         patch.setattr(knots, "_BAND", 16 * band)
-        arrays.bent("v", values, step)
+        arrays.bent("v", Curve.of(values, step))
     assert np.abs(unpacked(arrays, "v") - values).max() <= step * (1 + 1e-9)
 
 
 def test_a_straight_curve_has_a_knot_every_256_rows() -> None:
     arrays = Arrays()
-    arrays.bent("v", np.arange(1000.0), 1.0)
+    arrays.bent("v", Curve.of(np.arange(1000.0), 1.0))
     assert unpacked(arrays, "v_at").tolist() == [0, 256, 512, 768, 999]
-    arrays.bent("spike", np.where(np.arange(1000) == 300, 50.0, 0.0), 1.0)
+    arrays.bent("spike", Curve.of(np.where(np.arange(1000) == 300, 50.0, 0.0), 1.0))
     assert unpacked(arrays, "spike")[299:302].tolist() == [0.0, 50.0, 0.0]
-    arrays.bent("nothing", [], 1.0)
+    arrays.bent("nothing", Curve.of([], 1.0))
     assert unpacked(arrays, "nothing").tolist() == []
 
 

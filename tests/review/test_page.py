@@ -295,7 +295,8 @@ def test_a_source_shows_what_it_does(machine: Path) -> None:
     for name, size in review.scene.sources:
         metric: dict[str, Any] = next(m for m in page.manifest["metrics"] if m["name"] == f"source:{name}")
         shown = page.array(metric["by_layer"]["uncorrected"])
-        assert np.abs(shown - size * 1e3).max() <= max(size.max() * 1e3 / 200, 0.001)
+        assert np.abs(shown - size.values()).max() <= size.step
+        assert size.step <= max(size.largest / 200, 0.001)
 
 
 def test_findings_and_verdict_are_those_of_the_proof(machine: Path) -> None:

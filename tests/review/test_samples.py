@@ -116,16 +116,17 @@ def test_a_machine_that_is_off_everywhere(tmp_path: Path) -> None:
     )
     assert np.abs(scene.samples.corrected).max() < 1e-9
     assert [name for name, _ in scene.sources] == ["EXX", "EYY", "EZZ"]
-    assert [float(part.max()) * 1e3 for _, part in scene.sources] == pytest.approx([30.0, 20.0, 10.0])
+    assert [part.largest for _, part in scene.sources] == pytest.approx([30.0, 20.0, 10.0])
 
 
 def test_sources_add_up_to_the_error(tmp_path: Path) -> None:
     """Each is no more than the whole of them, and no less than what they leave to explain."""
     machine = random_machine(tmp_path / "m", 5, Recipe(backlash_um={"X": 4.0}, cyclic=True))
     scene = viewed(tmp_path, machine, "G1 X100 Y50 Z-20 F600\nX-90\nM2\n").scene
-    total = np.sum([part for _, part in scene.sources], axis=0)
-    assert (np.linalg.norm(scene.samples.uncorrected, axis=1) <= total * (1 + 1e-3) + 1e-6).all()
-    sizes = [float(part.max()) for _, part in scene.sources]
+    total = np.sum([part.values() for _, part in scene.sources], axis=0) * 1e-3
+    within = sum(part.step for _, part in scene.sources) * 1e-3
+    assert (np.linalg.norm(scene.samples.uncorrected, axis=1) <= total * (1 + 1e-3) + within).all()
+    sizes = [part.largest for _, part in scene.sources]
     assert sizes == sorted(sizes, reverse=True)
     assert {"EXX", "cyclic EXX", "backlash X"} <= {name for name, _ in scene.sources}
 

@@ -14,6 +14,7 @@ from judge import browser
 import olp
 from olp.files.config import load_job
 from olp.review import lines as coding
+from olp.review.knots import Curve
 from olp.review.listing import shown
 from olp.review.pack import DEVIATION_MM, POSITION_MM, Arrays
 
@@ -95,9 +96,9 @@ def test_curves_come_back_from_their_knots(page: Any) -> None:
     x = np.arange(3000)
     curve = 40.0 * np.sin(x / 90.0) + np.where(x == 1234, 7.0, 0.0)
     arrays = Arrays()
-    arrays.bent("curve", curve, 0.01)
-    arrays.bent("one", [3.0], 0.01)
-    arrays.bent("none", [], 0.01)
+    arrays.bent("curve", Curve.of(curve, 0.01))
+    arrays.bent("one", Curve.of([3.0], 0.01))
+    arrays.bent("none", Curve.of([], 0.01))
     result = unpacked(page, arrays)
     assert np.abs(np.array(result["curve"]) - curve).max() <= 0.01
     assert len(result["curve_at"]) < 1500

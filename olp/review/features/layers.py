@@ -41,13 +41,13 @@ class Layers:
         samples, (which, move, weight) = self._scene.samples, self._along(own)
         for name, delta in zip(MODEL, (samples.uncorrected, samples.corrected), strict=True):
             nominal = self._scene.position_mm[which]
-            yield name, Deviations(move, nominal, delta[which], weight) if len(which) else None
+            yield name, Deviations(move, nominal, delta[which].astype(float), weight) if len(which) else None
         for name, (matched, some, of) in zip(self.names[len(MODEL) :], self._points, strict=True):
             point, move = _taken(rows, of)
             mine = some[point]
             weight = np.ones(len(mine))
-            delta = matched.delta_mm[mine]
-            yield name, Deviations(move, matched.base_mm[mine], delta, weight) if len(mine) else None
+            measured = matched.delta_mm[mine]
+            yield name, Deviations(move, matched.base_mm[mine], measured, weight) if len(mine) else None
 
     def ranges(self, rows: Index) -> Index:
         """(k, 2) the samples of moves, rows rising: first and last of each run."""

@@ -46,7 +46,7 @@ class Picture:
     name: str
     title: str
     base_mm: Array
-    delta_mm: Array
+    delta_mm: npt.NDArray[np.floating[Any]]
     drawn: Mask
     shown: Mask
     arc_mm: Array
@@ -133,7 +133,7 @@ def pictures_of(scene: Scene, job_mm: float, exaggeration: float | None) -> Iter
     flags = {item["flag"]["layer"]: item for item in stated if item["flag"] is not None}
     feed = samples.joined & ~rapids(scene)
 
-    def factor(name: str, delta_mm: Array, shown: Mask) -> float:
+    def factor(name: str, delta_mm: npt.NDArray[np.floating[Any]], shown: Mask) -> float:
         largest = np.linalg.norm(delta_mm[shown], axis=1).max(initial=0.0)
         largest = max(largest, (of_layer[name]["largest_um"] or 0.0) / UM_PER_MM)
         return factor_of(float(largest), job_mm) if exaggeration is None else exaggeration
