@@ -207,7 +207,7 @@ def sources(path: Toolpath, model: ErrorModel) -> list[dict[str, Any]]:
 
     def sizes(point: Array, move: Index) -> Iterator[tuple[str, Array]]:
         for name, part in model.contributions(point, tool if tool.ndim == 1 else tool[move]):
-            yield name, np.sqrt((part * part).sum(axis=1))
+            yield name, np.sqrt(np.einsum("ij,ij->i", part, part))
 
     rows = [
         {"name": figure.name, "max_um": figure.largest * 1e3, "rms_um": figure.rms * 1e3}
@@ -223,7 +223,7 @@ def orientation(path: Toolpath, model: ErrorModel) -> dict[str, float]:
 
     def sizes(point: Array, move: Index) -> Iterator[tuple[str, Array]]:
         turned = model.rotation(point, None, payload if payload.ndim == 0 else payload[move])
-        yield "", np.sqrt((turned**2).sum(axis=1)) * 1e6
+        yield "", np.sqrt(np.einsum("ij,ij->i", turned, turned)) * 1e6
 
     angle = next(iter(figures(path, sizes)), Figure("", 0.0, 0.0))
     return {"max_urad": angle.largest, "rms_urad": angle.rms}

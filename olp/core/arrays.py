@@ -18,6 +18,8 @@ Mask = npt.NDArray[np.bool_]
 
 #: So many values are compared one by one.
 _FEW = 12
+#: In so many values others are looked up by bisection, which loads no masked arrays as `np.isin` may.
+_SHORT = 1 << 12
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 
@@ -42,7 +44,10 @@ def is_in(values: npt.NDArray[Scalar], some: Collection[float] | npt.NDArray[Any
     """Whether each value, of any shape, is one of `some`, as `np.isin` says."""
     wanted = np.asarray(list(some) if isinstance(some, set | frozenset) else some).ravel()
     if len(wanted) > _FEW:
-        return np.isin(values, wanted)
+        if np.size(values) > _SHORT:
+            return np.isin(values, wanted)
+        ordered = np.sort(wanted)
+        return np.asarray(ordered.take(np.searchsorted(ordered, values), mode="clip") == values)
     found = np.zeros(np.shape(values), bool)
     for one in wanted:
         found |= values == one

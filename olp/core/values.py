@@ -9,6 +9,7 @@ like work as on any dataclass, and type checkers see the standard decorator.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import inspect
 import threading
 from collections.abc import Callable, Iterable, Mapping
@@ -42,6 +43,7 @@ def _slotted(cls: type[T], names: Iterable[str], added: Mapping[str, Any]) -> ty
     return made
 
 
+@functools.cache
 def _declared(cls: type) -> dict[str, tuple[Any, bool]]:
     """The fields of a class and its bases as the standard library's `Field`, and whether calls name each."""
     fields: dict[str, tuple[Any, bool]] = {}
@@ -84,7 +86,7 @@ def _constructor(cls: type) -> Callable[..., None]:
 def _filled(self: Any, args: tuple[Any, ...], words: dict[str, Any]) -> bool:
     """Gives a value its fields as the constructor does; False, and nothing done, where a call does not fit:
     the constructor says why."""
-    declared = _declared(type(self))
+    declared = _declared(self.__class__)
     positional = [name for name, (field, kw_only) in declared.items() if field.init and not kw_only]
     given = dict(zip(positional, args, strict=False)) | words
     if len(given) < len(args) + len(words):
@@ -109,12 +111,12 @@ def _filled(self: Any, args: tuple[Any, ...], words: dict[str, Any]) -> bool:
 
 
 def _state(self: Any) -> tuple[Any, ...]:
-    return tuple([getattr(self, field.name) for field in dataclasses.fields(self)])
+    return tuple([getattr(self, name) for name in _declared(self.__class__)])
 
 
 def _set_state(self: Any, state: tuple[Any, ...]) -> None:
-    for field, value in zip(dataclasses.fields(self), state, strict=True):
-        object.__setattr__(self, field.name, value)
+    for name, value in zip(_declared(self.__class__), state, strict=True):
+        object.__setattr__(self, name, value)
 
 
 def _repr(self: Any) -> str:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import field, replace
+from typing import Any
 
 from olp.core.errors import ProgramError
 from olp.core.machine import ZERO, Setup, Vector
@@ -82,7 +83,8 @@ class AxisState(OffsetState):
     path_modes: list[PathMode] = field(default_factory=list)
     #: the frame of the last plain motion, -1 before any
     last_frame: int = -1
-    _index: dict[Frame, int] = field(default_factory=dict)
+    #: frames by the values of their fields: to look one up, none is made
+    _index: dict[tuple[Any, ...], int] = field(default_factory=dict)
 
     @staticmethod
     def at_start(setup: Setup, profile: Profile) -> AxisState:
@@ -121,23 +123,24 @@ class AxisState(OffsetState):
                 )
             base = list(work.offset_mm)
         angle_deg = self._angle_deg(name, line)
-        frame = Frame(
-            unit_mm=self.unit_mm,
-            offset_mm=self.offsets.total(base, angle_deg),
-            turn=self.offsets.turn(angle_deg),
-            length_mm=self.offsets.length,
-            tool_mm=self._tool_vector(line),
-            tool=self.spindle,
-            work_offset=name,
-            touched=self._touch(name, base, line),
-            lengths=self._lengths(name),
-            payload_kg=self.payload_kg,
-            compensation=self.compensation,
-        )
-        known = self._index.get(frame)
+        stated: dict[str, Any] = {
+            "unit_mm": self.unit_mm,
+            "offset_mm": self.offsets.total(base, angle_deg),
+            "turn": self.offsets.turn(angle_deg),
+            "length_mm": self.offsets.length,
+            "tool_mm": self._tool_vector(line),
+            "tool": self.spindle,
+            "work_offset": name,
+            "touched": self._touch(name, base, line),
+            "lengths": self._lengths(name),
+            "payload_kg": self.payload_kg,
+            "compensation": self.compensation,
+        }
+        key = tuple(stated.values())
+        known = self._index.get(key)
         if known is None:
-            known = self._index[frame] = len(self.frames)
-            self.frames.append(frame)
+            known = self._index[key] = len(self.frames)
+            self.frames.append(Frame(**stated))
         return known
 
     def _tool_vector(self, line: int) -> Vector:

@@ -138,16 +138,19 @@ def fill(
     start: list[float],
 ) -> Array:
     """(n, 3) axis positions of consecutive blocks from `start`; offsets (3,) or (n, 3), units one or (n,)."""
-    count = len(slot)
-    end = np.empty((count, 3))
-    order = np.arange(count)
+    known = slot >= 0
+    end: Array = value[slot]
+    end *= unit if isinstance(unit, float) else unit[:, None]
+    if incremental is None and known.all():
+        end += offset
+        return end
+    order = np.arange(len(slot))
     for a in range(3):
-        words = slot[:, a]
-        given = words >= 0
+        given = known[:, a]
         shift = offset[a] if offset.ndim == 1 else offset[:, a]
-        column = value[words] * unit
+        column = end[:, a]
         if incremental is None:
-            column += shift
+            column = column + shift
             if not given.all():
                 source = np.maximum.accumulate(np.where(given, order, -1))
                 column = column[source]

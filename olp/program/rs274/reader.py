@@ -48,7 +48,7 @@ from olp.program.rs274.modes import Context, Modes, Odd, check_odd, scaled
 from olp.program.rs274.motion import OTHER, Blocks, arc_geometry, fill, gather
 from olp.program.rs274.offset_state import STORES_POSITION, Word
 from olp.program.rs274.profiles.base import Act, Profile
-from olp.program.rs274.special_blocks import SpecialBlocks, check_codes, event_block
+from olp.program.rs274.special_blocks import SpecialBlocks, check_codes, event_block, event_words
 from olp.program.rs274.translated import Beside, check_frames
 from olp.program.rs274.translation import Translation
 from olp.program.rs274.turned import Turning, along_words
@@ -78,15 +78,22 @@ def read(
 
 @dataclass(slots=True, eq=False)
 class _Rows:
-    """The motion lines of a chunk while they are read: how many have a frame, how many a position. `present`
-    is the index of the frame in force, None after what may have changed it. `runs` leads from the first row
-    of each run of canned cycles to the row behind it. `calls` (lines of the chunk,) are those whose motion
-    calls a cycle, so no block may be put behind them."""
+    """The motion lines of a chunk (n,) while they are read: how many have a frame, how many a position.
+    `present` is the index of the frame in force, None after what may have changed it. `runs` leads from the
+    first row of each run of canned cycles to the row behind it.
+
+    What holds for the rows wherever they start is there at once: line `number`, `plane`, `kind` and `flag` of
+    the moves, the `word` (n, 3) of each coordinate, and whether these are `incremental`."""
 
     blocks: Blocks
     frame: npt.NDArray[np.int32]
     runs: dict[int, int]
-    calls: Mask
+    number: Index
+    plane: npt.NDArray[np.int16]
+    kind: npt.NDArray[np.uint8]
+    flag: npt.NDArray[np.uint8]
+    word: Index
+    incremental: Mask
     assigned: int = 0
     resolved: int = 0
     present: int | None = None
@@ -195,23 +202,51 @@ class _Reader:
 
     # -- stretches between events ------------------------------------------------------------------
 
+    def _rows(self, context: Context, blocks: Blocks, calls: Mask) -> _Rows:
+        """The rows of a chunk. No block may be put behind lines (of the chunk,) whose motion `calls` a
+        cycle."""
+        line, deleted = blocks.line, context.chunk.deleted
+        motion = context.motion[line]
+        kind = _KIND[motion]
+        number = line + (context.chunk.first_line + 1)
+        incremental = context.distance[line] == INCREMENTAL
+        flag = np.where(incremental, np.uint8(Flag.INCREMENTAL), np.uint8(0))
+        # a second block behind a thread would wait for the spindle to come round
+        flag[blocks.other | calls[line] | (motion == THREAD)] |= np.uint8(Flag.WHOLE)
+        flag[deleted[line]] |= np.uint8(Flag.DELETED)
+        if self.extrusion is not None:
+            # a straight move that feeds nothing is a travel
+            travel = np.where(self.feeding[line], np.uint8(Kind.LINE), np.uint8(Kind.RAPID))
+            kind = np.where(kind > Kind.LINE, kind, travel)
+            flag[self.whole[line]] |= np.uint8(Flag.WHOLE)
+        flag[context.feed_mode[line] == INVERSE_TIME] |= np.uint8(Flag.INVERSE_TIME)
+        if self.switches:
+            flag[self.switches.off(number)] |= np.uint8(Flag.PASS)
+        word = blocks.slot
+        if self.collector.keep_words:
+            word = np.where(word >= 0, word + context.base, -1)
+        frame, plane = np.zeros(len(blocks), np.int32), context.plane[line]
+        return _Rows(blocks, frame, runs(context, line), number, plane, kind, flag, word, incremental)
+
     def _stretches(self, context: Context, blocks: Blocks, beside: Beside) -> None:
         chunk, state, event = context.chunk, self.state, context.event
-        rows = _Rows(blocks, np.zeros(len(blocks), np.int32), runs(context, blocks.line), beside.calls)
+        rows = self._rows(context, blocks, beside.calls)
         motion = context.motion[blocks.line]
         alone, first = is_in(motion, _ALONE), is_in(motion, _PROBES)
         first[list(rows.runs)] = True
         special = event | beside.lines
         special[blocks.line[first]] = True
-        for line in np.flatnonzero(special).tolist():
-            upto = int(np.searchsorted(blocks.line, line))
-            here = upto < len(blocks) and bool(blocks.line[upto] == line)
+        lines = np.flatnonzero(special)
+        stated = event_words(context, lines[(event | beside.lines)[lines]])
+        before, behind = (blocks.line.searchsorted(lines, side).tolist() for side in ("left", "right"))
+        for line, upto, stop in zip(lines.tolist(), before, behind, strict=True):
+            here = stop > upto
             self._assign(context, rows, upto)
             if not event[line] and not beside.lines[line]:
                 self._alone(context, rows, upto, Effect())
                 continue
             number, deleted = context.number(line), bool(chunk.deleted[line])
-            words, codes = event_block(context, line, state.profile)
+            words, codes = event_block(context, next(stated), state.profile)
             tool = any(w.letter in "MT" for w in words)
             if tool or line in self.payloads or not _KEEPS_FRAME.issuperset(codes):
                 rows.present = None
@@ -288,45 +323,29 @@ class _Reader:
         a, rows.resolved = rows.resolved, max(upto, rows.resolved)
         if upto <= a:
             return
-        chunk, blocks, state = context.chunk, rows.blocks, self.state
-        line = blocks.line[a:upto]
-        number = line + (chunk.first_line + 1)
-        motion = context.motion[line]
-        kind = _KIND[motion]
+        blocks, state = rows.blocks, self.state
+        number, kind, frame = rows.number[a:upto], rows.kind[a:upto], rows.frame[a:upto]
         if (kind == 255).any():
             rows_without = np.flatnonzero(kind == 255).tolist()
             raise ProgramError.together(_no_motion(int(number[i])) for i in rows_without)
-        incremental = context.distance[line] == INCREMENTAL
-        frame = rows.frame[a:upto]
-        check_frames(state, number, incremental, context.plane[line], frame)
+        incremental = rows.incremental[a:upto]
+        check_frames(state, number, incremental, rows.plane[a:upto], frame)
         offset, unit = self._offsets(frame)
         value = scaled(context, state, self.collector.remarks)
-        slot = blocks.slot[a:upto]
         turning = Turning.of(self.turn)
         start = along_words(turning, state.position)
         if turning is not None:
             offset = turning.words(offset)
-        end = fill(slot, value, incremental if incremental.any() else None, offset, unit, start)
-        flag = np.where(incremental, np.uint8(Flag.INCREMENTAL), np.uint8(0))
-        # a second block would wait for the spindle to come round
-        flag[blocks.other[a:upto] | rows.calls[line] | (motion == THREAD)] |= np.uint8(Flag.WHOLE)
-        flag[chunk.deleted[line]] |= np.uint8(Flag.DELETED)
-        if self.extrusion is not None:
-            # a straight move that feeds nothing is a travel
-            kind = np.where(kind > Kind.LINE, kind, np.where(self.feeding[line], Kind.LINE, Kind.RAPID))
-            kind = kind.astype(np.uint8)
-            flag[self.whole[line]] |= np.uint8(Flag.WHOLE)
-        inverse = context.feed_mode[line] == INVERSE_TIME
-        if inverse.any():
-            flag[inverse] |= np.uint8(Flag.INVERSE_TIME)
-        if self.switches:
-            flag[self.switches.off(number)] |= np.uint8(Flag.PASS)
-        arcs = slice(*np.searchsorted(blocks.arc_row, (a, upto)))
-        if arcs.stop > arcs.start:
-            kind = self._arcs(context, rows, arcs, a, kind, np.vstack((start, end)), value, offset, unit)
+        steps = incremental if incremental.any() else None
+        end = fill(blocks.slot[a:upto], value, steps, offset, unit, start)
+        if len(blocks.arc_row):
+            arcs = slice(*np.searchsorted(blocks.arc_row, (a, upto)))
+            if arcs.stop > arcs.start:
+                point = np.vstack((start, end))
+                kind = self._arcs(context, rows, arcs, a, kind, point, value, offset, unit)
         if turning is not None:
             end = turning.axes(end)
-        self.collector.put_moves(kind, flag, number, frame, end, np.where(slot >= 0, slot + context.base, -1))
+        self.collector.put_moves(kind, rows.flag[a:upto], number, frame, end, rows.word[a:upto])
         state.position[:] = end[-1].tolist()
 
     def _arcs(

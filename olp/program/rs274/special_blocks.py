@@ -6,12 +6,14 @@ What an event does to frames and tools is in `axis_state`, blocks of canned cycl
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
-import numpy.typing as npt
 
 from olp.core.arrays import Index, distinct, is_in
 from olp.core.errors import ProgramError
 from olp.core.toolpath import Flag, Kind
+from olp.core.values import dataclass
 from olp.program.rs274.axis_state import AxisState, Effect
 from olp.program.rs274.codes import (
     DWELL,
@@ -31,16 +33,56 @@ from olp.program.rs274.state import NAN
 from olp.program.rs274.translation import Drilling
 from olp.program.rs274.turned import Turning, along_words
 
+#: (1,) the kind of a move that the control makes by itself.
+_RAPID = np.array([Kind.RAPID], np.uint8)
+#: (1,) the flag of such a move.
+_OWN = np.array([Flag.PASS | Flag.CONTROL], np.uint8)
+#: (1,) the flag of one under block delete.
+_OWN_DELETED = _OWN | np.uint8(Flag.DELETED)
+#: (1, 3) the words of a move without any.
+_NO_WORDS = np.full((1, 3), -1)
+#: Events that may stand under block delete.
+_DELETED_TOO = frozenset({DWELL, *HOMES, MACHINE})
 
-def event_block(context: Context, line: int, profile: Profile) -> tuple[list[Word], list[int]]:
-    """The words and event codes of a line of the chunk; refuses what cannot be read correctly."""
+
+@dataclass(frozen=True, slots=True)
+class EventWords:
+    """The words of a line of the chunk, and its G codes with what each does."""
+
+    line: int
+    words: list[Word]
+    codes: list[int]
+    acts: list[int]
+
+
+def event_words(context: Context, lines: Index) -> Iterator[EventWords]:
+    """What lines of the chunk say. Their words are taken out of the columns together."""
     chunk, codes = context.chunk, context.codes
-    a, b = chunk.first_word[line : line + 2].tolist()
-    columns = (chunk.letter[a:b], context.value[a:b], chunk.pointed[a:b])
+    word, ends = _within(chunk.first_word[lines], chunk.first_word[lines + 1])
+    columns = (chunk.letter[word], context.value[word], word + context.base, chunk.pointed[word])
     words = [
-        Word(chr(letter), value, context.base + a + i, pointed)
-        for i, (letter, value, pointed) in enumerate(zip(*(c.tolist() for c in columns), strict=True))
+        Word(chr(letter), value, number, pointed)
+        for letter, value, number, pointed in zip(*(c.tolist() for c in columns), strict=True)
     ]
+    first, last = (codes.line.searchsorted(lines, side) for side in ("left", "right"))
+    code, code_ends = _within(first, last)
+    numbers, acts = codes.code[code].tolist(), codes.act[code].tolist()
+    a = c = 0
+    for line, b, d in zip(lines.tolist(), ends, code_ends, strict=True):
+        yield EventWords(line, words[a:b], numbers[c:d], acts[c:d])
+        a, c = b, d
+
+
+def _within(first: Index, last: Index) -> tuple[Index, list[int]]:
+    """All indices from each `first` up to its `last`, and where those of each end among them."""
+    count = last - first
+    ends = np.cumsum(count)
+    return np.repeat(first - (ends - count), count) + np.arange(int(count.sum())), ends.tolist()
+
+
+def event_block(context: Context, stated: EventWords, profile: Profile) -> tuple[list[Word], list[int]]:
+    """The words and event codes of a line of the chunk; refuses what cannot be read correctly."""
+    line, words = stated.line, stated.words
     if profile.commands is not None:
         # letters behind a command are its parameters
         own = next((k for k, word in enumerate(words) if word.letter != "N"), len(words))
@@ -49,13 +91,11 @@ def event_block(context: Context, line: int, profile: Profile) -> tuple[list[Wor
         if words and words[0].letter != "G":
             letter = still.get(round(words[0].value), "") if words[0].letter == "M" else ""
             words = [] if letter and any(w.letter == letter for w in words) else words[:1]
-    mine = slice(codes.line.searchsorted(line), codes.line.searchsorted(line, "right"))
     number = context.number(line)
-    events = _checked(codes.code[mine], codes.act[mine], words, profile, number)
-    changes = set(events) - {DWELL, *HOMES, MACHINE} or any(
-        w.letter == "M" and w.value in (6, 61) for w in words
-    )
-    if chunk.deleted[line] and changes:
+    events = _checked(stated, words, profile, number)
+    if context.chunk.deleted[line] and (
+        not _DELETED_TOO.issuperset(events) or any(w.letter == "M" and w.value in (6, 61) for w in words)
+    ):
         raise ProgramError(
             "a block under block delete changes offsets, units, path mode, the tool or its compensation, "
             "so later blocks depend on the switch; remove the `/`",
@@ -65,13 +105,11 @@ def event_block(context: Context, line: int, profile: Profile) -> tuple[list[Wor
     return words, events
 
 
-def _checked(
-    code: Index, act: npt.NDArray[np.int8], words: list[Word], profile: Profile, line: int
-) -> list[int]:
+def _checked(stated: EventWords, words: list[Word], profile: Profile, line: int) -> list[int]:
     """The event codes of a block; refuses those that cannot be read correctly."""
     unroll = UNROLL if profile.unroller is not None else ""
     numbers = [word.value for word in words if word.letter == "G"]
-    for c, a, number in zip(code.tolist(), act.tolist(), numbers, strict=True):
+    for c, a, number in zip(stated.codes, stated.acts, numbers, strict=True):
         if a == Act.REFUSE:
             why = profile.refusals.get(c)
             name = f"G{number:g}"
@@ -85,9 +123,8 @@ def _checked(
                 # the other words of a macro call are its arguments
                 word="" if c in MACROS else name,
             )
-    for word in words:
-        m = round(word.value * 10)
-        if word.letter == "M" and m in profile.m_refusals:
+    for m in [round(word.value * 10) for word in words if word.letter == "M"]:
+        if m in profile.m_refusals:
             raise ProgramError(
                 f"M{m / 10:g} {profile.m_refusals[m]}",
                 hint=unroll,
@@ -95,7 +132,7 @@ def _checked(
                 code="OLP511" if unroll else "OLP512",
                 word=f"M{m / 10:g}",
             )
-    return [c for c, a in zip(code.tolist(), act.tolist(), strict=True) if a == Act.EVENT]
+    return [c for c, a in zip(stated.codes, stated.acts, strict=True) if a == Act.EVENT]
 
 
 def check_codes(context: Context, profile: Profile) -> None:
@@ -105,9 +142,9 @@ def check_codes(context: Context, profile: Profile) -> None:
     m = m[is_in(np.rint(context.value[m] * 10), list(profile.m_refusals))]
     lines = distinct(np.concatenate((codes.line[codes.act == Act.REFUSE], chunk.line[m])))
     errors = []
-    for line in lines.tolist():
+    for stated in event_words(context, lines):
         try:
-            event_block(context, line, profile)
+            event_block(context, stated, profile)
         except ProgramError as error:
             errors.append(error)
     if errors:
@@ -128,12 +165,12 @@ class SpecialBlocks:
             self._collector.start = (x, y, z)
             return
         self._collector.put_moves(
-            np.array([Kind.RAPID], np.uint8),
-            np.array([Flag.PASS | Flag.CONTROL | _deleted(deleted)], np.uint8),
-            np.array([line]),
-            np.array([self._loose_frame()]),
+            _RAPID,
+            _OWN_DELETED if deleted else _OWN,
+            [line],
+            [self._loose_frame()],
             np.array([self._state.position]),
-            np.full((1, 3), -1),
+            _NO_WORDS,
         )
 
     def _loose_frame(self) -> int:

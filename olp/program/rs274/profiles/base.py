@@ -10,6 +10,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from dataclasses import field
 from enum import IntEnum, auto
+from functools import cache
 from typing import Any, TypeVar
 
 from olp.core.arrays import Array
@@ -44,6 +45,11 @@ class Act(IntEnum):
     CONTROL = auto()  #: the control moves by itself: no position is known after it
     EVENT = auto()  #: changes frames, units, tools or path mode; handled block by block
     REFUSE = auto()
+
+
+@cache
+def _in_tenths(whole: frozenset[int], tenths: frozenset[int]) -> frozenset[int]:
+    return frozenset(10 * m for m in whole) | tenths
 
 
 _SUPPORT = {Act.UNCHANGED: Support.UNCHANGED, Act.REFUSE: Support.REFUSED, Act.MOTION: Support.CORRECTED}
@@ -162,7 +168,7 @@ class Profile(Dialect):
     @property
     def still_m(self) -> frozenset[int]:
         """The M codes that move no axis, ten times their number."""
-        return frozenset(10 * m for m in self.harmless_m) | self.harmless_m_tenths
+        return _in_tenths(self.harmless_m, self.harmless_m_tenths)
 
     def codes_of(self, act: Act) -> frozenset[int]:
         """The G codes that do something, ten times their number."""
