@@ -80,7 +80,10 @@ class CycleBlocks:
         if made is not None:
             self._spend(made, of, refused)
         refused.raise_first()
-        assert made is not None
+        if made is None:
+            # zero repeats: the words are kept for the blocks that follow
+            self._moves = collector.moves
+            return
         self._put(context, run, frame, drilling.pick(of), place, of, times, made)
 
     def _wanting(self, run: CycleRun) -> bool:
@@ -151,10 +154,13 @@ class CycleBlocks:
         for bare in (False, True):
             mine = pointed != bare
             dwell[mine] = state.profile.dwell_s(dwell[mine], pointed=not bare)
+        peck = run.number("Q")
+        if letter := state.profile.cycles.first_peck:
+            peck = np.where(np.isnan(peck), run.number(letter), peck)
         r, z, q, p = (
             self._inherited(letter, given)
             for letter, given in (
-                ("R", run.number("R")), (depth, run.number(depth)), ("Q", run.number("Q")),
+                ("R", run.number("R")), (depth, run.number(depth)), ("Q", peck),
                 ("P", dwell),
             )
         )  # fmt: skip
@@ -194,11 +200,17 @@ class CycleBlocks:
         """(n,) how many holes each block makes: its L word, or K on ISO controls."""
         slot = self._counter(run)
         times = np.where(slot >= 0, np.rint(context.value[slot]), 1.0)
-        refused.where(
-            times < 1,
-            "a canned cycle with zero repeats only stores values, which is not read; give one or more",
-            "OLP531",
-        )
+        if self._state.profile.cycles.stores:
+            first, second, _ = PLANES[run.plane]
+            placed = np.maximum(run.slot["XYZ"[first]], run.slot["XYZ"[second]]) >= 0
+            refused.where(
+                (times == 0) & placed,
+                "a canned cycle with zero repeats stores its values, and whether it goes to its place is not "
+                "known; leave the place out",
+                "OLP531",
+            )
+        least = int(not self._state.profile.cycles.stores)
+        refused.where(times < least, "a canned cycle has zero repeats; give one or more", "OLP531")
         refused.where(times > MOST_REPEATS, lambda i: repeats_error(int(times[i])))
         return np.clip(times, 0, 1e9).astype(np.int64)
 

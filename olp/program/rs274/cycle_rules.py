@@ -9,6 +9,7 @@ The sequence is that of RS-274/NGC (NIST IR 6556, section 3.5.16) as LinuxCNC ca
   initial level with G98. Fanuc positions at its present level.
 - tapping (G84, G74) and G89 feed up to R on Fanuc, then go to the initial level as a rapid; LinuxCNC
   feeds up to the end.
+- G82, G86 and G89 need a dwell P on LinuxCNC.
 - pecks: the clearance is 0.010 inch (0.254 mm) in LinuxCNC and a parameter of the control on Fanuc
   (5114, 5115) and Haas (settings 22, 52). Where it is not known the end points of the hole hold and the
   pecks between them do not.
@@ -21,6 +22,7 @@ of G84 and G74 there along the wrong axes.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from olp.core.values import dataclass
 
@@ -36,6 +38,8 @@ class CycleRules:
     - `peck_by_parameter`: a parameter of the control gives the clearance of pecks.
     - `repeat_words`: these count the holes of a block, the first of them that is there.
     - `stores`: zero holes store the words of the cycle, else they are an error.
+    - `dwells`: these cycles need a P. `first_peck`: the letter of the first peck where there is no Q; the
+      following ones are smaller, which is not followed.
     - `new_code_forgets`: another cycle of a series takes no words from the one before.
     - `levels_follow_distance`: after a change between G90 and G91 a series needs R and depth again.
     - `keeps_numbers`: a series keeps its initial level, R and depth as numbers of the program. Offsets and
@@ -52,6 +56,8 @@ class CycleRules:
     peck_by_parameter: bool
     repeat_words: str
     stores: bool
+    dwells: frozenset[int]
+    first_peck: str = ""
     new_code_forgets: bool
     levels_follow_distance: bool
     keeps_numbers: bool
@@ -66,13 +72,15 @@ class CycleRules:
 
 NGC_CYCLES = CycleRules(
     rises_first=True, feeds_home=True, taps_in_any_plane=False, taps_by_control=False,
-    peck_by_parameter=False, repeat_words="L", stores=False, new_code_forgets=True,
+    peck_by_parameter=False, repeat_words="L", stores=False, dwells=frozenset({820, 860, 890}), new_code_forgets=True,
     levels_follow_distance=False, keeps_numbers=True, exact_corners=True,
     other_axes=False, turning={740: (4,), 840: (3,), 860: (3, 4)},
 )  # fmt: skip
 ISO_CYCLES = CycleRules(
     rises_first=False, feeds_home=False, taps_in_any_plane=True, taps_by_control=True,
-    peck_by_parameter=True, repeat_words="LK", stores=True, new_code_forgets=False,
+    peck_by_parameter=True, repeat_words="LK", stores=True, dwells=frozenset(), new_code_forgets=False,
     levels_follow_distance=True, keeps_numbers=False, exact_corners=False,
     other_axes=True, turning={},
 )  # fmt: skip
+#: K of Haas controls is the least peck, not a count.
+HAAS_CYCLES = replace(ISO_CYCLES, repeat_words="L", first_peck="I")

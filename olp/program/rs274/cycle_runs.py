@@ -14,7 +14,7 @@ from olp.program.rs274.codes import CYCLES, INCREMENTAL, PLANE_OF
 from olp.program.rs274.modes import Context
 from olp.program.rs274.state import NAN
 
-_READ = "XYZRQPLK"
+_READ = "XYZRQPLKI"
 _CYCLES = np.array(sorted(CYCLES))
 
 

@@ -21,7 +21,6 @@ from olp.program.rs274.cycle_rules import CycleRules
 _TAPPING = frozenset({740, 840})
 #: pecking cycles, and whether each peck comes back to R
 _PECKING = {730: False, 830: True}
-_DWELL_NEEDED = frozenset({820, 860, 890})
 #: pecks of a hole at most: a step far below the resolution of the numbers would never end
 _MAX_PECKS = 100_000
 
@@ -143,7 +142,7 @@ class Drilling:
                         "OLP543",
                     ),
                 )
-        if self.code in _DWELL_NEEDED:
+        if self.code in self.rules.dwells:
             yield np.isnan(p), lambda _: _error(f"{name} needs a dwell P; give P0 for none")
         yield p < 0, lambda i: _error(f"{name} has a negative dwell P {p[i]:g}; expected zero or more")
         if not self.rules.taps_in_any_plane and self.code in _TAPPING and self.plane:

@@ -278,7 +278,7 @@ def test_rests_of_holes_are_dwells_and_reversals(setup: Setup) -> None:
 #: blocks of a series that are refused, and what the refusal says
 WRONG = {
     "X2 A5": "moves A too",
-    "X3 L0": "zero repeats only stores values",
+    "X3 L0": "zero repeats; give one",
     "X4 L20001": "makes 20001 holes",
     "X5 Z5": "has R 2 below the bottom 5",
     "X6 P-1": "negative dwell P -1",

@@ -96,6 +96,9 @@ def compile_line(line: bytes, number: int, language: Language) -> Line:
     text, places, comments = _compact(raw)
     if text.startswith("%"):
         return Line(number, raw, eol, percent=True)
+    if language.macro_b and text.startswith(":"):
+        # another way to write the number of a program
+        text = "o" + text[1:]
     start = 0
     deleted = text.startswith("/")
     if deleted:

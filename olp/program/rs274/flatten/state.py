@@ -254,6 +254,12 @@ class ProgramState(State):
         series.hold(given, depth)
         repeats = self._repeats(given)
         if repeats == 0:
+            if {AXES[first], AXES[second]} & given.keys():
+                raise ProgramError(
+                    "a canned cycle with zero repeats stores its values, and whether it goes to its place is "
+                    "not known; leave the place out",
+                    code="OLP531",
+                )
             return ()
         xy, step = self._hole_and_step(given, first, second)
         if self.retract < 0:

@@ -336,8 +336,8 @@ _FANUC_HOLE = ["G0 X2.", "G0 Z1.", "G1 Z-1.", "G0 Z1."]
         # of both counts the first one holds
         ("G91 G81 X1. Z-2. R-4. K1 L2", [*_FANUC_HOLE, "G0 X3.", "G1 Z-1.", "G0 Z1."]),
         # no hole stores the words
-        ("G81 X2. Z-1. R1. K0\nX3.", ["G0 X3.", *_FANUC_HOLE[1:]]),
-        ("G81 X2. Z-1. R1. L0\nX3.", ["G0 X3.", *_FANUC_HOLE[1:]]),
+        ("G81 Z-1. R1. K0\nX3.", ["G0 X3.", *_FANUC_HOLE[1:]]),
+        ("G81 Z-1. R1. L0\nX3.", ["G0 X3.", *_FANUC_HOLE[1:]]),
         ("G91 G81 X1. Z-2. R-4. K2", [*_FANUC_HOLE, "G0 X3.", "G1 Z-1.", "G0 Z1."]),
         ("G91 G81 X1. Z-2. R-4. L2", [*_FANUC_HOLE, "G0 X3.", "G1 Z-1.", "G0 Z1."]),
         # after a change of G90 and G91 with R and depth
@@ -379,7 +379,8 @@ _NO_POINT = (
         ("G81 X2. Z-1 R1.", "OLP541", _NO_POINT.format("Z")),
         ("G81 X2. Z-1. R1", "OLP541", _NO_POINT.format("R")),
         ("G81 X2. Z-1. R1. K1.5", "OLP540", "the repeat count K is 1.5; expected an integer"),
-        ("G82 X2. Z-1. R1.", "OLP531", "G82 needs a dwell P; give P0 for none"),
+        ("G81 X2. Z-1. R1. K0", "OLP531", "a canned cycle with zero repeats stores its values, and whether it "
+         "goes to its place is not known; leave the place out"),
         ("G83 X2. Z-1. R1. Q2", "OLP541", _NO_POINT.format("Q")),
         *((f"G{code} X2. Z-1. R1.", "OLP544",
            "G74 and G84 are synchronised by the control: plain moves cannot replace them") for code in (74,
