@@ -11,8 +11,10 @@ from dataclasses import field, replace
 from typing import Any
 
 from olp.core.errors import ProgramError
+from olp.core.geometry import PLANES
 from olp.core.machine import ZERO, Setup, Vector
 from olp.core.toolpath import CutterCompensation, Frame, LengthError
+from olp.core.units import AXES
 from olp.core.values import dataclass
 from olp.program.frames import length_errors_of, tool_vector_of, touch_tool_of
 from olp.program.rs274.codes import (
@@ -26,6 +28,7 @@ from olp.program.rs274.codes import (
     MACHINE,
     METRIC,
     PATH_MODES,
+    PLANE_OF,
     ROTATION,
     SHIFTS,
     TRANSFORMS,
@@ -273,6 +276,8 @@ class AxisState(OffsetState):
             self.compensation = None
         elif code in CUTTER_COMPENSATION:
             self.compensation = switched_on(self, code, line, by_letter)
+        elif code == self.profile.return_level:
+            self._return_level(line, axis_words)
         elif code in HOMES:
             if not axis_words:
                 return replace(effect, home=(0, 1, 2))
@@ -288,6 +293,17 @@ class AxisState(OffsetState):
             self.forget(lost)
             return replace(effect, lost=lost)
         return effect
+
+    def _return_level(self, line: int, axis_words: list[tuple[int, Word]]) -> None:
+        """The level that canned cycles return to, as a number of the program."""
+        third = PLANES[PLANE_OF[self.plane]][2]
+        if [axis for axis, _ in axis_words] != [third]:
+            raise ProgramError(
+                f"the return level of canned cycles is a word {AXES[third]} alone; give it",
+                line=line,
+                code="OLP516",
+            )
+        self.return_level = self.length_mm(axis_words[0][1]) / self.unit_mm
 
     def _dwell(self, line: int, by_letter: dict[str, Word]) -> None:
         """G4: ISO controls take its time from X too; RS-274 takes it from P only, so axis words still

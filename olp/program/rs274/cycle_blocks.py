@@ -122,7 +122,10 @@ class CycleBlocks:
                 f"{name} is in a frame that turns, mirrors or scales its tool axis; end that before it",
                 "OLP518",
             )
-        refused.where(np.asarray(context.retract[line] < 0), OPEN_RETRACT, "OLP532")
+        open_return = OPEN_RETRACT
+        if modes := state.profile.return_modes:
+            open_return = f"a canned cycle has no return mode; give {' or '.join(f'M{m}' for m in modes)}"
+        refused.where(np.asarray(context.retract[line] < 0), open_return, "OLP532")
         if turning is not None:
             spindle = " or ".join(f"M{m}" for m in turning)
             still = ~is_in(context.spindle[line], turning)
@@ -143,8 +146,25 @@ class CycleBlocks:
                 refused.all(BROKEN_SERIES, "OLP518")
             if self._code != run.code and rules.new_code_forgets:
                 series.held = {}
+        if state.profile.return_level:
+            self._begin_at_level(run, refused)
         self._line, self._frame = context.chunk.first_line + int(run.line[-1]), frame_index
         self._code = run.code
+
+    def _begin_at_level(self, run: CycleRun, refused: Refused) -> None:
+        """The series returns to the level that a code of the control states."""
+        series, level = self._state.series, self._state.return_level
+        if run.incremental:
+            refused.all(
+                "what a canned cycle in G91 counts from is not known of this control; give G90", "OLP518"
+            )
+        if level is None:
+            refused.all(
+                f"a canned cycle has no level to return to; give G{self._state.profile.return_level / 10:g} "
+                "with the level before it",
+                "OLP532",
+            )
+        series.initial = NAN if level is None else level
 
     def _drilling(self, context: Context, run: CycleRun, frame_index: int, refused: Refused) -> Drilling:
         """The numbers of the blocks and those inherited from their series."""
@@ -217,8 +237,12 @@ class CycleBlocks:
     def _counter(self, run: CycleRun) -> Index:
         """(n,) the word of each block that counts its holes, -1 where there is none."""
         slot = np.full(len(run.line), -1, np.int64)
-        for letter in reversed(self._state.profile.cycles.repeat_words):
-            slot = np.where(run.slot[letter] >= 0, run.slot[letter], slot)
+        rules = self._state.profile.cycles
+        for letter in reversed(rules.repeat_words):
+            counts = run.slot[letter] >= 0
+            if rules.first_peck and letter == "K":
+                counts &= run.slot[rules.first_peck] < 0
+            slot = np.where(counts, run.slot[letter], slot)
         return slot
 
     # -- the holes ---------------------------------------------------------------------------------

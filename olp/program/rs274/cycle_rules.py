@@ -39,7 +39,7 @@ class CycleRules:
     - `repeat_words`: these count the holes of a block, the first of them that is there.
     - `stores`: zero holes store the words of the cycle, else they are an error.
     - `dwells`: these cycles need a P. `first_peck`: the letter of the first peck where there is no Q; the
-      following ones are smaller, which is not followed.
+      following ones are smaller, which is not followed, and K beside it counts no holes.
     - `new_code_forgets`: another cycle of a series takes no words from the one before.
     - `levels_follow_distance`: after a change between G90 and G91 a series needs R and depth again.
     - `keeps_numbers`: a series keeps its initial level, R and depth as numbers of the program. Offsets and
@@ -72,7 +72,8 @@ class CycleRules:
 
 NGC_CYCLES = CycleRules(
     rises_first=True, feeds_home=True, taps_in_any_plane=False, taps_by_control=False,
-    peck_by_parameter=False, repeat_words="L", stores=False, dwells=frozenset({820, 860, 890}), new_code_forgets=True,
+    peck_by_parameter=False, repeat_words="L", stores=False, dwells=frozenset({820, 860, 890}),
+    new_code_forgets=True,
     levels_follow_distance=False, keeps_numbers=True, exact_corners=True,
     other_axes=False, turning={740: (4,), 840: (3,), 860: (3, 4)},
 )  # fmt: skip
@@ -82,5 +83,5 @@ ISO_CYCLES = CycleRules(
     levels_follow_distance=True, keeps_numbers=False, exact_corners=False,
     other_axes=True, turning={},
 )  # fmt: skip
-#: K of Haas controls is the least peck, not a count.
-HAAS_CYCLES = replace(ISO_CYCLES, repeat_words="L", first_peck="I")
+#: Haas counts I, J and K as the first peck, what each is smaller, and the least one (mill operator's manual).
+HAAS_CYCLES = replace(ISO_CYCLES, first_peck="I")

@@ -97,7 +97,9 @@ class Modes:
         self._block_delete = block_delete
         profile = state.profile
         self._cycles_apart = profile.cycles_apart
-        self._claims = sorted(AXIS_VALUES | {DWELL} if profile.axis_dwell else AXIS_VALUES)
+        claims = AXIS_VALUES | {profile.return_level}
+        self._claims = sorted(claims | {DWELL} if profile.axis_dwell else claims)
+        self._returns = profile.return_modes
         # the last entry is of codes that no control has
         self._act = np.full(3000, Act.REFUSE, np.int8)
         for code, act in profile.codes.items():
@@ -174,7 +176,7 @@ class Modes:
             distance=_modal(chunk, codes, Act.DISTANCE, state.distance),
             arc_distance=_modal(chunk, codes, Act.ARC_DISTANCE, state.arc_distance),
             feed_mode=_modal(chunk, codes, Act.FEED, state.feed_mode),
-            retract=_modal(chunk, codes, Act.RETRACT, state.retract),
+            retract=self._retract(chunk, value, codes, usable),
             spindle=self._spindle(chunk, value, usable),
             event=self._events(chunk, value, codes, usable),
             consumed=self._consumed(codes, active),
@@ -228,6 +230,14 @@ class Modes:
         line, code = line[order], code[order]
         last = np.append(line[1:] != line[:-1], True)[: len(line)]
         return modal(len(chunk.line_start), line[last], code[last], self._state.turning)
+
+    def _retract(self, chunk: WordChunk, value: Array, codes: Codes, usable: Mask) -> Modal:
+        """Whether cycles return to R: by G codes, or by M codes that stand for them."""
+        if not self._returns:
+            return _modal(chunk, codes, Act.RETRACT, self._state.retract)
+        m = np.flatnonzero((chunk.letter == 77) & usable & is_in(value, list(self._returns)))
+        code = np.array([self._returns[int(number)] for number in value[m].tolist()], np.int64)
+        return _in_force(chunk, chunk.line[m], code, self._state.retract)
 
     def _keys(self, chunk: WordChunk, value: Array, codes: Codes, usable: Mask) -> tuple[Index, Index]:
         """The lines and keys of G and M codes for `block_rules`."""

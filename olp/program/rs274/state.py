@@ -106,6 +106,8 @@ class State:
     retract: int = field(init=False)
     unit: int | None = None
     series: Series = field(default_factory=Series)
+    #: program coordinate of the tool axis that cycles return to, where the control has a code for that
+    return_level: float | None = None
 
     def __post_init__(self) -> None:
         self.retract = _none(self.profile.initial_retract)

@@ -68,6 +68,16 @@ READINGS: dict[str, tuple[str, dict[str, Outcome], Any]] = {
         {OKUMA: (5, 7, 9)},
         {OKUMA: {}},
     ),
+    "return_level": (
+        "G0 X0. Y0. Z9.\nG80\nG71 Z7.\nG81 X1. R3. Z-2. F60. M53",
+        {OKUMA: (1, 0, 7)},
+        {OKUMA: 0},
+    ),
+    "return_modes": (
+        "G0 X0. Y0. Z9.\nG71 Z7.\nG81 X1. R3. Z-2. F60. M54",
+        {OKUMA: (1, 0, 3)},
+        {OKUMA: {}},
+    ),
     "offsets_alone": (
         "G54\nG0 X1. Y2. Z3.",
         {SIEMENS: (1, 2, 3)},
@@ -193,7 +203,7 @@ CYCLES: dict[str, tuple[str, dict[str, str]]] = {
         {LINUXCNC: "before any G20 or G21"} | dict.fromkeys(_ISO, "give peck_clearance_mm"),
     ),
     "stores": (
-        "G0 X0. Y0. Z9.\nG81 X1. Y1. Z-2. R3. F60. L0\nX2.",
+        "G0 X0. Y0. Z9.\nG81 Z-2. R3. F60. L0\nX2.",
         {LINUXCNC: "repeated L0 times"} | dict.fromkeys(_ISO, "F60.|G0 X2.|G0 Z3.|G1 Z-2."),
     ),
     "new_code_forgets": (
@@ -267,8 +277,9 @@ def is_it(got: Outcome, want: Outcome) -> bool:
 def test_every_field_is_read_by_hand() -> None:
     own = {f.name for f in fields(Profile)} - {f.name for f in fields(Profile.__base__)}  # type: ignore[arg-type]
     assert own == set(READINGS) | OF_TIME | TABLES | OF_STATEMENTS
-    # letters, K on Fanuc and Haas, and the spindle, which `test_interleaved` holds
-    assert {f.name for f in fields(CycleRules)} == {*CYCLES, "repeat_words", "turning", "other_axes"}
+    # letters, K on Fanuc and Haas, and the spindle, which `test_interleaved` holds; `test_controls_cycles`
+    elsewhere = {"repeat_words", "turning", "other_axes", "dwells", "first_peck"}
+    assert {f.name for f in fields(CycleRules)} == {*CYCLES, *elsewhere}
 
 
 @pytest.mark.parametrize(

@@ -64,3 +64,48 @@ def test_a_colon_begins_the_number_of_a_program(reading) -> None:  # type: ignor
     assert path(reading("X5.\n", start=start)) == path(reading("X5.\n"))
     text = fanuc(":1\nG21 G90\nM98 P2\nM98 P2\nM30\n:2\nG91 G1 X5. F9.\nG90\nM99\n")
     assert text == ":1\nG21 G90\nG91 G1 X5. F9.\nG90\nG91 G1 X5. F9.\nG90\nM30\n"
+
+
+OKUMA = "G21 G90 G17\nG0 X0. Y0. Z50.\n"
+
+
+@pytest.fixture(scope="module")
+def okuma(tmp_path_factory: pytest.TempPathFactory):  # type: ignore[no-untyped-def]
+    setup = load_setup(machine(tmp_path_factory.mktemp("m"), tables=TRUE_ZERO))
+
+    def read_(body: str) -> Program:
+        return read(f"{OKUMA}{body}M2\n".encode(), setup, DIALECTS["okuma"])
+
+    return read_
+
+
+def test_okuma_returns_to_the_level_of_g71_or_to_r(okuma) -> None:  # type: ignore[no-untyped-def]
+    """By hand: M53 goes up to the level of G71, M54 to R, whatever the height before the series was."""
+    program = okuma("G71 Z20.\nG81 X10. R2. Z-5. F100. M53\nX20.\nX30. M54\nX40.\nG80\nG0 X0. Z50.\n")
+    assert [row[::2] for row in path(program)[1:]] == [
+        [10, 50], [10, 2], [10, -5], [10, 20], [20, 20], [20, 2], [20, -5], [20, 20],
+        [30, 20], [30, 2], [30, -5], [30, 2], [40, 2], [40, -5], [40, 2], [0, 50],
+    ]  # fmt: skip
+    np.testing.assert_array_equal(program.holes.initial_mm, 20.0)
+
+
+def test_a_later_level_of_okuma_holds_from_its_own_block_on(okuma) -> None:  # type: ignore[no-untyped-def]
+    program = okuma("M53\nG71 Z20.\nG81 X10. R2. Z-5. F100.\nG71 Z30.\nX20.\nG80\n")
+    assert [row[2] for row in path(program) if row[0] in (10, 20)] == [50, 2, -5, 20, 20, 2, -5, 30]
+
+
+@pytest.mark.parametrize(
+    ("body", "code", "line", "why"),
+    [
+        ("G81 X10. R2. Z-5. F100. M53\n", "OLP532", 3, "give G71 with the level"),
+        ("G71 Z20.\nG81 X10. R2. Z-5. F100.\n", "OLP532", 4, "give M53 or M54"),
+        ("G71 Z20.\nG91 G81 X10. R2. Z-5. F100. M53\n", "OLP518", 4, "give G90"),
+        ("G71 Z20.\nG81 X10. R2. Z-5. F100. M52\n", "OLP512", 4, "upper limit of Z"),
+        ("G71 X20.\n", "OLP516", 3, "a word Z alone"),
+        ("G71 Z20.\nG76 X10. R2. Z-5. Q1. F100. M53\n", "OLP512", 4, "bore"),
+    ],
+)
+def test_what_okuma_does_not_say_is_refused(body: str, code: str, line: int, why: str, okuma) -> None:  # type: ignore[no-untyped-def]
+    with pytest.raises(ProgramError, match=why) as caught:
+        okuma(body)
+    assert (caught.value.code, caught.value.line) == (code, line)

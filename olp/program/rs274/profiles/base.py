@@ -79,6 +79,9 @@ class Profile(Dialect):
       no point.
     - `polar`: X and Y between G16 and G15 are radius and angle about program zero, which the unroller writes
       as X and Y.
+    - `return_level`: the code whose word of the tool axis states the level that canned cycles return to, 0
+      where they return to the one before their series. `return_modes`: the M codes that choose between that
+      level and R, and the G codes that do the same elsewhere.
     - `cycles_apart`: canned cycles and G80 are a separate modal group.
     - `axis_dwell`: G4 takes its time from X and U, too, and counts milliseconds where it has no point.
     - `exact_stop`: G61 stops at the end of each block, as G9 does in one, and G62 and G63 end it as G64 does.
@@ -137,6 +140,8 @@ class Profile(Dialect):
     polar: bool = False
     scales_axes: bool = False
     scales_by_parameter: bool = False
+    return_level: int = 0
+    return_modes: Mapping[int, int] = field(default_factory=dict)
     cycles_apart: bool = False
     axis_dwell: bool = False
     exact_stop: bool = False

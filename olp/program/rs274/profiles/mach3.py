@@ -56,7 +56,8 @@ DIALECT = Profile(
     text=BlockText(),
     cycles=CycleRules(
         rises_first=True, feeds_home=True, taps_in_any_plane=True, taps_by_control=True,
-        peck_by_parameter=True, repeat_words="L", dwells=frozenset({820, 860, 890}), stores=False, new_code_forgets=True,
+        peck_by_parameter=True, repeat_words="L", stores=False, dwells=frozenset({820, 860, 890}),
+        new_code_forgets=True,
         levels_follow_distance=True, keeps_numbers=False, exact_corners=False,
         other_axes=True, turning={},
     ),

@@ -379,8 +379,8 @@ _NO_POINT = (
         ("G81 X2. Z-1 R1.", "OLP541", _NO_POINT.format("Z")),
         ("G81 X2. Z-1. R1", "OLP541", _NO_POINT.format("R")),
         ("G81 X2. Z-1. R1. K1.5", "OLP540", "the repeat count K is 1.5; expected an integer"),
-        ("G81 X2. Z-1. R1. K0", "OLP531", "a canned cycle with zero repeats stores its values, and whether it "
-         "goes to its place is not known; leave the place out"),
+        ("G81 X2. Z-1. R1. K0", "OLP531", "a canned cycle with zero repeats stores its values, and whether "
+         "it goes to its place is not known; leave the place out"),
         ("G83 X2. Z-1. R1. Q2", "OLP541", _NO_POINT.format("Q")),
         *((f"G{code} X2. Z-1. R1.", "OLP544",
            "G74 and G84 are synchronised by the control: plain moves cannot replace them") for code in (74,
