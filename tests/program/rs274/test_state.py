@@ -147,7 +147,7 @@ def test_what_is_in_force_at_the_start() -> None:
         state = State(profile)
         assert (state.plane, state.distance, state.arc_distance, state.feed_mode) == (170, 900, 911, 940)
         # a setting of the control where it is -1
-        assert state.retract in (980, 990) or profile.name in ("mach3", "mach4", "marlin", "klipper")
+        assert state.retract in (980, 990) or profile.name in ("mach3", "mach4", "okuma", "marlin", "klipper")
         assert (state.motion, state.unit, state.unit_mm) == (None, None, 1.0)
         assert state.retract_to_r == (profile.name in ("linuxcnc", "grbl"))
         assert len(state.position) == 3
