@@ -38,7 +38,7 @@ def command(
 
     DATA are plans (measurements.toml), folders and files as olp calibrate fit takes them."""
     from olp.files.measurements.reader import files_of_measurements
-    from olp.reports import calibration as report_calibration
+    from olp.reports import evaluation as report_evaluation
     from olp.workflows import calibrate_report
     from olp.workflows.calibrate_evaluate import evaluate_lines
 
@@ -51,7 +51,7 @@ def command(
     if report_file is not None and report_file != STREAM:
         files[report_file] = calibrate_report.evaluation(evaluated, report_file, date)
     if plot is not None:
-        files |= numbered(plot, report_calibration.plots_of(evaluated, cast(Any, kind)))
-    text = report_calibration.to_text(evaluated)
+        files |= numbered(plot, report_evaluation.plots_of(evaluated, cast(Any, kind)))
+    text = report_evaluation.to_text(evaluated)
     as_json = as_json or report_file == STREAM
     end(result, text, files, inputs, evaluated.findings, as_json=as_json, fail_on=fail_on, force=force)

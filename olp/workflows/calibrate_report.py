@@ -10,6 +10,7 @@ from olp.core.errors import ConfigError
 from olp.core.optional import takes_plots
 from olp.core.version import __version__
 from olp.reports import calibration as report_calibration
+from olp.reports import evaluation as report_evaluation
 from olp.reports.calibration import FitSummary
 from olp.reports.document import in_form
 from olp.reports.report import to_json
@@ -21,8 +22,8 @@ def evaluation(evaluated: Evaluated, name: str, date: datetime.date | None) -> b
     ending = FilePath(name).suffix.lower()
     if ending == ".json":
         return to_json(evaluated.as_dict())
-    plots = report_calibration.plots_of(evaluated) if takes_plots(name) else {}
-    return in_form(report_calibration.evaluation(evaluated, plots, __version__, date), name)
+    plots = report_evaluation.plots_of(evaluated) if takes_plots(name) else {}
+    return in_form(report_evaluation.evaluation(evaluated, plots, __version__, date), name)
 
 
 def fit(fitted: FittedCalibration, name: str, date: datetime.date | None) -> bytes:
@@ -40,5 +41,5 @@ def fit(fitted: FittedCalibration, name: str, date: datetime.date | None) -> byt
     summary = FitSummary(fitted.fit, fitted.calibration, report, fitted.findings)
     plots: dict[str, bytes] = {}
     if takes_plots(name):
-        plots = report_calibration.fit_plots(summary) | report_calibration.plots_of(evaluated)
+        plots = report_calibration.fit_plots(summary) | report_evaluation.plots_of(evaluated)
     return in_form(report_calibration.calibration(evaluated, summary, plots, __version__, date), name)
