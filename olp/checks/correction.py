@@ -98,6 +98,8 @@ def _contour_findings(program: Program) -> list[Finding]:
     for name, line, _ in program.remarks:
         if name == "path":
             text = "contours were replaced by the path of the tool; wear at the control does not act on it"
+            if program.origin is not None:
+                text += ", and loops and subprograms are written out"
             found.append(finding("OLP314", text, [line]))
     return found
 
@@ -149,14 +151,11 @@ def proof_findings(proof: Proof, uncorrected: Index, place: Callable[[int], str]
     above = size > proof.allowed_mm
     if above.any():
         worst = int(size.argmax())
-        findings.append(
-            finding(
-                "OLP101",
-                f"{int(above.sum())} moves are above tolerance: {size[worst] * 1e3:.2f} um at line "
-                f"{place(int(path.line[worst]))}, allowed {proof.allowed_mm * 1e3:.2f} um",
-                lines_of(path, above),
-            )
-        )
+        what = f"{int(above.sum())} moves are above tolerance: {size[worst] * 1e3:.2f} um at line "
+        what += f"{place(int(path.line[worst]))}, allowed {proof.allowed_mm * 1e3:.2f} um"
+        if (above & path.compensated()).any() and proof.written.compensated().any():
+            what += "; contours under cutter compensation are among them: correct with --contour path"
+        findings.append(finding("OLP101", what, lines_of(path, above)))
     if not proof.judged.any():
         findings.append(finding("OLP107", "no move of this program could be judged"))
     untouched = (path.flag & np.uint8(Flag.PASS | Flag.MACHINE)) != 0

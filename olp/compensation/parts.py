@@ -29,7 +29,8 @@ class Parts:
     is a part of, and `head` its first part. (p, 2) in the plane: `begin` and `end` of the tool as
     commanded, its directions there in rad (`begins`, `ends`),
     `centre` of arcs, and a `guess` of the contour's point. `left` is 1 or -1, `inside` arcs have the tool on
-    their inner side. (kept, 3) `beside` are axes of rows that end beside the contour."""
+    their inner side. (kept, 3) `beside` are axes of rows that end beside the contour. `unit` is that of the
+    program, mm."""
 
     row: Index
     element: Index
@@ -47,6 +48,7 @@ class Parts:
     radius: Array
     guess: Array
     beside: Mask
+    unit: Array
 
     def __len__(self) -> int:
         return len(self.row)
@@ -96,7 +98,7 @@ class Parts:
         stated = Parts(
             row, element, head, plane, was, ought, *_tangents(elements, element, was, ought), arc,
             elements.inside[element], elements.centre[element], tool_sweep, elements.side[element],
-            elements.radius[element], own, beside,
+            elements.radius[element], own, beside, elements.unit[element],
         )  # fmt: skip
         return stated, replace(
             stated, begin=begin, end=end, begins=begins, ends=ends, centre=centre, guess=own + (end - ought)
@@ -126,7 +128,7 @@ class Parts:
             np.arange(len(self)), first, ~first, self.left, self.radius, self.plane, begin, end,
             np.where(self.arc, _angle(begin - self.centre) + quarter, angle),
             np.where(self.arc, _angle(arms) + quarter, angle), self.arc, self.centre, sweep,
-            np.hypot(*arms.T),
+            np.hypot(*arms.T), self.unit,
         )  # fmt: skip
 
 

@@ -19,11 +19,14 @@ from olp.core.toolpath import Flag, Kind, Toolpath
 from olp.core.units import AXES
 from olp.program.origin import Origin, Unrolled, origin_of
 from olp.program.program import Program
-from olp.program.rs274.codes import CUTTER_COMPENSATION
+from olp.program.rs274.codes import CUTTER_COMPENSATION, GROUPS
+from olp.program.rs274.motion import modal
 
 #: Moves whose words are not those of their end point.
 _OTHER = np.uint8(Flag.CYCLE | Flag.CONTROL | Flag.PASS | Flag.MACHINE)
 _CODE = {Kind.RAPID: b"G0", Kind.LINE: b"G1", Kind.ARC_CW: b"G2", Kind.ARC_CCW: b"G3"}
+#: G90.1, ten times its number.
+_ABSOLUTE = 901
 #: mm by which rounding may move an end or a centre
 _ALIKE_MM = 0.05
 #: mm below which an axis does not move
@@ -71,6 +74,9 @@ class _Text:
         self.blocks = np.arange(len(self.path)) if program.blocks is None else program.blocks
         self.corner = np.array([(c := f.compensation) is not None and c.corner for f in self.path.frames])
         self.arc = {int(move): i for i, move in enumerate(self.path.arcs.move)}
+        #: tenths of the numbers of words, which G codes are
+        self.tenths = np.rint(self.words.mantissa / 10.0 ** (self.words.decimals.astype(float) - 1))
+        self.absolute = self._absolute_centres()
         self.edits: dict[int, list[tuple[int, int, bytes]]] = {}
         self.before: dict[int, list[bytes]] = {}
 
@@ -127,13 +133,25 @@ class _Text:
     ) -> list[tuple[bytes, int, bytes]]:
         """The centre words of an arc: letter, index of the word or -1, number."""
         arcs, slots = self.path.arcs, self.program.arc_slots
+        corner = self.corner[self.path.frame[move]]
+        absolute = self.absolute[int(self.path.line[move])] if corner else slots.absolute[arc]
         words = []
         for axis in PLANES[int(arcs.plane[arc])][:2]:
-            zero = offset_mm[axis] if slots.absolute[arc] else at[axis]
+            zero = offset_mm[axis] if absolute else at[axis]
             places = self.style.centre(axis, unit_mm)
             number = (arcs.centre_mm[arc, axis] - zero) / unit_mm
             words.append((b"IJK"[axis : axis + 1], int(slots.word[arc, axis]), b"%.*f" % (places, number)))
         return words
+
+    def _absolute_centres(self) -> Mask:
+        """(lines + 1,) whether centres are positions (G90.1) in front of a line, by its number."""
+        words = self.words
+        code = np.flatnonzero((words.letter == ord("G")) & np.isin(self.tenths, GROUPS["arc_distance"]))
+        line = np.searchsorted(words.first_word, code, "right") + 1
+        start = -1 if self.program.rs274.arc_distance is None else self.program.rs274.arc_distance
+        count = len(self.program.line_start) + 1
+        line, code = line[line < count], code[line < count]
+        return np.asarray(modal(count, line, self.tenths[code].astype(np.int64), start) == _ABSOLUTE, bool)
 
     def _replace(self, line: int, move: int, words: list[tuple[bytes, int, bytes]]) -> None:
         """Change and insert the words of a block."""
@@ -164,8 +182,7 @@ class _Text:
     def _without_codes(self) -> None:
         """Take out the codes that switch compensation on, with their D."""
         words = self.words
-        tenths = np.rint(words.mantissa / 10.0 ** (words.decimals.astype(float) - 1))
-        code = (words.letter == ord("G")) & np.isin(tenths, sorted(CUTTER_COMPENSATION))
+        code = (words.letter == ord("G")) & np.isin(self.tenths, sorted(CUTTER_COMPENSATION))
         for word in np.flatnonzero(code).tolist():
             line = int(np.searchsorted(words.first_word, word, "right"))
             if line > self.program.end_line:

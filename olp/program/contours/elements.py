@@ -32,7 +32,7 @@ class Elements:
     `move` is the index in the path. `first` moves enter a contour, and `next` ones have the element before in
     the same contour. `side` is 1 where the tool is left, else -1. `begin` and `end` are programmed points,
     `begins` and `ends` directions there in rad. Arcs have a `centre`, a `sweep` and a `size`, their radius at
-    the end.
+    the end. `unit` is that of the program, mm.
     """
 
     move: Index
@@ -49,6 +49,7 @@ class Elements:
     centre: Array
     sweep: Array
     size: Array
+    unit: Array
 
     def __len__(self) -> int:
         return len(self.move)
@@ -61,6 +62,7 @@ class Elements:
         numbers = np.array([-1 if c is None else c.number for c in table], np.int64)
         sides = np.array([1.0 if c is None or c.left else -1.0 for c in table])
         planes = np.array([0 if c is None else c.plane for c in table], np.int8)
+        units = np.array([f.unit_mm for f in path.frames])
         move = np.flatnonzero(radii[path.frame] > 0) if len(table) else np.zeros(0, np.int64)
         frame = path.frame[move]
         plane = planes[frame]
@@ -89,7 +91,7 @@ class Elements:
         return Elements(
             move[kept], first[kept], ~first[kept], sides[frame[kept]], radii[frame[kept]], plane[kept],
             begin[kept], end[kept], begins[kept], ends[kept], is_arc[kept], centre[kept], sweep[kept],
-            size[kept],
+            size[kept], units[frame[kept]],
         )  # fmt: skip
 
     def normal(self, angle: Array) -> Array:

@@ -18,9 +18,10 @@ from olp.program.contours.elements import Elements, direction, wrapped
 from olp.program.contours.meeting import Carriers, meeting
 from olp.program.contours.rules import ContourRules
 
-#: share and rad by which an arc of the tool may be longer than the programmed one
-_LONGER = 1.01
-_LONGER_RAD = 1e-3
+#: rad by which an arc of the tool may be longer than the programmed one, times the unit of the program, mm
+_LONGER_MM = 0.0254
+#: rad; a control takes a smaller arc for a whole circle
+_NO_ARC = 1e-6
 
 
 class Corner(IntEnum):
@@ -63,7 +64,8 @@ def corners(elements: Elements, rules: ContourRules) -> tuple[npt.NDArray[np.int
     # at an arc whose outer side is cut the tool stays on that side instead of going round
     outer = elements.arc & ~elements.inside
     kind[back & np.where(elements.arc, outer, outer[before])] = Corner.INSIDE
-    turn = np.where(back, np.abs(turn), turn)
+    # about a point where the path turns back the tool always goes on the outside
+    turn = np.where(back & (turn < 0), turn + 2 * np.pi, turn)
     if rules.entry == "next":
         kind[elements.first[before] & elements.next] = Corner.ENTERED
     kind[elements.first] = Corner.ENTRY
@@ -115,10 +117,13 @@ def refusals(elements: Elements, found: Joints, rules: ContourRules) -> list[tup
     inner |= np.append(elements.first[1:], True)
     moved = ((found.end - found.begin) * direction(elements.begins)).sum(axis=1)
     swept = sweeps(elements, found)
-    long = np.abs(swept) > _LONGER * np.abs(elements.sweep) + _LONGER_RAD
-    back = np.where(elements.arc, long | (swept * elements.sweep <= 0), moved < 0)
+    gone = swept * np.sign(elements.sweep)
+    long = gone > np.abs(elements.sweep) + _LONGER_MM / elements.unit
+    back = np.where(elements.arc, long, moved < 0)
+    turns = np.ceil((np.abs(elements.sweep) - _NO_ARC) / (2 * np.pi))
+    beyond = np.ceil((gone - _NO_ARC) / (2 * np.pi)) > turns
     return [
-        (elements.first & elements.arc, "an arc is the first move of a contour; expected a straight move"),
+        (elements.first & elements.arc, "an arc is the first move of a contour; enter it by a straight move"),
         (
             elements.first & ~elements.arc & (length <= radius) & (rules.entry == "own"),
             "the first move of a contour is not longer than the cutter radius of {r:g} mm",
@@ -132,7 +137,12 @@ def refusals(elements: Elements, found: Joints, rules: ContourRules) -> list[tup
             "a cutter radius of {r:g} mm does not fit into the inside corner before this move",
         ),
         (
-            inner & back & ~elements.first,
+            elements.arc & beyond & rules.circles_by_ends,
+            "beside the contour this circle ends beyond its begin, so the control goes on from there alone; "
+            "write two arcs",
+        ),
+        (
+            (inner & back & ~elements.first) | (elements.arc & (gone <= 0)),
             "a cutter radius of {r:g} mm does not fit into the corners of this move",
         ),
     ]
@@ -144,7 +154,7 @@ def refuse(elements: Elements, found: Joints, rules: ContourRules, line: npt.NDA
     for wrong, text in refusals(elements, found, rules):
         for i in np.flatnonzero(wrong & ~done).tolist():
             what = text.format(r=elements.radius[i])
-            hint = "; make the move longer, or use a smaller cutter"
+            hint = "" if ";" in what else "; make the move longer, or use a smaller cutter"
             errors.append(ProgramError(what + hint, line=int(line[i]), code="OLP528"))
         done |= wrong
     if errors:

@@ -19,6 +19,8 @@ class ContourRules:
     - `returns`: the first move after the contour goes to all that is programmed, whatever its words; else a
       move across the plane leaves the tool beside the contour.
     - `planes`: planes (0..2) in which the control compensates.
+    - `circles_by_ends`: an arc is a whole circle where it ends at its begin alone, beside the contour.
+    - `refused_g`, `refused_m`: codes that the control does not take along contours, ten times their number.
     """
 
     entry: Literal["own", "next"]
@@ -26,10 +28,17 @@ class ContourRules:
     smooth_rad: float
     returns: bool
     planes: tuple[int, ...]
+    circles_by_ends: bool = False
+    refused_g: frozenset[int] = frozenset()
+    refused_m: frozenset[int] = frozenset()
 
 
 #: LinuxCNC, as its interpreter does it.
-NGC_CONTOURS = ContourRules("own", "arc", 0.05, returns=True, planes=(0, 1))
+NGC_CONTOURS = ContourRules(
+    "own", "arc", 0.05, returns=True, planes=(0, 1), circles_by_ends=True,
+    refused_g=frozenset({430, 431, 432, 490, 610, 611, 640, 980, 990}),
+    refused_m=frozenset({*range(480, 540, 10), *range(620, 690, 10)}),
+)  # fmt: skip
 #: Fanuc and Haas with start-up of type A and linear corners, as they are delivered.
 ISO_CONTOURS = ContourRules("next", "extended", 0.05, returns=False, planes=(0, 1, 2))
 #: Sinumerik 840D with NORM and G450, as it is delivered.

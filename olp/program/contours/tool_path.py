@@ -39,6 +39,8 @@ def follow(path: Toolpath, rules: ContourRules) -> Followed:
     elements = Elements.of(path)
     _refuse_frames(path, elements)
     _refuse_unknown(path, elements)
+    if rules.entry == "own":
+        _refuse_along_tool(path, elements)
     beside = _Beside(path, elements, rules)
     found = joints(elements, rules)
     refuse(elements, found, rules, path.line[elements.move])
@@ -144,6 +146,24 @@ def _refuse_unknown(path: Toolpath, elements: Elements) -> None:
             code="OLP528",
         )
         for i in arcs.tolist()
+    ]
+    if errors:
+        raise ProgramError.together(errors)
+
+
+def _refuse_along_tool(path: Toolpath, elements: Elements) -> None:
+    """Refuse contours whose first move does not go across the plane."""
+    contour = path.contour_number()
+    on = np.flatnonzero(path.compensated_radius_mm() > 0)
+    first = on[np.concatenate(([True], contour[on][1:] != contour[on][:-1]))[: len(on)]]
+    errors = [
+        ProgramError(
+            "the first move of a contour does not go across its plane; enter the contour by a straight move "
+            "that is longer than the cutter radius",
+            line=int(path.line[i]),
+            code="OLP528",
+        )
+        for i in first[~np.isin(first, elements.move)].tolist()
     ]
     if errors:
         raise ProgramError.together(errors)

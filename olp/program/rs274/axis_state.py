@@ -37,7 +37,7 @@ from olp.program.rs274.codes import (
     WORK_OFFSETS,
     WRITE_OFFSET,
 )
-from olp.program.rs274.cutter import check_block, switched_on
+from olp.program.rs274.cutter import check_block, check_codes_along, switched_on
 from olp.program.rs274.offset_state import OffsetState, Word
 from olp.program.rs274.offsets import Offsets
 from olp.program.rs274.profiles.base import Profile
@@ -199,6 +199,7 @@ class AxisState(OffsetState):
         check_block(self, codes, line, changes_tool=changes_tool)
         for code in sorted(codes, key=lambda code: _RANK.get(code, len(_RANK))):
             effect = self._event(code, line, by_letter, axis_words, moves, effect)
+        check_codes_along(self, [round(w.value * 10) for w in words if w.letter == "G"], m_codes, line)
         if self.profile.turns_offsets:
             self._check_turned(angle_deg, effect, line)
         return effect

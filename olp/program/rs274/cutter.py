@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Protocol
 
 from olp.core.errors import ProgramError
@@ -21,6 +21,8 @@ from olp.program.rs274.profiles.base import Profile
 
 #: What a control refuses in cutter compensation, beside what changes offsets.
 _REFUSED = PROBES | {MACHINE, *UNITS}
+#: M0, M1 and M60, ten times their number: a control ends its path before it stops.
+STOPS = frozenset({0, 10, 600})
 
 
 class _State(Protocol):
@@ -113,3 +115,22 @@ def check_block(state: _State, codes: Sequence[int], line: int, *, changes_tool:
     else:
         return
     raise ProgramError(f"{what} in cutter compensation; give G40 before", line=line, code="OLP518")
+
+
+def check_codes_along(state: _State, codes: Collection[int], m_codes: Collection[int], line: int) -> None:
+    """Refuse codes of a block, ten times their number, that a control does not take in the compensation that
+    is on behind it, and stops: the control ends its path there, so it makes no corner with the next move."""
+    if state.compensation is None:
+        return
+    rules = state.profile.contours
+    names = [f"G{code / 10:g}" for code in codes if code in rules.refused_g]
+    names += [f"M{code / 10:g}" for code in m_codes if code in rules.refused_m]
+    if names:
+        why = "is not taken by this control in cutter compensation"
+    elif state.compensation.radius_mm and not STOPS.isdisjoint(m_codes):
+        names = [f"M{code / 10:g}" for code in m_codes if code in STOPS]
+        why = "stops the control in cutter compensation, which makes no corner with the next move then"
+    else:
+        return
+    where = "put it before the contour, or behind G40"
+    raise ProgramError(f"{names[0]} {why}; {where}", line=line, code="OLP518")

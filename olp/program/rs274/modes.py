@@ -20,6 +20,8 @@ from olp.program.rs274.axis_state import AxisState
 from olp.program.rs274.block_rules import M
 from olp.program.rs274.codes import (
     AXIS_VALUES,
+    COMPENSATION_OFF,
+    CUTTER_COMPENSATION,
     DWELL,
     END_OF_CYCLES,
     GROUPS,
@@ -253,7 +255,22 @@ class Modes:
         m = np.flatnonzero((letter == 77) & usable)
         event[line[m[self._m_event[np.clip(np.rint(value[m] * 10), 0, 10_000).astype(np.int64)]]]] = True
         event[line[(letter == 84) & usable]] = True
+        # along a contour, these are checked too
+        on = self._compensated(codes, len(event))
+        if on is not None:
+            stated = (codes.act == Act.PLANE) | is_in(codes.code, self._state.profile.contours.refused_g)
+            some = np.append(codes.line[stated], line[m])
+            event[some] |= on[some]
         return event
+
+    def _compensated(self, codes: Codes, lines: int) -> Mask | None:
+        """(lines,) whether cutter compensation is on before or behind a line; None where it is nowhere."""
+        switch = is_in(codes.code, CUTTER_COMPENSATION | {COMPENSATION_OFF})
+        before = self._state.compensation is not None
+        if not switch.any() and not before:
+            return None
+        on = modal(lines, codes.line[switch], codes.code[switch] != COMPENSATION_OFF, before) != 0
+        return np.asarray(on | np.append(before, on[:-1]), bool)
 
     def _consumed(self, codes: Codes, active: Mask) -> Mask:
         consumed = ~active
