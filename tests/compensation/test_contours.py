@@ -153,6 +153,8 @@ def test_a_path_keeps_distances_centres_and_units(tmp_path: Path) -> None:
         "G91": b"G1 X20 Y-10\nG91 G42 D1 X20 Y10\nX40\nG3 X10 Y10 J10\nG1 Y40\nX-50\nY-50\n"
         b"G40 X-20 Y-10\nG90\n",
         "R": absolute.replace(b"I0 J10", b"R10"),
+        "G90.1": b"G90.1\n" + absolute.replace(b"I0 J10", b"I80 J10"),
+        "G91.1": b"G90.1\nG91.1\n" + absolute + b"G90.1\n",
     }
     wanted = corrected(tmp_path, absolute, contour="path")
     for name, text in same.items():
@@ -160,5 +162,16 @@ def test_a_path_keeps_distances_centres_and_units(tmp_path: Path) -> None:
         assert b"G42" not in result.data
         assert result.position_mm == pytest.approx(wanted.position_mm, abs=1e-9), name
         assert result.report["deviation"]["holds"], name
-    with pytest.raises(ProgramError, match="cannot be written as blocks"):
-        corrected(tmp_path, b"G90.1\n" + absolute.replace(b"G3 X90 Y10 I0 J10", b"X90 Y10"), contour="path")
+
+
+def test_above_tolerance_along_a_contour_the_path_of_the_tool_is_named(tmp_path: Path) -> None:
+    slanted = b"G41 D1 X20 Y20\nX100 Y30\nX20 Y60\nG40 G0 X0 Y0\n"
+    above = corrected(tmp_path, slanted, PLAY)
+    (one,) = [f.message for f in above.findings if f.code == "OLP101"]
+    assert one.endswith("correct with --contour path")
+    path = corrected(tmp_path, slanted, PLAY, contour="path")
+    assert path.report["deviation"]["holds"]
+    edited = path.data.replace(b"G40 G0 X", b"G1 Z1\nG40 G0 X")
+    found = olp.verify(HEAD + slanted + b"M2\n", edited, tmp_path / "machine.toml").findings
+    (other,) = [f.message for f in found if f.code == "OLP101"]
+    assert "contour" not in other

@@ -101,7 +101,71 @@ REFUSED = {
     b"G41 D1 G1 X20 Y0\nX60\nG3 X60 Y8 J4\nG1 X20\n": (5, "does not fit into this arc"),
     b"G41 D1 G1 X20 Y0\nX60\nY4\nX20\nY40\n": (5, "does not fit into the corners of this move"),
     b"G41 D1 G1 X20 Y0\nX60\nG40 G2 X70 Y10 I10\n": (5, "the move behind a contour"),
+    b"G41 D1\nG1 Z0\nX20 Y0\nX60\n": (4, "does not go across its plane"),
+    b"G41 D1\nG0 Z0\nX20 Y0\nX60\nG40 X90\nG41 D1 Z9\nX120\n": (4, "does not go across its plane"),
+    # tangents that differ by 0.001 let the circle end behind its begin
+    b"G41 D1 G1 X20 Y0\nX60\nG2 X60 Y0 I-0.02 J-20\nG1 X90\n": (5, "this circle ends beyond its begin"),
 }
+IN_CONTOUR = {
+    b"M0": "M0 stops the control", b"M1": "M1 stops the control", b"M60": "M60 stops the control",
+    b"X30 M1": "M1 stops the control", b"G64 P0.1": "G64 is not taken", b"G61": "G61 is not taken",
+    b"G98": "G98 is not taken", b"M48": "M48 is not taken", b"M64 P0": "M64 is not taken",
+    b"G43 H1": "G43 is not taken", b"G49": "G49 is not taken", b"G18": "a change of plane is",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("block", IN_CONTOUR)
+def test_blocks_that_a_control_does_not_take_along_a_contour(tmp_path: Path, block: bytes) -> None:
+    line, why = refused(tmp_path, b"G41 D1 G1 X20 Y0\n%s\nX60 Y20\nG40 G1 X90\n" % block)
+    assert line == 4
+    assert IN_CONTOUR[block] in why
+    program(tmp_path, b"G41 D1 G1 X20 Y0\nX60 Y20\nG40 G1 X90\n%s\n" % block)
+
+
+def test_codes_of_g40_and_stops_of_a_cutter_without_radius_are_taken(tmp_path: Path) -> None:
+    program(tmp_path, b"G41 D1 G1 X20 Y0\nX60 Y20\nG40 G49 G64 M1\n")
+    program(tmp_path, b"G41.1 D0 G1 X20 Y0\nM1\nX60 Y20\nG40 X80\n")
+    line, _ = refused(tmp_path, b"G64 G1 X9 Y9\nG41 D1 G61 X20 Y0\nX60 Y20\nG40\n")
+    assert line == 4
+
+
+def test_round_a_point_where_the_path_turns_back_the_tool_goes_outside(tmp_path: Path) -> None:
+    """By a little more than half a turn, and by a little less."""
+    for y in (1, -1):
+        path = program(tmp_path, b"G42 D1 G1 X20 Y0\nX60\nX20 Y%d\nG40 X0\n" % y).toolpath
+        off = np.arctan2(y, -40) % (2 * np.pi)
+        assert path.arcs.sweep_rad == pytest.approx([off]), y
+
+
+def line_and_arc(corner: float, sweep: float, radius: float, unit: float = 1.0) -> bytes:
+    """A line, and an arc to the left with a corner of some rad before it; the tool is on its inner side."""
+    begin, centre = 60 + 0j, 60 + radius * 1j * np.exp(1j * corner)
+    end = centre + (begin - centre) * np.exp(1j * sweep)
+    x, i = end / unit, (centre - begin) / unit
+    text = b"G41 D1 G1 X%.6f Y0\nX%.6f\nG3 X%.6f Y%.6f I%.6f J%.6f\nG1 X%.6f Y%.6f\nG40 X0\n"
+    far = end + 30 * np.exp(1j * (corner + sweep))
+    return text % (20 / unit, 60 / unit, x.real, x.imag, i.real, i.imag, far.real / unit, far.imag / unit)
+
+
+def test_how_much_longer_an_arc_may_be_depends_on_the_unit(tmp_path: Path) -> None:
+    """The tool's arc is longer than the programmed one by 0.03 rad x 5 / 12, and a corner behind it makes it
+    look there."""
+    behind = b"G40 G1 X0\n"
+
+    def text(corner: float, radius: float, unit: float = 1.0) -> bytes:
+        return line_and_arc(corner, 0.7, radius, unit).rpartition(b"G1 X")[0] + behind
+
+    assert len(program(tmp_path, text(-0.03, 17.0)).toolpath) == 5
+    assert "corners of this move" in refused(tmp_path, b"G20\n" + text(-0.03, 17.0, 25.4))[1]
+    assert "corners of this move" in refused(tmp_path, text(-0.04, 11.0))[1]
+    assert len(program(tmp_path, b"G20\n" + text(0.03, 17.0, 25.4)).toolpath) == 5
+
+
+def test_a_short_arc_that_the_tool_would_go_back_is_refused(tmp_path: Path) -> None:
+    """Between corners that are none, a control would go round nearly a whole turn."""
+    assert len(program(tmp_path, line_and_arc(0.04, 0.1, 8.0)).toolpath) == 6
+    line, why = refused(tmp_path, line_and_arc(0.04, 0.05, 8.0))
+    assert (line, "corners of this move" in why) == (5, True)
 
 
 @pytest.mark.parametrize("text", REFUSED)
