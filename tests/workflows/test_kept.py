@@ -262,3 +262,35 @@ def test_calls_at_several_places_go_the_same_way(machine: Path, seed: int) -> No
     lines = {line for finding in kept.findings if finding.code == "OLP110" for line in finding.lines}
     assert kept.data.count(b"M98") <= text.count(b"M98") - len(lines)
     assert lines
+
+
+def test_a_kept_program_above_tolerance_is_written_where_unrolling_does_not_help(tmp_path: Path) -> None:
+    """No block takes up backlash along a contour, kept or not."""
+    machine = machines.random_machine(tmp_path, 3, machines.Recipe(backlash_um={"X": 8.0}, directed=""))
+    contour = "G41.1 D8 G1 X30 Y40 Z-1\nX60 Y45\nX35 Y90\nG40 X10 Y10 Z5\n"
+    text = f"{HEAD}M98 P100\nM2\nO100\n{contour}M99\n".encode()
+    kept = olp.correct(text, machine)
+    assert not kept.report["verdict"]["ok"]
+    assert b"M98 P100" in kept.data and b"G41.1" in kept.data
+    codes = [finding.code for finding in kept.findings]
+    assert "OLP109" in codes and "OLP101" in codes
+    assert not olp.correct(text, machine, flatten=True).report["verdict"]["ok"]
+    path = olp.correct(text, machine, contour="path")
+    assert path.report["verdict"]["ok"]
+    assert b"M98" not in path.data
+    (found,) = (finding for finding in path.findings if finding.code == "OLP314")
+    assert found.message.endswith("loops and subprograms are written out")
+
+
+def test_a_program_that_is_worse_when_kept_is_refused(machine: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As a fault in keeping would make it: the numbers of one line are those of the nominal program."""
+    from olp.program.rs274.flatten import kept
+
+    of_visits = kept._of_visits
+    monkeypatch.setattr(
+        kept,
+        "_of_visits",
+        lambda source, *rest: source if source.startswith(b"N20") else of_visits(source, *rest),
+    )
+    with pytest.raises(ProgramError, match=r"above the tolerance then.*--flatten"):
+        olp.correct(SPRING.encode(), machine)
