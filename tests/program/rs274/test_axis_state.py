@@ -472,7 +472,7 @@ def test_offsets_are_refused_in_cutter_compensation(text: str, setups: dict[str,
     said = refusal(f"{before}G81 X5 Z1 R2\nM2\n", setups["linuxcnc"])
     assert said["why"] == "the cycle G81 is in cutter compensation; give G40 before it"
     program(f"{before}G40\n{text}\nM2\n", setups["linuxcnc"])
-    program(f"{before}G43 H2\nG4 P1\nG61\nM2\n", setups["linuxcnc"])
+    program(f"{before}G4 P1\nM8\nM2\n", setups["linuxcnc"])
 
 
 @pytest.mark.parametrize(
