@@ -161,6 +161,7 @@ def _row(verdict: Verdict) -> dict[str, Any]:
         "sigma": verdict.sigma,
         "standard_deviations": verdict.z,
         "effect_rms_um": verdict.effect_mm * UM_PER_MM,
+        "excluded": ", ".join(verdict.excluded),
     }
 
 
@@ -184,15 +185,24 @@ def _findings(diagnosis: Diagnosis, advice: Advice | None) -> Iterator[Finding]:
             yield Finding("OLP831", f"{verdict.name} {', '.join(words)}: {spread}")
         elif verdict.unit == "no factor explains":
             yield Finding("OLP831", f"{verdict.name} in no known unit: {spread}")
+    for verdict in diagnosis.not_as_stated:
+        off = abs(verdict.factor - 1.0) / verdict.sigma
+        yield Finding(
+            "OLP831",
+            f"{verdict.name} is not as stated, its mistake undecided: factor {verdict.factor:.3g} with "
+            f"a standard uncertainty of {verdict.sigma:.2g}, {off:.1f} of them from 1; excluded: "
+            + ", ".join(verdict.excluded),
+        )
     for change in diagnosis.arrangements:
         yield Finding("OLP832", change.words)
-    if diagnosis.undecided:
-        names = ", ".join(v.name for v in diagnosis.undecided)
+    doubtful = [v for v in diagnosis.undecided if v not in diagnosis.not_as_stated]
+    if doubtful:
+        names = ", ".join(v.name for v in doubtful)
         doubts = f"; not excluded: {'; '.join(diagnosis.doubts)}" if diagnosis.doubts else ""
         hint = ""
         if advice is not None and len(advice.axis_mm):
             hint = f"; {len(advice.axis_mm)} points that would decide more are proposed"
-        yield Finding("OLP833", f"{names}{doubts}{hint}", count=len(diagnosis.undecided))
+        yield Finding("OLP833", f"{names}{doubts}{hint}", count=len(doubtful))
     if not diagnosis.explained:
         yield Finding(
             "OLP834",

@@ -113,6 +113,8 @@ def judged(diagnosis: Diagnosis, done: Done) -> Trial:
             counts["sign right"] += 1
         else:
             wrong.append(f"{verdict.name} is {verdict.sign}, {spread}, true {true:g}")
+        if {1.0: "right", -1.0: "flipped"}.get(true) in verdict.excluded:
+            wrong.append(f"{verdict.name}: the truth is excluded, {spread}, true {true:g}")
         if verdict.unit not in ("undecided",):
             good = verdict.unit != "no factor explains" and abs(verdict.applied / true - 1.0) < 1e-6
             counts["unit right" if good else "unit wrong"] += 1

@@ -48,6 +48,28 @@ def test_no_wrong_decision_among_blunders(seed: int) -> None:
     assert one.counts["sign right"] > 5
 
 
+@pytest.mark.slow
+def test_an_undecided_curve_that_cannot_be_right_is_told() -> None:
+    """Few points do not settle which mistake it is; that it is one is told, and never of a good curve."""
+    told = 0
+    for seed in range(4):
+        one = trial(seed, 50, 0.015)
+        assert one.wrong == []
+        told += len(one.diagnosis.not_as_stated)
+        for verdict in one.diagnosis.not_as_stated:
+            assert verdict.sign == "undecided" and verdict.factor != pytest.approx(1.0, abs=0.4)
+    assert told > 0
+
+
+def test_what_is_decided_excludes_the_rest() -> None:
+    calibration, points = case(4)
+    diagnosis = diagnose(scaled(calibration, {"EXX": -1.0}), "FXYZ", points)
+    of = {v.name: v for v in diagnosis.verdicts}
+    assert of["EXX"].excluded == ("right", "absent") and of["EYY"].excluded == ("flipped", "absent")
+    assert not diagnosis.not_as_stated
+    assert all("right" not in v.excluded for v in diagnosis.verdicts if v.name != "EXX")
+
+
 def test_curves_in_the_other_sense_are_put_right_exactly() -> None:
     calibration, points = case(4)
     flipped = {"EXX": -1.0, "EYY": -1.0, "C0Y": -1.0}

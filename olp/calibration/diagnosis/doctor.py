@@ -6,12 +6,14 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
 
 from olp.calibration.diagnosis.arrangements import Arrangement, arrangements, scaled
 from olp.calibration.diagnosis.factors import (
+    CHANGE,
     Checkpoints,
     Factors,
     Marginal,
@@ -39,10 +41,14 @@ LIKELY = 0.9995
 HOPELESS = 80.0
 #: Reduced chi-square above which no factor explains the points.
 MISFIT = 9.0
+#: A factor so many standard deviations from the estimate is excluded.
+EXCLUDED = 5.0
 #: A residual so many standard deviations long is reported as an outlier.
 OUTLIER = 5.0
 
 Sign = Literal["right", "flipped", "absent", "undecided"]
+#: The factor of each sign in the unit that is stated.
+_FACTORS: Mapping[Sign, float] = MappingProxyType({"right": 1.0, "flipped": -1.0, "absent": 0.0})
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +56,8 @@ class Verdict:
     """The verdict on one curve or squareness. `factor` with `sigma` is the estimate from the points.
     `applied` is the decided factor: 1 where nothing is decided, and where the curve is absent, as the control
     may correct it. `unit` is "right", "undecided", "no factor explains" or the mistake that was found.
-    `effect_mm` is the rms of its effect at the points as stated."""
+    `effect_mm` is the rms of its effect at the points as stated. `excluded` are those of "right", "flipped"
+    and "absent" that the points exclude, also where nothing is decided."""
 
     name: str
     sign: Sign
@@ -59,6 +66,7 @@ class Verdict:
     sigma: float
     applied: float
     effect_mm: float
+    excluded: tuple[Sign, ...] = ()
 
     @property
     def z(self) -> float:
@@ -87,6 +95,11 @@ class Diagnosis:
     @property
     def undecided(self) -> tuple[Verdict, ...]:
         return tuple(v for v in self.verdicts if v.sign == "undecided")
+
+    @property
+    def not_as_stated(self) -> tuple[Verdict, ...]:
+        """Those of which no mistake is decided, but that cannot be right."""
+        return tuple(v for v in self.undecided if "right" in v.excluded)
 
     @property
     def wrong(self) -> tuple[Verdict, ...]:
@@ -282,6 +295,17 @@ def _verdict(
         marginal.sigma,
         applied,
         float(np.sqrt(np.mean(column**2))),
+        () if doubted else _excluded([marginal, *(o for o in others if o is not None)]),
+    )
+
+
+def _excluded(marginals: Sequence[Marginal]) -> tuple[Sign, ...]:
+    """The signs that every arrangement which is not excluded puts far off the estimate; a curve that is as
+    stated may have changed by a share of itself since."""
+    return tuple(
+        sign
+        for sign, factor in _FACTORS.items()
+        if all(abs(m.factor - factor) > EXCLUDED * math.hypot(m.sigma, CHANGE * factor) for m in marginals)
     )
 
 
