@@ -158,8 +158,10 @@ def _component_tables(report: Mapping[str, Any]) -> Iterator[Block]:
     rows = []
     for row in report["squareness"]:
         angle = angle_words(row["name"], row["value_urad"] * RAD_PER_URAD)
-        rows.append([row["name"], angle, number(row["value_urad"]), number(2.0 * row["sigma_urad"])])
-    yield Grid(["squareness", "", "urad", "+-"], rows, text_columns=2)
+        figures = [row[f"{place}{key}_urad"] for place in ("", "mid_box_") for key in ("value", "sigma")]
+        shown = [number(value * (1.0, 2.0)[k % 2]) for k, value in enumerate(figures)]
+        rows.append([row["name"], f"{angle}; mid-box {row['in_the_middle']}", *shown])
+    yield Grid(["squareness", "", "urad", "+-", "mid-box", "+-"], rows, text_columns=2)
     for name, title in (("sets_of_points", "points"), ("diagonals_and_circles", "diagonals and circles")):
         sets = report.get(name) or ()
         if not sets:

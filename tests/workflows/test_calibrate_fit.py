@@ -312,6 +312,21 @@ def test_the_example_finds_the_errors_that_were_simulated(example: Path) -> None
         assert simulated.rms_um(simulated.off_frame(position_mm, rest)) < 3.0
 
 
+def test_squareness_is_stated_where_a_square_is_put(example: Path) -> None:
+    """At the datum as it is written, and in the middle of the box; where the pair of lines crossed it is what
+    the square showed there."""
+    fitted = olp.fit_calibration(example, example / "machine.toml")
+    pairs = {pair.reading.component: pair.reading for pair in olp.evaluate_lines([example]).pairs}
+    for name, reading in pairs.items():
+        row = fitted.fit.squareness_at(name, np.array(reading.line_mm), np.array(reading.tool_mm))
+        assert row @ fitted.fit.theta == pytest.approx(reading.value_rad, abs=2e-6)
+    rows = {row["name"]: row for row in fitted.report["squareness"]}
+    assert rows["C0Y"]["value_urad"] > rows["C0Y"]["mid_box_value_urad"] + 20.0
+    assert {name: row["in_the_middle"] for name, row in rows.items()} == {
+        "C0Y": "Y leans to -X", "B0Z": "Z leans to -X", "A0Z": "Z leans to -Y",
+    }  # fmt: skip
+
+
 def test_the_calibration_corrects_a_program(example: Path) -> None:
     program = PROGRAMS / "gantry-plate" / "plate.ngc"
     result = olp.correct(program, example / "machine.toml")

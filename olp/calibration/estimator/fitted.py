@@ -10,12 +10,16 @@ import numpy as np
 from olp.calibration.estimator.basis import Step
 from olp.calibration.estimator.parameters import CROSS, LEVER_ARM_MM, Parameters, frame_columns, turned_by
 from olp.calibration.estimator.prior import Prior
+from olp.calibration.iso230.conventions import AXES_OF, LEAN
 from olp.calibration.observations.base import Outlier, Result, S, ScatteredState
 from olp.calibration.observations.measurements import Measurements
 from olp.core.arrays import Array
 from olp.core.units import AXES
 from olp.core.values import dataclass
 from olp.errormodel.quality import Fitted, Quality
+
+#: Positions along a line from which its mean slope is taken.
+_ALONG = 41
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -158,3 +162,17 @@ class Fit:
         return np.asarray(
             functional + sign * (self.parameters.slopes[first] + self.parameters.slopes[second])
         )
+
+    def squareness_at(self, name: str, place_mm: Array, tool_mm: Array) -> Array:
+        """(size,) the squareness of lines through an axis position (3,), over the box and with a tool vector
+        (3,), as functional of theta: what a square would show there. Angles of the axes are in it."""
+        earlier, later = AXES_OF[name]
+        total = np.zeros(self.parameters.size)
+        for along, across in ((earlier, later), (later, earlier)):
+            low, high = self.box_mm[along].tolist()
+            q = np.linspace(low, high, _ALONG)
+            position = np.tile(np.asarray(place_mm, float), (_ALONG, 1))
+            position[:, along] = q
+            weight = (q - q.mean()) / float(((q - q.mean()) ** 2).sum())
+            total += weight @ self.design(position, tool_mm)[:, across]
+        return LEAN[name] * total

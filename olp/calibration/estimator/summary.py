@@ -12,9 +12,10 @@ import numpy as np
 from olp.calibration.estimator.curves import half_of, joints_of, sigma_of
 from olp.calibration.estimator.fitted import Fit
 from olp.calibration.estimator.parameters import LEVER_ARM_MM, SHEAR
+from olp.calibration.iso230.conventions import lean_words
 from olp.calibration.observations.base import rms, unit_of
 from olp.core.arrays import Array
-from olp.core.machine import COMPONENTS, SQUARENESS, Vector
+from olp.core.machine import COMPONENTS, SQUARENESS, ZERO, Vector
 from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM
 from olp.errormodel.calibration import Calibration
 
@@ -206,12 +207,16 @@ def _sections(fit: Fit) -> dict[str, Any]:
 
 
 def _square_row(fit: Fit, name: str) -> dict[str, Any]:
-    row = fit.squareness(name)
-    return {
-        "name": name,
-        "value_urad": float(row @ fit.theta) / RAD_PER_URAD,
-        "sigma_urad": math.sqrt(float(row @ fit.covariance @ row)) / RAD_PER_URAD,
-    }
+    """A squareness in the gauge of the datum, as it is written; and that of lines through the middle of the
+    box with the tool vector of most lines, where a square would be put."""
+    lines = [line.tool_mm for line in fit.measurements.lines if line.quantity != "angle"]
+    tool = np.array(max(lines, key=lines.count) if lines else ZERO)
+    middle = fit.squareness_at(name, fit.box_mm.mean(axis=1), tool)
+    values = {}
+    for key, row in (("", fit.squareness(name)), ("mid_box_", middle)):
+        values[f"{key}value_urad"] = float(row @ fit.theta) / RAD_PER_URAD
+        values[f"{key}sigma_urad"] = math.sqrt(max(float(row @ fit.covariance @ row), 0.0)) / RAD_PER_URAD
+    return {"name": name, **values, "in_the_middle": lean_words(name, float(middle @ fit.theta))}
 
 
 def _frame_row(fit: Fit) -> dict[str, Any]:

@@ -12,15 +12,16 @@ In one direction alone g and the servo mismatch are one column: such a circle gi
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from olp.calibration.iso230.conventions import LEAN
+from olp.calibration.observations.base import correlation_factor
 from olp.calibration.observations.circles import PLANES, SKIP_DEG, UNKNOWNS, Circles, columns
 from olp.calibration.observations.squareness import SquarenessReading
-from olp.core.arrays import Array, Index
+from olp.core.arrays import Array, Index, distinct
 from olp.core.errors import ConfigError
 from olp.core.units import RAD_PER_URAD, UM_PER_MM
 from olp.core.values import dataclass
@@ -51,8 +52,7 @@ class CircleFit:
     residual: Array
     used: Array
     noise: float
-    circular: dict[int, float]
-    hysteresis: float | None
+    figures: Mapping[str, float]
 
     @property
     def one_way(self) -> bool:
@@ -110,11 +110,7 @@ class CircleFit:
             "plane": c.plane, "file": c.source, "radius_mm": c.radius_mm, "centre_mm": list(c.centre_mm),
             "noise_um": self.noise * UM_PER_MM,
         }  # fmt: skip
-        for d, name in ((1, "G_ccw_um"), (-1, "G_cw_um")):
-            if d in self.circular:
-                report[name] = self.circular[d] * UM_PER_MM
-        if self.hysteresis is not None:
-            report["H_um"] = self.hysteresis * UM_PER_MM
+        report |= {f"{name}_um": value * UM_PER_MM for name, value in self.figures.items()}
         values = []
 
         def add(name: str, key: str, unit: str, factor: float) -> None:
@@ -165,13 +161,13 @@ def fit(circles: Circles, *, skip_deg: float = SKIP_DEG) -> CircleFit:
     noise = float(np.sqrt((residual[used] ** 2).sum() / max(dof, 1)))
     spread = max(noise * _correlation_factor(circles, residual, used), circles.sigma)
     sigma = spread * np.sqrt(np.diag(inverse @ inverse.T))
-    circular, hysteresis = _figures(circles, estimate)
-    return CircleFit(circles, estimate, sigma, determined, residual, used, noise, circular, hysteresis)
+    return CircleFit(
+        circles, estimate, sigma, determined, residual, used, noise, figures_of(circles, estimate[1:3])
+    )
 
 
 def _correlation_factor(circles: Circles, residual: Array, used: Array) -> float:
-    """Factor on the uncertainty of a mean because residuals of neighbours on the circle are correlated, from
-    straightness and scales: sqrt((1 + r) / (1 - r)) with the autocorrelation r of the first order."""
+    """Factor because residuals of neighbours on the circle are alike, from straightness and scales."""
     product = square = 0.0
     for d in (1, -1):
         for run in np.unique(circles.run[circles.direction == d]):
@@ -179,30 +175,41 @@ def _correlation_factor(circles: Circles, residual: Array, used: Array) -> float
             rest = residual[rows[np.argsort(circles.angle_rad[rows] % (2.0 * np.pi))]]
             product += float(rest[:-1] @ rest[1:])
             square += float(rest @ rest)
-    correlation = min(max(product / square, 0.0), 0.99) if square > 0.0 else 0.0
-    return float(np.sqrt((1.0 + correlation) / (1.0 - correlation)))
+    return correlation_factor(product, square)
 
 
-def _figures(circles: Circles, estimate: Array) -> tuple[dict[int, float], float | None]:
-    """Circular deviation G of each direction (the largest of its runs) and hysteresis H (of the mean runs),
-    the centre of the least-squares circle taken out (ISO 230-4, 3.2 to 3.4)."""
+def figures_of(circles: Circles, centre: Array) -> dict[str, float]:
+    """The figures of ISO 230-4 in mm, with the centre (2,) of the least-squares circle taken out.
+
+    `G_ccw`, `G_cw`: circular deviation of each direction. `F_max_ccw`, `F_min_ccw` and so on: largest and
+    least deviation from the nominal radius. Of both directions together: `G_b`, the circular deviation of
+    both paths, the first run with the first and so on. `H`, the hysteresis of the mean runs. `D`, the mean
+    radial deviation. Of several runs the largest counts.
+    """
     t = circles.angle_rad % (2.0 * np.pi)
-    centred = circles.value - estimate[1] * np.cos(t) - estimate[2] * np.sin(t)
-    circular: dict[int, float] = {}
-    means = {}
+    centred = circles.value - centre[0] * np.cos(t) - centre[1] * np.sin(t)
+    figures: dict[str, float] = {}
     grid = np.arange(_ANGLES) * 2.0 * np.pi / _ANGLES
-    for d in (1, -1):
-        laps = []
-        for run in np.unique(circles.run[circles.direction == d]):
+    laps: dict[int, list[Array]] = {1: [], -1: []}
+    ends: dict[int, list[tuple[float, float]]] = {1: [], -1: []}
+    for d, way in ((1, "ccw"), (-1, "cw")):
+        for run in distinct(circles.run[circles.direction == d]).tolist():
             rows = (circles.direction == d) & (circles.run == run)
-            circular[d] = max(circular.get(d, 0.0), float(np.ptp(centred[rows])))
+            own = centred[rows]
+            ends[d].append((float(own.min()), float(own.max())))
             order = np.argsort(t[rows])
-            laps.append(np.interp(grid, t[rows][order], centred[rows][order], period=2.0 * np.pi))
-        if laps:
-            means[d] = np.mean(laps, axis=0)
-    if len(means) < 2 or not _whole(t, circles.direction):
-        return circular, None
-    return circular, float(np.abs(means[1] - means[-1]).max())
+            laps[d].append(np.interp(grid, t[rows][order], own[order], period=2.0 * np.pi))
+        if ends[d]:
+            figures[f"G_{way}"] = max(high - low for low, high in ends[d])
+            figures[f"F_max_{way}"] = max(high for _, high in ends[d])
+            figures[f"F_min_{way}"] = min(low for low, _ in ends[d])
+    if laps[1] and laps[-1] and _whole(t, circles.direction):
+        pairs = zip(ends[1], ends[-1], strict=False)
+        figures["G_b"] = max(max(a[1], b[1]) - min(a[0], b[0]) for a, b in pairs)
+        means = [np.mean(laps[d], axis=0) for d in (1, -1)]
+        figures["H"] = float(np.abs(means[0] - means[1]).max())
+        figures["D"] = float(np.mean(means))
+    return figures
 
 
 def _whole(angle: Array, direction: Index) -> bool:

@@ -71,6 +71,17 @@ def angle_words(component: str, value_rad: float) -> str:
     return f"{first} to {second}: 90 deg {'-' if more < 0 else '+'} {abs(more):.2f} urad"
 
 
+def lean_words(component: str, value_rad: float) -> str:
+    """To which side the later axis leans, such as "Y leans to +X"."""
+    first, second = ("XYZ"[i] for i in AXES_OF[component])
+    lean = LEAN[component] * value_rad
+    return (
+        f"{second} leans to {'-' if lean < 0 else '+'}{first}"
+        if lean
+        else f"{second} does not lean to {first}"
+    )
+
+
 def _factor(component: str, convention: str) -> float:
     if component not in SQUARENESS:
         raise UsageError(f"squareness {component!r}; expected one of {', '.join(SQUARENESS)}")

@@ -10,7 +10,7 @@ import numpy as np
 from olp.calibration.estimator.normal import Block
 from olp.calibration.estimator.parameters import Unknowns
 from olp.calibration.iso230.positioning import Statistics, statistics, targets_of
-from olp.calibration.observations.base import Noise, Observation, scatter_words
+from olp.calibration.observations.base import Noise, Observation, correlation_factor, scatter_words
 from olp.calibration.observations.lines import Line, drift_ramps, noise_of
 from olp.calibration.observations.radial import AlongState, along_block
 from olp.core.arrays import Array, Index
@@ -86,7 +86,8 @@ class Diagonal(Observation):
     def elongation(self) -> tuple[float, float]:
         """Slope of the deviation along the diagonal by least squares (mm/mm), and its standard uncertainty.
         That follows from the scatter of the readings (or `sigma`), or from the deviations of the target means
-        from the line: the larger one counts."""
+        from the line: the larger one counts. Curves of the axes make neighbouring deviations alike, so they
+        count as fewer (`correlation_factor`)."""
         x = self.distance_mm - self.distance_mm.mean()
         spread = float(x @ x)
         if spread == 0.0:
@@ -97,6 +98,7 @@ class Diagonal(Observation):
         target, place = targets_of(self.distance_mm)
         means = np.bincount(place, rest) / np.bincount(place)
         bow = float(np.sqrt(means @ means / (len(target) - 2))) if len(target) > 2 else 0.0
+        bow *= correlation_factor(float(means[:-1] @ means[1:]), float(means @ means))
         apart = float(np.sqrt(((target - target.mean()) ** 2).sum()))
         return slope, max(max(noise, self.sigma) / np.sqrt(spread), bow / apart)
 
