@@ -17,6 +17,7 @@ from olp.core.arrays import Array, Index, Mask, distinct
 from olp.core.progress import Progress, silent
 from olp.core.toolpath import Flag
 from olp.program.bands import Band
+from olp.program.heidenhain.columns import SIDE
 from olp.program.program import Definitions
 from olp.program.text.edits import BARE, EditList, Edits
 
@@ -246,7 +247,7 @@ class ConversationalWriter(PoleWriter):
         words = self.words
         text = b""
         for i in words.of_line(line):
-            if words.letter[i] == ord("R") and words.mantissa[i] == 0:
+            if words.letter[i] == SIDE and words.mantissa[i] == 0:
                 text += b" R0"
             elif words.letter[i] == ord("F") and words.mantissa[i] < 0:
                 text += self._rapid

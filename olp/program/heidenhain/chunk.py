@@ -11,7 +11,7 @@ import numpy as np
 from olp.core.arrays import Array, Index, Mask, distinct
 from olp.core.geometry import PLANES
 from olp.core.values import dataclass
-from olp.program.heidenhain.columns import PARAMETER_FEED, Block, Blocks
+from olp.program.heidenhain.columns import PARAMETER_FEED, SIDE, TURN, Block, Blocks
 from olp.program.program import AS_BEFORE
 from olp.program.rs274.motion import Blocks as Rows
 from olp.program.rs274.motion import gather
@@ -25,7 +25,7 @@ _HARMLESS = (
 #: `_HARMLESS` by number.
 IS_HARMLESS = np.isin(np.arange(1000), sorted(_HARMLESS))
 #: Letters of words in motion blocks.
-KNOWN_LETTERS = np.isin(np.arange(256), list(b"XYZABCUVWFMRKPQOTS"))
+KNOWN_LETTERS = np.isin(np.arange(256), list(b"XYZABCUVWFMRKPQOTSG"))
 #: The axis of a letter, or -1.
 AXIS = np.full(256, -1, np.int8)
 AXIS[list(b"XYZ")] = (0, 1, 2)
@@ -118,5 +118,13 @@ def apart(blocks: Blocks) -> Index:
     axis = (AXIS[blocks.letter] >= 0) & ~blocks.step
     plain = np.bincount(words.line[axis], minlength=len(block))[pole] == 2
     plain &= np.diff(words.first_word)[pole] == 2
+    # a side of the contour, and words of arcs in other blocks
+    side = (blocks.letter == SIDE) & (blocks.value > 0)
+    side |= (blocks.letter == ord("R")) & (block[words.line] != Block.RADIUS)
+    side |= (blocks.letter == TURN) & (block[words.line] == Block.LINE)
     statements = np.flatnonzero(block == Block.STATEMENT)
-    return distinct(np.concatenate((statements, words.odd, words.line[m[special]], unknown, pole[~plain])))
+    return distinct(
+        np.concatenate(
+            (statements, words.odd, words.line[m[special]], words.line[side], unknown, pole[~plain])
+        )
+    )

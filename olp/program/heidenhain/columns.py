@@ -2,11 +2,13 @@
 
 The lexer of word-address text reads them, once what is no word is blanked in a copy of the text: block
 numbers, the names of blocks, comments, and whole statements. What says more than a letter becomes a letter
-that the language does not use, at its own place: `IX` the letter D, `DR+` the word K+1, `FMAX` the word F-1.
+that the language does not use, at its own place: `IX` the letter D, `DR+` the word K+1, `FMAX` the word F-1,
+`R0` the word G0. Where a program has such a letter itself, its line is odd.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from enum import IntEnum
 
@@ -43,6 +45,8 @@ _STEP_OF = {ord("X"): ord("D"), ord("Y"): ord("E"), ord("Z"): ord("H")}
 _OTHER_STEP = ord("T")
 #: The letter of a turn of the coordinates.
 TURN = ord("K")
+#: the letter of a side of the contour; its number is 0 for R0, 1 for RL, 2 for RR
+SIDE = ord("G")
 #: The letter of an incremental angle.
 STEP_ANGLE = ord("P")
 #: The letter of an angle.
@@ -63,6 +67,13 @@ _NUMERIC = _table(b"+-.0123456789")
 _VALUE = _table(b"+-.0123456789Q")
 _AXIS = _table(b"XYZABCUVW")
 _SKIPPED = _table(bytes(range(33)) + b"0123456789")
+#: the letters that stand for something else here
+_TAKEN = _table(b"DEHTKPOQG")
+#: FAUTO: the feed of the TOOL CALL
+_AUTOMATIC = re.compile(rb"F([ \t]?)AUTO\Z")
+#: The number of a side by its second letter, 255 for none.
+_SIDES = np.full(256, 255, np.uint8)
+_SIDES[list(b"0LR")] = list(b"012")
 _UPPER = np.arange(256, dtype=np.uint8)
 _UPPER[97:123] -= 32
 _STEPS = np.full(256, _OTHER_STEP, np.uint8)
@@ -131,8 +142,8 @@ def read(text: Bytes, offset: int = 0, first_line: int = 0) -> Blocks:
     motion = (block >= Block.LINE) & (block <= Block.POLE)
     _blank(work, starts, np.where(motion, content, ends))
     body = work[: len(text)]
-    _spelled(body, work)
-    strange = np.flatnonzero((body == ord("(")) | (body == ord(")")))
+    strange = np.flatnonzero((body == ord("(")) | (body == ord(")")) | _TAKEN[body])
+    strange = strange[~_spelled(body, work)[strange]]
     words = lex(body, _TEXT, offset, first_line, strange=strange)
     letter = _PLAIN[words.letter]
     step = _IS_STEP[words.letter]
@@ -194,16 +205,23 @@ def _named(work: Bytes, starts: Index, ends: Index) -> tuple[npt.NDArray[np.uint
     return block, head + length
 
 
-def _spelled(body: Bytes, work: Bytes) -> None:
-    """Put one letter for each word of several."""
+def _spelled(body: Bytes, work: Bytes) -> Mask:
+    """Put one letter for each word of several; returns which bytes were understood."""
     following, third = work[1 : len(body) + 1], work[2 : len(body) + 2]
+    known = np.zeros(len(body), bool)
+    side = np.flatnonzero((body == ord("R")) & (_SIDES[following] < 255))
+    before = body[np.maximum(side - 1, 0)]
+    side = side[~_NUMERIC[third[side]] & ~(_LETTER[before] & (side > 0))]
+    body[side], body[side + 1] = SIDE, _SIDES[following[side]]
     at = np.flatnonzero((body == ord("D")) & (following == ord("R")) & np.isin(third, (43, 45)))
     if at.size:
+        known[at] = True
         body[at], body[at + 1], body[at + 2] = TURN, body[at + 2], ord("1")
     polar = np.flatnonzero((body == ord("P")) & (following == ord("A")))
     for i in polar.tolist():
         stepped = i > 0 and body[i - 1] == ord("I")
         body[i - stepped : i + 2] = 32
+        known[i] = True
         body[i + 1] = STEP_ANGLE if stepped else ANGLE
     step = np.flatnonzero((body == ord("I")) & _AXIS[following])
     if step.size:
@@ -219,8 +237,20 @@ def _spelled(body: Bytes, work: Bytes) -> None:
         body[near], body[near + 1], body[near + 2] = ord("-"), ord("1"), 32
         body[far - 2], body[far - 1] = 32, ord("F")
         body[far], body[far + 1], body[far + 2] = ord("-"), ord("1"), 32
-    by_parameter = np.flatnonzero((body == ord("F")) & (following == PARAMETER_FEED))
-    body[by_parameter] = 32
+    automatic = np.flatnonzero((body == ord("U")) & (following == ord("T")) & (third == ord("O")))
+    for i in automatic.tolist():
+        match = _AUTOMATIC.search(body[max(i - 4, 0) : i + 3].tobytes())
+        if match is not None:
+            # a feed that only the control knows
+            body[i - 1 - len(match[1]) - 1 : i + 3] = 32
+            body[i - 1 : i + 1] = list(b"Q0")
+            known[i - 1 : i + 3] = True
+    feed = body == ord("F")
+    near = np.flatnonzero(feed & (following == PARAMETER_FEED))
+    far = np.flatnonzero(feed & (following <= 32) & (third == PARAMETER_FEED))
+    body[near] = body[far] = 32
+    known[near + 1] = known[far + 2] = True
+    return known
 
 
-__all__ = ["ANGLE", "PARAMETER_FEED", "STEP_ANGLE", "TURN", "Block", "Blocks", "blocks", "read"]
+__all__ = ["ANGLE", "PARAMETER_FEED", "SIDE", "STEP_ANGLE", "TURN", "Block", "Blocks", "blocks", "read"]

@@ -20,6 +20,14 @@ _ASSIGN = re.compile(rb"(?:FN[ \t]*0[ \t]*:[ \t]*)?(Q[LR]?\d+)[ \t]*=[ \t]*(.*)"
 _VALUE = re.compile(rb"(" + _NUMBER + rb"|[-+]?Q[LR]?\d+)\Z", re.I)
 _SET_BY = re.compile(rb"FN[ \t]*18[ \t]*:.*?\b(Q[LR]?\d+)[ \t]*=", re.I | re.S)
 _FN = re.compile(rb"FN[ \t]*(\d+)\b", re.I)
+#: FN 1 to FN 8, FN 13 and FN 18: the parameter that they assign
+_ASSIGNED = re.compile(rb"FN[ \t]*(?:[1-8]|13|18)[ \t]*:.*?\b(Q[LR]?\d+)[ \t]*=", re.I | re.S)
+#: what prints, and a stop
+_PRINTS = re.compile(rb"(?:FN[ \t]*(?:14|15|16|20)\b|STOP\b|\*)")
+#: where a jump leads to
+_TARGET = re.compile(rb'GOTO[ \t]*LBL[ \t]*("[^"]*"|\d+)\Z')
+#: bytes that a jump ahead may pass over
+_JUMPED = 4000
 _LABEL = re.compile(rb'LBL[ \t]*("[^"]*"|\d+)', re.I)
 _SECTION_END = re.compile(rb"(?im)^[ \t]*\d*[ \t]*LBL[ \t]*0(?![\d.])")
 _CALL = re.compile(rb'CALL[ \t]+LBL[ \t]*("[^"]*"|\d+)[ \t]*(REP.*)?\Z', re.I | re.S)
@@ -54,11 +62,13 @@ class Events:
         #: the statements of sections that are called, by label
         self.sections: dict[bytes, list[Statement] | None] = {}
         self._depth = 0
+        #: parameters that a jump to a label may leave as they were
+        self._jumped: dict[bytes, list[str]] = {}
         self._handlers: Sequence[tuple[bytes, Callable[[Statement], None]]] = (
             (b"BEGIN PGM", self._begin), (b"END PGM", self._end), (b"TOOL CALL", self._tool),
             (b"CYCL CALL", self._cycle_call), (b"CALL LBL", self._call), (b"LBL", self._label),
             (b"PLANE", self._plane), (b"STOP", self._stop), (b"FN 18", self._unknown), (b"Q", self._assign),
-            (b"FN 0", self._assign),
+            (b"FN 0", self._assign), *((b"FN %d" % n, self._jump) for n in (9, 10, 11, 12)),
         )  # fmt: skip
         self._by_name = dict(self._handlers)
 
@@ -160,11 +170,35 @@ class Events:
         if match is not None:
             self.modes.parameters.pop(match[1].upper().decode(), None)
 
+    def _jump(self, statement: Statement) -> None:
+        """A jump ahead over what moves nothing and changes no mode: what is assigned there is not known."""
+        target = _TARGET.search(statement.upper)
+        begin = statement.span[1]
+        if target is None or begin < 0:
+            self._by_table(name_of(statement.upper), statement)
+            return
+        lines = self.collector.data[begin : begin + _JUMPED].split(b"\n")[1:]
+        assigned: list[str] = []
+        for other in statements_of(lines, statement.line + 1):
+            label = _LABEL.match(other.upper)
+            if label is not None and label[1] == target[1]:
+                self._jumped.setdefault(label[1], []).extend(assigned)
+                return
+            match = _ASSIGN.match(other.text) or _ASSIGNED.match(other.text)
+            if other.deleted or (match is None and not _PRINTS.match(other.upper)):
+                break
+            if match is not None:
+                assigned.append(match[1].upper().decode())
+        self._by_table(name_of(statement.upper), statement)
+
     # -- labels --------------------------------------------------------------------------------------
 
     def _label(self, statement: Statement) -> None:
-        if _LABEL.match(statement.text) is None:
+        label = _LABEL.match(statement.upper)
+        if label is None:
             raise ProgramError("LBL has no number and no name", line=statement.line, code="OLP510")
+        for name in self._jumped.get(label[1], ()):
+            self.modes.parameters.pop(name, None)
 
     def _call(self, statement: Statement) -> None:
         """CALL LBL of a section that only sets modes: these are set here too."""

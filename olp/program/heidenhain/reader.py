@@ -21,7 +21,7 @@ from olp.program.dialect import Dialect, Options
 from olp.program.heidenhain.arcs import Arcs
 from olp.program.heidenhain.chunk import KNOWN_LETTERS, Chunk, apart, columns_of, harmless
 from olp.program.heidenhain.collector import Collected
-from olp.program.heidenhain.columns import PARAMETER_FEED, Block, Blocks, blocks
+from olp.program.heidenhain.columns import PARAMETER_FEED, SIDE, TURN, Block, Blocks, blocks
 from olp.program.heidenhain.modes import NAN, Modes
 from olp.program.heidenhain.statements import Statement, of_lines
 from olp.program.heidenhain.table import UNROLL
@@ -41,7 +41,6 @@ _TILTED = (104, 112, 114, 130)
 _READ = frozenset({*_ENDS, _MACHINE, _DATUM, _CALL, _MODAL_CALL, _PER_TURN})
 _ROTARY = re.compile(rb"\bI?[ABCUVW][ \t]*[-+]?Q[LR]?\d+", re.I)
 _WITH_PARAMETER = re.compile(rb"(?:[XYZ]|PA|PR|R)[ \t]*[-+]?Q[LR]?\d+", re.I)
-_SIDE = re.compile(rb"(?<![A-Z])R[LR](?![A-Z])", re.I)
 
 
 def read(data: bytes, setup: Setup, dialect: Dialect, options: Options, *, words: bool = True) -> Program:
@@ -122,7 +121,7 @@ class _Reader(Arcs):
             self._odd(chunk, line)
             return
         words = range(*blocks.words.first_word[line : line + 2].tolist())
-        self._check_letters(blocks, words, number)
+        self._check_letters(blocks, words, kind, number)
         if kind == Block.POLE:
             self.set_pole(chunk, line, words)
             return
@@ -160,7 +159,7 @@ class _Reader(Arcs):
                     hint=UNROLL,
                 )
 
-    def _check_letters(self, blocks: Blocks, words: range, line: int) -> None:
+    def _check_letters(self, blocks: Blocks, words: range, kind: int, line: int) -> None:
         for w in words:
             letter = int(blocks.letter[w])
             if not KNOWN_LETTERS[letter]:
@@ -169,18 +168,26 @@ class _Reader(Arcs):
                     line=line,
                     code="OLP510",
                 )
+            if letter == SIDE and blocks.value[w] > 0:
+                raise ProgramError(
+                    f"{'RL' if blocks.value[w] == 1 else 'RR'}: the control offsets the contour by the "
+                    "radius of the tool",
+                    line=line,
+                    code="OLP513",
+                    hint=UNROLL,
+                )
+            if (letter == ord("R") and kind != Block.RADIUS) or (letter == TURN and kind == Block.LINE):
+                raise ProgramError(
+                    f"the word {'R' if letter == ord('R') else 'DR'} is not expected in this block; state "
+                    "another block, or take it away",
+                    line=line,
+                    code="OLP510",
+                )
 
     def _odd(self, chunk: Chunk, line: int) -> None:
         """A motion block with something that is no word and a number."""
         statement = self._statement(chunk.blocks, line)
         upper = statement.upper
-        if _SIDE.search(upper):
-            raise ProgramError(
-                "RL or RR: the control offsets the contour by the radius of the tool; have the CAM system "
-                "write the path of the tool centre",
-                line=statement.line,
-                code="OLP513",
-            )
         if re.fullmatch(rb"(?:L[ \t]+)?M140[ \t]+MB[^;]*", upper):
             self.control_move(statement.line, (2,))
             return

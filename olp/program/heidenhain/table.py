@@ -15,6 +15,7 @@ _NO = Support.REFUSED
 #: what --flatten writes out
 UNROLL = "write it out with --flatten"
 _FLOW = f"branches, repeats or calls: {UNROLL}"
+_JUMP = f"branches, unless they pass over assignments alone: {UNROLL}"
 _PATH = f"follows from the blocks beside it: {UNROLL}"
 _CONTROL = "is a path that the control makes itself"
 _TILT = "tilts the working plane; only angles of 0 are read"
@@ -59,10 +60,10 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"LBL": (_R, "labels; those whose section only sets modes may be called"),
     b"CALL LBL": (_NO, _FLOW),
     b"CALL PGM": (_NO, _FLOW),
-    b"FN 9": (_NO, _FLOW),
-    b"FN 10": (_NO, _FLOW),
-    b"FN 11": (_NO, _FLOW),
-    b"FN 12": (_NO, _FLOW),
+    b"FN 9": (_NO, _JUMP),
+    b"FN 10": (_NO, _JUMP),
+    b"FN 11": (_NO, _JUMP),
+    b"FN 12": (_NO, _JUMP),
     b"Q": (_R, "parameters with numbers, for feeds and cycles; expressions and axis words with --flatten"),
     b"FN 0": (_R, "as Q"),
     b"FN 18": (_R, "the parameter is not known afterwards"),
@@ -75,8 +76,8 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"CHF": (_NO, _PATH),
     b"APPR": (_NO, _PATH),
     b"DEP": (_NO, _PATH),
-    b"RL": (_NO, "the control offsets the contour by the radius of the tool"),
-    b"RR": (_NO, "the control offsets the contour by the radius of the tool"),
+    b"RL": (_NO, f"the control offsets the contour by the radius of the tool: {UNROLL}"),
+    b"RR": (_NO, f"the control offsets the contour by the radius of the tool: {UNROLL}"),
     b"LN": (_NO, "needs the direction of a surface, and rotary axes"),
     b"SPL": (_NO, _CONTROL),
     b"TCH PROBE": (_NO, _KNOWN_AT_RUN),

@@ -114,6 +114,14 @@ def test_feeds_of_inch_programs_count_in_tenths(bent: Path) -> None:
     assert moves.toolpath.end_mm[0] == pytest.approx(ORIGIN + 25.4)
 
 
+def test_r0_fauto_and_joined_words(bent: Path) -> None:
+    moves = program(HEAD + "L X1R0F100M3\nL X2 FAUTO\nL X3 F AUTO M8\nCR X5 Y2 R+2 DR+ R0 F9\n", bent)
+    assert moves.statements is not None
+    assert moves.toolpath.end_mm[:, 0] - ORIGIN[0] == pytest.approx(np.array([0, 1, 2, 3, 5]))
+    assert np.isnan(moves.statements.feed_mm_s[2:4]).all()
+    assert moves.statements.feed_mm_s[[1, 4]] * 60 == pytest.approx(np.array([100, 9]))
+
+
 def test_feeds_may_be_parameters(bent: Path) -> None:
     moves = program(HEAD + "FN 0: Q2=+120\nL X1 FQ2\nQ2 = 60\nX2 FQ2\nX3\nL X4 FQ9\n", bent)
     assert moves.statements is not None
@@ -146,7 +154,11 @@ def test_the_pole_may_be_the_position_or_a_distance_from_it(bent: Path) -> None:
         ("L X1 M89\n", 5, "at the end of each block"), ("CYCL CALL POS X1\n", 5, "where the holes are"),
         ("CC X0 Y5\nCP IPA+90 DR-\n", 6, "opposite"), ("/L X5\n", 5, "block delete"),
         ("CYCL DEF 371 X\n", 5, "builder"), ("L X1 M112\n", 5, "M112"), ("HOPP X1\n", 5, "not a statement"),
-        ("L X1 G1\n", 5, "the word G"), ("TCH PROBE 400\n", 5, "only the control knows"),
+        ("L X1 G1\n", 5, "not understood"), ("L D5\n", 5, "not understood"),
+        ("L X1 K3\n", 5, "not understood"),
+        ("L X1 R5\n", 5, "the word R"), ("L X1 DR+\n", 5, "the word DR"),
+        ("CC X1 Y1\nC X2 DR- RR\n", 6, "RR:"),
+        ("TCH PROBE 400\n", 5, "only the control knows"),
         ("TOOL CALL 2 Y S5\n", 5, "along Y"), ("L X1\rL X2\n", 5, "carriage return"),
     ],
 )  # fmt: skip
@@ -161,6 +173,17 @@ def test_sections_that_only_set_modes_may_be_called(bent: Path) -> None:
     )
     assert ends(text + "M127\nLBL 0\nEND PGM A MM\n", bent)[1:, 0].tolist() == pytest.approx([101, 1])
     refused(text + "L X5\nLBL 0\n", bent, 7, "CALL LBL")
+
+
+def test_a_jump_over_what_moves_nothing_is_read(bent: Path) -> None:
+    text = HEAD + "FN 18: SYSREAD Q1 = ID240\nQ4 = 60\nL X1 FQ4\nFN9: IF +Q1 EQU -10 GOTO LBL1\n"
+    moves = program(text + "Q4 = 5\nFN15: PRINT Q4\nLBL1\nL X2 FQ4\n", bent)
+    assert moves.statements is not None
+    assert moves.statements.feed_mm_s[1] == pytest.approx(1.0)
+    assert np.isnan(moves.statements.feed_mm_s[2])
+    for between in ("L X5\n", "CYCL DEF 7.0\nCYCL DEF 7.1 X+5\n", "M3\n", "TOOL CALL 2 Z\n", "LBL2\n"):
+        refused(text + between + "LBL1\nL X2\n", bent, 8, "FN 9")
+    refused(HEAD + "LBL 1\nFN 9: IF +Q1 EQU -10 GOTO LBL 1\n", bent, 6, "FN 9")
 
 
 def test_a_preset_is_a_work_offset_or_that_of_the_job(bent: Path, tmp_path: Path) -> None:
