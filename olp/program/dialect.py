@@ -64,9 +64,10 @@ class Dialect:
     `reader` reads a text. Called with data, setup, this dialect, options, and `words` by keyword, it returns
     a `Program` (`olp.program.registry.read`). `unroller` writes loops, calls and expressions out. It is
     called with data, this dialect, and by keyword what `olp.program.rs274.flatten.unroll.flatten` takes. It
-    is None where the dialect has none. `keeper` puts the corrections of an unrolled text into the program
-    that it was made from. It is called with that text, the corrected one, where each line begins in it, and
-    this dialect, and returns a `Kept`.
+    is None where the dialect has none. With `unrolls_with_tools` it takes `setup` too: contours beside which
+    the control keeps the tool become the path of the tool. `keeper` puts the corrections of an unrolled text
+    into the program that it was made from. It is called with that text, the corrected one, where each line
+    begins in it, and this dialect, and returns a `Kept`.
 
     `path_mode` is how the control goes from move to move where a program does not say it. `inch_decimals` are
     the decimals of inch programs for a least increment of 0.001 mm, `free_digits` those that centres of arcs
@@ -90,6 +91,7 @@ class Dialect:
     path_mode: str
     reader: Callable[..., Any]
     unroller: Callable[..., Unrolled] | None = None
+    unrolls_with_tools: bool = False
     keeper: Callable[..., Kept] | None = None
     endings: tuple[str, ...] = ()
     folder_endings: tuple[str, ...] = ()

@@ -16,6 +16,7 @@ import re
 from bisect import bisect_left
 from collections.abc import Callable
 from dataclasses import field, replace
+from typing import Any
 
 from olp.core.errors import ConfigError, ProgramError, Reason, Refused
 from olp.core.machine import ZERO, Setup, Tool, WorkOffset
@@ -279,7 +280,9 @@ class _Survey:
         for error, _ in self.errors.values():
             if not error.hint and error.line is not None and error.line <= len(text):
                 text[error.line - 1] = _NO_LINE_END.sub(b" ", text[error.line - 1])
-        beside = {} if subprograms is None else {"subprograms": subprograms}
+        beside: dict[str, Any] = {} if subprograms is None else {"subprograms": subprograms}
+        if self.dialect.unrolls_with_tools:
+            beside["setup"] = self.setup
         try:
             unrolled = self.dialect.unroller(
                 b"".join(text), self.dialect, limit=UNROLLED, parameters=self.setup.job.parameters, **beside

@@ -117,6 +117,7 @@ def unroller(
             expand_cycles=options.expand_cycles, block_delete=block_delete,
             peck_clearance=options.peck_clearance_mm, parameters=setup.job.parameters,
             **({} if limit is None else {"limit": limit}),
+            **({"setup": setup} if dialect.unrolls_with_tools else {}),
         )  # fmt: skip
         _refuse_payloads_not_reached(setup, text.origin)
         if setup.job.payloads:

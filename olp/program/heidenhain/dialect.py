@@ -45,6 +45,7 @@ DIALECT = Conversational(
     path_mode="not stated",
     reader=_read,
     unroller=_unroll,
+    unrolls_with_tools=True,
     endings=("h", "hnc"),
     folder_endings=("h", "hnc"),
     sign=re.compile(

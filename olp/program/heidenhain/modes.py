@@ -12,7 +12,7 @@ from olp.program.heidenhain.statements import Statement
 from olp.program.heidenhain.table import UNROLL
 
 NAN = float("nan")
-_TOOL = re.compile(
+TOOL_CALL = re.compile(
     rb'TOOL[ \t]+CALL(?:[ \t]*(?:"(?P<name>[^"]*)"|(?P<number>\d+)\b(?![.\d]))?)(?P<rest>.*)', re.I | re.S
 )
 _DELTA = re.compile(rb"\bDL[ \t]*=?[ \t]*([-+]?(?:\d+\.?\d*|\.\d+|Q\w*))", re.I)
@@ -78,7 +78,7 @@ class Modes:
 
     def tool_call(self, statement: Statement) -> bool:
         """Take over a TOOL CALL; returns whether the tool is changed."""
-        match = _TOOL.match(statement.text)
+        match = TOOL_CALL.match(statement.text)
         assert match is not None
         number = self.tool
         if match["name"] is not None:

@@ -15,6 +15,7 @@ import numpy as np
 
 from olp.core.budget import Budget
 from olp.core.errors import ProgramError
+from olp.core.machine import Setup
 from olp.core.values import dataclass
 from olp.program.dialect import Dialect
 from olp.program.heidenhain.formulas import Parameters, assignment
@@ -93,9 +94,11 @@ def unroll(
     peck_clearance: float | None = None,
     parameters: Mapping[str, float] | None = None,
     limit: int = UNROLLED_BYTES,
+    setup: Setup | None = None,
 ) -> Unrolled:
     """Plain blocks of a program, with the origin of each. Blocks with `/` are left as they are. `parameters`
-    are values by names such as "Q5". Raises ProgramError with the line in the source, and its file."""
+    are values by names such as "Q5", `setup` has the tools of contours. Raises ProgramError with the line in
+    the source, and its file."""
     if expand_cycles:
         raise ProgramError(
             "cycles of this dialect are not written out; leave --expand-cycles out", code="OLP544"
@@ -106,7 +109,7 @@ def unroll(
     run.parameters.update({name.upper(): value for name, value in (parameters or {}).items()})
     run.stated = frozenset(run.parameters)
     run.visit(_Unit.of(data, "", dialect), 0, 0, main=True)
-    run.write_out()
+    run.write_out(setup)
     return Unrolled.of(b"".join(run.blocks), run.origin())
 
 
@@ -133,10 +136,10 @@ class _Run:
             np.array([int(first[unit]) + line for unit, line in self._sources], np.int64),
         )  # fmt: skip
 
-    def write_out(self) -> None:
+    def write_out(self, setup: Setup | None) -> None:
         """Write motion that follows from several statements as plain blocks."""
         try:
-            self.blocks, self._sources = written_out(self.blocks, self._sources)
+            self.blocks, self._sources = written_out(self.blocks, self._sources, setup)
         except ProgramError as error:
             if error.line is not None:
                 unit, error.line = self._sources[min(error.line, len(self._sources)) - 1]

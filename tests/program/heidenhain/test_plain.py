@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from cases.conversational_contours import contour
 from cases.fast import some_fast
-from judge import heidenhain_contours, machines
+from judge import heidenhain_contours, heidenhain_sides, machines
 from judge.machines import Recipe
 
 import olp
@@ -77,20 +77,19 @@ def test_contours_that_are_written_out_are_corrected(bent: Path, seed: int) -> N
         ("L X+10\nCC X+10 Y+0\nCTP PR+8 PA+90\n", "L X+10\nCC X+10 Y+0\nCC X+10 Y+4\nC X+10 Y+8 DR+\n"),
         # turned by 90 degrees, then back
         ("CYCL DEF 10.1 ROT+90\nL X+10\nCYCL DEF 10.1 IROT-90\nL X+3\n", "L X+0 Y+10\nL X+3\n"),
-        # a mirror turns arcs and the side of the contour
+        # a mirror turns arcs
         (
-            "CYCL DEF 8.0\nCYCL DEF 8.1 X\nL X+10 Y+0 RL\nCC X+5 Y+0\nC X+0 Y+0 DR+\nCYCL DEF 8.1\nL X+3\n",
-            "L X-10 Y+0 RR\nCC X-5 Y+0\nC X+0 Y+0 DR-\nL X+3\n",
+            "CYCL DEF 8.0\nCYCL DEF 8.1 X\nL X+10 Y+0\nCC X+5 Y+0\nC X+0 Y+0 DR+\nCYCL DEF 8.1\nL X+3\n",
+            "L X-10 Y+0\nCC X-5 Y+0\nC X+0 Y+0 DR-\nL X+3\n",
         ),
         # the shift stays in the text; a rotation is about it
         (
             "CYCL DEF 7.0\nCYCL DEF 7.1 X+100\nCYCL DEF 10.0\nCYCL DEF 10.1 ROT+180\nL X+1 Y+2\n",
             "CYCL DEF 7.0\nCYCL DEF 7.1 X+100\nL X-1 Y-2\n",
         ),
-        # behind DEP there is no compensation
         (
-            "APPR LT X+20 Y+0 LEN5 RL F9\nL X+50\nDEP LT LEN10\nL Y+9\n",
-            "L X+15 Y+0 RL\nL X+20 Y+0 F9\nL X+50\nL X+60 Y+0\nL Y+9 R0\n",
+            "APPR LT X+20 Y+0 LEN5 R0 F9\nL X+50\nDEP LT LEN10\nL Y+9\n",
+            "L X+15 Y+0 R0\nL X+20 Y+0 F9\nL X+50\nL X+60 Y+0\nL Y+9\n",
         ),
         # modal calls, up to M99
         (CYCLE + "L X+1 FMAX M89\nL X+2 FMAX\nL X+3 M99\nL X+4\n",
@@ -147,7 +146,6 @@ def test_a_pattern_definition_adds_to_the_surface_and_keeps_the_height() -> None
         ("CYCL DEF 10.0\nCYCL DEF 10.1 ROT+5\nCYCL DEF 8.0\nCYCL DEF 8.1 X\n", 6, "mirror it before"),
         ("CYCL DEF 8.0\nCYCL DEF 8.1 Z\n", 4, "another axis"),
         ("L M89\nCYCL DEF 11.0\nCYCL DEF 11.1 SCL 2\n", 5, "scales"),
-        ("L X+20 Y+3\nAPPR CT X+9 Y+9 R5 CCA90 RL\nL X+20\n", 4, "radius of the tool"),
         ("APPR LCT X+1 Y+1 R5 R0\nL X+20\n", 3, "inside the arc"),
         ("APPR LT X+9 Y+9 R0\nL X+20\n", 3, "needs LEN"),
         ("CYCL CALL PAT\nLP\n", 3, "no PATTERN DEF"),
@@ -166,3 +164,81 @@ def test_what_cannot_be_written_out(text: str, line: int, words: str) -> None:
 def test_plain_blocks_keep_their_bytes() -> None:
     text = "5 L IX+4  R0 F MAX ; A\n CC X+1 Y+1\n6 C X+2 Y+0 DR-\nL C+30\nX+5 M3\n~\n* - B\nCC IX+1 Y+1\n"
     assert flat(text + "LP PR+1 PA+0\n").startswith(text.rsplit("CC IX", 1)[0])
+
+
+# -- RL and RR -----------------------------------------------------------------------------------------
+
+AROUND = (
+    "BEGIN PGM A MM\nTOOL CALL 1 Z S100 DR{delta}\n"
+    "L X-40 Y-30 Z+5 R0 FMAX\nL Z-5 F500\nL X+0 Y+0 {side} F300\n"
+    "{path}L X+0 Y+0\nL X-40 Y-30 R0 F900\nL Z+50 R0 FMAX M30\nEND PGM A MM\n"
+)
+#: around a part, which is on the right; then a pocket, which is beside the tool on both sides
+PATHS = [
+    "L X+0 Y+40\nRND R8\nL X+50\nCC X+50 Y+30\nC X+60 Y+30 DR-\nL X+40 Y+0\n",
+    "L X+0 Y+40\nL X+20 Y+50\nCT X+40 Y+40\nRND R6\nL X+80\nCHF 4\nL X+60 Y+20\nCR X+60 Y+0 R+10 DR-\n",
+    "L X+5 Y+70\nL X+40 Y+71\nCR X+70 Y+70 R+30 DR+\nL X+100 Y+70\nL X+90 Y+20\nL X+60 Y+40\nL X+50 Y-20\n",
+]
+
+
+@pytest.mark.parametrize("path", PATHS)
+@pytest.mark.parametrize(("side", "mirror"), [("RL", ""), ("RL", "X"), ("RL", "Y")])
+@pytest.mark.parametrize("delta", ["+0", "-2.25"])
+def test_the_tool_is_at_its_radius_beside_the_contour(
+    bent: Path, path: str, side: str, mirror: str, delta: str
+) -> None:
+    radius = 5.0 + float(delta)
+    text = AROUND.format(side=side, path=path, delta=delta)
+    if mirror:
+        text = text.replace("L X-40 Y-30 Z+5", f"CYCL DEF 8.0\nCYCL DEF 8.1 {mirror}\nL X-40 Y-30 Z+5")
+    plain = olp.flatten(text.encode(), bent)
+    assert b"RL" not in plain
+    assert b"RR" not in plain
+    contour = heidenhain_contours.read(text.replace(" RL", "").encode())[3:-2]
+    tool = heidenhain_contours.read(plain)[3:-2]
+    assert heidenhain_sides.off_by(contour, tool, radius) < 2e-6
+    assert heidenhain_sides.sides(contour, tool) == {-1 if mirror else 1}
+    # it begins across from the beginning of the contour, and ends across from its end
+    assert tool[0].start == pytest.approx(
+        contour[0].start + contour[0].heading(0) * 1j * radius * (-1 if mirror else 1)
+    )
+    assert tool[-1].end == pytest.approx(
+        contour[-1].end + contour[-1].heading(1) * 1j * radius * (-1 if mirror else 1)
+    )
+
+
+def test_an_approach_and_a_departure_are_beside_the_contour_too(bent: Path) -> None:
+    text = "TOOL CALL 1 Z\nL X-20 Y-20 Z+5 R0 FMAX\nAPPR LT X+0 Y+0 LEN15 RR F100\nL X+40\nDEP LT LEN10\n"
+    plain = olp.flatten((text + "L Y+50\n").encode(), bent).decode().split("\n")
+    assert plain[2:-1] == [
+        "L X-15 Y-5 R0", "L X+0 Y-5 F100", "L X+40 Y-5", "L X+50 Y-5", "L X+50 Y+50 R0",
+    ]  # fmt: skip
+
+
+def test_a_contour_is_corrected_as_the_path_of_the_tool(bent: Path) -> None:
+    text = AROUND.format(side="RL", path=PATHS[0], delta="+0").encode()
+    assert olp.correct(text, bent, flatten=True).report["deviation"]["holds"]
+    with pytest.raises(ProgramError, match="RL: the control offsets"):
+        olp.correct(text, bent)
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "words"),
+    [
+        ("L X+2 Y+3\nAPPR CT X+9 Y+9 R5 CCA90 RL\nL X+20\n", 4, "radius of the tool"),
+        ("L X+0 Y+0 RL\nL Y+40\nL X+30 Y+3\nL X+1 Y+40\nL X-9 R0\n", 5, "does not fit"),
+        ("L X+0 Y+0 RR\nL Y+40\nCR X+6 Y+40 R+3 DR-\nL X+6 Y+0\nL X-9 R0\n", 5, "does not fit"),
+        ("L X+0 Y+0 RL\nL Y+40\nL Z+50 R0\n", 5, "behind a contour"),
+        ("L X+0 Y+0 RL\nL Y+40\n", 4, "no end"), ("L Z-9 RL\nL X+9 Y+40\nL X+0 R0\n", 3, "enters a contour"),
+        ("L X+0 Y+0 RL\nL X+9 R0\n", 3, "one move alone"),
+        ("L X+0 Y+0 RL\nL Y+40\nL X+10 RR\nL X+9 R0\n", 5, "the side or the tool changes"),
+        ("L X+0 Y+0 RL\nL Y+40\nTOOL CALL 2 Z\nL X+9 Y+3 R0\n", 4, "is called beside a contour"),
+        ("L X+0 Y+0 RL\nL Y+40 M97\nL X+10\nL X+9 R0\n", 4, "M97"),
+        ("TOOL CALL 3 Z\nL X+9 Y+3\nL X+0 Y+0 RL\nL Y+40\nL X+9 R0\n", 5, "radius of tool 3"),
+        ("TOOL CALL 1 Z DR-6\nL X+9 Y+3\nL X+0 Y+0 RL\nL Y+40\nL X+9 R0\n", 5, "negative"),
+    ],
+)  # fmt: skip
+def test_contours_that_are_refused(bent: Path, text: str, line: int, words: str) -> None:
+    with pytest.raises(ProgramError, match=words) as caught:
+        olp.flatten(("TOOL CALL 1 Z\nL X-20 Y-20 Z+5 R0 FMAX\n" + text).encode(), bent)
+    assert caught.value.line == line

@@ -11,6 +11,7 @@ import re
 from collections.abc import Sequence
 
 from olp.core.errors import ProgramError
+from olp.core.machine import Setup
 from olp.program.heidenhain.cycles import AT_ONCE
 from olp.program.heidenhain.plain.approach import approached, departed
 from olp.program.heidenhain.plain.blocks import Block, block_of, line_end
@@ -18,6 +19,8 @@ from olp.program.heidenhain.plain.frame import MIRROR, ROTATION, SCALING, SCALIN
 from olp.program.heidenhain.plain.holes import Holes
 from olp.program.heidenhain.plain.moves import NAN, Entry, Source, Text, flipped, unknown
 from olp.program.heidenhain.plain.path import Piece, chamfered, rounded
+from olp.program.heidenhain.plain.sides import beside
+from olp.program.heidenhain.plain.tools import Radius
 from olp.program.heidenhain.statements import Statement, cycle_of, of_lines, without_comment
 
 _TRANSFORMS = frozenset({SHIFT, MIRROR, ROTATION, SCALING, SCALINGS})
@@ -27,25 +30,28 @@ _AWAY = frozenset({91, 92, 140})
 _TILTED = frozenset({104, 112, 114, 128, 130})
 #: what is written out
 _WRITTEN_OUT = re.compile(
-    rb"(?<![A-Z])(?:LP|CTP?|RND|CHF|APPR|DEP|PATTERN|M89|I[XYZ]|CYCLE?[ \t]+DEF[ \t]*(?:8|10|22[01])(?!\d)|"
-    rb"CYCL[ \t]+CALL[ \t]+P)", re.I,
+    rb"(?<![A-Z])(?:LP|R[LR](?![.\d])|CTP?|RND|CHF|APPR|DEP|PATTERN|M89|I[XYZ]|"
+    rb"CYCLE?[ \t]+DEF[ \t]*(?:8|10|22[01])(?!\d)|CYCL[ \t]+CALL[ \t]+P)", re.I,
 )  # fmt: skip
 _SIDE = re.compile(rb"(?<![A-Z])(R0|RL|RR)(?![.\d])")
 
 
-def written_out(lines: Sequence[bytes], sources: Sequence[Source]) -> tuple[list[bytes], list[Source]]:
-    """The lines of a text without loops and parameters as plain blocks, with the sources of each. Raises
-    ProgramError whose line is an index of `lines`, from 1."""
+def written_out(
+    lines: Sequence[bytes], sources: Sequence[Source], setup: Setup | None
+) -> tuple[list[bytes], list[Source]]:
+    """The lines of a text without loops and parameters as plain blocks, with the sources of each. `setup` has
+    the tools. Raises ProgramError whose line is an index of `lines`, from 1."""
     if not any(_WRITTEN_OUT.search(without_comment(line)) for line in lines):
         return list(lines), list(sources)
-    return _Writing(lines, sources).run()
+    return _Writing(lines, sources, setup).run()
 
 
 class _Writing(Holes):
     """One text while it is written out."""
 
-    def __init__(self, lines: Sequence[bytes], sources: Sequence[Source]) -> None:
+    def __init__(self, lines: Sequence[bytes], sources: Sequence[Source], setup: Setup | None) -> None:
         super().__init__()
+        self.radius = Radius(setup)
         self.given, self.sources = lines, sources
         #: the side of the contour on which the tool is: R0, RL or RR
         self.side = b"R0"
@@ -67,7 +73,7 @@ class _Writing(Holes):
             begin = end
         self._nothing_waits(len(self.given))
         text = Text()
-        for entry in self.entries:
+        for entry in beside(self.entries):
             text.put(entry)
         return text.lines, text.sources
 
@@ -113,7 +119,10 @@ class _Writing(Holes):
 
     def _other(self, statement: Statement, entry: Entry) -> None:
         upper = statement.upper
-        if upper.startswith(b"TOOL CALL"):
+        if upper.startswith(b"BEGIN PGM"):
+            self.radius.begin(statement)
+        elif upper.startswith(b"TOOL CALL"):
+            self.radius.call(statement)
             self.at, self.last = [NAN, NAN, NAN], None
         elif self.pattern_or_call(upper, entry, statement.line):
             self.last = None
@@ -241,6 +250,13 @@ class _Writing(Holes):
 
     def _other_plane(self, block: Block, entry: Entry) -> None:
         self._nothing_waits(block.line)
+        if self.side != b"R0":
+            raise ProgramError(
+                "a contour with RL or RR is in another plane than XY, which is not read; write the path of "
+                "the tool",
+                line=block.line,
+                code="OLP518",
+            )
         _, z = self.end(block)
         here = self.end(block)[0]
         known = block.name == b"C"
@@ -257,6 +273,11 @@ class _Writing(Holes):
         elif self.back_to_r0:
             entry.rest, entry.changed = (entry.rest + b" R0").strip(), True
         self.back_to_r0 = False
+        self._keep_side(entry, block.line)
+
+    def _keep_side(self, entry: Entry, line: int) -> None:
+        if self.side != b"R0":
+            entry.side, entry.radius = 1 if self.side == b"RL" else -1, self.radius.of(line)
 
     # -- corners and approaches ----------------------------------------------------------------------
 
@@ -309,6 +330,7 @@ class _Writing(Holes):
         new = Entry(
             [], [source], block, corner, axes=b"XY", changed=True, rest=block.rest, shift=before.shift
         )
+        new.side, new.radius = entry.side, entry.radius
         self.entries.insert(self.entries.index(before) + 1, new)
         assert entry.block is not None
         if block.feed and not entry.block.feed and self.feed:
@@ -323,10 +345,13 @@ class _Writing(Holes):
                 line=line,
                 code="OLP513",
             )
-        side = 1 if self.side == b"RL" else -1
-        return -side if self.frame.flips else side
+        if self.side != b"R0":
+            return 1 if self.side == b"RL" else -1
+        return 1 if self.frame.flips else -1
 
     def _begin_approach(self, block: Block, entry: Entry) -> None:
+        if self.frame.flips:
+            entry.rest = flipped(entry.rest)
         self._side_of(block, entry)
         polar = block.name.split()[1].startswith(b"P")
         end, z = self.polar_end(block) if polar else self.end(block)
@@ -364,7 +389,9 @@ class _Writing(Holes):
         assert entry.block is not None
         block = entry.block
         bare = Block(b"L", {}, 0, {}, b"", block.head, line_end(block.tail) or b"\n", block.line)
-        return Entry([], entry.source[:1], bare, piece, entry.z, axes, True, rest, entry.shift)
+        made = Entry([], entry.source[:1], bare, piece, entry.z, axes, True, rest, entry.shift)
+        made.side, made.radius = entry.side, entry.radius
+        return made
 
     def _depart(self, block: Block, entry: Entry) -> None:
         before = None if self.last is None else self.last.piece
@@ -378,6 +405,7 @@ class _Writing(Holes):
         pieces = departed(form, block.sizes, side, before.end, heading, end, block.line)
         entry.z, entry.changed = (self.at[2], z), True
         entry.rest = _SIDE.sub(b"", block.rest).strip()
+        self._keep_side(entry, block.line)
         parts = [self._part(entry, piece, b"XY", b"") for piece in pieces]
         if b"Z" in block.words:
             parts.append(self._part(entry, None, b"Z", b""))
