@@ -12,6 +12,7 @@ from olp.cli.options import (
     MM,
     day_option,
     fail_on_option,
+    file_option,
     force_option,
     json_option,
     machine_option,
@@ -37,6 +38,11 @@ from olp.core.errors import UsageError
     "--map/--no-map", "map_", default=None,
     help="Also map errors that rigid bodies cannot make, where points show them. Default: [map] of the plan.",
 )  # fmt: skip
+@file_option(
+    "--propose",
+    "PLAN.toml",
+    "Only write a plan for the files of a folder: what they say by name and header, and what is asked for.",
+)
 @report_option()
 @json_option("Print the result as JSON.")
 @units_option
@@ -50,6 +56,7 @@ def command(
     datum: tuple[float, float, float] | None,
     valid_until: datetime.date | None,
     map_: bool | None,
+    propose: str | None,
     report_file: str | None,
     as_json: bool,
     fail_on: str,
@@ -62,6 +69,9 @@ def command(
     describe themselves. One adjustment takes all readings. It gives curves, squareness, backlash and cyclic
     errors with their uncertainties.
     """
+    if propose is not None:
+        _propose(data, machine, propose, force=force)
+        return
     if STREAM in (output, report_file, *data):
         raise UsageError("a calibration is several files and cannot be -; name files")
     from olp.files.measurements.reader import files_of_measurements
@@ -95,3 +105,24 @@ def command(
         diagnostic(f"wrote {report_file}")
     put_result(fitted, as_json=as_json, quiet=quiet)
     exit_for(fitted.findings, fail_on)
+
+
+def _propose(data: tuple[str, ...], machine: str | None, target: str, *, force: bool) -> None:
+    """Write the plan that the files of a folder propose, and say what is asked for."""
+    from olp.files.config import load_machine
+    from olp.files.measurements.proposal import propose
+    from olp.files.write import write_files
+
+    if len(data) != 1 or not Path(data[0]).is_dir():
+        raise UsageError("--propose looks at the files of one folder; name it as DATA")
+    if Path(target).absolute().parent.resolve() != Path(data[0]).absolute().resolve():
+        raise UsageError(
+            f"names of files in a plan are relative to it; expected a file in {data[0]}", file=target
+        )
+    proposal = propose(Path(data[0]), None if machine is None else load_machine(machine))
+    write_files({Path(target): proposal.text.encode()}, force=force, inputs=files_of(machine))
+    diagnostic(f"wrote {target}")
+    for question in proposal.asked:
+        diagnostic(f"asked for {question}")
+    for name in proposal.unknown:
+        diagnostic(f"not known: {name}; describe its columns with a profile, and name it in the plan")

@@ -1,7 +1,7 @@
 """Reads the measurements of a calibration: a plan (olp-measurements-1), or files that describe themselves.
 
 A plan is a TOML file, named in the call or found in a folder as `measurements.toml`. In a folder without
-one, every CSV file states in comments `# key = value` what it holds. A line of the plan and its file must
+one, every file states in comments `# key = value` what it holds. A line of the plan and its file must
 agree in the keys that both state. [defaults] apply to keys that neither states. No sign convention, position
 or tool vector is ever assumed.
 """
@@ -32,6 +32,8 @@ from olp.files.write import PathLike, read_bytes
 
 #: The name of the plan in a folder.
 PLAN = "measurements.toml"
+#: Endings of files in a folder without a plan that may describe themselves.
+ALONE = (".csv", ".rtl")
 
 
 @dataclass(slots=True)
@@ -103,7 +105,7 @@ def files_of_measurements(sources: Sequence[PathLike]) -> tuple[str, ...]:
         path = FilePath(source)
         plan = path / PLAN if path.is_dir() else path
         if path.is_dir() and not plan.is_file():
-            names += sorted(path.glob("*.csv"))
+            names += sorted(file for file in path.iterdir() if file.suffix.lower() in ALONE)
             continue
         names.append(plan)
         if plan.suffix.lower() != ".toml":
@@ -184,9 +186,9 @@ def _readings(
 
 
 def _folder(folder: FilePath, gathered: _Gathered) -> None:
-    files = sorted(folder.glob("*.csv"))
+    files = sorted(path for path in folder.iterdir() if path.suffix.lower() in ALONE)
     if not files:
-        sentence = f"holds neither {PLAN} nor CSV files; expected one of them"
+        sentence = f"holds neither {PLAN} nor files {' or '.join(ALONE)}; expected one of them"
         gathered.errors.append(ConfigError(sentence, file=str(folder)))
     for path in files:
         _alone(path, gathered)
@@ -198,7 +200,10 @@ def _alone(path: FilePath, gathered: _Gathered) -> None:
         stated, key_lines = stated_of(readings.keys, str(path))
         component = stated.component or readings.component
         if component is None:
-            sentence = 'states no component; expected a comment such as # component = "EXX", or a plan'
+            sentence = (
+                'states no component; expected a comment such as # component = "EXX", or a plan: --propose '
+                "writes one for a folder"
+            )
             raise ConfigError(sentence, file=str(path))
         check_component(readings, component)
         line = as_line(readings, component, stated, "Z", gathered.chain, str(path))

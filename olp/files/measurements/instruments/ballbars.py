@@ -56,6 +56,7 @@ def read_circles(path: PathLike) -> Circles:
 class BallbarFiles(Instrument[InstrumentTable, Circles]):
     key = "ballbars"
     table = InstrumentTable
+    marks = ("angle_deg",)
     words = "tables [[ballbars]]: the circles of a ball-bar about one centre each"
     gives = Circles
 

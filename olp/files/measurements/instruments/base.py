@@ -8,7 +8,7 @@ a plan can ask for the instrument, it also writes the table. Observations and th
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import ClassVar, Generic, TypeVar
 
@@ -46,15 +46,34 @@ class Plan:
         return self.path.parent / file
 
 
+@dataclass(frozen=True, slots=True)
+class SeenFile:
+    """What a file of readings shows of itself: its name, the names of its columns, its comments `# key =
+    value` as written, and the component where its format states one."""
+
+    name: str
+    header: tuple[str, ...]
+    stated: Mapping[str, str]
+    component: str | None = None
+
+
 class Instrument(ABC, Generic[T, Taken]):
     """`key` of its tables in a plan, the model of one table, and `words` on them for the schema. `gives` is
-    the type of observation. `plans` says that files for future readings can be written."""
+    the type of observation. `plans` says that files for future readings can be written. A file that has the
+    columns `marks` is one of its files, and `asks` are keys of its table that a person has to state."""
 
     key: ClassVar[str]
     table: ClassVar[type[Table]]
     words: ClassVar[str]
     gives: ClassVar[type[Observation]]
     plans: ClassVar[bool] = False
+    marks: ClassVar[tuple[str, ...]] = ()
+    asks: ClassVar[tuple[str, ...]] = ()
+
+    def proposed(self, seen: SeenFile) -> dict[str, object] | None:
+        """The keys of its table that a file shows by itself; None where it is not a file of this
+        instrument."""
+        return {} if self.marks and set(self.marks) <= set(seen.header) else None
 
     @abstractmethod
     def read(self, table: T, plan: Plan) -> Taken:

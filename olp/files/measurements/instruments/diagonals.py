@@ -9,7 +9,7 @@ from olp.core.schema import NotNegative, Table, Triple
 from olp.core.schema_keys import Field
 from olp.core.units import MM_PER_UM
 from olp.files.measurements.columns import read_columns
-from olp.files.measurements.instruments.base import PER_UNIT, Instrument, Plan
+from olp.files.measurements.instruments.base import PER_UNIT, Instrument, Plan, SeenFile
 from olp.files.measurements.instruments.self_described import InstrumentTable
 from olp.files.measurements.line_keys import Sense
 from olp.files.measurements.readings import SENSES
@@ -50,8 +50,12 @@ def read_diagonal(path: PathLike) -> Diagonal:
 class DiagonalFiles(Instrument[InstrumentTable, Diagonal]):
     key = "diagonals"
     table = InstrumentTable
+    marks = ("target_mm",)
     words = "tables [[diagonals]]: a laser along one face or body diagonal each"
     gives = Diagonal
+
+    def proposed(self, seen: SeenFile) -> dict[str, object] | None:
+        return super().proposed(seen) if "start_mm" in seen.stated else None
 
     def read(self, table: InstrumentTable, plan: Plan) -> Diagonal:
         return read_diagonal(plan.beside(table.file))

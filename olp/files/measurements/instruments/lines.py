@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 from olp.calibration.observations.lines import Line
 from olp.core.arrays import Index
 from olp.core.errors import ConfigError
 from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM
-from olp.files.measurements.instruments.base import UM_M, Instrument, Plan
+from olp.files.measurements.instruments.base import UM_M, Instrument, Plan, SeenFile
 from olp.files.measurements.line_keys import LineTable
 from olp.files.measurements.line_merging import as_line, merged, stated_of
 from olp.files.measurements.line_profile import load_line_profile, read_line
 from olp.files.measurements.readings import check_component
 from olp.files.toml_text import toml_lines
+
+#: A component in the name of a file, such as eyz-left.csv.
+_COMPONENT = re.compile(r"(?<![A-Z])(E[XYZABC][XYZ])(?![A-Z])")
 
 
 class LineFiles(Instrument[LineTable, Line]):
@@ -20,6 +26,18 @@ class LineFiles(Instrument[LineTable, Line]):
     words = "tables [[lines]]"
     gives = Line
     plans = True
+    marks = ("target_mm",)
+    asks = ("component",)
+
+    def proposed(self, seen: SeenFile) -> dict[str, object] | None:
+        if super().proposed(seen) is None or "start_mm" in seen.stated:
+            return None
+        if seen.component is not None or "component" in seen.stated:
+            return {"component": seen.component or seen.stated["component"].strip("\"'")}
+        named = _COMPONENT.search(Path(seen.name).stem.upper())
+        angular = any(name.endswith("_urad") for name in seen.header)
+        fits = named is not None and (named[1][1] in "ABC") == angular
+        return {"component": named[1]} if named is not None and fits else {}
 
     def read(self, table: LineTable, plan: Plan) -> Line:
         path = plan.beside(table.file)

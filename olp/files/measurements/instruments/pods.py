@@ -12,7 +12,7 @@ from olp.core.errors import ConfigError
 from olp.core.schema import Positive, Table, Text, Triple
 from olp.core.schema_keys import Field
 from olp.core.units import MM_PER_UM, RAD_PER_URAD, UM_PER_MM
-from olp.files.measurements.instruments.base import Instrument, Plan, points_to_fill, tools_of
+from olp.files.measurements.instruments.base import Instrument, Plan, SeenFile, points_to_fill, tools_of
 from olp.files.measurements.point_readings import AngleKeys, conventional, directions, read_point_readings
 from olp.files.toml_text import toml_lines
 
@@ -46,9 +46,15 @@ class PodsTable(AngleKeys):
 class PodFiles(Instrument[PodsTable, Pods]):
     key = "pods"
     table = PodsTable
+    marks = directions(1)
+    asks = ("sigma_urad", "azimuth", "vertical", "tool_mm")
     words = "tables [[pods]]: directions from unknown positions"
     gives = Pods
     plans = True
+
+    def proposed(self, seen: SeenFile) -> dict[str, object] | None:
+        own = super().proposed(seen)
+        return None if own is None else {"pods": sum(name.startswith("azimuth_") for name in seen.header)}
 
     def read(self, table: PodsTable, plan: Plan) -> Pods:
         readings = read_point_readings(plan.beside(table.file), directions(table.pods))

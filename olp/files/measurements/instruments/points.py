@@ -38,6 +38,8 @@ class PointsTable(Table):
 class PointFiles(Instrument[PointsTable, Points]):
     key = "points"
     table = PointsTable
+    marks = MEASURED
+    asks = ("sigma_um", "tool_mm")
     words = "tables [[points]]: one set-up of a tracker each"
     gives = Points
     plans = True

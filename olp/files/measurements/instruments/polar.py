@@ -36,6 +36,8 @@ class PolarTable(AngleKeys):
 class PolarFiles(Instrument[PolarTable, Points]):
     key = "polar"
     table = PolarTable
+    marks = POLAR
+    asks = ("sigma_distance_um", "sigma_angle_urad", "azimuth", "vertical", "tool_mm")
     words = "tables [[polar]]: distances and two angles from one unknown position"
     gives = Points
 

@@ -36,6 +36,8 @@ class StationTable(Table):
 class StationFiles(Instrument[StationTable, Lengths]):
     key = "stations"
     table = StationTable
+    marks = LENGTH
+    asks = ("sigma_um", "tool_mm")
     words = "tables [[stations]]: lengths from unknown positions (multilateration)"
     gives = Lengths
     plans = True

@@ -1,0 +1,136 @@
+"""A plan of measurements proposed from a folder: what files say by name, header and comments is taken, and
+what no file says is asked for."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from olp.core.errors import ConfigError
+from olp.core.machine import Machine
+from olp.core.schema import fields_of
+from olp.core.values import dataclass
+from olp.files.columns import decoded
+from olp.files.measurements.instruments.base import Instrument, SeenFile
+from olp.files.measurements.instruments.registry import INSTRUMENTS
+from olp.files.measurements.line_keys import LineKeys
+from olp.files.measurements.rtl import is_stored_line, parse_rtl
+from olp.files.measurements.schemas import PlanFile
+from olp.files.measurements.stated import stated_keys
+from olp.files.toml_text import toml_key, toml_value
+from olp.files.write import read_bytes
+from olp.program.text.rows import CSV
+
+#: Endings of files that say their columns.
+COLUMNS = (".csv",)
+#: Endings of measured lines of which only the first states its unit.
+STORED = (".rtl", ".rta", ".rts")
+#: What stands in the place of a value that no file states.
+ASKED = "?"
+#: Keys that every line needs, and that [defaults] may hold for all of them.
+_OF_LINES = ("sense", "line_mm", "tool_mm")
+#: Keys of the whole plan that files may state.
+_OF_ALL = ("machine", "measured", "temperature_degC")
+
+
+@dataclass(frozen=True, slots=True)
+class Proposal:
+    """The text of a plan (olp-measurements-1), what is asked for in it, and the files that are not known."""
+
+    text: str
+    asked: tuple[str, ...]
+    unknown: tuple[str, ...]
+
+
+def propose(folder: Path, machine: Machine | None = None) -> Proposal:
+    """The plan for the files of a folder. Raises InputError where one cannot be read, and ConfigError where
+    none is known."""
+    known: list[tuple[Instrument[Any, Any], SeenFile, dict[str, object]]] = []
+    unknown: list[str] = []
+    for path in sorted(p for p in folder.iterdir() if p.suffix.lower() in (*COLUMNS, *STORED)):
+        seen = _seen(path)
+        found = ((instrument, instrument.proposed(seen)) for instrument in INSTRUMENTS)
+        taken = next(((instrument, keys) for instrument, keys in found if keys is not None), None)
+        if taken is None:
+            unknown.append(path.name)
+        else:
+            known.append((taken[0], seen, taken[1]))
+    if not known:
+        endings = ", ".join((*COLUMNS, *STORED))
+        raise ConfigError(
+            f"holds no file of readings that says what it is; expected some of {endings}", file=str(folder)
+        )
+    asked: list[str] = []
+    lines = [*_whole([seen for _, seen, _ in known], machine, asked), ""]
+    lines += _defaults([seen for instrument, seen, _ in known if instrument.key == "lines"], asked)
+    for instrument, seen, keys in known:
+        lines += ["", f"[[{instrument.key}]]", *_table(instrument, seen, keys, asked)]
+    return Proposal("\n".join(lines) + "\n", tuple(asked), tuple(unknown))
+
+
+def _seen(path: Path) -> SeenFile:
+    data = read_bytes(path)
+    if is_stored_line(data):
+        readings = parse_rtl(data, str(path), "um")
+        stated = {key: written for key, (written, _) in readings.keys.items()}
+        own = readings.component if path.suffix.lower() == STORED[0] else None
+        return SeenFile(path.name, ("target_mm",), stated, own)
+    text = decoded(data, str(path))
+    rows = (line for _, line in CSV.lines(text) if line.strip() and not line.lstrip().startswith("#"))
+    header = tuple(cell.strip() for cell in next(rows, "").split(","))
+    return SeenFile(path.name, header, {key: written for key, (written, _) in stated_keys(text)})
+
+
+def _whole(files: Sequence[SeenFile], machine: Machine | None, asked: list[str]) -> Iterator[str]:
+    """The keys of the plan as a whole. A key that files state differently is asked for."""
+    yield "# Proposed from the files of this folder. Check it, and replace each question mark."
+    yield 'schema = "olp-measurements-1"'
+    for key in _OF_ALL:
+        values = {seen.stated[key] for seen in files if key in seen.stated}
+        value: Any = _value(values.pop()) if len(values) == 1 else ASKED
+        if key == "machine" and machine is not None:
+            value = machine.name
+        yield _line(key, value, PlanFile, "the plan", asked)
+    if machine is not None:
+        yield _line("chain", machine.chain, PlanFile, "the plan", asked)
+
+
+def _defaults(lines: Sequence[SeenFile], asked: list[str]) -> Iterator[str]:
+    """[defaults]: what lines need and not all of them state."""
+    wanted = [key for key in _OF_LINES if any(key not in seen.stated for seen in lines)]
+    if wanted:
+        yield "[defaults]"
+        yield from (_line(key, ASKED, LineKeys, "the lines", asked) for key in wanted)
+
+
+def _table(
+    instrument: Instrument[Any, Any], seen: SeenFile, keys: Mapping[str, object], asked: list[str]
+) -> Iterator[str]:
+    yield f"file = {toml_value(seen.name)}"
+    yield from (f"{toml_key(key)} = {toml_value(value)}" for key, value in keys.items())
+    for key in instrument.asks:
+        if key in keys or (key == "tool_mm" and "tool_X_mm" in seen.header):
+            continue
+        value = _value(seen.stated[key]) if key in seen.stated else ASKED
+        yield _line(key, value, instrument.table, seen.name, asked)
+    if instrument.key == "lines" and Path(seen.name).suffix.lower() in STORED[1:]:
+        yield _line("profile", ASKED, LineKeys, seen.name, asked)
+
+
+def _value(written: str) -> Any:
+    """The value of a comment; a word without quotes is that word."""
+    try:
+        return tomllib.loads(f"value = {written}")["value"]
+    except tomllib.TOMLDecodeError:
+        return written
+
+
+def _line(key: str, value: Any, model: type[Any], whose: str, asked: list[str]) -> str:
+    """A key of the plan; one that is asked for says in a comment what it means."""
+    if value != ASKED:
+        return f"{toml_key(key)} = {toml_value(value)}"
+    words = fields_of(model)[key].description
+    asked.append(f"{key} of {whose}: {words}")
+    return f'{toml_key(key)} = "{ASKED}"  # {words}'
