@@ -74,6 +74,7 @@ def test_the_page_of_the_house_is_the_house() -> None:
     assert [path for path in WHERE.values() if not (PACKAGE / path).is_file()] == []
 
 
+@pytest.mark.slow
 @in_each(MODULES, lambda path: path.relative_to(PACKAGE).as_posix())
 def test_every_module_says_what_it_holds(path: Path) -> None:
     assert purpose(path)
@@ -110,6 +111,7 @@ def test_a_circle_would_be_found() -> None:
         graphlib.TopologicalSorter(files_imported(modules)).prepare()
 
 
+@pytest.mark.slow
 @in_each(MODULES, lambda path: path.relative_to(PACKAGE).as_posix())
 def test_imports_go_one_way(path: Path) -> None:
     if top(path) not in FRONT:
@@ -139,6 +141,7 @@ LATE_ITSELF = {"trajectory": {"ruckig", "scipy"}}
 OPENERS = {"open", "read_bytes", "read_text", "write_bytes", "write_text"}
 
 
+@pytest.mark.slow
 @in_each(MODULES, lambda path: path.relative_to(PACKAGE).as_posix())
 def test_large_libraries_are_imported_late_and_files_opened_in_one_layer(path: Path) -> None:
     tree = parsed(path)

@@ -94,6 +94,7 @@ def questions(source: str) -> list[int]:
     return sorted({node.lineno for node in ast.walk(ast.parse(source)) if _asks(node)})  # type: ignore[attr-defined]
 
 
+@pytest.mark.slow
 @in_each(FILES, lambda path: path.relative_to(PACKAGE).as_posix())
 def test_no_name_of_a_dialect_decides(path: Path) -> None:
     assert questions(path.read_text("utf-8")) == []

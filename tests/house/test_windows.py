@@ -106,6 +106,7 @@ def _of_call(node: ast.Call) -> Iterator[str]:
         yield f"{name}: text without an encoding"
 
 
+@pytest.mark.slow
 @in_each(MODULES, lambda path: path.relative_to(PACKAGE).as_posix())
 def test_nothing_is_of_posix_alone(path: Path) -> None:
     assert list(findings(ast.parse(path.read_text("utf-8")))) == []

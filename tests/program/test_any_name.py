@@ -150,7 +150,7 @@ def _unrolled(text: bytes, setup: Setup, dialect: Dialect, expand: bool, clearan
     return as_asked(sources, given, setup, dialect, options).data
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", some_fast(NAMES, 4))
 def test_programs_are_unrolled_alike(pairs: Mapping[str, Pair], name: str) -> None:
     texts = [text.encode() for text in PARAMETRIC] + [(START + text).encode() for text in BLOCKS]
     for text in texts:

@@ -82,7 +82,7 @@ def test_every_registered_dialect_has_a_case() -> None:
 # -- L1, L3: identity ----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", some_fast(CASES, 2))
+@pytest.mark.parametrize("name", some_fast(CASES, 4))
 @given(data=st.data())
 @settings(max_examples=40)
 def test_l1_any_bytes_come_back_or_are_refused(
@@ -103,7 +103,7 @@ def test_l1_chosen_texts(zero: dict[str, Setup], shifted: dict[str, Setup], name
     attempt(text, shifted[name])
 
 
-@pytest.mark.parametrize("name", some_fast(CASES, 2))
+@pytest.mark.parametrize("name", some_fast(CASES, 4))
 @given(noise=st.binary(max_size=60))
 @example(noise=b"$$ \xff 'x'")
 @settings(max_examples=15)
@@ -115,7 +115,7 @@ def test_l1_text_in_a_comment_is_opaque(zero: dict[str, Setup], name: str, noise
     assert olp.correct(data, zero[name]).data == data
 
 
-@pytest.mark.parametrize("name", some_fast(CASES, 2))
+@pytest.mark.parametrize("name", some_fast(CASES, 4))
 @given(
     seed=st.integers(0, 2**20),
     cuts=st.lists(st.tuples(st.integers(0, 4000), st.binary(max_size=4)), max_size=6),
@@ -222,7 +222,7 @@ def commanded(
     return float(np.abs(own[match(own, want)] - want).max())
 
 
-@pytest.mark.parametrize("name", some_fast(CASES, 2))
+@pytest.mark.parametrize("name", some_fast(CASES, 4))
 @given(seed=st.integers(0, 2**16), digits=st.sampled_from([2, 3, 4]))
 @settings(max_examples=6)
 def test_l4_points_within_half_a_digit(bent: dict[str, Path], name: str, seed: int, digits: int) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from cases.acceptance import TRUE_ZERO, machine, points, unstamped
 from cases.dialects import RS274
+from cases.fast import some_fast
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from judge import machines, programs
@@ -74,7 +75,7 @@ def attempt(data: bytes, path: Path) -> bytes | None:
 # -- L1, L3: identity ----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("dialect", RS274)
+@pytest.mark.parametrize("dialect", some_fast(RS274, 4))
 @given(data=st.one_of(st.binary(max_size=200), st.text(ALPHABET, max_size=120).map(str.encode)))
 @example(data=b"")
 @example(data=b"%\n%\n")
@@ -90,7 +91,7 @@ def test_l1_any_bytes_come_back_or_are_refused(zero: dict[str, Path], dialect: s
     assert written is None or written == data
 
 
-@pytest.mark.parametrize("dialect", RS274)
+@pytest.mark.parametrize("dialect", some_fast(RS274, 4))
 @given(noise=st.binary(max_size=60))
 @settings(max_examples=15)
 def test_l1_text_in_a_comment_is_opaque(zero: dict[str, Path], dialect: str, noise: bytes) -> None:
@@ -143,7 +144,7 @@ def numbers(text: bytes) -> tuple[bytes, list[Decimal]]:
     return b"".join(pieces), values
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", some_fast(range(20), 4))
 def test_l2_a_shift_edits_every_slot_and_nothing_else(tmp_path: Path, seed: int) -> None:
     there = machines.shift_machine(tmp_path / "there")
     back = machines.shift_machine(tmp_path / "back", (-100.0, -100.0, -100.0))
@@ -235,7 +236,7 @@ def test_l7_arcs_keep_their_radius(
 # -- L8: every move is accounted for ------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", some_fast(range(10), 4))
 def test_l8_the_tally_is_complete(bent: Path, seed: int) -> None:
     moves = olp.correct(programs.random_program(seed, blocks=10), bent).report["moves"]
     parts = [moves[name] for name in ("corrected", "approximated", "passed", "refused")]

@@ -6,6 +6,7 @@ import socket
 
 import numpy as np
 import pytest
+from cases.fast import some_fast
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -124,7 +125,7 @@ class Refuses(ruckig_moves.ruckig.Ruckig):
         return ruckig_moves.ruckig.Result.ErrorSynchronizationCalculation
 
 
-@pytest.mark.parametrize("broken", [Raises, LoopsBack, Refuses])
+@pytest.mark.parametrize("broken", some_fast([Raises, LoopsBack, Refuses], 3))
 @settings(deadline=None, max_examples=50)
 @given(case=moves())
 def test_a_broken_ruckig_is_replaced(broken, case):

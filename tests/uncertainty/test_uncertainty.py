@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from cases.calibration import measurements_of
+from cases.fast import some_fast
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from judge import simulated
@@ -109,7 +110,7 @@ def unknowns(uncertainty: Uncertainty, chain: str = "FXYZ", repeat: float = 0.0)
     return Unknowns(Sensitivity.of(flat(), chain, uncertainty), (repeat,) * 3)
 
 
-@pytest.mark.parametrize(("chain", "touch"), [("FXYZ", False), ("YFXZ", True), ("ZYFX", True)])
+@pytest.mark.parametrize(("chain", "touch"), some_fast([("YFXZ", True), ("FXYZ", False), ("ZYFX", True)], 3))
 def test_an_independent_monte_carlo_agrees(chain: str, touch: bool) -> None:
     known = random_uncertainty()
 

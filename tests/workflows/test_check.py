@@ -31,7 +31,7 @@ def test_every_code_has_its_cases_and_its_explanation() -> None:
         assert rule.example.endswith(".")
 
 
-@pytest.mark.parametrize("code", some_fast(CASES, 2))
+@pytest.mark.parametrize("code", some_fast(CASES, 4))
 def test_a_program_that_triggers_it_and_one_that_just_does_not(code: str, tmp_path: Path) -> None:
     hit, miss = CASES[code]
     result = hit.run(tmp_path / "hit")

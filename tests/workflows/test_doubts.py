@@ -322,7 +322,7 @@ def test_without_a_slip_all_verbs_go_on(tmp_path: Path) -> None:
         assert code == 0, (verb, output)
 
 
-@pytest.mark.parametrize("name", some_fast(SLIPS, 4))
+@pytest.mark.parametrize("name", some_fast(SLIPS, 8))
 def test_a_slip_is_told_before_a_program_is_written(name: str, tmp_path: Path) -> None:
     code, slip = SLIPS[name]
     folder = written(tmp_path / "slip")
@@ -372,7 +372,9 @@ def test_points_left_out_of_all_numbers_are_told(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("verb", ["correct", "verify", "simulate", "view", "retime", "check"])
-@pytest.mark.parametrize("name", ["squareness C0Y in nrad", "zeros", "tool in metres", "expired"])
+@pytest.mark.parametrize(
+    "name", some_fast(["squareness C0Y in nrad", "zeros", "tool in metres", "expired"], 2)
+)
 def test_every_verb_tells_it(verb: str, name: str, tmp_path: Path) -> None:
     folder = written(tmp_path / "slip")
     SLIPS[name][1](folder)
@@ -505,7 +507,7 @@ def test_shipped_jobs_raise_no_doubt(job: Path) -> None:
     assert doubts_of(olp.check(program, None, job, select=sorted(DOUBTS), date=date).findings) == []
 
 
-@pytest.mark.parametrize("seed", some_fast(range(100), 5))
+@pytest.mark.parametrize("seed", some_fast(range(100), 12))
 def test_random_machines_raise_no_doubt(seed: int, tmp_path: Path) -> None:
     recipe = Recipe(
         chain=CHAINS[seed % 24], off_datum=seed % 2 == 1, cyclic=seed % 3 == 0,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from cases.fast import some_fast
 from cases.posted import CONTROLS, FOLDER, UNROLLED, recipe
 from judge import machines
 
@@ -44,7 +45,7 @@ def test_each_file_has_its_control() -> None:
     assert {path.name for path in FOLDER.iterdir()} == set(CONTROLS)
 
 
-@pytest.mark.parametrize("name", CONTROLS)
+@pytest.mark.parametrize("name", some_fast(CONTROLS, 3))
 def test_a_posted_program_is_corrected(name: str, setups: dict[tuple[str, bool], Setup]) -> None:
     bent = setups[CONTROLS[name], False]
     result = olp.correct(FOLDER / name, bent, flatten=name in UNROLLED)
@@ -58,7 +59,7 @@ def test_a_posted_program_is_corrected(name: str, setups: dict[tuple[str, bool],
     assert result.report["deviation"]["path_max_um"] < (3.0 if "inch" in name else 1.5)
 
 
-@pytest.mark.parametrize("name", sorted(set(CONTROLS) - UNROLLED))
+@pytest.mark.parametrize("name", some_fast(sorted(set(CONTROLS) - UNROLLED), 3))
 def test_without_errors_nothing_changes(name: str, setups: dict[tuple[str, bool], Setup]) -> None:
     text = (FOLDER / name).read_bytes()
     assert olp.correct(text, setups[CONTROLS[name], True]).data == text

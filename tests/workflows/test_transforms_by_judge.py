@@ -122,7 +122,7 @@ def test_every_move_ends_where_the_judge_has_it(tmp_path: Path, kind: str) -> No
             assert point == pytest.approx(judged[line][3], abs=2e-3), text.splitlines()[line - 1]
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", some_fast(KINDS, 4))
 def test_arcs_keep_their_way_round_where_backlash_is_taken_up(tmp_path: Path, kind: str) -> None:
     """A step before an arc makes its code necessary, which a mirror image turns round."""
     on, off, control, _, unit = KINDS[kind]

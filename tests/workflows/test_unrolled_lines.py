@@ -297,7 +297,7 @@ LAW = (
 )
 
 
-@pytest.mark.parametrize(("text", "control"), some_fast(product(LAW, ("linuxcnc", "fanuc", "haas")), 10))
+@pytest.mark.parametrize(("text", "control"), some_fast(product(LAW, ("linuxcnc", "fanuc", "haas")), 20))
 def test_correcting_an_unrolled_program_is_unrolling_and_correcting(
     control: str, text: str, controls: Mapping[str, Path]
 ) -> None:

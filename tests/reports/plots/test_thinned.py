@@ -69,7 +69,7 @@ def test_columns_counts_and_pixels_are_those_of_all_points() -> None:
     assert group.largest_um == size.max()
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(st.lists(st.integers(1, 399), max_size=4))
 def test_points_in_parts_make_the_figure_of_all_at_once(cuts: list[int]) -> None:
     path = wavy(60)
@@ -124,6 +124,7 @@ def test_a_canvas_has_the_places_of_the_path() -> None:
     assert line.max() == 0
 
 
+@pytest.mark.slow
 def test_points_beside_a_known_segment_are_at_the_nearest_place_about_it() -> None:
     path = wavy(40)
     rng = np.random.default_rng(3)
