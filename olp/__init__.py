@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from olp.core.errors import Refused as Refused
     from olp.errormodel.known import KnownErrors as KnownErrors
     from olp.files.config import load_setup as load_setup
+    from olp.files.kinematics.load import load_kinematics as load_kinematics
     from olp.findings.catalogue import Finding as Finding
     from olp.review.job import Review as Review
     from olp.review.job import view as view
@@ -120,6 +121,7 @@ _HOME = {
     "Finding": "olp.findings.catalogue",
     "KnownErrors": "olp.errormodel.known",
     "load_setup": "olp.files.config",
+    "load_kinematics": "olp.files.kinematics.load",
     "evaluate_lines": "olp.workflows.calibrate_evaluate",
     "fit_ballbar": "olp.workflows.calibrate_ballbar",
     "fit_diagonals": "olp.workflows.calibrate_diagonals",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,11 +28,21 @@ if TYPE_CHECKING:
     from olp.workflows.session import Session
 
 
+#: A number as it is given for an axis.
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)")
+
+
 @click.command("inspect")
 @click.argument("file", metavar="PROGRAM|machine.toml", required=False)
 @program_options
 @click.option("--at", type=(MM, MM, MM), metavar="X Y Z", help="Show the error at an axis position in mm.")
-@click.option("--tool", type=Integer(), help="Tool number for --at. Default: the tool at the start.")
+@click.option(
+    "--axes",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="Show pose and error of a machine with rotary joints, in mm and deg, such as --axes C=30.",
+)
+@click.option("--tool", type=Integer(), help="Tool number for --at or --axes. Default: that at the start.")
 @plot_option("Draw the curves of the calibration, as .svg or .png.")
 @json_option("Print as JSON.")
 @units_option
@@ -41,6 +52,7 @@ def command(
     machine: str | None,
     job: str | None,
     at: tuple[float, float, float] | None,
+    axes: tuple[str, ...],
     tool: int | None,
     plot: str | None,
     as_json: bool,
@@ -58,6 +70,12 @@ def command(
         file, machine = None, file
     elif file is None and machine is None:
         ask_program = at is None and plot is None
+    other = at is not None or plot is not None
+    about_machine = file is None and machine is not None
+    if about_machine and _of_joints(machine or "", job, axes, tool, as_json=as_json, other=other):
+        return
+    if axes:
+        raise UsageError("--axes is for machine files with rotary joints; give the axis position with --at")
     session, inputs = machine_given(machine, job)
     setup = session.setup
     if ask_program:
@@ -88,6 +106,40 @@ def command(
     from olp.reports.report import to_json
 
     put(to_json(values) if as_json else outline(shown))
+
+
+def _of_joints(
+    machine: str, job: str | None, axes: Sequence[str], tool: int | None, *, as_json: bool, other: bool
+) -> bool:
+    """Show a machine with other joints than three linear axes; False where the file is of no such machine.
+    `other` says that an option for three linear axes is given."""
+    from olp.files.kinematics.load import is_of_joints
+
+    if not is_of_joints(machine):
+        return False
+    if other:
+        raise UsageError("--at and --plot are for three linear axes; give axis values such as --axes C=30")
+    if tool is not None and not axes:
+        raise UsageError("--tool belongs to --axes; give axis values such as --axes C=30")
+    from olp.reports.outline import outline
+    from olp.reports.report import plain, to_json
+    from olp.workflows.inspect_joints import joint_error_at, joint_summary
+
+    values = joint_error_at(machine, _values(axes), job, tool) if axes else joint_summary(machine, job)
+    put(to_json(values) if as_json else outline(plain(values)))
+    return True
+
+
+def _values(stated: Sequence[str]) -> dict[str, float]:
+    """Axis values of texts such as "C=30". Raises UsageError."""
+    values: dict[str, float] = {}
+    for text in stated:
+        name, mark, number = text.partition("=")
+        value = float(number) if _NUMBER.fullmatch(number) else None
+        if not mark or value is None or name in values:
+            raise UsageError(f"--axes {text}; expected NAME=VALUE in mm or deg, each axis once, such as C=30")
+        values[name] = value
+    return values
 
 
 def _program(session: Session, file: str, options: UnrollOptions, *, as_json: bool) -> dict[str, Any]:

@@ -7,11 +7,15 @@ import click
 from olp.cli.common import STREAM, diagnostic, put
 from olp.cli.options import force_option, output_option
 
+#: The kinds of `olp.files.json_schema`, which is loaded late.
+_KINDS = (
+    *("machine", "calibration", "job", "joint-machine", "joint-calibration"),
+    *("measurements", "points", "dialect"),
+)
+
 
 @click.command("schema")
-@click.argument(
-    "kind", type=click.Choice(["machine", "calibration", "job", "measurements", "points", "dialect"])
-)
+@click.argument("kind", type=click.Choice(_KINDS))
 @output_option("FILE", "Default: stdout.", default=STREAM)
 @force_option("the output file")
 def command(kind: str, output: str, force: bool) -> None:

@@ -204,17 +204,19 @@ class Mesh:
 @dataclass(frozen=True, slots=True)
 class Job:
     """What changes per job. `part_tolerance_um` holds where a call gives none. `work_offsets` and `tools`
-    override the machine's, one by one. `payloads` leads from a line of the program, counted from 1, to the
-    payload from there on. `parameters` are values of parameters of the program, by names such as "#100".
-    Temperatures of the structure's sensors come from `sensors_degC`, settled, or from
-    `sensor_log` at a time in it. `dialect` is that of the program; None: it is detected from the text and the
-    ending of the file. `described` is a dialect that a file describes (`olp.program.dialect.Dialect`)."""
+    override the machine's, one by one. `payload_centre_mm` counts from the gauge point. `payloads` leads from
+    a line of the program, counted from 1, to the payload from there on. `parameters` are values of parameters
+    of the program, by names such as "#100". Temperatures of the structure's sensors come from `sensors_degC`,
+    settled, or from `sensor_log` at a time in it. `dialect` is that of the program; None: it is detected from
+    the text and the ending of the file. `described` is a dialect that a file describes
+    (`olp.program.dialect.Dialect`)."""
 
     program: str | None = None
     machine: str | None = None
     part_tolerance_um: float | None = None
     start_mm: tuple[float | None, float | None, float | None] = (None, None, None)
     payload_kg: float = 0.0
+    payload_centre_mm: Vector = ZERO
     payloads: Mapping[int, float] = field(default_factory=dict)
     parameters: Mapping[str, float] = field(default_factory=dict)
     temperatures_degC: Mapping[str, float] = field(default_factory=dict)

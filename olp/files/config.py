@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from pathlib import Path as FilePath
 
-from olp.core.errors import UsageError
+from olp.core.errors import ProgramError, UsageError
 from olp.core.machine import Axis, HolderPart, Job, Machine, Mesh, Sanity, Setup, Tool, Vector, WorkOffset
 from olp.core.schema import stated_values
 from olp.core.units import AXES, MM_PER_UM, shifted
@@ -19,6 +19,9 @@ from olp.files.schemas import JobFile, MachineFile, Tools, WorkOffsets
 from olp.files.toml_text import Path, dotted, line_of, read_toml
 from olp.files.write import PathLike, Reader, read_bytes
 
+#: Keys of a machine file that only a machine of any joints has, and keys of its axes.
+_OF_JOINTS = {"kinematics", "platforms", "gauge"}
+_OF_A_JOINT = {"kind", "direction", "point_mm", "travel_deg"}
 #: Says whether a file is there, as `Sources.exists` does.
 Exists = Callable[[PathLike], bool]
 
@@ -65,9 +68,13 @@ def read_setup(
     if problems:
         raise config_error(problems, str(machine_path))
     problems = _undefined_tools(setup, job.work_offsets, job_lines)
+    if any(job.payload_centre_mm):
+        key: Path = ("payload_centre_mm",)
+        sentence = "payload_centre_mm goes with machines that have rotary joints; leave it out"
+        problems.append((line_of(key, job_lines), sentence))
     for index, mesh in enumerate(job.meshes):
         if mesh.frame != "machine" and setup.work_offset(mesh.frame) is None:
-            key: Path = ("meshes", index, "frame")
+            key = ("meshes", index, "frame")
             sentence = (
                 f'{dotted(key)} = "{mesh.frame}" is not a work offset of machine or job; expected "machine" '
                 "or the name of a table [work_offsets.NAME]"
@@ -80,6 +87,15 @@ def read_setup(
 
 def _read_machine(path: PathLike, read: Reader) -> tuple[Machine, Mapping[Path, int]]:
     values, lines = read_toml(read(path), str(path))
+    if of_joints(values):
+        raise ProgramError(
+            f"the machine has the chain {values.get('chain')}, and not three linear axes alone; programs "
+            "are not corrected nor read for it. olp inspect shows what its files hold, and "
+            "olp.load_kinematics computes with it",
+            file=str(path),
+            line=line_of(("chain",), lines),
+            code="OLP563",
+        )
     file = validate(MachineFile, values, lines, str(path))
     axes = {
         axis: Axis(
@@ -105,7 +121,7 @@ def _read_machine(path: PathLike, read: Reader) -> tuple[Machine, Mapping[Path, 
         calibration=beside(path, file.calibration),
         compensated_by_controller=file.compensated_by_controller,
         work_offsets=_work_offsets(file.work_offsets),
-        tools=_tools(file.tools),
+        tools=tools_of(file.tools),
         styli={name: table.offset_mm for name, table in file.styli.items()},
         default_tool=file.job_defaults.tool,
         default_work_offset=file.job_defaults.work_offset,
@@ -123,6 +139,14 @@ def _read_machine(path: PathLike, read: Reader) -> tuple[Machine, Mapping[Path, 
         ),
     )
     return machine, lines
+
+
+def of_joints(values: Mapping[str, object]) -> bool:
+    """Whether a machine file states joints, not only the limits of three linear axes."""
+    axes = values.get("axes")
+    tables = axes.values() if isinstance(axes, Mapping) else ()
+    stated = {key for table in tables if isinstance(table, Mapping) for key in table}
+    return bool(_OF_JOINTS & values.keys() or _OF_A_JOINT & stated)
 
 
 def _compliance(stated: float | Vector, axis: int) -> Vector:
@@ -165,6 +189,7 @@ def _read_job(path: PathLike, read: Reader, exists: Exists = _is_file) -> tuple[
         part_tolerance_um=file.part_tolerance_um,
         start_mm=file.start_mm.values,
         payload_kg=file.payload_kg,
+        payload_centre_mm=file.payload_centre_mm,
         payloads={entry.line: entry.payload_kg for entry in file.payloads},
         parameters=file.parameters,
         temperatures_degC={
@@ -176,7 +201,7 @@ def _read_job(path: PathLike, read: Reader, exists: Exists = _is_file) -> tuple[
         sensor_log=beside(path, file.temperatures_degC.sensor_log),
         sensor_log_at_s=file.temperatures_degC.sensor_log_at_s,
         work_offsets=_work_offsets(file.work_offsets),
-        tools=_tools(file.tools),
+        tools=tools_of(file.tools),
         styli={name: table.offset_mm for name, table in file.styli.items()},
         meshes=tuple(meshes),
     )
@@ -198,7 +223,8 @@ def _work_offsets(tables: WorkOffsets) -> dict[str, WorkOffset]:
     }
 
 
-def _tools(tables: Tools) -> dict[int, Tool]:
+def tools_of(tables: Tools) -> dict[int, Tool]:
+    """The tools of tables [tools.NUMBER], by number."""
     return {
         int(number): Tool(
             number=int(number),

@@ -9,6 +9,8 @@ from olp.core.errors import UsageError
 from olp.core.schema import Table, fields_of
 from olp.files.described import DialectFile
 from olp.files.json_types import table_schema
+from olp.files.kinematics.calibration_schema import JointCalibrationFile
+from olp.files.kinematics.schema import JointMachineFile
 from olp.files.measurements.schemas import MeasurementsFile
 from olp.files.point_profile import PointProfile
 from olp.files.schemas import FILES
@@ -17,6 +19,8 @@ from olp.files.stated_units import with_quantities
 #: The model of each kind of file.
 KINDS: dict[str, type[Table]] = {
     **FILES,
+    "joint-machine": JointMachineFile,
+    "joint-calibration": JointCalibrationFile,
     "measurements": MeasurementsFile,
     "points": PointProfile,
     "dialect": DialectFile,
@@ -42,7 +46,8 @@ def json_schema(kind: str) -> dict[str, Any]:
 
 def schema_id(kind: str) -> str:
     """The `$id` of the schema of a kind of file: a name, and no address that anything would be read from."""
-    return f"{PREFIX}{_format(KINDS[kind])}"
+    form = _format(KINDS[kind])
+    return f"{PREFIX}{form}" if f"-{kind}-" in form else f"{PREFIX}{form}:{kind}"
 
 
 def _format(model: type[Table]) -> str:

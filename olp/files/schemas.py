@@ -375,6 +375,11 @@ class JobFile(Table):
     payload_kg: NotNegative = Field(
         default=0.0, description="the payload on the machine at the start of the program, in kg"
     )
+    payload_centre_mm: Triple = Field(
+        default=(0.0, 0.0, 0.0),
+        description="the centre of the payload from the gauge point, in the gauge frame, [X, Y, Z] in mm; "
+        "only for machines with rotary joints",
+    )
     payloads: list[PayloadTable] = Field(
         default=[],
         description="tables [[payloads]], the payload from a line of the program on; or the program holds "

@@ -18,8 +18,8 @@ import olp
 PACKAGE = Path(olp.__file__).parent
 #: The rooms of the house, the lowest first: a room imports only from rooms above it in this list.
 ROOMS = (
-    *("core", "findings", "program", "errormodel", "compensation", "proof", "clearance", "checks"),
-    *("trajectory", "calibration", "comparison", "uncertainty", "results", "files", "reports"),
+    *("core", "kinematics", "findings", "program", "errormodel", "compensation", "proof", "clearance"),
+    *("checks", "trajectory", "calibration", "comparison", "uncertainty", "results", "files", "reports"),
     *("workflows", "review", "cli"),
 )
 ROW = {name: row for row, name in enumerate(ROOMS)}

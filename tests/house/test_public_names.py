@@ -16,7 +16,7 @@ LARGE = ("scipy", "trimesh", "meshcat", "ruckig", "matplotlib")
 PUBLIC = {
     *("correct", "verify", "simulate", "retime", "check", "compare", "inspect", "error_at", "flatten"),
     *("Correction", "Verification", "Simulation", "Retiming", "Check", "Comparison", "Finding", "load_setup"),
-    "KnownErrors",
+    *("KnownErrors", "load_kinematics"),
     *("view", "Review", "add_layers", "Layers", "fit_calibration", "FittedCalibration"),
     *("diagnose_calibration", "CalibrationDiagnosis", "plan_measurements", "MeasurementPlan"),
     *("compare_methods", "ComparedMethods"),

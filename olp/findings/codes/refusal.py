@@ -307,4 +307,13 @@ RULES = (
         remedy="Give the nominal program and its own correction, the nominal one first.",
         example="`olp verify part.corrected.ngc part.ngc`: the order is wrong.",
     ),
+    _rule(
+        "OLP563",
+        "machine with other joints",
+        why="Programs are read and corrected for three linear axes. With rotary axes, arms or platforms "
+        "their words mean other motions.",
+        remedy="Look at the machine with `olp inspect machine.toml`, or compute with `olp.load_kinematics`. "
+        "Correct programs of machines with three linear axes only.",
+        example='`chain = "C A Y F X Z"` with tables of rotary axes in the machine file.',
+    ),
 )

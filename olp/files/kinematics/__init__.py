@@ -1,0 +1,1 @@
+"""Machine and calibration files of machines of any joints, and other descriptions of them."""

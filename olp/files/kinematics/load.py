@@ -1,0 +1,71 @@
+"""A machine of any joints from its files: machine, calibration and job."""
+
+from __future__ import annotations
+
+from olp.core.errors import ConfigError
+from olp.core.values import dataclass
+from olp.files.config import load_job, of_joints
+from olp.files.kinematics.calibration import load_joint_calibration
+from olp.files.kinematics.machine import load_joint_machine
+from olp.files.toml_text import read_toml
+from olp.files.write import PathLike, read_bytes
+from olp.kinematics.chain import Kinematics
+from olp.kinematics.errors import MachineErrors, Payload
+from olp.kinematics.machine import JointCalibration, JointMachine
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointSetup:
+    """What the files of a machine hold, and the machine with its tool that they make. The calibration is None
+    where the machine file names none; then the machine has no errors."""
+
+    machine: JointMachine
+    calibration: JointCalibration | None
+    kinematics: Kinematics
+
+
+def is_of_joints(machine: PathLike) -> bool:
+    """Whether a machine file states joints other than three linear axes. Raises InputError, ConfigError."""
+    return of_joints(read_toml(read_bytes(machine), str(machine))[0])
+
+
+def load_joint_setup(machine: PathLike, job: PathLike | None = None, tool: int | None = None) -> JointSetup:
+    """The machine of a machine file, with its calibration, the payload and tools of a job file, and a tool by
+    its number (default: that of `job_defaults`). Raises InputError, ConfigError."""
+    described = load_joint_machine(machine)
+    stated = None if job is None else load_job(job)
+    payload = Payload() if stated is None else Payload(stated.payload_kg, stated.payload_centre_mm)
+    tools = {**described.tools, **({} if stated is None else stated.tools)}
+    number = described.default_tool if tool is None else tool
+    if number is not None and number not in tools:
+        raise ConfigError(
+            f"tool {number} is not defined; expected the number of a table [tools.N]", file=str(machine)
+        )
+    vector = None if number is None else tools[number].tool_vector_mm
+    if number is not None and vector is None:
+        raise ConfigError(
+            f"tools.{number} states no gauge_to_tip_mm, and its length is a touch-off value; give the vector",
+            file=str(machine),
+        )
+    calibration = None
+    if described.calibration is not None:
+        calibration = load_joint_calibration(described.calibration, described.structure, payload)
+    errors = MachineErrors() if calibration is None else calibration.errors
+    kinematics = Kinematics(described.structure, errors, vector or (0.0, 0.0, 0.0))
+    return JointSetup(described, calibration, kinematics)
+
+
+def load_kinematics(machine: PathLike, job: PathLike | None = None, tool: int | None = None) -> Kinematics:
+    """A machine of any joints with the errors of its calibration: poses of the tool from axis values.
+
+    `job` states the payload and tools, `tool` the number of the tool; the default is that of `job_defaults`.
+    A machine file with three linear axes alone is refused. Raises InputError where a file cannot be read, and
+    ConfigError with all that is wrong in it.
+    """
+    if not is_of_joints(machine):
+        raise ConfigError(
+            "has three linear axes alone; expected tables [axes.NAME] with kind and direction, or use "
+            "olp.error_at for it",
+            file=str(machine),
+        )
+    return load_joint_setup(machine, job, tool).kinematics

@@ -1,0 +1,80 @@
+"""Reads the machine file of a machine of any joints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from olp.core.errors import ConfigError
+from olp.files.config import beside, tools_of
+from olp.files.kinematics.schema import OWN_DIRECTIONS, JointMachineFile, JointTable, kind_of
+from olp.files.problems import config_error, validate
+from olp.files.toml_text import read_toml
+from olp.files.write import PathLike, Reader, read_bytes
+from olp.kinematics.machine import JointMachine
+from olp.kinematics.structure import Gauge, Joint, Leg, Platform, Structure
+
+
+def load_joint_machine(path: PathLike, read: Reader = read_bytes) -> JointMachine:
+    """The machine of an olp-machine-1 file of any joints. Raises InputError where it cannot be read, and
+    ConfigError with all that is wrong."""
+    values, lines = read_toml(read(path), str(path))
+    file = validate(JointMachineFile, values, lines, str(path))
+    joints = {name: _joint(name, table) for name, table in file.axes.items()}
+    platforms = {
+        name: Platform(
+            name,
+            tuple(
+                Leg(leg.base_mm, leg.platform_mm, leg.length_mm, leg.axis, leg.carriage) for leg in table.legs
+            ),
+            table.start_mm,
+            table.orientation == "solved",
+        )
+        for name, table in file.platforms.items()
+    }
+    chain = tuple(file.chain.split()) if " " in file.chain.strip() else tuple(file.chain.strip())
+    gauge = Gauge(file.gauge.point_mm, (file.gauge.A_deg, file.gauge.B_deg, file.gauge.C_deg))
+    gravity, symmetry = file.kinematics.gravity, file.kinematics.tool_symmetry
+    slides = [name for name in chain if name in joints and joints[name].kind == "linear"]
+    symmetric = len(slides) >= len(OWN_DIRECTIONS) if symmetry is None else symmetry == "axis"
+    try:
+        structure = Structure(file.name, chain, joints, platforms, gauge, gravity, symmetric)
+    except ConfigError as error:
+        raise config_error([(None, problem) for problem in error.problems], str(path)) from None
+    default = file.job_defaults.tool
+    if default is not None and str(default) not in file.tools:
+        raise config_error(
+            [(None, f"job_defaults.tool = {default} is not defined; expected a table [tools.N]")], str(path)
+        )
+    return JointMachine(
+        structure=structure,
+        controller=file.controller,
+        calibration=beside(path, file.calibration),
+        tools=tools_of(file.tools),
+        work_offsets=tuple(file.work_offsets),
+        default_tool=default,
+    )
+
+
+def _joint(name: str, table: JointTable) -> Joint:
+    kind = kind_of(name, table)
+    assert kind is not None, "the schema refuses an axis without a kind"
+    own: Mapping[str, tuple[float, float, float]] = {
+        "X": (1.0, 0.0, 0.0),
+        "Y": (0.0, 1.0, 0.0),
+        "Z": (0.0, 0.0, 1.0),
+    }
+    # the length of a leg has no line of its own: its error counts along a direction of its own
+    default = own[name] if name in tuple(OWN_DIRECTIONS) else own["X"]
+    rotary = kind == "rotary"
+    travel = table.travel_deg if rotary else table.travel_mm
+    step = table.least_increment_deg if rotary else table.least_increment_mm
+    assert travel is not None, "the schema refuses an axis without travel"
+    return Joint(
+        name=name,
+        kind=kind,
+        direction=table.direction or default,
+        point_mm=table.point_mm or (0.0, 0.0, 0.0),
+        travel=travel,
+        least_increment=step or 0.0,
+        correct=table.correct,
+    )

@@ -1,0 +1,1 @@
+"""Machines of any joints: serial chains from workpiece to tool, and platforms on legs."""

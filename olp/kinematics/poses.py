@@ -1,0 +1,106 @@
+"""Rigid motions in columns: rotations (n, 3, 3) and positions (n, 3) in mm, or one of each for all rows."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from olp.core.arrays import Array
+from olp.core.values import dataclass
+
+#: Below this angle the sine over the angle is taken from its series, whose rest is then below 1e-17. Radians.
+_SMALL_RAD = 1e-5
+#: A sum of the diagonal below this is near half a turn, where the skew part does not show the axis.
+_NEAR_HALF_TURN = -0.99
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Poses:
+    """Rigid motions p -> `rotation` @ p + `position`; (n, 3, 3) or (3, 3), and (n, 3) or (3,) in mm."""
+
+    rotation: Array
+    position: Array
+
+    def __matmul__(self, other: Poses) -> Poses:
+        """First `other`, then this."""
+        return Poses(self.rotation @ other.rotation, self.at(other.position))
+
+    def at(self, point_mm: Array) -> Array:
+        """(n, 3) where points (n, 3) or (3,) come to lie."""
+        return turned(self.rotation, point_mm) + self.position
+
+    def inverse(self) -> Poses:
+        back = np.swapaxes(self.rotation, -1, -2)
+        return Poses(back, 0.0 - turned(back, self.position))
+
+    def rows(self, count: int) -> Poses:
+        """The same with a row for each of `count`."""
+        rotation = np.broadcast_to(self.rotation, (count, 3, 3))
+        return Poses(rotation, np.broadcast_to(self.position, (count, 3)))
+
+
+#: Nothing moves.
+STILL = Poses(np.eye(3), np.zeros(3))
+
+
+def turned(rotation: Array, vectors: Array) -> Array:
+    """(n, 3) vectors (n, 3) or (3,) after rotations (n, 3, 3) or (3, 3)."""
+    return np.asarray((rotation @ vectors[..., None])[..., 0])
+
+
+def shift(vector_mm: Array) -> Poses:
+    """The translation by (n, 3) or (3,) in mm."""
+    return Poses(np.eye(3), vector_mm)
+
+
+def about(point_mm: Array, rotation: Array, offset_mm: Array) -> Poses:
+    """Rotations about a point, then a shift: Trans(point) Trans(offset) R Trans(-point)."""
+    return Poses(rotation, point_mm + offset_mm - turned(rotation, point_mm))
+
+
+def axis_rotation(direction: Array, angle_rad: Array) -> Array:
+    """(n, 3, 3) rotations by angles (n,) about a unit vector (Rodrigues)."""
+    x, y, z = direction
+    cross = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
+    sine = np.sin(angle_rad)[..., None, None]
+    # 1 - cos, without cancelling at small angles
+    versine = 2.0 * np.square(np.sin(0.5 * angle_rad))[..., None, None]
+    return np.asarray(np.eye(3) + sine * cross + versine * (cross @ cross))
+
+
+def tilts(angles_rad: Array, *, reverse: bool = False) -> Array:
+    """(n, 3, 3) rotations by A, B, C (n, 3) of fixed axes: Rz Ry Rx; `reverse` gives Rx Ry Rz."""
+    x, y, z = (axis_rotation(np.eye(3)[k], angles_rad[..., k]) for k in range(3))
+    return np.asarray(x @ y @ z if reverse else z @ y @ x)
+
+
+def rotation_vector(rotation: Array) -> Array:
+    """(n, 3) angle times unit axis of rotations (n, 3, 3), in rad; the angle is from 0 to pi."""
+    skew = 0.5 * np.stack(
+        (
+            rotation[..., 2, 1] - rotation[..., 1, 2],
+            rotation[..., 0, 2] - rotation[..., 2, 0],
+            rotation[..., 1, 0] - rotation[..., 0, 1],
+        ),
+        axis=-1,
+    )
+    sine = np.linalg.norm(skew, axis=-1)
+    trace = np.trace(rotation, axis1=-2, axis2=-1)
+    angle = np.arctan2(sine, 0.5 * (trace - 1.0))
+    small = sine < _SMALL_RAD
+    factor = np.where(small, 1.0 + np.square(sine) / 6.0, angle / np.where(small, 1.0, sine))
+    vector = skew * factor[..., None]
+    half = trace < _NEAR_HALF_TURN
+    if np.any(half):
+        vector[half] = _near_half_turn(rotation[half], skew[half], angle[half])
+    return np.asarray(vector)
+
+
+def _near_half_turn(rotation: Array, skew: Array, angle: Array) -> Array:
+    """Rotation vectors near half a turn: the axis is the longest column of R + R^T - (trace - 1) I."""
+    trace = np.trace(rotation, axis1=-2, axis2=-1)
+    outer = rotation + np.swapaxes(rotation, -1, -2) - (trace - 1.0)[:, None, None] * np.eye(3)
+    longest = np.argmax(np.linalg.norm(outer, axis=-2), axis=-1)
+    axis = outer[np.arange(len(outer)), :, longest]
+    axis /= np.linalg.norm(axis, axis=-1)[:, None]
+    axis *= np.where(np.sum(axis * skew, axis=-1) < 0.0, -1.0, 1.0)[:, None]
+    return np.asarray(axis * angle[:, None])
