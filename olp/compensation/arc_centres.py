@@ -83,7 +83,7 @@ def solve(writer: Writer, rows: Rows) -> ArcRows:
     for group, count in groups:
         part = free[group]
         bend = sampled(path, writer.model, writer.targets, pieces.pick(part), tools, count)
-        best, _ = fit(bend, plane[part], start[part], end[part], sweep[part])
+        best = fit(bend, plane[part], start[part], end[part], sweep[part])
         equal = (np.abs(sweep[part]) <= WIDE) & (np.abs(bend.mismatch) < 1e-6) & ~bend.rigid
         centre[part] = _on_bisector(start[part], end[part], best, plane[part], equal)
         # an arc that is only shifted keeps its words

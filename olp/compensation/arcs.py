@@ -28,6 +28,8 @@ _DEEPEST = 14
 #: pieces of all arcs that do not fit yet: of few arcs, and for each arc
 _PIECES = 20_000
 _PIECES_PER_ARC = 16
+#: mm; the step of a fit behind such a one is its square or so, below the digits of a number
+_STILL_MM = 1e-7
 #: rad; arcs beyond this sweep need not have equal radii at both ends
 WIDE = 0.95 * np.pi
 #: rad; a piece that sweeps more may be a whole turn whose ends nearly meet
@@ -83,13 +85,13 @@ def subdivide_arcs(
     for _ in range(_DEEPEST):
         if not len(pieces) or len(pieces) > max(_PIECES, _PIECES_PER_ARC * len(arc)):
             break
-        departure = np.zeros(len(pieces))
+        away = np.zeros(len(pieces))
         for part, count in sample_groups(path, model, target, pieces, tools, tolerance):
-            departure[part] = fit_pieces(path, model, target, pieces.pick(part), tools, count)
-        good = departure <= tolerance
+            away[part] = fit_pieces(path, model, target, pieces.pick(part), tools, count)
+        good = away <= tolerance
         done.append(pieces.pick(good))
         # the departure of an arc goes with about the third power of its length
-        parts = np.clip(np.ceil((departure[~good] / tolerance) ** (1 / 3) * 1.05), 2, 16)
+        parts = np.clip(np.ceil((away[~good] / tolerance) ** (1 / 3) * 1.05), 2, 16)
         pieces = _divided(pieces.pick(~good), parts.astype(np.int64))
     if len(pieces):
         raise CannotCompute(
@@ -210,13 +212,13 @@ def sampled(
     axes, rows = _AXES[plane], np.arange(len(pieces))
     tool = tools if tools.ndim == 1 else tools[move]
     share = np.linspace(0.0, 1.0, count + 1)
-    spread = (pieces.begin[:, None] + share * (pieces.end - pieces.begin)[:, None]).reshape(-1)
-    which = np.repeat(np.arange(len(pieces)), len(share))
-    point = ArcShapes.of(start, end, centre, plane, sweep).at(which, spread)
+    spread = pieces.begin[:, None] + share * (pieces.end - pieces.begin)[:, None]
+    which = np.repeat(rows, len(share))
+    point = ArcShapes.of(start, end, centre, plane, sweep).at(rows[:, None], spread).reshape(-1, 3)
     play = None
     if model.backlash_at(point[:1]) is not None:
         play = arc_directions(
-            start[which], end[which], centre[which], plane[which], sweep[which], spread
+            start[which], end[which], centre[which], plane[which], sweep[which], spread.reshape(-1)
         )  # fmt: skip
         play = _inside(play.reshape(len(pieces), len(share), 3)).reshape(-1, 3)
     command = bent(model, point, tool if tool.ndim == 1 else tool[which], play)
@@ -242,50 +244,64 @@ def fit_pieces(
     bend = sampled(path, model, target, pieces, tools, count)
     sweep = path.arcs.sweep_rad[pieces.arc] * (pieces.end - pieces.begin)
     plane = path.arcs.plane[pieces.arc]
-    _, departure = fit(bend, plane, bend.command[:, 0], bend.command[:, -1], sweep)
-    departure[bend.rigid] = 0.0
-    return departure
+    ends = bend.command[:, 0], bend.command[:, -1]
+    away = departure(bend, plane, *ends, sweep, fit(bend, plane, *ends, sweep))
+    away[bend.rigid] = 0.0
+    return away
 
 
-def fit(
-    bend: Bend, plane: npt.NDArray[np.int8], start: Array, end: Array, sweep: Array
-) -> tuple[Array, Array]:
-    """Centres (n, 3) of the arcs from `start` to `end` that leave the samples least, and how far that is
-    (n,).
+def fit(bend: Bend, plane: npt.NDArray[np.int8], start: Array, end: Array, sweep: Array) -> Array:
+    """Centres (n, 3) of the arcs from `start` to `end` that leave the samples least.
 
     Least squares on the radial distance; the radius goes linearly from one end to the other. The nominal
     difference of the radii (mostly 0) has a large weight. The weight is small for more than half a circle,
     where a short chord would swing the far side.
     """
     command, share = bend.command, bend.share
-    rows = np.arange(len(command))
     axes = _AXES[plane]
-    q0, q1, q2 = (np.take_along_axis(command, axes[:, i][:, None, None], axis=2)[:, :, 0] for i in range(3))
-    s0, s1, s2 = (start[rows, axes[:, i]][:, None] for i in range(3))
-    e0, e1, e2 = (end[rows, axes[:, i]][:, None] for i in range(3))
+    (q0, q1), (s0, s1), (e0, e1) = (_in_planes(some, axes)[:2] for some in (command, start, end))
     centre = bend.centre + (command[:, 0] - bend.point[:, 0] + command[:, -1] - bend.point[:, -1]) / 2
-    x, y = centre[rows, axes[:, 0]][:, None], centre[rows, axes[:, 1]][:, None]
+    x, y = _in_planes(centre, axes)[:2]
     x_start, y_start = x, y
     strong = np.where(np.abs(sweep) > WIDE, 1.0, 100.0)[:, None]
     mismatch = bend.mismatch[:, None]
     soft = _STIFFNESS * _STIFFNESS
     for _ in range(4):
-        rs, re, rq = np.hypot(s0 - x, s1 - y), np.hypot(e0 - x, e1 - y), np.hypot(q0 - x, q1 - y)
+        rs, re = np.hypot(s0 - x, s1 - y), np.hypot(e0 - x, e1 - y)
         us0, us1, ue0, ue1 = (s0 - x) / rs, (s1 - y) / rs, (e0 - x) / re, (e1 - y) / re
-        f = rq - rs - (re - rs) * share
-        j0 = us0 + (ue0 - us0) * share - (q0 - x) / rq
-        j1 = us1 + (ue1 - us1) * share - (q1 - y) / rq
+        j0, j1 = q0 - x, q1 - y
+        f = _length(j0, j1)
+        j0 /= f
+        j1 /= f
+        f -= rs + (re - rs) * share
+        j0 -= us0 + (ue0 - us0) * share
+        j1 -= us1 + (ue1 - us1) * share
         g = strong * (re - rs - mismatch)
         k0, k1 = strong * (us0 - ue0), strong * (us1 - ue1)
-        n00 = (j0 * j0).sum(axis=1, keepdims=True) + k0 * k0 + soft
-        n11 = (j1 * j1).sum(axis=1, keepdims=True) + k1 * k1 + soft
-        n01 = (j0 * j1).sum(axis=1, keepdims=True) + k0 * k1
-        b0 = -((j0 * f).sum(axis=1, keepdims=True) + k0 * g + soft * (x - x_start))
-        b1 = -((j1 * f).sum(axis=1, keepdims=True) + k1 * g + soft * (y - y_start))
+        n00 = _dot(j0, j0) + k0 * k0 + soft
+        n11 = _dot(j1, j1) + k1 * k1 + soft
+        n01 = _dot(j0, j1) + k0 * k1
+        b0 = _dot(j0, f) - k0 * g - soft * (x - x_start)
+        b1 = _dot(j1, f) - k1 * g - soft * (y - y_start)
         det = n00 * n11 - n01 * n01
-        x = x + (b0 * n11 - b1 * n01) / det
-        y = y + (b1 * n00 - b0 * n01) / det
+        step0, step1 = (b0 * n11 - b1 * n01) / det, (b1 * n00 - b0 * n01) / det
+        x = x + step0
+        y = y + step1
+        if max(np.abs(step0).max(initial=0.0), np.abs(step1).max(initial=0.0)) < _STILL_MM:
+            break
     x, y = np.where(bend.rigid[:, None], x_start, x), np.where(bend.rigid[:, None], y_start, y)
+    rows = np.arange(len(command))
+    centre[rows, axes[:, 0]], centre[rows, axes[:, 1]] = x[:, 0], y[:, 0]
+    return centre
+
+
+def departure(
+    bend: Bend, plane: npt.NDArray[np.int8], start: Array, end: Array, sweep: Array, centre: Array
+) -> Array:
+    """(n,) how far the arcs from `start` to `end` about `centre` (n, 3) leave the samples."""
+    share, axes = bend.share, _AXES[plane]
+    (q0, q1, q2), (s0, s1, s2), (e0, e1, e2) = (_in_planes(some, axes) for some in (bend.command, start, end))
+    x, y, _ = _in_planes(centre, axes)
     rs, re = np.hypot(s0 - x, s1 - y), np.hypot(e0 - x, e1 - y)
     # the control counts the angle about the new centre, and reaches the end with its own sweep
     begin = np.arctan2(s1 - y, s0 - x)
@@ -293,10 +309,29 @@ def fit(
     # ends that rounding made one point
     turn = np.where(turn == 0.0, sweep[:, None], turn)
     reached = _near(np.arctan2(q1 - y, q0 - x) - begin, share * turn) / turn
-    radial = np.hypot(q0 - x, q1 - y) - (rs + (re - rs) * reached)
+    radial = _length(q0 - x, q1 - y) - (rs + (re - rs) * reached)
     level = (q2 - (s2 + (e2 - s2) * reached)) * rs / np.hypot(rs, (e2 - s2) / turn)
-    centre[rows, axes[:, 0]], centre[rows, axes[:, 1]] = x[:, 0], y[:, 0]
-    return centre, np.hypot(radial, level).max(axis=1)
+    return np.asarray(_length(radial, level).max(axis=1))
+
+
+def _in_planes(point: Array, axes: Index) -> tuple[Array, Array, Array]:
+    """(n, s) coordinates of points (n, s, 3) along `axes` (n, 3) of their planes, (n, 1) of points (n, 3)."""
+    if point.ndim == 2:
+        point = point[:, None]
+    first, second, third = (
+        np.take_along_axis(point, axes[:, i][:, None, None], axis=2)[:, :, 0] for i in range(3)
+    )
+    return first, second, third
+
+
+def _length(first: Array, second: Array) -> Array:
+    """Lengths of vectors of moderate size: a third of the time of `np.hypot`."""
+    return np.asarray(np.sqrt(first * first + second * second))
+
+
+def _dot(first: Array, second: Array) -> Array:
+    """(n, 1) sums of products along rows (n, s)."""
+    return np.asarray(np.einsum("ij,ij->i", first, second)[:, None])
 
 
 def _near(angle: Array, guess: Array) -> Array:

@@ -185,5 +185,5 @@ def _centres(
     for part, count in sample_groups(path, model, target, pieces, tools, limits.tolerance_mm):
         bend = sampled(path, model, target, pieces.pick(part), tools, count)
         begin = np.where(np.isfinite(start[part]), start[part], bend.command[:, 0])
-        centre[part], _ = fit(bend, plane[part], begin, end[part], sweep[part])
+        centre[part] = fit(bend, plane[part], begin, end[part], sweep[part])
     return centre

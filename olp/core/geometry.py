@@ -15,6 +15,8 @@ Plane = npt.NDArray[np.int8] | npt.NDArray[np.int64]
 
 #: Plane number to (first, second, third) axis, right-handed: G17, G18, G19.
 PLANES = ((0, 1, 2), (2, 0, 1), (1, 2, 0))
+#: rad; a whole turn.
+_TURN = 2.0 * np.pi
 #: PLANES as an array, to be indexed by columns of planes.
 _AXES = np.array(PLANES)
 
@@ -50,7 +52,7 @@ class ArcShapes:
         return ArcShapes(plane, c0, c1, radius, wider, np.arctan2(s1, s0), sweep, s2, e2 - s2)
 
     def at(self, which: Index, share: Array) -> Array:
-        """(n, 3) points at shares (n,) of arcs `which` (n,)."""
+        """(n, 3) points at shares (n,) of arcs `which` (n,); (n, s, 3) at shares (n, s) of arcs (n, 1)."""
         radius = self.radius[which] + self.wider[which] * share
         angle = self.angle[which] + share * self.sweep[which]
         columns = (
@@ -58,10 +60,10 @@ class ArcShapes:
             self.centre_second[which] + radius * np.sin(angle),
             self.level[which] + share * self.rise[which],
         )
-        points = np.empty((len(which), 3))
+        points = np.empty((*angle.shape, 3))
         for plane, mine in _by_plane(self.plane, which):
             for axis, column in zip(PLANES[plane], columns, strict=True):
-                points[mine, axis] = column[mine]
+                points[mine, ..., axis] = column[mine]
         return points
 
     def distance(self, point: Array, which: Index, near: Array) -> Array:
@@ -69,27 +71,45 @@ class ArcShapes:
         points that lie near share `near` of it."""
         p0, p1, p2 = _in_planes(point, self.plane[which])
         p0, p1 = p0 - self.centre_first[which], p1 - self.centre_second[which]
-        sweep, radius = self.sweep[which], self.radius[which]
+        sweep, level = self.sweep[which], p2 - self.level[which]
+        size = np.abs(sweep)
         angle = np.arctan2(p1, p0) - self.angle[which]
         # the point lies on the turn of share `near`
-        guess = near * sweep
-        angle = angle + 2 * np.pi * np.rint((guess - angle) / (2 * np.pi))
-        size = np.abs(sweep)
-        turned = angle * np.sign(sweep)
+        angle += _TURN * np.rint((near * sweep - angle) * (1.0 / _TURN))
+        turned = np.where(sweep < 0.0, -angle, angle)
         place = np.clip(turned, 0.0, size)
-        # beyond the end that is nearer, whatever the turn
-        wrapped = np.mod(turned, 2 * np.pi)
-        beyond = np.maximum(np.minimum(wrapped - size, 2 * np.pi - wrapped), 0.0)
-        beyond = np.where(size >= 2 * np.pi, np.abs(turned - place), beyond) * np.sign(turned - place)
-        wider, lead = self.wider[which] / size, self.rise[which] / size
-        level = p2 - self.level[which]
-        # a helix rises by `lead` per radian: the nearest point is a little ahead, unless it ends before
-        mean = radius + wider * place
-        ahead = (beyond * mean**2 + (level - place * lead) * lead) / np.maximum(mean**2 + lead**2, 1e-24)
-        nearest = np.clip(place + ahead, 0.0, size)
-        across = np.hypot(p0, p1) - radius - wider * nearest
-        along = (place + beyond - nearest) * mean
-        return np.asarray(np.sqrt(across**2 + along**2 + (level - nearest * lead) ** 2), float)
+        beyond = _beyond(turned, place, size)
+        per_rad = 1.0 / np.abs(self.sweep)
+        wider = (self.wider * per_rad)[which]
+        mean = self.radius[which] + wider * place
+        across = np.sqrt(p0 * p0 + p1 * p1) - mean
+        along = beyond * mean
+        rising = np.flatnonzero(self.rise[which])
+        if rising.size:
+            of = which[rising]
+            lead = self.rise[of] * per_rad[of]
+            some, radius, here = level[rising], mean[rising], place[rising]
+            # a helix rises by `lead` per radian: the nearest point is a little ahead, unless it ends before
+            ahead = (beyond[rising] * radius**2 + (some - here * lead) * lead) / np.maximum(
+                radius**2 + lead**2, 1e-24
+            )
+            nearest = np.clip(here + ahead, 0.0, size[rising])
+            across[rising] -= wider[rising] * (nearest - here)
+            along[rising] = (here + beyond[rising] - nearest) * radius
+            level[rising] -= nearest * lead
+        return np.asarray(np.sqrt(across * across + along * along + level * level), float)
+
+
+def _beyond(turned: Array, place: Array, size: Array) -> Array:
+    """(n,) signed angles of points at angles `turned` along arcs of `size` from their `place` on these: from
+    the end that is nearer, whatever the turn."""
+    beyond = np.zeros(len(turned))
+    off = np.flatnonzero(turned != place)
+    turned, place, size = turned[off], place[off], size[off]
+    wrapped = np.mod(turned, _TURN)
+    away = np.maximum(np.minimum(wrapped - size, _TURN - wrapped), 0.0)
+    beyond[off] = np.where(size >= _TURN, np.abs(turned - place), away) * np.sign(turned - place)
+    return beyond
 
 
 def _by_plane(plane: Plane, which: Index) -> Iterator[tuple[int, slice | Index]]:

@@ -140,8 +140,10 @@ class Alignment:
         about = np.searchsorted(self.gone[1:], before + np.diff(self.length[i : i + len(rows) + 1]))
         choice = np.clip(about[:, None] + _BESIDE, j, len(self.theirs) - 1)
         near = self._near(np.repeat(rows, len(_BESIDE)), choice.ravel()).reshape(choice.shape)
-        near &= self.gone[choice + 1] - before[:, None] >= self.least[rows][:, None]
-        near &= ~self._goes_on(np.repeat(rows, len(_BESIDE)), choice.ravel()).reshape(choice.shape)
+        row, beside = np.nonzero(near)
+        of, end = rows[row], choice[row, beside]
+        ended = (self.gone[end + 1] - before[row] >= self.least[of]) & ~self._goes_on(of, end)
+        near[row, beside] = ended
         ends: Index = choice[np.arange(len(rows)), near.argmax(axis=1)]
         begin = np.concatenate(([j], ends[:-1] + 1))
         inserted = ends - begin

@@ -11,7 +11,16 @@ import pytest
 from cases.toy import Toy, arc, constant_backlash, feed, linear, rapid, toolpath
 
 from olp.compensation import arcs
-from olp.compensation.arcs import Bend, Pieces, fit, fit_pieces, sample_groups, sampled, subdivide_arcs
+from olp.compensation.arcs import (
+    Bend,
+    Pieces,
+    departure,
+    fit,
+    fit_pieces,
+    sample_groups,
+    sampled,
+    subdivide_arcs,
+)
 from olp.core.errors import CannotCompute
 from olp.core.toolpath import Frame, Toolpath
 
@@ -54,7 +63,9 @@ def bend(
 
 
 def fitted(b: Bend, plane: int, sweep: float) -> tuple[np.ndarray, float]:
-    centre, away = fit(b, np.array([plane], np.int8), b.command[:, 0], b.command[:, -1], np.array([sweep]))
+    ends = np.array([plane], np.int8), b.command[:, 0], b.command[:, -1], np.array([sweep])
+    centre = fit(b, *ends)
+    away = departure(b, *ends, centre)
     return centre[0], float(away[0])
 
 
