@@ -234,17 +234,17 @@ def _spelled(body: Bytes, work: Bytes) -> Mask:
             ~joined & (body[np.maximum(rapid - 1, 0)] <= 32) & (body[np.maximum(rapid - 2, 0)] == ord("F"))
         )
         near, far = rapid[joined], rapid[spaced]
-        body[near], body[near + 1], body[near + 2] = ord("-"), ord("1"), 32
+        body[near], body[near + 1], body[near + 2] = list(b"-01")
         body[far - 2], body[far - 1] = 32, ord("F")
-        body[far], body[far + 1], body[far + 2] = ord("-"), ord("1"), 32
+        body[far], body[far + 1], body[far + 2] = list(b"-01")
     automatic = np.flatnonzero((body == ord("U")) & (following == ord("T")) & (third == ord("O")))
     for i in automatic.tolist():
         match = _AUTOMATIC.search(body[max(i - 4, 0) : i + 3].tobytes())
         if match is not None:
             # a feed that only the control knows
             body[i - 1 - len(match[1]) - 1 : i + 3] = 32
-            body[i - 1 : i + 1] = list(b"Q0")
-            known[i - 1 : i + 3] = True
+            body[i + 1 : i + 3] = list(b"Q0")
+            known[i + 1 : i + 3] = True
     feed = body == ord("F")
     near = np.flatnonzero(feed & (following == PARAMETER_FEED))
     far = np.flatnonzero(feed & (following <= 32) & (third == PARAMETER_FEED))

@@ -18,7 +18,6 @@ from olp.program.heidenhain.table import TABLE, UNROLL
 _NUMBER = rb"[-+]?(?:\d+\.?\d*|\.\d+)"
 _ASSIGN = re.compile(rb"(?:FN[ \t]*0[ \t]*:[ \t]*)?(Q[LR]?\d+)[ \t]*=[ \t]*(.*)", re.I | re.S)
 _VALUE = re.compile(rb"(" + _NUMBER + rb"|[-+]?Q[LR]?\d+)\Z", re.I)
-_SET_BY = re.compile(rb"FN[ \t]*18[ \t]*:.*?\b(Q[LR]?\d+)[ \t]*=", re.I | re.S)
 _FN = re.compile(rb"FN[ \t]*(\d+)\b", re.I)
 #: FN 1 to FN 8, FN 13 and FN 18: the parameter that they assign
 _ASSIGNED = re.compile(rb"FN[ \t]*(?:[1-8]|13|18)[ \t]*:.*?\b(Q[LR]?\d+)[ \t]*=", re.I | re.S)
@@ -67,7 +66,8 @@ class Events:
         self._handlers: Sequence[tuple[bytes, Callable[[Statement], None]]] = (
             (b"BEGIN PGM", self._begin), (b"END PGM", self._end), (b"TOOL CALL", self._tool),
             (b"CYCL CALL", self._cycle_call), (b"CALL LBL", self._call), (b"LBL", self._label),
-            (b"PLANE", self._plane), (b"STOP", self._stop), (b"FN 18", self._unknown), (b"Q", self._assign),
+            (b"PLANE", self._plane), (b"STOP", self._stop), (b"Q", self._assign),
+            *((b"FN %d" % n, self._unknown) for n in (*range(1, 9), 13, 18)),
             (b"FN 0", self._assign), *((b"FN %d" % n, self._jump) for n in (9, 10, 11, 12)),
         )  # fmt: skip
         self._by_name = dict(self._handlers)
@@ -166,7 +166,7 @@ class Events:
             known[name] = -known[other] if text.startswith(b"-") else known[other]
 
     def _unknown(self, statement: Statement) -> None:
-        match = _SET_BY.match(statement.text)
+        match = _ASSIGNED.match(statement.text)
         if match is not None:
             self.modes.parameters.pop(match[1].upper().decode(), None)
 

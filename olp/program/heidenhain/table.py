@@ -67,6 +67,10 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"Q": (_R, "parameters with numbers, for feeds and cycles; expressions and axis words with --flatten"),
     b"FN 0": (_R, "as Q"),
     b"FN 18": (_R, "the parameter is not known afterwards"),
+    **dict.fromkeys(
+        (b"FN 1", b"FN 2", b"FN 3", b"FN 4", b"FN 5", b"FN 6", b"FN 7", b"FN 8", b"FN 13"),
+        (_R, "as FN 18; its value with --flatten"),
+    ),
     b"FN 17": (_NO, "writes into tables of the control"),
     b"STOP": (_R, "the motion rests"),
     b"LP": (_NO, f"a polar position: {UNROLL}"),

@@ -122,6 +122,12 @@ def test_r0_fauto_and_joined_words(bent: Path) -> None:
     assert moves.statements.feed_mm_s[[1, 4]] * 60 == pytest.approx(np.array([100, 9]))
 
 
+def test_words_go_behind_fmax_and_fauto_whole(bent: Path) -> None:
+    text = HEAD + "L Z-1 R0 FMAX M91\nL A+0 C+0 FMAX\nL Z+5 FAUTO\nL X-150 Y-100 F MAX\n"
+    written = olp.correct(text.encode(), bent).data
+    assert all(word in written for word in (b"C+0 FMAX", b" FAUTO", b"F MAX"))
+
+
 def test_feeds_may_be_parameters(bent: Path) -> None:
     moves = program(HEAD + "FN 0: Q2=+120\nL X1 FQ2\nQ2 = 60\nX2 FQ2\nX3\nL X4 FQ9\n", bent)
     assert moves.statements is not None

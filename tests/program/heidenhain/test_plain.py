@@ -211,7 +211,20 @@ def test_an_approach_and_a_departure_are_beside_the_contour_too(bent: Path) -> N
     text = "TOOL CALL 1 Z\nL X-20 Y-20 Z+5 R0 FMAX\nAPPR LT X+0 Y+0 LEN15 RR F100\nL X+40\nDEP LT LEN10\n"
     plain = olp.flatten((text + "L Y+50\n").encode(), bent).decode().split("\n")
     assert plain[2:-1] == [
-        "L X-15 Y-5 R0", "L X+0 Y-5 F100", "L X+40 Y-5", "L X+50 Y-5", "L X+50 Y+50 R0",
+        "L X-15 Y-5 R0", "L X+0 Y-5 F100", "L X+40 Y-5", "L X+50 Y-5", "L Y+50 R0",
+    ]  # fmt: skip
+
+
+def test_arcs_of_approaches_have_the_radius_of_the_tools_centre(bent: Path) -> None:
+    # the tool is larger than the arc: beside the contour there would be none
+    text = "TOOL CALL 1 Z DR+2\nL X-40 Y+0 Z+5 R0 FMAX\nL Z-5 F100\nCC X+50 Y+0\n"
+    text += "APPR LCT X+0 Y+0 R4 RL F300\nC X+0 Y+0 DR-\nDEP CT CCA90 R+4\nL X-40 Y+0\n"
+    plain = olp.flatten(text.encode(), bent).decode().split("\n")
+    # from (-40, 0) the tangent of the circle about (-11, 0) with a radius of 4 touches it on its lower side
+    assert plain[4] == "L X-11.551724 Y-3.961767 R0 F300"
+    assert plain[5:-1] == [
+        "CC X-11 Y+0", "C X-7 Y+0 DR+ F300", "CC X+50 Y+0", "CP IPA-360 DR-", "CC X-11 Y+0", "C X-11 Y+4 DR+",
+        "L X-40 Y+0 R0",
     ]  # fmt: skip
 
 
@@ -225,7 +238,6 @@ def test_a_contour_is_corrected_as_the_path_of_the_tool(bent: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "line", "words"),
     [
-        ("L X+2 Y+3\nAPPR CT X+9 Y+9 R5 CCA90 RL\nL X+20\n", 4, "radius of the tool"),
         ("L X+0 Y+0 RL\nL Y+40\nL X+30 Y+3\nL X+1 Y+40\nL X-9 R0\n", 5, "does not fit"),
         ("L X+0 Y+0 RR\nL Y+40\nCR X+6 Y+40 R+3 DR-\nL X+6 Y+0\nL X-9 R0\n", 5, "does not fit"),
         ("L X+0 Y+0 RL\nL Y+40\nL Z+50 R0\n", 5, "behind a contour"),

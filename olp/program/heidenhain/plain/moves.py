@@ -29,7 +29,8 @@ class Entry:
     """A statement in the text that is written: its `lines` as they are, with the `source` of each. A move has
     a `piece` across the plane, or none, and the `axes` that it states. `changed` ones are written again, with
     `rest` as their other words. `shift` is the datum shift of its words, `pole` what a CC states. `side` is 1
-    where the control keeps the tool on the left of the contour, -1 on the right, by its `radius`."""
+    where the control keeps the tool on the left of the contour, -1 on the right, by its `radius`. `centre`:
+    the piece is that of the tool's centre already."""
 
     lines: list[bytes]
     source: list[Source]
@@ -44,6 +45,7 @@ class Entry:
     before: list[Entry] = field(default_factory=list)
     side: int = 0
     radius: float = 0.0
+    centre: bool = False
 
 
 def unknown(what: str, line: int) -> ProgramError:

@@ -41,6 +41,13 @@ class Piece:
         arm = math.atan2(point[1] - self.centre[1], point[0] - self.centre[0])
         return arm + math.copysign(math.pi / 2, self.sweep)
 
+    def across(self, off: float, *, last: bool) -> Point:
+        """The point that is `off` to the left of the end or of the start."""
+        heading = self.heading(last=last)
+        assert heading is not None
+        x, y = self.end if last else self.start
+        return x - off * math.sin(heading), y + off * math.cos(heading)
+
     def share(self, point: Point) -> float:
         """Where a point on the carrier is: 0 at the start, 1 at the end."""
         if not self.sweep:

@@ -36,7 +36,7 @@ def beside(entries: Sequence[Entry]) -> list[Entry]:
         if contour and entry.block is None and _ends(entry):
             raise _refused("a tool or a cycle is called beside a contour; end it with R0 before", contour[-1])
         if contour and entry.block is not None and entry.pole is None and not entry.side:
-            done += _followed(contour, entry)
+            done += _followed(contour, None if entry.centre else entry)
             contour = []
         if entry.side or contour:
             contour.append(entry)
@@ -56,10 +56,11 @@ def _refused(why: str, entry: Entry) -> ProgramError:
     return ProgramError(why, line=entry.block.line if entry.block is not None else 1, code="OLP528")
 
 
-def _followed(contour: list[Entry], behind: Entry) -> list[Entry]:
-    """The statements of one contour, whose pieces become those of the tool; `behind` is the block after."""
+def _followed(contour: list[Entry], behind: Entry | None) -> list[Entry]:
+    """The statements of one contour, whose pieces become those of the tool; `behind` is the block after it,
+    where that does not begin beside the contour."""
     moves = [e for e in contour if e.piece is not None and e.piece.heading(last=True) is not None]
-    if behind.piece is None or behind.piece.sweep or b"M91" in behind.rest:
+    if behind is not None and (behind.piece is None or behind.piece.sweep):
         raise _refused("the block behind a contour has no straight move in X and Y; leave it by one", behind)
     if contour[0] not in moves:
         raise _refused("the block that enters a contour has no move in X and Y; give it one", contour[0])
@@ -90,8 +91,9 @@ def _followed(contour: list[Entry], behind: Entry) -> list[Entry]:
             entry.changed |= entry.rest != entry.block.rest or entry.block.stated(b"XY")
         written.append(entry)
     assert end is not None
-    behind.piece, behind.changed = Piece(end, behind.piece.end), True
-    behind.axes = b"XY" + (b"Z" if b"Z" in behind.axes else b"")
+    if behind is not None and behind.piece is not None:
+        behind.piece, behind.changed = Piece(end, behind.piece.end), True
+        behind.axes = b"XY" + (b"Z" if b"Z" in behind.axes else b"")
     return written
 
 
@@ -104,13 +106,13 @@ def _pieces(moves: list[Entry]) -> tuple[list[Piece], list[Piece | None]]:
     """The pieces of the tool, and the arc about the corner before each."""
     given = [e.piece for e in moves if e.piece is not None]
     off = moves[0].side * moves[0].radius
-    if given[0].sweep:
+    if given[0].sweep and not moves[0].centre:
         raise _refused("an arc is the first move of a contour; expected a straight move", moves[0])
     for entry, piece in zip(moves[1:], given[1:], strict=True):
         if piece.sweep and piece.size - math.copysign(off, piece.sweep * off) <= 0:
             raise _refused(f"a cutter radius of {abs(off):g} does not fit into this arc", entry)
-    begins = [_across(piece, off, last=False) for piece in given]
-    ends = [_across(piece, off, last=True) for piece in given]
+    begins = [piece.across(off, last=False) for piece in given]
+    ends = [piece.across(off, last=True) for piece in given]
     begins[0], ends[0] = given[0].start, begins[1]
     corners: list[Piece | None] = [None] * len(given)
     for k in range(1, len(given) - 1):
@@ -127,7 +129,7 @@ def _pieces(moves: list[Entry]) -> tuple[list[Piece], list[Piece | None]]:
             ends[k] = begins[k + 1] = (float(x), float(y))
         else:
             raise _not_fitting(off, moves[k + 1])
-    made = [Piece(begins[0], ends[0])]
+    made = [given[0] if moves[0].centre else Piece(begins[0], ends[0])]
     for entry, piece, begin, end in zip(moves[1:], given[1:], begins[1:], ends[1:], strict=True):
         made.append(_between(piece, begin, end, off, entry))
     return made, corners
@@ -135,13 +137,6 @@ def _pieces(moves: list[Entry]) -> tuple[list[Piece], list[Piece | None]]:
 
 def _not_fitting(off: float, entry: Entry) -> ProgramError:
     return _refused(f"a cutter radius of {abs(off):g} does not fit into the corners of this move", entry)
-
-
-def _across(piece: Piece, off: float, *, last: bool) -> Point:
-    heading = piece.heading(last=last)
-    assert heading is not None
-    point = piece.end if last else piece.start
-    return point[0] - off * math.sin(heading), point[1] + off * math.cos(heading)
 
 
 def _between(piece: Piece, begin: Point, end: Point, off: float, entry: Entry) -> Piece:

@@ -336,15 +336,8 @@ class _Writing(Holes):
         if block.feed and not entry.block.feed and self.feed:
             entry.rest = (entry.rest + b" " + self.feed).strip()
 
-    def _turn_of(self, form: bytes, line: int) -> int:
+    def _turn_of(self) -> int:
         """1 where APPR and DEP are on the left of the contour, -1 on the right."""
-        if form != b"LT" and self.side != b"R0":
-            raise ProgramError(
-                f"how far APPR and DEP {form.decode()} go beside the contour depends on the radius of the "
-                "tool, and controls differ in it; use LT, or plain blocks",
-                line=line,
-                code="OLP513",
-            )
         if self.side != b"R0":
             return 1 if self.side == b"RL" else -1
         return 1 if self.frame.flips else -1
@@ -360,8 +353,7 @@ class _Writing(Holes):
             raise unknown("APPR", block.line)
         entry.piece, entry.z = Piece(start, end), (self.at[2], z)
         entry.axes = b"XY" + (b"Z" if b"Z" in block.words else b"")
-        form = block.name.split()[1].removeprefix(b"P")
-        self.approach = (entry, self._turn_of(form, block.line))
+        self.approach = (entry, self._turn_of())
         self.entries.append(entry)
         self.at, self.last = [end[0], end[1], z], None
 
@@ -373,9 +365,10 @@ class _Writing(Holes):
         if heading is None:
             raise ProgramError("APPR needs a move of the contour behind it", line=block.line, code="OLP516")
         form = block.name.split()[1].removeprefix(b"P")
-        to, onto = approached(form, block.sizes, side, piece.start, piece.end, heading, block.line)
-        match = _SIDE.search(helper.rest)
-        side_word = b"" if match is None else match[1]
+        # R and LEN are those of the tool's centre, and lead to beside the contour
+        begin = first.across(helper.side * helper.radius, last=False)
+        to, onto = approached(form, block.sizes, side, piece.start, begin, heading, block.line)
+        side_word = b"R0" if _SIDE.search(helper.rest) else b""
         # LCT goes to its arc with the feed of its own block, the others with the feed before
         early = block.feed if form == b"LCT" else b""
         words = b" ".join(w for w in (side_word, early) if w)
@@ -383,15 +376,13 @@ class _Writing(Holes):
         if b"Z" in helper.axes:
             helper.before.append(self._part(helper, None, b"Z", b""))
         helper.piece, helper.axes, helper.changed = onto, b"XY", True
-        helper.rest = _SIDE.sub(b"", helper.rest).strip()
+        helper.rest, helper.centre = _SIDE.sub(b"", helper.rest).strip(), True
 
     def _part(self, entry: Entry, piece: Piece | None, axes: bytes, rest: bytes) -> Entry:
         assert entry.block is not None
         block = entry.block
         bare = Block(b"L", {}, 0, {}, b"", block.head, line_end(block.tail) or b"\n", block.line)
-        made = Entry([], entry.source[:1], bare, piece, entry.z, axes, True, rest, entry.shift)
-        made.side, made.radius = entry.side, entry.radius
-        return made
+        return Entry([], entry.source[:1], bare, piece, entry.z, axes, True, rest, entry.shift, centre=True)
 
     def _depart(self, block: Block, entry: Entry) -> None:
         before = None if self.last is None else self.last.piece
@@ -401,11 +392,12 @@ class _Writing(Holes):
             raise ProgramError("DEP needs a move of the contour before it", line=block.line, code="OLP516")
         polar = block.name.split()[1].startswith(b"P")
         end, z = self.polar_end(block) if polar else self.end(block)
-        side = self._turn_of(form, block.line)
-        pieces = departed(form, block.sizes, side, before.end, heading, end, block.line)
+        side = self._turn_of()
+        self._keep_side(entry, block.line)
+        begin = before.across(entry.side * entry.radius, last=True)
+        pieces = departed(form, block.sizes, side, begin, heading, end, block.line)
         entry.z, entry.changed = (self.at[2], z), True
         entry.rest = _SIDE.sub(b"", block.rest).strip()
-        self._keep_side(entry, block.line)
         parts = [self._part(entry, piece, b"XY", b"") for piece in pieces]
         if b"Z" in block.words:
             parts.append(self._part(entry, None, b"Z", b""))
