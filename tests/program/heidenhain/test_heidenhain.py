@@ -122,6 +122,23 @@ def test_r0_fauto_and_joined_words(bent: Path) -> None:
     assert moves.statements.feed_mm_s[[1, 4]] * 60 == pytest.approx(np.array([100, 9]))
 
 
+def test_a_split_block_calls_its_cycle_once(bent: Path) -> None:
+    text = DRILLED.replace(
+        "L X-40 Y-30 R0 FMAX M99\nL X+50 FMAX M99", "L X-140 Y-30 R0 F900 M99\nL X+150 M99"
+    )
+    result = olp.correct(text.encode(), bent)
+    assert result.data.count(b"M99") == 2
+    assert result.data.count(b"\nL ") > text.count("\nL ")
+    assert all(line.split()[-1] == b"M99" for line in result.data.splitlines() if b"M99" in line)
+
+
+def test_angles_of_the_control_stay_in_rotary_words_alone(bent: Path) -> None:
+    path = program(HEAD + "L A+Q120 C+Q122 R0 FMAX\nL X1\n", bent).toolpath
+    assert len(path) == 2
+    refused(HEAD + "L X+Q120\n", bent, 5, "parameters")
+    assert unrolled("L A+Q120 C+Q122 FMAX\n")[0] == "L A+Q120 C+Q122 FMAX"
+
+
 def test_words_go_behind_fmax_and_fauto_whole(bent: Path) -> None:
     text = HEAD + "L Z-1 R0 FMAX M91\nL A+0 C+0 FMAX\nL Z+5 FAUTO\nL X-150 Y-100 F MAX\n"
     written = olp.correct(text.encode(), bent).data
