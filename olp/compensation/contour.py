@@ -78,7 +78,7 @@ def long_parts(path: Toolpath, cuts: Cuts) -> Cuts:
     return move[kept], share[kept], target[kept]
 
 
-def in_arcs(path: Toolpath, model: ErrorModel, cuts: Cuts) -> Cuts:
+def in_arcs(path: Toolpath, model: ErrorModel, cuts: Cuts, whole: Mask) -> Cuts:
     """The cuts of arcs, and further ones of contours.
 
     A control takes the radius at the end of an arc for that of all of it. A bent arc of more than half a
@@ -86,7 +86,8 @@ def in_arcs(path: Toolpath, model: ErrorModel, cuts: Cuts) -> Cuts:
     arcs = path.arcs
     size = np.abs(arcs.sweep_rad)
     some = np.flatnonzero((size > WIDE) & (path.compensated_radius_mm()[arcs.move] > 0))
-    some = some[~np.isin(arcs.move[some], cuts[0])]
+    # an arc that enters a contour stays one
+    some = some[~np.isin(arcs.move[some], cuts[0]) & ~whole[arcs.move[some]]]
     if not some.size:
         return cuts
     count = np.ceil(size[some] / (0.9 * np.pi)).astype(np.int64)

@@ -109,7 +109,7 @@ class Planning:
         tell("correct", 0.7)
         cuts = [cuts_line, cuts_arc]
         if contour is not None:
-            cuts = [long_parts(path, cuts_line), in_arcs(path, model, cuts_arc)]
+            cuts = [long_parts(path, cuts_line), in_arcs(path, model, cuts_arc, contour.whole)]
         rows = _expand(path, target, command, raw, uncorrected, shift, cuts, model, reversal is not None)
         if contour is not None:
             rows = contour.hold(rows)

@@ -18,6 +18,7 @@ from olp.core.errors import ProgramError
 from olp.errormodel.base import ErrorModel
 from olp.program.bands import Band
 from olp.program.contours.elements import AXES, Elements
+from olp.program.contours.entries import centre_on
 from olp.program.contours.joints import Corner, corners, joints, refuse
 from olp.program.contours.meeting import meeting
 from olp.program.program import Program
@@ -65,6 +66,7 @@ class _Contour:
         last = np.append(parts.head[1:], True)
         point = np.where(last[:, None], self.elements.end[parts.element], stated)
         point = point + self._points(parts) - stated
+        self.parts = parts = self._entered(point)
         made = self._made(point)
         self._check(made)
         command = rows.command_mm[kept].copy()
@@ -85,6 +87,17 @@ class _Contour:
             None if rows.play is None else rows.play[kept], centre,
         )  # fmt: skip
 
+    def _entered(self, point: Array) -> Parts:
+        """The parts with the programmed centres of arcs that enter a contour: on the line of that of the
+        tool, and as far from the begin as from the end."""
+        parts, elements = self.parts, self.elements
+        arcs = np.flatnonzero((elements.first & elements.arc)[parts.element])
+        if not arcs.size:
+            return parts
+        centre = parts.centre.copy()
+        centre[arcs] = centre_on(point[arcs], parts.centre[arcs], parts.begin[arcs])
+        return replace(parts, centre=centre)
+
     def _corner(self) -> Array:
         """(p,) the corner before each part."""
         parts = self.parts
@@ -100,7 +113,7 @@ class _Contour:
         behind[last] = Corner.ENTRY
         following = np.minimum(np.arange(len(parts)) + 1, len(parts) - 1)
         guess = parts.guess
-        entry = np.flatnonzero(elements.first[parts.element])
+        entry = np.flatnonzero((elements.first & ~elements.arc)[parts.element])
         own = elements.end[parts.element[entry]] - elements.begin[parts.element[entry]]
         nominal = np.arctan2(own[:, 1], own[:, 0])
         point = guess

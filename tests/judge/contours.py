@@ -68,3 +68,36 @@ def worn(seed: int) -> bytes:
             if rng.random() < 0.2:
                 lines.append(f"G1 {third}{rng.uniform(-0.2, 0.2):.3f}")
     return "\n".join([*lines, "G40 G0 X0 Y0", "G0 Z50", "M2", ""]).encode()
+
+
+def entered(seed: int) -> bytes:
+    """A contour that an arc of 6 to 20 mm enters, flat or as a helix, with a straight move or an outside
+    corner behind it."""
+    rng = np.random.default_rng(seed)
+    side, sense = rng.choice([1, -1]), rng.choice([1, -1])
+    centre, radius = rng.uniform(-5, 5, 2), rng.uniform(6, 20)
+    begin, sweep = rng.uniform(0, 2 * math.pi), sense * rng.uniform(0.5, 4.5)
+
+    def on(angle: float) -> np.ndarray:
+        return centre + radius * np.array([math.cos(angle), math.sin(angle)])
+
+    start, end = on(begin), on(begin + sweep)
+    heading = begin + sweep + sense * math.pi / 2
+    corner = -side * rng.choice([0.0, rng.uniform(0.1, 1.2)])
+    first = end + rng.uniform(12, 30) * np.array([math.cos(heading), math.sin(heading)])
+    second = first + rng.uniform(12, 30) * np.array([math.cos(heading + corner), math.sin(heading + corner)])
+    away = centre - start
+    level = f" Z{rng.uniform(-3, 0):.3f}" if rng.random() < 0.4 else ""
+    lines = [
+        "G21 G90 G17 G94 G54 F1000",
+        f"G0 X{start[0]:.5f} Y{start[1]:.5f} Z10",
+        "G1 Z0",
+        f"{'G41' if side > 0 else 'G42'}.1 D{rng.uniform(1, 8):.3f}",
+        f"{'G3' if sense > 0 else 'G2'} X{end[0]:.5f} Y{end[1]:.5f} I{away[0]:.6f} J{away[1]:.6f}{level}",
+        f"G1 X{first[0]:.5f} Y{first[1]:.5f}",
+        f"X{second[0]:.5f} Y{second[1]:.5f}",
+        "G40 G0 X60 Y60",
+        "G0 Z50",
+        "M2",
+    ]
+    return "\n".join([*lines, ""]).encode()

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from judge import linuxcnc, machines
-from judge.contours import contour, worn
+from judge.contours import contour, entered, worn
 from judge.linuxcnc import ARC, CanonMoves
 from judge.machines import Recipe
 from judge.path import _Curves, judge_programs
@@ -123,6 +123,46 @@ def test_the_tool_goes_where_it_should_with_a_worn_cutter(tmp_path: Path, block:
         assert olp.verify(nominal, result.data, path).report["deviation"]["holds"]
     assert not off
     assert taken == 25
+
+
+def test_an_arc_enters_a_contour_as_the_interpreter_has_it(tmp_path: Path) -> None:
+    path = machines.zero_machine(tmp_path, RECIPE)
+    setup = load_setup(path)
+    taken, differ = 0, []
+    for seed in range(100):
+        try:
+            mine = read(entered(seed), setup, DIALECTS["linuxcnc"]).toolpath
+        except ProgramError as error:
+            assert "on the wrong side" in error.message
+            continue
+        moves = linuxcnc.interpret(entered(seed), path, find_known=False)
+        taken += 1
+        arc = int(np.flatnonzero(moves.kind == ARC)[0])
+        same = len(mine) == len(moves) and np.abs(mine.end_mm - moves.axis).max() < 1e-6
+        same = same and np.abs(mine.arcs.centre_mm[0] - moves.centre[arc])[:2].max() < 1e-5
+        differ += [] if same else [seed]
+    assert not differ
+    assert taken >= 90
+
+
+@pytest.mark.parametrize("form", ["contour", "path"])
+def test_the_tool_goes_where_it_should_along_an_arc_that_enters(tmp_path: Path, form: str) -> None:
+    path = machines.random_machine(tmp_path, 3, WORN)
+    off, taken = {}, 0
+    for seed in range(20):
+        nominal = entered(seed)
+        try:
+            result = olp.correct(nominal, path, contour=form)  # type: ignore[arg-type]
+        except ProgramError as error:
+            assert "on the wrong side" in error.message
+            continue
+        verdict = judge_programs(nominal, result.data, path, kinds=CUTTING)
+        taken += 1
+        assert olp.verify(nominal, result.data, path).report["deviation"]["holds"]
+        if verdict.max_um > ALLOWED_UM:
+            off[seed] = verdict.max_um
+    assert not off
+    assert taken >= 18
 
 
 @pytest.mark.parametrize("play", [{}, PLAY])

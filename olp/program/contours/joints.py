@@ -15,6 +15,7 @@ from olp.core.arrays import Array, Mask
 from olp.core.errors import ProgramError
 from olp.core.values import dataclass
 from olp.program.contours.elements import Elements, direction, wrapped
+from olp.program.contours.entries import entry_arcs
 from olp.program.contours.meeting import Carriers, meeting
 from olp.program.contours.rules import ContourRules
 
@@ -103,7 +104,10 @@ def sweeps(elements: Elements, found: Joints) -> Array:
     for sign, own, tool in ((-1.0, elements.begin, found.begin), (1.0, elements.end, found.end)):
         a, b = own - elements.centre, tool - elements.centre
         gone += sign * wrapped(np.arctan2(b[:, 1], b[:, 0]) - np.arctan2(a[:, 1], a[:, 0]))
-    return np.where(elements.arc, elements.sweep + gone, 0.0)
+    swept = np.where(elements.arc, elements.sweep + gone, 0.0)
+    entry, _, entered = entry_arcs(elements, found.begin, found.end)
+    swept[entry] = entered
+    return swept
 
 
 def refusals(elements: Elements, found: Joints, rules: ContourRules) -> list[tuple[Mask, str]]:
@@ -123,10 +127,21 @@ def refusals(elements: Elements, found: Joints, rules: ContourRules) -> list[tup
     turns = np.ceil((np.abs(elements.sweep) - _NO_ARC) / (2 * np.pi))
     beyond = np.ceil((gone - _NO_ARC) / (2 * np.pi)) > turns
     return [
-        (elements.first & elements.arc, "an arc is the first move of a contour; enter it by a straight move"),
         (
-            elements.first & ~elements.arc & (length <= radius) & (rules.entry == "own"),
+            elements.first & elements.arc & (not rules.enters_by_arc),
+            "an arc is the first move of a contour; enter it by a straight move",
+        ),
+        (
+            elements.first & (length <= radius) & (rules.entry == "own"),
             "the first move of a contour is not longer than the cutter radius of {r:g} mm",
+        ),
+        (
+            _without_arc(elements, found),
+            "the arc that enters the contour begins on the wrong side of its end for a cutter of {r:g} mm",
+        ),
+        (
+            elements.first & elements.arc & np.append(corner[1:] == Corner.INSIDE, False),
+            "the contour turns inward behind the arc that enters it, and where the tool goes is not known",
         ),
         (
             elements.inside & (elements.size <= radius),
@@ -146,6 +161,14 @@ def refusals(elements: Elements, found: Joints, rules: ContourRules) -> list[tup
             "a cutter radius of {r:g} mm does not fit into the corners of this move",
         ),
     ]
+
+
+def _without_arc(elements: Elements, found: Joints) -> Mask:
+    """(k,) arcs that enter a contour and have no centre for the tool."""
+    some, centre, _ = entry_arcs(elements, found.begin, found.end)
+    lacks = np.zeros(len(elements), bool)
+    lacks[some] = np.isnan(centre).any(axis=1)
+    return lacks
 
 
 def refuse(elements: Elements, found: Joints, rules: ContourRules, line: npt.NDArray[np.int32]) -> None:

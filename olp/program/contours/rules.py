@@ -21,6 +21,7 @@ class ContourRules:
     - `planes`: planes (0..2) in which the control compensates.
     - `circles_by_ends`: an arc is a whole circle where it ends at its begin alone, beside the contour.
     - `refused_g`, `refused_m`: codes that the control does not take along contours, ten times their number.
+    - `enters_by_arc`: an arc may be the first move.
     """
 
     entry: Literal["own", "next"]
@@ -28,6 +29,7 @@ class ContourRules:
     smooth_rad: float
     returns: bool
     planes: tuple[int, ...]
+    enters_by_arc: bool = False
     circles_by_ends: bool = False
     refused_g: frozenset[int] = frozenset()
     refused_m: frozenset[int] = frozenset()
@@ -36,6 +38,7 @@ class ContourRules:
 #: LinuxCNC, as its interpreter does it.
 NGC_CONTOURS = ContourRules(
     "own", "arc", 0.05, returns=True, planes=(0, 1), circles_by_ends=True,
+    enters_by_arc=True,
     refused_g=frozenset({430, 431, 432, 490, 610, 611, 640, 980, 990}),
     refused_m=frozenset({*range(480, 540, 10), *range(620, 690, 10)}),
 )  # fmt: skip

@@ -11,6 +11,7 @@ from olp.core.errors import ProgramError
 from olp.core.toolpath import Arcs, Frame, Kind, Toolpath
 from olp.core.values import dataclass
 from olp.program.contours.elements import AXES, Elements, direction
+from olp.program.contours.entries import entry_arcs
 from olp.program.contours.joints import Corner, Joints, joints, refuse, sweeps
 from olp.program.contours.rules import ContourRules
 
@@ -215,7 +216,14 @@ def _arcs(path: Toolpath, elements: Elements, found: Joints, last: Index) -> Arc
     sweep = arcs.sweep_rad.copy()
     mine = np.flatnonzero(elements.arc)
     sweep[np.searchsorted(arcs.move, elements.move[mine])] = sweeps(elements, found)[mine]
-    return Arcs(last[arcs.move], arcs.centre_mm, arcs.plane, sweep)
+    entry, centre, _ = entry_arcs(elements, found.begin, found.end)
+    if not entry.size:
+        return Arcs(last[arcs.move], arcs.centre_mm, arcs.plane, sweep)
+    at, axes = np.searchsorted(arcs.move, elements.move[entry]), AXES[elements.plane[entry]]
+    centre_mm = arcs.centre_mm.copy()
+    for i in (0, 1):
+        centre_mm[at, axes[:, i]] = centre[:, i]
+    return Arcs(last[arcs.move], centre_mm, arcs.plane, sweep)
 
 
 def _joined(a: Arcs, b: Arcs) -> Arcs:

@@ -97,7 +97,11 @@ def test_each_move_knows_its_block_and_its_words(tmp_path: Path) -> None:
 
 REFUSED = {
     b"G41 D1 G1 X4 Y3\nX60\n": (3, "first move of a contour is not longer than the cutter radius of 5 mm"),
-    b"G41 D1 G2 X20 Y0 I10\nG1 X60\n": (3, "an arc is the first move of a contour"),
+    b"G41 D1 G2 X20 Y0 I10\nG1 X60 Y-90\n": (3, "turns inward behind the arc that enters it"),
+    b"G41 D1 G2 X4 Y0 I2\nG1 X60\n": (
+        3,
+        "first move of a contour is not longer than the cutter radius of 5 mm",
+    ),
     b"G41 D1 G1 X20 Y0\nX60\nG3 X60 Y8 J4\nG1 X20\n": (5, "does not fit into this arc"),
     b"G41 D1 G1 X20 Y0\nX60\nY4\nX20\nY40\n": (5, "does not fit into the corners of this move"),
     b"G41 D1 G1 X20 Y0\nX60\nG40 G2 X70 Y10 I10\n": (5, "the move behind a contour"),
@@ -260,3 +264,17 @@ def test_every_point_of_a_sinumerik_contour_is_the_radius_away_from_it(tmp_path:
         - d[nearest, 1] * gap[np.arange(len(every)), nearest, 0]
     )
     assert (cross > -1e-6).all() if seed % 2 == 0 else (cross < 1e-6).all()
+
+
+def test_an_arc_that_enters_ends_beside_its_end_on_an_arc_from_where_the_tool_is(tmp_path: Path) -> None:
+    """By hand: from (0, 0) round (20, 0) to (20, -20), inside, so that the tool ends 5 mm above that."""
+    path = program(tmp_path, b"G41 D1 G3 X20 Y-20 I20\nG1 X60\n").toolpath
+    arc = path.arcs.move[0]
+    assert path.end_mm[arc, :2] == pytest.approx([20, -15])
+    # as far from both ends: 20^2 + y^2 = (y + 15)^2
+    assert path.arcs.centre_mm[0, :2] == pytest.approx([20, 175 / 30])
+    assert path.arcs.sweep_rad[0] == pytest.approx(np.arctan2(20, 175 / 30))
+    assert path.end_mm[arc + 1, :2] == pytest.approx([60, -15])
+    other = program(tmp_path, b"G42 D1 G3 X20 Y-20 I20\nG1 X60\n").toolpath
+    assert other.end_mm[arc, :2] == pytest.approx([20, -25])
+    assert other.arcs.centre_mm[0, :2] == pytest.approx([20, -4.5])
