@@ -32,6 +32,44 @@ class SelectOffset(Action):
             state.offsets.written.setdefault(self.name, [0.0, 0.0, 0.0])
 
 
+@dataclass(frozen=True, slots=True)
+class WriteOffset(Action):
+    """$P_UIFR: a settable offset by its name, in mm; values of axes that stay as they are are None."""
+
+    name: str
+    values_mm: tuple[float | None, float | None, float | None]
+
+    def run(self, state: AxisState, line: int) -> None:
+        _outside_contours(state, "a change of offsets is", line)
+        if state.offsets.name == self.name and state.last_frame >= 0:
+            raise ProgramError(
+                f"{self.name} is in force while the program writes it, and counts from the next {self.name} "
+                "on only; program G500 before it",
+                line=line,
+                code="OLP518",
+            )
+        if state.unit_mm != 1.0:
+            raise ProgramError(
+                "$P_UIFR is written in inches, and machine data say in which unit it counts; give G71",
+                line=line,
+                code="OLP518",
+            )
+        work = state.setup.work_offset(self.name)
+        before = state.offsets.written.get(self.name) or (None if work is None else work.offset_mm)
+        if before is None and None in self.values_mm:
+            raise ProgramError(
+                f"$P_UIFR changes one axis of {self.name}, which is not defined; give "
+                f"[work_offsets.{self.name}] in the machine or job file",
+                line=line,
+                code="OLP520",
+                missing=("work_offsets", self.name),
+            )
+        old = before or ZERO
+        state.offsets.written[self.name] = [
+            o if v is None else v for v, o in zip(self.values_mm, old, strict=True)
+        ]
+
+
 #: G17, as ten times its number.
 _XY = 170
 #: G500, in which no settable offset counts.

@@ -15,6 +15,17 @@ from olp.program.sinumerik.blocks import NUMBER
 
 #: Cycles that come back to the safety distance at a feed.
 _FEED_BACK = frozenset({"CYCLE84", "CYCLE840", "CYCLE85", "CYCLE89"})
+#: Where the argument is that says whether the depth is a position or a distance (AMODE), and the one before
+#: the last of these three (GMODE), which refers it to a diameter.
+_MODES = {
+    "CYCLE81": 8,
+    "CYCLE82": 8,
+    "CYCLE83": 19,
+    "CYCLE84": 23,
+    "CYCLE840": 19,
+    "CYCLE85": 10,
+    "CYCLE86": 13,
+}
 #: CYCLE86: arguments RPA, RPO and RPAP, by which the tool leaves the wall of the hole.
 _LIFT_OFF = slice(7, 10)
 
@@ -24,6 +35,7 @@ def drilling(name: str, arguments: Sequence[bytes], *, always: bool = False) -> 
     cycles whose strokes they do not give."""
     values = [_number(name, text) for text in arguments[:5]]
     rtp, rfp, sdis, dp, dpr = [*values, *[None] * 5][:5]
+    dp, dpr = _stated(name, arguments, dp, dpr)
     if rtp is None or rfp is None or (dp is None and dpr is None):
         raise ProgramError(
             f"{name} needs RTP, RFP, and DP or DPR as its first, second, fourth and fifth argument",
@@ -54,6 +66,32 @@ def drilling(name: str, arguments: Sequence[bytes], *, always: bool = False) -> 
     if rtp != strokes[-1][1]:
         strokes.append((Kind.RAPID, rtp))
     return Drilling(name, tuple(strokes), always)
+
+
+def _stated(
+    name: str, arguments: Sequence[bytes], dp: float | None, dpr: float | None
+) -> tuple[float | None, float | None]:
+    """DP and DPR of a cycle, None for the one that does not count. Where both are given, one
+    that is 0 is none."""
+    last = _MODES.get(name, len(arguments))
+    tail = [_number(name, text) or 0.0 for text in arguments[max(last - 2, 0) : last + 1]]
+    if len(arguments) > last - 2 and last in _MODES.values():
+        shank, plane, mode = [*tail, 0.0, 0.0, 0.0][:3]
+        if shank or plane % 10 > 1:
+            raise ProgramError(
+                f"{name} refers its depth to a diameter, or selects another plane; program its tip and G17",
+                code="OLP544",
+            )
+        if (mode % 10 == 1 and not dpr) or (mode % 10 == 2 and dp is None):
+            raise ProgramError(
+                f"AMODE of {name} says where its depth is, and there is none: 1 takes DPR, 2 takes DP",
+                code="OLP531",
+            )
+        if mode % 10:
+            return (dp or None, dpr) if mode % 10 == 1 else (dp, dpr or None)
+    if dpr == 0.0 and dp is not None:
+        return dp, None
+    return (None, dpr) if dpr and dp == 0.0 else (dp, dpr)
 
 
 def _number(name: str, text: bytes) -> float | None:

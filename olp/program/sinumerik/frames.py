@@ -11,6 +11,7 @@ import numpy as np
 
 from olp.core.errors import ProgramError
 from olp.core.turns import about_z, rows_of
+from olp.core.units import AXES
 from olp.program.sinumerik.actions import ChangeFrame
 
 #: Each statement of the programmable frame, and whether it adds to the frame in force.
@@ -19,6 +20,56 @@ STATEMENTS: Mapping[str, tuple[str, bool]] = {
     "SCALE": ("SCALE", False), "ASCALE": ("SCALE", True), "MIRROR": ("MIRROR", False),
     "AMIRROR": ("MIRROR", True),
 }  # fmt: skip
+
+
+class Parts:
+    """The absolute and the additive part of the programmable offset, in numbers of the program, which G58 and
+    G59 change one by one. They are followed while the frame is an offset alone."""
+
+    def __init__(self) -> None:
+        self._parts: list[list[float]] = [[0.0] * 3, [0.0] * 3]
+        self._alone = True
+        self._changed = ""
+
+    def frame(self, name: str, values: Mapping[str, float], plane_angle: float | None) -> ChangeFrame | None:
+        """What TRANS, ROT, SCALE, MIRROR or one of the additive statements does, as `frame_of`."""
+        kind, adds = STATEMENTS[name]
+        given = [values.get(axis, 0.0) for axis in AXES]
+        if self._changed == "G59" and kind == "TRANS" and values:
+            raise ProgramError(
+                f"{name} comes behind G59, and manuals differ on whether it keeps that part; program "
+                "TRANS without values before it",
+                code="OLP518",
+                word=name,
+            )
+        if not adds:
+            self._parts = [given if kind == "TRANS" else [0.0] * 3, [0.0] * 3]
+            self._alone, self._changed = kind == "TRANS" or not (values or plane_angle), ""
+        elif kind == "TRANS":
+            self._parts[1] = [a + b for a, b in zip(self._parts[1], given, strict=True)]
+        else:
+            self._alone &= not (values or plane_angle)
+        return frame_of(name, values, plane_angle)
+
+    def part(self, name: str, values: Mapping[str, float]) -> ChangeFrame:
+        """G58 changes axes of the absolute part, G59 those of the additive one."""
+        if not self._alone:
+            raise ProgramError(
+                f"{name} changes a frame that is turned, scaled or mirrored, which is not read; "
+                "program TRANS and ATRANS",
+                code="OLP512",
+                word=name,
+            )
+        self._changed = name
+        mine = self._parts[name == "G59"]
+        mine[:] = [values.get(axis, old) for axis, old in zip(AXES, mine, strict=True)]
+        x, y, z = (a + b for a, b in zip(*self._parts, strict=True))
+        return ChangeFrame(shift=(x, y, z))
+
+    def unit_changes(self) -> None:
+        """Another unit of lengths: what is in force has other numbers."""
+        if any(map(any, self._parts)):
+            self._alone = False
 
 
 def frame_of(name: str, values: Mapping[str, float], plane_angle: float | None) -> ChangeFrame | None:

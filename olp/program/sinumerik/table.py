@@ -27,7 +27,7 @@ _WITHOUT_PATH = (
     "FENDOFF", "WALIMON", "WALIMOF", "SBLON", "SBLOF", "PTPG0", "CP", "DYNNORM", "DYNPOS", "DYNROUGH",
     "DYNSEMIFIN", "DYNFINISH", "DYNPREC", "CTOLOF", "RTLION", "RTLIOF", "OVRRAP", "OVR", "SPOS",
     "SPOSA", "LIMS", "ACC", "FA", "FB", "FL", "FZ", "FD", "SVC", "CTOL", "OTOL", "ATOL", "STOLF",
-    "ACCLIM",
+    "ACCLIM", "CPRECON", "CPRECOF", "CUTMOD", "NEWCONF", "TANGOF", "WAITM",
 )  # fmt: skip
 #: Statements that stay as they are, and why.
 HARMLESS: Mapping[str, str] = {
@@ -54,6 +54,7 @@ READ: Mapping[str, str] = {
     "RPL": "the angle of ROT and AROT in G17",
     "G500": "no settable offset; [work_offsets.G500] where the control has a base offset",
     "G505": "G505 to G599: settable offsets, which need [work_offsets.G505] and so on",
+    "$P_UIFR[1]": "=CTRANS(X,...) and [1,X,TR]=: settable offsets that the program writes, from G54 on",
     "SUPA": "one block in machine coordinates",
     "G153": "one block in machine coordinates",
     "T": 'T="NAME" is the tool with that name in the machine or job file',
@@ -61,6 +62,8 @@ READ: Mapping[str, str] = {
     "MCALL": "calls a cycle behind every block with motion",
     "CYCLE832": "states the path tolerance",
     "ADIS": "states the path tolerance of G641",
+    "G58": "the absolute part of the programmable offset, axis by axis",
+    "G59": "the additive part of the programmable offset, axis by axis",
     "G74": "to the reference point: the axes are not known behind it",
     "G75": "to a fixed point: the axes are not known behind it",
     "M17": "the end of the program, as RET",
@@ -98,8 +101,8 @@ REFUSED: Mapping[str, str] = {
     "AR": "is the angle of an arc, which is not read; post I, J and K, or CR",
     **dict.fromkeys(("MEAS", "MEAW", "MEASA", "MEAWA", "CYCLE971", "CYCLE976", "CYCLE977", "CYCLE978",
                      "CYCLE979", "CYCLE998"), _MEASURES),
-    **dict.fromkeys(("ROTS", "AROTS", "CROTS",
-                     "$P_UIFR", "$P_PFRAME", "$P_IFRAME"), _FRAME),
+    **dict.fromkeys(("ROTS", "AROTS", "CROTS", "$P_PFRAME", "$P_IFRAME"), _FRAME),
+    "$P_UIFR": "is read as shifts of X, Y and Z alone; give [work_offsets] in the job file",
     **dict.fromkeys(("WHEN", "WHENEVER", "FROM", "EVERY", "DO", "ID", "IDS"), _SYNCHRONOUS),
     **dict.fromkeys(("FRC", "FRCM"), "is a feed of corners that the control makes; post them as blocks"),
     **dict.fromkeys(("DIAMON", "DIAM90", "DIAMCYCOF", "CYCLE93", "CYCLE95"), _LATHE),
@@ -109,8 +112,6 @@ REFUSED: Mapping[str, str] = {
                      "CYCLE61", "CYCLE62", "CYCLE63", "CYCLE64", "CYCLE70", "CYCLE71", "CYCLE72", "CYCLE73",
                      "CYCLE74", "CYCLE75", "CYCLE76", "CYCLE77", "CYCLE79", "CYCLE801", "CYCLE802",
                      "CYCLE899", "CYCLE90"), _CYCLE),
-    **dict.fromkeys(("G58", "G59"), "writes one part of the programmable offset, which machine data split; "
-                    "program TRANS and ATRANS"),
     "G291": "switches to ISO mode, another language; name the dialect of that mode with --dialect",
     "POS": "moves a positioning axis on its own; program it as a G0 block",
     "POSA": "moves a positioning axis on its own; program it as a G0 block",

@@ -19,7 +19,8 @@ from olp.program.sinumerik.actions import (
     Tolerate,
 )
 from olp.program.sinumerik.blocks import NUMBER, Block, Form, Piece, arguments, unknown
-from olp.program.sinumerik.frames import STATEMENTS, frame_of
+from olp.program.sinumerik.frames import STATEMENTS, Parts
+from olp.program.sinumerik.offsets import written_offset
 from olp.program.sinumerik.refusals import refused, statement, unroll
 from olp.program.sinumerik.table import (
     CONTOUR_WAYS,
@@ -32,8 +33,10 @@ from olp.program.sinumerik.table import (
 )
 
 _AXES = "XYZ"
+_OTHER_AXES = frozenset("ABCUVW")
 _CENTRES = "IJK"
 _COUNTED = re.compile(rb"(AC|IC)[ \t]*\([ \t]*([+-]?(?:\d+\.?\d*|\.\d+))[ \t]*\)", re.IGNORECASE)
+_ROTARY = re.compile(rb"(?:AC|IC|DC|ACP|ACN)[ \t]*\([ \t]*([+-]?(?:\d+\.?\d*|\.\d+))[ \t]*\)", re.IGNORECASE)
 _ADDRESS = re.compile(r"([A-Z])(\d*)")
 _SAME = frozenset({0, 1, 2, 3, 9, 17, 18, 19, 40, *range(53, 58), 90, 91, 93, 94, 95, 96, 97})
 #: G codes by the one of this family with the same meaning
@@ -56,6 +59,7 @@ class Words:
         self.calls: dict[int, Drilling] = {}
         #: by what it is in, the statement that contours are not read with
         self.ways: dict[str, str] = {}
+        self.parts = Parts()
 
     def refuse(self, error: ProgramError, line: int) -> None:
         """Note why a line is refused; the first reason counts."""
@@ -149,6 +153,8 @@ class _Line:
             piece.form is Form.WORD and piece.name == "G" and self._int(piece) in (25, 26) for piece in pieces
         ):
             self._limits(pieces)
+        elif part := next((self._int(p) for p in pieces if p.name == "G" and self._int(p) in (58, 59)), 0):
+            self._part(part, pieces)
         elif any(
             piece.form is Form.WORD and piece.name == "G" and self._int(piece) in (74, 75) for piece in pieces
         ):
@@ -161,6 +167,19 @@ class _Line:
         else:
             return False
         return True
+
+    def _part(self, code: int, pieces: list[Piece]) -> None:
+        """G58 and G59: one part of the programmable offset."""
+        values = {}
+        for piece in pieces:
+            if piece.name in _AXES:
+                values[piece.name] = self._number(piece)
+            elif piece.name != "G" or self._int(piece) != code:
+                raise ProgramError(
+                    f"G{code} and other words are in one block; put them into blocks of their own",
+                    code="OLP518",
+                )
+        self.acts.append(self.words.parts.part(f"G{code}", values))
 
     def _frame(self, name: str, pieces: list[Piece]) -> None:
         values: dict[str, float] = {}
@@ -177,7 +196,7 @@ class _Line:
                     code="OLP512",
                     word=name,
                 )
-        action = frame_of(name, values, angle)
+        action = self.words.parts.frame(name, values, angle)
         if action is not None:
             self.acts.append(action)
 
@@ -245,7 +264,12 @@ class _Line:
         """Words of other axes, speeds, variables."""
         base = piece.name.partition("[")[0]
         address = _ADDRESS.fullmatch(piece.name)
-        if piece.form is Form.WORD and piece.name in "NFSABCUVW":
+        if piece.name in _OTHER_AXES and (
+            turned := _ROTARY.fullmatch(self.code, piece.value, piece.value_end)
+        ):
+            self._write(piece.start, piece.name.encode())
+            self._write(turned.start(1), turned[1])
+        elif piece.form is Form.WORD and piece.name in "NFSABCUVW":
             self._word(piece, piece.name.encode())
         elif address and address[1] in "FSABCUVW" and (not address[2] or address[1] in "UVW"):
             self._word(piece, address[1].encode())
@@ -260,8 +284,17 @@ class _Line:
             self._way(base, read=self._number(piece) == 0.0)
         elif base in HARMLESS or base.startswith(("$AC_", "$A_OUT", "$A_DBB", "$A_DBW")):
             pass
+        elif base == "$P_UIFR":
+            self.acts.append(written_offset(self.code, piece))
         elif base in REFUSED:
             raise refused(base)
+        elif base.startswith("$"):
+            raise ProgramError(
+                f"{base} is a variable of the control, and what it sets is not read; take it out, or state "
+                "what it sets in the machine or job file",
+                code="OLP512",
+                word=base,
+            )
         elif base in UNROLLED or (piece.form is Form.EQUAL and (not address or address[1] == "R")):
             raise unroll(f"`{self.code[piece.start : piece.end].decode('latin-1')}`")
         elif piece.form is Form.WORD and piece.name in "LP":
@@ -311,9 +344,12 @@ class _Line:
             self._way(name)
         elif code in _RENAMED:
             self._write(piece.start, b"G%d" % _RENAMED[code])
+            if code in (71, 700, 710):
+                self.words.parts.unit_changes()
         elif code == 70:
             self._write(piece.start, b"G21")
             self.acts.append(SetUnit(INCH))
+            self.words.parts.unit_changes()
         elif code == 500 or 505 <= code <= 599:
             self.acts.append(SelectOffset(name))
         elif code in HARMLESS_G:

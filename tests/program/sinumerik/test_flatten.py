@@ -107,6 +107,10 @@ WRITTEN = {
     "G91 X=AC(4)\n": "G91 X=4\n",
     "R3=2\nMCALL CYCLE81(5,0,1,-R3)\nX1\nMCALL\n": "MCALL CYCLE81(5,0,1,-2)\nX1\nMCALL\n",
     "SUB1(2)\nL7 P2\n": "X=4\nY1\nY1\n",
+    # words that are no positions of the program do not count for IC( )
+    "X5\nG26 X100\nX=IC(1)\n": "X5\nG26 X100\nX6\n",
+    "G58 X100\nX5\nX=IC(1)\n": "G58 X100\nX5\nX6\n",
+    "$P_UIFR[1]=CTRANS(X,R1+2,Y,3)\n": "$P_UIFR[1]=CTRANS(X,2,Y,3)\n",
     "TRANS X=R1+1\n": "TRANS X=1\n",
     # arguments that are names stay
     "CYCLE832(0.05,_SEMIFIN,1)\nX=R1+1\n": "CYCLE832(0.05,_SEMIFIN,1)\nX=1\n",
@@ -152,6 +156,7 @@ REFUSED = {
     "ENDIF": ("closes nothing", "OLP542"),
     "AA:\nGOTOB AA": ("endless loop", "OLP543"),
     "GUD=2.5": ("DEF REAL", "OLP542"),
+    "SUPA X100\nX=IC(1)": ("program it in G90 first", "OLP524"),
     "TRANS X1\nX=IC(1)": ("program it in G90 first", "OLP524"),
 }
 

@@ -96,6 +96,18 @@ ENDS: dict[str, tuple[float, float, float]] = {
     ZERO + "G26 X5 S1000\nX1": (1, 0, 0),
     ZERO + "S1=500 M1=3 H5 LIMS=2000 SPOS=90\nX1": (1, 0, 0),
     ZERO + "CYCLE800()\nTRAFOOF\nX1": (1, 0, 0),
+    # both parts of the programmable offset, one by one
+    "TRANS X10 Y10 Z10\nATRANS X5 Y5\nG58 X20\nG0 X0 Y0 Z0": (25, 15, 10),
+    "TRANS X10 Y10 Z10\nATRANS X5 Y5\nG58 X20\nG59 X10 Y10\nG0 X0 Y0 Z0": (30, 20, 10),
+    "G59 X3\nTRANS\nG0 X0 Y0 Z0": (0, 0, 0),
+    # settable offsets that the program writes
+    "$P_UIFR[1]=CTRANS(X,10,Y,20)\nG54 G0 X0 Y0 Z0": (10, 20, 0),
+    "$P_UIFR[5,Y,TR]=-7.5\nG505 G0 X0 Y0 Z0": (1000, -7.5, 0),
+    # other axes, with functions around their numbers
+    ZERO + "X1 C=DC(30) B=ACP(5)": (1, 0, 0),
+    # the depth of a hole by its mode, and where one of the two is 0
+    ZERO + "CYCLE82(9,1,2,-5,0,0.5,0,1,12)": (0, 0, 9),
+    ZERO + "CYCLE82(9,1,2,0,5,0.5)": (0, 0, 9),
     # the side, with the radius of the edge in force, and off again
     "T7 M6\nNORM G450 DISC=0\nG0 X0 Y0 Z0\nG1 G41 D1 X10 Y10\nX20\nG41 X30": (30, 14, 70),
     "T7 M6\nKONT\nNORM\nG0 X0 Y0 Z0\nG1 G42 X10 Y10\nX20\nG40 X30": (30, 10, 70),
@@ -125,8 +137,16 @@ REFUSED: dict[str, tuple[str, str]] = {
     'CYCLE800(0,"T",0,57,0,0,0,30,0,0)': ("rotary axes", "OLP512"),
     "G33 Z-10 K1": ("thread", "OLP512"),
     # no work offset, as on other controls
-    "G58 X5": ("programmable offset", "OLP512"),
-    "G59 X5": ("programmable offset", "OLP512"),
+    "ROT Z30\nG58 X5": ("turned, scaled or mirrored", "OLP512"),
+    "G59 X5\nTRANS X1": ("manuals differ", "OLP518"),
+    "TRANS X1\nG70\nG59 X5": ("turned, scaled or mirrored", "OLP512"),
+    "G58 X5 F100": ("blocks of their own", "OLP518"),
+    ZERO + "$P_UIFR[1]=CTRANS(X,1)": ("counts from the next G54", "OLP518"),
+    "G70\n$P_UIFR[2]=CTRANS(X,1)": ("in which unit", "OLP518"),
+    "$P_UIFR[2,X,TR]=1": ("is not defined", "OLP520"),
+    "$P_UIFR[2]=CROT(Z,1)": ("as shifts", "OLP512"),
+    "$P_UIFR[2]=CTRANS(A,1)": ("as shifts", "OLP512"),
+    "$TC_DP3[1,1]=100": ("variable of the control", "OLP512"),
     "G21": ("not known to the sinumerik profile", "OLP512"),
     "G43 H1": ("not known to the sinumerik profile", "OLP512"),
     "G291": ("ISO mode", "OLP512"),
@@ -154,6 +174,11 @@ REFUSED: dict[str, tuple[str, str]] = {
     "T2 M6\nG0 X0 Y0 Z0\nG18 X1": ("outside of G17", "OLP518"),
     ZERO + "G91 X1\nG505 X1": ("behind a change of offsets", "OLP518"),
     "MCALL CYCLE81(7,0,2)": ("DP or DPR", "OLP531"),
+    "MCALL CYCLE82(7,0,2,-5,,0,0,1,11)": ("1 takes DPR", "OLP531"),
+    "MCALL CYCLE82(7,0,2,,5,0,0,1,12)": ("1 takes DPR", "OLP531"),
+    "MCALL CYCLE82(7,0,2,-5,6,0,0,1,12)": ("depth twice", "OLP531"),
+    "MCALL CYCLE82(7,0,2,-5,,0,1,1,12)": ("to a diameter", "OLP544"),
+    "MCALL CYCLE82(7,0,2,-5,,0,0,2,12)": ("another plane", "OLP544"),
     "MCALL CYCLE81(7,0,2,-5,6)": ("depth twice", "OLP531"),
     "MCALL CYCLE86(7,0,2,-5,,1,3,1,1,1,45)": ("wall of the hole", "OLP544"),
     "MCALL POCKET3(7)": ("inside the control", "OLP512"),
@@ -187,6 +212,22 @@ def test_a_hole_goes_down_behind_the_motion_of_its_block(setup: Setup) -> None:
     # no block may come behind a motion that calls a cycle, and its strokes have no words
     flags = path.flag[2:].tolist()
     assert flags == [Flag.WHOLE, *[Flag.PASS] * 4] * 2
+
+
+DEPTHS = {
+    "1,2,-5,0,0,0,1,12": -5,
+    "1,2,0,5": -4,
+    "1,2,,5,0,0,1,11": -4,
+    "1,2,-5": -5,
+    "1,2,-4,5": -4,
+    "1,2,-5,0": -5,
+}
+
+
+@pytest.mark.parametrize("given", DEPTHS)
+def test_how_deep_a_hole_is(given: str, setup: Setup) -> None:
+    path = program(f"{ZERO}CYCLE82(9,{given})", setup).toolpath
+    assert path.end_mm[path.kind == Kind.LINE, 2].tolist() == [DEPTHS[given]]
 
 
 def test_turns_beyond_the_first_part_of_an_arc(setup: Setup) -> None:

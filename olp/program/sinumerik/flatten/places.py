@@ -22,6 +22,9 @@ _KEPT = frozenset({"CYCLE84", "CYCLE840"})
 _MOVING_G = frozenset(range(4))
 #: G53, the last code up to which positions keep their meaning, and further codes that leave it.
 _LAST_MODE = 53
+#: Codes whose axis words are no positions of the program, and those of them that leave positions alone.
+_NO_PLACE = frozenset({4, 25, 26, 53, 58, 59, 74, 75, 153})
+_KEEPS_PLACE = frozenset({4, 25, 26})
 _MODES = frozenset({60, 90, 91, 93, 94, 95, 96, 97, *HARMLESS_G, *ROUNDING_G})
 #: Statements that change what positions mean.
 _FRAMES = frozenset({*STATEMENTS, "SUPA", "D"})
@@ -61,6 +64,13 @@ class Places:
             yield from self._hole(pieces[0].name, arguments(code, pieces[0]))
             return
         codes = {self._code(code, p) for p in pieces if p.name == "G" and p.form is Form.WORD}
+        if codes & _NO_PLACE or "SUPA" in names:
+            # its axis words are no positions of the program
+            if "SUPA" in names or not codes & _KEEPS_PLACE:
+                self._position.clear()
+                self._shapes.forget()
+            yield raw
+            return
         if names & _FRAMES or any(c > _LAST_MODE and c not in _MODES for c in codes):
             self._position.clear()
             self._shapes.forget()

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from olp.core.budget import Budget
+from olp.core.units import AXES
 from olp.program.origin import Origin, Unrolled
 from olp.program.sinumerik.blocks import NUMBER, Form, Piece
 from olp.program.sinumerik.flatten.corners import SIGN, with_corners
@@ -170,6 +171,8 @@ def _numbers(line: Line, piece: Piece, scope: Scope) -> list[tuple[int, int, byt
             if _literal(inside[:-1]):
                 return []
             value = f"{name.strip()}({shown(number(inside[:-1], scope))})"
+        elif name.strip().upper() == "CTRANS" and inside.endswith(")"):
+            value = f"CTRANS({','.join(_argument(part, scope) for part in _arguments(inside[:-1]))})"
         elif text.strip().startswith('"'):
             return []
         else:
@@ -187,7 +190,7 @@ def _arguments(text: str) -> list[str]:
 
 
 def _argument(text: str, scope: Scope) -> str:
-    if not text or _literal(text) or '"' in text:
+    if not text or _literal(text) or '"' in text or text.upper() in AXES:
         return text
     return shown(number(text, scope))
 
