@@ -332,6 +332,9 @@ class AxisState(OffsetState):
                 code="OLP518",
             )
         transform = self.offsets.transform
+        if transform is not None and not transform.code:
+            # a frame of the control's own: machine positions and offsets are used beside it
+            transform = None
         if transform is not None and (_OFFSET_CODES - LENGTHS).intersection(codes):
             raise ProgramError(
                 "offsets, machine coordinates and reference positions are used in a turned, scaled or "

@@ -100,6 +100,9 @@ ENDS: dict[str, tuple[float, float, float]] = {
     "TRANS X10 Y10 Z10\nATRANS X5 Y5\nG58 X20\nG0 X0 Y0 Z0": (25, 15, 10),
     "TRANS X10 Y10 Z10\nATRANS X5 Y5\nG58 X20\nG59 X10 Y10\nG0 X0 Y0 Z0": (30, 20, 10),
     "G59 X3\nTRANS\nG0 X0 Y0 Z0": (0, 0, 0),
+    # a turned frame stays where the offset changes, and machine coordinates have none
+    "ROT Z90\nG505 G0 X1 Y0 Z0": (1000, 1, 0),
+    "ROT Z90\nG0 X1 Y0 Z0\nG0 SUPA X5 Y6": (5, 6, 0),
     # settable offsets that the program writes
     "$P_UIFR[1]=CTRANS(X,10,Y,20)\nG54 G0 X0 Y0 Z0": (10, 20, 0),
     "$P_UIFR[5,Y,TR]=-7.5\nG505 G0 X0 Y0 Z0": (1000, -7.5, 0),
