@@ -39,6 +39,8 @@ class Foreign:
     least: int = 1
     code: str = "OLP501"
     language: bool = False
+    #: what was made of it
+    how: str = "which is not read"
 
 
 def _line(pattern: bytes) -> re.Pattern[bytes]:
@@ -124,12 +126,14 @@ FOREIGN = (
         _line(SINUMERIK + rb"|(?:N\d+[ \t]*)?(?:DEF|PROC)[ \t]+\w+"),
         _NAME_IT,
         language=True,
+        how="and was read as another language",
     ),
     Foreign(
         "Okuma OSP",
         _line(rb"\$[\w-]+\.(?:MIN|SSB|SUB)\b|(?:N\d+[ \t]*)?(?:CALL[ \t]+O\w+|V[CT]\w+[ \t]*=)"),
         _OSP,
         language=True,
+        how="and was read as another language",
     ),
     Foreign(
         "HPGL",
@@ -154,9 +158,7 @@ def recognised(data: bytes, *, languages: bool, own: frozenset[str] = frozenset(
         matches = [match for match, _ in zip(kind.sign.finditer(start), range(kind.least), strict=False)]
         if len(matches) == kind.least:
             line = _line_of(start, matches[0])
-            return ProgramError(
-                f"this is {kind.name}, which is not read; {kind.instead}", line=line, code=kind.code
-            )
+            return ProgramError(f"this is {kind.name}, {kind.how}; {kind.instead}", line=line, code=kind.code)
     binary = _BINARY.search(start)
     if binary is not None and len(_BINARY.findall(start)) * BINARY_SHARE > len(start):
         byte = start[binary.start()]
