@@ -1,4 +1,4 @@
-"""Every real program of the corpus in RS-274 and APT, read as a user does after following the remedies.
+"""Every real program of the corpus in RS-274, Sinumerik and APT, read after a user followed the remedies.
 
     python tests/cases/refusals_by_reason.py CORPUS        # prints the table
 
@@ -8,6 +8,7 @@ tool paths, and what is parametric is unrolled.
 
 from __future__ import annotations
 
+import re
 import sys
 import tempfile
 from collections import Counter
@@ -26,7 +27,10 @@ FOLDERS = {
     "gcode_fanuc": "fanuc",
     "gcode_fanuc_haas_nist": "haas",
     "apt_cldata": "apt",
+    "gcode_sinumerik": "sinumerik",
 }
+FAMILIES = {"apt_cldata": "APT", "gcode_sinumerik": "Sinumerik"}
+_NAMED = re.compile(rb'(?i)\bT\d*[ \t]*=[ \t]*"([^"]+)"')
 #: Radius of all tools in mm: that of the smallest cutter that cuts a contour in the corpus, which is 1/8 inch
 #: wide. A larger one does not fit into the arcs, and the control stops there.
 RADIUS_MM = 1.5875
@@ -44,17 +48,28 @@ class Outcome:
 
     @property
     def family(self) -> str:
-        return "APT" if self.folder == "apt_cldata" else "RS-274"
+        return FAMILIES.get(self.folder, "RS-274")
 
 
-def machine(folder: Path, control: str) -> tuple[Path, Path]:
-    """A machine without errors, and the job that says where the axes start."""
-    names = [*(f"G{n}" for n in range(54, 60)), *(f"CSYS{n}" for n in range(1, 10)), "MCS"]
+def machine(folder: Path, control: str, called: list[str] | None = None) -> tuple[Path, Path]:
+    """A machine without errors, with tools that are `called` by name, and the job that says where the axes
+    start."""
+    names = [
+        *(f"G{n}" for n in (*range(54, 60), *range(505, 600))),
+        *(f"CSYS{n}" for n in range(1, 10)),
+        "MCS",
+    ]
     offsets = {name: {"set_by": "true"} for name in names}
     recipe = Recipe(
         controller=control,
         travel=((-5000.0, 5000.0),) * 3,
-        tools={n: {"Z_mm": 0.0, "radius_mm": RADIUS_MM} for n in range(1, 100)},
+        tools={
+            **{n: {"Z_mm": 0.0, "radius_mm": RADIUS_MM} for n in range(1, 100)},
+            **{
+                100 + k: {"Z_mm": 0.0, "radius_mm": RADIUS_MM, "name": name}
+                for k, name in enumerate(called or ())
+            },
+        },
         work_offsets=offsets,
     )
     path = machines.zero_machine(folder, recipe)
@@ -72,8 +87,10 @@ def outcomes(corpus: Path) -> list[Outcome]:
     every = []
     for folder, control in FOLDERS.items():
         with tempfile.TemporaryDirectory() as place:
-            where, job = machine(Path(place), control)
-            for path in sorted(p for p in (corpus / folder).iterdir() if p.is_file()):
+            paths = sorted(p for p in (corpus / folder).iterdir() if p.is_file())
+            called = {name.decode("latin-1") for path in paths for name in _NAMED.findall(path.read_bytes())}
+            where, job = machine(Path(place), control, sorted(called))
+            for path in paths:
                 every.append(_outcome(path, where, job))
     return every
 
@@ -82,11 +99,11 @@ def _outcome(path: Path, where: Path, job: Path) -> Outcome:
     error: OlpError | None = None
     for flatten in (False, True):
         try:
-            olp.correct(path, where, job, contour=True, flatten=flatten)
+            olp.correct(path, where, job, flatten=flatten)
             return Outcome(path.parent.name, path.name)
         except OlpError as refusal:
             error = error or refusal
-            if isinstance(refusal, ProgramError) and not (refusal.hinted and not flatten):
+            if isinstance(refusal, ProgramError) and (flatten or refusal.code != "OLP511"):
                 error = refusal
                 break
     code = getattr(error, "code", "") or type(error).__name__
@@ -97,7 +114,7 @@ def _outcome(path: Path, where: Path, job: Path) -> Outcome:
 def table(every: list[Outcome]) -> str:
     """Counts by reason, and each refusal."""
     lines = []
-    for family in ("RS-274", "APT"):
+    for family in ("RS-274", "APT", "Sinumerik"):
         mine = [each for each in every if each.family == family]
         read = sum(not each.code for each in mine)
         lines.append(f"{family}: {read} of {len(mine)} programs are read")
