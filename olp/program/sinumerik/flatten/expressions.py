@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping, MutableMapping
+from functools import lru_cache
 
 from olp.core.errors import ProgramError
 
@@ -25,6 +26,11 @@ _TOKEN = re.compile(
 _LEVELS: tuple[tuple[str, ...], ...] = (
     ("==", "<>", "<", ">", "<=", ">="), ("OR",), ("XOR",), ("AND",), ("+", "-"), ("*", "/", "DIV", "MOD"),
 )  # fmt: skip
+_RANK: Mapping[str, int] = {sign: rank for rank, signs in enumerate(_LEVELS) for sign in signs}
+#: The kind of what is no token.
+_BAD = "bad"
+#: Expressions whose tokens are kept: a program has fewer, and runs each many times.
+_KEPT = 4096
 _LOGICAL = frozenset({"OR", "XOR", "AND"})
 
 
@@ -60,12 +66,24 @@ def number(text: str, variables: Variables) -> float:
     return float(value)
 
 
+@lru_cache(_KEPT)
+def _tokens(text: str) -> tuple[tuple[str, str], ...]:
+    """The kind and the text of each token; the last one is empty, or of the kind of what is none."""
+    tokens, place = [], 0
+    while (match := _TOKEN.match(text, place)) is not None:
+        kind = match.lastgroup or ""
+        tokens.append((kind, match[kind] if kind == "text" else match[kind].upper()))
+        place = match.end()
+    return (*tokens, (_BAD if text[place:].strip() else "", ""))
+
+
 class _Reading:
     """One expression while it is read: the present token, its kind empty behind the last one."""
 
     def __init__(self, text: str, variables: Variables) -> None:
         self.text, self.variables = text, variables
-        self.place, self.kind, self.token = 0, "", ""
+        self._tokens = iter(_tokens(text))
+        self.kind, self.token = "", ""
         self.next()
 
     def error(self, what: str, code: str = "OLP540") -> ProgramError:
@@ -73,26 +91,20 @@ class _Reading:
 
     def next(self) -> None:
         """Go on to the next token."""
-        match = _TOKEN.match(self.text, self.place)
-        if match is None:
-            if self.text[self.place :].strip():
-                raise self.error("is not an expression")
-            self.kind = self.token = ""
-            return
-        self.place, self.kind = match.end(), match.lastgroup or ""
-        self.token = match[match.lastgroup or 0]
-        if self.kind != "text":
-            self.token = self.token.upper()
+        self.kind, self.token = next(self._tokens, ("", ""))
+        if self.kind == _BAD:
+            raise self.error("is not an expression")
 
     def level(self, depth: int) -> Value:
         """A value made by the operators of this priority and closer ones."""
-        if depth == len(_LEVELS):
-            return self._signed()
-        value = self.level(depth + 1)
-        while self.kind in ("sign", "name") and self.token in _LEVELS[depth]:
+        value = self._signed()
+        while self.kind != "text":
+            rank = _RANK.get(self.token, -1)
+            if rank < depth:
+                break
             operator = self.token
             self.next()
-            value = self._applied(operator, value, self.level(depth + 1))
+            value = self._applied(operator, value, self.level(rank + 1))
         return value
 
     def _applied(self, operator: str, left: Value, right: Value) -> Value:

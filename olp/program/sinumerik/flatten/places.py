@@ -45,7 +45,9 @@ class Places:
         code = without_comment(raw)
         pieces = list(block_of(code).pieces)
         self._modes(code, pieces)
-        plain = self._shapes.written(raw, self._position, (self._motion, self._plane, self._incremental))
+        plain = self._shapes.written(
+            raw, pieces, self._position, (self._motion, self._plane, self._incremental)
+        )
         if plain is None:
             return
         if plain is not raw:

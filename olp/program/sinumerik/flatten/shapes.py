@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from olp.program.sinumerik.blocks import Form, Piece, block_of, without_comment
+from olp.program.sinumerik.blocks import Form, Piece
 from olp.program.sinumerik.flatten.elements import (
     AXES,
     CENTRES,
@@ -52,12 +52,15 @@ class Shapes:
             self._pole = None
 
     def written(
-        self, raw: bytes, position: Mapping[str, float], modes: tuple[int, int, bool]
+        self,
+        raw: bytes,
+        pieces: Sequence[Piece],
+        position: Mapping[str, float],
+        modes: tuple[int, int, bool],
     ) -> bytes | None:
-        """The block in plain words; None for one that only sets the pole. `position` is that before it,
-        `modes` are motion, plane, and whether words are distances."""
-        code = without_comment(raw)
-        pieces = block_of(code).pieces
+        """The block with these pieces in plain words; None for one that only sets the pole. `position` is that
+        before it, `modes` are motion, plane, and whether words are distances."""
+        code = raw
         names = {piece.name for piece in pieces}
         numbers = _codes(code, pieces)
         if numbers & {0, 1, 2, 3}:
