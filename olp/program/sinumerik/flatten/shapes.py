@@ -58,9 +58,9 @@ class Shapes:
         position: Mapping[str, float],
         modes: tuple[int, int, bool],
     ) -> bytes | None:
-        """The block with these pieces in plain words; None for one that only sets the pole. `position` is that
-        before it, `modes` are motion, plane, and whether words are distances."""
-        code = raw
+        """The block with these pieces in plain words; None for one that only sets the pole. `position` is
+        that before it, `modes` are motion, plane, and whether words are distances."""
+        code = raw  # pieces lie before its comment
         names = {piece.name for piece in pieces}
         numbers = _codes(code, pieces)
         if numbers & {0, 1, 2, 3}:
