@@ -14,6 +14,7 @@ from olp.files.write import read_bytes
 #: The modules of this package that hold a FORMAT, in the order in which formats are listed.
 MODULES = (
     "isg",
+    "beckhoff",
     "etalon",
     "linuxcnc",
     "klipper",

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from olp.calibration.control_tables.controls import Shear
-from olp.core.errors import InputError, OlpError, UsageError
+from olp.core.errors import ConfigError, InputError, OlpError, UsageError
 from olp.core.machine import COMPONENTS, SQUARENESS
 from olp.core.units import AXES
 from olp.errormodel.calibration import Calibration, Curve, Cyclic, Thermal
@@ -68,6 +68,7 @@ def tables(draw: st.DrawFn, key: str) -> str | Calibration:
     """A calibration of what the format holds."""
     held = {
         "linuxcnc": ["EXX", "EYY", "EZZ"],
+        "beckhoff-ssfk": ["EXX", "EYY", "EZZ"],
         "klipper": [],
         "siemens-cec": [n for n in COMPONENTS if n[1] in AXES],
         "heidenhain": [n for n in COMPONENTS if n[1] in AXES],
@@ -79,7 +80,7 @@ def tables(draw: st.DrawFn, key: str) -> str | Calibration:
         q = shared[name[2]] if key == "heidenhain" else positions(draw, name[2], key == "siemens-cec")
         columns = st.lists(errors, min_size=len(q), max_size=len(q))
         both = (key == "siemens-cec" and draw(st.booleans())) or (
-            key in ("linuxcnc", "heidenhain") and name[1] == name[2] and draw(st.booleans())
+            key in ("linuxcnc", "heidenhain", "beckhoff-ssfk") and name[1] == name[2] and draw(st.booleans())
         )
         curves.append(
             Curve(
@@ -258,6 +259,86 @@ def test_siemens_tables_as_programs_write_them(end: str, modulo: str) -> None:
         for data in (CEC, text)
     ]
     assert [c.forward["EZX"].tolist() for c in curves[1]] == [c.forward["EZX"].tolist() for c in curves[0]]
+
+
+SSFK = """# the third gauged position is 10.2 um short in + and 8 um far in -
+kopf.log_achs_nr                     2
+kopf.log_achs_name                   Y-ACHSE
+kw.ssfk.interval                     0
+kw.ssfk.kw_startpos                 -200000
+kw.ssfk.kw_nr_max                    3
+kw.ssfk.unit                         1
+kw.ssfk.bilateral                    1
+kw.ssfk.table[0].setpoint           -200000
+kw.ssfk.table[1].setpoint           -199306
+kw.ssfk.table[2].setpoint           -198667
+kw.ssfk.table[0].pos                 0
+kw.ssfk.table[1].pos                 24
+kw.ssfk.table[2].pos                -102
+kw.ssfk.table[0].neg                 0
+kw.ssfk.table[1].neg                 67
+kw.ssfk.table[2].neg                 80
+Ende
+"""
+
+
+def test_beckhoff_lists_of_the_manual() -> None:
+    read = read_table(Path("a.lis"), "beckhoff-ssfk", stated("beckhoff-ssfk"), lambda path: SSFK.encode())
+    (curve,) = read.calibration.curves
+    assert curve.position_mm.tolist() == [-20.0, -19.9306, -19.8667]
+    assert curve.forward["EYY"].tolist() == [0.0, 0.0024, -0.0102]
+    assert curve.backward["EYY"].tolist() == [0.0, 0.0067, 0.008]
+
+
+def test_beckhoff_lists_with_equal_steps_of_two_axes_in_one_file() -> None:
+    one = "kopf.achs_nr 1\nkopf.log_achs_name AX1\nkw.ssfk.unit 1\nkw.ssfk.bilateral 0\n"
+    one += "kw.ssfk.interval 500000\nkw.ssfk.kw_startpos -10000\nkw.ssfk.kw_nr_max 2\n"
+    one += "kw.ssfk.table[0].pos = 5\nkw.ssfk.table[1].pos = -7\n"
+    text = one + one.replace("AX1", "Z")
+    state = stated("beckhoff-ssfk", names={"X": "AX1"})
+    read = read_table(Path("a.lis"), "beckhoff-ssfk", state, lambda path: text.encode()).calibration
+    assert [c.axis for c in read.curves] == ["X", "Z"]
+    for curve in read.curves:
+        assert curve.position_mm.tolist() == [-1.0, 49.0]
+        assert curve.mean(curve.names[0]).tolist() == [0.0005, -0.0007]
+    with pytest.raises(UsageError, match=r'axis "AX1".*--axis-name X=AX1'):
+        read_table(Path("a.lis"), "beckhoff-ssfk", stated("beckhoff-ssfk"), lambda path: text.encode())
+    alone = read_table(
+        Path("a.lis"), "beckhoff-ssfk", stated("beckhoff-ssfk", axis="X"), lambda _: one.encode()
+    )
+    assert alone.calibration.curves[0].axis == "X"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("unit                         1", "unit 0", "line 7: kw.ssfk.unit means increments of the encoder"),
+        (
+            "bilateral                    1",
+            "bilateral 0",
+            "line 15: a neg that interval and bilateral do not use",
+        ),
+        ("kw_nr_max                    3", "kw_nr_max 4", r"table\[3\].pos is missing"),
+        ("table[1].pos                 24", "table[1].pos 2.4", "line 13: .* is not an integer"),
+        ("table[1].setpoint           -199306", "table[1].setpoint -200000", "line 10: position"),
+        ("Ende", "kw.lose.backlash 3", "line 18: .* is not understood"),
+        ("kw.ssfk.interval                     0\n", "", "kw.ssfk.interval is missing"),
+        (
+            "kw.ssfk.interval                     0",
+            "kw.ssfk.interval 500",
+            "line 9: a setpoint that interval",
+        ),
+    ],
+)
+def test_beckhoff_lists_that_are_wrong(old: str, new: str, words: str) -> None:
+    assert old in SSFK
+    with pytest.raises(ConfigError, match=words):
+        read_table(
+            Path("a.lis"),
+            "beckhoff-ssfk",
+            stated("beckhoff-ssfk"),
+            lambda path: SSFK.replace(old, new).encode(),
+        )
 
 
 COM = """BEGIN X.COM MM
