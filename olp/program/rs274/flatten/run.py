@@ -235,7 +235,7 @@ class Walk(Branches):
             )
         if self.language.profile_cycles and codes & _PROFILE_CYCLES:
             raise ProgramError(
-                "G70 to G72 take their profile from a subprogram, which plain blocks do not have",
+                "G70 to G72 are cycles of a lathe with a profile from a subprogram; lathes are not corrected",
                 code="OLP544",
             )
         if ("g", 66.1) in codes:

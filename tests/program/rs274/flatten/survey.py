@@ -87,6 +87,20 @@ def runs(path: Path) -> bool:
     return len(canon) > 0
 
 
+def refused_that_run() -> tuple[int, dict[str, str]]:
+    """How many parametric programs of LinuxCNC it runs, and the names of those that are refused, each with
+    its reasons."""
+    count, why = 0, {}
+    with tempfile.TemporaryDirectory() as folder:
+        job = setup(Path(folder), "linuxcnc")
+        for path, _ in installed():
+            if parametric(path.read_bytes()) and runs(path):
+                count += 1
+                if reason := reading(path, job):
+                    why[path.name] = reason
+    return count, why
+
+
 def main(folders: list[str]) -> None:
     """Print each refused program with its reason, and the shares."""
     paths = (path for folder in folders for path in sorted(Path(folder).rglob("*")))

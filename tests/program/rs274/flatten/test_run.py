@@ -266,7 +266,7 @@ def test_a_macro_may_be_called_more_than_once_with_its_own_variables() -> None:
         ("M73", "OLP544", "M70, M72 and M73 act", 1),
         ("M72", "OLP532", "M72 without saved modes; M70 must come before", 1),
         ("M70\nM71\nM72", "OLP532", "M72 without saved modes; M70 must come before", 3),
-        *((f"G{code} Q1", "OLP544", "G70 to G72 take their profile", 1)
+        *((f"G{code} Q1", "OLP544", "G70 to G72 are cycles of a lathe", 1)
           for code in ("70", "71", "71.1", "71.2", "72", "72.1", "72.2")),
     ],
 )  # fmt: skip
