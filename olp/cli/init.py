@@ -11,6 +11,7 @@ import click
 
 from olp.cli.common import KNOWN, diagnostic, is_terminal
 from olp.cli.options import MM, day_option, force_option, known_errors, renamed_option
+from olp.core.errors import UsageError
 
 Travel = tuple[tuple[str, float, float], ...]
 
@@ -18,6 +19,8 @@ Travel = tuple[tuple[str, float, float], ...]
 @click.command("init")
 @click.argument("folder", metavar="DIR")
 @click.option("--from", "settings_file", metavar="FILE", help="Settings of the control: LinuxCNC, Grbl ...")
+@click.option("--urdf", metavar="FILE", help="A robot description in URDF: write its machine file alone.")
+@click.option("--tip", metavar="LINK", help="The last link of the chain in the URDF file.")
 @click.option("--name", help="Name of the machine. Default: that in FILE, or the folder's name.")
 @click.option("--chain", help="Axes from workpiece to tool, F the frame. Default: FXYZ.")
 @click.option("--controller", help="Dialect of the control, such as linuxcnc, fanuc, haas or grbl.")
@@ -39,6 +42,8 @@ Travel = tuple[tuple[str, float, float], ...]
 def command(
     folder: str,
     settings_file: str | None,
+    urdf: str | None,
+    tip: str | None,
     name: str | None,
     chain: str | None,
     controller: str | None,
@@ -57,6 +62,11 @@ def command(
     from olp.files.write import check_targets, make_folder, write_files
     from olp.workflows import init
 
+    if urdf is not None or tip is not None:
+        if chain is not None or travel or zero is not None or settings_file is not None:
+            raise UsageError("--urdf states chain and travel; leave out --from, --chain, --travel and --zero")
+        _from_urdf(folder, urdf, tip, name, controller, force=force)
+        return
     settings = None if settings_file is None else init.settings_in(settings_file)
     limits = {axis: (low, high) for axis, low, high in travel}
     known = KnownErrors.of(**click.get_current_context().meta.get(KNOWN, {}))
@@ -75,4 +85,28 @@ def command(
     for path in files:
         diagnostic(f"wrote {path}")
     for note in result.notes:
+        diagnostic(f"note: {note}")
+
+
+def _from_urdf(
+    folder: str, urdf: str | None, tip: str | None, name: str | None, controller: str | None, *, force: bool
+) -> None:
+    """Write the machine file of a robot that a URDF file describes. Raises UsageError, InputError."""
+    from olp.files.fields import CONTROLLER_NAMES, unknown_dialect
+    from olp.files.kinematics.urdf import machine_of_urdf
+    from olp.files.write import check_targets, make_folder, write_files
+
+    if urdf is None:
+        raise UsageError("--tip belongs to --urdf; name the file of the robot")
+    if click.get_current_context().meta.get(KNOWN, {}):
+        raise UsageError("--skew, --scale and --backlash are of three linear axes; leave them out")
+    if controller is not None and controller not in CONTROLLER_NAMES:
+        raise UsageError(f"--controller {unknown_dialect(controller)}")
+    made = machine_of_urdf(urdf, tip, name, controller)
+    files = {Path(folder) / "machine.toml": made.data}
+    check_targets(files, [urdf], force=force, new_folders=True)
+    make_folder(Path(folder))
+    write_files(files, force=force, inputs=[urdf])
+    diagnostic(f"wrote {Path(folder) / 'machine.toml'}")
+    for note in made.notes:
         diagnostic(f"note: {note}")

@@ -26,7 +26,7 @@ _FENCE = re.compile(
     re.DOTALL | re.MULTILINE,
 )
 #: First line of a block that is a file to be written.
-_PATH = re.compile(r"[#;] ([\w./-]+\.\w+)\n")
+_PATH = re.compile(r"(?:[#;]|<!--) ([\w./-]+\.\w+)(?: -->)?\n")
 #: Comment before a block of Python that goes on where the one before it ended.
 _CONTINUES = "continues"
 #: Printed between two such blocks.
@@ -54,7 +54,7 @@ class Block:
     def file(self) -> str | None:
         """The file that the block is, None where it is none."""
         match = _PATH.match(self.body)
-        return match[1] if match and self.kind in ("toml", "csv", "text") else None
+        return match[1] if match and self.kind in ("toml", "csv", "text", "xml") else None
 
     @property
     def set_up(self) -> bool:
