@@ -19,7 +19,7 @@ from olp.reports.plots.calibration import name_of_straightness, name_of_turn
 from olp.reports.report import findings_text, number, pairs, printable, table
 
 #: Figures of lines approached from both sides.
-_FIGURES = ("A", "E", "R", "M", "B", "B_mean")
+_FIGURES = ("A", "E", "R", "M", "B", "B_mean", "U_A", "U_E")
 #: Figures of lines approached from one side.
 _ONE_SIDE = ("A_up", "E_up", "R_up", "A_down", "E_down", "R_down")
 #: Title of the table of cyclic errors.
@@ -73,7 +73,7 @@ def _rows(evaluated: Evaluated, keys: Sequence[str], *, both: bool) -> list[list
         if (len(e.sides) == 2) != both:
             continue
         unit, scale = scale_of(e.line)
-        figures = e.figures()
+        figures = e.figures() | e.uncertainties()
         label = _name(e.component)
         if len(evaluated.of(e.component)) > 1 and e.line.source:
             label += f", {printable(FilePath(e.line.source).name)}"
@@ -100,7 +100,7 @@ def _table_text(evaluated: Evaluated, *, bidirectional: bool) -> Iterator[str]:
 
 def _head(key: str) -> str:
     base, _, rest = key.partition("_")
-    return base + {"": "", "up": "+", "down": "-", "mean": " mean"}[rest]
+    return base + {"": "", "up": "+", "down": "-", "mean": " mean", "A": "(A)", "E": "(E)"}[rest]
 
 
 def _cyclic_text(evaluated: Evaluated) -> Iterator[str]:

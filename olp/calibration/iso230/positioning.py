@@ -142,6 +142,25 @@ class Evaluation(Statistics):
     def component(self) -> str:
         return self.line.component
 
+    def uncertainties(self) -> dict[str, float]:
+        """U_A, U_E, U_R, and with both directions U_M and U_B: the expanded uncertainty (k = 2) of the
+        figures; mm or rad.
+
+        It follows from the spread of the readings, at least the stated `sigma` of one, and for positioning
+        from that of the scale over the length. The spread itself is known from few runs: that is in A and R.
+        """
+        s = np.concatenate([side.s for side in self.sides])
+        spread = float(np.mean(s**2))
+        mean = max(spread, self.line.sigma**2) / self.runs
+        of_s = spread / (2.0 * (self.runs - 1))
+        scale = (self.line.sigma_scale * float(np.ptp(self.target_mm))) ** 2
+        variances = {"A": 2.0 * (mean + 4.0 * of_s) + scale, "E": 2.0 * mean + scale}
+        if len(self.sides) == 2:
+            variances |= {"R": 8.0 * of_s + 2.0 * mean, "M": mean + scale, "B": 2.0 * mean}
+        else:
+            variances["R"] = 16.0 * of_s
+        return {f"U_{name}": 2.0 * float(np.sqrt(value)) for name, value in variances.items()}
+
     def as_dict(self) -> dict[str, Any]:
         """Figures and columns for JSON; keys end in um or urad."""
         unit, scale = scale_of(self.line)
@@ -151,13 +170,14 @@ class Evaluation(Statistics):
         for name, side in (("up", self.up), ("down", self.down)):
             if side is not None:
                 columns |= {f"mean_{name}": side.mean, f"s_{name}": side.s}
+        figures = self.figures() | self.uncertainties()
         report: dict[str, Any] = {
             "component": self.component,
             "quantity": self.line.quantity,
             "file": self.line.source,
             "runs": self.runs,
             "directions": len(self.sides),
-            **{f"{key}_{unit}": value * scale for key, value in self.figures().items()},
+            **{f"{key}_{unit}": value * scale for key, value in figures.items()},
             "targets": {
                 "target_mm": self.target_mm.tolist(),
                 **{f"{key}_{unit}": (value * scale).tolist() for key, value in columns.items()},

@@ -3,6 +3,7 @@ set."""
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -186,3 +187,33 @@ def test_incomplete_readings_are_refused_with_their_position() -> None:
         evaluate(lacking)
     with pytest.raises(ConfigError, match="expected 2, as many at every target"):
         evaluate(line([[0, 4, 6]], [[-1, 0, 5]], [0, 100, 200]))
+
+
+def test_the_uncertainty_of_the_figures_is_their_spread_when_measured_again() -> None:
+    """A machine measured 200 times, with a noise of 0.5 um and a laser whose scale is off by 2 um/m."""
+    random = np.random.default_rng(5)
+    true = np.array([0.0, 12.0, 3.0, -9.0, 1.0])
+    target = np.array([0.0, 1000.0, 500.0, -1000.0, 250.0])
+    back = np.array([1.0, 1.0, 6.0, 1.0, 1.0])
+    got: dict[str, list[float]] = {}
+    stated: dict[str, list[float]] = {}
+    for _ in range(200):
+        scaled = true + random.normal(0.0, 2.0) * target / 1000.0
+        noise = random.normal(0.0, 0.5, (2, 5, 5))
+        taken = line(scaled + noise[0], scaled + back + noise[1], target)
+        result = evaluate(dataclasses.replace(taken, sigma_scale=2e-6))
+        for name in ("A", "E", "M", "B"):
+            got.setdefault(name, []).append(result.figures()[name])
+            stated.setdefault(name, []).append(result.uncertainties()[f"U_{name}"])
+    for name, values in got.items():
+        assert 2.0 * np.std(values) == pytest.approx(np.sqrt(np.mean(np.square(stated[name]))), rel=0.2)
+
+
+def test_the_stated_uncertainty_of_a_reading_counts_where_the_spread_is_less() -> None:
+    taken = line([[0, 4, 6], [0, 4, 6]], [[-1, 0, 5], [-1, 0, 5]], [0, 100, 200])
+    assert set(evaluate(taken).uncertainties().values()) == {0.0}
+    known = evaluate(dataclasses.replace(taken, sigma=1.0 * UM)).uncertainties()
+    # means of two readings: 2 sqrt(2 / 2) of a span, 2 sqrt(1 / 2) of a span of the means of both
+    assert known["U_E"] / UM == pytest.approx(2.0) and known["U_M"] / UM == pytest.approx(math.sqrt(2.0))
+    one = evaluate(line([[0, 4, 6], [2, 4, 10]], None, [0, 100, 200])).uncertainties()
+    assert set(one) == {"U_A", "U_E", "U_R"}
