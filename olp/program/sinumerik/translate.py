@@ -26,6 +26,20 @@ _PLAIN = b"NGXYZFIJKMSTABCUVW"
 _LETTER = np.isin(np.arange(256), list(string.ascii_letters.encode()))
 #: Bytes that make a line more than words.
 _OTHER = ~np.isin(np.arange(256), list(b"0123456789+-. \t\r\n;/" + _PLAIN + _PLAIN.lower()))
+#: Letters of words that take their number with `=` too.
+_WITH_SIGN = np.zeros(256, bool)
+_WITH_SIGN[list(b"XYZIJKFSTABCUVWxyzijkfstabcuvw")] = True
+_NAME = _LETTER.copy()
+_NAME[list(b"0123456789_$[]")] = True
+_NUMBER = np.zeros(256, bool)
+_NUMBER[list(b"0123456789.")] = True
+_BLANK = np.zeros(256, bool)
+_BLANK[list(b" \t")] = True
+#: What may be behind a word.
+_BEHIND = _LETTER.copy()
+_BEHIND[list(b";\r\n")] = True
+#: bytes behind `=` that are looked at: the number, and blanks up to the next word
+_AHEAD = 32
 #: G and M codes of a plain line, by their number.
 _SAME_G = np.isin(np.arange(100), [0, 1, 2, 3, 9, 17, 18, 19, 40, *range(53, 58), 90, 91, 93, 94, 95, 96, 97])
 _SAME_M = ~np.isin(np.arange(100), [6, 17, 70, 97, 98, 99])
@@ -35,10 +49,16 @@ def translate(data: bytes) -> Translation:
     """A whole text. Lines that cannot be read are `refused` in the result; nothing is raised."""
     text = np.frombuffer(data, np.uint8)
     starts, ends = _line_spans(text)
-    lines = _special(text, starts)
-    if not lines.size:
+    signs, radius = _numbers(text)
+    lines = _special(text, starts, signs, radius)
+    if not lines.size and not signs.size:
         return Translation(data)
     out = bytearray(data)
+    canonical = np.frombuffer(out, np.uint8)
+    canonical[signs] = 32
+    canonical[radius - 1] = 32
+    canonical[radius - 2] = ord("R")
+    del canonical
     words = Words()
     for line in lines.tolist():
         start = int(starts[line])
@@ -81,11 +101,41 @@ def _line_spans(text: Bytes) -> tuple[Index, Index]:
     return np.concatenate(([0], ends[:-1] + 1)), ends
 
 
-def _special(text: Bytes, starts: Index) -> Index:
-    """The lines, from 0, that are more than plain words before their comment."""
+def _numbers(text: Bytes) -> tuple[Index, Index]:
+    """The `=` between a letter and a number, as in X=5, and those of them that are in CR=5."""
+    signs = np.flatnonzero(text == ord("="))
+    signs = signs[(signs >= 1) & (signs < len(text) - 1)]
+    if not signs.size:
+        return signs, signs
+    before = [np.where(signs >= k, text[np.maximum(signs - k, 0)], ord("\n")) for k in (1, 2, 3)]
+    alone = _WITH_SIGN[before[0]] & ~_NAME[before[1]]
+    radius = ((before[0] | 32) == ord("r")) & ((before[1] | 32) == ord("c")) & ~_NAME[before[2]]
+    kept = alone | radius
+    signs, radius = signs[kept], radius[kept]
+    place = signs[:, None] + 1 + np.arange(_AHEAD)
+    ahead = np.where(place < len(text), text[np.minimum(place, len(text) - 1)], ord("\n"))
+    in_number = _NUMBER[ahead]
+    signed = (ahead[:, 0] == ord("-")) | (ahead[:, 0] == ord("+"))
+    in_number[:, 0] |= signed
+    some = in_number[:, 0] & (in_number[:, 1] | ~signed)
+    over = np.logical_or.accumulate(~in_number, axis=1)
+    # an expression goes on behind blanks too
+    ends = over & ~_BLANK[ahead]
+    last = ends.argmax(axis=1)
+    good = some & ends.any(axis=1) & _BEHIND[ahead[np.arange(len(signs)), last]]
+    return signs[good], signs[good & radius]
+
+
+def _special(text: Bytes, starts: Index, signs: Index, radius: Index) -> Index:
+    """The lines, from 0, that are more than plain words before their comment, and words with `signs` before
+    their numbers."""
     letter = _LETTER[text]
     special = _OTHER[text]
-    special[:-1] |= letter[:-1] & letter[1:]
+    special[signs] = False
+    pairs = letter[:-1] & letter[1:]
+    pairs[radius - 2] = False
+    special[radius - 1] = False
+    special[:-1] |= pairs
     at = np.flatnonzero(special)
     at = np.concatenate((at, _codes(text, ord("g"), _SAME_G, 9), _codes(text, ord("m"), _SAME_M, 99)))
     if not at.size:

@@ -313,3 +313,33 @@ def test_the_reading_does_not_depend_on_the_chunks(
     parts = program(text, setup).toolpath
     for name in ("kind", "flag", "line", "end_mm"):
         assert np.array_equal(getattr(whole, name), getattr(parts, name), equal_nan=name == "end_mm")
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "X=5", "G1 x=-5.5Y=.5 F=300", "G2 X=1 Y2 CR=5.25", "g3x1y=2cr=-.5", "N5 S=500 M3 ; X=7", "T=2",
+        "X=5 ;a", "X=5", "I=5 J=-5 K=.1", "X= 5", "X =5", "X=AC(5)", "CR =5", "A=5 U=6",
+    ],
+)  # fmt: skip
+def test_numbers_with_a_sign_are_the_same_words_in_columns_and_one_by_one(line: str) -> None:
+    """What stands beside it takes a line out of the columns."""
+    beside = line.partition(";")[0] + " SOFT"
+    code = line.partition(";")[0].encode()
+    columns = translate(f"{line}\r\n".encode())
+    single = translate(beside.encode())
+    assert not columns.refused and not single.refused
+    assert columns.text[: len(code)].split() == single.text[: len(code)].split()
+
+
+@pytest.mark.parametrize(
+    "line", ["X=5 +3", "X=5-3", "X=5 DIV 2", "X=R1", "X=--5", "X=5*2", "CR=5 *2", "XA=5", "X=-"]
+)
+def test_expressions_are_no_numbers(line: str) -> None:
+    assert translate(line.encode()).refused
+
+
+def test_numbers_with_a_sign_are_read_in_columns() -> None:
+    """No line of them is cut into pieces one by one."""
+    text = b"X=5 Y=6.5 F=300\nG2 X1 CR=5\nS=1 T=2 ; CYCLE81(X=5)\n"
+    assert translate(text).text == b"X 5 Y 6.5 F 300\nG2 X1 R  5\nS 1 T 2 ; CYCLE81(X=5)\n"
