@@ -46,6 +46,10 @@ _REPEATED = 3
 _KEPT = 0.95
 #: Readings reported, at most.
 _MOST = 10
+#: A reference point has drifted where it moved by so many standard deviations of a difference.
+_DRIFTED = 5.0
+#: A smaller drift than this is none, mm or rad: only rounding.
+_LEAST = 1e-7
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -287,6 +291,7 @@ def findings_of(evaluation: Evaluation) -> Iterator[Finding]:
     readings far from their repetitions."""
     line, x = evaluation.line, evaluation.target_mm
     yield from _outliers(line)
+    yield from _drift(line)
     length = float(np.ptp(x))
     if length > LONG_MM:
         wanted = int(np.ceil(length / STEP_MM)) + 1
@@ -328,6 +333,29 @@ def _outliers(line: Line) -> Iterator[Finding]:
             f"{_named(line)}: the reading at {line.target_mm[k]:g} mm in run {line.run[k]} is "
             f"{rest[k] * scale:+.1f} {unit} off its repetitions",
             int(line.row[k]),
+        )
+
+
+def _drift(line: Line) -> Iterator[Finding]:
+    """The target of the first reading in the first run and in the last one, from the same side."""
+    group = targets_of(line.target_mm)[1] * 2 + (line.direction > 0)
+    rows = np.flatnonzero(group == group[0])
+    runs = np.unique(line.run, return_inverse=True)[1]
+    if len(rows) < _REPEATED:
+        return
+    # what drifts is in the level of the runs; what is left of each run is noise
+    rest = line.value - (np.bincount(group, line.value) / np.bincount(group))[group]
+    level = (np.bincount(runs, rest) / np.bincount(runs))[runs]
+    free = len(rest) - len(np.unique(group)) - int(runs.max())
+    noise = float(np.sqrt(((rest - level) ** 2).sum() / max(free, 1)))
+    moved = float(line.value[rows[-1]] - line.value[rows[0]])
+    if abs(moved) > _DRIFTED * max(noise, line.sigma) * np.sqrt(2.0) and abs(moved) > _LEAST:
+        unit, scale = scale_of(line)
+        yield Finding(
+            "OLP860",
+            f"{_named(line)}: {line.component[2]} {line.target_mm[0]:g} mm reads {moved * scale:+.2f} {unit} "
+            f"in the last run against the first; readings of a run scatter by {noise * scale:.2f} {unit}",
+            int(line.row[rows[-1]]),
         )
 
 

@@ -90,4 +90,15 @@ RULES = (
         "names them.",
         "A beam that was broken for a moment: +31 um in run 3.",
     ),
+    _rule(
+        "OLP860",
+        "reference point drifted",
+        Severity.WARNING,
+        "The target at which a line began reads otherwise in the last run than in the first, by far more "
+        "than the readings scatter. The machine or the air warmed up, or optics moved. The mean of the runs "
+        "is that of no state of the machine, and A and R are too large.",
+        "Let machine and air come to rest and measure again, or take the runs faster. `olp calibrate fit` "
+        "takes a drift of each run out.",
+        "The start of X reads 6 um more after five runs of 40 minutes.",
+    ),
 )

@@ -217,3 +217,16 @@ def test_the_stated_uncertainty_of_a_reading_counts_where_the_spread_is_less() -
     assert known["U_E"] / UM == pytest.approx(2.0) and known["U_M"] / UM == pytest.approx(math.sqrt(2.0))
     one = evaluate(line([[0, 4, 6], [2, 4, 10]], None, [0, 100, 200])).uncertainties()
     assert set(one) == {"U_A", "U_E", "U_R"}
+
+
+@pytest.mark.parametrize(("drift", "told"), [(0.0, False), (0.3, False), (6.0, True), (-6.0, True)])
+def test_a_reference_point_that_drifts_is_told(drift: float, told: bool) -> None:
+    """The level of five runs changes by `drift` um from the first to the last; readings scatter by 0.3 um."""
+    for seed in range(5):
+        random = np.random.default_rng(seed)
+        level = np.linspace(0.0, drift, 5)[:, None]
+        up, down = (random.normal(0.0, 0.3, (5, 6)) + level + side for side in (0.0, 1.0))
+        findings = list(findings_of(evaluate(line(up, down, np.arange(6) * 100.0))))
+        messages = [f.message for f in findings if f.code == "OLP860"]
+        assert len(messages) == told
+        assert all("X 0 mm reads " + ("+" if drift > 0 else "-") in message for message in messages)
