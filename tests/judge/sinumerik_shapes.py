@@ -124,7 +124,7 @@ def elements(text: str) -> list[Arc]:
                 parts.append(now if math.isnan(value) else value + now * counted)
             return complex(*parts)
 
-        if not {"X", "Y", "AP", "RP"} & set(words):
+        if not {"X", "Y", "AP", "RP", "AR"} & set(words):
             continue
         end = place("X", "Y")
         if {"AP", "RP"} & set(words):
@@ -149,6 +149,14 @@ def elements(text: str) -> list[Arc]:
             new = Arc(here, end, centre, turn)
         elif motion in ("G0", "G1"):
             new = Arc(here, end)
+        elif "AR" in words:
+            turn = cmath.exp(1j * math.radians(words["AR"][1]) * (1 if motion == "G3" else -1))
+            if {"I", "J"} & set(words):
+                centre = here + complex(words.get("I", ("", 0.0))[1], words.get("J", ("", 0.0))[1])
+                end = centre + (here - centre) * turn
+            else:
+                centre = (end - here * turn) / (1 - turn)
+            new = _between(here, end, centre, left=motion == "G3")
         elif "CR" in words:
             size = words["CR"][1]
             high = math.sqrt(max(size**2 - abs(end - here) ** 2 / 4, 0.0))

@@ -76,7 +76,7 @@ READ: Mapping[str, str] = {
 _UNROLLED = "goes through --flatten"
 _PARAMETRIC = """
     R DEF IF ELSE ENDIF FOR ENDFOR WHILE ENDWHILE REPEAT UNTIL LOOP ENDLOOP REPEATB GOTO GOTOF GOTOB
-    GOTOC GOTOS CASE CALL L P CIP CT I1 J1 K1 HOLES1 HOLES2 AP RP G110 G111 G112 ANG CHF CHR RND RNDM
+    GOTOC GOTOS CASE CALL L P CIP CT I1 J1 K1 HOLES1 HOLES2 AP RP G110 G111 G112 ANG CHF CHR RND RNDM AR
 """
 #: Statements that need the unroller.
 UNROLLED: Mapping[str, str] = dict.fromkeys(_PARAMETRIC.split(), _UNROLLED)
@@ -98,7 +98,6 @@ REFUSED: Mapping[str, str] = {
                      "ORIPATH", "ORICONCW", "ORICONCCW", "PTP"), _ROTARY),
     **dict.fromkeys(("G33", "G34", "G35", "G331", "G332", "G63", "CYCLE97", "CYCLE99"), _THREAD),
     **dict.fromkeys(("ASPLINE", "BSPLINE", "CSPLINE", "POLY", "PO", "PW", "INVCW", "INVCCW", "SPN"), _SPLINE),
-    "AR": "is the angle of an arc, which is not read; post I, J and K, or CR",
     **dict.fromkeys(("MEAS", "MEAW", "MEASA", "MEAWA", "CYCLE971", "CYCLE976", "CYCLE977", "CYCLE978",
                      "CYCLE979", "CYCLE998"), _MEASURES),
     **dict.fromkeys(("ROTS", "AROTS", "CROTS", "$P_PFRAME", "$P_IFRAME"), _FRAME),

@@ -68,7 +68,10 @@ def random_shapes(seed: int) -> str:
         elif kind == 4 and rows:
             row = f"CT {point(end)}"
         elif kind == 5:
-            row = f"G{rng.integers(2, 4)} {point(end)} CR={abs(end - here) * rng.uniform(0.6, 2):.6f}"
+            size = f"CR={abs(end - here) * rng.uniform(0.6, 2):.6f}"
+            if rng.random() < 0.5:
+                size = f"AR={rng.uniform(20, 120):.6f}"
+            row = f"G{rng.integers(2, 4)} {point(end)} {size}"
         else:
             if rng.random() < 0.3:
                 relative = not relative
@@ -120,6 +123,9 @@ WRITTEN = {
     "G91 X10 RND=2\nY10": "G91 X8 Y0\nG3 X2 Y2 I0 J2\nG1 Y8 X0\n",
     "CIP X2 Y0 I1=1 J1=1\nG90 X4 Y0 I1=3 J1=1": "G2 I1 J0 X2 Y0\nG90 X4 Y0 G2 I1 J0\n",
     "X5\nCT X10 Y5\nCT X10 Y8": "X5\nG3 I0 J5 X10 Y5\nG1 X10 Y8\n",
+    "G3 X10 Y0 AR=180": "G3 X10 Y0 I5 J0\n",
+    "G2 I5 J0 AR=90": "G2 I5 J0 X5 Y5\n",
+    "G91 G3 X10 AR=90": "G91 G3 X10 I5 J5\n",
     "G110 X1 Y2\nRP=1 AP=0": "X2 Y2\n",
     "G18 G111 Z0 X10\nRP=5 AP=90": "Z0 X15\n",
     "A1: X1\nREPEAT A1 P=2\nREPEATB A1": "X1\nX1\nX1\nX1\n",
@@ -144,6 +150,9 @@ REFUSED = {
     "CIP X5 Y0 I1=2": "on one line",
     "CIP X5 Y5 I1=2 J1=3 K1=1": "leaves the plane",
     "CIP X5 Y5 Z1 I1=2 J1=3": "leaves the plane",
+    "G3 X5 I5 AR=90": "one of them",
+    "G3 AR=400 X5": "below 360",
+    "G1 AR=40 X5": "in G2 and G3",
     "RP=5": "AP of a polar position",
     "G111 X1 Y1\nTRANS X5\nRP=1 AP=2": "pole",
     "RP=5 AP=1 X2": "one or the other",

@@ -26,7 +26,7 @@ from olp.program.sinumerik.flatten.text import shown
 #: The middle point of CIP by the axis that it is along.
 _MIDDLE: Mapping[str, str] = {"I1": "X", "J1": "Y", "K1": "Z"}
 _POLES = frozenset({110, 111, 112})
-_OWN = frozenset({"AP", "RP", "ANG", *_MIDDLE, "CIP", "CT"})
+_OWN = frozenset({"AP", "RP", "ANG", "AR", *_MIDDLE, "CIP", "CT"})
 #: rad below which a tangential circle is a straight line
 _STRAIGHT = 1e-9
 
@@ -81,6 +81,8 @@ class Shapes:
             added += self._polar(block, names)
         if "ANG" in names:
             added += _by_angle(block, names)
+        if "AR" in names:
+            added += _opened(block, names)
         if self.special and moves:
             ends = block.ends() | {word[0]: float(word[1:]) for word in added if word[0] in AXES}
             added += _through(block, ends) if self.special == "CIP" else self._tangential(block, ends)
@@ -216,6 +218,28 @@ def _through(block: _Block, ends: Mapping[str, float]) -> list[str]:
     pp, qq = p[0] ** 2 + p[1] ** 2, q[0] ** 2 + q[1] ** 2
     centre = ((pp * q[1] - qq * p[1]) / cross, (qq * p[0] - pp * q[0]) / cross)
     return [f"G{3 if cross > 0 else 2}", *_centre(centre, a, b)]
+
+
+def _opened(block: _Block, names: set[str]) -> list[str]:
+    """AR: a circle by the angle that it spans, and its end or its centre."""
+    a, b, _ = PLANES[block.plane]
+    angle = math.radians(block.number("AR") or 0.0)
+    if block.motion not in (2, 3) or not 0.0 < angle < 2 * math.pi or names & {"AP", "RP", "CR", "TURN"}:
+        raise refused("AR is read in G2 and G3, above 0 and below 360, beside X and Y or beside I and J")
+    (x, y), sign = block.begin(), 1.0 if block.motion == 3 else -1.0
+    i, j = (block.centre(axis, start) for axis, start in ((a, x), (b, y)))
+    if i is None and j is None:
+        (_, end, _), half = block.across(block.ends()), sign / (2 * math.tan(angle / 2))
+        dx, dy = end[0] - x, end[1] - y
+        if math.hypot(dx, dy) < SAME:
+            raise refused("a circle by AR ends where it begins; give I and J")
+        return _centre((dx / 2 - dy * half, dy / 2 + dx * half), a, b)
+    if names & {a, b}:
+        raise refused("AR stands beside both the end and the centre of its circle; give one of them")
+    cx, cy = x if i is None else i, y if j is None else j
+    c, s = math.cos(angle), sign * math.sin(angle)
+    end = (cx + (x - cx) * c - (y - cy) * s, cy + (x - cx) * s + (y - cy) * c)
+    return [block.placed(a, end[0]), block.placed(b, end[1])]
 
 
 def _by_angle(block: _Block, names: set[str]) -> list[str]:
