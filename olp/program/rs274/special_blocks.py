@@ -110,7 +110,7 @@ def _checked(stated: EventWords, words: list[Word], profile: Profile, line: int)
     unroll = UNROLL if profile.unroller is not None else ""
     numbers = [word.value for word in words if word.letter == "G"]
     for c, a, number in zip(stated.codes, stated.acts, numbers, strict=True):
-        if a == Act.REFUSE:
+        if a == Act.REFUSE and not _still(c, words, profile):
             why = profile.refusals.get(c)
             name = f"G{number:g}"
             spline = c in SPLINES and profile.language.splines and bool(unroll)
@@ -133,6 +133,13 @@ def _checked(stated: EventWords, words: list[Word], profile: Profile, line: int)
                 word=f"M{m / 10:g}",
             )
     return [c for c, a in zip(stated.codes, stated.acts, strict=True) if a == Act.EVENT]
+
+
+def _still(code: int, words: list[Word], profile: Profile) -> bool:
+    """Whether a code that is refused elsewhere changes nothing of the path in this block."""
+    letter, values = profile.still_with.get(code, ("", frozenset[float]()))
+    own = {word.letter: word.value for word in words if word.letter not in "GN"}
+    return bool(letter) and own.keys() == {letter} and own[letter] in values
 
 
 def check_codes(context: Context, profile: Profile) -> None:

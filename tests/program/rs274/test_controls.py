@@ -68,6 +68,11 @@ READINGS: dict[str, tuple[str, dict[str, Outcome], Any]] = {
         {OKUMA: (5, 7, 9)},
         {OKUMA: {}},
     ),
+    "still_with": (
+        "G0 X1. Y0. Z0.\nG05 P10000\nY2.\nG05 P0",
+        {FANUC: (1, 2, 0), HAAS: "high-speed mode"},
+        {FANUC: {}, HAAS: {50: ("P", frozenset({0.0, 10000.0}))}},
+    ),
     "return_level": (
         "G0 X0. Y0. Z9.\nG80\nG71 Z7.\nG81 X1. R3. Z-2. F60. M53",
         {OKUMA: (1, 0, 7)},

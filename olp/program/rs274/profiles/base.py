@@ -82,6 +82,8 @@ class Profile(Dialect):
     - `return_level`: the code whose word of the tool axis states the level that canned cycles return to, 0
       where they return to the one before their series. `return_modes`: the M codes that choose between that
       level and R, and the G codes that do the same elsewhere.
+    - `still_with`: codes that are refused but for a block of their own with this letter and one of its
+      numbers, where they change nothing of the path.
     - `cycles_apart`: canned cycles and G80 are a separate modal group.
     - `axis_dwell`: G4 takes its time from X and U, too, and counts milliseconds where it has no point.
     - `exact_stop`: G61 stops at the end of each block, as G9 does in one, and G62 and G63 end it as G64 does.
@@ -142,6 +144,7 @@ class Profile(Dialect):
     scales_by_parameter: bool = False
     return_level: int = 0
     return_modes: Mapping[int, int] = field(default_factory=dict)
+    still_with: Mapping[int, tuple[str, frozenset[float]]] = field(default_factory=dict)
     cycles_apart: bool = False
     axis_dwell: bool = False
     exact_stop: bool = False

@@ -21,5 +21,7 @@ DIALECT = replace(
     refusals={**ISO.refusals, 921: "G92.1 presets offsets that are not known off line"},
     harmless_m=ISO.harmless_m | {10, 11, 29, 13, 88, 89},
     feed_without_point=True,
+    # G5 switches the high-speed mode; other numbers call cycles
+    still_with={50: ("P", frozenset({0.0, 10000.0}))},
     path_mode="cutting mode G64 of the control, unless a smoothing mode is on",
 )
