@@ -16,12 +16,14 @@ from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import NotInvertible
 from olp.core.values import dataclass
 from olp.kinematics.chain import Kinematics
-from olp.kinematics.poses import Poses, rotation_vector
+from olp.kinematics.poses import Poses, rotation_vector, turned
 
 #: Position of the tip is met within this, mm.
 POSITION_MM = 1e-9
 #: Axis values no longer change: mm, and rad times the reference radius.
-_SETTLED_MM = 1e-9
+_SETTLED_MM = 1e-8
+#: After a step below this the slopes are taken as before: mm, and rad times the reference radius.
+_SAME_SLOPES_MM = 0.5
 #: At most so many steps; from a posture nearby three suffice.
 _MOST_STEPS = 100
 #: A step of a rotary axis is at most this long, so that the branch is kept, in rad.
@@ -183,40 +185,48 @@ def _newton(task: _Task, forward: Forward, slopes: Slopes) -> tuple[Array, Mask]
     met = np.zeros(len(values), bool)
     longest = np.where(task.scale == 1.0, _LONGEST_MM, _LONGEST_RAD * task.radius_mm)
     open_rows = np.arange(len(values), dtype=np.int64)
+    steps_of = np.zeros((len(values), values.shape[1], 5 if task.symmetric else 6))
+    moved = np.ones(len(values), bool)
     for _ in range(_MOST_STEPS):
         if not len(open_rows):
             break
         part = task.only(open_rows)
         here = values[open_rows]
-        pose = forward(here)
-        step, distance = _step(part, pose, slopes(here))
+        again = open_rows[moved]
+        if len(again):
+            steps_of[again] = _steps_of(task.only(again), slopes(values[again]))
+        miss = _miss(part, forward(here))
+        step = (steps_of[open_rows] @ miss[..., None])[..., 0]
+        distance = np.linalg.norm(miss[:, :3], axis=1)
         share = np.max(np.abs(step) / longest, axis=1)
         step /= np.maximum(1.0, share)[:, None]
         values[open_rows] = here + step / part.scale
-        settled = (distance < POSITION_MM) & (np.max(np.abs(step), axis=1) < _SETTLED_MM)
+        size = np.max(np.abs(step), axis=1)
+        settled = (distance < POSITION_MM) & (size < _SETTLED_MM)
         met[open_rows[settled]] = True
-        open_rows = open_rows[~settled]
+        open_rows, moved = open_rows[~settled], size[~settled] > _SAME_SLOPES_MM
     return values, met
 
 
-def _step(task: _Task, pose: Poses, slopes: Array) -> tuple[Array, Array]:
-    """(n, axes) scaled change that meets the linearised target, and (n,) the distance now in mm.
-
-    First the position, then of what moves it not the orientation, then the least change.
-    """
-    miss = task.target.position - pose.position
+def _miss(task: _Task, pose: Poses) -> Array:
+    """(n, 5 or 6) what is missing to the target: mm of the tip, and rad times the radius; of a symmetric tool
+    across its axis, in its own frame."""
     turn = rotation_vector(task.target.rotation @ np.swapaxes(pose.rotation, -1, -2)) * task.radius_mm
+    if task.symmetric:
+        turn = turned(np.swapaxes(task.target.rotation, -1, -2), turn)[:, :2]
+    return np.concatenate((task.target.position - pose.position, turn), axis=1)
+
+
+def _steps_of(task: _Task, slopes: Array) -> Array:
+    """(n, axes, 5 or 6) the scaled change of the axes by what is missing: first the position, then of what
+    moves it not the orientation, then the least change."""
     slopes = np.where(task.free[:, None, :], slopes, 0.0)
     shifts, turns = slopes[:, :3], slopes[:, 3:]
     if task.symmetric:
-        across = np.swapaxes(task.target.rotation, -1, -2)[:, :2]
-        turns, turn = across @ turns, (across @ turn[..., None])[..., 0]
+        turns = (np.swapaxes(task.target.rotation, -1, -2) @ turns)[:, :2]
     back = _pseudo_inverse(shifts, _MOVES)
-    first = (back @ miss[..., None])[..., 0]
-    rest = turns - turns @ back @ shifts
-    turn = turn - (turns @ first[..., None])[..., 0]
-    second = (_pseudo_inverse(rest, task.moves) @ turn[..., None])[..., 0]
-    return first + second, np.linalg.norm(miss, axis=1)
+    rest = _pseudo_inverse(turns - turns @ back @ shifts, task.moves)
+    return np.concatenate((back - rest @ turns @ back, rest), axis=2)
 
 
 def _pseudo_inverse(matrices: Array, least: float) -> Array:

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from olp.core.arrays import Array
+from olp.core.arrays import Array, read_only
 from olp.core.values import dataclass
 
 #: Below this angle the sine over the angle is taken from its series, whose rest is then below 1e-17. Radians.
 _SMALL_RAD = 1e-5
 #: A sum of the diagonal below this is near half a turn, where the skew part does not show the axis.
 _NEAR_HALF_TURN = -0.99
+
+#: No rotation. Motions that only shift hold this very array, so that nothing is multiplied by it.
+_UPRIGHT = read_only(np.eye(3))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -22,6 +25,10 @@ class Poses:
 
     def __matmul__(self, other: Poses) -> Poses:
         """First `other`, then this."""
+        if self.rotation is _UPRIGHT:
+            return Poses(other.rotation, self.at(other.position))
+        if other.rotation is _UPRIGHT:
+            return Poses(self.rotation, self.at(other.position))
         return Poses(self.rotation @ other.rotation, self.at(other.position))
 
     def at(self, point_mm: Array) -> Array:
@@ -29,6 +36,8 @@ class Poses:
         return turned(self.rotation, point_mm) + self.position
 
     def inverse(self) -> Poses:
+        if self.rotation is _UPRIGHT:
+            return Poses(_UPRIGHT, 0.0 - self.position)
         back = np.swapaxes(self.rotation, -1, -2)
         return Poses(back, 0.0 - turned(back, self.position))
 
@@ -39,17 +48,21 @@ class Poses:
 
 
 #: Nothing moves.
-STILL = Poses(np.eye(3), np.zeros(3))
+STILL = Poses(_UPRIGHT, np.zeros(3))
 
 
 def turned(rotation: Array, vectors: Array) -> Array:
     """(n, 3) vectors (n, 3) or (3,) after rotations (n, 3, 3) or (3, 3)."""
+    if rotation is _UPRIGHT:
+        return vectors
+    if rotation.ndim == 2:
+        return np.asarray(vectors @ rotation.T)
     return np.asarray((rotation @ vectors[..., None])[..., 0])
 
 
 def shift(vector_mm: Array) -> Poses:
     """The translation by (n, 3) or (3,) in mm."""
-    return Poses(np.eye(3), vector_mm)
+    return Poses(_UPRIGHT, vector_mm)
 
 
 def about(point_mm: Array, rotation: Array, offset_mm: Array) -> Poses:
