@@ -30,6 +30,22 @@ def test_each_line_was_made_from_one() -> None:
     assert empty.lines_of([0, 5]).tolist() == [0, 5]
 
 
+def test_lines_of_a_text_that_was_made_through_another_one() -> None:
+    """The program between has six lines of its own, of which two were made from the first file."""
+    inner = Origin(
+        ("sub/a.ngc", 'b "1".ngc'), np.array([6, 8]), tuple(b"%d\n" % i for i in range(10)),
+        np.array([1, 2, 4, 6, 7, 8, 9, 10, 2]),
+    )  # fmt: skip
+    whole = inner.through(ORIGIN)
+    # lines 1, 2, 4 and 6 as ORIGIN has them, then both lines of each file
+    assert whole.line.tolist() == [1, 4, 6, 3, 4, 5, 6, 7, 4]
+    assert (whole.files, whole.texts) == (ORIGIN.files, ORIGIN.texts)
+    assert whole.first.tolist() == [3, 5]
+    assert [whole.place(line) for line in whole.line[[3, 5, 7]].tolist()] == [
+        "3", "2 of a.ngc", '2 of b "1".ngc'
+    ]  # fmt: skip
+
+
 @pytest.mark.parametrize(
     ("line", "file", "number", "place", "text"),
     [

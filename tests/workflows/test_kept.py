@@ -264,6 +264,7 @@ def test_calls_at_several_places_go_the_same_way(machine: Path, seed: int) -> No
     assert lines
 
 
+@pytest.mark.slow
 def test_a_kept_program_above_tolerance_is_written_where_unrolling_does_not_help(tmp_path: Path) -> None:
     """No block takes up backlash along a contour, kept or not."""
     machine = machines.random_machine(tmp_path, 3, machines.Recipe(backlash_um={"X": 8.0}, directed=""))
@@ -294,3 +295,19 @@ def test_a_program_that_is_worse_when_kept_is_refused(machine: Path, monkeypatch
     )
     with pytest.raises(ProgramError, match=r"above the tolerance then.*--flatten"):
         olp.correct(SPRING.encode(), machine)
+
+
+@pytest.mark.slow
+def test_blocks_that_are_put_before_a_line_stay_with_it(tmp_path: Path) -> None:
+    """What takes up the backlash before the first cut of a subprogram is in the subprogram, not in front of
+    its calls."""
+    machine = machines.random_machine(tmp_path, 4, machines.Recipe(backlash_um={"X": 6.0, "Y": 4.0}))
+    call = "G0 X9 Y9\nM98 P100\n"
+    body = "N10 G1 X50 Y40 Z-1\nN20 X20 (back)\nN40 G0 X10 Y10 Z5\nX9 Y9\n"
+    lines = olp.correct(f"{HEAD}{call}{call}M2\nO100\n{body}M99\n".encode(), machine).data.split(b"\n")
+    assert [line[:4] for line in lines[4:8]] == [b"G0 X", b"M98 ", b"G0 X", b"M98 "]
+    inner = [line.split(b" ") for line in lines[lines.index(b"O100") + 1 :]]
+    assert [words[0] for words in inner[:4]] == [b"N10", b"X49.994", b"N20", inner[3][0]]
+    assert inner[0][1:3] == [b"G1", b"X8.989"]
+    assert inner[2][1:] == [b"X49.988", b"(back)"] and inner[3][0].startswith(b"X19.98")
+    assert inner[4][:2] == [b"N40", b"G0"]
