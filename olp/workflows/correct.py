@@ -28,7 +28,7 @@ from olp.errormodel.known import KnownErrors
 from olp.files.sources import Source, Sources
 from olp.files.write import write_bytes
 from olp.findings.catalogue import Finding
-from olp.program.origin import Unrolled
+from olp.program.origin import Unrolled, origin_of
 from olp.program.program import Program
 from olp.program.registry import Options, read
 from olp.proof.judgement import Judgements
@@ -180,7 +180,10 @@ def corrected(
         try:
             second = read(text, loaded.setup, loaded.dialect, reading, words=False)
         except ProgramError as error:
-            raise _refused_contour(error, done) if error.code == "OLP528" else error from None
+            if error.code != "OLP528":
+                raise
+            with done.nominal.errors():
+                raise _refused_contour(error, done, text) from None
         pair = Pair(done.nominal, data, program.name, second, done.text or b"", "", done.uncorrected)
         return proved(pair, loaded.held(), options, done.doubts, outside=held, notes=notes, tell=told)
 
@@ -315,18 +318,21 @@ def _written(
     return _Rewritten(source, nominal, text, written.uncorrected, parts, written.tally, doubts, flow, flat)
 
 
-def _refused_contour(error: ProgramError, done: _Rewritten) -> ProgramError:
-    """The refusal of a contour that the control would take but for the digits of its correction."""
-    path, line = done.nominal.toolpath, error.line or 1
+def _refused_contour(error: ProgramError, done: _Rewritten, text: bytes) -> ProgramError:
+    """The refusal of a contour that the control would take but for the digits of its correction, from that of
+    the corrected `text`."""
+    path, line, origin = done.nominal.toolpath, error.line or 1, origin_of(text)
+    if origin is not None:
+        # the error states a line of what was unrolled
+        line = int(np.argmax(origin.line == line)) + 1
     own = np.array([(c := f.compensation) is None or not c.corner for f in path.frames], bool)[path.frame]
     move = np.flatnonzero(own)
     behind = path.line[move] + np.cumsum(done.parts[move] - 1)
-    more = (done.text or b"").count(b"\n") - done.source.data.count(b"\n")
-    stamp = more - int(behind[-1] - path.line[move[-1]])
+    stamp = int(find_stamp(text) is not None)
     at = min(int(np.searchsorted(behind + stamp, line)), len(move) - 1)
     return ProgramError(
-        "the control would refuse this block once corrected: rounded to its digits, it is too narrow for the "
-        "cutter; make the move longer, or have the path of the tool written with --contour path",
+        "the control would refuse this block once corrected and rounded to its digits: "
+        f"{error.message.partition(';')[0]}; have the path of the tool written with --contour path",
         line=int(path.line[move[at]]),
         code="OLP561",
     )

@@ -86,10 +86,13 @@ def unrolled_again(sources: Sources, program: Source, text: bytes, loaded: Loade
 
 @contextmanager
 def provably_kept() -> Iterator[None]:
-    """Why a program that kept its flow is not proved, with the way on."""
+    """Why a program that kept its flow is not proved, with the way on. A block that the control refuses once
+    corrected has its own way, and unrolling is none."""
     try:
         yield
     except ProgramError as error:
+        if error.code == "OLP561":
+            raise
         why = f"with its loops and subprograms kept the program is not proved ({error.message}); {_UNROLL}"
         raise ProgramError(why, line=error.line or 1, code="OLP511") from None
 

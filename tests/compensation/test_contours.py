@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from cases.acceptance import TRUE_ZERO, machine, unstamped
+from judge import machines
 
 import olp
 from olp.core.errors import ProgramError, UsageError
@@ -175,3 +176,22 @@ def test_above_tolerance_along_a_contour_the_path_of_the_tool_is_named(tmp_path:
     found = olp.verify(HEAD + slanted + b"M2\n", edited, tmp_path / "machine.toml").findings
     (other,) = [f.message for f in found if f.code == "OLP101"]
     assert "contour" not in other
+
+
+@pytest.mark.parametrize("flow", ["", "M98 P100 L2\nM2\nO100\n"])
+@pytest.mark.parametrize("flatten", [False, True])
+def test_what_rounding_makes_too_narrow_is_refused_at_its_own_line(
+    tmp_path: Path, flow: str, flatten: bool
+) -> None:
+    """An arc of 5.01 mm has 5 mm of room, once its end is written with digits of 0.01 mm."""
+    recipe = machines.Recipe(increment_mm=0.01, peak_um=(150.0, 200.0), waves=3.0)
+    path = machines.random_machine(tmp_path, 1, recipe)
+    head = "G21 G90 G54\nG0 X0 Y0 Z10\nG1 X90 Y90 F600\n"
+    contour = "G0 X0 Y51.10\nG41.1 D10 G1 X20 Y51.10\nG3 X30.02 Y51.10 I5.01 J0\nG1 X60\nG40 G0 X0 Y0\n"
+    text = f"{head}{flow}{contour}{'M99' if flow else 'M2'}\n".encode()
+    with pytest.raises(ProgramError, match="would refuse this block once corrected") as caught:
+        olp.correct(text, path, flatten=flatten)
+    assert text.splitlines()[(caught.value.line or 1) - 1].startswith(b"G3")
+    assert "does not fit" in caught.value.message
+    assert caught.value.message.endswith("; have the path of the tool written with --contour path")
+    assert olp.correct(text, path, contour="path").report["deviation"]["holds"]

@@ -311,3 +311,9 @@ def test_blocks_that_are_put_before_a_line_stay_with_it(tmp_path: Path) -> None:
     assert inner[0][1:3] == [b"G1", b"X8.989"]
     assert inner[2][1:] == [b"X49.988", b"(back)"] and inner[3][0].startswith(b"X19.98")
     assert inner[4][:2] == [b"N40", b"G0"]
+
+
+def test_an_expression_without_parameters_is_not_written_out(machine: Path) -> None:
+    with pytest.raises(ProgramError, match="an expression gives its X") as caught:
+        olp.correct(f"{HEAD}G1 X[2*3] Y5\nM98 P1\nM2\nO1\nG1 X9\nM99\n".encode(), machine)
+    assert caught.value.line == 4
