@@ -298,19 +298,20 @@ def test_a_program_that_is_worse_when_kept_is_refused(machine: Path, monkeypatch
 
 
 @pytest.mark.slow
-def test_blocks_that_are_put_before_a_line_stay_with_it(tmp_path: Path) -> None:
+@pytest.mark.parametrize("number", ["", "N10 "])
+def test_blocks_that_are_put_before_a_line_stay_with_it(tmp_path: Path, number: str) -> None:
     """What takes up the backlash before the first cut of a subprogram is in the subprogram, not in front of
     its calls."""
     machine = machines.random_machine(tmp_path, 4, machines.Recipe(backlash_um={"X": 6.0, "Y": 4.0}))
     call = "G0 X9 Y9\nM98 P100\n"
-    body = "N10 G1 X50 Y40 Z-1\nN20 X20 (back)\nN40 G0 X10 Y10 Z5\nX9 Y9\n"
-    lines = olp.correct(f"{HEAD}{call}{call}M2\nO100\n{body}M99\n".encode(), machine).data.split(b"\n")
-    assert [line[:4] for line in lines[4:8]] == [b"G0 X", b"M98 ", b"G0 X", b"M98 "]
-    inner = [line.split(b" ") for line in lines[lines.index(b"O100") + 1 :]]
-    assert [words[0] for words in inner[:4]] == [b"N10", b"X49.994", b"N20", inner[3][0]]
-    assert inner[0][1:3] == [b"G1", b"X8.989"]
-    assert inner[2][1:] == [b"X49.988", b"(back)"] and inner[3][0].startswith(b"X19.98")
-    assert inner[4][:2] == [b"N40", b"G0"]
+    body = f"{number}G1 X50 Y40 Z-1\nX20 (back)\nG0 X10 Y10 Z5\nX9 Y9\n"
+    text = olp.correct(f"{HEAD}{call}{call}M2\nO100\n{body}M99\n".encode(), machine).data.decode()
+    lines = text.splitlines()
+    assert [line[:4] for line in lines[4:9]] == ["G0 X", "M98 ", "G0 X", "M98 ", "M2"]
+    inner = lines[lines.index("O100") + 1 :]
+    assert inner[0].startswith(f"{number}G1 X8.989") and inner[1].startswith("X49.994")
+    assert inner[2] == "X49.988 (back)" and inner[3].startswith("X19.98")
+    assert inner[4].startswith("G0 X9.98")
 
 
 def test_an_expression_without_parameters_is_not_written_out(machine: Path) -> None:
