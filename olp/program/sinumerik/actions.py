@@ -216,9 +216,7 @@ class Compensate(Action):
             )
         if state.compensation is not None and state.compensation.left == (self.code in COMPENSATION_LEFT):
             return
-        tool, state.spindle = state.spindle, state.length_tool
         state.compensation = switched_on(state, self.code, line, {})
-        state.spindle = tool
 
 
 @dataclass(frozen=True, slots=True)

@@ -118,6 +118,7 @@ def test_random_shapes_are_those_of_the_judge(setup: Setup) -> None:
 WRITTEN = {
     "X10 CHR=2\nY10": "X8 Y0\nG1 X10 Y2\nG1 Y10 X10\n",
     "X10 CHF=2\nY10": "X8.585786438 Y0\nG1 X10 Y1.414213562\nG1 Y10 X10\n",
+    "X10 CHF=2\nX20 Y5": "X8.972513703 Y0\nG1 X10.91901168 Y0.459505841\nG1 X20 Y5\n",
     "X10 RND=2\nM8\nY10 F100 ; a": "X8 Y0\nM8\nG3 X10 Y2 I0 J2 F100\nG1 Y10 F100 X10 ; a\n",
     "X10 RND=2\nZ5\nX20": "X10\nZ5\nX20\n",
     "G91 X10 RND=2\nY10": "G91 X8 Y0\nG3 X2 Y2 I0 J2\nG1 Y8 X0\n",

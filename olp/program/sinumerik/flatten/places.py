@@ -68,7 +68,7 @@ class Places:
         codes = {self._code(code, p) for p in pieces if p.name == "G" and p.form is Form.WORD}
         if codes & _NO_PLACE or "SUPA" in names:
             # its axis words are no positions of the program
-            if "SUPA" in names or not codes & _KEEPS_PLACE:
+            if not codes & _KEEPS_PLACE:
                 self._position.clear()
                 self._shapes.forget()
             yield raw
