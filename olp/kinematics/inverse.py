@@ -84,7 +84,7 @@ def inverse(
     """Axis values at which the tool is at `target`, found from `near` (n, axes) in mm and deg.
 
     A turn counts as its arc at `reference_radius_mm`. Axes whose joint is not to be corrected stay. Where a
-    rotary axis would turn by more than `largest_turn_deg` L from `near`, it turns by L^2 over that: at a
+    first step would turn a rotary axis by more than `largest_turn_deg` L, it turns by L^2 over that: at a
     singular posture not at all. Then the position is met by the other axes, and the rest of the orientation
     is left. `nominal` asks for the machine without errors. Raises NotInvertible with the row where no axis
     values meet the position.
@@ -106,8 +106,11 @@ def inverse(
     if not nominal and int(free.sum()) > (5 if structure.symmetric_tool else 6):
         # which of many solutions is reached depends on the slopes: those of the machine itself are taken
         slopes = partial(_differences, forward, task.scale, reference_radius_mm)
-    values, met = _newton(task, forward, slopes)
     limited = np.zeros(len(near), bool)
+    if largest_turn_deg is not None:
+        task = _bounded(task, forward, slopes, rotary, largest_turn_deg)
+        limited = np.any(task.free != free, axis=1)
+    values, met = _newton(task, forward, slopes)
     if not np.all(met):
         part = task.only(~met)
         well = _Task(
@@ -121,8 +124,6 @@ def inverse(
                 f"row {row}: no axis values of {structure.name!r} near the given ones bring the tool to its "
                 "target; expected a target within reach, and a posture away from a singular one"
             )
-    if largest_turn_deg is not None:
-        values, limited = _within(task, forward, slopes, values, limited, rotary, largest_turn_deg)
     reached = forward(values).rotation
     left = rotation_vector(reached @ np.swapaxes(task.target.rotation, -1, -2))
     return Solved(values, left, limited)
@@ -146,37 +147,13 @@ def command(
     )
 
 
-def _within(
-    task: _Task,
-    forward: Forward,
-    slopes: Slopes,
-    values: Array,
-    limited: Mask,
-    rotary: Mask,
-    largest_deg: float,
-) -> tuple[Array, Mask]:
-    """Axis values without too large turns: such an axis stays at L^2 / x, the others meet the position."""
-    turn = np.where(rotary, values - task.near, 0.0)
+def _bounded(task: _Task, forward: Forward, slopes: Slopes, rotary: Mask, largest_deg: float) -> _Task:
+    """The task with every axis that a first step would turn by x, more than L, standing at L^2 / x."""
+    steps = _steps_of(task, slopes(task.near)) @ _miss(task, forward(task.near))[..., None]
+    turn = np.where(rotary, steps[..., 0] / task.scale, 0.0)
     far = np.abs(turn) > largest_deg
-    rows = np.any(far, axis=1)
-    if not np.any(rows):
-        return values, limited
-    kept = np.where(far, task.near + largest_deg**2 / np.where(far, turn, 1.0), task.near)
-    part = task.only(rows)
-    still = _Task(
-        part.target, kept[rows], part.free & ~far[rows], part.scale, part.radius_mm, part.symmetric,
-        _MOVES_WELL,
-    )  # fmt: skip
-    solved, met = _newton(still, forward, slopes)
-    if not np.all(met):
-        row = int(np.flatnonzero(rows)[np.argmin(met)])
-        raise NotInvertible(
-            f"row {row}: near a singular posture an axis would turn by {np.max(np.abs(turn[row])):.3g} deg, "
-            f"and with at most {largest_deg:g} deg the position is not met; expected another posture"
-        )
-    values, limited = values.copy(), limited | rows
-    values[rows] = solved
-    return values, limited
+    near = np.where(far, task.near + largest_deg**2 / np.where(far, turn, 1.0), task.near)
+    return _Task(task.target, near, task.free & ~far, task.scale, task.radius_mm, task.symmetric, task.moves)
 
 
 def _newton(task: _Task, forward: Forward, slopes: Slopes) -> tuple[Array, Mask]:

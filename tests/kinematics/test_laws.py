@@ -200,6 +200,27 @@ def test_a_correction_is_bounded_near_a_singular_posture() -> None:
     assert solved.limited[[4, 6]].all()
 
 
+def test_the_bound_of_a_turn_is_met_from_both_sides() -> None:
+    """From |x| = L on, the turn is L^2 / x, and goes to zero where B does."""
+    machine, limit = wrong_wrist(), 0.5
+    angles = np.array([3.0, 1.0, 0.4, 0.2, 0.1, 0.01, 1e-3, 1e-5])
+    values = WRIST.axis_values({"B": angles, "C": 40.0})
+    free = command(machine, values, largest_turn_deg=1e3).values - values
+    bound = command(machine, values, largest_turn_deg=limit)
+    turn = (bound.values - values)[:, 3]
+    assert bound.limited.tolist() == [False, False, False, True, True, True, True, True]
+    assert turn[:3] == pytest.approx(free[:3, 3], abs=1e-9)
+    assert turn[3:5] == pytest.approx(limit**2 / free[3:5, 3], rel=0.1)
+    assert np.all(np.diff(np.abs(turn[3:])) < 0.0)
+    assert abs(turn[-1]) < 1e-3
+
+
+def test_curves_of_one_axis_are_bodies_the_first_next_to_the_frame() -> None:
+    both = JointErrors(ORIGIN, curves=(curve({5: 1e-3}), curve({0: 1.0})))
+    assert shift_at(HEAD, errors(C=both))[:2] == pytest.approx([1.0, 1e-3], abs=1e-6)
+    assert shift_at(TABLE, errors(C=both))[:2] == pytest.approx([1.0, 0.0], abs=1e-6)
+
+
 def test_mobility_is_zero_at_a_singular_posture() -> None:
     machine = Kinematics(WRIST, tool_mm=(0.0, 0.0, -150.0))
     smallest = mobility(machine, WRIST.axis_values({"B": [0.0, 1.0, 40.0]})).smallest
