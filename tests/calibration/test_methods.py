@@ -22,6 +22,7 @@ from olp.calibration.methods.equation_1 import equation_1, in_the_papers_signs
 from olp.calibration.methods.judging import Judged, best, judged, noise_of, stated
 from olp.calibration.methods.pod_map import adjusted, pod_map
 from olp.calibration.observations.measurements import Measurements
+from olp.calibration.observations.points import Points
 from olp.cli import main
 from olp.core.errors import CannotCompute, ConfigError
 from olp.core.machine import Axis, Machine, Setup
@@ -126,6 +127,17 @@ def test_a_shift_and_a_turn_are_no_error_and_noise_is_noise() -> None:
 
     rms, worst = judged(points, errors)
     assert rms == pytest.approx(noise_of(points), rel=0.15) and rms < worst < 4.0 * rms
+
+
+def test_the_frame_takes_its_share_of_the_noise_of_few_points() -> None:
+    random = np.random.default_rng(2)
+    axis = random.uniform(0.0, 1000.0, (8, 3))
+    squares = []
+    for _ in range(200):
+        measured = axis + random.normal(0.0, 5.0 * UM, axis.shape)
+        points = Points(axis, np.zeros((8, 3)), measured, 5.0 * UM)
+        squares.append(judged(points, lambda place, tool: np.zeros(place.shape))[0] ** 2)
+    assert np.sqrt(np.mean(squares)) == pytest.approx(noise_of(points), rel=0.05)
 
 
 @pytest.mark.slow
