@@ -211,8 +211,13 @@ class _Reader:
         number = line + (context.chunk.first_line + 1)
         incremental = context.distance[line] == INCREMENTAL
         flag = np.where(incremental, np.uint8(Flag.INCREMENTAL), np.uint8(0))
+        thread = motion == THREAD
+        still = number[thread & ~is_in(context.spindle[line], (3, 4))]
+        if still.size:
+            why = "G33 needs a turning spindle; give M3 or M4 before it"
+            raise ProgramError(why, line=int(still[0]), code="OLP518")
         # a second block behind a thread would wait for the spindle to come round
-        flag[blocks.other | calls[line] | (motion == THREAD)] |= np.uint8(Flag.WHOLE)
+        flag[blocks.other | calls[line] | thread] |= np.uint8(Flag.WHOLE)
         flag[deleted[line]] |= np.uint8(Flag.DELETED)
         if self.extrusion is not None:
             # a straight move that feeds nothing is a travel

@@ -122,7 +122,7 @@ REFUSED = {
     "G95 without S": ("G95\nG1 X1 F60", "linuxcnc", 2, "no S word"),
     "G95 with S0": ("G95 S0\nG1 X1 F60", "linuxcnc", 2, "no S word"),
     "G95 with G96": ("G95 G96 S100\nG1 X1. F60.", "fanuc", 2, "G96"),
-    "a thread": ("F60 S9\nG33 X9 K1", "linuxcnc", 2, "in time with the spindle"),
+    "a thread": ("F60 S9 M3\nG33 X9 K1", "linuxcnc", 2, "in time with the spindle"),
     "a probe without F": ("G38.2 X9", "linuxcnc", 1, "no feed"),
     "no point on a Haas": ("G1 X1. F60", "haas", 1, "decimal point"),
     "no point in inches": ("G20\nG1 X1. F60", "fanuc", 2, "decimal point"),

@@ -45,14 +45,16 @@ def refused(text: str, setup: Setup) -> str:
 
 
 def test_a_thread_is_a_straight_move_that_is_never_split(setup: Setup) -> None:
-    read_path = path("G33 X5 Z-4 K1\nZ-6 K1.5\nG0 Z9\n", setup)
+    read_path = path("M3 S9 G33 X5 Z-4 K1\nZ-6 K1.5\nG0 Z9\n", setup)
     assert read_path.kind[1:].tolist() == [Kind.LINE, Kind.LINE, Kind.RAPID]
     assert read_path.end_mm[1:].tolist() == [[105, 202, 296], [105, 202, 294], [105, 202, 309]]
     assert ((read_path.flag & Flag.WHOLE) != 0).tolist() == [False, True, True, False]
 
 
 def test_a_thread_needs_its_lead(setup: Setup) -> None:
-    assert "G33 needs K" in refused("G33 Z-4\n", setup)
+    assert "G33 needs K" in refused("M3 S9 G33 Z-4\n", setup)
+    assert "turning spindle" in refused("G33 Z-4 K1\n", setup)
+    assert "turning spindle" in refused("M5 G33 Z-4 K1\n", setup)
 
 
 @pytest.mark.parametrize(("code", "kind"), [("G0", Kind.RAPID), ("G1", Kind.LINE)])
