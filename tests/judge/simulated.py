@@ -154,6 +154,11 @@ class Taken:
     scale_sigma: float = 0.0
 
 
+def drift_of(rng: np.random.Generator, time: np.ndarray) -> np.ndarray:
+    """How an instrument drifts over a line, `time` from 0 to 1, in units of its size."""
+    return rng.normal() * time + 0.5 * rng.normal() * np.sin(2 * np.pi * time * rng.uniform(0.3, 1.0))
+
+
 LINE = (1500.0, 700.0, -600.0)
 TOOL = (0.0, 0.0, -120.0)
 COUNT = (31, 21, 21)
@@ -199,7 +204,7 @@ def take(
             value = value + (rng.normal(0.0, 1e-4) if slope is None else slope) * q
     unit = 1e-6 if d >= 3 else 1e-3
     time = np.linspace(0.0, 1.0, len(q))
-    level = rng.normal() * time + 0.5 * rng.normal() * np.sin(2 * np.pi * time * rng.uniform(0.3, 1.0))
+    level = drift_of(rng, time)
     value = value + drift * 2.0 * unit * level + rng.normal(0.0, 30.0) * unit + rng.normal(0.0, noise)
     return Taken(
         component, q, value, run, direction, tuple(map(float, line_mm)), tuple(map(float, tool)), square,
@@ -209,14 +214,14 @@ def take(
 
 def all_lines(
     m: Machine, seed: int, *, line_mm: Any = LINE, tool: Any = TOOL, tables: str = "", jitter: float = 5.0,
-    runs: int = 5, drift: float = 1.0,
+    runs: int = 5, drift: float = 1.0, count: Any = COUNT,
 ) -> list[Taken]:  # fmt: skip
     """The lines of a full set: positioning, eight angles (not roll of the vertical axis), straightness pairs
-    that share a square, and straightness of Z with the reflector at two offsets."""
+    that share a square, and straightness of Z with the reflector at two offsets; `count` targets an axis."""
     rng = np.random.default_rng([seed, 77])
     targets = []
     for axis in range(3):
-        q = np.linspace(*m.box[axis], COUNT[axis])
+        q = np.linspace(*m.box[axis], count[axis])
         q[1:-1] += rng.uniform(-jitter, jitter, len(q) - 2)
         targets.append(np.round(q, 3))
     lines: list[Taken] = []

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from olp.calibration.estimator.adjustment import POINT_CELLS
-from olp.calibration.estimator.basis import CurveSpace, Spline
+from olp.calibration.estimator.basis import CurveSpace, Scales, Spline
 from olp.calibration.estimator.fitted import Fit
 from olp.calibration.estimator.normal import Normal, solve
 from olp.calibration.estimator.parameters import MeasuringLine, Parameters, frame_columns
@@ -24,8 +23,14 @@ from olp.core.values import dataclass
 
 #: Positions in the box where the uncertainty is computed, for each tool.
 _POSITIONS = 150
-#: Size and second differences of curves of machines that are off by 0.1 mm or so (mm, rad).
-TYPICAL = {"positioning": (0.03, 6e-3), "straightness": (0.012, 2.5e-3), "angle": (2e-5, 5e-6)}
+#: Size and scales of curves of machines that are off by 0.1 mm or so (mm, rad).
+TYPICAL = {
+    "positioning": (0.03, Scales(0.0, 0.25, 0.0, 0.0)),
+    "straightness": (0.012, Scales(0.0, 0.10, 0.0, 0.0)),
+    "angle": (2e-5, Scales(0.0, 2e-4, 0.0, 0.0)),
+}
+#: Cells of the splines.
+_CELLS = 12
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,7 +85,7 @@ def _parameters(taken: Measurements, chain: str, box_mm: Array) -> Parameters:
     spaces, measuring_lines = {}, {}
     for name in COMPONENTS:
         axis = AXES.index(name[2])
-        spline = Spline(float(box_mm[axis, 0]), float(box_mm[axis, 1]), POINT_CELLS)
+        spline = Spline(float(box_mm[axis, 0]), float(box_mm[axis, 1]), _CELLS)
         kind = "straight" if name[1] in AXES and name[1] != name[2] else "zero"
         spaces[name] = CurveSpace.of(spline, (), datum[axis], kind)
         if name[1] in AXES:

@@ -198,8 +198,7 @@ def _as(fit: Fit, alternative: Alternative) -> _Source:
 
 
 def _agreements(fit: Fit, sources: list[_Source]) -> tuple[Agreement, ...]:
-    # a curve that is rougher between its targets than was learnt contradicts nothing
-    prior, _ = fit.prior.roughest().precision()
+    prior, _ = fit.prior.precision()
     means = Normal.of(fit.parameters.size)
     fit.prior.push(means)
     total = prior + sum(source.normal.H for source in sources)

@@ -16,7 +16,7 @@ from olp.calibration.estimator.fitted import Fit
 from olp.calibration.estimator.model import MOST, Model, squares_of
 from olp.calibration.estimator.normal import Block, Normal, Solved, solve
 from olp.calibration.estimator.parameters import Parameters
-from olp.calibration.estimator.prior import Prior
+from olp.calibration.estimator.prior import Class, Prior
 from olp.calibration.observations.base import Noise, Outlier, Result, State
 from olp.calibration.observations.lines import Line
 from olp.calibration.observations.measurements import Measurements
@@ -26,7 +26,7 @@ from olp.core.units import AXES
 from olp.core.values import dataclass
 
 #: Cells of the curves of an axis that has points or lengths but no lines. They double while the fit is bad.
-POINT_CELLS = 12
+POINT_CELLS = 24
 #: A fit is bad where chi-square is more than so many standard deviations above its expectation.
 MISFIT = 5.0
 #: More cells are kept where they lower reduced chi-square to less than this share.
@@ -117,7 +117,7 @@ def _iterate(start: _Start, tell: Progress) -> _Settled:
     """Solves, updates what is not linear, and leaves out noise terms and outliers, until nothing changes."""
     states, outliers, waves = start.states, [*start.outliers], start.model.waves
     theta = np.zeros(0)
-    learnt: dict[str, tuple[float, float]] | None = None
+    learnt: dict[str, Class] | None = None
     for _ in range(PASSES):
         parameters = start.model.parameters(waves)
         prior = Prior(parameters, start.model.shapes, squares_of(start.measurements, parameters))

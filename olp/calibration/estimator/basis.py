@@ -1,10 +1,14 @@
 """The functions that make a curve: uniform cubic B-splines, steps between two targets, kinks at a target.
 
 P-splines after P. H. C. Eilers and B. D. Marx (Statist. Sci. 11, 1996): many equally spaced knots, and a
-prior on the second differences of the coefficients in place of a choice of knots.
+prior on the coefficients in place of a choice of knots. The prior is a sum of processes: one whose curvature
+wanders, one whose slope wanders, one whose value wanders, and ripple. All have the eigenvectors of the second
+differences, and spectra that fall with the sixth, fourth, second and no power of the frequency.
 """
 
 from __future__ import annotations
+
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -49,6 +53,33 @@ class Wave:
 
 
 @dataclass(frozen=True, slots=True)
+class Scales:
+    """Sizes of the processes that make a curve, mm or rad over the whole length of its axis: `bows` of the
+    curvature that wanders, `bends` of the slope that wanders, `steps` of the value that wanders, `ripple` of
+    what has no neighbours."""
+
+    bows: float
+    bends: float
+    steps: float
+    ripple: float
+
+    @classmethod
+    def of(cls, values: Iterable[float]) -> Scales:
+        return cls(*(float(value) for value in values))
+
+    @property
+    def values(self) -> Array:
+        """(4,) all of them."""
+        return np.array((self.bows, self.bends, self.steps, self.ripple))
+
+
+#: Powers of the eigenvalues of second differences that are the variances of the processes, times -1.
+POWERS = (1.5, 1.0, 0.5, 0.0)
+#: Eigenvalues of the second differences that are zero: those of a constant and of a straight line.
+STRAIGHT = 2
+
+
+@dataclass(frozen=True, slots=True)
 class Spline:
     """Cubic B-splines over [low_mm, high_mm] with `cells` equal cells; end values outside."""
 
@@ -87,6 +118,16 @@ class Spline:
         """(count, count) sum of squares of second differences of the coefficients."""
         second = np.diff(np.eye(self.count), 2, axis=0)
         return np.asarray(second.T @ second)
+
+    def spectrum(self) -> tuple[Array, Array]:
+        """(4, count) variances of the eigenvectors of `roughness` where one process has the size 1, zero of
+        the first two; and the eigenvectors, (count, count), by column."""
+        values, vectors = np.linalg.eigh(self.roughness())
+        table = np.zeros((len(POWERS), self.count))
+        for row, power in zip(table, POWERS, strict=True):
+            # of a process of length 1: white noise has a variance that does not depend on the cells
+            row[STRAIGHT:] = (values[STRAIGHT:] * self.cells**4) ** -power * (self.cells if power else 1.0)
+        return table, vectors
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -127,6 +168,17 @@ class CurveSpace:
     def values(self, q: Array) -> Array:
         """(n, size) values at q (n,)."""
         return np.asarray(self.raw_values(q) @ self.gauge)
+
+    def process(self, scales: Scales, amplitude: float) -> Array:
+        """(size, size) precision of the sum of the processes; `amplitude` is the standard deviation of the
+        coefficients of straight lines and of features."""
+        table, vectors = self.spline.spectrum()
+        variance = scales.values**2 @ table
+        variance[:STRAIGHT] = amplitude**2
+        m = self.spline.count
+        full = np.eye(m + len(self.features)) / amplitude**2
+        full[:m, :m] = (vectors / variance) @ vectors.T
+        return np.asarray(self.gauge.T @ full @ self.gauge)
 
     def prior(self, roughness: float, amplitude: float) -> Array:
         """(size, size) precision for a standard deviation `roughness` of second differences, and `amplitude`

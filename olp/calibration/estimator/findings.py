@@ -9,9 +9,9 @@ from itertools import combinations
 import numpy as np
 
 from olp.calibration.estimator.adjustment import MISFIT
+from olp.calibration.estimator.character import class_of
 from olp.calibration.estimator.curves import joints_of
 from olp.calibration.estimator.fitted import Fit
-from olp.calibration.estimator.prior import class_of
 from olp.calibration.estimator.summary import (
     cost_um,
     scale_unobservable,

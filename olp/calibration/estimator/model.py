@@ -10,7 +10,7 @@ import numpy as np
 from olp.calibration.estimator.basis import CurveSpace, Spline, Step, Wave
 from olp.calibration.estimator.parameters import MeasuringLine, Parameters
 from olp.calibration.estimator.prior import POSE
-from olp.calibration.estimator.smoothing import Shape, shape_of
+from olp.calibration.estimator.smoothing import Features, Shape, features_of, shapes_of
 from olp.calibration.iso230.separation import aliased
 from olp.calibration.observations.base import Noise, Observation, Scattered
 from olp.calibration.observations.lines import Line, square_names, targets_of
@@ -22,8 +22,10 @@ from olp.core.progress import Progress
 from olp.core.units import AXES
 from olp.core.values import dataclass
 
-#: Cells of the spline of a curve, at least; else as many as a line has targets.
-FEWEST = 6
+#: Cells of the spline of a curve between two targets: its steps are somewhere between them.
+BETWEEN = 3
+#: Cells of the spline of a curve, at least.
+FEWEST = 24
 #: Cells of the spline of a curve, at most.
 MOST = 48
 #: Cells of the spline of a half difference.
@@ -160,7 +162,7 @@ def _spline(lines: Sequence[Line], axis: int, span: tuple[float, float], cells: 
     ]
     if not own:
         return Spline(*span, cells)
-    return Spline(*span, int(np.clip(max(long or own) - 1, FEWEST, MOST)))
+    return Spline(*span, int(np.clip(BETWEEN * (max(long or own) - 1), FEWEST, MOST)))
 
 
 def _half(spline: Spline) -> Spline:
@@ -173,23 +175,24 @@ def _shapes(
     waves: Mapping[str, tuple[Wave, ...]],
     tell: Progress,
 ) -> dict[str, Shape]:
-    """The shape of every component with lines: each by itself, then again where others have their steps."""
-    shapes: dict[str, Shape] = {}
+    """The shape of every component with lines: the features of each by itself, then again where others have
+    their steps; then the scales of all curves of a class."""
+    found: dict[str, Features] = {}
     for again in (False, True):
         for k, name in enumerate(COMPONENTS):
             tell("shapes of curves", (k + again * len(COMPONENTS)) / (2 * len(COMPONENTS)))
             own = _own_lines(name, lines)
-            others = [s for other, s in shapes.items() if other[2] == name[2] and other != name]
+            others = [one for other, one in found.items() if other[2] == name[2] and other != name]
             joints = sorted(
-                {f for shape in others for f in shape.features if isinstance(f, Step)},
+                {f for one in others for f in one.features if isinstance(f, Step)},
                 key=lambda step: step.low_mm,
             )
             if own and (joints or not again):
                 spline = splines[AXES.index(name[2])]
-                shapes[name] = shape_of(
+                found[name] = features_of(
                     own, spline, _half(spline), waves.get(name, ()), joints if again else ()
                 )
-    return shapes
+    return shapes_of(found)
 
 
 def _waves(

@@ -1,14 +1,16 @@
-"""The prior of an adjustment: smooth curves of a size that machines have, learnt from their own lines where
-there are some, else by class."""
+"""The prior of an adjustment: curves of a size and character that machines have, learnt from their own lines
+where there are some, else by class."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import field, replace
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import field
 
 import numpy as np
 
-from olp.calibration.estimator.basis import slope_grid
+from olp.calibration.estimator.basis import Scales, slope_grid
+from olp.calibration.estimator.character import class_of
 from olp.calibration.estimator.normal import Normal, evidence
 from olp.calibration.estimator.parameters import Parameters
 from olp.calibration.estimator.smoothing import AMPLITUDE, FEATURE, HALF, Shape
@@ -21,19 +23,21 @@ from olp.core.values import dataclass
 SQUARE = 1e-3
 #: Standard deviation of the unknown pose of a square, rad.
 POSE = 0.1
-#: Size and second differences (mm or rad) of a curve without lines, if no other curve of its class has any.
-UNKNOWN = {"positioning": (0.1, 2e-3), "straightness": (0.03, 1e-3), "angle": (6e-5, 2e-6)}
+#: Size and scales (mm or rad) of a curve without lines, if no other curve of its class has any.
+UNKNOWN = {
+    "positioning": (0.1, Scales(0.0, 0.1, 0.01, 1e-3)),
+    "straightness": (0.03, Scales(0.0, 0.05, 0.005, 5e-4)),
+    "angle": (6e-5, Scales(0.0, 1e-4, 1e-5, 1e-6)),
+}
 #: No curve is smaller than this (mm, rad).
 LEAST_SIZE = 1e-4, 1e-7
-#: How far the roughness of a class may differ from its start, as a standard deviation of its logarithm.
+#: How far a scale of a class may differ from its start, as a standard deviation of its logarithm.
 LOOSE = 1.5
+#: Steps of the logarithm of a scale that are tried.
+STEPS = (-3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0)
 
-
-def class_of(name: str) -> str:
-    """positioning, straightness or angle."""
-    if name[1] in "ABC":
-        return "angle"
-    return "positioning" if name[1] == name[2] else "straightness"
+#: Size and scales of the curves of a class.
+Class = tuple[float, Scales]
 
 
 def known_to(shapes: Mapping[str, Shape], kind: str) -> bool:
@@ -43,15 +47,15 @@ def known_to(shapes: Mapping[str, Shape], kind: str) -> bool:
 
 @dataclass(slots=True)
 class Prior:
-    """Roughness and amplitude of every curve. `shapes` are those that lines gave; `squares` the prior mean
-    and standard deviation of shared nuisances; `classes` (amplitude, roughness) for the other curves."""
+    """Scales and amplitude of every curve. `shapes` are those that lines gave; `squares` the prior mean
+    and standard deviation of shared nuisances; `classes` (amplitude, scales) for the other curves."""
 
     parameters: Parameters
     shapes: Mapping[str, Shape]
     squares: Mapping[str, tuple[float, float]]
-    classes: dict[str, tuple[float, float]] = field(default_factory=lambda: dict(UNKNOWN))
+    classes: dict[str, tuple[float, Scales]] = field(default_factory=lambda: dict(UNKNOWN))
 
-    def precision(self, classes: Mapping[str, tuple[float, float]] | None = None) -> tuple[Array, float]:
+    def precision(self, classes: Mapping[str, tuple[float, Scales]] | None = None) -> tuple[Array, float]:
         """(n, n) prior precision and its log determinant; the prior mean of all but squares is zero."""
         p = self.parameters
         precision = np.zeros((p.size, p.size))
@@ -59,12 +63,12 @@ class Prior:
         classes = self.classes if classes is None else classes
         for name in COMPONENTS:
             shape = self.shapes.get(name)
-            size, roughness = classes[class_of(name)]
+            size, scales = classes[class_of(name)]
             # coefficients that move together share one size
             amplitude = size * np.sqrt(p.spaces[name].size)
             if shape is not None:
-                amplitude, roughness = AMPLITUDE[name[1] in "ABC"], shape.roughness
-            block = p.spaces[name].prior(roughness, amplitude)
+                amplitude, scales = AMPLITUDE[name[1] in "ABC"], shape.scales
+            block = p.spaces[name].process(scales, amplitude)
             precision[p.slices[name], p.slices[name]] = block
             logdet += float(np.linalg.slogdet(block)[1])
         for name, space in p.halves.items():
@@ -83,11 +87,6 @@ class Prior:
             precision[p.slices["frame"], p.slices["frame"]] = np.eye(9) / FRAME_MM**2
         return precision, logdet
 
-    def roughest(self) -> Prior:
-        """The same with curves as rough as their lines do not exclude."""
-        shapes = {name: replace(shape, roughness=shape.roughest) for name, shape in self.shapes.items()}
-        return replace(self, shapes=shapes)
-
     def push(self, normal: Normal) -> None:
         """Add the prior means to the right side."""
         for name in self.parameters.shared:
@@ -95,14 +94,13 @@ class Prior:
             normal.g[self.parameters.slices[name]] += mean / sigma**2
 
     def learn(self, normal: Normal) -> None:
-        """Amplitude of classes from the curves that lines gave, then roughness by evidence, for the curves
-        without lines of their own that some reading depends on."""
+        """Scales of classes from the curves that lines gave, else their scales and size by evidence, for the
+        curves without lines of their own that some reading depends on."""
         p = self.parameters
         for kind in self.classes:
-            known = [s for name, s in self.shapes.items() if class_of(name) == kind]
+            known = [s.scales for name, s in self.shapes.items() if class_of(name) == kind]
             if known:
-                rough = float(np.exp(np.median([np.log(shape.roughness) for shape in known])))
-                self.classes[kind] = (self.classes[kind][0], rough)
+                self.classes[kind] = (self.classes[kind][0], _middle(known))
         for kind in self.classes:
             names = [
                 name
@@ -112,21 +110,23 @@ class Prior:
                 and normal.H[p.slices[name], p.slices[name]].any()
             ]
             if names:
-                self._choose(kind, normal, 1)
+                self._choose(kind, normal, _rougher)
+                self._choose(kind, normal, _stepped)
                 if not known_to(self.shapes, kind):
                     # only these readings determine the size of such curves
                     for _ in range(2):
-                        self._choose(kind, normal, 0)
-                        self._choose(kind, normal, 1)
+                        self._choose(kind, normal, _larger)
+                        self._choose(kind, normal, _rougher)
+                        self._choose(kind, normal, _stepped)
 
     def size_from(self, theta: Array) -> bool:
         """Take the size of curves without lines of their own to be that of the largest of their class with
         lines; True where there are such curves."""
         changed = False
-        for kind, (_, roughness) in self.classes.items():
+        for kind, (_, scales) in self.classes.items():
             own = [name for name in self.shapes if class_of(name) == kind]
             if own and any(class_of(name) == kind and name not in self.shapes for name in COMPONENTS):
-                self.classes[kind] = (max(self.rms(name, theta) for name in own), roughness)
+                self.classes[kind] = (max(self.rms(name, theta) for name in own), scales)
                 changed = True
         return changed
 
@@ -137,22 +137,32 @@ class Prior:
         values = space.values(q) @ theta[self.parameters.slices[name]]
         return max(float(np.sqrt(np.mean(values**2))), LEAST_SIZE[class_of(name) == "angle"])
 
-    def _choose(self, kind: str, normal: Normal, which: int) -> None:
-        """Take the size (0) or roughness (1) of a class that the evidence prefers."""
+    def _choose(self, kind: str, normal: Normal, moved: Callable[[Class, float], Class]) -> None:
+        """Moves a class as the evidence of the readings says: by the root mean square of all factors."""
         start = self.classes[kind]
-        steps = np.linspace(-3.0, 3.0, 7)
+        values = np.array([
+            evidence(normal, *self.precision({**self.classes, kind: moved(start, math.exp(step))}))
+            - 0.5 * (step / LOOSE) ** 2
+            for step in STEPS
+        ])  # fmt: skip
+        weight = np.exp(values - values.max())
+        factor = math.sqrt(float(weight @ np.exp(2.0 * np.array(STEPS)) / weight.sum()))
+        self.classes = {**self.classes, kind: moved(start, factor)}
 
-        def moved(step: float) -> dict[str, tuple[float, float]]:
-            pair = [*start]
-            pair[which] *= float(np.exp(step))
-            return {**self.classes, kind: (pair[0], pair[1])}
 
-        values = [
-            evidence(normal, *self.precision(moved(step))) - 0.5 * (step / LOOSE) ** 2
-            for step in steps.tolist()
-        ]
-        k = int(np.clip(np.argmax(values), 1, len(steps) - 2))
-        a, b, c = values[k - 1 : k + 2]
-        bend = a - 2.0 * b + c
-        shift = 0.5 * (a - c) / bend if bend < 0.0 else 0.0
-        self.classes = moved(float(steps[k] + np.clip(shift, -1.0, 1.0) * (steps[1] - steps[0])))
+def _larger(one: Class, factor: float) -> Class:
+    return factor * one[0], one[1]
+
+
+def _rougher(one: Class, factor: float) -> Class:
+    return one[0], Scales.of(factor * one[1].values)
+
+
+def _stepped(one: Class, factor: float) -> Class:
+    """Steps and ripple by a factor, the smooth parts as they are."""
+    return one[0], Scales.of(one[1].values * (1.0, 1.0, factor, factor))
+
+
+def _middle(scales: Sequence[Scales]) -> Scales:
+    """The root mean square of each scale."""
+    return Scales.of(np.sqrt(np.mean([one.values**2 for one in scales], axis=0)))
