@@ -94,13 +94,13 @@ class Evidence:
 
     def values(self, covariance: Array) -> Array:
         """(n,) log evidences of covariances (n, r, r)."""
-        factor = np.linalg.cholesky(covariance)
+        factor = np.asarray(np.linalg.cholesky(covariance), float)
         half = np.linalg.solve(factor, self.z[:, None])[:, :, 0]
         return np.asarray(-0.5 * (half**2).sum(axis=1) - _logs(factor))
 
     def gains(self, scales: Array, chosen: Sequence[int], rest: Sequence[int]) -> Array:
         """(len(rest),) by how much each feature of `rest` raises the evidence, integrated over scales."""
-        factor = np.linalg.cholesky(self.covariance(scales, chosen))
+        factor = np.asarray(np.linalg.cholesky(self.covariance(scales, chosen)), float)
         more = self.feature * self.rows[:, [self.count + i for i in rest]]
         table = np.linalg.solve(factor, np.column_stack([self.z, more]))
         z, columns = table[:, :, 0], table[:, :, 1:]

@@ -23,7 +23,9 @@ from olp.core.units import AXES
 from olp.core.values import dataclass
 
 #: Cells of the spline of a curve between two targets: its steps are somewhere between them.
-BETWEEN = 3
+BETWEEN = 2
+#: At most so many cells for what is between targets: more of them only where there are more targets.
+ENOUGH = 36
 #: Cells of the spline of a curve, at least.
 FEWEST = 24
 #: Cells of the spline of a curve, at most.
@@ -162,7 +164,8 @@ def _spline(lines: Sequence[Line], axis: int, span: tuple[float, float], cells: 
     ]
     if not own:
         return Spline(*span, cells)
-    return Spline(*span, int(np.clip(BETWEEN * (max(long or own) - 1), FEWEST, MOST)))
+    gaps = max(long or own) - 1
+    return Spline(*span, int(np.clip(max(gaps, min(BETWEEN * gaps, ENOUGH)), FEWEST, MOST)))
 
 
 def _half(spline: Spline) -> Spline:

@@ -114,10 +114,8 @@ class Prior:
                 self._choose(kind, normal, _stepped)
                 if not known_to(self.shapes, kind):
                     # only these readings determine the size of such curves
-                    for _ in range(2):
-                        self._choose(kind, normal, _larger)
-                        self._choose(kind, normal, _rougher)
-                        self._choose(kind, normal, _stepped)
+                    for moved in (_larger, _rougher, _stepped):
+                        self._choose(kind, normal, moved)
 
     def size_from(self, theta: Array) -> bool:
         """Take the size of curves without lines of their own to be that of the largest of their class with

@@ -68,8 +68,8 @@ def features_of(
     waves: Sequence[Wave] = (),
     joints: Sequence[Step] = (),
 ) -> Features:
-    """The features of the curve that all these lines read, beside what repeats with `waves`. At `joints` other
-    errors of the axis have a step."""
+    """The features of the curve that all these lines read, beside what repeats with `waves`. At `joints`
+    other errors of the axis have a step."""
     kind = lines[0][0].quantity
     angle = kind == "angle"
     inside = [line for line, _ in lines if np.ptp(line.target_mm) > 0.2 * (spline.high_mm - spline.low_mm)]

@@ -1,0 +1,102 @@
+"""Stated sigma covers what is between targets, on families of machines; and laws of the prior behind it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from cases.coverage import Scores, lines_of
+from cases.fast import some_fast
+from judge import families
+
+from olp.calibration.estimator.basis import CurveSpace, Scales, Spline
+from olp.calibration.estimator.character import Evidence, candidates, characters
+from olp.calibration.estimator.normal import Normal
+
+SPLINE = Spline(0.0, 900.0, 24)
+
+
+@pytest.mark.parametrize("family", some_fast(("tables", "joints", "smooth"), 3))
+def test_two_sigma_cover_what_five_targets_leave_open(family: str) -> None:
+    scores = lines_of(family, 5, 1, against_best=False)
+    assert scores.coverage > 0.91
+    # not by bands that say nothing
+    assert scores.stated < 4.0 * scores.rms
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("count", [3, 5, 8, 12, 20])
+def test_two_sigma_cover_on_the_average_of_families(count: int) -> None:
+    total = [Scores.of([lines_of(family, count, seed) for seed in (0, 1)]) for family in families.FAMILIES]
+    assert np.mean([one.coverage for one in total]) > 0.90
+    assert np.mean([one.rms for one in total]) < 1.25
+
+
+@pytest.mark.parametrize("which", range(4))
+def test_a_process_is_the_same_with_more_cells(which: int) -> None:
+    """Variance of the second difference over thirds of the axis; ripple has no length."""
+    scales = Scales.of(np.eye(4)[which])
+    seconds = []
+    for cells in (24, 48):
+        space = CurveSpace.of(Spline(0.0, 900.0, cells), (), 0.0, "free")
+        rows = np.array([1.0, -2.0, 1.0]) @ space.values(np.array([150.0, 450.0, 750.0]))
+        seconds.append(rows @ np.linalg.inv(space.process(Scales.of(scales.values + 1e-6), 1.0)) @ rows)
+    assert seconds[1] == pytest.approx(seconds[0], rel=0.1)
+
+
+def test_scales_add_up_as_variances() -> None:
+    space = CurveSpace.of(SPLINE, (), 0.0, "zero")
+
+    def variance(*values: float) -> np.ndarray:
+        return np.linalg.inv(space.process(Scales.of(values), 1e-3))
+
+    rows = space.values(np.array([300.0, 600.0, 900.0]))
+    parts = [rows @ variance(*part) @ rows.T for part in ((3e-2, 0, 1e-9, 1e-9), (1e-9, 0, 2e-2, 5e-3))]
+    both = rows @ variance(3e-2, 0.0, 2e-2, 5e-3) @ rows.T
+    assert both.trace() > parts[0].trace()
+    assert both.trace() > parts[1].trace()
+
+
+def readings(rng: np.random.Generator, curve: np.ndarray, at: np.ndarray) -> Normal:
+    """Normal equations of a spline and one feature (a ramp) read at positions with unit noise."""
+    normal = Normal.of(SPLINE.count + 1)
+    rows = np.column_stack([SPLINE.values(at), at / 900.0])
+    y = curve + rng.normal(size=len(at))
+    normal.H[:], normal.g[:], normal.square = rows.T @ rows, rows.T @ y, float(y @ y)
+    return normal
+
+
+def test_the_evidence_is_that_of_the_dense_gaussian() -> None:
+    rng = np.random.default_rng(4)
+    at = np.linspace(0.0, 900.0, 9)
+    normal = readings(rng, 40.0 * np.sin(at / 150.0), at)
+    evidence = Evidence(normal, SPLINE, 50.0, 7.0)
+    scales = np.array([[9.0, 4.0, 3.0, 2.0], [200.0, 1.0, 30.0, 8.0], [0.5, 60.0, 0.5, 0.5]])
+    rows = SPLINE.values(at)
+    # y that the normal equations hold: all of it, as there are fewer readings than unknowns
+    full = np.column_stack([rows, at / 900.0])
+    y = np.linalg.lstsq(full.T, normal.g, rcond=None)[0]
+    for chosen in ([], [0]):
+        found = evidence.values(evidence.covariance(scales, chosen))
+        expected = []
+        for one in scales:
+            prior = np.linalg.inv(CurveSpace.of(SPLINE, (), 0.0, "free").process(Scales.of(one), 50.0))
+            dense = np.eye(9) + rows @ prior @ rows.T + len(chosen) * np.outer(at, at) * (7.0 / 900.0) ** 2
+            expected.append(-0.5 * (y @ np.linalg.solve(dense, y) + np.linalg.slogdet(dense)[1]))
+        assert np.ptp(found - expected) < 1e-6
+    gain = evidence.gains(scales[:1], [], [0])[0]
+    pair = [evidence.values(evidence.covariance(scales[:1], chosen))[0] for chosen in ([0], [])]
+    assert gain == pytest.approx(pair[0] - pair[1], abs=1e-8)
+
+
+def test_curves_that_say_nothing_take_the_character_of_the_others() -> None:
+    """Evidence of eight angles for little ripple, and of none: the ninth is expected as the eight."""
+    flat = np.zeros(len(candidates("angle")))
+    ripple = candidates("angle")[:, 3]
+    quiet = {f"E{kind}{axis}": np.where(ripple < 2e-7, 0.0, -30.0) for kind in "ABC" for axis in "XYZ"}
+    told = characters({**quiet, "ECZ": flat})["ECZ"]
+    alone = characters({"ECZ": flat})["ECZ"]
+    assert told.ripple < 0.2 * alone.ripple
+    # other classes say it less strictly
+    related = characters({**quiet, "EXX": np.zeros(len(flat))})["EXX"]
+    alone = characters({"EXX": np.zeros(len(flat))})["EXX"]
+    assert told.ripple / 0.6e-3 < related.ripple < 0.8 * alone.ripple

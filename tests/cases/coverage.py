@@ -1,0 +1,82 @@
+"""Coverage of 2 sigma on families of machines: errors and stated sigma of fits, in units of what is best."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from functools import cache
+
+import numpy as np
+from cases.calibration import FRESH, cloud, measurements_of, rays, two_pods
+from judge import families, simulated
+
+from olp.calibration.estimator.adjustment import fit
+from olp.calibration.estimator.curves import sigma_of
+
+#: Positions of a curve where it is judged.
+POSITIONS = 40
+
+
+@dataclasses.dataclass(frozen=True)
+class Scores:
+    """Errors and stated sigma (n,) in units of `best` (n,), which the best linear estimator reaches."""
+
+    error: np.ndarray
+    sigma: np.ndarray
+
+    @property
+    def coverage(self) -> float:
+        return float(np.mean(np.abs(self.error) <= 2.0 * self.sigma))
+
+    @property
+    def rms(self) -> float:
+        return float(np.sqrt(np.mean(self.error**2)))
+
+    @property
+    def stated(self) -> float:
+        return float(np.sqrt(np.mean(self.sigma**2)))
+
+    @classmethod
+    def of(cls, parts: Sequence[Scores]) -> Scores:
+        return cls(*(np.concatenate([getattr(p, name) for p in parts]) for name in ("error", "sigma")))
+
+
+def lines_of(family: str, count: int, seed: int, *, against_best: bool = True) -> Scores:
+    """A machine measured by lines through the datum, judged curve by curve; else in units of usual curves."""
+    machine = families.machine(seed, family)
+    datum = (0.0, 0.0, 0.0)
+    taken = simulated.all_lines(machine, seed, line_mm=datum, tool=datum, count=(count,) * 3)
+    fitted = fit(measurements_of(taken), machine.chain)
+    rng = np.random.default_rng(seed)
+    parts = []
+    for line in {line.component: line for line in taken}.values():
+        name = line.component
+        side = machine.box["XYZ".index(name[2])]
+        q = rng.uniform(*side, POSITIONS)
+        best = best_of(family, name, count) if against_best else families.SIZE[families.class_of(name)]
+        off = fitted.curve(name, q) @ fitted.theta - machine.curves[name](q)
+        parts.append(Scores(off / best, sigma_of(fitted, name, q) / best))
+    return Scores.of(parts)
+
+
+@cache
+def best_of(family: str, name: str, count: int) -> float:
+    """The rms error of the best linear estimator over an axis, from so many targets."""
+    side = simulated.BOX["XYZ".index(name[2])]
+    sigma = families.best_linear(family, name, np.linspace(*side, count), np.linspace(*side, 97))
+    return float(np.sqrt(np.mean(sigma**2)))
+
+
+def volume_of(family: str, kind: str, seed: int) -> Scores:
+    """A machine measured by points, stations or pods, judged at poses."""
+    machine = families.machine(seed, family)
+    taken = {
+        "points": lambda: (cloud(machine, seed, 120, 5.0),),
+        "stations": lambda: rays(machine, seed, 6, 150),
+        "pods": lambda: (two_pods(machine, seed, 250),),
+    }[kind]()
+    fitted = fit(dataclasses.replace(measurements_of(()), observations=taken), machine.chain)
+    rng = np.random.default_rng(seed)
+    position, tool = rng.uniform(*machine.box.T, (POSITIONS * 3, 3)), np.array(FRESH[1])
+    off = fitted.error(position, tool) - machine.error(position, tool)
+    return Scores(off.ravel(), fitted.sigma(position, tool).ravel())
