@@ -136,7 +136,7 @@ class Prior:
         return max(float(np.sqrt(np.mean(values**2))), LEAST_SIZE[class_of(name) == "angle"])
 
     def _choose(self, kind: str, normal: Normal, moved: Callable[[Class, float], Class]) -> None:
-        """Moves a class as the evidence of the readings says: by the root mean square of all factors."""
+        """Moves a class by the expected logarithm of the factor: not at all where the readings say nothing."""
         start = self.classes[kind]
         values = np.array([
             evidence(normal, *self.precision({**self.classes, kind: moved(start, math.exp(step))}))
@@ -144,7 +144,7 @@ class Prior:
             for step in STEPS
         ])  # fmt: skip
         weight = np.exp(values - values.max())
-        factor = math.sqrt(float(weight @ np.exp(2.0 * np.array(STEPS)) / weight.sum()))
+        factor = math.exp(float(weight @ np.array(STEPS) / weight.sum()))
         self.classes = {**self.classes, kind: moved(start, factor)}
 
 
