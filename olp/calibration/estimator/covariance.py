@@ -19,7 +19,7 @@ from olp.errormodel.entry import Entry
 from olp.errormodel.uncertainty import Uncertainty, fingerprint
 
 #: Positions of a curve in each cell of its spline: between them its factor is linear.
-_PER_CELL = 3
+_PER_CELL = 2
 #: Positions in a step, as shares of its length. Its uncertainty over this length is a half circle.
 _IN_STEP = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 9))
 #: Largest share of the variance of a number that the factor drops; of a small variance, see _FLOOR.
