@@ -136,7 +136,7 @@ class Prior:
         return max(float(np.sqrt(np.mean(values**2))), LEAST_SIZE[class_of(name) == "angle"])
 
     def _choose(self, kind: str, normal: Normal, moved: Callable[[Class, float], Class]) -> None:
-        """Moves a class by the expected logarithm of the factor: not at all where the readings say nothing."""
+        """Moves a class by the expected logarithm of the factor: not at all where no reading says any."""
         start = self.classes[kind]
         values = np.array([
             evidence(normal, *self.precision({**self.classes, kind: moved(start, math.exp(step))}))
