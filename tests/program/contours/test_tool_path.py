@@ -95,6 +95,30 @@ def test_each_move_knows_its_block_and_its_words(tmp_path: Path) -> None:
     assert plain.programmed is None and plain.blocks is None
 
 
+def test_a_rapid_goes_round_a_corner_as_a_rapid(tmp_path: Path) -> None:
+    around = moves(program(tmp_path, b"G42 D1 G1 X20 Y0\nG0 X50\nY30\nG40 G1 X0\n"))
+    assert around[2:5] == [("RAPID", 50, -5, 10), ("RAPID", 55, 0, 10), ("RAPID", 55, 30, 10)]
+
+
+def test_holes_and_presets_behind_a_contour_count_the_moves_of_the_tool(tmp_path: Path) -> None:
+    text = b"G42 D1 G1 X20 Y0\nX50\nY30\nG40 X90 Y60\nG81 X95 Z5 R9\nX99\nG80\nG92 X1\n"
+    done = program(tmp_path, text)
+    assert done.programmed is not None
+    behind = done.programmed.holes
+    assert done.holes.first.tolist() == (behind.first + 1).tolist()
+    assert done.holes.last.tolist() == (behind.last + 1).tolist()
+    assert [c.moves for c in done.captures] == [c.moves + 1 for c in done.programmed.captures]
+    assert len(done.captures) == 1
+
+
+def test_a_move_along_the_tool_axis_before_a_contour_stays_where_it_was(tmp_path: Path) -> None:
+    """Some controls begin beside the next move, whatever is before it."""
+    text = b"G42 D1 G1 X20. Y0.\nX50.\nG40 X90. Y60.\nG41 D1 Z5.\nX70.\nY90.\nG40 X0.\n"
+    assert moves(program(tmp_path, text, "fanuc"))[3:6] == [
+        ("LINE", 90, 60, 10), ("LINE", 90, 60, 5), ("LINE", 65, 60, 5)
+    ]  # fmt: skip
+
+
 REFUSED = {
     b"G41 D1 G1 X4 Y3\nX60\n": (3, "first move of a contour is not longer than the cutter radius of 5 mm"),
     b"G41 D1 G2 X20 Y0 I10\nG1 X60 Y-90\n": (3, "turns inward behind the arc that enters it"),
