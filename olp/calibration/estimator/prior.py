@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import field
+from dataclasses import field, replace
 
 import numpy as np
 
@@ -33,6 +33,8 @@ UNKNOWN = {
 LEAST_SIZE = 1e-4, 1e-7
 #: How far a scale of a class may differ from its start, as a standard deviation of its logarithm.
 LOOSE = 1.5
+#: How much rougher than expected a curve may be, where it is compared with what other sources say.
+ROUGHER = 2.5
 #: Steps of the logarithm of a scale that are tried.
 STEPS = (-3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0)
 
@@ -86,6 +88,14 @@ class Prior:
         if p.framed:
             precision[p.slices["frame"], p.slices["frame"]] = np.eye(9) / FRAME_MM**2
         return precision, logdet
+
+    def rougher(self) -> Prior:
+        """The same with curves of lines as rough as may still be."""
+        shapes = {
+            name: replace(shape, scales=Scales.of(ROUGHER * shape.scales.values))
+            for name, shape in self.shapes.items()
+        }
+        return replace(self, shapes=shapes)
 
     def push(self, normal: Normal) -> None:
         """Add the prior means to the right side."""

@@ -103,6 +103,7 @@ def test_what_nothing_else_measures_is_said_to_be_unchecked() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.slow
 def test_a_left_handed_frame_is_no_machine() -> None:
     machine, taken = case(106, "smooth")
     points = cloud(machine, 106, 40, 8.0)
