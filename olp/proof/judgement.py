@@ -168,8 +168,9 @@ class Judgements:
 
     def _judged_rows(self) -> Iterator[Index]:
         """The rows of moves that count, in blocks."""
-        for a in range(0, len(self.line), _BLOCK):
-            yield a + np.flatnonzero(self.judged[a : a + _BLOCK])
+        judged = self.judged
+        for a in range(0, len(judged), _BLOCK):
+            yield a + np.flatnonzero(judged[a : a + _BLOCK])
 
     def report(self) -> dict[str, Any]:
         """The table by groups, as plain data."""
