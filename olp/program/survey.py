@@ -272,13 +272,13 @@ class _Survey:
 
     def judge_hints(self, subprograms: Subprograms | None) -> None:
         """Replace the hint to unroll what cannot be unrolled by the reason for that. The refusals without the
-        hint are taken out before."""
+        hint are taken out before, but for those that may follow from others."""
         hinted = self.hinted()
         if not hinted or self.dialect.unroller is None:
             return
         text = list(self.whole[""])
-        for error, _ in self.errors.values():
-            if not error.hint and error.line is not None and error.line <= len(text):
+        for error, follows in self.errors.values():
+            if not error.hint and not follows and error.line is not None and error.line <= len(text):
                 text[error.line - 1] = _NO_LINE_END.sub(b" ", text[error.line - 1])
         beside: dict[str, Any] = {} if subprograms is None else {"subprograms": subprograms}
         if self.dialect.unrolls_with_tools:

@@ -254,3 +254,12 @@ def test_contours_that_are_refused(bent: Path, text: str, line: int, words: str)
     with pytest.raises(ProgramError, match=words) as caught:
         olp.flatten(("TOOL CALL 1 Z\nL X-20 Y-20 Z+5 R0 FMAX\n" + text).encode(), bent)
     assert caught.value.line == line
+
+
+def test_a_refusal_that_follows_from_another_is_not_the_reason_against_flatten(bent: Path) -> None:
+    # the arc goes wrong only because the approach before it is not read
+    text = "TOOL CALL 1 Z\nL X-40 Y+0 Z+5 R0 FMAX\nL Z-5 F100\nCC X+50 Y+0\nAPPR LCT X+0 Y+0 R4 RL F300\n"
+    text += "C X+0 Y+0 DR-\nDEP CT CCA90 R+4\nL X-40 Y+0\n"
+    with pytest.raises(ProgramError) as caught:
+        olp.correct(text.encode(), bent)
+    assert "APPR follows from the blocks beside it; write it out with --flatten" in str(caught.value)

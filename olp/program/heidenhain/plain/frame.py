@@ -17,7 +17,16 @@ _NUMBER = rb"[-+]?(?:\d+\.?\d*|\.\d+)"
 _TURN = re.compile(rb"\A(I?)ROT[ \t]*(" + _NUMBER + rb")[ \t]*\Z", re.I)
 _SCALE = re.compile(rb"(?:SCL|[XYZ])[ \t]*(" + _NUMBER + rb")", re.I)
 _AXES = re.compile(rb"[ \t,]*([XYZ])", re.I)
-SHIFT, MIRROR, ROTATION, SCALING, SCALINGS = 7, 8, 10, 11, 26
+#: CYCL DEF of the datum shift.
+SHIFT = 7
+#: CYCL DEF of the mirror.
+MIRROR = 8
+#: CYCL DEF of the rotation.
+ROTATION = 10
+#: CYCL DEF of the scale of all axes.
+SCALING = 11
+#: CYCL DEF of scales by axis.
+SCALINGS = 26
 #: cycles whose statements are gone from the text that is written out
 WRITTEN_OUT = (MIRROR, ROTATION)
 

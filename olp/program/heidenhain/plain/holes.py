@@ -12,9 +12,24 @@ from olp.program.heidenhain.plain.moves import NAN, Entry, Moves, unknown
 from olp.program.heidenhain.plain.patterns import Hole, defined, on_circle, on_lines
 from olp.program.heidenhain.statements import CycleText, Statement
 
-_CIRCLE, _LINES = 220, 221
-_CLEAR, _DEPTH, _SURFACE, _SECOND, _BETWEEN = 200, 201, 203, 204, 301
-_CALL, _MODAL = 99, 89
+#: CYCL DEF of holes on a circle.
+_CIRCLE = 220
+#: CYCL DEF of holes on lines.
+_LINES = 221
+#: Q of the set-up clearance.
+_CLEAR = 200
+#: Q of the depth.
+_DEPTH = 201
+#: Q of the surface.
+_SURFACE = 203
+#: Q of the second set-up clearance.
+_SECOND = 204
+#: Q of where the tool is between holes: 0 at the set-up clearance, 1 at the second one.
+_BETWEEN = 301
+#: M function of one call.
+_CALL = 99
+#: M function of a call at the end of each block.
+_MODAL = 89
 _NUMBERED = re.compile(rb"^[ \t]*\d*[ \t]*")
 _M89 = re.compile(rb"(?<![A-Z])M89(?!\d)")
 
