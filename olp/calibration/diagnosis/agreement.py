@@ -212,6 +212,8 @@ def _agreements(fit: Fit, sources: list[_Source]) -> tuple[Agreement, ...]:
             label = source.state.label
             found.append(Agreement(label, source.state.component, Fitted(label, 0.0, 0.0), (), 0.0))
             continue
+        # all of a curve, whatever part of it was read: its scale is that of all
+        columns = np.union1d(columns, _curve(fit, source))
         given = _given(total - source.normal.H, right - source.normal.g, columns)
         alone = _given(prior, means.g, columns)
         z = given.z(source)
@@ -228,20 +230,27 @@ def _tried(
 ) -> Iterator[Tried]:
     """What may be wrong with a source: how much better the others predict it then. What the prior `alone`
     makes of its size is taken off."""
-    name = source.state.component
     for alternative in source.state.observation.alternatives():
         other = _as(fit, alternative)
         values = []
         for here in (given, alone):
             more = 0.0
-            if abs(alternative.factor) != 1.0 and name in fit.prior.shapes:
+            columns = _curve(fit, source)
+            if abs(alternative.factor) != 1.0 and len(columns):
                 # the roughness of a curve was learnt from these readings, and is of another size then
-                columns = np.arange(fit.parameters.size)[fit.parameters.slices[name]]
                 part = np.searchsorted(given.columns, columns)
                 here, more = here.scaled(part, prior[np.ix_(columns, columns)], alternative.factor)
             values.append(here.log_evidence(other) + more)
         support = values[0] - values[1]
         yield Tried(alternative.kind, alternative.words, support - as_read, support)
+
+
+def _curve(fit: Fit, source: _Source) -> Index:
+    """The unknowns of the curve that a source measures; none where it measures no curve of its own."""
+    name = source.state.component
+    if name not in fit.prior.shapes:
+        return np.zeros(0, np.int64)
+    return np.arange(fit.parameters.size)[fit.parameters.slices[name]]
 
 
 def _given(precision: Array, right: Array, columns: Index) -> _Given:

@@ -40,5 +40,5 @@ def test_little_is_reserved_beyond_what_is_there() -> None:
     columns = Columns()
     for count in range(1, 200):
         columns.put("a", np.zeros((1000, 3)), np.float64)
-        assert len(columns._arrays["a"]) <= max(1250 * count, 1024)
+        assert len(columns._columns["a"].array) <= max(1250 * count, 1024)
     assert columns.take("a", np.float64, 3).nbytes == 199 * 1000 * 24
