@@ -51,6 +51,7 @@ def codes(report: dict[str, Any]) -> set[str]:
     return {f["code"] for f in report["findings"]}
 
 
+@pytest.mark.slow
 def test_a_clean_run_has_no_findings(nominal: Path) -> None:
     code, report = compared(nominal, bent(4000) + np.array((0.0, 0.0, 0.01)), "--part-tolerance-um", 12)
     assert (code, codes(report)) == (0, set())
@@ -82,6 +83,7 @@ def test_one_set_of_runs_is_measured_and_not_said_to_be_corrected(nominal: Path,
     assert "corrected" not in labelled
 
 
+@pytest.mark.slow
 def test_wrong_pairing(nominal: Path) -> None:
     code, report = compared(nominal, bent(2000)[::-1] * (1, -1, 1), "--align", "none")
     assert code == 1
@@ -116,6 +118,7 @@ def test_fit_takes_the_error(nominal: Path) -> None:
     assert codes(compared(nominal, wavy, "--align", "fit")[1]) == {"OLP611"}
 
 
+@pytest.mark.slow
 def test_frame_not_determined(tmp_path: Path) -> None:
     x = np.linspace(0, 300, 500)
     line = np.column_stack((x, 0 * x, 0 * x))
@@ -136,6 +139,7 @@ def test_order_of_points(nominal: Path) -> None:
     assert codes(compared(nominal, shuffled, "--order", "forward")[1]) >= {"OLP601"}
 
 
+@pytest.mark.slow
 def test_crossings_without_order_are_in_doubt(tmp_path: Path) -> None:
     u = np.linspace(0, 2 * np.pi, 3000)
     eight = np.column_stack((200 * np.sin(u), 100 * np.sin(2 * u), 0 * u))
@@ -275,6 +279,7 @@ def test_cycles_of_poses_in_one_file_by_name_and_by_row(tmp_path: Path) -> None:
     assert codes(json.loads(wrong.stdout)) == {"OLP601"}
 
 
+@pytest.mark.slow
 def test_a_profile_is_saved_and_used(nominal: Path, tmp_path: Path) -> None:
     measured = tmp_path / "tracker.txt"
     rows = "\n".join(

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from cases.acceptance import TRUE_ZERO, machine
+from cases.fast import some_fast
 from cli.test_cli import run
 
 import olp
@@ -131,7 +132,7 @@ def test_an_output_file_is_whole_where_a_stream_fails(folder: Path, stream: str)
         ("compare {} {}", 3),
     ],
 )
-@pytest.mark.parametrize("name", ["a" * 300, "loop", "a" * 300 + "/b", "part.ngc/b"])
+@pytest.mark.parametrize("name", some_fast(["a" * 300, "loop", "a" * 300 + "/b", "part.ngc/b"], 4))
 def test_names_that_the_system_refuses(
     folder: Path, words: str, code: int | None, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -536,6 +536,7 @@ def test_a_report_that_is_none_is_refused_before_the_work(
     assert "the proof is not the report of a correction" in result.stderr
 
 
+@pytest.mark.slow
 def test_names_are_no_mathematics_of_a_picture(tmp_path: Path) -> None:
     where = machine(tmp_path / "m", tables=TRUE_ZERO, job=START)
     where.write_text(where.read_text().replace('name = "m"', 'name = "cost $5 and $x_$"'))
@@ -554,6 +555,7 @@ def test_names_are_no_mathematics_of_a_picture(tmp_path: Path) -> None:
         assert "cost $5 and $x_$" in words[-1].read_text()
 
 
+@pytest.mark.slow
 def test_beyond_travel_is_a_finding(tmp_path: Path) -> None:
     job = machine(tmp_path / "m", tables=TRUE_ZERO, job=START).with_name("job.toml")
     near = "G1 X1999.5 Y0 Z0 F30000\nG3 X1999.5 Y10 I0 J5\nG1 X0\n"

@@ -25,6 +25,7 @@ def table(points: np.ndarray, frame: str = "") -> str:
     return "\n".join([*([f"# frame={frame}"] if frame else []), "X_mm,Y_mm,Z_mm", *rows]) + "\n"
 
 
+@pytest.mark.slow
 def test_an_overshoot_at_the_end_of_a_slot_is_a_distance() -> None:
     """There and back along X: 50 um too far has no part across any line."""
     path = Path.through(np.array([[0.0, 0.0, 0.0], [100.0, 0.0, 0.0], [0.0, 0.0, 0.0]]))

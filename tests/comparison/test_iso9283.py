@@ -39,6 +39,7 @@ def test_the_worst_pose_counts_and_one_cycle_has_no_repeatability() -> None:
     assert largest(figures.repeatability).place == -1
 
 
+@pytest.mark.slow
 def test_path_accuracy_and_repeatability_by_hand() -> None:
     """Three cycles along X, off by y = 0.010, 0.020 and 0.030 mm everywhere, and z = 0.
 

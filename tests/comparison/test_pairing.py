@@ -80,6 +80,7 @@ def test_a_known_field_comes_back_within_the_noise(nominal: int, measured: int, 
     assert np.sqrt((away**2).mean()) < 1.1 * NOISE_MM + sagitta
 
 
+@pytest.mark.slow
 def test_three_laps_with_dwell_stay_in_their_laps() -> None:
     rng = np.random.default_rng(5)
     turns = 2 * np.pi * LAPS
@@ -107,6 +108,7 @@ def test_both_directions_on_one_line() -> None:
     assert np.abs(pairing.s_mm - true).max() < 1.0
 
 
+@pytest.mark.slow
 def test_parallel_passes_closer_than_the_deviation() -> None:
     """Lines 0.05 mm apart, on a machine that is off by 0.12 mm: the nearest line is wrong."""
     rows = np.repeat(np.arange(60), 2) * 0.05
@@ -123,6 +125,7 @@ def test_parallel_passes_closer_than_the_deviation() -> None:
     assert (free.segment[inner] != segment[inner]).mean() > 0.5
 
 
+@pytest.mark.slow
 def test_what_was_not_measured_leaves_the_rest_alone() -> None:
     rng = np.random.default_rng(8)
     turns = 2 * np.pi * LAPS

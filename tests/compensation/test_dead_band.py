@@ -59,6 +59,7 @@ def check(position: list[float], backlash: list[float], band: float) -> None:
 STEPS = st.sampled_from([0.0, 1e-13, -1e-13, 1e-4, -1e-4, 3e-4, -3e-4, 5e-4, -5e-4, 0.002, -0.002, 4.0, -4.0])
 
 
+@pytest.mark.slow
 @settings(max_examples=300, deadline=None)
 @given(
     st.lists(st.tuples(STEPS, st.sampled_from([0.0, -0.001, 0.001, 0.004]), st.booleans()), max_size=40),
@@ -81,6 +82,7 @@ def test_a_long_walk_is_followed_as_row_by_row(seed: int) -> None:
     check(smooth.tolist(), rng.uniform(0.002, 0.006, count).tolist(), float(rng.choice([0.0, 3e-4, 0.5])))
 
 
+@pytest.mark.slow
 @settings(max_examples=300, deadline=None)
 @given(
     st.lists(st.tuples(STEPS, st.sampled_from([0.0, -0.001, 0.001, 0.004]), st.booleans()), max_size=40),

@@ -15,6 +15,7 @@ def knots(rng: np.random.Generator, n: int, spread: float) -> np.ndarray:
     return np.cumsum(10.0 * np.exp(spread * rng.normal(size=n))) - 200.0
 
 
+@pytest.mark.slow
 @settings(max_examples=200, deadline=None)
 @given(st.integers(2, 30), st.integers(0, 10**6), st.booleans())
 def test_pchip_equals_scipy(n: int, seed: int, plateaus: bool) -> None:

@@ -259,6 +259,7 @@ def test_questions_lead_to_the_right_page(question: str) -> None:
     assert ANSWERS[question] in [section.page for section in handbook_search.best(question, sections)][:3]
 
 
+@pytest.mark.slow
 def test_no_question_leads_to_the_plan_of_the_code_first() -> None:
     sections = [section for page in handbook.pages().values() for section in page.sections]
     for question in [*QUESTIONS, *ANSWERS]:

@@ -161,6 +161,7 @@ def test_a_model_of_the_same_form_is_found_again() -> None:
     assert findings(fit) == ()
 
 
+@pytest.mark.slow
 def test_the_stated_uncertainty_is_that_of_repeated_fits() -> None:
     offset = Distortion("EXX", "beam", (0.0, 2000.0), 1e-3)
     steady = Structure((Sensor("beam", 20.0, (0.0, 40.0)),), (offset,))

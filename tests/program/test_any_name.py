@@ -187,6 +187,7 @@ def by_control(pair: Pair) -> Pair:
     return replace(pair, setup=setup, other=other)
 
 
+@pytest.mark.slow
 def test_axis_positions_of_results_count_alike(pairs: Mapping[str, Pair]) -> None:
     table = b"X_mm,Y_mm,Z_mm\n1,2,-203\n4,5,-206\n"
     counted = {

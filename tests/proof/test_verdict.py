@@ -83,6 +83,7 @@ def test_every_consumer_says_the_same_of_a_shipped_job(tmp_path: Path) -> None:
     predicted(job_of(SHORT, tmp_path))
 
 
+@pytest.mark.slow
 def test_page_and_compare_say_the_same_of_two_runs(tmp_path: Path) -> None:
     job = own_job(tmp_path, FEW)
     out = tmp_path / "out.ngc"

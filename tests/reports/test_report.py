@@ -98,6 +98,7 @@ def test_a_line_of_the_program_cannot_act_on_the_terminal() -> None:
     assert all(c.isprintable() or c == "\n" for c in to_text(REPORT))
 
 
+@pytest.mark.slow
 @given(data=st.data())
 def test_absent_parts_are_left_out(data: st.DataObject) -> None:
     report = copy.deepcopy(REPORT)
@@ -166,6 +167,7 @@ TREES = st.recursive(
 )
 
 
+@pytest.mark.slow
 @given(values=st.dictionaries(st.text(max_size=5).filter(lambda key: key != "findings"), TREES, max_size=4))
 def test_any_summary_has_an_outline(values: dict[str, Any]) -> None:
     assert all(c.isprintable() or c == "\n" for c in outline(values))

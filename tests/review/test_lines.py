@@ -59,12 +59,14 @@ def test_any_text_comes_back_to_the_letter(text: str) -> None:
     assert returned(text) == text
 
 
+@pytest.mark.slow
 @given(st.integers(0, 2**32), st.integers(1, 120), st.sampled_from([0.0, 0.1, 1.0]))
 def test_programs_of_all_dialects_come_back_to_the_letter(seed: int, count: int, uneven: float) -> None:
     text = texts.text(seed, count, uneven=uneven)
     assert returned(text) == text
 
 
+@pytest.mark.slow
 @given(st.integers(0, 2**32), st.data())
 def test_edited_programs_come_back_to_the_letter(seed: int, data: st.DataObject) -> None:
     text = texts.text(seed, 60)
@@ -85,6 +87,7 @@ def test_every_form_of_a_number_is_a_style_of_its_column(form: Any, decimals: in
     assert returned(text) == text
 
 
+@pytest.mark.slow
 @given(st.integers(0, 2**32), st.booleans())
 def test_texts_come_back_whatever_is_predicted(seed: int, moving: bool) -> None:
     """By positions that have nothing to do with them too."""
@@ -109,6 +112,7 @@ def test_a_text_with_the_mark_of_numbers_is_refused() -> None:
         Lines.of("X1\x01\nX2")
 
 
+@pytest.mark.slow
 def test_too_many_styles_belong_to_the_templates(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(coding, "_STYLES", 3)
     for seed in range(20):

@@ -136,6 +136,7 @@ def test_frames_are_told_apart(tmp_path: Path) -> None:
         olp.view(TEXT.encode(), machine, measured=[written(tmp_path, csv(points, "G59"))], time=False)
 
 
+@pytest.mark.slow
 def test_frames_lie_where_they_were_touched_off(tmp_path: Path) -> None:
     """Several offsets, touched off on the uncompensated machine: the same run stated in the first, in the
     other, and in the machine's own axes."""
@@ -166,6 +167,7 @@ def test_frames_lie_where_they_were_touched_off(tmp_path: Path) -> None:
     assert size <= np.linalg.norm(first.samples.uncorrected, axis=1).max() + 1e-5
 
 
+@pytest.mark.slow
 def test_several_measurements_are_layers_each(tmp_path: Path) -> None:
     machine = random_machine(tmp_path / "m", 3, Recipe())
     path = written(tmp_path, olp.simulate(TEXT.encode(), machine, step_mm=5.0).to_csv())
@@ -204,6 +206,7 @@ def test_columns_may_come_in_any_order() -> None:
     assert points.time_s is not None and points.time_s.tolist() == [0, 1]
 
 
+@pytest.mark.slow
 def test_noise_finds_the_same_places(tmp_path: Path) -> None:
     """A spiral of close turns, measured with noise, at random places along it."""
     rng = np.random.default_rng(2)

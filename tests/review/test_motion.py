@@ -110,6 +110,7 @@ def test_a_thinned_table_keeps_the_peaks(name: str, monkeypatch: pytest.MonkeyPa
     assert few.time_s[-1] == pytest.approx(timing.duration_s)
 
 
+@pytest.mark.slow
 def test_the_table_shows_no_more_than_the_audit_found() -> None:
     review, timing = viewed("modal")
     shown = review.scene.motion

@@ -326,6 +326,7 @@ def test_a_picture_that_is_not_there_is_refused_with_those_that_are(
         layers.show("command")
 
 
+@pytest.mark.slow
 def test_one_picture_is_shown_at_a_time_and_the_command_is_there_unseen(shifted: Review) -> None:
     layers, window = added(shifted, picture="measured")
 
@@ -341,6 +342,7 @@ def test_one_picture_is_shown_at_a_time_and_the_command_is_there_unseen(shifted:
     assert window.properties["/meshcat/olp/command"]["visible"] is False
 
 
+@pytest.mark.slow
 def test_a_second_review_takes_the_place_of_the_first(shifted: Review, wavy: Review) -> None:
     visualizer, window = judge.visualizer()
     olp.add_layers(visualizer, shifted, under="job")

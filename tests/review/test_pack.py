@@ -33,6 +33,7 @@ def rows(most: float, columns: int = 3) -> st.SearchStrategy[np.ndarray]:
     return st.lists(row, max_size=40).map(lambda values: np.array(values, float).reshape(-1, columns))
 
 
+@pytest.mark.slow
 @given(rows(TEN_METRES))
 def test_positions_on_a_long_axis_come_out_to_half_a_step(values: np.ndarray) -> None:
     arrays = Arrays()
@@ -40,6 +41,7 @@ def test_positions_on_a_long_axis_come_out_to_half_a_step(values: np.ndarray) ->
     assert np.abs(unpacked(arrays, "P") - values).max(initial=0.0) <= POSITION_MM / 2 + 1e-11
 
 
+@pytest.mark.slow
 @given(rows(TEN_METRES), st.integers(0, 2**32))
 def test_deviations_do_not_suffer_from_where_they_are(values: np.ndarray, seed: int) -> None:
     deltas = np.random.default_rng(seed).normal(0.0, 0.05, (3, *values.shape))
@@ -96,6 +98,7 @@ CURVES = st.lists(
 ).map(np.concatenate)
 
 
+@pytest.mark.slow
 @given(CURVES, st.sampled_from([1e-3, 0.1, 1.0]), st.integers(1, 300))
 def test_a_curve_by_its_knots_is_within_a_step(values: np.ndarray, step: float, band: int) -> None:
     arrays = Arrays()
@@ -116,6 +119,7 @@ def test_a_straight_curve_has_a_knot_every_256_rows() -> None:
     assert unpacked(arrays, "nothing").tolist() == []
 
 
+@pytest.mark.slow
 @given(st.integers(0, 2**32), st.integers(1, 400), st.sampled_from([0.0, 1e-3, 10.0]))
 def test_values_over_the_length_of_a_path_come_out_to_half_a_step(seed: int, n: int, wild: float) -> None:
     """Also where the path rests, and where they are not straight at all."""

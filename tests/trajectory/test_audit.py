@@ -72,6 +72,7 @@ def test_cubics_are_measured_exactly(motion):
     assert speed * (1 - 1e-6) - 1e-9 <= result.feed * 7.0 <= speed * (1 + 1e-3) + 1e-3
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=100)
 @given(motions(composed=True), st.booleans())
 def test_composed_pieces_are_bounded_and_what_is_too_large_is_measured(motion, high):
@@ -144,6 +145,7 @@ def route_of(points) -> Route:
     return Route(points, np.full(n - 1, 20.0), np.arange(n - 1), near, np.zeros(n))
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=30)
 @given(st.integers(0, 10**6), st.integers(3, 120))
 def test_a_search_finds_no_less_than_the_known_segments(seed, count):

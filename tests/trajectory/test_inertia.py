@@ -120,6 +120,7 @@ def test_the_report_states_it_beside_the_rest(job: Path, tmp_path: Path) -> None
     assert "deflects under acceleration" in result.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.9, 0.5, 0.2, 0.05])
 def test_a_bound_holds_and_costs_no_more_than_it_must(share: float, job: Path, tmp_path: Path) -> None:
     path = job.with_name("machine.toml")

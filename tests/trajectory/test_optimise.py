@@ -117,6 +117,7 @@ def test_a_larger_path_with_larger_limits_takes_as_long(scale: float) -> None:
     assert lasts(large, limits) == pytest.approx(lasts(small), rel=2e-3)
 
 
+@pytest.mark.slow
 def test_more_waypoints_of_the_same_curve_do_not_slow_it() -> None:
     assert lasts(wave(2000)) < 1.02 * lasts(wave(500))
 

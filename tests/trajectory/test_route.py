@@ -281,6 +281,7 @@ def test_collinear_parts_take_no_more_time(points: list[tuple[float, ...]], mode
             assert (b.tolerance_mm > 0).sum() - (a.tolerance_mm > 0).sum() == 3 * (len(a) - 1)
 
 
+@pytest.mark.slow
 @given(corners, st.sampled_from(["G61", "G61.1", "G64", "G93"]))
 def test_inches_drive_the_same_route(points: list[tuple[float, ...]], mode: str) -> None:
     metric, inch = driven(text_of(points, "G21 " + mode)), driven(text_of(points, "G20 " + mode, 1 / 25.4))

@@ -50,6 +50,7 @@ def test_adversarial_routes_are_smoothed_within_tolerance(name: str) -> None:
     laws_hold(given_route, smooth(given_route, limits))
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.integers(0, 2**32 - 1))
 def test_random_routes_are_smoothed_within_tolerance(seed: int) -> None:
@@ -90,6 +91,7 @@ def test_least_over_ranges() -> None:
     assert (least_over(value, begin, end) == want).all()
 
 
+@pytest.mark.slow
 def test_many_points_keep_their_digits() -> None:
     n = 200_001
     angle = np.linspace(0.0, 400.0, n)

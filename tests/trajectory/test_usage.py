@@ -99,6 +99,7 @@ def test_lines_and_places_share_out_the_whole(seed: int) -> None:
     assert (near[fed] <= lines.feed_seconds[fed] * lines.feed_mm_s[fed] * (1 + 1e-5)).all()
 
 
+@pytest.mark.slow
 @settings(max_examples=6)
 @given(st.integers(0, 10_000))
 def test_two_stretches_make_one_table(seed: int) -> None:

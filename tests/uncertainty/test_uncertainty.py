@@ -169,6 +169,7 @@ def test_variances_of_independent_numbers_add() -> None:
     assert np.sqrt(np.diagonal(scatter)) == pytest.approx([np.sqrt(26.0) * 1e-3, 1e-3, 1e-3])
 
 
+@pytest.mark.slow
 def test_probability_in_a_ball_against_known_distributions() -> None:
     from scipy.stats import ncx2, norm
 

@@ -127,6 +127,7 @@ def test_columns_refuse_to_be_changed(corrected: olp.Correction) -> None:
         olp.error_at(MACHINE, [450.0, 600.0, -300.0])["error_um"][0] = 1.0
 
 
+@pytest.mark.slow
 def test_a_comparison_has_the_columns_of_its_table(tmp_path: Path) -> None:
     program, machine = CMM / "housing.ngc", MACHINE
     measured = olp.simulate(program, machine, step_mm=20.0).write(tmp_path / "run.csv")
@@ -175,6 +176,7 @@ def test_write_never_overwrites_what_was_read(tmp_path: Path, name: str) -> None
     assert (folder / name).read_bytes() == before
 
 
+@pytest.mark.slow
 def test_a_fitted_calibration_spares_its_measurements(tmp_path: Path) -> None:
     folder = tmp_path / "lines"
     shutil.copytree(PROGRAMS / "gantry-lines", folder, ignore=shutil.ignore_patterns("calibration*"))

@@ -80,6 +80,7 @@ def test_curves_in_the_other_sense_are_put_right_exactly() -> None:
     assert np.array_equal(put_right, build(calibration, "FXYZ").error(points.axis_mm, points.tool_mm))
 
 
+@pytest.mark.slow
 def test_units_that_a_factor_explains() -> None:
     calibration, points = case(2)
     factors = {"EXX": 1000.0, "EYY": 1e-3, "EAX": np.pi / 0.648, "C0Y": 0.648 / np.pi}

@@ -140,6 +140,7 @@ def test_points_of_the_hypercube_fill_every_cell() -> None:
 # -- files and commands -----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_figures_of_an_example_and_their_order() -> None:
     machine = PROGRAMS / "gantry-plate" / "machine.toml"
     report = olp.compare_tables(machine, program=PROGRAMS / "gantry-plate" / "plate.ngc")
@@ -255,6 +256,7 @@ def test_a_call_that_cannot_be_meant_is_refused(
     assert message in done.stderr
 
 
+@pytest.mark.slow
 def test_a_program_that_correct_refuses_is_said() -> None:
     """A program that was corrected once is refused; the tables' figures are given all the same."""
     machine = PROGRAMS / "gantry-plate" / "machine.toml"

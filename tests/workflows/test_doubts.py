@@ -450,6 +450,7 @@ def test_a_fit_fails_by_probability_and_size(
     assert "OLP444" not in codes
 
 
+@pytest.mark.slow
 def test_a_fit_states_its_quality(tmp_path: Path) -> None:
     folder = PROGRAMS / "gantry-lines"
     fitted = olp.fit_calibration(folder, folder / M)

@@ -155,6 +155,7 @@ def test_block_delete(machine: Path, switch: str) -> None:
     assert ("\n/G1" in result.data.decode()) is bool(switch)
 
 
+@pytest.mark.slow
 def test_the_verbs_read_what_was_kept(machine: Path, tmp_path: Path) -> None:
     (tmp_path / "p.ngc").write_text(SPRING)
     files = ["p.ngc", "-m", str(machine)]

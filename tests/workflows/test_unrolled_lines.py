@@ -209,6 +209,7 @@ def test_the_lines_of_a_loop_are_added_up(folder: Path) -> None:
     assert rows["corrected_um"][rows["line"] == SILENT + 2] == pytest.approx(worst, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_places_in_texts_for_people_and_pipelines(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
     call = (
@@ -323,6 +324,7 @@ def test_correcting_an_unrolled_program_is_unrolling_and_correcting(
         np.testing.assert_array_equal(ours.table.corrected, theirs.table.corrected)
 
 
+@pytest.mark.slow
 def test_the_law_is_about_programs_that_are_corrected(controls: Mapping[str, Path]) -> None:
     """Not only about refusals; of each control some are."""
     for control, machine in controls.items():
@@ -424,6 +426,7 @@ PLAIN = (
 )
 
 
+@pytest.mark.slow
 def test_every_verb_lists_the_same_refusals_with_and_without_unrolling(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -62,7 +62,8 @@ def test_without_a_mistake_nothing_is_found(family: str, seed: int, kinds: str) 
     assert not outcome.wrong and not outcome.unlike
 
 
-@pytest.mark.parametrize(("seed", "file", "factor", "words"), some_fast(CASES, len(CASES)))
+@pytest.mark.slow
+@pytest.mark.parametrize(("seed", "file", "factor", "words"), CASES)
 def test_a_planted_mistake_is_named(seed: int, file: str, factor: float, words: str) -> None:
     outcome = found(seed, "rough", "p", times(file, factor))
     assert [one.label for one in outcome.wrong] == [file]

@@ -117,6 +117,7 @@ def test_the_gauge_of_the_datum(one: tuple[simulated.Machine, Measurements, Fit]
     assert slopes[1, 2] == pytest.approx(-square["A0Z"], abs=1e-7)
 
 
+@pytest.mark.slow
 def test_zeros_and_slopes_of_instruments_mean_nothing(
     one: tuple[simulated.Machine, Measurements, Fit],
 ) -> None:
@@ -290,6 +291,7 @@ def test_without_a_distance_the_scale_is_not_observable() -> None:
 # -- what is not observable ------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_roll_of_z_without_its_lines_is_reported_as_unknown() -> None:
     machine, measurements = case(0, "smooth", "FXYZ")
     kept = [line for line in measurements.lines if abs(line.tool_mm[0]) < 1.0]
@@ -304,6 +306,7 @@ def test_roll_of_z_without_its_lines_is_reported_as_unknown() -> None:
     assert far > 2.0 * near
 
 
+@pytest.mark.slow
 def test_straightness_without_a_square_leaves_squareness_unknown() -> None:
     _, measurements = case(0, "smooth", "FXYZ")
     lines = [dataclasses.replace(line, square=None) for line in measurements.lines]
@@ -381,6 +384,7 @@ def test_an_axis_without_lines_has_no_answer() -> None:
 TRAVEL = [(0.0, 3000.0), (0.0, 2000.0), (-1000.0, 0.0)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("names", [("EXX",), ("EXX", "EYY")])
 def test_one_axis_alone_is_corrected_along_itself(names: tuple[str, ...]) -> None:
     """What no reading shows is zero over the travel, and stated with its uncertainty and cost."""
@@ -420,6 +424,7 @@ def test_backlash_that_is_constant(one: tuple[simulated.Machine, Measurements, F
     assert not any(curve.forward for curve in calibration.curves)
 
 
+@pytest.mark.slow
 def test_an_axis_that_goes_farther_after_a_reversal_is_told() -> None:
     """As with a control that takes up more than there is, or with directions that were swapped."""
     _, measurements = case(0, "smooth", "FXYZ")
@@ -434,6 +439,7 @@ def test_an_axis_that_goes_farther_after_a_reversal_is_told() -> None:
     assert told < -0.5 and finding.message.startswith(f"Y: {told:.2f} +- ")
 
 
+@pytest.mark.slow
 def test_backlash_that_is_not_constant_becomes_a_direction_column(
     one: tuple[simulated.Machine, Measurements, Fit],
 ) -> None:
@@ -470,6 +476,7 @@ def test_a_slip_is_left_out_and_named(one: tuple[simulated.Machine, Measurements
     assert np.abs(again.error(position, TOOLS[0]) - fitted.error(position, TOOLS[0])).max() < 0.3 * UM
 
 
+@pytest.mark.slow
 def test_runs_that_scatter_more_than_stated_are_reported(
     one: tuple[simulated.Machine, Measurements, Fit],
 ) -> None:

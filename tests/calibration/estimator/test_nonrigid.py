@@ -144,6 +144,7 @@ def test_the_sines_make_the_kernel() -> None:
     assert matern(np.array([0.0, 1.0]))[1] == pytest.approx(0.523994, abs=1e-6)  # by hand
 
 
+@pytest.mark.slow
 def test_the_evidence_is_that_of_the_dense_gaussian() -> None:
     """Against the log density of the readings themselves, with every unknown marginalised."""
     machine = simulated.machine(4, "smooth")
@@ -190,6 +191,7 @@ def test_derivatives_of_the_evidence() -> None:
     assert by_noise == pytest.approx((up - down) / 2e-4, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_without_a_field_the_adjustment_is_that_of_the_fit() -> None:
     before = of_points(simulated.machine(6, "rough"), 6, 80)
     x, covariance, _ = Adjustment(before, Modes.over(BOX, 80)).solve((), np.zeros(0), 1.0)

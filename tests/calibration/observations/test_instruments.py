@@ -70,6 +70,7 @@ def test_points_in_the_frame_of_the_machine_show_all_of_the_error(chain: str, wi
     assert np.linalg.norm(row["shift_um"]) > 400.0
 
 
+@pytest.mark.slow
 def test_an_unknown_frame_beside_a_known_one_keeps_its_own() -> None:
     machine = simulated.machine(1, "smooth", "FXYZ")
     known, other = in_the_frame(machine, 1, 100, 5.0), cloud(machine, 1, 100, 5.0)
@@ -229,6 +230,7 @@ def test_a_ball_bar_or_diagonals_do_what_a_square_does(chain: str) -> None:
             assert abs(row @ fitted.theta - machine.square[name]) < 4.0 * sigma + 1e-6
 
 
+@pytest.mark.slow
 def test_squareness_is_not_observable_with_a_ball_bar_in_one_direction() -> None:
     machine, measurements = case(0, "smooth", "FXYZ")
     bare = no_square(measurements)
@@ -236,6 +238,7 @@ def test_squareness_is_not_observable_with_a_ball_bar_in_one_direction() -> None
     assert {words.split()[0] for words in messages_of(one_way, "OLP806")} == {"C0Y", "B0Z", "A0Z"}
 
 
+@pytest.mark.slow
 def test_a_diagonal_with_the_wrong_sign_does_not_fit() -> None:
     machine, measurements = case(0, "smooth", "FXYZ")
     first, *rest = diagonals_of(machine, 0)
@@ -244,6 +247,7 @@ def test_a_diagonal_with_the_wrong_sign_does_not_fit() -> None:
     assert messages_of(fitted, "OLP808")
 
 
+@pytest.mark.slow
 def test_no_uncertainty_is_refused() -> None:
     machine, measurements = case(0, "smooth", "FXYZ")
     first = circles_of(machine, 0)[0]

@@ -73,6 +73,7 @@ def test_every_cut_and_many_flips_of_bits_are_refused_or_read() -> None:
     assert refused > len(cuts)
 
 
+@pytest.mark.slow
 def test_an_archive_that_unpacks_to_much_is_refused_before_it_is_unpacked() -> None:
     data = archive(factor=np.zeros((7, 40_000_000 // 7), np.float32))
     assert len(data) < 500_000

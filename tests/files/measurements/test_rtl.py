@@ -120,6 +120,7 @@ WAYS = [
 ]
 
 
+@pytest.mark.slow
 def test_a_plan_names_the_file_and_states_the_rest(tmp_path: Path) -> None:
     text = stored([25.0 * k for k in range(6)], [way for _ in range(3) for way in WAYS])
     (tmp_path / "x.rtl").write_text(text)

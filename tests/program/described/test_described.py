@@ -426,6 +426,7 @@ def test_one_position_of_two_moves_that_want_different_numbers_is_refused(machin
     assert caught.value.line == 7
 
 
+@pytest.mark.slow
 def test_the_command_line(machine: Path, own: Path, tmp_path: Path) -> None:
     source, target = tmp_path / "a.prg", tmp_path / "b.prg"
     source.write_bytes(PROGRAM)

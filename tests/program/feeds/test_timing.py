@@ -530,6 +530,7 @@ def test_inverse_time_is_the_time_of_each_block(
     np.testing.assert_allclose(feed[length > 0], np.maximum(stated, 0.1 / 60.0), rtol=1e-12)
 
 
+@pytest.mark.slow
 @given(points, st.floats(0.01, 100).map(lambda v: round(v, 3)))
 def test_inches_and_millimetres_mean_the_same(waypoints: list[tuple[float, float, float]], f: float) -> None:
     rows = "\n".join(f"G1 X{x:.3f} Y{y:.3f} Z{z:.3f}" for x, y, z in waypoints)

@@ -123,6 +123,7 @@ def test_a_long_label_is_refused() -> None:
         unroll.flatten(("o" + "1" * 9000 + " sub\n").encode(), profile())
 
 
+@pytest.mark.slow
 def test_twenty_thousand_o_words_are_found_by_their_labels(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each search begins where it is, and looks at few statements."""
     count = 5000

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from olp.program.text.columns import Columns
 
 
+@pytest.mark.slow
 @given(st.lists(st.integers(0, 3000), max_size=6))
 def test_a_column_is_what_was_put_in_order(lengths: list[int]) -> None:
     columns = Columns()

@@ -53,6 +53,7 @@ def parts(run: Run, cuts: list[int]) -> list[Run]:
     ]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_columns_counts_and_pixels_are_those_of_all_points() -> None:
     path = wavy(60)
     run = measured(path, 5000)
@@ -69,6 +70,7 @@ def test_columns_counts_and_pixels_are_those_of_all_points() -> None:
     assert group.largest_um == size.max()
 
 
+@pytest.mark.slow
 @settings(max_examples=6, deadline=None)
 @given(st.lists(st.integers(1, 399), max_size=4))
 def test_points_in_parts_make_the_figure_of_all_at_once(cuts: list[int]) -> None:
@@ -86,6 +88,7 @@ def test_points_in_parts_make_the_figure_of_all_at_once(cuts: list[int]) -> None
     assert other.largest_um == whole.largest_um
 
 
+@pytest.mark.slow
 def test_ten_times_the_points_need_no_more_memory() -> None:
     path = wavy(60)
     sizes = []

@@ -53,6 +53,7 @@ def test_bands_of_a_long_motion_reach_as_far_as_its_lines(monkeypatch: pytest.Mo
         assert (wide[:, 0] <= wide[:, 1]).all()
 
 
+@pytest.mark.slow
 def test_a_span_cuts_the_motion() -> None:
     way, _ = random_route(3)
     trajectory = plan(way, LIMITS)

@@ -305,6 +305,7 @@ def test_figures_are_of_what_counts_only(machine: Path) -> None:
     assert nodes_of(half, "wall")[0]["moves"] == 2
 
 
+@pytest.mark.slow
 def test_any_number_of_ranges_is_exact(machine: Path) -> None:
     """300 plunges with rapids between them: neither the tree nor the page takes rapids with them."""
     text = "\n".join(f"G0 X{k} Z2\nG1 Z-{1 + k % 7}\nG0 Z2" for k in range(300))
