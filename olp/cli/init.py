@@ -21,6 +21,21 @@ Travel = tuple[tuple[str, float, float], ...]
 @click.option("--from", "settings_file", metavar="FILE", help="Settings of the control: LinuxCNC, Grbl ...")
 @click.option("--urdf", metavar="FILE", help="A robot description in URDF: write its machine file alone.")
 @click.option("--tip", metavar="LINK", help="The last link of the chain in the URDF file.")
+@click.option(
+    "--structure",
+    metavar="NAME",
+    help="Such as trunnion-ac, head-head, scara, arm-6, hexapod: an example of its machine file.",
+)
+@click.option(
+    "--mdh",
+    metavar="FILE",
+    help="Modified Denavit-Hartenberg parameters of an arm as CSV: write its machine file alone.",
+)
+@click.option(
+    "--trafo",
+    metavar="FILE",
+    help="A HAL file of LinuxCNC that sets its kinematics: write the machine file alone.",
+)
 @click.option("--name", help="Name of the machine. Default: that in FILE, or the folder's name.")
 @click.option("--chain", help="Axes from workpiece to tool, F the frame. Default: FXYZ.")
 @click.option("--controller", help="Dialect of the control, such as linuxcnc, fanuc, haas or grbl.")
@@ -44,6 +59,9 @@ def command(
     settings_file: str | None,
     urdf: str | None,
     tip: str | None,
+    structure: str | None,
+    mdh: str | None,
+    trafo: str | None,
     name: str | None,
     chain: str | None,
     controller: str | None,
@@ -62,10 +80,23 @@ def command(
     from olp.files.write import check_targets, make_folder, write_files
     from olp.workflows import init
 
-    if urdf is not None or tip is not None:
+    sources = {"--urdf": urdf, "--structure": structure, "--mdh": mdh, "--trafo": trafo}
+    given = [option for option, value in sources.items() if value is not None]
+    if given or tip is not None:
         if chain is not None or travel or zero is not None or settings_file is not None:
-            raise UsageError("--urdf states chain and travel; leave out --from, --chain, --travel and --zero")
-        _from_urdf(folder, urdf, tip, name, controller, force=force)
+            raise UsageError(
+                f"{(given or ['--tip'])[0]} states chain and travel; leave out --from, --chain, --travel and "
+                "--zero"
+            )
+        if len(given) != 1:
+            raise UsageError(
+                f"{' and '.join(given)} each describe a machine; expected one of them"
+                if given
+                else "--tip belongs to --urdf; name the file of the robot"
+            )
+        if tip is not None and urdf is None:
+            raise UsageError("--tip belongs to --urdf; name the file of the robot")
+        _of_joints(folder, given[0], str(sources[given[0]]), tip, name, controller, force=force)
         return
     settings = None if settings_file is None else init.settings_in(settings_file)
     limits = {axis: (low, high) for axis, low, high in travel}
@@ -88,25 +119,43 @@ def command(
         diagnostic(f"note: {note}")
 
 
-def _from_urdf(
-    folder: str, urdf: str | None, tip: str | None, name: str | None, controller: str | None, *, force: bool
+def _of_joints(
+    folder: str,
+    option: str,
+    value: str,
+    tip: str | None,
+    name: str | None,
+    controller: str | None,
+    *,
+    force: bool,
 ) -> None:
-    """Write the machine file of a robot that a URDF file describes. Raises UsageError, InputError."""
+    """Write the machine file of a machine of any joints, which `option` describes. Raises UsageError,
+    InputError, ConfigError."""
     from olp.files.fields import CONTROLLER_NAMES, unknown_dialect
+    from olp.files.kinematics.hal import machine_of_hal
+    from olp.files.kinematics.mdh import machine_of_mdh
+    from olp.files.kinematics.structures import machine_of_structure
     from olp.files.kinematics.urdf import machine_of_urdf
     from olp.files.write import check_targets, make_folder, write_files
 
-    if urdf is None:
-        raise UsageError("--tip belongs to --urdf; name the file of the robot")
     if click.get_current_context().meta.get(KNOWN, {}):
         raise UsageError("--skew, --scale and --backlash are of three linear axes; leave them out")
     if controller is not None and controller not in CONTROLLER_NAMES:
         raise UsageError(f"--controller {unknown_dialect(controller)}")
-    made = machine_of_urdf(urdf, tip, name, controller)
+    title = name or Path(os.path.realpath(folder)).name or "machine"
+    if option == "--urdf":
+        made = machine_of_urdf(value, tip, name, controller)
+    elif option == "--mdh":
+        made = machine_of_mdh(value, title, controller)
+    elif option == "--trafo":
+        made = machine_of_hal(value, title, controller)
+    else:
+        made = machine_of_structure(value, title, controller)
+    inputs = [] if option == "--structure" else [value]
     files = {Path(folder) / "machine.toml": made.data}
-    check_targets(files, [urdf], force=force, new_folders=True)
+    check_targets(files, inputs, force=force, new_folders=True)
     make_folder(Path(folder))
-    write_files(files, force=force, inputs=[urdf])
+    write_files(files, force=force, inputs=inputs)
     diagnostic(f"wrote {Path(folder) / 'machine.toml'}")
     for note in made.notes:
         diagnostic(f"note: {note}")

@@ -82,7 +82,7 @@ class LegErrors:
 @dataclass(frozen=True, slots=True)
 class Yield:
     """How a joint gives way in directions of its stator: own motion and tilts in rad per Nm of the torque
-    about its point, shifts in mm per N; `own` of a linear joint in mm per N along its direction."""
+    about its point, shifts in mm per N. `own` of a linear joint is in mm per N along its direction."""
 
     own: float = 0.0
     tilt: Vector = ZERO

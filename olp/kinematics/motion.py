@@ -1,6 +1,6 @@
 """The motion of one joint, nominal and with its errors.
 
-On the tool side a rotary joint is E Y R and a linear one V E Y, on the workpiece side R Y E and Y E V: R and
+On the tool side a rotary joint is E Y R and a linear one V E Y, on the workpiece side R Y E and Y E V. R and
 V are the motion on the line as it really lies, E the error motions, Y the yield.
 """
 

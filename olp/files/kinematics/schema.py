@@ -38,7 +38,7 @@ class JointTable(Table):
     direction: Direction | None = Field(
         default=None,
         description="the direction in which the tool moves, or about which it turns by the right-hand rule, "
-        "relative to the workpiece, while the axis value grows, [X, Y, Z] in machine coordinates; X, Y and Z "
+        "relative to the workpiece, while the axis value grows: [X, Y, Z] in machine coordinates. X, Y and Z "
         "have their own",
     )
     point_mm: Triple | None = Field(

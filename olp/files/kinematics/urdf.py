@@ -16,8 +16,7 @@ from olp.core.arrays import Array
 from olp.core.errors import InputError
 from olp.core.geometry import rotation_matrix
 from olp.core.rigid_fit import Rigid
-from olp.core.values import dataclass
-from olp.files.toml_text import toml_document, toml_key
+from olp.files.kinematics.written import DIGITS, STEP, Parts, Written, machine_file, numbers
 from olp.files.write import PathLike, read_bytes
 from olp.kinematics.poses import STILL, Poses
 
@@ -27,23 +26,11 @@ _MM_PER_M = 1e3
 _MOVING = {"revolute": "rotary", "continuous": "rotary", "prismatic": "linear"}
 #: Travel of a joint without ends, in degrees.
 _TURNING_DEG = 360.0
-#: The smallest step of a control where nothing states it: mm or deg.
-_STEP = 0.001
-#: Digits of lengths and directions, so that 90 degrees given as 1.5707963 stay 90 degrees to 1e-12.
-_DIGITS = 12
-
-
-@dataclass(frozen=True, slots=True)
-class UrdfMachine:
-    """A machine file, and what is to be checked in it."""
-
-    data: bytes
-    notes: tuple[str, ...]
 
 
 def machine_of_urdf(
     path: PathLike, tip: str | None = None, name: str | None = None, controller: str | None = None
-) -> UrdfMachine:
+) -> Written:
     """The machine file of a robot that a URDF file describes, from its root to the link `tip` (default: its
     only last link). It names no calibration. Raises InputError where the file cannot be
     read, or has joints that are not supported."""
@@ -55,28 +42,12 @@ def machine_of_urdf(
     axes, gauge = _lines(chain, path)
     if not axes:
         raise InputError("has no joint that moves between its root and its tip", file=str(path))
-    title = name or robot.get("name") or "robot"
-    tables: list[tuple[str, Mapping[str, object]]] = [
-        (
-            "",
-            {
-                "schema": "olp-machine-1",
-                "name": title,
-                "chain": " ".join(("F", *axes)),
-                "controller": controller or "linuxcnc",
-                "compensated_by_controller": [],
-            },
-        )
-    ]
-    tables += [(f"[axes.{toml_key(axis)}]", table) for axis, table in axes.items()]
-    tables.append(("[gauge]", gauge))
-    notes = [
-        f"URDF states no least increments; {_STEP:g} mm and deg are written: give those of the control",
-        "The file names no calibration, so the machine has no errors: add calibration where it was measured",
-    ]
-    if controller is None:
-        notes.append('URDF names no control; controller = "linuxcnc" is written')
-    return UrdfMachine(toml_document(tables).encode(), tuple(notes))
+    return machine_file(
+        Parts(("F", *axes), axes, gauge),
+        name or robot.get("name") or "robot",
+        controller,
+        [f"URDF states no least increments; {STEP:g} mm and deg are written: give those of the control"],
+    )
 
 
 def _robot(path: PathLike) -> ET.Element:
@@ -154,7 +125,7 @@ def _lines(chain: list[ET.Element], path: PathLike) -> tuple[dict[str, dict[str,
             raise InputError(f'the name "{name}" of a joint cannot be used; give it another', file=str(path))
         axes[name] = dict(_axis(joint, _MOVING[kind], pose, path))
     a, b, c = (_round(angle) for angle in _angles_deg(pose.rotation))
-    gauge = {"point_mm": _list(pose.position), "A_deg": a, "B_deg": b, "C_deg": c}
+    gauge = {"point_mm": numbers(pose.position), "A_deg": a, "B_deg": b, "C_deg": c}
     return axes, gauge
 
 
@@ -166,7 +137,7 @@ def _axis(joint: ET.Element, kind: str, pose: Poses, path: PathLike) -> Iterator
     if not size > 0.0:
         raise InputError(f"joint {joint.get('name')} has an axis without direction", file=str(path))
     direction = pose.rotation @ (along / size)
-    direction = np.where(np.abs(direction) < 10.0**-_DIGITS, 0.0, direction)
+    direction = np.where(np.abs(direction) < 10.0**-DIGITS, 0.0, direction)
     unit = "deg" if kind == "rotary" else "mm"
     scale = math.degrees(1.0) if kind == "rotary" else _MM_PER_M
     limit = joint.find("limit")
@@ -176,10 +147,10 @@ def _axis(joint: ET.Element, kind: str, pose: Poses, path: PathLike) -> Iterator
     elif not low < high:
         raise InputError(f"joint {joint.get('name')} states no travel; give lower and upper", file=str(path))
     yield "kind", kind
-    yield "direction", _list(direction)
-    yield "point_mm", _list(pose.position)
+    yield "direction", numbers(direction)
+    yield "point_mm", numbers(pose.position)
     yield f"travel_{unit}", [_round(low), _round(high)]
-    yield f"least_increment_{unit}", _STEP
+    yield f"least_increment_{unit}", STEP
     velocity = _number(limit, "velocity", joint, path) * scale
     if velocity > 0.0:
         yield f"velocity_{unit}_s", _round(velocity)
@@ -214,9 +185,5 @@ def _angles_deg(rotation: Array) -> tuple[float, float, float]:
     return Rigid(rotation, np.zeros(3)).angles_deg
 
 
-def _list(vector: Array) -> list[float]:
-    return [_round(float(value)) for value in vector]
-
-
 def _round(value: float) -> float:
-    return round(value, _DIGITS) + 0.0
+    return round(value, DIGITS) + 0.0
