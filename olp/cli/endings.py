@@ -45,8 +45,7 @@ def with_exit_code(words: Sequence[str]) -> Iterator[None]:
         silence(sys.stdout)
         raise click.exceptions.Exit(0) from None
     except MemoryError as error:
-        # the calls that it ended hold what filled the memory
-        traceback.clear_frames(error.__traceback__)
+        _let_go(error)
         _end_memory(words)
     except ImportError as error:
         # a library that finds no room to be loaded
@@ -64,6 +63,14 @@ def with_exit_code(words: Sequence[str]) -> Iterator[None]:
         _end(f"the system refuses ({error.strerror}); check where the output goes", UNEXPECTED)
     except Exception as error:
         _end_defect(words, error)
+
+
+def _let_go(error: BaseException | None) -> None:
+    """Clear the calls that an error ended, and those of the errors before it: they hold what filled the
+    memory."""
+    while error is not None:
+        traceback.clear_frames(error.__traceback__)
+        error = error.__context__
 
 
 def keep_streams() -> None:
