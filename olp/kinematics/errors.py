@@ -81,8 +81,8 @@ class LegErrors:
 
 @dataclass(frozen=True, slots=True)
 class Yield:
-    """How a joint gives way in directions of its stator: own motion and tilts in rad per Nm of the torque
-    about its point, shifts in mm per N. `own` of a linear joint is in mm per N along its direction."""
+    """How a joint gives way in directions of its stator. Own motion and tilts are in rad per Nm of the torque
+    about its point, shifts in mm per N; `own` of a linear joint is in mm per N along its direction."""
 
     own: float = 0.0
     tilt: Vector = ZERO

@@ -1,7 +1,7 @@
 """The motion of one joint, nominal and with its errors.
 
-On the tool side a rotary joint is E Y R and a linear one V E Y, on the workpiece side R Y E and Y E V. R and
-V are the motion on the line as it really lies, E the error motions, Y the yield.
+On the tool side a rotary joint is E Y R and a linear one V E Y. On the workpiece side they are R Y E and
+Y E V. R and V are the motion on the line as it really lies, E the error motions, Y the yield.
 """
 
 from __future__ import annotations

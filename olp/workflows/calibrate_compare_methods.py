@@ -49,7 +49,7 @@ from olp.workflows.shown import Shown
 
 #: Seconds from the end of a motion to a reading.
 SETTLE_S = 1.0
-#: The name of the machine as it is, without any correction.
+#: The name of the uncompensated machine.
 UNCORRECTED = "uncorrected"
 
 
@@ -123,7 +123,7 @@ METHODS: tuple[Method, ...] = (
 @dataclass(frozen=True, slots=True, eq=False)
 class ComparedMethods(Shown):
     """Methods of calibration at independent points: `methods` in the order of the table, the first one is the
-    uncorrected machine. `use` is the one to use, `report` the same as a mapping ("olp-methods-1")."""
+    uncompensated machine. `use` is the one to use, `report` the same as a mapping ("olp-methods-1")."""
 
     methods: tuple[Judged, ...]
     use: Judged
@@ -248,7 +248,7 @@ def _because(use: Judged, methods: Sequence[Judged]) -> str:
     before = methods[0]
     if use is before:
         return "no method is clearly better at these points than no correction"
-    size = f"{use.residual_mm * UM_PER_MM:.2g} um rms where the uncorrected machine has "
+    size = f"{use.residual_mm * UM_PER_MM:.2g} um rms where the uncompensated machine has "
     size += f"{before.residual_mm * UM_PER_MM:.2g} um"
     least = min(methods, key=lambda method: method.residual_mm)
     if use is not least:

@@ -26,7 +26,8 @@ def several_in_a_line(tree: ast.Module) -> Iterator[int]:
     for parent in (tree, *classes):
         for node in parent.body:
             if isinstance(node, ast.Assign):
-                names = [n.id for t in node.targets for n in ast.walk(t) if isinstance(n, ast.Name)]
+                assigned = (n for t in node.targets for n in ast.walk(t) if isinstance(n, ast.Name))
+                names = [n.id for n in assigned if isinstance(n.ctx, ast.Store)]
                 if sum(name.isupper() or parent is not tree for name in names) > 1:
                     yield node.lineno
 
@@ -78,6 +79,7 @@ def test_no_sentence_is_broken_into_single_words(path: Path) -> None:
 def test_what_they_refuse() -> None:
     assert list(several_in_a_line(ast.parse("A, B = 1, 2\n"))) == [1]
     assert list(several_in_a_line(ast.parse("a, b = 1, 2\n"))) == []
+    assert list(several_in_a_line(ast.parse("A[[1, B]] = 1\n"))) == []
     of_class = "class C:\n    a, b = 1, 2\n    c = d = 3\n    e = 4\n"
     assert list(several_in_a_line(ast.parse(of_class))) == [2, 3]
     assert list(broken_strings('x = (\n    "the path of a file, "\n    "a "\n    "b"\n)\n')) == [3]

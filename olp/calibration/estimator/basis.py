@@ -54,9 +54,8 @@ class Wave:
 
 @dataclass(frozen=True, slots=True)
 class Scales:
-    """Sizes of the processes that make a curve, mm or rad over the whole length of its axis: `bows` of the
-    curvature that wanders, `bends` of the slope that wanders, `steps` of the value that wanders, `ripple` of
-    what has no neighbours."""
+    """Sizes of the processes that make a curve, mm or rad over the whole length of its axis. `bows` is of the
+    curvature that wanders, `bends` of the slope, `steps` of the value, `ripple` of what has no neighbours."""
 
     bows: float
     bends: float

@@ -343,7 +343,7 @@ def _drift(line: Line) -> Iterator[Finding]:
     runs = np.unique(line.run, return_inverse=True)[1]
     if len(rows) < _REPEATED:
         return
-    # what drifts is in the level of the runs; what is left of each run is noise
+    # what drifts is in the level of the runs; the residual of each run is noise
     rest = line.value - (np.bincount(group, line.value) / np.bincount(group))[group]
     level = (np.bincount(runs, rest) / np.bincount(runs))[runs]
     free = len(rest) - len(np.unique(group)) - int(runs.max())

@@ -283,7 +283,7 @@ def rms(residual: Array) -> float:
 
 
 def correlation_factor(product: float, square: float) -> float:
-    """Factor on the uncertainty of a mean because neighbouring residuals are alike: sqrt((1 + r) / (1 - r))
-    with the autocorrelation r of the first order, from the sums of products of neighbours and of squares."""
+    """Factor on the uncertainty of a mean because neighbouring residuals are alike: sqrt((1 + r) / (1 - r)).
+    The autocorrelation r of the first order is from the sums of products of neighbours and of squares."""
     correlation = min(max(product / square, 0.0), 0.99) if square > 0.0 else 0.0
     return float(np.sqrt((1.0 + correlation) / (1.0 - correlation)))

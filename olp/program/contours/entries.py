@@ -31,7 +31,7 @@ def centre_on(end: Array, toward: Array, start: Array) -> Array:
 
 def entry_arcs(elements: Elements, begin: Array, end: Array) -> tuple[Index, Array, Array]:
     """The elements that enter a contour on an arc, and of the tool's path there the centres (m, 2) and the
-    sweeps (m,) in rad; `begin` and `end` (k, 2) are the ends of the tool's path along all elements."""
+    sweeps (m,) in rad. `begin` and `end` (k, 2) are the ends of the tool's path along all elements."""
     some = entering(elements)
     start, stop = begin[some], end[some]
     centre = centre_on(stop, elements.centre[some], start)

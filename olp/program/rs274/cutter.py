@@ -119,7 +119,7 @@ def check_block(state: _State, codes: Sequence[int], line: int, *, changes_tool:
 
 def check_codes_along(state: _State, codes: Collection[int], m_codes: Collection[int], line: int) -> None:
     """Refuse codes of a block, ten times their number, that a control does not take in the compensation that
-    is on behind it, and stops: the control ends its path there, so it makes no corner with the next move."""
+    is on behind it, and stops. The control ends its path there, so it makes no corner with the next move."""
     if state.compensation is None:
         return
     rules = state.profile.contours

@@ -74,12 +74,13 @@ READ: Mapping[str, str] = {
 }  # fmt: skip
 
 _UNROLLED = "goes through --flatten"
-_PARAMETRIC = """
+_FLOW = """
     R DEF IF ELSE ENDIF FOR ENDFOR WHILE ENDWHILE REPEAT UNTIL LOOP ENDLOOP REPEATB GOTO GOTOF GOTOB
-    GOTOC GOTOS CASE CALL L P CIP CT I1 J1 K1 HOLES1 HOLES2 AP RP G110 G111 G112 ANG CHF CHR RND RNDM AR
+    GOTOC GOTOS CASE CALL L P
 """
+_SHAPES = "CIP CT I1 J1 K1 HOLES1 HOLES2 AP RP G110 G111 G112 ANG CHF CHR RND RNDM AR"
 #: Statements that need the unroller.
-UNROLLED: Mapping[str, str] = dict.fromkeys(_PARAMETRIC.split(), _UNROLLED)
+UNROLLED: Mapping[str, str] = dict.fromkeys((*_FLOW.split(), *_SHAPES.split()), _UNROLLED)
 
 _ROTARY = "needs the kinematics of rotary axes, which are not read; post the operation for three axes"
 _THREAD = "cuts a thread, which a correction would distort; leave the thread to an uncorrected program"

@@ -28,9 +28,9 @@ DECIMALS = 6
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """A motion block: its `name`, words by letter (whether each is a distance, and its number), the `turn` of
-    DR (1, -1, or 0), sizes by name (R, LEN, CCA, and the bare number of RND and CHF as R), and as `rest` all
-    other words. `head` and `tail` are the bytes before and behind the statement."""
+    """A motion block: its `name`, words by letter (whether each is a distance, and its number), and the
+    `turn` of DR (1, -1, or 0). Sizes go by name: R, LEN, CCA, and the bare number of RND and CHF as R. `rest`
+    are all other words, `head` and `tail` are the bytes before and behind the statement."""
 
     name: bytes
     words: Mapping[bytes, tuple[bool, float]]

@@ -13,7 +13,8 @@ from olp.program.rs274.codes import MACHINE
 from olp.program.rs274.flatten.expressions import filled
 from olp.program.rs274.flatten.state import NO_AXES, ProgramState, Value
 
-RADIUS, ANGLE = "@", "^"
+RADIUS = "@"
+ANGLE = "^"
 
 
 def is_polar(words: list[Value]) -> bool:

@@ -1,7 +1,8 @@
 """Splines of RS-274 (G5, G5.1) and NURBS (G5.2, G5.3) as chords.
 
 All are B-splines in XY with weights, over an open uniform row of knots, as LinuxCNC's documentation of G5 to
-G5.3 has them and its interpreter makes them: G5 has four points, G5.1 three, and G5.2 to G5.3 list theirs.
+G5.3 has them and its interpreter makes them.
+G5 has four points, G5.1 three, and G5.2 to G5.3 list theirs.
 """
 
 from __future__ import annotations
@@ -24,7 +25,11 @@ CHORD_MM = 0.0005
 _ORDER = 3
 #: Chords between two knots, at most.
 _MOST_PIECES = 1 << 14
-_CUBIC, _QUADRATIC, _POINTS, _END = 50, 51, 52, 53
+# ten times the codes
+_CUBIC = 50
+_QUADRATIC = 51
+_POINTS = 52
+_END = 53
 #: Words that belong to a spline.
 SPLINE_WORDS = frozenset("xyijpql")
 #: M codes that stop behind the move of their block.

@@ -40,8 +40,8 @@ Placed = tuple[bytes, tuple[str | None, int]]
 
 @dataclass(frozen=True, slots=True)
 class _Leg:
-    """A block that moves in the plane: its place in the output, its element, plane and motion code, whether
-    its words are distances, and the kind and size of the corner behind it, of size 0 where there is none."""
+    """A block that moves in the plane: its place in the output, its element, plane and motion code, and
+    whether its words are distances. The corner behind it has a kind and a size, 0 where there is none."""
 
     index: int
     element: Element
