@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import functools
 import graphlib
 import re
 from collections.abc import Iterator, Mapping
@@ -11,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from cases.fast import in_each
+from house.trees import nodes, parsed
 from house.write_page import PAGE, WHERE, page, purpose
 
 import olp
@@ -25,12 +25,6 @@ ROOMS = (
 ROW = {name: row for row, name in enumerate(ROOMS)}
 FRONT = {"__init__", "__main__"}
 MODULES = sorted(PACKAGE.rglob("*.py"))
-
-
-@functools.cache
-def parsed(path: Path) -> ast.Module:
-    """A module, parsed once for all tests."""
-    return ast.parse(path.read_text("utf-8"))
 
 
 def top(path: Path) -> str:
@@ -145,8 +139,9 @@ OPENERS = {"open", "read_bytes", "read_text", "write_bytes", "write_text"}
 @in_each(MODULES, lambda path: path.relative_to(PACKAGE).as_posix())
 def test_large_libraries_are_imported_late_and_files_opened_in_one_layer(path: Path) -> None:
     tree = parsed(path)
-    inside = {id(n) for f in ast.walk(tree) if isinstance(f, ast.FunctionDef) for n in ast.walk(f)}
-    for node in ast.walk(tree):
+    outer = (*tree.body, *(n for c in tree.body if isinstance(c, ast.ClassDef) for n in c.body))
+    inside = {id(n) for f in outer if isinstance(f, ast.FunctionDef) for n in ast.walk(f)}
+    for node in nodes(path):
         names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
         names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
         for library in {name.split(".")[0] for name in names} & LATE:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from cases.fast import in_each
+from house.trees import parsed
 
 import olp
 
@@ -67,7 +68,7 @@ def broken_strings(source: str) -> Iterator[int]:
 @pytest.mark.slow
 @in_each(MODULES, lambda path: path.relative_to(PACKAGE).as_posix())
 def test_a_constant_stands_on_a_line_of_its_own(path: Path) -> None:
-    assert list(several_in_a_line(ast.parse(path.read_text("utf-8")))) == []
+    assert list(several_in_a_line(parsed(path))) == []
 
 
 @pytest.mark.slow

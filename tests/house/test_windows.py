@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from cases.fast import in_each
+from house.trees import parsed
 
 import olp
 
@@ -109,7 +110,7 @@ def _of_call(node: ast.Call) -> Iterator[str]:
 @pytest.mark.slow
 @in_each(MODULES, lambda path: path.relative_to(PACKAGE).as_posix())
 def test_nothing_is_of_posix_alone(path: Path) -> None:
-    assert list(findings(ast.parse(path.read_text("utf-8")))) == []
+    assert list(findings(parsed(path))) == []
 
 
 @pytest.mark.parametrize("line", [
