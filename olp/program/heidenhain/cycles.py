@@ -15,6 +15,8 @@ BY_SURFACE = frozenset({200, 201, 202, 203, 205, 206, 207, 208, 209, 240, 241})
 BY_HEIGHT = frozenset({1, 2, 17})
 #: cycles that act where they are defined, and move nothing
 AT_ONCE = frozenset({7, 8, 9, 10, 11, 13, 19, 26, 32, 239, 247, 332, 392})
+#: cycles that make holes where they are defined, with the cycle before them
+PATTERNS = frozenset({220, 221, 224})
 _TAPS = frozenset({2, 17, 206, 207, 209})
 _CENTRED = 240
 _SURFACE = re.compile(rb"Q203[ \t]*=[ \t]*([-+]?[\w.]+)", re.I)

@@ -7,18 +7,18 @@ from collections.abc import Callable, Sequence
 
 from olp.core.errors import ProgramError
 from olp.core.units import MM_PER_INCH
-from olp.program.dialect import Options, Support
+from olp.program.dialect import Options
 from olp.program.heidenhain.chunk import harmless
 from olp.program.heidenhain.collector import Collected
-from olp.program.heidenhain.cycles import AT_ONCE, Cycle
+from olp.program.heidenhain.cycles import AT_ONCE, PATTERNS, Cycle
 from olp.program.heidenhain.modes import Modes
+from olp.program.heidenhain.names import name_of, refuse
 from olp.program.heidenhain.statements import CycleText, Statement, cycle_of, of_lines
 from olp.program.heidenhain.table import TABLE, UNROLL
 
 _NUMBER = rb"[-+]?(?:\d+\.?\d*|\.\d+)"
 _ASSIGN = re.compile(rb"(?:FN[ \t]*0[ \t]*:[ \t]*)?(Q[LR]?\d+)[ \t]*=[ \t]*(.*)", re.I | re.S)
 _VALUE = re.compile(rb"(" + _NUMBER + rb"|[-+]?Q[LR]?\d+)\Z", re.I)
-_FN = re.compile(rb"FN[ \t]*(\d+)\b", re.I)
 #: FN 1 to FN 8, FN 13 and FN 18: the parameter that they assign
 _ASSIGNED = re.compile(rb"FN[ \t]*(?:[1-8]|13|18)[ \t]*:.*?\b(Q[LR]?\d+)[ \t]*=", re.I | re.S)
 #: what prints, and a stop
@@ -35,10 +35,6 @@ _TURN = re.compile(rb"\b(?:ROT|[ABC])[ \t]*(" + _NUMBER + rb")", re.I)
 _SCALE = re.compile(rb"\b(?:SCL|[XYZ])[ \t]*(" + _NUMBER + rb")", re.I)
 _FUNCTIONS = re.compile(rb"(?:L[ \t]+)?(?:M\d+[ \t]*)+")
 _PRESET = 339
-_NAMES = sorted(TABLE, key=len, reverse=True)
-_NAME = re.compile(
-    rb"(?:" + b"|".join(re.escape(n).replace(rb"\ ", rb"[ \t]*") for n in _NAMES) + rb")(?![A-Z])"
-)
 _MOTION = re.compile(rb"(?:L|CC?|CR|CP)[ \t]|[XYZABC][-+.\d]|I[XYZ]|[MF][ \t]*[-+.\dM]")
 _SHIFT = 7
 _MIRROR = 8
@@ -89,21 +85,7 @@ class Events:
         if handler is not None:
             handler(statement)
             return
-        self._by_table(name, statement)
-
-    def _by_table(self, name: bytes, statement: Statement) -> None:
-        support, why = TABLE.get(
-            name,
-            (Support.REFUSED, "is not a statement that olp knows in this dialect, and may move the machine"),
-        )
-        if support is Support.REFUSED:
-            shown = name.decode("latin-1") if name in TABLE else statement.shown
-            code = "OLP511" if UNROLL in why else "OLP512"
-            if name in (b"RL", b"RR"):
-                code = "OLP513"
-            hint = UNROLL if why.endswith(UNROLL) else ""
-            message = f"{shown} {why.removesuffix(UNROLL).rstrip(': ')}"
-            raise ProgramError(message, line=statement.line, code=code, hint=hint)
+        refuse(name, statement)
 
     def _deleted(self, statement: Statement, upper: bytes) -> None:
         if self.options.block_delete:
@@ -154,6 +136,7 @@ class Events:
                 code="OLP510",
             )
         name, known = match[1].upper().decode(), self.modes.parameters
+        self._not_of_cycle(name, statement)
         value = _VALUE.match(match[2].strip())
         known.pop(name, None)
         if value is None:
@@ -168,14 +151,27 @@ class Events:
     def _unknown(self, statement: Statement) -> None:
         match = _ASSIGNED.match(statement.text)
         if match is not None:
-            self.modes.parameters.pop(match[1].upper().decode(), None)
+            name = match[1].upper().decode()
+            self._not_of_cycle(name, statement)
+            self.modes.parameters.pop(name, None)
+
+    def _not_of_cycle(self, name: str, statement: Statement) -> None:
+        """Refuse an assignment to a parameter of the cycle in force, whose calls take the new value."""
+        if self.cycle is not None and name in {f"Q{number}" for number in self.cycle.values}:
+            raise ProgramError(
+                f"{name} belongs to CYCL DEF {self.cycle.number} of line {self.cycle.line}, whose next call "
+                "takes the new value",
+                line=statement.line,
+                code="OLP511",
+                hint=UNROLL,
+            )
 
     def _jump(self, statement: Statement) -> None:
         """A jump ahead over what moves nothing and changes no mode: what is assigned there is not known."""
         target = _TARGET.search(statement.upper)
         begin = statement.span[1]
         if target is None or begin < 0:
-            self._by_table(name_of(statement.upper), statement)
+            refuse(name_of(statement.upper), statement)
             return
         lines = self.collector.data[begin : begin + _JUMPED].split(b"\n")[1:]
         assigned: list[str] = []
@@ -188,8 +184,10 @@ class Events:
             if other.deleted or (match is None and not _PRINTS.match(other.upper)):
                 break
             if match is not None:
-                assigned.append(match[1].upper().decode())
-        self._by_table(name_of(statement.upper), statement)
+                name = match[1].upper().decode()
+                self._not_of_cycle(name, statement)
+                assigned.append(name)
+        refuse(name_of(statement.upper), statement)
 
     # -- labels --------------------------------------------------------------------------------------
 
@@ -205,7 +203,7 @@ class Events:
         match = _CALL.match(statement.text)
         section = None if match is None or match[2] else self._section(match[1].upper())
         if section is None or self._depth or any(_moves(s) for s in section):
-            self._by_table(b"CALL LBL", statement)
+            refuse(b"CALL LBL", statement)
             return
         self._depth = 1
         for inner in section:
@@ -231,6 +229,8 @@ class Events:
                 self.cycle = current
         if number in AT_ONCE:
             self._at_once(text, statement)
+        elif number in PATTERNS:
+            refuse(b"CYCL DEF %d" % number, statement)
         elif not part and number > 299:
             raise ProgramError(
                 f"CYCL DEF {number} is a cycle of the builder of the machine, and may move it",
@@ -262,7 +262,7 @@ class Events:
                 and (any(float(v) != 1.0 for v in _SCALE.findall(rest)) or b"Q" in rest.upper())
             )
         ):
-            self._by_table(name if name in TABLE else b"CYCL DEF 11", statement)
+            refuse(name if name in TABLE else b"CYCL DEF 11", statement)
 
     def _cycle_call(self, statement: Statement) -> None:
         rest = statement.upper[len(b"CYCL CALL") :].strip()
@@ -283,31 +283,14 @@ class Events:
 
     def _plane(self, statement: Statement) -> None:
         upper = statement.upper
-        if re.match(rb"PLANE[ \t]+RESET\b", upper) and b"MOVE" not in upper and b"TURN" not in upper:
-            return
         angles = _ANGLE.findall(upper)
-        still = b"MOVE" not in upper and b"TURN" not in upper
-        spatial = re.match(rb"PLANE[ \t]+SPATIAL\b", upper) and len(angles) == 3
-        if spatial and still and not any(float(a) for _, a in angles):
-            return
-        self._by_table(b"PLANE", statement)
-
-
-def name_of(upper: bytes) -> bytes:
-    """The name of a statement as the table has it, else its first word."""
-    match = _NAME.match(upper)
-    if upper.startswith(b"Q") and b"=" in upper:
-        return b"Q"
-    fn = _FN.match(upper)
-    if fn is not None:
-        return b"FN " + str(int(fn[1])).encode()
-    if match is not None:
-        return (
-            b" ".join(re.sub(rb"([A-Z])(\d)", rb"\1 \2", match[0]).split())
-            if match[0] not in TABLE
-            else match[0]
-        )
-    return upper.split()[0]
+        reset = re.match(rb"PLANE[ \t]+RESET\b", upper) is not None
+        spatial = re.match(rb"PLANE[ \t]+SPATIAL\b", upper) is not None and len(angles) == 3
+        if not reset and (not spatial or any(float(a) for _, a in angles)):
+            refuse(b"PLANE", statement)
+        elif b"MOVE" in upper:
+            # where rotary axes turn back, the linear ones follow
+            self.control_move(statement.line, (0, 1, 2))
 
 
 def _moves(statement: Statement) -> bool:

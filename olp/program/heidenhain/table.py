@@ -18,6 +18,7 @@ _FLOW = f"branches, repeats or calls: {UNROLL}"
 _JUMP = f"branches, unless they pass over assignments alone: {UNROLL}"
 _PATH = f"follows from the blocks beside it: {UNROLL}"
 _CONTROL = "is a path that the control makes itself"
+_FREE = "is free contour programming: the control finds its points; have it converted to L and C"
 _TILT = "tilts the working plane; only angles of 0 are read"
 _KNOWN_AT_RUN = "takes values that only the control knows"
 
@@ -47,15 +48,16 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"CYCL DEF 10": (_NO, f"rotates: {UNROLL}"),
     b"CYCL DEF 11": (_NO, "scales; only SCL 1 is read"),
     b"CYCL DEF 19": (_NO, _TILT),
-    b"CYCL DEF 220": (_NO, f"a pattern of holes on a circle: {UNROLL}"),
-    b"CYCL DEF 221": (_NO, f"a pattern of holes on lines: {UNROLL}"),
+    b"CYCL DEF 220": (_NO, f"makes a pattern of holes on a circle: {UNROLL}"),
+    b"CYCL DEF 221": (_NO, f"makes a pattern of holes on lines: {UNROLL}"),
+    b"CYCL DEF 224": (_NO, "makes a pattern of holes that encodes a text; post the holes one by one"),
     b"PLANE": (_NO, _TILT),
     b"FUNCTION TCPM": (_NO, "needs rotary axes"),
     b"M128": (_NO, "needs rotary axes"),
     b"M91": (_R, "axis positions; left uncorrected"),
     b"M92": (_R, "a position that is not known"),
     b"M99": (_R, "one hole at the end of the block"),
-    b"PATTERN DEF": (_NO, f"a pattern of holes: {UNROLL}"),
+    b"PATTERN DEF": (_NO, f"makes a pattern of holes: {UNROLL}"),
     b"M89": (_NO, f"a hole at the end of each block: {UNROLL}"),
     b"LBL": (_R, "labels; those whose section only sets modes may be called"),
     b"CALL LBL": (_NO, _FLOW),
@@ -73,7 +75,7 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     ),
     b"FN 17": (_NO, "writes into tables of the control"),
     b"STOP": (_R, "the motion rests"),
-    b"LP": (_NO, f"a polar position: {UNROLL}"),
+    b"LP": (_NO, f"states a polar position: {UNROLL}"),
     b"CT": (_NO, _PATH),
     b"CTP": (_NO, _PATH),
     b"RND": (_NO, _PATH),
@@ -84,6 +86,7 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"RR": (_NO, f"the control offsets the contour by the radius of the tool: {UNROLL}"),
     b"LN": (_NO, "needs the direction of a surface, and rotary axes"),
     b"SPL": (_NO, _CONTROL),
+    **dict.fromkeys((b"FL", b"FLT", b"FC", b"FCT", b"FPOL", b"FSELECT"), (_NO, _FREE)),
     b"TCH PROBE": (_NO, _KNOWN_AT_RUN),
     **dict.fromkeys(
         (b"BLK FORM", b"TOOL DEF", b"CYCL DEF 13", b"CYCL DEF 32", b"CYCL DEF 239", b"CYCL DEF 332",

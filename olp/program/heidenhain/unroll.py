@@ -18,7 +18,10 @@ from olp.core.errors import ProgramError
 from olp.core.machine import Setup
 from olp.core.values import dataclass
 from olp.program.dialect import Dialect
+from olp.program.heidenhain.cycles import AT_ONCE, PATTERNS
 from olp.program.heidenhain.formulas import Parameters, assignment
+from olp.program.heidenhain.plain.blocks import number
+from olp.program.heidenhain.plain.tools import Radius
 from olp.program.heidenhain.plain.writing import written_out
 from olp.program.heidenhain.statements import Statement, cycle_of, of_lines
 from olp.program.origin import Origin, Unrolled
@@ -29,8 +32,6 @@ UNROLLED_PER_BYTE = 80
 _TOO_LONG = "the run visits more than {limit} bytes of blocks; correct an endless loop, or divide the program"
 #: calls inside one another at most
 _DEEPEST = 20
-#: decimals of a number that comes from a parameter
-_DECIMALS = 6
 _LABEL = re.compile(rb'LBL[ \t]*("[^"]*"|\d+)', re.I)
 _CALL = re.compile(rb'CALL[ \t]+LBL[ \t]*("[^"]*"|\d+)[ \t]*(?:REP[ \t]*(\d+)(?:[ \t]*/[ \t]*\d+)?)?\Z', re.I)
 _PROGRAM = re.compile(rb'CALL[ \t]+PGM[ \t]+"?([^"]+?)"?[ \t]*\Z', re.I)
@@ -46,6 +47,8 @@ _UNKNOWN = re.compile(rb"FN[ \t]*18[ \t]*:.*?\b(Q[LR]?\d+)[ \t]*=", re.I | re.S)
 #: a parameter in a block, with its sign, where it is no name of a value
 _USED = re.compile(rb"([-+]?)(Q[LR]?\d+)(?![\d]|[ \t]*=)", re.I)
 _ENDS = re.compile(rb"(?:L\b.*\b)?M0*(?:2|30)\b", re.I | re.S)
+#: the parameter that a TOOL CALL sets to the radius of the tool
+_RADIUS = "Q108"
 _KEPT_BEHIND = frozenset(b"ABCUVWF")
 
 
@@ -103,11 +106,11 @@ def unroll(
         raise ProgramError(
             "cycles of this dialect are not written out; leave --expand-cycles out", code="OLP544"
         )
-    run = _Run(dialect, subprograms, Budget.of(
+    run = _Run(dialect, subprograms, Radius(setup), Budget.of(
         len(data), least=limit, per_byte=UNROLLED_PER_BYTE, message=_TOO_LONG
     ))  # fmt: skip
     run.parameters.update({name.upper(): value for name, value in (parameters or {}).items()})
-    run.stated = frozenset(run.parameters)
+    run.stated = dict(run.parameters)
     run.visit(_Unit.of(data, "", dialect), 0, 0, main=True)
     run.write_out(setup)
     return Unrolled.of(b"".join(run.blocks), run.origin())
@@ -117,15 +120,18 @@ class _Run:
     """One run: the blocks that were written, and the lines that they were made from."""
 
     def __init__(
-        self, dialect: Dialect, subprograms: Callable[[str], tuple[str, bytes] | None], budget: Budget
-    ) -> None:
-        self.dialect, self.subprograms, self.budget = dialect, subprograms, budget
+        self, dialect: Dialect, subprograms: Callable[[str], tuple[str, bytes] | None], radius: Radius,
+        budget: Budget,
+    ) -> None:  # fmt: skip
+        self.dialect, self.subprograms, self.radius, self.budget = dialect, subprograms, radius, budget
         self.parameters = Parameters()
-        #: names of those that the job states
-        self.stated: frozenset[str] = frozenset()
+        #: those that the job states
+        self.stated: Mapping[str, float] = {}
         self.blocks: list[bytes] = []
         self.units: list[_Unit] = []
         self._sources: list[tuple[int, int]] = []
+        #: the lines of the cycle in force, and their sources
+        self._definition: list[tuple[bytes, tuple[int, int]]] = []
 
     def origin(self) -> Origin:
         counts = np.array([len(unit.lines) for unit in self.units], np.int64)
@@ -193,8 +199,10 @@ class _Run:
             if main:
                 self._put(unit, known, place)
             return None
-        if upper.startswith(b"BEGIN PGM") and not main:
-            return place + 1
+        if upper.startswith(b"BEGIN PGM"):
+            if not main:
+                return place + 1
+            self.radius.begin(statement)
         jump = _JUMP.match(upper)
         if jump is not None:
             a, b = self.parameters.of(jump[1]), self.parameters.of(jump[3])
@@ -249,26 +257,63 @@ class _Run:
         asked = _UNKNOWN.match(statement.text)
         if asked is not None:
             name = asked[1].upper().decode()
-            if name not in self.stated:
+            if name in self.stated:
+                self.parameters[name] = self.stated[name]
+                self._define_again(name, self.stated[name])
+            elif self._of_cycle(name).search(b"".join(line for line, _ in self._definition)):
+                raise ProgramError(
+                    f"{name} belongs to the cycle in force, and only the control knows the value that "
+                    "FN 18 gives it; give it in [parameters] of the job file",
+                    code="OLP541",
+                )
+            else:
                 self.parameters.pop(name, None)
             return True
         given = assignment(statement.text, self.parameters)
         if given is not None:
             self.parameters[given[0]] = given[1]
+            self._define_again(*given)
         return given is not None
+
+    @staticmethod
+    def _of_cycle(name: str) -> re.Pattern[bytes]:
+        return re.compile(rb"(?<![A-Z])(%s[ \t]*=[ \t]*)[-+]?[\w.]+" % name.encode(), re.I)
+
+    def _define_again(self, name: str, value: float) -> None:
+        """Write the cycle in force again where a parameter of its own gets another value."""
+        written, new = self._of_cycle(name), number(value)
+        lines = [written.sub(lambda m: m[1] + new, line) for line, _ in self._definition]
+        if lines != [line for line, _ in self._definition]:
+            self._definition = list(zip(lines, (source for _, source in self._definition), strict=True))
+            self.blocks += lines
+            self._sources += [source for _, source in self._definition]
 
     def _put(self, unit: _Unit, known: int, place: int) -> None:
         """Write a statement with numbers for its parameters."""
         statement = unit.statements[place]
         cycle = cycle_of(statement)
         if cycle is not None:
-            for number, text in cycle.values.items():
+            for key, text in cycle.values.items():
                 name = text.upper().lstrip(b"+-").decode()
                 if not name.startswith("Q") or name in self.parameters:
-                    self.parameters[f"Q{number}"] = self.parameters.of(text)
-        for number in range(statement.line, unit.stop[place] + 1):
-            self.blocks.append(self._filled(unit.lines[number - 1]))
-            self._sources.append((known, number))
+                    self.parameters[f"Q{key}"] = self.parameters.of(text)
+        lines = [self._filled(unit.lines[k - 1]) for k in range(statement.line, unit.stop[place] + 1)]
+        sources = [(known, statement.line + k) for k in range(len(lines))]
+        self.blocks += lines
+        self._sources += sources
+        if statement.upper.startswith(b"TOOL CALL"):
+            self._call_tool(of_lines(lines, statement.line))
+        if cycle is not None and cycle.values and cycle.number not in AT_ONCE | PATTERNS:
+            self._definition = list(zip(lines, sources, strict=True))
+
+    def _call_tool(self, statement: Statement) -> None:
+        """Q108 is the radius of the tool that is called, with DR."""
+        self.radius.call(statement)
+        if _RADIUS not in self.stated:
+            try:
+                self.parameters[_RADIUS] = self.radius.of(statement.line)
+            except ProgramError:
+                self.parameters.pop(_RADIUS, None)
 
     def _filled(self, line: bytes) -> bytes:
         body, mark, comment = line.partition(b";")
@@ -277,9 +322,7 @@ class _Run:
             behind = body[: match.start()].rstrip()[-1:].upper()
             if match[2].upper().decode() not in self.parameters and behind and behind[0] in _KEPT_BEHIND:
                 return match[0]
-            number = self.parameters.of(match[1] + match[2])
-            text = f"{number:.{_DECIMALS}f}".rstrip("0").rstrip(".")
-            sign = "" if behind in (b"F", b"S", b"R", b"L") and number >= 0 else "+"
-            return (text if text.startswith("-") and text != "-0" else sign + text.lstrip("-")).encode()
+            text = number(self.parameters.of(match[1] + match[2]))
+            return text.removeprefix(b"+") if behind in (b"F", b"S", b"R", b"L") else text
 
         return (_USED.sub(value, body) if b"Q" in body.upper() else body) + mark + comment

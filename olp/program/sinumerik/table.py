@@ -76,9 +76,9 @@ READ: Mapping[str, str] = {
 _UNROLLED = "goes through --flatten"
 _FLOW = """
     R DEF IF ELSE ENDIF FOR ENDFOR WHILE ENDWHILE REPEAT UNTIL LOOP ENDLOOP REPEATB GOTO GOTOF GOTOB
-    GOTOC GOTOS CASE CALL L P
+    GOTOC GOTOS CASE CALL EXTCALL L P
 """
-_SHAPES = "CIP CT I1 J1 K1 HOLES1 HOLES2 AP RP G110 G111 G112 ANG CHF CHR RND RNDM AR"
+_SHAPES = "CIP CT I1 J1 K1 HOLES1 HOLES2 CYCLE801 AP RP G110 G111 G112 ANG CHF CHR RND RNDM AR"
 #: Statements that need the unroller.
 UNROLLED: Mapping[str, str] = dict.fromkeys((*_FLOW.split(), *_SHAPES.split()), _UNROLLED)
 
@@ -110,7 +110,7 @@ REFUSED: Mapping[str, str] = {
                     "post the approach as G1, G2 and G3"),
     **dict.fromkeys(("POCKET1", "POCKET2", "POCKET3", "POCKET4", "SLOT1", "SLOT2", "LONGHOLE", "CYCLE60",
                      "CYCLE61", "CYCLE62", "CYCLE63", "CYCLE64", "CYCLE70", "CYCLE71", "CYCLE72", "CYCLE73",
-                     "CYCLE74", "CYCLE75", "CYCLE76", "CYCLE77", "CYCLE79", "CYCLE801", "CYCLE802",
+                     "CYCLE74", "CYCLE75", "CYCLE76", "CYCLE77", "CYCLE79", "CYCLE802",
                      "CYCLE899", "CYCLE90"), _CYCLE),
     "G291": "switches to ISO mode, another language; name the dialect of that mode with --dialect",
     "POS": "moves a positioning axis on its own; program it as a G0 block",
@@ -124,6 +124,9 @@ REFUSED: Mapping[str, str] = {
 #: Cycles whose strokes are known.
 DRILLING = frozenset({"CYCLE81", "CYCLE82", "CYCLE83", "CYCLE84", "CYCLE840", "CYCLE85", "CYCLE86", "CYCLE87",
                       "CYCLE88", "CYCLE89"})  # fmt: skip
+
+#: Patterns of places for the cycle of an MCALL.
+PATTERNS = frozenset({"HOLES1", "HOLES2", "CYCLE801"})
 
 #: G codes that have no effect on the path.
 HARMLESS_G = frozenset({601, 602, 603, 140, 141, 142, 143, 290, 340, 341, 621})

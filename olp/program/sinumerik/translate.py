@@ -6,6 +6,7 @@ Lines of plain words, most of those that CAM systems write, are found in columns
 
 from __future__ import annotations
 
+import re
 import string
 from itertools import pairwise
 
@@ -21,6 +22,12 @@ from olp.program.sinumerik.words import Words
 
 Bytes = npt.NDArray[np.uint8]
 
+_VARIABLE = rb"[A-Z_][A-Z0-9_]*[ \t]*"
+#: variables without values: what uses one is refused where it is
+_DECLARED = re.compile(
+    rb"[ \t]*(?:N\d+)?[ \t]*DEF[ \t]+(?:INT|REAL|BOOL|CHAR|STRING[ \t]*\[\d+\])[ \t]+"
+    + _VARIABLE + rb"(?:,[ \t]*" + _VARIABLE + rb")*\s*", re.IGNORECASE,
+)  # fmt: skip
 #: Letters of words that mean the same in both languages.
 _PLAIN = b"NGXYZFIJKMSTABCUVW"
 _LETTER = np.isin(np.arange(256), list(string.ascii_letters.encode()))
@@ -67,6 +74,9 @@ def translate(data: bytes) -> Translation:
             continue
         number = line + 1
         block: Block | None = None
+        if _DECLARED.fullmatch(code) is not None:
+            out[start : start + len(code)] = b" " * len(code)
+            continue
         try:
             block = block_of(code)
         except ProgramError as error:

@@ -176,6 +176,11 @@ def test_the_pole_may_be_the_position_or_a_distance_from_it(bent: Path) -> None:
         ("L X1 M99\n", 5, "none is defined"), ("CYCL DEF 252 ~\n Q203=0\nL X1 M99\n", 7, "CYCL DEF 252"),
         ("L X1 M89\n", 5, "at the end of each block"), ("CYCL CALL POS X1\n", 5, "where the holes are"),
         ("CC X0 Y5\nCP IPA+90 DR-\n", 6, "opposite"), ("/L X5\n", 5, "block delete"),
+        ("CYCL DEF 220 Q216=+5\n", 5, "makes a pattern of holes"), ("CYCL DEF 221\n", 5, "makes a pattern"),
+        ("CYCL DEF 200 Q201=-5\nFN 0: Q201 = -9\n", 6, "next call takes"),
+        ("CYCL DEF 200 Q201=-5\nFN 1: Q201 = +Q1 + +9\n", 6, "next call takes"),
+        ("CYCL DEF 200 Q201=-5\nFN 9: IF Q1 EQU 0 GOTO LBL 2\nQ201=-9\nLBL 2\n", 6, "next call takes"),
+        ("PLANE SPATIAL SPA+0 SPB-1 SPC+0 TURN\n", 5, "tilts"), ("FLT\n", 5, "free contour"),
         ("CYCL DEF 371 X\n", 5, "builder"), ("L X1 M112\n", 5, "M112"), ("HOPP X1\n", 5, "not a statement"),
         ("L X1 G1\n", 5, "not understood"), ("L D5\n", 5, "not understood"),
         ("L X1 K3\n", 5, "not understood"),
@@ -187,6 +192,15 @@ def test_the_pole_may_be_the_position_or_a_distance_from_it(bent: Path) -> None:
 )  # fmt: skip
 def test_what_is_refused_and_where(bent: Path, text: str, line: int, words: str) -> None:
     refused(HEAD + text, bent, line, words)
+
+
+def test_planes_that_turn_back_may_move_all_axes(bent: Path) -> None:
+    for text, moves in (("PLANE RESET TURN FMAX", 2), ("PLANE SPATIAL SPA+0 SPB+0 SPC+0 TURN FMAX", 2),
+                        ("PLANE RESET STAY", 2), ("PLANE RESET MOVE ABST50 FMAX", 3)):  # fmt: skip
+        path = program(HEAD + text + "\nL X1 FMAX\n", bent).toolpath
+        assert len(path) == moves
+        assert bool(np.isfinite(path.end_mm[-1]).all()) == (moves == 2)
+        assert path.end_mm[-1, 0] == ORIGIN[0] + 1
 
 
 def test_sections_that_only_set_modes_may_be_called(bent: Path) -> None:
@@ -390,6 +404,31 @@ def test_programs_beside_are_called(bent: Path, tmp_path: Path) -> None:
     (tmp_path / "sub.h").write_text("BEGIN PGM SUB MM\nL X+Q1 Y0 Z0 F50\nQ2=7\nEND PGM SUB MM\n")
     text = olp.flatten(tmp_path / "MAIN.H", bent)
     assert text.split(b"\n")[1:3] == [b"L X+5 Y0 Z0 F50", b"L Y+7"]
+
+
+def test_a_parameter_of_the_cycle_in_force_takes_its_new_value() -> None:
+    cycle = "CYCL DEF 200 ~\n Q203=+0 ~\n Q201=Q1 ; DEPTH ~\n Q2010=7"
+    text = unrolled("Q1=-3\n" + cycle + "\nL X1 M99\nFN 0: Q201 = -9\nQ203=0\nQ9=8\nL X2 M99\n")
+    first = cycle.replace("Q1 ;", "-3 ;").split("\n")
+    again = cycle.replace("Q1 ;", "-9 ;").split("\n")
+    assert text == [*first, "L X1 M99", *again, "L X2 M99", ""]
+    asked = "FN 18: SYSREAD Q201 = ID1 NR2\n"
+    with pytest.raises(ProgramError, match="Q201 belongs to the cycle") as caught:
+        unrolled("Q1=-3\n" + cycle + "\n" + asked)
+    assert caught.value.line == 6
+    text = unrolled("Q1=-3\n" + cycle + "\n" + asked, parameters={"Q201": -4.5})
+    assert " Q201=-4.5 ; DEPTH ~" in text
+
+
+def test_a_call_of_a_tool_sets_q108_to_its_radius(bent: Path) -> None:
+    setup = load_setup(bent)
+    text = "BEGIN PGM A {unit}\nTOOL CALL {tool} Z DR+0.25\nL X+Q108\n"
+    for unit, value in (("MM", "5.25"), ("INCH", "0.44685")):
+        lines = unrolled(text.format(unit=unit, tool=1), setup=setup)
+        assert lines[2] == f"L X+{value}"
+    assert unrolled(text.format(unit="MM", tool=1), parameters={"Q108": 2})[2] == "L X+2"
+    with pytest.raises(ProgramError, match="Q108 is used before"):
+        unrolled(text.format(unit="MM", tool=77), setup=setup)
 
 
 def test_values_of_the_control_may_be_stated_in_the_job() -> None:

@@ -91,6 +91,9 @@ def test_contours_that_are_written_out_are_corrected(bent: Path, seed: int) -> N
             "APPR LT X+20 Y+0 LEN5 R0 F9\nL X+50\nDEP LT LEN10\nL Y+9\n",
             "L X+15 Y+0 R0\nL X+20 Y+0 F9\nL X+50\nL X+60 Y+0\nL Y+9\n",
         ),
+        # in planes with Z, angles count from Y and from Z
+        ("CC Z+1 X+2\nLP PR+5 PA+90 F9\nLP PA+180 IY+2\n", "CC Z+1 X+2\nL X+7 Z+1 F9\nL X+2 Y+2 Z-4\n"),
+        ("CC Y+0 Z+0\nL Y+3 Z+0\nLP IPA+90\nLP IPR+1\n", "CC Y+0 Z+0\nL Y+3 Z+0\nL Y+0 Z+3\nL Y+0 Z+4\n"),
         # modal calls, up to M99
         (CYCLE + "L X+1 FMAX M89\nL X+2 FMAX\nL X+3 M99\nL X+4\n",
          CYCLE + "L X+1 FMAX M99\nL X+2 FMAX M99\nL X+3 M99\nL X+4\n"),
@@ -145,6 +148,9 @@ def test_a_pattern_definition_adds_to_the_surface_and_keeps_the_height() -> None
         ("CYCL DEF 10.0\nCYCL DEF 10.1 ROT+5\nCYCL DEF 7.0\nCYCL DEF 7.1 X+5\n", 6, "shift it before"),
         ("CYCL DEF 10.0\nCYCL DEF 10.1 ROT+5\nCYCL DEF 8.0\nCYCL DEF 8.1 X\n", 6, "mirror it before"),
         ("CYCL DEF 8.0\nCYCL DEF 8.1 Z\n", 4, "another axis"),
+        ("APPR LT X+9 Y+9 LEN5 R0\nFLT\n", 4, "free contour"), ("L X+9\nRND R5\nFC DR- R18\n", 5, "free"),
+        ("CC Z+0 IX+5\nLP PR+5 PA+0\n", 4, "no pole"),
+        ("CC Z+0 X+5\nL X+1 RL\nLP PA+0\n", 5, "in a contour"),
         ("L M89\nCYCL DEF 11.0\nCYCL DEF 11.1 SCL 2\n", 5, "scales"),
         ("APPR LCT X+1 Y+1 R5 R0\nL X+20\n", 3, "inside the arc"),
         ("APPR LT X+9 Y+9 R0\nL X+20\n", 3, "needs LEN"),

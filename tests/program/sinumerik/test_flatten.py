@@ -138,6 +138,38 @@ def test_cycles_are_written_out_as_moves() -> None:
     assert unrolled(text, expand_cycles=True) == want
 
 
+@pytest.mark.parametrize(
+    ("call", "places"),
+    [
+        ("HOLES1(1,2,90,5,10,2)", [(1, 7), (1, 17)]),
+        ("HOLES1(1,2,90,5,10,2,1000,0,,,1)", [(1, 7), (1, 17)]),
+        ("HOLES2(1,2,5,90,0,2)", [(1, 7), (1, -3)]),
+        ("HOLES2(1,2,5,90,-90,2,,,,,1)", [(1, 7), (6, 2)]),
+        # a grid goes there and back, turned about its first place
+        ("CYCLE801(1,2,0,10,5,2,2)", [(1, 2), (11, 2), (11, 7), (1, 7)]),
+        ("CYCLE801(1,2,90,10,5,2,2,0,0,,,,,1)", [(1, 2), (1, 12), (-4, 12), (-4, 2)]),
+        # a frame has its rim alone
+        ("CYCLE801(0,0,0,1,1,3,3,1)", [(0, 0), (1, 0), (2, 0), (2, 1), (0, 1), (0, 2), (1, 2), (2, 2)]),
+    ],
+)
+def test_patterns_are_places(call: str, places: list[tuple[float, float]], setup: Setup) -> None:
+    text = unrolled(f"{HEAD}MCALL CYCLE81(5,0,1,-2)\n{call}\nMCALL\nM30\n")
+    path = read(text.encode(), setup, SINUMERIK).toolpath
+    drilled = path.end_mm[path.end_mm[:, 2] == path.end_mm[:, 2].min()]
+    assert drilled[:, :2] - path.end_mm[0, :2] == pytest.approx(np.array(places), abs=1e-9)
+
+
+def test_subprograms_are_called_by_their_files() -> None:
+    files = {"SUB": ("SUB.SPF", b"G1 X1\nM17\n")}
+    for call in ('EXTCALL "SUB"', 'EXTCALL("C:/SPF/SUB.SPF")', 'CALL "/_N_SPF_DIR/_N_SUB_SPF"', "SUB"):
+        assert unrolled(call + "\nM30\n", subprograms=files.get) == "G1 X1\nM30\n"
+
+
+def test_arrays_take_the_values_of_their_definition() -> None:
+    text = "DEF REAL P[3]=SET(1.5, 2*4)\nX=P[0] Y=P[1] Z=P[2]\n"
+    assert unrolled(HEAD + text).endswith("X=1.5 Y=8 Z=0\n")
+
+
 def test_subprograms_of_an_archive_have_the_lines_of_the_file() -> None:
     text = "%_N_A_MPF\n;$PATH=/_N_A\nBB1\nM30\n%_N_BB1_SPF\nG0 X1\nRET\n"
     done = flatten(text.encode(), SINUMERIK)
@@ -156,6 +188,12 @@ REFUSED = {
     "ENDIF": ("closes nothing", "OLP542"),
     "AA:\nGOTOB AA": ("endless loop", "OLP543"),
     "GUD=2.5": ("DEF REAL", "OLP542"),
+    "DEF REAL AA[2]=5": ("write SET", "OLP542"),
+    "DEF REAL AA[0]": ("a size", "OLP542"),
+    "CYCLE801(1,2,0,10,5,2)": ("needs 7 numbers", "OLP531"),
+    "CYCLE801(1,2,0,10,5,2,2,0,0,15)": ("argument 10", "OLP544"),
+    "CYCLE801(1,2,0,10,5,2,1.5)": ("expected an integer", "OLP531"),
+    "HOLES2(1,2,5,90,0,3,1100)": ("argument 7", "OLP544"),
     "SUPA X100\nX=IC(1)": ("program it in G90 first", "OLP524"),
     "TRANS X1\nX=IC(1)": ("program it in G90 first", "OLP524"),
 }

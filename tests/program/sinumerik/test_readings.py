@@ -56,6 +56,7 @@ ENDS: dict[str, tuple[float, float, float]] = {
     ZERO + "X1 C25.815": (1, 0, 0),
     # a numbered spindle ends no program, and turns nothing else
     ZERO + "M2=3\nX1": (1, 0, 0),
+    "N10 def real _TOL, XY2 ; a\nDEF INT _K\n" + ZERO + "X1": (1, 0, 0),
     ZERO + "X1\nM17\nX2": (1, 0, 0),
     ZERO + "X1\nRET\nX2": (1, 0, 0),
     # strings and comments with marks of the other kind
@@ -133,7 +134,9 @@ REFUSED: dict[str, tuple[str, str]] = {
     "X=R1": ("--flatten", "OLP511"),
     "X=2*3": ("--flatten", "OLP511"),
     "IF R1==1 GOTOF A": ("--flatten", "OLP511"),
-    "DEF REAL A, B": ("--flatten", "OLP511"),
+    "DEF REAL A, B=1": ("--flatten", "OLP511"),
+    "DEF REAL A\nX=A": ("--flatten", "OLP511"),
+    "DEF AXIS A": ("--flatten", "OLP511"),
     "MYSUB": ("subprogram or a statement that is not known", "OLP511"),
     "L100 P2": ("`L100` uses", "OLP511"),
     "TRAORI": ("rotary axes", "OLP512"),

@@ -64,6 +64,8 @@ class Moves:
         self.at = [NAN, NAN, NAN]
         #: the pole, from the preset; None in other planes than that of X and Y
         self.pole: Point | None = None
+        #: the axes of a pole in a plane with Z, that of angle 0 first, and the pole along them
+        self.upright: tuple[int, int, float, float] | None = None
         #: polar radius and angle of the last LP, in words
         self.angle = NAN
 
@@ -108,6 +110,34 @@ class Moves:
             raise unknown("a polar position with PR or PA alone, or with I,", block.line)
         point = self.outward(pole[0] + radius * math.cos(angle), pole[1] + radius * math.sin(angle))
         return point, self.end(block)[1]
+
+    def put_upright_pole(self, block: Block) -> None:
+        """Take over a CC of a plane with Z: angles count from Y in YZ, and from Z in ZX."""
+        first, second = (1, 2) if b"Y" in block.words else (2, 0)
+        letters = (b"XYZ"[first : first + 1], b"XYZ"[second : second + 1])
+        self.upright = None
+        if set(block.words) == set(letters) and not any(step for step, _ in block.words.values()):
+            a, b = (block.words[letter][1] + self.frame.shift[axis]
+                    for letter, axis in zip(letters, (first, second), strict=True))  # fmt: skip
+            self.upright = first, second, a, b
+
+    def upright_end(self, block: Block) -> tuple[list[float], bytes]:
+        """Where LP leads in a plane with Z, and the axes that it states."""
+        assert self.upright is not None
+        first, second, a, b = self.upright
+        point, z = self.end(block)
+        end = [*point, z]
+        dx, dy = self.at[first] - a, self.at[second] - b
+        radius, angle = math.hypot(dx, dy), math.degrees(math.atan2(dy, dx))
+        step, value = block.words.get(b"PR", (True, 0.0))
+        radius = radius + value if step else value
+        step, value = block.words.get(b"PA", (True, 0.0))
+        angle = math.radians(angle + value if step else value)
+        if math.isnan(radius) or math.isnan(angle):
+            raise unknown("a polar position with PR or PA alone, or with I,", block.line)
+        end[first], end[second] = a + radius * math.cos(angle), b + radius * math.sin(angle)
+        stated = {first, second} | {k for k in range(3) if b"XYZ"[k : k + 1] in block.words}
+        return end, bytes(b"XYZ"[k] for k in sorted(stated))
 
     def _pole(self, block: Block) -> Point:
         if self.pole is None:

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from olp.core.errors import ProgramError
 from olp.core.machine import Setup
 from olp.program.heidenhain.cycles import AT_ONCE
+from olp.program.heidenhain.names import refuse_also_unrolled
 from olp.program.heidenhain.plain.approach import approached, departed
 from olp.program.heidenhain.plain.blocks import Block, block_of, line_end
 from olp.program.heidenhain.plain.frame import MIRROR, ROTATION, SCALING, SCALINGS, SHIFT, WRITTEN_OUT
@@ -103,6 +104,8 @@ class _Writing(Holes):
         elif (block := block_of(lines[0], line) if len(lines) == 1 else None) is not None:
             self._motion(block, entry)
         else:
+            if self.corner is not None or self.approach is not None:
+                refuse_also_unrolled(statement)
             self._nothing_waits(line)
             self._other(statement, entry)
 
@@ -191,8 +194,10 @@ class _Writing(Holes):
                     line=block.line,
                     code="OLP512",
                 )
+            self.put_upright_pole(block)
             self.entries.append(entry)
             return
+        self.upright = None
         point, _ = self.end(block)
         if math.isnan(point[0]) or math.isnan(point[1]):
             raise unknown("this CC", block.line)
@@ -204,6 +209,9 @@ class _Writing(Holes):
     def _move(self, block: Block, entry: Entry) -> None:
         """L, C, CR, CT, and the polar ones."""
         name = block.name
+        if name == b"LP" and self.upright is not None:
+            self._upright_line(block, entry)
+            return
         arc = name != b"L" and name != b"LP"
         across = block.stated(b"XY") or arc or name == b"LP"
         if arc and name in (b"C", b"CP") and self.pole is None and not self.frame.turned:
@@ -247,6 +255,23 @@ class _Writing(Holes):
         unsure = [k for k in stated if math.isnan((*piece.end, z)[k])]
         if needed and (unsure or (self.frame.turned and math.isnan(sum(piece.end)))):
             raise unknown("this block", block.line)
+
+    def _upright_line(self, block: Block, entry: Entry) -> None:
+        """LP about a pole of a plane with Z."""
+        if self.side != b"R0" or self.frame.turned:
+            raise ProgramError(
+                "a polar position in another plane than XY is not read in a contour or a turned program",
+                line=block.line,
+                code="OLP518",
+            )
+        end, axes = self.upright_end(block)
+        entry.piece, entry.z = Piece((self.at[0], self.at[1]), (end[0], end[1])), (self.at[2], end[2])
+        entry.axes, entry.changed = axes, True
+        self._side_of(block, entry)
+        self._nothing_waits(block.line)
+        self.entries.append(entry)
+        self.at, self.last = end, None
+        self.call_behind(block, entry)
 
     def _other_plane(self, block: Block, entry: Entry) -> None:
         self._nothing_waits(block.line)

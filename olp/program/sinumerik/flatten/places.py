@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterator
 
 from olp.core.errors import ProgramError
 from olp.core.toolpath import Kind
-from olp.program.sinumerik import cycles
+from olp.program.sinumerik import cycles, patterns
 from olp.program.sinumerik.blocks import Form, Piece, arguments, block_of, without_comment
 from olp.program.sinumerik.flatten.elements import AXES, CENTRES, Element, Words
 from olp.program.sinumerik.flatten.shapes import Shapes
 from olp.program.sinumerik.flatten.text import shown
 from olp.program.sinumerik.frames import STATEMENTS
-from olp.program.sinumerik.table import DRILLING, HARMLESS_G, ROUNDING_G
+from olp.program.sinumerik.table import DRILLING, HARMLESS_G, PATTERNS, ROUNDING_G
 
 _CALL = re.compile(rb"(AC|IC)[ \t]*\(([^()]*)\)", re.IGNORECASE)
 #: Tapping cannot be written as plain moves.
@@ -59,8 +58,8 @@ class Places:
             keeps = self._call(code, pieces)
             if not keeps:
                 return
-        elif pieces and pieces[0].name in ("HOLES1", "HOLES2"):
-            yield from self._pattern(pieces[0].name, [float(a) for a in arguments(code, pieces[0])])
+        elif pieces and pieces[0].name in PATTERNS:
+            yield from self._pattern(pieces[0].name, arguments(code, pieces[0]))
             return
         elif pieces and pieces[0].name in DRILLING and self._expand and pieces[0].name not in _KEPT:
             yield from self._hole(pieces[0].name, arguments(code, pieces[0]))
@@ -157,20 +156,13 @@ class Places:
                 yield b"G4 F" + given[5]
         yield b"G%d" % self._motion
 
-    def _pattern(self, name: str, values: list[float]) -> Iterator[bytes]:
-        """HOLES1 and HOLES2: the places of holes on a line and on a circle, each as a block."""
-        if self._plane != 17 or self._incremental or len(values) != 6:
+    def _pattern(self, name: str, given: list[bytes]) -> Iterator[bytes]:
+        """The places of a pattern, each as a block."""
+        if self._plane != 17 or self._incremental:
             raise ProgramError(f"{name} outside of G17 and G90 is not written out", code="OLP544")
-        x, y, c, d, e, count = values
-        number = round(count)
-        for i in range(number):
-            if name == "HOLES1":
-                angle, away = math.radians(c), d + i * e
-            else:
-                angle, away = math.radians(d + i * (e or 360.0 / number)), c
-            place = (x + away * math.cos(angle), y + away * math.sin(angle))
-            yield b"G0 X%s Y%s" % (shown(place[0]).encode(), shown(place[1]).encode())
-            self._position |= {"X": place[0], "Y": place[1]}
+        for x, y in patterns.places(name, given):
+            yield b"G0 X%s Y%s" % (shown(x).encode(), shown(y).encode())
+            self._position |= {"X": x, "Y": y}
             if self._modal is not None:
                 yield from self._hole(*self._modal)
         yield b"G%d" % self._motion

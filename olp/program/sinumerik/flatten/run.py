@@ -15,7 +15,7 @@ from olp.program.sinumerik.blocks import Form, Piece, arguments
 from olp.program.sinumerik.flatten.expressions import Value, evaluate, number
 from olp.program.sinumerik.flatten.scope import Scope
 from olp.program.sinumerik.flatten.unit import Line, Unit
-from olp.program.sinumerik.table import DRILLING, HARMLESS, READ, REFUSED
+from olp.program.sinumerik.table import DRILLING, HARMLESS, PATTERNS, READ, REFUSED
 
 #: Subprograms inside one another at most.
 _DEEPEST = 16
@@ -23,7 +23,7 @@ _JUMP = re.compile(r"(.*?)\b(GOTO[FB]?)[ \t]+([A-Z_][A-Z0-9_]*|\d+)[ \t]*$", re.
 _RANGE = re.compile(r"([A-Z_][A-Z0-9_\[\]]*)[ \t]*=(.*?)\bTO\b(.*)$", re.IGNORECASE)
 _ARMS = re.compile(r"(.*?)[ \t]+(GOTO[FB]?)[ \t]+([A-Z_][A-Z0-9_]*)[ \t]*", re.IGNORECASE)
 _CASE = re.compile(r"(.*?)\bOF\b(.*)$", re.IGNORECASE)
-_KNOWN = frozenset({*DRILLING, *HARMLESS, *READ, *REFUSED, "HOLES1", "HOLES2", "CYCLE80", "CIP", "CT"})
+_KNOWN = frozenset({*DRILLING, *HARMLESS, *READ, *REFUSED, *PATTERNS, "CYCLE80", "CIP", "CT"})
 _REPEATED = re.compile(
     r"[ \t]*([A-Z_][A-Z0-9_]*)(?:[ \t]+(?!P[ \t]*=)([A-Z_][A-Z0-9_]*))?[ \t]*(?:P[ \t]*=?(.*))?$",
     re.IGNORECASE,
@@ -127,11 +127,11 @@ class Walk:
             return self._begin(unit, index, word, rest, scope, loops)
         elif word in ("ENDFOR", "ENDWHILE", "ENDLOOP", "UNTIL"):
             return self._end(unit, index, word, rest, scope, loops)
-        elif word == "CALL":
+        elif word in ("CALL", "EXTCALL"):
             name = evaluate(rest, scope)
             if not isinstance(name, str):
-                raise ProgramError("CALL needs the name of a subprogram as text", code="OLP540")
-            self._call(name.upper(), [], 1, line, scope, depth)
+                raise ProgramError(f"{word} needs the name of a subprogram as text", code="OLP540")
+            self._call(_file_name(name), [], 1, line, scope, depth)
         elif word != "ENDIF":
             raise ProgramError(f"{word} is not run; write GOTOF or GOTOB", code="OLP542")
         return index + 1
@@ -309,6 +309,12 @@ def _text(value: Value) -> str:
     return (
         f'"{value}"' if isinstance(value, str) else f"({float(value)!r})" if value >= 0 else f"(-{-value!r})"
     )
+
+
+def _file_name(text: str) -> str:
+    """The name of a subprogram in a text, which may have a folder and an ending."""
+    name = text.strip().replace("\\", "/").upper().rpartition("/")[2].removeprefix("_N_")
+    return re.sub(r"[._]([SM]PF)\Z", "", name)
 
 
 def _parameters(unit: Unit) -> str:

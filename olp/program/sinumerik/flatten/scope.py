@@ -16,6 +16,7 @@ _WORDS = frozenset({*HARMLESS, *READ, *REFUSED, *UNROLLED, "CR", "TURN", "ADIS",
 _TYPE = re.compile(r"(INT|REAL|BOOL|CHAR|STRING(?:[ \t]*\[[^\]]*\])?|AXIS)[ \t]+", re.IGNORECASE)
 _NAME = re.compile(r"[ \t]*([A-Z_][A-Z0-9_]*)[ \t]*(?:\[([^\]]*)\])?[ \t]*(?:=(.*))?$", re.IGNORECASE)
 _ELEMENT = re.compile(r"([A-Z_][A-Z0-9_]*|R)\[(.*)\]", re.IGNORECASE)
+_SET = re.compile(r"SET[ \t]*\((.*)\)", re.IGNORECASE)
 #: Elements of an array at most.
 _MOST_ELEMENTS = 10_000
 
@@ -63,9 +64,17 @@ class Scope(MutableMapping[str, Value]):
                 self._own[own] = empty if name[3] is None else evaluate(name[3], self)
                 continue
             size = int(float(evaluate(name[2], self)))
-            if name[3] is not None or not 0 < size <= _MOST_ELEMENTS:
-                raise ProgramError(f"the array {own} has values or a size that are not run", code="OLP542")
-            self._own |= {indexed(own, [i]): empty for i in range(size)}
+            if not 0 < size <= _MOST_ELEMENTS:
+                raise ProgramError(f"the array {own} has a size that is not run", code="OLP542")
+            values = [] if name[3] is None else self._set(own, name[3])
+            self._own |= {indexed(own, [i]): values[i] if i < len(values) else empty for i in range(size)}
+
+    def _set(self, name: str, text: str) -> list[Value]:
+        """The values of an array from its begin on."""
+        given = _SET.fullmatch(text.strip())
+        if given is None:
+            raise ProgramError(f"the array {name} has values that are not run; write SET( )", code="OLP542")
+        return [evaluate(part, self) for part in _split(given[1])]
 
     def bind(self, parameters: str, given: list[str], caller: Scope) -> None:
         """Parameters of a subprogram: values by position, or their defaults."""

@@ -25,10 +25,10 @@ from olp.program.sinumerik.flatten.run import Stop, Walk
 from olp.program.sinumerik.flatten.scope import Scope
 from olp.program.sinumerik.flatten.text import shown
 from olp.program.sinumerik.flatten.unit import Line, Unit, programs
-from olp.program.sinumerik.table import DRILLING
+from olp.program.sinumerik.table import DRILLING, PATTERNS
 
 #: Calls whose arguments are numbers; those of others are names and texts too, and stay.
-_COMPUTED = DRILLING | {"HOLES1", "HOLES2"}
+_COMPUTED = DRILLING | PATTERNS
 _LABEL = re.compile(rb"\A([ \t]*/?\d?[ \t]*(?:N\d+[ \t]*)?)(?:[A-Z_][A-Z0-9_]+[ \t]*:[ \t]*)+", re.IGNORECASE)
 _NUMBER = re.compile(rb"\A([ \t]*/?\d?[ \t]*)(?:N|:)[ \t]*\d+[ \t]*", re.IGNORECASE)
 #: bytes of visited blocks: of a short program, and for each byte
