@@ -150,7 +150,7 @@ def test_a_pattern_definition_adds_to_the_surface_and_keeps_the_height() -> None
         ("CYCL DEF 8.0\nCYCL DEF 8.1 Z\n", 4, "another axis"),
         ("APPR LT X+9 Y+9 LEN5 R0\nFLT\n", 4, "free contour"), ("L X+9\nRND R5\nFC DR- R18\n", 5, "free"),
         ("CC Z+0 IX+5\nLP PR+5 PA+0\n", 4, "no pole"),
-        ("CC Z+0 X+5\nL X+1 RL\nLP PA+0\n", 5, "in a contour"),
+        ("CC Z+0 X+5\nCYCL DEF 10.0\nCYCL DEF 10.1 ROT+5\nLP PA+0\n", 6, "a turned program"),
         ("L M89\nCYCL DEF 11.0\nCYCL DEF 11.1 SCL 2\n", 5, "scales"),
         ("APPR LCT X+1 Y+1 R5 R0\nL X+20\n", 3, "inside the arc"),
         ("APPR LT X+9 Y+9 R0\nL X+20\n", 3, "needs LEN"),
