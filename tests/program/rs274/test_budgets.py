@@ -201,7 +201,7 @@ def check_growth(texts: list[str], place: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", REPEATED)
 def test_work_grows_with_the_text_and_no_faster(name: str, tmp_path: Path) -> None:
-    texts = [HEAD + REPEATED[name] * count + "M2\n" for count in (1, 150, 300, 450)]
+    texts = [HEAD + REPEATED[name] * count + "M2\n" for count in (1, 80, 160, 240)]
     place = machine(tmp_path, tables=TABLES)
     work(texts[0], place)
     check_growth(texts[1:], place)
