@@ -74,9 +74,19 @@ def test_each_path_is_drawn_once_a_frame_and_sent_when_the_view_changes(chromium
         browser.until(page, f"asked.bytes > {sent}")
 
 
+#: The canvas has as many pixels as the pane that it fills.
+SAME_SIZE = """
+(({width, height}, {clientWidth, clientHeight}) => width === clientWidth && height === clientHeight)(
+    olp.app.scene.viewer.renderer.domElement, olp.app.scene.pane
+)
+"""
+
+
 def test_a_pane_of_another_size_is_drawn_at_that_size(chromium: Any, file: Path) -> None:
     with browser.opened(chromium, file, before=COUNT) as page:
         page.set_viewport_size({"width": 900, "height": 700})
+        rest(page)
+        browser.until(page, SAME_SIZE)
         rest(page)
         wide, high = page.evaluate("[olp.app.scene.pane.clientWidth, olp.app.scene.pane.clientHeight]")
         assert pixels(page).shape == (high, wide, 4)
