@@ -46,6 +46,8 @@ if TYPE_CHECKING:
     from olp.workflows.calibrate_go_return import go_return as go_return
     from olp.workflows.calibrate_import import TableImport as TableImport
     from olp.workflows.calibrate_import import import_table as import_table
+    from olp.workflows.calibrate_joints import FittedJoints as FittedJoints
+    from olp.workflows.calibrate_joints import fit_joint_calibration as fit_joint_calibration
     from olp.workflows.calibrate_plan import MeasurementPlan as MeasurementPlan
     from olp.workflows.calibrate_plan import plan_measurements as plan_measurements
     from olp.workflows.calibrate_postures import fit_postures as fit_postures
@@ -83,6 +85,8 @@ _HOME = {
     "Comparison": "olp.workflows.compare",
     "FittedCalibration": "olp.workflows.calibrate_fit",
     "fit_calibration": "olp.workflows.calibrate_fit",
+    "FittedJoints": "olp.workflows.calibrate_joints",
+    "fit_joint_calibration": "olp.workflows.calibrate_joints",
     "CalibrationDiagnosis": "olp.workflows.calibrate_doctor",
     "compare_methods": "olp.workflows.calibrate_compare_methods",
     "ComparedMethods": "olp.workflows.calibrate_compare_methods",

@@ -67,13 +67,28 @@ def command(
 
     DATA are plans (olp-measurements-1), folders with measurements.toml, or folders and files of readings that
     describe themselves. One adjustment takes all readings. It gives curves, squareness, backlash and cyclic
-    errors with their uncertainties.
+    errors with their uncertainties. For a machine of any joints it gives where its lines really are.
     """
     if propose is not None:
         _propose(data, machine, propose, force=force)
         return
     if STREAM in (output, report_file, *data):
         raise UsageError("a calibration is several files and cannot be -; name files")
+    if machine is not None and _is_of_joints(machine):
+        if datum is not None or map_ is not None:
+            raise UsageError("--datum and --map are of three linear axes; leave them out", file=machine)
+        _of_joints(
+            data,
+            output,
+            machine,
+            valid_until,
+            report_file,
+            as_json=as_json,
+            fail_on=fail_on,
+            quiet=quiet,
+            force=force,
+        )
+        return
     from olp.files.measurements.reader import files_of_measurements
 
     inputs = (*files_of_measurements(data), *files_of(machine))
@@ -103,6 +118,47 @@ def command(
         diagnostic(f"wrote {output} and {curves} files of {kinds} beside it")
     if report_file is not None:
         diagnostic(f"wrote {report_file}")
+    put_result(fitted, as_json=as_json, quiet=quiet)
+    exit_for(fitted.findings, fail_on)
+
+
+def _is_of_joints(machine: str) -> bool:
+    from olp.files.kinematics.load import is_of_joints
+
+    return is_of_joints(machine)
+
+
+def _of_joints(
+    data: tuple[str, ...],
+    output: str | None,
+    machine: str,
+    valid_until: datetime.date | None,
+    report_file: str | None,
+    *,
+    as_json: bool,
+    fail_on: str,
+    quiet: bool,
+    force: bool,
+) -> None:
+    """The calibration of a machine of any joints. Raises UsageError and as `fit_joint_calibration`."""
+    if len(data) != 1:
+        raise UsageError("the readings of a machine of any joints are in one plan; name it as DATA")
+    if report_file is not None and not report_file.endswith(".json"):
+        raise UsageError("the report of a machine of any joints is JSON; expected a name in .json")
+    refuse_early(files_of(output, report_file), (*data, *files_of(machine)), force=force)
+
+    from olp.files.write import write_files
+    from olp.reports.report import to_json
+    from olp.workflows.calibrate_joints import fit_joint_calibration
+
+    with progress(quiet):
+        fitted = fit_joint_calibration(data[0], machine, valid_until=valid_until)
+    files: dict[Path, bytes] = {} if output is None else fitted.files(output)
+    if report_file is not None:
+        files[Path(report_file)] = to_json(fitted.full_report())
+    write_files(files, force=force, inputs=fitted.inputs)
+    for path in files:
+        diagnostic(f"wrote {path}")
     put_result(fitted, as_json=as_json, quiet=quiet)
     exit_for(fitted.findings, fail_on)
 

@@ -10,6 +10,7 @@ from olp.core.schema import Table, fields_of
 from olp.files.described import DialectFile
 from olp.files.json_types import table_schema
 from olp.files.kinematics.calibration_schema import JointCalibrationFile
+from olp.files.kinematics.plan_schema import JointPlanFile
 from olp.files.kinematics.schema import JointMachineFile
 from olp.files.measurements.schemas import MeasurementsFile
 from olp.files.point_profile import PointProfile
@@ -21,6 +22,7 @@ KINDS: dict[str, type[Table]] = {
     **FILES,
     "joint-machine": JointMachineFile,
     "joint-calibration": JointCalibrationFile,
+    "joint-measurements": JointPlanFile,
     "measurements": MeasurementsFile,
     "points": PointProfile,
     "dialect": DialectFile,

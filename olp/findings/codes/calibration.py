@@ -153,4 +153,15 @@ RULES = (
         "Measure with three offsets of the reflector that do not lie on one line.",
         "A nest for the reflector in the spindle, and no other.",
     ),
+    _rule(
+        "OLP844",
+        "unknowns not determined by the readings",
+        Severity.WARNING,
+        "The structure shows these unknowns, but these readings do not, or hardly. They stay near zero, as "
+        "far as is usual for such a machine. The stated uncertainties include this. Poses like those of the "
+        "readings are predicted well, others less.",
+        "Add what tells them apart: other postures, a second and third nest off the line, a second ball, "
+        "another height, or lengths to another centre.",
+        "An arm with one reflector: three of its 24 unknowns turn the hand about it.",
+    ),
 )
