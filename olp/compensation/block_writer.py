@@ -3,20 +3,20 @@ nothing else."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
 from olp.compensation.block_arcs import arc_edits
-from olp.compensation.digits import AxisRows, Places, part_of
+from olp.compensation.digits import AxisRows, part_of
 from olp.compensation.holes import HoleWords
 from olp.compensation.inserted_blocks import block_edits
 from olp.compensation.plan import Plan
 from olp.compensation.rows import Rows
 from olp.compensation.shared_words import shared_edits
 from olp.compensation.stretches import Decimals, Stretches, digits_of
+from olp.compensation.style import by_unit
 from olp.compensation.writer import Writer
 from olp.core.arrays import Array, Index, Mask, distinct
 from olp.core.progress import Progress, silent
@@ -106,7 +106,7 @@ class BlockWriter(Writer):
             before = float(entry[axis])
             part = column.part(slice(a, b))
             decimals = Decimals(*(
-                _by_unit(places, axis, part.unit)
+                by_unit(places, axis, part.unit)
                 for places in (self.style.least, self.style.usual, self.style.grid)
             ))  # fmt: skip
             rows.put(a, b, axis, digits_of(part, stretches, before, decimals))
@@ -246,11 +246,3 @@ class BlockWriter(Writer):
                 edits.add(start, end, new, digits)
                 self.tally.changed_words += 1
         return [edits.done()]
-
-
-def _by_unit(places: Callable[[int, float], int], axis: int, unit: Array | float) -> Places:
-    """Decimals of an axis in the unit of all rows, or of each."""
-    if not isinstance(unit, np.ndarray):
-        return places(axis, unit)
-    units, which = np.unique(unit, return_inverse=True)
-    return np.array([places(axis, u) for u in units.tolist()], np.int8)[which]

@@ -20,7 +20,7 @@ from olp.program.contours.meeting import Carriers
 #: mm; the direction of a shorter part is that of the nominal one
 _SHORT_MM = 1e-3
 #: rad by which errors turn a part at most; what seems to turn it more is backlash
-_TURNED = 0.02
+TURNED = 0.02
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -149,7 +149,7 @@ def _tangents(elements: Elements, element: Index, begin: Array, end: Array) -> t
 def _turned(now: Array, nominal: Array) -> Array:
     """(p,) rad by which parts are turned, 0 where that is not known."""
     angle = wrapped(_angle(now) - _angle(nominal))
-    known = (np.hypot(*nominal.T) > _SHORT_MM) & (np.abs(angle) < _TURNED)
+    known = (np.hypot(*nominal.T) > _SHORT_MM) & (np.abs(angle) < TURNED)
     return np.where(known, angle, 0.0)
 
 

@@ -18,8 +18,10 @@ from olp.compensation.lines import Cuts, subdivide_lines
 from olp.compensation.plan import Limits, Plan, targets, zero_shifts
 from olp.compensation.programmed import programmed
 from olp.compensation.reversal import Carried, Reversal, carry_play
+from olp.compensation.style import Style
 from olp.core.arrays import Array, Index, Mask, distinct, is_in
 from olp.core.errors import OutsideBox, ProgramError
+from olp.core.machine import Vector
 from olp.core.progress import Progress, part, silent
 from olp.core.toolpath import Flag, Kind, Toolpath
 from olp.core.units import MM_PER_INCH
@@ -52,12 +54,17 @@ def plans(
 
 
 def written_plans(
-    program: Program, model: ErrorModel, limits: Limits, tell: Progress = silent
+    program: Program, model: ErrorModel, limits: Limits, increments_mm: Vector, tell: Progress = silent
 ) -> Iterator[tuple[Band, Plan]]:
-    """As `plans`, of what is programmed: contours where there is cutter compensation. Raises as `plans`, and
-    ProgramError where the control would refuse a contour."""
-    for band, rows in plans(program, model, limits, tell):
-        yield programmed(band, rows, model, limits)
+    """As `plans`, of what is programmed: contours where there is cutter compensation. `increments_mm` are the
+    least ones of the axes. Raises as `plans`, and ProgramError where the control would refuse a contour."""
+    every = plans(program, model, limits, tell)
+    if program.programmed is None:
+        yield from every
+        return
+    style = Style.of(program.programmed, increments_mm)
+    for band, rows in every:
+        yield programmed(band, rows, model, limits, style)
 
 
 def uncorrected_moves(program: Program, model: ErrorModel, limits: Limits) -> Index:

@@ -11,13 +11,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from olp.compensation.parts import Parts
+from olp.compensation.parts import TURNED, Parts
 from olp.compensation.plan import Limits, Plan
+from olp.compensation.short_blocks import Grid, together
+from olp.compensation.style import Style
 from olp.core.arrays import Array
 from olp.core.errors import ProgramError
 from olp.errormodel.base import ErrorModel
 from olp.program.bands import Band
-from olp.program.contours.elements import AXES, Elements
+from olp.program.contours.elements import AXES, Elements, wrapped
 from olp.program.contours.entries import centre_on
 from olp.program.contours.joints import Corner, corners, joints, refuse
 from olp.program.contours.meeting import meeting
@@ -27,9 +29,10 @@ from olp.program.program import Program
 _PASSES = 4
 
 
-def programmed(band: Band, rows: Plan, model: ErrorModel, limits: Limits) -> tuple[Band, Plan]:
-    """A band whose path is what is programmed, and the plan for it. Raises ProgramError where the control
-    would refuse the contour, or would make other moves of it."""
+def programmed(band: Band, rows: Plan, model: ErrorModel, limits: Limits, style: Style) -> tuple[Band, Plan]:
+    """A band whose path is what is programmed, and the plan for it; `style` says which numbers can be
+    written. Raises ProgramError where the control would refuse the contour, or would make other moves of
+    it."""
     program = band.program
     if program.programmed is None:
         return band, rows
@@ -37,7 +40,8 @@ def programmed(band: Band, rows: Plan, model: ErrorModel, limits: Limits) -> tup
     elements = Elements.of(contour.toolpath)
     if not len(elements):
         return replace(band, program=contour), rows
-    return replace(band, program=contour), _Contour(program, contour, elements, rows, model, limits).plan()
+    every = _Contour(program, contour, elements, rows, model, limits, style)
+    return replace(band, program=contour), every.plan()
 
 
 class _Contour:
@@ -45,10 +49,11 @@ class _Contour:
 
     def __init__(
         self, program: Program, contour: Program, elements: Elements, rows: Plan, model: ErrorModel,
-        limits: Limits,
+        limits: Limits, style: Style,
     ) -> None:  # fmt: skip
         assert program.blocks is not None
         self.rows, self.path, self.elements = rows, contour.toolpath, elements
+        self.contour, self.limits, self.style = contour, limits, style
         self.rules = program.rs274.contours
         corner = np.array([(c := f.compensation) is not None and c.corner for f in program.toolpath.frames])
         move = program.blocks[rows.move]
@@ -67,6 +72,7 @@ class _Contour:
         point = np.where(last[:, None], self.elements.end[parts.element], stated)
         point = point + self._points(parts) - stated
         self.parts = parts = self._entered(point)
+        point = together(self._made(point), self._grid(), self.limits)
         made = self._made(point)
         self._check(made)
         command = rows.command_mm[kept].copy()
@@ -98,6 +104,14 @@ class _Contour:
         centre[arcs] = centre_on(point[arcs], parts.centre[arcs], parts.begin[arcs])
         return replace(parts, centre=centre)
 
+    def _grid(self) -> Grid:
+        """What the ends of parts can be written as."""
+        parts, move = self.parts, self.move
+        changes = np.concatenate(([True], move[1:] != move[:-1], [True]))
+        alone = changes[:-1] & changes[1:] & ~self.rows.raw[self.kept].any(axis=1)
+        own, axes = move[parts.row].astype(np.int64), AXES[parts.plane][:, :2]
+        return Grid.of(self.contour, self.style, own, axes, alone[parts.row])
+
     def _corner(self) -> Array:
         """(p,) the corner before each part."""
         parts = self.parts
@@ -113,15 +127,15 @@ class _Contour:
         behind[last] = Corner.ENTRY
         following = np.minimum(np.arange(len(parts)) + 1, len(parts) - 1)
         guess = parts.guess
-        entry = np.flatnonzero((elements.first & ~elements.arc)[parts.element])
-        own = elements.end[parts.element[entry]] - elements.begin[parts.element[entry]]
-        nominal = np.arctan2(own[:, 1], own[:, 0])
+        # lines that begin where another part ends, and not where two carriers meet
+        enters = elements.first[parts.element] & parts.head
+        smooth = np.flatnonzero((enters | (self._corner() == Corner.SMOOTH)) & ~parts.arc)
         point = guess
         for _ in range(_PASSES):
-            now = point[entry] - parts.begin[entry]
-            ends[entry] = begins[entry] = (
-                elements.begins[parts.element[entry]] + np.arctan2(now[:, 1], now[:, 0]) - nominal
-            )
+            now = point[smooth] - np.where(enters[smooth, None], parts.begin[smooth], point[smooth - 1])
+            turn = wrapped(np.arctan2(now[:, 1], now[:, 0]) - parts.ends[smooth])
+            turn[np.abs(turn) > TURNED] = 0.0
+            ends[smooth] = begins[smooth] = parts.ends[smooth] + turn
             turned = replace(parts, begins=begins, ends=ends)
             point = parts.end - parts.normal(ends)
             entered = np.flatnonzero(behind == Corner.ENTERED)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import is_in
+from olp.core.arrays import Array, is_in
 from olp.core.machine import Vector
 from olp.core.toolpath import Flag
 from olp.core.units import MM_PER_INCH
@@ -157,3 +158,13 @@ class Style:
     def separator(self, which: int, letter: bytes) -> bytes:
         """Text before an inserted number, in the style of this number: space and letter."""
         return _SPACE[which % 3] + (letter.lower() if which >= 3 else letter)
+
+
+def by_unit(
+    places: Callable[[int, float], int], axis: int, unit: Array | float
+) -> int | npt.NDArray[np.int8]:
+    """Decimals of an axis in the unit of all rows, or of each."""
+    if not isinstance(unit, np.ndarray):
+        return places(axis, unit)
+    units, which = np.unique(unit, return_inverse=True)
+    return np.array([places(axis, u) for u in units.tolist()], np.int8)[which]

@@ -14,12 +14,13 @@ from olp.program.text.columns import Columns
 
 class PathColumns:
     """Without `keep_words` the columns that only writing needs are left out. `moves` counts the moves
-    so far."""
+    so far, and `frame` is the frame of the last one, -1 before any."""
 
     def __init__(self, *, keep_words: bool) -> None:
         self.keep_words = keep_words
         self.columns = Columns()
         self.moves = 0
+        self.frame = -1
 
     def put_moves(
         self,
@@ -35,6 +36,8 @@ class PathColumns:
         self.columns.put("flag", flag, np.uint8)
         self.columns.put("line", line, np.int32)
         self.columns.put("frame", frame, np.int32)
+        if len(kind):
+            self.frame = int(np.asarray(frame)[-1])
         self.columns.put("end", end_mm, np.float64)
         if self.keep_words:
             self.columns.put("slot", slot, np.int32)

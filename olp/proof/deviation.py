@@ -22,6 +22,7 @@ from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.reversal import play_after, play_interval
 from olp.errormodel.sampling import clear_length_mm, longer, steps_needed
+from olp.proof.smooth_joints import SmoothJoints
 from olp.proof.unknown_sides import UnknownSides
 from olp.proof.unknown_starts import UnknownStarts
 
@@ -42,7 +43,8 @@ _ARC_ANGLE_RAD = 0.1
 class Deviation:
     """Deviation per nominal move, in mm: `waypoint` at its end, `path` the largest along it and at its end,
     `bend` the part of it that comes from chords. NaN where the position is unknown. `side` (n,) is how much
-    more it may be because the side of the backlash is not known yet."""
+    more it may be because the side of the backlash is not known yet. Where a contour under cutter
+    compensation goes straight on (`SmoothJoints`), only what is across the path counts."""
 
     waypoint: Single
     path: Single
@@ -112,6 +114,7 @@ class Tracer:
         self.away = np.float32(np.nan)
         self.clear_mm = clear_length_mm(model, path.tools_mm(), bend)
         self.has_play = model.backlash_at(np.array(model.box_mm).mean(axis=1)[None]) is not None
+        self.joints = SmoothJoints.of(nominal)
         #: (n, 3) axes that are unknown at the end of a nominal move, None where there are none
         blind = np.isnan(nominal.end_mm)
         self.blind = blind if blind.any() else None
@@ -220,6 +223,8 @@ class Tracer:
         `tips` [1:]. A hole with fewer pecks than the nominal one has strokes that end before them, at -1."""
         away = self._known(a + np.arange(b - a), tips[ends + 1] - self.target[a:b])
         waypoint[:] = np.sqrt(np.einsum("ij,ij->i", away, away))
+        if self.joints is not None:
+            self.joints.put_across(waypoint, a + np.arange(b - a), away)
 
     def _samples(
         self, start: Array, end: Array, arc: Index, steps: Index, known: Mask, tool: Array,
@@ -365,6 +370,9 @@ class Tracer:
             )  # fmt: skip
             near = self._near(owner, first, inner.part[curved], inner.share[curved], of[curved])
             distance[curved] = shapes.distance(actual[curved], which, near)
+        if self.joints is not None:
+            self.joints.put_across(distance, a + of, actual - self._known(a + of, goal[of]))
+            self.joints.put_across(distance, a + of - 1, actual - self._known(a + of, begin[of]))
         # of one kind with the column: else numpy takes ten times as long
         np.fmax.at(worst, of, distance.astype(np.float32))
 

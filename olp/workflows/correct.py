@@ -301,7 +301,7 @@ def _written(
             program.programmed or program, loaded.model, limits.tolerance_mm, increments_mm,
             b"" if unrolled is not None else stamp, bool(accepted), located=unrolled is not None,
         )  # fmt: skip
-        written = write(task, written_plans(program, loaded.model, limits, told), told)
+        written = write(task, written_plans(program, loaded.model, limits, increments_mm, told), told)
     nominal = replace(program, words=None, slot=np.zeros((0, 3), np.int32), programmed=None, blocks=None)
     # the corrected text has lines of its own
     text: bytes | None = bytes(source.data) if written.text is None else written.text

@@ -278,12 +278,14 @@ def deviation(
     kinds: Collection[str] = KINDS,
     forget_at_tool_change: bool = False,
     shift_by_frame: Mapping[str, Any] | None = None,
+    smooth_rad: float = 0.0,
 ) -> Deviation:
     """Distance of the actual path to nominal path + zero shift, after and before correction.
 
     `skip_lines` are nominal lines that are left uncorrected on purpose (G53, G28, unknown axes). Points with
     unknown axes or play are left out and counted. `forget_at_tool_change`: an axis is unknown after a tool
-    change until it moves again.
+    change until it moves again. Where two nominal cuts meet with a turn of at most `smooth_rad`, a point of
+    one may lie on the other.
     """
     moves = nominal.pick(nominal.kind != DWELL)
     own = corrected.pick(corrected.kind != DWELL)
@@ -295,11 +297,11 @@ def deviation(
     uncorrected = np.isin(moves.line, list(skip_lines))
     real = actual(own, model, spacing_mm)
     groups = match(real.points[real.dense.last], moves.axis + shift)
-    after = _measure(real, groups, moves, shift, uncorrected, kinds)
+    after = _measure(real, groups, moves, shift, uncorrected, kinds, smooth_rad)
     if not after.judged:
         raise ValueError("no point could be judged: nowhere are all axes known on a line that counts")
     raw = actual(moves, model, spacing_mm)
-    before = _measure(raw, np.arange(len(moves)), moves, shift, uncorrected, kinds)
+    before = _measure(raw, np.arange(len(moves)), moves, shift, uncorrected, kinds, smooth_rad)
     return Deviation(after, before, moves.line, groups)
 
 
@@ -319,6 +321,7 @@ def _measure(
     shift: np.ndarray,
     uncorrected: np.ndarray,
     kinds: Collection[str],
+    smooth_rad: float,
 ) -> PathError:
     dense = real.dense
     skip = uncorrected | ~np.isin(moves.kind, [KINDS.index(kind) for kind in kinds])
@@ -328,6 +331,11 @@ def _measure(
     points = real.points - shift[owner]
     fraction = curves.nearest(owner, points)
     distance = 1e3 * np.linalg.norm(points - curves.at(owner, fraction), axis=1)
+    if smooth_rad:
+        for other, joined in _neighbours(curves, moves, owner, smooth_rad):
+            rows = np.flatnonzero(joined)
+            near = curves.at(other[rows], curves.nearest(other[rows], points[rows]))
+            distance[rows] = np.minimum(distance[rows], 1e3 * np.linalg.norm(points[rows] - near, axis=1))
     end_known = np.asarray(moves.known.all(axis=1), bool)
     whole = end_known & np.concatenate([[moves.start_known], end_known[:-1]])
     # a path from another zero, another tool or an uncorrected position has no nominal path
@@ -359,6 +367,26 @@ def _measure(
         int(len(use) - len(kept)),
         int((~real.inside[kept]).sum()),
     )
+
+
+def _neighbours(
+    curves: _Curves, moves: CanonMoves, owner: np.ndarray, smooth_rad: float
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """The cut behind and the one before each owner, and whether the path goes over to it without a corner."""
+    every = np.arange(len(moves))
+    step = 1e-6
+    first = curves.at(every, np.full(len(moves), step)) - curves.begin
+    last = curves.end - curves.at(every, np.full(len(moves), 1 - step))
+    with np.errstate(invalid="ignore"):
+        first, last = (way / np.linalg.norm(way, axis=1)[:, None] for way in (first, last))
+    cut = np.isin(moves.kind, [KINDS.index(kind) for kind in ("feed", "arc")])
+    smooth = np.einsum("ij,ij->i", last[:-1], first[1:]) > np.cos(smooth_rad)
+    smooth &= cut[:-1] & cut[1:]
+    behind, before = np.append(smooth, False), np.append(False, smooth)
+    return [
+        (np.minimum(owner + 1, len(moves) - 1), behind[owner]),
+        (np.maximum(owner - 1, 0), before[owner]),
+    ]
 
 
 def judge_programs(

@@ -106,6 +106,26 @@ def test_what_is_in_a_contour_is_taken_or_refused_as_by_the_interpreter(tmp_path
         assert taken == (linuxcnc.accepts(text, path) and block not in ("M0", "M1")), block
 
 
+def moving(axis: np.ndarray) -> np.ndarray:
+    """Without moves of zero length."""
+    return axis[np.append(True, (np.abs(np.diff(axis, axis=0)) > 1e-7).any(axis=1))]
+
+
+@pytest.mark.parametrize("cycle", ["G81 {} Z-5 R{}", "G98 G83 {} Z-5 R{} Q2", "G85 {} Z-5 R{}\nX70"])
+def test_holes_behind_a_contour_are_reached_as_by_the_interpreter(tmp_path: Path, cycle: str) -> None:
+    """Where the contour ended, at places beside it, at all levels; behind G40, and a move along Z."""
+    path = machines.zero_machine(tmp_path, WORN)
+    setup = load_setup(path)
+    for place in ("X50 Y0", "", "X50", "Y0", "X60 Y0"):
+        for level in (-2, 0, 3, 7):
+            for off in ("G40\n", "G40 ", "G40\nG0 Z5\n"):
+                text = f"G21 G90 G17 G54 F600\nG0 X0 Y0 Z10\nG1 Z0\nG42 D1 G1 X20 Y0\nX50\n{off}"
+                data = f"{text}{cycle.format(place, level)}\nG80\nM2\n".encode()
+                theirs = moving(linuxcnc.interpret(data, path, find_known=False).axis)
+                mine = moving(read(data, setup, DIALECTS["linuxcnc"]).toolpath.end_mm)
+                assert mine == pytest.approx(theirs, abs=1e-6), (place, level, off)
+
+
 @pytest.mark.parametrize("form", ["contour", "path"])
 @pytest.mark.parametrize("block", range(4))
 def test_the_tool_goes_where_it_should_with_a_worn_cutter(tmp_path: Path, block: int, form: str) -> None:
@@ -163,6 +183,24 @@ def test_the_tool_goes_where_it_should_along_an_arc_that_enters(tmp_path: Path, 
             off[seed] = verdict.max_um
     assert not off
     assert taken >= 18
+
+
+@pytest.mark.parametrize("block", range(3))
+def test_short_blocks_turn_no_farther_than_the_tolerance(tmp_path: Path, block: int) -> None:
+    """Blocks from 0.03 mm on, which one digit turns by 3 mrad: along the path the tool may be early."""
+    path = machines.random_machine(tmp_path, block, WORN)
+    off, taken = {}, 0
+    for seed in range(50 * block, 50 * block + 50):
+        nominal = contour(seed)
+        if not linuxcnc.accepts(nominal, path):
+            continue
+        result = olp.correct(nominal, path)
+        verdict = judge_programs(nominal, result.data, path, kinds=CUTTING, smooth_rad=0.05)
+        taken += 1
+        if verdict.max_um > ALLOWED_UM or not result.report["deviation"]["holds"]:
+            off[seed] = verdict.max_um
+    assert not off
+    assert taken > 15
 
 
 @pytest.mark.parametrize("play", [{}, PLAY])

@@ -8,7 +8,7 @@ import numpy as np
 
 from olp.core.arrays import Index, Mask
 from olp.core.errors import ProgramError
-from olp.core.toolpath import Arcs, Frame, Kind, Toolpath
+from olp.core.toolpath import Arcs, Flag, Frame, Kind, Toolpath
 from olp.core.values import dataclass
 from olp.program.contours.elements import AXES, Elements, direction
 from olp.program.contours.entries import entry_arcs
@@ -94,6 +94,14 @@ class _Beside:
             end = k
             still = (path.end_mm[k:, axes] == path.end_mm[k - 1, axes]).all(axis=1) & ~on[k:]
             end += len(still) if still.all() else int(still.argmin())
+            holes = k + np.flatnonzero(path.flag[k:end] & np.uint8(Flag.CYCLE))
+            if holes.size:
+                raise ProgramError(
+                    "a canned cycle drills where the contour ended, and whether the control goes there from "
+                    "beside the contour is not known; move across the plane between G40 and the cycle",
+                    line=int(path.line[holes[0]]),
+                    code="OLP528",
+                )
             held.append(np.arange(k, end))
             of.append(np.full(end - k, last[k]))
         order = np.argsort(np.concatenate(held), kind="stable")

@@ -276,7 +276,14 @@ class CycleBlocks:
         x, y, z = self._along(np.array(self._state.position)).tolist()
         initial = self._initial * drilling.unit + drilling.ground
         to_r = np.asarray(context.retract[run.line[of]] == RETRACT_TO_R)
-        return strokes(drilling, (x, y, z), place, to_r, initial)
+        return strokes(drilling, (x, y, z), place, to_r, initial, beside=self._beside())
+
+    def _beside(self) -> bool:
+        """Whether the tool still is beside the contour that the last move was of: the next one goes to all
+        that is programmed, and is one of the cycle."""
+        last = self._collector.frame
+        of = self._state.frames[last].compensation if last >= 0 else None
+        return of is not None and of.radius_mm > 0 and self._state.profile.contours.returns
 
     def _spend(self, made: Strokes, of: Index, refused: Refused) -> None:
         """Take the work of the holes from the budget, of one after the other."""

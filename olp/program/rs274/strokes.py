@@ -174,15 +174,17 @@ class Strokes:
 
 
 def strokes(
-    drilling: Drilling, start: tuple[float, float, float], place: Array, to_r: Mask, initial: float
-) -> Strokes:
+    drilling: Drilling, start: tuple[float, float, float], place: Array, to_r: Mask, initial: float,
+    *, beside: bool = False,
+) -> Strokes:  # fmt: skip
     """Strokes of holes one behind the other, which have no `faults`; rapids of zero length are left out, a
     feed of zero length is not.
 
     `start` is the position before the first of them, `place` (h, 2) where they are along the first and second
     axis of the plane. `to_r` (h,) return to R only, and others to `initial`, the position on the tool axis
-    before the series, where that is above R. Pecks are counted in numbers of the program, as the control does
-    it: the last one may hang on the last bit.
+    before the series, where that is above R. `beside` a contour the tool is not at the start yet: the move to
+    the first hole is one, however short, where the control does not rise before it. Pecks are counted in
+    numbers of the program, as the control does it: the last one may hang on the last bit.
     """
     rules, recipe = drilling.rules, _RECIPES[drilling.code]
     first, second, third = PLANES[drilling.plane]
@@ -216,6 +218,7 @@ def strokes(
     came = np.vstack(([start[first], start[second]], place[:-1]))
     keep = (step != Step.RAPID) | (level != np.concatenate(([start[third]], level[:-1])))
     keep[begin + 1] |= (place != came).any(axis=1)
+    keep[begin[:1] + 1] |= beside & ~below[:1]
     point = np.empty((len(hole), 3))
     for axis, here, there in ((first, came[:, 0], place[:, 0]), (second, came[:, 1], place[:, 1])):
         point[:, axis] = there[hole]

@@ -111,6 +111,32 @@ def test_holes_and_presets_behind_a_contour_count_the_moves_of_the_tool(tmp_path
     assert len(done.captures) == 1
 
 
+@pytest.mark.parametrize(("level", "first"), [("0", (50, 0, 10)), ("10", (50, 0, 10)), ("12", (50, 0, 12))])
+def test_a_hole_where_a_contour_ended_is_reached_across_the_plane_first(
+    tmp_path: Path, level: str, first: tuple[int, int, int]
+) -> None:
+    """From beside the contour at Z10; a retract level above is reached on the way there."""
+    text = b"G42 D1 G1 X20 Y0\nX50\nG40\n"
+    done = program(tmp_path, text + b"G98 G81 X50 Y0 Z-5 R%s\nG80\n" % level.encode())
+    after = moves(done)[3:]
+    assert after[0] == ("RAPID", *first)
+    assert after[-2:] == [("LINE", 50, 0, -5), ("RAPID", 50, 0, max(int(level), 10))]
+    assert len(after) == (4 if level == "0" else 3)
+    assert done.holes.first.tolist() == [3]
+    # a move between them has gone there already
+    between = moves(program(tmp_path, text + b"G0 Z9\nG81 X50 Y0 Z-5 R0\nG80\n"))
+    assert between[3:5] == [("RAPID", 50, 0, 9), ("RAPID", 50, 0, 0)]
+
+
+def test_a_hole_where_a_contour_ended_is_refused_on_other_controls(tmp_path: Path) -> None:
+    text = b"G42 D1 G1 X20. Y0.\nX50.\nG40\n%sG99 G81 X50. Y0. Z-5. R1.\nG80\n"
+    line, why = refused(tmp_path, text % b"", "fanuc")
+    assert line == 6
+    assert "drills where the contour ended" in why
+    assert refused(tmp_path, text % b"Z20.\n", "fanuc")[0] == 7
+    program(tmp_path, text % b"X51.\n", "fanuc")
+
+
 def test_a_move_along_the_tool_axis_before_a_contour_stays_where_it_was(tmp_path: Path) -> None:
     """Some controls begin beside the next move, whatever is before it."""
     text = b"G42 D1 G1 X20. Y0.\nX50.\nG40 X90. Y60.\nG41 D1 Z5.\nX70.\nY90.\nG40 X0.\n"
