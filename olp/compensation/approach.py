@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.compensation.plan import Limits, Plan
-from olp.core.arrays import Array, Index, Mask, distinct
+from olp.core.arrays import Array, Index, Mask, any_in_row, distinct
 from olp.core.toolpath import Flag, Kind, Toolpath
 from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
@@ -80,7 +80,7 @@ def with_approaches(
     if steady is not None:
         where = where[~steady[rows.move[where]]]
     wanted = unknown[where] & known.first(rows.command_mm, where, unknown)
-    where, wanted = where[wanted.any(axis=1)], wanted[wanted.any(axis=1)]
+    where, wanted = where[any_in_row(wanted)], wanted[any_in_row(wanted)]
     if not where.size:
         return rows
     past = np.maximum(_DIGITS * limits.digit_mm, _LEAST_MM)
@@ -109,8 +109,8 @@ def with_approaches(
 def _rapids(path: Toolpath, rows: Plan, unknown: Mask) -> Index:
     """The last rows of rapids after which a cut begins while the side of an axis is unknown."""
     kind, flag = path.kind[rows.move], path.flag[rows.move]
-    cutting = (kind != Kind.RAPID) & ~rows.raw.any(axis=1)
-    starts = np.flatnonzero(cutting[1:] & unknown[:-1].any(axis=1)) + 1
+    cutting = (kind != Kind.RAPID) & ~any_in_row(rows.raw)
+    starts = np.flatnonzero(cutting[1:] & any_in_row(unknown[:-1])) + 1
     found = []
     for start in starts.tolist():
         k = start - 1

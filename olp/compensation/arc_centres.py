@@ -8,7 +8,7 @@ import numpy.typing as npt
 from olp.compensation.arcs import WIDE, Pieces, fit, sample_groups, sampled
 from olp.compensation.rows import Rows
 from olp.compensation.writer import Writer
-from olp.core.arrays import Array, Index, Mask
+from olp.core.arrays import Array, Index, Mask, most_in_row
 from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES, arms
 from olp.core.toolpath import Flag
@@ -88,9 +88,9 @@ def solve(writer: Writer, rows: Rows) -> ArcRows:
         centre[part] = _on_bisector(start[part], end[part], best, plane[part], equal)
         # an arc that is only shifted keeps its words
         shift = bend.command[:, 0] - bend.point[:, 0]
-        alike = np.abs(start[part] - bend.point[:, 0] - end[part] + bend.point[:, -1]).max(axis=1) < 1e-7
+        alike = most_in_row(np.abs(start[part] - bend.point[:, 0] - end[part] + bend.point[:, -1])) < 1e-7
         absolute = writer.program.arc_slots.absolute[arc[part]]
-        kept[part] = bend.rigid & alike & (~absolute | (np.abs(shift).max(axis=1) < 1e-9))
+        kept[part] = bend.rigid & alike & (~absolute | (most_in_row(np.abs(shift)) < 1e-9))
     kept &= rows.head[arc_row] & (reach == 1.0)
     _check_sweep(start, end, centre, sweep, plane, path.line[move])
     solved = ArcRows(arc_row, move.astype(np.int64), path.line[move], start, end, centre, sweep, plane)

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from olp.compensation.invert import bent
 from olp.compensation.lines import Cuts, no_cuts
-from olp.core.arrays import Array, Index, Mask, distinct
+from olp.core.arrays import Array, Index, Mask, distinct, most_in_row
 from olp.core.errors import CannotCompute
 from olp.core.geometry import PLANES, ArcShapes, arc_directions, arc_points, arms
 from olp.core.toolpath import Toolpath
@@ -311,7 +311,7 @@ def departure(
     reached = _near(np.arctan2(q1 - y, q0 - x) - begin, share * turn) / turn
     radial = _length(q0 - x, q1 - y) - (rs + (re - rs) * reached)
     level = (q2 - (s2 + (e2 - s2) * reached)) * rs / np.hypot(rs, (e2 - s2) / turn)
-    return np.asarray(_length(radial, level).max(axis=1))
+    return np.asarray(most_in_row(_length(radial, level)))
 
 
 def _in_planes(point: Array, axes: Index) -> tuple[Array, Array, Array]:

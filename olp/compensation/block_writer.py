@@ -18,7 +18,7 @@ from olp.compensation.shared_words import shared_edits
 from olp.compensation.stretches import Decimals, Stretches, digits_of
 from olp.compensation.style import by_unit
 from olp.compensation.writer import Writer
-from olp.core.arrays import Array, Index, Mask, distinct
+from olp.core.arrays import Array, Index, Mask, any_in_row, distinct, most_in_row
 from olp.core.progress import Progress, silent
 from olp.core.toolpath import Flag
 from olp.core.turns import Turns
@@ -176,7 +176,7 @@ class BlockWriter(Writer):
             )
             self.tally.changed_words += len(replace)
         missing = write & (slot < 0)
-        incomplete = np.flatnonzero(missing.any(axis=1))
+        incomplete = np.flatnonzero(any_in_row(missing))
         if incomplete.size:
             edits += self._insertions(rows, head[incomplete], slot[incomplete], missing[incomplete])
         tails = np.flatnonzero(~rows.head & ((rows.flag & _BYPASS) == 0))
@@ -192,7 +192,7 @@ class BlockWriter(Writer):
         """Words of axes that a block omits, behind its last coordinate word, in that word's style."""
         words = self.words
         ends = np.where(slot >= 0, words.end[slot], -1)
-        place = ends.max(axis=1).astype(np.int64)
+        place = most_in_row(ends).astype(np.int64)
         last = np.take_along_axis(slot, ends.argmax(axis=1)[:, None], axis=1)[:, 0]
         none = np.flatnonzero(place < 0)
         for i in none.tolist():

@@ -11,7 +11,7 @@ from olp.compensation.digits import AxisRows, Digits, absolute
 from olp.compensation.incremental_holes import SeriesWords, incremental_block
 from olp.compensation.rows import Rows
 from olp.compensation.writer import Writer
-from olp.core.arrays import Array, Index, distinct
+from olp.core.arrays import Array, Index, any_in_row, distinct, most_in_row
 from olp.core.geometry import PLANES
 from olp.core.toolpath import Flag
 from olp.program.holes import CHANGED, Holes, Small
@@ -150,7 +150,7 @@ def _edits(writer: Writer, word: Small, last_word: Small, columns: dict[str, Dig
     """Edits of blocks whose X, Y, Z and R are `word` (h, 4): words replaced, or inserted behind the last of
     these, in its style and in the order of `columns`."""
     words = writer.words
-    anchor = np.where((word >= 0).any(axis=1), word.max(axis=1), last_word)
+    anchor = np.where(any_in_row(word >= 0), most_in_row(word), last_word)
     style = writer.style.separators(anchor, writer.program)
     for order, (letter, digits) in enumerate(columns.items()):
         slot = word[:, CHANGED.index(letter)]

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from olp.compensation.rows import Rows
 from olp.compensation.writer import Writer
-from olp.core.arrays import Index, Mask, distinct, is_in
+from olp.core.arrays import Index, Mask, any_in_row, distinct, is_in
 from olp.core.errors import ProgramError
 from olp.core.toolpath import Flag, Kind
 from olp.program.rs274.codes import (
@@ -42,7 +42,7 @@ def block_edits(writer: Writer, rows: Rows, tails: Index) -> list[Edits]:
     rapid = writer.path.kind[rows.move[tails]] == Kind.RAPID
     lead = _leads(writer, line_no, arc & straight, before, rapid)
     write = rows.write[tails]
-    first_axis = np.where(write.any(axis=1), write.argmax(axis=1), -1)
+    first_axis = np.where(any_in_row(write), write.argmax(axis=1), -1)
     columns: list[Edits] = []
     for axis in range(3):
         chosen = np.flatnonzero(write[:, axis] & straight)

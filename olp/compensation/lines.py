@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from olp.compensation.invert import bent
-from olp.core.arrays import Array, Index, Mask
+from olp.core.arrays import Array, Index, Mask, all_in_row
 from olp.core.toolpath import Toolpath
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.sampling import clear_length_mm, longer, steps_needed
@@ -52,7 +52,7 @@ def subdivide_lines(
         start[0] = target[a - 1] if a else begin
         delta = target[a:b] - start
         long = longer(delta, clear)
-        long = long[free[a:b][long] & np.isfinite(delta[long]).all(axis=1)]
+        long = long[free[a:b][long] & all_in_row(np.isfinite(delta[long]))]
         bound = model.chord_bound(delta[long], tools if tools.ndim == 1 else tools[a + long])
         long = long[bound > tolerance]
         if long.size:

@@ -94,7 +94,8 @@ class Targets:
     shift_mm: Array
 
     def __getitem__(self, rows: Index | slice | int, /) -> Array:
-        end = self.path.end_mm[rows]
+        end = self.path.end_mm
+        end = end.take(rows, axis=0) if isinstance(rows, np.ndarray) else end[rows]
         return end + self.shift_mm[self.path.frame[rows]] if self.shift_mm.any() else end
 
 

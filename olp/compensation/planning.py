@@ -19,7 +19,7 @@ from olp.compensation.plan import Limits, Plan, targets, zero_shifts
 from olp.compensation.programmed import programmed
 from olp.compensation.reversal import Carried, Reversal, carry_play
 from olp.compensation.style import Style
-from olp.core.arrays import Array, Index, Mask, distinct, is_in
+from olp.core.arrays import Array, Index, Mask, all_in_row, any_in_row, distinct, is_in
 from olp.core.errors import OutsideBox, ProgramError
 from olp.core.machine import Vector
 from olp.core.progress import Progress, part, silent
@@ -101,7 +101,7 @@ class Planning:
         tell("correct", 0.3)
         chord = limits.tolerance_mm * (CHORD_SHARE - (DEAD_BAND_SHARE if reversal is not None else 0.0))
         contour = Contour.of(path)
-        whole = ((path.flag & _UNSPLIT) != 0) | raw.any(axis=1)
+        whole = ((path.flag & _UNSPLIT) != 0) | any_in_row(raw)
         if contour is not None:
             whole |= contour.whole
         kinds = (Kind.LINE, Kind.RAPID) if limits.split_rapids else (Kind.LINE,)
@@ -151,14 +151,14 @@ def _untouched(path: Toolpath, model: ErrorModel) -> tuple[Mask, Index]:
     raw[(path.flag & _UNTOUCHED) != 0] = True
     unknown = np.isnan(path.end_mm)
     uncorrected = np.zeros(0, np.int64)
-    some = np.flatnonzero(unknown.any(axis=1))
+    some = np.flatnonzero(any_in_row(unknown))
     if some.size:
         blind = np.any(unknown[some][:, None, :] & model.depends_on[None], axis=2)
         # an unknown axis that has an error would need a word, which it never gets
         tool = path.tool_mm()
         error = model.error(path.end_mm[some], tool if tool.ndim == 1 else tool[some])
-        lacking = (unknown[some] & (np.nan_to_num(error) != 0)).any(axis=1)
-        wanting = some[(blind.any(axis=1) | lacking) & ~raw[some].any(axis=1)]
+        lacking = any_in_row(unknown[some] & (np.nan_to_num(error) != 0))
+        wanting = some[(any_in_row(blind) | lacking) & ~any_in_row(raw[some])]
         cutting = wanting[path.kind[wanting] != Kind.RAPID]
         if cutting.size:
             i = int(cutting[0])
@@ -179,7 +179,7 @@ def _untouched(path: Toolpath, model: ErrorModel) -> tuple[Mask, Index]:
 def _mix_turned(path: Toolpath, raw: Mask) -> None:
     """In a turned frame one word moves several axes: where one of these keeps the program's words, all do."""
     turns = path.turns()
-    some = np.flatnonzero(raw.any(axis=1) & ~raw.all(axis=1))
+    some = np.flatnonzero(any_in_row(raw) & ~all_in_row(raw))
     if turns is not None and some.size:
         mixes = turns.mixes(turns.of_frame[path.frame[some]])
         words = np.any(mixes & raw[some][:, :, None], axis=1)
@@ -262,7 +262,7 @@ def _check_box(path: Toolpath, model: ErrorModel, rows: Plan) -> None:
         outside = (rows.command_mm < box[:, 0]) | (rows.command_mm > box[:, 1])
     outside &= ~((path.flag & _UNTOUCHED) != 0)[rows.move][:, None]
     if outside.any():
-        row = int(np.flatnonzero(outside.any(axis=1))[0])
+        row = int(np.flatnonzero(any_in_row(outside))[0])
         axis = int(np.flatnonzero(outside[row])[0])
         unit = path.frames[int(path.frame[rows.move[row]])].unit_mm
         inches = "; the program counts in inches there" if unit == MM_PER_INCH else ""

@@ -17,7 +17,7 @@ from olp.compensation.contour import Contour
 from olp.compensation.dead_band import UNKNOWN, Rest, follow
 from olp.compensation.invert import invert
 from olp.compensation.plan import Plan
-from olp.core.arrays import Array, Index, Mask
+from olp.core.arrays import Array, Index, Mask, any_in_row
 from olp.core.progress import Progress, silent
 from olp.core.toolpath import Flag, Kind, Toolpath
 from olp.core.values import dataclass
@@ -162,14 +162,14 @@ def _still(path: Toolpath, rows: Plan, source: Index | None) -> Index | None:
 def _may_turn(path: Toolpath, rows: Plan, command_mm: Array, *, insert: bool) -> Mask:
     """(r,) rows before which a step may be put: feed moves that are corrected and start at a known position,
     the first one at `command_mm` (3,). Without `insert` not before those that are never split."""
-    may = ~rows.raw.any(axis=1) & (path.kind[rows.move] != Kind.RAPID)
+    may = ~any_in_row(rows.raw) & (path.kind[rows.move] != Kind.RAPID)
     may &= (path.flag[rows.move] & np.uint8(Flag.CYCLE)) == 0
     if not insert:
         may &= (path.flag[rows.move] & np.uint8(Flag.WHOLE)) == 0
     # a step in front of a block that calls a cycle would call it too
     calls = (path.line[1:] == path.line[:-1]) & ((path.flag[1:] & np.uint8(Flag.PASS)) != 0)
     may &= ~np.append(calls, False)[rows.move]
-    may &= ~np.isnan(_before(command_mm, rows.command_mm)).any(axis=1)
+    may &= ~any_in_row(np.isnan(_before(command_mm, rows.command_mm)))
     return np.asarray(may, bool)
 
 
@@ -182,7 +182,7 @@ def _take_up(model: ErrorModel, rows: Plan, tool: Array, held: Array, turns: Mas
     """Insert rows that turn the drive round before the load moves; `before` is of the row before the first
     one."""
     assert rows.play is not None
-    where = np.flatnonzero(turns.any(axis=1))
+    where = np.flatnonzero(any_in_row(turns))
     target = _before(before.target_mm, rows.target_mm)[where]
     start = _before(before.command_mm, rows.command_mm)[where]
     play = rows.play[where]

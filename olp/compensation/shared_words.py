@@ -11,6 +11,7 @@ import numpy as np
 from olp.compensation.digits import INT10
 from olp.compensation.rows import Rows
 from olp.compensation.writer import Writer
+from olp.core.arrays import any_in_row
 from olp.program.text.edits import Edits
 
 #: Digits of shares, at least: those of slicers.
@@ -33,7 +34,7 @@ def shared_edits(writer: Writer, rows: Rows) -> list[Edits]:
     word = shared.word[line - 1]
     # from an unknown position no share of one can be written
     known = (word >= 0) & ~np.isnan(shared.before[line - 1])
-    row = np.flatnonzero(several & known & (rows.head | rows.arc | rows.write.any(axis=1)))
+    row = np.flatnonzero(several & known & (rows.head | rows.arc | any_in_row(rows.write)))
     if not len(row):
         return []
     word, line, move = word[row], line[row], rows.move[row]

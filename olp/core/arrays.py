@@ -54,11 +54,36 @@ def is_in(values: npt.NDArray[Scalar], some: Collection[float] | npt.NDArray[Any
     return found
 
 
+def any_in_row(rows: Mask) -> Mask:
+    """(n,) whether a column of rows (n, k), k > 0, is true. On short rows NumPy's own takes ten times as
+    long, here and in the next two."""
+    found = rows[:, 0].copy()
+    for column in rows.T[1:]:
+        found |= column
+    return found
+
+
+def all_in_row(rows: Mask) -> Mask:
+    """(n,) whether all columns of rows (n, k), k > 0, are true."""
+    held = rows[:, 0].copy()
+    for column in rows.T[1:]:
+        held &= column
+    return held
+
+
+def most_in_row(rows: npt.NDArray[Scalar]) -> npt.NDArray[Scalar]:
+    """(n,) the largest value of each of rows (n, k), k > 0; NaN where one of them is."""
+    most = rows[:, 0].copy()
+    for column in rows.T[1:]:
+        np.maximum(most, column, out=most)
+    return most
+
+
 def distinct_rows(rows: npt.NDArray[Scalar]) -> npt.NDArray[Scalar]:
     """(m, k) the distinct rows (n, k) without NaN, in ascending order, as `np.unique` gives them."""
     ordered = rows[np.lexsort(rows.T[::-1])]
     first = np.ones(len(ordered), bool)
-    first[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    first[1:] = any_in_row(ordered[1:] != ordered[:-1])
     return ordered[first]
 
 

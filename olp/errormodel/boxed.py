@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from olp.core.arrays import Array, Index, Mask
+from olp.core.arrays import Array, Index, Mask, any_in_row
 from olp.core.errors import UsageError
 from olp.core.values import dataclass
 
@@ -48,7 +48,7 @@ def by_tool(tool_mm: Array) -> Iterator[tuple[slice | Index, Array]]:
     else:
         order = np.lexsort(tool_mm.T)
         ordered = tool_mm[order]
-        first = np.flatnonzero((ordered[1:] != ordered[:-1]).any(axis=1)) + 1
+        first = np.flatnonzero(any_in_row(ordered[1:] != ordered[:-1])) + 1
         for a, b in pairwise((0, *first.tolist(), len(order))):
             yield order[a:b], ordered[a]
 

@@ -6,10 +6,12 @@ the waypoints this is plain; elsewhere the alignment with the least squares of d
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
 from olp.compensation.plan import TargetRows
-from olp.core.arrays import Array, Index, Mask, distinct
+from olp.core.arrays import Array, Index, Mask, all_in_row, any_in_row, distinct, most_in_row
 from olp.core.geometry import PLANES, segment_distance
 from olp.core.toolpath import Flag, Kind
 from olp.proof.pages import Page, Tips
@@ -31,6 +33,8 @@ _WINDOW = 12
 _KEPT = 6
 #: rad; angles of an arc count from this much before its start.
 _WHOLE = 1e-3
+#: rad; an arc that turns farther passes its end before it ends there.
+_TURN = 2 * np.pi - _WHOLE
 #: Inserted moves that a window allows at first; more where the alignment needs them.
 _SPARE = 64
 #: Inserted moves that a window allows at most while some waypoint is far off.
@@ -57,16 +61,17 @@ class Alignment:
         before = max(path.first - 1, 0)
         tip = tips.of(before, path.first + len(path.path))
         own = tip[path.first - before :]
-        self.tip = own[path.last]
+        self.tip = own.take(path.last, axis=0)
         free = (part.flag[nominal.last] & FREE) != 0
-        self.unknown = np.asarray(np.isnan(self.target).all(axis=1))
+        self.unknown = np.asarray(all_in_row(np.isnan(self.target)))
         self.loose = free | self.unknown
         #: what is left uncorrected is known by its commands
-        self.said, self.written = part.end_mm[nominal.last], path.path.end_mm[path.last]
+        self.said = part.end_mm.take(nominal.last, axis=0)
+        self.written = path.path.end_mm.take(path.last, axis=0)
         # a rapid with an unknown axis is left uncorrected
-        partly = np.isnan(self.target).any(axis=1) & (nominal.kind == Kind.RAPID)
+        partly = any_in_row(np.isnan(self.target)) & (nominal.kind == Kind.RAPID)
         self.reach = np.where(partly, FAR_MM / 2, near_mm)
-        self.lost = np.asarray(np.isnan(self.tip).all(axis=1))
+        self.lost = np.asarray(all_in_row(np.isnan(self.tip)))
         index = np.full(len(part), -1, np.int64)
         index[part.arcs.move] = np.arange(len(part.arcs))
         self.arc = index[nominal.last]
@@ -74,17 +79,34 @@ class Alignment:
         move = self.arcs.move
         #: the centres move with the waypoints, by the shift of the zero
         self.centre = self.arcs.centre_mm + np.nan_to_num(target[begin + move] - part.end_mm[move])
-        #: the length of the path before each unit, and all of it
-        self.length = _lengths(nominal, self.begin, self.target)
-        first_tip = tip[:1] if path.first else np.array(path.path.start_mm)[None]
-        self.gone = _lengths(path, np.vstack((first_tip, self.tip[:-1])), self.tip)
-        #: mm, before which a unit does not end: a path of whole turns passes its end before it ends there
-        self.least = np.full(len(nominal), -np.inf)
-        turning = np.flatnonzero(self.arc >= 0)
-        sweep = np.abs(self.arcs.sweep_rad[self.arc[turning]])
-        turning, sweep = turning[sweep > 2 * np.pi - _WHOLE], sweep[sweep > 2 * np.pi - _WHOLE]
-        self.least[turning] = np.diff(self.length)[turning] * (1.0 - np.pi / sweep)
+        self.first_tip = tip[:1] if path.first else np.array(path.path.start_mm)[None]
+        self.turning = np.flatnonzero(self.arc >= 0)
+        sweep = np.abs(self.arcs.sweep_rad[self.arc[self.turning]])
+        self.turning, self.sweep = self.turning[sweep > _TURN], sweep[sweep > _TURN]
         self.tries = tries
+
+    @cached_property
+    def length(self) -> Array:
+        """(u + 1,) mm, the length of the nominal path before each unit, and all of it."""
+        return _lengths(self.mine, self.begin, self.target)
+
+    @cached_property
+    def gone(self) -> Array:
+        """The same of the corrected path."""
+        return _lengths(self.theirs, np.vstack((self.first_tip, self.tip[:-1])), self.tip)
+
+    @cached_property
+    def least(self) -> Array:
+        """(u,) mm, before which a unit does not end: a path of whole turns passes its end before."""
+        least = np.full(len(self.mine), -np.inf)
+        least[self.turning] = np.diff(self.length)[self.turning] * (1.0 - np.pi / self.sweep)
+        return least
+
+    @cached_property
+    def lonely(self) -> Mask:
+        """(u,) whether no tip is near both a waypoint and the one before it."""
+        # false where an axis is unknown
+        return any_in_row(np.abs(self.target - self.begin) > 2 * self.reach.max(initial=0.0))
 
     def ends(self) -> Index:
         """The unit of the corrected program at which each nominal unit ends, of the first nominal units: as
@@ -129,6 +151,15 @@ class Alignment:
         good &= self.mine.kind[i] == self.theirs.kind[j]
         return good
 
+    def _in_step(self, i: int, j: int, count: int) -> bool:
+        """Whether the next units, and the one behind them, end one by one at the units from j on."""
+        mine = slice(i, min(i + count + 1, len(self.mine)))
+        others = slice(j, j + mine.stop - i)
+        if others.stop > len(self.theirs):
+            return False
+        alike = self.lonely[mine] & (self.mine.kind[mine] == self.theirs.kind[others])
+        return bool((alike & _within(self.tip[others], self.target[mine], self.reach[mine])).all())
+
     def _stretch(self, i: int, j: int, size: int) -> Index:
         """The ends of the next units, `size` at most, up to the first that is in any doubt.
 
@@ -136,6 +167,8 @@ class Alignment:
         """
         # what comes behind a unit has to be on the page
         rows = np.arange(i, min(i + size, len(self.mine) - (not self.mine.final)))
+        if self._in_step(i, j, len(rows)):
+            return j + np.arange(len(rows))
         before = self.length[rows] - self.length[i] + self.gone[j]
         about = np.searchsorted(self.gone[1:], before + np.diff(self.length[i : i + len(rows) + 1]))
         choice = np.clip(about[:, None] + _BESIDE, j, len(self.theirs) - 1)
@@ -147,7 +180,7 @@ class Alignment:
         ends: Index = choice[np.arange(len(rows)), near.argmax(axis=1)]
         begin = np.concatenate(([j], ends[:-1] + 1))
         inserted = ends - begin
-        good = near.any(axis=1) & (inserted >= 0) & (inserted <= _SPARE)
+        good = any_in_row(near) & (inserted >= 0) & (inserted <= _SPARE)
         good &= ends - rows <= self._room(0, 0)
         if not self.theirs.final:
             good &= about + _BESIDE[-1] + 1 < len(self.theirs)
@@ -200,7 +233,7 @@ class Alignment:
         begin, end, point = (
             np.where(known, some, 0.0) for some in (self.begin[i], self.target[i], self.tip[j])
         )
-        nowhere = np.asarray(np.isnan(begin).any(axis=1))
+        nowhere = np.asarray(any_in_row(np.isnan(begin)))
         begin = np.where(nowhere[:, None], end, begin)
         away = segment_distance(point, begin, end)
         curved = np.flatnonzero(self.arc[i] >= 0)
@@ -260,7 +293,7 @@ class Alignment:
 
     def _far(self, i: Index, j: Index) -> bool:
         """Whether some nominal unit would end far from its waypoint."""
-        away = apart(self.tip[j], self.target[i]).max(axis=1)
+        away = most_in_row(apart(self.tip[j], self.target[i]))
         return bool(((away >= FAR_MM) & ~self.loose[i]).any())
 
     def _aligned(self, i: int, j: int, rows: int, width: int) -> Index:
@@ -329,5 +362,5 @@ def _within(tip: Array, target: Array, reach: Array) -> Mask:
     good = (away[:, 0] < reach) & (away[:, 1] < reach) & (away[:, 2] < reach)
     blind = np.flatnonzero(np.isnan(away[:, 0] + away[:, 1] + away[:, 2]))
     if blind.size:
-        good[blind] = apart(tip[blind], target[blind]).max(axis=1) < reach[blind]
+        good[blind] = most_in_row(apart(tip[blind], target[blind])) < reach[blind]
     return np.asarray(good)

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.compensation.plan import TargetRows
-from olp.core.arrays import Array, Index, Mask
+from olp.core.arrays import Array, Index, Mask, all_in_row, any_in_row
 from olp.core.geometry import ArcShapes, arms, segment_distance
 from olp.core.progress import Progress, silent
 from olp.core.toolpath import Flag, Kind, Toolpath
@@ -192,7 +192,7 @@ class Tracer:
         tool = path.tool_mm(first, last)
         delta = np.where(np.isnan(end), 0.0, end - start)
         steps = np.ones(len(end), np.int64)
-        known = np.asarray(np.isfinite(delta).all(axis=1))
+        known = np.asarray(all_in_row(np.isfinite(delta)))
         arc = _arc_index(path, first, last)
         cut = known & (path.kind[first:last] != Kind.RAPID)
         which = longer(delta, self.clear_mm)
@@ -221,7 +221,7 @@ class Tracer:
     def _ends(self, a: int, b: int, tips: Array, ends: Index, waypoint: Single) -> None:
         """How far the tip is off at the ends of nominal moves a..b, behind `ends` of the moves that reach
         `tips` [1:]. A hole with fewer pecks than the nominal one has strokes that end before them, at -1."""
-        away = self._known(a + np.arange(b - a), tips[ends + 1] - self.target[a:b])
+        away = self._known(a + np.arange(b - a), tips.take(ends + 1, axis=0) - self.target[a:b])
         waypoint[:] = np.sqrt(np.einsum("ij,ij->i", away, away))
         if self.joints is not None:
             self.joints.put_across(waypoint, a + np.arange(b - a), away)
@@ -255,7 +255,7 @@ class Tracer:
     ) -> _Inner:  # fmt: skip
         """Samples where an axis that turned round has taken up its backlash: from there on the tip is off by
         all of it. `plays` are those before and at each of the samples `share` of `part`."""
-        turned = np.flatnonzero((plays[1:] != plays[:-1]).any(axis=1) & (kind[part] != Kind.RAPID))
+        turned = np.flatnonzero(any_in_row(plays[1:] != plays[:-1]) & (kind[part] != Kind.RAPID))
         # a move ends with its sample at 1, and the next one begins at 0
         early = (np.concatenate(([1.0], share[:-1])) % 1.0)[turned]
         part, span = part[turned], share[turned] - early
@@ -305,12 +305,12 @@ class Tracer:
         self.before, self.away = tips[-1], waypoint[-1]
         begin = np.concatenate(([0], self.groups[a : b - 1] + 1 - first))
         farther = (np.nan_to_num(away, nan=np.inf) > worst) & (self.nominal.kind[a:b] != Kind.RAPID)
-        known = np.isfinite(self._known(a + np.arange(b - a), tips[begin])).all(axis=1)
+        known = all_in_row(np.isfinite(self._known(a + np.arange(b - a), tips.take(begin, axis=0))))
         farther &= (begin < len(tips) - 1) & known
         rows = np.flatnonzero(farther)
         rows = rows[owner[begin[rows]] == rows]
         if rows.size:
-            starts = _Inner(begin[rows], np.zeros(len(rows)), tips[begin[rows]])
+            starts = _Inner(begin[rows], np.zeros(len(rows)), tips.take(begin[rows], axis=0))
             self._along(a, b, first, owner, starts, worst)
 
     def _arc_steps(self, arc: Index, start: Array, delta: Array, tool: Array, rows: Index) -> Index:
@@ -358,8 +358,9 @@ class Tracer:
         line = of[straight]
         distance = np.empty(len(of))
         distance[straight] = segment_distance(
-            actual[straight], self._known(a + line, begin[line]), self._known(a + line, goal[line])
-        )
+            actual.take(straight, axis=0), self._known(a + line, begin.take(line, axis=0)),
+            self._known(a + line, goal.take(line, axis=0)),
+        )  # fmt: skip
         if curved.size:
             arcs, move = nominal.arcs, a + rows
             shift = goal[rows] - nominal.end_mm[move]

@@ -141,14 +141,19 @@ class Judgements:
         first, last = np.full(count, self.line.max(initial=0)), np.zeros(count, np.int64)
         largest, uncorrected, over = np.zeros(count, np.float32), np.zeros(count), np.zeros(count, bool)
         for rows in self._judged_rows():
-            group = np.searchsorted(values, of[rows])
-            np.minimum.at(begin, group, rows)
-            np.maximum.at(largest, group, np.nan_to_num(self.corrected[rows]))
-            np.minimum.at(first, group, self.line[rows])
-            np.maximum.at(last, group, self.line[rows])
-            np.fmax.at(uncorrected, group, self.uncorrected[rows])
+            # a group is a few runs of rows
+            runs = np.flatnonzero(np.diff(of[rows], prepend=-2))
+            group, line = np.searchsorted(values, of[rows[runs]]), self.line[rows]
+            size = np.nan_to_num(self.corrected[rows])
+            np.minimum.at(begin, group, rows[runs])
+            np.maximum.at(largest, group, np.maximum.reduceat(size, runs))
+            np.minimum.at(first, group, np.minimum.reduceat(line, runs))
+            np.maximum.at(last, group, np.maximum.reduceat(line, runs))
+            np.fmax.at(uncorrected, group, np.fmax.reduceat(self.uncorrected[rows], runs))
         for rows in self._judged_rows():
-            group, size = np.searchsorted(values, of[rows]), np.nan_to_num(self.corrected[rows])
+            runs = np.flatnonzero(np.diff(of[rows], prepend=-2))
+            group = np.searchsorted(values, of[rows[runs]]).repeat(np.diff(runs, append=len(rows)))
+            size = np.nan_to_num(self.corrected[rows])
             # the first of each group with the largest deviation
             top = size == largest[group]
             np.minimum.at(worst, group[top], rows[top])
@@ -170,7 +175,9 @@ class Judgements:
         """The rows of moves that count, in blocks."""
         judged = self.judged
         for a in range(0, len(judged), _BLOCK):
-            yield a + np.flatnonzero(judged[a : a + _BLOCK])
+            rows = np.flatnonzero(judged[a : a + _BLOCK])
+            if rows.size:
+                yield a + rows
 
     def report(self) -> dict[str, Any]:
         """The table by groups, as plain data."""

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from olp.core.arrays import Index, Mask
+from olp.core.arrays import Index, Mask, any_in_row
 from olp.core.errors import ProgramError
 from olp.core.toolpath import Flag, Kind, Toolpath
 from olp.program.program import Program
@@ -68,10 +68,10 @@ def _changes(
     last = np.zeros(len(written), bool)
     # one without moves ends with those before
     last[groups[groups >= 0]] = True
-    known, was_known = np.isfinite(written.end_mm), np.isfinite(path.end_mm[owner])
+    known, was_known = np.isfinite(written.end_mm), np.isfinite(path.end_mm.take(owner, axis=0))
     # where an axis is after a move of the control alone depends on the words behind it
     own = (path.flag[owner] & np.uint8(Flag.CONTROL)) != 0
-    unlike = (known != was_known).any(axis=1) & ~in_hole & ~own
+    unlike = any_in_row(known != was_known) & ~in_hole & ~own
     yield last & unlike, "ends where another axis is known than in the nominal program"
     moved = _moved(path, written, groups, owner, digit_mm)
     yield last & moved, "changes a move that is left uncorrected"
@@ -87,4 +87,4 @@ def _moved(path: Toolpath, written: Toolpath, groups: Index, owner: Index, digit
     first = np.minimum(np.concatenate(([0], groups[:-1] + 1)), len(written) - 1)
     begin = written.starts_mm()[first][owner]
     distance = np.abs((written.end_mm - begin) - (path.end_mm - path.starts_mm())[owner])
-    return np.asarray(away & (np.fmin(end, distance) > _DIGITS * digit_mm).any(axis=1))
+    return np.asarray(away & any_in_row(np.fmin(end, distance) > _DIGITS * digit_mm))

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from olp.compensation.plan import TargetRows
-from olp.core.arrays import Array, Index
+from olp.core.arrays import Array, Index, all_in_row, most_in_row
 from olp.core.errors import ProgramError
 from olp.core.progress import Progress, silent
 from olp.core.values import dataclass
@@ -62,7 +62,7 @@ def match(
         pair = _Pair.of(mine, i, theirs, ends)
         base = int(theirs.first(j, j + 1)[0])
         tip = tips.of(base, int(pair.end[-1]) + 1)
-        others.add(program, target_mm, pair.last, tip[pair.end - base])
+        others.add(program, target_mm, pair.last, tip.take(pair.end - base, axis=0))
         groups[pair.first[0] : pair.last[-1] + 1] = _groups(target_mm, pair, tip, base)
         i, j = i + len(ends), int(ends[-1]) + 1
         tell("prove", i / len(mine))
@@ -98,9 +98,9 @@ class _Others:
 
     def add(self, program: Program, target: TargetRows, move: Index, tip: Array) -> None:
         """Count the ends of units, which are moves (u,) and reach tips (u, 3)."""
-        nominal = program.toolpath
-        counted = ((nominal.flag[move] & FREE) == 0) & ~np.isnan(target[move]).all(axis=1)
-        far = counted & ~(apart(tip, target[move]).max(axis=1) < FAR_MM)
+        nominal, goal = program.toolpath, target[move]
+        counted = ((nominal.flag[move] & FREE) == 0) & ~all_in_row(np.isnan(goal))
+        far = counted & ~(most_in_row(apart(tip, goal)) < FAR_MM)
         if far.any() and not self.far:
             self.first = int(move[np.argmax(far)])
         self.counted += int(counted.sum())

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.compensation.plan import Targets, zero_shifts
-from olp.core.arrays import Array, Index, Mask
+from olp.core.arrays import Array, Index, Mask, all_in_row, any_in_row
 from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES
 from olp.core.progress import Progress, part, silent
@@ -197,7 +197,9 @@ def _longest(vectors: Array) -> float:
 
 def _moved(proof: Proof, a: int, b: int) -> Array:
     """(b - a, 3) how far the waypoints of nominal moves a..b were moved, 0 of canned cycles."""
-    correction = np.nan_to_num(proof.written.end_mm[proof.groups[a:b]] - proof.nominal.end_mm[a:b])
+    correction = np.nan_to_num(
+        proof.written.end_mm.take(proof.groups[a:b], axis=0) - proof.nominal.end_mm[a:b]
+    )
     correction[(proof.nominal.flag[a:b] & np.uint8(Flag.CYCLE | Flag.CONTROL)) != 0] = 0.0
     return np.asarray(correction)
 
@@ -221,8 +223,8 @@ def _how(program: Program) -> npt.NDArray[np.uint8]:
     cycle = (path.flag & np.uint8(Flag.CYCLE)) != 0
     how[cycle] = np.where(path.kind[cycle] == Kind.RAPID, Counts.RAPID, Counts.HOLE)
     unknown = np.isnan(path.end_mm)
-    how[unknown.all(axis=1) & (how <= Counts.HOLE)] = Counts.UNKNOWN
-    how[unknown.any(axis=1) & (how == Counts.HOLE)] = Counts.UNKNOWN
+    how[all_in_row(unknown) & (how <= Counts.HOLE)] = Counts.UNKNOWN
+    how[any_in_row(unknown) & (how == Counts.HOLE)] = Counts.UNKNOWN
     return how
 
 

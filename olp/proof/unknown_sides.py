@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from olp.core.arrays import Array, Index
+from olp.core.arrays import Array, Index, any_in_row
 from olp.core.toolpath import Toolpath
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.reversal import play_interval
@@ -46,7 +46,7 @@ class UnknownSides:
         self.command, self.play = chain[row : row + 1], np.stack((low[row], high[row]))
         half = ((high - low) / 2)[1:]
         half[np.isnan(end)] = 0.0
-        rows = np.flatnonzero((half > 0.0).any(axis=1))
+        rows = np.flatnonzero(any_in_row(half > 0.0))
         unknown = np.zeros(len(end))
         tool = self.path.tool_mm(first, more)
         tool = tool if tool.ndim == 1 else tool[rows]

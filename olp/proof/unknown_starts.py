@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.compensation.plan import TargetRows
-from olp.core.arrays import Array, Index
+from olp.core.arrays import Array, Index, all_in_row, any_in_row
 from olp.core.toolpath import Kind, Toolpath
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.reversal import plays
@@ -41,7 +41,10 @@ class UnknownStarts:
         unknown play changes is not part of it."""
         nominal = self.nominal
         start = nominal.starts_mm(a, b)
-        some = (np.isnan(start) & ~np.isnan(self.target[a:b])).any(axis=1) & np.isfinite(start).any(axis=1)
+        unknown = np.isnan(start)
+        if not unknown.any():
+            return
+        some = any_in_row(unknown & ~np.isnan(self.target[a:b])) & ~all_in_row(unknown)
         some &= nominal.kind[a:b] != Kind.RAPID
         for i in np.flatnonzero(some).tolist():
             meant = start[i] + self.target[a + i] - nominal.end_mm[a + i]

@@ -9,7 +9,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from olp.core.arrays import distinct, distinct_rows, is_in, median
+from olp.core.arrays import (
+    all_in_row,
+    any_in_row,
+    distinct,
+    distinct_rows,
+    is_in,
+    median,
+    most_in_row,
+)
 
 finite = st.one_of(st.sampled_from([0.0, -0.0, 1.0]), st.floats(-1e6, 1e6))
 numbers = arrays.arrays(np.float64, st.integers(1, 40), elements=finite)
@@ -33,6 +41,15 @@ def test_membership_is_that_of_numpy(values: npt.NDArray[np.int64], some: npt.ND
     judged = np.isin(values, some)
     for given_as in (some, some.tolist(), set(some.tolist())):
         assert np.array_equal(is_in(values, given_as), judged)
+
+
+@given(rows)
+def test_rows_are_judged_as_numpy_does(values: npt.NDArray[np.float64]) -> None:
+    values = np.where(values == 1.0, np.nan, values)
+    some = values > 0.0
+    assert np.array_equal(any_in_row(some), some.any(axis=1))
+    assert np.array_equal(all_in_row(some), some.all(axis=1))
+    assert np.array_equal(most_in_row(values), values.max(axis=1), equal_nan=True)
 
 
 @given(rows)

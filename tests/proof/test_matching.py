@@ -608,6 +608,54 @@ def test_parts_of_arcs_in_doubt_have_the_least_squares(seed: int) -> None:
     assert costs[got[1]] <= min(costs.values()) + 4.0 * (nominal.kind[1] != corrected.kind[1])
 
 
+def cut_at_random(seed: int) -> tuple[Toolpath, Toolpath]:
+    """Lines, some of which return to where they were or stay there, and the same with some of them split,
+    some of the parts near an end."""
+    rng = np.random.default_rng(seed)
+    near = 0.4 * NEAR_MM
+    mine: list[Move] = [rapid(0, 0, 0)]
+    theirs: list[Move] = [rapid(0, 0, 0)]
+    places = [np.zeros(3)]
+    for _ in range(150):
+        here = places[-1]
+        there = (here, places[-2:][0], *(here + rng.uniform(-2, 2, 3) for _ in range(6)))[rng.integers(8)]
+        places.append(there)
+        mine.append(line(*there))
+        if rng.random() < 0.1:
+            part = (0.5 * (here + there), there + rng.uniform(-near, near, 3) / 2)[rng.integers(2)]
+            theirs.append(line(*part))
+        theirs.append(line(*(there + rng.uniform(-near, near, 3))))
+    return toolpath(*mine), toolpath(*theirs)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_units_in_step_end_where_they_do_without_that_short_cut(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    nominal, corrected = cut_at_random(seed)
+    got = ends(nominal, corrected)
+    monkeypatch.setattr(alignment.Alignment, "_in_step", lambda *_: False)
+    assert ends(nominal, corrected) == got
+
+
+def test_the_last_in_step_goes_on_where_what_comes_behind_it_is_no_part_of_the_next() -> None:
+    """The last unit of the second block has a part that ends where it does."""
+    zigzag = [line(10.0 * k, 5.0 * (k % 2), 0) for k in range(1, 48)]
+    behind = [rapid(500, 0, 0), *(line(500 + 10.0 * k, 5.0 * (k % 2), 0) for k in range(1, 30))]
+    nominal = toolpath(rapid(0, 0, 0), *zigzag, *behind)
+    corrected = toolpath(rapid(0, 0, 0), *zigzag, zigzag[-1], *behind)
+    assert ends(nominal, corrected) == [*range(47), *range(48, 79)]
+
+
+def test_circles_at_one_place_are_not_taken_for_their_parts() -> None:
+    """Each of two turns is split into two of one turn, which all end in one place."""
+    turn = 2 * math.pi
+    nominal = [arc(10, 0, 0, centre=(0, 0, 0), sweep=2 * turn) for _ in range(30)]
+    corrected = [arc(10, 0, 0, centre=(0, 0, 0), sweep=turn) for _ in range(60)]
+    got = ends(toolpath(rapid(10, 0, 0), *nominal), toolpath(rapid(10, 0, 0), *corrected))
+    assert got == [0, *range(2, 61, 2)]
+
+
 # -- other jobs ------------------------------------------------------------------------------------------
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Array, Index, Mask
+from olp.core.arrays import Array, Index, Mask, all_in_row
 from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES
 from olp.core.values import dataclass
@@ -223,7 +223,7 @@ def _refuse(bad: Mask, line: Index, message: str, code: str = "OLP530", **figure
 
 def _check_stated(start: Array, end: Array, words: Array, plane: Index, absolute: Mask, line: Index) -> None:
     """Refuse arcs without known ends, without the words of a centre or a radius, or with a wrong P."""
-    known = np.isfinite(start).all(axis=1) & np.isfinite(end).all(axis=1)
+    known = all_in_row(np.isfinite(start)) & all_in_row(np.isfinite(end))
     _refuse(
         np.asarray(~known), line,
         "an arc starts or ends where an axis has not been commanded yet; "

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Array, Index, Mask, is_in
+from olp.core.arrays import Array, Index, Mask, any_in_row, is_in
 from olp.core.errors import ProgramError
 from olp.core.machine import Setup
 from olp.core.toolpath import Flag, Kind
@@ -408,7 +408,7 @@ class _Reader:
 
 def _check_centres(context: Context, line: Index, words: Index) -> None:
     """Refuse arcs with centre words where a setting of the control, which is not stated, decides of them."""
-    open_ones = (context.arc_distance[line] < 0) & (words[:, :3] >= 0).any(axis=1)
+    open_ones = (context.arc_distance[line] < 0) & any_in_row(words[:, :3] >= 0)
     if open_ones.any():
         raise ProgramError(
             "I, J and K of this arc are distances or positions by a setting of the control; give G91.1 or "

@@ -12,7 +12,7 @@ from enum import IntEnum
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Array, Index, Mask
+from olp.core.arrays import Array, Index, Mask, any_in_row
 from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES
 from olp.core.values import dataclass
@@ -217,7 +217,7 @@ def strokes(
         step[stop - len(recipe) + i], level[stop - len(recipe) + i] = what, ends[where]
     came = np.vstack(([start[first], start[second]], place[:-1]))
     keep = (step != Step.RAPID) | (level != np.concatenate(([start[third]], level[:-1])))
-    keep[begin + 1] |= (place != came).any(axis=1)
+    keep[begin + 1] |= any_in_row(place != came)
     keep[begin[:1] + 1] |= beside & ~below[:1]
     point = np.empty((len(hole), 3))
     for axis, here, there in ((first, came[:, 0], place[:, 0]), (second, came[:, 1], place[:, 1])):

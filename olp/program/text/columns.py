@@ -9,23 +9,24 @@ import numpy.typing as npt
 
 from olp.core.values import dataclass
 
-#: Entries of a column at first.
+#: Entries of the first block of a column; each further one has twice as many as the one before,
 _FIRST = 1 << 10
-#: A full column grows by this share of its length, so that little is reserved and each entry is moved few
-#: times.
-_GROWTH = 4
+#: up to so many.
+_MOST = 1 << 16
 
 
 @dataclass(slots=True, eq=False)
 class _Column:
-    """An array, and how many of its entries are used."""
+    """Blocks that are full, the block that is filled now, and how many of its entries are used."""
 
-    array: npt.NDArray[Any]
+    full: list[npt.NDArray[Any]]
+    block: npt.NDArray[Any]
     used: int = 0
 
 
 class Columns:
-    """Named columns that are appended to and taken once; none is longer than a quarter beyond its entries."""
+    """Named columns that are appended to and taken once. Each entry is moved once, when its column is taken:
+    a column of a million entries that grows as one array is moved five times."""
 
     def __init__(self) -> None:
         self._columns: dict[str, _Column] = {}
@@ -35,14 +36,15 @@ class Columns:
         values = np.asarray(values)
         column = self._columns.get(name)
         if column is None:
-            column = self._columns[name] = _Column(np.zeros((_FIRST, *values.shape[1:]), kind))
-        used, array = column.used, column.array
-        needed = used + len(values)
-        if needed > len(array):
-            # in place: the system moves pages, and no second array is filled
-            array.resize((needed + needed // _GROWTH, *array.shape[1:]), refcheck=False)
-        array[used:needed] = values
-        column.used = needed
+            column = self._columns[name] = _Column([], np.empty((_FIRST, *values.shape[1:]), kind))
+        while len(values) > (room := len(column.block) - column.used):
+            column.block[column.used :] = values[:room]
+            values = values[room:]
+            column.full.append(column.block)
+            size = min(2 * len(column.block), _MOST)
+            column.block, column.used = np.empty((size, *values.shape[1:]), column.block.dtype), 0
+        column.block[column.used : column.used + len(values)] = values
+        column.used += len(values)
 
     def take(self, name: str, kind: npt.DTypeLike, *width: int) -> npt.NDArray[Any]:
         """The column, read-only; empty where nothing was put."""
@@ -50,7 +52,14 @@ class Columns:
         if column is None:
             array = np.zeros((0, *width), kind)
         else:
-            array = column.array
-            array.resize((column.used, *array.shape[1:]), refcheck=False)
+            blocks = [*column.full, column.block[: column.used]]
+            column.full.clear()
+            end = sum(map(len, blocks))
+            array = np.empty((end, *column.block.shape[1:]), column.block.dtype)
+            # from the last one on: the memory of each is free before more of the array is filled
+            while blocks:
+                block = blocks.pop()
+                array[end - len(block) : end] = block
+                end -= len(block)
         array.setflags(write=False)
         return array
