@@ -20,8 +20,6 @@ from olp.errormodel.quality import Fitted, Quality
 
 #: Positions along a line from which its mean slope is taken.
 _ALONG = 41
-#: Share of the variance of ripple that is shorter than the cells of a spline, which cannot hold it.
-WITHIN_CELLS = 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,18 +102,13 @@ class Fit:
         return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
     def between_targets(self, name: str, q: Array) -> Array:
-        """(n,) variance of a component at q (n,) that its unknowns do not hold: of ripple shorter than the
-        cells of its spline, and of steps, whose position between two targets is unknown. A step of height J
-        lies before q with probability u, so it is J^2 u (1 - u)."""
+        """(n,) variance of a component at q (n,) that its unknowns do not hold: what the cells of its spline
+        hide, and steps, whose position between two targets is unknown. A step of height J lies before q with
+        probability u, so it is J^2 u (1 - u)."""
         space = self.parameters.spaces[name]
         raw = space.gauge @ self.theta[self.parameters.slices[name]]
-        total = np.zeros(len(q))
         shape = self.prior.shapes.get(name)
-        if shape is not None:
-            spline = space.spline
-            cell = (spline.high_mm - spline.low_mm) / spline.cells
-            from_datum = np.abs(q - self.parameters.datum_mm[AXES.index(name[2])]) / cell
-            total += WITHIN_CELLS * (shape.scales.ripple * np.minimum(from_datum, 1.0)) ** 2
+        total = np.zeros(len(q)) if shape is None else shape.hidden.at(q)
         for feature, jump in zip(space.features, raw[space.spline.count :], strict=True):
             if isinstance(feature, Step):
                 u = feature.values(q)

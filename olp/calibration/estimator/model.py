@@ -7,10 +7,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from olp.calibration.estimator.basis import CurveSpace, Spline, Step, Wave
+from olp.calibration.estimator.basis import CurveSpace, Scales, Spline, Step, Wave
+from olp.calibration.estimator.between import Hidden, hidden
 from olp.calibration.estimator.parameters import MeasuringLine, Parameters
 from olp.calibration.estimator.prior import POSE
-from olp.calibration.estimator.smoothing import Features, Shape, features_of, shapes_of
+from olp.calibration.estimator.smoothing import AMPLITUDE, Features, Shape, features_of, shapes_of
 from olp.calibration.iso230.separation import aliased
 from olp.calibration.observations.base import Noise, Observation, Scattered
 from olp.calibration.observations.lines import Line, square_names, targets_of
@@ -64,7 +65,7 @@ class Model:
         x, y, z = datum_mm or (float(np.clip(0.0, *side)) for side in box)
         splines = [_spline(own, axis, ranges[axis], cells) for axis in range(3)]
         waves, unobservable = _waves(measurements, own, observations)
-        shapes = _shapes(lines, splines, waves, tell)
+        shapes = _shapes(lines, splines, waves, (x, y, z), tell)
         framed = any(taken.framed for taken in observations)
         return cls(chain, (x, y, z), box, lines, splines, shapes, waves, unobservable, framed)
 
@@ -176,6 +177,7 @@ def _shapes(
     lines: Sequence[tuple[Line, Noise]],
     splines: Sequence[Spline],
     waves: Mapping[str, tuple[Wave, ...]],
+    datum_mm: Vector,
     tell: Progress,
 ) -> dict[str, Shape]:
     """The shape of every component with lines: the features of each by itself, then again where others have
@@ -195,7 +197,13 @@ def _shapes(
                 found[name] = features_of(
                     own, spline, _half(spline), waves.get(name, ()), joints if again else ()
                 )
-    return shapes_of(found)
+
+    def hides(name: str, scales: Scales) -> Hidden:
+        axis = AXES.index(name[2])
+        amplitude = AMPLITUDE[name[1] in "ABC"]
+        return hidden(_own_lines(name, lines), splines[axis], scales, amplitude, datum_mm[axis])
+
+    return shapes_of(found, hides)
 
 
 def _waves(

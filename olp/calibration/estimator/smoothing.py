@@ -7,12 +7,13 @@ Neural Computation 4, 1992): one more feature must explain more than its freedom
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Literal
 
 import numpy as np
 
 from olp.calibration.estimator.basis import Feature, Kink, Scales, Spline, Step, Wave
+from olp.calibration.estimator.between import Hidden
 from olp.calibration.estimator.character import Evidence, candidates, characters, fewer
 from olp.calibration.estimator.normal import Block, Chunk, Normal
 from olp.calibration.observations.base import Noise
@@ -43,12 +44,13 @@ Half = Literal["none", "constant", "curve"]
 @dataclass(frozen=True, slots=True, eq=False)
 class Shape:
     """The shape of a curve from its lines: the scales of its processes, features, dependence on direction and
-    its roughness."""
+    its roughness, and what the cells of its spline hide."""
 
     scales: Scales
     features: tuple[Feature, ...]
     half: Half
     half_roughness: float
+    hidden: Hidden
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -108,11 +110,12 @@ def features_of(
     return Features(tuple(tried[i] for i in sorted(chosen)), half, half_roughness, values)
 
 
-def shapes_of(features: Mapping[str, Features]) -> dict[str, Shape]:
-    """The shapes of all curves with lines, as they are alike."""
+def shapes_of(features: Mapping[str, Features], hides: Callable[[str, Scales], Hidden]) -> dict[str, Shape]:
+    """The shapes of all curves with lines, as they are alike; `hides` is what cells hide of each."""
     found = characters({name: own.values for name, own in features.items()})
     return {
-        name: Shape(found[name], own.features, own.half, own.half_roughness) for name, own in features.items()
+        name: Shape(found[name], own.features, own.half, own.half_roughness, hides(name, found[name]))
+        for name, own in features.items()
     }
 
 

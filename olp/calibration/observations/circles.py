@@ -6,11 +6,15 @@ servo mismatch and squareness are one column, so squareness is then not observab
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 
 from olp.calibration.estimator.normal import Block
 from olp.calibration.estimator.parameters import Unknowns
-from olp.calibration.observations.base import Noise, Observation
+from olp.calibration.observations.base import Alternative, Noise, Observation
+from olp.calibration.observations.lines import REVERSED, UNITS
 from olp.calibration.observations.radial import AlongState, along_block
 from olp.core.arrays import Array, Index
 from olp.core.errors import ConfigError
@@ -76,6 +80,17 @@ class Circles(Observation):
 
     def reach(self, axis: int) -> Array:
         return np.asarray(circle_positions(self)[:, axis])
+
+    def alternatives(self) -> Sequence[Alternative]:
+        """Sign, unit, and angles that count clockwise."""
+        found = [
+            Alternative(
+                kind, words, replace(self, value=factor * self.value, sigma=abs(factor) * self.sigma), factor
+            )
+            for kind, factor, words in (REVERSED, *UNITS[0])
+        ]
+        turned = replace(self, angle_rad=-self.angle_rad, direction=-self.direction)
+        return [*found, Alternative("order", "its angles count clockwise", turned)]
 
     def start(self, noise: Noise | None = None) -> CirclesState:
         return CirclesState(self, Noise(self.sigma, 0.0, None))

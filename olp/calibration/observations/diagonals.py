@@ -5,13 +5,22 @@ The laser has an unknown zero, drift and scale, and the backlash of the diagonal
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 
 from olp.calibration.estimator.normal import Block
 from olp.calibration.estimator.parameters import Unknowns
 from olp.calibration.iso230.positioning import Statistics, statistics, targets_of
-from olp.calibration.observations.base import Noise, Observation, correlation_factor, scatter_words
-from olp.calibration.observations.lines import Line, drift_ramps, noise_of
+from olp.calibration.observations.base import (
+    Alternative,
+    Noise,
+    Observation,
+    correlation_factor,
+    scatter_words,
+)
+from olp.calibration.observations.lines import REVERSED, UNITS, Line, drift_ramps, noise_of
 from olp.calibration.observations.radial import AlongState, along_block
 from olp.core.arrays import Array, Index
 from olp.core.errors import ConfigError
@@ -104,6 +113,17 @@ class Diagonal(Observation):
 
     def reach(self, axis: int) -> Array:
         return np.asarray(diagonal_positions(self)[:, axis])
+
+    def alternatives(self) -> Sequence[Alternative]:
+        """Sign, unit, and the other end as the start."""
+        found = [
+            Alternative(
+                kind, words, replace(self, value=factor * self.value, sigma=abs(factor) * self.sigma), factor
+            )
+            for kind, factor, words in (REVERSED, *UNITS[0])
+        ]
+        turned = replace(self, distance_mm=self.length_mm - self.distance_mm, direction=-self.direction)
+        return [*found, Alternative("order", "its targets run the other way", turned)]
 
     def start(self, noise: Noise | None = None) -> DiagonalState:
         return DiagonalState(self, noise_of_diagonal(self))

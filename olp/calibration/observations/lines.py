@@ -51,8 +51,10 @@ _DOUBLE = (
     ("factor 2", 2.0, "its values are half of what they should be"),
     ("factor 2", 0.5, "its values are twice what they should be"),
 )
+#: The sign of all values: kind, factor that puts it right, and words.
+REVERSED = ("sign", -1.0, "the sign of its values is reversed")
 #: What else the unit of lengths, and of angles, may be: the factor that puts it right, and words.
-_UNITS = (
+UNITS = (
     (
         ("unit", 25.4, "its values are in thousandths of an inch, taken as 0.001 mm"),
         ("unit", 1 / 25.4, "its values are in 0.001 mm, taken as thousandths of an inch"),
@@ -152,7 +154,7 @@ class Line(Observation):
 
     def alternatives(self) -> Sequence[Alternative]:
         """Sign, unit, order of the targets, and a scale of its own."""
-        factors = [("sign", -1.0, "the sign of its values is reversed"), *_UNITS[self.quantity == "angle"]]
+        factors = [REVERSED, *UNITS[self.quantity == "angle"]]
         found = [
             Alternative(
                 kind, words, replace(self, value=factor * self.value, sigma=abs(factor) * self.sigma), factor

@@ -1,0 +1,245 @@
+"""Planted blunders: readings of a simulated machine with one thing wrong, how large that is against what all
+other readings predict, and whether a fit says so."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+from cases.calibration import cloud, measurements_of, rays, two_pods
+from judge import families, simulated
+
+from olp.calibration.estimator.fitted import Fit
+from olp.calibration.estimator.normal import Block, Chunk, Normal
+from olp.calibration.observations.base import Observation, State
+from olp.calibration.observations.circles import Circles
+from olp.calibration.observations.diagonals import Diagonal
+from olp.calibration.observations.lengths import Lengths
+from olp.calibration.observations.lines import Line
+from olp.calibration.observations.measurements import Measurements
+from olp.calibration.observations.pods import Pods
+from olp.calibration.observations.points import Points
+from olp.core.errors import OlpError
+from olp.workflows.calibrate_fit import FittedCalibration, fit_calibration
+
+#: Kind, words and observation of a blunder.
+What = tuple[str, str, Observation]
+#: The seed of another machine of the same family is larger by this.
+OTHER = 5000
+#: What lines are taken together with.
+MIXTURES = ("points", "stations", "pods", "circles")
+#: Findings and refusals that speak against the readings.
+ALARMS = ("OLP808", "OLP810", "OLP811")
+#: Non-centrality from which no blunder may pass in silence.
+LOUD = 7.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Blunder:
+    """What is wrong with the observation of a number, a part of the words that name it, "" where no words can
+    tell it from others, and what is read instead."""
+
+    index: int
+    kind: str
+    words: str
+    planted: Observation
+
+
+@dataclasses.dataclass(frozen=True)
+class Outcome:
+    """What a fit says of a blunder: `alarms` are the codes of findings, or "refused"."""
+
+    noncentrality: float
+    alarms: tuple[str, ...]
+    named: bool
+
+    @property
+    def silent(self) -> bool:
+        return not self.alarms and self.noncentrality >= LOUD
+
+
+def readings(seed: int, family: str, mixture: str) -> Measurements:
+    """A machine's lines with 9 to 13 targets, and other readings of it."""
+    machine = families.machine(seed, family)
+    taken = measurements_of(simulated.all_lines(machine, seed, runs=3, count=(13, 11, 9)))
+    more: dict[str, Callable[[], tuple[Observation, ...]]] = {
+        "points": lambda: (cloud(machine, seed, 60, 6.0),),
+        "stations": lambda: rays(machine, seed, 4, 50),
+        "pods": lambda: (two_pods(machine, seed, 120),),
+        "circles": lambda: (*_diagonals(machine, seed), *_circles(machine, seed)),
+    }
+    return dataclasses.replace(
+        taken, observations=(*taken.observations, *more[mixture]()), chain=machine.chain
+    )
+
+
+def _diagonals(machine: simulated.Machine, seed: int) -> Iterator[Diagonal]:
+    low, high = machine.box.T
+    for k, side in enumerate(((1, 1, 1), (1, 0, 1), (0, 1, 1), (0, 0, 1))):
+        start = np.where(side, low, high)
+        end = low + high - start
+        a, b = tuple(start.tolist()), tuple(end.tolist())
+        columns = simulated.diagonal(machine, seed, a, b, simulated.TOOL)
+        yield Diagonal(a, b, *columns, simulated.TOOL, source=f"diagonal-{k}.csv")
+
+
+def _circles(machine: simulated.Machine, seed: int) -> Iterator[Circles]:
+    for plane in ("XY", "YZ", "ZX"):
+        centre = (1500.0, 1000.0, -500.0)
+        columns = simulated.circles(machine, seed, plane, centre, 300.0, simulated.TOOL)
+        yield Circles(
+            plane, 300.0, centre, columns[0], columns[1], columns[2], columns[3], simulated.TOOL,
+            sigma=3e-4, source=f"circle-{plane.lower()}.csv",
+        )  # fmt: skip
+
+
+def blunders(seed: int, family: str, mixture: str) -> list[Blunder]:
+    """Everything that is planted in readings, one at a time."""
+    others = readings(seed + OTHER, family, mixture).observations
+    found = []
+    for k, one in enumerate(readings(seed, family, mixture).observations):
+        planted = [*_PLANTS[type(one)](one), ("another machine", "", others[k])]
+        found += [Blunder(k, *what) for what in planted]
+    return found
+
+
+def _factors(one: Any, units: tuple[tuple[str, float, str], ...]) -> Iterator[What]:
+    for kind, factor, words in (("sign", -1.0, "sign"), *units):
+        value = factor * one.value
+        yield (kind, words, dataclasses.replace(one, value=value))
+
+
+_LENGTHS = (("25.4", 1 / 25.4, "of an inch"), ("25.4", 25.4, "of an inch"), ("1000", 1e-3, "in mm"))
+_ANGLES = (("4.848", 4.8481368, "arcsec"), ("4.848", 1 / 4.8481368, "arcsec"), ("1000", 1e-3, "mm/m"))
+
+
+def _of_line(line: Line) -> Iterator[What]:
+    angle = line.quantity == "angle"
+    yield from _factors(line, _ANGLES if angle else _LENGTHS)
+    ends = line.target_mm.min() + line.target_mm.max()
+    turned = dataclasses.replace(line, target_mm=ends - line.target_mm, direction=-line.direction)
+    yield ("direction", "other way", turned)
+    if angle:
+        letters = [d for d in "ABC" if d != line.component[1]]
+        for letter in letters:
+            name = f"E{letter}{line.component[2]}"
+            yield ("columns", "", dataclasses.replace(line, component=name))
+        return
+    place = list(line.line_mm)
+    place[(line.axis + 1) % 3] += 600.0
+    yield ("place", "", dataclasses.replace(line, line_mm=tuple(place)))
+    tool = (line.tool_mm[0] + 150.0, line.tool_mm[1] - 100.0, line.tool_mm[2] + 120.0)
+    yield ("lever", "", dataclasses.replace(line, tool_mm=tool))
+    if line.quantity == "positioning":
+        stretched = line.value + 1.1e-5 * 5.0 * (line.target_mm - line.target_mm.min())
+        yield ("temperature", "scale", dataclasses.replace(line, value=stretched))
+
+
+def _of_diagonal(one: Diagonal) -> Iterator[What]:
+    yield from _factors(one, _LENGTHS)
+    turned = dataclasses.replace(one, distance_mm=one.length_mm - one.distance_mm, direction=-one.direction)
+    yield ("direction", "other way", turned)
+
+
+def _of_circles(one: Circles) -> Iterator[What]:
+    yield from _factors(one, _LENGTHS)
+    turned = dataclasses.replace(one, angle_rad=-one.angle_rad, direction=-one.direction)
+    yield ("direction", "clockwise", turned)
+
+
+def _of_points(one: Points) -> Iterator[What]:
+    mirrored = one.measured_mm * np.array((1.0, 1.0, -1.0))
+    yield ("handedness", "left-handed", dataclasses.replace(one, measured_mm=mirrored))
+    scaled = one.measured_mm * (1.0 + 6e-5)
+    yield ("scale", "", dataclasses.replace(one, measured_mm=scaled))
+    yield ("lever", "", dataclasses.replace(one, tool_mm=one.tool_mm[:, [1, 0, 2]]))
+
+
+def _of_lengths(one: Lengths) -> Iterator[What]:
+    scaled = one.length_mm * (1.0 + 6e-5)
+    yield ("scale", "", dataclasses.replace(one, length_mm=scaled))
+    yield ("lever", "", dataclasses.replace(one, tool_mm=one.tool_mm[:, [1, 0, 2]]))
+
+
+def _of_pods(one: Pods) -> Iterator[What]:
+    yield ("handedness", "", dataclasses.replace(one, azimuth_rad=-one.azimuth_rad))
+    yield ("lever", "", dataclasses.replace(one, tool_mm=one.tool_mm[:, [1, 0, 2]]))
+    baselines = tuple((i, j, 1.0002 * apart, sigma) for i, j, apart, sigma in one.baselines)
+    yield ("scale", "", dataclasses.replace(one, baselines=baselines))
+
+
+_PLANTS: dict[type, Callable[[Any], Iterator[Blunder]]] = {
+    Line: _of_line, Diagonal: _of_diagonal, Circles: _of_circles, Points: _of_points, Lengths: _of_lengths,
+    Pods: _of_pods,
+}  # fmt: skip
+
+
+def outcome(taken: Measurements, clean: FittedCalibration, blunder: Blunder) -> Outcome:
+    """What the fit of the readings with a blunder says."""
+    changed = list(taken.observations)
+    changed[blunder.index] = blunder.planted
+    state = clean.fit.results[blunder.index].state
+    try:
+        size = noncentrality(clean.fit, state, blunder.planted)
+        fitted = fit_calibration(dataclasses.replace(taken, observations=tuple(changed)))
+    except OlpError as error:
+        return Outcome(np.inf, ("refused",), bool(blunder.words) and blunder.words in str(error))
+    alarms = tuple(sorted({one.code for one in fitted.findings if one.code in ALARMS}))
+    words = [one.message for one in fitted.findings if one.code == "OLP810"]
+    named = any(one.startswith(blunder.planted.source) and blunder.words in one for one in words)
+    return Outcome(size, alarms, named)
+
+
+def noncentrality(clean: Fit, state: State, planted: Observation) -> float:
+    """By how many standard deviations a blunder moves what a source says of the unknowns, against what all
+    other readings and the prior predict, with the uncertainty of both."""
+    size = clean.parameters.size
+    total = clean.prior.precision()[0]
+    own = Normal.of(size)
+    for result in clean.results:
+        if result.state is state:
+            own.add(state.block(clean.parameters, clean.theta))
+        else:
+            one = Normal.of(size)
+            one.add(result.state.block(clean.parameters, clean.theta))
+            total = total + one.H
+    block = state.block(clean.parameters, clean.theta)
+    shifted = Normal.of(size)
+    shifted.add(_shift(clean, state, block, planted))
+    columns = np.flatnonzero(own.H.any(axis=0))
+    scale = np.sqrt(np.diag(total))
+    covariance = np.linalg.inv(total / np.outer(scale, scale) + 1e-13 * np.eye(size))
+    covariance = (covariance / np.outer(scale, scale))[np.ix_(columns, columns)]
+    variance, vectors = np.linalg.eigh(covariance)
+    root = vectors * np.sqrt(np.maximum(variance, 0.0))
+    share, directions = np.linalg.eigh(root.T @ own.H[np.ix_(columns, columns)] @ root)
+    away = directions.T @ (root.T @ shifted.g[columns])
+    some = share > 1e-3
+    return float(np.sqrt(np.sum(away[some] ** 2 / (share[some] * (1.0 + share[some])))))
+
+
+def _shift(clean: Fit, state: State, block: Block, planted: Observation) -> Block:
+    """The rows of a source with the change of its residuals by the blunder as readings."""
+    noise = getattr(state, "noise", None)
+    other = planted.start(noise)
+    if noise is not None:
+        other = dataclasses.replace(other, noise=noise)  # type: ignore[type-var]
+    theta = clean.theta
+    wrong = other.block(clean.parameters, theta)
+
+    def residuals(of: Block) -> list[np.ndarray]:
+        return [chunk.y - chunk.rows @ theta[of.columns] for chunk in of.chunks()]
+
+    def chunks() -> Iterator[Chunk]:
+        for chunk, before, after in zip(block.chunks(), residuals(block), residuals(wrong), strict=True):
+            yield Chunk(chunk.rows, after - before, chunk.sigma, chunk.local)
+
+    return Block(block.columns, block.precision, chunks)
+
+
+def clean_fit(seed: int, family: str, mixture: str) -> tuple[Measurements, FittedCalibration]:
+    """Readings without a blunder, and their fit."""
+    taken = readings(seed, family, mixture)
+    return taken, fit_calibration(taken)
