@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from olp.files.config import load_setup as load_setup
     from olp.files.kinematics.load import load_kinematics as load_kinematics
     from olp.findings.catalogue import Finding as Finding
+    from olp.kinematics.correction import CorrectedPoses as CorrectedPoses
+    from olp.kinematics.correction import correct_poses as correct_poses
     from olp.review.job import Review as Review
     from olp.review.job import view as view
     from olp.review.notebook.layers import Layers as Layers
@@ -64,6 +66,12 @@ if TYPE_CHECKING:
     from olp.workflows.flatten import flatten as flatten
     from olp.workflows.inspect import error_at as error_at
     from olp.workflows.inspect import inspect as inspect
+    from olp.workflows.joints.correct import JointCorrection as JointCorrection
+    from olp.workflows.joints.correct import correct_joints as correct_joints
+    from olp.workflows.joints.simulate import JointSimulation as JointSimulation
+    from olp.workflows.joints.simulate import simulate_joints as simulate_joints
+    from olp.workflows.joints.verify import JointVerification as JointVerification
+    from olp.workflows.joints.verify import verify_joints as verify_joints
     from olp.workflows.results import ResultCorrection as ResultCorrection
     from olp.workflows.results import correct_results as correct_results
     from olp.workflows.retime import Retiming as Retiming
@@ -113,6 +121,14 @@ _HOME = {
     "ResultCorrection": "olp.workflows.results",
     "correct_results": "olp.workflows.results",
     "simulate": "olp.workflows.simulate",
+    "CorrectedPoses": "olp.kinematics.correction",
+    "correct_poses": "olp.kinematics.correction",
+    "JointCorrection": "olp.workflows.joints.correct",
+    "correct_joints": "olp.workflows.joints.correct",
+    "JointSimulation": "olp.workflows.joints.simulate",
+    "simulate_joints": "olp.workflows.joints.simulate",
+    "JointVerification": "olp.workflows.joints.verify",
+    "verify_joints": "olp.workflows.joints.verify",
     "verify": "olp.workflows.verify",
     "fit_thermal": "olp.workflows.calibrate_thermal",
     "ThermalFitting": "olp.workflows.calibrate_thermal",

@@ -36,6 +36,7 @@ from olp.cli.options import (
     program_options,
     quiet_option,
     tolerance_option,
+    turn_tolerance_option,
     units_option,
 )
 from olp.cli.progress import progress
@@ -64,6 +65,7 @@ from olp.core.errors import OlpError, UsageError, naming
 @units_option
 @output_option("OUT", "Default: stdout.", default=STREAM)
 @doubt_options
+@turn_tolerance_option
 @tolerance_option
 @outside_box_option("an error (OLP405)", "a warning (OLP403) and the error at the face")
 @confidence_options
@@ -80,6 +82,11 @@ def command(programs: tuple[str, ...], machine: str | None, job: str | None, **w
         raise UsageError(f"--json and --format {words['form']} exclude each other; leave one of them out")
     form = "json" if words.pop("as_json") else words.pop("form")
     words |= {"form": form}
+    from olp.cli import joints
+
+    if joints.on_joints(machine, job):
+        joints.check(programs or (None,), machine, job, words | {"as_json": form == "json"})
+        return
     if len(programs) < 2:
         _one(given(programs[0] if programs else None, machine, job), **words)
         return

@@ -81,6 +81,11 @@ def command(program: str | None, machine: str | None, job: str | None, **words: 
 
     For points that a measuring machine reported, use olp results.
     """
+    from olp.cli import joints
+
+    if joints.on_joints(machine, job):
+        joints.correct(program, machine, job, words)
+        return
     layout = (words["profile"], words["columns"], words["unit"])
     call = with_layout_of(given(program, machine, job), *layout)
     outputs = options_of(_Outputs, words)

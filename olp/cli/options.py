@@ -342,6 +342,13 @@ fail_on_option = click.option(
     show_default=True,
     help="Exit with 1 where a finding is at least this severe.",
 )
+turn_tolerance_option = click.option(
+    "--tolerance-urad",
+    type=Length(),
+    default=10.0,
+    show_default=True,
+    help="Numerical tolerance of the orientation on machines with rotary joints, in urad.",
+)
 contour_option = click.option(
     "--contour",
     type=click.Choice(["contour", "path"]),
@@ -409,6 +416,7 @@ def proof_options(function: F) -> F:
         json_option(),
         units_option,
         doubt_options,
+        turn_tolerance_option,
         tolerance_option,
     ):
         function = option(function)

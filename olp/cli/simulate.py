@@ -49,6 +49,12 @@ def command(
     """
     if as_json and output == STREAM:
         raise UsageError("stdout takes one result; write the points to a file (-o), or leave --json out")
+    from olp.cli import joints
+
+    if joints.on_joints(machine, job):
+        shown = {"as_json": as_json, "quiet": quiet, "force": force}
+        joints.simulate(program, machine, job, output, words.pop("step_mm"), words | shown)
+        return
     call = given(program, machine, job)
     refuse_early(files_of(output), call.inputs, force=force)
 

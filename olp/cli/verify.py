@@ -39,6 +39,12 @@ def command(
     """
     if nominal == corrected == STREAM:
         raise UsageError("NOMINAL and CORRECTED cannot both come from stdin; name one of the files")
+    from olp.cli import joints
+
+    if joints.on_joints(machine, job):
+        shown = {"as_json": as_json, "fail_on": fail_on, "quiet": quiet}
+        joints.verify(nominal, corrected, machine, job, words | shown)
+        return
     call = given(nominal, machine, job)
 
     from olp.reports import report

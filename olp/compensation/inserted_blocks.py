@@ -13,6 +13,7 @@ from olp.compensation.writer import Writer
 from olp.core.arrays import Index, Mask, any_in_row, distinct, is_in
 from olp.core.errors import ProgramError
 from olp.core.toolpath import Flag, Kind
+from olp.program.program import Program
 from olp.program.rs274.codes import (
     ABSOLUTE,
     FURTHER_OFFSETS,
@@ -74,7 +75,8 @@ def block_edits(writer: Writer, rows: Rows, tails: Index) -> list[Edits]:
             _arc_word(writer, rows, tail + 1, edits)
     writer.tally.inserted_blocks += int((~empty).sum())
     _inverse_time(writer, rows, tails, edits)
-    _end_words(writer, rows, tails[~before], edits)
+    split = writer.path.line[rows.move[tails[~before]]].astype(np.int64)
+    end_word_edits(writer.program, distinct(split), edits)
     return [*columns, edits.done()]
 
 
@@ -169,12 +171,13 @@ def _inverse_time(writer: Writer, rows: Rows, tails: Index, edits: EditList) -> 
             edits.add(start, end, int(feeds[i]), decimals, prefix, order)
 
 
-def _end_words(writer: Writer, rows: Rows, tails: Index, edits: EditList) -> None:
-    """M words that end a block (M0 M5 M9 M30 …) go from the first part to the last."""
-    if not tails.size:
+def end_word_edits(program: Program, lines: Index, edits: EditList) -> None:
+    """M words that end a block (M0 M5 M9 M30 …) go from the first part to the last, on lines whose moves are
+    split."""
+    words = program.words
+    assert words is not None
+    if not lines.size:
         return
-    words = writer.words
-    lines = distinct(writer.path.line[rows.move[tails]])
     first, last = int(words.first_word[lines[0] - 1]), int(words.first_word[lines[-1]])
     part = slice(first, last)
     ending = (words.letter[part] == ord("M")) & (words.decimals[part] == 0)
@@ -183,9 +186,9 @@ def _end_words(writer: Writer, rows: Rows, tails: Index, edits: EditList) -> Non
     for i, number in zip(index.tolist(), line.tolist(), strict=True):
         if lines[min(np.searchsorted(lines, number), len(lines) - 1)] != number:
             continue
-        place = int(writer.program.line_end[number - 1])
+        place = int(program.line_end[number - 1])
         start, end = int(words.start[i]), int(words.end[i])
         edits.add(start, end, BARE, 0)
         # behind all other words, in their order
         order = 2**30 + i - int(words.first_word[number - 1])
-        edits.add(place, place, BARE, 0, b" " + writer.program.data[start:end], order)
+        edits.add(place, place, BARE, 0, b" " + program.data[start:end], order)

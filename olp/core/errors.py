@@ -210,7 +210,10 @@ class CannotCompute(OlpError):
 
 
 class NotInvertible(CannotCompute):
-    """No command reaches the target within 1e-9 mm: the error grows as fast as the position."""
+    """No command reaches the target within 1e-9 mm: the error grows as fast as the position. `row` is that of
+    the target where there are several."""
+
+    row: int | None = None
 
 
 @contextlib.contextmanager

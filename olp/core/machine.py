@@ -204,7 +204,8 @@ class Mesh:
 @dataclass(frozen=True, slots=True)
 class Job:
     """What changes per job. `part_tolerance_um` holds where a call gives none. `work_offsets` and `tools`
-    override the machine's, one by one. `payload_centre_mm` counts from the gauge point. `payloads` leads from
+    override the machine's, one by one. `start_deg` are positions of rotary axes, of machines that have any.
+    `payload_centre_mm` counts from the gauge point. `payloads` leads from
     a line of the program, counted from 1, to the payload from there on. `parameters` are values of parameters
     of the program, by names such as "#100". Temperatures of the structure's sensors come from `sensors_degC`,
     settled, or from `sensor_log` at a time in it. `dialect` is that of the program; None: it is detected from
@@ -215,6 +216,7 @@ class Job:
     machine: str | None = None
     part_tolerance_um: float | None = None
     start_mm: tuple[float | None, float | None, float | None] = (None, None, None)
+    start_deg: Mapping[str, float] = field(default_factory=dict)
     payload_kg: float = 0.0
     payload_centre_mm: Vector = ZERO
     payloads: Mapping[int, float] = field(default_factory=dict)

@@ -72,6 +72,10 @@ def read_setup(
         key: Path = ("payload_centre_mm",)
         sentence = "payload_centre_mm goes with machines that have rotary joints; leave it out"
         problems.append((line_of(key, job_lines), sentence))
+    if job.start_deg:
+        key = ("start_deg",)
+        sentence = "start_deg goes with machines that have rotary joints; leave it out"
+        problems.append((line_of(key, job_lines), sentence))
     for index, mesh in enumerate(job.meshes):
         if mesh.frame != "machine" and setup.work_offset(mesh.frame) is None:
             key = ("meshes", index, "frame")
@@ -89,9 +93,8 @@ def _read_machine(path: PathLike, read: Reader) -> tuple[Machine, Mapping[Path, 
     values, lines = read_toml(read(path), str(path))
     if of_joints(values):
         raise ProgramError(
-            f"the machine has the chain {values.get('chain')}, and not three linear axes alone; programs "
-            "are not corrected nor read for it. olp inspect shows what its files hold, and "
-            "olp.load_kinematics computes with it",
+            f"the machine has the chain {values.get('chain')}, and not three linear axes alone, which is not "
+            "built here; use olp correct, verify, check, simulate or inspect, in Python olp.correct_joints",
             file=str(path),
             line=line_of(("chain",), lines),
             code="OLP563",
@@ -120,7 +123,7 @@ def _read_machine(path: PathLike, read: Reader) -> tuple[Machine, Mapping[Path, 
         axes=axes,
         calibration=beside(path, file.calibration),
         compensated_by_controller=file.compensated_by_controller,
-        work_offsets=_work_offsets(file.work_offsets),
+        work_offsets=work_offsets_of(file.work_offsets),
         tools=tools_of(file.tools),
         styli={name: table.offset_mm for name, table in file.styli.items()},
         default_tool=file.job_defaults.tool,
@@ -188,6 +191,7 @@ def _read_job(path: PathLike, read: Reader, exists: Exists = _is_file) -> tuple[
         described=own,
         part_tolerance_um=file.part_tolerance_um,
         start_mm=file.start_mm.values,
+        start_deg=file.start_deg,
         payload_kg=file.payload_kg,
         payload_centre_mm=file.payload_centre_mm,
         payloads={entry.line: entry.payload_kg for entry in file.payloads},
@@ -200,7 +204,7 @@ def _read_job(path: PathLike, read: Reader, exists: Exists = _is_file) -> tuple[
         sensors_degC=file.temperatures_degC.sensors,
         sensor_log=beside(path, file.temperatures_degC.sensor_log),
         sensor_log_at_s=file.temperatures_degC.sensor_log_at_s,
-        work_offsets=_work_offsets(file.work_offsets),
+        work_offsets=work_offsets_of(file.work_offsets),
         tools=tools_of(file.tools),
         styli={name: table.offset_mm for name, table in file.styli.items()},
         meshes=tuple(meshes),
@@ -208,7 +212,8 @@ def _read_job(path: PathLike, read: Reader, exists: Exists = _is_file) -> tuple[
     return job, lines
 
 
-def _work_offsets(tables: WorkOffsets) -> dict[str, WorkOffset]:
+def work_offsets_of(tables: WorkOffsets) -> dict[str, WorkOffset]:
+    """The work offsets of tables [work_offsets.NAME], by name."""
     return {
         name: WorkOffset(
             name=name,

@@ -146,8 +146,8 @@ class ToolTable(Table):
     )
     holder: list[HolderTable] = Field(
         default=[],
-        description="tables [[tools.NUMBER.holder]], the parts of the holder from its lower end up to the "
-        "gauge point",
+        description="tables [[tools.NUMBER.holder]], the parts of the holder from its lower "
+        "end up to the gauge point",
     )
 
     @rule("holder")
@@ -263,8 +263,8 @@ class MachineFile(Table):
     )
     scaling_unit: Positive | None = Field(
         default=None,
-        description="what 1 of a factor of G51 is to a Fanuc control, whose parameter sets it: 0.001 or "
-        "0.00001",
+        description="what 1 of a factor of G51 is to a Fanuc control, whose parameter "
+        "sets it: 0.001 or 0.00001",
     )
     arc_centres: Literal["incremental", "absolute"] | None = Field(
         default=None,
@@ -311,8 +311,8 @@ class TemperaturesTable(Table):
     )
     sensor_log: Text | None = Field(
         default=None,
-        description="the path of a log of the sensors (t_s, NAME_degC ...), relative to this file; instead "
-        "of sensors",
+        description="the path of a log of the sensors (t_s, NAME_degC ...), relative "
+        "to this file; instead of sensors",
     )
     sensor_log_at_s: float | None = Field(
         default=None,
@@ -367,6 +367,12 @@ class JobFile(Table):
     start_mm: Position = Field(
         default_factory=Position,
         description="the axis positions in mm at the start, { X = .., Y = .., Z = .. }",
+    )
+    start_deg: dict[Text, float] = Field(
+        default={},
+        description="the positions of rotary axes at the start, in degrees, such as { A "
+        "= 0.0, C = 0.0 }; only "
+        "for machines with rotary joints",
     )
     part_tolerance_um: Positive | None = Field(
         default=None,

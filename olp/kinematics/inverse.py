@@ -120,10 +120,12 @@ def inverse(
         limited[~met] = True
         if not np.all(now):
             row = int(np.flatnonzero(~met)[np.argmin(now)])
-            raise NotInvertible(
+            error = NotInvertible(
                 f"row {row}: no axis values of {structure.name!r} near the given ones bring the tool to its "
                 "target; expected a target within reach, and a posture away from a singular one"
             )
+            error.row = row
+            raise error
     reached = forward(values).rotation
     left = rotation_vector(reached @ np.swapaxes(task.target.rotation, -1, -2))
     return Solved(values, left, limited)

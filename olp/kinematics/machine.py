@@ -6,7 +6,7 @@ import datetime
 from collections.abc import Mapping
 from dataclasses import field
 
-from olp.core.machine import Tool
+from olp.core.machine import Machine, Tool
 from olp.core.values import dataclass
 from olp.kinematics.errors import MachineErrors
 from olp.kinematics.structure import Structure
@@ -14,7 +14,13 @@ from olp.kinematics.structure import Structure
 
 @dataclass(frozen=True, slots=True)
 class JointMachine:
-    """A machine file: the structure, the tools, and the path of the calibration, None where it names none."""
+    """A machine file: the structure, the tools, and the path of the calibration, None where it names none.
+
+    `control` is what a reader of programs needs to know of it: the linear axes X, Y and Z, work offsets and
+    tools. It is None where the machine has other axes than these three and rotary ones. With `tips_from_zero`
+    programs with tool centre point control count from the workpiece with its rotary axes at zero, else from
+    where these are when it is switched on; None is not stated.
+    """
 
     structure: Structure
     controller: str
@@ -22,6 +28,8 @@ class JointMachine:
     tools: Mapping[int, Tool] = field(default_factory=dict)
     work_offsets: tuple[str, ...] = ()
     default_tool: int | None = None
+    control: Machine | None = None
+    tips_from_zero: bool | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -5,8 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from olp.core.errors import ConfigError
-from olp.files.config import beside, tools_of
-from olp.files.kinematics.schema import OWN_DIRECTIONS, JointMachineFile, JointTable, kind_of
+from olp.core.machine import Axis, Machine
+from olp.core.units import AXES
+from olp.files.config import beside, tools_of, work_offsets_of
+from olp.files.kinematics.schema import (
+    OWN_DIRECTIONS,
+    ROTARY_NAMES,
+    JointMachineFile,
+    JointTable,
+    kind_of,
+)
 from olp.files.problems import config_error, validate
 from olp.files.toml_text import read_toml
 from olp.files.write import PathLike, Reader, read_bytes
@@ -52,6 +60,34 @@ def load_joint_machine(path: PathLike, read: Reader = read_bytes) -> JointMachin
         tools=tools_of(file.tools),
         work_offsets=tuple(file.work_offsets),
         default_tool=default,
+        control=_control(file, structure, path),
+        tips_from_zero={"axis-zero": True, "activation": False, None: None}[file.kinematics.tcp_frame_zero],
+    )
+
+
+def _control(file: JointMachineFile, structure: Structure, path: PathLike) -> Machine | None:
+    """What a reader of programs needs to know of a machine, None where its axes are no X, Y, Z with rotary
+    axes named A, B or C."""
+    kinds = {name: joint.kind for name, joint in structure.joints.items()}
+    linear = {name for name, kind in kinds.items() if kind == "linear"}
+    if structure.platforms or linear != set(AXES) or not kinds.keys() - linear <= set(ROTARY_NAMES):
+        return None
+    axes = {
+        name: Axis(structure.joints[name].travel, structure.joints[name].least_increment) for name in AXES
+    }
+    return Machine(
+        name=file.name,
+        chain=" ".join(structure.chain),
+        controller=file.controller,
+        axes=axes,
+        calibration=beside(path, file.calibration),
+        decimal_point=file.decimal_point,
+        tool_change_moves=file.tool_change_moves,
+        work_offsets=work_offsets_of(file.work_offsets),
+        tools=tools_of(file.tools),
+        default_tool=file.job_defaults.tool,
+        default_work_offset=file.job_defaults.work_offset,
+        length_active=file.job_defaults.length_active,
     )
 
 

@@ -12,6 +12,8 @@ from olp.files.schemas import JobDefaultsTable, Tools, WorkOffsets
 
 #: Axes that are linear where their table does not say.
 LINEAR_NAMES = "XYZUVW"
+#: Rotary axes that programs of words have letters for.
+ROTARY_NAMES = "ABC"
 #: Axes whose directions are known by name.
 OWN_DIRECTIONS = "XYZ"
 
@@ -32,8 +34,8 @@ class JointTable(Table):
 
     kind: Literal["linear", "rotary", "length"] | None = Field(
         default=None,
-        description='"linear", "rotary", or "length" (of a leg of a platform); "linear" for X Y Z U V W if '
-        "left out",
+        description='"linear", "rotary", or "length" (of a leg of a platform); "linear" for X Y Z '
+        "U V W if left out",
     )
     direction: Direction | None = Field(
         default=None,
@@ -94,8 +96,8 @@ class PlatformTable(Table):
     )
     orientation: Literal["solved", "fixed"] = Field(
         default="solved",
-        description='"solved" (six legs hold position and orientation) or "fixed" (three legs, and it does '
-        "not turn)",
+        description='"solved" (six legs hold position and orientation) or "fixed" (three '
+        "legs, and it does not turn)",
     )
     legs: list[LegTable] = Field(description="tables [[platforms.NAME.legs]], six or three")
 
@@ -118,6 +120,11 @@ class KinematicsTable(Table):
         description='"axis" (the turn about the tool\'s Z is free) or "none"; if left out, "axis" with '
         "three or more linear axes in the chain, as machine tools have",
     )
+    tcp_frame_zero: Literal["axis-zero", "activation"] | None = Field(
+        default=None,
+        description="where the frame of tool centre point control equals the work offset: with all "
+        'rotary axes at zero ("axis-zero"), or where they are when it is switched on ("activation")',
+    )
 
 
 class JointMachineFile(Table):
@@ -130,6 +137,15 @@ class JointMachineFile(Table):
         'such as "C A Y F X Z"; blanks may be left out between single letters'
     )
     controller: Controller = Field(description="the dialect of the programs: " + ", ".join(CONTROLLERS))
+    decimal_point: Literal["increment", "calculator"] | None = Field(
+        default=None,
+        description="what a number without a decimal point means to a Fanuc or Haas control: X100 is 100 "
+        "least increments, or 100 units as on a pocket calculator",
+    )
+    tool_change_moves: bool = Field(
+        default=True,
+        description="whether M6 may move the axes; if not, their positions are known after it",
+    )
     calibration: Text | None = Field(
         default=None, description="the path of the calibration file, relative to this file"
     )

@@ -51,8 +51,8 @@ RULES = (
     _rule(
         "OLP505",
         "form of a line",
-        why="The control refuses a line that is too long, or whose tape mark or block number is not in its "
-        "place.",
+        why="The control refuses a line that is too long, or whose tape mark or block number "
+        "is not in its place.",
         remedy="Write the line as the message says.",
         example="`X10 N20`: the block number is not the first word.",
     ),
@@ -82,8 +82,8 @@ RULES = (
         "OLP513",
         "cutter radius is not known",
         why="The control makes the path of the tool itself, from a radius in its tables.",
-        remedy="Give radius_mm, and wear_mm, of the tool in the machine or job file, as the control has "
-        "them.",
+        remedy="Give radius_mm, and wear_mm, of the tool in the machine or job file, "
+        "as the control has them.",
         example="`G41 D7` without radius_mm in `[tools.7]`.",
     ),
     _rule(
@@ -200,8 +200,8 @@ RULES = (
         "OLP530",
         "impossible arc",
         why="The control refuses an arc whose start, end and centre or radius do not fit.",
-        remedy="Write more digits, or check the plane (G17, G18, G19) and whether I, J and K are "
-        "absolute (G90.1).",
+        remedy="Write more digits, or check the plane (G17, G18, G19) and whether I, "
+        "J and K are absolute (G90.1).",
         example="`G2 X10 Y0 I4 J0` from X0 Y0: the radius is 4 mm at its start and 6 mm at its end.",
         follows=True,
     ),
@@ -242,8 +242,8 @@ RULES = (
         "value is not known off line",
         why="The value is in the control: a probe result, an offset, a setting, or a "
         "parameter that another program has set.",
-        remedy="Assign the value in the program, before it is used. Or give it in [parameters] of the job "
-        "file.",
+        remedy="Assign the value in the program, before it is used. Or give it in "
+        "[parameters] of the job file.",
         example="`X#5061` (the last probe result).",
         follows=True,
     ),
@@ -310,10 +310,50 @@ RULES = (
     _rule(
         "OLP563",
         "machine with other joints",
-        why="Programs are read and corrected for three linear axes. With rotary axes, arms or platforms "
-        "their words mean other motions.",
-        remedy="Look at the machine with `olp inspect machine.toml`, or compute with `olp.load_kinematics`. "
-        "Correct programs of machines with three linear axes only.",
-        example='`chain = "C A Y F X Z"` with tables of rotary axes in the machine file.',
+        why="This verb, or this dialect, is read for three linear axes only. Or the "
+        "machine has other axes than "
+        "X, Y, Z and rotary ones named A, B and C, so that words mean other motions.",
+        remedy="Use `olp correct`, `verify`, `check` or `simulate` with G-code. Look "
+        "at the machine with `olp "
+        "inspect machine.toml`, or compute with `olp.load_kinematics`.",
+        example="`olp retime part.nc -m trunnion.toml`, and a program for an arm.",
+    ),
+    _rule(
+        "OLP564",
+        "word of an axis that is not read",
+        why="The block moves an axis that the machine file does not state, or states "
+        "a rotary axis where nothing "
+        "moves.",
+        remedy="State the axis in the machine file. Give offsets of rotary axes in [work_offsets.NAME].",
+        example="`G1 B10` on a machine with A and C, and `G92 A0`.",
+    ),
+    _rule(
+        "OLP565",
+        "not corrected with rotary joints",
+        why="On a machine with rotary joints these blocks would need a correction that is not built.",
+        remedy="Post the program as the message says: straight moves, cycles written out, "
+        "the path of the tool's "
+        "centre.",
+        example="`G41 D1` or `G2 X10 I5` on a five-axis machine.",
+    ),
+    _rule(
+        "OLP566",
+        "no command for a pose",
+        why="No axis values near the programmed ones bring the tool with its errors to "
+        "where it should be, or no "
+        "number of splits keeps the path between them within tolerance.",
+        remedy="Look at the machine and its calibration there with `olp inspect "
+        "--axes`. Keep away from singular "
+        "postures, or raise the tolerances.",
+        example="A tip on the axis of a table that would have to turn about it at once.",
+    ),
+    _rule(
+        "OLP567",
+        "corrected command out of travel",
+        why="The correction leads an axis beyond its travel, where the control stops with an alarm.",
+        remedy="Move the part away from the end of the travel, or correct travel_mm "
+        "and travel_deg in the machine "
+        "file.",
+        example="`G1 A30` where travel_deg ends at 30 and A is corrected upwards.",
     ),
 )

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence, Set
-from dataclasses import field
+from dataclasses import field, replace
 from enum import IntEnum, auto
 from functools import cache
 from typing import Any, TypeVar
@@ -97,6 +97,9 @@ class Profile(Dialect):
       carried out along with the motion, without a rest.
     - `dwell_words`: the letters that state the time of G4. `dwell_ms`: P counts milliseconds, whatever its
       form.
+    - `tip_codes`: codes that switch tool centre point control on, where a machine has rotary axes: words
+    state
+      the tip then, until one of `axis_codes`.
     - `commands`: each line is a command with parameters, and no code holds for the next line. None: lines are
       blocks of words.
     - `inert`: whole lines that are no words and move nothing, such as names of programs and labels.
@@ -159,6 +162,8 @@ class Profile(Dialect):
     m_with_motion: frozenset[int] = frozenset()
     dwell_ms: bool = False
     dwell_words: str = "P"
+    tip_codes: frozenset[int] = frozenset()
+    axis_codes: frozenset[int] = frozenset({490})
     commands: Commands | None = None
     inert: re.Pattern[bytes] | None = None
     translator: Callable[[bytes], Any] | None = None
@@ -177,6 +182,17 @@ class Profile(Dialect):
     def still_m(self) -> frozenset[int]:
         """The M codes that move no axis, ten times their number."""
         return _in_tenths(self.harmless_m, self.harmless_m_tenths)
+
+    def with_tips(self) -> Profile:
+        """The same control on a machine with rotary axes. A tip has no length: the codes that switch tool
+        centre point control on end the tool length for a reader of linear axes."""
+        if not self.tip_codes:
+            return self
+        return replace(
+            self,
+            codes={**self.codes, **dict.fromkeys(self.tip_codes, Act.EVENT)},
+            aliases={**self.aliases, **dict.fromkeys(self.tip_codes, min(self.axis_codes))},
+        )
 
     def codes_of(self, act: Act) -> frozenset[int]:
         """The G codes that do something, ten times their number."""

@@ -15,6 +15,7 @@ DIALECT = replace(
         unchanged={*ISO_UNCHANGED, 51, 110},
         extra={**ISO_EXTRA, 51: Act.UNCHANGED, 501: Act.EVENT, 511: Act.EVENT},
     ),
+    tip_codes=frozenset({434}),
     polar=True,
     scales_axes=True,
     scales_by_parameter=True,

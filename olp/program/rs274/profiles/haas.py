@@ -17,6 +17,7 @@ DIALECT = replace(
     codes=g_codes(unchanged={*ISO_UNCHANGED, 1030, 1870}, extra={**ISO_EXTRA, **_OFFSETS}),
     refusals={**ISO.refusals, 921: "G92.1 is not a code of this control"},
     harmless_m=ISO.harmless_m | {10, 11, 29, 31, 33, 34, 35, 41, 42, 59, 69, 83, 84, 88, 89},
+    tip_codes=frozenset({2340}),
     cycles=HAAS_CYCLES,
     path_mode="the control's own smoothing (G187)",
 )

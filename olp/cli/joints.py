@@ -1,0 +1,172 @@
+"""What the verbs do where the machine has rotary joints: the same options, as far as they are built for
+it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+from click.core import ParameterSource
+
+from olp.cli.common import (
+    DIALECT,
+    KNOWN,
+    STREAM,
+    default_output,
+    diagnostic,
+    exit_for,
+    files_of,
+    options_of,
+    put,
+    refuse_early,
+    source,
+)
+from olp.core.errors import InputError, UsageError
+
+if TYPE_CHECKING:
+    from olp.findings.catalogue import Finding
+    from olp.workflows.joints.loaded import JointRun
+
+#: Words of a call that every verb takes on such a machine.
+_ALWAYS = ("program", "programs", "nominal", "corrected", "machine", "job", "dialect", "flatten",
+           "expand_cycles", "peck_clearance_mm", "output", "tolerance_um", "tolerance_urad", "outside_box",
+           "date", "fail_on", "as_json", "quiet", "force", "step_mm")  # fmt: skip
+
+
+def on_joints(machine: str | None, job: str | None) -> bool:
+    """Whether the machine of a call has rotary joints. Raises UsageError for --tolerance-urad elsewhere, and
+    for options that are not built for such a machine."""
+    context = click.get_current_context()
+    given = [
+        name for name in context.params if context.get_parameter_source(name) is ParameterSource.COMMANDLINE
+    ]
+    if context.meta.get(KNOWN) or not _is_of_joints(machine, job):
+        if "tolerance_urad" in given:
+            raise UsageError("--tolerance-urad is for machines with rotary joints; leave it out")
+        return False
+    wrong = [name for name in given if name not in _ALWAYS]
+    if wrong:
+        option = next(p for p in context.command.params if p.name == wrong[0])
+        raise UsageError(f"{option.opts[0]} does not go with machines with rotary joints yet; leave it out")
+    return True
+
+
+def _is_of_joints(machine: str | None, job: str | None) -> bool:
+    from olp.files.config import load_job, of_joints
+    from olp.files.toml_text import read_toml
+    from olp.files.write import read_bytes
+
+    if machine is None and job is not None:
+        machine = load_job(job).machine
+    return machine is not None and of_joints(read_toml(read_bytes(machine), str(machine))[0])
+
+
+def run_of(program: str | None, machine: str | None, job: str | None) -> JointRun:
+    """What a call is about."""
+    from olp.files.sources import Sources
+    from olp.workflows.joints.loaded import JointRun
+
+    sources = Sources()
+    if program is not None and program != STREAM and Path(program).is_dir():
+        raise InputError("is a folder; expected a program in it", file=program)
+    given = None if program is None else source(sources, program)
+    dialect = click.get_current_context().meta.get(DIALECT)
+    return JointRun.of(given, machine, job, dialect=dialect, sources=sources)
+
+
+def correct(program: str | None, machine: str | None, job: str | None, words: dict[str, Any]) -> None:
+    """`olp correct`."""
+    run = run_of(program, machine, job)
+    name = program or run.program.name
+    output = words["output"] or default_output(name)
+    if words["as_json"] and output == STREAM:
+        raise UsageError("JSON on stdout excludes -o -; name a file with -o")
+    refuse_early(files_of(output), run.files, force=words["force"])
+
+    from olp.files.write import write_files
+    from olp.reports.report import to_json
+    from olp.workflows.joints.correct import JointOptions, corrected
+
+    result = corrected(run, options_of(JointOptions, words))
+    write_files(
+        {Path(file): result.data for file in files_of(output)}, force=words["force"], inputs=run.files
+    )
+    if output == STREAM:
+        put(result.data)
+    if words["as_json"]:
+        put(to_json(result.report))
+    elif not words["quiet"]:
+        put(result.to_text(), err=output == STREAM)
+    if not words["quiet"]:
+        for file in files_of(output):
+            diagnostic(f"wrote {file}")
+    exit_for(result.findings, words["fail_on"])
+
+
+def verify(nominal: str, corrected: str, machine: str | None, job: str | None, words: dict[str, Any]) -> None:
+    """`olp verify`."""
+    run = run_of(nominal, machine, job)
+
+    from olp.reports.report import to_json
+    from olp.workflows.joints.correct import JointOptions
+    from olp.workflows.joints.verify import verified
+
+    result = verified(run, source(run.sources, corrected), options_of(JointOptions, words))
+    if words["as_json"]:
+        put(to_json(result.report))
+    elif not words["quiet"]:
+        put(result.to_text())
+    exit_for(result.findings, words["fail_on"])
+
+
+def check(
+    programs: Iterable[str | None], machine: str | None, job: str | None, words: dict[str, Any]
+) -> None:
+    """`olp check`: the program is corrected in memory, or proved against its nominal one."""
+    from olp.reports.report import to_json
+    from olp.workflows.joints.correct import JointOptions, corrected
+    from olp.workflows.joints.verify import verified
+
+    options = options_of(JointOptions, words)
+    found: list[Finding] = []
+    for program in programs:
+        nominal = words["nominal"]
+        run = run_of(program if nominal is None else nominal, machine, job)
+        result = (
+            corrected(run, options)
+            if nominal is None
+            else verified(run, source(run.sources, program or STREAM), options)
+        )
+        found += result.findings
+        if words["as_json"]:
+            put(to_json(result.report))
+        elif not words["quiet"]:
+            go = "Go" if result.report["verdict"]["ok"] else "NO GO"
+            put(f"{go}: {program or run.program.name}\n\n{result.to_text()}")
+    exit_for(tuple(found), words["fail_on"])
+
+
+def simulate(
+    program: str | None, machine: str | None, job: str | None, output: str | None, step_mm: float,
+    words: dict[str, Any],
+) -> None:  # fmt: skip
+    """`olp simulate`."""
+    run = run_of(program, machine, job)
+    refuse_early(files_of(output), run.files, force=words["force"])
+
+    from olp.files.write import write_bytes
+    from olp.reports.report import to_json
+    from olp.workflows.flatten import UnrollOptions
+    from olp.workflows.joints.simulate import simulated
+
+    result = simulated(run, options_of(UnrollOptions, words), step_mm)
+    if output not in (None, STREAM):
+        write_bytes(output, result.to_csv(), force=words["force"], inputs=run.files)
+        if not words["quiet"]:
+            diagnostic(f"wrote {output}: {len(result.points_mm)} poses in workpiece coordinates")
+    if words["as_json"]:
+        put(to_json(result.report))
+    elif output in (None, STREAM):
+        put(result.to_csv())

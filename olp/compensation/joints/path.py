@@ -1,0 +1,266 @@
+"""The path of a program in all axes of a machine: linear columns as they were read, rotary ones beside
+them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.compensation.joints.motion import Motion
+from olp.core.arrays import Array, Index, Mask, is_in
+from olp.core.errors import ProgramError
+from olp.core.machine import Machine, Vector
+from olp.core.toolpath import Flag, Kind, Touch
+from olp.core.units import AXES
+from olp.core.values import dataclass
+from olp.kinematics.errors import MachineErrors
+from olp.kinematics.structure import Structure
+from olp.program.program import Program
+from olp.program.rs274.rotary import RotaryWords
+
+#: Moves that are never corrected.
+_KEPT = np.uint8(Flag.PASS | Flag.MACHINE | Flag.CONTROL)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointPath:
+    """The moves of a program in all axes, columns by move.
+
+    (n, axes) `start` and `end` are programmed coordinates in the order of the structure, mm and deg, NaN
+    where unknown; the linear ones state the tip where `tip` (n,), else they are axis values. `slot` (n,
+    axes) are their words, -1 where there is none. `tool` is the place of the tool in `motion`, `shift_mm`
+    (n, 3) where the part really lies. `offset` (n, axes), `unit` (n,) and, of words without a point, `scale`
+    (axes,) lead from words to coordinates. `feed` are straight moves that cut, `kept` moves that stay
+    uncorrected. `held` (n,) are moves whose rotary axes stay as programmed: where these stand, tool centre
+    point control begins."""
+
+    program: Program
+    motion: Motion
+    start: Array
+    end: Array
+    slot: npt.NDArray[np.int32]
+    tool: Index
+    tip: Mask
+    shift_mm: Array
+    offset: Array
+    unit: Array
+    scale: Array
+    feed: Mask
+    kept: Mask
+    held: Mask
+
+    def __len__(self) -> int:
+        return len(self.end)
+
+    @property
+    def line(self) -> npt.NDArray[np.int32]:
+        return self.program.toolpath.line
+
+    def at(self, move: Index, share: Array) -> Array:
+        """(r, axes) programmed coordinates at shares of moves."""
+        start, end = self.start[move], self.end[move]
+        place: Array = start + share[:, None] * (end - start)
+        whole = share == 1.0
+        place[whole] = end[whole]
+        return place
+
+    @staticmethod
+    def of(
+        program: Program, structure: Structure, errors: MachineErrors, machine: Machine, *,
+        turned: Mapping[str, Mapping[str, float]], start_deg: Mapping[str, float],
+        tips_from_zero: bool | None = None,
+    ) -> JointPath:  # fmt: skip
+        """The path of a program that was read with its words. `turned` are the rotary values of work offsets,
+        `start_deg` those at the start, `tips_from_zero` is as in `JointMachine`. Raises ProgramError for
+        what is not read on such a machine."""
+        _refuse(program)
+        path = program.toolpath
+        order = structure.order
+        letters = [name for name in order if structure.joints[name].kind == "rotary"]
+        rotary = RotaryWords.of(program, letters, machine)
+        turns = [
+            [turned.get(frame.work_offset, {}).get(letter, 0.0) for letter in letters]
+            for frame in path.frames
+        ]
+        offsets = np.array(turns, float).reshape(len(path.frames), len(letters))
+        degrees = rotary.follow(
+            program, np.array([start_deg.get(letter, np.nan) for letter in letters]), offsets
+        )
+        tip = _tips(program)
+        end, slot = np.empty((len(path), len(order))), np.full((len(path), len(order)), -1, np.int32)
+        offset, scale = np.zeros(end.shape), np.ones(len(order))
+        linear = np.array([frame.offset_mm for frame in path.frames]).reshape(-1, 3)[path.frame]
+        for column, name in enumerate(order):
+            if name in letters:
+                own = letters.index(name)
+                end[:, column], slot[:, column] = degrees[:, own], rotary.slot[:, own]
+                offset[:, column], scale[column] = offsets[path.frame, own], rotary.scale[own]
+            else:
+                own = AXES.index(name)
+                end[:, column], slot[:, column] = path.end_mm[:, own], program.slot[:, own]
+                offset[:, column] = linear[:, own]
+        columns = [order.index(name) for name in AXES]
+        end[:, columns] = _stated_in_mode(end[:, columns], slot[:, columns] >= 0, tip)
+        _refuse_tips(program, structure, tip, end, offset, tips_from_zero)
+        tools = list(dict.fromkeys(frame.tool_mm for frame in path.frames)) or [(0.0, 0.0, 0.0)]
+        motion = Motion.of(structure, errors, tuple(tools))
+        tool_of = np.array([tools.index(frame.tool_mm) for frame in path.frames] or [0])
+        shifts = np.array(
+            [
+                _shift(structure, errors, frame.touched, row, order, letters)
+                for frame, row in zip(path.frames, offsets, strict=True)
+            ]
+        ).reshape(-1, 3)
+        unit = np.array([frame.unit_mm for frame in path.frames] or [1.0])[path.frame]
+        tool = tool_of[path.frame]
+        kept = (path.flag & _KEPT) != 0
+        start = _starts(motion, end, tool, tip, np.array(path.start_mm), columns, start_deg, order)
+        return JointPath(
+            program, motion, start, end, slot, tool, tip, shifts[path.frame], offset, unit, scale,
+            (path.kind == Kind.LINE) & ~kept, kept, np.append(tip[1:] & ~tip[:-1], False)[: len(tip)],
+        )  # fmt: skip
+
+
+def _starts(
+    motion: Motion, end: Array, tool: Index, tip: Mask, start_mm: Array, columns: list[int],
+    start_deg: Mapping[str, float], order: tuple[str, ...],
+) -> Array:  # fmt: skip
+    """(n, axes) coordinates at the start of each move, in the mode and with the tool of the move itself."""
+    if not len(end):
+        return end
+    first = np.array([start_deg.get(name, np.nan) for name in order])
+    first[columns] = start_mm
+    start = np.vstack((first, end[:-1]))
+    before_tip, before_tool = np.append(False, tip[:-1]), np.append(tool[:1], tool[:-1])
+    changed = np.flatnonzero((before_tip != tip) | (tip & (before_tool != tool)))
+    changed = changed[np.isfinite(start[changed]).all(axis=1)]
+    axes = motion.axes(start[changed], before_tool[changed], before_tip[changed])
+    start[changed] = motion.programmed(axes, tool[changed], tip[changed])
+    return np.asarray(start)
+
+
+def _stated_in_mode(end: Array, given: Mask, tip: Mask) -> Array:
+    """(n, 3) linear coordinates, NaN until they are stated after a change between axis values and tips."""
+    changes = np.append(True, tip[1:] != tip[:-1])[: len(tip)]
+    if not changes[1:].any():
+        return end
+    order = np.arange(len(end))
+    began = np.maximum.accumulate(np.where(changes, order, -1))
+    stated = np.maximum.accumulate(np.where(given, order[:, None], -1), axis=0)
+    first = began == 0
+    return np.where((stated >= began[:, None]) | first[:, None], end, np.nan)
+
+
+def _shift(
+    structure: Structure, errors: MachineErrors, touched: Touch | None, turned: Array, order: tuple[str, ...],
+    letters: list[str],
+) -> Vector:  # fmt: skip
+    """Where the part lies from where its offset says, in workpiece coordinates."""
+    if touched is None:
+        return (0.0, 0.0, 0.0)
+    position, tool = touched
+    values = np.zeros((1, len(order)))
+    for name, value in zip(AXES, position, strict=True):
+        values[0, order.index(name)] = value
+    for letter, value in zip(letters, turned.tolist(), strict=True):
+        values[0, order.index(letter)] = value
+    motion = Motion.of(structure, errors, ((tool[0], tool[1], tool[2]),))
+    x, y, z = motion.machines[0].deviation(values)[0][0].tolist()
+    return (x, y, z)
+
+
+def _tips(program: Program) -> Mask:
+    """(n,) moves whose words state the tip of the tool."""
+    words, profile = program.words, program.rs274
+    assert words is not None
+    index = np.flatnonzero(words.letter == ord("G"))
+    code = np.rint(words.mantissa[index] * 10.0 / 10.0 ** words.decimals[index]).astype(np.int64)
+    switch = is_in(code, [*profile.tip_codes, *profile.axis_codes]) if profile.tip_codes else code < 0
+    line = np.searchsorted(words.first_word, index[switch], "right")
+    on = is_in(code[switch], [*profile.tip_codes, -1])
+    last = np.searchsorted(line, program.toolpath.line, "right") - 1
+    return np.asarray((last >= 0) & np.append(on, False)[last], bool)
+
+
+def _refuse_tips(
+    program: Program, structure: Structure, tip: Mask, end: Array, offset: Array, from_zero: bool | None
+) -> None:
+    """Raise ProgramError where the tip is stated in a frame that is not known."""
+    moves = np.flatnonzero(tip)
+    if not moves.size:
+        return
+    path = program.toolpath
+    rotary = np.array([unit == "deg" for unit in structure.units])
+    begun = moves[np.append(True, np.diff(moves) != 1)]
+    before = np.vstack((np.full(len(rotary), np.nan), end))[begun]
+    carried = rotary & np.array([name in structure.workpiece_side for name in structure.order])
+    turned = ~(before[:, carried] == 0.0)
+    for row in np.flatnonzero(turned.any(axis=1) if from_zero is not True else np.zeros(len(begun), bool)):
+        raise ProgramError(
+            "tool centre point control is switched on where a table axis is not at zero; turn it to zero "
+            'before, or state tcp_frame_zero = "axis-zero" in [kinematics] where the control has it so',
+            line=int(path.line[begun[row]]),
+            code="OLP565",
+        )
+    shifted = moves[(offset[moves][:, rotary] != 0.0).any(axis=1)]
+    if shifted.size:
+        raise ProgramError(
+            "with tool centre point control the work offset has rotary values; expected 0 for A, B and C",
+            line=int(path.line[shifted[0]]),
+            code="OLP565",
+        )
+    _refuse_lengths(program, moves)
+
+
+def _refuse_lengths(program: Program, moves: Index) -> None:
+    """Raise ProgramError where tool centre point control takes the length of another tool than the one in the
+    spindle."""
+    words, path = program.words, program.toolpath
+    assert words is not None
+    index = np.flatnonzero(words.letter == ord("H"))
+    line = np.searchsorted(words.first_word, index, "right")
+    first = np.searchsorted(path.line, line)
+    inside = (first < len(path)) & is_in(np.minimum(first, len(path) - 1), moves)
+    for number, at, move in zip(
+        words.mantissa[index[inside]].tolist(), line[inside].tolist(), first[inside].tolist(), strict=True
+    ):
+        tool = path.frames[int(path.frame[move])].tool
+        if tool != number:
+            raise ProgramError(
+                f"H{number} is the length of another tool than T{tool}, which is "
+                "in the spindle; expected the "
+                "number of that tool, whose vector is that of [tools.N]",
+                line=at,
+                code="OLP565",
+            )
+
+
+def _refuse(program: Program) -> None:
+    """Raise ProgramError with the first line of what is not corrected on machines with rotary joints."""
+    path = program.toolpath
+    found: list[tuple[int, str]] = []
+
+    def note(moves: Mask, why: str) -> None:
+        if moves.any():
+            found.append((int(path.line[moves].min()), why))
+
+    flag = path.flag
+    note((flag & np.uint8(Flag.CYCLE)) != 0, "a canned cycle; give --expand-cycles, which writes it out")
+    note(path.compensated(), "cutter compensation (G41, G42); post the path of the tool's centre")
+    note(path.kind == Kind.PROBE, "a probing move; take it into a program of its own")
+    note((flag & np.uint8(Flag.DELETED)) != 0, "a block under block delete; remove the / or the block")
+    arc = np.zeros(len(path), bool)
+    arc[path.arcs.move] = True
+    note(arc & ((flag & _KEPT) == 0), "an arc; post it as straight moves, within your tolerance")
+    if path.turns() is not None:
+        turned = np.array([frame.turn is not None for frame in path.frames])[path.frame]
+        note(turned, "a rotated, mirrored or scaled frame; post the program without it")
+    for capture in program.captures[:1]:
+        found.append((capture.line, "a word that stores the present position (G92, G10 L20); use G54 to G59"))
+    if found:
+        line, why = min(found)
+        raise ProgramError(
+            f"on a machine with rotary joints this is not corrected: {why}", line=line, code="OLP565"
+        )

@@ -1,0 +1,275 @@
+"""What a machine with rotary joints is commanded, move by move: waypoints, splits between them, backlash."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from olp.compensation.joints.path import JointPath
+from olp.compensation.joints.sampling import Resolution, spread
+from olp.core.arrays import Array, Index, Mask, distinct
+from olp.core.errors import NotInvertible, ProgramError
+from olp.core.values import dataclass
+from olp.kinematics.correction import CorrectedPoses, deviations, left_angles
+from olp.kinematics.poses import Poses
+
+#: The share of a tolerance that a split leaves to what lies between its samples.
+_SHARE = 0.7
+#: A move is split into at most so many parts at a time.
+_MOST_PARTS = 64
+#: Rounds of splitting; each leaves less than half of a deviation.
+_MOST_ROUNDS = 12
+#: Rows of a program at most, for each of its moves and as a base: so that no short text makes work without
+#: end.
+_MOST_ROWS = 1_000_000
+#: Further rows for each of its moves.
+_ROWS_PER_MOVE = 100
+#: Rows whose commands are found at a time, so that memory is small.
+_BATCH = 1 << 15
+
+
+@dataclass(frozen=True, slots=True)
+class JointLimits:
+    """The numerical tolerances of a correction: mm at the tip, rad of the tool."""
+
+    tolerance_mm: float
+    tolerance_rad: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointPlan:
+    """Rows of the corrected program: their `move` (r,) and the `share` of it at which they end; a share of 0
+    takes up backlash. (r, axes) `command` are corrected programmed coordinates, NaN where a move stays as it
+    is;
+    `axes` the axis values of these and `target` the poses that they bring the tool to. `side` (r, axes) are
+    those of the backlash. `left_rad` (r,) are angles that remain, `limited` (r,) rows near a singular
+    posture.
+    """
+
+    move: Index
+    share: Array
+    command: Array
+    axes: Array
+    target: Poses
+    side: Array
+    left_rad: Array
+    limited: Mask
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Rows:
+    """Rows at shares of moves with their commands, before backlash."""
+
+    move: Index
+    share: Array
+    axes: Array
+    target: Poses
+    left_rad: Array
+    limited: Mask
+
+    @staticmethod
+    def join(parts: list[_Rows]) -> _Rows:
+        rotation = np.concatenate([part.target.rotation for part in parts])
+        position = np.concatenate([part.target.position for part in parts])
+        names = ("move", "share", "axes", "left_rad", "limited")
+        columns = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+        return _Rows(target=Poses(rotation, position), **columns)
+
+    def only(self, rows: Index | Mask) -> _Rows:
+        return _Rows(
+            self.move[rows], self.share[rows], self.axes[rows],
+            Poses(self.target.rotation[rows], self.target.position[rows]), self.left_rad[rows],
+            self.limited[rows],
+        )  # fmt: skip
+
+
+def planned(path: JointPath, limits: JointLimits) -> JointPlan:
+    """The plan of a path. Raises ProgramError with the line of a feed move from or to an unknown position, of
+    a command that does not exist, and of one that leaves the travel of an axis."""
+    known = np.asarray(np.isfinite(path.end).all(axis=1), bool)
+    solid = known & ~path.kept
+    _refuse_unknown(path, known)
+    move = np.flatnonzero(solid)
+    ends = _solved(path, move, np.ones(len(move)))
+    split = np.flatnonzero(solid & path.feed & (path.start != path.end).any(axis=1))
+    begins = _solved(path, split, np.zeros(len(split)))
+    inner = _split(path, begins, ends.only(np.searchsorted(move, split)), limits)
+    rows = _Rows.join([ends, *inner])
+    side, turned = _sides(path, solid)
+    back = begins.only(turned[split])
+    rows = _Rows.join([rows, back])
+    order = np.lexsort((rows.share, rows.move))
+    return _finished(path, rows.only(order), side)
+
+
+def _refuse_unknown(path: JointPath, known: Mask) -> None:
+    wrong = np.flatnonzero(path.feed & ~(known & np.isfinite(path.start).all(axis=1)))
+    if wrong.size:
+        first = int(wrong[0])
+        nowhere = np.isnan(path.end[first]) | np.isnan(path.start[first])
+        order = path.motion.structure.order
+        names = ", ".join(name for name, missing in zip(order, nowhere.tolist(), strict=True) if missing)
+        raise ProgramError(
+            f"a feed move begins or ends where {names} has not been commanded; command all axes before "
+            "it, after a change to tool centre point control again, or state start_mm and start_deg",
+            line=int(path.line[first]),
+            code="OLP524",
+        )
+
+
+def _solved(path: JointPath, move: Index, share: Array) -> _Rows:
+    """The commands at shares of moves."""
+    motion, parts = path.motion, []
+    for a in range(0, max(len(move), 1), _BATCH):
+        some, at = move[a : a + _BATCH], share[a : a + _BATCH]
+        tool, shift = path.tool[some], path.shift_mm[some]
+        axes = motion.axes(path.at(some, at), tool, path.tip[some])
+        nominal = motion.nominal(axes, tool)
+        done = _commanded(path, some, axes, tool, shift)
+        target = Poses(nominal.rotation, nominal.position + shift)
+        held = np.flatnonzero(path.held[some])
+        if held.size:
+            part = Poses(target.rotation[held], target.position[held])
+            done.values[held] = motion.linear(axes[held], tool[held], part)
+        left = left_angles(motion.structure, done.left_rad, target)
+        parts.append(_Rows(some, at, done.values, target, left, done.limited))
+    return _Rows.join(parts)
+
+
+def _commanded(path: JointPath, move: Index, axes: Array, tool: Index, shift: Array) -> CorrectedPoses:
+    structure = path.motion.structure
+    try:
+        done = path.motion.command(axes, tool, shift)
+    except NotInvertible as error:
+        if error.row is None:
+            raise
+        raise ProgramError(
+            "no axis values bring the tool to where this move has it; expected a target within reach, away "
+            "from a singular posture",
+            line=int(path.line[move[error.row]]),
+            code="OLP566",
+        ) from None
+    out = np.flatnonzero(done.beyond.any(axis=1))
+    if out.size:
+        row = int(out[np.argmin(path.line[move[out]])])
+        column = int(np.argmax(done.beyond[row]))
+        name = structure.order[column]
+        low, high = structure.joints[name].travel
+        raise ProgramError(
+            f"the corrected command of {name} "
+            f"is {done.values[row, column]:.6g} {structure.units[column]}, out "
+            f"of its travel {low:g} to {high:g}; move the part, or state the travel in the machine file",
+            line=int(path.line[move[row]]),
+            code="OLP567",
+        )
+    return done
+
+
+def _split(path: JointPath, begin: _Rows, end: _Rows, limits: JointLimits) -> list[_Rows]:
+    """Rows between the ends of moves, so that nothing between them leaves the tolerances."""
+    resolution = Resolution.of(path.motion)
+    found: list[_Rows] = []
+    most = _MOST_ROWS + _ROWS_PER_MOVE * len(path)
+    for _ in range(_MOST_ROUNDS):
+        if not len(begin.move):
+            return found
+        parts = _parts(path, begin, end, limits, resolution)
+        apart = np.flatnonzero(parts > 1)
+        begin, end, parts = begin.only(apart), end.only(apart), parts[apart]
+        if parts.sum() + sum(len(rows.move) for rows in found) > most:
+            break
+        owner, step = spread(parts - 1)
+        share = begin.share[owner] + (step + 1) / parts[owner] * (end.share - begin.share)[owner]
+        rows = _solved(path, begin.move[owner], share)
+        found.append(rows)
+        key = np.append(owner, np.arange(len(apart))), np.append(share, begin.share)
+        order = np.lexsort(key[::-1])
+        begins = _Rows.join([rows, begin]).only(order)
+        key = np.append(owner, np.arange(len(apart))), np.append(share, end.share)
+        order = np.lexsort(key[::-1])
+        begin, end = begins, _Rows.join([rows, end]).only(order)
+    if len(begin.move):
+        raise ProgramError(
+            "between the ends of this move no number of splits keeps the path within tolerance; expected an "
+            "error without steps; raise --tolerance-um or --tolerance-urad",
+            line=int(path.line[begin.move].min()),
+            code="OLP566",
+        )
+    return found
+
+
+def _parts(path: JointPath, begin: _Rows, end: _Rows, limits: JointLimits, resolution: Resolution) -> Index:
+    """(s,) into how many parts each stretch between two rows has to be split; 1 where it may stay."""
+    count = resolution.samples(begin.axes, end.axes)
+    parts = np.ones(len(count), np.int64)
+    totals = np.cumsum(count)
+    a = 0
+    while a < len(count):
+        b = max(int(np.searchsorted(totals, (totals[a - 1] if a else 0) + _BATCH)), a + 1)
+        worst = _worst(path, begin.only(np.arange(a, b)), end.only(np.arange(a, b)), limits, count[a:b])
+        bends = np.clip(np.ceil(np.sqrt(worst)), 2, _MOST_PARTS).astype(np.int64)
+        parts[a:b] = np.where(worst > 1.0, bends, 1)
+        a = b
+    return parts
+
+
+def _worst(path: JointPath, begin: _Rows, end: _Rows, limits: JointLimits, count: Index) -> Array:
+    """(s,) the largest deviation in each stretch over what may be."""
+    motion = path.motion
+    owner, step = spread(count)
+    part = (step + 1) / (count[owner] + 1)
+    move = begin.move[owner]
+    tool, tip = path.tool[move], path.tip[move]
+    ends = [motion.programmed(rows.axes, path.tool[rows.move], path.tip[rows.move]) for rows in (begin, end)]
+    written = ends[0][owner] + part[:, None] * (ends[1] - ends[0])[owner]
+    share = begin.share[owner] + part * (end.share - begin.share)[owner]
+    nominal = motion.nominal(motion.axes(path.at(move, share), tool, tip), tool)
+    target = Poses(nominal.rotation, nominal.position + path.shift_mm[move])
+    actual = motion.actual(motion.axes(written, tool, tip), tool)
+    distance, angle = deviations(motion.structure, actual, target)
+    left = np.maximum(begin.left_rad, end.left_rad)
+    over = np.maximum(distance / limits.tolerance_mm, (angle - left[owner]) / limits.tolerance_rad) / _SHARE
+    worst = np.zeros(len(count))
+    np.maximum.at(worst, owner, over)
+    return worst
+
+
+def _sides(path: JointPath, solid: Mask) -> tuple[Array, Mask]:
+    """(n, axes) on which side of its backlash each axis is at the end of each move, 0 where that is not
+    known, and (n,) feed moves at whose begin an axis turns round."""
+    motion = path.motion
+    side = np.zeros(path.end.shape)
+    if not motion.width.any() or not len(path):
+        return side, np.zeros(len(path), bool)
+    known = solid & np.isfinite(path.start).all(axis=1)
+    rows = np.flatnonzero(known)
+    ends = [motion.axes(place[rows], path.tool[rows], path.tip[rows]) for place in (path.start, path.end)]
+    moved = np.zeros(path.end.shape)
+    moved[rows] = ends[1] - ends[0]
+    moves = np.abs(moved) > 0.0
+    order = np.arange(len(path))[:, None]
+    last = np.maximum.accumulate(np.where(moves, order, -1), axis=0)
+    side = np.where(last >= 0, np.take_along_axis(np.sign(moved), np.maximum(last, 0), axis=0), 0.0)
+    before = np.vstack((np.zeros((1, len(motion.width))), side[:-1]))
+    turned = ((side != before) & (motion.width != 0.0)).any(axis=1) & path.feed & known
+    return side * (motion.width != 0.0), turned
+
+
+def _finished(path: JointPath, rows: _Rows, side: Array) -> JointPlan:
+    """The plan of rows in their order, with a row for each move that stays as it is."""
+    motion, count = path.motion, len(path)
+    still = np.setdiff1d(np.arange(count), distinct(rows.move))
+    own = side[rows.move]
+    axes = rows.axes + 0.5 * motion.width * own
+    command = motion.programmed(axes, path.tool[rows.move], path.tip[rows.move])
+    blank = np.full((len(still), path.end.shape[1]), np.nan)
+    move, share = np.append(rows.move, still), np.append(rows.share, np.ones(len(still)))
+    order = np.lexsort((share, move))
+    eye = np.broadcast_to(np.eye(3), (len(still), 3, 3))
+    return JointPlan(
+        move[order], share[order], np.vstack((command, blank))[order], np.vstack((axes, blank))[order],
+        Poses(np.concatenate((rows.target.rotation, eye))[order],
+              np.concatenate((rows.target.position, blank[:, :3]))[order]),
+        np.vstack((own, np.zeros(blank.shape)))[order],
+        np.append(rows.left_rad, np.zeros(len(still)))[order],
+        np.append(rows.limited, np.zeros(len(still), bool))[order],
+    )  # fmt: skip

@@ -1,0 +1,259 @@
+"""Writes the plan of a machine with rotary joints into its program: words changed and inserted, blocks
+inserted, nothing else.
+
+Rotary words are rounded first. The linear ones are then solved for the position that these rotary words give,
+and rounded, so that the rounding of an angle does not move the tip.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from olp.compensation.digits import AxisRows, Digits
+from olp.compensation.inserted_blocks import end_word_edits
+from olp.compensation.joints.path import JointPath
+from olp.compensation.joints.planning import JointPlan
+from olp.compensation.stamp import stamped
+from olp.compensation.stretches import Decimals, Stretches, digits_of
+from olp.compensation.style import Style, fewest_decimals
+from olp.compensation.tally import Tally
+from olp.core.arrays import Array, Index, Mask, distinct
+from olp.core.errors import ProgramError
+from olp.core.machine import Vector
+from olp.core.toolpath import Flag
+from olp.core.units import AXES
+from olp.core.values import dataclass
+from olp.kinematics.poses import Poses
+from olp.program.text.edits import EditList, Edits, Prefixes, splice
+
+Small = npt.NDArray[np.int8]
+
+#: The largest number of axes that have words; orders of insertions leave room for them and for F.
+_PLACES = 16
+#: The share of the time of a block in G93 that a step takes which takes up backlash.
+_TAKE_UP_SHARE = 0.05
+#: Decimals of F in G93, where a block is split.
+_FEED_DECIMALS = 4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WrittenJoints:
+    """The corrected text, None where nothing changes, what was changed, and `parts` (n,), how many moves it
+    has for each nominal one."""
+
+    text: bytes | None
+    tally: Tally
+    parts: Index
+
+
+def write_joints(path: JointPath, plan: JointPlan, stamp: bytes) -> WrittenJoints:
+    """The text with its plan. Raises ProgramError where it cannot be written, NotInvertible."""
+    return _JointWriter(path, plan).written(stamp)
+
+
+class _JointWriter:
+    def __init__(self, path: JointPath, plan: JointPlan) -> None:
+        program = path.program
+        assert program.words is not None
+        self.path, self.plan, self.program, self.words = path, plan, program, program.words
+        structure = path.motion.structure
+        self.structure, self.order = structure, structure.order
+        self.rotary = np.array([unit == "deg" for unit in structure.units])
+        steps = [structure.joints[name].least_increment for name in AXES]
+        increments: Vector = (steps[0], steps[1], steps[2])
+        self.style = Style.of(program, increments)
+        self.prefixes, self.tally = Prefixes(), Tally()
+        self.head = np.append(True, plan.move[1:] != plan.move[:-1])[: len(plan.move)]
+        self.solid = np.asarray(np.isfinite(plan.command).all(axis=1), bool)
+        shape = plan.command.shape
+        self.write, self.mantissa = np.zeros(shape, bool), np.zeros(shape, np.int64)
+        self.decimals = np.zeros(shape, np.int8)
+        self.slot = np.where(self.head[:, None], path.slot[plan.move], -1)
+
+    def written(self, stamp: bytes) -> WrittenJoints:
+        command = self.plan.command.copy()
+        emitted = np.full(command.shape, np.nan)
+        for column in np.flatnonzero(self.rotary).tolist():
+            emitted[:, column] = self._round(column, command[:, column])
+        command = self._linear(command, emitted)
+        for column in np.flatnonzero(~self.rotary).tolist():
+            self._round(column, command[:, column])
+        edits = [*self._replaced(), *self._inserted_words(), *self._inserted_blocks()]
+        edits = [part for part in edits if len(part)]
+        tails = self._tails()
+        parts = np.bincount(self.plan.move[self.head | tails], minlength=len(self.path))
+        data = self.program.data
+        if not edits:
+            return WrittenJoints(None, self.tally, parts)
+        text = splice(
+            np.frombuffer(data, np.uint8), 0, Edits.join(edits), self.prefixes,
+            leading_zero=self.style.leading_zero,
+        ).tobytes()  # fmt: skip
+        if stamp:
+            text = stamped(text, stamp, self.program.eol(1), self.program.dialect.first)
+        return WrittenJoints(text, self.tally, parts)
+
+    def _linear(self, command: Array, emitted: Array) -> Array:
+        """Commands whose linear axes meet the position with the rotary ones as written."""
+        rows = np.flatnonzero(self.solid)
+        motion, move = self.path.motion, self.plan.move[rows]
+        play = 0.5 * motion.width * self.plan.side[rows]
+        axes = self.plan.axes[rows] - play
+        axes[:, self.rotary] = (emitted[rows] - play)[:, self.rotary]
+        target = Poses(self.plan.target.rotation[rows], self.plan.target.position[rows])
+        tool = self.path.tool[move]
+        axes = motion.linear(axes, tool, target) + play
+        command[rows] = motion.programmed(axes, tool, self.path.tip[move])
+        return command
+
+    # -- digits ------------------------------------------------------------------------------------
+
+    def _round(self, column: int, command: Array) -> Array:
+        """The digits of one axis; returns the positions as written."""
+        path, plan, slot = self.path, self.plan, self.slot[:, column]
+        given = slot >= 0
+        flag = path.program.toolpath.flag[plan.move]
+        nominal = path.end[plan.move, column]
+        unit = np.ones(len(slot)) if self.rotary[column] else path.unit[plan.move]
+        least, usual, finest = self._places(column, unit)
+        rows = AxisRows(
+            command=command,
+            nominal=nominal,
+            given=given,
+            raw=~self.solid,
+            reset=((flag & np.uint8(Flag.CONTROL)) != 0) & np.isnan(nominal),
+            word=np.where(given, self.words.mantissa[slot], 0),
+            decimals=np.where(given, self._own_decimals(column, slot, unit), 0).astype(np.int8),
+            offset=path.offset[plan.move, column],
+            unit=unit,
+        )
+        counting = (flag & np.uint8(Flag.INCREMENTAL)) != 0
+        if not len(slot):
+            return command
+        first = float(path.start[plan.move[0], column])
+        digits: Digits = digits_of(rows, Stretches.of(counting, unit), first, Decimals(least, usual, finest))
+        self.write[:, column] = digits.write & self.solid
+        self.mantissa[:, column], self.decimals[:, column] = digits.mantissa, digits.decimals
+        return digits.emitted
+
+    def _own_decimals(self, column: int, slot: Index, unit: Array) -> Index:
+        """Decimals of the words of an axis, with those that a number without a point hides."""
+        if not self.rotary[column]:
+            return self.style.decimals(slot, AXES.index(self.order[column]), unit)
+        hidden = np.rint(-np.log10(self.path.scale[column])).astype(np.int64)
+        own = self.words.decimals[slot].astype(np.int64)
+        return np.where(self.words.pointed[slot], own, own + hidden)
+
+    def _places(self, column: int, unit: Array) -> tuple[Small, Small, Small]:
+        """(r,) the fewest decimals of words of an axis, the usual ones, and those of distances."""
+        name = self.order[column]
+        if not self.rotary[column]:
+            axis = AXES.index(name)
+            tables = [
+                np.array([places(axis, one) for one in distinct(unit).tolist()])
+                for places in (self.style.least, self.style.usual, self.style.grid)
+            ]
+            which = np.searchsorted(distinct(unit), unit)
+            least, usual, finest = (table[which].astype(np.int8) for table in tables)
+            return least, usual, finest
+        fewest = max(fewest_decimals(self.structure.joints[name].least_increment, 1.0, 0), 1)
+        used = self.path.slot[:, column]
+        own = self._own_decimals(column, used[used >= 0].astype(np.int64), unit)
+        common = int(np.bincount(own).argmax()) if own.size else 0
+        counts = (fewest, max(fewest, common), max(fewest, int(own.max(initial=0))))
+        least, usual, finest = (np.full(len(unit), count, np.int8) for count in counts)
+        return least, usual, finest
+
+    # -- edits -------------------------------------------------------------------------------------
+
+    def _tails(self) -> Mask:
+        """(r,) rows that get a block of their own: a part whose rounded end is where it began needs none."""
+        return ~self.head & self.write.any(axis=1)
+
+    def _edit(
+        self, rows: Index, column: int, start: Index, end: Index, prefix: Index | int, order: Index | int
+    ) -> Edits:
+        return Edits.of(start, end, self.mantissa[rows, column], self.decimals[rows, column], prefix, order)
+
+    def _replaced(self) -> list[Edits]:
+        edits = []
+        for column in range(len(self.order)):
+            rows = np.flatnonzero(self.write[:, column] & (self.slot[:, column] >= 0))
+            index = self.slot[rows, column]
+            edits.append(self._edit(rows, column, self.words.number[index], self.words.end[index], 0, 0))
+            self.tally.changed_words += len(rows)
+        return edits
+
+    def _letters(self) -> list[int]:
+        """The columns in the order in which inserted words are written."""
+        return sorted(
+            range(len(self.order)), key=lambda column: (*(self.rotary[column],), self.order[column])
+        )
+
+    def _inserted_words(self) -> list[Edits]:
+        """Words of axes that a block omits, behind its last coordinate word, in that word's style."""
+        missing = self.write & (self.slot < 0) & self.head[:, None]
+        rows = np.flatnonzero(missing.any(axis=1))
+        if not rows.size:
+            return []
+        slot = self.slot[rows]
+        ends = np.where(slot >= 0, self.words.end[slot], -1)
+        last = np.take_along_axis(slot, ends.argmax(axis=1)[:, None], axis=1)[:, 0]
+        place = ends.max(axis=1).astype(np.int64)
+        style = self.style.separators(last, self.program)
+        edits = []
+        for number, column in enumerate(self._letters()):
+            for which in distinct(style[missing[rows, column]]).tolist():
+                some = np.flatnonzero(missing[rows, column] & (style == which))
+                prefix = self.prefixes(self.style.separator(which, self.order[column].encode()))
+                edits.append(self._edit(rows[some], column, place[some], place[some], prefix, number + 1))
+                self.tally.inserted_words += len(some)
+        return edits
+
+    def _inserted_blocks(self) -> list[Edits]:
+        tails = np.flatnonzero(self._tails())
+        if not tails.size:
+            return []
+        line = self.path.line[self.plan.move[tails]].astype(np.int64)
+        place = self.program.line_end[line - 1].astype(np.int64)
+        starts, which = self.style.block_starts(line)
+        columns, edits = self._letters(), []
+        first = np.argmax(self.write[tails][:, columns], axis=1)
+        for number, column in enumerate(columns):
+            letter = self.order[column].encode()
+            chosen = np.flatnonzero(self.write[tails, column])
+            lead = np.array([self.prefixes(start + letter) for start in starts])[which[chosen]]
+            begins = first[chosen] == number
+            prefix = np.where(begins, lead, self.prefixes(b" " + letter))
+            order = tails[chosen] * _PLACES + _PLACES + number
+            at = place[chosen]
+            edits.append(self._edit(tails[chosen], column, at, at, prefix, order))
+        self.tally.inserted_blocks += len(tails)
+        extra = EditList(self.prefixes)
+        self._inverse_time(tails, extra)
+        end_word_edits(self.program, distinct(line), extra)
+        return [*edits, extra.done()]
+
+    def _inverse_time(self, tails: Index, edits: EditList) -> None:
+        """In G93 every part of a block gets its share of the time: F grows by what its path shrinks."""
+        flag, plan = self.program.toolpath.flag, self.plan
+        timed = tails[(flag[plan.move[tails]] & np.uint8(Flag.INVERSE_TIME)) != 0]
+        for move in distinct(plan.move[timed]).tolist():
+            rows = np.flatnonzero((plan.move == move) & (self.head | self._tails()))
+            line = int(self.path.line[move])
+            index = self.style.word(line, "F")
+            if index is None:
+                raise ProgramError(
+                    "this block in G93 has no F word; expected one in every block", line=line, code="OLP561"
+                )
+            value = float(self.words.mantissa[index]) / 10.0 ** int(self.words.decimals[index])
+            share = np.diff(plan.share[rows], prepend=0.0)
+            share = np.where(share > 0.0, share, _TAKE_UP_SHARE)
+            decimals = max(int(self.words.decimals[index]), _FEED_DECIMALS)
+            for row, feed in zip(rows.tolist(), np.rint(value / share * 10**decimals).tolist(), strict=True):
+                if self.head[row]:
+                    edits.add(int(self.words.number[index]), int(self.words.end[index]), int(feed), decimals)
+                else:
+                    at = int(self.program.line_end[line - 1])
+                    edits.add(at, at, int(feed), decimals, b" F", row * _PLACES + 2 * _PLACES - 1)

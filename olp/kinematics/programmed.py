@@ -1,0 +1,71 @@
+"""Programmed coordinates of machines with three linear axes, and the axis values that they stand for.
+
+In axis words the numbers are axis values. With tool centre point control the linear ones state the tip in the
+workpiece, as the axis values that would bring a tool without length there with all rotary axes at zero.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from olp.core.arrays import Array
+from olp.core.errors import ConfigError
+from olp.core.machine import ZERO
+from olp.kinematics.chain import Kinematics
+from olp.kinematics.structure import Structure
+
+#: Below this share of a unit volume three linear axes do not reach every point of space.
+_FLAT = 1e-6
+
+
+def linear_columns(structure: Structure) -> list[int]:
+    """The columns of the three linear axes, in their order. Raises ConfigError where there are others."""
+    joints = list(structure.joints.values())
+    columns = [column for column, joint in enumerate(joints) if joint.kind == "linear"]
+    on_chain = not structure.platforms and len(columns) == 3
+    directions = np.array([joints[column].direction for column in columns]).reshape(-1, 3)
+    if not on_chain or not abs(np.linalg.det(directions)) > _FLAT:
+        raise ConfigError(
+            f"machine {structure.name!r} has {len(columns)} linear axes in the chain "
+            f"{' '.join(structure.chain)}; programs are read for three of them that span space, with rotary "
+            "axes"
+        )
+    return columns
+
+
+def axes_of_tips(machine: Kinematics, values: Array) -> Array:
+    """(n, axes) axis values of the nominal machine at programmed tips (n, axes): rotary columns as they are,
+    linear ones such that the tip is there."""
+    columns = linear_columns(machine.structure)
+    still = values.copy()
+    still[:, columns] = 0.0
+    slopes = machine.jacobian(still)[:, :3, columns]
+    away = _tips(machine, values[:, columns]) - machine.nominal(still).position
+    still[:, columns] = np.linalg.solve(slopes, away[..., None])[..., 0]
+    return still
+
+
+def tips_of_axes(machine: Kinematics, values: Array) -> Array:
+    """(n, axes) the other way round."""
+    columns = linear_columns(machine.structure)
+    origin, slopes = _workpiece(machine)
+    tips = values.copy()
+    away = machine.nominal(values).position - origin
+    tips[:, columns] = np.linalg.solve(slopes, away.T).T
+    return tips
+
+
+def _tips(machine: Kinematics, linear: Array) -> Array:
+    """(n, 3) tips in workpiece coordinates of linear programmed coordinates (n, 3)."""
+    origin, slopes = _workpiece(machine)
+    return np.asarray(origin + linear @ slopes.T)
+
+
+def _workpiece(machine: Kinematics) -> tuple[Array, Array]:
+    """Where a tool without length is with all axes at zero, (3,), and how the linear axes move it, (3, 3)."""
+    bare = replace(machine, tool_mm=ZERO)
+    zero = np.zeros((1, len(machine.structure.order)))
+    slopes = bare.jacobian(zero)[0, :3, linear_columns(machine.structure)].T
+    return bare.nominal(zero).position[0], np.asarray(slopes)

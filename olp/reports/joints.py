@@ -1,0 +1,115 @@
+"""The report of a correction on a machine with rotary joints, for people: position and orientation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from olp.reports.report import CORRECTED, UNCORRECTED, findings_text, number, pairs, sentences, table
+
+Report = Mapping[str, Any]
+
+#: The columns of a deviation: their key, and their title.
+_COLUMNS = (
+    ("position_max_um", "position max"),
+    ("position_rms_um", "rms um"),
+    ("orientation_max_urad", "orientation max"),
+    ("orientation_rms_urad", "rms urad"),
+)
+
+
+def to_text(report: Report) -> str:
+    """Plain text of at most 100 columns."""
+    sections = (
+        _heads(report),
+        _verdict(report),
+        _deviation(report),
+        _corrections(report),
+        _worst(report),
+        findings_text(report.get("findings") or ()),
+        sentences("What this proves", report.get("proves") or ()),
+        sentences("What it does not prove", report.get("does_not_prove") or ()),
+    )
+    return "\n\n".join("\n".join(lines) for lines in map(list, sections) if lines) + "\n"
+
+
+def _heads(report: Report) -> Iterator[str]:
+    program, machine = report["program"], report["machine"]
+    calibration, moves = report.get("calibration") or {}, report["moves"]
+    written = report.get("written") or {}
+    until = calibration.get("valid_until")
+    yield from pairs(
+        [
+            (
+                "Program",
+                f"{program['name'] or 'bytes'}, {program['lines']} lines, {program['moves']} moves, "
+                f"{program['dialect']}",
+            ),
+            ("Machine", f"{machine['name']}, chain {machine['chain']}, control {machine['controller']}"),
+            (
+                "Calibration",
+                f"measured {calibration['measured']}" + (f", valid until {until}" if until else "")
+                if calibration
+                else "none: the machine has no errors",
+            ),
+            (
+                "Moves",
+                f"{moves['feed']} feed, {moves['rapid']} rapid, {moves['with_tip_control']} with tool centre "
+                f"point control, {moves['uncorrected']} uncorrected",
+            ),
+            (
+                "Written",
+                f"{written['changed_words']} words changed, {written['inserted_words']} inserted, "
+                f"{written['inserted_blocks']} blocks inserted"
+                if written
+                else "",
+            ),
+        ]
+    )
+
+
+def _verdict(report: Report) -> Iterator[str]:
+    deviation = report["deviation"]
+    within = "within" if deviation["holds"] else "NOT within"
+    yield (
+        f"The corrected path is {within} {number(deviation['allowed_um'])} um and "
+        f"{number(deviation['allowed_urad'])} urad of the nominal one"
+    )
+    yield (
+        f"(tolerances {number(report['tolerance_um'])} um and {number(report['tolerance_urad'])} urad, and "
+        "rounding to the last digit)."
+    )
+
+
+def _deviation(report: Report) -> Iterator[str]:
+    deviation = report["deviation"]
+    rows: list[Sequence[str]] = [
+        [title, *(number(deviation[key][name]) for name, _ in _COLUMNS)]
+        for key, title in (("before", UNCORRECTED), ("after", CORRECTED))
+    ]
+    yield "Deviation of the tip in um, and of the tool in urad"
+    yield from table(["path", *(title for _, title in _COLUMNS)], rows)
+    left = report["orientation"]["uncorrectable_urad"]
+    if left:
+        yield f"Orientation that no command corrects: {number(left)} urad at most."
+
+
+def _corrections(report: Report) -> Iterator[str]:
+    yield "Largest change of each axis"
+    words = (name.rpartition("_") for name in report["largest_correction"])
+    rows = [
+        [axis, f"{number(value)} {unit}"]
+        for (axis, _, unit), value in zip(words, report["largest_correction"].values(), strict=True)
+    ]
+    yield from table(["axis", "change"], rows)
+
+
+def _worst(report: Report) -> Iterator[str]:
+    if not report["worst"]:
+        return
+    yield "Worst blocks, corrected and uncorrected"
+    keys = ("position_um", "orientation_urad", "uncorrected_um", "uncorrected_urad")
+    yield from table(
+        ["line", "um", "urad", "uncorrected um", "uncorrected urad"],
+        [[str(row["line"]), *(number(row[key]) for key in keys)] for row in report["worst"]],
+    )

@@ -1,0 +1,1 @@
+"""Programs on machines with rotary joints: the verbs that read them."""

@@ -1,0 +1,150 @@
+"""`correct` on machines with rotary joints: a program corrected and proved in position and orientation."""
+
+from __future__ import annotations
+
+import datetime
+import hashlib
+from pathlib import Path
+from typing import Any, Literal
+
+from olp.compensation.joints.path import JointPath
+from olp.compensation.joints.planning import JointLimits, JointPlan, planned
+from olp.compensation.joints.writer import write_joints
+from olp.compensation.stamp import find_stamp, stamp_line
+from olp.compensation.tally import Tally
+from olp.core.errors import AlreadyCorrected, OutsideBox
+from olp.core.units import MM_PER_UM, RAD_PER_URAD
+from olp.core.values import dataclass
+from olp.files.sources import Source
+from olp.files.write import write_bytes
+from olp.findings.catalogue import Finding
+from olp.proof.joints import JointProof, prove_joints
+from olp.workflows.flatten import UnrollOptions
+from olp.workflows.joints.loaded import JointRun
+from olp.workflows.joints.report import findings_of, last_digits, outside_box, report_of
+from olp.workflows.session import Outside, PathLike
+from olp.workflows.shown import Shown
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointOptions(UnrollOptions):
+    """The options of verbs that prove a correction on a machine with rotary joints: the numerical tolerances
+    of position and orientation, and the day of the run."""
+
+    tolerance_um: float = 1.0
+    tolerance_urad: float = 10.0
+    outside_box: Outside = "refuse"
+    date: datetime.date | None = None
+
+    def limits(self) -> JointLimits:
+        return JointLimits(self.tolerance_um * MM_PER_UM, self.tolerance_urad * RAD_PER_URAD)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointCorrection(Shown):
+    """A corrected program of a machine with rotary joints: its bytes, the text that was corrected, the proof,
+    the report ("olp-joints-1") and the findings. `inputs` are the files that were read, which `write` never
+    overwrites."""
+
+    data: bytes
+    nominal: bytes
+    proof: JointProof
+    report: dict[str, Any]
+    findings: tuple[Finding, ...]
+    inputs: tuple[str, ...] = ()
+
+    def to_text(self) -> str:
+        """The report as the command line prints it."""
+        from olp.reports.joints import to_text
+
+        return to_text(self.report)
+
+    def write(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write the corrected program as `Correction.write` does."""
+        write_bytes(path, self.data, force=force, inputs=self.inputs)
+        return Path(path)
+
+
+def correct_joints(
+    program: PathLike | bytes,
+    machine: PathLike,
+    job: PathLike | None = None,
+    *,
+    tolerance_um: float = 1.0,
+    tolerance_urad: float = 10.0,
+    flatten: bool = False,
+    expand_cycles: bool = False,
+    outside_box: Literal["refuse", "hold"] = "refuse",
+    date: datetime.date | None = None,
+) -> JointCorrection:
+    """Correct a program for a machine with X, Y, Z and rotary axes, and prove it.
+
+    The corrected text is in the program's own dialect; only coordinate words differ, and words and blocks are
+    inserted. Moves are split where the tip or the tool would leave its tolerance, in um and urad. Raises
+    InputError (ProgramError with its line, ConfigError) and CannotCompute.
+    """
+    options = JointOptions(
+        tolerance_um=tolerance_um, tolerance_urad=tolerance_urad, flatten=flatten,
+        expand_cycles=expand_cycles, outside_box=outside_box, date=date,
+    )  # fmt: skip
+    return corrected(JointRun.of(program, machine, job), options)
+
+
+def corrected(run: JointRun, options: JointOptions) -> JointCorrection:
+    """As `correct_joints`, for a run that is loaded."""
+    with run.program.errors():
+        _refuse_stamped(run.program)
+        source, nominal = run.read(run.program, options)
+        profile = run.dialect(run.program)
+        with nominal.program.errors():
+            plan = planned(nominal, options.limits())
+            if options.outside_box == "refuse" and run.calibration is not None:
+                _refuse_outside(nominal, plan, run)
+            stamp = stamp_line(run.digest, profile.comment) if profile.marks else b""
+            written = write_joints(nominal, plan, stamp)
+        text = bytes(source.data) if written.text is None else written.text
+        done = proved(run, (nominal, plan), run.again(text, profile), options, written.tally)
+    return JointCorrection(text, bytes(source.data), done[0], done[1], done[2], run.files)
+
+
+def proved(
+    run: JointRun, nominal: tuple[JointPath, JointPlan], corrected: JointPath, options: JointOptions,
+    tally: Tally | None = None,
+) -> tuple[JointProof, dict[str, Any], tuple[Finding, ...]]:  # fmt: skip
+    """The proof of two programs with its report and findings."""
+    path, plan = nominal
+    digit_mm, digit_deg = last_digits(path)
+    proof = prove_joints(path, corrected, plan, options.limits(), digit_mm=digit_mm, digit_deg=digit_deg)
+    findings = findings_of(path, plan, proof, run, options.date)
+    text = bytes(corrected.program.data)
+    report = report_of(run, path, plan, proof, findings, (options.tolerance_um, options.tolerance_urad))
+    report["corrected"] = {"sha256": hashlib.sha256(text).hexdigest(), "lines": text.count(b"\n")}
+    if tally is not None:
+        report["written"] = {
+            "changed_words": tally.changed_words,
+            "inserted_words": tally.inserted_words,
+            "inserted_blocks": tally.inserted_blocks,
+        }
+    return proof, report, findings
+
+
+def _refuse_stamped(program: Source) -> None:
+    stamp = find_stamp(program.data)
+    if stamp:
+        raise AlreadyCorrected(
+            f"the program has the stamp `{stamp.group().decode()}` of a correction; a second one would apply "
+            "the model twice; correct the nominal program",
+            line=program.data.count(b"\n", 0, stamp.start()) + 1,
+            code="OLP560",
+        )
+
+
+def _refuse_outside(path: JointPath, plan: JointPlan, run: JointRun) -> None:
+    out = outside_box(path, plan, run)
+    if out:
+        line, sentence = out[0]
+        raise OutsideBox(
+            f"{sentence}; measure there, move the part, or give --outside-box hold to "
+            "take the error at the end",
+            line=line,
+        )

@@ -1,0 +1,185 @@
+"""Machine, job, calibration and programs of a run on a machine with rotary joints, each opened once."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import field, replace
+from pathlib import Path
+from typing import Any
+
+from olp.compensation.joints.path import JointPath
+from olp.core.errors import ConfigError, ProgramError, UsageError
+from olp.core.machine import Job, Setup, WorkOffset
+from olp.core.values import dataclass
+from olp.files.calibration.reader import files_beside
+from olp.files.config import load_job
+from olp.files.kinematics.calibration import load_joint_calibration
+from olp.files.kinematics.machine import load_joint_machine
+from olp.files.sources import Source, Sources
+from olp.kinematics.errors import MachineErrors, Payload
+from olp.kinematics.machine import JointCalibration, JointMachine
+from olp.program.program import Program
+from olp.program.registry import Options, dialect_of, find, read
+from olp.program.rs274.profiles.base import Profile
+from olp.workflows import refusals
+from olp.workflows.flatten import UnrollOptions
+from olp.workflows.session import PathLike
+
+#: The axes that turn a work offset about, in the order of its table.
+_TURNS = "ABC"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointRun:
+    """What a run on a machine with rotary joints needs. `setup` is what the reader of programs sees, `turned`
+    are the rotary values of work offsets by name and axis, `digest` is the hash of the calibration."""
+
+    machine: JointMachine
+    calibration: JointCalibration | None
+    setup: Setup
+    turned: Mapping[str, Mapping[str, float]]
+    digest: str
+    sources: Sources
+    program: Source
+    files: tuple[str, ...] = field(default_factory=tuple)
+
+    @property
+    def errors(self) -> MachineErrors:
+        return MachineErrors() if self.calibration is None else self.calibration.errors
+
+    @staticmethod
+    def of(
+        program: PathLike | bytes | Source | None, machine: PathLike | None, job: PathLike | None = None,
+        dialect: str | None = None, sources: Sources | None = None,
+    ) -> JointRun:  # fmt: skip
+        """From the files; program and machine of the job where they are not given. Raises UsageError,
+        InputError, ConfigError, ProgramError."""
+        sources = sources or Sources()
+        stated = Job() if job is None else load_job(job)
+        machine = stated.machine if machine is None else machine
+        program = stated.program if program is None else program
+        if machine is None:
+            raise UsageError(
+                "no machine file is given; name it with -m, or with the key machine of the job file"
+            )
+        if program is None:
+            raise UsageError("no program is given; name it, or set the key program of the job file (-j)")
+        described = load_joint_machine(machine, sources.read)
+        if described.control is None:
+            raise ProgramError(
+                f"the machine has the chain {' '.join(described.structure.chain)}; programs are read for "
+                f"X, Y and "
+                "Z with rotary axes named A, B or C. olp inspect shows what its files hold, and "
+                "olp.load_kinematics computes with it",
+                file=str(machine),
+                code="OLP563",
+            )
+        payload = Payload(stated.payload_kg, stated.payload_centre_mm)
+        calibration = None
+        if described.calibration is not None:
+            calibration = load_joint_calibration(
+                described.calibration, described.structure, payload, sources.read
+            )
+        control = described.control
+        offsets = {**control.work_offsets, **stated.work_offsets}
+        setup = Setup(
+            replace(control, work_offsets=_unturned(control.work_offsets)),
+            replace(stated, work_offsets=_unturned(stated.work_offsets), dialect=dialect or stated.dialect),
+        )
+        _refuse_undefined(setup, described, str(machine))
+        turned = {
+            name: dict(zip(_TURNS, offset.rotation_deg, strict=True)) for name, offset in offsets.items()
+        }
+        source = sources.source(program)
+        digest = _digest(described, sources)
+        named = [str(machine), job, described.calibration, source.name]
+        files = tuple(dict.fromkeys(str(Path(name).absolute()) for name in named if name))
+        return JointRun(
+            described, calibration, setup, turned, digest, sources, source, (*sources.files, *files)
+        )
+
+    def dialect(self, source: Source) -> Profile:
+        """The dialect of a program on this machine. Raises ProgramError where it is not one of words."""
+        control = find(self.machine.controller)
+        if control is None:
+            raise ConfigError(
+                f"controller {self.machine.controller!r} has no dialect that is read for such a machine"
+            )
+        dialect = dialect_of(self.setup.job.dialect, control, source.data, source.name)
+        if not isinstance(dialect, Profile) or dialect.commands is not None or dialect.translator is not None:
+            raise ProgramError(
+                f"{dialect.title} programs are not read for machines with "
+                "rotary joints; expected G-code such as "
+                "that of LinuxCNC, Fanuc or Haas",
+                code="OLP563",
+            )
+        return dialect.with_tips()
+
+    def read(self, source: Source, unrolling: UnrollOptions) -> tuple[Source, JointPath]:
+        """A program and its path. Raises ProgramError with all that is refused."""
+        profile = self.dialect(source)
+        text, program = refusals.read(self.sources, source, self.setup, profile, Options(), unrolling)
+        with program.errors():
+            return text, self.path(program)
+
+    def again(self, data: bytes, profile: Profile) -> JointPath:
+        """The path of a text that was written."""
+        return self.path(read(data, self.setup, profile))
+
+    def path(self, program: Program) -> JointPath:
+        """The path of a program that was read with its words."""
+        return JointPath.of(
+            program, self.machine.structure, self.errors, self.setup.machine,
+            turned=self.turned, start_deg=self.setup.job.start_deg,
+            tips_from_zero=self.machine.tips_from_zero,
+        )  # fmt: skip
+
+    def heads(self) -> dict[str, Any]:
+        """The parts of a report on the machine and its calibration."""
+        structure, calibration = self.machine.structure, self.calibration
+        heads: dict[str, Any] = {
+            "machine": {
+                "name": structure.name,
+                "chain": " ".join(structure.chain),
+                "controller": self.machine.controller,
+            }
+        }
+        if calibration is not None:
+            heads["calibration"] = {
+                "measured": calibration.measured,
+                "valid_until": calibration.valid_until,
+                "temperature_degC": calibration.temperature_degC,
+                "sha256": self.digest,
+            }
+        return heads
+
+
+def _unturned(offsets: Mapping[str, WorkOffset]) -> dict[str, WorkOffset]:
+    """Work offsets whose rotary values are none of a frame that is turned."""
+    return {name: replace(offset, rotation_deg=(0.0, 0.0, 0.0)) for name, offset in offsets.items()}
+
+
+def _refuse_undefined(setup: Setup, machine: JointMachine, file: str) -> None:
+    """Raise ConfigError for names that neither file defines, and positions of axes that do not exist."""
+    default, order = setup.machine.default_tool, machine.structure.order
+    if default is not None and setup.tool(default) is None:
+        raise ConfigError(
+            f"job_defaults.tool = {default} is not defined; expected a table [tools.N]", file=file
+        )
+    unknown = sorted(setup.job.start_deg.keys() - set(order))
+    if unknown:
+        raise ConfigError(
+            f"start_deg names {', '.join(unknown)}; expected rotary axes of {', '.join(order)}", file=file
+        )
+
+
+def _digest(machine: JointMachine, sources: Sources) -> str:
+    """Hash of the calibration file, the files that it names, and the machine that it is relative to."""
+    digest = hashlib.sha256()
+    if machine.calibration is not None:
+        digest.update(sources.read(machine.calibration))
+        for file in files_beside(machine.calibration, sources.read):
+            digest.update(sources.read(file))
+    digest.update(repr(machine.structure).encode())
+    return digest.hexdigest()

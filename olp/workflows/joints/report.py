@@ -1,0 +1,202 @@
+"""The report ("olp-joints-1") of a proof on a machine with rotary joints, and its findings."""
+
+from __future__ import annotations
+
+import datetime
+import hashlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from olp.checks.base import finding
+from olp.compensation.joints.path import JointPath
+from olp.compensation.joints.planning import JointPlan
+from olp.compensation.style import fewest_decimals
+from olp.core.arrays import Array, Mask
+from olp.core.toolpath import Kind
+from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM
+from olp.findings.catalogue import Finding
+from olp.proof.joints import Deviation, JointProof
+from olp.workflows.joints.loaded import JointRun
+
+#: Lines of the table of worst blocks.
+_WORST = 10
+#: An axis value beyond its calibrated range by less than this is on its end: mm or deg.
+_AT_END = 1e-6
+
+_PROVES = (
+    "the written text, read back from its bytes, commands what was computed (syntax, digits, modal words)",
+    "the machine with its errors at those commands has tip and tool axis where the program says, at and "
+    "between the waypoints",
+)
+_DOES_NOT_PROVE = (
+    "that the calibration still describes the machine: measure a ball or a circle to see that",
+    "what the control does between blocks (blending, following error) and what the process does to the part",
+)
+
+
+def last_digits(path: JointPath) -> tuple[float, float]:
+    """The coarsest last digits of the corrected program: mm and deg."""
+    joints, dialect = path.motion.structure.joints, path.program.dialect
+    units = {frame.unit_mm for frame in path.program.toolpath.frames} or {1.0}
+    steps = [joints[name].least_increment for name in AXES]
+    linear = [10.0 ** -fewest_decimals(step, u, dialect.inch_decimals) * u for step in steps for u in units]
+    turns = [j.least_increment for j in joints.values() if j.unit == "deg"]
+    rotary = [10.0 ** -max(fewest_decimals(step, 1.0, 0), 1) for step in turns]
+    return max(linear), max(rotary, default=0.0)
+
+
+def report_of(
+    run: JointRun, path: JointPath, plan: JointPlan, proof: JointProof, findings: tuple[Finding, ...],
+    tolerance: tuple[float, float],
+) -> dict[str, Any]:  # fmt: skip
+    program = path.program
+    solid = np.isfinite(plan.command).all(axis=1)
+    kept = np.setdiff1d(np.arange(len(path)), plan.move[solid])
+    return {
+        "schema": "olp-joints-1",
+        "program": {
+            "name": Path(run.program.name).name if run.program.name else "",
+            "sha256": hashlib.sha256(program.data).hexdigest(),
+            "lines": program.lines,
+            "dialect": program.dialect.name,
+            "moves": len(path),
+        },
+        **run.heads(),
+        "tolerance_um": tolerance[0],
+        "tolerance_urad": tolerance[1],
+        "deviation": {
+            "before": _summary(proof.before, proof.judged),
+            "after": _summary(proof.after, proof.judged),
+            "allowed_um": proof.allowed_mm * UM_PER_MM,
+            "allowed_urad": proof.allowed_rad / RAD_PER_URAD,
+            "holds": proof.holds,
+        },
+        "orientation": {
+            "uncorrectable_urad": float(np.max(proof.left_rad, initial=0.0)) / RAD_PER_URAD,
+            "near_singular": int(plan.limited.sum()),
+        },
+        "largest_correction": _largest(path, plan),
+        "moves": {
+            "feed": int((path.program.toolpath.kind == Kind.LINE).sum()),
+            "rapid": int((path.program.toolpath.kind == Kind.RAPID).sum()),
+            "with_tip_control": int(path.tip.sum()),
+            "uncorrected": len(kept),
+            "parts": len(plan.move),
+        },
+        "worst": _worst(path, proof),
+        "verdict": {"ok": proof.holds},
+        "findings": [one.as_dict() for one in findings],
+        "proves": list(_PROVES),
+        "does_not_prove": list(_DOES_NOT_PROVE),
+    }
+
+
+def _summary(deviation: Deviation, judged: Mask) -> dict[str, float | None]:
+    """The largest and the rms deviation of the moves that cut."""
+    samples = int(deviation.samples[judged].sum())
+
+    def largest(values: Array) -> float | None:
+        return float(np.max(values[judged])) if judged.any() else None
+
+    def rms(squares: Array) -> float | None:
+        return float(np.sqrt(squares[judged].sum() / samples)) if samples else None
+
+    values = {
+        "position_max_um": largest(deviation.distance_mm * UM_PER_MM),
+        "position_rms_um": rms(deviation.square_mm2 * UM_PER_MM**2),
+        "orientation_max_urad": largest(deviation.angle_rad / RAD_PER_URAD),
+        "orientation_rms_urad": rms(deviation.square_rad2 / RAD_PER_URAD**2),
+    }
+    return values
+
+
+def _largest(path: JointPath, plan: JointPlan) -> dict[str, float]:
+    """By axis the largest change of its coordinates, um or urad."""
+    with np.errstate(invalid="ignore"):
+        change = np.abs(plan.command - path.at(plan.move, plan.share))
+    largest = np.nanmax(np.append(change, np.zeros((1, change.shape[1])), axis=0), axis=0)
+    structure = path.motion.structure
+    return {
+        f"{name}_urad" if unit == "deg" else f"{name}_um": float(
+            np.radians(value) / RAD_PER_URAD if unit == "deg" else value * UM_PER_MM
+        )
+        for name, unit, value in zip(structure.order, structure.units, largest.tolist(), strict=True)
+    }
+
+
+def _worst(path: JointPath, proof: JointProof) -> list[dict[str, Any]]:
+    over = np.maximum(
+        proof.after.distance_mm / proof.allowed_mm,
+        (proof.after.angle_rad - proof.left_rad) / proof.allowed_rad,
+    )
+    over = np.where(proof.judged, over, -np.inf)
+    rows = [row for row in np.argsort(-over, kind="stable")[:_WORST].tolist() if np.isfinite(over[row])]
+    return [
+        {
+            "line": int(path.line[row]),
+            "position_um": float(proof.after.distance_mm[row]) * UM_PER_MM,
+            "orientation_urad": float(proof.after.angle_rad[row]) / RAD_PER_URAD,
+            "uncorrected_um": float(proof.before.distance_mm[row]) * UM_PER_MM,
+            "uncorrected_urad": float(proof.before.angle_rad[row]) / RAD_PER_URAD,
+        }
+        for row in rows
+    ]
+
+
+def findings_of(
+    path: JointPath, plan: JointPlan, proof: JointProof, run: JointRun, date: datetime.date | None
+) -> tuple[Finding, ...]:  # fmt: skip
+    """What a person should know of a correction."""
+    found = []
+    if proof.over.any():
+        lines = path.line[proof.over].tolist()
+        found.append(finding("OLP101", "the corrected path leaves its tolerance at these lines", lines))
+    solid = np.isfinite(plan.command).all(axis=1)
+    kept = np.ones(len(path), bool)
+    kept[plan.move[solid]] = False
+    if kept.any():
+        found.append(
+            finding("OLP102", f"{int(kept.sum())} moves are left uncorrected", path.line[kept].tolist())
+        )
+    if plan.limited.any():
+        what = "near a singular posture: the position is met, and a rest of the orientation is left"
+        found.append(finding("OLP106", what, path.line[plan.move[plan.limited]].tolist()))
+    if not proof.judged.any():
+        found.append(finding("OLP107", "no feed move was corrected at a known position"))
+    if run.calibration is not None:
+        found += _outside(path, plan, run)
+        until = run.calibration.valid_until
+        if until is not None and date is not None and date > until:
+            found.append(finding("OLP401", f"the calibration was valid until {until}"))
+    return tuple(found)
+
+
+def outside_box(path: JointPath, plan: JointPlan, run: JointRun) -> list[tuple[int, str]]:
+    """Lines whose commands leave the calibrated values of an axis, each with a sentence."""
+    assert run.calibration is not None
+    structure, found = path.motion.structure, []
+    for column, name in enumerate(structure.order):
+        low, high = run.calibration.box[name]
+        value = plan.axes[:, column]
+        with np.errstate(invalid="ignore"):
+            out = np.flatnonzero((value < low - _AT_END) | (value > high + _AT_END))
+        unit = structure.units[column]
+        found += [
+            (
+                int(path.line[plan.move[row]]),
+                f"the command {name} = {value[row]:.6g} {unit} is outside the calibrated {low:g} to {high:g}",
+            )
+            for row in out.tolist()
+        ]
+    return sorted(found)
+
+
+def _outside(path: JointPath, plan: JointPlan, run: JointRun) -> list[Finding]:
+    out = outside_box(path, plan, run)
+    if not out:
+        return []
+    return [
+        finding("OLP403", f"{out[0][1]}; its error is that at the nearest end", [line for line, _ in out])
+    ]

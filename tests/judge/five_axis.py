@@ -1,0 +1,184 @@
+"""An independent judge of programs on machines with X, Y, Z and rotary axes: its own reader of plain words,
+and its own forward computation from the machine and calibration files. It imports nothing of what it judges.
+
+Every joint is a 4 x 4 matrix. Errors: location of lines, squareness as location, harmonics of the own
+motion, and backlash of nothing. The tip of tool 1 counts.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+#: mm per rad, where a place on a move is sought.
+ARM = 100.0
+#: mm or deg: a move that ends nearer than this ends where the nominal one does.
+NEAR = 0.2
+OWN = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
+
+
+def matrix(rotation: np.ndarray, shift: np.ndarray) -> np.ndarray:
+    """(n, 4, 4) of rotations (n, 3, 3) and shifts (n, 3)."""
+    count = max(len(rotation), len(shift))
+    whole = np.zeros((count, 4, 4))
+    whole[:, :3, :3], whole[:, :3, 3], whole[:, 3, 3] = rotation, shift, 1.0
+    return whole
+
+
+def about(point: Sequence[float], rotation: np.ndarray) -> np.ndarray:
+    """Rotations about a point."""
+    place = np.asarray(point, float)
+    return matrix(rotation, place - rotation @ place)
+
+
+class Judge:
+    """A machine from its files."""
+
+    def __init__(self, machine: Path) -> None:
+        self.file = tomllib.loads(machine.read_text())
+        calibration = machine.parent / self.file["calibration"]
+        self.errors = tomllib.loads(calibration.read_text())
+        self.chain = self.file["chain"].split()
+        self.order = list(self.file["axes"])
+        self.tool = np.array(self.file["tools"]["1"]["gauge_to_tip_mm"])
+        self.offset = {
+            name: float(self.file.get("work_offsets", {}).get("G54", {}).get(key, 0.0))
+            for name in self.order
+            for key in (f"{name}_mm" if name in OWN else f"{name}_deg",)
+        }
+
+    def forward(self, axes: np.ndarray, actual: bool) -> tuple[np.ndarray, np.ndarray]:
+        """(n, 3) tips and (n, 3) tool axes at axis values (n, k) in the order of the file."""
+        whole = np.tile(np.eye(4), (len(axes), 1, 1))
+        for name in self.chain:
+            if name != "F":
+                whole = whole @ self._joint(name, axes[:, self.order.index(name)], actual)
+        return whole[:, :3, :3] @ self.tool + whole[:, :3, 3], whole[:, :3, 2]
+
+    def _joint(self, name: str, value: np.ndarray, actual: bool) -> np.ndarray:
+        axis: dict[str, Any] = self.file["axes"][name]
+        direction = np.array(axis.get("direction", OWN.get(name)), float)
+        direction /= np.linalg.norm(direction)
+        wrong = self.errors.get("location", {}).get(name, {}) if actual else {}
+        tilt = np.array([wrong.get(f"{k}_urad", 0.0) for k in "ABC"]) * 1e-6
+        shift = np.array([wrong.get(f"{k}_um", 0.0) for k in "XYZ"]) * 1e-3
+        own = np.zeros(len(value))
+        for wave in self.errors.get("cyclic", []) if actual else []:
+            if wave["component"][2:] == name:
+                period = wave.get("period_deg") or wave["period_mm"]
+                amplitude = wave.get("amplitude_urad", 0.0) * 1e-6 + wave.get("amplitude_um", 0.0) * 1e-3
+                own += amplitude * np.sin(2 * np.pi * value / period + wave.get("phase_rad", 0.0))
+        if axis.get("kind", "linear") == "linear":
+            across = np.cross(tilt, direction)
+            return matrix(
+                np.eye(3)[None],
+                (value + own + wrong.get("zero_um", 0.0) * 1e-3)[:, None] * direction
+                + value[:, None] * across,
+            )
+        angle = np.radians(value) + own + wrong.get("zero_urad", 0.0) * 1e-6
+        turn = Rotation.from_rotvec(angle[:, None] * direction).as_matrix()
+        # Rz Ry Rx of the tilt across the axis
+        tilted = Rotation.from_euler("xyz", tilt - direction * (direction @ tilt)).as_matrix()[None]
+        point = np.array(axis["point_mm"])
+        line = matrix(np.eye(3)[None], (shift)[None]) @ about(point, tilted)
+        return line @ about(point, turn) @ np.linalg.inv(line)
+
+    def solve(self, tips: np.ndarray, axes: np.ndarray) -> np.ndarray:
+        """Axis values whose nominal tips are there, rotary ones as given."""
+        linear = [self.order.index(name) for name in "XYZ"]
+        found = axes.copy()
+        for _ in range(4):
+            base = self.forward(found, False)[0]
+            slopes = []
+            for column in linear:
+                ahead = found.copy()
+                ahead[:, column] += 1.0
+                slopes.append(self.forward(ahead, False)[0] - base)
+            step = np.linalg.solve(np.stack(slopes, axis=2), (tips - base)[..., None])[..., 0]
+            found[:, linear] += step
+        return found
+
+    def read(self, text: bytes) -> list[tuple[bool, bool, np.ndarray]]:
+        """Moves of a program: whether it cuts, whether its words state the tip, and its coordinates."""
+        place = np.full(len(self.order), np.nan)
+        cuts = tips = counts = False
+        moves = []
+        for line in text.decode().splitlines():
+            words = re.findall(r"([A-Z])\s*([-+]?[\d.]+)", re.sub(r"\(.*?\)", "", line))
+            given = {letter: float(number) for letter, number in words if letter in self.order}
+            for letter, number in words:
+                if letter == "G":
+                    code = float(number)
+                    cuts = code == 1 if code in (0, 1) else cuts
+                    tips = {43.4: True, 49.0: False}.get(code, tips)
+                    counts = {90.0: False, 91.0: True}.get(code, counts)
+            if given:
+                place = place.copy()
+                for letter, number in given.items():
+                    column = self.order.index(letter)
+                    start = place[column] if counts else self.offset[letter]
+                    place[column] = start + number
+                moves.append((cuts, tips, place))
+        return moves
+
+    def axes(self, coordinates: np.ndarray, tips: bool) -> np.ndarray:
+        """Axis values of programmed coordinates."""
+        if not tips:
+            return coordinates
+        linear = [self.order.index(name) for name in "XYZ"]
+        return self.solve(coordinates[:, linear], coordinates)
+
+    def judged(self, nominal: bytes, corrected: bytes) -> tuple[float, float]:
+        """The largest distance in mm and angle in rad of the tool with errors from the nominal path."""
+        first, second = self.read(nominal), self.read(corrected)
+        worst, j = np.zeros(2), 0
+        for i, (cuts, tips, end) in enumerate(first):
+            last = self._last(second, j, len(second) - (len(first) - i), end)
+            group = second[j : last + 1]
+            j = last + 1
+            if cuts:
+                worst = np.maximum(
+                    worst, self._move(first[i - 1][2], end, tips, second[j - len(group) - 1][2], group)
+                )
+        return float(worst[0]), float(worst[1])
+
+    def _last(self, second: list[Any], j: int, most: int, end: np.ndarray) -> int:
+        """The move with which one that ends at `end` ends: the nearest of the first ones that are near."""
+        away = [np.abs(second[k][2] - end).max() for k in range(j, most + 1)]
+        near = next(k for k, one in enumerate(away) if one < NEAR)
+        while near + 1 < len(away) and away[near + 1] < away[near]:
+            near += 1
+        return j + near
+
+    def _move(
+        self, begin: np.ndarray, end: np.ndarray, tips: bool, start: np.ndarray, group: list[Any]
+    ) -> np.ndarray:
+        """Deviations of one move; each sample against the nearest nominal pose."""
+        places = np.array([start, *(row[2] for row in group)])
+        part = np.linspace(0.0, 1.0, 12)[:, None]
+        samples = np.vstack([a + part * (b - a) for a, b in pairwise(places)])
+        tip, axis = self.forward(self.axes(samples, tips), True)
+        way = end - begin
+        share = (samples - begin) @ way / (way @ way)
+        low, high = np.clip(share - 0.05, 0.0, 1.0), np.clip(share + 0.05, 0.0, 1.0)
+
+        def miss(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            place = begin + at[:, None] * way
+            there, along = self.forward(place, False)
+            # by its definition; the axis of the tool depends on the rotary axes alone
+            there = place[:, [self.order.index(name) for name in "XYZ"]] if tips else there
+            return np.linalg.norm(tip - there, axis=1), np.linalg.norm(np.cross(axis, along), axis=1)
+
+        for _ in range(45):
+            left, right = low + (high - low) / 3, high - (high - low) / 3
+            costs = [np.hypot(d, ARM * a) for d, a in (miss(left), miss(right))]
+            low, high = np.where(costs[0] < costs[1], low, left), np.where(costs[0] < costs[1], right, high)
+        distance, angle = miss(0.5 * (low + high))
+        return np.array([distance.max(), angle.max()])
