@@ -193,12 +193,7 @@ def test_a_path_out_of_the_calibrated_box_is_refused_or_held(tmp_path: Path) -> 
 
 def test_near_a_singular_posture_nothing_jumps(tmp_path: Path) -> None:
     """The tool along the axis of the table, whose tilt only a large turn of the table would correct."""
-    text = b"G90 G54
-G0 X0 Y0 Z0 A0 C0
-G1 X10 A0.05 F100
-X20 A-0.05
-M30
-"
+    text = b"G90 G54\nG0 X0 Y0 Z0 A0 C0\nG1 X10 A0.05 F100\nX20 A-0.05\nM30\n"
     result = corrected(tmp_path, text)
     assert result.report["largest_correction"]["C_urad"] < np.radians(1.01) * 1e6
     assert result.report["verdict"]["ok"]
