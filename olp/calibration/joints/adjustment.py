@@ -126,7 +126,7 @@ def fit_joints(model: Model, readings: Sequence[Reading]) -> JointFit:
     CannotCompute where readings cannot be used."""
     starts, left_out = starts_of(model, readings), list[LeftOut]()
     while True:
-        fit = _adjusted(model, starts)
+        fit = adjusted(model, starts)
         slips = [_slips(source, fit.chi_square / fit.freedom) for source in fit.sources]
         if not any(slips):
             return replace(fit, left_out=tuple(left_out))
@@ -161,7 +161,7 @@ def held_out(fit: JointFit) -> tuple[Array, Array] | None:
         return None
     offs = []
     for one in (replace(model, unknowns=()), model):
-        part = _adjusted(one, train)
+        part = adjusted(one, train)
         off = []
         for start, source in zip(test, part.sources, strict=True):
             pose = one.machine(part.theta, start.reading.payload).actual(start.reading.values)
@@ -170,12 +170,13 @@ def held_out(fit: JointFit) -> tuple[Array, Array] | None:
     return offs[0], offs[1]
 
 
-def _adjusted(model: Model, starts: Sequence[Start]) -> JointFit:
+def adjusted(model: Model, starts: Sequence[Start], most: int = _STEPS) -> JointFit:
+    """One fit of all readings in at most so many steps. Raises CannotCompute where it does not settle."""
     theta = np.zeros(len(model.unknowns))
     owns = [np.zeros(len(start.prior)) for start in starts]
     precision = np.diag(1.0 / model.prior**2) if len(theta) else np.zeros((0, 0))
     before, longest = np.inf, _LONGEST * model.prior
-    for _ in range(_STEPS):
+    for _ in range(most):
         blocks = [_block(model, theta, start, own) for start, own in zip(starts, owns, strict=True)]
         normal = Normal.of(len(theta))
         for block in blocks:

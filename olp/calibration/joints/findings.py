@@ -8,7 +8,7 @@ from pathlib import PurePath
 
 import numpy as np
 
-from olp.calibration.joints.adjustment import JointFit, fit_joints
+from olp.calibration.joints.adjustment import JointFit, adjusted, fit_joints, starts_of
 from olp.calibration.joints.readings import Reading
 from olp.calibration.joints.unknowns import Model
 from olp.core.errors import CannotCompute, ConfigError
@@ -25,6 +25,8 @@ _HELD = 0.5
 _RIGHT = 0.05
 #: Reduced chi-square of readings that may be those of the machine.
 _PLAUSIBLE = 25.0
+#: Readings put right settle within so many steps.
+_QUICK = 7
 #: At most so many names are listed.
 _NAMED = 8
 #: Values that may be radians are at most this large: two turns and a half.
@@ -98,7 +100,7 @@ def _mistake(model: Model, readings: Sequence[Reading], below: float) -> list[tu
     best, words = below, ""
     for what, mended in _alternatives(model.structure, readings):
         try:
-            other = fit_joints(model, mended)
+            other = adjusted(model, starts_of(model, mended), _QUICK)
         except (CannotCompute, ConfigError):
             continue
         if other.chi_square / other.freedom < best:
