@@ -112,15 +112,16 @@ def test_readings_along_the_machine_are_those_along_the_workpiece(name: str) -> 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("planes", "rank"), [(1, 17), (3, 19)])
+@pytest.mark.parametrize(("planes", "rank"), [(1, 18), (3, 20)])
 def test_ranks_of_an_arm_on_planes(planes: int, rank: int) -> None:
+    """21 of a tip, less three motions along a level plane; three planes leave the scale to be known."""
     model, _, values = spread()
     machine = Kinematics(model.structure, tool_mm=TOOL)
     random = np.random.default_rng(1)
     values = np.repeat(values, 3, axis=0) + random.uniform(-20.0, 20.0, (180, 6))
     which = np.arange(len(values)) % planes
-    normals = np.eye(3)[which % 3]
-    heights = np.array((300.0, 200.0, 500.0))[which]
+    normals = np.eye(3)[::-1][which % 3]
+    heights = np.array((500.0, 200.0, 300.0))[which]
     for _ in range(30):
         miss = heights - np.sum(machine.nominal(values).position * normals, axis=1)
         slopes = np.einsum("ni,nik->nk", normals, machine.jacobian(values)[:, :3])
