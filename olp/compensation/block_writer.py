@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.compensation.block_arcs import arc_edits
+from olp.compensation.called_holes import CalledHoles, joined
 from olp.compensation.digits import AxisRows, part_of
 from olp.compensation.holes import HoleWords
 from olp.compensation.inserted_blocks import block_edits
@@ -17,7 +18,7 @@ from olp.compensation.rows import Rows
 from olp.compensation.shared_words import shared_edits
 from olp.compensation.stretches import Decimals, Stretches, digits_of
 from olp.compensation.style import by_unit
-from olp.compensation.writer import Writer
+from olp.compensation.writer import Task, Writer
 from olp.core.arrays import Array, Index, Mask, any_in_row, distinct, most_in_row
 from olp.core.progress import Progress, silent
 from olp.core.toolpath import Flag
@@ -35,6 +36,13 @@ class BlockWriter(Writer):
 
     letters = (b"X", b"Y", b"Z")
 
+    def __init__(self, task: Task) -> None:
+        super().__init__(task)
+        self._called_holes = CalledHoles()
+
+    def _spans(self) -> list[tuple[int, int]]:
+        return joined(self.program.called, self.plan.move, super()._spans())
+
     def add(self, band: Band, plan: Plan, tell: Progress = silent) -> None:
         self._hole_words = HoleWords(band.program.holes)
         self._next_capture = 0
@@ -42,10 +50,13 @@ class BlockWriter(Writer):
 
     def _rewritten(self, rows: Rows, begin: int, end: int) -> bytes | None:
         edits: list[Edits] = []
-        columns = self._columns(rows)
+        columns = self._called_holes.middled(self, rows, self._columns(rows))
         for a, b in pairwise(self._breaks(rows)):
             if rows.flag[a] & np.uint8(Flag.CYCLE):
-                edits += self._hole_words.edits(self, rows, a, b)
+                if len(self.program.called):
+                    edits.append(self._called_holes.edits(self, rows, a, b))
+                else:
+                    edits += self._hole_words.edits(self, rows, a, b)
             else:
                 self._digits(rows, columns, a, b)
         self._after_block_delete(rows)

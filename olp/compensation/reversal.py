@@ -167,7 +167,7 @@ def _may_turn(path: Toolpath, rows: Plan, command_mm: Array, *, insert: bool) ->
     if not insert:
         may &= (path.flag[rows.move] & np.uint8(Flag.WHOLE)) == 0
     # a step in front of a block that calls a cycle would call it too
-    calls = (path.line[1:] == path.line[:-1]) & ((path.flag[1:] & np.uint8(Flag.PASS)) != 0)
+    calls = (path.line[1:] == path.line[:-1]) & ((path.flag[1:] & np.uint8(Flag.PASS | Flag.CYCLE)) != 0)
     may &= ~np.append(calls, False)[rows.move]
     may &= ~any_in_row(np.isnan(_before(command_mm, rows.command_mm)))
     return np.asarray(may, bool)

@@ -122,4 +122,5 @@ def _part(program: Program, first: int, last: int) -> Program:
         program, programmed=programmed, blocks=blocks, toolpath=path.part(first, last),
         slot=program.slot[first:last], arc_slots=arc_slots,
         captures=captures, holes=program.holes.part(first, last),
+        called=program.called.part(first, last),
     )  # fmt: skip

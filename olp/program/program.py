@@ -9,7 +9,7 @@ from dataclasses import field, replace
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Index
+from olp.core.arrays import Index, Mask
 from olp.core.toolpath import Toolpath
 from olp.core.values import dataclass
 from olp.program.dialect import Dialect
@@ -161,6 +161,34 @@ class Definitions:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Called:
+    """Holes of cycles that blocks call with levels of their own.
+
+    (k, 2) `strokes`: the moves to the hole and to its bottom. (k, 2) the bytes of the `text` of the call, and
+    (k, 3, 2) of the `numbers` of its levels, -1 for one that it does not state. Levels are where the tool
+    goes back to, where the hole begins, and its bottom. `alone` (k,): the call itself makes the hole."""
+
+    strokes: Index
+    text: Index
+    numbers: Index
+    alone: Mask
+
+    @staticmethod
+    def of(rows: Sequence[tuple[int, ...]]) -> Called:
+        """Of holes in order: moves, text, three numbers, and 1 where it is made alone."""
+        table = np.array(rows, np.int64).reshape(-1, 11)
+        return Called(table[:, :2], table[:, 2:4], table[:, 4:10].reshape(-1, 3, 2), table[:, 10] != 0)
+
+    def part(self, first: int, last: int) -> Called:
+        """The holes whose bottoms are among moves `first`..`last`, with moves counted from `first`."""
+        some = slice(*np.searchsorted(self.strokes[:, 1], (first, last)).tolist())
+        return Called(self.strokes[some] - first, self.text[some], self.numbers[some], self.alone[some])
+
+    def __len__(self) -> int:
+        return len(self.strokes)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Statements:
     """What a program of whole statements has beside its words.
 
@@ -221,6 +249,7 @@ class Program:
     captures: tuple[Capture, ...] = ()
     path_modes: tuple[PathMode, ...] = ()
     holes: Holes = field(default_factory=Holes.none)
+    called: Called = field(default_factory=lambda: Called.of([]))
     remarks: tuple[tuple[str, int, str], ...] = field(default=())
     end_line: int = 0
     calculator: bool = True

@@ -92,7 +92,7 @@ class Reading:
             elif call == "MCALL":
                 self.cycle = None
             elif call.startswith("CYCLE8"):
-                self.cycle = [float(a) if a else None for a in given[1:-1].split(",")]
+                self.cycle = [float(a) if a.strip() else None for a in given[1:-1].split(",")]
             elif call and call not in _QUIET:
                 raise ValueError(text)
             elif letter == "G":

@@ -28,10 +28,11 @@ def with_tool_path(program: Program, rules: ContourRules) -> Program:
     holes = replace(
         program.holes, first=behind[program.holes.first], last=behind[program.holes.last]
     )  # fmt: skip
+    called = replace(program.called, strokes=last[program.called.strokes])
     captures = tuple(replace(c, moves=int(behind[c.moves])) for c in program.captures)
     return replace(
         program, toolpath=done.path, slot=slot, arc_slots=_arc_slots(program, done.path.arcs.move, last),
-        holes=holes, captures=captures, programmed=program, blocks=done.block,
+        holes=holes, called=called, captures=captures, programmed=program, blocks=done.block,
     )  # fmt: skip
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from olp.core.arrays import Array, Index, Mask
 from olp.program.holes import Holes
 from olp.program.path_columns import PathColumns
-from olp.program.program import ArcSlots, Program, SharedWords, Words
+from olp.program.program import ArcSlots, Called, Program, SharedWords, Words
 from olp.program.rs274.axis_state import AxisState
 from olp.program.rs274.extrusion import Extruder
 from olp.program.rs274.lexer import WordChunk
@@ -31,6 +31,7 @@ class Collector(PathColumns):
         self.start = start
         self.word_count = 0
         self.holes: list[Holes] = []
+        self.called: list[tuple[int, ...]] = []
         self.remarks: dict[str, tuple[int, str]] = {}
 
     def put_words(self, chunk: WordChunk) -> None:
@@ -77,6 +78,7 @@ class Collector(PathColumns):
             captures=tuple(state.captures),
             path_modes=tuple(state.path_modes),
             holes=Holes.join(self.holes),
+            called=Called.of(self.called),
             remarks=tuple((name, line, text) for name, (line, text) in self.remarks.items()),
             end_line=end_line,
             calculator=not state.bare_increments,

@@ -255,9 +255,15 @@ class SpecialBlocks:
                 code="OLP512",
             )
         kind, end = drilling.moves(state, np.array(frame.offset_mm), frame.unit_mm)
-        count = len(kind)
+        count, moves = len(kind), self._collector.moves
+        if moves and drilling.text[0] >= 0:
+            bottom = moves + [k for k, _ in drilling.strokes].index(Kind.LINE)
+            self._collector.called.append(
+                (moves - 1, bottom, *drilling.text, *(byte for level in drilling.levels for byte in level),
+                 int(drilling.always))
+            )  # fmt: skip
         self._collector.put_moves(
-            kind, np.full(count, Flag.PASS | _deleted(deleted), np.uint8), np.full(count, line),
+            kind, np.full(count, Flag.CYCLE | _deleted(deleted), np.uint8), np.full(count, line),
             np.full(count, number), end, np.full((count, 3), -1),
         )  # fmt: skip
         state.position[:] = end[-1].tolist()

@@ -21,6 +21,10 @@ from olp.core.values import dataclass
 from olp.program.rs274.axis_state import AxisState
 from olp.program.rs274.codes import PLANE_OF
 
+#: Bytes of a text from one up to another.
+Span = tuple[int, int]
+#: The span of what the text does not have.
+NOWHERE: Span = (-1, -1)
 _NO_LINES = np.zeros(0, np.int64)
 
 
@@ -39,11 +43,17 @@ class Action:
 @dataclass(frozen=True, slots=True)
 class Drilling:
     """A cycle that is called behind the motion of blocks: strokes along the tool axis, each a kind of move
-    and the program coordinate where it ends. `always`: the block calls it without motion too."""
+    and the program coordinate where it ends. `always`: the block calls it without motion too.
+
+    `text` are the bytes of its call, `levels` those of its numbers, NOWHERE for one that is not stated. They
+    say where the tool goes back to, where the hole begins, and where its bottom is.
+    """
 
     name: str
     strokes: tuple[tuple[Kind, float], ...]
     always: bool = False
+    text: Span = NOWHERE
+    levels: tuple[Span, Span, Span] = (NOWHERE, NOWHERE, NOWHERE)
 
     def moves(
         self, state: AxisState, offset_mm: Array, unit_mm: float

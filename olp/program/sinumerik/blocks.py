@@ -153,19 +153,28 @@ def expression_end(line: bytes, place: int) -> int:
 
 def arguments(line: bytes, piece: Piece) -> list[bytes]:
     """The arguments of a call as written, without blanks around them; empty ones for those left out."""
+    return [line[a:b] for a, b in argument_spans(line, piece)]
+
+
+def argument_spans(line: bytes, piece: Piece) -> list[tuple[int, int]]:
+    """Where the arguments of a call are in the line."""
     text = line[piece.value : piece.value_end]
     if not text.strip():
         return []
-    parts, depth, start, quoted = [], 0, 0, False
+    ends, depth, quoted = [], 0, False
     for i, byte in enumerate(text):
         if byte == 34:
             quoted = not quoted
         elif not quoted:
             depth += (byte in b"([") - (byte in b")]")
             if byte == 44 and not depth:
-                parts.append(text[start:i].strip())
-                start = i + 1
-    return [*parts, text[start:].strip()]
+                ends.append(i)
+    spans = []
+    for start, end in zip([0, *(end + 1 for end in ends)], [*ends, len(text)], strict=True):
+        part = text[start:end]
+        begin = piece.value + start + len(part) - len(part.lstrip())
+        spans.append((begin, begin + len(part.strip())))
+    return spans
 
 
 def _closed(line: bytes, place: int) -> int:

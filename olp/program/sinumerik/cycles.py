@@ -10,9 +10,13 @@ from collections.abc import Sequence
 from olp.core.errors import ProgramError
 from olp.core.toolpath import Kind
 from olp.program.rs274.modes import UNROLL
-from olp.program.rs274.translation import Drilling
-from olp.program.sinumerik.blocks import NUMBER
+from olp.program.rs274.translation import NOWHERE, Drilling, Span
+from olp.program.sinumerik.blocks import NUMBER, Piece, argument_spans, arguments
 
+#: Arguments of the level to which the tool goes back, of the one from which a hole begins, and of its bottom.
+_RTP = 0
+_RFP = 1
+_DP = 3
 #: Cycles that come back to the safety distance at a feed.
 _FEED_BACK = frozenset({"CYCLE84", "CYCLE840", "CYCLE85", "CYCLE89"})
 #: Where the argument is that says whether the depth is a position or a distance (AMODE), and the one before
@@ -30,9 +34,25 @@ _MODES = {
 _LIFT_OFF = slice(7, 10)
 
 
-def drilling(name: str, arguments: Sequence[bytes], *, always: bool = False) -> Drilling:
-    """The strokes of a cycle. Raises ProgramError, without a line, for arguments that are no numbers, and for
-    cycles whose strokes they do not give."""
+def called(code: bytes, start: int, call: Piece, cycle: Piece, *, always: bool = False) -> Drilling:
+    """A cycle that is called from a piece on, in a line that begins at byte `start`. Raises as `drilling`."""
+    spans = [(start + a, start + b) for a, b in argument_spans(code, cycle)]
+    text = start + call.start, start + cycle.end
+    return drilling(cycle.name, arguments(code, cycle), always=always, text=text, spans=spans)
+
+
+def drilling(
+    name: str,
+    arguments: Sequence[bytes],
+    *,
+    always: bool = False,
+    text: Span = NOWHERE,
+    spans: Sequence[Span] = (),
+) -> Drilling:
+    """The strokes of a cycle, whose call is the bytes `text`, with the `spans` of its arguments.
+
+    Raises ProgramError, without a line, for arguments that are no numbers, and for cycles whose strokes they
+    do not give."""
     values = [_number(name, text) for text in arguments[:5]]
     rtp, rfp, sdis, dp, dpr = [*values, *[None] * 5][:5]
     dp, dpr = _stated(name, arguments, dp, dpr)
@@ -65,7 +85,10 @@ def drilling(name: str, arguments: Sequence[bytes], *, always: bool = False) -> 
         strokes.append((Kind.LINE, clear))
     if rtp != strokes[-1][1]:
         strokes.append((Kind.RAPID, rtp))
-    return Drilling(name, tuple(strokes), always)
+    levels = (NOWHERE, NOWHERE, NOWHERE)
+    if spans:
+        levels = (spans[_RTP], spans[_RFP], spans[_DP] if dp is not None else NOWHERE)
+    return Drilling(name, tuple(strokes), always, text, levels)
 
 
 def _stated(

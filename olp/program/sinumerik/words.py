@@ -136,12 +136,10 @@ class _Line:
         if first.name in STATEMENTS:
             self._frame(first.name, pieces[1:])
         elif first.name == "MCALL":
-            self._modal_call(pieces[1:])
+            self._modal_call(first, pieces[1:])
         elif first.name in DRILLING and first.called:
             self._alone(pieces)
-            self.words.calls[self.number] = cycles.drilling(
-                first.name, arguments(self.code, first), always=True
-            )
+            self.words.calls[self.number] = cycles.called(self.code, self.start, first, first, always=True)
         elif first.name == "PROC":
             if any(piece.called and self.code[piece.value : piece.value_end].strip() for piece in pieces):
                 raise unroll("a subprogram with parameters")
@@ -200,13 +198,13 @@ class _Line:
         if action is not None:
             self.acts.append(action)
 
-    def _modal_call(self, pieces: list[Piece]) -> None:
+    def _modal_call(self, call: Piece, pieces: list[Piece]) -> None:
         drilling = None
         if pieces and pieces[0].name != "CYCLE80":
             if pieces[0].name not in DRILLING:
                 raise statement(pieces[0])
             self._alone(pieces)
-            drilling = cycles.drilling(pieces[0].name, arguments(self.code, pieces[0]))
+            drilling = cycles.called(self.code, self.start, call, pieces[0])
         self.words.modal.append((self.number, drilling))
 
     def _alone(self, pieces: list[Piece]) -> None:

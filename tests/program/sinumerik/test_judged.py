@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -163,3 +164,80 @@ def test_jobs_with_holes_are_read_alike(bent: Path, seed: int) -> None:
     data = Job(seed, holes=True).text
     same_poses(data, bent)
     same_poses(olp.correct(data, bent).data, bent)
+
+
+DRILLED = """G71 G90 G17 G40 G54 G64
+T1 M6
+D1
+G0 X0 Y0 Z20
+MCALL CYCLE82(9,0,2,-4,,0.5)
+X-120 Y-90
+/X-100
+X130
+G0 Y110 F500
+MCALL
+N7 MCALL CYCLE85( 9 ,1.5,2, ,4)
+X-110 Y100
+MCALL
+X120 Y-100
+N9 CYCLE81(9,0,2,-3.25)
+G0 X0 Y0
+ROT Z30
+X80 Y10
+MCALL CYCLE83(8,0,1,-4,4,-2)
+X81
+MCALL
+TRANS
+G0 X1
+M30
+"""
+
+
+def test_holes_are_right_at_their_bottoms_and_in_the_middle_of_their_strokes(bent: Path) -> None:
+    # the judge knows modal calls alone
+    data = DRILLED.replace("N9 CYCLE81(9,0,2,-3.25)\n", "").encode()
+    result = olp.correct(data, bent)
+    nominal, corrected = canon(data), canon(result.data)
+    errors = deviation(corrected, nominal, JudgeModel(bent), shift_by_frame=STILL, kinds=("feed", "arc"))
+    assert errors.before.max_um > 10
+    assert errors.max_um <= ALLOWED_UM
+    assert result.report["deviation"]["holds"]
+
+
+def test_a_deep_hole_is_right_in_its_middle(bent: Path) -> None:
+    data = (DRILLED.split("MCALL")[0] + "MCALL CYCLE81(9,0,2,-80)\nX100 Y90\nMCALL\nM30\n").encode()
+    corrected = canon(olp.correct(data, bent).data)
+    errors = deviation(corrected, canon(data), JudgeModel(bent), shift_by_frame=STILL, kinds=("feed",))
+    assert errors.before.max_um > 20
+    # half of what the axis of the hole leans along its stroke; where its begin is right it is 6 um
+    assert errors.max_um < 3
+
+
+def test_a_call_is_written_again_with_other_levels(bent: Path) -> None:
+    lines = olp.correct(DRILLED.encode(), bent).data.decode().splitlines()
+    calls = {name: [line for line in lines if name in line] for name in ("CYCLE82", "CYCLE85", "CYCLE81")}
+    assert len(calls["CYCLE82"]) == 5
+    assert calls["CYCLE82"][0] == "MCALL CYCLE82(9,0,2,-4,,0.5)"
+    for line in calls["CYCLE82"][1:]:
+        found = re.fullmatch(r"MCALL CYCLE82\((\S+?),(\S+?),2,(\S+?),,0.5\)", line)
+        assert found is not None
+        assert float(found[1]) != 9
+        assert float(found[2]) - float(found[3]) == pytest.approx(4)
+        # directly before the block that goes to its hole
+        assert re.match(r"/?(G0 )?[XY]-?\d", lines[lines.index(line) + 1])
+    # a distance to the bottom stays; the call of one hole is changed where it is
+    first, again = calls["CYCLE85"]
+    assert first == "N7 MCALL CYCLE85( 9 ,1.5,2, ,4)"
+    assert re.fullmatch(r"MCALL CYCLE85\( 8\.9\d+ ,1\.\d+,2, ,4\)", again)
+    (alone,) = calls["CYCLE81"]
+    found = re.fullmatch(r"N9 CYCLE81\(9\.\d+,(-?0\.\d+),2,(-3\.\d+)\)", alone)
+    assert found is not None
+    assert float(found[1]) - float(found[2]) == pytest.approx(3.25)
+
+
+def test_holes_do_not_depend_on_bands_and_chunks(bent: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    data = DRILLED.replace("/X", "X").encode()
+    whole = olp.correct(data, bent).data
+    monkeypatch.setattr("olp.program.bands.SIZE", 1)
+    monkeypatch.setattr("olp.compensation.writer.Writer.chunk", 1)
+    assert olp.correct(data, bent).data == whole

@@ -217,7 +217,7 @@ def test_a_hole_goes_down_behind_the_motion_of_its_block(setup: Setup) -> None:
     assert rows == [*first, (Kind.RAPID, 1, 1, 7), *((k, 1, 1, z) for k, z in hole)]
     # no block may come behind a motion that calls a cycle, and its strokes have no words
     flags = path.flag[2:].tolist()
-    assert flags == [Flag.WHOLE, *[Flag.PASS] * 4] * 2
+    assert flags == [Flag.WHOLE, *[Flag.CYCLE] * 4] * 2
 
 
 DEPTHS = {
@@ -296,7 +296,7 @@ def test_no_block_comes_between_a_motion_and_its_hole(tmp_path: Path) -> None:
     text = f"{head}{body}MCALL\nG1 X1 Y1\nM30\n".encode()
     written = olp.correct(text, setup).data
     assert written != text
-    counts = [int((read(t, setup, SINUMERIK).toolpath.flag == Flag.PASS).sum()) for t in (text, written)]
+    counts = [int((read(t, setup, SINUMERIK).toolpath.flag == Flag.CYCLE).sum()) for t in (text, written)]
     assert counts == [12, 12]
 
 
