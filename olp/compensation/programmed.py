@@ -15,11 +15,11 @@ from olp.compensation.parts import TURNED, Parts
 from olp.compensation.plan import Limits, Plan
 from olp.compensation.short_blocks import Grid, together
 from olp.compensation.style import Style
-from olp.core.arrays import Array
+from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import ProgramError
 from olp.errormodel.base import ErrorModel
 from olp.program.bands import Band
-from olp.program.contours.elements import AXES, Elements, wrapped
+from olp.program.contours.elements import AXES, Elements, direction, wrapped
 from olp.program.contours.entries import centre_on
 from olp.program.contours.joints import Corner, corners, joints, refuse
 from olp.program.contours.meeting import meeting
@@ -27,6 +27,8 @@ from olp.program.program import Program
 
 #: passes for the direction of entries
 _PASSES = 4
+#: share of its length by which a turned line may become longer or shorter
+_LONGER = 0.25
 
 
 def programmed(band: Band, rows: Plan, model: ErrorModel, limits: Limits, style: Style) -> tuple[Band, Plan]:
@@ -130,12 +132,16 @@ class _Contour:
         # lines that begin where another part ends, and not where two carriers meet
         enters = elements.first[parts.element] & parts.head
         smooth = np.flatnonzero((enters | (self._corner() == Corner.SMOOTH)) & ~parts.arc)
+        before = np.maximum(smooth - 1, 0)
+        sharp = self._sharp(smooth, guess[smooth] - guess[before]) & ~enters[smooth]
+        along = direction(elements.begins[parts.element[smooth]])
         point = guess
         for _ in range(_PASSES):
-            now = point[smooth] - np.where(enters[smooth, None], parts.begin[smooth], point[smooth - 1])
+            now = point[smooth] - np.where(enters[smooth, None], parts.begin[smooth], point[before])
             turn = wrapped(np.arctan2(now[:, 1], now[:, 0]) - parts.ends[smooth])
             turn[np.abs(turn) > TURNED] = 0.0
-            ends[smooth] = begins[smooth] = parts.ends[smooth] + turn
+            angle = np.where(sharp, elements.begins[parts.element[smooth]], parts.ends[smooth] + turn)
+            ends[smooth] = begins[smooth] = angle
             turned = replace(parts, begins=begins, ends=ends)
             point = parts.end - parts.normal(ends)
             entered = np.flatnonzero(behind == Corner.ENTERED)
@@ -145,7 +151,17 @@ class _Contour:
             one, other = turned.carriers(met, ends=True), turned.carriers(following[met], ends=False)
             found = meeting(one, other, guess[met])
             point[met] = np.where(np.isnan(found), guess[met], found)
+            some, last = smooth[sharp], before[sharp]
+            way = ((point[some] - point[last]) * along[sharp]).sum(axis=1)
+            point[some] = point[last] + way[:, None] * along[sharp]
         return np.asarray(point)
+
+    def _sharp(self, row: Index, way: Array) -> Mask:
+        """(k,) lines, parts `row`, that a step aside would turn so far that the tool goes much farther or
+        less far: they keep their directions, and the tool stays aside along them. `way` (k, 2) they go."""
+        parts, own = self.parts, self.elements.begins[self.parts.element[row]]
+        turn = np.abs(wrapped(np.arctan2(way[:, 1], way[:, 0]) - own))
+        return np.asarray(parts.radius[row] * turn > _LONGER * np.hypot(*way.T))
 
     def _put(self, command: Array, point: Array) -> None:
         """Put the points into commands, where rows end beside the contour."""

@@ -73,6 +73,15 @@ def test_a_move_to_the_contour_is_not_split_and_one_behind_it_is(tmp_path: Path)
     assert b"G40" in lines[-5] and lines[-1] == b"M2"
 
 
+@pytest.mark.parametrize("depth", [1, 2])
+def test_a_short_block_behind_a_plunge_ends_where_it_should(tmp_path: Path, depth: int) -> None:
+    """The plunge of 1 or 2 mm leaves the tool 0.5 or 1 um aside, which turns a block of 0.06 mm."""
+    rows = b"G41 D1 X20.00000 Y9.00000\nX50.00000 Y9.00000\nZ-%d\nX50.06000 Y9.00000\nZ-%d\n"
+    text = rows % (depth, 2 * depth) + b"X99.00000 Y9.00000\nG40 G0 X0 Y0\n"
+    deviation = corrected(tmp_path, text, LEANING).report["deviation"]
+    assert deviation["path_max_um"] < 1.2 * depth
+
+
 @pytest.mark.parametrize("code", [b"G41", b"G42"])
 def test_no_part_is_shorter_than_the_cutter_radius(tmp_path: Path, code: bytes) -> None:
     """The chords bend at Y = 90."""
