@@ -191,6 +191,28 @@ def test_a_path_out_of_the_calibrated_box_is_refused_or_held(tmp_path: Path) -> 
     assert [one.code for one in held.findings] == ["OLP403"]
 
 
+def test_backlash_is_taken_up_where_an_axis_turns_round(tmp_path: Path) -> None:
+    play = "[backlash]\nX_um = 6.0\nC_urad = 80.0\n"
+    machine = machine_file(tmp_path, "C F X Y Z B", errors=False, calibration=play)
+    lines = [
+        b"G90 G54",
+        b"G0 X-5 Y0 Z0 B10 C-5",
+        b"G0 X0 C0",
+        b"G1 X10 C5 F100",
+        b"X5 C10",
+        b"X12 C2",
+        b"M30",
+        b"",
+    ]
+    result = olp.correct_joints(b"\n".join(lines), machine, tolerance_urad=2.0)
+    assert result.report["verdict"]["ok"]
+    assert result.report["deviation"]["before"]["position_max_um"] > 5.0
+    # a step before each of the two moves that turn X round
+    assert result.report["moves"]["parts"] == 7
+    where = [float(x) for x in re.findall(rb"X(-?[\d.]+)", result.data)]
+    assert where[1:] == pytest.approx([0.003, 10.003, 9.997, 4.997, 5.003, 12.003])
+
+
 def test_near_a_singular_posture_nothing_jumps(tmp_path: Path) -> None:
     """The tool along the axis of the table, whose tilt only a large turn of the table would correct."""
     text = b"G90 G54\nG0 X0 Y0 Z0 A0 C0\nG1 X10 A0.05 F100\nX20 A-0.05\nM30\n"
