@@ -180,9 +180,8 @@ def outcome(taken: Measurements, clean: FittedCalibration, blunder: Blunder) -> 
     """What the fit of the readings with a blunder says."""
     changed = list(taken.observations)
     changed[blunder.index] = blunder.planted
-    state = clean.fit.results[blunder.index].state
     try:
-        size = noncentrality(clean.fit, state, blunder.planted)
+        size = noncentrality(clean.fit, blunder.index, taken.observations[blunder.index], blunder.planted)
         fitted = fit_calibration(dataclasses.replace(taken, observations=tuple(changed)))
     except OlpError as error:
         return Outcome(np.inf, ("refused",), bool(blunder.words) and blunder.words in str(error))
@@ -192,16 +191,17 @@ def outcome(taken: Measurements, clean: FittedCalibration, blunder: Blunder) -> 
     return Outcome(size, alarms, named)
 
 
-def noncentrality(clean: Fit, state: State, planted: Observation) -> float:
+def noncentrality(clean: Fit, index: int, taken: Observation, planted: Observation) -> float:
     """By how many standard deviations a blunder moves what a source says of the unknowns, against what all
     other readings and the prior predict, with the uncertainty of both."""
     size = clean.parameters.size
+    # with all its readings, also those that the fit left out
+    state = _started(taken, clean.results[index].state)
     total = clean.prior.precision()[0]
     own = Normal.of(size)
-    for result in clean.results:
-        if result.state is state:
-            own.add(state.block(clean.parameters, clean.theta))
-        else:
+    own.add(state.block(clean.parameters, clean.theta))
+    for k, result in enumerate(clean.results):
+        if k != index:
             one = Normal.of(size)
             one.add(result.state.block(clean.parameters, clean.theta))
             total = total + one.H
@@ -220,12 +220,15 @@ def noncentrality(clean: Fit, state: State, planted: Observation) -> float:
     return float(np.sqrt(np.sum(away[some] ** 2 / (share[some] * (1.0 + share[some])))))
 
 
+def _started(observation: Observation, like: State) -> State:
+    """An observation as it begins, with the noise of another state."""
+    state, noise = observation.start(), getattr(like, "noise", None)
+    return state if noise is None else dataclasses.replace(state, noise=noise)  # type: ignore[type-var]
+
+
 def _shift(clean: Fit, state: State, block: Block, planted: Observation) -> Block:
     """The rows of a source with the change of its residuals by the blunder as readings."""
-    noise = getattr(state, "noise", None)
-    other = planted.start(noise)
-    if noise is not None:
-        other = dataclasses.replace(other, noise=noise)  # type: ignore[type-var]
+    other = _started(planted, state)
     theta = clean.theta
     wrong = other.block(clean.parameters, theta)
 
