@@ -170,7 +170,7 @@ def _of_pods(one: Pods) -> Iterator[What]:
     yield ("scale", "", dataclasses.replace(one, baselines=baselines))
 
 
-_PLANTS: dict[type, Callable[[Any], Iterator[Blunder]]] = {
+_PLANTS: dict[type, Callable[[Any], Iterator[What]]] = {
     Line: _of_line, Diagonal: _of_diagonal, Circles: _of_circles, Points: _of_points, Lengths: _of_lengths,
     Pods: _of_pods,
 }  # fmt: skip
