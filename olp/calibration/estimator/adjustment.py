@@ -26,7 +26,7 @@ from olp.core.units import AXES
 from olp.core.values import dataclass
 
 #: Cells of the curves of an axis that has points or lengths but no lines. They double while the fit is bad.
-POINT_CELLS = 24
+POINT_CELLS = 16
 #: A fit is bad where chi-square is more than so many standard deviations above its expectation.
 MISFIT = 5.0
 #: More cells are kept where they lower reduced chi-square to less than this share.

@@ -185,6 +185,19 @@ def test_where_the_instrument_stands_means_nothing() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("seed", [3, 4, 5])
+def test_a_slip_among_few_points_is_the_first_that_is_left_out(seed: int) -> None:
+    """150 points hardly determine 18 curves: readings beside it may be left out with it, it always is."""
+    machine = simulated.machine(seed, "smooth", "FXYZ")
+    points = cloud(machine, seed, 150, 5.0)
+    measured = points.measured_mm.copy()
+    measured[17] += 0.2
+    fitted = fit(Measurements("m", (dataclasses.replace(points, measured_mm=measured),)), "FXYZ")
+    assert fitted.outliers[0].row == 18
+    assert len(fitted.outliers) <= 4
+
+
+@pytest.mark.slow
 def test_a_point_that_slipped_is_left_out_and_named() -> None:
     machine = simulated.machine(2, "smooth", "FXYZ")
     points = cloud(machine, 2, 150, 5.0)

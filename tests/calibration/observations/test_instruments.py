@@ -140,7 +140,7 @@ def test_a_polar_station_weighs_distance_and_angles_as_they_are() -> None:
     """0.5 um along the ray and 10 urad across it: far better than as points of the mean uncertainty, with
     the stated band."""
     weighed, alike, z = [], [], []
-    for seed in range(2):
+    for seed in range(4):
         machine = simulated.machine(seed, "smooth", "FXYZ")
         taken = polar_readings(machine, seed, 250, 0.5 * UM, 10e-6)
         points = polar_points(*taken, sigma_mm=np.array(0.5 * UM), sigma_rad=10e-6, source="polar.csv")
