@@ -20,6 +20,8 @@ _MOST_OTHER_UNIT = 10_000.0
 _TINY_MM = 0.5e-3
 #: rad; a column of angles in another unit has no value above this.
 _TINY_RAD = 0.5e-6
+#: mm or mrad; in the calibration of a fit, a column without a larger value is what nothing was observed of.
+_UNOBSERVED = 1e-5
 #: Columns beside one, without which none is the odd one.
 _OTHERS = 3
 #: rad; angles of all axes, or all squareness, in mrad or degrees. Autocollimators resolve 0.05 urad.
@@ -48,8 +50,9 @@ def unit_doubts(calibration: Calibration) -> Iterator[Finding]:
     """All doubts about columns of curves, squareness and maps."""
     for letters, what, tiny in _KINDS:
         sizes = _sizes(calibration, letters)
+        least = _UNOBSERVED * tiny / _TINY_MM if calibration.quality else 0.0
         axes = list(_axes_of_other_unit(sizes, what, tiny))
-        yield from axes or _columns_of_other_unit(sizes, tiny)
+        yield from axes or _columns_of_other_unit(sizes, tiny, least)
     yield from _no_angles(calibration)
     yield from _squareness(calibration)
     yield from _maps(calibration)
@@ -90,11 +93,11 @@ def _axes_of_other_unit(sizes: Mapping[str, float], what: str, tiny: float) -> I
             yield finding("OLP450", f"{text}of the other axes; {_EXPECTED}")
 
 
-def _columns_of_other_unit(sizes: Mapping[str, float], tiny: float) -> Iterator[Finding]:
-    """One column that is a thousand times smaller than most others."""
+def _columns_of_other_unit(sizes: Mapping[str, float], tiny: float, least: float) -> Iterator[Finding]:
+    """One column that is a thousand times smaller than most others, if it is not below `least`."""
     for name, size in sizes.items():
         others = [value for other, value in sizes.items() if other != name]
-        if size >= tiny or len(others) < _OTHERS:
+        if not least <= size < tiny or len(others) < _OTHERS:
             continue
         ratio = median(np.array(others)) / size
         if _OTHER_UNIT < ratio < _MOST_OTHER_UNIT:

@@ -105,7 +105,7 @@ def _most(step: Array, limits: Limits) -> Array:
 
 def _settle(away: Array, nearest: Array, grid: Grid, limits: Limits, across: Array, row: Index) -> None:
     """Put the ends of parts `row` (k,), none of which is the next one of another, where they are best for
-    what their neighbours are off; `away` (p, 2) is what all are off, `nearest` with the nearest numbers."""
+    what their neighbours are off. `away` (p, 2) is what all are off, `nearest` with the nearest numbers."""
     step, slopes = grid.step[row], (across[row], np.vstack((across, np.zeros((1, 2))))[row + 1])
     others = (away[np.maximum(row - 1, 0)], away[np.minimum(row + 1, len(away) - 1)])
     matrix, wanted = np.broadcast_to(np.eye(2), (len(row), 2, 2)), np.zeros((len(row), 2))
