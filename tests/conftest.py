@@ -15,6 +15,12 @@ settings.load_profile("olp")
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 
 
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_setupnodes() -> None:
+    """Several processes run tests: each takes one core, also where numpy solves."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+
 def _folder(variable: str, name: str, promise: str | None = None) -> Path:
     folder = Path(os.environ.get(variable) or SHARED / name)
     if not folder.is_dir():

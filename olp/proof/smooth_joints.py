@@ -49,20 +49,26 @@ class SmoothJoints:
             return None
         return SmoothJoints(move[smooth], before[smooth], behind[smooth], back[smooth], ahead[smooth])
 
-    def put_across(self, distance: Array | Single, move: Index, away: Array) -> None:
-        """Replace distances (m,) of points that are `away` (m, 3) from the ends of moves (m,), where these
-        are joints and the points are near them, by what is across the path."""
+    def across(self, move: Index, away: Array) -> tuple[Index, Array]:
+        """Of points that are `away` (m, 3) from the ends of moves (m,): the rows (r,) of those near joints,
+        and (r, 3) what of it is across the path."""
         place = np.minimum(np.searchsorted(self.move, move), len(self.move) - 1)
         rows = np.flatnonzero(self.move[place] == move)
         joint, off = place[rows], away[rows]
         back, ahead = ((off * course[joint]).sum(axis=1) for course in (self.before, self.behind))
-        sizes = (
-            np.square(off - along[:, None] * course[joint]).sum(axis=1)
+        one, other = (
+            off - along[:, None] * course[joint]
             for along, course in ((back, self.before), (ahead, self.behind))
         )
         near = (-back <= self.back[joint]) & (ahead <= self.ahead[joint])
-        across = np.sqrt(np.maximum(*sizes))
-        distance[rows[near]] = np.fmin(distance[rows], across)[near]
+        more = np.square(one).sum(axis=1) >= np.square(other).sum(axis=1)
+        return rows[near], np.where(more[:, None], one, other)[near]
+
+    def put_across(self, distance: Array | Single, move: Index, away: Array) -> None:
+        """Replace distances (m,) of points that are `away` (m, 3) from the ends of moves (m,), where these
+        are joints and the points are near them, by what is across the path."""
+        rows, off = self.across(move, away)
+        distance[rows] = np.fmin(distance[rows], np.sqrt(np.square(off).sum(axis=1)))
 
 
 def _course(path: Toolpath, move: Index, *, ends: bool) -> tuple[Array, Array]:

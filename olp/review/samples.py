@@ -21,6 +21,7 @@ from olp.errormodel.reversal import plays
 from olp.errormodel.sampling import clear_length_mm, longer, steps_needed
 from olp.program.feeds.moves import lengths_mm
 from olp.program.program import Program
+from olp.proof.smooth_joints import SmoothJoints
 from olp.review.parts import BLOCK, Ends, Parts, error_mm, held_mm, set_beside, set_in_holes
 
 Single = npt.NDArray[np.float32]
@@ -109,6 +110,7 @@ def sample(
     rows = np.union1d(beside, set_in_holes(nominal, corrected, move, axis, command))
     own = None if play_there is None else play_there[rows]
     result[rows] = tip.deviation(move[rows], share[rows], axis[rows], command[rows], own)
+    _put_across(path, move, share, uncorrected, result)
     # of several samples at one point the last is used: the moves before it took up backlash
     keep = np.ones(len(move), bool)
     keep[:-1] = (np.diff(move) != 0) | (np.diff(share) > 1e-12)
@@ -129,6 +131,17 @@ def sample(
         every = every.take(np.flatnonzero(keep))
     every.joined[0] = False
     return every
+
+
+def _put_across(path: Toolpath, move: Index, share: Array, *deviations: Array) -> None:
+    """Leave of deviations at smooth joints of contours what the proof counts."""
+    joints = SmoothJoints.of(path)
+    if joints is None:
+        return
+    ends = np.flatnonzero(share == 1.0)
+    for deviation in deviations:
+        rows, off = joints.across(move[ends], deviation[ends])
+        deviation[ends[rows]] = off
 
 
 def away_mm(position_mm: Array, share: Array, delta_mm: Array) -> Array:
