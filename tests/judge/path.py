@@ -321,7 +321,7 @@ def _measure(
     shift: np.ndarray,
     uncorrected: np.ndarray,
     kinds: Collection[str],
-    smooth_rad: float,
+    smooth_rad: float = 0.0,
 ) -> PathError:
     dense = real.dense
     skip = uncorrected | ~np.isin(moves.kind, [KINDS.index(kind) for kind in kinds])
