@@ -193,7 +193,10 @@ def work(text: str, place: Path) -> int:
 
 def check_growth(texts: list[str], place: Path) -> None:
     """Each text has as many more lines than the one before: the second growth costs no more than the
-    first, but for one more block of points."""
+    first, but for one more block of points. All are within one band, and what is made once in a process,
+    such as the constructor of a class of which there are a few values, is made before."""
+    for _ in range(7):
+        olp.correct(texts[0].encode(), place)
     one, two, three = (work(text, place) for text in texts)
     assert three - two < 1.05 * (two - one) + 10_000
 
@@ -201,19 +204,15 @@ def check_growth(texts: list[str], place: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", REPEATED)
 def test_work_grows_with_the_text_and_no_faster(name: str, tmp_path: Path) -> None:
-    texts = [HEAD + REPEATED[name] * count + "M2\n" for count in (1, 80, 160, 240)]
-    place = machine(tmp_path, tables=TABLES)
-    work(texts[0], place)
-    check_growth(texts[1:], place)
+    texts = [HEAD + REPEATED[name] * count + "M2\n" for count in (60, 120, 180)]
+    check_growth(texts, machine(tmp_path, tables=TABLES))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_work_grows_with_lines_of_a_kind_and_no_faster(kind: str, tmp_path: Path) -> None:
     place = machine(tmp_path, "[squareness]\nC0Y_urad = 20.0\n", tables=TABLES)
-    texts = [program(kind, lines) for lines in (3, 400, 800, 1200)]
-    work(texts[0], place)
-    check_growth(texts[1:], place)
+    check_growth([program(kind, lines) for lines in (400, 800, 1200)], place)
 
 
 def calls(text: str, place: Path) -> int:
