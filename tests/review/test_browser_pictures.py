@@ -215,6 +215,22 @@ def test_the_flag_is_the_worst_place_of_the_table(page: Any, review: Review) -> 
     assert page.evaluate("olp.state.sample") == flag["sample"]
 
 
+def test_the_readout_says_what_the_table_states_of_the_line(page: Any, review: Review) -> None:
+    table = review.scene.table.by_line()
+    for sample in middle_of_moves(review):
+        line = int(review.scene.nominal.toolpath.line[review.scene.samples.move[sample]])
+        at = int(np.searchsorted(table["line"], line))
+        page.evaluate("sample => olp.app.set_sample(sample)", sample)
+        heads, _, *rows = page.locator("#readout tr").all()
+        assert heads.locator("th").first.inner_text() == f"line {line}"
+        for row, layer in zip(rows, ("uncorrected", "corrected"), strict=True):
+            here, stated = row.locator("td").all_inner_texts()[-2:]
+            assert row.locator("th").inner_text() == f"{layer}, µm"
+            assert stated == f"{table[f'{layer}_um'][at]:.2f}"
+            # of a move alone on its line, no point is farther off
+            assert float(here) <= float(stated) + 0.011
+
+
 def test_whiskers_lead_from_the_nominal_path(page: Any) -> None:
     still(page)
     found = page.evaluate(

@@ -94,6 +94,10 @@ RAPIDS = "\n".join(["# frame=G54", "X_mm,Y_mm,Z_mm", *(f"0.01,0,{z}" for z in ra
 def test_the_page_names_each_run(two: Review, chromium: Any, tmp_path: Path) -> None:
     two.write(tmp_path / "two.html")
     with browser.opened(chromium, tmp_path / "two.html", size=(1440, 900)) as page:
+        # what fails is read first, and no control covers another
+        assert page.locator("#card .answer").first.inner_text() == "NO"
+        blend, views = (page.locator(box).bounding_box() for box in ("#blend", "#views"))
+        assert blend["x"] + blend["width"] <= views["x"] or blend["y"] >= views["y"] + views["height"]
         rows = page.locator("#card table tr").all_inner_texts()
         for name, largest, line, above in (("first", "30.00", 4, 1), ("second", "22.00", 5, 2)):
             text = next(row for row in rows if f"{name}.csv" in row).split()
@@ -106,6 +110,9 @@ def test_the_page_names_each_run(two: Review, chromium: Any, tmp_path: Path) -> 
             still(page)
             marks = page.evaluate("n => olp.app.overlay.marks.get(n).length", f"measured-{k}")
             assert marks == k
+            stated = two.scene.table.measured.largest_um(k - 1)
+            read = page.locator("#readout tr", has_text=f"{name}.csv").locator("td").last
+            assert read.inner_text() == f"{stated:.2f}"
         page.click("#tab-display")
         page.evaluate("olp.app.choose([])")
         page.evaluate("olp.set_metric('magnitude')")

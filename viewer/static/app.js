@@ -165,6 +165,13 @@
       return {points, rows};
     }
 
+    // The deviation that the table states of a layer on a row, um; null where it states none.
+    stated_um(name, row) {
+      const own = this.manifest.listing.by_layer?.[name],
+        value = own && row >= 0 ? this.arrays.get(own.um)[row] : -1;
+      return value >= 0 ? value : null;
+    }
+
     // The largest deviation that the table states of a layer on rows that count; -1 where none does.
     largest_of(rows, name) {
       const own = this.manifest.listing.by_layer?.[name];

@@ -57,7 +57,9 @@
         box.className = name;
         box.textContent = word;
       }
-      const questions = (verdict?.questions ?? []).map(q => {
+      // what fails is read first
+      const asked = (verdict?.questions ?? []).toSorted((p, q) => (q.ok === false) - (p.ok === false));
+      const questions = asked.map(q => {
         const [name, word] = ANSWER.get(q.ok);
         return make(
           "dl",
@@ -238,38 +240,42 @@
         $("findings").append(make("p", {className: "empty", textContent: `${list.length - MOST_FINDINGS} more are in the report.`}));
     }
 
-    // Where the tool is, and by how much it is off in each picture; nothing while it is where it began.
+    // Where the tool is, by how much it is off there in each picture, and what the table states of its line, which may be
+    // at a place between two points; nothing while it is where it began.
     readout() {
       const {app} = this,
-        {state, manifest} = app;
+        {state, manifest} = app,
+        {um} = OLP.colour;
       $("readout").hidden = state.sample_at === 0;
       const nominal = app.layers.get("nominal") ?? app.layers.values().next().value,
         p = nominal.at(state.sample_at, 0),
         number = v => (v <= -0.005 ? "−" : "") + Math.abs(v).toFixed(2);
       const line = app.listing?.number(state.row, 0),
         table = make("table"),
-        row = (head, cells) => table.append(make("tr", {}, make("th", {textContent: head}), ...cells.map(t => make("td", {textContent: t}))));
+        row = (head, cells, className = "") => table.append(make("tr", {className}, make("th", {textContent: head}), ...cells.map(t => make("td", {textContent: t}))));
       table.append(
         make(
           "tr",
           {},
           make("th", {textContent: line ? `line ${line}` : ""}),
-          ...["X", "Y", "Z", app.distance?.label ?? ""].map(a => make("th", {textContent: a})),
+          ...["X", "Y", "Z", app.distance ? `${app.distance.label} here` : "", "line, at most"].map(a => make("th", {textContent: a})),
         ),
       );
-      row("nominal, mm", [...p.map((v, j) => (v + manifest.origin_mm[j]).toFixed(3).replace("-", "−")), ""]);
+      row("nominal, mm", [...p.map((v, j) => (v + manifest.origin_mm[j]).toFixed(3).replace("-", "−")), "", ""]);
       for (const layer of app.layers.values()) {
         const label = app.pictures.of_layer(layer.name)?.label;
         if (!layer.D || !label) continue;
+        const stated = um(app.stated_um(layer.name, state.row)),
+          other = app.pictures.current.layers.includes(layer.name) ? "" : "other";
         if (!layer.knows(state.sample_at)) {
-          row(`${label}, µm`, ["–", "–", "–", "–"]);
+          row(`${label}, µm`, ["–", "–", "–", "–", stated], other);
           continue;
         }
         const at = layer.own(state.sample_at),
           a = layer.at(at, 0),
           d = layer.at(at, 1).map((v, j) => 1e3 * (v - a[j])),
           size = app.metrics.values(app.distance, layer.name)?.[Math.ceil(at - 1e-9)] ?? NaN;
-        row(`${label}, µm`, [...d.map(number), size === size ? number(size) : "–"]);
+        row(`${label}, µm`, [...d.map(number), size === size ? number(size) : "–", stated], other);
       }
       $("readout").replaceChildren(table);
     }

@@ -4,13 +4,13 @@
   const $ = id => document.getElementById(id);
   // [name, metrics of the lanes, text of the choice]; without metrics the lanes are the pictures, each with its own scale
   const STRIPS = [
-    ["frame", ["normal", "binormal", "along"], "normal, binormal, along"],
+    ["frame", ["normal", "binormal", "along"], "along and across"],
     ["axes", ["x", "y", "z"], "X, Y, Z"],
     ["pictures", null, "size, by picture"],
   ];
   // [name, title, unit, text of the choice]
   const MOTIONS = [
-    ["speed", "Speed", "mm/s", "path and feed"],
+    ["speed", "Speed", "mm/s", "speed"],
     ["velocity", "Velocity", "mm/s", "velocity"],
     ["acceleration", "Acceleration", "mm/s²", "acceleration"],
     ["jerk", "Jerk", "mm/s³", "jerk"],
@@ -79,7 +79,7 @@
       return ends.length ? [Math.min(...ends), Math.max(...ends)] : [0, 1];
     }
     get x_label() {
-      return this.abscissa === "time" ? "time, s" : "distance along the path, mm";
+      return this.abscissa === "time" ? "time, s" : "distance, mm";
     }
     time_at(x) {
       return this.abscissa === "time" ? x : this.between(this.app.arc, this.app.time, x);
