@@ -8,6 +8,7 @@ has its own rule.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -35,6 +36,9 @@ _MOVES = 1e-7
 #: Below this a direction is left out where the exact solution is not found: a tilt of 1 mrad then costs at
 #: most 20 mrad of an axis.
 _MOVES_WELL = 0.05
+#: A command turns no axis by more than so many times the largest turn that the orientation may need: what the
+#: position needs comes on top of that.
+_FARTHEST = 2.0
 #: Half the step of differences of the actual motion, rad; times the reference radius in mm.
 _HALF_STEP = 1e-5
 
@@ -54,12 +58,15 @@ class Solved:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Task:
-    """Rows to be solved: targets, the axis values to start from, and which axes may move (n, axes).
-    `scale` (axes,) turns axis values into mm: 1, or the reference radius per degree."""
+    """Rows to be solved: targets, the axis values to start from, (n, axes, axes) `free`, which takes from
+    scaled changes of the axes what may not change, and (n, k, k) `asked`, which takes from turns of the tool
+    what is not asked for. `scale` (axes,) turns axis values into mm: 1, or the reference radius per
+    degree."""
 
     target: Poses
     near: Array
-    free: Mask
+    free: Array
+    asked: Array
     scale: Array
     radius_mm: float
     symmetric: bool
@@ -67,8 +74,8 @@ class _Task:
 
     def only(self, rows: Index | Mask) -> _Task:
         target = Poses(self.target.rotation[rows], self.target.position[rows])
-        return _Task(
-            target, self.near[rows], self.free[rows], self.scale, self.radius_mm, self.symmetric, self.moves
+        return replace(
+            self, target=target, near=self.near[rows], free=self.free[rows], asked=self.asked[rows]
         )
 
 
@@ -83,21 +90,24 @@ def inverse(
 ) -> Solved:
     """Axis values at which the tool is at `target`, found from `near` (n, axes) in mm and deg.
 
-    A turn counts as its arc at `reference_radius_mm`. Axes whose joint is not to be corrected stay. Where a
-    first step would turn a rotary axis by more than `largest_turn_deg` L, it turns by L^2 over that: at a
-    singular posture not at all. Then the position is met by the other axes, and the rest of the orientation
-    is left. `nominal` asks for the machine without errors. Raises NotInvertible with the row where no axis
-    values meet the position.
+    A turn counts as its arc at `reference_radius_mm`. Axes whose joint is not to be corrected stay. Where the
+    orientation needs a motion of the axes that turns one of them by x, more than `largest_turn_deg` L, that
+    motion is made smaller, to L^2 / x: at a singular posture to nothing. The position is met all the same,
+    and the rest of the orientation is left. `nominal` asks for the machine without errors. Raises
+    NotInvertible with the row where no axis values meet the position, or where these turn an axis by more
+    than 2 L.
     """
     structure = machine.structure
     near = np.asarray(near, float)
     rotary = np.array([joint.unit == "deg" for joint in structure.joints.values()])
     free = np.array([joint.correct for joint in structure.joints.values()])
     forward: Forward = machine.nominal if nominal else machine.actual
+    turns = 2 if structure.symmetric_tool else 3
     task = _Task(
         target.rows(len(near)),
         near,
-        np.broadcast_to(free, near.shape),
+        np.broadcast_to(np.diag(free.astype(float)), (len(near), len(free), len(free))),
+        np.broadcast_to(np.eye(turns), (len(near), turns, turns)),
         np.where(rotary, np.radians(1.0) * reference_radius_mm, 1.0),
         reference_radius_mm,
         structure.symmetric_tool,
@@ -108,24 +118,18 @@ def inverse(
         slopes = partial(_differences, forward, task.scale, reference_radius_mm)
     limited = np.zeros(len(near), bool)
     if largest_turn_deg is not None:
-        task = _bounded(task, forward, slopes, rotary, largest_turn_deg)
-        limited = np.any(task.free != free, axis=1)
+        task, limited = _bounded(task, forward, slopes, rotary, largest_turn_deg)
     values, met = _newton(task, forward, slopes)
     if not np.all(met):
-        part = task.only(~met)
-        well = _Task(
-            part.target, part.near, part.free, part.scale, part.radius_mm, part.symmetric, _MOVES_WELL
-        )
+        well = replace(task.only(~met), moves=_MOVES_WELL)
         values[~met], now = _newton(well, forward, slopes)
         limited[~met] = True
         if not np.all(now):
-            row = int(np.flatnonzero(~met)[np.argmin(now)])
-            error = NotInvertible(
-                f"row {row}: no axis values of {structure.name!r} near the given ones bring the tool to its "
-                "target; expected a target within reach, and a posture away from a singular one"
-            )
-            error.row = row
-            raise error
+            raise _none_near(machine, int(np.flatnonzero(~met)[np.argmin(now)]))
+    if largest_turn_deg is not None:
+        turn = np.max(np.abs(np.where(rotary, values - near, 0.0)), axis=1, initial=0.0)
+        if np.any(turn > _FARTHEST * largest_turn_deg):
+            raise _none_near(machine, int(np.argmax(turn)))
     reached = forward(values).rotation
     left = rotation_vector(reached @ np.swapaxes(task.target.rotation, -1, -2))
     return Solved(values, left, limited)
@@ -149,13 +153,39 @@ def command(
     )
 
 
-def _bounded(task: _Task, forward: Forward, slopes: Slopes, rotary: Mask, largest_deg: float) -> _Task:
-    """The task with every axis that a first step would turn by x, more than L, standing at L^2 / x."""
-    steps = _steps_of(task, slopes(task.near)) @ _miss(task, forward(task.near))[..., None]
-    turn = np.where(rotary, steps[..., 0] / task.scale, 0.0)
-    far = np.abs(turn) > largest_deg
-    near = np.where(far, task.near + largest_deg**2 / np.where(far, turn, 1.0), task.near)
-    return _Task(task.target, near, task.free & ~far, task.scale, task.radius_mm, task.symmetric, task.moves)
+def _none_near(machine: Kinematics, row: int) -> NotInvertible:
+    error = NotInvertible(
+        f"row {row}: no axis values of {machine.structure.name!r} near the given ones bring the tool to its "
+        "target; expected a target within reach, and a posture away from a singular one"
+    )
+    error.row = row
+    return error
+
+
+def _bounded(
+    task: _Task, forward: Forward, slopes: Slopes, rotary: Mask, largest_deg: float
+) -> tuple[_Task, Mask]:
+    """The task without the motions of axes that would turn one of them by x, more than L, and without the
+    turns of the tool that they are for: these are made beforehand, by L^2 / x. And the rows (n,) where there
+    are any.
+
+    Of a first step the orientation needs up to three motions that keep the tip. They are at right angles to
+    each other, and near a singular posture one of them is long."""
+    miss = _miss(task, forward(task.near))[..., None]
+    shifts, turns = _parts_of(task, slopes(task.near))
+    place = _pseudo_inverse(shifts, _MOVES) @ miss[:, :3]
+    left, size, right = np.linalg.svd(_of_still_tips(shifts, turns), full_matrices=False)
+    share = np.swapaxes(left, -1, -2) @ (miss[:, 3:] - turns @ place)
+    long = np.where(size > task.moves, share[..., 0] / np.maximum(size, task.moves), 0.0)
+    motions = long[..., None] * right
+    turn = np.max(np.abs(np.where(rotary, motions / task.scale, 0.0)), axis=2)
+    far = turn > largest_deg
+    less = np.where(far, largest_deg / np.maximum(turn, largest_deg), 0.0) ** 2
+    near = task.near + np.sum(less[..., None] * motions, axis=1) / task.scale
+    held, given_up = np.where(far[..., None], right, 0.0), np.where(far[:, None, :], left, 0.0)
+    free = task.free - np.swapaxes(held, -1, -2) @ held
+    asked = task.asked - given_up @ np.swapaxes(given_up, -1, -2)
+    return replace(task, near=near, free=free, asked=asked), np.asarray(far.any(axis=1))
 
 
 def _newton(task: _Task, forward: Forward, slopes: Slopes) -> tuple[Array, Mask]:
@@ -193,19 +223,30 @@ def _miss(task: _Task, pose: Poses) -> Array:
     turn = rotation_vector(task.target.rotation @ np.swapaxes(pose.rotation, -1, -2)) * task.radius_mm
     if task.symmetric:
         turn = turned(np.swapaxes(task.target.rotation, -1, -2), turn)[:, :2]
-    return np.concatenate((task.target.position - pose.position, turn), axis=1)
+    return np.concatenate((task.target.position - pose.position, turned(task.asked, turn)), axis=1)
 
 
 def _steps_of(task: _Task, slopes: Array) -> Array:
     """(n, axes, 5 or 6) the scaled change of the axes by what is missing: first the position, then of what
     moves it not the orientation, then the least change."""
-    slopes = np.where(task.free[:, None, :], slopes, 0.0)
+    shifts, turns = _parts_of(task, slopes)
+    back = _pseudo_inverse(shifts, _MOVES)
+    rest = _pseudo_inverse(_of_still_tips(shifts, turns), task.moves)
+    return np.concatenate((back - rest @ turns @ back, rest), axis=2)
+
+
+def _parts_of(task: _Task, slopes: Array) -> tuple[Array, Array]:
+    """(n, 3, axes) how the tip moves by what may move, and (n, 2 or 3, axes) how the tool turns."""
+    slopes = slopes @ task.free
     shifts, turns = slopes[:, :3], slopes[:, 3:]
     if task.symmetric:
         turns = (np.swapaxes(task.target.rotation, -1, -2) @ turns)[:, :2]
-    back = _pseudo_inverse(shifts, _MOVES)
-    rest = _pseudo_inverse(turns - turns @ back @ shifts, task.moves)
-    return np.concatenate((back - rest @ turns @ back, rest), axis=2)
+    return shifts, task.asked @ turns
+
+
+def _of_still_tips(shifts: Array, turns: Array) -> Array:
+    """(n, 2 or 3, axes) how the tool turns by motions that keep the tip where it is."""
+    return np.asarray(turns - turns @ _pseudo_inverse(shifts, _MOVES) @ shifts)
 
 
 def _pseudo_inverse(matrices: Array, least: float) -> Array:
