@@ -35,6 +35,8 @@ _ARM_MM = 100.0
 _STEPS = 3
 #: Samples of a stretch are so many times those of the plan, and one: so none falls on one of the plan.
 _FINER = 2
+#: Rows of a Jacobian: mm of the tip, and rad of the tool.
+_PLACE_AND_TURN = (slice(0, 3), slice(3, 6))
 #: Places at a time, so that memory is small.
 _BATCH = 1 << 15
 
@@ -78,15 +80,40 @@ def prove_joints(
     """The proof of `corrected`, with the plan of the nominal program; digits are the coarsest last ones.
     Raises ProgramError where it is no correction of the nominal program."""
     groups = match(nominal, corrected, plan, digit_mm, digit_deg)
-    left = np.zeros(len(nominal))
-    np.maximum.at(left, plan.move, plan.left_rad)
-    after = _deviation(nominal, corrected, groups)
-    before = _deviation(nominal, nominal, np.arange(len(nominal)))
-    allowed_mm = limits.tolerance_mm + _HALF_DIGITS * digit_mm
-    allowed_rad = limits.tolerance_rad + _HALF_TURNS * float(np.radians(digit_deg))
-    judged = nominal.feed & np.isfinite(after.distance_mm)
+    after = _deviation(nominal, corrected, groups, plan)
+    before = _deviation(nominal, nominal, np.arange(len(nominal)), plan)
+    left = _left(plan, len(nominal))
+    rounded_mm, rounded_rad = _rounding(nominal, plan, digit_mm, digit_deg)
+    allowed_mm = limits.tolerance_mm + rounded_mm
+    allowed_rad = limits.tolerance_rad + rounded_rad
+    judged = nominal.judged & np.isfinite(after.distance_mm)
     over = judged & ((after.distance_mm > allowed_mm) | (after.angle_rad - left > allowed_rad))
     return JointProof(groups, before, after, left, judged, allowed_mm, allowed_rad, over)
+
+
+def _left(plan: JointPlan, count: int) -> Array:
+    """(n,) the largest angle that no command corrects, at the begin of a move, along it and at its end."""
+    left, ends = np.zeros(count), np.zeros(count)
+    np.maximum.at(left, plan.move, plan.left_rad)
+    ends[plan.move] = plan.left_rad
+    return np.asarray(np.maximum(left, np.append(0.0, ends[:-1])[:count]))
+
+
+def _rounding(path: JointPath, plan: JointPlan, digit_mm: float, digit_deg: float) -> tuple[float, float]:
+    """mm and rad by which the tip and the tool are off at most because words have a last digit. In G-code the
+    linear words take up what the rounding of rotary ones does to the tip; in lists nothing does."""
+    if path.listed is None:
+        return _HALF_DIGITS * digit_mm, _HALF_TURNS * float(np.radians(digit_deg))
+    rotary = np.array([unit == "deg" for unit in path.motion.structure.units])
+    half = 0.5 * 10.0 ** -path.places.astype(float)
+    half[rotary] = np.radians(half[rotary])
+    rows, most = np.flatnonzero(np.isfinite(plan.axes).all(axis=1)), np.zeros(2)
+    for a in range(0, len(rows), _BATCH):
+        some = rows[a : a + _BATCH]
+        slopes = path.motion.slopes(plan.axes[some], path.tool[plan.move[some]])
+        sizes = np.stack([np.linalg.norm(slopes[:, part], axis=1) @ half for part in _PLACE_AND_TURN])
+        most = np.maximum(most, sizes.max(axis=1))
+    return float(most[0]), float(most[1])
 
 
 def match(
@@ -141,7 +168,7 @@ def _stretched(expected: Array, end: Array, near: Array, feed: Mask) -> Index:
     return np.array(groups)
 
 
-def _deviation(nominal: JointPath, path: JointPath, groups: Index) -> Deviation:
+def _deviation(nominal: JointPath, path: JointPath, groups: Index, plan: JointPlan) -> Deviation:
     """The deviation of the machine that runs `path` from the nominal poses, by nominal move."""
     motion, count = path.motion, len(nominal)
     owner = np.searchsorted(groups, np.arange(len(path)))
@@ -155,7 +182,7 @@ def _deviation(nominal: JointPath, path: JointPath, groups: Index) -> Deviation:
     start[begun] = motion.axes(path.start[begun], path.tool[begun], path.tip[begun])
     play = _plays(axes, motion.width)
     before = np.vstack((np.zeros((1, len(motion.width))), play[:-1])) if len(play) else play
-    shares = _shares(nominal, path, groups, owner, axes, play, known & begun & nominal.feed[owner])
+    shares = _shares(nominal, path, (groups, owner), plan, axes, play, known & begun & nominal.feed[owner])
     result = _Sums(count)
     result.add(nominal, path, owner[ends], ends, np.ones(len(ends)), shares[1][ends], play[ends])
     feeds = np.flatnonzero(known & begun & nominal.feed[owner])
@@ -193,13 +220,24 @@ def _plays(axes: Array, width: Array) -> Array:
 
 
 def _shares(
-    nominal: JointPath, path: JointPath, groups: Index, owner: Index, axes: Array, play: Array, feed: Mask
-) -> tuple[Array, Array]:
-    """(m,) at which shares of its nominal move each move begins and ends."""
-    end = np.ones(len(path))
-    inner = np.flatnonzero(feed & (groups[owner] != np.arange(len(path))))
-    if inner.size:
-        end[inner] = _places(nominal, path, owner[inner], inner, axes[inner], play[inner])
+    nominal: JointPath, path: JointPath, pairs: tuple[Index, Index], plan: JointPlan, axes: Array,
+    play: Array, feed: Mask,
+) -> tuple[Array, Array]:  # fmt: skip
+    """(m,) at which shares of its nominal move each move begins and ends: as planned where a nominal move has
+    as many parts as the plan, else where the pose is nearest. `pairs` are the last part of each nominal move,
+    and the nominal move of each part."""
+    groups, owner = pairs
+    end, number = np.ones(len(path)), np.arange(len(path))
+    first = np.append(-1, groups[:-1]) + 1
+    begins = np.searchsorted(plan.move, np.arange(len(nominal)))
+    parts = np.append(begins[1:], len(plan.move)) - begins
+    planned = (groups - first + 1 == parts)[owner]
+    inner = feed & (groups[owner] != number)
+    row = np.flatnonzero(inner & planned)
+    end[row] = plan.share[begins[owner[row]] + row - first[owner[row]]]
+    row = np.flatnonzero(inner & ~planned)
+    if row.size:
+        end[row] = _places(nominal, path, owner[row], row, axes[row], play[row])
     begin = np.append(0.0, np.where(owner[1:] == owner[:-1], end[:-1], 0.0))[: len(path)]
     return begin, np.maximum(end, begin)
 

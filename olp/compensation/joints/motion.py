@@ -79,6 +79,14 @@ class Motion:
                 values[rows] = meet_positions(self.machines[which], part, axes[rows])
         return values
 
+    def slopes(self, axes: Array, tool: Index) -> Array:
+        """(n, 6, axes) as `Kinematics.jacobian`."""
+        slopes = np.empty((len(axes), 6, axes.shape[1]))
+        for which in distinct(tool).tolist():
+            rows = np.flatnonzero(tool == which)
+            slopes[rows] = self.machines[which].jacobian(axes[rows])
+        return slopes
+
     def _poses(self, axes: Array, tool: Index, pose: Callable[[Kinematics, Index], Poses]) -> Poses:
         rotation, position = np.empty((len(axes), 3, 3)), np.empty((len(axes), 3))
         for which in distinct(tool).tolist():

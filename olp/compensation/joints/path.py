@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.compensation.joints.motion import Motion
+from olp.compensation.style import fewest_decimals
 from olp.core.arrays import Array, Index, Mask, is_in
 from olp.core.errors import ProgramError
 from olp.core.machine import Machine, Vector
@@ -17,9 +18,12 @@ from olp.core.units import AXES
 from olp.core.values import dataclass
 from olp.kinematics.errors import MachineErrors
 from olp.kinematics.structure import Structure
+from olp.program.pointlist.axis_list import AxisList
 from olp.program.program import Program
 from olp.program.rs274.rotary import RotaryWords
 
+#: Decimals of an axis that states no least increment.
+_UNSTATED_DECIMALS = 6
 #: Moves that are never corrected.
 _KEPT = np.uint8(Flag.PASS | Flag.MACHINE | Flag.CONTROL)
 
@@ -32,9 +36,10 @@ class JointPath:
     where unknown; the linear ones state the tip where `tip` (n,), else they are axis values. `slot` (n,
     axes) are their words, -1 where there is none. `tool` is the place of the tool in `motion`, `shift_mm`
     (n, 3) where the part really lies. `offset` (n, axes), `unit` (n,) and, of words without a point, `scale`
-    (axes,) lead from words to coordinates. `feed` are straight moves that cut, `kept` moves that stay
-    uncorrected. `held` (n,) are moves whose rotary axes stay as programmed: where these stand, tool centre
-    point control begins."""
+    (axes,) lead from words to coordinates. `feed` are straight moves that cut, `judged` those that the
+    proof judges, `kept` moves that stay uncorrected. `held` (n,) are moves whose rotary axes stay as
+    programmed: where these stand, tool centre point control begins. `places` (axes,) are the fewest decimals
+    of words in mm and deg. `listed` are the rows of a list of axis values."""
 
     program: Program
     motion: Motion
@@ -48,8 +53,11 @@ class JointPath:
     unit: Array
     scale: Array
     feed: Mask
+    judged: Mask
     kept: Mask
     held: Mask
+    places: Index
+    listed: AxisList | None = None
 
     def __len__(self) -> int:
         return len(self.end)
@@ -116,11 +124,46 @@ class JointPath:
         unit = np.array([frame.unit_mm for frame in path.frames] or [1.0])[path.frame]
         tool = tool_of[path.frame]
         kept = (path.flag & _KEPT) != 0
+        feed = (path.kind == Kind.LINE) & ~kept
         start = _starts(motion, end, tool, tip, np.array(path.start_mm), columns, start_deg, order)
         return JointPath(
             program, motion, start, end, slot, tool, tip, shifts[path.frame], offset, unit, scale,
-            (path.kind == Kind.LINE) & ~kept, kept, np.append(tip[1:] & ~tip[:-1], False)[: len(tip)],
+            feed, feed, kept, np.append(tip[1:] & ~tip[:-1], False)[: len(tip)], _places(structure),
         )  # fmt: skip
+
+    @staticmethod
+    def of_list(
+        rows: AxisList, structure: Structure, errors: MachineErrors, tools: Mapping[int, Vector]
+    ) -> JointPath:
+        """The path of a list of axis values. `tools` are vectors by number, that of -1 counts where a row
+        states none. Raises ProgramError for tools that are not there."""
+        count, axes = rows.values.shape
+        line = rows.program.toolpath.line
+        for number, at in zip(rows.tool.tolist(), line.tolist(), strict=True):
+            if number not in tools:
+                known = ", ".join(str(tool) for tool in tools if tool >= 0) or "none"
+                raise ProgramError(
+                    f"tool {number} has no vector gauge_to_tip_mm; the tools that have one: {known}",
+                    line=at,
+                    code="OLP504",
+                )
+        motion = Motion.of(structure, errors, tuple(tools.values()))
+        places = {number: place for place, number in enumerate(tools)}
+        feed = np.full(count, rows.joined)
+        feed[:1] = False
+        none = np.zeros(count, bool)
+        return JointPath(
+            rows.program, motion, np.vstack((np.full((1, axes), np.nan), rows.values[:-1])), rows.values,
+            np.full((count, axes), -1, np.int32), np.array([places[n] for n in rows.tool.tolist()]),
+            none, np.zeros((count, 3)), np.zeros((count, axes)), np.ones(count), np.ones(axes),
+            feed, ~none, none, none, _places(structure), rows,
+        )  # fmt: skip
+
+
+def _places(structure: Structure) -> Index:
+    """(axes,) the fewest decimals of words: those of the least increments, where they are stated."""
+    steps = [joint.least_increment for joint in structure.joints.values()]
+    return np.array([fewest_decimals(step, 1.0, 0) if step > 0.0 else _UNSTATED_DECIMALS for step in steps])
 
 
 def _starts(

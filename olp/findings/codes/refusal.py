@@ -310,12 +310,10 @@ RULES = (
     _rule(
         "OLP563",
         "machine with other joints",
-        why="This verb, or this dialect, is read for three linear axes only. Or the "
-        "machine has other axes than "
-        "X, Y, Z and rotary ones named A, B and C, so that words mean other motions.",
-        remedy="Use `olp correct`, `verify`, `check` or `simulate` with G-code. Look "
-        "at the machine with `olp "
-        "inspect machine.toml`, or compute with `olp.load_kinematics`.",
+        why="This verb, or this dialect, is read for three linear axes only. Or the machine has other "
+        "axes than X, Y, Z and rotary ones named A, B and C, so that words mean other motions.",
+        remedy="Use `olp correct`, `verify`, `check` or `simulate` with G-code or a list of axis values. "
+        "Look at the machine with `olp inspect machine.toml`, or compute with `olp.load_kinematics`.",
         example="`olp retime part.nc -m trunnion.toml`, and a program for an arm.",
     ),
     _rule(

@@ -7,6 +7,7 @@ import hashlib
 from pathlib import Path
 from typing import Any, Literal
 
+from olp.compensation.joints.list_writer import write_list
 from olp.compensation.joints.path import JointPath
 from olp.compensation.joints.planning import JointLimits, JointPlan, planned
 from olp.compensation.joints.writer import write_joints
@@ -77,11 +78,12 @@ def correct_joints(
     outside_box: Literal["refuse", "hold"] = "refuse",
     date: datetime.date | None = None,
 ) -> JointCorrection:
-    """Correct a program for a machine with X, Y, Z and rotary axes, and prove it.
+    """Correct a program for a machine of any joints, and prove it: G-code for X, Y, Z with rotary axes, or a
+    list of axis values of any machine.
 
-    The corrected text is in the program's own dialect; only coordinate words differ, and words and blocks are
-    inserted. Moves are split where the tip or the tool would leave its tolerance, in um and urad. Raises
-    InputError (ProgramError with its line, ConfigError) and CannotCompute.
+    The corrected text is in the program's own dialect; only coordinate words differ, and words, blocks and
+    rows are inserted. Moves are split where the tip or the tool would leave its tolerance, in um and urad.
+    Raises InputError (ProgramError with its line, ConfigError) and CannotCompute.
     """
     options = JointOptions(
         tolerance_um=tolerance_um, tolerance_urad=tolerance_urad, flatten=flatten,
@@ -95,15 +97,16 @@ def corrected(run: JointRun, options: JointOptions) -> JointCorrection:
     with run.program.errors():
         _refuse_stamped(run.program)
         source, nominal = run.read(run.program, options)
-        profile = run.dialect(run.program)
+        dialect = run.dialect(run.program)
         with nominal.program.errors():
             plan = planned(nominal, options.limits())
             if options.outside_box == "refuse" and run.calibration is not None:
                 _refuse_outside(nominal, plan, run)
-            stamp = stamp_line(run.digest, profile.comment) if profile.marks else b""
-            written = write_joints(nominal, plan, stamp)
+            stamp = stamp_line(run.digest, dialect.comment) if dialect.marks else b""
+            write = write_joints if nominal.listed is None else write_list
+            written = write(nominal, plan, stamp)
         text = bytes(source.data) if written.text is None else written.text
-        done = proved(run, (nominal, plan), run.again(text, profile), options, written.tally)
+        done = proved(run, (nominal, plan), run.again(text, dialect), options, written.tally)
     return JointCorrection(text, bytes(source.data), done[0], done[1], done[2], run.files)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Mapping
 from dataclasses import field, replace
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import Any
 
 from olp.compensation.joints.path import JointPath
 from olp.core.errors import ConfigError, ProgramError, UsageError
-from olp.core.machine import Job, Setup, WorkOffset
+from olp.core.machine import ZERO, Job, Setup, WorkOffset
 from olp.core.values import dataclass
 from olp.files.calibration.reader import files_beside
 from olp.files.config import load_job
@@ -19,9 +20,13 @@ from olp.files.kinematics.machine import load_joint_machine
 from olp.files.sources import Source, Sources
 from olp.kinematics.errors import MachineErrors, Payload
 from olp.kinematics.machine import JointCalibration, JointMachine
+from olp.program.pointlist.axis_list import read_axis_list
+from olp.program.pointlist.base import PointList
+from olp.program.pointlist.dialect import DIALECT as AXIS_LIST
 from olp.program.program import Program
 from olp.program.registry import Options, dialect_of, find, read
 from olp.program.rs274.profiles.base import Profile
+from olp.program.text.delimited import first_lines
 from olp.workflows import refusals
 from olp.workflows.flatten import UnrollOptions
 from olp.workflows.session import PathLike
@@ -32,12 +37,14 @@ _TURNS = "ABC"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointRun:
-    """What a run on a machine with rotary joints needs. `setup` is what the reader of programs sees, `turned`
-    are the rotary values of work offsets by name and axis, `digest` is the hash of the calibration."""
+    """What a run on a machine with rotary joints needs. `setup` is what the reader of G-code sees, None where
+    the machine has other axes than X, Y, Z with rotary ones: then lists of axis values are read. `turned` are
+    the rotary values of work offsets by name and axis, `digest` is the hash of the calibration."""
 
     machine: JointMachine
     calibration: JointCalibration | None
-    setup: Setup
+    job: Job
+    setup: Setup | None
     turned: Mapping[str, Mapping[str, float]]
     digest: str
     sources: Sources
@@ -66,74 +73,98 @@ class JointRun:
         if program is None:
             raise UsageError("no program is given; name it, or set the key program of the job file (-j)")
         described = load_joint_machine(machine, sources.read)
-        if described.control is None:
-            raise ProgramError(
-                f"the machine has the chain {' '.join(described.structure.chain)}; programs are read for "
-                f"X, Y and "
-                "Z with rotary axes named A, B or C. olp inspect shows what its files hold, and "
-                "olp.load_kinematics computes with it",
-                file=str(machine),
-                code="OLP563",
-            )
         payload = Payload(stated.payload_kg, stated.payload_centre_mm)
         calibration = None
         if described.calibration is not None:
             calibration = load_joint_calibration(
                 described.calibration, described.structure, payload, sources.read
             )
-        control = described.control
-        offsets = {**control.work_offsets, **stated.work_offsets}
-        setup = Setup(
-            replace(control, work_offsets=_unturned(control.work_offsets)),
-            replace(stated, work_offsets=_unturned(stated.work_offsets), dialect=dialect or stated.dialect),
-        )
-        _refuse_undefined(setup, described, str(machine))
-        turned = {
-            name: dict(zip(_TURNS, offset.rotation_deg, strict=True)) for name, offset in offsets.items()
-        }
+        stated = replace(stated, dialect=dialect or stated.dialect)
+        control, setup, turned = described.control, None, {}
+        if control is not None:
+            offsets = {**control.work_offsets, **stated.work_offsets}
+            setup = Setup(
+                replace(control, work_offsets=_unturned(control.work_offsets)),
+                replace(stated, work_offsets=_unturned(stated.work_offsets)),
+            )
+            _refuse_undefined(setup, described, str(machine))
+            turned = {
+                name: dict(zip(_TURNS, offset.rotation_deg, strict=True)) for name, offset in offsets.items()
+            }
         source = sources.source(program)
         digest = _digest(described, sources)
         named = [str(machine), job, described.calibration, source.name]
         files = tuple(dict.fromkeys(str(Path(name).absolute()) for name in named if name))
         return JointRun(
-            described, calibration, setup, turned, digest, sources, source, (*sources.files, *files)
+            described, calibration, stated, setup, turned, digest, sources, source, (*sources.files, *files)
         )
 
-    def dialect(self, source: Source) -> Profile:
-        """The dialect of a program on this machine. Raises ProgramError where it is not one of words."""
+    def dialect(self, source: Source) -> Profile | PointList:
+        """The dialect of a program on this machine. Raises ProgramError where it is not one that is read."""
+        if self.setup is None:
+            if self.job.dialect not in (None, AXIS_LIST.name) or not _names_axes(source.data, self.machine):
+                raise ProgramError(
+                    f"on a machine with the chain {' '.join(self.machine.structure.chain)} lists of axis "
+                    f"values are read; expected a table with the columns {', '.join(_columns(self.machine))}",
+                    code="OLP563",
+                )
+            return AXIS_LIST
         control = find(self.machine.controller)
         if control is None:
             raise ConfigError(
                 f"controller {self.machine.controller!r} has no dialect that is read for such a machine"
             )
-        dialect = dialect_of(self.setup.job.dialect, control, source.data, source.name)
+        if self.job.dialect is None and _names_axes(source.data, self.machine):
+            return AXIS_LIST
+        dialect = dialect_of(self.job.dialect, control, source.data, source.name)
+        if isinstance(dialect, PointList):
+            return dialect
         if not isinstance(dialect, Profile) or dialect.commands is not None or dialect.translator is not None:
             raise ProgramError(
                 f"{dialect.title} programs are not read for machines with "
                 "rotary joints; expected G-code such as "
-                "that of LinuxCNC, Fanuc or Haas",
+                "that of LinuxCNC, Fanuc or Haas, or a list of axis values",
                 code="OLP563",
             )
         return dialect.with_tips()
 
     def read(self, source: Source, unrolling: UnrollOptions) -> tuple[Source, JointPath]:
         """A program and its path. Raises ProgramError with all that is refused."""
-        profile = self.dialect(source)
-        text, program = refusals.read(self.sources, source, self.setup, profile, Options(), unrolling)
+        dialect = self.dialect(source)
+        if isinstance(dialect, PointList) or self.setup is None:
+            return source, self._listed(source.data)
+        text, program = refusals.read(self.sources, source, self.setup, dialect, Options(), unrolling)
         with program.errors():
-            return text, self.path(program)
+            return text, self._path(program, self.setup)
 
-    def again(self, data: bytes, profile: Profile) -> JointPath:
+    def again(self, data: bytes, dialect: Profile | PointList) -> JointPath:
         """The path of a text that was written."""
-        return self.path(read(data, self.setup, profile))
+        if isinstance(dialect, PointList) or self.setup is None:
+            return self._listed(data)
+        return self._path(read(data, self.setup, dialect), self.setup)
 
-    def path(self, program: Program) -> JointPath:
+    def _path(self, program: Program, setup: Setup) -> JointPath:
         """The path of a program that was read with its words."""
         return JointPath.of(
-            program, self.machine.structure, self.errors, self.setup.machine,
-            turned=self.turned, start_deg=self.setup.job.start_deg,
-            tips_from_zero=self.machine.tips_from_zero,
+            program, self.machine.structure, self.errors, setup.machine,
+            turned=self.turned, start_deg=self.job.start_deg, tips_from_zero=self.machine.tips_from_zero,
         )  # fmt: skip
+
+    def _listed(self, data: bytes) -> JointPath:
+        """The path of a list of axis values."""
+        structure = self.machine.structure
+        rows = read_axis_list(data, structure.order, structure.units)
+        tools = {
+            number: vector
+            for number, tool in {**self.machine.tools, **self.job.tools}.items()
+            if (vector := tool.tool_vector_mm) is not None
+        }
+        default = self.machine.default_tool
+        if default is None:
+            tools[-1] = ZERO
+        elif default in tools:
+            tools[-1] = tools[default]
+        return JointPath.of_list(rows, structure, self.errors, tools)
 
     def heads(self) -> dict[str, Any]:
         """The parts of a report on the machine and its calibration."""
@@ -153,6 +184,19 @@ class JointRun:
                 "sha256": self.digest,
             }
         return heads
+
+
+def _columns(machine: JointMachine) -> list[str]:
+    structure = machine.structure
+    return [f"{name}_{unit}" for name, unit in zip(structure.order, structure.units, strict=True)]
+
+
+def _names_axes(data: bytes, machine: JointMachine) -> bool:
+    """Whether the first line that is no comment names an axis of the machine with its unit, as the header of
+    a list does."""
+    rows = [line for line in first_lines(data) if line.strip() and not line.lstrip().startswith("#")]
+    head = rows[0] if rows else ""
+    return any(re.search(rf"(?<!\w){re.escape(name)}(?!\w)", head) for name in _columns(machine))
 
 
 def _unturned(offsets: Mapping[str, WorkOffset]) -> dict[str, WorkOffset]:

@@ -15,7 +15,7 @@ from olp.compensation.joints.planning import JointPlan
 from olp.compensation.style import fewest_decimals
 from olp.core.arrays import Array, Mask
 from olp.core.toolpath import Kind
-from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM
+from olp.core.units import RAD_PER_URAD, UM_PER_MM
 from olp.findings.catalogue import Finding
 from olp.proof.joints import Deviation, JointProof
 from olp.workflows.joints.loaded import JointRun
@@ -35,16 +35,25 @@ _DOES_NOT_PROVE = (
     "what the control does between blocks (blending, following error) and what the process does to the part",
 )
 
+#: What the proof of a list of points says nothing of.
+_BETWEEN = "the path between the rows: the list does not say how the machine goes from one to the next"
+
 
 def last_digits(path: JointPath) -> tuple[float, float]:
     """The coarsest last digits of the corrected program: mm and deg."""
-    joints, dialect = path.motion.structure.joints, path.program.dialect
+    joints, dialect = path.motion.structure.joints.values(), path.program.dialect
     units = {frame.unit_mm for frame in path.program.toolpath.frames} or {1.0}
-    steps = [joints[name].least_increment for name in AXES]
-    linear = [10.0 ** -fewest_decimals(step, u, dialect.inch_decimals) * u for step in steps for u in units]
-    turns = [j.least_increment for j in joints.values() if j.unit == "deg"]
-    rotary = [10.0 ** -max(fewest_decimals(step, 1.0, 0), 1) for step in turns]
-    return max(linear), max(rotary, default=0.0)
+    in_words = path.listed is None
+    linear, rotary = [], []
+    for joint, places in zip(joints, path.places.tolist(), strict=True):
+        if joint.unit == "deg":
+            rotary.append(10.0 ** -(max(places, 1) if in_words else places))
+        elif in_words:
+            step = joint.least_increment
+            linear += [10.0 ** -fewest_decimals(step, u, dialect.inch_decimals) * u for u in units]
+        else:
+            linear.append(10.0**-places)
+    return max(linear, default=0.0), max(rotary, default=0.0)
 
 
 def report_of(
@@ -89,7 +98,7 @@ def report_of(
         "verdict": {"ok": proof.holds},
         "findings": [one.as_dict() for one in findings],
         "proves": list(_PROVES),
-        "does_not_prove": list(_DOES_NOT_PROVE),
+        "does_not_prove": [*_DOES_NOT_PROVE, *([] if path.feed.any() else [_BETWEEN])],
     }
 
 
