@@ -15,6 +15,8 @@ import sys
 import tempfile
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
 from bench_correct import ENVIRONMENT, machine, user_seconds
 from cases.event_lines import KINDS, program
 

@@ -21,6 +21,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
 from bench_correct import ENVIRONMENT, ROOT, TEN_LINES, machine, user_seconds
 from bench_cycles import arcs, holes
 from bench_reports import touches, with_sigmas
