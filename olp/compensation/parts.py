@@ -89,7 +89,9 @@ class Parts:
         last = np.append(head[1:], True)
         own = np.where(last[:, None], elements.end[element], ought - _normals(elements, element, ends))
         # moves along the tool axis keep beside it, and so do those behind it on some controls
-        beside = path.end_mm[rows.move[kept]] != contour.end_mm[move]
+        tool_end, end_mm = path.end_mm[rows.move[kept]], contour.end_mm[move]
+        # an axis that no block has commanded yet is in the same place in both
+        beside = (tool_end != end_mm) & ~np.isnan(end_mm)
         # both axes of the plane, also where one of them happens to be the same
         off = np.flatnonzero(beside.any(axis=1))
         before = np.maximum(np.searchsorted(row, off, "right") - 1, 0)

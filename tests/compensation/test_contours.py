@@ -14,6 +14,7 @@ from olp.core.errors import ProgramError, UsageError
 HEAD = b"G21 G90 G54 G64 P0.001 Q0\nG0 X0 Y0 Z10\nG1 Z0 F600\n"
 #: a rectangle, entered and left
 RECTANGLE = b"G41 D1 X20 Y20\nX100\nY80\nX20\nY20\nG40 G0 X0 Y0\n"
+TWO = {name: {"X_mm": 300.0, "Y_mm": 300.0, "Z_mm": -200.0, "set_by": "true"} for name in ("G54", "G55")}
 PLAY = "[backlash]\nX_um = 6.0\nY_um = 6.0\n"
 #: leaning columns: X and Y follow Z
 LEANING = "[squareness]\nB0Z_urad = 500.0\nA0Z_urad = 500.0\n"
@@ -204,3 +205,18 @@ def test_what_rounding_makes_too_narrow_is_refused_at_its_own_line(
     assert "does not fit" in caught.value.message
     assert caught.value.message.endswith("; have the path of the tool written with --contour path")
     assert olp.correct(text, path, contour="path").report["deviation"]["holds"]
+
+
+def test_a_move_behind_a_tool_change_goes_where_it_should(tmp_path: Path) -> None:
+    """Z is unknown there, and a contour came before: X and Y are those of the block, not of the contour."""
+    recipe = machines.Recipe(
+        controller="fanuc", tools={n: {"Z_mm": 0.0, "radius_mm": 5.0} for n in (1, 2)}, work_offsets=TWO
+    )
+    text = b"G21 G90 G17 G54\nT1 M6\nG0 X0 Y0\nG43 H1 Z10.\nG1 Z0 F600\nG41 D1 X10. Y-5.\nY50.\nX80.\n"
+    text += b"G40 X95.\nG0 Z100.\nT2 M6\n%sG0 X10. Y10.\nG43 H2 Z50.\nM30\n"
+    for offset in (b"", b"G55\n"):
+        data = text % offset
+        assert olp.correct(data, machines.zero_machine(tmp_path, recipe)).data == data
+        lines = olp.correct(data, machines.random_machine(tmp_path, 3, recipe)).data.splitlines()
+        x, y = (float(word[1:]) for word in lines[-3].split()[1:3])
+        assert abs(x - 10) < 0.2 and abs(y - 10) < 0.2
