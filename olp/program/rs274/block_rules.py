@@ -17,9 +17,9 @@ from olp.core.errors import ProgramError
 from olp.core.values import dataclass
 from olp.program.rs274.codes import (
     AXIS_VALUES,
+    COMMON_CYCLES,
     COMPENSATION_OFF,
     CUTTER_COMPENSATION,
-    CYCLES,
     DWELL,
     GROUPS,
     HOMES,
@@ -57,7 +57,7 @@ _CENTRE = _bits("IJK")
 _IN_PLANE = {170: _bits("IJ"), 180: _bits("IK"), 190: _bits("JK")}
 #: Words of their ends.
 _ENDS = {170: _bits("XY"), 180: _bits("XZ"), 190: _bits("YZ")}
-_MOTION = frozenset({0, 10, THREAD, *_ARCS, *CYCLES, *PROBES})
+_MOTION = frozenset({0, 10, THREAD, *_ARCS, *COMMON_CYCLES, *PROBES})
 _MOTIONS = np.array(sorted(_MOTION))
 #: Codes that take the axis words of their block for something else.
 _STATING = np.array(sorted(AXIS_VALUES | HOMES))
@@ -300,11 +300,11 @@ NGC_RULES = BlockRules(
         "I": frozenset({*_ARCS, 50, 51, 52, 760, 870}),
         "J": frozenset({*_ARCS, 50, 51, 52, 760, 870}),
         "K": frozenset({*_ARCS, THREAD, 331, 760, 870}),
-        "L": frozenset({*(CYCLES - {740}), WRITE_OFFSET, 760}) | _m(66, 98),
+        "L": frozenset({*(COMMON_CYCLES - {740}), WRITE_OFFSET, 760}) | _m(66, 98),
         "P": frozenset({*_ARCS, DWELL, WRITE_OFFSET, 640, 50, 51, 52, 760, 820, 840, 860, 880, 890, 740})
         | _SYNCHRONOUS | _m(50, 51, 52, 53, 66, 19, 98) | _OWN_M,
         "Q": frozenset({50, WRITE_OFFSET, 640, 730, 760, 830}) | _m(19, 61) | _OUTPUTS | _OWN_M,
-        "R": frozenset({*_ARCS, *CYCLES, WRITE_OFFSET, 760}) | _m(19),
+        "R": frozenset({*_ARCS, *COMMON_CYCLES, WRITE_OFFSET, 760}) | _m(19),
     },
     groups=(
         *_GROUPS,
@@ -327,7 +327,7 @@ NGC_RULES = BlockRules(
     ),
     needs={
         **dict.fromkeys((520, 920), "XYZABCUVW"),
-        **dict.fromkeys(sorted(CYCLES | PROBES), "XYZABCUVW"),
+        **dict.fromkeys(sorted(COMMON_CYCLES | PROBES), "XYZABCUVW"),
         **dict.fromkeys(sorted(_ARCS), "IJKR"),
         DWELL: "P",
         THREAD: "K",

@@ -5,8 +5,16 @@ The reader and the unroller use the same sets. The profile of a control says whi
 
 from __future__ import annotations
 
-#: Canned cycles: G73, G74, G81 to G89.
-CYCLES = frozenset({730, 740, 810, 820, 830, 840, 850, 860, 890})
+#: Canned cycles that nearly all controls have: G73, G74, G81 to G86, G89.
+COMMON_CYCLES = frozenset({730, 740, 810, 820, 830, 840, 850, 860, 890})
+#: G76, which leaves the bottom of a bore with its tip off the wall.
+FINE_BORE = 760
+#: Bores from below: G87, and G77 of Haas.
+BACK_BORES = frozenset({770, 870})
+#: Bores that the control leaves with an oriented spindle, shifted aside.
+SHIFTED_BORES = frozenset({FINE_BORE, *BACK_BORES})
+#: Canned cycles: those, G73, G74, G81 to G89.
+CYCLES = COMMON_CYCLES | SHIFTED_BORES
 #: Probing moves: G38.2 to G38.5.
 PROBES = frozenset({382, 383, 384, 385})
 #: Splines and NURBS: G5, G5.1, G5.2, G5.3.

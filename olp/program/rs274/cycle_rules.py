@@ -14,9 +14,11 @@ The sequence is that of RS-274/NGC (NIST IR 6556, section 3.5.16) as LinuxCNC ca
   (5114, 5115) and Haas (settings 22, 52). Where it is not known the end points of the hole hold and the
   pecks between them do not.
 
-Grbl has no canned cycles. G76 and G87 (orientation and shift of the spindle) and G88 (an operator moves
-the axes by hand) are refused. So is tapping outside G17 on LinuxCNC: its release 2.9 makes the feed strokes
-of G84 and G74 there along the wrong axes.
+Grbl has no canned cycles. On ISO controls the spindle stops at an angle in G76 and G87 (G77 of Haas), and
+is shifted aside in a direction that a parameter sets. The strokes along the hole are read; the shift is in
+rapids beside the wall. G87 bores from R up to Z, and ends at the initial level. G76 and G87 of other
+controls are refused, and so is G88, in which an operator moves the axes by hand. So is tapping outside G17
+on LinuxCNC: its release 2.9 makes the feed strokes of G84 and G74 there along the wrong axes.
 """
 
 from __future__ import annotations
@@ -34,7 +36,8 @@ class CycleRules:
     - `rises_first`: it leaves a level below R before it goes to the hole.
     - `feeds_home`: G84, G74 and G89 feed up to the end, else to R only.
     - `taps_in_any_plane`: else G84 and G74 go along the wrong axes outside G17.
-    - `taps_by_control`: it synchronises G84 and G74, so that plain moves cannot replace them.
+    - `taps_by_control`: it synchronises G84 and G74, and orients the spindle in G76 and G87, so that plain
+      moves cannot replace them.
     - `peck_by_parameter`: a parameter of the control gives the clearance of pecks.
     - `repeat_words`: these count the holes of a block, the first of them that is there.
     - `stores`: zero holes store the words of the cycle, else they are an error.

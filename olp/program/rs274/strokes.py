@@ -16,6 +16,7 @@ from olp.core.arrays import Array, Index, Mask, any_in_row
 from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES
 from olp.core.values import dataclass
+from olp.program.rs274.codes import BACK_BORES
 from olp.program.rs274.cycle_rules import CycleRules
 
 _TAPPING = frozenset({740, 840})
@@ -58,7 +59,10 @@ _RECIPES: dict[int, _Recipe] = {
     830: _DRILL,
     840: _TAP,
     850: _BORE,
+    760: _BORE_STOP,
+    770: _BORE_STOP,
     860: _BORE_STOP,
+    870: _BORE_STOP,
     890: _BORE_DWELL,
 }
 
@@ -123,10 +127,16 @@ class Drilling:
             ~(np.isfinite(r) & np.isfinite(z)),
             lambda _: _error(f"{name} without a finite R and Z; give both on the first block of the cycle"),
         )
-        yield (
-            r < z,
-            lambda i: _error(f"{name} has R {r[i]:g} below the bottom {z[i]:g}; R must not be below it"),
-        )
+        if self.code in BACK_BORES:
+            yield (
+                r > z,
+                lambda i: _error(f"{name} bores upwards, and its R {r[i]:g} is above its end {z[i]:g}"),
+            )
+        else:
+            yield (
+                r < z,
+                lambda i: _error(f"{name} has R {r[i]:g} below the bottom {z[i]:g}; R must not be below it"),
+            )
         if self.code in _PECKING:
             yield (
                 ~(q > 0),
@@ -189,7 +199,9 @@ def strokes(
     rules, recipe = drilling.rules, _RECIPES[drilling.code]
     first, second, third = PLANES[drilling.plane]
     r, z = drilling.level(drilling.r), drilling.level(drilling.z)
-    clear = np.where(to_r | (r > initial), r, initial)
+    # a bore from below always ends above the part
+    back = drilling.code in BACK_BORES
+    clear = np.where((to_r & (not back)) | (r > initial), r, initial)
     before = np.concatenate(([start[third]], clear[:-1]))
     owner, depth = _depths(drilling)
     full = _PECKING.get(drilling.code, False)

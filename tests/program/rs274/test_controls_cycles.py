@@ -8,6 +8,7 @@ from cases.acceptance import TRUE_ZERO, machine
 from cases.unrolling import fanuc
 
 from olp.core.errors import ProgramError
+from olp.core.toolpath import Kind
 from olp.files.config import load_setup
 from olp.program.program import Program
 from olp.program.registry import DIALECTS, read
@@ -109,3 +110,32 @@ def test_what_okuma_does_not_say_is_refused(body: str, code: str, line: int, why
     with pytest.raises(ProgramError, match=why) as caught:
         okuma(body)
     assert (caught.value.code, caught.value.line) == (code, line)
+
+
+def test_a_fine_bore_has_the_strokes_of_a_bore_with_a_stop(reading) -> None:  # type: ignore[no-untyped-def]
+    for control in ("fanuc", "haas", "mazak", "siemens-iso"):
+        for words in ("X5. Y6. Z-20. R2. {}P200 F60.\nX30.", "X5. Z-20. R2. {}F60.\nG98 Y3."):
+            fine = reading(f"G99 G76 {words.format('Q0.3 ')}\nG80\n", control)
+            assert path(fine) == path(reading(f"G99 G86 {words.format('')}\nG80\n", control))
+
+
+@pytest.mark.parametrize(("control", "code"), [("fanuc", "G87"), ("siemens-iso", "G87"), ("haas", "G77")])
+@pytest.mark.parametrize("mode", ["G98", "G99"])
+def test_a_bore_from_below_is_fed_upwards_and_left_above(control: str, code: str, mode: str, reading) -> None:  # type: ignore[no-untyped-def]
+    """Worked by hand: down to R beside the wall, up to Z in feed, and always back to the initial level."""
+    program = reading(f"{mode} {code} X5. Y6. Z-12. R-35. Q1.5 F40.\nX9.\nG80\n", control)
+    assert path(program) == [
+        [0, 0, 20], [5, 6, 20], [5, 6, -35], [5, 6, -12], [5, 6, 20],
+        [9, 6, 20], [9, 6, -35], [9, 6, -12], [9, 6, 20],
+    ]  # fmt: skip
+    assert np.flatnonzero(program.toolpath.kind == Kind.LINE).tolist() == [3, 7]
+
+
+def test_bores_and_patterns_that_a_control_makes_otherwise_are_refused(reading) -> None:  # type: ignore[no-untyped-def]
+    for body, why in (
+        ("G98 G87 X5. Z-12. R2. F40.\n", "waits for the operator"),
+        ("G81 G98 Z-5. R2. F9. L0\nG70 I20. L6\n", "pattern of holes"),
+        ("G98 G77 X5. Z-12. R2. F40.\n", "R 2 is above its end -12"),
+    ):
+        with pytest.raises(ProgramError, match=why):
+            reading(body, "haas")

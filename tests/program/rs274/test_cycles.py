@@ -14,6 +14,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from olp.core.errors import ProgramError
+from olp.program.rs274.codes import BACK_BORES, COMMON_CYCLES
 from olp.program.rs274.cycle_rules import ISO_CYCLES, NGC_CYCLES, CycleRules
 from olp.program.rs274.cycles import (
     LCNC_CLEARANCE_INCH,
@@ -204,27 +205,20 @@ def test_holes_of_a_block_follow_one_another() -> None:
     assert _spelled(turned, 0) == "r5 r1 f-2 d0.25 r1"
 
 
-_ALL = "G73, G74, G81, G82, G83, G84, G85, G86, G89"
+_ALL = "G73, G74, G76, G77, G81, G82, G83, G84, G85, G86, G87, G89"
 
 
 @pytest.mark.parametrize(
     ("code", "change", "why", "refused"),
     [
         (
-            870, {},
-            f"G87 has no geometry that is known offline; expected one of {_ALL}; "
+            880, {},
+            f"G88 has no geometry that is known offline; expected one of {_ALL}; "
             "write the hole as plain moves",
             "OLP544",
         ),
-        *(
-            (
-                code, {},
-                f"G{code // 10} has no geometry that is known offline; expected one of {_ALL}; "
-                "write the hole as plain moves",
-                "OLP544",
-            )
-            for code in (760, 880)
-        ),
+        (870, {}, "G87 bores upwards, and its R 1 is above its end -2", "OLP531"),
+        (770, {}, "G77 bores upwards, and its R 1 is above its end -2", "OLP531"),
         (890, {"p": -1.0}, "G89 has a negative dwell P -1; expected zero or more", "OLP531"),
         (810, {"plane": 20}, "G81 in plane G20; expected G17, G18 or G19", "OLP531"),
         (
@@ -310,7 +304,7 @@ _level = st.integers(-3000, 3000).map(lambda n: n / 100)
 
 
 @given(
-    code=st.sampled_from(sorted(CODES)),
+    code=st.sampled_from(sorted(CODES - BACK_BORES)),
     plane=st.sampled_from(sorted(PLANES)),
     rules=st.sampled_from([NGC_CYCLES, ISO_CYCLES]),
     retract_to_r=st.booleans(),
@@ -421,8 +415,7 @@ def test_linuxcnc_makes_the_same_strokes(tmp_path: Path, seed: int) -> None:
     position = start
     absolute = True
     for _ in range(rng.randint(1, 5)):
-        # its G76 cuts threads
-        made = CODES - {740, 760}
+        made = COMMON_CYCLES - {740}
         code = rng.choice(sorted(made if plane == 17 else made - {840}))
         absolute = rng.random() < 0.5
         retract_to_r = rng.random() < 0.5

@@ -91,7 +91,10 @@ def test_g92_2_leaves_the_stored_shift_and_g92_1_does_not() -> None:
 
 #: Sets of codes by their names, as the manuals have them.
 NAMED = {
-    "CYCLES": "G73 G74 G81 G82 G83 G84 G85 G86 G89",
+    "CYCLES": "G73 G74 G76 G77 G81 G82 G83 G84 G85 G86 G87 G89",
+    "COMMON_CYCLES": "G73 G74 G81 G82 G83 G84 G85 G86 G89",
+    "SHIFTED_BORES": "G76 G77 G87",
+    "BACK_BORES": "G77 G87",
     "PROBES": "G38.2 G38.3 G38.4 G38.5",
     "SPLINES": "G5 G5.1 G5.2 G5.3",
     "LINEAR": "G0 G1 G2 G3 G33",

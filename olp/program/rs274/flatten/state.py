@@ -44,6 +44,7 @@ from olp.program.rs274.cycles import (
     levels,
 )
 from olp.program.rs274.flatten.expressions import whole
+from olp.program.rs274.profiles.base import Act
 from olp.program.rs274.state import BROKEN_SERIES, NAN, OPEN_RETRACT, State
 
 #: A word with its value; None is a value whose unit is not known (`Language.increments_open`).
@@ -103,7 +104,7 @@ class ProgramState(State):
         codes = self.codes(words)
         motion = codes & MOTIONS
         if motion:
-            return bool(motion & CYCLES)
+            return any(self.profile.codes.get(code) is Act.MOTION for code in motion & CYCLES)
         return self.motion in CYCLES and not codes & NO_AXES and any(letter in "xyz" for letter, _ in words)
 
     def apply(self, words: Sequence[Value]) -> None:

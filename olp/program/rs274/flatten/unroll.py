@@ -20,7 +20,7 @@ import numpy as np
 from olp.core.budget import Budget
 from olp.core.errors import ProgramError
 from olp.program.origin import Origin, Unrolled, Within
-from olp.program.rs274.codes import ABSOLUTE, INCREMENTAL, SPLINES
+from olp.program.rs274.codes import ABSOLUTE, INCREMENTAL, SHIFTED_BORES, SPLINES
 from olp.program.rs274.cycles import Stroke, stroke_budget
 from olp.program.rs274.flatten import radius_angle
 from olp.program.rs274.flatten.expressions import filled, whole
@@ -36,6 +36,8 @@ from olp.program.rs274.profiles.base import Profile
 
 _COMMENT = re.compile(rb"\([^)]*\)")
 _ENDS = frozenset({2, 30})
+#: Cycles for which the control turns the spindle in step, or stops it at an angle.
+_BY_CONTROL = SHIFTED_BORES | {740, 840}
 
 #: bytes of visited blocks, each with some for the visit itself: of a short program, and for each byte
 UNROLLED_BYTES = 12_000_000
@@ -297,9 +299,11 @@ class _Flattener:
             else:
                 self.strokes.spend(count)
             return None
-        if self.cycles.taps_by_control and self.state.codes(active) & {740, 840}:
+        if self.cycles.taps_by_control and self.state.codes(active) & _BY_CONTROL:
             raise ProgramError(
-                "G74 and G84 are synchronised by the control: plain moves cannot replace them", code="OLP544"
+                "G74 and G84 are synchronised by the control, and it stops the spindle of G76 and G87 at an "
+                "angle: plain moves cannot replace them",
+                code="OLP544",
             )
         strokes = self.state.cycle(active, self.peck_clearance)
         self.strokes.spend(len(strokes))

@@ -21,7 +21,7 @@ from olp.program.contours.rules import NGC_CONTOURS, ContourRules
 from olp.program.dialect import Dialect, Row, Support
 from olp.program.rs274.block_rules import OTHER_RULES, BlockRules
 from olp.program.rs274.block_text import BlockText
-from olp.program.rs274.codes import COMPENSATION_OFF, CUTTER_COMPENSATION, CYCLES, PROBES
+from olp.program.rs274.codes import COMMON_CYCLES, COMPENSATION_OFF, CUTTER_COMPENSATION, PROBES
 from olp.program.rs274.commands import Commands
 from olp.program.rs274.cycle_rules import CycleRules
 from olp.program.rs274.flatten.language import Language
@@ -285,7 +285,7 @@ REFUSALS: Mapping[int, str] = {
 def g_codes(*, unchanged: set[int], extra: dict[int, Act], without: Set[int] = frozenset()) -> dict[int, Act]:
     """The table of a control: the usual codes, those that stay `unchanged`, those with an `extra` or another
     act, `without` those that it does not have."""
-    codes = dict.fromkeys((0, 10, 20, 30, 800, *CYCLES, *PROBES), Act.MOTION)
+    codes = dict.fromkeys((0, 10, 20, 30, 800, *COMMON_CYCLES, *PROBES), Act.MOTION)
     codes |= dict.fromkeys((170, 180, 190), Act.PLANE)
     codes |= dict.fromkeys((900, 910), Act.DISTANCE)
     codes |= dict.fromkeys((930, 940, 950), Act.FEED)

@@ -9,13 +9,21 @@ from olp.program.rs274.profiles.base import Act, g_codes
 from olp.program.rs274.profiles.iso import ISO, ISO_EXTRA, ISO_UNCHANGED
 
 _OFFSETS = dict.fromkeys((1540, *range(1100, 1300, 10)), Act.EVENT)
+#: G77 bores from below, and with G87 an operator leaves the bore; G70 to G72 drill patterns of holes.
+_CYCLES = {770: Act.MOTION, **dict.fromkeys((700, 710, 720, 870), Act.REFUSE)}
+_PATTERN = "drills a pattern of holes inside the control; post each hole with its place"
 
 DIALECT = replace(
     ISO,
     name="haas",
     title="Haas mills",
-    codes=g_codes(unchanged={*ISO_UNCHANGED, 1030, 1870}, extra={**ISO_EXTRA, **_OFFSETS}),
-    refusals={**ISO.refusals, 921: "G92.1 is not a code of this control"},
+    codes=g_codes(unchanged={*ISO_UNCHANGED, 1030, 1870}, extra={**ISO_EXTRA, **_OFFSETS, **_CYCLES}),
+    refusals={
+        **ISO.refusals,
+        921: "G92.1 is not a code of this control",
+        870: "G87 waits for the operator inside the cycle",
+        **{code: f"G{code // 10} {_PATTERN}" for code in (700, 710, 720)},
+    },
     harmless_m=ISO.harmless_m | {10, 11, 29, 31, 33, 34, 35, 41, 42, 59, 69, 83, 84, 88, 89},
     tip_codes=frozenset({2340}),
     cycles=HAAS_CYCLES,

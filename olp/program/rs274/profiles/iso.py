@@ -13,8 +13,9 @@ from olp.program.rs274.profiles.base import ISO_M, REFUSALS, Act, Profile
 
 #: G codes without effect on the path on these controls.
 ISO_UNCHANGED = frozenset({80, 90, 150, 501, 620, 630, 670, 691, 131, 231, 250})
-#: G44, G54.1, rotation and scaling; G92.1 needs offsets that are not known off line.
+#: G44, G54.1, rotation and scaling, fine and back bores; G92.1 needs offsets that are not known off line.
 ISO_EXTRA = {
+    **dict.fromkeys((760, 870), Act.MOTION),
     **dict.fromkeys((440, 541, 500, 510, 680, 690), Act.EVENT),
     **dict.fromkeys((411, 421, 921), Act.REFUSE),
 }

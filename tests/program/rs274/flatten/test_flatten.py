@@ -247,9 +247,11 @@ def test_a_frame_or_length_that_begins_in_a_block_leaves_its_own_words_known() -
         ("G81 Z-1 R1. F1.", "decimal point"),
         ("G83 Z-1. R1. Q1. F1.", "peck_clearance"),
         ("G84 Z-1. R1. F1.", "synchronised"),
+        ("G76 Z-1. R1. Q.5 F1.", "at an angle"),
+        ("G87 Z1. R-1. Q.5 F1.", "at an angle"),
         ("G81 Z-1. F1.", "no R word"),
         ("G81 A5. Z-1. R1. F1.", "moves A"),
-        ("G87 Z-1. R1. F1.\nX#5001", "position of X"),
+        ("G88 Z-1. R1. F1.\nX#5001", "position of X"),
     ],
 )
 def test_cycles_that_cannot_be_written_out(block: str, message: str) -> None:

@@ -383,8 +383,8 @@ _NO_POINT = (
          "it goes to its place is not known; leave the place out"),
         ("G83 X2. Z-1. R1. Q2", "OLP541", _NO_POINT.format("Q")),
         *((f"G{code} X2. Z-1. R1.", "OLP544",
-           "G74 and G84 are synchronised by the control: plain moves cannot replace them") for code in (74,
-           84)),
+           "G74 and G84 are synchronised by the control, and it stops the spindle of G76 and G87 at an "
+           "angle: plain moves cannot replace them") for code in (74, 76, 84, 87)),
     ],
 )  # fmt: skip
 def test_cycles_of_fanuc_that_are_refused(block: str, code: str, message: str) -> None:
