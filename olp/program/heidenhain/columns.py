@@ -18,6 +18,7 @@ import numpy.typing as npt
 from olp.core.arrays import Array, Index, Mask
 from olp.core.progress import Progress
 from olp.core.values import dataclass
+from olp.program.heidenhain.statements import OPERANDS
 from olp.program.rs274.block_text import BlockText
 from olp.program.rs274.lexer import CHUNK, WordChunk, lex
 
@@ -137,6 +138,7 @@ def read(text: Bytes, offset: int = 0, first_line: int = 0) -> Blocks:
     starts = np.concatenate(([0], ends[:-1] + 1))
     goes_on = _continued(work, starts, ends)
     _blank(work, *_comments(work, starts, ends))
+    _without_operands(work)
     block, content = _named(work, starts, ends)
     block[1:][goes_on[:-1]] = Block.MORE
     motion = (block >= Block.LINE) & (block <= Block.POLE)
@@ -170,6 +172,14 @@ def _comments(work: Bytes, starts: Index, ends: Index) -> tuple[Index, Index]:
     first = np.ones(len(marks), bool)
     first[1:] = line[1:] != line[:-1]
     return marks[first], ends[line[first]]
+
+
+def _without_operands(work: Bytes) -> None:
+    """Blank the words that belong to an M function: M118 Z5 is no move, M103 F20 no feed."""
+    text = work.tobytes()
+    if any(name in text for name in (b"M101", b"M103", b"M118", b"M120")):
+        for match in OPERANDS.finditer(text):
+            work[match.start(2) : match.end(2)] = 32
 
 
 def _blank(work: Bytes, begin: Index, end: Index) -> None:

@@ -11,6 +11,12 @@ _NUMBER = re.compile(rb"[ \t]*(?P<mark>/?)[ \t]*\d*[ \t]*(?P<late>/?)[ \t]*")
 _QUOTED = re.compile(rb'"[^"]*"')
 _CYCLE = re.compile(rb"CYCLE?[ \t]+DEF[ \t]*(\d+)(?:\.(\d+))?[ \t]*(.*)", re.I | re.S)
 _VALUE = re.compile(rb"Q(\d+)[ \t]*=[ \t]*([-+]?(?:Q[LR]?\d+|\d*\.?\d+|\d+\.))", re.I)
+#: M functions with words of their own, which move no axis: group 1 is the function
+OPERANDS = re.compile(
+    rb"(?<![A-Z])(M(?:118(?=[ \t]+[XYZABCUVW][ \t]*[-+]?[Q\d.])|120(?=[ \t]*LA)|103(?=[ \t]*F)|"
+    rb"101(?=[ \t]*BT)))"
+    rb"((?:[ \t]*(?:[XYZABCUVWF]|LA|BT)[ \t]*[-+]?(?:Q[LR]?)?[\d.]+)+)"
+)
 _WORD = re.compile(rb"(I?)([XYZABCUVW])[ \t]*([-+]?(?:\d+\.?\d*|\.\d+))", re.I)
 
 

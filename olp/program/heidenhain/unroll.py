@@ -45,7 +45,7 @@ _COMPARED: Mapping[bytes, Callable[[float, float], bool]] = {
 }  # fmt: skip
 _UNKNOWN = re.compile(rb"FN[ \t]*18[ \t]*:.*?\b(Q[LR]?\d+)[ \t]*=", re.I | re.S)
 #: a parameter in a block, with its sign, where it is no name of a value
-_USED = re.compile(rb"([-+]?)(Q[LR]?\d+)(?![\d]|[ \t]*=)", re.I)
+_USED = re.compile(rb"((?:[-+][ \t]*)?)(Q[LR]?\d+)(?![\d]|[ \t]*=)", re.I)
 _ENDS = re.compile(rb"(?:L\b.*\b)?M0*(?:2|30)\b", re.I | re.S)
 #: the parameter that a TOOL CALL sets to the radius of the tool
 _RADIUS = "Q108"

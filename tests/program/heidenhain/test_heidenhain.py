@@ -107,6 +107,22 @@ def test_fmax_holds_in_its_block_alone(bent: Path) -> None:
     assert moves.statements.feed_mm_s.tolist() == pytest.approx(feeds.tolist())
 
 
+def test_words_of_functions_are_no_moves_and_no_feeds(bent: Path) -> None:
+    text = (
+        HEAD
+        + "L X1 M118 Z+7 Y1\nL X2 M103 F20\nL X3 M120 LA5\nL X4 M101 BT3 M8\nL Z1 M118\nL Y2 F90 M118 X1\n"
+    )
+    assert ends(text, bent)[1:].tolist() == pytest.approx(
+        np.array([[1, 0, 5], [2, 0, 5], [3, 0, 5], [4, 0, 5], [4, 0, 1], [4, 2, 1]])
+    )
+    statements = program(text, bent).statements
+    assert statements is not None
+    assert statements.feed_mm_s[1:].tolist() == pytest.approx([500 / 60] * 5 + [1.5])
+    # they stay where they are, also where the block is split
+    corrected = olp.correct((HEAD + "L X+400 Y+300 M118 Z+7.5 F90\n").encode(), bent).data
+    assert corrected.count(b"M118 Z+7.5 F90") == corrected.count(b"M118") == 1
+
+
 def test_feeds_of_inch_programs_count_in_tenths(bent: Path) -> None:
     moves = program("BEGIN PGM A INCH\nL X1 Y1 Z1 F100\n", bent)
     assert moves.statements is not None
@@ -404,6 +420,10 @@ def test_programs_beside_are_called(bent: Path, tmp_path: Path) -> None:
     (tmp_path / "sub.h").write_text("BEGIN PGM SUB MM\nL X+Q1 Y0 Z0 F50\nQ2=7\nEND PGM SUB MM\n")
     text = olp.flatten(tmp_path / "MAIN.H", bent)
     assert text.split(b"\n")[1:3] == [b"L X+5 Y0 Z0 F50", b"L Y+7"]
+
+
+def test_a_sign_may_stand_apart_from_its_parameter() -> None:
+    assert unrolled("Q1=2.5\nQ2=-4\nL X+ Q1 Y -Q2 Z- Q2\n")[0].split() == ["L", "X+2.5", "Y", "+4", "Z+4"]
 
 
 def test_a_parameter_of_the_cycle_in_force_takes_its_new_value() -> None:

@@ -111,6 +111,36 @@ def places(text: str) -> list[tuple[float, float]]:
     return [(float(b[1][1:]), float(b[2][1:])) for b in blocks]
 
 
+def test_grids_of_holes_and_their_rims() -> None:
+    def holes(pattern: str) -> list[tuple[float, float]]:
+        return places(CYCLE + f"PATTERN DEF {pattern}\nCYCL CALL PAT FMAX\n")
+
+    grid = "PAT1 (X+10 Y+20 DX+8 DY+5 NUMX3 NUMY2 ROT{} ROTX{} ROTY{} Z+0)"
+    assert holes(grid.format("+0", "+0", "+0")) == [
+        (10, 20),
+        (18, 20),
+        (26, 20),
+        (26, 25),
+        (18, 25),
+        (10, 25),
+    ]
+    # the whole is turned; one direction alone is
+    assert holes(grid.format("+90", "+0", "+0"))[2:4] == [(10, 36), (5, 36)]
+    assert holes(grid.format("+0", "+90", "+0"))[2:4] == [(10, 36), (10, 41)]
+    assert holes(grid.format("+0", "+0", "+90"))[2:4] == [(26, 20), (21, 20)]
+    rim = holes("FRAME1 (X+0 Y+0 DX+1 DY+1 NUMX4 NUMY3 ROT+0 ROTX+0 ROTY+0 Z+0)")
+    assert len(rim) == 10
+    assert not {(1, 1), (2, 1)} & set(rim)
+
+
+def test_words_of_functions_stay_theirs_in_what_is_written_out() -> None:
+    text = "L X+10 M118 Z5\nRND R2 F90\nL Y+10 M103 F20\n"
+    plain = "L X+8 Y+0 M118 Z5\nCC X+8 Y+2\nC X+10 Y+2 DR+ F90\nL X+10 Y+10 F500 M103 F20\n"
+    assert [sorted(b.split()) for b in flat(text).split("\n")] == [
+        sorted(b.split()) for b in plain.split("\n")
+    ]
+
+
 def test_patterns_of_holes() -> None:
     surface = "Q200=2 Q203=+1 Q204=30 Q301=0\n"
     circle = "CYCL DEF 220 Q216=+50 Q217=+10 Q244=80 Q245=+0 Q246=+360 Q247=+0 Q241=4 "
@@ -155,7 +185,7 @@ def test_a_pattern_definition_adds_to_the_surface_and_keeps_the_height() -> None
         ("APPR LCT X+1 Y+1 R5 R0\nL X+20\n", 3, "inside the arc"),
         ("APPR LT X+9 Y+9 R0\nL X+20\n", 3, "needs LEN"),
         ("CYCL CALL PAT\nLP\n", 3, "no PATTERN DEF"),
-        ("PATTERN DEF PAT1 (X+1 Y+1 DX+1 DY+1)\n", 3, "not read"),
+        ("PATTERN DEF PAT1 (X+1 Y+1 DX+1 DY+1)\n", 3, "0 holes"),
         ("CYCL CALL POS X+1 Y+1 Z+0\n", 3, "no cycle with Q203"), ("L X+5 X+6\nLP\n", 3, "states X twice"),
         ("CYCL DEF 221 Q225=+1\n", 3, "has 0 holes"),
         ("CYCL DEF 10.0\nCYCL DEF 10.1 ROT+5\n/L X1\n", 5, "block delete"),

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 from olp.core.errors import ProgramError
 from olp.core.values import dataclass
-from olp.program.heidenhain.statements import without_comment
+from olp.program.heidenhain.statements import OPERANDS, without_comment
 
 _NUMBER = rb"[-+]?(?:\d+\.?\d*|\.\d+)"
 _HEAD = re.compile(rb"[ \t]*/?[ \t]*\d*[ \t]*/?[ \t]*")
@@ -48,7 +48,7 @@ class Block:
     @property
     def feed(self) -> bytes:
         """The words of the feed, empty without one."""
-        match = _FEED.search(self.rest)
+        match = _FEED.search(OPERANDS.sub(b"", self.rest))
         return b"" if match is None else match[0]
 
     def stated(self, letters: bytes) -> bool:
@@ -68,6 +68,8 @@ def block_of(text: bytes, line: int) -> Block | None:
         return None
     name = b"L" if match is None else b" ".join(match["name"].split())
     rest = upper if match is None else upper[match.end() :]
+    own = [match[0] for match in OPERANDS.finditer(rest)]
+    rest = OPERANDS.sub(b" ", rest)
     words: dict[bytes, tuple[bool, float]] = {}
     for step, letter, number in _WORD.findall(rest):
         if letter in words:
@@ -91,8 +93,9 @@ def block_of(text: bytes, line: int) -> Block | None:
             raise ProgramError(f"{name.decode()} has no size; give it", line=line, code="OLP516")
         sizes, rest = {b"R": float(size[1])}, rest[size.end() :]
     end = text[len(body.rstrip()) :]
+    rest = b" ".join([*rest.split(), *own])
     return Block(
-        name, words, 0 if turn is None else 1 if turn[1] == b"+" else -1, sizes, b" ".join(rest.split()),
+        name, words, 0 if turn is None else 1 if turn[1] == b"+" else -1, sizes, rest,
         body[: head.end()], end, line,
     )  # fmt: skip
 

@@ -78,11 +78,31 @@ def _group(name: bytes, v: Mapping[bytes, float], line: int) -> list[Hole]:
         count = _count(v.get(b"NUM", 0.0), line)
         step = 360.0 / count if name == b"CIRC" else v.get(b"STEP", 0.0)
         return _circle(x, y, v.get(b"D", 0.0) / 2, v.get(b"START", 0.0), step, count, z)
+    if name in (b"PAT", b"FRAME"):
+        return _grid(v, line, rim=name == b"FRAME")
     raise ProgramError(
-        f"{name.decode()} of PATTERN DEF is not read; state its holes with POS, ROW or CIRC",
+        f"{name.decode()} of PATTERN DEF is not read; state its holes with POS, ROW, CIRC or PAT",
         line=line,
         code="OLP512",
     )
+
+
+def _grid(v: Mapping[bytes, float], line: int, *, rim: bool) -> list[Hole]:
+    """Rows of a grid, each back as the one before went; of a frame its rim alone. ROT turns the whole, ROTX
+    and ROTY one of its directions."""
+    columns, rows = _count(v.get(b"NUMX", 0.0), line), _count(v.get(b"NUMY", 0.0), line)
+    _count(float(columns * rows), line)
+    along, up = (math.radians(v.get(b"ROT", 0.0) + v.get(key, 0.0)) for key in (b"ROTX", b"ROTY"))
+    dx, dy = v.get(b"DX", 0.0), v.get(b"DY", 0.0)
+    holes = []
+    for row in range(rows):
+        for k in range(columns):
+            column = k if row % 2 == 0 else columns - 1 - k
+            if rim and 0 < row < rows - 1 and 0 < column < columns - 1:
+                continue
+            x, y, z = _turned(v[b"X"], v[b"Y"], column * dx, 0.0, along, v.get(b"Z", 0.0))
+            holes.append(_turned(x, y, 0.0, row * dy, up, z))
+    return holes
 
 
 def _circle(x: float, y: float, radius: float, start: float, step: float, count: int, z: float) -> list[Hole]:
