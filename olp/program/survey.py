@@ -324,9 +324,15 @@ class _Survey:
         return "".join(c if c.isprintable() else "?" for c in shown)
 
 
+#: brackets of a call, with those inside of them
+_BRACKETS = rb"\((?:[^()\n]|\([^()\n]*\))*\)"
+#: what a word of a name has behind it: a value, or the brackets of a call
+_BEHIND = rb"(?:[ \t]*(?:=[ \t]*[^\s(]*(?:" + _BRACKETS + rb")?|" + _BRACKETS + rb"))?"
+
+
 def _form(word: str) -> re.Pattern[bytes]:
     """How a word is written, such as G068 for G68; of a letter alone with any number."""
-    number = rb"0*" + re.escape(word[1:].encode()) + rb"(?![\d.])"
+    number = rb"0*" + re.escape(word[1:].encode()) + rb"(?![\d.])" + _BEHIND
     return re.compile(rb"(?i)" + word[:1].encode() + (number if word[1:] else _NUMBER))
 
 

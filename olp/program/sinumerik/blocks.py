@@ -29,7 +29,7 @@ _OPERAND = re.compile(
     rb"(?:\d+\.?\d*|\.\d+)(?:EX[+-]?\d+)?|'[HB][0-9A-F]+'|\"[^\"]*\"|[$A-Z_][$A-Z0-9_]*", re.IGNORECASE
 )
 _OPERATOR = re.compile(
-    rb"<<|<>|==|<=|>=|[-+*/<>]|(?:DIV|MOD|AND|OR|XOR|B_AND|B_OR|B_XOR)(?![A-Z0-9_])", re.IGNORECASE
+    rb"<<|<>|==|<=|>=|[-+*/<>:]|(?:DIV|MOD|AND|OR|XOR|B_AND|B_OR|B_XOR)(?![A-Z0-9_])", re.IGNORECASE
 )
 _SIGN = re.compile(rb"(?:[-+]|(?:NOT|B_NOT)(?![A-Z0-9_]))[ \t]*", re.IGNORECASE)
 

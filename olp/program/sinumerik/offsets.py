@@ -14,6 +14,10 @@ from olp.program.sinumerik.refusals import refused, unroll
 
 _INDEX = re.compile(r"\$P_UIFR\[(\d+)(?:,([XYZ]),TR)?\]")
 _CTRANS = re.compile(rb"CTRANS[ \t]*\(([^()]*)\)", re.IGNORECASE)
+#: a rotation by nothing, which some posts put behind the shift
+_UNTURNED = re.compile(
+    rb"[ \t]*:[ \t]*CROT[ \t]*\([ \t]*(?:[XYZ][ \t]*,[ \t]*[-+]?0*\.?0*[ \t]*,?[ \t]*)*\)", re.IGNORECASE
+)
 #: index from which names are G505 and on
 _FIRST_FURTHER = 5
 #: indices, up to that of G599
@@ -22,7 +26,9 @@ _MOST = 100
 
 def written_offset(code: bytes, piece: Piece) -> WriteOffset:
     """What an assignment writes. Raises ProgramError, without a line, for other than shifts of X, Y and Z."""
-    found, shift = _INDEX.fullmatch(piece.name), _CTRANS.fullmatch(code, piece.value, piece.value_end)
+    unturned = _UNTURNED.search(code, piece.value, piece.value_end)
+    end = piece.value_end if unturned is None or unturned.end() < piece.value_end else unturned.start()
+    found, shift = _INDEX.fullmatch(piece.name), _CTRANS.fullmatch(code, piece.value, end)
     if found is None or not 1 <= int(found[1]) < _MOST or bool(found[2]) == bool(shift):
         raise refused("$P_UIFR")
     values: dict[str, float] = {axis: 0.0 for axis in AXES if shift}

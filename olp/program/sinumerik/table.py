@@ -28,6 +28,7 @@ _WITHOUT_PATH = (
     "DYNSEMIFIN", "DYNFINISH", "DYNPREC", "CTOLOF", "RTLION", "RTLIOF", "OVRRAP", "OVR", "SPOS",
     "SPOSA", "LIMS", "ACC", "FA", "FB", "FL", "FZ", "FD", "SVC", "CTOL", "OTOL", "ATOL", "STOLF",
     "ACCLIM", "CPRECON", "CPRECOF", "CUTMOD", "NEWCONF", "TANGOF", "WAITM",
+    "ORISON", "ORISOF",
 )  # fmt: skip
 #: Statements that stay as they are, and why.
 HARMLESS: Mapping[str, str] = {

@@ -170,6 +170,11 @@ def test_arrays_take_the_values_of_their_definition() -> None:
     assert unrolled(HEAD + text).endswith("X=1.5 Y=8 Z=0\n")
 
 
+def test_the_last_index_of_an_array_counts_first() -> None:
+    text = "DEF REAL P[2,3]=SET(1, 2, 3, 4)\nP[1,2]=9\nX=P[0,2] Y=P[1,0] Z=P[1,2]\nX=P[1,1]\n"
+    assert unrolled(HEAD + text).endswith("X=3 Y=4 Z=9\nX=0\n")
+
+
 def test_subprograms_of_an_archive_have_the_lines_of_the_file() -> None:
     text = "%_N_A_MPF\n;$PATH=/_N_A\nBB1\nM30\n%_N_BB1_SPF\nG0 X1\nRET\n"
     done = flatten(text.encode(), SINUMERIK)

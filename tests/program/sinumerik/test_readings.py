@@ -11,10 +11,11 @@ import pytest
 from cases.acceptance import TRUE_ZERO, machine
 
 import olp
-from olp.core.errors import ProgramError
+from olp.core.errors import ProgramError, Refused
 from olp.core.machine import Setup
 from olp.core.toolpath import Flag, Kind
 from olp.files.config import load_setup
+from olp.program import survey
 from olp.program.feeds.stated import programmed
 from olp.program.program import Program
 from olp.program.registry import DIALECTS, dialect_of, read
@@ -106,6 +107,7 @@ ENDS: dict[str, tuple[float, float, float]] = {
     "ROT Z90\nG0 X1 Y0 Z0\nG0 SUPA X5 Y6": (5, 6, 0),
     # settable offsets that the program writes
     "$P_UIFR[1]=CTRANS(X,10,Y,20)\nG54 G0 X0 Y0 Z0": (10, 20, 0),
+    "$P_UIFR[6]=CTRANS(X,10,Y,20) : CROT(X,0,Z,0.0)\nG506 G0 X0 Y0 Z0": (10, 20, 0),
     "$P_UIFR[5,Y,TR]=-7.5\nG505 G0 X0 Y0 Z0": (1000, -7.5, 0),
     # other axes, with functions around their numbers
     ZERO + "X1 C=DC(30) B=ACP(5)": (1, 0, 0),
@@ -151,6 +153,7 @@ REFUSED: dict[str, tuple[str, str]] = {
     "G70\n$P_UIFR[2]=CTRANS(X,1)": ("in which unit", "OLP518"),
     "$P_UIFR[2,X,TR]=1": ("is not defined", "OLP520"),
     "$P_UIFR[2]=CROT(Z,1)": ("as shifts", "OLP512"),
+    "$P_UIFR[2]=CTRANS(X,1):CROT(Z,0.5)": ("as shifts", "OLP512"),
     "$P_UIFR[2]=CTRANS(A,1)": ("as shifts", "OLP512"),
     "$TC_DP3[1,1]=100": ("variable of the control", "OLP512"),
     "G21": ("not known to the sinumerik profile", "OLP512"),
@@ -206,6 +209,13 @@ def test_all_refusals_of_a_text_are_told_together(setup: Setup) -> None:
     with pytest.raises(ProgramError) as caught:
         program("TRAORI\nX1\nR1=2\nM30\nR3=4", setup)
     assert [e.line for e in (caught.value, *caught.value.others)] == [1, 3]
+
+
+def test_a_call_that_is_refused_is_one_reason_with_its_arguments(setup: Setup) -> None:
+    text = b"G0 X0 Y0 Z5\nPOCKET3(50,0,2,-10,MAX(1,2))\nG1 X1 A3=0 F100\nCYCLE61(50,,2)\n"
+    with pytest.raises(Refused) as caught:
+        survey.read_all(text, setup, SINUMERIK)
+    assert [reason.line for reason in caught.value.reasons] == [2, 3, 4]
 
 
 def test_a_hole_goes_down_behind_the_motion_of_its_block(setup: Setup) -> None:

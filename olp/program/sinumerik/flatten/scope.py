@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 import re
 from collections.abc import Iterator, Mapping, MutableMapping
 
@@ -63,11 +65,14 @@ class Scope(MutableMapping[str, Value]):
             if name[2] is None:
                 self._own[own] = empty if name[3] is None else evaluate(name[3], self)
                 continue
-            size = int(float(evaluate(name[2], self)))
-            if not 0 < size <= _MOST_ELEMENTS:
+            sizes = [int(float(evaluate(part, self))) for part in _split(name[2])]
+            if min(sizes) <= 0 or math.prod(sizes) > _MOST_ELEMENTS:
                 raise ProgramError(f"the array {own} has a size that is not run", code="OLP542")
             values = [] if name[3] is None else self._set(own, name[3])
-            self._own |= {indexed(own, [i]): values[i] if i < len(values) else empty for i in range(size)}
+            # the last index counts first
+            places = itertools.product(*(range(size) for size in sizes))
+            filled = itertools.chain(values, itertools.repeat(empty))
+            self._own |= {indexed(own, [*place]): value for place, value in zip(places, filled, strict=False)}
 
     def _set(self, name: str, text: str) -> list[Value]:
         """The values of an array from its begin on."""
