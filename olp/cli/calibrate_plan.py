@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+from typing import Any, Literal
 
 import click
 
@@ -34,7 +35,21 @@ METHODS = ("lines", "tracker", "lines-and-tracker", "pods", "multilateration")
     help="Residual error that a correction may leave: rms length over the box, best-fit frame.",
 )  # fmt: skip
 @click.option("--instrument", type=click.Choice(METHODS), help="Default: the quickest that reaches it.")
-@click.option("--points", type=Count(min=8), help="Number of points. Default: the fewest.")
+@click.option(
+    "--points", type=Count(min=8), help="Number of points, with --next of a station. Default: the fewest."
+)
+@click.option(
+    "--next", "next_", type=Count(min=1), metavar="N",
+    help="The N points of a tracker, or stations of lengths, that help most now.",
+)  # fmt: skip
+@click.option(
+    "--calibration", metavar="CALIBRATION",
+    help="What was measured so far, for --next: a calibration with its covariance. Default: nothing.",
+)  # fmt: skip
+@click.option(
+    "--criterion", type=click.Choice(("A", "D")), default="A", show_default=True,
+    help="For --next: A lowers the mean square of the error in the box, D the volume of all uncertainty.",
+)  # fmt: skip
 @click.option(
     "--box", type=(MM, MM, MM, MM, MM, MM), metavar="X X Y Y Z Z",
     help="Axis positions between which to measure. Default: the travel less 1 % at each end.",
@@ -60,6 +75,9 @@ def command(
     uncertainty_um: float,
     instrument: str | None,
     points: int | None,
+    next_: int | None,
+    calibration: str | None,
+    criterion: Literal["A", "D"],
     box: tuple[float, float, float, float, float, float] | None,
     reflector: tuple[tuple[float, float, float], ...],
     sigma_um: float | None,
@@ -80,30 +98,45 @@ def command(
     Compares methods: the time they take, and the residual error of a correction made from them, by the
     covariance of the adjustment. FOLDER gets measurements.toml, CSV files whose readings are still empty, and
     a program for each run of the machine: machine coordinates, a dwell at each point.
+
+    With --next it names single readings, each chosen by what the earlier ones leave unknown. Measure them,
+    then fit all readings together, or refine the calibration with them, and ask again.
     """
     from pathlib import Path
 
     from olp.files.write import write_files
+    from olp.workflows.calibrate_next import NEXT, plan_next
     from olp.workflows.calibrate_plan import INSTRUMENTS, plan_measurements
 
     if output is not None and not Path(output).is_dir():
         raise UsageError("is not a folder; create it first", file=output)
-    plan = plan_measurements(
-        machine,
-        uncertainty_um=uncertainty_um,
-        instrument=next((name for name in INSTRUMENTS if name == instrument), None),
-        box_mm=None if box is None else (box[0:2], box[2:4], box[4:6]),
-        tools=reflector,
-        sigma_um=sigma_um,
-        periods_mm=(period_x, period_y, period_z),
-        dwell_s=dwell_s,
-        settle_s=settle_s,
-        points=points,
-    )
+    periods_mm = (period_x, period_y, period_z)
+    shared: dict[str, Any] = {
+        "uncertainty_um": uncertainty_um,
+        "box_mm": None if box is None else (box[0:2], box[2:4], box[4:6]),
+        "tools": reflector,
+        "sigma_um": sigma_um,
+        "dwell_s": dwell_s,
+        "settle_s": settle_s,
+        "points": points,
+    }
+    if next_ is None:
+        if calibration is not None or criterion != "A":
+            raise UsageError("--calibration and --criterion are for --next N; add it")
+        known = next((name for name in INSTRUMENTS if name == instrument), None)
+        plan = plan_measurements(machine, instrument=known, periods_mm=periods_mm, **shared)
+    else:
+        if any(periods_mm) or instrument not in (None, *NEXT):
+            raise UsageError(f"--next chooses for {' or '.join(NEXT)}, and without --period-x, -y and -z")
+        offered = next((name for name in NEXT if name == instrument), None)
+        plan = plan_next(
+            machine, next_, instrument=offered, calibration=calibration, criterion=criterion, **shared
+        )
     if output is not None:
+        inputs = (*plan.inputs, *files_of(machine))
         files = plan.files(output, date)
-        refuse_early([str(name) for name in files], files_of(machine), force=force)
-        write_files(files, force=force, inputs=files_of(machine))
+        refuse_early([str(name) for name in files], inputs, force=force)
+        write_files(files, force=force, inputs=inputs)
         diagnostic(f"wrote {len(files)} files to {output}")
     put_result(plan, as_json=as_json, quiet=quiet)
     exit_for(plan.findings, fail_on)

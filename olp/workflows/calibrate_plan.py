@@ -108,14 +108,9 @@ def plan_measurements(
     setup = session.setup
     described = setup.machine
     described.motion_limits()
-    box = _box(described, box_mm)
-    reflectors = list(tools) or _reflectors(described)
-    tool_vectors = [tool.tool_vector_mm for tool in described.tools.values()]
-    judged = list(
-        dict.fromkeys(
-            [reflectors[0], *(tool_vector for tool_vector in tool_vectors if tool_vector is not None)]
-        )
-    )
+    box = box_of(described, box_mm)
+    reflectors = list(tools) or reflectors_of(described)
+    judged = judged_of(described, reflectors)
     sigma = TRACKER if sigma_um is None else sigma_um * MM_PER_UM
     names = INSTRUMENTS if instrument is None else (instrument,)
     methods: list[Method] = []
@@ -123,19 +118,32 @@ def plan_measurements(
         dwell = DWELL_S[name] if dwell_s is None else dwell_s
         for title, planned in _candidates(name, described.name, box, reflectors, sigma, periods_mm, points):
             prediction = predict(planned, described.chain, box, judged)
-            passes = tuple(passes_of(planned.measurements, described, dwell + settle_s, box))
-            seconds = sum(seconds_of(run, described) for run in passes)
-            by_hand = set_up_min(planned.measurements)
-            methods.append(Method(name, title, planned, prediction, passes, seconds, by_hand))
-    good = [m for m in methods if m.prediction.rms_mm <= uncertainty_um * MM_PER_UM]
-    chosen = min(good, key=lambda m: m.hours) if good else min(methods, key=lambda m: m.prediction.rms_mm)
+            methods.append(timed(name, title, planned, prediction, described, dwell + settle_s, box))
+    chosen = quickest(methods, uncertainty_um)
     used = (DWELL_S[chosen.instrument] if dwell_s is None else dwell_s) + settle_s
     report = _report(described, box, chosen, methods, uncertainty_um, reflectors, judged)
-    findings = tuple(_findings(chosen, uncertainty_um))
+    findings = tuple(findings_of_plan(chosen, uncertainty_um))
     return MeasurementPlan(setup, chosen, tuple(methods), report, findings, used, session.sources.files)
 
 
-def _box(machine: Machine, box_mm: Sequence[tuple[float, float]] | None) -> Array:
+def timed(
+    name: Instrument, title: str, planned: Planned, prediction: Prediction, machine: Machine, wait_s: float,
+    box: Array,
+) -> Method:  # fmt: skip
+    """A method with its runs of the machine and their time. Raises ConfigError without limits of motion."""
+    passes = tuple(passes_of(planned.measurements, machine, wait_s, box))
+    seconds = sum(seconds_of(run, machine) for run in passes)
+    return Method(name, title, planned, prediction, passes, seconds, set_up_min(planned.measurements))
+
+
+def quickest(methods: Sequence[Method], wanted_um: float) -> Method:
+    """The quickest method that reaches the wanted uncertainty, else the best one."""
+    good = [m for m in methods if m.prediction.rms_mm <= wanted_um * MM_PER_UM]
+    return min(good, key=lambda m: m.hours) if good else min(methods, key=lambda m: m.prediction.rms_mm)
+
+
+def box_of(machine: Machine, box_mm: Sequence[tuple[float, float]] | None) -> Array:
+    """(3, 2) axis positions between which to measure. Raises UsageError."""
     travel = np.array([machine.axes[a].travel_mm for a in AXES])
     if box_mm is None:
         margin = 0.01 * np.ptp(travel, axis=1)
@@ -151,7 +159,14 @@ def _box(machine: Machine, box_mm: Sequence[tuple[float, float]] | None) -> Arra
     return box
 
 
-def _reflectors(machine: Machine) -> list[Vector]:
+def judged_of(machine: Machine, reflectors: Sequence[Vector]) -> list[Vector]:
+    """The tool vectors that a prediction is for: the first reflector and all tools."""
+    tools = [tool.tool_vector_mm for tool in machine.tools.values()]
+    return list(dict.fromkeys([reflectors[0], *(vector for vector in tools if vector is not None)]))
+
+
+def reflectors_of(machine: Machine) -> list[Vector]:
+    """Three tool vectors that are not on one line."""
     tool = machine.tools.get(machine.default_tool) if machine.default_tool is not None else None
     tool_vector = tool.tool_vector_mm if tool is not None else None
     first = tool_vector if tool_vector is not None else (0.0, 0.0, -100.0)
@@ -209,23 +224,29 @@ def _report(
         "cannot_see": list(chosen.prediction.hidden),
         "reflectors": [{"name": f"reflector {k}", "tool_mm": list(v)} for k, v in enumerate(reflectors, 1)],
         "judged_with": [{"name": f"tool {k}", "tool_mm": list(v)} for k, v in enumerate(judged, 1)],
-        "methods": [
-            {
-                "name": m.name,
-                "predicted_um": m.prediction.rms_mm * UM_PER_MM,
-                "worst_um": m.prediction.worst_mm * UM_PER_MM,
-                "machine_h": m.machine_s / 3600.0,
-                "set_up_h": m.set_up_min / 60.0,
-                "total_h": m.hours,
-                "reaches": m.prediction.rms_mm <= wanted * MM_PER_UM,
-                "cannot_see": list(m.prediction.hidden),
-            }
-            for m in sorted(methods, key=lambda m: m.hours)
-        ],
+        "methods": method_rows(methods, wanted),
     }
 
 
-def _findings(chosen: Method, wanted: float) -> Iterator[Finding]:
+def method_rows(methods: Sequence[Method], wanted: float) -> list[dict[str, Any]]:
+    """Methods as rows of a report, the quickest first."""
+    return [
+        {
+            "name": m.name,
+            "predicted_um": m.prediction.rms_mm * UM_PER_MM,
+            "worst_um": m.prediction.worst_mm * UM_PER_MM,
+            "machine_h": m.machine_s / 3600.0,
+            "set_up_h": m.set_up_min / 60.0,
+            "total_h": m.hours,
+            "reaches": m.prediction.rms_mm <= wanted * MM_PER_UM,
+            "cannot_see": list(m.prediction.hidden),
+        }
+        for m in sorted(methods, key=lambda m: m.hours)
+    ]
+
+
+def findings_of_plan(chosen: Method, wanted: float) -> Iterator[Finding]:
+    """What it does not reach, and what would not be observable."""
     rms = chosen.prediction.rms_mm * UM_PER_MM
     if rms > wanted:
         yield Finding("OLP837", f"{chosen.name}: residual about {rms:.1f} um, wanted {wanted:g} um")

@@ -281,13 +281,20 @@ def points(
     share = np.stack([(rng.permutation(n) + rng.uniform(0, 1, n)) / n for _ in range(3)], axis=1)
     axis_mm = m.box[:, 0] + share * np.ptp(m.box, axis=1)
     tool = np.array(tools)[np.arange(n) % len(tools)]
-    place = axis_mm + tool + rng.normal(0.0, sigma, (n, 3))
-    for vector in np.array(tools):
+    return axis_mm, tool, tracked(m, rng, axis_mm, tool, sigma)
+
+
+def tracked(
+    m: Machine, rng: np.random.Generator, axis_mm: np.ndarray, tool: np.ndarray, sigma: float
+) -> np.ndarray:
+    """Places (n, 3) of the reflector at axis positions with tool vectors (n, 3), in a tracker's frame."""
+    place = axis_mm + tool + rng.normal(0.0, sigma, axis_mm.shape)
+    for vector in np.unique(tool, axis=0):
         own = (tool == vector).all(axis=1)
         place[own] += m.error(axis_mm[own], vector)
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     turn *= np.sign(np.linalg.det(turn))
-    return axis_mm, tool, place @ turn.T + rng.uniform(-5000.0, 5000.0, 3)
+    return np.asarray(place @ turn.T + rng.uniform(-5000.0, 5000.0, 3))
 
 
 def polar(

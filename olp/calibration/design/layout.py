@@ -66,7 +66,7 @@ def hypercube(box_mm: Array, n: int, seed: int) -> Array:
 
 def points(machine: str, box_mm: Array, tools: Sequence[Vector], n: int, sigma: float, seed: int) -> Planned:
     """Points of a tracker with each tool vector in turn."""
-    axis, tool = _scattered(box_mm, tools, n, seed)
+    axis, tool = scattered(box_mm, tools, n, seed)
     return Planned(machine, (PointsState(Points(axis, tool, axis + tool, sigma, source="points")),))
 
 
@@ -74,9 +74,14 @@ def lengths(
     machine: str, box_mm: Array, tools: Sequence[Vector], n: int, stations: int, sigma: float, seed: int
 ) -> Planned:
     """Lengths from stations around the box, one after the other, with n points each."""
-    axis, tool = _scattered(box_mm, tools, n, seed)
+    axis, tool = scattered(box_mm, tools, n, seed)
+    return lengths_from(machine, axis, tool, around(box_mm, stations), sigma)
+
+
+def lengths_from(machine: str, axis: Array, tool: Array, places: Array, sigma: float) -> Planned:
+    """Lengths from stations at places (n, 3) to the same points."""
     rays = []
-    for k, place in enumerate(_around(box_mm, stations)):
+    for k, place in enumerate(places):
         distance = np.linalg.norm(axis + tool - place, axis=1)
         read = Lengths(axis, tool, distance, sigma + LENGTH_SCALE * distance, source=f"station {k + 1}")
         rays.append(LengthsState(read, Station(place, 0.0)))
@@ -85,7 +90,7 @@ def lengths(
 
 def pods(machine: str, box_mm: Array, tools: Sequence[Vector], n: int, sigma: float, seed: int) -> Planned:
     """Directions from two pods in front of the longest side of the box, with their distance known."""
-    axis, tool = _scattered(box_mm, tools, n, seed)
+    axis, tool = scattered(box_mm, tools, n, seed)
     long = int(np.argmax(np.ptp(box_mm[:2], axis=1)))
     across = 1 - long
     size = float(np.ptp(box_mm, axis=1).max())
@@ -158,11 +163,12 @@ def together(first: Planned, second: Planned) -> Planned:
     return dataclasses.replace(first, states=(*first.states, *second.states))
 
 
-def _scattered(box_mm: Array, tools: Sequence[Vector], n: int, seed: int) -> tuple[Array, Array]:
+def scattered(box_mm: Array, tools: Sequence[Vector], n: int, seed: int) -> tuple[Array, Array]:
+    """(n, 3) axis positions of a hypercube, and (n, 3) the tools in turn."""
     return hypercube(box_mm, n, seed), np.array(tools, float)[np.arange(n) % len(tools)]
 
 
-def _around(box_mm: Array, stations: int) -> Array:
+def around(box_mm: Array, stations: int) -> Array:
     """(stations, 3) positions around the box, at several heights: a golden spiral about its middle."""
     middle, side = box_mm.mean(axis=1), np.ptp(box_mm, axis=1)
     k = np.arange(stations)

@@ -7,10 +7,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from olp.calibration.design.known import Known, judged_rows, lengths_of
 from olp.calibration.estimator.basis import CurveSpace, Scales, Spline
 from olp.calibration.estimator.fitted import Fit
 from olp.calibration.estimator.normal import Normal, solve
-from olp.calibration.estimator.parameters import MeasuringLine, Parameters, frame_columns
+from olp.calibration.estimator.parameters import MeasuringLine, Parameters
 from olp.calibration.estimator.prior import POSE, Prior
 from olp.calibration.estimator.summary import squareness_unobservable, unobservable
 from olp.calibration.observations.base import State
@@ -21,8 +22,6 @@ from olp.core.machine import COMPONENTS, Vector
 from olp.core.units import AXES
 from olp.core.values import dataclass
 
-#: Positions in the box where the uncertainty is computed, for each tool.
-_POSITIONS = 150
 #: Size and scales of curves of machines that are off by 0.1 mm or so (mm, rad).
 TYPICAL = {
     "positioning": (0.03, Scales(0.0, 0.25, 0.0, 0.0)),
@@ -75,8 +74,15 @@ def predict(planned: Planned, chain: str, box_mm: Array, tools: Sequence[Vector]
     precision, logdet = prior.precision()
     solved = solve(normal, precision, logdet)
     predicted = Fit(taken, parameters, theta, solved.covariance, prior, (), (), box_mm, 0.0, 1.0, {})
-    after, worst = _spread(parameters, solved.covariance, box_mm, tools)
-    return Prediction(after, worst, (*unobservable(predicted), *squareness_unobservable(predicted)))
+    length = lengths_of(judged_rows(parameters, box_mm, tools), solved.covariance)
+    rms, worst = float(np.sqrt((length**2).mean())), float(length.max())
+    return Prediction(rms, worst, (*unobservable(predicted), *squareness_unobservable(predicted)))
+
+
+def known_of_machines(chain: str, box_mm: Array) -> Known:
+    """What is known of a machine of which nothing was measured yet."""
+    parameters = _parameters(Measurements(""), chain, box_mm)
+    return Known.of_prior(parameters, Prior(parameters, {}, {}, dict(TYPICAL)).precision()[0])
 
 
 def _parameters(taken: Measurements, chain: str, box_mm: Array) -> Parameters:
@@ -96,22 +102,3 @@ def _parameters(taken: Measurements, chain: str, box_mm: Array) -> Parameters:
             measuring_lines[name] = MeasuringLine((line_mm[0], line_mm[1], line_mm[2]), tool)
     shared = sorted({n for line in taken.lines if line.square is not None for n in square_names(line)})
     return Parameters(chain, datum, spaces, measuring_lines, shared=tuple(shared))
-
-
-def _spread(
-    parameters: Parameters, covariance: Array, box_mm: Array, tools: Sequence[Vector]
-) -> tuple[float, float]:
-    """rms and largest expected length of the error at positions in the box, less the best-fit frame."""
-    rng = np.random.default_rng(1)
-    position = rng.uniform(box_mm[:, 0], box_mm[:, 1], (_POSITIONS, 3))
-    square = np.zeros((len(tools), _POSITIONS))
-    for k, tool in enumerate(tools):
-        vector = np.asarray(tool, float)
-        rows = parameters.design(position, vector).reshape(3 * _POSITIONS, -1)
-        frame = frame_columns(position + vector - (position + vector).mean(axis=0)).reshape(
-            3 * _POSITIONS, -1
-        )
-        basis, _ = np.linalg.qr(frame)
-        rows = rows - basis @ (basis.T @ rows)
-        square[k] = np.einsum("nk,nk->n", rows @ covariance, rows).reshape(_POSITIONS, 3).sum(axis=1)
-    return float(np.sqrt(square.mean())), float(np.sqrt(square.max()))

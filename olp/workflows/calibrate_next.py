@@ -1,0 +1,155 @@
+"""What to measure next: the readings that lower the uncertainty of a calibration most, and their files."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any, Literal
+
+from olp.calibration.design import offers
+from olp.calibration.design.choosing import Criterion, choose
+from olp.calibration.design.known import Known, judged_rows
+from olp.calibration.design.prediction import Prediction, known_of_machines
+from olp.core.arrays import Array
+from olp.core.errors import CannotCompute, ConfigError, UsageError
+from olp.core.machine import Machine, Setup, Vector
+from olp.core.units import AXES, MM_PER_UM, UM_PER_MM
+from olp.files.calibration.covariance import load_uncertainty
+from olp.files.calibration.reader import load_calibration
+from olp.findings.catalogue import Finding
+from olp.workflows.calibrate_plan import (
+    TRACKER,
+    MeasurementPlan,
+    Method,
+    box_of,
+    findings_of_plan,
+    judged_of,
+    method_rows,
+    quickest,
+    reflectors_of,
+    timed,
+)
+from olp.workflows.measuring_time import DWELL_S
+from olp.workflows.session import PathLike, Session
+
+NextInstrument = Literal["tracker", "multilateration"]
+NEXT: tuple[NextInstrument, ...] = ("tracker", "multilateration")
+#: Points that every station measures.
+TARGETS = 60
+#: Seed of random positions; another one than that of a first plan.
+_SEED = 21
+
+
+def plan_next(
+    machine: PathLike | Setup,
+    count: int,
+    *,
+    calibration: PathLike | None = None,
+    criterion: Criterion = "A",
+    uncertainty_um: float = 5.0,
+    instrument: NextInstrument | None = None,
+    box_mm: Sequence[tuple[float, float]] | None = None,
+    tools: Sequence[Vector] = (),
+    sigma_um: float | None = None,
+    dwell_s: float | None = None,
+    settle_s: float = 1.0,
+    points: int | None = None,
+) -> MeasurementPlan:
+    """The `count` points of a tracker, or stations of lengths to `points` points each, that help most.
+
+    `calibration` is what was measured so far; its covariance says what is known already. Without one nothing
+    was measured. Criterion "A" lowers the mean square of the error over the box, "D" the volume of all
+    uncertainty. The other arguments are those of `plan_measurements`; without `box_mm` it is the
+    calibrated box. Raises UsageError, ConfigError and CannotCompute.
+    """
+    session = Session.start(machine)
+    setup = session.setup
+    described = setup.machine
+    described.motion_limits()
+    known, box = _known(session, described, calibration, box_mm)
+    reflectors = list(tools) or reflectors_of(described)
+    judged = judged_of(described, reflectors)
+    rows = judged_rows(known, box, judged)
+    sigma = TRACKER if sigma_um is None else sigma_um * MM_PER_UM
+    methods: list[Method] = []
+    tables: dict[str, list[dict[str, Any]]] = {}
+    before = 0.0
+    for name in NEXT if instrument is None else (instrument,):
+        wait = (DWELL_S[name] if dwell_s is None else dwell_s) + settle_s
+        offer, noun = _offer(name, described, known, box, reflectors, sigma, points or TARGETS)
+        if not offer.fewest <= count <= len(offer.candidates.rows):
+            raise UsageError(
+                f"{count} {noun} cannot be planned; expected {offer.fewest} to {len(offer.candidates.rows)}"
+            )
+        choice = choose(offer.candidates, rows, count, criterion)
+        planned = offer.planned(choice.index)
+        after = Prediction(float(choice.rms_mm[-1]), choice.worst_mm, ())
+        method = timed(name, f"{count} {noun}", planned, after, described, wait, box)
+        methods.append(method)
+        before = float(choice.rms_mm[0])
+        tables[name] = [
+            {"number": k, **offer.row(int(one)), "predicted_um": float(rms) * UM_PER_MM}
+            for k, (one, rms) in enumerate(zip(choice.index, choice.rms_mm[1:], strict=True), start=1)
+        ]
+    chosen = quickest(methods, uncertainty_um)
+    report: dict[str, Any] = {
+        "schema": "olp-next-1",
+        "machine": described.name,
+        "chain": described.chain,
+        "calibration": None if calibration is None else str(calibration),
+        "criterion": criterion,
+        "box_mm": {axis: box[k].tolist() for k, axis in enumerate(AXES)},
+        "wanted_um": uncertainty_um,
+        "known_um": before * UM_PER_MM,
+        "method": chosen.name,
+        "instrument": chosen.instrument,
+        "predicted_um": chosen.prediction.rms_mm * UM_PER_MM,
+        "predicted_worst_um": chosen.prediction.worst_mm * UM_PER_MM,
+        "machine_h": chosen.machine_s / 3600.0,
+        "set_up_h": chosen.set_up_min / 60.0,
+        "reflectors": [{"name": f"reflector {k}", "tool_mm": list(v)} for k, v in enumerate(reflectors, 1)],
+        "judged_with": [{"name": f"tool {k}", "tool_mm": list(v)} for k, v in enumerate(judged, 1)],
+        "next": tables[chosen.instrument],
+        "methods": method_rows(methods, uncertainty_um),
+    }
+    used = (DWELL_S[chosen.instrument] if dwell_s is None else dwell_s) + settle_s
+    findings: tuple[Finding, ...] = tuple(findings_of_plan(chosen, uncertainty_um))
+    return MeasurementPlan(setup, chosen, tuple(methods), report, findings, used, session.sources.files)
+
+
+def _known(
+    session: Session, machine: Machine, calibration: PathLike | None,
+    box_mm: Sequence[tuple[float, float]] | None,
+) -> tuple[Known, Array]:  # fmt: skip
+    """What was measured so far, and the box. Raises ConfigError and UsageError."""
+    if calibration is None:
+        box = box_of(machine, box_mm)
+        return known_of_machines(machine.chain, box), box
+    described = dataclasses.replace(machine, calibration=str(calibration))
+    old = load_calibration(calibration, described, read=session.sources.read)
+    uncertainty = load_uncertainty(calibration, old, session.sources.read)
+    if uncertainty is None or not uncertainty.entries:
+        raise ConfigError(
+            "states no uncertainty; expected [covariance] or sigma_ columns, as from olp calibrate fit",
+            file=str(calibration),
+        )
+    covered = [(float(low), float(high)) for low, high in old.box_mm]
+    box = box_of(machine, box_mm or covered)
+    skip = frozenset(machine.compensated_by_controller - old.active_during_measurement)
+    known = Known.of_calibration(old, machine.chain, uncertainty, skip)
+    if not known.size:
+        raise CannotCompute("the control corrects every error that the calibration states")
+    return known, box
+
+
+def _offer(
+    name: NextInstrument, machine: Machine, known: Known, box: Array, tools: Sequence[Vector], sigma: float,
+    targets: int,
+) -> tuple[offers.Offer, str]:  # fmt: skip
+    if name == "tracker":
+        return offers.points(machine.name, known, box, tools, sigma, _SEED), "points of a tracker"
+    offer = offers.stations(machine.name, known, box, tools, targets, _SEED)
+    return offer, f"stations with {targets} lengths"
+
+
+__all__ = ["NEXT", "NextInstrument", "plan_next"]
