@@ -50,6 +50,7 @@ if TYPE_CHECKING:
     from olp.workflows.calibrate_import import import_table as import_table
     from olp.workflows.calibrate_joints import FittedJoints as FittedJoints
     from olp.workflows.calibrate_joints import fit_joint_calibration as fit_joint_calibration
+    from olp.workflows.calibrate_next import plan_next as plan_next
     from olp.workflows.calibrate_plan import MeasurementPlan as MeasurementPlan
     from olp.workflows.calibrate_plan import plan_measurements as plan_measurements
     from olp.workflows.calibrate_postures import fit_postures as fit_postures
@@ -103,6 +104,7 @@ _HOME = {
     "refine_calibration": "olp.workflows.calibrate_refine",
     "MeasurementPlan": "olp.workflows.calibrate_plan",
     "plan_measurements": "olp.workflows.calibrate_plan",
+    "plan_next": "olp.workflows.calibrate_next",
     "correct": "olp.workflows.correct",
     "compare_tables": "olp.workflows.calibrate_export",
     "export_table": "olp.workflows.calibrate_export",

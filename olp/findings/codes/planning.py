@@ -73,8 +73,8 @@ RULES = (
         Severity.WARNING,
         "None of the methods compared reaches the wanted uncertainty in the given box with the given "
         "instruments.",
-        "Use a better instrument or more points (--points), make the box smaller (--box), or accept a "
-        "larger uncertainty.",
+        "Use a better instrument or more readings (--points, or N of --next), make the box smaller (--box), "
+        "or accept a larger uncertainty.",
         "2 um over 3 x 2 x 1 m from a tracker of 15 um.",
     ),
     _rule(
