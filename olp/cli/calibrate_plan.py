@@ -130,7 +130,13 @@ def command(
             raise UsageError(f"--next chooses for {' or '.join(NEXT)}, and without --period-x, -y and -z")
         offered = next((name for name in NEXT if name == instrument), None)
         plan = plan_next(
-            machine, next_, instrument=offered, calibration=calibration, criterion=criterion, **shared
+            machine,
+            next_,
+            instrument=offered,
+            calibration=calibration,
+            criterion=criterion,
+            date=date,
+            **shared,
         )
     if output is not None:
         inputs = (*plan.inputs, *files_of(machine))

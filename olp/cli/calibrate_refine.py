@@ -9,6 +9,7 @@ import click
 
 from olp.cli.common import STREAM, diagnostic, exit_for, files_of, put_result, refuse_early
 from olp.cli.options import (
+    Length,
     day_option,
     fail_on_option,
     force_option,
@@ -32,6 +33,14 @@ from olp.core.errors import UsageError
 )
 @instrument_options
 @day_option("Day of the run: the new calibration's date of measuring. Default: the old one's.")
+@click.option(
+    "--growth-per-year", type=click.FloatRange(min=0.0), metavar="SHARE",
+    help="What is known fades by this share a year until the day of the run. Default: the calibration's.",
+)  # fmt: skip
+@click.option(
+    "--uncertainty-um", type=Length(), default=5.0, show_default=True,
+    help="Measure again when the uncertainty in the box (rms length, best-fit frame) is more.",
+)  # fmt: skip
 @json_option()
 @units_option
 @fail_on_option
@@ -47,6 +56,8 @@ def command(
     sigma_um: float | None,
     reflector: tuple[float, float, float] | None,
     date: datetime.date | None,
+    growth_per_year: float | None,
+    uncertainty_um: float,
     as_json: bool,
     fail_on: str,
     quiet: bool,
@@ -78,7 +89,7 @@ def command(
 
     refined = refine_calibration(
         calibration, measured, machine, job, program=program, sigma_um=sigma_um, tool_mm=reflector,
-        date=date, **unrolling,
+        date=date, growth_per_year=growth_per_year, uncertainty_um=uncertainty_um, **unrolling,
     )  # fmt: skip
     files = refined.files(output)
     write_files(files, force=force, inputs=inputs)

@@ -84,6 +84,10 @@ class Uncertainty:
         """The factor on standard uncertainties so many days after measuring."""
         return 1.0 if days is None else 1.0 + self.growth_per_year * max(days, 0.0) / YEAR
 
+    def aged(self, days: float | None) -> Uncertainty:
+        """So many days after measuring."""
+        return self.scaled(self.growth(days))
+
 
 def fingerprint(calibration: Calibration) -> str:
     """SHA-256 of the numbers of a calibration, to nine digits: comments, names of files and the last bits do

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import datetime
 from collections.abc import Sequence
 from typing import Any, Literal
 
@@ -54,19 +55,21 @@ def plan_next(
     dwell_s: float | None = None,
     settle_s: float = 1.0,
     points: int | None = None,
+    date: datetime.date | None = None,
 ) -> MeasurementPlan:
     """The `count` points of a tracker, or stations of lengths to `points` points each, that help most.
 
-    `calibration` is what was measured so far; its covariance says what is known already. Without one nothing
-    was measured. Criterion "A" lowers the mean square of the error over the box, "D" the volume of all
-    uncertainty. The other arguments are those of `plan_measurements`; without `box_mm` it is the
-    calibrated box. Raises UsageError, ConfigError and CannotCompute.
+    `calibration` is what was measured so far; its covariance says what is known already. That has faded by
+    its growth_per_year until `date`. Without one nothing was measured. Criterion "A" lowers the mean square
+    of the error over the box, "D" the volume of all uncertainty. The other arguments are those of
+    `plan_measurements`; without `box_mm` it is the calibrated box. Raises UsageError, ConfigError and
+    CannotCompute.
     """
     session = Session.start(machine)
     setup = session.setup
     described = setup.machine
     described.motion_limits()
-    known, box = _known(session, described, calibration, box_mm)
+    known, box = _known(session, described, calibration, box_mm, date)
     reflectors = list(tools) or reflectors_of(described)
     judged = judged_of(described, reflectors)
     rows = judged_rows(known, box, judged)
@@ -119,7 +122,7 @@ def plan_next(
 
 def _known(
     session: Session, machine: Machine, calibration: PathLike | None,
-    box_mm: Sequence[tuple[float, float]] | None,
+    box_mm: Sequence[tuple[float, float]] | None, date: datetime.date | None,
 ) -> tuple[Known, Array]:  # fmt: skip
     """What was measured so far, and the box. Raises ConfigError and UsageError."""
     if calibration is None:
@@ -136,7 +139,8 @@ def _known(
     covered = [(float(low), float(high)) for low, high in old.box_mm]
     box = box_of(machine, box_mm or covered)
     skip = frozenset(machine.compensated_by_controller - old.active_during_measurement)
-    known = Known.of_calibration(old, machine.chain, uncertainty, skip)
+    days = None if date is None or old.measured is None else (date - old.measured).days
+    known = Known.of_calibration(old, machine.chain, uncertainty.aged(days), skip)
     if not known.size:
         raise CannotCompute("the control corrects every error that the calibration states")
     return known, box

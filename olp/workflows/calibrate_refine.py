@@ -10,19 +10,20 @@ from typing import Any
 
 import numpy as np
 
+from olp.calibration.design.known import Known, judged_rows, lengths_of
 from olp.calibration.diagnosis.refinement import Refinement, refine
 from olp.calibration.estimator.covariance import sigmas_at
 from olp.calibration.observations.points import Points
 from olp.comparison.nominal import nominal_of
 from olp.core.arrays import Array
 from olp.core.errors import CannotCompute, ConfigError
-from olp.core.machine import Setup, Vector
+from olp.core.machine import Machine, Setup, Vector
 from olp.core.units import MM_PER_UM, RAD_PER_URAD, UM_PER_MM
 from olp.core.values import dataclass
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration
 from olp.errormodel.reversal import plays
-from olp.errormodel.uncertainty import Uncertainty, fingerprint
+from olp.errormodel.uncertainty import YEAR, Uncertainty, fingerprint
 from olp.files.calibration.covariance import load_uncertainty
 from olp.files.calibration.reader import load_calibration
 from olp.files.calibration.writer import calibration_files
@@ -31,6 +32,7 @@ from olp.files.measurements.reader import files_of_measurements
 from olp.files.sources import Source
 from olp.findings.catalogue import Finding
 from olp.workflows import compare, refusals
+from olp.workflows.calibrate_plan import judged_of, reflectors_of
 from olp.workflows.flatten import UnrollOptions
 from olp.workflows.session import PathLike, Session
 from olp.workflows.shown import Filed
@@ -41,6 +43,8 @@ MISFIT = 1.5
 MOST_POINTS = 3000
 #: Most rows of points that a finding names.
 _LISTED = 10
+#: Years ahead that a report looks at most.
+MOST_YEARS = 100.0
 #: Steps of a path below this, in mm, have no tangent.
 _MOVES = 1e-6
 
@@ -86,6 +90,8 @@ def refine_calibration(
     sigma_um: float | None = None,
     tool_mm: Vector | None = None,
     date: datetime.date | None = None,
+    growth_per_year: float | None = None,
+    uncertainty_um: float = 5.0,
 ) -> RefinedCalibration:
     """Update a calibration by a measured run, within its covariance.
 
@@ -93,8 +99,11 @@ def refine_calibration(
     `diagnose_calibration`, or Points). With `program`, the nominal program, they are tip positions along a
     run of its correction, paired as in `compare`; only deviations across the path are used. `sigma_um` is the
     standard uncertainty of a coordinate, `date` the day of the run. `flatten`, `expand_cycles` and
-    `peck_clearance_mm` are those of `correct`, for the program. Raises InputError, ConfigError where the
-    calibration states no uncertainty, and CannotCompute.
+    `peck_clearance_mm` are those of `correct`, for the program.
+
+    What is known fades until `date`: standard uncertainties grow by `growth_per_year` (default: that of the
+    calibration). The report states when those of the new calibration will exceed `uncertainty_um`. Raises
+    InputError, ConfigError where the calibration states no uncertainty, and CannotCompute.
     """
     session = Session.start(machine, job)
     described = dataclasses.replace(session.setup.machine, calibration=str(calibration))
@@ -105,6 +114,11 @@ def refine_calibration(
             "states no uncertainty; expected [covariance] or sigma_ columns, as from olp calibrate fit",
             file=str(calibration),
         )
+    growth = known.growth_per_year if growth_per_year is None else growth_per_year
+    if growth_per_year and (date is None or old.measured is None):
+        raise ConfigError("growth_per_year needs the day of the run; give it (--date)", file=str(calibration))
+    days = None if date is None or old.measured is None else (date - old.measured).days
+    known = dataclasses.replace(known, growth_per_year=growth).aged(days)
     skip = frozenset(described.compensated_by_controller - old.active_during_measurement)
     along: Array | None = None
     play: Array | None = None
@@ -131,9 +145,31 @@ def refine_calibration(
         uncertainty = dataclasses.replace(uncertainty, fingerprint=fingerprint(new))
     read = () if isinstance(measured, Points) else files_of_measurements([measured])
     inputs = (*session.sources.files, *read)
-    return RefinedCalibration(
-        new, uncertainty, done, _report(new, done, len(points.axis_mm)), tuple(_findings(done)), inputs
-    )
+    report = _report(new, done, len(points.axis_mm)) | {
+        "growth_by_age": known.growth(days),
+        **_ageing(new, uncertainty, described, skip, uncertainty_um * MM_PER_UM),
+    }
+    return RefinedCalibration(new, uncertainty, done, report, tuple(_findings(done)), inputs)
+
+
+def _ageing(
+    calibration: Calibration, uncertainty: Uncertainty, machine: Machine, skip: frozenset[str], wanted: float
+) -> dict[str, Any]:
+    """What the new calibration knows of the error in its box (rms length in the best-fit frame), and the day
+    from which that will be more than wanted."""
+    tools = judged_of(machine, reflectors_of(machine)[:1])
+    known = Known.of_calibration(calibration, machine.chain, uncertainty, skip)
+    length = lengths_of(judged_rows(known, calibration.box_mm, tools), np.eye(known.size))
+    rms = float(np.sqrt(np.mean(length**2)))
+    again = None
+    if calibration.measured is not None and (rms >= wanted or uncertainty.growth_per_year > 0.0):
+        years = max(wanted / rms - 1.0, 0.0) / uncertainty.growth_per_year if rms < wanted else 0.0
+        again = calibration.measured + datetime.timedelta(days=min(years, MOST_YEARS) * YEAR)
+    return {
+        "uncertainty_um": rms * UM_PER_MM,
+        "wanted_um": wanted * UM_PER_MM,
+        "measure_again": None if again is None else again.isoformat(),
+    }
 
 
 def _along(

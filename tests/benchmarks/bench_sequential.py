@@ -1,6 +1,6 @@
 """Chosen readings beside those of today's plan: `olp calibrate plan --next`.
 
-    python tests/benchmarks/bench_sequential.py [SEEDS]
+    python tests/benchmarks/bench_sequential.py [SEEDS [FAMILY]]
 
 Random machines of 3 x 2 x 1 m, six chains, both families. After a full set of lines: 40 points of a tracker
 of 8 um in a Latin hypercube, and 20 or fewer that are chosen by the covariance of the fit. From nothing: 120
@@ -22,8 +22,8 @@ SEEDS = 6
 SIGMA = 0.008
 
 
-def main(seeds: int) -> None:
-    for family in ("smooth", "rough"):
+def main(seeds: int, *families: str) -> None:
+    for family in families or ("smooth", "rough"):
         rows: dict[str, list[float]] = {}
 
         def note(name: str, value: float, rows: dict[str, list[float]] = rows) -> None:
@@ -52,4 +52,4 @@ def main(seeds: int) -> None:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else SEEDS)
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else SEEDS, *sys.argv[2:])

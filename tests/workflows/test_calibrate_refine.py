@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import datetime
 import json
 import shutil
 from pathlib import Path
@@ -19,8 +20,12 @@ from olp.cli import main
 from olp.core.errors import ConfigError
 from olp.errormodel.build import build
 from olp.errormodel.sensitivity import Sensitivity
+from olp.errormodel.uncertainty import Uncertainty
 from olp.files.calibration.covariance import load_uncertainty
 from olp.files.calibration.reader import load_calibration
+from olp.files.calibration.writer import calibration_files
+from olp.files.config import load_setup
+from olp.files.measurements.checkpoints import load_checkpoints
 from olp.workflows.calibrate_refine import refine_calibration
 
 PROGRAMS = Path(__file__).resolve().parents[2] / "programs"
@@ -206,3 +211,74 @@ def test_a_calibration_without_uncertainty_is_refused(shop: Path) -> None:
     gantry = PROGRAMS / "gantry-plate"
     with pytest.raises(ConfigError, match="states no uncertainty"):
         refine_calibration(gantry / "calibration.toml", shop / "tracker.csv", gantry / "machine.toml")
+
+
+@pytest.mark.slow
+def test_what_is_known_fades_until_the_run(shop: Path, tmp_path: Path) -> None:
+    """Against a run whose old covariance was made larger by hand; the new file keeps the growth."""
+    file, points, machine = (shop / name for name in ("calibration.toml", "tracker.csv", "machine.toml"))
+    old = load_calibration(file)
+    assert old.measured is not None
+    day = old.measured + datetime.timedelta(days=731)
+    ageing = file.read_text("utf-8").replace("[covariance]", "[covariance]\ngrowth_per_year = 0.25")
+    (shop / "ageing.toml").write_text(ageing, "utf-8")
+    done = refine_calibration(shop / "ageing.toml", points, machine, date=day)
+    growth = 1.0 + 0.25 * 731 / 365.25
+    assert done.report["growth_by_age"] == pytest.approx(growth)
+    known = load_uncertainty(file, old)
+    assert known is not None
+    taken, _ = load_checkpoints(points, sigma_um=None, tool_mm=None)
+    chain = load_setup(machine).machine.chain
+    by_hand = refine(old, chain, known.scaled(growth), taken)
+    assert done.refinement.expected_mm == pytest.approx(by_hand.expected_mm)
+    for a, b in zip(done.calibration.curves, by_hand.calibration.curves, strict=True):
+        assert all(np.array_equal(a.mean(name), b.mean(name)) for name in a.names)
+    # the day from which one and a half of the uncertainty is reached
+    rms = done.report["uncertainty_um"]
+    again = refine_calibration(shop / "ageing.toml", points, machine, date=day, uncertainty_um=1.5 * rms)
+    assert again.report["measure_again"] == (day + datetime.timedelta(days=2 * 365.25)).isoformat()
+    now = refine_calibration(shop / "ageing.toml", points, machine, date=day, uncertainty_um=0.9 * rms)
+    assert now.report["measure_again"] == day.isoformat()
+    never = refine_calibration(file, points, machine, date=day)
+    assert never.report["measure_again"] is None and never.report["growth_by_age"] == 1.0
+    assert never.report["uncertainty_um"] < rms
+    done.write(tmp_path / "new.toml")
+    kept = load_uncertainty(tmp_path / "new.toml", load_calibration(tmp_path / "new.toml"))
+    assert kept is not None and kept.growth_per_year == 0.25
+
+
+def test_fading_needs_the_day_of_the_run(tmp_path: Path) -> None:
+    """A share for a year, and no day."""
+    machine = PROGRAMS / "gantry-lines" / "machine.toml"
+    calibration, uncertainty = begun_files(tmp_path)
+    assert uncertainty.growth_per_year == 0.0
+    with pytest.raises(ConfigError, match=r"growth_per_year needs the day of the run; give it \(--date\)"):
+        refine_calibration(
+            calibration, PROGRAMS / "gantry-lines" / "tracker.csv", machine, growth_per_year=0.2
+        )
+
+
+def begun_files(folder: Path) -> tuple[Path, Uncertainty]:
+    """A calibration of one squareness with its uncertainty."""
+    file = folder / "calibration.toml"
+    file.write_text(
+        'schema = "olp-calibration-1"\nmachine = "gantry-1600"\nmeasured = 2026-04-20\n'
+        'temperature_degC = 20.0\nsign = "actual-minus-commanded"\nmodel = "rigid-body"\n'
+        "datum_mm = [0.0, 0.0, 0.0]\nbox_mm = [[20, 1580], [20, 980], [-440, -5]]\n"
+        "active_during_measurement = []\n[squareness]\nC0Y_urad = 20.0\nsigma_C0Y_urad = 5.0\n",
+        "utf-8",
+    )
+    known = load_uncertainty(file, load_calibration(file))
+    assert known is not None
+    return file, known
+
+
+def test_a_written_calibration_keeps_growth_and_temperature(tmp_path: Path) -> None:
+    file, known = begun_files(tmp_path)
+    ageing = dataclasses.replace(known, growth_per_year=0.3, temperature_K=0.5)
+    for path, data in calibration_files(
+        load_calibration(file), tmp_path / "new.toml", covariance=ageing
+    ).items():
+        path.write_bytes(data)
+    kept = load_uncertainty(tmp_path / "new.toml", load_calibration(tmp_path / "new.toml"))
+    assert kept is not None and (kept.growth_per_year, kept.temperature_K) == (0.3, 0.5)

@@ -45,7 +45,11 @@ def calibration_files(
     if covariance is not None:
         archive = target.with_name(f"{target.stem}-covariance.npz")
         writing.files[archive] = covariance_bytes(covariance)
-        writing.table("[covariance]", {"file": archive.name})
+        stated = {
+            "growth_per_year": covariance.growth_per_year or None,
+            "temperature_K": covariance.temperature_K or None,
+        }
+        writing.table("[covariance]", {"file": archive.name, **stated})
     for header, values in _quality(calibration):
         writing.table(header, values)
     above = [*(line for note in notes for line in comment(note)), *_head(calibration)]
