@@ -31,6 +31,15 @@ def test_there_is_something_to_try() -> None:
     assert kinds.count("python") > 1
 
 
+def test_pages_do_not_take_the_files_of_another_page() -> None:
+    """All pages share one folder, so each names its machines and files itself."""
+    own: dict[str, str] = {}
+    for name, page in PAPERS.items():
+        bodies = "".join(block.body for block in page if block.kind == "sh" and name != "README")
+        written = [*re.findall(r"^olp init (\S+)", bodies, re.MULTILINE), *(b.file for b in page if b.file)]
+        assert {file: own.setdefault(file, name) for file in written} == dict.fromkeys(written, name)
+
+
 @pytest.mark.slow
 def test_the_readme_runs_from_top_to_bottom(folder: Path) -> None:
     assert list(problems(PAPERS["README"], folder)) == []
