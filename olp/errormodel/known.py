@@ -112,5 +112,6 @@ def _pairs(
         try:
             value = quantity(text, unit)
         except ValueError:
-            raise UsageError(f"{what} {name}={text} is {_WANTED[unit]}") from None
+            comma = "; write a decimal point instead of the comma" if "," in text else ""
+            raise UsageError(f"{what} {name}={text} is {_WANTED[unit]}{comma}") from None
         yield name, text.strip(), value

@@ -59,7 +59,10 @@ def read_setup(
     machine_path = machine_path if machine_path is not None else job.machine
     if machine_path is None:
         what = f"{job_path} names no machine" if job_path is not None else "no machine file is given"
-        raise UsageError(f"{what}; name the machine file with -m, or with the key machine of the job file")
+        raise UsageError(
+            f"{what}; name the machine file with -m, or with the key machine of the job file. "
+            "olp init writes one; olp correct --skew, --scale or --backlash needs none"
+        )
     machine, machine_lines = _read_machine(machine_path, read)
     setup = Setup(machine, job)
     problems = _undefined_tools(setup, machine.work_offsets, machine_lines)

@@ -46,6 +46,68 @@ def line(file: str, component: str, more: str = "") -> str:
     return f'[[lines]]\nfile = "{file}.csv"\ncomponent = "{component}"\n{more}\n'
 
 
+# -- a laser file and a ball-bar -------------------------------------------------------------------------
+
+
+def circle_at_one_height(folder: Path, sigma: str = "# sigma_um = 0.3\n") -> Path:
+    """A mill with positioning of X and a circle in XY at one Z: Y leans by 40 urad to -X."""
+    wave = np.random.default_rng(4)
+    rows = [f"{x},{run},{side},{0.03 * x + wave.normal(0.0, 0.3):.3f}"
+            for run in (1, 2) for side in (1, -1) for x in range(-700, 1, 70)[::side]]  # fmt: skip
+    turns = [(angle, side) for side in (1, -1) for angle in range(0, 360, 5)[::side]]
+    places = {
+        angle: (150.0 * np.cos(np.radians(angle)), 150.0 * np.sin(np.radians(angle))) for angle, _ in turns
+    }
+    radial = {a: (0.03 * x - 0.04 * y) * np.cos(np.radians(a)) for a, (x, y) in places.items()}
+    circle = [f"{a},1,{side},{radial[a] + wave.normal(0.0, 0.2):.3f}" for a, side in turns]
+    places_of = "# centre_mm = [-350.0, -200.0, -300.0]\n# tool_mm = [0, 0, -120]\n"
+    head = f"# plane = XY\n# radius_mm = 150.0\n{places_of}"
+    laser = line("exx", "EXX", "line_mm = { Y = -200.0, Z = -300.0 }")
+    return planned(
+        folder, f'{laser}[[ballbars]]\nfile = "circle.csv"\n',
+        exx="\n".join(("target_mm,run,direction,value_um", *rows)),
+        circle=head + sigma + "\n".join(("angle_deg,run,direction,deviation_um", *circle)),
+    )  # fmt: skip
+
+
+def mill_of(folder: Path) -> Path:
+    travel = ["--travel", "X", "-700", "0", "--travel", "Y", "-400", "0", "--travel", "Z", "-500", "0"]
+    result = CliRunner().invoke(
+        main, ["init", str(folder / "m"), "--controller", "fanuc", "--chain", "XYFZ", *travel]
+    )
+    assert result.exit_code == 0, result.output
+    return folder / "m" / "machine.toml"
+
+
+@pytest.mark.slow
+def test_a_laser_file_and_one_circle_make_a_calibration_that_corrects(tmp_path: Path) -> None:
+    machine = mill_of(tmp_path)
+    fitted = olp.fit_calibration(circle_at_one_height(tmp_path), machine)
+    assert fitted.calibration.box_mm[2].tolist() == [-500.0, 0.0], "a circle at one Z tells nothing along Z"
+    middle = next(row["mid_box_value_urad"] for row in fitted.report["squareness"] if row["name"] == "C0Y")
+    assert middle == pytest.approx(40.0, abs=4.0)
+    fitted.write(machine.parent / "calibration.toml", force=True)
+    done = olp.correct(machine.parent / "first.nc", machine)
+    codes = {finding.code for finding in done.findings}
+    assert done.report["deviation"]["path_max_um"] < 1.0
+    assert "OLP466" not in codes, "zeros of a fit are what it did not observe"
+
+
+def test_a_circle_without_uncertainty_says_how_to_state_it(tmp_path: Path) -> None:
+    with pytest.raises(
+        ConfigError, match=r"circle\.csv: circle XY: .* add a comment such as # sigma_um = 0\.2"
+    ):
+        olp.fit_calibration(circle_at_one_height(tmp_path, ""), mill_of(tmp_path))
+
+
+def test_a_profile_that_is_missing_is_named_and_not_the_readings(tmp_path: Path) -> None:
+    plan = planned(tmp_path, 'profile = "laser.toml"\n' + line("exx", "EXX"), exx=LENGTHS)
+    with pytest.raises(ConfigError, match=r"lines\[0\]: .*laser\.toml: no such file") as caught:
+        load_measurements([plan])
+    assert "exx.csv" not in str(caught.value)
+    assert str(tmp_path / "laser.toml") in files_of_measurements([plan])
+
+
 # -- plans -----------------------------------------------------------------------------------------------
 
 

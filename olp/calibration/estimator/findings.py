@@ -65,23 +65,36 @@ def findings_of(
 
 
 def _unobservable_findings(fit: Fit, tools: Sequence[Vector]) -> Iterator[Finding]:
-    for name, sigma in unobservable(fit).items():
-        unit, scale = unit_of(name)
-        arm = f", plus {sigma * 1e5:.2g} um per 100 mm of tool" if name[1] in "ABC" else ""
-        like = {"angle": "angles", "straightness": "straightness", "positioning": "positioning"}[
-            class_of(name)
-        ]
+    """One finding for all errors of a class that no reading shows for one reason; the report lists each."""
+    hidden = unobservable(fit)
+    reasons = {name: (class_of(name), _why(fit, name)) for name in hidden}
+    for reason in dict.fromkeys(reasons.values()):
+        names = [name for name in hidden if reasons[name] == reason]
+        unit, scale = unit_of(names[0])
+        sigma = [hidden[name] for name in names]
+        cost = max(cost_um(fit, name, hidden[name], tools) for name in names)
+        angles = reason[0] == "angle"
+        arm = f", plus {max(sigma) * 1e5:.2g} um per 100 mm of tool" if angles else ""
         yield Finding(
             "OLP801",
-            f"{name} is taken as zero: as large as other {like} of this machine ({sigma * scale:.2g} {unit}) "
-            f"it costs {cost_um(fit, name, sigma, tools):.2g} um at the longest lever arm in the box{arm}"
-            + _why(fit, name),
+            f"{_zero(names)}: as large as other {'angles' if angles else reason[0]} of this machine "
+            f"({_span(sigma, scale)} {unit}) {'they cost up to' if names[1:] else 'it costs'} {cost:.2g} um "
+            f"at the longest lever arm in the box{arm}{reason[1]}",
         )
-    for name in squareness_unobservable(fit):
-        yield Finding(
-            "OLP806",
-            f"{name} is taken as zero: 100 urad of it cost {cost_um(fit, name, 1e-4, tools):.3g} um",
-        )
+    square = list(squareness_unobservable(fit))
+    if square:
+        cost = max(cost_um(fit, name, 1e-4, tools) for name in square)
+        yield Finding("OLP806", f"{_zero(square)}: 100 urad cost up to {cost:.3g} um")
+
+
+def _zero(names: Sequence[str]) -> str:
+    return f"{', '.join(names)} {'are' if len(names) > 1 else 'is'} taken as zero"
+
+
+def _span(values: Sequence[float], scale: float) -> str:
+    """The range of some values in another unit, or the one that they are when rounded."""
+    low, high = (f"{value * scale:.2g}" for value in (min(values), max(values)))
+    return low if low == high else f"{low} to {high}"
 
 
 def _scale_findings(fit: Fit) -> Iterator[Finding]:

@@ -112,13 +112,14 @@ def _ranges(
     for axis in range(3):
         own = [line for line in lines if line.axis == axis]
         reached = [q for q in (taken.reach(axis) for taken in observations) if len(q)]
-        if not reached:
-            # nothing is known of this axis: all its errors are zero over its travel, with their uncertainty
-            ranges.append(_travel_of(axis, observations, travel_mm))
-            box[axis] = ranges[-1]
+        low = min((float(q.min()) for q in reached), default=np.inf)
+        high = max((float(q.max()) for q in reached), default=-np.inf)
+        if low >= high:
+            # nothing is known of this axis, or one position of it, such as that of a circle: all its errors
+            # are zero over its travel, with their uncertainty
+            box[axis] = _travel_of(axis, observations, travel_mm)
+            ranges.append((min(low, box[axis, 0]), max(high, box[axis, 1])))
             continue
-        low = min(float(q.min()) for q in reached)
-        high = max(float(q.max()) for q in reached)
         ranges.append((low, high))
         sides = [] if own else [(low, high)]
         for name in {line.component for line in own}:

@@ -147,7 +147,9 @@ def circle_block(circles: Circles, parameters: Unknowns) -> Block:
     """The readings of all circles about one centre, one row each. Raises ConfigError."""
     if circles.sigma <= 0.0:
         raise ConfigError(
-            f"circle {circles.plane}: no uncertainty is stated; expected sigma_um", file=circles.source
+            f"circle {circles.plane}: no uncertainty is stated; add a comment such as # sigma_um = 0.2, the "
+            "standard uncertainty of one reading",
+            file=circles.source,
         )
     used = circle_used(circles)
     if used.sum() < 2 * len(UNKNOWNS):

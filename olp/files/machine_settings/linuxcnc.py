@@ -250,8 +250,12 @@ def _offsets(reading: Reading, ini: Path, load: Load) -> tuple[dict[str, WorkOff
 
 
 def _recognises(text: str) -> bool:
+    """[TRAJ] beside another section, or one of them where an `#INCLUDE` may bring the rest."""
     sections = set(re.findall(r"^\[(\w+)\]", text, re.MULTILINE))
-    return "TRAJ" in sections and bool(sections & {"KINS", "EMC", "RS274NGC", "AXIS_X", "AXIS_0", "JOINT_0"})
+    others = sections & {"KINS", "EMC", "HAL", "DISPLAY", "RS274NGC", "AXIS_X", "AXIS_0", "JOINT_0"}
+    if "TRAJ" in sections:
+        return bool(others - {"HAL", "DISPLAY"})
+    return bool(others) and re.search(r"^\s*#INCLUDE\s", text, re.MULTILINE) is not None
 
 
 FORMAT = SettingsFormat(

@@ -112,7 +112,8 @@ def files_of_measurements(sources: Sequence[PathLike]) -> tuple[str, ...]:
             continue
         try:
             stated = tomllib.loads(read_bytes(plan).decode("utf-8-sig"))
-            for table in (t for instrument in INSTRUMENTS for t in stated.get(instrument.key, ())):
+            tables = [t for instrument in INSTRUMENTS for t in stated.get(instrument.key, ())]
+            for table in (*tables, stated.get("defaults", {})):
                 names += [plan.parent / table[key] for key in ("file", "profile") if key in table]
         except (InputError, ValueError, TypeError, AttributeError):
             # The loader reports what is wrong with it.
@@ -178,8 +179,9 @@ def _readings(
                 name = dotted(key) if file is None else f"{dotted(key)} ({file})"
                 yield from ((line_of(key, key_lines), f"{name}: {text}") for text in error.problems)
             except InputError as error:
-                sentence = f'{dotted(key)}.file = "{file}": {error.message}'
-                yield line_of((*key, "file"), key_lines), sentence
+                own = file is not None and error.file == str(whole.beside(file)) and error.line is None
+                what = f'.file = "{file}": {error.message}' if own else f": {error}"
+                yield line_of((*key, "file"), key_lines), dotted(key) + what
 
 
 # -- files that describe themselves ----------------------------------------------------------------------

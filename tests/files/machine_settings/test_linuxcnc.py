@@ -196,6 +196,14 @@ def test_a_configuration_without_what_is_needed_is_refused(
     assert caught.value.exit_code == 3
 
 
+def test_a_configuration_is_recognised_whose_units_stand_in_an_included_file(tmp_path: Path) -> None:
+    whole = from_linuxcnc(write_set(tmp_path, INI)).machine
+    begin, end = INI.index("[TRAJ]"), INI.index("[RS274NGC]")
+    (tmp_path / "trajectory.inc").write_text(INI[begin:end], "utf-8")
+    path = write_set(tmp_path, f"#INCLUDE trajectory.inc\n{INI[:begin]}{INI[end:]}")
+    assert from_linuxcnc(path).machine == whole
+
+
 SAMPLES = [
     folder
     for folder in (
