@@ -139,9 +139,11 @@ def _maps(calibration: Calibration) -> Iterator[Finding]:
 
 
 def zero_curves(calibration: Calibration) -> Iterator[Finding]:
-    """Curves of nothing but zeros, as a skeleton has them. A fit writes what it did not observe as zeros with
-    their uncertainty."""
-    for curve in calibration.curves if calibration.quality is None else ():
+    """Curves of nothing but zeros, as a skeleton has them. A fit, which names its sources, writes what it did
+    not observe as zeros with their uncertainty."""
+    if calibration.quality is not None and calibration.quality.sources:
+        return
+    for curve in calibration.curves:
         if not any(values.any() for _, values in columns(curve)):
             text = f"calibration: every value of a curve of axis {curve.axis} is zero"
             yield finding("OLP466", f"{text}; expected measured values, or no such curve")

@@ -58,10 +58,9 @@ class Solved:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Task:
-    """Rows to be solved: targets, the axis values to start from, (n, axes, axes) `free`, which takes from
-    scaled changes of the axes what may not change, and (n, k, k) `asked`, which takes from turns of the tool
-    what is not asked for. `scale` (axes,) turns axis values into mm: 1, or the reference radius per
-    degree."""
+    """Rows to be solved: targets, and the axis values to start from. `free` (n, axes, axes) takes from scaled
+    changes of the axes what may not change. `asked` (n, k, k) takes from turns of the tool what is not asked
+    for. `scale` (axes,) turns axis values into mm: 1, or the reference radius per degree."""
 
     target: Poses
     near: Array
@@ -166,8 +165,8 @@ def _bounded(
     task: _Task, forward: Forward, slopes: Slopes, rotary: Mask, largest_deg: float
 ) -> tuple[_Task, Mask]:
     """The task without the motions of axes that would turn one of them by x, more than L, and without the
-    turns of the tool that they are for: these are made beforehand, by L^2 / x. And the rows (n,) where there
-    are any.
+    turns of the tool that they are for. Such a motion is made beforehand, by L^2 / x. And the rows (n,) where
+    there is one.
 
     Of a first step the orientation needs up to three motions that keep the tip. They are at right angles to
     each other, and near a singular posture one of them is long."""

@@ -223,15 +223,16 @@ def _shares(
     nominal: JointPath, path: JointPath, pairs: tuple[Index, Index], plan: JointPlan, axes: Array,
     play: Array, feed: Mask,
 ) -> tuple[Array, Array]:  # fmt: skip
-    """(m,) at which shares of its nominal move each move begins and ends: as planned where a nominal move has
-    as many parts as the plan, else where the pose is nearest. `pairs` are the last part of each nominal move,
-    and the nominal move of each part."""
+    """(m,) at which shares of its nominal move each move begins and ends. `pairs` are the last part of each
+    nominal move, and the nominal move of each part. A part ends where the pose is nearest, as words are
+    rounded along the path, too. In lists it ends as planned, where there are as many parts: the nearest
+    pose is another one where the machine cannot turn the tool."""
     groups, owner = pairs
     end, number = np.ones(len(path)), np.arange(len(path))
     first = np.append(-1, groups[:-1]) + 1
     begins = np.searchsorted(plan.move, np.arange(len(nominal)))
     parts = np.append(begins[1:], len(plan.move)) - begins
-    planned = (groups - first + 1 == parts)[owner]
+    planned = (groups - first + 1 == parts)[owner] & (path.listed is not None)
     inner = feed & (groups[owner] != number)
     row = np.flatnonzero(inner & planned)
     end[row] = plan.share[begins[owner[row]] + row - first[owner[row]]]

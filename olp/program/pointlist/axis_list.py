@@ -33,9 +33,10 @@ _COMMA_NUMBER = re.compile(r"[-+]?\d+,\d+")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AxisList:
-    """The rows of a list as a program without words, (n, axes) `values` in mm and deg, and their text: bytes
-    `start` to `stop` and `decimals`, (n, axes) each; `begin` and `end` (n,) are the bytes of a row. `tool`
-    (n,) are numbers of tools, -1 where none is stated. The rows are `joined` by straight lines or not."""
+    """The rows of a list as a program without words, with their (n, axes) `values` in mm and deg. The text of
+    a value is the bytes `start` to `stop`, with its `decimals`, (n, axes) each. `begin` and `end` (n,) are
+    the bytes of a row. `tool` (n,) are numbers of tools, -1 where none is stated. The rows are `joined` by
+    straight lines or not."""
 
     program: Program
     values: Array
