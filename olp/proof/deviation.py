@@ -49,7 +49,7 @@ class Deviation:
     waypoint: Single
     path: Single
     bend: Single
-    side: Array
+    side: Single
 
 
 def cutting_moves(path: Toolpath) -> Mask:
@@ -73,7 +73,7 @@ def measure(
     waypoint = np.full(count, np.nan, np.float32)
     worst = np.full(count, np.nan, np.float32)
     bend = np.zeros(count, np.float32)
-    side = np.zeros(count)
+    side = np.zeros(count, np.float32)
     tracer = Tracer(nominal, target_mm, path, groups, model, bend_mm)
     starts = UnknownStarts(nominal, target_mm, path, groups, model, bend_mm)
     sides = UnknownSides(path, model) if tracer.has_play else None

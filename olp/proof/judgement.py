@@ -7,8 +7,8 @@ program are groups of rows. Nothing else decides whether a program is within tol
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
@@ -44,7 +44,8 @@ class Judgements:
     """(n,) per nominal move: `line`, `tool` (-1: none), `operation` (from 0: of one tool and work offset) and
     `counts`. In mm: `uncorrected` and `corrected` are the deviations that count, or where the move only is
     shown its deviation at the end. NaN where a position is unknown. `allowed_mm` is numerical tolerance plus
-    rounding. `measured` is the layer of runs on the machine, None where there are none."""
+    rounding. `measured` is the layer of runs on the machine, None where there are none. `side` has by layer
+    how much of the deviation an unknown side of the backlash may be; without a layer it is nothing."""
 
     line: Index
     tool: Index
@@ -55,6 +56,7 @@ class Judgements:
     tolerance_mm: float
     allowed_mm: float
     measured: Measured | None = None
+    side: Mapping[str, Single] = field(default_factory=dict)
 
     @staticmethod
     def of(proof: Proof) -> Judgements:
@@ -66,9 +68,11 @@ class Judgements:
             np.where(judged, size, np.where(shown, part.waypoint, np.nan)).astype(np.float32)
             for part, size in ((proof.before, proof.before_mm), (proof.after, proof.after_mm))
         ]
+        parts = (("uncorrected", proof.before), ("corrected", proof.after))
         return Judgements(
             path.line.astype(np.int64), tool, operation, proof.counts, sides[0], sides[1],
-            proof.tolerance_mm, proof.allowed_mm,
+            proof.tolerance_mm, proof.allowed_mm, None,
+            {name: part.side for name, part in parts if part.side[judged].any()},
         )  # fmt: skip
 
     def with_measured(self, runs: Measured) -> Judgements:
@@ -115,7 +119,8 @@ class Judgements:
         """Of each line that moves: `line`, and of each layer the largest deviation of what counts on it, else
         of what is shown, and its state: 0 within, 1 above, 2 shown and not judged. `uncorrected_um` and
         `corrected_um` are judged by what is allowed, `measured_um` (NaN: not measured) by the part tolerance.
-        `state` is that of the line: of the corrected program, and above where the measured one is."""
+        `state` is that of the line: of the corrected program, and above where the measured one is. Of
+        layers in `side`, `uncorrected_side_um` and `corrected_side_um` are the part of the deviation."""
         lines, row = np.unique(self.line, return_inverse=True)
         result: dict[str, npt.NDArray[Any]] = {"line": lines}
         counted = np.zeros(len(lines), bool)
@@ -125,6 +130,10 @@ class Judgements:
             largest = np.full(len(lines), np.nan)
             np.fmax.at(largest, row[rows], values[rows].astype(float) * UM_PER_MM)
             result[f"{name}_um"] = largest
+            if name in self.side:
+                top = self.judged & (values.astype(float) * UM_PER_MM == largest[row])
+                part = result[f"{name}_side_um"] = np.zeros(len(lines))
+                np.fmax.at(part, row[top], self.side[name][top].astype(float) * UM_PER_MM)
             over = self.judged & (np.nan_to_num(values) > self.allowed_mm)
             state = np.where(counted, WITHIN, SHOWN).astype(np.uint8)
             state[row[over]] = ABOVE

@@ -251,7 +251,7 @@ def _refuse_blind(path: Toolpath, blind: Mask) -> None:
 
 def _sizes(deviation: Deviation, how: npt.NDArray[np.uint8], bottom: Index, stroke: Single) -> Single:
     """(n,) mm: along the path of feed moves, at the end of points, of a hole at the move to its bottom."""
-    side = deviation.side.astype(np.float32)
+    side = deviation.side
     size = np.full(len(how), np.nan, np.float32)
     along, end = how == Counts.FEED, how == Counts.POINT
     size[along] = np.fmax(deviation.waypoint, deviation.path)[along] + side[along]

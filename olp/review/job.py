@@ -237,9 +237,8 @@ def _shown(
 ) -> _Shown:  # fmt: skip
     """Samples, with the motion, or with the times at the programmed feed of moves that take `seconds`."""
     (progress or silent)("sample", 0.0)
-    path, table = texts.nominal.toolpath, texts.table
     samples = sample(texts.nominal, texts.second, texts.groups, loaded.model, options.step_mm)
-    samples = with_starts(samples, path, {"uncorrected": table.uncorrected, "corrected": table.corrected})
+    samples = with_starts(samples, texts.nominal, texts.table)
     if seconds is not None:
         return _Shown(samples, by_feed(seconds, samples), None)
     from olp.workflows import retime

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from olp.core.arrays import Array
 from olp.core.units import UM_PER_MM
+from olp.proof.judgement import Judgements
 from olp.proof.measured import ABOVE
 from olp.proof.proof import Counts
 from olp.review.pack import Arrays
@@ -55,7 +56,10 @@ def judged_lines(scene: Scene, arrays: Arrays) -> dict[str, Any]:
             own = runs.by_line(k)
             columns[name] = _line_column(scene, arrays, f"um_{name}", own["line"], own["measured_um"])
             states[name] = _line_states(scene, arrays, name, own["line"], own["state"])
-    by_layer = {name: {"um": columns[name], "state": states[name]} for name in columns}
+    by_layer = {name: {"um": columns[name], "state": states[name], "side": None} for name in columns}
+    for name in scene.table.side:
+        side_um = table[f"{name}_side_um"]
+        by_layer[name]["side"] = _line_column(scene, arrays, f"{name}_side_um", table["line"], side_um)
     state = _line_states(scene, arrays, "line", table["line"], table["state"])
     return shown | {"state": state, "by_layer": by_layer}
 
@@ -117,7 +121,8 @@ def pictures(scene: Scene) -> Iterator[dict[str, Any]]:
         above = table.judged & (np.nan_to_num(values) > table.allowed_mm)
         yield {
             "name": layer, "label": layer, "layers": [layer], "tolerance_um": allowed_um, "basis": "allowed",
-            "rms_um": rms_um, "lines_above": len(np.unique(table.line[above])), "note": None,
+            "rms_um": rms_um, "lines_above": len(np.unique(table.line[above])),
+            "note": _side_note(table, layer, values),
             **_largest(scene, layer, values),
         }  # fmt: skip
     runs = table.measured
@@ -134,6 +139,21 @@ def pictures(scene: Scene) -> Iterator[dict[str, Any]]:
                 "note": None if scene.measured[k].counted.any() else _NOT_JUDGED,
                 **_largest_measured(scene, k),
             }  # fmt: skip
+
+
+def _side_note(table: Judgements, layer: str, values: npt.NDArray[np.float32]) -> str | None:
+    """What a picture says where its largest deviation has an unknown side of the backlash in it."""
+    if layer not in table.side or not table.judged.any():
+        return None
+    worst = int(_size(values, table.judged).argmax())
+    part_um = float(table.side[layer][worst]) * UM_PER_MM
+    largest_um = float(values[worst]) * UM_PER_MM
+    if part_um < _LISTED_UM / 2:
+        return None
+    return (
+        f"up to {part_um:.2f} um of the largest, {largest_um:.2f} um, may be backlash, whose side is not "
+        f"known there yet; the path is drawn {largest_um - part_um:.2f} um off."
+    )
 
 
 def _along(scene: Scene) -> bool:

@@ -71,8 +71,8 @@ def manifest_of(scene: Scene) -> tuple[dict[str, Any], Arrays]:
     arrays.quantised("Q", scene.samples.axis_mm - axes_origin, POSITION_MM, plus=[base])
     row = scene.listing.row_of(scene.nominal.toolpath.line[scene.samples.move].astype(np.int64))
     arrays.quantised("line", row, 1.0)
-    arrays.raw("rapid", _rapid(scene), "u1")
-    arrays.raw("waypoint", (scene.samples.share == 1.0).astype(np.uint8), "u1")
+    arrays.raw("rapid", rapid(scene), "u1")
+    arrays.raw("waypoint", scene.waypoint.astype(np.uint8), "u1")
     arrays.along("t", scene.time_s, TIME_S, "P")
     arrays.along("s", scene.samples.arc_mm, ARC_MM, "P")
     manifest = {
@@ -120,11 +120,12 @@ def manifest_of(scene: Scene) -> tuple[dict[str, Any], Arrays]:
     return manifest | {"arrays": arrays.specs}, arrays
 
 
-def _rapid(scene: Scene) -> npt.NDArray[np.uint8]:
+def rapid(scene: Scene) -> npt.NDArray[np.uint8]:
     """(n,) 1 where the path does not count: rapids, and the way to a point that counts alone."""
     samples = scene.samples
-    aside = scene.nominal.toolpath.kind[samples.move] == Kind.RAPID
-    aside |= (scene.table.counts[samples.move] == Counts.POINT) & (samples.share < 1.0)
+    point = scene.table.counts[samples.move] == Counts.POINT
+    aside = (scene.nominal.toolpath.kind[samples.move] == Kind.RAPID) | point
+    aside &= ~point | (samples.share < 1.0)
     rapid = np.where(aside, np.uint8(1), np.uint8(0))
     rapid[~samples.joined] = 2
     return np.asarray(rapid)

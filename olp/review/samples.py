@@ -6,7 +6,7 @@ point, so that a deviation is the distance from the nominal point.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +21,8 @@ from olp.errormodel.reversal import plays
 from olp.errormodel.sampling import clear_length_mm, longer, steps_needed
 from olp.program.feeds.moves import lengths_mm
 from olp.program.program import Program
+from olp.proof.judgement import Judgements
+from olp.proof.proof import Counts
 from olp.proof.smooth_joints import SmoothJoints
 from olp.review.parts import BLOCK, Ends, Parts, error_mm, held_mm, set_beside, set_in_holes
 
@@ -43,7 +45,7 @@ _MOST_STEPS = 1 << 12
 #: A cut gets a sample at its start where that is farther off than the others by more than this share of it,
 _LESS = 0.005
 #: and by more than this, in mm.
-_LESS_MM = 2e-5
+_LESS_MM = 1e-5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -144,39 +146,70 @@ def _put_across(path: Toolpath, move: Index, share: Array, *deviations: Array) -
         deviation[ends[rows]] = off
 
 
-def away_mm(position_mm: Array, share: Array, delta_mm: Array) -> Array:
-    """(n,) mm: how far the tip is off at samples, as in the proof. At the end of a move that is from the
-    nominal point, before it from the path. At its start it is from the path ahead, or from the nominal point
-    where the tip is behind that. `position_mm` and `delta_mm` are (n, 3), `share` (n,)."""
-    step = np.diff(position_mm, axis=0, prepend=position_mm[:1])
-    begins = (share == 0.0) & (step == 0.0).all(axis=1)
-    # the tangent of arcs: from the sample before to the one behind
-    inner = np.flatnonzero(share[:-1] != 1.0)
-    step[inner] += step[inner + 1]
-    length = np.sqrt(np.einsum("ij,ij->i", step, step))
-    along = np.einsum("ij,ij->i", delta_mm, step) / np.maximum(length, 1e-12)
-    along[(share == 1.0) | (begins & (along < 0.0))] = 0.0
-    squares = np.einsum("ij,ij->i", delta_mm, delta_mm) - along * along
-    return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
+def waypoints(samples: Samples, table: Judgements, rows: slice = slice(None)) -> Mask:
+    """(m,) which samples, or which of some, are waypoints: ends of moves, but not of the strokes of a hole
+    above its bottom, which have no figure of their own."""
+    inside = (table.counts == Counts.HOLE) & np.isnan(table.corrected)
+    return np.asarray((samples.share[rows] == 1.0) & ~inside[samples.move[rows]])
 
 
-def with_starts(samples: Samples, path: Toolpath, stated: Mapping[str, npt.NDArray[np.float32]]) -> Samples:
+def away_mm(position_mm: Array, share: Array, waypoint: Mask, delta_mm: Array) -> Array:
+    """(n,) mm: how far the tip is off at samples, as in the proof. At waypoints that is from the nominal
+    point, before them from the path of the move: where the tip is behind its start or beyond its end, from
+    there.
+    `position_mm` and `delta_mm` are (n, 3), `share` and `waypoint` (n,)."""
+    away = np.empty(len(share))
+    for a in range(0, len(share), BLOCK):
+        rows = np.arange(a, min(a + BLOCK, len(share)))
+        here, delta, own = position_mm[rows], delta_mm[rows].astype(float), share[rows]
+        # the tangent of arcs: from the sample before to the one behind
+        begins = own == 0.0
+        before, behind = np.where(begins, rows, np.maximum(rows - 1, 0)), np.where(own == 1.0, rows, rows + 1)
+        behind = np.minimum(behind, len(share) - 1)
+        # a start may be there twice, before and after backlash is taken up
+        behind[begins & (share[behind] == 0.0)] += 1
+        behind = np.minimum(behind, len(share) - 1)
+        back, ahead = position_mm[before], position_mm[behind]
+        step = ahead - back
+        length = np.sqrt(np.einsum("ij,ij->i", step, step))
+        along = np.einsum("ij,ij->i", delta, step) / np.maximum(length, 1e-12)
+        done, left = np.sqrt(((here - back) ** 2).sum(axis=1)), np.sqrt(((ahead - here) ** 2).sum(axis=1))
+        on = np.clip(
+            along, np.where(waypoint[before] | (share[before] == 0.0), -done, -np.inf),
+            np.where(waypoint[behind], left, np.inf),
+        )  # fmt: skip
+        on[waypoint[rows]] = 0.0
+        squares = np.einsum("ij,ij->i", delta, delta) - along * along + (along - on) ** 2
+        away[rows] = np.sqrt(np.maximum(squares, 0.0))
+    return away
+
+
+def with_starts(samples: Samples, nominal: Program, table: Judgements) -> Samples:
     """The samples, and the start of each cut that is farther off than its other samples by more than `_LESS`
-    or `_LESS_MM`; of long programs those with the most. `stated` has (n,) mm of the moves by layer, as in the
-    table of judgements."""
+    or `_LESS_MM`, as the table of judgements states it; of long programs those with the most."""
+    path = nominal.toolpath
     first = np.flatnonzero(np.diff(samples.move, prepend=-1))
     first = first[1:] if len(first) else first
     move = samples.move[first]
-    starts = (samples.share[first] > 0.0) & samples.joined[first] & (path.kind[move] != Kind.RAPID)
+    starts = samples.joined[first] & (path.kind[move] != Kind.RAPID)
     starts &= (samples.move[first - 1] == move - 1) & (path.frame[move] == path.frame[move - 1])
+    # what is there already, unless backlash was taken up there
+    moved = np.any(samples.uncorrected[first] != samples.uncorrected[first - 1], axis=1)
+    moved |= np.any(samples.corrected[first] != samples.corrected[first - 1], axis=1)
+    starts &= (samples.share[first] > 0.0) | moved
     first, move = first[starts], move[starts]
     more = np.zeros(len(first))
-    for layer, largest in stated.items():
-        away = away_mm(samples.axis_mm, samples.share, getattr(samples, layer))
-        drawn = np.zeros(len(path))
-        np.maximum.at(drawn, samples.move, away)
-        missed = largest[move] - drawn[move]
-        more = np.fmax(more, np.where(missed > np.maximum(_LESS_MM, _LESS * largest[move]), missed, 0.0))
+    ends, groups = waypoints(samples, table), _groups(nominal)
+    for layer in ("uncorrected", "corrected"):
+        delta = getattr(samples, layer)
+        away = away_mm(samples.axis_mm, samples.share, ends, delta)
+        drawn, largest = np.zeros(len(path)), np.zeros(len(path), np.float32)
+        np.maximum.at(drawn, groups[samples.move], away)
+        np.fmax.at(largest, groups, getattr(table, layer) - table.side.get(layer, np.float32(0.0)))
+        stated, before = largest[groups[move]], drawn[groups[move]]
+        there = np.sqrt(np.einsum("ij,ij->i", delta[first - 1], delta[first - 1]))
+        missed = np.minimum(stated, there) - before
+        more = np.fmax(more, np.where(missed > np.maximum(_LESS_MM, _LESS * stated), missed, 0.0))
     spare = max(SAMPLES - len(samples), SAMPLES // 10)
     chosen = np.sort(np.argsort(-more, kind="stable")[: min(spare, np.count_nonzero(more))])
     first, move = first[chosen], move[chosen]
@@ -185,6 +218,15 @@ def with_starts(samples: Samples, path: Toolpath, stated: Mapping[str, npt.NDArr
     begins = np.flatnonzero(np.diff(order, prepend=-1) == 0)
     twice.move[begins], twice.share[begins], twice.joined[begins] = move, 0.0, True
     return twice
+
+
+def _groups(nominal: Program) -> Index:
+    """(n,) the move whose figure is that of each move: of the strokes of a hole it is one for all."""
+    groups = np.arange(len(nominal.toolpath))
+    move, hole = nominal.holes.moves()
+    feed = nominal.toolpath.kind[move] != Kind.RAPID
+    groups[move[feed]] = nominal.holes.ends(feed)[0][hole[feed]]
+    return groups
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Array
+from olp.core.arrays import Array, Mask
 from olp.core.machine import Machine
 from olp.core.toolpath import Toolpath
 from olp.core.values import dataclass
@@ -19,7 +19,7 @@ from olp.review.listing import Listing
 from olp.review.measured import Matched
 from olp.review.meshes import Body
 from olp.review.motion import MotionTable
-from olp.review.samples import Samples, away_mm
+from olp.review.samples import Samples, away_mm, waypoints
 
 Single = npt.NDArray[np.float32]
 
@@ -93,6 +93,11 @@ class Scene:
     digit_mm: float
     uncertainty: TipUncertainty | None = None
 
+    @property
+    def waypoint(self) -> Mask:
+        """(n,) samples at the ends of moves, which count by their distance from the nominal point."""
+        return waypoints(self.samples, self.table)
+
     def worst_sample(self, layer: str, move: int) -> int | None:
         """The sample of a move where a layer ("uncorrected" or "corrected") is off by what the table states
         of the move, as nearly as it is sampled; None where the move has no sample."""
@@ -101,7 +106,8 @@ class Scene:
         if a == b:
             return None
         rows = slice(max(a - 1, 0), b + 1)
-        size = away_mm(self.position_mm[rows], samples.share[rows], getattr(samples, layer)[rows])
+        ends = waypoints(samples, self.table, rows)
+        size = away_mm(self.position_mm[rows], samples.share[rows], ends, getattr(samples, layer)[rows])
         size = size[a - rows.start :][: b - a]
         stated = float(getattr(self.table, layer)[move])
         return int(a) + int(np.abs(size - stated).argmin())

@@ -3,6 +3,7 @@ hand."""
 
 from __future__ import annotations
 
+import math
 import shutil
 from functools import cache
 from pathlib import Path
@@ -16,6 +17,7 @@ import olp
 from olp.core.errors import CannotCompute
 from olp.core.toolpath import Flag, Kind
 from olp.review.job import Review
+from olp.review.manifest import rapid
 from olp.review.samples import away_mm
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -204,33 +206,71 @@ def test_a_program_without_positions_has_nothing_to_show(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize(
-    ("folder", "program"), [("nasty", "modal.ngc"), ("nasty", "planes.ngc"), ("gantry-plate", "plate.ngc")]
+    ("folder", "program", "job"),
+    [
+        ("nasty", "modal.ngc", "job.toml"),
+        ("nasty", "planes.ngc", "job.toml"),
+        ("nasty", "cycles.ngc", "job.toml"),
+        ("gantry-plate", "plate.ngc", "job.toml"),
+        ("gantry-plate", "bracket.mpf", "job-bracket.toml"),
+        ("haas-mill", "bracket.nc", "job.toml"),
+        ("haas-mill", "manifold.nc", "job-manifold.toml"),
+        pytest.param("table-router", "front.ngc", "job.toml", marks=pytest.mark.slow),
+        ("table-router", "outline.ngc", "job-outline.toml"),
+        ("table-router", "drill.ngc", "job-drill.toml"),
+        pytest.param("bridge-cmm", "housing.ngc", "job.toml", marks=pytest.mark.slow),
+    ],
 )
-def test_what_is_drawn_of_a_cut_is_what_the_table_states(folder: str, program: str) -> None:
-    """But for what an unknown side of the backlash may change, 3 um on the plate, and for holes, of which
-    the table judges the stroke and not the retraction."""
+def test_what_is_drawn_of_a_line_is_what_the_table_states(folder: str, program: str, job: str) -> None:
+    """Without what an unknown side of the backlash may add, which the table tells, within what the proof may
+    miss between two of its samples. Every line that counts is drawn."""
     where = ROOT / "programs" / folder
-    scene = olp.view(where / program, where / "machine.toml", time=False).scene
-    path, samples = scene.nominal.toolpath, scene.samples
-    cuts = (path.kind != Kind.RAPID) & ((path.flag & np.uint8(Flag.CYCLE)) == 0)
-    cuts &= np.isin(np.arange(len(path)), samples.move)
+    scene = olp.view(where / program, where / "machine.toml", where / job, time=False).scene
+    samples, table = scene.samples, scene.table
+    lines = table.by_line()
+    counts = np.flatnonzero(lines["state"] < 2)
+    row = np.searchsorted(lines["line"], table.line[samples.move])
+    drawn_there = table.judged[samples.move] & (rapid(scene) != 1)
     for layer in ("uncorrected", "corrected"):
-        away = away_mm(scene.position_mm, samples.share, getattr(samples, layer))
-        drawn = np.zeros(len(path))
-        np.maximum.at(drawn, samples.move, away)
-        more = (getattr(scene.table, layer) - drawn)[cuts] * 1e3
-        size = drawn[cuts] * 1e3
-        assert (more > -0.03 - 0.005 * size).all(), layer
-        known = more < 0.03 + 0.01 * size
-        assert known.mean() > 0.97 and (more < 3.03 + 0.01 * size).all(), layer
+        away = away_mm(scene.position_mm, samples.share, scene.waypoint, getattr(samples, layer))
+        drawn = np.full(len(lines["line"]), -np.inf)
+        np.maximum.at(drawn, row[drawn_there], 1e3 * away[drawn_there])
+        side = lines.get(f"{layer}_side_um", np.zeros(len(drawn)))
+        stated = lines[f"{layer}_um"] - side
+        assert (np.abs(drawn - stated) < 0.1 + 0.01 * stated)[counts].all(), layer
+        close = np.abs(drawn - stated) < 0.02 + 0.005 * stated
+        assert close[counts].mean() > 0.8, layer
+
+
+def test_an_unknown_side_of_the_backlash_is_told_of_each_line() -> None:
+    """On the plate, whose axes have 3 um of backlash, until they have moved by it."""
+    where = ROOT / "programs" / "gantry-plate"
+    scene = olp.view(where / "plate.ngc", where / "machine.toml", where / "job.toml", time=False).scene
+    lines = scene.table.by_line()
+    told = lines["line"][lines["uncorrected_side_um"] > 0.005].tolist()
+    assert 849 in told and 900 not in told and len(told) < 20
+    assert lines["uncorrected_side_um"][lines["line"] == 849] == pytest.approx(3.0, abs=0.01)
+    # the corrected program takes it up first
+    assert "corrected" not in scene.table.side
 
 
 def test_how_far_a_sample_is_off_by_its_place_in_the_move() -> None:
     """On a path to the right, then up: the deviation is (-3, 4) at the end of the first move, at the start of
     the second one, within it and at its end."""
-    position = np.array([[0.0, 0, 0], [1, 0, 0], [1, 0, 0], [1, 1, 0], [1, 2, 0]])
+    position = np.array([[0.0, 0, 0], [9, 0, 0], [9, 0, 0], [9, 9, 0], [9, 18, 0]])
     share = np.array([0.0, 1.0, 0.0, 0.5, 1.0])
     delta = np.tile([-3.0, 4.0, 0.0], (5, 1))
     # the start of the path lies behind the nominal point, that of the second move ahead of it
-    assert away_mm(position, share, delta).tolist() == [5.0, 5.0, 3.0, 3.0, 5.0]
-    assert away_mm(position, share, -delta).tolist() == [4.0, 5.0, 5.0, 3.0, 5.0]
+    assert away_mm(position, share, share == 1.0, delta).tolist() == [5.0, 5.0, 3.0, 3.0, 5.0]
+    assert away_mm(position, share, share == 1.0, -delta).tolist() == [4.0, 5.0, 5.0, 3.0, 5.0]
+    # the end of a stroke above the bottom counts as what is between
+    assert away_mm(position, share, np.array([0, 1, 0, 0, 0], bool), delta)[-1] == 3.0
+
+
+def test_beyond_the_end_of_a_short_move_it_is_off_from_there() -> None:
+    """Moves of 2 to the right, which are shorter than the tip is off, (3, 4)."""
+    position = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]])
+    share, delta = np.array([0.0, 0.5, 1.0]), np.tile([3.0, 4.0, 0.0], (3, 1))
+    away = away_mm(position, share, share == 1.0, delta)
+    assert away.tolist() == pytest.approx([4.0, math.hypot(2, 4), 5.0])
+    assert away_mm(position, share, share == 1.0, -delta)[1] == pytest.approx(math.hypot(2, 4))

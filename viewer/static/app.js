@@ -172,6 +172,12 @@
       return value >= 0 ? value : null;
     }
 
+    // The part of that which an unknown side of the backlash may be, um.
+    side_um(name, row) {
+      const own = this.manifest.listing.by_layer?.[name];
+      return own?.side && row >= 0 ? Math.max(0, this.arrays.get(own.side)[row]) : 0;
+    }
+
     // The largest deviation that the table states of a layer on rows that count; -1 where none does.
     largest_of(rows, name) {
       const own = this.manifest.listing.by_layer?.[name];

@@ -84,8 +84,7 @@
     }
 
     // What counts, as in the proof: at waypoints the distance from the nominal point, between them the distance from the
-    // path, which at the start of a move is that from the nominal point where the tip is behind it; of measured points
-    // the distance.
+    // path of the move; of measured points the distance.
     distance(layer, out) {
       const {n, D, index} = layer,
         {waypoint} = this.app;
@@ -97,27 +96,38 @@
 
     // Parts by the direction of the nominal segment that ends in the sample: along it; normal, to its left in the plane
     // across Z; binormal, which completes the two (up on a level path); across, the size of the last two.
-    // Path: across, or the distance from the nominal point where the tip is behind the start of the move.
+    // Path: across, or the distance from the start of the move where the tip is behind it, or from its end where beyond.
     split(part, {n, D, index}, out) {
       const P = this.app.base,
         {waypoint} = this.app,
         u = [1, 0, 0],
-        side = [0, 1, 0];
+        side = [0, 1, 0],
+        far = (a, b) => Math.sqrt((P[a] - P[b]) ** 2 + (P[a + 1] - P[b + 1]) ** 2 + (P[a + 2] - P[b + 2]) ** 2),
+        same = (a, b) => P[a] === P[b] && P[a + 1] === P[b + 1] && P[a + 2] === P[b + 2];
+      let begins = false;
       for (let i = 0, k = 0; i < n; i++, k += 3) {
         const s = index ? index[i] : i,
           a = 3 * s;
-        let start = false;
-        if (s > 0) {
-          let x = P[a] - P[a - 3],
-            y = P[a + 1] - P[a - 2],
-            z = P[a + 2] - P[a - 1];
-          // between waypoints from the sample before to the one behind, which on arcs is the tangent
-          if (waypoint && !waypoint[s] && a + 5 < P.length) {
-            start = x === 0 && y === 0 && z === 0 && waypoint[s - 1];
-            x = P[a + 3] - P[a - 3];
-            y = P[a + 4] - P[a - 2];
-            z = P[a + 5] - P[a - 1];
+        let done = Infinity,
+          left = Infinity,
+          next = a;
+        // between waypoints from the sample before to the one behind, which on arcs is the tangent
+        if (waypoint && !waypoint[s] && a + 5 < P.length) {
+          const opened = begins || waypoint[s - 1] === 1;
+          begins = s === 0 || (opened && same(a, a - 3));
+          next = a + 3;
+          // a start may be there twice, before and after backlash is taken up
+          if (begins && !waypoint[s + 1] && a + 8 < P.length && same(a, next)) next += 3;
+          if (part === "path") {
+            done = begins ? 0 : opened ? far(a, a - 3) : Infinity;
+            left = waypoint[next / 3] ? far(a, next) : Infinity;
           }
+        } else begins = false;
+        if (s > 0 || next) {
+          const from = s > 0 ? a - 3 : 0,
+            x = P[next] - P[from],
+            y = P[next + 1] - P[from + 1],
+            z = P[next + 2] - P[from + 2];
           const length = Math.sqrt(x * x + y * y + z * z);
           if (length > 0) {
             u[0] = x / length;
@@ -137,7 +147,7 @@
           value = -D[k] * u[2] * side[1] + D[k + 1] * u[2] * side[0] + D[k + 2] * (u[0] * side[1] - u[1] * side[0]);
         else {
           if (part !== "across" && part !== "path") throw new Error(`unknown metric part ${part}`);
-          const off = part === "path" && start && along < 0 ? 0 : along,
+          const off = Math.max(-done, Math.min(left, along)),
             x = D[k] - off * u[0],
             y = D[k + 1] - off * u[1],
             z = D[k + 2] - off * u[2];

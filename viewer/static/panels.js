@@ -24,7 +24,7 @@
 
   // What is to be said of pictures beside their figures.
   OLP.notes_of = app =>
-    app.pictures.list.filter(p => p.note).map(p => make("p", {className: "empty note-of", textContent: `${p.label}: ${p.note}`}));
+    app.pictures.list.filter(p => p.note).map(p => make("p", {className: "empty note-of", textContent: `${p.label}: ${micrometres(p.note)}`}));
 
   class Panels {
     constructor(app) {
@@ -276,6 +276,11 @@
           d = layer.at(at, 1).map((v, j) => 1e3 * (v - a[j])),
           size = app.metrics.values(app.distance, layer.name)?.[Math.ceil(at - 1e-9)] ?? NaN;
         row(`${label}, µm`, [...d.map(number), size === size ? number(size) : "–", stated], other);
+      }
+      for (const name of app.pictures.current.layers) {
+        const part = app.side_um(name, state.row),
+          text = `${um(part)} µm of the line's ${um(app.stated_um(name, state.row))} may be backlash: its side is not known yet`;
+        if (part > 0) table.append(make("tr", {}, make("td", {className: "side", colSpan: 6, textContent: text})));
       }
       $("readout").replaceChildren(table);
     }
