@@ -102,9 +102,28 @@ class _Contour:
         arcs = np.flatnonzero((elements.first & elements.arc)[parts.element])
         if not arcs.size:
             return parts
+        self._refuse_backward(arcs)
         centre = parts.centre.copy()
         centre[arcs] = centre_on(point[arcs], parts.centre[arcs], parts.begin[arcs])
         return replace(parts, centre=centre)
+
+    def _refuse_backward(self, arcs: Index) -> None:
+        """Raise ProgramError where the tool arrives against the direction of an arc, part `arcs`, that enters
+        a contour: there a digit of the programmed arc moves that of the tool by many."""
+        parts, of = self.parts, self.parts.element[arcs]
+        way, own = parts.centre[arcs] - parts.end[arcs], self.elements.centre[of] - parts.end[arcs]
+        errors = [
+            ProgramError(
+                "the arc that enters the contour begins on the wrong side of its end for a cutter of "
+                f"{self.elements.radius[i]:g} mm, so the tool arrives against its direction; make the move "
+                "longer, use a smaller cutter, or have this path of the tool written, with --contour path",
+                line=int(self.path.line[self.elements.move[i]]),
+                code="OLP561",
+            )
+            for i in of[(way * own).sum(axis=1) < 0].tolist()
+        ]
+        if errors:
+            raise ProgramError.together(errors)
 
     def _grid(self) -> Grid:
         """What the ends of parts can be written as."""

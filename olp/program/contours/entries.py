@@ -1,7 +1,8 @@
 """Arcs that enter a contour, as LinuxCNC makes them.
 
 Measured on its interpreter: the tool ends beside the end of the programmed arc, as on any arc. It gets there
-from the point where it is on another arc, whose centre lies on the line from that end to the programmed one.
+from the point where it is on another arc, whose centre lies on the line through that end and the programmed
+one. Where it lies behind the end, the tool arrives against the direction of the contour.
 """
 
 from __future__ import annotations
@@ -11,6 +12,8 @@ import numpy as np
 from olp.core.arrays import Array, Index
 from olp.program.contours.elements import Elements
 
+#: cosine below which LinuxCNC finds no centre
+_ACROSS = 1e-4
 
 def entering(elements: Elements) -> Index:
     """The elements that are such arcs."""
@@ -18,14 +21,14 @@ def entering(elements: Elements) -> Index:
 
 
 def centre_on(end: Array, toward: Array, start: Array) -> Array:
-    """(k, 2) centres of arcs from `start` to `end` (k, 2), on the line from the end to the points `toward`.
-    NaN where the start lies behind the end, so that there is none on that side."""
+    """(k, 2) centres of arcs from `start` to `end` (k, 2), on the line through the end and the points
+    `toward`. NaN where the start lies across that line, so that there is none."""
     way = toward - end
     with np.errstate(divide="ignore", invalid="ignore"):
         way = way / np.hypot(*way.T)[:, None]
         back = start - end
-        along = (back * way).sum(axis=1)
-        size = np.where(along > 0, np.square(back).sum(axis=1) / (2 * along), np.nan)
+        along, length = (back * way).sum(axis=1), np.hypot(*back.T)
+        size = np.where(np.abs(along) < _ACROSS * length, np.nan, length**2 / (2 * along))
     return np.asarray(end + size[:, None] * way)
 
 

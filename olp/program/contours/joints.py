@@ -137,7 +137,7 @@ def refusals(elements: Elements, found: Joints, rules: ContourRules) -> list[tup
         ),
         (
             _without_arc(elements, found),
-            "the arc that enters the contour begins on the wrong side of its end for a cutter of {r:g} mm",
+            "no arc leads a cutter of {r:g} mm to the end of the arc that enters the contour",
         ),
         (
             elements.first & elements.arc & np.append(corner[1:] == Corner.INSIDE, False),
