@@ -15,6 +15,7 @@ from olp.program.contours.elements import Elements
 #: cosine below which LinuxCNC finds no centre
 _ACROSS = 1e-4
 
+
 def entering(elements: Elements) -> Index:
     """The elements that are such arcs."""
     return np.flatnonzero(elements.first & elements.arc)

@@ -15,6 +15,7 @@ class Language:
 
     - `macro_b`: IF, WHILE, DO, END and GOTO control the run without O-words, and the right side of an
       assignment needs no brackets. Variables are numbered as in Macro B: #1 to #33 local, vacant until set.
+    - `modal_variables`: #4001 to #4010 and #4107 to #4120 have what is in force before a block.
     - `saved_modes`: M70 to M73 save and restore modal codes. `profile_cycles`: G70 to G72 name a subprogram.
     - `splines`: G5 to G5.3 are splines, and `@` and `^` radius and angle.
     - `counts_in_p`: P of M98 has the count in front of four digits of the number. `shared_locals`: M98 keeps
@@ -27,6 +28,7 @@ class Language:
 
     arithmetic: Arithmetic
     macro_b: bool
+    modal_variables: bool
     saved_modes: bool
     profile_cycles: bool
     splines: bool
@@ -41,14 +43,14 @@ class Language:
 
 
 NGC = Language(
-    arithmetic=expressions.NGC, macro_b=False, saved_modes=True, profile_cycles=True, splines=True,
-    counts_in_p=False, shared_locals=False, calls_none=True, increments_open=False, decimals=12,
+    arithmetic=expressions.NGC, macro_b=False, modal_variables=False, saved_modes=True, profile_cycles=True,
+    splines=True, counts_in_p=False, shared_locals=False, calls_none=True, increments_open=False, decimals=12,
     all_digits=True, counts=frozenset(), points=False,
 )  # fmt: skip
 #: Without splines, radius and angle, as other controls have the words of RS-274.
 PLAIN_NGC = replace(NGC, splines=False)
 MACRO_B = Language(
-    arithmetic=expressions.MACRO_B, macro_b=True, saved_modes=False, profile_cycles=False, splines=False,
-    counts_in_p=True, shared_locals=True, calls_none=False, increments_open=True, decimals=4,
-    all_digits=False, counts=frozenset("gmnpltdhos"), points=True,
+    arithmetic=expressions.MACRO_B, macro_b=True, modal_variables=True, saved_modes=False,
+    profile_cycles=False, splines=False, counts_in_p=True, shared_locals=True, calls_none=False,
+    increments_open=True, decimals=4, all_digits=False, counts=frozenset("gmnpltdhos"), points=True,
 )  # fmt: skip

@@ -200,6 +200,7 @@ class _Flattener:
         cut = set(without)
         kept = [i for i in range(len(line.words)) if i not in cut]
         active: list[Value] = [(values[i][0], self._tracked(line.words[i], values[i][1])) for i in kept]
+        self.variables.modal.follow(active, switched=line.deleted)
         before = (self.state.absolute, self.state.path, tuple(self.state.position))
         texts: dict[int, str] = {}
         if self.language.splines:

@@ -8,6 +8,7 @@ from olp.core.errors import ProgramError
 from olp.program.rs274.codes import INVERSE_TIME, METRIC
 from olp.program.rs274.flatten.expressions import filled
 from olp.program.rs274.flatten.lines import Line
+from olp.program.rs274.flatten.modal_variables import ModalVariables, meaning
 from olp.program.rs274.flatten.state import ProgramState
 
 #: largest local parameter of LinuxCNC
@@ -20,6 +21,8 @@ _NGC_LAST = 5602
 _DEBUG_SWITCH = 5599
 #: largest local variable of Macro B
 _MACRO_B_LOCAL = 33
+#: the present position of Z
+_PRESENT_Z = 5043
 #: common variables are below this
 _MACRO_B_COMMON = 1000
 _FEED_MODES = {"_inverse_time": INVERSE_TIME, "_units_per_minute": 940, "_units_per_rev": 950}
@@ -49,6 +52,7 @@ class Variables:
 
     def __init__(self, state: ProgramState, given: Mapping[str, float] | None = None) -> None:
         self.state = state
+        self.modal = ModalVariables()
         names = {_bare(name): value for name, value in (given or {}).items()}
         self.given = {int(name): value for name, value in names.items() if name.isdigit()}
         self.given_names = {name: value for name, value in names.items() if not name.isdigit()}
@@ -92,11 +96,27 @@ class Variables:
             return value
         if index in self.common:
             return self.common[index]
+        if index == _PRESENT_Z and self.modal.length_on:
+            raise ProgramError(
+                f"whether #{index} counts the tool length is a setting of the control; use #5003, the end of "
+                "the block before",
+                code="OLP541",
+            )
         for base in (5001, 5041):
             if base <= index <= base + 2:
                 return self.state.position_of(index - base)
+        what = meaning(index) if self.state.profile.language.modal_variables else ""
+        stated = self.modal.value(index) if what else None
+        if stated is not None:
+            return stated
         if index in self.given:
             return self.given[index]
+        if what:
+            raise ProgramError(
+                f"#{index} is {what} in force, which the program has not stated before; state it there, or "
+                f"{_way_on(f'#{index}')}",
+                code="OLP541",
+            )
         raise ProgramError(
             f"#{index} is not set before in the program and not known off line; assign it there, or "
             f"{_way_on(f'#{index}')}",

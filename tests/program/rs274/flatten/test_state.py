@@ -17,7 +17,7 @@ def known(block: str, profile: str = "linuxcnc", start: str = _START) -> dict[st
     head = f"O1\n{start}" if points else start
     positions = {}
     for axis, number in _NUMBERS.items():
-        number -= 379 if points else 0
+        number -= 419 if points else 0
         source = f"{head}{block}\nA#{number}\nM30\n"
         try:
             text = flatten(source.encode(), profile=profile).decode()

@@ -139,6 +139,62 @@ def test_positions_of_macro_b(base: int) -> None:
     assert fanuc(f"{start}{words}M30\n") == f"{start}A1. B2. C3.\nM30\n"
 
 
+@pytest.mark.parametrize(
+    ("before", "index", "value"),
+    [
+        ("G0 X1.\nX2.", 4001, 0), ("G3 X1. Y0 R1.", 4001, 3), ("G19", 4002, 19), ("G90\nG91", 4003, 91),
+        ("G93 G1 X1. F2.", 4005, 93), ("G20", 4006, 20), ("G41 D4", 4007, 41), ("G43 H3", 4008, 43),
+        ("G43 H3\nG49", 4008, 49), ("G1 X0", 4009, 80), ("G99 G83 Z-1. R1. Q1. F9.\nX5.", 4009, 83),
+        ("G81 Z-1. R1. F9.\nG80", 4009, 80), ("G99 G81 Z-1. R1. F9.", 4010, 99), ("G41 D4", 4107, 4),
+        ("G21 F250.", 4109, 250), ("G43 H3", 4111, 3), ("S900 M3", 4119, 900), ("T7", 4120, 7),
+        # those of the block itself count from the next one on
+        ("G91", 4003, 91),
+    ],
+)  # fmt: skip
+def test_modal_variables_are_what_the_program_has_stated(before: str, index: int, value: float) -> None:
+    text = fanuc(f"O1\n{before}\nG65 P2\nM30\nO2\n#1=#{index}\nG90\nG4 P#1\nM99\n")
+    assert text == f"O1\n{before}\nG90\nG4 P{value}\nM30\n"
+
+
+def test_a_macro_restores_the_modes_of_its_caller() -> None:
+    macro = "O2\n#30=#4003\nG91\nX1.\nG#30\nM99\n"
+    for code in ("G90", "G91"):
+        assert fanuc(f"O1\n{code}\nG65 P2\nM30\n{macro}") == f"O1\n{code}\nG91\nX1.\n{code}\nM30\n"
+
+
+@pytest.mark.parametrize(
+    ("before", "index", "what"),
+    [
+        ("X1.", 4001, "the G code of group 1"), ("G0 X1.", 4003, "the G code of group 3"),
+        ("/G91", 4003, "the G code of group 3"), ("G90\n/G91", 4003, "the G code of group 3"),
+        # what is the motion behind cycles, and the feed behind a change of its unit, differs
+        ("G0 X1.\nG81 Z-1. R1. F9.", 4001, "the G code of group 1"),
+        ("G0 X1.\nG81 Z-1. R1. F9.\nG80", 4001, "the G code of group 1"),
+        ("G21 F9.\nG20", 4109, "the F word"), ("G94 F9.\nG95", 4109, "the F word"),
+        ("/G1 X1.", 4009, "the G code of group 9"), ("/S9", 4119, "the S word"),
+    ],
+)  # fmt: skip
+def test_modal_variables_that_the_program_has_not_stated(before: str, index: int, what: str) -> None:
+    line = 2 + len(before.splitlines())
+    message = f"#{index} is {what} in force, which the program has not stated before; state it there, or "
+    assert refused(f"O1\n{before}\n#1=#{index}\n", "fanuc") == (
+        "OLP541", message + _WAY_ON.format(f"#{index}"), line
+    )  # fmt: skip
+    assert fanuc(f"O1\n{before}\nG4 P#{index}\nM30\n", parameters={f"#{index}": 9}).endswith("P9\nM30\n")
+
+
+def test_other_modal_variables_are_not_known() -> None:
+    # further groups differ from control to control, and Mach4 has a list of its own
+    assert refused("O1\nG54\n#1=#4014\n", "fanuc")[1].startswith("#4014 is not set before")
+    assert refused("O1\nG90\n#1=#4003\n", "mach4")[1].startswith("#4003 is not set before")
+
+
+def test_the_present_position_under_a_tool_length_is_a_setting() -> None:
+    start = "O1\nG90 G0 X1. Z3.\nG43 H1 Z5.\n"
+    assert refused(f"{start}#1=#5043\n", "fanuc")[1].startswith("whether #5043 counts the tool length")
+    assert fanuc(f"{start}X#5041 Z#5003\nG49 Z1.\nZ#5043\nM30\n").endswith("X1. Z5.\nG49 Z1.\nZ1.\nM30\n")
+
+
 def test_a_vacant_variable_stays_vacant_when_it_is_copied() -> None:
     # a word with it is left out; in arithmetic it is 0
     assert fanuc("O1\n#100=#5\nG1 X#100 Y#0 Z1.\nX[#100+1]\n#100=[#100+0]\nX#100\nM30\n") == (
