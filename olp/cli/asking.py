@@ -46,7 +46,7 @@ def asked(options: InitOptions, settings: Settings | None) -> InitOptions:
 
 
 def _asked(options: InitOptions, settings: Settings | None) -> InitOptions:
-    if options.controller is None and (settings is None or settings.controller is None):
+    if options.controller is None and settings is None:
         known = ", ".join(CONTROLLER_NAMES)
         options = replace(options, controller=_ask(f"Control ({known})", _control, CONTROLLER))
     if options.chain is None:

@@ -48,7 +48,8 @@ def check_name(name: str) -> None:
     """Raise UsageError for a name that is no name of a file on every system."""
     if not _NAME.fullmatch(name) or name[-1] in ". " or _DEVICE.fullmatch(name):
         raise UsageError(
-            f"--release {name!r} is no name of a file; expected letters, digits, `-`, `_` and `.`"
+            f"--release {name!r} is no name of a file; expected a letter (a to z) or digit first, "
+            "then also spaces, `-`, `_` and `.`, and no name of a device of Windows such as CON"
         )
 
 

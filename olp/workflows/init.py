@@ -72,7 +72,7 @@ def run(folder: str, options: InitOptions, settings: Settings | None = None) -> 
     stated, and is not."""
     notes = [] if settings is None else list(settings.notes)
     travel = _travel(options, settings, notes)
-    controller = options.controller or _controller(settings)
+    controller = options.controller or (CONTROLLER if settings is None else settings.controller)
     if options.chain is None:
         notes.append(f"The chain {CHAIN} is assumed: no axis moves the workpiece. State yours with --chain.")
     if options.zero_mm is None and not (settings and settings.work_offsets):
@@ -89,7 +89,7 @@ def run(folder: str, options: InitOptions, settings: Settings | None = None) -> 
         settings=settings, zero_mm=options.zero_mm,
     )  # fmt: skip
     program, ending = _first(machine, notes)
-    name = f"{FIRST}.{ending}" if program else "part.nc"
+    name = f"{FIRST if program else 'part'}.{ending}"
     texts = starter.starter_set(machine, _known(options, machine), notes, name)
     files = {file: text.encode() for file, text in texts.items()}
     return FirstFiles(machine, files | ({name: program} if program else {}), tuple(notes))
@@ -115,17 +115,6 @@ def _travel(
     return TRAVEL_MM | stated
 
 
-def _controller(settings: Settings | None) -> str:
-    if settings is None:
-        return CONTROLLER
-    if settings.controller is None:
-        raise UsageError(
-            "olp reads no programs in the language of this control; name with --controller the dialect of "
-            "yours, such as fanuc where it runs ISO code, or apt for the file of your CAM"
-        )
-    return settings.controller
-
-
 def _known(options: InitOptions, machine: Machine) -> Calibration | None:
     """The calibration of the numbers that a person knows: it covers the whole travel."""
     if not options.known:
@@ -141,7 +130,7 @@ def _first(machine: Machine, notes: list[str]) -> tuple[bytes | None, str]:
     control = Session(Setup(machine)).control()
     if not isinstance(control, Profile):
         notes.append(f"No first program is written for {control.title}: take one of your own.")
-        return None, ""
+        return None, control.endings[0] if control.endings else "nc"
     program = first_program(control, machine, machine.default_work_offset)
     if program is None:
         notes.append("No first program is written: the travel is too short, or the work offset is turned.")

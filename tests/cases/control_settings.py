@@ -183,7 +183,7 @@ class Sample:
     key: str
     name: str
     text: str
-    controller: str | None
+    controller: str
     travel_mm: dict[str, Limits]
     velocity_mm_s: tuple[float, float, float]
     acceleration_mm_s2: tuple[float, float, float]
@@ -226,13 +226,13 @@ SAMPLES = (
         notes=("M852 corrects C0Y", "M425 X = 0.08 mm", "no jerk"),
     ),
     Sample(
-        "sinumerik", "nc.arc", SINUMERIK, None, of((-0.6, 1500.6), (0.0, 800.0), (-500.0, 0.5)),
+        "sinumerik", "nc.arc", SINUMERIK, "sinumerik", of((-0.6, 1500.6), (0.0, 800.0), (-500.0, 0.5)),
         (500.0, 500.0, 20000 / 60), (3000.0, 2500.0, 2000.0), (40000.0, None, 20000.0),
         least_increment_mm=0.0001, compensated=frozenset({"EYY"}),
         notes=("BACKLASH of X = 0.004 mm", "ENC_COMP_ENABLE of Y corrects EYY", "no jerk of Y:"),
     ),
     Sample(
-        "heidenhain", "tnc.mp", HEIDENHAIN, None, of((-10.0, 510.0), (-5.0, 405.0), (-400.0, 1.0)),
+        "heidenhain", "tnc.mp", HEIDENHAIN, "heidenhain", of((-10.0, 510.0), (-5.0, 405.0), (-400.0, 1.0)),
         (400.0, 400.0, 250.0), (3500.0, 3000.0, 2000.0), least_increment_mm=0.0001,
         notes=("MP750.1 = 0.008 mm", "MP730 switches", "no jerk of X, Y, Z"),
     ),

@@ -131,3 +131,11 @@ def test_the_proof_needs_the_same_numbers() -> None:
     assert verify.run(Session.start(KNOWN), one, two, options).report["deviation"]["holds"]
     other = KnownErrors.of(["XY=-1.414mm/m"], ["Y=0.2mm/m"], ["X=0.03mm"])
     assert not verify.run(Session.start(other), one, two, options).report["deviation"]["holds"]
+
+
+def test_the_remedy_for_a_first_move_in_g91_works() -> None:
+    with pytest.raises(
+        ProgramError, match="in an absolute rapid first, or give start_mm in a job file, which"
+    ):
+        corrected(b"G21 G91\nG1 X10 F500\nM30\n")
+    assert corrected(b"G21 G90\nG0 X0 Y0 Z5\nG91\nG1 X10 F500\nM30\n").report["deviation"]["holds"]

@@ -38,12 +38,12 @@ class Settings:
     """What the configuration of a control states of its machine, and `notes` on what you must know or decide
     about it, one sentence each.
 
-    `name` is empty where the file has none. `controller` is the dialect of its programs, None where `olp`
-    reads none of them. `compensated` are ISO names of what the control corrects.
+    `name` is empty where the file has none. `controller` is the dialect of its programs. `compensated` are
+    ISO names of what the control corrects.
     """
 
     name: str
-    controller: str | None
+    controller: str
     axes: Mapping[str, AxisSettings]
     compensated: frozenset[str] = frozenset()
     tools: Mapping[int, Tool] = field(default_factory=dict)

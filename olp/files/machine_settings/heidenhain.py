@@ -72,7 +72,7 @@ def _read(path: Path, load: Load) -> Settings:
             "MP730 switches error tables on. List in compensated_by_controller what they correct; olp "
             "calibrate import --format heidenhain reads them."
         )
-    return Settings("", None, axes, notes=tuple(notes))
+    return Settings("", "heidenhain", axes, notes=tuple(notes))
 
 
 class _Axis:

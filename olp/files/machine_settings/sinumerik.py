@@ -92,7 +92,7 @@ def _read(path: Path, load: Load) -> Settings:
                 f"CEC_ENABLE of {axis} is on: its tables correct errors of {axis}. List in "
                 "compensated_by_controller which; olp calibrate import --format siemens reads them."
             )
-    return Settings("", None, axes, frozenset(compensated), notes=tuple(notes))
+    return Settings("", "sinumerik", axes, frozenset(compensated), notes=tuple(notes))
 
 
 def _entries(text: str) -> list[_Entry]:

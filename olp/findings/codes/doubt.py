@@ -207,7 +207,8 @@ RULES = (
         "On this control a length without a decimal point counts least increments, or whole units, as it "
         "is set. No length of the program has a point, and the machine file does not say which. The two "
         "differ by a factor of 1000.",
-        'State decimal_point = "increment" or "calculator" in the machine file.',
+        'Write the points into the program, such as X100., or state decimal_point = "increment" or '
+        '"calculator" in the machine file, which olp init writes.',
         "`G1 X100 Y200` alone on a Fanuc control.",
     ),
     _rule(

@@ -168,7 +168,8 @@ RULES = (
         "position is not known",
         why="The block needs the present position, and an axis has not been commanded yet. The "
         "error of the machine depends on it.",
-        remedy="Command X, Y and Z first, or give start_mm in the job file.",
+        remedy="Command X, Y and Z in an absolute rapid first, or give start_mm in the job file. A job file "
+        "needs a machine file: --skew, --scale and --backlash take none.",
         example="`G2 X10 Y0 I5` as the first move.",
         follows=True,
     ),

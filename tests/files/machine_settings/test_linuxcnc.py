@@ -81,7 +81,7 @@ class Imported:
 def from_linuxcnc(ini: Path, chain: str = "FXYZ") -> Imported:
     read = read_settings(ini)
     travel = {axis: stated.travel_mm for axis, stated in read.axes.items() if stated.travel_mm}
-    machine = starter_machine(read.name, chain, travel, read.controller or "", settings=read)
+    machine = starter_machine(read.name, chain, travel, read.controller, settings=read)
     # init names a calibration
     return Imported(replace(machine, calibration=None), read.notes)
 

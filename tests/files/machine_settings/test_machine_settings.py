@@ -36,7 +36,7 @@ def settings(folder: Path, text: str, name: str = "settings.txt") -> Settings:
 
 def machine_of(read: Settings, sample: Sample) -> Machine:
     travel = {axis: stated.travel_mm for axis, stated in read.axes.items() if stated.travel_mm}
-    return starter_machine("mill", "YFXZ", travel, sample.controller or "fanuc", settings=read)
+    return starter_machine("mill", "YFXZ", travel, sample.controller, settings=read)
 
 
 def test_every_format_has_a_sample_and_a_source() -> None:
