@@ -36,6 +36,8 @@ PLOT_ENDINGS = (".svg", ".png")
 DIALECT = "olp.dialect"
 #: Key under which a call keeps the values of --skew, --scale and --backlash.
 KNOWN = "olp.known"
+#: Key under which a call keeps the files that it has read.
+_SOURCES = "olp.sources"
 
 T = TypeVar("T")
 
@@ -105,8 +107,20 @@ def machine_given(machine: str | None, job: str | None) -> tuple[Session, tuple[
     """A session of machine and job, and the files that describe them. Raises UsageError, InputError."""
     from olp.workflows.session import Session
 
-    session = Session.start(machine, job, dialect=click.get_current_context().meta.get(DIALECT))
+    dialect = click.get_current_context().meta.get(DIALECT)
+    session = Session.start(machine, job, dialect=dialect, sources=sources_of_call())
     return session, session.inputs()
+
+
+def sources_of_call() -> Sources:
+    """The files of this call: each is opened once."""
+    from olp.files.sources import Sources
+
+    meta = click.get_current_context().meta
+    if _SOURCES not in meta:
+        meta[_SOURCES] = Sources()
+    sources: Sources = meta[_SOURCES]
+    return sources
 
 
 def source(sources: Sources, name: str) -> Source:

@@ -22,6 +22,7 @@ from olp.cli.common import (
     put,
     refuse_early,
     source,
+    sources_of_call,
 )
 from olp.core.errors import InputError, UsageError
 
@@ -56,19 +57,18 @@ def on_joints(machine: str | None, job: str | None) -> bool:
 def _is_of_joints(machine: str | None, job: str | None) -> bool:
     from olp.files.config import load_job, of_joints
     from olp.files.toml_text import read_toml
-    from olp.files.write import read_bytes
 
+    read = sources_of_call().read
     if machine is None and job is not None:
-        machine = load_job(job).machine
-    return machine is not None and of_joints(read_toml(read_bytes(machine), str(machine))[0])
+        machine = load_job(job, read).machine
+    return machine is not None and of_joints(read_toml(read(machine), str(machine))[0])
 
 
 def run_of(program: str | None, machine: str | None, job: str | None) -> JointRun:
     """What a call is about."""
-    from olp.files.sources import Sources
     from olp.workflows.joints.loaded import JointRun
 
-    sources = Sources()
+    sources = sources_of_call()
     if program is not None and program != STREAM and Path(program).is_dir():
         raise InputError("is a folder; expected a program in it", file=program)
     given = None if program is None else source(sources, program)

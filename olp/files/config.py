@@ -37,9 +37,9 @@ def load_machine(path: PathLike) -> Machine:
     return _read_machine(path, read_bytes)[0]
 
 
-def load_job(path: PathLike) -> Job:
+def load_job(path: PathLike, read: Reader = read_bytes) -> Job:
     """The job of an olp-job-1 file. `program`, `machine` and meshes become paths that can be opened."""
-    return _read_job(path, read_bytes)[0]
+    return _read_job(path, read)[0]
 
 
 def load_setup(machine_path: PathLike | None = None, job_path: PathLike | None = None) -> Setup:

@@ -63,7 +63,7 @@ class JointRun:
         """From the files; program and machine of the job where they are not given. Raises UsageError,
         InputError, ConfigError, ProgramError."""
         sources = sources or Sources()
-        stated = Job() if job is None else load_job(job)
+        stated = Job() if job is None else load_job(job, sources.read)
         machine = stated.machine if machine is None else machine
         program = stated.program if program is None else program
         if machine is None:

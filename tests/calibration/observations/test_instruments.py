@@ -217,7 +217,8 @@ def test_a_ball_bar_or_diagonals_do_what_a_square_does(chain: str) -> None:
     bare = no_square(measurements)
     square = residual_of(machine, fit(measurements, chain), TOOLS[0], 400).after_framed
     alone = fit(bare, chain)
-    assert len(messages_of(alone, "OLP806")) == 3
+    (message,) = messages_of(alone, "OLP806")
+    assert message.startswith("C0Y, B0Z, A0Z are taken as zero: ")
     for more in (circles_of(machine, 0), diagonals_of(machine, 0)):
         fitted = fit(bare.also(more), chain)
         assert not messages_of(fitted, "OLP806") and not messages_of(fitted, "OLP808")
@@ -235,7 +236,8 @@ def test_squareness_is_not_observable_with_a_ball_bar_in_one_direction() -> None
     machine, measurements = case(0, "smooth", "FXYZ")
     bare = no_square(measurements)
     one_way = fit(bare.also(circles_of(machine, 0, both=False)), "FXYZ")
-    assert {words.split()[0] for words in messages_of(one_way, "OLP806")} == {"C0Y", "B0Z", "A0Z"}
+    (message,) = messages_of(one_way, "OLP806")
+    assert message.startswith("C0Y, B0Z, A0Z are taken as zero: ")
 
 
 @pytest.mark.slow

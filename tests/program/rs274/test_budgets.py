@@ -93,7 +93,7 @@ def test_unrolling_is_bounded_by_the_bytes_of_visited_blocks(
 def test_strokes_of_unrolled_cycles_are_bounded(expand: bool) -> None:
     text = HEAD + "o1 repeat [99]\nG91 G81 X0.001 Z-1 R1 L19999\no1 endrepeat\nM2\n"
     with pytest.raises(ProgramError, match="have more than 250000 strokes") as caught:
-        unroll.flatten(text.encode(), profile(), expand_cycles=expand)
+        unroll.flatten(text.encode(), profile("linuxcnc"), expand_cycles=expand)
     assert caught.value.line == 5
 
 
