@@ -165,8 +165,8 @@ def _untouched(path: Toolpath, model: ErrorModel) -> tuple[Mask, Index]:
             axes = " and ".join("XYZ"[a] for a in np.flatnonzero(unknown[i]))
             raise ProgramError(
                 f"the position of {axes} is not known at this feed move, and its correction needs it; "
-                "command all axes in an absolute rapid first, or give start_mm in a job file, which needs a "
-                "machine file",
+                "command all axes in an absolute rapid first, or give a machine file and a job file with "
+                "start_mm",
                 line=int(path.line[i]),
                 code="OLP524",
             )

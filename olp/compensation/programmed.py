@@ -114,9 +114,9 @@ class _Contour:
         way, own = parts.centre[arcs] - parts.end[arcs], self.elements.centre[of] - parts.end[arcs]
         errors = [
             ProgramError(
-                "the arc that enters the contour begins on the wrong side of its end for a cutter of "
-                f"{self.elements.radius[i]:g} mm, so the tool arrives against its direction; make the move "
-                "longer, use a smaller cutter, or have this path of the tool written, with --contour path",
+                f"the arc into the contour brings a cutter of {self.elements.radius[i]:g} mm against its own "
+                "direction; make the move longer, use a smaller cutter, or have this path of the tool "
+                "written, with --contour path",
                 line=int(self.path.line[self.elements.move[i]]),
                 code="OLP561",
             )

@@ -185,8 +185,8 @@ def away_mm(position_mm: Array, share: Array, waypoint: Mask, delta_mm: Array) -
 
 
 def with_starts(samples: Samples, nominal: Program, table: Judgements) -> Samples:
-    """The samples, and the start of each cut that is farther off than its other samples by more than `_LESS`
-    or `_LESS_MM`, as the table of judgements states it; of long programs those with the most."""
+    """The samples, and the start of each cut that the table of judgements states to be farther off than its
+    samples show, by more than `_LESS` or `_LESS_MM`; of long programs those with the most."""
     path = nominal.toolpath
     first = np.flatnonzero(np.diff(samples.move, prepend=-1))
     first = first[1:] if len(first) else first

@@ -22,7 +22,11 @@ _GROUPS = {
     9: CYCLES | {END_OF_CYCLES},
     10: frozenset({980, 990}),
 }
-_MOTION, _FEED_MODE, _UNITS, _LENGTH, _CYCLE = 1, 5, 6, 8, 9
+_MOTION = 1
+_FEED_MODE = 5
+_UNITS = 6
+_LENGTH = 8
+_CYCLE = 9
 _FIRST_GROUP = 4000
 #: The letters whose word each variable has.
 _WORDS = {4107: "d", 4109: "f", 4111: "h", 4119: "s", 4120: "t"}
