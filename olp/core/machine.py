@@ -131,7 +131,8 @@ class Machine:
     `decimal_point` says what a length without a decimal point means to a control that makes a difference
     (Fanuc, Haas): so many least increments, or whole units as on a pocket calculator. None is not stated, and
     read as increments.
-    `arc_centres` says what I, J and K are at the start, to a control that has a setting for it.
+    `arc_centres` says what I, J and K are at the start, and `cycle_return` where canned cycles return, to a
+    control that has a setting for it.
     `still_macros` are the macros of a printer that move no axis and change no mode.
     `styli` are end of the ram to centre of the tip of sensors by label.
     `path_mode` is the mode at the start of a program, `blend_mm` the tolerance where the program names none
@@ -154,6 +155,7 @@ class Machine:
     length_active: bool = False
     decimal_point: Literal["increment", "calculator"] | None = None
     arc_centres: Literal["incremental", "absolute"] | None = None
+    cycle_return: Literal["initial", "r"] | None = None
     still_macros: frozenset[str] = frozenset()
     path_mode: Literal["blend", "exact-stop"] = "blend"
     blend_mm: float | None = None

@@ -271,6 +271,11 @@ class MachineFile(Table):
         description="what I, J and K of arcs are before any G90.1 or G91.1, by a setting of Mach3 and Mach4: "
         "distances from the start of the arc, or positions",
     )
+    cycle_return: Literal["initial", "r"] | None = Field(
+        default=None,
+        description="where canned cycles return before any G98 or G99, by a setting of Mach3 and Mach4: to "
+        "the level before them, or to R",
+    )
     still_macros: list[Text] = Field(
         default=[],
         description="the macros of a Klipper printer that move no axis and change no mode, by their names",

@@ -15,6 +15,7 @@ from dataclasses import field
 from enum import Enum
 from typing import Any
 
+from olp.core.machine import Machine
 from olp.core.progress import Progress, silent
 from olp.core.values import dataclass
 from olp.program.kept import Kept
@@ -112,6 +113,10 @@ class Dialect:
     def rows(self) -> Sequence[Row]:
         """The support matrix, from the table that the reader uses."""
         raise NotImplementedError
+
+    def set_as(self, machine: Machine) -> Dialect:
+        """The dialect with what the machine file states of the settings of its control."""
+        return self
 
     def lines(self, data: bytes) -> list[bytes]:
         """The lines of a text with their ends, as errors count them."""

@@ -285,8 +285,9 @@ class _Survey:
             beside["setup"] = self.setup
         try:
             unrolled = self.dialect.unroller(
-                b"".join(text), self.dialect, limit=UNROLLED, parameters=self.setup.job.parameters, **beside
-            )
+                b"".join(text), self.dialect.set_as(self.setup.machine), limit=UNROLLED,
+                parameters=self.setup.job.parameters, **beside,
+            )  # fmt: skip
         except ProgramError as error:
             if error.code == TOO_LONG:
                 return

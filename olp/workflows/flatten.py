@@ -113,7 +113,8 @@ def unroller(
 
         given = change(None, program.data)
         text = unrolled(
-            with_payloads(given, setup.job.payloads, dialect.comment), dialect, subprograms=changed,
+            with_payloads(given, setup.job.payloads, dialect.comment), dialect.set_as(setup.machine),
+            subprograms=changed,
             expand_cycles=options.expand_cycles, block_delete=block_delete,
             peck_clearance=options.peck_clearance_mm, parameters=setup.job.parameters,
             **({} if limit is None else {"limit": limit}),

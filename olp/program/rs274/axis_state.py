@@ -92,6 +92,7 @@ class AxisState(OffsetState):
     @staticmethod
     def at_start(setup: Setup, profile: Profile) -> AxisState:
         start = [NAN if p is None else p for p in setup.job.start_mm]
+        profile = profile.set_as(setup.machine)
         state = AxisState(profile, start, setup=setup, offsets=Offsets(setup.machine.default_work_offset))
         state.motion = None if profile.motion is None else profile.motion * 10
         if profile.arc_distance is not None:

@@ -58,7 +58,7 @@ BROKEN_SERIES = (
 #: Why a cycle is refused where it may end at two levels.
 OPEN_RETRACT = (
     "whether this cycle returns to its initial level or to R is a setting of the control; give G98 or G99 "
-    "before it"
+    'before it, or state cycle_return = "initial" or "r" in the machine file'
 )
 
 

@@ -315,6 +315,24 @@ def test_a_control_makes_cycles_as_its_manual_says(rule: str, control: str, setu
     assert wanted[control] not in written_out(text, setups[control], replace(profile, cycles=rules))
 
 
+@pytest.mark.parametrize("control", [MACH3, MACH4, FANUC, OKUMA])
+def test_where_cycles_return_may_be_stated_where_it_is_a_setting(
+    control: str, setups: dict[str, Setup]
+) -> None:
+    text = READINGS["initial_retract"][0]
+    given, profile = setups[control], DIALECTS[control]
+    assert isinstance(profile, Profile)
+    for stated, level in (("initial", 9), ("r", 3)):
+        setup = replace(given, machine=replace(given.machine, cycle_return=stated))
+        end = outcome(text, setup, profile)
+        if control in (MACH3, MACH4):
+            assert end == (1, 1, level)
+            assert written_out(text, setup, profile).endswith(f"|G0 Z{level}" + "." * (control == MACH4))
+            assert outcome(f"G99\n{text}", setup, profile) == (1, 1, 3)
+        else:
+            assert end == outcome(text, given, profile)
+
+
 @pytest.mark.parametrize("control", _ISO)
 def test_k_counts_holes(control: str, setups: dict[str, Setup]) -> None:
     profile = DIALECTS[control]

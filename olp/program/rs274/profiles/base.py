@@ -21,7 +21,14 @@ from olp.program.contours.rules import NGC_CONTOURS, ContourRules
 from olp.program.dialect import Dialect, Row, Support
 from olp.program.rs274.block_rules import OTHER_RULES, BlockRules
 from olp.program.rs274.block_text import BlockText
-from olp.program.rs274.codes import COMMON_CYCLES, COMPENSATION_OFF, CUTTER_COMPENSATION, PROBES
+from olp.program.rs274.codes import (
+    COMMON_CYCLES,
+    COMPENSATION_OFF,
+    CUTTER_COMPENSATION,
+    PROBES,
+    RETRACT_TO_INITIAL,
+    RETRACT_TO_R,
+)
 from olp.program.rs274.commands import Commands
 from olp.program.rs274.cycle_rules import CycleRules
 from olp.program.rs274.flatten.language import Language
@@ -193,6 +200,13 @@ class Profile(Dialect):
             codes={**self.codes, **dict.fromkeys(self.tip_codes, Act.EVENT)},
             aliases={**self.aliases, **dict.fromkeys(self.tip_codes, min(self.axis_codes))},
         )
+
+    def set_as(self, machine: Machine) -> Profile:
+        """The same control with what the machine file states of its settings."""
+        stated = machine.cycle_return
+        if stated is None or self.initial_retract is not None or self.return_modes:
+            return self
+        return replace(self, initial_retract={"initial": RETRACT_TO_INITIAL, "r": RETRACT_TO_R}[stated])
 
     def codes_of(self, act: Act) -> frozenset[int]:
         """The G codes that do something, ten times their number."""
