@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import datetime
 from collections.abc import Sequence
 from typing import Any, Literal
@@ -12,11 +11,10 @@ from olp.calibration.design.choosing import Criterion, choose
 from olp.calibration.design.known import Known, judged_rows
 from olp.calibration.design.prediction import Prediction, known_of_machines
 from olp.core.arrays import Array
-from olp.core.errors import CannotCompute, ConfigError, UsageError
+from olp.core.errors import CannotCompute, UsageError
 from olp.core.machine import Machine, Setup, Vector
-from olp.core.units import AXES, MM_PER_UM, UM_PER_MM
-from olp.files.calibration.covariance import load_uncertainty
-from olp.files.calibration.reader import load_calibration
+from olp.core.units import MM_PER_UM, UM_PER_MM
+from olp.files.calibration.covariance import load_known
 from olp.findings.catalogue import Finding
 from olp.workflows.calibrate_plan import (
     TRACKER,
@@ -25,7 +23,7 @@ from olp.workflows.calibrate_plan import (
     box_of,
     findings_of_plan,
     judged_of,
-    method_rows,
+    plan_rows,
     quickest,
     reflectors_of,
     timed,
@@ -97,23 +95,11 @@ def plan_next(
     chosen = quickest(methods, uncertainty_um)
     report: dict[str, Any] = {
         "schema": "olp-next-1",
-        "machine": described.name,
-        "chain": described.chain,
         "calibration": None if calibration is None else str(calibration),
         "criterion": criterion,
-        "box_mm": {axis: box[k].tolist() for k, axis in enumerate(AXES)},
-        "wanted_um": uncertainty_um,
         "known_um": before * UM_PER_MM,
-        "method": chosen.name,
-        "instrument": chosen.instrument,
-        "predicted_um": chosen.prediction.rms_mm * UM_PER_MM,
-        "predicted_worst_um": chosen.prediction.worst_mm * UM_PER_MM,
-        "machine_h": chosen.machine_s / 3600.0,
-        "set_up_h": chosen.set_up_min / 60.0,
-        "reflectors": [{"name": f"reflector {k}", "tool_mm": list(v)} for k, v in enumerate(reflectors, 1)],
-        "judged_with": [{"name": f"tool {k}", "tool_mm": list(v)} for k, v in enumerate(judged, 1)],
         "next": tables[chosen.instrument],
-        "methods": method_rows(methods, uncertainty_um),
+        **plan_rows(described, box, chosen, methods, uncertainty_um, reflectors, judged),
     }
     used = (DWELL_S[chosen.instrument] if dwell_s is None else dwell_s) + settle_s
     findings: tuple[Finding, ...] = tuple(findings_of_plan(chosen, uncertainty_um))
@@ -128,14 +114,7 @@ def _known(
     if calibration is None:
         box = box_of(machine, box_mm)
         return known_of_machines(machine.chain, box), box
-    described = dataclasses.replace(machine, calibration=str(calibration))
-    old = load_calibration(calibration, described, read=session.sources.read)
-    uncertainty = load_uncertainty(calibration, old, session.sources.read)
-    if uncertainty is None or not uncertainty.entries:
-        raise ConfigError(
-            "states no uncertainty; expected [covariance] or sigma_ columns, as from olp calibrate fit",
-            file=str(calibration),
-        )
+    old, uncertainty = load_known(calibration, machine, session.sources.read)
     covered = [(float(low), float(high)) for low, high in old.box_mm]
     box = box_of(machine, box_mm or covered)
     skip = frozenset(machine.compensated_by_controller - old.active_during_measurement)

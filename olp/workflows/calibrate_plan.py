@@ -121,7 +121,11 @@ def plan_measurements(
             methods.append(timed(name, title, planned, prediction, described, dwell + settle_s, box))
     chosen = quickest(methods, uncertainty_um)
     used = (DWELL_S[chosen.instrument] if dwell_s is None else dwell_s) + settle_s
-    report = _report(described, box, chosen, methods, uncertainty_um, reflectors, judged)
+    report = {
+        "schema": "olp-plan-1",
+        "cannot_see": list(chosen.prediction.hidden),
+        **plan_rows(described, box, chosen, methods, uncertainty_um, reflectors, judged),
+    }
     findings = tuple(findings_of_plan(chosen, uncertainty_um))
     return MeasurementPlan(setup, chosen, tuple(methods), report, findings, used, session.sources.files)
 
@@ -205,12 +209,12 @@ def _candidates(
             yield words.format(n), make(n)
 
 
-def _report(
+def plan_rows(
     machine: Machine, box: Array, chosen: Method, methods: Sequence[Method], wanted: float,
     reflectors: Sequence[Vector], judged: Sequence[Vector],
 ) -> dict[str, Any]:  # fmt: skip
+    """What the report of every plan states: the machine, the method that was chosen, and the others."""
     return {
-        "schema": "olp-plan-1",
         "machine": machine.name,
         "chain": machine.chain,
         "box_mm": {axis: box[k].tolist() for k, axis in enumerate(AXES)},
@@ -221,14 +225,13 @@ def _report(
         "predicted_worst_um": chosen.prediction.worst_mm * UM_PER_MM,
         "machine_h": chosen.machine_s / 3600.0,
         "set_up_h": chosen.set_up_min / 60.0,
-        "cannot_see": list(chosen.prediction.hidden),
         "reflectors": [{"name": f"reflector {k}", "tool_mm": list(v)} for k, v in enumerate(reflectors, 1)],
         "judged_with": [{"name": f"tool {k}", "tool_mm": list(v)} for k, v in enumerate(judged, 1)],
-        "methods": method_rows(methods, wanted),
+        "methods": _method_rows(methods, wanted),
     }
 
 
-def method_rows(methods: Sequence[Method], wanted: float) -> list[dict[str, Any]]:
+def _method_rows(methods: Sequence[Method], wanted: float) -> list[dict[str, Any]]:
     """Methods as rows of a report, the quickest first."""
     return [
         {

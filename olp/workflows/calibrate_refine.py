@@ -24,8 +24,7 @@ from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration
 from olp.errormodel.reversal import plays
 from olp.errormodel.uncertainty import YEAR, Uncertainty, fingerprint
-from olp.files.calibration.covariance import load_uncertainty
-from olp.files.calibration.reader import load_calibration
+from olp.files.calibration.covariance import load_known
 from olp.files.calibration.writer import calibration_files
 from olp.files.measurements.checkpoints import load_checkpoints
 from olp.files.measurements.reader import files_of_measurements
@@ -107,13 +106,7 @@ def refine_calibration(
     """
     session = Session.start(machine, job)
     described = dataclasses.replace(session.setup.machine, calibration=str(calibration))
-    old = load_calibration(calibration, described, read=session.sources.read)
-    known = load_uncertainty(calibration, old, session.sources.read)
-    if known is None or not known.entries:
-        raise ConfigError(
-            "states no uncertainty; expected [covariance] or sigma_ columns, as from olp calibrate fit",
-            file=str(calibration),
-        )
+    old, known = load_known(calibration, described, session.sources.read)
     growth = known.growth_per_year if growth_per_year is None else growth_per_year
     if growth_per_year and (date is None or old.measured is None):
         raise ConfigError("growth_per_year needs the day of the run; give it (--date)", file=str(calibration))

@@ -15,12 +15,12 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from olp.core.errors import ConfigError
-from olp.core.machine import COMPONENTS, ZERO
+from olp.core.machine import COMPONENTS, ZERO, Machine
 from olp.errormodel.calibration import Calibration
 from olp.errormodel.entry import Entry
 from olp.errormodel.sources.registry import NUMBERS, SOURCES
 from olp.errormodel.uncertainty import Uncertainty, fingerprint, of_sigmas
-from olp.files.calibration.reader import CalibrationReading
+from olp.files.calibration.reader import CalibrationReading, load_calibration
 from olp.files.calibration.schema import covariance_of
 from olp.files.write import PathLike, Reader, read_bytes
 
@@ -68,6 +68,23 @@ def load_uncertainty(
         growth_per_year=stated.growth_per_year,
         temperature_K=stated.temperature_K,
     )
+
+
+def load_known(
+    path: PathLike, machine: Machine, read: Reader = read_bytes
+) -> tuple[Calibration, Uncertainty]:
+    """The calibration of `path` for a machine of the chain of `machine`, and its uncertainty.
+
+    Raises InputError where a file cannot be read, ConfigError where it is wrong or states no uncertainty.
+    """
+    calibration = load_calibration(path, replace(machine, calibration=str(path)), read=read)
+    uncertainty = load_uncertainty(path, calibration, read)
+    if uncertainty is None or not uncertainty.entries:
+        raise ConfigError(
+            "states no uncertainty; expected [covariance] or sigma_ columns, as from olp calibrate fit",
+            file=str(path),
+        )
+    return calibration, uncertainty
 
 
 def covariance_bytes(uncertainty: Uncertainty) -> bytes:
