@@ -82,6 +82,7 @@ def test_any_other_text_has_a_sentence(text: str, unit: str, message: str) -> No
     assert message in str(error.value)
 
 
+@pytest.mark.slow
 @given(st.text(max_size=30), st.sampled_from(["mm", "urad", "mm/s"]))
 def test_no_text_raises_anything_else(text: str, unit: str) -> None:
     try:

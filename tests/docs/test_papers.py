@@ -397,6 +397,7 @@ def test_the_html_is_linked_and_needs_no_network() -> None:
     assert b"http://" not in scripts.replace(b"http://localhost", b"")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("folder", "words"),
     [

@@ -51,6 +51,7 @@ def arm(folder: Path, tables: str = POINTS) -> tuple[Path, np.ndarray, np.ndarra
     return plan, values, pose.at(np.array(TOOL))
 
 
+@pytest.mark.slow
 def test_a_plan_becomes_a_calibration_that_predicts_the_machine(tmp_path: Path) -> None:
     plan, values, true = arm(tmp_path)
     machine = machine_in(tmp_path, "arm_6r_kr6", "calibration.toml")

@@ -137,7 +137,7 @@ def reading(text: bytes, setup: Setup, dialect: Dialect, options: Options) -> li
 
 
 @pytest.mark.parametrize("options", [Options(), Options(block_delete=True)], ids=str)
-@pytest.mark.parametrize("name", some_fast(NAMES, 8))
+@pytest.mark.parametrize("name", some_fast(NAMES, 16))
 def test_programs_are_read_and_timed_alike(pairs: Mapping[str, Pair], name: str, options: Options) -> None:
     outcomes = [alike(lambda s, d: reading(text, s, d, options), pairs[name]) for text in texts_of(name)]  # noqa: B023
     assert sum(text.startswith("[") for text in outcomes) > 3
@@ -158,7 +158,7 @@ def test_programs_are_unrolled_alike(pairs: Mapping[str, Pair], name: str) -> No
             alike(lambda s, d: _unrolled(text, s, d, expand, clearance), pairs[name])  # noqa: B023
 
 
-@pytest.mark.parametrize("name", some_fast(NAMES, 8))
+@pytest.mark.parametrize("name", some_fast(NAMES, 16))
 def test_programs_are_corrected_and_judged_alike(pairs: Mapping[str, Pair], name: str) -> None:
     def corrected(text: bytes, setup: Setup) -> tuple[bytes, object, object]:
         result = olp.correct(text, setup)
