@@ -83,29 +83,38 @@ def _constructor(cls: type) -> Callable[..., None]:
     return made
 
 
+@functools.cache
+def _plan(cls: type) -> tuple[tuple[str, ...], list[tuple[str, bool, Any, Any]], bool]:
+    """What a call of a class gives by position, of each field its name, whether calls give it, its default
+    and its factory, and whether `__post_init__` follows."""
+    declared = _declared(cls)
+    positional = tuple(name for name, (field, kw_only) in declared.items() if field.init and not kw_only)
+    fields = [(name, f.init, f.default, f.default_factory) for name, (f, _) in declared.items()]
+    return positional, fields, hasattr(cls, "__post_init__")
+
+
 def _filled(self: Any, args: tuple[Any, ...], words: dict[str, Any]) -> bool:
     """Gives a value its fields as the constructor does; False, and nothing done, where a call does not fit:
     the constructor says why."""
-    declared = _declared(self.__class__)
-    positional = [name for name, (field, kw_only) in declared.items() if field.init and not kw_only]
+    positional, fields, checked = _plan(self.__class__)
     given = dict(zip(positional, args, strict=False)) | words
     if len(given) < len(args) + len(words):
         return False
     values: dict[str, Any] = {}
-    for name, (field, _) in declared.items():
-        if field.init and name in given:
+    for name, init, default, factory in fields:
+        if init and name in given:
             values[name] = given.pop(name)
-        elif field.default is not dataclasses.MISSING:
-            values[name] = field.default
-        elif field.default_factory is not dataclasses.MISSING:
-            values[name] = field.default_factory()
-        elif field.init:
+        elif default is not dataclasses.MISSING:
+            values[name] = default
+        elif factory is not dataclasses.MISSING:
+            values[name] = factory()
+        elif init:
             return False
     if given:
         return False
     for name, value in values.items():
         object.__setattr__(self, name, value)
-    if hasattr(self, "__post_init__"):
+    if checked:
         self.__post_init__()
     return True
 
@@ -140,6 +149,25 @@ def _refuse_delete(self: Any, name: str) -> None:
     raise dataclasses.FrozenInstanceError(f"cannot delete field {name!r}")
 
 
+def _described(made: type, stated: dict[str, Any], frozen: bool, kw_only: bool) -> dict[str, Any]:
+    """What the standard decorator says of a class: its fields, those of its bases first, and how it was
+    decorated. Only a class without methods is decorated for it: of a frozen one it would compile some."""
+    kinds = inspect.get_annotations(made)
+    body = {name: value for name, value in stated.items() if value is not dataclasses.MISSING}
+    body |= {"__annotations__": {name: kinds[name] for name in stated}, "__module__": made.__module__}
+    # without words of its own the standard library writes some, from the signature
+    bare: Any = type(made.__name__, (), {**body, "__doc__": made.__name__})
+    dataclasses.dataclass(init=False, repr=False, eq=False, kw_only=kw_only)(bare)
+    fields: dict[str, Any] = {}
+    for base in reversed(made.__mro__[1:]):
+        fields |= getattr(base, _FIELDS, {})
+    fields |= getattr(bare, _FIELDS)
+    params = bare.__dataclass_params__
+    params.frozen = frozen
+    names = tuple(name for name, field in fields.items() if field.init and not field.kw_only)
+    return {_FIELDS: fields, "__dataclass_params__": params, "__match_args__": names}
+
+
 class _Fields:
     """Stands for the fields until they are asked for."""
 
@@ -166,14 +194,9 @@ def _value_type(
     def decorated(cls: type[T]) -> type[T]:
         def complete() -> None:
             with _LOCK:
-                if _FIELDS not in vars(cls):  # no other thread was first
-                    # else the standard library writes one, from the signature
-                    cls.__doc__ = cls.__doc__ or cls.__name__
-                    dataclasses.dataclass(init=False, repr=False, eq=False, frozen=frozen, kw_only=kw_only)(
-                        cls
-                    )
-                    for name in (_FIELDS, "__dataclass_params__", "__match_args__"):
-                        setattr(made, name, vars(cls)[name])
+                if isinstance(vars(made)[_FIELDS], _Fields):  # no other thread was first
+                    for name, value in _described(made, stated, frozen, kw_only).items():
+                        setattr(made, name, value)
 
         made_values = 0
 
