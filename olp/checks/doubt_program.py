@@ -6,13 +6,14 @@ import re
 
 from olp.checks.base import finding
 from olp.core.machine import Setup
+from olp.core.patterns import pattern
 from olp.findings.catalogue import Finding
 from olp.program.program import Program
 
 #: Comments of the controls on which the point decides.
-_COMMENT = re.compile(rb"\([^)\n]*\)?|;[^\n]*")
+_COMMENT = pattern(rb"\([^)\n]*\)?|;[^\n]*")
 #: A word of a length with a decimal point.
-_POINTED = re.compile(rb"[XYZIJKRQ]\s*[+-]?\s*[0-9]*\.", re.IGNORECASE)
+_POINTED = pattern(rb"[XYZIJKRQ]\s*[+-]?\s*[0-9]*\.", re.IGNORECASE)
 
 
 def program_doubts(program: Program, setup: Setup) -> list[Finding]:

@@ -6,9 +6,7 @@ Every exception becomes `olp: error: ...` on stderr and an exit code in `endings
 from __future__ import annotations
 
 import contextlib
-import difflib
 import os
-import re
 from collections.abc import Iterator
 from typing import IO, Any
 
@@ -17,6 +15,7 @@ import click
 from olp.cli.common import diagnostic
 from olp.cli.endings import with_exit_code
 from olp.cli.late import LateGroup
+from olp.core.patterns import pattern
 from olp.core.version import __version__
 
 #: Verb to what it does. Kept here so that `olp --help` imports no verb.
@@ -40,7 +39,7 @@ VERBS = {
 }
 
 #: What click says of words that a verb does not take.
-_EXTRA = re.compile(r"Got unexpected extra arguments? \((.*)\)")
+_EXTRA = pattern(r"Got unexpected extra arguments? \((.*)\)")
 #: Key under which a call keeps its words.
 _WORDS = "olp.words"
 
@@ -76,6 +75,8 @@ def _plain(error: click.UsageError) -> str:
     takes = [] if error.ctx is None else [name for p in error.ctx.command.params for name in p.opts]
     if isinstance(error, click.NoSuchOption):
         wanted = error.option_name.replace("_", "-")
+        import difflib
+
         near = difflib.get_close_matches(wanted, takes, 1)
         hint = f"did you mean {near[0]}?" if near else f"{path} --help lists the options"
         return f"there is no option {error.option_name}; {hint}"

@@ -6,7 +6,6 @@ import contextlib
 import errno
 import os
 import sys
-import traceback
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NoReturn
@@ -69,7 +68,11 @@ def _let_go(error: BaseException | None) -> None:
     """Clear the calls that an error ended, and those of the errors before it: they hold what filled the
     memory."""
     while error is not None:
-        traceback.clear_frames(error.__traceback__)
+        call = error.__traceback__
+        while call is not None:
+            with contextlib.suppress(RuntimeError):  # one that still runs
+                call.tb_frame.clear()
+            call = call.tb_next
         error = error.__context__
 
 
@@ -100,6 +103,8 @@ def _end_memory(words: Sequence[str]) -> NoReturn:
 
 def _end_defect(words: Sequence[str], error: Exception) -> NoReturn:
     """One sentence: what happened and where, whose fault it is, and what to send."""
+    import traceback
+
     if os.environ.get(TRACEBACK):
         diagnostic("".join(traceback.format_exception(error)).rstrip())
     text = " ".join(str(error).split())[:_MOST_LETTERS]
@@ -116,6 +121,8 @@ def _end_defect(words: Sequence[str], error: Exception) -> NoReturn:
 
 def _place(error: BaseException) -> str:
     """The innermost line of ours, such as `cli/correct.py:120`."""
+    import traceback
+
     ours = Path(__file__).parents[1]
     places = [
         f"{Path(frame.filename).relative_to(ours).as_posix()}:{frame.lineno}"

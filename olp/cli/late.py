@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import importlib
 from collections.abc import Mapping
 from pathlib import PurePath
@@ -37,6 +36,8 @@ class LateGroup(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         name = args[0]
         if name not in self._verbs and not name.startswith("-"):
+            import difflib
+
             near = difflib.get_close_matches(name, self._verbs, 1)
             hint = f"did you mean {near[0]}?" if near else f"see {ctx.command_path} --help"
             if _FIRST in self._verbs and PurePath(name).suffix:

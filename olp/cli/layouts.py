@@ -63,8 +63,6 @@ def layout_of(
 
 def with_layout_of(call: Given, profile: str | None, columns: tuple[str, ...], unit: str | None) -> Given:
     """A call about a list of positions, with the layout that it states; unchanged where it states none."""
-    from olp.program.pointlist.dialect import with_layout
-
     if profile is None and not columns and unit is None:
         return call
     if call.program == STREAM:
@@ -72,6 +70,8 @@ def with_layout_of(call: Given, profile: str | None, columns: tuple[str, ...], u
     session = call.session
     layout = layout_of(profile, columns, unit, call.source, session.sources)
     assert layout is not None
+    from olp.program.pointlist.dialect import with_layout
+
     job = replace(call.setup.job, described=with_layout(layout))
     session = session.of(replace(call.setup, job=job))
     return replace(call, session=session, inputs=(*call.inputs, *files_of(profile)))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import datetime
 import math
-import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
@@ -14,13 +13,15 @@ import click
 from olp.cli.common import DIALECT, KNOWN, STREAM, diagnostic, no_page
 from olp.core.errors import UsageError
 from olp.core.optional import has_matplotlib
+from olp.core.patterns import pattern
+from olp.core.units import unit_of_key
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
 #: A number with a decimal comma, and one with a unit.
-_COMMA = re.compile(r"[-+]?\d*,\d+")
-_UNIT = re.compile(r"[-+]?[\d.]+\s*[A-Za-z\u00b5\u03bc/%]+")
+_COMMA = pattern(r"[-+]?\d*,\d+")
+_UNIT = pattern(r"[-+]?[\d.]+\s*[A-Za-z\u00b5\u03bc/%]+")
 
 
 def renamed_option(old: str, new: str, *, flag: bool = False, values: int = 1) -> Callable[[F], F]:
@@ -66,8 +67,6 @@ def number_in(value: Any, unit: str | None) -> Any:
 
 def _unit(param: click.Parameter | None) -> str | None:
     """The unit in which the name of an option ends."""
-    from olp.core.quantities import unit_of_key
-
     return None if param is None or param.name is None else unit_of_key(param.name)
 
 

@@ -16,7 +16,6 @@ from olp.compensation.contour import Contour, in_arcs, long_parts
 from olp.compensation.invert import invert
 from olp.compensation.lines import Cuts, subdivide_lines
 from olp.compensation.plan import Limits, Plan, targets, zero_shifts
-from olp.compensation.programmed import programmed
 from olp.compensation.reversal import Carried, Reversal, carry_play
 from olp.compensation.style import Style
 from olp.core.arrays import Array, Index, Mask, all_in_row, any_in_row, distinct, is_in
@@ -62,6 +61,8 @@ def written_plans(
     if program.programmed is None:
         yield from every
         return
+    from olp.compensation.programmed import programmed
+
     style = Style.of(program.programmed, increments_mm)
     for band, rows in every:
         yield programmed(band, rows, model, limits, style)

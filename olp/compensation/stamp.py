@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
+from olp.core.patterns import pattern
 from olp.core.version import __version__
 
 #: The stamp with the first digits of the hash of the calibration.
-_STAMP = re.compile(rb"olp-corrected ([0-9a-f]{12})")
+_STAMP = pattern(rb"olp-corrected ([0-9a-f]{12})")
 #: What stands behind it: the version, and the codes of the doubts that were accepted.
-_ACCEPTED = re.compile(_STAMP.pattern + rb" olp \S+ accepted((?: OLP[0-9]{3})+)")
+_ACCEPTED = pattern(_STAMP.pattern + rb" olp \S+ accepted((?: OLP[0-9]{3})+)")
 
 
 def find_stamp(text: bytes) -> re.Match[bytes] | None:

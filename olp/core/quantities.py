@@ -85,22 +85,10 @@ _KNOWN = {
     "acceleration": ("mm/s2", "m/s2", "in/s2", "g"),
     "jerk": ("mm/s3", "m/s3", "in/s3"),
 }
-#: Endings of keys, the longer ones first, and their units.
-_KEYS = {
-    "_mm_s3": "mm/s3", "_mm_s2": "mm/s2", "_mm_s": "mm/s", "_mm": "mm", "_um": "um", "_nm": "nm",
-    "_urad": "urad", "_mrad": "mrad", "_rad": "rad", "_deg": "deg", "_arcsec": "arcsec",
-}  # fmt: skip
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,3})?"
 _QUANTITY = re.compile(rf"\s*((?>{_NUMBER}))\s*(\S.*?)\s*")
 _RATIO = re.compile(rf"([^\d\s/]+)\s*/\s*({_NUMBER})?\s*([^\d\s/][^\s/]*)")
-
-
-def unit_of_key(name: str) -> str | None:
-    """The unit of length, angle or speed in which a key ends, such as "um"; None for any other key."""
-    if "_per_" in name:
-        return None
-    return next((unit for ending, unit in _KEYS.items() if name.endswith(ending)), None)
 
 
 def unit_named(name: str) -> Unit:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from decimal import Decimal
 
 #: mm per inch, exactly.
 MM_PER_INCH = 25.4
@@ -16,8 +15,20 @@ UM_PER_MM = 1e3
 #: Linear axes in the order of rows.
 AXES = "XYZ"
 
+#: Endings of keys, the longer ones first, and their units.
+_KEYS = {
+    "_mm_s3": "mm/s3", "_mm_s2": "mm/s2", "_mm_s": "mm/s", "_mm": "mm", "_um": "um", "_nm": "nm",
+    "_urad": "urad", "_mrad": "mrad", "_rad": "rad", "_deg": "deg", "_arcsec": "arcsec",
+}  # fmt: skip
 #: Neighbours of a number that are tried until one reads back exactly.
 _NEIGHBOURS = 3
+
+
+def unit_of_key(name: str) -> str | None:
+    """The unit of length, angle or speed in which a key ends, such as "um"; None for any other key."""
+    if "_per_" in name:
+        return None
+    return next((unit for ending, unit in _KEYS.items() if name.endswith(ending)), None)
 
 
 def shifted(number: float | str, exponent: int) -> float:
@@ -48,6 +59,8 @@ def in_unit(value: float, power: int) -> float:
 
 def in_unit_text(value: float, power: int) -> str:
     """The shortest decimal of a double in units of ten to `power`; read as text it is the same double."""
+    from decimal import Decimal
+
     text = format(Decimal(repr(float(value))).scaleb(-power), "f")
     text = text.rstrip("0").rstrip(".") if "." in text else text
     return "0" if text in ("-0", "") else text

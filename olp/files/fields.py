@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime
-import difflib
 import json
 import math
 import re
@@ -11,6 +10,7 @@ from collections.abc import Iterable
 from typing import Annotated
 
 from olp.core.machine import CHAINS, COMPONENTS, SQUARENESS
+from olp.core.patterns import pattern
 from olp.core.schema_keys import After, Before, Field, Instead, Shown, refusal
 from olp.program.registry import DESCRIBED, DIALECTS
 
@@ -27,7 +27,7 @@ SIGN = "actual-minus-commanded"
 
 _TOOL_NUMBER = "(0|[1-9][0-9]*)"
 # Frames of other languages may have any name, but no program would ever select a misspelt G-code.
-_G_OFFSET = re.compile(r"G(5[4-9](\.\d)?|1[12]\d|154)( ?P\d{1,3})?|G15 ?H\d{1,3}|G50[05-9]|G5[1-9]\d")
+_G_OFFSET = pattern(r"G(5[4-9](\.\d)?|1[12]\d|154)( ?P\d{1,3})?|G15 ?H\d{1,3}|G50[05-9]|G5[1-9]\d")
 
 
 def shown(value: object) -> str:
@@ -45,6 +45,8 @@ def shown(value: object) -> str:
 
 def nearest(name: str, known: Iterable[str]) -> str | None:
     """The known name that a misspelt one most likely means."""
+    import difflib
+
     folded = {candidate.casefold(): candidate for candidate in known}
     similar = difflib.get_close_matches(name.casefold(), folded, n=1, cutoff=0.6)
     without_unit = [candidate for candidate in folded if candidate.startswith(name.casefold() + "_")]

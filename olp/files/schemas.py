@@ -6,10 +6,10 @@ One class per TOML table. A key that no class names is refused. Every descriptio
 
 from __future__ import annotations
 
-import re
 from itertools import pairwise
 from typing import Annotated, Literal
 
+from olp.core.patterns import pattern
 from olp.core.schema import Interval, NotNegative, Position, Positive, Table, Text, Triple
 from olp.core.schema_keys import Field, Known, refusal, rule
 from olp.files.calibration.schema import CalibrationFile
@@ -238,7 +238,7 @@ class StylusTable(Table):
 
 
 #: A parameter of a program, by its number or its name.
-_PARAMETER = re.compile(r"#(\d{1,5}|<[^<>]+>)|(?:Q[LR]?|R)\d{1,5}")
+_PARAMETER = pattern(r"#(\d{1,5}|<[^<>]+>)|(?:Q[LR]?|R)\d{1,5}")
 Styli = dict[Text, StylusTable]
 WorkOffsets = dict[OffsetName, WorkOffsetTable]
 Tools = dict[ToolNumber, ToolTable]

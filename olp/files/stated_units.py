@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, get_args, get_origin
 
-from olp.core.quantities import pattern, quantity, unit_of_key
 from olp.core.schema import Table, fields_of, is_table
+from olp.core.units import unit_of_key
 
 
 def in_units_of_keys(model: type[Table], values: Mapping[str, object]) -> dict[str, object]:
@@ -43,6 +43,8 @@ def _names_table(annotation: object) -> bool:
 
 def _numbers(value: object, unit: str) -> object:
     if isinstance(value, str):
+        from olp.core.quantities import quantity
+
         try:
             return quantity(value, unit)
         except ValueError:
@@ -60,6 +62,8 @@ def not_a_quantity(path: tuple[str | int, ...], value: object) -> str | None:
     unit = next(filter(None, (unit_of_key(str(part)) for part in reversed(path))), None)
     if unit is None or not isinstance(value, str):
         return None
+    from olp.core.quantities import quantity
+
     try:
         quantity(value, unit)
     except ValueError as error:
@@ -95,6 +99,8 @@ def _or_text(node: Any, unit: str, shared: dict[str, str]) -> Any:
         shared[node["$ref"].rpartition("/")[2]] = unit
         return node
     if node.get("type") == "number":
+        from olp.core.quantities import pattern
+
         kept = {key: node[key] for key in ("description", "default") if key in node}
         number = {key: value for key, value in node.items() if key not in kept}
         return {"anyOf": [number, {"type": "string", "pattern": pattern(unit)}]} | kept

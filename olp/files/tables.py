@@ -12,6 +12,7 @@ import numpy as np
 from olp.core.arrays import Array
 from olp.core.errors import ConfigError
 from olp.core.machine import COMPONENTS
+from olp.core.patterns import pattern
 from olp.core.units import AXES, shifted
 from olp.core.values import dataclass
 from olp.files.columns import Row, Wanted, names, read_sheet, unknown
@@ -22,7 +23,7 @@ from olp.program.text.rows import LOOSE_CSV
 #: Units of error columns as powers of ten of the base unit (mm or rad).
 _POWER = {"um": -3, "urad": -6, "um/kg": -3, "urad/kg": -6}
 
-_COLUMN = re.compile(r"(sigma_)?(E[XYZABC][XYZ])_([A-Za-z]+)", re.IGNORECASE)
+_COLUMN = pattern(r"(sigma_)?(E[XYZABC][XYZ])_([A-Za-z]+)", re.IGNORECASE)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

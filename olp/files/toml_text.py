@@ -9,22 +9,23 @@ import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 
 from olp.core.errors import ConfigError
+from olp.core.patterns import pattern
 
 #: A key path, such as ("axes", "X", "travel_mm") or ("curves", 0, "file").
 Path = tuple[str | int, ...]
 
-_KEY = re.compile(r'"(?:[^"\\]|\\.)*"|\'[^\']*\'|[A-Za-z0-9_-]+')
-_KEY_LINE = re.compile(rf"\s*((?:{_KEY.pattern})(?:\s*\.\s*(?:{_KEY.pattern}))*)\s*=(.*)")
-_HEADER = re.compile(r"\s*(\[\[?)(.*?)\]\]?\s*(?:#.*)?$")
-_STRING_OR_COMMENT = re.compile(r'"(?:[^"\\]|\\.)*"|\'[^\']*\'|#.*')
+_KEY = pattern(r'"(?:[^"\\]|\\.)*"|\'[^\']*\'|[A-Za-z0-9_-]+')
+_KEY_LINE = pattern(rf"\s*((?:{_KEY.pattern})(?:\s*\.\s*(?:{_KEY.pattern}))*)\s*=(.*)")
+_HEADER = pattern(r"\s*(\[\[?)(.*?)\]\]?\s*(?:#.*)?$")
+_STRING_OR_COMMENT = pattern(r'"(?:[^"\\]|\\.)*"|\'[^\']*\'|#.*')
 #: characters of a line that a message shows
 _SHOWN = 120
 #: parts of a key at most; the time to read one goes with their square
 _DEEPEST = 16
 _PART = r"(?:[A-Za-z0-9_-]++|\"[^\"\n]*+\"|'[^'\n]*+')[ \t]*+"
-_DEEP_KEY = re.compile(rf"(?m)(?:^|[\[{{,])[ \t]*+(?:{_PART}\.[ \t]*+){{{_DEEPEST}}}")
-_BLANKS = re.compile(r"[A-Za-z]\w*(?: +\w+)+\s*(?==)")
-_BARE = re.compile(r"[A-Za-z0-9_-]+")
+_DEEP_KEY = pattern(rf"(?m)(?:^|[\[{{,])[ \t]*+(?:{_PART}\.[ \t]*+){{{_DEEPEST}}}")
+_BLANKS = pattern(r"[A-Za-z]\w*(?: +\w+)+\s*(?==)")
+_BARE = pattern(r"[A-Za-z0-9_-]+")
 
 
 def read_toml(data: bytes, file: str) -> tuple[dict[str, object], dict[Path, int]]:

@@ -9,7 +9,6 @@ Programs of blocks of words (RS-274) and of whole statements (APT, DMIS, lists) 
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
 from enum import Enum
@@ -21,6 +20,7 @@ from olp.core.values import dataclass
 from olp.program.kept import Kept
 from olp.program.origin import Unrolled
 from olp.program.text.line_ends import split
+from olp.program.text.signs import NO_SIGNS, Signs
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,15 +76,13 @@ class Dialect:
     marks around a comment. `first` are the beginnings of lines, in capitals, that stay before all others, in
     this order; `|` separates alternatives.
 
-    `endings` are endings of files, in small letters, that only this dialect has. `folder_endings` are those
-    by which a file in a folder is known as a program, also where several dialects have them. `sign` matches
-    what only its texts say at the start of a line, `shared_sign` what texts of other dialects say too.
-    `languages` are those of `olp.program.foreign` that its own texts look like. With `payload_comments` the
-    payload may change inside a program. `path_tolerance`: programs state how far the control may leave the
-    path (G64 P), and without it the control has no bound. `axes_at_ram`: axis positions count at the end of
-    the ram, whatever stylus or tool is active. `points`: programs state points, and all of them count,
-    however the machine goes there. `contours_assumed` says what is assumed of contours under cutter
-    compensation, empty where nothing is.
+    `signs` are what shows the dialect of a text or a file. `folder_endings` are endings by which a file in a
+    folder is known as a program, also where several dialects have them. `languages` are those of
+    `olp.program.foreign` that its own texts look like. With `payload_comments` the payload may change inside
+    a program. `path_tolerance`: programs state how far the control may leave the path (G64 P), and without it
+    the control has no bound. `axes_at_ram`: axis positions count at the end of the ram, whatever stylus or
+    tool is active. `points`: programs state points, and all of them count, however the machine goes there.
+    `contours_assumed` says what is assumed of contours under cutter compensation, empty where nothing is.
     """
 
     name: str
@@ -94,10 +92,8 @@ class Dialect:
     unroller: Callable[..., Unrolled] | None = None
     unrolls_with_tools: bool = False
     keeper: Callable[..., Kept] | None = None
-    endings: tuple[str, ...] = ()
+    signs: Signs = NO_SIGNS
     folder_endings: tuple[str, ...] = ()
-    sign: re.Pattern[bytes] | None = None
-    shared_sign: re.Pattern[bytes] | None = None
     languages: frozenset[str] = frozenset()
     payload_comments: bool = False
     path_tolerance: bool = False

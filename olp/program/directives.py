@@ -10,7 +10,6 @@ text that has the marks is not marked again.
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 from collections.abc import Mapping
@@ -20,15 +19,14 @@ import numpy.typing as npt
 
 from olp.core.arrays import Mask
 from olp.core.errors import ProgramError
+from olp.core.patterns import pattern
 from olp.program.rs274.lexer import WordChunk
 from olp.program.text.line_ends import LINE_END
 
-_DIRECTIVE = re.compile(rb"([(;])[ \t]*olp[ \t]+([^\r\n]*)", re.IGNORECASE)
-_SWITCH = re.compile(rb"(off|on)\b", re.IGNORECASE)
-_PAYLOAD = re.compile(
-    r"payload[ \t]+(\d+(?:\.\d*)?|\.\d+)(?:[ \t]*kg)?(?:[ \t]*,[ \t]*line[ \t]+(\d+))?", re.I
-)
-_MARKED = re.compile(
+_DIRECTIVE = pattern(rb"([(;])[ \t]*olp[ \t]+([^\r\n]*)", re.IGNORECASE)
+_SWITCH = pattern(rb"(off|on)\b", re.IGNORECASE)
+_PAYLOAD = pattern(r"payload[ \t]+(\d+(?:\.\d*)?|\.\d+)(?:[ \t]*kg)?(?:[ \t]*,[ \t]*line[ \t]+(\d+))?", re.I)
+_MARKED = pattern(
     rb"[(;][ \t]*olp[ \t]+payload[ \t]+([\d.]+)[ \t]*(?:kg)?[ \t]*(?:,[ \t]*line[ \t]+(\d+))?", re.IGNORECASE
 )
 
@@ -86,6 +84,8 @@ class Directives:
 
 def _payload(content: str, line: int) -> float | None:
     """The payload that a comment states; None where it is about something else."""
+    import difflib
+
     word = content.split(maxsplit=1)[0].rstrip("=:,").lower() if content else ""
     if not word.startswith("payload") and not difflib.get_close_matches(word, ["payload"], cutoff=0.7):
         return None

@@ -10,7 +10,7 @@ import re
 
 from olp.core.errors import ProgramError
 from olp.core.values import dataclass
-from olp.program.text.signs import SINUMERIK
+from olp.program.text.signs import SINUMERIK_LINE
 
 #: Bytes of a text that are searched.
 LOOKED_AT = 1 << 16
@@ -123,7 +123,7 @@ FOREIGN = (
     ),
     Foreign(
         "Sinumerik (Siemens)",
-        _line(SINUMERIK + rb"|(?:N\d+[ \t]*)?(?:DEF|PROC)[ \t]+\w+"),
+        _line(SINUMERIK_LINE + rb"|(?:N\d+[ \t]*)?(?:DEF|PROC)[ \t]+\w+"),
         _NAME_IT,
         language=True,
         how="and was read as another language",

@@ -1,65 +1,90 @@
 """All dialects by name, which of them a text is written in, and the function that reads any of them.
 
-A new dialect is a file with its value, `DIALECT`, and a line in `_MODULES` here. One that a file describes is
-that file and its name in `DESCRIBED`. Only this module looks names up.
+A new dialect is a file with its value, `DIALECT`, and a line in `_KNOWN` here. One that a file describes is
+that file and its name in `DESCRIBED`. Only this module looks names up. The file of a dialect is imported when
+it is asked for: its name and its signs are known without.
 """
 
 from __future__ import annotations
 
-import difflib
-import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from importlib import import_module
-from types import MappingProxyType
 
 from olp.core.errors import ProgramError, UsageError
 from olp.core.machine import Setup
+from olp.core.patterns import pattern
+from olp.core.values import dataclass
 from olp.program.bounds import bounded
 from olp.program.dialect import Dialect
 from olp.program.dialect import Options as Options
 from olp.program.origin import in_original
 from olp.program.program import Program
+from olp.program.text import signs
+from olp.program.text.signs import NO_SIGNS, Signs
 
-_MODULES = (
-    "olp.program.rs274.profiles.linuxcnc",
-    "olp.program.rs274.profiles.fanuc",
-    "olp.program.rs274.profiles.grbl",
-    "olp.program.rs274.profiles.haas",
-    "olp.program.rs274.profiles.mach3",
-    "olp.program.rs274.profiles.mach4",
-    "olp.program.rs274.profiles.mazak",
-    "olp.program.rs274.profiles.okuma",
-    "olp.program.rs274.profiles.siemens_iso",
-    "olp.program.rs274.profiles.marlin",
-    "olp.program.rs274.profiles.klipper",
-    "olp.program.sinumerik.dialect",
-    "olp.program.heidenhain.dialect",
-    "olp.program.apt.dialect",
-    "olp.program.dmis.dialect",
-    "olp.program.pointlist.dialect",
-)
+
+@dataclass(frozen=True, slots=True)
+class Known:
+    """What is known of a dialect before its `module` is imported."""
+
+    module: str
+    signs: Signs = NO_SIGNS
+
+
+_KNOWN = {
+    "linuxcnc": Known("olp.program.rs274.profiles.linuxcnc"),
+    "fanuc": Known("olp.program.rs274.profiles.fanuc"),
+    "grbl": Known("olp.program.rs274.profiles.grbl"),
+    "haas": Known("olp.program.rs274.profiles.haas"),
+    "mach3": Known("olp.program.rs274.profiles.mach3"),
+    "mach4": Known("olp.program.rs274.profiles.mach4"),
+    "mazak": Known("olp.program.rs274.profiles.mazak"),
+    "okuma": Known("olp.program.rs274.profiles.okuma", signs.OKUMA),
+    "siemens-iso": Known("olp.program.rs274.profiles.siemens_iso"),
+    "marlin": Known("olp.program.rs274.profiles.marlin", signs.PRINTER),
+    "klipper": Known("olp.program.rs274.profiles.klipper", signs.KLIPPER),
+    "sinumerik": Known("olp.program.sinumerik.dialect", signs.SINUMERIK),
+    "heidenhain": Known("olp.program.heidenhain.dialect", signs.HEIDENHAIN),
+    "apt": Known("olp.program.apt.dialect", signs.APT),
+    "dmis": Known("olp.program.dmis.dialect", signs.DMIS),
+    "list": Known("olp.program.pointlist.dialect", signs.LISTS),
+}
 #: Files of `olp/program/described/shipped` that describe a dialect, without their ending.
 DESCRIBED = ("kawasaki-as", "val2", "karel")
 
 
-def _registered() -> dict[str, Dialect]:
-    by_name: dict[str, Dialect] = {}
-    for module in _MODULES:
-        dialect: Dialect = import_module(module).DIALECT
-        if dialect.name in by_name:
-            raise ValueError(f"two dialects have the name {dialect.name}")
-        by_name[dialect.name] = dialect
-    return by_name
+_LOADED: dict[str, Dialect] = {}
 
 
-_BY_NAME = _registered()
+class _Dialects(Mapping[str, Dialect]):
+    """The dialects by name, each imported when it is first looked up."""
+
+    def __getitem__(self, name: str) -> Dialect:
+        if name not in _LOADED:
+            known = _KNOWN[name]
+            dialect: Dialect = import_module(known.module).DIALECT
+            if (dialect.name, dialect.signs) != (name, known.signs):
+                raise ValueError(f"the dialect {dialect.name} has another name or other signs than {name}")
+            _LOADED[name] = dialect
+        return _LOADED[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(_KNOWN)
+
+    def __len__(self) -> int:
+        return len(_KNOWN)
+
+    def __contains__(self, name: object) -> bool:
+        return name in _KNOWN
+
+
 #: All registered dialects in the order of their lines.
-DIALECTS: Mapping[str, Dialect] = MappingProxyType(_BY_NAME)
+DIALECTS: Mapping[str, Dialect] = _Dialects()
 
-_VERSION = re.compile(r"\.\d+$")
+_VERSION = pattern(r"\.\d+$")
 #: bytes of a text that are searched for signs of a dialect
 _LOOKED_AT = 1 << 16
-_PAYLOAD = re.compile(rb"(?im)^[^\r\n]*\bolp[ \t]+payload\b")
+_PAYLOAD = pattern(rb"(?im)^[^\r\n]*\bolp[ \t]+payload\b")
 
 
 def read(
@@ -104,6 +129,8 @@ def named(name: str) -> Dialect:
     """The registered dialect of this name. Raises UsageError where there is none."""
     dialect = find(name)
     if dialect is None:
+        import difflib
+
         near = difflib.get_close_matches(name.casefold(), DIALECTS, 1)
         hint = f"did you mean {near[0]}?" if near else f"expected one of {', '.join(DIALECTS)}"
         raise UsageError(f"there is no dialect {name!r}; {hint}")
@@ -153,14 +180,18 @@ def dialect_of(name: str | None, control: Dialect, data: bytes, file: str) -> Di
 def _by_ending(file: str) -> str | None:
     """The dialect that alone has the ending of a file."""
     ending = ending_of(file)
-    return next((name for name, dialect in DIALECTS.items() if ending in dialect.endings), None)
+    return next((name for name, known in _KNOWN.items() if ending in known.signs.endings), None)
 
 
 def _by_text(data: bytes) -> set[str]:
     """The dialects of statements that a text may be written in; none where it has no statements."""
     start = data[:_LOOKED_AT]
-    counts = {name: len(d.sign.findall(start)) for name, d in DIALECTS.items() if d.sign is not None}
+    if signs.ODD.search(signs.ASIDE.sub(b"", start)) is None:
+        return set()
+    own = ((name, known.signs.own) for name, known in _KNOWN.items())
+    counts = {name: len(sign.findall(start)) for name, sign in own if sign is not None}
     most = max(counts.values(), default=0)
     if most:
         return {name for name, count in counts.items() if count == most}
-    return {name for name, d in DIALECTS.items() if d.shared_sign is not None and d.shared_sign.search(start)}
+    shared = ((name, known.signs.shared) for name, known in _KNOWN.items())
+    return {name for name, sign in shared if sign is not None and sign.search(start)}

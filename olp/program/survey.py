@@ -20,6 +20,7 @@ from typing import Any
 
 from olp.core.errors import ConfigError, ProgramError, Reason, Refused
 from olp.core.machine import ZERO, Setup, Tool, WorkOffset
+from olp.core.patterns import pattern
 from olp.core.values import dataclass
 from olp.findings.catalogue import RULES
 from olp.program.dialect import Dialect, Options
@@ -49,7 +50,7 @@ SHOWN = 60
 
 #: A number behind its letter; that of an expression goes with its whole block.
 _NUMBER = rb"[ \t]*[-+]?[ \t]*[\d.]+"
-_NO_LINE_END = re.compile(rb"[^\r\n]")
+_NO_LINE_END = pattern(rb"[^\r\n]")
 #: Most bytes of visited blocks of an unrolling that is tried; a longer one counts as one that helps.
 UNROLLED = 1_000_000
 TOO_LONG = "OLP543"
@@ -102,7 +103,7 @@ def read_all(
             raise
         from olp.program.foreign import recognised
 
-        certain = dialect.sign is not None or setup.job.described is not None
+        certain = dialect.signs.own is not None or setup.job.described is not None
         other = recognised(data, languages=not certain, own=dialect.languages)
         if other is not None:
             raise other from None

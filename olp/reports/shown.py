@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 
+from olp.core.patterns import pattern
 from olp.core.units import MM_PER_INCH, UM_PER_MM
 
 #: Choices of --units.
@@ -35,11 +36,11 @@ _NAMES = "um|mm/min|mm/s3|mm/s2|mm/s|mm"
 _NUMBER = r"[<>]?[-+]*\d+(?:\.\d+)?(?:e[-+]?\d+)?"
 _PART = rf"(?:[XYZ] )?{_NUMBER}(?: to {_NUMBER})?"
 #: Numbers before a unit: `0.20 um`, `0 to 600 mm`, `X 0 to 600, Y 0 to 400 mm`; not in `plate 300 mm.ngc`.
-_QUANTITY = re.compile(rf"(?<!line )(?<!lines )(?<![\w.])({_PART}(?:, {_PART})*) ({_NAMES})(?![\w/]|\.\w)")
+_QUANTITY = pattern(rf"(?<!line )(?<!lines )(?<![\w.])({_PART}(?:, {_PART})*) ({_NAMES})(?![\w/]|\.\w)")
 #: The unit of a column or a title: its last word, or after "in".
-_OF_COLUMN = re.compile(rf"(?:^|[ ,])({_NAMES})(?= [XYZ]$|$)")
-_IN = re.compile(rf"\bin ({_NAMES})\b")
-_NUMBERS = re.compile(rf"{_NUMBER}(?:(?:, | to | ){_NUMBER})*")
+_OF_COLUMN = pattern(rf"(?:^|[ ,])({_NAMES})(?= [XYZ]$|$)")
+_IN = pattern(rf"\bin ({_NAMES})\b")
+_NUMBERS = pattern(rf"{_NUMBER}(?:(?:, | to | ){_NUMBER})*")
 
 
 @contextmanager

@@ -16,7 +16,6 @@ from olp.checks import correction as checks
 from olp.compensation.planning import written_plans
 from olp.compensation.stamp import find_stamp, stamp_line, stamped
 from olp.compensation.tally import Tally
-from olp.compensation.tool_path_text import as_tool_path, with_exact_path
 from olp.compensation.writer import Task
 from olp.compensation.writing import write
 from olp.core.arrays import Array, Index, read_only
@@ -346,6 +345,8 @@ def _as_path(source: Source, program: Program, loaded: Loaded, reading: Options)
             "--contour path goes with programs of blocks (G41, G42) only; points under CUTCOM are corrected "
             "where they are stated"
         )
+    from olp.compensation.tool_path_text import as_tool_path, with_exact_path
+
     with program.errors():
         text = as_tool_path(program, loaded.setup.machine.least_increment_mm)
         try:

@@ -130,7 +130,7 @@ def _first(machine: Machine, notes: list[str]) -> tuple[bytes | None, str]:
     control = Session(Setup(machine)).control()
     if not isinstance(control, Profile):
         notes.append(f"No first program is written for {control.title}: take one of your own.")
-        return None, control.endings[0] if control.endings else "nc"
+        return None, control.signs.endings[0] if control.signs.endings else "nc"
     program = first_program(control, machine, machine.default_work_offset)
     if program is None:
         notes.append("No first program is written: the travel is too short, or the work offset is turned.")

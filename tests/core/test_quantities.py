@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from olp.core.quantities import EXAMPLES, pattern, quantity, unit_named, unit_of_key
+from olp.core.quantities import EXAMPLES, pattern, quantity, unit_named
+from olp.core.units import unit_of_key
 
 #: A text, the unit of the key, and the number; those without pi are the nearest doubles of exact values.
 STATED = [

@@ -21,7 +21,7 @@ NAMES = {*registry.DIALECTS, *registry.DESCRIBED, *FAMILIES}
 HOLDS_A_NAME = {"controller", "dialect", "family"}
 HAS_A_NAME = {"dialect", "profile", "control", "control_of"}
 TABLES = {"DIALECTS", "PROFILES", "REGISTERED", "READERS"}
-DEFINES = {Path(str(import_module(name).__file__)) for name in registry._MODULES}
+DEFINES = {Path(str(import_module(known.module).__file__)) for known in registry._KNOWN.values()}
 FREE = DEFINES | {Path(str(registry.__file__))}
 FILES = sorted(set(PACKAGE.rglob("*.py")) - FREE)
 

@@ -70,7 +70,8 @@ def pairs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Pair]]
             dialect = registry.find(name) or described(name)
             assert dialect is not None
             copy = replace(dialect, name=f"{OTHER}-{name}")
-            patch.setitem(registry._BY_NAME, copy.name, copy)
+            patch.setitem(registry._KNOWN, copy.name, registry.Known("", copy.signs))
+            patch.setitem(registry._LOADED, copy.name, copy)
             other = replace(setup.machine, controller=copy.name)
             setups[name] = Pair(
                 replace(setup, job=replace(setup.job, dialect=name, described=described(name))),

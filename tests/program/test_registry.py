@@ -10,8 +10,10 @@ from cases.acceptance import TRUE_ZERO, machine
 
 from olp.core.errors import ProgramError, UsageError
 from olp.files.config import load_setup
+from olp.program import registry
 from olp.program.dialect import Row, Support
 from olp.program.registry import DIALECTS, dialect_of, find, named, read
+from olp.program.text.signs import ASIDE, ODD
 
 HAAS = DIALECTS["haas"]
 SHARED = b"GOTO/1,2,3\n"
@@ -102,10 +104,40 @@ def test_a_line_that_only_one_dialect_has_shows_it(name: str, line: str) -> None
         assert chosen(None, text.encode(), "a.txt") == name
 
 
+@pytest.mark.parametrize("line", [line for lines in SIGNS.values() for line in lines] + ["GOTO/1", "FROM /1"])
+def test_a_line_that_shows_a_dialect_is_odd(line: str) -> None:
+    """Texts without an odd place are not searched for signs."""
+    for text in (line, line.lower()):
+        assert ODD.search(ASIDE.sub(b"", text.encode()))
+
+
+def test_a_text_of_plain_blocks_is_not_odd() -> None:
+    assert ODD.search(ASIDE.sub(b"", b"N10 G1 X-1.5Y+.5 Z2. F1E3 (L X+1 R0 FMAX)\r\nM30\n")) is None
+
+
+def test_a_dialect_is_imported_when_it_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(registry, "_LOADED", {})
+    assert chosen(None, b"GOTO/1,2,3\n", "a.cls", "apt") == "apt"
+    assert {*registry._LOADED} == {"apt"}
+    assert "dmis" in registry.DIALECTS and len(registry.DIALECTS) == len([*registry.DIALECTS])
+    with pytest.raises(KeyError):
+        _ = registry.DIALECTS["no such dialect"]
+
+
+def test_a_dialect_with_another_name_or_other_signs_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(registry, "_LOADED", {})
+    apt = registry._KNOWN["apt"]
+    monkeypatch.setitem(registry._KNOWN, "mine", apt)
+    monkeypatch.setitem(registry._KNOWN, "apt", replace(apt, signs=registry.NO_SIGNS))
+    for name in ("mine", "apt"):
+        with pytest.raises(ValueError, match="another name or other signs"):
+            named(name)
+
+
 @pytest.mark.parametrize("line", NO_SIGNS)
 def test_a_line_that_others_have_too_shows_nothing(line: str) -> None:
     assert chosen(None, f"{line}\n".encode(), "a.nc", "apt") == "apt"
-    signs = [d.sign for d in DIALECTS.values() if d.sign is not None]
+    signs = [d.signs.own for d in DIALECTS.values() if d.signs.own is not None]
     assert not any(sign.search(line.encode()) for sign in signs)
 
 

@@ -15,7 +15,6 @@ from olp.core.schema import Position, Table, Text, Triple
 from olp.core.schema_keys import Field
 from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM, in_unit_text
 from olp.errormodel.base import ErrorModel
-from olp.errormodel.grid_errors import GridErrors
 from olp.errormodel.gridded import ComponentTable, grid_rows
 from olp.errormodel.sources.base import (
     ErrorSource,
@@ -109,6 +108,8 @@ class Compliance(ErrorSource[list[ComplianceTable], tuple[ComponentTable, ...]])
     def models(self, values: tuple[ComponentTable, ...], frame: Frame) -> list[ErrorModel]:
         if not values and not frame.loads:
             return []
+        from olp.errormodel.grid_errors import GridErrors
+
         return [
             GridErrors.of(
                 "load", values, frame.chain, frame.datum_mm, frame.box_mm, hold=frame.hold,

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from itertools import product
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -21,7 +21,6 @@ from olp.core.units import AXES, UM_PER_MM, in_unit_text
 from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.boxed import Boxed, as_points
-from olp.errormodel.grid_bound import GridBound
 from olp.errormodel.gridded import frozen, grid_rows, knot_problems, refuse
 from olp.errormodel.sources.base import (
     ErrorSource,
@@ -33,6 +32,9 @@ from olp.errormodel.sources.base import (
     files_of_tables,
     floats,
 )
+
+if TYPE_CHECKING:
+    from olp.errormodel.grid_bound import GridBound
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,6 +103,8 @@ class MapErrors(Boxed):
 
     @classmethod
     def of(cls, described: DeviationMap, box_mm: Array, hold: bool) -> MapErrors:
+        from olp.errormodel.grid_bound import GridBound
+
         grid = Grid.through(described.knots_mm, described.values, described.interpolation)
         return cls(box_mm, hold, described.name, grid, GridBound.of(grid, tuple(AXES)))
 

@@ -23,8 +23,6 @@ from olp.core.schema_keys import Field, Known, refusal, rule
 from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM, in_unit, shifted
 from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
-from olp.errormodel.distortion import lagged, shapes
-from olp.errormodel.grid_errors import GridErrors
 from olp.errormodel.gridded import COVER_MM, ComponentTable, refuse
 from olp.errormodel.sources.base import ErrorSource, Example, Frame, Reading, Writing, floats, vector
 from olp.errormodel.sources.expansion import Thermal, write_table
@@ -113,6 +111,8 @@ class Structure:
             raise ConfigError(
                 f"the time {at_s:g} s is not in the log of temperatures, {time_s[0]:g} to {time_s[-1]:g} s"
             )
+        from olp.errormodel.distortion import lagged
+
         lags = {sensor.name: sensor.lag_s for sensor in self.sensors}
         structure_degC = {
             name: float(lagged(time_s[:upto], values[:upto], lags[name])[-1])
@@ -153,6 +153,8 @@ class Structure:
     def tables(self, *, hold: bool) -> tuple[ComponentTable, ...]:
         """The component errors at these temperatures, one table per measuring line and span; a parabola over
         three nodes is exact."""
+        from olp.errormodel.distortion import shapes
+
         rises = self.rises(hold=hold)
         sums: dict[tuple[str, tuple[float, float], Vector | None, Vector], dict[str, Array]] = {}
         for d in self.distortions:
@@ -305,6 +307,8 @@ class ThermalStructure(ErrorSource[str | None, Structure | None]):
         tables = () if values is None else values.tables(hold=frame.hold)
         if not tables:
             return []
+        from olp.errormodel.grid_errors import GridErrors
+
         return [
             GridErrors.of(
                 "thermal", tables, frame.chain, frame.datum_mm, frame.box_mm, hold=frame.hold,

@@ -4,7 +4,6 @@ drift."""
 from __future__ import annotations
 
 import math
-import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, TypeVar
 from olp.core.arrays import Array
 from olp.core.errors import ConfigError
 from olp.core.machine import COMPONENTS, ZERO, Vector
+from olp.core.patterns import pattern
 from olp.core.schema import Table
 from olp.core.units import AXES, shifted
 from olp.errormodel.sources.structure import Structure, ThermalFile, structure_of, structure_tables
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 
 T = TypeVar("T", bound=Table)
 
-_READING = re.compile(r"(E[A-Z]{2})@([-+]?\d+(?:\.\d+)?)_(um|urad)")
-_DATA = re.compile(r"\s*#\s*(line_mm|tool_mm)\s*=\s*(.+?)\s*")
+_READING = pattern(r"(E[A-Z]{2})@([-+]?\d+(?:\.\d+)?)_(um|urad)")
+_DATA = pattern(r"\s*#\s*(line_mm|tool_mm)\s*=\s*(.+?)\s*")
 
 
 def load_structure(path: PathLike, machine: str | None = None, read: Reader = read_bytes) -> Structure:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from typing import Any
 
 from olp.core.machine import Setup
@@ -10,10 +9,7 @@ from olp.program.apt.table import TABLE
 from olp.program.dialect import Dialect, Options, StatementDialect
 from olp.program.origin import Unrolled
 from olp.program.program import Program
-from olp.program.text.signs import POINTS_BY_SLASH
-
-#: endings of files, in small letters
-_ENDINGS = ("apt", "aptsource", "ncl", "cls", "cl", "clt", "cldata", "clf")
+from olp.program.text.signs import APT
 
 
 def _read(data: bytes, setup: Setup, dialect: Dialect, options: Options, *, words: bool) -> Program:
@@ -35,15 +31,8 @@ DIALECT = StatementDialect(
     path_mode="the post-processor's",
     reader=_read,
     unroller=_unroll,
-    endings=_ENDINGS,
-    folder_endings=_ENDINGS,
-    sign=re.compile(
-        rb"(?im)^[ \t]*(PARTNO|LOADTL|LOAD[ \t]*/|SPINDL|FINI[ \t]*\r?$|CUTTER|TOOL PATH|CUTCOM|MULTAX|"
-        rb"TLAXIS|RAPID[ \t]*/?[ \t]*\r?$|FEDRAT[ \t]*/[ \t]*(?:[\d.]|[IM]P?M)|GODLTA|INDIRV|MOVARC|"
-        rb"CIRCLE[ \t]*/|CYCLE[ \t]*/|UNITS?[ \t]*/[ \t]*(?:MM|INCH(?:ES)?)[ \t]*\r?$|"
-        rb"GOTO[ \t]*/[-+.\dED \t]+(?:,[-+.\dED \t]+){5})"
-    ),
-    shared_sign=POINTS_BY_SLASH,
+    signs=APT,
+    folder_endings=APT.endings,
     comment=(b"$$ ", b""),
     first=(b"%", b"$$*", b"PARTNO"),
     contours_assumed="points under CUTCOM are corrected where they are stated: that the tool is there, or no "

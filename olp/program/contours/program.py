@@ -8,7 +8,6 @@ import numpy as np
 
 from olp.core.arrays import Index
 from olp.program.contours.rules import ContourRules
-from olp.program.contours.tool_path import follow
 from olp.program.program import ArcSlots, Program
 
 
@@ -18,6 +17,8 @@ def with_tool_path(program: Program, rules: ContourRules) -> Program:
     path = program.toolpath
     if not (path.compensated_radius_mm() > 0).any():
         return program
+    from olp.program.contours.tool_path import follow
+
     done = follow(path, rules)
     last = np.searchsorted(done.block, np.arange(len(path)), "right") - 1
     # the first move behind n moves of the text comes behind as many of the tool

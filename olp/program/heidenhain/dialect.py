@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import re
 from typing import Any
 
 from olp.core.machine import Setup
+from olp.core.patterns import pattern
 from olp.core.values import dataclass
 from olp.program.dialect import Dialect, Options, StatementDialect
 from olp.program.heidenhain.table import TABLE
 from olp.program.origin import Unrolled
 from olp.program.program import Program
+from olp.program.text.signs import HEIDENHAIN
 
-_ARC = re.compile(rb"(?i)^([ \t]*\d*[ \t]*)C[RP]?\b|DR[ \t]*[-+]")
+_ARC = pattern(rb"(?i)^([ \t]*\d*[ \t]*)C[RP]?\b|DR[ \t]*[-+]")
 
 
 def _read(data: bytes, setup: Setup, dialect: Dialect, options: Options, *, words: bool) -> Program:
@@ -46,13 +47,8 @@ DIALECT = Conversational(
     reader=_read,
     unroller=_unroll,
     unrolls_with_tools=True,
-    endings=("h", "hnc"),
+    signs=HEIDENHAIN,
     folder_endings=("h", "hnc"),
-    sign=re.compile(
-        rb"(?im)^[ \t]*(?:\d+[ \t]+)?(?:(?:BEGIN|END)[ \t]+PGM\b|TOOL[ \t]+CALL\b|CYCLE?[ \t]+DEF\b|"
-        rb"BLK[ \t]+FORM\b|CALL[ \t]+LBL\b|LBL[ \t]+[\d\"]|"
-        rb"L[ \t]+[^\r\n;]*(?:\bR[0LR]\b|\bF[ \t]*MAX\b)|CC?[ \t]+[XYZ][^\r\n;]*[-+\d.])"
-    ),
     inch_decimals=4,
     comment=(b"; ", b""),
     first=(b"BEGIN PGM|0 BEGIN PGM|0  BEGIN PGM",),

@@ -9,6 +9,7 @@ from olp.program.dialect import Dialect, Options
 from olp.program.pointlist.base import PointList
 from olp.program.program import Program
 from olp.program.text.delimited import Layout
+from olp.program.text.signs import LISTS
 
 
 def _read(data: bytes, setup: Setup, dialect: Dialect, options: Options, *, words: bool) -> Program:
@@ -23,7 +24,7 @@ DIALECT = PointList(
     path_mode="not stated",
     points=True,
     reader=_read,
-    endings=("csv", "tsv"),
+    signs=LISTS,
     comment=(b"# ", b""),
 )
 

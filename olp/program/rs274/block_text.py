@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 
 from olp.core.errors import ProgramError
+from olp.core.patterns import pattern
 from olp.core.values import dataclass
 from olp.program.text.line_ends import LINE_END, STRAY_CR
 
@@ -15,9 +16,9 @@ _SHOWN_OF_LINE = 60
 #: Bytes that are good on every control.
 PLAIN = b"\t\n" + bytes(range(0x20, 0x7F))
 #: Control characters but tab and those of line ends.
-CONTROL = re.compile(rb"[\x00-\x08\x0b\x0c\x0e-\x1f]")
-_COMMENTS = re.compile(rb"\([^)]*\)?|;.*", re.DOTALL)
-_NEWLINE = re.compile(rb"\n")
+CONTROL = pattern(rb"[\x00-\x08\x0b\x0c\x0e-\x1f]")
+_COMMENTS = pattern(rb"\([^)]*\)?|;.*", re.DOTALL)
+_NEWLINE = pattern(rb"\n")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -16,13 +16,14 @@ import numpy as np
 
 from olp.core.arrays import Index, Mask, is_in
 from olp.core.errors import ProgramError
+from olp.core.patterns import pattern
 from olp.core.values import dataclass
 from olp.program.rs274.lexer import WordChunk
 
-_COMMENT = re.compile(rb";.*", re.DOTALL)
-_NUMBERED = re.compile(rb"N[ \t]*\d+[ \t]*")
-_CODE = re.compile(rb"([GMT])[ \t]*(\d+(?:\.\d+)?)(?![\w.])|([GMT])[ \t]*(\d+(?:\.\d+)?)(?=[A-Z])")
-_NAME = re.compile(rb"[A-Z_][A-Z0-9_]+")
+_COMMENT = pattern(rb";.*", re.DOTALL)
+_NUMBERED = pattern(rb"N[ \t]*\d+[ \t]*")
+_CODE = pattern(rb"([GMT])[ \t]*(\d+(?:\.\d+)?)(?![\w.])|([GMT])[ \t]*(\d+(?:\.\d+)?)(?=[A-Z])")
+_NAME = pattern(rb"[A-Z_][A-Z0-9_]+")
 _COMMAND_LETTERS = is_in(np.arange(256), list(b"GMT"))
 #: Characters of a line that a message shows.
 _SHOWN = 60

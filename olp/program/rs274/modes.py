@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from olp.core.arrays import Array, Index, Mask, distinct, is_in
 from olp.core.errors import ProgramError
+from olp.core.patterns import pattern
 from olp.core.values import dataclass
 from olp.program.rs274.axis_state import AxisState
 from olp.program.rs274.block_rules import M
@@ -33,11 +34,11 @@ from olp.program.rs274.profiles.base import Act, Profile
 
 Modal = npt.NDArray[np.int16]
 
-_FLOW = re.compile(rb"[#\[=<]|^/?\s*O|^\W*N?\d*\s*(IF|WHILE|GOTO|END|DO)", re.IGNORECASE)
-_POLAR = re.compile(rb"[@^]")
+_FLOW = pattern(rb"[#\[=<]|^/?\s*O|^\W*N?\d*\s*(IF|WHILE|GOTO|END|DO)", re.IGNORECASE)
+_POLAR = pattern(rb"[@^]")
 #: What to do where the unroller helps.
 UNROLL = "unroll the program with --flatten"
-_COMMA = re.compile(rb"\d,\d")
+_COMMA = pattern(rb"\d,\d")
 _LENGTHS = np.zeros(256, bool)
 _LENGTHS[list(b"XYZIJKRQ")] = True
 

@@ -6,12 +6,12 @@ Lengths become mm here. How offsets add up is in `offsets`, what becomes of them
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import field
 
 from olp.core.errors import ProgramError
 from olp.core.machine import ZERO, Setup, Vector, WorkOffset
+from olp.core.patterns import pattern
 from olp.core.toolpath import Touch
 from olp.core.turns import Turn
 from olp.core.values import dataclass
@@ -26,7 +26,7 @@ from olp.program.rs274.turned import Turning, along_words
 STORES_POSITION = 20
 #: P of a G10 L20 that writes an offset G54.1 P, at most.
 _FURTHER = 300
-_SPACED = re.compile(r"([\d.])([A-Z])")
+_SPACED = pattern(r"([\d.])([A-Z])")
 
 
 @dataclass(frozen=True, slots=True)

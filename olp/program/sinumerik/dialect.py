@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from types import MappingProxyType
 
@@ -57,9 +56,8 @@ DIALECT = Sinumerik(
     reader=read_blocks,
     unroller=unroll_text,
     translator=translate_text,
-    endings=("mpf", "spf"),
+    signs=SINUMERIK,
     folder_endings=("mpf", "spf", "arc"),
-    sign=re.compile(rb"(?im)^[ \t]*(?:" + SINUMERIK + rb")"),
     comment=(b"; ", b""),
     first=(b"%_N_", b";$PATH"),
     metric="G71",

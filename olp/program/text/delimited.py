@@ -13,6 +13,7 @@ from types import MappingProxyType
 from typing import Literal
 
 from olp.core.errors import InputError
+from olp.core.patterns import pattern
 from olp.core.values import dataclass
 
 Delimiter = Literal["comma", "semicolon", "tab", "space"]
@@ -53,12 +54,12 @@ AXES = ("X", "Y", "Z")
 LOOK = 40
 #: bytes that have these rows
 _HEAD = 1 << 16
-_FRAME = re.compile(r"[#/%;\s]*frame\s*=\s*(\S+)", re.IGNORECASE)
-_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
-_COMMA_NUMBER = re.compile(r"[-+]?\d+,\d+")
-_AXIS = re.compile(r"([xyz])(?:[ _]*[\[(]?(mm|um|m|inch)[\])]?)?")
-_OTHER = re.compile(r"(.+?)(?:(?:[ _]+|[ _]*[\[(])(?:mm|deg|rad|s|ms|us|(?:mm|m|inch)[/_](?:s|min))[\])]?)?")
-_SPEED = re.compile(r".+?[ _]*[\[(]?(mm|m|inch)[/_](s|min)[\])]?")
+_FRAME = pattern(r"[#/%;\s]*frame\s*=\s*(\S+)", re.IGNORECASE)
+_NUMBER = pattern(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
+_COMMA_NUMBER = pattern(r"[-+]?\d+,\d+")
+_AXIS = pattern(r"([xyz])(?:[ _]*[\[(]?(mm|um|m|inch)[\])]?)?")
+_OTHER = pattern(r"(.+?)(?:(?:[ _]+|[ _]*[\[(])(?:mm|deg|rad|s|ms|us|(?:mm|m|inch)[/_](?:s|min))[\])]?)?")
+_SPEED = pattern(r".+?[ _]*[\[(]?(mm|m|inch)[/_](s|min)[\])]?")
 _MARKS = ("#", "//", "%")
 
 

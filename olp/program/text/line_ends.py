@@ -7,14 +7,16 @@ from __future__ import annotations
 
 import re
 
+from olp.core.patterns import pattern
+
 #: One line end, where a lone carriage return is one.
-LINE_END = re.compile(rb"\r*\n|\r")
+LINE_END = pattern(rb"\r*\n|\r")
 #: The same in text.
-LINE_END_TEXT = re.compile(r"\r*\n|\r")
+LINE_END_TEXT = pattern(r"\r*\n|\r")
 #: A carriage return that belongs to no line feed and is not the last byte of the text.
-LONE_CR = re.compile(rb"\r(?!\r*\n|\Z)")
+LONE_CR = pattern(rb"\r(?!\r*\n|\Z)")
 #: A carriage return within a line, for controls that end a line at a line feed alone.
-STRAY_CR = re.compile(rb"\r(?!\r*(?:\n|\Z))")
+STRAY_CR = pattern(rb"\r(?!\r*(?:\n|\Z))")
 
 
 def split(data: bytes, ending: re.Pattern[bytes] = LINE_END) -> list[bytes]:

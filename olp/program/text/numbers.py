@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-import re
 
 import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Index, Mask
+from olp.core.patterns import pattern
 from olp.core.values import dataclass
 
 Spans = npt.NDArray[np.int64] | npt.NDArray[np.int32]
@@ -19,7 +19,7 @@ MOST_DECIMALS = 10
 LONGEST = 40
 #: Positions are smaller than this in any unit.
 LARGEST = 1e8
-_NUMBER = re.compile(rb"([-+]?)(\d*)([.,]?)(\d*)(?:([eEdD])([-+]?\d+))?")
+_NUMBER = pattern(rb"([-+]?)(\d*)([.,]?)(\d*)(?:([eEdD])([-+]?\d+))?")
 #: Blanks as bytes.
 _SPACE = 32
 _TAB = 9

@@ -1,15 +1,82 @@
-"""Signs of a dialect in a text that several dialects share."""
+"""What shows the dialect of a program: endings of files, and what its texts say.
+
+It stands apart from the dialects, so that a text is told from others without importing them all.
+"""
+
+from __future__ import annotations
 
 import re
 
-#: Statements of points that APT and DMIS share.
-POINTS_BY_SLASH = re.compile(rb"(?im)^[ \t]*(GOTO|RAPID|FROM)[ \t]*/")
+from olp.core.patterns import pattern
+from olp.core.values import dataclass
 
+
+@dataclass(frozen=True, slots=True)
+class Signs:
+    """`endings` are endings of files, in small letters, that only this dialect has. `own` matches what only
+    its texts say at the start of a line, `shared` what texts of other dialects say too. In every line that
+    shows a sign `ODD` finds something too."""
+
+    endings: tuple[str, ...] = ()
+    own: re.Pattern[bytes] | None = None
+    shared: re.Pattern[bytes] | None = None
+
+
+#: A comment in a block, which is no sign.
+ASIDE = pattern(rb"\([^)\r\n]*\)")
+#: What a text of plain blocks does not have: a letter that no number follows, a mark, and G641 to G645.
+ODD = pattern(rb"[A-Za-z_](?![-+.\d])|[^\w\s.+-]|[Gg]64[1-5]")
+
+#: Statements of points that APT and DMIS share.
+_POINTS_BY_SLASH = pattern(rb"(?im)^[ \t]*(GOTO|RAPID|FROM)[ \t]*/")
+
+NO_SIGNS = Signs()
+OKUMA = Signs(("min", "ssb", "sub"))
+LISTS = Signs(("csv", "tsv"))
+PRINTER = Signs(
+    shared=pattern(
+        rb"(?im)^;[ \t]*(?:FLAVOR:Marlin|generated (?:by|with) (?:\w+slicer|cura|simplify3d)\w*"
+        rb"|generated with Cura_SteamEngine|HEADER_BLOCK_START|gcode_flavor[ \t]*=)"
+    )
+)
+KLIPPER = Signs(
+    own=pattern(rb"(?im)^;[ \t]*gcode_flavor[ \t]*=[ \t]*klipper[ \t]*\r?$|^;FLAVOR:Klipper[ \t]*\r?$"),
+    shared=PRINTER.shared,
+)
 #: What begins lines of Sinumerik programs, and of those of no other dialect that is read.
-SINUMERIK = (
+SINUMERIK_LINE = (
     rb"(?:N\d+[ \t]*)?(?:;?%_N_|;\$PATH=|TRAORI\b|TRAFOOF\b|CYCLE\d+[ \t]*\(|MCALL\b|"
     rb"POCKET\d[ \t]*\(|HOLES\d[ \t]*\(|MSG[ \t]*\(|T[ \t]*=[ \t]*\"|"
     rb"(?:A?TRANS|A?ROT|A?MIRROR|A?SCALE)\b|"
     rb"R\d+[ \t]*=|(?:EXTERN|SUPA|FFWON|SOFT|COMPCAD|COMPON|STOPRE|G64[1-5])\b|WORKPIECE[ \t]*\(|"
     rb"[^;(\r\n]*\b(?:[XYZIJKFS]1?|CR|TURN)=[ \t]*[-+R\d(AI])"
+)
+SINUMERIK = Signs(("mpf", "spf"), own=pattern(rb"(?im)^[ \t]*(?:" + SINUMERIK_LINE + rb")"))
+HEIDENHAIN = Signs(
+    ("h", "hnc"),
+    own=pattern(
+        rb"(?im)^[ \t]*(?:\d+[ \t]+)?(?:(?:BEGIN|END)[ \t]+PGM\b|TOOL[ \t]+CALL\b|CYCLE?[ \t]+DEF\b|"
+        rb"BLK[ \t]+FORM\b|CALL[ \t]+LBL\b|LBL[ \t]+[\d\"]|"
+        rb"L[ \t]+[^\r\n;]*(?:\bR[0LR]\b|\bF[ \t]*MAX\b)|CC?[ \t]+[XYZ][^\r\n;]*[-+\d.])"
+    ),
+)
+APT = Signs(
+    ("apt", "aptsource", "ncl", "cls", "cl", "clt", "cldata", "clf"),
+    own=pattern(
+        rb"(?im)^[ \t]*(PARTNO|LOADTL|LOAD[ \t]*/|SPINDL|FINI[ \t]*\r?$|CUTTER|TOOL PATH|CUTCOM|MULTAX|"
+        rb"TLAXIS|RAPID[ \t]*/?[ \t]*\r?$|FEDRAT[ \t]*/[ \t]*(?:[\d.]|[IM]P?M)|GODLTA|INDIRV|MOVARC|"
+        rb"CIRCLE[ \t]*/|CYCLE[ \t]*/|UNITS?[ \t]*/[ \t]*(?:MM|INCH(?:ES)?)[ \t]*\r?$|"
+        rb"GOTO[ \t]*/[-+.\dED \t]+(?:,[-+.\dED \t]+){5})"
+    ),
+    shared=_POINTS_BY_SLASH,
+)
+DMIS = Signs(
+    ("dmi", "dms", "dmis"),
+    own=pattern(
+        rb"(?im)^[ \t]*(DMISMN|FILNAM|SNSLCT|SNSET|PTMEAS|MEAS[ \t]*/|ENDMES|ENDFIL|WKPLAN|TECOMP|"
+        rb"UNITS[ \t]*/[ \t]*\w+[ \t]*,|GOTO[ \t]*/[ \t]*CART|"
+        rb"MODE[ \t]*/[ \t]*(?:MAN|PROG|AUTO)|F\([^)]*\)[ \t]*=[ \t]*FEAT|"
+        rb"FEDRAT[ \t]*/[ \t]*\w+VEL)"
+    ),
+    shared=_POINTS_BY_SLASH,
 )

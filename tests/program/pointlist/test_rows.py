@@ -402,7 +402,7 @@ def test_the_marks_of_a_list_are_those_of_its_layout() -> None:
     assert (own.name, own.comment, own.marks) == ("list", (b"// ", b""), False)
     assert own.layout == PointProfile(comment="//", stamp=False).layout
     assert (DIALECT.comment, DIALECT.marks, DIALECT.layout) == ((b"# ", b""), True, None)
-    assert (DIALECT.endings, DIALECT.points, DIALECT.path_mode) == (("csv", "tsv"), True, "not stated")
+    assert (DIALECT.signs.endings, DIALECT.points, DIALECT.path_mode) == (("csv", "tsv"), True, "not stated")
     assert DIALECT.title == "list of positions (CSV, TXT)"
 
 

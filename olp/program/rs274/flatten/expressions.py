@@ -13,11 +13,11 @@ Every error is a ProgramError without a line, which the caller adds.
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Mapping
 from typing import Protocol
 
 from olp.core.errors import ProgramError
+from olp.core.patterns import pattern
 from olp.core.values import dataclass
 
 #: LinuxCNC takes two numbers as equal, and a number as an integer, within this.
@@ -62,10 +62,10 @@ class Arithmetic:
     exact: bool
 
 
-_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)")
-_UNSIGNED = re.compile(r"\d+\.?\d*|\.\d+")
-_FUNCTION = re.compile(r"(abs|acos|asin|atan|cos|exp|fix|fup|ln|round|rnd|sin|sqrt|sqr|tan|exists)(?=\[)")
-_OPERATOR = re.compile(r"\*\*|\*|/|\+|-|mod|and|xor|or|eq|ne|gt|ge|lt|le")
+_NUMBER = pattern(r"[+-]?(?:\d+\.?\d*|\.\d+)")
+_UNSIGNED = pattern(r"\d+\.?\d*|\.\d+")
+_FUNCTION = pattern(r"(abs|acos|asin|atan|cos|exp|fix|fup|ln|round|rnd|sin|sqrt|sqr|tan|exists)(?=\[)")
+_OPERATOR = pattern(r"\*\*|\*|/|\+|-|mod|and|xor|or|eq|ne|gt|ge|lt|le")
 _COMPARISONS = ("eq", "ne", "gt", "ge", "lt", "le")
 #: levels of nesting in an expression at most
 _MAX_DEPTH = 60

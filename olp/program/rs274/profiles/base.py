@@ -15,6 +15,7 @@ from typing import Any, TypeVar
 
 from olp.core.arrays import Array
 from olp.core.machine import Machine
+from olp.core.patterns import pattern
 from olp.core.units import AXES
 from olp.core.values import dataclass
 from olp.program.contours.rules import NGC_CONTOURS, ContourRules
@@ -262,7 +263,7 @@ def increment(machine: Machine, letter: str, unit_mm: float) -> float:
 
 
 #: The words of a block that make its move an arc.
-_OF_ARC = re.compile(rb"(?i)G[ \t]*0*[23](?![\d.])|[IJKRP][ \t]*[-+]?[\d.]+")
+_OF_ARC = pattern(rb"(?i)G[ \t]*0*[23](?![\d.])|[IJKRP][ \t]*[-+]?[\d.]+")
 
 #: Why codes are refused, where a control has no other reason.
 REFUSALS: Mapping[int, str] = {

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import re
-
+from olp.core.patterns import pattern
 from olp.program.contours.rules import ISO_CONTOURS
 from olp.program.rs274.block_text import BlockText
 from olp.program.rs274.cycle_rules import ISO_CYCLES
@@ -47,7 +46,7 @@ ISO = Profile(
     lengths_along_z=True,
     text=BlockText(),
     # `:1234` is another way to write the number of a program
-    inert=re.compile(rb"[ \t]*:[ \t]*\d+[ \t]*(?:\([^)]*\)[ \t]*)?"),
+    inert=pattern(rb"[ \t]*:[ \t]*\d+[ \t]*(?:\([^)]*\)[ \t]*)?"),
     cycles=ISO_CYCLES,
     contours=ISO_CONTOURS,
     language=MACRO_B,

@@ -7,12 +7,12 @@ refused by the firmware, and its G18 turns the other way than that of RS-274.
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 
 from olp.program.rs274.commands import Commands
 from olp.program.rs274.profiles.base import Act
 from olp.program.rs274.profiles.printer import PRINTER, PRINTER_CODES, TEXTS
+from olp.program.text import signs
 
 #: Commands of Klipper that move no axis and change no mode and no zero.
 _STILL = frozenset(
@@ -58,6 +58,6 @@ DIALECT = replace(
         extruder_follows=False,
         arc_words="IJ",
     ),
-    sign=re.compile(rb"(?im)^;[ \t]*gcode_flavor[ \t]*=[ \t]*klipper[ \t]*\r?$|^;FLAVOR:Klipper[ \t]*\r?$"),
+    signs=signs.KLIPPER,
     path_mode="junctions of the firmware: square_corner_velocity",
 )

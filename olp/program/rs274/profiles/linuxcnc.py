@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import re
-
+from olp.core.patterns import pattern
 from olp.program.rs274.block_rules import NGC_RULES
 from olp.program.rs274.block_text import BlockText
 from olp.program.rs274.codes import THREAD
@@ -37,11 +36,11 @@ DIALECT = Profile(
     least_inverse_feed=0.1,
     m_with_motion=frozenset({62, 63, 67}),
     text=BlockText(
-        odd_bytes=re.compile(rb"\x00|" + STRAY_CR.pattern),
+        odd_bytes=pattern(rb"\x00|" + STRAY_CR.pattern),
         skips_control=False,
         nested_comments=False,
         marks_in_pairs=True,
-        unread=re.compile(rb"\$[ \t]*-?\d+"),
+        unread=pattern(rb"\$[ \t]*-?\d+"),
         longest=252,
     ),
     rules=NGC_RULES,

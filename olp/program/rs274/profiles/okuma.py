@@ -10,11 +10,12 @@ Source: programming manuals of OSP-E10M, OSP-E100M and OSP-P200M.
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 
+from olp.core.patterns import pattern
 from olp.program.rs274.profiles.base import M_REFUSALS, NO_CODE, Act, g_codes
 from olp.program.rs274.profiles.iso import ISO
+from olp.program.text.signs import OKUMA
 
 _LACKING = frozenset({382, 383, 384, 385, 280, 980, 990, 520, 920, 540, 550, 560, 570, 580, 590, 640})
 _LENGTHS = (540, 550, 570, 580, 590)
@@ -27,7 +28,7 @@ DIALECT = replace(
     name="okuma",
     title="Okuma mills (OSP)",
     folder_endings=("min", "nc", "tap"),
-    endings=("min", "ssb", "sub"),
+    signs=OKUMA,
     unroller=None,
     keeper=None,
     codes=g_codes(
@@ -63,7 +64,7 @@ DIALECT = replace(
     axis_dwell=False,
     dwell_words="F",
     g10_stores=False,
-    inert=re.compile(rb"[ \t]*(?:\$[^()%]*%?|[ON][A-Z][A-Z0-9]*(?:[ \t]*\([^)]*\))?)[ \t]*"),
+    inert=pattern(rb"[ \t]*(?:\$[^()%]*%?|[ON][A-Z][A-Z0-9]*(?:[ \t]*\([^)]*\))?)[ \t]*"),
     languages=frozenset({"Okuma OSP"}),
     program_number=False,
     path_mode="G64 of the control, unless a high-speed function is on",

@@ -5,7 +5,6 @@ Sources: `G-code` pages and sources of Marlin 2 and Klipper; each says where it 
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 
 from olp.program.rs274.block_rules import BlockRules
@@ -15,6 +14,7 @@ from olp.program.rs274.cycle_rules import NGC_CYCLES
 from olp.program.rs274.entry import read_blocks
 from olp.program.rs274.flatten.language import PLAIN_NGC
 from olp.program.rs274.profiles.base import Act, Profile
+from olp.program.text import signs
 
 #: What printers make of G codes. G10 and G11 retract, G60 stores a position, G80 ends a mode.
 PRINTER_CODES: Mapping[int, Act] = {
@@ -90,9 +90,6 @@ PRINTER = Profile(
     language=PLAIN_NGC,
     comment=(b"; ", b""),
     first=(b";FLAVOR|; HEADER|;GENERATED|; GENERATED",),
-    shared_sign=re.compile(
-        rb"(?im)^;[ \t]*(?:FLAVOR:Marlin|generated (?:by|with) (?:\w+slicer|cura|simplify3d)\w*"
-        rb"|generated with Cura_SteamEngine|HEADER_BLOCK_START|gcode_flavor[ \t]*=)"
-    ),
+    signs=signs.PRINTER,
     path_mode="junctions of the firmware: it rounds corners by the speed that it may jump by",
 )
