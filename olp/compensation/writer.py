@@ -7,6 +7,7 @@ small: digits, then edits, then one splice per chunk of text.
 
 from __future__ import annotations
 
+import io
 from abc import ABC, abstractmethod
 from dataclasses import replace
 from itertools import pairwise
@@ -78,7 +79,8 @@ class Writer(ABC):
         self.word_offset_mm = self.frame_offset_mm
         if self.turns is not None:
             self.word_offset_mm = self.turns.words(self.frame_offset_mm, self.turns.of_frame)
-        self._pieces: list[bytes] = []
+        # what is written so far: nothing before the first change
+        self._out = io.BytesIO()
         # where the text grows, and by how much, if that is asked for
         self._grown: list[tuple[Index, Index]] | None = [] if task.located else None
         self._begin, self._changed = 0, False
@@ -91,27 +93,38 @@ class Writer(ABC):
         self.targets = targets(self.path, plan.shift_mm)
         self.parts = np.zeros(len(self.path), np.int32)
         self.holes = HolePlan.of(self.program, plan, self.model).along_words(self.path, self.turns)
-        data, move = self.program.data, plan.move
+        move = plan.move
         for first, last in self._spans():
             end = band.end if last == len(move) else self._start_of(int(move[last]))
             rows = Rows.of(plan, self.path, first, last, self._entry)
             low, high = int(rows.move[0]), int(rows.move[-1])
             self.parts[low : high + 1] += np.bincount(rows.move - low).astype(np.int32)
             text = self._rewritten(rows, self._begin, end)
-            self._changed |= text is not None
-            self._pieces.append(data[self._begin : end] if text is None else text)
+            if text is not None and not self._changed:
+                self._changed = True
+                self._put(0, self._begin)
+            if self._changed:
+                self._put(self._begin, end, text)
             self._begin, self._entry = end, rows.emitted[-1].copy()
             tell("correct", last / len(move))
 
     def text(self) -> bytes | None:
         """The corrected text, None where nothing is written. It is given once."""
-        program, pieces = self.program, self._pieces
         if not (self._changed or (self.stamp and self.stamp_always)):
             return None
-        pieces.append(program.data[self._begin :])
-        if self.stamp:
-            pieces[0] = stamped(pieces[0], self.stamp, program.eol(1), program.dialect.first)
-        return b"".join(pieces)
+        self._put(self._begin if self._changed else 0, len(self.program.data))
+        return self._out.getvalue()
+
+    def _put(self, begin: int, end: int, text: bytes | None = None) -> None:
+        """Write the bytes `begin`..`end` of the program, or the `text` in their place; the stamp with the
+        first of them."""
+        program = self.program
+        text = program.data[begin:end] if text is None else text
+        if not text:
+            return
+        if self.stamp and not self._out.tell():
+            text = stamped(text, self.stamp, program.eol(1), program.dialect.first)
+        self._out.write(text)
 
     def starts(self) -> Index | None:
         """(lines,) where each line of the program, with the blocks that are put before it, begins in the

@@ -15,6 +15,8 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
+#: Whole numbers of any size, such as lines.
+Numbers = npt.NDArray[np.signedinteger[Any]]
 
 #: So many values are compared one by one.
 _FEW = 12

@@ -196,6 +196,10 @@ class Toolpath:
         """(n,) moves along a contour that the control offsets by the cutter radius."""
         return np.array([f.compensation is not None for f in self.frames], bool)[self.frame]
 
+    def offset_by_radius(self) -> bool:
+        """Whether the control offsets any move by a cutter radius which is not 0."""
+        return any(c is not None and c.radius_mm > 0 for c in (f.compensation for f in self.frames))
+
     def compensated_radius_mm(self) -> Array:
         """(n,) radius by which the control offsets each move, 0 where it does not."""
         radii = [0.0 if (c := f.compensation) is None else c.radius_mm for f in self.frames]

@@ -73,10 +73,11 @@ def measure(
     waypoint = np.full(count, np.nan, np.float32)
     worst = np.full(count, np.nan, np.float32)
     bend = np.zeros(count, np.float32)
-    side = np.zeros(count, np.float32)
     tracer = Tracer(nominal, target_mm, path, groups, model, bend_mm)
     starts = UnknownStarts(nominal, target_mm, path, groups, model, bend_mm)
     sides = UnknownSides(path, model) if tracer.has_play else None
+    # without play one 0 stands for all
+    side = np.broadcast_to(np.float32(0.0), count) if sides is None else np.zeros(count, np.float32)
     a = 0
     while a < count:
         parts = int(groups[a - 1]) + _BLOCK if a else _BLOCK

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Array, Index, Mask, distinct
+from olp.core.arrays import Array, Index, Mask, Numbers, distinct
 from olp.core.toolpath import Toolpath
 from olp.core.units import UM_PER_MM
 from olp.core.values import dataclass
@@ -47,7 +47,7 @@ class Judgements:
     rounding. `measured` is the layer of runs on the machine, None where there are none. `side` has by layer
     how much of the deviation an unknown side of the backlash may be; without a layer it is nothing."""
 
-    line: Index
+    line: Numbers
     tool: Index
     operation: Index
     counts: npt.NDArray[np.uint8]
@@ -63,14 +63,9 @@ class Judgements:
         path = proof.nominal
         tool, operation = groups_of(path)
         judged = proof.judged
-        shown = (proof.counts == Counts.RAPID) | (proof.counts == Counts.UNCORRECTED)
-        sides = [
-            np.where(judged, size, np.where(shown, part.waypoint, np.nan)).astype(np.float32)
-            for part, size in ((proof.before, proof.before_mm), (proof.after, proof.after_mm))
-        ]
         parts = (("uncorrected", proof.before), ("corrected", proof.after))
         return Judgements(
-            path.line.astype(np.int64), tool, operation, proof.counts, sides[0], sides[1],
+            path.line, tool, operation, proof.counts, proof.before_mm, proof.after_mm,
             proof.tolerance_mm, proof.allowed_mm, None,
             {name: part.side for name, part in parts if part.side[judged].any()},
         )  # fmt: skip
@@ -94,7 +89,7 @@ class Judgements:
         rows = self.judged if which is None else self.judged & which
         return float(np.nan_to_num(self.corrected[rows]).max(initial=0.0))
 
-    def worst_lines(self, count: int) -> Index:
+    def worst_lines(self, count: int) -> Numbers:
         """So many lines, or some more, with moves that count: those that are farthest off when corrected are
         among them. All where there are fewer."""
         rows = np.flatnonzero(self.judged)
@@ -107,7 +102,7 @@ class Judgements:
             some *= _FEW
         return distinct(self.line[rows])
 
-    def on_lines(self, lines: Index) -> Judgements:
+    def on_lines(self, lines: Numbers) -> Judgements:
         """The rows of these lines alone, without measured runs."""
         rows = np.flatnonzero(np.isin(self.line, lines))
         return Judgements(
@@ -212,13 +207,16 @@ def groups_of(path: Toolpath) -> tuple[Index, Index]:
     # frames of the same key have the number of the first of them
     first = {key: k for k, key in reversed(list(enumerate(keys)))}
     number = np.array([first[key] for key in keys], np.int32)[path.frame] if len(path.frames) else path.frame
+    if len(number) and (number == number[0]).all():
+        # one number stands for all
+        return np.broadcast_to(numbers[number[0]], len(number)), np.broadcast_to(np.int64(0), len(number))
     operation = np.zeros(len(number), np.int64)
     np.cumsum(number[1:] != number[:-1], out=operation[1:])
     return np.asarray(numbers[path.frame], np.int64), operation
 
 
 def _measured_columns(
-    runs: Measured | None, lines: Index, state: npt.NDArray[np.uint8]
+    runs: Measured | None, lines: Numbers, state: npt.NDArray[np.uint8]
 ) -> dict[str, npt.NDArray[Any]]:
     """`measured_um` and `measured_state` of all runs; `state` is set where a line is above when measured."""
     if runs is None:

@@ -54,19 +54,29 @@ class Counts(IntEnum):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Side:
+    """What a proof keeps of a `Deviation`: (n,) `waypoint` and `side` in mm, and `bend_mm`: of feed moves
+    that count, the largest part that comes from chords."""
+
+    waypoint: Single
+    side: Single
+    bend_mm: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Proof:
     """Deviations of the nominal program (`before`) and of the corrected one (`after`), per nominal move.
 
     `written` is the path of the corrected program, and `groups` (n,) the last of its moves that belongs to
     each nominal one. `digit_mm` is the coarsest last digit written. `counts` (n,) are values of Counts,
-    (n,) `before_mm` and `after_mm` the deviation of each move that counts, NaN of others. `lean` (n,) are
-    feed moves that start where a move ended uncorrected."""
+    (n,) `before_mm` and `after_mm` the deviation of each move that counts, that at the end of those that are
+    only shown, NaN of others. `lean` (n,) are feed moves that start where a move ended uncorrected."""
 
     nominal: Toolpath
     written: Toolpath
     groups: Index
-    before: Deviation
-    after: Deviation
+    before: Side
+    after: Side
     tolerance_mm: float
     digit_mm: float
     counts: npt.NDArray[np.uint8]
@@ -86,11 +96,11 @@ class Proof:
 
     def size_mm(self) -> Array:
         """(n,) the deviation per nominal move, 0 where the move does not count."""
-        return np.asarray(np.nan_to_num(self.after_mm), float)
+        return np.where(self.judged, np.nan_to_num(self.after_mm), np.float64(0.0))
 
     @property
     def largest_mm(self) -> float:
-        return float(self.size_mm().max(initial=0.0))
+        return float(np.fmax.reduce(self.after_mm[self.judged], initial=0.0))
 
     def owner(self) -> Index:
         """(m,) the nominal move that each move of the corrected program belongs to."""
@@ -111,7 +121,7 @@ class Proof:
     def summary(self, side: str) -> dict[str, dict[str, float]]:
         """Largest and rms in um of what counts, at waypoints and along cutting moves; `side` is "before" or
         "after"."""
-        part: Deviation = getattr(self, side)
+        part: Side = getattr(self, side)
         whole: Single = getattr(self, f"{side}_mm")
         at_end = (self.counts <= Counts.POINT) | (self.counts == Counts.LEFT)
         waypoints = part.waypoint[at_end & np.isfinite(part.waypoint)]
@@ -156,18 +166,25 @@ def prove(
     bend = tolerance_mm * _BEND_SHARE
     how = _how(nominal)
     counts = _counts(path, how, exempt)
-    sides = []
-    for begin, program, ends in ((0.4, nominal, np.arange(len(path))), (0.7, corrected, groups)):
-        told = part(tell, begin, begin + 0.3)
+
+    def side(program: Program, ends: Index, told: Progress) -> tuple[Side, Single]:
         deviation = measure(path, target, program.toolpath, ends, model, bend, told)
         strokes = strokes_mm(nominal, target, program.toolpath, program.holes, model, bend)
-        size = np.where(counts <= Counts.LEFT, _sizes(deviation, how, *strokes), np.float32(np.nan))
-        sides.append((deviation, size))
-    (before, before_mm), (after, after_mm) = sides
+        size = _sizes(deviation, how, *strokes)
+        size[counts > Counts.LEFT] = np.nan
+        largest = float(deviation.bend[counts == Counts.FEED].max(initial=0.0))
+        return Side(deviation.waypoint, deviation.side, largest), size
+
+    before, before_mm = side(nominal, np.arange(len(path)), part(tell, 0.4, 0.7))
+    after, after_mm = side(corrected, groups, part(tell, 0.7, 1.0))
     blind = np.isnan(after_mm) & (counts <= Counts.LEFT)
     counts[blind & (counts == Counts.LEFT)] = Counts.UNKNOWN
     # strokes of a hole above its bottom have no figure of their own
     _refuse_blind(path, blind & ((counts <= Counts.POINT) | ((counts == Counts.HOLE) & ~np.isnan(before_mm))))
+    shown = (counts == Counts.RAPID) | (counts == Counts.UNCORRECTED)
+    for one, size in ((before, before_mm), (after, after_mm)):
+        size[counts > Counts.LEFT] = np.nan
+        size[shown] = one.waypoint[shown]
     lean = uncorrected_starts(path, exempt) & (counts == Counts.FEED)
     return Proof(
         path, written, groups, before, after, tolerance_mm, digit_mm, counts, before_mm, after_mm, lean
@@ -251,16 +268,19 @@ def _refuse_blind(path: Toolpath, blind: Mask) -> None:
 
 def _sizes(deviation: Deviation, how: npt.NDArray[np.uint8], bottom: Index, stroke: Single) -> Single:
     """(n,) mm: along the path of feed moves, at the end of points, of a hole at the move to its bottom."""
-    side = deviation.side
+    side, end, along = deviation.side, deviation.waypoint, deviation.path
     size = np.full(len(how), np.nan, np.float32)
-    along, end = how == Counts.FEED, how == Counts.POINT
-    size[along] = np.fmax(deviation.waypoint, deviation.path)[along] + side[along]
-    size[end] = deviation.waypoint[end] + side[end]
+
+    def put(rows: Mask | Index, values: Single) -> None:
+        size[rows] = values + side[rows]
+
+    feed, point, hole = (how == kind for kind in (Counts.FEED, Counts.POINT, Counts.HOLE))
+    put(feed, np.fmax(end[feed], along[feed]))
+    put(point, end[point])
     if len(bottom):
-        hole = how[bottom] == Counts.HOLE
-        size[bottom[hole]] = stroke[hole] + side[bottom[hole]]
+        some = how[bottom] == Counts.HOLE
+        put(bottom[some], stroke[some])
     else:
         # holes without a partner are compared stroke by stroke
-        hole_moves = how == Counts.HOLE
-        size[hole_moves] = np.fmax(deviation.waypoint, deviation.path)[hole_moves] + side[hole_moves]
+        put(hole, np.fmax(end[hole], along[hole]))
     return size

@@ -38,6 +38,8 @@ class SmoothJoints:
     @staticmethod
     def of(path: Toolpath) -> SmoothJoints | None:
         """Those of a nominal path, None where it has none."""
+        if not path.offset_by_radius():
+            return None
         on = (path.compensated_radius_mm() > 0) & (path.kind != Kind.RAPID)
         number = path.contour_number()
         move = np.flatnonzero(on[:-1] & on[1:] & (number[:-1] == number[1:]))

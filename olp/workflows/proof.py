@@ -31,7 +31,7 @@ from olp.program.origin import original_of
 from olp.program.program import Program
 from olp.program.registry import Options, read
 from olp.proof.judgement import Judgements, verdict
-from olp.proof.proof import ROUNDING_SHARE, Counts, Proof, largest_correction_mm, prove
+from olp.proof.proof import ROUNDING_SHARE, Proof, largest_correction_mm, prove
 from olp.workflows.doubt import accepted_of, doubted
 from olp.workflows.flatten import UnrollOptions
 from olp.workflows.session import Loaded
@@ -274,7 +274,6 @@ def report_of(
 ) -> dict[str, Any]:
     """The parts of the report ("olp-report-1") that a proof alone gives."""
     data, name = source
-    bend = float(np.where(proof.counts == Counts.FEED, proof.after.bend, 0.0).max(initial=0.0))
     return {
         "schema": "olp-report-1",
         "program": {
@@ -293,7 +292,7 @@ def report_of(
             "allowed_um": proof.allowed_mm * 1e3,
             "holds": proof.holds,
         },
-        "budget_um": _budget(bend, proof, program, loaded),
+        "budget_um": _budget(proof, program, loaded),
         "orientation": checks.orientation(program.toolpath, loaded.model),
         "sources": checks.sources(program.toolpath, loaded.model),
         "worst": checks.worst_blocks(program, table),
@@ -304,7 +303,7 @@ def report_of(
     }
 
 
-def _budget(bend_mm: float, proof: Proof, program: Program, loaded: Loaded) -> dict[str, float]:
+def _budget(proof: Proof, program: Program, loaded: Loaded) -> dict[str, float]:
     """The remaining deviation by cause, in um: the largest of each, of the random part two standard
     deviations. The control rounds to its least increment where the written digits are not multiples of it."""
     machine, repeatability = loaded.setup.machine, loaded.calibration.repeatability_mm
@@ -319,7 +318,7 @@ def _budget(bend_mm: float, proof: Proof, program: Program, loaded: Loaded) -> d
         for least in machine.least_increment_mm
     ]
     budget = {
-        "model_and_chords": bend_mm,
+        "model_and_chords": proof.after.bend_mm,
         "inversion": TOLERANCE_MM,
         "rounding": ROUNDING_SHARE * proof.digit_mm,
         "increment": float(np.linalg.norm(halves)),

@@ -61,7 +61,7 @@ def read(
             parsed = survey()
     except ProgramError as error:
         raise error if setup.machine.located else _with_control(error, dialect) from None
-    if not program.data.strip():
+    if not program.data or program.data.isspace():
         raise ProgramError("the file is empty; expected a program of at least one block", code="OLP501")
     return program if unroll is None else program.holding(parsed.data), parsed
 

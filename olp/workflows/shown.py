@@ -78,7 +78,7 @@ class Judged(Shown):
     @property
     def line(self) -> Index:
         """(n,) the line of each move in the nominal program."""
-        return read_only(self.table.line)
+        return read_only(self.table.line.astype(np.int64))
 
     @property
     def tool(self) -> Index:

@@ -36,6 +36,7 @@ from olp.proof.deviation import Deviation
 from olp.proof.proof import (
     Counts,
     Proof,
+    Side,
     corrections_mm,
     largest_correction_mm,
     prove,
@@ -126,7 +127,8 @@ def test_feeds_count_along_their_path_and_points_at_their_end() -> None:
     model = Known(half_wave, 0.01 * (np.pi / 50) ** 2)
     moves = (rapid(0, 0, 0), line(50, 0, 0), Move(Kind.PROBE, (0.0, 0.0, 0.0), WHOLE), rapid(0, 9, 0))
     got = proved(of(*moves), model=model)
-    assert np.isnan(got.before_mm).tolist() == [True, False, False, True]
+    assert got.judged.tolist() == [False, True, True, False]
+    assert got.before_mm[[0, 3]].tolist() == got.before.waypoint[[0, 3]].tolist()
     assert 1e3 * got.before_mm[1:3] == pytest.approx([math.hypot(10, 4), 4.0], abs=0.1)
     np.testing.assert_array_equal(got.before_mm, got.after_mm)
 
@@ -176,7 +178,8 @@ def test_a_hole_counts_at_the_move_to_its_bottom() -> None:
     mine, other = of(*pecked(-4.0, -10.0), holes=holes), of(*pecked(-5.0, -10.0), holes=holes)
     got = proved(mine, other, Known(aside))
     assert got.counts[1:].tolist() == [Counts.RAPID, Counts.HOLE, Counts.RAPID, Counts.HOLE, Counts.RAPID]
-    assert np.isnan(got.after_mm).tolist() == [True, True, True, True, False, True]
+    size = np.where(got.judged, got.after_mm, np.nan)
+    assert np.isnan(size).tolist() == [True, True, True, True, False, True]
     assert 1e3 * got.after_mm[4] == pytest.approx(2.0, rel=1e-4)
     alone = proved(replace(mine, holes=columns()), replace(other, holes=columns()), Known(aside))
     assert 1e3 * alone.after_mm[[2, 4]] == pytest.approx([1000.0, 2.0], rel=1e-3)
@@ -276,9 +279,9 @@ def test_numbers_of_the_proof(monkeypatch: pytest.MonkeyPatch) -> None:
 # -- its figures -----------------------------------------------------------------------------------------
 
 
-def deviation(*waypoint: float) -> Deviation:
+def side_of(*waypoint: float) -> Side:
     values = np.array(waypoint, np.float32) / np.float32(1000)
-    return Deviation(values, values * 2, values * 0, np.zeros(len(values)))
+    return Side(values, np.zeros(len(values), np.float32), 0.0)
 
 
 def of_figures(*rows: tuple[Counts, float, float]) -> Proof:
@@ -287,7 +290,7 @@ def of_figures(*rows: tuple[Counts, float, float]) -> Proof:
     end, whole = (np.array([row[k] for row in rows], np.float32) for k in (1, 2))
     path = toolpath(*(line(k, 0, 0) for k in range(len(rows))))
     return Proof(
-        path, path, np.arange(len(rows)), deviation(*(10 * end)), deviation(*end), 1e-3, 1e-4, counts,
+        path, path, np.arange(len(rows)), side_of(*(10 * end)), side_of(*end), 1e-3, 1e-4, counts,
         (whole / 100).astype(np.float32), (whole / 1000).astype(np.float32), np.zeros(len(rows), bool),
     )  # fmt: skip
 

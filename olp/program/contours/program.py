@@ -15,7 +15,7 @@ def with_tool_path(program: Program, rules: ContourRules) -> Program:
     """The program with the path of the tool, where it has contours of a known radius. Raises ProgramError
     where the control refuses them."""
     path = program.toolpath
-    if not (path.compensated_radius_mm() > 0).any():
+    if not (path.offset_by_radius() and (path.compensated_radius_mm() > 0).any()):
         return program
     from olp.program.contours.tool_path import follow
 

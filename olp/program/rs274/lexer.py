@@ -66,7 +66,8 @@ def chunks(data: bytes, rules: BlockText, size: int = CHUNK, tell: Progress = si
     """Lex a whole text, chunk by chunk, each ending at a line end. Lines that the `rules` refuse are odd."""
     if rules.cr_ends_line and b"\r" in data:
         data = LONE_CR.sub(b"\n", data)
-    plain = not data.translate(None, PLAIN)
+    # in parts, as no copy of the whole is needed
+    plain = not any(data[a : a + CHUNK].translate(None, PLAIN) for a in range(0, len(data), CHUNK))
     odd = () if plain or rules.odd_bytes is None else rules.odd_bytes.finditer(data)
     strange = np.array([match.start() for match in odd], np.int64)
     if not rules.skips_control and (plain or not CONTROL.search(data)):

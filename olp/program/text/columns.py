@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import mmap
+import os
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -13,6 +16,24 @@ from olp.core.values import dataclass
 _FIRST = 1 << 10
 #: up to so many.
 _MOST = 1 << 16
+#: Bytes from which an array has memory of its own. That of a smaller one is a place among others, and what is
+#: free between places in use does not go back to the system.
+_OWN = 1 << 16
+#: Such memory is of this process alone. On Windows all memory is.
+_ALONE = {} if os.name == "nt" else {"flags": mmap.MAP_PRIVATE}
+
+
+def apart(shape: tuple[int, ...], kind: npt.DTypeLike) -> npt.NDArray[Any]:
+    """An array to be filled, whose memory goes back to the system with it where it is large."""
+    kind = np.dtype(kind)
+    size = prod(shape) * kind.itemsize
+    if size < _OWN:
+        return np.empty(shape, kind)
+    try:
+        memory = mmap.mmap(-1, size, **_ALONE)
+    except OSError:
+        raise MemoryError from None
+    return np.frombuffer(memory, kind).reshape(shape)
 
 
 @dataclass(slots=True, eq=False)
@@ -36,13 +57,13 @@ class Columns:
         values = np.asarray(values)
         column = self._columns.get(name)
         if column is None:
-            column = self._columns[name] = _Column([], np.empty((_FIRST, *values.shape[1:]), kind))
+            column = self._columns[name] = _Column([], apart((_FIRST, *values.shape[1:]), kind))
         while len(values) > (room := len(column.block) - column.used):
             column.block[column.used :] = values[:room]
             values = values[room:]
             column.full.append(column.block)
             size = min(2 * len(column.block), _MOST)
-            column.block, column.used = np.empty((size, *values.shape[1:]), column.block.dtype), 0
+            column.block, column.used = apart((size, *values.shape[1:]), column.block.dtype), 0
         column.block[column.used : column.used + len(values)] = values
         column.used += len(values)
 
@@ -53,9 +74,10 @@ class Columns:
             array = np.zeros((0, *width), kind)
         else:
             blocks = [*column.full, column.block[: column.used]]
-            column.full.clear()
+            width, kind = column.block.shape[1:], column.block.dtype
+            del column
             end = sum(map(len, blocks))
-            array = np.empty((end, *column.block.shape[1:]), column.block.dtype)
+            array = apart((end, *width), kind)
             # from the last one on: the memory of each is free before more of the array is filled
             while blocks:
                 block = blocks.pop()
