@@ -131,22 +131,11 @@ class Sensitivity:
         points = as_points(axis_mm)
         n, unknowns = len(points), len(self.table)
         slots: tuple[list[Slot], list[Slot], list[Slot]] = ([], [], [])
-        position = [np.ascontiguousarray(points[:, k]) for k in range(3)]
-        tool: list[Column] = [0.0, 0.0, 0.0]
-        if self.tool_terms:
-            tool = [tool_mm[..., k] for k in range(3)]
-        for body in self.bodies:
-            lever_arms = [(rows, lever_arm.at(position, tool)) for rows, lever_arm in body.lever_arms]
-            q = position[body.axis]
-            axis_play = None if play is None else play[:, body.axis]
-            state = AxisState(body.axis, q, axis_play, body.datum_mm, lever_arms)
-            for entry, first, spare in zip(self.entries, self.first, self.spare, strict=True):
-                if AXES.index(entry.name[-1]) != body.axis:
-                    continue
-                acts = list(NUMBERS[entry.kind].acts(entry, state))
-                own = list(_own(entry, first, spare, q)) if acts else []
-                for row, coefficient in acts:
-                    slots[row].extend((number, weight * coefficient) for number, weight in own)
+        position, tool = self._columns(points, tool_mm)
+        for entry, first, spare, q, acts in self._acting(position, tool, play):
+            own = list(_own(entry, first, spare, q))
+            for row, coefficient in acts:
+                slots[row].extend((number, weight * coefficient) for number, weight in own)
         if self.expansion is not None:
             for j, taken in enumerate(slots):
                 tip = position[j] + tool_mm[..., j]
@@ -160,6 +149,111 @@ class Sensitivity:
             ends = np.arange(0, n * width + 1, width) if width else np.zeros(n + 1, np.int32)
             matrices.append(csr_array((weight.ravel(), number.ravel(), ends), shape=(n, unknowns)))
         return matrices
+
+    def covariance(
+        self, axis_mm: Array, tool_mm: Array, play: Array | None, held: Rows, frame: npt.NDArray[np.integer]
+    ) -> tuple[Array, Array]:
+        """(n, 3, 3) covariance in mm^2 of the error less that of the touch-off of its frame, at positions
+        as in `weights`; and (n,) the variance that comes from expansion. `held` (frames, 3, columns) are the
+        rows of the touch-offs, `frame` (n,) leads to them.
+
+        Independent unknowns act one by one, so that only those which the numbers share need rows.
+        """
+        points = as_points(axis_mm)
+        position, tool = self._columns(points, tool_mm)
+        touched = bool(held.any())
+        covariance = self._of_parts(position, tool, play, held[frame] if touched else None)
+        if self.rank:
+            shared = np.ascontiguousarray(self.table[:, : self.rank])
+            rows = np.stack([weights @ shared for weights in self.weights(axis_mm, tool_mm, play)])
+            if touched:
+                rows -= held[frame, :, : self.rank].transpose(1, 0, 2)
+            _add_products(covariance, rows)
+        grown = np.zeros(len(points))
+        if self.expansion is not None:
+            rows = np.zeros((3, len(points), 4), np.float32)
+            for j in range(3):
+                for k, weight in _expansion(self.expansion, j, 0, position[j], position[j] + tool_mm[..., j]):
+                    rows[j, :, k[0]] = weight
+            rows -= held[frame, :, -4:].transpose(1, 0, 2)
+            _add_products(covariance, rows)
+            grown = (rows**2).sum(axis=(0, 2))
+        for i, j in ((0, 1), (0, 2), (1, 2)):
+            covariance[j, i] = covariance[i, j]
+        return covariance.transpose(2, 0, 1), grown
+
+    def _of_parts(
+        self, position: list[Array], tool: list[Column], play: Array | None, held: Rows | None
+    ) -> Array:
+        """The upper half of (3, 3, n), the covariance that comes from the independent parts of entries, less
+        those `held` (n, 3, columns) of touch-offs."""
+        covariance = np.zeros((3, 3, len(position[0])))
+        point, behind = np.arange(len(position[0])), self.columns - len(self.table)
+        for entry, _, spare, q, acts in self._acting(position, tool, play):
+            if spare < 0:
+                continue
+            own = list(NUMBERS[entry.kind].part_weights(entry, q))
+            merged = _merged(acts)
+            variance = sum(weight * weight for _, weight in own)
+            for i, one in merged:
+                part = variance * one
+                for j, other in merged:
+                    if i <= j:
+                        covariance[i, j] += part * other
+            if held is None:
+                continue
+            for j in range(3):
+                both = sum(weight * held[point, j, spare + behind + number] for number, weight in own)
+                for i, one in merged:
+                    covariance[min(i, j), max(i, j)] -= (2.0 if i == j else 1.0) * (one * both)
+        if held is not None:
+            end = self.columns - (4 if self.expansion is not None else 0)
+            _add_products(covariance, held[:, :, self.rank : end].transpose(1, 0, 2).astype(float))
+        return covariance
+
+    @property
+    def rank(self) -> int:
+        """Columns of the unknowns that the numbers share, the first ones."""
+        return int(self.entries[0].factor.shape[1]) if self.entries else 0
+
+    def _columns(self, points: Array, tool_mm: Array) -> tuple[list[Array], list[Column]]:
+        """Positions and tool vectors by axis."""
+        tool: list[Column] = [0.0, 0.0, 0.0]
+        if self.tool_terms:
+            tool = [tool_mm[..., k] for k in range(3)]
+        return [np.ascontiguousarray(points[:, k]) for k in range(3)], tool
+
+    def _acting(
+        self, position: list[Array], tool: list[Column], play: Array | None
+    ) -> Iterator[tuple[Entry, int, int, Array, list[tuple[int, Column]]]]:
+        """Each entry with its first unknowns, the positions (n,) of its axis, and the rows of the error that
+        it acts on, with what coefficient."""
+        for body in self.bodies:
+            lever_arms = [(rows, lever_arm.at(position, tool)) for rows, lever_arm in body.lever_arms]
+            q = position[body.axis]
+            axis_play = None if play is None else play[:, body.axis]
+            state = AxisState(body.axis, q, axis_play, body.datum_mm, lever_arms)
+            for entry, first, spare in zip(self.entries, self.first, self.spare, strict=True):
+                if AXES.index(entry.name[-1]) != body.axis:
+                    continue
+                acts = list(NUMBERS[entry.kind].acts(entry, state))
+                if acts:
+                    yield entry, first, spare, q, acts
+
+
+def _merged(acts: list[tuple[int, Column]]) -> list[tuple[int, Column]]:
+    """Each row once, with the sum of its coefficients."""
+    sums: dict[int, Column] = {}
+    for row, coefficient in acts:
+        sums[row] = sums[row] + coefficient if row in sums else coefficient
+    return list(sums.items())
+
+
+def _add_products(covariance: Array, rows: Rows | Array) -> None:
+    """Add to the upper half of a covariance (3, 3, n) that of rows (3, n, columns)."""
+    for i in range(3):
+        for j in range(i, 3):
+            covariance[i, j] += np.einsum("nk,nk->n", rows[i], rows[j])
 
 
 def value_rows(entry: Entry, q: Array) -> Array:

@@ -7,8 +7,7 @@ waypoint has the uncertainty of the difference from there; "true" work offsets c
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -23,9 +22,6 @@ from olp.errormodel.reversal import plays
 from olp.errormodel.sensitivity import Rows, Sensitivity
 from olp.program.program import Program
 from olp.uncertainty.probability import normal, within
-
-if TYPE_CHECKING:
-    from scipy.sparse import csr_array
 
 #: Coverage factor of bands: with normal errors about 95 % of a coordinate.
 COVERAGE = 2.0
@@ -44,8 +40,6 @@ PROBABLE_GAIN = 0.8413
 _BLOCK = 2048
 #: Flags of moves that have no waypoint.
 _AWAY = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE)
-#: Rows and columns of a symmetric 3 by 3 matrix.
-_PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -180,8 +174,8 @@ def covariances(unknowns: Unknowns, path: Toolpath, points: Points) -> Array:
     """(n, 3, 3) covariance of the position of the tip at points of a path, in mm^2."""
     touch, count = unknowns.touches(path.frames)
     covariance = np.zeros((len(points), 3, 3))
-    for part, rows in _blocks(unknowns.sensitivity, path, points, np.arange(len(points)), touch):
-        covariance[part] = _covariance(rows)
+    for part in _blocks(np.arange(len(points))):
+        covariance[part] = _covariance(unknowns.sensitivity, path, points, part, touch)[0]
     covariance += _scatter(unknowns, count, path, points)
     return covariance
 
@@ -208,16 +202,16 @@ def confidence(
     line = path.line[points.move].astype(np.int64)
     covariance = np.zeros((n, 3, 3))
     touch, count = unknowns.touches(path.frames)
-    expands, expansion = unknowns.sensitivity.expansion is not None, 0.0
+    expansion = 0.0
     joint = None if limit_mm is None else _Joint(unknowns, path, points, touch, count, limit_mm, seed)
-    order = np.argsort(line, kind="stable")
-    for a in range(0, n, _BLOCK):
-        which = order[a : a + _BLOCK]
-        tell("uncertainty", a / n)
-        for part, rows in _blocks(unknowns.sensitivity, path, points, which, touch, joint):
-            covariance[part] = _covariance(rows)
-            if expands:
-                expansion = max(expansion, float((rows[:, :, -4:] ** 2).sum(axis=(0, 2)).max(initial=0.0)))
+    order, done = np.argsort(line, kind="stable"), 0
+    for part in _blocks(order):
+        tell("uncertainty", done / n)
+        covariance[part], grown = _covariance(unknowns.sensitivity, path, points, part, touch)
+        expansion = max(expansion, float(grown.max(initial=0.0)))
+        if joint is not None:
+            joint.add(part)
+        done += len(part)
     covariance += _scatter(unknowns, count, path, points)
     return Confidence(
         points=points,
@@ -235,31 +229,23 @@ def _positive(mean: Array, spread: Array) -> Array:
         return np.where(spread > 0.0, normal(mean / spread), 0.5 + 0.5 * np.sign(mean))
 
 
-def _blocks(
-    sensitivity: Sensitivity, path: Toolpath, points: Points, which: Index, touch: Rows,
-    joint: _Joint | None = None,
-) -> Iterator[tuple[Index, Rows]]:  # fmt: skip
-    """Points in blocks, with their rows (3, b, columns) less those of their touch-off."""
+def _blocks(which: Index) -> Iterator[Index]:
+    return (which[a : a + _BLOCK] for a in range(0, len(which), _BLOCK))
+
+
+def _covariance(
+    sensitivity: Sensitivity, path: Toolpath, points: Points, part: Index, touch: Rows
+) -> tuple[Array, Array]:
+    """(b, 3, 3) covariance of some points less their touch-off, and (b,) what expansion adds to it."""
+    position, tool, play = _states(path, points, part)
+    return sensitivity.covariance(position, tool, play, touch, path.frame[points.move[part]])
+
+
+def _states(path: Toolpath, points: Points, part: Index) -> tuple[Array, Array, Array | None]:
+    """Axis positions, tool vectors and play of some points."""
     tool = path.tool_mm()
-    for a in range(0, len(which), _BLOCK):
-        part = which[a : a + _BLOCK]
-        move = points.move[part]
-        tool_vector = tool if tool.ndim == 1 else tool[move]
-        play = None if points.play is None else points.play[part]
-        weights = sensitivity.weights(points.axis_mm[part], tool_vector, play)
-        rows = np.stack([one @ sensitivity.table for one in weights])
-        if touch.any():
-            rows -= touch[path.frame[move]].transpose(1, 0, 2)
-        if joint is not None:
-            joint.add(part, weights, rows)
-        yield part, rows
-
-
-def _covariance(rows: Rows) -> Array:
-    covariance = np.zeros((rows.shape[1], 3, 3))
-    for i, j in _PAIRS:
-        covariance[:, i, j] = covariance[:, j, i] = np.einsum("nk,nk->n", rows[i], rows[j])
-    return covariance
+    play = None if points.play is None else points.play[part]
+    return points.axis_mm[part], tool if tool.ndim == 1 else tool[points.move[part]], play
 
 
 def _scatter(unknowns: Unknowns, count: Array, path: Toolpath, points: Points) -> Array:
@@ -289,7 +275,7 @@ class _Joint:
         self.draws = int(np.clip(WORK / max(len(points), 1), FEWEST_DRAWS, DRAWS))
         self.path, self.points, self.limit_mm, self.limit = path, points, limit_mm, limit_mm**2
         self.random = np.random.default_rng(seed)
-        sensitivity = unknowns.sensitivity
+        self.sensitivity = sensitivity = unknowns.sensitivity
         drawn = self.random.standard_normal((sensitivity.columns, self.draws), dtype=np.float32)
         self.values = sensitivity.table @ drawn
         self.scatter = np.array(unknowns.repeatability_mm)
@@ -297,7 +283,7 @@ class _Joint:
         self.change = points.before_mm - points.after_mm
         self.share = np.zeros(sensitivity.columns)
         self.loose = _scatter_of_sum(unknowns, count, path, points, self.change)
-        self.held = touch @ drawn
+        self.touch, self.held = touch, touch @ drawn
         if self.scatter.any() and count.any():
             noise = self.random.standard_normal(self.held.shape, dtype=np.float32)
             noise *= (np.sqrt(count) * self.scatter)[:, :, None]
@@ -308,16 +294,19 @@ class _Joint:
         self.worst = np.zeros((2, self.draws))
         self.last: tuple[int, Rows] | None = None
 
-    def add(self, part: Index, weights: Sequence[csr_array], rows: Rows) -> None:
-        """The next waypoints, in the order of lines, with their `rows` (3, b, columns)."""
-        self.share += np.einsum("ink,ni->k", rows, self.change[part], optimize=True)
+    def add(self, part: Index) -> None:
+        """The next waypoints, in the order of lines."""
+        weights = self.sensitivity.weights(*_states(self.path, self.points, part))
+        change = self.change[part]
         sides = (self.points.before_mm[part], self.points.after_mm[part])
         square = np.zeros((2, len(part), self.draws), np.float32)
         frame = self.path.frame[self.points.move[part]]
         for i, one in enumerate(weights):
+            self.share += (one.T @ change[:, i]) @ self.sensitivity.table
             moved = one @ self.values
             if self.touched:
                 moved -= self.held[frame, i]
+                self.share -= change[:, i] @ self.touch[frame, i]
             if self.scatter[i]:
                 noise = self.random.standard_normal(moved.shape, dtype=np.float32)
                 moved += np.float32(self.scatter[i]) * noise

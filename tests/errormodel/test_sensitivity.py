@@ -153,3 +153,36 @@ def test_standard_uncertainties_by_the_key_of_their_source() -> None:
     assert "the 16 parts of a curve" in known.source
     assert of_sigmas(measured, {}) is None
     assert of_sigmas(measured, {"squareness": {}, "curves": {"EYX": np.full(3, 2e-3)}}) is None
+
+
+@pytest.mark.parametrize("grown", [False, True])
+@pytest.mark.parametrize("touched", [False, True])
+@pytest.mark.parametrize("rank", [0, 2])
+def test_the_covariance_is_that_of_the_rows(rank: int, touched: bool, grown: bool) -> None:
+    """Independent parts are added up without rows: the same as rows less those of touch-offs, squared."""
+    rng = np.random.default_rng(rank)
+
+    def entry(kind: str, name: str, *positions: float, period_mm: float = 0.0) -> Entry:
+        count = len(positions) or (2 if period_mm else 1)
+        size = 1e-3 if name[1:2] in "XYZ" else 1e-5
+        factor = size * rng.normal(size=(count, rank))
+        return Entry(kind, name, factor, size * rng.random(count), np.array(positions), period_mm)
+
+    entries = (
+        entry("mean", "EXX", *X), entry("half", "EXX", *X), entry("mean", "EAX", *X),
+        entry("mean", "EAZ", -200.0, 0.0), entry("mean", "EBZ", -200.0, 0.0),
+        entry("wave", "EBX", period_mm=7.0), entry("squareness", "B0Z"), entry("backlash", "Y"),
+    )  # fmt: skip
+    expansion = Expansion((1e-6, 2e-6, 0.0), (5.0, 0.0, 0.0), 3e-6, (1.0, 2.0, 3.0)) if grown else None
+    sensitivity = Sensitivity.of(calibration(), "FXYZ", Uncertainty(entries, "", ""), expansion=expansion)
+    points = rng.uniform(BOX[:, 0], BOX[:, 1], (40, 3))
+    play, tool = rng.choice([-1.0, 0.5, 1.0], (40, 3)), TOOL + rng.normal(size=(40, 3))
+    held = np.zeros((2, 3, sensitivity.columns), np.float32)
+    if touched:
+        held[1] = sensitivity.rows(points[:1], TOOL)[:, 0]
+    frame = rng.integers(0, 2, 40)
+    rows = sensitivity.rows(points, tool, play).astype(float) - held[frame].transpose(1, 0, 2)
+    covariance, of_expansion = sensitivity.covariance(points, tool, play, held, frame)
+    np.testing.assert_allclose(covariance, np.einsum("ink,jnk->nij", rows, rows), rtol=1e-4, atol=1e-12)
+    largest = (rows[:, :, -4:] ** 2).sum(axis=(0, 2)) if grown else np.zeros(40)
+    np.testing.assert_allclose(of_expansion, largest, rtol=1e-5, atol=1e-18)
