@@ -92,19 +92,17 @@ def _cut_batch(
     first = np.cumsum(samples) - samples
     owner = np.repeat(np.arange(len(move)), samples)
     share = (np.arange(len(owner)) - np.repeat(first, samples)) / np.repeat(count, samples)
-    step = delta.take(owner, axis=0)
-    point = share[:, None] * step
+    point = share[:, None] * delta.take(owner, axis=0)
     point += start.take(owner, axis=0)
     tools = tool if tool.ndim == 1 else tool[owner]
-    play = np.sign(step) if model.backlash_at(point[:1]) is not None else None
-    across = np.ascontiguousarray((point - bent(model, point, tools, play)).T)
-    length2 = np.maximum((delta * delta).sum(axis=1), 1e-30)
-    along = across[0] * step[:, 0]
-    for axis in (1, 2):
-        along += across[axis] * step[:, axis]
-    along /= np.repeat(length2, samples)
-    for axis in range(3):
-        across[axis] -= along * step[:, axis]
+    play = None
+    if model.backlash_at(point[:1]) is not None:
+        play = np.sign(delta).take(owner, axis=0)
+    departure = point - bent(model, point, tools, play)
+    across = np.zeros((2, len(owner)))
+    for column, side in zip(across, _sides(delta), strict=True):
+        for axis in range(3):
+            column += departure[:, axis] * side[:, axis].take(owner)
     last = count * _FINE
     cut_move, cut_place = [], []
     begin = np.zeros(len(move), np.int64)
@@ -129,6 +127,16 @@ def _cut_batch(
     owner = np.concatenate(cut_move)
     share = np.concatenate(cut_place) / last[owner]
     return move[owner], share, start[owner] + share[:, None] * delta[owner]
+
+
+def _sides(delta: Array) -> tuple[Array, Array]:
+    """Two directions (n, 3) across each of lines `delta` (n, 3), and across one another."""
+    along = delta / np.sqrt((delta * delta).sum(axis=1))[:, None]
+    least = np.zeros_like(along)
+    least[np.arange(len(along)), np.abs(along).argmin(axis=1)] = 1.0
+    one = np.cross(along, least)
+    one /= np.sqrt((one * one).sum(axis=1))[:, None]
+    return one, np.cross(along, one)
 
 
 def _longest(
@@ -165,21 +173,32 @@ def _fits(across: Array, first: Index, begin: Index, end: Index, tolerance: floa
     wide = np.flatnonzero(inner > 0)
     if not wide.size:
         return fits
-    first, begin, end, low, inner = first[wide], begin[wide], end[wide], low[wide], inner[wide]
+    first, begin, end, low, inner = (column.take(wide) for column in (first, begin, end, low, inner))
     looked = np.minimum(inner, most)
-    offset = np.cumsum(looked) - looked
-    nth = np.arange(int(offset[-1] + looked[-1])) - np.repeat(offset, looked)
-    if (inner > most).any():
-        nth = (2 * nth + 1) * np.repeat(inner, looked) // np.repeat(2 * looked, looked)
-    sample = nth + np.repeat(low, looked)
-    share = (_FINE * sample - np.repeat(begin, looked)) / np.repeat(end - begin, looked)
-    sample += np.repeat(first, looked)
-    square = np.zeros(len(sample))
-    begins, ends = (_places(first, place) for place in (begin, end))
+    ends = np.cumsum(looked)
+    total, offset = int(ends[-1]), ends - looked
+    # the nth sample behind the first one: all of them, or from each of equal parts the one in its middle
+    nth = np.arange(0.5, total)
+    nth -= np.repeat(offset.astype(float), looked)
+    if total < int(inner.sum()):
+        nth *= np.repeat(inner / looked, looked)
+    np.floor(nth, out=nth)
+    sample = nth.astype(np.int64)
+    sample += np.repeat(first + low, looked)
+    # the chord at the first sample, and from each sample to the next
+    per_sample = _FINE / (end - begin)
+    ahead = (_FINE * low - begin) / (end - begin)
+    square = np.zeros(total)
+    begins, stops = (_places(first, place) for place in (begin, end))
     for values in across:
-        a, b = _between(values, *begins), _between(values, *ends)
-        departure = values[sample] - np.repeat(a, looked) - share * np.repeat(b - a, looked)
-        square += departure * departure
+        a = _between(values, *begins)
+        rise = _between(values, *stops) - a
+        departure = np.repeat(per_sample * rise, looked)
+        departure *= nth
+        departure += np.repeat(a + ahead * rise, looked)
+        departure -= values.take(sample)
+        departure *= departure
+        square += departure
     fits[wide] = np.maximum.reduceat(square, offset) <= tolerance * tolerance
     return fits
 
@@ -193,5 +212,5 @@ def _places(first: Index, place: Index) -> tuple[Index, Index, Array]:
 
 def _between(values: Array, before: Index, behind: Index, part: Array) -> Array:
     """Values at positions, linear between two samples."""
-    interpolated: Array = values[before] + (values[behind] - values[before]) * part
-    return interpolated
+    value = values.take(before)
+    return np.asarray(value + (values.take(behind) - value) * part)

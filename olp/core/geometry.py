@@ -17,6 +17,8 @@ Plane = npt.NDArray[np.int8] | npt.NDArray[np.int64]
 PLANES = ((0, 1, 2), (2, 0, 1), (1, 2, 0))
 #: rad; a whole turn.
 _TURN = 2.0 * np.pi
+#: Points at a time, so that their columns stay in the cache.
+_POINTS = 1 << 13
 #: PLANES as an array, to be indexed by columns of planes.
 _AXES = np.array(PLANES)
 
@@ -53,22 +55,37 @@ class ArcShapes:
 
     def at(self, which: Index, share: Array) -> Array:
         """(n, 3) points at shares (n,) of arcs `which` (n,); (n, s, 3) at shares (n, s) of arcs (n, 1)."""
-        radius = self.radius[which] + self.wider[which] * share
-        angle = self.angle[which] + share * self.sweep[which]
+        points = np.empty((*share.shape, 3))
+        rows = max(_POINTS // int(np.prod(share.shape[1:])), 1)
+        for a in range(0, len(share), rows):
+            self._put(points[a : a + rows], which[a : a + rows], share[a : a + rows])
+        return points
+
+    def _put(self, points: Array, which: Index, share: Array) -> None:
+        """The same of some, put into `points`."""
+        radius = self.radius.take(which) + self.wider.take(which) * share
+        angle = self.angle.take(which) + share * self.sweep.take(which)
         columns = (
-            self.centre_first[which] + radius * np.cos(angle),
-            self.centre_second[which] + radius * np.sin(angle),
-            self.level[which] + share * self.rise[which],
+            self.centre_first.take(which) + radius * np.cos(angle),
+            self.centre_second.take(which) + radius * np.sin(angle),
+            self.level.take(which) + share * self.rise.take(which),
         )
-        points = np.empty((*angle.shape, 3))
         for plane, mine in _by_plane(self.plane, which):
             for axis, column in zip(PLANES[plane], columns, strict=True):
                 points[mine, ..., axis] = column[mine]
-        return points
 
     def distance(self, point: Array, which: Index, near: Array) -> Array:
         """(n,) distances of points (n, 3) from arcs `which` (n,), across the path and beyond its ends, for
         points that lie near share `near` of it."""
+        distance = np.empty(len(point))
+        per_rad = 1.0 / np.abs(self.sweep)
+        for a in range(0, len(point), _POINTS):
+            part = slice(a, a + _POINTS)
+            distance[part] = self._away(point[part], which[part], near[part], per_rad)
+        return distance
+
+    def _away(self, point: Array, which: Index, near: Array, per_rad: Array) -> Array:
+        """The same of some points; `per_rad` (m,) are arcs per radian."""
         p0, p1, p2 = _in_planes(point, self.plane[which])
         p0, p1 = p0 - self.centre_first[which], p1 - self.centre_second[which]
         sweep, level = self.sweep[which], p2 - self.level[which]
@@ -79,7 +96,6 @@ class ArcShapes:
         turned = np.where(sweep < 0.0, -angle, angle)
         place = np.clip(turned, 0.0, size)
         beyond = _beyond(turned, place, size)
-        per_rad = 1.0 / np.abs(self.sweep)
         wider = (self.wider * per_rad)[which]
         mean = self.radius[which] + wider * place
         across = np.sqrt(p0 * p0 + p1 * p1) - mean
@@ -151,16 +167,31 @@ def quarter_shares(start: Array, centre: Array, plane: Plane, sweep: Array, quar
     return np.where(share <= 1.0, share, np.nan)
 
 
-def segment_distance(point: Array, start: Array, end: Array) -> Array:
-    """(n,) distances of points from segments; a segment without length is a point."""
-    along = end - start
-    length2 = np.einsum("ij,ij->i", along, along)
-    away = point - start
-    with np.errstate(invalid="ignore", divide="ignore"):
-        share = np.einsum("ij,ij->i", away, along) / length2
-    share = np.clip(np.where(length2 > 0, share, 0.0), 0.0, 1.0)
-    away -= share[:, None] * along
-    return np.asarray(np.sqrt(np.einsum("ij,ij->i", away, away)), float)
+def segment_distance(point: Array, start: Array, end: Array, which: Index | None = None) -> Array:
+    """(n,) distances of points from segments, or from those `which` (n,); a segment without length is a
+    point."""
+    begin, along = (list(np.ascontiguousarray(rows.T)) for rows in (start, end - start))
+    length2 = along[0] * along[0] + along[1] * along[1] + along[2] * along[2]
+    # no way along one without length, or to an unknown end
+    inverse = np.divide(1.0, length2, out=np.zeros_like(length2), where=length2 > 0)
+    distance = np.empty(len(point))
+    for a in range(0, len(point), _POINTS):
+        part = slice(a, a + _POINTS)
+        of = part if which is None else which[part]
+        away = [point[part, axis] - begin[axis][of] for axis in range(3)]
+        way = [column[of] for column in along]
+        share = away[0] * way[0]
+        for axis in (1, 2):
+            share += away[axis] * way[axis]
+        share *= inverse[of]
+        np.clip(share, 0.0, 1.0, out=share)
+        square = np.zeros(len(share))
+        for axis in range(3):
+            away[axis] -= share * way[axis]
+            away[axis] *= away[axis]
+            square += away[axis]
+        np.sqrt(square, out=distance[part])
+    return distance
 
 
 def arc_directions(

@@ -161,8 +161,9 @@ class Tracer:
             part, share = part[order], share[order]
         if len(part) == len(steps):
             return end, part, share
-        point = self._at(start, end, arc, part, share)
-        point[share == 1.0] = end
+        point, last = self._at(start, end, arc, part, share), np.flatnonzero(share == 1.0)
+        for axis in range(3):
+            point[last, axis] = end[:, axis]
         return point, part, share
 
     def _quarters(self, start: Array, arc: Index, rows: Index) -> tuple[Index, Array]:
@@ -246,7 +247,8 @@ class Tracer:
             samples = _Inner(part[inside], share[inside], actual[inside])
             taken_up = self._turns(start, end, arc, part, share, np.vstack((before, plays)), tool, kind)
             return actual[~inside], samples.with_more(taken_up)
-        part, share, point = part[inside], share[inside], point[inside]
+        inner = np.flatnonzero(inside)
+        part, share, point = part[inner], share[inner], point.take(inner, axis=0)
         reached = self.actual(end, tool)
         return reached, _Inner(part, share, self.actual(point, tool if tool.ndim == 1 else tool[part]))
 
@@ -287,9 +289,13 @@ class Tracer:
             start[rows], end[rows], arcs.centre_mm[which], arcs.plane[which], arcs.sweep_rad[which]
         )
         straight, curved, of = _kinds(arc >= 0, part)
+        on_arcs = shapes.at(of, share[curved])
+        if not straight.size:
+            return on_arcs
+        on_lines = _between(start, end, part[straight], share[straight])
         point = np.empty((len(part), 3))
-        point[curved] = shapes.at(of, share[curved])
-        point[straight] = _between(start, end, part[straight], share[straight])
+        for axis in range(3):
+            point[curved, axis], point[straight, axis] = on_arcs[:, axis], on_lines[:, axis]
         return point
 
     def _start(self) -> Array:
@@ -358,10 +364,10 @@ class Tracer:
         straight, curved, which = _kinds(arc >= 0, of)
         line = of[straight]
         distance = np.empty(len(of))
-        distance[straight] = segment_distance(
-            actual.take(straight, axis=0), self._known(a + line, begin.take(line, axis=0)),
-            self._known(a + line, goal.take(line, axis=0)),
-        )  # fmt: skip
+        every = a + np.arange(b - a)
+        ways = self._known(every, begin), self._known(every, goal)
+        some = actual.take(straight, axis=0) if curved.size else actual
+        distance[straight] = segment_distance(some, *ways, line)
         if curved.size:
             arcs, move = nominal.arcs, a + rows
             shift = goal[rows] - nominal.end_mm[move]
@@ -371,7 +377,7 @@ class Tracer:
                 arcs.sweep_rad[arc[rows]],
             )  # fmt: skip
             near = self._near(owner, first, inner.part[curved], inner.share[curved], of[curved])
-            distance[curved] = shapes.distance(actual[curved], which, near)
+            distance[curved] = shapes.distance(actual.take(curved, axis=0), which, near)
         if self.joints is not None:
             self.joints.put_across(distance, a + of, actual - self._known(a + of, goal[of]))
             self.joints.put_across(distance, a + of - 1, actual - self._known(a + of, begin[of]))
@@ -392,13 +398,15 @@ class Tracer:
     def _bend(self, a: int, tips: Array, inner: _Inner, owner: Index, curved: Mask, bend: Single) -> None:
         """How far the samples of straight parts leave the chord between the actual ends of their part, which
         are `tips` and the ones behind them."""
-        straight = ~curved[inner.part]
-        part, actual = inner.part[straight], inner.actual[straight]
-        of = a + owner[part]
-        departure = segment_distance(
-            *(self._known(of, some) for some in (actual, tips[part], tips[part + 1]))
-        )
-        np.fmax.at(bend, owner[part], departure.astype(np.float32))
+        part, actual = inner.part, inner.actual
+        if curved.any():
+            straight = np.flatnonzero(~curved[part])
+            part, actual = part[straight], actual.take(straight, axis=0)
+        of = a + owner
+        ways = self._known(of, tips[:-1]), self._known(of, tips[1:])
+        mine = owner[part]
+        departure = segment_distance(self._known(a + mine, actual), *ways, part)
+        np.fmax.at(bend, mine, departure.astype(np.float32))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

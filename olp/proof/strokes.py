@@ -47,7 +47,7 @@ def strokes_mm(
         return move, worst
     tip, of = _tips(path, rows, model, bend_mm)
     hole_of = which[of]
-    away = segment_distance(tip, top[hole_of], bottom[hole_of])
+    away = segment_distance(tip, top, bottom, hole_of)
     along = bottom - top
     # in no unit, but in order
     depth = ((tip - top[hole_of]) * along[hole_of]).sum(axis=1)
