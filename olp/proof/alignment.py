@@ -240,7 +240,8 @@ class Alignment:
         for plane in distinct(self.arcs.plane[self.arc[i[curved]]]).tolist():
             some = curved[self.arcs.plane[self.arc[i[curved]]] == plane]
             away[some] = self._from_arcs(self.arc[i[some]], begin[some], end[some], point[some], plane)
-        return np.nan_to_num(away, nan=FAR_MM)
+        away[np.isnan(away)] = FAR_MM
+        return away
 
     def _from_arcs(self, arc: Index, begin: Array, end: Array, point: Array, plane: int) -> Array:
         """(m,) distances of points from nominal arcs of a plane: across them, and beyond their ends."""
@@ -302,16 +303,18 @@ class Alignment:
         best = np.full(width + 1, np.inf)
         best[0] = 0.0
         back = np.zeros((rows, width), np.int64)
+        ends_mm2, inner_mm2 = self._costs(i + np.arange(rows), columns)
+        totals = np.zeros((rows, width + 1))
+        np.cumsum(inner_mm2, axis=1, out=totals[:, 1:])
         for r in range(rows):
-            end, inner = self._costs(i + r, columns)
-            total = np.concatenate(([0.0], np.cumsum(inner)))
+            total = totals[r]
             # best[c]: the units before end before column c
             gain = best - total
             least = np.minimum.accumulate(gain)
             lower = gain < np.concatenate(([np.inf], least[:-1]))
             back[r] = np.maximum.accumulate(np.where(lower, np.arange(width + 1), 0))[:width]
             best = np.full(width + 1, np.inf)
-            best[1:] = least[:width] + total[:width] + end
+            best[1:] = least[:width] + total[:width] + ends_mm2[r]
         whole = i + rows == self.mine.left and j + width == self.theirs.left
         column = width - 1 if whole else int(np.argmin(best[1:]))
         ends = np.zeros(rows, np.int64)
@@ -320,16 +323,19 @@ class Alignment:
             column = int(back[r, column]) - 1
         return ends
 
-    def _costs(self, i: int, j: Index) -> tuple[Array, Array]:
-        """mm2: what it costs that unit i ends at each of units j, and that each of them is a part of it."""
-        away = np.minimum((apart(self.tip[j], self.target[i : i + 1]) ** 2).sum(axis=1), FAR_MM**2)
-        if self.loose[i]:
-            away = np.minimum((apart(self.written[j], self.said[i : i + 1]) ** 2).sum(axis=1), FAR_MM**2)
-        end = away + np.where(self.mine.kind[i] == self.theirs.kind[j], 0.0, _OTHER_KIND_MM2)
-        of = np.full(len(j), i)
-        part = np.minimum(self._along(of, j), FAR_MM) ** 2
-        part += np.where(self._unlike(of, j), _OTHER_KIND_MM2, 0.0)
-        return end, part
+    def _costs(self, i: Index, j: Index) -> tuple[Array, Array]:
+        """(rows, width) mm2: what it costs that each of units i ends at each of units j, and that each of
+        these is a part of it."""
+        shape = len(i), len(j)
+        i, j = np.repeat(i, len(j)), np.tile(j, len(i))
+        loose = self.loose[i, None]
+        tip = np.where(loose, self.written[j], self.tip[j])
+        target = np.where(loose, self.said[i], self.target[i])
+        end = np.minimum((apart(tip, target) ** 2).sum(axis=1), FAR_MM**2)
+        end += np.where(self.mine.kind[i] == self.theirs.kind[j], 0.0, _OTHER_KIND_MM2)
+        part = np.minimum(self._along(i, j), FAR_MM) ** 2
+        part += np.where(self._unlike(i, j), _OTHER_KIND_MM2, 0.0)
+        return end.reshape(shape), part.reshape(shape)
 
 
 def _lengths(units: Page, begin: Array, end: Array) -> Array:
@@ -353,7 +359,7 @@ def apart(tip: Array, target: Array) -> Array:
     """(m, 3) mm: how far tips are from targets along each axis. An axis that is unknown in both is as meant,
     one that is unknown in one of them is far off."""
     away = np.abs(tip - target)
-    return np.where(np.isnan(tip) & np.isnan(target), 0.0, np.nan_to_num(away, nan=FAR_MM))
+    return np.where(np.isnan(away), np.where(np.isnan(tip) & np.isnan(target), 0.0, FAR_MM), away)
 
 
 def _within(tip: Array, target: Array, reach: Array) -> Mask:
