@@ -155,6 +155,11 @@ def proof_findings(proof: Proof, uncorrected: Index, place: Callable[[int], str]
         what += f"{place(int(path.line[worst]))}, allowed {proof.allowed_mm * 1e3:.2f} um"
         if (above & path.compensated()).any() and proof.written.compensated().any():
             what += "; contours under cutter compensation are among them: correct with --contour path"
+        made = (path.flag & np.uint8(Flag.CYCLE)) != 0
+        made[1:] |= made[:-1].copy()
+        if (above & made).any():
+            what += "; holes of canned cycles, or moves from there, are among them: write these cycles out "
+            what += "with --expand-cycles, where the dialect has it"
         findings.append(finding("OLP101", what, lines_of(path, above)))
     if not proof.judged.any():
         findings.append(finding("OLP107", "no move of this program could be judged"))

@@ -119,8 +119,8 @@ def sample(
     keep &= np.isfinite(uncorrected).all(axis=1) & np.isfinite(result).all(axis=1)
     if not keep.any():
         raise CannotCompute(
-            "no position of the program is known, so there is nothing to show; give start_mm in the job "
-            "file, or command X, Y and Z first"
+            "no position of the program is known, so there is nothing to show; command X, Y and Z "
+            "first, or give a machine file and a job file with start_mm"
         )
     started = np.isfinite(ends.length)[move]
     length = np.nan_to_num(ends.length)

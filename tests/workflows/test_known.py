@@ -134,8 +134,23 @@ def test_the_proof_needs_the_same_numbers() -> None:
 
 
 def test_the_remedy_for_a_first_move_in_g91_works() -> None:
-    with pytest.raises(
-        ProgramError, match="in an absolute rapid first, or give start_mm in a job file, which"
-    ):
+    with pytest.raises(ProgramError, match="in an absolute rapid first, or give a machine file and a job"):
         corrected(b"G21 G91\nG1 X10 F500\nM30\n")
     assert corrected(b"G21 G90\nG0 X0 Y0 Z5\nG91\nG1 X10 F500\nM30\n").report["deviation"]["holds"]
+
+
+@pytest.mark.parametrize("text, hint", [
+    (b"G0 X50 Y50 Z5\nG81 X100 Z-3 R2 F100\nG80\nG1 Z-1\n", True),
+    (b"G0 X50 Y50 Z5\nG1 X100 Z-3 F100\n", False),
+])  # fmt: skip
+def test_holes_above_tolerance_name_the_option_that_helps(text: bytes, hint: bool) -> None:
+    program = b"G21 G90 G54 G61\n" + text + b"M2\n"
+    known = KnownErrors.of(["XZ=5mm/m"])
+
+    def above(*, expand: bool) -> list[str]:
+        options = correct.CorrectOptions(expand_cycles=expand)
+        done = correct.run(Session.start(known, dialect="linuxcnc"), Source("", lambda: program), options)
+        return [one.message for one in done.findings if one.code == "OLP101"]
+
+    assert any("--expand-cycles" in message for message in above(expand=False)) == hint
+    assert above(expand=True) == []

@@ -17,7 +17,8 @@ RULES = (
         "these lines. The deviation exceeds the tolerance plus what rounding to the last digit explains.",
         "Correct the nominal program again, or undo the edit. If it fails again, look at the listed blocks. "
         "Give a smaller least_increment_mm if the control takes more digits, or raise --tolerance-um if so "
-        "much is allowed. Along contours under G41 or G42, correct with --contour path.",
+        "much is allowed. Along contours under G41 or G42, correct with --contour path. At holes of canned "
+        "cycles, correct with --expand-cycles.",
         "A hand-edited corrected program: `G1 X100.050` where X100.012 was written.",
     ),
     _rule(

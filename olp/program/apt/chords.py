@@ -51,7 +51,8 @@ def chorded(
     inner = basis if turn is None else basis @ turn
     if not np.isfinite([start, end]).all():
         raise ProgramError(
-            "the start of the arc is not known; command X, Y and Z first, or give start_mm in the job",
+            "the start of the arc is not known; command X, Y and Z first, or give a machine file and a job "
+            "file with start_mm",
             line=form.line,
             code="OLP524",
         )

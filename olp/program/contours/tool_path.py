@@ -141,7 +141,7 @@ def _refuse_unknown(path: Toolpath, elements: Elements) -> None:
     errors = [
         ProgramError(
             "a contour under cutter compensation begins where an axis has not been commanded yet; command "
-            "X, Y and Z first, or give start_mm in the job file",
+            "X, Y and Z first, or give a machine file and a job file with start_mm",
             line=int(path.line[elements.move[i]]),
             code="OLP524",
         )

@@ -115,7 +115,7 @@ class Cycle:
         if z_mm != z_mm:
             raise ProgramError(
                 f"CYCL DEF {self.number} counts from the present height, which is not known here; command Z "
-                "before, or give start_mm in the job file",
+                "first, or give a machine file and a job file with start_mm",
                 line=line,
                 code="OLP524",
             )

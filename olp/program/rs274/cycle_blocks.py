@@ -66,7 +66,7 @@ class CycleBlocks:
         if self._wanting(run):
             refused.all(
                 "a canned cycle starts where an axis has not been commanded yet; "
-                "command X, Y and Z first, or give start_mm in the job file",
+                "command X, Y and Z first, or give a machine file and a job file with start_mm",
                 "OLP524",
             )
         for bad, why in drilling.faults():

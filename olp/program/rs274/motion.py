@@ -227,7 +227,7 @@ def _check_stated(start: Array, end: Array, words: Array, plane: Index, absolute
     _refuse(
         np.asarray(~known), line,
         "an arc starts or ends where an axis has not been commanded yet; "
-        "command X, Y and Z first, or give start_mm in the job file",
+        "command X, Y and Z first, or give a machine file and a job file with start_mm",
         "OLP524",
     )  # fmt: skip
     rows, axes = np.arange(len(start)), np.array(PLANES)[plane]

@@ -255,7 +255,7 @@ class OffsetState(State):
         if math.isnan(along_words(Turning.of(turn), self.position)[axis]):
             raise ProgramError(
                 f"{word.letter} is stored as the present position, but the axis has not been commanded yet; "
-                "give start_mm in the job file or command the axis first",
+                "command the axis first, or give a machine file and a job file with start_mm",
                 line=line,
                 code="OLP524",
             )

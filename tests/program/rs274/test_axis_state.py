@@ -335,7 +335,7 @@ TABLE = "is not a number of a table; expected an integer from 0"
 NUMBER = "G10 needs a P word with the number of a work offset, 1 for G54"
 POSITION = (
     "is stored as the present position, but the axis has not been commanded yet; "
-    "give start_mm in the job file or command the axis first"
+    "command the axis first, or give a machine file and a job file with start_mm"
 )
 LOST = (
     "with G92 in force, which the control does not count there: it loses the position in this block; "

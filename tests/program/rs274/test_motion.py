@@ -166,13 +166,13 @@ def said(end: tuple[float, float, float], **words: object) -> tuple[str, str]:
         (
             (0.0, 10.0, NAN), {"i": -10.0},
             "an arc starts or ends where an axis has not been commanded yet; "
-            "command X, Y and Z first, or give start_mm in the job file",
+            "command X, Y and Z first, or give a machine file and a job file with start_mm",
             "OLP524",
         ),
         (
             (0.0, 10.0, 5.0), {"i": -10.0, "start": (10.0, 0.0, NAN)},
             "an arc starts or ends where an axis has not been commanded yet; "
-            "command X, Y and Z first, or give start_mm in the job file",
+            "command X, Y and Z first, or give a machine file and a job file with start_mm",
             "OLP524",
         ),
         (

@@ -255,7 +255,7 @@ PERCENT = (
 NO_MOTION = "a block has axis words, but no motion code is in force; expected G0, G1, G2 or G3"
 UNKNOWN = (
     "an arc starts or ends where an axis has not been commanded yet; "
-    "command X, Y and Z first, or give start_mm in the job file"
+    "command X, Y and Z first, or give a machine file and a job file with start_mm"
 )
 #: Control and text behind `HEAD`: the line, the sentence, the code, and what else the refusal names.
 REFUSED: dict[tuple[str, str], dict[str, object]] = {
@@ -377,7 +377,7 @@ REFUSED: dict[tuple[str, str], dict[str, object]] = {
     },
     ("linuxcnc", "M100\nG81 X1 R2 Z1"): {
         "why": "a canned cycle starts where an axis has not been commanded yet; "
-        "command X, Y and Z first, or give start_mm in the job file",
+        "command X, Y and Z first, or give a machine file and a job file with start_mm",
         "code": "OLP524", "line": 4,
     },
     ("fanuc", "G81 X1. R2. Z1.\nG55\nX2."): {
