@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +27,8 @@ _POINTS = 11
 SCHEMAS = "schemas"
 #: In mm: where no one states it.
 _LEAST_INCREMENT_MM = 0.001
+#: Of mm and mm/s: a change of inches or of mm/min makes more.
+_DECIMALS = 6
 
 
 def machine_toml(machine: Machine, notes: Iterable[str] = ()) -> str:
@@ -118,11 +120,11 @@ def starter_machine(
         axis: _axis(travel_mm[axis], AxisSettings() if settings is None else settings.axes[axis])
         for axis in AXES
     }
-    x, y, z = (sum(axes[axis].travel_mm) / 2 for axis in AXES)
-    offsets = {} if settings is None else dict(settings.work_offsets)
+    x, y, z = _plain(sum(axes[axis].travel_mm) / 2 for axis in AXES)
+    offsets = {} if settings is None else {name: _offset(one) for name, one in settings.work_offsets.items()}
     if zero_mm is not None or not offsets:
         offsets["G54"] = WorkOffset("G54", offset_mm=zero_mm or (x, y, z))
-    tools = {} if settings is None else dict(settings.tools)
+    tools = {} if settings is None else {number: _held(one) for number, one in settings.tools.items()}
     named = settings is not None and settings.work_offset in offsets
     return Machine(
         name=name,
@@ -138,14 +140,33 @@ def starter_machine(
     )
 
 
+def _plain(values: Iterable[float]) -> Iterator[float]:
+    """Numbers without the digits that a change of units makes."""
+    return (round(float(value), _DECIMALS) for value in values)
+
+
 def _axis(travel_mm: tuple[float, float], stated: AxisSettings) -> Axis:
+    low, high = _plain(travel_mm)
+    limits = (stated.velocity_mm_s, stated.acceleration_mm_s2, stated.jerk_mm_s3)
+    velocity, acceleration, jerk = (None if most is None else next(_plain([most])) for most in limits)
     return Axis(
-        travel_mm=(float(travel_mm[0]), float(travel_mm[1])),
+        travel_mm=(low, high),
         least_increment_mm=stated.least_increment_mm or _LEAST_INCREMENT_MM,
-        velocity_mm_s=stated.velocity_mm_s,
-        acceleration_mm_s2=stated.acceleration_mm_s2,
-        jerk_mm_s3=stated.jerk_mm_s3,
+        velocity_mm_s=velocity,
+        acceleration_mm_s2=acceleration,
+        jerk_mm_s3=jerk,
     )
+
+
+def _offset(stated: WorkOffset) -> WorkOffset:
+    x, y, z = _plain(stated.offset_mm)
+    return replace(stated, offset_mm=(x, y, z))
+
+
+def _held(stated: Tool) -> Tool:
+    x, y, z, wear = _plain((*stated.length_mm, stated.wear_mm))
+    radius = None if stated.radius_mm is None else next(_plain([stated.radius_mm]))
+    return replace(stated, length_mm=(x, y, z), radius_mm=radius, wear_mm=wear)
 
 
 #: What the head of a machine file says that is still to be completed.

@@ -94,7 +94,7 @@ def _numbers(text: str, path: Path) -> dict[int, float]:
             stated[number] = value
         elif number in (22, 23) or 100 <= number < 170:
             line = text.count("\n", 0, match.start(1)) + 1
-            what = f'line {line}: ${number} = "{match[2]}" is not a number'
+            what = f'${number} = "{match[2]}" is not a number'
             raise InputError(f"{what}; expected it as the control prints it", file=str(path), line=line)
     return stated
 

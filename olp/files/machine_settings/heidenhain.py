@@ -88,7 +88,7 @@ class _Axis:
         line, text = self.stated[parameter, self.place]
         value = finite(text)
         if value is None:
-            what = f'line {line}: MP{parameter}.{self.place} = "{text}" is not a number; expected a number'
+            what = f'MP{parameter}.{self.place} = "{text}" is not a number; expected a number'
             raise InputError(what, file=str(self.path), line=line)
         return value
 

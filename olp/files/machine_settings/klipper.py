@@ -88,7 +88,7 @@ def _number(section: dict[str, tuple[str, str]], key: str) -> float | None:
     value = finite(text)
     if value is None:
         file, _, line = place.rpartition(":")
-        what = f'line {line}: {key} = "{text}" is not a number; expected it in mm and s'
+        what = f'{key} = "{text}" is not a number; expected it in mm and s'
         raise InputError(what, file=file, line=int(line))
     return value
 

@@ -36,6 +36,11 @@ OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 
 _UNITS_MM = {"mm": 1.0, "metric": 1.0, "in": MM_PER_INCH, "inch": MM_PER_INCH, "imperial": MM_PER_INCH}
 _CARTESIAN = ("trivkins", "corexykins")
+#: Kinematics of arms and platforms.
+_OF_OTHER_JOINTS = frozenset({
+    "genhexkins", "genserkins", "lineardeltakins", "pentakins", "pumakins", "rosekins", "rotarydeltakins",
+    "scarakins", "scorbot-kins", "tripodkins",
+})  # fmt: skip
 _TOOL_WORD = re.compile(rf"([A-Z])\s*({NUMBER})", re.IGNORECASE)
 #: Depth of nested `#INCLUDE` files.
 _MAX_INCLUDES = 20
@@ -129,12 +134,21 @@ def joints_of(reading: Reading) -> dict[str, list[str]]:
         raise InputError(f"{what}; expected a machine with the linear axes X, Y and Z", file=reading.file)
     rotary = [letter for letter in coordinates if letter not in AXES]
     if rotary:
-        reading.notes.append(f"Axes {', '.join(rotary)} are left out: olp corrects X, Y and Z.")
+        reading.notes.append(
+            f"These files describe X, Y and Z, without {', '.join(rotary)}. Machines of more axes are "
+            "described by olp init --structure, --trafo or --urdf."
+        )
     if module != "trivkins":
+        if module in _OF_OTHER_JOINTS:
+            raise InputError(
+                f"KINEMATICS = {module} is no machine of three linear axes; describe it with olp init DIR "
+                "and one of --trafo (its HAL file), --structure or --urdf",
+                file=reading.file,
+            )
         if module not in _CARTESIAN:
             reading.notes.append(
-                f"KINEMATICS = {module}: check that X, Y, Z are three linear axes in series; "
-                "olp corrects no other machine."
+                f"KINEMATICS = {module}: check that X, Y, Z are three linear axes in series. Other machines "
+                "are described by olp init --trafo, --structure or --urdf."
             )
         return {letter: [] for letter in AXES}
     joints: dict[str, list[str]] = {}
@@ -255,7 +269,7 @@ def _recognises(text: str) -> bool:
     others = sections & {"KINS", "EMC", "HAL", "DISPLAY", "RS274NGC", "AXIS_X", "AXIS_0", "JOINT_0"}
     if "TRAJ" in sections:
         return bool(others - {"HAL", "DISPLAY"})
-    return bool(others) and re.search(r"^\s*#INCLUDE\s", text, re.MULTILINE) is not None
+    return bool(sections) and re.search(r"^\s*#INCLUDE\s", text, re.MULTILINE) is not None
 
 
 FORMAT = SettingsFormat(

@@ -136,7 +136,7 @@ def _value(entries: list[_Entry], path: Path, name: str) -> float | None:
             continue
         value = finite({"TRUE": "1", "FALSE": "0"}.get(entry.text.upper(), entry.text))
         if value is None:
-            what = f'line {entry.line}: {name} = "{entry.text}" is not a number'
+            what = f'{name} = "{entry.text}" is not a number'
             raise InputError(f"{what}; expected a number", file=str(path), line=entry.line)
         return value
     return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -185,6 +186,7 @@ def test_kinematics_between_axes_and_joints_leave_the_joints_out(tmp_path: Path)
         ("MAX_LIMIT = 8.0", "MAX_LIMIT = -8.0", r"axis Y has no travel; expected .* \[AXIS_Y\]"),
         ("MAX_VELOCITY = 2\n", "MAX_VELOCITY = fast\n", r'\[AXIS_X\] MAX_VELOCITY = "fast" is not a number'),
         ("#INCLUDE z.inc", "#INCLUDE y.inc", r"y\.inc: no such file"),
+        ("trivkins coordinates=XYYZ", "scarakins", "is no machine of three linear axes; .* --structure"),
     ],
 )
 def test_a_configuration_without_what_is_needed_is_refused(
@@ -202,6 +204,19 @@ def test_a_configuration_is_recognised_whose_units_stand_in_an_included_file(tmp
     (tmp_path / "trajectory.inc").write_text(INI[begin:end], "utf-8")
     path = write_set(tmp_path, f"#INCLUDE trajectory.inc\n{INI[:begin]}{INI[end:]}")
     assert from_linuxcnc(path).machine == whole
+
+
+def test_a_configuration_of_nothing_but_includes_is_recognised(tmp_path: Path) -> None:
+    whole = from_linuxcnc(write_set(tmp_path, INI)).machine
+    (tmp_path / "all.inc").write_text(INI, "utf-8")
+    assert from_linuxcnc(write_set(tmp_path, "[NOTES]\nsize = 7\n#INCLUDE all.inc\n")).machine == whole
+
+
+def test_inches_leave_no_digits_of_their_conversion(tmp_path: Path) -> None:
+    ini = write_set(tmp_path, INI.replace("MAX_LIMIT = 8.0", "MAX_LIMIT = 14.0"))
+    text = machine_toml(from_linuxcnc(ini).machine)
+    assert "355.6]" in text
+    assert not re.search(r"\.\d{7}", text)
 
 
 SAMPLES = [

@@ -114,7 +114,8 @@ def test_a_number_that_is_none_is_named_with_its_place(
     with pytest.raises(InputError, match="is not a number") as error:
         settings(tmp_path, text.replace(number, wrong))
     assert str(tmp_path / "settings.txt") in str(error.value)
-    assert re.search(r"line \d+|\[AXIS_X\]", str(error.value))
+    assert re.search(r"settings\.txt:\d+: |\[AXIS_X\]", str(error.value))
+    assert " line " not in str(error.value), "the line is said once"
 
 
 @pytest.mark.parametrize(
