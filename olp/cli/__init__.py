@@ -40,6 +40,10 @@ VERBS = {
 
 #: What click says of words that a verb does not take.
 _EXTRA = pattern(r"Got unexpected extra arguments? \((.*)\)")
+#: What click says of an option with fewer values than it takes.
+_FEW = pattern(r"requires (an|\d+) arguments?\.$")
+#: How alike an option is that may have been meant, from 0 to 1.
+_NEAR = 0.75
 #: Key under which a call keeps its words.
 _WORDS = "olp.words"
 
@@ -77,11 +81,15 @@ def _plain(error: click.UsageError) -> str:
         wanted = error.option_name.replace("_", "-")
         import difflib
 
-        near = difflib.get_close_matches(wanted, takes, 1)
+        near = difflib.get_close_matches(wanted, takes, 1, _NEAR)
         hint = f"did you mean {near[0]}?" if near else f"{path} --help lists the options"
         return f"there is no option {error.option_name}; {hint}"
-    if isinstance(error, click.BadOptionUsage) and message.endswith("requires an argument."):
-        return f"the option {error.option_name} needs a value after it; give one, or leave the option out"
+    if isinstance(error, click.BadOptionUsage) and (short := _FEW.search(message)):
+        if short[1] == "an":
+            return f"the option {error.option_name} needs a value after it; give one, or leave the option out"
+        return f"the option {error.option_name} needs {short[1]} values after it; --help says which"
+    if isinstance(error, click.MissingParameter) and error.param is not None:
+        return f"{_spelled(error.param)} is missing; expected {path} {_usage(error.ctx)}"
     extra = _EXTRA.match(message)
     if extra is None:
         return message
@@ -90,6 +98,18 @@ def _plain(error: click.UsageError) -> str:
         return f"{words} is one word too many; options begin with - or --, as in -q"
     files = "; name the machine file with -m, and the job file with -j" if "--machine" in takes else ""
     return f"{words} is one word too many{files or f'; {path} --help says what it takes'}"
+
+
+def _spelled(parameter: click.Parameter) -> str:
+    """A parameter as a call writes it, such as NOMINAL or -o FOLDER."""
+    names = "" if isinstance(parameter, click.Argument) else f"{parameter.opts[0]} "
+    return f"{names}{parameter.metavar or (parameter.name or '').upper()}"
+
+
+def _usage(context: click.Context | None) -> str:
+    """The arguments of a verb, and the options that it cannot do without."""
+    parameters = [] if context is None else context.command.params
+    return " ".join(_spelled(p) for p in sorted(parameters, key=lambda p: p.param_type_name) if p.required)
 
 
 class _Verbs(LateGroup):

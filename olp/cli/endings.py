@@ -13,7 +13,7 @@ from typing import NoReturn
 import click
 
 from olp.cli.common import diagnostic, silence
-from olp.core.errors import INTERRUPTED, OlpError
+from olp.core.errors import INTERRUPTED, OlpError, ProgramError, Reason, Refused
 
 #: Exit code of a run that no error of ours ended: a defect, too little memory, a system that refuses.
 UNEXPECTED = 4
@@ -35,6 +35,7 @@ def with_exit_code(words: Sequence[str]) -> Iterator[None]:
         raise
     except OlpError as error:
         show_error(str(error))
+        _show_remedies(error)
         raise click.exceptions.Exit(error.exit_code) from None
     except KeyboardInterrupt:
         diagnostic("olp: interrupted")
@@ -90,6 +91,21 @@ def show_error(message: str) -> None:
     """Write the lines of an error to stderr."""
     for line in message.split("\n"):
         diagnostic(f"olp: error: {line}")
+
+
+def _show_remedies(error: OlpError) -> None:
+    """What to do about statements that are refused, once per code, where no sentence says it."""
+    reasons = error.reasons[: Refused.LISTED] if isinstance(error, Refused) else (error,)
+    codes = dict.fromkeys(
+        reason.code
+        for reason in reasons
+        if isinstance(reason, ProgramError | Reason) and ";" not in reason.message
+    )
+    if codes:
+        from olp.findings.catalogue import RULES
+
+        for code in codes:
+            diagnostic(f"olp: what to do ({code}): {RULES[code].remedy}")
 
 
 def _end(message: str, code: int) -> NoReturn:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import field
 
@@ -17,12 +18,16 @@ from olp.errormodel.calibration import Calibration, Curve
 _LEANS = {"XY": ("C0Y", -1.0), "XZ": ("B0Z", 1.0), "YZ": ("A0Z", -1.0)}
 #: mm per mm; an axis that is off by more has another number of steps, or its whole ratio was stated.
 _MOST_SCALE = 0.05
+#: rad; axes that lean by more: the angle between them was stated.
+_MOST_LEAN_RAD = 0.2
 
 #: What a text is that cannot be read in a unit.
 _WANTED = {
     "rad": "neither an angle nor a ratio of lengths; expected such as 1.4mm/m, 0.4mm/600mm or 300urad",
     "mm": "not a length; expected such as 0.05mm or 0.002in",
 }
+#: What is given as an example of such a value.
+_SUCH = {"rad": "1.4mm/m", "mm": "0.05mm"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +47,11 @@ class KnownErrors:
         squareness: dict[str, float] = {}
         for name, text, value in _pairs("skew", skew, (*_LEANS, *SQUARENESS), "rad"):
             own, sign = _LEANS.get(name, (name, 1.0))
+            if abs(value) > _MOST_LEAN_RAD:
+                raise UsageError(
+                    f"skew {name}={text} is {math.degrees(value):.4g} deg; expected how far the angle "
+                    "between the axes differs from 90 deg, such as 0.02deg or 0.4mm/600mm"
+                )
             if own in squareness:
                 raise UsageError(f"skew {name}={text} states {own} a second time; state each squareness once")
             squareness[own] = sign * value
@@ -108,7 +118,10 @@ def _pairs(
         name, equals, text = each.partition("=")
         name = name.strip().upper()
         if not equals or name not in names:
-            raise UsageError(f"{what} {each!r}: expected NAME=VALUE with a name out of {', '.join(names)}")
+            raise UsageError(
+                f"{what} {each!r}: expected NAME=VALUE with a name out of {', '.join(names)}, such as "
+                f"{names[0]}={_SUCH[unit]}"
+            )
         try:
             value = quantity(text, unit)
         except ValueError:

@@ -88,6 +88,9 @@ def read_sheet(data: bytes, file: str, wanted: Wanted) -> Sheet:
     problems: list[Problem] = []
     numbers: list[Row] = []
     for row_line, cells in records[1:]:
+        if not any(cells):
+            problems.append((row_line, "has marks between columns and no value; delete this line"))
+            continue
         if len(cells) != len(header):
             hint = wanted.many if len(cells) > len(header) else ""
             problems.append((row_line, f"{len(cells)} values under {len(header)} columns{wanted.one}{hint}"))

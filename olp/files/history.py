@@ -78,7 +78,10 @@ def _locked(path: Path, place: Path) -> sqlite3.Connection:
     except sqlite3.Error as error:
         why = "another olp batch is writing there; call again when it has ended"
         if error.sqlite_errorname != "SQLITE_BUSY":
-            why = f"the lock {path.name} beside it cannot be taken ({error})"
+            why = (
+                f"the file {path.name} beside it cannot be written ({error}); name another folder, or let "
+                "your user write there"
+            )
         raise CannotCompute(why, file=str(place)) from None
     return lock
 

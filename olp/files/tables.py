@@ -77,8 +77,14 @@ def _header_problems(line: int, header: Sequence[str]) -> list[Problem]:
     if len(header) == 1 and re.search(r"[;\t]", first):
         mark = "semicolons" if ";" in first else "tabs"
         return [
-            (line, f"columns are separated by {mark}; expected commas between columns and decimal points")
+            (
+                line,
+                f"columns are separated by {mark}; expected commas between columns and decimal points; "
+                "replace them in this file",
+            )
         ]
+    if first.startswith("sep="):
+        return [(line, "sep= is a line for Excel; delete it, so that the names of columns come first")]
     if first not in [f"{axis}_mm" for axis in AXES]:
         what = f'column 1 is "{first}"'
         if re.fullmatch(r"-?[\d.]+", first):

@@ -75,6 +75,30 @@ CASES = [
          args=(*CORRECT, "--date", "21.11.2026"), code=2),
     Case("PDF as report", ("r.pdf: is not a form of this report", "expected .html"),
          args=(*CORRECT, "--report", "r.pdf"), code=2),
+    Case("skew without a unit", ("skew XY=1.414", "expected such as 1.4mm/m"),
+         args=("correct", "part.nc", "--skew", "XY=1.414"), code=2),
+    Case("skew as a length alone", ("skew XY=0.4mm", "expected such as 1.4mm/m, 0.4mm/600mm"),
+         args=("correct", "part.nc", "--skew", "XY=0.4mm"), code=2),
+    Case("angle between the axes as skew", ("XY=90.02deg is 90.02 deg", "differs from 90 deg, such as"),
+         args=("correct", "part.nc", "--skew", "XY=90.02deg"), code=2),
+    Case("skew without a name", ("skew '1.4mm/m'", "such as XY=1.4mm/m"),
+         args=("correct", "part.nc", "--skew", "1.4mm/m"), code=2),
+    Case("ratio as scale", ("scale of", "such as -0.2% where it moves 99.8 mm instead of 100 mm"),
+         args=("correct", "part.nc", "--scale", "X=100.2%"), code=2),
+    Case("backlash of a rotary axis", ("backlash 'A=0.1mm'", "out of X, Y, Z, such as X=0.05mm"),
+         args=("correct", "part.nc", "--backlash", "A=0.1mm"), code=2),
+    Case("travel without an end", ("--travel needs 3 values after it", "--help says which"),
+         args=("init", "new", "--travel", "X", "500"), code=2),
+    Case("travel from high to low", ("travel of X is [500, 0] mm", "expected min below max"),
+         args=("init", "new", "--travel", "X", "500", "0"), code=2),
+    Case("verify with one program", ("CORRECTED is missing", "expected olp verify NOMINAL CORRECTED"),
+         args=("verify", "part.nc", "-m", "machine.toml"), code=2),
+    Case("batch without an output", ("-o OUT is missing", "expected olp batch -o OUT"),
+         args=("batch", ".", "-m", "machine.toml"), code=2),
+    Case("batch into its own folder", (".: holds the programs of this call", "name another folder with -o"),
+         args=("batch", ".", "-m", "machine.toml", "-o", "."), code=2),
+    Case("no program", ("no program is given", "name it, or set the key program of the job"),
+         args=("correct", "-m", "machine.toml"), code=2),
     # names of files
     Case("typo in the name of the calibration", ("calibraton.toml: no such file", "check the path",
          "the key calibration of the machine file names it"),
@@ -105,6 +129,16 @@ CASES = [
     Case("empty machine file", ("machine.toml: the file is empty", "olp init writes first files"),
          written("machine.toml", b"\r\n")),
     Case("CSV of a German Excel", ("x.csv: line 1", "semicolons", "expected commas"), german),
+    Case("sep= of Excel", ("x.csv: line 1: sep= is a line for Excel", "delete it"),
+         lambda folder: void((folder / "x.csv").write_text(
+             "sep=,\n" + (folder / "x.csv").read_text("utf-8"), "utf-8"))),
+    Case("empty rows of a sheet", ("x.csv: line 23: has marks between columns and no value", "delete this"),
+         lambda folder: void((folder / "x.csv").write_text(
+             (folder / "x.csv").read_text("utf-8") + ",,,,,,\n,,,,,,\n", "utf-8"))),
+    Case("tabs in CSV", ("x.csv: line 1", "tabs", "replace them in this file"),
+         changed("x.csv", ",", "\t")),
+    Case("DXF as program", ("part.nc:1: this is a DXF drawing", "the program that the CAM system writes"),
+         written("part.nc", b"0\nSECTION\n2\nHEADER\n9\n$ACADVER\n")),
     # units and values
     Case("blank in a key", ("machine.toml: line 10", "a key has no blanks", "did you mean travel_mm?"),
          changed("machine.toml", "travel_mm", "travel mm", 1)),
@@ -119,6 +153,21 @@ CASES = [
     Case("part outside the box", ("part.nc:7: axis X", "-760 to -2 mm", "--outside-box hold"),
          program(b"X50.", b"X-700.")),
     # machine, calibration, dialect
+    Case("cycle that the control alone knows", ("part.nc:7: G150 is not known to the haas profile",
+         "what to do (OLP512): Have the CAM system write plain moves"),
+         program(b"X50.", b"G150 X50. Y3.")),
+    Case("tilted plane", ("part.nc:7: G68.2 (tilted plane) is not read", "what to do (OLP512): Have the CAM"),
+         program(b"X50.", b"G68.2 X50. Y3.")),
+    Case("datum in another frame", ("OLP453", "datum_mm has X = 9000", "expected -762 to 0 mm"),
+         changed("calibration.toml", "datum_mm = [-381.0", "datum_mm = [9000.0")),
+    Case("curve of another axis", ('x.csv: line 1: column 2 is "EXX_um"', "column 1 is Y_mm"),
+         changed("x.csv", "X_mm", "Y_mm", 1)),
+    Case("axis in small letters", ("machine.toml: line 9: axes.x is not a known key", "did you mean X?"),
+         changed("machine.toml", "[axes.X]", "[axes.x]")),
+    Case("no travel", ("machine.toml: line 9: axes.X.travel_mm is missing", "[min, max] in mm"),
+         changed("machine.toml", "travel_mm = [-762.0, 0.0]\n", "")),
+    Case("calibration of a later day", ("OLP460", "after the day of the run, 2020-01-01", "Check --date"),
+         args=(*CORRECT, "--date", "2020-01-01")),
     Case("length of a tool is not defined", ("part.nc:4", "tool 99", "give [tools.99]"),
          program(b"H1", b"H99")),
     Case("cutter compensation", ("part.nc:7", "radius of tool 99, which is not known", "give radius_mm"),
@@ -142,7 +191,7 @@ def test_a_mistake_gets_a_clear_message(shop: Path, case: Case) -> None:
     before = {path: path.read_bytes() for path in shop.rglob("*") if path.is_file()}
     result = run(*case.args)
     assert result.exit_code == case.code, result.stderr
-    errors = [line for line in result.stderr.splitlines() if line.startswith("olp: error: ")]
+    errors = [line for line in result.stderr.splitlines() if line.startswith("olp: ")]
     for words in case.says:
         assert words in "\n".join(errors)
     assert "defect" not in result.stderr and "Traceback" not in result.stderr

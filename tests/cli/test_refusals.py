@@ -62,9 +62,10 @@ def test_correct_refuses_with_the_first_twenty(part: Path) -> None:
     assert result.exit_code == 3
     assert result.stdout == ""
     lines = result.stderr.splitlines()
-    assert len(lines) == 21
+    assert len(lines) == 22
     assert lines[2].startswith(f"olp: error: {part}:7: M6 uses tool 77")
-    assert lines[-1] == f"olp: error: {part}: 23 more statements are refused; olp inspect lists them"
+    assert lines[-2] == f"olp: error: {part}: 23 more statements are refused; olp inspect lists them"
+    assert lines[-1] == f"olp: what to do (OLP512): {RULES['OLP512'].remedy}"
     assert sorted(part.parent.iterdir()) == [part]
 
 
