@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import product
@@ -20,6 +21,14 @@ from olp.workflows.session import PathLike, Session, opened
 _ENDINGS = ("", ".ngc", ".nc", ".NC", ".h", ".H", ".spf", ".SPF", ".mpf", ".MPF")
 #: Digits of O numbers in names of files.
 _DIGITS = (1, 4, 5)
+
+
+def above_zero(options: object, *names: str) -> None:
+    """Raise UsageError where one of these options is stated and is no finite number above zero."""
+    for name in names:
+        value = getattr(options, name)
+        if value is not None and not 0.0 < value < math.inf:
+            raise UsageError(f"{name} = {value}: expected a finite number above zero")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -33,7 +33,7 @@ from olp.program.registry import Options, read
 from olp.proof.judgement import Judgements, verdict
 from olp.proof.proof import ROUNDING_SHARE, Proof, largest_correction_mm, prove
 from olp.workflows.doubt import accepted_of, doubted
-from olp.workflows.flatten import UnrollOptions
+from olp.workflows.flatten import UnrollOptions, above_zero
 from olp.workflows.session import Loaded
 
 if TYPE_CHECKING:
@@ -60,6 +60,9 @@ class ProofOptions(UnrollOptions):
     only_sure_components: bool = False
     date: datetime.date | None = None
     accept: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        above_zero(self, "tolerance_um", "part_tolerance_um", "peck_clearance_mm")
 
     def proof(self) -> dict[str, Any]:
         """These values alone, as the keywords of another verb's options."""

@@ -27,7 +27,7 @@ from olp.program.registry import Options
 from olp.reports.report import printable
 from olp.workflows import refusals
 from olp.workflows.doubt import accepted_of, doubted
-from olp.workflows.flatten import UnrollOptions
+from olp.workflows.flatten import UnrollOptions, above_zero
 from olp.workflows.original import placed, placed_findings
 from olp.workflows.session import Loaded, Outside, PathLike, Session, opened
 from olp.workflows.shown import Shown
@@ -41,6 +41,9 @@ class SimulateOptions(UnrollOptions):
     outside_box: Outside = "hold"
     date: datetime.date | None = None
     accept: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        above_zero(self, "step_mm", "peck_clearance_mm")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

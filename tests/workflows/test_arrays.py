@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import shutil
 from html.parser import HTMLParser
@@ -281,3 +282,15 @@ def test_a_simulation_has_read_only_columns(tmp_path: Path) -> None:
         assert len(result.line) == len(result.points_mm)
         assert not (result.line.flags.writeable or result.points_mm.flags.writeable)
     assert not olp.correct(router / "outline.ngc", router / "machine.toml").groups.flags.writeable
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, math.nan, math.inf])
+@pytest.mark.parametrize("name", ["tolerance_um", "part_tolerance_um", "peck_clearance_mm"])
+def test_a_tolerance_that_is_none_is_refused_before_the_work(name: str, value: float) -> None:
+    with pytest.raises(UsageError, match=rf"{name} = .*: expected a finite number above zero"):
+        olp.correct(CMM / "housing.ngc", MACHINE, **{name: value})  # type: ignore[arg-type]
+
+
+def test_a_step_that_is_none_is_refused_before_the_work() -> None:
+    with pytest.raises(UsageError, match="step_mm = 0: expected a finite number above zero"):
+        olp.simulate(CMM / "housing.ngc", MACHINE, step_mm=0)

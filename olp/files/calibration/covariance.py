@@ -81,7 +81,7 @@ def load_known(
     uncertainty = load_uncertainty(path, calibration, read)
     if uncertainty is None or not uncertainty.entries:
         raise ConfigError(
-            "states no uncertainty; expected [covariance] or sigma_ columns, as from olp calibrate fit",
+            "states no uncertainty; expected [covariance], or keys and columns that begin with sigma_",
             file=str(path),
         )
     return calibration, uncertainty
