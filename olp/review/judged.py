@@ -13,6 +13,7 @@ from olp.core.units import UM_PER_MM
 from olp.proof.judgement import Judgements
 from olp.proof.measured import ABOVE
 from olp.proof.proof import Counts
+from olp.review.listing import pictured
 from olp.review.pack import Arrays
 from olp.review.scene import Scene
 
@@ -33,7 +34,7 @@ def measured_names(scene: Scene) -> list[str]:
 
 def measured_label(scene: Scene, k: int) -> str:
     """What measured run k is called: by its file where there are several."""
-    return "measured" if len(scene.measured) == 1 else f"measured: {scene.measured[k].label}"
+    return "measured" if len(scene.measured) == 1 else pictured(f"measured: {scene.measured[k].label}")
 
 
 def judged_lines(scene: Scene, arrays: Arrays) -> dict[str, Any]:

@@ -77,10 +77,10 @@ def manifest_of(scene: Scene) -> tuple[dict[str, Any], Arrays]:
     arrays.along("s", scene.samples.arc_mm, ARC_MM, "P")
     manifest = {
         "schema": "olp-review-1",
-        "title": f"{scene.name} on {scene.machine.name}",
-        "program": scene.name,
-        "corrected": scene.corrected_name,
-        "machine": scene.machine.name,
+        "title": pictured(f"{scene.name} on {scene.machine.name}"),
+        "program": pictured(scene.name),
+        "corrected": pictured(scene.corrected_name),
+        "machine": pictured(scene.machine.name),
         "profile": scene.nominal.dialect.name,
         "digest": scene.digest,
         "compression": "deflate",
@@ -273,7 +273,7 @@ def _meshes(scene: Scene, arrays: Arrays, origin: Array) -> Iterator[dict[str, A
     for body in scene.bodies:
         yield {
             "name": body.name,
-            "label": body.label,
+            "label": pictured(body.label),
             "role": body.role,
             "vertices": arrays.raw(f"v_{body.name}", body.vertices - origin, "f4"),
             "faces": arrays.raw(f"f_{body.name}", body.faces, "u4"),
@@ -303,7 +303,7 @@ def _findings(scene: Scene) -> list[dict[str, Any]]:
             "severity": finding["severity"],
             "line": finding["line"],
             "place": None if finding["line"] is None else place(finding),
-            "message": finding["message"],
+            "message": pictured(finding["message"]),
             "title": RULES[finding["code"]].title,
             "count": finding["count"],
         }

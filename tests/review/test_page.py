@@ -244,6 +244,15 @@ def test_hostile_names_are_text(machine: Path, tmp_path: Path, html: bytes) -> N
     assert path.name in page.text
 
 
+def test_a_name_cannot_turn_the_words_beside_it(machine: Path, tmp_path: Path) -> None:
+    path = tmp_path / "part\u202egnp.ngc"
+    path.write_bytes(TEXT)
+    page = Page(olp.view(path, machine).html())
+    assert "\u202e" not in json.dumps(page.manifest, ensure_ascii=False)
+    assert page.manifest["program"] == "part\ufffdgnp.ngc"
+    assert "\u202e" not in page.text
+
+
 # -- what it says ---------------------------------------------------------------------------------------
 
 
