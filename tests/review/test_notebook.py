@@ -254,7 +254,8 @@ def test_the_legend_has_the_bands_of_the_palette_and_what_the_report_says(shifte
     assert [(b.low_um, b.high_um) for b in own.bands] == list(itertools.pairwise(edges))
     assert [b.colour for b in own.bands] == palette.colours(edges, tolerance, "light")
     assert [b.high for b in own.bands] == [top / tolerance for top in edges[1:]]
-    assert own.verdict == " ".join(scene.report["verdict"]["sentences"])
+    assert own.verdict == " ".join(scene.report["verdict"]["sentences"]).replace(" um", " µm")
+    assert "µm" in own.verdict
     assert own.ok is scene.report["verdict"]["ok"]
     text = own._repr_html_()
     assert all(f"background:{b.colour}" in text and b.text in text for b in own.bands)

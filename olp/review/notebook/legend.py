@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import io
+import re
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -94,9 +95,11 @@ class Legend:
             for colour, low, high in zip(picture.colours, edges[:-1], edges[1:], strict=True)
         ]
         verdict = scene.report["verdict"]
+        # the report is in ASCII
+        sentences = re.sub(r"\bum\b", "µm", " ".join(verdict["sentences"]))
         return Legend(
             picture.name, picture.title, picture.exaggeration, picture.judge, unit, tuple(bands),
-            picture.flag, " ".join(verdict["sentences"]), verdict["ok"],
+            picture.flag, sentences, verdict["ok"],
         )  # fmt: skip
 
     @property
