@@ -19,13 +19,13 @@ Each holds its data and builds its message in `__str__`, as
 from __future__ import annotations
 
 import contextlib
-import re
 from collections.abc import Iterable, Iterator
 
+from olp.core.patterns import pattern
 from olp.core.values import dataclass
 
 #: What a message states of its statement: quoted text, and numbers.
-_OWN = re.compile(r"`[^`]*`|'[^']*'|-?\d+(?:\.\d+)?")
+_OWN = pattern(r"`[^`]*`|'[^']*'|-?\d+(?:\.\d+)?")
 
 #: Exit code of an interrupted run, as shells report it.
 INTERRUPTED = 130

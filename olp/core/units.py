@@ -39,7 +39,7 @@ def shifted(number: float | str, exponent: int) -> float:
     """
     text = number if isinstance(number, str) else repr(float(number))
     value = float(text)
-    if not math.isfinite(value):
+    if not exponent or not math.isfinite(value):
         return value
     digits, _, own = text.lower().partition("e")
     return float(f"{digits}e{int(own or 0) + exponent}")

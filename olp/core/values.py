@@ -44,14 +44,17 @@ def _slotted(cls: type[T], names: Iterable[str], added: Mapping[str, Any]) -> ty
 
 
 @functools.cache
-def _declared(cls: type) -> dict[str, tuple[Any, bool]]:
-    """The fields of a class and its bases as the standard library's `Field`, and whether calls name each."""
-    fields: dict[str, tuple[Any, bool]] = {}
+def _declared(cls: type) -> dict[str, tuple[Any, Any, bool, bool]]:
+    """Of each field of a class and its bases the default, the factory, whether calls give it, and whether
+    they name it."""
+    fields: dict[str, tuple[Any, Any, bool, bool]] = {}
     for base in reversed(cls.__mro__):
         stated, kw_only = vars(base).get(_STATED, ({}, False))
         for name, value in stated.items():
-            field = value if isinstance(value, dataclasses.Field) else dataclasses.field(default=value)
-            fields[name] = (field, kw_only)
+            if isinstance(value, dataclasses.Field):
+                fields[name] = (value.default, value.default_factory, value.init, kw_only)
+            else:
+                fields[name] = (value, dataclasses.MISSING, True, kw_only)
     return fields
 
 
@@ -61,18 +64,18 @@ def _constructor(cls: type) -> Callable[..., None]:
     positional: list[str] = []
     named: list[str] = []
     lines: list[str] = []
-    for name, (field, kw_only) in _declared(cls).items():
+    for name, (default, factory, init, kw_only) in _declared(cls).items():
         value = parameter = name
-        if field.default is not dataclasses.MISSING:
-            known[f"_default_{name}"] = field.default
+        if default is not dataclasses.MISSING:
+            known[f"_default_{name}"] = default
             parameter = f"{name}=_default_{name}"
-        elif field.default_factory is not dataclasses.MISSING:
-            known[f"_make_{name}"] = field.default_factory
+        elif factory is not dataclasses.MISSING:
+            known[f"_make_{name}"] = factory
             parameter = f"{name}=_MADE"
-            value = f"_make_{name}() if {name} is _MADE else {name}" if field.init else f"_make_{name}()"
-        if field.init:
+            value = f"_make_{name}() if {name} is _MADE else {name}" if init else f"_make_{name}()"
+        if init:
             (named if kw_only else positional).append(parameter)
-        if field.init or parameter != name:
+        if init or parameter != name:
             lines.append(f"    _set(self, {name!r}, {value})")
     if hasattr(cls, "__post_init__"):
         lines.append("    self.__post_init__()")
@@ -84,24 +87,20 @@ def _constructor(cls: type) -> Callable[..., None]:
 
 
 @functools.cache
-def _plan(cls: type) -> tuple[tuple[str, ...], list[tuple[str, bool, Any, Any]], bool]:
-    """What a call of a class gives by position, of each field its name, whether calls give it, its default
-    and its factory, and whether `__post_init__` follows."""
-    declared = _declared(cls)
-    positional = tuple(name for name, (field, kw_only) in declared.items() if field.init and not kw_only)
-    fields = [(name, f.init, f.default, f.default_factory) for name, (f, _) in declared.items()]
-    return positional, fields, hasattr(cls, "__post_init__")
+def _positional(cls: type) -> list[str]:
+    """What a call of a class gives by position."""
+    return [name for name, (_, _, init, kw_only) in _declared(cls).items() if init and not kw_only]
 
 
 def _filled(self: Any, args: tuple[Any, ...], words: dict[str, Any]) -> bool:
     """Gives a value its fields as the constructor does; False, and nothing done, where a call does not fit:
     the constructor says why."""
-    positional, fields, checked = _plan(self.__class__)
-    given = dict(zip(positional, args, strict=False)) | words
+    cls = self.__class__
+    given = dict(zip(_positional(cls), args, strict=False)) | words
     if len(given) < len(args) + len(words):
         return False
     values: dict[str, Any] = {}
-    for name, init, default, factory in fields:
+    for name, (default, factory, init, _) in _declared(cls).items():
         if init and name in given:
             values[name] = given.pop(name)
         elif default is not dataclasses.MISSING:
@@ -114,7 +113,7 @@ def _filled(self: Any, args: tuple[Any, ...], words: dict[str, Any]) -> bool:
         return False
     for name, value in values.items():
         object.__setattr__(self, name, value)
-    if checked:
+    if hasattr(cls, "__post_init__"):
         self.__post_init__()
     return True
 
@@ -152,16 +151,19 @@ def _refuse_delete(self: Any, name: str) -> None:
 def _described(made: type, stated: dict[str, Any], frozen: bool, kw_only: bool) -> dict[str, Any]:
     """What the standard decorator says of a class: its fields, those of its bases first, and how it was
     decorated. Only a class without methods is decorated for it: of a frozen one it would compile some."""
-    kinds = inspect.get_annotations(made)
     body = {name: value for name, value in stated.items() if value is not dataclasses.MISSING}
-    body |= {"__annotations__": {name: kinds[name] for name in stated}, "__module__": made.__module__}
+    body |= {"__annotations__": dict.fromkeys(stated, object), "__module__": made.__module__}
     # without words of its own the standard library writes some, from the signature
     bare: Any = type(made.__name__, (), {**body, "__doc__": made.__name__})
     dataclasses.dataclass(init=False, repr=False, eq=False, kw_only=kw_only)(bare)
     fields: dict[str, Any] = {}
     for base in reversed(made.__mro__[1:]):
         fields |= getattr(base, _FIELDS, {})
-    fields |= getattr(bare, _FIELDS)
+    own = getattr(bare, _FIELDS)
+    kinds = inspect.get_annotations(made)
+    for name, field in own.items():
+        field.type = kinds[name]
+    fields |= own
     params = bare.__dataclass_params__
     params.frozen = frozen
     names = tuple(name for name, field in fields.items() if field.init and not field.kw_only)

@@ -9,7 +9,6 @@ from dataclasses import field
 from olp.core.arrays import Array
 from olp.core.errors import UsageError
 from olp.core.machine import SQUARENESS, ZERO, Vector
-from olp.core.quantities import quantity
 from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM
 from olp.core.values import dataclass
 from olp.errormodel.calibration import Calibration, Curve
@@ -114,6 +113,8 @@ def _pairs(
     what: str, given: Iterable[str], names: tuple[str, ...], unit: str
 ) -> Iterator[tuple[str, str, float]]:
     """Name, text and value in a unit of each NAME=VALUE; a slope is an angle."""
+    from olp.core.quantities import quantity
+
     for each in given:
         name, equals, text = each.partition("=")
         name = name.strip().upper()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -130,12 +131,19 @@ def _number(name: str, cell: str) -> tuple[float, str | None]:
     return number, f"{name} {wrong}" if wrong else None
 
 
-def _stated(name: str, cell: str) -> tuple[float, str | None]:
+@cache
+def _unit_of(name: str) -> tuple[str, int]:
+    """The unit in which the name of a column ends, and its power of ten."""
     unit = "/".join(name.split("_")[-2:]) if name.endswith("_kg") else name.rpartition("_")[2]
+    return unit, _POWER.get(unit, 0)
+
+
+def _stated(name: str, cell: str) -> tuple[float, str | None]:
+    unit, power = _unit_of(name)
     if not cell:
         return 0.0, f"is empty; expected a number in {unit}"
     try:
-        number = shifted(cell, _POWER.get(unit, 0)) if "_" not in cell else math.nan
+        number = shifted(cell, power) if "_" not in cell else math.nan
     except ValueError:
         if re.fullmatch(r"[-+]?\d*,\d+", cell):
             return 0.0, f"= {cell} has a decimal comma; expected a decimal point"

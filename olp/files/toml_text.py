@@ -7,6 +7,7 @@ import datetime
 import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
+from functools import cached_property
 
 from olp.core.errors import ConfigError
 from olp.core.patterns import pattern
@@ -28,7 +29,7 @@ _BLANKS = pattern(r"[A-Za-z]\w*(?: +\w+)+\s*(?==)")
 _BARE = pattern(r"[A-Za-z0-9_-]+")
 
 
-def read_toml(data: bytes, file: str) -> tuple[dict[str, object], dict[Path, int]]:
+def read_toml(data: bytes, file: str) -> tuple[dict[str, object], Mapping[Path, int]]:
     """Values and key lines of a TOML file. Raises ConfigError with the line where the text is not TOML."""
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         raise ConfigError("the text is UTF-16; expected a text file saved as UTF-8", file=file)
@@ -44,7 +45,9 @@ def read_toml(data: bytes, file: str) -> tuple[dict[str, object], dict[Path, int
         raise ConfigError(
             "the file is empty; expected keys and values; olp init writes first files", file=file
         )
-    deep = _DEEP_KEY.search(text)
+    deep = None
+    if any(line.count(".") >= _DEEPEST for line in text.split("\n")):
+        deep = _DEEP_KEY.search(text)
     if deep is not None:
         line = text.count("\n", 0, deep.end()) + 1
         raise ConfigError(
@@ -57,7 +60,27 @@ def read_toml(data: bytes, file: str) -> tuple[dict[str, object], dict[Path, int
     except (ValueError, RecursionError):
         problem = "has a number with thousands of digits, or brackets nested too deeply; correct it"
         raise ConfigError(problem, file=file) from None
-    return values, key_lines(text)
+    return values, _KeyLines(text)
+
+
+class _KeyLines(Mapping[Path, int]):
+    """`key_lines` of a text; they are looked for when the first one is asked for."""
+
+    def __init__(self, text: str) -> None:
+        self._text = text
+
+    @cached_property
+    def _lines(self) -> dict[Path, int]:
+        return key_lines(self._text)
+
+    def __getitem__(self, path: Path) -> int:
+        return self._lines[path]
+
+    def __iter__(self) -> Iterator[Path]:
+        return iter(self._lines)
+
+    def __len__(self) -> int:
+        return len(self._lines)
 
 
 def _syntax_error(message: str, text: str, file: str) -> ConfigError:

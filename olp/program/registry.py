@@ -186,7 +186,8 @@ def _by_ending(file: str) -> str | None:
 def _by_text(data: bytes) -> set[str]:
     """The dialects of statements that a text may be written in; none where it has no statements."""
     start = data[:_LOOKED_AT]
-    if signs.ODD.search(signs.ASIDE.sub(b"", start)) is None:
+    blocks = signs.ASIDE.sub(b"", start) if b"(" in start else start
+    if signs.ODD.search(blocks) is None:
         return set()
     own = ((name, known.signs.own) for name, known in _KNOWN.items())
     counts = {name: len(sign.findall(start)) for name, sign in own if sign is not None}

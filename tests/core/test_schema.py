@@ -5,7 +5,8 @@ from __future__ import annotations
 import datetime
 import math
 import pickle
-from typing import Annotated, Any, Literal
+import re
+from typing import Annotated, Any, Literal, get_type_hints
 
 import pytest
 
@@ -25,12 +26,26 @@ from olp.core.schema import (
     with_keys,
 )
 from olp.core.schema_keys import After, Before, Field, Instead, Known, WrongTable, refusal, rule
+from olp.files import schemas
+from olp.files.calibration.schema import CalibrationFile
 
 
 def _even(value: int) -> int:
     if value % 2:
         raise refusal(f"= {value} is odd")
     return value
+
+
+@pytest.mark.parametrize("model", [schemas.MachineFile, schemas.JobFile, CalibrationFile, schemas.CheckTable])
+def test_types_of_keys_are_those_of_the_standard_library(model: type[Table]) -> None:
+    hints = get_type_hints(model, include_extras=True)
+    found = {name: field.annotation for name, field in fields_of(model).items()}
+    # limits are values of their own each time
+    assert _plain(found) == _plain({name: hints[name] for name in found})
+
+
+def _plain(hints: dict[str, Any]) -> dict[str, str]:
+    return {name: re.sub(r" at 0x[0-9a-f]+", "", repr(kind)) for name, kind in hints.items()}
 
 
 class Part(Table):
