@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.compensation.plan import Targets, zero_shifts
-from olp.core.arrays import Array, Index, Mask, all_in_row, any_in_row
+from olp.core.arrays import Array, Index, Mask, all_in_row, any_in_row, is_in
 from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES
 from olp.core.progress import Progress, part, silent
@@ -172,10 +172,14 @@ def prove(
         strokes = strokes_mm(nominal, target, program.toolpath, program.holes, model, bend)
         size = _sizes(deviation, how, *strokes)
         size[counts > Counts.LEFT] = np.nan
-        largest = float(deviation.bend[counts == Counts.FEED].max(initial=0.0))
+        largest = float(deviation.bend.max(initial=0.0, where=counts == Counts.FEED))
         return Side(deviation.waypoint, deviation.side, largest), size
 
-    before, before_mm = side(nominal, np.arange(len(path)), part(tell, 0.4, 0.7))
+    each = np.arange(len(path))
+    if np.array_equal(groups, each):
+        # where nothing is inserted, one array does for both
+        each = groups
+    before, before_mm = side(nominal, each, part(tell, 0.4, 0.7))
     after, after_mm = side(corrected, groups, part(tell, 0.7, 1.0))
     blind = np.isnan(after_mm) & (counts <= Counts.LEFT)
     counts[blind & (counts == Counts.LEFT)] = Counts.UNKNOWN
@@ -268,19 +272,16 @@ def _refuse_blind(path: Toolpath, blind: Mask) -> None:
 
 def _sizes(deviation: Deviation, how: npt.NDArray[np.uint8], bottom: Index, stroke: Single) -> Single:
     """(n,) mm: along the path of feed moves, at the end of points, of a hole at the move to its bottom."""
-    side, end, along = deviation.side, deviation.waypoint, deviation.path
     size = np.full(len(how), np.nan, np.float32)
-
-    def put(rows: Mask | Index, values: Single) -> None:
-        size[rows] = values + side[rows]
-
-    feed, point, hole = (how == kind for kind in (Counts.FEED, Counts.POINT, Counts.HOLE))
-    put(feed, np.fmax(end[feed], along[feed]))
-    put(point, end[point])
-    if len(bottom):
-        some = how[bottom] == Counts.HOLE
-        put(bottom[some], stroke[some])
-    else:
+    feeds = (Counts.FEED,) if len(bottom) else (Counts.FEED, Counts.HOLE)
+    for a in range(0, len(how), _BLOCK):
+        rows = slice(a, a + _BLOCK)
+        kind, end, part = how[rows], deviation.waypoint[rows], size[rows]
         # holes without a partner are compared stroke by stroke
-        put(hole, np.fmax(end[hole], along[hole]))
+        along = is_in(kind, feeds)
+        np.fmax(end, deviation.path[rows], out=part, where=along)
+        np.copyto(part, end, where=kind == Counts.POINT)
+        part += deviation.side[rows]
+    hole = bottom[how[bottom] == Counts.HOLE]
+    size[hole] = stroke[how[bottom] == Counts.HOLE] + deviation.side[hole]
     return size

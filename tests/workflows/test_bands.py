@@ -19,7 +19,7 @@ from judge.programs import FEATURES, LOOSE, random_program
 import olp
 from olp.core.errors import OlpError, OutsideBox
 from olp.program import bands
-from olp.proof import deviation, kinds, matching
+from olp.proof import deviation, kinds, matching, proof
 
 PROGRAMS = Path(__file__).resolve().parents[2] / "programs"
 MAKE = runpy.run_path(str(PROGRAMS / "generate.py"))
@@ -48,7 +48,7 @@ def in_sizes(monkeypatch: pytest.MonkeyPatch, sizes: Sequence[int] = SIZES) -> I
         monkeypatch.setattr(bands, "SIZE", size)
         # a page holds a window of the search at least
         monkeypatch.setattr(matching, "_PAGE", max(size, 12))
-        for module in (deviation, kinds):
+        for module in (deviation, kinds, proof):
             monkeypatch.setattr(module, "_BLOCK", 3 * size)
         yield size
 

@@ -68,7 +68,8 @@ class Columns:
         column.used += len(values)
 
     def take(self, name: str, kind: npt.DTypeLike, *width: int) -> npt.NDArray[Any]:
-        """The column, read-only; empty where nothing was put."""
+        """The column, read-only; empty where nothing was put. Where all its numbers are the same, as frames
+        often are, it is one number that stands for all."""
         column = self._columns.pop(name, None)
         if column is None:
             array = np.zeros((0, *width), kind)
@@ -83,5 +84,7 @@ class Columns:
                 block = blocks.pop()
                 array[end - len(block) : end] = block
                 end -= len(block)
+            if array.ndim == 1 and len(array) and (array == array[0]).all():
+                array = np.broadcast_to(array[:1].copy(), len(array))
         array.setflags(write=False)
         return array

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from olp.program.text.columns import Columns
+from olp.program.text import columns as module
+from olp.program.text.columns import Columns, apart
 
 
 @pytest.mark.slow
@@ -45,3 +46,29 @@ def test_little_is_reserved_beyond_what_is_there() -> None:
         reserved = sum(map(len, [*column.full, column.block]))
         assert reserved <= 1000 * count + min(1000 * count + 1024, 1 << 16)
     assert columns.take("a", np.float64, 3).nbytes == 199 * 1000 * 24
+
+
+def test_a_large_column_has_memory_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is in it is the same, also where blocks and column are large."""
+    monkeypatch.setattr(module, "_OWN", 1)
+    columns, parts = Columns(), [np.arange(n) for n in (1, 1500, 70, 40_000)]
+    for part in parts:
+        columns.put("a", np.stack((part, -part), axis=1), np.int32)
+    taken = columns.take("a", np.int32, 2)
+    assert taken.tolist() == [[k, -k] for part in parts for k in part.tolist()]
+    assert not taken.flags.owndata and not taken.flags.writeable
+
+
+def test_one_number_stands_for_a_column_of_equal_ones() -> None:
+    columns = Columns()
+    columns.put("a", np.full(3000, 7), np.int32)
+    columns.put("b", np.full(3000, np.nan), np.float64)
+    columns.put("c", np.full((3000, 2), 7), np.int32)
+    one, nan, rows = columns.take("a", np.int32), columns.take("b", np.float64), columns.take("c", np.int32)
+    assert one.dtype == np.int32 and one.tolist() == [7] * 3000 and one.strides == (0,)
+    assert np.isnan(nan).all() and rows.tolist() == [[7, 7]] * 3000
+
+
+def test_too_large_a_column_is_out_of_memory() -> None:
+    with pytest.raises(MemoryError):
+        apart((1 << 50,), np.float64)
