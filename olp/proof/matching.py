@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from olp.compensation.plan import TargetRows
-from olp.core.arrays import Array, Index, all_in_row, most_in_row
+from olp.core.arrays import Array, Index, all_in_row, distinct, most_in_row
 from olp.core.errors import ProgramError
 from olp.core.progress import Progress, silent
 from olp.core.values import dataclass
@@ -21,6 +21,8 @@ from olp.proof.pages import Page, Tips, Units
 
 #: Share of waypoints that may be far off before the programs count as different jobs.
 _MOST_FAR = 0.5
+#: Strokes by which the first one of a hole is found.
+_STROKES = 2
 #: Nominal units that are matched at once.
 _PAGE = 1 << 14
 
@@ -124,9 +126,12 @@ def _groups(target: TargetRows, units: _Pair, tip: Array, base: int) -> Index:
     moves from `base` on."""
     # of a hole: the strokes one by one; one peck more belongs to the last stroke
     first, last, begin, end = units.first, units.last, units.begin.copy(), units.end
-    for u in np.flatnonzero((last > first) & (end - begin > last - first)).tolist():
-        strokes = tip[begin[u] - base : end[u] + 1 - base]
-        begin[u] += _first_stroke(target[first[u] : last[u] + 1], strokes)
+    extra = (end - begin) - (last - first)
+    longer = np.flatnonzero((last > first) & (extra > 0))
+    for more in distinct(extra[longer]).tolist():
+        some = longer[extra[longer] == more]
+        strokes = [target[first[some] + k] for k in range(_STROKES)]
+        begin[some] += _first_strokes(strokes, tip, begin[some] - base, more)
     unit = np.repeat(np.arange(len(first)), last - first + 1)
     move = first[0] + np.arange(len(unit))
     groups: Index = np.minimum(begin[unit] + move - first[unit], end[unit])
@@ -134,10 +139,14 @@ def _groups(target: TargetRows, units: _Pair, tip: Array, base: int) -> Index:
     return groups
 
 
-def _first_stroke(target: Array, tip: Array) -> int:
-    """With how many moves the corrected hole begins before the first of the nominal one: a rapid to the hole
-    that the nominal program does not need."""
-    extra = max(len(tip) - len(target), 0)
-    few = min(2, len(target), len(tip))
-    away = [np.abs(tip[k : k + few] - target[:few]).sum() for k in range(extra + 1)]
-    return int(np.argmin(away))
+def _first_strokes(strokes: list[Array], tip: Array, begin: Index, more: int) -> Index:
+    """(m,) with how many of its `more` moves each corrected hole begins before the first of the nominal one:
+    rapids to the hole that the nominal program does not need. `strokes` (m, 3) are the first moves of the
+    nominal holes, `begin` (m,) the first ones of the corrected holes."""
+    away = np.zeros((more + 1, len(begin)))
+    for k, size in enumerate(away):
+        for stroke, goal in enumerate(strokes):
+            off = np.abs(tip.take(begin + (k + stroke), axis=0) - goal)
+            for column in off.T:
+                size += column
+    return np.asarray(away.argmin(axis=0))

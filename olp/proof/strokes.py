@@ -50,12 +50,15 @@ def strokes_mm(
     away = segment_distance(tip, top, bottom, hole_of)
     along = bottom - top
     # in no unit, but in order
-    depth = ((tip - top[hole_of]) * along[hole_of]).sum(axis=1)
+    depth = np.zeros(len(tip))
+    for axis in range(3):
+        depth += (tip[:, axis] - top[:, axis].take(hole_of)) * along[:, axis].take(hole_of)
     deepest = np.full(count, -np.inf)
     np.fmax.at(deepest, hole_of, depth)
     # the deepest of a hole counts to its bottom
-    lowest = depth == deepest[hole_of]
-    away[lowest] = np.sqrt(((tip - bottom[hole_of]) ** 2).sum(axis=1))[lowest]
+    lowest = np.flatnonzero(depth == deepest[hole_of])
+    off = tip.take(lowest, axis=0) - bottom.take(hole_of[lowest], axis=0)
+    away[lowest] = np.sqrt((off**2).sum(axis=1))
     np.fmax.at(worst, hole_of, away.astype(np.float32))
     return move, worst
 
@@ -82,7 +85,7 @@ def _axes(path: Toolpath, target: TargetRows, holes: Holes) -> tuple[Index, Arra
 
 def _tips(path: Toolpath, rows: Index, model: ErrorModel, bend_mm: float) -> tuple[Array, Index]:
     """(m, 3) where the tip is along moves `rows`, their starts too, and (m,) which of `rows` each is on."""
-    start, end = path.starts_mm()[rows], path.end_mm[rows]
+    start, end = path.starts_mm().take(rows, axis=0), path.end_mm.take(rows, axis=0)
     tool = path.tool_mm()
     tool = tool if tool.ndim == 1 else tool[rows]
     steps = steps_needed(model, np.nan_to_num(end - start), tool, bend_mm, at_most=_MOST_STEPS)
@@ -91,7 +94,7 @@ def _tips(path: Toolpath, rows: Index, model: ErrorModel, bend_mm: float) -> tup
     share = (np.arange(len(of)) - first[of]) / steps[of]
     play = plays(model, path.end_mm)
     if play is None:
-        point = start[of] + share[:, None] * (end - start)[of]
+        point = start.take(of, axis=0) + share[:, None] * (end - start).take(of, axis=0)
         return point + model.error(point, tool if tool.ndim == 1 else tool[of], None), of
     # a stroke begins on the side on which the move before it ended, and then takes up the backlash
     before = np.concatenate((play[:1], play[:-1]))[rows]
