@@ -168,28 +168,30 @@ def quarter_shares(start: Array, centre: Array, plane: Plane, sweep: Array, quar
 
 
 def segment_distance(point: Array, start: Array, end: Array, which: Index | None = None) -> Array:
-    """(n,) distances of points from segments, or from those `which` (n,); a segment without length is a
-    point."""
+    """(n,) distances of points from segments, or from those `which` (n,), in the plane or in space; a segment
+    without length is a point."""
     begin, along = (list(np.ascontiguousarray(rows.T)) for rows in (start, end - start))
-    length2 = along[0] * along[0] + along[1] * along[1] + along[2] * along[2]
+    length2 = np.zeros(len(start))
+    for column in along:
+        length2 += column * column
     # no way along one without length, or to an unknown end
     inverse = np.divide(1.0, length2, out=np.zeros_like(length2), where=length2 > 0)
     distance = np.empty(len(point))
     for a in range(0, len(point), _POINTS):
         part = slice(a, a + _POINTS)
         of = part if which is None else which[part]
-        away = [point[part, axis] - begin[axis][of] for axis in range(3)]
+        away = [point[part, axis] - column[of] for axis, column in enumerate(begin)]
         way = [column[of] for column in along]
-        share = away[0] * way[0]
-        for axis in (1, 2):
-            share += away[axis] * way[axis]
+        share = np.zeros(len(away[0]))
+        for there, ahead in zip(away, way, strict=True):
+            share += there * ahead
         share *= inverse[of]
         np.clip(share, 0.0, 1.0, out=share)
         square = np.zeros(len(share))
-        for axis in range(3):
-            away[axis] -= share * way[axis]
-            away[axis] *= away[axis]
-            square += away[axis]
+        for there, ahead in zip(away, way, strict=True):
+            there -= share * ahead
+            there *= there
+            square += there
         np.sqrt(square, out=distance[part])
     return distance
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from olp.core.arrays import Array
-from olp.core.geometry import PLANES, ArcShapes
+from olp.core.geometry import PLANES, ArcShapes, segment_distance
 
 COUNT = 12
 
@@ -61,3 +61,22 @@ def test_a_point_on_the_arc_has_no_distance_and_one_beyond_its_end_is_that_far()
     point = np.array([[10 * math.cos(0.4), 10 * math.sin(0.4), 0], [12.0, 0, 0], [0, 10, 3]])
     away = made.distance(point, np.zeros(3, np.int64), np.array([0.25, 0.0, 1.0]))
     assert away == pytest.approx([0.0, 2.0, 3.0], abs=1e-12)
+
+
+@pytest.mark.parametrize("width", [2, 3])
+def test_distances_from_segments_in_any_number(width: int) -> None:
+    """More points than are computed at once, also to segments that many of them share; by dense samples."""
+    rng = np.random.default_rng(width)
+    start, end = rng.normal(size=(2, 50, width))
+    end[7] = start[7]
+    which = rng.integers(0, 50, 10_000)
+    point = 2.0 * rng.normal(size=(len(which), width))
+    distance = segment_distance(point, start, end, which)
+    np.testing.assert_allclose(segment_distance(point, start[which], end[which]), distance)
+    some = np.arange(0, len(which), 97)
+    share = np.linspace(0.0, 1.0, 2001)[:, None, None]
+    samples = start[which[some]] + share * (end - start)[which[some]]
+    nearest = np.sqrt(((point[some] - samples) ** 2).sum(axis=2)).min(axis=0)
+    np.testing.assert_allclose(distance[some], nearest, atol=2e-3)
+    end[3] = np.nan
+    assert np.isnan(segment_distance(start[3:4], start[3:4], end[3:4])).all()
