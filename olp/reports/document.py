@@ -142,6 +142,8 @@ footer { color: var(--soft); font-size: 8pt; border-top: .5pt solid var(--line);
 @page { size: A4; margin: 15mm 14mm 16mm; @bottom-right { content: counter(page) " / " counter(pages);
   font: 8pt Arial, sans-serif; color: #5b6670; } }
 @media print { body { padding: 0; max-width: none; } }
+@media screen and (max-width: 190mm) { body { padding: 5mm 4mm; }
+  table { display: block; overflow-x: auto; } dl { grid-template-columns: minmax(25mm, 2fr) 3fr; } }
 """
 
 

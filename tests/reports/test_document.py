@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import pytest
+from judge import browser
 
 from olp.reports.document import (
     Block,
@@ -164,3 +166,28 @@ def test_the_page_may_load_nothing() -> None:
         '<meta http-equiv="Content-Security-Policy" '
         "content=\"default-src 'none'; style-src 'unsafe-inline'; img-src data:\">"
     ) in to_html(of()).decode()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("width", [360, 768])
+def test_a_wide_table_scrolls_and_the_page_does_not(tmp_path: Path, width: int) -> None:
+    browser.require()
+    head = [
+        "program",
+        "machine",
+        "verdict",
+        "report",
+        "findings",
+        "moves",
+        "uncorrected max",
+        "corrected max",
+    ]
+    rows = [
+        ["cell-3/bracket-left.nc", "mill-30-16", "good", "report", "OLP466, OLP102", "1200", "9.4", "0.4"]
+    ]
+    path = tmp_path / "page.html"
+    path.write_bytes(to_html(of(Grid(head, rows, 5), Pairs([("Sha-256 of the program", "0" * 64)]))))
+    with browser.driver() as driver, browser.launched(driver) as chromium:
+        page = chromium.new_page(viewport={"width": width, "height": 800})
+        page.goto(path.as_uri())
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
