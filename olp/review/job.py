@@ -343,15 +343,17 @@ def _resting(samples: Samples, arrival: Array, leaving: Array) -> tuple[Samples,
     rests = np.flatnonzero(leaving - arrival > _REST_S)
     order = np.sort(np.concatenate((np.arange(len(samples)), rests)), kind="stable")
     again = np.diff(order, prepend=-1) == 0
-    twice = samples.take(order)
-    twice.joined[again] = True
-    return twice, np.where(again, leaving[order], arrival[order])
+    samples.become(order)
+    samples.joined[again] = True
+    return samples, np.where(again, leaving[order], arrival[order])
 
 
 def _digest(texts: _Texts, loaded: Loaded, measured: Sequence[str], sources: Sources) -> str:
     """12 digits that change with every input of the page; `measured` are the digests of those files."""
-    parts = (texts.nominal.data, texts.second.data, loaded.digest.encode(), repr(loaded.setup).encode())
-    combined = hashlib.sha256(b"\0".join(parts))
+    combined = hashlib.sha256(texts.nominal.data)
+    for part in (texts.second.data, loaded.digest.encode(), repr(loaded.setup).encode()):
+        combined.update(b"\0")
+        combined.update(part)
     for digest in measured:
         combined.update(bytes.fromhex(digest))
     for mesh in loaded.setup.job.meshes:

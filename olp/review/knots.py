@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy.typing as npt
 from olp.core.arrays import Array, Index
 from olp.core.values import dataclass
 
-#: Most rows between two knots.
+#: Most rows between two knots, a power of two.
 _APART = 256
 #: Rows that are worked on at once; a multiple of the above.
 _BAND = 1 << 16
@@ -30,26 +31,32 @@ class Curve:
     @staticmethod
     def of(values: npt.ArrayLike, step: float) -> Curve:
         """The curve of (n,) finite values; its knots are stored in steps."""
-        rows = np.asarray(values, float)
-        at = knots(rows, np.rint(rows / step) * step, np.arange(len(rows), dtype=float), step)
-        knot = np.asarray(values)[at]
-        return Curve(at.astype(np.int32), knot, step, len(rows), float(rows.max(initial=0.0)))
+        whole = np.asarray(values)
+
+        def columns(rows: slice) -> tuple[Array, Array, Array]:
+            some = whole[rows].astype(float)
+            along = np.arange(rows.start, rows.start + len(some), dtype=float)
+            return some, np.rint(some / step) * step, along
+
+        at = knots(len(whole), columns, step)
+        return Curve(at.astype(np.int32), whole[at], step, len(whole), float(whole.max(initial=0.0)))
 
     def values(self) -> Array:
         """(n,) the values, straight between knots."""
         return straight(self.knot.astype(float), self.at, np.arange(self.count, dtype=float))
 
 
-def knots(values: Array, stored: Array, along: Array, tolerance: float) -> Index:
-    """Rows of (n,) values between which they are straight over `along` (n,), which never falls, within a
-    tolerance; a knot has the `stored` value of its row."""
-    keep = np.zeros(len(values), bool)
+def knots(count: int, columns: Callable[[slice], tuple[Array, Array, Array]], tolerance: float) -> Index:
+    """Rows of `count` values between which they are straight over `along`, which never falls, within a
+    tolerance. `columns` gives of some rows the values, what is stored of them if they are knots, and `along`.
+    """
+    keep = np.zeros(count, bool)
     keep[::_APART] = True
     keep[-1:] = True
-    for a in range(0, len(values), _BAND):
+    for a in range(0, count, _BAND):
         # bands share the knot between them
         rows = slice(a, a + _BAND + 1)
-        _refine(keep[rows], values[rows], stored[rows], along[rows], tolerance)
+        _refine(keep[rows], *columns(rows), tolerance)
     return np.flatnonzero(keep)
 
 
@@ -75,22 +82,27 @@ def lengths(path: npt.NDArray[Any]) -> Array:
 def _refine(
     keep: npt.NDArray[np.bool_], values: Array, stored: Array, along: Array, tolerance: float
 ) -> None:
-    """Halve the stretches between knots until each is straight."""
-    edge = np.flatnonzero(keep)
-    first, last = edge[:-1], edge[1:]
-    while len(first):
-        inside = last - first - 1
-        first, last, inside = (some[inside > 0] for some in (first, last, inside))
-        if not len(first):
-            return
-        begin = np.cumsum(inside) - inside
-        of = np.repeat(np.arange(len(first)), inside)
-        row = np.arange(len(of)) + (first - begin + 1)[of]
-        span = along[last] - along[first]
-        rise = np.divide(stored[last] - stored[first], span, out=np.zeros(len(span)), where=span > 0.0)
-        off = np.abs(stored[first][of] + (along[row] - along[first][of]) * rise[of] - values[row])
-        bent = np.maximum.reduceat(off, begin) > tolerance
-        first, last = first[bent], last[bent]
-        middle = (first + last) // 2
+    """Halve the stretches between knots until each is straight. All are as long: a matrix has a column for
+    each."""
+    last = len(values) - 1
+    first = np.arange(0, last, _APART)
+    # rows behind the last are as that one
+    short = len(first) * _APART - last
+    values, stored, along = (np.pad(column, (0, short), mode="edge") for column in (values, stored, along))
+    size = _APART
+    while size > 1 and len(first):
+        begin, base = along[first], stored[first]
+        span = along[first + size] - begin
+        rise = np.divide(stored[first + size] - base, span, out=np.zeros(len(span)), where=span > 0.0)
+        inside = first + np.arange(1, size)[:, None]
+        off = along[inside]
+        off -= begin
+        off *= rise
+        off += base
+        off -= values[inside]
+        bent = first[np.abs(off, out=off).max(axis=0) > tolerance]
+        size //= 2
+        middle = bent + size
+        middle = middle[middle < last]
         keep[middle] = True
-        first, last = np.concatenate((first, middle)), np.concatenate((middle, last))
+        first = np.concatenate((bent, middle))

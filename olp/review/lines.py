@@ -96,7 +96,7 @@ class Lines:
 
     @staticmethod
     def of(text: str, positions: Positions | None = None) -> Lines:
-        tokens = Tokens.of(text.encode())
+        tokens = Tokens.of(text)
         slots = _Slots.of(tokens)
         code = np.full(len(tokens.value), -1, np.int32)
         styles: list[Style] = []
@@ -104,7 +104,7 @@ class Lines:
         predictions: list[Prediction | None] = []
         rest: list[npt.NDArray[Any]] = []
         for key in range(slots.columns):
-            rows = np.flatnonzero(slots.column == key).astype(np.int32)
+            rows = slots.rows(key)
             column = _column(tokens, rows, len(styles), len(rest), len(tokens.skeleton))
             if column is None:
                 continue
@@ -115,6 +115,7 @@ class Lines:
             predictions.append(guess)
             rest.append(left)
         templates, template = slots.templates(tokens, code)
+        del tokens, slots, code
         columns = np.column_stack(rest) if rest else np.zeros((len(template), 0), np.int32)
         return Lines(templates, template, styles, decimals, predictions, columns)
 
@@ -138,16 +139,20 @@ def _column(tokens: Tokens, rows: Small, first_style: int, number: int, lines: i
     decimals = tokens.decimals[rows]
     most = int(decimals.max())
     value = tokens.value[rows].astype(np.int64)
-    fits = np.abs(value) < _POWERS[DIGITS_MOST - 1 - most + decimals]
-    rows, value, decimals = rows[fits], value[fits], decimals[fits]
-    value *= _POWERS[most - decimals]
+    fits = np.empty(len(rows), bool)
+    for some in _bands(len(rows)):
+        fits[some] = np.abs(value[some]) < _POWERS[DIGITS_MOST - 1 - most + decimals[some]]
+        value[some] *= _POWERS[most - decimals[some]]
+    if not fits.all():
+        rows, value, decimals = rows[fits], value[fits], decimals[fits]
     written = Written(value, most, tokens.whole[rows], decimals, tokens.point[rows])
     styles, style = written.styles(number)
     room = max(_STYLES - first_style, 0)
     known = style < room
     if not known.any():
         return None
-    return _Column(rows[known], value[known], most, first_style + style[known], styles[:room])
+    which = slice(None) if known.all() else known
+    return _Column(rows[which], value[which], most, first_style + style[which], styles[:room])
 
 
 def _few(values: Small) -> bool:
@@ -174,7 +179,7 @@ def _predicted(
     best = min(choices, key=lambda c: float(np.log2(1.0 + np.abs(np.diff(rest(c, tried)))).sum()))
     before = np.zeros(lines, np.int32)
     before[line] = np.arange(len(line))
-    left = small(np.concatenate([rest(best, rows) for rows in _bands(len(line))]))
+    left = np.concatenate([small(rest(best, rows)) for rows in _bands(len(line))])
     return best, left[np.maximum.accumulate(before)]
 
 
@@ -193,8 +198,8 @@ def _tried(count: int) -> Index:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Slots:
-    """Where the k numbers of a text are: (k,) `line` and `column` of each, the `slot` in its skeleton among
-    the slots of all skeletons, and the number of columns."""
+    """Where the k numbers of a text are: (k,) `line` of each, and the `slot` in its skeleton among the slots
+    of all skeletons. `column` is that of each slot, and `columns` their number."""
 
     line: Small
     slot: Small
@@ -215,10 +220,11 @@ class _Slots:
         done = np.cumsum(count, dtype=np.int32) - count
         slot = np.arange(len(line), dtype=np.int32)
         slot += np.repeat(begin[:-1][tokens.skeleton] - done, count)
-        column, of = np.empty(len(slot), np.int32), np.array(flat, np.int32)
-        for rows in _bands(len(slot)):
-            column[rows] = of[slot[rows]]
-        return _Slots(line, slot, column, len(known))
+        return _Slots(line, slot, np.array(flat, np.int32), len(known))
+
+    def rows(self, column: int) -> Small:
+        """The numbers of a column."""
+        return np.flatnonzero((self.column == column)[self.slot]).astype(np.int32)
 
     def templates(self, tokens: Tokens, code: Small) -> tuple[list[str], Small]:
         """Templates and (n,) the template of each line; `code` (k,) is the style of each number, -1 for one

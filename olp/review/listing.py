@@ -7,6 +7,7 @@ where the reader of programs ends them.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from difflib import SequenceMatcher
 
 import numpy as np
@@ -24,6 +25,8 @@ Small = npt.NDArray[np.int32]
 _MOST_COMPARED = 500
 #: Most characters of a line; a longer one is cut, as browsers are slow with it.
 LONGEST = 2000
+#: Bytes of a text that are looked at at once.
+_BAND = 1 << 20
 
 #: Characters that act on a terminal, hide text, or change its direction, except tab and line feed.
 _CONTROL = re.compile(
@@ -38,16 +41,21 @@ _LONG = re.compile(rf"[^\n]{{{LONGEST + 1},}}")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Listing:
-    """Texts with the lines of the files, without control characters; (r,) `row_nominal` and `row_corrected`,
-    line numbers counted from 1, 0 where a row has no such line. For each line of the texts, `sample_nominal`
-    and `sample_corrected`, the last sample of its moves, or else that of the line before."""
+    """The nominal text as it was `read`, and the `corrected` one as it is shown; (r,) `row_nominal` and
+    `row_corrected`, line numbers counted from 1, 0 where a row has no such line. For each line of the texts,
+    `sample_nominal` and `sample_corrected`, the last sample of its moves, or else that of the line before."""
 
-    nominal: str
+    read: bytes
     corrected: str
     row_nominal: Small
     row_corrected: Small
     sample_nominal: Small
     sample_corrected: Small
+
+    @property
+    def nominal(self) -> str:
+        """The nominal text as it is shown. It is not kept, as long texts are large."""
+        return shown(self.read)
 
     def row_of(self, line: Index) -> Index:
         """Rows of lines of the nominal program."""
@@ -65,17 +73,29 @@ def shown(data: bytes) -> str:
     pictures, and long lines are cut. Bytes that are not UTF-8 are read as Latin-1."""
     if data.startswith(b"\xef\xbb\xbf"):
         data = data[3:]
-    plain = data.isascii() and len(data.translate(None, _CONTROL_BYTES)) == len(data)
-    try:
-        text = data.decode("utf-8")
-    except UnicodeDecodeError:
-        text = data.decode("latin-1")
-    if not plain:
-        text = pictured(LINE_END_TEXT.sub("\n", text) if "\r" in text else text)
+    # the end of the last line begins no further line
+    if _is_plain(data):
+        text = str(memoryview(data)[: len(data) - data.endswith(b"\n")], "ascii")
+    else:
+        try:
+            text = data.decode("utf-8")
+        except UnicodeDecodeError:
+            text = data.decode("latin-1")
+        text = pictured(LINE_END_TEXT.sub("\n", text) if "\r" in text else text).removesuffix("\n")
     if _longest(data) > LONGEST:
         text = _LONG.sub(lambda m: f"{m[0][:LONGEST]} … ({len(m[0])} characters)", text)
-    # the end of the last line begins no further line
-    return text.removesuffix("\n")
+    return text
+
+
+def _is_plain(data: bytes) -> bool:
+    """Whether a text is ASCII without control characters other than tab and line feed."""
+    bare = (some.translate(None, _CONTROL_BYTES) for some in _bands(data))
+    return data.isascii() and sum(map(len, bare)) == len(data)
+
+
+def _bands(data: bytes) -> Iterator[bytes]:
+    """Some bytes at a time, so that a long text is not there twice."""
+    return (data[a : a + _BAND] for a in range(0, len(data), _BAND))
 
 
 def pictured(text: str) -> str:
@@ -85,8 +105,12 @@ def pictured(text: str) -> str:
 
 def _longest(data: bytes) -> int:
     """Bytes of the longest line: a line has no more characters than bytes."""
-    feeds = np.flatnonzero(np.frombuffer(data, np.uint8) == _LINE_FEED)
-    return int(np.diff(feeds, prepend=-1, append=len(data)).max())
+    longest, begin, last = 0, 0, -1
+    for some in _bands(data):
+        feeds = np.flatnonzero(np.frombuffer(some, np.uint8) == _LINE_FEED) + begin
+        longest = max(longest, int(np.diff(feeds, prepend=last).max(initial=0)))
+        begin, last = begin + len(some), int(feeds[-1]) if len(feeds) else last
+    return max(longest, len(data) - last)
 
 
 def _picture(match: re.Match[str]) -> str:
@@ -96,16 +120,16 @@ def _picture(match: re.Match[str]) -> str:
 
 def aligned(nominal: Program, corrected: Program, groups: Index, samples: Samples) -> Listing:
     """Both texts, their lines paired: by the moves that they make, and between those by their text."""
-    first, second = shown(nominal.data), shown(corrected.data)
     rows = _pairs(nominal, corrected, *_anchors(nominal, corrected, groups))
-    last = _last(nominal.toolpath.line[samples.move], first)
-    return Listing(first, second, *rows, last, _last(corrected.toolpath.line[samples.part], second))
+    last = _last(nominal, nominal.toolpath.line[samples.move])
+    last_corrected = _last(corrected, corrected.toolpath.line[samples.part])
+    return Listing(nominal.data, shown(corrected.data), *rows, last, last_corrected)
 
 
-def _last(line: Small, text: str) -> Small:
+def _last(program: Program, line: Small) -> Small:
     """The last sample of each line of a text, or else that of the line before; `line` is that of each sample,
     from 1."""
-    count = text.count("\n") + 1
+    count = len(program.line_start)
     last = np.full(count, -1, np.int32)
     last[line - 1] = np.arange(len(line))
     known = np.maximum.accumulate(np.where(last >= 0, np.arange(count), 0))

@@ -66,9 +66,9 @@ def manifest_of(scene: Scene) -> tuple[dict[str, Any], Arrays]:
     """The manifest of a scene, and the arrays that it names."""
     arrays = Arrays()
     origin = np.round(scene.position_mm.mean(axis=0))
-    base = arrays.quantised("P", scene.position_mm - origin, POSITION_MM, keep=True)
+    base = arrays.quantised("P", scene.position_mm, POSITION_MM, less=origin, keep=True)
     axes_origin = scene.samples.axis_mm[0]
-    arrays.quantised("Q", scene.samples.axis_mm - axes_origin, POSITION_MM, plus=[base])
+    arrays.quantised("Q", scene.samples.axis_mm, POSITION_MM, less=axes_origin, plus=[base])
     row = scene.listing.row_of(scene.nominal.toolpath.line[scene.samples.move].astype(np.int64))
     arrays.quantised("line", row, 1.0)
     arrays.raw("rapid", rapid(scene), "u1")
@@ -136,11 +136,14 @@ def _layers(scene: Scene, arrays: Arrays, origin: Array) -> list[dict[str, Any]]
     deltas = {
         "nominal": None,
         "uncorrected": arrays.quantised("d_uncorrected", samples.uncorrected, DEVIATION_MM, keep=True),
-        "command": arrays.quantised("d_command", samples.correction, DEVIATION_MM, keep=True),
+        "command": arrays.quantised(
+            "d_command", samples.command_mm, DEVIATION_MM, less=samples.axis_mm, keep=True
+        ),
         "corrected": arrays.quantised(
             "d_corrected", samples.corrected, DEVIATION_MM, plus=["d_uncorrected", "d_command"]
         ),
     }
+    arrays.forget("d_uncorrected")
     layers = [
         _layer(name, label, "P", deltas[name], None, width, dashes) for name, label, width, dashes in LAYERS
     ]

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from olp.core.arrays import Array
 from olp.review.integers import Coded, small
 from olp.review.knots import Curve, knots, lengths, straight
 from olp.review.lines import FIRST_STYLE, NM_PER_MM, Lines, Positions
@@ -38,6 +39,8 @@ _TYPES = {"f4": "<f4", "u4": "<u4", "u1": "u1"}
 _NEAR = 20
 #: Level of zlib: bytes of differences gain little from more.
 _LEVEL = 6
+#: Parts that wait to be deflated at most: more of them would only take memory.
+_WAITING = 8
 
 
 class Arrays:
@@ -52,10 +55,12 @@ class Arrays:
         self._kept: dict[str, tuple[npt.NDArray[Any], float]] = {}
 
     def quantised(
-        self, name: str, values: npt.ArrayLike, step: float, *, plus: Sequence[str] = (), keep: bool = False
-    ) -> str:
-        """Store (n,) or (n, c) finite values in integer steps (a power of ten), minus the values of the
-        arrays `plus`. With `keep` a later array can name it, and it can predict a text. Returns the name.
+        self, name: str, values: npt.ArrayLike, step: float, *, less: Array | None = None,
+        plus: Sequence[str] = (), keep: bool = False,
+    ) -> str:  # fmt: skip
+        """Store (n,) or (n, c) finite values less (c,) or (n, c) others in integer steps (a power of ten),
+        minus the values of the arrays `plus`. With `keep` a later array can name it, and it can predict a
+        text. Returns the name.
 
         Raises CannotCompute for values of 2^48 steps or more.
         """
@@ -64,7 +69,12 @@ class Arrays:
         columns: list[Coded] = []
         kept: list[npt.NDArray[Any]] = []
         for j in range(rows.shape[1]):
-            whole = np.rint(rows[:, j].astype(float) * round(1.0 / step)).astype(np.int64)
+            # a column at a time: no difference of all is made
+            column = rows[:, j].astype(float)
+            if less is not None:
+                column -= less[..., j]
+            column *= round(1.0 / step)
+            whole = np.rint(column, out=column).astype(np.int64)
             if keep:
                 kept.append(small(whole))
             for other in plus:
@@ -93,7 +103,7 @@ class Arrays:
         (n, 3): their differences from what is straight between knots."""
         whole = np.rint(np.asarray(values, float) * round(1.0 / step))
         length = lengths(self._kept[path][0])
-        at = knots(whole, whole, length, _NEAR)
+        at = knots(len(whole), lambda rows: (whole[rows], whole[rows], length[rows]), _NEAR)
         rest = whole - np.floor(straight(whole[at], at, length) + 0.5)
         self.specs[name] = {
             "enc": "along", "n": len(whole), "q": step, "path": path,
@@ -102,6 +112,10 @@ class Arrays:
             "rest": self.quantised(f"{name}_rest", rest, 1.0),
         }  # fmt: skip
         return name
+
+    def forget(self, name: str) -> None:
+        """A kept array that no other will name."""
+        del self._kept[name]
 
     def raw(self, name: str, values: npt.ArrayLike, dtype: str) -> str:
         """Store (n,) or (n, c) values unchanged."""
@@ -155,6 +169,8 @@ class Arrays:
         for part in (*parts, bytes(-size % _ALIGN)):
             if part:
                 self._sum = zlib.adler32(part, self._sum)
+                if len(self._parts) >= _WAITING:
+                    self._parts[-_WAITING].result()
                 self._parts.append(self._threads.submit(_deflated, part))
         self._size += size + -size % _ALIGN
 

@@ -161,13 +161,13 @@ def set_beside(
         return rows
     which = part[rows]
     # the last sample of a part is its end
-    last = result[np.searchsorted(part, np.arange(len(parts.cut)), "right") - 1]
-    first = np.concatenate((last[:1], last[:-1]))
+    end = np.searchsorted(part, np.arange(len(parts.cut)), "right") - 1
+    first, last = result[end[np.maximum(which - 1, 0)]], result[end[which]]
     first = np.where(np.isfinite(first), first, last)
     with np.errstate(invalid="ignore", divide="ignore"):
         even = (share[rows] - parts.begin[which]) / (parts.cut - parts.begin)[which]
     even = np.clip(np.nan_to_num(even), 0.0, 1.0)[:, None]
-    extra = result[rows] - first[which] - even * (last - first)[which]
+    extra = result[rows] - first - even * (last - first)
     ahead = np.einsum("ij,ij->i", extra, ends.directions(move[rows], share[rows]))
     step = np.nan_to_num(ahead) / np.maximum(other.length[which], 1e-9)
     within[rows] = np.clip(within[rows] - step, 0.0, 1.0)

@@ -7,6 +7,7 @@ point, so that a deviation is the distance from the nominal point.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import fields
 
 import numpy as np
 import numpy.typing as npt
@@ -48,7 +49,7 @@ _LESS = 0.005
 _LESS_MM = 1e-5
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(slots=True, eq=False)
 class Samples:
     """The n samples of a path in program order.
 
@@ -74,13 +75,12 @@ class Samples:
     def __len__(self) -> int:
         return len(self.move)
 
-    def take(self, which: Index) -> Samples:
-        """Some of the samples, each once or several times."""
-        return Samples(
-            self.move[which], self.share[which], self.part[which], self.within[which], self.axis_mm[which],
-            self.command_mm[which], self.uncorrected[which], self.corrected[which], self.joined[which],
-            self.arc_mm[which], None if self.play is None else self.play[which],
-        )  # fmt: skip
+    def become(self, which: Index) -> None:
+        """Be some of the samples, each once or several times. One column is copied at a time, the largest
+        first, whose room the others can take: a long program has none for all of them twice."""
+        names = [column.name for column in fields(self) if getattr(self, column.name) is not None]
+        for name in sorted(names, key=lambda name: -int(getattr(self, name).nbytes)):
+            setattr(self, name, getattr(self, name)[which])
 
     @property
     def correction(self) -> Array:
@@ -101,22 +101,26 @@ def sample(
     shift = zero_shifts(path.frames, model) if path.frames else np.zeros((1, 3))
     ends, other = Ends.of(path), Ends.of(written)
     parts = Parts.of(ends, other, groups, shift, model)
-    steps = _steps(path, model, step_mm)
-    move, share, part, within = _merged(steps, parts, start=bool(np.isfinite(path.start_mm).all()))
+    start = bool(np.isfinite(path.start_mm).all())
+    move, share, part, within = _merged(_steps(path, model, step_mm), parts, start=start)
     axis, command = ends.at(move, share), other.at(part, within)
     tip = _Tip(model, path, shift)
     play, play_there = plays(model, axis), plays(model, command)
-    uncorrected = tip.deviation(move, share, axis, axis, play)
+    # deviations in half the memory: that is finer than the page shows
+    joints = SmoothJoints.of(path)
+    result = tip.deviation(move, share, axis, axis, play)
+    uncorrected = _across(joints, move, share, result).astype(np.float32)
     result = tip.deviation(move, share, axis, command, play_there)
     beside = set_beside(ends, other, parts, move, share, part, within, command, result)
     rows = np.union1d(beside, set_in_holes(nominal, corrected, move, axis, command))
     own = None if play_there is None else play_there[rows]
     result[rows] = tip.deviation(move[rows], share[rows], axis[rows], command[rows], own)
-    _put_across(path, move, share, uncorrected, result)
+    corrected_mm = _across(joints, move, share, result).astype(np.float32)
+    del result
     # of several samples at one point the last is used: the moves before it took up backlash
     keep = np.ones(len(move), bool)
     keep[:-1] = (np.diff(move) != 0) | (np.diff(share) > 1e-12)
-    keep &= np.isfinite(uncorrected).all(axis=1) & np.isfinite(result).all(axis=1)
+    keep &= np.isfinite(uncorrected).all(axis=1) & np.isfinite(corrected_mm).all(axis=1)
     if not keep.any():
         raise CannotCompute(
             "no position of the program is known, so there is nothing to show; command X, Y and Z "
@@ -125,25 +129,22 @@ def sample(
     started = np.isfinite(ends.length)[move]
     length = np.nan_to_num(ends.length)
     arc_mm = np.concatenate(([0.0], np.cumsum(length)))[move] + share * length[move]
-    # half the memory, and finer than the page shows
-    deviations = uncorrected.astype(np.float32), result.astype(np.float32)
-    every = Samples(move, share, part, within, axis, command, *deviations, started, arc_mm, play)
-    del uncorrected, result
+    every = Samples(
+        move, share, part, within, axis, command, uncorrected, corrected_mm, started, arc_mm, play
+    )  # fmt: skip
     if not keep.all():
-        every = every.take(np.flatnonzero(keep))
+        every.become(np.flatnonzero(keep))
     every.joined[0] = False
     return every
 
 
-def _put_across(path: Toolpath, move: Index, share: Array, *deviations: Array) -> None:
-    """Leave of deviations at smooth joints of contours what the proof counts."""
-    joints = SmoothJoints.of(path)
-    if joints is None:
-        return
-    ends = np.flatnonzero(share == 1.0)
-    for deviation in deviations:
+def _across(joints: SmoothJoints | None, move: Index, share: Array, deviation: Array) -> Array:
+    """Deviations of which at smooth joints of contours only what the proof counts is left."""
+    if joints is not None:
+        ends = np.flatnonzero(share == 1.0)
         rows, off = joints.across(move[ends], deviation[ends])
         deviation[ends[rows]] = off
+    return deviation
 
 
 def waypoints(samples: Samples, table: Judgements, rows: slice = slice(None)) -> Mask:
@@ -185,8 +186,9 @@ def away_mm(position_mm: Array, share: Array, waypoint: Mask, delta_mm: Array) -
 
 
 def with_starts(samples: Samples, nominal: Program, table: Judgements) -> Samples:
-    """The samples, and the start of each cut that the table of judgements states to be farther off than its
-    samples show, by more than `_LESS` or `_LESS_MM`; of long programs those with the most."""
+    """The same samples, to which the start of each cut is added that the table of judgements states to be
+    farther off than its samples show, by more than `_LESS` or `_LESS_MM`; of long programs those with the
+    most."""
     path = nominal.toolpath
     first = np.flatnonzero(np.diff(samples.move, prepend=-1))
     first = first[1:] if len(first) else first
@@ -214,10 +216,10 @@ def with_starts(samples: Samples, nominal: Program, table: Judgements) -> Sample
     chosen = np.sort(np.argsort(-more, kind="stable")[: min(spare, np.count_nonzero(more))])
     first, move = first[chosen], move[chosen]
     order = np.sort(np.concatenate((np.arange(len(samples)), first - 1)), kind="stable")
-    twice = samples.take(order)
+    samples.become(order)
     begins = np.flatnonzero(np.diff(order, prepend=-1) == 0)
-    twice.move[begins], twice.share[begins], twice.joined[begins] = move, 0.0, True
-    return twice
+    samples.move[begins], samples.share[begins], samples.joined[begins] = move, 0.0, True
+    return samples
 
 
 def _groups(nominal: Program) -> Index:

@@ -46,8 +46,9 @@ class Frame:
     def positions(self, path: Toolpath, move: npt.NDArray[np.int64], axis_mm: Array) -> Array:
         """(n, 3) the tip at axis positions (n, 3), reached in moves (n,)."""
         length = path.per_frame([f.length_mm for f in path.frames])
-        tip = axis_mm - (length if length.ndim == 1 else length[move])
-        return np.asarray(tip - np.array(self.origin_mm), float)
+        tip = np.asarray(axis_mm - (length if length.ndim == 1 else length[move]), float)
+        tip -= self.origin_mm
+        return tip
 
 
 @dataclass(frozen=True, slots=True, eq=False)

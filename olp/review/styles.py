@@ -73,10 +73,12 @@ class Written:
     def _kept(self) -> Byte:
         """(k,) decimals without the zeros at the end."""
         kept = np.full(len(self.value), self.most, np.uint8)
-        rows = np.arange(len(self.value), dtype=np.int32)
-        for k in range(1, self.most + 1):
-            rows = rows[self.value[rows] % 10**k == 0]
-            kept[rows] = self.most - k
+        for a in range(0, len(kept), _BAND):
+            some = self.value[a : a + _BAND]
+            rows = np.arange(len(some))
+            for k in range(1, self.most + 1):
+                rows = rows[some[rows] % 10**k == 0]
+                kept[a + rows] = self.most - k
         return kept
 
     def _usual(self, column: int, kept: Byte, telling: Byte) -> Style:

@@ -7,6 +7,7 @@ form give its characters back, so that a text is its skeleton and its numbers.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -21,8 +22,8 @@ Byte = npt.NDArray[np.uint8]
 MARK = b"\x01"
 #: Most digits of a number; a longer run of digits is text.
 DIGITS = 9
-#: Bytes of a text that are searched at once, so that temporaries are small.
-_BAND = 1 << 21
+#: Characters of a text that are searched at once, so that temporaries fit the cache.
+_BAND = 1 << 17
 
 _MINUS = b"-"[0]
 _POINT = b"."[0]
@@ -43,39 +44,45 @@ class Tokens:
     point: npt.NDArray[np.bool_]
 
     @staticmethod
-    def of(text: bytes) -> Tokens:
+    def of(text: str) -> Tokens:
         """Raises ValueError for a text that contains the mark."""
-        if MARK in text:
+        if MARK.decode() in text:
             raise ValueError("the text contains the mark of numbers")
         known: dict[bytes, int] = {}
-        lines, numbers = [], []
+        lines: list[Small] = []
+        parts: tuple[list[npt.NDArray[Any]], ...] = ([], [], [], [])
         for band in _bands(text):
             found, rest = _numbers(np.frombuffer(band, np.uint8))
-            numbers.append(found)
+            for part, column in zip(parts, found, strict=True):
+                part.append(column)
             names = rest.tobytes().split(b"\n")
             for name in dict.fromkeys(names):
                 known.setdefault(name, len(known))
             lines.append(np.fromiter(map(known.__getitem__, names), np.int32, len(names)))
-        columns = [np.concatenate(column) for column in zip(*numbers, strict=True)]
-        value, whole, decimals, point = columns
-        return Tokens(
-            list(known), np.concatenate(lines), value.astype(np.int32, copy=False), whole, decimals, point
-        )
+        return Tokens(list(known), _joined(lines), *map(_joined, parts))
 
 
-def _bands(text: bytes) -> Iterator[bytes]:
-    """The text in parts of whole lines, without the line feeds between them."""
+def _joined(parts: list[npt.NDArray[Any]]) -> npt.NDArray[Any]:
+    """Parts of a column in one, and no longer alone."""
+    whole = np.concatenate(parts)
+    parts.clear()
+    return whole
+
+
+def _bands(text: str) -> Iterator[bytes]:
+    """The text in parts of whole lines, without the line feeds between them. A long text is not encoded as a
+    whole."""
     begin = 0
     while True:
-        end = text.find(b"\n", begin + _BAND)
+        end = text.find("\n", begin + _BAND)
         if end < 0:
-            yield text[begin:]
+            yield text[begin:].encode()
             return
-        yield text[begin:end]
+        yield text[begin:end].encode()
         begin = end + 1
 
 
-def _numbers(code: Byte) -> tuple[tuple[Small, Byte, Byte, npt.NDArray[np.bool_]], Byte]:
+def _numbers(code: Byte) -> tuple[tuple[npt.NDArray[Any], ...], Byte]:
     """Value, digits before and behind the point, and the point of each number; and the skeleton."""
     is_point = code == _POINT
     body = np.zeros(len(code) + 2, bool)

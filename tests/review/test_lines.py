@@ -137,14 +137,14 @@ def test_too_many_styles_belong_to_the_templates(monkeypatch: pytest.MonkeyPatch
 )  # fmt: skip
 def test_numbers_of_a_line(line: bytes, skeleton: bytes, numbers: list[tuple[int, int, int, bool]]) -> None:
     """Value, digits before and behind the point, and the point, by hand."""
-    tokens = Tokens.of(line)
+    tokens = Tokens.of(line.decode())
     assert tokens.skeletons == [skeleton]
     columns = (tokens.value, tokens.whole, tokens.decimals, tokens.point)
     assert list(zip(*(column.tolist() for column in columns), strict=True)) == numbers
 
 
 def test_bands_are_cut_at_lines(monkeypatch: pytest.MonkeyPatch) -> None:
-    text = texts.text(5, 300).encode()
+    text = texts.text(5, 300)
     whole = Tokens.of(text)
     monkeypatch.setattr("olp.review.tokens._BAND", 100)
     bands = Tokens.of(text)

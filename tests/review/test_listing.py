@@ -190,3 +190,19 @@ def test_lines_that_are_not_changed_stand_beside_themselves(name: str) -> None:
     for line in single:
         number = beside[texts[0].index(line) + 1]
         assert number and texts[1][number - 1] == line
+
+
+@pytest.mark.parametrize(
+    "data", [b"", b"\n", b"G21\nX1\n\n", b"X1\r\nX2\r\n", b"X1\tY2\x07\nM2", "X1 (\u00e4)\n".encode()]
+)
+def test_a_text_is_looked_at_by_bands(data: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = shown(data), shown(data + b"x" * LONGEST + b"y\n" + data)
+    monkeypatch.setattr(listing, "_BAND", 3)
+    assert (shown(data), shown(data + b"x" * LONGEST + b"y\n" + data)) == whole
+    assert whole[0] == "\n".join(lines_of(data)).replace("\x07", "\u2407")
+
+
+def test_the_nominal_text_is_not_kept_twice() -> None:
+    scene = olp.view(PROGRAMS[0], NASTY / "machine.toml", time=False).scene
+    assert scene.listing.read is scene.nominal.data
+    assert scene.listing.nominal == shown(scene.nominal.data)

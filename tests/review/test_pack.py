@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 import zlib
 from itertools import accumulate
 from typing import Any
@@ -13,7 +14,7 @@ from hypothesis import strategies as st
 from judge.unpacker import decoded
 
 from olp.core.errors import CannotCompute
-from olp.review import knots
+from olp.review import knots, pack
 from olp.review.knots import Curve
 from olp.review.pack import DEVIATION_MM, POSITION_MM, TIME_S, Arrays, resolution
 
@@ -184,3 +185,47 @@ def test_resolution_shows_as_many_levels_as_asked(peak: float, levels: int) -> N
     assert 1e-4 <= step <= 1.0
     assert step == pytest.approx(10.0 ** round(np.log10(step)))
     assert step == 1e-4 or peak / step >= levels * (1 - 1e-12)
+
+
+def test_a_curve_is_looked_at_by_bands(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Columns of doubles are made for a band only, and knots do not depend on where bands end."""
+    values = np.random.default_rng(2).normal(size=5000).cumsum()
+    along = np.arange(len(values), dtype=float)
+    asked = []
+
+    def columns(rows: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        asked.append(len(values[rows]))
+        return values[rows], values[rows], along[rows]
+
+    whole = knots.knots(len(values), columns, 1.0)
+    monkeypatch.setattr(knots, "_BAND", 512)
+    del asked[:]
+    assert knots.knots(len(values), columns, 1.0).tolist() == whole.tolist()
+    assert max(asked) == 513 and len(asked) == 10
+
+
+def test_values_less_others_are_their_difference() -> None:
+    rng = np.random.default_rng(3)
+    values, others = rng.normal(0.0, 1e3, (2, 200, 3))
+    for less in (others, others[0]):
+        arrays, plain = Arrays(), Arrays()
+        arrays.quantised("P", values, POSITION_MM, less=less)
+        plain.quantised("P", values - less, POSITION_MM)
+        assert arrays.deflated() == plain.deflated()
+
+
+def test_few_parts_wait_to_be_deflated(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the packing is ahead of the threads that deflate, it waits: parts of long programs are large."""
+    deflated = pack._deflated
+
+    def slowly(data: bytes) -> bytes:
+        time.sleep(0.002)
+        return deflated(data)
+
+    monkeypatch.setattr(pack, "_deflated", slowly)
+    arrays, waiting = Arrays(), []
+    for k in range(60):
+        arrays.raw(f"r{k}", np.arange(8), "u1")
+        waiting.append(sum(not part.done() for part in arrays._parts))
+    assert max(waiting) <= pack._WAITING
+    assert all((unpacked(arrays, f"r{k}") == np.arange(8)).all() for k in range(60))

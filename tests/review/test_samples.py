@@ -3,8 +3,10 @@ hand."""
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import shutil
+import tracemalloc
 from functools import cache
 from pathlib import Path
 
@@ -274,3 +276,25 @@ def test_beyond_the_end_of_a_short_move_it_is_off_from_there() -> None:
     away = away_mm(position, share, share == 1.0, delta)
     assert away.tolist() == pytest.approx([4.0, math.hypot(2, 4), 5.0])
     assert away_mm(position, share, share == 1.0, -delta)[1] == pytest.approx(math.hypot(2, 4))
+
+
+def test_samples_become_others_one_column_at_a_time() -> None:
+    """A long program has no room for all columns twice: each is freed before the next is copied."""
+    samples = nasty(PROGRAMS[0]).scene.samples
+    names = [field.name for field in dataclasses.fields(samples)]
+    present = {name: getattr(samples, name) for name in names if getattr(samples, name) is not None}
+    count = 20_000
+    tracemalloc.start()
+    try:
+        copies = {name: np.resize(values, (count, *values.shape[1:])) for name, values in present.items()}
+        whole = sum(values.nbytes for values in copies.values())
+        expected = {name: values[::-1][:1000].copy() for name, values in copies.items()}
+        many = dataclasses.replace(samples, **copies)
+        del copies
+        tracemalloc.reset_peak()
+        many.become(np.arange(count)[::-1])
+        assert tracemalloc.get_traced_memory()[1] < 1.6 * whole
+    finally:
+        tracemalloc.stop()
+    for name, values in expected.items():
+        np.testing.assert_array_equal(getattr(many, name)[:1000], values)
