@@ -186,9 +186,8 @@ def away_mm(position_mm: Array, share: Array, waypoint: Mask, delta_mm: Array) -
 
 
 def with_starts(samples: Samples, nominal: Program, table: Judgements) -> Samples:
-    """The same samples, to which the start of each cut is added that the table of judgements states to be
-    farther off than its samples show, by more than `_LESS` or `_LESS_MM`; of long programs those with the
-    most."""
+    """The same samples with more of them: the starts of cuts that the table of judgements states to be
+    farther off than their samples show, by more than `_LESS` or `_LESS_MM`; of long programs the worst."""
     path = nominal.toolpath
     first = np.flatnonzero(np.diff(samples.move, prepend=-1))
     first = first[1:] if len(first) else first

@@ -9,6 +9,7 @@ from seeds.
 from __future__ import annotations
 
 import argparse
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -34,6 +35,18 @@ def with_sigmas(described: Path, folder: Path) -> Path:
     (folder / "calibration.toml").write_text(calibration + sigmas)
     target = folder / "machine.toml"
     target.write_text(described.read_text())
+    return target
+
+
+def without_limits(described: Path, folder: Path) -> Path:
+    """The same machine without limits of motion, so that its pages have no motion."""
+    shutil.copytree(
+        described.parent, folder, ignore=shutil.ignore_patterns("*.ngc", "*.html", "unsure", "bytecode")
+    )
+    target = folder / "machine.toml"
+    limits = ("velocity_mm_s", "acceleration_mm_s2", "jerk_mm_s3")
+    lines = described.read_text().splitlines()
+    target.write_text("\n".join(line for line in lines if not line.startswith(limits)) + "\n")
     return target
 
 
@@ -80,6 +93,8 @@ def main() -> None:
         plain = measured(f"{options.lines} lines", [*correct, described])
         measured("  with an HTML report", [*correct, described, "--report", folder / "r.html"], plain)
         measured("  with --review", [*correct, described, "--review", folder / "v.html"], plain)
+        still = without_limits(described, folder / "still")
+        measured("  with --review, no motion", [*correct, still, "--review", folder / "v.html"], plain)
         measured("  with sigma columns", [*correct, unsure], plain)
         measured("  and a part tolerance", [*correct, unsure, "--part-tolerance-um", "10"], plain)
         table, dmis = touches(folder, int(float(options.points)))
