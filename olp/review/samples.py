@@ -186,8 +186,9 @@ def away_mm(position_mm: Array, share: Array, waypoint: Mask, delta_mm: Array) -
 
 
 def with_starts(samples: Samples, nominal: Program, table: Judgements) -> Samples:
-    """The same samples with more of them: the starts of cuts that the table of judgements states to be
-    farther off than their samples show, by more than `_LESS` or `_LESS_MM`; of long programs the worst."""
+    """The samples, and the start of each cut that the table of judgements states to be farther off than they
+    show, by more than `_LESS` or `_LESS_MM`. They are added to the same samples; of long programs the worst.
+    """
     path = nominal.toolpath
     first = np.flatnonzero(np.diff(samples.move, prepend=-1))
     first = first[1:] if len(first) else first
