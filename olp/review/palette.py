@@ -37,7 +37,7 @@ _ROUND = (1.0, 2.0, 2.5, 5.0, 10.0)
 _ROUNDING = 1e-9
 #: Smallest step above the tolerance, as a share of it.
 _LEAST_STEP = 0.25
-#: A ratio that is not smaller: bands of nothing.
+#: A smaller ratio is nothing, whose bands go to 1.
 _LEAST = 1e-6
 
 
@@ -47,7 +47,9 @@ def bands(largest: float, tolerance: float | None) -> list[float]:
     With a tolerance they are round shares or multiples of it. It is one of them unless all are below it.
     """
     unit = 1.0 if tolerance is None else tolerance
-    ratio = max(largest / unit, _LEAST)
+    ratio = largest / unit
+    if ratio < _LEAST:
+        ratio = 1.0
     if tolerance is None or ratio <= 1.0 + _ROUNDING:
         return [unit * edge for edge in (0.0, *_multiples(0.0, ratio, _step(ratio / MOST)))]
     within = (0.0, 1.0) if ratio > 2.0 * MOST else (0.0, 0.5, 1.0)

@@ -151,6 +151,86 @@ def test_every_panel_is_reached_on_a_small_screen(chromium: Any, file: Path, siz
         assert page.evaluate("document.body.scrollWidth") == size[0]
 
 
+def test_a_phone_has_the_readout_below_the_picture(chromium: Any, file: Path) -> None:
+    with browser.opened(chromium, file, size=(390, 844)) as page:
+        assert page.is_hidden("#readout")
+        before = page.locator("#pane").bounding_box()
+        page.evaluate("olp.set_time(olp.app.end / 2)")
+        readout, pane, legend = (page.locator(box).bounding_box() for box in ("#readout", "#pane", "#legend"))
+        assert pane == before
+        assert readout["y"] >= pane["y"] + pane["height"] - 0.5
+        assert legend["y"] >= readout["y"] + readout["height"] - 0.5
+        assert page.evaluate("document.body.scrollWidth") == 390
+        overlay = page.locator("#overlay").bounding_box()
+        assert (overlay["width"], overlay["height"]) == (pane["width"], pane["height"])
+
+
+CHOICES = """k => {
+  const {host, over} = olp.app.plots.charts[k], bottom = e => e.getBoundingClientRect().bottom;
+  return [bottom(host.querySelector(".choices")) - host.getBoundingClientRect().top, over];
+}"""
+
+
+@pytest.mark.parametrize("size", [(390, 844), (1024, 640), (1440, 900)])
+def test_numbers_of_a_chart_are_apart_and_nothing_covers_it(
+    chromium: Any, file: Path, size: tuple[int, int]
+) -> None:
+    with browser.opened(chromium, file, size=size) as page:
+        for strip in ("frame", "pictures"):
+            page.select_option("#strip", strip)
+            for chart in range(2):
+                written = np.sort(page.evaluate("k => olp.app.plots.charts[k].written", chart))
+                assert len(written) >= 2 and np.diff(written).min() >= 11.0
+                choices, top = page.evaluate(CHOICES, chart)
+                assert choices <= top + 0.5
+
+
+def test_a_scale_has_two_numbers_or_more(page: Any) -> None:
+    ends = [(low, low + span) for low in (-1.0, -0.38, 0.0, 2.7) for span in (1e-3, 0.74, 1.0, 1.9, 9.9, 4e4)]
+    for low, high in ends:
+        for count in (1, 2, 3, 7):
+            shown = page.evaluate("a => OLP.colour.ticks(...a)", [low, high, count])
+            assert len(shown) >= 2, (low, high, count)
+            step = shown[1] - shown[0]
+            assert np.diff(shown) == pytest.approx(step)
+            assert low - 1e-6 * step <= shown[0] < low + step
+            assert high - step < shown[-1] <= high + 1e-6 * step
+            assert f"{step:.0e}"[0] in "125"
+
+
+def test_a_text_that_has_no_room_is_cut_and_not_squeezed(page: Any) -> None:
+    for text in ("measured: a very long name of a run.csv", "short"):
+        shown, wide = page.evaluate(
+            "text => { const c = olp.app.legend.canvas.getContext('2d'); const s = OLP.fitted(c, text, 90);"
+            " return [s, c.measureText(s).width]; }",
+            text,
+        )
+        assert wide <= 90
+        assert shown == text or (shown.endswith("…") and text.startswith(shown[:-1]) and len(shown) > 5)
+
+
+def test_no_label_hides_the_tool(page: Any) -> None:
+    boxes = page.evaluate(
+        """() => {
+          const {overlay, samples} = olp.app, out = [];
+          for (let k = 0; k < 60; k++) {
+            olp.app.set_sample(Math.floor((k * samples) / 60));
+            overlay.show();
+            out.push([overlay.taken.at(-1), overlay.at(olp.app.tool_point())]);
+          }
+          return out;
+        }"""
+    )
+    for (left, top, right, bottom), (x, y) in boxes:
+        assert right - left > 100, "the label of the flag"
+        assert x + 9 < left or x - 9 > right or y + 9 < top or y - 9 > bottom
+
+
+def test_the_page_opens_at_the_first_point(page: Any) -> None:
+    assert page.evaluate("[olp.state.sample_at, olp.state.row]") == [0, page.evaluate("olp.app.rows[0]")]
+    assert page.is_hidden("#readout")
+
+
 @pytest.mark.parametrize("width", [1200, 1440, 1920])
 def test_the_listing_shows_whole_words(chromium: Any, file: Path, width: int) -> None:
     with browser.opened(chromium, file, size=(width, 900)) as page:

@@ -116,6 +116,8 @@ def test_bands_and_colours_are_those_of_the_palette(page: Any) -> None:
         expected = bands(largest, tolerance)
         assert edges == pytest.approx(expected, rel=1e-12)
         assert shades == colours(expected, tolerance, "dark")
+    # of nothing the bands go to what is allowed, and not to a millionth of it
+    assert bands(0.0, 1.87)[-1] == pytest.approx(1.87)
 
 
 def test_each_picture_has_bands_in_units_of_what_it_is_judged_by(page: Any, review: Review) -> None:

@@ -171,6 +171,20 @@ def test_filters_keep_what_they_name(tree: Any, drilled: Review) -> None:
     assert mask(tree).any()
 
 
+def test_a_filter_by_lines_names_the_lines_that_it_keeps(tree: Any) -> None:
+    tree.evaluate("document.getElementById('filter').open = true")
+    tree.fill("#filter-first", "abc")
+    tree.press("#filter-first", "Enter")
+    assert "No line abc" in tree.inner_text("#toast")
+    tree.fill("#filter-last", "30")
+    tree.press("#filter-last", "Enter")
+    assert tree.input_value("#filter-first") == ""
+    assert "lines first to 30" in tree.inner_text("#selection")
+    tree.fill("#filter-first", "31")
+    tree.press("#filter-first", "Enter")
+    assert "after the last" in tree.inner_text("#toast")
+
+
 def test_the_largest_of_a_selection_is_that_of_its_lines(tree: Any, drilled: Review) -> None:
     table = drilled.scene.table.by_line()
     by_line = dict(zip(table["line"].tolist(), table["corrected_um"].tolist(), strict=True))
@@ -267,6 +281,8 @@ def test_a_print_is_a_report_of_a4_pages(page: Any, review: Review, tmp_path: Pa
     text = page.inner_text("#print")
     verdict = review.scene.report["verdict"]
     assert page.is_hidden("#app")
+    # also behind the first sheet
+    assert page.evaluate("getComputedStyle(document.documentElement).backgroundColor") == "rgb(255, 255, 255)"
     assert {True: "PASS", False: "FAIL", None: "NOT JUDGED"}[verdict["ok"]] in text
     assert verdict["questions"][0]["question"] in text
     assert um(verdict["numerical"]["largest_um"]) in text
@@ -290,6 +306,8 @@ def test_a_print_is_a_report_of_a4_pages(page: Any, review: Review, tmp_path: Pa
 def test_a_job_that_fails_says_so_everywhere(chromium: Any, tmp_path: Path) -> None:
     review = view(PROGRAM, GANTRY, part_tolerance_um=0.05, time=False)
     assert review.scene.report["verdict"]["ok"] is False
+    asked = review.scene.report["verdict"]["questions"]
+    assert asked[0]["ok"] is True
     review.write(tmp_path / "failed.html")
     with browser.opened(chromium, tmp_path / "failed.html") as page:
         assert page.inner_text("#verdict") == "FAIL"
@@ -297,6 +315,10 @@ def test_a_job_that_fails_says_so_everywhere(chromium: Any, tmp_path: Path) -> N
         assert "ABOVE the part tolerance of 0.05 µm" in page.inner_text("#card")
         page.evaluate("olp.app.report()")
         assert "FAIL" in page.evaluate("document.getElementById('print').textContent")
+        # on paper, too, what fails is read first
+        questions = page.locator("#print > p > b").all_text_contents()[:2]
+        assert questions == page.locator("#card dt").all_text_contents()
+        assert questions[0] == next(q["question"] for q in asked if q["ok"] is False)
 
 
 def test_a_line_above_is_flagged_in_tree_listing_and_picture(chromium: Any, tmp_path: Path) -> None:
@@ -320,4 +342,14 @@ def test_a_line_above_is_flagged_in_tree_listing_and_picture(chromium: Any, tmp_
         open_all(page)
         marks = {row["mark"] for row in rows(page)}
         assert "above" in marks
-        assert page.evaluate("olp.app.overlay.marks.get('corrected').length") == len(over)
+        samples = page.evaluate("olp.app.overlay.marks.get('corrected')")
+        lines = review.scene.nominal.toolpath.line[review.scene.samples.move[samples]]
+        assert {int(line) for line in lines} == over
+        # each stands where its line is farthest off
+        for sample in samples:
+            here, stated = page.evaluate(
+                "i => [olp.app.metrics.values(olp.app.distance, 'corrected')[i],"
+                " olp.app.stated_um('corrected', olp.app.rows[i])]",
+                sample,
+            )
+            assert here == pytest.approx(stated, abs=0.1, rel=0.01)

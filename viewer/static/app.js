@@ -302,7 +302,7 @@
       this.state.worst =
         this.state.worst < 0 ? (step > 0 ? 0 : list.length - 1) : (this.state.worst + step + list.length) % list.length;
       const {row, value} = list[this.state.worst],
-        sample = this.place_of(row, name, value);
+        [sample] = this.places_of([row], name);
       this.set_sample(sample);
       this.select_row(row, true);
       this.camera.reveal(this.tool_point());
@@ -323,17 +323,23 @@
       return rows.sort((p, q) => q.value - p.value || p.row - q.row).slice(0, RANKED);
     }
 
-    // The sample of a row where the layer is off by what the table states, as nearly as it is shown.
-    place_of(row, name, value) {
+    // The sample of each row where the layer is off by what the table states, as nearly as it is shown.
+    places_of(rows, name) {
       const values = this.metrics.values(this.distance, name),
-        layer = this.layers.get(name);
-      let sample = this.first[row],
-        least = Infinity;
+        {index} = this.layers.get(name),
+        sample = new Map(rows.map(row => [row, this.first[row]])),
+        least = new Map();
       for (let i = 0; i < values.length; i++) {
-        const at = layer.index ? layer.index[i] : i;
-        if (this.rows[at] === row && Math.abs(values[i] - value) < least) [sample, least] = [at, Math.abs(values[i] - value)];
+        const at = index ? index[i] : i,
+          row = this.rows[at];
+        if (!sample.has(row)) continue;
+        const off = Math.abs(values[i] - this.stated_um(name, row));
+        if (off < (least.get(row) ?? Infinity)) {
+          sample.set(row, at);
+          least.set(row, off);
+        }
       }
-      return sample;
+      return [...sample.values()];
     }
   }
 

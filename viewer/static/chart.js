@@ -2,7 +2,7 @@
 // Line charts on a canvas, in lanes one above the other: any number of points as one minimum and maximum per pixel column,
 // so no peak is lost. Series tell themselves apart by their dashes.
 (() => {
-  const EDGE = {left: 54, right: 12, top: 22, bottom: 20},
+  const EDGE = {left: 54, right: 12, top: 22, bottom: 20}, // px; the top is at least what the choices take
     GAP = 6; // px between lanes
 
   // Index of the first x that is not below `value`, in an ascending array.
@@ -29,7 +29,7 @@
       this.base.setAttribute("aria-keyshortcuts", "+ - Home ArrowLeft ArrowRight Shift+ArrowLeft Shift+ArrowRight Escape");
       this.top.setAttribute("aria-hidden", "true");
       host.prepend(this.base, this.top);
-      Object.assign(this, {lanes: [], range: null, extent: [0, 1], marks: {now: null, hover: null}, bands: []});
+      Object.assign(this, {lanes: [], over: EDGE.top, range: null, extent: [0, 1], marks: {now: null, hover: null}, bands: []});
       new ResizeObserver(() => this.draw()).observe(host);
       OLP.zoom(this, events);
     }
@@ -60,7 +60,7 @@
       return Math.max(1, this.host.clientWidth - EDGE.left - EDGE.right);
     }
     get high() {
-      return Math.max(1, this.host.clientHeight - EDGE.top - EDGE.bottom);
+      return Math.max(1, this.host.clientHeight - this.over - EDGE.bottom);
     }
     px(x) {
       return EDGE.left + ((x - this.window[0]) / (this.window[1] - this.window[0])) * this.wide;
@@ -120,10 +120,11 @@
 
     draw() {
       if (!this.host.clientWidth || !this.host.clientHeight || !this.lanes.length) return;
+      this.over = Math.max(EDGE.top, (this.host.querySelector(".choices")?.offsetHeight ?? 0) + 2);
       const c = this.prepare(this.base),
         each = (this.high - GAP * (this.lanes.length - 1)) / this.lanes.length;
       this.lanes.forEach((lane, k) => {
-        lane.at = EDGE.top + k * (each + GAP);
+        lane.at = this.over + k * (each + GAP);
         lane.high = Math.max(1, each);
         lane.drawn = lane.series.map(s => this.columns(s));
         this.fit(lane);
@@ -134,6 +135,7 @@
         for (const lane of this.lanes) Object.assign(lane, {low, up});
       }
       this.abscissa(c);
+      this.written = [];
       for (const lane of this.lanes) this.lane(c, lane);
       this.heading(c);
       this.base.setAttribute("aria-label", this.text());
@@ -169,7 +171,7 @@
 
     abscissa(c) {
       const {ticks, number} = OLP.colour,
-        bottom = EDGE.top + this.high;
+        bottom = this.over + this.high;
       Object.assign(c, {strokeStyle: this.look.rule, fillStyle: this.look.soft, lineWidth: 1, textBaseline: "top"});
       const right = EDGE.left + this.wide - c.measureText(this.x_label).width - 14;
       c.textAlign = "center";
@@ -187,20 +189,23 @@
       for (const [a, b] of this.bands) {
         if (b < this.window[0] || a > this.window[1]) continue;
         const [from, to] = [a, b].map(x => Math.min(EDGE.left + this.wide, Math.max(EDGE.left, this.px(x))));
-        c.fillRect(from, EDGE.top, Math.max(1.5, to - from), this.high);
+        c.fillRect(from, this.over, Math.max(1.5, to - from), this.high);
       }
     }
 
     lane(c, lane) {
       const {ticks, number} = OLP.colour;
       Object.assign(c, {strokeStyle: this.look.rule, fillStyle: this.look.soft, lineWidth: 1, textAlign: "right", textBaseline: "middle"});
-      for (const y of ticks(lane.low, lane.up, Math.max(3, lane.high / 26))) {
+      // of numbers that would overlap, also with those of the lane above, the largest is written
+      for (const y of ticks(lane.low, lane.up, Math.max(3, lane.high / 26)).sort((p, q) => Math.abs(q) - Math.abs(p))) {
         const at = Math.round(this.py(lane, y)) + 0.5;
         c.beginPath();
         c.moveTo(EDGE.left, at);
         c.lineTo(EDGE.left + this.wide, at);
         c.stroke();
+        if (this.written.some(other => Math.abs(other - at) < 11)) continue;
         c.fillText(number(y), EDGE.left - 6, at);
+        this.written.push(at);
       }
       c.save();
       c.beginPath();
@@ -254,14 +259,14 @@
       const choices = this.host.querySelector(".choices"),
         room = this.host.clientWidth - (choices?.offsetWidth ?? 0) - 16,
         [first] = this.lanes,
-        bold = c.font;
-      Object.assign(c, {textAlign: "left", textBaseline: "middle", fillStyle: this.look.ink});
-      c.font = "600 " + bold;
+        plain = c.font;
+      Object.assign(c, {textAlign: "left", textBaseline: "middle", fillStyle: this.look.ink, font: "600 " + plain});
       const name = this.lanes.length > 1 ? this.title : first.title,
-        title = first.unit ? `${name}, ${first.unit}` : name;
-      c.fillText(title, 10, 11, room - 10);
+        titles = [name, name.split(",")[0]].map(text => (first.unit ? `${text}, ${first.unit}` : text)),
+        title = OLP.fitted(c, titles.find(text => c.measureText(text).width <= room - 10) ?? titles[1], room - 10);
+      c.fillText(title, 10, 11);
       let x = Math.ceil(10 + c.measureText(title).width) + 14;
-      c.font = bold;
+      c.font = plain;
       if (first.series.length < 2) return;
       for (const {label, dashes} of first.series) {
         const wide = c.measureText(label).width;
@@ -289,17 +294,15 @@
       if (!this.host.clientWidth || !this.lanes.length || this.lanes[0].up === undefined) return;
       const c = this.prepare(this.top),
         {now, hover} = this.marks;
-      for (const [x, colour, dash] of [
-        [now, this.look.ink, []],
-        [hover, this.look.soft, [3, 3]],
-      ]) {
+      const kinds = [[now, this.look.ink, []], [hover, this.look.soft, [3, 3]]];
+      for (const [x, colour, dash] of kinds) {
         if (x === null || x < this.window[0] || x > this.window[1]) continue;
         const at = Math.round(this.px(x)) + 0.5;
         c.strokeStyle = colour;
         c.setLineDash(dash);
         c.beginPath();
-        c.moveTo(at, EDGE.top);
-        c.lineTo(at, EDGE.top + this.high);
+        c.moveTo(at, this.over);
+        c.lineTo(at, this.over + this.high);
         c.stroke();
       }
       c.setLineDash([]);
@@ -328,12 +331,12 @@
       const left = at + 10 + wide > this.host.clientWidth ? at - wide - 10 : at + 10;
       Object.assign(c, {fillStyle: this.look.panel, strokeStyle: this.look.rule, textBaseline: "middle"});
       c.beginPath();
-      c.roundRect(left, EDGE.top + 2, wide, high, 4);
+      c.roundRect(left, this.over + 2, wide, high, 4);
       c.fill();
       c.stroke();
       c.fillStyle = this.look.ink;
       rows.forEach(([label, value], i) => {
-        const y = EDGE.top + 14 + 15 * i;
+        const y = this.over + 14 + 15 * i;
         c.textAlign = "left";
         c.fillText(label, left + 7, y);
         c.textAlign = "right";

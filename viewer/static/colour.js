@@ -5,7 +5,7 @@
     ROUND = [1, 2, 2.5, 5, 10],
     LEAST_STEP = 0.25,
     ROUNDING = 1e-9,
-    LEAST = 1e-6;
+    LEAST = 1e-6; // a smaller ratio is nothing
 
   function step_of(least) {
     const unit = 10 ** Math.floor(Math.log10(least));
@@ -22,7 +22,7 @@
   // Ascending edges from 0 to the first round number at or above `largest`; with a tolerance its round shares or multiples.
   function bands(largest, tolerance) {
     const unit = tolerance ?? 1,
-      ratio = Math.max(largest / unit, LEAST);
+      ratio = largest / unit < LEAST ? 1 : largest / unit;
     if (tolerance === null || ratio <= 1 + ROUNDING)
       return [0, ...multiples(0, ratio, step_of(ratio / MOST))].map(v => v * unit);
     const within = ratio > 2 * MOST ? [0, 1] : [0, 0.5, 1];
@@ -64,15 +64,18 @@
     return +([1, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10].find(m => m * unit >= x * (1 - 1e-9)) * unit).toPrecision(6);
   }
 
-  // Round steps that divide [lo, hi] into about `count` parts.
+  // Multiples of a round step that divide [lo, hi] into about `count` parts: two or more, as one is no scale.
   function ticks(lo, hi, count) {
     const span = hi - lo;
     if (!(span > 0) || !Number.isFinite(span)) return [lo];
     const raw = span / Math.max(1, count),
       unit = 10 ** Math.floor(Math.log10(raw));
-    const step = [1, 2, 5, 10].find(m => m * unit >= raw * (1 - 1e-9)) * unit,
+    const first = step => Math.ceil(lo / step - 1e-9),
+      last = step => Math.floor(hi / step + 1e-9),
+      widest = [1, 2, 5, 10].findIndex(m => m * unit >= raw * (1 - 1e-9)),
+      step = [10, 5, 2, 1, 0.5, 0.2, 0.1].slice(3 - widest).find(m => last(m * unit) > first(m * unit)) * unit,
       out = [];
-    for (let k = Math.ceil(lo / step - 1e-9); k * step <= hi + 1e-9 * span; k++) out.push(k * step);
+    for (let k = first(step); k <= last(step); k++) out.push(k * step);
     return out;
   }
 
@@ -115,7 +118,16 @@
     return plain === "" ? NaN : Number(plain);
   };
 
+  // A text of a canvas that is no wider than `width`: whole, or with a mark where its end is left out.
+  function fitted(c, text, width) {
+    if (c.measureText(text).width <= width) return text;
+    const letters = [...text];
+    while (letters.length && c.measureText(`${letters.join("")}…`).width > width) letters.pop();
+    return letters.length ? `${letters.join("")}…` : "";
+  }
+
   Object.assign(OLP, {
+    fitted,
     colour: {bands, signed_bands, shades, band_of, round_up, ticks, number, um, unit_label, parse},
   });
 })();

@@ -37,12 +37,15 @@
           let row = listing.row_of_line(listing.names ? text : +text);
           if (row < 0) {
             this.app.toast(`No line ${text}`, 2500);
+            $(id).value = ""; // the summary names the lines that are kept
             return null;
           }
           if (last && listing.names) while (row + 1 < listing.n && String(listing.number(row + 1, 0)) === text) row++;
           return row;
         };
-      this.lines = [end("filter-first", false), end("filter-last", true)];
+      const [first, last] = [end("filter-first", false), end("filter-last", true)];
+      if (first !== null && last !== null && first > last) this.app.toast("The first line is after the last", 2500);
+      this.lines = [first, last];
       this.apply();
     }
 

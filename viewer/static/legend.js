@@ -66,10 +66,14 @@
       return `${this.title()}: ${scale.shades.length} bands from ${ends}${this.unit_text()}; enlarged ${this.factor()} times`;
     }
 
-    title() {
+    // The picture, and what its colours show.
+    heading() {
       const {pictures, metric} = this.app,
         unit = OLP.colour.unit_label(metric?.unit);
-      return pictures.current && metric ? `${pictures.current.label}: ${metric.label}${unit ? ", " + unit : ""}` : "nominal path";
+      return pictures.current && metric ? [pictures.current.label, `: ${metric.label}${unit ? ", " + unit : ""}`] : ["nominal path", ""];
+    }
+    title() {
+      return this.heading().join("");
     }
 
     // What one unit of the upper numbers is.
@@ -107,17 +111,19 @@
         {metric, pictures} = app,
         scale = pictures.current?.scale;
       Object.assign(c, {fillStyle: look.ink, textBaseline: "middle", textAlign: "left"});
-      c.font = `600 11.5px ${look.font}`;
-      c.fillText(this.title(), x, y + 7, wide);
-      const titled = Math.min(wide, c.measureText(this.title()).width);
-      c.font = `11px ${look.font}`;
-      c.fillStyle = look.soft;
-      if (!metric) return;
-      if (!scale) {
-        c.fillText("not known for this picture", x + titled + 12, y + 7);
-        return;
-      }
-      c.fillText(this.unit_text().replace(/^; /, ""), x + titled + 12, y + 7, Math.max(1, wide - titled - 12));
+      const bold = `600 11.5px ${look.font}`,
+        plain = `11px ${look.font}`,
+        said = !metric ? "" : scale ? this.unit_text().replace(/^; /, "") : "not known for this picture";
+      c.font = plain;
+      const taken = said ? c.measureText(said).width + 12 : 0;
+      c.font = bold;
+      const [picture, shown] = this.heading(),
+        title = OLP.fitted(c, picture, wide - taken - c.measureText(shown).width) + shown,
+        titled = c.measureText(title).width;
+      c.fillText(title, x, y + 7);
+      Object.assign(c, {font: plain, fillStyle: look.soft});
+      c.fillText(said, x + titled + 12, y + 7);
+      if (!scale) return;
       const {edges, shades, tolerance} = scale,
         each = Math.min(96, (wide - 56) / shades.length),
         top = y + 15 + SHARES;

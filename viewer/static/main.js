@@ -166,7 +166,7 @@
     app.set_metric(app.state.metric);
     app.set_view("iso");
     app.pictures.show(app.pictures.at);
-    app.set_time(app.time[0]);
+    app.set_sample(0);
     app.plots.draw();
     app.notes.restore();
     expose(app);

@@ -89,6 +89,7 @@
           Object.assign(c, {lineWidth: width, strokeStyle: stroke});
           c.stroke();
         }
+      if (tool) this.taken.push([tool[0] - 10, tool[1] - 10, tool[0] + 10, tool[1] + 10]); // no label hides it
       if (this.hover) {
         const layer = app.layers.get(this.hover.layer),
           p = this.at(layer.at(this.hover.at, pictures.k_of(layer)));
@@ -105,19 +106,17 @@
       c.stroke();
     }
 
-    // Lines that the table of judgements says are above, as small flags without words.
+    // Lines that the table of judgements says are above, as small flags without words where they are farthest off.
     lines_above() {
       const {app, context: c} = this,
         layer = app.pictures.layer,
         own = app.manifest.listing.by_layer?.[layer.name];
       if (!own) return;
-      const state = app.arrays.get(own.state);
       this.marks ??= new Map();
       if (!this.marks.has(layer.name)) {
         const rows = [];
-        for (let row = 0; row < state.length && rows.length <= MOST_MARKS; row++)
-          if (state[row] === 1 && app.first[row] >= 0) rows.push(app.first[row]);
-        this.marks.set(layer.name, rows.length > MOST_MARKS ? [] : rows);
+        app.arrays.get(own.state).forEach((code, row) => code === 1 && app.first[row] >= 0 && rows.push(row));
+        this.marks.set(layer.name, rows.length > MOST_MARKS ? [] : app.places_of(rows, layer.name));
       }
       for (const sample of this.marks.get(layer.name)) {
         const p = this.at(app.point_of(sample, layer.name));
@@ -214,9 +213,8 @@
 
     notes() {
       const {app} = this,
-        ends = app.state.notes.map(note => this.at(app.point_of(note.sample, note.layer))),
-        tool = this.at(app.tool_point());
-      for (const p of [...ends, tool]) if (p) this.taken.push([p[0] - 10, p[1] - 10, p[0] + 10, p[1] + 10]);
+        ends = app.state.notes.map(note => this.at(app.point_of(note.sample, note.layer)));
+      for (const p of ends) if (p) this.taken.push([p[0] - 10, p[1] - 10, p[0] + 10, p[1] + 10]);
       app.state.notes.forEach((note, i) => {
         const p = ends[i];
         if (!p) return;
@@ -245,5 +243,5 @@
     }
   }
 
-  OLP.Overlay = Overlay;
+  Object.assign(OLP, {Overlay, MOST_MARKS});
 })();

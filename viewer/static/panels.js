@@ -22,6 +22,9 @@
   // Sentences of the proof are in ASCII, for terminals.
   const micrometres = text => text.replace(/\bum\b/g, "µm");
 
+  // The questions of a verdict: what fails is read first.
+  OLP.questions = verdict => (verdict?.questions ?? []).toSorted((p, q) => (q.ok === false) - (p.ok === false));
+
   // What is to be said of pictures beside their figures.
   OLP.notes_of = app =>
     app.pictures.list.filter(p => p.note).map(p => make("p", {className: "empty note-of", textContent: `${p.label}: ${micrometres(p.note)}`}));
@@ -57,9 +60,7 @@
         box.className = name;
         box.textContent = word;
       }
-      // what fails is read first
-      const asked = (verdict?.questions ?? []).toSorted((p, q) => (q.ok === false) - (p.ok === false));
-      const questions = asked.map(q => {
+      const questions = OLP.questions(verdict).map(q => {
         const [name, word] = ANSWER.get(q.ok);
         return make(
           "dl",
@@ -106,7 +107,7 @@
             make("td", {}, make("b", {textContent: um(picture.largest_um)})),
             make("td", {textContent: um(picture.rms_um)}),
             make("td", {}, line),
-            make("td", {textContent: picture.lines_above ?? "–", title: "lines above what they are judged by"}),
+            make("td", {textContent: picture.lines_above ?? "–", title: picture.lines_above > OLP.MOST_MARKS ? `lines above what they are judged by; of more than ${OLP.MOST_MARKS} the picture marks none: its colours tell` : "lines above what they are judged by"}),
           ),
         );
       });

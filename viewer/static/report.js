@@ -155,7 +155,7 @@
       make("h1", {textContent: manifest.title}),
       make("p", {textContent: $("subtitle").textContent}),
       make("p", {}, make("span", {className: "verdict", textContent: word})),
-      ...(manifest.verdict?.questions ?? []).map(q => make("p", {}, make("b", {textContent: q.question}), ` ${OLP.micrometres(q.sentence)}`)),
+      ...OLP.questions(manifest.verdict).map(q => make("p", {}, make("b", {textContent: q.question}), ` ${OLP.micrometres(q.sentence)}`)),
       ...(manifest.verdict?.unasked ?? []).map(text => make("p", {}, make("b", {textContent: text}), " Not asked: no part tolerance is stated.")),
       ...(manifest.verdict?.remarks ?? []).map(text => make("p", {textContent: OLP.micrometres(text)})),
       table(
