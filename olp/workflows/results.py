@@ -167,6 +167,9 @@ def _corrected(
     if reported.comment is not None:
         mark = stamp_line(loaded.digest, reported.comment, accepted_of(doubts))
     text, rounding = write(reported, result.added_mm, mark, options.decimals)
+    # and so were the numbers and their places
+    none = {name: getattr(reported, name)[:0].copy() for name in ("start", "end", "value")}
+    reported = replace(reported, **none)
     turned = sorted(
         {f.name for f in frames if f.touched is not None and not np.allclose(f.rotation, np.eye(3))}
     )

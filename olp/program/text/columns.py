@@ -84,7 +84,8 @@ class Columns:
                 block = blocks.pop()
                 array[end - len(block) : end] = block
                 end -= len(block)
-            if array.ndim == 1 and len(array) and (array == array[0]).all():
-                array = np.broadcast_to(array[:1].copy(), len(array))
+            if array.ndim == 1 and len(array):
+                one = np.broadcast_to(array[:1].copy(), len(array))
+                array = one if np.array_equal(array, one, equal_nan=True) else array
         array.setflags(write=False)
         return array

@@ -66,7 +66,7 @@ def test_one_number_stands_for_a_column_of_equal_ones() -> None:
     columns.put("c", np.full((3000, 2), 7), np.int32)
     one, nan, rows = columns.take("a", np.int32), columns.take("b", np.float64), columns.take("c", np.int32)
     assert one.dtype == np.int32 and one.tolist() == [7] * 3000 and one.strides == (0,)
-    assert np.isnan(nan).all() and rows.tolist() == [[7, 7]] * 3000
+    assert np.isnan(nan).all() and nan.strides == (0,) and rows.tolist() == [[7, 7]] * 3000
 
 
 def test_too_large_a_column_is_out_of_memory() -> None:
