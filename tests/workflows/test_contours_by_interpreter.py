@@ -167,7 +167,7 @@ BACKWARD = 5052
 def test_an_arc_that_enters_backwards_is_written_as_the_path_of_the_tool(tmp_path: Path) -> None:
     path = machines.random_machine(tmp_path, 3, WORN)
     nominal = entered(BACKWARD)
-    with pytest.raises(ProgramError, match="against its direction") as refused:
+    with pytest.raises(ProgramError, match="against its own direction") as refused:
         olp.correct(nominal, path)
     assert refused.value.line == 5
     assert "--contour path" in refused.value.message
