@@ -208,7 +208,8 @@ RULES = (
         "is set. No length of the program has a point, and the machine file does not say which. The two "
         "differ by a factor of 1000.",
         'Write the points into the program, such as X100., or state decimal_point = "increment" or '
-        '"calculator" in the machine file, which olp init writes.',
+        '"calculator" in the machine file, which olp init writes. Where the finding is accepted, X100 counts '
+        "as 100 least increments.",
         "`G1 X100 Y200` alone on a Fanuc control.",
     ),
     _rule(
