@@ -198,14 +198,14 @@ class Writer(ABC):
         if not edits:
             return None
         source = np.frombuffer(self.program.data, np.uint8)[begin:end]
-        joined = Edits.join(_outside(edits, self.program.closings))
+        joined = Edits.join(outside(edits, self.program.closings))
         if self._grown is not None:
             _, length = render(joined, self.prefixes, leading_zero=self.style.leading_zero)
             self._grown.append((joined.start, length - (joined.end - joined.start)))
         return splice(source, begin, joined, self.prefixes, leading_zero=self.style.leading_zero).tobytes()
 
 
-def _outside(edits: list[Edits], closings: Index) -> list[Edits]:
+def outside(edits: list[Edits], closings: Index) -> list[Edits]:
     """Edits in which what is inserted behind a number comes behind the bracket that closes there too."""
     if not len(closings):
         return edits

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import field
 from enum import IntEnum, IntFlag
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +20,8 @@ from olp.core.values import dataclass
 Tool = tuple[float, ...]
 #: An axis position in mm, and the tool with which it was touched.
 Touch = tuple[Vector, Tool]
+#: What the control leads evenly along a move with tool centre point control, "" without it.
+Interpolated = Literal["", "axes", "vector"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +92,9 @@ class Frame:
     turned first, by the rows of `turn`, None where nothing turns: axis position = `turn` (word x `unit_mm`)
     + `offset_mm`. `lift_mm` is
     the part of the offset by which the tip keeps off the programmed point, as over a hole. `compensation` is
-    that of the cutter, where the contour was taken as the path of the tool.
+    that of the cutter, where the contour was taken as the path of the tool. With tool centre point control
+    words state the tip in the workpiece, and `tip` says what turns evenly from end to end: rotary "axes", or
+    the direction of the tool ("vector"). It is "" without.
     """
 
     unit_mm: float = 1.0
@@ -104,6 +109,7 @@ class Frame:
     turn: Turn | None = None
     lift_mm: Vector = ZERO
     compensation: CutterCompensation | None = None
+    tip: Interpolated = ""
 
     def origin_mm(self) -> Vector:
         """The axis position of the program's origin, no tool length active."""

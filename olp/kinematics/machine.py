@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import field
 
 from olp.core.machine import Machine, Tool
+from olp.core.toolpath import Interpolated
 from olp.core.values import dataclass
 from olp.kinematics.errors import MachineErrors
 from olp.kinematics.structure import Structure
@@ -19,7 +20,8 @@ class JointMachine:
     `control` is what a reader of programs needs to know of it: the linear axes X, Y and Z, work offsets and
     tools. It is None where the machine has other axes than these three and rotary ones. With `tips_from_zero`
     programs with tool centre point control count from the workpiece with its rotary axes at zero, else from
-    where these are when it is switched on; None is not stated.
+    where these are when it is switched on; None is not stated. `leads` is what this mode leads evenly where
+    the program does not say it, empty where the control decides.
     """
 
     structure: Structure
@@ -30,6 +32,7 @@ class JointMachine:
     default_tool: int | None = None
     control: Machine | None = None
     tips_from_zero: bool | None = None
+    leads: Interpolated = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

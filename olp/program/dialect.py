@@ -10,12 +10,13 @@ Programs of blocks of words (RS-274) and of whole statements (APT, DMIS, lists) 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import field
+from dataclasses import field, replace
 from enum import Enum
 from typing import Any
 
 from olp.core.machine import Machine
 from olp.core.progress import Progress, silent
+from olp.core.toolpath import Interpolated
 from olp.core.values import dataclass
 from olp.program.kept import Kept
 from olp.program.origin import Unrolled
@@ -83,6 +84,11 @@ class Dialect:
     the control has no bound. `axes_at_ram`: axis positions count at the end of the ram, whatever stylus or
     tool is active. `points`: programs state points, and all of them count, however the machine goes there.
     `contours_assumed` says what is assumed of contours under cutter compensation, empty where nothing is.
+
+    `tips` is empty but for a machine with rotary axes: how tool centre point control leads these there, where
+    the program does not say it (`Frame.tip`). `leads` is what the control does where the machine file does
+    not say it, empty where programs of such machines are not read. `tips_from_zero` is as in `JointMachine`,
+    where the machine file does not state it.
     """
 
     name: str
@@ -105,6 +111,9 @@ class Dialect:
     first: tuple[bytes, ...] = ()
     marks: bool = True
     contours_assumed: str = ""
+    tips: Interpolated = ""
+    leads: Interpolated = ""
+    tips_from_zero: bool = False
 
     def rows(self) -> Sequence[Row]:
         """The support matrix, from the table that the reader uses."""
@@ -113,6 +122,10 @@ class Dialect:
     def set_as(self, machine: Machine) -> Dialect:
         """The dialect with what the machine file states of the settings of its control."""
         return self
+
+    def with_tips(self, tips: Interpolated) -> Dialect:
+        """The dialect on a machine with rotary axes, which tool centre point control leads so."""
+        return replace(self, tips=tips)
 
     def lines(self, data: bytes) -> list[bytes]:
         """The lines of a text with their ends, as errors count them."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from olp.core.errors import ConfigError, ProgramError
 from olp.core.machine import ZERO, Setup, Vector, WorkOffset
-from olp.core.toolpath import CutterCompensation, Frame, LengthError, Touch, carried
+from olp.core.toolpath import CutterCompensation, Frame, Interpolated, LengthError, Touch, carried
 from olp.core.turns import Turn
 from olp.core.units import UM_PER_MM
 from olp.core.values import dataclass
@@ -265,6 +265,10 @@ class FrameTable:
         frame = self.frames[number]
         x, y, z = (o + v for o, v in zip(frame.offset_mm, shift, strict=True))
         return self._known(replace(frame, offset_mm=(x, y, z)))
+
+    def tipped(self, number: int, tip: Interpolated) -> int:
+        """A frame whose words state the tip of the tool (`Frame.tip`)."""
+        return self._known(replace(self.frames[number], tip=tip))
 
     def _known(self, frame: Frame) -> int:
         known = self._index.get(frame)

@@ -1,5 +1,6 @@
 """An independent judge of programs on machines with X, Y, Z and rotary axes: its own reader of plain words,
-and its own forward computation from the machine and calibration files. It imports nothing of what it judges.
+and its own forward computation from the machine and calibration files. It imports nothing of what it
+judges. TRAORI and ORIVECT are read as well; the last of ORIVECT and ORIAXES holds for the whole program.
 
 Every joint is a 4 x 4 matrix. Errors: location of lines, squareness as location, harmonics of the own
 motion, and backlash of nothing. The tip of tool 1 counts.
@@ -47,6 +48,7 @@ class Judge:
         self.errors = tomllib.loads(calibration.read_text())
         self.chain = self.file["chain"].split()
         self.order = list(self.file["axes"])
+        self.vector = False
         self.tool = np.array(self.file["tools"]["1"]["gauge_to_tip_mm"])
         self.offset = {
             name: float(self.file.get("work_offsets", {}).get("G54", {}).get(key, 0.0))
@@ -111,6 +113,17 @@ class Judge:
         cuts = tips = counts = False
         moves = []
         for line in text.decode().splitlines():
+            line = line.partition(";")[0]
+            line = re.sub(r"\bL\b|\bR0\b|F ?MAX", lambda m: "G0" if "MAX" in m[0] else "", line)
+            if "M12" in line:
+                tips = "M128" in line
+            if "TRA" in line:
+                tips = "TRAORI" in line
+                continue
+            if "ORI" in line:
+                self.vector = "ORIVECT" in line
+                continue
+            line = re.sub(r"=\s*(?:DC\(([^)]*)\))?", r"\1", line)
             words = re.findall(r"([A-Z])\s*([-+]?[\d.]+)", re.sub(r"\(.*?\)", "", line))
             given = {letter: float(number) for letter, number in words if letter in self.order}
             for letter, number in words:
@@ -157,20 +170,41 @@ class Judge:
             near += 1
         return j + near
 
+    def _between(self, begin: np.ndarray, end: np.ndarray, share: np.ndarray) -> np.ndarray:
+        """Coordinates at shares (n, 1) of a move; along a great circle of the tool where that is led."""
+        place = begin + share * (end - begin)
+        turning = [column for column, name in enumerate(self.order) if name not in OWN]
+        if not self.vector or (begin[turning] == end[turning]).all():
+            return place
+        first, last = (self.forward(row[None], False)[1][0] for row in (begin, end))
+        turn = Rotation.align_vectors([last], [first])[0].as_rotvec()
+        turn -= first * (turn @ first)
+        wanted = Rotation.from_rotvec(share * turn).apply(first)
+        for _ in range(5):
+            along = self.forward(place, False)[1]
+            slopes = np.empty((len(place), 3, len(turning)))
+            for number, column in enumerate(turning):
+                ahead = place.copy()
+                ahead[:, column] += 1e-4
+                slopes[:, :, number] = (self.forward(ahead, False)[1] - along) / 1e-4
+            step = [np.linalg.lstsq(a, b, rcond=1e-6)[0] for a, b in zip(slopes, wanted - along, strict=True)]
+            place[:, turning] += np.array(step)
+        return place
+
     def _move(
         self, begin: np.ndarray, end: np.ndarray, tips: bool, start: np.ndarray, group: list[Any]
     ) -> np.ndarray:
         """Deviations of one move; each sample against the nearest nominal pose."""
         places = np.array([start, *(row[2] for row in group)])
         part = np.linspace(0.0, 1.0, 12)[:, None]
-        samples = np.vstack([a + part * (b - a) for a, b in pairwise(places)])
+        samples = np.vstack([self._between(a, b, part) for a, b in pairwise(places)])
         tip, axis = self.forward(self.axes(samples, tips), True)
         way = end - begin
         share = (samples - begin) @ way / (way @ way)
         low, high = np.clip(share - 0.05, 0.0, 1.0), np.clip(share + 0.05, 0.0, 1.0)
 
         def miss(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            place = begin + at[:, None] * way
+            place = self._between(begin, end, at[:, None])
             there, along = self.forward(place, False)
             # by its definition; the axis of the tool depends on the rotary axes alone
             there = place[:, [self.order.index(name) for name in "XYZ"]] if tips else there

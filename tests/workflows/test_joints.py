@@ -102,7 +102,6 @@ REFUSED = [
     (b"G1 F100 Z-1\nG81 X1 Z-5 R2\nG80\n", "OLP565", 4),
     (b"G1 A900 F100\n", "OLP567", 3),
     (b"G1 A1 A2 F100\n", "OLP515", 3),
-    (b"G10 L2 P1 R10\nG1 X1 F100\n", "OLP565", 4),
 ]
 
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
 from olp.core.arrays import Array, Index, Mask, distinct
 from olp.core.errors import NotInvertible
 from olp.core.machine import Vector
+from olp.core.turns import Turn, turned
+from olp.core.units import AXES
 from olp.core.values import dataclass
 from olp.kinematics.chain import Kinematics
 from olp.kinematics.correction import CorrectedPoses, beyond_travel, correct_poses, meet_positions
@@ -18,18 +20,31 @@ from olp.kinematics.poses import Poses
 from olp.kinematics.programmed import axes_of_tips, tips_of_axes
 from olp.kinematics.structure import Structure
 
+#: A tool vector, and how words are turned.
+TurnedTool = tuple[Vector, Turn | None]
+#: Steps by which a direction of the tool is found.
+_STEPS = 6
+#: deg by which slopes of directions are found.
+_HALF_DEG = 1e-3
+#: Below this share of the largest slope a rotary axis does not turn the direction.
+_FLAT = 1e-6
+#: rad by which a direction may be missed.
+_DIRECTED_RAD = 1e-8
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """A machine with its errors and the tool vectors of a program, one `machines` each. Rows of axis values
-    (n, axes) name their `tool` (n,) by its place there."""
+    """A machine with its errors and the tool vectors of a program, one `machines` each, beside how words are
+    turned with it (`Frame.turn`). Rows of axis values (n, axes) name their `tool` (n,) by its place there."""
 
     structure: Structure
     machines: tuple[Kinematics, ...]
+    turns: tuple[Turn | None, ...]
 
     @staticmethod
-    def of(structure: Structure, errors: MachineErrors, tools: tuple[Vector, ...]) -> Motion:
-        return Motion(structure, tuple(Kinematics(structure, errors, tool) for tool in tools))
+    def of(structure: Structure, errors: MachineErrors, tools: Sequence[TurnedTool]) -> Motion:
+        machines = {tool: Kinematics(structure, errors, tool) for tool, _ in tools}
+        return Motion(structure, tuple(machines[tool] for tool, _ in tools), tuple(turn for _, turn in tools))
 
     @property
     def width(self) -> Array:
@@ -53,11 +68,61 @@ class Motion:
 
     def axes(self, programmed: Array, tool: Index, tip: Mask) -> Array:
         """(n, axes) axis values of programmed coordinates, which state the `tip` in some rows."""
-        return self._by_tool(programmed, tool, tip, axes_of_tips)
+        return self._by_tool(self._turned(programmed, tool, back=False), tool, tip, axes_of_tips)
 
     def programmed(self, axes: Array, tool: Index, tip: Mask) -> Array:
         """(n, axes) the other way round."""
-        return self._by_tool(axes, tool, tip, tips_of_axes)
+        return self._turned(self._by_tool(axes, tool, tip, tips_of_axes), tool, back=True)
+
+    def between(self, start: Array, end: Array, share: Array, tool: Index, vector: Mask) -> Array:
+        """(n, axes) programmed coordinates at shares of moves. In `vector` rows the direction of the tool
+        goes evenly along a great circle, else each coordinate goes evenly. Raises NotInvertible with a row
+        whose directions are not reached."""
+        place: Array = start + share[:, None] * (end - start)
+        whole = share == 1.0
+        place[whole] = end[whole]
+        rotary = np.array([unit == "deg" for unit in self.structure.units])
+        turning = (start[:, rotary] != end[:, rotary]).any(axis=1)
+        rows = np.flatnonzero(vector & turning & ~whole & (share != 0.0))
+        if rows.size:
+            target = _great_circle(self._axis(start[rows]), self._axis(end[rows]), share[rows])
+            place[rows] = self._directed(place[rows], target, np.flatnonzero(rotary), rows)
+        return place
+
+    def _axis(self, axes: Array) -> Array:
+        """(n, 3) directions of the nominal tool, which depend on rotary axes alone."""
+        return np.asarray(self.machines[0].nominal(axes).rotation[:, :, 2])
+
+    def _directed(self, place: Array, target: Array, rotary: Index, rows: Index) -> Array:
+        """The rotary values (r, k) near those of `place` whose tool has the directions `target`."""
+        for _ in range(_STEPS):
+            slopes = np.empty((len(place), 3, len(rotary)))
+            for number, column in enumerate(rotary.tolist()):
+                ahead, behind = place.copy(), place.copy()
+                ahead[:, column] += _HALF_DEG
+                behind[:, column] -= _HALF_DEG
+                slopes[:, :, number] = (self._axis(ahead) - self._axis(behind)) / (2.0 * _HALF_DEG)
+            miss = target - self._axis(place)
+            place[:, rotary] += (np.linalg.pinv(slopes, rcond=_FLAT) @ miss[..., None])[..., 0]
+        away = np.linalg.norm(target - self._axis(place), axis=1)
+        if (away > _DIRECTED_RAD).any():
+            error = NotInvertible("no rotary axis values give the direction of the tool")
+            error.row = int(rows[away.argmax()])
+            raise error
+        return place
+
+    def _turned(self, values: Array, tool: Index, *, back: bool) -> Array:
+        """Linear coordinates along the words turned into those along the axes, or back."""
+        if not any(self.turns):
+            return values
+        columns, result = np.array([self.structure.order.index(name) for name in AXES]), values.copy()
+        for which in distinct(tool).tolist():
+            turn = self.turns[which]
+            if turn is not None:
+                rows = np.flatnonzero(tool == which)
+                matrix = np.array(turn).T if back else np.array(turn)
+                result[np.ix_(rows, columns)] = turned(matrix, values[np.ix_(rows, columns)])
+        return result
 
     def command(self, axes: Array, tool: Index, shift_mm: Array) -> CorrectedPoses:
         """Corrected axis values of nominal ones, whose targets are moved by (n, 3). Raises NotInvertible."""
@@ -103,6 +168,16 @@ class Motion:
             rows = np.flatnonzero(tip & (tool == which))
             changed[rows] = change(self.machines[which], values[rows])
         return changed
+
+
+def _great_circle(start: Array, end: Array, share: Array) -> Array:
+    """(n, 3) directions at shares of the way between two (n, 3)."""
+    sine = np.linalg.norm(np.cross(start, end), axis=1)
+    angle = np.arctan2(sine, np.sum(start * end, axis=1))
+    whole = np.where(sine > 0.0, sine, 1.0)
+    first = np.where(sine > 0.0, np.sin((1.0 - share) * angle) / whole, 1.0 - share)
+    second = np.where(sine > 0.0, np.sin(share * angle) / whole, share)
+    return np.asarray(first[:, None] * start + second[:, None] * end)
 
 
 @contextlib.contextmanager

@@ -10,20 +10,25 @@ import numpy.typing as npt
 
 from olp.compensation.joints.motion import Motion
 from olp.compensation.style import fewest_decimals
-from olp.core.arrays import Array, Index, Mask, is_in
-from olp.core.errors import ProgramError
-from olp.core.machine import Machine, Vector
+from olp.core.arrays import Array, Index, Mask, distinct, is_in
+from olp.core.errors import NotInvertible, ProgramError
+from olp.core.machine import ZERO, Machine, Vector
 from olp.core.toolpath import Flag, Kind, Touch
+from olp.core.turns import Turn, turned
 from olp.core.units import AXES
 from olp.core.values import dataclass
 from olp.kinematics.errors import MachineErrors
 from olp.kinematics.structure import Structure
+from olp.program.heidenhain.columns import OTHER_STEP
 from olp.program.pointlist.axis_list import AxisList
 from olp.program.program import Program
+from olp.program.rs274.profiles.base import Profile
 from olp.program.rs274.rotary import RotaryWords
 
 #: Decimals of an axis that states no least increment.
 _UNSTATED_DECIMALS = 6
+#: A matrix whose rows are so near to orthonormal ones is a rotation.
+_ROTATION = 1e-9
 #: Moves that are never corrected.
 _KEPT = np.uint8(Flag.PASS | Flag.MACHINE | Flag.CONTROL)
 
@@ -33,7 +38,8 @@ class JointPath:
     """The moves of a program in all axes, columns by move.
 
     (n, axes) `start` and `end` are programmed coordinates in the order of the structure, mm and deg, NaN
-    where unknown; the linear ones state the tip where `tip` (n,), else they are axis values. `slot` (n,
+    where unknown, in a turned frame along its words; the linear ones state the tip where `tip` (n,), else
+    they are axis values. In `vector` (n,) the direction of the tool goes evenly, else each axis. `slot` (n,
     axes) are their words, -1 where there is none. `tool` is the place of the tool in `motion`, `shift_mm`
     (n, 3) where the part really lies. `offset` (n, axes), `unit` (n,) and, of words without a point, `scale`
     (axes,) lead from words to coordinates. `feed` are straight moves that cut, `judged` those that the
@@ -48,6 +54,7 @@ class JointPath:
     slot: npt.NDArray[np.int32]
     tool: Index
     tip: Mask
+    vector: Mask
     shift_mm: Array
     offset: Array
     unit: Array
@@ -68,35 +75,45 @@ class JointPath:
 
     def at(self, move: Index, share: Array) -> Array:
         """(r, axes) programmed coordinates at shares of moves."""
-        start, end = self.start[move], self.end[move]
-        place: Array = start + share[:, None] * (end - start)
-        whole = share == 1.0
-        place[whole] = end[whole]
-        return place
+        try:
+            return self.motion.between(
+                self.start[move], self.end[move], share, self.tool[move], self.vector[move]
+            )
+        except NotInvertible as error:
+            assert error.row is not None
+            raise ProgramError(
+                "along this move the tool has directions that no rotary axis values give; split it, or lead "
+                "it by the axes",
+                line=int(self.line[move[error.row]]),
+                code="OLP566",
+            ) from None
 
     @staticmethod
     def of(
         program: Program, structure: Structure, errors: MachineErrors, machine: Machine, *,
-        turned: Mapping[str, Mapping[str, float]], start_deg: Mapping[str, float],
+        rotated: Mapping[str, Mapping[str, float]], start_deg: Mapping[str, float],
         tips_from_zero: bool | None = None,
     ) -> JointPath:  # fmt: skip
-        """The path of a program that was read with its words. `turned` are the rotary values of work offsets,
-        `start_deg` those at the start, `tips_from_zero` is as in `JointMachine`. Raises ProgramError for
-        what is not read on such a machine."""
+        """The path of a program that was read with its words. `rotated` are the rotary values of work
+        offsets, `start_deg` those at the start, `tips_from_zero` is as in `JointMachine`. Raises ProgramError
+        for what is not read on such a machine."""
         _refuse(program)
         path = program.toolpath
         order = structure.order
         letters = [name for name in order if structure.joints[name].kind == "rotary"]
         rotary = RotaryWords.of(program, letters, machine)
         turns = [
-            [turned.get(frame.work_offset, {}).get(letter, 0.0) for letter in letters]
+            [rotated.get(frame.work_offset, {}).get(letter, 0.0) for letter in letters]
             for frame in path.frames
         ]
         offsets = np.array(turns, float).reshape(len(path.frames), len(letters))
         degrees = rotary.follow(
             program, np.array([start_deg.get(letter, np.nan) for letter in letters]), offsets
         )
-        tip = _tips(program)
+        rotary.refuse_ways(program, degrees)
+        modes = [frame.tip for frame in path.frames]
+        tip = np.array([mode != "" for mode in modes], bool)[path.frame]
+        vector = np.array([mode == "vector" for mode in modes], bool)[path.frame]
         end, slot = np.empty((len(path), len(order))), np.full((len(path), len(order)), -1, np.int32)
         offset, scale = np.zeros(end.shape), np.ones(len(order))
         linear = np.array([frame.offset_mm for frame in path.frames]).reshape(-1, 3)[path.frame]
@@ -110,11 +127,17 @@ class JointPath:
                 end[:, column], slot[:, column] = path.end_mm[:, own], program.slot[:, own]
                 offset[:, column] = linear[:, own]
         columns = [order.index(name) for name in AXES]
-        end[:, columns] = _stated_in_mode(end[:, columns], slot[:, columns] >= 0, tip)
+        tools = list(dict.fromkeys((frame.tool_mm, frame.turn) for frame in path.frames)) or [(ZERO, None)]
+        motion = Motion.of(structure, errors, tools)
+        tool_of = np.array([tools.index((frame.tool_mm, frame.turn)) for frame in path.frames] or [0])
+        matrices = path.turns()
+        if matrices is not None:
+            inverse = matrices.inverse[matrices.of_frame[path.frame]]
+            end[:, columns] = turned(inverse, end[:, columns])
+            offset[:, columns] = turned(inverse, offset[:, columns])
+        elsewhere = tip & ((path.flag & np.uint8(Flag.MACHINE)) != 0)
+        end[:, columns] = _stated_in_mode(end[:, columns], slot[:, columns] >= 0, tip, elsewhere)
         _refuse_tips(program, structure, tip, end, offset, tips_from_zero)
-        tools = list(dict.fromkeys(frame.tool_mm for frame in path.frames)) or [(0.0, 0.0, 0.0)]
-        motion = Motion.of(structure, errors, tuple(tools))
-        tool_of = np.array([tools.index(frame.tool_mm) for frame in path.frames] or [0])
         shifts = np.array(
             [
                 _shift(structure, errors, frame.touched, row, order, letters)
@@ -127,7 +150,7 @@ class JointPath:
         feed = (path.kind == Kind.LINE) & ~kept
         start = _starts(motion, end, tool, tip, np.array(path.start_mm), columns, start_deg, order)
         return JointPath(
-            program, motion, start, end, slot, tool, tip, shifts[path.frame], offset, unit, scale,
+            program, motion, start, end, slot, tool, tip, vector, shifts[path.frame], offset, unit, scale,
             feed, feed, kept, np.append(tip[1:] & ~tip[:-1], False)[: len(tip)], _places(structure),
         )  # fmt: skip
 
@@ -147,7 +170,7 @@ class JointPath:
                     line=at,
                     code="OLP504",
                 )
-        motion = Motion.of(structure, errors, tuple(tools.values()))
+        motion = Motion.of(structure, errors, [(vector, None) for vector in tools.values()])
         places = {number: place for place, number in enumerate(tools)}
         feed = np.full(count, rows.joined)
         feed[:1] = False
@@ -155,7 +178,7 @@ class JointPath:
         return JointPath(
             rows.program, motion, np.vstack((np.full((1, axes), np.nan), rows.values[:-1])), rows.values,
             np.full((count, axes), -1, np.int32), np.array([places[n] for n in rows.tool.tolist()]),
-            none, np.zeros((count, 3)), np.zeros((count, axes)), np.ones(count), np.ones(axes),
+            none, none, np.zeros((count, 3)), np.zeros((count, axes)), np.ones(count), np.ones(axes),
             feed, ~none, none, none, _places(structure), rows,
         )  # fmt: skip
 
@@ -177,23 +200,29 @@ def _starts(
     first[columns] = start_mm
     start = np.vstack((first, end[:-1]))
     before_tip, before_tool = np.append(False, tip[:-1]), np.append(tool[:1], tool[:-1])
-    changed = np.flatnonzero((before_tip != tip) | (tip & (before_tool != tool)))
+    start[:1] = motion.programmed(start[:1], tool[:1], before_tip[:1])
+    turns = np.array([turn is not None for turn in motion.turns])
+    other = (tip | turns[tool] | turns[before_tool]) & (before_tool != tool)
+    changed = np.flatnonzero((before_tip != tip) | other)
     changed = changed[np.isfinite(start[changed]).all(axis=1)]
     axes = motion.axes(start[changed], before_tool[changed], before_tip[changed])
     start[changed] = motion.programmed(axes, tool[changed], tip[changed])
     return np.asarray(start)
 
 
-def _stated_in_mode(end: Array, given: Mask, tip: Mask) -> Array:
-    """(n, 3) linear coordinates, NaN until they are stated after a change between axis values and tips."""
-    changes = np.append(True, tip[1:] != tip[:-1])[: len(tip)]
-    if not changes[1:].any():
+def _stated_in_mode(end: Array, given: Mask, tip: Mask, elsewhere: Mask) -> Array:
+    """(n, 3) linear coordinates, NaN until they are stated after a change between axis values and tips.
+    `elsewhere` (n,) states machine positions while tips are stated."""
+    mode = tip + 2 * elsewhere
+    changes = np.append(True, mode[1:] != mode[:-1])[: len(tip)]
+    if not changes[1:].any() and not elsewhere.any():
         return end
     order = np.arange(len(end))
     began = np.maximum.accumulate(np.where(changes, order, -1))
     stated = np.maximum.accumulate(np.where(given, order[:, None], -1), axis=0)
     first = began == 0
-    return np.where((stated >= began[:, None]) | first[:, None], end, np.nan)
+    kept = ((stated >= began[:, None]) | first[:, None]) & ~elsewhere[:, None]
+    return np.where(kept, end, np.nan)
 
 
 def _shift(
@@ -209,22 +238,9 @@ def _shift(
         values[0, order.index(name)] = value
     for letter, value in zip(letters, turned.tolist(), strict=True):
         values[0, order.index(letter)] = value
-    motion = Motion.of(structure, errors, ((tool[0], tool[1], tool[2]),))
+    motion = Motion.of(structure, errors, [((tool[0], tool[1], tool[2]), None)])
     x, y, z = motion.machines[0].deviation(values)[0][0].tolist()
     return (x, y, z)
-
-
-def _tips(program: Program) -> Mask:
-    """(n,) moves whose words state the tip of the tool."""
-    words, profile = program.words, program.rs274
-    assert words is not None
-    index = np.flatnonzero(words.letter == ord("G"))
-    code = np.rint(words.mantissa[index] * 10.0 / 10.0 ** words.decimals[index]).astype(np.int64)
-    switch = is_in(code, [*profile.tip_codes, *profile.axis_codes]) if profile.tip_codes else code < 0
-    line = np.searchsorted(words.first_word, index[switch], "right")
-    on = is_in(code[switch], [*profile.tip_codes, -1])
-    last = np.searchsorted(line, program.toolpath.line, "right") - 1
-    return np.asarray((last >= 0) & np.append(on, False)[last], bool)
 
 
 def _refuse_tips(
@@ -254,7 +270,8 @@ def _refuse_tips(
             line=int(path.line[shifted[0]]),
             code="OLP565",
         )
-    _refuse_lengths(program, moves)
+    if isinstance(program.dialect, Profile) and program.dialect.tip_codes:
+        _refuse_lengths(program, moves)
 
 
 def _refuse_lengths(program: Program, moves: Index) -> None:
@@ -290,6 +307,9 @@ def _refuse(program: Program) -> None:
             found.append((int(path.line[moves].min()), why))
 
     flag = path.flag
+    if program.statements is not None:
+        note((flag & np.uint8(Flag.INCREMENTAL)) != 0, "a distance (I); program the position")
+        note(_turned_by(program), "a distance (I) of a rotary axis; program the position")
     note((flag & np.uint8(Flag.CYCLE)) != 0, "a canned cycle; give --expand-cycles, which writes it out")
     note(path.compensated(), "cutter compensation (G41, G42); post the path of the tool's centre")
     note(path.kind == Kind.PROBE, "a probing move; take it into a program of its own")
@@ -297,9 +317,9 @@ def _refuse(program: Program) -> None:
     arc = np.zeros(len(path), bool)
     arc[path.arcs.move] = True
     note(arc & ((flag & _KEPT) == 0), "an arc; post it as straight moves, within your tolerance")
-    if path.turns() is not None:
-        turned = np.array([frame.turn is not None for frame in path.frames])[path.frame]
-        note(turned, "a rotated, mirrored or scaled frame; post the program without it")
+    other = np.array([frame.turn is not None and not _is_rotation(frame.turn) for frame in path.frames], bool)
+    if other.any():
+        note(other[path.frame], "a mirrored or scaled frame; post the program without it")
     for capture in program.captures[:1]:
         found.append((capture.line, "a word that stores the present position (G92, G10 L20); use G54 to G59"))
     if found:
@@ -307,3 +327,16 @@ def _refuse(program: Program) -> None:
         raise ProgramError(
             f"on a machine with rotary joints this is not corrected: {why}", line=line, code="OLP565"
         )
+
+
+def _turned_by(program: Program) -> Mask:
+    """(n,) moves of a conversational program with a distance of a rotary axis."""
+    words, line = program.words, program.toolpath.line
+    assert words is not None
+    stepped = np.searchsorted(words.first_word, np.flatnonzero(words.letter == OTHER_STEP), "right")
+    return np.asarray(is_in(line, distinct(stepped)), bool)
+
+
+def _is_rotation(turn: Turn) -> bool:
+    matrix = np.array(turn)
+    return bool(np.abs(matrix @ matrix.T - np.eye(3)).max() < _ROTATION and np.linalg.det(matrix) > 0.0)

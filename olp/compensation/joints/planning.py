@@ -220,7 +220,7 @@ def _worst(path: JointPath, begin: _Rows, end: _Rows, limits: JointLimits, count
     move = begin.move[owner]
     tool, tip = path.tool[move], path.tip[move]
     ends = [motion.programmed(rows.axes, path.tool[rows.move], path.tip[rows.move]) for rows in (begin, end)]
-    written = ends[0][owner] + part[:, None] * (ends[1] - ends[0])[owner]
+    written = motion.between(ends[0][owner], ends[1][owner], part, tool, path.vector[move])
     share = begin.share[owner] + part * (end.share - begin.share)[owner]
     nominal = motion.nominal(motion.axes(path.at(move, share), tool, tip), tool)
     target = Poses(nominal.rotation, nominal.position + path.shift_mm[move])

@@ -18,6 +18,7 @@ from olp.compensation.stamp import stamped
 from olp.compensation.stretches import Decimals, Stretches, digits_of
 from olp.compensation.style import Style, fewest_decimals
 from olp.compensation.tally import Tally
+from olp.compensation.writer import outside
 from olp.core.arrays import Array, Index, Mask, distinct
 from olp.core.errors import ProgramError
 from olp.core.machine import Vector
@@ -30,7 +31,7 @@ from olp.program.text.edits import EditList, Edits, Prefixes, splice
 Small = npt.NDArray[np.int8]
 
 #: The largest number of axes that have words; orders of insertions leave room for them and for F.
-_PLACES = 16
+PLACES = 16
 #: The share of the time of a block in G93 that a step takes which takes up backlash.
 _TAKE_UP_SHARE = 0.05
 #: Decimals of F in G93, where a block is split.
@@ -49,10 +50,16 @@ class WrittenJoints:
 
 def write_joints(path: JointPath, plan: JointPlan, stamp: bytes) -> WrittenJoints:
     """The text with its plan. Raises ProgramError where it cannot be written, NotInvertible."""
-    return _JointWriter(path, plan).written(stamp)
+    if path.program.statements is None:
+        return JointWriter(path, plan).written(stamp)
+    from olp.compensation.joints.conversational import ConversationalJoints
+
+    return ConversationalJoints(path, plan).written(stamp)
 
 
-class _JointWriter:
+class JointWriter:
+    """A writer of blocks of words."""
+
     def __init__(self, path: JointPath, plan: JointPlan) -> None:
         program = path.program
         assert program.words is not None
@@ -87,12 +94,25 @@ class _JointWriter:
         if not edits:
             return WrittenJoints(None, self.tally, parts)
         text = splice(
-            np.frombuffer(data, np.uint8), 0, Edits.join(edits), self.prefixes,
+            np.frombuffer(data, np.uint8), 0, Edits.join(self._placed(edits)), self.prefixes,
             leading_zero=self.style.leading_zero,
         ).tobytes()  # fmt: skip
         if stamp:
             text = stamped(text, stamp, self.program.eol(1), self.program.dialect.first)
         return WrittenJoints(text, self.tally, parts)
+
+    def _placed(self, edits: list[Edits]) -> list[Edits]:
+        """The edits as they are made, beside the marks of the language."""
+        return outside(edits, self.program.closings)
+
+    def _starts(self, line: Index) -> tuple[list[bytes], Index]:
+        """The different texts before the first word of blocks behind lines, and which of them each has."""
+        return self.style.block_starts(line)
+
+    def _ends(self, tails: Index, line: Index, edits: EditList) -> None:
+        """What changes at the end of the blocks `tails` of split `line`s."""
+        self._inverse_time(tails, edits)
+        end_word_edits(self.program, distinct(line), edits)
 
     def _linear(self, command: Array, emitted: Array) -> Array:
         """Commands whose linear axes meet the position with the rotary ones as written."""
@@ -217,7 +237,7 @@ class _JointWriter:
             return []
         line = self.path.line[self.plan.move[tails]].astype(np.int64)
         place = self.program.line_end[line - 1].astype(np.int64)
-        starts, which = self.style.block_starts(line)
+        starts, which = self._starts(line)
         columns, edits = self._letters(), []
         first = np.argmax(self.write[tails][:, columns], axis=1)
         for number, column in enumerate(columns):
@@ -226,13 +246,12 @@ class _JointWriter:
             lead = np.array([self.prefixes(start + letter) for start in starts])[which[chosen]]
             begins = first[chosen] == number
             prefix = np.where(begins, lead, self.prefixes(b" " + letter))
-            order = tails[chosen] * _PLACES + _PLACES + number
+            order = tails[chosen] * PLACES + PLACES + number
             at = place[chosen]
             edits.append(self._edit(tails[chosen], column, at, at, prefix, order))
         self.tally.inserted_blocks += len(tails)
         extra = EditList(self.prefixes)
-        self._inverse_time(tails, extra)
-        end_word_edits(self.program, distinct(line), extra)
+        self._ends(tails, line, extra)
         return [*edits, extra.done()]
 
     def _inverse_time(self, tails: Index, edits: EditList) -> None:
@@ -256,4 +275,4 @@ class _JointWriter:
                     edits.add(int(self.words.number[index]), int(self.words.end[index]), int(feed), decimals)
                 else:
                     at = int(self.program.line_end[line - 1])
-                    edits.add(at, at, int(feed), decimals, b" F", row * _PLACES + 2 * _PLACES - 1)
+                    edits.add(at, at, int(feed), decimals, b" F", row * PLACES + 2 * PLACES - 1)

@@ -62,6 +62,7 @@ def load_joint_machine(path: PathLike, read: Reader = read_bytes) -> JointMachin
         default_tool=default,
         control=_control(file, structure, path),
         tips_from_zero={"axis-zero": True, "activation": False, None: None}[file.kinematics.tcp_frame_zero],
+        leads=file.kinematics.orientation_interpolation or "",
     )
 
 

@@ -22,6 +22,8 @@ _HARMLESS = (
     | {118, 120, 124, 126, 127, 129, 134, 135, 137, 138, 141, 143, 144, 145, 148, 149, 150}
     | set(range(10, 30)) | set(range(31, 60))
 )  # fmt: skip
+#: M129, which ends tool centre point control.
+UNTIPPED = 129
 #: `_HARMLESS` by number.
 IS_HARMLESS = np.isin(np.arange(1000), sorted(_HARMLESS))
 #: Letters of words in motion blocks.
@@ -112,7 +114,12 @@ def apart(blocks: Blocks) -> Index:
     block, words = blocks.block, blocks.words
     m = np.flatnonzero(blocks.letter == ord("M"))
     code = np.rint(blocks.value[m]).astype(np.int64)
-    special = (code < 0) | (code >= len(IS_HARMLESS)) | ~IS_HARMLESS[np.clip(code, 0, len(IS_HARMLESS) - 1)]
+    special = (
+        (code < 0)
+        | (code == UNTIPPED)
+        | (code >= len(IS_HARMLESS))
+        | ~IS_HARMLESS[np.clip(code, 0, len(IS_HARMLESS) - 1)]
+    )
     unknown = words.line[~KNOWN_LETTERS[blocks.letter]]
     pole = np.flatnonzero(block == Block.POLE)
     axis = (AXIS[blocks.letter] >= 0) & ~blocks.step

@@ -43,7 +43,7 @@ class Block(IntEnum):
 
 #: the letters that stand for words of several: incremental X, Y, Z, and an incremental rotary axis
 _STEP_OF = {ord("X"): ord("D"), ord("Y"): ord("E"), ord("Z"): ord("H")}
-_OTHER_STEP = ord("T")
+OTHER_STEP = ord("T")
 #: The letter of a turn of the coordinates.
 TURN = ord("K")
 #: the letter of a side of the contour; its number is 0 for R0, 1 for RL, 2 for RR
@@ -77,7 +77,7 @@ _SIDES = np.full(256, 255, np.uint8)
 _SIDES[list(b"0LR")] = list(b"012")
 _UPPER = np.arange(256, dtype=np.uint8)
 _UPPER[97:123] -= 32
-_STEPS = np.full(256, _OTHER_STEP, np.uint8)
+_STEPS = np.full(256, OTHER_STEP, np.uint8)
 for _axis, _letter in _STEP_OF.items():
     _STEPS[_axis] = _letter
 _PLAIN = np.arange(256, dtype=np.uint8)
@@ -263,4 +263,15 @@ def _spelled(body: Bytes, work: Bytes) -> Mask:
     return known
 
 
-__all__ = ["ANGLE", "PARAMETER_FEED", "SIDE", "STEP_ANGLE", "TURN", "Block", "Blocks", "blocks", "read"]
+__all__ = [
+    "ANGLE",
+    "OTHER_STEP",
+    "PARAMETER_FEED",
+    "SIDE",
+    "STEP_ANGLE",
+    "TURN",
+    "Block",
+    "Blocks",
+    "blocks",
+    "read",
+]

@@ -50,6 +50,8 @@ DIALECT = Conversational(
     signs=HEIDENHAIN,
     folder_endings=("h", "hnc"),
     inch_decimals=4,
+    leads="axes",
+    tips_from_zero=True,
     comment=(b"; ", b""),
     first=(b"BEGIN PGM|0 BEGIN PGM|0  BEGIN PGM",),
 )

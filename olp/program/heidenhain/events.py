@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Sequence
 
 from olp.core.errors import ProgramError
+from olp.core.toolpath import Interpolated
 from olp.core.units import MM_PER_INCH
 from olp.program.dialect import Options
 from olp.program.heidenhain.chunk import harmless
@@ -33,6 +34,10 @@ _CALL = re.compile(rb'CALL[ \t]+LBL[ \t]*("[^"]*"|\d+)[ \t]*(REP.*)?\Z', re.I | 
 _ANGLE = re.compile(rb"\bSP([ABC])[ \t]*(" + _NUMBER + rb")", re.I)
 _TURN = re.compile(rb"\b(?:ROT|[ABC])[ \t]*(" + _NUMBER + rb")", re.I)
 _SCALE = re.compile(rb"\b(?:SCL|[XYZ])[ \t]*(" + _NUMBER + rb")", re.I)
+_TCPM = re.compile(
+    rb"FUNCTION[ \t]+TCPM[ \t]+F[ \t]+(?:TCP|CONT)[ \t]+AXIS[ \t]+POS[ \t]+PATHCTRL[ \t]+(?P<way>AXIS|VECTOR)"
+    rb"(?:[ \t]+REFPNT[ \t]+TIP-TIP)?(?:[ \t]+F[ \t]*[\d.]+)?"
+)
 _FUNCTIONS = re.compile(rb"(?:L[ \t]+)?(?:M\d+[ \t]*)+")
 _PRESET = 339
 _MOTION = re.compile(rb"(?:L|CC?|CR|CP)[ \t]|[XYZABC][-+.\d]|I[XYZ]|[MF][ \t]*[-+.\dM]")
@@ -51,6 +56,8 @@ class Events:
 
     def __init__(self, modes: Modes, collector: Collected, options: Options) -> None:
         self.modes, self.collector, self.options = modes, collector, options
+        #: how tool centre point control leads rotary axes, empty where the machine has none
+        self.tips: Interpolated = ""
         self.cycle: Cycle | None = None
         self.definition: Cycle | None = None
         self.ended = 0
@@ -62,7 +69,8 @@ class Events:
         self._handlers: Sequence[tuple[bytes, Callable[[Statement], None]]] = (
             (b"BEGIN PGM", self._begin), (b"END PGM", self._end), (b"TOOL CALL", self._tool),
             (b"CYCL CALL", self._cycle_call), (b"CALL LBL", self._call), (b"LBL", self._label),
-            (b"PLANE", self._plane), (b"STOP", self._stop), (b"Q", self._assign),
+            (b"FUNCTION TCPM", self._tcpm), (b"FUNCTION RESET", self._reset), (b"PLANE", self._plane),
+            (b"STOP", self._stop), (b"Q", self._assign),
             *((b"FN %d" % n, self._unknown) for n in (*range(1, 9), 13, 18)),
             (b"FN 0", self._assign), *((b"FN %d" % n, self._jump) for n in (9, 10, 11, 12)),
         )  # fmt: skip
@@ -209,6 +217,8 @@ class Events:
         for inner in section:
             if not _FUNCTIONS.fullmatch(inner.upper):
                 self.take(inner)
+            elif self.tips and re.search(rb"M129\b", inner.upper):
+                self.modes.switch_tips("", statement.line)
         self._depth = 0
 
     def _section(self, label: bytes) -> list[Statement] | None:
@@ -242,6 +252,14 @@ class Events:
         number, part, rest = text.number, text.part, text.rest
         name = b"CYCL DEF %d" % number
         if number == _SHIFT and part:
+            turned = [n for letter, (_, n) in statement.numbers().items() if letter in b"ABC"]
+            if self.tips and any(turned):
+                raise ProgramError(
+                    "CYCL DEF 7 shifts a rotary axis, which is not read; state the shift in "
+                    "[work_offsets.NAME]",
+                    line=statement.line,
+                    code="OLP565",
+                )
             self.modes.datum_shift(statement)
         elif number == _SELECT:
             value = text.values.get(_PRESET)
@@ -278,6 +296,27 @@ class Events:
     def hole(self, line: int) -> None:
         """The strokes of the cycle in force, where the tool is."""
         raise NotImplementedError
+
+    # -- tool centre point control -------------------------------------------------------------------
+
+    def _tcpm(self, statement: Statement) -> None:
+        """FUNCTION TCPM with axis positions; the other forms are refused by name."""
+        if not self.tips:
+            refuse(b"FUNCTION TCPM", statement)
+        words = _TCPM.fullmatch(statement.upper)
+        if words is None:
+            raise ProgramError(
+                f"{statement.shown} is not read; expected F TCP or F CONT, AXIS POS, PATHCTRL AXIS or "
+                "VECTOR, and REFPNT TIP-TIP",
+                line=statement.line,
+                code="OLP512",
+                word="FUNCTION TCPM",
+            )
+        self.modes.switch_tips("vector" if words["way"] == b"VECTOR" else "axes", statement.line)
+
+    def _reset(self, statement: Statement) -> None:
+        if self.tips and re.match(rb"FUNCTION[ \t]+RESET[ \t]+TCPM\b", statement.upper):
+            self.modes.switch_tips("", statement.line)
 
     # -- tilted planes -------------------------------------------------------------------------------
 

@@ -6,6 +6,7 @@ import re
 
 from olp.core.errors import ProgramError
 from olp.core.machine import ZERO, Setup, Vector
+from olp.core.toolpath import Interpolated
 from olp.core.units import MM_PER_INCH
 from olp.program.frames import FrameTable, tool_vector_of
 from olp.program.heidenhain.statements import Statement
@@ -39,6 +40,8 @@ class Modes:
         #: parameters with known numbers
         self.parameters: dict[str, float] = {}
         self.remarks: dict[str, tuple[int, str]] = {}
+        #: tool centre point control, as in `Frame`
+        self.tip: Interpolated = ""
         self._frame: int | None = None
 
     @property
@@ -67,14 +70,26 @@ class Modes:
                 vector = (x, y, z - self.delta_mm)
                 tool = self.setup.tool(self.tool)
                 assert tool is not None
-                if self.length_active:
+                if self.length_active and not self.tip:
                     length = (*tool.length_mm[:2], tool.length_mm[2] + self.delta_mm)
             index = self.table.index(
                 work, line, unit_mm=self.unit_mm, tool=self.tool, length=length, tool_vector=vector,
                 length_active=self.length_active and bool(self.tool),
             )  # fmt: skip
-            self._frame = self.table.moved(index, self.shift) if any(self.shift) else index
+            index = self.table.moved(index, self.shift) if any(self.shift) else index
+            self._frame = self.table.tipped(index, self.tip) if self.tip else index
         return self._frame
+
+    def switch_tips(self, tip: Interpolated, line: int) -> None:
+        """M128, M129 and FUNCTION TCPM. Raises ProgramError where no tool is known."""
+        if tip and self.tool is None:
+            raise ProgramError(
+                "words state the tip of the tool from here on, and no tool is called; give TOOL CALL before",
+                line=line,
+                code="OLP532",
+            )
+        self.tip = tip
+        self.changed()
 
     def tool_call(self, statement: Statement) -> bool:
         """Take over a TOOL CALL; returns whether the tool is changed."""

@@ -19,7 +19,7 @@ from olp.core.progress import Progress
 from olp.core.toolpath import Flag, Kind
 from olp.program.dialect import Dialect, Options
 from olp.program.heidenhain.arcs import Arcs
-from olp.program.heidenhain.chunk import KNOWN_LETTERS, Chunk, apart, columns_of, harmless
+from olp.program.heidenhain.chunk import KNOWN_LETTERS, UNTIPPED, Chunk, apart, columns_of, harmless
 from olp.program.heidenhain.collector import Collected
 from olp.program.heidenhain.columns import PARAMETER_FEED, SIDE, TURN, Block, Blocks, blocks
 from olp.program.heidenhain.modes import NAN, Modes
@@ -38,7 +38,7 @@ _PER_TURN = 136
 _TIPPED = 128
 _TILTED = (104, 112, 114, 130)
 #: M functions that are read one by one
-_READ = frozenset({*_ENDS, _MACHINE, _DATUM, _CALL, _MODAL_CALL, _PER_TURN})
+_READ = frozenset({*_ENDS, _MACHINE, _DATUM, _CALL, _MODAL_CALL, _PER_TURN, _TIPPED})
 _ROTARY = re.compile(rb"\bI?[ABCUVW][ \t]*[-+]?Q[LR]?\d+", re.I)
 _WITH_PARAMETER = re.compile(rb"(?:[XYZ]|PA|PR|R)[ \t]*[-+]?Q[LR]?\d+", re.I)
 
@@ -56,7 +56,7 @@ class _Reader(Arcs):
         modes = Modes(setup)
         x, y, z = modes.position
         super().__init__(modes, Collected(data, (x, y, z), keep_words=words), options)
-        self.data, self.dialect = data, dialect
+        self.data, self.dialect, self.tips = data, dialect, dialect.tips
         self.feed_mm_s = NAN
 
     def run(self, tell: Progress) -> Program:
@@ -137,6 +137,9 @@ class _Reader(Arcs):
         else:
             self._resolve(chunk, row + int(here), line + 1)
         chunk.done, chunk.done_line = row + int(here), line
+        if UNTIPPED in functions and self.tips:
+            # it acts when its block has ended
+            self.modes.switch_tips("", number)
         moving = [m for m in functions if not harmless(m) and m not in _READ]
         if moving:
             self.control_move(number, (0, 1, 2))
@@ -147,8 +150,13 @@ class _Reader(Arcs):
 
     def _functions(self, functions: Sequence[int], line: int, *, here: bool) -> None:
         for m in functions:
-            if m == _TIPPED or m in _TILTED:
-                why = "needs rotary axes" if m == _TIPPED else "changes where later positions count from"
+            if m == _TIPPED and self.tips:
+                self.modes.switch_tips(self.tips, line)
+            elif m == _TIPPED or m in _TILTED:
+                tipped = m == _TIPPED
+                why = (
+                    "needs the rotary axes of the machine" if tipped else "changes where positions count from"
+                )
                 raise ProgramError(f"M{m} {why}, which is not read", line=line, code="OLP512", word=f"M{m}")
             if m == _MODAL_CALL:
                 raise ProgramError(
@@ -191,7 +199,7 @@ class _Reader(Arcs):
         if re.fullmatch(rb"(?:L[ \t]+)?M140[ \t]+MB[^;]*", upper):
             self.control_move(statement.line, (2,))
             return
-        rest = _ROTARY.sub(b"", upper)
+        rest = upper if self.tips else _ROTARY.sub(b"", upper)
         if rest != upper and re.fullmatch(
             rb"(?:L)?[ \t]*(?:R0[ \t]*)?(?:F[ \t]*(?:MAX|[\d.]+|Q\d+))?[ \t]*(?:M\d+[ \t]*)*", rest
         ):

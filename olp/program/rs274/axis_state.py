@@ -13,7 +13,7 @@ from typing import Any
 from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES
 from olp.core.machine import ZERO, Setup, Vector
-from olp.core.toolpath import CutterCompensation, Frame, LengthError
+from olp.core.toolpath import CutterCompensation, Frame, Interpolated, LengthError
 from olp.core.units import AXES
 from olp.core.values import dataclass
 from olp.program.frames import length_errors_of, tool_vector_of, touch_tool_of
@@ -82,6 +82,9 @@ class AxisState(OffsetState):
     payload_kg: float = 0.0
     compensation: CutterCompensation | None = None
     contours: int = 0
+    #: what tool centre point control leads evenly, as the program says it: `Frame.tip`
+    leads: Interpolated = ""
+    leads_stated: bool = False
     frames: list[Frame] = field(default_factory=list)
     path_modes: list[PathMode] = field(default_factory=list)
     #: the frame of the last plain motion, -1 before any
@@ -139,6 +142,7 @@ class AxisState(OffsetState):
             "lengths": self._lengths(name),
             "payload_kg": self.payload_kg,
             "compensation": self.compensation,
+            "tip": self.offsets.tip,
         }
         key = tuple(stated.values())
         known = self._index.get(key)
@@ -198,12 +202,22 @@ class AxisState(OffsetState):
         self._check_modes(codes, line)
         changes_tool = TOOL_CHANGE in m_codes or (SET_TOOL in m_codes and self.profile.m61_sets_tool)
         check_block(self, codes, line, changes_tool=changes_tool)
+        self._switch_tips(words)
         for code in sorted(codes, key=lambda code: _RANK.get(code, len(_RANK))):
             effect = self._event(code, line, by_letter, axis_words, moves, effect)
         check_codes_along(self, [round(w.value * 10) for w in words if w.letter == "G"], m_codes, line)
         if self.profile.turns_offsets:
             self._check_turned(angle_deg, effect, line)
         return effect
+
+    def _switch_tips(self, words: Sequence[Word]) -> None:
+        """Tool centre point control with axis words, which every other code of tool lengths ends."""
+        for word in words:
+            code = round(word.value * 10) if word.letter == "G" else -1
+            if code in self.profile.tip_codes:
+                self.offsets.tip = self.profile.tips
+            elif code in LENGTHS:
+                self.offsets.tip = ""
 
     def _check_turned(self, before_deg: float, effect: Effect, line: int) -> None:
         """Refuse what makes a control that turns work offsets lose its position."""

@@ -13,6 +13,7 @@ import numpy as np
 
 from olp.core.arrays import Array
 from olp.core.machine import ZERO, Vector
+from olp.core.toolpath import Interpolated
 from olp.core.turns import Turn, about_z, rows_of, turned
 from olp.core.values import dataclass
 
@@ -41,7 +42,8 @@ class Transform:
 class Offsets:
     """The offsets in force, in mm. `name` is the work offset, `written` are those that the program has
     written, by name, and `turned_deg` their angles about Z. `shift` is that of G92, `saved` its stored value,
-    `local` that of G52, `length` that of the tool. `transform` is that of the program."""
+    `local` that of G52, `length` that of the tool. `transform` is that of the program. `tip` is as in
+    `Frame`."""
 
     name: str
     written: dict[str, list[float]] = field(default_factory=dict)
@@ -51,6 +53,7 @@ class Offsets:
     local: list[float] = field(default_factory=_zeros)
     length: Vector = ZERO
     transform: Transform | None = None
+    tip: Interpolated = ""
 
     def turn(self, angle_deg: float) -> Turn | None:
         """How words are turned, with a work offset at this angle; None where they are not."""

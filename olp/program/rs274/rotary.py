@@ -6,6 +6,7 @@ columns beside the linear ones, in degrees.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -23,6 +24,14 @@ from olp.program.rs274.profiles.base import Profile
 ROTARY_LETTERS = "ABC"
 #: Letters of further linear axes, which are not read.
 _FURTHER = "UVW"
+#: Bytes of a letter and `=` before a number.
+_PLAIN_GAP = 2
+#: The form of a word of Sinumerik programs.
+_FORM = re.compile(rb"(?i)\b(AC|IC|DC|ACP|ACN)[ \t]*\(")
+#: deg; a position that is as far off is not left on the shortest way in any case.
+_HALF_TURN = 179.0
+#: M126 of Heidenhain programs: rotary axes go the shortest way.
+_SHORTEST_M = 126
 #: deg of a rotary word without a decimal point, where a length without one counts least increments.
 _BARE_DEG = 1e-3
 
@@ -40,10 +49,11 @@ class RotaryWords:
     def of(program: Program, letters: Sequence[str], machine: Machine) -> RotaryWords:
         """The words of these axes. Raises ProgramError for words of axes that the machine does not have,
         twice in a block, in blocks that do not move, and on arcs."""
-        words, profile = program.words, program.rs274
+        words, dialect = program.words, program.dialect
         assert words is not None
+        profile = dialect if isinstance(dialect, Profile) else None
         _refuse_others(words, letters, profile)
-        counting = profile.counts_increments(machine)
+        counting = profile is not None and profile.counts_increments(machine)
         scale = np.full(len(letters), _BARE_DEG if counting else 1.0)
         slot = np.full((len(program.toolpath), len(letters)), -1, np.int32)
         for column, letter in enumerate(letters):
@@ -77,6 +87,49 @@ class RotaryWords:
             end[:, column] = np.where(source < 0, start_deg[column] + total, from_anchor)
         return end
 
+    def refuse_ways(self, program: Program, end_deg: Array) -> None:
+        """Raise ProgramError for words that say on which way the axis goes, where it is another one than that
+        of a plain number, or would be with a small correction. `end_deg` as from `follow`."""
+        words, path = program.words, program.toolpath
+        assert words is not None
+        before = np.vstack((np.full((1, end_deg.shape[1]), np.nan), end_deg))[:-1]
+        counting = (path.flag & np.uint8(Flag.INCREMENTAL)) != 0
+        shortest = bool(((words.letter == ord("M")) & (words.mantissa == _SHORTEST_M)).any())
+        shortest &= program.statements is not None
+        for column in range(end_deg.shape[1]):
+            given = np.flatnonzero(self.slot[:, column] >= 0)
+            index = self.slot[given, column]
+            some = words.number[index] - words.start[index] > _PLAIN_GAP
+            for move, word in zip(given[some].tolist(), index[some].tolist(), strict=True):
+                form = _FORM.search(program.data[int(words.start[word]) : int(words.number[word])])
+                _refuse_form(form[1].upper() if form else b"", bool(counting[move]), int(path.line[move]))
+            near = some if not shortest else np.ones(len(given), bool)
+            long = np.abs(end_deg[given, column] - before[given, column]) > _HALF_TURN
+            far = given[near & long & ~counting[given]]
+            if far.size:
+                raise ProgramError(
+                    "a rotary axis goes the shortest way here, and the numbers are half a turn apart, or "
+                    "nearly so; program the position that it comes to",
+                    line=int(path.line[far[0]]),
+                    code="OLP565",
+                )
+
+
+def _refuse_form(form: bytes, counting: bool, line: int) -> None:
+    """Raise ProgramError for a form of words that its mode does not have."""
+    if form in (b"ACP", b"ACN"):
+        why = f"{form.decode()} says on which side an axis comes, and a small correction turns it round"
+        raise ProgramError(
+            f"{why}; program the position, or DC( )", line=line, code="OLP565", word=form.decode()
+        )
+    if (form == b"IC") != counting and form in (b"IC", b"AC", b"DC"):
+        what = "a distance in G90" if form == b"IC" else "a position in G91"
+        raise ProgramError(
+            f"the word of a rotary axis is {what}; program it in the other mode",
+            line=line,
+            code="OLP565",
+        )
+
 
 def _stated_lines(program: Program) -> Mask:
     """(n,) moves whose line has an axis word: the control moves these axes alone."""
@@ -89,10 +142,10 @@ def _stated_lines(program: Program) -> Mask:
     return np.asarray(stated[program.toolpath.line])
 
 
-def _refuse_others(words: Words, letters: Sequence[str], profile: Profile) -> None:
+def _refuse_others(words: Words, letters: Sequence[str], profile: Profile | None) -> None:
     """Raise ProgramError for words of axes that the machine does not have."""
     others = [letter for letter in ROTARY_LETTERS + _FURTHER if letter not in letters]
-    if "U" in profile.dwell_words or profile.axis_dwell:
+    if profile is not None and ("U" in profile.dwell_words or profile.axis_dwell):
         # beside a dwell it is a time
         others = [letter for letter in others if letter != "U"]
     some = np.flatnonzero(is_in(words.letter, [ord(letter) for letter in others]))

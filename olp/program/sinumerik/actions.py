@@ -26,7 +26,7 @@ class SelectOffset(Action):
     name: str
 
     def run(self, state: AxisState, line: int) -> None:
-        _outside_contours(state, "a change of offsets is", line)
+        outside_contours(state, "a change of offsets is", line)
         state.offsets.name = self.name
         if self.name == NO_OFFSET and state.setup.work_offset(self.name) is None:
             state.offsets.written.setdefault(self.name, [0.0, 0.0, 0.0])
@@ -40,7 +40,7 @@ class WriteOffset(Action):
     values_mm: tuple[float | None, float | None, float | None]
 
     def run(self, state: AxisState, line: int) -> None:
-        _outside_contours(state, "a change of offsets is", line)
+        outside_contours(state, "a change of offsets is", line)
         if state.offsets.name == self.name and state.last_frame >= 0:
             raise ProgramError(
                 f"{self.name} is in force while the program writes it, and counts from the next {self.name} "
@@ -83,7 +83,7 @@ class SetUnit(Action):
     code: int
 
     def run(self, state: AxisState, line: int) -> None:
-        _outside_contours(state, "a change of units is", line)
+        outside_contours(state, "a change of units is", line)
         state.unit = self.code
 
 
@@ -98,7 +98,7 @@ class ChangeFrame(Action):
     in_plane: bool = False
 
     def run(self, state: AxisState, line: int) -> None:
-        _outside_contours(state, "a change of the frame is", line)
+        outside_contours(state, "a change of the frame is", line)
         if self.in_plane and state.plane != _XY:
             raise ProgramError(
                 "RPL outside of G17 tilts the plane, which is not read; post the operation for three axes",
@@ -148,7 +148,7 @@ class ChangeTool(Action):
         return state.setup.machine.tool_change_moves
 
     def run(self, state: AxisState, line: int) -> None:
-        _outside_contours(state, "a tool change is", line)
+        outside_contours(state, "a tool change is", line)
         if state.selected is None:
             raise ProgramError(
                 "M6 changes to a tool, but no T word comes before it; give T", line=line, code="OLP516"
@@ -166,9 +166,16 @@ class Edge(Action):
     number: int
 
     def run(self, state: AxisState, line: int) -> None:
-        _outside_contours(state, "another edge is", line)
+        outside_contours(state, "another edge is", line)
         offsets = state.offsets
         if self.number == 0:
+            if offsets.tip:
+                raise ProgramError(
+                    "D0 comes behind TRAORI, so words do not state the tip of the tool; program TRAFOOF "
+                    "before it",
+                    line=line,
+                    code="OLP518",
+                )
             offsets.length, state.length_tool = ZERO, None
             return
         if self.number > 1:
@@ -188,7 +195,8 @@ class Edge(Action):
             )
         if state.spindle is None:
             state.spindle = tool
-        offsets.length = _length(state, tool, line)
+        # a tip has no length
+        offsets.length = ZERO if offsets.tip else _length(state, tool, line)
         state.length_tool = tool or None
 
 
@@ -229,7 +237,7 @@ class GoHome(Action):
     axes: tuple[int, ...]
 
     def run(self, state: AxisState, line: int) -> None:
-        _outside_contours(state, "a move of the control's own is", line)
+        outside_contours(state, "a move of the control's own is", line)
         state.forget(self.axes)
 
 
@@ -244,7 +252,7 @@ class Tolerate(Action):
         state.path_modes.append(PathMode(line, "G64", self.tolerance * state.unit_mm, merges=False))
 
 
-def _outside_contours(state: AxisState, what: str, line: int) -> None:
+def outside_contours(state: AxisState, what: str, line: int) -> None:
     """Refuse what changes in the midst of a contour under cutter compensation."""
     if state.compensation is not None:
         raise ProgramError(f"{what} in cutter compensation; give G40 before", line=line, code="OLP518")

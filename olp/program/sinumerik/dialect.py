@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
 from types import MappingProxyType
 
+from olp.core.toolpath import Interpolated
 from olp.core.values import dataclass
 from olp.program.contours.rules import SINUMERIK_CONTOURS
 from olp.program.dialect import Row, Support
@@ -34,6 +37,11 @@ _WRITTEN = {200: "G70", 210: "G71", 610: "G60"}
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sinumerik(Profile):
     """The profile with the table of its own statements."""
+
+    def with_tips(self, tips: Interpolated) -> Sinumerik:
+        tipped = Profile.with_tips(self, tips)
+        assert isinstance(tipped, Sinumerik)
+        return replace(tipped, translator=partial(translate_text, tips=True))
 
     def comment_marks(self) -> tuple[tuple[bytes, bytes], ...]:
         return ((b";", b""),)
@@ -73,6 +81,8 @@ DIALECT = Sinumerik(
     machine_moves_keep_length=True,
     increments_take_offsets=True,
     lengths_follow_plane=True,
+    leads="vector",
+    tips_from_zero=True,
     further_turns=b"TURN=",
     absolute_centre=b"AC",
     text=BlockText(),

@@ -8,11 +8,11 @@ from olp.program.origin import Unrolled
 from olp.program.rs274.translation import Translation
 
 
-def translate_text(data: bytes) -> Translation:
+def translate_text(data: bytes, *, tips: bool = False) -> Translation:
     """`olp.program.sinumerik.translate.translate`."""
     from olp.program.sinumerik.translate import translate
 
-    return translate(data)
+    return translate(data, tips=tips)
 
 
 def unroll_text(data: bytes, dialect: Any, **options: Any) -> Unrolled:

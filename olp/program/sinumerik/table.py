@@ -21,8 +21,8 @@ _WITHOUT_PATH = (
     "FGROUP", "FGREF", "WORKPIECE", "EXTERN", "GROUP_BEGIN", "GROUP_END", "GROUP_ADDEND", "STARTFIFO",
     "STOPFIFO", "FIFOCTRL", "WAITS", "UPATH", "SPATH", "CFC", "CFTCP", "CFIN",
     "CUT2D", "CUT2DF", "CUT2DD", "CDON", "CDOF", "CDOF2", "DIAMOF",
-    "TRAFOOF", "TOFRAMEOF", "TOROTOF", "PAROTOF", "TCOFR", "DISPLON", "DISPLOF", "ACTBLOCNO", "SAVE",
-    "ORIWKS", "ORIMKS", "ORIAXES", "ORIVECT", "ORIEULER", "ORIRPY", "ORIRPY2", "ORIVIRT1", "ORIVIRT2",
+    "TOFRAMEOF", "TOROTOF", "PAROTOF", "TCOFR", "DISPLON", "DISPLOF", "ACTBLOCNO", "SAVE",
+    "ORIEULER", "ORIRPY", "ORIRPY2", "ORIVIRT1", "ORIVIRT2",
     "OSOF", "OSC", "OSS", "OSSE", "OSD", "OST", "PROC", "SETPIECE", "SPCON", "SPCOF", "ISD", "FENDNORM",
     "FENDOFF", "WALIMON", "WALIMOF", "SBLON", "SBLOF", "PTPG0", "CP", "DYNNORM", "DYNPOS", "DYNROUGH",
     "DYNSEMIFIN", "DYNFINISH", "DYNPREC", "CTOLOF", "RTLION", "RTLIOF", "OVRRAP", "OVR", "SPOS",
@@ -47,6 +47,8 @@ CONTOUR_WAYS: Mapping[str, tuple[str, bool]] = {
 
 #: Statements that change how later blocks are understood.
 READ: Mapping[str, str] = {
+    "TRAFOOF": "ends TRAORI",
+    **dict.fromkeys(("ORIWKS", "ORIMKS", "ORIAXES", "ORIVECT"), "what turns evenly where the tool turns"),
     "TRANS": "a programmable offset, which replaces the programmable frame",
     "ATRANS": "a programmable offset, which adds to the programmable frame",
     **dict.fromkeys(("ROT", "AROT"), "turns the programmable frame about Z; about X and Y it is refused"),
@@ -94,7 +96,8 @@ _CYCLE = "makes its path inside the control; post the operation as plain moves"
 
 #: Statements that are refused, and why.
 REFUSED: Mapping[str, str] = {
-    **dict.fromkeys(("TRAORI", "CYCLE800", "TRACYL", "TRANSMIT", "TRAANG", "TRACON", "TRAFOON", "TCARR",
+    "TRAORI": "needs the rotary axes of the machine; describe them in the machine file",
+    **dict.fromkeys(("CYCLE800", "TRACYL", "TRANSMIT", "TRAANG", "TRACON", "TRAFOON", "TCARR",
                      "TOROT", "TOROTX", "TOROTY", "TOROTZ", "TOFRAME", "TOFRAMEX", "TOFRAMEY", "TOFRAMEZ",
                      "PAROT", "A2", "B2", "C2", "A3", "B3", "C3", "A4", "B4", "C4", "LEAD", "TILT", "THETA",
                      "ORIPATH", "ORICONCW", "ORICONCCW", "PTP"), _ROTARY),

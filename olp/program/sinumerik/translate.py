@@ -52,8 +52,9 @@ _SAME_G = np.isin(np.arange(100), [0, 1, 2, 3, 9, 17, 18, 19, 40, *range(53, 58)
 _SAME_M = ~np.isin(np.arange(100), [6, 17, 70, 97, 98, 99])
 
 
-def translate(data: bytes) -> Translation:
-    """A whole text. Lines that cannot be read are `refused` in the result; nothing is raised."""
+def translate(data: bytes, *, tips: bool = False) -> Translation:
+    """A whole text. Lines that cannot be read are `refused` in the result; nothing is raised. `tips`: words
+    may state the tip of the tool, on a machine with rotary axes."""
     text = np.frombuffer(data, np.uint8)
     starts, ends = _line_spans(text)
     signs, radius = _numbers(text)
@@ -66,7 +67,7 @@ def translate(data: bytes) -> Translation:
     canonical[radius - 1] = 32
     canonical[radius - 2] = ord("R")
     del canonical
-    words = Words()
+    words = Words(tips=tips)
     for line in lines.tolist():
         start = int(starts[line])
         code = without_comment(data[start : int(ends[line])])

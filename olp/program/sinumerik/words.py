@@ -31,6 +31,7 @@ from olp.program.sinumerik.table import (
     ROUNDING_G,
     UNROLLED,
 )
+from olp.program.sinumerik.tips import TIPS, tips_action
 
 _AXES = "XYZ"
 _OTHER_AXES = frozenset("ABCUVW")
@@ -49,7 +50,8 @@ _SPINDLE_M = frozenset({3, 4, 5, 19, 40, 41, 42, 43, 44, 45, 70})
 class Words:
     """What the special lines of a text give, line by line: see `Translation`."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, tips: bool = False) -> None:
+        self.tips = tips
         self.refused: dict[int, ProgramError] = {}
         self.actions: dict[int, tuple[Action, ...]] = {}
         self.counted: dict[int, tuple[str, str]] = {}
@@ -267,6 +269,7 @@ class _Line:
         ):
             self._write(piece.start, piece.name.encode())
             self._write(turned.start(1), turned[1])
+            self.words.closings.append(self.start + turned.end(1))
         elif piece.form is Form.WORD and piece.name in "NFSABCUVW":
             self._word(piece, piece.name.encode())
         elif address and address[1] in "FSABCUVW" and (not address[2] or address[1] in "UVW"):
@@ -311,7 +314,9 @@ class _Line:
                 self.acts.append(Tolerate(name, float(number[0])))
         elif name == "CYCLE800":
             self._tilt(arguments(self.code, piece))
-        elif name == "TRAORI" or name in REFUSED:
+        elif name in TIPS:
+            self._tips(name, arguments(self.code, piece) if piece.called else [])
+        elif name in REFUSED:
             raise refused(name)
         elif name == "RET":
             self._write(piece.start, b"M2")
@@ -321,6 +326,20 @@ class _Line:
             pass
         else:
             raise statement(piece)
+
+    def _tips(self, name: str, given: list[bytes]) -> None:
+        """TRAORI with the first transformation of the machine, which the machine file describes, and what
+        belongs to it."""
+        if name == "TRAORI" and not self.words.tips:
+            raise refused(name)
+        if name == "TRAORI" and given not in ([], [b""], [b"1"]):
+            raise ProgramError(
+                "TRAORI names another transformation than the first of the machine; program TRAORI(1)",
+                code="OLP512",
+                word=name,
+            )
+        if self.words.tips:
+            self.acts.append(tips_action(name))
 
     def _tilt(self, given: list[bytes]) -> None:
         """CYCLE800 without a tilt ends one. It may retract, and then the axes are not known."""

@@ -20,6 +20,7 @@ from olp.files.kinematics.machine import load_joint_machine
 from olp.files.sources import Source, Sources
 from olp.kinematics.errors import MachineErrors, Payload
 from olp.kinematics.machine import JointCalibration, JointMachine
+from olp.program.dialect import Dialect
 from olp.program.pointlist.axis_list import read_axis_list
 from olp.program.pointlist.base import PointList
 from olp.program.pointlist.dialect import DIALECT as AXIS_LIST
@@ -99,7 +100,7 @@ class JointRun:
             described, calibration, stated, setup, turned, digest, sources, source, (*sources.files, *files)
         )
 
-    def dialect(self, source: Source) -> Profile | PointList:
+    def dialect(self, source: Source) -> Dialect:
         """The dialect of a program on this machine. Raises ProgramError where it is not one that is read."""
         if self.setup is None:
             if self.job.dialect not in (None, AXIS_LIST.name) or not _names_axes(source.data, self.machine):
@@ -119,14 +120,14 @@ class JointRun:
         dialect = dialect_of(self.job.dialect, control, source.data, source.name)
         if isinstance(dialect, PointList):
             return dialect
-        if not isinstance(dialect, Profile) or dialect.commands is not None or dialect.translator is not None:
+        if not dialect.leads or (isinstance(dialect, Profile) and dialect.commands is not None):
             raise ProgramError(
                 f"{dialect.title} programs are not read for machines with "
-                "rotary joints; expected G-code such as "
-                "that of LinuxCNC, Fanuc or Haas, or a list of axis values",
+                "rotary joints; expected G-code such as that of LinuxCNC, Fanuc or Haas, a Sinumerik or "
+                "Heidenhain program, or a list of axis values",
                 code="OLP563",
             )
-        return dialect.with_tips()
+        return dialect.with_tips(self.machine.leads or dialect.leads)
 
     def read(self, source: Source, unrolling: UnrollOptions) -> tuple[Source, JointPath]:
         """A program and its path. Raises ProgramError with all that is refused."""
@@ -137,7 +138,7 @@ class JointRun:
         with program.errors():
             return text, self._path(program, self.setup)
 
-    def again(self, data: bytes, dialect: Profile | PointList) -> JointPath:
+    def again(self, data: bytes, dialect: Dialect) -> JointPath:
         """The path of a text that was written."""
         if isinstance(dialect, PointList) or self.setup is None:
             return self._listed(data)
@@ -145,9 +146,11 @@ class JointRun:
 
     def _path(self, program: Program, setup: Setup) -> JointPath:
         """The path of a program that was read with its words."""
+        from_zero = self.machine.tips_from_zero
         return JointPath.of(
             program, self.machine.structure, self.errors, setup.machine,
-            turned=self.turned, start_deg=self.job.start_deg, tips_from_zero=self.machine.tips_from_zero,
+            rotated=self.turned, start_deg=self.job.start_deg,
+            tips_from_zero=program.dialect.tips_from_zero if from_zero is None else from_zero,
         )  # fmt: skip
 
     def _listed(self, data: bytes) -> JointPath:

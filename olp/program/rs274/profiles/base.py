@@ -16,6 +16,7 @@ from typing import Any, TypeVar
 from olp.core.arrays import Array
 from olp.core.machine import Machine
 from olp.core.patterns import pattern
+from olp.core.toolpath import Interpolated
 from olp.core.units import AXES
 from olp.core.values import dataclass
 from olp.program.contours.rules import NGC_CONTOURS, ContourRules
@@ -106,8 +107,7 @@ class Profile(Dialect):
     - `dwell_words`: the letters that state the time of G4. `dwell_ms`: P counts milliseconds, whatever its
       form.
     - `tip_codes`: codes that switch tool centre point control on, where a machine has rotary axes: words
-    state
-      the tip then, until one of `axis_codes`.
+      state the tip then, until a code of tool lengths.
     - `commands`: each line is a command with parameters, and no code holds for the next line. None: lines are
       blocks of words.
     - `inert`: whole lines that are no words and move nothing, such as names of programs and labels.
@@ -171,7 +171,7 @@ class Profile(Dialect):
     dwell_ms: bool = False
     dwell_words: str = "P"
     tip_codes: frozenset[int] = frozenset()
-    axis_codes: frozenset[int] = frozenset({490})
+    leads: Interpolated = "axes"
     commands: Commands | None = None
     inert: re.Pattern[bytes] | None = None
     translator: Callable[[bytes], Any] | None = None
@@ -191,15 +191,14 @@ class Profile(Dialect):
         """The M codes that move no axis, ten times their number."""
         return _in_tenths(self.harmless_m, self.harmless_m_tenths)
 
-    def with_tips(self) -> Profile:
+    def with_tips(self, tips: Interpolated) -> Profile:
         """The same control on a machine with rotary axes. A tip has no length: the codes that switch tool
         centre point control on end the tool length for a reader of linear axes."""
-        if not self.tip_codes:
-            return self
         return replace(
             self,
+            tips=tips,
             codes={**self.codes, **dict.fromkeys(self.tip_codes, Act.EVENT)},
-            aliases={**self.aliases, **dict.fromkeys(self.tip_codes, min(self.axis_codes))},
+            aliases={**self.aliases, **dict.fromkeys(self.tip_codes, _LENGTH_OFF)},
         )
 
     def set_as(self, machine: Machine) -> Profile:
@@ -262,6 +261,8 @@ def increment(machine: Machine, letter: str, unit_mm: float) -> float:
     return metric if unit_mm == 1.0 else metric / 10
 
 
+#: G49, as ten times its number.
+_LENGTH_OFF = 490
 #: The words of a block that make its move an arc.
 _OF_ARC = pattern(rb"(?i)G[ \t]*0*[23](?![\d.])|[IJKRP][ \t]*[-+]?[\d.]+")
 

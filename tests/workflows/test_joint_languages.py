@@ -1,0 +1,153 @@
+"""Programs of Sinumerik and Heidenhain controls on machines with rotary axes, judged by an independent
+forward."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cases.joint_machines import machine_file, program
+from judge.five_axis import Judge
+
+import olp
+
+#: mm and rad: half a last digit of 0.001 mm or deg, of three words and of two.
+DIGITS_MM, DIGITS_RAD = 0.5e-3 * 3**0.5, np.radians(0.5e-3) * 2**0.5
+CHAINS = ("C A Y F X Z", "C F X Y Z B", "F X Y Z C B")
+
+
+def sinumerik(text: bytes, lead: str) -> bytes:
+    """A program of G-code as a Sinumerik control has it."""
+    text = text.replace(b"G21 G90 G54", b"G71 G90 G54\nT1 M6\nD1\n" + lead.encode())
+    text = re.sub(rb"G43.4 H1 (.*)", rb"TRAORI(1)\nG0 \1", text)
+    return text.replace(b"G49", b"TRAFOOF")
+
+
+def corrected(folder: Path, text: bytes, chain: str, control: str, **words: str) -> olp.JointCorrection:
+    machine = machine_file(folder, chain, control=control, **words)
+    return olp.correct_joints(text, machine, tolerance_urad=2.0)
+
+
+@pytest.mark.parametrize(
+    ("chain", "lead"), [(CHAINS[0], "ORIAXES"), (CHAINS[1], "ORIVECT"), (CHAINS[2], "ORIVECT")]
+)
+def test_traori_is_corrected_as_the_judge_finds(chain: str, lead: str, tmp_path: Path) -> None:
+    nominal = sinumerik(program(chain, seed=3, moves=3, tips=True), lead)
+    result = corrected(tmp_path, nominal, chain, "sinumerik")
+    assert result.report["verdict"]["ok"] and result.report["moves"]["with_tip_control"]
+    distance, angle = Judge(tmp_path / "machine.toml").judged(nominal, result.data)
+    assert distance <= 1.1e-3 + DIGITS_MM
+    assert angle <= 2.2e-6 + DIGITS_RAD
+
+
+def heidenhain(text: bytes) -> bytes:
+    """A program of G-code as a Heidenhain control has it."""
+    lines = [b"BEGIN PGM A MM", b"TOOL CALL 1 Z S1000"]
+    for line in text.splitlines()[1:-1]:
+        stated = re.sub(rb"([XYZABC])(?=\d)", rb"\1+", re.sub(rb"^G(?:[01]|43.4 H1) ", b"", line))
+        if line.startswith(b"G43.4"):
+            lines.append(b"FUNCTION TCPM F TCP AXIS POS PATHCTRL AXIS")
+        rapid = line.startswith((b"G0", b"G43.4"))
+        lines.append(b"L M129" if line == b"G49" else b"L " + stated + (b" R0 FMAX" if rapid else b" R0"))
+    numbered = [b"%d %s" % (k, line) for k, line in enumerate([*lines, b"END PGM A MM"])]
+    return b"\n".join(numbered) + b"\n"
+
+
+def numbers(text: bytes) -> list[tuple[bytes, bytes]]:
+    """The axis words of a program, one after the other, where each language has the same."""
+    lines = [
+        line
+        for line in text.splitlines()
+        if not re.search(rb"PGM|TCPM|CALL|olp|G21|M\d|G49|G71|[DT]\d|OR|TR", line)
+    ]
+    return re.findall(rb"([XYZABC])\+?([-\d.]+)", b"\n".join(lines))
+
+
+@pytest.mark.parametrize("tips", [False, True])
+@pytest.mark.parametrize("chain", CHAINS[:2])
+def test_each_language_has_the_words_that_gcode_has(chain: str, tips: bool, tmp_path: Path) -> None:
+    """One path in G-code, in Sinumerik and in Heidenhain words is corrected to the same numbers."""
+    text = program(chain, seed=5, moves=3, tips=tips)
+    wanted = numbers(corrected(tmp_path / "a", text, chain, "fanuc").data)
+    assert len(wanted) > len(numbers(text))
+    machine = machine_file(tmp_path / "b", chain, control="heidenhain")
+    found = olp.correct_joints(heidenhain(text), machine, tolerance_urad=2.0)
+    assert found.report["moves"]["with_tip_control"] == (5 if tips else 0)
+    assert numbers(found.data) == wanted
+    assert b"R0 FMAX\n" in found.data and b" L X+" in found.data
+    text = sinumerik(text, "ORIAXES").replace(b"D1\n", b"" if not tips else b"D1\n")
+    assert numbers(corrected(tmp_path / "c", text, chain, "sinumerik").data) == wanted
+
+
+@pytest.mark.parametrize("control", ["sinumerik", "heidenhain"])
+def test_without_errors_no_byte_changes(control: str, tmp_path: Path) -> None:
+    text = program("C A Y F X Z", seed=2, moves=4, tips=True)
+    text = heidenhain(text) if control == "heidenhain" else sinumerik(text, "ORIVECT")
+    machine = machine_file(tmp_path, "C A Y F X Z", control=control, errors=False)
+    assert olp.correct_joints(text, machine).data == text
+
+
+S_HEAD = b"G71 G90 G54\nT1 M6\nD1\nG0 X0 Y0 Z0 A-20 C30\n"
+H_HEAD = b"BEGIN PGM A MM\nTOOL CALL 1 Z\nL X+0 Y+0 Z+0 A-20 C+30 R0 FMAX\n"
+REFUSED = [
+    ("sinumerik", b"G1 C=ACP(20) F100\n", "turns it round", 5),
+    ("sinumerik", b"G1 C=DC(330) F100\n", "shortest way", 5),
+    ("sinumerik", b"G1 C=IC(5) F100\n", "a distance in G90", 5),
+    ("sinumerik", b"SCALE X2\nG0 X0 Y0 Z0\nG1 X1 F100\n", "mirrored or scaled", 6),
+    ("sinumerik", b"TRAORI(2)\n", "another transformation", 5),
+    ("sinumerik", b"D0\nTRAORI\n", "no edge", 6),
+    ("sinumerik", b"TRAORI\nD0\n", "D0 comes behind TRAORI", 6),
+    ("sinumerik", b"TRANS X5\nTRAORI\n", "programmable frame", 6),
+    ("sinumerik", b"TRAORI\nG1 A3=0 B3=0 C3=1 F100\n", "A3", 6),
+    ("sinumerik", b"TRAORI\nSUPA G0 Z0\nG1 X5 F100\n", "X, Y, Z has not been commanded", 7),
+    ("heidenhain", b"L IX+5 F100\n", "distance", 4),
+    ("heidenhain", b"L IC+5 F100\n", "distance", 4),
+    ("heidenhain", b"M126\nL C+300 F100\n", "shortest way", 5),
+    ("heidenhain", b"FUNCTION TCPM F TCP AXIS SPAT PATHCTRL AXIS\n", "AXIS POS", 4),
+    ("heidenhain", b"L A+Q120 C+Q122 FMAX\n", "parameters", 4),
+    ("heidenhain", b"CYCL DEF 7.0 DATUM SHIFT\nCYCL DEF 7.1 C+5\n", "rotary axis", 5),
+    ("heidenhain", b"M128\nL X+5 F100\n", "Y, Z has not been commanded", 5),
+]
+
+
+@pytest.mark.parametrize(("control", "text", "message", "line"), REFUSED)
+def test_what_is_not_known_is_refused_with_its_line(
+    control: str, text: bytes, message: str, line: int, tmp_path: Path
+) -> None:
+    head = S_HEAD if control == "sinumerik" else H_HEAD
+    with pytest.raises(olp.ProgramError, match=message) as caught:
+        corrected(tmp_path, head + text, "C A Y F X Z", control)
+    assert caught.value.line == line
+
+
+def test_the_tip_ends_where_m129_stands(tmp_path: Path) -> None:
+    """M128 acts at the begin of its block, M129 at the end; a later part of the move takes it along."""
+    text = (
+        H_HEAD.replace(b"A-20 C+30", b"A+0 C+0")
+        + b"L X+1 Y+1 Z+1 FMAX M128\nL X+90 A-30 F500 M129\nEND PGM A MM\n"
+    )
+    result = corrected(tmp_path, text, "C A Y F X Z", "heidenhain")
+    assert result.report["moves"]["with_tip_control"] == 2
+    parts = [line for line in result.data.splitlines() if line.startswith(b"L ")]
+    assert len(parts) > 3 and [b"M129" in line for line in parts].index(True) == len(parts) - 1
+
+
+def test_words_in_brackets_keep_them(tmp_path: Path) -> None:
+    text = S_HEAD + b"G1 C=DC(32) F100\nX=AC(5)\nM30\n"
+    lines = corrected(tmp_path, text, "C A Y F X Z", "sinumerik").data.splitlines()
+    assert any(re.match(rb"G1 C=DC\([\d.]+\)", line) for line in lines)
+    assert any(re.match(rb"X=AC\([\d.]+\) Y", line) for line in lines)
+
+
+def test_a_rotated_frame_turns_with_the_words(tmp_path: Path) -> None:
+    """A path in a frame about Z, and the same path without it, come to the same places."""
+    turned = S_HEAD + b"ROT Z90\nG0 X0 Y0 Z0\nG1 X20 Z5 F100\nM30\n"
+    plain = S_HEAD + b"G0 X0 Y0 Z0\nG1 Y20 Z5 F100\nM30\n"
+    both = [
+        corrected(tmp_path / name, text, "C A Y F X Z", "sinumerik").report
+        for name, text in (("a", turned), ("b", plain))
+    ]
+    assert both[0]["deviation"]["before"] == pytest.approx(both[1]["deviation"]["before"])
+    assert both[0]["verdict"]["ok"] and both[1]["verdict"]["ok"]
