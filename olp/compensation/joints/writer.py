@@ -48,15 +48,6 @@ class WrittenJoints:
     parts: Index
 
 
-def write_joints(path: JointPath, plan: JointPlan, stamp: bytes) -> WrittenJoints:
-    """The text with its plan. Raises ProgramError where it cannot be written, NotInvertible."""
-    if path.program.statements is None:
-        return JointWriter(path, plan).written(stamp)
-    from olp.compensation.joints.conversational import ConversationalJoints
-
-    return ConversationalJoints(path, plan).written(stamp)
-
-
 class JointWriter:
     """A writer of blocks of words."""
 

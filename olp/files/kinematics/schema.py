@@ -123,14 +123,14 @@ class KinematicsTable(Table):
     tcp_frame_zero: Literal["axis-zero", "activation"] | None = Field(
         default=None,
         description="where the frame of tool centre point control equals the work offset: with all "
-        'rotary axes at zero ("axis-zero"), or where they are when it is switched on ("activation"); if left '
-        "out, axis-zero for Sinumerik and Heidenhain controls, and not known for others",
+        'rotary axes at zero ("axis-zero"), or where they are when it is switched on ("activation"). If left '
+        "out, it is axis-zero for Sinumerik and Heidenhain controls, and not known for others",
     )
     orientation_interpolation: Literal["axes", "vector"] | None = Field(
         default=None,
         description="what tool centre point control leads evenly along a move where the program does not say "
-        'it: each rotary axis ("axes"), or the direction of the tool, along a great circle ("vector"); if '
-        'left out, "vector" for Sinumerik controls (ORIWKS), "axes" for others',
+        'it: each rotary axis ("axes"), or the direction of the tool, along a great circle ("vector"). If '
+        'left out, it is "vector" for Sinumerik controls (ORIWKS), "axes" for others',
     )
 
 

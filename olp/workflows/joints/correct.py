@@ -10,7 +10,7 @@ from typing import Any, Literal
 from olp.compensation.joints.list_writer import write_list
 from olp.compensation.joints.path import JointPath
 from olp.compensation.joints.planning import JointLimits, JointPlan, planned
-from olp.compensation.joints.writer import write_joints
+from olp.compensation.joints.writing import write_joints
 from olp.compensation.stamp import find_stamp, stamp_line
 from olp.compensation.tally import Tally
 from olp.core.errors import AlreadyCorrected, OutsideBox
