@@ -39,8 +39,8 @@ class JointPath:
 
     (n, axes) `start` and `end` are programmed coordinates in the order of the structure, mm and deg, NaN
     where unknown. In a turned frame they are along its words. The linear ones state the tip where `tip` (n,),
-    else they are axis values. In `vector` (n,) the direction of the tool goes evenly, else each axis. `slot` (n,
-    axes) are their words, -1 where there is none. `tool` is the place of the tool in `motion`, `shift_mm`
+    else they are axis values. In `vector` (n,) the direction of the tool goes evenly, else each axis. `slot`
+    (n, axes) are their words, -1 where there is none. `tool` is the place of the tool in `motion`, `shift_mm`
     (n, 3) where the part really lies. `offset` (n, axes), `unit` (n,) and, of words without a point, `scale`
     (axes,) lead from words to coordinates. `feed` are straight moves that cut, `judged` those that the
     proof judges, `kept` moves that stay uncorrected. `held` (n,) are moves whose rotary axes stay as
