@@ -30,6 +30,7 @@ def corrected(folder: Path, text: bytes, chain: str, control: str, **words: str)
     return olp.correct_joints(text, machine, tolerance_urad=2.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("chain", "lead"), [(CHAINS[0], "ORIAXES"), (CHAINS[1], "ORIVECT"), (CHAINS[2], "ORIVECT")]
 )
