@@ -27,6 +27,9 @@ _TIME = 0.1
 _MEANS = 8192
 #: points per block
 _BLOCK = 1 << 17
+#: nodes of the finest level from a point to its place, and the share of points beyond that which is doubted
+_NODES = 2.0
+_SHARE = 1e-3
 #: share of the size of a path beyond which a point is not on it
 FAR = 0.05
 #: nearest nodes that are compared where points come in no order
@@ -118,9 +121,31 @@ def coarse(
 
 
 def _in_order(path: Path, points: Array) -> tuple[Array, float]:
-    """Arc length (m,) of the node of each point, and the distance between nodes: level by level."""
+    """Arc length (m,) of the node of each point, and the distance between nodes.
+
+    Where passes lie closer than nodes of the coarsest level, as on a raster, the match there may be off by
+    some passes. The distance travelled tells them apart; it is tried where points are far from their nodes.
+    """
+    few, index, s, _ = coarse(path, points, far=FAR)
+    matched, step = _refined(path, points, index, s)
+    away_mm = _away(path, points, matched)
+    if (away_mm > _NODES * step).mean() > _SHARE:
+        travelled_mm = np.append(0.0, np.cumsum(np.sqrt((np.diff(few, axis=0) ** 2).sum(axis=1))))
+        share = travelled_mm / max(travelled_mm[-1], 1e-12)
+        other, _ = _refined(path, points, index, share * path.length_mm)
+        if _away(path, points, other).mean() < away_mm.mean():
+            matched = other
+    return matched, step
+
+
+def _away(path: Path, points: Array, s: Array) -> Array:
+    """Distances of points (m, 3) from the places at arc lengths `s` (m,)."""
+    return np.asarray(np.linalg.norm(path.at(s)[0] - points, axis=1), float)
+
+
+def _refined(path: Path, points: Array, index: Array, s: Array) -> tuple[Array, float]:
+    """As `_in_order`, level by level from arc lengths `s` (L,) at the points of numbers `index` (L,)."""
     m = len(points)
-    _, index, s, _ = coarse(path, points, far=FAR)
     finest = int(np.clip(max(len(path), m), COARSE, min(max(4 * m, COARSE), _MOST)))
     count = COARSE
     gaps = leaps(points, COARSE) if m > COARSE else np.zeros(0, np.int64)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -123,6 +125,24 @@ def test_parallel_passes_closer_than_the_deviation() -> None:
     assert (pairing.segment[inner] == segment[inner]).all()
     free = pair(path, points, "free")
     assert (free.segment[inner] != segment[inner]).mean() > 0.5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("order", ["forward", "backward"])
+def test_passes_closer_than_the_coarsest_nodes(order: Literal["forward", "backward"]) -> None:
+    """250 rows of a raster 2.4 mm apart, each of 12 nodes of the coarsest level."""
+    rows = np.repeat(np.arange(250), 2) * 2.4
+    ends = np.tile((0.0, 1000.0, 1000.0, 0.0), 125)
+    way = np.column_stack((ends, rows, np.zeros(500)))
+    path = Path.through(np.vstack((way[0] + (0, 0, 40.0), way, way[-1] + (0, 0, 40.0))))
+    s = np.linspace(0.0, path.length_mm, 40_000)
+    place, _ = path.at(s)
+    points = place + field(place) + np.random.default_rng(9).normal(0, NOISE_MM, place.shape)
+    if order == "backward":
+        points, s = points[::-1], s[::-1]
+    pairing = pair(path, points, order)
+    assert np.abs(pairing.s_mm - s).max() < 1.0
+    assert pairing.distance_mm.max() < 0.2
 
 
 @pytest.mark.slow

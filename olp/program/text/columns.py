@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import mmap
-import os
+import sys
 from math import prod
 from typing import Any
 
@@ -19,8 +19,17 @@ _MOST = 1 << 16
 #: Bytes from which an array has memory of its own. That of a smaller one is a place among others, and what is
 #: free between places in use does not go back to the system.
 _OWN = 1 << 16
-#: Such memory is of this process alone. On Windows all memory is.
-_ALONE = {} if os.name == "nt" else {"flags": mmap.MAP_PRIVATE}
+
+
+if sys.platform == "win32":
+
+    def _memory(size: int) -> mmap.mmap:
+        return mmap.mmap(-1, size)
+
+else:
+
+    def _memory(size: int) -> mmap.mmap:
+        return mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE)
 
 
 def apart(shape: tuple[int, ...], kind: npt.DTypeLike) -> npt.NDArray[Any]:
@@ -30,7 +39,7 @@ def apart(shape: tuple[int, ...], kind: npt.DTypeLike) -> npt.NDArray[Any]:
     if size < _OWN:
         return np.empty(shape, kind)
     try:
-        memory = mmap.mmap(-1, size, **_ALONE)
+        memory = _memory(size)
     except OSError:
         raise MemoryError from None
     return np.frombuffer(memory, kind).reshape(shape)
