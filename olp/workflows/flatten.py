@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import numbers
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import product
@@ -27,8 +28,8 @@ def above_zero(options: object, *names: str) -> None:
     """Raise UsageError where one of these options is stated and is no finite number above zero."""
     for name in names:
         value = getattr(options, name)
-        if value is not None and not 0.0 < value < math.inf:
-            raise UsageError(f"{name} = {value}: expected a finite number above zero")
+        if value is not None and not (isinstance(value, numbers.Real) and 0.0 < float(value) < math.inf):
+            raise UsageError(f"{name} = {value!r}: expected a finite number above zero")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

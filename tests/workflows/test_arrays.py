@@ -284,9 +284,9 @@ def test_a_simulation_has_read_only_columns(tmp_path: Path) -> None:
     assert not olp.correct(router / "outline.ngc", router / "machine.toml").groups.flags.writeable
 
 
-@pytest.mark.parametrize("value", [0.0, -1.0, math.nan, math.inf])
+@pytest.mark.parametrize("value", [0.0, -1.0, math.nan, math.inf, "5"])
 @pytest.mark.parametrize("name", ["tolerance_um", "part_tolerance_um", "peck_clearance_mm"])
-def test_a_tolerance_that_is_none_is_refused_before_the_work(name: str, value: float) -> None:
+def test_a_tolerance_that_is_none_is_refused_before_the_work(name: str, value: float | str) -> None:
     with pytest.raises(UsageError, match=rf"{name} = .*: expected a finite number above zero"):
         olp.correct(CMM / "housing.ngc", MACHINE, **{name: value})  # type: ignore[arg-type]
 
