@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from itertools import pairwise
 
@@ -17,7 +16,6 @@ from olp.core.arrays import Array, Index, Mask, distinct
 from olp.core.progress import Progress, silent
 from olp.core.toolpath import Flag
 from olp.program.bands import Band
-from olp.program.heidenhain.columns import SIDE
 from olp.program.program import Definitions
 from olp.program.text.edits import BARE, EditList, Edits
 
@@ -25,10 +23,8 @@ from olp.program.text.edits import BARE, EditList, Edits
 _LATE_M = frozenset({0, 1, 2, 5, 9, 30, 99})
 #: mm; a surface that is off by less is the same
 _SAME_MM = 1e-9
-_NUMBER = re.compile(rb"[ \t]*\d*[ \t]*")
 #: words that show whether numbers are written with a plus
 _LOOKED_AT = 4000
-_SPACED = re.compile(rb"(?i)\bF[ \t]+MAX\b")
 
 
 class ConversationalWriter(PoleWriter):
@@ -42,9 +38,7 @@ class ConversationalWriter(PoleWriter):
         self._surface = (-1, 0.0)
         self._defined = EditList(self.prefixes)
         slot = self.program.slot[self.program.slot >= 0][:_LOOKED_AT]
-        first = np.frombuffer(self.program.data, np.uint8)[self.words.number[slot]]
-        self._signed = bool((first == ord("+")).sum() > ((first != ord("+")) & (first != ord("-"))).sum())
-        self._rapid = b" F MAX" if _SPACED.search(self.program.data) else b" FMAX"
+        self._signed = self.blocks.signed(slot)
 
     def add(self, band: Band, plan: Plan, tell: Progress = silent) -> None:
         self.moves_before = band.first
@@ -203,13 +197,13 @@ class ConversationalWriter(PoleWriter):
         # a part whose rounded end is where it began needs no block
         np.subtract.at(self.parts, rows.move[tails[~some]], 1)
         lines, which = np.unique(line, return_inverse=True)
-        lead = np.array([prefixes(self.lead(n)) for n in lines.tolist()])[which]
-        trail = np.array([prefixes(self.trail(n)) for n in lines.tolist()])[which]
+        lead = np.array([prefixes(self.blocks.lead(n)) for n in lines.tolist()])[which]
+        trail = np.array([prefixes(self.blocks.trail(n)) for n in lines.tolist()])[which]
         ahead = np.flatnonzero(before & some)
         for k in ahead.tolist():
             n = int(line[k])
-            lead[k] = prefixes(self.lead(n)[len(program.eol(n)) :])
-            trail[k] = prefixes(self.trail(n) + self._feed(n) + program.eol(n))
+            lead[k] = prefixes(self.blocks.lead(n)[len(program.eol(n)) :])
+            trail[k] = prefixes(self.blocks.trail(n) + self._feed(n) + program.eol(n))
         step = (rows.flag[tails] & np.uint8(Flag.INCREMENTAL)) != 0
         order = tails * 8 + 16
         begun = np.zeros(len(tails), bool)
@@ -235,23 +229,6 @@ class ConversationalWriter(PoleWriter):
         )
         self.tally.inserted_blocks += int(some.sum())
         return edits
-
-    def lead(self, line: int) -> bytes:
-        """What comes before the name of a block that is put behind a line: a line end and the number."""
-        number = _NUMBER.match(self.program.data, int(self.program.line_start[line - 1]))
-        assert number is not None
-        return self.program.eol(line) + number[0].lstrip()
-
-    def trail(self, line: int) -> bytes:
-        """What comes behind the words of a part of a block: R0 and FMAX where the block has them."""
-        words = self.words
-        text = b""
-        for i in words.of_line(line):
-            if words.letter[i] == SIDE and words.mantissa[i] == 0:
-                text += b" R0"
-            elif words.letter[i] == ord("F") and words.mantissa[i] < 0:
-                text += self._rapid
-        return text
 
     def _feed(self, line: int) -> bytes:
         """The F word of a block, for the block that is put before it."""

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 import re
-from abc import abstractmethod
 
 import numpy as np
 
 from olp.compensation.arc_centres import ArcRows, solve
 from olp.compensation.block_arcs import radii
 from olp.compensation.block_writer import BlockWriter
+from olp.compensation.conversational_blocks import ConversationalBlocks
 from olp.compensation.rows import Rows
+from olp.compensation.writer import Task
 from olp.core.arrays import Array, Mask
 from olp.core.geometry import PLANES
 from olp.core.toolpath import Flag
@@ -34,13 +35,9 @@ class PoleWriter(BlockWriter):
 
     moves_before = 0
 
-    @abstractmethod
-    def lead(self, line: int) -> bytes:
-        """What comes before the name of a block that is put behind a line: a line end and the number."""
-
-    @abstractmethod
-    def trail(self, line: int) -> bytes:
-        """What comes behind the words of a part of a block."""
+    def __init__(self, task: Task) -> None:
+        super().__init__(task)
+        self.blocks = ConversationalBlocks(self.program)
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,7 +149,7 @@ class PoleArcs:
             numbers = {a: _number(writer, part.move, a, centre[a])[:2] for a in axes}
         self._pole = centre
         begin = int(_poles(writer).begin[part.arc])
-        lead = writer.lead(part.line)
+        lead = writer.blocks.lead(part.line)
         if part.head:
             if moved and begin >= 0:
                 self._edit_pole(writer, part, numbers, edits)
@@ -171,7 +168,7 @@ class PoleArcs:
         pieces = _pole_words(lead, numbers) if moved else []
         pieces += _end_words(writer, rows, part, centre, lead)
         direction = b" DR+" if part.sweep > 0 else b" DR-"
-        _put(edits, place, pieces, direction + writer.trail(part.line), order)
+        _put(edits, place, pieces, direction + writer.blocks.trail(part.line), order)
         writer.tally.inserted_blocks += 1 + int(moved)
 
     def _edit_pole(
@@ -243,7 +240,7 @@ class PoleArcs:
             m, d, centre[a] = _number(writer, part.move, a, part.centre[a])
             numbers[a] = (m, d)
         self._pole = centre
-        lead, eol = writer.lead(part.line), writer.program.eol(part.line)
+        lead, eol = writer.blocks.lead(part.line), writer.program.eol(part.line)
         place = int(writer.program.line_start[part.line - 1])
         _put(edits, place, _pole_words(lead[len(eol) :], numbers), eol, part.row * 8 + 21)
         name = writer.program.data.upper().index(b"CR", place)

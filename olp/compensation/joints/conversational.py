@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 
 import numpy as np
 
+from olp.compensation.conversational_blocks import ConversationalBlocks
 from olp.compensation.joints.path import JointPath
 from olp.compensation.joints.planning import JointPlan
 from olp.compensation.joints.writer import PLACES, JointWriter
 from olp.core.arrays import Index, distinct
-from olp.program.heidenhain.columns import SIDE
 from olp.program.text.edits import BARE, EditList, Edits
 
 #: M functions that act when their block has ended.
 _LATE_M = frozenset({0, 1, 2, 5, 9, 30, 129})
-_NUMBER = re.compile(rb"[ \t]*\d*[ \t]*")
-_SPACED = re.compile(rb"(?i)\bF[ \t]+MAX\b")
 
 
 class ConversationalJoints(JointWriter):
@@ -26,9 +23,8 @@ class ConversationalJoints(JointWriter):
     def __init__(self, path: JointPath, plan: JointPlan) -> None:
         super().__init__(path, plan)
         slot = path.slot[path.slot >= 0]
-        first = np.frombuffer(self.program.data, np.uint8)[self.words.number[slot]]
-        self._signed = bool((first == ord("+")).sum() > ((first != ord("+")) & (first != ord("-"))).sum())
-        self._rapid = b" F MAX" if _SPACED.search(self.program.data) else b" FMAX"
+        self._blocks = ConversationalBlocks(self.program)
+        self._signed = self._blocks.signed(slot)
 
     def _placed(self, edits: list[Edits]) -> list[Edits]:
         """Numbers that stay positive keep their plus, and new ones get one where the program writes it."""
@@ -45,23 +41,13 @@ class ConversationalJoints(JointWriter):
 
     def _starts(self, line: Index) -> tuple[list[bytes], Index]:
         lines, which = np.unique(line, return_inverse=True)
-        starts = []
-        for number in lines.tolist():
-            match = _NUMBER.match(self.program.data, int(self.program.line_start[number - 1]))
-            assert match is not None
-            starts.append(self.program.eol(number) + match[0].lstrip() + b"L ")
-        return starts, np.asarray(which, np.int64)
+        return [self._blocks.lead(n) + b"L " for n in lines.tolist()], np.asarray(which, np.int64)
 
     def _ends(self, tails: Index, line: Index, edits: EditList) -> None:
         """R0 and FMAX behind the words of each part; M functions that act at the end go to the last one."""
         words, data = self.words, self.program.data
         for row, number in zip(tails.tolist(), line.tolist(), strict=True):
-            text = b""
-            for i in words.of_line(number):
-                if words.letter[i] == SIDE and words.mantissa[i] == 0:
-                    text += b" R0"
-                elif words.letter[i] == ord("F") and words.mantissa[i] < 0:
-                    text += self._rapid
+            text = self._blocks.trail(number)
             if text:
                 place = int(self.program.line_end[number - 1])
                 edits.add(place, place, BARE, 0, text, row * PLACES + 2 * PLACES - 2)
