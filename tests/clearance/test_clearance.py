@@ -90,6 +90,7 @@ def test_a_point_in_common_is_a_contact(seed: int) -> None:
     assert nearest(swept, triangle).distance_mm.max() <= CLOSE_MM
 
 
+@pytest.mark.slow
 @few
 @given(SEEDS)
 def test_a_bound_hides_nothing_below_it(seed: int) -> None:
@@ -140,6 +141,7 @@ def test_the_search_finds_what_looking_at_all_finds(seed: int, count: int) -> No
     assert (best.tag == 7).all()
 
 
+@pytest.mark.slow
 @few
 @given(SEEDS)
 @example(9998)

@@ -103,6 +103,7 @@ def sarif(text: str) -> dict[str, Any]:
     return json.loads(text)
 
 
+@pytest.mark.slow
 def test_sarif_holds_rules_places_and_levels(tmp_path: Path) -> None:
     log = sarif(checked(tmp_path, SEVERAL, "--format", "sarif").stdout)
     assert log["version"] == "2.1.0"
@@ -205,6 +206,7 @@ def test_programs_come_from_stdin_as_well(tmp_path: Path) -> None:
     assert wrong.stderr.startswith("olp: error: <stdin>:1: ")
 
 
+@pytest.mark.slow
 def test_the_gate_passes_what_correct_wrote(tmp_path: Path) -> None:
     folder = tmp_path / "mill"
     shutil.copytree(Path(__file__).parents[2] / "programs" / "haas-mill", folder)

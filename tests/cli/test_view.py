@@ -62,6 +62,7 @@ def test_nothing_is_overwritten(job: Path) -> None:
     assert run("view", "-j", job / "job.toml", "-o", job / "none" / "out.html", "--no-time").exit_code == 2
 
 
+@pytest.mark.slow
 def test_a_corrected_program_and_measurements_are_shown(job: Path) -> None:
     corrected, measured = job / "good.ngc", job / "raw.csv"
     assert run("correct", "-j", job / "job.toml", "-o", corrected, "-q").exit_code == 0
@@ -123,6 +124,7 @@ def test_refusals_name_file_and_line(job: Path) -> None:
     assert not list(job.glob("*.html"))
 
 
+@pytest.mark.slow
 def test_correct_writes_the_page_of_what_it_wrote(job: Path) -> None:
     target, page = job / "good.ngc", job / "review.html"
     done = run("correct", "-j", job / "job.toml", "-o", target, "--review", page, "-q")

@@ -100,6 +100,7 @@ def _arc_length(points: np.ndarray) -> np.ndarray:
     return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
 
 
+@pytest.mark.slow
 def test_both_directions_on_one_line() -> None:
     rng = np.random.default_rng(6)
     u = np.linspace(0, 6 * np.pi, 9001)
@@ -255,6 +256,7 @@ def test_a_fit_that_absorbs_the_error_is_a_finding() -> None:
     assert field_after < 0.5
 
 
+@pytest.mark.slow
 @settings(max_examples=40)
 @given(
     st.lists(st.floats(-3, 3), min_size=3, max_size=3), st.lists(st.floats(-1e3, 1e3), min_size=3, max_size=3)

@@ -117,6 +117,7 @@ def departures(model, start: np.ndarray, delta: np.ndarray, tool: np.ndarray) ->
     return np.linalg.norm(error - chord, axis=2).max(axis=1)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=40)
 @given(
     st.integers(0, 10**6),

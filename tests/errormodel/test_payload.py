@@ -304,6 +304,7 @@ def test_the_error_is_linear_in_the_payload_and_its_sources_add() -> None:
     np.testing.assert_allclose(no_payload, -10.0 * one, atol=1e-14)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=40)
 @given(st.integers(0, 10**6), st.sampled_from(["linear", "cubic"]), st.sampled_from(sorted(CHAINS)))
 def test_the_chord_bound_holds_with_load(seed: int, interpolation: str, chain: str) -> None:

@@ -35,6 +35,7 @@ def one_by_one(command: np.ndarray, width: np.ndarray, start: float) -> tuple[np
     return low, high
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(
     seed=st.integers(0, 10**6),

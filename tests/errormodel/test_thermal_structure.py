@@ -145,6 +145,7 @@ def exact_log(
     return DriftLog(time, sensors, readings, name=f"log {seed}")
 
 
+@pytest.mark.slow
 def test_a_model_of_the_same_form_is_found_again() -> None:
     logs = [exact_log(STRUCTURE, seed) for seed in (1, 2)]
     fit = identify(logs, BOX, {"beam": 20.0, "column": 21.0})

@@ -100,6 +100,7 @@ def test_a_saved_profile_is_read_as_it_was(
     assert load_profile(path) == profile
 
 
+@pytest.mark.slow
 @given(st.lists(st.tuples(NUMBERS, NUMBERS, NUMBERS), min_size=1, max_size=20), st.sampled_from(";\t, "))
 def test_points_come_back(rows: list[tuple[float, float, float]], mark: str) -> None:
     text = mark.join("XYZ") + "\n" + "".join(mark.join(map(repr, row)) + "\n" for row in rows)

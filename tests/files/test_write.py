@@ -16,6 +16,7 @@ from olp.files.starter import starter_machine, write_starter
 from olp.files.write import read_bytes, write_bytes, write_files
 
 
+@pytest.mark.slow
 @given(data=st.binary(max_size=300))
 def test_what_is_written_is_read(data: bytes, tmp_path_factory: pytest.TempPathFactory) -> None:
     path = tmp_path_factory.getbasetemp() / "out.ngc"

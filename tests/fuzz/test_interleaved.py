@@ -46,6 +46,7 @@ def test_a_seed_is_one_program() -> None:
     assert grammar.legal(3) == grammar.legal(3) != grammar.legal(4)
 
 
+@pytest.mark.slow
 def test_the_grammar_draws_every_code_and_every_odd_spelling() -> None:
     text = b"\n".join(grammar.program(seed).data for seed in range(2000)).upper()
     codes = "G0 G1 G2 G3 G4 G10 G17 G18 G19 G20 G21 G28 G30 G40 G43 G43.1 G43.2 G49 G52 G53 G54 G55 G59.3 "

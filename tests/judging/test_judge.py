@@ -38,6 +38,7 @@ def machine(
     return JudgeModel(folder)
 
 
+@pytest.mark.slow
 def test_judge_is_independent() -> None:
     for path in (Path(__file__).parents[1] / "judge").glob("*.py"):
         for node in ast.walk(ast.parse(path.read_text())):
@@ -427,6 +428,7 @@ def test_a_linear_error_needs_one_chord(tmp_path: Path) -> None:
     assert chord_count((0, 0, 0), (1500, 200, 0), model, np.zeros(3), 1e-4) == 1
 
 
+@pytest.mark.slow
 def test_a_quadratic_error_needs_the_chords_of_a_parabola(tmp_path: Path) -> None:
     """A chord of length h leaves k h^2 / 4 of y = k x^2."""
     k, tolerance = 1e-6, 1e-3

@@ -156,6 +156,7 @@ def test_wrong_rows_are_refused_with_their_line(tmp_path: Path) -> None:
     assert "holds no rows" in run("calibrate", "fit", plan, "-m", machine)[1]
 
 
+@pytest.mark.slow
 def test_options_of_linear_axes_are_refused(tmp_path: Path) -> None:
     plan, _, _ = arm(tmp_path)
     machine = machine_in(tmp_path, "arm_6r_kr6")

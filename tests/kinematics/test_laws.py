@@ -217,6 +217,7 @@ def test_the_bound_of_a_turn_is_met_from_both_sides() -> None:
     assert abs(turn[-1]) < 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", some_fast(["linuxcnc_puma560", "arm_6r_kr6", "arm_7r_on_track"], 3))
 def test_no_arm_jumps_near_a_singular_posture(name: str) -> None:
     """A large turn that the orientation needs is made smaller; what the position needs is met, or refused."""

@@ -82,6 +82,7 @@ def pairs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Pair]]
         yield setups
 
 
+@pytest.mark.slow
 def test_the_copies_are_registered_and_only_here(pairs: Mapping[str, Pair]) -> None:
     assert {pair.copy.name for pair in pairs.values()} <= registry.DIALECTS.keys()
     assert all(registry.named(pair.copy.name) is pair.copy for pair in pairs.values())
@@ -137,6 +138,7 @@ def reading(text: bytes, setup: Setup, dialect: Dialect, options: Options) -> li
         return [program, str(error)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [Options(), Options(block_delete=True)], ids=str)
 @pytest.mark.parametrize("name", some_fast(NAMES, 16))
 def test_programs_are_read_and_timed_alike(pairs: Mapping[str, Pair], name: str, options: Options) -> None:
@@ -159,6 +161,7 @@ def test_programs_are_unrolled_alike(pairs: Mapping[str, Pair], name: str) -> No
             alike(lambda s, d: _unrolled(text, s, d, expand, clearance), pairs[name])  # noqa: B023
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", some_fast(NAMES, 16))
 def test_programs_are_corrected_and_judged_alike(pairs: Mapping[str, Pair], name: str) -> None:
     def corrected(text: bytes, setup: Setup) -> tuple[bytes, object, object]:

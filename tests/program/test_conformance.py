@@ -82,6 +82,7 @@ def test_every_registered_dialect_has_a_case() -> None:
 # -- L1, L3: identity ----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", some_fast(CASES, 4))
 @given(data=st.data())
 @settings(max_examples=40)
@@ -103,6 +104,7 @@ def test_l1_chosen_texts(zero: dict[str, Setup], shifted: dict[str, Setup], name
     attempt(text, shifted[name])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", some_fast(CASES, 4))
 @given(noise=st.binary(max_size=60))
 @example(noise=b"$$ \xff 'x'")
@@ -115,6 +117,7 @@ def test_l1_text_in_a_comment_is_opaque(zero: dict[str, Setup], name: str, noise
     assert olp.correct(data, zero[name]).data == data
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", some_fast(CASES, 4))
 @given(
     seed=st.integers(0, 2**20),
@@ -222,6 +225,7 @@ def commanded(
     return float(np.abs(own[match(own, want)] - want).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", some_fast(CASES, 4))
 @given(seed=st.integers(0, 2**16), digits=st.sampled_from([2, 3, 4]))
 @settings(max_examples=6)

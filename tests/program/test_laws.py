@@ -75,6 +75,7 @@ def attempt(data: bytes, path: Path) -> bytes | None:
 # -- L1, L3: identity ----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dialect", some_fast(RS274, 4))
 @given(data=st.one_of(st.binary(max_size=200), st.text(ALPHABET, max_size=120).map(str.encode)))
 @example(data=b"")

@@ -31,6 +31,7 @@ def test_a_section_stays_as_it_is(shifted: Path, end: str, off: str, on: str) ->
     assert lines[after + 1] != "X3. Y3. Z2."
 
 
+@pytest.mark.slow
 def test_a_section_may_be_long(shifted: Path) -> None:
     """Over many of the chunks in which a text is read."""
     inner = "".join(f"X{i % 97}.5\n" for i in range(120_000))

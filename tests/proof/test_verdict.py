@@ -79,6 +79,7 @@ def own_job(folder: Path, text: bytes = TEXT, seed: int = 4, recipe: Recipe = PL
     return Job(program, ("-m", path), folder)
 
 
+@pytest.mark.slow
 def test_every_consumer_says_the_same_of_a_shipped_job(tmp_path: Path) -> None:
     predicted(job_of(SHORT, tmp_path))
 

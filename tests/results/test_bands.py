@@ -70,6 +70,7 @@ def done(data: bytes, machine: Path) -> tuple[bytes, bytes]:
     return result.data, to_json(result.report)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "data", [text(700), text(700, ";", '"'), dmis_text(700)], ids=["plain", "quoted", "dmis"]
 )
@@ -151,6 +152,7 @@ _LINE = st.sampled_from(
 )  # fmt: skip
 
 
+@pytest.mark.slow
 @example(["FA(P$1)=FEAT/POINT,CART,1,2,3"], "\n")
 @example(["$$ a comment $", "FA(P1)=FEAT/POINT,CART,1,2,3"], "\r\n")
 @example(["FA(P1)=FEAT/POINT,CART,1,2,300000000"], "\n")

@@ -308,6 +308,7 @@ NUMBERS = st.from_regex(r"[-+]?(0|[1-9][0-9]{0,5})?(\.[0-9]{1,6})?", fullmatch=T
 )
 
 
+@pytest.mark.slow
 @given(NUMBERS)
 def test_a_number_written_again_is_the_same_text(text: str) -> None:
     form = number(text.encode())

@@ -172,6 +172,7 @@ def test_a_line_without_end_is_cut_and_says_so() -> None:
     assert shown(b"x" * LONGEST) == "x" * LONGEST
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["creo.ncl", "catia.aptsource", "nx.cls", "solidworks.apt"])
 def test_lines_that_are_not_changed_stand_beside_themselves(name: str) -> None:
     """Blocks are inserted at two places before the first cut: at the top, and where backlash is taken up."""

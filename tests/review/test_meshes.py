@@ -40,6 +40,7 @@ def corners(page: Page, name: str) -> np.ndarray:
     return np.array([vertices.min(axis=0), vertices.max(axis=0)])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["stl", "obj", "ply", "glb"])
 def test_a_mesh_stands_where_its_frame_is(kind: str, tmp_path: Path) -> None:
     """Work offsets of the test machine: G54 at (250, 200, -300), G55 at (420, 310, -280)."""

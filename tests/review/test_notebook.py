@@ -83,6 +83,7 @@ def feed_ends(review: Review) -> np.ndarray:
 # -- where things are --------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PREDICTED)
 def test_a_picture_is_the_nominal_path_plus_its_deviations_enlarged(
     shown: tuple[olp.Layers, judge.Window], wavy: Review, name: str
@@ -96,6 +97,7 @@ def test_a_picture_is_the_nominal_path_plus_its_deviations_enlarged(
     np.testing.assert_allclose(pairs(window, f"{name}/path"), there[ends], atol=1e-3)
 
 
+@pytest.mark.slow
 def test_known_errors_are_drawn_as_large_as_they_are_enlarged(
     enlarged: tuple[olp.Layers, judge.Window],
 ) -> None:
@@ -474,6 +476,7 @@ def test_the_animation_has_the_tip_and_the_machine_where_they_are_at_each_time(
     assert window.properties["/meshcat/olp/tool"]["position"] == scene.position_mm[0].tolist()
 
 
+@pytest.mark.slow
 def test_the_motion_starts_at_once_where_asked(wavy: Review) -> None:
     _, window = added(wavy, play=True)
     assert window.animation["options"] == {"play": True, "repetitions": 1}

@@ -71,6 +71,7 @@ def test_values_beyond_what_a_double_counts_are_refused() -> None:
             arrays.quantised("t", [0.0, value], 1.0)
 
 
+@pytest.mark.slow
 @given(st.lists(st.integers(1 - 2**48, 2**48 - 1), max_size=60), st.integers(0, 3))
 def test_whole_numbers_come_out_however_often_they_are_differenced(values: list[int], order: int) -> None:
     """Steps of any size, and paths so smooth that they are differenced."""

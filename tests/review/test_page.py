@@ -308,6 +308,7 @@ def test_a_source_shows_what_it_does(machine: Path) -> None:
         assert size.step <= max(size.largest / 200, 0.001)
 
 
+@pytest.mark.slow
 def test_findings_and_verdict_are_those_of_the_proof(machine: Path) -> None:
     result = olp.correct(TEXT, machine)
     page = Page(olp.view(TEXT, machine, correction=result, time=False).html())
@@ -361,6 +362,7 @@ def test_refusals_name_file_and_line(machine: Path, tmp_path: Path) -> None:
     assert str(foreign.value).startswith(f"{other}:")
 
 
+@pytest.mark.slow
 def test_a_corrected_program_is_shown_as_it_is(machine: Path) -> None:
     """Whoever wrote it: the proof is that of a verification."""
     result = olp.correct(TEXT, machine)
@@ -432,6 +434,7 @@ def test_a_file_that_is_not_there(machine: Path, tmp_path: Path) -> None:
         olp.view(tmp_path / "none.ngc", machine)
 
 
+@pytest.mark.slow
 def test_the_page_colours_by_band_and_by_probability(tmp_path: Path) -> None:
     machine = random_machine(tmp_path, 3)
     unknown = Page(olp.view(TEXT, machine, time=False).html())

@@ -244,6 +244,7 @@ def test_what_is_drawn_of_a_line_is_what_the_table_states(folder: str, program: 
         assert close[counts].mean() > 0.8, layer
 
 
+@pytest.mark.slow
 def test_an_unknown_side_of_the_backlash_is_told_of_each_line() -> None:
     """On the plate, whose axes have 3 um of backlash, until they have moved by it."""
     where = ROOT / "programs" / "gantry-plate"

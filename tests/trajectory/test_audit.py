@@ -93,6 +93,7 @@ def test_composed_pieces_are_bounded_and_what_is_too_large_is_measured(motion, h
         assert ratio <= max(sampled * (1 + 1e-4), 1.0 + 1e-9)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=100)
 @given(st.integers(1, 14), st.integers(1, 3), st.integers(1, 20), st.integers(0, 10**6))
 def test_the_largest_of_polynomials_is_found(degree, width, count, seed):

@@ -123,6 +123,7 @@ _SPEED = st.one_of(st.just(0.0), st.floats(1e-3, 1e3))
 _POSITIVE = st.floats(-6, 6).map(lambda e: 10.0**e)
 
 
+@pytest.mark.slow
 @settings(max_examples=300, deadline=None)
 @given(_SPEED, _POSITIVE, _POSITIVE, _POSITIVE)
 def test_what_is_reached_is_reached_in_the_length(v0: float, length: float, a: float, j: float) -> None:
@@ -158,6 +159,7 @@ def test_ramps_fit_under_the_peak(
     assert -1e-12 * length <= place <= ramps.distance(b, p, a_, j_) * (1.0 + 1e-9)
 
 
+@pytest.mark.slow
 @settings(max_examples=200, deadline=None)
 @given(_SPEED, _POSITIVE, _POSITIVE, st.floats(0.0, 1.0))
 def test_when_is_the_inverse_of_the_cubic(v: float, j: float, t: float, share: float) -> None:
@@ -167,6 +169,7 @@ def test_when_is_the_inverse_of_the_cubic(v: float, j: float, t: float, share: f
     assert got == pytest.approx(u, rel=1e-9, abs=1e-12 * t)
 
 
+@pytest.mark.slow
 @settings(max_examples=300, deadline=None)
 @given(
     st.floats(0.0, 1e3), st.floats(1e-9, 1e5), st.floats(1e-1, 1e5), st.floats(1e-1, 1e8)

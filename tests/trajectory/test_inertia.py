@@ -71,6 +71,7 @@ def test_it_is_what_samples_say(seed: int, compliance: np.ndarray) -> None:
     assert result.across_mm <= result.most_mm * (1 + 1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [0.1, 3.0])
 def test_it_is_proportional_to_the_compliance(factor: float) -> None:
     given_route, limits = random_route(5)
@@ -80,6 +81,7 @@ def test_it_is_proportional_to_the_compliance(factor: float) -> None:
         assert getattr(other, name) == pytest.approx(factor * getattr(one, name), rel=1e-9)
 
 
+@pytest.mark.slow
 @given(matrices, st.floats(1e-3, 2.0))
 def test_the_guaranteed_cap_holds_whatever_the_axes_do(compliance: np.ndarray, share: float) -> None:
     most = share * worst(LIMITS, compliance)

@@ -172,6 +172,7 @@ def test_short_runs_are_planned_together_as_well_as_one_by_one() -> None:
     assert waits.sum() == pytest.approx(route.dwell_s.sum())
 
 
+@pytest.mark.slow
 def test_blocks_and_groups_make_no_difference(monkeypatch: pytest.MonkeyPatch) -> None:
     route = arcs(30, seed=3)
     whole = plan(route, LIMITS, optimise=False)
@@ -192,6 +193,7 @@ def test_what_is_not_finite_is_refused(what: str) -> None:
         plan(replace(route, **{what: values}), LIMITS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("job", JOBS)
 def test_shipped_jobs(job: str) -> None:
     folder = PROGRAMS / job

@@ -174,6 +174,7 @@ def test_helices_in_all_planes(plane: int) -> None:
 size = st.floats(0.01, 400).map(lambda v: round(v, 3))
 
 
+@pytest.mark.slow
 @given(size, st.floats(0.05, 6.2), st.floats(1e-4, 1).map(lambda v: round(v, 5)), st.booleans())
 def test_chords_stay_within_their_share(r: float, sweep: float, tolerance: float, ccw: bool) -> None:
     x, y = r * math.cos(sweep), (1 if ccw else -1) * r * math.sin(sweep)

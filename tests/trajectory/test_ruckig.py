@@ -56,6 +56,7 @@ def check(case, duration, jerk):
     assert abs(rate - a1) <= 1e-8 * min(acceleration, most * total)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=300)
 @given(moves())
 def test_a_move_ends_at_its_target_inside_its_limits(case):
@@ -125,6 +126,7 @@ class Refuses(ruckig_moves.ruckig.Ruckig):
         return ruckig_moves.ruckig.Result.ErrorSynchronizationCalculation
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("broken", some_fast([Raises, LoopsBack, Refuses], 3))
 @settings(deadline=None, max_examples=50)
 @given(case=moves())

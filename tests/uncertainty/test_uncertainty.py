@@ -110,6 +110,7 @@ def unknowns(uncertainty: Uncertainty, chain: str = "FXYZ", repeat: float = 0.0)
     return Unknowns(Sensitivity.of(flat(), chain, uncertainty), (repeat,) * 3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("chain", "touch"), some_fast([("YFXZ", True), ("FXYZ", False), ("ZYFX", True)], 3))
 def test_an_independent_monte_carlo_agrees(chain: str, touch: bool) -> None:
     known = random_uncertainty()

@@ -216,6 +216,7 @@ def shown(result: Shown) -> Text:
     return text
 
 
+@pytest.mark.slow
 def test_notebooks_show_what_the_terminal_shows(corrected: olp.Correction, tmp_path: Path) -> None:
     program, machine = NASTY / "helix-turns.ngc", NASTY / "machine.toml"
     printed = run("correct", program, "-m", machine, "-o", tmp_path / "out.ngc").stdout

@@ -82,6 +82,7 @@ def test_a_size_of_bands_gives_the_same_of_some_that_are_shipped(
     check(monkeypatch, path, path.with_name("machine.toml"), path.with_name("job.toml"), sizes=(2,))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", some_fast(range(24), 24))
 def test_any_size_of_bands_gives_the_same_of_random_programs(
     seed: int, machine: Path, monkeypatch: pytest.MonkeyPatch
@@ -120,6 +121,7 @@ def test_any_size_of_bands_gives_the_same_of_contours(machine: Path, monkeypatch
     check(monkeypatch, text, machine)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", some_fast(range(6), 6))
 def test_any_size_of_bands_gives_the_same_where_errors_are_large(
     seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -363,6 +363,7 @@ def test_the_table_says_what_was_found(example: Path) -> None:
         assert words in shown
 
 
+@pytest.mark.slow
 def test_the_example_finds_the_errors_that_were_simulated(example: Path) -> None:
     """The independent judge reads both calibrations; the frame of the machine cannot be measured."""
     true, fitted = JudgeModel(PROGRAMS / "gantry-plate"), JudgeModel(example)
@@ -374,6 +375,7 @@ def test_the_example_finds_the_errors_that_were_simulated(example: Path) -> None
         assert simulated.rms_um(simulated.off_frame(position_mm, rest)) < 3.0
 
 
+@pytest.mark.slow
 def test_squareness_is_stated_where_a_square_is_put(example: Path) -> None:
     """At the datum as it is written, and in the middle of the box; where the pair of lines crossed it is what
     the square showed there."""

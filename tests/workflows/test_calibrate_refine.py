@@ -91,6 +91,7 @@ def test_what_is_known_exactly_does_not_move(begun) -> None:
         assert all(np.allclose(a.mean(n), b.mean(n), atol=1e-7) for n in b.names)
 
 
+@pytest.mark.slow
 def test_a_run_that_fits_nothing_is_told_and_widens(begun) -> None:
     machine, calibration, uncertainty = begun
     good = refine(calibration, machine.chain, uncertainty.scaled(0.2), run(machine, 6, 40, 0.001))

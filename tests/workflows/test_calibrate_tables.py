@@ -208,6 +208,7 @@ def test_the_table_marks_what_the_control_corrects(tmp_path: Path) -> None:
     assert "OLP876" in [f.code for f in again.findings]
 
 
+@pytest.mark.slow
 def test_commands(tmp_path: Path) -> None:
     machine = str(PROGRAMS / "gantry-plate" / "machine.toml")
     run = CliRunner()

@@ -315,6 +315,7 @@ def told(output: str) -> set[str]:
     return set(re.findall(r"error: (OLP[0-9]{3})", output))
 
 
+@pytest.mark.slow
 def test_without_a_slip_all_verbs_go_on(tmp_path: Path) -> None:
     folder = written(tmp_path / "sane")
     for verb in ("correct", "simulate", "view", "check"):

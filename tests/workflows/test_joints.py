@@ -25,6 +25,7 @@ def corrected(folder: Path, text: bytes, chain: str = "C A Y F X Z", **words: ob
     return olp.correct_joints(text, machine_file(folder, chain, **words), tolerance_urad=2.0)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("chain", "tips"), some_fast(CASES, 11))
 def test_the_judge_finds_the_corrected_path_within_tolerance(chain: str, tips: bool, tmp_path: Path) -> None:
     machine = machine_file(tmp_path, chain, control="fanuc" if tips else "linuxcnc", seed=7)

@@ -79,6 +79,7 @@ def test_without_a_part_tolerance_none_is_judged(uncertain: Path, verb: str) -> 
         assert "robab" not in to_text(report)
 
 
+@pytest.mark.slow
 def test_view_shows_the_tolerance_of_the_job_unless_the_call_gives_one(uncertain: Path) -> None:
     machine = uncertain.with_name("machine.toml")
     for given, shown_um in ((None, OF_JOB_UM), (OF_CALL_UM, OF_CALL_UM)):

@@ -45,6 +45,7 @@ def test_each_file_has_its_control() -> None:
     assert {path.name for path in FOLDER.iterdir()} == set(CONTROLS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", some_fast(CONTROLS, 3))
 def test_a_posted_program_is_corrected(name: str, setups: dict[tuple[str, bool], Setup]) -> None:
     bent = setups[CONTROLS[name], False]

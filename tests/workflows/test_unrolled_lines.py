@@ -236,6 +236,7 @@ def test_places_in_texts_for_people_and_pipelines(folder: Path, monkeypatch: pyt
     assert_moves({("other.ngc" if file else "", int(line)) for line, file in rows})
 
 
+@pytest.mark.slow
 def test_the_page_shows_the_unrolled_text_with_the_lines_of_the_files(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -372,6 +373,7 @@ def test_errors_name_the_line_and_the_file_of_the_original(
     assert (error.file, error.line) == (str(folder / "sub.ngc"), SILENT + 2)
 
 
+@pytest.mark.slow
 def test_a_bad_line_is_named_by_every_verb(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
     (folder / "bad.ngc").write_text(MAIN)

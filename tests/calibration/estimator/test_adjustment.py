@@ -70,6 +70,7 @@ def test_residuals_of_simulated_machines(family: str, seeds: range) -> None:
     assert 0.6 < np.sqrt(np.mean(z**2)) < 1.5
 
 
+@pytest.mark.slow
 def test_the_files_say_what_the_fit_says(one: tuple[simulated.Machine, Measurements, Fit]) -> None:
     """The exact model of the written curves against the linear one of the fit."""
     machine, _, fitted = one
@@ -479,6 +480,7 @@ def test_backlash_that_is_not_constant_becomes_a_direction_column(
     assert middle - ends == pytest.approx(8.0 * UM, abs=1.0 * UM)
 
 
+@pytest.mark.slow
 def test_a_slip_is_left_out_and_named(one: tuple[simulated.Machine, Measurements, Fit]) -> None:
     machine, measurements, fitted = one
     lines = list(measurements.lines)

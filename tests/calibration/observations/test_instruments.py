@@ -48,6 +48,7 @@ def in_the_frame(machine: simulated.Machine, seed: int, n: int, sigma_um: float)
 # -- TCP points in the frame of the machine --------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("chain", "with_lines"), some_fast([("YFXZ", True), ("FXYZ", False), ("ZXFY", False)], 3)
 )

@@ -230,6 +230,7 @@ TEXTS = st.lists(st.sampled_from([
 ]))  # fmt: skip
 
 
+@pytest.mark.slow
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60, deadline=None)
 @given(text=st.one_of(st.binary(max_size=100), TEXTS.map(lambda t: "".join(t).encode("latin-1"))),
        which=st.sampled_from(["own", *SHIPPED]))  # fmt: skip
@@ -249,6 +250,7 @@ LINES = st.sampled_from([
 ])  # fmt: skip
 
 
+@pytest.mark.slow
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=80, deadline=None)
 @given(lines=st.lists(LINES, max_size=14), end=st.sampled_from(["\n", "\r\n", "\r"]))
 def test_similar_lines_are_read_as_each_is_alone(

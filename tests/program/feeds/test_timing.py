@@ -517,6 +517,7 @@ numbers = st.floats(-90, 90).map(lambda v: round(v, 3))
 points = st.lists(st.tuples(numbers, numbers, numbers), min_size=2, max_size=8)
 
 
+@pytest.mark.slow
 @given(points, st.floats(0.01, 100).map(lambda v: round(v, 3)))
 def test_inverse_time_is_the_time_of_each_block(
     waypoints: list[tuple[float, float, float]], f: float

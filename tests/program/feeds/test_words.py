@@ -83,6 +83,7 @@ def test_style_is_kept(name: str) -> None:
     np.testing.assert_allclose(got, halves, rtol=0.01)
 
 
+@pytest.mark.slow
 @given(
     st.decimals(min_value="0.001", max_value=99999, places=3).map(str) | st.integers(1, 99999).map(str),
     st.floats(0.001, 1.5),

@@ -282,6 +282,7 @@ def test_a_split_block_repeats_r0_and_fmax_and_its_late_functions_come_last(bent
     assert all(block.endswith(b" R0 F MAX") for block in split[1:-1])
 
 
+@pytest.mark.slow
 def test_corrected_text_is_read_band_by_band_alike(bent: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     data = b"".join(
         random_program(seed, 40).split(b"FMAX M30")[0].rsplit(b"\n", 1)[0] + b"\n" for seed in (1, 2)

@@ -113,6 +113,7 @@ def test_expressions_are_bounded_in_depth_and_value(value: str, expected: str) -
     assert caught.value.line == 2
 
 
+@pytest.mark.slow
 def test_a_long_sum_is_no_deep_one() -> None:
     text = f"G0 X[{'+'.join(['1'] * 9000)}]\n"
     assert unroll.flatten(text.encode(), profile()) == b"G0 X9000\n"

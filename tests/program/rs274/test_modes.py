@@ -276,6 +276,7 @@ def outcome(text: str, setup: Setup, control: str) -> object:
     return columns
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("control", ["linuxcnc", "fanuc"])
 def test_what_is_read_does_not_depend_on_the_chunks(
     control: str, setups: dict[str, Setup], monkeypatch: pytest.MonkeyPatch

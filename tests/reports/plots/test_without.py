@@ -41,6 +41,7 @@ def test_the_rest_works_without(without: None, tmp_path: Path) -> None:
     assert (tmp_path / "a.md").stat().st_size > 1000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [
     ("correct", PROGRAM, "-m", MACHINE, "-o", "a.ngc"),
     ("calibrate", "fit", LINES, "-m", LINES / "machine.toml", "-o", "a.toml"),
