@@ -149,8 +149,9 @@ def ending_of(file: str) -> str:
 
 def dialect_of(name: str | None, control: Dialect, data: bytes, file: str) -> Dialect:
     """The dialect of a program: the one that is named, else what its text and the ending of its file show,
-    else that of the control. Raises UsageError for an unknown name, ProgramError where text and ending
-    contradict each other or leave several dialects possible."""
+    else that of the control, which also has endings that programs of it share with those of another. Raises
+    UsageError for an unknown name, ProgramError where text and ending contradict each other or leave several
+    dialects possible."""
     if name is not None:
         return named(name)
     names = _by_text(data)
@@ -174,7 +175,8 @@ def dialect_of(name: str | None, control: Dialect, data: bytes, file: str) -> Di
                 code="OLP503",
             )
         return DIALECTS[one]
-    return DIALECTS[ending] if ending is not None else control
+    shared = ending_of(file) in control.folder_endings
+    return control if ending is None or shared else DIALECTS[ending]
 
 
 def _by_ending(file: str) -> str | None:

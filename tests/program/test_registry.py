@@ -44,6 +44,12 @@ def test_an_ending_comes_before_the_control(file: str) -> None:
     assert chosen(None, b"", "a.cls.nc") == "haas"
 
 
+def test_an_ending_of_the_control_too_leaves_the_dialect_to_it() -> None:
+    assert chosen(None, b"G291\nG0 X1\n", "A.MPF", "siemens-iso") == "siemens-iso"
+    assert chosen(None, b"R1=5\nG0 X1\n", "a.mpf", "siemens-iso") == "sinumerik"
+    assert chosen(None, b"G0 X1\n", "a.mpf") == chosen(None, b"", "a.spf", "sinumerik") == "sinumerik"
+
+
 def test_a_text_that_two_dialects_share_is_decided_by_ending_or_control() -> None:
     assert chosen(None, SHARED, "a.dmi") == "dmis"
     assert chosen(None, SHARED, "a.ncl") == "apt"
