@@ -95,6 +95,14 @@ def test_a_later_level_of_okuma_holds_from_its_own_block_on(okuma) -> None:  # t
     assert [row[2] for row in path(program) if row[0] in (10, 20)] == [50, 2, -5, 20, 20, 2, -5, 30]
 
 
+@pytest.mark.parametrize(("synchronous", "plain"), [("G284", "G84"), ("G274", "G74")])
+def test_synchronous_taps_of_okuma_have_the_strokes_of_its_taps(  # type: ignore[no-untyped-def]
+    synchronous: str, plain: str, okuma
+) -> None:
+    taps = "G71 Z20.\nM3 S500\n{} X10. Y5. R4. Z-8. F625. M53\nX30. M54\nG80\n"
+    assert path(okuma(taps.format(synchronous))) == path(okuma(taps.format(plain)))
+
+
 @pytest.mark.parametrize(
     ("body", "code", "line", "why"),
     [

@@ -2,8 +2,8 @@
 
 Differs from Fanuc: G15 H selects the work offset, G56 H calls up a tool length along Z and G53 ends it; G54,
 G55 and G57 to G59 are lengths of other axes. G62 mirrors. The time of G4 is F. Canned cycles return to the
-level of G71 with M53, and to R with M54. Variables, CALL and branches are refused. Names of programs and
-labels in letters stay.
+level of G71 with M53, and to R with M54. G284 and G274 are synchronous taps. Variables, CALL and branches are
+refused. Names of programs and labels in letters stay.
 
 Source: programming manuals of OSP-E10M, OSP-E100M and OSP-P200M.
 """
@@ -52,7 +52,7 @@ DIALECT = replace(
         160: "G16 (a work offset for one block) is not read; use G15",
         620: "G62 (mirror image) is not read; post the coordinates",
     },
-    aliases={150: 541, 560: 430, 530: 490, 541: NO_CODE, 430: NO_CODE, 490: NO_CODE},
+    aliases={150: 541, 560: 430, 530: 490, 2740: 740, 2840: 840, 541: NO_CODE, 430: NO_CODE, 490: NO_CODE},
     offset_words={541: "H"},
     offset_names={541: "G15"},
     harmless_m=ISO.harmless_m - {48, 49} | {50, 51, 53, 54},
