@@ -60,7 +60,7 @@ FORMATS = ("csv", "npz", "parquet", "ros", "pvt")
     "--format",
     "kind",
     type=click.Choice(FORMATS),
-    help="Format of OUT. Default: by its suffix (.csv, .npz, .parquet, .json for ROS), else csv.",
+    help="Format of OUT. Default: by its ending (.csv, .npz, .parquet, .json for ROS); csv on stdout.",
 )
 @click.option("--cycle-ms", type=Length(), default=1.0, show_default=True, help="Time between samples.")
 @click.option(
@@ -119,6 +119,8 @@ def command(program: str | None, machine: str | None, job: str | None, **words: 
     from olp.files.write import write_files
     from olp.workflows import retime
 
+    for target in files_of(outputs.output):
+        retime.format_of(target, outputs.kind)
     options = options_of(retime.RetimeOptions, words | {"study_blend": words["blend_study"]})
     sources = call.session.sources
     second = None if nominal is None else source(sources, nominal)

@@ -145,7 +145,7 @@ class Retiming(Shown):
     ) -> dict[Path, Iterator[bytes]]:  # fmt: skip
         """The files of `write`, by path: one file, or `name-1.csv`, `name-2.csv` ... of several stretches."""
         target = Path(path)
-        chosen = kind or _SUFFIX.get(target.suffix.lower(), "csv")
+        chosen = format_of(target, kind)
         if stretch is not None or len(self.trajectories) == 1:
             return {target: self._counted(chosen, cycle_s, stretch, progress)}
         self._any()
@@ -211,7 +211,7 @@ class Retiming(Shown):
         stretch: int | None = None, *, force: bool = False,
     ) -> list[Path]:  # fmt: skip
         """Write the samples; the format is that of the suffix (.csv, .npz, .parquet, .json for ROS) unless
-        given. All files or none. Raises as `parts` and `olp.files.write.write_files` do."""
+        given. All files or none. Raises as `parts`, `format_of` and `olp.files.write.write_files` do."""
         written = self.files(path, kind, cycle_s, stretch)
         write_files(written, force=force)
         return list(written)
@@ -220,6 +220,19 @@ class Retiming(Shown):
 _WRITERS: Mapping[Format, Callable[[Trajectory, float], Iterator[bytes]]] = {
     "csv": files.csv, "npz": files.npz, "parquet": files.parquet, "ros": files.ros, "pvt": files.pvt,
 }  # fmt: skip
+
+
+def format_of(target: PathLike, kind: Format | None) -> Format:
+    """The format of a trajectory: `kind`, else that of the ending of the file. Raises UsageError for an
+    ending that names none."""
+    chosen = kind or _SUFFIX.get(Path(target).suffix.lower())
+    if chosen is None:
+        endings = ", ".join(_SUFFIX)
+        raise UsageError(
+            f"the trajectory {str(target)!r} ends in no known format; expected {endings} (.json for ROS), or "
+            "name the format"
+        )
+    return chosen
 
 
 def numbered(target: Path, number: int) -> Path:

@@ -133,6 +133,17 @@ def test_parquet_or_its_refusal(job: Path, tmp_path: Path) -> None:
     np.testing.assert_array_equal(held["X_mm"].to_numpy(), timing.trajectory.at(times)[0][:, 0])
 
 
+def test_an_unknown_ending_is_refused_with_the_list(job: Path, tmp_path: Path) -> None:
+    part, target = program(tmp_path), tmp_path / "out.rsf"
+    result = run("retime", part, "-j", job, "-o", target)
+    assert result.exit_code == 2
+    assert ".csv, .npz, .parquet, .json" in result.stderr
+    assert not target.exists()
+    with pytest.raises(UsageError, match=r"\.csv, \.npz"):
+        olp.retime(part, job.with_name("machine.toml"), job).write(target)
+    assert run("retime", part, "-j", job, "-o", target, "--format", "pvt").exit_code == 0
+
+
 def test_long_files_are_made_in_parts(job: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("olp.files.trajectory.ROWS", 500)
     timing = olp.retime(program(tmp_path), job.with_name("machine.toml"), job)
