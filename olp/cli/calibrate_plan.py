@@ -25,7 +25,7 @@ from olp.cli.options import (
 )
 from olp.core.errors import UsageError
 
-METHODS = ("lines", "tracker", "lines-and-tracker", "pods", "multilateration")
+METHODS = ("lines", "targets", "tracker", "lines-and-tracker", "pods", "multilateration")
 
 
 @click.command("plan")
@@ -40,7 +40,11 @@ METHODS = ("lines", "tracker", "lines-and-tracker", "pods", "multilateration")
 )
 @click.option(
     "--next", "next_", type=Count(min=1), metavar="N",
-    help="The N points of a tracker, or stations of lengths, that help most now.",
+    help="The N points of a tracker, stations of lengths, lines, or targets of lines, that help most now.",
+)  # fmt: skip
+@click.option(
+    "--component", multiple=True, metavar="EXX",
+    help="With --next of lines and targets: an error that you can read; repeat it. Default: all but ECZ.",
 )  # fmt: skip
 @click.option(
     "--calibration", metavar="CALIBRATION",
@@ -76,6 +80,7 @@ def command(
     instrument: str | None,
     points: int | None,
     next_: int | None,
+    component: tuple[str, ...],
     calibration: str | None,
     criterion: Literal["A", "D"],
     box: tuple[float, float, float, float, float, float] | None,
@@ -121,13 +126,15 @@ def command(
         "points": points,
     }
     if next_ is None:
-        if calibration is not None or criterion != "A":
-            raise UsageError("--calibration and --criterion are for --next N; add it")
+        if calibration is not None or criterion != "A" or component or instrument == "targets":
+            raise UsageError("--calibration, --criterion, --component and targets are for --next N; add it")
         known = next((name for name in INSTRUMENTS if name == instrument), None)
         plan = plan_measurements(machine, instrument=known, periods_mm=periods_mm, **shared)
     else:
         if any(periods_mm) or instrument not in (None, *NEXT):
-            raise UsageError(f"--next chooses for {' or '.join(NEXT)}, and without --period-x, -y and -z")
+            raise UsageError(f"--next chooses for {', '.join(NEXT)}, and without --period-x, -y and -z")
+        if component and instrument not in (None, "lines", "targets"):
+            raise UsageError(f"--component is for lines and targets, not for {instrument}")
         offered = next((name for name in NEXT if name == instrument), None)
         plan = plan_next(
             machine,
@@ -135,6 +142,7 @@ def command(
             instrument=offered,
             calibration=calibration,
             criterion=criterion,
+            components=component,
             date=date,
             **shared,
         )

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import datetime
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any, Literal
 
-from olp.calibration.design import offers
+from olp.calibration.design import line_offers, offers
 from olp.calibration.design.choosing import Criterion, choose
 from olp.calibration.design.known import Known, judged_rows
 from olp.calibration.design.prediction import Prediction, known_of_machines
@@ -31,8 +31,8 @@ from olp.workflows.calibrate_plan import (
 from olp.workflows.measuring_time import DWELL_S
 from olp.workflows.session import PathLike, Session
 
-NextInstrument = Literal["tracker", "multilateration"]
-NEXT: tuple[NextInstrument, ...] = ("tracker", "multilateration")
+NextInstrument = Literal["tracker", "multilateration", "lines", "targets"]
+NEXT: tuple[NextInstrument, ...] = ("tracker", "multilateration", "lines", "targets")
 #: Points that every station measures.
 TARGETS = 60
 #: Seed of random positions; another one than that of a first plan.
@@ -53,13 +53,16 @@ def plan_next(
     dwell_s: float | None = None,
     settle_s: float = 1.0,
     points: int | None = None,
+    components: Collection[str] = (),
     date: datetime.date | None = None,
 ) -> MeasurementPlan:
-    """The `count` points of a tracker, or stations of lengths to `points` points each, that help most.
+    """The `count` points of a tracker, stations of lengths to `points` points each, lines, or targets of
+    lines, that help most.
 
     `calibration` is what was measured so far; its covariance says what is known already. That has faded by
     its growth_per_year until `date`. Without one nothing was measured. Criterion "A" lowers the mean square
-    of the error over the box, "D" the volume of all uncertainty. The other arguments are those of
+    of the error over the box, "D" the volume of all uncertainty. `components` are the errors that lines may
+    read, all of them if left out. The other arguments are those of
     `plan_measurements`; without `box_mm` it is the calibrated box. Raises UsageError, ConfigError and
     CannotCompute.
     """
@@ -77,7 +80,7 @@ def plan_next(
     before = 0.0
     for name in NEXT if instrument is None else (instrument,):
         wait = (DWELL_S[name] if dwell_s is None else dwell_s) + settle_s
-        offer, noun = _offer(name, described, known, box, reflectors, sigma, points or TARGETS)
+        offer, noun = _offer(name, described, known, box, reflectors, sigma, points or TARGETS, components)
         if not offer.fewest <= count <= len(offer.candidates.rows):
             raise UsageError(
                 f"{count} {noun} cannot be planned; expected {offer.fewest} to {len(offer.candidates.rows)}"
@@ -127,12 +130,20 @@ def _known(
 
 def _offer(
     name: NextInstrument, machine: Machine, known: Known, box: Array, tools: Sequence[Vector], sigma: float,
-    targets: int,
+    targets: int, components: Collection[str],
 ) -> tuple[offers.Offer, str]:  # fmt: skip
     if name == "tracker":
         return offers.points(machine.name, known, box, tools, sigma, _SEED), "points of a tracker"
-    offer = offers.stations(machine.name, known, box, tools, targets, _SEED)
-    return offer, f"stations with {targets} lengths"
+    if name == "multilateration":
+        offer = offers.stations(machine.name, known, box, tools, targets, _SEED)
+        return offer, f"stations with {targets} lengths"
+    wanted = components or line_offers.READ
+    unknown = sorted(set(wanted) - set(line_offers.READ))
+    if unknown:
+        raise UsageError(f"{unknown[0]} is read by no line; expected some of {', '.join(line_offers.READ)}")
+    if name == "lines":
+        return line_offers.lines(machine.name, known, box, tools[0], wanted, _SEED), "lines"
+    return line_offers.targets(machine.name, known, box, tools[0], wanted), "targets of lines"
 
 
 __all__ = ["NEXT", "NextInstrument", "plan_next"]

@@ -28,7 +28,8 @@ from olp.workflows.measuring_time import DWELL_S, passes_of, seconds_of, set_up_
 from olp.workflows.session import PathLike, Session
 from olp.workflows.shown import Filed
 
-Instrument = Literal["lines", "tracker", "lines-and-tracker", "pods", "multilateration"]
+Instrument = Literal["lines", "targets", "tracker", "lines-and-tracker", "pods", "multilateration"]
+#: Methods of a first plan.
 INSTRUMENTS: tuple[Instrument, ...] = ("lines", "tracker", "lines-and-tracker", "pods", "multilateration")
 #: Numbers of points that are tried, fewest first.
 COUNTS = (30, 60, 120, 250, 500, 1000)

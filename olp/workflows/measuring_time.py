@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -14,24 +14,32 @@ from olp.calibration.observations.pods import Pods
 from olp.calibration.observations.points import Points
 from olp.core.arrays import Array
 from olp.core.machine import Machine
-from olp.core.units import AXES
-from olp.files.measurements.plan_files import Pass
+from olp.files.measurements.plan_files import Pass, unused_name
 
 #: Minutes to set up a line, an instrument at a station, and another reflector.
 SET_UP_MIN = {"line": 30.0, "station": 45.0, "reflector": 5.0}
 #: Seconds of a reading, by instrument.
-DWELL_S = {"lines": 3.0, "tracker": 3.0, "lines-and-tracker": 3.0, "pods": 5.0, "multilateration": 2.0}
+DWELL_S = {
+    "lines": 3.0,
+    "targets": 3.0,
+    "tracker": 3.0,
+    "lines-and-tracker": 3.0,
+    "pods": 5.0,
+    "multilateration": 2.0,
+}
 #: Lines overrun their first and last target by this, in mm, so that backlash is taken up.
 OVERRUN_MM = 5.0
 
 
 def passes_of(measurements: Measurements, machine: Machine, wait_s: float, box: Array) -> Iterator[Pass]:
     """Runs of the machine, each with one instrument at one station and one reflector."""
-    for axis in AXES:
-        own = [line for line in measurements.lines if line.component[2] == axis]
-        if own:
-            k, line = AXES.index(axis), own[0]
-            yield _line_pass(axis, k, line, machine, wait_s, box, len(own))
+    together: dict[tuple[int, bytes, tuple[float, ...]], list[Line]] = {}
+    for line in sorted(measurements.lines, key=lambda line: line.axis):
+        beside = (*line.line_mm[: line.axis], 0.0, *line.line_mm[line.axis + 1 :])
+        together.setdefault((line.axis, line.target_mm.tobytes(), beside), []).append(line)
+    names: set[str] = set()
+    for own in together.values():
+        yield _line_pass(own, machine, wait_s, box, unused_name(f"line-{own[0].component[2].lower()}", names))
     rays = measurements.of(Lengths)
     for cloud in measurements.scattered:
         if any(cloud is later for later in rays[1:]):
@@ -49,9 +57,10 @@ def passes_of(measurements: Measurements, machine: Machine, wait_s: float, box: 
             )  # fmt: skip
 
 
-def _line_pass(
-    axis: str, k: int, line: Line, machine: Machine, wait_s: float, box: Array, lines: int
-) -> Pass:
+def _line_pass(lines: Sequence[Line], machine: Machine, wait_s: float, box: Array, name: str) -> Pass:
+    """The run of lines along one axis at one place with the same targets."""
+    line = lines[0]
+    axis, k = line.component[2], line.axis
     target, run = line.target_mm, line.run
     low, high = machine.axes[axis].travel_mm
     first, last = float(target.min()), float(target.max())
@@ -66,8 +75,9 @@ def _line_pass(
     points[:, k] = [q for q, _ in stops]
     waits = [0.0, *(wait for _, wait in stops)]
     runs = len(np.unique(run))
-    words = f"lines along {axis}: {runs} runs in both directions, once for each error of {axis}"
-    return Pass(f"line-{axis.lower()}", _approached(points, box), waits, words, f"line {axis}", repeats=lines)
+    errors = ", ".join(line.component for line in lines)
+    words = f"lines along {axis}: {runs} runs in both directions, once for each of {errors}"
+    return Pass(name, _approached(points, box), waits, words, name, repeats=len(lines))
 
 
 def _approached(points: Array, box: Array) -> Array:

@@ -3,6 +3,7 @@ other, and then exchanged while that helps (V. V. Fedorov, 1972)."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
@@ -19,6 +20,9 @@ Criterion = Literal["A", "D"]
 _SHARED_MM = 1.0
 #: Every reading is exchanged for a better one at most so often.
 _ROUNDS = 3
+#: Readings that leave less than this share of a variance are not given back by a change of the covariance:
+#: rounding would count.
+_SAFE = 1e-5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,13 +54,24 @@ class _Knowledge:
         size, shared = candidates.rows.shape[2], candidates.shared.shape[2]
         self.rows = np.concatenate([candidates.rows, candidates.shared], axis=2)
         self.shared = candidates.shared
-        self.shared_precision = np.eye(shared) / _SHARED_MM**2
-        self.covariance = np.diag(np.concatenate([np.ones(size), np.full(shared, _SHARED_MM**2)]))
+        self.before = np.diag(np.concatenate([np.ones(size), np.full(shared, _SHARED_MM**2)]))
         self.judged = np.pad(judged, ((0, 0), (0, shared)))
+        self.begin(())
+
+    def begin(self, taken: Sequence[int]) -> None:
+        """Begin with the readings of some candidates, and of no others."""
+        self.free = np.ones(len(self.rows), bool)
+        self.free[list(taken)] = False
+        self.covariance = self.before
+        self.shared_precision = np.eye(self.shared.shape[2]) / _SHARED_MM**2
+        for one in taken:
+            seen = self.covariance @ self.rows[one].T
+            inner = np.eye(seen.shape[1]) + self.rows[one] @ seen
+            self.covariance = self.covariance - seen @ np.linalg.solve(inner, seen.T)
+            self.shared_precision = self.shared_precision + self.shared[one].T @ self.shared[one]
         seen = self.rows @ self.covariance
         self.spread = seen @ self.rows.transpose(0, 2, 1)
         self.across = seen @ self.judged.T
-        self.free = np.ones(len(self.rows), bool)
 
     @property
     def square(self) -> float:
@@ -73,6 +88,14 @@ class _Knowledge:
             known = self.shared @ np.linalg.solve(self.shared_precision, self.shared.transpose(0, 2, 1))
             gain = np.linalg.slogdet(inner)[1] - np.linalg.slogdet(np.eye(known.shape[1]) + known)[1]
         return int(np.argmax(np.where(self.free, gain, -np.inf)))
+
+    def give_back(self, one: int, others: Sequence[int]) -> None:
+        """Give back the readings of a candidate; those of others are kept."""
+        left = np.linalg.eigvalsh(np.eye(self.spread.shape[1]) - self.spread[one])[0]
+        if left > _SAFE:
+            self.take(one, -1.0)
+        else:
+            self.begin(others)
 
     def take(self, one: int, sign: float = 1.0) -> None:
         """Take the readings of a candidate, or give them back with sign -1."""
@@ -98,7 +121,7 @@ def choose(candidates: Candidates, judged: Array, count: int, criterion: Criteri
     for _ in range(_ROUNDS):
         before = list(taken)
         for k, one in enumerate(before):
-            knowledge.take(one, -1.0)
+            knowledge.give_back(one, [*taken[:k], *taken[k + 1 :]])
             taken[k] = _took(knowledge, criterion)
         if taken == before:
             break

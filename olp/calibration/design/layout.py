@@ -119,30 +119,12 @@ def lines(
     it."""
     middle = np.round(box_mm.mean(axis=1), 1)
     place = (float(middle[0]), float(middle[1]), float(middle[2]))
-    targets = [_targets(box_mm[k], periods_mm[k], seed + k) for k in range(3)]
+    targets = [line_targets(box_mm[k], periods_mm[k], seed + k) for k in range(3)]
     states: list[LineState] = []
 
     def add(name: str, square: str | None = None, reflector: Vector = tool) -> None:
-        axis = AXES.index(name[2])
-        both_ways = np.concatenate([targets[axis], targets[axis][::-1]])
-        side = np.repeat([1, -1], len(targets[axis]))
-        n = len(both_ways)
-        half = 0.5 * float(np.ptp(targets[axis]))
-        sigma = ANGLE if name[1] in "ABC" else LASER if name[1] == name[2] else LASER + LASER_SCALE * half
-        line = Line(
-            name,
-            np.tile(both_ways, RUNS),
-            np.zeros(n * RUNS),
-            np.repeat(np.arange(1, RUNS + 1), n),
-            np.tile(side, RUNS),
-            place,
-            reflector,
-            square=square,
-            sigma=sigma,
-            sigma_scale=LASER_SCALE if name[1] == name[2] else 0.0,
-            source=f"{name.lower()}.csv",
-        )
-        states.append(LineState(line, Noise(sigma, _DRIFT * sigma, None)))
+        q = targets[AXES.index(name[2])]
+        states.append(line(name, q, place, reflector, box_mm, square, f"{name.lower()}.csv"))
 
     for a in AXES:
         add(f"E{a}{a}")
@@ -156,6 +138,38 @@ def lines(
     squares = tuple(Square(f"square {a}{b}", 0.0, SQUARE) for a, b in itertools.combinations(AXES, 2))
     x, y, z = (tuple(map(float, p)) for p in periods_mm)
     return Planned(machine, tuple(states), squares, (x, y, z))
+
+
+def line(
+    name: str, targets_mm: Array, place_mm: Vector, tool: Vector, box_mm: Array, square: str | None,
+    source: str,
+) -> LineState:  # fmt: skip
+    """A line of a component in runs of both directions, with the noise of its instrument."""
+    both_ways = np.concatenate([targets_mm, targets_mm[::-1]])
+    n = len(both_ways)
+    sigma = line_sigma(name, box_mm)
+    taken = Line(
+        name,
+        np.tile(both_ways, RUNS),
+        np.zeros(n * RUNS),
+        np.repeat(np.arange(1, RUNS + 1), n),
+        np.tile(np.repeat([1, -1], len(targets_mm)), RUNS),
+        place_mm,
+        tool,
+        square=square,
+        sigma=sigma,
+        sigma_scale=LASER_SCALE if name[1] == name[2] else 0.0,
+        source=source,
+    )
+    return LineState(taken, Noise(sigma, _DRIFT * sigma, None))
+
+
+def line_sigma(name: str, box_mm: Array) -> float:
+    """Noise of a reading of a component along its axis of the box, mm or rad."""
+    if name[1] in "ABC":
+        return ANGLE
+    half = 0.5 * float(np.ptp(box_mm[AXES.index(name[2])]))
+    return LASER if name[1] == name[2] else LASER + LASER_SCALE * half
 
 
 def together(first: Planned, second: Planned) -> Planned:
@@ -181,7 +195,7 @@ def around(box_mm: Array, stations: int) -> Array:
     )
 
 
-def _targets(side: Array, periods_mm: Sequence[float], seed: int) -> Array:
+def line_targets(side: Array, periods_mm: Sequence[float], seed: int) -> Array:
     """Targets off equal steps by random parts of a period, as ISO 230-2 asks, at which every period is
     observable. Raises CannotCompute where there are none."""
     low, high = side.tolist()

@@ -81,8 +81,13 @@ def predict(planned: Planned, chain: str, box_mm: Array, tools: Sequence[Vector]
 
 def known_of_machines(chain: str, box_mm: Array) -> Known:
     """What is known of a machine of which nothing was measured yet."""
-    parameters = _parameters(Measurements(""), chain, box_mm)
+    parameters = parameters_of_machines(chain, box_mm)
     return Known.of_prior(parameters, Prior(parameters, {}, {}, dict(TYPICAL)).precision()[0])
+
+
+def parameters_of_machines(chain: str, box_mm: Array) -> Parameters:
+    """The unknowns of a machine of which nothing was measured yet."""
+    return _parameters(Measurements(""), chain, box_mm)
 
 
 def _parameters(taken: Measurements, chain: str, box_mm: Array) -> Parameters:

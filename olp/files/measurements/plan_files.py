@@ -56,7 +56,7 @@ def plan_files(
     for state in planned.states:
         taken = state.observation
         instrument = planner_of(taken)
-        name = _unused(f"{taken.source.removesuffix('.csv').replace(' ', '-')}.csv", used)
+        name = unused_name(f"{taken.source.removesuffix('.csv').replace(' ', '-')}.csv", used)
         text += ["", *instrument.asked(taken, name)]
         yield name, instrument.empty(taken, _rows(state, planned, passes))
     yield PLAN, ("\n".join(text) + "\n").encode()
@@ -73,10 +73,12 @@ def _rows(state: State, planned: Planned, passes: Sequence[Pass]) -> Index:
     return np.arange(state.count)
 
 
-def _unused(name: str, used: set[str]) -> str:
-    stem, k = name.removesuffix(".csv"), 1
+def unused_name(wanted: str, used: set[str]) -> str:
+    """The name, or with a number where it is used already; it is used then."""
+    first, dot, ending = wanted.partition(".")
+    name, k = wanted, 1
     while name in used:
         k += 1
-        name = f"{stem}-{k}.csv"
+        name = f"{first}-{k}{dot}{ending}"
     used.add(name)
     return name
