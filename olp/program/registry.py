@@ -149,7 +149,7 @@ def ending_of(file: str) -> str:
 
 def dialect_of(name: str | None, control: Dialect, data: bytes, file: str) -> Dialect:
     """The dialect of a program: the one that is named, else what its text and the ending of its file show,
-    else that of the control, which also has endings that programs of it share with those of another. Raises
+    else that of the control. An ending that programs of the control have too shows no other dialect. Raises
     UsageError for an unknown name, ProgramError where text and ending contradict each other or leave several
     dialects possible."""
     if name is not None:
