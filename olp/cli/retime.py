@@ -26,6 +26,7 @@ from olp.cli.options import (
     NUMBER,
     Count,
     Length,
+    Range,
     doubt_options,
     fail_on_option,
     file_option,
@@ -74,6 +75,11 @@ FORMATS = ("csv", "npz", "parquet", "ros", "pvt")
     help="Limit accelerations so that the machine deflects by no more than this.",
 )
 @click.option("--blend-study", is_flag=True, help="Also report time and deviation at other path tolerances.")
+@click.option(
+    "--feed-override", type=Range(min=0.0, min_open=True, max=200.0), default=100.0, show_default=True,
+    metavar="PERCENT", help="The override of feeds at the control; rapids keep their speed.",
+)  # fmt: skip
+@click.option("--gains", is_flag=True, help="Also list lines on which more tolerance or feed saves most.")
 @click.option("--nominal", metavar="NOMINAL", help="Compare the times with those of another program.")
 @click.option("--proof", metavar="report.json", help="Also show the error budget of a report of olp correct.")
 @file_option("--lines", "FILE.csv", "Write time, speed and limit of each line.")

@@ -125,6 +125,16 @@ class Tool:
 
 
 @dataclass(frozen=True, slots=True)
+class ControlTimes:
+    """Seconds that the control takes beside motion, None where they are not stated. A tool change counts with
+    its moves. A change of the spindle's speed or direction counts as a start. M codes are by number."""
+
+    tool_change_s: float | None = None
+    spindle_start_s: float | None = None
+    m_codes_s: Mapping[int, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
 class Machine:
     """A machine file: chain, limits, offsets, tools and what its control already corrects.
 
@@ -136,9 +146,9 @@ class Machine:
     `still_macros` are the macros of a printer that move no axis and change no mode.
     `styli` are end of the ram to centre of the tip of sensors by label.
     `path_mode` is the mode at the start of a program, `blend_mm` the tolerance where the program names none
-    (None: not stated). `tool_change_moves`: M6 may move the axes. `scaling_unit` is what 1 of a factor of G51
-    is, None where it is not stated. `located` says whether positions in machine coordinates are known; where
-    they are not, only distances are.
+    (None: not stated). `times` is what the control takes beside motion. `tool_change_moves`: M6 may move the
+    axes. `scaling_unit` is what 1 of a factor of G51 is, None where it is not stated. `located` says whether
+    positions in machine coordinates are known; where they are not, only distances are.
     """
 
     name: str
@@ -161,6 +171,7 @@ class Machine:
     blend_mm: float | None = None
     tool_change_moves: bool = True
     scaling_unit: float | None = None
+    times: ControlTimes = field(default_factory=ControlTimes)
     sanity: Sanity = Sanity()
     located: bool = True
 

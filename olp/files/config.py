@@ -10,7 +10,19 @@ from collections.abc import Callable, Mapping
 from pathlib import Path as FilePath
 
 from olp.core.errors import ProgramError, UsageError
-from olp.core.machine import Axis, HolderPart, Job, Machine, Mesh, Sanity, Setup, Tool, Vector, WorkOffset
+from olp.core.machine import (
+    Axis,
+    ControlTimes,
+    HolderPart,
+    Job,
+    Machine,
+    Mesh,
+    Sanity,
+    Setup,
+    Tool,
+    Vector,
+    WorkOffset,
+)  # fmt: skip
 from olp.core.schema import stated_values
 from olp.core.units import AXES, MM_PER_UM, shifted
 from olp.files.calibration.reader import load_calibration
@@ -135,6 +147,11 @@ def _read_machine(path: PathLike, read: Reader) -> tuple[Machine, Mapping[Path, 
         length_active=file.job_defaults.length_active,
         path_mode=file.path.mode,
         blend_mm=file.path.blend_mm,
+        times=ControlTimes(
+            tool_change_s=file.times.tool_change_s,
+            spindle_start_s=file.times.spindle_start_s,
+            m_codes_s={int(name[1:]): seconds for name, seconds in file.times.m_codes_s.items()},
+        ),
         sanity=Sanity(
             largest_correction_mm=None
             if file.check.largest_correction_um is None

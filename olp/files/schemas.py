@@ -185,6 +185,12 @@ class ToolTable(Table):
         return value
 
 
+#: The name of an M code.
+_M_CODE = pattern(r"M\d{1,4}")
+#: Spindle starts and tool changes.
+_NOT_M_CODES = (3, 4, 6)
+
+
 class PathTable(Table):
     mode: Literal["blend", "exact-stop"] = Field(
         default="blend",
@@ -195,6 +201,33 @@ class PathTable(Table):
         default=None,
         description="the path tolerance at corners where the program states none, in mm; 0.01 if left out",
     )
+
+
+class TimesTable(Table):
+    tool_change_s: NotNegative | None = Field(
+        default=None, description="the time of a tool change with its moves, in s; not counted if left out"
+    )
+    spindle_start_s: NotNegative | None = Field(
+        default=None,
+        description="the time in which the spindle starts, or changes its speed or direction, in s; not "
+        "counted if left out",
+    )
+    m_codes_s: dict[Text, NotNegative] = Field(
+        default={}, description="the times of other M codes, in s, by their names, such as { M8 = 0.5 }"
+    )
+
+    @rule("m_codes_s")
+    @staticmethod
+    def _codes(value: dict[str, float], _: Known) -> dict[str, float]:
+        for name in value:
+            if not _M_CODE.fullmatch(name):
+                raise refusal(f'names "{name}"; expected names of M codes, such as M8')
+            if int(name[1:]) in _NOT_M_CODES:
+                raise refusal(
+                    f"names {name}; expected tool_change_s for M6 and spindle_start_s for M3 and M4, keys of "
+                    "their own"
+                )
+        return value
 
 
 class CheckTable(Table):
@@ -292,6 +325,10 @@ class MachineFile(Table):
     axes: AxesTable = Field(description="the tables [axes.X], [axes.Y] and [axes.Z]")
     path: PathTable = Field(
         default_factory=PathTable, description="the table [path]: how the control moves from block to block"
+    )
+    times: TimesTable = Field(
+        default_factory=TimesTable,
+        description="the table [times]: what the control takes beside motion",
     )
     check: CheckTable = Field(
         default_factory=CheckTable, description="the table [check]: the limits of plausible inputs"

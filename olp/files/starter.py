@@ -9,7 +9,18 @@ from pathlib import Path
 import numpy as np
 
 from olp.core.errors import UsageError
-from olp.core.machine import CHAINS, COMPONENTS, ZERO, Axis, Job, Machine, Tool, Vector, WorkOffset
+from olp.core.machine import (
+    CHAINS,
+    COMPONENTS,
+    ZERO,
+    Axis,
+    ControlTimes,
+    Job,
+    Machine,
+    Tool,
+    Vector,
+    WorkOffset,
+)  # fmt: skip
 from olp.core.units import AXES, in_unit
 from olp.errormodel.calibration import PLACEHOLDER_DATE, Calibration
 from olp.files.calibration.writer import calibration_files
@@ -56,6 +67,12 @@ def machine_toml(machine: Machine, notes: Iterable[str] = ()) -> str:
     if (machine.path_mode, machine.blend_mm) != ("blend", None):
         lines += ["", *comment("How the control moves from block to block where a program does not say.")]
         lines += ["[path]", *toml_lines({"mode": machine.path_mode, "blend_mm": machine.blend_mm})]
+    if machine.times != ControlTimes():
+        times = machine.times
+        stated = {"tool_change_s": times.tool_change_s, "spindle_start_s": times.spindle_start_s}
+        codes = ", ".join(f"M{code} = {seconds!r}" for code, seconds in times.m_codes_s.items())
+        lines += ["", *comment("What the control takes beside motion.")]
+        lines += ["[times]", *toml_lines(stated), *([f"m_codes_s = {{ {codes} }}"] if codes else [])]
     lines += ["", *comment("Axis position of the program's origin, without tool length.")]
     for offset in machine.work_offsets.values():
         lines += [f"[work_offsets.{toml_key(offset.name)}]", *_work_offset(offset)]

@@ -30,8 +30,8 @@ _NAME = 50
 def to_text(report: Report) -> str:
     """Plain text of at most 100 columns."""
     sections = (
-        _head(report), _nominal(report), _blend_study(report), _budget(report), _use(report), _slow(report),
-        _lines(report), _feeds_written(report), _notes(report),
+        _head(report), _control(report), _nominal(report), _gains(report), _blend_study(report),
+        _budget(report), _use(report), _slow(report), _lines(report), _feeds_written(report), _notes(report),
         findings_text(report["findings"]),
     )  # fmt: skip
     return "\n\n".join("\n".join(lines) for lines in map(list, sections) if lines) + "\n"
@@ -42,11 +42,12 @@ def _head(report: Report) -> Iterator[str]:
     feed, dwell = report["feed_moves"], float(report["dwell_s"])
     share = report["largest_share_of_limit"]
     kept = ", ".join(f"{name} {_percent(part, 2)}" for name, part in share.items())
-    stretches = report["stretches"]
+    stretches, override = report["stretches"], report["feed_override"]
     yield from pairs(
         [
             ("Program", f"{printable(report['program']) or '<stdin>'}, {report['waypoints']} waypoints"),
             ("Machine", report["machine"]),
+            ("Override", "" if override == 1.0 else f"{_percent(override, 0)} of the programmed feed"),
             ("Time", clock(float(report["duration_s"])) + (f", {dwell:.2f} s of it dwells" if dwell else "")),
             (
                 "Feed moves",
@@ -71,6 +72,30 @@ def _head(report: Report) -> Iterator[str]:
             for n, s in enumerate(stretches, 1)
         ]
         yield from _cut(table(("stretch", "lines", "seconds"), rows), len(rows))
+
+
+def _control(report: Report) -> Iterator[str]:
+    rows = [
+        (row["what"], str(row["count"]), "not stated" if row["seconds"] is None else f"{row['seconds']:.2f}")
+        for row in report["control"]
+    ]
+    if rows:
+        yield "Asked of the control, seconds in all by [times] of the machine file"
+        yield from table(("", "count", "seconds"), rows)
+
+
+def _gains(report: Report) -> Iterator[str]:
+    if "gains" not in report:
+        return
+    yield "What would gain most"
+    for row in report["gains"]:
+        unit = "um" if row["change"] == "tolerance" else "mm/min"
+        yield (
+            f"  line {place(row)}: {row['seconds']:.3f} s for a {row['change']} of {row['then']:.4g} "
+            f"instead of {row['now']:.4g} {unit}"
+        )
+    if not report["gains"]:
+        yield "  No line gains from four times the path tolerance, or from a quarter more feed."
 
 
 def _nominal(report: Report) -> Iterator[str]:

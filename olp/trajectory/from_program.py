@@ -6,13 +6,16 @@ rounding of their corners the rest.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from olp.core.arrays import Array, Index, Mask
 from olp.core.geometry import PLANES, arc_points
-from olp.core.machine import Machine
+from olp.core.machine import ControlTimes, Machine
 from olp.core.toolpath import Toolpath
 from olp.core.values import dataclass
+from olp.program.feeds.actions import actions
 from olp.program.feeds.moves import lengths_mm
 from olp.program.feeds.timing import BLEND_MM, PathControl, Timing, timing
 from olp.program.program import Program
@@ -39,17 +42,28 @@ def axis_limits(machine: Machine) -> AxisLimits:
     return AxisLimits(velocity=velocity, acceleration=acceleration, jerk=jerk)
 
 
-def routes(program: Program, *, blend_mm: float = BLEND_MM, block_delete: bool = False) -> tuple[Route, ...]:
+def routes(
+    program: Program,
+    *,
+    blend_mm: float = BLEND_MM,
+    block_delete: bool = False,
+    times: ControlTimes | None = None,
+) -> tuple[Route, ...]:
     """The routes of a program that was read with its words, in order; nominal or corrected.
 
     A new route begins wherever the position is not known (tool changes, G28, after a probe). Dwells at such
-    positions count at the start of the next route. `blend_mm` is the tolerance of a path mode without one.
+    positions count at the start of the next route, and so do the `times` of what the control does beside
+    motion. `blend_mm` is the tolerance of a path mode without one.
     Raises as `olp.program.feeds.timing.timing`.
     """
     path = program.toolpath
     clock = timing(program, blend_mm=blend_mm, block_delete=block_delete)
     if not len(path):
         return ()
+    waits = None if times is None else actions(program, block_delete=block_delete)
+    if times is not None and waits is not None:
+        wait = waits.waits(path.line.astype(np.int64), times)
+        clock = replace(clock, rest=clock.rest | (wait > 0.0), dwell_s=clock.dwell_s + wait)
     steps = _Steps.of(path, clock)
     tolerance = _tolerances(path, clock, steps)
     return _cut(path, clock, steps, tolerance)

@@ -14,6 +14,7 @@ from olp.core.errors import CannotCompute, OlpError, UsageError
 from olp.core.machine import Setup
 from olp.core.progress import Progress
 from olp.core.values import dataclass
+from olp.program.feeds.actions import actions
 from olp.program.feeds.moves import lengths_mm
 from olp.program.feeds.timing import PathControl, path_modes
 from olp.program.feeds.words import Shared, check_feeds, write_feeds
@@ -35,8 +36,8 @@ _LINES = 8
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Case:
-    """A program to plan: its text as read, the path tolerance where it states none, and the routes that it
-    drives."""
+    """A program to plan: its text as read, the path tolerance where it states none, the override of feeds
+    (1: as programmed), and the routes that it drives."""
 
     name: str
     setup: Setup
@@ -45,6 +46,7 @@ class Case:
     blend_from: str
     block_delete: bool
     legs: tuple[Route, ...]
+    override: float = 1.0
 
     def rewritten(self, data: bytes) -> Case:
         """The case of another text, read with the same options. Raises ProgramError."""
@@ -56,8 +58,18 @@ class Case:
 
     def driven(self) -> Case:
         """The same with its routes."""
-        legs = routes(self.program, blend_mm=self.blend_mm, block_delete=self.block_delete)
+        legs = routes(
+            self.program, blend_mm=self.blend_mm, block_delete=self.block_delete,
+            times=self.setup.machine.times,
+        )  # fmt: skip
+        if self.override != 1.0:
+            legs = tuple(replace(leg, feed_mm_s=leg.feed_mm_s * self.override) for leg in legs)
         return replace(self, legs=legs)
+
+    def control(self) -> list[dict[str, Any]]:
+        """What the program asks of the control beside motion, how often, and its time as far as stated."""
+        asked = actions(self.program, block_delete=self.block_delete)
+        return [] if asked is None else asked.rows(self.setup.machine.times)
 
     def scaled(self, factor: float) -> Case:
         """The same with all path tolerances, also those that the program states, times a factor."""

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from olp.checks.state import travel_findings
+from olp.checks.timed import time_findings
 from olp.core.errors import CannotCompute, UsageError
 from olp.core.machine import Setup
 from olp.core.progress import Progress, silent
@@ -24,6 +25,7 @@ from olp.program.registry import Options
 from olp.program.rs274.state import PathMode
 from olp.reports.plots.base import Format as Picture
 from olp.trajectory.from_program import axis_limits
+from olp.trajectory.gains import gains
 from olp.trajectory.inertia import compliance_of
 from olp.trajectory.plan import Trajectory
 from olp.trajectory.route import Route
@@ -46,6 +48,8 @@ PICTURES: Mapping[str, Picture] = {".svg": "svg", ".png": "png"}
 
 #: Default time between samples: a common servo cycle of controls.
 CYCLE_S = 1e-3
+#: Largest override of feeds in percent: that of common switches.
+MOST_OVERRIDE = 200.0
 #: Multiples of the path tolerances of the program that `blend_study` tries.
 FACTORS = (0.25, 0.5, 1.0, 2.0, 4.0)
 
@@ -57,6 +61,8 @@ class RetimeOptions(UnrollOptions):
     blend_mm: float | None = None
     study_blend: bool = False
     max_inertial_um: float | None = None
+    feed_override: float = 100.0
+    gains: bool = False
     block_delete: bool = False
     date: datetime.date | None = None
     accept: tuple[str, ...] = ()
@@ -171,6 +177,8 @@ class Retiming(Shown):
         An F word for several blocks gets the feed with the same total time, or with "least" the least planned
         feed of them. Raises ProgramError for a feed that cannot be written in the style of its word.
         """
+        if self.plan.case.override != 1.0:
+            raise UsageError("planned feeds count at an override of 100 %; leave the feed override out")
         data, report = with_feeds(self.plan, shared, progress or silent)
         self.report["write_feed"] = placed(report, self.origin)
         return data
@@ -250,6 +258,8 @@ def retime(
     blend_mm: float | None = None,
     study_blend: bool = False,
     max_inertial_um: float | None = None,
+    feed_override: float = 100.0,
+    gains: bool = False,
     block_delete: bool = False,
     flatten: bool = False,
     expand_cycles: bool = False,
@@ -266,17 +276,23 @@ def retime(
     `blend_mm` is the path tolerance where the program names none; it has priority over the machine file, and
     the path mode at the start is then to blend. `study_blend` adds times and deviations at a quarter to four
     times the path tolerances in use. `max_inertial_um` limits the deviation by accelerations and the
-    machine's compliance. `block_delete` leaves `/` blocks out. `flatten`, `expand_cycles` and
+    machine's compliance. `feed_override` is the override of feeds in percent; rapids keep their speed.
+    `gains` adds the lines on which more path tolerance or more feed would save most.
+    `block_delete` leaves `/` blocks out. `flatten`, `expand_cycles` and
     `peck_clearance_mm` are those of `correct`. Axes commanded beyond their travel are findings (OLP402), and
     planned all the same. `date` and `accept` are those of `correct`, for doubts about
     the inputs. Raises InputError (ProgramError with its line, ConfigError, Doubtful), UsageError and
     CannotCompute.
     """
+    if not 0.0 < feed_override <= MOST_OVERRIDE:
+        raise UsageError(
+            f"the feed override is {feed_override:g} %; expected more than 0, and at most {MOST_OVERRIDE:g}"
+        )
     session = Session.start(machine, job)
     options = RetimeOptions(
         blend_mm=blend_mm, study_blend=study_blend, max_inertial_um=max_inertial_um,
-        block_delete=block_delete, flatten=flatten, expand_cycles=expand_cycles,
-        peck_clearance_mm=peck_clearance_mm, date=date, accept=tuple(accept),
+        feed_override=feed_override, gains=gains, block_delete=block_delete, flatten=flatten,
+        expand_cycles=expand_cycles, peck_clearance_mm=peck_clearance_mm, date=date, accept=tuple(accept),
     )  # fmt: skip
     other = None if nominal is None else session.sources.source(nominal)
     source = session.sources.source(program)
@@ -319,9 +335,12 @@ def run(
         report["proof"] = stated | {"at_most_um": stated["path_max_um"] + moving}
     if options.study_blend:
         report["blend_study"] = blend_study(case, plan, FACTORS, tell)
+    if options.gains:
+        report |= placed({"gains": gains(case, plan, tell)}, origin)
     # the motion is inside the box of its waypoints, so commands within travel are motion within travel
     path = case.program.in_original().toolpath
-    findings = placed_findings((*doubts, *travel_findings(path, setup.machine)), origin)
+    untimed = time_findings(path, case.control())
+    findings = placed_findings((*doubts, *travel_findings(path, setup.machine), *untimed), origin)
     report["accepted"] = accepted_of(findings)
     report["findings"] = [f.as_dict() for f in findings]
     return Retiming(plan, report, findings, shown)
@@ -346,7 +365,7 @@ def _case(session: Session, program: Source, options: RetimeOptions) -> Case:
                 program.short, setup, parsed,
                 next(v for v in (blend_mm, stated, BLEND_MM) if v is not None),
                 "the call" if blend_mm is not None else "the machine file" if stated else "the default",
-                options.block_delete, (),
+                options.block_delete, (), options.feed_override / 100.0,
             ).driven()  # fmt: skip
     if not case.legs and case.untimed()["moves"]:
         raise CannotCompute(

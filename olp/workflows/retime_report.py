@@ -83,6 +83,10 @@ def report_of(case: Case, plan: Plan, compliance: Any, max_inertial_um: float | 
             for leg, t in zip(case.legs, plan.trajectories, strict=True)
         ],
     } | summary(plan.trajectories, plan.lines, plan.slow)
+    report["control"] = case.control()
+    # the motion is at rest in dwells and while the control does something else
+    report["dwell_s"] -= sum(row["seconds"] or 0.0 for row in report["control"])
+    report["feed_override"] = case.override
     if compliance.any():
         parts = [Inertial.of(t.motion, compliance) for t in plan.trajectories]
         most = max(parts, key=lambda p: p.most_mm, default=None)

@@ -60,6 +60,85 @@ def report_of(*args: str | Path) -> dict[str, Any]:
     return dict(json.loads(result.stdout))
 
 
+# -- the whole time ---------------------------------------------------------------------------------------
+
+
+def test_the_control_takes_the_times_of_the_machine_file(job: Path, tmp_path: Path) -> None:
+    text = "S900 M3\nG1 X40 F3000 M8\nT2 M6\nG0 X0 Y0 Z9\nG1 X5 F600\nM9\nG1 X2\nM2\n"
+    part, file = program(tmp_path, text), job.with_name("machine.toml")
+    bare = report_of(part, "-j", job)
+    assert [row["seconds"] for row in bare["control"]] == [None] * 4
+    assert [f["code"] for f in bare["findings"]].count("OLP209") == 1
+    rest = report_of(program(tmp_path, text.replace("M9\n", "G4 P0\n"), "rest.ngc"), "-j", job)
+    with file.open("a") as machine_file:
+        machine_file.write(
+            "[times]\ntool_change_s = 6.0\nspindle_start_s = 2.0\nm_codes_s = { M8 = 0.5, M9 = 0.25 }\n"
+        )
+    whole = report_of(part, "-j", job)
+    assert whole["control"] == [
+        {"what": "spindle start", "count": 1, "seconds": 2.0},
+        {"what": "tool change", "count": 1, "seconds": 6.0}, {"what": "M8", "count": 1, "seconds": 0.5},
+        {"what": "M9", "count": 1, "seconds": 0.25},
+    ]  # fmt: skip
+    assert whole["duration_s"] == pytest.approx(rest["duration_s"] + 8.75, abs=1e-9)
+    assert whole["dwell_s"] == pytest.approx(0.0, abs=1e-9)
+    assert not any(f["code"] == "OLP209" for f in whole["findings"])
+    assert "tool change  " in run("retime", part, "-j", job).stdout
+
+
+@pytest.mark.parametrize(
+    ("codes", "says"), [("{ M6 = 1.0 }", "tool_change_s"), ("{ G4 = 1.0 }", "such as M8")]
+)
+def test_a_time_of_no_m_code_is_refused(job: Path, tmp_path: Path, codes: str, says: str) -> None:
+    with job.with_name("machine.toml").open("a") as machine_file:
+        machine_file.write(f"[times]\nm_codes_s = {codes}\n")
+    result = run("retime", program(tmp_path), "-j", job)
+    assert result.exit_code == 3
+    assert says in result.stderr
+
+
+def test_an_override_changes_feeds_and_no_rapids(job: Path, tmp_path: Path) -> None:
+    part = program(tmp_path, "G1 X40 F600\nG0 X0\nM2\n")
+    slow = report_of(program(tmp_path, "G1 X40 F300\nG0 X0\nM2\n", "slow.ngc"), "-j", job)
+    half = report_of(part, "-j", job, "--feed-override", "50")
+    assert half["duration_s"] == slow["duration_s"]
+    assert half["feed_override"] == 0.5
+    assert "Override    50 %" in run("retime", part, "-j", job, "--feed-override", "50").stdout
+    refused = run("retime", part, "-j", job, "--feed-override", "50", "--write-feed", tmp_path / "f.ngc")
+    assert refused.exit_code == 2
+    with pytest.raises(UsageError, match="feed override is 0 %"):
+        olp.retime(part, job.with_name("machine.toml"), job, feed_override=0.0)
+
+
+def test_gains_are_those_of_the_program_with_more_tolerance_or_feed(job: Path, tmp_path: Path) -> None:
+    lines = "\n".join(f"X{x} Y{x % 2}" for x in range(1, 20))
+    text = "G64 P{p}\nG1 F6000\n" + lines + "\nG1 X60 F{f}\nM2\n"
+    part = program(tmp_path, text.format(p=0.005, f=600))
+    rows = report_of(part, "-j", job, "--gains")["gains"]
+    feed = max((row for row in rows if row["change"] == "feed"), key=lambda row: row["seconds"])
+    assert (feed["line"], feed["now"], feed["then"]) == (22, 600.0, 750.0)
+    own, machine_file = (
+        program(tmp_path, text.format(p=0.02, f=600), "wide.ngc"),
+        job.with_name("machine.toml"),
+    )
+    base, wide = (olp.retime(p, machine_file, job).lines for p in (part, own))
+    tolerance = next(row for row in rows if row["change"] == "tolerance")
+    assert (tolerance["now"], tolerance["then"]) == (5.0, 20.0)
+    gained = base.seconds - wide.seconds
+    assert tolerance["line"] == int(base.line[np.argmax(gained)])
+    assert tolerance["seconds"] == pytest.approx(float(gained.max()), rel=1e-12)
+    assert (
+        f"line {tolerance['line']}: {gained.max():.3f} s for a tolerance of 20 instead of 5 um"
+        in run("retime", part, "-j", job, "--gains").stdout
+    )
+
+
+def test_moves_of_other_axes_are_a_finding(job: Path, tmp_path: Path) -> None:
+    report = report_of(program(tmp_path, "G1 X40 F600\nG1 A360\nG1 X0\nM2\n"), "-j", job)
+    row = next(f for f in report["findings"] if f["code"] == "OLP208")
+    assert (row["severity"], row["lines"]) == ("warning", [2])
+
+
 # -- the trajectory --------------------------------------------------------------------------------------
 
 

@@ -12,7 +12,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from olp.core.errors import UsageError
-from olp.core.machine import CHAINS, COMPONENTS, SQUARENESS, Axis, Job, Machine, Mesh, Setup, Tool, WorkOffset
+from olp.core.machine import (
+    CHAINS,
+    COMPONENTS,
+    SQUARENESS,
+    Axis,
+    ControlTimes,
+    Job,
+    Machine,
+    Mesh,
+    Setup,
+    Tool,
+    WorkOffset,
+)
 from olp.files.config import load_calibration, load_job, load_machine, load_setup
 from olp.files.described import described
 from olp.files.fields import CONTROLLERS, SHIPPED
@@ -276,6 +288,12 @@ machines = st.builds(
     length_active=st.booleans(),
     path_mode=st.sampled_from(("blend", "exact-stop")),
     blend_mm=st.none() | positive,
+    times=st.builds(
+        ControlTimes,
+        tool_change_s=st.none() | positive,
+        spindle_start_s=st.none() | positive,
+        m_codes_s=st.dictionaries(st.integers(7, 9999), positive, max_size=3),
+    ),
 )
 
 

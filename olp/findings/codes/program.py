@@ -37,6 +37,24 @@ RULES = (
         "`G64 P0.01`, where LinuxCNC takes Q = P.",
     ),
     _rule(
+        "OLP208",
+        "other axes not timed",
+        Severity.WARNING,
+        "Blocks also move a rotary or other axis, whose limits are not known here. Only X, Y and Z are "
+        "timed, so the program takes longer than it says.",
+        "Add the time of these blocks, or measure it at the control.",
+        "`G1 A3600 F1000` on a machine file with X, Y and Z.",
+    ),
+    _rule(
+        "OLP209",
+        "times of the control not stated",
+        Severity.INFO,
+        "The program changes tools, starts the spindle or calls M functions. The machine file does not state "
+        "how long that takes, so it counts as no time.",
+        "Give tool_change_s, spindle_start_s and m_codes_s in the table [times] of the machine file.",
+        "`T2 M6` and a machine file without [times].",
+    ),
+    _rule(
         "OLP301",
         "units assumed",
         Severity.INFO,

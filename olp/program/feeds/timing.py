@@ -17,6 +17,7 @@ from olp.core.arrays import Array, Index, Mask, is_in
 from olp.core.errors import ProgramError, UsageError
 from olp.core.toolpath import Kind
 from olp.core.values import dataclass
+from olp.program.feeds.actions import AFTER, AFTER_EXACT
 from olp.program.feeds.moves import Scan, numbers
 from olp.program.feeds.stated import programmed
 from olp.program.program import Program, Statements
@@ -24,11 +25,6 @@ from olp.program.program import Program, Statements
 #: How far a control may round corners where a program does not state it, in mm: Grbl's default of $11, and
 #: usual for a finishing cut.
 BLEND_MM = 0.01
-
-#: ten times the M codes that take effect after the motion of their block
-_AFTER = (0, 10, 20, 300, 600)
-#: those that do so too on controls with exact stops
-_AFTER_EXACT = (50, 90)
 
 
 class PathControl(IntEnum):
@@ -163,7 +159,8 @@ def _rests(program: Program, scan: Scan) -> tuple[Mask, Array]:
     code = np.rint(numbers(scan.words, word) * 10).astype(np.int64)
     along = is_in(code, [10 * m for m in program.rs274.m_with_motion])
     m_line, code = m_line[~along], code[~along]
-    late = is_in(code, _AFTER + _AFTER_EXACT if program.rs274.exact_stop else _AFTER)
+    after = AFTER + AFTER_EXACT if program.rs274.exact_stop else AFTER
+    late = is_in(code, [10 * m for m in after])
     rest[np.searchsorted(line, m_line[late], "right")] = True
     rest[np.searchsorted(line, m_line[~late])] = True
     rest[np.searchsorted(line, scan.of_letter(b"S")[1])] = True

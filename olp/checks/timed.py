@@ -1,0 +1,27 @@
+"""What the time of a program leaves out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from olp.checks.base import finding, lines_of
+from olp.core.toolpath import Flag, Toolpath
+from olp.findings.catalogue import Finding
+
+
+def time_findings(path: Toolpath, control: Sequence[dict[str, Any]]) -> list[Finding]:
+    """Moves of axes that are not timed, and what the program asks of the control (rows with `what`, `count`
+    and `seconds`) without a stated time."""
+    findings = []
+    whole = (path.flag & np.uint8(Flag.WHOLE)) != 0
+    if whole.any():
+        lines = lines_of(path, whole)
+        what = f"{len(lines)} blocks also move another axis; only X, Y and Z are timed there"
+        findings.append(finding("OLP208", what, lines))
+    unknown = [f"{row['count']} x {row['what']}" for row in control if row["seconds"] is None]
+    if unknown:
+        findings.append(finding("OLP209", f"no time is stated for {', '.join(unknown)}"))
+    return findings
