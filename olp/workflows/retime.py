@@ -284,10 +284,6 @@ def retime(
     the inputs. Raises InputError (ProgramError with its line, ConfigError, Doubtful), UsageError and
     CannotCompute.
     """
-    if not 0.0 < feed_override <= MOST_OVERRIDE:
-        raise UsageError(
-            f"the feed override is {feed_override:g} %; expected more than 0, and at most {MOST_OVERRIDE:g}"
-        )
     session = Session.start(machine, job)
     options = RetimeOptions(
         blend_mm=blend_mm, study_blend=study_blend, max_inertial_um=max_inertial_um,
@@ -309,6 +305,11 @@ def run(
     progress: Progress | None = None,
 ) -> Retiming:
     """As `retime`, in a session."""
+    override = options.feed_override
+    if not 0.0 < override <= MOST_OVERRIDE:
+        raise UsageError(
+            f"the feed override is {override:g} %; expected more than 0, and at most {MOST_OVERRIDE:g}"
+        )
     setup, most_um = session.setup, options.max_inertial_um
     stated = None if proof is None else proved(proof, setup)
     tell = progress or silent

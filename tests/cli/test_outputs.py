@@ -106,7 +106,7 @@ def test_only_what_came_from_stdin_is_called_so(
     streamed = run(words[0], "-", *words[1:], "-j", "job.toml", *(["-o", "-"]), stdin=bad)
     assert (streamed.exit_code, "<stdin>:2: " in streamed.stderr) == (3, True), streamed.stderr
     (folder / "bad.ngc").write_bytes(bad)
-    named = run(words[0], "bad.ngc", *words[1:], "-j", "job.toml", "-o", "out")
+    named = run(words[0], "bad.ngc", *words[1:], "-j", "job.toml", "-o", "out.csv")
     assert (named.exit_code, "bad.ngc:2: " in named.stderr) == (3, True), named.stderr
 
 
