@@ -20,8 +20,9 @@ from olp.core.values import dataclass
 Tool = tuple[float, ...]
 #: An axis position in mm, and the tool with which it was touched.
 Touch = tuple[Vector, Tool]
-#: What the control leads evenly along a move with tool centre point control, "" without it.
-Interpolated = Literal["", "axes", "vector"]
+#: What the control leads evenly along a move with tool centre point control, "" without it. In a tilted
+#: plane the rotary axes are "fixed".
+Interpolated = Literal["", "axes", "vector", "fixed"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +95,8 @@ class Frame:
     the part of the offset by which the tip keeps off the programmed point, as over a hole. `compensation` is
     that of the cutter, where the contour was taken as the path of the tool. With tool centre point control
     words state the tip in the workpiece, and `tip` says what turns evenly from end to end: rotary "axes", or
-    the direction of the tool ("vector"). It is "" without.
+    the direction of the tool ("vector"). In a tilted plane words state the tip too, while rotary axes stand
+    ("fixed"). It is "" without.
     """
 
     unit_mm: float = 1.0

@@ -12,7 +12,7 @@ import numpy as np
 from olp.core.arrays import Array, Mask
 from olp.core.values import dataclass
 from olp.kinematics.chain import Kinematics
-from olp.kinematics.inverse import inverse
+from olp.kinematics.inverse import Solved, inverse
 from olp.kinematics.poses import Poses, rotation_vector, turned
 from olp.kinematics.structure import Structure
 
@@ -52,16 +52,16 @@ def correct_poses(
     )
 
 
-def meet_positions(machine: Kinematics, target: Poses, values: Array) -> Array:
-    """(n, axes) axis values whose linear axes bring the actual tip to `target` while the others stay as they
-    are in `values`. Raises NotInvertible with the row."""
+def meet_positions(machine: Kinematics, target: Poses, values: Array) -> Solved:
+    """The axis values whose linear axes bring the actual tip to `target` while the others stay as they are in
+    `values` (n, axes). Raises NotInvertible with the row."""
     structure = machine.structure
     joints = {
         name: joint if joint.kind == "linear" else replace(joint, correct=False)
         for name, joint in structure.joints.items()
     }
     held = replace(machine, structure=replace(structure, joints=joints))
-    return inverse(held, target, values).values
+    return inverse(held, target, values)
 
 
 def left_angles(structure: Structure, left_rad: Array, target: Poses) -> Array:

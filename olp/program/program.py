@@ -18,6 +18,7 @@ from olp.program.origin import Origin, in_original, origin_of
 from olp.program.rs274.profiles.base import Profile
 from olp.program.rs274.state import Capture, PathMode
 from olp.program.text.line_ends import LINE_END
+from olp.program.tilts import Tilt
 
 Small = npt.NDArray[np.int32]
 
@@ -231,7 +232,8 @@ class Program:
 
     `slot` (n, 3): index of the X, Y, Z word of each move, -1 where omitted. `calculator`: lengths without
     a decimal point are whole units. `statements` is None for blocks of words. `closings` are
-    brackets that close behind a number, sorted. `by_original`: lines are those of the text that this one was
+    brackets that close behind a number, sorted. `tilts` are moves by which the control turns rotary axes to
+    a plane. `by_original`: lines are those of the text that this one was
     unrolled from (`in_original`).
 
     Along contours under cutter compensation `toolpath` is that of the tool. `programmed` is then the program
@@ -256,6 +258,7 @@ class Program:
     statements: Statements | None = None
     shared: SharedWords = field(default_factory=SharedWords.none)
     closings: Index = field(default_factory=lambda: np.zeros(0, np.int64))
+    tilts: tuple[Tilt, ...] = ()
     by_original: bool = False
     programmed: Program | None = None
     blocks: Index | None = None

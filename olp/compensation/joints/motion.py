@@ -134,15 +134,16 @@ class Motion:
             values[rows], left[rows], limited[rows] = done.values, done.left_rad, done.limited
         return CorrectedPoses(values, left, limited, beyond_travel(self.structure, values))
 
-    def linear(self, axes: Array, tool: Index, target: Poses) -> Array:
-        """(n, axes) axis values whose linear axes bring the tip to its target. Raises NotInvertible."""
-        values = axes.copy()
+    def linear(self, axes: Array, tool: Index, target: Poses) -> CorrectedPoses:
+        """Axis values whose linear axes alone bring the tip to its target. Raises NotInvertible."""
+        values, left, limited = axes.copy(), np.zeros((len(axes), 3)), np.zeros(len(axes), bool)
         for which in distinct(tool).tolist():
             rows = np.flatnonzero(tool == which)
             part = Poses(target.rotation[rows], target.position[rows])
             with _of_rows(rows):
-                values[rows] = meet_positions(self.machines[which], part, axes[rows])
-        return values
+                solved = meet_positions(self.machines[which], part, axes[rows])
+            values[rows], left[rows] = solved.values, solved.left_rad
+        return CorrectedPoses(values, left, limited, beyond_travel(self.structure, values))
 
     def slopes(self, axes: Array, tool: Index) -> Array:
         """(n, 6, axes) as `Kinematics.jacobian`."""

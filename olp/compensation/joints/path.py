@@ -9,6 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.compensation.joints.motion import Motion
+from olp.compensation.joints.tilts import (
+    found_positions,
+    refuse_off_normal,
+    stands_before,
+    stated_afresh,
+)
 from olp.compensation.style import fewest_decimals
 from olp.core.arrays import Array, Index, Mask, distinct, is_in
 from olp.core.errors import NotInvertible, ProgramError
@@ -44,8 +50,9 @@ class JointPath:
     (n, 3) where the part really lies. `offset` (n, axes), `unit` (n,) and, of words without a point, `scale`
     (axes,) lead from words to coordinates. `feed` are straight moves that cut, `judged` those that the
     proof judges, `kept` moves that stay uncorrected. `held` (n,) are moves whose rotary axes stay as
-    programmed: where these stand, tool centre point control begins. `places` (axes,) are the fewest decimals
-    of words in mm and deg. `listed` are the rows of a list of axis values."""
+    programmed: where these stand, tool centre point control begins, or a tilted plane is `fixed` (n,) to
+    them. `places` (axes,) are the fewest decimals of words in mm and deg. `listed` are the rows of a list of
+    axis values."""
 
     program: Program
     motion: Motion
@@ -63,6 +70,7 @@ class JointPath:
     judged: Mask
     kept: Mask
     held: Mask
+    fixed: Mask
     places: Index
     listed: AxisList | None = None
 
@@ -107,13 +115,15 @@ class JointPath:
             for frame in path.frames
         ]
         offsets = np.array(turns, float).reshape(len(path.frames), len(letters))
+        found = found_positions(program, structure, letters)
         degrees = rotary.follow(
-            program, np.array([start_deg.get(letter, np.nan) for letter in letters]), offsets
+            program, np.array([start_deg.get(letter, np.nan) for letter in letters]), offsets, found
         )
         rotary.refuse_ways(program, degrees)
         modes = [frame.tip for frame in path.frames]
         tip = np.array([mode != "" for mode in modes], bool)[path.frame]
         vector = np.array([mode == "vector" for mode in modes], bool)[path.frame]
+        fixed = np.array([mode == "fixed" for mode in modes], bool)[path.frame]
         end, slot = np.empty((len(path), len(order))), np.full((len(path), len(order)), -1, np.int32)
         offset, scale = np.zeros(end.shape), np.ones(len(order))
         linear = np.array([frame.offset_mm for frame in path.frames]).reshape(-1, 3)[path.frame]
@@ -135,23 +145,30 @@ class JointPath:
             inverse = matrices.inverse[matrices.of_frame[path.frame]]
             end[:, columns] = turned(inverse, end[:, columns])
             offset[:, columns] = turned(inverse, offset[:, columns])
+        unit = np.array([frame.unit_mm for frame in path.frames] or [1.0])[path.frame]
+        if fixed.any():
+            stated = _words(program, slot[:, columns]) * unit[:, None] + offset[:, columns]
+            end[:, columns] = np.where(fixed[:, None], stated, end[:, columns])
         elsewhere = tip & ((path.flag & np.uint8(Flag.MACHINE)) != 0)
-        end[:, columns] = _stated_in_mode(end[:, columns], slot[:, columns] >= 0, tip, elsewhere)
-        _refuse_tips(program, structure, tip, end, offset, tips_from_zero)
+        mode = tip + 2 * elsewhere + 4 * fixed
+        fresh = stated_afresh(program, fixed, degrees)
+        end[:, columns] = _stated_in_mode(end[:, columns], slot[:, columns] >= 0, mode, elsewhere, fresh)
+        _refuse_tips(program, structure, tip & ~fixed, end, offset, tips_from_zero)
         shifts = np.array(
             [
                 _shift(structure, errors, frame.touched, row, order, letters)
                 for frame, row in zip(path.frames, offsets, strict=True)
             ]
         ).reshape(-1, 3)
-        unit = np.array([frame.unit_mm for frame in path.frames] or [1.0])[path.frame]
         tool = tool_of[path.frame]
         kept = (path.flag & _KEPT) != 0
         feed = (path.kind == Kind.LINE) & ~kept
         start = _starts(motion, end, tool, tip, np.array(path.start_mm), columns, start_deg, order)
+        refuse_off_normal(program, structure, fixed, feed, start, end)
+        held = np.append(tip[1:] & ~tip[:-1], False)[: len(tip)] | stands_before(fixed, feed, degrees)
         return JointPath(
             program, motion, start, end, slot, tool, tip, vector, shifts[path.frame], offset, unit, scale,
-            feed, feed, kept, np.append(tip[1:] & ~tip[:-1], False)[: len(tip)], _places(structure),
+            feed, feed, kept, held, fixed, _places(structure),
         )  # fmt: skip
 
     @staticmethod
@@ -179,7 +196,7 @@ class JointPath:
             rows.program, motion, np.vstack((np.full((1, axes), np.nan), rows.values[:-1])), rows.values,
             np.full((count, axes), -1, np.int32), np.array([places[n] for n in rows.tool.tolist()]),
             none, none, np.zeros((count, 3)), np.zeros((count, axes)), np.ones(count), np.ones(axes),
-            feed, ~none, none, none, _places(structure), rows,
+            feed, ~none, none, none, none, _places(structure), rows,
         )  # fmt: skip
 
 
@@ -210,19 +227,27 @@ def _starts(
     return np.asarray(start)
 
 
-def _stated_in_mode(end: Array, given: Mask, tip: Mask, elsewhere: Mask) -> Array:
-    """(n, 3) linear coordinates, NaN until they are stated after a change between axis values and tips.
-    `elsewhere` (n,) states machine positions while tips are stated."""
-    mode = tip + 2 * elsewhere
-    changes = np.append(True, mode[1:] != mode[:-1])[: len(tip)]
-    if not changes[1:].any() and not elsewhere.any():
+def _words(program: Program, slot: npt.NDArray[np.int32]) -> Array:
+    """(n, 3) the numbers of linear words, NaN where there is none."""
+    words = program.words
+    assert words is not None
+    return np.where(slot >= 0, words.mantissa[slot] / 10.0 ** words.decimals[slot], np.nan)
+
+
+def _stated_in_mode(end: Array, given: Mask, mode: Index, elsewhere: Mask, fresh: Mask) -> Array:
+    """(n, 3) linear coordinates, NaN until they are stated after a change between axis values and tips, or in
+    a tilted plane that is `fresh` (n,). `elsewhere` (n,) states machine positions while tips are stated."""
+    changes = np.append(True, mode[1:] != mode[:-1])[: len(mode)] | fresh
+    if not changes[1:].any() and not elsewhere.any() and not fresh.any():
         return end
     order = np.arange(len(end))
     began = np.maximum.accumulate(np.where(changes, order, -1))
     stated = np.maximum.accumulate(np.where(given, order[:, None], -1), axis=0)
-    first = began == 0
+    first = (began == 0) & ~fresh[:1].any()
+    in_plane = (mode & 4) != 0
+    last = np.take_along_axis(end, np.maximum(stated, 0), axis=0)
     kept = ((stated >= began[:, None]) | first[:, None]) & ~elsewhere[:, None]
-    return np.where(kept, end, np.nan)
+    return np.where(kept, np.where(in_plane[:, None], last, end), np.nan)
 
 
 def _shift(

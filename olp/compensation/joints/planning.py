@@ -88,13 +88,13 @@ def planned(path: JointPath, limits: JointLimits) -> JointPlan:
     known = np.asarray(np.isfinite(path.end).all(axis=1), bool)
     solid = known & ~path.kept
     _refuse_unknown(path, known)
-    move = np.flatnonzero(solid)
-    ends = _solved(path, move, np.ones(len(move)))
-    split = np.flatnonzero(solid & path.feed & (path.start != path.end).any(axis=1))
-    begins = _solved(path, split, np.zeros(len(split)))
-    inner = _split(path, begins, ends.only(np.searchsorted(move, split)), limits)
-    rows = _Rows.join([ends, *inner])
     side, turned = _sides(path, solid)
+    move = np.flatnonzero(solid)
+    ends = _solved(path, move, np.ones(len(move)), side)
+    split = np.flatnonzero(solid & path.feed & (path.start != path.end).any(axis=1))
+    begins = _solved(path, split, np.zeros(len(split)), side)
+    inner = _split(path, begins, ends.only(np.searchsorted(move, split)), limits, side)
+    rows = _Rows.join([ends, *inner])
     back = begins.only(turned[split])
     rows = _Rows.join([rows, back])
     order = np.lexsort((rows.share, rows.move))
@@ -116,9 +116,10 @@ def _refuse_unknown(path: JointPath, known: Mask) -> None:
         )
 
 
-def _solved(path: JointPath, move: Index, share: Array) -> _Rows:
-    """The commands at shares of moves."""
+def _solved(path: JointPath, move: Index, share: Array, side: Array) -> _Rows:
+    """The commands at shares of moves; `side` (n, axes) of the backlash at their ends."""
     motion, parts = path.motion, []
+    rotary = np.array([unit == "deg" for unit in motion.structure.units])
     for a in range(0, max(len(move), 1), _BATCH):
         some, at = move[a : a + _BATCH], share[a : a + _BATCH]
         tool, shift = path.tool[some], path.shift_mm[some]
@@ -129,7 +130,12 @@ def _solved(path: JointPath, move: Index, share: Array) -> _Rows:
         held = np.flatnonzero(path.held[some])
         if held.size:
             part = Poses(target.rotation[held], target.position[held])
-            done.values[held] = motion.linear(axes[held], tool[held], part)
+            stands = axes[held]
+            # in a tilted plane no word of a rotary axis changes, so its backlash stays
+            play = np.where(path.fixed[some[held], None] & rotary, 0.5 * motion.width * side[some[held]], 0.0)
+            solved = motion.linear(stands - play, tool[held], part)
+            done.values[held], done.left_rad[held] = solved.values, solved.left_rad
+            done.limited[held] = False
         left = left_angles(motion.structure, done.left_rad, target)
         parts.append(_Rows(some, at, done.values, target, left, done.limited))
     return _Rows.join(parts)
@@ -164,7 +170,7 @@ def _commanded(path: JointPath, move: Index, axes: Array, tool: Index, shift: Ar
     return done
 
 
-def _split(path: JointPath, begin: _Rows, end: _Rows, limits: JointLimits) -> list[_Rows]:
+def _split(path: JointPath, begin: _Rows, end: _Rows, limits: JointLimits, side: Array) -> list[_Rows]:
     """Rows between the ends of moves, so that nothing between them leaves the tolerances."""
     resolution = Resolution.of(path.motion)
     found: list[_Rows] = []
@@ -179,7 +185,7 @@ def _split(path: JointPath, begin: _Rows, end: _Rows, limits: JointLimits) -> li
             break
         owner, step = spread(parts - 1)
         share = begin.share[owner] + (step + 1) / parts[owner] * (end.share - begin.share)[owner]
-        rows = _solved(path, begin.move[owner], share)
+        rows = _solved(path, begin.move[owner], share, side)
         found.append(rows)
         key = np.append(owner, np.arange(len(apart))), np.append(share, begin.share)
         order = np.lexsort(key[::-1])

@@ -19,7 +19,7 @@ from olp.compensation.stretches import Decimals, Stretches, digits_of
 from olp.compensation.style import Style, fewest_decimals
 from olp.compensation.tally import Tally
 from olp.compensation.writer import outside
-from olp.core.arrays import Array, Index, Mask, distinct
+from olp.core.arrays import Array, Index, Mask, distinct, is_in
 from olp.core.errors import ProgramError
 from olp.core.machine import Vector
 from olp.core.toolpath import Flag
@@ -114,7 +114,7 @@ class JointWriter:
         axes[:, self.rotary] = (emitted[rows] - play)[:, self.rotary]
         target = Poses(self.plan.target.rotation[rows], self.plan.target.position[rows])
         tool = self.path.tool[move]
-        axes = motion.linear(axes, tool, target) + play
+        axes = motion.linear(axes, tool, target).values + play
         command[rows] = motion.programmed(axes, tool, self.path.tip[move])
         return command
 
@@ -133,7 +133,7 @@ class JointWriter:
             nominal=nominal,
             given=given,
             raw=~self.solid,
-            reset=((flag & np.uint8(Flag.CONTROL)) != 0) & np.isnan(nominal),
+            reset=self._set_by_control(column, flag, nominal),
             word=np.where(given, self.words.mantissa[slot], 0),
             decimals=np.where(given, self._own_decimals(column, slot, unit), 0).astype(np.int8),
             offset=path.offset[plan.move, column],
@@ -147,6 +147,15 @@ class JointWriter:
         self.write[:, column] = digits.write & self.solid
         self.mantissa[:, column], self.decimals[:, column] = digits.mantissa, digits.decimals
         return digits.emitted
+
+    def _set_by_control(self, column: int, flag: npt.NDArray[np.uint8], nominal: Array) -> Mask:
+        """(r,) rows at which the control makes an axis unknown, or turns it to where it finds it."""
+        lost = ((flag & np.uint8(Flag.CONTROL)) != 0) & np.isnan(nominal)
+        tilts = [tilt.move for tilt in self.program.tilts]
+        if not tilts or not self.rotary[column]:
+            return np.asarray(lost, bool)
+        turned = is_in(self.plan.move, tilts) & (self.slot[:, column] < 0) & np.isfinite(nominal)
+        return np.asarray(lost | turned, bool)
 
     def _own_decimals(self, column: int, slot: Index, unit: Array) -> Index:
         """Decimals of the words of an axis, with those that a number without a point hides."""

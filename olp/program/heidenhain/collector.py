@@ -15,6 +15,7 @@ from olp.program.dialect import Dialect
 from olp.program.heidenhain.columns import Blocks
 from olp.program.program import ArcSlots, Definitions, Poles, Program, StatedFeeds, Statements
 from olp.program.rs274.collector import Collector
+from olp.program.tilts import Tilt
 
 #: M functions that act when their block has ended
 _LATE_M = (0, 1, 2, 5, 9, 30)
@@ -55,6 +56,7 @@ class Collected(Collector):
         self.strokes: list[tuple[int, int]] = []
         self.definitions: list[tuple[int, int, int, int, float]] = []
         self.pauses: list[tuple[int, float]] = []
+        self.tilts: list[Tilt] = []
 
     def put_blocks(self, blocks: Blocks) -> None:
         words = blocks.words
@@ -109,6 +111,7 @@ class Collected(Collector):
             line_end=line_end,
             remarks=tuple((name, line, text) for name, (line, text) in self.remarks.items()),
             end_line=end_line,
+            tilts=tuple(self.tilts),
             statements=Statements(
                 begin=line_start[path.line - 1], end=line_end[path.line - 1],
                 feed_mm_s=take("feed", np.float64), rest=rest, dwell_s=dwell, arcs={}, broken={},

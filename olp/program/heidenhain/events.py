@@ -14,6 +14,7 @@ from olp.program.heidenhain.collector import Collected
 from olp.program.heidenhain.cycles import AT_ONCE, PATTERNS, Cycle
 from olp.program.heidenhain.modes import Modes
 from olp.program.heidenhain.names import name_of, refuse
+from olp.program.heidenhain.planes import Plane, plane_of
 from olp.program.heidenhain.statements import CycleText, Statement, cycle_of, of_lines
 from olp.program.heidenhain.table import TABLE, UNROLL
 
@@ -131,6 +132,10 @@ class Events:
 
     def control_move(self, line: int, axes: Sequence[int]) -> None:
         """A move that the control makes by itself: the position of some axes is not known after it."""
+        raise NotImplementedError
+
+    def turned_by_control(self, plane: Plane, letters: str, line: int) -> None:
+        """A move of rotary axes, all where no `letters` are stated, to where the control finds them."""
         raise NotImplementedError
 
     # -- parameters ----------------------------------------------------------------------------------
@@ -321,6 +326,13 @@ class Events:
     # -- tilted planes -------------------------------------------------------------------------------
 
     def _plane(self, statement: Statement) -> None:
+        if self.tips:
+            before = self.modes.plane
+            plane = plane_of(statement, None if before is None else before.turn)
+            self.modes.tilt(plane, statement.line)
+            if plane.turns:
+                self.turned_by_control(plane, "", statement.line)
+            return
         upper = statement.upper
         angles = _ANGLE.findall(upper)
         reset = re.match(rb"PLANE[ \t]+RESET\b", upper) is not None

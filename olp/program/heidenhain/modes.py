@@ -8,7 +8,8 @@ from olp.core.errors import ProgramError
 from olp.core.machine import ZERO, Setup, Vector
 from olp.core.toolpath import Interpolated
 from olp.core.units import MM_PER_INCH
-from olp.program.frames import FrameTable, tool_vector_of
+from olp.program.frames import FrameTable, Placement, tool_vector_of, turned
+from olp.program.heidenhain.planes import Plane
 from olp.program.heidenhain.statements import Statement
 from olp.program.heidenhain.table import UNROLL
 
@@ -34,7 +35,16 @@ class Modes:
         self.tool = setup.machine.default_tool
         self.length_active = setup.machine.length_active and self.tool is not None
         self.delta_mm = 0.0
+        #: the datum shift along the words, and in a tilted plane also the one below it
         self.shift: Vector = ZERO
+        self.below: Vector = ZERO
+        #: the tilted plane in force, and the last one that was stated
+        self.plane: Plane | None = None
+        self.stated_plane: Plane | None = None
+        #: axes whose datum shift is not known: it was changed while one below a tilted plane was in force
+        self.unclear: set[int] = set()
+        #: axes whose shift was set to 0 in the plane in force: all three cancel the one below it, too
+        self.cancelled: set[int] = set()
         self.preset = setup.machine.default_work_offset
         self.selected: tuple[int, str] | None = None
         #: parameters with known numbers
@@ -70,15 +80,58 @@ class Modes:
                 vector = (x, y, z - self.delta_mm)
                 tool = self.setup.tool(self.tool)
                 assert tool is not None
-                if self.length_active and not self.tip:
+                if self.length_active and not self.tip and self.plane is None:
                     length = (*tool.length_mm[:2], tool.length_mm[2] + self.delta_mm)
             index = self.table.index(
-                work, line, unit_mm=self.unit_mm, tool=self.tool, length=length, tool_vector=vector,
-                length_active=self.length_active and bool(self.tool),
+                work, line, inner=self._placement(line), unit_mm=self.unit_mm, tool=self.tool, length=length,
+                tool_vector=vector, length_active=self.length_active and bool(self.tool),
             )  # fmt: skip
-            index = self.table.moved(index, self.shift) if any(self.shift) else index
-            self._frame = self.table.tipped(index, self.tip) if self.tip else index
+            tip = self.tip or ("" if self.plane is None else "fixed")
+            self._frame = self.table.tipped(index, tip) if tip else index
         return self._frame
+
+    def _placement(self, line: int) -> Placement:
+        """Where words lie in the preset. Raises ProgramError where a datum shift is not known."""
+        if self.unclear:
+            raise ProgramError(
+                "a datum shift was changed in a tilted plane while another one below the plane was in force, "
+                "so it is not known; program CYCL DEF 7 with X, Y and Z behind PLANE RESET",
+                line=line,
+                code="OLP518",
+            )
+        if self.plane is None:
+            return Placement(None, self.shift)
+        shift = turned(self.plane.turn, self.shift)
+        x, y, z = (a + b for a, b in zip(self.below, shift, strict=True))
+        return Placement(self.plane.turn, (x, y, z))
+
+    def tilt(self, plane: Plane, line: int) -> None:
+        """PLANE: a shift that is in force before it acts below the plane. Raises ProgramError where no tool
+        is known."""
+        if plane.ends:
+            if self.plane is not None:
+                if len(self.cancelled) == len(ZERO):
+                    self.below, self.unclear = ZERO, set()
+                elif any(self.shift):
+                    self.unclear = {0, 1, 2}
+                self.shift, self.below = (self.below, ZERO)
+            self.plane = self.stated_plane = None
+            self.changed()
+            return
+        if self.tool is None:
+            raise ProgramError(
+                "words state the tip of the tool in a tilted plane, and no tool is called; give TOOL CALL "
+                "before",
+                line=line,
+                code="OLP532",
+            )
+        if self.plane is None:
+            self.below, self.shift = self.shift, ZERO
+        elif any(self.shift):
+            self.unclear = {0, 1, 2}
+        self.plane = self.stated_plane = plane
+        self.cancelled = set()
+        self.changed()
 
     def switch_tips(self, tip: Interpolated, line: int) -> None:
         """M128, M129 and FUNCTION TCPM. Raises ProgramError where no tool is known."""
@@ -157,7 +210,8 @@ class Modes:
             )
             name = self.setup.machine.default_work_offset
         self.preset = name
-        self.shift = ZERO
+        self.shift = self.below = ZERO
+        self.unclear = set()
         self.changed()
 
     def datum_shift(self, statement: Statement) -> None:
@@ -173,7 +227,15 @@ class Modes:
             axis = b"XYZ".find(letter)
             if axis >= 0:
                 shift[axis] = value * self.unit_mm + (shift[axis] if adds else 0.0)
+                if not adds and self.plane is None:
+                    self.unclear.discard(axis)
+                if not adds and not value:
+                    self.cancelled.add(axis)
+                else:
+                    self.cancelled.discard(axis)
         self.shift = (shift[0], shift[1], shift[2])
+        if self.plane is not None and any(self.below):
+            self.unclear = {0, 1, 2}
         self.changed()
 
     def value(self, text: bytes, statement: Statement) -> float:

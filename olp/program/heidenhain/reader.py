@@ -16,18 +16,21 @@ from olp.core.arrays import Array, Index, Mask, distinct
 from olp.core.errors import ProgramError
 from olp.core.machine import Setup
 from olp.core.progress import Progress
-from olp.core.toolpath import Flag, Kind
+from olp.core.toolpath import Flag, Frame, Kind
+from olp.core.turns import turned
 from olp.program.dialect import Dialect, Options
 from olp.program.heidenhain.arcs import Arcs
 from olp.program.heidenhain.chunk import KNOWN_LETTERS, UNTIPPED, Chunk, apart, columns_of, harmless
 from olp.program.heidenhain.collector import Collected
 from olp.program.heidenhain.columns import PARAMETER_FEED, SIDE, TURN, Block, Blocks, blocks
 from olp.program.heidenhain.modes import NAN, Modes
+from olp.program.heidenhain.planes import Plane, found_by_control
 from olp.program.heidenhain.statements import Statement, of_lines
 from olp.program.heidenhain.table import UNROLL
 from olp.program.program import Program
 from olp.program.rs274.motion import fill
 from olp.program.text.line_ends import STRAY_CR
+from olp.program.tilts import Tilt
 
 _ENDS = (2, 30)
 _MACHINE = 91
@@ -199,12 +202,15 @@ class _Reader(Arcs):
         if re.fullmatch(rb"(?:L[ \t]+)?M140[ \t]+MB[^;]*", upper):
             self.control_move(statement.line, (2,))
             return
-        rest = upper if self.tips else _ROTARY.sub(b"", upper)
+        rest = _ROTARY.sub(b"", upper)
         if rest != upper and re.fullmatch(
             rb"(?:L)?[ \t]*(?:R0[ \t]*)?(?:F[ \t]*(?:MAX|[\d.]+|Q\d+))?[ \t]*(?:M\d+[ \t]*)*", rest
         ):
             functions = [int(m) for m in re.findall(rb"M(\d+)", rest.replace(b"MAX", b""))]
             self._functions(functions, statement.line, here=False)
+            if self.tips:
+                plane, letters = found_by_control(statement, self.modes.stated_plane)
+                self.turned_by_control(plane, letters, statement.line)
             return
         if _WITH_PARAMETER.search(upper) or b"Q" in upper:
             raise ProgramError(
@@ -230,6 +236,14 @@ class _Reader(Arcs):
             return
         frame = max(len(self.modes.table.frames) - 1, 0)
         self.collector.put_one(Kind.RAPID, Flag.PASS | Flag.CONTROL, line, frame, position, NAN)
+
+    def turned_by_control(self, plane: Plane, letters: str, line: int) -> None:
+        self.last_line, collector = line, self.collector
+        collector.tilts.append(Tilt(collector.moves, line, letters, plane.turn, plane.branch))
+        if not letters:
+            self.modes.position[:] = (NAN, NAN, NAN)
+        flag = Flag.PASS if letters else Flag.PASS | Flag.CONTROL
+        collector.put_one(Kind.RAPID, flag, line, self.modes.frame(line), self.modes.position, np.inf)
 
     def _machine(self, chunk: Chunk, row: int, line: int) -> None:
         """M91: words are axis positions."""
@@ -299,19 +313,23 @@ class _Reader(Arcs):
         if not modes.unit_stated:
             self.collector.remarks.setdefault("unit", (int(number[0]), "mm"))
         frame = modes.table.frames[index]
-        slot, offset = rows.slot[a:upto], np.array(frame.offset_mm)
+        slot = rows.slot[a:upto]
         step = chunk.steps[a:upto]
         self._check_steps(blocks, slot, step, number)
         counted = np.asarray(step.any(axis=1))
-        end = fill(
-            slot, blocks.value, counted if counted.any() else None, offset, frame.unit_mm, modes.position
-        )
+        end = _filled(slot, blocks.value, counted if counted.any() else None, frame, modes.position)
         flag = np.where(step.any(axis=1), np.uint8(Flag.INCREMENTAL), np.uint8(0))
         flag[rows.other[a:upto]] |= np.uint8(Flag.WHOLE)
         rapid = chunk.rapid[line]
         kind = np.where(rapid, np.uint8(Kind.RAPID), np.uint8(Kind.LINE))
         arcs = slice(*np.searchsorted(rows.arc_row, (a, upto)))
         if arcs.stop > arcs.start:
+            if frame.tip == "fixed":
+                raise ProgramError(
+                    "an arc in a tilted plane is not read; post it as straight moves, within your tolerance",
+                    line=int(number[rows.arc_row[arcs.start] - a]),
+                    code="OLP565",
+                )
             kind[rows.arc_row[arcs] - a] = self.arcs(chunk, arcs, a, end, frame.unit_mm, number)
         held = np.searchsorted(feed_line, line, "right") - 1
         feed = (
@@ -352,3 +370,15 @@ class _Reader(Arcs):
             collector.put_one(kind, Flag.CYCLE, line, frame, (x, y, z), feed)
         modes.position[2] = stroke.retract
         self.last_line = line
+
+
+def _filled(
+    slot: Index, value: Array, counted: Mask | None, frame: Frame, position: Sequence[float]
+) -> Array:
+    """(n, 3) axis positions of blocks in one frame, from `position`."""
+    offset = np.array(frame.offset_mm)
+    if frame.turn is None:
+        return fill(slot, value, counted, offset, frame.unit_mm, list(position))
+    matrix = np.array(frame.turn)
+    start, offset = turned(matrix.T, np.array([position, frame.offset_mm]))
+    return turned(matrix, fill(slot, value, counted, offset, frame.unit_mm, start.tolist()))

@@ -51,7 +51,7 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"CYCL DEF 220": (_NO, f"makes a pattern of holes on a circle: {UNROLL}"),
     b"CYCL DEF 221": (_NO, f"makes a pattern of holes on lines: {UNROLL}"),
     b"CYCL DEF 224": (_NO, "makes a pattern of holes that encodes a text; post the holes one by one"),
-    b"PLANE": (_NO, _TILT),
+    b"PLANE": (_NO, f"{_TILT}; as a frame where the machine file has the rotary axes"),
     b"FUNCTION TCPM": (_NO, "needs the rotary axes of the machine; describe them in the machine file"),
     b"M128": (_NO, "as FUNCTION TCPM"),
     b"M91": (_R, "axis positions; left uncorrected"),

@@ -64,9 +64,10 @@ class RotaryWords:
         bare = ~words.pointed[slot] & (slot >= 0)
         return RotaryWords(slot, np.where(bare, number * scale, number), scale)
 
-    def follow(self, program: Program, start_deg: Array, offset_deg: Array) -> Array:
+    def follow(self, program: Program, start_deg: Array, offset_deg: Array, found_deg: Array) -> Array:
         """(n, k) degrees of each axis behind each move, NaN where it is not known; `start_deg` (k,) before
-        the first, `offset_deg` (frames, k) what a work offset adds to its words."""
+        the first, `offset_deg` (frames, k) what a work offset adds to its words. `found_deg` (n, k) are
+        positions that the control finds by itself, NaN elsewhere."""
         path = program.toolpath
         flag = path.flag
         control = (flag & np.uint8(Flag.CONTROL)) != 0
@@ -74,10 +75,11 @@ class RotaryWords:
         machine = (flag & np.uint8(Flag.MACHINE)) != 0
         offset = np.where(machine[:, None], 0.0, offset_deg[path.frame])
         given = self.slot >= 0
-        lost = control[:, None] & (given | ~_stated_lines(program)[:, None])
+        found = np.isfinite(found_deg)
+        lost = control[:, None] & (given | ~_stated_lines(program)[:, None]) & ~found
         steps = np.where(given & counting[:, None] & ~lost, self.value, 0.0)
-        anchor = (given & ~counting[:, None]) | lost
-        place = np.where(lost, np.nan, self.value + offset)
+        anchor = (given & ~counting[:, None]) | lost | found
+        place = np.where(lost, np.nan, np.where(found, found_deg, self.value + offset))
         end = np.empty((len(path), len(self.scale)))
         order = np.arange(len(path))
         for column in range(len(self.scale)):

@@ -1,0 +1,24 @@
+"""Moves by which a control turns rotary axes until the tool stands on a tilted plane."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from olp.core.turns import Turn
+from olp.core.values import dataclass
+
+#: Which of two positions of the axis nearest the tool: the one at a positive angle, at a negative one, or
+#: not stated.
+Branch = Literal[-1, 0, 1]
+
+
+@dataclass(frozen=True, slots=True)
+class Tilt:
+    """A `move` that brings the rotary axes `letters` to where the tool is along the normal of a plane. `turn`
+    is the plane in the workpiece, None where nothing turns."""
+
+    move: int
+    line: int
+    letters: str
+    turn: Turn | None
+    branch: Branch

@@ -1,0 +1,128 @@
+"""An independent judge of programs with tilted planes: its own reading of PLANE, CYCLE800 and G68.2, and its
+own search of the rotary positions. It imports nothing of what it judges.
+
+Words in a plane state the tip in the workpiece, turned by `scipy`'s rotations. Rotary axes stand there.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+
+from judge.five_axis import OWN, Judge
+
+#: rad by which a found position may miss the normal.
+MISSED = 1e-9
+
+
+class TiltedJudge(Judge):
+    """Reads the planes of a program, and judges its feed moves in position."""
+
+    def __init__(self, machine: Path) -> None:
+        super().__init__(machine)
+        self.turn = np.eye(3)
+        self.below = np.zeros(3)
+        self.shift = np.zeros(3)
+        self.on = False
+        self.found: dict[str, float] = {}
+
+    def read(self, text: bytes) -> list[tuple[bool, bool, np.ndarray]]:
+        self.turn, self.below, self.shift, self.on = np.eye(3), np.zeros(3), np.zeros(3), False
+        rotary = [name for name in self.order if name not in OWN]
+        words = dict.fromkeys("XYZ", np.nan)
+        turned = dict.fromkeys(rotary, np.nan)
+        moves = []
+        for line in text.decode().splitlines():
+            line = line.partition(";")[0]
+            if self.statement(line, words, turned):
+                continue
+            line = re.sub(r"\bL\b|R0|M\d+", "", line)
+            given = dict(re.findall(r"([XYZABC])\s*([-+]?[\d.]+|\+Q12\d)", line))
+            given = {name: word for name, word in given.items() if name in self.order}
+            if not given:
+                continue
+            for name, word in given.items():
+                if name in OWN:
+                    words[name] = float(word)
+                else:
+                    turned[name] = self.found[name] if "Q" in word else float(word)
+            place = np.full(len(self.order), np.nan)
+            tip = np.array([words[name] for name in "XYZ"]) + self.shift
+            tip = self.turn @ tip + self.below if self.on else tip + self.below
+            for name, value in [*zip("XYZ", tip, strict=True), *turned.items()]:
+                place[self.order.index(name)] = value
+            if np.isfinite(place).all():
+                moves.append((self.cuts(line), self.on, place))
+        return moves
+
+    def cuts(self, line: str) -> bool:
+        return "MAX" not in line
+
+    def statement(self, line: str, words: dict[str, float], turned: dict[str, float]) -> bool:
+        """Take over a line that is no move."""
+        if match := re.search(r"CYCL DEF 7\.\d ([XYZ])([-+\d.]+)", line):
+            where = self.shift if self.on else self.below
+            where["XYZ".index(match[1])] = float(match[2])
+        elif "PLANE" in line:
+            self.plane(line)
+            words.update(dict.fromkeys("XYZ", np.nan))
+            if "TURN" in line or "MOVE" in line:
+                turned.update(self.found)
+        return any(name in line for name in ("PLANE", "CYCL", "TOOL", "PGM"))
+
+    def plane(self, line: str) -> None:
+        self.on = "RESET" not in line
+        self.shift = np.zeros(3)
+        line = re.sub(r"P[123](?=[XYZ])", "", line)
+        numbers = [float(n) for n in re.findall(r"[A-Z]([-+]?\d+\.?\d*)", line)]
+        if "RESET" in line:
+            self.turn = np.eye(3)
+        elif "SPATIAL" in line:
+            self.turn = Rotation.from_euler("xyz", numbers[:3], degrees=True).as_matrix()
+        elif "EULER" in line:
+            self.turn = Rotation.from_euler("ZXZ", numbers[:3], degrees=True).as_matrix()
+        elif "VECTOR" in line:
+            base, normal = np.array(numbers[:3]), np.array(numbers[3:6])
+            self.turn = self.directed(base, normal)
+        elif "POINTS" in line:
+            one, two, three = np.array(numbers[:9]).reshape(3, 3)
+            self.turn = self.directed(two - one, np.cross(two - one, three - one))
+        elif match := re.search(r"RELATIV SP([ABC])([-+\d.]+)", line):
+            axis = np.eye(3)["ABC".index(match[1])]
+            self.turn = self.turn @ Rotation.from_rotvec(axis * np.radians(float(match[2]))).as_matrix()
+        if self.on:
+            self.search(1.0 if re.search(r"S(EQ|YM)\+", line) else -1.0)
+
+    @staticmethod
+    def directed(first: np.ndarray, third: np.ndarray) -> np.ndarray:
+        z = third / np.linalg.norm(third)
+        y = np.cross(z, first)
+        y /= np.linalg.norm(y)
+        return np.column_stack((np.cross(y, z), y, z))
+
+    def search(self, sign: float) -> None:
+        """The rotary positions that bring the tool along the normal, the axis nearest the tool of a sign."""
+        columns = [k for k, name in enumerate(self.order) if name not in OWN]
+        names = [name for name in self.chain if name not in OWN and name != "F"]
+
+        def miss(values: np.ndarray) -> np.ndarray:
+            axes = np.zeros((1, len(self.order)))
+            axes[0, columns] = values
+            return self.forward(axes, False)[1][0] - self.turn[:, 2]
+
+        best = None
+        for start in np.random.default_rng(1).uniform(-180, 180, (60, len(columns))):
+            done = least_squares(miss, start, xtol=1e-15, ftol=1e-15, gtol=1e-15)
+            if np.abs(done.fun).max() > MISSED:
+                continue
+            values = dict(zip([self.order[k] for k in columns], done.x, strict=True))
+            values = {name: (v + 180.0) % 360.0 - 180.0 for name, v in values.items()}
+            if sign * values[names[-1]] >= -1e-6:
+                best = values
+                break
+        assert best is not None, self.turn
+        self.found = best
