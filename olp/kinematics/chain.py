@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -10,12 +10,29 @@ from olp.core.arrays import Array
 from olp.core.errors import ConfigError
 from olp.core.machine import ZERO, Vector
 from olp.core.values import dataclass
+from olp.kinematics.columns import (
+    BATCH,
+    STILL,
+    Columns,
+    Triple,
+    about,
+    add,
+    cross,
+    dot,
+    shifted,
+    subtract,
+    tilted,
+    triple,
+)
 from olp.kinematics.errors import JointErrors, LegErrors, MachineErrors, Yield
 from olp.kinematics.motion import actual_motion, nominal_motion
 from olp.kinematics.platforms import held, rods_of, swings
-from olp.kinematics.poses import STILL, Poses, about, rotation_vector, shift, tilts, turned
+from olp.kinematics.poses import Poses, relative
 from olp.kinematics.structure import FRAME, Platform, Structure
 from olp.kinematics.weight import yields_of
+
+#: Axis values (n,) by name.
+Values = Mapping[str, Array]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,47 +55,63 @@ class Kinematics:
 
     def nominal(self, values: Array) -> Poses:
         """(n) poses of the tool without errors. Raises CannotCompute where a platform does not close."""
-        return self._tool(self._nominal_motions(self._checked(values)), len(values))
+        return self._poses(self._nominal, self._checked(values))
 
     def actual(self, values: Array, sides: Array | None = None) -> Poses:
         """(n) poses of the tool with all errors. `sides` (n, axes) from -1 to 1 are the sides of the
         backlash: 1 after a motion toward larger values; None: in the middle of it. Raises CannotCompute."""
-        return self._actual(self._checked(values), sides)
+        values = self._checked(values)
+        sides = np.zeros((1, 1)) if sides is None else sides
+        return self._poses(self._actual, values, np.broadcast_to(sides, values.shape))
 
     def deviation(self, values: Array, sides: Array | None = None) -> tuple[Array, Array]:
         """(n, 3) mm at the tip and (n, 3) rad as rotation vectors, actual minus nominal, in workpiece
         coordinates. Raises CannotCompute."""
         nominal, actual = self.nominal(values), self.actual(values, sides)
-        turn = actual.rotation @ np.swapaxes(nominal.rotation, -1, -2)
-        return actual.position - nominal.position, rotation_vector(turn)
+        return actual.position - nominal.position, relative(actual.rotation, nominal.rotation)
 
     def jacobian(self, values: Array) -> Array:
         """(n, 6, axes) nominal: mm of the tip and rad of the tool per mm or rad of each axis, in workpiece
         coordinates. Raises CannotCompute."""
+        return self.nominal_and_slopes(values, range(len(self.structure.order)))[1]
+
+    def nominal_and_slopes(self, values: Array, axes: Sequence[int]) -> tuple[Poses, Array]:
+        """(n) poses without errors and the Jacobian of some axes by column, as (n, 6, k)."""
         values = self._checked(values)
-        motions, count = self._nominal_motions(values), len(values)
-        tip = self._tool(motions, count).position
-        columns = np.zeros((count, 6, len(self.structure.order)))
-        pose = STILL
+        places = {self.structure.order[axis]: place for place, axis in enumerate(axes)}
+        slopes = np.zeros((6, len(places), len(values)))
+        rotation, position = np.empty((3, 3, len(values))), np.empty((3, len(values)))
+        for a, some in self._batches(values):
+            b = a + some.shape[1]
+            tool = self._slopes(some, places, slopes[:, :, a:b])
+            tool.store(rotation[:, :, a:b], position[:, a:b])
+        return Poses(rotation.transpose(2, 0, 1), position.T), slopes.transpose(2, 0, 1)
+
+    def _slopes(self, columns: Array, places: Mapping[str, int], slopes: Array) -> Columns:
+        """The pose of the tool at axis values (axes, n). Its Jacobian is put into its `places` of (6, axes,
+        n)."""
+        values = self._named(columns)
+        motions, count = self._nominal_motions(values, columns.shape[1]), columns.shape[1]
+        tool = self._tool(motions)
+        tip, pose = tool.shift, STILL
         for name in self.structure.chain:
             if name in self.structure.platforms:
                 platform = self.structure.platforms[name]
-                local = turned(np.swapaxes(pose.rotation, -1, -2), tip - pose.position)
-                for axis, (velocity, turn) in self._swings(platform, values, motions, local).items():
-                    columns[:, :3, axis] = turned(pose.rotation, velocity)
-                    columns[:, 3:, axis] = turned(pose.rotation, turn)
-            elif name != FRAME:
-                joint, axis = self.structure.joints[name], self.structure.order.index(name)
-                direction = turned(pose.rotation, np.array(joint.direction))
+                local = pose.inverse().at(tip)
+                for axis, (velocity, turn) in self._swings(platform, values, motions, local, count).items():
+                    if axis in places:
+                        _put(slopes[:, places[axis]], pose.turned(velocity), pose.turned(turn))
+            elif name in places:
+                joint, place = self.structure.joints[name], slopes[:, places[name]]
+                direction = pose.turned(triple(joint.direction))
                 if joint.kind == "rotary":
-                    point = pose.at(np.array(joint.point_mm))
-                    columns[:, :3, axis] = np.cross(direction, tip - point)
-                    columns[:, 3:, axis] = direction
+                    arm = subtract(tip, pose.at(triple(joint.point_mm)))
+                    _put(place, cross(direction, arm), direction)
                 else:
-                    columns[:, :3, axis] = direction
+                    _put(place, direction, ZERO)
             if name != FRAME:
                 pose = pose @ motions[name]
-        return columns
+        return tool
 
     def _checked(self, values: Array) -> Array:
         values = np.asarray(values, float)
@@ -89,84 +122,104 @@ class Kinematics:
             )
         return values
 
-    def _column(self, values: Array, name: str) -> Array:
-        return np.asarray(values[:, self.structure.order.index(name)])
+    def _batches(self, values: Array) -> Iterator[tuple[int, Array]]:
+        """The first row of each batch, and its (axes, rows) values. Platforms are solved in one."""
+        size = max(len(values), 1) if self.structure.platforms else BATCH
+        for a in range(0, len(values), size):
+            yield a, np.ascontiguousarray(values[a : a + size].T)
 
-    def _nominal_motions(self, values: Array) -> dict[str, Poses]:
+    def _poses(self, compose: Callable[..., Columns], values: Array, *more: Array) -> Poses:
+        rotation, position = np.empty((3, 3, len(values))), np.empty((3, len(values)))
+        for a, some in self._batches(values):
+            b = a + some.shape[1]
+            columns = compose(some, *(np.ascontiguousarray(part[a:b].T) for part in more))
+            columns.store(rotation[:, :, a:b], position[:, a:b])
+        return Poses(rotation.transpose(2, 0, 1), position.T)
+
+    def _named(self, columns: Array) -> Values:
+        return dict(zip(self.structure.order, columns, strict=True))
+
+    def _nominal(self, columns: Array) -> Columns:
+        return self._tool(self._nominal_motions(self._named(columns), columns.shape[1]))
+
+    def _nominal_motions(self, values: Values, count: int) -> dict[str, Columns]:
         """The motion of each joint and platform by name."""
         structure = self.structure
         motions = {
-            name: nominal_motion(joint, self._column(values, name))
+            name: nominal_motion(joint, values[name])
             for name, joint in structure.joints.items()
             if joint.kind != "length"
         }
         for platform in structure.platforms.values():
-            rods = rods_of(platform, self._lengths(values, None), motions, lambda _: LegErrors(), len(values))
-            motions[platform.name] = held(platform, rods, None)
+            rods = rods_of(platform, self._lengths(values, None), motions, lambda _: LegErrors(), count)
+            motions[platform.name] = Columns.of(held(platform, rods, None))
         return motions
 
-    def _lengths(self, values: Array, sides: Array | None) -> dict[str, Array]:
+    def _lengths(self, values: Values, sides: Values | None) -> dict[str, Array]:
         """(n,) values of the axes that are lengths of legs; with their errors where `sides` is given."""
         lengths = {}
         for name, joint in self.structure.joints.items():
             if joint.kind == "length":
-                lengths[name] = self._column(values, name)
+                lengths[name] = values[name]
                 errors = self.errors.joints.get(name)
                 if sides is not None and errors is not None:
-                    motion = actual_motion(
-                        joint, errors, lengths[name], on_workpiece=False, side=self._column(sides, name)
-                    )
-                    lengths[name] = motion.position @ np.array(joint.direction)
+                    motion = actual_motion(joint, errors, values[name], on_workpiece=False, side=sides[name])
+                    lengths[name] = np.asarray(dot(motion.shift, triple(joint.direction)))
         return lengths
 
-    def _actual(self, values: Array, sides: Array | None) -> Poses:
-        structure, errors = self.structure, self.errors
-        sides = np.zeros_like(values) if sides is None else np.broadcast_to(sides, values.shape)
-        nominal = self._nominal_motions(values) if structure.platforms or errors.yields else {}
-        yields = yields_of(structure, errors, nominal, values)
+    def _actual(self, columns: Array, side_columns: Array) -> Columns:
+        structure, errors, count = self.structure, self.errors, columns.shape[1]
+        values, sides = self._named(columns), self._named(side_columns)
+        nominal = self._nominal_motions(values, count) if structure.platforms or errors.yields else {}
+        yields = yields_of(structure, errors, nominal)
         motions = {}
         for name, joint in structure.joints.items():
             if joint.kind != "length":
                 motions[name] = actual_motion(
                     joint,
                     errors.joints.get(name) or JointErrors(joint.point_mm),
-                    self._column(values, name),
+                    values[name],
                     on_workpiece=name in structure.workpiece_side,
-                    side=self._column(sides, name),
+                    side=sides[name],
                     yielded=yields.get(name),
                 )
         for name, platform in structure.platforms.items():
             legs = [errors.legs.get((name, leg)) or LegErrors() for leg in range(len(platform.legs))]
-            rods = rods_of(platform, self._lengths(values, sides), motions, legs.__getitem__, len(values))
-            motions[name] = held(platform, rods, nominal[name])
+            rods = rods_of(platform, self._lengths(values, sides), motions, legs.__getitem__, count)
+            motions[name] = Columns.of(held(platform, rods, nominal[name].rows(count)))
         wrong = about(
-            np.array(structure.gauge.point_mm),
-            tilts(np.array(errors.gauge_tilt_rad)),
-            np.array(errors.gauge_shift_mm),
+            triple(structure.gauge.point_mm),
+            tilted(triple(errors.gauge_tilt_rad)),
+            triple(errors.gauge_shift_mm),
         )
-        return self._tool(motions, len(values), wrong)
+        return self._tool(motions, wrong)
 
-    def _tool(self, motions: Mapping[str, Poses], count: int, gauge: Poses = STILL) -> Poses:
+    def _tool(self, motions: Mapping[str, Columns], gauge: Columns = STILL) -> Columns:
         """The pose of the tool from the motions of all parts and the error of the gauge frame."""
         pose = STILL
         for name in self.structure.chain:
             if name != FRAME:
                 pose = pose @ motions[name]
-        tool = pose @ gauge @ self.structure.gauge.pose @ shift(np.array(self.tool_mm))
-        return tool.rows(count)
+        return pose @ (gauge @ Columns.of(self.structure.gauge.pose) @ shifted(triple(self.tool_mm)))
 
     def _swings(
-        self, platform: Platform, values: Array, motions: Mapping[str, Poses], tip: Array
-    ) -> dict[int, tuple[Array, Array]]:
-        """By the column of each axis of a platform (n, 3) mm of the tip and (n, 3) rad of the platform per
-        unit of the axis, in the coordinates in front of the platform."""
-        rods = rods_of(platform, self._lengths(values, None), motions, lambda _: LegErrors(), len(values))
-        steps = swings(platform, self.structure.joints, rods, motions)
-        arm = tip - motions[platform.name].position
-        return {
-            self.structure.order.index(axis): (step[:, :3] + np.cross(step[:, 3:], arm), step[:, 3:])
-            for axis, step in steps.items()
-        }
+        self, platform: Platform, values: Values, motions: Mapping[str, Columns], tip: Triple, count: int
+    ) -> dict[str, tuple[Triple, Triple]]:
+        """By each axis of a platform mm of the tip and rad of the platform per unit of it,
+        in the coordinates in front of the platform."""
+        rods = rods_of(platform, self._lengths(values, None), motions, lambda _: LegErrors(), count)
+        arm = subtract(tip, motions[platform.name].shift)
+        rates = {}
+        for axis, step in swings(platform, self.structure.joints, rods, motions).items():
+            turn = triple(step[:, 3:])
+            rates[axis] = add(triple(step[:, :3]), cross(turn, arm)), turn
+        return rates
+
+
+def _put(slopes: Array, velocity: Triple, turn: Triple) -> None:
+    """Put one axis into (6, n)."""
+    for row, entry in enumerate((*velocity, *turn)):
+        slopes[row] = entry
 
 
 def _unknown_parts(structure: Structure, errors: MachineErrors) -> list[str]:

@@ -17,7 +17,9 @@ from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import NotInvertible
 from olp.core.values import dataclass
 from olp.kinematics.chain import Kinematics
-from olp.kinematics.poses import Poses, rotation_vector, turned
+from olp.kinematics.columns import BATCH
+from olp.kinematics.poses import Poses, relative, turned
+from olp.kinematics.regular import RegularSteps
 
 #: Position of the tip is met within this, mm.
 POSITION_MM = 1e-9
@@ -25,6 +27,14 @@ POSITION_MM = 1e-9
 _SETTLED_MM = 1e-8
 #: After a step below this the slopes are taken as before: mm, and rad times the reference radius.
 _SAME_SLOPES_MM = 0.5
+#: Coordinates of a place.
+_PLACE = 3
+#: By so much less than the last step the next one is taken to shrink.
+_MARGIN = 10.0
+#: No division by less.
+_TINY = 1e-300
+#: So many steps with the same slopes suffice at a regular posture.
+_FEW_STEPS = 6
 #: At most so many steps; from a posture nearby three suffice.
 _MOST_STEPS = 100
 #: A step of a rotary axis is at most this long, so that the branch is kept, in rad.
@@ -115,22 +125,25 @@ def inverse(
     if not nominal and int(free.sum()) > (5 if structure.symmetric_tool else 6):
         # which of many solutions is reached depends on the slopes: those of the machine itself are taken
         slopes = partial(_differences, forward, task.scale, reference_radius_mm)
-    limited = np.zeros(len(near), bool)
-    if largest_turn_deg is not None:
-        task, limited = _bounded(task, forward, slopes, rotary, largest_turn_deg)
-    values, met = _newton(task, forward, slopes)
-    if not np.all(met):
-        well = replace(task.only(~met), moves=_MOVES_WELL)
-        values[~met], now = _newton(well, forward, slopes)
-        limited[~met] = True
-        if not np.all(now):
-            raise _none_near(machine, int(np.flatnonzero(~met)[np.argmin(now)]))
+    values, left, met = _regular(task, free, forward, slopes, largest_turn_deg)
+    limited, hard = np.zeros(len(near), bool), np.flatnonzero(~met)
+    if hard.size:
+        part = task.only(hard)
+        if largest_turn_deg is not None:
+            part, limited[hard] = _bounded(part, forward, slopes, rotary, largest_turn_deg)
+        values[hard], met = _newton(part, forward, slopes)
+        again = hard[~met]
+        if again.size:
+            well = replace(part.only(~met), moves=_MOVES_WELL)
+            values[again], now = _newton(well, forward, slopes)
+            limited[again] = True
+            if not np.all(now):
+                raise _none_near(machine, int(again[np.argmin(now)]))
+        left[hard] = relative(forward(values[hard]).rotation, task.target.rotation[hard])
     if largest_turn_deg is not None:
         turn = np.max(np.abs(np.where(rotary, values - near, 0.0)), axis=1, initial=0.0)
         if np.any(turn > _FARTHEST * largest_turn_deg):
             raise _none_near(machine, int(np.argmax(turn)))
-    reached = forward(values).rotation
-    left = rotation_vector(reached @ np.swapaxes(task.target.rotation, -1, -2))
     return Solved(values, left, limited)
 
 
@@ -159,6 +172,53 @@ def _none_near(machine: Kinematics, row: int) -> NotInvertible:
     )
     error.row = row
     return error
+
+
+def _regular(
+    task: _Task, free: Mask, forward: Forward, slopes: Slopes, largest_deg: float | None
+) -> tuple[Array, Array, Mask]:
+    """Axis values, the turns (n, 3) that they leave, and which rows are found so: those at regular postures
+    whose first step turns no axis far. Of more axes than are needed none is."""
+    values, left, met = task.near.copy(), np.zeros((len(task.near), 3)), np.zeros(len(task.near), bool)
+    count, asked = int(free.sum()), 5 if task.symmetric else 6
+    if count not in (_PLACE, asked):
+        return values, left, met
+    longest = _LONGEST_RAD if largest_deg is None else min(np.radians(largest_deg), _LONGEST_RAD)
+    for a in range(0, len(values), BATCH):
+        rows = np.arange(a, min(a + BATCH, len(values)))
+        part, here = task.only(rows), values[rows]
+        steps = RegularSteps.of(_asked_rows(part, slopes(here), count)[:, free])
+        found, size = steps.regular, np.full(len(rows), np.inf)
+        for number in range(_FEW_STEPS):
+            pose = forward(here)
+            miss = _miss(part, pose).T[:count]
+            step = steps(miss)
+            before, size = size, np.max(np.abs(step), axis=0)
+            # with the same slopes each step shrinks by the same share
+            shrinks = np.minimum(1.0, _MARGIN * size / np.maximum(before, _TINY)) if number else 1.0
+            if number == 0:
+                found = found & (np.linalg.norm(step, axis=0) < longest * task.radius_mm)
+            here[:, free] += (np.where(found, step, 0.0) / task.scale[free, None]).T
+            away = np.linalg.norm(miss[:3], axis=0)
+            settled = (away * shrinks < POSITION_MM) & (size * shrinks < _SETTLED_MM)
+            if np.all(settled | ~found):
+                break
+        met[rows] = found & settled
+        values[rows] = np.where(met[rows, None], here, values[rows])
+        left[rows] = relative(pose.rotation, part.target.rotation)
+    return values, left, met
+
+
+def _asked_rows(task: _Task, slopes: Array, count: int) -> Array:
+    """(m, axes, n) how the tip moves by the axes and, with more than three of them, how the tool turns."""
+    columns = slopes.transpose(1, 2, 0)
+    if count == _PLACE:
+        return np.asarray(columns[:_PLACE])
+    if not task.symmetric:
+        return np.asarray(columns)
+    rotation = task.target.rotation
+    across = [sum(rotation[:, k, i] * columns[_PLACE + k] for k in range(3)) for i in range(2)]
+    return np.concatenate((columns[:_PLACE], np.stack(across)))
 
 
 def _bounded(
@@ -219,10 +279,12 @@ def _newton(task: _Task, forward: Forward, slopes: Slopes) -> tuple[Array, Mask]
 def _miss(task: _Task, pose: Poses) -> Array:
     """(n, 5 or 6) what is missing to the target: mm of the tip, and rad times the radius; of a symmetric tool
     across its axis, in its own frame."""
-    turn = rotation_vector(task.target.rotation @ np.swapaxes(pose.rotation, -1, -2)) * task.radius_mm
+    turn = relative(task.target.rotation, pose.rotation) * task.radius_mm
     if task.symmetric:
         turn = turned(np.swapaxes(task.target.rotation, -1, -2), turn)[:, :2]
-    return np.concatenate((task.target.position - pose.position, turned(task.asked, turn)), axis=1)
+    return np.concatenate(
+        (task.target.position - pose.position, (task.asked @ turn[..., None])[..., 0]), axis=1
+    )
 
 
 def _steps_of(task: _Task, slopes: Array) -> Array:
@@ -271,7 +333,7 @@ def _differences(forward: Forward, scale: Array, radius_mm: float, values: Array
         ahead[:, column] += half / unit
         behind[:, column] -= half / unit
         after, before = forward(ahead), forward(behind)
-        turn = rotation_vector(after.rotation @ np.swapaxes(before.rotation, -1, -2))
+        turn = relative(after.rotation, before.rotation)
         slopes[:, :3, column] = (after.position - before.position) / (2.0 * half)
         slopes[:, 3:, column] = turn * radius_mm / (2.0 * half)
     return slopes

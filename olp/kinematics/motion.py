@@ -9,28 +9,41 @@ from __future__ import annotations
 import numpy as np
 
 from olp.core.arrays import Array
+from olp.core.machine import Vector
 from olp.core.values import dataclass
+from olp.kinematics.columns import (
+    STILL,
+    Columns,
+    Entry,
+    Triple,
+    about,
+    add,
+    plus,
+    scaled,
+    shifted,
+    tilted,
+    triple,
+    turn_about,
+)
 from olp.kinematics.errors import OWN, JointErrors
-from olp.kinematics.poses import STILL, Poses, about, axis_rotation, shift, tilts
 from olp.kinematics.structure import Joint
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Yielded:
-    """What one joint gives way at each row: `own` (n,) in mm or rad, `tilt_rad` and `shift_mm` (n, 3)."""
+    """What one joint gives way at each row: `own` in mm or rad, `tilt_rad` and `shift_mm`."""
 
-    own: Array
-    tilt_rad: Array
-    shift_mm: Array
+    own: Entry
+    tilt_rad: Triple
+    shift_mm: Triple
 
 
-def nominal_motion(joint: Joint, value: Array) -> Poses:
+def nominal_motion(joint: Joint, value: Array) -> Columns:
     """The motion at axis values (n,) in mm or deg."""
-    direction = np.array(joint.direction)
+    direction = triple(joint.direction)
     if joint.kind == "rotary":
-        rotation = axis_rotation(direction, np.radians(value))
-        return about(np.array(joint.point_mm), rotation, np.zeros(3))
-    return shift(value[:, None] * direction)
+        return about(triple(joint.point_mm), turn_about(direction, np.radians(value)))
+    return shifted(scaled(direction, value))
 
 
 def actual_motion(
@@ -41,71 +54,69 @@ def actual_motion(
     on_workpiece: bool,
     side: Array | None = None,
     yielded: Yielded | None = None,
-) -> Poses:
+) -> Columns:
     """The motion with its errors at axis values (n,). `side` (n,) is the side of the backlash, from -1 to 1:
     1 after a motion toward larger values."""
-    own, turns = np.zeros(len(value)), joint.kind == "rotary"
+    own: Entry = 0.0
+    turns = joint.kind == "rotary"
     bodies = []
     for curve in errors.curves:
-        motions = curve.at(value)
-        own = own + (motions[:, OWN] if turns else 0.0)
+        motions = _entries(curve.at(value))
+        own = plus(own, motions[OWN] if turns else 0.0)
         bodies.append(_body(joint, curve.point_mm, motions, value, curve.follows, on_workpiece))
     if errors.harmonics:
-        motions = np.zeros((len(value), OWN + 1))
+        waves: list[Entry] = [0.0] * (OWN + 1)
         for wave in errors.harmonics:
-            motions[:, wave.component] += wave.at(value)
-        own = own + (motions[:, OWN] if turns else 0.0)
-        if np.any(motions[:, : OWN if turns else OWN + 1]):
+            waves[wave.component] = plus(waves[wave.component], wave.at(value))
+        own = plus(own, waves[OWN] if turns else 0.0)
+        if any(not isinstance(wave, float) for wave in (waves[:OWN] if turns else waves)):
             first = errors.curves[0] if errors.curves else None
             point = errors.point_mm if first is None else first.point_mm
             follows = first is not None and first.follows
-            bodies.append(_body(joint, point, motions, value, follows, on_workpiece))
+            bodies.append(_body(joint, point, waves, value, follows, on_workpiece))
     if side is not None and errors.backlash:
-        own = own - 0.5 * errors.backlash * side
-    stated = _composed(bodies[::-1] if on_workpiece else bodies)
+        own = plus(own, -0.5 * errors.backlash * side)
+    stated = STILL
+    for body in bodies[::-1] if on_workpiece else bodies:
+        stated = stated @ body
     gives = STILL
     if yielded is not None:
-        own = own + yielded.own
-        gives = _yield_body(joint, yielded, value, on_workpiece)
+        own = plus(own, yielded.own)
+        turn = tilted(yielded.tilt_rad, reverse=on_workpiece)
+        gives = about(triple(joint.point_mm), turn, yielded.shift_mm)
     line = _on_its_line(joint, errors, value, own)
-    if joint.kind == "rotary":
+    if turns:
         return line @ gives @ stated if on_workpiece else stated @ gives @ line
     return gives @ stated @ line if on_workpiece else line @ stated @ gives
 
 
-def _composed(bodies: list[Poses]) -> Poses:
-    pose = STILL
-    for body in bodies:
-        pose = pose @ body
-    return pose
+def _entries(motions: Array) -> list[Entry]:
+    """The columns of error motions (n, 7), 0 where all of one are."""
+    columns = np.ascontiguousarray(motions.T)
+    return [column if column.any() else 0.0 for column in columns]
 
 
 def _body(
-    joint: Joint, point_mm: tuple[float, ...], motions: Array, value: Array, follows: bool, on_workpiece: bool
-) -> Poses:
-    point = np.array(point_mm)
+    joint: Joint, point_mm: Vector, motions: list[Entry], value: Array, follows: bool, on_workpiece: bool
+) -> Columns:
+    point, direction = triple(point_mm), triple(joint.direction)
     if follows:
-        point = point + value[:, None] * np.array(joint.direction)
-    moved = motions[:, :3]
+        point = add(point, scaled(direction, value))
+    moved: Triple = (motions[0], motions[1], motions[2])
     if joint.kind != "rotary":
-        moved = moved + motions[:, OWN, None] * np.array(joint.direction)
-    return about(point, tilts(motions[:, 3:6], reverse=on_workpiece), moved)
+        moved = add(moved, scaled(direction, motions[OWN]))
+    return about(point, tilted((motions[3], motions[4], motions[5]), reverse=on_workpiece), moved)
 
 
-def _yield_body(joint: Joint, yielded: Yielded, value: Array, on_workpiece: bool) -> Poses:
-    rotation = tilts(yielded.tilt_rad, reverse=on_workpiece)
-    return about(np.array(joint.point_mm), rotation, yielded.shift_mm)
-
-
-def _on_its_line(joint: Joint, errors: JointErrors, value: Array, own: Array) -> Poses:
+def _on_its_line(joint: Joint, errors: JointErrors, value: Array, own: Entry) -> Columns:
     """The motion along or about the line where it really is; at axis zero nothing moves but the own error."""
-    direction = np.array(joint.direction)
-    tilt = np.array(errors.tilt_rad)
+    direction = triple(joint.direction)
     if joint.kind == "rotary":
-        point = np.array(joint.point_mm)
-        turn = axis_rotation(direction, np.radians(value) + errors.zero + own)
-        line = about(point, tilts(tilt), np.array(errors.shift_mm))
-        return line @ about(point, turn, np.zeros(3)) @ line.inverse()
-    along = (value + errors.zero + own)[:, None] * direction
-    across = (value - errors.datum)[:, None] * np.cross(tilt, direction)
-    return shift(along + across)
+        turn = turn_about(
+            tilted(triple(errors.tilt_rad)).turned(direction),
+            plus(plus(np.radians(value), float(errors.zero)), own),
+        )
+        return about(add(triple(joint.point_mm), triple(errors.shift_mm)), turn)
+    along = scaled(direction, plus(plus(value, float(errors.zero)), own))
+    across = triple(np.cross(errors.tilt_rad, joint.direction))
+    return shifted(add(along, scaled(across, value - errors.datum)))

@@ -9,6 +9,7 @@ import numpy as np
 from olp.core.arrays import Array
 from olp.core.errors import CannotCompute
 from olp.core.values import dataclass
+from olp.kinematics.columns import Columns
 from olp.kinematics.errors import LegErrors
 from olp.kinematics.poses import Poses
 from olp.kinematics.structure import Joint, Platform
@@ -37,7 +38,7 @@ class Rods:
 def rods_of(
     platform: Platform,
     lengths: Mapping[str, Array],
-    carriages: Mapping[str, Poses],
+    carriages: Mapping[str, Columns],
     errors: Callable[[int], LegErrors],
     count: int,
 ) -> Rods:
@@ -47,7 +48,7 @@ def rods_of(
         wrong = errors(number)
         base = np.array(leg.base_mm) + wrong.base_mm
         if leg.carriage is not None:
-            base = carriages[leg.carriage].at(base)
+            base = carriages[leg.carriage].rows(count).at(base)
         bases.append(np.broadcast_to(base, (count, 3)))
         ends.append(np.broadcast_to(np.array(leg.platform_mm) + wrong.platform_mm, (count, 3)))
         value = lengths[leg.axis] if leg.axis is not None else 0.0
@@ -138,7 +139,7 @@ _CROSS: Sequence[tuple[tuple[int, int], int, float]] = (
 
 
 def swings(
-    platform: Platform, joints: Mapping[str, Joint], rods: Rods, motions: Mapping[str, Poses]
+    platform: Platform, joints: Mapping[str, Joint], rods: Rods, motions: Mapping[str, Columns]
 ) -> dict[str, Array]:
     """By axis (n, 6) how the platform shifts (mm) and turns (rad) per mm or rad of it, at its pose in
     `motions`. Raises CannotCompute where the platform is singular."""

@@ -57,17 +57,18 @@ def turned(rotation: Array, vectors: Array) -> Array:
         return vectors
     if rotation.ndim == 2:
         return np.asarray(vectors @ rotation.T)
-    return np.asarray((rotation @ vectors[..., None])[..., 0])
+    x, y, z = np.moveaxis(vectors, -1, 0)
+    result = np.empty((3, len(rotation)))
+    for i in range(3):
+        np.multiply(rotation[:, i, 0], x, out=result[i])
+        result[i] += rotation[:, i, 1] * y
+        result[i] += rotation[:, i, 2] * z
+    return result.T
 
 
 def shift(vector_mm: Array) -> Poses:
     """The translation by (n, 3) or (3,) in mm."""
     return Poses(_UPRIGHT, vector_mm)
-
-
-def about(point_mm: Array, rotation: Array, offset_mm: Array) -> Poses:
-    """Rotations about a point, then a shift: Trans(point) Trans(offset) R Trans(-point)."""
-    return Poses(rotation, point_mm + offset_mm - turned(rotation, point_mm))
 
 
 def axis_rotation(direction: Array, angle_rad: Array) -> Array:
@@ -86,16 +87,23 @@ def tilts(angles_rad: Array, *, reverse: bool = False) -> Array:
     return np.asarray(x @ y @ z if reverse else z @ y @ x)
 
 
+def relative(rotation: Array, other: Array) -> Array:
+    """(n, 3) rotation vectors from the `other` rotations (n, 3, 3) to the first ones, in rad."""
+    turn = np.empty((3, 3, len(rotation)))
+    for i in range(3):
+        for k in range(3):
+            np.multiply(rotation[:, i, 0], other[:, k, 0], out=turn[i, k])
+            turn[i, k] += rotation[:, i, 1] * other[:, k, 1]
+            turn[i, k] += rotation[:, i, 2] * other[:, k, 2]
+    return rotation_vector(turn.transpose(2, 0, 1))
+
+
 def rotation_vector(rotation: Array) -> Array:
     """(n, 3) angle times unit axis of rotations (n, 3, 3), in rad; the angle is from 0 to pi."""
-    skew = 0.5 * np.stack(
-        (
-            rotation[..., 2, 1] - rotation[..., 1, 2],
-            rotation[..., 0, 2] - rotation[..., 2, 0],
-            rotation[..., 1, 0] - rotation[..., 0, 1],
-        ),
-        axis=-1,
-    )
+    skew = np.empty((3, *rotation.shape[:-2]))
+    for row, (i, k) in enumerate(((2, 1), (0, 2), (1, 0))):
+        skew[row] = 0.5 * (rotation[..., i, k] - rotation[..., k, i])
+    skew = np.moveaxis(skew, 0, -1)
     sine = np.linalg.norm(skew, axis=-1)
     trace = np.trace(rotation, axis1=-2, axis2=-1)
     angle = np.arctan2(sine, 0.5 * (trace - 1.0))

@@ -14,6 +14,7 @@ from olp.core.arrays import Array
 from olp.core.errors import ConfigError
 from olp.core.machine import ZERO
 from olp.kinematics.chain import Kinematics
+from olp.kinematics.columns import cross, dot, triple
 from olp.kinematics.structure import Structure
 
 #: Below this share of a unit volume three linear axes do not reach every point of space.
@@ -41,10 +42,20 @@ def axes_of_tips(machine: Kinematics, values: Array) -> Array:
     columns = linear_columns(machine.structure)
     still = values.copy()
     still[:, columns] = 0.0
-    slopes = machine.jacobian(still)[:, :3, columns]
-    away = _tips(machine, values[:, columns]) - machine.nominal(still).position
-    still[:, columns] = np.linalg.solve(slopes, away[..., None])[..., 0]
+    pose, slopes = machine.nominal_and_slopes(still, columns)
+    away = stated_tips(machine, values) - pose.position
+    first, second, third = (triple(slopes[:, :3, k]) for k in range(3))
+    normals = cross(second, third), cross(third, first), cross(first, second)
+    volume = dot(first, normals[0])
+    for column, normal in zip(columns, normals, strict=True):
+        still[:, column] = dot(triple(away), normal) / volume
     return still
+
+
+def stated_tips(machine: Kinematics, values: Array) -> Array:
+    """(n, 3) tips in workpiece coordinates of programmed coordinates (n, axes), which state the tip."""
+    origin, slopes = _workpiece(machine)
+    return np.asarray(origin + values[:, linear_columns(machine.structure)] @ slopes.T)
 
 
 def tips_of_axes(machine: Kinematics, values: Array) -> Array:
@@ -55,12 +66,6 @@ def tips_of_axes(machine: Kinematics, values: Array) -> Array:
     away = machine.nominal(values).position - origin
     tips[:, columns] = np.linalg.solve(slopes, away.T).T
     return tips
-
-
-def _tips(machine: Kinematics, linear: Array) -> Array:
-    """(n, 3) tips in workpiece coordinates of linear programmed coordinates (n, 3)."""
-    origin, slopes = _workpiece(machine)
-    return np.asarray(origin + linear @ slopes.T)
 
 
 def _workpiece(machine: Kinematics) -> tuple[Array, Array]:

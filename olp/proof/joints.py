@@ -33,7 +33,8 @@ _MOST_FAR = 0.5
 _ARM_MM = 100.0
 #: Steps by which a place on a move is found.
 _STEPS = 3
-#: Samples of a stretch are so many times those of the plan, and one: so none falls on one of the plan.
+#: Samples of a corrected stretch are so many times those of the plan, and one: so none falls on one of the
+#: plan.
 _FINER = 2
 #: Rows of a Jacobian: mm of the tip, and rad of the tool.
 _PLACE_AND_TURN = (slice(0, 3), slice(3, 6))
@@ -186,7 +187,8 @@ def _deviation(nominal: JointPath, path: JointPath, groups: Index, plan: JointPl
     result = _Sums(count)
     result.add(nominal, path, owner[ends], ends, np.ones(len(ends)), shares[1][ends], play[ends])
     feeds = np.flatnonzero(known & begun & nominal.feed[owner])
-    samples = _FINER * Resolution.of(motion).samples(start[feeds], axes[feeds]) + 1
+    finer = 1 if path is nominal else _FINER
+    samples = finer * Resolution.of(motion).samples(start[feeds], axes[feeds]) + 1
     totals = np.cumsum(samples)
     a = 0
     while a < len(feeds):
@@ -253,7 +255,7 @@ def _places(nominal: JointPath, path: JointPath, move: Index, rows: Index, axes:
     tool, tip, shift = nominal.tool[move], nominal.tip[move], nominal.shift_mm[move]
 
     def pose(at: Array) -> Poses:
-        place = motion.nominal(motion.axes(nominal.at(move, at), tool, tip), tool)
+        place = motion.targets(nominal.at(move, at), tool, tip)
         return Poses(place.rotation, place.position + shift)
 
     half, symmetric = 1e-4, motion.structure.symmetric_tool
@@ -293,10 +295,10 @@ class _Sums:
         if not len(rows):
             return
         motion, tool = path.motion, path.tool[rows]
-        actual = motion.actual(motion.axes(path.at(rows, part), tool, path.tip[rows]), tool, side)
-        own = nominal.motion
-        axes = own.axes(nominal.at(move, share), nominal.tool[move], nominal.tip[move])
-        target = own.nominal(axes, nominal.tool[move])
+        place = path.at(rows, part)
+        actual = motion.actual(motion.axes(place, tool, path.tip[rows]), tool, side)
+        place = place if path is nominal else nominal.at(move, share)
+        target = nominal.motion.targets(place, nominal.tool[move], nominal.tip[move])
         target = Poses(target.rotation, target.position + nominal.shift_mm[move])
         both = np.stack(deviations(motion.structure, actual, target), axis=1)
         np.maximum.at(self.largest, move, both)

@@ -17,11 +17,13 @@ from olp.kinematics.chain import Kinematics
 from olp.kinematics.correction import CorrectedPoses, beyond_travel, correct_poses, meet_positions
 from olp.kinematics.errors import MachineErrors
 from olp.kinematics.poses import Poses
-from olp.kinematics.programmed import axes_of_tips, tips_of_axes
+from olp.kinematics.programmed import axes_of_tips, stated_tips, tips_of_axes
 from olp.kinematics.structure import Structure
 
 #: A tool vector, and how words are turned.
 TurnedTool = tuple[Vector, Turn | None]
+#: Some rows, or all.
+Rows = Index | slice
 #: Steps by which a direction of the tool is found.
 _STEPS = 6
 #: deg by which slopes of directions are found.
@@ -56,19 +58,30 @@ class Motion:
 
     def nominal(self, axes: Array, tool: Index) -> Poses:
         """(n) poses of the nominal machine."""
-        return self._poses(axes, tool, lambda machine, rows: machine.nominal(axes[rows]))
+        return self._poses(tool, lambda machine, rows: machine.nominal(axes[rows]))
 
     def actual(self, axes: Array, tool: Index, sides: Array | None = None) -> Poses:
         """(n) poses of the machine with its errors; `sides` as in `Kinematics.actual`."""
         return self._poses(
-            axes,
-            tool,
-            lambda machine, rows: machine.actual(axes[rows], None if sides is None else sides[rows]),
+            tool, lambda machine, rows: machine.actual(axes[rows], None if sides is None else sides[rows])
         )
 
     def axes(self, programmed: Array, tool: Index, tip: Mask) -> Array:
         """(n, axes) axis values of programmed coordinates, which state the `tip` in some rows."""
         return self._by_tool(self._turned(programmed, tool, back=False), tool, tip, axes_of_tips)
+
+    def targets(self, programmed: Array, tool: Index, tip: Mask) -> Poses:
+        """(n) poses of the nominal machine at programmed coordinates, which state the `tip` in some rows:
+        the linear axes do not turn the tool."""
+        values = self._turned(programmed, tool, back=False)
+
+        def pose(machine: Kinematics, rows: Rows) -> Poses:
+            poses, stated = machine.nominal(values[rows]), tip[rows]
+            if stated.any():
+                poses.position[stated] = stated_tips(machine, values[rows][stated])
+            return poses
+
+        return self._poses(tool, pose)
 
     def programmed(self, axes: Array, tool: Index, tip: Mask) -> Array:
         """(n, axes) the other way round."""
@@ -127,47 +140,54 @@ class Motion:
     def command(self, axes: Array, tool: Index, shift_mm: Array) -> CorrectedPoses:
         """Corrected axis values of nominal ones, whose targets are moved by (n, 3). Raises NotInvertible."""
         values, left, limited = axes.copy(), np.zeros((len(axes), 3)), np.zeros(len(axes), bool)
-        for which in distinct(tool).tolist():
-            rows = np.flatnonzero(tool == which)
+        for machine, rows in self._groups(tool):
             with _of_rows(rows):
-                done = correct_poses(self.machines[which], axes[rows], shift_mm=shift_mm[rows])
+                done = correct_poses(machine, axes[rows], shift_mm=shift_mm[rows])
             values[rows], left[rows], limited[rows] = done.values, done.left_rad, done.limited
         return CorrectedPoses(values, left, limited, beyond_travel(self.structure, values))
 
     def linear(self, axes: Array, tool: Index, target: Poses) -> CorrectedPoses:
         """Axis values whose linear axes alone bring the tip to its target. Raises NotInvertible."""
         values, left, limited = axes.copy(), np.zeros((len(axes), 3)), np.zeros(len(axes), bool)
-        for which in distinct(tool).tolist():
-            rows = np.flatnonzero(tool == which)
+        for machine, rows in self._groups(tool):
             part = Poses(target.rotation[rows], target.position[rows])
             with _of_rows(rows):
-                solved = meet_positions(self.machines[which], part, axes[rows])
+                solved = meet_positions(machine, part, axes[rows])
             values[rows], left[rows] = solved.values, solved.left_rad
         return CorrectedPoses(values, left, limited, beyond_travel(self.structure, values))
 
     def slopes(self, axes: Array, tool: Index) -> Array:
         """(n, 6, axes) as `Kinematics.jacobian`."""
         slopes = np.empty((len(axes), 6, axes.shape[1]))
-        for which in distinct(tool).tolist():
-            rows = np.flatnonzero(tool == which)
-            slopes[rows] = self.machines[which].jacobian(axes[rows])
+        for machine, rows in self._groups(tool):
+            slopes[rows] = machine.jacobian(axes[rows])
         return slopes
 
-    def _poses(self, axes: Array, tool: Index, pose: Callable[[Kinematics, Index], Poses]) -> Poses:
-        rotation, position = np.empty((len(axes), 3, 3)), np.empty((len(axes), 3))
+    def _groups(self, tool: Index) -> Iterator[tuple[Kinematics, Rows]]:
+        """The machine with each tool, and its rows."""
         for which in distinct(tool).tolist():
-            rows = np.flatnonzero(tool == which)
-            part = pose(self.machines[which], rows)
-            rotation[rows], position[rows] = part.rotation, part.position
-        return Poses(rotation, position)
+            mine = tool == which
+            yield self.machines[which], slice(None) if mine.all() else np.flatnonzero(mine)
+
+    def _poses(self, tool: Index, pose: Callable[[Kinematics, Rows], Poses]) -> Poses:
+        parts = [(rows, pose(machine, rows)) for machine, rows in self._groups(tool)]
+        if len(parts) == 1:
+            return parts[0][1]
+        rotation, position = np.empty((3, 3, len(tool))), np.empty((3, len(tool)))
+        for rows, part in parts:
+            rotation[:, :, rows] = part.rotation.transpose(1, 2, 0)
+            position[:, rows] = part.position.T
+        return Poses(rotation.transpose(2, 0, 1), position.T)
 
     def _by_tool(
         self, values: Array, tool: Index, tip: Mask, change: Callable[[Kinematics, Array], Array]
     ) -> Array:
+        if not tip.any():
+            return values
         changed = values.copy()
-        for which in distinct(tool[tip]).tolist():
-            rows = np.flatnonzero(tip & (tool == which))
-            changed[rows] = change(self.machines[which], values[rows])
+        for machine, rows in self._groups(tool):
+            mine = np.arange(len(tool))[rows][tip[rows]]
+            changed[mine] = change(machine, values[mine])
         return changed
 
 
@@ -182,11 +202,11 @@ def _great_circle(start: Array, end: Array, share: Array) -> Array:
 
 
 @contextlib.contextmanager
-def _of_rows(rows: Index) -> Iterator[None]:
+def _of_rows(rows: Rows) -> Iterator[None]:
     """Names the row of all rows in an error that names one of some."""
     try:
         yield
     except NotInvertible as error:
-        if error.row is not None:
+        if error.row is not None and not isinstance(rows, slice):
             error.row = int(rows[error.row])
         raise

@@ -228,7 +228,7 @@ def _worst(path: JointPath, begin: _Rows, end: _Rows, limits: JointLimits, count
     ends = [motion.programmed(rows.axes, path.tool[rows.move], path.tip[rows.move]) for rows in (begin, end)]
     written = motion.between(ends[0][owner], ends[1][owner], part, tool, path.vector[move])
     share = begin.share[owner] + part * (end.share - begin.share)[owner]
-    nominal = motion.nominal(motion.axes(path.at(move, share), tool, tip), tool)
+    nominal = motion.targets(path.at(move, share), tool, tip)
     target = Poses(nominal.rotation, nominal.position + path.shift_mm[move])
     actual = motion.actual(motion.axes(written, tool, tip), tool)
     distance, angle = deviations(motion.structure, actual, target)

@@ -15,8 +15,10 @@ _PER_PERIOD = 8
 _SMOOTH_DEG = 5.0
 #: The same of linear axes.
 _SMOOTH_MM = 50.0
-#: Samples of one stretch at least, and at most.
+#: Samples of a stretch at least, where it is no short one.
 _FEWEST = 3
+#: A stretch of a step over this has one sample.
+_SHORT = 4
 #: Samples of one stretch at most, so that a short text makes no work without end.
 _MOST = 4096
 
@@ -36,9 +38,11 @@ class Resolution:
         return Resolution(np.array(steps))
 
     def samples(self, begin: Array, end: Array) -> Index:
-        """(s,) how many samples lie between axis values (s, axes)."""
-        steps = np.ceil(np.max(np.abs(end - begin) / self.step, axis=1, initial=0.0))
-        return np.asarray(np.clip(steps, _FEWEST, _MOST), np.int64)
+        """(s,) how many samples lie between axis values (s, axes). A short stretch bends one way only, so
+        the one in its middle shows by how much."""
+        steps = np.max(np.abs(end - begin) / self.step, axis=1, initial=0.0)
+        fewest = np.clip(np.ceil(_SHORT * steps), 1, _FEWEST)
+        return np.asarray(np.clip(np.ceil(steps), fewest, _MOST), np.int64)
 
 
 def _step(errors: JointErrors) -> float:
