@@ -51,9 +51,14 @@ def write(task: Task, plans: Iterable[tuple[Band, Plan]], tell: Progress = silen
 
 
 def _writer(program: Program, plan: Plan) -> type[Writer]:
-    """What a program needs: a writer of blocks of words, of whole statements, or of verbatim numbers."""
+    """What a program needs: a writer of blocks of words, of whole statements, of verbatim numbers, or of
+    targets."""
     if program.statements is None:
         return BlockWriter
+    if program.targets is not None:
+        from olp.compensation.target_writer import TargetWriter
+
+        return TargetWriter
     if program.in_blocks:
         from olp.compensation.conversational_writer import ConversationalWriter
 

@@ -98,8 +98,9 @@ FOREIGN = (
             rb"%%%\s*VERSION|MODULE[ \t]+\w+[ \t]*(?:\(|\r?$)|PROC[ \t]+\w+[ \t]*\(|"
             rb"Move(?:L|J|C|AbsJ)[ \t]+(?:\[|\w+[ \t]*,)|(?:CONST|PERS|VAR)[ \t]+(?:robtarget|tooldata)\b"
         ),
-        _ROBOT,
+        _NAME_IT.replace("sinumerik", "abb-rapid"),
         language=True,
+        how="and was read as another language",
     ),
     Foreign("FANUC TP", _line(rb"/(?:PROG|ATTR|MN|POS)\b|\d*:[ \t]*[JLC][ \t]+PR?\["), _ROBOT, language=True),
     Foreign(

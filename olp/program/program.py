@@ -15,6 +15,7 @@ from olp.core.values import dataclass
 from olp.program.dialect import Dialect
 from olp.program.holes import Holes
 from olp.program.origin import Origin, in_original, origin_of
+from olp.program.robots.targets import Targets
 from olp.program.rs274.profiles.base import Profile
 from olp.program.rs274.state import Capture, PathMode
 from olp.program.text.line_ends import LINE_END
@@ -237,7 +238,8 @@ class Program:
     unrolled from (`in_original`).
 
     Along contours under cutter compensation `toolpath` is that of the tool. `programmed` is then the program
-    with the contour in its place, and (n,) `blocks` the move of it that each move belongs to.
+    with the contour in its place, and (n,) `blocks` the move of it that each move belongs to. `targets` are
+    those of a program of a robot, which several moves may use.
     """
 
     data: bytes
@@ -262,6 +264,7 @@ class Program:
     by_original: bool = False
     programmed: Program | None = None
     blocks: Index | None = None
+    targets: Targets | None = None
 
     @property
     def in_blocks(self) -> bool:
@@ -321,7 +324,7 @@ class Program:
     @property
     def verbatim(self) -> bool:
         """Whether numbers keep their own form and column, and no row is inserted."""
-        return self.statements is not None and bool(self.statements.decimal)
+        return self.statements is not None and bool(self.statements.decimal) and self.targets is None
 
     @property
     def rs274(self) -> Profile:

@@ -48,6 +48,7 @@ _KNOWN = {
     "apt": Known("olp.program.apt.dialect", signs.APT),
     "dmis": Known("olp.program.dmis.dialect", signs.DMIS),
     "list": Known("olp.program.pointlist.dialect", signs.LISTS),
+    "abb-rapid": Known("olp.program.robots.rapid.dialect", signs.RAPID),
 }
 #: Files of `olp/program/described/shipped` that describe a dialect, without their ending.
 DESCRIBED = ("kawasaki-as", "val2", "karel")

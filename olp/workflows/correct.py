@@ -246,7 +246,7 @@ def _rewritten(
     )  # fmt: skip
     tell("read", 0.0)
     source, program = read_kept(source)
-    if options.split_rapids and program.verbatim:
+    if options.split_rapids and (program.verbatim or program.targets is not None):
         raise UsageError(
             "--split-rapids does not go with this dialect: it does not state the path between its points; "
             'set joined = "lines" and insert = true in the profile'

@@ -61,6 +61,11 @@ def _karel(values: Sequence[float], digits: int) -> str:
     return f"{name} = POS({_list(values, digits)},0,180,0,config)\nMOVE TO {name}"
 
 
+def _rapid(values: Sequence[float], digits: int) -> str:
+    rest = "[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]"
+    return f"MoveL [[{_list(values, digits)}],{rest}],v100,fine,rod\\WObj:=G54;"
+
+
 def _rs274(name: str, profile: Profile) -> Case:
     opening, closing = profile.comment
     head = ["G21 G90 G17 G54 G94 F600"] if profile.codes.get(540) is Act.EVENT else ["G21 G90 G17 G94 F600"]
@@ -203,6 +208,22 @@ CASES = {
             b"p = POS(1,2,3,0,180,0,c)\np = POS(1,2,3,0,180,0,c)\nMOVE TO p -- 'x'", b"$MOTYPE = LINEAR",
         ),
         support=frozenset({"corrected", "carried", "refused"}),
+    ),
+    "abb-rapid": Case(
+        "abb-rapid", "abb-rapid", "MoveLJROCVabsptw[](),;:=!\\{}%\"+-. 0123456789\r\n\tEN",
+        ["MODULE T", "PERS tooldata rod:=[TRUE,[[0,0,-120],[1,0,0,0]],[1,[0,0,1],[1,0,0,0],0,0,0]];",
+         "PROC main()"], ["ENDPROC", "ENDMODULE"],
+        _rapid, None, lambda text: f"! {text}",
+        re.compile(rb"(?m)^MoveL \[\[(" + NUMBER + rb"),(" + NUMBER + rb"),(" + NUMBER + rb")\]"),
+        ("rapid/*",),
+        (
+            b"MoveL [[1,2,3],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,z1,tool0;",
+            b"CONST robtarget p{2}:=[[[1,2,3],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],"
+            b"[[4,5,6],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]];\nMoveJ p{2},v100,z1,tool0;",
+            b"MoveL Offs(p,1,2,3),v100,z1,tool0;", b"MoveL p,v100\\V:=10,z1\\Z:=3,tool0\\WObj:=wobj0;",
+            b"IF x THEN\nENDIF;\nELSE", b"%x%;", b"MODULE m\nRECORD r\nnum a;\nENDRECORD\nr.a:=5;",
+            b"TPWrite \"a;b!\";", b"MoveAbsJ [[0,0,0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;",
+        ),
     ),
 }  # fmt: skip
 #: Named frames of the test's machines.

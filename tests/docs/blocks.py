@@ -26,7 +26,7 @@ _FENCE = re.compile(
     re.DOTALL | re.MULTILINE,
 )
 #: First line of a block that is a file to be written.
-_PATH = re.compile(r"(?:[#;] |<!-- |\()([\w./-]+\.\w+)(?: -->|\))?\n")
+_PATH = re.compile(r"(?:[#;!] |<!-- |\()([\w./-]+\.\w+)(?: -->|\))?\n")
 #: Comment before a block of Python that goes on where the one before it ended.
 _CONTINUES = "continues"
 #: Printed between two such blocks.

@@ -80,3 +80,11 @@ DMIS = Signs(
     ),
     shared=_POINTS_BY_SLASH,
 )
+RAPID = Signs(
+    ("mod", "modx", "prg", "sysx"),
+    own=pattern(
+        rb"(?im)^[ \t]*(?:%%%\s*VERSION|MODULE[ \t]+\w+[ \t]*(?:\(|\r?$)|"
+        rb"(?:LOCAL[ \t]+)?PROC[ \t]+\w+[ \t]*\(|Move(?:L|J|C|AbsJ)[ \t]+(?:\[|\w+[ \t]*[,{\\(])|"
+        rb"(?:(?:LOCAL|TASK)[ \t]+)?(?:CONST|PERS|VAR)[ \t]+\w+[ \t]+\w+)"
+    ),
+)

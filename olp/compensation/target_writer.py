@@ -1,0 +1,222 @@
+"""Writes a plan back into a program of a robot: numbers of targets changed, targets cloned, moves split."""
+
+from __future__ import annotations
+
+import re
+import sys
+from typing import ClassVar
+
+import numpy as np
+
+from olp.compensation.digits import POW10
+from olp.compensation.point_writer import PointWriter
+from olp.compensation.rows import Rows
+from olp.compensation.writer import Task
+from olp.core.arrays import Array, Index, Mask
+from olp.core.toolpath import Flag
+from olp.core.values import dataclass
+from olp.program.robots.dialect import RobotDialect
+from olp.program.robots.targets import NOWHERE, Target, Use
+from olp.program.text.numbers import MOST_DECIMALS, number, spliced, written
+
+#: Bytes of the text from one position up to another, and what replaces them.
+Replacement = tuple[int, int, bytes]
+#: A number that is nearer to what is wanted than this share of its last digit is right.
+_RIGHT = 0.5 + 1e-6
+_NAMES = re.compile(rb"[A-Za-z_]\w*")
+#: Flags of moves that the text does not state as targets.
+_NOT_STATED = np.uint8(Flag.CONTROL)
+
+
+@dataclass(slots=True, eq=False)
+class _Wanted:
+    """What rows want of their targets: (r, 3) numbers before rounding (`value`), `decimals` and `mantissa`.
+    `stated` (r,) rows have a target."""
+
+    value: Array
+    decimals: Index
+    mantissa: Index
+    stated: Mask
+
+
+class TargetWriter(PointWriter):
+    """A writer of targets. A target that moves want to differ is cloned, and each part of a move that is
+    split states its own."""
+
+    #: Rows at a time: all, as moves far apart may share a target.
+    chunk: ClassVar[int] = sys.maxsize
+
+    def __init__(self, task: Task) -> None:
+        super().__init__(task)
+        program = task.program
+        assert isinstance(program.dialect, RobotDialect)
+        assert program.targets is not None
+        self.dialect, self.stated = program.dialect, program.targets
+        # the writer puts the stamp where the language has it
+        self._stamp, self.stamp = self.stamp, b""
+        self._names: set[bytes] | None = None
+
+    def _rewritten(self, rows: Rows, begin: int, end: int) -> bytes | None:
+        last = np.append(rows.move[1:] != rows.move[:-1], True)[: len(rows)]
+        wanted = self._wanted(rows)
+        edits = [*self._targets(rows, np.flatnonzero(last & wanted.stated), wanted),
+                 *self._parts(rows, np.flatnonzero(~last & wanted.stated), wanted)]  # fmt: skip
+        if self._stamp and (edits or self.stamp_always):
+            place = self.dialect.stamp_place(self.program.data)
+            edits.append((place, place, self._stamp + self.program.eol(1)))
+        return spliced(self.program.data, edits) if edits else None
+
+    def _wanted(self, rows: Rows) -> _Wanted:
+        """Numbers of all rows as their targets state them, before they move along with their moves."""
+        move, part = rows.move, slice(rows.first, rows.first + len(rows.move))
+        command = self.plan.command_mm[part].copy()
+        raw = self.plan.raw[part].any(axis=1)
+        command[raw] = self.path.end_mm[move][raw]
+        local = self.local(command, self.path.frame[move])
+        slot = self.program.slot[move]
+        stated = (slot >= 0).all(axis=1) & ((rows.flag & _NOT_STATED) == 0)
+        own = np.where(slot >= 0, self.words.decimals[slot], 0).astype(np.int64)
+        least = np.maximum(self.fewest[self.path.frame[move]], self.dialect.decimals)
+        decimals = np.minimum(np.maximum(own, least), MOST_DECIMALS)
+        mantissa = np.where(stated[:, None], np.rint(np.nan_to_num(local) * POW10[decimals]), 0.0)
+        rows.emitted[:] = np.where(
+            stated[:, None], self.placed(mantissa / POW10[decimals], self.path.frame[move]), np.nan
+        )
+        return _Wanted(local, decimals, mantissa.astype(np.int64), stated)
+
+    # -- targets -------------------------------------------------------------------------------------
+
+    def _targets(self, rows: Rows, last: Index, wanted: _Wanted) -> list[Replacement]:
+        """Numbers of the targets at the ends of moves, and clones of targets whose moves differ."""
+        by_target: dict[int, list[int]] = {}
+        for row in last.tolist():
+            by_target.setdefault(self._use(rows, row).target, []).append(row)
+        edits: list[Replacement] = []
+        for place, own in by_target.items():
+            target = self.stated.targets[place]
+            groups = self._groups(target, own, wanted)
+            for k, group in enumerate(groups):
+                for row in group:
+                    rows.emitted[row] = self._reached(rows, row, target, group[0], wanted)
+                if k == 0:
+                    edits += self._renumbered(target, group[0], wanted)
+                else:
+                    edits += self._cloned(rows, target, group, wanted)
+        return edits
+
+    def _groups(self, target: Target, rows: list[int], wanted: _Wanted) -> list[list[int]]:
+        """Rows that want the same of a target, the largest group first."""
+        groups: list[list[int]] = []
+        for row in rows:
+            for group in groups:
+                mantissa, decimals = wanted.mantissa[group[0]], wanted.decimals[group[0]]
+                if (np.abs(wanted.value[row] * POW10[decimals] - mantissa) <= _RIGHT).all():
+                    group.append(row)
+                    break
+            else:
+                groups.append([row])
+        return sorted(groups, key=len, reverse=True)
+
+    def _kept(self, target: Target, row: int, wanted: _Wanted) -> bool:
+        """Whether the numbers of a target are right to their last digit as they are written."""
+        own = np.rint(np.array(target.point) * POW10[wanted.decimals[row]])
+        return bool((own == wanted.mantissa[row]).all())
+
+    def _reached(self, rows: Rows, row: int, target: Target, first: int, wanted: _Wanted) -> Array:
+        """Where a row ends with the numbers that row `first` gives to the target."""
+        if self._kept(target, first, wanted):
+            return np.asarray(self.path.end_mm[rows.move[row]])
+        number = wanted.mantissa[first] / POW10[wanted.decimals[first]]
+        frame = self.path.frame[rows.move[row : row + 1]]
+        return np.asarray(self.placed(number[None], frame)[0])
+
+    def _renumbered(self, target: Target, row: int, wanted: _Wanted) -> list[Replacement]:
+        """New numbers in place of those of a target, where they differ."""
+        texts = self._numbers(target, row, wanted, target.point)
+        edits = [
+            (a, b, text)
+            for (a, b), text in zip(target.numbers, texts, strict=True)
+            if text != self.program.data[a:b]
+        ]
+        self.tally.changed_words += len(edits)
+        return edits
+
+    def _cloned(self, rows: Rows, target: Target, group: list[int], wanted: _Wanted) -> list[Replacement]:
+        """A declaration of its own for the moves of a group, which name it."""
+        data, first = self.program.data, target.value[0]
+        texts = self._numbers(target, group[0], wanted, target.point)
+        numbers = [(a - first, b - first, text) for (a, b), text in zip(target.numbers, texts, strict=True)]
+        name = self._new_name(target)
+        place, text = self.dialect.clone(
+            self.program, target, name, spliced(data[slice(*target.value)], numbers)
+        )
+        edits = [(place, place, text)]
+        for row in group:
+            named = self._use(rows, row).named
+            assert named != NOWHERE
+            edits.append((*named, name.encode()))
+        self.tally.inserted_blocks += 1
+        return edits
+
+    def _new_name(self, target: Target) -> str:
+        """A name that the text does not have, made from that of a target."""
+        if self._names is None:
+            self._names = {word.upper() for word in _NAMES.findall(self.program.data)}
+        number = 1
+        while True:
+            tail = f"_olp{number}"
+            name = target.name[: self.dialect.longest_name - len(tail)] + tail
+            if name.upper().encode() not in self._names:
+                self._names.add(name.upper().encode())
+                return name
+            number += 1
+
+    # -- parts ---------------------------------------------------------------------------------------
+
+    def _parts(self, rows: Rows, inner: Index, wanted: _Wanted) -> list[Replacement]:
+        """Statements of the parts of moves before their ends."""
+        edits: list[Replacement] = []
+        for row in inner.tolist():
+            move, use = int(rows.move[row]), self._use(rows, row)
+            target = self.stated.targets[use.target]
+            scale = POW10[wanted.decimals[row]]
+            shift = np.array(use.shift_mm) / self.frame_of(move).unit_mm
+            value = np.rint((wanted.value[row] + shift) * scale)
+            reached = (value / scale - shift)[None]
+            rows.emitted[row] = self.placed(reached, self.path.frame[move : move + 1])[0]
+            texts = [
+                self._number(target.numbers[k], float(value[k] / scale[k]), int(wanted.decimals[row, k]))
+                for k in range(3)
+            ]
+            share = float(self.plan.reach[rows.first + row])
+            stop = bool(rows.take_up[row])
+            text = self.dialect.part(self.program, move, use, texts, share, stop=stop)
+            edits.append((use.statement[0], use.statement[0], text))
+            self.tally.inserted_blocks += 1
+        return edits
+
+    def _use(self, rows: Rows, row: int) -> Use:
+        use = self.stated.uses[int(rows.move[row])]
+        assert use is not None
+        return use
+
+    def _numbers(
+        self, target: Target, row: int, wanted: _Wanted, own: tuple[float, float, float]
+    ) -> list[bytes]:
+        """The three numbers that a row gives to a target; those that are right keep their bytes."""
+        texts = []
+        for k, (a, b) in enumerate(target.numbers):
+            decimals, mantissa = int(wanted.decimals[row, k]), int(wanted.mantissa[row, k])
+            if int(np.rint(own[k] * POW10[decimals])) == mantissa:
+                texts.append(self.program.data[a:b])
+            else:
+                texts.append(self._number((a, b), mantissa / 10.0**decimals, decimals))
+        return texts
+
+    def _number(self, span: tuple[int, int], value: float, decimals: int) -> bytes:
+        """A value in the form of a number of the text, never with an exponent."""
+        form = number(self.program.data[slice(*span)])
+        if form is None or form.letter:
+            form = number(b"0.0")
+            assert form is not None
+        return written(form, value, max(decimals, form.decimals))

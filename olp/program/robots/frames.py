@@ -1,0 +1,126 @@
+"""Frames and tools of robot programs: from the program, or from the machine and job file, never assumed.
+
+A target states the tool tip in a frame. Frames of a program are stated in the world of the robot, which is
+the machine's own frame unless the job states where it lies.
+"""
+
+from __future__ import annotations
+
+from olp.core.errors import ProgramError
+from olp.core.machine import ZERO, Setup, Vector, WorkOffset
+from olp.core.values import dataclass
+from olp.program.frames import FrameTable, Placement
+from olp.program.robots.poses import Pose, Quaternion, inverted, multiplied, of_zyx, rotated, turn_of
+
+#: How different two tool vectors may be to be the same, mm.
+_SAME_TOOL_MM = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class Located:
+    """A frame: its `pose` in machine coordinates, and where it is in the work offset `work` of machine or
+    job, None where these state none."""
+
+    name: str
+    pose: Pose
+    inner: Pose
+    work: WorkOffset | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Tool:
+    """A tool: the pose of its tip at the flange, or the `vector_mm` from gauge point to tip where machine or
+    job state it, and the number that it has there."""
+
+    name: str
+    pose: Pose | None
+    vector_mm: Vector = ZERO
+    number: int | None = None
+
+
+class RobotFrames:
+    """The frames of one program. `world` is the name of the robot's world."""
+
+    def __init__(self, setup: Setup, world: str) -> None:
+        self.setup = setup
+        self.table = FrameTable(setup)
+        work = self._work(world)
+        self.world = Located(world, Pose() if work is None else _pose(work), Pose(), work)
+
+    def located(self, name: str, stated: Pose | None, line: int) -> Located:
+        """A frame by its name; `stated` is what the program says of it. Raises ProgramError where nothing
+        does, or two say something different."""
+        if name.casefold() == self.world.name.casefold():
+            return self.world
+        work = self._work(name)
+        own = None if stated is None else self.world.pose.then(stated)
+        if work is None:
+            if own is None:
+                self.table.work_offset(name, line, "this target")
+            assert own is not None
+            assert stated is not None
+            return Located(name, own, stated, self.world.work)
+        if own is not None and not own.same(_pose(work)):
+            raise ProgramError(
+                f"the frame {name} is stated by the program and by [work_offsets.{work.name}], and they "
+                "differ; state it once, or the same",
+                line=line,
+                code="OLP523",
+            )
+        return Located(name, _pose(work), Pose(), work)
+
+    def tool(self, name: str, stated: Pose | None, line: int) -> Tool:
+        """A tool by its name; as `located`."""
+        number = self.setup.tool_named(name)
+        entry = None if number is None else self.setup.tool(number)
+        vector = None if entry is None else entry.tool_vector_mm
+        if stated is None and vector is None:
+            raise ProgramError(
+                f"the program does not state the tool {name}; give [tools.N] in the machine or job file with "
+                f'name = "{name}" and gauge_to_tip_mm',
+                line=line,
+                code="OLP521",
+            )
+        return Tool(name, stated, vector or ZERO, number if vector is not None else None)
+
+    def index(self, frame: Located, tool: Tool, turn: Quaternion, shift_mm: Vector, line: int) -> int:
+        """The number of the frame of a target: its orientation is `turn`, and the move goes `shift_mm` from
+        it along the frame."""
+        vector = self._vector(frame, tool, turn, line)
+        length = ZERO
+        if self.setup.machine.length_active:
+            length = (-vector[0], -vector[1], -vector[2])
+        x, y, z = rotated(frame.inner.turn, shift_mm)
+        a, b, c = frame.inner.origin_mm
+        inner = Placement(turn_of(frame.inner.turn), (a + x, b + y, c + z))
+        work = frame.work or WorkOffset(frame.name, set_by="true")
+        return self.table.index(work, line, inner=inner, unit_mm=1.0, length=length, tool_vector=vector)
+
+    def _vector(self, frame: Located, tool: Tool, turn: Quaternion, line: int) -> Vector:
+        """Gauge point to tip in machine coordinates."""
+        world = multiplied(frame.pose.turn, turn)
+        if tool.pose is None:
+            return tool.vector_mm
+        flange = multiplied(world, inverted(tool.pose.turn))
+        vector = rotated(flange, tool.pose.origin_mm)
+        if tool.number is not None:
+            away = max(abs(a - b) for a, b in zip(vector, tool.vector_mm, strict=True))
+            if away > _SAME_TOOL_MM:
+                raise ProgramError(
+                    f"the tool {tool.name} is stated by the program and by [tools.{tool.number}], and they "
+                    f"differ by {away:.6g} mm at this orientation; state it once, or the same",
+                    line=line,
+                    code="OLP521",
+                )
+        return vector
+
+    def _work(self, name: str) -> WorkOffset | None:
+        """The work offset of this name, in any case of letters."""
+        wanted = name.casefold()
+        both = {**self.setup.machine.work_offsets, **self.setup.job.work_offsets}
+        return next((work for key, work in both.items() if key.casefold() == wanted), None)
+
+
+def _pose(work: WorkOffset) -> Pose:
+    a, b, c = work.rotation_deg
+    return Pose(work.offset_mm, of_zyx((c, b, a)))

@@ -1,0 +1,118 @@
+"""Collects the moves of a robot program while it is read, whatever its language."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from olp.core.machine import Setup, Vector
+from olp.core.toolpath import Flag, Kind
+from olp.program.dialect import Dialect
+from olp.program.program import Program
+from olp.program.robots.frames import Located, RobotFrames, Tool
+from olp.program.robots.poses import Quaternion
+from olp.program.robots.targets import NOWHERE, Span, Target, Targets, Use
+from olp.program.verbatim import Moves
+
+NAN = float("nan")
+#: mm; less of a tool vector moves nothing, and comes from the digits of orientations
+_SAME_VECTOR_MM = 1e-4
+_NOWHERE: Vector = (NAN, NAN, NAN)
+
+
+class RobotMoves:
+    """Targets and moves of one program. `known` is False where the position before the next move depends on
+    the run of the program."""
+
+    def __init__(self, data: bytes, setup: Setup, world: str) -> None:
+        self.data, self.setup = data, setup
+        self.frames = RobotFrames(setup, world)
+        self.moves = Moves()
+        self.targets: list[Target] = []
+        self.uses: list[Use | None] = []
+        self._remarks: dict[str, tuple[str, int, str]] = {}
+        self.known = True
+        self._frame = -1
+        self._turn: Quaternion | None = None
+        self._rest: tuple[float, ...] = ()
+        self._feed = NAN
+        self._first_turns: dict[str, Quaternion] = {}
+        self._index: dict[tuple[str, str, Quaternion, Vector], int] = {}
+
+    @property
+    def count(self) -> int:
+        return len(self.uses)
+
+    def remark(self, about: str, line: int, text: str, name: str = "told") -> None:
+        """Note the first of what is `about` the same, as a remark of the reader by its `name`."""
+        self._remarks.setdefault(about, (name, line, text))
+
+    def target(
+        self, line: int, value: Span, numbers: tuple[Span, Span, Span], point: Vector, turn: Quaternion,
+        rest: tuple[float, ...], name: str = "", declaration: Span = NOWHERE,
+    ) -> int:  # fmt: skip
+        """Add a target that the text states; returns its place."""
+        first, second, third = (self.moves.number(*span) for span in numbers)
+        slots = (first, second, third)
+        self.targets.append(Target(line, value, numbers, slots, point, turn, rest, name, declaration))
+        return len(self.targets) - 1
+
+    def move(
+        self, line: int, use: Use, frame: Located, tool: Tool, feed: float, *, straight: bool,
+        whole: bool = False,
+    ) -> None:  # fmt: skip
+        """Add a move to a target; `straight` where its path is a line, `whole` where it is never split."""
+        key = (frame.name, tool.name, use.turn, use.shift_mm)
+        index = self._index.get(key)
+        if index is None:
+            index = self._index[key] = self.frames.index(frame, tool, use.turn, use.shift_mm, line)
+        if not self.known:
+            self.away(line)
+        target = self.targets[use.target]
+        end = self.frames.table.frames[index].placed_mm(target.point)
+        known = straight and self._turn is not None
+        swings = known and self._swings(index)
+        if swings:
+            self.remark("swings", line, "the tool turns on the way: the move is corrected at its end")
+        elif straight and not known:
+            self.remark("told", line, "where this move begins depends on the run: it is corrected at its end")
+        line_kind = known and not swings
+        held = line_kind and (whole or target.rest != self._rest)
+        flag = Flag.WHOLE if held else Flag(0)
+        kind = Kind.LINE if line_kind else Kind.RAPID
+        self.moves.put(
+            kind=int(kind), flag=int(flag), line=line, frame=index, end=end,
+            slot=target.slots, bounds=use.statement, feed=feed,
+        )  # fmt: skip
+        first = self._first_turns.setdefault(tool.name, use.turn)
+        if tool.pose is None and first != use.turn:
+            what = f"the orientation changes, and the vector of the tool {tool.name} does not"
+            self.remark("turning", line, what, "turning")
+        before = use.turn if self._turn is None else self._turn
+        self.uses.append(replace(use, before=before))
+        self.known, self._frame, self._turn, self._rest, self._feed = True, index, use.turn, target.rest, feed
+
+    def away(self, line: int) -> None:
+        """The machine may have gone to a position that the text does not state."""
+        self.known, self._turn, self._rest = True, None, ()
+        if not self.uses:
+            return
+        frame = max(self._frame, 0)
+        self.moves.put(
+            kind=int(Kind.RAPID), flag=int(Flag.CONTROL), line=line, frame=frame, end=_NOWHERE,
+            slot=(-1, -1, -1), bounds=NOWHERE, feed=self._feed,
+        )  # fmt: skip
+        self.uses.append(None)
+
+    def _swings(self, index: int) -> bool:
+        """Whether the tool vector changes on the way to a target."""
+        frames = self.frames.table.frames
+        pairs = zip(frames[index].tool_mm, frames[self._frame].tool_mm, strict=True)
+        return max(abs(a - b) for a, b in pairs) > _SAME_VECTOR_MM
+
+    def program(self, dialect: Dialect, *, words: bool) -> Program:
+        """The whole program."""
+        program = self.moves.program(
+            self.data, dialect, self.setup, self.frames.table.frames,
+            list(self._remarks.values()), decimal=b".", words=words,
+        )  # fmt: skip
+        return replace(program, targets=Targets(tuple(self.targets), tuple(self.uses)))

@@ -1,0 +1,117 @@
+"""Poses as robots state them: a position and a rotation, from quaternions or angles."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from olp.core.arrays import Array
+from olp.core.machine import ZERO, Vector
+from olp.core.turns import Turn
+from olp.core.values import dataclass
+
+Quaternion = tuple[float, float, float, float]
+#: The rotation that turns nothing, w first.
+NO_TURN: Quaternion = (1.0, 0.0, 0.0, 0.0)
+#: rad; rotations that are nearer to each other are the same
+SAME_TURN = 2e-6
+#: mm; positions that are nearer to each other are the same
+SAME_PLACE_MM = 1e-6
+#: Two quaternions this near are led from one to the other along a straight line.
+_NEAR = 1.0 - 1e-12
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """A frame in another: its `origin_mm`, and its rotation as a quaternion, w first."""
+
+    origin_mm: Vector = ZERO
+    turn: Quaternion = NO_TURN
+
+    def then(self, inner: Pose) -> Pose:
+        """The pose of `inner`, which is stated in this frame, in the frame where this one is stated."""
+        x, y, z = rotated(self.turn, inner.origin_mm)
+        a, b, c = self.origin_mm
+        return Pose((a + x, b + y, c + z), multiplied(self.turn, inner.turn))
+
+    def same(self, other: Pose) -> bool:
+        """Whether both are the same within what controls keep of their digits."""
+        away = max(abs(a - b) for a, b in zip(self.origin_mm, other.origin_mm, strict=True))
+        return away <= SAME_PLACE_MM and angle_between(self.turn, other.turn) <= SAME_TURN
+
+
+def multiplied(a: Quaternion, b: Quaternion) -> Quaternion:
+    """The rotation `b`, then `a`."""
+    (p, q, r, s), (w, x, y, z) = a, b
+    return (
+        p * w - q * x - r * y - s * z,
+        p * x + q * w + r * z - s * y,
+        p * y - q * z + r * w + s * x,
+        p * z + q * y - r * x + s * w,
+    )
+
+
+def inverted(a: Quaternion) -> Quaternion:
+    w, x, y, z = a
+    return (w, -x, -y, -z)
+
+
+def rotated(a: Quaternion, vector: Sequence[float]) -> Vector:
+    """A vector turned by a rotation."""
+    if a[1:] == ZERO:
+        x, y, z = vector
+        return (x, y, z)
+    first, second, third = vector
+    _, x, y, z = multiplied(multiplied(a, (0.0, first, second, third)), inverted(a))
+    return (x, y, z)
+
+
+def normalised(a: Sequence[float]) -> Quaternion:
+    size = sum(v * v for v in a) ** 0.5
+    w, x, y, z = (v / size for v in a)
+    return (w, x, y, z)
+
+
+def angle_between(a: Quaternion, b: Quaternion) -> float:
+    """rad between two rotations."""
+    _, x, y, z = multiplied(inverted(a), b)
+    return 2.0 * float(np.arcsin(min(1.0, (x * x + y * y + z * z) ** 0.5)))
+
+
+def between(a: Quaternion, b: Quaternion, share: float) -> Quaternion:
+    """The rotation at a share of the even turn from `a` to `b`."""
+    cosine = sum(p * q for p, q in zip(a, b, strict=True))
+    if cosine < 0.0:
+        b, cosine = (-b[0], -b[1], -b[2], -b[3]), -cosine
+    first, second = 1.0 - share, share
+    if cosine < _NEAR:
+        angle = float(np.arccos(cosine))
+        first, second = (float(np.sin(part * angle) / np.sin(angle)) for part in (first, second))
+    return normalised([first * p + second * q for p, q in zip(a, b, strict=True)])
+
+
+def turn_of(a: Quaternion) -> Turn | None:
+    """The rows of a rotation; None where it turns nothing."""
+    if a[1:] == ZERO:
+        return None
+    columns = [rotated(a, axis) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
+    first, second, third = ((row[0], row[1], row[2]) for row in zip(*columns, strict=True))
+    return (first, second, third)
+
+
+def of_zyx(angles_deg: Sequence[float]) -> Quaternion:
+    """Rz(first) Ry(second) Rx(third), in degrees."""
+    turn = NO_TURN
+    for place, angle in zip((3, 2, 1), angles_deg, strict=True):
+        half = np.radians(angle) / 2.0
+        part = [float(np.cos(half)), 0.0, 0.0, 0.0]
+        part[place] = float(np.sin(half))
+        turn = multiplied(turn, (part[0], part[1], part[2], part[3]))
+    return turn if any(angles_deg) else NO_TURN
+
+
+def matrix(a: Quaternion) -> Array:
+    """(3, 3) the rotation as a matrix."""
+    turn = turn_of(a)
+    return np.eye(3) if turn is None else np.array(turn)

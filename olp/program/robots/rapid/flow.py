@@ -1,0 +1,107 @@
+"""Which statements of a RAPID text may move the robot, and behind which it is not known where it is."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from olp.core.patterns import pattern
+from olp.core.values import dataclass
+from olp.program.dialect import Support
+from olp.program.robots.rapid.table import TABLE
+from olp.program.robots.rapid.text import Statement
+
+_ROUTINE = pattern(rb"(?i)(?:LOCAL\s+|TASK\s+)?(PROC|FUNC|TRAP|RECORD)\s+(?:\w+\s+)?(\w+)")
+_PROC = pattern(rb"(?i)(?:LOCAL\s+)?(?:PROC|TRAP)\s+(\w+)")
+_WORD = pattern(rb"\s*([A-Za-z]\w*)")
+_SHORT_IF = pattern(rb"(?is)\s*IF\b")
+_HARMLESS_TAIL = pattern(
+    rb"(?is).*[\s)](?:GOTO\s+\w+|RETURN\b.*|EXIT|EXITCYCLE|STOP|BREAK|(?:Set|Reset|Wait|TPWrite|Incr|Decr|"
+    rb"SetDO|SetGO|SetAO|WaitTime)\b.*|[\w.{}]+\s*:=.*)"
+)
+_ASSIGNED = pattern(rb"(?<![\\\w.}])([A-Za-z]\w*)\s*(?:\{[^}]*\})?(?:\.\w+)*\s*:=")
+#: What a short IF must not hold.
+_MOVES = pattern(rb"(?i)\b(?:Move|Trigg|Search|Arc|PDisp|EOffs)\w*\b")
+
+
+def routine_of(statement: Statement) -> str:
+    """The name of a routine that a statement begins, in capitals."""
+    match = _PROC.match(statement.text) or _ROUTINE.match(statement.text)
+    return "" if match is None else match[match.lastindex or 1].decode("latin-1").upper()
+
+
+def word_of(statement: Statement) -> bytes:
+    """The first word of a statement in capitals; empty where it has none."""
+    match = _WORD.match(statement.text)
+    return b"" if match is None else match[1].upper()
+
+
+def is_short_if(statement: Statement) -> bool:
+    return _SHORT_IF.match(statement.text) is not None
+
+
+def may_move(text: bytes) -> bool:
+    """Whether a short IF holds an instruction that moves."""
+    return _MOVES.search(text) is not None
+
+
+def calls(text: bytes) -> bool:
+    """Whether a short IF may call a routine."""
+    return _HARMLESS_TAIL.fullmatch(text) is None
+
+
+def is_assignment(statement: Statement) -> bool:
+    match = _ASSIGNED.match(statement.text.lstrip())
+    return match is not None
+
+
+def assigned_in(statement: Statement) -> list[str]:
+    """The names that get another value in a statement, in capitals."""
+    return [name.decode("latin-1").upper() for name in _ASSIGNED.findall(statement.text)]
+
+
+@dataclass(slots=True)
+class _Routine:
+    moves: bool
+    calls: set[str]
+
+
+def moving_routines(statements: Sequence[Statement]) -> tuple[set[str], set[str]]:
+    """The routines of a text that may move the robot, and all routines of it; names in capitals."""
+    routines: dict[str, _Routine] = {}
+    current: _Routine | None = None
+    for statement in statements:
+        if statement.block == "routine":
+            current = routines.setdefault(routine_of(statement), _Routine(moves=False, calls=set()))
+            continue
+        if current is None or statement.block or is_assignment(statement):
+            continue
+        word = word_of(statement)
+        row = TABLE.get(word)
+        if (
+            (is_short_if(statement) and calls(statement.text))
+            or (row is not None and row[0] in (Support.CORRECTED, Support.REFUSED))
+            or word == b"MOVEABSJ"
+            or statement.text.lstrip()[:1] == b"%"
+        ):
+            current.moves = True
+        elif row is None and word:
+            current.calls.add(word.decode("latin-1"))
+    moving = {name for name, routine in routines.items() if routine.moves}
+    while True:
+        more = {
+            name
+            for name, routine in routines.items()
+            if name not in moving and any(c in moving or c not in routines for c in routine.calls)
+        }
+        if not more:
+            return moving, set(routines)
+        moving |= more
+
+
+def mentioned(text: bytes) -> list[str]:
+    """Names that stand alone as arguments, in capitals."""
+    return [
+        name.decode("latin-1").upper()
+        for name in re.findall(rb"(?:^|[\s,(])([A-Za-z]\w*)\s*(?=,|$)", text.partition(b" ")[2])
+    ]

@@ -1,0 +1,247 @@
+"""Reads RAPID: statements to moves, and the targets whose numbers can be edited.
+
+Moves carry their tool and their frame, so a target is right wherever the program comes from. Where a move
+begins is known only between moves that follow each other in every run: elsewhere its end alone is corrected.
+"""
+
+from __future__ import annotations
+
+from olp.core.errors import ProgramError
+from olp.core.machine import Setup
+from olp.program.dialect import Dialect, Options, Support
+from olp.program.program import Program
+from olp.program.robots.frames import Located, Tool
+from olp.program.robots.moves import RobotMoves
+from olp.program.robots.poses import inverted, multiplied, of_zyx, rotated
+from olp.program.robots.rapid import flow
+from olp.program.robots.rapid.data import Declared
+from olp.program.robots.rapid.table import TABLE
+from olp.program.robots.rapid.text import Lines, Statement, statements
+from olp.program.robots.rapid.values import ROBTARGET, target_of
+from olp.program.robots.rapid.words import Words, moved, name_of, words_of
+from olp.program.robots.targets import NOWHERE, Span, Use
+
+#: Words of moves that are read, in capitals.
+_KNOWN = frozenset((b"V", b"Z", b"INPOS", b"CONC", b"TLOAD", b"NOEOFFS"))
+#: What ends a routine, or a record, behind END.
+_ROUTINES = frozenset((b"PROC", b"FUNC", b"TRAP", b"RECORD"))
+_NOT_READ = "OLP512"
+
+
+def read(
+    data: bytes, setup: Setup, dialect: Dialect, options: Options | None = None, *, words: bool = True
+) -> Program:
+    """Read a whole program. Raises ProgramError with the line of the first statement that cannot be read
+    correctly."""
+    return _Reader(data, setup).run(dialect, options or Options(), words=words)
+
+
+class _Reader:
+    """Reads one program."""
+
+    def __init__(self, data: bytes, setup: Setup) -> None:
+        self.data = data
+        self.moves = RobotMoves(data, setup, "wobj0")
+        self.declared = Declared(data, self.moves)
+        self.routine = ""
+        #: of open blocks: whether it is a loop, and the moves before it
+        self.blocks: list[tuple[bool, int]] = []
+        self.tools: dict[tuple[str, str], Tool] = {}
+        self.frames: dict[tuple[str, str], Located] = {}
+        self.refusals: list[ProgramError] = []
+
+    def run(self, dialect: Dialect, options: Options, *, words: bool) -> Program:
+        if self.data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+            raise ProgramError("the text is UTF-16; save it as plain text", line=1, code="OLP502")
+        every = list(statements(self.data, Lines(self.data)))
+        rest = self._declare(every)
+        self.moving, self.routines = flow.moving_routines(rest)
+        count = max(len(rest), 1)
+        for k, statement in enumerate(rest):
+            if k % 4096 == 0:
+                options.tell("read", k / count)
+            try:
+                self._statement(statement)
+            except ProgramError as error:
+                self.refusals.append(error)
+        if self.refusals:
+            first = self.refusals[0]
+            first.others = tuple(self.refusals[1:])
+            raise first
+        return self.moves.program(dialect, words=words)
+
+    def _declare(self, every: list[Statement]) -> list[Statement]:
+        """Keep the data, and what changes them; returns the other statements."""
+        routine, inside, rest = "", False, []
+        for statement in every:
+            if statement.block == "routine":
+                routine = flow.routine_of(statement)
+                inside = statement.text.upper().split()[-2:-1] == [b"RECORD"]
+            elif statement.block == "end":
+                inside = False
+            if inside and statement.block != "routine":
+                continue
+            if statement.block == "end" and statement.text.upper()[3:] in _ROUTINES:
+                routine = ""
+            if not statement.block and self.declared.declare(statement, routine):
+                continue
+            if not statement.block and not flow.word_of(statement).startswith(b"MOVE"):
+                for name in flow.assigned_in(statement):
+                    self.declared.assigned.setdefault(name, statement.line)
+                if not flow.is_assignment(statement):
+                    for name in flow.mentioned(statement.text):
+                        self.declared.assigned.setdefault(name, statement.line)
+            rest.append(statement)
+        return rest
+
+    # -- statements ----------------------------------------------------------------------------------
+
+    def _statement(self, statement: Statement) -> None:
+        if statement.block:
+            self._block(statement)
+            return
+        if not statement.text.strip():
+            return
+        word = flow.word_of(statement)
+        if word in (b"MOVEL", b"MOVEJ"):
+            self._move(statement, straight=word == b"MOVEL")
+        elif word == b"MOVEABSJ":
+            self._loop_begins()
+            self._unknown()
+            what = "joint values are kept as written (MoveAbsJ)"
+            self.moves.remark("joints", statement.line, what)
+        elif flow.is_short_if(statement):
+            self._short_if(statement)
+        elif flow.is_assignment(statement):
+            return
+        else:
+            self._instruction(statement, word)
+
+    def _instruction(self, statement: Statement, word: bytes) -> None:
+        row = TABLE.get(word)
+        if row is None:
+            self._call(statement, word)
+        elif row[0] is Support.REFUSED:
+            raise ProgramError(f"{word.decode('latin-1')} {row[1]}", line=statement.line, code=_NOT_READ)
+
+    def _call(self, statement: Statement, word: bytes) -> None:
+        """A call of a routine, which may move the robot."""
+        name = word.decode("latin-1")
+        if not name and statement.text.lstrip()[:1] != b"%":
+            shown = statement.text.strip()[:60].decode("latin-1")
+            raise ProgramError(f"`{shown}` is not a statement of RAPID", line=statement.line, code="OLP510")
+        if name in self.routines and name not in self.moving:
+            return
+        if name not in self.routines:
+            what = f"{name or 'a routine'} is in another file: correct that too"
+            self.moves.remark("called", statement.line, what)
+        self._unknown()
+
+    def _short_if(self, statement: Statement) -> None:
+        if flow.may_move(statement.text):
+            raise ProgramError(
+                "a move in an IF without THEN is not read; write IF, THEN and ENDIF",
+                line=statement.line,
+                code=_NOT_READ,
+            )
+        if flow.calls(statement.text):
+            self._unknown()
+
+    def _block(self, statement: Statement) -> None:
+        """Where the flow of the program parts and meets."""
+        block = statement.block
+        if block in ("routine", "label"):
+            self._unknown()
+            if block == "routine":
+                self.routine, self.blocks = flow.routine_of(statement), []
+        elif block in ("if", "loop", "test"):
+            self.blocks.append((block == "loop", self.moves.count))
+        elif block in ("elseif", "case", "part"):
+            if statement.text.upper().split()[0] in (b"ERROR", b"UNDO", b"BACKWARD"):
+                self.blocks = []
+                self._unknown()
+            elif self.blocks and self.blocks[-1][1] != self.moves.count:
+                self._unknown()
+        elif block == "end":
+            what = statement.text.upper()[3:]
+            if what in (b"IF", b"FOR", b"WHILE", b"TEST") and self.blocks:
+                if self.blocks.pop()[1] != self.moves.count:
+                    self._unknown()
+            elif what in _ROUTINES:
+                self.routine, self.blocks = "", []
+                self._unknown()
+
+    def _unknown(self) -> None:
+        self.moves.known = False
+
+    def _loop_begins(self) -> None:
+        """The first move in a loop begins where the last one ends, or before the loop."""
+        if any(loop and before == self.moves.count for loop, before in self.blocks):
+            self._unknown()
+
+    # -- moves ---------------------------------------------------------------------------------------
+
+    def _move(self, statement: Statement, *, straight: bool) -> None:
+        line = statement.line
+        words = words_of(statement, statement.begin + len(b"MoveL"), self.data)
+        unread = [name for name in words.others if name not in _KNOWN]
+        if unread:
+            raise ProgramError(
+                f"a move with \\{unread[0].decode('latin-1')} is not read", line=line, code=_NOT_READ
+            )
+        use = self._use(statement, words)
+        tool, frame = self._tool(words.tool, line), self._frame(words.frame, line)
+        feed = self.declared.speed(words.others.get(b"V", words.speed), self.routine, line)
+        self._loop_begins()
+        whole = b"CONC" in words.others
+        self.moves.move(line, use, frame, tool, feed, straight=straight, whole=whole)
+
+    def _tool(self, name: str, line: int) -> Tool:
+        key = (self.routine, name)
+        if key not in self.tools:
+            pose = self.declared.tool(name, self.routine, line)
+            self.tools[key] = self.moves.frames.tool(name, pose, line)
+        return self.tools[key]
+
+    def _frame(self, name: str, line: int) -> Located:
+        key = (self.routine, name)
+        if key not in self.frames:
+            pose = self.declared.frame(name, self.routine, line)
+            self.frames[key] = self.moves.frames.located(name, pose, line)
+        return self.frames[key]
+
+    def _use(self, statement: Statement, words: Words) -> Use:
+        """How a move uses its target. Raises ProgramError where the text does not state it with numbers."""
+        span, line = words.target, statement.line
+        shift, turn = moved(self.data, span), None
+        inner = span if shift is None else shift.inner
+        index, named = self._target(inner, line)
+        target = self.moves.targets[index]
+        place = (0.0, 0.0, 0.0)
+        if shift is not None:
+            place = shift.shift_mm
+            if shift.tool:
+                place = rotated(target.turn, place)
+                a, b, c = shift.turns_deg
+                if any(shift.turns_deg):
+                    # Rx Ry Rz is the inverse of Rz Ry Rx with all angles against it
+                    turn = multiplied(target.turn, inverted(of_zyx((-c, -b, -a))))
+        return Use(
+            index, (statement.begin, statement.end), span, named, place,
+            target.turn if turn is None else turn, zone=words.zone,
+        )  # fmt: skip
+
+    def _target(self, span: Span, line: int) -> tuple[int, Span]:
+        """The place of a target, and the bytes of its name, `NOWHERE` where it is stated in the move."""
+        match = ROBTARGET.match(self.data, *span)
+        if match is not None and not self.data[match.end() : span[1]].strip():
+            stated, value = target_of(match, line), match.span()
+            place = self.moves.target(line, value, stated.spans, stated.point, stated.turn, stated.rest)
+            return place, NOWHERE
+        name = name_of(self.data[slice(*span)])
+        if name is None:
+            shown = self.data[slice(*span)].decode("latin-1").strip()[:60]
+            raise ProgramError(
+                f"the target `{shown}` is computed; program it with its numbers", line=line, code="OLP533"
+            )
+        return self.declared.target(*name, self.routine, line), span

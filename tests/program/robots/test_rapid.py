@@ -1,0 +1,184 @@
+"""RAPID on three linear axes: read and corrected as a judge that shares nothing with it says."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from judge import machines, rapid
+from judge.machines import Recipe
+from judge.model import JudgeModel
+
+import olp
+from olp.core.errors import OlpError, ProgramError
+
+RECIPE = Recipe(controller="abb-rapid", tools={}, job_defaults={}, work_offsets={})
+#: rounding of the fourth decimal, mm
+DIGIT = 0.5e-4
+HEAD = """MODULE Made
+PERS tooldata grip:=[TRUE,[[10,-5,120],[0.996194698,0,0.087155743,0]],[1,[0,0,1],[1,0,0,0],0,0,0]];
+PERS wobjdata part:=[FALSE,TRUE,"",[[300,250,-300],[0.965925826,0,0,0.258819045]],[[5,6,7],[1,0,0,0]]];
+"""
+TAIL = "[0,0,1,0],[0,-1,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
+MACHINE_TAIL = b"ENDPROC\nENDMODULE\n"
+
+
+def program(rng: np.random.Generator, count: int) -> bytes:
+    """Moves to declared targets, some of them shared, inline ones, Offs and RelTool."""
+    named = rng.uniform(-40, 40, (6, 3)).round(3)
+    lines = [f"CONST robtarget p{k}:=[[{x},{y},{z}],{TAIL};" for k, (x, y, z) in enumerate(named.tolist())]
+    lines.append("PROC main()")
+    for _ in range(count):
+        x, y, z = rng.uniform(-60, 60, 3).round(2).tolist()
+        name = f"p{rng.integers(6)}"
+        target = [
+            name,
+            f"[[{x},{y},{z}],{TAIL}",
+            f"Offs({name},{x},{y},{z})",
+            f"RelTool({name},{x},{y},{z}\\Rz:=30)",
+        ][rng.integers(4)]
+        move = "MoveL" if rng.random() < 0.7 else "MoveJ"
+        zone = rng.choice(["fine", "z10"])
+        lines.append(f"  {move} {target}, v{rng.integers(50, 500)},{zone},grip\\WObj:=part;")
+    return HEAD.encode() + "\n".join(lines).encode() + b"\n" + MACHINE_TAIL
+
+
+@pytest.fixture(scope="module")
+def bent(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return machines.random_machine(tmp_path_factory.mktemp("bent"), 7, RECIPE)
+
+
+@pytest.fixture(scope="module")
+def zero(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return machines.zero_machine(tmp_path_factory.mktemp("zero"), RECIPE)
+
+
+def ends(nominal: list[rapid.RobotMove], written: list[rapid.RobotMove], model: JudgeModel) -> list[int]:
+    """The written move with which each nominal one ends: the first one that is where it has to be."""
+    place, found = 0, []
+    for move in nominal:
+        want = model.command_for(move.tip[None], move.lever)[0]
+        while np.abs(written[place].tip - want).max() > 2 * DIGIT:
+            place += 1
+            assert place < len(written), "a target is not reached"
+        found.append(place)
+        place += 1
+    assert place == len(written)
+    return found
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_each_target_is_where_the_judge_wants_it(bent: Path, zero: Path, seed: int) -> None:
+    text = program(np.random.default_rng(seed), 40)
+    assert olp.correct(text, zero).data == text
+    done = olp.correct(text, bent)
+    assert done.report["verdict"]["ok"]
+    nominal, written, model = rapid.moves(text), rapid.moves(done.data), JudgeModel(bent)
+    groups = ends(nominal, written, model)
+    begin = -1
+    for k, (move, last) in enumerate(zip(nominal, groups, strict=True)):
+        for part in written[begin + 1 : last + 1]:
+            assert np.abs(part.turn - move.turn).max() < 1e-6 or not move.straight
+            actual = part.tip + model.error_mm(part.tip[None], move.lever)[0]
+            start = nominal[k - 1].tip
+            way = move.tip - start
+            share = np.clip((actual - start) @ way / max(way @ way, 1e-9), 0, 1)
+            assert np.linalg.norm(start + share * way - actual) < 1.0e-3 + DIGIT
+        begin = last
+    assert len(written) > len(nominal), "long moves are split"
+
+
+def test_a_target_is_cloned_only_where_its_moves_differ(bent: Path) -> None:
+    body = (
+        f"CONST robtarget a:=[[1,2,3],{TAIL}; ! kept\nLOCAL VAR robtarget b:=[[4,5,6],{TAIL};\nPROC main()\n"
+        "MoveJ a,v100,fine,grip\\WObj:=part;\nMoveJ a,v50,z1,grip\\WObj:=part;\n"
+        "MoveJ b,v100,fine,grip\\WObj:=part;\nMoveJ Offs(b,90,0,0),v100,fine,grip\\WObj:=part;\n"
+    )
+    text = olp.correct(HEAD.encode() + body.encode() + MACHINE_TAIL, bent).data.decode()
+    assert "a_olp1" not in text
+    assert "; ! kept\n" in text
+    assert text.count("LOCAL VAR robtarget b") == 2
+    assert "MoveJ Offs(b_olp1,90,0,0),v100" in text or "MoveJ b_olp1,v100" in text
+
+
+def test_parts_of_a_move_pass_without_a_stop(bent: Path) -> None:
+    body = (
+        f"PROC main()\nMoveJ [[-60,-60,0],{TAIL},v100,fine,grip\\WObj:=part;\n"
+        f"MoveL [[60,60,20],{TAIL},v100,fine,grip\\WObj:=part;\n"
+    )
+    text = olp.correct(HEAD.encode() + body.encode() + MACHINE_TAIL, bent).data.decode()
+    parts = [line for line in text.splitlines() if line.startswith("MoveL")]
+    assert len(parts) > 1
+    assert all(",v100,z0,grip" in line for line in parts[:-1])
+    assert ",v100,fine,grip" in parts[-1]
+
+
+REFUSED = {
+    "MoveL CRobT(),v100,fine,tool0;": "computed",
+    "MoveL Offs(p,i,0,0),v100,fine,tool0;": "computed",
+    "MoveL p,v100,fine,tool0;\np.trans.z:=5;": "another value in line",
+    "MoveL gone,v100,fine,tool0;": "not stated in this text",
+    "MoveL p,v100,fine,lost;": "does not state the tool lost",
+    "MoveL p,v100,fine,tool0\\WObj:=lost;": "lost",
+    "MoveL p,v100,fine,still;": "stands still",
+    "MoveL p,v100,fine,tool0\\WObj:=held;": "moves",
+    "MoveL p,v100\\T:=2,fine,tool0;": "T",
+    "MoveC p,p,v100,fine,tool0;": "arc",
+    "SearchL x,p,p,v100,tool0;": "SEARCHL",
+    "PDispSet frame1;": "PDISPSET",
+    "IF x=1 MoveL p,v100,fine,tool0;": "IF without THEN",
+    "MoveL p,v100,fine,tool0": "semicolon",
+    "MoveL [[0,0,0],[1,1,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;": "quaternion",
+}
+
+
+@pytest.mark.parametrize(("statement", "why"), REFUSED.items())
+def test_what_is_not_certain_is_refused_with_its_line(zero: Path, statement: str, why: str) -> None:
+    head = (
+        f"MODULE m\nCONST robtarget p:=[[0,0,0],{TAIL};\n"
+        "PERS tooldata still:=[FALSE,[[0,0,0],[1,0,0,0]],[1,[0,0,1],[1,0,0,0],0,0,0]];\n"
+        'PERS wobjdata held:=[TRUE,TRUE,"",[[0,0,0],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];\nPROC main()\n'
+    )
+    with pytest.raises(OlpError, match=why) as error:
+        olp.correct(head.encode() + statement.encode() + b"\nENDPROC\nENDMODULE\n", zero)
+    assert isinstance(error.value, ProgramError)
+    assert error.value.line is not None
+    assert 3 <= error.value.line <= 7
+
+
+def test_frames_and_tools_come_from_program_or_job(tmp_path: Path) -> None:
+    job = replace(
+        RECIPE,
+        work_offsets={"part": {"X_mm": 100.0, "C_deg": 30.0, "set_by": "true"}},
+        tools={4: {"name": "grip", "gauge_to_tip_mm": [0.0, 0.0, -120.0]}},
+        travel=((-900.0, 900.0),) * 3,
+    )
+    path = machines.shift_machine(tmp_path, (100.0, 50.0, 20.0), recipe=job)
+    move = f"PROC main()\nMoveJ [[1,2,3],{TAIL},v100,fine,grip\\WObj:=part;\n".encode()
+    text = olp.correct(b"MODULE m\n" + move + MACHINE_TAIL, path).data
+    # error in X and Y, along the axes of a frame that is turned by 30 degrees
+    assert b"[[0.8884,2.0067,2.9800]" in text
+    with pytest.raises(OlpError, match="frame part is stated by the program and by"):
+        olp.correct(HEAD.encode() + move + MACHINE_TAIL, path)
+    same = "[[100,0,0],[0.9659258262890683,0,0,0.2588190451025207]],[[0,0,0]"
+    own = HEAD.replace("[[300,250,-300],[0.965925826,0,0,0.258819045]],[[5,6,7]", same)
+    with pytest.raises(OlpError, match="tool grip is stated by the program and by"):
+        olp.correct(own.encode() + move + MACHINE_TAIL, path)
+
+
+def test_behind_moves_that_may_not_run_only_the_end_is_corrected(bent: Path) -> None:
+    body = (
+        f"PROC main()\nMoveJ [[-60,-60,0],{TAIL},v100,fine,grip\\WObj:=part;\n"
+        f"IF x=1 THEN\nMoveL [[0,0,20],{TAIL},v100,fine,grip\\WObj:=part;\nENDIF\n"
+        f"MoveL [[60,60,20],{TAIL},v100,fine,grip\\WObj:=part;\n"
+        f"IF x=1 THEN\nSetDO a,1;\nENDIF\nMoveL [[-60,-60,20],{TAIL},v100,fine,grip\\WObj:=part;\n"
+    )
+    text = olp.correct(HEAD.encode() + body.encode() + MACHINE_TAIL, bent).data.decode()
+    lines = text.splitlines()
+    second = next(k for k, line in enumerate(lines) if line == "ENDIF")
+    assert lines[second + 1].startswith("MoveL [[60.")
+    assert lines[second + 2] == "IF x=1 THEN"
+    assert lines[second + 5].startswith("MoveL")
+    assert not lines[second + 5].startswith("MoveL [[-60.0"), "the last move is split"
