@@ -23,6 +23,8 @@ _MOST_ROUNDS = 12
 _MOST_ROWS = 1_000_000
 #: Further rows for each of its moves.
 _ROWS_PER_MOVE = 100
+#: mm or deg that an axis moves by rounding alone: it turns nothing round.
+_STILL = 1e-9
 #: Rows whose commands are found at a time, so that memory is small.
 _BATCH = 1 << 15
 
@@ -251,7 +253,7 @@ def _sides(path: JointPath, solid: Mask) -> tuple[Array, Mask]:
     ends = [motion.axes(place[rows], path.tool[rows], path.tip[rows]) for place in (path.start, path.end)]
     moved = np.zeros(path.end.shape)
     moved[rows] = ends[1] - ends[0]
-    moves = np.abs(moved) > 0.0
+    moves = np.abs(moved) > _STILL
     order = np.arange(len(path))[:, None]
     last = np.maximum.accumulate(np.where(moves, order, -1), axis=0)
     side = np.where(last >= 0, np.take_along_axis(np.sign(moved), np.maximum(last, 0), axis=0), 0.0)
