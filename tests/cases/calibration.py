@@ -10,10 +10,11 @@ from judge import simulated
 
 from olp.calibration.estimator.fitted import Fit
 from olp.calibration.observations.lengths import Lengths
-from olp.calibration.observations.lines import Line, Square
+from olp.calibration.observations.lines import Line
 from olp.calibration.observations.measurements import Measurements
 from olp.calibration.observations.pods import Pods
 from olp.calibration.observations.points import Points
+from olp.calibration.observations.references import Square
 
 CHAINS = ("FXYZ", "YFXZ", "XYFZ", "FYXZ", "XFYZ", "ZFXY")
 #: tools of the judgement: the one measured with, and one with which no line was measured

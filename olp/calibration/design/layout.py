@@ -12,9 +12,10 @@ from olp.calibration.design.prediction import Planned
 from olp.calibration.iso230.separation import aliased
 from olp.calibration.observations.base import Noise
 from olp.calibration.observations.lengths import Lengths, LengthsState, Station
-from olp.calibration.observations.lines import Line, LineState, Square
+from olp.calibration.observations.lines import Line, LineState
 from olp.calibration.observations.pods import Pods, PodsState, Pose
 from olp.calibration.observations.points import Points, PointsState
+from olp.calibration.observations.references import Square
 from olp.core.arrays import Array
 from olp.core.errors import CannotCompute
 from olp.core.machine import Vector

@@ -12,7 +12,8 @@ from olp.calibration.design.choosing import Candidates, alone
 from olp.calibration.design.known import Known
 from olp.calibration.design.offers import Offer
 from olp.calibration.design.prediction import Planned
-from olp.calibration.observations.lines import LineState, Square
+from olp.calibration.observations.lines import LineState
+from olp.calibration.observations.references import Square
 from olp.core.arrays import Array, Index
 from olp.core.machine import COMPONENTS, Vector
 from olp.core.units import AXES, UM_PER_MM

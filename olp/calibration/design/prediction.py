@@ -10,13 +10,15 @@ import numpy as np
 from olp.calibration.design.known import Known, judged_rows, lengths_of
 from olp.calibration.estimator.basis import CurveSpace, Scales, Spline
 from olp.calibration.estimator.fitted import Fit
+from olp.calibration.estimator.model import artefacts_of
 from olp.calibration.estimator.normal import Normal, solve
 from olp.calibration.estimator.parameters import MeasuringLine, Parameters
-from olp.calibration.estimator.prior import POSE, Prior
+from olp.calibration.estimator.prior import Prior
 from olp.calibration.estimator.summary import squareness_unobservable, unobservable
 from olp.calibration.observations.base import State
-from olp.calibration.observations.lines import Square, square_names
+from olp.calibration.observations.lines import shared_names
 from olp.calibration.observations.measurements import Measurements
+from olp.calibration.observations.references import Square
 from olp.core.arrays import Array
 from olp.core.machine import COMPONENTS, Vector
 from olp.core.units import AXES
@@ -63,10 +65,7 @@ def predict(planned: Planned, chain: str, box_mm: Array, tools: Sequence[Vector]
     """The prediction for a box (3, 2) and tool vectors."""
     taken = planned.measurements
     parameters = _parameters(taken, chain, box_mm)
-    squares = {f"error of square {s.name}": (s.error_rad, s.sigma_rad) for s in taken.squares}
-    prior = Prior(
-        parameters, {}, {name: squares.get(name, (0.0, POSE)) for name in parameters.shared}, dict(TYPICAL)
-    )
+    prior = Prior(parameters, {}, artefacts_of(taken, parameters), dict(TYPICAL))
     theta = np.zeros(parameters.size)
     normal = Normal.of(parameters.size)
     for state in planned.states:
@@ -105,5 +104,5 @@ def _parameters(taken: Measurements, chain: str, box_mm: Array) -> Parameters:
             line_mm[axis] = datum[axis]
             tool = own[0].tool_mm if own else (0.0, 0.0, 0.0)
             measuring_lines[name] = MeasuringLine((line_mm[0], line_mm[1], line_mm[2]), tool)
-    shared = sorted({n for line in taken.lines if line.square is not None for n in square_names(line)})
+    shared = sorted({name for line in taken.lines for name in shared_names(line)})
     return Parameters(chain, datum, spaces, measuring_lines, shared=tuple(shared))

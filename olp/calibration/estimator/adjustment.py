@@ -13,7 +13,7 @@ import numpy as np
 
 from olp.calibration.estimator.basis import Wave
 from olp.calibration.estimator.fitted import Fit
-from olp.calibration.estimator.model import MOST, Model, squares_of
+from olp.calibration.estimator.model import MOST, Model, artefacts_of
 from olp.calibration.estimator.normal import Block, Normal, Solved, solve
 from olp.calibration.estimator.parameters import Parameters
 from olp.calibration.estimator.prior import Class, Prior
@@ -120,7 +120,7 @@ def _iterate(start: _Start, tell: Progress) -> _Settled:
     learnt: dict[str, Class] | None = None
     for _ in range(PASSES):
         parameters = start.model.parameters(waves)
-        prior = Prior(parameters, start.model.shapes, squares_of(start.measurements, parameters))
+        prior = Prior(parameters, start.model.shapes, artefacts_of(start.measurements, parameters))
         if learnt is not None:
             prior.classes = learnt
         theta = theta if len(theta) == parameters.size else np.zeros(parameters.size)

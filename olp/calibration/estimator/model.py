@@ -4,18 +4,19 @@ terms, and where displacements were measured. Most of it follows from lines, as 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from olp.calibration.estimator.basis import CurveSpace, Scales, Spline, Step, Wave
 from olp.calibration.estimator.between import Hidden, hidden
 from olp.calibration.estimator.parameters import MeasuringLine, Parameters
-from olp.calibration.estimator.prior import POSE
 from olp.calibration.estimator.smoothing import AMPLITUDE, Features, Shape, features_of, shapes_of
 from olp.calibration.iso230.separation import aliased
 from olp.calibration.observations.base import Noise, Observation, Scattered
-from olp.calibration.observations.lines import Line, square_names, targets_of
+from olp.calibration.observations.lines import Line, shared_names, targets_of
 from olp.calibration.observations.measurements import Measurements
+from olp.calibration.observations.references import known_of, sense_of
 from olp.core.arrays import Array
 from olp.core.errors import CannotCompute
 from olp.core.machine import COMPONENTS, ZERO, Vector
@@ -65,7 +66,7 @@ class Model:
         x, y, z = datum_mm or (float(np.clip(0.0, *side)) for side in box)
         splines = [_spline(own, axis, ranges[axis], cells) for axis in range(3)]
         waves, unobservable = _waves(measurements, own, observations)
-        shapes = _shapes(lines, splines, waves, (x, y, z), tell)
+        shapes = _shapes(_without_form(lines), splines, waves, (x, y, z), tell)
         framed = any(taken.framed for taken in observations)
         return cls(chain, (x, y, z), box, lines, splines, shapes, waves, unobservable, framed)
 
@@ -89,16 +90,15 @@ class Model:
                 line_mm = list(line_of.line_mm)
                 line_mm[axis] = self.datum_mm[axis]
                 lines[name] = MeasuringLine((line_mm[0], line_mm[1], line_mm[2]), line_of.tool_mm)
-        shared = sorted({n for line in own_lines if line.square is not None for n in square_names(line)})
+        shared = sorted({name for line in own_lines for name in shared_names(line)})
         return Parameters(
             self.chain, self.datum_mm, spaces, lines, halves, dict(waves), tuple(shared), self.framed
         )
 
 
-def squares_of(measurements: Measurements, parameters: Parameters) -> dict[str, tuple[float, float]]:
-    """Prior mean and standard deviation of the shared nuisances, rad."""
-    known = {f"error of square {s.name}": (s.error_rad, max(s.sigma_rad, 1e-9)) for s in measurements.squares}
-    return {name: known.get(name, (0.0, POSE)) for name in parameters.shared}
+def artefacts_of(measurements: Measurements, parameters: Parameters) -> dict[str, tuple[float, float]]:
+    """Prior mean and standard deviation of the shared nuisances, rad or mm."""
+    return known_of(parameters.shared, measurements.squares, measurements.straightedges)
 
 
 def _ranges(
@@ -225,6 +225,37 @@ def _waves(
             else:
                 unobservable[name, period] = str(reasons[0])
     return waves, unobservable
+
+
+def _without_form(lines: Sequence[tuple[Line, Noise]]) -> list[tuple[Line, Noise]]:
+    """Lines less the form of straightedges, as reversals show it at single targets: so it does not count as
+    the shape of curves."""
+
+    def means(line: Line, turned: bool) -> Array:
+        """(n, 2) targets and mean readings of all lines of a component with the straightedge this way up."""
+        own = [
+            one for one, _ in lines
+            if (one.straightedge, one.component, one.turned) == (line.straightedge, line.component, turned)
+        ]  # fmt: skip
+        if not own:
+            return np.zeros((0, 2))
+        q = np.round(np.concatenate([one.target_mm for one in own]), 1)
+        value = np.concatenate([one.value - one.value.mean() for one in own])
+        targets, inverse = np.unique(q, return_inverse=True)
+        return np.stack([targets, np.bincount(inverse, value) / np.bincount(inverse)], axis=1)
+
+    less: list[tuple[Line, Noise]] = []
+    for line, noise in lines:
+        less.append((line, noise))
+        if line.straightedge is None:
+            continue
+        direct, turned = means(line, False), means(line, True)
+        if len(direct) > 2 and len(turned) > 2:
+            form = 0.5 * (direct[:, 1] - np.interp(direct[:, 0], turned[:, 0], turned[:, 1]))
+            form = form - np.polyval(np.polyfit(direct[:, 0], form, 1), direct[:, 0])
+            shown = sense_of(line.turned) * np.interp(line.target_mm, direct[:, 0], form)
+            less[-1] = replace(line, value=line.value - shown), noise
+    return less
 
 
 def _own_lines(name: str, lines: Sequence[tuple[Line, Noise]]) -> list[tuple[Line, Noise]]:

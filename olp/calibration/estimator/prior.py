@@ -21,8 +21,6 @@ from olp.core.values import dataclass
 
 #: Standard deviation of a squareness, rad.
 SQUARE = 1e-3
-#: Standard deviation of the unknown pose of a square, rad.
-POSE = 0.1
 #: Size and scales (mm or rad) of a curve without lines, if no other curve of its class has any.
 UNKNOWN = {
     "positioning": (0.1, Scales(0.0, 0.1, 0.01, 1e-3)),

@@ -14,6 +14,7 @@ from olp.calibration.estimator.fitted import Fit
 from olp.calibration.estimator.parameters import LEVER_ARM_MM, SHEAR
 from olp.calibration.iso230.conventions import lean_words
 from olp.calibration.observations.base import rms, unit_of
+from olp.calibration.observations.references import error_name, form_at
 from olp.core.arrays import Array
 from olp.core.machine import COMPONENTS, SQUARENESS, ZERO, Vector
 from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM
@@ -152,6 +153,7 @@ def summary(fit: Fit, calibration: Calibration, tools: Sequence[Vector]) -> dict
             for term in calibration.cyclic
         ],
         **_sections(fit),
+        **_artefacts(fit),
         "not_observed": [
             {"name": name, "costs_um": cost_um(fit, name, sigma, tools)}
             for name, sigma in {**hidden, **squareness_unobservable(fit)}.items()
@@ -217,6 +219,39 @@ def _square_row(fit: Fit, name: str) -> dict[str, Any]:
         values[f"{key}value_urad"] = float(row @ fit.theta) / RAD_PER_URAD
         values[f"{key}sigma_urad"] = math.sqrt(max(float(row @ fit.covariance @ row), 0.0)) / RAD_PER_URAD
     return {"name": name, **values, "in_the_middle": lean_words(name, float(middle @ fit.theta))}
+
+
+def _artefacts(fit: Fit) -> dict[str, Any]:
+    """Tables of squares and straightedges that lines were read against: what the readings tell of them."""
+    squares = [
+        {
+            "name": square.name,
+            "error_urad": round(float(fit.theta[part][0]) / RAD_PER_URAD, 2) + 0.0,
+            "sigma_urad": math.sqrt(float(fit.covariance[part, part][0, 0])) / RAD_PER_URAD,
+        }
+        for square in fit.measurements.squares
+        if (part := fit.parameters.slices.get(error_name(square.name))) is not None
+    ]
+    edges = [row for one in fit.measurements.straightedges for row in _form_rows(fit, one.name)]
+    tables = {"squares": squares, "straightedges": edges}
+    return {key: rows for key, rows in tables.items() if rows}
+
+
+def _form_rows(fit: Fit, name: str) -> list[dict[str, Any]]:
+    """The form of a straightedge at its targets, less the straight line that fits best."""
+    found = sorted(
+        (at, fit.parameters.slices[key].start) for key in fit.parameters.shared
+        if (at := form_at(name, key)) is not None
+    )  # fmt: skip
+    q, index = np.array([at for at, _ in found]), [start for _, start in found]
+    lines = np.linalg.qr(np.stack([np.ones(len(q)), q], axis=1))[0]
+    less = np.eye(len(q)) - lines @ lines.T
+    form = less @ fit.theta[index] * UM_PER_MM
+    sigma = np.sqrt(np.diag(less @ fit.covariance[np.ix_(index, index)] @ less)) * UM_PER_MM
+    return [
+        {"name": name, "target_mm": at, "form_um": value, "sigma_um": spread}
+        for at, value, spread in zip(q.tolist(), form.tolist(), sigma.tolist(), strict=True)
+    ]
 
 
 def _frame_row(fit: Fit) -> dict[str, Any]:

@@ -15,8 +15,9 @@ from olp.calibration.iso230.go_return import Reversal, reversal_of
 from olp.calibration.iso230.positioning import Evaluation, Zone
 from olp.calibration.iso230.separation import Separation, separate
 from olp.calibration.iso230.squareness import component_of, from_straightness_pair, pairs_of
-from olp.calibration.observations.lines import Line, Square
+from olp.calibration.observations.lines import Line
 from olp.calibration.observations.measurements import Measurements
+from olp.calibration.observations.references import Square
 from olp.calibration.observations.squareness import SquarenessReading
 from olp.core.errors import ConfigError
 from olp.core.units import RAD_PER_URAD

@@ -13,7 +13,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from olp.calibration.iso230.conventions import AXES_OF, LEAN
-from olp.calibration.observations.lines import Line, Square
+from olp.calibration.observations.lines import Line
+from olp.calibration.observations.references import Square, sense_of
 from olp.calibration.observations.squareness import SquarenessReading
 from olp.core.errors import ConfigError, UsageError
 from olp.core.machine import ZERO, Vector
@@ -108,7 +109,7 @@ def from_straightness_pair(first: Line, second: Line, square: Square) -> Squaren
             file=b.source,
         )
     one, other = slope_of(a), slope_of(b)
-    lean = one.slope + other.slope - square.error_rad
+    lean = one.slope + other.slope - sense_of(a.turned) * square.error_rad
     place = [0.0, 0.0, 0.0]
     place[earlier], place[later], place[third] = b.line_mm[earlier], a.line_mm[later], a.line_mm[third]
     return SquarenessReading(
@@ -197,7 +198,7 @@ def pairs_of(lines: Sequence[Line]) -> Iterator[tuple[Line, Line]]:
                 crossed
                 and first.quantity == "straightness"
                 and first.square
-                and first.square == second.square
+                and (first.square, first.turned) == (second.square, second.turned)
             ):
                 yield first, second
 

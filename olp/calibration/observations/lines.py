@@ -32,6 +32,7 @@ from olp.calibration.observations.base import (
     scatter_words,
     unit_of,
 )
+from olp.calibration.observations.references import form_columns, sense_of, square_names
 from olp.core.arrays import Array, Index
 from olp.core.errors import ConfigError
 from olp.core.machine import COMPONENTS, ZERO, Vector
@@ -83,7 +84,8 @@ class Line(Observation):
     `direction` (n,) +1 or -1: from which side the target was approached. `line_mm` holds the positions of
     the other axes (the own entry is ignored) and `tool_mm` the tool vector to the reflector; with `reference`
     "table" the reflector was fixed on a moving table. The zero of the values is arbitrary, so is the slope of
-    a straightness. Straightness lines that name the same `square` were read against its two legs.
+    a straightness. Straightness lines that name the same `square` were read against its two legs, those that
+    name a `straightedge` against that, at one place of it along the axis; `turned` where it was turned over.
     `sigma` is the standard uncertainty of one reading (mm or rad), `sigma_scale` that of the scale of
     all readings of a line (mm/mm, a laser's wavelength). A sigma of 0 means not known: it then follows from
     the spread of the runs. `source` is the file and `row` (n,) the line of each reading in it. Raises
@@ -104,6 +106,8 @@ class Line(Observation):
     source: str = ""
     row: Index = field(default_factory=lambda: np.zeros(0, np.int64))
     instrument: str = ""
+    straightedge: str | None = None
+    turned: bool = False
 
     def __post_init__(self) -> None:
         if not len(self.row):
@@ -153,7 +157,8 @@ class Line(Observation):
         return _screened(self)
 
     def alternatives(self) -> Sequence[Alternative]:
-        """Sign, unit, order of the targets, and a scale of its own."""
+        """Sign, unit, order of the targets, and a scale of its own. The form of a straightedge is known at
+        the targets only, so no other order is tried."""
         factors = [REVERSED, *UNITS[self.quantity == "angle"]]
         found = [
             Alternative(
@@ -161,9 +166,10 @@ class Line(Observation):
             )
             for kind, factor, words in factors
         ]
-        ends = float(self.target_mm.min() + self.target_mm.max())
-        turned = replace(self, target_mm=ends - self.target_mm, direction=-self.direction)
-        found.append(Alternative("order", "its targets run the other way", turned))
+        if self.straightedge is None:
+            ends = float(self.target_mm.min() + self.target_mm.max())
+            turned = replace(self, target_mm=ends - self.target_mm, direction=-self.direction)
+            found.append(Alternative("order", "its targets run the other way", turned))
         if self.quantity == "positioning":
             scaled = replace(self, sigma_scale=math.hypot(self.sigma_scale, OWN_SCALE))
             words = "it has a scale of its own (temperature, expansion, wavelength)"
@@ -215,19 +221,6 @@ class LineState(State):
             f"residual_{unit}": rms(residual) * scale,
             "chi_square_per_reading": chi_square / self.count,
         }
-
-
-@dataclass(frozen=True, slots=True)
-class Square:
-    """An optical or mechanical square that two straightness lines share.
-
-    `error_rad` is by how much the angle between its legs, both along + of their axes, differs from 90 degrees
-    (more is +), as its certificate says; `sigma_rad` its standard uncertainty.
-    """
-
-    name: str
-    error_rad: float = 0.0
-    sigma_rad: float = 0.0
 
 
 def noise_of(line: Line) -> Noise:
@@ -295,10 +288,10 @@ def drift_ramps(line: Line) -> Array:
     )
 
 
-def square_names(line: Line) -> tuple[str, str]:
-    """The shared nuisances of a straightness read against a square: its pose in this plane, its error."""
-    plane = "".join(sorted((line.component[1], line.component[2])))
-    return f"pose of square {line.square} in {plane}", f"error of square {line.square}"
+def shared_names(line: Line) -> list[str]:
+    """The shared nuisances that a line depends on."""
+    names = list(square_names(line.square, line.component, line.turned)) if line.square is not None else []
+    return names + (list(form_columns(line.straightedge, line.target_mm)) if line.straightedge else [])
 
 
 def line_block(line: Line, parameters: Parameters, noise: Noise) -> Block:
@@ -328,16 +321,20 @@ def line_block(line: Line, parameters: Parameters, noise: Noise) -> Block:
                 for name, (i, j, sign) in SHEAR.items()
                 if (i, j) == (row, axis)
             ]
+            if line.straightedge is not None:
+                form = form_columns(line.straightedge, q)
+                columns_of_form = sense_of(line.turned) * np.stack(list(form.values()), axis=1)
+                parts += [(parameters.slices[name], columns_of_form[:, [k]]) for k, name in enumerate(form)]
             if line.square is None:
                 local.append(from_datum / 1000.0)
                 precision.append(0.0)
             else:
                 # slopes against both legs differ in sign, and add up to the square's error
-                pose, error = (parameters.slices[name] for name in square_names(line))
+                pose, error = (parameters.slices[name] for name in shared_names(line))
                 first = axis < row
                 parts.append((pose, (1.0 if first else -1.0) * from_datum[:, None]))
                 if not first:
-                    parts.append((error, from_datum[:, None]))
+                    parts.append((error, sense_of(line.turned) * from_datum[:, None]))
         elif line.sigma_scale > 0.0:
             local.append(from_datum)
             precision.append(1.0 / line.sigma_scale**2)

@@ -12,7 +12,8 @@ from collections.abc import Iterable
 from typing import Literal, TypeVar
 
 from olp.calibration.observations.base import Observation, Scattered
-from olp.calibration.observations.lines import Line, Square
+from olp.calibration.observations.lines import Line
+from olp.calibration.observations.references import Square, Straightedge
 from olp.core.values import dataclass
 
 T = TypeVar("T", bound=Observation)
@@ -45,6 +46,7 @@ class Measurements:
     measured: datetime.date | None = None
     chain: str | None = None
     map: MapWish | None = None
+    straightedges: tuple[Straightedge, ...] = ()
 
     def of(self, kind: type[T]) -> tuple[T, ...]:
         """All observations of a kind."""

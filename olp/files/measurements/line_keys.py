@@ -42,6 +42,13 @@ class LineKeys(Table):
     square: Text | None = Field(
         default=None, description="the name of the square whose leg the straightness was read against"
     )
+    straightedge: Text | None = Field(
+        default=None, description="the name of the straightedge that the straightness was read against"
+    )
+    turned_over: bool | None = Field(
+        default=None,
+        description="whether the square was turned over about one leg, or the straightedge about its length",
+    )
     sense: Sense | None = Field(
         default=None,
         description='"actual-minus-commanded" or "commanded-minus-actual" of the tool relative to the '

@@ -79,6 +79,8 @@ def as_line(
         tool_mm=keys.tool_mm or (0.0, 0.0, 0.0),
         reference=keys.reference or "functional-point",
         square=keys.square,
+        straightedge=keys.straightedge,
+        turned=bool(keys.turned_over),
         sigma=sigma,
         sigma_scale=(keys.sigma_scale_um_m or 0.0) * PER_UNIT,
         source=file,
@@ -109,8 +111,7 @@ def _line_problems(
             f"the straightness of {axis} twice, with the reflector at two offsets across it. Or leave "
             f"{component} out; the report then lists it as not observed, with its possible effect"
         )
-    if keys.square is not None and (angular or component[1] == axis):
-        yield f"square is for straightness only, and {component} is not a straightness; leave it out"
+    yield from _artefact_problems(component, keys, vertical)
     if keys.sigma_scale_um_m and component[1] != axis:
         yield f"sigma_scale_um_m is for positioning only, and {component} is not a positioning; leave it out"
     if (keys.sigma_um if angular else keys.sigma_urad) is not None and (
@@ -123,6 +124,23 @@ def _line_problems(
             yield f'sense = "{keys.sense}", but axis {axis} of the chain {chain} moves the tool, not a table'
         if keys.reference == "table":
             yield f'reference = "table", but axis {axis} of the chain {chain} moves the tool, not a table'
+
+
+def _artefact_problems(component: str, keys: LineKeys, vertical: str) -> Iterator[str]:
+    """What is wrong with the square or straightedge of a line."""
+    artefacts = [name for name in ("square", "straightedge") if getattr(keys, name) is not None]
+    for name in artefacts:
+        if component[1] not in AXES or component[1] == component[2]:
+            yield f"{name} is for straightness only, and {component} is not a straightness; leave it out"
+    if len(artefacts) > 1:
+        yield "square and straightedge are both stated; expected what the line was read against"
+    if keys.turned_over is not None and not artefacts:
+        yield "turned_over is stated without a square or straightedge; leave it out, or name one"
+    if keys.turned_over and keys.straightedge is not None and component[1] == vertical:
+        yield (
+            f"a straightedge that is turned over still sags by its own weight, which {component} reads along "
+            f"with its form; state sigma_um of the straightedge and leave turned_over out"
+        )
 
 
 def word(value: object) -> str:

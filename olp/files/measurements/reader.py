@@ -14,9 +14,12 @@ from dataclasses import field
 from pathlib import Path as FilePath
 from typing import Any
 
+import numpy as np
+
 from olp.calibration.observations.base import Observation
-from olp.calibration.observations.lines import Line, Square
+from olp.calibration.observations.lines import SAME_MM, Line, targets_of
 from olp.calibration.observations.measurements import MapWish, Measurements
+from olp.calibration.observations.references import Square, Straightedge
 from olp.core.errors import ConfigError, InputError
 from olp.core.units import AXES, MM_PER_UM, RAD_PER_URAD
 from olp.core.values import dataclass
@@ -43,6 +46,7 @@ class _Gathered:
     chain: str | None
     observations: list[Observation] = field(default_factory=list)
     squares: dict[str, Square] = field(default_factory=dict)
+    straightedges: dict[str, Straightedge] = field(default_factory=dict)
     periods: dict[str, set[float]] = field(default_factory=lambda: {axis: set() for axis in AXES})
     whole: dict[str, tuple[Any, str]] = field(default_factory=dict)
     errors: list[ConfigError] = field(default_factory=list)
@@ -76,6 +80,7 @@ def load_measurements(sources: Sequence[PathLike], chain: str | None = None) -> 
             _alone(path, gathered)
     if not gathered.errors:
         gathered.errors += _undefined_squares(gathered)
+        gathered.errors += _open_straightedges(gathered)
         gathered.errors += [
             config_error([(None, f"{key} is missing; expected it in the plan or in a file")], "measurements")
             for key in ("machine", "measured", "temperature_degC")
@@ -89,6 +94,7 @@ def load_measurements(sources: Sequence[PathLike], chain: str | None = None) -> 
         machine=gathered.whole["machine"][0],
         observations=tuple(sorted(gathered.observations, key=rank_of)),
         squares=tuple(gathered.squares.values()),
+        straightedges=tuple(gathered.straightedges.values()),
         periods_mm=(x, y, z),
         temperature_degC=gathered.whole["temperature_degC"][0],
         active_during_measurement=gathered.whole.get("active_during_measurement", (frozenset(), ""))[0],
@@ -156,6 +162,9 @@ def _plan(path: FilePath, gathered: _Gathered) -> None:
                 )
             )
         gathered.squares[square.name] = _square(square)
+    for straightedge in plan.straightedges:
+        sigma = (straightedge.sigma_um or 0.0) * MM_PER_UM
+        gathered.straightedges[straightedge.name] = Straightedge(straightedge.name, sigma)
     problems += _readings(plan, path, key_lines, gathered)
     if problems:
         gathered.errors.append(config_error(problems, str(path)))
@@ -235,5 +244,30 @@ def _undefined_squares(gathered: _Gathered) -> Iterator[ConfigError]:
             yield ConfigError(
                 f'square "{line.square}" is not defined; expected a table [[squares]] with its sigma_urad or '
                 "square_sigma_urad in the file",
+                file=line.source,
+            )
+
+
+def _open_straightedges(gathered: _Gathered) -> Iterator[ConfigError]:
+    """Straightedges that no plan defines, and those whose form neither a value nor a reversal shows."""
+    against = [line for line in gathered.observations if isinstance(line, Line) and line.straightedge]
+    for line in against:
+        known = gathered.straightedges.get(line.straightedge or "")
+        if known is None:
+            yield ConfigError(
+                f'straightedge "{line.straightedge}" is not defined; expected a table [[straightedges]]',
+                file=line.source,
+            )
+            continue
+        others = [
+            np.abs(other.target_mm[:, None] - targets_of(line)).min(axis=0) <= SAME_MM
+            for other in against
+            if other.straightedge == line.straightedge and other.turned != line.turned
+        ]
+        if not known.sigma_mm and not (others and np.any(others, axis=0).sum() > 2):
+            yield ConfigError(
+                f'the form of straightedge "{known.name}" is unknown, and no other line was read at the same '
+                "targets with it turned over; expected one with turned_over the other way, or sigma_um in "
+                "[[straightedges]]",
                 file=line.source,
             )

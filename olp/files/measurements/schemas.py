@@ -22,6 +22,15 @@ class SquareTable(Table):
     sigma_urad: Positive = Field(description="the standard uncertainty of that angle, in urad")
 
 
+class StraightedgeTable(Table):
+    name: Text = Field(description="the name that lines use")
+    sigma_um: Positive | None = Field(
+        default=None,
+        description="how straight it is, a standard uncertainty in um; if left out, lines read with it "
+        "turned over find its form",
+    )
+
+
 class MapKeys(Table):
     noise: Literal["learnt", "stated"] = Field(
         default="learnt",
@@ -68,6 +77,7 @@ class PlanFile(Table):
         description="the table [periods_mm]: the periods of cyclic errors to be fitted",
     )
     squares: list[SquareTable] = Field(default=[], description="tables [[squares]]")
+    straightedges: list[StraightedgeTable] = Field(default=[], description="tables [[straightedges]]")
 
 
 def _tables() -> dict[str, Any]:

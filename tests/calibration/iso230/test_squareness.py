@@ -17,7 +17,8 @@ from olp.calibration.iso230 import ballbar, diagonals, squareness
 from olp.calibration.iso230.conventions import AXES_OF, CONVENTIONS, LEAN, angle_words, from_iso, to_iso
 from olp.calibration.observations.circles import PLANES, Circles
 from olp.calibration.observations.diagonals import Diagonal
-from olp.calibration.observations.lines import Line, Square
+from olp.calibration.observations.lines import Line
+from olp.calibration.observations.references import Square
 from olp.calibration.observations.squareness import SquarenessReading
 from olp.compensation.invert import invert
 from olp.core.errors import ConfigError, UsageError
