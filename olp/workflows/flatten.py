@@ -19,7 +19,7 @@ from olp.program.survey import Change, Unroll, as_it_is
 from olp.workflows.session import PathLike, Session, opened
 
 #: Endings of files of subprograms.
-_ENDINGS = ("", ".ngc", ".nc", ".NC", ".h", ".H", ".spf", ".SPF", ".mpf", ".MPF")
+_ENDINGS = ("", ".ngc", ".nc", ".NC", ".h", ".H", ".spf", ".SPF", ".mpf", ".MPF", ".SSB", ".SUB", ".MIN")
 #: Digits of O numbers in names of files.
 _DIGITS = (1, 4, 5)
 
@@ -147,7 +147,7 @@ def beside(sources: Sources, program: Source) -> Callable[[str], tuple[str, byte
         if not program.name:
             return None
         number = (wanted, *(f"{o}{wanted.zfill(n)}" for o in "Oo" for n in _DIGITS))
-        names = number if wanted.isdigit() else (wanted,)
+        names = number if wanted.isdigit() else (wanted, f"O{wanted}".upper())
         for name, ending in product(names, _ENDINGS):
             candidate = Path(program.name).parent / f"{name}{ending}"
             if sources.exists(candidate):

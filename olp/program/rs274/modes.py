@@ -34,7 +34,7 @@ from olp.program.rs274.profiles.base import Act, Profile
 
 Modal = npt.NDArray[np.int16]
 
-_FLOW = pattern(rb"[#\[=<]|^/?\s*O|^\W*N?\d*\s*(IF|WHILE|GOTO|END|DO)", re.IGNORECASE)
+_FLOW = pattern(rb"[#\[=<]|^/?\s*O|^\W*N?\d*\s*(IF|WHILE|GOTO|END|DO|CALL|RTS)", re.IGNORECASE)
 _POLAR = pattern(rb"[@^]")
 #: What to do where the unroller helps.
 UNROLL = "unroll the program with --flatten"

@@ -125,11 +125,12 @@ def _checked(stated: EventWords, words: list[Word], profile: Profile, line: int)
             )
     for m in [round(word.value * 10) for word in words if word.letter == "M"]:
         if m in profile.m_refusals:
+            helps = profile.unrolls_m(m)
             raise ProgramError(
                 f"M{m / 10:g} {profile.m_refusals[m]}",
-                hint=unroll,
+                hint=unroll if helps else "",
                 line=line,
-                code="OLP511" if unroll else "OLP512",
+                code="OLP511" if helps else "OLP512",
                 word=f"M{m / 10:g}",
             )
     return [c for c, a in zip(stated.codes, stated.acts, strict=True) if a == Act.EVENT]

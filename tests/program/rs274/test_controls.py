@@ -525,7 +525,7 @@ def test_how_programs_of_a_control_are_written() -> None:
         assert profile.title.startswith({GRBL: "Grbl 1.1 and", HAAS: "Haas mills"}.get(profile.name, ""))
         assert profile.first == (b"%", b"O|:") or profile.commands is not None
         assert profile.payload_comments
-        assert (profile.unroller is None) == (profile.name in (OKUMA, *PRINTERS))
+        assert (profile.unroller is None) == (profile.name in PRINTERS)
         # outputs that are switched along with a motion
         along = frozenset({62, 63, 67}) if profile.name == LINUXCNC else frozenset()
         assert profile.m_with_motion == along or {104, 106, 204} < profile.m_with_motion

@@ -1,10 +1,10 @@
 """Expressions of parametric programs: `#1`, `#<name>`, `[ ]`, functions and operators.
 
-There are two kinds of arithmetic. `NGC` follows RS-274/NGC (NIST IR 6556, section 3.3.2) as LinuxCNC
+There are three kinds of arithmetic. `NGC` follows RS-274/NGC (NIST IR 6556, section 3.3.2) as LinuxCNC
 evaluates it. `**` binds tightest, then `* / MOD`, then `+ -`, then comparisons, then `AND OR XOR`, all from
 left to right. A sign belongs to its operand, so -2**2 is 4. EQ and NE compare within 1e-4. `MACRO_B` is
 Custom Macro B: `* / MOD AND`, then `+ - OR XOR`, then comparisons. FIX and FUP count by magnitude. A variable
-that was never set is *vacant* (None): 0 in arithmetic and equal to #0 only.
+that was never set is *vacant* (None): 0 in arithmetic and equal to #0 only. `USER_TASKS` is that of Okuma.
 
 Text is compact and lower case: the caller has removed blanks and comments. Angles are in degrees.
 Every error is a ProgramError without a line, which the caller adds.
@@ -169,6 +169,11 @@ class Reader:
         """An expression without brackets around it, as Macro B has it to the right of `=`."""
         return self._level(0)
 
+    def skip(self) -> None:
+        """Move past blanks, which only some languages keep."""
+        while self.text.startswith(" ", self.position):
+            self.position += 1
+
     def _level(self, level: int) -> Expression:
         levels = self.arithmetic.levels
         if level == len(levels):
@@ -176,6 +181,7 @@ class Reader:
         first = self._level(level + 1)
         rest: list[tuple[_Join, Expression]] = []
         while True:
+            self.skip()
             match = _OPERATOR.match(self.text, self.position)
             if match is None or match.group() not in levels[level]:
                 return _chained(first, tuple(rest)) if rest else first
@@ -372,6 +378,15 @@ MACRO_B = Arithmetic(
     operators=_MACRO_B_OPERATORS,
     functions=_FUNCTIONS | _BY_MAGNITUDE,
     angle=_atan2_of_positive,
+    single_atan=True,
+    exact=True,
+)
+#: Logical operators are left out: how they rank is not known.
+USER_TASKS = Arithmetic(
+    levels=(_COMPARISONS, ("+", "-"), ("*", "/")),
+    operators=_MACRO_B_OPERATORS,
+    functions=_FUNCTIONS,
+    angle=_atan2_degrees,
     single_atan=True,
     exact=True,
 )

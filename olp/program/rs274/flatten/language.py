@@ -1,4 +1,4 @@
-"""The two languages of parametric RS-274 programs: O-words of LinuxCNC, and Custom Macro B."""
+"""The languages of parametric RS-274 programs: O-words of LinuxCNC, Custom Macro B, user tasks of Okuma."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ class Language:
 
     - `macro_b`: IF, WHILE, DO, END and GOTO control the run without O-words, and the right side of an
       assignment needs no brackets. Variables are numbered as in Macro B: #1 to #33 local, vacant until set.
+    - `user_tasks`: variables have names, words take their value behind `=`, and CALL runs a subprogram.
     - `modal_variables`: #4001 to #4010 and #4107 to #4120 have what is in force before a block.
     - `saved_modes`: M70 to M73 save and restore modal codes. `profile_cycles`: G70 to G72 name a subprogram.
     - `splines`: G5 to G5.3 are splines, and `@` and `^` radius and angle.
@@ -28,6 +29,7 @@ class Language:
 
     arithmetic: Arithmetic
     macro_b: bool
+    user_tasks: bool = False
     modal_variables: bool
     saved_modes: bool
     profile_cycles: bool
@@ -53,4 +55,8 @@ MACRO_B = Language(
     arithmetic=expressions.MACRO_B, macro_b=True, modal_variables=True, saved_modes=False,
     profile_cycles=False, splines=False, counts_in_p=True, shared_locals=True, calls_none=False,
     increments_open=True, decimals=4, all_digits=False, counts=frozenset("gmnpltdhos"), points=True,
+)  # fmt: skip
+USER_TASKS = replace(
+    MACRO_B, arithmetic=expressions.USER_TASKS, user_tasks=True, modal_variables=False, counts_in_p=False,
+    counts=frozenset("ghmnosdt"),
 )  # fmt: skip

@@ -59,18 +59,21 @@ class Flow:
     """A statement that controls the run. `label` is "" where an expression (`dynamic`) gives it.
 
     Keywords are those of LinuxCNC's O-words, "program" for a header such as O1234, and of Macro B
-    "when-goto", "when-then", "while-do", "do", "end" and "goto".
+    "when-goto", "when-then", "while-do", "do", "end" and "goto". Those of user tasks are "jump", "call-task",
+    with the `names` of its arguments, and "rts".
     """
 
     keyword: str
     label: str
     dynamic: Expression | None = None
     values: tuple[Expression, ...] = ()
+    names: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """One source line; `number` counts from 1. `opaque` lines hold something that is not understood."""
+    """One source line; `number` counts from 1. `opaque` lines hold something that is not understood.
+    `label` is the number or name behind N of a user task."""
 
     number: int
     raw: bytes
@@ -81,6 +84,7 @@ class Line:
     words: tuple[Word, ...] = ()
     assignments: tuple[Assignment, ...] = ()
     flow: Flow | None = None
+    label: str = ""
     comments: tuple[bytes, ...] = ()
 
     @property
@@ -93,7 +97,7 @@ def compile_line(line: bytes, number: int, language: Language) -> Line:
     """Compile one line with its end. Raises ProgramError (without a line) for a broken expression."""
     raw = line.rstrip(b"\r\n")
     eol = line[len(raw) :]
-    text, places, comments = _compact(raw)
+    text, places, comments = compact(raw)
     if text.startswith("%"):
         return Line(number, raw, eol, percent=True)
     if language.macro_b and text.startswith(":"):
@@ -122,8 +126,9 @@ class _Source:
     comments: tuple[bytes, ...]
 
 
-def _compact(raw: bytes) -> tuple[str, list[int], tuple[bytes, ...]]:
-    """Lower-case text without blanks and comments, the positions of its characters, and the comments."""
+def compact(raw: bytes, *, keep_blanks: bool = False) -> tuple[str, list[int], tuple[bytes, ...]]:
+    """Lower-case text without blanks and comments, the positions of its characters, and the comments. A blank
+    between letters or digits stays one where they are kept."""
     # Latin-1 keeps one character per byte, also in lower case.
     source = raw.decode("latin-1")
     pieces: list[str] = []
@@ -134,11 +139,19 @@ def _compact(raw: bytes) -> tuple[str, list[int], tuple[bytes, ...]]:
         pieces.append(source[done : match.start()])
         places.extend(range(done, match.start()))
         done = match.end()
+        if keep_blanks and _between(source, match.start(), done):
+            pieces.append(" ")
+            places.append(match.start())
         if match.group()[0] in "(;":
             comments.append(raw[match.start() : match.end()])
     pieces.append(source[done:])
     places.extend(range(done, len(source)))
     return "".join(pieces).lower(), places, tuple(comments)
+
+
+def _between(source: str, start: int, end: int) -> bool:
+    """Whether letters or digits are on both sides."""
+    return source[max(start - 1, 0) : start].isalnum() and source[end : end + 1].isalnum()
 
 
 def _compile(source: _Source, begin: int, language: Language) -> Line:

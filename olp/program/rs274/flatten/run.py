@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 from olp.core.budget import Budget
 from olp.core.errors import ProgramError
-from olp.program.rs274.flatten.branches import Branches
 from olp.program.rs274.flatten.expressions import filled, whole
 from olp.program.rs274.flatten.lines import Flow, Line
 from olp.program.rs274.flatten.modal import Modal, moves
+from olp.program.rs274.flatten.tasks import Tasks
 from olp.program.rs274.flatten.unit import Frame, Unit
 from olp.program.rs274.flatten.values import Variables, macro_arguments
 
@@ -46,7 +46,7 @@ def _refuse_by_switch(line: Line) -> None:
         )
 
 
-class Walk(Branches):
+class Walk(Tasks):
     """Runs a program; gives every executed line to `write`."""
 
     def __init__(
@@ -122,7 +122,7 @@ class Walk(Branches):
         flow = line.flow
         if flow is not None:
             return self._flow(flow, line, frame, index)
-        called = self._calls(line, frame, index)
+        called = None if self.language.user_tasks else self._calls(line, frame, index)
         if called is not None:
             return called
         if len(self._frames) == 1 and any(word.letter != "n" for word in line.words):

@@ -10,6 +10,7 @@ from dataclasses import field
 
 from olp.core.errors import ProgramError
 from olp.core.values import dataclass
+from olp.program.rs274.flatten import user_task
 from olp.program.rs274.flatten.lines import Flow, Line, compile_line
 from olp.program.rs274.profiles.base import Profile
 from olp.program.text.line_ends import split
@@ -41,6 +42,7 @@ class Unit:
         self._definitions: dict[tuple[str, str], int] | None = None
         self._bounds: list[int] | None = None
         self._numbers: dict[float, list[int]] | None = None
+        self._labels: dict[str, list[int]] | None = None
 
     def line(self, index: int) -> Line:
         if index not in self._compiled:
@@ -48,7 +50,8 @@ class Unit:
                 refusal = self.profile.text.refusal(self.lines[index].removesuffix(b"\n"))
                 if refusal is not None:
                     raise refusal
-                self._compiled[index] = compile_line(self.lines[index], index + 1, self.language)
+                compiled = user_task.compile_line if self.language.user_tasks else compile_line
+                self._compiled[index] = compiled(self.lines[index], index + 1, self.language)
             except ProgramError as error:
                 error.line = index + 1
                 raise
@@ -61,9 +64,11 @@ class Unit:
             for index, raw in enumerate(self.lines):
                 if not self.language.macro_b and not _MAYBE_O.match(raw):
                     continue
-                flow = self.line(index).flow
-                if flow is not None:
-                    self._flows.append((index, flow))
+                with contextlib.suppress(*((ProgramError,) if self.language.user_tasks else ())):
+                    # a line of a user task that is broken begins no program
+                    flow = self.line(index).flow
+                    if flow is not None:
+                        self._flows.append((index, flow))
         return self._flows
 
     def definition(self, label: str, keyword: str) -> int | None:
@@ -101,11 +106,7 @@ class Unit:
 
     def block_number(self, number: int, index: int) -> int:
         """Index of the line N`number` in the program around `index`: forward first, then from its start."""
-        if self._bounds is None:
-            self._bounds = [i for i, flow in self.flows() if flow.keyword == "program"]
-        k = bisect.bisect_right(self._bounds, index)
-        start = self._bounds[k - 1] if k else 0
-        stop = self._bounds[k] if k < len(self._bounds) else len(self.lines)
+        start, stop = self._around(index)
         places = self._numbered().get(number, [])
         ahead = bisect.bisect_right(places, index)
         if ahead < len(places) and places[ahead] < stop:
@@ -114,6 +115,30 @@ class Unit:
         if first < ahead:
             return places[first]
         raise ProgramError(f"GOTO {number}: the program has no block N{number}", code="OLP542")
+
+    def _around(self, index: int) -> tuple[int, int]:
+        """The first line of the program around `index`, and the line behind its last."""
+        if self._bounds is None:
+            self._bounds = [i for i, flow in self.flows() if flow.keyword == "program"]
+        k = bisect.bisect_right(self._bounds, index)
+        return (
+            self._bounds[k - 1] if k else 0,
+            self._bounds[k] if k < len(self._bounds) else len(self.lines),
+        )
+
+    def labelled(self, label: str, index: int) -> int:
+        """Index of the one line with a label in the program around `index`."""
+        if self._labels is None:
+            self._labels = {}
+            for i in range(len(self.lines)):
+                with contextlib.suppress(ProgramError):
+                    self._labels.setdefault(self.line(i).label, []).append(i)
+        start, stop = self._around(index)
+        places = [i for i in self._labels.get(label, []) if start <= i < stop]
+        if len(places) != 1:
+            what = f"{len(places)} blocks" if places else "no block"
+            raise ProgramError(f"the program has {what} N{label.upper()}; expected one", code="OLP542")
+        return places[0]
 
     def _numbered(self) -> dict[float, list[int]]:
         """The lines of each block number, in order. A line that is broken has none, until it is run."""

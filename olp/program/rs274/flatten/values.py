@@ -36,9 +36,12 @@ _COUNT_ARGUMENTS = frozenset("dhmst")
 UNSETTLED = float("nan")
 
 
-def _bare(name: str) -> str:
-    """A parameter as expressions name it: its number, or its name in small letters."""
+def _bare(name: str, *, tasks: bool) -> str:
+    """A parameter as expressions name it: its number, or its name in small letters; common variables of user
+    `tasks` begin with `_`."""
     text = name.lower().removeprefix("#").strip("<>")
+    if tasks and text.startswith("vc"):
+        return f"_{text}"
     return str(int(text)) if text.isdigit() else text.replace(" ", "")
 
 
@@ -53,7 +56,8 @@ class Variables:
     def __init__(self, state: ProgramState, given: Mapping[str, float] | None = None) -> None:
         self.state = state
         self.modal = ModalVariables()
-        names = {_bare(name): value for name, value in (given or {}).items()}
+        self.tasks = state.profile.language.user_tasks
+        names = {_bare(name, tasks=self.tasks): value for name, value in (given or {}).items()}
         self.given = {int(name): value for name, value in names.items() if name.isdigit()}
         self.given_names = {name: value for name, value in names.items() if not name.isdigit()}
         self.common: dict[int, float | None] = {}
@@ -129,14 +133,27 @@ class Variables:
             return known()
         table = self.globals if name.startswith("_") else self.names
         if name in table:
-            return table[name]
+            return self._settled(name, table[name])
         if name.startswith("_") and name in self.given_names:
             return self.given_names[name]
+        shown = self._shown(name)
         raise ProgramError(
-            f"#<{name}> is not set before in the program and not known off line; assign it there, or "
-            f"{_way_on(f'#<{name}>')}",
+            f"{shown} is not set before in the program and not known off line; assign it there, or "
+            f"{_way_on(shown)}",
             code="OLP541",
         )
+
+    def _shown(self, name: str) -> str:
+        return name.removeprefix("_").upper() if self.tasks else f"#<{name}>"
+
+    def _settled(self, name: str, value: float) -> float:
+        if value is UNSETTLED:
+            raise ProgramError(
+                f"{self._shown(name)} is a local variable on both sides of a CALL, and whether it is one "
+                "or two is not known; give it another name in the subprogram",
+                code="OLP541",
+            )
+        return value
 
     def exists(self, name: str) -> bool:
         if name.startswith("_") and name in self.given_names:
@@ -144,6 +161,7 @@ class Variables:
         if name.startswith(("_ini[", "_hal[")):
             raise ProgramError(f"#<{name}> belongs to the control and is not known off line", code="OLP541")
         table = self.globals if name.startswith("_") else self.names
+        self._settled(name, table.get(name, 0.0))
         return self._predefined(name) is not None or name in table
 
     def _predefined(self, name: str) -> Callable[[], float] | None:
@@ -176,7 +194,9 @@ class Variables:
         if isinstance(target, str):
             if self._predefined(target) is not None:
                 raise ProgramError(f"#<{target}> belongs to the control and cannot be set", code="OLP544")
-            (self.globals if target.startswith("_") else self.names)[target] = filled(value)
+            table = self.globals if target.startswith("_") else self.names
+            self._settled(target, table.get(target, 0.0))
+            table[target] = filled(value)
         elif self.state.profile.language.macro_b:
             self._assign_macro_b(target, value)
         elif 1 <= target <= _NGC_LOCAL:

@@ -191,6 +191,12 @@ class Profile(Dialect):
         """The M codes that move no axis, ten times their number."""
         return _in_tenths(self.harmless_m, self.harmless_m_tenths)
 
+    def unrolls_m(self, code: int) -> bool:
+        """Whether the unroller carries out this M code, ten times its number."""
+        language = self.language
+        calls = code in _CALLS and not language.user_tasks
+        return self.unroller is not None and (calls or (language.saved_modes and code in _SAVES))
+
     def with_tips(self, tips: Interpolated) -> Profile:
         """The same control on a machine with rotary axes. A tip has no length: the codes that switch tool
         centre point control on end the tool length for a reader of linear axes."""
@@ -203,10 +209,13 @@ class Profile(Dialect):
 
     def set_as(self, machine: Machine) -> Profile:
         """The same control with what the machine file states of its settings."""
-        stated = machine.cycle_return
-        if stated is None or self.initial_retract is not None or self.return_modes:
-            return self
-        return replace(self, initial_retract={"initial": RETRACT_TO_INITIAL, "r": RETRACT_TO_R}[stated])
+        stated, profile = machine.cycle_return, self
+        if stated is not None and self.initial_retract is None and not self.return_modes:
+            level = {"initial": RETRACT_TO_INITIAL, "r": RETRACT_TO_R}[stated]
+            profile = replace(profile, initial_retract=level)
+        if self.language.user_tasks and not self.counts_increments(machine):
+            profile = replace(profile, language=replace(self.language, increments_open=False))
+        return profile
 
     def codes_of(self, act: Act) -> frozenset[int]:
         """The G codes that do something, ten times their number."""
@@ -261,6 +270,9 @@ def increment(machine: Machine, letter: str, unit_mm: float) -> float:
     return metric if unit_mm == 1.0 else metric / 10
 
 
+#: M codes of subprograms, and those that save and restore modes, ten times their numbers.
+_CALLS = frozenset({970, 980, 990})
+_SAVES = frozenset({700, 710, 720, 730})
 #: G49, as ten times its number.
 _LENGTH_OFF = 490
 #: The words of a block that make its move an arc.

@@ -2,8 +2,8 @@
 
 Differs from Fanuc: G15 H selects the work offset, G56 H calls up a tool length along Z and G53 ends it; G54,
 G55 and G57 to G59 are lengths of other axes. G62 mirrors. The time of G4 is F. Canned cycles return to the
-level of G71 with M53, and to R with M54. G284 and G274 are synchronous taps. Variables, CALL and branches are
-refused. Names of programs and labels in letters stay.
+level of G71 with M53, and to R with M54. G284 and G274 are synchronous taps. Parametric programs are user
+tasks: VC1, CALL, RTS, IF, GOTO. Names of programs and labels in letters stay.
 
 Source: programming manuals of OSP-E10M, OSP-E100M and OSP-P200M.
 """
@@ -13,6 +13,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from olp.core.patterns import pattern
+from olp.program.rs274.flatten.language import USER_TASKS
 from olp.program.rs274.profiles.base import M_REFUSALS, NO_CODE, Act, g_codes
 from olp.program.rs274.profiles.iso import ISO
 from olp.program.text.signs import OKUMA
@@ -29,7 +30,6 @@ DIALECT = replace(
     title="Okuma mills (OSP)",
     folder_endings=("min", "nc", "tap"),
     signs=OKUMA,
-    unroller=None,
     keeper=None,
     codes=g_codes(
         unchanged=set(_UNCHANGED),
@@ -67,5 +67,6 @@ DIALECT = replace(
     inert=pattern(rb"[ \t]*(?:\$[^()%]*%?|[ON][A-Z][A-Z0-9]*(?:[ \t]*\([^)]*\))?)[ \t]*"),
     languages=frozenset({"Okuma OSP"}),
     program_number=False,
+    language=USER_TASKS,
     path_mode="G64 of the control, unless a high-speed function is on",
 )

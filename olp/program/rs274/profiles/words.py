@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
-from typing import Any, Protocol
+from collections.abc import Iterator, Mapping
+from typing import Protocol
 
 from olp.program.dialect import Row, Support
 from olp.program.rs274.block_text import BlockText
 from olp.program.rs274.commands import Commands
+from olp.program.rs274.flatten.language import Language
 
 _LOST = "may move the axes: no position is known behind it, until X, Y and Z have been commanded"
 _UNROLL = "unroll the program with --flatten"
@@ -30,7 +31,8 @@ class Control(Protocol):
     @property
     def inert(self) -> re.Pattern[bytes] | None: ...
     @property
-    def unroller(self) -> Callable[..., Any] | None: ...
+    def language(self) -> Language: ...
+    def unrolls_m(self, code: int) -> bool: ...
 
 
 def word_rows(profile: Control) -> Iterator[Row]:
@@ -58,7 +60,7 @@ def _m_codes(profile: Control) -> Iterator[Row]:
     if profile.m61_sets_tool:
         yield Row("M61 Q", Support.READ, "Q is the tool in the spindle")
     for m, why in sorted(profile.m_refusals.items()):
-        remedy = f"; {_UNROLL}" if profile.unroller is not None else ""
+        remedy = f"; {_UNROLL}" if profile.unrolls_m(m) else ""
         yield Row(f"M{m / 10:g}", Support.REFUSED, f"{why}{remedy}")
     yield Row("any other M", Support.READ, _LOST)
 
@@ -79,10 +81,12 @@ def _lines(profile: Control) -> Iterator[Row]:
     yield Row("% and O with a number", Support.UNCHANGED)
     if profile.inert is not None:
         yield Row("names of programs, labels alone in a line", Support.UNCHANGED)
-    if profile.unroller is not None:
-        yield Row("# [ ] IF WHILE GOTO O-words", Support.REFUSED, f"parameters and flow; {_UNROLL}")
-    else:
-        yield Row("variables, CALL, IF, GOTO", Support.REFUSED, "are not read; post the program without them")
+    tasks = profile.language.user_tasks
+    flow = "= [ ] IF GOTO CALL RTS" if tasks else "# [ ] IF WHILE GOTO O-words"
+    yield Row(flow, Support.REFUSED, f"parameters and flow; {_UNROLL}")
+    if tasks:
+        why = "calls after each move, and values that the control has; post the moves"
+        yield Row("MODIN MODOUT, variables V... but VC", Support.REFUSED, why)
 
 
 def _lines_of_commands(profile: Control) -> Iterator[Row]:
