@@ -27,6 +27,8 @@ from olp.workflows.session import Session
 INSTALLED = (Path("/usr/share/linuxcnc/ncfiles"), Path("/usr/share/doc/linuxcnc/examples"))
 CORPUS = {"gcode_cncjs": "grbl", "gcode_fanuc": "fanuc", "gcode_fanuc_haas_nist": "haas"}
 LARGEST = 300_000
+#: bytes of a program of the corpus that the count looks at, at most: larger ones are of the same machines
+LARGEST_COUNTED = 100_000
 TOOLS = dict.fromkeys(range(1, 100), (0.0, 0.0, 0.0))
 _COMMENT = re.compile(rb"\([^)]*\)|;[^\r\n]*")
 _PARAMETRIC = re.compile(rb"(?im)#|^\s*(?:n\d+)?\s*o\s*[<\d\[]|\bm\s*0*9[78]\b|\bg\s*0*6[56]\b|goto|while")
@@ -59,23 +61,30 @@ def setup(folder: Path, control: str) -> Path:
     offsets = {f"G{n}": {"Z_mm": 0.0, "set_by": "true"} for n in (*range(54, 60), 59.1, 59.2, 59.3)}
     recipe = machines.Recipe(controller=control, travel=((-9e4, 9e4),) * 3, tools=tools, work_offsets=offsets)
     machine = machines.zero_machine(folder / control, recipe)
+    # `X0Y50` is beside `X50.Y0` in those of the corpus
+    text = machine.read_text()
+    machine.write_text(text.replace('decimal_point = "increment"', 'decimal_point = "calculator"'))
     job = machine.with_name("job.toml")
     start = "start_mm = { X = 0.0, Y = 0.0, Z = 0.0 }\n"
     job.write_text(f'schema = "olp-job-1"\nmachine = "machine.toml"\n{start}')
     return job
 
 
-def reading(path: Path, job: Path, *, flatten: bool = True) -> str:
-    """Why a program is refused, with its code; empty where it is read."""
+def reading(path: Path, job: Path) -> str:
+    """Why a program is refused with `--flatten`, and with `--expand-cycles` too; empty where it is read."""
     session = Session.start(job.with_name("machine.toml"), job)
     source = session.sources.source(path)
-    try:
-        source.load()
-        options = UnrollOptions(flatten=flatten, expand_cycles=True)
-        refusals.read(session.sources, source, *session.reading(source), None, options, words=False)
-    except OlpError as error:
-        return str(error)
-    return ""
+    why = ""
+    for expand in (False, True):
+        try:
+            source.load()
+            options = UnrollOptions(flatten=True, expand_cycles=expand)
+            refusals.read(session.sources, source, *session.reading(source), None, options, words=False)
+        except OlpError as error:
+            why = why or str(error)
+        else:
+            return ""
+    return why
 
 
 def runs(path: Path) -> bool:
@@ -97,6 +106,20 @@ def refused_that_run() -> tuple[int, dict[str, str]]:
             if parametric(path.read_bytes()) and runs(path):
                 count += 1
                 if reason := reading(path, job):
+                    why[path.name] = reason
+    return count, why
+
+
+def refused_of_corpus(corpus: Path) -> tuple[int, dict[str, str]]:
+    """How many parametric programs the corpus has, large ones left out, and the names of those that are
+    refused, each with its reasons."""
+    count, why = 0, {}
+    with tempfile.TemporaryDirectory() as folder:
+        jobs = {control: setup(Path(folder), control) for control in CORPUS.values()}
+        for path, control in of_corpus(corpus):
+            if path.stat().st_size <= LARGEST_COUNTED and parametric(path.read_bytes()):
+                count += 1
+                if reason := reading(path, jobs[control]):
                     why[path.name] = reason
     return count, why
 
