@@ -82,6 +82,8 @@ SOLVERS = (
         bends=True,
     ),
 )
+#: the overlapping solver alone
+STRAIGHT = (Candidate(SOLVERS[0], 0.0),)
 #: exact stops, for where the others fail
 LAST = Solver(
     EXACT_STOP,
