@@ -131,9 +131,12 @@ def compare(
 
 
 def _ends(route: Route) -> tuple[Index, Array]:
-    """(m,) lines of a route in order, and (m + 1, 3) the start of the route and the end of each line."""
+    """(m,) lines of a route in order, and (m + 1, 4) the start of the route and the end of each line, with
+    the distance along the route: a full circle ends where it begins."""
     last = np.flatnonzero(np.diff(route.line, append=-1))
-    return route.line[last], route.point_mm[np.concatenate(([0], last + 1))]
+    step = np.sqrt((np.diff(route.point_mm, axis=0) ** 2).sum(axis=1))
+    along = np.concatenate(([0.0], np.cumsum(step)))
+    return route.line[last], np.column_stack((route.point_mm, along))[np.concatenate(([0], last + 1))]
 
 
 def partners(nominal_mm: Array, corrected_mm: Array) -> Index | None:
@@ -147,7 +150,7 @@ def partners(nominal_mm: Array, corrected_mm: Array) -> Index | None:
         return None
     partner = np.zeros(count, np.int64)
     i = j = 0
-    offset = np.zeros(3) if not count else corrected_mm[0] - nominal_mm[0]
+    offset = np.zeros(nominal_mm.shape[1]) if not count else corrected_mm[0] - nominal_mm[0]
     while i < count:
         span = min(_RUN, count - i, len(corrected_mm) - j)
         away = corrected_mm[j : j + span] - nominal_mm[i : i + span]

@@ -139,6 +139,18 @@ def test_moves_of_other_axes_are_a_finding(job: Path, tmp_path: Path) -> None:
     assert (row["severity"], row["lines"]) == ("warning", [2])
 
 
+def test_full_circles_are_compared_with_their_quarters_and_not_with_a_jog(job: Path, tmp_path: Path) -> None:
+    quarters = (
+        "G1 X9.996\nG3 X0 Y10 I-10 J0\nG1 Y9.996\nG3 X-10 Y0 I0 J-10\nG3 X0 Y-10 I10 J0\nG3 X10 Y0 I0 J10\n"
+    )
+    head, end = "G64 P0.02\nG1 X10 F900\n", "G1 X20\nM2\n"
+    nominal = program(tmp_path, head + "G3 X10 Y0 I-10 J0\n" * 3 + end, "n.ngc")
+    report = report_of(program(tmp_path, head + quarters * 3 + end), "-j", job, "--nominal", nominal)
+    rows = {row["line"]: row for row in report["nominal"]["differences"]}
+    for line in (3, 4, 5):
+        assert rows[line]["corrected_s"] == pytest.approx(rows[line]["nominal_s"], rel=0.02)
+
+
 # -- the trajectory --------------------------------------------------------------------------------------
 
 
