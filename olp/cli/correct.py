@@ -62,6 +62,7 @@ LAST_DIGITS_UM = 10.0
 @outside_box_option("refuse the program", "take the error at the box's face")
 @contour_option
 @click.option("--split-rapids", is_flag=True, help="Split rapids like feed moves.")
+@click.option("--times", is_flag=True, help="Also state how long both programs take, as olp retime plans.")
 @report_option()
 @click.option("--review", "review_file", metavar="review.html", help="Also write the page of olp view.")
 @layout_options("Layout of the columns of a list of positions.", "Unit of X, Y and Z in a list.")

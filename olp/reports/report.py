@@ -57,6 +57,7 @@ def to_text(report: Report) -> str:
         _deviation(report),
         _budget(report),
         _moves(report),
+        _time(report),
         _sources(report),
         _worst(report),
         uncertainty_text(report),
@@ -144,6 +145,22 @@ def _part(report: Report, *keys: str) -> Report:
     for key in keys:
         report = report.get(key) or {}
     return report
+
+
+def time_text(report: Report) -> str:
+    """How long both programs take; empty where that was not asked."""
+    time = report.get("time")
+    if not time:
+        return ""
+    nominal, corrected = float(time["nominal_s"]), float(time["corrected_s"])
+    share = f"{100.0 * float(time['share']):+.3f} %"
+    return f"nominal program {nominal:.3f} s, corrected program {corrected:.3f} s ({share})"
+
+
+def _time(report: Report) -> Iterator[str]:
+    text = time_text(report)
+    if text:
+        yield f"Time, planned: {text}"
 
 
 def _heads(report: Report) -> Iterator[str]:

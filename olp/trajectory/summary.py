@@ -131,8 +131,8 @@ def compare(
 
 
 def _ends(route: Route) -> tuple[Index, Array]:
-    """(m,) lines of a route in order, and (m + 1, 4) the start of the route and the end of each line, with
-    the distance along the route: a full circle ends where it begins."""
+    """(m,) lines of a route in order, and (m + 1, 4) the start of the route and the end of each line. The
+    last column is the distance along the route, as a full circle ends where it begins."""
     last = np.flatnonzero(np.diff(route.line, append=-1))
     step = np.sqrt((np.diff(route.point_mm, axis=0) ** 2).sum(axis=1))
     along = np.concatenate(([0.0], np.cumsum(step)))

@@ -55,11 +55,12 @@ if TYPE_CHECKING:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CorrectOptions(ProofOptions):
     """The options of `correct`. Under cutter compensation a `contour` is written as one, or as the path of
-    the tool without compensation."""
+    the tool without compensation. With `times` both programs are planned in time."""
 
     outside_box: Outside = "refuse"
     split_rapids: bool = False
     contour: Literal["contour", "path"] = "contour"
+    times: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,6 +120,7 @@ def correct(
     peck_clearance_mm: float | None = None,
     contour: Literal["contour", "path"] = "contour",
     split_rapids: bool = False,
+    times: bool = False,
     part_tolerance_um: float | None = None,
     only_sure_components: bool = False,
     date: datetime.date | None = None,
@@ -132,7 +134,8 @@ def correct(
     `flatten` loops, subprograms and expressions are unrolled first, with `expand_cycles` canned cycles are
     written out. `peck_clearance_mm` is the clearance above the last peck, for controls where it is a
     parameter. Under cutter compensation (G41, G42) a contour is written from which the control makes the
-    corrected path of the tool; with `contour` "path" that path is written, without compensation.
+    corrected path of the tool; with `contour` "path" that path is written, without compensation. With `times`
+    the report states how long both programs take, as `retime` plans them, which takes as long as twice that.
 
     Where the calibration states uncertainties, the report gives the probability that the tip is within
     `part_tolerance_um` (default: the job's; without any there is no probability). With
@@ -143,7 +146,7 @@ def correct(
     session, source = opened(program, machine, job)
     options = CorrectOptions(
         tolerance_um=tolerance_um, outside_box=outside_box, flatten=flatten, expand_cycles=expand_cycles,
-        peck_clearance_mm=peck_clearance_mm, contour=contour, split_rapids=split_rapids,
+        peck_clearance_mm=peck_clearance_mm, contour=contour, split_rapids=split_rapids, times=times,
         part_tolerance_um=part_tolerance_um, only_sure_components=only_sure_components, date=date,
         accept=tuple(accept),
     )  # fmt: skip
@@ -157,7 +160,32 @@ def run(
     with program.errors():
         loaded = session.loaded(options.outside_box, only_sure=options.only_sure_components)
         done = corrected(session.sources, program, loaded, options, progress or silent)
-    return Correction.of(done, session.inputs())
+    result = Correction.of(done, session.inputs())
+    if options.times:
+        result.report["time"] = _times(session, program, result, options, progress)
+    return result
+
+
+def _times(
+    session: Session, program: Source, result: Correction, options: CorrectOptions, tell: Progress | None
+) -> dict[str, float]:
+    """Seconds of the nominal and of the corrected program, and what the correction adds as a share."""
+    from olp.workflows.retime import RetimeOptions
+    from olp.workflows.retime import run as retimed
+
+    asked = RetimeOptions(
+        date=options.date, accept=options.accept, flatten=options.flatten,
+        expand_cycles=options.expand_cycles, peck_clearance_mm=options.peck_clearance_mm,
+    )  # fmt: skip
+    nominal, corrected = (
+        retimed(session, program.holding(data), asked, progress=tell).duration_s
+        for data in (result.nominal, result.plain)
+    )
+    return {
+        "nominal_s": nominal,
+        "corrected_s": corrected,
+        "share": corrected / nominal - 1.0 if nominal else 0.0,
+    }
 
 
 def corrected(

@@ -100,7 +100,7 @@ def test_what_is_missing_is_asked_for(args: list[str | Path]) -> None:
 
 
 def test_options_reach_the_library(mill: Path, library: Fake) -> None:
-    flags = ["--flatten", "--expand-cycles", "--contour", "path", "--split-rapids"]
+    flags = ["--flatten", "--expand-cycles", "--contour", "path", "--split-rapids", "--times"]
     flags += ["--only-sure-components", "--part-tolerance-um", "7.5"]
     options = ["--tolerance-um", "2.5", "--outside-box", "hold", "--date", "2027-01-31"]
     options += ["--accept", "OLP409,OLP401", "--accept", "OLP440"]
@@ -109,8 +109,8 @@ def test_options_reach_the_library(mill: Path, library: Fake) -> None:
     assert passed.pop("date").isoformat() == "2027-01-31"
     assert passed == {
         "tolerance_um": 2.5, "outside_box": "hold", "flatten": True, "expand_cycles": True, "contour": "path",
-        "split_rapids": True, "peck_clearance_mm": None, "progress": None, "part_tolerance_um": 7.5,
-        "only_sure_components": True, "accept": ("OLP409", "OLP401", "OLP440"),
+        "split_rapids": True, "times": True, "peck_clearance_mm": None, "progress": None,
+        "part_tolerance_um": 7.5, "only_sure_components": True, "accept": ("OLP409", "OLP401", "OLP440"),
     }  # fmt: skip
     run("correct", "-j", mill / "job.toml", "--force")
     assert library.calls[1][1]["date"] is None, "no run reads the clock"

@@ -139,6 +139,20 @@ def test_moves_of_other_axes_are_a_finding(job: Path, tmp_path: Path) -> None:
     assert (row["severity"], row["lines"]) == ("warning", [2])
 
 
+def test_a_correction_states_what_it_costs_in_time(tmp_path: Path) -> None:
+    words = ("correct", "-j", PROGRAMS / "nasty" / "job.toml", "-o", tmp_path / "c.ngc", "--times")
+    result = run(*words, "--report", tmp_path / "r.json")
+    assert result.exit_code == 0
+    time = json.loads((tmp_path / "r.json").read_text())["time"]
+    report = report_of(tmp_path / "c.ngc", "-m", BED, "--nominal", PROGRAMS / "nasty" / "modal.ngc")
+    assert time == {
+        "nominal_s": report["nominal"]["duration_s"], "corrected_s": report["duration_s"],
+        "share": report["duration_s"] / report["nominal"]["duration_s"] - 1.0,
+    }  # fmt: skip
+    assert abs(time["share"]) <= 0.002
+    assert f"Time, planned: nominal program {time['nominal_s']:.3f} s" in result.stdout
+
+
 def test_full_circles_are_compared_with_their_quarters_and_not_with_a_jog(job: Path, tmp_path: Path) -> None:
     quarters = (
         "G1 X9.996\nG3 X0 Y10 I-10 J0\nG1 Y9.996\nG3 X-10 Y0 I0 J-10\nG3 X0 Y-10 I10 J0\nG3 X10 Y0 I0 J10\n"
