@@ -13,14 +13,13 @@ from olp.compensation.point_writer import PointWriter
 from olp.compensation.rows import Rows
 from olp.compensation.writer import Task
 from olp.core.arrays import Array, Index, Mask
-from olp.core.toolpath import Flag
+from olp.core.errors import ProgramError
+from olp.core.toolpath import Flag, Kind
 from olp.core.values import dataclass
-from olp.program.robots.dialect import RobotDialect
-from olp.program.robots.targets import NOWHERE, Target, Use
+from olp.program.robots.dialect import Replacement, RobotDialect
+from olp.program.robots.targets import NOWHERE, Part, Target, Use
 from olp.program.text.numbers import MOST_DECIMALS, number, spliced, written
 
-#: Bytes of the text from one position up to another, and what replaces them.
-Replacement = tuple[int, int, bytes]
 #: A number that is nearer to what is wanted than this share of its last digit is right.
 _RIGHT = 0.5 + 1e-6
 _NAMES = re.compile(rb"[A-Za-z_]\w*")
@@ -54,16 +53,20 @@ class TargetWriter(PointWriter):
         self.dialect, self.stated = program.dialect, program.targets
         # the writer puts the stamp where the language has it
         self._stamp, self.stamp = self.stamp, b""
-        self._names: set[bytes] | None = None
+        self._names: set[str] = set()
+        self._clones = 0
 
     def _rewritten(self, rows: Rows, begin: int, end: int) -> bytes | None:
         last = np.append(rows.move[1:] != rows.move[:-1], True)[: len(rows)]
         wanted = self._wanted(rows)
         edits = [*self._targets(rows, np.flatnonzero(last & wanted.stated), wanted),
                  *self._parts(rows, np.flatnonzero(~last & wanted.stated), wanted)]  # fmt: skip
+        blocks = self.tally.inserted_blocks - self._clones
         if self._stamp and (edits or self.stamp_always):
-            place = self.dialect.stamp_place(self.program.data)
-            edits.append((place, place, self._stamp + self.program.eol(1)))
+            edits.append(self.dialect.stamped(self.program, self._stamp))
+            blocks += 1
+        if blocks:
+            edits += self.dialect.counted(self.program, blocks)
         return spliced(self.program.data, edits) if edits else None
 
     def _wanted(self, rows: Rows) -> _Wanted:
@@ -147,29 +150,23 @@ class TargetWriter(PointWriter):
         texts = self._numbers(target, group[0], wanted, target.point)
         numbers = [(a - first, b - first, text) for (a, b), text in zip(target.numbers, texts, strict=True)]
         name = self._new_name(target)
-        place, text = self.dialect.clone(
-            self.program, target, name, spliced(data[slice(*target.value)], numbers)
-        )
-        edits = [(place, place, text)]
+        text = spliced(data[slice(*target.value)], numbers)
+        edits = [self.dialect.clone(self.program, target, name, text)]
         for row in group:
             named = self._use(rows, row).named
             assert named != NOWHERE
             edits.append((*named, name.encode()))
         self.tally.inserted_blocks += 1
+        self._clones += 1
         return edits
 
     def _new_name(self, target: Target) -> str:
         """A name that the text does not have, made from that of a target."""
-        if self._names is None:
-            self._names = {word.upper() for word in _NAMES.findall(self.program.data)}
-        number = 1
-        while True:
-            tail = f"_olp{number}"
-            name = target.name[: self.dialect.longest_name - len(tail)] + tail
-            if name.upper().encode() not in self._names:
-                self._names.add(name.upper().encode())
-                return name
-            number += 1
+        if not self._names:
+            self._names = {word.decode("latin-1").upper() for word in _NAMES.findall(self.program.data)}
+        name = self.dialect.named(self.program, target, self._names)
+        self._names.add(name.upper())
+        return name
 
     # -- parts ---------------------------------------------------------------------------------------
 
@@ -184,14 +181,23 @@ class TargetWriter(PointWriter):
             value = np.rint((wanted.value[row] + shift) * scale)
             reached = (value / scale - shift)[None]
             rows.emitted[row] = self.placed(reached, self.path.frame[move : move + 1])[0]
+            if rows.take_up[row] and self.path.flag[move] & np.uint8(Flag.WHOLE):
+                raise ProgramError(
+                    "an axis turns round at the begin of this move, and another axis moves in it, so no step "
+                    "that takes up backlash can be put before it; make it two moves",
+                    line=int(self.path.line[move]),
+                    code="OLP561",
+                )
             texts = [
                 self._number(target.numbers[k], float(value[k] / scale[k]), int(wanted.decimals[row, k]))
                 for k in range(3)
             ]
             share = float(self.plan.reach[rows.first + row])
-            stop = bool(rows.take_up[row])
-            text = self.dialect.part(self.program, move, use, texts, share, stop=stop)
-            edits.append((use.statement[0], use.statement[0], text))
+            # a step that takes up backlash has to be reached
+            stop = bool(rows.take_up[row] or self.path.kind[move] == Kind.RAPID)
+            name = self._new_name(target) if self.dialect.names_parts else ""
+            part = Part((texts[0], texts[1], texts[2]), share, stop, name)
+            edits += self.dialect.part(self.program, move, use, part)
             self.tally.inserted_blocks += 1
         return edits
 

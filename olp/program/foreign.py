@@ -102,7 +102,13 @@ FOREIGN = (
         language=True,
         how="and was read as another language",
     ),
-    Foreign("FANUC TP", _line(rb"/(?:PROG|ATTR|MN|POS)\b|\d*:[ \t]*[JLC][ \t]+PR?\["), _ROBOT, language=True),
+    Foreign(
+        "FANUC TP",
+        _line(rb"/(?:PROG|ATTR|MN|POS)\b|\d*:[ \t]*[JLC][ \t]+PR?\["),
+        _NAME_IT.replace("sinumerik", "fanuc-tp"),
+        language=True,
+        how="and was read as another language",
+    ),
     Foreign(
         "Stäubli VAL 3",
         re.compile(rb"(?im)<Program[^>]*staubli|^[ \t]*begin[ \t]*\r?\n[ \t]*move[jlc]\("),

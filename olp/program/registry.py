@@ -48,6 +48,7 @@ _KNOWN = {
     "apt": Known("olp.program.apt.dialect", signs.APT),
     "dmis": Known("olp.program.dmis.dialect", signs.DMIS),
     "list": Known("olp.program.pointlist.dialect", signs.LISTS),
+    "fanuc-tp": Known("olp.program.robots.ls.dialect", signs.LS),
     "abb-rapid": Known("olp.program.robots.rapid.dialect", signs.RAPID),
 }
 #: Files of `olp/program/described/shipped` that describe a dialect, without their ending.

@@ -61,6 +61,15 @@ def _karel(values: Sequence[float], digits: int) -> str:
     return f"{name} = POS({_list(values, digits)},0,180,0,config)\nMOVE TO {name}"
 
 
+def _tp(values: Sequence[float], digits: int) -> str:
+    """A move, and its position in a part of its own."""
+    x, y, z = (f"{v:.{digits}f}" for v in values)
+    name = f"P[{next(_positions)}]"
+    head = "\n GP1:\n UF : 1, UT : 1, CONFIG : 'N U T, 0, 0, 0',\n"
+    point = f" X = {x} mm, Y = {y} mm, Z = {z} mm,\n W = 0 deg, P = 0 deg, R = 0 deg\n"
+    return f"   1:L {name} 100mm/sec FINE ;\n/POS\n{name}{{{head}{point}}};\n/MN"
+
+
 def _rapid(values: Sequence[float], digits: int) -> str:
     rest = "[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]"
     return f"MoveL [[{_list(values, digits)}],{rest}],v100,fine,rod\\WObj:=G54;"
@@ -209,6 +218,22 @@ CASES = {
         ),
         support=frozenset({"corrected", "carried", "refused"}),
     ),
+    "fanuc-tp": Case(
+        "fanuc-tp", "fanuc-tp", "LJCP[]RUFTXYZW:;,.='{}+-/MNGCOS 0123456789\r\n\t!*",
+        ["/PROG T", "/ATTR", "/MN"], ["/END"],
+        _tp, None, lambda text: f"   1:  !{text} ;",
+        re.compile(rb"X = (" + NUMBER + rb") mm, Y = (" + NUMBER + rb") mm, Z = (" + NUMBER + rb") mm"),
+        ("fanuc_ls/*",),
+        (
+            b"/PROG A\n/MN\n 1:J P[1] 10% FINE ;\n/POS\nP[1]{\n GP1:\n UF : 0, UT : 0,"
+            b" CONFIG : 'N U T, 0, 0, 0',\n X = 1 mm, Y = 2 mm, Z = 3 mm, W = 0 deg, P = 0 deg, R = 0 deg\n};\n",
+            b"/MN\n1:",
+            b"/PROG A\n/MN\n 1:L P[1] 10mm/sec FINE ;\n/POS\nP[1]{\n GP1:\n UF : 0, UT : 0,\n J1= 1 deg\n};",
+            b"/PROG A\n/MN\n 1:  UFRAME_NUM=1 ;\n 2:  PR[1,1]=5 ;\n 3:L PR[1] 10mm/sec FINE ;\n",
+            b"/PROG A\n/MN\n 1:  IF (R[1]=1) THEN ;\n 2:  ENDIF ;\n 3:  ! don't ;\n",
+            b"/PROG A\n/MN\n 4:C P[1]\n  :  P[2] FINE ;",
+        ),
+    ),
     "abb-rapid": Case(
         "abb-rapid", "abb-rapid", "MoveLJROCVabsptw[](),;:=!\\{}%\"+-. 0123456789\r\n\tEN",
         ["MODULE T", "PERS tooldata rod:=[TRUE,[[0,0,-120],[1,0,0,0]],[1,[0,0,1],[1,0,0,0],0,0,0]];",
@@ -229,5 +254,5 @@ CASES = {
 #: Named frames of the test's machines.
 FRAMES = {
     name: {"X_mm": 250.0, "Y_mm": 200.0, "Z_mm": -300.0, "set_by": "true"}
-    for name in ("G54", "MCS", "A", "CSYS2", "CSYS3")
+    for name in ("G54", "MCS", "A", "CSYS2", "CSYS3", "UFRAME1")
 }

@@ -12,8 +12,6 @@ from olp.program.foreign import FOREIGN, LOOKED_AT, recognised
 MILL = PROGRAMS / "haas-mill"
 TEXTS = {
     "KUKA KRL": (b"&ACCESS RVP\nDEF part()\nPTP {X 10, Y 0, Z 5}\nLIN P2\nEND\n", 1),
-    "ABB RAPID": (b"MODULE M\n PROC main()\n MoveL p1, v100, fine, tool0;\n ENDPROC\nENDMODULE\n", 1),
-    "FANUC TP": (b"/PROG TEST\n/ATTR\n/MN\n 1:J P[1] 100% FINE ;\n/POS\n/END\n", 1),
     "UR script": (b"def part():\n  movej(p[0.1, 0, 0, 0, 0, 0], a=1.4)\nend\n", 1),
     "Yaskawa": (b"/JOB\n//NAME TEST\nNOP\nMOVJ C00000 VJ=50\nEND\n", 1),
     "VAL 3": (b"begin\n  movej(pA,flange,mNomSpeed)\nend\n", 1),
@@ -94,13 +92,13 @@ SIGNS = {
         b"DEFFCT a_1 (b)\r\n",
         b"PTP {X 1}\n", b"LIN_REL {\n", b"CIRC XP1\n", b"lin\tX_1\n", b"PTP XHOME Vel\n",
     ),
-    ("ABB RAPID", ROBOT, "OLP501"): (
+    ("ABB RAPID", NAMED.replace("sinumerik", "abb-rapid"), "OLP501"): (
         b"%%% VERSION:1", b"%%%\n VERSION", b"MODULE a\n", b"module a_1 (SYSMODULE)\n", b"PROC main()\n",
         b"proc a (num b)\n",
         b"MoveL p1, v1", b"movej [[1", b"MoveC p1 ,p2", b"MoveAbsJ a,", b"CONST robtarget p",
         b"pers tooldata t", b"VAR\trobtarget p",
     ),
-    ("FANUC TP", ROBOT, "OLP501"): (
+    ("FANUC TP", NAMED.replace("sinumerik", "fanuc-tp"), "OLP501"): (
         b"/PROG A", b"/ATTR\n", b"/MN", b"/pos\n", b"1:J P[1]", b"  12: L PR[1]", b":C P[", b"1:\tj  P[2]",
     ),
     ("Stäubli VAL 3", ROBOT, "OLP501"): (
@@ -132,7 +130,7 @@ SIGNS = {
     ),
 }  # fmt: skip
 #: Languages that are read by another dialect.
-READ = ("Sinumerik (Siemens)", "Okuma OSP")
+READ = ("Sinumerik (Siemens)", "Okuma OSP", "ABB RAPID", "FANUC TP")
 LANGUAGES = (
     "KUKA KRL", "ABB RAPID", "FANUC TP", "Stäubli VAL 3", "Mazatrol",
     "UR script",

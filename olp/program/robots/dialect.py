@@ -2,34 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from olp.core.values import dataclass
 from olp.program.dialect import StatementDialect
 from olp.program.program import Program
-from olp.program.robots.targets import Target, Use
+from olp.program.robots.targets import Part, Target, Use
+
+#: Bytes of the text from one position up to another, and what replaces them.
+Replacement = tuple[int, int, bytes]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RobotDialect(StatementDialect):
-    """A language of robots. `decimals` are the fewest of a number that is changed, `longest_name` the
-    characters that a name may have."""
+    """A language of robots. `decimals` are the fewest of a number that is changed. With `names_parts` the
+    target of a part of a move needs a name."""
 
     decimals: int
-    longest_name: int
+    names_parts: bool = False
 
-    def stamp_place(self, data: bytes) -> int:
-        """Where the stamp of a correction is put as a line of its own."""
+    def stamped(self, program: Program, stamp: bytes) -> Replacement:
+        """The stamp of a correction as a line of its own."""
         raise NotImplementedError
 
-    def part(
-        self, program: Program, move: int, use: Use, numbers: Sequence[bytes], share: float, *, stop: bool
-    ) -> bytes:
-        """The statements of a part of a move that ends at a share of it, with or without a `stop` there, with
-        the line end and the blanks that come before the move itself."""
+    def named(self, program: Program, target: Target, taken: set[str]) -> str:
+        """A name for a clone of a target that no other has, `taken` in capitals among them."""
         raise NotImplementedError
 
-    def clone(self, program: Program, target: Target, name: str, text: bytes) -> tuple[int, bytes]:
-        """The declaration of a target again, under another name and with another value; and where it is
-        put."""
+    def part(self, program: Program, move: int, use: Use, part: Part) -> list[Replacement]:
+        """What states a part of a move before its end."""
         raise NotImplementedError
+
+    def clone(self, program: Program, target: Target, name: str, text: bytes) -> Replacement:
+        """The declaration of a target again, under another name and with another value."""
+        raise NotImplementedError
+
+    def counted(self, program: Program, blocks: int) -> list[Replacement]:
+        """Counts of the text, where so many statements were inserted."""
+        return []

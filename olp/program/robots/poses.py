@@ -111,6 +111,15 @@ def of_zyx(angles_deg: Sequence[float]) -> Quaternion:
     return turn if any(angles_deg) else NO_TURN
 
 
+def zyx_of(a: Quaternion) -> Vector:
+    """The angles in degrees whose Rz(first) Ry(second) Rx(third) is a rotation."""
+    rows = matrix(a)
+    first, third = np.arctan2(rows[1, 0], rows[0, 0]), np.arctan2(rows[2, 1], rows[2, 2])
+    second = np.arctan2(-rows[2, 0], np.hypot(rows[0, 0], rows[1, 0]))
+    x, y, z = np.degrees([first, second, third]).tolist()
+    return (x, y, z)
+
+
 def matrix(a: Quaternion) -> Array:
     """(3, 3) the rotation as a matrix."""
     turn = turn_of(a)

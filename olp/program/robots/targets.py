@@ -53,3 +53,14 @@ class Targets:
 
     targets: tuple[Target, ...]
     uses: tuple[Use | None, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A part of a move that ends before it: its three `numbers`, the `share` of the move where it ends,
+    whether the robot stops there, and the `name` of its target where the language needs one."""
+
+    numbers: tuple[bytes, bytes, bytes]
+    share: float
+    stop: bool
+    name: str

@@ -88,3 +88,7 @@ RAPID = Signs(
         rb"(?:(?:LOCAL|TASK)[ \t]+)?(?:CONST|PERS|VAR)[ \t]+\w+[ \t]+\w+)"
     ),
 )
+LS = Signs(
+    ("ls",),
+    own=pattern(rb"(?im)^[ \t]*(?:/(?:PROG|ATTR|MN|POS)\b|\d*:[ \t]*[JLCAS][ \t]+PR?\[)"),
+)

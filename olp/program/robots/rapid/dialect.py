@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from itertools import count
 
 import numpy as np
 
 from olp.core.patterns import pattern
 from olp.core.values import dataclass
 from olp.program.program import Program
-from olp.program.robots.dialect import RobotDialect
+from olp.program.robots.dialect import Replacement, RobotDialect
 from olp.program.robots.poses import between
 from olp.program.robots.rapid.reader import read
 from olp.program.robots.rapid.table import TABLE
 from olp.program.robots.rapid.values import ROBTARGET
-from olp.program.robots.targets import Target, Use
+from olp.program.robots.targets import Part, Target, Use
 from olp.program.text.numbers import spliced
 from olp.program.text.signs import RAPID
 
 _MODULE = pattern(rb"(?im)^[ \t]*MODULE\s+\w+(?:\s*\([^)]*\))?[^\r\n]*(?:\r\n|\n|\r|\Z)")
 _DECLARED_NAME = pattern(rb"(?is)((?:(?:LOCAL|TASK)\s+)?(?:CONST|PERS|VAR)\s+robtarget\s+)\w+")
+#: Characters that a name may have.
+_LONGEST_NAME = 32
 #: A zone through which the robot passes without a stop.
 _PASSED = b"z0"
 #: A zone at which it stops: a step that takes up backlash is smaller than any other.
@@ -33,25 +35,33 @@ class Rapid(RobotDialect):
     def continues(self, line: bytes) -> bool:
         return False
 
-    def stamp_place(self, data: bytes) -> int:
-        match = _MODULE.search(data)
-        return 0 if match is None else match.end()
+    def stamped(self, program: Program, stamp: bytes) -> Replacement:
+        match = _MODULE.search(program.data)
+        place = 0 if match is None else match.end()
+        return place, place, stamp + program.eol(1)
 
-    def part(
-        self, program: Program, move: int, use: Use, numbers: Sequence[bytes], share: float, *, stop: bool
-    ) -> bytes:
+    def named(self, program: Program, target: Target, taken: set[str]) -> str:
+        for number in count(1):
+            tail = f"_olp{number}"
+            name = target.name[: _LONGEST_NAME - len(tail)] + tail
+            if name.upper() not in taken:
+                return name
+        raise AssertionError
+
+    def part(self, program: Program, move: int, use: Use, part: Part) -> list[Replacement]:
         data, targets = program.data, program.targets
         assert targets is not None
         target, (begin, end) = targets.targets[use.target], use.statement
-        value = self._value(program, target, numbers, use, share)
+        value = self._value(program, target, part, use)
         edits = [(use.place[0] - begin, use.place[1] - begin, value)]
-        edits.append((use.zone[0] - begin, use.zone[1] - begin, _STOP if stop else _PASSED))
+        edits.append((use.zone[0] - begin, use.zone[1] - begin, _STOP if part.stop else _PASSED))
         line = int(program.toolpath.line[move])
         lead = data[int(program.line_start[line - 1]) : begin]
         blanks = lead if not lead.strip() else b""
-        return spliced(data[begin:end], edits) + b";" + program.eol(line) + blanks
+        text = spliced(data[begin:end], edits) + b";" + program.eol(line) + blanks
+        return [(begin, begin, text)]
 
-    def clone(self, program: Program, target: Target, name: str, text: bytes) -> tuple[int, bytes]:
+    def clone(self, program: Program, target: Target, name: str, text: bytes) -> Replacement:
         data = program.data
         begin, end = target.declaration
         lead = _DECLARED_NAME.match(data, begin, end)
@@ -59,17 +69,20 @@ class Rapid(RobotDialect):
         line = int(program.line_start[target.line - 1])
         blanks = data[line:begin] if not data[line:begin].strip() else b""
         eol, last = program.eol(target.line), int(np.searchsorted(program.line_end, end + 1))
-        return int(program.line_end[last]), eol + blanks + lead[1] + name.encode() + b":=" + text + b";"
+        place = int(program.line_end[last])
+        return place, place, eol + blanks + lead[1] + name.encode() + b":=" + text + b";"
 
     @staticmethod
-    def _value(program: Program, target: Target, numbers: Sequence[bytes], use: Use, share: float) -> bytes:
-        """A target with other numbers, and the orientation at a share of the move."""
+    def _value(program: Program, target: Target, part: Part, use: Use) -> bytes:
+        """A target with other numbers, and the orientation at the end of a part."""
         data, start = program.data, target.value[0]
-        edits = [(a - start, b - start, text) for (a, b), text in zip(target.numbers, numbers, strict=True)]
+        edits = [
+            (a - start, b - start, text) for (a, b), text in zip(target.numbers, part.numbers, strict=True)
+        ]
         if not (use.before == use.turn == target.turn):
             match = ROBTARGET.match(data, *target.value)
             assert match is not None
-            turn = between(use.before, use.turn, share)
+            turn = between(use.before, use.turn, part.share)
             spans = [match.span(k) for k in range(4, 8)]
             edits += [
                 (a - start, b - start, f"{v:.9f}".encode()) for (a, b), v in zip(spans, turn, strict=True)
@@ -88,5 +101,4 @@ DIALECT = Rapid(
     languages=frozenset(("ABB RAPID",)),
     table=TABLE,
     decimals=4,
-    longest_name=32,
 )

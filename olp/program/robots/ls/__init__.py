@@ -1,0 +1,1 @@
+"""TP programs of FANUC robots as text (LS)."""

@@ -1,0 +1,117 @@
+"""TP programs as a dialect: how a corrected program says new positions and moves."""
+
+from __future__ import annotations
+
+import re
+
+from olp.core.patterns import pattern
+from olp.core.values import dataclass
+from olp.program.program import Program
+from olp.program.robots.dialect import Replacement, RobotDialect
+from olp.program.robots.ls.reader import read
+from olp.program.robots.ls.table import TABLE
+from olp.program.robots.ls.text import line_count, lines, parts
+from olp.program.robots.poses import between, zyx_of
+from olp.program.robots.targets import Part, Target, Use
+from olp.program.text.numbers import spliced
+from olp.program.text.signs import LS
+
+_NUMBERED = pattern(rb"P\[\s*(\d+)")
+_HEAD = pattern(rb"(?m)^([ \t]*)(\d*)([ \t]*:)")
+_MAIN = pattern(rb"(?im)^[ \t]*/MN[^\r\n]*(?:\r\n|\n|\r|\Z)")
+_PLAIN_TAIL = pattern(rb"(?i)\b(?:ACC\s*\d+|PTH|Wjnt)\b")
+_END = pattern(rb"(?i)(\s)(FINE|CNT\s*\d+|CNT\s*R\[[^\]]*\]|CD\d+|CR\d+)?(\s[^;]*)?;")
+_TURN = {name: pattern(rb"\b" + name + rb"\s*=\s*([-+]?(?:\d+\.?\d*|\.\d+))") for name in (b"W", b"P", b"R")}
+#: Characters that a comment may have.
+_LONGEST_COMMENT = 32
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ls(RobotDialect):
+    """TP programs."""
+
+    def continues(self, line: bytes) -> bool:
+        return False
+
+    def stamped(self, program: Program, stamp: bytes) -> Replacement:
+        match = _MAIN.search(program.data)
+        place = 0 if match is None else match.end()
+        words = stamp.strip(b"!; ")
+        if b"accepted" not in words:
+            words = words[: _LONGEST_COMMENT - 1]
+        return place, place, b"    :  !" + words.rstrip() + b" ;" + program.eol(1)
+
+    def named(self, program: Program, target: Target, taken: set[str]) -> str:
+        if "" not in taken:
+            # the numbers of the text are found once
+            taken.add("")
+            taken |= {number.decode() for number in _NUMBERED.findall(program.data)}
+        return str(max((int(name) for name in taken if name.isdigit()), default=0) + 1)
+
+    def part(self, program: Program, move: int, use: Use, part: Part) -> list[Replacement]:
+        data, targets = program.data, program.targets
+        assert targets is not None
+        target, (begin, end) = targets.targets[use.target], use.statement
+        text = b" ".join(data[begin:end].split(b"\n"))
+        head = _HEAD.match(text)
+        assert head is not None
+        first = use.place[0] - begin
+        behind = text[use.place[1] - begin :]
+        lead = b" " * (len(head[1]) + len(head[2])) + text[head.end(2) : first]
+        ending = _END.search(behind)
+        assert ending is not None
+        kept = b"".join(b" " + word for word in _PLAIN_TAIL.findall(ending[3] or b""))
+        close = (b"FINE" if part.stop else b"CNT100") + kept
+        statement = lead + part.name.encode() + behind[: ending.end(1)] + close + b" ;"
+        value = self._value(program, target, part, use)
+        return [
+            (begin, begin, statement + program.eol(int(program.toolpath.line[move]))),
+            self.clone(program, target, part.name, value),
+        ]
+
+    def clone(self, program: Program, target: Target, name: str, text: bytes) -> Replacement:
+        place = target.declaration[1]
+        return (
+            place,
+            place,
+            program.eol(target.line) + re.sub(rb"\AP\[[^\]]*\]", b"P[" + name.encode() + b"]", text),
+        )
+
+    def counted(self, program: Program, blocks: int) -> list[Replacement]:
+        sections = parts(program.data)
+        stated = line_count(program.data, sections["ATTR"][0]) if "ATTR" in sections else None
+        count = sum(len(lines(program.data, part)) for part in sections["MN"])
+        # one that is wrong says nothing, and stays
+        if stated is None or stated[1] != count:
+            return []
+        return [(*stated[0], str(stated[1] + blocks).encode())]
+
+    @staticmethod
+    def _value(program: Program, target: Target, part: Part, use: Use) -> bytes:
+        """A position with other numbers, and the orientation at the end of a part."""
+        data, start = program.data, target.value[0]
+        edits = [
+            (a - start, b - start, text) for (a, b), text in zip(target.numbers, part.numbers, strict=True)
+        ]
+        if use.before != use.turn:
+            angles = zyx_of(between(use.before, use.turn, part.share))
+            for name, angle in zip((b"R", b"P", b"W"), angles, strict=True):
+                match = _TURN[name].search(data, target.numbers[2][1], target.value[1])
+                assert match is not None
+                edits.append((match.start(1) - start, match.end(1) - start, f"{angle:.6f}".encode()))
+        return spliced(data[slice(*target.value)], edits)
+
+
+DIALECT = Ls(
+    name="fanuc-tp",
+    title="TP (FANUC robots)",
+    path_mode="CNT",
+    reader=read,
+    signs=LS,
+    folder_endings=("ls",),
+    comment=(b"!", b" ;"),
+    languages=frozenset(("FANUC TP",)),
+    table=TABLE,
+    decimals=3,
+    names_parts=True,
+)

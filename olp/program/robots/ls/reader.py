@@ -1,0 +1,265 @@
+"""Reads TP programs of FANUC robots: moves, and the positions whose numbers can be edited.
+
+A position names its own frame and tool, so it is right wherever the program comes from.
+"""
+
+from __future__ import annotations
+
+from olp.core.errors import ProgramError
+from olp.core.machine import Setup, Vector
+from olp.core.patterns import pattern
+from olp.core.values import dataclass
+from olp.program.dialect import Dialect, Options
+from olp.program.frames import tool_vector_of
+from olp.program.program import Program
+from olp.program.robots.frames import Located, Tool
+from olp.program.robots.ls.registers import Registers
+from olp.program.robots.ls.text import Line, Position, lines, parts, positions
+from olp.program.robots.moves import RobotMoves
+from olp.program.robots.poses import Pose, of_zyx, rotated
+from olp.program.robots.targets import Use
+
+_MOVE = pattern(
+    rb"(?i)\s*([LJ])\s+(PR?)\[\s*(\d+)\s*(?::[^\]]*)?\]\s+(?:(\d+\.?\d*)\s*(mm/sec|cm/min|inch/min|%|deg/sec|"
+    rb"sec|msec)|(\S+))\s+(FINE|CNT\s*\d+|CNT\s*R\[[^\]]*\]|CD\d+|CR\d+)?(.*)"
+)
+_OTHER_MOVE = pattern(rb"(?i)\s*[CASLJ]\s+PR?\[")
+_OFFSET = pattern(rb"(?i)\b(Tool_Offset|Offset|WZVersatz|Versatz)\b\s*(?:,\s*PR\[\s*(\d+)[^\]]*\])?")
+_INCREMENT = pattern(rb"(?i)\bINC\b")
+_COORD = pattern(rb"(?i)\bCOORD\b")
+_SKIP = pattern(rb"(?i)\bSkip\b")
+#: Words of a move by which a sensor moves its target.
+_SENSED = pattern(rb"(?i)\bVOFFSET\b|\bSearch\[|\bTrack\b")
+#: Statements by which later targets are moved.
+_MOVING = pattern(
+    rb"(?i)\s*(?:Touch\s+Offset|Search\s+Start|Track\b|VISION\s+.*OFFSET|(?:TOOL_)?OFFSET\s+COND)"
+)
+_ASSIGNED = pattern(rb"(?i)\s*P\[\s*(\d+)[^\]]*\]\s*=")
+#: Statements that neither move nor lead elsewhere.
+_STILL = pattern(
+    rb"(?i)\s*(?:!.*|//.*|--.*|(?:R|DO|RO|GO|AO|F|SO|SR|UO|TIMER|AR|VR|SI)\[.*|WAIT\b.*|WARTE\b.*|PAYLOAD\b.*|"
+    rb"PAUSE|UALM\b.*|OVERRIDE\b.*|\$.*|JMP\s+LBL\b.*|IF\b.*,\s*JMP\s+LBL\b.*|MESSAGE\b.*|"
+    rb"RSR\b.*|COL\s+.*|Arc\s+.*|Weld\s+.*|Weave\s+.*|LOCK\s+.*|UNLOCK\s+.*|COMMENT\b.*|SKIP\s+CONDITION\b.*|"
+    rb"MONITOR\b.*|TC_ONLINE\b.*|JOINT_MAX_SPEED\b.*|LINEAR_MAX_SPEED\b.*|POINT_LOGIC\b.*|ACC\b.*|"
+    rb"STOP_TRACKING\b.*)?\s*"
+)
+_ENDS = pattern(rb"(?i)\s*(?:END|ABORT|JMP\s+LBL\b[^,]*)\s*")
+_BLOCK = pattern(rb"(?i)\s*(?:(IF\b.*THEN|SELECT\b.*)|(FOR\b.*)|(ELSE\b.*|=.*)|(ENDIF|ENDFOR))\s*")
+#: mm/s in one unit of a speed
+_SPEEDS = {b"mm/sec": 1.0, b"cm/min": 10.0 / 60.0, b"inch/min": 25.4 / 60.0}
+_NAN = float("nan")
+
+
+@dataclass(frozen=True, slots=True)
+class _Move:
+    """The words of a move: straight or not, the number of its position, its speed in mm/s, its `tail`."""
+
+    straight: bool
+    register: bool
+    number: int
+    feed: float
+    timed: bool
+    tail: bytes
+
+
+def read(
+    data: bytes, setup: Setup, dialect: Dialect, options: Options | None = None, *, words: bool = True
+) -> Program:
+    """Read a whole program. Raises ProgramError with the line of the first statement that cannot be read
+    correctly."""
+    return _Reader(data, setup).run(dialect, words=words)
+
+
+class _Reader:
+    """Reads one program."""
+
+    def __init__(self, data: bytes, setup: Setup) -> None:
+        self.data, self.setup = data, setup
+        self.moves = RobotMoves(data, setup, "UFRAME0")
+        self.registers = Registers()
+        self.positions: dict[int, list[Position]] = {}
+        self.known: dict[int, int] = {}
+        #: configurations and other groups by their text
+        self.configs: dict[tuple[bytes, bytes], int] = {}
+        self.blocks: list[tuple[bool, int]] = []
+        self.refusals: list[ProgramError] = []
+
+    def run(self, dialect: Dialect, *, words: bool) -> Program:
+        sections = parts(self.data)
+        if "MN" not in sections:
+            raise ProgramError("the text has no part /MN", line=1, code="OLP510")
+        for part in sections.get("POS", []):
+            positions(self.data, part, self.positions)
+        for line in (line for part in sections["MN"] for line in lines(self.data, part)):
+            try:
+                self._statement(line)
+            except ProgramError as error:
+                self.refusals.append(error)
+        if self.refusals:
+            first = self.refusals[0]
+            first.others = tuple(self.refusals[1:])
+            raise first
+        return self.moves.program(dialect, words=words)
+
+    # -- statements ----------------------------------------------------------------------------------
+
+    def _statement(self, line: Line) -> None:
+        text = line.text
+        move = _MOVE.fullmatch(text)
+        if move is not None:
+            self._move(line, self._words(move))
+            return
+        if _OTHER_MOVE.match(text):
+            raise _refused("a move that is not read (an arc, a spline, or words of its own)", line)
+        if _ASSIGNED.match(text):
+            raise _refused("a position gets another value, so its numbers depend on the run", line)
+        if _MOVING.match(text):
+            raise _refused("targets are moved by what a sensor or a register says", line)
+        if self.registers.take(text) or _STILL.fullmatch(text):
+            return
+        block = _BLOCK.fullmatch(text)
+        if block is not None:
+            self._block(block.lastindex or 0)
+        elif not _ENDS.fullmatch(text):
+            self._unknown(line)
+
+    def _unknown(self, line: Line) -> None:
+        """Behind a label, a call or a macro where the robot is depends on the run."""
+        self.moves.known = False
+        self.registers.forget()
+        text = line.text.strip()
+        if not text.upper().startswith(b"LBL"):
+            what = f"`{text[:40].decode('latin-1')}` may move the robot: correct that program too"
+            self.moves.remark("called", line.line, what)
+
+    def _block(self, kind: int) -> None:
+        if kind in (1, 2):
+            self.blocks.append((kind == 2, self.moves.count))
+            return
+        moved = bool(self.blocks) and self.blocks[-1][1] != self.moves.count
+        if kind == 4 and self.blocks:
+            self.blocks.pop()
+        if moved or not self.blocks:
+            self.moves.known = False
+        self.registers.forget()
+
+    # -- moves ---------------------------------------------------------------------------------------
+
+    @staticmethod
+    def _words(move: object) -> _Move:
+        groups = move.groups(b"")  # type: ignore[attr-defined]
+        unit = groups[4].lower()
+        feed = float(groups[3]) * _SPEEDS[unit] if unit in _SPEEDS else _NAN
+        return _Move(
+            groups[0].upper() == b"L", groups[1].upper() == b"PR", int(groups[2]), feed,
+            unit in (b"sec", b"msec"), groups[7],
+        )  # fmt: skip
+
+    def _move(self, line: Line, move: _Move) -> None:
+        if any(loop and before == self.moves.count for loop, before in self.blocks):
+            self.moves.known = False
+        for sign, why in (
+            (_INCREMENT, "is a distance (INC)"),
+            (_COORD, "counts from a positioner (COORD)"),
+            (_SENSED, "goes where a sensor says"),
+        ):
+            if sign.search(move.tail):
+                raise _refused(f"this move {why}, which is not read", line)
+        position = None if move.register else self._position(move.number, line)
+        shift = self._shift(move, position)
+        if position is None or "X" not in position.axes or shift is None:
+            self.moves.known = False
+            what = "left as written: the text does not state where this move goes"
+            if position is not None and "X" not in position.axes:
+                what = "joint values are kept as written"
+            self.moves.remark("left" if position is None else "joints", line.line, what)
+            return
+        index = self._target(move.number, position)
+        target = self.moves.targets[index]
+        begin = self.data.index(b"[", line.first) + 1
+        end = self.data.index(b"]", begin)
+        use = Use(
+            index, (line.span[0], line.span[1]), (begin, end), (begin, end), shift, target.turn,
+            zone=(line.first, line.span[1]),
+        )  # fmt: skip
+        self.moves.move(
+            line.line, use, self._frame(position, line), self._tool(position, line), move.feed,
+            straight=move.straight, whole=move.timed,
+        )  # fmt: skip
+        if _SKIP.search(move.tail):
+            self.moves.known = False
+
+    def _shift(self, move: _Move, position: Position | None) -> Vector | None:
+        """How far a move goes from its position, along its frame; None where the text does not say it."""
+        offset = _OFFSET.search(move.tail)
+        if offset is None or position is None or "X" not in position.axes:
+            return (0.0, 0.0, 0.0)
+        pose = None if offset[2] is None else self.registers.pose(int(offset[2]))
+        if pose is None or pose.turn[1:] != (0.0, 0.0, 0.0):
+            return None
+        if offset[1].lower() in (b"offset", b"versatz"):
+            return pose.origin_mm
+        return rotated(_turn(position), pose.origin_mm)
+
+    def _position(self, number: int, line: Line) -> Position:
+        found = self.positions.get(number, [])
+        if len(found) != 1:
+            what = "is not stated" if not found else "is stated twice"
+            raise ProgramError(f"the position P[{number}] {what}", line=line.line, code="OLP533")
+        axes = found[0].axes
+        if not any(name[0] in "XJ" for name in axes) or ("X" in axes and not {*"YZWPR"} <= set(axes)):
+            raise ProgramError(
+                f"the position P[{number}] of line {found[0].line} is not taught, or in another form",
+                line=line.line,
+                code="OLP533",
+            )
+        return found[0]
+
+    def _target(self, number: int, position: Position) -> int:
+        known = self.known.get(number)
+        if known is None:
+            axes = position.axes
+            (x, a), (y, b), (z, c) = (axes[name] for name in "XYZ")
+            rest = tuple(value for name, (_, value) in sorted(axes.items()) if name[0] == "E")
+            key = position.config, position.others
+            config = float(self.configs.setdefault(key, len(self.configs)))
+            known = self.known[number] = self.moves.target(
+                position.line, position.span, (x, y, z), (a, b, c), _turn(position), (config, *rest),
+                f"P[{number}]", position.span,
+            )  # fmt: skip
+        return known
+
+    def _frame(self, position: Position, line: Line) -> Located:
+        number = self.registers.frame if position.frame < 0 else position.frame
+        if number < 0:
+            raise _refused("the frame of this position is the active one, and not known here", line)
+        if number == 0:
+            return self.moves.frames.world
+        pose = self.registers.frames.get(number)
+        if pose is None and number in self.registers.frames:
+            raise _refused(f"UFRAME[{number}] gets numbers that the text does not state", line)
+        return self.moves.frames.located(f"UFRAME{number}", pose, line.line)
+
+    def _tool(self, position: Position, line: Line) -> Tool:
+        number = self.registers.tool if position.tool < 0 else position.tool
+        if number < 0:
+            raise _refused("the tool of this position is the active one, and not known here", line)
+        pose = self.registers.tools.get(number)
+        if pose is None and number in self.registers.tools:
+            raise _refused(f"UTOOL[{number}] gets numbers that the text does not state", line)
+        if number == 0 or pose is not None:
+            stated = self.setup.tool(number) if number else None
+            vector = None if stated is None else stated.tool_vector_mm
+            own = Pose() if pose is None else pose
+            return Tool(f"UTOOL{number}", own, vector or own.origin_mm, number if vector else None)
+        return Tool(f"UTOOL{number}", None, tool_vector_of(self.setup, number, line.line), number)
+
+
+def _turn(position: Position) -> tuple[float, float, float, float]:
+    """The orientation of a position: Rz(R) Ry(P) Rx(W)."""
+    w, p, r = (position.axes[name][1] for name in "WPR")
+    return of_zyx((r, p, w))
+
+
+def _refused(what: str, line: Line) -> ProgramError:
+    return ProgramError(what, line=line.line, code="OLP512")

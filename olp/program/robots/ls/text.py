@@ -1,0 +1,111 @@
+"""The parts of a TP program as text: header, lines, positions. Nothing here knows what they mean."""
+
+from __future__ import annotations
+
+from olp.core.errors import ProgramError
+from olp.core.patterns import pattern
+from olp.core.values import dataclass
+from olp.program.robots.targets import Span
+from olp.program.text.numbers import LARGEST
+
+_PART = pattern(rb"(?im)^[ \t]*/(PROG|ATTR|APPL|MN|POS|END)\b[^\r\n]*")
+#: A line with its number; a statement ends with the semicolon at the end of a line.
+_LINE = pattern(rb"(?m)^[ \t]*(\d*)[ \t]*:([^\r\n]*?)(;?)[ \t]*\r?$")
+_POSITION = pattern(rb"P\[\s*(\d+)\s*(?::[^\]]*)?\]\s*\{([^{}]*)\}\s*;")
+_GROUP = pattern(rb"GP(\d+)\s*:")
+_COUNT = pattern(rb"(?im)^[ \t]*LINE_COUNT[ \t]*=[ \t]*(\d+)")
+_NUMBER = rb"([-+]?(?:\d+\.?\d*|\.\d+))"
+_AXIS = pattern(rb"\b(X|Y|Z|W|P|R|E\d|J\d)\s*=\s*(?:" + _NUMBER + rb"|\*+)\s*(mm|deg)?")
+_FRAME = pattern(rb"UF\s*:\s*(\d+|F)\s*,\s*UT\s*:\s*(\d+|F)")
+_CONFIG = pattern(rb"CONFIG\s*:\s*'([^']*)'")
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A statement of the main part: its `line`, its bytes with the number, and its `text` without."""
+
+    line: int
+    span: Span
+    text: bytes
+    first: int
+
+
+@dataclass(frozen=True, slots=True)
+class Position:
+    """A position of the first group: its `line`, the bytes of all of it and of its number, frame and tool (-1
+    for the active one), the bytes and values of its axes by their letters, and what else it states."""
+
+    line: int
+    span: Span
+    number: Span
+    frame: int
+    tool: int
+    axes: dict[str, tuple[Span, float]]
+    config: bytes
+    others: bytes
+
+
+def parts(data: bytes) -> dict[str, list[Span]]:
+    """The bytes of the parts of a program by their names."""
+    marks = list(_PART.finditer(data))
+    ends = [*(mark.start() for mark in marks[1:]), len(data)][: len(marks)]
+    found: dict[str, list[Span]] = {}
+    for mark, end in zip(marks, ends, strict=True):
+        found.setdefault(mark[1].decode().upper(), []).append((mark.end(), end))
+    return found
+
+
+def line_count(data: bytes, header: Span) -> tuple[Span, int] | None:
+    """The bytes of the count of lines in the header, and the count; None where there is none."""
+    match = _COUNT.search(data, *header)
+    return None if match is None else (match.span(1), int(match[1]))
+
+
+def lines(data: bytes, main: Span) -> list[Line]:
+    """The statements of a main part, each with the lines in which it goes on. Raises ProgramError where one
+    does not end."""
+    found: list[Line] = []
+    begin, first, text = -1, 0, b""
+    count, place = data.count(b"\n", 0, main[0]) + 1, main[0]
+    for match in _LINE.finditer(data, *main):
+        count += data.count(b"\n", place, match.start())
+        place = match.start()
+        if begin < 0:
+            begin, first, line, text = match.start(), match.start(2), count, b""
+        text += match[2]
+        if match[3]:
+            found.append(Line(line, (begin, match.end()), text, first))
+            begin = -1
+    if begin >= 0:
+        raise ProgramError("the statement has no semicolon at its end", line=line, code="OLP510")
+    return found
+
+
+def positions(data: bytes, part: Span, found: dict[int, list[Position]]) -> None:
+    """Add the positions of a part to those `found` by their numbers. One that is not taught, or in joints,
+    lacks X, Y and Z."""
+    count, place = data.count(b"\n", 0, part[0]) + 1, part[0]
+    for match in _POSITION.finditer(data, *part):
+        count += data.count(b"\n", place, match.start())
+        place = match.start()
+        groups = list(_GROUP.finditer(data, *match.span(2)))
+        bounds = [*(group.start() for group in groups[1:]), match.end(2)][: len(groups)]
+        span, others = (match.span(2) if not groups else (0, 0)), b""
+        for group, end in zip(groups, bounds, strict=True):
+            if group[1] == b"1":
+                span = group.end(), end
+            else:
+                others += data[group.start() : end]
+        frame, config = _FRAME.search(data, *span), _CONFIG.search(data, *span)
+        axes = {
+            axis[1].decode(): (axis.span(2), float(axis[2]))
+            for axis in _AXIS.finditer(data, *span)
+            if axis[2] is not None and abs(float(axis[2])) < LARGEST
+        }
+        used = [-1 if frame is None or frame[k] == b"F" else int(frame[k]) for k in (1, 2)]
+        found.setdefault(int(match[1]), []).append(
+            Position(
+                count, match.span(), match.span(1), used[0], used[1], axes,
+                b"" if config is None else config[1], b"".join(others.split()),
+            )
+        )  # fmt: skip

@@ -1,0 +1,157 @@
+"""TP programs on three linear axes: read and corrected as a judge that shares nothing with it says."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from judge import machines, tp
+from judge.machines import Recipe
+from judge.model import JudgeModel
+
+import olp
+from olp.core.errors import OlpError, ProgramError
+
+FRAMES = {1: (300.0, 250.0, -300.0, 25.0), 2: (350.0, 200.0, -250.0, 0.0)}
+RECIPE = Recipe(
+    controller="fanuc-tp", job_defaults={},
+    work_offsets={
+        f"UFRAME{n}": {"X_mm": x, "Y_mm": y, "Z_mm": z, "C_deg": c, "set_by": "true"}
+        for n, (x, y, z, c) in FRAMES.items()
+    },
+)  # fmt: skip
+LEVER = np.array([0.0, 0.0, -120.0])
+#: rounding of the third decimal, mm
+DIGIT = 0.5e-3
+
+
+def position(number: int, point: list[float], frame: int = 1, more: str = "") -> str:
+    x, y, z = (f"{v:.1f}" for v in point)
+    return (
+        f"P[{number}:\"a b\"]{{\n   GP1:\n\tUF : {frame}, UT : 1,\t\tCONFIG : 'N U T, 0, 0, 0',\n"
+        f"\tX = {x} mm, Y = {y} mm, Z = {z} mm,\n\tW = 180.0 deg, P = 0.0 deg, R = 30.0 deg{more}\n}};\n"
+    )
+
+
+def text_of(lines: list[str], positions: list[str], count: int | None = None) -> bytes:
+    main = "".join(f"{k:4d}:{line} ;\n" for k, line in enumerate(lines, 1))
+    head = f"/PROG  T\n/ATTR\nLINE_COUNT\t= {len(lines) if count is None else count};\n/MN\n"
+    return f"{head}{main}/POS\n{''.join(positions)}/END\n".encode()
+
+
+def program(rng: np.random.Generator, count: int) -> bytes:
+    """Moves to shared positions and their own, with and without an offset."""
+    points = rng.uniform(-60, 60, (count, 3)).round(1).tolist()
+    positions = [position(k + 1, point, 1 + k % 2) for k, point in enumerate(points)]
+    lines = ["  UFRAME_NUM=1", *(f"  PR[5,{k}]={v}" for k, v in enumerate((0, 0, 20, 0, 0, 0), 1))]
+    for _ in range(count):
+        number, kind = rng.integers(1, count + 1), "L" if rng.random() < 0.7 else "J"
+        speed = "200mm/sec" if kind == "L" else "50%"
+        tail = " Offset,PR[5]" if rng.random() < 0.3 else ""
+        lines.append(f'{kind} P[{number}:"a b"] {speed} {rng.choice(["FINE", "CNT50"])}{tail}   ')
+    return text_of(lines, positions)
+
+
+@pytest.fixture(scope="module")
+def bent(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return machines.random_machine(tmp_path_factory.mktemp("bent"), 8, RECIPE)
+
+
+@pytest.fixture(scope="module")
+def zero(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return machines.zero_machine(tmp_path_factory.mktemp("zero"), RECIPE)
+
+
+def world(move: tp.TpMove) -> np.ndarray:
+    x, y, z, c = FRAMES[move.frame]
+    cosine, sine = np.cos(np.radians(c)), np.sin(np.radians(c))
+    return np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]]) @ move.tip + (x, y, z)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_each_position_is_where_the_judge_wants_it(bent: Path, zero: Path, seed: int) -> None:
+    text = program(np.random.default_rng(seed), 25)
+    assert olp.correct(text, zero).data == text
+    done = olp.correct(text, bent)
+    assert done.report["verdict"]["ok"]
+    nominal, written, model = tp.moves(text), tp.moves(done.data), JudgeModel(bent)
+    assert len(written) > len(nominal), "long moves are split"
+    place = 0
+    for k, move in enumerate(nominal):
+        tip, start = world(move), world(nominal[k - 1])
+        want = model.command_for(tip[None], LEVER)[0]
+        while np.abs(world(written[place]) - want).max() > 2 * DIGIT:
+            here = world(written[place])
+            actual = here + model.error_mm(here[None], LEVER)[0]
+            share = np.clip((actual - start) @ (tip - start) / max((tip - start) @ (tip - start), 1e-9), 0, 1)
+            assert np.linalg.norm(start + share * (tip - start) - actual) < 1e-3 + 2 * DIGIT
+            place += 1
+        place += 1
+    assert place == len(written)
+
+
+def test_counts_and_lines_stay_right(bent: Path) -> None:
+    lines = [
+        "J P[1] 50% FINE",
+        '  !don\'t; "move"',
+        "L P[2] 200mm/sec CNT50 ACC80 TB .05sec,CALL X",
+        "L P[3] 200mm/sec FINE",
+    ]
+    points = [position(k, p) for k, p in ((1, [-60, -60, 0]), (2, [60, 60, 20]), (3, [60, -60, 20]))]
+    text = olp.correct(text_of(lines, points), bent).data.decode()
+    main = text.split("/MN\n")[1].split("/POS")[0].splitlines()
+    assert re.search(r"LINE_COUNT\t= (\d+)", text)[1] == str(len(main))
+    assert main[0].startswith("    :  !olp-corrected ")
+    assert len(main[0].split("!")[1]) <= 33
+    parts = [line for line in main if re.match(r" +:L P\[\d+\] 200mm/sec CNT100( ACC80)? ;", line)]
+    assert len(parts) == len(main) - 5
+    assert all("TB" not in line for line in parts)
+    assert text.count("TB .05sec,CALL X") == 1
+    wrong = olp.correct(text_of(lines, points, 77), bent).data
+    assert b"LINE_COUNT\t= 77;" in wrong
+
+
+def test_frames_and_tools_of_registers(tmp_path: Path) -> None:
+    path = machines.shift_machine(tmp_path, (100.0, 0.0, 0.0), recipe=replace(RECIPE, work_offsets={}))
+    lines = [f"  PR[1,{k}]={v}" for k, v in enumerate((300, 200, -300, 0, 0, 90), 1)]
+    lines += ["  UFRAME[1]=PR[1]", "J P[1] 50% FINE"]
+    text = olp.correct(text_of(lines, [position(1, [1, 2, 3])]), path).data
+    assert b"X = 1.0 mm, Y = 2.100 mm, Z = 3.0 mm" in text
+    with pytest.raises(OlpError, match="UFRAME1"):
+        olp.correct(text_of(["J P[1] 50% FINE"], [position(1, [1, 2, 3])]), path)
+    with pytest.raises(OlpError, match="gets numbers that the text does not state"):
+        olp.correct(text_of(["  UFRAME[1]=PR[9]", *lines[-1:]], [position(1, [1, 2, 3])]), path)
+
+
+@pytest.mark.parametrize(
+    ("line", "why"),
+    [
+        ("L P[9] 200mm/sec FINE", "not stated"),
+        ("L P[1] 200mm/sec FINE INC", "INC"),
+        ("L P[1] 200mm/sec FINE COORD", "COORD"),
+        ("L P[1] 200mm/sec FINE VOFFSET,VR[1]", "sensor"),
+        ("C P[1]\n    :  P[1] 200mm/sec FINE", "arc"),
+        ("  P[1]=LPOS", "another value"),
+        ("  OFFSET CONDITION PR[1]", "targets are moved"),
+        ("L P[2] 200mm/sec FINE", "not taught"),
+    ],
+)
+def test_what_is_not_certain_is_refused_with_its_line(zero: Path, line: str, why: str) -> None:
+    untaught = position(2, [0, 0, 0]).replace("0.0 mm", "******** mm")
+    with pytest.raises(OlpError, match=why) as error:
+        olp.correct(text_of([line], [position(1, [0, 0, 0]), untaught]), zero)
+    assert isinstance(error.value, ProgramError)
+    assert error.value.line == 5
+
+
+def test_what_the_text_does_not_state_is_left_and_listed(bent: Path) -> None:
+    lines = ["J P[1] 50% FINE", "L PR[3] 200mm/sec FINE", "L P[2] 200mm/sec FINE", "L P[3] 200mm/sec FINE"]
+    points = [position(k, p) for k, p in ((1, [-60, -60, 0]), (2, [60, 60, 20]))]
+    joints = "P[3]{\n   GP1:\n\tUF : 1, UT : 1,\n\tJ1= 0.0 deg\n};\n"
+    done = olp.correct(text_of(lines, [*points, joints]), bent)
+    assert joints.encode() in done.data
+    assert b"L PR[3] 200mm/sec FINE ;\n   3:L P[2]" in done.data
+    assert any("does not state where this move goes" in finding.message for finding in done.findings)
