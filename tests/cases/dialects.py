@@ -226,7 +226,8 @@ CASES = {
         ("fanuc_ls/*",),
         (
             b"/PROG A\n/MN\n 1:J P[1] 10% FINE ;\n/POS\nP[1]{\n GP1:\n UF : 0, UT : 0,"
-            b" CONFIG : 'N U T, 0, 0, 0',\n X = 1 mm, Y = 2 mm, Z = 3 mm, W = 0 deg, P = 0 deg, R = 0 deg\n};\n",
+            b" CONFIG : 'N U T, 0, 0, 0',\n X = 1 mm, Y = 2 mm, Z = 3 mm,\n"
+            b" W = 0 deg, P = 0 deg, R = 0 deg\n};\n",
             b"/MN\n1:",
             b"/PROG A\n/MN\n 1:L P[1] 10mm/sec FINE ;\n/POS\nP[1]{\n GP1:\n UF : 0, UT : 0,\n J1= 1 deg\n};",
             b"/PROG A\n/MN\n 1:  UFRAME_NUM=1 ;\n 2:  PR[1,1]=5 ;\n 3:L PR[1] 10mm/sec FINE ;\n",
