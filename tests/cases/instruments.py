@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from olp.calibration.observations.artefact import Artefact
 from olp.calibration.observations.base import Observation
 from olp.calibration.observations.circles import PLANES, Circles
 from olp.calibration.observations.diagonals import Diagonal
@@ -90,6 +91,31 @@ def polar(error: Error) -> Readings:
     )
 
 
+def artefacts(error: Error) -> Readings:
+    """A plate of 12 balls in four poses; one ball is 0.2 mm from where its drawing says."""
+    grid = np.array([(x, y, 0.0) for x in (0.0, 130.0, 260.0, 390.0) for y in (0.0, 150.0, 300.0)])
+    drawn = grid.copy()
+    drawn[5] += (0.2, -0.1, 0.05)
+    axis_mm, ball, pose = [], [], []
+    for k, (angle, shift) in enumerate(
+        [(0, (150, 150)), (90, (700, 120)), (180, (800, 600)), (0, (450, 320))]
+    ):
+        c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+        turned = grid @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]).T
+        stop = place = turned + np.array([*shift, -200.0 - 40.0 * k]) - np.array(TOOL)
+        for _ in range(8):
+            stop = place - error(stop, np.array(TOOL))
+        axis_mm.append(stop)
+        ball.append(np.arange(len(grid)))
+        pose.append(np.full(len(grid), k + 1))
+    return (
+        Artefact(
+            np.concatenate(axis_mm), TOOL, np.concatenate(ball), np.concatenate(pose), drawn,
+            np.zeros(len(drawn)), 1e-4, "artefact.csv",
+        ),
+    )  # fmt: skip
+
+
 def stations(error: Error) -> Readings:
     measurements = []
     for k, place in enumerate([(-700.0, -900.0, 100.0), (1800.0, -600.0, -400.0)]):
@@ -166,5 +192,5 @@ def squareness(error: Error) -> Readings:
 
 #: By the key of the instrument's tables in a plan.
 EXAMPLES: Mapping[str, Callable[[Error], Readings]] = {
-    f.__name__: f for f in (lines, points, polar, stations, pods, diagonals, ballbars, squareness)
+    f.__name__: f for f in (lines, points, polar, artefacts, stations, pods, diagonals, ballbars, squareness)
 }

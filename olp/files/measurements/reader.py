@@ -37,6 +37,8 @@ from olp.files.write import PathLike, read_bytes
 PLAN = "measurements.toml"
 #: Endings of files in a folder without a plan that may describe themselves.
 ALONE = (".csv", ".rtl")
+#: Keys of tables that name a file.
+_FILES = ("file", "profile", "certificate")
 
 
 @dataclass(slots=True)
@@ -120,7 +122,7 @@ def files_of_measurements(sources: Sequence[PathLike]) -> tuple[str, ...]:
             stated = tomllib.loads(read_bytes(plan).decode("utf-8-sig"))
             tables = [t for instrument in INSTRUMENTS for t in stated.get(instrument.key, ())]
             for table in (*tables, stated.get("defaults", {})):
-                names += [plan.parent / table[key] for key in ("file", "profile") if key in table]
+                names += [plan.parent / table[key] for key in _FILES if key in table]
         except (InputError, ValueError, TypeError, AttributeError):
             # The loader reports what is wrong with it.
             continue

@@ -127,6 +127,7 @@ def test_its_reach_is_where_it_was_read(key: str) -> None:
 #: The columns that an instrument reads, and a blunder in their unit.
 READ = {
     "value": 0.05, "measured_mm": 0.05, "length_mm": 0.05, "azimuth_rad": 1e-4, "value_rad": 1e-4,
+    "axis_mm": 0.05,
 }  # fmt: skip
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cases.calibration import FRESH, TOOLS, case, cloud, residual_of
+from cases.calibration import FRESH, TOOLS, case, cloud, line_of, residual_of
 from cases.fast import some_fast
 from judge import simulated
 
@@ -17,6 +17,7 @@ from olp.calibration.estimator.curves import calibration_of
 from olp.calibration.estimator.findings import findings_of
 from olp.calibration.estimator.fitted import Fit
 from olp.calibration.estimator.summary import summary
+from olp.calibration.observations.artefact import Artefact
 from olp.calibration.observations.circles import Circles
 from olp.calibration.observations.diagonals import Diagonal
 from olp.calibration.observations.measurements import Measurements
@@ -91,6 +92,44 @@ def test_points_far_from_the_frame_are_refused() -> None:
 
 
 # -- a ball plate, a space grid --------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_a_plate_that_nobody_calibrated_is_calibrated_with_the_machine() -> None:
+    """Its balls are up to 1 mm from where they are drawn. In twelve poses, with a laser line for the scale,
+    it tells nearly as much as one with a certificate."""
+    machine = simulated.machine(3, "smooth", "FXYZ")
+    rng = np.random.default_rng(5)
+    drawn = np.array([(x, y, 0.0) for x in np.linspace(0, 800, 6) for y in np.linspace(0, 800, 6)])
+    true = drawn + rng.uniform(-0.6, 0.6, drawn.shape)
+    stops, balls, poses = [], [], []
+    vector = np.array(simulated.OFFSETS[0])
+    for k in range(12):
+        turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        turn *= np.sign(np.linalg.det(turn))
+        inner = np.array([[420.0, 2580.0], [420.0, 1580.0], [-580.0, -420.0]])
+        place = (true - true.mean(axis=0)) @ turn.T + rng.uniform(inner[:, 0], inner[:, 1])
+        use = np.flatnonzero(((place > machine.box[:, 0]) & (place < machine.box[:, 1])).all(axis=1))
+        stop = place[use] - vector
+        for _ in range(6):
+            stop = place[use] - vector - machine.error(stop, vector)
+        stops.append(stop + rng.normal(0.0, 0.5 * UM, stop.shape))
+        balls.append(use)
+        poses.append(np.full(len(use), k))
+    lines = [line_of(taken) for taken in simulated.all_lines(machine, 3) if taken.component == "EXX"]
+
+    def fitted_with(places: np.ndarray, sigma_mm: float) -> Fit:
+        plate = Artefact(
+            np.concatenate(stops), vector, np.concatenate(balls), np.concatenate(poses), places,
+            np.full(len(places), sigma_mm), 0.5 * UM, "plate.csv",
+        )  # fmt: skip
+        return fit(Measurements("m", (*lines, plate)), "FXYZ")
+
+    own, known = fitted_with(drawn, 0.0), fitted_with(true, 0.2 * UM)
+    results = [residual_of(machine, one, simulated.OFFSETS[0], 400) for one in (own, known)]
+    assert results[0].before_framed > 40.0
+    assert results[0].after_framed < 1.5 * results[1].after_framed + 1.0
+    assert not messages_of(own, "OLP808")
 
 
 @pytest.mark.slow
@@ -314,3 +353,45 @@ def test_tables_of_diagonals_and_ball_bars(tmp_path: Path) -> None:
     (tmp_path / "d.csv").write_text("target_mm,run,direction,value_um\n0,1,1,0\n")
     with pytest.raises(ConfigError, match=r"d\.csv.*start_mm"):
         load_measurements([plan])
+
+
+CENTRES = "pose,ball,X_mm,Y_mm,Z_mm\n" + "".join(
+    f"{pose},{name},{x + 50 * pose},{y},-200\n"
+    for pose in (1, 2)
+    for name, x, y in (("A1", 0, 0), ("A2", 200, 0), ("B1", 0, 200))
+)
+BALLS = "ball,X_mm,Y_mm,Z_mm,sigma_um\nA1,0,0,0,0.5\nA2,200,0,0,0.5\nB1,0,200,0,0\n"
+
+
+def plate_plan(folder: Path, centres: str = CENTRES, balls: str = BALLS) -> Measurements:
+    (folder / "centres.csv").write_text(centres, "utf-8")
+    (folder / "balls.csv").write_text(balls, "utf-8")
+    (folder / "measurements.toml").write_text(
+        'schema = "olp-measurements-1"\nmachine = "m"\nmeasured = 2026-05-14\ntemperature_degC = 20.0\n'
+        '[[artefacts]]\nfile = "centres.csv"\ncertificate = "balls.csv"\nsigma_um = 1.0\n'
+        "tool_mm = [0.0, 0.0, -120.0]\n",
+        "utf-8",
+    )
+    return load_measurements([folder], "FXYZ")
+
+
+def test_centres_of_balls_are_read_from_a_plan(tmp_path: Path) -> None:
+    (plate,) = plate_plan(tmp_path).of(Artefact)
+    assert plate.ball.tolist() == [0, 1, 2, 0, 1, 2] and plate.pose.tolist() == [1, 1, 1, 2, 2, 2]
+    assert plate.sigma_ball_mm.tolist() == [0.5 * UM, 0.5 * UM, 0.0]
+    names = {Path(name).name for name in files_of_measurements([tmp_path])}
+    assert names == {"measurements.toml", "centres.csv", "balls.csv"}
+
+
+@pytest.mark.parametrize(
+    ("centres", "balls", "words"),
+    [
+        (CENTRES.replace("2,B1", "2,C1"), BALLS, 'ball "C1" is not in balls.csv'),
+        (CENTRES, BALLS + "A1,0,0,0,0\n", 'ball "A1" is listed twice'),
+        (CENTRES.replace("2,B1", "2,A1"), BALLS, "pose 2 has 2 balls"),
+        (CENTRES[: CENTRES.index("2,A1")], BALLS, "one pose only and balls whose places are not known"),
+    ],
+)
+def test_a_wrong_plate_is_refused(centres: str, balls: str, words: str, tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=words):
+        plate_plan(tmp_path, centres, balls)

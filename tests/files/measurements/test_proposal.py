@@ -25,6 +25,7 @@ FILES = {
     "lines": ("eyz-left.csv", LINE),
     "points": ("tracker.csv", POINTS.format("measured_X_mm,measured_Y_mm,measured_Z_mm")),
     "polar": ("station.csv", POINTS.format("distance_mm,azimuth_deg,elevation_deg")),
+    "artefacts": ("centres.csv", "pose,ball,X_mm,Y_mm,Z_mm\n"),
     "stations": ("lengths.csv", POINTS.format("length_mm")),
     "pods": ("t.csv", POINTS.format("azimuth_1_deg,elevation_1_deg,azimuth_2_deg,elevation_2_deg")),
     "diagonals": ("d.csv", "# start_mm = [0, 0, 0]\n# end_mm = [9, 9, 9]\n" + LINE),

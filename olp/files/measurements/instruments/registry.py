@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from olp.calibration.observations.base import Observation
+from olp.files.measurements.instruments.artefacts import ArtefactFiles
 from olp.files.measurements.instruments.ballbars import BallbarFiles
 from olp.files.measurements.instruments.base import Instrument
 from olp.files.measurements.instruments.diagonals import DiagonalFiles
@@ -20,6 +21,7 @@ INSTRUMENTS: tuple[Instrument[Any, Any], ...] = (
     LineFiles(),
     PointFiles(),
     PolarFiles(),
+    ArtefactFiles(),
     StationFiles(),
     PodFiles(),
     DiagonalFiles(),
