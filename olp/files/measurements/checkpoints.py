@@ -75,7 +75,10 @@ def load_checkpoints(
     if stated.sigma_um is not None and sigma_um is not None and stated.sigma_um != sigma_um:
         problems.append(f"sigma_um = {stated.sigma_um:g}, but {sigma_um:g} in the call; expected it once")
     sigma = stated.sigma_um if stated.sigma_um is not None else sigma_um
-    if sigma is None:
+    own = readings.sigma_mm
+    if own is not None and sigma is not None:
+        problems.append("sigma_um is stated beside columns of uncertainties; expected it once")
+    elif own is None and sigma is None:
         problems.append("the uncertainty of a coordinate is not stated; expected a comment # sigma_um = 8")
     if readings.tool_mm is not None and stated.tool_mm is not None:
         problems.append("tool_mm is stated in a comment and in columns; expected it once")
@@ -95,9 +98,10 @@ def load_checkpoints(
         axis_mm=readings.axis_mm,
         tool_mm=vector,
         measured_mm=measured,
-        sigma=(sigma or 0.0) * MM_PER_UM,
+        sigma=own or (sigma or 0.0) * MM_PER_UM,
         sigma_scale=stated.sigma_scale_um_m * PER_UNIT,
         source=str(path),
         row=readings.row,
+        covariance_mm2=readings.covariance_mm2,
     )
     return points, stated.frame == MACHINE

@@ -8,10 +8,14 @@ The instrument frame is unknown. Columns tool_X_mm, tool_Y_mm, tool_Z_mm hold th
 to the reflector where it differs from point to point. Other instruments have other columns instead of the
 measured ones. Lengths from a station: length_mm. A polar station: distance_mm, azimuth_deg and elevation_deg.
 Directions from pods: azimuth_1_deg, elevation_1_deg, azimuth_2_deg ...
+
+Measured positions may have uncertainties of their own, in the frame of their coordinates: sigma_X_um,
+sigma_Y_um, sigma_Z_um, or covariance_XX_um2, covariance_XY_um2, covariance_XZ_um2, covariance_YY_um2 ...
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
@@ -21,9 +25,10 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Array
+from olp.core.errors import ConfigError
 from olp.core.schema import Table
 from olp.core.schema_keys import Field
-from olp.core.units import AXES
+from olp.core.units import AXES, MM_PER_UM
 from olp.core.values import dataclass
 from olp.files.columns import Wanted, finite, missing, names, read_sheet, unknown
 from olp.files.measurements.stated import stated_keys
@@ -37,6 +42,11 @@ POLAR = ("distance_mm", "azimuth_deg", "elevation_deg")
 #: Actual minus commanded, instead of measured positions.
 DEVIATION = tuple(f"deviation_{axis}_um" for axis in AXES)
 TOOL = tuple(f"tool_{axis}_mm" for axis in AXES)
+#: The standard uncertainty of each coordinate of a point, or the covariance of all three.
+SIGMA = tuple(f"sigma_{axis}_um" for axis in AXES)
+COVARIANCE = tuple(
+    f"covariance_{first}{second}_um2" for first, second in itertools.combinations_with_replacement(AXES, 2)
+)
 
 
 def directions(pods: int) -> tuple[str, ...]:
@@ -71,7 +81,8 @@ def conventional(angles: AngleKeys, azimuth: Array, vertical: Array) -> tuple[Ar
 @dataclass(frozen=True, slots=True, eq=False)
 class PointReadings:
     """(n, 3) columns in mm, and `measured` (n, k) as in the file. `tool_mm` is None where the file has no
-    such columns. `row` (n,) is the line of each point. `keys` are the comments, each with its line."""
+    such columns, nor `covariance_mm2` (n, 3, 3). `row` (n,) is the line of each point. `keys` are the
+    comments, each with its line."""
 
     file: str
     axis_mm: Array
@@ -79,6 +90,14 @@ class PointReadings:
     tool_mm: Array | None
     row: npt.NDArray[np.int64]
     keys: Mapping[str, tuple[str, int]]
+    covariance_mm2: Array | None = None
+
+    @property
+    def sigma_mm(self) -> float | None:
+        """Root mean square of the standard uncertainties of coordinates, where points have their own."""
+        if self.covariance_mm2 is None:
+            return None
+        return float(np.sqrt(np.trace(self.covariance_mm2, axis1=1, axis2=2).mean() / 3.0))
 
 
 def read_point_readings(path: PathLike, measured: tuple[str, ...] = MEASURED) -> PointReadings:
@@ -89,10 +108,12 @@ def read_point_readings(path: PathLike, measured: tuple[str, ...] = MEASURED) ->
 
 def parse_point_readings(data: bytes, file: str, measured: tuple[str, ...] = MEASURED) -> PointReadings:
     """As `read_point_readings`, from the bytes of the file."""
-    known = (*AXIS, *measured, *TOOL)
+    spreads = (SIGMA, COVARIANCE) if measured == MEASURED else ()
+    known = (*AXIS, *measured, *TOOL, *(name for group in spreads for name in group))
 
     def header_problems(line: int, header: Sequence[str]) -> list[Problem]:
-        wanted = (*AXIS, *measured, *(TOOL if any(name in header for name in TOOL) else ()))
+        some = [group for group in (TOOL, *spreads) if any(name in header for name in group)]
+        wanted = (*AXIS, *measured, *(name for group in some for name in group))
         return [
             *names(line, header, lambda _, name: unknown(name, known)),
             *missing(line, header, wanted),
@@ -107,6 +128,12 @@ def parse_point_readings(data: bytes, file: str, measured: tuple[str, ...] = MEA
     def columns(group: Sequence[str]) -> Array:
         return np.asarray(table[:, [sheet.header.index(name) for name in group]])
 
+    spread = [group for group in spreads if group[0] in sheet.header]
+    if len(spread) > 1:
+        raise ConfigError(
+            f"has columns {SIGMA[0]} and {COVARIANCE[0]}; expected one of both kinds", file=file
+        )
+    covariance = _covariance(columns(spread[0]), sheet.lines, file) if spread else None
     return PointReadings(
         file,
         columns(AXIS),
@@ -114,7 +141,29 @@ def parse_point_readings(data: bytes, file: str, measured: tuple[str, ...] = MEA
         columns(TOOL) if TOOL[0] in sheet.header else None,
         sheet.lines,
         dict(stated_keys(sheet.text)),
+        covariance,
     )
+
+
+def _covariance(values: Array, lines: npt.NDArray[np.int64], file: str) -> Array:
+    """(n, 3, 3) in mm^2 from standard uncertainties (n, 3) in um or covariances (n, 6) in um^2. Raises
+    ConfigError where one of them is no covariance."""
+    matrix = np.zeros((len(values), 3, 3))
+    if values.shape[1] == len(SIGMA):
+        matrix[:, range(3), range(3)] = values * np.abs(values)
+    else:
+        first, second = np.triu_indices(3)
+        matrix[:, first, second] = matrix[:, second, first] = values
+    wrong = np.flatnonzero(np.linalg.eigvalsh(matrix)[:, 0] <= 0.0)
+    if len(wrong):
+        raise config_error(
+            [
+                (int(lines[k]), "the covariance of the point is not positive; expected variances above 0")
+                for k in wrong[:8]
+            ],
+            file,
+        )
+    return matrix * MM_PER_UM**2
 
 
 def _number(name: str, cell: str) -> tuple[float, str | None]:

@@ -16,6 +16,7 @@ from olp.files.columns import decoded
 from olp.files.measurements.instruments.base import Instrument, SeenFile
 from olp.files.measurements.instruments.registry import INSTRUMENTS
 from olp.files.measurements.line_keys import LineKeys
+from olp.files.measurements.point_readings import COVARIANCE, SIGMA, TOOL
 from olp.files.measurements.rtl import is_stored_line, parse_rtl
 from olp.files.measurements.schemas import PlanFile
 from olp.files.measurements.stated import stated_keys
@@ -31,6 +32,8 @@ STORED = (".rtl", ".rta", ".rts")
 ASKED = "?"
 #: Keys that every line needs, and that [defaults] may hold for all of them.
 _OF_LINES = ("sense", "line_mm", "tool_mm")
+#: Columns that state for each row what a key states for all of them.
+_COLUMNS_OF = {"tool_mm": TOOL, "sigma_um": (*SIGMA, *COVARIANCE)}
 #: Keys of the whole plan that files may state.
 _OF_ALL = ("machine", "measured", "temperature_degC")
 
@@ -111,7 +114,7 @@ def _table(
     yield f"file = {toml_value(seen.name)}"
     yield from (f"{toml_key(key)} = {toml_value(value)}" for key, value in keys.items())
     for key in instrument.asks:
-        if key in keys or (key == "tool_mm" and "tool_X_mm" in seen.header):
+        if key in keys or any(name in seen.header for name in _COLUMNS_OF.get(key, ())):
             continue
         value = _value(seen.stated[key]) if key in seen.stated else ASKED
         yield _line(key, value, instrument.table, seen.name, asked)

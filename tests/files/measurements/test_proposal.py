@@ -49,6 +49,13 @@ def test_every_instrument_with_files_recognises_its_own(tmp_path: Path) -> None:
     assert plan["pods"][0]["azimuth"] == plan["polar"][0]["vertical"] == ASKED
 
 
+def test_uncertainties_in_columns_are_not_asked_for(tmp_path: Path) -> None:
+    axes = "measured_X_mm,measured_Y_mm,measured_Z_mm,tool_X_mm,tool_Y_mm,tool_Z_mm,"
+    (tmp_path / "t.csv").write_text(POINTS.format(axes + "sigma_X_um,sigma_Y_um,sigma_Z_um"))
+    plan = tomllib.loads(propose(tmp_path).text)
+    assert plan["points"] == [{"file": "t.csv"}]
+
+
 def test_a_plan_that_is_filled_in_is_read(tmp_path: Path) -> None:
     for name in ("eax.csv", "eyx.csv", "eyz-left.csv", "tracker.csv"):
         shutil.copy(PROGRAMS / "gantry-lines" / name, tmp_path)

@@ -6,6 +6,7 @@ from typing import Literal
 
 from olp.calibration.observations.points import Points
 from olp.core.arrays import Index
+from olp.core.errors import ConfigError
 from olp.core.schema import NotNegative, Positive, Table, Text, Triple
 from olp.core.schema_keys import Field
 from olp.core.units import MM_PER_UM, UM_PER_MM
@@ -19,7 +20,11 @@ class PointsTable(Table):
         description="the path of a CSV file with columns X_mm, Y_mm, Z_mm (axis positions) and "
         "measured_X_mm, measured_Y_mm, measured_Z_mm (in the instrument's frame), relative to this file"
     )
-    sigma_um: Positive = Field(description="the standard uncertainty of a coordinate, in um")
+    sigma_um: Positive | None = Field(
+        default=None,
+        description="the standard uncertainty of a coordinate, in um; or columns sigma_X_um ... of the file, "
+        "or covariance_XX_um2, covariance_XY_um2 ... of each point",
+    )
     frame: Literal["unknown", "known"] = Field(
         default="unknown",
         description='"unknown" (of the instrument), or "known": measured_ columns are in the frame of the '
@@ -46,15 +51,20 @@ class PointFiles(Instrument[PointsTable, Points]):
 
     def read(self, table: PointsTable, plan: Plan) -> Points:
         readings = read_point_readings(plan.beside(table.file))
+        own = readings.sigma_mm
+        if (own is None) == (table.sigma_um is None):
+            wrong = "is missing" if own is None else "is stated here and in columns of the file"
+            raise ConfigError(f"sigma_um {wrong}; expected the uncertainty of the points once")
         return Points(
             axis_mm=readings.axis_mm,
             tool_mm=tools_of(readings, table.tool_mm, plan.defaults),
             measured_mm=readings.measured,
-            sigma=table.sigma_um * MM_PER_UM,
+            sigma=own or (table.sigma_um or 0.0) * MM_PER_UM,
             sigma_scale=table.sigma_scale_um_m * PER_UNIT,
             source=readings.file,
             row=readings.row,
             known_frame=table.frame == "known",
+            covariance_mm2=readings.covariance_mm2,
         )
 
     def asked(self, taken: Points, name: str) -> list[str]:
