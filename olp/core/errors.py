@@ -210,10 +210,14 @@ class CannotCompute(OlpError):
 
 
 class NotInvertible(CannotCompute):
-    """No command reaches the target within 1e-9 mm: the error grows as fast as the position. `row` is that of
-    the target where there are several."""
+    """No command reaches the target within 1e-9 mm: the error grows as fast as the position. `rows` are those
+    of such targets where there are several; `row` is the first one."""
 
-    row: int | None = None
+    rows: tuple[int, ...] = ()
+
+    @property
+    def row(self) -> int | None:
+        return self.rows[0] if self.rows else None
 
 
 @contextlib.contextmanager

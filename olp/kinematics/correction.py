@@ -40,7 +40,7 @@ def correct_poses(
     Position is met to 1e-9 mm, and of the orientation as much as the chain can correct: the tool axis on five
     axes, all of it on six. `shift_mm` (n, 3) moves the targets, in workpiece coordinates. Near a singular
     posture no rotary axis turns by more than `largest_turn_deg`; the branch is kept. Raises NotInvertible
-    with the row where no axis values meet the position.
+    with all `rows` where no axis values meet the position.
     """
     values = np.asarray(values, float)
     target = machine.nominal(values)
@@ -54,7 +54,7 @@ def correct_poses(
 
 def meet_positions(machine: Kinematics, target: Poses, values: Array) -> Solved:
     """The axis values whose linear axes bring the actual tip to `target` while the others stay as they are in
-    `values` (n, axes). Raises NotInvertible with the row."""
+    `values` (n, axes). Raises NotInvertible with the rows."""
     structure = machine.structure
     joints = {
         name: joint if joint.kind == "linear" else replace(joint, correct=False)

@@ -29,6 +29,8 @@ _SETTLED_MM = 1e-8
 _SAME_SLOPES_MM = 0.5
 #: Coordinates of a place.
 _PLACE = 3
+#: A step of so many rows costs less than one row that is solved with all safeguards.
+_WORTH = 100
 #: By so much less than the last step the next one is taken to shrink.
 _MARGIN = 10.0
 #: No division by less.
@@ -103,7 +105,7 @@ def inverse(
     orientation needs a motion of the axes that turns one of them by x, more than `largest_turn_deg` L, that
     motion is made smaller, to L^2 / x: at a singular posture to nothing. The position is met all the same,
     and the rest of the orientation is left. `nominal` asks for the machine without errors. Raises
-    NotInvertible with the row where no axis values meet the position, or where these turn an axis by more
+    NotInvertible with all rows where no axis values meet the position, or where these turn an axis by more
     than 2 L.
     """
     structure = machine.structure
@@ -126,7 +128,7 @@ def inverse(
         # which of many solutions is reached depends on the slopes: those of the machine itself are taken
         slopes = partial(_differences, forward, task.scale, reference_radius_mm)
     values, left, met = _regular(task, free, forward, slopes, largest_turn_deg)
-    limited, hard = np.zeros(len(near), bool), np.flatnonzero(~met)
+    limited, bad, hard = np.zeros(len(near), bool), np.zeros(len(near), bool), np.flatnonzero(~met)
     if hard.size:
         part = task.only(hard)
         if largest_turn_deg is not None:
@@ -137,13 +139,13 @@ def inverse(
             well = replace(part.only(~met), moves=_MOVES_WELL)
             values[again], now = _newton(well, forward, slopes)
             limited[again] = True
-            if not np.all(now):
-                raise _none_near(machine, int(again[np.argmin(now)]))
+            bad[again] = ~now
         left[hard] = relative(forward(values[hard]).rotation, task.target.rotation[hard])
     if largest_turn_deg is not None:
         turn = np.max(np.abs(np.where(rotary, values - near, 0.0)), axis=1, initial=0.0)
-        if np.any(turn > _FARTHEST * largest_turn_deg):
-            raise _none_near(machine, int(np.argmax(turn)))
+        bad |= turn > _FARTHEST * largest_turn_deg
+    if bad.any():
+        raise _none_near(machine, np.flatnonzero(bad))
     return Solved(values, left, limited)
 
 
@@ -165,12 +167,13 @@ def command(
     )
 
 
-def _none_near(machine: Kinematics, row: int) -> NotInvertible:
+def _none_near(machine: Kinematics, rows: Index) -> NotInvertible:
+    more = f" (and {len(rows) - 1} other rows)" if len(rows) > 1 else ""
     error = NotInvertible(
-        f"row {row}: no axis values of {machine.structure.name!r} near the given ones bring the tool to its "
-        "target; expected a target within reach, and a posture away from a singular one"
+        f"row {rows[0]}{more}: no axis values of {machine.structure.name!r} near the given ones bring the "
+        "tool to its target; expected a target within reach, and a posture away from a singular one"
     )
-    error.row = row
+    error.rows = tuple(rows.tolist())
     return error
 
 
@@ -201,7 +204,7 @@ def _regular(
             here[:, free] += (np.where(found, step, 0.0) / task.scale[free, None]).T
             away = np.linalg.norm(miss[:3], axis=0)
             settled = (away * shrinks < POSITION_MM) & (size * shrinks < _SETTLED_MM)
-            if np.all(settled | ~found):
+            if _WORTH * np.count_nonzero(found & ~settled) <= len(rows):
                 break
         met[rows] = found & settled
         values[rows] = np.where(met[rows, None], here, values[rows])

@@ -128,6 +128,25 @@ def test_what_is_no_axis_value_stays(tmp_path: Path) -> None:
     assert re.fullmatch(rb"P2;12,\d+;1,[78]\d+e1;(99|100),\d{4};[45],\d{4};c", written[5])
 
 
+def test_numbers_keep_their_form(tmp_path: Path) -> None:
+    machine = machine_of(tmp_path, "scara")
+    text = b"J1_deg,J2_deg,J3_mm,J4_deg\n010.50,.5,100.25,+5\n12.5, 1.8E1 ,100,-0.0\n"
+    done = olp.correct_joints(text, machine, tolerance_um=1e4, tolerance_urad=1e4).data
+    first, second = done.splitlines()[2:]
+    assert re.fullmatch(rb"0\d\d\.\d{4},-?\.\d{4},(99|100)\.\d{4},\+[45]\.\d{4}", first)
+    assert re.fullmatch(rb"1\d\.\d{4}, 1\.[78]\d+E1 ,(99|100)\.\d{4},-?0\.\d{4}", second)
+
+
+def test_all_rows_out_of_reach_are_told(tmp_path: Path) -> None:
+    """A straight arm does not reach outward, where its error takes it inward."""
+    machine = machine_of(tmp_path, "scara")
+    rows = [b"12.5,18,100,5", b"41,0,100,5", b"12,17,100,5", b"40,0,100,5"]
+    text = b"# joined=points\nJ1_deg,J2_deg,J3_mm,J4_deg\n" + b"\n".join(rows) + b"\n"
+    with pytest.raises(olp.ProgramError, match="no axis values") as told:
+        olp.correct_joints(text, machine, outside_box="hold")
+    assert [told.value.line, *(other.line for other in told.value.others)] == [4, 6]
+
+
 def test_points_and_times_get_no_rows(tmp_path: Path) -> None:
     machine = machine_of(tmp_path, "scara")
     plain = text_of("scara", postures("scara"))

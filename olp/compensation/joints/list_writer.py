@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from olp.compensation.joints.path import JointPath
 from olp.compensation.joints.planning import JointPlan
@@ -13,6 +14,9 @@ from olp.core.arrays import Array, Index, Mask
 from olp.program.pointlist.axis_list import AxisList
 from olp.program.text.numbers import MOST_DECIMALS, number, spliced, written
 
+#: The bit that makes a letter a small one.
+_LOWER = 0x20
+
 
 def write_list(path: JointPath, plan: JointPlan, stamp: bytes) -> WrittenJoints:
     """The text of a list of axis values with its plan. An inserted row is its own one again, with other axis
@@ -22,7 +26,8 @@ def write_list(path: JointPath, plan: JointPlan, stamp: bytes) -> WrittenJoints:
     head = np.append(plan.move[1:] != plan.move[:-1], True)[: len(move)]
     decimals = np.minimum(np.maximum(rows.decimals, path.places), MOST_DECIMALS)[move]
     scale = 10.0**decimals
-    value = np.rint(plan.command * scale) / scale
+    # no zero has a minus
+    value = np.rint(plan.command * scale) / scale + 0.0
     # a number that is right to its last digit stays as it is written
     same = np.rint(rows.values[move] * scale) == np.rint(plan.command * scale)
     change = np.where(head[:, None], ~same, True)
@@ -52,6 +57,7 @@ class _Cells:
         self.rows, self.data = rows, rows.program.data
         self.value, self.decimals = value.tolist(), decimals.tolist()
         self.start, self.stop = rows.start.tolist(), rows.stop.tolist()
+        self.plain = _plain(rows).tolist()
 
     def edit(
         self, move: Index, head: Mask, change: Mask, insert: Mask, edits: list[tuple[int, int, bytes]]
@@ -79,9 +85,28 @@ class _Cells:
                 edits.append((begin[own], begin[own], spliced(line, cells) + eol))
 
     def _text(self, row: int, own: int, column: int) -> bytes:
+        if self.plain[own][column] and self.decimals[row][column]:
+            return b"%.*f" % (self.decimals[row][column], self.value[row][column])
         form = number(self.data[self.start[own][column] : self.stop[own][column]], self.rows.decimal)
         assert form is not None, "the reader refuses what is no number"
         value, decimals = self.value[row][column], self.decimals[row][column]
         # with an exponent the digits before the mark count as decimals
         decimals += len(f"{abs(value):.0f}") if form.letter else 0
         return written(form, value, decimals, self.rows.decimal)
+
+
+def _plain(rows: AxisList) -> Mask:
+    """(n, axes) numbers that need no look at their form: a whole part without plus and filling zeros, with a
+    point and no exponent."""
+    if rows.decimal != b".":
+        return np.zeros(rows.values.shape, bool)
+    text = np.frombuffer(rows.program.data, np.uint8)
+    first = rows.start + (text[rows.start] == ord("-"))
+    digits = _is_digit(text[first])
+    filled = (text[first] == ord("0")) & _is_digit(text[np.minimum(first + 1, len(text) - 1)])
+    letters = np.cumsum(np.append(0, (text | _LOWER == ord("e")) | (text | _LOWER == ord("d"))))
+    return np.asarray(digits & ~filled & (letters[rows.stop] == letters[rows.start]), bool)
+
+
+def _is_digit(byte: npt.NDArray[np.uint8]) -> Mask:
+    return np.asarray((byte >= ord("0")) & (byte <= ord("9")), bool)

@@ -120,7 +120,7 @@ class Motion:
         away = np.linalg.norm(target - self._axis(place), axis=1)
         if (away > _DIRECTED_RAD).any():
             error = NotInvertible("no rotary axis values give the direction of the tool")
-            error.row = int(rows[away.argmax()])
+            error.rows = tuple(rows[away > _DIRECTED_RAD].tolist())
             raise error
         return place
 
@@ -203,10 +203,10 @@ def _great_circle(start: Array, end: Array, share: Array) -> Array:
 
 @contextlib.contextmanager
 def _of_rows(rows: Rows) -> Iterator[None]:
-    """Names the row of all rows in an error that names one of some."""
+    """Names rows of all rows in an error that names some of a part."""
     try:
         yield
     except NotInvertible as error:
-        if error.row is not None and not isinstance(rows, slice):
-            error.row = int(rows[error.row])
+        if not isinstance(rows, slice):
+            error.rows = tuple(rows[list(error.rows)].tolist())
         raise

@@ -148,13 +148,16 @@ def _commanded(path: JointPath, move: Index, axes: Array, tool: Index, shift: Ar
     try:
         done = path.motion.command(axes, tool, shift)
     except NotInvertible as error:
-        if error.row is None:
+        if not error.rows:
             raise
-        raise ProgramError(
-            "no axis values bring the tool to where this move has it; expected a target within reach, away "
-            "from a singular posture",
-            line=int(path.line[move[error.row]]),
-            code="OLP566",
+        raise ProgramError.together(
+            ProgramError(
+                "no axis values bring the tool to where this move has it; expected a target within reach, "
+                "away from a singular posture",
+                line=line,
+                code="OLP566",
+            )
+            for line in distinct(path.line[move[list(error.rows)]]).tolist()
         ) from None
     out = np.flatnonzero(done.beyond.any(axis=1))
     if out.size:
