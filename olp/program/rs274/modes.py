@@ -35,6 +35,8 @@ from olp.program.rs274.profiles.base import Act, Profile
 Modal = npt.NDArray[np.int16]
 
 _FLOW = pattern(rb"[#\[=<]|^/?\s*O|^\W*N?\d*\s*(IF|WHILE|GOTO|END|DO|CALL|RTS)", re.IGNORECASE)
+#: The number of a program on ISO controls.
+_PROGRAM = b":1"
 _POLAR = pattern(rb"[@^]")
 #: What to do where the unroller helps.
 UNROLL = "unroll the program with --flatten"
@@ -363,6 +365,12 @@ def _odd(data: bytes, chunk: WordChunk, line: int, profile: Profile, *, words: b
         )
     if profile.unroller is not None and profile.language.splines and _POLAR.search(text):
         return ProgramError(f"`{shown}` states a radius or an angle", hint=UNROLL, line=number, code="OLP511")
+    if text.startswith(b":") and inert is not None and inert.fullmatch(_PROGRAM):
+        return ProgramError(
+            f"`{shown}` begins with a colon, with which a program begins on this control; write N instead",
+            line=number,
+            code="OLP510",
+        )
     comma = "; write a decimal point instead of the comma" if _COMMA.search(text) else ""
     return ProgramError(
         f"`{shown}` is not understood and may move the machine; expected words of a letter and a number"

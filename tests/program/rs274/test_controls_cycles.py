@@ -67,6 +67,19 @@ def test_a_colon_begins_the_number_of_a_program(reading) -> None:  # type: ignor
     assert text == ":1\nG21 G90\nG91 G1 X5. F9.\nG90\nG91 G1 X5. F9.\nG90\nM30\n"
 
 
+@pytest.mark.parametrize("flatten", [False, True])
+def test_a_colon_in_front_of_words_is_named(flatten: bool, reading) -> None:  # type: ignore[no-untyped-def]
+    """As a common post of NX has it for changes of tools; these controls begin a program there."""
+    body = ":0030 T01 M06\nX5.\n"
+    if flatten:
+        assert ":0030 T01 M06\n" in fanuc(START + body + "M30\n")
+    with pytest.raises(
+        ProgramError, match=r"`:0030 T01 M06` begins with a colon, .* write N instead"
+    ) as caught:
+        reading(body)
+    assert (caught.value.code, caught.value.line) == ("OLP510", 4)
+
+
 OKUMA = "G21 G90 G17\nG0 X0. Y0. Z50.\n"
 
 

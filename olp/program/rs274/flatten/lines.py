@@ -100,7 +100,7 @@ def compile_line(line: bytes, number: int, language: Language) -> Line:
     text, places, comments = compact(raw)
     if text.startswith("%"):
         return Line(number, raw, eol, percent=True)
-    if language.macro_b and text.startswith(":"):
+    if language.macro_b and text.startswith(":") and text[1:].isdigit():
         # another way to write the number of a program
         text = "o" + text[1:]
     start = 0

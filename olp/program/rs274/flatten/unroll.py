@@ -75,8 +75,9 @@ def flatten(
     """
     strokes = stroke_budget(len(data))
     writer = _Flattener(
-        profile, strokes, expand_cycles=expand_cycles, peck_clearance=peck_clearance, parameters=parameters
-    )
+        profile, strokes, expand_cycles=expand_cycles, peck_clearance=peck_clearance, parameters=parameters,
+        switch_open=block_delete is None,
+    )  # fmt: skip
     main = Unit(data, profile, file)
     visit = writer.block
     budget = Budget.of(len(data), least=limit, per_byte=UNROLLED_PER_BYTE, message=_TOO_LONG)
@@ -107,13 +108,15 @@ class _Flattener:
 
     def __init__(
         self, profile: Profile, strokes: Budget, *, expand_cycles: bool, peck_clearance: float | None,
-        parameters: Mapping[str, float] | None = None,
+        parameters: Mapping[str, float] | None = None, switch_open: bool = False,
     ) -> None:  # fmt: skip
         self.language, self.cycles = profile.language, profile.cycles
         self.state = ProgramState(profile)
         self.variables = Variables(self.state, parameters)
         self.splines = Splines(self.state)
         self.strokes = strokes
+        #: whether blocks under block delete may run or not
+        self.switch_open = switch_open
         #: whether a block has words of axes
         self.moves = False
         self.expand_cycles = expand_cycles
@@ -187,8 +190,12 @@ class _Flattener:
         for i, word in enumerate(line.words):
             if self._vacant(word, values[i][1]) or (word.letter == "n" and seen):
                 cut.add(i)
+        start = list(self.state.position)
         for _ in range(self._polar_repeats(line, values, cut)):
             active = self._carry_out(line, values, frozenset(cut), exact=frame.unit.radius_arcs)
+        if line.deleted and self.switch_open:
+            # where the switch leaves the block out, the axes are still where they were
+            self.state.forget(axis for axis in range(3) if self.state.position[axis] != start[axis])
         for target, value in settings:
             self.variables.assign(target, value)
         return any(letter == "m" and value in _ENDS for letter, value in active)

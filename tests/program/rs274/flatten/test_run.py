@@ -402,3 +402,18 @@ def test_the_work_is_bounded_by_the_bytes_of_blocks() -> None:
     # a long program may do more: 80 for each of its bytes
     endless = "o1 while [1]\no1 endwhile\n"
     assert refused(endless, limit=1)[1] == f"the run visits more than {80 * len(endless)} {ending}"
+
+
+@pytest.mark.parametrize(("profile", "x", "y"), [("linuxcnc", "#5420", "#5421"), ("fanuc", "#5001", "#5002")])
+def test_a_position_behind_a_block_under_the_switch_is_not_known(profile: str, x: str, y: str) -> None:
+    """The axis is where the block ends, or where it was: until a block without `/` states it."""
+    moved = "G21 G90\nG0 X0. Y0. Z0.\n/G0 X5. Y0.\n"
+    code, why, line = refused(f"{moved}G1 X[{x}+1.] F9\nM2\n", profile, block_delete=None)
+    assert (code, line) == ("OLP524", 4)
+    assert "position of X is needed" in why
+    for text in (f"{moved}G1 Y[{y}+1.] F9\nM2\n", f"{moved}X7.\nG1 Y[{x}-6.] F9\nM2\n"):
+        assert b"G1 Y1. F9" in flatten(text.encode(), profile=profile, block_delete=None).replace(
+            b"Y1 ", b"Y1. "
+        )
+    run = flatten(f"{moved}G1 X[{x}+1.] F9\nM2\n".encode(), profile=profile, block_delete=False)
+    assert b"G1 X6" in run
