@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 @click.option("--compare", is_flag=True, help="Write nothing; show the residual error of every format.")
 @click.option("--program", metavar="PROGRAM", help="Also show the residual error along this program.")
 @click.option("--most-rows", type=Count(min=2), help="Rows that the control takes in one table.")
+@click.option("--self-test", is_flag=True, help="Compile written code here and compare it with the model.")
 @doubt_options
 @json_option()
 @fail_on_option
@@ -45,6 +46,7 @@ def command(
     compare: bool,
     program: str | None,
     most_rows: int | None,
+    self_test: bool,
     date: datetime.date | None,
     accept: tuple[str, ...],
     as_json: bool,
@@ -57,9 +59,9 @@ def command(
     force: bool,
     **unrolling: Any,
 ) -> None:
-    """Write a calibration as the compensation table of a control, and show the residual error.
+    """Write a calibration as the compensation table of a control, or as code that corrects in real time.
 
-    The figures stand next to those of a corrected program, so that you can choose either.
+    The residual error is shown next to that of a corrected program, so that you can choose.
     """
     from olp.files.write import write_files
     from olp.workflows.calibrate_export import compare_tables, export_table
@@ -79,8 +81,9 @@ def command(
         raise UsageError("a table is written to files; name the first one with -o")
     refuse_early([output], inputs, force=force)
     exported = export_table(
-        machine, kind, output, job, sense=sense, comp_type=comp_type, axis_names=names, **common
-    )
+        machine, kind, output, job, sense=sense, comp_type=comp_type, axis_names=names,
+        self_test=self_test, **common,
+    )  # fmt: skip
     write_files(exported.files, force=force, inputs=inputs)
     _put(exported.report, as_json)
     for finding in exported.findings:
@@ -111,6 +114,10 @@ def _put(report: dict[str, Any], as_json: bool) -> None:
     for key, form in report.get("formats", {}).items():
         for finding in form["findings"]:
             lines.append(f"{key}: {finding['message']}")
+    if "self_test" in report:
+        lines.append(f"self-test: {report['self_test']}")
+    if "real_time" in report:
+        lines += ["once the control runs it, in the machine file:", f'real_time = "{report["real_time"]}"']
     if "compensated_by_controller" in report:
         listed = ", ".join(f'"{name}"' for name in report["compensated_by_controller"])
         lines += ["with this table active, in the machine file:", f"compensated_by_controller = [{listed}]"]

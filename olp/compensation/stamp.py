@@ -1,4 +1,8 @@
-"""The stamp of a corrected program: a comment in front of it, by which a second correction is refused."""
+"""The stamp of a program: a comment in front of it, by which a second correction is refused.
+
+`olp-corrected` marks a program with its corrections, `olp-real-time` one without that needs them from the
+control. Both name the calibration.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +16,14 @@ from olp.core.version import __version__
 _STAMP = pattern(rb"olp-corrected ([0-9a-f]{12})")
 #: What stands behind it: the version, and the codes of the doubts that were accepted.
 _ACCEPTED = pattern(_STAMP.pattern + rb" olp \S+ accepted((?: OLP[0-9]{3})+)")
+
+#: The stamp of a program for a control that corrects in real time.
+_REAL_TIME = pattern(rb"olp-real-time ([0-9a-f]{12})")
+
+
+def find_real_time(text: bytes) -> re.Match[bytes] | None:
+    """The stamp in a text that needs its corrections from the control."""
+    return _REAL_TIME.search(text)
 
 
 def find_stamp(text: bytes) -> re.Match[bytes] | None:
@@ -33,11 +45,14 @@ def accepted_in(text: bytes, digest: str | None) -> frozenset[str]:
     return frozenset(stamp.group(2).decode().split())
 
 
-def stamp_line(digest: str, comment: tuple[bytes, bytes], accepted: Sequence[str] = ()) -> bytes:
+def stamp_line(
+    digest: str, comment: tuple[bytes, bytes], accepted: Sequence[str] = (), *, real_time: bool = False
+) -> bytes:
     """The stamp for the calibration with this hash and the codes of `accepted` doubts, between the marks of a
-    comment."""
+    comment; `real_time`: the control corrects by it, the program does not."""
     before, after = comment
-    words = ["olp-corrected", digest[:12], "olp", __version__, *(["accepted", *accepted] if accepted else [])]
+    kind = "olp-real-time" if real_time else "olp-corrected"
+    words = [kind, digest[:12], "olp", __version__, *(["accepted", *accepted] if accepted else [])]
     return before + " ".join(words).encode() + after
 
 

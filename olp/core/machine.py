@@ -144,6 +144,8 @@ class Machine:
     `arc_centres` says what I, J and K are at the start, and `cycle_return` where canned cycles return, to a
     control that has a setting for it.
     `still_macros` are the macros of a printer that move no axis and change no mode.
+    `real_time` is the beginning of the hash of the calibration that the control itself corrects by in every
+    servo cycle, None where it does not.
     `styli` are end of the ram to centre of the tip of sensors by label.
     `path_mode` is the mode at the start of a program, `blend_mm` the tolerance where the program names none
     (None: not stated). `times` is what the control takes beside motion. `tool_change_moves`: M6 may move the
@@ -157,6 +159,7 @@ class Machine:
     axes: Mapping[str, Axis]
     calibration: str | None = None
     compensated_by_controller: frozenset[str] = frozenset()
+    real_time: str | None = None
     work_offsets: Mapping[str, WorkOffset] = field(default_factory=dict)
     tools: Mapping[int, Tool] = field(default_factory=dict)
     styli: Mapping[str, Vector] = field(default_factory=dict)

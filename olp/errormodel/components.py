@@ -86,7 +86,7 @@ class AxisComponents:
         cls, calibration: Calibration, axis: str, skip: frozenset[str], cyclic: tuple[ActingTerm, ...]
     ) -> AxisComponents:
         j = AXES.index(axis)
-        columns = _Columns(calibration, axis, skip)
+        columns = AxisColumns(calibration, axis, skip)
         mean, half = columns.slots("mean"), columns.slots("half")
         table = columns.table()
         low, high = (float(face) for face in calibration.box_mm[j])
@@ -146,14 +146,15 @@ class AxisComponents:
         )
 
 
-class _Columns:
-    """Gathers the columns of all curves of one axis, to be resampled onto one grid."""
+class AxisColumns:
+    """Gathers the columns of all curves of one axis, to be resampled onto one grid. Column i is column
+    `of_column[i][1]` of `interpolants[of_column[i][0]]`."""
 
     def __init__(self, calibration: Calibration, axis: str, skip: frozenset[str]) -> None:
         self._axis = axis
         self._keys: list[tuple[str, str]] = []
-        self._interpolants: list[Interpolant] = []
-        self._of_column: list[tuple[int, int]] = []
+        self.interpolants: list[Interpolant] = []
+        self.of_column: list[tuple[int, int]] = []
         for curve in calibration.curves_of(axis):
             kept: list[Array] = []
             for name in curve.names:
@@ -162,36 +163,40 @@ class _Columns:
                 for key, values in (("mean", curve.mean(name)), ("half", curve.half_difference(name))):
                     if values is not None and np.any(values != 0.0):
                         self._keys.append((key, name))
-                        self._of_column.append((len(self._interpolants), len(kept)))
+                        self.of_column.append((len(self.interpolants), len(kept)))
                         kept.append(values)
             if kept:
                 y = np.stack(kept, axis=1)
-                self._interpolants.append(Interpolant.through(curve.position_mm, y, curve.interpolation))
+                self.interpolants.append(Interpolant.through(curve.position_mm, y, curve.interpolation))
 
     def slots(self, key: str) -> tuple[int | None, ...]:
         names = [(key, f"E{d}{self._axis}") for d in DIRECTIONS]
         return tuple(self._keys.index(name) if name in self._keys else None for name in names)
 
-    def table(self) -> DenseTable:
-        if not self._interpolants:
-            return DenseTable(0.0, 1.0, 1, None, ())
-        low = max(float(f.x[0]) for f in self._interpolants)
-        high = min(float(f.x[-1]) for f in self._interpolants)
-        knots = distinct(np.concatenate([f.x for f in self._interpolants]))
-        curvature = np.concatenate([f.max_curvature() for f in self._interpolants])
-        tolerance = [TABLE_RAD if name[1] in "ABC" else TABLE_MM for _, name in self._keys]
-
-        def evaluate(q: Array) -> Array:
-            return np.concatenate([f(q) for f in self._interpolants], axis=1)
-
+    def knots(self) -> Array:
+        """Where the columns are resampled in any case: positions that all curves of the axis cover."""
+        low = max(float(f.x[0]) for f in self.interpolants)
+        high = min(float(f.x[-1]) for f in self.interpolants)
+        knots = distinct(np.concatenate([f.x for f in self.interpolants]))
         knots = knots[(knots >= low) & (knots <= high)]
         # Files of one axis may differ by rounding; two knots that close are one.
         apart = np.concatenate([[True], np.diff(knots) > ON_GRID_MM])
-        return dense_table(knots[apart], evaluate, curvature.tolist(), tolerance)
+        return np.asarray(knots[apart], float)
+
+    def table(self) -> DenseTable:
+        if not self.interpolants:
+            return DenseTable(0.0, 1.0, 1, None, ())
+        curvature = np.concatenate([f.max_curvature() for f in self.interpolants])
+        tolerance = [TABLE_RAD if name[1] in "ABC" else TABLE_MM for _, name in self._keys]
+
+        def evaluate(q: Array) -> Array:
+            return np.concatenate([f(q) for f in self.interpolants], axis=1)
+
+        return dense_table(self.knots(), evaluate, curvature.tolist(), tolerance)
 
     def variation(self, slot: int, table: DenseTable) -> Variation:
-        which, column = self._of_column[slot]
-        return Variation.of_curve(self._interpolants[which], column, table.step)
+        which, column = self.of_column[slot]
+        return Variation.of_curve(self.interpolants[which], column, table.step)
 
 
 def _plus(a: Column | None, b: Column) -> Column:

@@ -322,6 +322,11 @@ class MachineFile(Table):
         description="the errors that the control corrects now and did not correct while measuring: a list of "
         'ISO 230-1 names, or "all"',
     )
+    real_time: Text | None = Field(
+        default=None,
+        description="the hash of the calibration that the control corrects by in real time, as "
+        "`olp calibrate export` prints it for code; left out where the control does not",
+    )
     axes: AxesTable = Field(description="the tables [axes.X], [axes.Y] and [axes.Z]")
     path: PathTable = Field(
         default_factory=PathTable, description="the table [path]: how the control moves from block to block"

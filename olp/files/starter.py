@@ -54,6 +54,8 @@ def machine_toml(machine: Machine, notes: Iterable[str] = ()) -> str:
     lines += toml_lines({"controller": machine.controller, "calibration": machine.calibration})
     lines += comment("What the control corrects now and did not correct while measuring, by ISO 230-1 name.")
     lines += toml_lines({"compensated_by_controller": "all" if compensated == ["all"] else compensated})
+    if machine.real_time is not None:
+        lines += toml_lines({"real_time": machine.real_time})
     if machine.missing_limits:
         keys = "velocity_mm_s, acceleration_mm_s2 and jerk_mm_s3"
         lines += ["", *comment(f"Only a motion in time (olp retime) needs {keys} of each axis.")]

@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from olp.calibration.control_tables.controls import Control
+from olp.calibration.control_tables.controls import Control, RealTime
 from olp.calibration.control_tables.residuals import (
     CORRECT,
+    REAL_TIME,
     UNCOMPENSATED,
     Residual,
     along,
@@ -27,6 +28,9 @@ from olp.errormodel.base import ErrorModel
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration, Reference
 from olp.files.calibration.reader import load_calibration
+from olp.files.control_code.compiled import self_test as run_self_test
+from olp.files.control_code.registry import CODE, write_code
+from olp.files.control_code.source import HASH_DIGITS
 from olp.files.control_tables.base import Exported, Given, Sense
 from olp.files.control_tables.registry import FORMATS, format_named, read_table, write_table
 from olp.files.sources import Sources
@@ -36,7 +40,7 @@ from olp.workflows import refusals
 from olp.workflows.control_table import given_of
 from olp.workflows.correct import CorrectOptions, corrected
 from olp.workflows.doubt import acceptable
-from olp.workflows.session import Loaded, PathLike, Session
+from olp.workflows.session import Loaded, PathLike, Session, content_of, digest_of
 
 #: Number of random points over the box.
 POINTS = 4000
@@ -49,7 +53,7 @@ _MAIN = Path("table")
 @dataclass(frozen=True, slots=True, eq=False)
 class TableExport:
     """The files of a table, findings, and the report as a mapping ("olp-tables-1"): the residual errors, and
-    `compensated_by_controller` for the machine file once the table is active."""
+    for the machine file `compensated_by_controller` once the table is active, `real_time` once code is."""
 
     files: Mapping[Path, bytes]
     findings: tuple[Finding, ...]
@@ -70,6 +74,7 @@ def export_table(
     axis_names: Mapping[str, str] | None = None,
     reference: Reference | None = None,
     most_rows: int | None = None,
+    self_test: bool = False,
     chain: str | None = None,
     flatten: bool = False,
     expand_cycles: bool = False,
@@ -77,7 +82,9 @@ def export_table(
     date: datetime.date | None = None,
     accept: Sequence[str] = (),
 ) -> TableExport:
-    """Write the calibration of a machine, or a calibration file alone, as the table of a control.
+    """Write the calibration of a machine, or a calibration file alone, as the table of a control, or as code
+    that corrects in real time (`olp.files.control_code`). `self_test` compiles the code here and compares it
+    with the model.
 
     The report states the residual error over the calibrated box and, with `program`, along it. The figures
     are those of the written table, read back. `flatten` and the options after it are those of `correct`, for
@@ -89,12 +96,20 @@ def export_table(
     )  # fmt: skip
     source = _source(machine, job, calibration, chain)
     given = given_of(source.machine, chain, sense, None, comp_type, axis_names, reference, most_rows)
-    form = format_named(kind)
-    written = write_table(source.rest, kind, Path(target), given)
-    control = _control(written, kind, given, source)
-    report = _report(source, {form.key: control}, program, options)
-    corrects = sorted(written.corrects | source.compensated)
-    report["compensated_by_controller"] = corrects
+    if kind in CODE:
+        files = write_code(source.rest, source.chain, source.digest, kind, Path(target))
+        written = Exported(files, frozenset())
+        control: Control = RealTime(source.model)
+    else:
+        written = write_table(source.rest, format_named(kind).key, Path(target), given)
+        control = _control(written, kind, given, source)
+    report = _report(source, {kind: control}, program, options)
+    if self_test:
+        report["self_test"] = run_self_test(CODE.get(kind), written.files)
+    if kind in CODE:
+        report["real_time"] = source.digest[:HASH_DIGITS]
+    else:
+        report["compensated_by_controller"] = sorted(written.corrects | source.compensated)
     findings = (*source.findings, *written.findings)
     report["findings"] = [finding.as_dict() for finding in findings]
     return TableExport(written.files, findings, written.notes, report)
@@ -133,6 +148,7 @@ def compare_tables(
         written = write_table(source.rest, key, _MAIN.with_suffix(form.ending), given)
         controls[key] = _control(written, key, given, source)
         findings[key] = [f.as_dict() for f in written.findings if f.code not in ("OLP874", "OLP875")]
+    controls[REAL_TIME] = RealTime(source.model)
     report = _report(source, controls, program, options)
     report["formats"] = {
         key: {"title": form.title, "status": form.status, "holds": form.holds, "findings": findings[key]}
@@ -150,6 +166,7 @@ class _Source:
     machine: Machine | None
     loaded: Loaded | None
     chain: str
+    digest: str
     rest: Calibration
     model: ErrorModel
     tools_mm: np.ndarray
@@ -169,13 +186,17 @@ def _source(
     if calibration is not None:
         alone = load_calibration(calibration, read=sources.read)
         model = build(alone, chain or "FXYZ", outside="hold")
+        digest = digest_of(content_of(sources, calibration), chain or "FXYZ")
         return _Source(
-            sources, None, None, chain or "FXYZ", alone, model, np.zeros((1, 3)), np.full(3, 1e-3),
+            sources, None, None, chain or "FXYZ", digest, alone, model, np.zeros((1, 3)), np.full(3, 1e-3),
             frozenset(), (),
         )  # fmt: skip
     if chain is not None:
         raise UsageError("--chain goes with -c; the machine file states its own chain")
-    loaded = Session.start(machine, job, sources=sources).loaded("hold")
+    session = Session.start(machine, job, sources=sources)
+    # what the control corrects by now does not matter to what it will
+    session = replace(session, setup=_by_itself(session.setup))
+    loaded = session.loaded("hold")
     described = loaded.setup.machine
     skip = described.compensated_by_controller - loaded.calibration.active_during_measurement
     findings = []
@@ -185,11 +206,16 @@ def _source(
     tool_vectors = {
         tool.tool_vector_mm for tool in described.tools.values() if tool.tool_vector_mm is not None
     }
+    rest = _without(loaded.calibration, skip)
     return _Source(
-        sources, described, loaded, described.chain, _without(loaded.calibration, skip), loaded.model,
+        sources, described, loaded, described.chain, loaded.digest, rest, loaded.model,
         np.array(sorted(tool_vectors) or [(0.0, 0.0, 0.0)]), np.array(described.least_increment_mm),
         described.compensated_by_controller, tuple(findings),
     )  # fmt: skip
+
+
+def _by_itself(setup: Setup) -> Setup:
+    return replace(setup, machine=replace(setup.machine, real_time=None))
 
 
 def _without(calibration: Calibration, skip: frozenset[str]) -> Calibration:

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from olp.checks import correction as checks
 from olp.compensation.planning import written_plans
-from olp.compensation.stamp import find_stamp, stamp_line, stamped
+from olp.compensation.stamp import find_real_time, find_stamp, stamped
 from olp.compensation.tally import Tally
 from olp.compensation.writer import Task
 from olp.compensation.writing import write
@@ -322,11 +322,13 @@ def _written(
             program, loaded, options, refuse_outside=options.outside_box == "refuse",
             split_rapids=options.split_rapids,
         )  # fmt: skip
-        stamp = stamp_line(loaded.digest, loaded.dialect.comment, accepted) if loaded.dialect.marks else b""
+        marked = find_real_time(source.data) is not None
+        stamp = loaded.stamp(accepted) if loaded.dialect.marks and not marked else b""
+        always = bool(accepted) or loaded.setup.machine.real_time is not None
         increments_mm = loaded.setup.machine.least_increment_mm
         task = Task(
             program.programmed or program, loaded.model, limits.tolerance_mm, increments_mm,
-            b"" if unrolled is not None else stamp, bool(accepted), located=unrolled is not None,
+            b"" if unrolled is not None else stamp, always, located=unrolled is not None,
         )  # fmt: skip
         written = write(task, written_plans(program, loaded.model, limits, increments_mm, told), told)
     nominal = replace(program, words=None, slot=np.zeros((0, 3), np.int32), programmed=None, blocks=None)
@@ -339,7 +341,7 @@ def _written(
         flat = text
         kept = with_flow(unrolled, text, written.starts, loaded)
         flow, text = Flow(kept), kept.text
-        if text is not None and stamp and (kept.changed or accepted):
+        if text is not None and stamp and (kept.changed or always):
             text = stamped(text, stamp, program.eol(1), loaded.dialect.first)
     parts = written.parts if program.blocks is None else written.parts[program.blocks]
     return _Rewritten(source, nominal, text, written.uncorrected, parts, written.tally, doubts, flow, flat)

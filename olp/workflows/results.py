@@ -28,6 +28,7 @@ from olp.results.frames import frame_of, stylus_of
 from olp.results.reported import Reported, Stated, missing
 from olp.results.table import read_table
 from olp.results.writing import write
+from olp.workflows import real_time
 from olp.workflows.doubt import acceptable, accepted_of, with_accepted
 from olp.workflows.results_report import report_of
 from olp.workflows.session import Loaded, Outside, PathLike, Session, opened
@@ -115,6 +116,7 @@ def correct_results(
 
 def run(session: Session, results: Source, options: ResultOptions) -> ResultCorrection:
     """As `correct_results`, in a session."""
+    real_time.refuse_correcting(session.setup.machine)
     loaded = session.loaded(options.outside_box)
     profile = options.profile
     if profile is not None and not isinstance(profile, Layout):

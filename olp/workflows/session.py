@@ -10,6 +10,7 @@ from operator import index
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
+from olp.compensation.stamp import stamp_line
 from olp.core.errors import ConfigError, InputError, UsageError
 from olp.core.machine import Setup
 from olp.core.values import dataclass
@@ -24,6 +25,7 @@ from olp.files.config import read_setup
 from olp.files.sources import Source, Sources
 from olp.program.dialect import Dialect
 from olp.program.registry import DIALECTS, dialect_of, find
+from olp.workflows import real_time
 from olp.workflows.known import Stated, described_by
 
 PathLike = str | Path
@@ -79,11 +81,33 @@ class Loaded:
             },
         }
 
+    def stamp(self, accepted: Sequence[str] = ()) -> bytes:
+        """The stamp of a program for this machine, with the codes of accepted doubts."""
+        by_control = self.setup.machine.real_time is not None
+        return stamp_line(self.digest, self.dialect.comment, accepted, real_time=by_control)
+
     def reading(self, program: Source) -> Loaded:
         """The same for a program: its dialect is detected here, also for later versions of it. Raises
-        ProgramError where it cannot be detected, UsageError for an unknown name."""
+        ProgramError where it cannot be detected, or where the program is corrected and the control corrects
+        too, UsageError for an unknown name."""
+        real_time.refuse_stamped(self.setup.machine, self.digest, program)
         setup, dialect = _settled(self.setup, self.dialect, program)
         return replace(self, setup=setup, dialect=dialect)
+
+
+def content_of(sources: Sources, calibration: PathLike) -> bytes:
+    """The bytes of a calibration file and of the files that it names."""
+    files = (calibration, *files_beside(calibration, sources.read))
+    return b"".join(sources.read(file) for file in files)
+
+
+def digest_of(content: bytes, chain: str, left_out: frozenset[str] = frozenset()) -> str:
+    """The hash of a calibration, on a chain and without the components that are left out."""
+    digest = hashlib.sha256(content)
+    digest.update(repr(chain).encode())
+    if left_out:
+        digest.update(repr(sorted(left_out)).encode())
+    return digest.hexdigest()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -218,6 +242,8 @@ class Session:
             from olp.uncertainty.components import improbable
 
             left_out = improbable(calibration, uncertainty) - skip
+        if machine.real_time is not None:
+            calibration = real_time.corrected(machine, calibration, self._digest(frozenset()))
         model = build(calibration, machine.chain, outside=outside, skip_components=skip | left_out)
         digest = self._digest(left_out)
         control = self.control()
@@ -248,16 +274,9 @@ class Session:
         """Hash of the calibration file, the files that it names and the machine values that decide the
         model; of a stated calibration its statement."""
         calibration = self.setup.machine.calibration
-        if calibration is None:
-            digest = hashlib.sha256(self.stated.statement.encode() if self.stated else b"")
-        else:
-            digest = hashlib.sha256(self.sources.read(calibration))
-            for file in files_beside(calibration, self.sources.read):
-                digest.update(self.sources.read(file))
-        digest.update(repr(self.setup.machine.chain).encode())
-        if left_out:
-            digest.update(repr(sorted(left_out)).encode())
-        return digest.hexdigest()
+        statement = self.stated.statement.encode() if self.stated else b""
+        content = statement if calibration is None else content_of(self.sources, calibration)
+        return digest_of(content, self.setup.machine.chain, left_out)
 
     def once(self, name: str, make: Callable[[], T]) -> T:
         """What `make` gives, which depends on machine, job and calibration alone; it is made once."""

@@ -155,7 +155,7 @@ def options() -> frozenset[str]:
     "path", [p for p in PAGES if p not in HISTORY and p.name != "measured.md"], ids=name_of
 )
 def test_every_option_that_is_named_exists(path: Path) -> None:
-    others = r"(apt-get|pip|pytest|halsampler|mypy|ruff|python tests|run\.py|--post=)[^`\n]*"
+    others = r"(apt-get|pip|pytest|halsampler|halcompile|mypy|ruff|python tests|run\.py|--post=)[^`\n]*"
     ours = re.sub(others, "", path.read_text("utf-8"))
     assert set(re.findall(r"(?<![\w-])--[a-z][a-z-]+", ours)) <= options()
 

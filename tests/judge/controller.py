@@ -27,6 +27,7 @@ ARC = 3
 _STARTS = 3
 _LATE = re.compile("not within .* s: (machine on|homed|started)")
 _DRIVER = Path(__file__).with_name("controller_driver.py")
+_LOCKSTEP = Path(__file__).with_name("lockstep.c")
 _NETS = {
     "joint.0.pos-cmd": "sampler.0.pin.0",
     "joint.1.pos-cmd": "sampler.0.pin.1",
@@ -44,11 +45,12 @@ _NETS = {
 @dataclass(frozen=True, slots=True)
 class Run:
     """Commanded axis positions (n, 3) in mm, one row a servo cycle, and the kind of motion (n,); `motor`
-    (n, 3) are the commands to the drives, tables of the control included."""
+    (n, 3) are the commands to the drives, tables of the control included; `pins` are those asked for."""
 
     axis: np.ndarray
     kind: np.ndarray
     motor: np.ndarray
+    pins: np.ndarray
 
     @property
     def cutting(self) -> np.ndarray:
@@ -68,22 +70,38 @@ def require() -> None:
     pytest.skip("needs LinuxCNC: apt-get install --no-install-recommends linuxcnc-uspace")
 
 
+@dataclass(frozen=True, slots=True)
+class Kinematics:
+    """A component `name`, compiled in `folder`, and the lines of HAL that go with it; `pins` are sampled
+    besides. Its functions `begin` and `end` go around motion-controller."""
+
+    name: str
+    folder: Path
+    hal: str
+    pins: tuple[str, ...] = ()
+    acceleration_mm_s2: float = ACCELERATION_MM_S2
+
+
 def run(
-    program: bytes, machine: Path, folder: Path, *, limit_s: float = 240.0, tables: Path | None = None
-) -> Run:
+    program: bytes, machine: Path, folder: Path, *, limit_s: float = 240.0, tables: Path | None = None,
+    kinematics: Kinematics | None = None,
+) -> Run:  # fmt: skip
     """Execute a program from axis position 0 with the offsets and tools of a machine folder; `tables` is an
-    INI file whose keys of joints are taken over, its files lie beside it.
+    INI file whose keys of joints are taken over, its files lie beside it. `kinematics` takes the place of the
+    identity; then the control runs in virtual time.
 
     Raises RuntimeError where the control reports an error or does not end in time.
     """
     folder = folder.resolve()
     folder.mkdir(parents=True, exist_ok=True)
-    _configure(machine, folder, tables)
+    _configure(machine, folder, tables, kinematics)
     (folder / "p.ngc").write_bytes(program)
     env = {"HOME": str(folder), "PATH": "/usr/bin:/bin:/usr/sbin:/sbin", "CONTROLLER_LIMIT_S": str(limit_s)}
     env["CONTROLLER_FOLDER"] = str(folder)
     if os.getuid() == 0:  # the realtime part refuses to be root
         env |= {"RTAPI_UID": "65534", "RTAPI_FIFO_PATH": str(folder / ".rtapi_fifo")}
+    if kinematics is not None:
+        env |= _in_step(folder, kinematics)
     lock = Path(tempfile.gettempdir()) / "judge-controller.lock"
     driver_log = folder / "driver.log"
     with lock.open("wb") as one, (folder / "log").open("wb") as log:
@@ -91,7 +109,8 @@ def run(
         fcntl.flock(one, fcntl.LOCK_EX)
         for _ in range(_STARTS):
             if os.getuid() == 0:
-                _open(folder)
+                for opened in (folder, *([kinematics.folder] if kinematics else [])):
+                    _open(opened)
             try:
                 subprocess.run(
                     ["linuxcnc", str(folder / "m.ini")],
@@ -107,8 +126,22 @@ def run(
         texts = [p.read_text(errors="replace")[-2000:] for p in (driver_log, debug) if p.exists()]
         detail = texts[0] if texts else "it did not start"
         raise RuntimeError(f"the control did not run the program to its end: {detail}")
-    rows = np.loadtxt(folder / "samples", comments=None, usecols=range(1, 8))
-    return Run(rows[:, :3], rows[:, 3].astype(int), rows[:, 4:])
+    more = len(kinematics.pins) if kinematics else 0
+    rows = np.loadtxt(folder / "samples", comments=None, usecols=range(1, 8 + more))
+    return Run(rows[:, :3], rows[:, 3].astype(int), rows[:, 4:7], rows[:, 7:])
+
+
+def _in_step(folder: Path, kinematics: Kinematics) -> dict[str, str]:
+    """The environment that lets each servo cycle wait for the task, and finds the component."""
+    library, counters = folder / "lockstep.so", folder / "counters"
+    subprocess.run(["gcc", "-shared", "-fPIC", "-O2", "-o", library, _LOCKSTEP], check=True)
+    counters.write_bytes(bytes(4096))
+    counters.chmod(0o666)
+    module = kinematics.folder / f"{kinematics.name}.so"
+    return {
+        "LD_PRELOAD": str(library), "LOCKSTEP": str(counters), "LOCKSTEP_DT": str(PERIOD_NS),
+        "LOCKSTEP_MODULE": str(module),
+    }  # fmt: skip
 
 
 def _open(folder: Path) -> None:
@@ -132,7 +165,7 @@ def _end_realtime(folder: Path) -> None:
             continue
 
 
-def _configure(machine: Path, folder: Path, tables: Path | None) -> None:
+def _configure(machine: Path, folder: Path, tables: Path | None, kinematics: Kinematics | None) -> None:
     setup = _setup(machine, {}, {}, None)
     sections: dict[str, dict[str, object]] = {
         "EMC": {"VERSION": "1.1", "MACHINE": "judge"},
@@ -147,10 +180,11 @@ def _configure(machine: Path, folder: Path, tables: Path | None) -> None:
             "DEFAULT_LINEAR_VELOCITY": SPEED_MM_S, "MAX_LINEAR_VELOCITY": SPEED_MM_S,
             "MAX_LINEAR_ACCELERATION": ACCELERATION_MM_S2,
         },
-        "KINS": {"KINEMATICS": "trivkins coordinates=XYZ", "JOINTS": 3},
+        "KINS": {"KINEMATICS": kinematics.name if kinematics else "trivkins coordinates=XYZ", "JOINTS": 3},
     }  # fmt: skip
     reach = {"MIN_LIMIT": -5000, "MAX_LIMIT": 5000}
-    reach |= {"MAX_VELOCITY": SPEED_MM_S, "MAX_ACCELERATION": ACCELERATION_MM_S2}
+    most = kinematics.acceleration_mm_s2 if kinematics else ACCELERATION_MM_S2
+    reach |= {"MAX_VELOCITY": SPEED_MM_S, "MAX_ACCELERATION": most}
     home = {"HOME": 0.0, "HOME_OFFSET": 0.0, "HOME_SEARCH_VEL": 0, "HOME_LATCH_VEL": 0, "HOME_SEQUENCE": 0}
     for joint, axis in enumerate("XYZ"):
         sections[f"AXIS_{axis}"] = dict(reach)
@@ -174,13 +208,19 @@ def _configure(machine: Path, folder: Path, tables: Path | None) -> None:
             for name, section in sections.items()
         )
     )
+    own = kinematics or Kinematics("trivkins coordinates=XYZ", folder, "")
+    nets = {**_NETS, **{pin: f"sampler.0.pin.{7 + i}" for i, pin in enumerate(own.pins)}}
+    linked = {source: signal for signal, source in re.findall(r"^net (\S+) (\S+) =>", own.hal, re.MULTILINE)}
+    around = [f"addf {own.name}.{function} servo-thread\n" for function in ("begin", "end")]
+    before, behind = around if kinematics else ("", "")
     (folder / "m.hal").write_text(
-        "loadrt trivkins coordinates=XYZ\n"
+        f"loadrt {own.name}\n"
         f"loadrt motmod servo_period_nsec={PERIOD_NS} num_joints=3\n"
-        "loadrt sampler depth=100000 cfg=fffsfff\n"
-        "addf motion-command-handler servo-thread\naddf motion-controller servo-thread\n"
+        f"loadrt sampler depth=100000 cfg=fffsfff{'f' * len(own.pins)}\n"
+        f"addf motion-command-handler servo-thread\n{before}addf motion-controller servo-thread\n{behind}"
         "addf sampler.0 servo-thread\nsetp sampler.0.enable 0\n"
-        + "".join(f"net n{i} {a} => {b}\n" for i, (a, b) in enumerate(_NETS.items()))
+        + own.hal
+        + "".join(f"net {linked.get(a, f'n{i} {a}')} => {b}\n" for i, (a, b) in enumerate(nets.items()))
     )
     (folder / "v.var").write_text(_parameters(setup))
     (folder / "t.tbl").write_text(

@@ -405,3 +405,13 @@ def judge_programs(
         JudgeModel(machine),
         **how,
     )
+
+
+def away(moves: CanonMoves, points: np.ndarray) -> np.ndarray:
+    """(n,) distance in mm of points (n, 3) from the nearest move that cuts."""
+    curves, least = _Curves.of(moves), np.full(len(points), np.inf)
+    for move in np.flatnonzero((moves.kind == linuxcnc.FEED) | (moves.kind == ARC)):
+        rows = np.full(len(points), move)
+        there = curves.at(rows, curves.nearest(rows, points))
+        least = np.minimum(least, np.linalg.norm(there - points, axis=1))
+    return least

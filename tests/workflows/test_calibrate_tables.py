@@ -25,6 +25,7 @@ from olp.core.errors import UsageError
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration, Curve, Cyclic
 from olp.files.calibration.reader import load_calibration
+from olp.files.control_code.registry import CODE
 from olp.files.control_tables.registry import FORMATS
 from olp.files.write import write_files
 
@@ -145,11 +146,13 @@ def test_figures_of_an_example_and_their_order() -> None:
     machine = PROGRAMS / "gantry-plate" / "machine.toml"
     report = olp.compare_tables(machine, program=PROGRAMS / "gantry-plate" / "plate.ngc")
     box, path = report["box"]["left"], report["program"]["left"]
-    assert set(box) == {"as it is", "olp correct", *FORMATS} == set(path)
+    assert set(box) == {"as it is", "olp correct", "real time", *FORMATS} == set(path)
     assert box["olp correct"]["max_um"] < 1.0 and path["olp correct"]["max_um"] < 1.87
     # the only residual of a volumetric table is a backlash of 6 um
     assert box["isg"]["rms_um"] == pytest.approx(3.0, abs=0.02)
-    order = ["olp correct", "isg", "siemens-cec", "linuxcnc", "klipper", "as it is"]
+    # the model itself in the control leaves the dead band of the backlash
+    assert box["real time"]["max_um"] < 1e-3 and path["real time"]["max_um"] < 0.11
+    order = ["real time", "olp correct", "isg", "siemens-cec", "linuxcnc", "klipper", "as it is"]
     framed = [box[name]["rms_in_frame_um"] for name in order]
     assert framed == sorted(framed)
 
@@ -213,7 +216,7 @@ def test_commands(tmp_path: Path) -> None:
     machine = str(PROGRAMS / "gantry-plate" / "machine.toml")
     run = CliRunner()
     listed = run.invoke(main, ["calibrate", "formats", "--json"])
-    assert set(json.loads(listed.stdout)) == set(FORMATS)
+    assert set(json.loads(listed.stdout)) == {*FORMATS, *CODE}
     target = str(tmp_path / "t.csv")
     done = run.invoke(main, ["calibrate", "export", "-m", machine, "--format", "isg", "-o", target])
     assert done.exit_code == 0, done.output

@@ -11,6 +11,7 @@ from typing import Protocol
 
 import numpy as np
 
+from olp.compensation.invert import invert
 from olp.core.arrays import Array
 from olp.core.units import AXES
 from olp.core.values import dataclass
@@ -83,6 +84,16 @@ class Volumetric:
 
     def offset(self, axis_mm: Array, tool_mm: Array, direction: Array) -> Array:
         return np.asarray(-self.model.error(axis_mm, tool_mm))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RealTime:
+    """The model itself in the control, which inverts it in every cycle, on the right side of the backlash."""
+
+    model: ErrorModel
+
+    def offset(self, axis_mm: Array, tool_mm: Array, direction: Array) -> Array:
+        return np.asarray(invert(self.model, axis_mm, tool_mm, direction) - axis_mm)
 
 
 @dataclass(frozen=True, slots=True)

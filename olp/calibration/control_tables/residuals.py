@@ -10,7 +10,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from olp.calibration.control_tables.controls import Control, Uncompensated
+from olp.calibration.control_tables.controls import Control, RealTime, Uncompensated
+from olp.compensation.dead_band import follow
 from olp.compensation.invert import invert
 from olp.core.arrays import Array
 from olp.core.rigid_fit import fit_points
@@ -25,8 +26,12 @@ from olp.proof.deviation import Tracer
 
 #: The key of the uncompensated machine in reports.
 UNCOMPENSATED = "as it is"
+#: The key of the model itself in the control.
+REAL_TIME = "real time"
 #: The key of a corrected program.
 CORRECT = "olp correct"
+#: mm; by which a load may be off before its drive turns, as control code starts with.
+BAND_MM = 5e-5
 #: Points along a program, at most.
 _MOST_POINTS = 100_000
 
@@ -86,13 +91,25 @@ def residuals_by(
     `increment_mm` (3,) is given, with corrected commands that are rounded to it."""
     residuals = {}
     for name, control in {UNCOMPENSATED: Uncompensated(), **controls}.items():
-        command = samples.points_mm + control.offset(samples.points_mm, samples.tool_mm, samples.direction)
+        direction = samples.direction
+        if isinstance(control, RealTime) and samples.path:
+            direction = _sides(model, samples)
+        command = samples.points_mm + control.offset(samples.points_mm, samples.tool_mm, direction)
         residuals[name] = _residual(model, command, samples)
     if increment_mm is not None:
         play = _play(model, samples.points_mm, samples)
         command = invert(model, samples.points_mm, samples.tool_mm, play)
         residuals[CORRECT] = _residual(model, np.round(command / increment_mm) * increment_mm, samples)
     return residuals
+
+
+def _sides(model: ErrorModel, samples: Samples) -> Array:
+    """(n, 3) the sides of the backlash that bring the loads of the axes to points which follow each other."""
+    load = invert(model, samples.points_mm, samples.tool_mm)
+    width = model.backlash_at(load)
+    if width is None:
+        return samples.direction
+    return np.stack([follow(load[:, j], width[:, j], BAND_MM)[0] for j in range(3)], axis=1)
 
 
 def _play(model: ErrorModel, command: Array, samples: Samples) -> Array | None:

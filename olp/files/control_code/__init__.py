@@ -1,0 +1,1 @@
+"""The calibrated model as C code for controls that correct in real time."""

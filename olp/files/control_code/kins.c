@@ -1,0 +1,95 @@
+#ifndef OLP_SELF_TEST
+/* The kinematics of the control. LinuxCNC asks for the inverse also where it looks ahead (limits of a block):
+   only what motion-controller asks for, between `begin` and `end`, moves the axes and takes up backlash. */
+#include "kinematics.h"
+
+static olp_state olp_now;
+static olp_limits olp_bounds;
+static olp_follower olp_at;
+static double olp_tick_s;
+static int olp_ready, olp_in_tick, olp_calls, olp_ever_unsolved;
+
+FUNCTION(begin)
+{
+    olp_now.tool_mm[0] = tool_more_x - tool_offset_x;
+    olp_now.tool_mm[1] = tool_more_y - tool_offset_y;
+    olp_now.tool_mm[2] = tool_more_z - tool_offset_z;
+    olp_now.payload_kg = payload;
+@TEMPERATURES@
+    olp_bounds.most_mm = most_correction;
+    olp_bounds.rate_mm_s = most_rate;
+    olp_bounds.ramp_s = ramp_time;
+    olp_bounds.band_mm = dead_band;
+    olp_bounds.on = enable;
+    olp_tick_s = period * 1e-9;
+    olp_switch(&olp_at, &olp_bounds, olp_tick_s);
+    olp_in_tick = 1;
+    olp_calls = 0;
+}
+
+FUNCTION(end)
+{
+    double joints[3] = {joint_0, joint_1, joint_2};
+    /* axes that are moved one by one, or home */
+    if (!olp_calls) olp_led(&olp_at, &olp_now, joints);
+    olp_in_tick = 0;
+    olp_ready = 1;
+    correction_x = olp_at.correction[0];
+    correction_y = olp_at.correction[1];
+    correction_z = olp_at.correction[2];
+    play_x = olp_at.play[0];
+    play_y = olp_at.play[1];
+    play_z = olp_at.play[2];
+    switched_on = olp_at.share;
+    active = olp_at.share >= 1.0;
+    outside_box = olp_outside(olp_at.command);
+    bounded = olp_calls && olp_at.limited;
+    if (olp_calls && olp_at.unsolved) olp_ever_unsolved = 1;
+    not_solved = olp_ever_unsolved;
+    iterations = olp_at.steps;
+    (void)period;
+}
+
+int kinematicsForward(const double *joint, EmcPose *world, const KINEMATICS_FORWARD_FLAGS *fflags,
+                      KINEMATICS_INVERSE_FLAGS *iflags)
+{
+    double wanted[3] = {joint[0], joint[1], joint[2]};
+    if (olp_ready) olp_forward(&olp_at, &olp_now, joint, wanted);
+    world->tran.x = wanted[0];
+    world->tran.y = wanted[1];
+    world->tran.z = wanted[2];
+    world->a = world->b = world->c = world->u = world->v = world->w = 0.0;
+    (void)fflags;
+    (void)iflags;
+    return 0;
+}
+
+int kinematicsInverse(const EmcPose *world, double *joint, const KINEMATICS_INVERSE_FLAGS *iflags,
+                      KINEMATICS_FORWARD_FLAGS *fflags)
+{
+    double wanted[3] = {world->tran.x, world->tran.y, world->tran.z}, command[3];
+    int j;
+    for (j = 0; j < 3; j++) command[j] = wanted[j];
+    if (olp_ready && olp_in_tick) {
+        olp_follow(&olp_at, &olp_bounds, &olp_now, wanted, olp_tick_s, command);
+        olp_calls++;
+    } else if (olp_ready) {
+        olp_follower ahead = olp_at;
+        olp_bounded(&ahead, &olp_bounds, &olp_now, wanted, 0.0, command);
+    }
+    for (j = 0; j < 3; j++) joint[j] = command[j];
+    (void)iflags;
+    (void)fflags;
+    return 0;
+}
+
+KINEMATICS_TYPE kinematicsType(void)
+{
+    return KINEMATICS_BOTH;
+}
+
+KINS_NOT_SWITCHABLE
+EXPORT_SYMBOL(kinematicsType);
+EXPORT_SYMBOL(kinematicsForward);
+EXPORT_SYMBOL(kinematicsInverse);
+#endif
