@@ -119,8 +119,9 @@ FOREIGN = (
     Foreign(
         "UR script",
         _line(rb"def[ \t]+\w+\(\):|(?:movej|movel|movep|movec|servoj)[ \t]*\("),
-        _ROBOT,
+        _NAME_IT.replace("sinumerik", "urscript"),
         language=True,
+        how="and was read as another language",
     ),
     Foreign(
         "Yaskawa INFORM (JBI)",

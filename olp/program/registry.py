@@ -49,6 +49,7 @@ _KNOWN = {
     "dmis": Known("olp.program.dmis.dialect", signs.DMIS),
     "list": Known("olp.program.pointlist.dialect", signs.LISTS),
     "fanuc-tp": Known("olp.program.robots.ls.dialect", signs.LS),
+    "urscript": Known("olp.program.robots.urscript.dialect", signs.URSCRIPT),
     "abb-rapid": Known("olp.program.robots.rapid.dialect", signs.RAPID),
 }
 #: Files of `olp/program/described/shipped` that describe a dialect, without their ending.

@@ -23,7 +23,7 @@ Lines = list[str]
 @dataclass(frozen=True)
 class Case:
     """One dialect. `coordinates` finds the numbers of motion statements, its groups the three of them;
-    `support` are the kinds of statements that it has."""
+    `support` are the kinds of statements that it has, and its lengths count in `unit_mm`."""
 
     name: str
     controller: str
@@ -38,6 +38,7 @@ class Case:
     examples: tuple[bytes, ...] = ()
     keys: str = ""
     support: frozenset[str] = frozenset({"corrected", "read", "carried", "refused"})
+    unit_mm: int = 1
 
     def program(self, points: np.ndarray, digits: int) -> bytes:
         rows = [self.point(p, digits) for p in points.tolist()]
@@ -68,6 +69,12 @@ def _tp(values: Sequence[float], digits: int) -> str:
     head = "\n GP1:\n UF : 1, UT : 1, CONFIG : 'N U T, 0, 0, 0',\n"
     point = f" X = {x} mm, Y = {y} mm, Z = {z} mm,\n W = 0 deg, P = 0 deg, R = 0 deg\n"
     return f"   1:L {name} 100mm/sec FINE ;\n/POS\n{name}{{{head}{point}}};\n/MN"
+
+
+def _ur(values: Sequence[float], digits: int) -> str:
+    """In metres, in a frame that the program states."""
+    x, y, z = (f"{v / 1000.0:.{digits + 3}f}" for v in values)
+    return f"movel(pose_trans(p[0.25,0.2,-0.3,0,0,0],p[{x},{y},{z},0,0,0]),1.2,0.25,0,0)"
 
 
 def _rapid(values: Sequence[float], digits: int) -> str:
@@ -217,6 +224,22 @@ CASES = {
             b"p = POS(1,2,3,0,180,0,c)\np = POS(1,2,3,0,180,0,c)\nMOVE TO p -- 'x'", b"$MOTYPE = LINEAR",
         ),
         support=frozenset({"corrected", "carried", "refused"}),
+    ),
+    "urscript": Case(
+        "urscript", "urscript", "movelpjdfnP[](),.=:#_ 0123456789\r\n\te+-",
+        ["def t():", "  set_tcp(p[0,0,-0.12,0,0,0])"], ["end"],
+        _ur, None, lambda text: f"# {text}",
+        re.compile(rb"(?m)^movel\(pose_trans\(p\[0.25,0.2,-0.3,0,0,0\],p\[(" + NUMBER + rb"),("
+                   + NUMBER + rb"),(" + NUMBER + rb"),"),
+        ("urscript/*",),
+        (
+            b"set_tcp(p[0,0,0,0,0,0])\nmovel(p[1,2,3,0,0,0],a=1,v=1,r=0)",
+            b"P=p[0,0,0,0,0,0]\nP[1]=2\nmovel(P)",
+            b"def a():\nmovel(p[1,2,3,0,0,0])\nend\nset_tcp(p[0,0,0,0,0,0])", b"if movel(p[0,0,0,0,0,0]):",
+            b"movej([0,0,0,0,0,0])\nmovej(get_inverse_kin(p[1,2,3,0,0,0]))",
+            b"movel(p[1e3,2,3,0,0,0],1,1,2,0)",
+        ),
+        unit_mm=1000,
     ),
     "fanuc-tp": Case(
         "fanuc-tp", "fanuc-tp", "LJCP[]RUFTXYZW:;,.='{}+-/MNGCOS 0123456789\r\n\t!*",

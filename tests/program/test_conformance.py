@@ -205,7 +205,7 @@ def test_l2_a_shift_edits_every_slot_and_nothing_else(
     frame, before = numbers(nominal, case.coordinates)
     same, after = numbers(corrected, case.coordinates)
     assert same == frame
-    assert [b - a for b, a in zip(before, after, strict=True)] == [Decimal("0.1")] * 60
+    assert [(b - a) * case.unit_mm for b, a in zip(before, after, strict=True)] == [Decimal("0.1")] * 60
     assert numbers(unstamped(olp.correct(corrected, back).data), case.coordinates) == (frame, before)
 
 
@@ -222,6 +222,7 @@ def commanded(
     want = model.command_for(nominal + OFFSET + up, LEVER) - OFFSET - up
     if own is None:
         own = np.array([[float(g) for g in m.groups()] for m in case.coordinates.finditer(text)])
+        own *= case.unit_mm
     return float(np.abs(own[match(own, want)] - want).max())
 
 

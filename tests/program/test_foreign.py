@@ -12,7 +12,6 @@ from olp.program.foreign import FOREIGN, LOOKED_AT, recognised
 MILL = PROGRAMS / "haas-mill"
 TEXTS = {
     "KUKA KRL": (b"&ACCESS RVP\nDEF part()\nPTP {X 10, Y 0, Z 5}\nLIN P2\nEND\n", 1),
-    "UR script": (b"def part():\n  movej(p[0.1, 0, 0, 0, 0, 0], a=1.4)\nend\n", 1),
     "Yaskawa": (b"/JOB\n//NAME TEST\nNOP\nMOVJ C00000 VJ=50\nEND\n", 1),
     "VAL 3": (b"begin\n  movej(pA,flange,mNomSpeed)\nend\n", 1),
     "Mazatrol": (b"MAZATROL MATRIX\n", 1),
@@ -105,7 +104,7 @@ SIGNS = {
         b"  <program xmlns='STAUBLI'>", b"begin\n movej(a)", b"\tBegin \r\nmovel(b)", b"begin\nmovec(c)",
     ),
     ("Mazatrol", OTHER_POST, "OLP501"): (b"MAZATROL", b"UNo. UNIT", b" \nUNo.\tUNIT"),
-    ("UR script", ROBOT, "OLP501"): (
+    ("UR script", NAMED.replace("sinumerik", "urscript"), "OLP501"): (
         b"def a():\n", b"movej(", b" movel (", b"MOVEP(", b"movec(", b"servoj(", b"def a_1():",
     ),
     ("Yaskawa INFORM (JBI)", ROBOT, "OLP501"): (
@@ -130,7 +129,7 @@ SIGNS = {
     ),
 }  # fmt: skip
 #: Languages that are read by another dialect.
-READ = ("Sinumerik (Siemens)", "Okuma OSP", "ABB RAPID", "FANUC TP")
+READ = ("Sinumerik (Siemens)", "Okuma OSP", "ABB RAPID", "FANUC TP", "UR script")
 LANGUAGES = (
     "KUKA KRL", "ABB RAPID", "FANUC TP", "Stäubli VAL 3", "Mazatrol",
     "UR script",

@@ -39,10 +39,11 @@ class Tool:
 
 
 class RobotFrames:
-    """The frames of one program. `world` is the name of the robot's world."""
+    """The frames of one program, whose positions are in units of `unit_mm`. `world` is the name of the
+    robot's world."""
 
-    def __init__(self, setup: Setup, world: str) -> None:
-        self.setup = setup
+    def __init__(self, setup: Setup, world: str, unit_mm: float = 1.0) -> None:
+        self.setup, self.unit_mm = setup, unit_mm
         self.table = FrameTable(setup)
         work = self._work(world)
         self.world = Located(world, Pose() if work is None else _pose(work), Pose(), work)
@@ -94,7 +95,9 @@ class RobotFrames:
         a, b, c = frame.inner.origin_mm
         inner = Placement(turn_of(frame.inner.turn), (a + x, b + y, c + z))
         work = frame.work or WorkOffset(frame.name, set_by="true")
-        return self.table.index(work, line, inner=inner, unit_mm=1.0, length=length, tool_vector=vector)
+        return self.table.index(
+            work, line, inner=inner, unit_mm=self.unit_mm, length=length, tool_vector=vector
+        )
 
     def _vector(self, frame: Located, tool: Tool, turn: Quaternion, line: int) -> Vector:
         """Gauge point to tip in machine coordinates."""

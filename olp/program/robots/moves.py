@@ -23,9 +23,9 @@ class RobotMoves:
     """Targets and moves of one program. `known` is False where the position before the next move depends on
     the run of the program."""
 
-    def __init__(self, data: bytes, setup: Setup, world: str) -> None:
+    def __init__(self, data: bytes, setup: Setup, world: str, unit_mm: float = 1.0) -> None:
         self.data, self.setup = data, setup
-        self.frames = RobotFrames(setup, world)
+        self.frames = RobotFrames(setup, world, unit_mm)
         self.moves = Moves()
         self.targets: list[Target] = []
         self.uses: list[Use | None] = []

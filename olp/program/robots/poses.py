@@ -111,6 +111,24 @@ def of_zyx(angles_deg: Sequence[float]) -> Quaternion:
     return turn if any(angles_deg) else NO_TURN
 
 
+def of_vector(vector: Sequence[float]) -> Quaternion:
+    """The rotation about a vector by its length in rad."""
+    x, y, z = vector
+    angle = float(np.sqrt(x * x + y * y + z * z))
+    if angle == 0.0:
+        return NO_TURN
+    size = float(np.sin(angle / 2.0)) / angle
+    return (float(np.cos(angle / 2.0)), x * size, y * size, z * size)
+
+
+def vector_of(a: Quaternion) -> Vector:
+    """The vector of a rotation, of half a turn at most."""
+    w, x, y, z = a if a[0] >= 0.0 else (-a[0], -a[1], -a[2], -a[3])
+    sine = (x * x + y * y + z * z) ** 0.5
+    size = 2.0 if sine == 0.0 else 2.0 * float(np.arctan2(sine, w)) / sine
+    return (x * size, y * size, z * size)
+
+
 def zyx_of(a: Quaternion) -> Vector:
     """The angles in degrees whose Rz(first) Ry(second) Rx(third) is a rotation."""
     rows = matrix(a)

@@ -57,8 +57,9 @@ class Targets:
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A part of a move that ends before it: its three `numbers`, the `share` of the move where it ends,
-    whether the robot stops there, and the `name` of its target where the language needs one."""
+    """A part of a move that ends before it: its three `numbers`, and the `share` of the move where it ends.
+
+    `stop`: the robot stops there. `name` is that of its target where the language needs one."""
 
     numbers: tuple[bytes, bytes, bytes]
     share: float

@@ -92,3 +92,10 @@ LS = Signs(
     ("ls",),
     own=pattern(rb"(?im)^[ \t]*(?:/(?:PROG|ATTR|MN|POS)\b|\d*:[ \t]*[JLCAS][ \t]+PR?\[)"),
 )
+URSCRIPT = Signs(
+    ("script", "urscript"),
+    own=pattern(
+        rb"(?im)^[ \t]*(?:def[ \t]+\w+\(\):|"
+        rb"(?:movej|movel|movep|movec|servoj|set_tcp)[ \t]*\([ \t]*(?:p?\[|pose_|get_))"
+    ),
+)

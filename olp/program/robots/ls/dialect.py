@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-
 from olp.core.patterns import pattern
 from olp.core.values import dataclass
 from olp.program.program import Program
@@ -63,19 +61,17 @@ class Ls(RobotDialect):
         kept = b"".join(b" " + word for word in _PLAIN_TAIL.findall(ending[3] or b""))
         close = (b"FINE" if part.stop else b"CNT100") + kept
         statement = lead + part.name.encode() + behind[: ending.end(1)] + close + b" ;"
-        value = self._value(program, target, part, use)
+        value = _renumbered(self._value(program, target, part, use), part.name)
+        # in the order of the path: before the position where the move ends
+        place = target.declaration[0]
         return [
             (begin, begin, statement + program.eol(int(program.toolpath.line[move]))),
-            self.clone(program, target, part.name, value),
+            (place, place, value + program.eol(target.line)),
         ]
 
     def clone(self, program: Program, target: Target, name: str, text: bytes) -> Replacement:
         place = target.declaration[1]
-        return (
-            place,
-            place,
-            program.eol(target.line) + re.sub(rb"\AP\[[^\]]*\]", b"P[" + name.encode() + b"]", text),
-        )
+        return place, place, program.eol(target.line) + _renumbered(text, name)
 
     def counted(self, program: Program, blocks: int) -> list[Replacement]:
         sections = parts(program.data)
@@ -100,6 +96,11 @@ class Ls(RobotDialect):
                 assert match is not None
                 edits.append((match.start(1) - start, match.end(1) - start, f"{angle:.6f}".encode()))
         return spliced(data[slice(*target.value)], edits)
+
+
+def _renumbered(text: bytes, number: str) -> bytes:
+    """A position with another number, and without its name."""
+    return b"P[" + number.encode() + text[text.index(b"]") :]
 
 
 DIALECT = Ls(

@@ -32,8 +32,10 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Position:
-    """A position of the first group: its `line`, the bytes of all of it and of its number, frame and tool (-1
-    for the active one), the bytes and values of its axes by their letters, and what else it states."""
+    """A position of the first group: its `line`, the bytes of all of it and of its number.
+
+    `frame` and `tool` are -1 for the active one. `axes` are bytes and values by their letters. `config` and
+    `others` are what else it states."""
 
     line: int
     span: Span

@@ -1,0 +1,90 @@
+"""URScript as a dialect: how a corrected program says new poses and moves."""
+
+from __future__ import annotations
+
+from itertools import count
+
+from olp.core.patterns import pattern
+from olp.core.values import dataclass
+from olp.program.program import Program
+from olp.program.robots.dialect import Replacement, RobotDialect
+from olp.program.robots.poses import between, vector_of
+from olp.program.robots.targets import NOWHERE, Part, Target, Use
+from olp.program.robots.urscript.reader import POSE, read
+from olp.program.robots.urscript.table import TABLE
+from olp.program.text.numbers import spliced
+from olp.program.text.signs import URSCRIPT
+
+_DEF = pattern(rb"(?m)^[ \t]*def[ \t]+\w+\([^)\r\n]*\):[^\r\n]*(?:\r\n|\n|\r|\Z)")
+#: A blend in metres by which a part is passed without a stop.
+_PASSED = b"0.0005"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UrScript(RobotDialect):
+    """URScript programs."""
+
+    def continues(self, line: bytes) -> bool:
+        return False
+
+    def stamped(self, program: Program, stamp: bytes) -> Replacement:
+        match = _DEF.search(program.data)
+        place = 0 if match is None else match.end()
+        return place, place, (b"" if match is None else b"  ") + stamp + program.eol(1)
+
+    def named(self, program: Program, target: Target, taken: set[str]) -> str:
+        for number in count(1):
+            name = f"{target.name}_olp{number}"
+            if name.upper() not in taken:
+                return name
+        raise AssertionError
+
+    def part(self, program: Program, move: int, use: Use, part: Part) -> list[Replacement]:
+        data, targets = program.data, program.targets
+        assert targets is not None
+        target, (begin, end) = targets.targets[use.target], use.statement
+        edits = [(use.place[0] - begin, use.place[1] - begin, self._value(program, target, part, use))]
+        radius = b"0" if part.stop else _PASSED
+        if use.zone != NOWHERE:
+            edits.append((use.zone[0] - begin, use.zone[1] - begin, radius))
+        else:
+            close = data[begin:end].rindex(b")")
+            edits.append((close, close, b", r=" + radius))
+        line = int(program.toolpath.line[move])
+        blanks = data[int(program.line_start[line - 1]) : begin]
+        return [(begin, begin, spliced(data[begin:end], edits) + program.eol(line) + blanks)]
+
+    def clone(self, program: Program, target: Target, name: str, text: bytes) -> Replacement:
+        data, (begin, _) = program.data, target.declaration
+        blanks = data[int(program.line_start[target.line - 1]) : begin]
+        place = int(program.line_end[target.line - 1])
+        return place, place, program.eol(target.line) + blanks + name.encode() + b"=" + text
+
+    @staticmethod
+    def _value(program: Program, target: Target, part: Part, use: Use) -> bytes:
+        """A pose with other numbers, and the orientation at the end of a part."""
+        data, start = program.data, target.value[0]
+        edits = [
+            (a - start, b - start, text) for (a, b), text in zip(target.numbers, part.numbers, strict=True)
+        ]
+        if use.before != use.turn:
+            match = POSE.match(data, *target.value)
+            assert match is not None
+            vector = vector_of(between(use.before, use.turn, part.share))
+            for k, value in zip((4, 5, 6), vector, strict=True):
+                edits.append((match.start(k) - start, match.end(k) - start, f"{value:.9f}".encode()))
+        return spliced(data[slice(*target.value)], edits)
+
+
+DIALECT = UrScript(
+    name="urscript",
+    title="URScript (Universal Robots)",
+    path_mode="blend radius",
+    reader=read,
+    signs=URSCRIPT,
+    folder_endings=("script", "urscript"),
+    comment=(b"# ", b""),
+    languages=frozenset(("UR script",)),
+    table=TABLE,
+    decimals=8,
+)

@@ -1,0 +1,333 @@
+"""Reads URScript: lines to moves, and the poses whose numbers can be edited. Lengths are in metres.
+
+A pose states the tool tip in the robot's base. The tool is that of `set_tcp`, or of machine and job.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from olp.core.errors import ProgramError
+from olp.core.machine import Setup
+from olp.core.patterns import pattern
+from olp.core.values import dataclass
+from olp.program.dialect import Dialect, Options, Support
+from olp.program.frames import tool_vector_of
+from olp.program.program import Program
+from olp.program.robots.frames import Located, Tool
+from olp.program.robots.moves import RobotMoves
+from olp.program.robots.poses import Pose, of_vector
+from olp.program.robots.targets import NOWHERE, Span, Use
+from olp.program.robots.urscript.table import TABLE
+from olp.program.text.numbers import LARGEST
+
+_N = rb"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*"
+#: A pose with all its numbers, each a group.
+POSE = pattern(rb"p\[" + b",".join([_N] * 6) + rb"\]")
+_JOINTS = pattern(rb"\s*(?:\[[^\[\]]*\]|get_inverse_kin\(.*\)|d2r\(.*\))\s*")
+_ASSIGNED = pattern(rb"\s*(?:(?:global|local)\s+)?([A-Za-z_]\w*)\s*=(?!=)\s*(.*?)\s*")
+_ELEMENT = pattern(rb"\s*([A-Za-z_]\w*)\s*\[[^\]]*\]\s*=(?!=)")
+_DEFINED = pattern(rb"(?m)^[ \t]*(?:def|thread)[ \t]+(\w+)")
+_TCP = pattern(rb"(?m)^[ \t]*set_tcp[ \t]*\(")
+#: Words of moves, which a line that begins a block must not have.
+_MOVING = pattern(rb"\b(?:opti)?(?:move|servo|speed)[jlpc]\b")
+_CALL = pattern(rb"\s*([A-Za-z_]\w*)\s*\((.*)\)\s*")
+_NAME = pattern(rb"\s*([A-Za-z_]\w*)\s*")
+_ARGUMENT = pattern(rb"(?:[^,\[\]()]|\[[^\[\]]*\]|\((?:[^()]|\([^()]*\))*\))+")
+_NAMED = pattern(rb"\s*([atvr])\s*=(?!=)\s*(.*?)\s*")
+_NUMBER = pattern(rb"\s*([-+]?(?:\d+\.?\d*|\.\d+))\s*")
+_TRANSFORMED = pattern(rb"\s*pose_trans\((.*)\)\s*")
+_WORDS = pattern(rb"[A-Za-z_]\w*")
+#: In metres, as lengths of the language are.
+_MM_PER_M = 1000.0
+_NAN = float("nan")
+
+
+@dataclass(frozen=True, slots=True)
+class _Line:
+    line: int
+    begin: int
+    text: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class _Named:
+    """A pose with a name: its line, the bytes of its value and of the whole statement."""
+
+    line: int
+    value: Span
+    statement: Span
+
+
+def read(
+    data: bytes, setup: Setup, dialect: Dialect, options: Options | None = None, *, words: bool = True
+) -> Program:
+    """Read a whole program. Raises ProgramError with the line of the first statement that cannot be read
+    correctly."""
+    return _Reader(data, setup).run(dialect, words=words)
+
+
+def _lines(data: bytes) -> Iterator[_Line]:
+    """The lines of a text without their comments."""
+    place = 3 if data[:3] == b"\xef\xbb\xbf" else 0
+    for number, raw in enumerate(data[place:].splitlines(keepends=True), 1):
+        text = raw.rstrip(b"\r\n")
+        bare = re.sub(rb"\"[^\"]*\"|'[^']*'", lambda hit: b"_" * len(hit[0]), text)
+        text = bare[: bare.find(b"#")] if b"#" in bare else bare
+        yield _Line(number, place, text.rstrip())
+        place += len(raw)
+
+
+class _Reader:
+    """Reads one program."""
+
+    def __init__(self, data: bytes, setup: Setup) -> None:
+        self.data, self.setup = data, setup
+        self.moves = RobotMoves(data, setup, "base", _MM_PER_M)
+        self.poses: dict[bytes, _Named] = {}
+        self.assigned: dict[bytes, int] = {}
+        self.targets: dict[Span, int] = {}
+        self.tool: Tool | None = None
+        #: functions of the text, the one that is read, those with moves, and the tools that are set
+        self.defined = set(_DEFINED.findall(data))
+        self.function = 0
+        self.moving: set[int] = set()
+        self.tools: list[Pose] = []
+        self.blocks: list[tuple[bytes, int]] = []
+        self.refusals: list[ProgramError] = []
+
+    def run(self, dialect: Dialect, *, words: bool) -> Program:
+        every = [line for line in _lines(self.data) if line.text.strip()]
+        self._assignments(every)
+        for line in every:
+            try:
+                self._statement(line)
+            except ProgramError as error:
+                self.refusals.append(error)
+        if self.refusals:
+            first = self.refusals[0]
+            first.others = tuple(self.refusals[1:])
+            raise first
+        return self.moves.program(dialect, words=words)
+
+    def _assignments(self, every: list[_Line]) -> None:
+        """Keep poses with a name, and the names that get several values."""
+        for line in every:
+            match, element = _ASSIGNED.fullmatch(line.text), _ELEMENT.match(line.text)
+            if element is not None:
+                self.assigned.setdefault(element[1], line.line)
+                self.poses.pop(element[1], None)
+            if match is None:
+                continue
+            name = match[1]
+            if name in self.assigned:
+                self.poses.pop(name, None)
+                continue
+            self.assigned[name] = line.line
+            if POSE.fullmatch(match[2]):
+                start = line.begin + match.start(1)
+                value = (line.begin + match.start(2), line.begin + match.end(2))
+                self.poses[name] = _Named(line.line, value, (start, line.begin + len(line.text)))
+
+    # -- statements ----------------------------------------------------------------------------------
+
+    def _statement(self, line: _Line) -> None:
+        text = line.text.strip()
+        first = _WORDS.match(text)
+        word = b"" if first is None else first[0]
+        if text.count(b"(") != text.count(b")") or text.count(b"[") != text.count(b"]"):
+            raise ProgramError("a bracket is not closed in this line", line=line.line, code="OLP510")
+        if word in (b"def", b"thread", b"if", b"while", b"for", b"elif", b"else", b"end"):
+            if _MOVING.search(text):
+                raise ProgramError(
+                    "a move in the line of a block; write it in a line of its own",
+                    line=line.line,
+                    code="OLP512",
+                )
+            self._block(word)
+            return
+        match = _ASSIGNED.fullmatch(text)
+        call = _CALL.fullmatch(text)
+        row = TABLE.get(word)
+        if row is not None and row[0] is Support.REFUSED:
+            raise ProgramError(f"{word.decode()} {row[1]}", line=line.line, code="OLP512")
+        if call is not None and word in (b"movel", b"movep", b"movej"):
+            self._move(line, call)
+        elif call is not None and word == b"set_tcp":
+            self._set_tcp(line, call)
+        elif match is not None:
+            self._value(line, match[2])
+        elif row is None or row[0] is not Support.UNCHANGED:
+            self._call(line)
+
+    def _value(self, line: _Line, value: bytes) -> None:
+        """A value that a function gives may come with moves."""
+        for name in _WORDS.findall(value):
+            row = TABLE.get(name)
+            if row is not None and row[0] in (Support.REFUSED, Support.CORRECTED):
+                raise ProgramError(f"{name.decode()} in a value is not read", line=line.line, code="OLP512")
+        if b"(" in value and not re.match(rb"\s*(?:pose_\w+|get_\w+|read_\w+|d2r|r2d|floor|sqrt)\(", value):
+            self._call(line)
+
+    def _call(self, line: _Line) -> None:
+        name = _WORDS.search(line.text)
+        if name is None or name[0] not in self.defined:
+            shown = line.text.strip()[:40].decode("latin-1")
+            what = f"`{shown}` may move: the next move is corrected at its end"
+            self.moves.remark("called", line.line, what)
+        self.moves.known = False
+
+    def _block(self, word: bytes) -> None:
+        if word in (b"elif", b"else", b"end"):
+            moved = bool(self.blocks) and self.blocks[-1][1] != self.moves.count
+            kind = self.blocks[-1][0] if self.blocks else b""
+            if word == b"end" and self.blocks:
+                self.blocks.pop()
+            if moved or kind in (b"def", b"thread"):
+                self.moves.known = False
+        else:
+            self.blocks.append((word, self.moves.count))
+            if word in (b"def", b"thread"):
+                self.moves.known = False
+                self.function += 1
+
+    def _set_tcp(self, line: _Line, call: re.Match[bytes]) -> None:
+        """The tool from here on. Raises ProgramError where it depends on the run, or is not stated."""
+        if any(kind not in (b"def",) for kind, _ in self.blocks) or len(self.blocks) > 1:
+            raise ProgramError(
+                "set_tcp in a branch, a loop or a function within another depends on the run",
+                line=line.line,
+                code="OLP521",
+            )
+        stated = self._pose(call[2])
+        if stated is None:
+            raise ProgramError("set_tcp is not stated with numbers", line=line.line, code="OLP521")
+        if all(not known.same(stated) for known in self.tools):
+            self.tools.append(stated)
+        # a tool for each statement: a later one has another vector
+        self.tool = Tool(f"tcp{line.line}", stated)
+
+    # -- moves ---------------------------------------------------------------------------------------
+
+    def _move(self, line: _Line, call: re.Match[bytes]) -> None:
+        lead = len(line.text) - len(line.text.lstrip())
+        start = line.begin + lead
+        place = start + call.start(2)
+        arguments = [(place + m.start(), m[0]) for m in _ARGUMENT.finditer(call[2])]
+        if not arguments:
+            raise ProgramError("the move has no target", line=line.line, code="OLP516")
+        begin, target = arguments[0]
+        if call[1] == b"movej" and (_JOINTS.fullmatch(target) or self._is_joints(target)):
+            self.moves.remark("joints", line.line, "joint values are kept as written")
+            self.moves.known = False
+            return
+        index, span, named, frame = self._target(line, begin, target)
+        rest = self._rest(call[1], arguments[1:])
+        if any(loop in (b"while", b"for") and before == self.moves.count for loop, before in self.blocks):
+            self.moves.known = False
+        turn = self.moves.targets[index].turn
+        use = Use(
+            index, (start, line.begin + len(line.text)), span, named, turn=turn,
+            zone=rest.get("r", NOWHERE),
+        )  # fmt: skip
+        timed = "t" in rest and self._number(rest["t"]) != 0.0
+        speed = self._number(rest["v"]) if "v" in rest else _NAN
+        self.moves.move(
+            line.line, use, frame, self._tool(line), speed * _MM_PER_M, straight=call[1] != b"movej",
+            whole=timed,
+        )  # fmt: skip
+
+    def _rest(self, name: bytes, arguments: list[tuple[int, bytes]]) -> dict[str, Span]:
+        """The bytes of acceleration, speed, time and radius of a move, by their names."""
+        order = ("a", "v", "r") if name == b"movep" else ("a", "v", "t", "r")
+        found: dict[str, Span] = {}
+        for (begin, text), usual in zip(arguments, order, strict=False):
+            match = _NAMED.fullmatch(text)
+            key = usual if match is None else match[1].decode()
+            first, last = (0, len(text)) if match is None else match.span(2)
+            found[key] = (begin + first, begin + last)
+        return found
+
+    def _number(self, span: Span) -> float:
+        match = _NUMBER.fullmatch(self.data, *span)
+        return _NAN if match is None else float(match[1])
+
+    def _is_joints(self, text: bytes) -> bool:
+        """Whether a name stands for joint values with numbers."""
+        match = _NAME.fullmatch(text)
+        return (
+            match is not None
+            and re.search(rb"(?m)^\s*(?:global\s+|local\s+)?" + match[1] + rb"\s*=\s*\[", self.data)
+            is not None
+        )
+
+    def _target(self, line: _Line, begin: int, text: bytes) -> tuple[int, Span, Span, Located]:
+        """The place of a target, its bytes, those of its name, and the frame that it is in."""
+        frame, stated = self.moves.frames.world, _TRANSFORMED.fullmatch(text)
+        if stated is not None:
+            parts = list(_ARGUMENT.finditer(stated[1]))
+            outer = self._pose(parts[0][0]) if len(parts) == 2 else None
+            if outer is None:
+                raise self._computed(line, text)
+            name = b"".join(parts[0][0].split()).decode("latin-1")
+            frame = self.moves.frames.located(f"pose_trans {name}", outer, line.line)
+            begin, text = begin + stated.start(1) + parts[1].start(), parts[1][0]
+        blank = len(text) - len(text.lstrip())
+        span = (begin + blank, begin + len(text.rstrip()))
+        named = self.poses.get(text.strip())
+        match = POSE.fullmatch(self.data, *(span if named is None else named.value))
+        if match is None:
+            raise self._computed(line, text)
+        key = match.span()
+        if key not in self.targets:
+            numbers = [float(group) for group in match.groups()]
+            if max(map(abs, numbers)) * _MM_PER_M >= LARGEST:
+                raise ProgramError("a number is larger than a machine", line=line.line, code="OLP516")
+            name = "" if named is None else text.strip().decode("latin-1")
+            self.targets[key] = self.moves.target(
+                line.line if named is None else named.line, key,
+                (match.span(1), match.span(2), match.span(3)), (numbers[0], numbers[1], numbers[2]),
+                of_vector(numbers[3:]), (), name, NOWHERE if named is None else named.statement,
+            )  # fmt: skip
+        return self.targets[key], span, NOWHERE if named is None else span, frame
+
+    def _computed(self, line: _Line, text: bytes) -> ProgramError:
+        shown = text.strip()[:60].decode("latin-1")
+        return ProgramError(
+            f"the target `{shown}` is computed, or gets several values; program it with its numbers",
+            line=line.line,
+            code="OLP533",
+        )
+
+    def _pose(self, text: bytes) -> Pose | None:
+        """A pose with numbers, or that of a name; None where there is none."""
+        named = self.poses.get(text.strip())
+        value = text.strip() if named is None else self.data[slice(*named.value)]
+        match = POSE.fullmatch(value)
+        if match is None:
+            return None
+        x, y, z, *turn = (float(group) for group in match.groups())
+        return Pose((x * _MM_PER_M, y * _MM_PER_M, z * _MM_PER_M), of_vector(turn))
+
+    def _tool(self, line: _Line) -> Tool:
+        """The tool of a move: that of `set_tcp`, else the one of machine or job."""
+        self.moving.add(self.function)
+        set_later = self.tool is None and _TCP.search(self.data) is not None
+        if set_later or (len(self.moving) > 1 and len(self.tools) > 1):
+            raise ProgramError(
+                "which set_tcp holds for this move depends on the run; set one tool, before all moves",
+                line=line.line,
+                code="OLP521",
+            )
+        number = self.setup.machine.default_tool
+        if self.tool is not None:
+            return self.tool
+        if not number:
+            raise ProgramError(
+                "no set_tcp states the tool; state it, or the tool of the installation with "
+                "job_defaults.tool in the machine file",
+                line=line.line,
+                code="OLP521",
+            )
+        return Tool("tcp", None, tool_vector_of(self.setup, number, line.line), number)

@@ -1,0 +1,112 @@
+"""URScript on three linear axes: read and corrected as a judge that shares nothing with it says."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from judge import machines, ur
+from judge.machines import Recipe
+from judge.model import JudgeModel
+
+import olp
+from olp.core.errors import OlpError, ProgramError
+
+RECIPE = Recipe(controller="urscript", tools={}, job_defaults={}, work_offsets={})
+#: rounding of the eighth decimal of a metre, mm
+DIGIT = 0.5e-5
+TURN = "2.2,2.2,0.1"
+HEAD = "def prog():\n  set_tcp(p[0.01,-0.005,0.12,0,0,0.3])\n"
+
+
+def program(rng: np.random.Generator, count: int) -> bytes:
+    """Moves to poses with a name, some of them in two frames, and to their own."""
+    lines = []
+    for k, (x, y, z) in enumerate((rng.uniform(-40, 40, (5, 3)) / 1000).round(5).tolist()):
+        lines.append(f"  P{k}=p[{x},{y},{z},{TURN}]")
+    for _ in range(count):
+        x, y, z = (rng.uniform(-60, 60, 3) / 1000).round(4).tolist()
+        target = [f"P{rng.integers(5)}", f"p[{x},{y},{z},{TURN}]"][rng.integers(2)]
+        frame = ["p[0.3,0.25,-0.3,0,0,0.4]", "p[0.35,0.2,-0.25,0,0,0.4]"][rng.integers(2)]
+        move = ["movel", "movej", "movep"][rng.integers(3)]
+        rest = {"movep": ",1.2,0.25,0.001"}.get(
+            move, [",a=1.2,v=0.25,r=0.01", ",1.2,0.25,0,0.001"][rng.integers(2)]
+        )
+        lines.append(f"  {move}(pose_trans({frame},{target}){rest})")
+    return (HEAD + "\n".join(lines) + "\nend\n").encode()
+
+
+@pytest.fixture(scope="module")
+def bent(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return machines.random_machine(tmp_path_factory.mktemp("bent"), 9, RECIPE)
+
+
+@pytest.fixture(scope="module")
+def zero(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return machines.zero_machine(tmp_path_factory.mktemp("zero"), RECIPE)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_each_pose_is_where_the_judge_wants_it(bent: Path, zero: Path, seed: int) -> None:
+    text = program(np.random.default_rng(seed), 25)
+    assert olp.correct(text, zero).data == text
+    done = olp.correct(text, bent)
+    assert done.report["verdict"]["ok"]
+    nominal, written, model = ur.moves(text), ur.moves(done.data), JudgeModel(bent)
+    assert len(written) > len(nominal), "long moves are split"
+    place = 0
+    for k, move in enumerate(nominal):
+        want = model.command_for(move.tip[None], move.lever)[0]
+        start = nominal[k - 1].tip
+        while np.abs(written[place].tip - want).max() > 2 * DIGIT:
+            here = written[place].tip
+            actual = here + model.error_mm(here[None], move.lever)[0]
+            way = move.tip - start
+            share = np.clip((actual - start) @ way / max(way @ way, 1e-9), 0, 1)
+            assert np.linalg.norm(start + share * way - actual) < 1e-3 + 2 * DIGIT
+            place += 1
+        assert np.abs(written[place].turn - move.turn).max() < 1e-12
+        place += 1
+    assert place == len(written)
+
+
+def test_parts_of_a_move_blend(bent: Path) -> None:
+    text = HEAD + (
+        "  movej(pose_trans(p[0.3,0.25,-0.3,0,0,0],p[-0.06,-0.06,0,2.2,2.2,0.1]),a=1,v=1)\n"
+        "  movel(pose_trans(p[0.3,0.25,-0.3,0,0,0],p[0.06,0.06,0.02,2.2,2.2,0.1]),a=1,v=1)\nend\n"
+    )
+    lines = olp.correct(text.encode(), bent).data.decode().splitlines()
+    parts = [line for line in lines if line.startswith("  movel")]
+    assert len(parts) > 1
+    assert all(line.endswith("a=1,v=1, r=0.0005)") for line in parts[:-1])
+    assert parts[-1].endswith("a=1,v=1)")
+
+
+@pytest.mark.parametrize(
+    ("lines", "why"),
+    [
+        ("set_tcp(p[0,0,0,0,0,0])\nq=p[0,0,0,0,0,0]\nq[2]=0.1\nmovel(q)", "several values"),
+        ("set_tcp(p[0,0,0,0,0,0])\nmovel(pose_add(q,q))", "computed"),
+        ("set_tcp(p[0,0,0,0,0,0])\nmovec(p[0,0,0,0,0,0],p[0,0,0,0,0,0])", "arc"),
+        ("set_tcp(p[0,0,0,0,0,0])\nspeedl([0,0,0,0,0,0],1,1)", "speeds"),
+        ("movel(p[0,0,0,0,0,0])", "no set_tcp"),
+        ("movel(p[0,0,0,0,0,0])\nset_tcp(p[0,0,0,0,0,0])", "depends on the run"),
+        ("if x:\nset_tcp(p[0,0,0,0,0,0])\nend", "depends on the run"),
+        ("if movel(p[0,0,0,0,0,0]):", "line of its own"),
+        ("movel(p[0,0,0,0,0,0]", "bracket"),
+    ],
+)
+def test_what_is_not_certain_is_refused_with_its_line(zero: Path, lines: str, why: str) -> None:
+    with pytest.raises(OlpError, match=why) as error:
+        olp.correct(f"def a():\n{lines}\nend\n".encode(), zero)
+    assert isinstance(error.value, ProgramError)
+    assert error.value.line is not None
+
+
+def test_the_tool_of_the_job_holds_without_set_tcp(tmp_path: Path) -> None:
+    tools = {1: {"gauge_to_tip_mm": [0.0, 0.0, -120.0]}}
+    recipe = Recipe(controller="urscript", tools=tools, job_defaults={"tool": 1}, work_offsets={})
+    path = machines.shift_machine(tmp_path, (100.0, 0.0, 0.0), recipe=recipe)
+    text = olp.correct(b"def a():\n  movej(p[0.1,0.2,-0.3,0,0,0])\nend\n", path).data
+    assert b"movej(p[0.09990000,0.2,-0.3,0,0,0])" in text
