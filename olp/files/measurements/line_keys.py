@@ -25,6 +25,12 @@ Sense = Annotated[str, Field(shown={"enum": list(SENSES)}), Before(_sense)]
 Instrument = Literal["laser", "level", "autocollimator", "straightedge", "other"]
 
 
+class AirTable(Table):
+    air_degC: float = Field(description="the temperature of the air, in degC")
+    pressure_hPa: Positive = Field(description="the pressure of the air, in hPa")
+    humidity_percent: NotNegative = Field(description="the relative humidity of the air, in percent")
+
+
 class LineKeys(Table):
     """The keys of one line, in a plan, in its [defaults], or in the file itself."""
 
@@ -64,6 +70,22 @@ class LineKeys(Table):
     sigma_scale_um_m: NotNegative | None = Field(
         default=None,
         description="the standard uncertainty of the scale of a positioning line (wavelength), in um/m",
+    )
+    laser_assumes: AirTable | None = Field(
+        default=None,
+        description="the air that the laser took for its readings, where columns air_degC, pressure_hPa and "
+        "humidity_percent state what it was",
+    )
+    laser_zero_mm: float | None = Field(
+        default=None, description="the axis position where the laser was zeroed, for these columns"
+    )
+    expansion_um_m_K: NotNegative | None = Field(
+        default=None,
+        description="the expansion of the scale or screw, whose temperature a column material_degC states",
+    )
+    material_reference_degC: float | None = Field(
+        default=None,
+        description="the temperature to which these readings are reduced: temperature_degC of the plan",
     )
     instrument: Instrument | None = Field(
         default=None, description='"laser", "level", "autocollimator", "straightedge" or "other"'

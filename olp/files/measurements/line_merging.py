@@ -10,6 +10,7 @@ from olp.calibration.observations.lines import Line
 from olp.core.errors import ConfigError
 from olp.core.schema import Position, fields_of, made, stated_keys
 from olp.core.units import AXES, MM_PER_UM, RAD_PER_URAD
+from olp.files.measurements.air import compensated, environment_problems
 from olp.files.measurements.instruments.base import PER_UNIT
 from olp.files.measurements.line_keys import LineKeys, LineTable, Stated
 from olp.files.measurements.readings import Readings
@@ -62,9 +63,11 @@ def as_line(
 ) -> Line:
     """The line of these readings, with the merged keys. Raises ConfigError with every problem."""
     problems = list(_line_problems(component, keys, vertical, chain, readings.sense_known))
+    problems += environment_problems(readings, component, keys)
     if problems:
         raise ConfigError("; ".join(problems), file=file, problems=tuple(problems))
     angular = component[1] in "ABC"
+    readings = compensated(readings, keys)
     known = readings.sense_known or keys.sense is None
     value = readings.value if known else readings.with_sense(str(keys.sense)).value
     line_mm = [0.0 if position is None else position for position in keys.line_mm.values]

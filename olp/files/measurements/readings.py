@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import field
+from dataclasses import field, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -61,6 +61,9 @@ ANGULAR = frozenset({"rad", "mrad", "urad", "arcsec", "um/m", "mm/m"})
 
 _HEADER = ("target_mm", "run", "direction")
 _VALUES = {"value_um": "um", "value_urad": "urad"}
+#: Columns of the environment of a laser: of its air, all or none, and of the material.
+AIR = ("air_degC", "pressure_hPa", "humidity_percent")
+MATERIAL = "material_degC"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,7 +74,8 @@ class Readings:
     `line` (n,) is the line of each row in the file, 0 where it has none. `component` is an ISO 230-1 name,
     None where the file does not state it. `angular` says that values are in rad, None where the file does not
     state it. `keys` are the comments of the file, each with its line. `notes` are sentences on what the
-    reader assumed. `sense_known` says that values are actual minus commanded.
+    reader assumed. `sense_known` says that values are actual minus commanded. `environment` are columns (n,)
+    of AIR and MATERIAL.
     """
 
     file: str
@@ -85,13 +89,11 @@ class Readings:
     keys: Mapping[str, tuple[str, int]] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     sense_known: bool = False
+    environment: Mapping[str, Array] = field(default_factory=dict)
 
     def with_sense(self, sense: str) -> Readings:
         """The same as actual minus commanded. `sense`, a key of SENSES, is the sign convention so far."""
-        return Readings(
-            self.file, self.target_mm, self.value * SENSES[sense], self.run, self.direction, self.line,
-            self.component, self.angular, self.keys, self.notes, sense_known=True,
-        )  # fmt: skip
+        return replace(self, value=self.value * SENSES[sense], sense_known=True)
 
 
 def read_readings(path: PathLike) -> Readings:
@@ -124,6 +126,7 @@ def parse_readings(data: bytes, file: str) -> Readings:
         component,
         unit in ANGULAR,
         MappingProxyType(keys),
+        environment={name: column[name] for name in (*AIR, MATERIAL) if name in column},
     )
 
 
@@ -142,13 +145,14 @@ def check_component(readings: Readings, component: str) -> None:
 
 
 def _header_problems(line: int, header: Sequence[str]) -> list[Problem]:
-    known = (*_HEADER, *_VALUES)
+    known = (*_HEADER, *_VALUES, *AIR, MATERIAL)
     if len(header) == 1 and re.search(r"[;\t]", header[0]):
         sentence = "columns are separated by semicolons or tabs; expected commas, or a profile for this file"
         return [(line, sentence)]
     more = "; files of other instruments need a profile"
     problems = names(line, header, lambda _, name: unknown(name, known, more))
-    problems += missing(line, header, _HEADER)
+    air = AIR if any(name in header for name in AIR) else ()
+    problems += missing(line, header, (*_HEADER, *air))
     if sum(name in _VALUES for name in header) != 1:
         sentence = "expected one column of values: value_um for lengths or value_urad for angles"
         problems.append((line, sentence))
