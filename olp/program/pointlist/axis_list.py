@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -21,7 +20,7 @@ from olp.program.pointlist.columns import columns
 from olp.program.pointlist.dialect import DIALECT
 from olp.program.program import ArcSlots, Program
 from olp.program.text.delimited import DELIMITERS, Delimiter, Layout, first_lines, mapping, stated_frame
-from olp.program.text.line_ends import split
+from olp.program.text.line_ends import LINE_END
 from olp.program.text.numbers import MOST_DECIMALS, Number
 from olp.program.text.rows import Cells
 
@@ -167,9 +166,11 @@ def _tool(text: str, line: int) -> int:
 
 def _program(data: bytes, line: Index, kind: Kind) -> Program:
     count = len(line)
-    starts = np.cumsum([0, *(len(row) for row in split(data))])
-    bounds = [(a, a + len(data[a:b].rstrip(b"\r\n"))) for a, b in pairwise(starts.tolist())]
-    line_start, line_end = np.array(bounds, np.int32).reshape(-1, 2).T
+    spans = np.array([match.span() for match in LINE_END.finditer(data)], np.int32).reshape(-1, 2)
+    line_start, line_end = np.append(0, spans[:, 1]), np.append(spans[:, 0], len(data))
+    # the end of the last line begins no further line
+    lines = len(line_start) - (line_start[-1] == len(data))
+    line_start, line_end = line_start[:lines].astype(np.int32), line_end[:lines].astype(np.int32)
     return Program(
         data=data, dialect=DIALECT,
         toolpath=Toolpath(
