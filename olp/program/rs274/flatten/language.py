@@ -17,6 +17,7 @@ class Language:
       assignment needs no brackets. Variables are numbered as in Macro B: #1 to #33 local, vacant until set.
     - `user_tasks`: variables have names, words take their value behind `=`, and CALL runs a subprogram.
     - `modal_variables`: #4001 to #4010 and #4107 to #4120 have what is in force before a block.
+    - `work_offsets`: #5221 and on have the work offsets G54 and on.
     - `saved_modes`: M70 to M73 save and restore modal codes. `profile_cycles`: G70 to G72 name a subprogram.
     - `splines`: G5 to G5.3 are splines, and `@` and `^` radius and angle.
     - `counts_in_p`: P of M98 has the count in front of four digits of the number. `shared_locals`: M98 keeps
@@ -31,6 +32,7 @@ class Language:
     macro_b: bool
     user_tasks: bool = False
     modal_variables: bool
+    work_offsets: bool = False
     saved_modes: bool
     profile_cycles: bool
     splines: bool
@@ -45,18 +47,18 @@ class Language:
 
 
 NGC = Language(
-    arithmetic=expressions.NGC, macro_b=False, modal_variables=False, saved_modes=True, profile_cycles=True,
-    splines=True, counts_in_p=False, shared_locals=False, calls_none=True, increments_open=False, decimals=12,
-    all_digits=True, counts=frozenset(), points=False,
+    arithmetic=expressions.NGC, macro_b=False, work_offsets=True, modal_variables=False, saved_modes=True,
+    profile_cycles=True, splines=True, counts_in_p=False, shared_locals=False, calls_none=True,
+    increments_open=False, decimals=12, all_digits=True, counts=frozenset(), points=False,
 )  # fmt: skip
 #: Without splines, radius and angle, as other controls have the words of RS-274.
-PLAIN_NGC = replace(NGC, splines=False)
+PLAIN_NGC = replace(NGC, splines=False, work_offsets=False)
 MACRO_B = Language(
-    arithmetic=expressions.MACRO_B, macro_b=True, modal_variables=True, saved_modes=False,
+    arithmetic=expressions.MACRO_B, macro_b=True, work_offsets=True, modal_variables=True, saved_modes=False,
     profile_cycles=False, splines=False, counts_in_p=True, shared_locals=True, calls_none=False,
     increments_open=True, decimals=4, all_digits=False, counts=frozenset("gmnpltdhos"), points=True,
 )  # fmt: skip
 USER_TASKS = replace(
-    MACRO_B, arithmetic=expressions.USER_TASKS, user_tasks=True, modal_variables=False, counts_in_p=False,
-    counts=frozenset("ghmnosdt"),
+    MACRO_B, arithmetic=expressions.USER_TASKS, user_tasks=True, modal_variables=False, work_offsets=False,
+    counts_in_p=False, counts=frozenset("ghmnosdt"),
 )  # fmt: skip

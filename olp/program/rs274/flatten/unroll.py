@@ -19,6 +19,7 @@ import numpy as np
 
 from olp.core.budget import Budget
 from olp.core.errors import ProgramError
+from olp.core.machine import Setup
 from olp.program.origin import Origin, Unrolled, Within
 from olp.program.rs274.codes import ABSOLUTE, INCREMENTAL, SHIFTED_BORES, SPLINES
 from olp.program.rs274.cycles import Stroke, stroke_budget
@@ -60,6 +61,7 @@ def flatten(
     file: str | None = None,
     peck_clearance: float | None = None,
     parameters: Mapping[str, float] | None = None,
+    setup: Setup | None = None,
     limit: int = UNROLLED_BYTES,
 ) -> Unrolled:
     """Plain blocks of a program, with the origin of each; see the module for what is kept.
@@ -69,14 +71,14 @@ def flatten(
     None both positions of the switch have to give the same program. `expand_cycles` writes canned cycles as
     G0, G1, G4 and spindle blocks. `peck_clearance` (program units) is the clearance of G73 and G83, needed
     where a parameter of the control sets it. `parameters` are values that parameters such as "#100" have in
-    the control. `limit` is the work that a short program may cause, in bytes of
+    the control, `setup` has the work offsets. `limit` is the work that a short program may cause, in bytes of
     visited blocks; a long one may cause `UNROLLED_PER_BYTE` for each of its bytes. Raises ProgramError with
     the line in the source, or with the line in the subprogram and its file.
     """
     strokes = stroke_budget(len(data))
     writer = _Flattener(
         profile, strokes, expand_cycles=expand_cycles, peck_clearance=peck_clearance, parameters=parameters,
-        switch_open=block_delete is None,
+        setup=setup, switch_open=block_delete is None,
     )  # fmt: skip
     main = Unit(data, profile, file)
     visit = writer.block
@@ -108,11 +110,11 @@ class _Flattener:
 
     def __init__(
         self, profile: Profile, strokes: Budget, *, expand_cycles: bool, peck_clearance: float | None,
-        parameters: Mapping[str, float] | None = None, switch_open: bool = False,
+        parameters: Mapping[str, float] | None = None, setup: Setup | None = None, switch_open: bool = False,
     ) -> None:  # fmt: skip
         self.language, self.cycles = profile.language, profile.cycles
         self.state = ProgramState(profile)
-        self.variables = Variables(self.state, parameters)
+        self.variables = Variables(self.state, parameters, setup)
         self.splines = Splines(self.state)
         self.strokes = strokes
         #: whether blocks under block delete may run or not
@@ -208,6 +210,7 @@ class _Flattener:
         kept = [i for i in range(len(line.words)) if i not in cut]
         active: list[Value] = [(values[i][0], self._tracked(line.words[i], values[i][1])) for i in kept]
         self.variables.modal.follow(active, switched=line.deleted)
+        self.variables.offsets.follow(active)
         before = (self.state.absolute, self.state.path, tuple(self.state.position))
         texts: dict[int, str] = {}
         if self.language.splines:

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 
 from olp.core.errors import ProgramError
+from olp.core.machine import Setup
 from olp.program.rs274.codes import INVERSE_TIME, METRIC
 from olp.program.rs274.flatten.expressions import filled
 from olp.program.rs274.flatten.lines import Line
 from olp.program.rs274.flatten.modal_variables import ModalVariables, meaning
 from olp.program.rs274.flatten.state import ProgramState
+from olp.program.rs274.flatten.work_offsets import WorkOffsets
 
 #: largest local parameter of LinuxCNC
 _NGC_LOCAL = 30
@@ -53,8 +55,11 @@ class Variables:
     """Parameters of the run. `given` are values that the control has, by "#number" or "#<name>"; they hold
     until the program sets the parameter. Other values that only the control knows raise ProgramError."""
 
-    def __init__(self, state: ProgramState, given: Mapping[str, float] | None = None) -> None:
+    def __init__(
+        self, state: ProgramState, given: Mapping[str, float] | None = None, setup: Setup | None = None
+    ) -> None:
         self.state = state
+        self.offsets = WorkOffsets(state, setup if state.profile.language.work_offsets else None)
         self.modal = ModalVariables()
         self.tasks = state.profile.language.user_tasks
         names = {_bare(name, tasks=self.tasks): value for name, value in (given or {}).items()}
@@ -78,8 +83,9 @@ class Variables:
             return self.common.get(index, self.given.get(index, 0.0))
         if 5420 <= index <= 5422:
             return self.state.position_of(index - 5420)
-        if index in self.given:
-            return self.given[index]
+        stated = self._of_control(index)
+        if stated is not None:
+            return stated
         raise ProgramError(
             f"#{index} is kept by the control (probe result, offset, tool or position) and not known "
             f"off line; {_way_on(f'#{index}')}",
@@ -111,10 +117,9 @@ class Variables:
                 return self.state.position_of(index - base)
         what = meaning(index) if self.state.profile.language.modal_variables else ""
         stated = self.modal.value(index) if what else None
+        stated = self._of_control(index) if stated is None else stated
         if stated is not None:
             return stated
-        if index in self.given:
-            return self.given[index]
         if what:
             raise ProgramError(
                 f"#{index} is {what} in force, which the program has not stated before; state it there, or "
@@ -126,6 +131,10 @@ class Variables:
             f"{_way_on(f'#{index}')}",
             code="OLP541",
         )
+
+    def _of_control(self, index: int) -> float | None:
+        """What the job states of a variable that the control has, or of a work offset."""
+        return self.given[index] if index in self.given else self.offsets.value(index)
 
     def named(self, name: str) -> float:
         known = self._predefined(name)

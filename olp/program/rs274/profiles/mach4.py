@@ -27,5 +27,7 @@ DIALECT = replace(
     m_refusals=M_REFUSALS,
     g52_is_g92=False,
     g10_stores=False,
-    language=replace(MACRO_B, modal_variables=False, counts_in_p=False, increments_open=False),
+    language=replace(
+        MACRO_B, modal_variables=False, work_offsets=False, counts_in_p=False, increments_open=False
+    ),
 )

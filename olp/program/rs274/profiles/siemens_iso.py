@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from olp.program.rs274.flatten.language import MACRO_B
 from olp.program.rs274.profiles.base import Act, g_codes
 from olp.program.rs274.profiles.iso import ISO, ISO_EXTRA, ISO_UNCHANGED
 
@@ -31,5 +32,7 @@ DIALECT = replace(
     offset_words={**ISO.offset_words, 540: "P"},
     offset_names={540: "G54.1"},
     offsets_alone=frozenset({540}),
+    # which variables have the offsets there is not stated
+    language=replace(MACRO_B, work_offsets=False),
     path_mode="G64 of the control, unless a compressor or a smoothing mode is on",
 )
