@@ -4,6 +4,7 @@
 #define OLP_STEPS 12        /* of the iteration, at most; each makes the error a thousandth */
 #define OLP_CLOSE 1e-9      /* mm; an iteration that moves less has ended */
 #define OLP_SETTLED 4       /* steps behind which no axis changes its side: two that turn could do so for ever */
+#define OLP_GENTLE 4.0      /* times the largest correction in the time of the ramp */
 typedef struct {
     double most_mm;         /* the largest correction of an axis */
     double rate_mm_s;       /* by which it changes at most */
@@ -102,6 +103,10 @@ static void olp_bounded(olp_follower *follower, const olp_limits *limits, const 
         double held = olp_within(whole, -limits->most_mm, limits->most_mm);
         if (follower->known && tick_s > 0.0) {
             double step = limits->rate_mm_s * tick_s, before = follower->correction[j];
+            double gentle = OLP_GENTLE * limits->most_mm * tick_s;
+            /* while it is switched, a drive crosses its backlash by and by too */
+            if (follower->share > 0.0 && follower->share < 1.0 && gentle < step * limits->ramp_s)
+                step = gentle / limits->ramp_s;
             held = olp_within(held, before - step, before + step);
         }
         if (!(held == held)) held = 0.0;

@@ -152,6 +152,63 @@ def test_a_file_that_is_not_the_model_is_found_out(tmp_path: Path) -> None:
             self_test(CODE["c"], {**files, first: broken})
 
 
+BOUNDS = """
+#include <stdio.h>
+int main(void)
+{
+    olp_follower at;
+    olp_limits limits = {1.0, 2.0, 0.5, 5e-5, 1};
+    olp_state now;
+    double place[3] = {300.0, 200.0, -50.0}, wanted[3], command[3], before[3], most = 0.0, switched = 0.0;
+    int tick, j, held = 0, limited = 0;
+    memset(&at, 0, sizeof at);
+    memset(&now, 0, sizeof now);
+    memcpy(now.temperature_degC, olp_start_degC, sizeof now.temperature_degC);
+    olp_led(&at, &now, place);
+    for (j = 0; j < 3; j++) before[j] = at.correction[j];
+    for (tick = 0; tick < 4000; tick++) {
+        if (tick == 1000) now.tool_mm[2] = -150.0;
+        if (tick == 2000) limits.most_mm = 0.002;
+        if (tick == 3000) limits.on = 0;
+        for (j = 0; j < 3; j++) {
+            wanted[j] = place[j];
+            if (tick >= 500 && tick < 2900) wanted[j] += 0.02 * (tick - 500) * (j - 1);
+        }
+        olp_switch(&at, &limits, 1e-3);
+        olp_follow(&at, &limits, &now, wanted, 1e-3, command);
+        for (j = 0; j < 3; j++) {
+            double step = fabs(command[j] - wanted[j] - before[j]);
+            if (step > most) most = step;
+            if (tick < 500 && step > switched) switched = step;
+            if (tick > 2100 && fabs(command[j] - wanted[j]) > 0.002 + 1e-12) held++;
+            before[j] = command[j] - wanted[j];
+        }
+        limited += at.limited;
+    }
+    printf("%.9f %.9f %d %d %.9f %d %d\\n", most, switched, held, limited, at.share, olp_outside(place),
+           olp_outside(wanted) + (command[0] == wanted[0]));
+    return 0;
+}
+"""
+
+
+def test_every_cycle_is_bounded(tmp_path: Path) -> None:
+    """Switched on, another tool, a smaller bound, outside of the box, switched off: in no cycle more than the
+    rate allows, and never more than the bound once it is reached."""
+    calibration = replace(warm(), backlash_mm=(0.004, 0.0, 0.006))
+    files = write_code(calibration, "FXYZ", DIGEST, "c", tmp_path / "model.c")
+    (tmp_path / "bounds.c").write_bytes(next(iter(files.values())) + BOUNDS.encode())
+    built, program = str(tmp_path / "bounds.c"), str(tmp_path / "bounds")
+    subprocess.run(["gcc", "-std=c99", "-O1", "-o", program, built, "-lm"], check=True)
+    said = subprocess.run([program], capture_output=True, text=True, check=True).stdout.split()
+    most, switched, share = float(said[0]), float(said[1]), float(said[4])
+    assert 1.9e-3 < most <= 2e-3 + 1e-12
+    assert 0.0 < switched < 1e-4
+    assert said[2] == "0" and int(said[3]) > 100
+    assert share == 0.0
+    assert said[5] == "0" and said[6] == "1"
+
+
 def test_what_code_cannot_hold_is_refused_by_name(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="distortions of axis X on 2 measuring lines"):
         carried(warm((0.0, 99.0, 0.0)), "FXYZ")

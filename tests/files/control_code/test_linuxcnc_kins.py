@@ -4,6 +4,7 @@ judge's model of the machine, stay on the programmed path."""
 from __future__ import annotations
 
 import csv
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -128,6 +129,25 @@ def test_the_machine_follows_the_program(name: str, built: Path, tmp_path: Path)
     assert away(moves, actual[cutting]).max() * 1e3 <= PATH_UM
     # without the component the joints would be the path, and the tip where the joints' error leads it
     assert away(moves, run.axis[cutting]).max() * 1e3 > 20.0
+
+
+def test_it_is_switched_without_a_jump(built: Path, tmp_path: Path) -> None:
+    """Switched on and off at rest, and off again on the move; outside of it the joints are the program."""
+    program = (
+        f"{START}G1 X30 Y20\nG4 P0.2\nM64 P0\nG4 P1.3\nM65 P0\nG4 P1.3\nM64 P0\nG4 P1.3\n"
+        "M65 P0\nG1 X90 Y30 F3000\nG4 P0.5\nM2\n"
+    )
+    run = executed(built, program, tmp_path, f"net on motion.digital-out-00 => {NAME}.enable")
+    correction, share = run.pins[:, :3], run.pins[:, 3]
+    step = np.abs(np.diff(correction, axis=0)).max(axis=1)
+    ramp = (share[1:] > 0.0) & (share[1:] < 1.0)
+    assert {0.0, 1.0} <= set(share.tolist()) and np.abs(np.diff(share)).max() <= 1.01e-3
+    assert np.abs(correction[share == 1.0]).max() > 0.02
+    assert not correction[share == 0.0].any()
+    text = (built / f"{NAME}.comp").read_text()
+    rate, most = (float(re.findall(rf"most_{what} = (\S+)", text)[0]) for what in ("rate", "correction"))
+    assert ramp.sum() > 3000 and step[ramp].max() <= 4e-3 * most + 2e-6
+    assert step.max() <= rate * 1e-3 + 2e-6
 
 
 def test_what_has_no_name_in_hal_is_refused(tmp_path: Path) -> None:
