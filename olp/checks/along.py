@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 
@@ -42,37 +42,51 @@ class Figure:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Places:
-    """(m,) `move` and the `share` of it, 1 at its end."""
+    """(m,) `move` and the `share` of it, 1 at its end; `length` of the move in mm."""
 
     move: Index
     share: Array
+    length: Array
 
 
-def figures(path: Toolpath, sizes: Sizes) -> list[Figure]:
-    """Of each size in the order in which `sizes` names them; none where no waypoint is known.
+@dataclass(frozen=True, slots=True, eq=False)
+class Along:
+    """Where figures of a `path` are taken: at waypoints, and at samples between them `step_mm` apart, which
+    are even over the length of what cuts. A rapid counts with its end alone."""
 
-    Both are of waypoints and of samples between them, which are even over the length of what cuts. Around the
-    largest samples more are taken. A rapid counts with its end alone.
-    """
-    pick = _waypoints(path)
-    if not len(pick):
-        return []
-    length = _lengths(path)
-    between, step_mm = _between(length)
-    places = _Places(
-        np.concatenate((pick, between.move)), np.concatenate((np.ones(len(pick)), between.share))
-    )
-    values = _named(sizes(_points(path, places), places.move))
-    near = _near(places, values, length, step_mm)
-    more = _named(sizes(_points(path, near), near.move)) if len(near.move) else {}
-    return [
-        Figure(
-            name,
-            max(float(value.max()), float(more[name, number].max()) if (name, number) in more else 0.0),
-            float(np.sqrt(np.mean(value * value))),
-        )
-        for (name, number), value in values.items()
-    ]
+    path: Toolpath
+    step_mm: float
+    _places: _Places
+    _point: Array
+
+    @staticmethod
+    def of(path: Toolpath) -> Along:
+        """The places of a path; none where no waypoint is known."""
+        pick = _waypoints(path)
+        length = _lengths(path) if len(pick) else np.zeros(0)
+        between, step_mm = _between(length)
+        places = _Places(
+            np.concatenate((pick, between.move)), np.concatenate((np.ones(len(pick)), between.share)),
+            np.concatenate((length[pick], between.length)),
+        )  # fmt: skip
+        return Along(path, step_mm, places, _points(path, places))
+
+    def figures(self, sizes: Sizes) -> list[Figure]:
+        """Of each size in the order in which `sizes` names them; none where no waypoint is known. Around the
+        largest samples more are taken."""
+        if not len(self._point):
+            return []
+        values = _named(sizes(self._point, self._places.move))
+        near = _near(self._places, values, self.step_mm)
+        more = _named(sizes(_points(self.path, near), near.move)) if len(near.move) else {}
+        return [
+            Figure(
+                name,
+                max(float(value.max()), float(more[name, number].max()) if (name, number) in more else 0.0),
+                float(np.sqrt(np.mean(value * value))),
+            )
+            for (name, number), value in values.items()
+        ]
 
 
 def _named(pairs: Iterable[tuple[str, Array]]) -> dict[tuple[str, int], Array]:
@@ -123,27 +137,41 @@ def _starts(path: Toolpath, move: Index) -> Array:
 def _between(length: Array) -> tuple[_Places, float]:
     """Places between waypoints, one in each of so many equal parts of all lengths, and the length of a
     part."""
-    ends = np.cumsum(length)
-    if not ends[-1] > 0.0:
-        return _Places(np.zeros(0, np.int64), np.zeros(0)), 0.0
+    whole = 0.0
+    for _, ends in _ends(length):
+        whole = float(ends[-1])
+    if not whole > 0.0:
+        return _Places(np.zeros(0, np.int64), np.zeros(0), np.zeros(0)), 0.0
     part = np.arange(_BETWEEN)
-    place_mm = (part + np.mod(part * _GOLDEN, 1.0)) * (ends[-1] / _BETWEEN)
-    move = np.minimum(
-        np.searchsorted(ends, place_mm, side="right"), len(length) - 1 - int((length[::-1] > 0.0).argmax())
-    )
-    share = (place_mm - (ends[move] - length[move])) / length[move]
-    return _Places(move, np.clip(share, 0.0, 1.0)), float(ends[-1]) / _BETWEEN
+    place_mm = (part + np.mod(part * _GOLDEN, 1.0)) * (whole / _BETWEEN)
+    last = len(length) - 1 - int((length[::-1] > 0.0).argmax())
+    move, end, done = np.full(_BETWEEN, last), np.full(_BETWEEN, whole), 0
+    for a, ends in _ends(length):
+        some = slice(done, int(np.searchsorted(place_mm, ends[-1])))
+        inside = np.searchsorted(ends, place_mm[some], side="right")
+        move[some], end[some], done = a + inside, ends[inside], some.stop
+    share = (place_mm - (end - length[move])) / length[move]
+    return _Places(move, np.clip(share, 0.0, 1.0), length[move]), whole / _BETWEEN
 
 
-def _near(places: _Places, values: dict[tuple[str, int], Array], length: Array, step_mm: float) -> _Places:
+def _ends(length: Array) -> Iterator[tuple[int, Array]]:
+    """Blocks of moves: the first of each, and (k,) the length of the path up to the end of each move."""
+    before = 0.0
+    for a in range(0, len(length), _BLOCK):
+        ends = np.cumsum(np.concatenate(([before], length[a : a + _BLOCK])))[1:]
+        yield a, ends
+        before = float(ends[-1])
+
+
+def _near(places: _Places, values: dict[tuple[str, int], Array], step_mm: float) -> _Places:
     """More places within two steps of the largest values, on the same moves."""
     tops = [np.argpartition(value, -min(_LARGEST, len(value)))[-_LARGEST:] for value in values.values()]
     top = distinct(np.concatenate([np.zeros(0, np.int64), *tops]))
-    top = top[length[places.move[top]] > 0.0]
+    top = top[places.length[top] > 0.0]
     offset_mm = np.linspace(-2.0, 2.0, 4 * _AROUND + 1) * step_mm
-    move = np.repeat(places.move[top], len(offset_mm))
-    share = places.share[top][:, None] + offset_mm / length[places.move[top]][:, None]
-    return _Places(move, np.clip(share, 0.0, 1.0).ravel())
+    move, length = (np.repeat(column[top], len(offset_mm)) for column in (places.move, places.length))
+    share = places.share[top][:, None] + offset_mm / places.length[top][:, None]
+    return _Places(move, np.clip(share, 0.0, 1.0).ravel(), length)
 
 
 def _points(path: Toolpath, places: _Places) -> Array:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from olp.checks.along import Figure, figures
+from olp.checks.along import Along, Figure
 from olp.checks.base import finding, lines_of
 from olp.checks.listed import between_findings as between_findings
 from olp.checks.listed import remark_findings
@@ -205,9 +205,9 @@ def part_findings(table: Judgements, part_tolerance_um: float | None) -> list[Fi
     return [finding("OLP108", what, sorted(set(table.line[above].tolist())))]
 
 
-def sources(path: Toolpath, model: ErrorModel) -> list[dict[str, Any]]:
+def sources(along: Along, model: ErrorModel) -> list[dict[str, Any]]:
     """Size of each error source over the nominal path, at waypoints and between them, largest first."""
-    tool = path.tool_mm()
+    tool = along.path.tool_mm()
 
     def sizes(point: Array, move: Index) -> Iterator[tuple[str, Array]]:
         for name, part in model.contributions(point, tool if tool.ndim == 1 else tool[move]):
@@ -215,21 +215,22 @@ def sources(path: Toolpath, model: ErrorModel) -> list[dict[str, Any]]:
 
     rows = [
         {"name": figure.name, "max_um": figure.largest * 1e3, "rms_um": figure.rms * 1e3}
-        for figure in figures(path, sizes)
+        for figure in along.figures(sizes)
     ]
     return sorted(rows, key=lambda row: -row["max_um"])
 
 
-def orientation(path: Toolpath, model: ErrorModel) -> dict[str, float]:
+def orientation(along: Along, model: ErrorModel) -> dict[str, float]:
     """Largest and rms angle of the tool in urad along the nominal path, which a machine with three linear
     axes cannot correct."""
+    path = along.path
     payload = path.per_frame([(f.payload_kg,) for f in path.frames])[..., 0]
 
     def sizes(point: Array, move: Index) -> Iterator[tuple[str, Array]]:
         turned = model.rotation(point, None, payload if payload.ndim == 0 else payload[move])
         yield "", np.sqrt(np.einsum("ij,ij->i", turned, turned)) * 1e6
 
-    angle = next(iter(figures(path, sizes)), Figure("", 0.0, 0.0))
+    angle = next(iter(along.figures(sizes)), Figure("", 0.0, 0.0))
     return {"max_urad": angle.largest, "rms_urad": angle.rms}
 
 
@@ -249,7 +250,7 @@ def worst_blocks(program: Program, table: Judgements) -> list[dict[str, Any]]:
     ]
 
 
-def tally_moves(path: Toolpath, uncorrected: int, parts: npt.NDArray[np.int32]) -> dict[str, int]:
+def tally_moves(path: Toolpath, uncorrected: int, parts: npt.NDArray[np.integer[Any]]) -> dict[str, int]:
     """Every move is corrected, corrected approximately, or left uncorrected; the three add up to all."""
     untouched = (path.flag & np.uint8(Flag.PASS | Flag.MACHINE | Flag.CONTROL)) != 0
     rough = ((path.flag & np.uint8(Flag.CYCLE | Flag.WHOLE)) != 0) | (path.kind == Kind.PROBE)

@@ -75,7 +75,7 @@ class _Text:
         self.corner = np.array([(c := f.compensation) is not None and c.corner for f in self.path.frames])
         self.arc = {int(move): i for i, move in enumerate(self.path.arcs.move)}
         #: tenths of the numbers of words, which G codes are
-        self.tenths = np.rint(self.words.mantissa / 10.0 ** (self.words.decimals.astype(float) - 1))
+        self.tenths = np.rint(self.words.mantissa[:] / 10.0 ** (self.words.decimals.astype(float) - 1))
         self.absolute = self._absolute_centres()
         self.edits: dict[int, list[tuple[int, int, bytes]]] = {}
         self.before: dict[int, list[bytes]] = {}

@@ -39,7 +39,7 @@ class VerbatimWriter(PointWriter):
         head = np.flatnonzero(rows.head)
         slot = self.program.slot[rows.move[head]]
         self._omitted(rows, head, slot)
-        placing = Placing(self.program.data, self.words.number, self.words.end)
+        placing = Placing(self.program.data, self.words.number[:], self.words.end[:])
         new: dict[int, tuple[int, int, int]] = {}
         for axis in range(3):
             stated = np.flatnonzero(slot[:, axis] >= 0)
@@ -73,7 +73,7 @@ class VerbatimWriter(PointWriter):
 
     def _line_end(self, position: int) -> int:
         """The end of the line of a byte: what is inserted comes behind a comment."""
-        ends = self.program.line_end
+        ends = self.program.line_end[:]
         return int(ends[min(int(np.searchsorted(ends, position)), len(ends) - 1)])
 
     def _share(

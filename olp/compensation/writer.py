@@ -33,6 +33,9 @@ from olp.program.bands import Band
 from olp.program.program import Program
 from olp.program.text.edits import Edits, Prefixes, render, splice
 
+#: Room for a text that is written, in halves of the program: most grow by less.
+_ROOM = 3
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Task:
@@ -79,8 +82,9 @@ class Writer(ABC):
         self.word_offset_mm = self.frame_offset_mm
         if self.turns is not None:
             self.word_offset_mm = self.turns.words(self.frame_offset_mm, self.turns.of_frame)
-        # what is written so far: nothing before the first change
-        self._out = io.BytesIO()
+        # what is written so far: nothing before the first change. Room for all of it is moved nowhere, and
+        # takes memory only as it is filled.
+        self._out = io.BytesIO(bytes(_ROOM * len(program.data) // 2))
         # where the text grows, and by how much, if that is asked for
         self._grown: list[tuple[Index, Index]] | None = [] if task.located else None
         self._begin, self._changed = 0, False
@@ -113,6 +117,7 @@ class Writer(ABC):
         if not (self._changed or (self.stamp and self.stamp_always)):
             return None
         self._put(self._begin if self._changed else 0, len(self.program.data))
+        self._out.truncate()
         return self._out.getvalue()
 
     def _put(self, begin: int, end: int, text: bytes | None = None) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-import numpy.typing as npt
 
 from olp.compensation.block_writer import BlockWriter
 from olp.compensation.digits import INT10
@@ -18,6 +17,7 @@ from olp.core.units import MM_PER_INCH
 from olp.core.values import dataclass
 from olp.program.bands import Band
 from olp.program.program import Program
+from olp.program.text.columns import Columns, Packed
 from olp.program.text.numbers import Placing
 
 
@@ -29,7 +29,7 @@ class Written:
 
     text: bytes | None
     uncorrected: Index
-    parts: npt.NDArray[np.int32]
+    parts: Packed
     tally: Tally
     starts: Index | None = None
 
@@ -38,16 +38,16 @@ def write(task: Task, plans: Iterable[tuple[Band, Plan]], tell: Progress = silen
     """Write the bands of a program, each with its plan, as they come; `tell` is told the second half of each.
     Raises ProgramError where a plan cannot be written in the dialect."""
     writer: Writer | None = None
-    uncorrected, parts = [], []
+    uncorrected, parts = [], Columns()
     for band, rows in plans:
         if writer is None:
             writer = _writer(band.program, rows)(task)
         writer.add(band, rows, part(tell, band.middle, band.until))
         uncorrected.append(band.first + rows.uncorrected)
-        parts.append(writer.parts)
+        parts.put("parts", writer.parts, np.int32)
     assert writer is not None
     starts = writer.starts()
-    return Written(writer.text(), np.concatenate(uncorrected), np.concatenate(parts), writer.tally, starts)
+    return Written(writer.text(), np.concatenate(uncorrected), parts.packed("parts"), writer.tally, starts)
 
 
 def _writer(program: Program, plan: Plan) -> type[Writer]:
@@ -79,7 +79,7 @@ def _plain(program: Program, plan: Plan) -> bool:
     if words is None or statements is None or not len(words.start):
         return False
     split = distinct(plan.move[1:][plan.move[1:] == plan.move[:-1]])
-    if not is_in(statements.end[split], program.line_end).all():
+    if not is_in(statements.end[split], program.line_end[:]).all():
         return False
     units = {frame.unit_mm for frame in program.toolpath.frames}
     if statements.decimal != b"." or not units <= {1.0, MM_PER_INCH}:
@@ -88,16 +88,14 @@ def _plain(program: Program, plan: Plan) -> bool:
     if len(slot) != program.slot.size or len(slot) != len(words.start):
         return False
     text = np.frombuffer(program.data, np.uint8)
-    size = np.abs(words.mantissa)
+    mantissa, begin, end = words.mantissa[:], words.number[:], words.end[:]
+    size = np.abs(mantissa)
     whole = size // INT10[words.decimals]
-    length = 1 + (whole[:, None] >= INT10[1:10]).sum(axis=1) + (words.mantissa < 0)
+    length = 1 + (whole[:, None] >= INT10[1:10]).sum(axis=1) + (mantissa < 0)
     length += np.where(words.decimals > 0, words.decimals + 1, 0)
     # zero behind a minus, which rounding leaves
-    length += (size == 0) & (text[words.number] == ord("-"))
+    length += (size == 0) & (text[begin] == ord("-"))
     # a plus, zeros in front and exponents all show in the length
-    if (words.end - words.number != length).any() or (slot != np.arange(len(slot))).any():
+    if (end - begin != length).any() or (slot != np.arange(len(slot))).any():
         return False
-    return (
-        not Placing(program.data, words.number, words.end).padded
-        and not (text[words.number] == ord("+")).any()
-    )
+    return not (Placing(program.data, begin, end).padded or (text[begin] == ord("+")).any())

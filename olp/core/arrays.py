@@ -36,6 +36,9 @@ def read_only(values: npt.NDArray[Scalar]) -> npt.NDArray[Scalar]:
 def distinct(values: npt.NDArray[Scalar]) -> npt.NDArray[Scalar]:
     """(m,) the distinct values of an array without NaN, ascending, as `np.unique` gives them. It is fast
     where they are in order already, as lines are."""
+    if values.size and not any(values.strides):
+        # one number that stands for all
+        return np.asarray(values.flat[:1])
     ordered = np.sort(values, axis=None, kind="stable")
     first = np.ones(len(ordered), bool)
     first[1:] = ordered[1:] != ordered[:-1]

@@ -18,6 +18,7 @@ from olp.program.origin import Origin, in_original, origin_of
 from olp.program.robots.targets import Targets
 from olp.program.rs274.profiles.base import Profile
 from olp.program.rs274.state import Capture, PathMode
+from olp.program.text.columns import Packed
 from olp.program.text.line_ends import LINE_END
 from olp.program.tilts import Tilt
 
@@ -30,12 +31,12 @@ class Words:
     the number is `mantissa` / 10**`decimals`. `first_word` (lines + 1,) leads from line to words."""
 
     letter: npt.NDArray[np.uint8]
-    mantissa: Index
+    mantissa: Packed
     decimals: npt.NDArray[np.int8]
     pointed: npt.NDArray[np.bool_]
     start: Small
-    number: Small
-    end: Small
+    number: Packed
+    end: Packed
     first_word: Small
 
     def of_line(self, line: int) -> range:
@@ -249,7 +250,7 @@ class Program:
     slot: Small
     arc_slots: ArcSlots
     line_start: Small
-    line_end: Small
+    line_end: Small | Packed
     captures: tuple[Capture, ...] = ()
     path_modes: tuple[PathMode, ...] = ()
     holes: Holes = field(default_factory=Holes.none)

@@ -14,6 +14,7 @@ from olp.core.values import dataclass
 from olp.program.dialect import Dialect
 from olp.program.path_columns import PathColumns
 from olp.program.program import ArcSlots, ArcText, ChordText, Program, StatedFeeds, Statements, Words
+from olp.program.text.columns import Packed
 from olp.program.text.statements import Chunk, Field, Statement, is_cards
 
 #: Powers of ten by their exponent: those of the decimals of a number.
@@ -263,12 +264,12 @@ class StatementCollector(PathColumns):
         start = take("word_start", np.int32)
         return Words(
             letter=np.zeros(len(start), np.uint8),
-            mantissa=take("mantissa", np.int64),
+            mantissa=self.columns.packed("mantissa"),
             decimals=take("decimals", np.int8),
             pointed=take("pointed", np.bool_),
             start=start,
-            number=start,
-            end=take("word_end", np.int32),
+            number=Packed.of(start, start),
+            end=Packed.of(take("word_end", np.int32), start),
             first_word=np.zeros(0, np.int32),
         )
 

@@ -16,6 +16,7 @@ from olp.core.values import dataclass
 from olp.program.dialect import Dialect
 from olp.program.pointlist.columns import plain_numbers
 from olp.program.program import ArcSlots, Program, StatedFeeds, Statements, Words
+from olp.program.text.columns import Packed
 from olp.program.text.line_ends import split
 from olp.program.text.numbers import MOST_DECIMALS, number
 
@@ -135,14 +136,15 @@ class Moves:
             )
             value = np.array([0.0 if n is None else n.value for n in forms], float)
             mantissa = np.rint(value * 10.0 ** decimals.astype(np.int64))
+        begin = start.astype(np.int32)
         return Words(
             letter=np.zeros(len(start), np.uint8),
-            mantissa=mantissa.astype(np.int64),
+            mantissa=Packed.of(mantissa.astype(np.int64)),
             decimals=decimals.astype(np.int8),
             pointed=np.ones(len(start), bool),
-            start=start.astype(np.int32),
-            number=start.astype(np.int32),
-            end=stop.astype(np.int32),
+            start=begin,
+            number=Packed.of(begin, begin),
+            end=Packed.of(stop, begin),
             first_word=np.zeros(lines + 1, np.int32),
         )
 

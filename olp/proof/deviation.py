@@ -22,6 +22,7 @@ from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.reversal import play_after, play_interval
 from olp.errormodel.sampling import clear_length_mm, longer, steps_needed
+from olp.program.text.columns import apart
 from olp.proof.smooth_joints import SmoothJoints
 from olp.proof.unknown_sides import UnknownSides
 from olp.proof.unknown_starts import UnknownStarts
@@ -41,14 +42,15 @@ _ARC_ANGLE_RAD = 0.1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Deviation:
-    """Deviation per nominal move, in mm: `waypoint` at its end, `path` the largest along it and at its end,
-    `bend` the part of it that comes from chords. NaN where the position is unknown. `side` (n,) is how much
-    more it may be because the side of the backlash is not known yet. Where a contour under cutter
-    compensation goes straight on (`SmoothJoints`), only what is across the path counts."""
+    """Deviation per nominal move, in mm: `waypoint` at its end, `path` the largest along it and at its end.
+    NaN where the position is unknown. `bend_mm` is the largest part that comes from chords of moves that
+    count. `side` (n,) is how much more it may be because the side of the backlash is not known yet.
+    Where a contour under cutter compensation goes straight on (`SmoothJoints`), only what is across the path
+    counts."""
 
     waypoint: Single
     path: Single
-    bend: Single
+    bend_mm: float
     side: Single
 
 
@@ -61,18 +63,18 @@ def cutting_moves(path: Toolpath) -> Mask:
 
 
 def measure(
-    nominal: Toolpath, target_mm: TargetRows, path: Toolpath, groups: Index, model: ErrorModel,
+    nominal: Toolpath, target_mm: TargetRows, path: Toolpath, groups: Index, counted: Mask, model: ErrorModel,
     bend_mm: float, tell: Progress = silent,
 ) -> Deviation:  # fmt: skip
     """Compare the actual path of `path` with the nominal one.
 
     `target_mm` (n, 3) are the nominal waypoints where the part really lies; `groups` (n,) is the index of
-    the last move of `path` that belongs to each nominal move.
+    the last move of `path` that belongs to each nominal move. (n,) `counted` are those whose chords count.
     """
     count = len(nominal)
-    waypoint = np.full(count, np.nan, np.float32)
-    worst = np.full(count, np.nan, np.float32)
-    bend = np.zeros(count, np.float32)
+    waypoint, worst = (apart((count,), np.float32) for _ in range(2))
+    waypoint[:] = worst[:] = np.nan
+    largest = 0.0
     tracer = Tracer(nominal, target_mm, path, groups, model, bend_mm)
     starts = UnknownStarts(nominal, target_mm, path, groups, model, bend_mm)
     sides = UnknownSides(path, model) if tracer.has_play else None
@@ -82,13 +84,15 @@ def measure(
     while a < count:
         parts = int(groups[a - 1]) + _BLOCK if a else _BLOCK
         b = min(max(int(np.searchsorted(groups, parts)), a + 1), a + _BLOCK, count)
-        tracer.block(a, b, waypoint[a:b], worst[a:b], bend[a:b])
+        bend = np.zeros(b - a, np.float32)
+        tracer.block(a, b, waypoint[a:b], worst[a:b], bend)
+        largest = max(largest, float(bend.max(initial=0.0, where=counted[a:b])))
         starts.block(a, b, worst[a:b])
         if sides is not None:
             side[a:b] = sides.of(int(groups[a - 1]) + 1 if a else 0, groups[a:b])
         tell("prove", b / count)
         a = b
-    return Deviation(waypoint, worst, bend, side)
+    return Deviation(waypoint, worst, largest, side)
 
 
 class Tracer:

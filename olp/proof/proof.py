@@ -55,12 +55,12 @@ class Counts(IntEnum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Side:
-    """What a proof keeps of a `Deviation`: (n,) `waypoint` and `side` in mm, and `bend_mm`: of feed moves
-    that count, the largest part that comes from chords."""
+    """What a proof keeps of a `Deviation`: (n,) `side` in mm, and of feed moves that count `bend_mm`, the
+    largest part that comes from chords. `summary` are `figures` of all moves."""
 
-    waypoint: Single
     side: Single
     bend_mm: float
+    summary: dict[str, dict[str, float]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,22 +118,29 @@ class Proof:
     def holds(self) -> bool:
         return self.largest_mm <= self.allowed_mm
 
-    def summary(self, side: str) -> dict[str, dict[str, float]]:
-        """Largest and rms in um of what counts, at waypoints and along cutting moves; `side` is "before" or
-        "after"."""
-        part: Side = getattr(self, side)
-        whole: Single = getattr(self, f"{side}_mm")
-        at_end = (self.counts <= Counts.POINT) | (self.counts == Counts.LEFT)
-        waypoints = part.waypoint[at_end & np.isfinite(part.waypoint)]
-        along = whole[self.judged & (self.counts != Counts.POINT) & np.isfinite(whole)]
-        return {"waypoints": _figures(waypoints), "between": _figures(along)}
+
+def figures(counts: npt.NDArray[np.uint8], waypoint: Single, whole: Single) -> dict[str, dict[str, float]]:
+    """Largest and rms in um of what counts, of deviations in mm (n,): `waypoint` at the ends of moves, and
+    `whole` along cutting moves."""
+    at_end = (counts <= Counts.POINT) | (counts == Counts.LEFT)
+    along = (counts <= Counts.LEFT) & (counts != Counts.POINT)
+    return {"waypoints": _figures(waypoint, at_end), "between": _figures(whole, along)}
 
 
-def _figures(values: Single) -> dict[str, float]:
+def _figures(values: Single, counted: Mask) -> dict[str, float]:
+    values = values[counted & np.isfinite(values)]
     if not len(values):
         return {"max_um": 0.0, "rms_um": 0.0}
-    rms = float(np.sqrt(np.mean(np.square(values, dtype=np.float64))))
+    rms = float(np.sqrt(_square_sum(values) / len(values)))
     return {"max_um": float(values.max()) * UM_PER_MM, "rms_um": rms * UM_PER_MM}
+
+
+def _square_sum(values: Single) -> np.float64:
+    """The sum of the squares, of halves and their halves, so that it is as exact as that of all at once."""
+    if len(values) <= _BLOCK:
+        return np.float64(np.add.reduce(np.square(values, dtype=np.float64)))
+    half = len(values) // 16 * 8
+    return np.float64(_square_sum(values[:half]) + _square_sum(values[half:]))
 
 
 def uncorrected_starts(path: Toolpath, uncorrected: Mask) -> Mask:
@@ -167,32 +174,48 @@ def prove(
     how = _how(nominal)
     counts = _counts(path, how, exempt)
 
-    def side(program: Program, ends: Index, told: Progress) -> tuple[Side, Single]:
-        deviation = measure(path, target, program.toolpath, ends, model, bend, told)
+    def side(program: Program, ends: Index, told: Progress) -> _Measured:
+        deviation = measure(path, target, program.toolpath, ends, counts == Counts.FEED, model, bend, told)
         strokes = strokes_mm(nominal, target, program.toolpath, program.holes, model, bend)
         size = _sizes(deviation, how, *strokes)
         size[counts > Counts.LEFT] = np.nan
-        largest = float(deviation.bend.max(initial=0.0, where=counts == Counts.FEED))
-        return Side(deviation.waypoint, deviation.side, largest), size
+        return _Measured(deviation.waypoint, deviation.side, deviation.bend_mm, size)
 
-    each = np.arange(len(path))
-    if np.array_equal(groups, each):
-        # where nothing is inserted, one array does for both
-        each = groups
-    before, before_mm = side(nominal, each, part(tell, 0.4, 0.7))
-    after, after_mm = side(corrected, groups, part(tell, 0.7, 1.0))
+    before = side(nominal, _each(groups), part(tell, 0.4, 0.7))
+    after = side(corrected, groups, part(tell, 0.7, 1.0))
+    before_mm, after_mm = before.size, after.size
     blind = np.isnan(after_mm) & (counts <= Counts.LEFT)
     counts[blind & (counts == Counts.LEFT)] = Counts.UNKNOWN
     # strokes of a hole above its bottom have no figure of their own
     _refuse_blind(path, blind & ((counts <= Counts.POINT) | ((counts == Counts.HOLE) & ~np.isnan(before_mm))))
     shown = (counts == Counts.RAPID) | (counts == Counts.UNCORRECTED)
-    for one, size in ((before, before_mm), (after, after_mm)):
-        size[counts > Counts.LEFT] = np.nan
-        size[shown] = one.waypoint[shown]
+    for one in (before, after):
+        one.size[counts > Counts.LEFT] = np.nan
+        one.size[shown] = one.waypoint[shown]
     lean = uncorrected_starts(path, exempt) & (counts == Counts.FEED)
     return Proof(
-        path, written, groups, before, after, tolerance_mm, digit_mm, counts, before_mm, after_mm, lean
-    )
+        path, written, groups, before.side_of(counts), after.side_of(counts), tolerance_mm, digit_mm, counts,
+        before_mm, after_mm, lean,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Measured:
+    """Of one program: (n,) `waypoint`, `side` and `size` in mm, and `bend_mm` as in `Side`."""
+
+    waypoint: Single
+    side: Single
+    bend_mm: float
+    size: Single
+
+    def side_of(self, counts: npt.NDArray[np.uint8]) -> Side:
+        return Side(self.side, self.bend_mm, figures(counts, self.waypoint, self.size))
+
+
+def _each(groups: Index) -> Index:
+    """(n,) each move by itself. Where nothing is inserted, one array does for both."""
+    each = np.arange(len(groups))
+    return groups if np.array_equal(groups, each) else each
 
 
 def corrections_mm(nominal: Program, corrected: Program, proof: Proof) -> Array:
@@ -271,15 +294,17 @@ def _refuse_blind(path: Toolpath, blind: Mask) -> None:
 
 
 def _sizes(deviation: Deviation, how: npt.NDArray[np.uint8], bottom: Index, stroke: Single) -> Single:
-    """(n,) mm: along the path of feed moves, at the end of points, of a hole at the move to its bottom."""
-    size = np.full(len(how), np.nan, np.float32)
+    """(n,) mm: along the path of feed moves, at the end of points, of a hole at the move to its bottom. They
+    take the place of `deviation.path`."""
+    size = deviation.path
     feeds = (Counts.FEED,) if len(bottom) else (Counts.FEED, Counts.HOLE)
     for a in range(0, len(how), _BLOCK):
         rows = slice(a, a + _BLOCK)
         kind, end, part = how[rows], deviation.waypoint[rows], size[rows]
         # holes without a partner are compared stroke by stroke
         along = is_in(kind, feeds)
-        np.fmax(end, deviation.path[rows], out=part, where=along)
+        np.fmax(end, part, out=part, where=along)
+        part[~along] = np.nan
         np.copyto(part, end, where=kind == Counts.POINT)
         part += deviation.side[rows]
     hole = bottom[how[bottom] == Counts.HOLE]

@@ -12,6 +12,7 @@ import numpy as np
 
 from olp.checks import correction as checks
 from olp.checks import motion, state
+from olp.checks.along import Along
 from olp.checks.base import finding
 from olp.checks.clearance import Clearances, Solid, clearances
 from olp.checks.model import model_findings
@@ -311,7 +312,7 @@ def _findings(case: _Case, options: CheckOptions) -> list[Finding]:
             findings += checks.proof_findings(proof, run.uncorrected)
             findings += checks.between_findings(run.nominal, proof, loaded.model)
             findings += _in_lines_of_corrected(run)
-    lean = checks.orientation(path, loaded.model)["max_urad"] * RAD_PER_URAD
+    lean = checks.orientation(Along.of(path), loaded.model)["max_urad"] * RAD_PER_URAD
     findings += state.orientation_findings(path, lean, loaded.setup, tolerance_mm)
     findings += motion.reversal_findings(path, loaded.model)
     speeds = motion.Feeds.of(case.worded(case.written))

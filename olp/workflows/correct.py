@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from olp.checks import correction as checks
 from olp.compensation.planning import written_plans
@@ -30,6 +29,7 @@ from olp.findings.catalogue import Finding
 from olp.program.origin import Unrolled, origin_of
 from olp.program.program import Program
 from olp.program.registry import Options, read
+from olp.program.text.columns import Packed
 from olp.proof.judgement import Judgements
 from olp.workflows import refusals
 from olp.workflows.doubt import accepted_of, doubted
@@ -255,7 +255,7 @@ class _Rewritten:
     nominal: Program
     text: bytes | None
     uncorrected: Index
-    parts: npt.NDArray[np.int32]
+    parts: Packed
     tally: Tally
     doubts: tuple[Finding, ...]
     flow: Flow | None = None
@@ -343,7 +343,7 @@ def _written(
         flow, text = Flow(kept), kept.text
         if text is not None and stamp and (kept.changed or always):
             text = stamped(text, stamp, program.eol(1), loaded.dialect.first)
-    parts = written.parts if program.blocks is None else written.parts[program.blocks]
+    parts = written.parts if program.blocks is None else Packed.of(written.parts[program.blocks])
     return _Rewritten(source, nominal, text, written.uncorrected, parts, written.tally, doubts, flow, flat)
 
 
@@ -393,7 +393,7 @@ def _written_report(done: _Rewritten) -> dict[str, Any]:
     """The parts of the report on the corrected text that are not in its proof."""
     tally = done.tally
     return {
-        "moves": checks.tally_moves(done.nominal.toolpath, len(done.uncorrected), done.parts)
+        "moves": checks.tally_moves(done.nominal.toolpath, len(done.uncorrected), done.parts.small)
         | {
             "inserted_blocks": tally.inserted_blocks,
             "inserted_words": tally.inserted_words,

@@ -12,6 +12,7 @@ import numpy as np
 
 from olp.checks import correction as checks
 from olp.checks import state
+from olp.checks.along import Along
 from olp.checks.base import finding
 from olp.checks.model import model_findings
 from olp.compensation.invert import TOLERANCE_MM
@@ -277,6 +278,7 @@ def report_of(
 ) -> dict[str, Any]:
     """The parts of the report ("olp-report-1") that a proof alone gives."""
     data, name = source
+    along = Along.of(program.toolpath)
     return {
         "schema": "olp-report-1",
         "program": {
@@ -289,15 +291,15 @@ def report_of(
         **loaded.heads(),
         "tolerance_um": tolerance_um,
         "deviation": {
-            "before": proof.summary("before"),
-            "after": proof.summary("after"),
+            "before": proof.before.summary,
+            "after": proof.after.summary,
             "path_max_um": proof.largest_mm * UM_PER_MM,
             "allowed_um": proof.allowed_mm * 1e3,
             "holds": proof.holds,
         },
         "budget_um": _budget(proof, program, loaded),
-        "orientation": checks.orientation(program.toolpath, loaded.model),
-        "sources": checks.sources(program.toolpath, loaded.model),
+        "orientation": checks.orientation(along, loaded.model),
+        "sources": checks.sources(along, loaded.model),
         "worst": checks.worst_blocks(program, table),
         "accepted": accepted_of(findings),
         "findings": [f.as_dict() for f in findings],

@@ -9,7 +9,7 @@ import pytest
 from cases.acceptance import TRUE_ZERO, machine
 
 import olp
-from olp.checks.along import figures
+from olp.checks.along import Along
 from olp.checks.correction import orientation, sources
 from olp.core.toolpath import Arcs, Flag, Frame, Kind, Toolpath
 from olp.errormodel.build import build
@@ -70,7 +70,7 @@ def test_helices_count_all_along(turns: int) -> None:
         "Y", [-1000.0, 70.0, 71.0, 72.0, 2000.0], {"EYY": [0.0, 0.0, 6e-3, 0.0, 0.0]}, interpolation="linear"
     )
     model = build(Calibration("m", BOX, curves=(peak,)), "FXYZ")
-    (row,) = sources(path, model)
+    (row,) = sources(Along.of(path), model)
     assert row["max_um"] == pytest.approx(6.0, rel=0.02)
 
 
@@ -80,10 +80,10 @@ def test_periods_keep_no_step_with_the_samples(period_mm: float) -> None:
     model = build(
         Calibration("m", BOX, cyclic=(Cyclic("EXX", period_mm, 2e-3), Cyclic("EBX", 7.0, 1e-5))), "FXYZ"
     )
-    found = {row["name"]: row for row in sources(path, model)}
+    found = {row["name"]: row for row in sources(Along.of(path), model)}
     assert found["cyclic EXX"]["max_um"] == pytest.approx(2.0, rel=0.02)
     assert found["cyclic EXX"]["rms_um"] == pytest.approx(2.0 / np.sqrt(2.0), rel=0.05)
-    assert orientation(path, model)["max_urad"] == pytest.approx(10.0, rel=0.02)
+    assert orientation(Along.of(path), model)["max_urad"] == pytest.approx(10.0, rel=0.02)
 
 
 @pytest.mark.slow
@@ -99,12 +99,12 @@ def test_a_long_path_of_a_machine_of_many_sources() -> None:
     path = lines(*map(tuple, rng.uniform(-900.0, 1900.0, (11, 3))))
     points = dense(path)
     expected = largest(path, model, points)
-    found = {row["name"]: row["max_um"] for row in sources(path, model)}
+    found = {row["name"]: row["max_um"] for row in sources(Along.of(path), model)}
     assert found.keys() == expected.keys()
     for name, value in expected.items():
         assert 0.98 * value <= found[name] <= 1.001 * value, name
     angle = 1e6 * np.linalg.norm(model.rotation(points), axis=1).max()
-    assert 0.98 * angle <= orientation(path, model)["max_urad"] <= 1.001 * angle
+    assert 0.98 * angle <= orientation(Along.of(path), model)["max_urad"] <= 1.001 * angle
 
 
 @pytest.mark.parametrize("peak_mm", [487.0, 500.0, 512.0])
@@ -114,7 +114,7 @@ def test_a_narrow_peak_that_one_move_of_a_long_path_meets(peak_mm: float) -> Non
     peak = Curve("Y", knots, {"EYY": [0.0, 0.0, 6e-3, 0.0, 0.0]}, interpolation="linear")
     model = build(Calibration("m", BOX, curves=(peak,)), "FXYZ")
     path = lines(*((0.0, -900.0, z) for z in (-900.0, 2000.0) * 50), (0.0, 1900.0, 2000.0))
-    (row,) = sources(path, model)
+    (row,) = sources(Along.of(path), model)
     assert row["max_um"] == pytest.approx(6.0, rel=0.02)
 
 
@@ -131,13 +131,13 @@ def test_rapids_and_moves_that_are_left_as_they_are_count_with_their_ends() -> N
     left.flag.flags.writeable = True
     left.flag[1] = Flag.PASS
     for path in (lines(*ends, kind=Kind.RAPID), left):
-        (row,) = sources(path, model)
+        (row,) = sources(Along.of(path), model)
         assert row["max_um"] == row["rms_um"] == pytest.approx(1.0)
 
 
 def test_a_path_of_which_nothing_is_known_has_no_figures() -> None:
     model = build(Calibration("m", BOX, squareness={"C0Y": 1e-5}), "FXYZ")
     nowhere = lines((np.nan, 0.0, 0.0), (np.nan, 5.0, 0.0))
-    assert sources(nowhere, model) == []
-    assert orientation(nowhere, model) == {"max_urad": 0.0, "rms_urad": 0.0}
-    assert figures(nowhere, lambda points, move: []) == []
+    assert sources(Along.of(nowhere), model) == []
+    assert orientation(Along.of(nowhere), model) == {"max_urad": 0.0, "rms_urad": 0.0}
+    assert Along.of(nowhere).figures(lambda points, move: []) == []

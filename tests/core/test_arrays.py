@@ -36,6 +36,13 @@ def test_nothing_has_no_distinct_values() -> None:
     assert distinct(np.zeros(0, np.int64)).shape == (0,)
 
 
+@pytest.mark.parametrize("shape", [(5,), (2, 3), ()])
+def test_one_number_that_stands_for_all_is_the_distinct_one(shape: tuple[int, ...]) -> None:
+    found = distinct(np.broadcast_to(np.int32(7), shape))
+    assert found.tolist() == [7]
+    assert found.dtype == np.int32
+
+
 @given(whole, arrays.arrays(np.int64, st.integers(0, 30), elements=st.integers(-3, 300)))
 def test_membership_is_that_of_numpy(values: npt.NDArray[np.int64], some: npt.NDArray[np.int64]) -> None:
     judged = np.isin(values, some)

@@ -37,11 +37,19 @@ def of(
     corrected: Toolpath | None = None,
     groups: list[int] | None = None,
     shift: Array | None = None,
+    counted: int | None = None,
 ) -> Deviation:
-    """The deviation of a path, or of its correction."""
+    """The deviation of a path, or of its correction; the bend of one move is `counted`, or of all."""
     target = path.end_mm if shift is None else path.end_mm + shift
     ends = np.arange(len(path)) if groups is None else np.array(groups)
-    return measure(path, target, path if corrected is None else corrected, ends, model, BEND_MM)
+    counts = np.arange(len(path)) == counted if counted is not None else np.ones(len(path), bool)
+    other = path if corrected is None else corrected
+    return measure(path, target, other, ends, counts, model, BEND_MM)
+
+
+def bends(path: Toolpath, model: Known) -> list[float]:
+    """The bend of each move of a path."""
+    return [of(path, model, counted=move).bend_mm for move in range(len(path))]
 
 
 def linear(component: int, axis: int, slope: float) -> Known:
@@ -81,14 +89,14 @@ def test_the_end_the_path_and_the_bend_of_a_line() -> None:
     got = of(path, wave(1, 0, 0.01, 100.0))
     assert got.waypoint == pytest.approx([0.0] * 4, abs=1e-8)
     assert got.path == pytest.approx([0.0, 0.01, 0.0, 0.0], abs=1e-4)
-    assert got.bend == pytest.approx([0.0, 0.01, 0.0, 0.0], abs=1e-4)
+    assert bends(path, wave(1, 0, 0.01, 100.0)) == pytest.approx([0.0, 0.01, 0.0, 0.0], abs=1e-4)
     assert got.side.tolist() == [0.0] * 4
-    assert {part.dtype for part in (got.waypoint, got.path, got.bend)} == {np.dtype(np.float32)}
+    assert {part.dtype for part in (got.waypoint, got.path)} == {np.dtype(np.float32)}
 
 
 def test_the_first_move_bends_as_any_other() -> None:
     got = of(toolpath(line(50, 0, 0)), wave(1, 0, 0.01, 100.0))
-    assert got.bend == pytest.approx([0.01], abs=1e-4)
+    assert got.bend_mm == pytest.approx(0.01, abs=1e-4)
 
 
 def test_a_bend_is_measured_from_the_chord_between_the_actual_ends() -> None:
@@ -98,14 +106,14 @@ def test_a_bend_is_measured_from_the_chord_between_the_actual_ends() -> None:
     share = 2 / math.pi * math.acos(2 / math.pi)
     most = math.sin(share * math.pi / 2) - share
     assert got.path[1] == pytest.approx(0.01, rel=1e-6)
-    assert got.bend[1] == pytest.approx(0.01 * most, abs=5e-5)
+    assert got.bend_mm == pytest.approx(0.01 * most, abs=5e-5)
 
 
 def test_an_arc_has_no_bend_of_chords() -> None:
     path = toolpath(rapid(0, 0, 0), arc(20, 0, 0, centre=(10, 0, 0), sweep=-math.pi))
     got = of(path, wave(2, 0, 0.01, 40.0))
     assert got.path[1] == pytest.approx(0.01, abs=1e-4)
-    assert got.bend.tolist() == [0.0, 0.0]
+    assert got.bend_mm == 0.0
 
 
 def test_the_error_goes_with_the_tool_of_each_move() -> None:
@@ -198,7 +206,8 @@ def test_parts_between_count_along_the_axes_that_are_known() -> None:
     angle = np.linspace(-math.pi / 2, math.pi / 2, 2001)
     across = 0.01 * np.sin(2 * np.pi * (50 + 15 * np.cos(angle)) / 100) * np.sin(angle)
     assert got.path[2] == pytest.approx(np.abs(across).max(), rel=0.01)
-    assert got.bend == pytest.approx([0.0, 0.01, 0.0, 0.0, 0.01, 0.0], abs=1e-4)
+    each = bends(path, wave(1, 0, 0.01, 100.0))
+    assert each == pytest.approx([0.0, 0.01, 0.0, 0.0, 0.01, 0.0], abs=1e-4)
     assert 1e3 * of(path, wave(2, 0, 0.01, 100.0)).path == pytest.approx([0, 0, 0, 0, 10, 0], abs=0.1)
 
 
@@ -326,7 +335,7 @@ def test_the_side_of_a_group_is_the_largest_at_its_start_and_its_end() -> None:
 
 def test_without_moves_there_is_nothing() -> None:
     got = of(toolpath(), Known(backlash_mm=(0.1, 0.1, 0.1)))
-    assert [len(part) for part in (got.waypoint, got.path, got.bend, got.side)] == [0] * 4
+    assert [len(part) for part in (got.waypoint, got.path, got.side)] == [0] * 3
 
 
 def test_a_turn_counts_where_the_backlash_is_taken_up() -> None:
@@ -455,7 +464,7 @@ def test_blocks_of_a_path_with_an_unknown_axis_do_not_matter(
     assert whole.path.min() >= 0.0
     monkeypatch.setattr(deviation, "_BLOCK", block)
     parts = of(path, wave(1, 0, 0.01, 70.0))
-    for name in ("waypoint", "path", "bend", "side"):
+    for name in ("waypoint", "path", "bend_mm", "side"):
         np.testing.assert_array_equal(getattr(parts, name), getattr(whole, name))
 
 
@@ -468,7 +477,7 @@ def test_blocks_do_not_matter(block: int, play: float, monkeypatch: pytest.Monke
     whole = of(path, model, corrected, groups)
     monkeypatch.setattr(deviation, "_BLOCK", block)
     parts = of(path, model, corrected, groups)
-    for name in ("waypoint", "path", "bend", "side"):
+    for name in ("waypoint", "path", "bend_mm", "side"):
         np.testing.assert_array_equal(getattr(parts, name), getattr(whole, name))
 
 

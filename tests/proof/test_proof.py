@@ -128,7 +128,7 @@ def test_feeds_count_along_their_path_and_points_at_their_end() -> None:
     moves = (rapid(0, 0, 0), line(50, 0, 0), Move(Kind.PROBE, (0.0, 0.0, 0.0), WHOLE), rapid(0, 9, 0))
     got = proved(of(*moves), model=model)
     assert got.judged.tolist() == [False, True, True, False]
-    assert got.before_mm[[0, 3]].tolist() == got.before.waypoint[[0, 3]].tolist()
+    assert 1e3 * got.before_mm[[0, 3]] == pytest.approx([4.0, 4.0], rel=1e-5)
     assert 1e3 * got.before_mm[1:3] == pytest.approx([math.hypot(10, 4), 4.0], abs=0.1)
     np.testing.assert_array_equal(got.before_mm, got.after_mm)
 
@@ -136,10 +136,10 @@ def test_feeds_count_along_their_path_and_points_at_their_end() -> None:
 def test_before_is_of_the_nominal_program_and_after_of_the_corrected_one() -> None:
     nominal = of(rapid(0, 0, 0), line(50, 0, 0))
     got = proved(nominal, of(rapid(0, -0.002, 0), line(50, -0.002, 0)), Known(aside))
-    assert 1e3 * got.before_mm[1:] == pytest.approx([2.0], rel=1e-5)
-    assert 1e3 * got.after_mm[1:] == pytest.approx([0.0], abs=1e-5)
-    assert 1e3 * got.before.waypoint == pytest.approx([2.0, 2.0], rel=1e-5)
-    assert 1e3 * got.after.waypoint == pytest.approx([0.0, 0.0], abs=1e-5)
+    assert 1e3 * got.before_mm == pytest.approx([2.0, 2.0], rel=1e-5)
+    assert 1e3 * got.after_mm == pytest.approx([0.0, 0.0], abs=1e-5)
+    found = [side.summary["waypoints"]["max_um"] for side in (got.before, got.after)]
+    assert found == pytest.approx([2.0, 0.0], rel=1e-5, abs=1e-5)
     assert got.written.end_mm[1].tolist() == [50.0, -0.002, 0.0]
     assert (got.tolerance_mm, got.digit_mm, got.groups.tolist()) == (TOLERANCE_MM, DIGIT_MM, [0, 1])
 
@@ -266,7 +266,7 @@ def test_numbers_of_the_proof(monkeypatch: pytest.MonkeyPatch) -> None:
         return match(*values)
 
     def measured(*values: Any) -> Deviation:
-        given["bend"] = values[5]
+        given["bend"] = values[6]
         return measure(*values)
 
     monkeypatch.setattr(module, "match", matched)
@@ -279,9 +279,10 @@ def test_numbers_of_the_proof(monkeypatch: pytest.MonkeyPatch) -> None:
 # -- its figures -----------------------------------------------------------------------------------------
 
 
-def side_of(*waypoint: float) -> Side:
-    values = np.array(waypoint, np.float32) / np.float32(1000)
-    return Side(values, np.zeros(len(values), np.float32), 0.0)
+def side_of(counts: np.ndarray, end: np.ndarray, whole: np.ndarray) -> tuple[Side, np.ndarray]:
+    """From um at the ends, and of what counts."""
+    waypoint, size = ((um / 1000).astype(np.float32) for um in (end, whole))
+    return Side(np.zeros(len(size), np.float32), 0.0, module.figures(counts, waypoint, size)), size
 
 
 def of_figures(*rows: tuple[Counts, float, float]) -> Proof:
@@ -289,9 +290,11 @@ def of_figures(*rows: tuple[Counts, float, float]) -> Proof:
     counts = np.array([row[0] for row in rows], np.uint8)
     end, whole = (np.array([row[k] for row in rows], np.float32) for k in (1, 2))
     path = toolpath(*(line(k, 0, 0) for k in range(len(rows))))
+    before, before_mm = side_of(counts, 10 * end, 10 * whole)
+    after, after_mm = side_of(counts, end, whole)
     return Proof(
-        path, path, np.arange(len(rows)), side_of(*(10 * end)), side_of(*end), 1e-3, 1e-4, counts,
-        (whole / 100).astype(np.float32), (whole / 1000).astype(np.float32), np.zeros(len(rows), bool),
+        path, path, np.arange(len(rows)), before, after, 1e-3, 1e-4, counts, before_mm, after_mm,
+        np.zeros(len(rows), bool),
     )  # fmt: skip
 
 
@@ -305,7 +308,7 @@ FIGURES = of_figures(
 @pytest.mark.parametrize(("side", "factor"), [("after", 1.0), ("before", 10.0)])
 def test_a_summary_of_waypoints_and_of_what_lies_between(side: str, factor: float) -> None:
     """Waypoints of feeds, points and what is left; along feeds, holes and what is left."""
-    got = FIGURES.summary(side)
+    got = getattr(FIGURES, side).summary
     assert got["waypoints"] == {
         "max_um": pytest.approx(5.0 * factor), "rms_um": pytest.approx(factor * math.sqrt(50 / 3))
     }  # fmt: skip
@@ -316,7 +319,7 @@ def test_a_summary_of_waypoints_and_of_what_lies_between(side: str, factor: floa
 
 def test_a_summary_of_nothing_is_zero() -> None:
     nothing = {"max_um": 0.0, "rms_um": 0.0}
-    assert of_figures((Counts.RAPID, 5.0, NAN)).summary("after") == {"waypoints": nothing, "between": nothing}
+    assert of_figures((Counts.RAPID, 5.0, NAN)).after.summary == {"waypoints": nothing, "between": nothing}
     assert of_figures().largest_mm == 0.0
 
 

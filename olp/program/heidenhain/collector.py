@@ -94,7 +94,7 @@ class Collected(Collector):
         """The whole program. Takes the columns: call it once only."""
         take = self.columns.take
         path = self.toolpath(frames, self.start)
-        line_start, line_end = take("line_start", np.int32), take("line_end", np.int32)
+        line_start, line_end = self._line_bounds()
         words = self._words() if self.keep_words else None
         rest, dwell = self._rests(path.line)
         return Program(

@@ -7,6 +7,7 @@ Nothing here interprets; indices of words count over the whole text (`Context.ba
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from olp.core.arrays import Array, Index, Mask
 from olp.program.holes import Holes
@@ -15,6 +16,7 @@ from olp.program.program import ArcSlots, Called, Program, SharedWords, Words
 from olp.program.rs274.axis_state import AxisState
 from olp.program.rs274.extrusion import Extruder
 from olp.program.rs274.lexer import WordChunk
+from olp.program.text.columns import Packed
 
 
 class Collector(PathColumns):
@@ -36,13 +38,14 @@ class Collector(PathColumns):
 
     def put_words(self, chunk: WordChunk) -> None:
         self.columns.put("line_start", chunk.line_start, np.int32)
-        self.columns.put("line_end", chunk.line_end, np.int32)
+        self.columns.put("line_end", chunk.line_end - chunk.line_start, np.int32)
         if self.keep_words:
             for name in ("letter", "mantissa", "decimals", "pointed"):
                 column = getattr(chunk, name)
                 self.columns.put(name, column, column.dtype)
-            for name in ("start", "number", "end"):
-                self.columns.put("word_" + name, getattr(chunk, name), np.int32)
+            self.columns.put("word_start", chunk.start, np.int32)
+            for name in ("number", "end"):
+                self.columns.put("word_" + name, getattr(chunk, name) - chunk.start, np.int32)
             self.columns.put("first_word", chunk.first_word[:-1] + self.word_count, np.int32)
         self.word_count += len(chunk.letter)
 
@@ -64,6 +67,7 @@ class Collector(PathColumns):
     def program(self, state: AxisState, end_line: int, closings: Index) -> Program:
         """The whole program, with the frames and path modes of the final `state`. Takes the columns: call it
         once only."""
+        line_start, line_end = self._line_bounds()
         return Program(
             data=self.data,
             dialect=state.profile,
@@ -73,8 +77,8 @@ class Collector(PathColumns):
             arc_slots=ArcSlots(
                 self.columns.take("arc_words", np.int32, 5), self.columns.take("arc_absolute", np.bool_)
             ),
-            line_start=self.columns.take("line_start", np.int32),
-            line_end=self.columns.take("line_end", np.int32),
+            line_start=line_start,
+            line_end=line_end,
             captures=tuple(state.captures),
             path_modes=tuple(state.path_modes),
             holes=Holes.join(self.holes),
@@ -90,15 +94,17 @@ class Collector(PathColumns):
             closings=closings,
         )
 
+    def _line_bounds(self) -> tuple[npt.NDArray[np.int32], Packed]:
+        """(lines,) where each line begins, and where its text ends."""
+        start: npt.NDArray[np.int32] = self.columns.take("line_start", np.int32)
+        return start, self.columns.packed("line_end", start)
+
     def _words(self) -> Words:
         self.columns.put("first_word", [self.word_count], np.int32)
+        take, packed = self.columns.take, self.columns.packed
+        start = take("word_start", np.int32)
         return Words(
-            self.columns.take("letter", np.uint8),
-            self.columns.take("mantissa", np.int64),
-            self.columns.take("decimals", np.int8),
-            self.columns.take("pointed", np.bool_),
-            self.columns.take("word_start", np.int32),
-            self.columns.take("word_number", np.int32),
-            self.columns.take("word_end", np.int32),
-            self.columns.take("first_word", np.int32),
-        )
+            take("letter", np.uint8), packed("mantissa"), take("decimals", np.int8),
+            take("pointed", np.bool_), start, packed("word_number", start), packed("word_end", start),
+            take("first_word", np.int32),
+        )  # fmt: skip

@@ -96,7 +96,7 @@ class RotaryWords:
         assert words is not None
         before = np.vstack((np.full((1, end_deg.shape[1]), np.nan), end_deg))[:-1]
         counting = (path.flag & np.uint8(Flag.INCREMENTAL)) != 0
-        shortest = bool(((words.letter == ord("M")) & (words.mantissa == _SHORTEST_M)).any())
+        shortest = bool(((words.letter == ord("M")) & (words.mantissa[:] == _SHORTEST_M)).any())
         shortest &= program.statements is not None
         for column in range(end_deg.shape[1]):
             given = np.flatnonzero(self.slot[:, column] >= 0)

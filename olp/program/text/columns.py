@@ -54,6 +54,31 @@ class _Column:
     used: int = 0
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Packed:
+    """(n,) whole numbers that take few bytes each: `small` of the least kind that holds them, added to those
+    `before`, where there are any. Indexed as an array, it gives them at full width."""
+
+    small: npt.NDArray[np.integer[Any]]
+    before: npt.NDArray[np.int32] | None = None
+
+    @staticmethod
+    def of(values: npt.NDArray[np.integer[Any]], before: npt.NDArray[np.int32] | None = None) -> Packed:
+        """Numbers (n,) that are not far behind those `before`, where there are any."""
+        column = Columns()
+        for a in range(0, len(values), _MOST):
+            part = values[a : a + _MOST]
+            column.put("all", part if before is None else part - before[a : a + _MOST], values.dtype)
+        return column.packed("all", before)
+
+    def __len__(self) -> int:
+        return len(self.small)
+
+    def __getitem__(self, index: Any) -> Any:
+        numbers = self.small[index].astype(np.int64)
+        return numbers if self.before is None else numbers + self.before[index]
+
+
 class Columns:
     """Named columns that are appended to and taken once. Each entry is moved once, when its column is taken:
     a column of a million entries that grows as one array is moved five times."""
@@ -79,22 +104,35 @@ class Columns:
     def take(self, name: str, kind: npt.DTypeLike, *width: int) -> npt.NDArray[Any]:
         """The column, read-only; empty where nothing was put. Where all its numbers are the same, as frames
         often are, it is one number that stands for all."""
+        blocks = self._blocks(name)
+        return _joined(blocks, blocks[0].dtype) if blocks else _joined([np.zeros((0, *width), kind)], kind)
+
+    def packed(self, name: str, before: npt.NDArray[np.int32] | None = None) -> Packed:
+        """The column (n,) of whole numbers in few bytes; it holds by how much each is behind those `before`,
+        where there are any."""
+        blocks = self._blocks(name) or [np.zeros(0, np.int64)]
+        low = min(int(block.min(initial=0)) for block in blocks)
+        high = max(int(block.max(initial=0)) for block in blocks)
+        least = np.min_scalar_type(high if low == 0 else min(low, -1 - high))
+        return Packed(_joined(blocks, least), before)
+
+    def _blocks(self, name: str) -> list[npt.NDArray[Any]]:
+        """The blocks of a column, which is not there any more; none where nothing was put."""
         column = self._columns.pop(name, None)
-        if column is None:
-            array = np.zeros((0, *width), kind)
-        else:
-            blocks = [*column.full, column.block[: column.used]]
-            width, kind = column.block.shape[1:], column.block.dtype
-            del column
-            end = sum(map(len, blocks))
-            array = apart((end, *width), kind)
-            # from the last one on: the memory of each is free before more of the array is filled
-            while blocks:
-                block = blocks.pop()
-                array[end - len(block) : end] = block
-                end -= len(block)
-            if array.ndim == 1 and len(array):
-                one = np.broadcast_to(array[:1].copy(), len(array))
-                array = one if np.array_equal(array, one, equal_nan=True) else array
-        array.setflags(write=False)
-        return array
+        return [] if column is None else [*column.full, column.block[: column.used]]
+
+
+def _joined(blocks: list[npt.NDArray[Any]], kind: npt.DTypeLike) -> npt.NDArray[Any]:
+    """One read-only array of blocks, which are taken from the list."""
+    end = sum(map(len, blocks))
+    array = apart((end, *blocks[0].shape[1:]), kind)
+    # from the last one on: the memory of each is free before more of the array is filled
+    while blocks:
+        block = blocks.pop()
+        array[end - len(block) : end] = block
+        end -= len(block)
+    if array.ndim == 1 and len(array):
+        one = np.broadcast_to(array[:1].copy(), len(array))
+        array = one if np.array_equal(array, one, equal_nan=True) else array
+    array.setflags(write=False)
+    return array

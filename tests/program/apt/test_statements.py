@@ -730,7 +730,7 @@ def test_words_of_statements_have_no_letters(setup: Setup) -> None:
     words = done.words
     assert words is not None
     assert (words.letter == 0).all()
-    assert words.number.tolist() == words.start.tolist()
+    assert words.number[:].tolist() == words.start.tolist()
     assert len(words.first_word) == 0
     rows = [[word_of(done, k) for k in row] for row in done.slot.tolist()]
     assert rows == [

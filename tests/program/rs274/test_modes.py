@@ -270,7 +270,7 @@ def outcome(text: str, setup: Setup, control: str) -> object:
     columns += [read.arc_slots.word.tolist(), read.toolpath.frame.tolist(), read.toolpath.frames]
     columns += [
         read.line_start.tolist(),
-        read.line_end.tolist(),
+        read.line_end[:].tolist(),
         np.nan_to_num(read.toolpath.start_mm).tolist(),
     ]
     return columns

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from olp.program.text import columns as module
-from olp.program.text.columns import Columns, apart
+from olp.program.text.columns import Columns, Packed, apart
 
 
 @pytest.mark.slow
@@ -72,3 +72,29 @@ def test_one_number_stands_for_a_column_of_equal_ones() -> None:
 def test_too_large_a_column_is_out_of_memory() -> None:
     with pytest.raises(MemoryError):
         apart((1 << 50,), np.float64)
+
+
+@pytest.mark.parametrize(
+    ("values", "kind"),
+    [([], "u1"), ([7, 7, 7], "u1"), ([0, 255], "u1"), ([0, 256], "u2"), ([-1, 127], "i1"), ([-1, 128], "i2"),
+     ([-128, 5], "i1"), ([-129, 5], "i2"), ([5, -(2**40)], "i8"), ([2**31], "u4"), ([2**62], "u8")],
+)  # fmt: skip
+def test_packed_numbers_take_few_bytes_and_are_given_at_full_width(values: list[int], kind: str) -> None:
+    numbers = np.array(values, np.int64)
+    packed = Packed.of(numbers)
+    assert packed.small.dtype == np.dtype(kind)
+    assert len(packed) == len(values)
+    for full in (packed[:], packed[np.arange(len(values))]):
+        assert full.dtype == np.int64
+        assert full.tolist() == values
+    assert [int(packed[k]) for k in range(len(values))] == values
+
+
+def test_packed_numbers_behind_others() -> None:
+    before = np.array([10, 70_000, 2_000_000_000], np.int32)
+    packed = Packed.of(before + np.array([1, 0, 255]), before)
+    assert packed.small.tolist() == [1, 0, 255]
+    assert packed.small.dtype == np.uint8
+    assert packed[np.array([2, 0])].tolist() == [2_000_000_255, 11]
+    assert int(packed[1]) == 70_000
+    assert Packed.of(before, before).small.strides == (0,)
