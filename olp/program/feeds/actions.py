@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
+from heapq import merge
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from olp.core.arrays import Array, Index, Mask
 from olp.core.machine import ControlTimes
 from olp.core.patterns import pattern
 from olp.core.values import dataclass
-from olp.program.feeds.moves import Scan, numbers
+from olp.program.feeds.moves import Scan, deleted_lines, numbers
 from olp.program.program import Program
 
 TOOL_CHANGE = "tool change"
@@ -36,6 +37,7 @@ _CHANGE = 6
 #: G4, whose S is no speed, as ten times its number
 _DWELL = 40
 _CONVERSATIONAL = pattern(rb"(?i)TOOL[ \t]+CALL([^;\r\n]*)|(?<![A-Z0-9_])M(\d{1,3})(?![\d.])")
+_M6 = pattern(rb"(?i)(?<![A-Z0-9_])M0*6(?![\d.=])")
 _TOOL = pattern(rb'[ \t]*(?:\d|")')
 _SPEED = pattern(rb"(?i)(?<![A-Z])S[ \t]*(\d+(?:\.\d*)?)")
 _APT = pattern(
@@ -98,11 +100,15 @@ def actions(program: Program, *, block_delete: bool = False) -> Actions | None:
     if program.statements is None:
         assert program.words is not None
         late = AFTER + AFTER_EXACT if program.rs274.exact_stop else AFTER
-        return _actions(_of_words(Scan.of(program, program.words, block_delete=block_delete)), late)
-    asked = {"heidenhain": _conversational, "apt": _apt}.get(program.dialect.name)
-    if asked is None:
+        asked = _of_words(Scan.of(program, program.words, block_delete=block_delete))
+        if program.dialect.name == "sinumerik":
+            changes = _changes(program, deleted_lines(program).tolist() if block_delete else ())
+            asked = merge(changes, asked, key=lambda one: one.line)
+        return _actions(asked, late)
+    reader = {"heidenhain": _conversational, "apt": _apt}.get(program.dialect.name)
+    if reader is None:
         return None
-    return _actions((one for one in asked(program) if one.line <= program.end_line), AFTER + AFTER_EXACT)
+    return _actions((one for one in reader(program) if one.line <= program.end_line), AFTER + AFTER_EXACT)
 
 
 def _actions(asked: Iterable[_Asked], late: tuple[int, ...]) -> Actions:
@@ -144,6 +150,15 @@ def _asked(line: int, codes: list[int], turns: dict[int, int], speed: float | No
         line, tuple(c for c in codes if c not in (3, 4, _CHANGE, *_CALLS)), speed, _CHANGE in codes,
         next((turns[c] for c in reversed(codes) if c in turns), None),
     )  # fmt: skip
+
+
+def _changes(program: Program, left_out: Iterable[int]) -> Iterator[_Asked]:
+    """M6 of Sinumerik programs, which is not among their words."""
+    deleted = set(left_out)
+    for line, _, before in _matches(program, _M6):
+        said = b";" in before or before.count(b'"') % 2
+        if not said and line <= program.end_line and line not in deleted:
+            yield _Asked(line, change=True)
 
 
 def _conversational(program: Program) -> Iterator[_Asked]:

@@ -30,6 +30,12 @@ CASES: dict[str, tuple[str, str, list[tuple[int, str]]]] = {
         "linuxcnc",
         [(1, "M8"), (4, "M9")],
     ),
+    "M6 of Sinumerik": (
+        'N10 T1 M6\nS900 M3 D1\nG0 X1 ; M6\nMSG("M6")\nT2\nM06\nM3 M8\nG0 X2',
+        "sinumerik",
+        [(1, "tool change"), (2, "spindle start"), (6, "tool change"), (7, "spindle start"), (7, "M8")],
+    ),
+    "M6 of Sinumerik under block delete": ("/T1 M6\nG0 X1", "sinumerik", []),
     "blocks under block delete": ("/M8\nG0 X1", "fanuc", []),
 }
 
