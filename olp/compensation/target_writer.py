@@ -17,11 +17,14 @@ from olp.core.errors import ProgramError
 from olp.core.toolpath import Flag, Kind
 from olp.core.values import dataclass
 from olp.program.robots.dialect import Replacement, RobotDialect
+from olp.program.robots.poses import matrix
 from olp.program.robots.targets import NOWHERE, Part, Target, Use
 from olp.program.text.numbers import MOST_DECIMALS, number, spliced, written
 
 #: A number that is nearer to what is wanted than this share of its last digit is right.
 _RIGHT = 0.5 + 1e-6
+#: Groups of rows that are compared with another row, where none wants the very same digits.
+_COMPARED = 8
 _NAMES = re.compile(rb"[A-Za-z_]\w*")
 #: Flags of moves that the text does not state as targets.
 _NOT_STATED = np.uint8(Flag.CONTROL)
@@ -97,28 +100,63 @@ class TargetWriter(PointWriter):
         edits: list[Replacement] = []
         for place, own in by_target.items():
             target = self.stated.targets[place]
-            groups = self._groups(target, own, wanted)
+            groups = self._groups(rows, own, wanted)
             for k, group in enumerate(groups):
-                for row in group:
+                # the shift of a move is its own, and takes up what the target does not
+                shifted = [row for row in group if k and self._use(rows, row).offsets]
+                for row in shifted:
+                    edits += self._shifted(rows, row, target, groups[0][0], wanted)
+                fixed = [row for row in group if not (k and self._use(rows, row).offsets)]
+                for row in fixed:
                     rows.emitted[row] = self._reached(rows, row, target, group[0], wanted)
                 if k == 0:
                     edits += self._renumbered(target, group[0], wanted)
-                else:
-                    edits += self._cloned(rows, target, group, wanted)
+                elif fixed:
+                    edits += self._cloned(rows, target, fixed, wanted)
         return edits
 
-    def _groups(self, target: Target, rows: list[int], wanted: _Wanted) -> list[list[int]]:
-        """Rows that want the same of a target, the largest group first."""
+    def _shifted(
+        self, rows: Rows, row: int, target: Target, first: int, wanted: _Wanted
+    ) -> list[Replacement]:
+        """New numbers of the shift of a row, whose target has the numbers that row `first` gives it."""
+        use, move = self._use(rows, row), int(rows.move[row])
+        decimals = int(wanted.decimals[row].max())
+        base = np.array(target.point)
+        if not self._kept(target, first, wanted):
+            base = wanted.mantissa[first] / POW10[wanted.decimals[first]]
+        turn, shift = matrix(use.offset_turn), np.array(use.shift_mm) / self.frame_of(move).unit_mm
+        new = np.round(turn.T @ (shift + wanted.value[row] - base), decimals)
+        reached = (base + turn @ new - shift)[None]
+        rows.emitted[row] = self.placed(reached, self.path.frame[move : move + 1])[0]
+        edits = [
+            (a, b, self._number((a, b), float(value), decimals))
+            for (a, b), value in zip(use.offsets, new, strict=True)
+        ]
+        self.tally.changed_words += len(edits)
+        return edits
+
+    def _groups(self, all_: Rows, rows: list[int], wanted: _Wanted) -> list[list[int]]:
+        """Rows that want the same of a target: first those that have no shift of their own, the largest group
+        before others."""
         groups: list[list[int]] = []
+        known: dict[tuple[int, ...], list[int]] = {}
         for row in rows:
-            for group in groups:
-                mantissa, decimals = wanted.mantissa[group[0]], wanted.decimals[group[0]]
-                if (np.abs(wanted.value[row] * POW10[decimals] - mantissa) <= _RIGHT).all():
-                    group.append(row)
-                    break
-            else:
-                groups.append([row])
-        return sorted(groups, key=len, reverse=True)
+            key = tuple(wanted.mantissa[row].tolist())
+            group = known.get(key) or next(
+                (g for g in groups[:_COMPARED] if self._near(g[0], row, wanted)), None
+            )
+            if group is None:
+                groups.append([])
+                group = known[key] = groups[-1]
+            group.append(row)
+        plain = {id(g): any(not self._use(all_, row).offsets for row in g) for g in groups}
+        return sorted(groups, key=lambda g: (plain[id(g)], len(g)), reverse=True)
+
+    @staticmethod
+    def _near(first: int, row: int, wanted: _Wanted) -> bool:
+        """Whether the numbers of row `first` are right for another row to their last digit."""
+        away = np.abs(wanted.value[row] * POW10[wanted.decimals[first]] - wanted.mantissa[first])
+        return bool((away <= _RIGHT).all())
 
     def _kept(self, target: Target, row: int, wanted: _Wanted) -> bool:
         """Whether the numbers of a target are right to their last digit as they are written."""

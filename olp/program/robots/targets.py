@@ -34,7 +34,8 @@ class Use:
     """How a move uses a target, which is the place of it in `Targets.targets`. `statement` are the bytes of
     the move, `place` those that state the target, and `named` those of its name in them. `shift_mm` is how
     far the move goes from the target, along its frame, and `turn` its orientation there. `before` is the
-    orientation at the start of the move. `zone` are the bytes that say how the move ends."""
+    orientation at the start of the move. `zone` are the bytes that say how the move ends. `offsets` are the
+    bytes of the three numbers of its shift, empty where it has none, along axes turned by `offset_turn`."""
 
     target: int
     statement: Span
@@ -44,6 +45,8 @@ class Use:
     turn: Quaternion = NO_TURN
     before: Quaternion = NO_TURN
     zone: Span = NOWHERE
+    offsets: tuple[Span, ...] = ()
+    offset_turn: Quaternion = NO_TURN
 
 
 @dataclass(frozen=True, slots=True, eq=False)

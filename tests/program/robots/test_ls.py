@@ -155,3 +155,16 @@ def test_what_the_text_does_not_state_is_left_and_listed(bent: Path) -> None:
     assert joints.encode() in done.data
     assert b"L PR[3] 200mm/sec FINE ;\n   3:L P[2]" in done.data
     assert any("does not state where this move goes" in finding.message for finding in done.findings)
+
+
+@pytest.mark.parametrize(
+    "between", ["  CALL X", "  LBL[1]", "  SELECT R[1]=1,CALL X", "  IF R[1]=1,CALL X", "  GRIP OPEN"]
+)
+def test_behind_what_may_move_only_the_end_is_corrected(bent: Path, between: str) -> None:
+    points = [position(k, p) for k, p in ((1, [-60, -60, 0]), (2, [60, 60, 20]))]
+    ends = ["J P[1] 50% FINE", "L P[2] 200mm/sec FINE"]
+    split = olp.correct(text_of(ends, points), bent)
+    whole = olp.correct(text_of([ends[0], between, ends[1]], points), bent)
+    assert split.report["moves"]["inserted_blocks"] > 0
+    assert whole.report["moves"]["inserted_blocks"] == 0
+    assert any("where this move begins" in finding.message for finding in whole.findings)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -94,13 +95,16 @@ def test_a_target_is_cloned_only_where_its_moves_differ(bent: Path) -> None:
     body = (
         f"CONST robtarget a:=[[1,2,3],{TAIL}; ! kept\nLOCAL VAR robtarget b:=[[4,5,6],{TAIL};\nPROC main()\n"
         "MoveJ a,v100,fine,grip\\WObj:=part;\nMoveJ a,v50,z1,grip\\WObj:=part;\n"
-        "MoveJ b,v100,fine,grip\\WObj:=part;\nMoveJ Offs(b,90,0,0),v100,fine,grip\\WObj:=part;\n"
+        "MoveJ b,v100,fine,grip\\WObj:=part;\nMoveJ b,v100,fine,tool0\\WObj:=part;\n"
+        "MoveJ Offs(a,90,0,0),v100,fine,grip\\WObj:=part;\n"
     )
     text = olp.correct(HEAD.encode() + body.encode() + MACHINE_TAIL, bent).data.decode()
     assert "a_olp1" not in text
     assert "; ! kept\n" in text
     assert text.count("LOCAL VAR robtarget b") == 2
-    assert "MoveJ Offs(b_olp1,90,0,0),v100" in text or "MoveJ b_olp1,v100" in text
+    assert "MoveJ b_olp1,v100,fine,tool0" in text
+    # the shift of a move takes up its own correction
+    assert re.search(r"Offs\(a,(89|90)\.\d{4},-?0\.\d{4},-?0\.\d{4}\)", text)
 
 
 def test_parts_of_a_move_pass_without_a_stop(bent: Path) -> None:

@@ -44,7 +44,7 @@ _STILL = pattern(
     rb"STOP_TRACKING\b.*)?\s*"
 )
 _ENDS = pattern(rb"(?i)\s*(?:END|ABORT|JMP\s+LBL\b[^,]*)\s*")
-_BLOCK = pattern(rb"(?i)\s*(?:(IF\b.*THEN|SELECT\b.*)|(FOR\b.*)|(ELSE\b.*|=.*)|(ENDIF|ENDFOR))\s*")
+_BLOCK = pattern(rb"(?i)\s*(?:(IF\b.*THEN)|(FOR\b.*)|(ELSE)|(ENDIF|ENDFOR))\s*")
 #: mm/s in one unit of a speed
 _SPEEDS = {b"mm/sec": 1.0, b"cm/min": 10.0 / 60.0, b"inch/min": 25.4 / 60.0}
 _NAN = float("nan")

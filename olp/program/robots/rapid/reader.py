@@ -12,7 +12,7 @@ from olp.program.dialect import Dialect, Options, Support
 from olp.program.program import Program
 from olp.program.robots.frames import Located, Tool
 from olp.program.robots.moves import RobotMoves
-from olp.program.robots.poses import inverted, multiplied, of_zyx, rotated
+from olp.program.robots.poses import NO_TURN, inverted, multiplied, of_zyx, rotated
 from olp.program.robots.rapid import flow
 from olp.program.robots.rapid.data import Declared
 from olp.program.robots.rapid.table import TABLE
@@ -229,6 +229,8 @@ class _Reader:
         return Use(
             index, (statement.begin, statement.end), span, named, place,
             target.turn if turn is None else turn, zone=words.zone,
+            offsets=() if shift is None else shift.numbers,
+            offset_turn=target.turn if shift is not None and shift.tool else NO_TURN,
         )  # fmt: skip
 
     def _target(self, span: Span, line: int) -> tuple[int, Span]:

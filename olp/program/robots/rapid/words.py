@@ -100,10 +100,11 @@ def name_of(text: bytes) -> tuple[str, int] | None:
 @dataclass(frozen=True, slots=True)
 class Moved:
     """A target that is moved: `tool` along the tool, else along its frame; `inner` are the bytes of the
-    target, `turns_deg` what it is turned by about x, y, z of the tool."""
+    target, `numbers` those of the shift, `turns_deg` what it is turned by about x, y, z of the tool."""
 
     tool: bool
     inner: Span
+    numbers: tuple[Span, Span, Span]
     shift_mm: tuple[float, float, float]
     turns_deg: tuple[float, float, float]
 
@@ -116,6 +117,11 @@ def moved(data: bytes, span: Span) -> Moved | None:
     turns = {axis.lower(): float(value) for axis, value in _TURN.findall(match[6])}
     x, y, z = (float(match[k]) for k in (3, 4, 5))
     tool = match[1].lower() == b"reltool"
+    numbers = (match.span(3), match.span(4), match.span(5))
     return Moved(
-        tool, match.span(2), (x, y, z), (turns.get(b"x", 0.0), turns.get(b"y", 0.0), turns.get(b"z", 0.0))
+        tool,
+        match.span(2),
+        numbers,
+        (x, y, z),
+        (turns.get(b"x", 0.0), turns.get(b"y", 0.0), turns.get(b"z", 0.0)),
     )
