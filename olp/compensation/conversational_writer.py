@@ -16,11 +16,10 @@ from olp.core.arrays import Array, Index, Mask, distinct
 from olp.core.progress import Progress, silent
 from olp.core.toolpath import Flag
 from olp.program.bands import Band
+from olp.program.heidenhain.chunk import LATE_M
 from olp.program.program import Definitions
 from olp.program.text.edits import BARE, EditList, Edits
 
-#: M functions that act when their block has ended
-_LATE_M = frozenset({0, 1, 2, 5, 9, 30, 99})
 #: mm; a surface that is off by less is the same
 _SAME_MM = 1e-9
 #: words that show whether numbers are written with a plus
@@ -243,11 +242,7 @@ class ConversationalWriter(PoleWriter):
         words = self.words
         for line in distinct(self.path.line[rows.move[tails]]).tolist():
             for i in words.of_line(line):
-                if (
-                    words.letter[i] == ord("M")
-                    and int(words.mantissa[i]) in _LATE_M
-                    and not words.decimals[i]
-                ):
+                if words.letter[i] == ord("M") and int(words.mantissa[i]) in LATE_M and not words.decimals[i]:
                     place = int(self.program.line_end[line - 1])
                     start, end = int(words.start[i]), int(words.end[i])
                     edits.add(start, end, BARE, 0)

@@ -11,10 +11,8 @@ from olp.compensation.joints.path import JointPath
 from olp.compensation.joints.planning import JointPlan
 from olp.compensation.joints.writer import PLACES, JointWriter
 from olp.core.arrays import Index, distinct
+from olp.program.heidenhain.chunk import LATE_M
 from olp.program.text.edits import BARE, EditList, Edits
-
-#: M functions that act when their block has ended.
-_LATE_M = frozenset({0, 1, 2, 5, 9, 30, 129})
 
 
 class ConversationalJoints(JointWriter):
@@ -53,7 +51,7 @@ class ConversationalJoints(JointWriter):
                 edits.add(place, place, BARE, 0, text, row * PLACES + 2 * PLACES - 2)
         for number in distinct(line).tolist():
             for i in words.of_line(number):
-                if words.letter[i] == ord("M") and int(words.mantissa[i]) in _LATE_M:
+                if words.letter[i] == ord("M") and int(words.mantissa[i]) in LATE_M:
                     place, (start, end) = (
                         int(self.program.line_end[number - 1]),
                         (words.start[i], words.end[i]),

@@ -22,6 +22,8 @@ _HARMLESS = (
     | {118, 120, 124, 126, 127, 129, 134, 135, 137, 138, 141, 143, 144, 145, 148, 149, 150}
     | set(range(10, 30)) | set(range(31, 60))
 )  # fmt: skip
+#: M functions that act when their block has ended.
+LATE_M = (0, 1, 2, 5, 9, 30, 99, 129)
 #: M129, which ends tool centre point control.
 UNTIPPED = 129
 #: `_HARMLESS` by number.

@@ -12,13 +12,12 @@ import numpy.typing as npt
 from olp.core.arrays import Array, Index, Mask
 from olp.core.toolpath import Flag, Frame, Kind
 from olp.program.dialect import Dialect
+from olp.program.heidenhain.chunk import LATE_M
 from olp.program.heidenhain.columns import Blocks
 from olp.program.program import ArcSlots, Definitions, Poles, Program, StatedFeeds, Statements
 from olp.program.rs274.collector import Collector
 from olp.program.tilts import Tilt
 
-#: M functions that act when their block has ended
-_LATE_M = (0, 1, 2, 5, 9, 30)
 #: M functions that say how a block is carried out, and stop nothing
 _NO_REST = (
     89,
@@ -65,7 +64,7 @@ class Collected(Collector):
         code = np.rint(blocks.value[m]).astype(np.int64)
         rests = ~np.isin(code, _NO_REST)
         self.columns.put("rest_line", words.line[m[rests]] + words.first_line + 1, np.int64)
-        self.columns.put("rest_late", np.isin(code[rests], _LATE_M), np.bool_)
+        self.columns.put("rest_late", np.isin(code[rests], LATE_M), np.bool_)
 
     def put_feeds(self, mm_s: Array) -> None:
         self.columns.put("feed", mm_s, np.float64)

@@ -219,8 +219,10 @@ class _Reader(Arcs):
                 code="OLP511",
                 hint=UNROLL,
             )
+        comma = re.search(rb"\d,\d", upper) is not None
         raise ProgramError(
-            f"{statement.shown} is not understood, and may move the machine",
+            f"{statement.shown} is not understood, and may move the machine"
+            + ("; write its numbers with a decimal point instead of the comma" if comma else ""),
             line=statement.line,
             code="OLP510",
         )

@@ -39,6 +39,10 @@ _JUMP = re.compile(
     rb"FN[ \t]*(?:9|10|11|12)[ \t]*:[ \t]*IF[ \t]*([-+]?[ \t]*[\w.]+?)[ \t]*(EQU|NE|GT|LT)[ \t]*"
     rb'([-+]?[ \t]*[\w.]+)[ \t]*GOTO[ \t]*LBL[ \t]*("[^"]*"|\d+)\Z', re.I,
 )  # fmt: skip
+_DEFINED = re.compile(
+    rb"FN[ \t]*9[ \t]*:[ \t]*IF[ \t]*\+?(Q[LR]?\d+)[ \t]+IS[ \t]+(UN)?DEFINED[ \t]+"
+    rb'GOTO[ \t]*LBL[ \t]*("[^"]*"|\d+)\Z', re.I,
+)  # fmt: skip
 _COMPARED: Mapping[bytes, Callable[[float, float], bool]] = {
     b"EQU": lambda a, b: a == b, b"NE": lambda a, b: a != b, b"GT": lambda a, b: a > b,
     b"LT": lambda a, b: a < b,
@@ -207,6 +211,11 @@ class _Run:
         if jump is not None:
             a, b = self.parameters.of(jump[1]), self.parameters.of(jump[3])
             return self._target(unit, jump[4]) if _COMPARED[jump[2]](a, b) else place + 1
+        defined = _DEFINED.match(upper)
+        if defined is not None:
+            # raises where the program has not given it a value, as the control may have one
+            self.parameters.of(defined[1])
+            return place + 1 if defined[2] else self._target(unit, defined[3])
         call = _CALL.match(upper)
         if call is not None:
             return self._call(unit, call, place, depth, left)

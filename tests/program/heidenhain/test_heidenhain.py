@@ -151,7 +151,9 @@ def test_a_split_block_calls_its_cycle_once(bent: Path) -> None:
 def test_angles_of_the_control_stay_in_rotary_words_alone(bent: Path) -> None:
     path = program(HEAD + "L A+Q120 C+Q122 R0 FMAX\nL X1\n", bent).toolpath
     assert len(path) == 2
+    refused(HEAD + "L X+30,5\n", bent, 5, "decimal point instead of the comma")
     refused(HEAD + "L X+Q120\n", bent, 5, "parameters")
+    assert unrolled("Q1 = 2\nFN 9: IF +Q1 IS UNDEFINED GOTO LBL 1\nL X+Q1\nLBL 1\n")[0] == "L X+2"
     assert unrolled("L A+Q120 C+Q122 FMAX\n")[0] == "L A+Q120 C+Q122 FMAX"
 
 
