@@ -96,7 +96,7 @@ class Frame:
     that of the cutter, where the contour was taken as the path of the tool. With tool centre point control
     words state the tip in the workpiece, and `tip` says what turns evenly from end to end: rotary "axes", or
     the direction of the tool ("vector"). In a tilted plane words state the tip too, while rotary axes stand
-    ("fixed"). It is "" without.
+    ("fixed"), and `length_mm` is NaN where none is in force. It is "" without.
     """
 
     unit_mm: float = 1.0

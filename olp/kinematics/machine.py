@@ -21,7 +21,8 @@ class JointMachine:
     tools. It is None where the machine has other axes than these three and rotary ones. With `tips_from_zero`
     programs with tool centre point control count from the workpiece with its rotary axes at zero, else from
     where these are when it is switched on; None is not stated. `leads` is what this mode leads evenly where
-    the program does not say it, empty where the control decides.
+    the program does not say it, empty where the control decides. `swivel_axis` is the axis by whose position
+    CYCLE800 chooses between two, empty where that is not stated.
     """
 
     structure: Structure
@@ -33,6 +34,7 @@ class JointMachine:
     control: Machine | None = None
     tips_from_zero: bool | None = None
     leads: Interpolated = ""
+    swivel_axis: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -15,10 +15,13 @@ Branch = Literal[-1, 0, 1]
 @dataclass(frozen=True, slots=True)
 class Tilt:
     """A `move` that brings the rotary axes `letters` to where the tool is along the normal of a plane. `turn`
-    is the plane in the workpiece, None where nothing turns."""
+    is the plane in the workpiece, None where nothing turns. A `move` of -1 is that of the `line`. With
+    `by_swivel` the branch counts larger and smaller positions of the axis that the swivel data of the control
+    name, else signs of that nearest the tool."""
 
     move: int
     line: int
     letters: str
     turn: Turn | None
     branch: Branch
+    by_swivel: bool = False

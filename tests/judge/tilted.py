@@ -29,6 +29,9 @@ class TiltedJudge(Judge):
         self.shift = np.zeros(3)
         self.on = False
         self.found: dict[str, float] = {}
+        self.feeds = True
+        #: the axis of larger and smaller positions of a swivel
+        self.swivels = self.file.get("kinematics", {}).get("swivel_axis", "")
 
     def read(self, text: bytes) -> list[tuple[bool, bool, np.ndarray]]:
         self.turn, self.below, self.shift, self.on = np.eye(3), np.zeros(3), np.zeros(3), False
@@ -60,7 +63,9 @@ class TiltedJudge(Judge):
         return moves
 
     def cuts(self, line: str) -> bool:
-        return "MAX" not in line
+        if match := re.search(r"\bG0?([01])\b", line):
+            self.feeds = match[1] == "1"
+        return self.feeds and "MAX" not in line
 
     def statement(self, line: str, words: dict[str, float], turned: dict[str, float]) -> bool:
         """Take over a line that is no move."""
@@ -72,7 +77,35 @@ class TiltedJudge(Judge):
             words.update(dict.fromkeys("XYZ", np.nan))
             if "TURN" in line or "MOVE" in line:
                 turned.update(self.found)
-        return any(name in line for name in ("PLANE", "CYCL", "TOOL", "PGM"))
+        elif "CYCLE800" in line:
+            self.swivel(line)
+            words.update(dict.fromkeys("XYZ", np.nan))
+            if self.on:
+                turned.update(self.found)
+        elif match := re.search(r"G68\.2 X(\S+) Y(\S+) Z(\S+) I(\S+) J(\S+) K(\S+)", line):
+            x, y, z, *angles = map(float, match.groups())
+            self.on, self.below, self.shift = True, np.array([x, y, z]), np.zeros(3)
+            self.turn = Rotation.from_euler("ZXZ", angles, degrees=True).as_matrix()
+            words.update(dict.fromkeys("XYZ", np.nan))
+        elif "G53.1" in line:
+            self.search(0.0, "")
+            turned.update(self.found)
+        elif "G69" in line:
+            self.on, self.below, self.turn = False, np.zeros(3), np.eye(3)
+            words.update(dict.fromkeys("XYZ", np.nan))
+        names = ("PLANE", "CYCL", "TOOL", "PGM", "G68", "G53.1", "G69", "G43", "T1", "G54", "D1")
+        return any(name in line for name in names)
+
+    def swivel(self, line: str) -> None:
+        given = [text.strip() for text in re.findall(r"\((.*)\)", line)[0].split(",")]
+        self.on, self.turn, self.below, self.shift = len(given) > 1, np.eye(3), np.zeros(3), np.zeros(3)
+        if not self.on:
+            return
+        numbers = [float(text or 0) if '"' not in text else 0.0 for text in given]
+        axes = "".join("-XYZ"[int(numbers[3]) // 4**k % 4] for k in range(3))
+        self.turn = Rotation.from_euler(axes, numbers[7:10], degrees=True).as_matrix()
+        self.below, self.shift = np.array(numbers[4:7]), np.array(numbers[10:13])
+        self.search(numbers[13], self.swivels)
 
     def plane(self, line: str) -> None:
         self.on = "RESET" not in line
@@ -95,7 +128,7 @@ class TiltedJudge(Judge):
             axis = np.eye(3)["ABC".index(match[1])]
             self.turn = self.turn @ Rotation.from_rotvec(axis * np.radians(float(match[2]))).as_matrix()
         if self.on:
-            self.search(1.0 if re.search(r"S(EQ|YM)\+", line) else -1.0)
+            self.search(1.0 if re.search(r"S(EQ|YM)\+", line) else -1.0, "")
 
     @staticmethod
     def directed(first: np.ndarray, third: np.ndarray) -> np.ndarray:
@@ -104,8 +137,9 @@ class TiltedJudge(Judge):
         y /= np.linalg.norm(y)
         return np.column_stack((np.cross(y, z), y, z))
 
-    def search(self, sign: float) -> None:
-        """The rotary positions that bring the tool along the normal, the axis nearest the tool of a sign."""
+    def search(self, sign: float, axis: str) -> None:
+        """The rotary positions that bring the tool along the normal: of an axis the larger or the smaller
+        one, else that nearest the tool of a sign, or any within the travel."""
         columns = [k for k, name in enumerate(self.order) if name not in OWN]
         names = [name for name in self.chain if name not in OWN and name != "F"]
 
@@ -114,15 +148,16 @@ class TiltedJudge(Judge):
             axes[0, columns] = values
             return self.forward(axes, False)[1][0] - self.turn[:, 2]
 
-        best = None
-        for start in np.random.default_rng(1).uniform(-180, 180, (60, len(columns))):
+        found: list[dict[str, float]] = []
+        for start in np.random.default_rng(1).uniform(-180, 180, (16, len(columns))):
             done = least_squares(miss, start, xtol=1e-15, ftol=1e-15, gtol=1e-15)
-            if np.abs(done.fun).max() > MISSED:
-                continue
             values = dict(zip([self.order[k] for k in columns], done.x, strict=True))
             values = {name: (v + 180.0) % 360.0 - 180.0 for name, v in values.items()}
-            if sign * values[names[-1]] >= -1e-6:
-                best = values
-                break
-        assert best is not None, self.turn
-        self.found = best
+            ends = {name: self.file["axes"][name]["travel_deg"] for name in values}
+            inside = all(ends[name][0] <= v <= ends[name][1] for name, v in values.items())
+            if np.abs(done.fun).max() <= MISSED and inside:
+                found.append(values)
+        if axis:
+            self.found = max(found, key=lambda values: sign * values[axis])
+        else:
+            self.found = max(found, key=lambda values: sign * values[names[-1]] >= -1e-6)

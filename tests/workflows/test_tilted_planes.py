@@ -40,8 +40,10 @@ def program(planes: list[str], rotary: str = "", path: list[str] = PATH, shift: 
     return "\n".join([*head, *shift, *planes, *turn, *path, *tail]).encode() + b"\n"
 
 
-def corrected(folder: Path, text: bytes, chain: str = "C A Y F X Z", **words: str) -> olp.JointCorrection:
-    return olp.correct_joints(text, machine_file(folder, chain, control="heidenhain", **words))
+def corrected(
+    folder: Path, text: bytes, chain: str = "C A Y F X Z", control: str = "heidenhain", **words: str
+) -> olp.JointCorrection:
+    return olp.correct_joints(text, machine_file(folder, chain, control=control, **words))
 
 
 @pytest.mark.slow
@@ -121,3 +123,122 @@ def test_what_is_not_known_is_refused_with_its_line(
     with pytest.raises(olp.ProgramError, match=message) as caught:
         corrected(tmp_path, program(planes, rotary, path))
     assert caught.value.line == line
+
+
+SWIVEL = 'CYCLE800(1,"TABLE",0,{mode},10,5,-20,30,20,15,0,0,3,{way},0)'
+S_PATH = "G0 X10 Y20\nZ50\nG1 Z-5 F200\nX40\nY-35.5\nX-10 Y-10 Z-7\nG0 Z50\n"
+
+
+def swivelled(mode: int = 57, way: int = 1, call: str = SWIVEL, path: str = S_PATH) -> bytes:
+    head = "G71 G90 G54 G17\nT1 M6\nD1\nG0 X0 Y0 Z200 A0 C0\n"
+    return f"{head}{call.format(mode=mode, way=way)}\n{path}CYCLE800()\nG0 Z300\nM30\n".encode()
+
+
+def by_swivel(folder: Path, text: bytes, axis: str = "A") -> olp.JointCorrection:
+    key = f'[kinematics]\nswivel_axis = "{axis}"\n' if axis else ""
+    return corrected(folder, text, control="sinumerik", extra=key)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("mode", "way", "axis"), [(57, 1, "A"), (27, -1, "A"), (54, 1, "C")])
+def test_swivelled_planes_are_corrected_as_the_judge_finds(
+    mode: int, way: int, axis: str, tmp_path: Path
+) -> None:
+    nominal = swivelled(mode, way)
+    result = by_swivel(tmp_path, nominal, axis)
+    assert result.report["verdict"]["ok"]
+    judge = TiltedJudge(tmp_path / "machine.toml")
+    assert judge.judged(nominal, nominal)[0] > 10e-3
+    assert judge.judged(nominal, result.data)[0] <= WITHIN_MM
+
+
+def test_a_swivel_that_turns_no_axis_takes_the_words(tmp_path: Path) -> None:
+    """_DIR 0: the program turns the axes itself, and these are checked."""
+    call = 'CYCLE800(0,"T",0,57,0,0,0,0,45,0,0,0,0,0)'
+    done = by_swivel(tmp_path, swivelled(call=call, path="G0 A45 C90\n" + S_PATH), "")
+    assert done.report["verdict"]["ok"] and b"A45 C90\n" in done.data
+    with pytest.raises(olp.ProgramError, match="1 deg off the normal"):
+        by_swivel(tmp_path, swivelled(call=call, path="G0 A44 C90\n" + S_PATH), "")
+
+
+S_REFUSED = [
+    (SWIVEL, S_PATH, "", "swivel_axis", 5),
+    (SWIVEL.replace('"TABLE",0', '"TABLE",100'), S_PATH, "A", "_ST is not", 5),
+    (SWIVEL.replace("{mode}", "192"), S_PATH, "A", "_MODE", 5),
+    (SWIVEL.replace("{way}", ""), S_PATH, "A", "_DIR is left out", 5),
+    (SWIVEL.replace("30,20", "R1,20"), S_PATH, "A", "no number", 5),
+    ("TRANS X5\n" + SWIVEL, S_PATH, "A", "programmable frame", 6),
+    ("D0\n" + SWIVEL, S_PATH, "A", "length of the tool in the spindle is not in force", 7),
+    (SWIVEL + "\nTRAORI", S_PATH, "A", "swivelled plane", 6),
+    (SWIVEL, S_PATH + "G1 A10 F100\n", "A", "turns while", 13),
+    (SWIVEL, "G0 X10 Y20\nG1 Z-5 F200\n", "A", "Z has not been commanded", 7),
+]
+
+
+@pytest.mark.parametrize(("call", "path", "axis", "message", "line"), S_REFUSED)
+def test_what_is_not_known_of_a_swivel_is_refused(
+    call: str, path: str, axis: str, message: str, line: int, tmp_path: Path
+) -> None:
+    with pytest.raises(olp.ProgramError, match=message) as caught:
+        by_swivel(tmp_path, swivelled(call=call, path=path), axis)
+    assert caught.value.line == line
+
+
+PLANE = "G68.2 X10. Y5. Z-20. I30. J25. K15."
+G_PATH = "G43 H1\nG0 X10. Y20.\nZ50.\nG1 Z-5. F200.\nX40.\nY-35.5\nX-10. Y-10. Z-7.\nG0 Z50.\n"
+
+
+def tilted(turn: str = "A25. C150.", plane: str = PLANE, path: str = G_PATH) -> bytes:
+    head = "G21 G90 G54\nT1 M6\nG0 X0. Y0. Z200. A0. C0.\n"
+    return f"{head}{plane}\n{turn}\n{path}G69\nG49\nM30\n".encode()
+
+
+@pytest.mark.slow
+def test_planes_of_iso_controls_are_corrected_as_the_judge_finds(tmp_path: Path) -> None:
+    nominal = tilted()
+    result = corrected(tmp_path, nominal, control="fanuc")
+    assert result.report["verdict"]["ok"]
+    judge = TiltedJudge(tmp_path / "machine.toml")
+    assert judge.judged(nominal, nominal)[0] > 10e-3
+    assert judge.judged(nominal, result.data)[0] <= WITHIN_MM
+
+
+def test_g53_1_takes_the_position_within_the_travel(tmp_path: Path) -> None:
+    machine = machine_file(tmp_path, "C A Y F X Z", control="fanuc")
+    head, mark, tail = machine.read_text().partition("[axes.A]")
+    machine.write_text(head + mark + tail.replace("[-720.0, 720.0]", "[-5.0, 200.0]", 1))
+    found = olp.correct_joints(tilted("G53.1"), machine).data
+    stated = olp.correct_joints(tilted("A25. C150."), machine).data
+    assert found.partition(b"G43")[2] == stated.partition(b"G43")[2]
+
+
+G_REFUSED = [
+    ("G53.1", PLANE, G_PATH, "two positions", 5),
+    ("G53.1 P1", PLANE, G_PATH, "G53.1 is read alone", 5),
+    ("A25. C150.", PLANE.replace("J25.", "J25"), G_PATH, "no decimal point", 4),
+    ("A25. C150.", PLANE.replace(" K15.", ""), G_PATH, "I, J and K", 4),
+    ("A25. C150.", PLANE + "\nG68.2 X1. Y0. Z0. I1. J1. K1.", G_PATH, "another plane", 5),
+    ("A25. C150.", "G91\n" + PLANE, G_PATH, "in G90", 5),
+    ("A25. C150.", PLANE, G_PATH.replace("G43 H1\n", ""), "is not in force", 6),
+    ("A25. C150.", PLANE, G_PATH + "G69\nG0 X0.\nG1 X5. F100.\n", "has not been commanded", 16),
+]
+
+
+@pytest.mark.parametrize(("turn", "plane", "path", "message", "line"), G_REFUSED)
+def test_what_is_not_known_of_a_plane_of_iso_controls_is_refused(
+    turn: str, plane: str, path: str, message: str, line: int, tmp_path: Path
+) -> None:
+    with pytest.raises(olp.ProgramError, match=message) as caught:
+        corrected(tmp_path, tilted(turn, plane, path), control="fanuc")
+    assert caught.value.line == line
+
+
+@pytest.mark.slow
+def test_the_tip_is_led_in_a_plane_as_without_it(tmp_path: Path) -> None:
+    """M128 in a plane that turns the words by 90 deg, and the same path without the plane."""
+    head = "BEGIN PGM A MM\nTOOL CALL 1 Z\nL X+0 Y+0 Z+200 A+0 C+0 R0 FMAX\n"
+    plane = "PLANE SPATIAL SPA+0 SPB+0 SPC+90 STAY\nM128\nL X+0 Y+0 Z+20 A-10 C+5 R0 FMAX\n"
+    turned = head + plane + "L X+30 Y+10 Z+10 A-20 C+15 F500\nL X-10 F500\n"
+    plain = head + "M128\nL X+0 Y+0 Z+20 A-10 C+5 R0 FMAX\nL X-10 Y+30 Z+10 A-20 C+15 F500\nL Y-10 F500\n"
+    both = [corrected(tmp_path, text.encode()).report["deviation"]["before"] for text in (turned, plain)]
+    assert both[0] == pytest.approx(both[1], rel=1e-6)

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from olp.compensation.joints.motion import Motion
 from olp.compensation.joints.tilts import (
     found_positions,
+    refuse_lengths,
     refuse_off_normal,
     stands_before,
     stated_afresh,
@@ -100,11 +101,11 @@ class JointPath:
     def of(
         program: Program, structure: Structure, errors: MachineErrors, machine: Machine, *,
         rotated: Mapping[str, Mapping[str, float]], start_deg: Mapping[str, float],
-        tips_from_zero: bool | None = None,
+        tips_from_zero: bool | None = None, swivel_axis: str = "",
     ) -> JointPath:  # fmt: skip
         """The path of a program that was read with its words. `rotated` are the rotary values of work
-        offsets, `start_deg` those at the start, `tips_from_zero` is as in `JointMachine`. Raises ProgramError
-        for what is not read on such a machine."""
+        offsets, `start_deg` those at the start, `tips_from_zero` and `swivel_axis` as in `JointMachine`.
+        Raises ProgramError for what is not read on such a machine."""
         _refuse(program)
         path = program.toolpath
         order = structure.order
@@ -115,7 +116,7 @@ class JointPath:
             for frame in path.frames
         ]
         offsets = np.array(turns, float).reshape(len(path.frames), len(letters))
-        found = found_positions(program, structure, letters)
+        found = found_positions(program, structure, letters, swivel_axis)
         degrees = rotary.follow(
             program, np.array([start_deg.get(letter, np.nan) for letter in letters]), offsets, found
         )
@@ -147,6 +148,7 @@ class JointPath:
             offset[:, columns] = turned(inverse, offset[:, columns])
         unit = np.array([frame.unit_mm for frame in path.frames] or [1.0])[path.frame]
         if fixed.any():
+            refuse_lengths(program, fixed, slot[:, columns] >= 0)
             stated = _words(program, slot[:, columns]) * unit[:, None] + offset[:, columns]
             end[:, columns] = np.where(fixed[:, None], stated, end[:, columns])
         elsewhere = tip & ((path.flag & np.uint8(Flag.MACHINE)) != 0)

@@ -8,6 +8,7 @@ import numpy as np
 
 from olp.core.arrays import Array, Mask
 from olp.core.errors import ConfigError, ProgramError
+from olp.core.toolpath import Flag
 from olp.kinematics.chain import Kinematics
 from olp.kinematics.directions import rotary_positions
 from olp.kinematics.structure import Structure
@@ -22,12 +23,14 @@ _ALONG = 1e-9
 _ZERO_DEG = 1e-6
 
 
-def found_positions(program: Program, structure: Structure, letters: Sequence[str]) -> Array:
-    """(n, k) positions of rotary axes that the control finds by itself, NaN elsewhere. Raises ProgramError
-    where the program does not say which of several it takes."""
+def found_positions(
+    program: Program, structure: Structure, letters: Sequence[str], swivel_axis: str
+) -> Array:
+    """(n, k) positions of rotary axes that the control finds by itself, NaN elsewhere. `swivel_axis` is as in
+    `JointMachine`. Raises ProgramError where the program does not say which of several it takes."""
     places = np.full((len(program.toolpath), len(letters)), np.nan)
     for tilt in program.tilts:
-        values = _position(tilt, structure)
+        values = _position(tilt, structure, swivel_axis)
         for letter in tilt.letters or letters:
             if letter not in values:
                 raise ProgramError(_unknown(letter, letters), line=tilt.line, code="OLP565")
@@ -44,7 +47,7 @@ def _unknown(letter: str, letters: Sequence[str]) -> str:
     )
 
 
-def _position(tilt: Tilt, structure: Structure) -> Mapping[str, float]:
+def _position(tilt: Tilt, structure: Structure, swivel_axis: str) -> Mapping[str, float]:
     """Where the control turns the rotary axes, without one that the plane does not need."""
     matrix = np.eye(3) if tilt.turn is None else np.array(tilt.turn)
     try:
@@ -52,7 +55,7 @@ def _position(tilt: Tilt, structure: Structure) -> Mapping[str, float]:
     except ConfigError as error:
         raise ProgramError(str(error), line=tilt.line, code="OLP565") from None
     outer, inner = (name for name in structure.chain if name in _rotary(structure))
-    kept = [one for one in found if not tilt.branch or tilt.branch * one[inner] >= -_ZERO_DEG]
+    kept = _swivelled(found, tilt, swivel_axis) if tilt.by_swivel else _signed(found, tilt, inner)
     if len(kept) != 1:
         why = (
             "no positions of the rotary axes within their travel bring the tool along the normal of this "
@@ -60,14 +63,29 @@ def _position(tilt: Tilt, structure: Structure) -> Mapping[str, float]:
         )
         if kept:
             why = (
-                "two positions of the rotary axes bring the tool along the normal of this plane, and which "
-                "of them the control takes is not stated; state it (SEQ+ or SEQ-)"
+                "two positions of the rotary axes bring the tool along the normal, and which one the control "
+                "takes is not stated; program it, or SEQ+ or SEQ- in PLANE, or swivel_axis in [kinematics]"
             )
         raise ProgramError(why, line=tilt.line, code="OLP565")
     free = np.linalg.norm(np.cross(matrix[:, 2], structure.joints[outer].direction)) < _ALONG
     if free and tilt.turn is not None:
         return {inner: kept[0][inner]}
     return kept[0]
+
+
+def _signed(found: Sequence[Mapping[str, float]], tilt: Tilt, axis: str) -> Sequence[Mapping[str, float]]:
+    """Of positions those at which an axis has the sign that the program states."""
+    return [one for one in found if not tilt.branch or tilt.branch * one[axis] >= -_ZERO_DEG]
+
+
+def _swivelled(
+    found: Sequence[Mapping[str, float]], tilt: Tilt, swivel_axis: str
+) -> Sequence[Mapping[str, float]]:
+    """Of positions that a swivel finds those at the larger or the smaller value of its axis."""
+    if not swivel_axis or len(found) < 2:
+        return found
+    best = max(tilt.branch * one[swivel_axis] for one in found)
+    return [one for one in found if tilt.branch * one[swivel_axis] >= best - _ZERO_DEG]
 
 
 def _rotary(structure: Structure) -> list[str]:
@@ -109,15 +127,31 @@ def refuse_off_normal(
         )
 
 
+def refuse_lengths(program: Program, fixed: Mask, given: Mask) -> None:
+    """Raise ProgramError for moves in tilted planes with linear words, `given` (n, 3), where the length of
+    the tool is not in force."""
+    path = program.toolpath
+    without = np.array([np.isnan(frame.length_mm[2]) for frame in path.frames] or [False])[path.frame]
+    wrong = np.flatnonzero(fixed & without & given.any(axis=1))
+    if wrong.size:
+        raise ProgramError(
+            "in a tilted plane words state the tip of the tool, and the length of the tool in the spindle is "
+            "not in force; switch it on before this move",
+            line=int(path.line[wrong[0]]),
+            code="OLP565",
+        )
+
+
 def stated_afresh(program: Program, fixed: Mask, degrees: Array) -> Mask:
-    """(n,) moves in tilted planes before which a rotary axis or the plane has turned: coordinates count from
-    here on only where they are stated."""
+    """(n,) moves in tilted planes before which a rotary axis or the plane has turned, and those that the
+    control makes by itself: coordinates count from here on only where they are stated."""
     path = program.toolpath
     turned = np.append(True, (degrees[1:] != degrees[:-1]).any(axis=1))[: len(path)]
     places = list(dict.fromkeys((frame.turn, frame.offset_mm) for frame in path.frames))
     place = np.array([places.index((f.turn, f.offset_mm)) for f in path.frames] or [0])[path.frame]
     other = np.append(True, place[1:] != place[:-1])[: len(path)]
-    return np.asarray(fixed & (turned | other), bool)
+    lost = (path.flag & np.uint8(Flag.CONTROL)) != 0
+    return np.asarray(fixed & (turned | other | lost), bool)
 
 
 def stands_before(fixed: Mask, feed: Mask, degrees: Array) -> Mask:

@@ -63,7 +63,17 @@ def load_joint_machine(path: PathLike, read: Reader = read_bytes) -> JointMachin
         control=_control(file, structure, path),
         tips_from_zero={"axis-zero": True, "activation": False, None: None}[file.kinematics.tcp_frame_zero],
         leads=file.kinematics.orientation_interpolation or "",
+        swivel_axis=_swivel_axis(file.kinematics.swivel_axis, structure, path),
     )
+
+
+def _swivel_axis(name: str | None, structure: Structure, path: PathLike) -> str:
+    rotary = [axis for axis, joint in structure.joints.items() if joint.kind == "rotary"]
+    if name is not None and name not in rotary:
+        raise config_error(
+            [(None, f"kinematics.swivel_axis = {name!r}; expected one of {', '.join(rotary)}")], str(path)
+        )
+    return name or ""
 
 
 def _control(file: JointMachineFile, structure: Structure, path: PathLike) -> Machine | None:

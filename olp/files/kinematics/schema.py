@@ -132,6 +132,12 @@ class KinematicsTable(Table):
         'it: each rotary axis ("axes"), or the direction of the tool, along a great circle ("vector"). If '
         'left out, it is "vector" for Sinumerik controls (ORIWKS), "axes" for others',
     )
+    swivel_axis: Text | None = Field(
+        default=None,
+        description="the rotary axis that the swivel data of a Sinumerik control have as reference of the "
+        "direction. Of two positions for CYCLE800, _DIR 1 takes the one with the larger value of this axis, "
+        "-1 the smaller. If left out, a plane with two positions is refused",
+    )
 
 
 class JointMachineFile(Table):

@@ -18,6 +18,7 @@ from olp.core.units import AXES
 from olp.core.values import dataclass
 from olp.program.frames import length_errors_of, tool_vector_of, touch_tool_of
 from olp.program.rs274.codes import (
+    ALIGNED,
     COMPENSATION_OFF,
     CUTTER_COMPENSATION,
     DWELL,
@@ -31,7 +32,9 @@ from olp.program.rs274.codes import (
     PLANE_OF,
     ROTATION,
     SHIFTS,
+    TILTED,
     TRANSFORMS,
+    UNDOES,
     UNDONE_BY,
     UNITS,
     WORK_OFFSETS,
@@ -40,9 +43,11 @@ from olp.program.rs274.codes import (
 from olp.program.rs274.cutter import check_block, check_codes_along, switched_on
 from olp.program.rs274.offset_state import OffsetState, Word
 from olp.program.rs274.offsets import Offsets
+from olp.program.rs274.planes import tilted
 from olp.program.rs274.profiles.base import Profile
 from olp.program.rs274.state import NAN, PathMode
 from olp.program.rs274.transforms import change
+from olp.program.tilts import Tilt
 
 #: M6, as ten times its number.
 TOOL_CHANGE = 60
@@ -87,6 +92,7 @@ class AxisState(OffsetState):
     leads_stated: bool = False
     frames: list[Frame] = field(default_factory=list)
     path_modes: list[PathMode] = field(default_factory=list)
+    tilts: list[Tilt] = field(default_factory=list)
     #: the frame of the last plain motion, -1 before any
     last_frame: int = -1
     #: frames by the values of their fields: to look one up, none is made
@@ -130,11 +136,12 @@ class AxisState(OffsetState):
                 )
             base = list(work.offset_mm)
         angle_deg = self._angle_deg(name, line)
+        fixed = self.offsets.plane is not None and not self.offsets.tip
         stated: dict[str, Any] = {
             "unit_mm": self.unit_mm,
             "offset_mm": self.offsets.total(base, angle_deg),
             "turn": self.offsets.turn(angle_deg),
-            "length_mm": self.offsets.length,
+            "length_mm": self._plane_length() if fixed else self.offsets.length,
             "tool_mm": self._tool_vector(line),
             "tool": self.spindle,
             "work_offset": name,
@@ -142,7 +149,7 @@ class AxisState(OffsetState):
             "lengths": self._lengths(name),
             "payload_kg": self.payload_kg,
             "compensation": self.compensation,
-            "tip": self.offsets.tip,
+            "tip": "fixed" if fixed else self.offsets.tip,
         }
         key = tuple(stated.values())
         known = self._index.get(key)
@@ -150,6 +157,14 @@ class AxisState(OffsetState):
             known = self._index[key] = len(self.frames)
             self.frames.append(Frame(**stated))
         return known
+
+    def _plane_length(self) -> Vector:
+        """In a tilted plane words state the tip, which has no length; it is not known where the length of the
+        tool in the spindle is not in force."""
+        number = self.length_tool
+        tool = None if number is None else self.setup.tool(number)
+        own = tool is not None and tool.length_mm[2] == self.offsets.length[2]
+        return ZERO if own and self.spindle in (None, number) else (NAN, NAN, NAN)
 
     def _tool_vector(self, line: int) -> Vector:
         number = self.spindle if self.spindle is not None else self.length_tool
@@ -304,6 +319,10 @@ class AxisState(OffsetState):
             self._write_offset(line, by_letter, axis_words, moves)
         elif code in SHIFTS:
             self._shift(code, line, axis_words, moves)
+        elif code in (TILTED, ALIGNED) or (code in UNDOES and self.offsets.plane is not None):
+            found = tilted(self, code, line, by_letter)
+            self.tilts += found
+            return replace(effect, lost=(0, 1, 2)) if found else effect
         elif code in TRANSFORMS:
             lost = change(self, code, line, by_letter, axis_words)
             self.forget(lost)

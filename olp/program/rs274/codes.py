@@ -91,15 +91,18 @@ ROTATION = 680
 SCALING = 510
 #: G51.1, a mirror image of the program.
 MIRROR = 511
+#: G68.2, a tilted plane, and G53.1, which brings the tool along its normal.
+TILTED = 682
+ALIGNED = 531
 #: G69, G50 and G50.1 by what they end.
 UNDOES = {690: ROTATION, 500: SCALING, 501: MIRROR}
 #: The names of the codes that end these.
 UNDONE_BY = {ROTATION: "G69", SCALING: "G50", MIRROR: "G50.1"}
 #: Every code that changes how a program is turned, scaled or mirrored.
 TRANSFORMS = frozenset({*UNDOES, *UNDOES.values()})
-#: Their axis words are values, not motion: G10, G52, G92, G43.1, G50.1, G51, G51.1 and G68. Beside G92.1 to
-#: G92.3 they are motion.
-AXIS_VALUES = frozenset({WRITE_OFFSET, LOCAL_OFFSET, PRESET, 431, 501, ROTATION, SCALING, MIRROR})
+#: Their axis words are values, not motion: G10, G52, G92, G43.1, G50.1, G51, G51.1, G68 and G68.2. Beside
+#: G92.1 to G92.3 they are motion.
+AXIS_VALUES = frozenset({WRITE_OFFSET, LOCAL_OFFSET, PRESET, 431, 501, ROTATION, SCALING, MIRROR, TILTED})
 #: Tool lengths from the table of tools, and G43.1 and G43.2.
 TABLE_LENGTHS = frozenset({430, 440, 490})
 #: G43.1, a tool length from the words of the block.

@@ -6,10 +6,14 @@ Nothing here interprets; indices of words count over the whole text (`Context.ba
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Array, Index, Mask
+from olp.core.errors import ProgramError
+from olp.core.toolpath import Toolpath
 from olp.program.holes import Holes
 from olp.program.path_columns import PathColumns
 from olp.program.program import ArcSlots, Called, Program, SharedWords, Words
@@ -67,11 +71,12 @@ class Collector(PathColumns):
     def program(self, state: AxisState, end_line: int, closings: Index) -> Program:
         """The whole program, with the frames and path modes of the final `state`. Takes the columns: call it
         once only."""
+        path = self.toolpath(state.frames, self.start)
         line_start, line_end = self._line_bounds()
         return Program(
             data=self.data,
             dialect=state.profile,
-            toolpath=self.toolpath(state.frames, self.start),
+            toolpath=path,
             words=self._words() if self.keep_words else None,
             slot=self.columns.take("slot", np.int32, 3),
             arc_slots=ArcSlots(
@@ -92,6 +97,7 @@ class Collector(PathColumns):
                 self.columns.take("shared_distance", np.bool_),
             ),
             closings=closings,
+            tilts=tuple(replace(tilt, move=_move_at(path, tilt.line)) for tilt in state.tilts),
         )
 
     def _line_bounds(self) -> tuple[npt.NDArray[np.int32], Packed]:
@@ -108,3 +114,15 @@ class Collector(PathColumns):
             take("pointed", np.bool_), start, packed("word_number", start), packed("word_end", start),
             take("first_word", np.int32),
         )  # fmt: skip
+
+
+def _move_at(path: Toolpath, line: int) -> int:
+    """The move that the control makes by itself on a line. Raises ProgramError where no move is before it."""
+    move = int(np.searchsorted(path.line, line))
+    if move == len(path) or path.line[move] != line:
+        raise ProgramError(
+            "the control turns rotary axes here before the first move; program a position before it",
+            line=line,
+            code="OLP524",
+        )
+    return move

@@ -16,6 +16,8 @@ from olp.core.machine import ZERO, Vector
 from olp.core.toolpath import Interpolated
 from olp.core.turns import Turn, about_z, rows_of, turned
 from olp.core.values import dataclass
+from olp.program.frames import Placement, product
+from olp.program.frames import turned as turned_vector
 
 
 def _zeros() -> list[float]:
@@ -42,8 +44,8 @@ class Transform:
 class Offsets:
     """The offsets in force, in mm. `name` is the work offset, `written` are those that the program has
     written, by name, and `turned_deg` their angles about Z. `shift` is that of G92, `saved` its stored value,
-    `local` that of G52, `length` that of the tool. `transform` is that of the program. `tip` is as in
-    `Frame`."""
+    `local` that of G52, `length` that of the tool. `transform` is that of the program. `plane` is a
+    tilted one, below it and the shifts. `tip` is as in `Frame`."""
 
     name: str
     written: dict[str, list[float]] = field(default_factory=dict)
@@ -53,25 +55,33 @@ class Offsets:
     local: list[float] = field(default_factory=_zeros)
     length: Vector = ZERO
     transform: Transform | None = None
+    plane: Placement | None = None
     tip: Interpolated = ""
 
     def turn(self, angle_deg: float) -> Turn | None:
         """How words are turned, with a work offset at this angle; None where they are not."""
-        if self.transform is None:
+        inner = None if self.transform is None else self.transform.turn
+        if self.plane is not None:
+            inner = product(self.plane.turn, inner)
+        if inner is None:
             return rows_of(about_z(angle_deg)) if angle_deg else None
-        return rows_of(about_z(angle_deg) @ np.array(self.transform.turn))
+        return rows_of(about_z(angle_deg) @ np.array(inner))
 
     def total(self, work: Sequence[float], angle_deg: float) -> Vector:
         """Axis position of the zero of the program, with this work offset (3,) at this angle."""
-        if not angle_deg and self.transform is None:
+        if not angle_deg and self.transform is None and self.plane is None:
             x, y, z = (work[i] + self.shift[i] + self.local[i] + self.length[i] for i in range(3))
             return (x, y, z)
         inner = [s + o for s, o in zip(self.shift, self.local, strict=True)]
         if self.transform is not None:
             inner = [i + float(m) for i, m in zip(inner, self.transform.shift(), strict=True)]
+        if self.plane is not None:
+            inside = turned_vector(self.plane.turn, (inner[0], inner[1], inner[2]))
+            inner = [i + p for i, p in zip(inside, self.plane.shift_mm, strict=True)]
         if angle_deg:
             inner = (about_z(angle_deg) @ inner).tolist()
-        x, y, z = (work[i] + inner[i] + self.length[i] for i in range(3))
+        length = ZERO if self.plane is not None else self.length
+        x, y, z = (work[i] + inner[i] + length[i] for i in range(3))
         return (x, y, z)
 
     def work_at(self, axis: int, position: float, value: float) -> float:

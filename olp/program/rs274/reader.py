@@ -22,6 +22,7 @@ from olp.program.directives import Directives, with_payloads
 from olp.program.program import Program
 from olp.program.rs274.axis_state import AxisState, Effect
 from olp.program.rs274.codes import (
+    ALIGNED,
     CYCLES,
     DWELL,
     HOMES,
@@ -33,6 +34,7 @@ from olp.program.rs274.codes import (
     PRESET,
     PROBES,
     THREAD,
+    TILTED,
     TRANSFORMS,
     UNITS,
     WRITE_OFFSET,
@@ -59,7 +61,7 @@ _KIND[[0, 10, 20, 30, THREAD]] = (Kind.RAPID, Kind.LINE, Kind.ARC_CW, Kind.ARC_C
 _ALONE = np.array(sorted(CYCLES | PROBES))
 _PROBES = np.array(sorted(PROBES))
 #: Events that need the present position
-_APART = HOMES | TRANSFORMS | {MACHINE, PRESET}
+_APART = HOMES | TRANSFORMS | {MACHINE, PRESET, TILTED, ALIGNED}
 #: Events that change no frame
 _KEEPS_FRAME = frozenset({DWELL, MACHINE, *HOMES, *PATH_MODES})
 

@@ -35,10 +35,10 @@ class SwitchTips(Action):
             return
         name = "TRAORI" if self.on else "TRAFOOF"
         outside_contours(state, f"{name} is", line)
-        if any(offsets.local) or offsets.transform is not None:
+        if any(offsets.local) or offsets.transform is not None or offsets.plane is not None:
             raise ProgramError(
-                f"{name} comes in a programmable frame, and machine data say what becomes of that; program "
-                "TRANS without values before it, and the frame behind it",
+                f"{name} comes in a programmable frame or a swivelled plane, and machine data say what "
+                "becomes of that; program TRANS without values and CYCLE800() before it",
                 line=line,
                 code="OLP518",
             )

@@ -22,6 +22,7 @@ from olp.program.sinumerik.blocks import NUMBER, Block, Form, Piece, arguments, 
 from olp.program.sinumerik.frames import STATEMENTS, Parts
 from olp.program.sinumerik.offsets import written_offset
 from olp.program.sinumerik.refusals import refused, statement, unroll
+from olp.program.sinumerik.swivel import swivel
 from olp.program.sinumerik.table import (
     CONTOUR_WAYS,
     DRILLING,
@@ -343,6 +344,9 @@ class _Line:
 
     def _tilt(self, given: list[bytes]) -> None:
         """CYCLE800 without a tilt ends one. It may retract, and then the axes are not known."""
+        if self.words.tips:
+            self.acts.append(swivel(given))
+            return
         rest = given[4:13]
         if any(text and (not NUMBER.fullmatch(text) or float(text)) for text in rest):
             raise refused("CYCLE800")

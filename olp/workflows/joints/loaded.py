@@ -151,6 +151,7 @@ class JointRun:
             program, self.machine.structure, self.errors, setup.machine,
             rotated=self.turned, start_deg=self.job.start_deg,
             tips_from_zero=program.dialect.tips_from_zero if from_zero is None else from_zero,
+            swivel_axis=self.machine.swivel_axis,
         )  # fmt: skip
 
     def _listed(self, data: bytes) -> JointPath:

@@ -108,6 +108,7 @@ class Profile(Dialect):
       form.
     - `tip_codes`: codes that switch tool centre point control on, where a machine has rotary axes: words
       state the tip then, until a code of tool lengths.
+    - `plane_codes`: codes of tilted planes, which are read there, too.
     - `commands`: each line is a command with parameters, and no code holds for the next line. None: lines are
       blocks of words.
     - `inert`: whole lines that are no words and move nothing, such as names of programs and labels.
@@ -172,6 +173,7 @@ class Profile(Dialect):
     dwell_ms: bool = False
     dwell_words: str = "P"
     tip_codes: frozenset[int] = frozenset()
+    plane_codes: frozenset[int] = frozenset()
     leads: Interpolated = "axes"
     commands: Commands | None = None
     inert: re.Pattern[bytes] | None = None
@@ -204,7 +206,7 @@ class Profile(Dialect):
         return replace(
             self,
             tips=tips,
-            codes={**self.codes, **dict.fromkeys(self.tip_codes, Act.EVENT)},
+            codes={**self.codes, **dict.fromkeys(self.tip_codes | self.plane_codes, Act.EVENT)},
             aliases={**self.aliases, **dict.fromkeys(self.tip_codes, _LENGTH_OFF)},
         )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from olp.program.rs274.codes import ALIGNED, TILTED
 from olp.program.rs274.profiles.base import Act, g_codes
 from olp.program.rs274.profiles.iso import ISO, ISO_EXTRA, ISO_UNCHANGED
 
@@ -16,6 +17,7 @@ DIALECT = replace(
         extra={**ISO_EXTRA, 51: Act.UNCHANGED, 501: Act.EVENT, 511: Act.EVENT},
     ),
     tip_codes=frozenset({434}),
+    plane_codes=frozenset({TILTED, ALIGNED}),
     polar=True,
     scales_axes=True,
     scales_by_parameter=True,
