@@ -68,7 +68,8 @@ class Rapid(RobotDialect):
         assert lead is not None
         line = int(program.line_start[target.line - 1])
         blanks = data[line:begin] if not data[line:begin].strip() else b""
-        eol, last = program.eol(target.line), int(np.searchsorted(program.line_end, end + 1))
+        # the line of the semicolon
+        eol, last = program.eol(target.line), int(np.searchsorted(program.line_start, end, "right")) - 1
         place = int(program.line_end[last])
         return place, place, eol + blanks + lead[1] + name.encode() + b":=" + text + b";"
 
