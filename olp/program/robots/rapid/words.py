@@ -99,8 +99,10 @@ def name_of(text: bytes) -> tuple[str, int] | None:
 
 @dataclass(frozen=True, slots=True)
 class Moved:
-    """A target that is moved: `tool` along the tool, else along its frame; `inner` are the bytes of the
-    target, `numbers` those of the shift, `turns_deg` what it is turned by about x, y, z of the tool."""
+    """A target that is moved: `tool` along the tool, else along its frame.
+
+    `inner` are the bytes of the target, and `numbers` those of the shift. `turns_deg` is what it is turned by
+    about x, y, z of the tool."""
 
     tool: bool
     inner: Span
