@@ -9,7 +9,7 @@ Programs of blocks of words (RS-274) and of whole statements (APT, DMIS, lists) 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import field, replace
 from enum import Enum
 from typing import Any
@@ -69,7 +69,8 @@ class Dialect:
     is None where the dialect has none. With `unrolls_with_tools` it takes `setup` too: contours beside which
     the control keeps the tool become the path of the tool. `keeper` puts the corrections of an unrolled text
     into the program that it was made from. It is called with that text, the corrected one, where each line
-    begins in it, and this dialect, and returns a `Kept`.
+    begins in it, and this dialect, and returns a `Kept`. `asks` finds what a program asks of the control
+    beside motion and beside its words (`olp.program.asked.Asked`), in order of lines.
 
     `path_mode` is how the control goes from move to move where a program does not say it. `inch_decimals` are
     the decimals of inch programs for a least increment of 0.001 mm, `free_digits` those that centres of arcs
@@ -98,6 +99,7 @@ class Dialect:
     unroller: Callable[..., Unrolled] | None = None
     unrolls_with_tools: bool = False
     keeper: Callable[..., Kept] | None = None
+    asks: Callable[..., Iterable[Any]] | None = None
     signs: Signs = NO_SIGNS
     folder_endings: tuple[str, ...] = ()
     languages: frozenset[str] = frozenset()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -15,12 +16,14 @@ from olp.core.values import dataclass
 from olp.program.dialect import Dialect
 from olp.program.holes import Holes
 from olp.program.origin import Origin, in_original, origin_of
-from olp.program.robots.targets import Targets
 from olp.program.rs274.profiles.base import Profile
 from olp.program.rs274.state import Capture, PathMode
 from olp.program.text.columns import Packed
 from olp.program.text.line_ends import LINE_END
-from olp.program.tilts import Tilt
+
+if TYPE_CHECKING:
+    from olp.program.robots.targets import Targets
+    from olp.program.tilts import Tilt
 
 Small = npt.NDArray[np.int32]
 

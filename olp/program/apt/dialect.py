@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 from olp.core.machine import Setup
 from olp.program.apt.table import TABLE
+from olp.program.asked import Asked
 from olp.program.dialect import Dialect, Options, StatementDialect
 from olp.program.origin import Unrolled
 from olp.program.program import Program
@@ -24,6 +26,12 @@ def _unroll(data: bytes, dialect: Dialect, **options: Any) -> Unrolled:
     return unroll(data, dialect, **options)
 
 
+def _asks(program: Program) -> Iterator[Asked]:
+    from olp.program.apt.asks import asks
+
+    return asks(program)
+
+
 DIALECT = StatementDialect(
     name="apt",
     table=TABLE,
@@ -31,6 +39,7 @@ DIALECT = StatementDialect(
     path_mode="the post-processor's",
     reader=_read,
     unroller=_unroll,
+    asks=_asks,
     signs=APT,
     folder_endings=APT.endings,
     comment=(b"$$ ", b""),

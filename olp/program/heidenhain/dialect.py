@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 from olp.core.machine import Setup
 from olp.core.patterns import pattern
 from olp.core.values import dataclass
+from olp.program.asked import Asked
 from olp.program.dialect import Dialect, Options, StatementDialect
 from olp.program.heidenhain.table import TABLE
 from olp.program.origin import Unrolled
@@ -28,6 +30,12 @@ def _unroll(data: bytes, dialect: Dialect, **options: Any) -> Unrolled:
     return unroll(data, dialect, **options)
 
 
+def _asks(program: Program) -> Iterator[Asked]:
+    from olp.program.heidenhain.asks import asks
+
+    return asks(program)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Conversational(StatementDialect):
     """Statements that go on in the next line where a line ends with `~`."""
@@ -46,6 +54,7 @@ DIALECT = Conversational(
     path_mode="not stated",
     reader=_read,
     unroller=_unroll,
+    asks=_asks,
     unrolls_with_tools=True,
     signs=HEIDENHAIN,
     folder_endings=("h", "hnc"),

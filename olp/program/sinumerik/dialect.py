@@ -17,7 +17,7 @@ from olp.program.rs274.cycle_rules import ISO_CYCLES
 from olp.program.rs274.entry import read_blocks
 from olp.program.rs274.flatten.language import MACRO_B
 from olp.program.rs274.profiles.base import ISO_M, Act, Profile
-from olp.program.sinumerik.entry import translate_text, unroll_text
+from olp.program.sinumerik.entry import asked_of, translate_text, unroll_text
 from olp.program.sinumerik.table import HARMLESS_G, ROUNDING_G, statements
 from olp.program.text.signs import SINUMERIK
 
@@ -64,6 +64,7 @@ DIALECT = Sinumerik(
     reader=read_blocks,
     unroller=unroll_text,
     translator=translate_text,
+    asks=asked_of,
     signs=SINUMERIK,
     folder_endings=("mpf", "spf", "arc"),
     comment=(b"; ", b""),

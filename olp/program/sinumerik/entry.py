@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
+from olp.program.asked import Asked
 from olp.program.origin import Unrolled
+from olp.program.program import Program
 from olp.program.rs274.translation import Translation
 
 
@@ -20,3 +23,10 @@ def unroll_text(data: bytes, dialect: Any, **options: Any) -> Unrolled:
     from olp.program.sinumerik.flatten.unroll import flatten
 
     return flatten(data, dialect, **options)
+
+
+def asked_of(program: Program) -> Iterator[Asked]:
+    """`olp.program.sinumerik.asks.asks`."""
+    from olp.program.sinumerik.asks import asks
+
+    return asks(program)
