@@ -25,6 +25,8 @@ from olp.proof.strokes import strokes_mm
 
 #: the proof samples so finely that the error bends by less than this share of the tolerance between samples
 _BEND_SHARE = 0.1
+#: numbers that NumPy adds up at once, before it goes by halves
+_SUMMED = 128
 #: half the diagonal of the last digit's cube, as a share of the digit
 ROUNDING_SHARE = 0.87
 #: A move that ends within so many digits of its waypoint along each axis, rounding being half of one, ...
@@ -137,7 +139,7 @@ def _figures(values: Single, counted: Mask) -> dict[str, float]:
 
 def _square_sum(values: Single) -> np.float64:
     """The sum of the squares, of halves and their halves, so that it is as exact as that of all at once."""
-    if len(values) <= _BLOCK:
+    if len(values) <= max(_BLOCK, _SUMMED):
         return np.float64(np.add.reduce(np.square(values, dtype=np.float64)))
     half = len(values) // 16 * 8
     return np.float64(_square_sum(values[:half]) + _square_sum(values[half:]))

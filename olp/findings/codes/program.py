@@ -44,6 +44,7 @@ RULES = (
         "timed, so the program takes longer than it says.",
         "Add the time of these blocks, or measure it at the control.",
         "`G1 A3600 F1000` on a machine file with X, Y and Z.",
+        gate=False,
     ),
     _rule(
         "OLP209",
@@ -53,6 +54,7 @@ RULES = (
         "how long that takes, so it counts as no time.",
         "Give tool_change_s, spindle_start_s and m_codes_s in the table [times] of the machine file.",
         "`T2 M6` and a machine file without [times].",
+        gate=False,
     ),
     _rule(
         "OLP301",

@@ -296,7 +296,7 @@ def same(one: Program, other: Program) -> None:
     assert one.toolpath.frames == other.toolpath.frames
     assert one.slot.tolist() == other.slot.tolist()
     for name in ("mantissa", "decimals", "number", "end"):
-        assert getattr(one.words, name).tolist() == getattr(other.words, name).tolist(), name
+        assert getattr(one.words, name)[:].tolist() == getattr(other.words, name)[:].tolist(), name
     for name in ("begin", "end"):
         assert getattr(one.statements, name).tolist() == getattr(other.statements, name).tolist(), name
     assert one.statements is not None

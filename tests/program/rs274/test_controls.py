@@ -235,7 +235,7 @@ OF_TIME = {
 }  # fmt: skip
 #: Tables and texts, which have tests of their own.
 TABLES = {"codes", "refusals", "harmless_m", "text", "rules", "cycles", "contours", "language",
-          "written_ending", "program_number", "tip_codes"}  # fmt: skip
+          "written_ending", "program_number", "tip_codes", "plane_codes"}  # fmt: skip
 #: What controls with statements of their own do, which `tests/program/sinumerik` reads.
 OF_STATEMENTS = {"translator", "machine_moves_keep_length", "increments_take_offsets", "lengths_follow_plane",
                  "further_turns", "absolute_centre", "metric", "cleared", "dwell"}  # fmt: skip
