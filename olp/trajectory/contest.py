@@ -5,7 +5,6 @@ A candidate that exceeds a limit is slowed down as a whole. One that leaves the 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
@@ -107,10 +106,9 @@ def _whole(
             best = _faster(best, solution)
             smooth = _faster(smooth, solution) if candidate.solver.bends else smooth
     if optimise and best is not None and any(candidate.solver.bends for candidate in candidates):
-        # optimising takes most of the time: only the variant that is fastest in closed form
-        variant = min((*others, run), key=_closed_s) if others else run
-        solution = _optimised(run, best.duration_s, variant)
-        best, smooth = _faster(best, solution), _faster(smooth, solution)
+        for variant in (*others, run):
+            solution = _optimised(run, best.duration_s, variant)
+            best, smooth = _faster(best, solution) or best, _faster(smooth, solution)
     asked = [candidate.solver for candidate in candidates]
     for solver in (*SOLVERS, LAST):
         if best is None and solver not in asked:
@@ -139,14 +137,6 @@ def contest(run: Run, candidates: tuple[Candidate, ...]) -> list[tuple[int, int,
         pieces = slice(int(np.searchsorted(of, a)), int(np.searchsorted(of, b)))
         winners.append((int(stops[a]), int(stops[b]), replace(solution, motion=solution.motion.part(pieces))))
     return winners
-
-
-def _closed_s(run: Run) -> float:
-    """The time of the smooth path in closed form; inf where there is none."""
-    try:
-        return seconds(run.path(), run.profile())
-    except _FAILURES:
-        return math.inf
 
 
 def _optimised(run: Run, best_s: float, variant: Run) -> Solution | None:
