@@ -31,8 +31,6 @@ _ROUNDING = 1e-9
 _GAIN = 0.003
 #: share of the time that jerk costs in closed form which optimising does not recover
 _JERK_COST = 0.1
-#: waypoints beyond which short steps are not merged unless the run is optimised: a second path takes memory
-_LONG = 200_000
 #: exceptions of a solver that fails
 _FAILURES = (ArithmeticError, ValueError, IndexError, CannotCompute)
 
@@ -92,8 +90,7 @@ def _whole(
     best: Solution | None = None
     smooth: Solution | None = None
     # a few short steps, such as those that take up backlash
-    long = len(run.route) > _LONG and not optimise
-    others = [] if long else [Run(other, run.limits) for other in variants(run.route)]
+    others = [Run(other, run.limits) for other in variants(run.route)]
     tried = [(run, candidate) for candidate in candidates]
     tried += [
         (variant, Candidate(solver, float(solver.least_s(variant.route, run.limits).sum())))
