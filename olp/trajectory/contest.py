@@ -18,7 +18,7 @@ from olp.trajectory.audit import Ratios, ratios, slowing
 from olp.trajectory.critical import seconds
 from olp.trajectory.deviation import deviation_bound
 from olp.trajectory.divide import ends, part_of, parts
-from olp.trajectory.merge import variants
+from olp.trajectory.merge import merged
 from olp.trajectory.motion import Motion
 from olp.trajectory.optimise import optimised
 from olp.trajectory.route import Route
@@ -90,11 +90,12 @@ def _whole(
     best: Solution | None = None
     smooth: Solution | None = None
     # a few short steps, such as those that take up backlash
-    others = [Run(other, run.limits) for other in variants(run.route)]
+    other = merged(run.route)
+    variants = [run] if other is None else [Run(other, run.limits), run]
     tried = [(run, candidate) for candidate in candidates]
     tried += [
         (variant, Candidate(solver, float(solver.least_s(variant.route, run.limits).sum())))
-        for variant in others
+        for variant in variants[:-1]
         for solver in SOLVERS
     ]
     for variant, candidate in tried:
@@ -103,7 +104,7 @@ def _whole(
             best = _faster(best, solution)
             smooth = _faster(smooth, solution) if candidate.solver.bends else smooth
     if optimise and best is not None and any(candidate.solver.bends for candidate in candidates):
-        for variant in (*others, run):
+        for variant in variants:
             solution = _optimised(run, best.duration_s, variant)
             best, smooth = _faster(best, solution) or best, _faster(smooth, solution)
     asked = [candidate.solver for candidate in candidates]

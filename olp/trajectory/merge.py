@@ -21,18 +21,9 @@ _SHARE = 0.6
 _LEAST = 1e-3
 
 
-def variants(route: Route) -> list[Route]:
-    """The route merged by clusters, and by pairs where that differs: the middles of the steps of a fine
-    staircase are on a straight line, those of its clusters are not."""
-    found = [other for pairs in (False, True) if (other := merged(route, pairs=pairs)) is not None]
-    if len(found) == 2 and np.array_equal(found[0].point_mm, found[1].point_mm):
-        found.pop()
-    return found
-
-
-def merged(route: Route, *, pairs: bool = False) -> Route | None:
+def merged(route: Route) -> Route | None:
     """The same waypoints, those of a cluster in one place, and the tolerance that remains; None where there
-    are no clusters. With `pairs` a cluster has two waypoints.
+    are no clusters.
 
     That place is the middle of a cluster, or the rest with which it begins or ends. No waypoint is moved by
     more than `_SHARE` of its tolerance, and no rest is moved.
@@ -41,8 +32,8 @@ def merged(route: Route, *, pairs: bool = False) -> Route | None:
     rest[:1] = rest[-1:] = True
     room = np.where(rest, math.inf, _SHARE * route.tolerance_mm)
     step = np.sqrt((np.diff(route.point_mm, axis=0) ** 2).sum(axis=1))
-    least, larger = np.minimum(room[:-1], room[1:]), np.maximum(room[:-1], room[1:])
-    reach = np.where(np.isinf(larger), least, 2.0 * least)
+    least, most = np.minimum(room[:-1], room[1:]), np.maximum(room[:-1], room[1:])
+    reach = np.where(np.isinf(most), least, 2.0 * least)
     short = (step <= reach) & (step > _LEAST * least) & np.isfinite(least)
     point, tolerance = route.point_mm.copy(), route.tolerance_mm.copy()
     last = 0
@@ -50,7 +41,7 @@ def merged(route: Route, *, pairs: bool = False) -> Route | None:
         # a rest may end one cluster and begin the next one
         if first < last or (first == last and not rest[first]):
             continue
-        last = first + 1 if pairs else _last(route.point_mm, room, first)
+        last = _last(route.point_mm, room, first)
         fixed = first if rest[first] else last
         place = point[fixed] if rest[fixed] else 0.5 * (route.point_mm[first] + route.point_mm[last])
         own = slice(first, last + 1)
