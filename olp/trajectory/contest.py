@@ -17,12 +17,11 @@ from olp.core.values import dataclass
 from olp.trajectory.audit import Ratios, ratios, slowing
 from olp.trajectory.critical import seconds
 from olp.trajectory.deviation import deviation_bound
-from olp.trajectory.divide import ends, part_of, parts
 from olp.trajectory.merge import merged
 from olp.trajectory.motion import Motion
 from olp.trajectory.optimise import optimised
 from olp.trajectory.route import Route
-from olp.trajectory.solvers import LAST, OPTIMISED, SOLVERS, STRAIGHT, Candidate, Run, Solver
+from olp.trajectory.solvers import LAST, OPTIMISED, SOLVERS, Candidate, Run, Solver
 from olp.trajectory.speedgrid import bound_s
 
 #: a limit may be reached; this share above it is rounding
@@ -52,72 +51,35 @@ class Solution:
     def driven(self) -> Motion:
         return self.motion if self.factor == 1.0 else self.motion.slowed(self.factor)
 
-    def shifted(self, segments: int) -> Solution:
-        """The same with other numbers of its segments."""
-        return replace(self, motion=replace(self.motion, line=self.motion.line + segments))
 
-
-def fastest(run: Run, candidates: tuple[Candidate, ...], optimise: bool) -> list[tuple[int, int, Solution]]:
-    """First and last waypoint of consecutive parts of a run, and the fastest solution found for each; empty
-    where all solvers fail."""
-    best, smooth = _whole(run, candidates, optimise)
-    if best is None:
-        return []
-    whole = [(0, len(run.route) - 1, best)]
-    if not optimise or smooth is None:
-        return whole
-    divisions = [_divided(run, cut) for cut in (ends(run), parts(run, smooth.motion, best.duration_s))]
-    return min((whole, *filter(None, divisions)), key=lambda some: sum(s.duration_s for _, _, s in some))
-
-
-def _divided(run: Run, cut: list[tuple[int, int, bool]]) -> list[tuple[int, int, Solution]]:
-    """The fastest solution of each part of a run; empty where one has none."""
-    divided = []
-    for first, last, straight in cut:
-        candidates = STRAIGHT if straight else tuple(Candidate(solver, 0.0) for solver in SOLVERS)
-        solution, _ = _whole(part_of(run, first, last), candidates, not straight)
-        if solution is None:
-            return []
-        divided.append((first, last, solution.shifted(first)))
-    return divided
-
-
-def _whole(
-    run: Run, candidates: tuple[Candidate, ...], optimise: bool
-) -> tuple[Solution | None, Solution | None]:
-    """The fastest solution of the candidates, and the fastest along a smooth path. Where all fail, the other
-    solvers are tried in order; exact stops come last, as they are never the fastest."""
+def fastest(run: Run, candidates: tuple[Candidate, ...], optimise: bool) -> Solution | None:
+    """The fastest solution of the candidates. Where all fail, the other solvers are tried in order; exact
+    stops come last, as they are never the fastest."""
     best: Solution | None = None
-    smooth: Solution | None = None
+    for candidate in candidates:
+        if best is None or candidate.least_s < best.duration_s:
+            best = _better(run, candidate.solver, best)
     # a few short steps, such as those that take up backlash
     other = merged(run.route)
     variants = [run] if other is None else [Run(other, run.limits), run]
-    tried = [(run, candidate) for candidate in candidates]
-    tried += [
-        (variant, Candidate(solver, float(solver.least_s(variant.route, run.limits).sum())))
-        for variant in variants[:-1]
-        for solver in SOLVERS
-    ]
-    for variant, candidate in tried:
-        if best is None or candidate.least_s < best.duration_s:
-            solution = _solution(run, candidate.solver, variant)
-            best = _faster(best, solution)
-            smooth = _faster(smooth, solution) if candidate.solver.bends else smooth
+    for variant in variants[:-1]:
+        for solver in SOLVERS:
+            if best is None or float(solver.least_s(variant.route, run.limits).sum()) < best.duration_s:
+                best = _better(run, solver, best, variant)
     if optimise and best is not None and any(candidate.solver.bends for candidate in candidates):
         for variant in variants:
-            solution = _optimised(run, best.duration_s, variant)
-            best, smooth = _faster(best, solution) or best, _faster(smooth, solution)
+            best = _optimised(run, best, variant)
     asked = [candidate.solver for candidate in candidates]
     for solver in (*SOLVERS, LAST):
         if best is None and solver not in asked:
-            best = _solution(run, solver)
-    return best, smooth
+            best = _better(run, solver, best)
+    return best
 
 
 def contest(run: Run, candidates: tuple[Candidate, ...]) -> list[tuple[int, int, Solution]]:
     """First and last waypoint of consecutive runs, and the solver that is fastest there. Empty where a solver
     fails, or where its motion has to be slowed down."""
-    solutions = [_solution(run, candidate.solver) for candidate in candidates]
+    solutions = [_better(run, candidate.solver, None) for candidate in candidates]
     whole = [solution for solution in solutions if solution is not None and solution.factor == 1.0]
     if len(whole) < len(candidates):
         return []
@@ -137,38 +99,34 @@ def contest(run: Run, candidates: tuple[Candidate, ...]) -> list[tuple[int, int,
     return winners
 
 
-def _optimised(run: Run, best_s: float, variant: Run) -> Solution | None:
-    """The motion of optimised speed along the smooth path of a variant of a run; None where it can hardly
-    be faster than the best."""
+def _optimised(run: Run, best: Solution, variant: Run) -> Solution:
+    """The motion of optimised speed along the smooth path of a variant of a run, where it is faster."""
     try:
         path, profile = variant.path(), variant.profile()
     except _FAILURES:
-        return None
+        return best
     bound, closed = bound_s(path, run.limits), seconds(path, profile)
-    if bound + _JERK_COST * (closed - bound) > (1.0 - _GAIN) * best_s:
-        return None
+    if bound + _JERK_COST * (closed - bound) > (1.0 - _GAIN) * best.duration_s:
+        return best
     solver = Solver(OPTIMISED, lambda run: optimised(path, run.limits, profile), LAST.least_s, bends=True)
-    return _solution(run, solver)
+    return _better(run, solver, best) or best
 
 
-def _faster(best: Solution | None, other: Solution | None) -> Solution | None:
-    if best is None or (other is not None and other.duration_s < best.duration_s):
-        return other
-    return best
-
-
-def _solution(run: Run, solver: Solver, variant: Run | None = None) -> Solution | None:
-    """The solver's solution for the run, or for a variant of it; None where it is not valid for the run."""
+def _better(run: Run, solver: Solver, best: Solution | None, variant: Run | None = None) -> Solution | None:
+    """The solver's solution for the run, or for a variant of it, if it is valid for the run and faster than
+    the best so far; else the best so far."""
     motion = _tried(lambda: solver.solve(variant or run))
     if motion is None:
-        return None
+        return best
     used = ratios(motion, run.limits, run.route.feed_mm_s[motion.line])
     factor = slowing(used)
     factor = factor if factor > 1.0 + _ROUNDING else 1.0
+    if best is not None and not motion.duration_s * factor < best.duration_s:
+        return best
     allowed = _allowed(run.route)[motion.line]
     deviation = deviation_bound(motion, run.route, motion.line, allowed)
     if not (deviation <= allowed).all():
-        return None
+        return best
     return Solution(motion, solver.name, factor, used.slowed(factor), float(deviation.max(initial=0.0)))
 
 

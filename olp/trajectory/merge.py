@@ -53,8 +53,7 @@ def merged(route: Route) -> Route | None:
 
 
 def _last(point: Array, room: Array, first: int) -> int:
-    """The last waypoint of the cluster that begins with a short step at waypoint `first`. A rest ends it, and
-    none has two."""
+    """The last waypoint of the cluster that begins with a short step at waypoint `first`. A rest ends it, and none has two."""
     last = first + 1
     least = min(float(room[first]), float(room[last]))
     wide = 1.0 if math.isinf(room[first]) else 2.0

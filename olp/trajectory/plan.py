@@ -138,7 +138,8 @@ def _legs(
         limits,
     )  # fmt: skip
     if stretch.runs == 1 or len(stretch.candidates) == 1:
-        chosen = fastest(run, stretch.candidates, stretch.segments >= least and stretch.runs == 1)
+        solution = fastest(run, stretch.candidates, stretch.segments >= least and stretch.runs == 1)
+        chosen = [] if solution is None else [(0, last - first, solution)]
     else:
         chosen = contest(run, stretch.candidates)
     if chosen:

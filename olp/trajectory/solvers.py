@@ -82,8 +82,6 @@ SOLVERS = (
         bends=True,
     ),
 )
-#: the overlapping solver alone
-STRAIGHT = (Candidate(SOLVERS[0], 0.0),)
 #: exact stops, for where the others fail
 LAST = Solver(
     EXACT_STOP,
