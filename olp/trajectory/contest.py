@@ -17,7 +17,6 @@ from olp.core.values import dataclass
 from olp.trajectory.audit import Ratios, ratios, slowing
 from olp.trajectory.critical import seconds
 from olp.trajectory.deviation import deviation_bound
-from olp.trajectory.merge import merged
 from olp.trajectory.motion import Motion
 from olp.trajectory.optimise import optimised
 from olp.trajectory.route import Route
@@ -59,16 +58,8 @@ def fastest(run: Run, candidates: tuple[Candidate, ...], optimise: bool) -> Solu
     for candidate in candidates:
         if best is None or candidate.least_s < best.duration_s:
             best = _better(run, candidate.solver, best)
-    # a few short steps, such as those that take up backlash
-    other = merged(run.route)
-    variants = [run] if other is None else [Run(other, run.limits), run]
-    for variant in variants[:-1]:
-        for solver in SOLVERS:
-            if best is None or float(solver.least_s(variant.route, run.limits).sum()) < best.duration_s:
-                best = _better(run, solver, best, variant)
     if optimise and best is not None and any(candidate.solver.bends for candidate in candidates):
-        for variant in variants:
-            best = _optimised(run, best, variant)
+        best = _optimised(run, best)
     asked = [candidate.solver for candidate in candidates]
     for solver in (*SOLVERS, LAST):
         if best is None and solver not in asked:
@@ -99,10 +90,10 @@ def contest(run: Run, candidates: tuple[Candidate, ...]) -> list[tuple[int, int,
     return winners
 
 
-def _optimised(run: Run, best: Solution, variant: Run) -> Solution:
-    """The motion of optimised speed along the smooth path of a variant of a run, where it is faster."""
+def _optimised(run: Run, best: Solution) -> Solution:
+    """The motion of optimised speed, where it is faster."""
     try:
-        path, profile = variant.path(), variant.profile()
+        path, profile = run.path(), run.profile()
     except _FAILURES:
         return best
     bound, closed = bound_s(path, run.limits), seconds(path, profile)
@@ -112,10 +103,9 @@ def _optimised(run: Run, best: Solution, variant: Run) -> Solution:
     return _better(run, solver, best) or best
 
 
-def _better(run: Run, solver: Solver, best: Solution | None, variant: Run | None = None) -> Solution | None:
-    """The solver's solution for the run, or for a variant of it, if it is valid for the run and faster than
-    the best so far; else the best so far."""
-    motion = _tried(lambda: solver.solve(variant or run))
+def _better(run: Run, solver: Solver, best: Solution | None) -> Solution | None:
+    """The solver's solution if it is valid and faster than the best so far; else the best so far."""
+    motion = _tried(lambda: solver.solve(run))
     if motion is None:
         return best
     used = ratios(motion, run.limits, run.route.feed_mm_s[motion.line])
