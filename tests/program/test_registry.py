@@ -58,6 +58,12 @@ def test_a_text_that_two_dialects_share_is_decided_by_ending_or_control() -> Non
         chosen(None, SHARED, "a.txt")
 
 
+def test_a_procedure_is_of_the_language_of_its_parameters() -> None:
+    text = b"PROC HOLES1 (REAL SPCA, INT NUM)\nDEF AXIS _X\nM17\n"
+    assert chosen(None, text, "holes1.spf") == "sinumerik"
+    assert chosen(None, b"PROC holes1(num spca)\nENDPROC\n", "holes1.txt") == "abb-rapid"
+
+
 def test_a_text_that_its_ending_contradicts_is_refused() -> None:
     text = b"DMISMN/'a',05.2\nGOTO/1,2,3\n"
     assert chosen(None, text, "a.txt") == "dmis"

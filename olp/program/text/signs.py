@@ -84,7 +84,10 @@ RAPID = Signs(
     ("mod", "modx", "prg", "sysx"),
     own=pattern(
         rb"(?im)^[ \t]*(?:%%%\s*VERSION|MODULE[ \t]+\w+[ \t]*(?:\(|\r?$)|"
-        rb"(?:LOCAL[ \t]+)?PROC[ \t]+\w+[ \t]*\(|Move(?:L|J|C|AbsJ)[ \t]+(?:\[|\w+[ \t]*[,{\\(])|"
+        # not the types of Sinumerik's own PROC
+        rb"(?:LOCAL[ \t]+)?PROC[ \t]+\w+[ \t]*\("
+        rb"(?![ \t]*(?:VAR[ \t]+)?(?:(?:REAL|INT|BOOL|AXIS|FRAME|CHAR)\b|STRING[ \t]*\[))|"
+        rb"Move(?:L|J|C|AbsJ)[ \t]+(?:\[|\w+[ \t]*[,{\\(])|"
         rb"(?:(?:LOCAL|TASK)[ \t]+)?(?:CONST|PERS|VAR)[ \t]+\w+[ \t]+\w+)"
     ),
 )
