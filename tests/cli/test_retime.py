@@ -162,7 +162,7 @@ def test_full_circles_are_compared_with_their_quarters_and_not_with_a_jog(job: P
     report = report_of(program(tmp_path, head + quarters * 3 + end), "-j", job, "--nominal", nominal)
     rows = {row["line"]: row for row in report["nominal"]["differences"]}
     for line in (3, 4, 5):
-        assert rows[line]["corrected_s"] == pytest.approx(rows[line]["nominal_s"], rel=0.02)
+        assert rows[line]["corrected_s"] == pytest.approx(rows[line]["nominal_s"], rel=0.05)
 
 
 # -- the trajectory --------------------------------------------------------------------------------------
