@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
+from olp.core.errors import ProgramError
 from olp.core.machine import Setup, Vector
 from olp.core.toolpath import Flag, Kind
 from olp.program.dialect import Dialect
@@ -17,6 +19,14 @@ NAN = float("nan")
 #: mm; less of a tool vector moves nothing, and comes from the digits of orientations
 _SAME_VECTOR_MM = 1e-4
 _NOWHERE: Vector = (NAN, NAN, NAN)
+
+
+def raise_all(refusals: Sequence[ProgramError]) -> None:
+    """Raises the first of what a reader refused, with the others; nothing where there is none."""
+    if refusals:
+        first = refusals[0]
+        first.others = tuple(refusals[1:])
+        raise first
 
 
 class RobotMoves:

@@ -68,3 +68,10 @@ class Part:
     share: float
     stop: bool
     name: str
+
+    def renumbered(self, target: Target) -> list[tuple[int, int, bytes]]:
+        """What replaces the numbers of a target, from its first byte on."""
+        start = target.value[0]
+        return [
+            (a - start, b - start, text) for (a, b), text in zip(target.numbers, self.numbers, strict=True)
+        ]

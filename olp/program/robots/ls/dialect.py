@@ -28,9 +28,6 @@ _LONGEST_COMMENT = 32
 class Ls(RobotDialect):
     """TP programs."""
 
-    def continues(self, line: bytes) -> bool:
-        return False
-
     def stamped(self, program: Program, stamp: bytes) -> Replacement:
         match = _MAIN.search(program.data)
         place = 0 if match is None else match.end()
@@ -86,9 +83,7 @@ class Ls(RobotDialect):
     def _value(program: Program, target: Target, part: Part, use: Use) -> bytes:
         """A position with other numbers, and the orientation at the end of a part."""
         data, start = program.data, target.value[0]
-        edits = [
-            (a - start, b - start, text) for (a, b), text in zip(target.numbers, part.numbers, strict=True)
-        ]
+        edits = part.renumbered(target)
         if use.before != use.turn:
             angles = zyx_of(between(use.before, use.turn, part.share))
             for name, angle in zip((b"R", b"P", b"W"), angles, strict=True):

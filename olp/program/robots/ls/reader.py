@@ -15,7 +15,7 @@ from olp.program.program import Program
 from olp.program.robots.frames import Located, Tool
 from olp.program.robots.ls.registers import Registers
 from olp.program.robots.ls.text import Line, Position, lines, parts, positions
-from olp.program.robots.moves import RobotMoves
+from olp.program.robots.moves import RobotMoves, raise_all
 from olp.program.robots.poses import Pose, of_zyx, rotated
 from olp.program.robots.targets import Use
 
@@ -95,10 +95,7 @@ class _Reader:
                 self._statement(line)
             except ProgramError as error:
                 self.refusals.append(error)
-        if self.refusals:
-            first = self.refusals[0]
-            first.others = tuple(self.refusals[1:])
-            raise first
+        raise_all(self.refusals)
         return self.moves.program(dialect, words=words)
 
     # -- statements ----------------------------------------------------------------------------------

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import count
-
 import numpy as np
 
 from olp.core.patterns import pattern
@@ -20,8 +18,6 @@ from olp.program.text.signs import RAPID
 
 _MODULE = pattern(rb"(?im)^[ \t]*MODULE\s+\w+(?:\s*\([^)]*\))?[^\r\n]*(?:\r\n|\n|\r|\Z)")
 _DECLARED_NAME = pattern(rb"(?is)((?:(?:LOCAL|TASK)\s+)?(?:CONST|PERS|VAR)\s+robtarget\s+)\w+")
-#: Characters that a name may have.
-_LONGEST_NAME = 32
 #: A zone through which the robot passes without a stop.
 _PASSED = b"z0"
 #: A zone at which it stops: a step that takes up backlash is smaller than any other.
@@ -32,21 +28,10 @@ _STOP = b"fine"
 class Rapid(RobotDialect):
     """RAPID programs."""
 
-    def continues(self, line: bytes) -> bool:
-        return False
-
     def stamped(self, program: Program, stamp: bytes) -> Replacement:
         match = _MODULE.search(program.data)
         place = 0 if match is None else match.end()
         return place, place, stamp + program.eol(1)
-
-    def named(self, program: Program, target: Target, taken: set[str]) -> str:
-        for number in count(1):
-            tail = f"_olp{number}"
-            name = target.name[: _LONGEST_NAME - len(tail)] + tail
-            if name.upper() not in taken:
-                return name
-        raise AssertionError
 
     def part(self, program: Program, move: int, use: Use, part: Part) -> list[Replacement]:
         data, targets = program.data, program.targets
@@ -77,9 +62,7 @@ class Rapid(RobotDialect):
     def _value(program: Program, target: Target, part: Part, use: Use) -> bytes:
         """A target with other numbers, and the orientation at the end of a part."""
         data, start = program.data, target.value[0]
-        edits = [
-            (a - start, b - start, text) for (a, b), text in zip(target.numbers, part.numbers, strict=True)
-        ]
+        edits = part.renumbered(target)
         if not (use.before == use.turn == target.turn):
             match = ROBTARGET.match(data, *target.value)
             assert match is not None
@@ -102,4 +85,5 @@ DIALECT = Rapid(
     languages=frozenset(("ABB RAPID",)),
     table=TABLE,
     decimals=4,
+    longest_name=32,
 )

@@ -11,7 +11,7 @@ from olp.core.machine import Setup
 from olp.program.dialect import Dialect, Options, Support
 from olp.program.program import Program
 from olp.program.robots.frames import Located, Tool
-from olp.program.robots.moves import RobotMoves
+from olp.program.robots.moves import RobotMoves, raise_all
 from olp.program.robots.poses import NO_TURN, inverted, multiplied, of_zyx, rotated
 from olp.program.robots.rapid import flow
 from olp.program.robots.rapid.data import Declared
@@ -64,10 +64,7 @@ class _Reader:
                 self._statement(statement)
             except ProgramError as error:
                 self.refusals.append(error)
-        if self.refusals:
-            first = self.refusals[0]
-            first.others = tuple(self.refusals[1:])
-            raise first
+        raise_all(self.refusals)
         return self.moves.program(dialect, words=words)
 
     def _declare(self, every: list[Statement]) -> list[Statement]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import count
-
 from olp.core.patterns import pattern
 from olp.core.values import dataclass
 from olp.program.program import Program
@@ -24,20 +22,10 @@ _PASSED = b"0.0005"
 class UrScript(RobotDialect):
     """URScript programs."""
 
-    def continues(self, line: bytes) -> bool:
-        return False
-
     def stamped(self, program: Program, stamp: bytes) -> Replacement:
         match = _DEF.search(program.data)
         place = 0 if match is None else match.end()
         return place, place, (b"" if match is None else b"  ") + stamp + program.eol(1)
-
-    def named(self, program: Program, target: Target, taken: set[str]) -> str:
-        for number in count(1):
-            name = f"{target.name}_olp{number}"
-            if name.upper() not in taken:
-                return name
-        raise AssertionError
 
     def part(self, program: Program, move: int, use: Use, part: Part) -> list[Replacement]:
         data, targets = program.data, program.targets
@@ -64,9 +52,7 @@ class UrScript(RobotDialect):
     def _value(program: Program, target: Target, part: Part, use: Use) -> bytes:
         """A pose with other numbers, and the orientation at the end of a part."""
         data, start = program.data, target.value[0]
-        edits = [
-            (a - start, b - start, text) for (a, b), text in zip(target.numbers, part.numbers, strict=True)
-        ]
+        edits = part.renumbered(target)
         if use.before != use.turn:
             match = POSE.match(data, *target.value)
             assert match is not None

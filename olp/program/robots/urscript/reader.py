@@ -16,7 +16,7 @@ from olp.program.dialect import Dialect, Options, Support
 from olp.program.frames import tool_vector_of
 from olp.program.program import Program
 from olp.program.robots.frames import Located, Tool
-from olp.program.robots.moves import RobotMoves
+from olp.program.robots.moves import RobotMoves, raise_all
 from olp.program.robots.poses import Pose, of_vector
 from olp.program.robots.targets import NOWHERE, Span, Use
 from olp.program.robots.urscript.table import TABLE
@@ -105,10 +105,7 @@ class _Reader:
                 self._statement(line)
             except ProgramError as error:
                 self.refusals.append(error)
-        if self.refusals:
-            first = self.refusals[0]
-            first.others = tuple(self.refusals[1:])
-            raise first
+        raise_all(self.refusals)
         return self.moves.program(dialect, words=words)
 
     def _assignments(self, every: list[_Line]) -> None:
