@@ -1,24 +1,35 @@
-"""The inputs of a run: each file is opened once, and every later reader gets the same bytes."""
+"""The inputs of a run: every reader gets the same bytes of a file.
+
+A long text is let go while nobody needs it, and read again where it is asked for."""
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
 import os
+import tempfile
+import weakref
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
+from typing import IO
 
 from olp.core.errors import InputError, OlpError, naming
 from olp.core.values import dataclass
 from olp.files.write import PathLike, read_bytes
 
+#: Bytes from which a text is let go: shorter ones cost less than to read them again.
+LONG = 1 << 22
+
 
 class Sources:
-    """Reads files and keeps their bytes for a run, so that the whole run uses one state of each file."""
+    """Reads files and keeps their bytes for a run, so that the whole run uses one state of each file. Of one
+    that is let go it keeps the digest, and refuses another state of it."""
 
     def __init__(self) -> None:
         self._bytes: dict[Path, bytes] = {}
+        self._digests: dict[Path, bytes] = {}
         self._opened: dict[str, None] = {}
         self._there: set[Path] = set()
         self._absent: set[Path] = set()
@@ -29,12 +40,25 @@ class Sources:
         return tuple(self._opened)
 
     def read(self, path: PathLike) -> bytes:
-        """The bytes of a file, opened the first time only. Raises InputError where it cannot be read."""
+        """The bytes of a file, opened the first time only, and again where it was let go. Raises InputError
+        where it cannot be read, or is not as it was."""
         key = Path(path)
         if key not in self._bytes:
             self._opened[str(Path(path).absolute())] = None
-            self._bytes[key] = read_bytes(path)
+            data = read_bytes(path)
+            if self._digests.get(key) not in (None, hashlib.sha256(data).digest()):
+                what = "was changed by another program during this call; look at it, and call again"
+                raise InputError(what, file=str(path))
+            self._bytes[key] = data
         return self._bytes[key]
+
+    def let_go(self, path: PathLike) -> None:
+        """Keep of a long file that was read only its digest; it is read again where it is asked for."""
+        key = Path(path)
+        data = self._bytes.get(key, b"")
+        if len(data) >= LONG:
+            self._digests[key] = self._digests.get(key) or hashlib.sha256(data).digest()
+            del self._bytes[key]
 
     def read_last(self, path: PathLike) -> bytes:
         """As `read`, for a large file that is not read again: its bytes are no longer kept."""
@@ -44,19 +68,23 @@ class Sources:
 
     def exists(self, path: PathLike) -> bool:
         """Whether a file is there."""
-        there = Path(path) in self._bytes or Path(path).is_file()
+        there = Path(path) in self._were_read() or Path(path).is_file()
         (self._there if there else self._absent).add(Path(path))
         return there
 
     def there(self) -> frozenset[str]:
         """The names in a parcel of files that are there and were not read."""
-        return frozenset(in_parcel(path) for path in self._there - self._bytes.keys())
+        return frozenset(in_parcel(path) for path in self._there - self._were_read().keys())
 
     def parcel(self) -> dict[str, bytes | None]:
         """What was read by now, under the names that a parcel has for it; None for files that were asked for
         and are not there."""
-        read: dict[str, bytes | None] = {in_parcel(path): data for path, data in self._bytes.items()}
+        read: dict[str, bytes | None] = {in_parcel(path): self.read(path) for path in self._were_read()}
         return {in_parcel(path): None for path in self._absent} | read
+
+    def _were_read(self) -> dict[Path, None]:
+        """The files that were read by now."""
+        return dict.fromkeys((*self._bytes, *self._digests))
 
     def digest(self, path: PathLike) -> bytes:
         """SHA-256 of a file. Raises as `read`."""
@@ -68,12 +96,17 @@ class Sources:
             return given
         if isinstance(given, bytes):
             return Source("", lambda: given)
-        return Source(str(given), functools.partial(self.read, given))
+        part = functools.partial
+        return Source(str(given), part(self.read, given), part(self.let_go, given))
 
 
 def in_parcel(path: PathLike) -> str:
     """The name of a file in a parcel: its path without detours."""
     return os.path.normpath(path)
+
+
+def _keep() -> None:
+    """What somebody else keeps is not let go."""
 
 
 class Wanted(Exception):
@@ -119,18 +152,60 @@ class Parcel(Sources):
             raise Wanted(name) from None
 
 
+class _Spool:
+    """A text that has no file. Where it is long, it is let go into a temporary one, which ends with it."""
+
+    def __init__(self, read: Callable[[], bytes]) -> None:
+        self._first: Callable[[], bytes] | None = read
+        self._data: bytes | None = None
+        self._file: IO[bytes] | None = None
+
+    def read(self) -> bytes:
+        """The text; that of a stream is read when it is first needed."""
+        if self._first is not None:
+            self._data, self._first = self._first(), None
+        if self._data is None:
+            assert self._file is not None
+            self._file.seek(0)
+            self._data = self._file.read()
+        return self._data
+
+    def let_go(self) -> None:
+        """Keep a long text in its file only; in memory, where there is no room for one."""
+        if self._data is None or len(self._data) < LONG:
+            return
+        if self._file is None:
+            with contextlib.suppress(OSError), contextlib.ExitStack() as unless:
+                file = unless.enter_context(tempfile.TemporaryFile())
+                file.write(self._data)
+                file.flush()
+                weakref.finalize(self, unless.pop_all().close)
+                self._file = file
+        if self._file is not None:
+            self._data = None
+
+
 @dataclass(frozen=True, slots=True)
 class Source:
     """A program or results: a file, or bytes from a caller or a stream. `name` is the path of the file, ""
-    for bytes. `data` can be read again and again."""
+    for bytes. `data` can be read again and again; `let_go` frees its memory until then."""
 
     name: str
     _read: Callable[[], bytes]
+    let_go: Callable[[], None] = _keep
 
     @staticmethod
     def stream(read: Callable[[], bytes]) -> Source:
         """The contents of a stream, which can be read only once. It is read when it is first needed."""
-        return Source("", functools.cache(read))
+        spool = _Spool(read)
+        return Source("", spool.read, spool.let_go)
+
+    @staticmethod
+    def made(data: bytes) -> Source:
+        """A text that was made here."""
+        source = Source.stream(lambda: data)
+        source.load()
+        return source
 
     def load(self) -> None:
         """Read it now. Raises InputError where it cannot be read."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import field, replace
 from typing import TYPE_CHECKING
 
@@ -15,7 +15,7 @@ from olp.core.toolpath import Toolpath
 from olp.core.values import dataclass
 from olp.program.dialect import Dialect
 from olp.program.holes import Holes
-from olp.program.origin import Origin, in_original, origin_of
+from olp.program.origin import Origin, Unrolled
 from olp.program.rs274.profiles.base import Profile
 from olp.program.rs274.state import Capture, PathMode
 from olp.program.text.columns import Packed
@@ -235,18 +235,18 @@ class Statements:
 class Program:
     """A program as read.
 
-    `slot` (n, 3): index of the X, Y, Z word of each move, -1 where omitted. `calculator`: lengths without
-    a decimal point are whole units. `statements` is None for blocks of words. `closings` are
-    brackets that close behind a number, sorted. `tilts` are moves by which the control turns rotary axes to
-    a plane. `by_original`: lines are those of the text that this one was
-    unrolled from (`in_original`).
+    `content` is the text, or what reads it again (`let_go`). `slot` (n, 3): index of the X, Y, Z word of each
+    move, -1 where omitted. `calculator`: lengths without a decimal point are whole units. `statements` is
+    None for blocks of words. `closings` are brackets that close behind a number, sorted. `tilts` are moves by
+    which the control turns rotary axes to a plane. `by_original`: lines are those of the text that this one
+    was unrolled from (`in_original`).
 
     Along contours under cutter compensation `toolpath` is that of the tool. `programmed` is then the program
     with the contour in its place, and (n,) `blocks` the move of it that each move belongs to. `targets` are
     those of a program of a robot, which several moves may use.
     """
 
-    data: bytes
+    content: bytes | Callable[[], bytes]
     dialect: Dialect
     toolpath: Toolpath
     words: Words | None
@@ -269,6 +269,17 @@ class Program:
     programmed: Program | None = None
     blocks: Index | None = None
     targets: Targets | None = None
+
+    @property
+    def data(self) -> bytes:
+        """The text."""
+        return self.content if isinstance(self.content, bytes) else self.content()
+
+    def let_go(self, text: bytes, again: Callable[[], bytes]) -> Program:
+        """The same without its text, which `again` reads where it is asked for. One that was unrolled keeps
+        it, and so does one that has another than `text`, such as one with payloads."""
+        kept = self.content is not text or isinstance(text, Unrolled)
+        return self if kept else replace(self, content=again)
 
     @property
     def in_blocks(self) -> bool:
@@ -294,7 +305,7 @@ class Program:
     @property
     def origin(self) -> Origin | None:
         """Where the lines of the text come from; None where it was not unrolled."""
-        return origin_of(self.data)
+        return self.content.origin if isinstance(self.content, Unrolled) else None
 
     def in_original(self) -> Program:
         """The same with the lines of the text that this one was unrolled from, as people are told them. Lines
@@ -319,7 +330,7 @@ class Program:
 
     def errors(self) -> AbstractContextManager[None]:
         """Errors with a line of the text get the line of its original, where it was unrolled."""
-        return in_original(self.data)
+        return nullcontext() if self.origin is None else self.origin.errors()
 
     def place(self, line: int) -> str:
         """A line in words; of the original with its file where that is not the program's."""

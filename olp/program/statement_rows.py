@@ -237,7 +237,7 @@ class StatementCollector(PathColumns):
         )  # fmt: skip
         count = len(path.arcs)
         return Program(
-            data=self.data,
+            content=self.data,
             dialect=self.dialect,
             toolpath=path,
             words=self._words() if self.keep_words else None,

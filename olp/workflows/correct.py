@@ -44,7 +44,7 @@ from olp.workflows.kept import (
     with_flow,
 )
 from olp.workflows.original import placed, placed_findings
-from olp.workflows.proof import Pair, ProofOptions, Run, limits_of, proved
+from olp.workflows.proof import Pair, ProofOptions, Run, digest_of, limits_of, proved
 from olp.workflows.session import Loaded, Outside, PathLike, Session, opened
 from olp.workflows.shown import Judged
 
@@ -74,13 +74,13 @@ class Correction(Judged):
     (n, 3) `position_mm` are the nominal axis positions at the ends of the moves, NaN where unknown. `inputs`
     are the files that were read, which `write` never overwrites."""
 
-    data: bytes
-    plain: bytes
+    _data: Source
+    _plain: Program
     report: dict[str, Any]
     findings: tuple[Finding, ...]
     table: Judgements
     groups: Index
-    nominal: bytes
+    _nominal: Program
     position_mm: Array
     confidence: Confidence | None = None
     inputs: tuple[str, ...] = ()
@@ -89,10 +89,25 @@ class Correction(Judged):
     def of(run: Run, inputs: tuple[str, ...] = ()) -> Correction:
         origin = run.nominal.origin
         return Correction(
-            run.text, run.corrected.data, placed(run.report, origin), placed_findings(run.findings, origin),
-            run.table, read_only(run.proof.groups), run.nominal.data, read_only(run.proof.nominal.end_mm),
+            run.text, run.corrected, placed(run.report, origin), placed_findings(run.findings, origin),
+            run.table, read_only(run.proof.groups), run.nominal, read_only(run.proof.nominal.end_mm),
             run.confidence, inputs,
         )  # fmt: skip
+
+    @property
+    def data(self) -> bytes:
+        """The corrected text."""
+        return self._data.data
+
+    @property
+    def plain(self) -> bytes:
+        """The corrected text, unrolled where its loops and subprograms are kept."""
+        return self._plain.data
+
+    @property
+    def nominal(self) -> bytes:
+        """The text that was corrected."""
+        return self._nominal.data
 
     def to_text(self) -> str:
         """The report as `olp correct` prints it."""
@@ -197,21 +212,24 @@ def corrected(
     _refuse_stamped(program.data)
     loaded = loaded.reading(program)
     done = _rewritten(sources, program, loaded, options, refuse_doubts, tell)
-    data = done.source.data
+    digest = digest_of(done.source.data)
+    done.source.let_go()
     tell("prove", 0.7)
     reading = Options(tell=part(tell, 0.7, 0.78, "prove"))
     held = outside if options.outside_box == "hold" else None
     told = part(tell, 0.78, 1.0)
 
-    def prove(text: bytes, notes: tuple[Finding, ...] = ()) -> Run:
+    def prove(text: Source, notes: tuple[Finding, ...] = ()) -> Run:
+        assert done.text is not None
         try:
-            second = read(text, loaded.setup, loaded.dialect, reading, words=False)
+            second = read(text.data, loaded.setup, loaded.dialect, reading, words=False)
         except ProgramError as error:
             if error.code != "OLP528":
                 raise
             with done.nominal.errors():
-                raise _refused_contour(error, done, text) from None
-        pair = Pair(done.nominal, data, program.name, second, done.text or b"", "", done.uncorrected)
+                raise _refused_contour(error, done, text.data) from None
+        second = second.let_go(text.data, lambda: text.data)
+        pair = Pair(done.nominal, done.source, digest, second, done.text, done.uncorrected)
         return proved(pair, loaded.held(), options, done.doubts, outside=held, notes=notes, tell=told)
 
     assert done.text is not None
@@ -219,10 +237,10 @@ def corrected(
         run = prove(done.text)
     else:
         with provably_kept():
-            text = unrolled_again(sources, program, done.text, loaded).data
+            text = unrolled_again(sources, program, done.text.data, loaded)
             run = prove(text, findings_of(done.flow))
             # where the unrolled program is no better, its flow is not the reason
-            if not run.proof.holds and not _as_good(run, prove(done.unrolled or b"")):
+            if not run.proof.holds and not _as_good(run, prove(done.source.holding(done.unrolled or b""))):
                 raise ProgramError("it is above the tolerance then", code="OLP511")
     return replace(run, report=run.report | _written_report(done))
 
@@ -253,7 +271,7 @@ class _Rewritten:
 
     source: Source
     nominal: Program
-    text: bytes | None
+    text: Source | None
     uncorrected: Index
     parts: Packed
     tally: Tally
@@ -298,7 +316,7 @@ def _rewritten(
     source, program = read_kept(source.holding(bytes(outer)))
     inner = unrolled_unasked(source, options)
     data = outer if inner is None else through(inner, outer)
-    program = replace(program, data=data)
+    program = replace(program, content=data)
     done = _written(source.holding(data), program, inner, loaded, options, refuse_doubts, tell)
     if done.text is None:
         raise refusal
@@ -343,8 +361,10 @@ def _written(
         flow, text = Flow(kept), kept.text
         if text is not None and stamp and (kept.changed or always):
             text = stamped(text, stamp, program.eol(1), loaded.dialect.first)
+    nominal = nominal.let_go(source.data, lambda: source.data)
+    made = None if text is None else Source.made(text)
     parts = written.parts if program.blocks is None else Packed.of(written.parts[program.blocks])
-    return _Rewritten(source, nominal, text, written.uncorrected, parts, written.tally, doubts, flow, flat)
+    return _Rewritten(source, nominal, made, written.uncorrected, parts, written.tally, doubts, flow, flat)
 
 
 def _refused_contour(error: ProgramError, done: _Rewritten, text: bytes) -> ProgramError:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import datetime
 import hashlib
 from dataclasses import fields, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,6 +26,7 @@ from olp.core.progress import Progress, part, silent
 from olp.core.toolpath import Flag, Toolpath
 from olp.core.units import MM_PER_UM, UM_PER_MM
 from olp.core.values import dataclass
+from olp.files.sources import Source
 from olp.findings.catalogue import Finding
 from olp.program.origin import original_of
 from olp.program.program import Program
@@ -76,7 +76,7 @@ class Run:
     table of judgements, the report ("olp-report-1") and the findings. `confidence` has bands and
     probabilities where a part tolerance is stated and the calibration states uncertainties."""
 
-    text: bytes
+    text: Source
     nominal: Program
     corrected: Program
     proof: Proof
@@ -89,16 +89,15 @@ class Run:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pair:
-    """A nominal program and its correction as read, with the bytes and the names of both, and the moves of
-    the nominal one that are left uncorrected. `text` keeps the loops and subprograms that `corrected` has
-    unrolled."""
+    """A nominal program and its correction as read, with their texts, and the moves of the nominal one that
+    are left uncorrected. `text` keeps the loops and subprograms that `corrected` has unrolled. `sha256` is
+    the digest of the nominal text."""
 
     nominal: Program
-    data: bytes
-    name: str
+    source: Source
+    sha256: str
     corrected: Program
-    text: bytes
-    other: str
+    text: Source
     uncorrected: Index
 
 
@@ -126,7 +125,8 @@ def verify_programs(
             with first.errors():
                 limits = limits_of(first, loaded, options, refuse_outside=outside is None)
                 uncorrected = uncorrected_moves(first, loaded.model, limits)
-            pair = Pair(first, first.data, name, second, second.data, other, uncorrected)
+            texts = Source(name, lambda: first.data), Source(other, lambda: second.data)
+            pair = Pair(first, texts[0], digest_of(first.data), second, texts[1], uncorrected)
             return proved(pair, loaded.held(), options, doubts, outside=outside)
     except ProgramError as error:
         raise error.in_file(other or "<corrected>") from None
@@ -152,6 +152,8 @@ def proved(
     the calibrated box, None where nothing is outside. Raises ProgramError where the second is not a
     correction of the first, or not with the block-delete switch on."""
     tolerance_mm = options.tolerance_um * MM_PER_UM
+    written = _written(pair.text.data)
+    pair.text.let_go()
     proof = _prove(
         pair.nominal, pair.corrected, loaded, pair.uncorrected, tolerance_mm,
         last_digit_mm(pair.corrected, loaded.setup), part(tell, 0.0, 0.8),
@@ -183,9 +185,10 @@ def proved(
         *(assessment[2] if assessment else ()),
         *findings_of_model(first.toolpath, loaded, tolerance_mm),
     )
-    source = pair.data, pair.name
+    source = pair.source.short, pair.sha256
     report = report_of(first, source, loaded, proof, table, findings, options.tolerance_um)
-    report["corrected"] = {"sha256": hashlib.sha256(pair.text).hexdigest(), "lines": pair.text.count(b"\n")}
+    pair.source.let_go()
+    report["corrected"] = written
     report["largest_correction_um"] = largest_mm * UM_PER_MM
     if assessment:
         report["uncertainty"] = assessment[1]
@@ -220,8 +223,8 @@ def _prove_without_deleted(
     if not deleted.any():
         return
     reading = Options(block_delete=True)
-    nominal = read(pair.data, loaded.setup, loaded.dialect, reading, words=False)
-    with naming(pair.other or "<corrected>"):
+    nominal = read(pair.source.data, loaded.setup, loaded.dialect, reading, words=False)
+    with naming(pair.text.name or "<corrected>"):
         other = read(pair.corrected.data, loaded.setup, loaded.dialect, reading, words=False)
     try:
         limits = limits_of(nominal, loaded, options, refuse_outside=False)
@@ -269,21 +272,22 @@ def findings_of_model(path: Toolpath, loaded: Loaded, tolerance_mm: float) -> li
 
 def report_of(
     program: Program,
-    source: tuple[bytes, str],
+    source: tuple[str, str],
     loaded: Loaded,
     proof: Proof,
     table: Judgements,
     findings: tuple[Finding, ...],
     tolerance_um: float,
 ) -> dict[str, Any]:
-    """The parts of the report ("olp-report-1") that a proof alone gives."""
-    data, name = source
+    """The parts of the report ("olp-report-1") that a proof alone gives; `source` is the name of the nominal
+    text and its digest."""
+    name, digest = source
     along = Along.of(program.toolpath)
     return {
         "schema": "olp-report-1",
         "program": {
-            "name": Path(name).name if name else "",
-            "sha256": hashlib.sha256(original_of(data)).hexdigest(),
+            "name": name,
+            "sha256": digest,
             "lines": program.lines,
             "dialect": loaded.dialect.name,
             "moves": len(program.toolpath),
@@ -335,6 +339,16 @@ def _budget(proof: Proof, program: Program, loaded: Loaded) -> dict[str, float]:
 
 def _multiple(length_mm: float, of_mm: float) -> bool:
     return abs(length_mm / of_mm - round(length_mm / of_mm)) < 1e-6 and length_mm > 0.5 * of_mm
+
+
+def _written(text: bytes) -> dict[str, Any]:
+    """What a report says of a corrected text."""
+    return {"sha256": hashlib.sha256(text).hexdigest(), "lines": text.count(b"\n")}
+
+
+def digest_of(data: bytes) -> str:
+    """The digest of a nominal text; of one that was unrolled that of its original."""
+    return hashlib.sha256(original_of(data)).hexdigest()
 
 
 def last_digit_mm(program: Program, setup: Setup) -> float:

@@ -18,6 +18,7 @@ from judge.programs import FEATURES, LOOSE, random_program
 
 import olp
 from olp.core.errors import OlpError, OutsideBox
+from olp.files import sources
 from olp.program import bands
 from olp.proof import deviation, kinds, matching, proof
 
@@ -43,7 +44,8 @@ def corrected(*given: Any, **options: Any) -> tuple[bytes, dict[str, Any]] | str
 
 
 def in_sizes(monkeypatch: pytest.MonkeyPatch, sizes: Sequence[int] = SIZES) -> Iterator[int]:
-    """Bands and pages of some sizes, one after the other."""
+    """Bands and pages of some sizes, one after the other; texts are let go as long ones are."""
+    monkeypatch.setattr(sources, "LONG", 1)
     for size in sizes:
         monkeypatch.setattr(bands, "SIZE", size)
         # a page holds a window of the search at least

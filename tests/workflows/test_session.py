@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import errno
 import hashlib
 import inspect
 import os
 import shutil
 import subprocess
 import sys
+import tempfile
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
@@ -18,6 +20,7 @@ import pytest
 
 import olp
 from olp.core.errors import InputError, OlpError, ProgramError
+from olp.files import sources
 from olp.files.sources import Source, Sources
 from olp.review.job import ViewOptions
 from olp.workflows.check import CheckOptions
@@ -201,6 +204,64 @@ def test_a_stream_is_read_once_and_when_it_is_wanted() -> None:
     assert source.data is source.data
     assert source.data == b"text"
     assert next(texts, None) is None
+
+
+def test_a_long_file_is_let_go_and_read_again_as_it_was(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "part.ngc"
+    path.write_bytes(b"one")
+    files = Sources()
+    source = files.source(path)
+    source.load()
+    source.let_go()
+    path.write_bytes(b"two")
+    assert source.data == b"one", "a short text is kept"
+    monkeypatch.setattr(sources, "LONG", 3)
+    source.let_go()
+    assert files.exists(path)
+    assert files.there() == frozenset()
+    with pytest.raises(InputError, match=r"part\.ngc: was changed by another program during this call"):
+        files.parcel()
+    path.write_bytes(b"one")
+    assert files.parcel() == {str(path): b"one"}
+    assert source.data is files.read(path)
+
+
+def test_a_long_stream_is_let_go_into_a_file_where_there_is_room(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sources, "LONG", 4)
+    source = Source.stream(lambda: bytes([*b"text"]))
+    first = source.data
+    source.let_go()
+    again = source.data
+    assert again == first
+    assert again is not first
+    assert again is source.data, "it is kept until it is let go again"
+    source.let_go()
+    assert source.data == first
+    monkeypatch.setattr(tempfile, "TemporaryFile", no_room)
+    full = Source.made(first)
+    full.let_go()
+    assert full.data is first
+
+
+def no_room() -> None:
+    raise OSError(errno.ENOSPC, "No space left on device")
+
+
+def test_a_program_that_changed_since_it_was_corrected_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sources, "LONG", 1)
+    path = tmp_path / "part.ngc"
+    path.write_text("G21 G90 G54\nG43 H1\nG0 X0 Y0 Z20\nG1 X100 F600\nY80 Z30\nM2\n")
+    done = olp.correct(path, FOLDER / "machine.toml")
+    assert done.nominal == path.read_bytes()
+    assert done.data == done.plain == olp.correct(done.nominal, FOLDER / "machine.toml").data
+    done = olp.correct(path, FOLDER / "machine.toml")
+    path.write_bytes(b"G0 X1\n" + done.data)
+    with pytest.raises(InputError, match="was changed by another program during this call"):
+        _ = done.nominal
 
 
 def test_a_missing_file_is_said_when_it_is_wanted(tmp_path: Path) -> None:

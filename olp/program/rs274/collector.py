@@ -74,7 +74,7 @@ class Collector(PathColumns):
         path = self.toolpath(state.frames, self.start)
         line_start, line_end = self._line_bounds()
         return Program(
-            data=self.data,
+            content=self.data,
             dialect=state.profile,
             toolpath=path,
             words=self._words() if self.keep_words else None,
