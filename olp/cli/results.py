@@ -112,7 +112,7 @@ def command(results: str, machine: str | None, job: str | None, **words: Any) ->
         date=asked.date, accept=asked.accept,
     )  # fmt: skip
     result = workflow.run(call.session, call.source, options)
-    written: dict[Path, Content] = {Path(name): result.data for name in files_of(output)}
+    written: dict[Path, Content] = {Path(name): result.parts() for name in files_of(output)}
     for name in files_of(asked.report_file):
         from olp.workflows import report as report_files
 

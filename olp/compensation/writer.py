@@ -7,7 +7,6 @@ small: digits, then edits, then one splice per chunk of text.
 
 from __future__ import annotations
 
-import io
 from abc import ABC, abstractmethod
 from dataclasses import replace
 from itertools import pairwise
@@ -26,15 +25,13 @@ from olp.core.arrays import Array, Index, Mask
 from olp.core.geometry import Plane
 from olp.core.machine import Vector
 from olp.core.progress import Progress, silent
+from olp.core.spool import Spool
 from olp.core.toolpath import Flag, Frame, Kind
 from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
 from olp.program.bands import Band
 from olp.program.program import Program
 from olp.program.text.edits import Edits, Prefixes, render, splice
-
-#: Room for a text that is written, in halves of the program: most grow by less.
-_ROOM = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,9 +79,8 @@ class Writer(ABC):
         self.word_offset_mm = self.frame_offset_mm
         if self.turns is not None:
             self.word_offset_mm = self.turns.words(self.frame_offset_mm, self.turns.of_frame)
-        # what is written so far: nothing before the first change. Room for all of it is moved nowhere, and
-        # takes memory only as it is filled.
-        self._out = io.BytesIO(bytes(_ROOM * len(program.data) // 2))
+        # what is written so far: nothing before the first change
+        self._out = Spool()
         # where the text grows, and by how much, if that is asked for
         self._grown: list[tuple[Index, Index]] | None = [] if task.located else None
         self._begin, self._changed = 0, False
@@ -112,13 +108,12 @@ class Writer(ABC):
             self._begin, self._entry = end, rows.emitted[-1].copy()
             tell("correct", last / len(move))
 
-    def text(self) -> bytes | None:
+    def text(self) -> Spool | None:
         """The corrected text, None where nothing is written. It is given once."""
         if not (self._changed or (self.stamp and self.stamp_always)):
             return None
         self._put(self._begin if self._changed else 0, len(self.program.data))
-        self._out.truncate()
-        return self._out.getvalue()
+        return self._out
 
     def _put(self, begin: int, end: int, text: bytes | None = None) -> None:
         """Write the bytes `begin`..`end` of the program, or the `text` in their place; the stamp with the
@@ -127,7 +122,7 @@ class Writer(ABC):
         text = program.data[begin:end] if text is None else text
         if not text:
             return
-        if self.stamp and not self._out.tell():
+        if self.stamp and not self._out.size:
             text = stamped(text, self.stamp, program.eol(1), program.dialect.first)
         self._out.write(text)
 

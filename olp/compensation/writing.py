@@ -13,6 +13,7 @@ from olp.compensation.tally import Tally
 from olp.compensation.writer import Task, Writer
 from olp.core.arrays import Index, distinct, is_in
 from olp.core.progress import Progress, part, silent
+from olp.core.spool import Spool
 from olp.core.units import MM_PER_INCH
 from olp.core.values import dataclass
 from olp.program.bands import Band
@@ -23,11 +24,11 @@ from olp.program.text.numbers import Placing
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Written:
-    """The corrected bytes, None where nothing is changed, and what was changed. `uncorrected` are moves that
+    """The corrected text, None where nothing is changed, and what was changed. `uncorrected` are moves that
     are left so, (n,) `parts` how many moves the text has for each nominal one. `starts` as
     `Writer.starts`."""
 
-    text: bytes | None
+    text: Spool | None
     uncorrected: Index
     parts: Packed
     tally: Tally

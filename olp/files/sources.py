@@ -1,26 +1,21 @@
 """The inputs of a run: every reader gets the same bytes of a file.
 
-A long text is let go while nobody needs it, and read again where it is asked for."""
+A long text is let go while nothing needs it, and read again where it is asked for."""
 
 from __future__ import annotations
 
-import contextlib
 import functools
 import hashlib
 import os
-import tempfile
-import weakref
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
-from typing import IO
 
+from olp.core import spool
 from olp.core.errors import InputError, OlpError, naming
+from olp.core.spool import Spool
 from olp.core.values import dataclass
 from olp.files.write import PathLike, read_bytes
-
-#: Bytes from which a text is let go: shorter ones cost less than to read them again.
-LONG = 1 << 22
 
 
 class Sources:
@@ -56,7 +51,7 @@ class Sources:
         """Keep of a long file that was read only its digest; it is read again where it is asked for."""
         key = Path(path)
         data = self._bytes.get(key, b"")
-        if len(data) >= LONG:
+        if len(data) >= spool.LONG:
             self._digests[key] = self._digests.get(key) or hashlib.sha256(data).digest()
             del self._bytes[key]
 
@@ -106,7 +101,7 @@ def in_parcel(path: PathLike) -> str:
 
 
 def _keep() -> None:
-    """What somebody else keeps is not let go."""
+    """What a caller keeps is not let go."""
 
 
 class Wanted(Exception):
@@ -152,36 +147,23 @@ class Parcel(Sources):
             raise Wanted(name) from None
 
 
-class _Spool:
-    """A text that has no file. Where it is long, it is let go into a temporary one, which ends with it."""
+class _Held:
+    """A text that has no file of its own, and waits in a spool where it is let go."""
 
-    def __init__(self, read: Callable[[], bytes]) -> None:
-        self._first: Callable[[], bytes] | None = read
+    def __init__(self, first: Callable[[], bytes], spool: Spool | None = None) -> None:
+        self._first, self._spool = first, spool
         self._data: bytes | None = None
-        self._file: IO[bytes] | None = None
 
     def read(self) -> bytes:
         """The text; that of a stream is read when it is first needed."""
-        if self._first is not None:
-            self._data, self._first = self._first(), None
         if self._data is None:
-            assert self._file is not None
-            self._file.seek(0)
-            self._data = self._file.read()
+            self._data = self._first() if self._spool is None else self._spool.read()
         return self._data
 
     def let_go(self) -> None:
-        """Keep a long text in its file only; in memory, where there is no room for one."""
-        if self._data is None or len(self._data) < LONG:
-            return
-        if self._file is None:
-            with contextlib.suppress(OSError), contextlib.ExitStack() as unless:
-                file = unless.enter_context(tempfile.TemporaryFile())
-                file.write(self._data)
-                file.flush()
-                weakref.finalize(self, unless.pop_all().close)
-                self._file = file
-        if self._file is not None:
+        """Keep a long text in its spool only."""
+        if self._data is not None and len(self._data) >= spool.LONG:
+            self._spool = self._spool or Spool(self._data)
             self._data = None
 
 
@@ -197,15 +179,14 @@ class Source:
     @staticmethod
     def stream(read: Callable[[], bytes]) -> Source:
         """The contents of a stream, which can be read only once. It is read when it is first needed."""
-        spool = _Spool(read)
-        return Source("", spool.read, spool.let_go)
+        held = _Held(read)
+        return Source("", held.read, held.let_go)
 
     @staticmethod
-    def made(data: bytes) -> Source:
+    def made(text: Spool) -> Source:
         """A text that was made here."""
-        source = Source.stream(lambda: data)
-        source.load()
-        return source
+        held = _Held(text.read, text)
+        return Source("", held.read, held.let_go)
 
     def load(self) -> None:
         """Read it now. Raises InputError where it cannot be read."""

@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-import io
-
 import numpy as np
 
 from olp.compensation.stamp import stamped
 from olp.core.arrays import Array, Index
+from olp.core.spool import Spool
 from olp.program.text.edits import Bytes, replaced
 from olp.program.text.numbers import Placing
 from olp.program.text.rewriting import kept, padded, rewritten
 from olp.results.reported import Reported
 
 
-def write(reported: Reported, added_mm: Array, stamp: bytes, decimals: int | None) -> tuple[bytes, float]:
+def write(reported: Reported, added_mm: Array, stamp: bytes, decimals: int | None) -> tuple[Spool, float]:
     """The text with `added_mm` (n, 3) added to its points, and the largest rounding error, in mm. A `stamp`
     comes in front where a number changes; `decimals` are the fewest that are written."""
-    data, out = reported.data, io.BytesIO()
+    data, out = reported.data, Spool()
     text = np.frombuffer(data, np.uint8)
     placing = Placing(data, reported.start, reported.end)
     done, rounding_mm = 0, 0.0
@@ -35,10 +34,8 @@ def write(reported: Reported, added_mm: Array, stamp: bytes, decimals: int | Non
             piece = stamped(piece, stamp, eol, ())
         out.write(piece)
         done = stop
-    if not done:
-        return data, rounding_mm
     out.write(memoryview(data)[done:])
-    return out.getvalue(), rounding_mm
+    return out, rounding_mm
 
 
 def _edits(

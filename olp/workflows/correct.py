@@ -21,6 +21,7 @@ from olp.core.arrays import Array, Index, read_only
 from olp.core.errors import AlreadyCorrected, ProgramError, UsageError
 from olp.core.machine import Setup
 from olp.core.progress import Progress, part, silent
+from olp.core.spool import Spool
 from olp.core.values import dataclass
 from olp.errormodel.known import KnownErrors
 from olp.files.sources import Source, Sources
@@ -351,19 +352,20 @@ def _written(
         written = write(task, written_plans(program, loaded.model, limits, increments_mm, told), told)
     nominal = replace(program, words=None, slot=np.zeros((0, 3), np.int32), programmed=None, blocks=None)
     # the corrected text has lines of its own
-    text: bytes | None = bytes(source.data) if written.text is None else written.text
+    text: Spool | None = written.text or Spool(source.data)
     flow, flat = None, None
     if unrolled is not None:
         assert text is not None
         assert written.starts is not None
-        flat = text
-        kept = with_flow(unrolled, text, written.starts, loaded)
-        flow, text = Flow(kept), kept.text
-        if text is not None and stamp and (kept.changed or always):
-            text = stamped(text, stamp, program.eol(1), loaded.dialect.first)
+        flat = text.read()
+        kept = with_flow(unrolled, flat, written.starts, loaded)
+        whole = kept.text
+        if whole is not None and stamp and (kept.changed or always):
+            whole = stamped(whole, stamp, program.eol(1), loaded.dialect.first)
+        flow, text = Flow(kept), None if whole is None else Spool(whole)
     nominal = nominal.let_go(source.data, lambda: source.data)
-    made = None if text is None else Source.made(text)
     parts = written.parts if program.blocks is None else Packed.of(written.parts[program.blocks])
+    made = None if text is None else Source.made(text)
     return _Rewritten(source, nominal, made, written.uncorrected, parts, written.tally, doubts, flow, flat)
 
 

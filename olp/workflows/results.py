@@ -4,7 +4,7 @@ report."""
 from __future__ import annotations
 
 import datetime
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
@@ -16,6 +16,7 @@ from olp.checks.doubt_size import box_doubts
 from olp.compensation.stamp import find_stamp, stamp_line
 from olp.core.errors import AlreadyCorrected, InputError, UsageError
 from olp.core.machine import Setup
+from olp.core.spool import Spool
 from olp.core.units import UM_PER_MM
 from olp.core.values import dataclass
 from olp.files.point_profile import load_profile
@@ -66,10 +67,19 @@ class ResultCorrection(Shown):
     """Corrected results: their bytes, the report as a mapping ("olp-results-1"), and the findings. `inputs`
     are the files that were read, which `write` never overwrites."""
 
-    data: bytes
+    _data: Spool
     report: dict[str, Any]
     findings: tuple[Finding, ...]
     inputs: tuple[str, ...] = ()
+
+    @property
+    def data(self) -> bytes:
+        """The corrected text."""
+        return self._data.read()
+
+    def parts(self) -> Iterator[bytes]:
+        """The corrected text in parts."""
+        return self._data.parts()
 
     def to_text(self) -> str:
         """The report as `olp results` prints it."""
@@ -79,7 +89,7 @@ class ResultCorrection(Shown):
 
     def write(self, path: PathLike, *, force: bool = False) -> Path:
         """Write the corrected results as `Correction.write` does."""
-        write_bytes(path, self.data, force=force, inputs=self.inputs)
+        write_bytes(path, self.parts(), force=force, inputs=self.inputs)
         return Path(path)
 
 

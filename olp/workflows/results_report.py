@@ -9,6 +9,7 @@ from typing import Any, overload
 import numpy as np
 
 from olp.core.arrays import Array
+from olp.core.spool import Spool
 from olp.core.units import UM_PER_MM
 from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
@@ -38,7 +39,7 @@ def report_of(
     result: Forward,
     loaded: Loaded,
     name: str,
-    text: bytes,
+    text: Spool,
     rounding_mm: float,
     findings: Sequence[Finding],
 ) -> dict[str, Any]:
@@ -65,7 +66,7 @@ def report_of(
             {"line": item.line, "name": item.name, "reason": item.reason} for item in reported.unchanged
         ],
         "points": Points(reported, result),
-        "corrected": {"sha256": hashlib.sha256(text).hexdigest()},
+        "corrected": {"sha256": text.sha256()},
         "accepted": accepted_of(findings),
         "findings": [f.as_dict() for f in findings],
         "why": list(WHY),

@@ -17,8 +17,8 @@ from judge.machines import Recipe, random_machine
 from judge.programs import FEATURES, LOOSE, random_program
 
 import olp
+from olp.core import spool
 from olp.core.errors import OlpError, OutsideBox
-from olp.files import sources
 from olp.program import bands
 from olp.proof import deviation, kinds, matching, proof
 
@@ -45,7 +45,7 @@ def corrected(*given: Any, **options: Any) -> tuple[bytes, dict[str, Any]] | str
 
 def in_sizes(monkeypatch: pytest.MonkeyPatch, sizes: Sequence[int] = SIZES) -> Iterator[int]:
     """Bands and pages of some sizes, one after the other; texts are let go as long ones are."""
-    monkeypatch.setattr(sources, "LONG", 1)
+    monkeypatch.setattr(spool, "LONG", 1)
     for size in sizes:
         monkeypatch.setattr(bands, "SIZE", size)
         # a page holds a window of the search at least
