@@ -153,12 +153,19 @@ def _offsets(path: Toolpath, frames: dict[int, Frame], setup: Setup) -> Iterator
 
 
 def _start(setup: Setup) -> Iterator[Finding]:
-    for axis, place in zip("XYZ", setup.job.start_mm, strict=True):
-        low, high = setup.machine.axes[axis].travel_mm
-        slack = _BEYOND * (high - low)
-        if place is not None and not low - slack <= place <= high + slack:
-            what = f"job file: start_mm.{axis} = {place:g} is outside the travel"
-            yield finding("OLP456", f"{what}; expected {low:g} to {high:g} mm")
+    machine = setup.machine
+    stated = {"job file: start_mm": setup.job.start_mm, "machine file: home_mm": machine.home_mm}
+    stated |= {
+        "machine file: second_home_mm": machine.second_home_mm,
+        "machine file: tool_change_mm": machine.tool_change_mm,
+    }
+    for key, places in stated.items():
+        for axis, place in zip("XYZ", places, strict=True):
+            low, high = machine.axes[axis].travel_mm
+            slack = _BEYOND * (high - low)
+            if place is not None and not low - slack <= place <= high + slack:
+                what = f"{key}.{axis} = {place:g} is outside the travel"
+                yield finding("OLP456", f"{what}; expected {low:g} to {high:g} mm")
 
 
 def _temperatures(setup: Setup, calibration: Calibration | None) -> Iterator[Finding]:

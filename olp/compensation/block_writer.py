@@ -82,7 +82,7 @@ class BlockWriter(Writer):
         one = len(frame) > 0 and bool((frame == frame[0]).all())
         unit = self.frame_unit_mm[frame[:1]] if one else self.frame_unit_mm[frame]
         same_unit = bool((unit == unit[:1]).all())
-        control = (rows.flag & np.uint8(Flag.CONTROL)) != 0
+        reset = self._set_by_control(rows)
         offset = self.word_offset_mm[frame[0]] if one else self.word_offset_mm[frame]
         command, ends, columns = self.plan.command_mm[part], path.end_mm[rows.move], []
         if self.turns is not None:
@@ -98,7 +98,7 @@ class BlockWriter(Writer):
                     nominal=nominal,
                     given=given,
                     raw=self.plan.raw[part, axis],
-                    reset=control & np.isnan(nominal),
+                    reset=reset[:, axis],
                     word=np.where(given, words.mantissa[slot], 0),
                     decimals=np.where(given, self.style.decimals(slot, axis, unit), 0).astype(np.int8),
                     offset=float(offset[axis]) if one else offset[:, axis],
@@ -106,6 +106,17 @@ class BlockWriter(Writer):
                 )
             )
         return columns
+
+    def _set_by_control(self, rows: Rows) -> Mask:
+        """(r, 3) axes whose position the control loses or finds by itself."""
+        control = (rows.flag & np.uint8(Flag.CONTROL)) != 0
+        reset = np.zeros((len(control), 3), bool)
+        if control.any():
+            move, path = rows.move[control], self.path
+            begin = path.end_mm[np.maximum(move - 1, 0)]
+            begin[move == 0] = path.start_mm
+            reset[control] = np.isnan(path.end_mm[move]) | np.isnan(begin)
+        return reset
 
     def _digits(self, rows: Rows, columns: list[AxisRows], a: int, b: int) -> None:
         """Digits of rows a..b, which no canned cycle makes."""

@@ -167,7 +167,7 @@ def _untouched(path: Toolpath, model: ErrorModel) -> tuple[Mask, Index]:
             raise ProgramError(
                 f"the position of {axes} is not known at this feed move, and its correction needs it; "
                 "command all axes in an absolute rapid first, or give a machine file and a job file with "
-                "start_mm",
+                f"start_mm{_lost(path, i)}",
                 line=int(path.line[i]),
                 code="OLP524",
             )
@@ -176,6 +176,19 @@ def _untouched(path: Toolpath, model: ErrorModel) -> tuple[Mask, Index]:
     held = _hold_after_machine_moves(path, raw)
     _mix_turned(path, raw)
     return raw, distinct(np.concatenate((uncorrected, held)))
+
+
+def _lost(path: Toolpath, move: int) -> str:
+    """Where the control has moved the axes by itself, so that the position is not known at a move."""
+    axes = np.isnan(path.end_mm[move])
+    own = np.isnan(path.end_mm[:move]) & ((path.flag[:move] & np.uint8(Flag.CONTROL)) != 0)[:, None]
+    lost = np.flatnonzero(any_in_row(own[:, axes]))
+    if not lost.size:
+        return ""
+    return (
+        f". The control moves by itself in line {path.line[lost[-1]]}: where it leaves the axes of a tool "
+        "change, G28 or G30 can be stated in the machine file (tool_change_moves, tool_change_mm, home_mm)"
+    )
 
 
 def _mix_turned(path: Toolpath, raw: Mask) -> None:

@@ -15,8 +15,12 @@ from olp.core.errors import ConfigError
 from olp.core.values import dataclass
 
 Vector = tuple[float, float, float]
+#: Positions of which some may not be known.
+Place = tuple[float | None, float | None, float | None]
 #: No tool, no offset: mm.
 ZERO: Vector = (0.0, 0.0, 0.0)
+#: No position is known.
+UNKNOWN: Place = (None, None, None)
 
 #: All 24 serial chains of three linear axes, workpiece to tool, with `F` the machine frame.
 CHAINS = frozenset("".join(p) for p in itertools.permutations("FXYZ"))
@@ -57,7 +61,7 @@ class WorkOffset:
     offset_mm: Vector = ZERO
     rotation_deg: Vector = ZERO
     set_by: Literal["touch", "true"] = "touch"
-    touched_at_mm: tuple[float | None, float | None, float | None] = (None, None, None)
+    touched_at_mm: Place = UNKNOWN
     touch_tool: int | None = None
     touched_payload_kg: float | None = None
 
@@ -148,8 +152,10 @@ class Machine:
     servo cycle, None where it does not.
     `styli` are end of the ram to centre of the tip of sensors by label.
     `path_mode` is the mode at the start of a program, `blend_mm` the tolerance where the program names none
-    (None: not stated). `times` is what the control takes beside motion. `tool_change_moves`: M6 may move the
-    axes. `scaling_unit` is what 1 of a factor of G51 is, None where it is not stated. `located` says whether
+    (None: not stated). `times` is what the control takes beside motion. `tool_change_moves` are the axes that
+    M6 may move. `home_mm`, `second_home_mm` and `tool_change_mm` are the axis positions where G28, G30 and M6
+    leave the axes that they move, None where it is not known. `scaling_unit` is what 1 of a factor of G51 is,
+    None where it is not stated. `located` says whether
     positions in machine coordinates are known; where they are not, only distances are.
     """
 
@@ -172,7 +178,10 @@ class Machine:
     still_macros: frozenset[str] = frozenset()
     path_mode: Literal["blend", "exact-stop"] = "blend"
     blend_mm: float | None = None
-    tool_change_moves: bool = True
+    tool_change_moves: frozenset[str] = frozenset("XYZ")
+    home_mm: Place = UNKNOWN
+    second_home_mm: Place = UNKNOWN
+    tool_change_mm: Place = UNKNOWN
     scaling_unit: float | None = None
     times: ControlTimes = field(default_factory=ControlTimes)
     sanity: Sanity = Sanity()
@@ -231,7 +240,7 @@ class Job:
     program: str | None = None
     machine: str | None = None
     part_tolerance_um: float | None = None
-    start_mm: tuple[float | None, float | None, float | None] = (None, None, None)
+    start_mm: Place = UNKNOWN
     start_deg: Mapping[str, float] = field(default_factory=dict)
     payload_kg: float = 0.0
     payload_centre_mm: Vector = ZERO

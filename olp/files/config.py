@@ -6,7 +6,7 @@ ConfigError with all problems of the file where it is wrong; both end the comman
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path as FilePath
 
 from olp.core.errors import ProgramError, UsageError
@@ -131,7 +131,10 @@ def _read_machine(path: PathLike, read: Reader) -> tuple[Machine, Mapping[Path, 
         chain=file.chain,
         controller=file.controller,
         decimal_point=file.decimal_point,
-        tool_change_moves=file.tool_change_moves,
+        tool_change_moves=moved_by_change(file.tool_change_moves),
+        home_mm=file.home_mm.values,
+        second_home_mm=file.second_home_mm.values,
+        tool_change_mm=file.tool_change_mm.values,
         scaling_unit=file.scaling_unit,
         arc_centres=file.arc_centres,
         cycle_return=file.cycle_return,
@@ -172,6 +175,11 @@ def of_joints(values: Mapping[str, object]) -> bool:
     tables = axes.values() if isinstance(axes, Mapping) else ()
     stated = {key for table in tables if isinstance(table, Mapping) for key in table}
     return bool(_OF_JOINTS & values.keys() or _OF_A_JOINT & stated)
+
+
+def moved_by_change(stated: bool | Sequence[str]) -> frozenset[str]:
+    """The axes that M6 may move, from the key `tool_change_moves`."""
+    return frozenset(AXES if stated else ()) if isinstance(stated, bool) else frozenset(stated)
 
 
 def _compliance(stated: float | Vector, axis: int) -> Vector:

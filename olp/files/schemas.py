@@ -290,9 +290,23 @@ class MachineFile(Table):
         description="what a length without a decimal point means to a Fanuc or Haas control: X100 is 100 "
         "least increments, or 100 units as on a pocket calculator; increments, with a doubt, if left out",
     )
-    tool_change_moves: bool = Field(
+    tool_change_moves: bool | list[Literal["X", "Y", "Z"]] = Field(
         default=True,
-        description="whether M6 may move the axes; if not, their positions are known after it",
+        description="whether M6 may move the axes, or a list of those that it may move; the positions of "
+        "others are known after it",
+    )
+    home_mm: Position = Field(
+        default_factory=Position,
+        description="the axis positions in mm where G28 leaves the axes that it moves, { X = .., Y = .., "
+        "Z = .. }; not known if left out",
+    )
+    second_home_mm: Position = Field(
+        default_factory=Position,
+        description="the same in mm for G30 and G30 P2",
+    )
+    tool_change_mm: Position = Field(
+        default_factory=Position,
+        description="the same in mm for M6",
     )
     scaling_unit: Positive | None = Field(
         default=None,

@@ -56,6 +56,7 @@ def machine_toml(machine: Machine, notes: Iterable[str] = ()) -> str:
     lines += toml_lines({"compensated_by_controller": "all" if compensated == ["all"] else compensated})
     if machine.real_time is not None:
         lines += toml_lines({"real_time": machine.real_time})
+    lines += _stands(machine)
     if machine.missing_limits:
         keys = "velocity_mm_s, acceleration_mm_s2 and jerk_mm_s3"
         lines += ["", *comment(f"Only a motion in time (olp retime) needs {keys} of each axis.")]
@@ -91,6 +92,23 @@ def machine_toml(machine: Machine, notes: Iterable[str] = ()) -> str:
         }
     )
     return "\n".join(lines) + "\n"
+
+
+def _stands(machine: Machine) -> Iterator[str]:
+    """Where the control leaves the axes that it moves by itself; a comment where nothing is stated."""
+    places = {"home_mm": machine.home_mm, "second_home_mm": machine.second_home_mm}
+    places["tool_change_mm"] = machine.tool_change_mm
+    stated = {
+        key: {a: v for a, v in zip(AXES, place, strict=True) if v is not None}
+        for key, place in places.items()
+    }
+    yield from comment("Axis positions where G28, G30 and M6 leave the axes, if they are known:")
+    yield from toml_lines({key: place or None for key, place in stated.items()})
+    if not any(stated.values()):
+        yield "# home_mm = { X = 0.0, Y = 0.0, Z = 0.0 }"
+    moves = machine.tool_change_moves
+    if moves != frozenset(AXES):
+        yield from toml_lines({"tool_change_moves": sorted(moves) if moves else False})
 
 
 def _work_offset(offset: WorkOffset) -> Iterator[str]:

@@ -170,6 +170,7 @@ class _Setup:
     tool: int | None
     frame: str
     length_active: bool
+    homes: Mapping[int, Mapping[str, float]]
 
 
 @functools.lru_cache(maxsize=16)
@@ -206,6 +207,7 @@ def _setup(
         defaults.get("tool"),
         defaults.get("work_offset", "G54"),
         bool(defaults.get("length_active", False)),
+        {5161: text.get("home_mm", {}), 5181: text.get("second_home_mm", {})},
     )
 
 
@@ -314,8 +316,11 @@ def _run(
 
 
 def _parameters(setup: _Setup) -> str:
-    """Parameter file: 5210 G92 in force, 5211.. G92, 5220 active frame, 5221 + 20 k frames, 5230 + 20 k R."""
+    """Parameter file: 5161.. G28, 5181.. G30, 5210 G92 in force, 5211.. G92, 5220 active frame, 5221 +
+    20 k frames, 5230 + 20 k R."""
     values = {5210: 0.0, 5220: float(FRAMES.index(setup.frame) + 1)}
+    for first, home in setup.homes.items():
+        values |= {first + i: float(home.get(axis, 0.0)) for i, axis in enumerate("XYZ")}
     if setup.g92 is not None:
         values[5210] = 1.0
         values.update({5211 + i: float(value) for i, value in enumerate(setup.g92)})

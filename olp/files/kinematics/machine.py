@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from olp.core.errors import ConfigError
 from olp.core.machine import Axis, Machine
 from olp.core.units import AXES
-from olp.files.config import beside, tools_of, work_offsets_of
+from olp.files.config import beside, moved_by_change, tools_of, work_offsets_of
 from olp.files.kinematics.schema import (
     OWN_DIRECTIONS,
     ROTARY_NAMES,
@@ -93,7 +93,7 @@ def _control(file: JointMachineFile, structure: Structure, path: PathLike) -> Ma
         axes=axes,
         calibration=beside(path, file.calibration),
         decimal_point=file.decimal_point,
-        tool_change_moves=file.tool_change_moves,
+        tool_change_moves=moved_by_change(file.tool_change_moves),
         work_offsets=work_offsets_of(file.work_offsets),
         tools=tools_of(file.tools),
         default_tool=file.job_defaults.tool,

@@ -168,8 +168,10 @@ RULES = (
         "position is not known",
         why="The block needs the present position, and an axis has not been commanded yet. The "
         "error of the machine depends on it.",
-        remedy="Command X, Y and Z in an absolute rapid first, or give start_mm in the job file. A job file "
-        "needs a machine file: --skew, --scale and --backlash take none.",
+        remedy="Command X, Y and Z in an absolute rapid first, or give start_mm in the job file. Where G28, "
+        "G30 and M6 leave the axes can be stated in the machine file: home_mm, second_home_mm, "
+        "tool_change_mm and tool_change_moves. A job file needs a machine file: --skew, --scale and "
+        "--backlash take none.",
         example="`G2 X10 Y0 I5` as the first move.",
         follows=True,
     ),

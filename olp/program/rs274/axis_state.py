@@ -6,13 +6,13 @@ Positions are axis positions in mm; an axis whose position is not known is NaN. 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import field, replace
 from typing import Any
 
 from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES
-from olp.core.machine import ZERO, Setup, Vector
+from olp.core.machine import UNKNOWN, ZERO, Place, Setup, Vector
 from olp.core.toolpath import CutterCompensation, Frame, Interpolated, LengthError
 from olp.core.units import AXES
 from olp.core.values import dataclass
@@ -22,6 +22,7 @@ from olp.program.rs274.codes import (
     COMPENSATION_OFF,
     CUTTER_COMPENSATION,
     DWELL,
+    FIRST_HOME,
     FURTHER_OFFSETS,
     HOMES,
     LENGTH_FROM_WORDS,
@@ -70,11 +71,12 @@ _RANK = {
 @dataclass(frozen=True, slots=True)
 class Effect:
     """What the axis words of a block mean after its events: `machine` coordinates (G53), or `home`, the axes
-    that G28/G30 send home after the intermediate point. The positions of the axes `lost` are not known any
-    more in the program, as it is turned otherwise."""
+    that G28/G30 send home after the intermediate point, and `home_mm`, where they stand then. The positions
+    of the axes `lost` are not known any more in the program, as it is turned otherwise."""
 
     machine: bool = False
     home: tuple[int, ...] = ()
+    home_mm: Place = UNKNOWN
     lost: tuple[int, ...] = ()
 
 
@@ -209,8 +211,7 @@ class AxisState(OffsetState):
             if "Q" not in by_letter:
                 raise ProgramError("M61 needs a Q word with the tool number", line=line, code="OLP516")
             self.spindle = self._integer(by_letter["Q"], line)
-        if any(self.may_move(m) for m in m_codes):
-            self.forget()
+        self.forget(self.moved_by(m_codes)[0])
         effect = Effect()
         angle_deg = self._angle_deg(self.offsets.name, line) if self.profile.turns_offsets else 0.0
         self.unit = next((code for code in codes if code in UNITS), self.unit)
@@ -274,14 +275,22 @@ class AxisState(OffsetState):
             )
         self.forget()
 
-    def may_move(self, m10: int) -> bool:
-        """Whether an M code may move axes: M6, and codes that are not known to leave the axes where they
-        are."""
-        if m10 == SET_TOOL and self.profile.m61_sets_tool:
-            return False
-        if m10 == TOOL_CHANGE and not self.setup.machine.tool_change_moves:
-            return False
-        return m10 not in self.profile.still_m
+    def moved_by(self, m_codes: Iterable[int]) -> tuple[tuple[int, ...], Place]:
+        """The axes that M codes may move, ten times their numbers, and where these stand then: those of M6,
+        and all of codes that are not known to leave the axes."""
+        moving = {m for m in m_codes if m not in self.profile.still_m}
+        if self.profile.m61_sets_tool:
+            moving.discard(SET_TOOL)
+        if moving != {TOOL_CHANGE}:
+            return (0, 1, 2) if moving else (), UNKNOWN
+        machine = self.setup.machine
+        axes = (i for i, a in enumerate(AXES) if a in machine.tool_change_moves)
+        return tuple(axes), machine.tool_change_mm
+
+    def home_of(self, words: Sequence[Word]) -> Place:
+        """Where a command of a printer leaves the axes: known of G28 without axes."""
+        home = [(w.letter, w.value) for w in words if w.letter != "N"] == [("G", 28.0)]
+        return self.setup.machine.home_mm if home else UNKNOWN
 
     def _event(
         self,
@@ -310,9 +319,8 @@ class AxisState(OffsetState):
         elif code == self.profile.return_level:
             self._return_level(line, axis_words)
         elif code in HOMES:
-            if not axis_words:
-                return replace(effect, home=(0, 1, 2))
-            return replace(effect, home=tuple(i for i, _ in axis_words))
+            home = tuple(i for i, _ in axis_words) or (0, 1, 2)
+            return replace(effect, home=home, home_mm=self._home(code, by_letter))
         elif code == MACHINE:
             return replace(effect, machine=True)
         elif code == WRITE_OFFSET:
@@ -328,6 +336,13 @@ class AxisState(OffsetState):
             self.forget(lost)
             return replace(effect, lost=lost)
         return effect
+
+    def _home(self, code: int, by_letter: dict[str, Word]) -> Place:
+        """Where G28 and G30 leave the axes. P of G30 is the number of the reference point, 2 if left out."""
+        machine = self.setup.machine
+        if code == FIRST_HOME:
+            return machine.home_mm
+        return machine.second_home_mm if "P" not in by_letter or by_letter["P"].value == 2 else UNKNOWN
 
     def _return_level(self, line: int, axis_words: list[tuple[int, Word]]) -> None:
         """The level that canned cycles return to, as a number of the program."""

@@ -81,8 +81,10 @@ LOCAL_OFFSET = 520
 PRESET = 920
 #: G53, a move in machine positions.
 MACHINE = 530
+#: G28, to the first reference position.
+FIRST_HOME = 280
 #: To the reference positions, through the point that the axis words state.
-HOMES = frozenset({280, 300})
+HOMES = frozenset({FIRST_HOME, 300})
 #: G10 L2 and L20, G52, and the family of G92: they write offsets between axis and program positions.
 SHIFTS = frozenset({LOCAL_OFFSET, PRESET, 921, 922, 923})
 #: G68, a rotation of the program about Z.

@@ -20,7 +20,7 @@ from olp.program.rs274.collector import Collector
 from olp.program.rs274.cycle_runs import CycleRun, Refused
 from olp.program.rs274.cycles import HOLE_STROKES, LCNC_CLEARANCE_MM, MOST_REPEATS, levels, repeats_error
 from olp.program.rs274.modes import Context, scaled
-from olp.program.rs274.state import BROKEN_SERIES, NAN, OPEN_RETRACT
+from olp.program.rs274.state import BROKEN_SERIES, KNOWN_BY, NAN, OPEN_RETRACT
 from olp.program.rs274.strokes import Drilling, Step, Strokes, strokes
 from olp.program.rs274.turned import Turning
 
@@ -65,8 +65,7 @@ class CycleBlocks:
         times = self._times(context, run, refused)
         if self._wanting(run):
             refused.all(
-                "a canned cycle starts where an axis has not been commanded yet; "
-                "command X, Y and Z first, or give a machine file and a job file with start_mm",
+                f"a canned cycle starts where an axis has not been commanded yet; {KNOWN_BY}",
                 "OLP524",
             )
         for bad, why in drilling.faults():

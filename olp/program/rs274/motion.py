@@ -14,6 +14,7 @@ from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES
 from olp.core.values import dataclass
 from olp.program.rs274.lexer import WordChunk
+from olp.program.rs274.state import KNOWN_BY
 
 #: Powers of ten by their exponent: those of the decimals of a number.
 _POW10 = 10.0 ** np.arange(19)
@@ -226,8 +227,7 @@ def _check_stated(start: Array, end: Array, words: Array, plane: Index, absolute
     known = all_in_row(np.isfinite(start)) & all_in_row(np.isfinite(end))
     _refuse(
         np.asarray(~known), line,
-        "an arc starts or ends where an axis has not been commanded yet; "
-        "command X, Y and Z first, or give a machine file and a job file with start_mm",
+        f"an arc starts or ends where an axis has not been commanded yet; {KNOWN_BY}",
         "OLP524",
     )  # fmt: skip
     rows, axes = np.arange(len(start)), np.array(PLANES)[plane]

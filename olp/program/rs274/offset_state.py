@@ -19,7 +19,7 @@ from olp.program.frames import touch_of
 from olp.program.rs274.codes import LOCAL_OFFSET, METRIC
 from olp.program.rs274.offsets import Offsets
 from olp.program.rs274.profiles.base import increment
-from olp.program.rs274.state import NAN, Capture, State
+from olp.program.rs274.state import KNOWN_BY, NAN, Capture, State
 from olp.program.rs274.turned import Turning, along_words
 
 #: L of a G10 that stores the present position.
@@ -255,7 +255,7 @@ class OffsetState(State):
         if math.isnan(along_words(Turning.of(turn), self.position)[axis]):
             raise ProgramError(
                 f"{word.letter} is stored as the present position, but the axis has not been commanded yet; "
-                "command the axis first, or give a machine file and a job file with start_mm",
+                f"{KNOWN_BY}",
                 line=line,
                 code="OLP524",
             )

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from olp.core.arrays import Array, Index, Mask, any_in_row, is_in
 from olp.core.errors import ProgramError
-from olp.core.machine import Setup
+from olp.core.machine import UNKNOWN, Setup
 from olp.core.toolpath import Flag, Kind
 from olp.core.turns import Turn
 from olp.core.values import dataclass
@@ -257,8 +257,10 @@ class _Reader:
             tool = any(w.letter in "MT" for w in words)
             if tool or line in self.payloads or not _KEEPS_FRAME.issuperset(codes):
                 rows.present = None
-            moved = any(state.may_move(round(w.value * 10)) for w in words if w.letter == "M")
+            moved, place = state.moved_by(round(w.value * 10) for w in words if w.letter == "M")
             lost = line in self.lost or state.changes_nozzle(words)
+            if lost:
+                moved, place = (0, 1, 2), state.home_of(words)
             if moved or lost or beside.lines[line] or self._needs_position(words, codes):
                 self._resolve(context, rows, upto)
             state.distance, state.plane = int(context.distance[line]), int(context.plane[line])
@@ -268,14 +270,19 @@ class _Reader:
                 state.lose(number)
             if beside.act(line):
                 rows.present = None
-                moved |= beside.forgets(line)
-            if moved or lost or effect.lost:
+                if beside.forgets(line):
+                    moved, place = (0, 1, 2), UNKNOWN
+            if moved or effect.lost:
                 self.special_blocks.control_move(number, deleted=deleted)
+            if not effect.lost and not effect.home:
+                self.special_blocks.stand(number, moved, place, deleted=deleted)
             if here and (alone[upto] or effect.home or effect.machine):
                 self._alone(context, rows, upto, effect)
             if effect.home:
                 state.forget(effect.home)
                 self.special_blocks.control_move(number, deleted=deleted)
+                if not moved:
+                    self.special_blocks.stand(number, effect.home, effect.home_mm, deleted=deleted)
             if beside.lines[line]:
                 self._call(context, rows, upto + here, beside, line)
         self._assign(context, rows, len(blocks))

@@ -6,12 +6,13 @@ What an event does to frames and tools is in `axis_state`, blocks of canned cycl
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from olp.core.arrays import Index, distinct, is_in
 from olp.core.errors import ProgramError
+from olp.core.machine import Place
 from olp.core.toolpath import Flag, Kind
 from olp.core.values import dataclass
 from olp.program.rs274.axis_state import AxisState, Effect
@@ -37,6 +38,8 @@ from olp.program.rs274.turned import Turning, along_words
 _RAPID = np.array([Kind.RAPID], np.uint8)
 #: (1,) the flag of such a move.
 _OWN = np.array([Flag.PASS | Flag.CONTROL], np.uint8)
+#: (1,) the flag of one whose end the machine file states.
+_STANDS = _OWN | np.uint8(Flag.MACHINE)
 #: (1,) the flag of one under block delete.
 _OWN_DELETED = _OWN | np.uint8(Flag.DELETED)
 #: (1, 3) the words of a move without any.
@@ -180,6 +183,25 @@ class SpecialBlocks:
             np.array([self._state.position]),
             _NO_WORDS,
         )
+
+    def stand(self, line: int, axes: Sequence[int], place: Place, *, deleted: bool) -> None:
+        """Where axes stand after such a move, as far as the machine file states it and the words are those of
+        the axes."""
+        if deleted or all(place[axis] is None for axis in axes):
+            return
+        state = self._state
+        try:
+            number = state.frame(line)
+        except ProgramError:
+            # what is not defined is refused where a move uses it
+            return
+        if state.frames[number].turn is not None or state.frames[number].tip:
+            return
+        for axis in axes:
+            state.position[axis] = NAN if (at := place[axis]) is None else at
+        self._collector.put_moves(
+            _RAPID, _STANDS, [line], [number], np.array([state.position]), _NO_WORDS,
+        )  # fmt: skip
 
     def _loose_frame(self) -> int:
         """The last frame without cutter compensation, which is of no contour."""

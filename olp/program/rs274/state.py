@@ -62,6 +62,13 @@ OPEN_RETRACT = (
 )
 
 
+#: What to do where a position is not known.
+KNOWN_BY = (
+    "command X, Y and Z first, or give a machine file and a job file with start_mm. Where G28, G30 and M6 "
+    "leave the axes is stated by home_mm, second_home_mm and tool_change_mm of the machine file"
+)
+
+
 @dataclass(slots=True)
 class Series:
     """Canned cycles that follow one another, until another motion code is in force.

@@ -145,7 +145,7 @@ class ChangeTool(Action):
     """M6: the next tool is in the spindle, and its first edge counts."""
 
     def moves(self, state: AxisState) -> bool:
-        return state.setup.machine.tool_change_moves
+        return bool(state.setup.machine.tool_change_moves)
 
     def run(self, state: AxisState, line: int) -> None:
         outside_contours(state, "a tool change is", line)

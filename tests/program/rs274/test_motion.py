@@ -11,6 +11,7 @@ from olp.core.errors import ProgramError
 from olp.program.rs274 import motion
 from olp.program.rs274.block_text import BlockText
 from olp.program.rs274.lexer import lex
+from olp.program.rs274.state import KNOWN_BY
 
 NAN = math.nan
 QUARTER = math.pi / 2
@@ -165,14 +166,12 @@ def said(end: tuple[float, float, float], **words: object) -> tuple[str, str]:
     [
         (
             (0.0, 10.0, NAN), {"i": -10.0},
-            "an arc starts or ends where an axis has not been commanded yet; "
-            "command X, Y and Z first, or give a machine file and a job file with start_mm",
+            f"an arc starts or ends where an axis has not been commanded yet; {KNOWN_BY}",
             "OLP524",
         ),
         (
             (0.0, 10.0, 5.0), {"i": -10.0, "start": (10.0, 0.0, NAN)},
-            "an arc starts or ends where an axis has not been commanded yet; "
-            "command X, Y and Z first, or give a machine file and a job file with start_mm",
+            f"an arc starts or ends where an axis has not been commanded yet; {KNOWN_BY}",
             "OLP524",
         ),
         (

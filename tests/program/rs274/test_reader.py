@@ -13,6 +13,7 @@ from olp.core.machine import Setup
 from olp.core.toolpath import Flag
 from olp.program.rs274 import reader
 from olp.program.rs274.lexer import chunks
+from olp.program.rs274.state import KNOWN_BY
 
 ALL = ("linuxcnc", "fanuc", "haas", "grbl")
 PASS, DELETED, CYCLE, WHOLE = Flag.PASS, Flag.DELETED, Flag.CYCLE, Flag.WHOLE
@@ -253,10 +254,7 @@ PERCENT = (
     "line and the last one, or not at all"
 )
 NO_MOTION = "a block has axis words, but no motion code is in force; expected G0, G1, G2 or G3"
-UNKNOWN = (
-    "an arc starts or ends where an axis has not been commanded yet; "
-    "command X, Y and Z first, or give a machine file and a job file with start_mm"
-)
+UNKNOWN = f"an arc starts or ends where an axis has not been commanded yet; {KNOWN_BY}"
 #: Control and text behind `HEAD`: the line, the sentence, the code, and what else the refusal names.
 REFUSED: dict[tuple[str, str], dict[str, object]] = {
     ("fanuc", "#1=2"): {"why": parametric("#1=2"), "code": "OLP511", "hint": UNROLL},
@@ -376,8 +374,7 @@ REFUSED: dict[tuple[str, str], dict[str, object]] = {
         "why": "the block makes 20001 holes; expected at most 20000", "code": "OLP543",
     },
     ("linuxcnc", "M100\nG81 X1 R2 Z1"): {
-        "why": "a canned cycle starts where an axis has not been commanded yet; "
-        "command X, Y and Z first, or give a machine file and a job file with start_mm",
+        "why": f"a canned cycle starts where an axis has not been commanded yet; {KNOWN_BY}",
         "code": "OLP524", "line": 4,
     },
     ("fanuc", "G81 X1. R2. Z1.\nG55\nX2."): {
