@@ -18,6 +18,7 @@ from olp.core.toolpath import Flag, Kind, Toolpath
 from olp.core.units import UM_PER_MM
 from olp.errormodel.base import ErrorModel
 from olp.findings.catalogue import Finding
+from olp.program.dialect import Dialect
 from olp.program.program import Program
 from olp.proof.judgement import Judgements
 from olp.proof.measured import SHOWN
@@ -33,6 +34,8 @@ _REMARKS = {
     "preset": "OLP417",
     "macro": "OLP334",
 }
+#: how canned cycles become plain moves: with an option, where the dialect has it
+_AS_MOVES = {True: "with --expand-cycles", False: "as plain moves in the post-processor"}
 #: blocks that the report lists
 _WORST = 5
 
@@ -143,8 +146,10 @@ def path_mode_findings(program: Program, correction_mm: float) -> list[Finding]:
     return findings
 
 
-def proof_findings(proof: Proof, uncorrected: Index, place: Callable[[int], str] = str) -> list[Finding]:
-    """Findings from the proof; `place` puts a line into words."""
+def proof_findings(
+    proof: Proof, uncorrected: Index, dialect: Dialect, place: Callable[[int], str] = str
+) -> list[Finding]:
+    """Findings from the proof of a program of this dialect; `place` puts a line into words."""
     findings = []
     path = proof.nominal
     size = proof.size_mm()
@@ -159,7 +164,7 @@ def proof_findings(proof: Proof, uncorrected: Index, place: Callable[[int], str]
         made[1:] |= made[:-1].copy()
         if (above & made).any():
             what += "; holes of canned cycles, or moves from there, are among them: write these cycles out "
-            what += "with --expand-cycles, where the dialect has it"
+            what += _AS_MOVES[dialect.expands_cycles]
         findings.append(finding("OLP101", what, lines_of(path, above)))
     if not proof.judged.any():
         findings.append(finding("OLP107", "no move of this program could be judged"))
@@ -181,7 +186,8 @@ def proof_findings(proof: Proof, uncorrected: Index, place: Callable[[int], str]
     holes = (proof.counts == Counts.HOLE) & (size > proof.tolerance_mm)
     if holes.any():
         most_um = size[holes].max() * UM_PER_MM
-        what = f"{int(holes.sum())} holes are off by up to {most_um:.2f} um along the stroke"
+        what = f"{int(holes.sum())} holes are off by up to {most_um:.2f} um along the stroke; write their "
+        what += f"cycles out {_AS_MOVES[dialect.expands_cycles]}"
         findings.append(finding("OLP105", what, lines_of(path, holes)))
     lean = proof.lean & (size > proof.tolerance_mm)
     if lean.any():

@@ -66,7 +66,8 @@ class Dialect:
     `reader` reads a text. Called with data, setup, this dialect, options, and `words` by keyword, it returns
     a `Program` (`olp.program.registry.read`). `unroller` writes loops, calls and expressions out. It is
     called with data, this dialect, and by keyword what `olp.program.rs274.flatten.unroll.flatten` takes. It
-    is None where the dialect has none. With `unrolls_with_tools` it takes `setup` too: contours beside which
+    is None where the dialect has none. Where the dialect `expands_cycles` it writes canned cycles as plain
+    moves. With `unrolls_with_tools` it takes `setup` too: contours beside which
     the control keeps the tool become the path of the tool. `keeper` puts the corrections of an unrolled text
     into the program that it was made from. It is called with that text, the corrected one, where each line
     begins in it, and this dialect, and returns a `Kept`. `asks` finds what a program asks of the control
@@ -98,6 +99,7 @@ class Dialect:
     reader: Callable[..., Any]
     unroller: Callable[..., Unrolled] | None = None
     unrolls_with_tools: bool = False
+    expands_cycles: bool = False
     keeper: Callable[..., Kept] | None = None
     asks: Callable[..., Iterable[Any]] | None = None
     signs: Signs = NO_SIGNS

@@ -309,7 +309,7 @@ def _findings(case: _Case, options: CheckOptions) -> list[Finding]:
         findings += checks.program_findings(written, loaded.setup)
         findings += model_findings(path, loaded.calibration, loaded.model, sanity, tolerance_mm)
         if run is not None and proof is not None:
-            findings += checks.proof_findings(proof, run.uncorrected)
+            findings += checks.proof_findings(proof, run.uncorrected, run.nominal.dialect)
             findings += checks.between_findings(run.nominal, proof, loaded.model)
             findings += _in_lines_of_corrected(run)
     lean = checks.orientation(Along.of(path), loaded.model)["max_urad"] * RAD_PER_URAD

@@ -68,6 +68,7 @@ def described_by(known: KnownErrors, named: Dialect | None) -> tuple[Setup, Stat
         tools=_Every[int, Tool](Tool),
         sanity=Sanity(largest_correction_mm=np.inf),
         located=False,
+        assumed=True,
     )
     sentences = tuple(known.sentences())
     assumed = (

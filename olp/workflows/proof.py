@@ -176,7 +176,7 @@ def proved(
         *doubts,
         *_unstamped(doubts, loaded),
         *notes,
-        *checks.proof_findings(proof, pair.uncorrected, first.place),
+        *checks.proof_findings(proof, pair.uncorrected, first.dialect, first.place),
         *checks.part_findings(table, part_um),
         *checks.between_findings(first, proof, loaded.model),
         *position_findings(proof, loaded, outside),

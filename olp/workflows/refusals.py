@@ -60,7 +60,7 @@ def read(
                 )
             parsed = survey()
     except ProgramError as error:
-        raise error if setup.machine.located else _with_control(error, dialect) from None
+        raise _with_control(error, dialect) if setup.machine.assumed else error from None
     if not program.data or program.data.isspace():
         raise ProgramError("the file is empty; expected a program of at least one block", code="OLP501")
     return program if unroll is None else program.holding(parsed.data), parsed
@@ -77,7 +77,7 @@ def _can_be_unrolled(sources: Sources, program: Source, setup: Setup, dialect: D
 
 
 def _with_control(error: ProgramError, dialect: Dialect) -> ProgramError:
-    """The refusal of a program whose control no file states: with that of the first code, how to name it."""
+    """The refusal of a program whose control nothing states: with that of the first code, how to name it."""
     way_on = f"; no file says which control this is for, {dialect.name} is taken: name yours with --dialect"
     if isinstance(error, Refused):
         for i, reason in enumerate(error.reasons):

@@ -148,7 +148,8 @@ class Session:
             from olp.files.described import described
 
             own = described(dialect, read=sources.read)
-            setup = replace(setup, job=replace(setup.job, dialect=dialect, described=own))
+            named = replace(setup.machine, assumed=False)
+            setup = replace(setup, machine=named, job=replace(setup.job, dialect=dialect, described=own))
         return Session(setup, sources, stated)
 
     def of(self, setup: Setup) -> Session:

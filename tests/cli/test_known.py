@@ -71,4 +71,7 @@ def test_a_code_that_the_assumed_control_has_not_says_how_to_name_another(tmp_pa
     code, says = run("correct", str(program), "--skew", "XY=1mm/m")
     assert code == 3
     assert says.count("grbl is taken: name yours with --dialect") == 1
+    code, says = run("correct", str(program), "--skew", "XY=1mm/m", "--dialect", "grbl")
+    assert code == 3
+    assert "name yours" not in says
     assert run("correct", str(program), "--skew", "XY=1mm/m", "--dialect", "linuxcnc")[0] == 0

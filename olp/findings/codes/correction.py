@@ -18,7 +18,7 @@ RULES = (
         "Correct the nominal program again, or undo the edit. If it fails again, look at the listed blocks. "
         "Give a smaller least_increment_mm if the control takes more digits, or raise --tolerance-um if so "
         "much is allowed. Along contours under G41 or G42, correct with --contour path. At holes of canned "
-        "cycles, correct with --expand-cycles.",
+        "cycles, correct with --expand-cycles, where the finding names it.",
         "A hand-edited corrected program: `G1 X100.050` where X100.012 was written.",
     ),
     _rule(
@@ -55,7 +55,8 @@ RULES = (
         Severity.WARNING,
         "A canned cycle moves straight along the tool axis, so it can be exact at one depth only. The rest "
         "of its feed strokes deviates from the axis of the hole by more than the numerical tolerance.",
-        "Write the cycles out as plain moves with olp correct --expand-cycles.",
+        "Write the cycles out as plain moves: with olp correct --expand-cycles, where the finding names it, "
+        "else in the post-processor.",
         "`G81 Z-80 R2` where the column leans by 3 um over 80 mm.",
     ),
     _rule(

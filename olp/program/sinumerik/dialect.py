@@ -63,6 +63,7 @@ DIALECT = Sinumerik(
     title="Sinumerik 840D",
     reader=read_blocks,
     unroller=unroll_text,
+    expands_cycles=True,
     unrolls_with_tools=False,
     translator=translate_text,
     asks=asked_of,

@@ -128,6 +128,7 @@ class Profile(Dialect):
     first: tuple[bytes, ...] = (b"%", b"O|:")
     payload_comments: bool = True
     unrolls_with_tools: bool = True
+    expands_cycles: bool = True
     metric: str = "G21"
     cleared: str = "G80 G40 G49"
     dwell: str = "P"
