@@ -12,21 +12,21 @@ from dataclasses import replace
 import numpy as np
 
 from olp.compensation.digits import AxisRows
+from olp.compensation.hole_levels import CalledLevels
 from olp.compensation.rows import Rows
 from olp.compensation.writer import Writer
 from olp.core.arrays import Index
 from olp.core.toolpath import Kind
 from olp.program.holes import Small
 from olp.program.program import Called
-from olp.program.text.edits import BARE, EditList, Edits
+from olp.program.text.edits import EditList, Edits
 
 
 class CalledHoles:
     """Writes the holes of one program, band by band."""
 
     def __init__(self) -> None:
-        #: the text of the call in force, and how much higher than in the program its levels are, in words
-        self._in_force = (-1, 0.0, 0.0)
+        self._levels = CalledLevels()
 
     def middled(self, writer: Writer, rows: Rows, columns: list[AxisRows]) -> list[AxisRows]:
         """Columns of the words, with the position of each hole as the middle of its stroke needs it."""
@@ -69,10 +69,10 @@ class CalledHoles:
     def _lifted(self, writer: Writer, rows: Rows, row: int, k: int, made: EditList) -> tuple[float, float]:
         """How much higher than the program says the tool goes back, and a hole is, mm; writes its call with
         these levels."""
-        called, path, program = writer.program.called, writer.path, writer.program
+        path = writer.path
         move = int(rows.move[row])
         unit = float(writer.frame_unit_mm[path.frame[move]])
-        decimals, begin = writer.style.usual(2, unit), int(called.text[k, 0])
+        decimals = writer.style.usual(2, unit)
 
         def lift(at: int) -> float:
             away = writer.plan.command_mm[rows.first + at, 2] - path.end_mm[rows.move[at], 2]
@@ -84,32 +84,9 @@ class CalledHoles:
         raised = path.line[rows.move[last : last + 1]] == path.line[move]
         down = lift(row)
         back = lift(last) if raised.any() else down
-        if (back, down) != (self._in_force[1:] if self._in_force[0] == begin else (0.0, 0.0)):
-            spans = called.numbers[k].tolist()
-            raised_by = zip(spans, (back, down, down), strict=True)
-            levels = [(a, b, high) for (a, b), high in raised_by if a >= 0]
-            if called.alone[k]:
-                for a, b, high in levels:
-                    _put(made, program.data[a:b], high, decimals, (a, b), b"", 0)
-                writer.tally.changed_words += len(levels)
-            else:
-                self._in_force = (begin, back, down)
-                self._again(writer, int(path.line[move]), k, levels, decimals, made)
+        line = int(path.line[move])
+        self._levels.lift(writer.program, k, line, (back, down), decimals, made, writer.tally)
         return back * unit, down * unit
-
-    @staticmethod
-    def _again(
-        writer: Writer, line: int, k: int, levels: list[tuple[int, int, float]], decimals: int, made: EditList
-    ) -> None:
-        """Write a call again before a line, with some of its levels higher."""
-        data, place = writer.program.data, int(writer.program.line_start[line - 1])
-        begin, end = writer.program.called.text[k].tolist()
-        order = 1
-        for a, b, high in levels:
-            _put(made, data[a:b], high, decimals, (place, place), data[begin:a], order)
-            begin, order = b, order + 1
-        made.add(place, place, BARE, 0, data[begin:end] + writer.program.eol(line), order)
-        writer.tally.inserted_blocks += 1
 
 
 def _among(called: Called, rows: Rows) -> tuple[Index, Index]:
@@ -133,12 +110,3 @@ def joined(called: Called, moves: Small, spans: Sequence[tuple[int, int]]) -> li
         else:
             done.append((first, last))
     return done
-
-
-def _put(
-    made: EditList, text: bytes, lift: float, decimals: int, span: tuple[int, int], prefix: bytes, order: int
-) -> None:
-    """Put a number that is higher by `lift` than the one in a text."""
-    given = text.replace(b" ", b"").replace(b"\t", b"")
-    own = max(decimals, len(given.partition(b".")[2]))
-    made.add(*span, round((float(given) + lift) * 10**own), own, prefix, order)

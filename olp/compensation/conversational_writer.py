@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from olp.compensation.digits import AxisRows
+from olp.compensation.hole_levels import Surfaces
 from olp.compensation.plan import Plan
 from olp.compensation.pole_arcs import PoleArcs, PoleWriter
 from olp.compensation.rows import Rows
@@ -20,8 +21,6 @@ from olp.program.heidenhain.chunk import LATE_M
 from olp.program.program import Definitions
 from olp.program.text.edits import BARE, EditList, Edits
 
-#: mm; a surface that is off by less is the same
-_SAME_MM = 1e-9
 #: words that show whether numbers are written with a plus
 _LOOKED_AT = 4000
 
@@ -33,8 +32,7 @@ class ConversationalWriter(PoleWriter):
     def __init__(self, task: Task) -> None:
         super().__init__(task)
         self._arcs = PoleArcs()
-        #: the definition of the cycle in force, where it begins, and its surface as written
-        self._surface = (-1, 0.0)
+        self._surfaces = Surfaces()
         self._defined = EditList(self.prefixes)
         slot = self.program.slot[self.program.slot >= 0][:_LOOKED_AT]
         self._signed = self.blocks.signed(slot)
@@ -120,33 +118,17 @@ class ConversationalWriter(PoleWriter):
                 # it begins at the height where the tool is
                 lift = float(before[2] - nominal)
             else:
-                lift = self._surfaced(rows, row, k, definitions)
+                lift = self._surfaced(rows, row, k)
             rows.emitted[row - 1 : row + 2, 2] += lift
 
-    def _surfaced(self, rows: Rows, row: int, stroke: int, definitions: Definitions) -> float:
+    def _surfaced(self, rows: Rows, row: int, stroke: int) -> float:
         """How much higher a hole is than the program says; defines its cycle again where that changes."""
-        begin, end = definitions.text[stroke].tolist()
-        surface, move = float(definitions.surface[stroke]), int(rows.move[row])
+        move = int(rows.move[row])
         unit = float(self.frame_unit_mm[self.path.frame[move]])
-        if begin < 0:
-            return 0.0
-        if self._surface[0] != begin:
-            self._surface = (begin, surface)
-        away = float(self.plan.command_mm[rows.first + row, 2] - self.path.end_mm[move, 2])
-        decimals = self.style.usual(2, unit)
-        wanted = surface
-        if abs(away) > _SAME_MM:
-            wanted = round((surface + away / unit) * 10**decimals) / 10**decimals
-        if wanted != self._surface[1]:
-            self._surface = (begin, wanted)
-            line = int(self.path.line[move])
-            place = int(self.program.line_start[line - 1])
-            number, stop = definitions.number[stroke].tolist()
-            data, mantissa = self.program.data, round(wanted * 10**decimals)
-            self._defined.add(place, place, mantissa, decimals, data[begin:number], 1)
-            self._defined.add(place, place, BARE, 0, data[stop:end] + self.program.eol(line), 2)
-            self.tally.inserted_blocks += 1
-        return (wanted - surface) * unit
+        away = float(self.plan.command_mm[rows.first + row, 2] - self.path.end_mm[move, 2]) / unit
+        line, decimals = int(self.path.line[move]), self.style.usual(2, unit)
+        made, tally = self._defined, self.tally
+        return unit * self._surfaces.lift(self.program, stroke, line, away, decimals, made, tally)
 
     def _spliced(self, edits: list[Edits], begin: int, end: int) -> bytes | None:
         """Numbers that stay positive keep their plus, and new ones get one where the program writes it."""

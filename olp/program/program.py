@@ -238,8 +238,9 @@ class Program:
     `content` is the text, or what reads it again (`let_go`). `slot` (n, 3): index of the X, Y, Z word of each
     move, -1 where omitted. `calculator`: lengths without a decimal point are whole units. `statements` is
     None for blocks of words. `closings` are brackets that close behind a number, sorted. `tilts` are moves by
-    which the control turns rotary axes to a plane. `by_original`: lines are those of the text that this one
-    was unrolled from (`in_original`).
+    which the control turns rotary axes to a plane. `levels` are moves of cycles in planes, each with its
+    height along the words, mm. `by_original`: lines are those of the text that this one was unrolled from
+    (`in_original`).
 
     Along contours under cutter compensation `toolpath` is that of the tool. `programmed` is then the program
     with the contour in its place, and (n,) `blocks` the move of it that each move belongs to. `targets` are
@@ -265,6 +266,7 @@ class Program:
     shared: SharedWords = field(default_factory=SharedWords.none)
     closings: Index = field(default_factory=lambda: np.zeros(0, np.int64))
     tilts: tuple[Tilt, ...] = ()
+    levels: tuple[tuple[int, float], ...] = ()
     by_original: bool = False
     programmed: Program | None = None
     blocks: Index | None = None

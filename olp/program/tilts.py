@@ -17,7 +17,8 @@ class Tilt:
     """A `move` that brings the rotary axes `letters` to where the tool is along the normal of a plane. `turn`
     is the plane in the workpiece, None where nothing turns. A `move` of -1 is that of the `line`. With
     `by_swivel` the branch counts larger and smaller positions of the axis that the swivel data of the control
-    name, else signs of that nearest the tool."""
+    name, else signs of that nearest the tool. With `by_table` a table that turns about the tool takes the
+    turn of the plane over."""
 
     move: int
     line: int
@@ -25,3 +26,4 @@ class Tilt:
     turn: Turn | None
     branch: Branch
     by_swivel: bool = False
+    by_table: bool = False

@@ -136,7 +136,7 @@ def match(
     near = _NEAR_DIGITS * np.where(rotary, digit_deg, digit_mm)
     groups = np.arange(count)
     if other > count:
-        groups = _stretched(expected, corrected.end, near, nominal.feed)
+        groups = _stretched(expected, corrected.end, near, nominal.feed & ~nominal.holes.whole)
     away = np.nanmax(
         np.append(np.abs(corrected.end[groups] - expected), np.zeros((count, 1)), axis=1), axis=1
     )

@@ -29,6 +29,7 @@ class TiltedJudge(Judge):
         self.shift = np.zeros(3)
         self.on = False
         self.found: dict[str, float] = {}
+        self.searched: dict[tuple[bytes, float, str], dict[str, float]] = {}
         self.feeds = True
         #: the axis of larger and smaller positions of a swivel
         self.swivels = self.file.get("kinematics", {}).get("swivel_axis", "")
@@ -38,11 +39,24 @@ class TiltedJudge(Judge):
         rotary = [name for name in self.order if name not in OWN]
         words = dict.fromkeys("XYZ", np.nan)
         turned = dict.fromkeys(rotary, np.nan)
-        moves = []
+        moves: list[tuple[bool, bool, np.ndarray]] = []
+        cycle, modal = "", ""
+        text = re.sub(rb"\s*(?:;.*)?~\n", b" ", text)
         for line in text.decode().splitlines():
             line = line.partition(";")[0]
+            if match := re.search(r"CYCL DEF 2\d\d .*Q203.*", line):
+                cycle = match[0]
+                continue
+            if match := re.fullmatch(r"(?:N\d+ )?MCALL(.*)", line):
+                modal = match[1].strip()
+                continue
+            if "CYCL CALL" in line or re.match(r"CYCLE8\d\b", line):
+                moves += self.hole(moves[-1], cycle if "CALL" in line else line)
+                words["Z"] = self.retracted
+                continue
             if self.statement(line, words, turned):
                 continue
+            calls = cycle if "M99" in line else modal
             line = re.sub(r"\bL\b|R0|M\d+", "", line)
             given = dict(re.findall(r"([XYZABC])\s*([-+]?[\d.]+|\+Q12\d)", line))
             given = {name: word for name, word in given.items() if name in self.order}
@@ -54,13 +68,36 @@ class TiltedJudge(Judge):
                 else:
                     turned[name] = self.found[name] if "Q" in word else float(word)
             place = np.full(len(self.order), np.nan)
+            self.words = words
             tip = np.array([words[name] for name in "XYZ"]) + self.shift
             tip = self.turn @ tip + self.below if self.on else tip + self.below
             for name, value in [*zip("XYZ", tip, strict=True), *turned.items()]:
                 place[self.order.index(name)] = value
             if np.isfinite(place).all():
                 moves.append((self.cuts(line), self.on, place))
+                if calls:
+                    moves += self.hole(moves[-1], calls)
+                    words["Z"] = self.retracted
         return moves
+
+    def hole(self, before: tuple[bool, bool, np.ndarray], cycle: str) -> list[tuple[bool, bool, np.ndarray]]:
+        """Where the tool stands, to the clearance, along the axis to the bottom, and out again."""
+        if cycle.startswith("CYCL DEF"):
+            q = {int(n): float(v) for n, v in re.findall(r"Q(\d+)\s*=\s*([-+\d.]+)", cycle)}
+            levels = [q[203] + q[200], q[203] + q[201], q[203] + max(q[200], q[204])]
+        else:
+            number, given = re.findall(r"CYCLE8(\d)\s*\((.*)\)", cycle)[0]
+            rtp, rfp, sdis, dp, *_ = (float(text or 0) for text in given.split(","))
+            levels = [rfp + sdis, dp, *([rfp + sdis] if number in "459" else []), rtp]
+        self.retracted = levels[-1]
+        along = self.turn[:, 2] if self.on else np.array([0.0, 0.0, 1.0])
+        strokes = []
+        for number, level in enumerate(levels):
+            place = before[2].copy()
+            for name, part in zip("XYZ", along, strict=True):
+                place[self.order.index(name)] += part * (level - self.words["Z"])
+            strokes.append((0 < number < len(levels) - (levels[-1] != levels[-2]), self.on, place))
+        return strokes
 
     def cuts(self, line: str) -> bool:
         if match := re.search(r"\bG0?([01])\b", line):
@@ -140,6 +177,12 @@ class TiltedJudge(Judge):
     def search(self, sign: float, axis: str) -> None:
         """The rotary positions that bring the tool along the normal: of an axis the larger or the smaller
         one, else that nearest the tool of a sign, or any within the travel."""
+        key = (self.turn.tobytes(), sign, axis)
+        if key not in self.searched:
+            self.searched[key] = self.first_of(sign, axis)
+        self.found = self.searched[key]
+
+    def first_of(self, sign: float, axis: str) -> dict[str, float]:
         columns = [k for k, name in enumerate(self.order) if name not in OWN]
         names = [name for name in self.chain if name not in OWN and name != "F"]
 
@@ -158,6 +201,5 @@ class TiltedJudge(Judge):
             if np.abs(done.fun).max() <= MISSED and inside:
                 found.append(values)
         if axis:
-            self.found = max(found, key=lambda values: sign * values[axis])
-        else:
-            self.found = max(found, key=lambda values: sign * values[names[-1]] >= -1e-6)
+            return max(found, key=lambda values: sign * values[axis])
+        return max(found, key=lambda values: sign * values[names[-1]] >= -1e-6)

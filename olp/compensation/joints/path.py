@@ -8,6 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
+from olp.compensation.joints.drilled import Drilled
 from olp.compensation.joints.motion import Motion
 from olp.compensation.joints.tilts import (
     found_positions,
@@ -51,9 +52,10 @@ class JointPath:
     (n, 3) where the part really lies. `offset` (n, axes), `unit` (n,) and, of words without a point, `scale`
     (axes,) lead from words to coordinates. `feed` are straight moves that cut, `judged` those that the
     proof judges, `kept` moves that stay uncorrected. `held` (n,) are moves whose rotary axes stay as
-    programmed: where these stand, tool centre point control begins, or a tilted plane is `fixed` (n,) to
-    them. `places` (axes,) are the fewest decimals of words in mm and deg. `listed` are the rows of a list of
-    axis values."""
+    programmed: where these stand, tool centre point control begins, a tilted plane is fixed to them, or a
+    hole is made. In the last two no word of theirs changes: these moves `stay` (n,). `places` (axes,) are the
+    fewest decimals of words in mm and deg. `holes` are those of cycles, `listed` the rows of a list of axis
+    values."""
 
     program: Program
     motion: Motion
@@ -71,8 +73,9 @@ class JointPath:
     judged: Mask
     kept: Mask
     held: Mask
-    fixed: Mask
+    stay: Mask
     places: Index
+    holes: Drilled
     listed: AxisList | None = None
 
     def __len__(self) -> int:
@@ -107,7 +110,7 @@ class JointPath:
         offsets, `start_deg` those at the start, `tips_from_zero` and `swivel_axis` as in `JointMachine`.
         Raises ProgramError for what is not read on such a machine."""
         _refuse(program)
-        path = program.toolpath
+        path, holes = program.toolpath, Drilled.of(program)
         order = structure.order
         letters = [name for name in order if structure.joints[name].kind == "rotary"]
         rotary = RotaryWords.of(program, letters, machine)
@@ -147,14 +150,18 @@ class JointPath:
             end[:, columns] = turned(inverse, end[:, columns])
             offset[:, columns] = turned(inverse, offset[:, columns])
         unit = np.array([frame.unit_mm for frame in path.frames] or [1.0])[path.frame]
+        given = slot[:, columns] >= 0
         if fixed.any():
-            refuse_lengths(program, fixed, slot[:, columns] >= 0)
+            refuse_lengths(program, fixed, given)
             stated = _words(program, slot[:, columns]) * unit[:, None] + offset[:, columns]
+            for move, level_mm in program.levels:
+                stated[move, 2] = level_mm
             end[:, columns] = np.where(fixed[:, None], stated, end[:, columns])
+        given[holes.strokes, 2] = True
         elsewhere = tip & ((path.flag & np.uint8(Flag.MACHINE)) != 0)
         mode = tip + 2 * elsewhere + 4 * fixed
         fresh = stated_afresh(program, fixed, degrees)
-        end[:, columns] = _stated_in_mode(end[:, columns], slot[:, columns] >= 0, mode, elsewhere, fresh)
+        end[:, columns] = _stated_in_mode(end[:, columns], given, mode, elsewhere, fresh)
         _refuse_tips(program, structure, tip & ~fixed, end, offset, tips_from_zero)
         shifts = np.array(
             [
@@ -167,10 +174,11 @@ class JointPath:
         feed = (path.kind == Kind.LINE) & ~kept
         start = _starts(motion, end, tool, tip, np.array(path.start_mm), columns, start_deg, order)
         refuse_off_normal(program, structure, fixed, feed, start, end)
-        held = np.append(tip[1:] & ~tip[:-1], False)[: len(tip)] | stands_before(fixed, feed, degrees)
+        stay = stands_before(fixed | holes.whole, feed, degrees)
+        held = np.append(tip[1:] & ~tip[:-1], False)[: len(tip)] | stay
         return JointPath(
             program, motion, start, end, slot, tool, tip, vector, shifts[path.frame], offset, unit, scale,
-            feed, feed, kept, held, fixed, _places(structure),
+            feed, feed, kept, held, stay, _places(structure), holes,
         )  # fmt: skip
 
     @staticmethod
@@ -198,7 +206,7 @@ class JointPath:
             rows.program, motion, np.vstack((np.full((1, axes), np.nan), rows.values[:-1])), rows.values,
             np.full((count, axes), -1, np.int32), np.array([places[n] for n in rows.tool.tolist()]),
             none, none, np.zeros((count, 3)), np.zeros((count, axes)), np.ones(count), np.ones(axes),
-            feed, ~none, none, none, none, _places(structure), rows,
+            feed, ~none, none, none, none, _places(structure), Drilled.none(count), rows,
         )  # fmt: skip
 
 
@@ -337,7 +345,6 @@ def _refuse(program: Program) -> None:
     if program.statements is not None:
         note((flag & np.uint8(Flag.INCREMENTAL)) != 0, "a distance (I); program the position")
         note(_turned_by(program), "a distance (I) of a rotary axis; program the position")
-    note((flag & np.uint8(Flag.CYCLE)) != 0, "a canned cycle; give --expand-cycles, which writes it out")
     note(path.compensated(), "cutter compensation (G41, G42); post the path of the tool's centre")
     note(path.kind == Kind.PROBE, "a probing move; take it into a program of its own")
     note((flag & np.uint8(Flag.DELETED)) != 0, "a block under block delete; remove the / or the block")

@@ -93,7 +93,8 @@ def planned(path: JointPath, limits: JointLimits) -> JointPlan:
     side, turned = _sides(path, solid)
     move = np.flatnonzero(solid)
     ends = _solved(path, move, np.ones(len(move)), side)
-    split = np.flatnonzero(solid & path.feed & (path.start != path.end).any(axis=1))
+    whole = path.holes.whole
+    split = np.flatnonzero(solid & path.feed & ~whole & (path.start != path.end).any(axis=1))
     begins = _solved(path, split, np.zeros(len(split)), side)
     inner = _split(path, begins, ends.only(np.searchsorted(move, split)), limits, side)
     rows = _Rows.join([ends, *inner])
@@ -133,8 +134,8 @@ def _solved(path: JointPath, move: Index, share: Array, side: Array) -> _Rows:
         if held.size:
             part = Poses(target.rotation[held], target.position[held])
             stands = axes[held]
-            # in a tilted plane no word of a rotary axis changes, so its backlash stays
-            play = np.where(path.fixed[some[held], None] & rotary, 0.5 * motion.width * side[some[held]], 0.0)
+            # where no word of a rotary axis changes, its backlash stays
+            play = np.where(path.stay[some[held], None] & rotary, 0.5 * motion.width * side[some[held]], 0.0)
             solved = motion.linear(stands - play, tool[held], part)
             done.values[held], done.left_rad[held] = solved.values, solved.left_rad
             done.limited[held] = False

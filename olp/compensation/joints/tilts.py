@@ -42,8 +42,8 @@ def _unknown(letter: str, letters: Sequence[str]) -> str:
     if letter not in letters:
         return f"the block moves {letter}, which is no axis of the machine; expected {', '.join(letters)}"
     return (
-        f"the plane is turned about its normal alone, and whether {letter} turns with it is not known; "
-        f"program the position of {letter}"
+        f"the plane is turned about the axis of {letter}, and whether {letter} turns with it is not known; "
+        f"program the position of {letter}, or TABLE ROT in PLANE"
     )
 
 
@@ -68,9 +68,34 @@ def _position(tilt: Tilt, structure: Structure, swivel_axis: str) -> Mapping[str
             )
         raise ProgramError(why, line=tilt.line, code="OLP565")
     free = np.linalg.norm(np.cross(matrix[:, 2], structure.joints[outer].direction)) < _ALONG
-    if free and tilt.turn is not None:
+    if not free or tilt.turn is None:
+        return kept[0]
+    if not tilt.by_table or outer not in structure.workpiece_side or not _is_upright(matrix):
         return {inner: kept[0][inner]}
-    return kept[0]
+    return {inner: kept[0][inner], outer: _of_table(structure, outer, matrix, tilt.line)}
+
+
+def _is_upright(matrix: Array) -> bool:
+    """Whether a plane is turned about Z of the workpiece alone."""
+    return float(matrix[2, 2]) > 1.0 - _ALONG
+
+
+def _of_table(structure: Structure, letter: str, matrix: Array, line: int) -> float:
+    """The position of a table at which the X axis of a plane is along that of the machine: of positions a
+    whole turn apart the one nearest to zero. Raises ProgramError where its travel has none."""
+    joint = structure.joints[letter]
+    sense = float(np.sign(joint.direction[2]))
+    value = sense * float(np.degrees(np.arctan2(matrix[1, 0], matrix[0, 0])))
+    low, high = joint.travel
+    inside = [value + turn for turn in (0.0, -360.0, 360.0) if low <= value + turn <= high]
+    if not inside:
+        raise ProgramError(
+            f"the plane turns {letter} to {value:g} deg, out of its travel {low:g} to {high:g}; turn the "
+            "part",
+            line=line,
+            code="OLP565",
+        )
+    return min(inside, key=abs)
 
 
 def _signed(found: Sequence[Mapping[str, float]], tilt: Tilt, axis: str) -> Sequence[Mapping[str, float]]:

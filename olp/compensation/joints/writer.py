@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from olp.compensation.digits import AxisRows, Digits
 from olp.compensation.inserted_blocks import end_word_edits
+from olp.compensation.joints.drilled import lifted, middled
 from olp.compensation.joints.path import JointPath
 from olp.compensation.joints.planning import JointPlan
 from olp.compensation.stamp import stamped
@@ -71,13 +72,11 @@ class JointWriter:
 
     def written(self, stamp: bytes) -> WrittenJoints:
         command = self.plan.command.copy()
-        emitted = np.full(command.shape, np.nan)
+        emitted, drilled = np.full(command.shape, np.nan), self.path.holes.strokes[self.plan.move]
         for column in np.flatnonzero(self.rotary).tolist():
-            emitted[:, column] = self._round(column, command[:, column])
-        command = self._linear(command, emitted)
-        for column in np.flatnonzero(~self.rotary).tolist():
-            self._round(column, command[:, column])
-        edits = [*self._replaced(), *self._inserted_words(), *self._inserted_blocks()]
+            emitted[:, column] = self._round(column, command[:, column], drilled)
+        made = self._drill(self._linear(command, emitted))
+        edits = [*self._replaced(), *self._inserted_words(), *self._inserted_blocks(), made]
         edits = [part for part in edits if len(part)]
         tails = self._tails()
         parts = np.bincount(self.plan.move[self.head | tails], minlength=len(self.path))
@@ -118,22 +117,42 @@ class JointWriter:
         command[rows] = motion.programmed(axes, tool, self.path.tip[move])
         return command
 
+    def _drill(self, command: Array) -> Edits:
+        """The digits of linear axes; returns the edits of cycles, whose strokes have no words."""
+        path, plan, holes = self.path, self.plan, self.path.holes
+        columns, made = [self.order.index(name) for name in AXES], EditList(self.prefixes)
+        drilled = holes.strokes[plan.move]
+        if len(holes):
+            row_of = np.searchsorted(plan.move, np.arange(len(path)), "right") - 1
+            linear, nominal = command[:, columns], path.end[:, columns]
+            usual = np.array([self.style.usual(2, unit) for unit in path.unit.tolist()])
+            away = (linear[row_of] - nominal)[:, 2]
+            lift = lifted(self.program, holes, away, path.unit, usual, made, self.tally)
+            linear = middled(holes, linear, nominal, row_of, self.program.toolpath.frame)
+            linear[:, 2] = np.where(drilled, (nominal[:, 2] + lift)[plan.move], linear[:, 2])
+            command[:, columns] = linear
+        for column in columns:
+            self._round(column, command[:, column], drilled)
+        return made.done()
+
     # -- digits ------------------------------------------------------------------------------------
 
-    def _round(self, column: int, command: Array) -> Array:
-        """The digits of one axis; returns the positions as written."""
+    def _round(self, column: int, command: Array, drilled: Mask) -> Array:
+        """The digits of one axis; returns the positions as written. In the strokes of cycles, `drilled` (r,),
+        Z goes where it is commanded, and the other axes stay."""
         path, plan, slot = self.path, self.plan, self.slot[:, column]
         given = slot >= 0
         flag = path.program.toolpath.flag[plan.move]
         nominal = path.end[plan.move, column]
+        own = drilled & (self.order[column] == AXES[2])
         unit = np.ones(len(slot)) if self.rotary[column] else path.unit[plan.move]
         least, usual, finest = self._places(column, unit)
         rows = AxisRows(
             command=command,
-            nominal=nominal,
+            nominal=np.where(own, command, nominal),
             given=given,
-            raw=~self.solid,
-            reset=self._set_by_control(column, flag, nominal),
+            raw=~self.solid | drilled,
+            reset=self._set_by_control(column, flag, nominal) | own,
             word=np.where(given, self.words.mantissa[slot], 0),
             decimals=np.where(given, self._own_decimals(column, slot, unit), 0).astype(np.int8),
             offset=path.offset[plan.move, column],
@@ -144,7 +163,7 @@ class JointWriter:
             return command
         first = float(path.start[plan.move[0], column])
         digits: Digits = digits_of(rows, Stretches.of(counting, unit), first, Decimals(least, usual, finest))
-        self.write[:, column] = digits.write & self.solid
+        self.write[:, column] = digits.write & self.solid & ~drilled
         self.mantissa[:, column], self.decimals[:, column] = digits.mantissa, digits.decimals
         return digits.emitted
 

@@ -111,6 +111,7 @@ class Collected(Collector):
             remarks=tuple((name, line, text) for name, (line, text) in self.remarks.items()),
             end_line=end_line,
             tilts=tuple(self.tilts),
+            levels=tuple(self.levels),
             statements=Statements(
                 begin=line_start[path.line - 1], end=line_end[path.line - 1],
                 feed_mm_s=take("feed", np.float64), rest=rest, dwell_s=dwell, arcs={}, broken={},

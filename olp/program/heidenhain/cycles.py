@@ -25,7 +25,7 @@ _NUMBER = re.compile(rb"([-+]?(?:\d+\.?\d*|\.\d+))\s*\Z")
 
 @dataclass(frozen=True, slots=True)
 class Stroke:
-    """Heights of one hole, in axis positions: `approach` and `retract` at rapid, `bottom` at `feed_mm_s`."""
+    """Heights of one hole along the words, mm: `approach` and `retract` at rapid, `bottom` at `feed_mm_s`."""
 
     approach: float
     bottom: float
@@ -48,11 +48,11 @@ class Cycle:
     def of(text: CycleText, statement: Statement) -> Cycle:
         return Cycle(text.number, statement.line, statement, dict(text.values), {})
 
-    def stroke(self, modes: Modes, z_mm: float, line: int) -> Stroke | None:
-        """The stroke of a hole with the tool at `z_mm`; None where the cycle makes none. Raises ProgramError
-        for a cycle that is not read."""
+    def stroke(self, modes: Modes, z_mm: float, line: int, offset_mm: float) -> Stroke | None:
+        """The stroke of a hole along the words, where Z counts from `offset_mm` and the tool is at `z_mm`;
+        None where the cycle makes none. Raises ProgramError for a cycle that is not read."""
         if self.number in BY_SURFACE:
-            return self._by_surface(modes, line)
+            return self._by_surface(modes, offset_mm)
         if self.number in BY_HEIGHT:
             return self._by_height(modes, z_mm, line)
         raise ProgramError(
@@ -70,7 +70,7 @@ class Cycle:
             )
         return default if text is None and default is not None else modes.value(text or b"", self.statement)
 
-    def _by_surface(self, modes: Modes, line: int) -> Stroke | None:
+    def _by_surface(self, modes: Modes, offset_mm: float) -> Stroke | None:
         if self.number == _CENTRED and self._value(modes, 343, 0.0) == 1.0:
             raise ProgramError(
                 "CYCL DEF 240 takes its depth from a diameter, which is not read; state the depth (Q343=0)",
@@ -90,9 +90,8 @@ class Cycle:
         feed = NAN
         if self.number not in _TAPS and 206 in self.values and self._is_number(modes, 206):
             feed = self._value(modes, 206) * modes.feed_scale
-        scale, offset = modes.unit_mm, modes.table.frames[modes.frame(line)].offset_mm[2]
         heights = (surface + clear, surface + depth, surface + max(clear, second))
-        approach, bottom, retract = (h * scale + offset for h in heights)
+        approach, bottom, retract = (h * modes.unit_mm + offset_mm for h in heights)
         return Stroke(approach, bottom, retract, feed)
 
     def _is_number(self, modes: Modes, number: int) -> bool:
@@ -115,7 +114,7 @@ class Cycle:
         if z_mm != z_mm:
             raise ProgramError(
                 f"CYCL DEF {self.number} counts from the present height, which is not known here; command Z "
-                "first, or give a machine file and a job file with start_mm",
+                "first, or give start_mm in the job file; in a tilted plane use a cycle with Q203",
                 line=line,
                 code="OLP524",
             )

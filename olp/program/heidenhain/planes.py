@@ -34,7 +34,7 @@ _SQUARE = 1e-4
 _REST = re.compile(
     r"(?:[ \t]+(?P<turning>TURN|MOVE|STAY))?"
     r"(?P<way>(?:[ \t]+(?:DIST[ \t]*[\d.]+|MB[ \t]*(?:MAX|[\d.]+)|F[ \t]*(?:MAX|AUTO|[\d.]+)))*)"
-    r"(?:[ \t]+(?:SEQ|SYM)(?P<branch>[-+]))?(?:[ \t]+(?:TABLE|COORD)[ \t]+ROT)?[ \t]*"
+    r"(?:[ \t]+(?:SEQ|SYM)(?P<branch>[-+]))?(?:[ \t]+(?P<free>TABLE|COORD)[ \t]+ROT)?[ \t]*"
 )
 
 
@@ -42,12 +42,14 @@ _REST = re.compile(
 class Plane:
     """A tilted plane: how its words are turned in the workpiece, None where they are not. `branch` is which
     of two positions the rotary axes take. With `turns` the control turns them at once. `ends`: PLANE RESET.
+    `by_table`: TABLE ROT.
     """
 
     turn: Turn | None
     branch: Branch
     turns: bool
     ends: bool = False
+    by_table: bool = False
 
 
 def plane_of(statement: Statement, before: Turn | None) -> Plane:
@@ -116,7 +118,7 @@ def _with(matrix: Array | None, rest: str, statement: Statement, *, ends: bool =
         )
     branch: Branch = 0 if match["branch"] is None else 1 if match["branch"] == "+" else -1
     turn = None if np.allclose(matrix, np.eye(3), rtol=0.0, atol=1e-12) else rows_of(matrix)
-    return Plane(turn, branch, match["turning"] in ("TURN", "MOVE"), ends)
+    return Plane(turn, branch, match["turning"] in ("TURN", "MOVE"), ends, match["free"] == "TABLE")
 
 
 def _spatial(a: float, b: float, c: float) -> Array:

@@ -241,7 +241,8 @@ class _Reader(Arcs):
 
     def turned_by_control(self, plane: Plane, letters: str, line: int) -> None:
         self.last_line, collector = line, self.collector
-        collector.tilts.append(Tilt(collector.moves, line, letters, plane.turn, plane.branch))
+        tilt = Tilt(collector.moves, line, letters, plane.turn, plane.branch, by_table=plane.by_table)
+        collector.tilts.append(tilt)
         if not letters:
             self.modes.position[:] = (NAN, NAN, NAN)
         flag = Flag.PASS if letters else Flag.PASS | Flag.CONTROL
@@ -358,19 +359,24 @@ class _Reader(Arcs):
         modes, collector = self.modes, self.collector
         if self.cycle is None:
             raise ProgramError("a cycle is called, and none is defined", line=line, code="OLP516")
-        stroke = self.cycle.stroke(modes, modes.position[2], line)
+        number = modes.frame(line)
+        frame = modes.table.frames[number]
+        matrix = np.eye(3) if frame.turn is None else np.array(frame.turn)
+        (x, y, z), offset = turned(matrix.T, np.array([modes.position, frame.offset_mm])).tolist()
+        stroke = self.cycle.stroke(modes, NAN if frame.tip == "fixed" else z, line, offset[2])
         if stroke is None:
             return
-        x, y, _ = modes.position
-        frame = modes.frame(line)
         heights = (stroke.approach, stroke.bottom, stroke.retract)
-        for kind, z in zip((Kind.RAPID, Kind.LINE, Kind.RAPID), heights, strict=True):
+        ends = turned(matrix, np.array([(x, y, z) for z in heights])).tolist()
+        for kind, z, end in zip((Kind.RAPID, Kind.LINE, Kind.RAPID), heights, ends, strict=True):
             feed = stroke.feed_mm_s if kind == Kind.LINE else np.inf
             if kind == Kind.LINE and collector.moves > 1:
                 collector.strokes.append((collector.moves - 2, collector.moves))
                 collector.definitions.append(self.cycle.definition(modes, collector.data))
-            collector.put_one(kind, Flag.CYCLE, line, frame, (x, y, z), feed)
-        modes.position[2] = stroke.retract
+            if frame.tip == "fixed":
+                collector.levels.append((collector.moves, z))
+            collector.put_one(kind, Flag.CYCLE, line, number, end, feed)
+        modes.position[:] = ends[-1]
         self.last_line = line
 
 

@@ -38,6 +38,7 @@ class Collector(PathColumns):
         self.word_count = 0
         self.holes: list[Holes] = []
         self.called: list[tuple[int, ...]] = []
+        self.levels: list[tuple[int, float]] = []
         self.remarks: dict[str, tuple[int, str]] = {}
 
     def put_words(self, chunk: WordChunk) -> None:
@@ -88,6 +89,7 @@ class Collector(PathColumns):
             path_modes=tuple(state.path_modes),
             holes=Holes.join(self.holes),
             called=Called.of(self.called),
+            levels=tuple(self.levels),
             remarks=tuple((name, line, text) for name, (line, text) in self.remarks.items()),
             end_line=end_line,
             calculator=not state.bare_increments,

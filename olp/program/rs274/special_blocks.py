@@ -14,6 +14,7 @@ from olp.core.arrays import Index, distinct, is_in
 from olp.core.errors import ProgramError
 from olp.core.machine import Place
 from olp.core.toolpath import Flag, Kind
+from olp.core.turns import turned
 from olp.core.values import dataclass
 from olp.program.rs274.axis_state import AxisState, Effect
 from olp.program.rs274.codes import (
@@ -22,6 +23,7 @@ from olp.program.rs274.codes import (
     INCREMENTAL,
     MACHINE,
     MACROS,
+    PLANE_OF,
     POLAR,
     SPLINES,
 )
@@ -270,15 +272,27 @@ class SpecialBlocks:
         state = self._state
         number = state.frame(line)
         frame = state.frames[number]
-        if frame.turn is not None and frame.turn[2] != (0.0, 0.0, 1.0):
+        fixed = frame.tip == "fixed"
+        if fixed and PLANE_OF[state.plane]:
+            raise ProgramError(
+                f"{drilling.name} is called in a tilted plane outside of G17, which is not read; program G17",
+                line=line,
+                code="OLP512",
+            )
+        if not fixed and frame.turn is not None and frame.turn[2] != (0.0, 0.0, 1.0):
             raise ProgramError(
                 f"{drilling.name} is in a frame that scales or mirrors Z, which is not read; write the hole "
                 "as plain moves",
                 line=line,
                 code="OLP512",
             )
-        kind, end = drilling.moves(state, np.array(frame.offset_mm), frame.unit_mm)
+        matrix = np.array(frame.turn) if fixed and frame.turn is not None else np.eye(3)
+        place, offset = turned(matrix.T, np.array([state.position, frame.offset_mm]))
+        kind, end = drilling.moves(state, place, offset, frame.unit_mm)
         count, moves = len(kind), self._collector.moves
+        if fixed:
+            self._collector.levels += [(moves + k, float(z)) for k, z in enumerate(end[:, 2])]
+        end = turned(matrix, end)
         if moves and drilling.text[0] >= 0:
             bottom = moves + [k for k, _ in drilling.strokes].index(Kind.LINE)
             self._collector.called.append(

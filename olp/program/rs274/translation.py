@@ -56,11 +56,11 @@ class Drilling:
     levels: tuple[Span, Span, Span] = (NOWHERE, NOWHERE, NOWHERE)
 
     def moves(
-        self, state: AxisState, offset_mm: Array, unit_mm: float
+        self, state: AxisState, place_mm: Array, offset_mm: Array, unit_mm: float
     ) -> tuple[npt.NDArray[np.uint8], Array]:
-        """Kinds (k,) and ends (k, 3) of the strokes from the present position."""
+        """Kinds (k,) and ends (k, 3) of the strokes from a place, along the words."""
         axis = PLANES[PLANE_OF[state.plane]][2]
-        ends = np.tile(np.array(state.position, float), (len(self.strokes), 1))
+        ends = np.tile(place_mm, (len(self.strokes), 1))
         ends[:, axis] = [level * unit_mm + offset_mm[axis] for _, level in self.strokes]
         return np.array([kind for kind, _ in self.strokes], np.uint8), ends
 

@@ -162,6 +162,11 @@ def findings_of(
     if proof.over.any():
         lines = path.line[proof.over].tolist()
         found.append(finding("OLP101", "the corrected path leaves its tolerance at these lines", lines))
+    holes = path.holes.strokes & proof.judged & (proof.after.distance_mm > proof.allowed_mm)
+    if holes.any():
+        most_um = float(proof.after.distance_mm[holes].max()) * UM_PER_MM
+        what = f"{int(holes.sum())} holes are off by up to {most_um:.2f} um along the stroke"
+        found.append(finding("OLP105", what, path.line[holes].tolist()))
     solid = np.isfinite(plan.command).all(axis=1)
     kept = np.ones(len(path), bool)
     kept[plan.move[solid]] = False
