@@ -20,8 +20,6 @@ from scipy.spatial.transform import Rotation
 
 #: mm per rad, where a place on a move is sought.
 ARM = 100.0
-#: mm or deg: a move that ends nearer than this ends where the nominal one does.
-NEAR = 0.2
 OWN = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
 
 
@@ -39,6 +37,24 @@ def about(point: Sequence[float], rotation: np.ndarray) -> np.ndarray:
     return matrix(rotation, place - rotation @ place)
 
 
+def ends(first: Sequence[np.ndarray], second: Sequence[np.ndarray]) -> list[int]:
+    """By nominal move the corrected one that ends it: each later than the one before, the last with the last,
+    and all together as near to their ends as can be."""
+    away = np.abs(np.array(first)[:, None] - np.array(second)[None]).max(axis=2)
+    # coordinates that are not known yet say nothing
+    away = np.where(np.isnan(away), 0.0, away)
+    count, total, came = len(second), away[0].copy(), []
+    for row in away[1:]:
+        best = np.minimum.accumulate(total)
+        fresh = np.append(True, total[1:] < best[:-1])
+        came.append(np.maximum.accumulate(np.where(fresh, np.arange(count), 0)))
+        total = np.append(np.inf, best[:-1]) + row
+    chosen = [count - 1]
+    for row in reversed(came):
+        chosen.append(int(row[chosen[-1] - 1]))
+    return chosen[::-1]
+
+
 class Judge:
     """A machine from its files."""
 
@@ -46,6 +62,9 @@ class Judge:
         self.file = tomllib.loads(machine.read_text())
         calibration = machine.parent / self.file["calibration"]
         self.errors = tomllib.loads(calibration.read_text())
+        for name, value in self.errors.get("squareness", {}).items():
+            line = self.errors.setdefault("location", {}).setdefault(name[2], {})
+            line[f"{name[0]}_urad"] = line.get(f"{name[0]}_urad", 0.0) + value
         self.chain = self.file["chain"].split()
         self.order = list(self.file["axes"])
         self.vector = False
@@ -152,23 +171,13 @@ class Judge:
         """The largest distance in mm and angle in rad of the tool with errors from the nominal path."""
         first, second = self.read(nominal), self.read(corrected)
         worst, j = np.zeros(2), 0
-        for i, (cuts, tips, end) in enumerate(first):
-            last = self._last(second, j, len(second) - (len(first) - i), end)
+        for i, last in enumerate(ends([row[2] for row in first], [row[2] for row in second])):
+            cuts, tips, end = first[i]
             group = second[j : last + 1]
-            j = last + 1
             if cuts:
-                worst = np.maximum(
-                    worst, self._move(first[i - 1][2], end, tips, second[j - len(group) - 1][2], group)
-                )
+                worst = np.maximum(worst, self._move(first[i - 1][2], end, tips, second[j - 1][2], group))
+            j = last + 1
         return float(worst[0]), float(worst[1])
-
-    def _last(self, second: list[Any], j: int, most: int, end: np.ndarray) -> int:
-        """The move with which one that ends at `end` ends: the nearest of the first ones that are near."""
-        away = [np.abs(second[k][2] - end).max() for k in range(j, most + 1)]
-        near = next(k for k, one in enumerate(away) if one < NEAR)
-        while near + 1 < len(away) and away[near + 1] < away[near]:
-            near += 1
-        return j + near
 
     def _between(self, begin: np.ndarray, end: np.ndarray, share: np.ndarray) -> np.ndarray:
         """Coordinates at shares (n, 1) of a move; along a great circle of the tool where that is led."""
@@ -199,8 +208,9 @@ class Judge:
         part = np.linspace(0.0, 1.0, 12)[:, None]
         samples = np.vstack([self._between(a, b, part) for a, b in pairwise(places)])
         tip, axis = self.forward(self.axes(samples, tips), True)
-        way = end - begin
-        share = (samples - begin) @ way / (way @ way)
+        # along what is written: of a short move its ends lie far beside, for its length
+        way = places[-1] - places[0]
+        share = (samples - places[0]) @ way / max(way @ way, 1e-12)
         low, high = np.clip(share - 0.05, 0.0, 1.0), np.clip(share + 0.05, 0.0, 1.0)
 
         def miss(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -43,6 +43,20 @@ def test_the_judge_finds_the_corrected_path_within_tolerance(chain: str, tips: b
     assert after[1] == pytest.approx(1e-6 * stated["orientation_max_urad"], abs=1e-6)
 
 
+@pytest.mark.slow
+def test_moves_shorter_than_their_errors_are_judged(tmp_path: Path) -> None:
+    rng, place, lines = np.random.default_rng(1), np.array([0.0, 0.0, 0.0, -20.0, 30.0]), []
+    for step in ([10.0] * 3 + [8.0] * 2, *3 * [[0.03] * 3 + [0.02] * 2]):
+        place = place + np.array(step) * rng.normal(0.0, 1.0, 5)
+        lines.append("G1 X{:.3f} Y{:.3f} Z{:.3f} A{:.3f} C{:.3f} F500\n".format(*place))
+    text, machine = HEAD + "".join(lines).encode() + b"M30\n", machine_file(tmp_path, "C A Y F X Z", seed=1)
+    result = olp.correct_joints(text, machine, tolerance_urad=2.0)
+    far, turned = Judge(machine).judged(text, result.data)
+    stated = result.report["deviation"]["after"]
+    assert far == pytest.approx(1e-3 * stated["position_max_um"], abs=0.15e-3)
+    assert turned < 1e-6 * (stated["orientation_max_urad"] + 1.0)
+
+
 @pytest.mark.parametrize(("chain", "tips"), some_fast(CASES, 11))
 def test_without_errors_no_byte_changes(chain: str, tips: bool, tmp_path: Path) -> None:
     machine = machine_file(tmp_path, chain, control="fanuc" if tips else "linuxcnc", errors=False)

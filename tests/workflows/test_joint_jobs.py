@@ -1,0 +1,53 @@
+"""The jobs that ship for machines with rotary joints: corrected, proved, and judged by an own forward."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+from cases.joint_jobs import JOINT_JOBS
+from judge.five_axis import Judge
+
+import olp
+
+FOLDER = Path(__file__).resolve().parents[2] / "programs"
+#: By job the largest deviation without correction, from and to, in um and urad.
+FAR = {
+    "trunnion-mill": ((20.0, 60.0), (50.0, 100.0)),
+    "gantry-wrist": ((50.0, 90.0), (80.0, 130.0)),
+    "arm-payload": ((400.0, 700.0), (700.0, 1100.0)),
+    "hexapod": ((100.0, 150.0), (400.0, 600.0)),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", JOINT_JOBS)
+def test_the_job_is_corrected_and_proved(name: str) -> None:
+    far, turned = FAR[name]
+    path, job = FOLDER / name / JOINT_JOBS[name], FOLDER / name / "job.toml"
+    result = olp.correct_joints(path, path.with_name("machine.toml"), job)
+    before = result.report["deviation"]["before"]
+    assert result.report["verdict"]["ok"]
+    assert far[0] < before["position_max_um"] < far[1]
+    assert turned[0] < before["orientation_max_urad"] < turned[1]
+    proof = olp.verify_joints(path, result.data, path.with_name("machine.toml"), job)
+    assert proof.report["deviation"]["after"] == result.report["deviation"]["after"]
+
+
+@pytest.mark.slow
+def test_the_judge_agrees(tmp_path: Path) -> None:
+    """On the first rings of the trunnion mill, without the measured curve, which the judge does not model."""
+    shutil.copytree(FOLDER / "trunnion-mill", tmp_path / "job")
+    calibration = tmp_path / "job" / "calibration.toml"
+    text = calibration.read_text("utf-8")
+    calibration.write_text(re.sub(r"(?ms)^\[\[curves\].*?(?=^\[)", "", text), "utf-8")
+    program = (FOLDER / "trunnion-mill" / "dome.nc").read_bytes().partition(b"(RING AT 34")[0] + b"M30\n"
+    result = olp.correct_joints(program, tmp_path / "job" / "machine.toml")
+    far, turned = Judge(tmp_path / "job" / "machine.toml").judged(program, result.data)
+    stated = result.report["deviation"]["after"]
+    assert far == pytest.approx(1e-3 * stated["position_max_um"], abs=0.15e-3)
+    assert turned < 1e-6 * (
+        stated["orientation_max_urad"] + result.report["orientation"]["uncorrectable_urad"]
+    )
