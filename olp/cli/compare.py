@@ -22,6 +22,7 @@ from olp.cli.common import (
     refuse_stream,
     refuse_twice,
     source,
+    sources_of_call,
 )
 from olp.cli.layouts import layout_options
 from olp.cli.options import (
@@ -52,6 +53,9 @@ if TYPE_CHECKING:
 
 #: Options that say how files are laid out.
 _LAYOUT = ("profile", "columns", "unit", "delimiter", "positions")
+#: Words of a call that go with machines with rotary joints.
+_ON_JOINTS = ("measured", "before", "poses", "align", "order", "reach_mm", "part_tolerance_um", "report_file",
+              "save_profile", *_LAYOUT[:4])  # fmt: skip
 
 
 @click.command("compare")
@@ -104,11 +108,15 @@ def command(
     NOMINAL is a program (with -m or -j) or a file of points; every MEASURED is one run. Files come from
     trackers, CMMs, logs of a control, or olp simulate.
     """
-    from olp.files.sources import Sources
+    from olp.cli import joints
 
     outputs = options_of(_Outputs, words)
-    session, described = machine_given(machine, job) if machine or job else (None, ())
-    sources = Sources() if session is None else session.sources
+    turning = (machine or job) is not None and joints.on_joints(machine, job, also=_ON_JOINTS)
+    if turning:
+        session, described = None, tuple(name for name in (machine, job) if name)
+    else:
+        session, described = machine_given(machine, job) if machine or job else (None, ())
+    sources = sources_of_call() if session is None else session.sources
     inputs = (*files_of(nominal, *measured, *words["before"]), *described)
     _refuse(outputs, inputs, poses=words["poses"])
 
@@ -120,7 +128,10 @@ def command(
     layout = _layout(measured[0], sources, **{key: words[key] for key in _LAYOUT})
     options = options_of(compare.CompareOptions, words | {"profile": layout, "part_frame": part_frame})
     with progress(outputs.quiet) as show:
-        result = compare.run(sources, session, source(sources, nominal), measured, options, show)
+        if turning:
+            result = joints.compare(nominal, measured, machine, job, options)
+        else:
+            result = compare.run(sources, session, source(sources, nominal), measured, options, show)
         written = _files(result, outputs, session, options.date)
         write_files(written, force=outputs.force, inputs=inputs)
     if outputs.as_json or outputs.report_file == STREAM:

@@ -76,6 +76,11 @@ def command(
         return
     if axes:
         raise UsageError("--axes is for machine files with rotary joints; give the axis position with --at")
+    from olp.cli import joints
+
+    if not about_machine and joints.on_joints(machine, job, also=("file",)):
+        joints.inspect(file, machine, job, words | {"as_json": as_json})
+        return
     session, inputs = machine_given(machine, job)
     setup = session.setup
     if ask_program:

@@ -3,7 +3,8 @@ it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import datetime
+from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +22,7 @@ from olp.cli.common import (
     options_of,
     put,
     refuse_early,
+    refuse_twice,
     source,
     sources_of_call,
 )
@@ -28,6 +30,7 @@ from olp.core.errors import InputError, UsageError
 
 if TYPE_CHECKING:
     from olp.findings.catalogue import Finding
+    from olp.workflows.compare import CompareOptions, Comparison
     from olp.workflows.joints.loaded import JointRun
 
 #: Words of a call that every verb takes on such a machine.
@@ -36,9 +39,9 @@ _ALWAYS = ("program", "programs", "nominal", "corrected", "machine", "job", "dia
            "date", "fail_on", "as_json", "quiet", "force", "step_mm")  # fmt: skip
 
 
-def on_joints(machine: str | None, job: str | None) -> bool:
+def on_joints(machine: str | None, job: str | None, also: Collection[str] = ()) -> bool:
     """Whether the machine of a call has rotary joints. Raises UsageError for --tolerance-urad elsewhere, and
-    for options that are not built for such a machine."""
+    for options that are not built for such a machine: a verb takes some `also`."""
     context = click.get_current_context()
     given = [
         name for name in context.params if context.get_parameter_source(name) is ParameterSource.COMMANDLINE
@@ -47,7 +50,7 @@ def on_joints(machine: str | None, job: str | None) -> bool:
         if "tolerance_urad" in given:
             raise UsageError("--tolerance-urad is for machines with rotary joints; leave it out")
         return False
-    wrong = [name for name in given if name not in _ALWAYS]
+    wrong = [name for name in given if name not in _ALWAYS and name not in also]
     if wrong:
         option = next(p for p in context.command.params if p.name == wrong[0])
         raise UsageError(f"{option.opts[0]} does not go with machines with rotary joints yet; leave it out")
@@ -83,26 +86,40 @@ def correct(program: str | None, machine: str | None, job: str | None, words: di
     output = words["output"] or default_output(name)
     if words["as_json"] and output == STREAM:
         raise UsageError("JSON on stdout excludes -o -; name a file with -o")
-    refuse_early(files_of(output), run.files, force=words["force"])
+    report_file = words["report_file"]
+    refuse_twice(files_of(output, report_file))
+    refuse_early(files_of(output, report_file), run.files, force=words["force"])
 
     from olp.files.write import write_files
     from olp.reports.report import to_json
     from olp.workflows.joints.correct import JointOptions, corrected
 
     result = corrected(run, options_of(JointOptions, words))
-    write_files(
-        {Path(file): result.data for file in files_of(output)}, force=words["force"], inputs=run.files
-    )
+    written = {Path(file): result.data for file in files_of(output)}
+    written |= {Path(file): _report(result.report, file, words["date"]) for file in files_of(report_file)}
+    write_files(written, force=words["force"], inputs=run.files)
     if output == STREAM:
         put(result.data)
-    if words["as_json"]:
+    if words["as_json"] or report_file == STREAM:
         put(to_json(result.report))
     elif not words["quiet"]:
         put(result.to_text(), err=output == STREAM)
     if not words["quiet"]:
-        for file in files_of(output):
+        for file in written:
             diagnostic(f"wrote {file}")
     exit_for(result.findings, words["fail_on"])
+
+
+def _report(report: dict[str, Any], name: str, date: datetime.date | None) -> bytes:
+    """The report of a correction in the form that `name` ends in."""
+    from olp.core.version import __version__
+    from olp.reports.document import in_form
+    from olp.reports.document_joints import correction
+    from olp.reports.report import to_json
+
+    if Path(name).suffix.lower() == ".json":
+        return to_json(report)
+    return in_form(correction(report, __version__, date), name)
 
 
 def verify(nominal: str, corrected: str, machine: str | None, job: str | None, words: dict[str, Any]) -> None:
@@ -170,3 +187,23 @@ def simulate(
         put(to_json(result.report))
     elif output in (None, STREAM):
         put(result.to_csv())
+
+
+def compare(
+    nominal: str, measured: Sequence[str], machine: str | None, job: str | None, options: CompareOptions
+) -> Comparison:
+    """`olp compare`, up to what is written."""
+    from olp.workflows.joints.compare import compare_with
+
+    return compare_with(run_of(nominal, machine, job), measured, options)
+
+
+def inspect(program: str | None, machine: str | None, job: str | None, words: dict[str, Any]) -> None:
+    """`olp inspect` of a program."""
+    from olp.reports.outline import outline
+    from olp.reports.report import plain, to_json
+    from olp.workflows.flatten import UnrollOptions
+    from olp.workflows.joints.inspect import program_summary
+
+    values = program_summary(run_of(program, machine, job), options_of(UnrollOptions, words))
+    put(to_json(values) if words["as_json"] else outline(plain(values)))

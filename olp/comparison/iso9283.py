@@ -1,4 +1,4 @@
-"""Accuracy and repeatability of poses and paths after ISO 9283:1998, positions only.
+"""Accuracy and repeatability of poses and paths after ISO 9283:1998: positions, and orientations of poses.
 
 All figures come from equal cycles; the standard requires 30 cycles for poses and 10 for paths.
 """
@@ -46,6 +46,30 @@ def repeated(command_mm: Array, attained_mm: Array) -> Repeated:
         repeatability = np.where(count > 1, average + 3.0 * np.sqrt(square / (count - 1)), np.nan)
     bias = mean - command_mm
     return Repeated(np.sqrt((bias * bias).sum(axis=1)), repeatability, bias)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Turned:
+    """Per pose (m, 3), in rad, about X, Y and Z: `accuracy`, the mean turn from the commanded orientation,
+    with its sign; `repeatability`, three standard deviations of it, NaN with one cycle."""
+
+    accuracy: Array
+    repeatability: Array
+
+
+def turned(turns_rad: Array) -> Turned:
+    """Figures of the orientations of n cycles, from rotation vectors (n, m, 3) from the commanded ones.
+
+    ISO 9283, 7.2.1 and 7.2.2: AP_a = mean - command and RP_a = 3 S_a, S_a with n - 1, and so for b and c.
+    Cycles that did not reach a pose (NaN) are left out there.
+    """
+    there = np.isfinite(turns_rad).all(axis=2, keepdims=True)
+    count = there.sum(axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean = np.where(there, turns_rad, 0.0).sum(axis=0) / count
+        square = np.where(there, (turns_rad - mean) ** 2, 0.0).sum(axis=0)
+        spread = np.where(count > 1, 3.0 * np.sqrt(square / (count - 1)), np.nan)
+    return Turned(np.asarray(mean), np.asarray(spread))
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,19 +13,26 @@ import numpy.typing as npt
 
 from olp.core.arrays import Array
 from olp.core.errors import InputError
+from olp.core.units import RAD_PER_URAD
 from olp.core.values import dataclass
 from olp.files.columns import place_in
 from olp.files.point_profile import MEASURED, PointProfile, looked_at
 from olp.files.write import PathLike, Reader, read_bytes
+from olp.kinematics.poses import tilts
 from olp.program.text.delimited import DELIMITERS, LOOK, MM, SECONDS, first_lines, stated_frame
 from olp.program.text.rows import Form, decoded, form_of, no_number
+
+#: Columns of an orientation, with their unit.
+_ANGLE = re.compile(r"(?i)([ABC])[ _]*[\[(]?deg[\])]?|(R[XYZ])[ _]*[\[(]?urad[\])]?")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Points:
     """(n, 3) positions in mm, with times (n,) in s, names and program lines (n,) where the file has them.
 
-    `frame` is the frame of the positions as the file states it, None where it does not.
+    `frame` is the frame of the positions as the file states it, None where it does not. `rotation` (n, 3, 3)
+    is the orientation of the tool where columns A_deg, B_deg, C_deg state it: R = Rz(C) Ry(B) Rx(A).
+    `turn_rad` (n, 3) are rotation vectors from the nominal orientation, of columns RX_urad, RY_urad, RZ_urad.
     """
 
     file: str
@@ -36,18 +43,22 @@ class Points:
     frame: str | None
     profile: PointProfile
     sha256: str
+    rotation: Array | None = None
+    turn_rad: Array | None = None
 
     def __len__(self) -> int:
         return len(self.points_mm)
 
 
-def read_points(path: PathLike, profile: PointProfile | None = None, read: Reader = read_bytes) -> Points:
+def read_points(
+    path: PathLike, profile: PointProfile | None = None, read: Reader = read_bytes, *, oriented: bool = False
+) -> Points:
     """The points of a file. Without a profile its layout is detected from its first rows.
 
     Raises InputError where the file cannot be read, its layout cannot be detected, or a row is wrong, with
-    the line.
+    the line. Orientations are read where they are to be `oriented`.
     """
-    return parse_points(read(path), str(path), profile)
+    return parse_points(read(path), str(path), profile, oriented=oriented)
 
 
 def row_line(points: Points, row: int) -> int:
@@ -63,7 +74,9 @@ def layout_of(data: bytes) -> PointProfile | None:
     return looked_at(first_lines(data))
 
 
-def parse_points(data: bytes, file: str, profile: PointProfile | None = None) -> Points:
+def parse_points(
+    data: bytes, file: str, profile: PointProfile | None = None, *, oriented: bool = False
+) -> Points:
     """As `read_points`, from the bytes of the file."""
     try:
         text = _lines(decoded(data))
@@ -86,6 +99,8 @@ def parse_points(data: bytes, file: str, profile: PointProfile | None = None) ->
     columns = {
         key: place_in(header, column, file) for key, column in layout.columns.given.items() if key in MEASURED
     }
+    turning = _turning(header, file) if oriented else {}
+    columns |= turning
     numbers = [key for key in columns if key != "name"]
     table = _table(text, file, layout, skip, [columns[key] for key in numbers])
     column = dict(zip(numbers, table.T, strict=True))
@@ -95,6 +110,8 @@ def parse_points(data: bytes, file: str, profile: PointProfile | None = None) ->
     names = None
     if "name" in columns:
         names = _texts(text, file, layout, skip, columns["name"])
+    turns = np.column_stack([column[key] for key in turning]) if turning else None
+    stated_turn = turns is not None and "RX" in turning
     return Points(
         file,
         np.column_stack([column[axis] for axis in "XYZ"]) * MM[layout.unit],
@@ -104,7 +121,24 @@ def parse_points(data: bytes, file: str, profile: PointProfile | None = None) ->
         stated or layout.frame,
         layout,
         hashlib.sha256(data).hexdigest(),
+        tilts(np.radians(turns)) if turns is not None and not stated_turn else None,
+        turns * RAD_PER_URAD if turns is not None and stated_turn else None,
     )
+
+
+def _turning(header: Sequence[str], file: str) -> dict[str, int]:
+    """The columns of the orientation: those of A_deg, B_deg, C_deg, or of RX_urad, RY_urad, RZ_urad; none
+    where the header does not name three. Raises InputError where it names all six."""
+    found = [_ANGLE.fullmatch(name) for name in header]
+    named = {str(m[1] or m[2]).upper(): place for place, m in enumerate(found) if m is not None}
+    chosen = [keys for keys in (("A", "B", "C"), ("RX", "RY", "RZ")) if named.keys() >= set(keys)]
+    if len(chosen) > 1:
+        raise InputError(
+            "states the orientation by A_deg, B_deg, C_deg and by RX_urad, RY_urad, RZ_urad; expected one of "
+            "them",
+            file=file,
+        )
+    return {key: named[key] for keys in chosen for key in keys}
 
 
 def _lines(text: str) -> str:

@@ -98,6 +98,17 @@ def relative(rotation: Array, other: Array) -> Array:
     return rotation_vector(turn.transpose(2, 0, 1))
 
 
+def rotations(vectors_rad: Array) -> Array:
+    """(n, 3, 3) rotations by the length of vectors (n, 3), in rad, about them."""
+    cross = np.zeros((len(vectors_rad), 3, 3))
+    cross[:, (2, 0, 1), (1, 2, 0)] = vectors_rad
+    cross -= np.swapaxes(cross, 1, 2)
+    angle = np.linalg.norm(vectors_rad, axis=1)[:, None, None]
+    # sin(a) / a and (1 - cos(a)) / a^2, also at zero
+    first, second = np.sinc(angle / np.pi), 0.5 * np.square(np.sinc(0.5 * angle / np.pi))
+    return np.asarray(np.eye(3) + first * cross + second * (cross @ cross))
+
+
 def rotation_vector(rotation: Array) -> Array:
     """(n, 3) angle times unit axis of rotations (n, 3, 3), in rad; the angle is from 0 to pi."""
     skew = np.empty((3, *rotation.shape[:-2]))

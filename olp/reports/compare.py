@@ -35,6 +35,8 @@ ISO = (
     ("pose accuracy AP", ("iso_9283", "AP_um")),
     ("pose repeatability RP", ("iso_9283", "RP_um")),
 )
+#: Heads of figures of orientations.
+TURN_FIGURES = ("AP X", "AP Y", "AP Z", "RP X", "RP Y", "RP Z")
 #: Most rows of a table of poses.
 _MAX_ROWS = 20
 
@@ -161,6 +163,16 @@ def _poses(report: Report) -> Iterator[str]:
         yield from table(["", "AP", "RP", "X", "Y", "Z"], rows, unit="um")
         if len(poses) > _MAX_ROWS:
             yield f"  and {len(poses) - _MAX_ROWS} more"
+        if "AP_turn_urad" in poses[0]:
+            yield ""
+            yield shown.title(f"Orientation, {side}, about X, Y, Z in urad")
+            largest = ("largest", (report.get(name) or {})["iso_9283"])
+            each = [largest, *((str(p["name"]), p) for p in poses[:_MAX_ROWS])]
+            rows = [
+                [printable(title), *map(number, (*p["AP_turn_urad"], *p["RP_turn_urad"]))]
+                for title, p in each
+            ]
+            yield from table(["", *TURN_FIGURES], rows, unit="urad")
 
 
 def _worst(report: Report) -> Iterator[str]:

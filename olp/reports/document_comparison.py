@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from olp.reports.compare import absorbed_by_fit, change, table_rows
+from olp.reports.compare import TURN_FIGURES, absorbed_by_fit, change, table_rows
 from olp.reports.document import Block, Document, Grid, Pairs, Paragraph, Section
 from olp.reports.document_parts import (
     MOST_POSES,
@@ -133,5 +133,11 @@ def _measured(report: Report, plots: Plots) -> Iterator[Block]:
             yield Paragraph(f"Poses, {side}, in um:")
             yield Grid(["pose", "AP", "RP", "X", "Y", "Z"], [
                 [str(p["name"]), number(p["AP_um"]), number(p["RP_um"]), *map(number, p["bias_um"])]
+                for p in poses[:MOST_POSES]
+            ])  # fmt: skip
+        if poses and "AP_turn_urad" in poses[0]:
+            yield Paragraph(f"Orientation, {side}, about X, Y and Z, in urad:")
+            yield Grid(["pose", *TURN_FIGURES], [
+                [str(p["name"]), *map(number, (*p["AP_turn_urad"], *p["RP_turn_urad"]))]
                 for p in poses[:MOST_POSES]
             ])  # fmt: skip

@@ -39,8 +39,14 @@ def machine_rows(report: Report) -> list[tuple[str, str]]:
         ("Machine", str(machine.get("name", ""))),
         ("Axes, workpiece to tool", str(machine.get("chain", ""))),
         ("Numerical controller", str(machine.get("controller", ""))),
-        ("Scope", "three linear axes, quasi-static errors; without forces and dynamics"),
+        ("Scope", f"{_scope(machine)}, quasi-static errors; without forces and dynamics"),
     ]
+
+
+def _scope(machine: Mapping[str, object]) -> str:
+    """The axes of a machine: chains of any joints are written with blanks."""
+    any_joints = " " in str(machine.get("chain", ""))
+    return "joints of any kind, position and orientation" if any_joints else "three linear axes"
 
 
 def calibration_blocks(report: Report, date: datetime.date | None) -> list[Block]:
@@ -59,7 +65,7 @@ def calibration_blocks(report: Report, date: datetime.date | None) -> list[Block
     temperature = calibration.get("temperature_degC")
     return [Pairs([
         ("Measured", date_text(measured)), ("Valid until", date_text(until)), ("Age", age),
-        ("Model", str(calibration.get("model", ""))),
+        ("Model", str(calibration.get("model", "rigid bodies"))),
         ("Temperature", "" if temperature is None else f"{temperature:g} degC"),
         ("SHA-256", str(calibration.get("sha256", ""))),
     ])]  # fmt: skip

@@ -9,6 +9,13 @@ from olp.reports.report import CORRECTED, UNCORRECTED, findings_text, number, pa
 
 Report = Mapping[str, Any]
 
+#: The columns of the worst blocks: their key, and their title.
+WORST = {
+    "position_um": "um",
+    "orientation_urad": "urad",
+    "uncorrected_um": "uncorrected um",
+    "uncorrected_urad": "uncorrected urad",
+}
 #: The columns of a deviation: their key, and their title.
 _COLUMNS = (
     ("position_max_um", "position max"),
@@ -69,13 +76,16 @@ def _heads(report: Report) -> Iterator[str]:
 
 
 def _verdict(report: Report) -> Iterator[str]:
+    yield from verdict_of(report).split("\n")
+
+
+def verdict_of(report: Report) -> str:
+    """What the proof says, in two lines."""
     deviation = report["deviation"]
     within = "within" if deviation["holds"] else "NOT within"
-    yield (
+    return (
         f"The corrected path is {within} {number(deviation['allowed_um'])} um and "
-        f"{number(deviation['allowed_urad'])} urad of the nominal one"
-    )
-    yield (
+        f"{number(deviation['allowed_urad'])} urad of the nominal one\n"
         f"(tolerances {number(report['tolerance_um'])} um and {number(report['tolerance_urad'])} urad, and "
         "rounding to the last digit)."
     )
@@ -96,20 +106,21 @@ def _deviation(report: Report) -> Iterator[str]:
 
 def _corrections(report: Report) -> Iterator[str]:
     yield "Largest change of each axis"
+    yield from table(["axis", "change"], axis_changes(report))
+
+
+def axis_changes(report: Report) -> list[list[str]]:
+    """By axis the largest change of its coordinates, with its unit."""
     words = (name.rpartition("_") for name in report["largest_correction"])
-    rows = [
+    return [
         [axis, f"{number(value)} {unit}"]
         for (axis, _, unit), value in zip(words, report["largest_correction"].values(), strict=True)
     ]
-    yield from table(["axis", "change"], rows)
 
 
 def _worst(report: Report) -> Iterator[str]:
     if not report["worst"]:
         return
     yield "Worst blocks, corrected and uncorrected"
-    keys = ("position_um", "orientation_urad", "uncorrected_um", "uncorrected_urad")
-    yield from table(
-        ["line", "um", "urad", "uncorrected um", "uncorrected urad"],
-        [[str(row["line"]), *(number(row[key]) for key in keys)] for row in report["worst"]],
-    )
+    rows = [[str(row["line"]), *(number(row[key]) for key in WORST)] for row in report["worst"]]
+    yield from table(["line", *WORST.values()], rows)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 import hashlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Any, Literal, TypeVar
@@ -172,13 +172,17 @@ def _joined(parts: Iterable[npt.NDArray[S]], none: npt.NDArray[S]) -> npt.NDArra
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Side:
-    """The nominal side: points, or a program with its machine."""
+class Side:
+    """The nominal side: points, or a program with its machine. On a machine with rotary joints `ground` is
+    the path, `joints` are the parts of the report on the machine, and the tool may be `symmetric`."""
 
     source: Source
     points: Points | None
     program: Program | None
     loaded: Loaded | None
+    ground: Ground | None = None
+    joints: Mapping[str, Any] | None = None
+    symmetric: bool = False
 
 
 def compare(
@@ -238,21 +242,31 @@ def run(
     if not measured:
         raise UsageError("no measured file is given; name at least one")
     sets = [
-        [read_points(name, options.profile, sources.read_last) for name in names]
+        [read_points(name, options.profile, sources.read_last, oriented=options.poses) for name in names]
         for names in (measured, options.before)
     ]
     side = _nominal_side(nominal, session, options)
     if side.loaded is not None:
         part_um = side.loaded.part_tolerance_um(options.part_tolerance_um)
         options = replace(options, part_tolerance_um=part_um)
-    done = _poses(side, sets, options) if options.poses else _paths(side, sets, options, tell)
-    return replace(done, inputs=sources.files if session is None else session.inputs())
+    return replace(
+        compared(side, sets, options, tell), inputs=sources.files if session is None else session.inputs()
+    )
 
 
-def _poses(side: _Side, sets: Sequence[Sequence[Points]], options: CompareOptions) -> Comparison:
+def compared(
+    side: Side, sets: Sequence[Sequence[Points]], options: CompareOptions, tell: Progress = silent
+) -> Comparison:
+    """As `compare`, of what was read: runs, and runs without correction."""
+    return _poses(side, sets, options) if options.poses else _paths(side, sets, options, tell)
+
+
+def _poses(side: Side, sets: Sequence[Sequence[Points]], options: CompareOptions) -> Comparison:
     if side.points is None:
         raise UsageError("poses need a file of points as NOMINAL, and it is a program")
-    report, findings = poses_report(side.points, *sets, align=options.align, reach_mm=options.reach_mm)
+    report, findings = poses_report(
+        side.points, *sets, align=options.align, reach_mm=options.reach_mm, symmetric=side.symmetric
+    )
     report = _head(side, sets, options) | report
     name = options.part_frame
     table = None if name is None else poses_frame(side.points, sets[0], name)
@@ -260,7 +274,7 @@ def _poses(side: _Side, sets: Sequence[Sequence[Points]], options: CompareOption
 
 
 def _paths(
-    side: _Side, sets: Sequence[Sequence[Points]], options: CompareOptions, tell: Progress
+    side: Side, sets: Sequence[Sequence[Points]], options: CompareOptions, tell: Progress
 ) -> Comparison:
     axes = _positions(sets) == "axes"
     if options.add_errors and not (axes and side.program):
@@ -269,7 +283,7 @@ def _paths(
             'profile with positions = "axes"'
         )
     _same_frame(side, sets)
-    ground = _ground(side, axes)
+    ground = side.ground or _ground(side, axes)
     how = How(
         align=options.align, order=options.order, reach_mm=options.reach_mm, axes=axes,
         part_tolerance_um=options.part_tolerance_um, add_errors=options.add_errors,
@@ -292,7 +306,7 @@ def _paths(
 
 
 def _judged_report(
-    side: _Side, ground: Ground, done: Judged, axes: bool, options: CompareOptions
+    side: Side, ground: Ground, done: Judged, axes: bool, options: CompareOptions
 ) -> dict[str, Any]:
     path, frame = ground.path, parts.frame(done.placed)
     if done.absorbed is not None:
@@ -305,7 +319,7 @@ def _judged_report(
             "segments": len(path),
             "cutting_mm": float(np.diff(path.s_mm)[path.cutting].sum()),
             "points": len(path.stops),
-            "compared_in": "axis positions" if axes else "the program's frame",
+            "compared_in": _compared_in(side, axes),
             "machine_errors_added": options.add_errors,
         },
         **done.figures,
@@ -320,11 +334,17 @@ def _judged_report(
     return report
 
 
+def _compared_in(side: Side, axes: bool) -> str:
+    if side.joints is not None:
+        return "workpiece coordinates"
+    return "axis positions" if axes else "the program's frame"
+
+
 def _with(report: dict[str, Any], findings: Sequence[Finding]) -> dict[str, Any]:
     return report | {"findings": [f.as_dict() for f in findings]}
 
 
-def _nominal_side(nominal: Source, session: Session | None, options: CompareOptions) -> _Side:
+def _nominal_side(nominal: Source, session: Session | None, options: CompareOptions) -> Side:
     """A table of points is a path, or poses; with a machine whose dialect has points, it is a program."""
     nominal.load()
     name, data = nominal.name, nominal.data
@@ -341,12 +361,13 @@ def _nominal_side(nominal: Source, session: Session | None, options: CompareOpti
             raise UsageError(
                 "--flatten and --expand-cycles are for a program, and NOMINAL is a table of points"
             )
-        return _Side(nominal, parse_points(data, name or "<stdin>"), None, loaded)
+        points_of = parse_points(data, name or "<stdin>", oriented=options.poses)
+        return Side(nominal, points_of, None, loaded)
     with nominal.errors("<stdin>"):
         sources = session.sources if session is not None else Sources()
         reading = Options()
         nominal, program = refusals.read(sources, nominal, loaded.setup, loaded.dialect, reading, options)
-    return _Side(nominal, None, program.in_original(), loaded)
+    return Side(nominal, None, program.in_original(), loaded)
 
 
 def _positions(sets: Sequence[Sequence[Points]]) -> Literal["tip", "axes"]:
@@ -358,14 +379,14 @@ def _positions(sets: Sequence[Sequence[Points]]) -> Literal["tip", "axes"]:
     return kinds.pop()
 
 
-def _ground(side: _Side, axes: bool) -> Ground:
+def _ground(side: Side, axes: bool) -> Ground:
     if side.points is not None:
         return Ground.of_points(side.points)
     assert side.program is not None and side.loaded is not None
     return Ground.of_program(side.program, side.loaded, axes=axes)
 
 
-def _same_frame(side: _Side, sets: Sequence[Sequence[Points]]) -> None:
+def _same_frame(side: Side, sets: Sequence[Sequence[Points]]) -> None:
     """Raise InputError where files state different frames, and no machine says how they lie."""
     if side.points is None:
         return
@@ -381,11 +402,12 @@ def _same_frame(side: _Side, sets: Sequence[Sequence[Points]]) -> None:
         )
 
 
-def _head(side: _Side, sets: Sequence[Sequence[Points]], options: CompareOptions) -> dict[str, Any]:
+def _head(side: Side, sets: Sequence[Sequence[Points]], options: CompareOptions) -> dict[str, Any]:
     nominal = {
         "name": side.source.short,
         "sha256": hashlib.sha256(original_of(side.source.data)).hexdigest(),
         "kind": "program" if side.program else "points",
     }
     stated = {"align": options.align, "reach_mm": options.reach_mm, "tolerance_um": options.part_tolerance_um}
-    return parts.head(nominal, side.loaded, *sets) | stated
+    heads = side.joints if side.loaded is None else side.loaded.heads()
+    return parts.head(nominal, heads or {}, *sets) | stated

@@ -15,25 +15,25 @@ from olp.files.points import Points
 from olp.findings.catalogue import Finding
 from olp.proof import judgement
 from olp.proof.measured import Measured
-from olp.workflows.session import Loaded
 
 #: Most lines of a finding.
 _WORST = 10
 
 
 def head(
-    nominal: Mapping[str, Any], loaded: Loaded | None, measured: Sequence[Points], before: Sequence[Points]
+    nominal: Mapping[str, Any],
+    machine: Mapping[str, Any],
+    measured: Sequence[Points],
+    before: Sequence[Points],
 ) -> dict[str, Any]:
-    """What was compared, with the hashes of all files."""
-    report: dict[str, Any] = {
+    """What was compared, with the hashes of all files; `machine` are the parts on it and its calibration."""
+    return {
         "schema": "olp-comparison-1",
         "nominal": dict(nominal),
         "measured": [_described(points) for points in measured],
         "measured_before": [_described(points) for points in before],
+        **machine,
     }
-    if loaded is not None:
-        report |= loaded.heads()
-    return report
 
 
 def _described(points: Points) -> dict[str, Any]:

@@ -44,7 +44,7 @@ def dome() -> Iterator[str]:
                 yield f"X{x:.3f} Y{y:.3f} C{turn:.3f}"
         yield "G0 Z60."
         yield "C0."
-    yield from ("G49", "G0 Z150.")
+    yield from ("G49", "G0 X0. Y0. Z150.")
     for turn in (0.0, 90.0, 180.0, 270.0):
         yield f"(SLOT AT C {turn:g})"
         yield f"G0 A-60. C{turn:.3f}"
@@ -74,7 +74,7 @@ def trim() -> Iterator[str]:
                 first = False
             else:
                 yield f"{word} F3000"
-    yield from ("G0 Z-200", "TRAFOOF", "G0 Z-100", "G0 C0 B0", "M30")
+    yield from ("G0 Z-200", "TRAFOOF", "G0 X800 Y500 Z-100 C0 B0", "M30")
 
 
 def listed(name: str, poses: Poses, start: np.ndarray, decimals: int) -> Iterator[str]:

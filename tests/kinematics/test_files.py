@@ -127,6 +127,17 @@ WRONG_CALIBRATIONS = [
 ]
 
 
+@pytest.mark.parametrize("names", ["", '"ECC"'])
+def test_a_calibration_says_that_the_control_corrected_nothing(tmp_path: Path, names: str) -> None:
+    line = f"active_during_measurement = [{names}]\n"
+    folder = written(tmp_path, calibration=CALIBRATION.replace("[box]", line + "[box]"))
+    if not names:
+        olp.load_kinematics(folder)
+        return
+    with pytest.raises(olp.ConfigError, match=r"active_during_measurement names .* expected \[\]"):
+        olp.load_kinematics(folder)
+
+
 @pytest.mark.parametrize(("more", "words"), WRONG_CALIBRATIONS)
 def test_a_wrong_calibration_is_refused(tmp_path: Path, more: str, words: str) -> None:
     with pytest.raises(olp.ConfigError, match=words):

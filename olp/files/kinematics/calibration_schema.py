@@ -8,6 +8,7 @@ from typing import ClassVar, Literal
 from olp.core.schema import Interval, Positive, Table, Text, Triple
 from olp.core.schema_keys import Field, Known, refusal, rule
 from olp.files.fields import Sign
+from olp.files.kinematics.schema import none_named
 
 #: What the format of machines with three linear axes has, and such machines not yet.
 _NOT_BUILT = {
@@ -136,6 +137,9 @@ class JointCalibrationFile(Table):
     box: dict[Text, Interval] = Field(
         description="the calibrated axis positions, { X_mm = [min, max], C_deg = [min, max] }"
     )
+    active_during_measurement: list[Text] = Field(
+        default=[], description="the errors that the control corrected then; none can be named here yet"
+    )
     curves: list[JointCurveTable] = Field(default=[], description="tables [[curves]]: error motions")
     location: dict[Text, LocationTable] = Field(
         default={},
@@ -155,6 +159,11 @@ class JointCalibrationFile(Table):
     )
     masses: list[MassTable] = Field(default=[], description="tables [[masses]]: weights on the bodies")
     legs: list[LegErrorTable] = Field(default=[], description="tables [[legs]]: errors of legs of platforms")
+
+    @rule("active_during_measurement")
+    @staticmethod
+    def _none_yet(value: list[str], _: Known) -> list[str]:
+        return none_named(value)
 
     @rule("valid_until")
     @staticmethod

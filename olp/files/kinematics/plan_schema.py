@@ -6,8 +6,9 @@ import datetime
 from typing import Literal
 
 from olp.core.schema import NotNegative, Positive, Table, Text, Triple
-from olp.core.schema_keys import Field, Known, refusal, rule
+from olp.core.schema_keys import Field, Known, rule
 from olp.files.kinematics.calibration_schema import MassTable
+from olp.files.kinematics.schema import none_named
 
 
 class ReadingTable(Table):
@@ -132,8 +133,4 @@ class JointPlanFile(Table):
     @rule("active_during_measurement")
     @staticmethod
     def _none_yet(value: list[str], _: Known) -> list[str]:
-        if value:
-            raise refusal(
-                "names errors that the control corrects, which is not built for such a machine; expected []"
-            )
-        return value
+        return none_named(value)

@@ -140,6 +140,15 @@ class KinematicsTable(Table):
     )
 
 
+def none_named(value: list[str]) -> list[str]:
+    """Errors that the control corrects: none. Raises where some are named."""
+    if value:
+        raise refusal(
+            "names errors that the control corrects, which is not built for such a machine; expected []"
+        )
+    return value
+
+
 class JointMachineFile(Table):
     """olp-machine-1 of any joints: its chain, its axes, platforms and tools."""
 
@@ -180,11 +189,7 @@ class JointMachineFile(Table):
     @rule("compensated_by_controller")
     @staticmethod
     def _none_yet(value: list[str], _: Known) -> list[str]:
-        if value:
-            raise refusal(
-                "names errors that the control corrects, which is not built for such a machine; expected []"
-            )
-        return value
+        return none_named(value)
 
     @rule("axes")
     @staticmethod

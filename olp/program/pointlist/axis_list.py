@@ -71,6 +71,16 @@ def read_axis_list(data: bytes, order: Sequence[str], units: Sequence[str]) -> A
     )  # fmt: skip
 
 
+def names_of(rows: AxisList) -> tuple[str, ...] | None:
+    """The column `name` of a list, None where it has none."""
+    data = bytes(rows.program.data)
+    cells = Cells(data, _layout(first_lines(data)))
+    if "name" not in cells.header:
+        return None
+    place = cells.header.index("name")
+    return tuple(cells.word(row, place) for _, row in cells.rows())
+
+
 #: Line (n,), bytes of numbers (n, axes, 2), values and decimals (n, axes), bytes of rows (n, 2), tools.
 _Rows = tuple[Index, Index, Array, Index, Index, list[str]]
 

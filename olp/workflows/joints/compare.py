@@ -1,0 +1,115 @@
+"""`compare` on machines with rotary joints: measured poses and paths of the tool in workpiece coordinates."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from olp.comparison.path import Path
+from olp.compensation.joints.path import JointPath
+from olp.compensation.joints.sampling import Resolution, spread
+from olp.core.arrays import Array, Index
+from olp.core.errors import InputError, UsageError
+from olp.files.point_profile import PointProfile
+from olp.files.points import Points, read_points
+from olp.kinematics.poses import Poses
+from olp.kinematics.programmed import stated_tips
+from olp.program.pointlist.axis_list import names_of
+from olp.proof.judgement import groups_of
+from olp.workflows.compare import CompareOptions, Comparison, Side, compared
+from olp.workflows.compare_runs import Ground
+from olp.workflows.joints.loaded import JointRun
+from olp.workflows.session import PathLike
+
+#: How files name the coordinates of the workpiece with all axes at zero, as `simulate` states them.
+_WORKPIECE = "workpiece"
+#: Nominal paths are sampled at least so often, mm.
+_STEP_MM = 0.5
+
+
+def compare_with(run: JointRun, measured: Sequence[PathLike], options: CompareOptions) -> Comparison:
+    """Measured runs against the poses or the path that the nominal machine takes. Raises InputError,
+    UsageError and CannotCompute."""
+    if not measured:
+        raise UsageError("no measured file is given; name at least one")
+    with run.program.errors():
+        _, path = run.read(run.program, options)
+    sets = [
+        [
+            _in_workpiece(
+                read_points(name, options.profile, run.sources.read_last, oriented=options.poses), run, path
+            )
+            for name in names
+        ]
+        for names in (measured, options.before)
+    ]
+    side = Side(
+        run.program, _poses(path, run.program.short) if options.poses else None,
+        None if options.poses else path.program.in_original(), None,
+        None if options.poses else _ground(path), run.heads(), run.machine.structure.symmetric_tool,
+    )  # fmt: skip
+    done = compared(side, sets, options)
+    return replace(done, inputs=(*run.files, *run.sources.files))
+
+
+def _known(path: JointPath) -> Index:
+    return np.flatnonzero(np.isfinite(path.end).all(axis=1))
+
+
+def _nominal(path: JointPath, row: Index, places: Array) -> Poses:
+    """Nominal poses at programmed coordinates (r, axes) of moves."""
+    axes = path.motion.axes(places, path.tool[row], path.tip[row])
+    return path.motion.nominal(axes, path.tool[row])
+
+
+def _poses(path: JointPath, file: str) -> Points:
+    """The poses at the ends of moves, with the names of a list."""
+    rows = _known(path)
+    poses = _nominal(path, rows, path.end[rows]).rows(len(rows))
+    names = None if path.listed is None else names_of(path.listed)
+    return Points(
+        file, poses.position, None, names, path.line[rows].astype(np.int64), _WORKPIECE, PointProfile(), "",
+        np.array(poses.rotation),
+    )  # fmt: skip
+
+
+def _ground(path: JointPath) -> Ground:
+    """The path of the nominal tip, by chords."""
+    rows = _known(path)
+    rows = rows[np.isfinite(path.start[rows]).all(axis=1)]
+    tool, tip = path.tool[rows], path.tip[rows]
+    begin, end = (path.motion.axes(place[rows], tool, tip) for place in (path.start, path.end))
+    tips = [path.motion.nominal(axes, tool).position for axes in (begin, end)]
+    count = np.maximum(
+        np.ceil(np.linalg.norm(tips[1] - tips[0], axis=1) / _STEP_MM).astype(np.int64),
+        np.maximum(Resolution.of(path.motion).samples(begin, end), 1),
+    )
+    owner, step = spread(count)
+    move = rows[owner]
+    places = _nominal(path, move, path.at(move, (step + 1) / count[owner])).position
+    points, move = np.vstack((tips[0][:1], places)), np.append(move[:1], move)
+    feed = path.feed if path.feed.any() else path.judged
+    through = Path.through(points, move, feed[move])
+    line = path.program.in_original().toolpath.line.astype(np.int64)
+    numbers, operation = groups_of(path.program.toolpath)
+    none = np.zeros(0, np.int64)
+    return Ground(replace(through, line=line[through.line]), through.line, none, line, numbers, operation)
+
+
+def _in_workpiece(points: Points, run: JointRun, path: JointPath) -> Points:
+    """Measured points in workpiece coordinates. Raises InputError for a frame that is not known."""
+    if points.frame in (None, _WORKPIECE):
+        return points
+    offset = None if run.setup is None else run.setup.work_offset(points.frame)
+    if offset is None or any(offset.rotation_deg) or any(run.turned.get(points.frame, {}).values()):
+        raise InputError(
+            f"states the frame {points.frame}, no work offset of this machine without rotary values; "
+            f"expected {_WORKPIECE} or such an offset",
+            file=points.file,
+        )
+    structure = path.motion.structure
+    values = np.zeros((len(points), len(structure.order)))
+    values[:, [structure.order.index(axis) for axis in "XYZ"]] = points.points_mm + np.array(offset.offset_mm)
+    return replace(points, points_mm=stated_tips(path.motion.machines[0], values), frame=_WORKPIECE)

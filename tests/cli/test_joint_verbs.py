@@ -1,0 +1,71 @@
+"""`inspect` of programs and report files on machines with rotary joints."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+from olp.cli import main
+
+FOLDER = Path(__file__).resolve().parents[2] / "programs"
+ARM = FOLDER / "arm-payload"
+
+
+def run(*words: object) -> Result:
+    return CliRunner().invoke(main, [*map(str, words)])
+
+
+def test_a_list_is_inspected() -> None:
+    values = json.loads(run("inspect", "-j", ARM / "job.toml", "--json").stdout)
+    rows = np.loadtxt(ARM / "deburr.csv", delimiter=",", skiprows=1)
+    for column, (name, low, high) in enumerate((("J1", -170.0, 170.0), ("J2", -120.0, 90.0))):
+        axis = values["axes"][name]
+        assert (axis["from_deg"], axis["to_deg"]) == (rows[:, column].min(), rows[:, column].max())
+        rest = np.minimum(rows[:, column] - low, high - rows[:, column])
+        assert axis["travel_left_deg"] == pytest.approx(rest.min())
+        # the header is line 1
+        assert axis["line"] == 2 + rest.argmin()
+    # the wrist is straightest there
+    assert values["nearest_to_singular"]["line"] == 2 + np.abs(rows[:, 4]).argmin()
+    assert values["tip_range_mm"]["Y"] == pytest.approx([-180.0, 180.0], abs=1e-3)
+
+
+def test_a_program_is_inspected(tmp_path: Path) -> None:
+    program = tmp_path / "part.nc"
+    program.write_text(
+        "G21 G90 G54\nG0 X0 Y0 Z50 A0 C0\nG43.4 H1 X0 Y0 Z20 A0 C0\nG1 X9 A-20 C30 F100\nG49\nM30\n"
+    )
+    machine = FOLDER / "trunnion-mill" / "machine.toml"
+    values = json.loads(run("inspect", program, "-m", machine, "--json").stdout)
+    assert values["moves"] == {"rapid": 2, "line": 1, "with_tip_control": 2, "in_tilted_planes": 0}
+    assert (values["dialect"], values["tools"], values["stamped"]) == ("fanuc", [1], False)
+    assert values["axes"]["A"] == {"from_deg": -20.0, "to_deg": 0.0, "travel_left_deg": 30.0, "line": 2}
+    # the tip: 140 mm of the work offset and, before the control of the tip, 120 mm of the tool below
+    assert values["tip_range_mm"]["X"] == pytest.approx([0.0, 9.0], abs=1e-9)
+    assert values["tip_range_mm"]["Z"] == pytest.approx([-210.0, -120.0], abs=1e-9)
+    assert "nearest to singular" in run("inspect", program, "-m", machine).stdout.lower()
+    refused = run("inspect", program, "-m", machine, "--at", "0", "0", "0")
+    assert "--at does not go with machines with rotary joints" in refused.output
+
+
+@pytest.mark.parametrize("ending", ["md", "html", "json"])
+def test_the_report_of_a_correction_is_a_file(ending: str, tmp_path: Path) -> None:
+    file = tmp_path / f"report.{ending}"
+    hexapod = FOLDER / "hexapod" / "job.toml"
+    done = run(
+        "correct", "-j", hexapod, "-o", tmp_path / "o.csv", "--report", file, "--json", "--date", "2026-11-20"
+    )
+    assert done.exit_code == 0, done.output
+    report, text = json.loads(done.stdout), file.read_text("utf-8")
+    if ending == "json":
+        assert json.loads(text) == report
+        return
+    before = report["deviation"]["before"]["position_max_um"]
+    for words in (f"{before:.2f}", "joints of any kind", "hexapod-650", "18 days on 2026-11-20", "L6"):
+        assert words in text
+    again = run("correct", "-j", hexapod, "-o", tmp_path / "p.csv", "--report", tmp_path / "p.csv")
+    assert again.exit_code != 0
