@@ -57,7 +57,7 @@ def _head(report: Report) -> Iterator[str]:
                 else "",
             ),
             ("Limits", f"used at most: {kept}"),
-            ("Planned by", solvers),
+            ("Planned by", f"{solvers}; {_percent(report['ruckig_share'], 1)} of the motion by Ruckig"),
             (
                 "Stretches",
                 f"{len(stretches)}, between moves that the control makes by itself"

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from olp.core.arrays import Array, Index
 from olp.trajectory.plan import Trajectory
 from olp.trajectory.route import Route
+from olp.trajectory.solvers import EXACT_STOP, OVERLAP
 from olp.trajectory.usage import LIMITS, LineUse, SlowStretches
 
 #: lines and slow stretches that a report lists
@@ -44,6 +45,7 @@ def summary(
         "duration_s": sum(t.duration_s for t in trajectories),
         "dwell_s": float(use.dwell_s.sum()),
         "solvers_s": solvers,
+        "ruckig_share": (solvers.get(OVERLAP, 0.0) + solvers.get(EXACT_STOP, 0.0)) / whole,
         "slowed_by_at_most": max((leg.factor for t in trajectories for leg in t.legs), default=1.0),
         "largest_share_of_limit": most | {"feed": float(use.most[:, -1].max(initial=0.0))},
         "at_limit": dict(zip(LIMITS, at_limit.tolist(), strict=True)),

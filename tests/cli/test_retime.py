@@ -104,6 +104,7 @@ def test_an_override_changes_feeds_and_no_rapids(job: Path, tmp_path: Path) -> N
     assert half["duration_s"] == slow["duration_s"]
     assert half["feed_override"] == 0.5
     assert "Override    50 %" in run("retime", part, "-j", job, "--feed-override", "50").stdout
+    assert half["ruckig_share"] == 1.0
     refused = run("retime", part, "-j", job, "--feed-override", "50", "--write-feed", tmp_path / "f.ngc")
     assert refused.exit_code == 2
     with pytest.raises(UsageError, match="feed override is 0 %"):
