@@ -65,10 +65,16 @@ def command(
     """
     from olp.files.write import write_files
     from olp.workflows.calibrate_export import compare_tables, export_table
+    from olp.workflows.calibrate_export_joints import given_joints, joint_inputs
 
     if compare == (kind is not None):
         raise UsageError("give either --format with -o, or --compare")
-    described = machine_given(machine, job)[1] if machine or job else ()
+    if machine is None and job is None:
+        described: tuple[str, ...] = ()
+    elif (of_joints := given_joints(machine, job)) is not None:
+        described = joint_inputs(of_joints, job)
+    else:
+        described = machine_given(machine, job)[1]
     inputs = (*files_of(calibration, program), *described)
     common: dict[str, Any] = {
         "calibration": calibration, "program": program, "reference": reference, "most_rows": most_rows,
@@ -97,7 +103,7 @@ def command(
 
 def _put(report: dict[str, Any], as_json: bool) -> None:
     from olp.reports.report import table, to_json
-    from olp.workflows.calibrate_export import residual_rows
+    from olp.workflows.calibrate_export import residual_rows, turns
 
     if as_json:
         put(to_json(report))
@@ -105,6 +111,8 @@ def _put(report: dict[str, Any], as_json: bool) -> None:
     header = ["residual with", "rms um", "max um", "in frame"]
     if "program" in report:
         header += ["path rms", "path max", "in frame"]
+    if turns(report):
+        header += ["rms urad", "max urad"]
     box = report["box"]
     over = f"{box['points']} points over the box, {len(box['tools_mm'])} tool(s)"
     lines = [f"{over}; in frame: rms after a best-fit frame"]

@@ -22,7 +22,8 @@ class JointMachine:
     programs with tool centre point control count from the workpiece with its rotary axes at zero, else from
     where these are when it is switched on; None is not stated. `leads` is what this mode leads evenly where
     the program does not say it, empty where the control decides. `swivel_axis` is the axis by whose position
-    CYCLE800 chooses between two, empty where that is not stated.
+    CYCLE800 chooses between two, empty where that is not stated. `real_time` is the beginning of the hash of
+    the calibration that the control corrects by in every servo cycle, None where it does not.
     """
 
     structure: Structure
@@ -35,6 +36,7 @@ class JointMachine:
     tips_from_zero: bool | None = None
     leads: Interpolated = ""
     swivel_axis: str = ""
+    real_time: str | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

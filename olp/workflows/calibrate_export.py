@@ -28,7 +28,9 @@ from olp.errormodel.base import ErrorModel
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration, Reference
 from olp.files.calibration.reader import load_calibration
+from olp.files.control_code.base import Code
 from olp.files.control_code.compiled import self_test as run_self_test
+from olp.files.control_code.linear import linear_code
 from olp.files.control_code.registry import CODE, write_code
 from olp.files.control_code.source import HASH_DIGITS
 from olp.files.control_tables.base import Exported, Given, Sense
@@ -37,6 +39,7 @@ from olp.files.sources import Sources
 from olp.findings.catalogue import Finding
 from olp.reports.report import number
 from olp.workflows import refusals
+from olp.workflows.calibrate_export_joints import given_joints, joint_export
 from olp.workflows.control_table import given_of
 from olp.workflows.correct import CorrectOptions, corrected
 from olp.workflows.doubt import acceptable
@@ -94,25 +97,36 @@ def export_table(
         outside_box="hold", flatten=flatten, expand_cycles=expand_cycles, peck_clearance_mm=peck_clearance_mm,
         date=date, accept=tuple(sorted(acceptable(accept))),
     )  # fmt: skip
+    if calibration is None and (of_joints := given_joints(machine, job)) is not None:
+        code, report = joint_export(of_joints, kind, job, chain)
+        return _coded(code, kind, Path(target), report, self_test=self_test)
     source = _source(machine, job, calibration, chain)
     given = given_of(source.machine, chain, sense, None, comp_type, axis_names, reference, most_rows)
     if kind in CODE:
-        files = write_code(source.rest, source.chain, source.digest, kind, Path(target))
-        written = Exported(files, frozenset())
-        control: Control = RealTime(source.model)
-    else:
-        written = write_table(source.rest, format_named(kind).key, Path(target), given)
-        control = _control(written, kind, given, source)
-    report = _report(source, {kind: control}, program, options)
+        code = linear_code(source.rest, source.chain, source.digest)
+        report = _report(source, {kind: RealTime(source.model)}, program, options)
+        return _coded(code, kind, Path(target), report, source.findings, self_test=self_test)
     if self_test:
-        report["self_test"] = run_self_test(CODE.get(kind), written.files)
-    if kind in CODE:
-        report["real_time"] = source.digest[:HASH_DIGITS]
-    else:
-        report["compensated_by_controller"] = sorted(written.corrects | source.compensated)
+        raise UsageError("--self-test goes with a format of code, such as --format c; a table has no code")
+    written = write_table(source.rest, format_named(kind).key, Path(target), given)
+    report = _report(source, {kind: _control(written, kind, given, source)}, program, options)
+    report["compensated_by_controller"] = sorted(written.corrects | source.compensated)
     findings = (*source.findings, *written.findings)
     report["findings"] = [finding.as_dict() for finding in findings]
     return TableExport(written.files, findings, written.notes, report)
+
+
+def _coded(
+    code: Code, kind: str, target: Path, report: dict[str, Any], findings: tuple[Finding, ...] = (), *,
+    self_test: bool,
+) -> TableExport:  # fmt: skip
+    """Code that corrects in real time, with its report."""
+    files = write_code(code, kind, target)
+    report["real_time"] = code.digest[:HASH_DIGITS]
+    if self_test:
+        report["self_test"] = run_self_test(CODE[kind], files)
+    report["findings"] = [finding.as_dict() for finding in findings]
+    return TableExport(files, findings, (), report)
 
 
 def compare_tables(
@@ -137,6 +151,12 @@ def compare_tables(
         outside_box="hold", flatten=flatten, expand_cycles=expand_cycles, peck_clearance_mm=peck_clearance_mm,
         date=date, accept=tuple(sorted(acceptable(accept))),
     )  # fmt: skip
+    if calibration is None and (of_joints := given_joints(machine, job)) is not None:
+        raise UsageError(
+            "tables of controls hold three linear axes, and this machine has others; export code with "
+            f"--format {' or '.join(CODE)}",
+            file=str(of_joints),
+        )
     source = _source(machine, job, calibration, chain)
     controls: dict[str, Control] = {}
     findings: dict[str, list[dict[str, object]]] = {}
@@ -303,8 +323,14 @@ def _figures(residuals: Mapping[str, Residual]) -> dict[str, Any]:
     return {name: residual.as_dict() for name, residual in residuals.items()}
 
 
+def turns(report: Mapping[str, Any]) -> bool:
+    """Whether a report states a residual orientation."""
+    return any("rms_urad" in box for box in report["box"]["left"].values())
+
+
 def residual_rows(report: Mapping[str, Any]) -> Sequence[tuple[str, ...]]:
-    """Rows of figures: method, over the box (rms, max, rms in a frame), along the program (same)."""
+    """Rows of figures: method, over the box (rms, max, rms in a frame), along the program (same), and the
+    orientation over the box (rms, max)."""
     rows = []
     for name, box in report["box"]["left"].items():
         title = "uncompensated machine" if name == UNCOMPENSATED else name
@@ -312,5 +338,7 @@ def residual_rows(report: Mapping[str, Any]) -> Sequence[tuple[str, ...]]:
         if "program" in report:
             residual = report["program"]["left"][name]
             row += [number(residual[key]) for key in ("rms_um", "max_um", "rms_in_frame_um")]
+        if turns(report):
+            row += [number(box[key]) for key in ("rms_urad", "max_urad")]
         rows.append(tuple(row))
     return rows

@@ -8,23 +8,15 @@ from olp.compensation.stamp import find_real_time, find_stamp, is_of
 from olp.core.errors import AlreadyCorrected, ConfigError, ProgramError
 from olp.core.machine import Machine
 from olp.errormodel.calibration import Calibration
+from olp.files.real_time import refuse_other
 from olp.files.sources import Source
-
-#: Digits of a hash that tell two calibrations apart.
-_LEAST_DIGITS = 8
 
 
 def corrected(machine: Machine, calibration: Calibration, digest: str) -> Calibration:
     """What remains of a calibration whose errors the control takes off in every servo cycle: its box. Raises
     ConfigError where the control does so by another calibration."""
     assert machine.real_time is not None
-    if len(machine.real_time) < _LEAST_DIGITS or not digest.startswith(machine.real_time.lower()):
-        raise ConfigError(
-            f'real_time = "{machine.real_time}": the control corrects by that calibration. The hash of this '
-            f"file is {digest[:12]}; expected the same; export it again, load it in the control, state its "
-            "hash, or name the file that the control has",
-            file=machine.calibration,
-        )
+    refuse_other(machine.real_time, digest, machine.calibration)
     return Calibration(
         calibration.machine, calibration.box_mm, datum_mm=calibration.datum_mm,
         payload_kg=calibration.payload_kg, temperature_degC=calibration.temperature_degC,
@@ -32,20 +24,20 @@ def corrected(machine: Machine, calibration: Calibration, digest: str) -> Calibr
     )  # fmt: skip
 
 
-def refuse_stamped(machine: Machine, digest: str, program: Source) -> None:
+def refuse_stamped(real_time: str | None, digest: str, program: Source) -> None:
     """Raises AlreadyCorrected for a program that was corrected, on a control that corrects too; ProgramError
     for one that needs a control which corrects by its calibration, on another."""
     data = program.data
-    if machine.real_time is not None and (stamp := find_stamp(data)) is not None:
+    if real_time is not None and (stamp := find_stamp(data)) is not None:
         raise AlreadyCorrected(
             f"the program has the stamp `{stamp.group().decode()}` of a correction. The control corrects in "
-            f'real time too (real_time = "{machine.real_time}"): both would apply the model twice; run the '
+            f'real time too (real_time = "{real_time}"): both would apply the model twice; run the '
             "nominal program, or switch the correction of the control off and leave real_time out",
             line=_line(data, stamp),
             code="OLP560",
         )
     needs = find_real_time(data)
-    if needs is not None and (machine.real_time is None or not is_of(needs, digest)):
+    if needs is not None and (real_time is None or not is_of(needs, digest)):
         raise ProgramError(
             f"the program has the stamp `{needs.group().decode()}`: it needs a control that corrects by this "
             "calibration in real time. The machine file does not state that (real_time); correct the program "

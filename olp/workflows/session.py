@@ -90,7 +90,7 @@ class Loaded:
         """The same for a program: its dialect is detected here, also for later versions of it. Raises
         ProgramError where it cannot be detected, or where the program is corrected and the control corrects
         too, UsageError for an unknown name."""
-        real_time.refuse_stamped(self.setup.machine, self.digest, program)
+        real_time.refuse_stamped(self.setup.machine.real_time, self.digest, program)
         setup, dialect = _settled(self.setup, self.dialect, program)
         return replace(self, setup=setup, dialect=dialect)
 

@@ -73,13 +73,16 @@ def require() -> None:
 @dataclass(frozen=True, slots=True)
 class Kinematics:
     """A component `name`, compiled in `folder`, and the lines of HAL that go with it; `pins` are sampled
-    besides. Its functions `begin` and `end` go around motion-controller."""
+    besides. Its functions `begin` and `end` go around motion-controller. `letters` are those of the joints in
+    their order, `options` those of its loadrt."""
 
     name: str
     folder: Path
     hal: str
     pins: tuple[str, ...] = ()
     acceleration_mm_s2: float = ACCELERATION_MM_S2
+    letters: str = "XYZ"
+    options: str = ""
 
 
 def run(
@@ -167,6 +170,7 @@ def _end_realtime(folder: Path) -> None:
 
 def _configure(machine: Path, folder: Path, tables: Path | None, kinematics: Kinematics | None) -> None:
     setup = _setup(machine, {}, {}, None)
+    letters = kinematics.letters if kinematics else "XYZ"
     sections: dict[str, dict[str, object]] = {
         "EMC": {"VERSION": "1.1", "MACHINE": "judge"},
         "DISPLAY": {"DISPLAY": folder / "display", "PROGRAM_PREFIX": folder},
@@ -176,19 +180,23 @@ def _configure(machine: Path, folder: Path, tables: Path | None, kinematics: Kin
         "EMCIO": {"EMCIO": "io", "CYCLE_TIME": 0.01, "TOOL_TABLE": folder / "t.tbl"},
         "HAL": {"HALFILE": folder / "m.hal"},
         "TRAJ": {
-            "COORDINATES": "X Y Z", "LINEAR_UNITS": "mm", "ANGULAR_UNITS": "degree", "NO_FORCE_HOMING": 1,
-            "DEFAULT_LINEAR_VELOCITY": SPEED_MM_S, "MAX_LINEAR_VELOCITY": SPEED_MM_S,
+            "COORDINATES": " ".join(letters), "LINEAR_UNITS": "mm", "ANGULAR_UNITS": "degree",
+            "NO_FORCE_HOMING": 1, "DEFAULT_LINEAR_VELOCITY": SPEED_MM_S, "MAX_LINEAR_VELOCITY": SPEED_MM_S,
             "MAX_LINEAR_ACCELERATION": ACCELERATION_MM_S2,
         },
-        "KINS": {"KINEMATICS": kinematics.name if kinematics else "trivkins coordinates=XYZ", "JOINTS": 3},
+        "KINS": {
+            "KINEMATICS": kinematics.name if kinematics else "trivkins coordinates=XYZ",
+            "JOINTS": len(letters),
+        },
     }  # fmt: skip
     reach = {"MIN_LIMIT": -5000, "MAX_LIMIT": 5000}
     most = kinematics.acceleration_mm_s2 if kinematics else ACCELERATION_MM_S2
     reach |= {"MAX_VELOCITY": SPEED_MM_S, "MAX_ACCELERATION": most}
     home = {"HOME": 0.0, "HOME_OFFSET": 0.0, "HOME_SEARCH_VEL": 0, "HOME_LATCH_VEL": 0, "HOME_SEQUENCE": 0}
-    for joint, axis in enumerate("XYZ"):
+    for joint, axis in enumerate(letters):
+        kind = "ANGULAR" if axis in "ABC" else "LINEAR"
         sections[f"AXIS_{axis}"] = dict(reach)
-        sections[f"JOINT_{joint}"] = {"TYPE": "LINEAR", "FERROR": 1000, "MIN_FERROR": 1000, **home, **reach}
+        sections[f"JOINT_{joint}"] = {"TYPE": kind, "FERROR": 1000, "MIN_FERROR": 1000, **home, **reach}
     if tables is not None:
         section = ""
         for line in tables.read_text().splitlines():
@@ -209,13 +217,14 @@ def _configure(machine: Path, folder: Path, tables: Path | None, kinematics: Kin
         )
     )
     own = kinematics or Kinematics("trivkins coordinates=XYZ", folder, "")
-    nets = {**_NETS, **{pin: f"sampler.0.pin.{7 + i}" for i, pin in enumerate(own.pins)}}
+    more = {f"joint.{j}.motor-pos-cmd": f"joint.{j}.motor-pos-fb" for j in range(3, len(letters))}
+    nets = {**_NETS, **more, **{pin: f"sampler.0.pin.{7 + i}" for i, pin in enumerate(own.pins)}}
     linked = {source: signal for signal, source in re.findall(r"^net (\S+) (\S+) =>", own.hal, re.MULTILINE)}
     around = [f"addf {own.name}.{function} servo-thread\n" for function in ("begin", "end")]
     before, behind = around if kinematics else ("", "")
     (folder / "m.hal").write_text(
-        f"loadrt {own.name}\n"
-        f"loadrt motmod servo_period_nsec={PERIOD_NS} num_joints=3\n"
+        f"loadrt {own.name} {own.options}\n"
+        f"loadrt motmod servo_period_nsec={PERIOD_NS} num_joints={len(letters)}\n"
         f"loadrt sampler depth=100000 cfg=fffsfff{'f' * len(own.pins)}\n"
         f"addf motion-command-handler servo-thread\n{before}addf motion-controller servo-thread\n{behind}"
         "addf sampler.0 servo-thread\nsetp sampler.0.enable 0\n"

@@ -36,7 +36,7 @@ def main(folder, limit_s):
     command.mode(linuxcnc.MODE_MANUAL)
     command.wait_complete()
     command.home(-1)
-    until(lambda: all(status.homed[:3]), 20, "homed")
+    until(lambda: all(status.homed[: status.joints]), 20, "homed")
     command.mode(linuxcnc.MODE_AUTO)
     command.wait_complete()
     command.program_open(str(folder / "p.ngc"))

@@ -8,7 +8,6 @@ import numpy.typing as npt
 from olp.compensation.joints.path import JointPath
 from olp.compensation.joints.planning import JointPlan
 from olp.compensation.joints.writer import WrittenJoints
-from olp.compensation.stamp import stamped
 from olp.compensation.tally import Tally
 from olp.core.arrays import Array, Index, Mask
 from olp.program.pointlist.axis_list import AxisList
@@ -18,7 +17,7 @@ from olp.program.text.numbers import MOST_DECIMALS, number, spliced, written
 _LOWER = 0x20
 
 
-def write_list(path: JointPath, plan: JointPlan, stamp: bytes) -> WrittenJoints:
+def write_list(path: JointPath, plan: JointPlan) -> WrittenJoints:
     """The text of a list of axis values with its plan. An inserted row is its own one again, with other axis
     values."""
     move, rows, tally = plan.move, path.listed, Tally()
@@ -39,8 +38,6 @@ def write_list(path: JointPath, plan: JointPlan, stamp: bytes) -> WrittenJoints:
     tally.changed_words = int((change & head[:, None]).sum())
     tally.inserted_blocks = int(insert.sum())
     text = spliced(path.program.data, edits)
-    if stamp:
-        text = stamped(text, stamp, path.program.eol(1), path.program.dialect.first)
     return WrittenJoints(text, tally, np.bincount(move[head | insert], minlength=len(path)))
 
 

@@ -15,7 +15,6 @@ from olp.compensation.inserted_blocks import end_word_edits
 from olp.compensation.joints.drilled import lifted, middled
 from olp.compensation.joints.path import JointPath
 from olp.compensation.joints.planning import JointPlan
-from olp.compensation.stamp import stamped
 from olp.compensation.stretches import Decimals, Stretches, digits_of
 from olp.compensation.style import Style, fewest_decimals
 from olp.compensation.tally import Tally
@@ -70,7 +69,7 @@ class JointWriter:
         self.decimals = np.zeros(shape, np.int8)
         self.slot = np.where(self.head[:, None], path.slot[plan.move], -1)
 
-    def written(self, stamp: bytes) -> WrittenJoints:
+    def written(self) -> WrittenJoints:
         command = self.plan.command.copy()
         emitted, drilled = np.full(command.shape, np.nan), self.path.holes.strokes[self.plan.move]
         for column in np.flatnonzero(self.rotary).tolist():
@@ -87,8 +86,6 @@ class JointWriter:
             np.frombuffer(data, np.uint8), 0, Edits.join(self._placed(edits)), self.prefixes,
             leading_zero=self.style.leading_zero,
         ).tobytes()  # fmt: skip
-        if stamp:
-            text = stamped(text, stamp, self.program.eol(1), self.program.dialect.first)
         return WrittenJoints(text, self.tally, parts)
 
     def _placed(self, edits: list[Edits]) -> list[Edits]:

@@ -7,10 +7,10 @@ from olp.compensation.joints.planning import JointPlan
 from olp.compensation.joints.writer import JointWriter, WrittenJoints
 
 
-def write_joints(path: JointPath, plan: JointPlan, stamp: bytes) -> WrittenJoints:
+def write_joints(path: JointPath, plan: JointPlan) -> WrittenJoints:
     """The text with its plan. Raises ProgramError where it cannot be written, NotInvertible."""
     if path.program.statements is None:
-        return JointWriter(path, plan).written(stamp)
+        return JointWriter(path, plan).written()
     from olp.compensation.joints.conversational import ConversationalJoints
 
-    return ConversationalJoints(path, plan).written(stamp)
+    return ConversationalJoints(path, plan).written()

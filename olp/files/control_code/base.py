@@ -1,4 +1,4 @@
-"""What a format of control code is, and the bounds with which it starts."""
+"""What control code is made of, what a format of it is, and the bounds with which it starts."""
 
 from __future__ import annotations
 
@@ -10,31 +10,59 @@ import numpy as np
 
 from olp.core.arrays import Array
 from olp.core.values import dataclass
-from olp.files.control_code.carried import Carried
+from olp.files.control_code.carried import Sensor
 
-#: Share by which the first bound of a correction exceeds the largest error of the test vectors.
+#: Share by which the first bound of a correction exceeds the largest of the test vectors.
 _MORE = 1.5
-#: mm/s; the least first bound of the rate of a correction.
+#: mm/s and deg/s; the least first bound of the rate of a correction.
 _LEAST_RATE = 5.0
 #: s; the servo cycle within which the largest backlash is crossed.
 _CYCLE_S = 1e-3
+#: Steps of a first bound of a correction by unit: 1 um, and 1e-5 deg.
+_STEPS: Mapping[str, float] = {"mm": 1e-3, "deg": 1e-5}
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """The largest correction of an axis, mm or deg, and by how much it changes in a second."""
+
+    most: float
+    rate: float
+
+    @staticmethod
+    def of(corrections: Array, backlash: float, unit: str) -> Bounds:
+        """From corrections or errors of test vectors and the largest backlash, rounded up."""
+        step = _STEPS[unit]
+        most = math.ceil(_MORE * float(np.abs(corrections).max(initial=0.0)) / step + 1.0) * step
+        return Bounds(round(most, 5), max(_LEAST_RATE, float(math.ceil(1.1 * backlash / _CYCLE_S))))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Code:
-    """What is written: the model, the hash of its calibration, and the test vectors."""
+    """What is written: the tables of one machine, and the parts of C that read them.
 
-    kept: Carried
+    `axes` are their names with their `units`, mm or deg. `shapes` and `engine` are parts by name, around
+    `tables`; `tips` gives axis values by where the tip is, where that is possible. `vectors` is the text of
+    the test vectors, which the part `self_test` reads. `centred` says whether the centre of the payload
+    counts. `linear` and `rotary` are the first bounds.
+    """
+
+    machine: str
+    chain: str
     digest: str
-    rows: Array
-
-    def most_mm(self) -> float:
-        """The first bound of a correction, to 1 um upward."""
-        return math.ceil(_MORE * float(np.abs(self.rows[:, -3:]).max(initial=0.0)) * 1e3 + 1.0) / 1e3
-
-    def rate_mm_s(self) -> float:
-        """The first bound of its rate."""
-        return max(_LEAST_RATE, math.ceil(1.1 * self.kept.backlash_mm() / _CYCLE_S))
+    axes: tuple[str, ...]
+    units: tuple[str, ...]
+    shapes: tuple[str, ...]
+    tables: tuple[str, ...]
+    engine: tuple[str, ...]
+    tips: tuple[str, ...]
+    self_test: str
+    vectors: str
+    sensors: tuple[Sensor, ...]
+    payload_kg: float
+    centred: bool
+    linear: Bounds
+    rotary: Bounds
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,11 +16,9 @@ _COMPILERS = ("cc", "gcc", "clang")
 _LIMIT_S = 120.0
 
 
-def self_test(form: CodeFormat | None, files: Mapping[Path, bytes]) -> str:
-    """What the self-test of written code says. Raises UsageError where there is no compiler or nothing to
-    compile, CannotCompute where the code and the model differ."""
-    if form is None:
-        raise UsageError("--self-test goes with a format of code, such as --format c; a table has no code")
+def self_test(form: CodeFormat, files: Mapping[Path, bytes]) -> str:
+    """What the self-test of written code says. Raises UsageError where there is no compiler,
+    CannotCompute where the code and the model differ."""
     compiler = next((found for name in _COMPILERS if (found := shutil.which(name))), None)
     if compiler is None:
         raise UsageError(

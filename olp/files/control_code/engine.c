@@ -1,39 +1,9 @@
 /* What a model needs beside the position of the axes: tool vector (gauge point to tip), payload, temperatures,
    and the play of each axis: +1 where it last moved in + and has taken up its backlash, -1 in -, 0 unknown. */
+#define OLP_AXES 3
 typedef struct {
-    double tool_mm[3], payload_kg, temperature_degC[OLP_SENSORS + 1], play[3];
+    double tool_mm[3], payload_kg, temperature_degC[OLP_SENSORS + 1], play[OLP_AXES];
 } olp_state;
-
-static double olp_within(double value, double low, double high)
-{
-    return value < low ? low : value > high ? high : value;
-}
-
-/* The last knot that is not above q, but the last one. */
-static int olp_cell(int knots, const double *knot, double q)
-{
-    int low = 0, high = knots - 1;
-    while (high - low > 1) {
-        int middle = (low + high) / 2;
-        if (knot[middle] <= q) low = middle; else high = middle;
-    }
-    return low;
-}
-
-static double olp_curve_at(const olp_curve *curve, double q)
-{
-    int i;
-    double h, s, rise, m0, m1;
-    q = olp_within(q, curve->at[0], curve->at[curve->knots - 1]);
-    i = olp_cell(curve->knots, curve->at, q);
-    h = curve->at[i + 1] - curve->at[i];
-    s = (q - curve->at[i]) / h;
-    rise = curve->value[i + 1] - curve->value[i];
-    if (!curve->smooth) return curve->value[i] + s * rise;
-    m0 = h * curve->slope[i];
-    m1 = h * curve->slope[i + 1];
-    return curve->value[i] + s * (m0 + s * ((3.0 * rise - 2.0 * m0 - m1) + s * (m0 + m1 - 2.0 * rise)));
-}
 
 /* The components of one axis. A curve is a chain of short chords, as in the model that corrects programs. */
 static void olp_components(const olp_body *body, double q, double play, double six[6])
@@ -246,4 +216,51 @@ int olp_outside(const double axis_mm[3])
     for (i = 0; i < 3; i++)
         if (!(axis_mm[i] >= olp_box[i][0] && axis_mm[i] <= olp_box[i][1])) return 1;
     return 0;
+}
+
+/* What the follower asks of a model: its aim, by how much a command is off it, and the play of its axes. */
+#define OLP_WELL 0
+static const int olp_turns[OLP_AXES] = {0, 0, 0};
+static const double olp_unit_mm[OLP_AXES] = {1.0, 1.0, 1.0};
+typedef struct {
+    double wanted[OLP_AXES];
+} olp_aim;
+
+static void olp_aim_at(olp_aim *aim, const double wanted[], const double correction[], const olp_state *state,
+                       int well, double command[])
+{
+    int j;
+    for (j = 0; j < OLP_AXES; j++) {
+        aim->wanted[j] = wanted[j];
+        command[j] = wanted[j] + correction[j];
+    }
+    (void)state;
+    (void)well;
+}
+
+/* What to take from a command, so that the tip comes to its aim. */
+static void olp_off(olp_aim *aim, const double command[], const olp_state *state, double off[])
+{
+    int j;
+    olp_error(command, state, off);
+    for (j = 0; j < OLP_AXES; j++) off[j] += command[j] - aim->wanted[j];
+}
+
+/* The axis values that stand for where the tip is. */
+static int olp_stands_for(const double command[], const olp_state *state, double wanted[])
+{
+    int j;
+    olp_error(command, state, wanted);
+    for (j = 0; j < OLP_AXES; j++) wanted[j] += command[j];
+    return 1;
+}
+
+static void olp_backlash_at(const double command[3], double backlash[3])
+{
+    int b;
+    for (b = 0; b < OLP_BODIES; b++) {
+        const olp_body *body = olp_body_list + b;
+        int j = body->axis;
+        backlash[j] = olp_backlash(body, olp_within(command[j], olp_box[j][0], olp_box[j][1]));
+    }
 }

@@ -6,18 +6,22 @@
 static olp_state olp_now;
 static olp_limits olp_bounds;
 static olp_follower olp_at;
-static double olp_tick_s;
+static double olp_tick_s, olp_offset[3];
 static int olp_ready, olp_in_tick, olp_calls, olp_ever_unsolved;
 
 FUNCTION(begin)
 {
-    olp_now.tool_mm[0] = tool_more_x - tool_offset_x;
-    olp_now.tool_mm[1] = tool_more_y - tool_offset_y;
-    olp_now.tool_mm[2] = tool_more_z - tool_offset_z;
+    olp_offset[0] = tool_offset_x;
+    olp_offset[1] = tool_offset_y;
+    olp_offset[2] = tool_offset_z;
+    olp_now.tool_mm[0] = tool_more_x - olp_offset[0];
+    olp_now.tool_mm[1] = tool_more_y - olp_offset[1];
+    olp_now.tool_mm[2] = tool_more_z - olp_offset[2];
     olp_now.payload_kg = payload;
-@TEMPERATURES@
+@STATE@
     olp_bounds.most_mm = most_correction;
     olp_bounds.rate_mm_s = most_rate;
+@BOUNDS@
     olp_bounds.ramp_s = ramp_time;
     olp_bounds.band_mm = dead_band;
     olp_bounds.on = enable;
@@ -29,17 +33,12 @@ FUNCTION(begin)
 
 FUNCTION(end)
 {
-    double joints[3] = {joint_0, joint_1, joint_2};
+    double joints[OLP_AXES] = {@JOINTS@};
     /* axes that are moved one by one, or home */
     if (!olp_calls) olp_led(&olp_at, &olp_now, joints);
     olp_in_tick = 0;
     olp_ready = 1;
-    correction_x = olp_at.correction[0];
-    correction_y = olp_at.correction[1];
-    correction_z = olp_at.correction[2];
-    play_x = olp_at.play[0];
-    play_y = olp_at.play[1];
-    play_z = olp_at.play[2];
+@SHOWN@
     switched_on = olp_at.share;
     active = olp_at.share >= 1.0;
     outside_box = olp_outside(olp_at.command);
@@ -53,12 +52,13 @@ FUNCTION(end)
 int kinematicsForward(const double *joint, EmcPose *world, const KINEMATICS_FORWARD_FLAGS *fflags,
                       KINEMATICS_INVERSE_FLAGS *iflags)
 {
-    double wanted[3] = {joint[0], joint[1], joint[2]};
+    double wanted[OLP_AXES];
+    int j;
+    for (j = 0; j < OLP_AXES; j++) wanted[j] = joint[j];
     if (olp_ready) olp_forward(&olp_at, &olp_now, joint, wanted);
-    world->tran.x = wanted[0];
-    world->tran.y = wanted[1];
-    world->tran.z = wanted[2];
-    world->a = world->b = world->c = world->u = world->v = world->w = 0.0;
+@TO_TIP@
+    memset(world, 0, sizeof *world);
+@TO_WORLD@
     (void)fflags;
     (void)iflags;
     return 0;
@@ -67,9 +67,10 @@ int kinematicsForward(const double *joint, EmcPose *world, const KINEMATICS_FORW
 int kinematicsInverse(const EmcPose *world, double *joint, const KINEMATICS_INVERSE_FLAGS *iflags,
                       KINEMATICS_FORWARD_FLAGS *fflags)
 {
-    double wanted[3] = {world->tran.x, world->tran.y, world->tran.z}, command[3];
+    double wanted[OLP_AXES] = {@OF_WORLD@}, command[OLP_AXES];
     int j;
-    for (j = 0; j < 3; j++) command[j] = wanted[j];
+@OF_TIP@
+    for (j = 0; j < OLP_AXES; j++) command[j] = wanted[j];
     if (olp_ready && olp_in_tick) {
         olp_follow(&olp_at, &olp_bounds, &olp_now, wanted, olp_tick_s, command);
         olp_calls++;
@@ -77,7 +78,7 @@ int kinematicsInverse(const EmcPose *world, double *joint, const KINEMATICS_INVE
         olp_follower ahead = olp_at;
         olp_bounded(&ahead, &olp_bounds, &olp_now, wanted, 0.0, command);
     }
-    for (j = 0; j < 3; j++) joint[j] = command[j];
+    for (j = 0; j < OLP_AXES; j++) joint[j] = command[j];
     (void)iflags;
     (void)fflags;
     return 0;

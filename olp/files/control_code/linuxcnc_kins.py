@@ -12,9 +12,10 @@ from pathlib import Path
 from olp.calibration.control_tables.residuals import BAND_MM
 from olp.core.errors import ConfigError, UsageError
 from olp.core.units import AXES
-from olp.files.control_code import data, source, vectors
+from olp.files.control_code import source
 from olp.files.control_code.base import Code, CodeFormat, vectors_beside
 from olp.files.control_code.carried import Sensor
+from olp.files.control_code.tables import real
 
 #: HAL names are shorter than this.
 _LONGEST = 47
@@ -27,14 +28,14 @@ _HEADERS = """#ifdef OLP_SELF_TEST
 #endif
 """
 
+#: The fields of a pose by the letter of their axis.
+_FIELDS = {**{a: f"tran.{a.lower()}" for a in AXES}, **{a: a.lower() for a in "ABCUVW"}}
+
 _PINS = [
     ("in bit enable = 1", "corrects while it is 1"),
     *((f"in float tool_offset_{a}", f"the tool offset along {a.upper()}: motion.tooloffset") for a in "xyz"),
     *((f"in float tool_more_{a}", "what gauge_to_tip_mm has beyond minus the tool offset") for a in "xyz"),
-    *((f"in float joint_{j}", f"joint.{j}.pos-cmd") for j in range(3)),
     ("in float ramp_time = 1.0", "seconds in which the correction is switched on and off"),
-    *((f"out float correction_{a}", f"what is added to {a.upper()} in this cycle") for a in "xyz"),
-    *((f"out float play_{a}", "+1: backlash taken up in +, -1: in -, between: not known") for a in "xyz"),
     ("out float switched_on", "0 to 1: how far the correction is switched on"),
     ("out bit active", "the whole correction acts"),
     ("out bit outside_box", "outside of the calibrated box: the error at its face acts"),
@@ -52,12 +53,18 @@ def _write(code: Code, target: Path) -> Mapping[Path, bytes]:
             "letters, digits and _",
             file=str(target),
         )
-    pins = _temperature_pins(name, code.kept.sensors)
+    strange = [axis for axis in code.axes if axis not in _FIELDS]
+    if strange:
+        raise ConfigError(
+            f"axes {', '.join(strange)} are none of the letters {' '.join(_FIELDS)} that LinuxCNC moves; "
+            "export the format c, and call it behind the kinematics of the control"
+        )
+    pins = _temperature_pins(name, code.sensors)
     return {
         target: _component(code, name, pins).encode("ascii"),
         target.with_name(f"{name}.hal"): _hal(name, code, pins).encode("ascii"),
         target.with_name(f"{name}.ini"): _ini(name, code).encode("ascii"),
-        vectors_beside(target): vectors.text(code.rows).encode("ascii"),
+        vectors_beside(target): code.vectors.encode("ascii"),
     }
 
 
@@ -75,23 +82,45 @@ def _temperature_pins(name: str, sensors: Sequence[Sensor]) -> list[str]:
     return pins
 
 
-def _component(code: Code, name: str, temperatures: Sequence[str]) -> str:
-    kept, digest = code.kept, code.digest
-    pins = [
-        *_PINS,
-        (f"out u32 calibration_hash = 0x{digest[:8]}", "the first 8 digits of the hash, as in the stamp"),
-        (f"out u32 calibration_hash_rest = 0x{digest[8:12]}", "the next 4 digits"),
-        (f"in float payload = {data.real(kept.calibration.payload_kg)}", "kg of payload"),
-        (f"in float most_correction = {code.most_mm()!r}", "mm; the largest correction of an axis"),
-        (f"in float most_rate = {code.rate_mm_s()!r}", "mm/s; by which a correction changes at most"),
+def _pins(code: Code, temperatures: Sequence[str]) -> list[tuple[str, str]]:
+    pins = [*_PINS, *((f"in float joint_{j}", f"joint.{j}.pos-cmd") for j in range(len(code.axes)))]
+    for axis in code.axes:
+        pins += [
+            (f"out float correction_{axis.lower()}", f"what is added to {axis} in this cycle"),
+            (f"out float play_{axis.lower()}", "+1: backlash taken up in +, -1: in -, between: not known"),
+        ]
+    pins += [
+        (
+            f"out u32 calibration_hash = 0x{code.digest[:8]}",
+            "the first 8 digits of the hash, as in the stamp",
+        ),
+        (f"out u32 calibration_hash_rest = 0x{code.digest[8:12]}", "the next 4 digits"),
+        (f"in float payload = {real(code.payload_kg)}", "kg of payload"),
+        (f"in float most_correction = {code.linear.most!r}", "mm; the largest correction of an axis"),
+        (f"in float most_rate = {code.linear.rate!r}", "mm/s; by which a correction changes at most"),
         (f"in float dead_band = {BAND_MM!r}", "mm; an axis turns only where it would be off by more"),
     ]
-    for pin, sensor in zip(temperatures, kept.sensors, strict=True):
-        pins.append((f"in float {pin} = {data.real(sensor.start_degC)}", "degC"))
-    taken = "\n".join(f"    olp_now.temperature_degC[{k}] = {pin};" for k, pin in enumerate(temperatures))
+    if code.centred:
+        pins += [
+            (f"in float payload_{a}", "mm; the centre of the payload from the gauge point") for a in "xyz"
+        ]
+    if "deg" in code.units:
+        pins += [
+            (f"in float most_turn = {code.rotary.most!r}", "deg; the largest correction of a rotary axis"),
+            (f"in float most_turn_rate = {code.rotary.rate!r}", "deg/s; by which it changes at most"),
+        ]
+    for pin, sensor in zip(temperatures, code.sensors, strict=True):
+        pins.append((f"in float {pin} = {real(sensor.start_degC)}", "degC"))
+    return pins
+
+
+def _component(code: Code, name: str, temperatures: Sequence[str]) -> str:
+    digest = code.digest
+    tip = "1: X, Y and Z state the tip of the tool in the workpiece; 0: the axes"
     head = [
         f'component {name} "kinematics with the calibration {digest[: source.HASH_DIGITS]}";',
-        *(f'pin {pin} "{says}";' for pin, says in pins),
+        *(f'pin {pin} "{says}";' for pin, says in _pins(code, temperatures)),
+        *([f'modparam int tip = 0 "{tip}";'] if code.tips else []),
         'function begin fp "right before motion-controller";',
         'function end fp "right behind motion-controller";',
         "option singleton yes;",
@@ -101,13 +130,50 @@ def _component(code: Code, name: str, temperatures: Sequence[str]) -> str:
     ]
     parts = [
         "\n".join(head),
-        source.remark(kept, digest, "Kinematics of LinuxCNC with the calibrated model of a machine."),
+        source.remark(code, "Kinematics of LinuxCNC with the calibrated model of a machine."),
         _HEADERS,
-        source.source(kept, digest),
-        source.part("kins").replace("@TEMPERATURES@", taken),
-        source.part("self_test"),
+        source.source(code),
+        _kins(code, temperatures),
+        source.part(code.self_test),
     ]
     return "\n".join(parts)
+
+
+def _kins(code: Code, temperatures: Sequence[str]) -> str:
+    """The kinematics itself: the part of that name with the axes and pins of this machine."""
+    axes = list(enumerate(code.axes))
+    state = [f"olp_now.temperature_degC[{k}] = {pin};" for k, pin in enumerate(temperatures)]
+    if code.centred:
+        state += [f"olp_now.payload_centre_mm[{k}] = payload_{a};" for k, a in enumerate("xyz")]
+    bounds = ["olp_bounds.most_deg = most_turn;", "olp_bounds.rate_deg_s = most_turn_rate;"]
+    to_tip = ["if (tip) {", "    olp_tip_of_axes(wanted, &olp_now, wanted);"]
+    of_tip = ["if (tip) {"]
+    for k, axis in enumerate(AXES):
+        if axis in code.axes:
+            place = code.axes.index(axis)
+            to_tip.append(f"    wanted[{place}] += olp_offset[{k}];")
+            of_tip.append(f"    wanted[{place}] -= olp_offset[{k}];")
+    of_tip.append("    olp_axes_of_tip(wanted, &olp_now, wanted);")
+    filled = {
+        "STATE": state,
+        "BOUNDS": bounds if "deg" in code.units else [],
+        "SHOWN": [
+            line
+            for j, axis in axes
+            for line in (
+                f"correction_{axis.lower()} = olp_at.correction[{j}];",
+                f"play_{axis.lower()} = olp_at.play[{j}];",
+            )
+        ],
+        "TO_TIP": [*to_tip, "}"] if code.tips else [],
+        "OF_TIP": [*of_tip, "}"] if code.tips else [],
+        "TO_WORLD": [f"world->{_FIELDS[axis]} = wanted[{j}];" for j, axis in axes],
+    }
+    text = source.part("kins")
+    for key, lines in filled.items():
+        text = text.replace(f"@{key}@\n", "".join(f"    {line}\n" for line in lines))
+    text = text.replace("@JOINTS@", ", ".join(f"joint_{j}" for j, _ in axes))
+    return text.replace("@OF_WORLD@", ", ".join(f"world->{_FIELDS[axis]}" for _, axis in axes))
 
 
 def _hal(name: str, code: Code, temperatures: Sequence[str]) -> str:
@@ -115,18 +181,22 @@ def _hal(name: str, code: Code, temperatures: Sequence[str]) -> str:
         f"# HAL of {name}: take it over into the HAL file of the machine.",
         f"# [KINS]KINEMATICS = {name}; in place of the line of trivkins, before motmod:",
         f"#   loadrt {name}",
+    ]
+    if code.tips:
+        lines.append(f"#   or loadrt {name} tip=1, where programs state the tip of the tool")
+    lines += [
         "# The order of the functions decides:",
         "#   addf motion-command-handler servo-thread",
         f"#   addf {name}.begin servo-thread",
         "#   addf motion-controller servo-thread",
         f"#   addf {name}.end servo-thread",
     ]
-    lines += [f"net {name}-joint-{j} joint.{j}.pos-cmd => {name}.joint-{j}" for j in range(3)]
+    lines += [f"net {name}-joint-{j} joint.{j}.pos-cmd => {name}.joint-{j}" for j in range(len(code.axes))]
     lines += [f"net {name}-tool-{a} motion.tooloffset.{a} => {name}.tool-offset-{a}" for a in "xyz"]
-    lines += [f"setp {name}.payload {data.real(code.kept.calibration.payload_kg)}"]
-    for pin, sensor in zip(temperatures, code.kept.sensors, strict=True):
+    lines += [f"setp {name}.payload {real(code.payload_kg)}"]
+    for pin, sensor in zip(temperatures, code.sensors, strict=True):
         shown = pin.replace("_", "-")
-        lines.append(f"setp {name}.{shown} {data.real(sensor.start_degC)}")
+        lines.append(f"setp {name}.{shown} {real(sensor.start_degC)}")
     lines += [
         f"# Stop, or tell the operator, where {name}.outside-box, .bounded or .not-solved is 1.",
         f"setp {name}.enable 1",
@@ -135,17 +205,20 @@ def _hal(name: str, code: Code, temperatures: Sequence[str]) -> str:
 
 
 def _ini(name: str, code: Code) -> str:
+    more = [f"{code.linear.most!r} mm"] + ([f"{code.rotary.most!r} deg"] if "deg" in code.units else [])
     lines = [
         f"# INI of {name}.",
-        f"# Joints need room beyond the limits of their axes: {code.most_mm()!r} mm more at both ends.",
+        f"# Joints need room beyond the limits of their axes: {' or '.join(more)} more at both ends.",
         "# Leave out COMP_FILE and BACKLASH of every joint: the component does both.",
         "[KINS]",
         f"KINEMATICS = {name}",
-        "JOINTS = 3",
+        f"JOINTS = {len(code.axes)}",
         "[TRAJ]",
-        "COORDINATES = " + " ".join(AXES),
+        "COORDINATES = " + " ".join(code.axes),
         "LINEAR_UNITS = mm",
     ]
+    if "deg" in code.units:
+        lines.append("ANGULAR_UNITS = degree")
     return "\n".join(lines) + "\n"
 
 
@@ -158,7 +231,7 @@ FORMAT = CodeFormat(
     "LinuxCNC kinematics component",
     ".comp",
     "its documents and headers; compiled by halcompile and run in the control in the tests",
-    "the model itself: 21 errors, tool, direction, payload, temperatures, maps; corrects in real time",
+    "the model itself: errors of axes and chain, tool, direction, payload, temperatures; in real time",
     _write,
     _plain,
 )

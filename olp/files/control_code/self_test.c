@@ -7,7 +7,7 @@
 int main(int count, char **words)
 {
     FILE *file = count > 1 ? fopen(words[1], "r") : 0;
-    olp_limits limits = {1e9, 1e12, 0.0, 0.0, 1};
+    olp_limits limits = {1e9, 1e9, 1e12, 1e12, 0.0, 0.0, 1};
     double most = 0.0, inverse = 0.0;
     long lines = 0, wrong = 0, steps = 0;
     if (!file) {

@@ -1,8 +1,3 @@
-/* What the tables below are made of: lengths in mm, angles in rad, masses in kg, temperatures in degC. */
-typedef struct {            /* one column of a curve by axis position */
-    int knots, smooth;      /* smooth: the monotone cubic through slopes; else straight lines */
-    const double *at, *value, *slope;
-} olp_curve;
 typedef struct {            /* amplitude * sin(factor * q + phase) of component d, and rows that it moves besides */
     int component;
     double amplitude, factor, phase;

@@ -5,8 +5,8 @@ from __future__ import annotations
 from importlib import resources
 
 from olp.core.version import __version__
-from olp.files.control_code import data
-from olp.files.control_code.carried import Carried
+from olp.files.control_code.base import Code
+from olp.files.control_code.tables import real
 
 #: Digits of the hash of the calibration, as the stamp of corrected programs has them.
 HASH_DIGITS = 12
@@ -22,35 +22,35 @@ def _ascii(name: str) -> str:
     return name.replace("*/", "* /").replace("\n", " ").encode("ascii", "replace").decode()
 
 
-def remark(kept: Carried, digest: str, what: str) -> str:
+def remark(code: Code, what: str) -> str:
     """The first lines of a file: what it is, and of which calibration."""
+    units = ", ".join(f"{name} in {unit}" for name, unit in zip(code.axes, code.units, strict=True))
     lines = [
         what,
-        f"Machine {_ascii(kept.calibration.machine)}, chain {kept.chain}.",
-        f"Calibration {digest[:HASH_DIGITS]}.",
-        "Lengths in mm, angles in rad, error = actual - commanded.",
+        f"Machine {_ascii(code.machine)}, chain {_ascii(code.chain)}.",
+        f"Axes in their order: {_ascii(units)}.",
+        f"Calibration {code.digest[:HASH_DIGITS]}.",
+        "Lengths in mm, angles of errors in rad, error = actual - commanded.",
         f"Written by olp {__version__}. Do not edit: export it again.",
     ]
     return f"/* {(chr(10) + '   ').join(lines)} */\n"
 
 
-def source(kept: Carried, digest: str) -> str:
+def source(code: Code) -> str:
     """The C source of a model, without the headers that it needs (math.h, string.h)."""
-    sensors = "".join(
-        f"   temperature_degC[{k}]: {_ascii(s.name)}, {data.real(s.start_degC)} until it is known\n"
-        for k, s in enumerate(kept.sensors)
-    )
-    start = ", ".join([*(data.real(s.start_degC) for s in kept.sensors), "0.0"])
-    defines = "".join(f"#define {name} {value}\n" for name, value in data.sizes(kept).items())
-    return "\n".join(
-        [
-            part("shapes") + defines,
-            *data.write(kept),
-            f'const char olp_calibration[] = "{digest[:HASH_DIGITS]}";',
+    lines = [
+        *map(part, code.shapes),
+        *code.tables,
+        f'const char olp_calibration[] = "{code.digest[:HASH_DIGITS]}";',
+    ]
+    if code.sensors:
+        sensors = "".join(
+            f"   temperature_degC[{k}]: {_ascii(s.name)}, {real(s.start_degC)} until it is known\n"
+            for k, s in enumerate(code.sensors)
+        )
+        start = ", ".join(real(s.start_degC) for s in code.sensors)
+        lines += [
             f"/* Temperatures that the model takes.\n{sensors}*/",
             f"const double olp_start_degC[] = {{{start}}};",
-            "",
-            part("engine"),
-            part("follower"),
         ]
-    )
+    return "\n".join([*lines, "", *map(part, (*code.engine, *code.tips))])

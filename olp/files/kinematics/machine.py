@@ -64,6 +64,7 @@ def load_joint_machine(path: PathLike, read: Reader = read_bytes) -> JointMachin
         tips_from_zero={"axis-zero": True, "activation": False, None: None}[file.kinematics.tcp_frame_zero],
         leads=file.kinematics.orientation_interpolation or "",
         swivel_axis=_swivel_axis(file.kinematics.swivel_axis, structure, path),
+        real_time=file.real_time,
     )
 
 

@@ -174,6 +174,11 @@ class JointMachineFile(Table):
     compensated_by_controller: list[Text] = Field(
         default=[], description="the errors that the control corrects now; none can be named here yet"
     )
+    real_time: Text | None = Field(
+        default=None,
+        description="the hash of the calibration that the control corrects by in real time, as "
+        "`olp calibrate export` prints it for code; left out where the control does not",
+    )
     kinematics: KinematicsTable = Field(default_factory=KinematicsTable, description="the table [kinematics]")
     axes: dict[Text, JointTable] = Field(description="tables [axes.NAME], one for each axis")
     platforms: dict[Text, PlatformTable] = Field(default={}, description="tables [platforms.NAME]")

@@ -11,15 +11,17 @@ from olp.compensation.joints.list_writer import write_list
 from olp.compensation.joints.path import JointPath
 from olp.compensation.joints.planning import JointLimits, JointPlan, planned
 from olp.compensation.joints.writing import write_joints
-from olp.compensation.stamp import find_stamp, stamp_line
+from olp.compensation.stamp import find_real_time, find_stamp, stamp_line, stamped
 from olp.compensation.tally import Tally
 from olp.core.errors import AlreadyCorrected, OutsideBox
 from olp.core.units import MM_PER_UM, RAD_PER_URAD
 from olp.core.values import dataclass
-from olp.files.sources import Source
 from olp.files.write import write_bytes
 from olp.findings.catalogue import Finding
+from olp.program.dialect import Dialect
+from olp.program.program import Program
 from olp.proof.joints import JointProof, prove_joints
+from olp.workflows import real_time
 from olp.workflows.flatten import UnrollOptions
 from olp.workflows.joints.loaded import JointRun
 from olp.workflows.joints.report import findings_of, last_digits, outside_box, report_of
@@ -95,19 +97,29 @@ def correct_joints(
 def corrected(run: JointRun, options: JointOptions) -> JointCorrection:
     """As `correct_joints`, for a run that is loaded."""
     with run.program.errors():
-        _refuse_stamped(run.program)
+        _refuse_stamped(run)
         source, nominal = run.read(run.program, options)
         dialect = run.dialect(run.program)
         with nominal.program.errors():
             plan = planned(nominal, options.limits())
             if options.outside_box == "refuse" and run.calibration is not None:
                 _refuse_outside(nominal, plan, run)
-            stamp = stamp_line(run.digest, dialect.comment) if dialect.marks else b""
             write = write_joints if nominal.listed is None else write_list
-            written = write(nominal, plan, stamp)
-        text = bytes(source.data) if written.text is None else written.text
+            written = write(nominal, plan)
+        text = _stamped(run, dialect, nominal.program, written.text)
         done = proved(run, (nominal, plan), run.again(text, dialect), options, written.tally)
     return JointCorrection(text, bytes(source.data), done[0], done[1], done[2], run.files)
+
+
+def _stamped(run: JointRun, dialect: Dialect, nominal: Program, written: bytes | None) -> bytes:
+    """The text with its stamp. One where nothing changed, None, has it only where the control corrects."""
+    by_control = run.machine.real_time is not None
+    text = bytes(nominal.data) if written is None else written
+    told = written is None and (not by_control or find_real_time(text) is not None)
+    if told or not dialect.marks:
+        return text
+    stamp = stamp_line(run.digest, dialect.comment, real_time=by_control)
+    return stamped(text, stamp, nominal.eol(1), dialect.first)
 
 
 def proved(
@@ -131,13 +143,14 @@ def proved(
     return proof, report, findings
 
 
-def _refuse_stamped(program: Source) -> None:
-    stamp = find_stamp(program.data)
+def _refuse_stamped(run: JointRun) -> None:
+    real_time.refuse_stamped(run.machine.real_time, run.digest, run.program)
+    stamp = find_stamp(run.program.data)
     if stamp:
         raise AlreadyCorrected(
             f"the program has the stamp `{stamp.group().decode()}` of a correction; a second one would apply "
             "the model twice; correct the nominal program",
-            line=program.data.count(b"\n", 0, stamp.start()) + 1,
+            line=run.program.data.count(b"\n", 0, stamp.start()) + 1,
             code="OLP560",
         )
 

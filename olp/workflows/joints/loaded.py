@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import re
 from collections.abc import Mapping
 from dataclasses import field, replace
@@ -13,9 +12,8 @@ from olp.compensation.joints.path import JointPath
 from olp.core.errors import ConfigError, ProgramError, UsageError
 from olp.core.machine import ZERO, Job, Setup, WorkOffset
 from olp.core.values import dataclass
-from olp.files.calibration.reader import files_beside
 from olp.files.config import load_job
-from olp.files.kinematics.calibration import load_joint_calibration
+from olp.files.kinematics.load import load_joint_errors
 from olp.files.kinematics.machine import load_joint_machine
 from olp.files.sources import Source, Sources
 from olp.kinematics.errors import MachineErrors, Payload
@@ -75,11 +73,7 @@ class JointRun:
             raise UsageError("no program is given; name it, or set the key program of the job file (-j)")
         described = load_joint_machine(machine, sources.read)
         payload = Payload(stated.payload_kg, stated.payload_centre_mm)
-        calibration = None
-        if described.calibration is not None:
-            calibration = load_joint_calibration(
-                described.calibration, described.structure, payload, sources.read
-            )
+        calibration, digest = load_joint_errors(described, payload, sources.read)
         stated = replace(stated, dialect=dialect or stated.dialect)
         control, setup, turned = described.control, None, {}
         if control is not None:
@@ -93,7 +87,6 @@ class JointRun:
                 name: dict(zip(_TURNS, offset.rotation_deg, strict=True)) for name, offset in offsets.items()
             }
         source = sources.source(program)
-        digest = _digest(described, sources)
         named = [str(machine), job, described.calibration, source.name]
         files = tuple(dict.fromkeys(str(Path(name).absolute()) for name in named if name))
         return JointRun(
@@ -220,14 +213,3 @@ def _refuse_undefined(setup: Setup, machine: JointMachine, file: str) -> None:
         raise ConfigError(
             f"start_deg names {', '.join(unknown)}; expected rotary axes of {', '.join(order)}", file=file
         )
-
-
-def _digest(machine: JointMachine, sources: Sources) -> str:
-    """Hash of the calibration file, the files that it names, and the machine that it is relative to."""
-    digest = hashlib.sha256()
-    if machine.calibration is not None:
-        digest.update(sources.read(machine.calibration))
-        for file in files_beside(machine.calibration, sources.read):
-            digest.update(sources.read(file))
-    digest.update(repr(machine.structure).encode())
-    return digest.hexdigest()

@@ -25,8 +25,8 @@ from olp.errormodel.sources.structure import Distortion, Sensor, Structure
 from olp.files.calibration.reader import load_calibration
 from olp.files.control_code.carried import carried
 from olp.files.control_code.compiled import self_test
+from olp.files.control_code.linear import linear_code, vectors
 from olp.files.control_code.registry import CODE, write_code
-from olp.files.control_code.vectors import vectors
 from olp.workflows.session import Session
 
 pytestmark = pytest.mark.slow
@@ -105,7 +105,9 @@ def test_every_state_of_a_machine_agrees(seed: int, recipe: Recipe, tmp_path: Pa
     machine = machines.random_machine(tmp_path / "m", seed, recipe)
     machines.add_map_and_load(machine, np.random.default_rng(seed))
     calibration = load_calibration(machine.parent / "calibration.toml")
-    told = self_test(CODE["c"], write_code(calibration, recipe.chain, DIGEST, "c", tmp_path / "model.c"))
+    told = self_test(
+        CODE["c"], write_code(linear_code(calibration, recipe.chain, DIGEST), "c", tmp_path / "model.c")
+    )
     assert told.startswith("2000 vectors") and told.endswith("0 unsolved")
 
 
@@ -136,14 +138,16 @@ def test_temperatures_are_taken_at_run_time(model: str, tmp_path: Path) -> None:
     kept = carried(calibration, "FXYZ")
     assert [s.name for s in kept.sensors] == ["Y_scale", "Z_scale", "workpiece", "beam", "spindle"]
     rows = vectors(kept, 4000)
-    source = write_code(calibration, "FXYZ", DIGEST, "c", tmp_path / "model.c")[tmp_path / "model.c"]
+    source = write_code(linear_code(calibration, "FXYZ", DIGEST), "c", tmp_path / "model.c")[
+        tmp_path / "model.c"
+    ]
     found = compiled(source, tmp_path)(rows[:, :-3])
     assert np.abs(found - rows[:, -3:]).max() <= SAME_MM
     assert np.ptp(rows[:, -3:], axis=0).min() > 0.01
 
 
 def test_a_file_that_is_not_the_model_is_found_out(tmp_path: Path) -> None:
-    files = write_code(warm(), "FXYZ", DIGEST, "c", tmp_path / "model.c")
+    files = write_code(linear_code(warm(), "FXYZ", DIGEST), "c", tmp_path / "model.c")
     first = next(iter(files))
     for right, wrong in ((b"0.01, ", b"0.0100001, "), (b"(expansion->of_tip ?", b"(!expansion->of_tip ?")):
         broken = files[first].replace(right, wrong)
@@ -157,7 +161,7 @@ BOUNDS = """
 int main(void)
 {
     olp_follower at;
-    olp_limits limits = {1.0, 2.0, 0.5, 5e-5, 1};
+    olp_limits limits = {1.0, 1.0, 2.0, 2.0, 0.5, 5e-5, 1};
     olp_state now;
     double place[3] = {300.0, 200.0, -50.0}, wanted[3], command[3], before[3], most = 0.0, switched = 0.0;
     int tick, j, held = 0, limited = 0;
@@ -196,7 +200,7 @@ def test_every_cycle_is_bounded(tmp_path: Path) -> None:
     """Switched on, another tool, a smaller bound, outside of the box, switched off: in no cycle more than the
     rate allows, and never more than the bound once it is reached."""
     calibration = replace(warm(), backlash_mm=(0.004, 0.0, 0.006))
-    files = write_code(calibration, "FXYZ", DIGEST, "c", tmp_path / "model.c")
+    files = write_code(linear_code(calibration, "FXYZ", DIGEST), "c", tmp_path / "model.c")
     (tmp_path / "bounds.c").write_bytes(next(iter(files.values())) + BOUNDS.encode())
     built, program = str(tmp_path / "bounds.c"), str(tmp_path / "bounds")
     subprocess.run(["gcc", "-std=c99", "-O1", "-o", program, built, "-lm"], check=True)
@@ -217,8 +221,9 @@ def test_what_code_cannot_hold_is_refused_by_name(tmp_path: Path) -> None:
     curve = Curve("Y", [0.0, 300.0], {}, {"EYY": [0.0, 0.003]}, {"EYY": [0.001, 0.002]})
     with pytest.raises(ConfigError, match="a backlash below 0"):
         carried(replace(warm(), curves=(curve,)), "FXYZ")
+    machine = machines.random_machine(tmp_path / "m", 2, Recipe())
     with pytest.raises(UsageError, match="a table has no code"):
-        self_test(None, {})
+        olp.export_table(machine, "linuxcnc", tmp_path / "t.comp", self_test=True)
 
 
 def test_the_command_writes_the_file_and_tests_it(tmp_path: Path) -> None:

@@ -22,6 +22,7 @@ from judge.path import away
 import olp
 from olp.core.errors import ConfigError, UsageError
 from olp.files.calibration.reader import load_calibration
+from olp.files.control_code.linear import linear_code
 from olp.files.control_code.registry import write_code
 from olp.files.write import write_files
 
@@ -157,7 +158,7 @@ def test_what_has_no_name_in_hal_is_refused(tmp_path: Path) -> None:
     calibration = load_calibration(machine.parent / "calibration.toml")
     for name in ("Gantry.comp", "my-kins.comp", "kins.c"):
         with pytest.raises(UsageError, match="expected the name of a component"):
-            write_code(calibration, "FXYZ", "0" * 64, "linuxcnc-kins", tmp_path / name)
+            write_code(linear_code(calibration, "FXYZ", "0" * 64), "linuxcnc-kins", tmp_path / name)
     folder = machine.parent
     (folder / "warm.toml").write_text(
         'schema = "olp-thermal-1"\nmachine = "m"\n'
@@ -172,4 +173,4 @@ def test_what_has_no_name_in_hal_is_refused(tmp_path: Path) -> None:
     (folder / "calibration.toml").write_text(f'{text}[thermal]\nstructure = "warm.toml"\n')
     calibration = load_calibration(folder / "calibration.toml")
     with pytest.raises(ConfigError, match='"beam-1" has no name of its own in HAL'):
-        write_code(calibration, "FXYZ", "0" * 64, "linuxcnc-kins", tmp_path / "kins.comp")
+        write_code(linear_code(calibration, "FXYZ", "0" * 64), "linuxcnc-kins", tmp_path / "kins.comp")

@@ -1,11 +1,17 @@
-"""Test vectors of a model: states of the machine, and the error that `olp` finds there."""
+"""Control code of a machine with three linear axes, and its test vectors: states of the machine, and the
+error that `olp` finds there."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from olp.core.arrays import Array
-from olp.files.control_code.carried import Carried
+from olp.core.units import AXES
+from olp.errormodel.calibration import Calibration
+from olp.files.control_code.base import Bounds, Code
+from olp.files.control_code.carried import Carried, carried
+from olp.files.control_code.linear_tables import linear_tables
+from olp.files.control_code.tables import written
 
 #: Vectors in a file.
 COUNT = 2000
@@ -40,6 +46,25 @@ def vectors(kept: Carried, count: int = COUNT, seed: int = 1) -> Array:
     return rows
 
 
-def text(rows: Array) -> str:
-    """The file: one vector per line, with all digits."""
-    return "".join(" ".join(map(repr, row)) + "\n" for row in rows.tolist())
+def linear_code(calibration: Calibration, chain: str, digest: str) -> Code:
+    """The code of a machine with three linear axes. Raises ConfigError for what C code cannot hold."""
+    kept = carried(calibration, chain)
+    rows = vectors(kept)
+    return Code(
+        machine=kept.calibration.machine,
+        chain=chain,
+        digest=digest,
+        axes=tuple(AXES),
+        units=("mm", "mm", "mm"),
+        shapes=("common", "shapes"),
+        tables=tuple(linear_tables(kept)),
+        engine=("engine", "follower"),
+        tips=(),
+        self_test="self_test",
+        vectors=written(rows),
+        sensors=kept.sensors,
+        payload_kg=kept.calibration.payload_kg,
+        centred=False,
+        linear=Bounds.of(rows[:, -3:], kept.backlash_mm(), "mm"),
+        rotary=Bounds.of(np.zeros(1), 0.0, "deg"),
+    )

@@ -1,73 +1,22 @@
-"""The numbers of a model as C tables, each number with all its digits and each list once."""
+"""The tables of a machine with three linear axes."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from olp.core.arrays import Array
 from olp.core.grid_interpolation import Grid, Line
-from olp.core.interpolation import Interpolant
 from olp.core.units import AXES
 from olp.errormodel.bodies import Body
 from olp.errormodel.components import ActingTerm, AxisColumns
 from olp.errormodel.lever_arms import DIRECTIONS, LeverArms
 from olp.files.control_code.carried import Carried, Expansion, Table
-
-#: Numbers in one line of the source.
-_IN_LINE = 6
-#: No struct, no list.
-_NONE = "0"
+from olp.files.control_code.tables import NONE, Data, curve, defines, pair, real, triple
 
 
-class Data:
-    """Gathers the tables of a model; `lines` are their definitions in order."""
-
-    def __init__(self) -> None:
-        self.lines: list[str] = []
-        self._names: dict[tuple[str, ...], str] = {}
-
-    def numbers(self, values: Iterable[float] | Array) -> str:
-        """The name of a list of doubles."""
-        return self._list("double", [real(v) for v in np.asarray(values, float).ravel().tolist()])
-
-    def integers(self, values: Iterable[int]) -> str:
-        return self._list("int", [str(int(v)) for v in values])
-
-    def one(self, kind: str, fields: str) -> str:
-        """The name of a struct, without the & before it."""
-        key = (kind, fields)
-        if key not in self._names:
-            self._names[key] = f"olp_d{len(self._names)}"
-            self.lines.append(f"static const {kind} {self._names[key]} = {fields};")
-        return self._names[key]
-
-    def array(self, name: str, kind: str, items: Sequence[str]) -> None:
-        """A list of structs; C has no empty one."""
-        body = ",\n    ".join(items or ["{0}" if not kind.endswith("*") else "0"])
-        self.lines.append(f"static const {kind} {name}[] = {{\n    {body}}};")
-
-    def _list(self, kind: str, texts: list[str]) -> str:
-        key = (kind, *texts)
-        if key not in self._names:
-            name = self._names[key] = f"olp_d{len(self._names)}"
-            rows = [", ".join(texts[i : i + _IN_LINE]) for i in range(0, len(texts), _IN_LINE)]
-            body = ",\n    ".join(rows)
-            self.lines.append(f"static const {kind} {name}[] = {{{body}}};")
-        return self._names[key]
-
-
-def real(value: float) -> str:
-    """A double with all its digits."""
-    return repr(float(value) + 0.0)
-
-
-def _triple(values: Iterable[float]) -> str:
-    return "{" + ", ".join(real(v) for v in values) + "}"
-
-
-def write(kept: Carried) -> list[str]:
+def linear_tables(kept: Carried) -> list[str]:
     """The lines that define all tables of a model."""
     data = Data()
     bodies = [_body(data, b, c) for b, c in zip(kept.bodies, kept.columns, strict=True)]
@@ -76,17 +25,17 @@ def write(kept: Carried) -> list[str]:
     maps = [f"&{_grid(data, grid, (0, 1, 2))}" for grid in kept.maps]
     data.array("olp_map_list", "olp_grid *", maps)
     data.array("olp_expansion_list", "olp_expansion", [_expansion(e) for e in kept.expansions])
-    box = ", ".join(_pair(row) for row in np.asarray(kept.model.box_mm, float).tolist())
+    box = ", ".join(pair(row) for row in np.asarray(kept.model.box_mm, float).tolist())
     directed = {b.axis for b, c in zip(kept.bodies, kept.columns, strict=True) if _directed(b, c)}
     return [
+        defines(_sizes(kept)),
         *data.lines,
         f"static const double olp_box[3][2] = {{{box}}};",
         f"static const int olp_directed[3] = {{{', '.join(str(int(j in directed)) for j in range(3))}}};",
     ]
 
 
-def sizes(kept: Carried) -> dict[str, int]:
-    """What the engine has to know before it reads the tables."""
+def _sizes(kept: Carried) -> dict[str, int]:
     return {
         "OLP_BODIES": len(kept.bodies),
         "OLP_TABLES": len(kept.tables),
@@ -98,28 +47,24 @@ def sizes(kept: Carried) -> dict[str, int]:
     }
 
 
-def _pair(row: Sequence[float]) -> str:
-    return f"{{{real(row[0])}, {real(row[1])}}}"
-
-
 def _directed(body: Body, columns: AxisColumns) -> bool:
     """Whether errors of the axis depend on its direction."""
     return body.components.backlash_mm != 0.0 or any(s is not None for s in columns.slots("half"))
 
 
 def _body(data: Data, body: Body, columns: AxisColumns) -> str:
-    parts = [_NONE, _NONE, _NONE]
+    parts = [NONE, NONE, NONE]
     if columns.interpolants:
         knots = columns.knots()
         parts = [str(len(knots)), data.numbers(knots), data.integers(_pieces(body, knots))]
     mean, half = (_six(data, columns, key) for key in ("mean", "half"))
     waves = [_wave(data, acting) for acting in body.components.cyclic]
-    wave = _NONE
+    wave = NONE
     if waves:
         wave = f"olp_waves_{AXES[body.axis]}"
         data.array(wave, "olp_wave", waves)
     return (
-        f"{{{body.axis}, {int(body.carries_workpiece)}, {body.sine_terms}, {_triple(body.shear)}, "
+        f"{{{body.axis}, {int(body.carries_workpiece)}, {body.sine_terms}, {triple(body.shear)}, "
         f"{real(body.datum_mm)}, {real(body.components.backlash_mm)},\n     {', '.join(parts)},\n"
         f"     {mean}, {half},\n     {len(waves)}, {wave},\n     {_arms(body.lever_arms)}}}"
     )
@@ -138,21 +83,16 @@ def _six(data: Data, columns: AxisColumns, key: str) -> str:
     names = []
     for slot in columns.slots(key):
         if slot is None:
-            names.append(_NONE)
+            names.append(NONE)
             continue
         which, column = columns.of_column[slot]
-        names.append(f"&{_curve(data, columns.interpolants[which], column)}")
+        names.append(f"&{curve(data, columns.interpolants[which], column)}")
     return f"{{{', '.join(names)}}}"
-
-
-def _curve(data: Data, curve: Interpolant, column: int) -> str:
-    lists = [data.numbers(values) for values in (curve.x, curve.y[:, column], curve.slopes[:, column])]
-    return data.one("olp_curve", f"{{{len(curve.x)}, {int(curve.kind == 'pchip')}, {', '.join(lists)}}}")
 
 
 def _wave(data: Data, acting: ActingTerm) -> str:
     term = acting.term
-    lists = [_NONE] * 3
+    lists = [NONE] * 3
     if acting.moved:
         rows, constants, slopes = zip(*acting.moved, strict=True)
         lists = [data.integers(rows), data.numbers(constants), data.numbers(slopes)]
@@ -163,7 +103,7 @@ def _wave(data: Data, acting: ActingTerm) -> str:
 
 def _arms(lever_arms: LeverArms) -> str:
     by_row = {row: arm for rows, arm in lever_arms for row in rows}
-    arms = (f"{{{_triple(map(float, by_row[i].moves))}, {_triple(by_row[i].offset_mm)}}}" for i in range(3))
+    arms = (f"{{{triple(map(float, by_row[i].moves))}, {triple(by_row[i].offset_mm)}}}" for i in range(3))
     return f"{{{', '.join(arms)}}}"
 
 
@@ -175,7 +115,7 @@ def _line(data: Data, line: Line) -> str:
 
 def _grid(data: Data, grid: Grid, axes: Sequence[int]) -> str:
     lines = [f"&{_line(data, line)}" for line in grid.lines]
-    fill = [_NONE] * (3 - len(lines))
+    fill = [NONE] * (3 - len(lines))
     arguments = ", ".join([*map(str, axes), *fill])
     values = data.numbers(grid.values)
     head = f"{len(lines)}, {grid.values.shape[-1]}, {{{arguments}}}"
