@@ -422,7 +422,7 @@ class JobFile(Table):
     )
     dialect: ProgramDialect | None = Field(
         default=None,
-        description="the dialect of the program, where its text and its file ending do not show it: "
+        description="the dialect of the program, where its text and its file ending do not show it. One of "
         + ", ".join(CONTROLLERS),
     )
     start_mm: Position = Field(

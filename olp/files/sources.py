@@ -13,6 +13,7 @@ from pathlib import Path
 
 from olp.core import spool
 from olp.core.errors import InputError, OlpError, naming
+from olp.core.paired import data_beside, joined
 from olp.core.spool import Spool
 from olp.core.values import dataclass
 from olp.files.write import PathLike, read_bytes
@@ -92,7 +93,14 @@ class Sources:
         if isinstance(given, bytes):
             return Source("", lambda: given)
         part = functools.partial
-        return Source(str(given), part(self.read, given), part(self.let_go, given))
+        return Source(str(given), part(self._whole, given), part(self.let_go, given))
+
+    def _whole(self, path: PathLike) -> bytes:
+        """A program with its data, where these are in a file beside it."""
+        data = data_beside(Path(path))
+        if data is None or not self.exists(data):
+            return self.read(path)
+        return joined(self.read(path), self.read(data), data.name)
 
 
 def in_parcel(path: PathLike) -> str:

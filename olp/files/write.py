@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 from olp.core.errors import InputError, OlpError, UsageError
+from olp.core.paired import divided
 from olp.files import names
 from olp.files.names import not_found
 from olp.files.replacing import HELD, Replacement, remove_stale
@@ -59,7 +60,8 @@ def write_files(
 ) -> None:
     """Write files, each whole or not at all. Where one cannot be written, no target is replaced.
 
-    Contents in parts are written part by part, so that a long file never has to be in memory.
+    Contents in parts are written part by part, so that a long file never has to be in memory. A program that
+    was read from two files is written to two (`olp.core.paired`).
 
     Each file is first written beside its target under a temporary name and synced, with the owner and mode of
     the file that it replaces. Then all replace their targets. Temporary files of killed runs are removed. A
@@ -68,6 +70,11 @@ def write_files(
     another. Raises OlpError where the system refuses to write, or where another program holds a target or has
     changed it meanwhile.
     """
+    files = {
+        part: content
+        for target, whole in files.items()
+        for part, content in (divided(target, whole) if isinstance(whole, bytes) else {target: whole}).items()
+    }
     check_targets(files, inputs, force=force)
     waiting: list[Replacement] = []
     current = Path()

@@ -89,8 +89,9 @@ FOREIGN = (
             rb"&(?:ACCESS|REL|PARAM)\b|DEF(?:DAT|FCT)?[ \t]+[A-Z_]\w*[ \t]*\([^:\r\n]*\r?$|"
             rb"(?:PTP|LIN|CIRC)(?:_REL)?[ \t]+(?:\{|X[A-Z_]*\w*\b(?![ \t]*[-+.\d]))"
         ),
-        _ROBOT,
+        _NAME_IT.replace("sinumerik", "kuka-krl"),
         language=True,
+        how="and was read as another language",
     ),
     Foreign(
         "ABB RAPID",

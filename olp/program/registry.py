@@ -51,6 +51,7 @@ _KNOWN = {
     "fanuc-tp": Known("olp.program.robots.ls.dialect", signs.LS),
     "urscript": Known("olp.program.robots.urscript.dialect", signs.URSCRIPT),
     "abb-rapid": Known("olp.program.robots.rapid.dialect", signs.RAPID),
+    "kuka-krl": Known("olp.program.robots.krl.dialect", signs.KRL),
 }
 #: Files of `olp/program/described/shipped` that describe a dialect, without their ending.
 DESCRIBED = ("kawasaki-as", "val2", "karel")

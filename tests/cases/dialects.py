@@ -82,6 +82,11 @@ def _rapid(values: Sequence[float], digits: int) -> str:
     return f"MoveL [[{_list(values, digits)}],{rest}],v100,fine,rod\\WObj:=G54;"
 
 
+def _krl(values: Sequence[float], digits: int) -> str:
+    x, y, z = (f"{v:.{digits}f}" for v in values)
+    return f"LIN {{X {x},Y {y},Z {z},A 0,B 0,C 0}}"
+
+
 def _rs274(name: str, profile: Profile) -> Case:
     opening, closing = profile.comment
     head = ["G21 G90 G17 G54 G94 F600"] if profile.codes.get(540) is Act.EVENT else ["G21 G90 G17 G94 F600"]
@@ -272,6 +277,21 @@ CASES = {
             b"MoveL Offs(p,1,2,3),v100,z1,tool0;", b"MoveL p,v100\\V:=10,z1\\Z:=3,tool0\\WObj:=wobj0;",
             b"IF x THEN\nENDIF;\nELSE", b"%x%;", b"MODULE m\nRECORD r\nnum a;\nENDRECORD\nr.a:=5;",
             b"TPWrite \"a;b!\";", b"MoveAbsJ [[0,0,0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;",
+        ),
+    ),
+    "kuka-krl": Case(
+        "kuka-krl", "kuka-krl", "LINPTPXYZABCDEF{},:;=$#_[]()&\"'. 0123456789\r\n\t+-",
+        ["&ACCESS RVP", "DEF t()", "$TOOL={X 0,Y 0,Z -120,A 0,B 0,C 0}",
+         "$BASE={X 250,Y 200,Z -300,A 0,B 0,C 0}"], ["END"],
+        _krl, None, lambda text: f"; {text}",
+        re.compile(rb"(?m)^LIN \{X (" + NUMBER + rb"),Y (" + NUMBER + rb"),Z (" + NUMBER + rb"),"),
+        ("krl/*.src",),
+        (
+            b"DEFDAT a\nDECL E6POS XP={X 1,Y 2,Z 3,A 0,B 0,C 0,S 'B1',T 35}\nENDDAT\nDEF a()\nPTP XP\nEND",
+            b"LIN {FRAME: X 1, Y 2, Z 3, A 0, B 0, C 0} C_DIS ; x", b"LIN p:{X 1,Y 2,Z 3,A 0,B 0,C 0}",
+            b"PTP {A1 0,A2 0,A3 0,A4 0,A5 0,A6 0}\nPTP XHOME\nLIN $POS_ACT", b"$BASE=BASE_DATA[1]",
+            b"FDAT_ACT=FP1\nBAS(#PTP_PARAMS,100)\nPTP XP1", b"IF a THEN\nELSE\nENDIF\nLOOP\nEXIT\nENDLOOP",
+            b"SLIN XP1 WITH $VEL.CP=1, $BASE=SBASE(FP1.BASE_NO) C_SPL", b"CIRC a,b", b"x[1].X='HFF'",
         ),
     ),
 }  # fmt: skip

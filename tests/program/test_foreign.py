@@ -11,7 +11,6 @@ from olp.program.foreign import FOREIGN, LOOKED_AT, recognised
 
 MILL = PROGRAMS / "haas-mill"
 TEXTS = {
-    "KUKA KRL": (b"&ACCESS RVP\nDEF part()\nPTP {X 10, Y 0, Z 5}\nLIN P2\nEND\n", 1),
     "Yaskawa": (b"/JOB\n//NAME TEST\nNOP\nMOVJ C00000 VJ=50\nEND\n", 1),
     "VAL 3": (b"begin\n  movej(pA,flange,mNomSpeed)\nend\n", 1),
     "Mazatrol": (b"MAZATROL MATRIX\n", 1),
@@ -86,7 +85,7 @@ SIGNS = {
         b"name\t=\t7",
     ),
     ("JSON", PROGRAM, "OLP501"): (b'{"a": 1}', b' [\n{"a": 1}]', b'["a"]', b"[[1]]", b"{{", b"{["),
-    ("KUKA KRL", ROBOT, "OLP501"): (
+    ("KUKA KRL", NAMED.replace("sinumerik", "kuka-krl"), "OLP501"): (
         b"&ACCESS RV\n", b" &rel 1\n", b"&PARAM A\n", b"DEF part()\n", b"DEFDAT part (x)\n",
         b"DEFFCT a_1 (b)\r\n",
         b"PTP {X 1}\n", b"LIN_REL {\n", b"CIRC XP1\n", b"lin\tX_1\n", b"PTP XHOME Vel\n",
@@ -129,7 +128,7 @@ SIGNS = {
     ),
 }  # fmt: skip
 #: Languages that are read by another dialect.
-READ = ("Sinumerik (Siemens)", "Okuma OSP", "ABB RAPID", "FANUC TP", "UR script")
+READ = ("Sinumerik (Siemens)", "Okuma OSP", "KUKA KRL", "ABB RAPID", "FANUC TP", "UR script")
 LANGUAGES = (
     "KUKA KRL", "ABB RAPID", "FANUC TP", "Stäubli VAL 3", "Mazatrol",
     "UR script",

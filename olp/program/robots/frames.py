@@ -9,7 +9,7 @@ from __future__ import annotations
 from olp.core.errors import ProgramError
 from olp.core.machine import ZERO, Setup, Vector, WorkOffset
 from olp.core.values import dataclass
-from olp.program.frames import FrameTable, Placement
+from olp.program.frames import FrameTable, Placement, tool_vector_of
 from olp.program.robots.poses import Pose, Quaternion, inverted, multiplied, of_zyx, rotated, turn_of
 
 #: How different two tool vectors may be to be the same, mm.
@@ -25,6 +25,10 @@ class Located:
     pose: Pose
     inner: Pose
     work: WorkOffset | None = None
+
+    def holding(self, name: str, inner: Pose) -> Located:
+        """A frame that is stated in this one."""
+        return Located(name, self.pose.then(inner), self.inner.then(inner), self.work)
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +87,15 @@ class RobotFrames:
                 code="OLP521",
             )
         return Tool(name, stated, vector or ZERO, number if vector is not None else None)
+
+    def numbered_tool(self, name: str, number: int, stated: Pose | None, line: int) -> Tool:
+        """A tool by its number, 0 for none; as `located`."""
+        if number and stated is None:
+            return Tool(name, None, tool_vector_of(self.setup, number, line), number)
+        entry = self.setup.tool(number) if number else None
+        vector = None if entry is None else entry.tool_vector_mm
+        own = stated or Pose()
+        return Tool(name, own, vector or own.origin_mm, number if vector else None)
 
     def index(self, frame: Located, tool: Tool, turn: Quaternion, shift_mm: Vector, line: int) -> int:
         """The number of the frame of a target: its orientation is `turn`, and the move goes `shift_mm` from

@@ -49,7 +49,7 @@ SINUMERIK_LINE = (
     rb"POCKET\d[ \t]*\(|HOLES\d[ \t]*\(|MSG[ \t]*\(|T[ \t]*=[ \t]*\"|"
     rb"(?:A?TRANS|A?ROT|A?MIRROR|A?SCALE)\b|"
     rb"R\d+[ \t]*=|(?:EXTERN|SUPA|FFWON|SOFT|COMPCAD|COMPON|STOPRE|G64[1-5])\b|WORKPIECE[ \t]*\(|"
-    rb"[^;(\r\n]*\b(?:[XYZIJKFS]1?|CR|TURN)=[ \t]*[-+R\d(AI])"
+    rb"[^;(\r\n]*(?<![\w.])(?:[XYZIJKFS]1?|CR|TURN)=[ \t]*[-+R\d(AI])"
 )
 SINUMERIK = Signs(("mpf", "spf"), own=pattern(rb"(?im)^[ \t]*(?:" + SINUMERIK_LINE + rb")"))
 HEIDENHAIN = Signs(
@@ -100,5 +100,14 @@ URSCRIPT = Signs(
     own=pattern(
         rb"(?im)^[ \t]*(?:def[ \t]+\w+\(\):|"
         rb"(?:movej|movel|movep|movec|servoj|set_tcp)[ \t]*\([ \t]*(?:p?\[|pose_|get_))"
+    ),
+)
+KRL = Signs(
+    ("src",),
+    own=pattern(
+        rb"(?im)^[ \t]*(?:&(?:ACCESS|REL|PARAM|COMMENT)\b|"
+        rb"(?:GLOBAL[ \t]+)?DEF(?:DAT|FCT[ \t]+\w+)?[ \t]+\w+[ \t]*(?:\([^\r\n]*\)[ \t]*(?:;[^\r\n]*)?)?\r?$|"
+        rb"S?(?:PTP|LIN|CIRC)(?:_REL)?[ \t]+(?:\{|X[A-Z_]*\w*\b(?![ \t]*[-+.\d]))|"
+        rb"\$(?:BASE|TOOL)[ \t]*=|BAS[ \t]*\([ \t]*#|(?:GLOBAL[ \t]+)?DECL[ \t]+(?:GLOBAL[ \t]+)?E6POS\b)"
     ),
 )

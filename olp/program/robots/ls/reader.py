@@ -10,13 +10,12 @@ from olp.core.machine import Setup, Vector
 from olp.core.patterns import pattern
 from olp.core.values import dataclass
 from olp.program.dialect import Dialect, Options
-from olp.program.frames import tool_vector_of
 from olp.program.program import Program
 from olp.program.robots.frames import Located, Tool
 from olp.program.robots.ls.registers import Registers
 from olp.program.robots.ls.text import Line, Position, lines, parts, positions
 from olp.program.robots.moves import RobotMoves, raise_all
-from olp.program.robots.poses import Pose, of_zyx, rotated
+from olp.program.robots.poses import of_zyx, rotated
 from olp.program.robots.targets import Use
 
 _MOVE = pattern(
@@ -244,12 +243,7 @@ class _Reader:
         pose = self.registers.tools.get(number)
         if pose is None and number in self.registers.tools:
             raise _refused(f"UTOOL[{number}] gets numbers that the text does not state", line)
-        if number == 0 or pose is not None:
-            stated = self.setup.tool(number) if number else None
-            vector = None if stated is None else stated.tool_vector_mm
-            own = Pose() if pose is None else pose
-            return Tool(f"UTOOL{number}", own, vector or own.origin_mm, number if vector else None)
-        return Tool(f"UTOOL{number}", None, tool_vector_of(self.setup, number, line.line), number)
+        return self.moves.frames.numbered_tool(f"UTOOL{number}", number, pose, line.line)
 
 
 def _turn(position: Position) -> tuple[float, float, float, float]:

@@ -1,0 +1,93 @@
+"""KRL as a dialect: how a corrected program says new positions and moves."""
+
+from __future__ import annotations
+
+from olp.core.errors import ProgramError
+from olp.core.patterns import pattern
+from olp.core.values import dataclass
+from olp.program.program import Program
+from olp.program.robots.dialect import Replacement, RobotDialect
+from olp.program.robots.krl.data import is_declaration
+from olp.program.robots.krl.reader import read
+from olp.program.robots.krl.table import TABLE
+from olp.program.robots.krl.text import aggregate
+from olp.program.robots.poses import between, zyx_of
+from olp.program.robots.targets import NOWHERE, Part, Target, Use
+from olp.program.text.numbers import spliced
+from olp.program.text.signs import KRL
+
+_ROUTINE = pattern(rb"(?im)^[ \t]*(?:GLOBAL[ \t]+)?DEF(?:FCT)?\b[^\r\n]*(?:\r\n|\n|\r|\Z)")
+_HEADER = pattern(rb"(?:\xef\xbb\xbf)?(?:&[^\r\n]*(?:\r\n|\n|\r|\Z))*")
+_WORD = pattern(rb"(?i)(S?)(LIN|PTP)")
+_TYPE = pattern(rb"(?i)((?:(?:GLOBAL|DECL|CONST)\s+)*)(E6POS|E3POS|POS|FRAME)\b")
+#: The words with which a part is passed without a stop.
+_PASSED = {b"LIN": b"C_DIS", b"PTP": b"C_PTP", b"SLIN": b"C_SPL", b"SPTP": b"C_SPL"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Krl(RobotDialect):
+    """KRL programs."""
+
+    def stamped(self, program: Program, stamp: bytes) -> Replacement:
+        match = _ROUTINE.search(program.data) or _HEADER.match(program.data)
+        assert match is not None
+        return match.end(), match.end(), stamp + program.eol(1)
+
+    def part(self, program: Program, move: int, use: Use, part: Part) -> list[Replacement]:
+        data, targets = program.data, program.targets
+        assert targets is not None
+        target, (begin, end) = targets.targets[use.target], use.statement
+        word = _WORD.match(data, begin)
+        assert word is not None
+        edits = [(use.place[0] - begin, use.place[1] - begin, self._value(program, target, part, use))]
+        if use.zone != NOWHERE:
+            edits.append((use.zone[0] - begin, use.zone[1] - begin, b""))
+        text = spliced(data[begin:end], edits).rstrip()
+        if not part.stop:
+            text += b" " + _PASSED[word[0].upper()]
+        line = int(program.toolpath.line[move])
+        blanks = data[int(program.line_start[line - 1]) : begin]
+        return [(begin, begin, text + program.eol(line) + blanks)]
+
+    def clone(self, program: Program, target: Target, name: str, text: bytes) -> Replacement:
+        data, (begin, end) = program.data, target.declaration
+        if not is_declaration(data[begin:end]):
+            raise ProgramError(
+                f"moves to {target.name} want different numbers of it, and it is assigned by a statement; "
+                "give each move its own position",
+                line=target.line,
+                code="OLP561",
+            )
+        head = _TYPE.match(data, begin, end)
+        assert head is not None
+        blanks = data[int(program.line_start[target.line - 1]) : begin]
+        place = int(program.line_end[target.line - 1])
+        return place, place, program.eol(target.line) + blanks + head[0] + b" " + name.encode() + b"=" + text
+
+    @staticmethod
+    def _value(program: Program, target: Target, part: Part, use: Use) -> bytes:
+        """A position with other numbers, and the orientation at the end of a part."""
+        start, numbers = target.value[0], aggregate(program.data, target.value)
+        assert numbers is not None
+        edits = part.renumbered(target)
+        if not (use.before == use.turn == target.turn):
+            angles = zyx_of(between(use.before, use.turn, part.share))
+            for name, angle in zip("ABC", angles, strict=True):
+                a, b = numbers.values[name][0]
+                edits.append((a - start, b - start, f"{angle:.6f}".encode()))
+        return spliced(program.data[slice(*target.value)], edits)
+
+
+DIALECT = Krl(
+    name="kuka-krl",
+    title="KRL (KUKA)",
+    path_mode="approximation",
+    reader=read,
+    signs=KRL,
+    folder_endings=("src",),
+    comment=(b"; ", b""),
+    languages=frozenset(("KUKA KRL",)),
+    table=TABLE,
+    decimals=5,
+    longest_name=24,
+)

@@ -1,0 +1,317 @@
+"""Reads KRL: moves, and the positions whose numbers can be edited.
+
+A move goes in the base and with the tool that are in force, so these are followed through the text. Where
+they depend on the run, a move is refused.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from olp.core.errors import ProgramError
+from olp.core.machine import Setup
+from olp.core.patterns import pattern
+from olp.core.values import dataclass
+from olp.program.dialect import Dialect, Options
+from olp.program.program import Program
+from olp.program.robots.frames import Located
+from olp.program.robots.krl import flow
+from olp.program.robots.krl.active import Active, State
+from olp.program.robots.krl.data import Declared, assigned, is_declaration, key_of, pose_of
+from olp.program.robots.krl.text import Aggregate, Line, aggregate, lines, parts
+from olp.program.robots.moves import RobotMoves, raise_all
+from olp.program.robots.poses import Pose, multiplied, rotated
+from olp.program.robots.targets import NOWHERE, Span, Use
+
+_MOVE = pattern(rb"(?i)(S?(?:LIN|PTP))\s*(?=[\s{])(.*)")
+_OTHER_MOVE = pattern(rb"(?i)(S?CIRC(?:_REL)?|S?(?:LIN|PTP)_REL|SPLINE|SPL|ASYPTP)\b")
+_TAIL = pattern(
+    rb"(?i)\s*(\bWITH\b.*?)?(?:\s*\b(C_(?:PTP|DIS|VEL|ORI|SPL)(?:\s+C_(?:PTP|DIS|VEL|ORI))?))?\s*"
+)
+_TARGET = pattern(rb"(?i)(?:\{[^{}]*\}|[^{}])*?(?=\s*(?:\bC_(?:PTP|DIS|VEL|ORI|SPL)\b|\bWITH\b|$))")
+_ACTUAL = pattern(rb"(?i)\$(?:POS_ACT|AXIS_ACT)")
+_HOME = pattern(rb"XHOME\d*")
+_NAME = pattern(rb"([A-Za-z_]\w*)\s*(?:\[\s*([^\]]*?)\s*\])?")
+_SENSOR = pattern(rb"(?i)(RSI_MOVECORR|RSI_ON)\b")
+_TRIGGER = pattern(rb"(?i)(?:TRIGGER|SYN\s+(?:OUT|PULSE))\b")
+_LEADS = pattern(
+    rb"(?i)(?:GOTO|EXIT|RETURN|HALT|CONTINUE|WAIT|INTERRUPT|BRAKE|RESUME|ANIN|ANOUT|DIGIN|ENDSPLINE)\b"
+)
+#: Components of a position, and its external axes.
+_PLACE = ("X", "Y", "Z")
+_OUTER = ("E1", "E2", "E3", "E4", "E5", "E6")
+
+
+@dataclass(slots=True)
+class _Block:
+    """An open block: whether it is a loop, the moves before it, what is in force at its begin, and at the
+    ends of its branches. `whole`: one of its branches runs in any case."""
+
+    loop: bool
+    moves: int
+    begin: State
+    ends: list[State]
+    whole: bool = False
+
+
+def read(
+    data: bytes, setup: Setup, dialect: Dialect, options: Options | None = None, *, words: bool = True
+) -> Program:
+    """Read a whole program. Raises ProgramError with the line of the first statement that cannot be read
+    correctly."""
+    return _Reader(data, setup).run(dialect, options or Options(), words=words)
+
+
+class _Reader:
+    """Reads one program."""
+
+    def __init__(self, data: bytes, setup: Setup) -> None:
+        self.data = data
+        self.moves = RobotMoves(data, setup, "BASE0")
+        self.lines = list(lines(data))
+        self.declared = Declared(data, self.lines)
+        self.flow = flow.Flow(self.lines)
+        self.active = Active(data, setup, self.declared, self.moves.frames)
+        self.blocks: list[_Block] = []
+        self.targets: dict[Span, int] = {}
+        self.bases: dict[tuple[str, str], Located] = {}
+        self.listed = self.triggered = False
+        self.refusals: list[ProgramError] = []
+
+    def run(self, dialect: Dialect, options: Options, *, words: bool) -> Program:
+        for line in self.lines:
+            self._mentioned(line)
+        count = max(len(self.lines), 1)
+        for k, line in enumerate(self.lines):
+            if k % 4096 == 0:
+                options.tell("read", k / count)
+            try:
+                self._statement(line)
+            except ProgramError as error:
+                self.refusals.append(error)
+        raise_all(self.refusals)
+        return self.moves.program(dialect, words=words)
+
+    def _mentioned(self, line: Line) -> None:
+        """A routine may give its arguments other values."""
+        for name in flow.calls_in(line.text):
+            if name == b"BAS" or flow.routine_of(line.text) or is_declaration(line.text):
+                continue
+            for argument in flow.arguments_in(line.text):
+                self.declared.change(argument, line.line)
+
+    # -- statements ----------------------------------------------------------------------------------
+
+    def _statement(self, line: Line) -> None:
+        text = line.text
+        block = flow.BLOCK.match(text)
+        if block is not None:
+            self._block(block.lastgroup or "", line)
+            return
+        if self.listed or is_declaration(text):
+            return
+        move = _MOVE.fullmatch(text)
+        if move is not None:
+            self._move(line, move[1].upper(), line.begin + move.start(2))
+            self.triggered = False
+            return
+        other = _OTHER_MOVE.match(text)
+        if other is not None:
+            raise _refused(f"{other[1].decode().upper()} is not read; post straight moves to positions", line)
+        if _SENSOR.match(text):
+            raise _refused("targets are moved by what a sensor says", line)
+        if _TRIGGER.match(text):
+            self.triggered = True
+        elif self.active.take(line) or _LEADS.match(text) or assigned(text) is not None or b"(" in text:
+            self._calls(line)
+        else:
+            shown = text[:60].decode("latin-1")
+            raise ProgramError(f"`{shown}` is not a statement of KRL", line=line.line, code="OLP510")
+
+    def _calls(self, line: Line) -> None:
+        """Routines that a statement calls, and what they may do."""
+        for name in flow.calls_in(line.text):
+            if name == b"BAS":
+                continue
+            if self.flow.moves(name):
+                self.moves.known = False
+            if self.flow.may_set(name):
+                shown = name.decode("latin-1")
+                self.active.forget(f"{shown} in line {line.line} may set it")
+            if not self.flow.known(name):
+                what = f"{name.decode('latin-1')} is in another file: correct that too"
+                self.moves.remark("called", line.line, what)
+
+    def _block(self, kind: str, line: Line) -> None:
+        """Where the flow of the program parts and meets."""
+        if kind == "data":
+            self.listed = line.text.upper().find(b"DEFDAT") >= 0
+        elif kind in ("routine", "last"):
+            self.blocks = []
+            self.moves.known = False
+            self.active.forget("this routine does not set it" if self.flow.sets else "")
+        elif kind == "label":
+            self.moves.known = False
+            if self.flow.sets:
+                self.active.forget(f"moves jump to line {line.line}")
+        elif kind in ("if", "loop"):
+            self._calls(line)
+            if self.flow.sets_in_loop(line.line):
+                self.active.forget(f"the loop of line {line.line} sets it")
+            self.blocks.append(_Block(kind == "loop", self.moves.count, self.active.state, []))
+        elif self.blocks:
+            self._branch(kind, line)
+
+    def _branch(self, kind: str, line: Line) -> None:
+        block = self.blocks[-1]
+        if block.moves != self.moves.count:
+            self.moves.known = False
+        block.ends.append(self.active.state)
+        if kind == "else":
+            block.whole |= not line.text.upper().startswith(b"CASE")
+            self.active.state = block.begin
+            return
+        self._calls(line)
+        self.blocks.pop()
+        ends = {(state.base, state.tool) for state in block.ends}
+        if not (block.whole or line.text.upper().startswith((b"UNTIL", b"ENDLOOP"))):
+            ends.add((block.begin.base, block.begin.tool))
+        if len(ends) > 1:
+            self.active.forget(f"the branches up to line {line.line} set it differently")
+
+    # -- moves ---------------------------------------------------------------------------------------
+
+    def _move(self, line: Line, word: bytes, begin: int) -> None:
+        stated = _TARGET.match(self.data, begin, line.end)
+        tail = None if stated is None else _TAIL.fullmatch(self.data, stated.end(), line.end)
+        if stated is None or tail is None or not stated[0].strip():
+            raise ProgramError("the words of this move are not read", line=line.line, code="OLP516")
+        target = stated.start() + len(stated[0]) - len(stated[0].lstrip()), stated.end()
+        if _ACTUAL.fullmatch(stated[0].strip()):
+            return
+        if any(block.loop and block.moves == self.moves.count for block in self.blocks):
+            # the first move in a loop begins where the last one ends, or before the loop
+            self.moves.known = False
+        state = self.active.state
+        if tail[1] is not None:
+            state = self.active.within(tail[1], tail.start(1), line)
+        terms = parts(self.data, target)
+        if self._in_joints(terms, line):
+            self.moves.known = False
+            self.moves.remark("joints", line.line, "joint values are kept as written")
+            return
+        base = self.active.base(state, line.line)
+        use, frame = self._use(line, target, terms, base)
+        tool = self.active.tool(state, line.line)
+        self.moves.move(
+            line.line, replace(use, zone=tail.span(2)), frame, tool, self.active.feed,
+            straight=word.endswith(b"LIN"), whole=self.triggered,
+        )  # fmt: skip
+
+    def _in_joints(self, terms: list[Span], line: Line) -> bool:
+        """Whether a move states joints, as those of the home position do, which the control knows."""
+        if len(terms) != 1:
+            return False
+        text = self.data[slice(*terms[0])]
+        numbers = aggregate(self.data, terms[0])
+        if numbers is None:
+            name = _NAME.fullmatch(text)
+            if name is None:
+                return False
+            key = key_of(name[1], name[2])
+            if key not in self.declared.values:
+                return _HOME.fullmatch(key.encode("latin-1")) is not None
+            numbers = self._position(name[1], name[2], line)[1]
+        return numbers.joints
+
+    def _use(self, line: Line, span: Span, terms: list[Span], base: Located) -> tuple[Use, Located]:
+        """How a move uses its target, and the frame that this is in. In a product the last term with a name
+        is the target; numbers behind it are a shift in it."""
+        statement = (line.begin, line.end)
+        last = aggregate(self.data, terms[-1]) if len(terms) > 1 else None
+        shift = Pose() if last is None else pose_of(last, line.line)
+        own = terms[-1] if last is None else terms[-2]
+        frame = self._frame(base, terms[: terms.index(own)], line)
+        index, named = self._target(own, line)
+        turn = self.moves.targets[index].turn
+        if last is None:
+            return Use(index, statement, span, named, turn=turn), frame
+        x, y, z = (last.values[name][0] for name in _PLACE)
+        use = Use(
+            index, statement, span, named, rotated(turn, shift.origin_mm), multiplied(turn, shift.turn),
+            offsets=(x, y, z), offset_turn=turn,
+        )  # fmt: skip
+        return use, frame
+
+    def _frame(self, base: Located, terms: list[Span], line: Line) -> Located:
+        """The base, with the frames that stand before a target."""
+        if not terms:
+            return base
+        text = self.data[terms[0][0] : terms[-1][1]].decode("latin-1")
+        key = base.name, text
+        if key not in self.bases:
+            pose = Pose()
+            for term in terms:
+                pose = pose.then(self._pose(term, line))
+            self.bases[key] = base.holding(f"{base.name} : {text}", pose)
+        return self.bases[key]
+
+    def _pose(self, span: Span, line: Line) -> Pose:
+        numbers = aggregate(self.data, span)
+        name = _NAME.fullmatch(self.data, *span)
+        if numbers is None and name is not None:
+            numbers = self._position(name[1], name[2], line)[1]
+        if numbers is None:
+            raise self._computed(span, line)
+        return pose_of(numbers, line.line)
+
+    def _position(self, name: bytes, index: bytes | None, line: Line) -> tuple[Line, Aggregate]:
+        """A position with a name. Raises ProgramError where the text does not state it with its numbers."""
+        key = key_of(name, index)
+        if index is not None and not index.strip().isdigit():
+            raise ProgramError(
+                f"the position {key} is chosen in the run; program it with its number",
+                line=line.line,
+                code="OLP533",
+            )
+        found = self.declared.value(key, line.line, "the position")
+        if found is None:
+            raise ProgramError(
+                f"the position {key} is not stated in this text; give the .dat file beside it, or declare it "
+                "with its numbers",
+                line=line.line,
+                code="OLP533",
+            )
+        return found[0].line, found[1]
+
+    def _target(self, span: Span, line: Line) -> tuple[int, Span]:
+        """The place of a target, and the bytes of its name, `NOWHERE` where it is stated in the move."""
+        numbers, declaration = aggregate(self.data, span), line
+        name = _NAME.fullmatch(self.data, *span)
+        if numbers is None and name is not None:
+            declaration, numbers = self._position(name[1], name[2], line)
+        if numbers is None:
+            raise self._computed(span, line)
+        if numbers.span not in self.targets:
+            what = "the position" if name is None else f"the position {key_of(name[1], name[2])}"
+            pose, values = pose_of(numbers, line.line, what), numbers.values
+            x, y, z = (values[axis][0] for axis in _PLACE)
+            outer = tuple(values[axis][1] if axis in values else 0.0 for axis in _OUTER)
+            self.targets[numbers.span] = self.moves.target(
+                declaration.line, numbers.span, (x, y, z), pose.origin_mm, pose.turn, outer,
+                "" if name is None else name[1].decode("latin-1"),
+                NOWHERE if name is None else (declaration.begin, declaration.end),
+            )  # fmt: skip
+        return self.targets[numbers.span], NOWHERE if name is None else span
+
+    def _computed(self, span: Span, line: Line) -> ProgramError:
+        shown = self.data[slice(*span)][:60].decode("latin-1")
+        return ProgramError(
+            f"the target `{shown}` is computed, or lacks numbers; program it with its numbers",
+            line=line.line,
+            code="OLP533",
+        )
+
+
+def _refused(what: str, line: Line) -> ProgramError:
+    return ProgramError(what, line=line.line, code="OLP512")

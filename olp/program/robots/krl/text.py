@@ -1,0 +1,91 @@
+"""The lines of a KRL text, and the aggregates in them. Nothing here knows what they mean."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from olp.core.patterns import pattern
+from olp.core.values import dataclass
+from olp.program.robots.targets import Span
+from olp.program.text.line_ends import split
+from olp.program.text.numbers import LARGEST
+
+_CODE = pattern(rb'(?:[^;"]|"[^"]*"?)*')
+_AGGREGATE = pattern(rb"(?i)\{\s*(?:(FRAME|POS|E3POS|E6POS|AXIS|E3AXIS|E6AXIS)\s*:)?([^{}:\"]*)\}")
+_COMPONENT = pattern(
+    rb"(?i)\s*([A-Z]\w*)(?:\s+|(?=[-+.']))"
+    rb"([-+]?(?:\d+\.?\d*|\.\d+)(?:E[-+]?\d+)?|'[BH][\dA-F]+')\s*(?:,|$)"
+)
+_PART = pattern(rb"\{[^{}]*\}|[^{}:]+")
+#: Bases of bit strings by their letters.
+_BASES = {"B": 2, "H": 16}
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A line that says something: its number, its first byte that is not blank, and its `text` without blanks
+    and comments around it."""
+
+    line: int
+    begin: int
+    text: bytes
+
+    @property
+    def end(self) -> int:
+        return self.begin + len(self.text)
+
+
+@dataclass(frozen=True, slots=True)
+class Aggregate:
+    """An aggregate of numbers: its bytes, the bytes and the value of each component by its name in capitals,
+    and whether these are joints."""
+
+    span: Span
+    values: dict[str, tuple[Span, float]]
+    joints: bool
+
+
+def lines(data: bytes) -> Iterator[Line]:
+    """The lines that are neither blank, nor comments, nor of the header of a file."""
+    place = 3 if data[:3] == b"\xef\xbb\xbf" else 0
+    for number, raw in enumerate(split(data[place:]), 1):
+        code = raw
+        if b";" in raw:
+            match = _CODE.match(raw)
+            assert match is not None
+            code = match[0]
+        text = code.strip()
+        if text and text[:1] != b"&":
+            yield Line(number, place + len(code) - len(code.lstrip()), text)
+        place += len(raw)
+
+
+def aggregate(data: bytes, span: Span) -> Aggregate | None:
+    """The aggregate that bytes are; None where they are none, or one of its components is no number."""
+    match = _AGGREGATE.fullmatch(data, *span)
+    if match is None:
+        return None
+    place, end = match.span(2)
+    values: dict[str, tuple[Span, float]] = {}
+    while place < end:
+        component = _COMPONENT.match(data, place, end)
+        if component is None:
+            return None
+        name, text = component[1].decode().upper(), component[2].decode()
+        value = float(int(text[2:-1], _BASES[text[1].upper()])) if text[0] == "'" else float(text)
+        if name in values or abs(value) >= LARGEST:
+            return None
+        values[name] = component.span(2), value
+        place = component.end()
+    kind = (match[1] or b"").upper()
+    return Aggregate(match.span(), values, kind.endswith(b"AXIS") or "A1" in values)
+
+
+def parts(data: bytes, span: Span) -> list[Span]:
+    """The bytes of the operands of the operator `:`, without blanks around them."""
+    found = []
+    for match in _PART.finditer(data, *span):
+        text = match[0]
+        begin = match.start() + len(text) - len(text.lstrip())
+        found.append((begin, begin + len(text.strip())))
+    return [(a, b) for a, b in found if b > a]

@@ -1,0 +1,203 @@
+"""KRL on three linear axes: read and corrected as a judge that shares nothing with it says."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from judge import krl, machines
+from judge.machines import Recipe
+from judge.model import JudgeModel
+
+import olp
+from olp.core.errors import OlpError, ProgramError
+
+RECIPE = Recipe(controller="kuka-krl", tools={}, job_defaults={}, work_offsets={})
+#: rounding of the fifth decimal, mm
+DIGIT = 0.5e-5
+TURN = "A 30.5,B -10.25,C 170.125"
+HEAD = """&ACCESS RVP
+&REL 2
+DEF made()
+  $TOOL={X 10,Y -5,Z 120,A 0,B 10,C 0}
+  BASE_DATA[3]={FRAME: X 300,Y 250,Z -300,A 30,B 0,C 0}
+  $BASE=BASE_DATA[3]
+  $VEL.CP=0.25
+"""
+
+
+def program(rng: np.random.Generator, count: int) -> bytes:
+    """Moves to declared positions, some of them shared, to numbers, and to products."""
+    data = ["DEFDAT made", f"DECL FRAME g={{X 5,Y 6,Z 7,{TURN}}}"]
+    for k, (x, y, z) in enumerate(rng.uniform(-40, 40, (5, 3)).round(3).tolist()):
+        data.append(f"DECL E6POS XP{k}={{X {x},Y {y},Z {z},{TURN},S 2,T 'B100011',E1 0.0}} ; taught")
+    lines = []
+    for _ in range(count):
+        x, y, z = rng.uniform(-60, 60, 3).round(2).tolist()
+        name = f"XP{rng.integers(5)}"
+        target = [
+            name, f"{{X {x},Y {y},Z {z},{TURN}}}", f"{name} : {{X {x},Y {y},Z {z},A 0,B 0,C 10}}",
+            f"g:{name}", f"{{E6POS: X {x}, Y {y}, Z {z}, {TURN}, E1 0}}",
+        ][rng.integers(5)]  # fmt: skip
+        move = rng.choice(["LIN", "LIN", "SLIN", "PTP"])
+        lines.append(f"  {move} {target}{rng.choice(['', ' C_DIS', ' C_VEL ; on'])}")
+    return (HEAD + "\n".join([*lines, "END", *data, "ENDDAT"]) + "\n").encode()
+
+
+def halves(text: bytes) -> tuple[bytes, bytes]:
+    src, _, dat = text.partition(b"DEFDAT")
+    return src, dat
+
+
+@pytest.fixture(scope="module")
+def bent(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return machines.random_machine(tmp_path_factory.mktemp("bent"), 11, RECIPE)
+
+
+@pytest.fixture(scope="module")
+def zero(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return machines.zero_machine(tmp_path_factory.mktemp("zero"), RECIPE)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_each_position_is_where_the_judge_wants_it(bent: Path, zero: Path, seed: int) -> None:
+    text = program(np.random.default_rng(seed), 30)
+    assert olp.correct(text, zero).data == text
+    done = olp.correct(text, bent)
+    assert done.report["verdict"]["ok"]
+    nominal, written, model = krl.moves(*halves(text)), krl.moves(*halves(done.data)), JudgeModel(bent)
+    assert len(nominal) == 30
+    assert len(written) > len(nominal), "long moves are split"
+    place = 0
+    for k, move in enumerate(nominal):
+        want = model.command_for(move.tip[None], move.lever)[0]
+        start = nominal[k - 1].tip
+        while np.abs(written[place].tip - want).max() > 3 * DIGIT:
+            here = written[place].tip
+            actual = here + model.error_mm(here[None], move.lever)[0]
+            way = move.tip - start
+            share = np.clip((actual - start) @ way / max(way @ way, 1e-9), 0, 1)
+            assert np.linalg.norm(start + share * way - actual) < 1e-3 + 3 * DIGIT
+            place += 1
+        assert np.abs(written[place].turn - move.turn).max() < 1e-12
+        place += 1
+    assert place == len(written)
+
+
+def test_parts_pass_and_clones_are_declared_behind_their_position(bent: Path) -> None:
+    position = "DECL E6POS XP1={X 1,Y 2,Z 3,A 0,B 0,C 180,S 2,T 2,E1 0.0}"
+    text = HEAD + (
+        "  PTP {X -60,Y -60,Z 0,A 0,B 0,C 180}\n"
+        "  SLIN {X 60,Y 60,Z 20,A 0,B 0,C 180} WITH $VEL.CP=0.1 C_SPL\n"
+        "  LIN XP1 C_DIS ; last\n  $TOOL=$NULLFRAME\n  PTP XP1\nEND\n"
+        f"DEFDAT made\n{position}\nENDDAT\n"
+    )
+    lines = olp.correct(text.encode(), bent).data.decode().splitlines()
+    splines = [line for line in lines if line.startswith("  SLIN")]
+    assert len(splines) > 1
+    assert all(line.endswith("WITH $VEL.CP=0.1 C_SPL") for line in splines)
+    straight = [line for line in lines if line.startswith("  LIN")]
+    assert all(
+        line.startswith("  LIN {X ") and line.endswith("S 2,T 2,E1 0.0} C_DIS") for line in straight[:-1]
+    )
+    assert straight[-1] == "  LIN XP1 C_DIS ; last"
+    assert "  PTP XP1_olp1" in lines
+    place = next(k for k, line in enumerate(lines) if line.startswith("DECL E6POS XP1="))
+    assert lines[place + 1].startswith("DECL E6POS XP1_olp1={X ")
+    assert lines[place + 1].endswith("A 0,B 0,C 180,S 2,T 2,E1 0.0}")
+
+
+P = "{X 0,Y 0,Z 0,A 0,B 0,C 0}"
+REFUSED = {
+    f"$BASE={P}\nLIN {P}": "which .TOOL is in force here is not stated",
+    f"$TOOL={P}\nLIN {P}": "which .BASE is in force here is not stated",
+    f"$TOOL={P}\n$BASE=BASE_DATA[4]\nLIN {P}": "BASE4",
+    f"$TOOL=TOOL_DATA[4]\n$BASE=$NULLFRAME\nLIN {P}": "tool 4",
+    f"$TOOL={P}\n$BASE={P}\nmore()\nLIN {P}": "MORE in line 4 may set it",
+    f"$TOOL={P}\n$BASE={P}\nIF x THEN\n$BASE=$NULLFRAME\nENDIF\nLIN {P}": "branches up to line 6",
+    f"$TOOL={P}\n$BASE={P}\nLOOP\nLIN {P}\n$BASE=$NULLFRAME\nENDLOOP": "loop of line 4 sets it",
+    f"$TOOL={P}\n$BASE={P}\n$BASE.X=5\nLIN {P}": "gets a value that the text does not state",
+    f"$TOOL={P}\n$BASE={P}\nagain:\nLIN {P}": "jump to line 4",
+    f"$TOOL={P}\n$BASE={P}\nLIN p": "not stated in this text",
+    f"$TOOL={P}\n$BASE={P}\np={P}\np.X=5\nLIN p": "another value in line 5",
+    f"$TOOL={P}\n$BASE={P}\np[1]={P}\np[i]={P}\nLIN p[1]": "another value in line 5",
+    f"$TOOL={P}\n$BASE={P}\np={P}\nteach(p)\n$TOOL={P}\n$BASE={P}\nLIN p": "another value in line 5",
+    f"$TOOL={P}\n$BASE={P}\np=q\nLIN p": "not stated with its numbers in line 4",
+    f"$TOOL={P}\n$BASE={P}\nLIN p[i]": "chosen in the run",
+    f"$TOOL={P}\n$BASE={P}\nLIN {{X 1}}": "lacks one of",
+    f"$TOOL={P}\n$BASE={P}\nLIN {{X 1+y,Y 0,Z 0,A 0,B 0,C 0}}": "computed",
+    "CIRC p,q": "CIRC is not read",
+    "LIN_REL {X 5}": "LIN_REL is not read",
+    "$IPO_MODE=#TCP": "stands still",
+    "RSI_MOVECORR()": "sensor",
+    "FDAT_ACT=f\nBAS(#PTP_PARAMS,10)": "stands still",
+    "what is this": "not a statement of KRL",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("statements", "why"), REFUSED.items())
+def test_what_is_not_certain_is_refused_with_its_line(zero: Path, statements: str, why: str) -> None:
+    text = (
+        f"DEF a()\n{statements}\nEND\nDEFDAT a\nDECL FDAT f={{TOOL_NO 1,BASE_NO 1,IPO_FRAME #TCP}}\nENDDAT\n"
+    )
+    with pytest.raises(OlpError, match=why) as error:
+        olp.correct(text.encode(), zero)
+    assert isinstance(error.value, ProgramError)
+    assert error.value.line is not None
+    assert 2 <= error.value.line <= 9
+
+
+def test_taught_points_have_their_own_base_and_tool(tmp_path: Path) -> None:
+    job = Recipe(
+        controller="kuka-krl", job_defaults={}, travel=((-900.0, 900.0),) * 3,
+        work_offsets={"BASE2": {"X_mm": 100.0, "C_deg": 30.0, "set_by": "true"}},
+        tools={4: {"gauge_to_tip_mm": [0.0, 0.0, -120.0]}},
+    )  # fmt: skip
+    path = machines.shift_machine(tmp_path, (100.0, 50.0, 20.0), recipe=job)
+    text = (
+        b"DEF a()\nBAS(#INITMOV,0)\nPTP XHOME\nLOOP\nFDAT_ACT=FP1\nBAS(#PTP_PARAMS,50)\nPTP XP1\nENDLOOP\n"
+        b"SLIN XP2 WITH $TOOL=STOOL2(FP1), $BASE=SBASE(FP1.BASE_NO)\nEND\n"
+        b"DEFDAT a\nDECL GLOBAL E6POS XP1={X 1,Y 2,Z 3,A 0,B 0,C 180,S 2}\n"
+        b"E6POS XP2={X 9,Y 2,Z 3,A 0,B 0,C 180}\n"
+        b"DECL FDAT FP1={TOOL_NO 4,BASE_NO 2,IPO_FRAME #BASE}\nENDDAT\n"
+    )
+    done = olp.correct(text, path).data
+    # error in X and Y, along the axes of a frame that is turned by 30 degrees
+    assert b"XP1={X 0.88840,Y 2.00670,Z 2.98000,A" in done
+    assert b"XP2={X 8.88840,Y 2.00670,Z 2.98000,A" in done
+
+
+SRC = b"DEF a()\r\n$TOOL=$NULLFRAME\r\n$BASE={X 250,Y 200,Z -300,A 0,B 0,C 0}\r\nPTP XP1\r\nEND"
+DAT = b"DEFDAT a\nDECL E6POS XP1={X 1,Y 2,Z 3,A 0,B 0,C 0,S 2}\nENDDAT"
+
+
+def test_statements_and_data_are_written_both_or_none(bent: Path, tmp_path: Path) -> None:
+    (tmp_path / "a.src").write_bytes(SRC)
+    (tmp_path / "a.dat").write_bytes(DAT)
+    out, data = tmp_path / "b.src", tmp_path / "b.dat"
+    done = olp.correct(tmp_path / "a.src", bent)
+    done.write(out)
+    assert out.read_bytes().partition(b"olp-corrected")[0] == SRC[:9] + b"; "
+    assert out.read_bytes().endswith(SRC[9:])
+    assert b"XP1={X 1,Y 2,Z 3," not in data.read_bytes()
+    assert data.read_bytes().startswith(DAT[:26])
+    assert data.read_bytes().endswith(DAT[-24:])
+    assert olp.verify(tmp_path / "a.src", out, bent).report["verdict"]["ok"]
+    out.unlink()
+    with pytest.raises(OlpError, match="exists already"):
+        done.write(out)
+    assert not out.exists()
+    with pytest.raises(OlpError, match="is an input"):
+        done.write(tmp_path / "a.src", force=True)
+
+
+def test_a_refusal_names_the_file_of_data(zero: Path, tmp_path: Path) -> None:
+    (tmp_path / "a.SRC").write_bytes(SRC)
+    (tmp_path / "a.DAT").write_bytes(DAT.replace(b"ENDDAT", b"XP1={X 1}"))
+    with pytest.raises(OlpError, match=r"XP1 gets another value in line 3 of a\.DAT") as error:
+        olp.correct(tmp_path / "a.SRC", zero)
+    assert error.value.line == 4
+    (tmp_path / "a.DAT").unlink()
+    with pytest.raises(OlpError, match=r"XP1 is not stated in this text; give the \.dat file beside it"):
+        olp.correct(tmp_path / "a.SRC", zero)
