@@ -26,6 +26,7 @@ def program_summary(run: JointRun, options: UnrollOptions) -> dict[str, Any]:
         _, path = run.read(run.program, options)
     program = path.program.in_original()
     toolpath = program.toolpath
+    tilted = np.array([frame.tip == "fixed" for frame in toolpath.frames], bool)
     rows = np.flatnonzero(np.isfinite(path.end).all(axis=1))
     axes = path.motion.axes(path.end[rows], path.tool[rows], path.tip[rows])
     values: dict[str, Any] = {
@@ -36,7 +37,7 @@ def program_summary(run: JointRun, options: UnrollOptions) -> dict[str, Any]:
         "moves": {
             **{kind.name.lower(): int((toolpath.kind == kind).sum()) for kind in (Kind.RAPID, Kind.LINE)},
             "with_tip_control": int(path.tip.sum()),
-            "in_tilted_planes": int(path.fixed.sum()),
+            "in_tilted_planes": int(tilted[toolpath.frame].sum()),
         },
         "tools": sorted({frame.tool for frame in toolpath.frames if frame.tool is not None}),
         "work_offsets": sorted({frame.work_offset for frame in toolpath.frames if frame.work_offset}),
