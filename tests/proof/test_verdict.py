@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from cases.consumers import Job, measured, measured_briefly, predicted
+from cases.joint_jobs import JOINT_JOBS
 from cli.test_cli import run
 from judge.machines import Recipe, random_machine, zero_machine
 from judge.programs import random_program
@@ -22,8 +23,10 @@ from olp.proof.proof import Counts
 from olp.workflows.session import Session
 
 ROOT = Path(__file__).resolve().parents[2] / "programs"
-#: Shipped jobs by their job file.
-JOBS = sorted(path for path in ROOT.glob("*/job*.toml") if path.parent.name not in ("dmis-housing",))
+#: Shipped jobs by their job file, on machines with three linear axes.
+JOBS = sorted(
+    path for path in ROOT.glob("*/job*.toml") if path.parent.name not in ("dmis-housing", *JOINT_JOBS)
+)
 #: The same without backlash.
 STIFF = Recipe(work_offsets={"G54": {"Z_mm": -100.0, "set_by": "true"}})
 HEAD = b"G21 G90 G17 G54 G94 G61\n"
