@@ -154,8 +154,9 @@ def _offsets(path: Toolpath, frames: dict[int, Frame], setup: Setup) -> Iterator
 
 def _start(setup: Setup) -> Iterator[Finding]:
     machine = setup.machine
-    stated = {"job file: start_mm": setup.job.start_mm, "machine file: home_mm": machine.home_mm}
-    stated |= {
+    stated = {
+        "job file: start_mm": setup.job.start_mm,
+        "machine file: home_mm": machine.home_mm,
         "machine file: second_home_mm": machine.second_home_mm,
         "machine file: tool_change_mm": machine.tool_change_mm,
     }

@@ -14,8 +14,9 @@ TOLERANCE_MM = 1e-9
 _ITERATIONS = 30
 #: mm; smaller errors change by less than a thousandth of themselves over their own length.
 _SMALL_MM = 0.15
-#: mm per mm; rate of growth of the error that is assumed at the least.
-_LEAST_RATE = 0.01
+#: mm per mm; rate of growth of the error that is assumed at the least: that of steep cyclic errors, of which
+#: two steps near a turning point show less.
+_LEAST_RATE = 0.1
 #: Points at a time: the columns of one block fit in the second-level cache.
 BLOCK = 1 << 14
 

@@ -155,9 +155,8 @@ class Machine:
     (None: not stated). `times` is what the control takes beside motion. `tool_change_moves` are the axes that
     M6 may move. `home_mm`, `second_home_mm` and `tool_change_mm` are the axis positions where G28, G30 and M6
     leave the axes that they move, None where it is not known. `scaling_unit` is what 1 of a factor of G51 is,
-    None where it is not stated. `located` says whether
-    positions in machine coordinates are known; where they are not, only distances are. `assumed`: nothing
-    names the controller.
+    None where it is not stated. `located` says whether positions in machine coordinates are known; where they
+    are not, only distances are. `assumed`: nothing names the controller.
     """
 
     name: str

@@ -12,7 +12,7 @@ import numpy as np
 from olp.core.arrays import Array, Mask
 from olp.core.values import dataclass
 from olp.kinematics.chain import Kinematics
-from olp.kinematics.inverse import Solved, inverse
+from olp.kinematics.inverse import LARGEST_TURN_DEG, Solved, inverse
 from olp.kinematics.poses import Poses, rotation_vector, turned
 from olp.kinematics.structure import Structure
 
@@ -33,7 +33,11 @@ class CorrectedPoses:
 
 
 def correct_poses(
-    machine: Kinematics, values: Array, *, shift_mm: Array | None = None, largest_turn_deg: float = 1.0
+    machine: Kinematics,
+    values: Array,
+    *,
+    shift_mm: Array | None = None,
+    largest_turn_deg: float = LARGEST_TURN_DEG,
 ) -> CorrectedPoses:
     """The axis values that bring the actual tool to where the nominal one is at `values` (n, axes).
 

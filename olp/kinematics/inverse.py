@@ -20,7 +20,10 @@ from olp.kinematics.chain import Kinematics
 from olp.kinematics.columns import BATCH
 from olp.kinematics.poses import Poses, relative, turned
 from olp.kinematics.regular import RegularSteps
+from olp.kinematics.structure import REFERENCE_RADIUS_MM
 
+#: deg; an exact correction of an axis by more is made smaller, where nothing else is said.
+LARGEST_TURN_DEG = 1.0
 #: Position of the tip is met within this, mm.
 POSITION_MM = 1e-9
 #: Axis values no longer change: mm, and rad times the reference radius.
@@ -95,7 +98,7 @@ def inverse(
     target: Poses,
     near: Array,
     *,
-    reference_radius_mm: float = 500.0,
+    reference_radius_mm: float = REFERENCE_RADIUS_MM,
     largest_turn_deg: float | None = None,
     nominal: bool = False,
 ) -> Solved:
@@ -153,8 +156,8 @@ def command(
     machine: Kinematics,
     values: Array,
     *,
-    reference_radius_mm: float = 500.0,
-    largest_turn_deg: float | None = 1.0,
+    reference_radius_mm: float = REFERENCE_RADIUS_MM,
+    largest_turn_deg: float | None = LARGEST_TURN_DEG,
 ) -> Solved:
     """The axis values that bring the actual tool to where the nominal one is at `values` (n, axes). Raises as
     `inverse`."""

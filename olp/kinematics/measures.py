@@ -7,7 +7,7 @@ import numpy as np
 from olp.core.arrays import Array
 from olp.core.values import dataclass
 from olp.kinematics.chain import Kinematics
-from olp.kinematics.structure import Structure
+from olp.kinematics.structure import REFERENCE_RADIUS_MM, Structure
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,7 +35,9 @@ class Mobility:
         return np.asarray(np.prod(self.singular_values, axis=1))
 
 
-def mobility(machine: Kinematics, values: Array, reference_radius_mm: float = 500.0) -> Mobility:
+def mobility(
+    machine: Kinematics, values: Array, reference_radius_mm: float = REFERENCE_RADIUS_MM
+) -> Mobility:
     """How postures `values` (n, axes) in mm and deg move the tool of the nominal machine. With as many axes
     as the tool has freedoms, or fewer, the smallest singular value is 0 where an axis has no effect of its
     own. Raises CannotCompute where a platform does not close."""

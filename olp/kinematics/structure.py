@@ -20,6 +20,8 @@ from olp.kinematics.poses import Poses
 Kind = Literal["linear", "rotary", "length"]
 #: The unit of an axis value by the kind of its joint.
 UNITS: Mapping[str, str] = {"linear": "mm", "rotary": "deg", "length": "mm"}
+#: mm; a turn of an axis or the tool counts as its arc at this radius, where nothing else is said.
+REFERENCE_RADIUS_MM = 500.0
 #: The name of the frame in a chain.
 FRAME = "F"
 

@@ -39,7 +39,7 @@ from olp.files.sources import Sources
 from olp.findings.catalogue import Finding
 from olp.reports.report import number
 from olp.workflows import refusals
-from olp.workflows.calibrate_export_joints import given_joints, joint_export
+from olp.workflows.calibrate_export_joints import given_joints, joint_export, refuse_tables
 from olp.workflows.control_table import given_of
 from olp.workflows.correct import CorrectOptions, corrected
 from olp.workflows.doubt import acceptable
@@ -98,7 +98,7 @@ def export_table(
         date=date, accept=tuple(sorted(acceptable(accept))),
     )  # fmt: skip
     if calibration is None and (of_joints := given_joints(machine, job)) is not None:
-        code, report = joint_export(of_joints, kind, job, chain)
+        code, report = joint_export(of_joints, kind, job, chain, program)
         return _coded(code, kind, Path(target), report, self_test=self_test)
     source = _source(machine, job, calibration, chain)
     given = given_of(source.machine, chain, sense, None, comp_type, axis_names, reference, most_rows)
@@ -152,11 +152,7 @@ def compare_tables(
         date=date, accept=tuple(sorted(acceptable(accept))),
     )  # fmt: skip
     if calibration is None and (of_joints := given_joints(machine, job)) is not None:
-        raise UsageError(
-            "tables of controls hold three linear axes, and this machine has others; export code with "
-            f"--format {' or '.join(CODE)}",
-            file=str(of_joints),
-        )
+        refuse_tables(of_joints)
     source = _source(machine, job, calibration, chain)
     controls: dict[str, Control] = {}
     findings: dict[str, list[dict[str, object]]] = {}

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
 from olp.calibration.control_tables.residuals import BAND_MM, REAL_TIME, UNCOMPENSATED
 from olp.core.arrays import Array
-from olp.core.errors import UsageError
+from olp.core.errors import ConfigError, UsageError
 from olp.core.units import RAD_PER_URAD, UM_PER_MM
 from olp.files.config import load_job
 from olp.files.control_code.base import Code
@@ -40,17 +40,24 @@ def joint_inputs(machine: PathLike, job: PathLike | None) -> tuple[str, ...]:
     return tuple(str(name) for name in (machine, job, calibration) if name is not None)
 
 
+def refuse_tables(machine: PathLike) -> NoReturn:
+    """Raises UsageError where the table of a control is asked for."""
+    raise UsageError(
+        "tables of controls hold three linear axes, and this machine has others; expected --format "
+        f"{' or '.join(CODE)}",
+        file=str(machine),
+    )
+
+
 def joint_export(
-    machine: PathLike, kind: str | None, job: PathLike | None, chain: str | None
+    machine: PathLike, kind: str, job: PathLike | None, chain: str | None, program: object
 ) -> tuple[Code, dict[str, Any]]:
     """The code of a machine with rotary axes and the report ("olp-tables-1"): what is left without it, and
-    with it. Raises UsageError for a table, InputError, ConfigError."""
+    with it. Raises UsageError for a table and along a program, InputError, ConfigError."""
     if kind not in CODE:
-        raise UsageError(
-            f"tables of controls hold three linear axes, and this machine has others; expected --format "
-            f"{' or '.join(CODE)}",
-            file=str(machine),
-        )
+        refuse_tables(machine)
+    if program is not None:
+        raise UsageError("--program is for machines with three linear axes; leave it out", file=str(machine))
     if chain is not None:
         raise UsageError("--chain goes with -c; the machine file states its own chain")
     setup = load_joint_setup(machine, job, by_itself=True)
@@ -58,7 +65,10 @@ def joint_export(
         raise UsageError(
             "the machine file names no calibration, so there is nothing to export", file=str(machine)
         )
-    code = joint_code(setup.kinematics, setup.calibration.box, setup.digest)
+    try:
+        code = joint_code(setup.kinematics, setup.calibration.box, setup.digest)
+    except ConfigError as error:
+        raise error.in_file(str(machine)) from None
     return code, _report(setup)
 
 

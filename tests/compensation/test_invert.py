@@ -1,11 +1,11 @@
-"""The inverse of the error model: the tip comes to its place within 10 pm, or olp refuses."""
+"""The inverse of the error model: the tip comes to its place within 1 pm, or olp refuses."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 from cases.toy import Toy
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from olp.compensation.invert import BLOCK, TOLERANCE_MM, bent, invert
@@ -33,6 +33,7 @@ def rough_machine(seed: int, slope: float, cyclic_mm: float) -> ErrorModel:
 
 
 @settings(max_examples=40)
+@example(seed=828, slope=1e-3, cyclic_mm=0.02, count=103)
 @given(
     seed=st.integers(0, 10_000),
     slope=st.sampled_from([1e-6, 1e-4, 1e-3, 1e-2]),
@@ -46,8 +47,8 @@ def test_the_tip_comes_to_its_place(seed: int, slope: float, cyclic_mm: float, c
     tool = np.array([10.0, -20.0, -150.0])
     command = invert(model, target, tool)
     residual = np.abs(command + model.error(command, tool) - target).max()
-    # the size of the last step is predicted; where a cyclic error turns, it can be some times larger
-    assert residual <= 10.0 * TOLERANCE_MM
+    # sums of numbers of 1e3 mm carry 1e-13 mm
+    assert residual <= TOLERANCE_MM + 1e-12
 
 
 def test_an_error_that_grows_faster_than_the_position_is_refused() -> None:

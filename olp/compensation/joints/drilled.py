@@ -111,13 +111,13 @@ def lifted(
     columns = (holes.first.tolist(), holes.bottom.tolist(), holes.last.tolist())
     for k, (first, bottom, last) in enumerate(zip(*columns, strict=True)):
         line, places = int(path.line[bottom]), int(decimals[bottom])
-        down, back = (
-            round(float(away[move] / unit[move]) * 10**places) / 10**places for move in (bottom, last)
-        )
         if program.statements is not None:
-            down = float(away[bottom] / unit[bottom])
-            down = back = surfaces.lift(program, k, line, down, places, made, tally)
+            wanted = float(away[bottom] / unit[bottom])
+            down = back = surfaces.lift(program, k, line, wanted, places, made, tally)
         else:
+            down, back = (
+                round(float(away[move] / unit[move]) * 10**places) / 10**places for move in (bottom, last)
+            )
             if path.kind[last] == Kind.LINE:
                 back = down
             levels.lift(program, k, line, (back, down), places, made, tally)

@@ -27,8 +27,6 @@ _CENTRE_MM = 100.0
 _HEAVIER_KG = 10.0
 #: Vectors are taken where a motion of the axes by 1 mm moves the tool by more.
 _SINGULAR = 0.05
-#: deg; an exact correction by more is made smaller near a singular posture.
-LARGEST_DEG = 1.0
 
 
 def joint_code(machine: Kinematics, box: Mapping[str, tuple[float, float]], digest: str) -> Code:
@@ -53,7 +51,7 @@ def joint_code(machine: Kinematics, box: Mapping[str, tuple[float, float]], dige
         axes=structure.order,
         units=structure.units,
         shapes=("common", "joint_shapes"),
-        tables=tuple(joint_tables(machine, box, LARGEST_DEG)),
+        tables=tuple(joint_tables(machine, box)),
         engine=("joint_engine", "joint_inverse", "follower"),
         tips=("joint_tips",) if has_tips(machine) else (),
         self_test="joint_test",
@@ -104,6 +102,6 @@ def reached(machine: Kinematics, values: Array) -> tuple[CorrectedPoses, Index]:
     rows = np.arange(len(values))
     while True:
         try:
-            return correct_poses(machine, values[rows], largest_turn_deg=LARGEST_DEG), rows
+            return correct_poses(machine, values[rows]), rows
         except NotInvertible as error:
             rows = np.delete(rows, list(error.rows))

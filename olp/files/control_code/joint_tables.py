@@ -13,12 +13,11 @@ from olp.kinematics.chain import Kinematics
 from olp.kinematics.columns import Columns, about, tilted
 from olp.kinematics.columns import triple as columns_of
 from olp.kinematics.errors import OWN, JointErrors, MotionCurve, Yield
+from olp.kinematics.inverse import LARGEST_TURN_DEG
 from olp.kinematics.programmed import linear_columns
-from olp.kinematics.structure import FRAME
+from olp.kinematics.structure import FRAME, REFERENCE_RADIUS_MM
 from olp.kinematics.weight import FREE_FALL_M_S2
 
-#: mm at which a turn of an axis counts as a way (`olp.kinematics.inverse`).
-_RADIUS_MM = 500.0
 #: Axes beyond those that hold the tip and the axis of a tool.
 _SYMMETRIC = 5
 _WHOLE = 6
@@ -41,9 +40,7 @@ def refuse_chain(machine: Kinematics) -> None:
         )
 
 
-def joint_tables(
-    machine: Kinematics, box: Mapping[str, tuple[float, float]], largest_deg: float
-) -> list[str]:
+def joint_tables(machine: Kinematics, box: Mapping[str, tuple[float, float]]) -> list[str]:
     """The lines that define all tables of a machine with its errors."""
     structure, errors = machine.structure, machine.errors
     data = Data()
@@ -66,11 +63,11 @@ def joint_tables(
         "OLP_MASSES": len(masses),
         "OLP_YIELDS": int(bool(errors.yields)),
         "OLP_SYMMETRIC": int(structure.symmetric_tool),
-        "OLP_RADIUS": real(_RADIUS_MM),
-        "OLP_LARGEST_DEG": real(largest_deg),
+        "OLP_RADIUS": real(REFERENCE_RADIUS_MM),
+        "OLP_LARGEST_DEG": real(LARGEST_TURN_DEG),
     }
     gravity = [FREE_FALL_M_S2 * part for part in structure.gravity]
-    units = [math.radians(1.0) * _RADIUS_MM if joint.unit == "deg" else 1.0 for joint in joints]
+    units = [math.radians(1.0) * REFERENCE_RADIUS_MM if joint.unit == "deg" else 1.0 for joint in joints]
     rows = ", ".join(pair(box[name]) for name in structure.order)
     return [
         defines(sizes),

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 from olp.core.errors import ProgramError
 from olp.core.machine import Setup, Vector
 from olp.core.toolpath import Flag, Kind
-from olp.program.dialect import Dialect
+from olp.program.dialect import Dialect, Options
 from olp.program.program import Program
 from olp.program.robots.frames import Located, RobotFrames, Tool
 from olp.program.robots.poses import Quaternion
@@ -18,15 +19,32 @@ from olp.program.verbatim import Moves
 NAN = float("nan")
 #: mm; less of a tool vector moves nothing, and comes from the digits of orientations
 _SAME_VECTOR_MM = 1e-4
+#: Statements between two reports of progress.
+_TOLD = 4096
 _NOWHERE: Vector = (NAN, NAN, NAN)
 
 
-def raise_all(refusals: Sequence[ProgramError]) -> None:
-    """Raises the first of what a reader refused, with the others; nothing where there is none."""
+def take_all(
+    statements: Sequence[Any], take: Callable[[Any], None], refusals: list[ProgramError], options: Options
+) -> None:
+    """Takes every statement, and tells how far that is. Raises the first of `refusals`, which statements add
+    to, with the others."""
+    for k, statement in enumerate(statements):
+        if k % _TOLD == 0:
+            options.tell("read", k / len(statements))
+        try:
+            take(statement)
+        except ProgramError as error:
+            refusals.append(error)
     if refusals:
         first = refusals[0]
         first.others = tuple(refusals[1:])
         raise first
+
+
+def not_read(what: str, line: int) -> ProgramError:
+    """The refusal of a statement whose effect on the path is not known."""
+    return ProgramError(what, line=line, code="OLP512")
 
 
 class RobotMoves:

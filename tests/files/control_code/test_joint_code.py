@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import re
 import subprocess
 from dataclasses import replace
 from pathlib import Path
@@ -260,11 +261,19 @@ def test_what_is_no_chain_or_leaves_a_choice_is_refused(tmp_path: Path) -> None:
             joint_code(
                 setup.kinematics, {n: j.travel for n, j in setup.machine.structure.joints.items()}, "0"
             )
+    platform = golden_folder("hexapod") / "machine.toml"
+    with pytest.raises(ConfigError, match=f"{re.escape(str(platform))}: P: .* no platforms on legs"):
+        olp.export_table(platform, "c", tmp_path / "m.c")
     folder = golden_folder("arm_6r_kr6")
     with pytest.raises(ConfigError, match="export the format c"):
         olp.export_table(folder / "machine.toml", "linuxcnc-kins", tmp_path / "armkins.comp")
     with pytest.raises(UsageError, match="expected --format c or linuxcnc-kins"):
         olp.export_table(folder / "machine.toml", "linuxcnc", tmp_path / "x.comp")
+    with pytest.raises(UsageError, match="expected --format c or linuxcnc-kins"):
+        olp.compare_tables(folder / "machine.toml")
+    with pytest.raises(UsageError, match="--program is for machines with three linear axes"):
+        olp.export_table(folder / "machine.toml", "c", tmp_path / "m.c", program=b"G1 X1\n")
+    assert not list(tmp_path.iterdir())
 
 
 def golden_folder(name: str) -> Path:

@@ -11,6 +11,7 @@ from olp.core.values import dataclass
 from olp.program.robots.frames import Located, RobotFrames, Tool
 from olp.program.robots.krl.data import Declared, Taught, key_of, pose_of
 from olp.program.robots.krl.text import Line, aggregate
+from olp.program.robots.moves import NAN
 from olp.program.robots.poses import Pose
 
 _SET = pattern(rb"(?i)\$(BASE|TOOL)\s*(\.\s*\w+)?\s*=(?!=)\s*(.*)")
@@ -28,7 +29,6 @@ _NUMBER = pattern(rb"\s*[+-]?(?:\d+\.?\d*|\.\d+)\s*")
 _WITH = pattern(rb"(?i)\$(BASE|TOOL|IPO_MODE)\s*=\s*(\{[^{}]*\}|[^,({]*(?:\([^()]*\))?)")
 _OF_MODE = pattern(rb"(?i)SIPO_MODE\s*\(\s*(\w+)")
 _MM_PER_M = 1000.0
-_NAN = float("nan")
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +54,7 @@ class Active:
 
     def __init__(self, data: bytes, setup: Setup, declared: Declared, frames: RobotFrames) -> None:
         self.data, self.setup, self.declared, self.frames = data, setup, declared, frames
-        self.feed = _NAN
+        self.feed = NAN
         self._taught: Taught | None = None
         self._places: dict[tuple[str, Place], Located | Tool] = {}
         self.state = State(None, None, "")
@@ -84,7 +84,7 @@ class Active:
             raise _fixed(line)
         if _ANY_SPEED.match(text):
             speed = _SPEED.fullmatch(text)
-            self.feed = _NAN if speed is None else float(speed[1]) * _MM_PER_M
+            self.feed = NAN if speed is None else float(speed[1]) * _MM_PER_M
             return True
         return False
 
@@ -128,7 +128,7 @@ class Active:
 
     def _bas(self, command: bytes, value: bytes, line: Line) -> None:
         """A call of BAS, by which inline forms set what is in force."""
-        speed = float(value) * _MM_PER_M if _NUMBER.fullmatch(value) else _NAN
+        speed = float(value) * _MM_PER_M if _NUMBER.fullmatch(value) else NAN
         if command in (b"PTP_PARAMS", b"CP_PARAMS"):
             for which in ("BASE", "TOOL"):
                 self._set(which, self._of_taught(which, self._taught, line), line)

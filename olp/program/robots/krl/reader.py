@@ -19,7 +19,7 @@ from olp.program.robots.krl import flow
 from olp.program.robots.krl.active import Active, State
 from olp.program.robots.krl.data import Declared, assigned, is_declaration, key_of, pose_of
 from olp.program.robots.krl.text import Aggregate, Line, aggregate, lines, parts
-from olp.program.robots.moves import RobotMoves, raise_all
+from olp.program.robots.moves import RobotMoves, not_read, take_all
 from olp.program.robots.poses import Pose, multiplied, rotated
 from olp.program.robots.targets import NOWHERE, Span, Use
 
@@ -81,15 +81,7 @@ class _Reader:
     def run(self, dialect: Dialect, options: Options, *, words: bool) -> Program:
         for line in self.lines:
             self._mentioned(line)
-        count = max(len(self.lines), 1)
-        for k, line in enumerate(self.lines):
-            if k % 4096 == 0:
-                options.tell("read", k / count)
-            try:
-                self._statement(line)
-            except ProgramError as error:
-                self.refusals.append(error)
-        raise_all(self.refusals)
+        take_all(self.lines, self._statement, self.refusals, options)
         return self.moves.program(dialect, words=words)
 
     def _mentioned(self, line: Line) -> None:
@@ -117,9 +109,10 @@ class _Reader:
             return
         other = _OTHER_MOVE.match(text)
         if other is not None:
-            raise _refused(f"{other[1].decode().upper()} is not read; post straight moves to positions", line)
+            what = f"{other[1].decode().upper()} is not read; post straight moves to positions"
+            raise not_read(what, line.line)
         if _SENSOR.match(text):
-            raise _refused("targets are moved by what a sensor says", line)
+            raise not_read("targets are moved by what a sensor says", line.line)
         if _TRIGGER.match(text):
             self.triggered = True
         elif self.active.take(line) or _LEADS.match(text) or assigned(text) is not None or b"(" in text:
@@ -311,7 +304,3 @@ class _Reader:
             line=line.line,
             code="OLP533",
         )
-
-
-def _refused(what: str, line: Line) -> ProgramError:
-    return ProgramError(what, line=line.line, code="OLP512")

@@ -14,7 +14,7 @@ from olp.program.program import Program
 from olp.program.robots.frames import Located, Tool
 from olp.program.robots.ls.registers import Registers
 from olp.program.robots.ls.text import Line, Position, lines, parts, positions
-from olp.program.robots.moves import RobotMoves, raise_all
+from olp.program.robots.moves import NAN, RobotMoves, not_read, take_all
 from olp.program.robots.poses import of_zyx, rotated
 from olp.program.robots.targets import Use
 
@@ -46,7 +46,6 @@ _ENDS = pattern(rb"(?i)\s*(?:END|ABORT|JMP\s+LBL\b[^,]*)\s*")
 _BLOCK = pattern(rb"(?i)\s*(?:(IF\b.*THEN)|(FOR\b.*)|(ELSE)|(ENDIF|ENDFOR))\s*")
 #: mm/s in one unit of a speed
 _SPEEDS = {b"mm/sec": 1.0, b"cm/min": 10.0 / 60.0, b"inch/min": 25.4 / 60.0}
-_NAN = float("nan")
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +65,7 @@ def read(
 ) -> Program:
     """Read a whole program. Raises ProgramError with the line of the first statement that cannot be read
     correctly."""
-    return _Reader(data, setup).run(dialect, words=words)
+    return _Reader(data, setup).run(dialect, options or Options(), words=words)
 
 
 class _Reader:
@@ -83,18 +82,14 @@ class _Reader:
         self.blocks: list[tuple[bool, int]] = []
         self.refusals: list[ProgramError] = []
 
-    def run(self, dialect: Dialect, *, words: bool) -> Program:
+    def run(self, dialect: Dialect, options: Options, *, words: bool) -> Program:
         sections = parts(self.data)
         if "MN" not in sections:
             raise ProgramError("the text has no part /MN", line=1, code="OLP510")
         for part in sections.get("POS", []):
             positions(self.data, part, self.positions)
-        for line in (line for part in sections["MN"] for line in lines(self.data, part)):
-            try:
-                self._statement(line)
-            except ProgramError as error:
-                self.refusals.append(error)
-        raise_all(self.refusals)
+        every = [line for part in sections["MN"] for line in lines(self.data, part)]
+        take_all(every, self._statement, self.refusals, options)
         return self.moves.program(dialect, words=words)
 
     # -- statements ----------------------------------------------------------------------------------
@@ -106,11 +101,11 @@ class _Reader:
             self._move(line, self._words(move))
             return
         if _OTHER_MOVE.match(text):
-            raise _refused("a move that is not read (an arc, a spline, or words of its own)", line)
+            raise not_read("a move that is not read (an arc, a spline, or words of its own)", line.line)
         if _ASSIGNED.match(text):
-            raise _refused("a position gets another value, so its numbers depend on the run", line)
+            raise not_read("a position gets another value, so its numbers depend on the run", line.line)
         if _MOVING.match(text):
-            raise _refused("targets are moved by what a sensor or a register says", line)
+            raise not_read("targets are moved by what a sensor or a register says", line.line)
         if self.registers.take(text) or _STILL.fullmatch(text):
             return
         block = _BLOCK.fullmatch(text)
@@ -145,7 +140,7 @@ class _Reader:
     def _words(move: object) -> _Move:
         groups = move.groups(b"")  # type: ignore[attr-defined]
         unit = groups[4].lower()
-        feed = float(groups[3]) * _SPEEDS[unit] if unit in _SPEEDS else _NAN
+        feed = float(groups[3]) * _SPEEDS[unit] if unit in _SPEEDS else NAN
         return _Move(
             groups[0].upper() == b"L", groups[1].upper() == b"PR", int(groups[2]), feed,
             unit in (b"sec", b"msec"), groups[7],
@@ -160,7 +155,7 @@ class _Reader:
             (_SENSED, "goes where a sensor says"),
         ):
             if sign.search(move.tail):
-                raise _refused(f"this move {why}, which is not read", line)
+                raise not_read(f"this move {why}, which is not read", line.line)
         position = None if move.register else self._position(move.number, line)
         shift = self._shift(move, position)
         if position is None or "X" not in position.axes or shift is None:
@@ -228,21 +223,21 @@ class _Reader:
     def _frame(self, position: Position, line: Line) -> Located:
         number = self.registers.frame if position.frame < 0 else position.frame
         if number < 0:
-            raise _refused("the frame of this position is the active one, and not known here", line)
+            raise not_read("the frame of this position is the active one, and not known here", line.line)
         if number == 0:
             return self.moves.frames.world
         pose = self.registers.frames.get(number)
         if pose is None and number in self.registers.frames:
-            raise _refused(f"UFRAME[{number}] gets numbers that the text does not state", line)
+            raise not_read(f"UFRAME[{number}] gets numbers that the text does not state", line.line)
         return self.moves.frames.located(f"UFRAME{number}", pose, line.line)
 
     def _tool(self, position: Position, line: Line) -> Tool:
         number = self.registers.tool if position.tool < 0 else position.tool
         if number < 0:
-            raise _refused("the tool of this position is the active one, and not known here", line)
+            raise not_read("the tool of this position is the active one, and not known here", line.line)
         pose = self.registers.tools.get(number)
         if pose is None and number in self.registers.tools:
-            raise _refused(f"UTOOL[{number}] gets numbers that the text does not state", line)
+            raise not_read(f"UTOOL[{number}] gets numbers that the text does not state", line.line)
         return self.moves.frames.numbered_tool(f"UTOOL{number}", number, pose, line.line)
 
 
@@ -250,7 +245,3 @@ def _turn(position: Position) -> tuple[float, float, float, float]:
     """The orientation of a position: Rz(R) Ry(P) Rx(W)."""
     w, p, r = (position.axes[name][1] for name in "WPR")
     return of_zyx((r, p, w))
-
-
-def _refused(what: str, line: Line) -> ProgramError:
-    return ProgramError(what, line=line.line, code="OLP512")

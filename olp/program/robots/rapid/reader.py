@@ -11,7 +11,7 @@ from olp.core.machine import Setup
 from olp.program.dialect import Dialect, Options, Support
 from olp.program.program import Program
 from olp.program.robots.frames import Located, Tool
-from olp.program.robots.moves import RobotMoves, raise_all
+from olp.program.robots.moves import RobotMoves, take_all
 from olp.program.robots.poses import NO_TURN, inverted, multiplied, of_zyx, rotated
 from olp.program.robots.rapid import flow
 from olp.program.robots.rapid.data import Declared
@@ -56,15 +56,7 @@ class _Reader:
         every = list(statements(self.data, Lines(self.data)))
         rest = self._declare(every)
         self.moving, self.routines = flow.moving_routines(rest)
-        count = max(len(rest), 1)
-        for k, statement in enumerate(rest):
-            if k % 4096 == 0:
-                options.tell("read", k / count)
-            try:
-                self._statement(statement)
-            except ProgramError as error:
-                self.refusals.append(error)
-        raise_all(self.refusals)
+        take_all(rest, self._statement, self.refusals, options)
         return self.moves.program(dialect, words=words)
 
     def _declare(self, every: list[Statement]) -> list[Statement]:

@@ -16,7 +16,7 @@ from olp.program.dialect import Dialect, Options, Support
 from olp.program.frames import tool_vector_of
 from olp.program.program import Program
 from olp.program.robots.frames import Located, Tool
-from olp.program.robots.moves import RobotMoves, raise_all
+from olp.program.robots.moves import NAN, RobotMoves, take_all
 from olp.program.robots.poses import Pose, of_vector
 from olp.program.robots.targets import NOWHERE, Span, Use
 from olp.program.robots.urscript.table import TABLE
@@ -41,7 +41,6 @@ _TRANSFORMED = pattern(rb"\s*pose_trans\((.*)\)\s*")
 _WORDS = pattern(rb"[A-Za-z_]\w*")
 #: In metres, as lengths of the language are.
 _MM_PER_M = 1000.0
-_NAN = float("nan")
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +64,7 @@ def read(
 ) -> Program:
     """Read a whole program. Raises ProgramError with the line of the first statement that cannot be read
     correctly."""
-    return _Reader(data, setup).run(dialect, words=words)
+    return _Reader(data, setup).run(dialect, options or Options(), words=words)
 
 
 def _lines(data: bytes) -> Iterator[_Line]:
@@ -97,15 +96,10 @@ class _Reader:
         self.blocks: list[tuple[bytes, int]] = []
         self.refusals: list[ProgramError] = []
 
-    def run(self, dialect: Dialect, *, words: bool) -> Program:
+    def run(self, dialect: Dialect, options: Options, *, words: bool) -> Program:
         every = [line for line in _lines(self.data) if line.text.strip()]
         self._assignments(every)
-        for line in every:
-            try:
-                self._statement(line)
-            except ProgramError as error:
-                self.refusals.append(error)
-        raise_all(self.refusals)
+        take_all(every, self._statement, self.refusals, options)
         return self.moves.program(dialect, words=words)
 
     def _assignments(self, every: list[_Line]) -> None:
@@ -229,7 +223,7 @@ class _Reader:
             zone=rest.get("r", NOWHERE),
         )  # fmt: skip
         timed = "t" in rest and self._number(rest["t"]) != 0.0
-        speed = self._number(rest["v"]) if "v" in rest else _NAN
+        speed = self._number(rest["v"]) if "v" in rest else NAN
         self.moves.move(
             line.line, use, frame, self._tool(line), speed * _MM_PER_M, straight=call[1] != b"movej",
             whole=timed,
@@ -248,7 +242,7 @@ class _Reader:
 
     def _number(self, span: Span) -> float:
         match = _NUMBER.fullmatch(self.data, *span)
-        return _NAN if match is None else float(match[1])
+        return NAN if match is None else float(match[1])
 
     def _is_joints(self, text: bytes) -> bool:
         """Whether a name stands for joint values with numbers."""
