@@ -54,6 +54,8 @@ if TYPE_CHECKING:
     from olp.workflows.calibrate_plan import MeasurementPlan as MeasurementPlan
     from olp.workflows.calibrate_plan import plan_measurements as plan_measurements
     from olp.workflows.calibrate_postures import fit_postures as fit_postures
+    from olp.workflows.calibrate_probe import ProbedArtefact as ProbedArtefact
+    from olp.workflows.calibrate_probe import probe_artefact as probe_artefact
     from olp.workflows.calibrate_refine import RefinedCalibration as RefinedCalibration
     from olp.workflows.calibrate_refine import refine_calibration as refine_calibration
     from olp.workflows.calibrate_thermal import ThermalFitting as ThermalFitting
@@ -105,6 +107,8 @@ _HOME = {
     "MeasurementPlan": "olp.workflows.calibrate_plan",
     "plan_measurements": "olp.workflows.calibrate_plan",
     "plan_next": "olp.workflows.calibrate_next",
+    "ProbedArtefact": "olp.workflows.calibrate_probe",
+    "probe_artefact": "olp.workflows.calibrate_probe",
     "correct": "olp.workflows.correct",
     "compare_tables": "olp.workflows.calibrate_export",
     "export_table": "olp.workflows.calibrate_export",

@@ -10,6 +10,7 @@ VERBS: dict[str, str] = {
     "doctor": "Check sign, unit and column of every curve of a calibration with independent points.",
     "compare-methods": "Judge equation (1), a map of two pods and the adjustment on your own readings.",
     "plan": "Propose what to measure for a wanted uncertainty, and write the programs for it.",
+    "probe": "Touch an artefact with the machine's own probe: write the programs, read the touches.",
     "refine": "Update a calibration within its covariance by a measured run.",
     "read": "Show what the program reads in the file of an instrument.",
     "import": "Read the compensation table of a control as a calibration.",

@@ -10,7 +10,7 @@ from olp.cli.options import force_option, output_option
 #: The kinds of `olp.files.json_schema`, which is loaded late.
 _KINDS = (
     *("machine", "calibration", "job", "joint-machine", "joint-calibration"),
-    *("joint-measurements", "measurements", "points", "dialect"),
+    *("joint-measurements", "measurements", "artefact", "points", "dialect"),
 )
 
 

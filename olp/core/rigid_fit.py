@@ -80,12 +80,17 @@ def fit_points(measured_mm: Array, nominal_mm: Array) -> Rigid:
     return Rigid(rotation, b - rotation @ a)
 
 
+def line_of_points(points_mm: Array) -> Array | None:
+    """(3,) the direction of the line that all points (n, 3) are on, None where they are on none."""
+    _, spread, ways = np.linalg.svd(points_mm - points_mm.mean(axis=0), full_matrices=False)
+    return np.asarray(ways[0]) if len(points_mm) < 3 or spread[1] <= _NARROW * spread[0] else None
+
+
 def fit_frame(measured_mm: Array, nominal_mm: Array) -> Rigid:
     """As `fit_points`; raises CannotCompute for fewer than three points, or where they lie on one line."""
     if len(measured_mm) < 3:
         raise CannotCompute(f"a frame of {len(measured_mm)} points; expected at least three; measure more")
-    spread = np.linalg.svd(nominal_mm - nominal_mm.mean(axis=0), compute_uv=False)
-    if spread[1] <= _NARROW * spread[0]:
+    if line_of_points(nominal_mm) is not None:
         raise CannotCompute("the points of a frame lie on one line; measure at least one point off that line")
     return fit_points(measured_mm, nominal_mm)
 

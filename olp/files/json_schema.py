@@ -12,6 +12,7 @@ from olp.files.json_types import table_schema
 from olp.files.kinematics.calibration_schema import JointCalibrationFile
 from olp.files.kinematics.plan_schema import JointPlanFile
 from olp.files.kinematics.schema import JointMachineFile
+from olp.files.measurements.artefact_file import ArtefactFile
 from olp.files.measurements.schemas import MeasurementsFile
 from olp.files.point_profile import PointProfile
 from olp.files.schemas import FILES
@@ -24,6 +25,7 @@ KINDS: dict[str, type[Table]] = {
     "joint-calibration": JointCalibrationFile,
     "joint-measurements": JointPlanFile,
     "measurements": MeasurementsFile,
+    "artefact": ArtefactFile,
     "points": PointProfile,
     "dialect": DialectFile,
 }

@@ -25,6 +25,7 @@ KINDS = {
     "olp-job-1": ("a job file", ", as -j takes it"),
     "olp-calibration-1": ("a calibration", ", which the machine file names"),
     "olp-measurements-1": ("a file of measurements", ", as olp calibrate fit takes it"),
+    "olp-artefact-1": ("an artefact to be touched", ", as olp calibrate probe takes it"),
     "olp-thermal-1": ("a thermal model", ", which the calibration names"),
     "olp-dialect-1": ("the description of a dialect", ", as --dialect takes it"),
     "olp-points-1": ("the layout of a list of positions", ", as --profile takes it"),

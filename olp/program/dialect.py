@@ -71,7 +71,9 @@ class Dialect:
     the control keeps the tool become the path of the tool. `keeper` puts the corrections of an unrolled text
     into the program that it was made from. It is called with that text, the corrected one, where each line
     begins in it, and this dialect, and returns a `Kept`. `asks` finds what a program asks of the control
-    beside motion and beside its words (`olp.program.asked.Asked`), in order of lines.
+    beside motion and beside its words (`olp.program.asked.Asked`), in order of lines. `toucher` writes a
+    program of touches. It is called with this dialect, `olp.program.touches.Touches`, decimals, notes, and
+    the name of the log.
 
     `path_mode` is how the control goes from move to move where a program does not say it. `inch_decimals` are
     the decimals of inch programs for a least increment of 0.001 mm, `free_digits` those that centres of arcs
@@ -102,6 +104,7 @@ class Dialect:
     expands_cycles: bool = False
     keeper: Callable[..., Kept] | None = None
     asks: Callable[..., Iterable[Any]] | None = None
+    toucher: Callable[..., bytes] | None = None
     signs: Signs = NO_SIGNS
     folder_endings: tuple[str, ...] = ()
     languages: frozenset[str] = frozenset()

@@ -20,7 +20,7 @@ PUBLIC = {
     *("KnownErrors", "load_kinematics"),
     *("view", "Review", "add_layers", "Layers", "fit_calibration", "FittedCalibration"),
     *("diagnose_calibration", "CalibrationDiagnosis", "plan_measurements", "MeasurementPlan"),
-    "plan_next",
+    *("plan_next", "probe_artefact", "ProbedArtefact"),
     *("compare_methods", "ComparedMethods", "fit_joint_calibration", "FittedJoints"),
     *("refine_calibration", "RefinedCalibration", "batch", "Batch"),
     *("import_table", "export_table", "compare_tables", "TableImport", "TableExport"),

@@ -2,7 +2,7 @@
 
 The places of the balls may be unknown: they are the same in all poses, while the errors of the machine
 differ. So the artefact need not be better than the machine. Only its scale has to be known from somewhere:
-two balls whose places are known tell it, or a laser.
+two balls whose places are known tell it, or a laser. A ball bar is an artefact of two balls.
 """
 
 from __future__ import annotations
@@ -26,12 +26,14 @@ from olp.calibration.observations.base import (
 )
 from olp.core.arrays import Array, Index
 from olp.core.errors import ConfigError
-from olp.core.rigid_fit import fit_frame
+from olp.core.rigid_fit import fit_points, line_of_points
 from olp.core.units import UM_PER_MM
 from olp.core.values import dataclass
 
 #: Standard deviation of a coordinate of a ball whose place is not known but for a drawing, mm.
 DRAWN_MM = 1.0
+#: No centre is known better than this, in mm: 1 nm.
+LEAST_MM = 1e-6
 #: Balls whose places change by less in a step have converged, mm: what is left acts over the turn of a pose.
 STILL_MM = 1e-3
 
@@ -43,7 +45,8 @@ class Artefact(Scattered):
     `axis_mm` (n, 3) are axis positions where the probe, at the end of `tool_mm` (n, 3) or (3,), is at the
     centre of a ball. `ball` (n,) are rows of `certificate_mm` (balls, 3): places in the frame of the
     artefact. `pose` (n,) numbers how it lay. `sigma` is the standard uncertainty of a coordinate of a centre,
-    `sigma_ball_mm` (balls,) that of the certificate; 0 where the place is only as drawn. Raises ConfigError.
+    with `covariance_mm2` (n, 3, 3) of each centre their root mean square. `sigma_ball_mm` (balls,) is that of
+    the certificate; 0 where the place is only as drawn. Raises ConfigError.
     """
 
     axis_mm: Array
@@ -55,6 +58,7 @@ class Artefact(Scattered):
     sigma: float
     source: str = ""
     row: Index = field(default_factory=lambda: np.zeros(0, np.int64))
+    covariance_mm2: Array | None = None
 
     def __post_init__(self) -> None:
         axis = np.atleast_2d(np.array(self.axis_mm, float))
@@ -74,10 +78,9 @@ class Artefact(Scattered):
             )
         for number in np.unique(columns["pose"]):
             few = len(np.unique(columns["ball"][columns["pose"] == number]))
-            if few < 3:
+            if few < 2:
                 raise ConfigError(
-                    f"pose {number} has {few} balls; expected at least 3 that are not on one line",
-                    file=self.source or None,
+                    f"pose {number} has one ball; expected at least 2", file=self.source or None
                 )
         once = len(np.unique(columns["pose"])) == 1
         if once and not columns["sigma_ball_mm"].all():
@@ -132,6 +135,7 @@ class ArtefactState(ScatteredState):
         kept = replace(
             taken, axis_mm=taken.axis_mm[use], tool_mm=taken.tool_mm[use], ball=taken.ball[use],
             pose=taken.pose[use], row=taken.row[use],
+            covariance_mm2=None if taken.covariance_mm2 is None else taken.covariance_mm2[use],
         )  # fmt: skip
         return ArtefactState(kept, taken.certificate_mm + step.values)
 
@@ -149,25 +153,40 @@ class ArtefactState(ScatteredState):
 
 
 def artefact_block(taken: Artefact, parameters: Unknowns, balls_mm: Array) -> Block:
-    """The centres of an artefact. Its own unknowns are six small motions of each pose, and how far each ball
-    is from its certificate. Raises CannotCompute where the balls of a pose are on one line."""
+    """The centres of an artefact, along the axes or the principal axes of each covariance. Its own unknowns
+    are the small motions of each pose, and how far each ball is from its certificate. The turn of balls on
+    one line about that line shows nowhere, and is none of them."""
     n, balls = len(taken.axis_mm), len(balls_mm)
     tip = taken.axis_mm + taken.tool_mm
-    poses = np.unique(taken.pose)
     y = np.zeros((n, 3))
-    local = np.zeros((n, 3, 6 * len(poses) + 3 * balls))
-    for k, number in enumerate(poses.tolist()):
+    motions: list[Array] = []
+    offsets = np.zeros((n, 3, 3 * balls))
+    for number in np.unique(taken.pose).tolist():
         own = np.flatnonzero(taken.pose == number)
-        frame = fit_frame(balls_mm[taken.ball[own]], tip[own])
+        frame = fit_points(balls_mm[taken.ball[own]], tip[own])
         y[own] = frame(balls_mm[taken.ball[own]]) - tip[own]
-        local[own, :, 6 * k : 6 * k + 6] = frame_columns(tip[own] - tip[own].mean(axis=0))
+        moved = np.zeros((n, 3, 6))
+        moved[own] = frame_columns(tip[own] - tip[own].mean(axis=0))
+        line = line_of_points(tip[own])
+        if line is not None:
+            across = np.linalg.svd(line[None])[2][1:].T
+            moved = np.concatenate([moved[:, :, :3], moved[:, :, 3:] @ across], axis=2)
+        motions.append(moved)
         off = (balls_mm - taken.certificate_mm)[taken.ball[own]]
         # what the balls are off counts from the certificate, whose uncertainty is its prior
         y[own] -= off @ frame.rotation.T
         for one, ball in zip(own.tolist(), taken.ball[own].tolist(), strict=True):
-            local[one, :, 6 * len(poses) + 3 * ball : 6 * len(poses) + 3 * ball + 3] = -frame.rotation
+            offsets[one, :, 3 * ball : 3 * ball + 3] = -frame.rotation
+    free = sum(moved.shape[2] for moved in motions)
     known = np.where(taken.sigma_ball_mm > 0.0, taken.sigma_ball_mm, DRAWN_MM)
-    precision = np.concatenate([np.zeros(6 * len(poses)), np.repeat(known**-2.0, 3)])
-    rows = parameters.design(taken.axis_mm, taken.tool_mm).reshape(3 * n, -1)
-    chunk = Chunk(rows, y.reshape(-1), np.full(3 * n, taken.sigma), local.reshape(3 * n, -1))
-    return Block.of(chunk, np.arange(parameters.size), precision, taken.source or "artefact")
+    precision = np.concatenate([np.zeros(free), np.repeat(known**-2.0, 3)])
+    rows = parameters.design(taken.axis_mm, taken.tool_mm)
+    local = np.concatenate([*motions, offsets], axis=2)
+    sigma = np.full((n, 3), taken.sigma)
+    if taken.covariance_mm2 is not None:
+        variance, across = np.linalg.eigh(taken.covariance_mm2)
+        sigma, turn = np.sqrt(np.maximum(variance, LEAST_MM**2)), across.transpose(0, 2, 1)
+        rows, local, y = turn @ rows, turn @ local, np.einsum("nij,nj->ni", turn, y)
+    size = parameters.size
+    chunk = Chunk(rows.reshape(3 * n, size), y.reshape(-1), sigma.reshape(-1), local.reshape(3 * n, -1))
+    return Block.of(chunk, np.arange(size), precision, taken.source or "artefact")

@@ -133,7 +133,7 @@ def parse_point_readings(data: bytes, file: str, measured: tuple[str, ...] = MEA
         raise ConfigError(
             f"has columns {SIGMA[0]} and {COVARIANCE[0]}; expected one of both kinds", file=file
         )
-    covariance = _covariance(columns(spread[0]), sheet.lines, file) if spread else None
+    covariance = covariances(columns(spread[0]), sheet.lines, file) if spread else None
     return PointReadings(
         file,
         columns(AXIS),
@@ -145,7 +145,7 @@ def parse_point_readings(data: bytes, file: str, measured: tuple[str, ...] = MEA
     )
 
 
-def _covariance(values: Array, lines: npt.NDArray[np.int64], file: str) -> Array:
+def covariances(values: Array, lines: npt.NDArray[np.int64], file: str) -> Array:
     """(n, 3, 3) in mm^2 from standard uncertainties (n, 3) in um or covariances (n, 6) in um^2. Raises
     ConfigError where one of them is no covariance."""
     matrix = np.zeros((len(values), 3, 3))

@@ -101,4 +101,14 @@ RULES = (
         "takes a drift of each run out.",
         "The start of X reads 6 um more after five runs of 40 minutes.",
     ),
+    _rule(
+        "OLP861",
+        "touches scatter more than stated",
+        Severity.WARNING,
+        "The touches of an artefact do not agree with its diameters by far more than a touch is stated to "
+        "repeat. Their uncertainty was enlarged to what they show.",
+        "Look at the touch that is named, and at the diameters of the spheres and holes. Clean them and the "
+        "tip, tighten the stylus, and touch again.",
+        "Touches scatter by 9 um where 1 um is stated.",
+    ),
 )

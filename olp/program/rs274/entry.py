@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 from olp.core.arrays import Index
 from olp.core.machine import Setup
@@ -11,6 +12,9 @@ from olp.program.kept import Kept
 from olp.program.origin import Unrolled
 from olp.program.program import Program
 from olp.program.rs274.profiles.base import Profile
+
+if TYPE_CHECKING:
+    from olp.program.touches import Touches
 
 
 def read_blocks(data: bytes, setup: Setup, profile: Profile, options: Options, *, words: bool) -> Program:
@@ -33,3 +37,10 @@ def keep_blocks(unrolled: Unrolled, corrected: bytes, starts: Index, profile: Pr
     from olp.program.rs274.flatten.kept import kept
 
     return kept(unrolled, corrected, starts, profile)
+
+
+def touching_blocks(profile: Profile, touches: Touches, digits: int, notes: Sequence[str], log: str) -> bytes:
+    """`olp.program.rs274.probing.probing_program`."""
+    from olp.program.rs274.probing import probing_program
+
+    return probing_program(profile, touches, digits, notes, log)

@@ -14,7 +14,7 @@ from olp.program.rs274.codes import MACHINE
 from olp.program.rs274.profiles.base import Act, Profile
 
 #: Characters of a comment line at most: some controls take no more.
-_WIDTH = 68
+COMMENT_WIDTH = 68
 
 
 def positions_program(
@@ -29,7 +29,11 @@ def positions_program(
     if profile.codes.get(MACHINE) != Act.EVENT or MACHINE in profile.aliases:
         raise CannotCompute(f"{profile.title} has no G53; take the points from the CSV file")
     opening, closing = (mark.decode() for mark in profile.comment)
-    lines = [f"{opening}{line}{closing}" for note in notes for line in textwrap.wrap(_plain(note), _WIDTH)]
+    lines = [
+        f"{opening}{line}{closing}"
+        for note in notes
+        for line in textwrap.wrap(plain_note(note), COMMENT_WIDTH)
+    ]
     lines.append(f"{profile.metric} G90 G94 {profile.cleared}")
     before: list[str] = []
     for position, wait in zip(np.round(positions_mm, digits).tolist(), dwell_s, strict=True):
@@ -46,6 +50,6 @@ def positions_program(
     return ("\n".join(lines) + "\n").encode()
 
 
-def _plain(note: str) -> str:
+def plain_note(note: str) -> str:
     """The note without marks that would end a comment."""
     return note.replace("(", "[").replace(")", "]").encode("ascii", "replace").decode()

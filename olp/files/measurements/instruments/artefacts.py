@@ -10,9 +10,9 @@ from olp.core.errors import ConfigError
 from olp.core.schema import NotNegative, Positive, Table, Text, Triple
 from olp.core.schema_keys import Field
 from olp.core.units import MM_PER_UM
-from olp.files.measurements.columns import read_columns
+from olp.files.measurements.columns import Columns, read_columns
 from olp.files.measurements.instruments.base import Instrument, Plan
-from olp.files.measurements.point_readings import AXIS
+from olp.files.measurements.point_readings import AXIS, COVARIANCE, covariances
 from olp.files.write import PathLike
 
 
@@ -25,7 +25,11 @@ class ArtefactTable(Table):
         description="the path of a CSV file with columns ball, X_mm, Y_mm, Z_mm (places in the frame of the "
         "artefact, or as drawn) and, for balls that are known better, sigma_um"
     )
-    sigma_um: Positive = Field(description="the standard uncertainty of a coordinate of a centre, in um")
+    sigma_um: Positive | None = Field(
+        default=None,
+        description="the standard uncertainty of a coordinate of a centre, in um; or columns "
+        "covariance_XX_um2, covariance_XY_um2 ... of the file",
+    )
     sigma_certificate_um: NotNegative = Field(
         default=0.0,
         description="the standard uncertainty of a coordinate of the certificate, in um; 0: as drawn, so "
@@ -68,7 +72,7 @@ class ArtefactFiles(Instrument[ArtefactTable, Artefact]):
 
     def read(self, table: ArtefactTable, plan: Plan) -> Artefact:
         path = plan.beside(table.file)
-        columns, stated = read_columns(path, CentreKeys, ("pose", *AXIS), words=("ball",))
+        columns, stated = read_columns(path, CentreKeys, ("pose", *AXIS), COVARIANCE, words=("ball",))
         names, places, sigma = read_certificate(plan.beside(table.certificate))
         unknown = sorted(set(columns.word["ball"]) - set(names))
         if unknown:
@@ -81,6 +85,7 @@ class ArtefactFiles(Instrument[ArtefactTable, Artefact]):
             raise ConfigError(
                 "tool_mm is missing; expected [X, Y, Z] from the gauge point to the probe, in mm"
             )
+        covariance, sigma_mm = _spread(columns, table)
         index = {name: k for k, name in enumerate(names)}
         certificate = table.sigma_certificate_um * MM_PER_UM
         return Artefact(
@@ -90,7 +95,26 @@ class ArtefactFiles(Instrument[ArtefactTable, Artefact]):
             columns.number["pose"].astype(np.int64),
             places,
             np.where(sigma > 0.0, sigma, certificate),
-            table.sigma_um * MM_PER_UM,
+            sigma_mm,
             str(path),
             columns.line,
+            covariance,
         )
+
+
+def _spread(columns: Columns, table: ArtefactTable) -> tuple[Array | None, float]:
+    """The covariance of each centre, where the file has them, and the uncertainty of a coordinate, in mm.
+    Raises ConfigError."""
+    own = [name for name in COVARIANCE if name in columns.number]
+    if bool(own) == (table.sigma_um is not None):
+        wrong = "is stated here and in columns of the file" if own else "is missing"
+        raise ConfigError(
+            f"sigma_um {wrong}; expected the uncertainty of the centres once", file=columns.file
+        )
+    if not own:
+        return None, (table.sigma_um or 0.0) * MM_PER_UM
+    if len(own) < len(COVARIANCE):
+        raise ConfigError(f"has some covariances only; expected {', '.join(COVARIANCE)}", file=columns.file)
+    values = np.stack([columns.number[name] for name in COVARIANCE], axis=1)
+    covariance = covariances(values, columns.line, columns.file)
+    return covariance, float(np.sqrt(np.trace(covariance, axis1=1, axis2=2).mean() / 3.0))

@@ -122,7 +122,8 @@ class Profile(Dialect):
     - `metric`: the word of lengths in mm. `cleared`: modes without cycle, tool length and cutter
       compensation. `dwell`: the letter of a time in seconds.
     - `written_ending`: the ending of files that are written for the control. `program_number`: a program
-      begins with % and an O number, and ends with %.
+      begins with % and an O number, and ends with %. `touch_log`: comments (LOG, ...) write the results of
+      touches to a file.
     """
 
     first: tuple[bytes, ...] = (b"%", b"O|:")
@@ -134,6 +135,7 @@ class Profile(Dialect):
     dwell: str = "P"
     written_ending: str = "nc"
     program_number: bool = False
+    touch_log: bool = False
     codes: Mapping[int, Act]
     refusals: Mapping[int, str]
     aliases: Mapping[int, int] = field(default_factory=dict)

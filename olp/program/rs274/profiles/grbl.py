@@ -7,7 +7,7 @@ from dataclasses import replace
 from olp.program.rs274.block_text import BlockText
 from olp.program.rs274.codes import CYCLES
 from olp.program.rs274.cycle_rules import NGC_CYCLES
-from olp.program.rs274.entry import keep_blocks, read_blocks, unroll_blocks
+from olp.program.rs274.entry import keep_blocks, read_blocks, touching_blocks, unroll_blocks
 from olp.program.rs274.flatten.language import PLAIN_NGC
 from olp.program.rs274.profiles.base import ISO_M, REFUSALS, Act, Profile, g_codes
 
@@ -24,6 +24,7 @@ DIALECT = Profile(
     folder_endings=("nc", "ngc", "gcode", "gc", "tap"),
     unroller=unroll_blocks,
     keeper=keep_blocks,
+    toucher=touching_blocks,
     codes=g_codes(unchanged=set(), extra=_EXTRA, without=_LACKING),
     refusals=REFUSALS,
     harmless_m=ISO_M | {56},

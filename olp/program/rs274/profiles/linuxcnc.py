@@ -7,7 +7,7 @@ from olp.program.rs274.block_rules import NGC_RULES
 from olp.program.rs274.block_text import BlockText
 from olp.program.rs274.codes import THREAD
 from olp.program.rs274.cycle_rules import NGC_CYCLES
-from olp.program.rs274.entry import keep_blocks, read_blocks, unroll_blocks
+from olp.program.rs274.entry import keep_blocks, read_blocks, touching_blocks, unroll_blocks
 from olp.program.rs274.flatten.language import NGC
 from olp.program.rs274.profiles.base import ARC_DISTANCE, ISO_M, REFUSALS, Act, Profile, g_codes
 from olp.program.text.line_ends import STRAY_CR
@@ -21,6 +21,8 @@ DIALECT = Profile(
     folder_endings=("ngc", "nc", "tap", "cnc", "gcode"),
     unroller=unroll_blocks,
     keeper=keep_blocks,
+    toucher=touching_blocks,
+    touch_log=True,
     codes=g_codes(unchanged={80}, extra={**_EVENTS, **ARC_DISTANCE, THREAD: Act.MOTION}),
     refusals=REFUSALS,
     harmless_m=ISO_M | {50, 51, 52, 53} | frozenset(range(62, 69)),
