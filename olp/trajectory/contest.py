@@ -5,6 +5,7 @@ A candidate that exceeds a limit is slowed down as a whole. One that leaves the 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
@@ -17,6 +18,7 @@ from olp.core.values import dataclass
 from olp.trajectory.audit import Ratios, ratios, slowing
 from olp.trajectory.critical import seconds
 from olp.trajectory.deviation import deviation_bound
+from olp.trajectory.merge import shared, variants
 from olp.trajectory.motion import Motion
 from olp.trajectory.optimise import optimised
 from olp.trajectory.route import Route
@@ -29,6 +31,8 @@ _ROUNDING = 1e-9
 _GAIN = 0.003
 #: share of the time that jerk costs in closed form which optimising does not recover
 _JERK_COST = 0.1
+#: waypoints beyond which short steps are not merged unless the run is optimised: a second path takes memory
+_LONG = 200_000
 #: exceptions of a solver that fails
 _FAILURES = (ArithmeticError, ValueError, IndexError, CannotCompute)
 
@@ -52,19 +56,37 @@ class Solution:
 
 
 def fastest(run: Run, candidates: tuple[Candidate, ...], optimise: bool) -> Solution | None:
-    """The fastest solution of the candidates. Where all fail, the other solvers are tried in order; exact
-    stops come last, as they are never the fastest."""
+    """The fastest solution of the candidates, along the route and its variants. Where all fail, the other
+    solvers are tried in order; exact stops come last, as they are never the fastest."""
     best: Solution | None = None
-    for candidate in candidates:
+    smooth: list[Run] = []
+    for own, candidate in _entries(run, candidates, optimise):
         if best is None or candidate.least_s < best.duration_s:
-            best = _better(run, candidate.solver, best)
+            best = _better(run, candidate.solver, best, own)
+            if candidate.solver.bends:
+                smooth.append(own)
     if optimise and best is not None and any(candidate.solver.bends for candidate in candidates):
-        best = _optimised(run, best)
+        # optimising takes most of the time: only along the path that is fastest in closed form
+        best = _optimised(run, best, min(smooth or [run], key=_closed_s))
     asked = [candidate.solver for candidate in candidates]
     for solver in (*SOLVERS, LAST):
         if best is None and solver not in asked:
             best = _better(run, solver, best)
     return best
+
+
+def _entries(run: Run, candidates: tuple[Candidate, ...], optimise: bool) -> list[tuple[Run, Candidate]]:
+    """The solvers with the runs that they drive: the run itself, and its variants without short steps."""
+    entries = [(run, candidate) for candidate in candidates]
+    if len(run.route) <= _LONG or optimise:
+        for route in variants(run.route):
+            own = Run(route, run.limits)
+            entries += [
+                (own, Candidate(solver, float(solver.least_s(route, run.limits).sum()))) for solver in SOLVERS
+            ]
+        # the most promising first, as it may spare the others
+        entries.sort(key=lambda entry: entry[1].least_s)
+    return entries
 
 
 def contest(run: Run, candidates: tuple[Candidate, ...]) -> list[tuple[int, int, Solution]]:
@@ -90,24 +112,34 @@ def contest(run: Run, candidates: tuple[Candidate, ...]) -> list[tuple[int, int,
     return winners
 
 
-def _optimised(run: Run, best: Solution) -> Solution:
-    """The motion of optimised speed, where it is faster."""
+def _closed_s(run: Run) -> float:
+    """The time along the smooth path in closed form; inf where there is none."""
     try:
-        path, profile = run.path(), run.profile()
+        return seconds(run.path(), run.profile())
     except _FAILURES:
+        return math.inf
+
+
+def _optimised(run: Run, best: Solution, own: Run) -> Solution:
+    """The motion of optimised speed along the smooth path of `own`, where it is faster."""
+    closed = _closed_s(own)
+    if math.isinf(closed):
         return best
-    bound, closed = bound_s(path, run.limits), seconds(path, profile)
+    path, profile = own.path(), own.profile()
+    bound = bound_s(path, run.limits)
     if bound + _JERK_COST * (closed - bound) > (1.0 - _GAIN) * best.duration_s:
         return best
     solver = Solver(OPTIMISED, lambda run: optimised(path, run.limits, profile), LAST.least_s, bends=True)
     return _better(run, solver, best) or best
 
 
-def _better(run: Run, solver: Solver, best: Solution | None) -> Solution | None:
-    """The solver's solution if it is valid and faster than the best so far; else the best so far."""
-    motion = _tried(lambda: solver.solve(run))
+def _better(run: Run, solver: Solver, best: Solution | None, own: Run | None = None) -> Solution | None:
+    """The solver's solution for the run, or for its variant `own`, if it is valid for the run and faster than
+    the best so far; else the best so far."""
+    motion = _tried(lambda: solver.solve(own or run))
     if motion is None:
         return best
+    motion = motion if own in {None, run} or solver.bends else shared(motion)
     used = ratios(motion, run.limits, run.route.feed_mm_s[motion.line])
     factor = slowing(used)
     factor = factor if factor > 1.0 + _ROUNDING else 1.0

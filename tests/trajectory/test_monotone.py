@@ -65,3 +65,10 @@ def test_less_freedom_is_no_gain(seed: int) -> None:
     seconds = {name: plan(some, limits).duration_s for name, (some, limits, _) in less.items()}
     faster = {name: s for name, s in seconds.items() if s * (1.0 + less[name][2]) < duration_s}
     assert faster == {}
+
+
+def test_a_fine_staircase_inside_the_tolerance_is_nearly_a_straight_line() -> None:
+    step = 0.05 * np.eye(3)[np.arange(400) % 2]
+    stairs = route(np.concatenate((np.zeros((1, 3)), np.cumsum(step, axis=0))), 50.0, 0.05)
+    line = route(np.array([[0.0, 0.0, 0.0], [10.0, 10.0, 0.0]]), 50.0, 0.05)
+    assert plan(stairs, LIMITS).duration_s <= 1.2 * plan(line, LIMITS).duration_s
