@@ -96,7 +96,8 @@ class Frame:
     that of the cutter, where the contour was taken as the path of the tool. With tool centre point control
     words state the tip in the workpiece, and `tip` says what turns evenly from end to end: rotary "axes", or
     the direction of the tool ("vector"). In a tilted plane words state the tip too, while rotary axes stand
-    ("fixed"), and `length_mm` is NaN where none is in force. It is "" without.
+    ("fixed"), and `length_mm` is NaN where none is in force. It is "" without. Where it is `directed`, words
+    I, J and K of straight moves state the direction of the tool.
     """
 
     unit_mm: float = 1.0
@@ -112,6 +113,7 @@ class Frame:
     lift_mm: Vector = ZERO
     compensation: CutterCompensation | None = None
     tip: Interpolated = ""
+    directed: bool = False
 
     def origin_mm(self) -> Vector:
         """The axis position of the program's origin, no tool length active."""

@@ -91,7 +91,8 @@ class Dialect:
 
     `tips` is empty but for a machine with rotary axes: how tool centre point control leads these there, where
     the program does not say it (`Frame.tip`). `leads` is what the control does where the machine file does
-    not say it, empty where programs of such machines are not read. `tips_from_zero` is as in `JointMachine`,
+    not say it, empty where programs of such machines are not read. `direction_words` are those that state the
+    three components of the direction of the tool there. `tips_from_zero` is as in `JointMachine`,
     where the machine file does not state it.
     """
 
@@ -121,6 +122,7 @@ class Dialect:
     tips: Interpolated = ""
     leads: Interpolated = ""
     tips_from_zero: bool = False
+    direction_words: tuple[bytes, ...] = ()
 
     def rows(self) -> Sequence[Row]:
         """The support matrix, from the table that the reader uses."""

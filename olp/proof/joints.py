@@ -102,9 +102,12 @@ def _left(plan: JointPlan, count: int) -> Array:
 
 def _rounding(path: JointPath, plan: JointPlan, digit_mm: float, digit_deg: float) -> tuple[float, float]:
     """mm and rad by which the tip and the tool are off at most because words have a last digit. In G-code the
-    linear words take up what the rounding of rotary ones does to the tip; in lists nothing does."""
+    linear words take up what the rounding of rotary ones does to the tip, and a tip that is rounded along the
+    path is beside another direction; in lists nothing does."""
     if path.listed is None:
-        return _HALF_DIGITS * digit_mm, _HALF_TURNS * float(np.radians(digit_deg))
+        rounded_mm = _HALF_DIGITS * digit_mm
+        beside = rounded_mm / (2.0 * _ARM_MM)
+        return rounded_mm, _HALF_TURNS * float(np.radians(digit_deg)) + beside
     rotary = np.array([unit == "deg" for unit in path.motion.structure.units])
     half = 0.5 * 10.0 ** -path.places.astype(float)
     half[rotary] = np.radians(half[rotary])
@@ -134,6 +137,7 @@ def match(
     expected = np.where(np.isnan(plan.command[last]), nominal.end, plan.command[last])
     rotary = np.array([unit == "deg" for unit in nominal.motion.structure.units])
     near = _NEAR_DIGITS * np.where(rotary, digit_deg, digit_mm)
+    near = nominal.directions.widened(nominal.motion, near, expected)
     groups = np.arange(count)
     if other > count:
         groups = _stretched(expected, corrected.end, near, nominal.feed & ~nominal.holes.whole)
@@ -156,10 +160,10 @@ def _stretched(expected: Array, end: Array, near: Array, feed: Mask) -> Index:
     """The ends of nominal moves among more moves of the corrected program: each feed move ends with the next
     one that is where it is expected."""
     spare, groups, j = len(end) - len(expected), [], 0
-    scaled = np.nan_to_num(expected / near), np.nan_to_num(end / near)
+    expected, end = np.nan_to_num(expected), np.nan_to_num(end)
     for i, split in enumerate(feed.tolist()):
         if split and spare:
-            away = np.abs(scaled[1][j : j + spare + 1] - scaled[0][i]).max(axis=1)
+            away = (np.abs(end[j : j + spare + 1] - expected[i]) / near[i]).max(axis=1)
             found = int(np.argmax(away <= 1.0)) if (away <= 1.0).any() else 0
             spare -= found
             j += found

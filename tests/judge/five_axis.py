@@ -1,6 +1,7 @@
 """An independent judge of programs on machines with X, Y, Z and rotary axes: its own reader of plain words,
 and its own forward computation from the machine and calibration files. It imports nothing of what it
-judges. TRAORI and ORIVECT are read as well; the last of ORIVECT and ORIAXES holds for the whole program.
+judges. TRAORI and ORIVECT are read as well; the last of ORIVECT and ORIAXES holds for the whole program. I,
+J, K and A3, B3, C3 state the direction of the tool; the rotary axes go to the position near the last one.
 
 Every joint is a 4 x 4 matrix. Errors: location of lines, squareness as location, harmonics of the own
 motion, and backlash of nothing. The tip of tool 1 counts.
@@ -16,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 #: mm per rad, where a place on a move is sought.
@@ -142,6 +144,7 @@ class Judge:
             if "ORI" in line:
                 self.vector = "ORIVECT" in line
                 continue
+            line = re.sub(r"([ABC])3=", lambda m: "IJK"["ABC".index(m[1])], line)
             line = re.sub(r"=\s*(?:DC\(([^)]*)\))?", r"\1", line)
             words = re.findall(r"([A-Z])\s*([-+]?[\d.]+)", re.sub(r"\(.*?\)", "", line))
             given = {letter: float(number) for letter, number in words if letter in self.order}
@@ -149,16 +152,34 @@ class Judge:
                 if letter == "G":
                     code = float(number)
                     cuts = code == 1 if code in (0, 1) else cuts
-                    tips = {43.4: True, 49.0: False}.get(code, tips)
+                    tips = {43.4: True, 43.5: True, 49.0: False}.get(code, tips)
                     counts = {90.0: False, 91.0: True}.get(code, counts)
-            if given:
+            towards = {letter: float(number) for letter, number in words if letter in "IJK"}
+            if given or towards:
                 place = place.copy()
                 for letter, number in given.items():
                     column = self.order.index(letter)
                     start = place[column] if counts else self.offset[letter]
                     place[column] = start + number
+                if towards:
+                    place = self._towards(place, np.array([towards.get(letter, 0.0) for letter in "IJK"]))
                 moves.append((cuts, tips, place))
         return moves
+
+    def _towards(self, place: np.ndarray, direction: np.ndarray) -> np.ndarray:
+        """Coordinates with the rotary values near their own that give the tool a direction."""
+        turning = [column for column, name in enumerate(self.order) if name not in OWN]
+
+        def away(values: np.ndarray) -> np.ndarray:
+            found = np.nan_to_num(place)
+            found[turning] = values
+            return self.forward(found[None], False)[1][0] - direction / np.linalg.norm(direction)
+
+        solved = least_squares(away, place[turning], x_scale=10.0, xtol=1e-15, ftol=1e-15, gtol=1e-15)
+        assert np.abs(solved.fun).max() < 1e-9
+        found = place.copy()
+        found[turning] = solved.x
+        return found
 
     def axes(self, coordinates: np.ndarray, tips: bool) -> np.ndarray:
         """Axis values of programmed coordinates."""

@@ -101,7 +101,7 @@ REFUSED = [
     ("sinumerik", b"D0\nTRAORI\n", "no edge", 6),
     ("sinumerik", b"TRAORI\nD0\n", "D0 comes behind TRAORI", 6),
     ("sinumerik", b"TRANS X5\nTRAORI\n", "programmable frame", 6),
-    ("sinumerik", b"TRAORI\nG1 A3=0 B3=0 C3=1 F100\n", "A3", 6),
+    ("sinumerik", b"TRAORI\nG1 A2=0 B2=0 C2=1 F100\n", "A2", 6),
     ("sinumerik", b"TRAORI\nSUPA G0 Z0\nG1 X5 F100\n", "X, Y, Z has not been commanded", 7),
     ("heidenhain", b"L IX+5 F100\n", "distance", 4),
     ("heidenhain", b"L IC+5 F100\n", "distance", 4),

@@ -99,15 +99,16 @@ class Motion:
         rows = np.flatnonzero(vector & turning & ~whole & (share != 0.0))
         if rows.size:
             target = _great_circle(self._axis(start[rows]), self._axis(end[rows]), share[rows])
-            place[rows] = self._directed(place[rows], target, np.flatnonzero(rotary), rows)
+            place[rows] = self.directed(place[rows], target, np.flatnonzero(rotary), rows)
         return place
 
     def _axis(self, axes: Array) -> Array:
         """(n, 3) directions of the nominal tool, which depend on rotary axes alone."""
         return np.asarray(self.machines[0].nominal(axes).rotation[:, :, 2])
 
-    def _directed(self, place: Array, target: Array, rotary: Index, rows: Index) -> Array:
-        """The rotary values (r, k) near those of `place` whose tool has the directions `target`."""
+    def directed(self, place: Array, target: Array, rotary: Index, rows: Index) -> Array:
+        """(r, axes) `place` with the rotary values, in the columns `rotary`, near its own whose tool has the
+        directions `target` (r, 3). Raises NotInvertible with one of `rows` (r,) where none does."""
         for _ in range(_STEPS):
             slopes = np.empty((len(place), 3, len(rotary)))
             for number, column in enumerate(rotary.tolist()):

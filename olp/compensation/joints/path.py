@@ -8,6 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
+from olp.compensation.joints.directed import Directions
 from olp.compensation.joints.drilled import Drilled
 from olp.compensation.joints.motion import Motion
 from olp.compensation.joints.tilts import (
@@ -54,8 +55,8 @@ class JointPath:
     proof judges, `kept` moves that stay uncorrected. `held` (n,) are moves whose rotary axes stay as
     programmed: where these stand, tool centre point control begins, a tilted plane is fixed to them, or a
     hole is made. In the last two no word of theirs changes: these moves `stay` (n,). `places` (axes,) are the
-    fewest decimals of words in mm and deg. `holes` are those of cycles, `listed` the rows of a list of axis
-    values."""
+    fewest decimals of words in mm and deg. `holes` are those of cycles, `directions` those that words state,
+    `listed` the rows of a list of axis values."""
 
     program: Program
     motion: Motion
@@ -76,6 +77,7 @@ class JointPath:
     stay: Mask
     places: Index
     holes: Drilled
+    directions: Directions
     listed: AxisList | None = None
 
     def __len__(self) -> int:
@@ -120,9 +122,13 @@ class JointPath:
         ]
         offsets = np.array(turns, float).reshape(len(path.frames), len(letters))
         found = found_positions(program, structure, letters, swivel_axis)
-        degrees = rotary.follow(
-            program, np.array([start_deg.get(letter, np.nan) for letter in letters]), offsets, found
-        )
+        first = np.array([start_deg.get(letter, np.nan) for letter in letters])
+        degrees = rotary.follow(program, first, offsets, found)
+        directions = Directions.of(program, rotary)
+        if directions.stated.any():
+            since = np.vstack((first, degrees))
+            found = directions.positions(program, structure, letters, rotary, found, since)
+            degrees = rotary.follow(program, first, offsets, found)
         rotary.refuse_ways(program, degrees)
         modes = [frame.tip for frame in path.frames]
         tip = np.array([mode != "" for mode in modes], bool)[path.frame]
@@ -178,7 +184,7 @@ class JointPath:
         held = np.append(tip[1:] & ~tip[:-1], False)[: len(tip)] | stay
         return JointPath(
             program, motion, start, end, slot, tool, tip, vector, shifts[path.frame], offset, unit, scale,
-            feed, feed, kept, held, stay, _places(structure), holes,
+            feed, feed, kept, held, stay, _places(structure), holes, directions,
         )  # fmt: skip
 
     @staticmethod
@@ -206,7 +212,8 @@ class JointPath:
             rows.program, motion, np.vstack((np.full((1, axes), np.nan), rows.values[:-1])), rows.values,
             np.full((count, axes), -1, np.int32), np.array([places[n] for n in rows.tool.tolist()]),
             none, none, np.zeros((count, 3)), np.zeros((count, axes)), np.ones(count), np.ones(axes),
-            feed, ~none, none, none, none, _places(structure), Drilled.none(count), rows,
+            feed, ~none, none, none, none, _places(structure), Drilled.none(count),
+            Directions.none(count), rows,
         )  # fmt: skip
 
 

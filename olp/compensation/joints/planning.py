@@ -130,7 +130,8 @@ def _solved(path: JointPath, move: Index, share: Array, side: Array) -> _Rows:
         nominal = motion.nominal(axes, tool)
         done = _commanded(path, some, axes, tool, shift)
         target = Poses(nominal.rotation, nominal.position + shift)
-        held = np.flatnonzero(path.held[some])
+        pole = path.directions.keep(motion.structure, some, nominal.rotation[:, :, 2])
+        held = np.flatnonzero(path.held[some] | pole)
         if held.size:
             part = Poses(target.rotation[held], target.position[held])
             stands = axes[held]
@@ -138,7 +139,7 @@ def _solved(path: JointPath, move: Index, share: Array, side: Array) -> _Rows:
             play = np.where(path.stay[some[held], None] & rotary, 0.5 * motion.width * side[some[held]], 0.0)
             solved = motion.linear(stands - play, tool[held], part)
             done.values[held], done.left_rad[held] = solved.values, solved.left_rad
-            done.limited[held] = False
+            done.limited[held] = pole[held]
         left = left_angles(motion.structure, done.left_rad, target)
         parts.append(_Rows(some, at, done.values, target, left, done.limited))
     return _Rows.join(parts)

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from olp.compensation.digits import AxisRows, Digits
 from olp.compensation.inserted_blocks import end_word_edits
+from olp.compensation.joints.direction_words import DirectionWords
 from olp.compensation.joints.drilled import lifted, middled
 from olp.compensation.joints.path import JointPath
 from olp.compensation.joints.planning import JointPlan
@@ -64,16 +65,22 @@ class JointWriter:
         self.prefixes, self.tally = Prefixes(), Tally()
         self.head = np.append(True, plan.move[1:] != plan.move[:-1])[: len(plan.move)]
         self.solid = np.asarray(np.isfinite(plan.command).all(axis=1), bool)
-        shape = plan.command.shape
+        # columns of axes, and behind them those of the components of directions
+        self.led = path.directions.led[plan.move]
+        names = program.dialect.direction_words if self.led.any() else ()
+        self.names = [*(name.encode() for name in self.order), *names]
+        shape = (len(plan.move), len(self.names))
         self.write, self.mantissa = np.zeros(shape, bool), np.zeros(shape, np.int64)
         self.decimals = np.zeros(shape, np.int8)
-        self.slot = np.where(self.head[:, None], path.slot[plan.move], -1)
+        slot = np.hstack((path.slot, path.directions.slot))[:, : len(self.names)]
+        self.slot = np.where(self.head[:, None], slot[plan.move], -1)
 
     def written(self) -> WrittenJoints:
         command = self.plan.command.copy()
         emitted, drilled = np.full(command.shape, np.nan), self.path.holes.strokes[self.plan.move]
         for column in np.flatnonzero(self.rotary).tolist():
             emitted[:, column] = self._round(column, command[:, column], drilled)
+        self._aim(emitted)
         made = self._drill(self._linear(command, emitted))
         edits = [*self._replaced(), *self._inserted_words(), *self._inserted_blocks(), made]
         edits = [part for part in edits if len(part)]
@@ -114,6 +121,15 @@ class JointWriter:
         command[rows] = motion.programmed(axes, tool, self.path.tip[move])
         return command
 
+    def _aim(self, emitted: Array) -> None:
+        """The digits of directions, and the rotary values that they lead to."""
+        if not self.led.any():
+            return
+        words, columns = DirectionWords.of(self.path, self.plan, self.head), slice(len(self.order), None)
+        self.write[:, columns] = words.write[:, None]
+        self.mantissa[:, columns], self.decimals[:, columns] = words.mantissa, words.decimals
+        emitted[np.ix_(self.led, self.rotary)] = words.axes[np.ix_(self.led, self.rotary)]
+
     def _drill(self, command: Array) -> Edits:
         """The digits of linear axes; returns the edits of cycles, whose strokes have no words."""
         path, plan, holes = self.path, self.plan, self.path.holes
@@ -142,14 +158,15 @@ class JointWriter:
         flag = path.program.toolpath.flag[plan.move]
         nominal = path.end[plan.move, column]
         own = drilled & (self.order[column] == AXES[2])
+        turned = self.led & self.rotary[column]
         unit = np.ones(len(slot)) if self.rotary[column] else path.unit[plan.move]
         least, usual, finest = self._places(column, unit)
         rows = AxisRows(
             command=command,
             nominal=np.where(own, command, nominal),
             given=given,
-            raw=~self.solid | drilled,
-            reset=self._set_by_control(column, flag, nominal) | own,
+            raw=~self.solid | drilled | turned,
+            reset=self._set_by_control(column, flag, nominal) | own | turned,
             word=np.where(given, self.words.mantissa[slot], 0),
             decimals=np.where(given, self._own_decimals(column, slot, unit), 0).astype(np.int8),
             offset=path.offset[plan.move, column],
@@ -160,7 +177,7 @@ class JointWriter:
             return command
         first = float(path.start[plan.move[0], column])
         digits: Digits = digits_of(rows, Stretches.of(counting, unit), first, Decimals(least, usual, finest))
-        self.write[:, column] = digits.write & self.solid & ~drilled
+        self.write[:, column] = digits.write & self.solid & ~drilled & ~turned
         self.mantissa[:, column], self.decimals[:, column] = digits.mantissa, digits.decimals
         return digits.emitted
 
@@ -214,7 +231,7 @@ class JointWriter:
 
     def _replaced(self) -> list[Edits]:
         edits = []
-        for column in range(len(self.order)):
+        for column in range(len(self.names)):
             rows = np.flatnonzero(self.write[:, column] & (self.slot[:, column] >= 0))
             index = self.slot[rows, column]
             edits.append(self._edit(rows, column, self.words.number[index], self.words.end[index], 0, 0))
@@ -223,9 +240,8 @@ class JointWriter:
 
     def _letters(self) -> list[int]:
         """The columns in the order in which inserted words are written."""
-        return sorted(
-            range(len(self.order)), key=lambda column: (*(self.rotary[column],), self.order[column])
-        )
+        axes = sorted(range(len(self.order)), key=lambda column: (self.rotary[column], self.order[column]))
+        return [*axes, *range(len(self.order), len(self.names))]
 
     def _inserted_words(self) -> list[Edits]:
         """Words of axes that a block omits, behind its last coordinate word, in that word's style."""
@@ -242,7 +258,7 @@ class JointWriter:
         for number, column in enumerate(self._letters()):
             for which in distinct(style[missing[rows, column]]).tolist():
                 some = np.flatnonzero(missing[rows, column] & (style == which))
-                prefix = self.prefixes(self.style.separator(which, self.order[column].encode()))
+                prefix = self.prefixes(self.style.separator(which, self.names[column]))
                 edits.append(self._edit(rows[some], column, place[some], place[some], prefix, number + 1))
                 self.tally.inserted_words += len(some)
         return edits
@@ -257,7 +273,7 @@ class JointWriter:
         columns, edits = self._letters(), []
         first = np.argmax(self.write[tails][:, columns], axis=1)
         for number, column in enumerate(columns):
-            letter = self.order[column].encode()
+            letter = self.names[column]
             chosen = np.flatnonzero(self.write[tails, column])
             lead = np.array([self.prefixes(start + letter) for start in starts])[which[chosen]]
             begins = first[chosen] == number

@@ -152,6 +152,7 @@ class AxisState(OffsetState):
             "payload_kg": self.payload_kg,
             "compensation": self.compensation,
             "tip": "fixed" if fixed else self.offsets.tip,
+            "directed": self.offsets.directed,
         }
         key = tuple(stated.values())
         known = self._index.get(key)
@@ -227,13 +228,15 @@ class AxisState(OffsetState):
         return effect
 
     def _switch_tips(self, words: Sequence[Word]) -> None:
-        """Tool centre point control with axis words, which every other code of tool lengths ends."""
+        """Tool centre point control with axis words or directions, which every other code of tool lengths
+        ends."""
         for word in words:
             code = round(word.value * 10) if word.letter == "G" else -1
             if code in self.profile.tip_codes:
                 self.offsets.tip = self.profile.tips
+                self.offsets.directed = code in self.profile.direction_codes
             elif code in LENGTHS:
-                self.offsets.tip = ""
+                self.offsets.tip, self.offsets.directed = "", False
 
     def _check_turned(self, before_deg: float, effect: Effect, line: int) -> None:
         """Refuse what makes a control that turns work offsets lose its position."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Array, Index, Mask, all_in_row
+from olp.core.arrays import Array, Index, Mask, all_in_row, is_in
 from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES
 from olp.core.values import dataclass
@@ -23,6 +23,8 @@ for _i, _letter in enumerate(b"XYZ"):
     _AXIS_OF[_letter] = _i
 #: A B C U V W, and E: axes whose words stay unchanged.
 OTHER = b"ABCUVWE"
+#: Components of the direction of the tool, in straight moves with tool centre point control.
+DIRECTION = b"IJK"
 _ARC_OF = np.full(256, -1, np.int8)
 for _i, _letter in enumerate(b"IJKRP"):
     _ARC_OF[_letter] = _i
@@ -68,10 +70,11 @@ class Blocks:
 
 
 def gather(
-    chunk: WordChunk, motion: npt.NDArray[np.int16], consumed: Mask, other_axes: bytes = OTHER
-) -> Blocks:
+    chunk: WordChunk, motion: npt.NDArray[np.int16], consumed: Mask, other_axes: bytes = OTHER, *,
+    directed: bool = False,
+) -> Blocks:  # fmt: skip
     """Find the motion lines: those with an axis word, or one of `other_axes`, that no other word of the line
-    claims."""
+    claims. With `directed`, a straight move may have the direction of the tool alone."""
     lines = len(chunk.line_start)
     axis = _AXIS_OF[chunk.letter]
     words = np.flatnonzero(axis >= 0)
@@ -84,6 +87,10 @@ def gather(
     if others.size:
         other[chunk.line[others]] = True
         moving |= other
+    if directed:
+        turns = np.flatnonzero(is_in(chunk.letter, list(DIRECTION)))
+        turns = turns[is_in(motion[chunk.line[turns]], (0, 10))]
+        moving[chunk.line[turns]] = True
     in_arc = (motion == 20) | (motion == 30)
     centre_words = np.zeros(0, np.int64)
     if in_arc.any():

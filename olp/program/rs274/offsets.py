@@ -45,7 +45,7 @@ class Offsets:
     """The offsets in force, in mm. `name` is the work offset, `written` are those that the program has
     written, by name, and `turned_deg` their angles about Z. `shift` is that of G92, `saved` its stored value,
     `local` that of G52, `length` that of the tool. `transform` is that of the program. `plane` is a
-    tilted one, below it and the shifts. `tip` is as in `Frame`."""
+    tilted one, below it and the shifts. `tip` and `directed` are as in `Frame`."""
 
     name: str
     written: dict[str, list[float]] = field(default_factory=dict)
@@ -57,6 +57,7 @@ class Offsets:
     transform: Transform | None = None
     plane: Placement | None = None
     tip: Interpolated = ""
+    directed: bool = False
 
     def turn(self, angle_deg: float) -> Turn | None:
         """How words are turned, with a work offset at this angle; None where they are not."""

@@ -172,7 +172,9 @@ class _Reader:
             # for these lines alone, whatever the mode is
             mode = context.arc_distance.copy()
             context.arc_distance[central] = 901
-        self._stretches(context, gather(chunk, context.motion, context.consumed, self.others), beside)
+        directed = self.state.profile.directed
+        blocks = gather(chunk, context.motion, context.consumed, self.others, directed=directed)
+        self._stretches(context, blocks, beside)
         if central.size:
             context.arc_distance[:] = mode
         self.modes.leave(context, last - 1)

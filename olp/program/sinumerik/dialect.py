@@ -86,6 +86,7 @@ DIALECT = Sinumerik(
     lengths_follow_plane=True,
     leads="vector",
     tips_from_zero=True,
+    direction_words=(b"A3=", b"B3=", b"C3="),
     further_turns=b"TURN=",
     absolute_centre=b"AC",
     text=BlockText(),

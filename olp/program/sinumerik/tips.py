@@ -50,6 +50,7 @@ class SwitchTips(Action):
                 code="OLP518",
             )
         offsets.tip = (state.leads or state.profile.tips) if self.on else ""
+        offsets.directed = self.on
         offsets.length = ZERO
         if not self.on:
             Edge(1).run(state, line)

@@ -37,6 +37,8 @@ from olp.program.sinumerik.tips import TIPS, tips_action
 _AXES = "XYZ"
 _OTHER_AXES = frozenset("ABCUVW")
 _CENTRES = "IJK"
+#: Components of the direction of the tool, by the letters that state it in this family.
+_DIRECTIONS = {"A3": b"I", "B3": b"J", "C3": b"K"}
 _COUNTED = re.compile(rb"(AC|IC)[ \t]*\([ \t]*([+-]?(?:\d+\.?\d*|\.\d+))[ \t]*\)", re.IGNORECASE)
 _ROTARY = re.compile(rb"(?:AC|IC|DC|ACP|ACN)[ \t]*\([ \t]*([+-]?(?:\d+\.?\d*|\.\d+))[ \t]*\)", re.IGNORECASE)
 _ADDRESS = re.compile(r"([A-Z])(\d*)")
@@ -271,6 +273,8 @@ class _Line:
             self._write(piece.start, piece.name.encode())
             self._write(turned.start(1), turned[1])
             self.words.closings.append(self.start + turned.end(1))
+        elif self.words.tips and piece.name in _DIRECTIONS:
+            self._word(piece, _DIRECTIONS[piece.name])
         elif piece.form is Form.WORD and piece.name in "NFSABCUVW":
             self._word(piece, piece.name.encode())
         elif address and address[1] in "FSABCUVW" and (not address[2] or address[1] in "UVW"):

@@ -53,6 +53,10 @@ def last_digits(path: JointPath) -> tuple[float, float]:
             linear += [10.0 ** -fewest_decimals(step, u, dialect.inch_decimals) * u for u in units]
         else:
             linear.append(10.0**-places)
+    led = path.directions.led[path.judged]
+    if led.any():
+        rotary = [] if led.all() else rotary
+        rotary.append(float(np.degrees(10.0**-path.directions.decimals)))
     return max(linear, default=0.0), max(rotary, default=0.0)
 
 

@@ -62,7 +62,7 @@ _UNSETTING = (
     | PROBES
     | {WRITE_OFFSET, 101, 281, 301, 310, 331, 760, 870, 880, MACRO, 660}
 )
-_ODD_FRAME = frozenset({70, 71, 121, 160, 434, 510, 511, 680, 682})
+_ODD_FRAME = frozenset({70, 71, 121, 160, 434, 435, 510, 511, 680, 682})
 _EVEN_FRAME = frozenset({80, 130, 131, 150, 490, 500, 501, 690})
 #: Codes whose axis words are no motion, or a motion to another position.
 NO_AXES = HOMES | {DWELL, WRITE_OFFSET, LOCAL_OFFSET, PRESET, MACHINE, MACRO}

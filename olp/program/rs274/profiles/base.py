@@ -107,7 +107,8 @@ class Profile(Dialect):
     - `dwell_words`: the letters that state the time of G4. `dwell_ms`: P counts milliseconds, whatever its
       form.
     - `tip_codes`: codes that switch tool centre point control on, where a machine has rotary axes: words
-      state the tip then, until a code of tool lengths.
+      state the tip then, until a code of tool lengths. Behind `direction_codes`, which are some of them,
+      words state the direction of the tool, and none a rotary axis.
     - `plane_codes`: codes of tilted planes, which are read there, too.
     - `commands`: each line is a command with parameters, and no code holds for the next line. None: lines are
       blocks of words.
@@ -176,6 +177,7 @@ class Profile(Dialect):
     dwell_ms: bool = False
     dwell_words: str = "P"
     tip_codes: frozenset[int] = frozenset()
+    direction_codes: frozenset[int] = frozenset()
     plane_codes: frozenset[int] = frozenset()
     leads: Interpolated = "axes"
     commands: Commands | None = None
@@ -196,6 +198,11 @@ class Profile(Dialect):
     def still_m(self) -> frozenset[int]:
         """The M codes that move no axis, ten times their number."""
         return _in_tenths(self.harmless_m, self.harmless_m_tenths)
+
+    @property
+    def directed(self) -> bool:
+        """Whether words may state the direction of the tool."""
+        return bool(self.tips and self.direction_words)
 
     def unrolls_m(self, code: int) -> bool:
         """Whether the unroller carries out this M code, ten times its number."""
@@ -302,6 +309,7 @@ REFUSALS: Mapping[int, str] = {
     330: "G33 cuts a thread, which a correction would distort",
     331: "G33.1 (rigid tapping) is synchronous with the spindle",
     434: "G43.4 (tool centre point control) needs rotary axes",
+    435: "G43.5 (tool centre point control by directions) needs rotary axes",
     510: "G51 (scaling) is not read",
     511: "G51.1 (mirror image) is not read",
     650: "G65 calls a macro",

@@ -1,0 +1,112 @@
+"""Programs whose words state the direction of the tool, judged by an independent forward."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cases.joint_machines import machine_file, program
+from judge.five_axis import Judge
+
+import olp
+
+#: mm and rad: half a last digit of 0.001 mm, of three words, and of 1e-7 of three components. A tip that is
+#: rounded along the path is beside another direction.
+DIGITS_MM = 0.5e-3 * 3**0.5
+DIGITS_RAD = 0.5e-7 * 3**0.5 + DIGITS_MM / 200.0
+CHAINS = ("C A Y F X Z", "C F X Y Z B", "F X Y Z C B", "F X Y Z C A")
+
+
+#: The words of a direction, by control.
+WORDS = {"fanuc": ("I", "J", "K"), "sinumerik": ("A3=", "B3=", "C3=")}
+
+
+def directed(judge: Judge, text: bytes, control: str) -> bytes:
+    """A program in tool centre point control with directions in place of rotary words."""
+    moves, lines, number = judge.read(text), [], -1
+    for line in text.decode().splitlines():
+        number += bool(re.search(r"[XYZABC]-?[\d.]", line))
+        if number >= 0 and moves[number][1] and re.search(r"[ABC]-?[\d.]", line):
+            towards = judge.forward(np.nan_to_num(moves[number][2])[None], False)[1][0]
+            pairs = zip(WORDS[control], towards, strict=True)
+            stated = "".join(f" {letter}{value:.6f}" for letter, value in pairs)
+            line = re.sub(r"\s*[ABC]-?[\d.]+", "", line) + stated
+        lines.append(line.replace("G43.4", "G43.5"))
+    text = "\n".join(lines).encode() + b"\n"
+    if control == "sinumerik":
+        text = text.replace(b"G21 G90 G54", b"G71 G90 G54\nT1 M6\nD1\nORIVECT")
+        text = re.sub(rb"G43.5 H1 (.*)", rb"TRAORI(1)\nG0 \1", text).replace(b"G49", b"TRAFOOF")
+    return text
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("control", ["fanuc", "sinumerik"])
+@pytest.mark.parametrize("chain", CHAINS)
+def test_directions_are_corrected_as_the_judge_finds(chain: str, control: str, tmp_path: Path) -> None:
+    machine = machine_file(tmp_path, chain, control=control)
+    judge = Judge(machine)
+    nominal = directed(judge, program(chain, seed=3, moves=4, tips=True), control)
+    result = olp.correct_joints(nominal, machine, tolerance_urad=2.0)
+    assert result.report["verdict"]["ok"], result.to_text()
+    distance, angle = judge.judged(nominal, result.data)
+    assert distance <= 1.1e-3 + DIGITS_MM
+    assert angle <= 2.2e-6 + DIGITS_RAD
+
+
+@pytest.mark.parametrize("control", ["fanuc", "sinumerik"])
+def test_without_errors_no_byte_changes(control: str, tmp_path: Path) -> None:
+    machine = machine_file(tmp_path, CHAINS[0], control=control, errors=False)
+    text = directed(Judge(machine), program(CHAINS[0], seed=2, moves=5, tips=True), control)
+    assert olp.correct_joints(text, machine).data == text
+
+
+F_HEAD = b"G21 G90 G54\nG0 X0 Y0 Z0 A-20. C30.\nG43.5 H1 X0 Y0 Z0\n"
+S_HEAD = b"G71 G90 G54\nT1 M6\nD1\nG0 X0 Y0 Z0 A-20 C30\nTRAORI\nG0 X0 Y0 Z0\n"
+
+
+def corrected(folder: Path, text: bytes, control: str) -> olp.JointCorrection:
+    zero = '[kinematics]\ntcp_frame_zero = "axis-zero"\n'
+    machine = machine_file(folder, CHAINS[0], control=control, extra=zero)
+    return olp.correct_joints(text, machine, tolerance_urad=2.0)
+
+
+REFUSED = [
+    ("fanuc", F_HEAD + b"G1 X5. A-10. F100.\n", "where I, J, K state the direction", 4),
+    ("fanuc", F_HEAD + b"G1 X5. I0 J0 K0 F100.\n", "has no length", 4),
+    ("fanuc", F_HEAD + b"G1 X5. I0. J0.5 K1 F100.\n", "decimal point", 4),
+    ("fanuc", F_HEAD + b"G1 I0. I0.1 K1. F100.\n", "twice", 4),
+    ("fanuc", F_HEAD + b"G1 X5. I0.00001 J0. K1. F100.\n", "nearly along the axis of C", 4),
+    ("fanuc", F_HEAD.replace(b"G43.5", b"G43.4") + b"G1 X5. I0. J0. K1. F100.\n", "no mode", 4),
+    ("fanuc", F_HEAD + b"G1 X5. I0. J0. K1. F100.\nI0.3 J-0.2 K0.9\n", "about as far", 5),
+    ("sinumerik", S_HEAD + b"G1 A=5 A3=0 B3=0 C3=1 F100\n", "beside words", 7),
+    ("sinumerik", S_HEAD + b"TRAFOOF\nG1 A3=0 B3=0 C3=1 F100\n", "no mode", 8),
+    ("sinumerik", S_HEAD + b"G1 A3=R1 B3=0 C3=1 F100\n", "--flatten", 7),
+]
+
+
+@pytest.mark.parametrize(("control", "text", "message", "line"), REFUSED)
+def test_what_is_not_known_is_refused_with_its_line(
+    control: str, text: bytes, message: str, line: int, tmp_path: Path
+) -> None:
+    with pytest.raises(olp.ProgramError, match=message) as caught:
+        corrected(tmp_path, text, control)
+    assert caught.value.line == line
+
+
+def test_along_the_outer_axis_it_keeps_its_position(tmp_path: Path) -> None:
+    """There a correction of some urad would turn the table by degrees: it stays, and that is said."""
+    text = F_HEAD + b"G1 X5. I0. J0. K1. F100.\nX9.\nX20. I-0.2 J-0.3 K0.9\nM30\n"
+    result = corrected(tmp_path, text, "fanuc")
+    assert b"I0.0000000 J0.0000000 K1.0000000" in result.data
+    assert [one.code for one in result.findings] == ["OLP106"]
+    assert result.report["verdict"]["ok"]
+
+
+def test_a_direction_holds_until_the_next_one(tmp_path: Path) -> None:
+    """A block without one gets one where the correction needs it, in the order of the letters."""
+    text = F_HEAD + b"G1 X5. I-0.2 J-0.3 K0.9 F100.\nX300. Y200.\nM30\n"
+    lines = [line for line in corrected(tmp_path, text, "fanuc").data.splitlines() if b"I" in line]
+    assert len(lines) > 2
+    assert all(re.search(rb"I-?0\.\d{7} J-?0\.\d{7} K0\.\d{7}", line) for line in lines[1:])
