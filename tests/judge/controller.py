@@ -74,7 +74,8 @@ def require() -> None:
 class Kinematics:
     """A component `name`, compiled in `folder`, and the lines of HAL that go with it; `pins` are sampled
     besides. Its functions `begin` and `end` go around motion-controller. `letters` are those of the joints in
-    their order, `options` those of its loadrt."""
+    their order, `options` those of its loadrt. With `home` all joints turn, and begin there, in deg: letters
+    are those of poses then."""
 
     name: str
     folder: Path
@@ -83,6 +84,7 @@ class Kinematics:
     acceleration_mm_s2: float = ACCELERATION_MM_S2
     letters: str = "XYZ"
     options: str = ""
+    home: tuple[float, ...] = ()
 
 
 def run(
@@ -194,7 +196,10 @@ def _configure(machine: Path, folder: Path, tables: Path | None, kinematics: Kin
     reach |= {"MAX_VELOCITY": SPEED_MM_S, "MAX_ACCELERATION": most}
     home = {"HOME": 0.0, "HOME_OFFSET": 0.0, "HOME_SEARCH_VEL": 0, "HOME_LATCH_VEL": 0, "HOME_SEQUENCE": 0}
     for joint, axis in enumerate(letters):
-        kind = "ANGULAR" if axis in "ABC" else "LINEAR"
+        turns = bool(kinematics and kinematics.home)
+        kind = "ANGULAR" if turns or axis in "ABC" else "LINEAR"
+        if kinematics and turns:
+            home |= dict.fromkeys(("HOME", "HOME_OFFSET"), kinematics.home[joint])
         sections[f"AXIS_{axis}"] = dict(reach)
         sections[f"JOINT_{joint}"] = {"TYPE": kind, "FERROR": 1000, "MIN_FERROR": 1000, **home, **reach}
     if tables is not None:

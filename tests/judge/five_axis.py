@@ -79,11 +79,16 @@ class Judge:
 
     def forward(self, axes: np.ndarray, actual: bool) -> tuple[np.ndarray, np.ndarray]:
         """(n, 3) tips and (n, 3) tool axes at axis values (n, k) in the order of the file."""
+        tips, turns = self.poses(axes, actual)
+        return tips, turns[:, :, 2]
+
+    def poses(self, axes: np.ndarray, actual: bool) -> tuple[np.ndarray, np.ndarray]:
+        """(n, 3) tips and (n, 3, 3) rotations of the tool."""
         whole = np.tile(np.eye(4), (len(axes), 1, 1))
         for name in self.chain:
             if name != "F":
                 whole = whole @ self._joint(name, axes[:, self.order.index(name)], actual)
-        return whole[:, :3, :3] @ self.tool + whole[:, :3, 3], whole[:, :3, 2]
+        return whole[:, :3, :3] @ self.tool + whole[:, :3, 3], whole[:, :3, :3]
 
     def _joint(self, name: str, value: np.ndarray, actual: bool) -> np.ndarray:
         axis: dict[str, Any] = self.file["axes"][name]

@@ -42,9 +42,9 @@ class Code:
     """What is written: the tables of one machine, and the parts of C that read them.
 
     `axes` are their names with their `units`, mm or deg. `shapes` and `engine` are parts by name, around
-    `tables`; `tips` gives axis values by where the tip is, where that is possible. `vectors` is the text of
-    the test vectors, which the part `self_test` reads. `centred` says whether the centre of the payload
-    counts. `linear` and `rotary` are the first bounds.
+    `tables`; `tips` gives axis values by where the tip is, or with `poses` the tool, where that is possible.
+    `vectors` is the text of the test vectors, which the part `self_test` reads. `centred` says whether the
+    centre of the payload counts. `linear` and `rotary` are the first bounds.
     """
 
     machine: str
@@ -56,6 +56,7 @@ class Code:
     tables: tuple[str, ...]
     engine: tuple[str, ...]
     tips: tuple[str, ...]
+    poses: bool
     self_test: str
     vectors: str
     sensors: tuple[Sensor, ...]

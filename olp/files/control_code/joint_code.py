@@ -17,6 +17,8 @@ from olp.kinematics.correction import CorrectedPoses, correct_poses
 from olp.kinematics.errors import Payload
 from olp.kinematics.measures import mobility
 
+#: Letters of axes, as controls of machine tools have them.
+AXIS_LETTERS = frozenset("XYZABCUVW")
 #: Vectors in a file, and states of tool and payload among them.
 COUNT = 2000
 _STATES = 8
@@ -34,6 +36,8 @@ def joint_code(machine: Kinematics, box: Mapping[str, tuple[float, float]], dige
     what it cannot hold."""
     refuse_chain(machine)
     structure = machine.structure
+    # joints whose names are no letters of axes: programs state poses
+    poses = not set(structure.order) <= AXIS_LETTERS
     rows, corrections = joint_vectors(machine, box)
     backlash = {"mm": 0.0, "deg": 0.0}
     for name, errors in machine.errors.joints.items():
@@ -53,7 +57,8 @@ def joint_code(machine: Kinematics, box: Mapping[str, tuple[float, float]], dige
         shapes=("common", "joint_shapes"),
         tables=tuple(joint_tables(machine, box)),
         engine=("joint_engine", "joint_inverse", "follower"),
-        tips=("joint_tips",) if has_tips(machine) else (),
+        tips=("joint_poses",) if poses else ("joint_tips",) if has_tips(machine) else (),
+        poses=poses,
         self_test="joint_test",
         vectors=written(rows),
         sensors=(),

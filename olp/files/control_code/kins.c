@@ -7,6 +7,7 @@ static olp_state olp_now;
 static olp_limits olp_bounds;
 static olp_follower olp_at;
 static double olp_tick_s, olp_offset[3];
+@KEPT@
 static int olp_ready, olp_in_tick, olp_calls, olp_ever_unsolved;
 
 FUNCTION(begin)
@@ -35,7 +36,10 @@ FUNCTION(end)
 {
     double joints[OLP_AXES] = {@JOINTS@};
     /* axes that are moved one by one, or home */
-    if (!olp_calls) olp_led(&olp_at, &olp_now, joints);
+    if (!olp_calls) {
+        olp_led(&olp_at, &olp_now, joints);
+@LED@
+    }
     olp_in_tick = 0;
     olp_ready = 1;
 @SHOWN@
@@ -56,8 +60,6 @@ int kinematicsForward(const double *joint, EmcPose *world, const KINEMATICS_FORW
     int j;
     for (j = 0; j < OLP_AXES; j++) wanted[j] = joint[j];
     if (olp_ready) olp_forward(&olp_at, &olp_now, joint, wanted);
-@TO_TIP@
-    memset(world, 0, sizeof *world);
 @TO_WORLD@
     (void)fflags;
     (void)iflags;
@@ -67,13 +69,14 @@ int kinematicsForward(const double *joint, EmcPose *world, const KINEMATICS_FORW
 int kinematicsInverse(const EmcPose *world, double *joint, const KINEMATICS_INVERSE_FLAGS *iflags,
                       KINEMATICS_FORWARD_FLAGS *fflags)
 {
-    double wanted[OLP_AXES] = {@OF_WORLD@}, command[OLP_AXES];
+    double wanted[OLP_AXES], command[OLP_AXES];
     int j;
-@OF_TIP@
+@OF_WORLD@
     for (j = 0; j < OLP_AXES; j++) command[j] = wanted[j];
     if (olp_ready && olp_in_tick) {
         olp_follow(&olp_at, &olp_bounds, &olp_now, wanted, olp_tick_s, command);
         olp_calls++;
+@MOVED@
     } else if (olp_ready) {
         olp_follower ahead = olp_at;
         olp_bounded(&ahead, &olp_bounds, &olp_now, wanted, 0.0, command);

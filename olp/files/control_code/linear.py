@@ -60,6 +60,7 @@ def linear_code(calibration: Calibration, chain: str, digest: str) -> Code:
         tables=tuple(linear_tables(kept)),
         engine=("engine", "follower"),
         tips=(),
+        poses=False,
         self_test="self_test",
         vectors=written(rows),
         sensors=kept.sensors,

@@ -53,12 +53,6 @@ def _write(code: Code, target: Path) -> Mapping[Path, bytes]:
             "letters, digits and _",
             file=str(target),
         )
-    strange = [axis for axis in code.axes if axis not in _FIELDS]
-    if strange:
-        raise ConfigError(
-            f"axes {', '.join(strange)} are none of the letters {' '.join(_FIELDS)} that LinuxCNC moves; "
-            "export the format c, and call it behind the kinematics of the control"
-        )
     pins = _temperature_pins(name, code.sensors)
     return {
         target: _component(code, name, pins).encode("ascii"),
@@ -120,7 +114,7 @@ def _component(code: Code, name: str, temperatures: Sequence[str]) -> str:
     head = [
         f'component {name} "kinematics with the calibration {digest[: source.HASH_DIGITS]}";',
         *(f'pin {pin} "{says}";' for pin, says in _pins(code, temperatures)),
-        *([f'modparam int tip = 0 "{tip}";'] if code.tips else []),
+        *([f'modparam int tip = 0 "{tip}";'] if code.tips and not code.poses else []),
         'function begin fp "right before motion-controller";',
         'function end fp "right behind motion-controller";',
         "option singleton yes;",
@@ -146,14 +140,7 @@ def _kins(code: Code, temperatures: Sequence[str]) -> str:
     if code.centred:
         state += [f"olp_now.payload_centre_mm[{k}] = payload_{a};" for k, a in enumerate("xyz")]
     bounds = ["olp_bounds.most_deg = most_turn;", "olp_bounds.rate_deg_s = most_turn_rate;"]
-    to_tip = ["if (tip) {", "    olp_tip_of_axes(wanted, &olp_now, wanted);"]
-    of_tip = ["if (tip) {"]
-    for k, axis in enumerate(AXES):
-        if axis in code.axes:
-            place = code.axes.index(axis)
-            to_tip.append(f"    wanted[{place}] += olp_offset[{k}];")
-            of_tip.append(f"    wanted[{place}] -= olp_offset[{k}];")
-    of_tip.append("    olp_axes_of_tip(wanted, &olp_now, wanted);")
+    world = _poses() if code.poses else _axes(code)
     filled = {
         "STATE": state,
         "BOUNDS": bounds if "deg" in code.units else [],
@@ -165,15 +152,76 @@ def _kins(code: Code, temperatures: Sequence[str]) -> str:
                 f"play_{axis.lower()} = olp_at.play[{j}];",
             )
         ],
-        "TO_TIP": [*to_tip, "}"] if code.tips else [],
-        "OF_TIP": [*of_tip, "}"] if code.tips else [],
-        "TO_WORLD": [f"world->{_FIELDS[axis]} = wanted[{j}];" for j, axis in axes],
+        **world,
     }
     text = source.part("kins")
     for key, lines in filled.items():
         text = text.replace(f"@{key}@\n", "".join(f"    {line}\n" for line in lines))
-    text = text.replace("@JOINTS@", ", ".join(f"joint_{j}" for j, _ in axes))
-    return text.replace("@OF_WORLD@", ", ".join(f"world->{_FIELDS[axis]}" for _, axis in axes))
+    return text.replace("@JOINTS@", ", ".join(f"joint_{j}" for j, _ in axes))
+
+
+def _axes(code: Code) -> dict[str, list[str]]:
+    """Programs state axis values, or by the option `tip` the tip."""
+    to_tip = ["if (tip) {", "    olp_tip_of_axes(wanted, &olp_now, wanted);"]
+    of_tip = ["if (tip) {"]
+    for k, axis in enumerate(AXES):
+        if axis in code.axes:
+            place = code.axes.index(axis)
+            to_tip.append(f"    wanted[{place}] += olp_offset[{k}];")
+            of_tip.append(f"    wanted[{place}] -= olp_offset[{k}];")
+    of_tip.append("    olp_axes_of_tip(wanted, &olp_now, wanted);")
+    fields = [(j, _FIELDS[axis]) for j, axis in enumerate(code.axes)]
+    return {
+        "KEPT": [],
+        "LED": [],
+        "TO_WORLD": [
+            *([*to_tip, "}"] if code.tips else []),
+            "memset(world, 0, sizeof *world);",
+            *(f"world->{field} = wanted[{j}];" for j, field in fields),
+        ],
+        "OF_WORLD": [
+            *(f"wanted[{j}] = world->{field};" for j, field in fields),
+            *([*of_tip, "}"] if code.tips else []),
+        ],
+        "MOVED": [],
+    }
+
+
+def _poses() -> dict[str, list[str]]:
+    """Programs state where the tool is: X, Y and Z of its tip, and its turn as A, B and C. The joints go on
+    from where they were."""
+    fields = list(enumerate(("tran.x", "tran.y", "tran.z", "a", "b", "c")))
+    offset = [f" + olp_offset[{k}]" for k in range(3)] + [""] * 3
+    stated = ", ".join(f"world->{field}{offset[k].replace('+', '-')}" for k, field in fields)
+    copy = "for (j = 0; j < OLP_AXES; j++)"
+    return {
+        "KEPT": ["static double olp_last[OLP_AXES];"],
+        "LED": [
+            "{",
+            "    int j;",
+            f"    {copy} olp_last[j] = olp_at.command[j] - olp_at.correction[j];",
+            "}",
+        ],
+        "TO_WORLD": [
+            "{",
+            "    double pose[6];",
+            "    olp_pose_of_axes(wanted, &olp_now, pose);",
+            "    memset(world, 0, sizeof *world);",
+            *(f"    world->{field} = pose[{k}]{offset[k]};" for k, field in fields),
+            "}",
+        ],
+        "OF_WORLD": [
+            "{",
+            f"    double pose[6] = {{{stated}}};",
+            f"    {copy} wanted[j] = olp_last[j];",
+            "    if (!olp_axes_of_pose(pose, &olp_now, wanted)) {",
+            "        if (olp_in_tick) olp_ever_unsolved = 1;",
+            f"        {copy} wanted[j] = olp_last[j];",
+            "    }",
+            "}",
+        ],
+        "MOVED": [f"{copy} olp_last[j] = wanted[j];"],
+    }
 
 
 def _hal(name: str, code: Code, temperatures: Sequence[str]) -> str:
@@ -182,7 +230,7 @@ def _hal(name: str, code: Code, temperatures: Sequence[str]) -> str:
         f"# [KINS]KINEMATICS = {name}; in place of the line of trivkins, before motmod:",
         f"#   loadrt {name}",
     ]
-    if code.tips:
+    if code.tips and not code.poses:
         lines.append(f"#   or loadrt {name} tip=1, where programs state the tip of the tool")
     lines += [
         "# The order of the functions decides:",
@@ -214,7 +262,7 @@ def _ini(name: str, code: Code) -> str:
         f"KINEMATICS = {name}",
         f"JOINTS = {len(code.axes)}",
         "[TRAJ]",
-        "COORDINATES = " + " ".join(code.axes),
+        "COORDINATES = " + " ".join("XYZABC" if code.poses else code.axes),
         "LINEAR_UNITS = mm",
     ]
     if "deg" in code.units:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from kinematics.cases import golden, random_values
+from scipy.spatial.transform import Rotation
 
 import olp
 from olp.cli import main
@@ -48,6 +49,17 @@ void errors(int n, const double *value, const double *side, const olp_state *sta
         olp_error(value + i * OLP_AXES, &now, error + 6 * i);
     }
 }
+#ifdef OLP_POSES
+void poses(int n, const double *near, const double *value, const olp_state *state, double *pose,
+           double *again)
+{
+    for (int i = 0; i < n; i++) {
+        olp_pose_of_axes(value + i * OLP_AXES, state, pose + 6 * i);
+        for (int k = 0; k < OLP_AXES; k++) again[i * OLP_AXES + k] = near[i * OLP_AXES + k];
+        if (!olp_axes_of_pose(pose + 6 * i, state, again + i * OLP_AXES)) again[i * OLP_AXES] = NAN;
+    }
+}
+#endif
 int follow(int n, const double *wanted, const olp_state *state, const olp_limits *limits, double *command)
 {
     olp_follower at;
@@ -228,6 +240,29 @@ def test_near_a_singular_posture_nothing_jumps(tmp_path: Path) -> None:
     assert far.any() and np.abs(command - correct_poses(machine, values).values)[far].max() <= 1e-6
 
 
+def test_a_pose_leads_to_the_joints_near_by(tmp_path: Path) -> None:
+    """Programs of an arm state poses; the control goes on from where the joints are."""
+    machine, box = case("arm_6r_kr6")
+    values = random_values(golden("arm_6r_kr6")[0], 400, seed=5)
+    values = np.ascontiguousarray(values[mobility(machine, values).smallest > 0.1])
+    code = Compiled(machine, box, tmp_path)
+    near = values + np.random.default_rng(1).uniform(-1.0, 1.0, values.shape)
+    pose, again = np.empty((len(values), 6)), np.empty(values.shape)
+    code.library.poses(
+        len(values),
+        _doubles(near),
+        _doubles(values),
+        ctypes.byref(code.state),
+        _doubles(pose),
+        _doubles(again),
+    )
+    assert len(values) > 100 and np.abs(again - values).max() < 1e-7
+    nominal = machine.nominal(values)
+    assert np.abs(pose[:, :3] - nominal.position).max() < 1e-9
+    wanted = Rotation.from_euler("xyz", pose[:, 3:], degrees=True).as_matrix()
+    assert np.abs(wanted - nominal.rotation).max() < 1e-11
+
+
 def test_outside_of_the_box_the_face_holds(tmp_path: Path) -> None:
     machine, box = case("xyzac_trunnion")
     small = {name: (0.5 * low, 0.5 * high) for name, (low, high) in box.items()}
@@ -265,8 +300,6 @@ def test_what_is_no_chain_or_leaves_a_choice_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=f"{re.escape(str(platform))}: P: .* no platforms on legs"):
         olp.export_table(platform, "c", tmp_path / "m.c")
     folder = golden_folder("arm_6r_kr6")
-    with pytest.raises(ConfigError, match="export the format c"):
-        olp.export_table(folder / "machine.toml", "linuxcnc-kins", tmp_path / "armkins.comp")
     with pytest.raises(UsageError, match="expected --format c or linuxcnc-kins"):
         olp.export_table(folder / "machine.toml", "linuxcnc", tmp_path / "x.comp")
     with pytest.raises(UsageError, match="expected --format c or linuxcnc-kins"):
