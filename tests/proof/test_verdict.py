@@ -23,9 +23,18 @@ from olp.proof.proof import Counts
 from olp.workflows.session import Session
 
 ROOT = Path(__file__).resolve().parents[2] / "programs"
-#: Shipped jobs by their job file, on machines with three linear axes.
+#: Shipped jobs by their job file, on machines with three linear axes: the shortest of each machine.
 JOBS = sorted(
-    path for path in ROOT.glob("*/job*.toml") if path.parent.name not in ("dmis-housing", *JOINT_JOBS)
+    path
+    for path in ROOT.glob("*/job*.toml")
+    if path.parent.name not in ("dmis-housing", *JOINT_JOBS)
+    and f"{path.parent.name}/{path.name}"
+    not in (
+        "gantry-plate/job.toml",
+        "haas-mill/job-manifold.toml",
+        "table-router/job.toml",
+        "table-router/job-outline.toml",
+    )
 )
 #: The same without backlash.
 STIFF = Recipe(work_offsets={"G54": {"Z_mm": -100.0, "set_by": "true"}})
@@ -108,7 +117,7 @@ def test_every_consumer_says_the_same_of_every_shipped_job(job: Path, tmp_path: 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(5))
 def test_every_consumer_says_the_same_of_random_jobs(seed: int, tmp_path: Path) -> None:
     features = ("lines", "short", "arcs", "helix", "circle", "incremental", "cycles", "rapid", "tools")
     text = random_program(seed, features=features, blocks=8)

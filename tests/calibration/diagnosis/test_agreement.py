@@ -20,11 +20,11 @@ from olp.workflows.calibrate_fit import fit_calibration
 
 #: file, factor on its values, part of the words that name the mistake, and machines whose readings tell it
 PLANTED = (
-    ("ezz.csv", -1.0, "sign", (103, 107, 109)),
-    ("eyx.csv", 0.5, "half of what", (103, 107, 109)),
-    ("exz.csv", 2.0, "twice what", (103, 107, 109)),
-    ("exx.csv", 1 / 25.4, "thousandths of an inch, taken as 0.001 mm", (103, 107, 109)),
-    ("ebx.csv", -1.0, "sign", (103, 109)),
+    ("ezz.csv", -1.0, "sign", (103, 107)),
+    ("eyx.csv", 0.5, "half of what", (107, 109)),
+    ("exz.csv", 2.0, "twice what", (103, 109)),
+    ("exx.csv", 1 / 25.4, "thousandths of an inch, taken as 0.001 mm", (103, 107)),
+    ("ebx.csv", -1.0, "sign", (109,)),
     ("ecx.csv", 4.8481368, "urad, taken as arcsec", (107,)),
 )
 CASES = [(seed, *planted[:3]) for planted in PLANTED for seed in planted[3]]
