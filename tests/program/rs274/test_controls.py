@@ -235,7 +235,8 @@ OF_TIME = {
 }  # fmt: skip
 #: Tables and texts, which have tests of their own.
 TABLES = {"codes", "refusals", "harmless_m", "text", "rules", "cycles", "contours", "language",
-          "written_ending", "program_number", "tip_codes", "plane_codes"}  # fmt: skip
+          "written_ending", "program_number", "tip_codes", "direction_codes", "plane_codes",
+          "touch_log"}  # fmt: skip
 #: What controls with statements of their own do, which `tests/program/sinumerik` reads.
 OF_STATEMENTS = {"translator", "machine_moves_keep_length", "increments_take_offsets", "lengths_follow_plane",
                  "further_turns", "absolute_centre", "metric", "cleared", "dwell"}  # fmt: skip
@@ -388,7 +389,7 @@ def test_m_codes_that_move_no_axis(control: str) -> None:
 
 _MILLING = "G0-G3 G38.2-G38.5 G80"
 _DRILLING = "G73 G74 G81-G86 G89"
-_FAMILY_REFUSED = "G5.2 G5.3 G6 G7 G7.1 G10.1 G12 G12.1 G13 G16 G31 G43.4 G65 G66 G68.2"
+_FAMILY_REFUSED = "G5.2 G5.3 G6 G7 G7.1 G10.1 G12 G12.1 G13 G16 G31 G43.4 G43.5 G65 G66 G68.2"
 _TRANSFORMS = "G51 G51.1 G68"
 _REFUSED = f"G5 {_FAMILY_REFUSED} G28.1 G30.1 G33 G33.1 G88"
 _BORES = "G76 G87"
