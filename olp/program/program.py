@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Index, Mask
+from olp.core.arrays import Array, Index, Mask
 from olp.core.toolpath import Toolpath
 from olp.core.values import dataclass
 from olp.program.dialect import Dialect
@@ -232,6 +232,15 @@ class Statements:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Towards:
+    """Directions of the tool in the workpiece that statements of points state: of each move (n, 3) the `slot`
+    of its numbers or -1, and the direction as `stated`, NaN where there is none."""
+
+    slot: Small
+    stated: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Program:
     """A program as read.
 
@@ -244,7 +253,8 @@ class Program:
 
     Along contours under cutter compensation `toolpath` is that of the tool. `programmed` is then the program
     with the contour in its place, and (n,) `blocks` the move of it that each move belongs to. `targets` are
-    those of a program of a robot, which several moves may use.
+    those of a program of a robot, which several moves may use. `towards` are directions of the tool, where
+    rotary axes turn it.
     """
 
     content: bytes | Callable[[], bytes]
@@ -271,6 +281,7 @@ class Program:
     programmed: Program | None = None
     blocks: Index | None = None
     targets: Targets | None = None
+    towards: Towards | None = None
 
     @property
     def data(self) -> bytes:

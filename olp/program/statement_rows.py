@@ -13,7 +13,16 @@ from olp.core.toolpath import Flag, Frame, Kind
 from olp.core.values import dataclass
 from olp.program.dialect import Dialect
 from olp.program.path_columns import PathColumns
-from olp.program.program import ArcSlots, ArcText, ChordText, Program, StatedFeeds, Statements, Words
+from olp.program.program import (
+    ArcSlots,
+    ArcText,
+    ChordText,
+    Program,
+    StatedFeeds,
+    Statements,
+    Towards,
+    Words,
+)
 from olp.program.text.columns import Packed
 from olp.program.text.statements import Chunk, Field, Statement, is_cards
 
@@ -47,8 +56,8 @@ class Points:
     """The points of a chunk in order.
 
     (m,) `line` from 1, `begin` and `end` of their statements, `incremental` and `form`. (m, 3) `slot` word or
-    -1, `value` as written, `direction` (NaN where none is stated). Those of another form than 0 have their
-    numbers in `value` and `direction`."""
+    -1, `value` as written, `direction` (NaN where none is stated) and `aim`, its words or -1. Those of
+    another form than 0 have their numbers in `value` and `direction`."""
 
     line: Index
     begin: Index
@@ -58,9 +67,14 @@ class Points:
     direction: Array
     incremental: Mask
     form: Index
+    aim: Index
 
     def __len__(self) -> int:
         return len(self.line)
+
+
+#: A point that was read singly: its words, its numbers, its direction, and the words of that.
+Lone = tuple[Point, tuple[int, ...], Array, Array, tuple[int, ...]]
 
 
 class StatementCollector(PathColumns):
@@ -78,6 +92,7 @@ class StatementCollector(PathColumns):
         self.restated: dict[int, bool] = {}
         self.chords: list[ChordText] = []
         self.remarks: dict[str, tuple[int, str]] = {}
+        self._towards: list[tuple[int, Array, Index]] = []
         self._feeds: list[tuple[int, float, int, int]] = [(0, float("nan"), 0, -1)]
         self.pauses: list[tuple[int, float]] = []
 
@@ -116,10 +131,11 @@ class StatementCollector(PathColumns):
             direction=direction,
             incremental=np.zeros(len(slot), bool),
             form=np.zeros(len(slot), np.int64),
+            aim=np.where(wide[:, None], slot + self._base + 3, -1),
         )
         return _merged(points, [self._alone(p) for p in alone]) if alone else points
 
-    def _alone(self, point: Point) -> tuple[Point, tuple[int, ...], Array, Array]:
+    def _alone(self, point: Point) -> Lone:
         if point.form:
             return self._of_another_form(point)
         slot = tuple(self.word(f) for f in point.fields)
@@ -127,16 +143,16 @@ class StatementCollector(PathColumns):
         if len(slot) == 1:
             slot, value = (-1, -1, slot[0]), np.array([0.0, 0.0, value[0]])
         direction = np.array([_value(f) for f in point.direction] or [np.nan] * 3)
-        return point, slot, value, direction
+        return point, slot, value, direction, tuple(self.word(f) for f in point.direction) or _NONE
 
-    def _of_another_form(self, point: Point) -> tuple[Point, tuple[int, ...], Array, Array]:
+    def _of_another_form(self, point: Point) -> Lone:
         """Three words without a number, and the numbers of the statement."""
         decimals = max((f.number[1] for f in point.fields if f.number is not None), default=0)
         slot = tuple(self._put_word(0, decimals, f.start, f.end) for f in point.fields)
         if slot[0] >= 0:
             self.broken[slot[0]] = self.broken.get(slot[0], b"") + point.lead
         values = np.array((*point.values, *[np.nan] * 6)[:6])
-        return point, slot, values[:3], values[3:]
+        return point, slot, values[:3], values[3:], _NONE
 
     def word(self, field: Field) -> int:
         """Add a word for a number; returns its index."""
@@ -190,6 +206,10 @@ class StatementCollector(PathColumns):
         if self.keep_words:
             self.columns.put("begin_byte", begin, np.int32)
             self.columns.put("end_byte", end, np.int32)
+
+    def put_directions(self, stated: Array, slot: Index) -> None:
+        """Directions (m, 3) of the tool in the next moves, NaN where a move states none, and their words."""
+        self._towards.append((self.moves, stated, slot))
 
     def put_lone(
         self,
@@ -248,7 +268,17 @@ class StatementCollector(PathColumns):
             remarks=tuple((name, line, text) for name, (line, text) in self.remarks.items()),
             end_line=end_line,
             statements=statements,
+            towards=self._directions(len(path)),
         )
+
+    def _directions(self, count: int) -> Towards | None:
+        if not self._towards:
+            return None
+        towards = Towards(np.full((count, 3), -1, np.int32), np.full((count, 3), np.nan))
+        for first, stated, slot in self._towards:
+            towards.stated[first : first + len(stated)] = stated
+            towards.slot[first : first + len(slot)] = slot if self.keep_words else -1
+        return towards
 
     def _feed(self, kind: npt.NDArray[np.uint8], flag: npt.NDArray[np.uint8]) -> Array:
         move, value, *_ = (np.array(column) for column in zip(*self._feeds, strict=True))
@@ -280,17 +310,18 @@ def _value(field: Field) -> float:
     return pair[0] / 10.0 ** pair[1]
 
 
-def _merged(points: Points, alone: Sequence[tuple[Point, tuple[int, ...], Array, Array]]) -> Points:
+def _merged(points: Points, alone: Sequence[Lone]) -> Points:
     """Points read in columns and points read singly, in the order of their lines."""
     more = Points(
         line=np.array([p.line for p, *_ in alone], np.int64),
         begin=np.array([p.begin for p, *_ in alone], np.int64),
         end=np.array([p.end for p, *_ in alone], np.int64),
-        slot=np.array([s for _, s, _, _ in alone], np.int64),
-        value=np.array([v for _, _, v, _ in alone]),
-        direction=np.array([d for *_, d in alone]),
+        slot=np.array([slot for _, slot, *_ in alone], np.int64),
+        value=np.array([value for _, _, value, *_ in alone]),
+        direction=np.array([direction for *_, direction, _ in alone]),
         incremental=np.array([p.incremental for p, *_ in alone]),
         form=np.array([p.form for p, *_ in alone], np.int64),
+        aim=np.array([aim for *_, aim in alone], np.int64),
     )
     order = np.argsort(np.concatenate((points.line, more.line)), kind="stable")
     columns = (

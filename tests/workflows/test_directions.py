@@ -55,6 +55,92 @@ def test_directions_are_corrected_as_the_judge_finds(chain: str, control: str, t
     assert angle <= 2.2e-6 + DIGITS_RAD
 
 
+#: Job files with the rotary positions at the start of cutter-location data, on machines with B and with A.
+STARTS = (
+    'schema = "olp-job-1"\nstart_deg = { B = 15.0, C = 30.0 }\n',
+    'schema = "olp-job-1"\nstart_deg = { A = -20.0, C = 30.0 }\n',
+)
+
+
+def points(judge: Judge, chain: str, seed: int, moves: int = 4) -> bytes:
+    """The moves with directions as cutter-location data; one point has the direction of the one before."""
+    lines, count = ["PARTNO/FIVE AXES", "UNITS/MM", "MULTAX/ON", "LOADTL/1", "RAPID"], 0
+    for cuts, tips, place in judge.read(program(chain, seed=seed, moves=moves, tips=True)):
+        if not tips:
+            continue
+        towards = judge.forward(np.nan_to_num(place)[None], False)[1][0]
+        numbers = [f"{place[judge.order.index(name)]:.4f}" for name in "XYZ"]
+        numbers += [f"{value:.7f}" for value in towards] if count != 2 else []
+        lines += ["FEDRAT/500.,MMPM"] if cuts and count == 1 else []
+        lines.append("GOTO/" + ",".join(numbers))
+        count += 1
+    return ("\n".join([*lines, "FINI"]) + "\n").encode()
+
+
+def as_blocks(text: bytes) -> bytes:
+    """Points as blocks that the judge reads, and where the rotary axes are at the start."""
+    lines, rapid = ["G0 X0. Y0. Z0. A-20. B15. C30.", "G43.5"], False
+    for line in text.decode().splitlines():
+        if line.startswith("GOTO/"):
+            numbers = line[5:].split(",")
+            words = " ".join(f"{letter}{number}" for letter, number in zip("XYZIJK", numbers, strict=False))
+            lines.append(f"G{0 if rapid else 1} {words}")
+        rapid = line == "RAPID"
+    return "\n".join(lines).encode()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("chain", CHAINS)
+def test_points_with_directions_are_corrected_as_the_judge_finds(chain: str, tmp_path: Path) -> None:
+    machine, job = machine_file(tmp_path, chain, control="fanuc"), tmp_path / "job.toml"
+    job.write_text(STARTS["A" in chain])
+    judge = Judge(machine)
+    nominal = points(judge, chain, seed=3)
+    result = olp.correct_joints(nominal, machine, job, tolerance_urad=2.0)
+    assert result.report["verdict"]["ok"], result.to_text()
+    judge.vector = True
+    distance, angle = judge.judged(as_blocks(nominal), as_blocks(result.data))
+    assert distance <= 1.1e-3 + DIGITS_MM
+    assert angle <= 2.2e-6 + DIGITS_RAD
+
+
+def test_points_keep_their_form(tmp_path: Path) -> None:
+    """Without errors no byte changes; with them a point that goes on in the next line still does, and one
+    behind TLAXIS states its direction."""
+    text = b"UNITS/MM\nLOADTL/1\nTLAXIS/-0.2,-0.3,0.9327379\nGOTO/1.,2.,3.\nMULTAX/ON\nFEDRAT/500.,MMPM\n"
+    text += b"GOTO/20.,2.,3.,$\n -0.25,-0.3,0.9205977\nGOTO/25.,2.,3.\nFINI\n"
+    job = tmp_path / "job.toml"
+    job.write_text(STARTS[1])
+    exact = machine_file(tmp_path / "exact", CHAINS[0], errors=False)
+    assert olp.correct_joints(text, exact, job).data == text
+    result = olp.correct_joints(text, machine_file(tmp_path / "m", CHAINS[0]), job, tolerance_urad=2.0)
+    assert result.report["verdict"]["ok"]
+    numbers = [line.count(b",") for line in result.data.splitlines() if line.startswith(b"GOTO/")]
+    assert numbers[0] == 5 and 3 in numbers and b",$\n" in result.data
+    again = olp.verify_joints(text, result.data, exact.parents[1] / "m" / "machine.toml", job)
+    assert again.report["verdict"]["ok"]
+
+
+POINTS = b"UNITS/MM\nLOADTL/1\nGOTO/1.,2.,3.,-0.2,-0.3,0.9327379\n"
+NO_POINTS = [
+    (POINTS + b"CYCLE/DRILL,DEPTH,5.,MMPM,100.,CLEAR,2.\nGOTO/5.,2.,3.\nFINI\n", "a CYCLE", 5, True),
+    (POINTS + b"CIRCLE/0.,0.,3.,0.,0.,1.,5.\nGOTO/5.,2.,3.\nFINI\n", "an arc", 5, True),
+    (POINTS + b"GODLTA/1.,0.,0.\nFINI\n", "a distance", 4, True),
+    (POINTS + b"FINI\n", "start_deg", 3, False),
+]
+
+
+@pytest.mark.parametrize(("text", "message", "line", "started"), NO_POINTS)
+def test_points_that_are_not_corrected_are_refused(
+    text: bytes, message: str, line: int, started: bool, tmp_path: Path
+) -> None:
+    job = tmp_path / "job.toml"
+    job.write_text(STARTS[1] if started else STARTS[1].splitlines()[0])
+    with pytest.raises(olp.ProgramError, match=message) as caught:
+        olp.correct_joints(text, machine_file(tmp_path, CHAINS[0]), job)
+    assert caught.value.line == line
+
+
 @pytest.mark.parametrize("control", ["fanuc", "sinumerik"])
 def test_without_errors_no_byte_changes(control: str, tmp_path: Path) -> None:
     machine = machine_file(tmp_path, CHAINS[0], control=control, errors=False)

@@ -20,7 +20,7 @@ from olp.core.turns import turned
 from olp.core.values import dataclass
 from olp.kinematics.directions import along_outer, branches, pair_of
 from olp.kinematics.structure import Joint, Structure
-from olp.program.program import Program
+from olp.program.program import Program, Towards
 from olp.program.rs274.motion import DIRECTION
 from olp.program.rs274.profiles.base import Profile
 from olp.program.rs274.rotary import RotaryWords
@@ -56,7 +56,7 @@ class Directions:
 
     @property
     def stated(self) -> Mask:
-        return np.asarray((self.slot >= 0).any(axis=1), bool)
+        return np.isfinite(self.unit[:, 0])
 
     @staticmethod
     def none(count: int) -> Directions:
@@ -68,6 +68,8 @@ class Directions:
         """The directions of a program that was read with its words. Raises ProgramError for words that state
         none, and beside those of rotary axes."""
         path, dialect = program.toolpath, program.dialect
+        if program.towards is not None:
+            return Directions._of_points(program, program.towards)
         if not isinstance(dialect, Profile) or not dialect.directed or not len(path):
             return Directions.none(len(path))
         slot = _slots(program)
@@ -87,11 +89,15 @@ class Directions:
             if wrong.any():
                 raise ProgramError(why, line=int(path.line[np.argmax(wrong)]), code="OLP565")
         led = _last(stated, given | ~allowed) | (allowed & always)
-        words = program.words
-        assert words is not None
-        used = slot[slot >= 0]
-        decimals = max(_DECIMALS, int(words.decimals[used].max(initial=0)))
-        return Directions(slot, _units(program, slot, stated), led & allowed, decimals)
+        return Directions(slot, _units(program, slot, stated), led & allowed, _decimals(program, slot))
+
+    @staticmethod
+    def _of_points(program: Program, towards: Towards) -> Directions:
+        """Those of statements, each of which has a direction or that of the one before."""
+        size = np.linalg.norm(towards.stated, axis=1)
+        led = np.logical_or.accumulate(np.isfinite(size))
+        unit = towards.stated / size[:, None]
+        return Directions(towards.slot, unit, led, _decimals(program, towards.slot))
 
     def positions(
         self, program: Program, structure: Structure, letters: Sequence[str], rotary: RotaryWords,
@@ -131,8 +137,9 @@ class Directions:
         return led & (along_outer(structure, towards) < _POLE) if led.any() else led
 
     def widened(self, motion: Motion, near: Array, axes: Array) -> Array:
-        """(n, axes) `near` (axes,), by how much axis values may be off because of digits, where directions
-        lead to `axes` (n, axes): the outer one is off by more the nearer the tool is to it."""
+        """(n, axes) by how much axis values may be off because of digits: `near` (axes,) where words state
+        them. Where directions lead to `axes` (n, axes), the outer one is off by more the nearer the tool is to
+        it."""
         wide = np.broadcast_to(near, axes.shape).copy()
         rows = np.flatnonzero(self.led & np.isfinite(axes).all(axis=1))
         if rows.size:
@@ -168,6 +175,13 @@ def refuse_near(structure: Structure, towards: Array, line: npt.NDArray[np.int32
             code="OLP566",
         )
     return np.asarray(sine <= _ALONG, bool)
+
+
+def _decimals(program: Program, slot: npt.NDArray[np.int32]) -> int:
+    """Those of the finest component, and at least as many as the tool needs."""
+    words = program.words
+    assert words is not None
+    return max(_DECIMALS, int(words.decimals[slot[slot >= 0]].max(initial=0)))
 
 
 def _shown(dialect: Profile) -> list[str]:

@@ -115,7 +115,9 @@ class JointPath:
         path, holes = program.toolpath, Drilled.of(program)
         order = structure.order
         letters = [name for name in order if structure.joints[name].kind == "rotary"]
-        rotary = RotaryWords.of(program, letters, machine)
+        rotary = RotaryWords.none(len(path), len(letters))
+        if program.in_blocks:
+            rotary = RotaryWords.of(program, letters, machine)
         turns = [
             [rotated.get(frame.work_offset, {}).get(letter, 0.0) for letter in letters]
             for frame in path.frames

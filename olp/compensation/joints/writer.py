@@ -67,13 +67,16 @@ class JointWriter:
         self.solid = np.asarray(np.isfinite(plan.command).all(axis=1), bool)
         # columns of axes, and behind them those of the components of directions
         self.led = path.directions.led[plan.move]
-        names = program.dialect.direction_words if self.led.any() else ()
+        names = self._direction_words() if self.led.any() else ()
         self.names = [*(name.encode() for name in self.order), *names]
         shape = (len(plan.move), len(self.names))
         self.write, self.mantissa = np.zeros(shape, bool), np.zeros(shape, np.int64)
         self.decimals = np.zeros(shape, np.int8)
         slot = np.hstack((path.slot, path.directions.slot))[:, : len(self.names)]
         self.slot = np.where(self.head[:, None], slot[plan.move], -1)
+
+    def _direction_words(self) -> tuple[bytes, ...]:
+        return self.program.dialect.direction_words
 
     def written(self) -> WrittenJoints:
         command = self.plan.command.copy()
@@ -145,7 +148,7 @@ class JointWriter:
             linear[:, 2] = np.where(drilled, (nominal[:, 2] + lift)[plan.move], linear[:, 2])
             command[:, columns] = linear
         for column in columns:
-            self._round(column, command[:, column], drilled)
+            command[:, column] = self._round(column, command[:, column], drilled)
         return made.done()
 
     # -- digits ------------------------------------------------------------------------------------

@@ -22,13 +22,15 @@ class Placing:
     reader defines, turns the points before a statement into positions."""
 
     def __init__(self, setup: Setup, collector: StatementCollector) -> None:
-        self.setup, self.collector = setup, collector
+        self.setup, self.collector, self.tips = setup, collector, collector.dialect.tips
         self.table = FrameTable(setup)
         self.unit_mm, self.unit_stated = 1.0, False
         self.tool = setup.machine.default_tool
         self.length_active = setup.machine.length_active
         self.axis: Vector = UP
         self.up: Vector = UP
+        #: the direction that the last point states, or has from before
+        self.aimed: Vector | None = None
         self.systems: list[tuple[object, object]] = []
         self.system: tuple[object, object] = (None, None)
         self.transform: Rigid = NOTHING
@@ -55,19 +57,22 @@ class Placing:
         length = tool_vector = ZERO
         if self.tool:
             tool_vector = tool_vector_of(self.setup, self.tool, line)
-            if self.length_active:
+            if self.length_active and not self.tips:
                 tool = self.setup.tool(self.tool)
                 assert tool is not None
                 length = tool.length_mm
         inner = self._placement()
         # an axis that was never stated is the Z axis of the machine
         turn = product(turn_of(work.rotation_deg), inner.turn)
-        self.up = UP if self.axis == UP else turned(turn, self.axis)
-        return self.table.index(
+        # rotary axes turn the tool, where the machine has them
+        self.up = UP if self.axis == UP or self.tips else turned(turn, self.axis)
+        length_active = self.length_active and bool(self.tool) and not self.tips
+        number = self.table.index(
             work, line, inner=inner, unit_mm=self.unit_mm, tool=self.tool, length=length,
-            tool_vector=tool_vector, axis=self.up, length_active=self.length_active and bool(self.tool),
+            tool_vector=tool_vector, axis=self.up, length_active=length_active,
             compensation=self.compensation,
         )  # fmt: skip
+        return self.table.tipped(number, self.tips) if self.tips else number
 
     def _placement(self) -> Placement:
         """The transforms in force: TRACUT first, then TRANS."""

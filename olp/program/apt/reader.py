@@ -201,7 +201,7 @@ class _Reader(ArcMoves):
             )
         if not self.unit_stated:
             self.collector.remarks.setdefault("unit", (int(line[0]), "the program states no unit"))
-        frame, tilting, up = self._frames(points, part)
+        frame, tilting, up = self._aimed(points, part) if self.tips else self._frames(points, part)
         offset, turn = self._offset_and_turn(frame)
         value = points.value[part] * self.unit_mm
         value = value if turn is None else value @ turn.T
@@ -213,6 +213,9 @@ class _Reader(ArcMoves):
         kind = np.full(count, Kind.LINE, np.uint8)
         now = bisect_left(self.rapid, upto)
         kind[np.array(self.rapid[:now], np.int64) - a] = Kind.RAPID
+        if self.tips and not np.isfinite(self.position).all():
+            # from where the tool comes is not known
+            kind[0] = Kind.RAPID
         del self.rapid[:now]
         flag = np.where(incremental, np.uint8(Flag.INCREMENTAL), np.uint8(0))
         flag[tilting] |= np.uint8(Flag.WHOLE)
@@ -240,19 +243,10 @@ class _Reader(ArcMoves):
         direction, line = points.direction[part], int(points.line[part][0])
         count = len(direction)
         turning = np.zeros(count, bool)
-        stated = ~np.isnan(direction[:, 0])
+        stated, size = _sizes(points, part)
         if not stated.any():
             number = self._frame(line)
             return np.full(count, number), turning, np.broadcast_to(self.up, (count, 3))
-        size = np.sqrt((direction * direction).sum(axis=1))
-        wrong = stated & ~(np.abs(size - 1.0) < UNIT)
-        if wrong.any():
-            bad = int(np.flatnonzero(wrong)[0])
-            raise ProgramError(
-                f"the tool axis has length {size[bad]:.6g}; expected a direction of length 1",
-                line=int(points.line[part][bad]),
-                code="OLP516",
-            )
         held = np.maximum.accumulate(np.where(stated, np.arange(count), -1))
         axes = np.where((held >= 0)[:, None], (direction / size[:, None])[held], np.array(self.axis))
         before = np.vstack((np.array(self.axis), axes[:-1]))
@@ -269,6 +263,27 @@ class _Reader(ArcMoves):
         x, y, z = axes[-1].tolist()
         self.axis = axis_of(x, y, z)
         return number_of[which], turning, up[which]
+
+    def _aimed(self, points: Points, part: slice) -> tuple[Index, Mask, Array]:
+        """The same where rotary axes turn the tool: points state its tip and its direction."""
+        direction, line = points.direction[part].copy(), points.line[part]
+        arcs = [row for row, _ in self.arcs if row < part.stop]
+        if self.cycle is not None or arcs:
+            raise ProgramError(
+                "on a machine with rotary joints this is not corrected: an arc or a CYCLE; write its points",
+                line=int(points.line[arcs[0]]) if arcs else int(line[0]),
+                code="OLP565",
+            )
+        stated, _ = _sizes(points, part)
+        if not stated[0] and self.axis != self.aimed:
+            direction[0] = self.axis
+        if stated.any():
+            x, y, z = direction[np.flatnonzero(stated)[-1]].tolist()
+            self.axis = axis_of(x, y, z)
+        self.aimed = self.axis
+        self.collector.put_directions(direction, points.aim[part])
+        count = len(line)
+        return np.full(count, self._frame(int(line[0]))), np.zeros(count, bool), np.tile(UP, (count, 1))
 
     def _offset_and_turn(self, frame: Index) -> tuple[Array, Array | None]:
         frames = self.table.frames
@@ -328,6 +343,22 @@ class _Reader(ArcMoves):
         csys = match is not None and match[1] == b"CSYS"
         body = b"$$" + text[text.find(b"/") :] if csys else b"TITLE"
         return Statement(comment.line, comment.begin, comment.end, body, None, lines)
+
+
+def _sizes(points: Points, part: slice) -> tuple[Mask, Array]:
+    """(m,) which points state a direction, and the lengths of these. Raises ProgramError where one is not
+    1."""
+    direction = points.direction[part]
+    stated, size = ~np.isnan(direction[:, 0]), np.sqrt((direction * direction).sum(axis=1))
+    wrong = stated & ~(np.abs(size - 1.0) < UNIT)
+    if wrong.any():
+        bad = int(np.flatnonzero(wrong)[0])
+        raise ProgramError(
+            f"the tool axis has length {size[bad]:.6g}; expected a direction of length 1",
+            line=int(points.line[part][bad]),
+            code="OLP516",
+        )
+    return stated, size
 
 
 def _summed(value: Array, point: Array, incremental: Mask, start: Sequence[float]) -> Array:

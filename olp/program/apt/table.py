@@ -39,7 +39,7 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"TURRET": (_R, "as LOADTL"),
     b"CYCLE": (_R, "the GOTOs under it are positions of holes: corrected where the tool meets the part"),
     b"CUTCOM": (_R, "points keep their side, and are corrected where they are stated"),
-    b"MULTAX": (_R, "points carry a tool axis"),
+    b"MULTAX": (_R, "points carry a tool axis, which is corrected where the machine has rotary axes"),
     b"TLAXIS": (_R, "the tool axis from here on"),
     b"CSYS": (_R, "a coordinate system: a frame of the job"),
     b"MSYS": (_R, "a coordinate system: a frame of the job"),

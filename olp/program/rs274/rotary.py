@@ -46,6 +46,11 @@ class RotaryWords:
     scale: Array
 
     @staticmethod
+    def none(moves: int, axes: int) -> RotaryWords:
+        slot = np.full((moves, axes), -1, np.int32)
+        return RotaryWords(slot, np.full(slot.shape, np.nan), np.ones(axes))
+
+    @staticmethod
     def of(program: Program, letters: Sequence[str], machine: Machine) -> RotaryWords:
         """The words of these axes. Raises ProgramError for words of axes that the machine does not have,
         twice in a block, in blocks that do not move, and on arcs."""
@@ -137,6 +142,8 @@ def _stated_lines(program: Program) -> Mask:
     """(n,) moves whose line has an axis word: the control moves these axes alone."""
     words = program.words
     assert words is not None
+    if not program.in_blocks:
+        return np.zeros(len(program.toolpath), bool)
     axes = np.flatnonzero(is_in(words.letter, [ord(letter) for letter in "XYZABC"]))
     line = np.searchsorted(words.first_word, axes, "right")
     stated = np.zeros(len(words.first_word) + 1, bool)
