@@ -138,8 +138,8 @@ class Directions:
 
     def widened(self, motion: Motion, near: Array, axes: Array) -> Array:
         """(n, axes) by how much axis values may be off because of digits: `near` (axes,) where words state
-        them. Where directions lead to `axes` (n, axes), the outer one is off by more the nearer the tool is to
-        it."""
+        them. Where directions lead to `axes` (n, axes), the outer one is off by more the nearer the tool is
+        to it."""
         wide = np.broadcast_to(near, axes.shape).copy()
         rows = np.flatnonzero(self.led & np.isfinite(axes).all(axis=1))
         if rows.size:
