@@ -271,6 +271,9 @@ def test_linuxcnc_runs_the_program_as_planned(tmp_path: Path) -> None:
 def test_the_program_reads_back_as_its_touches(controller: str, tmp_path: Path) -> None:
     bench = Bench(tmp_path, HEAD + PLATE + POSE, controller=controller)
     (data,) = bench.probed.files(tmp_path).values()
+    offset = {"grbl": "G59", "linuxcnc": "G59.3"}[controller]
+    first = data.decode().splitlines()[0]
+    assert first == f"(Sets work offset {offset} to zero and ends G92: what they held is lost.)"
     dialect = find(controller)
     assert dialect is not None
     path = read(data, load_setup(bench.machine), dialect).toolpath

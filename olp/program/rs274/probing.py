@@ -15,22 +15,25 @@ from olp.program.touches import Touches
 
 
 def probing_program(profile: Profile, touches: Touches, digits: int, notes: Sequence[str], log: str) -> bytes:
-    """Touches in machine coordinates: the last work offset of the control is set to zero and chosen.
+    """Touches in machine coordinates: the last work offset of the control is set to zero and chosen. A
+    comment at the top says what is lost by that.
 
     `digits` are the decimals of words, `notes` become comments. A control that logs writes the file `log`,
     one line for each touch.
     """
     opening, closing = (mark.decode() for mark in profile.comment)
+    offset = _LAST_OFFSET[profile.g10_offsets]
+    lost = f"Sets work offset {offset} to zero and ends G92: what they held is lost."
     lines = [
         f"{opening}{line}{closing}"
-        for note in notes
+        for note in (lost, *notes)
         for line in textwrap.wrap(plain_note(note), COMMENT_WIDTH)
     ]
     lines += [
         f"{profile.metric} G90 G94 {profile.cleared}",
         "G92.1",
         f"G10 L2 P{profile.g10_offsets} X0 Y0 Z0{' R0' if profile.turns_offsets else ''}",
-        _LAST_OFFSET[profile.g10_offsets],
+        offset,
     ]
     logs = profile.touch_log
     if logs:
