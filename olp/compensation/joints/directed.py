@@ -122,12 +122,20 @@ class Directions:
         # how often words and the control have set each axis before a move
         times = np.cumsum(stated, axis=0) - stated
         before, again = degrees[rows][:, columns], np.diff(times[rows], axis=0, prepend=-1) != 0
-        places, done = found_deg.copy(), np.full(2, np.nan)
-        for number, row in enumerate(rows.tolist()):
-            done = np.where(again[number], before[number], done)
-            found = both[:, number].tolist()
-            done = np.array(_nearest(found, done.tolist(), pair, free[number], int(line[row])))
-            places[row, columns] = done
+        known, first, second = before.tolist(), both[0].tolist(), both[1].tolist()
+        done, found = [np.nan, np.nan], []
+        for number, (outer_set, inner_set) in enumerate(again.tolist()):
+            if outer_set or inner_set:
+                done = [
+                    known[number][0] if outer_set else done[0],
+                    known[number][1] if inner_set else done[1],
+                ]
+            done = _nearest(
+                (first[number], second[number]), done, pair, free[number], int(line[rows[number]])
+            )
+            found.append(done)
+        places = found_deg.copy()
+        places[np.ix_(rows, columns)] = found
         return places
 
     def keep(self, structure: Structure, moves: Index, towards: Array) -> Mask:
@@ -241,22 +249,28 @@ def _last(these: Mask, others: Mask) -> Mask:
 
 
 def _nearest(
-    both: list[list[float]], before: list[float], pair: tuple[Joint, Joint], free: bool, line: int
-) -> tuple[float, float]:
+    both: tuple[list[float], list[float]],
+    before: list[float],
+    pair: tuple[Joint, Joint],
+    free: bool,
+    line: int,
+) -> list[float]:
     """The position to which the control turns the two axes from `before`; where the outer one is `free` it
     stays."""
-    ways: list[tuple[float, tuple[float, float]]] = []
+    best, way, next_way = before, np.inf, np.inf
     for values in both:
-        places = [
-            _turn_of(joint, place, value) for joint, place, value in zip(pair, before, values, strict=True)
-        ]
-        if free:
-            places[0] = before[0]
-        outer, inner = places
-        same = any(abs(outer - other[0]) + abs(inner - other[1]) < _AT_END for _, other in ways)
-        if outer == outer and inner == inner and not same:
-            ways.append((max(abs(outer - before[0]), abs(inner - before[1])), (outer, inner)))
-    if not ways:
+        outer = before[0] if free else _turn_of(pair[0], before[0], values[0])
+        inner = _turn_of(pair[1], before[1], values[1])
+        if outer != outer or inner != inner:
+            continue
+        own = max(abs(outer - before[0]), abs(inner - before[1]))
+        if way < np.inf and abs(outer - best[0]) + abs(inner - best[1]) < _AT_END:
+            continue
+        if own < way:
+            best, way, next_way = [outer, inner], own, way
+        else:
+            next_way = own
+    if way == np.inf:
         known = before[0] == before[0] and before[1] == before[1]
         why = (
             "no positions of the rotary axes within their travel give the tool this direction"
@@ -265,22 +279,24 @@ def _nearest(
             "are before is not known; command them before, or state start_deg in the job file"
         )
         raise ProgramError(why, line=line, code="OLP566")
-    ways.sort()
-    if len(ways) > 1 and ways[1][0] <= _FARTHER * ways[0][0] + _FARTHER_DEG:
+    if next_way <= _FARTHER * way + _FARTHER_DEG:
         raise ProgramError(
             "two positions of the rotary axes give the tool this direction, and both are about as far; "
             "program a direction between",
             line=line,
             code="OLP566",
         )
-    return ways[0][1]
+    return best
 
 
 def _turn_of(joint: Joint, before: float, value: float) -> float:
     """A position a number of whole turns from `value`, within the travel, as near to `before` as can be; NaN
     where there is none."""
+    if not value - before < np.inf:
+        return np.nan
     low, high = joint.travel
-    value += _WHOLE_DEG * np.rint((before - value) / _WHOLE_DEG) if before == before else np.nan
-    turns = (value, value - _WHOLE_DEG, value + _WHOLE_DEG)
-    inside = [turn for turn in turns if low - _AT_END <= turn <= high + _AT_END]
-    return min(inside, key=lambda turn: abs(turn - before), default=np.nan)
+    value += _WHOLE_DEG * round((before - value) / _WHOLE_DEG)
+    if low - _AT_END <= value <= high + _AT_END:
+        return value
+    value += _WHOLE_DEG if value < low else -_WHOLE_DEG
+    return value if low - _AT_END <= value <= high + _AT_END else np.nan
