@@ -135,7 +135,7 @@ class Directions:
             )
             found.append(done)
         places = found_deg.copy()
-        places[np.ix_(rows, columns)] = found
+        places[np.ix_(rows, np.array(columns))] = found
         return places
 
     def keep(self, structure: Structure, moves: Index, towards: Array) -> Mask:
