@@ -42,7 +42,7 @@ from olp.program.rs274.codes import (
     WRITE_OFFSET,
 )
 from olp.program.rs274.cutter import check_block, check_codes_along, switched_on
-from olp.program.rs274.offset_state import OffsetState, Word
+from olp.program.rs274.offset_state import EventBlock, OffsetState, Word
 from olp.program.rs274.offsets import Offsets
 from olp.program.rs274.planes import tilted
 from olp.program.rs274.profiles.base import Profile
@@ -60,12 +60,6 @@ STORES_POSITION = 20
 
 #: What changes or uses offsets beside the move of a block.
 _OFFSET_CODES = LENGTHS | HOMES | SHIFTS | WORK_OFFSETS | FURTHER_OFFSETS | {MACHINE, WRITE_OFFSET}
-#: RS-274's order of execution within a block; other codes come last.
-_RANK = {
-    code: rank
-    for rank, codes in enumerate(((DWELL,), UNITS, LENGTHS, WORK_OFFSETS, PATH_MODES))
-    for code in codes
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,14 +179,12 @@ class AxisState(OffsetState):
 
     # -- events ------------------------------------------------------------------------------------
 
-    def run(self, line: int, words: Sequence[Word], codes: Sequence[int], moves: int) -> Effect:
+    def run(self, line: int, block: EventBlock, moves: int) -> Effect:
         """Carry out the events of one block in the order of the control; returns what its axis words mean
         then."""
-        by_letter = {w.letter: w for w in words}
-        axis_words = [(i, by_letter[a]) for i, a in enumerate("XYZ") if a in by_letter]
-        m_codes = [round(w.value * 10) for w in words if w.letter == "M"]
+        by_letter, codes, m_codes = block.by_letter, block.events, block.m_codes
         if "T" in by_letter:
-            self._select_tool(line, [w for w in words if w.letter == "T"])
+            self._select_tool(line, [w for w in block.words if w.letter == "T"])
         if TOOL_CHANGE in m_codes:
             if self.selected is None:
                 raise ProgramError(
@@ -219,19 +211,18 @@ class AxisState(OffsetState):
         self._check_modes(codes, line)
         changes_tool = TOOL_CHANGE in m_codes or (SET_TOOL in m_codes and self.profile.m61_sets_tool)
         check_block(self, codes, line, changes_tool=changes_tool)
-        self._switch_tips(words)
-        for code in sorted(codes, key=lambda code: _RANK.get(code, len(_RANK))):
-            effect = self._event(code, line, by_letter, axis_words, moves, effect)
-        check_codes_along(self, [round(w.value * 10) for w in words if w.letter == "G"], m_codes, line)
+        self._switch_tips(block.g_codes)
+        for code in codes:
+            effect = self._event(code, line, by_letter, block.axes, moves, effect)
+        check_codes_along(self, block.g_codes, m_codes, line)
         if self.profile.turns_offsets:
             self._check_turned(angle_deg, effect, line)
         return effect
 
-    def _switch_tips(self, words: Sequence[Word]) -> None:
+    def _switch_tips(self, codes: Sequence[int]) -> None:
         """Tool centre point control with axis words or directions, which every other code of tool lengths
         ends."""
-        for word in words:
-            code = round(word.value * 10) if word.letter == "G" else -1
+        for code in codes:
             if code in self.profile.tip_codes:
                 self.offsets.tip = self.profile.tips
                 self.offsets.directed = code in self.profile.direction_codes

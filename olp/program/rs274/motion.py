@@ -144,10 +144,14 @@ def fill(
     offset: Array,
     unit: Array | float,
     start: list[float],
+    lost: Index | None = None,
 ) -> Array:
-    """(n, 3) axis positions of consecutive blocks from `start`; offsets (3,) or (n, 3), units one or (n,)."""
+    """(n, 3) axis positions of consecutive blocks from `start`; offsets (3,) or (n, 3), units one or (n,). No
+    position is known from the blocks `lost` on until it is commanded; any words stand there."""
     known = slot >= 0
     end: Array = value[slot]
+    if lost is not None:
+        end[lost] = np.nan
     end *= unit if isinstance(unit, float) else unit[:, None]
     if incremental is None and known.all():
         end += offset

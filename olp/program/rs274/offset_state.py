@@ -14,9 +14,18 @@ from olp.core.machine import ZERO, Setup, Vector, WorkOffset
 from olp.core.patterns import pattern
 from olp.core.toolpath import Touch
 from olp.core.turns import Turn
+from olp.core.units import AXES
 from olp.core.values import dataclass
 from olp.program.frames import touch_of
-from olp.program.rs274.codes import LOCAL_OFFSET, METRIC
+from olp.program.rs274.codes import (
+    DWELL,
+    LENGTHS,
+    LOCAL_OFFSET,
+    METRIC,
+    PATH_MODES,
+    UNITS,
+    WORK_OFFSETS,
+)
 from olp.program.rs274.offsets import Offsets
 from olp.program.rs274.profiles.base import increment
 from olp.program.rs274.state import KNOWN_BY, NAN, Capture, State
@@ -26,17 +35,44 @@ from olp.program.rs274.turned import Turning, along_words
 STORES_POSITION = 20
 #: P of a G10 L20 that writes an offset G54.1 P, at most.
 _FURTHER = 300
+#: RS-274's order of execution within a block; other codes come last.
+_RANK = {
+    code: rank
+    for rank, codes in enumerate(((DWELL,), UNITS, LENGTHS, WORK_OFFSETS, PATH_MODES))
+    for code in codes
+}
 _SPACED = pattern(r"([\d.])([A-Z])")
 
 
 @dataclass(frozen=True, slots=True)
 class Word:
-    """One word of a block: upper-case letter, number as written, index in the program's word table."""
+    """One word of a block: upper-case letter, number as written, place in the block."""
 
     letter: str
     value: float
     index: int
     pointed: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class EventBlock:
+    """The words of a block with an event, also `by_letter`, those of axes with the `axes`, and the codes of G
+    and M, ten times their number. `events` are the G codes that are events, in the order of the control."""
+
+    words: list[Word]
+    by_letter: dict[str, Word]
+    axes: list[tuple[int, Word]]
+    g_codes: list[int]
+    m_codes: list[int]
+    events: list[int]
+
+    @staticmethod
+    def of(words: list[Word], events: Sequence[int]) -> EventBlock:
+        by_letter = {word.letter: word for word in words}
+        axes = [(i, by_letter[a]) for i, a in enumerate(AXES) if a in by_letter]
+        g_codes, m_codes = ([round(w.value * 10) for w in words if w.letter == a] for a in "GM")
+        ordered = sorted(events, key=lambda code: _RANK.get(code, len(_RANK)))
+        return EventBlock(words, by_letter, axes, g_codes, m_codes, ordered)
 
 
 @dataclass(slots=True, kw_only=True)
@@ -51,6 +87,8 @@ class OffsetState(State):
     spindle: int | None = None
     length_unit: int = METRIC
     captures: list[Capture] = field(default_factory=list)
+    #: index of the first word of the present block in the program's table
+    first_word: int = 0
 
     def length_mm(self, word: Word) -> float:
         """A length word in mm; without a decimal point it counts least increments on some controls."""
@@ -259,7 +297,7 @@ class OffsetState(State):
                 line=line,
                 code="OLP524",
             )
-        self.captures.append(Capture(word.index, axis, self.unit_mm, moves, line, turn))
+        self.captures.append(Capture(self.first_word + word.index, axis, self.unit_mm, moves, line, turn))
 
     @staticmethod
     def _integer(word: Word, line: int) -> int:

@@ -8,6 +8,8 @@ change frames (`axis_state`) or need the present position (`special_blocks`) are
 
 from __future__ import annotations
 
+from dataclasses import field
+
 import numpy as np
 import numpy.typing as npt
 
@@ -48,9 +50,16 @@ from olp.program.rs274.extrusion import Extrusion
 from olp.program.rs274.lexer import WordChunk, chunks
 from olp.program.rs274.modes import Context, Modes, Odd, check_odd, scaled
 from olp.program.rs274.motion import OTHER, Blocks, arc_geometry, fill, gather
-from olp.program.rs274.offset_state import STORES_POSITION, Word
+from olp.program.rs274.offset_state import STORES_POSITION, EventBlock
 from olp.program.rs274.profiles.base import Act, Profile
-from olp.program.rs274.special_blocks import SpecialBlocks, check_codes, event_block, event_words
+from olp.program.rs274.special_blocks import (
+    KnownBlocks,
+    OwnMove,
+    SpecialBlocks,
+    check_codes,
+    event_block,
+    event_words,
+)
 from olp.program.rs274.translated import Beside, check_frames
 from olp.program.rs274.translation import Translation
 from olp.program.rs274.turned import Turning, along_words
@@ -82,7 +91,8 @@ def read(
 class _Rows:
     """The motion lines of a chunk (n,) while they are read: how many have a frame, how many a position.
     `present` is the index of the frame in force, None after what may have changed it. `runs` leads from the
-    first row of each run of canned cycles to the row behind it.
+    first row of each run of canned cycles to the row behind it. `own` are the moves that the control makes by
+    itself among the rows that have no position yet.
 
     What holds for the rows wherever they start is there at once: line `number`, `plane`, `kind` and `flag` of
     the moves, the `word` (n, 3) of each coordinate, and whether these are `incremental`."""
@@ -99,6 +109,7 @@ class _Rows:
     assigned: int = 0
     resolved: int = 0
     present: int | None = None
+    own: list[OwnMove] = field(default_factory=list)
 
 
 class _Reader:
@@ -115,6 +126,7 @@ class _Reader:
         self.payloads: dict[int, float] = {}
         self.special_blocks = SpecialBlocks(self.state, self.collector)
         self.cycle_blocks = CycleBlocks(self.state, self.collector, self.switches, stroke_budget(len(data)))
+        self.known: KnownBlocks = {}
         self.end_line = 0
         # that of the rows which have a frame and no position yet
         self.turn: Turn | None = None
@@ -255,19 +267,27 @@ class _Reader:
                 self._alone(context, rows, upto, Effect())
                 continue
             number, deleted = context.number(line), bool(chunk.deleted[line])
-            words, codes = event_block(context, next(stated), state.profile)
-            tool = any(w.letter in "MT" for w in words)
-            if tool or line in self.payloads or not _KEEPS_FRAME.issuperset(codes):
+            own = next(stated)
+            block = event_block(context, own, state.profile, self.known)
+            tool = block.m_codes or "T" in block.by_letter
+            if tool or line in self.payloads or not _KEEPS_FRAME.issuperset(block.events):
                 rows.present = None
-            moved, place = state.moved_by(round(w.value * 10) for w in words if w.letter == "M")
-            lost = line in self.lost or state.changes_nozzle(words)
+            moved, place = state.moved_by(block.m_codes)
+            lost = line in self.lost or state.changes_nozzle(block.words)
             if lost:
-                moved, place = (0, 1, 2), state.home_of(words)
-            if moved or lost or beside.lines[line] or self._needs_position(words, codes):
+                moved, place = (0, 1, 2), state.home_of(block.words)
+            # where nothing says where the axes stand then, it is found together with the rows around it
+            loose = moved == (0, 1, 2) and place == UNKNOWN and not lost
+            if (moved and not loose) or lost or beside.lines[line] or self._needs_position(block):
                 self._resolve(context, rows, upto)
             state.distance, state.plane = int(context.distance[line]), int(context.plane[line])
             state.payload_kg = self.payloads.get(line, state.payload_kg)
-            effect = state.run(number, words, codes, self.collector.moves)
+            state.first_word = context.base + own.first
+            before = state.position.copy()
+            effect = state.run(number, block, self.collector.moves)
+            if loose and rows.resolved < upto:
+                rows.own.append(self.special_blocks.own_move(number, upto, deleted=deleted))
+                state.position[:], moved = before, ()
             if lost:
                 state.lose(number)
             if beside.act(line):
@@ -290,10 +310,11 @@ class _Reader:
         self._assign(context, rows, len(blocks))
         self._resolve(context, rows, len(blocks))
 
-    def _needs_position(self, words: list[Word], codes: list[int]) -> bool:
+    def _needs_position(self, block: EventBlock) -> bool:
         """Whether an event needs the present position, or the numbers before it count by another unit."""
+        codes = block.events
         if WRITE_OFFSET in codes:
-            stores = any(w.letter == "L" and round(w.value) == STORES_POSITION for w in words)
+            stores = any(w.letter == "L" and round(w.value) == STORES_POSITION for w in block.words)
             return stores and self.state.profile.g10_stores
         counted = self.state.bare_increments and not set(UNITS).isdisjoint(codes)
         return counted or not _APART.isdisjoint(codes)
@@ -344,8 +365,18 @@ class _Reader:
         if (kind == 255).any():
             rows_without = np.flatnonzero(kind == 255).tolist()
             raise ProgramError.together(_no_motion(int(number[i])) for i in rows_without)
-        incremental = rows.incremental[a:upto]
+        incremental, flag = rows.incremental[a:upto], rows.flag[a:upto]
+        slot, word = blocks.slot[a:upto], rows.word[a:upto]
         check_frames(state, number, incremental, rows.plane[a:upto], frame)
+        lost = np.array([own.row - a for own in rows.own], np.int64)
+        if lost.size:
+            number = np.insert(number, lost, [own.line for own in rows.own])
+            flag = np.insert(flag, lost, [own.flag for own in rows.own])
+            frame = np.insert(frame, lost, [own.frame for own in rows.own])
+            kind, incremental = np.insert(kind, lost, Kind.RAPID), np.insert(incremental, lost, False)
+            slot, word = np.insert(slot, lost, 0, axis=0), np.insert(word, lost, -1, axis=0)
+            lost += np.arange(len(lost))
+            rows.own.clear()
         offset, unit = self._offsets(frame)
         value = scaled(context, state, self.collector.remarks)
         turning = Turning.of(self.turn)
@@ -353,15 +384,17 @@ class _Reader:
         if turning is not None:
             offset = turning.words(offset)
         steps = incremental if incremental.any() else None
-        end = fill(blocks.slot[a:upto], value, steps, offset, unit, start)
+        end = fill(slot, value, steps, offset, unit, start, lost)
         if len(blocks.arc_row):
             arcs = slice(*np.searchsorted(blocks.arc_row, (a, upto)))
             if arcs.stop > arcs.start:
                 point = np.vstack((start, end))
-                kind = self._arcs(context, rows, arcs, a, kind, point, value, offset, unit)
+                row = blocks.arc_row[arcs] - a
+                row += (lost - np.arange(len(lost))).searchsorted(row, "right")
+                kind = self._arcs(context, rows, arcs, row, kind, point, value, offset, unit)
         if turning is not None:
             end = turning.axes(end)
-        self.collector.put_moves(kind, rows.flag[a:upto], number, frame, end, rows.word[a:upto])
+        self.collector.put_moves(kind, flag, number, frame, end, word)
         state.position[:] = end[-1].tolist()
 
     def _arcs(
@@ -369,17 +402,16 @@ class _Reader:
         context: Context,
         rows: _Rows,
         arcs: slice,
-        a: int,
+        row: Index,
         kind: npt.NDArray[np.uint8],
         point: Array,
         value: Array,
         offset: Array,
         unit: Array | float,
     ) -> npt.NDArray[np.uint8]:
-        """Put the arcs among moves that lead from point to point (n + 1, 3) along the words; returns the
-        kinds of all moves for the axes."""
+        """Put the arcs, the moves `row` among those that lead from point to point (n + 1, 3) along the words;
+        returns the kinds of all moves for the axes."""
         blocks = rows.blocks
-        row = blocks.arc_row[arcs] - a
         words = blocks.arc_slot[arcs]
         line = blocks.line[blocks.arc_row[arcs]]
         number = line + (context.chunk.first_line + 1)

@@ -7,8 +7,10 @@ What an event does to frames and tools is in `axis_state`, blocks of canned cycl
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from olp.core.arrays import Index, distinct, is_in
 from olp.core.errors import ProgramError
@@ -30,7 +32,7 @@ from olp.program.rs274.codes import (
 from olp.program.rs274.collector import Collector
 from olp.program.rs274.modes import UNROLL, Context, scaled
 from olp.program.rs274.motion import fill
-from olp.program.rs274.offset_state import Word
+from olp.program.rs274.offset_state import EventBlock, Word
 from olp.program.rs274.profiles.base import Act, Profile
 from olp.program.rs274.state import NAN
 from olp.program.rs274.translation import Drilling
@@ -38,44 +40,57 @@ from olp.program.rs274.turned import Turning, along_words
 
 #: (1,) the kind of a move that the control makes by itself.
 _RAPID = np.array([Kind.RAPID], np.uint8)
-#: (1,) the flag of such a move.
-_OWN = np.array([Flag.PASS | Flag.CONTROL], np.uint8)
-#: (1,) the flag of one whose end the machine file states.
-_STANDS = _OWN | np.uint8(Flag.MACHINE)
-#: (1,) the flag of one under block delete.
-_OWN_DELETED = _OWN | np.uint8(Flag.DELETED)
+#: (1,) the flag of a move that ends where the machine file says.
+_STANDS = np.array([Flag.PASS | Flag.CONTROL | Flag.MACHINE], np.uint8)
 #: (1, 3) the words of a move without any.
 _NO_WORDS = np.full((1, 3), -1)
 #: Events that may stand under block delete.
 _DELETED_TOO = frozenset({DWELL, *HOMES, MACHINE})
+#: M6 and M61, ten times their number
+_TOOL_CODES = frozenset({60, 610})
+#: blocks by what they say
+KnownBlocks = dict[tuple[bytes, bytes], EventBlock]
+
+
+#: A word of a line as bytes, then a G code with what it does.
+_WORD = np.dtype([("letter", np.uint8), ("value", np.float64), ("pointed", np.bool_)])
+_CODE = np.dtype([("code", np.int64), ("act", np.int64)])
 
 
 @dataclass(frozen=True, slots=True)
 class EventWords:
-    """The words of a line of the chunk, and its G codes with what each does."""
+    """The words of a line of the chunk and its G codes with what each does, as bytes. They are the same in
+    lines that say the same. `first` is the index of the first word in the chunk."""
 
     line: int
-    words: list[Word]
-    codes: list[int]
-    acts: list[int]
+    first: int
+    words: bytes
+    codes: bytes
 
 
 def event_words(context: Context, lines: Index) -> Iterator[EventWords]:
     """What lines of the chunk say. Their words are taken out of the columns together."""
     chunk, codes = context.chunk, context.codes
-    word, ends = _within(chunk.first_word[lines], chunk.first_word[lines + 1])
-    columns = (chunk.letter[word], context.value[word], word + context.base, chunk.pointed[word])
-    words = [
-        Word(chr(letter), value, number, pointed)
-        for letter, value, number, pointed in zip(*(c.tolist() for c in columns), strict=True)
-    ]
+    begin = chunk.first_word[lines]
+    word, ends = _within(begin, chunk.first_word[lines + 1])
+    words = _rows(_WORD, chunk.letter[word], context.value[word], chunk.pointed[word])
     first, last = (codes.line.searchsorted(lines, side) for side in ("left", "right"))
     code, code_ends = _within(first, last)
-    numbers, acts = codes.code[code].tolist(), codes.act[code].tolist()
+    acts = _rows(_CODE, codes.code[code], codes.act[code])
     a = c = 0
-    for line, b, d in zip(lines.tolist(), ends, code_ends, strict=True):
-        yield EventWords(line, words[a:b], numbers[c:d], acts[c:d])
+    for line, one, b, d in zip(lines.tolist(), begin.tolist(), ends, code_ends, strict=True):
+        yield EventWords(
+            line, one, words[a * _WORD.itemsize : b * _WORD.itemsize],
+            acts[c * _CODE.itemsize : d * _CODE.itemsize],
+        )  # fmt: skip
         a, c = b, d
+
+
+def _rows(kind: np.dtype[Any], *columns: npt.NDArray[Any]) -> bytes:
+    rows = np.empty(len(columns[0]), kind)
+    for name, column in zip(kind.names or (), columns, strict=True):
+        rows[name] = column
+    return rows.tobytes()
 
 
 def _within(first: Index, last: Index) -> tuple[Index, list[int]]:
@@ -85,9 +100,30 @@ def _within(first: Index, last: Index) -> tuple[Index, list[int]]:
     return np.repeat(first - (ends - count), count) + np.arange(int(count.sum())), ends.tolist()
 
 
-def event_block(context: Context, stated: EventWords, profile: Profile) -> tuple[list[Word], list[int]]:
-    """The words and event codes of a line of the chunk; refuses what cannot be read correctly."""
-    line, words = stated.line, stated.words
+def event_block(context: Context, stated: EventWords, profile: Profile, known: KnownBlocks) -> EventBlock:
+    """The words and event codes of a line of the chunk; refuses what cannot be read correctly. Blocks that
+    are `known` of this profile are not looked at again."""
+    key = stated.words, stated.codes
+    block = known.get(key)
+    if block is None:
+        block = known[key] = _event_block(stated, profile, context.number(stated.line))
+    if context.chunk.deleted[stated.line] and (
+        not _DELETED_TOO.issuperset(block.events) or not _TOOL_CODES.isdisjoint(block.m_codes)
+    ):
+        raise ProgramError(
+            "a block under block delete changes offsets, units, path mode, the tool or its compensation, "
+            "so later blocks depend on the switch; remove the `/`",
+            line=context.number(stated.line),
+            code="OLP525",
+        )
+    return block
+
+
+def _event_block(stated: EventWords, profile: Profile, number: int) -> EventBlock:
+    words = [
+        Word(chr(letter), value, place, pointed)
+        for place, (letter, value, pointed) in enumerate(np.frombuffer(stated.words, _WORD).tolist())
+    ]
     if profile.commands is not None:
         # letters behind a command are its parameters
         own = next((k for k, word in enumerate(words) if word.letter != "N"), len(words))
@@ -96,25 +132,15 @@ def event_block(context: Context, stated: EventWords, profile: Profile) -> tuple
         if words and words[0].letter != "G":
             letter = still.get(round(words[0].value), "") if words[0].letter == "M" else ""
             words = [] if letter and any(w.letter == letter for w in words) else words[:1]
-    number = context.number(line)
-    events = _checked(stated, words, profile, number)
-    if context.chunk.deleted[line] and (
-        not _DELETED_TOO.issuperset(events) or any(w.letter == "M" and w.value in (6, 61) for w in words)
-    ):
-        raise ProgramError(
-            "a block under block delete changes offsets, units, path mode, the tool or its compensation, "
-            "so later blocks depend on the switch; remove the `/`",
-            line=number,
-            code="OLP525",
-        )
-    return words, events
+    return EventBlock.of(words, _checked(stated, words, profile, number))
 
 
 def _checked(stated: EventWords, words: list[Word], profile: Profile, line: int) -> list[int]:
     """The event codes of a block; refuses those that cannot be read correctly."""
     unroll = UNROLL if profile.unroller is not None else ""
     numbers = [word.value for word in words if word.letter == "G"]
-    for c, a, number in zip(stated.codes, stated.acts, numbers, strict=True):
+    codes: list[tuple[int, int]] = np.frombuffer(stated.codes, _CODE).tolist()
+    for (c, a), number in zip(codes, numbers, strict=True):
         if a == Act.REFUSE and not _still(c, words, profile):
             why = profile.refusals.get(c)
             name = f"G{number:g}"
@@ -138,7 +164,7 @@ def _checked(stated: EventWords, words: list[Word], profile: Profile, line: int)
                 code="OLP511" if helps else "OLP512",
                 word=f"M{m / 10:g}",
             )
-    return [c for c, a in zip(stated.codes, stated.acts, strict=True) if a == Act.EVENT]
+    return [c for c, a in codes if a == Act.EVENT]
 
 
 def _still(code: int, words: list[Word], profile: Profile) -> bool:
@@ -157,11 +183,21 @@ def check_codes(context: Context, profile: Profile) -> None:
     errors = []
     for stated in event_words(context, lines):
         try:
-            event_block(context, stated, profile)
+            event_block(context, stated, profile, {})
         except ProgramError as error:
             errors.append(error)
     if errors:
         raise ProgramError.together(errors)
+
+
+@dataclass(frozen=True, slots=True)
+class OwnMove:
+    """A move that the control makes by itself before a `row` of a chunk; no position is known after it."""
+
+    row: int
+    line: int
+    flag: int
+    frame: int
 
 
 class SpecialBlocks:
@@ -177,14 +213,20 @@ class SpecialBlocks:
             x, y, z = self._state.position
             self._collector.start = (x, y, z)
             return
+        own = self.own_move(line, 0, deleted=deleted)
         self._collector.put_moves(
             _RAPID,
-            _OWN_DELETED if deleted else _OWN,
+            np.array([own.flag], np.uint8),
             [line],
-            [self._loose_frame()],
+            [own.frame],
             np.array([self._state.position]),
             _NO_WORDS,
         )
+
+    def own_move(self, line: int, row: int, *, deleted: bool) -> OwnMove:
+        """Such a move before a row of a chunk."""
+        flag = Flag.PASS | Flag.CONTROL
+        return OwnMove(row, line, flag | _deleted(deleted), self._loose_frame())
 
     def stand(self, line: int, axes: Sequence[int], place: Place, *, deleted: bool) -> None:
         """Where axes stand after such a move, as far as the machine file states it and the words are those of

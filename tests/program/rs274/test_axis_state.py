@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from cases.blocks import OFFSETS, TOOLS, program, refusal, setup_of
 
@@ -520,6 +521,29 @@ def test_axes_that_the_control_moves_are_unknown(text: str, setups: dict[str, Se
     if via:
         assert int(path.flag[1]) & Flag.PASS
         assert not int(path.flag[1]) & Flag.CONTROL
+
+
+def test_moves_of_the_control_lie_among_the_moves_that_are_resolved_with_them(
+    setups: dict[str, Setup],
+) -> None:
+    """Two of them at one place, one under block delete, arcs behind each, and steps from where nothing is
+    known."""
+    text = (
+        "G0 X1 Y1 Z1\nM100\nM100\nG0 X2 Y2 Z2\nG2 X4 I1\nG1 X3 F1\n/M100\nY7\n"
+        "G91 X1\nX1 Y1 Z1\nG90 X5 Y5 Z5\nM100\nG0 X1 Y1 Z1\nG3 X3 Y1 I1\nM100\nM2\n"
+    )
+    path = program(f"G21 G17 G90 G53 G0 X0 Y0 Z0\n{text}", setups["linuxcnc"]).toolpath
+    own = np.flatnonzero((path.flag & Flag.CONTROL) > 0).tolist()
+    assert own == [2, 3, 7, 12, 15]
+    assert np.isnan(path.end_mm[own]).all()
+    assert [bool(path.flag[i] & Flag.DELETED) for i in own] == [False, False, True, False, False]
+    assert path.line[own].tolist() == [3, 4, 8, 13, 16]
+    assert path.arcs.move.tolist() == [5, 14]
+    zero = path.end_mm[1] - 1
+    assert (path.end_mm[5] - zero).tolist() == [4, 2, 2]
+    assert (path.end_mm[6] - zero).tolist() == [3, 2, 2]
+    known = [np.isfinite(path.end_mm[i]).tolist() for i in (8, 9, 10, 11)]
+    assert known == [[False, True, False], [False, True, False], [False, True, False], [True, True, True]]
 
 
 def test_the_job_states_where_the_axes_and_which_tool_are_at_the_start(
