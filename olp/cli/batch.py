@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from olp.workflows.batch import Batch, BatchOptions
     from olp.workflows.batch_find import Where
     from olp.workflows.batch_pool import Opener
-    from olp.workflows.batch_work import Page
+    from olp.workflows.batch_task import Page
 
 
 @click.command("batch")

@@ -3,7 +3,6 @@ it."""
 
 from __future__ import annotations
 
-import datetime
 from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -58,13 +57,9 @@ def on_joints(machine: str | None, job: str | None, also: Collection[str] = ()) 
 
 
 def _is_of_joints(machine: str | None, job: str | None) -> bool:
-    from olp.files.config import load_job, of_joints
-    from olp.files.toml_text import read_toml
+    from olp.files.config import have_joints
 
-    read = sources_of_call().read
-    if machine is None and job is not None:
-        machine = load_job(job, read).machine
-    return machine is not None and of_joints(read_toml(read(machine), str(machine))[0])
+    return have_joints(machine, job, sources_of_call().read)
 
 
 def run_of(program: str | None, machine: str | None, job: str | None) -> JointRun:
@@ -93,10 +88,11 @@ def correct(program: str | None, machine: str | None, job: str | None, words: di
     from olp.files.write import write_files
     from olp.reports.report import to_json
     from olp.workflows.joints.correct import JointOptions, corrected
+    from olp.workflows.joints.report import filed
 
     result = corrected(run, options_of(JointOptions, words))
     written = {Path(file): result.data for file in files_of(output)}
-    written |= {Path(file): _report(result.report, file, words["date"]) for file in files_of(report_file)}
+    written |= {Path(file): filed(result.report, file, words["date"]) for file in files_of(report_file)}
     write_files(written, force=words["force"], inputs=run.files)
     if output == STREAM:
         put(result.data)
@@ -108,18 +104,6 @@ def correct(program: str | None, machine: str | None, job: str | None, words: di
         for file in written:
             diagnostic(f"wrote {file}")
     exit_for(result.findings, words["fail_on"])
-
-
-def _report(report: dict[str, Any], name: str, date: datetime.date | None) -> bytes:
-    """The report of a correction in the form that `name` ends in."""
-    from olp.core.version import __version__
-    from olp.reports.document import in_form
-    from olp.reports.document_joints import correction
-    from olp.reports.report import to_json
-
-    if Path(name).suffix.lower() == ".json":
-        return to_json(report)
-    return in_form(correction(report, __version__, date), name)
 
 
 def verify(nominal: str, corrected: str, machine: str | None, job: str | None, words: dict[str, Any]) -> None:

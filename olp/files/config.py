@@ -177,6 +177,14 @@ def of_joints(values: Mapping[str, object]) -> bool:
     return bool(_OF_JOINTS & values.keys() or _OF_A_JOINT & stated)
 
 
+def have_joints(machine: PathLike | None, job: PathLike | None, read: Reader = read_bytes) -> bool:
+    """Whether the machine of a call states joints other than three linear axes. The job names it where the
+    call does not. Raises InputError, ConfigError."""
+    if machine is None and job is not None:
+        machine = load_job(job, read).machine
+    return machine is not None and of_joints(read_toml(read(machine), str(machine))[0])
+
+
 def moved_by_change(stated: bool | Sequence[str]) -> frozenset[str]:
     """The axes that M6 may move, from the key `tool_change_moves`."""
     return frozenset(AXES if stated else ()) if isinstance(stated, bool) else frozenset(stated)

@@ -22,7 +22,8 @@ from olp.findings.rule import Severity
 from olp.workflows.batch_find import Case, Found, Where, find
 from olp.workflows.batch_pool import Opener, Pool, opened
 from olp.workflows.batch_setup import Files, config_of, digest, plain_options, with_file
-from olp.workflows.batch_work import UNEXPECTED, Config, Outcome, Page, Task, lost, refused
+from olp.workflows.batch_task import Config, Outcome, Page, Task
+from olp.workflows.batch_work import UNEXPECTED, lost, refused
 from olp.workflows.correct import CorrectOptions
 from olp.workflows.session import PathLike
 

@@ -8,7 +8,8 @@ import queue
 from typing import TYPE_CHECKING, Any
 
 from olp.core.errors import CannotCompute, UsageError
-from olp.workflows.batch_work import Config, Outcome, Task, lost, perform
+from olp.workflows.batch_task import Config, Outcome, Task
+from olp.workflows.batch_work import lost, perform
 
 if TYPE_CHECKING:
     from distributed import Client, Future

@@ -16,7 +16,8 @@ from multiprocessing.context import SpawnProcess
 from typing import Any, Protocol
 
 from olp.core.values import dataclass
-from olp.workflows.batch_work import Config, Outcome, Task, lost, perform
+from olp.workflows.batch_task import Config, Outcome, Task
+from olp.workflows.batch_work import lost, perform
 
 #: How often a task is begun whose process ends before it is done.
 ATTEMPTS = 3

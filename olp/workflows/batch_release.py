@@ -21,7 +21,7 @@ from olp.files.sources import Sources, in_parcel
 from olp.files.write import make_folder, read_bytes, write_files
 from olp.workflows.batch_pool import Opener, Pool
 from olp.workflows.batch_setup import Files, held, options_from
-from olp.workflows.batch_work import Config, Outcome, Task
+from olp.workflows.batch_task import Config, Outcome, Task
 from olp.workflows.session import PathLike
 
 

@@ -12,9 +12,10 @@ from typing import Any
 
 from olp.core.errors import InputError
 from olp.errormodel.known import KnownErrors
+from olp.files.config import have_joints
 from olp.files.sources import Sources
 from olp.files.write import read_bytes
-from olp.workflows.batch_work import Config, Task
+from olp.workflows.batch_task import Config, Task
 from olp.workflows.correct import CorrectOptions
 from olp.workflows.session import Session
 
@@ -28,6 +29,8 @@ def config_of(
     """The setup of machine and job with the files that it names; `known` are errors that are stated in place
     of both. Raises as `Session.start`."""
     sources = Sources()
+    if known is None and have_joints(machine, job, sources.read):
+        return held(Config(machine, job, dialect, sources.parcel(), sources.there(), "", joints=True))
     session = Session.start(machine if known is None else known, job, dialect=dialect, sources=sources)
     setup = session.setup
     for name in filter(None, (setup.machine.calibration, *_beside(session), setup.job.sensor_log)):

@@ -1,103 +1,24 @@
-"""What a worker of a batch does: one program corrected, or a released one judged, from bytes to bytes.
-
-Nothing here reads or writes a file, and a task is the same wherever it is done.
-"""
+"""What a worker of a batch does: one program corrected, or a released one judged, from bytes to bytes."""
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
 from olp.core.errors import OlpError, ProgramError
-from olp.core.values import dataclass
 from olp.core.version import __version__
-from olp.errormodel.known import KnownErrors
 from olp.files.sources import Parcel, Source, Wanted
 from olp.findings.catalogue import Finding
 from olp.workflows import correct, refusals, verify
-from olp.workflows.correct import Correction, CorrectOptions
+from olp.workflows.batch_task import Config, Outcome, Task, counts
 from olp.workflows.session import Session
 from olp.workflows.verify import VerifyOptions
 
-#: Makes the review page of a correction: session, nominal program, options, correction, name of the output.
-Page = Callable[[Session, Source, CorrectOptions, Correction, str], bytes]
-
 #: Exit code of a program that no error of ours ended.
 UNEXPECTED = 4
-#: Setups that a worker keeps.
-_KEPT = 16
 #: letters of the text of an exception that is not ours
 _MOST_LETTERS = 200
-
-#: Sessions by the digest of their setup. A thread has its own, as a session is no shared value.
-_SESSIONS = threading.local()
-
-
-@dataclass(frozen=True, slots=True)
-class Config:
-    """Machine, job and calibration of tasks, as bytes: `files` by their names in a parcel, `there` are names
-    of files that are there and are not sent, `digest` stands for all of this. `calibration` is another file
-    than the machine names, where one is tried. `known` are errors that are stated in place of a machine."""
-
-    machine: str | None
-    job: str | None
-    dialect: str | None
-    files: Mapping[str, bytes | None]
-    there: frozenset[str]
-    digest: str
-    calibration: str | None = None
-    known: KnownErrors | None = None
-
-    def session(self) -> Session:
-        """A session of its own, with the calibration as far as it is loaded by then."""
-        kept: dict[str, Session] = _SESSIONS.__dict__.setdefault("kept", {})
-        if self.digest not in kept:
-            sources = Parcel(self.files, self.there)
-            machine = self.machine if self.known is None else self.known
-            session = Session.start(machine, self.job, dialect=self.dialect, sources=sources)
-            if self.calibration is not None:
-                setup = session.setup
-                other = replace(setup.machine, calibration=self.calibration)
-                session = session.of(replace(setup, machine=other))
-            while len(kept) >= _KEPT:
-                del kept[next(iter(kept))]
-            kept[self.digest] = session
-        return kept[self.digest]
-
-
-@dataclass(frozen=True, slots=True)
-class Task:
-    """A program to correct. `files` are those beside the setup, the program among them, by their names in a
-    parcel. `output` is the name of the corrected program, `report` that of its report ("": none), with
-    `plots` or without. `page` makes its review page. With `released`, the name of a corrected program among
-    the files, that one is judged instead, and nothing is written."""
-
-    program: str
-    files: Mapping[str, bytes | None]
-    options: CorrectOptions
-    output: str
-    report: str = ""
-    plots: bool = False
-    page: Page | None = None
-    released: str | None = None
-    version: str = __version__
-
-
-@dataclass(frozen=True, slots=True)
-class Outcome:
-    """What became of a task: a row of the summary, and the bytes to be written, None where there are none.
-    `wanted` is a file that the task needs before it can be done; there is no row then. `used` are the names
-    of the files that it asked for. `lasting`: the same inputs have the same outcome."""
-
-    row: Mapping[str, Any] | None
-    text: bytes | None = None
-    report: bytes | None = None
-    page: bytes | None = None
-    used: tuple[str, ...] = ()
-    wanted: str | None = None
-    lasting: bool = True
 
 
 def perform(config: Config, task: Task) -> Outcome:
@@ -110,12 +31,7 @@ def perform(config: Config, task: Task) -> Outcome:
                 "version on all workers"
             )
             return _failed(sentence, UNEXPECTED, lasting=False)
-        session = config.session().reading_from(parcel)
-        source = session.sources.source(task.program)
-        if task.released is not None:
-            outcome = _judged(session, source, task, session.sources.source(task.released))
-        else:
-            outcome = _corrected(session, source, task)
+        outcome = _outcome(config, parcel, task)
     except Wanted as lack:
         return Outcome(None, wanted=lack.path)
     except ProgramError as error:
@@ -134,6 +50,18 @@ def perform(config: Config, task: Task) -> Outcome:
     return replace(outcome, used=tuple(sorted(parcel.used)))
 
 
+def _outcome(config: Config, parcel: Parcel, task: Task) -> Outcome:
+    if config.joints:
+        from olp.workflows import batch_joints
+
+        return batch_joints.outcome(config, parcel, task)
+    session = config.session().reading_from(parcel)
+    source = session.sources.source(task.program)
+    if task.released is not None:
+        return _judged(session, source, task, session.sources.source(task.released))
+    return _corrected(session, source, task)
+
+
 def refused(error: OlpError, findings: Iterable[Finding] = ()) -> Outcome:
     """The outcome of a program that is refused with an error."""
     return _failed(str(error), error.exit_code, findings)
@@ -147,7 +75,7 @@ def lost(message: str) -> Outcome:
 def _failed(
     message: str, exit_code: int, findings: Iterable[Finding] = (), *, lasting: bool = True
 ) -> Outcome:
-    row = {"message": message, "exit_code": exit_code, "ok": False, "findings": _counts(findings)}
+    row = {"message": message, "exit_code": exit_code, "ok": False, "findings": counts(findings)}
     return Outcome(row, lasting=lasting)
 
 
@@ -194,15 +122,5 @@ def _row(stated: Mapping[str, Any], findings: Iterable[Finding]) -> dict[str, An
         "part_ok": None if part is None else part["holds"],
         "ok": verdict["ok"],
         "sentences": list(verdict["sentences"]),
-        "findings": _counts(findings),
+        "findings": counts(findings),
     }
-
-
-def _counts(findings: Iterable[Finding]) -> list[dict[str, Any]]:
-    """Codes with severity and number, in the order in which they are found."""
-    rows: dict[str, dict[str, Any]] = {}
-    for finding in findings:
-        severity = finding.severity.name.lower()
-        row = rows.setdefault(finding.code, {"code": finding.code, "severity": severity, "count": 0})
-        row["count"] += finding.count
-    return list(rows.values())

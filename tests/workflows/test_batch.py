@@ -111,7 +111,7 @@ def test_another_version_is_another_correction(folder: Path, monkeypatch: pytest
 
 
 def _of_version(version: str):  # type: ignore[no-untyped-def]
-    from olp.workflows.batch_work import Task
+    from olp.workflows.batch_task import Task
 
     made = Task.__init__
 

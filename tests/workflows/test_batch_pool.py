@@ -22,7 +22,8 @@ from olp.core.errors import CannotCompute, UsageError
 from olp.files.sources import Parcel, Wanted, in_parcel
 from olp.workflows.batch_pool import ATTEMPTS, Here, Processes, _Worker
 from olp.workflows.batch_setup import config_of
-from olp.workflows.batch_work import Config, Task, perform
+from olp.workflows.batch_task import Config, Task
+from olp.workflows.batch_work import perform
 from olp.workflows.correct import CorrectOptions
 
 ROOT = Path(__file__).resolve().parents[2]

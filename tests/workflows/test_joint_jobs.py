@@ -11,6 +11,7 @@ from cases.joint_jobs import JOINT_JOBS
 from judge.five_axis import Judge
 
 import olp
+from olp.workflows.correct import CorrectOptions
 
 FOLDER = Path(__file__).resolve().parents[2] / "programs"
 #: By job the largest deviation without correction, from and to, in um and urad.
@@ -51,3 +52,27 @@ def test_the_judge_agrees(tmp_path: Path) -> None:
     assert turned < 1e-6 * (
         stated["orientation_max_urad"] + result.report["orientation"]["uncorrectable_urad"]
     )
+
+
+@pytest.mark.slow
+def test_a_batch_takes_machines_of_all_kinds(tmp_path: Path) -> None:
+    """The bytes are those of a call for each; a changed curve of errors makes its program again, no other."""
+    shutil.copytree(FOLDER / "trunnion-mill", tmp_path / "mill")
+    shutil.copytree(FOLDER / "arm-payload", tmp_path / "arm")
+    plant = tmp_path / "out"
+    done = olp.batch([tmp_path / "mill", tmp_path / "arm"], output=plant, workers=1)
+    assert done.exit_code == 0 and done.report["counts"] == {"written": 2}
+    (mill,) = (row for row in done.report["programs"] if row["program"].endswith("dome.nc"))
+    machine, job = tmp_path / "mill" / "machine.toml", tmp_path / "mill" / "job.toml"
+    alone = olp.correct_joints(tmp_path / "mill" / "dome.nc", machine, job)
+    assert (plant / mill["program"]).read_bytes() == alone.data
+    assert mill["corrected_um"] == alone.report["deviation"]["after"]["position_max_um"]
+    with (tmp_path / "mill" / "c.csv").open("a") as curve:
+        curve.write("# again\n")
+    again = olp.batch([tmp_path / "mill", tmp_path / "arm"], output=plant, workers=1)
+    assert {row["program"]: row["state"] for row in again.report["programs"]} == {
+        row["program"]: "written" if row is mill else "unchanged" for row in done.report["programs"]
+    }
+    options = CorrectOptions(part_tolerance_um=5.0)
+    other = olp.batch([tmp_path / "arm"], output=tmp_path / "b", options=options, workers=1)
+    assert other.exit_code == 2 and "--part-tolerance-um" in other.report["programs"][0]["message"]

@@ -8,11 +8,10 @@ from dataclasses import replace
 from olp.core.errors import ConfigError
 from olp.core.values import dataclass
 from olp.files.calibration.reader import files_beside
-from olp.files.config import load_job, of_joints
+from olp.files.config import have_joints, load_job
 from olp.files.kinematics.calibration import load_joint_calibration
 from olp.files.kinematics.machine import load_joint_machine
 from olp.files.real_time import refuse_other
-from olp.files.toml_text import read_toml
 from olp.files.write import PathLike, Reader, read_bytes
 from olp.kinematics.chain import Kinematics
 from olp.kinematics.errors import MachineErrors, Payload
@@ -32,7 +31,7 @@ class JointSetup:
 
 def is_of_joints(machine: PathLike) -> bool:
     """Whether a machine file states joints other than three linear axes. Raises InputError, ConfigError."""
-    return of_joints(read_toml(read_bytes(machine), str(machine))[0])
+    return have_joints(machine, None)
 
 
 def load_joint_errors(

@@ -106,6 +106,18 @@ def report_of(
     }
 
 
+def filed(report: dict[str, Any], name: str, date: datetime.date | None) -> bytes:
+    """The report of a correction in the form that `name` ends in."""
+    from olp.core.version import __version__
+    from olp.reports.document import in_form
+    from olp.reports.document_joints import correction
+    from olp.reports.report import to_json
+
+    if Path(name).suffix.lower() == ".json":
+        return to_json(report)
+    return in_form(correction(report, __version__, date), name)
+
+
 def _summary(deviation: Deviation, judged: Mask) -> dict[str, float | None]:
     """The largest and the rms deviation of the moves that cut."""
     samples = int(deviation.samples[judged].sum())
