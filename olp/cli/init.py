@@ -34,7 +34,8 @@ Travel = tuple[tuple[str, float, float], ...]
 @click.option(
     "--trafo",
     metavar="FILE",
-    help="A HAL file of LinuxCNC that sets its kinematics: write the machine file alone.",
+    help="Kinematics of a control: a HAL file of LinuxCNC, or vectors of a Sinumerik ($TC_CARR or "
+    "$MC_TRAFO5). Write the machine file alone.",
 )
 @click.option("--name", help="Name of the machine. Default: that in FILE, or the folder's name.")
 @click.option("--chain", help="Axes from workpiece to tool, F the frame. Default: FXYZ.")
@@ -132,9 +133,9 @@ def _of_joints(
     """Write the machine file of a machine of any joints, which `option` describes. Raises UsageError,
     InputError, ConfigError."""
     from olp.files.fields import CONTROLLER_NAMES, unknown_dialect
-    from olp.files.kinematics.hal import machine_of_hal
     from olp.files.kinematics.mdh import machine_of_mdh
     from olp.files.kinematics.structures import machine_of_structure
+    from olp.files.kinematics.trafo import machine_of_trafo
     from olp.files.kinematics.urdf import machine_of_urdf
     from olp.files.write import check_targets, make_folder, write_files
 
@@ -148,7 +149,7 @@ def _of_joints(
     elif option == "--mdh":
         made = machine_of_mdh(value, title, controller)
     elif option == "--trafo":
-        made = machine_of_hal(value, title, controller)
+        made = machine_of_trafo(value, title, controller)
     else:
         made = machine_of_structure(value, title, controller)
     inputs = [] if option == "--structure" else [value]
