@@ -73,9 +73,9 @@ def require() -> None:
 @dataclass(frozen=True, slots=True)
 class Kinematics:
     """A component `name`, compiled in `folder`, and the lines of HAL that go with it; `pins` are sampled
-    besides. Its functions `begin` and `end` go around motion-controller. `letters` are those of the joints in
-    their order, `options` those of its loadrt. With `home` all joints turn, and begin there, in deg: letters
-    are those of poses then."""
+    besides. Its functions `begin` and `end` go around motion-controller; a module of LinuxCNC, which is
+    `built_in`, has none. `letters` are those of the joints in their order, `options` those of its loadrt.
+    With `home` all joints turn, and begin there, in deg: letters are those of poses then."""
 
     name: str
     folder: Path
@@ -85,6 +85,7 @@ class Kinematics:
     letters: str = "XYZ"
     options: str = ""
     home: tuple[float, ...] = ()
+    built_in: bool = False
 
 
 def run(
@@ -105,7 +106,7 @@ def run(
     env["CONTROLLER_FOLDER"] = str(folder)
     if os.getuid() == 0:  # the realtime part refuses to be root
         env |= {"RTAPI_UID": "65534", "RTAPI_FIFO_PATH": str(folder / ".rtapi_fifo")}
-    if kinematics is not None:
+    if kinematics is not None and not kinematics.built_in:
         env |= _in_step(folder, kinematics)
     lock = Path(tempfile.gettempdir()) / "judge-controller.lock"
     driver_log = folder / "driver.log"
@@ -173,6 +174,9 @@ def _end_realtime(folder: Path) -> None:
 def _configure(machine: Path, folder: Path, tables: Path | None, kinematics: Kinematics | None) -> None:
     setup = _setup(machine, {}, {}, None)
     letters = kinematics.letters if kinematics else "XYZ"
+    module = kinematics.name if kinematics else "trivkins coordinates=XYZ"
+    if kinematics and kinematics.built_in:
+        module = f"{kinematics.name} {kinematics.options}"
     sections: dict[str, dict[str, object]] = {
         "EMC": {"VERSION": "1.1", "MACHINE": "judge"},
         "DISPLAY": {"DISPLAY": folder / "display", "PROGRAM_PREFIX": folder},
@@ -187,7 +191,7 @@ def _configure(machine: Path, folder: Path, tables: Path | None, kinematics: Kin
             "MAX_LINEAR_ACCELERATION": ACCELERATION_MM_S2,
         },
         "KINS": {
-            "KINEMATICS": kinematics.name if kinematics else "trivkins coordinates=XYZ",
+            "KINEMATICS": module,
             "JOINTS": len(letters),
         },
     }  # fmt: skip
@@ -226,7 +230,7 @@ def _configure(machine: Path, folder: Path, tables: Path | None, kinematics: Kin
     nets = {**_NETS, **more, **{pin: f"sampler.0.pin.{7 + i}" for i, pin in enumerate(own.pins)}}
     linked = {source: signal for signal, source in re.findall(r"^net (\S+) (\S+) =>", own.hal, re.MULTILINE)}
     around = [f"addf {own.name}.{function} servo-thread\n" for function in ("begin", "end")]
-    before, behind = around if kinematics else ("", "")
+    before, behind = around if kinematics and not kinematics.built_in else ("", "")
     (folder / "m.hal").write_text(
         f"loadrt {own.name} {own.options}\n"
         f"loadrt motmod servo_period_nsec={PERIOD_NS} num_joints={len(letters)}\n"
