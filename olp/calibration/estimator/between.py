@@ -1,7 +1,8 @@
 """What a curve may do between its targets within the cells of its spline, which cannot hold it.
 
 The same processes on a spline of many more cells, known at the same targets, leave more open between them.
-The difference of both variances is what the cells hide.
+The difference of both variances is what the cells hide. Waves of a screw are shorter than any of these cells:
+ripple that readings show at targets is another one right beside them, and targets do not tell it.
 """
 
 from __future__ import annotations
@@ -49,10 +50,9 @@ def hidden(
     ends = np.array([spline.low_mm, spline.high_mm])
     q = np.union1d((targets[:-1, None] + inside).ravel(), np.append(targets[-1:], ends))
     straight = lines[0][0].quantity == "straightness"
-    values = [
-        _left(one, scales, amplitude, q, targets, variance, datum_mm, straight) for one in (fine, spline)
-    ]
-    return Hidden(q, np.maximum(values[0] - values[1], 0.0))
+    read = _Read(targets, variance, datum_mm, straight)
+    left, held = (_left(one, scales, amplitude, q, read, apart=one is fine) for one in (fine, spline))
+    return Hidden(q, np.maximum(left - held, 0.0))
 
 
 def _read(lines: Sequence[tuple[Line, Noise]]) -> tuple[Array, Array]:
@@ -65,24 +65,39 @@ def _read(lines: Sequence[tuple[Line, Noise]]) -> tuple[Array, Array]:
     return targets[order], variance[order]
 
 
-def _left(
-    spline: Spline, scales: Scales, amplitude: float, q: Array, targets: Array, variance: Array,
-    datum_mm: float, straight: bool,
-) -> Array:  # fmt: skip
-    """(n,) variance at q of a curve that is zero at the datum, and known at targets up to its level."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _Read:
+    """Targets (n,) of a curve that is zero at the datum, with the variance of each; whether its mean slope is
+    zero."""
+
+    targets: Array
+    variance: Array
+    datum_mm: float
+    straight: bool
+
+
+def _left(spline: Spline, scales: Scales, amplitude: float, q: Array, read: _Read, *, apart: bool) -> Array:
+    """(n,) variance at q of a curve that is known at targets up to its level. Where `apart`, ripple at one
+    place says nothing of the place beside it."""
     table, vectors = _spectrum(spline)
-    own = scales.values**2 @ table
+    sizes = scales.values**2
+    own = sizes @ table
+    grain = 0.0
+    if apart:
+        own = sizes[:-1] @ table[:-1]
+        grain = float(sizes[-1] * (spline.values(q) ** 2).sum(axis=1).mean())
     own[:STRAIGHT] = amplitude**2
     root = vectors * np.sqrt(own)
-    wanted = (spline.values(q) - spline.values(np.array([datum_mm]))) @ root
-    if straight:
+    wanted = (spline.values(q) - spline.values(np.array([read.datum_mm]))) @ root
+    if read.straight:
         slope = slope_weights(spline) @ spline.values(slope_grid(spline)) @ root
-        wanted = wanted - (q - datum_mm)[:, None] * slope
-    seen = spline.values(targets) @ root
-    inner = seen @ seen.T + np.diag(variance)
-    across = wanted @ seen.T
+        wanted = wanted - (q - read.datum_mm)[:, None] * slope
+    seen = spline.values(read.targets) @ root
+    same = np.equal.outer(read.targets, read.targets)
+    inner = seen @ seen.T + np.diag(read.variance) + grain * same
+    across = wanted @ seen.T - grain * (read.targets == read.datum_mm)
     explained = np.einsum("ij,ji->i", across, np.linalg.solve(inner, across.T))
-    return np.asarray((wanted**2).sum(axis=1) - explained)
+    return np.asarray((wanted**2).sum(axis=1) + 2.0 * grain * (q != read.datum_mm) - explained)
 
 
 @cache

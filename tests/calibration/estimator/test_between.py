@@ -29,18 +29,28 @@ def test_steps_are_open_as_a_brownian_bridge() -> None:
 
 
 def test_more_cells_hide_less() -> None:
-    scales = Scales(0.0, 0.0, 1e-4, 1e-5)
+    scales = Scales(0.0, 0.0, 1e-4, 0.0)
     few, many, all_of_it = (np.mean(hides(scales, 12, cells).variance) for cells in (24, 48, 132))
     assert few > 1.3 * many
     assert all_of_it < 1e-6 * few
 
 
 def test_nothing_is_hidden_at_targets_and_of_what_is_smooth() -> None:
-    rough = hides(Scales(0.0, 0.0, 1e-4, 1e-5), 12, 24)
+    rough = hides(Scales(0.0, 0.0, 1e-4, 0.0), 12, 24)
     targets = np.linspace(0.0, LENGTH, 12)
     assert rough.at(targets).max() < 1e-3 * rough.variance.max()
     smooth = hides(Scales(1e-2, 0.0, 0.0, 0.0), 12, 24)
     assert smooth.variance.max() < 1e-3 * rough.variance.max()
+
+
+def test_ripple_beside_a_target_is_another_one() -> None:
+    """A wave of a screw is elsewhere a few millimetres on. The mean square of a cubic B-spline is 151/315."""
+    ripple = hides(Scales(0.0, 0.0, 0.0, 1e-5), 12, 24)
+    inside = np.linspace(0.0, LENGTH, 12)[1:-1]
+    assert ripple.at(inside) == pytest.approx(np.full(10, 1e-10 * 151.0 / 315.0), rel=0.35)
+    # under steps, what a target shows is its own ripple too
+    both = hides(Scales(0.0, 0.0, 1e-4, 1e-5), 12, 24)
+    assert both.at(inside) == pytest.approx(np.full(10, 2e-10 * 151.0 / 315.0), rel=0.1)
 
 
 @pytest.mark.parametrize("component", ["EXX", "EYX", "EAX"])
