@@ -119,6 +119,11 @@ REFUSED = [
     ('$TC_CARR9[1]=1\n$TC_CARR24[1]=5\n$TC_CARR23[1]="P"\n', "TC_CARR24.1. adds"),
     ('$TC_CARR9[1]=1\n$TC_CARR12[1]=1\n$TC_CARR23[1]="P"\n', "both rotary axes would be C"),
     ('$TC_CARR9[1]=1\n$TC_CARR23[1]="P"\n$TC_CARR23[2]="P"\n', "2 sets"),
+    ('$TC_CARR9[1]=1\n$TC_CARR9[1]=0\n$TC_CARR23[1]="P"\n', "state it once"),
+    ('$TC_CARR9[1]=1\n$TC_CARR23[1]="P"\n$MC_TRAFO_TYPE_1=24\n', "keep one"),
+    ('$TC_CARR9[1]=1\n$TC_CARR30[1]=5\n$TC_CARR32[1]=-5\n$TC_CARR23[1]="P"\n', "limits"),
+    ("$MC_TRAFO_TYPE_1=24\n$MC_TRAFO5_AXIS1_1[2]=1\n$MC_TRAFO5_ROT_SIGN_IS_PLUS_1[0]=0\n", "changes what"),
+    ("$MC_TRAFO_TYPE_1=24\n$MC_TRAFO5_AXIS1_1[2]=1\n$MC_TRAFO5_BASE_ORIENT_1[0]=1\n", "along Z"),
     ('$TC_CARR9[1]=R1\n$TC_CARR23[1]="P"\n', "expected a number"),
 ]
 

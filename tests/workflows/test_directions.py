@@ -127,6 +127,7 @@ NO_POINTS = [
     (POINTS + b"CIRCLE/0.,0.,3.,0.,0.,1.,5.\nGOTO/5.,2.,3.\nFINI\n", "an arc", 5, True),
     (POINTS + b"GODLTA/1.,0.,0.\nFINI\n", "a distance", 4, True),
     (POINTS + b"FINI\n", "start_deg", 3, False),
+    (POINTS + b"FROM/0.,0.,50.,0.,0.,1.\nFINI\n", "has a tool axis", 4, True),
 ]
 
 
@@ -196,3 +197,78 @@ def test_a_direction_holds_until_the_next_one(tmp_path: Path) -> None:
     lines = [line for line in corrected(tmp_path, text, "fanuc").data.splitlines() if b"I" in line]
     assert len(lines) > 2
     assert all(re.search(rb"I-?0\.\d{7} J-?0\.\d{7} K0\.\d{7}", line) for line in lines[1:])
+
+
+AWAY = b"I-0.2 J-0.3 K0.9"
+
+
+def test_a_move_that_is_kept_before_the_outer_axis_is_free(tmp_path: Path) -> None:
+    text = F_HEAD + b"G1 X5. I0 J0 K1 F100.\nG53 G0 Z0\nG0 X5. Y0 Z50.\nM30\n"
+    assert corrected(tmp_path, text, "fanuc").report["verdict"]["ok"]
+
+
+@pytest.mark.parametrize("control", ["fanuc", "sinumerik"])
+def test_a_direction_in_force_is_not_stated_again(control: str, tmp_path: Path) -> None:
+    """Where nothing turns, no byte changes: behind words of axes, at the begin, and in another frame."""
+    zero = '[kinematics]\ntcp_frame_zero = "axis-zero"\n'
+    machine = machine_file(tmp_path, CHAINS[0], control=control, errors=False, extra=zero)
+    text = F_HEAD + b"G1 X5. " + AWAY + b" F100.\nM30\n"
+    if control == "sinumerik":
+        text = S_HEAD + b"G1 X5 A3=-0.2 B3=-0.3 C3=0.9 F100\nROT Z30\nX7 Y0 Z0\nROT\nX9 Y0 Z0\nM30\n"
+    assert olp.correct_joints(text, machine).data == text
+
+
+def test_points_go_on_behind_a_change_of_tool(tmp_path: Path) -> None:
+    """TLAXIS states a direction each time, and a deck of cards stays one."""
+    job = tmp_path / "job.toml"
+    job.write_text(STARTS[1])
+    machine = machine_file(tmp_path, CHAINS[0], extra="")
+    axis = b"TLAXIS/-0.2,-0.3,0.9327379\n"
+    text = b"UNITS/MM\nLOADTL/1\n" + axis + b"GOTO/1.,2.,3.\nFEDRAT/500.,MMPM\n" + axis + b"GOTO/5.,2.,3.\n"
+    text += b"LOADTL/1\nRAPID\nGOTO/5.,2.,3.,-0.2,-0.3,0.9327379\nGOTO/9.,2.,3.\nFINI\n"
+    result = olp.correct_joints(text, machine, job, tolerance_urad=2.0)
+    assert result.report["verdict"]["ok"], result.to_text()
+    cards = b"".join(b"%-72s%08d\n" % (line, 10 * k) for k, line in enumerate(text.splitlines(), 1))
+    carded = olp.correct_joints(cards, machine, job, tolerance_urad=2.0)
+    assert carded.report["verdict"]["ok"]
+    assert {len(line) for line in carded.data.splitlines()} == {80}
+
+
+def test_a_frame_that_turns_takes_the_tool_along(tmp_path: Path) -> None:
+    """Points without a direction have the numbers of the one before, in the new frame too."""
+    job = tmp_path / "job.toml"
+    job.write_text(STARTS[1])
+    axis, turn = (
+        b",-0.2,-0.3,0.9327379\n",
+        b"TRACUT/.9396926208,-.3420201433,0,10,.3420201433,.9396926208,0,0,0,0,1,0\n",
+    )
+    head = b"UNITS/MM\nLOADTL/1\nGOTO/1.,2.,3." + axis + b"FEDRAT/500.,MMPM\n" + turn
+    machine = machine_file(tmp_path, CHAINS[0])
+    ends = [
+        olp.correct_joints(head + b"GOTO/20.,2.,3." + last + b"FINI\n", machine, job).data.splitlines()[-2]
+        for last in (b"\n", axis)
+    ]
+    assert ends[0] == ends[1]
+
+
+MORE_REFUSED = [
+    ("fanuc", F_HEAD + b"G1 X5. " + AWAY + b" F100.\nG49\nG0 X0 Y0 Z0\nG91 G0 C1.\n", "a distance of a", 7),
+    ("sinumerik", S_HEAD + b"G1 X5 A3=0 B3=0 C3=1 F100\nX9 A3=-0.25 B3=-0.3 C3=0.9\n", "near by|open", 8),
+]
+
+
+@pytest.mark.parametrize(("control", "text", "message", "line"), MORE_REFUSED)
+def test_more_that_is_not_known_is_refused(
+    control: str, text: bytes, message: str, line: int, tmp_path: Path
+) -> None:
+    with pytest.raises(olp.ProgramError, match=message) as caught:
+        corrected(tmp_path, text, control)
+    assert caught.value.line == line
+
+
+def test_a_head_near_the_end_of_its_reach_is_proved(tmp_path: Path) -> None:
+    """There the inner axis hangs on the digits of a direction, too."""
+    text = b"G21 G90 G54\nG0 X0 Y0 Z0 A160. C30.\nG43.5 H1 X0 Y0 Z0\n"
+    text += b"G1 X5. I0.8771635 J0.3861236 K0.2854692 F100.\nX9. I0.8825478 J0.3683607 K0.2922667\n"
+    machine = machine_file(tmp_path, "F X Y Z C A", control="fanuc")
+    assert olp.correct_joints(text, machine, tolerance_urad=2.0).report["verdict"]["ok"]

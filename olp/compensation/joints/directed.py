@@ -78,6 +78,7 @@ class Directions:
         given = np.asarray((rotary.slot >= 0).any(axis=1), bool)
         names = ", ".join(_shown(dialect))
         always = bool(dialect.direction_codes)
+        counting = given & ((path.flag & np.uint8(Flag.INCREMENTAL)) != 0) & stated.any()
         for wrong, why in (
             (
                 stated & ~allowed,
@@ -85,6 +86,7 @@ class Directions:
             ),
             (stated & given, f"{names} are beside words of rotary axes; program one of both"),
             (given & allowed & always, f"a rotary axis has a word where {names} state the direction"),
+            (counting, "a distance of a rotary axis where others state directions; program its position"),
         ):
             if wrong.any():
                 raise ProgramError(why, line=int(path.line[np.argmax(wrong)]), code="OLP565")
@@ -99,6 +101,16 @@ class Directions:
         unit = towards.stated / size[:, None]
         return Directions(towards.slot, unit, led, _decimals(program, towards.slot))
 
+    def refuse_other_axes(self, program: Program, structure: Structure) -> None:
+        """Raise ProgramError where directions turn other than two rotary axes."""
+        if not self.led.any():
+            return
+        try:
+            pair_of(structure)
+        except ConfigError as error:
+            first = int(program.toolpath.line[np.argmax(self.led)])
+            raise ProgramError(str(error), line=first, code="OLP565") from None
+
     def positions(
         self, program: Program, structure: Structure, letters: Sequence[str], rotary: RotaryWords,
         found_deg: Array, degrees: Array,
@@ -109,11 +121,7 @@ class Directions:
         rows = np.flatnonzero(self.stated)
         if not rows.size:
             return found_deg
-        line = program.toolpath.line
-        try:
-            pair = pair_of(structure)
-        except ConfigError as error:
-            raise ProgramError(str(error), line=int(line[rows[0]]), code="OLP565") from None
+        line, pair = program.toolpath.line, pair_of(structure)
         towards = self.turned(program, rows, self.unit[rows])
         both, free = branches(structure, towards), refuse_near(structure, towards, line[rows]).tolist()
         columns = [letters.index(joint.name) for joint in pair]
@@ -152,10 +160,14 @@ class Directions:
         rows = np.flatnonzero(self.led & np.isfinite(axes).all(axis=1))
         if rows.size:
             structure = motion.structure
-            column = structure.order.index(pair_of(structure)[0].name)
-            towards = motion.nominal(axes[rows], np.zeros(len(rows), np.int64)).rotation[:, :, 2]
-            sine = along_outer(structure, towards)
-            wide[rows, column] = np.where(sine < _POLE, np.inf, near[column] / np.maximum(sine, _POLE))
+            columns = [structure.order.index(joint.name) for joint in pair_of(structure)]
+            tool = np.zeros(len(rows), np.int64)
+            towards = motion.nominal(axes[rows], tool).rotation[:, :, 2]
+            slopes = motion.slopes(axes[rows], tool)[:, 3:, columns]
+            across = np.cross(slopes, towards[:, :, None], axis=1)
+            least = np.linalg.svd(across, compute_uv=False)[:, -1]
+            wide[np.ix_(rows, np.array(columns))] /= np.maximum(least, _POLE)[:, None]
+            wide[rows[along_outer(structure, towards) < _POLE], columns[0]] = np.inf
         return wide
 
     def turned(self, program: Program, rows: Index, directions: Array, *, back: bool = False) -> Array:

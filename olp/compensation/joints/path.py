@@ -89,18 +89,16 @@ class JointPath:
 
     def at(self, move: Index, share: Array) -> Array:
         """(r, axes) programmed coordinates at shares of moves."""
+        return self.between(self.start[move], self.end[move], share, move)
+
+    def between(self, start: Array, end: Array, share: Array, move: Index) -> Array:
+        """(r, axes) coordinates at shares of ways from `start` to `end`, led as in moves. Raises ProgramError
+        where the tool has directions there that are not reached."""
         try:
-            return self.motion.between(
-                self.start[move], self.end[move], share, self.tool[move], self.vector[move]
-            )
+            return self.motion.between(start, end, share, self.tool[move], self.vector[move])
         except NotInvertible as error:
             assert error.row is not None
-            raise ProgramError(
-                "along this move the tool has directions that no rotary axis values give; split it, or lead "
-                "it by the axes",
-                line=int(self.line[move[error.row]]),
-                code="OLP566",
-            ) from None
+            raise unreached(int(self.line[move[error.row]])) from None
 
     @staticmethod
     def of(
@@ -127,6 +125,7 @@ class JointPath:
         first = np.array([start_deg.get(letter, np.nan) for letter in letters])
         degrees = rotary.follow(program, first, offsets, found)
         directions = Directions.of(program, rotary)
+        directions.refuse_other_axes(program, structure)
         if directions.stated.any():
             since = np.vstack((first, degrees))
             found = directions.positions(program, structure, letters, rotary, found, since)
@@ -217,6 +216,16 @@ class JointPath:
             feed, ~none, none, none, none, _places(structure), Drilled.none(count),
             Directions.none(count), rows,
         )  # fmt: skip
+
+
+def unreached(line: int) -> ProgramError:
+    """Why a move is refused along which directions of the tool are not reached."""
+    return ProgramError(
+        "along this move the tool has directions that no rotary axis values near by give; split it, or lead "
+        "it by the axes",
+        line=line,
+        code="OLP566",
+    )
 
 
 def _places(structure: Structure) -> Index:

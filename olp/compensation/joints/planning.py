@@ -233,7 +233,7 @@ def _worst(path: JointPath, begin: _Rows, end: _Rows, limits: JointLimits, count
     move = begin.move[owner]
     tool, tip = path.tool[move], path.tip[move]
     ends = [motion.programmed(rows.axes, path.tool[rows.move], path.tip[rows.move]) for rows in (begin, end)]
-    written = motion.between(ends[0][owner], ends[1][owner], part, tool, path.vector[move])
+    written = path.between(ends[0][owner], ends[1][owner], part, move)
     share = begin.share[owner] + part * (end.share - begin.share)[owner]
     nominal = motion.targets(path.at(move, share), tool, tip)
     target = Poses(nominal.rotation, nominal.position + path.shift_mm[move])

@@ -128,7 +128,10 @@ class JointWriter:
         """The digits of directions, and the rotary values that they lead to."""
         if not self.led.any():
             return
-        words, columns = DirectionWords.of(self.path, self.plan, self.head), slice(len(self.order), None)
+        words, columns = (
+            DirectionWords.of(self.path, self.plan, self.head, emitted),
+            slice(len(self.order), None),
+        )
         self.write[:, columns] = words.write[:, None]
         self.mantissa[:, columns], self.decimals[:, columns] = words.mantissa, words.decimals
         emitted[np.ix_(self.led, self.rotary)] = words.axes[np.ix_(self.led, self.rotary)]

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from olp.core.errors import InputError
 from olp.core.machine import ZERO, Vector
@@ -43,6 +44,16 @@ _CLOSED: Mapping[str, Sequence[tuple[str, ...]]] = {
 }
 _CLOSE_MM = 1e-3
 _LETTERS = "ABC"
+#: A name of a rotary axis that tells its letter.
+_NAME = re.compile(r"(?i)[ABC]\d*")
+#: Data of a transformation that change what its vectors mean, each with the values that do not.
+_NEUTRAL: Mapping[str, tuple[str, ...]] = {
+    "TRAFO5_ROT_SIGN_IS_PLUS_1": ("1", "TRUE"),
+    "TRAFO5_ROT_AX_OFFSET_1": ("0", "0.0"),
+    "TRAFO5_ROT_OFFSET_FROM_FRAME_1": ("0", "FALSE"),
+    "TRAFO5_NUTATOR_AX_ANGLE_1": ("0", "0.0", "45", "45.0"),
+}
+_BASE_ORIENT = "TRAFO5_BASE_ORIENT_1"
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,13 +89,15 @@ def _read(text: str, file: str) -> Vectors:
     data: dict[str, str] = {}
     for match in _STATED.finditer(_REMARK.sub("", text)):
         value = match["value"].strip('"')
-        if match["part"]:
-            sets.setdefault(match["set"], {})[int(match["part"])] = value
-        else:
-            data[f"{match['name'].upper()}[{match['index'] or 0}]"] = value
+        kept: dict[Any, str] = sets.setdefault(match["set"], {}) if match["part"] else data
+        key = int(match["part"]) if match["part"] else f"{match['name'].upper()}[{match['index'] or 0}]"
+        if kept.setdefault(key, value) != value:
+            raise InputError(f"{match[0].strip()}: was {kept[key]} before; state it once", file=file)
     kind = next((number for number in _DATA if data.get("TRAFO_TYPE_1[0]") == str(number)), None)
-    if kind is not None:
+    if kind is not None and not sets:
         return _of_transformation(kind, data, file)
+    if kind is not None:
+        raise InputError("states swivel data and a transformation; keep one of them", file=file)
     used = {number: values for number, values in sets.items() if 23 in values}
     if len(used) != 1:
         found = f"states {len(used)} sets of swivel data" if used else "states no $TC_CARR23"
@@ -107,6 +120,11 @@ def _of_swivel(number: str, values: Mapping[int, str], file: str) -> Vectors:
             )
     vectors = {name: (of(first), of(first + 1), of(first + 2)) for name, first in _NUMBERED.items()}
     low, high = (of(30), of(31)), (of(32), of(33))
+    for a, b in zip(low, high, strict=True):
+        if b < a:
+            raise InputError(
+                f"a rotary axis has limits from {a:g} to {b:g}; expected them in order", file=file
+            )
     first, second = ((a, b) if b > a else WIDE_DEG for a, b in zip(low, high, strict=True))
     kind = values[23].strip("'").upper()
     return Vectors(kind, vectors, (values.get(21, ""), values.get(22, "")), (first, second))
@@ -120,6 +138,18 @@ def _of_transformation(number: int, data: Mapping[str, str], file: str) -> Vecto
         x, y, z = (_number(f"$MC_{key}", data.get(key, "0"), file) for key in keys)
         return (x, y, z)
 
+    for key, value in data.items():
+        neutral = _NEUTRAL.get(key.partition("[")[0])
+        if neutral is not None and value.upper() not in neutral:
+            raise InputError(
+                f"$MC_{key} = {value} changes what the vectors mean, which is not read", file=file
+            )
+    if any(key.startswith(_BASE_ORIENT) for key in data):
+        x, y, z = (
+            _number(f"$MC_{_BASE_ORIENT}[{k}]", data.get(f"{_BASE_ORIENT}[{k}]", "0"), file) for k in range(3)
+        )
+        if x or y or z <= 0.0:
+            raise InputError(f"$MC_{_BASE_ORIENT} is {x:g}, {y:g}, {z:g}; expected a tool along Z", file=file)
     vectors = {vector: of(name) for vector, name in names.items()}
     return Vectors(kind, vectors | {"V1": of("AXIS1"), "V2": of("AXIS2")})
 
@@ -185,8 +215,7 @@ def _direction(vector: Vector, name: str, file: str) -> Vector | None:
 def _named(stated: tuple[str, str], directions: Sequence[Vector | None], file: str) -> tuple[str, str]:
     """The letters of the rotary axes: as they are stated, or by what they turn about, first that which turns
     about one axis the most."""
-    found = [name.strip()[:1].upper() for name in stated]
-    found = [letter if letter and letter in _LETTERS else "" for letter in found]
+    found = [name[0].upper() if _NAME.fullmatch(name.strip()) else "" for name in stated]
     sizes = [[abs(part) for part in direction or ZERO] for direction in directions]
     for which in sorted((0, 1), key=lambda k: -max(sizes[k])):
         if not found[which]:

@@ -207,10 +207,18 @@ class Events(Placing):
 
     def _from(self, statement: Statement, row: int) -> None:
         self._resolve(row)
-        numbers = [f.number for f in statement.fields()][:3]
-        if len(numbers) != 3 or None in numbers:
+        numbers = [f.number for f in statement.fields()]
+        if len(numbers) < 3 or None in numbers[:3]:
             what = f"{shown(statement.head()[1])} needs three numbers"
             raise ProgramError(what, line=statement.line, code="OLP516")
+        if self.tips and len(numbers) > 3:
+            raise ProgramError(
+                f"{shown(statement.head()[1])} has a tool axis, which is not read there; state it in the "
+                "next GOTO or by TLAXIS, and write three numbers",
+                line=statement.line,
+                code="OLP565",
+            )
+        numbers = numbers[:3]
         point = np.array([n[0] / 10.0 ** n[1] for n in numbers if n is not None]) * self.unit_mm
         number = self._frame(statement.line)
         frame = self.table.frames[number]

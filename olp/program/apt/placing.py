@@ -5,6 +5,7 @@ from __future__ import annotations
 from olp.core.errors import ProgramError
 from olp.core.machine import ZERO, Setup, Vector
 from olp.core.toolpath import CutterCompensation
+from olp.core.turns import Turn
 from olp.program.apt.controls import numbers_of
 from olp.program.apt.transforms import NOTHING, Rigid, rigid
 from olp.program.frames import UP, FrameTable, Placement, product, tool_vector_of, turn_of, turned
@@ -29,8 +30,8 @@ class Placing:
         self.length_active = setup.machine.length_active
         self.axis: Vector = UP
         self.up: Vector = UP
-        #: the direction that the last point states, or has from before
-        self.aimed: Vector | None = None
+        #: the direction that the last point states, or has from before, and how its frame lies
+        self.aimed: tuple[Vector, Turn | None] | None = None
         self.systems: list[tuple[object, object]] = []
         self.system: tuple[object, object] = (None, None)
         self.transform: Rigid = NOTHING
@@ -97,7 +98,7 @@ class Placing:
                 line=statement.line,
                 code="OLP516",
             )
-        self.axis = axis_of(x / size, y / size, z / size)
+        self.axis, self.aimed = axis_of(x / size, y / size, z / size), None
 
     def _csys(self, statement: Statement, row: int) -> None:
         values = []

@@ -275,15 +275,16 @@ class _Reader(ArcMoves):
                 code="OLP565",
             )
         stated, _ = _sizes(points, part)
-        if not stated[0] and self.axis != self.aimed:
+        number, count = self._frame(int(line[0])), len(line)
+        turn = self.table.frames[number].turn
+        if not stated[0] and (self.axis, turn) != self.aimed:
             direction[0] = self.axis
         if stated.any():
             x, y, z = direction[np.flatnonzero(stated)[-1]].tolist()
             self.axis = axis_of(x, y, z)
-        self.aimed = self.axis
+        self.aimed = self.axis, turn
         self.collector.put_directions(direction, points.aim[part])
-        count = len(line)
-        return np.full(count, self._frame(int(line[0]))), np.zeros(count, bool), np.tile(UP, (count, 1))
+        return np.full(count, number), np.zeros(count, bool), np.tile(UP, (count, 1))
 
     def _offset_and_turn(self, frame: Index) -> tuple[Array, Array | None]:
         frames = self.table.frames

@@ -143,7 +143,8 @@ def _stated_lines(program: Program) -> Mask:
     words = program.words
     assert words is not None
     if not program.in_blocks:
-        return np.zeros(len(program.toolpath), bool)
+        # what is between points is the post-processor's, which has no reason to turn the tool
+        return np.ones(len(program.toolpath), bool)
     axes = np.flatnonzero(is_in(words.letter, [ord(letter) for letter in "XYZABC"]))
     line = np.searchsorted(words.first_word, axes, "right")
     stated = np.zeros(len(words.first_word) + 1, bool)

@@ -28,6 +28,9 @@ from olp.workflows.joints.report import findings_of, last_digits, outside_box, r
 from olp.workflows.session import Outside, PathLike
 from olp.workflows.shown import Shown
 
+#: Columns of a card behind its statement.
+_CARD_NUMBER = 8
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointOptions(UnrollOptions):
@@ -119,6 +122,10 @@ def _stamped(run: JointRun, dialect: Dialect, nominal: Program, written: bytes |
     if told or not dialect.marks:
         return text
     stamp = stamp_line(run.digest, dialect.comment, real_time=by_control)
+    statements = nominal.statements
+    if statements is not None and statements.cards:
+        # a line of another length would tell a reader that the text is no deck of cards
+        stamp = stamp.ljust(statements.width + _CARD_NUMBER)
     return stamped(text, stamp, nominal.eol(1), dialect.first)
 
 
