@@ -20,7 +20,9 @@ def outcome(config: Config, parcel: Parcel, task: Task) -> Outcome:
     """A program corrected, or a released one judged. Raises as `correct_joints`, and UsageError for what is
     not built for such a machine."""
     options = _options(task)
-    run = JointRun.of(parcel.source(task.program), config.machine, config.job, config.dialect, parcel)
+    run = JointRun.of(
+        parcel.source(task.program), config.machine, config.job, config.dialect, parcel, config.calibration
+    )
     if task.released is not None:
         return Outcome(_row(verified(run, parcel.source(task.released), options)))
     result = corrected(run, options)

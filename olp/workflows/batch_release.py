@@ -14,10 +14,11 @@ from olp.core.errors import CannotCompute, InputError, UsageError
 from olp.core.progress import Progress, silent
 from olp.core.values import dataclass
 from olp.files.calibration.reader import files_beside
+from olp.files.config import have_joints
 from olp.files.folders import digest_of
 from olp.files.history import History, Record, ReleaseLine, writing
 from olp.files.releases import Release, check_name, packed, read_release
-from olp.files.sources import Sources, in_parcel
+from olp.files.sources import Parcel, Sources, in_parcel
 from olp.files.write import make_folder, read_bytes, write_files
 from olp.workflows.batch_pool import Opener, Pool
 from olp.workflows.batch_setup import Files, held, options_from
@@ -221,9 +222,9 @@ def _task(
     machine, job = (setup[key] and str(history.place(setup[key])) for key in ("machine", "job"))
     common = {name: data for name, data in inputs.items() if name != program}
     # meshes are not kept, and no verification reads one
-    config = held(
-        Config(machine, job, setup["dialect"], {**common, **files}, _meshes(common), "", calibration)
-    )
+    meshes, given = _meshes(common), {**common, **files}
+    joints = have_joints(machine, job, Parcel(given, meshes).read)
+    config = held(Config(machine, job, setup["dialect"], given, meshes, "", calibration, joints=joints))
     own = {program: inputs[program], corrected: case.text}
     options = replace(options_from(setup["options"]), **changes)
     return config, Task(program, own, options, Path(case.path).name, released=corrected)

@@ -11,6 +11,8 @@ from cases.joint_jobs import JOINT_JOBS
 from judge.five_axis import Judge
 
 import olp
+from olp.workflows.batch_pool import Here
+from olp.workflows.batch_release import release, what_if
 from olp.workflows.correct import CorrectOptions
 
 FOLDER = Path(__file__).resolve().parents[2] / "programs"
@@ -76,3 +78,27 @@ def test_a_batch_takes_machines_of_all_kinds(tmp_path: Path) -> None:
     options = CorrectOptions(part_tolerance_um=5.0)
     other = olp.batch([tmp_path / "arm"], output=tmp_path / "b", options=options, workers=1)
     assert other.exit_code == 2 and "--part-tolerance-um" in other.report["programs"][0]["message"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("squareness_urad", [16.0, 96.0])
+def test_a_new_calibration_says_of_a_release_what_verify_says(tmp_path: Path, squareness_urad: float) -> None:
+    """The file of the release itself finds it good, and a machine that is 80 urad less square does not."""
+    folder, plant = tmp_path / "mill", tmp_path / "out"
+    shutil.copytree(FOLDER / "trunnion-mill", folder)
+    olp.batch([folder], output=plant, workers=1)
+    release(plant, "may")
+    stated = (folder / "calibration.toml").read_text("utf-8")
+    new = folder / "new.toml"
+    new.write_text(stated.replace("C0Y_urad = 16.0", f"C0Y_urad = {squareness_urad}"), "utf-8")
+    report = what_if(plant, new, lambda _: Here())
+    (row,) = report["programs"]
+    shutil.copy(new, folder / "calibration.toml")
+    text = (plant / "dome.nc").read_bytes()
+    alone = olp.verify_joints(folder / "dome.nc", text, folder / "machine.toml", folder / "job.toml")
+    deviation = alone.report["deviation"]
+    assert row["largest_um"] == deviation["after"]["position_max_um"]
+    assert row["tolerance_um"] == deviation["allowed_um"]
+    assert row["outside"] is not deviation["holds"]
+    assert row["outside"] is (squareness_urad > 16.0)
+    assert report["exit_code"] == int(row["outside"])

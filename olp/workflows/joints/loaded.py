@@ -57,10 +57,11 @@ class JointRun:
     @staticmethod
     def of(
         program: PathLike | bytes | Source | None, machine: PathLike | None, job: PathLike | None = None,
-        dialect: str | None = None, sources: Sources | None = None,
+        dialect: str | None = None, sources: Sources | None = None, calibration: str | None = None,
     ) -> JointRun:  # fmt: skip
-        """From the files; program and machine of the job where they are not given. Raises UsageError,
-        InputError, ConfigError, ProgramError."""
+        """From the files; program and machine of the job where they are not given. `calibration` names
+        another file than the machine does, where one is tried. Raises UsageError, InputError, ConfigError,
+        ProgramError."""
         sources = sources or Sources()
         stated = Job() if job is None else load_job(job, sources.read)
         machine = stated.machine if machine is None else machine
@@ -72,8 +73,10 @@ class JointRun:
         if program is None:
             raise UsageError("no program is given; name it, or set the key program of the job file (-j)")
         described = load_joint_machine(machine, sources.read)
+        if calibration is not None:
+            described = replace(described, calibration=calibration)
         payload = Payload(stated.payload_kg, stated.payload_centre_mm)
-        calibration, digest = load_joint_errors(described, payload, sources.read)
+        loaded, digest = load_joint_errors(described, payload, sources.read)
         stated = replace(stated, dialect=dialect or stated.dialect)
         control, setup, turned = described.control, None, {}
         if control is not None:
@@ -90,7 +93,7 @@ class JointRun:
         named = [str(machine), job, described.calibration, source.name]
         files = tuple(dict.fromkeys(str(Path(name).absolute()) for name in named if name))
         return JointRun(
-            described, calibration, stated, setup, turned, digest, sources, source, (*sources.files, *files)
+            described, loaded, stated, setup, turned, digest, sources, source, (*sources.files, *files)
         )
 
     def dialect(self, source: Source) -> Dialect:
