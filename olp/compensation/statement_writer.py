@@ -9,7 +9,7 @@ from olp.compensation.point_writer import PointWriter
 from olp.compensation.rows import Rows
 from olp.compensation.statement_arcs import ROW, arc_edits
 from olp.compensation.statement_chords import chord_edits
-from olp.compensation.wrapping import carded, wrapped
+from olp.compensation.wrapping import card_stamp, carded, wrapped
 from olp.compensation.writer import Task
 from olp.core.arrays import Index
 from olp.core.toolpath import Kind
@@ -25,7 +25,7 @@ class StatementWriter(PointWriter):
         self._broken = np.array(sorted(self.statements.broken), np.int64)
         self._begins = {arc.first: arc.begin for arc in self.statements.chords}
         if self.statements.cards:
-            self.stamp = self.stamp.ljust(self.statements.width + 8)
+            self.stamp = card_stamp(self.stamp, self.statements.width)
 
     def _start_of(self, move: int) -> int:
         """What states an arc comes before its end point, and belongs to the move too."""

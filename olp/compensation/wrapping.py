@@ -6,7 +6,8 @@ import re
 
 import numpy as np
 
-#: The number of a card, in its last eight columns.
+#: Columns at the end of a card that hold its number, and what may stand in them.
+_COLUMNS = 8
 _CARD_NUMBER = re.compile(rb"[A-Z]{0,4} *\d{1,8} *\Z")
 
 
@@ -28,6 +29,12 @@ def wrapped(text: bytes, width: int, mark: bytes) -> bytes:
     return b"".join([*parts, text[position:]]) if parts else text
 
 
+def card_stamp(stamp: bytes, width: int) -> bytes:
+    """A stamp as a whole card without a number: a line of another length would tell a reader that the text
+    is no deck of cards."""
+    return stamp.ljust(width + _COLUMNS)
+
+
 def carded(text: bytes, width: int, mark: bytes) -> bytes:
     """A text of cards, some of whose lines have another length or are new. Their numbers are put into the
     eight columns behind `width` again, each once. A line that is too long goes on in a card without a
@@ -37,21 +44,21 @@ def carded(text: bytes, width: int, mark: bytes) -> bytes:
     for raw in text.split(b"\n"):
         end = b"\r" if raw.endswith(b"\r") else b""
         line = raw.removesuffix(b"\r")
-        number = line[-8:]
-        numbered = len(line) > 8 and (line[-9:-8] == b" " or len(line) > width)
+        number = line[-_COLUMNS:]
+        numbered = len(line) > _COLUMNS and (line[-_COLUMNS - 1 : -_COLUMNS] == b" " or len(line) > width)
         if not line.strip():
             lines.append(raw)
             continue
         if not (numbered and _CARD_NUMBER.match(number)):
-            number, body = b" " * 8, line.rstrip()
+            number, body = b" " * _COLUMNS, line.rstrip()
         else:
-            body = line[:-8].rstrip()
+            body = line[:-_COLUMNS].rstrip()
         if number == last:
-            number = b" " * 8
+            number = b" " * _COLUMNS
         last = number if number.strip() else last
         first, *more = _broken(body, width, mark, b"\n").split(b"\n")
         lines.append(first.ljust(width) + number + end)
-        lines += [card.ljust(width) + b" " * 8 + end for card in more]
+        lines += [card.ljust(width) + b" " * _COLUMNS + end for card in more]
     return b"\n".join(lines)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from olp.core.errors import UsageError
 from olp.files.sources import Parcel
-from olp.workflows.batch_task import Config, Outcome, Task, counts
+from olp.workflows.batch_task import Config, Outcome, Task, counts, heading
 from olp.workflows.correct import CorrectOptions
 from olp.workflows.joints.correct import JointCorrection, JointOptions, corrected
 from olp.workflows.joints.loaded import JointRun
@@ -48,17 +48,9 @@ def _options(task: Task) -> JointOptions:
 def _row(result: JointCorrection | JointVerification) -> Mapping[str, Any]:
     """The row of a summary, as of other machines: figures of the report, none of its own."""
     stated = result.report
-    program, deviation, calibration = stated["program"], stated["deviation"], stated.get("calibration", {})
-    measured = calibration.get("measured")
+    deviation = stated["deviation"]
     return {
-        "lines": program["lines"],
-        "moves": program["moves"],
-        "dialect": program["dialect"],
-        "machine": stated["machine"]["name"],
-        "calibration": {
-            "measured": None if measured is None else measured.isoformat(),
-            "sha256": calibration.get("sha256"),
-        },
+        **heading(stated),
         "uncorrected_um": deviation["before"]["position_max_um"],
         "corrected_um": deviation["after"]["position_max_um"],
         "allowed_um": deviation["allowed_um"],

@@ -102,3 +102,19 @@ def counts(findings: Iterable[Finding]) -> list[dict[str, Any]]:
         row = rows.setdefault(finding.code, {"code": finding.code, "severity": severity, "count": 0})
         row["count"] += finding.count
     return list(rows.values())
+
+
+def heading(stated: Mapping[str, Any]) -> dict[str, Any]:
+    """What a row tells of a report before its figures: the program, the machine and its calibration."""
+    program, calibration = stated["program"], stated.get("calibration", {})
+    measured = calibration.get("measured")
+    return {
+        "lines": program["lines"],
+        "moves": program["moves"],
+        "dialect": program["dialect"],
+        "machine": stated["machine"]["name"],
+        "calibration": {
+            "measured": None if measured is None else measured.isoformat(),
+            "sha256": calibration.get("sha256"),
+        },
+    }

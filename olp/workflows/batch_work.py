@@ -11,7 +11,7 @@ from olp.core.version import __version__
 from olp.files.sources import Parcel, Source, Wanted
 from olp.findings.catalogue import Finding
 from olp.workflows import correct, refusals, verify
-from olp.workflows.batch_task import Config, Outcome, Task, counts
+from olp.workflows.batch_task import Config, Outcome, Task, counts, heading
 from olp.workflows.session import Session
 from olp.workflows.verify import VerifyOptions
 
@@ -101,19 +101,10 @@ def _judged(session: Session, source: Source, task: Task, released: Source) -> O
 
 def _row(stated: Mapping[str, Any], findings: Iterable[Finding]) -> dict[str, Any]:
     """The row of a summary: figures of a report, none of its own."""
-    verdict, deviation, program = stated["verdict"], stated["deviation"], stated["program"]
+    verdict, deviation = stated["verdict"], stated["deviation"]
     numerical, part = verdict["numerical"], verdict["part"]
-    calibration = stated["calibration"]
-    measured = calibration.get("measured")
     return {
-        "lines": program["lines"],
-        "moves": program["moves"],
-        "dialect": program["dialect"],
-        "machine": stated["machine"]["name"],
-        "calibration": {
-            "measured": None if measured is None else measured.isoformat(),
-            "sha256": calibration["sha256"],
-        },
+        **heading(stated),
         "uncorrected_um": deviation["before"]["between"]["max_um"],
         "corrected_um": numerical["largest_um"],
         "allowed_um": numerical["allowed_um"],

@@ -119,8 +119,6 @@ class Directions:
         `degrees` (1 + n, k) are what words of axes alone lead to, from the start on. Raises ProgramError
         where the program does not say which of two positions it takes."""
         rows = np.flatnonzero(self.stated)
-        if not rows.size:
-            return found_deg
         line, pair = program.toolpath.line, pair_of(structure)
         towards = self.turned(program, rows, self.unit[rows])
         both, free = branches(structure, towards), refuse_near(structure, towards, line[rows]).tolist()

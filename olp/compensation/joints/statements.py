@@ -38,9 +38,8 @@ class StatementJoints(JointWriter):
     def _replaced(self) -> list[Edits]:
         edits, statements = super()._replaced(), self.program.statements
         assert statements is not None
-        for edit in edits:
-            for row, start in enumerate(edit.start.tolist()):
-                word = int(np.searchsorted(self.words.start, start)) if statements.broken else -1
+        for edit in edits if statements.broken else ():
+            for row, word in enumerate(np.searchsorted(self.words.start, edit.start).tolist()):
                 if word in statements.broken:
                     edit.prefix[row] = self.prefixes(statements.broken[word])
         return edits

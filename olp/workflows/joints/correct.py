@@ -13,6 +13,7 @@ from olp.compensation.joints.planning import JointLimits, JointPlan, planned
 from olp.compensation.joints.writing import write_joints
 from olp.compensation.stamp import find_real_time, find_stamp, stamp_line, stamped
 from olp.compensation.tally import Tally
+from olp.compensation.wrapping import card_stamp
 from olp.core.errors import AlreadyCorrected, OutsideBox
 from olp.core.units import MM_PER_UM, RAD_PER_URAD
 from olp.core.values import dataclass
@@ -27,9 +28,6 @@ from olp.workflows.joints.loaded import JointRun
 from olp.workflows.joints.report import findings_of, last_digits, outside_box, report_of
 from olp.workflows.session import Outside, PathLike
 from olp.workflows.shown import Shown
-
-#: Columns of a card behind its statement.
-_CARD_NUMBER = 8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -124,8 +122,7 @@ def _stamped(run: JointRun, dialect: Dialect, nominal: Program, written: bytes |
     stamp = stamp_line(run.digest, dialect.comment, real_time=by_control)
     statements = nominal.statements
     if statements is not None and statements.cards:
-        # a line of another length would tell a reader that the text is no deck of cards
-        stamp = stamp.ljust(statements.width + _CARD_NUMBER)
+        stamp = card_stamp(stamp, statements.width)
     return stamped(text, stamp, nominal.eol(1), dialect.first)
 
 
