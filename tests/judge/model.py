@@ -171,6 +171,16 @@ def _read_map(folder: Path, entry: dict[str, Any]) -> RegularGridInterpolator:
     return RegularGridInterpolator(levels, values)
 
 
+def _read_warm(folder: Path, entry: dict[str, Any]) -> list[tuple[dict[str, Any], float]]:
+    _only(entry, {"structure"}, "thermal")
+    file = tomllib.loads((folder / entry["structure"]).read_text())
+    reference = {sensor["name"]: float(sensor["reference_degC"]) for sensor in file["sensors"]}
+    for one in file["distortions"]:
+        shapes = {f"{shape}_K" for shape in ("offset_um", "offset_urad", "growth_um_m", "growth_urad_m")}
+        _only(one, {"component", "sensor", "span_mm"} | shapes, "distortions")
+    return [(one, reference[one["sensor"]]) for one in file["distortions"]]
+
+
 def _only(table: dict[str, Any], known: set[str], where: str) -> None:
     """Refuse what the judge does not model, so that it never passes a program it cannot judge."""
     unknown = set(table) - known
@@ -200,9 +210,14 @@ class JudgeModel:
         modelled = {"model", "datum_mm", "curves", "squareness", "backlash", "cyclic"}
         _only(
             cal,
-            described | modelled | {"active_during_measurement", "maps", "compliance", "payload_kg"},
+            described
+            | modelled
+            | {"active_during_measurement", "maps", "compliance", "payload_kg", "thermal"},
             "calibration.toml",
         )
+        #: (distortion, reference) of the file of distortions, and the temperatures that hold now, by sensor
+        self.warm = _read_warm(cal_path.parent, cal["thermal"]) if "thermal" in cal else []
+        self.temperature_degC: dict[str, float] = {}
         self.maps = [_read_map(cal_path.parent, entry) for entry in cal.get("maps", [])]
         job_path = path.with_name("job.toml")
         job: dict[str, Any] = tomllib.loads(job_path.read_text()) if job_path.exists() else {}
@@ -336,6 +351,23 @@ class JudgeModel:
             angle += own
             arm = self._node_arm(load, points)
             tool_vector -= np.einsum("nij,nj->ni", _rotation(own) - np.eye(3), arm)
+        for distortion, reference in self.warm:
+            name = distortion["component"]
+            if name[2] != AXES[axis]:
+                continue
+            unit = "um" if name[1] in "XYZ" else "urad"
+            rise = self.temperature_degC.get(distortion["sensor"], reference) - reference
+            per_mm = 1e-3 * distortion.get(f"growth_{unit}_m_K", 0.0)
+            shape = distortion.get(f"offset_{unit}_K", 0.0) + per_mm * (q - np.mean(distortion["span_mm"]))
+            value = (1e-3 if unit == "um" else 1e-6) * rise * shape
+            if unit == "um":
+                shift[:, "XYZ".index(name[1])] += value
+                continue
+            own = np.zeros((len(q), 3))
+            own[:, "ABC".index(name[1])] = value
+            angle += own
+            line = self._line_arm(_CurveFile(axis, {}, False, np.zeros(3), np.zeros(3), False), q)
+            tool_vector -= np.einsum("nij,nj->ni", _rotation(own) - np.eye(3), line)
         for name, period, amplitude, phase, measured in self.cyclic:
             if name[2] != AXES[axis]:
                 continue

@@ -38,6 +38,7 @@ PINS = (
     f"{NAME}.switched-on",
     "motion.tooloffset.z",
     "motion.analog-out-00",
+    "motion.analog-out-01",
 )
 TOOLS = {1: {"Z_mm": 120.0, "radius_mm": 5.0}, 2: {"Z_mm": 85.5, "radius_mm": 3.0}}
 #: kg on the machine while measuring
@@ -45,6 +46,7 @@ MEASURED_KG = 5.0
 #: what every program begins with: every axis takes up its backlash before it cuts
 START = """G21 G90 G61 G17 F1200 G54
 M68 E0 Q5
+M68 E1 Q20
 T1 M6 G43 H1
 G0 X-60 Y-80 Z10
 G0 X5 Y5 Z5
@@ -60,7 +62,28 @@ PROGRAMS = {
     "G0 Z20\nT1 M6 G43 H1\nG0 X70 Y60\nG1 X0 Y0 Z-3\n",
     "payload": "G1 X60 Y10 Z-5\nM68 E0 Q40\nG0 Z5\nG1 X0 Y40 Z-5\nG3 X30 Y40 I15 J0\n"
     "M68 E0 Q15\nG0 Z2\nG1 X60 Y0 Z-9\n",
+    "temperature": "G1 X60 Y10 Z-5\nM68 E1 Q29\nG0 Z5\nG1 X0 Y40 Z-5\nG3 X30 Y40 I15 J0\n"
+    "M68 E1 Q17.5\nG0 Z2\nG1 X60 Y0 Z-9\n",
 }
+WARM = """schema = "olp-thermal-1"
+machine = "m"
+[[sensors]]
+name = "beam"
+reference_degC = 20.0
+range_degC = [15.0, 30.0]
+[[distortions]]
+component = "EXX"
+sensor = "beam"
+span_mm = [0.0, 800.0]
+offset_um_K = -6.0
+growth_um_m_K = 11.0
+[[distortions]]
+component = "EBX"
+sensor = "beam"
+span_mm = [0.0, 800.0]
+offset_urad_K = 2.0
+growth_urad_m_K = 15.0
+"""
 
 
 def turns_alone(path: Path) -> None:
@@ -90,6 +113,9 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     turns_alone(folder / "m" / "z.csv")
     machines.add_map_and_load(machine, np.random.default_rng(1))
     (folder / "m" / "job.toml").unlink()
+    (folder / "m" / "warm.toml").write_text(WARM)
+    with (folder / "m" / "calibration.toml").open("a") as stream:
+        stream.write('[thermal]\nstructure = "warm.toml"\n')
     exported = olp.export_table(machine, "linuxcnc-kins", folder / f"{NAME}.comp", self_test=True)
     assert exported.report["self_test"].endswith(" 0 unsolved")
     write_files(exported.files)
@@ -103,7 +129,8 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def executed(built: Path, program: str, folder: Path, hal: str = "") -> Run:
     lines = (built / f"{NAME}.hal").read_text().splitlines()
     taken = [line for line in lines if not line.startswith("#") and "payload" not in line]
-    taken += [f"net payload motion.analog-out-00 => {NAME}.payload", hal]
+    taken += [f"net payload motion.analog-out-00 => {NAME}.payload"]
+    taken += [f"net warm motion.analog-out-01 => {NAME}.temperature-beam", hal]
     component = Kinematics(NAME, built, "\n".join(taken) + "\n", PINS, ACCELERATION)
     return controller.run(program.encode(), built / "m" / "machine.toml", folder, kinematics=component)
 
@@ -114,9 +141,9 @@ def on_the_machine(built: Path, run: Run) -> tuple[np.ndarray, np.ndarray]:
     play, known = judge.play(run.axis)
     tool, actual = np.zeros(run.axis.shape), run.axis.copy()
     tool[:, 2] = -run.pins[:, 4]
-    for payload in np.unique(run.pins[:, 5]):
-        rows = run.pins[:, 5] == payload
-        judge.load_kg = payload - MEASURED_KG
+    for payload, beam in np.unique(run.pins[:, 5:7], axis=0):
+        rows = (run.pins[:, 5:7] == (payload, beam)).all(axis=1)
+        judge.load_kg, judge.temperature_degC = payload - MEASURED_KG, {"beam": beam}
         actual[rows] += judge.error_mm(run.axis[rows], tool[rows], play[rows])
     return actual, run.cutting & known.all(axis=1)
 
