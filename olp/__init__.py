@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from olp.kinematics.correction import correct_poses as correct_poses
     from olp.review.job import Review as Review
     from olp.review.job import view as view
+    from olp.review.joints import view_joints as view_joints
     from olp.review.notebook.layers import Layers as Layers
     from olp.review.notebook.layers import add_layers as add_layers
     from olp.workflows.batch import Batch as Batch
@@ -129,6 +130,7 @@ _HOME = {
     "simulate": "olp.workflows.simulate",
     "CorrectedPoses": "olp.kinematics.correction",
     "correct_poses": "olp.kinematics.correction",
+    "view_joints": "olp.review.joints",
     "JointCorrection": "olp.workflows.joints.correct",
     "correct_joints": "olp.workflows.joints.correct",
     "JointSimulation": "olp.workflows.joints.simulate",

@@ -3,7 +3,7 @@ it."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,7 +28,9 @@ from olp.cli.common import (
 from olp.core.errors import InputError, UsageError
 
 if TYPE_CHECKING:
+    from olp.files.write import Content
     from olp.findings.catalogue import Finding
+    from olp.review.job import Review
     from olp.workflows.compare import CompareOptions, Comparison
     from olp.workflows.joints.loaded import JointRun
 
@@ -81,18 +83,26 @@ def correct(program: str | None, machine: str | None, job: str | None, words: di
     output = words["output"] or default_output(name)
     if words["as_json"] and output == STREAM:
         raise UsageError("JSON on stdout excludes -o -; name a file with -o")
-    report_file = words["report_file"]
-    refuse_twice(files_of(output, report_file))
-    refuse_early(files_of(output, report_file), run.files, force=words["force"])
+    report_file, review_file = words["report_file"], words["review_file"]
+    if review_file == STREAM:
+        raise UsageError("--review writes a file and cannot be -; name a file, or use olp view -o -")
+    refuse_twice(files_of(output, report_file, review_file))
+    refuse_early(files_of(output, report_file, review_file), run.files, force=words["force"])
 
     from olp.files.write import write_files
     from olp.reports.report import to_json
-    from olp.workflows.joints.correct import JointOptions, corrected
+    from olp.workflows.joints.correct import JointCorrection, JointOptions, correction_of
     from olp.workflows.joints.report import filed
 
-    result = corrected(run, options_of(JointOptions, words))
-    written = {Path(file): result.data for file in files_of(output)}
+    options = options_of(JointOptions, words)
+    done = correction_of(run, options)
+    result = JointCorrection.of(run, done)
+    written: dict[Path, Content] = {Path(file): result.data for file in files_of(output)}
     written |= {Path(file): filed(result.report, file, words["date"]) for file in files_of(report_file)}
+    if review_file is not None:
+        from olp.review.joints import page_of
+
+        written[Path(review_file)] = page_of(run, done, options, output).parts()
     write_files(written, force=words["force"], inputs=run.files)
     if output == STREAM:
         put(result.data)
@@ -171,6 +181,26 @@ def simulate(
         put(to_json(result.report))
     elif output in (None, STREAM):
         put(result.to_csv())
+
+
+def view(
+    program: str | None, machine: str | None, job: str | None, corrected: str | None, words: dict[str, Any]
+) -> tuple[Callable[[], Review], tuple[str, ...], str]:
+    """`olp view`: what makes the page, its inputs, and the name of the program."""
+    runs = [run_of(program, machine, job)]
+    first = runs[0]
+
+    def make() -> Review:
+        from olp.review.joints import reviewed
+        from olp.workflows.joints.correct import JointOptions
+
+        # files may have changed since the last call
+        run = runs.pop() if runs else run_of(program, machine, job)
+        second = None if corrected is None else source(run.sources, corrected)
+        return reviewed(run, options_of(JointOptions, words), second)
+
+    meshes = [mesh.file for mesh in first.job.meshes]
+    return make, (*first.files, *files_of(corrected), *meshes), program or first.program.name
 
 
 def compare(

@@ -72,37 +72,21 @@ def command(
 
     The page is one file that needs no network. PROGRAM and the machine file may come from the job file.
     """
-    call = given(program, machine, job)
-    if live and (output is not None or call.program == STREAM):
-        raise UsageError("--live serves files: leave out -o, and name PROGRAM as a file")
+    from olp.cli import joints
+
     if port and not live:
         raise UsageError("--port is for --live; add --live")
     if STREAM in (corrected, *measured):
         raise UsageError("stdin can be PROGRAM only; name the corrected program and measurements as files")
-    inputs = (*call.inputs, *files_of(corrected, *measured))
-    output = output or _default_output(call.program)
+    if joints.on_joints(machine, job, also=("live", "port", "no_time")):
+        make, inputs, name = joints.view(program, machine, job, corrected, words)
+    else:
+        make, inputs, name = _viewed(program, machine, job, corrected, measured, words, no_time, quiet)
+    if live and (output is not None or name == STREAM):
+        raise UsageError("--live serves files: leave out -o, and name PROGRAM as a file")
+    output = output or _default_output(name)
     if not live:
         refuse_early(files_of(output), inputs, force=force)
-
-    from olp.review import job as review
-
-    options = options_of(review.ViewOptions, words | {"time": not no_time})
-
-    missing = call.setup.machine.missing_limits
-    if missing and not no_time and not quiet:
-        diagnostic(
-            f"note: without {', '.join(missing)} the motion is not planned; times are those of the feed"
-        )
-
-    def make() -> Review:
-        # files may have changed since the last call
-        now = given(program, machine, job) if live else call
-        second = None if corrected is None else source(now.session.sources, corrected)
-        with progress(quiet) as show, naming(call.stream):
-            return review.run(
-                now.session, now.source, options, corrected=second, measured=measured, progress=show
-            )
-
     if live:
         _serve(make, inputs, port, quiet)
         return
@@ -117,6 +101,34 @@ def command(
         diagnostic(
             f"wrote {output}: {len(page.scene.samples)} points, {Path(output).stat().st_size / 1e6:.1f} MB"
         )
+
+
+def _viewed(
+    program: str | None, machine: str | None, job: str | None, corrected: str | None,
+    measured: tuple[str, ...], words: dict[str, Any], no_time: bool, quiet: bool,
+) -> tuple[Callable[[], Review], tuple[str, ...], str]:  # fmt: skip
+    """What makes the page of a machine with three linear axes, its inputs, and the name of the program."""
+    calls = [given(program, machine, job)]
+    call = calls[0]
+    missing = call.setup.machine.missing_limits
+    if missing and not no_time and not quiet:
+        diagnostic(
+            f"note: without {', '.join(missing)} the motion is not planned; times are those of the feed"
+        )
+
+    def make() -> Review:
+        from olp.review import job as review
+
+        options = options_of(review.ViewOptions, words | {"time": not no_time})
+        # files may have changed since the last call
+        now = calls.pop() if calls else given(program, machine, job)
+        second = None if corrected is None else source(now.session.sources, corrected)
+        with progress(quiet) as show, naming(call.stream):
+            return review.run(
+                now.session, now.source, options, corrected=second, measured=measured, progress=show
+            )
+
+    return make, (*call.inputs, *files_of(corrected, *measured)), call.program
 
 
 def _default_output(program: str) -> str:

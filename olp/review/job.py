@@ -24,16 +24,17 @@ from olp.files.write import write_bytes
 from olp.program.program import Program
 from olp.program.registry import Options, read
 from olp.proof.judgement import Judgements
+from olp.proof.proof import Counts
 from olp.review.features.moves import digit_mm
 from olp.review.listing import aligned
 from olp.review.manifest import curve_um, manifest_of
 from olp.review.measured import Matched, Matcher, refuse_unplaced, with_measured
-from olp.review.meshes import Body, of_job, of_machine
+from olp.review.meshes import Body, nodes, of_job, of_machine
 from olp.review.motion import by_feed, feed_seconds, retimed
 from olp.review.motion import table as motion_table
 from olp.review.page import page
-from olp.review.samples import Samples, by_source, sample, with_starts
-from olp.review.scene import Frame, Scene, TipUncertainty
+from olp.review.samples import Samples, by_source, sample, waypoints, with_starts
+from olp.review.scene import Figures, Frame, Scene, TipUncertainty
 from olp.uncertainty.probability import within
 from olp.uncertainty.spread import Points, bands, covariances
 from olp.workflows import refusals
@@ -280,15 +281,21 @@ def _scene(
         table = table.with_measured(replace(layer, line=table.line))
         report = with_measured(report, table, done)
     bodies = tuple(_bodies(session, setup, nominal, samples, frame, position))
+    machine = setup.machine
     return Scene(
         name=texts.source.short or "program",
         corrected_name=Path(texts.corrected_name).name,
         digest=_digest(texts, loaded, digests, session.sources),
-        machine=setup.machine,
+        machine=machine.name,
         nominal=nominal,
         frame=frame,
         samples=samples,
         position_mm=position,
+        waypoint=waypoints(samples, texts.table),
+        axes=samples.axis_mm,
+        drawn_at=samples.axis_mm[0],
+        nodes=nodes(machine),
+        limits={} if plan is None else machine.motion_limits(),
         time_s=moment,
         motion=None if plan is None else motion_table(plan.trajectories, plan.routes),
         duration_s=float(moment[-1]) if plan is None else plan.duration_s,
@@ -299,6 +306,7 @@ def _scene(
         bodies=bodies,
         measured=shown_runs,
         report=report,
+        figures=_figures(report, table),
         table=_as_shown(table, nominal),
         tolerance_um=report["verdict"]["numerical"]["allowed_um"],
         tool_radius_mm=_radius(setup, nominal),
@@ -306,6 +314,16 @@ def _scene(
         digit_mm=digit,
         uncertainty=_uncertainty(loaded, nominal, samples, part_um, options.date),
     )
+
+
+def _figures(report: dict[str, Any], table: Judgements) -> dict[str, Figures]:
+    """What a report says of each layer. Points alone have nothing between them."""
+    along = bool((table.judged & (table.counts != Counts.POINT)).any())
+    sides = {"uncorrected": report["deviation"]["before"], "corrected": report["deviation"]["after"]}
+    return {
+        name: Figures(float(side["between"]["rms_um"]) if along else None, float(side["waypoints"]["max_um"]))
+        for name, side in sides.items()
+    }
 
 
 def _as_shown(table: Judgements, nominal: Program) -> Judgements:
@@ -364,7 +382,7 @@ def _digest(texts: _Texts, loaded: Loaded, measured: Sequence[str], sources: Sou
 def _bodies(
     session: Session, setup: Setup, nominal: Program, samples: Samples, frame: Frame, position: Array
 ) -> Iterator[Body]:
-    yield from of_job(setup, np.array(frame.origin_mm), session.sources.read)
+    yield from of_job(setup.job, setup, np.array(frame.origin_mm), session.sources.read)
     first = nominal.toolpath.frames[int(nominal.toolpath.frame[samples.move[0]])]
     tip = position[0]
     gauge = tip - np.array(first.tool_mm)

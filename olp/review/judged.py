@@ -12,7 +12,6 @@ from olp.core.arrays import Array, Index
 from olp.core.units import UM_PER_MM
 from olp.proof.judgement import Judgements
 from olp.proof.measured import ABOVE
-from olp.proof.proof import Counts
 from olp.review.listing import pictured
 from olp.review.pack import Arrays
 from olp.review.scene import Scene
@@ -83,17 +82,19 @@ def _line_states(scene: Scene, arrays: Arrays, name: str, row: Index, states: np
 
 def statistics(scene: Scene) -> Iterator[dict[str, Any]]:
     """The figures of the report, of each layer and of the job."""
-    deviation, table = scene.report["deviation"], scene.table
+    table = scene.table
     largest = {
         "uncorrected": float(np.nan_to_num(table.uncorrected[table.judged]).max(initial=0.0)) * UM_PER_MM,
         "corrected": table.largest_mm() * UM_PER_MM,
     }
-    for side, layer in (("before", "uncorrected"), ("after", "corrected")):
+    for layer, figures in scene.figures.items():
         yield {"label": "largest", "value": largest[layer], "unit": "um", "layer": layer}
-        rms, waypoints = deviation[side]["between"]["rms_um"], deviation[side]["waypoints"]["max_um"]
-        if _along(scene):
-            yield {"label": "rms", "value": float(rms), "unit": "um", "layer": layer}
-        yield {"label": "at waypoints", "value": float(waypoints), "unit": "um", "layer": layer}
+        for label, value, unit in (
+            ("rms", figures.rms_um, "um"), ("at waypoints", figures.waypoints_um, "um"),
+            ("direction of the tool", figures.turn_urad, "urad"),
+        ):  # fmt: skip
+            if value is not None:
+                yield {"label": label, "value": value, "unit": unit, "layer": layer}
     runs = scene.report["measured"]["runs"] if scene.measured else ()
     for name, run in zip(measured_names(scene), runs, strict=bool(runs)):
         for label, key in (("largest", "max"), ("rms", "rms")):
@@ -111,16 +112,14 @@ def pictures(scene: Scene) -> Iterator[dict[str, Any]]:
     """The pictures of a page: uncorrected, corrected and each measured run. Each has its `layers`, the
     `tolerance_um` that it is judged by, the largest deviation of what counts and its rms. `flag` is the place
     of the largest, `lines_above` how many there are (None where nothing judges them), `note` a remark."""
-    table, deviation = scene.table, scene.report["deviation"]
+    table = scene.table
     allowed_um = table.allowed_mm * UM_PER_MM
-    for layer, side, values in (
-        ("uncorrected", "before", table.uncorrected), ("corrected", "after", table.corrected),
-    ):  # fmt: skip
-        rms_um = float(deviation[side]["between"]["rms_um"]) if _along(scene) else None
+    for layer, values in (("uncorrected", table.uncorrected), ("corrected", table.corrected)):
         above = table.judged & (np.nan_to_num(values) > table.allowed_mm)
         yield {
             "name": layer, "label": layer, "layers": [layer], "tolerance_um": allowed_um, "basis": "allowed",
-            "rms_um": rms_um, "lines_above": int(np.count_nonzero(np.bincount(table.line[above]))),
+            "rms_um": scene.figures[layer].rms_um,
+            "lines_above": int(np.count_nonzero(np.bincount(table.line[above]))),
             "note": _side_note(table, layer, values),
             **_largest(scene, layer, values),
         }  # fmt: skip
@@ -153,11 +152,6 @@ def _side_note(table: Judgements, layer: str, values: npt.NDArray[np.float32]) -
         f"up to {part_um:.2f} um of the largest, {largest_um:.2f} um, may be backlash, whose side is not "
         f"known there yet; the path is drawn {largest_um - part_um:.2f} um off."
     )
-
-
-def _along(scene: Scene) -> bool:
-    """Whether a path counts, and not points alone: those have nothing between them."""
-    return bool((scene.table.judged & (scene.table.counts != Counts.POINT)).any())
 
 
 def removed(scene: Scene) -> dict[str, float | None]:

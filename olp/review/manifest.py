@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,6 @@ from olp.review.features.nodes import plain
 from olp.review.judged import judged_lines, measured_label, measured_names, pictures, removed, statistics
 from olp.review.knots import Curve
 from olp.review.listing import pictured
-from olp.review.meshes import nodes
 from olp.review.pack import ARC_MM, DEVIATION_MM, POSITION_MM, TIME_S, Arrays, resolution
 from olp.review.palette import COLOURS
 from olp.review.scene import Scene
@@ -50,6 +50,8 @@ _JUDGED = "magnitude"
 _SOURCE_LEVELS = 200
 #: Finest step of an error source in um.
 _FINEST_UM = 0.001
+#: Step of the angles of a tool in urad.
+_TURN_URAD = 0.01
 #: Step of a probability in %.
 _PERCENT = 0.1
 #: Fewest steps of a column of the motion over its range.
@@ -67,8 +69,9 @@ def manifest_of(scene: Scene) -> tuple[dict[str, Any], Arrays]:
     arrays = Arrays()
     origin = np.round(scene.position_mm.mean(axis=0))
     base = arrays.quantised("P", scene.position_mm, POSITION_MM, less=origin, keep=True)
-    axes_origin = scene.samples.axis_mm[0]
-    arrays.quantised("Q", scene.samples.axis_mm, POSITION_MM, less=axes_origin, plus=[base])
+    # three axes go as the path does
+    like = [base] if scene.axes.shape[1] == len(origin) else []
+    arrays.quantised("Q", scene.axes, POSITION_MM, less=scene.drawn_at, plus=like)
     row = scene.listing.row_of(scene.nominal.toolpath.line[scene.samples.move].astype(np.int64))
     arrays.quantised("line", row, 1.0)
     arrays.raw("rapid", rapid(scene), "u1")
@@ -77,10 +80,10 @@ def manifest_of(scene: Scene) -> tuple[dict[str, Any], Arrays]:
     arrays.along("s", scene.samples.arc_mm, ARC_MM, "P")
     manifest = {
         "schema": "olp-review-1",
-        "title": pictured(f"{scene.name} on {scene.machine.name}"),
+        "title": pictured(f"{scene.name} on {scene.machine}"),
         "program": pictured(scene.name),
         "corrected": pictured(scene.corrected_name),
-        "machine": pictured(scene.machine.name),
+        "machine": pictured(scene.machine),
         "profile": scene.nominal.dialect.name,
         "digest": scene.digest,
         "compression": "deflate",
@@ -102,9 +105,9 @@ def manifest_of(scene: Scene) -> tuple[dict[str, Any], Arrays]:
         "motion": _motion(scene, arrays),
         "listing": _listing(scene, arrays),
         "meshes": list(_meshes(scene, arrays, origin)),
-        "nodes": [{"path": list(path), "axis": axis} for path, axis in nodes(scene.machine)],
+        "nodes": [asdict(node) for node in scene.nodes],
         "axes": "Q",
-        "axes_origin_mm": axes_origin.tolist(),
+        "axes_origin": scene.drawn_at.tolist(),
         "statistics": list(statistics(scene)),
         "findings": _findings(scene),
         "notes": [],
@@ -181,6 +184,17 @@ def _metrics(scene: Scene, arrays: Arrays) -> list[dict[str, Any]]:
         }
         for part, label, kind in _PARTS
     ]  # fmt: skip
+    if scene.turn_urad:
+        turns = {
+            name: arrays.bent(f"turn:{name}", Curve.of(value, _TURN_URAD))
+            for name, value in scene.turn_urad.items()
+        }
+        metrics.append(
+            {
+                "name": "turn", "label": "direction of the tool", "unit": "urad", "kind": "sequential",
+                "by_layer": turns, "judged": False,
+            }
+        )  # fmt: skip
     metrics += _uncertainty(scene, arrays)
     for name, size in scene.sources:
         array = arrays.bent(f"source:{name}", size)
@@ -225,9 +239,8 @@ def _motion(scene: Scene, arrays: Arrays) -> dict[str, Any] | None:
         return arrays.quantised(f"m_{name}", values, step)
 
     axes = []
-    stated = scene.machine.motion_limits()
     for i, axis in enumerate(AXES):
-        most_velocity, most_acceleration, most_jerk = stated[axis]
+        most_velocity, most_acceleration, most_jerk = scene.limits[axis]
         axes.append(
             {
                 "name": axis,

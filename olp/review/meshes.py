@@ -9,13 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Array
+from olp.core.errors import ConfigError
 from olp.core.geometry import rotation_matrix
-from olp.core.machine import Machine, Mesh, Setup
+from olp.core.machine import ZERO, Job, Machine, Mesh, Setup, Vector
 from olp.core.units import AXES
 from olp.core.values import dataclass
 from olp.files.meshes import read_mesh
@@ -25,6 +27,7 @@ from olp.files.write import Reader
 MOST_FACES = 150_000
 #: Colour by role.
 _COLOURS = {"workpiece": "#9aa7b5", "fixture": "#7d8f69", "machine": "#5f7a96", "tool": "#b0803a"}
+_UNIT: dict[str, Vector] = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
 #: Opacity by role.
 _OPACITY = {"workpiece": 0.55, "fixture": 0.5, "machine": 0.25, "tool": 0.4}
 #: Triangles of a box, by the indices of its corners.
@@ -54,19 +57,46 @@ class Body:
         return _OPACITY[self.role]
 
 
-def of_job(setup: Setup, origin_mm: Array, read: Reader) -> list[Body]:
+@dataclass(frozen=True, slots=True)
+class Node:
+    """A part of the drawn machine: it moves all that is below it in the tree, whose names are `path`. By the
+    column `axis` of axis values it goes along `direction`, or turns about the line through `point_mm`."""
+
+    path: tuple[str, ...]
+    axis: int
+    kind: Literal["linear", "rotary"] = "linear"
+    direction: Vector = ZERO
+    point_mm: Vector = ZERO
+
+    def placed(self, value: Array) -> tuple[Array, Array]:
+        """(n, 3) shifts and (n, 4) unit quaternions x, y, z, w of the node at axis values (n,)."""
+        shift = np.outer(value, self.direction)
+        if self.kind == "linear":
+            return shift, np.tile([0.0, 0.0, 0.0, 1.0], (len(value), 1))
+        from scipy.spatial.transform import Rotation
+
+        rotation = Rotation.from_rotvec(np.radians(shift))
+        return self.point_mm - rotation.apply(self.point_mm), rotation.as_quat()
+
+
+def of_job(job: Job, setup: Setup | None, origin_mm: Array, read: Reader) -> list[Body]:
     """The meshes of the job, placed by their frames; `origin_mm` is the zero of the frame shown on the
-    machine, `read` opens their files.
+    machine, `read` opens their files. Without a `setup` the machine has no work offsets.
 
     Raises InputError for a file that is not a mesh.
     """
-    return [_placed(mesh, k, setup, origin_mm, read) for k, mesh in enumerate(setup.job.meshes, 1)]
+    return [_placed(mesh, k, setup, origin_mm, read) for k, mesh in enumerate(job.meshes, 1)]
 
 
-def _placed(mesh: Mesh, number: int, setup: Setup, origin_mm: Array, read: Reader) -> Body:
+def _placed(mesh: Mesh, number: int, setup: Setup | None, origin_mm: Array, read: Reader) -> Body:
     vertices, faces = coarser(*read_mesh(mesh.file, read))
     vertices = vertices * mesh.unit_mm
-    offset = None if mesh.frame == "machine" else setup.work_offset(mesh.frame)
+    if setup is None and mesh.frame != "machine":
+        raise ConfigError(
+            f"the mesh {mesh.file} lies in the frame {mesh.frame}; this machine has no work offsets, so "
+            'expected frame = "machine"'
+        )
+    offset = None if setup is None or mesh.frame == "machine" else setup.work_offset(mesh.frame)
     if offset is not None:
         vertices = vertices @ rotation_matrix(offset.rotation_deg).T + np.array(offset.offset_mm)
     name = Path(mesh.file).stem
@@ -90,10 +120,13 @@ def coarser(vertices: Array, faces: npt.NDArray[np.int64]) -> tuple[Array, npt.N
     return small, few
 
 
-def nodes(machine: Machine) -> list[tuple[tuple[str, ...], int]]:
-    """(path, axis) of the nodes of a machine, each inside the one before it."""
+def nodes(machine: Machine) -> tuple[Node, ...]:
+    """The nodes of a machine, each inside the one before it."""
     order = machine.chain.replace("F", "")
-    return [(("machine", *order[: k + 1]), AXES.index(axis)) for k, axis in enumerate(order)]
+    return tuple(
+        Node(("machine", *order[: k + 1]), AXES.index(axis), direction=_UNIT[axis])
+        for k, axis in enumerate(order)
+    )
 
 
 def of_machine(

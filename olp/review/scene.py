@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import field
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Array, Mask
-from olp.core.machine import Machine
+from olp.core.machine import Vector
 from olp.core.toolpath import Toolpath
 from olp.core.values import dataclass
 from olp.program.program import Program
@@ -17,9 +18,9 @@ from olp.proof.judgement import Judgements
 from olp.review.knots import Curve
 from olp.review.listing import Listing
 from olp.review.measured import Matched
-from olp.review.meshes import Body
+from olp.review.meshes import Body, Node
 from olp.review.motion import MotionTable
-from olp.review.samples import Samples, away_mm, waypoints
+from olp.review.samples import Samples, away_mm
 
 Single = npt.NDArray[np.float32]
 
@@ -62,23 +63,41 @@ class TipUncertainty:
     beyond: Mapping[str, Single]
 
 
+@dataclass(frozen=True, slots=True)
+class Figures:
+    """What the report says of a layer, None where nothing counts: rms deviation, and the largest one at
+    waypoints, in um. `turn_urad` is the largest angle of the tool, None where nothing turns it."""
+
+    rms_um: float | None
+    waypoints_um: float | None
+    turn_urad: float | None = None
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """`position_mm` (n, 3) are the samples in `frame`; `time_s` (n,) are their times on the re-timed motion,
-    where there is one, else at the feed. `sources` are (name, (n,) um) by size; `report` is that of the
-    correction or verification ("olp-report-1"), `table` its judgements with lines of the nominal text as
-    shown. `digit_mm` is the last digit of its coordinates.
+    """`position_mm` (n, 3) are the samples in `frame`; `waypoint` (n,) are those which count by their
+    distance from the nominal point. `axes` (n, k) are axis values, less which bodies are drawn `drawn_at`
+    (k,), `limits` the limits of motion by axis. `time_s` (n,) are times on the re-timed motion, where there
+    is one, else at the feed. `sources` are (name, (n,) um) by size; `report` is that of the correction or
+    verification, `figures` what it says by layer, `table` its judgements with lines of the nominal text as
+    shown. `turn_urad` are (n,) angles of the tool by layer, where they are corrected. Where moves are
+    `straight` in the frame, features are found in them. `digit_mm` is the last digit of coordinates.
     `tool_radii_mm` has the tools of the program that have a radius; `uncertainty` is None where the
     calibration states none."""
 
     name: str
     corrected_name: str
     digest: str
-    machine: Machine
+    machine: str
     nominal: Program
     frame: Frame
     samples: Samples
     position_mm: Array
+    waypoint: Mask
+    axes: Array
+    drawn_at: Array
+    nodes: tuple[Node, ...]
+    limits: Mapping[str, Vector]
     time_s: Array
     motion: MotionTable | None
     duration_s: float
@@ -87,17 +106,15 @@ class Scene:
     bodies: tuple[Body, ...]
     measured: tuple[Matched, ...]
     report: Mapping[str, Any]
+    figures: Mapping[str, Figures]
     table: Judgements
     tolerance_um: float
     tool_radius_mm: float
     tool_radii_mm: Mapping[int, float]
     digit_mm: float
     uncertainty: TipUncertainty | None = None
-
-    @property
-    def waypoint(self) -> Mask:
-        """(n,) samples at the ends of moves, which count by their distance from the nominal point."""
-        return waypoints(self.samples, self.table)
+    turn_urad: Mapping[str, Array] = field(default_factory=dict)
+    straight: bool = True
 
     def worst_sample(self, layer: str, move: int) -> int | None:
         """The sample of a move where a layer ("uncorrected" or "corrected") is off by what the table states
@@ -107,7 +124,7 @@ class Scene:
         if a == b:
             return None
         rows = slice(max(a - 1, 0), b + 1)
-        ends = waypoints(samples, self.table, rows)
+        ends = self.waypoint[rows]
         size = away_mm(self.position_mm[rows], samples.share[rows], ends, getattr(samples, layer)[rows])
         size = size[a - rows.start :][: b - a]
         stated = float(getattr(self.table, layer)[move])

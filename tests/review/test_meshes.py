@@ -142,7 +142,7 @@ def test_every_axis_has_a_body_of_its_own(chain: str, tmp_path: Path) -> None:
     machine = olp.load_setup(zero_machine(tmp_path / "m", Recipe(chain=chain))).machine
     gauge, tip = np.array([0.0, 0.0, 120.0]), np.zeros(3)
     bodies = list(of_machine(machine, np.array([400.0, 300.0, -200.0]), gauge, tip, 5.0))
-    paths = [path for path, _ in nodes(machine)]
+    paths = [node.path for node in nodes(machine)]
     assert len(paths) == 3 and all(len(path) == k + 2 for k, path in enumerate(paths))
     assert {body.path for body in bodies} == {(), *paths}
     for body in bodies:

@@ -465,11 +465,11 @@ def test_the_animation_has_the_tip_and_the_machine_where_they_are_at_each_time(
     half_a_pixel = 0.0005 * View.of(scene).job_mm
     tip = played(window, "/meshcat/olp/tool", ".position", scene.time_s)
     assert np.linalg.norm(tip - scene.position_mm, axis=1).max() <= half_a_pixel * 1.001
-    order = scene.machine.chain.replace("F", "")
+    order = scene.nodes[-1].path[1:]
     for k, axis in enumerate(order):
         i = "XYZ".index(axis)
         path = "/meshcat/olp/machine/" + "/".join(order[: k + 1])
-        moved = played(window, path, f".position[{'xyz'[i]}]", scene.time_s)[:, 0]
+        moved = played(window, path, ".position", scene.time_s)[:, i]
         wanted = scene.samples.axis_mm[:, i] - scene.samples.axis_mm[0, i]
         assert np.abs(moved - wanted).max() <= half_a_pixel * 1.001
     assert window.animation["options"]["play"] is False

@@ -166,7 +166,7 @@ def test_the_motion_plays_in_real_time_and_is_where_the_tip_is(
 ) -> None:
     olp.add_layers(server, small)
     scene = small.scene
-    order = scene.machine.chain.replace("F", "")
+    order = scene.nodes[-1].path[1:]
     tool = NODE.format(["meshcat", "olp", "tool"])
     ends = NODE.format(["meshcat", "olp", "machine", *order])
 
@@ -223,7 +223,7 @@ def test_a_live_page_takes_one_review_after_another(chromium: Any, server: Any, 
     np.testing.assert_allclose(page.evaluate(camera), first, atol=1e-9)
     assert coloured(beside(browser.picture(page, "canvas")), "blue").sum() > 1000
     machine = page.evaluate(f"{NODE.format(['meshcat', 'olp', 'machine'])}.object.children.map(c => c.name)")
-    assert [name for name in machine if name != scene.machine.chain.replace("F", "")[0]] == []
+    assert [name for name in machine if name != scene.nodes[0].path[-1]] == []
     browser.until(page, "viewer.animator.time > 0.3")
     page.context.close()
     assert trouble == []

@@ -285,7 +285,7 @@ def test_layers_are_the_samples_to_a_nanometre(machine: Path) -> None:
     scene, page = review.scene, Page(review.html())
     origin = np.array(page.manifest["origin_mm"])
     assert np.abs(page.array("P") + origin - scene.position_mm).max() <= 0.5e-4 + 1e-10
-    axes = page.array("Q") + np.array(page.manifest["axes_origin_mm"])
+    axes = page.array("Q") + np.array(page.manifest["axes_origin"])
     assert np.abs(axes - scene.samples.axis_mm).max() <= 0.5e-4 + 1e-10
     deltas = {
         "uncorrected": scene.samples.uncorrected, "command": scene.samples.correction,

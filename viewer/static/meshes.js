@@ -63,7 +63,12 @@
       if (!this.shown.tool) this.draw_tool(manifest.tool_radius_mm || 1);
       this.nodes =
         manifest.axes && arrays.has(manifest.axes)
-          ? (manifest.nodes ?? []).map(n => ({axis: n.axis, object: scene.viewer.scene_tree.find(["olp", ...n.path]).object}))
+          ? (manifest.nodes ?? []).map(n => ({
+              ...n,
+              direction: new T.Vector3(...n.direction),
+              point: new T.Vector3(...n.point_mm.map((v, j) => v - manifest.origin_mm[j])),
+              object: scene.viewer.scene_tree.find(["olp", ...n.path]).object,
+            }))
           : [];
     }
 
@@ -95,11 +100,20 @@
       this.app.scene.viewer.scene_tree.find(["olp", "tool"]).object.position.set(...point);
       if (!this.nodes.length) return;
       const Q = this.app.arrays.get(this.app.manifest.axes),
-        n = Q.length / 3,
+        columns = this.app.manifest.axes_origin.length,
+        n = Q.length / columns,
         i = Math.min(n - 1, Math.floor(sample)),
         j = Math.min(n - 1, i + 1);
-      for (const {axis, object} of this.nodes)
-        object.position.setComponent(axis, Q[3 * i + axis] + (sample - i) * (Q[3 * j + axis] - Q[3 * i + axis]));
+      for (const {axis, kind, direction, point, object} of this.nodes) {
+        const from = Q[columns * i + axis],
+          value = from + (sample - i) * (Q[columns * j + axis] - from);
+        if (kind === "linear") object.position.copy(direction).multiplyScalar(value);
+        else {
+          // about a line: what is on it stays
+          object.quaternion.setFromAxisAngle(direction, (value * Math.PI) / 180);
+          object.position.copy(point).sub(point.clone().applyQuaternion(object.quaternion));
+        }
+      }
     }
   }
 

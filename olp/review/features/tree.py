@@ -52,7 +52,7 @@ def tree_of(scene: Scene, most: int = MOST) -> tuple[list[Node], int]:
     stands for all of them."""
     ground = Ground(scene)
     operations = _operations(ground)
-    for node in _nested(ground):
+    for node in _nested(ground) if scene.straight else ():
         operations[int(ground.moves.operation[node.moves[0]])].children.append(node)
     tops = list(operations.values())
     _sort(tops)

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from olp.core.arrays import Array
-from olp.review.meshes import nodes
 from olp.review.notebook import drawing
 from olp.review.notebook.framing import View
 from olp.review.notebook.keys import key_frames
@@ -30,15 +29,19 @@ def animate(visualizer: Any, root: Any, scene: Scene, view: View, *, play: bool)
     root["tool"]["tip"].set_object(drawing.dots(np.zeros((1, 3)), rgb([_TIP]), _TIP_PIXELS, in_front=True))
     root["tool"].set_property("position", scene.position_mm[0].tolist())
     tolerance = TOLERANCE * view.job_mm
-    clips = {root["tool"].path: _track("position", "vector3", scene.time_s, scene.position_mm, tolerance)}
-    for path, axis in nodes(scene.machine):
+    clips = {root["tool"].path: [_track("position", "vector3", scene.time_s, scene.position_mm, tolerance)]}
+    for part in scene.nodes:
         node = root
-        for name in path:
+        for name in part.path:
             node = node[name]
-        moved = scene.samples.axis_mm[:, [axis]] - scene.samples.axis_mm[0, axis]
-        clips[node.path] = _track(f"position[{'xyz'[axis]}]", "number", scene.time_s, moved, tolerance)
+        place, turn = part.placed(scene.axes[:, part.axis] - scene.drawn_at[part.axis])
+        clips[node.path] = [_track("position", "vector3", scene.time_s, place, tolerance)]
+        if part.kind == "rotary":
+            clips[node.path].append(_track("quaternion", "quaternion", scene.time_s, turn, TOLERANCE))
     # one frame is one second
-    animation = Animation({path: AnimationClip({t.name: t}, fps=1) for path, t in clips.items()})
+    animation = Animation(
+        {path: AnimationClip({t.name: t for t in tracks}, fps=1) for path, tracks in clips.items()}
+    )
     visualizer.set_animation(animation, play=play)
 
 

@@ -17,6 +17,7 @@ from olp.compensation.wrapping import card_stamp
 from olp.core.errors import AlreadyCorrected, OutsideBox
 from olp.core.units import MM_PER_UM, RAD_PER_URAD
 from olp.core.values import dataclass
+from olp.files.sources import Source
 from olp.files.write import write_bytes
 from olp.findings.catalogue import Finding
 from olp.program.dialect import Dialect
@@ -45,6 +46,20 @@ class JointOptions(UnrollOptions):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class ProvedJoints:
+    """A nominal and a corrected program with the proof, its report ("olp-joints-1") and the findings.
+    `source` is the nominal text, unrolled where the call asks for it."""
+
+    source: Source
+    nominal: JointPath
+    plan: JointPlan
+    corrected: JointPath
+    proof: JointProof
+    report: dict[str, Any]
+    findings: tuple[Finding, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class JointCorrection(Shown):
     """A corrected program of a machine with rotary joints: its bytes, the text that was corrected, the proof,
     the report ("olp-joints-1") and the findings. `inputs` are the files that were read, which `write` never
@@ -56,6 +71,11 @@ class JointCorrection(Shown):
     report: dict[str, Any]
     findings: tuple[Finding, ...]
     inputs: tuple[str, ...] = ()
+
+    @staticmethod
+    def of(run: JointRun, done: ProvedJoints) -> JointCorrection:
+        text, nominal = bytes(done.corrected.program.data), bytes(done.source.data)
+        return JointCorrection(text, nominal, done.proof, done.report, done.findings, run.files)
 
     def to_text(self) -> str:
         """The report as the command line prints it."""
@@ -97,6 +117,11 @@ def correct_joints(
 
 def corrected(run: JointRun, options: JointOptions) -> JointCorrection:
     """As `correct_joints`, for a run that is loaded."""
+    return JointCorrection.of(run, correction_of(run, options))
+
+
+def correction_of(run: JointRun, options: JointOptions) -> ProvedJoints:
+    """A program corrected and proved. Raises as `correct_joints`."""
     with run.program.errors():
         _refuse_stamped(run)
         source, nominal = run.read(run.program, options)
@@ -108,8 +133,7 @@ def corrected(run: JointRun, options: JointOptions) -> JointCorrection:
             write = write_joints if nominal.listed is None else write_list
             written = write(nominal, plan)
         text = _stamped(run, dialect, nominal.program, written.text)
-        done = proved(run, (nominal, plan), run.again(text, dialect), options, written.tally)
-    return JointCorrection(text, bytes(source.data), done[0], done[1], done[2], run.files)
+        return proved(run, source, (nominal, plan), run.again(text, dialect), options, written.tally)
 
 
 def _stamped(run: JointRun, dialect: Dialect, nominal: Program, written: bytes | None) -> bytes:
@@ -127,9 +151,9 @@ def _stamped(run: JointRun, dialect: Dialect, nominal: Program, written: bytes |
 
 
 def proved(
-    run: JointRun, nominal: tuple[JointPath, JointPlan], corrected: JointPath, options: JointOptions,
-    tally: Tally | None = None,
-) -> tuple[JointProof, dict[str, Any], tuple[Finding, ...]]:  # fmt: skip
+    run: JointRun, source: Source, nominal: tuple[JointPath, JointPlan], corrected: JointPath,
+    options: JointOptions, tally: Tally | None = None,
+) -> ProvedJoints:  # fmt: skip
     """The proof of two programs with its report and findings."""
     path, plan = nominal
     digit_mm, digit_deg = last_digits(path)
@@ -144,7 +168,7 @@ def proved(
             "inserted_words": tally.inserted_words,
             "inserted_blocks": tally.inserted_blocks,
         }
-    return proof, report, findings
+    return ProvedJoints(source, path, plan, corrected, proof, report, findings)
 
 
 def _refuse_stamped(run: JointRun) -> None:

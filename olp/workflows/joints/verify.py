@@ -13,7 +13,7 @@ from olp.files.sources import Source
 from olp.findings.catalogue import Finding
 from olp.proof.joints import JointProof
 from olp.workflows.flatten import AS_IT_IS
-from olp.workflows.joints.correct import JointOptions, proved
+from olp.workflows.joints.correct import JointOptions, ProvedJoints, proved
 from olp.workflows.joints.loaded import JointRun
 from olp.workflows.session import PathLike
 from olp.workflows.shown import Shown
@@ -59,6 +59,12 @@ def verify_joints(
 
 def verified(run: JointRun, corrected: Source, options: JointOptions) -> JointVerification:
     """As `verify_joints`, for a run that is loaded."""
+    done = verification_of(run, corrected, options)
+    return JointVerification(done.proof, done.report, done.findings)
+
+
+def verification_of(run: JointRun, corrected: Source, options: JointOptions) -> ProvedJoints:
+    """Two texts with the proof. Raises as `verify_joints`."""
     with run.program.errors():
         if find_stamp(run.program.data) is not None and find_stamp(corrected.data) is None:
             raise ProgramError(
@@ -66,10 +72,10 @@ def verified(run: JointRun, corrected: Source, options: JointOptions) -> JointVe
                 "exchange the two",
                 code="OLP562",
             )
-        _, nominal = run.read(run.program, options)
+        source, nominal = run.read(run.program, options)
         with nominal.program.errors():
             plan = planned(nominal, options.limits())
     with corrected.errors():
         _, written = run.read(corrected, AS_IT_IS)
     with run.program.errors():
-        return JointVerification(*proved(run, (nominal, plan), written, options))
+        return proved(run, source, (nominal, plan), written, options)

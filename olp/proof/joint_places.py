@@ -1,0 +1,181 @@
+"""Places along a corrected program with the nominal poses that belong to them, on machines with rotary
+joints: where the proof looks, and what a page shows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from olp.compensation.joints.path import JointPath
+from olp.compensation.joints.planning import JointPlan
+from olp.compensation.joints.sampling import Resolution, spread
+from olp.core.arrays import Array, Index, Mask
+from olp.core.values import dataclass
+from olp.errormodel.reversal import play_after, play_states
+from olp.kinematics.poses import Poses, rotation_vector
+
+#: The arm in mm at which a turn counts as much as a shift, where a place on a move is found.
+ARM_MM = 100.0
+#: Steps by which a place on a move is found.
+_STEPS = 3
+#: Places at a time, so that memory is small.
+BATCH = 1 << 15
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sides:
+    """(m, axes) axis values of a path at the `start` and `end` of its moves, NaN where unknown, and on which
+    side of its backlash each axis is `before` a move and `behind` it."""
+
+    path: JointPath
+    start: Array
+    end: Array
+    before: Array
+    behind: Array
+
+    @staticmethod
+    def of(path: JointPath) -> Sides:
+        motion, ends = path.motion, []
+        for programmed in (path.start, path.end):
+            known = np.isfinite(programmed).all(axis=1)
+            axes = np.full(programmed.shape, np.nan)
+            axes[known] = motion.axes(programmed[known], path.tool[known], path.tip[known])
+            ends.append(axes)
+        behind = _plays(ends[1], motion.width)
+        before = np.vstack((np.zeros((1, len(motion.width))), behind[:-1])) if len(behind) else behind
+        return Sides(path, ends[0], ends[1], before, behind)
+
+    def along(self, rows: Index, part: Array) -> Array:
+        """(r, axes) the sides at shares of moves."""
+        path, motion = self.path, self.path.motion
+        side = self.before[rows]
+        if motion.width.any():
+            here = motion.axes(path.at(rows, part), path.tool[rows], path.tip[rows])
+            side = play_after(side, here - self.start[rows], np.broadcast_to(motion.width, here.shape))
+        return side
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Places:
+    """Places (r,) at `part` of the moves `rows` of a path, which are at `share` of the nominal moves `move`.
+    `side` (r, axes) is that of the backlash."""
+
+    move: Index
+    rows: Index
+    part: Array
+    share: Array
+    side: Array
+
+    def poses(self, path: JointPath) -> tuple[Array, Poses]:
+        """(r, axes) commanded axis values there, and the poses of the machine with its errors."""
+        tool = path.tool[self.rows]
+        axes = path.motion.axes(path.at(self.rows, self.part), tool, path.tip[self.rows])
+        return axes, path.motion.actual(axes, tool, self.side)
+
+    def targets(self, nominal: JointPath) -> Poses:
+        """(r) the nominal poses, where the part lies."""
+        place, tool = nominal.at(self.move, self.share), nominal.tool[self.move]
+        target = nominal.motion.targets(place, tool, nominal.tip[self.move])
+        return Poses(target.rotation, target.position + nominal.shift_mm[self.move])
+
+
+def visited(
+    nominal: JointPath, path: JointPath, groups: Index, plan: JointPlan, at: Mask, between: Mask, finer: int
+) -> Iterator[Places]:
+    """The known ends of the moves of `path` that belong to nominal moves `at` (n,), and places along those
+    `between` (n,), so many times `finer` than the plan has them."""
+    owner = np.searchsorted(groups, np.arange(len(path)))
+    owner = np.minimum(owner, max(len(nominal) - 1, 0))
+    sides = Sides.of(path)
+    known = np.isfinite(sides.end).all(axis=1) & np.isfinite(nominal.end[owner]).all(axis=1)
+    begun = np.isfinite(sides.start).all(axis=1) & np.isfinite(nominal.start[owner]).all(axis=1)
+    ends = np.flatnonzero(known & at[owner])
+    along = known & begun & between[owner]
+    shares = _shares(nominal, path, (groups, owner), plan, sides, along)
+    yield Places(owner[ends], ends, np.ones(len(ends)), shares[1][ends], sides.behind[ends])
+    feeds = np.flatnonzero(along)
+    samples = finer * Resolution.of(path.motion).samples(sides.start[feeds], sides.end[feeds]) + 1
+    totals = np.cumsum(samples)
+    a = 0
+    while a < len(feeds):
+        b = max(int(np.searchsorted(totals, (totals[a - 1] if a else 0) + BATCH)), a + 1)
+        mine, step = spread(samples[a:b])
+        rows = feeds[a:b][mine]
+        part = step / samples[a:b][mine]
+        share = shares[0][rows] + part * (shares[1] - shares[0])[rows]
+        yield Places(owner[rows], rows, part, share, sides.along(rows, part))
+        a = b
+
+
+def _plays(axes: Array, width: Array) -> Array:
+    """(m, axes) the side of the backlash of each axis behind each move."""
+    play = np.zeros(axes.shape)
+    if width.any():
+        for first in range(0, axes.shape[1], 3):
+            columns = np.full((len(axes), 3), 0.0)
+            part = axes[:, first : first + 3]
+            columns[:, : part.shape[1]] = part
+            widths = np.zeros(3)
+            widths[: part.shape[1]] = width[first : first + 3]
+            play[:, first : first + 3] = play_states(columns, widths)[:, : part.shape[1]]
+        play[:, width == 0.0] = 0.0
+    return play
+
+
+def _shares(
+    nominal: JointPath, path: JointPath, pairs: tuple[Index, Index], plan: JointPlan, sides: Sides,
+    along: Mask,
+) -> tuple[Array, Array]:  # fmt: skip
+    """(m,) at which shares of its nominal move each move begins and ends. `pairs` are the last part of each
+    nominal move, and the nominal move of each part. A part ends where the pose is nearest, as words are
+    rounded along the path, too. In lists it ends as planned, where there are as many parts: the nearest
+    pose is another one where the machine cannot turn the tool."""
+    groups, owner = pairs
+    end, number = np.ones(len(path)), np.arange(len(path))
+    first = np.append(-1, groups[:-1]) + 1
+    begins = np.searchsorted(plan.move, np.arange(len(nominal)))
+    parts = np.append(begins[1:], len(plan.move)) - begins
+    planned = (groups - first + 1 == parts)[owner] & (path.listed is not None)
+    inner = along & (groups[owner] != number)
+    row = np.flatnonzero(inner & planned)
+    end[row] = plan.share[begins[owner[row]] + row - first[owner[row]]]
+    row = np.flatnonzero(inner & ~planned)
+    if row.size:
+        end[row] = _places(nominal, path, owner[row], row, sides.end[row], sides.behind[row])
+    begin = np.append(0.0, np.where(owner[1:] == owner[:-1], end[:-1], 0.0))[: len(path)]
+    return begin, np.maximum(end, begin)
+
+
+def _places(nominal: JointPath, path: JointPath, move: Index, rows: Index, axes: Array, play: Array) -> Array:
+    """(r,) the shares of nominal moves whose pose is nearest to that of the machine at axis values."""
+    motion = nominal.motion
+    actual = path.motion.actual(axes, path.tool[rows], play)
+    start, way = nominal.start[move], nominal.end[move] - nominal.start[move]
+    along = np.einsum("ij,ij->i", path.end[rows] - start, way)
+    share = along / np.maximum(np.einsum("ij,ij->i", way, way), 1e-30)
+    tool, tip, shift = nominal.tool[move], nominal.tip[move], nominal.shift_mm[move]
+
+    def pose(at: Array) -> Poses:
+        place = motion.targets(nominal.at(move, at), tool, tip)
+        return Poses(place.rotation, place.position + shift)
+
+    half, symmetric = 1e-4, motion.structure.symmetric_tool
+    for _ in range(_STEPS):
+        ahead, behind = pose(share + half), pose(share - half)
+        slope = _apart(ahead, behind, symmetric) / (2.0 * half)
+        miss = _apart(actual, pose(share), symmetric)
+        share = share + np.einsum("ij,ij->i", miss, slope) / np.maximum(
+            np.einsum("ij,ij->i", slope, slope), 1e-30
+        )
+    return np.asarray(np.clip(share, 0.0, 1.0), float)
+
+
+def _apart(one: Poses, other: Poses, symmetric: bool) -> Array:
+    """(r, 6) from the other pose to one: mm, and turns as arcs in mm; of a symmetric tool those of its
+    axis."""
+    turn = rotation_vector(one.rotation @ np.swapaxes(other.rotation, -1, -2))
+    if symmetric:
+        axis = other.rotation[:, :, 2]
+        turn = turn - np.sum(turn * axis, axis=1)[:, None] * axis
+    return np.concatenate((one.position - other.position, ARM_MM * turn), axis=1)

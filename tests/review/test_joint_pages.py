@@ -1,0 +1,187 @@
+"""Pages of machines with rotary joints: they show what the proof says, where an own forward has it."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from cases.joint_jobs import JOINT_JOBS
+from cli.test_cli import run
+from judge import browser
+from judge.five_axis import Judge
+from judge.unpacker import Page
+from scipy.spatial.transform import Rotation
+
+import olp
+from olp.core.errors import ConfigError, ProgramError
+from olp.proof.proof import Counts
+from olp.review.job import Review
+from olp.review.scene import Scene
+
+FOLDER = Path(__file__).resolve().parents[2] / "programs"
+
+
+@pytest.fixture(scope="module")
+def reviews() -> dict[str, Review]:
+    return {
+        name: olp.view_joints(file, file.with_name("machine.toml"), file.with_name("job.toml"))
+        for name, file in ((name, FOLDER / name / program) for name, program in JOINT_JOBS.items())
+    }
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Any:
+    browser.require()
+    with browser.driver() as play, browser.launched(play, *browser.SOFTWARE_GL) as launched:
+        yield launched
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", JOINT_JOBS)
+def test_the_page_says_what_the_report_says(name: str, reviews: dict[str, Review]) -> None:
+    scene = reviews[name].scene
+    stated, table = scene.report["deviation"], scene.table
+    assert table.largest_mm() * 1e3 == pytest.approx(stated["after"]["position_max_um"], rel=1e-6)
+    judged = table.judged[scene.samples.move]
+    assert judged.any() and not (table.counts[~table.judged] == Counts.FEED).any()
+    for layer, side in (("corrected", "after"), ("uncorrected", "before")):
+        off = np.linalg.norm(getattr(scene.samples, layer)[judged], axis=1) * 1e3
+        most = stated[side]["position_max_um"]
+        # the corrected program is seen where the proof looked; between those places the uncorrected one too
+        assert off.max() == pytest.approx(most, rel=1e-5 if layer == "corrected" else 0.01)
+        turn = scene.turn_urad[layer][judged].max()
+        assert turn == pytest.approx(stated[side]["orientation_max_urad"], rel=0.02)
+    page = Page(reviews[name].html())
+    assert page.manifest["verdict"]["ok"] is True
+    assert page.manifest["verdict"]["questions"][0]["sentence"].startswith("The corrected path is within")
+    assert {metric["name"] for metric in page.manifest["metrics"]} >= {"magnitude", "turn"}
+    assert [f["code"] for f in page.manifest["findings"]] == [f["code"] for f in scene.report["findings"]]
+
+
+def moved(scene: Scene, point: np.ndarray) -> np.ndarray:
+    """(n, 3) a point of the last body at all samples: what the nodes do, innermost first."""
+    place = np.tile(point, (len(scene.samples), 1))
+    for node in reversed(scene.nodes):
+        value = (scene.axes[:, node.axis] - scene.drawn_at[node.axis])[:, None] * node.direction
+        before = place
+        if node.kind == "linear":
+            place = place + value
+        else:
+            place = Rotation.from_rotvec(np.radians(value)).apply(place - node.point_mm) + node.point_mm
+        # what notebooks are told
+        shift, turn = node.placed(scene.axes[:, node.axis] - scene.drawn_at[node.axis])
+        np.testing.assert_allclose(Rotation.from_quat(turn).apply(before) + shift, place, atol=1e-9)
+    return place
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", JOINT_JOBS)
+def test_the_nodes_bring_the_tool_to_the_tip(name: str, reviews: dict[str, Review]) -> None:
+    scene = reviews[name].scene
+    (tool,) = [body for body in scene.bodies if body.role == "tool"]
+    assert tool.path == scene.nodes[-1].path
+    first = moved(scene, tool.vertices.mean(axis=0)) - scene.position_mm
+    # the tip is on the axis of the tool, at one end
+    ends = tool.vertices[np.linalg.norm(tool.vertices - tool.vertices.mean(axis=0), axis=1).argsort()[:2]]
+    centres = [moved(scene, end) for end in ends]
+    away = min(float(np.linalg.norm(centre - scene.position_mm, axis=1).max()) for centre in centres)
+    assert away < 1e-6
+    length = np.linalg.norm(first, axis=1)
+    assert np.ptp(length) < 1e-6 and length[0] > 1.0
+
+
+@pytest.mark.slow
+def test_tips_and_errors_are_those_of_the_judge(tmp_path: Path) -> None:
+    """On the trunnion mill without its measured curve, which the judge does not model."""
+    shutil.copytree(FOLDER / "trunnion-mill", tmp_path / "job")
+    calibration = tmp_path / "job" / "calibration.toml"
+    text = calibration.read_text("utf-8")
+    calibration.write_text(re.sub(r"(?ms)^\[\[curves\].*?(?=^\[)", "", text), "utf-8")
+    machine = tmp_path / "job" / "machine.toml"
+    scene = olp.view_joints(FOLDER / "trunnion-mill" / "dome.nc", machine).scene
+    judge, tip = Judge(machine), scene.position_mm + np.array(scene.frame.origin_mm)
+    assert scene.frame.label == "G54, as programmed"
+    nominal, actual = (judge.forward(scene.axes, errors) for errors in (False, True))
+    np.testing.assert_allclose(tip, nominal[0], atol=1e-8)
+    np.testing.assert_allclose(scene.samples.uncorrected, actual[0] - nominal[0], atol=2e-6)
+    turn = np.linalg.norm(np.cross(nominal[1], actual[1]), axis=1) * 1e6
+    np.testing.assert_allclose(scene.turn_urad["uncorrected"], turn, atol=1e-3)
+
+
+@pytest.mark.slow
+def test_a_program_that_is_off_is_shown_as_such() -> None:
+    file = FOLDER / "trunnion-mill" / "dome.nc"
+    machine = file.with_name("machine.toml")
+    right = olp.correct_joints(file, machine)
+    wrong = right.data.replace(b"X12.021 F700", b"X12.071 F700")
+    assert wrong != right.data
+    review = olp.view_joints(file, machine, corrected=wrong)
+    assert Page(review.html()).manifest["verdict"]["ok"] is False
+    assert review.scene.table.over.any()
+    with pytest.raises(ProgramError, match="fewer than"):
+        olp.view_joints(file, machine, corrected=right.data[:200] + b"M30\n")
+
+
+@pytest.mark.slow
+def test_meshes_of_the_job_lie_on_the_workpiece(tmp_path: Path) -> None:
+    (tmp_path / "block.obj").write_text("v 0 0 0\nv 20 0 0\nv 0 30 0\nf 1 2 3\n")
+    mesh = '\n[[meshes]]\nfile = "block.obj"\nrole = "workpiece"\nframe = "{}"\n'
+    for name, frame, low in (("trunnion-mill", "G54", 0.0), ("arm-payload", "machine", 0.0)):
+        file = FOLDER / name / JOINT_JOBS[name]
+        text = file.with_name("job.toml").read_text("utf-8").partition("[[meshes]]")[0]
+        text = text.replace("machine.toml", str(file.with_name("machine.toml"))).replace(file.name, str(file))
+        job = tmp_path / f"{name}.toml"
+        job.write_text(text + mesh.format(frame), "utf-8")
+        scene = olp.view_joints(file, file.with_name("machine.toml"), job).scene
+        (block,) = [body for body in scene.bodies if body.role == "workpiece"]
+        np.testing.assert_allclose(block.vertices.min(axis=0), low, atol=1e-9)
+        other = olp.view_joints(file, file.with_name("machine.toml")).scene
+        assert other.digest != scene.digest
+    job.write_text(text + mesh.format("G54"), "utf-8")
+    with pytest.raises(ConfigError, match='expected frame = "machine"'):
+        olp.view_joints(file, file.with_name("machine.toml"), job)
+
+
+@pytest.mark.slow
+def test_the_verbs_write_it(tmp_path: Path) -> None:
+    job = str(FOLDER / "trunnion-mill" / "job.toml")
+    out, page, again = (str(tmp_path / name) for name in ("out.nc", "a.html", "b.html"))
+    done = run("correct", "-j", job, "-o", out, "--review", page, "-q")
+    assert done.exit_code == 0, done.stderr
+    done = run("view", "-j", job, "--corrected", out, "-o", again)
+    assert done.exit_code == 0 and "points" in done.stderr, done.stderr
+    one, other = (Page(Path(name).read_bytes()).manifest for name in (page, again))
+    assert one["statistics"] == other["statistics"] and one["digest"] == other["digest"]
+    done = run("view", "-j", job, "--measured", "x.csv", "-o", again, "--force")
+    assert done.exit_code == 2 and "--measured does not go with machines with rotary joints" in done.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["trunnion-mill", "hexapod"])
+def test_the_machine_moves_in_the_browser(
+    name: str, reviews: dict[str, Review], chromium: Any, tmp_path: Path
+) -> None:
+    file = tmp_path / "page.html"
+    reviews[name].write(file)
+    scene = reviews[name].scene
+    path = ["olp", *scene.nodes[-1].path]
+    place = f"olp.app.scene.viewer.scene_tree.find({path}).object"
+    (tool,) = [body for body in scene.bodies if body.role == "tool"]
+    with browser.opened(chromium, file) as page:
+        origin = np.array(Page(reviews[name].html()).manifest["origin_mm"])
+        zero = page.evaluate("olp.app.scene.viewer.scene_tree.find(['olp']).object.matrixWorld.elements")
+        for share in (0.0, 0.31, 0.77):
+            page.evaluate(f"olp.set_time({share} * olp.app.end)")
+            page.wait_for_timeout(200)
+            columns = page.evaluate(f"({place}.updateWorldMatrix(true), {place}.matrixWorld.elements)")
+            world = np.linalg.inv(np.array(zero).reshape(4, 4).T) @ np.array(columns).reshape(4, 4).T
+            ends = tool.vertices[
+                np.linalg.norm(tool.vertices - tool.vertices.mean(axis=0), axis=1).argsort()[:2]
+            ]
+            seen = [(world @ np.append(end - origin, 1.0))[:3] + origin for end in ends]
+            at = np.array([np.interp(share * scene.time_s[-1], scene.time_s, c) for c in scene.position_mm.T])
+            assert min(np.linalg.norm(one - at) for one in seen) < 0.3
