@@ -13,6 +13,7 @@ import numpy as np
 from olp.calibration.estimator.basis import Kink, Step
 from olp.calibration.estimator.fitted import Fit
 from olp.calibration.estimator.parameters import MeasuringLine
+from olp.calibration.estimator.warming import structure_of
 from olp.core.arrays import Array
 from olp.core.interpolation import Interpolant
 from olp.core.machine import SQUARENESS
@@ -57,6 +58,7 @@ def calibration_of(fit: Fit, valid_until: datetime.date | None = None) -> Calibr
         valid_until=valid_until,
         active_during_measurement=m.active_during_measurement,
         quality=fit.quality,
+        structure=structure_of(fit),
     )
 
 

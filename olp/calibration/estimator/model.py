@@ -17,6 +17,7 @@ from olp.calibration.observations.base import Noise, Observation, Scattered
 from olp.calibration.observations.lines import Line, shared_names, targets_of
 from olp.calibration.observations.measurements import Measurements
 from olp.calibration.observations.references import known_of, sense_of
+from olp.calibration.observations.sensors import middle_of, ranges_of
 from olp.core.arrays import Array
 from olp.core.errors import CannotCompute
 from olp.core.machine import COMPONENTS, ZERO, Vector
@@ -62,6 +63,7 @@ class Model:
         """The model for observations; `cells` are those of axes without lines. Raises CannotCompute where
         no reading depends on an axis."""
         own = [line for line, _ in lines]
+        ranges_of([(line.source, line.sensors_degC) for line in own if line.sensors_degC])
         ranges, box = _ranges(own, observations, travel_mm)
         x, y, z = datum_mm or (float(np.clip(0.0, *side)) for side in box)
         splines = [_spline(own, axis, ranges[axis], cells) for axis in range(3)]
@@ -91,9 +93,16 @@ class Model:
                 line_mm[axis] = self.datum_mm[axis]
                 lines[name] = MeasuringLine((line_mm[0], line_mm[1], line_mm[2]), line_of.tool_mm)
         shared = sorted({name for line in own_lines for name in shared_names(line)})
+        warm = tuple(name for name in COMPONENTS if any(one.component == name for one in self.heated))
         return Parameters(
-            self.chain, self.datum_mm, spaces, lines, halves, dict(waves), tuple(shared), self.framed
-        )
+            self.chain, self.datum_mm, spaces, lines, halves, dict(waves), tuple(shared), self.framed, warm,
+            middle_of([one.sensors_degC for one in self.heated]),
+        )  # fmt: skip
+
+    @property
+    def heated(self) -> list[Line]:
+        """The lines with sensors beside them."""
+        return [line for line, _ in self.lines if line.sensors_degC]
 
 
 def artefacts_of(measurements: Measurements, parameters: Parameters) -> dict[str, tuple[float, float]]:

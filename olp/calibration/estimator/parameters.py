@@ -14,6 +14,7 @@ from typing import Protocol
 import numpy as np
 
 from olp.calibration.estimator.basis import CurveSpace, Wave, slope_grid, slope_weights
+from olp.calibration.observations.sensors import shapes_of, warmed
 from olp.core.arrays import Array
 from olp.core.machine import COMPONENTS, SQUARENESS, ZERO, Vector
 from olp.core.units import AXES
@@ -55,6 +56,8 @@ class Parameters:
     "EXX", "half EXX", "wave EXX", "C0Y" and the names of shared nuisances. With `framed` some points were
     measured in the machine's frame. Theta then has a part "frame" of nine numbers: shift (mm) and turn of the
     axes in that frame, and turn of the tool vectors. Turns are in rad times LEVER_ARM_MM.
+    `sensors_degC` are the sensors beside lines with the temperature at which curves hold, `warm` the
+    components that change with them: their parts are "warm EXX".
 
     `slopes` are the mean slopes of the straightness curves on lines through the datum with no tool, as
     functionals of theta. Curves are straight on their own lines. Tool vectors count from the axes as they
@@ -69,6 +72,8 @@ class Parameters:
     waves: Mapping[str, tuple[Wave, ...]] = field(default_factory=dict)
     shared: tuple[str, ...] = ()
     framed: bool = False
+    warm: tuple[str, ...] = ()
+    sensors_degC: Mapping[str, float] = field(default_factory=dict)
     slices: Mapping[str, slice] = field(init=False)
     size: int = field(init=False)
     slopes: Mapping[str, Array] = field(init=False)
@@ -79,6 +84,7 @@ class Parameters:
         sizes = [(name, self.spaces[name].size) for name in COMPONENTS]
         sizes += [(f"half {name}", space.size) for name, space in self.halves.items()]
         sizes += [(f"wave {name}", 2 * len(terms)) for name, terms in self.waves.items()]
+        sizes += [(f"warm {n}", len(shapes_of(n, self.warm)) * len(self.sensors_degC)) for n in self.warm]
         sizes += [(name, 1) for name in (*SQUARENESS, *self.shared)]
         sizes += [("frame", 9)] if self.framed else []
         for name, size in sizes:
@@ -141,6 +147,35 @@ class Parameters:
             if np.any(lever_arm != 0.0):
                 for part, values in self.curve(f"E{'ABC'[a]}{AXES[axis]}", q, direction):
                     yield part, sign * lever_arm[:, None] * values
+
+    def warmed(self, name: str, q: Array, sensors_degC: Mapping[str, Array]) -> list[Part]:
+        """The parts of what temperatures (n,) do to a component at q (n,); none without sensors."""
+        if name not in self.warm or not sensors_degC:
+            return []
+        rise = {one: sensors_degC[one] - at for one, at in self.sensors_degC.items()}
+        columns = warmed(self.span_mm(name), q, rise, shapes_of(name, self.warm))
+        return [(self.slices[f"warm {name}"], columns)]
+
+    def span_mm(self, name: str) -> tuple[float, float]:
+        """The axis positions that a component spans."""
+        spline = self.spaces[name].spline
+        return spline.low_mm, spline.high_mm
+
+    def distortion(
+        self, row: int, axis: int, position: Array, tool: Array, sensors_degC: Mapping[str, Array],
+        *, on_table: bool,
+    ) -> Iterator[Part]:  # fmt: skip
+        """As `displacement`, what temperatures (n,) add. A displacement that does not change with them is
+        still where the axis was positioned, so its angles act from there."""
+        own, q = f"E{AXES[row]}{AXES[axis]}", position[:, axis]
+        yield from self.warmed(own, q, sensors_degC)
+        seen_from = row if own in self.warm else axis
+        for i, a, k, sign in CROSS:
+            for part, values in self.warmed(f"E{'ABC'[a]}{AXES[axis]}", q, sensors_degC) if i == row else ():
+                lever_arm = self.lever_arm(seen_from, axis, k, position, tool)
+                if on_table and k == axis:
+                    lever_arm = lever_arm - (q - self.datum_mm[axis])
+                yield part, sign * lever_arm[:, None] * values
 
     def lever_arm(self, row: int, axis: int, k: int, position: Array, tool: Array) -> Array:
         """(n,) coordinate `k` of the lever arm by which angles of `axis` act on displacement `row`."""

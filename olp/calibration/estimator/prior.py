@@ -15,6 +15,7 @@ from olp.calibration.estimator.normal import Normal, evidence
 from olp.calibration.estimator.parameters import Parameters
 from olp.calibration.estimator.smoothing import AMPLITUDE, FEATURE, HALF, Shape
 from olp.calibration.observations.points import FRAME_MM
+from olp.calibration.observations.sensors import per_kelvin, shapes_of
 from olp.core.arrays import Array
 from olp.core.machine import COMPONENTS, SQUARENESS
 from olp.core.values import dataclass
@@ -79,6 +80,10 @@ class Prior:
         for name in p.waves:
             part = p.slices[f"wave {name}"]
             precision[part, part] = np.eye(part.stop - part.start) / FEATURE[name[1] in "ABC"] ** 2
+        for name in p.warm:
+            part = p.slices[f"warm {name}"]
+            sizes = per_kelvin(name, len(p.sensors_degC), shapes_of(name, p.warm))
+            precision[part, part] = np.diag(sizes**-2.0)
         for name in SQUARENESS:
             precision[p.slices[name], p.slices[name]] = 1.0 / SQUARE**2
         for name in p.shared:

@@ -18,6 +18,7 @@ from olp.calibration.estimator.character import Evidence, candidates, characters
 from olp.calibration.estimator.normal import Block, Chunk, Normal
 from olp.calibration.observations.base import Noise
 from olp.calibration.observations.lines import Line, drift_ramps, targets_of
+from olp.calibration.observations.sensors import own_columns, per_kelvin
 from olp.core.arrays import Array
 from olp.core.values import dataclass
 
@@ -158,5 +159,7 @@ def _block(rows: Array, line: Line, noise: Noise, waves: Sequence[Wave], amplitu
         ramps = drift_ramps(line)
         local += list(ramps.T)
         precision += [1.0 / noise.drift**2] * ramps.shape[1]
+    local += list(own_columns(line.target_mm, line.sensors_degC).T)
+    precision += (per_kelvin(line.component, len(line.sensors_degC)) ** -2.0).tolist()
     chunk = Chunk(rows, line.value, np.full(n, noise.sigma), np.stack(local, axis=1))
     return Block.of(chunk, np.arange(rows.shape[1]), np.array(precision))

@@ -12,6 +12,7 @@ import numpy as np
 from olp.calibration.estimator.curves import half_of, joints_of, sigma_of
 from olp.calibration.estimator.fitted import Fit
 from olp.calibration.estimator.parameters import LEVER_ARM_MM, SHEAR
+from olp.calibration.estimator.warming import temperature_rows
 from olp.calibration.iso230.conventions import lean_words
 from olp.calibration.observations.base import rms, unit_of
 from olp.calibration.observations.references import error_name, form_at
@@ -154,6 +155,7 @@ def summary(fit: Fit, calibration: Calibration, tools: Sequence[Vector]) -> dict
         ],
         **_sections(fit),
         **_artefacts(fit),
+        **temperature_rows(fit),
         "not_observed": [
             {"name": name, "costs_um": cost_um(fit, name, sigma, tools)}
             for name, sigma in {**hidden, **squareness_unobservable(fit)}.items()

@@ -11,7 +11,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
 from typing import Any, Literal
 
@@ -33,6 +33,7 @@ from olp.calibration.observations.base import (
     unit_of,
 )
 from olp.calibration.observations.references import form_columns, sense_of, square_names
+from olp.calibration.observations.sensors import own_columns, per_kelvin
 from olp.core.arrays import Array, Index
 from olp.core.errors import ConfigError
 from olp.core.machine import COMPONENTS, ZERO, Vector
@@ -73,6 +74,8 @@ UNITS = (
 )
 #: Drift of an instrument over a run, assumed where there is one run only (mm, rad): 2 um, 2 urad.
 DRIFT = 2e-3, 2e-6
+#: How much larger the drift of an instrument beside sensors may be.
+_LARGE_DRIFT = 5.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,8 +91,9 @@ class Line(Observation):
     name a `straightedge` against that, at one place of it along the axis; `turned` where it was turned over.
     `sigma` is the standard uncertainty of one reading (mm or rad), `sigma_scale` that of the scale of
     all readings of a line (mm/mm, a laser's wavelength). A sigma of 0 means not known: it then follows from
-    the spread of the runs. `source` is the file and `row` (n,) the line of each reading in it. Raises
-    ConfigError.
+    the spread of the runs. `source` is the file and `row` (n,) the line of each reading in it.
+    `sensors_degC` (n,) are the temperatures of the structure at each reading, by the name of the sensor.
+    Raises ConfigError.
     """
 
     component: str
@@ -108,6 +112,7 @@ class Line(Observation):
     instrument: str = ""
     straightedge: str | None = None
     turned: bool = False
+    sensors_degC: Mapping[str, Array] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not len(self.row):
@@ -136,6 +141,12 @@ class Line(Observation):
             raise ConfigError(f"{label}: a reading is not finite; leave the row out", file=self.source)
         if not np.isin(self.direction, (-1, 1)).all():
             raise ConfigError(f"{label}: a direction is neither +1 nor -1", file=self.source)
+        for name, own in self.sensors_degC.items():
+            if np.shape(own) != (n,) or not np.isfinite(own).all():
+                raise ConfigError(
+                    f"{label}: sensor {name} has no temperature at each reading; leave such rows out",
+                    file=self.source,
+                )
 
     @property
     def axis(self) -> int:
@@ -232,11 +243,13 @@ def noise_of(line: Line) -> Noise:
     n, several = len(line.value), len(np.unique(line.run)) > 1
     ramps = drift_ramps(line)
     spread: float | None = None
-    drift = 0.0
+    drift, least = 0.0, LEAST[line.quantity == "angle"]
     if several:
         # the mean of each target and direction is removed on both sides, so the ramps describe the drift
         count = int(groups.max()) + 1
-        own = ramps - _means(ramps, groups, count)[groups]
+        # what temperatures do is not noise
+        causes = np.concatenate([ramps, own_columns(line.target_mm, line.sensors_degC)], axis=1)
+        own = causes - _means(causes, groups, count)[groups]
         value = line.value - _means(line.value[:, None], groups, count)[groups, 0]
         steps, _, rank, _ = np.linalg.lstsq(own, value, rcond=1e-9)
         free = n - count - int(rank)
@@ -245,8 +258,9 @@ def noise_of(line: Line) -> Noise:
             # from the median, so that one slip does not enlarge the noise of all readings
             robust = 1.4826 * float(np.median(np.abs(rest))) * np.sqrt(n / free)
             spread = min(float(np.sqrt(rest @ rest / free)), 1.3 * robust)
-            drift = float(np.sqrt(np.mean(steps**2)))
-    least = LEAST[line.quantity == "angle"]
+            if line.sensors_degC:
+                steps = _apart(line, own, value, max(spread, least))
+            drift = float(np.sqrt(np.mean(steps[: ramps.shape[1]] ** 2)))
     if spread is None and line.sigma <= 0.0:
         raise ConfigError(
             f"line {line.component} has no repeated readings and states no sigma; expected at least two runs "
@@ -255,6 +269,17 @@ def noise_of(line: Line) -> Noise:
         )
     sigma = max(line.sigma, spread or 0.0, least)
     return Noise(sigma, max(drift, 0.2 * sigma) if several else DRIFT[line.quantity == "angle"], spread)
+
+
+def _apart(line: Line, causes: Array, value: Array, sigma: float) -> Array:
+    """Drift of the instrument and what temperatures do, as far as both differ: where they rise alike, neither
+    is larger than usual."""
+    angle = line.quantity == "angle"
+    warm = per_kelvin(line.component, len(line.sensors_degC))
+    usual = np.concatenate([np.full(causes.shape[1] - len(warm), _LARGE_DRIFT * DRIFT[angle]), warm])
+    table = causes * usual / sigma
+    inner = table.T @ table + np.eye(len(usual))
+    return np.asarray(usual * np.linalg.solve(inner, table.T @ value / sigma))
 
 
 def _means(columns: Array, groups: np.ndarray, count: int) -> Array:
@@ -302,12 +327,16 @@ def line_block(line: Line, parameters: Parameters, noise: Noise) -> Block:
     from_datum = q - parameters.datum_mm[axis]
     local = [np.ones(n)]
     precision = [0.0]
+    position = np.tile(np.array(line.line_mm), (n, 1))
+    position[:, axis] = q
+    tool, sensors = np.array(line.tool_mm), line.sensors_degC
     if line.quantity == "angle":
         parts = parameters.curve(line.component, q, side)
+        for k, letter in enumerate(AXES):
+            # an axis at rest turns with temperature, too
+            parts += parameters.warmed(line.component[:2] + letter, position[:, k], sensors)
     else:
-        position = np.tile(np.array(line.line_mm), (n, 1))
-        position[:, axis] = q
-        row, tool = AXES.index(line.component[1]), np.array(line.tool_mm)
+        row = AXES.index(line.component[1])
         parts = []
         for other in range(3):
             # an axis at rest still has an angle there, and this tilts the line of an axis that it carries
@@ -315,6 +344,7 @@ def line_block(line: Line, parameters: Parameters, noise: Noise) -> Block:
             on_table = own and line.reference == "table"
             where = side if own else None
             parts += parameters.displacement(row, other, position, tool, where, on_table=on_table)
+            parts += parameters.distortion(row, other, position, tool, sensors, on_table=on_table)
         if line.quantity == "straightness":
             parts += [
                 (parameters.slices[name], sign * from_datum[:, None])
@@ -369,19 +399,31 @@ def _part(line: Line, use: np.ndarray) -> Line:
     if use.all():
         return line
     columns = ("target_mm", "value", "run", "direction", "row")
-    return dataclasses.replace(line, **{name: getattr(line, name)[use] for name in columns})
+    sensors = {name: own[use] for name, own in line.sensors_degC.items()}
+    kept = {name: getattr(line, name)[use] for name in columns}
+    return dataclasses.replace(line, sensors_degC=sensors, **kept)
 
 
 def _about_group(line: Line) -> Array:
     """(n,) deviation from the others of the same target and direction, with the level of its run removed;
     zero where fewer than three were read."""
     group = group_of(line)
-    rest = line.value.copy()
+    rest = line.value - _of_temperatures(line, group)
     for _ in range(3):
         for labels in (group, line.run - line.run.min()):
             rest -= _medians(rest, labels)[labels]
     counts = np.bincount(group)[group]
     return np.where(counts >= 3, rest, 0.0)
+
+
+def _of_temperatures(line: Line, group: np.ndarray) -> Array:
+    """(n,) what the temperatures of a line explain of the spread of its repetitions."""
+    causes = own_columns(line.target_mm, line.sensors_degC)
+    if not causes.shape[1]:
+        return np.zeros(len(line.value))
+    table = np.column_stack([causes, line.value])
+    rest = table - _means(table, group, int(group.max()) + 1)[group]
+    return np.asarray(causes @ np.linalg.lstsq(rest[:, :-1], rest[:, -1], rcond=1e-9)[0])
 
 
 def _medians(values: Array, labels: np.ndarray) -> Array:

@@ -64,6 +64,7 @@ def as_line(
     """The line of these readings, with the merged keys. Raises ConfigError with every problem."""
     problems = list(_line_problems(component, keys, vertical, chain, readings.sense_known))
     problems += environment_problems(readings, component, keys)
+    problems += _sensor_problems(readings, component, keys)
     if problems:
         raise ConfigError("; ".join(problems), file=file, problems=tuple(problems))
     angular = component[1] in "ABC"
@@ -89,6 +90,7 @@ def as_line(
         source=file,
         row=readings.line,
         instrument=keys.instrument or "",
+        sensors_degC=readings.sensors,
     )
 
 
@@ -127,6 +129,14 @@ def _line_problems(
             yield f'sense = "{keys.sense}", but axis {axis} of the chain {chain} moves the tool, not a table'
         if keys.reference == "table":
             yield f'reference = "table", but axis {axis} of the chain {chain} moves the tool, not a table'
+
+
+def _sensor_problems(readings: Readings, component: str, keys: LineKeys) -> Iterator[str]:
+    """What is missing beside sensors: axes at rest turn with temperature, too."""
+    places = [a for a in AXES if a != component[2] and getattr(keys.line_mm, a) is None]
+    if readings.sensors and component[1] in "ABC" and places:
+        names = ", ".join(f"line_mm.{a}" for a in places)
+        yield f"{names} is missing; expected the position, because axes at rest turn with temperature, too"
 
 
 def _artefact_problems(component: str, keys: LineKeys, vertical: str) -> Iterator[str]:

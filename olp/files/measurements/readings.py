@@ -64,6 +64,10 @@ _VALUES = {"value_um": "um", "value_urad": "urad"}
 #: Columns of the environment of a laser: of its air, all or none, and of the material.
 AIR = ("air_degC", "pressure_hPa", "humidity_percent")
 MATERIAL = "material_degC"
+#: The end of the name of a column of a sensor of the structure.
+SENSOR = "_degC"
+#: What a sensor may read, degC.
+_DEGC = -50.0, 150.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,7 +79,7 @@ class Readings:
     None where the file does not state it. `angular` says that values are in rad, None where the file does not
     state it. `keys` are the comments of the file, each with its line. `notes` are sentences on what the
     reader assumed. `sense_known` says that values are actual minus commanded. `environment` are columns (n,)
-    of AIR and MATERIAL.
+    of AIR and MATERIAL, `sensors` are temperatures (n,) of the structure by the name of the sensor.
     """
 
     file: str
@@ -90,6 +94,7 @@ class Readings:
     notes: tuple[str, ...] = ()
     sense_known: bool = False
     environment: Mapping[str, Array] = field(default_factory=dict)
+    sensors: Mapping[str, Array] = field(default_factory=dict)
 
     def with_sense(self, sense: str) -> Readings:
         """The same as actual minus commanded. `sense`, a key of SENSES, is the sign convention so far."""
@@ -127,7 +132,13 @@ def parse_readings(data: bytes, file: str) -> Readings:
         unit in ANGULAR,
         MappingProxyType(keys),
         environment={name: column[name] for name in (*AIR, MATERIAL) if name in column},
+        sensors={name.removesuffix(SENSOR): column[name] for name in column if _is_sensor(name)},
     )
+
+
+def _is_sensor(name: str) -> bool:
+    """Whether a column holds the temperatures of a sensor of the structure."""
+    return name.endswith(SENSOR) and name not in (*AIR, MATERIAL, SENSOR)
 
 
 def check_component(readings: Readings, component: str) -> None:
@@ -150,7 +161,7 @@ def _header_problems(line: int, header: Sequence[str]) -> list[Problem]:
         sentence = "columns are separated by semicolons or tabs; expected commas, or a profile for this file"
         return [(line, sentence)]
     more = "; files of other instruments need a profile"
-    problems = names(line, header, lambda _, name: unknown(name, known, more))
+    problems = names(line, header, lambda _, name: None if _is_sensor(name) else unknown(name, known, more))
     air = AIR if any(name in header for name in AIR) else ()
     problems += missing(line, header, (*_HEADER, *air))
     if sum(name in _VALUES for name in header) != 1:
@@ -168,6 +179,8 @@ def _number(name: str, cell: str) -> tuple[float, str | None]:
         problem = f"direction = {cell}; expected 1 (approached in +) or -1"
     elif name == "run" and (value != int(value) or value < 1):
         problem = f"run = {cell}; expected an integer from 1"
+    elif _is_sensor(name) and not _DEGC[0] <= value <= _DEGC[1]:
+        problem = f"{name} = {cell}; expected {_DEGC[0]:g} to {_DEGC[1]:g}"
     return value, problem
 
 
