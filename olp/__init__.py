@@ -72,6 +72,8 @@ if TYPE_CHECKING:
     from olp.workflows.inspect import inspect as inspect
     from olp.workflows.joints.correct import JointCorrection as JointCorrection
     from olp.workflows.joints.correct import correct_joints as correct_joints
+    from olp.workflows.joints.retime import JointRetiming as JointRetiming
+    from olp.workflows.joints.retime import retime_joints as retime_joints
     from olp.workflows.joints.simulate import JointSimulation as JointSimulation
     from olp.workflows.joints.simulate import simulate_joints as simulate_joints
     from olp.workflows.joints.verify import JointVerification as JointVerification
@@ -133,6 +135,8 @@ _HOME = {
     "view_joints": "olp.review.joints",
     "JointCorrection": "olp.workflows.joints.correct",
     "correct_joints": "olp.workflows.joints.correct",
+    "JointRetiming": "olp.workflows.joints.retime",
+    "retime_joints": "olp.workflows.joints.retime",
     "JointSimulation": "olp.workflows.joints.simulate",
     "simulate_joints": "olp.workflows.joints.simulate",
     "JointVerification": "olp.workflows.joints.verify",

@@ -183,6 +183,43 @@ def simulate(
         put(result.to_csv())
 
 
+def retime(program: str | None, machine: str | None, job: str | None, words: dict[str, Any]) -> None:
+    """`olp retime`."""
+    from olp.cli.progress import progress
+
+    output, report_file = words["output"], words["report_file"]
+    if output == STREAM and words["as_json"]:
+        raise UsageError("stdout takes one result; write the others to files (-o, --report)")
+    for file in files_of(output):
+        if Path(file).suffix.lower() != ".csv":
+            raise UsageError(
+                f"the trajectory {file!r} of a machine with rotary joints is a table; expected .csv"
+            )
+    run = run_of(program, machine, job)
+    refuse_twice(files_of(output, report_file))
+    refuse_early(files_of(output, report_file), run.files, force=words["force"])
+
+    from olp.files.write import write_files
+    from olp.reports.report import to_json
+    from olp.workflows.joints.retime import JointRetimeOptions, retimed
+
+    with progress(words["quiet"]) as show:
+        result = retimed(run, options_of(JointRetimeOptions, words), show)
+        cycle_s = words["cycle_ms"] * 1e-3
+        written: dict[Path, Content] = {Path(file): result.to_csv(cycle_s) for file in files_of(output)}
+        written |= {Path(file): to_json(result.report) for file in files_of(report_file)}
+        write_files(written, force=words["force"], inputs=run.files)
+    if output == STREAM:
+        put(result.to_csv(cycle_s))
+    if not words["quiet"]:
+        for path in written:
+            diagnostic(f"wrote {path}")
+    if words["as_json"]:
+        put(to_json(result.report))
+    elif not words["quiet"]:
+        put(result.to_text(), err=output == STREAM)
+
+
 def view(
     program: str | None, machine: str | None, job: str | None, corrected: str | None, words: dict[str, Any]
 ) -> tuple[Callable[[], Review], tuple[str, ...], str]:

@@ -110,6 +110,11 @@ def command(program: str | None, machine: str | None, job: str | None, **words: 
     OUT has axis positions, velocities and accelerations every --cycle-ms. Moves of the control itself (tool
     changes, G28, probing) divide the motion into stretches, and OUT becomes OUT-1, OUT-2 ...
     """
+    from olp.cli import joints
+
+    if joints.on_joints(machine, job, also=("cycle_ms", "blend_mm", "report_file")):
+        joints.retime(program, machine, job, words)
+        return
     call, outputs = given(program, machine, job), options_of(_Outputs, words)
     nominal, proof = words["nominal"], words["proof"]
     if call.program == STREAM == nominal:

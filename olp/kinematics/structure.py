@@ -30,7 +30,8 @@ FRAME = "F"
 class Joint:
     """A straight line in space and what moves along or about it. `length` is that of a leg of a platform,
     which has no line of its own. `direction` is a unit vector. `travel` is in mm or deg. Where `correct` is
-    False a correction keeps the axis as the program states it."""
+    False a correction keeps the axis as the program states it. `most` are the largest velocity, acceleration
+    and jerk, None where the machine file states none."""
 
     name: str
     kind: Kind
@@ -39,6 +40,7 @@ class Joint:
     travel: tuple[float, float]
     least_increment: float = 0.0
     correct: bool = True
+    most: tuple[float | None, float | None, float | None] = (None, None, None)
 
     @property
     def unit(self) -> str:

@@ -27,7 +27,7 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ratios:
-    """Largest ratios to the limits: `velocity`, `acceleration`, `jerk` (3,) per axis, and `feed` along the
+    """Largest ratios to the limits: `velocity`, `acceleration`, `jerk` (axes,) per axis, and `feed` along the
     path (0 without feeds). A value up to 1 may be a bound that the motion does not reach."""
 
     velocity: Array
@@ -75,7 +75,7 @@ def ratios(motion: Motion, limits: AxisLimits, feed_mm_s_by_piece: Array | None 
     if feed_mm_s_by_piece is not None and feed_mm_s_by_piece.shape != (len(motion),):
         raise UsageError(f"feeds have shape {feed_mm_s_by_piece.shape}; expected ({len(motion)},)")
     most = np.stack((limits.velocity, limits.acceleration, limits.jerk))
-    largest, feed = np.zeros((3, 3)), 0.0
+    largest, feed = np.zeros((3, motion.axes)), 0.0
     for part, pieces in blocks(motion):
         given = None if feed_mm_s_by_piece is None else feed_mm_s_by_piece[part]
         largest, feed = _of(pieces, most, given, (largest, feed))
@@ -117,7 +117,7 @@ def _states(pieces: Pieces, s: Array, s1: Array, s2: Array) -> tuple[Array, Arra
 
 
 def _of(pieces: Pieces, most: Array, feed: Array | None, before: tuple[Array, float]) -> tuple[Array, float]:
-    """(3, 3) largest ratios to `most`, and of the speed to the feed; never below those `before`."""
+    """(3, axes) largest ratios to `most`, and of the speed to the feed; never below those `before`."""
     value, speed, exact, even = _bounds(pieces)
     ratio = value / most[:, :, None]
     share = np.zeros_like(speed) if feed is None else speed / feed
@@ -154,13 +154,14 @@ def _exactly(
         fastest = max(fastest, extreme(values[:, 0] / feed, max(fastest, 1.0)))
     values /= most[:, :, None]
     extremes = np.array([
-        [extreme(values[:, i, axis, None], max(1.0, largest[i, axis])) for axis in range(3)] for i in range(3)
+        [extreme(values[:, i, axis, None], max(1.0, largest[i, axis])) for axis in range(len(third))]
+        for i in range(3)
     ])  # fmt: skip
     return np.maximum(largest, extremes), fastest
 
 
 def _bounds(pieces: Pieces) -> tuple[Array, Array, Mask, Mask]:
-    """(3, 3, n) bounds of velocity, acceleration and jerk of each axis, and (n,) of the speed along the path.
+    """(3, axes, n) bounds of velocity, acceleration and jerk, and (n,) of the speed along the path.
 
     The masks (n,) mark where the axes' bounds are exact, and where the speed's is."""
     rate, cubic = _rates(pieces)
@@ -176,7 +177,7 @@ def _bounds(pieces: Pieces) -> tuple[Array, Array, Mask, Mask]:
     m1 = np.maximum(np.maximum(np.abs(first), np.abs(last)), np.abs(inside))
     m2 = np.maximum(np.abs(bend), np.abs(bend_last))
     m3 = np.abs(third)
-    value = np.empty((3, 3, len(low)))
+    value = np.empty((3, *m1.shape))
     value[0] = m1 * rate[0]
     value[1] = m2 * (rate[0] * rate[0]) + m1 * rate[1]
     value[2] = (m3 * rate[0] ** 2 + 3.0 * m2 * rate[1]) * rate[0] + m1 * rate[2]

@@ -16,7 +16,7 @@ from olp.core.arrays import Array, Index
 def deviations(
     x: Array, centre: Array, width: Array, bend: Array, begin: Index, middle: Index, end: Index
 ) -> Array:
-    """(k, 4, 3) sum of kernels and its first three derivatives at the start of each piece, valid over it.
+    """(k, 4, axes) sum of kernels and its first three derivatives at the start of each piece, valid over it.
 
     `x` (k + 1,) rising breaks; kernel i is bend_i w g((x - centre_i) / w), g(z) = (1 - |z|)^3 / 6. Its first
     half covers the pieces begin..middle, the second middle..end (half open, cut to the breaks given).
@@ -25,7 +25,8 @@ def deviations(
     depth = max(k - 1, 0).bit_length()
     size = 1 << depth
     start = np.concatenate((x[:-1], np.full(size - k, x[-1])))
-    tree = np.zeros((12, 2 * size))
+    axes = bend.shape[1]
+    tree = np.zeros((4 * axes, 2 * size))
     top = depth
     for lo, hi, edge, sign in (
         (begin, middle, centre - width, 1.0),
@@ -34,18 +35,18 @@ def deviations(
         top = min(top, _lay(tree, size, start, lo, hi, edge, sign, 1.0 / (width * width), bend))
     for level in range(top, depth):
         base = 1 << level
-        parent = tree[:, base : 2 * base].reshape(4, 3, base)
-        first_child = tree[:, 2 * base : 4 * base : 2].reshape(4, 3, base)
-        second_child = tree[:, 2 * base + 1 : 4 * base : 2].reshape(4, 3, base)
+        parent = tree[:, base : 2 * base].reshape(4, axes, base)
+        first_child = tree[:, 2 * base : 4 * base : 2].reshape(4, axes, base)
+        second_child = tree[:, 2 * base + 1 : 4 * base : 2].reshape(4, axes, base)
         span = size >> (level + 1)
         d = start[span :: 2 * span] - start[:: 2 * span]
         f, f1, f2, f3 = parent
-        tree[:, 2 * base : 4 * base : 2] = (first_child + parent).reshape(12, base)
+        tree[:, 2 * base : 4 * base : 2] = (first_child + parent).reshape(4 * axes, base)
         shifted = np.stack(
             (f + d * (f1 + d * (f2 / 2.0 + d * (f3 / 6.0))), f1 + d * (f2 + d * (f3 / 2.0)), f2 + d * f3, f3)
         )
-        tree[:, 2 * base + 1 : 4 * base : 2] = (second_child + shifted).reshape(12, base)
-    return np.ascontiguousarray(tree[:, size : size + k].T).reshape(k, 4, 3)
+        tree[:, 2 * base + 1 : 4 * base : 2] = (second_child + shifted).reshape(4 * axes, base)
+    return np.ascontiguousarray(tree[:, size : size + k].T).reshape(k, 4, axes)
 
 
 def _lay(
@@ -72,8 +73,8 @@ def _lay(
             f1 = f2 * y / 2.0
             spot = node - base
             for order, f in enumerate((f1 * y / 3.0, f1, f2, f3)):
-                for axis in range(3):
-                    tree[3 * order + axis, base : 2 * base] += np.bincount(
+                for axis in range(bend.shape[1]):
+                    tree[bend.shape[1] * order + axis, base : 2 * base] += np.bincount(
                         spot, weights=f * bend[i, axis], minlength=base
                     )
         lo, hi = (lo + 1) >> 1, hi >> 1

@@ -34,6 +34,11 @@ class Motion:
     def duration_s(self) -> float:
         return float(self.start_s[-1] - self.start_s[0]) if len(self.start_s) else 0.0
 
+    @property
+    def axes(self) -> int:
+        """How many axes move."""
+        return int(self.path.shape[2])
+
     def __len__(self) -> int:
         return len(self.time)
 
@@ -49,7 +54,7 @@ class Motion:
 
     def of(self, piece: Index, u: Array) -> tuple[Array, Array, Array, Array]:
         """The same at times `u` (n,) after the start of pieces (n,)."""
-        position, velocity, acceleration, jerk = (np.empty((3, len(piece))) for _ in range(4))
+        position, velocity, acceleration, jerk = (np.empty((self.axes, len(piece))) for _ in range(4))
         for some in _blocks(len(piece)):
             s, s1, s2, s3 = derivatives(self.time[piece[some]], u[some])
             for axis, (p0, p1, p2, p3) in enumerate(self._coefficients(piece[some])):
@@ -64,7 +69,7 @@ class Motion:
 
     def positions(self, piece: Index, u: Array) -> Array:
         """The first of these alone."""
-        position = np.empty((3, len(piece)))
+        position = np.empty((self.axes, len(piece)))
         for some in _blocks(len(piece)):
             c = self.time[piece[some]].T
             s = c[-1]
@@ -81,7 +86,7 @@ class Motion:
         low, high = (int(shape.min()), int(shape.max()) + 1) if len(shape) else (0, 0)
         shape -= low
         columns = np.ascontiguousarray(self.path[low:high].transpose(2, 1, 0))
-        for axis in range(3):
+        for axis in range(self.axes):
             p0, p1, p2, p3 = (column.take(shape) for column in columns[axis])
             yield p0, p1, p2, p3
 
@@ -106,7 +111,7 @@ class Motion:
     @staticmethod
     def rest(at_mm: Array, seconds: float, line: int) -> Motion:
         """A motion that stands still."""
-        path = np.zeros((1, 4, 3))
+        path = np.zeros((1, 4, len(at_mm)))
         path[0, 0] = at_mm
         return Motion(
             np.array([0.0, seconds]),
@@ -126,13 +131,13 @@ class Motion:
                 first = part
                 continue
             if whole is None:
-                whole = _Joined()
+                whole = _Joined(first.axes)
                 whole.add(first)
             whole.add(part)
         if whole is not None:
             return whole.motion()
         if first is None:
-            return _Joined().motion()
+            return _Joined(3).motion()
         return first if first.start_s[0] == 0.0 else first.shifted(-first.start_s[0])
 
 
@@ -144,10 +149,10 @@ def _blocks(count: int) -> Iterator[slice]:
 class _Joined:
     """Motions one after the other."""
 
-    def __init__(self) -> None:
+    def __init__(self, axes: int) -> None:
         self._start = Growing(np.zeros(0))
         self._time = Growing(np.zeros((0, 4)))
-        self._path = Growing(np.zeros((0, 4, 3)))
+        self._path = Growing(np.zeros((0, 4, axes)))
         self._shape = Growing(np.zeros(0, np.int64))
         self._line = Growing(np.zeros(0, np.int64))
         self._wide = 4

@@ -83,7 +83,7 @@ def overlap_parts(route: Route, limits: AxisLimits) -> Overlapped:
     _check(route, limits)
     count = len(route)
     if count == 0:
-        return Overlapped(_nothing(), np.zeros(0, np.int64))
+        return Overlapped(_nothing(route), np.zeros(0, np.int64))
     first, moves = _merged(route, limits)
     segment = first[1:] - 1
     if segment.size == 0:
@@ -91,7 +91,8 @@ def overlap_parts(route: Route, limits: AxisLimits) -> Overlapped:
         return Overlapped(Motion.rest(route.point_mm[0], 0.0, line), np.zeros(1, np.int64))
     points = route.point_mm[first]
     none = np.zeros(0, np.int64)
-    all_seconds, all_time, all_path = (Growing(np.zeros(e)) for e in ((0,), (0, 4), (0, 4, 3)))
+    sizes = ((0,), (0, 4), (0, 4, points.shape[1]))
+    all_seconds, all_time, all_path = (Growing(np.zeros(size)) for size in sizes)
     all_shape, all_owner = Growing(none), Growing(none)
     for a in range(0, len(segment), _BLOCK):
         part = _block(moves, points, a, min(a + _BLOCK, len(segment)))
@@ -120,10 +121,10 @@ def _check(route: Route, limits: AxisLimits) -> None:
     for name, values in (
         ("velocity", limits.velocity), ("acceleration", limits.acceleration), ("jerk", limits.jerk)
     ):  # fmt: skip
-        if np.shape(values) != (3,) or not bool(np.all(np.isfinite(values) & (values > 0.0))):
-            raise UsageError(f"the axis limits of {name} are {values}; expected three numbers above 0")
-    if route.point_mm.ndim != 2 or route.point_mm.shape[1] != 3:
-        raise UsageError(f"waypoints have shape {route.point_mm.shape}; expected (n, 3)")
+        if np.ndim(values) != 1 or not bool(np.all(np.isfinite(values) & (values > 0.0))):
+            raise UsageError(f"the axis limits of {name} are {values}; expected numbers above 0")
+    if route.point_mm.ndim != 2 or route.point_mm.shape[1] != len(limits.velocity):
+        raise UsageError(f"waypoints have shape {route.point_mm.shape}; expected (n, {len(limits.velocity)})")
     if not bool(np.isfinite(route.point_mm).all()):
         raise UsageError("a waypoint is not finite")
     if not bool(np.all(route.feed_mm_s > 0.0)):
@@ -193,7 +194,7 @@ def _block(moves: _Moves, point: Array, a: int, b: int) -> _Pieces:
     time[:, 1:, 3] = solved.jerk / 6.0
     time[:, 1 + CRUISE, 3] = 0.0
     corners = np.flatnonzero(head > 0.0)
-    path = np.zeros((count + len(corners), 4, 3))
+    path = np.zeros((count + len(corners), 4, point.shape[1]))
     path[:count, 0], path[:count, 1] = point[pick], moves.along[pick]
     if corners.size:
         path[count:] = _corner(moves, point, a + corners)
@@ -220,6 +221,6 @@ def _corner(moves: _Moves, point: Array, waypoint: Index) -> Array:
     )
 
 
-def _nothing() -> Motion:
+def _nothing(route: Route) -> Motion:
     none = np.zeros(0, np.int64)
-    return Motion(np.zeros(1), np.zeros((0, 4)), np.zeros((0, 4, 3)), none, none)
+    return Motion(np.zeros(1), np.zeros((0, 4)), np.zeros((0, 4, route.point_mm.shape[1])), none, none)

@@ -74,8 +74,10 @@ def blocks(motion: Motion) -> Iterator[tuple[slice, Pieces]]:
 
 
 def dot(a: Array, b: Array) -> Array:
-    """(n,) scalar products of (3, n) and (3, n)."""
-    result: Array = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    """(n,) scalar products of (axes, n) and (axes, n)."""
+    result: Array = a[0] * b[0]
+    for one, other in zip(a[1:], b[1:], strict=True):
+        result = result + one * other
     return result
 
 

@@ -76,7 +76,8 @@ def plan(
     _check(route, limits)
     route = _with_stops(route)
     legs: list[Leg] = []
-    used = [Ratios(np.zeros(3), np.zeros(3), np.zeros(3), 0.0)]
+    none = np.zeros_like(limits.velocity)
+    used = [Ratios(none, none, none, 0.0)]
 
     def parts() -> Iterator[Motion]:
         runs = runs_of(route, limits)
@@ -89,7 +90,7 @@ def plan(
                 if tell is not None:
                     tell("plan", some[-1].last / (len(route) - 1))
         if not runs:
-            where = route.point_mm[0] if len(route) else np.zeros(3)
+            where = route.point_mm[0] if len(route) else none
             line = int(route.line[0]) if len(route.line) else 0
             yield Motion.rest(where, float(route.dwell_s.sum()), line)
 
@@ -175,7 +176,7 @@ def _with_dwells(route: Route, first: int, last: int, motion: Motion) -> Motion:
         return replace(motion, line=line)
     seconds = route.dwell_s[waits]
     index = np.searchsorted(motion.line, waits - first)
-    still = np.zeros((len(waits), 4, 3))
+    still = np.zeros((len(waits), *motion.path.shape[1:]))
     still[:, 0] = route.point_mm[waits]
     lasts = np.insert(np.diff(motion.start_s), index, seconds)
     return Motion(

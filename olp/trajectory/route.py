@@ -8,7 +8,7 @@ from olp.core.values import dataclass
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AxisLimits:
-    """(3,) largest velocity mm/s, acceleration mm/s^2 and jerk mm/s^3 of each axis."""
+    """(axes,) largest velocity mm/s, acceleration mm/s^2 and jerk mm/s^3 of each axis."""
 
     velocity: Array
     acceleration: Array
@@ -19,7 +19,7 @@ class AxisLimits:
 class Route:
     """A polyline of commanded axis positions.
 
-    - `point_mm` (n, 3): the waypoints.
+    - `point_mm` (n, axes): the waypoints; rotary axes as `olp.trajectory.from_joints` has them.
     - `feed_mm_s` (n - 1,): largest speed along each segment, inf for rapids.
     - `line` (n - 1,): the line of the program that each segment comes from.
     - `tolerance_mm` (n,): how far from each waypoint the path may pass, 0 for a stop on it (as at both ends).

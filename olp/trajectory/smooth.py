@@ -118,7 +118,7 @@ def smooth(route: Route, limits: AxisLimits) -> SmoothPath:
     point = route.point_mm[kept]
     if len(kept) < 2:
         none = np.zeros(0, np.int64)
-        return SmoothPath(np.zeros(1), np.zeros((0, 4, 3)), np.zeros(0), none, none, none)
+        return SmoothPath(np.zeros(1), np.zeros((0, 4, point.shape[1])), np.zeros(0), none, none, none)
     source = kept[1:] - 1
     feed, line = np.asarray(route.feed_mm_s, float)[source], np.asarray(route.line, np.int64)[source]
     delta = np.diff(point, axis=0)
@@ -259,7 +259,7 @@ def _fitted(
     for turn in range(_ROUNDS):
         breaks = np.unique(np.concatenate((arc_mm, inner - width, inner + width)))
         begin, middle, end = (np.searchsorted(breaks, e) for e in (inner - width, inner, inner + width))
-        shape = np.empty((len(breaks) - 1, 4, 3))
+        shape = np.empty((len(breaks) - 1, 4, u.shape[1]))
         factor = np.ones(len(width))
         for lo in range(0, len(shape), _BLOCK):
             hi = min(lo + _BLOCK, len(shape))

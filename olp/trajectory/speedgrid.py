@@ -35,7 +35,8 @@ _AT_FEED = 0.999
 
 def speed_caps(path: SmoothPath, limits: AxisLimits) -> Array:
     """(k,) largest speed along each piece for the feed and the axes' velocities."""
-    free = AxisLimits(limits.velocity, np.full(3, _FREE), np.full(3, _FREE))
+    none = np.full_like(limits.velocity, _FREE)
+    free = AxisLimits(limits.velocity, none, none)
     return ceilings(path, free, np.ones(len(path)))[0]
 
 
@@ -115,7 +116,7 @@ def bound_s(path: SmoothPath, limits: AxisLimits) -> float:
     """About the least seconds of a motion along the path without a jerk limit."""
     x = path.break_mm
     top = ceilings(path, limits, np.ones(len(path)))[0]
-    free = AxisLimits(limits.velocity, limits.acceleration, np.full(3, _FREE))
+    free = AxisLimits(limits.velocity, limits.acceleration, np.full_like(limits.jerk, _FREE))
     acceleration = ceilings(path, free, np.full(len(path), _STRAIGHT))[1]
     ends = np.concatenate(([0.0], np.minimum(top[:-1], top[1:]), [0.0]))
     speed = free_speeds(x, ends, acceleration)

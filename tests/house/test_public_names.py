@@ -26,7 +26,8 @@ PUBLIC = {
     *("import_table", "export_table", "compare_tables", "TableImport", "TableExport"),
     *("evaluate_lines", "fit_ballbar", "fit_diagonals", "fit_postures", "go_return"),
     *("fit_thermal", "ThermalFitting", "correct_results", "ResultCorrection"),
-    *("correct_poses", "CorrectedPoses", "correct_joints", "JointCorrection", "verify_joints", "view_joints"),
+    *("correct_poses", "CorrectedPoses", "correct_joints", "JointCorrection", "verify_joints"),
+    *("view_joints", "retime_joints", "JointRetiming"),
     *("JointVerification", "simulate_joints", "JointSimulation"),
     *("OlpError", "InputError", "ConfigError", "ProgramError", "Refused", "CannotCompute"),
 }

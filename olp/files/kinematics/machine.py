@@ -117,6 +117,8 @@ def _joint(name: str, table: JointTable) -> Joint:
     travel = table.travel_deg if rotary else table.travel_mm
     step = table.least_increment_deg if rotary else table.least_increment_mm
     assert travel is not None, "the schema refuses an axis without travel"
+    in_mm = (table.velocity_mm_s, table.acceleration_mm_s2, table.jerk_mm_s3)
+    in_deg = (table.velocity_deg_s, table.acceleration_deg_s2, table.jerk_deg_s3)
     return Joint(
         name=name,
         kind=kind,
@@ -125,4 +127,5 @@ def _joint(name: str, table: JointTable) -> Joint:
         travel=travel,
         least_increment=step or 0.0,
         correct=table.correct,
+        most=in_deg if rotary else in_mm,
     )

@@ -1,0 +1,162 @@
+"""Re-timing on machines with rotary joints: limits in all axes, the feed and the tolerance at the tip, found
+with own samples and an own forward."""
+
+from __future__ import annotations
+
+import tomllib
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cases.joint_jobs import JOINT_JOBS
+from cli.test_cli import run
+from judge.five_axis import Judge
+from judge.machines import Recipe, zero_machine
+
+import olp
+from olp.core.errors import ConfigError, ProgramError
+from olp.workflows.joints.loaded import JointRun
+from olp.workflows.joints.retime import JointRetimeOptions, JointRetiming, retimed
+
+FOLDER = Path(__file__).resolve().parents[2] / "programs"
+TRUNNION = FOLDER / "trunnion-mill" / "machine.toml"
+HEAD = b"G21 G90 G17 G94 G54 G49\nG0 X0. Y0. Z150. A0. C0.\n"
+
+
+def samples(result: JointRetiming, cycle_s: float = 1e-3) -> list[tuple[np.ndarray, ...]]:
+    """Times, axis values, velocities, accelerations, jerks and lines of each stretch."""
+    parts = []
+    for k, one in enumerate(result.stretches):
+        time = np.append(np.arange(0.0, one.trajectory.duration_s, cycle_s), one.trajectory.duration_s)
+        parts.append((time, *result.at(k, time)))
+    return parts
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", JOINT_JOBS)
+def test_every_axis_keeps_its_limits(name: str) -> None:
+    job = FOLDER / name / "job.toml"
+    result = olp.retime_joints(job.with_name(JOINT_JOBS[name]), job.with_name("machine.toml"), job)
+    axes = tomllib.loads(job.with_name("machine.toml").read_text())["axes"]
+    for time, place, *rates, _ in samples(result):
+        for column, axis in enumerate(axes.values()):
+            unit = "deg" if axis.get("kind") == "rotary" else "mm"
+            for rate, key in zip(rates, ("velocity_{}_s", "acceleration_{}_s2", "jerk_{}_s3"), strict=True):
+                most = axis[key.format(unit)]
+                assert np.abs(rate[:, column]).max() <= most * (1.0 + 1e-9), (name, column, key)
+        # what is said of velocities is the slope of the positions
+        slope = np.diff(place, axis=0) / np.diff(time)[:, None]
+        assert np.abs(slope - 0.5 * (rates[0][1:] + rates[0][:-1])).max() < 0.5
+        assert not rates[0][0].any() and np.abs(rates[0][-1]).max() < 1e-6
+
+
+def judged(text: bytes, machine: Path, tolerance_mm: float) -> JointRetiming:
+    """The tip is within its feed, and within the tolerance of the programmed way, by an own reader."""
+    result = retimed(JointRun.of(text, machine), JointRetimeOptions(blend_mm=tolerance_mm))
+    judge = Judge(machine)
+    moves = judge.read(text)
+    way = []
+    for (_, _, first), (_, tips, second) in pairwise(moves):
+        assert not tips
+        if np.isfinite(first).all():
+            share = np.linspace(0.0, 1.0, 4001)[:, None]
+            way.append(judge.forward(first + share * (second - first), False)[0])
+    every = np.vstack(way)
+    feeds = [float(word[1:]) for word in text.decode().split() if word.startswith("F")]
+    assert len(set(feeds)) == 1
+    for time, place, *_ in samples(result, 2e-3):
+        tip = judge.forward(place, False)[0]
+        for point in tip[:: max(1, len(tip) // 400)]:
+            assert np.linalg.norm(every - point, axis=1).min() < tolerance_mm + 0.01
+        speed = np.linalg.norm(np.diff(tip, axis=0), axis=1) / np.diff(time)
+        assert speed.max() <= feeds[0] / 60.0 * 1.002
+    return result
+
+
+@pytest.mark.slow
+def test_the_tip_keeps_feed_and_path() -> None:
+    """Axis words: the tip makes curves while the axes go straight."""
+    text = (
+        HEAD.replace(b"G0", b"G1 F900")
+        + b"G1 X20. Y10. Z120. A-20. C30.\nX-20. C-40.\nA5. Y0.\nX10. Z140.\nM30\n"
+    )
+    machine = TRUNNION
+    result = judged(text, machine, 0.05)
+    assert result.report["largest_share_of_limit"]["feed"] == pytest.approx(1.0, abs=2e-3)
+    # a wider tolerance is never slower
+    wider = retimed(JointRun.of(text, machine), JointRetimeOptions(blend_mm=0.5))
+    assert wider.duration_s < result.duration_s
+
+
+@pytest.mark.slow
+def test_linear_moves_take_the_time_that_they_take_three_axes(tmp_path: Path) -> None:
+    """The same limits, the same program, without and with rotary axes that stand."""
+    limits = "velocity_mm_s = 500.0\nacceleration_mm_s2 = 4000.0\njerk_mm_s3 = 40000.0\n"
+    travel = ((-300.0, 300.0),) * 3
+    three = zero_machine(tmp_path / "m", Recipe(travel=travel, work_offsets={"G54": {"set_by": "true"}}))
+    text = three.read_text()
+    for line in set(text.splitlines()):
+        if line.startswith(("velocity_mm_s", "acceleration_mm_s2", "jerk_mm_s3")):
+            text = text.replace(f"{line}\n", "")
+    for axis in "XYZ":
+        text = text.replace(f"[axes.{axis}]\n", f"[axes.{axis}]\n{limits}")
+    three.write_text(text)
+    five = tmp_path / "five.toml"
+    plain = TRUNNION.read_text("utf-8").replace('calibration = "calibration.toml"\n', "")
+    five.write_text(plain.replace("5000.0", "4000.0").replace("50000.0", "40000.0"), "utf-8")
+    moves = b"G1 X60. Y20. Z10. F6000\nX80. Y-30.\nY-60. Z0.\nX0. Y0.\nZ30.\nM30\n"
+    start = b"G21 G90 G17 G94 G54 G49 G64\nG0 X0. Y0. Z50.%s\n"
+    one = olp.retime((start % b"").replace(b"G49", b"") + moves, three, blend_mm=0.05).duration_s
+    other = olp.retime_joints(start % b" A0. C0." + moves, five, blend_mm=0.05).duration_s
+    assert other == pytest.approx(one, rel=1e-3)
+
+
+@pytest.mark.slow
+def test_one_axis_alone_takes_what_ruckig_says() -> None:
+    import ruckig
+
+    text = HEAD + b"G1 C90. F99999\nM30\n"
+    result = olp.retime_joints(text, TRUNNION)
+    motion = ruckig.InputParameter(1)
+    motion.target_position, motion.max_velocity = [90.0], [180.0]
+    motion.max_acceleration, motion.max_jerk = [900.0], [9000.0]
+    found = ruckig.Trajectory(1)
+    ruckig.Ruckig(1).calculate(motion, found)
+    # the tip is off the axis of C by nothing: the feed counts nowhere
+    assert result.duration_s == pytest.approx(found.duration, rel=1e-6)
+
+
+@pytest.mark.slow
+def test_times_and_dwells_are_kept() -> None:
+    program = HEAD + b"G93 G1 X30. C20. F4.\nG94\nG4 P2000\nM30\n"
+    result = olp.retime_joints(program, TRUNNION)
+    assert result.report["dwell_s"] == pytest.approx(2.0)
+    assert 15.0 < result.duration_s - 2.0 < 15.6
+    with pytest.raises(ProgramError, match=r"3: .*no way of X, Y and Z"):
+        olp.retime_joints(HEAD + b"G93 G1 C20. F4.\nM30\n", TRUNNION)
+
+
+def test_limits_that_are_missing_are_named(tmp_path: Path) -> None:
+    machine = tmp_path / "m.toml"
+    text = TRUNNION.read_text("utf-8").replace('calibration = "calibration.toml"\n', "")
+    machine.write_text(text.replace("jerk_deg_s3 = 6000.0\n", ""), "utf-8")
+    with pytest.raises(ConfigError, match=r"does not state axes\.A\.jerk_deg_s3, which"):
+        olp.retime_joints(HEAD + b"M30\n", machine)
+
+
+@pytest.mark.slow
+def test_the_verb_writes_table_and_report(tmp_path: Path) -> None:
+    job = str(FOLDER / "gantry-wrist" / "job.toml")
+    out, report = tmp_path / "out.csv", tmp_path / "out.json"
+    done = run("retime", "-j", job, "-o", str(out), "--report", str(report), "--cycle-ms", "10")
+    assert done.exit_code == 0, done.stderr
+    assert "Longest lines" in done.stdout and "57.5" in done.stdout
+    head, *rows = out.read_text().splitlines()
+    assert head.startswith("t_s,X_mm,Y_mm,Z_mm,C_deg,B_deg,VX_mm_s") and head.endswith(",AB_deg_s2,line")
+    assert len(rows) == pytest.approx(5752, abs=5)
+    assert '"schema": "olp-joint-retime-1"' in report.read_text()
+    done = run("retime", "-j", job, "-o", str(tmp_path / "x.npz"))
+    assert done.exit_code == 2 and "expected .csv" in done.stderr
+    done = run("retime", "-j", job, "--gains")
+    assert done.exit_code == 2 and "--gains does not go with machines with rotary joints" in done.stderr
