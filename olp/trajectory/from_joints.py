@@ -7,14 +7,16 @@ point control, become chords. The feed is that of the tip in the workpiece.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from olp.compensation.joints.motion import Motion
 from olp.compensation.joints.path import JointPath
 from olp.compensation.joints.sampling import spread
 from olp.core.arrays import Array, Index, Mask
-from olp.core.errors import ConfigError, ProgramError
-from olp.core.toolpath import Flag, Kind
+from olp.core.errors import ConfigError
+from olp.core.toolpath import Arcs, Flag, Kind
 from olp.core.values import dataclass
 from olp.kinematics.structure import Structure
 from olp.program.feeds.timing import PathControl, Timing, timing
@@ -93,8 +95,8 @@ def limits_of(structure: Structure) -> AxisLimits:
 def routes_of(path: JointPath, blend_mm: float) -> tuple[JointRoute, ...]:
     """The routes of a program, in order: a new one begins where the position is not known. `blend_mm` is the
     tolerance of a path mode without one, and of lists. Raises ProgramError as
-    `olp.program.feeds.timing.timing`, and for a time of a move whose tip stays."""
-    clock = timing(path.program, blend_mm=blend_mm) if path.listed is None else _of_list(path, blend_mm)
+    `olp.program.feeds.timing.timing`."""
+    clock = _of_program(path, blend_mm) if path.listed is None else _of_list(path, blend_mm)
     known = np.isfinite(path.start).all(axis=1) & np.isfinite(path.end).all(axis=1)
     motion, moved = path.motion, np.zeros(len(path), bool)
     rows = np.flatnonzero(known)
@@ -107,6 +109,16 @@ def routes_of(path: JointPath, blend_mm: float) -> tuple[JointRoute, ...]:
         if len(steps.move):
             routes.append(_route(path, clock, steps))
     return tuple(routes)
+
+
+def _of_program(path: JointPath, blend_mm: float) -> Timing:
+    """The timing of a program as if each move were 1 mm long, so that a time of a move (G93) is one over its
+    feed, also where the rotary axes move alone."""
+    toolpath = path.program.toolpath
+    end = np.zeros((len(path), 3))
+    end[:, 0] = np.arange(1.0, len(path) + 1.0)
+    even = replace(toolpath, end_mm=end, start_mm=(0.0, 0.0, 0.0), arcs=Arcs.none())
+    return timing(replace(path.program, toolpath=even), blend_mm=blend_mm)
 
 
 def _of_list(path: JointPath, blend_mm: float) -> Timing:
@@ -212,14 +224,6 @@ def _feeds(
     length = np.linalg.norm(np.diff(point, axis=0), axis=1)
     feed = np.where(toolpath.kind[move] == Kind.RAPID, np.inf, clock.feed_mm_s[move])
     timed = (toolpath.flag[move] & np.uint8(Flag.INVERSE_TIME)) != 0
-    untimed = np.flatnonzero(np.isnan(feed))
-    if untimed.size:
-        raise ProgramError(
-            "this move has a time (G93) but no way of X, Y and Z, which is not timed; expected its feed as a "
-            "speed (G94)",
-            line=int(path.line[move[untimed[0]]]),
-            code="OLP551",
-        )
     way = np.zeros(len(length))
     before = _tips(path, move, _axes(path, move, share - 1.0 / count[owner]))
     for part in range(1, _PARTS + 1):
@@ -229,7 +233,5 @@ def _feeds(
     with np.errstate(divide="ignore", invalid="ignore"):
         speed = np.where(way > _SHORTEST_MM, feed * length / way, np.inf)
         if timed.any():
-            step = np.linalg.norm(toolpath.end_mm - toolpath.starts_mm(), axis=1)[move]
-            own = np.bincount(owner, length)[owner]
-            speed = np.where(timed, feed * own / step, speed)
+            speed = np.where(timed, feed * np.bincount(owner, length)[owner], speed)
     return np.asarray(speed, float)
