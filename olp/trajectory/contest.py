@@ -127,7 +127,8 @@ def _optimised(run: Run, best: Solution, own: Run) -> Solution:
         return best
     path, profile = own.path(), own.profile()
     bound = bound_s(path, run.limits)
-    if bound + _JERK_COST * (closed - bound) > (1.0 - _GAIN) * best.duration_s:
+    least = bound + _JERK_COST * (min(closed, best.duration_s) - bound)
+    if least > (1.0 - _GAIN) * best.duration_s:
         return best
     solver = Solver(OPTIMISED, lambda run: optimised(path, run.limits, profile), LAST.least_s, bends=True)
     return _better(run, solver, best) or best

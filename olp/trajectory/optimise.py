@@ -39,6 +39,8 @@ _LAUNCH = 0.04
 _LONGEST = 0.25
 #: length of a launch over the rounding of the arc length, at least
 _DIGITS = 1e8
+#: the same of the first cell behind it: with fewer digits its jerk would be that of rounding
+_CELL_DIGITS = 1e5
 #: share of a cell's time that the cell beside an end lasts at least
 _CLEAR = 0.4
 #: growth of the times of cells after a launch
@@ -157,7 +159,9 @@ class _End:
         gone = j * seconds**3 / 6.0
         # cells that grow in time until they are as long as all others
         times = seconds * _GROW ** np.arange(1.0, _MOST)
-        times = times[fine & (times * (1.0 - 1.0 / _GROW) < CELL_S) & (times < abs(most_s))]
+        least = j * ((_GROW - 1.0) * seconds) ** 3 / 6.0
+        grow = least > _CELL_DIGITS * np.spacing(x[-1])
+        times = times[grow & (times * (1.0 - 1.0 / _GROW) < CELL_S) & (times < abs(most_s))]
         knots = clock.arc_at(clock.start_s[clock.first[node]] + sign * times)
         begin = arc_mm + sign * gone
         last = np.concatenate(([arc_mm, begin], knots))[-2:]

@@ -12,14 +12,17 @@ from hypothesis import strategies as st
 from ruckig import InputParameter, Result, Ruckig, Trajectory
 from scipy.optimize import minimize
 
+from olp.trajectory import optimise
 from olp.trajectory.audit import audit, slowing
-from olp.trajectory.critical import best_profile, seconds
+from olp.trajectory.critical import Timeline, best_profile, seconds
 from olp.trajectory.interior import Rows, Spline, fits, least_time
 from olp.trajectory.motion import Motion, derivatives
 from olp.trajectory.optimise import optimised
+from olp.trajectory.plan import plan
 from olp.trajectory.route import AxisLimits, Route
 from olp.trajectory.smooth import SmoothPath, smooth
-from olp.trajectory.speedgrid import bound_s
+from olp.trajectory.solvers import OPTIMISED
+from olp.trajectory.speedgrid import bound_s, grid, speed_caps
 
 _SLOW_CHECK = settings(
     max_examples=25, deadline=None, suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow]
@@ -171,3 +174,32 @@ _LONG = {"gentle jerk", "feed changes in a curve", "collinear", "one axis slow",
 )
 def test_adversarial_routes_keep_the_laws(name: str) -> None:
     laws_hold(*CASES[name]())
+
+
+#: a small router, and a stroke whose backlash is taken up along a ramp
+_ROUTER = AxisLimits(np.array([33.0, 33, 12]), np.array([150.0, 150, 80]), np.array([5e3, 5e3, 3e3]))
+_RAPID = np.inf
+
+
+@pytest.mark.parametrize("step_mm", (0.02, 0.03))
+def test_a_short_first_move_of_a_long_path_launches_within_bounds(step_mm: float) -> None:
+    """Its launch is long, as a short one would have few digits: cells grow behind it all the same."""
+    points = [[0, -step_mm, 0], [0, 0, 0], [0, -0.025, -0.3], [0, -0.028, -3.9], [150, -0.028, -3.9]]
+    path = smooth(route(np.array(points), np.array([_RAPID, 1.5, 1.5, _RAPID]), 0.01), _ROUTER)
+    profile, cap = best_profile(path, _ROUTER), speed_caps(path, _ROUTER)
+    clock = Timeline.of(path, profile)
+    knots = grid(path, _ROUTER, profile, cap, clock)
+    window = optimise._Window.of(path, _ROUTER, profile, clock, cap, knots, 0, 7)
+    assert fits(window.rows.rows(), window.spline, optimise._SLOWED**2 * window.start)
+
+
+@pytest.mark.slow
+def test_a_ramp_beside_a_turn_back_costs_no_stop() -> None:
+    """The critical points stand still at such a turn, so their time says nothing of what optimising gains."""
+    there = [[0, 0, 0], [0, -0.025, -0.3], [0, -0.028, -2], [0, -0.003, -1.7], [0, 0, 0], [3, 0, 0]]
+    ramps = plan(route(np.array(there), np.array([1.5] * 4 + [_RAPID]), 0.01), _ROUTER)
+    straight = route(
+        np.array([[0, 0, 0], [0, 0, -2], [0, 0, 0], [3, 0, 0]]), np.array([1.5, 1.5, _RAPID]), 0.01
+    )
+    assert [leg.solver for leg in ramps.legs] == [OPTIMISED]
+    assert ramps.duration_s < plan(straight, _ROUTER).duration_s
