@@ -102,7 +102,7 @@ def correct(program: str | None, machine: str | None, job: str | None, words: di
     if review_file is not None:
         from olp.review.joints import page_of
 
-        written[Path(review_file)] = page_of(run, done, options, output).parts()
+        written[Path(review_file)] = page_of(run, done, options, output, time=True).parts()
     write_files(written, force=words["force"], inputs=run.files)
     if output == STREAM:
         put(result.data)
@@ -221,8 +221,9 @@ def retime(program: str | None, machine: str | None, job: str | None, words: dic
 
 
 def view(
-    program: str | None, machine: str | None, job: str | None, corrected: str | None, words: dict[str, Any]
-) -> tuple[Callable[[], Review], tuple[str, ...], str]:
+    program: str | None, machine: str | None, job: str | None, corrected: str | None, words: dict[str, Any],
+    *, time: bool,
+) -> tuple[Callable[[], Review], tuple[str, ...], str]:  # fmt: skip
     """`olp view`: what makes the page, its inputs, and the name of the program."""
     runs = [run_of(program, machine, job)]
     first = runs[0]
@@ -234,7 +235,7 @@ def view(
         # files may have changed since the last call
         run = runs.pop() if runs else run_of(program, machine, job)
         second = None if corrected is None else source(run.sources, corrected)
-        return reviewed(run, options_of(JointOptions, words), second)
+        return reviewed(run, options_of(JointOptions, words), second, time=time)
 
     meshes = [mesh.file for mesh in first.job.meshes]
     return make, (*first.files, *files_of(corrected), *meshes), program or first.program.name

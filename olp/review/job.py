@@ -297,6 +297,7 @@ def _scene(
         nodes=nodes(machine),
         limits={} if plan is None else machine.motion_limits(),
         time_s=moment,
+        planned=plan is not None,
         motion=None if plan is None else motion_table(plan.trajectories, plan.routes),
         duration_s=float(moment[-1]) if plan is None else plan.duration_s,
         sources=tuple(

@@ -30,11 +30,13 @@ from olp.review.job import Review
 from olp.review.joint_machine import drawn
 from olp.review.listing import aligned
 from olp.review.meshes import of_job
-from olp.review.motion import by_feed, feed_seconds
+from olp.review.motion import by_feed, feed_seconds, filled
 from olp.review.samples import Samples
 from olp.review.scene import Figures, Frame, Scene
+from olp.trajectory.from_joints import missing_limits
 from olp.workflows.joints.correct import JointOptions, ProvedJoints, correction_of
 from olp.workflows.joints.loaded import JointRun
+from olp.workflows.joints.retime import JointRetimeOptions, motion_of
 from olp.workflows.joints.verify import verification_of
 from olp.workflows.session import PathLike
 
@@ -71,28 +73,32 @@ def view_joints(
     expand_cycles: bool = False,
     outside_box: Literal["refuse", "hold"] = "refuse",
     date: datetime.date | None = None,
+    time: bool = True,
 ) -> Review:
     """A program of a machine with rotary joints and its correction, for a browser.
 
     `corrected` is the corrected program, which is proved as in `verify_joints`. Without it the program is
-    corrected as in `correct_joints`. Times are those of the programmed feed. Raises as these.
+    corrected as in `correct_joints`. Without `time`, or without limits of motion in the machine file, the
+    motion is not planned: times are those of the programmed feed. Raises as these.
     """
     options = JointOptions(
         tolerance_um=tolerance_um, tolerance_urad=tolerance_urad, flatten=flatten,
         expand_cycles=expand_cycles, outside_box=outside_box, date=date,
     )  # fmt: skip
     run = JointRun.of(program, machine, job)
-    return reviewed(run, options, None if corrected is None else run.sources.source(corrected))
+    return reviewed(run, options, None if corrected is None else run.sources.source(corrected), time=time)
 
 
-def reviewed(run: JointRun, options: JointOptions, corrected: Source | None, name: str = "") -> Review:
-    """As `view_joints`, for a run that is loaded. `name` is that of a corrected program that is made here."""
+def reviewed(run: JointRun, options: JointOptions, corrected: Source | None, *, time: bool) -> Review:
+    """As `view_joints`, for a run that is loaded."""
     if corrected is None:
-        return page_of(run, correction_of(run, options), options, name)
-    return page_of(run, verification_of(run, corrected, options), options, corrected.name)
+        return page_of(run, correction_of(run, options), options, "", time=time)
+    return page_of(run, verification_of(run, corrected, options), options, corrected.name, time=time)
 
 
-def page_of(run: JointRun, done: ProvedJoints, options: JointOptions, corrected_name: str) -> Review:
+def page_of(
+    run: JointRun, done: ProvedJoints, options: JointOptions, corrected_name: str, *, time: bool
+) -> Review:
     """The review of two programs that are proved. Raises CannotCompute where no position is known."""
     path, second = done.nominal, done.corrected
     seen = _seen(done)
@@ -105,8 +111,11 @@ def page_of(run: JointRun, done: ProvedJoints, options: JointOptions, corrected_
     nodes, bodies, axes, drawn_at = drawn(
         machine.structure, path.motion, seen.axes, tool, (origin, float(np.ptp(position, axis=0).max()))
     )
-    seconds = _seconds(run, nominal, samples)
-    moment = by_feed(seconds, samples)
+    planned = time and not missing_limits(machine.structure)
+    if planned:
+        moment = filled(motion_of(run, second, JointRetimeOptions()).seconds(samples.part, samples.within))
+    else:
+        moment = by_feed(_seconds(run, nominal, samples), samples)
     table = _table(done, options)
     return Review(
         Scene(
@@ -139,6 +148,7 @@ def page_of(run: JointRun, done: ProvedJoints, options: JointOptions, corrected_
             digit_mm=digit_mm(path.program),
             turn_urad={name: angle / RAD_PER_URAD for name, angle in seen.off_rad.items()},
             straight=False,
+            planned=planned,
         )
     )
 

@@ -97,7 +97,7 @@ def manifest_of(scene: Scene) -> tuple[dict[str, Any], Arrays]:
         "waypoint": "waypoint",
         "time": "t",
         "way": "s",
-        "time_source": "retimed" if scene.motion is not None else "feed",
+        "time_source": "retimed" if scene.planned else "feed",
         "duration_s": scene.duration_s,
         "layers": _layers(scene, arrays, origin),
         "metrics": _metrics(scene, arrays),

@@ -109,8 +109,8 @@ def retimed(corrected: Toolpath, samples: Samples, trajectories: Sequence[Trajec
         times = _along(corrected, length, mine, samples, a, b, trajectory.motion)
         arrival[a:b], leaving[a:b] = begin + times[0], begin + times[1]
         begin += trajectory.duration_s
-    arrival = _filled(arrival)
-    return arrival, np.maximum(_filled(leaving), arrival)
+    arrival = filled(arrival)
+    return arrival, np.maximum(filled(leaving), arrival)
 
 
 def _along(
@@ -191,7 +191,7 @@ def _travel(motion: Motion) -> tuple[Array, Array, Index]:
     )
 
 
-def _filled(time: Array) -> Array:
+def filled(time: Array) -> Array:
     """Times, with the one before for samples that no motion reaches."""
     return np.maximum.accumulate(np.nan_to_num(time, nan=0.0))
 
@@ -216,7 +216,7 @@ def feed_seconds(program: Program, machine: Machine) -> Array:
 def by_feed(seconds: Array, samples: Samples) -> Array:
     """(n,) s at which the nominal program reaches each sample, where each move takes as long."""
     before = np.concatenate(([0.0], np.cumsum(seconds)))
-    return _filled(before[samples.move] + samples.share * seconds[samples.move])
+    return filled(before[samples.move] + samples.share * seconds[samples.move])
 
 
 def table(trajectories: Sequence[Trajectory], routes: Sequence[Route]) -> MotionTable:

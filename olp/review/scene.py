@@ -77,8 +77,8 @@ class Figures:
 class Scene:
     """`position_mm` (n, 3) are the samples in `frame`; `waypoint` (n,) are those which count by their
     distance from the nominal point. `axes` (n, k) are axis values, less which bodies are drawn `drawn_at`
-    (k,), `limits` the limits of motion by axis. `time_s` (n,) are times on the re-timed motion, where there
-    is one, else at the feed. `sources` are (name, (n,) um) by size; `report` is that of the correction or
+    (k,), `limits` the limits of motion by axis. `time_s` (n,) are times on the motion, where it is `planned`,
+    else at the feed. `sources` are (name, (n,) um) by size; `report` is that of the correction or
     verification, `figures` what it says by layer, `table` its judgements with lines of the nominal text as
     shown. `turn_urad` are (n,) angles of the tool by layer, where they are corrected. Where moves are
     `straight` in the frame, features are found in them. `digit_mm` is the last digit of coordinates.
@@ -115,6 +115,7 @@ class Scene:
     uncertainty: TipUncertainty | None = None
     turn_urad: Mapping[str, Array] = field(default_factory=dict)
     straight: bool = True
+    planned: bool = False
 
     def worst_sample(self, layer: str, move: int) -> int | None:
         """The sample of a move where a layer ("uncorrected" or "corrected") is off by what the table states

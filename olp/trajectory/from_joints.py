@@ -45,13 +45,15 @@ _SHORTEST_MM = 1e-9
 class JointRoute:
     """A route from rest to rest: `point_mm` of the route are axis values times `scale` (axes,), in mm per mm
     or deg. The route's lines number its segments: (m,) `line` of the program, `tool` in the motion, and
-    `feed_mm_s` at the tip (inf: none)."""
+    `feed_mm_s` at the tip (inf: none). A segment ends at a `share` (m,) of its `move` (m,)."""
 
     route: Route
     scale: Array
     line: Index
     tool: Index
     feed_mm_s: Array
+    move: Index
+    share: Array
 
     def slower(self, factor: Array) -> JointRoute:
         """The same with the feeds of segments divided by (m,)."""
@@ -59,7 +61,7 @@ class JointRoute:
         slowed = Route(
             route.point_mm, route.feed_mm_s / factor, route.line, route.tolerance_mm, route.dwell_s
         )
-        return JointRoute(slowed, self.scale, self.line, self.tool, self.feed_mm_s)
+        return replace(self, route=slowed)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,15 +77,20 @@ class _Steps:
     dwell_s: Array
 
 
-def limits_of(structure: Structure) -> AxisLimits:
-    """The limits of all axes in mm and deg. Raises ConfigError where the machine file leaves one out."""
+def missing_limits(structure: Structure) -> list[str]:
+    """The keys of limits of motion that the machine file does not state."""
     words = ("velocity", "acceleration", "jerk")
-    missing = [
+    return [
         f"axes.{name}.{word}_{joint.unit}_s{'' if power == 1 else power}"
         for name, joint in structure.joints.items()
         for power, (word, value) in enumerate(zip(words, joint.most, strict=True), 1)
         if value is None
     ]
+
+
+def limits_of(structure: Structure) -> AxisLimits:
+    """The limits of all axes in mm and deg. Raises ConfigError where the machine file leaves one out."""
+    missing = missing_limits(structure)
     if missing:
         raise ConfigError(
             f"the machine file does not state {', '.join(missing)}, which a motion in time needs; give them"
@@ -164,7 +171,8 @@ def _route(path: JointPath, clock: Timing, steps: _Steps) -> JointRoute:
     route = Route(point, feed, np.arange(len(feed)), tolerance / widest, dwell)
     stated = np.where(path.program.toolpath.kind[move] == Kind.RAPID, np.inf, clock.feed_mm_s[move])
     timed = (path.program.toolpath.flag[move] & np.uint8(Flag.INVERSE_TIME)) != 0
-    return JointRoute(route, scale, path.line[move].astype(np.int64), tool, np.where(timed, np.inf, stated))
+    line, feed = path.line[move].astype(np.int64), np.where(timed, np.inf, stated)
+    return JointRoute(route, scale, line, tool, feed, move, share)
 
 
 def _axes(path: JointPath, move: Index, share: Array) -> Array:

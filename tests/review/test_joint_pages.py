@@ -113,6 +113,31 @@ def test_tips_and_errors_are_those_of_the_judge(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("name", JOINT_JOBS)
+def test_times_are_those_of_the_planned_motion(name: str, reviews: dict[str, Review]) -> None:
+    """Where the motion is at the times of the samples, the tip is beside them."""
+    file = FOLDER / name / JOINT_JOBS[name]
+    machine, scene = file.with_name("machine.toml"), reviews[name].scene
+    corrected = olp.correct_joints(file, machine, file.with_name("job.toml")).data
+    motion = olp.retime_joints(corrected, machine, file.with_name("job.toml"))
+    assert scene.planned and scene.duration_s == pytest.approx(motion.duration_s, abs=1e-6)
+    assert (np.diff(scene.time_s) >= 0.0).all() and Page(reviews[name].html()).manifest[
+        "time_source"
+    ] == "retimed"
+    (stretch,) = motion.stretches
+    axes = motion.at(0, np.clip(scene.time_s, 0.0, stretch.trajectory.duration_s))[0]
+    kinematics = olp.load_kinematics(machine)
+    tip = kinematics.nominal(axes).position - scene.frame.origin_mm
+    away = np.linalg.norm(tip - scene.position_mm, axis=1)
+    # corrections, rounded corners; along rapids the tip does not go evenly
+    cuts = scene.table.judged[scene.samples.move]
+    assert np.median(away[cuts]) < 0.6 and away[cuts].max() < 1.5
+    assert away[scene.samples.joined].max() < 0.05 * np.ptp(scene.position_mm, axis=0).max() + 1.5
+    feed = olp.view_joints(file, machine, file.with_name("job.toml"), time=False).scene
+    assert not feed.planned and feed.duration_s != scene.duration_s
+
+
+@pytest.mark.slow
 def test_a_program_that_is_off_is_shown_as_such() -> None:
     file = FOLDER / "trunnion-mill" / "dome.nc"
     machine = file.with_name("machine.toml")

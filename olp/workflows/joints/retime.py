@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from olp.compensation.joints.motion import Motion
+from olp.compensation.joints.path import JointPath
 from olp.core.arrays import Array, Index
 from olp.core.errors import CannotCompute
 from olp.core.progress import Progress, silent
@@ -16,6 +18,7 @@ from olp.files.write import write_bytes
 from olp.kinematics.structure import Structure
 from olp.program.feeds.timing import BLEND_MM
 from olp.trajectory.from_joints import JointRoute, limits_of, routes_of
+from olp.trajectory.motion import Motion as PlannedMotion
 from olp.trajectory.plan import Trajectory, plan
 from olp.trajectory.route import AxisLimits
 from olp.workflows.flatten import UnrollOptions
@@ -29,6 +32,8 @@ _ROUNDS = 5
 _FASTER = 1e-3
 #: Samples of a piece of the motion at which the tip is looked at, as shares of its time.
 _SHARES = (0.0, 0.25, 0.5, 0.75)
+#: Places of a piece of the motion between which its way is about straight.
+_STEPS = 9
 #: Lines of the table of those that take longest.
 _LONGEST = 10
 #: From this share a limit counts as reached.
@@ -69,6 +74,22 @@ class JointRetiming(Shown):
     @property
     def duration_s(self) -> float:
         return float(sum(s.trajectory.duration_s for s in self.stretches))
+
+    def seconds(self, move: Index, share: Array) -> Array:
+        """(n,) s at which the motion is about at shares of moves, NaN where none is planned."""
+        result, begin = np.full(len(move), np.nan), 0.0
+        for one in self.stretches:
+            route, pieces = one.route, one.trajectory.motion
+            end = np.zeros(len(route.line) + 1)
+            np.maximum.at(end, pieces.line + 1, pieces.start_s[1:])
+            end = np.maximum.accumulate(end)
+            key = np.append(float(route.move[0]), route.move + route.share)
+            rows = np.flatnonzero((move >= route.move[0]) & (move <= route.move[-1]))
+            time, way = _ways(pieces)
+            place = np.interp(move[rows] + share[rows], key, np.interp(end, time, way))
+            result[rows] = begin + np.interp(place, way, time)
+            begin += one.trajectory.duration_s
+        return result
 
     def at(self, stretch: int, time_s: Array) -> tuple[Array, Array, Array, Array, Index]:
         """Axis values in mm and deg, their velocities, accelerations and jerks, (n, axes) each, and lines
@@ -131,13 +152,22 @@ def retime_joints(
 
 def retimed(run: JointRun, options: JointRetimeOptions, progress: Progress | None = None) -> JointRetiming:
     """As `retime_joints`, for a run that is loaded."""
+    limits_of(run.machine.structure)
+    with run.program.errors():
+        _, path = run.read(run.program, options)
+    return motion_of(run, path, options, progress)
+
+
+def motion_of(
+    run: JointRun, path: JointPath, options: JointRetimeOptions, progress: Progress | None = None
+) -> JointRetiming:
+    """As `retime_joints`, for a path that was read."""
     tell = progress or silent
     structure, control = run.machine.structure, run.machine.control
     limits = limits_of(structure)
     stated = (options.blend_mm, None if control is None else control.blend_mm, BLEND_MM)
     blend_mm = next(value for value in stated if value is not None)
-    with run.program.errors():
-        _, path = run.read(run.program, options)
+    with path.program.errors():
         routes = routes_of(path, blend_mm)
     if not routes:
         raise CannotCompute(
@@ -162,7 +192,7 @@ def retimed(run: JointRun, options: JointRetimeOptions, progress: Progress | Non
     return JointRetiming(structure, stretches, report)
 
 
-def _planned(motion: Any, route: JointRoute, limits: AxisLimits, tell: Progress) -> _Stretch:
+def _planned(motion: Motion, route: JointRoute, limits: AxisLimits, tell: Progress) -> _Stretch:
     """The motion of a route, again with lower feeds where the tip would be faster than its own."""
     scaled = AxisLimits(
         limits.velocity * route.scale, limits.acceleration * route.scale, limits.jerk * route.scale
@@ -178,7 +208,7 @@ def _planned(motion: Any, route: JointRoute, limits: AxisLimits, tell: Progress)
     raise AssertionError("the last round returns")
 
 
-def _used(motion: Any, route: JointRoute, found: Trajectory, limits: AxisLimits) -> tuple[Array, Index]:
+def _used(motion: Motion, route: JointRoute, found: Trajectory, limits: AxisLimits) -> tuple[Array, Index]:
     """`ratio` and `limit` of a stretch. The limits of an axis are velocity, acceleration and jerk."""
     pieces = found.motion
     count, seconds = len(pieces), np.diff(pieces.start_s)
@@ -199,6 +229,15 @@ def _used(motion: Any, route: JointRoute, found: Trajectory, limits: AxisLimits)
             ratio[piece] = np.maximum(ratio[piece], fast)
     nearest = most.argmax(axis=1)
     return ratio, np.where(ratio >= most.max(axis=1), -1, nearest)
+
+
+def _ways(motion: PlannedMotion) -> tuple[Array, Array]:
+    """Times in order, and the length of the path up to each."""
+    width, share = np.diff(motion.start_s), np.linspace(0.0, 1.0, _STEPS)
+    piece = np.arange(len(motion)).repeat(_STEPS)
+    after = (width[:, None] * share).ravel()
+    step = np.linalg.norm(np.diff(motion.positions(piece, after), axis=0), axis=1)
+    return motion.start_s[piece] + after, np.append(0.0, np.cumsum(step))
 
 
 def _names(structure: Structure) -> list[str]:
