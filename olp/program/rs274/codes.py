@@ -19,6 +19,10 @@ CYCLES = COMMON_CYCLES | SHIFTED_BORES
 PROBES = frozenset({382, 383, 384, 385})
 #: Splines and NURBS: G5, G5.1, G5.2, G5.3.
 SPLINES = frozenset({50, 51, 52, 53})
+#: G70 and G71 of Haas: a canned cycle at places around a centre.
+HOLE_CIRCLE = 700
+HOLE_ARC = 710
+HOLE_PATTERNS = frozenset({HOLE_CIRCLE, HOLE_ARC})
 #: G33, a straight move in time with the spindle.
 THREAD = 330
 #: Motion that ends where its axis words say.

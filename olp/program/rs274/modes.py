@@ -28,6 +28,7 @@ from olp.program.rs274.codes import (
     GROUPS,
 )
 from olp.program.rs274.commands import Reading, check_lines, own_words, sorted_line
+from olp.program.rs274.flatten.language import UNROLL
 from olp.program.rs274.lexer import WordChunk
 from olp.program.rs274.motion import modal, values
 from olp.program.rs274.profiles.base import Act, Profile
@@ -38,8 +39,6 @@ _FLOW = pattern(rb"[#\[=<]|^/?\s*O|^\W*N?\d*\s*(IF|WHILE|GOTO|END|DO|CALL|RTS)",
 #: The number of a program on ISO controls.
 _PROGRAM = b":1"
 _POLAR = pattern(rb"[@^]")
-#: What to do where the unroller helps.
-UNROLL = "unroll the program with --flatten"
 _COMMA = pattern(rb"\d,\d")
 _LENGTHS = np.zeros(256, bool)
 _LENGTHS[list(b"XYZIJKRQ")] = True

@@ -21,6 +21,7 @@ from olp.core.values import dataclass
 from olp.program.rs274.axis_state import AxisState, Effect
 from olp.program.rs274.codes import (
     DWELL,
+    HOLE_PATTERNS,
     HOMES,
     INCREMENTAL,
     MACHINE,
@@ -30,7 +31,8 @@ from olp.program.rs274.codes import (
     SPLINES,
 )
 from olp.program.rs274.collector import Collector
-from olp.program.rs274.modes import UNROLL, Context, scaled
+from olp.program.rs274.flatten.language import UNROLL
+from olp.program.rs274.modes import Context, scaled
 from olp.program.rs274.motion import fill
 from olp.program.rs274.offset_state import EventBlock, Word
 from olp.program.rs274.profiles.base import Act, Profile
@@ -145,7 +147,8 @@ def _checked(stated: EventWords, words: list[Word], profile: Profile, line: int)
             why = profile.refusals.get(c)
             name = f"G{number:g}"
             spline = c in SPLINES and profile.language.splines and bool(unroll)
-            unrolled = c in MACROS or (c == POLAR and profile.polar) or spline
+            holes = c in HOLE_PATTERNS and profile.language.hole_patterns
+            unrolled = c in MACROS or (c == POLAR and profile.polar) or spline or holes
             raise ProgramError(
                 why or f"{name} is not known to the {profile.name} profile and may move the machine",
                 line=line,

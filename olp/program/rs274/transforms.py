@@ -13,6 +13,7 @@ import numpy as np
 from olp.core.errors import ProgramError
 from olp.core.turns import about_z, rows_of
 from olp.program.rs274.codes import MIRROR, ROTATION, SCALING, UNDOES, UNDONE_BY
+from olp.program.rs274.flatten.language import UNROLL
 from olp.program.rs274.offset_state import OffsetState, Word
 from olp.program.rs274.offsets import Transform
 
@@ -62,11 +63,9 @@ def _rotation(
         raise _refusal("G68 is read in the plane of X and Y only; give G17 before it", line)
     if set(by_letter) & {"I", "J", "K", "Z"}:
         raise _refusal("G68 with I, J, K or Z turns in space, which is not read; give X, Y and R", line)
-    if not {"X", "Y", "R"} <= set(by_letter):
-        raise _refusal(
-            "G68 without X, Y or R takes the present position or a setting of the control; give all three",
-            line,
-        )
+    if "R" not in by_letter:
+        raise _refusal("G68 without R turns by a setting of the control; give R", line)
+    _check_centre("G68", "XY", by_letter, state, line)
     angle = by_letter["R"]
     if not angle.pointed and angle.value and state.profile.increments_without_point:
         raise _refusal(
@@ -80,16 +79,30 @@ def _rotation(
     return Transform(ROTATION, rows_of(about_z(angle.value)), (x, y, 0.0), (0, 1))
 
 
+def _check_centre(
+    name: str, letters: str, by_letter: Mapping[str, Word], state: OffsetState, line: int
+) -> None:
+    """Refuse a centre that is not stated: the present position is another one in a corrected program."""
+    given = [letter for letter in letters if letter in by_letter]
+    if not given:
+        unroll = UNROLL if state.profile.unroller is not None else "give it"
+        none = f"{', '.join(letters[:-1])} and {letters[-1]}"
+        raise ProgramError(
+            f"{name} without {none} takes the present position for its centre",
+            hint=unroll,
+            line=line,
+            code="OLP511",
+        )
+    if len(given) < len(letters):
+        missing = next(letter for letter in letters if letter not in given)
+        raise _refusal(f"{name} has no {missing} for its centre, which is not certain then; give it", line)
+
+
 def _scaling(
     state: OffsetState, line: int, by_letter: Mapping[str, Word], axis_words: Sequence[tuple[int, Word]]
 ) -> Transform | None:
     """G51 X Y Z P, or with a factor per axis: I, J, K."""
-    if len(axis_words) < 3:
-        raise _refusal(
-            "G51 without X, Y or Z takes the present position for its centre, or leaves an axis out; give "
-            "all three",
-            line,
-        )
+    _check_centre("G51", "XYZ", by_letter, state, line)
     letters = ("P",) if "P" in by_letter else ("I", "J", "K") if state.profile.scales_axes else ()
     if not letters or not set(letters) <= set(by_letter):
         own = "P, or I, J and K" if state.profile.scales_axes else "P"

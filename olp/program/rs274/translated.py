@@ -12,7 +12,8 @@ from olp.core.arrays import Index, Mask
 from olp.core.errors import ProgramError
 from olp.program.rs274.axis_state import AxisState
 from olp.program.rs274.codes import INCREMENTAL
-from olp.program.rs274.modes import UNROLL, Context
+from olp.program.rs274.flatten.language import UNROLL
+from olp.program.rs274.modes import Context
 from olp.program.rs274.translation import Drilling, Translation
 
 #: Plane code of the plane across Z.

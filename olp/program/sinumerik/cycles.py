@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from olp.core.errors import ProgramError
 from olp.core.toolpath import Kind
-from olp.program.rs274.modes import UNROLL
+from olp.program.rs274.flatten.language import UNROLL
 from olp.program.rs274.translation import NOWHERE, Drilling, Span
 from olp.program.sinumerik.blocks import NUMBER, Piece, argument_spans, arguments
 

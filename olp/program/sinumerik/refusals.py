@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from olp.core.errors import ProgramError
-from olp.program.rs274.modes import UNROLL
+from olp.program.rs274.flatten.language import UNROLL
 from olp.program.sinumerik.blocks import Piece
 from olp.program.sinumerik.table import REFUSED, UNROLLED
 

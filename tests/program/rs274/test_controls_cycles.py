@@ -155,7 +155,7 @@ def test_a_bore_from_below_is_fed_upwards_and_left_above(control: str, code: str
 def test_bores_and_patterns_that_a_control_makes_otherwise_are_refused(reading) -> None:  # type: ignore[no-untyped-def]
     for body, why in (
         ("G98 G87 X5. Z-12. R2. F40.\n", "waits for the operator"),
-        ("G81 G98 Z-5. R2. F9. L0\nG70 I20. L6\n", "pattern of holes"),
+        ("G81 G98 Z-5. R2. F9. L0\nG70 I20. L6\n", "unroll the program with --flatten"),
         ("G98 G77 X5. Z-12. R2. F40.\n", "R 2 is above its end -12"),
     ):
         with pytest.raises(ProgramError, match=why):

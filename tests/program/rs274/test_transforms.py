@@ -73,8 +73,9 @@ def test_a_mirrored_arc_turns_the_other_way(setups: dict[str, Setup]) -> None:
 
 #: Blocks behind `HEAD`: a part of why they are refused, and the code.
 REFUSED = {
-    ("fanuc", "G68 X1. R30."): ("without X, Y or R", "OLP518"),
-    ("fanuc", "G68 X1. Y1."): ("without X, Y or R", "OLP518"),
+    ("fanuc", "G68 X1. R30."): ("no Y for its centre", "OLP518"),
+    ("fanuc", "G68 X1. Y1."): ("without R turns by a setting", "OLP518"),
+    ("haas", "G68 R30."): ("its centre; unroll the program with --flatten", "OLP511"),
     ("fanuc", "G68 X1. Y1. R30"): ("R of G68 has no decimal point", "OLP518"),
     ("fanuc", "G91 G68 X1. Y1. R30."): ("depends on a parameter of the control", "OLP518"),
     ("fanuc", "G18 G68 X1. Z1. R30."): ("plane of X and Y only", "OLP518"),
@@ -92,7 +93,7 @@ REFUSED = {
     ("scaled", f"{FACTORS} P2."): ("has a decimal point", "OLP518"),
     ("scaled", f"{FACTORS} P0"): ("expected a factor from", "OLP518"),
     ("scaled", FACTORS): ("without its factors", "OLP518"),
-    ("scaled", "G51 X1. Y1. P200000"): ("without X, Y or Z", "OLP518"),
+    ("scaled", "G51 X1. Y1. P200000"): ("no Z for its centre", "OLP518"),
     ("scaled", f"{FACTORS} I200000 J100000 K100000\nX0. Y0.\nG2 X4. R5."): ("scaled to an ellipse", "OLP530"),
     ("haas", f"{FACTORS} P2"): ("has no decimal point", "OLP518"),
     ("haas", f"{FACTORS} I2. J1. K1."): ("without its factors", "OLP518"),

@@ -15,8 +15,9 @@ from olp.core.arrays import Index
 from olp.core.errors import ProgramError
 from olp.program.kept import Difference, Kept
 from olp.program.origin import Unrolled
-from olp.program.rs274.codes import SPLINES
+from olp.program.rs274.codes import HOLE_PATTERNS, SPLINES
 from olp.program.rs274.flatten.apart import apart, can_be_apart, runs_once
+from olp.program.rs274.flatten.centres import LETTERS as CENTRES
 from olp.program.rs274.flatten.lines import Line, Word, compile_line
 from olp.program.rs274.profiles.base import Profile
 from olp.program.text.line_ends import split
@@ -52,6 +53,9 @@ def kept(unrolled: Unrolled, corrected: bytes, starts: Index, profile: Profile) 
     for line, runs in sorted(visits.items()):
         counts = sum(runs.values(), Counter[_Visit]())
         if all(raw == written for raw, written in counts):
+            if _centre_stated(origin.texts[line - 1], counts, profile):
+                why = "it turns or scales about the present position, which the correction moves"
+                differences.append(Difference(line, why))
             continue
         try:
             if line > origin.lines:
@@ -99,6 +103,16 @@ def _cannot(why: str) -> ProgramError:
     return ProgramError(why, code="OLP511")
 
 
+def _centre_stated(source: bytes, counts: Counter[_Visit], profile: Profile) -> bool:
+    """Whether unrolling has put a centre into a block that had none."""
+    visited = [compile_line(raw, 0, profile.language).words for raw, _ in counts]
+    own = {word.letter for word in compile_line(source, 0, profile.language).words}
+    return any(
+        round(10 * word.number) in CENTRES and word.letter == "g" and {w.letter for w in words} - own
+        for words in visited for word in words
+    )  # fmt: skip
+
+
 def _bare(text: bytes) -> bytes:
     return text.rstrip(b"\r\n")
 
@@ -122,6 +136,10 @@ def _restored(line: Line, source: bytes, raw: bytes, written: bytes, profile: Pr
         raise _cannot("its flow is in the block that has to change; put it into a block of its own")
     if any(word.letter == "g" and round(10 * word.number) in SPLINES for word in line.words):
         raise _cannot("its spline is written as chords")
+    if profile.language.hole_patterns and any(
+        word.letter == "g" and round(10 * word.number) in HOLE_PATTERNS for word in line.words
+    ):
+        raise _cannot("its holes are written one by one")
     if any(word.letter in "@^" for word in line.words):
         raise _cannot("its radius and angle are written as X and Y")
     stated = {word.letter: word.number for word in line.words if word.letter in "xy" and word.value is None}

@@ -8,6 +8,9 @@ from olp.core.values import dataclass
 from olp.program.rs274.flatten import expressions
 from olp.program.rs274.flatten.expressions import Arithmetic
 
+#: What to do where the unroller helps.
+UNROLL = "unroll the program with --flatten"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Language:
@@ -17,7 +20,8 @@ class Language:
       assignment needs no brackets. Variables are numbered as in Macro B: #1 to #33 local, vacant until set.
     - `user_tasks`: variables have names, words take their value behind `=`, and CALL runs a subprogram.
     - `modal_variables`: #4001 to #4010 and #4107 to #4120 have what is in force before a block.
-    - `work_offsets`: #5221 and on have the work offsets G54 and on.
+    - `work_offsets`: #5221 and on have the work offsets G54 and on, which a program in Macro B may set.
+      `hole_patterns`: G70 and G71 make holes around a centre.
     - `saved_modes`: M70 to M73 save and restore modal codes. `profile_cycles`: G70 to G72 name a subprogram.
     - `splines`: G5 to G5.3 are splines, and `@` and `^` radius and angle.
     - `counts_in_p`: P of M98 has the count in front of four digits of the number. `shared_locals`: M98 keeps
@@ -33,6 +37,7 @@ class Language:
     user_tasks: bool = False
     modal_variables: bool
     work_offsets: bool = False
+    hole_patterns: bool = False
     saved_modes: bool
     profile_cycles: bool
     splines: bool
@@ -60,5 +65,5 @@ MACRO_B = Language(
 )  # fmt: skip
 USER_TASKS = replace(
     MACRO_B, arithmetic=expressions.USER_TASKS, user_tasks=True, modal_variables=False, work_offsets=False,
-    counts_in_p=False, counts=frozenset("ghmnosdt"),
+       counts_in_p=False, counts=frozenset("ghmnosdt"),
 )  # fmt: skip

@@ -13,7 +13,7 @@ and refused on a Fanuc (#100 and up keep values of earlier runs).
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -24,8 +24,10 @@ from olp.program.origin import Origin, Unrolled, Within
 from olp.program.rs274.codes import ABSOLUTE, INCREMENTAL, SHIFTED_BORES, SPLINES
 from olp.program.rs274.cycles import Stroke, stroke_budget
 from olp.program.rs274.flatten import radius_angle
+from olp.program.rs274.flatten.centres import centre
 from olp.program.rs274.flatten.expressions import filled, whole
-from olp.program.rs274.flatten.lines import Line, Word
+from olp.program.rs274.flatten.lines import Line, Word, compile_line
+from olp.program.rs274.flatten.patterns import holes, is_pattern
 from olp.program.rs274.flatten.polar import as_xy
 from olp.program.rs274.flatten.run import Walk
 from olp.program.rs274.flatten.splines import SPLINE_WORDS, Splines
@@ -199,7 +201,10 @@ class _Flattener:
             # where the switch leaves the block out, the axes are still where they were
             self.state.forget(axis for axis in range(3) if self.state.position[axis] != start[axis])
         for target, value in settings:
-            self.variables.assign(target, value)
+            texts = self.variables.offsets.blocks(target, value) if isinstance(target, int) else []
+            self._insert(texts, line)
+            if not texts:
+                self.variables.assign(target, value)
         return any(letter == "m" and value in _ENDS for letter, value in active)
 
     def _carry_out(
@@ -212,7 +217,10 @@ class _Flattener:
         self.variables.modal.follow(active, switched=line.deleted)
         self.variables.offsets.follow(active)
         before = (self.state.absolute, self.state.path, tuple(self.state.position))
-        texts: dict[int, str] = {}
+        if is_pattern(active, self.state):
+            self._holes(line, values, kept)
+            return active
+        texts = self._centre(line, kept, active)
         if self.language.splines:
             if radius_angle.is_polar(active):
                 texts, active = self._as_xy(kept, active, cut)
@@ -232,6 +240,42 @@ class _Flattener:
         else:
             self._write(line, values, cut, texts, exact=exact)
         return active
+
+    def _insert(self, texts: Sequence[str], line: Line) -> None:
+        """Carry out blocks that stand for the present line, or for a part of it."""
+        mark = "/" if line.deleted else ""
+        for text in texts:
+            block = compile_line((mark + text).encode() + line.eol, line.number, self.language)
+            words: list[Value] = [(word.letter, word.number) for word in block.words]
+            self._carry_out(block, words, frozenset(), exact=False)
+
+    def _holes(self, line: Line, values: list[Value], kept: list[int]) -> None:
+        """Write a pattern of holes, one by one."""
+        words: list[Value] = [
+            (letter, value if self._pointed(line.words[i]) else None)
+            for i, (letter, value) in enumerate(values) if i in kept
+        ]  # fmt: skip
+        places = holes(words, self.state, self.strokes)
+        cut = {i for i, word in enumerate(line.words) if i not in kept or word.letter != "n"}
+        self._write(line, values, cut, exact=False)
+        pairs = ([number_text(v, "x", self.language) for v in place] for place in places)
+        self._insert([f"X{x} Y{y}" for x, y in pairs], line)
+        self.state.forget((0, 1))
+
+    def _centre(self, line: Line, kept: list[int], active: list[Value]) -> dict[int, str]:
+        """The text in the place of a code that takes the present position for its centre: the code with that
+        position."""
+        stated = centre(active, self.state)
+        if stated is None:
+            return {}
+        code, place = stated
+        at = next(i for i, word in zip(kept, active, strict=True) if self.state.codes([word]) == {code})
+        words = [letter.upper() + number_text(v, "x", self.language) for letter, v in place.items()]
+        return {at: " ".join([f"G{code // 10}", *words])}
+
+    def _pointed(self, word: Word) -> bool:
+        """Whether what the number of a word counts is certain."""
+        return word.value is not None or word.pointed or word.number == 0 or word.letter in "gln"
 
     def _polar_repeats(self, line: Line, values: list[Value], cut: set[int]) -> int:
         """How often a block is written by itself: each hole of a polar cycle in G91 has another position."""

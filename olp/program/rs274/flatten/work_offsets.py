@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from olp.core.machine import Setup
 from olp.program.rs274.codes import METRIC, WRITE_OFFSET
 from olp.program.rs274.flatten.state import ProgramState, Value
+from olp.program.rs274.flatten.written import number_text
 
 _FIRST = 5221
 _STEP = 20
@@ -35,6 +36,17 @@ class WorkOffsets:
         from control to control."""
         value, unit = self._known.get(index, (None, None))
         return value if unit == self._state.unit else None
+
+    def blocks(self, index: int, value: float | None) -> list[str]:
+        """Blocks that have the effect of setting a variable in Macro B; none for variables of other use."""
+        state = self._state
+        number, axis = divmod(index - _FIRST, _STEP)
+        sets = state.profile.language.macro_b and state.profile.language.work_offsets
+        if not sets or not 0 <= number < self._count or axis >= len(_AXES) or value is None:
+            return []
+        letter = _AXES[axis].upper()
+        text = f"G10 L{_STATES} P{number + 1} {letter}{number_text(value, 'x', state.profile.language)}"
+        return [text] if state.absolute else ["G90", text, "G91"]
 
     def follow(self, words: Sequence[Value]) -> None:
         """Take the words of a block: G10 L2 in G90 states offsets, other G10 leave all of them unknown."""

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from olp.program.rs274.codes import HOLE_PATTERNS
 from olp.program.rs274.cycle_rules import HAAS_CYCLES
+from olp.program.rs274.flatten.language import MACRO_B
 from olp.program.rs274.profiles.base import Act, g_codes
 from olp.program.rs274.profiles.iso import ISO, ISO_EXTRA, ISO_UNCHANGED
 
 _OFFSETS = dict.fromkeys((1540, *range(1100, 1300, 10)), Act.EVENT)
-#: G77 bores from below, and with G87 an operator leaves the bore; G70 to G72 drill patterns of holes.
+#: G77 bores from below, and with G87 an operator leaves the bore; G70 to G72 make patterns of holes.
 _CYCLES = {770: Act.MOTION, **dict.fromkeys((700, 710, 720, 870), Act.REFUSE)}
-_PATTERN = "drills a pattern of holes inside the control; post each hole with its place"
+_AROUND = "makes holes around the present position inside the control"
+_ALONG = "G72 makes holes along a line inside the control; post each hole with its place"
 
 DIALECT = replace(
     ISO,
@@ -22,10 +25,12 @@ DIALECT = replace(
         **ISO.refusals,
         921: "G92.1 is not a code of this control",
         870: "G87 waits for the operator inside the cycle",
-        **{code: f"G{code // 10} {_PATTERN}" for code in (700, 710, 720)},
+        **{code: f"G{code // 10} {_AROUND}" for code in HOLE_PATTERNS},
+        720: _ALONG,
     },
     harmless_m=ISO.harmless_m | {10, 11, 29, 31, 33, 34, 35, 41, 42, 59, 69, 83, 84, 88, 89},
     tip_codes=frozenset({2340}),
     cycles=HAAS_CYCLES,
+    language=replace(MACRO_B, hole_patterns=True),
     path_mode="the control's own smoothing (G187)",
 )

@@ -9,10 +9,9 @@ from typing import Protocol
 from olp.program.dialect import Row, Support
 from olp.program.rs274.block_text import BlockText
 from olp.program.rs274.commands import Commands
-from olp.program.rs274.flatten.language import Language
+from olp.program.rs274.flatten.language import UNROLL, Language
 
 _LOST = "may move the axes: no position is known behind it, until X, Y and Z have been commanded"
-_UNROLL = "unroll the program with --flatten"
 
 
 class Control(Protocol):
@@ -60,7 +59,7 @@ def _m_codes(profile: Control) -> Iterator[Row]:
     if profile.m61_sets_tool:
         yield Row("M61 Q", Support.READ, "Q is the tool in the spindle")
     for m, why in sorted(profile.m_refusals.items()):
-        remedy = f"; {_UNROLL}" if profile.unrolls_m(m) else ""
+        remedy = f"; {UNROLL}" if profile.unrolls_m(m) else ""
         yield Row(f"M{m / 10:g}", Support.REFUSED, f"{why}{remedy}")
     yield Row("any other M", Support.READ, _LOST)
 
@@ -83,7 +82,7 @@ def _lines(profile: Control) -> Iterator[Row]:
         yield Row("names of programs, labels alone in a line", Support.UNCHANGED)
     tasks = profile.language.user_tasks
     flow = "= [ ] IF GOTO CALL RTS" if tasks else "# [ ] IF WHILE GOTO O-words"
-    yield Row(flow, Support.REFUSED, f"parameters and flow; {_UNROLL}")
+    yield Row(flow, Support.REFUSED, f"parameters and flow; {UNROLL}")
     if tasks:
         why = "calls after each move, and values that the control has; post the moves"
         yield Row("MODIN MODOUT, variables V... but VC", Support.REFUSED, why)

@@ -44,6 +44,25 @@ def test_offsets_that_the_program_states_are_known_on_fanuc(tmp_path: Path) -> N
     assert b"G0 Y-2." in known
 
 
+def test_offsets_that_a_macro_sets_are_stated_by_g10() -> None:
+    text = "O1\nG21 G90 G17\n#1=40.\n#5221=-[#1+2.5]\n#5242=#5221*2\nG54 G0 X1. Y2. Z3.\nG55 Y4.\nM30\n"
+    written = fanuc(text).splitlines()
+    assert written[2:4] == ["G10 L2 P1 X-42.5", "G10 L2 P2 Y-85."]
+    assert "G91\nG90\nG10 L2 P6 Z5.\nG91\n" in fanuc("O1\nG21\nG91\n#5323=5.\nG1 X1.\nM30\n")
+    for index in (5201, 5224, 5341, 7001):
+        assert refused(f"O1\n#{index}=1.\n", "fanuc")[0] == "OLP544"
+    assert refused("O1\n#5221=1.\n", "siemens-iso")[0] == "OLP544"
+
+
+@pytest.mark.oracle
+def test_the_interpreter_moves_where_a_macro_has_put_the_offset(tmp_path: Path) -> None:
+    path = machines.zero_machine(tmp_path, Recipe(work_offsets=OFFSETS))
+    unrolled = fanuc("O1\nG21 G90 G17\n#5221=100.+1.5\nG54 G0 X1. Y2. Z3.\nM30\n")
+    plain = "\n".join(unrolled.splitlines()[1:]) + "\n"
+    axis = linuxcnc.interpret(plain.encode(), path, find_known=False).axis
+    np.testing.assert_allclose(axis[-1, 0], 102.5, atol=1e-9)
+
+
 @pytest.mark.parametrize("profile", ["linuxcnc", "fanuc"])
 @pytest.mark.parametrize(
     ("before", "variable"),
