@@ -35,11 +35,17 @@ from olp.files.control_code.registry import CODE, write_code
 from olp.files.control_code.source import HASH_DIGITS
 from olp.files.control_tables.base import Exported, Given, Sense
 from olp.files.control_tables.registry import FORMATS, format_named, read_table, write_table
+from olp.files.kinematics.tables import TABLES
 from olp.files.sources import Sources
 from olp.findings.catalogue import Finding
 from olp.reports.report import number
 from olp.workflows import refusals
-from olp.workflows.calibrate_export_joints import given_joints, joint_export, refuse_tables
+from olp.workflows.calibrate_export_joints import (
+    given_joints,
+    joint_export,
+    refuse_tables,
+    table_export,
+)
 from olp.workflows.control_table import given_of
 from olp.workflows.correct import CorrectOptions, corrected
 from olp.workflows.doubt import acceptable
@@ -98,10 +104,15 @@ def export_table(
         date=date, accept=tuple(sorted(acceptable(accept))),
     )  # fmt: skip
     if calibration is None and (of_joints := given_joints(machine, job)) is not None:
+        if kind in TABLES:
+            files, notes, report = table_export(of_joints, kind, job, Path(target))
+            return TableExport(files, (), notes, report | {"findings": []})
         code, report = joint_export(of_joints, kind, job, chain, program)
         return _coded(code, kind, Path(target), report, self_test=self_test)
     source = _source(machine, job, calibration, chain)
     given = given_of(source.machine, chain, sense, None, comp_type, axis_names, reference, most_rows)
+    if kind in TABLES:
+        raise UsageError(f"--format {kind} holds rotary axes, and this machine has none")
     if kind in CODE:
         code = linear_code(source.rest, source.chain, source.digest)
         report = _report(source, {kind: RealTime(source.model)}, program, options)

@@ -17,7 +17,10 @@ from olp.files.control_code.joint_code import joint_code, reached
 from olp.files.control_code.registry import CODE
 from olp.files.kinematics.load import JointSetup, is_of_joints, load_joint_setup
 from olp.files.kinematics.machine import load_joint_machine
-from olp.kinematics.correction import left_angles
+from olp.files.kinematics.tables import TABLES, as_it_lies, left_zeros_deg
+from olp.kinematics.chain import Kinematics
+from olp.kinematics.correction import deviations, left_angles
+from olp.kinematics.structure import Structure
 from olp.workflows.session import PathLike
 
 #: Random postures over the box, and the seed of their axis values.
@@ -41,12 +44,44 @@ def joint_inputs(machine: PathLike, job: PathLike | None) -> tuple[str, ...]:
 
 
 def refuse_tables(machine: PathLike) -> NoReturn:
-    """Raises UsageError where the table of a control is asked for."""
+    """Raises UsageError where the table of three linear axes is asked for."""
     raise UsageError(
-        "tables of controls hold three linear axes, and this machine has others; expected --format "
-        f"{' or '.join(CODE)}",
+        "tables of errors hold three linear axes, and this machine has others; expected --format "
+        f"{' or '.join((*TABLES, *CODE))}",
         file=str(machine),
     )
+
+
+def table_export(
+    machine: PathLike, kind: str, job: PathLike | None, target: Path
+) -> tuple[dict[Path, bytes], tuple[str, ...], dict[str, Any]]:
+    """The file of a table of rotary axes, what to know of it, and the report. Raises ConfigError for a
+    machine that the table cannot hold."""
+    setup = _calibrated(machine, job)
+    kinematics = setup.kinematics
+    lies = as_it_lies(kinematics.structure, kinematics.errors)
+    try:
+        files = {target: TABLES[kind].write(lies)}
+    except ConfigError as error:
+        raise error.in_file(str(machine)) from None
+    notes = [
+        f"once the control has these vectors, describe it anew (olp init --trafo {target.name}) and fit the "
+        "calibration again: the present one is relative to the old vectors"
+    ]
+    notes += [
+        f"the zero of {name} is off by {value:.6f} deg; set it at the reference point, no vector holds it"
+        for name, value in left_zeros_deg(kinematics.structure, kinematics.errors).items()
+    ]
+    return files, tuple(notes), _report(setup, (kind, lies))
+
+
+def _calibrated(machine: PathLike, job: PathLike | None) -> JointSetup:
+    setup = load_joint_setup(machine, job, by_itself=True)
+    if setup.calibration is None:
+        raise UsageError(
+            "the machine file names no calibration, so there is nothing to export", file=str(machine)
+        )
+    return setup
 
 
 def joint_export(
@@ -60,11 +95,8 @@ def joint_export(
         raise UsageError("--program is for machines with three linear axes; leave it out", file=str(machine))
     if chain is not None:
         raise UsageError("--chain goes with -c; the machine file states its own chain")
-    setup = load_joint_setup(machine, job, by_itself=True)
-    if setup.calibration is None:
-        raise UsageError(
-            "the machine file names no calibration, so there is nothing to export", file=str(machine)
-        )
+    setup = _calibrated(machine, job)
+    assert setup.calibration is not None
     try:
         code = joint_code(setup.kinematics, setup.calibration.box, setup.digest)
     except ConfigError as error:
@@ -72,7 +104,8 @@ def joint_export(
     return code, _report(setup)
 
 
-def _report(setup: JointSetup) -> dict[str, Any]:
+def _report(setup: JointSetup, table: tuple[str, Structure] | None = None) -> dict[str, Any]:
+    """What is left without correction, with code in the control, and with the lines of a `table` alone."""
     assert setup.calibration is not None
     structure, box = setup.machine.structure, setup.calibration.box
     low, high = np.array([box[name] for name in structure.order], float).T
@@ -88,6 +121,11 @@ def _report(setup: JointSetup) -> dict[str, Any]:
         UNCOMPENSATED: (np.linalg.norm(shift, axis=1), left_angles(structure, turn, target)),
         REAL_TIME: (np.full(len(rows), band), left_angles(structure, solved.left_rad, target)),
     }
+    if table is not None:
+        name, lies = table
+        known = Kinematics(lies, tool_mm=setup.kinematics.tool_mm).nominal(values)
+        actual = setup.kinematics.actual(values)
+        left[name] = deviations(structure, actual, known)
     units = {name: f"{name}_{unit}" for name, unit in zip(structure.order, structure.units, strict=True)}
     return {
         "schema": "olp-tables-1",

@@ -27,9 +27,9 @@ _STATED = re.compile(
 #: What a remark of the control says.
 _REMARK = re.compile(r";.*")
 #: First number of each vector in swivel data.
-_NUMBERED = {"I1": 1, "I2": 4, "V1": 7, "V2": 10, "I3": 15, "I4": 18}
+NUMBERED = {"I1": 1, "I2": 4, "V1": 7, "V2": 10, "I3": 15, "I4": 18}
 #: By type of a transformation the kind of the machine, and the data of its vectors.
-_DATA: Mapping[int, tuple[str, Mapping[str, str]]] = {
+DATA: Mapping[int, tuple[str, Mapping[str, str]]] = {
     24: ("T", {"I1": "PART_OFFSET", "I2": "JOINT_OFFSET", "I3": "BASE_TOOL"}),
     40: ("P", {"I2": "BASE_TOOL", "I3": "JOINT_OFFSET", "I4": "PART_OFFSET"}),
     56: ("M", {"I1": "JOINT_OFFSET", "I2": "BASE_TOOL", "I3": "JOINT_OFFSET_PART", "I4": "PART_OFFSET"}),
@@ -93,7 +93,7 @@ def _read(text: str, file: str) -> Vectors:
         key = int(match["part"]) if match["part"] else f"{match['name'].upper()}[{match['index'] or 0}]"
         if kept.setdefault(key, value) != value:
             raise InputError(f"{match[0].strip()}: was {kept[key]} before; state it once", file=file)
-    kind = next((number for number in _DATA if data.get("TRAFO_TYPE_1[0]") == str(number)), None)
+    kind = next((number for number in DATA if data.get("TRAFO_TYPE_1[0]") == str(number)), None)
     if kind is not None and not sets:
         return _of_transformation(kind, data, file)
     if kind is not None:
@@ -102,7 +102,7 @@ def _read(text: str, file: str) -> Vectors:
     if len(used) != 1:
         found = f"states {len(used)} sets of swivel data" if used else "states no $TC_CARR23"
         raise InputError(
-            f"{found}; expected one set, or $MC_TRAFO_TYPE_1 = {', '.join(map(str, _DATA))} and its vectors",
+            f"{found}; expected one set, or $MC_TRAFO_TYPE_1 = {', '.join(map(str, DATA))} and its vectors",
             file=file,
         )
     return _of_swivel(*used.popitem(), file)
@@ -118,7 +118,7 @@ def _of_swivel(number: str, values: Mapping[int, str], file: str) -> Vectors:
                 f"$TC_CARR{part}[{number}] adds to the other vectors or angles; put it into them, and 0 here",
                 file=file,
             )
-    vectors = {name: (of(first), of(first + 1), of(first + 2)) for name, first in _NUMBERED.items()}
+    vectors = {name: (of(first), of(first + 1), of(first + 2)) for name, first in NUMBERED.items()}
     low, high = (of(30), of(31)), (of(32), of(33))
     for a, b in zip(low, high, strict=True):
         if b < a:
@@ -131,7 +131,7 @@ def _of_swivel(number: str, values: Mapping[int, str], file: str) -> Vectors:
 
 
 def _of_transformation(number: int, data: Mapping[str, str], file: str) -> Vectors:
-    kind, names = _DATA[number]
+    kind, names = DATA[number]
 
     def of(name: str) -> Vector:
         keys = [f"TRAFO5_{name}_1[{index}]" for index in range(3)]
@@ -167,7 +167,7 @@ def _number(name: str, text: str, file: str) -> float:
 def _parts(vectors: Vectors, file: str) -> Parts:
     if vectors.kind not in _CLOSED:
         raise InputError(f"$TC_CARR23 is {vectors.kind!r}; expected T, P or M", file=file)
-    of = {**dict.fromkeys(_NUMBERED, ZERO), **vectors.of}
+    of = {**dict.fromkeys(NUMBERED, ZERO), **vectors.of}
     for names in _CLOSED[vectors.kind]:
         rest = [sum(parts) for parts in zip(*(of[name] for name in names), strict=True)]
         if max(map(abs, rest)) > _CLOSE_MM:
