@@ -6,10 +6,11 @@ from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 
-from olp.core.arrays import Array, Index, distinct
+from olp.core.arrays import Array, Index, all_in_row, distinct
 from olp.core.geometry import arc_points
 from olp.core.toolpath import Flag, Toolpath
 from olp.core.values import dataclass
+from olp.program.text.columns import apart, picked, spans
 from olp.proof.deviation import cutting_moves
 
 #: waypoints that are sampled at most
@@ -102,9 +103,9 @@ def _named(pairs: Iterable[tuple[str, Array]]) -> dict[tuple[str, int], Array]:
 
 def _waypoints(path: Toolpath) -> Index:
     """Some moves that end at a known position, evenly among all of them."""
-    known = np.ones(len(path), bool)
-    for axis in range(3):
-        known &= np.isfinite(path.end_mm[:, axis])
+    known = np.empty(len(path), bool)
+    for some in spans(len(path)):
+        known[some] = all_in_row(np.isfinite(path.end_mm[some]))
     count = int(np.count_nonzero(known))
     pick = np.linspace(0, count - 1, min(count, _WAYPOINTS)).astype(np.int64)
     return pick if count == len(path) else np.flatnonzero(known)[pick]
@@ -112,11 +113,10 @@ def _waypoints(path: Toolpath) -> Index:
 
 def _lengths(path: Toolpath) -> Array:
     """(n,) length in mm of each move that cuts, 0 for others."""
-    length = np.empty(len(path))
-    for a in range(0, len(path), _BLOCK):
-        b = min(a + _BLOCK, len(path))
-        away = path.end_mm[a:b] - path.starts_mm(a, b)
-        length[a:b] = np.sqrt(np.einsum("ij,ij->i", away, away))
+    length = apart((len(path),), np.float64)
+    for some in spans(len(path), _BLOCK):
+        away = path.end_mm[some] - path.starts_mm(some.start, some.stop)
+        length[some] = np.sqrt(np.einsum("ij,ij->i", away, away))
     arcs = path.arcs
     if len(arcs):
         begin = _starts(path, arcs.move) - arcs.centre_mm
@@ -124,27 +124,29 @@ def _lengths(path: Toolpath) -> Array:
         radius = np.sqrt(np.einsum("ij,ij->i", begin, begin))
         length[arcs.move] = np.maximum(length[arcs.move], radius * np.abs(arcs.sweep_rad))
     cuts = cutting_moves(path) & ((path.flag & _AWAY) == 0)
-    np.nan_to_num(length, copy=False)
-    length[~cuts] = 0.0
+    for some in spans(len(path)):
+        length[some] = np.where(cuts[some], np.nan_to_num(length[some]), 0.0)
     return length
 
 
 def _starts(path: Toolpath, move: Index) -> Array:
     """(m, 3) axis positions at the start of moves (m,)."""
-    return np.where((move > 0)[:, None], path.end_mm[np.maximum(move - 1, 0)], np.array(path.start_mm))
+    return np.where(
+        (move > 0)[:, None], picked(path.end_mm, np.maximum(move - 1, 0)), np.array(path.start_mm)
+    )
 
 
 def _between(length: Array) -> tuple[_Places, float]:
     """Places between waypoints, one in each of so many equal parts of all lengths, and the length of a
     part."""
-    whole = 0.0
-    for _, ends in _ends(length):
-        whole = float(ends[-1])
+    whole, last = 0.0, 0
+    for a, ends in _ends(length):
+        whole, cuts = float(ends[-1]), np.flatnonzero(length[a : a + len(ends)] > 0.0)
+        last = a + int(cuts[-1]) if cuts.size else last
     if not whole > 0.0:
         return _Places(np.zeros(0, np.int64), np.zeros(0), np.zeros(0)), 0.0
     part = np.arange(_BETWEEN)
     place_mm = (part + np.mod(part * _GOLDEN, 1.0)) * (whole / _BETWEEN)
-    last = len(length) - 1 - int((length[::-1] > 0.0).argmax())
     move, end, done = np.full(_BETWEEN, last), np.full(_BETWEEN, whole), 0
     for a, ends in _ends(length):
         some = slice(done, int(np.searchsorted(place_mm, ends[-1])))
@@ -157,9 +159,9 @@ def _between(length: Array) -> tuple[_Places, float]:
 def _ends(length: Array) -> Iterator[tuple[int, Array]]:
     """Blocks of moves: the first of each, and (k,) the length of the path up to the end of each move."""
     before = 0.0
-    for a in range(0, len(length), _BLOCK):
-        ends = np.cumsum(np.concatenate(([before], length[a : a + _BLOCK])))[1:]
-        yield a, ends
+    for some in spans(len(length), _BLOCK):
+        ends = np.cumsum(np.concatenate(([before], length[some])))[1:]
+        yield some.start, ends
         before = float(ends[-1])
 
 
@@ -176,10 +178,10 @@ def _near(places: _Places, values: dict[tuple[str, int], Array], step_mm: float)
 
 def _points(path: Toolpath, places: _Places) -> Array:
     """(m, 3) axis positions."""
-    points = path.end_mm[places.move].copy()
+    points = picked(path.end_mm, places.move)
     inside = np.flatnonzero(places.share < 1.0)
     move, share = places.move[inside], places.share[inside]
-    start, end = _starts(path, move), path.end_mm[move]
+    start, end = _starts(path, move), picked(path.end_mm, move)
     points[inside] = start + share[:, None] * (end - start)
     arcs = path.arcs
     if len(arcs):

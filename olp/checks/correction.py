@@ -20,6 +20,7 @@ from olp.errormodel.base import ErrorModel
 from olp.findings.catalogue import Finding
 from olp.program.dialect import Dialect
 from olp.program.program import Program
+from olp.program.text.columns import found, spans
 from olp.proof.judgement import Judgements
 from olp.proof.measured import SHOWN
 from olp.proof.proof import Counts, Proof
@@ -152,48 +153,53 @@ def proof_findings(
     """Findings from the proof of a program of this dialect; `place` puts a line into words."""
     findings = []
     path = proof.nominal
-    size = proof.size_mm()
-    above = size > proof.allowed_mm
-    if above.any():
-        worst = int(size.argmax())
-        what = f"{int(above.sum())} moves are above tolerance: {size[worst] * 1e3:.2f} um at line "
+    count, over = len(path), found(len(path), lambda some: proof.size_mm(some) > proof.tolerance_mm)
+    size = proof.size_mm(over)
+    chosen = size > proof.allowed_mm
+    above = over[chosen]
+    if above.size:
+        worst = int(above[size[chosen].argmax()])
+        what = f"{len(above)} moves are above tolerance: {size.max() * 1e3:.2f} um at line "
         what += f"{place(int(path.line[worst]))}, allowed {proof.allowed_mm * 1e3:.2f} um"
-        if (above & path.compensated()).any() and proof.written.compensated().any():
+        if path.compensated()[above].any() and proof.written.compensated().any():
             what += "; contours under cutter compensation are among them: correct with --contour path"
         made = (path.flag & np.uint8(Flag.CYCLE)) != 0
         made[1:] |= made[:-1].copy()
-        if (above & made).any():
+        if made[above].any():
             what += "; holes of canned cycles, or moves from there, are among them: write these cycles out "
             what += _AS_MOVES[dialect.expands_cycles]
         findings.append(finding("OLP101", what, lines_of(path, above)))
-    if not proof.judged.any():
+    if not any((proof.counts[some] <= Counts.LEFT).any() for some in spans(count)):
         findings.append(finding("OLP107", "no move of this program could be judged"))
     untouched = (path.flag & np.uint8(Flag.PASS | Flag.MACHINE)) != 0
     untouched[uncorrected] = True
     if untouched.any():
         lines = lines_of(path, untouched)
         findings.append(finding("OLP102", f"{int(untouched.sum())} moves were written unchanged", lines))
-    unknown = proof.judged & (proof.after.side > proof.tolerance_mm)
-    if unknown.any():
+    unknown = found(
+        count,
+        lambda some: (proof.counts[some] <= Counts.LEFT) & (proof.after.side[some] > proof.tolerance_mm),
+    )
+    if unknown.size:
         findings.append(
             finding(
                 "OLP103",
-                f"in {int(unknown.sum())} moves the side of an axis' backlash is unknown; up to "
+                f"in {len(unknown)} moves the side of an axis' backlash is unknown; up to "
                 f"{proof.after.side[unknown].max() * UM_PER_MM:.1f} um of the deviation comes from that",
                 lines_of(path, unknown),
             )
         )
-    holes = (proof.counts == Counts.HOLE) & (size > proof.tolerance_mm)
+    holes = proof.counts[over] == Counts.HOLE
     if holes.any():
         most_um = size[holes].max() * UM_PER_MM
         what = f"{int(holes.sum())} holes are off by up to {most_um:.2f} um along the stroke; write their "
         what += f"cycles out {_AS_MOVES[dialect.expands_cycles]}"
-        findings.append(finding("OLP105", what, lines_of(path, holes)))
-    lean = proof.lean & (size > proof.tolerance_mm)
+        findings.append(finding("OLP105", what, lines_of(path, over[holes])))
+    lean = proof.lean[over]
     if lean.any():
         what = f"{int(lean.sum())} feed moves start where a canned cycle or an uncorrected move ended; they "
         what += f"are off by up to {size[lean].max() * UM_PER_MM:.2f} um"
-        findings.append(finding("OLP306", what, lines_of(path, lean)))
+        findings.append(finding("OLP306", what, lines_of(path, over[lean])))
     return findings
 
 
@@ -201,11 +207,17 @@ def part_findings(table: Judgements, part_tolerance_um: float | None) -> list[Fi
     """Is the corrected path within the part tolerance, uncertainty left aside?"""
     if part_tolerance_um is None:
         return []
-    above = table.judged & (np.nan_to_num(table.corrected) * UM_PER_MM > part_tolerance_um)
-    if not above.any():
+    above = found(
+        len(table.counts),
+        lambda some: (
+            (table.counts[some] <= Counts.LEFT)
+            & (np.nan_to_num(table.corrected[some]) * UM_PER_MM > part_tolerance_um)
+        ),
+    )
+    if not above.size:
         return []
     what = (
-        f"{int(above.sum())} moves are above the part tolerance: "
+        f"{len(above)} moves are above the part tolerance: "
         f"{table.largest_mm() * UM_PER_MM:.2f} um, {part_tolerance_um:g} um allowed"
     )
     return [finding("OLP108", what, sorted(set(table.line[above].tolist())))]

@@ -15,6 +15,7 @@ from olp.core.units import UM_PER_MM
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.calibration import Calibration
 from olp.findings.catalogue import Finding
+from olp.program.text.columns import apart, found, spans
 
 #: Sane errors per length: 1 mm/m is five times a poor machine tool, and 667 urad of a hobby router pass.
 _SHARE = 1e-3
@@ -47,13 +48,13 @@ def size_doubts(
     """Errors too large for this machine at waypoints, else in the box, or too small to be measured."""
     limit = largest_mm(machine)
     size = _at_waypoints(path, model)
-    wild = size > limit
+    wild = found(len(size), lambda some: size[some] > limit)
     expected = f"at most {limit * UM_PER_MM:.0f} um are expected of this machine"
-    if wild.any():
-        largest = float(size.max()) * UM_PER_MM
-        what = f"the error is up to {largest:.0f} um at {int(wild.sum())} waypoints; {expected}"
+    if wild.size:
+        largest = float(size[wild].max()) * UM_PER_MM
+        what = f"the error is up to {largest:.0f} um at {len(wild)} waypoints; {expected}"
         return [finding("OLP409", what, lines_of(path, wild))]
-    return box_doubts(model, path.tools_mm(), calibration, machine, float(size.max(initial=0.0)))
+    return box_doubts(model, path.tools_mm(), calibration, machine, _largest(size))
 
 
 def box_doubts(
@@ -84,18 +85,21 @@ def box_doubts(
 def _at_waypoints(path: Toolpath, model: ErrorModel) -> Array:
     """(n,) size of the error at the end of each move, at the face of the box for those outside, 0 where it is
     not known or the move is not corrected. Half of the backlash is part of it."""
-    size = np.zeros(len(path))
+    size = apart((len(path),), np.float64)
     low, high = model.box_mm.T
-    for first in range(0, len(path), _CHUNK):
-        last = min(first + _CHUNK, len(path))
-        place = np.clip(path.end_mm[first:last], low, high)
-        error = np.nan_to_num(model.error(place, path.tool_mm(first, last)))
+    for some in spans(len(path), _CHUNK):
+        place = np.clip(path.end_mm[some], low, high)
+        error = np.nan_to_num(model.error(place, path.tool_mm(some.start, some.stop)))
         backlash = model.backlash_at(place)
         if backlash is not None:
             error = np.abs(error) + 0.5 * np.abs(np.nan_to_num(backlash))
-        size[first:last] = np.sqrt(np.einsum("ij,ij->i", error, error))
-    size[(path.flag & _UNTOUCHED) != 0] = 0.0
+        size[some] = np.sqrt(np.einsum("ij,ij->i", error, error))
+        size[some][(path.flag[some] & _UNTOUCHED) != 0] = 0.0
     return size
+
+
+def _largest(size: Array) -> float:
+    return max((float(size[some].max()) for some in spans(len(size))), default=0.0)
 
 
 def _box_points(box_mm: Array) -> Array:

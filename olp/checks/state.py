@@ -7,11 +7,12 @@ import datetime
 import numpy as np
 
 from olp.checks.base import finding, first_line, lines_of
-from olp.core.arrays import Array, Mask, distinct
+from olp.core.arrays import Array, Index, Mask, any_in_row, distinct
 from olp.core.machine import Job, Machine, Sanity, Setup
 from olp.core.toolpath import Flag, Toolpath
 from olp.errormodel.calibration import Calibration
 from olp.findings.catalogue import Finding
+from olp.program.text.columns import spans
 from olp.proof.proof import ROUNDING_SHARE
 
 #: mm; how far rounding may put a position beyond a limit
@@ -28,12 +29,12 @@ _UNTOUCHED = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE)
 def travel_findings(path: Toolpath, machine: Machine) -> list[Finding]:
     """Commands beyond the travel of an axis, arcs between their ends included."""
     travel_mm = np.array([machine.axes[name].travel_mm for name in "XYZ"])
-    outside = _outside(path, travel_mm)
+    moves, outside = _outside(path, travel_mm)
     findings = []
     for i, name in enumerate("XYZ"):
         least, most = travel_mm[i].tolist()
-        beyond = outside[:, i]
-        if beyond.any():
+        beyond = moves[outside[:, i]]
+        if beyond.size:
             what = f"{name} is commanded beyond its travel of {least:g} to {most:g} mm"
             findings.append(finding("OLP402", what, lines_of(path, beyond)))
     return findings
@@ -42,23 +43,26 @@ def travel_findings(path: Toolpath, machine: Machine) -> list[Finding]:
 def box_findings(path: Toolpath, box_mm: Array, code: str) -> list[Finding]:
     """Commands outside the calibrated box (3, 2), arcs between their ends included. `code` is OLP405, or
     OLP403 with --outside-box hold."""
-    outside = _outside(path, box_mm)
-    moves = outside.any(axis=1) & ((path.flag & _UNTOUCHED) == 0)
-    if not moves.any():
+    moves, outside = _outside(path, box_mm)
+    own = (path.flag[moves] & _UNTOUCHED) == 0
+    moves, outside = moves[own], outside[own]
+    if not moves.size:
         return []
-    axes = " and ".join("XYZ"[i] for i in np.flatnonzero(outside[moves].any(axis=0)))
-    what = f"{int(moves.sum())} commands lie outside the calibrated box in {axes}"
+    axes = " and ".join("XYZ"[i] for i in np.flatnonzero(outside.any(axis=0)))
+    what = f"{len(moves)} commands lie outside the calibrated box in {axes}"
     return [finding(code, what, lines_of(path, moves))]
 
 
-def _outside(path: Toolpath, box_mm: Array) -> Mask:
-    """(n, 3) moves that leave a box (3, 2) along an axis, arcs between their ends too."""
-    outside = np.empty((len(path), 3), bool)
-    for a in range(0, len(path), _BLOCK):
-        low, high = path.part(a, min(a + _BLOCK, len(path))).reach_mm()
+def _outside(path: Toolpath, box_mm: Array) -> tuple[Index, Mask]:
+    """(m,) the moves that leave a box (3, 2), arcs between their ends too, and (m, 3) along which axes."""
+    moves, outside = [np.zeros(0, np.int64)], [np.zeros((0, 3), bool)]
+    for some in spans(len(path), _BLOCK):
+        low, high = path.part(some.start, some.stop).reach_mm()
         beyond = (low < box_mm[:, 0] - _ON_LIMIT_MM) | (high > box_mm[:, 1] + _ON_LIMIT_MM)
-        outside[a : a + _BLOCK] = beyond
-    return outside
+        rows = np.flatnonzero(any_in_row(beyond))
+        moves.append(some.start + rows)
+        outside.append(beyond[rows])
+    return np.concatenate(moves), np.concatenate(outside)
 
 
 def calibration_findings(calibration: Calibration, date: datetime.date | None, days: int) -> list[Finding]:

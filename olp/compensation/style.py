@@ -14,9 +14,12 @@ from olp.core.toolpath import Flag
 from olp.core.units import MM_PER_INCH
 from olp.core.values import dataclass
 from olp.program.program import Program
+from olp.program.text.columns import spans
 
 #: Digits behind the point, at most.
 _MOST_DECIMALS = 9
+#: Numbers of digits behind the point that a word may have.
+_KINDS = 1 << 7
 #: Bytes that are blanks at the start of a line.
 _BLANK = np.array([chr(byte).isspace() for byte in range(256)])
 #: The space before a word, by style number modulo 3.
@@ -49,20 +52,19 @@ class Style:
     def of(program: Program, increments_mm: Vector) -> Style:
         words, path = program.words, program.toolpath
         assert words is not None
-        common, finest = [], []
+        counts, finest = np.zeros((3, _KINDS), np.int64), [0, 0, 0]
         leading_zero = True
-        counting = (path.flag & np.uint8(Flag.INCREMENTAL)) != 0
         text = np.frombuffer(program.data, np.uint8)
-        for axis in range(3):
-            slot = program.slot[:, axis]
-            used = words.decimals[slot[slot >= 0]]
-            common.append(int(np.bincount(used).argmax()) if used.size else 0)
-            steps = slot[counting]
-            steps = steps[steps >= 0]
-            finest.append(int(words.decimals[steps].max(initial=0)))
-            first = text[words.number[slot[slot >= 0]]]
-            if (first == 46).any():
-                leading_zero = False
+        for some in spans(len(program.slot)):
+            counting = (path.flag[some] & np.uint8(Flag.INCREMENTAL)) != 0
+            for axis in range(3):
+                slot = program.slot[some, axis]
+                used = slot >= 0
+                counts[axis] += np.bincount(words.decimals[slot[used]], minlength=_KINDS)
+                steps = slot[used & counting]
+                finest[axis] = max(finest[axis], int(words.decimals[steps].max(initial=0)))
+                leading_zero = leading_zero and not (text[words.number[slot[used]]] == 46).any()
+        common = counts.argmax(axis=1).tolist()
         index = np.arange(1, min(len(words.start), 4000))
         inner = index[words.number[index - 1] >= 0]
         inner = inner[~is_in(inner, words.first_word[:4001])]

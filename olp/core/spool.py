@@ -1,10 +1,15 @@
-"""A long text that is made part by part, and waits in a temporary file until it is read."""
+"""A long text that is made part by part, and waits in a temporary file until it is read.
+
+Columns of numbers wait there as well. Their pages are in memory while they are looked at, until `unload`."""
 
 from __future__ import annotations
 
 import contextlib
 import hashlib
 import io
+import mmap
+import shutil
+import sys
 import tempfile
 import weakref
 from collections.abc import Iterator
@@ -14,13 +19,31 @@ from typing import IO
 LONG = 1 << 22
 #: Bytes that are read at once.
 _PART = 1 << 20
+#: Files whose pages are in memory where they were looked at.
+_MAPPED: weakref.WeakSet[mmap.mmap] = weakref.WeakSet()
+
+
+def unload() -> None:
+    """Let go the pages of all mapped files; each comes back where it is looked at again."""
+    if sys.platform != "win32":
+        for mapped in tuple(_MAPPED):
+            mapped.madvise(mmap.MADV_DONTNEED)
+
+
+def room() -> int:
+    """The bytes that there is room for in temporary files."""
+    try:
+        return shutil.disk_usage(tempfile.gettempdir()).free
+    except OSError:
+        return 0
 
 
 class Spool:
-    """A text that grows at its end; `size` is the number of its bytes. It is in memory while it is short, and
-    where the system has no room for a temporary file. The file ends with it."""
+    """A text that grows at its end; `size` is the number of its bytes. It is in memory while it has fewer
+    than `long` bytes, and where the system has no room for a temporary file. The file ends with it."""
 
-    def __init__(self, data: bytes = b"") -> None:
+    def __init__(self, data: bytes = b"", long: int | None = None) -> None:
+        self._long = LONG if long is None else long
         self._file: IO[bytes] = io.BytesIO()
         self._moved = False
         self.size = 0
@@ -29,7 +52,7 @@ class Spool:
 
     def write(self, data: bytes | memoryview) -> None:
         """Put bytes behind those that are there."""
-        if not self._moved and self.size + len(data) >= LONG:
+        if not self._moved and self.size + len(data) >= self._long:
             self._moved = True
             with contextlib.suppress(OSError), contextlib.ExitStack() as unless:
                 self._move(unless.enter_context(tempfile.TemporaryFile(buffering=0)))
@@ -62,6 +85,18 @@ class Spool:
         """The whole text."""
         self._file.seek(0)
         return self._file.read()
+
+    def mapped(self) -> mmap.mmap | memoryview:
+        """The whole text without reading it, which may be written over; nothing grows any more. It stays when
+        the spool ends."""
+        if isinstance(self._file, io.BytesIO):
+            return self._file.getbuffer()
+        try:
+            mapped = mmap.mmap(self._file.fileno(), self.size)
+        except OSError:
+            raise MemoryError from None
+        _MAPPED.add(mapped)
+        return mapped
 
     def sha256(self) -> str:
         """The digest of the text."""

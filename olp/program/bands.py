@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Array, Mask
+from olp.core.spool import unload
 from olp.core.toolpath import Flag, Kind, Toolpath
 from olp.core.values import dataclass
 from olp.program.program import Program
@@ -56,6 +57,7 @@ def bands(program: Program) -> Iterator[Band]:
         end = len(program.data) if last == len(path) else program.text_of(last)
         ahead = path.end_mm[last : last + AHEAD]
         yield Band(_part(program, first, last), first, end, first / count, last / count, ahead)
+        unload()
 
 
 def spans(path: Toolpath, size: int) -> Iterator[tuple[int, int]]:

@@ -294,7 +294,7 @@ class Alignment:
 
     def _far(self, i: Index, j: Index) -> bool:
         """Whether some nominal unit would end far from its waypoint."""
-        away = most_in_row(apart(self.tip[j], self.target[i]))
+        away = most_in_row(off_mm(self.tip[j], self.target[i]))
         return bool(((away >= FAR_MM) & ~self.loose[i]).any())
 
     def _aligned(self, i: int, j: int, rows: int, width: int) -> Index:
@@ -331,7 +331,7 @@ class Alignment:
         loose = self.loose[i, None]
         tip = np.where(loose, self.written[j], self.tip[j])
         target = np.where(loose, self.said[i], self.target[i])
-        end = np.minimum((apart(tip, target) ** 2).sum(axis=1), FAR_MM**2)
+        end = np.minimum((off_mm(tip, target) ** 2).sum(axis=1), FAR_MM**2)
         end += np.where(self.mine.kind[i] == self.theirs.kind[j], 0.0, _OTHER_KIND_MM2)
         part = np.minimum(self._along(i, j), FAR_MM) ** 2
         part += np.where(self._unlike(i, j), _OTHER_KIND_MM2, 0.0)
@@ -355,7 +355,7 @@ def _lengths(units: Page, begin: Array, end: Array) -> Array:
     return np.concatenate(([0.0], np.cumsum(own)))
 
 
-def apart(tip: Array, target: Array) -> Array:
+def off_mm(tip: Array, target: Array) -> Array:
     """(m, 3) mm: how far tips are from targets along each axis. An axis that is unknown in both is as meant,
     one that is unknown in one of them is far off."""
     away = np.abs(tip - target)
@@ -363,10 +363,10 @@ def apart(tip: Array, target: Array) -> Array:
 
 
 def _within(tip: Array, target: Array, reach: Array) -> Mask:
-    """Whether tips (m, 3) are within reach (m,) of targets, as `apart` says."""
+    """Whether tips (m, 3) are within reach (m,) of targets, as `off_mm` says."""
     away = np.abs(tip - target)
     good = (away[:, 0] < reach) & (away[:, 1] < reach) & (away[:, 2] < reach)
     blind = np.flatnonzero(np.isnan(away[:, 0] + away[:, 1] + away[:, 2]))
     if blind.size:
-        good[blind] = most_in_row(apart(tip[blind], target[blind])) < reach[blind]
+        good[blind] = most_in_row(off_mm(tip[blind], target[blind])) < reach[blind]
     return np.asarray(good)

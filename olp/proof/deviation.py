@@ -17,12 +17,13 @@ from olp.compensation.plan import TargetRows
 from olp.core.arrays import Array, Index, Mask, all_in_row, any_in_row
 from olp.core.geometry import ArcShapes, arms, segment_distance
 from olp.core.progress import Progress, silent
+from olp.core.spool import unload
 from olp.core.toolpath import Flag, Kind, Toolpath
 from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.reversal import play_after, play_interval
 from olp.errormodel.sampling import clear_length_mm, longer, steps_needed
-from olp.program.text.columns import apart
+from olp.program.text.columns import apart, spans
 from olp.proof.smooth_joints import SmoothJoints
 from olp.proof.unknown_sides import UnknownSides
 from olp.proof.unknown_starts import UnknownStarts
@@ -73,7 +74,6 @@ def measure(
     """
     count = len(nominal)
     waypoint, worst = (apart((count,), np.float32) for _ in range(2))
-    waypoint[:] = worst[:] = np.nan
     largest = 0.0
     tracer = Tracer(nominal, target_mm, path, groups, model, bend_mm)
     starts = UnknownStarts(nominal, target_mm, path, groups, model, bend_mm)
@@ -91,6 +91,7 @@ def measure(
         if sides is not None:
             side[a:b] = sides.of(int(groups[a - 1]) + 1 if a else 0, groups[a:b])
         tell("prove", b / count)
+        unload()
         a = b
     return Deviation(waypoint, worst, largest, side)
 
@@ -121,8 +122,8 @@ class Tracer:
         self.has_play = model.backlash_at(np.array(model.box_mm).mean(axis=1)[None]) is not None
         self.joints = SmoothJoints.of(nominal)
         #: (n, 3) axes that are unknown at the end of a nominal move, None where there are none
-        blind = np.isnan(nominal.end_mm)
-        self.blind = blind if blind.any() else None
+        unknown = any(np.isnan(nominal.end_mm[some]).any() for some in spans(len(nominal)))
+        self.blind = np.isnan(nominal.end_mm) if unknown else None
 
     @staticmethod
     def trace(path: Toolpath, model: ErrorModel, step_mm: float) -> tuple[Array, Index]:

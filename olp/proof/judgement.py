@@ -14,12 +14,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Array, Index, Mask, Numbers, distinct
+from olp.core.arrays import Array, Index, Mask, Numbers, distinct, is_in
 from olp.core.toolpath import Toolpath
 from olp.core.units import UM_PER_MM
 from olp.core.values import dataclass
 from olp.findings.catalogue import Finding
 from olp.findings.rule import Severity
+from olp.program.text.columns import Columns, found, spans
 from olp.proof.measured import ABOVE, SHOWN, WITHIN, Measured
 from olp.proof.proof import Counts, Proof
 
@@ -62,12 +63,11 @@ class Judgements:
     def of(proof: Proof) -> Judgements:
         path = proof.nominal
         tool, operation = groups_of(path)
-        judged = proof.judged
         parts = (("uncorrected", proof.before), ("corrected", proof.after))
         return Judgements(
             path.line, tool, operation, proof.counts, proof.before_mm, proof.after_mm,
             proof.tolerance_mm, proof.allowed_mm, None,
-            {name: part.side for name, part in parts if part.side[judged].any()},
+            {name: one.side for name, one in parts if _any_counts(one.side, proof.counts)},
         )  # fmt: skip
 
     def with_measured(self, runs: Measured) -> Judgements:
@@ -82,29 +82,48 @@ class Judgements:
     @property
     def over(self) -> Mask:
         """(n,) moves that count and are above what is allowed."""
-        return np.asarray(self.judged & (np.nan_to_num(self.corrected) > self.allowed_mm))
+        over = np.zeros(len(self.counts), bool)
+        for some in spans(len(over)):
+            judged = self.counts[some] <= Counts.LEFT
+            over[some] = judged & (np.nan_to_num(self.corrected[some]) > self.allowed_mm)
+        return over
 
     def largest_mm(self, which: Mask | None = None) -> float:
         """The largest deviation of the corrected program that counts, of all moves or of some."""
-        rows = self.judged if which is None else self.judged & which
-        return float(np.nan_to_num(self.corrected[rows]).max(initial=0.0))
+        rows = self._judged_rows() if which is None else [np.flatnonzero(self.judged & which)]
+        return max((float(np.nan_to_num(self.corrected[r]).max(initial=0.0)) for r in rows), default=0.0)
+
+    def worst(self) -> int | None:
+        """The first of the moves with the largest deviation that counts, None where none does."""
+        worst, largest = None, -1.0
+        for rows in self._judged_rows():
+            size = np.nan_to_num(self.corrected[rows])
+            top = int(size.argmax())
+            if size[top] > largest:
+                worst, largest = int(rows[top]), float(size[top])
+        return worst
 
     def worst_lines(self, count: int) -> Numbers:
         """So many lines, or some more, with moves that count: those that are farthest off when corrected are
         among them. All where there are fewer."""
-        rows = np.flatnonzero(self.judged)
-        size = -np.nan_to_num(self.corrected[rows])
-        some = _FEW * count
-        while some < len(rows):
-            lines = distinct(self.line[rows[size <= np.partition(size, some)[some]]])
+        judged, some = sum(map(len, self._judged_rows())), _FEW * count
+        while some < judged:
+            top = np.zeros(0, np.float32)
+            for rows in self._judged_rows():
+                top = np.append(top, -np.nan_to_num(self.corrected[rows]))
+                top = np.partition(top, some)[: some + 1] if len(top) > some else top
+            least = top.max()
+            lines = distinct(np.concatenate([
+                self.line[rows[-np.nan_to_num(self.corrected[rows]) <= least]] for rows in self._judged_rows()
+            ]))  # fmt: skip
             if len(lines) >= count:
                 return lines
             some *= _FEW
-        return distinct(self.line[rows])
+        return distinct(self.line[self.judged])
 
     def on_lines(self, lines: Numbers) -> Judgements:
         """The rows of these lines alone, without measured runs."""
-        rows = np.flatnonzero(np.isin(self.line, lines))
+        rows = found(len(self.line), lambda some: is_in(self.line[some], lines))
         return Judgements(
             self.line[rows], self.tool[rows], self.operation[rows], self.counts[rows],
             self.uncorrected[rows], self.corrected[rows], self.tolerance_mm, self.allowed_mm,
@@ -139,10 +158,10 @@ class Judgements:
     def groups(self, of: Index) -> list[dict[str, Any]]:
         """Largest deviations and verdict of the moves that count of each value of `of` (n,), in order of
         appearance."""
-        values = distinct(of[self.judged])
+        values = distinct(np.concatenate([of[:0], *(distinct(of[rows]) for rows in self._judged_rows())]))
         count = len(values)
         begin, worst = np.full(count, len(of)), np.full(count, len(of))
-        first, last = np.full(count, self.line.max(initial=0)), np.zeros(count, np.int64)
+        first, last = np.full(count, np.iinfo(np.int64).max), np.zeros(count, np.int64)
         largest, uncorrected, over = np.zeros(count, np.float32), np.zeros(count), np.zeros(count, bool)
         for rows in self._judged_rows():
             # a group is a few runs of rows
@@ -177,23 +196,24 @@ class Judgements:
 
     def _judged_rows(self) -> Iterator[Index]:
         """The rows of moves that count, in blocks."""
-        judged = self.judged
-        for a in range(0, len(judged), _BLOCK):
-            rows = np.flatnonzero(judged[a : a + _BLOCK])
+        for some in spans(len(self.counts), _BLOCK):
+            rows = np.flatnonzero(self.counts[some] <= Counts.LEFT)
             if rows.size:
-                yield a + rows
+                yield some.start + rows
 
     def report(self) -> dict[str, Any]:
         """The table by groups, as plain data."""
-        shown = {
-            REASONS[kind]: float(np.nan_to_num(self.corrected[self.counts == kind]).max(initial=0.0))
-            * UM_PER_MM
-            for kind in (Counts.RAPID, Counts.UNCORRECTED)
-            if (self.counts == kind).any()
-        }
+        moves, shown = np.zeros(len(Counts), np.int64), dict.fromkeys((Counts.RAPID, Counts.UNCORRECTED), 0.0)
+        for some in spans(len(self.counts)):
+            moves += np.bincount(self.counts[some], minlength=len(Counts))
+            for kind, largest in shown.items():
+                size = np.nan_to_num(self.corrected[some][self.counts[some] == kind])
+                shown[kind] = float(size.max(initial=largest))
         return {
-            "moves": {REASONS[kind]: int((self.counts == kind).sum()) for kind in Counts},
-            "shown_um": shown,
+            "moves": {REASONS[kind]: int(moves[kind]) for kind in Counts},
+            "shown_um": {
+                REASONS[kind]: largest * UM_PER_MM for kind, largest in shown.items() if moves[kind]
+            },
             "operations": self.groups(self.operation),
             "tools": self.groups(self.tool),
         } | ({} if self.measured is None else {"measured": self.measured.report()})
@@ -206,13 +226,20 @@ def groups_of(path: Toolpath) -> tuple[Index, Index]:
     keys = list(zip(numbers.tolist(), offsets, strict=True))
     # frames of the same key have the number of the first of them
     first = {key: k for k, key in reversed(list(enumerate(keys)))}
-    number = np.array([first[key] for key in keys], np.int32)[path.frame] if len(path.frames) else path.frame
-    if len(number) and (number == number[0]).all():
-        # one number stands for all
-        return np.broadcast_to(numbers[number[0]], len(number)), np.broadcast_to(np.int64(0), len(number))
-    operation = np.zeros(len(number), np.int64)
-    np.cumsum(number[1:] != number[:-1], out=operation[1:])
-    return np.asarray(numbers[path.frame], np.int64), operation
+    key_of = np.array([first[key] for key in keys] or [0])
+    columns, before, count = Columns(), -1, -1
+    for some in spans(len(path.frame)):
+        number = key_of[path.frame[some]]
+        operation = count + np.cumsum(np.diff(number, prepend=before) != 0)
+        columns.put("tool", numbers[path.frame[some]], np.int64)
+        columns.put("operation", operation, np.int64)
+        before, count = int(number[-1]), int(operation[-1])
+    return columns.take("tool", np.int64), columns.take("operation", np.int64)
+
+
+def _any_counts(side: Single, counts: npt.NDArray[np.uint8]) -> bool:
+    """Whether any of what an unknown side may be is of a move that counts."""
+    return any(side[some][counts[some] <= Counts.LEFT].any() for some in spans(len(counts)))
 
 
 def _measured_columns(
@@ -313,18 +340,16 @@ _OWN = {"OLP101", "OLP108"}
 
 
 def _numerical(table: Judgements) -> dict[str, Any]:
-    judged = bool(table.judged.any())
-    values = np.where(table.judged, np.nan_to_num(table.corrected), -1.0)
-    worst = int(values.argmax()) if judged else None
+    worst = table.worst()
     return {
-        "largest_um": table.largest_mm() * UM_PER_MM if judged else None,
+        "largest_um": None if worst is None else table.largest_mm() * UM_PER_MM,
         "tolerance_um": table.tolerance_mm * UM_PER_MM,
         "rounding_um": (table.allowed_mm - table.tolerance_mm) * UM_PER_MM,
         "allowed_um": table.allowed_mm * UM_PER_MM,
         "line": None if worst is None else int(table.line[worst]),
         "left": bool(worst is not None and table.counts[worst] == Counts.LEFT),
         "unknown": int((table.counts == Counts.UNKNOWN).sum()),
-        "holds": not bool(table.over.any()) if judged else None,
+        "holds": None if worst is None else not bool(table.over.any()),
     }
 
 

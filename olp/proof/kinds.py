@@ -11,6 +11,7 @@ import numpy as np
 
 from olp.core.arrays import Index, Mask, any_in_row
 from olp.core.errors import ProgramError
+from olp.core.spool import unload
 from olp.core.toolpath import Flag, Kind, Toolpath
 from olp.program.program import Program
 
@@ -39,6 +40,7 @@ def check_kinds(nominal: Program, corrected: Program, groups: Index, digit_mm: f
             if wrong.any():
                 _refuse(path, written, here - begin, int(np.argmax(wrong)), text)
         begin = end
+        unload()
 
 
 def _refuse(path: Toolpath, written: Toolpath, groups: Index, move: int, text: str) -> None:

@@ -13,10 +13,12 @@ from olp.compensation.plan import TargetRows
 from olp.core.arrays import Array, Index, all_in_row, distinct, most_in_row
 from olp.core.errors import ProgramError
 from olp.core.progress import Progress, silent
+from olp.core.spool import unload
 from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
 from olp.program.program import Program
-from olp.proof.alignment import FAR_MM, FREE, Alignment, apart
+from olp.program.text.columns import apart
+from olp.proof.alignment import FAR_MM, FREE, Alignment, off_mm
 from olp.proof.pages import Page, Tips, Units
 
 #: Share of waypoints that may be far off before the programs count as different jobs.
@@ -46,7 +48,7 @@ def match(
             "nominal one, so it is not a correction of it; give the two programs of one job",
             code="OLP562",
         )
-    groups = np.zeros(len(program.toolpath), np.int64)
+    groups = apart((len(program.toolpath),), np.int64)
     tips, others = Tips(corrected.toolpath, model), _Others()
     i = j = tries = 0
     width = 2 * _PAGE
@@ -68,6 +70,7 @@ def match(
         groups[pair.first[0] : pair.last[-1] + 1] = _groups(target_mm, pair, tip, base)
         i, j = i + len(ends), int(ends[-1]) + 1
         tell("prove", i / len(mine))
+        unload()
     others.refuse(program)
     return groups
 
@@ -102,7 +105,7 @@ class _Others:
         """Count the ends of units, which are moves (u,) and reach tips (u, 3)."""
         nominal, goal = program.toolpath, target[move]
         counted = ((nominal.flag[move] & FREE) == 0) & ~all_in_row(np.isnan(goal))
-        far = counted & ~(most_in_row(apart(tip, goal)) < FAR_MM)
+        far = counted & ~(most_in_row(off_mm(tip, goal)) < FAR_MM)
         if far.any() and not self.far:
             self.first = int(move[np.argmax(far)])
         self.counted += int(counted.sum())

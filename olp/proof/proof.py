@@ -13,11 +13,13 @@ from olp.core.arrays import Array, Index, Mask, all_in_row, any_in_row, is_in
 from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES
 from olp.core.progress import Progress, part, silent
+from olp.core.spool import unload
 from olp.core.toolpath import Flag, Kind, Toolpath
 from olp.core.units import UM_PER_MM
 from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
 from olp.program.program import Program
+from olp.program.text.columns import Columns, apart, found, spans
 from olp.proof.deviation import Deviation, Single, cutting_moves, measure
 from olp.proof.kinds import check_kinds
 from olp.proof.matching import match
@@ -96,13 +98,18 @@ class Proof:
         """(n,) moves that count."""
         return np.asarray(self.counts <= Counts.LEFT)
 
-    def size_mm(self) -> Array:
-        """(n,) the deviation per nominal move, 0 where the move does not count."""
-        return np.where(self.judged, np.nan_to_num(self.after_mm), np.float64(0.0))
+    def size_mm(self, rows: slice | Index) -> Array:
+        """(m,) the deviation of nominal moves, 0 where the move does not count."""
+        judged = self.counts[rows] <= Counts.LEFT
+        return np.where(judged, np.nan_to_num(self.after_mm[rows]), np.float64(0.0))
 
     @property
     def largest_mm(self) -> float:
-        return float(np.fmax.reduce(self.after_mm[self.judged], initial=0.0))
+        largest = np.float32(0.0)
+        for some in spans(len(self.counts)):
+            judged = self.counts[some] <= Counts.LEFT
+            largest = np.fmax.reduce(self.after_mm[some][judged], initial=largest)
+        return float(largest)
 
     def owner(self) -> Index:
         """(m,) the nominal move that each move of the corrected program belongs to."""
@@ -110,10 +117,9 @@ class Proof:
 
     def nominal_lines(self) -> npt.NDArray[np.int32]:
         """(m,) the nominal line of each move of the corrected program."""
-        line = np.empty(len(self.written), np.int32)
-        for a in range(0, len(line), _BLOCK):
-            part = line[a : a + _BLOCK]
-            part[:] = self.nominal.line[np.searchsorted(self.groups, np.arange(a, a + len(part)))]
+        line = apart((len(self.written),), np.int32)
+        for some in spans(len(line), _BLOCK):
+            line[some] = self.nominal.line[np.searchsorted(self.groups, np.arange(some.start, some.stop))]
         return line
 
     @property
@@ -124,22 +130,28 @@ class Proof:
 def figures(counts: npt.NDArray[np.uint8], waypoint: Single, whole: Single) -> dict[str, dict[str, float]]:
     """Largest and rms in um of what counts, of deviations in mm (n,): `waypoint` at the ends of moves, and
     `whole` along cutting moves."""
-    at_end = (counts <= Counts.POINT) | (counts == Counts.LEFT)
-    along = (counts <= Counts.LEFT) & (counts != Counts.POINT)
-    return {"waypoints": _figures(waypoint, at_end), "between": _figures(whole, along)}
+    at_end, along = (Counts.FEED, Counts.POINT, Counts.LEFT), (Counts.FEED, Counts.HOLE, Counts.LEFT)
+    return {"waypoints": _figures(waypoint, counts, at_end), "between": _figures(whole, counts, along)}
 
 
-def _figures(values: Single, counted: Mask) -> dict[str, float]:
-    values = values[counted & np.isfinite(values)]
-    if not len(values):
+def _figures(values: Single, counts: npt.NDArray[np.uint8], counted: tuple[Counts, ...]) -> dict[str, float]:
+    column, largest = Columns(), 0.0
+    for some in spans(len(values)):
+        part = values[some]
+        part = part[is_in(counts[some], counted) & np.isfinite(part)]
+        column.put("all", part, np.float32)
+        largest = max(largest, float(part.max(initial=0.0)))
+    known = column.take("all", np.float32)
+    if not len(known):
         return {"max_um": 0.0, "rms_um": 0.0}
-    rms = float(np.sqrt(_square_sum(values) / len(values)))
-    return {"max_um": float(values.max()) * UM_PER_MM, "rms_um": rms * UM_PER_MM}
+    rms = float(np.sqrt(_square_sum(known) / len(known)))
+    return {"max_um": largest * UM_PER_MM, "rms_um": rms * UM_PER_MM}
 
 
 def _square_sum(values: Single) -> np.float64:
     """The sum of the squares, of halves and their halves, so that it is as exact as that of all at once."""
     if len(values) <= max(_BLOCK, _SUMMED):
+        unload()
         return np.float64(np.add.reduce(np.square(values, dtype=np.float64)))
     half = len(values) // 16 * 8
     return np.float64(_square_sum(values[:half]) + _square_sum(values[half:]))
@@ -173,28 +185,38 @@ def prove(
     groups = match(nominal, target, corrected, model, near, part(tell, 0.1, 0.4))
     check_kinds(nominal, corrected, groups, digit_mm)
     bend = tolerance_mm * _BEND_SHARE
-    how = _how(nominal)
-    counts = _counts(path, how, exempt)
+    how, counts = apart((len(path),), np.uint8), apart((len(path),), np.uint8)
+    points = nominal.dialect.points or not (path.kind != Kind.RAPID).any()
+    for some in spans(len(path)):
+        part_of = path.part(some.start, some.stop)
+        how[some] = _how(part_of, points)
+        counts[some] = _counts(part_of, how[some], exempt[some])
+    feed = np.asarray(counts == Counts.FEED)
 
     def side(program: Program, ends: Index, told: Progress) -> _Measured:
-        deviation = measure(path, target, program.toolpath, ends, counts == Counts.FEED, model, bend, told)
+        deviation = measure(path, target, program.toolpath, ends, feed, model, bend, told)
         strokes = strokes_mm(nominal, target, program.toolpath, program.holes, model, bend)
         size = _sizes(deviation, how, *strokes)
-        size[counts > Counts.LEFT] = np.nan
+        for some in spans(len(size)):
+            size[some][counts[some] > Counts.LEFT] = np.nan
         return _Measured(deviation.waypoint, deviation.side, deviation.bend_mm, size)
 
     before = side(nominal, _each(groups), part(tell, 0.4, 0.7))
     after = side(corrected, groups, part(tell, 0.7, 1.0))
     before_mm, after_mm = before.size, after.size
-    blind = np.isnan(after_mm) & (counts <= Counts.LEFT)
-    counts[blind & (counts == Counts.LEFT)] = Counts.UNKNOWN
+    blind = found(len(path), lambda some: np.isnan(after_mm[some]) & (counts[some] <= Counts.LEFT))
+    counts[blind[counts[blind] == Counts.LEFT]] = Counts.UNKNOWN
     # strokes of a hole above its bottom have no figure of their own
-    _refuse_blind(path, blind & ((counts <= Counts.POINT) | ((counts == Counts.HOLE) & ~np.isnan(before_mm))))
-    shown = (counts == Counts.RAPID) | (counts == Counts.UNCORRECTED)
-    for one in (before, after):
-        one.size[counts > Counts.LEFT] = np.nan
-        one.size[shown] = one.waypoint[shown]
-    lean = uncorrected_starts(path, exempt) & (counts == Counts.FEED)
+    count = counts[blind]
+    stroke = (count == Counts.HOLE) & ~np.isnan(before_mm[blind])
+    _refuse_blind(path, blind[(count <= Counts.POINT) | stroke])
+    for some in spans(len(path)):
+        shown = is_in(counts[some], (Counts.RAPID, Counts.UNCORRECTED))
+        for one in (before, after):
+            one.size[some][counts[some] > Counts.LEFT] = np.nan
+            one.size[some][shown] = one.waypoint[some][shown]
+    lean = uncorrected_starts(path, exempt)
+    lean &= feed
     return Proof(
         path, written, groups, before.side_of(counts), after.side_of(counts), tolerance_mm, digit_mm, counts,
         before_mm, after_mm, lean,
@@ -216,8 +238,12 @@ class _Measured:
 
 def _each(groups: Index) -> Index:
     """(n,) each move by itself. Where nothing is inserted, one array does for both."""
-    each = np.arange(len(groups))
-    return groups if np.array_equal(groups, each) else each
+    if all(np.array_equal(groups[some], np.arange(some.start, some.stop)) for some in spans(len(groups))):
+        return groups
+    each = apart((len(groups),), np.int64)
+    for some in spans(len(each)):
+        each[some] = np.arange(some.start, some.stop)
+    return each
 
 
 def corrections_mm(nominal: Program, corrected: Program, proof: Proof) -> Array:
@@ -233,7 +259,7 @@ def corrections_mm(nominal: Program, corrected: Program, proof: Proof) -> Array:
 def largest_correction_mm(nominal: Program, corrected: Program, proof: Proof) -> float:
     """The largest distance of the commands from the nominal path."""
     count = len(proof.nominal)
-    parts = (_longest(_moved(proof, a, min(a + _BLOCK, count))) for a in range(0, count, _BLOCK))
+    parts = (_longest(_moved(proof, some.start, some.stop)) for some in spans(count, _BLOCK))
     return max(_longest(_holes_moved(nominal, corrected)), max(parts, default=0.0))
 
 
@@ -258,12 +284,11 @@ def _holes_moved(nominal: Program, corrected: Program) -> Array:
     return np.asarray(np.hstack(moved))
 
 
-def _how(program: Program) -> npt.NDArray[np.uint8]:
-    """(n,) how each nominal move would count if it were corrected."""
-    path = program.toolpath
+def _how(path: Toolpath, points: bool) -> npt.NDArray[np.uint8]:
+    """(n,) how each nominal move would count if it were corrected. With `points` rapids count at their
+    ends."""
     cutting = cutting_moves(path)
     how = np.full(len(path), Counts.RAPID, np.uint8)
-    points = program.dialect.points or not (path.kind != Kind.RAPID).any()
     how[cutting] = Counts.FEED
     how[~cutting & (points | (path.kind != Kind.RAPID))] = Counts.POINT
     cycle = (path.flag & np.uint8(Flag.CYCLE)) != 0
@@ -285,12 +310,12 @@ def _counts(path: Toolpath, how: npt.NDArray[np.uint8], exempt: Mask) -> npt.NDA
     return counts
 
 
-def _refuse_blind(path: Toolpath, blind: Mask) -> None:
-    if blind.any():
+def _refuse_blind(path: Toolpath, blind: Index) -> None:
+    if blind.size:
         raise ProgramError(
             "the deviation of this move cannot be computed: where the corrected program commands it, the "
             "error is not known; correct the nominal program again, or give start_mm in the job file",
-            line=int(path.line[np.argmax(blind)]),
+            line=int(path.line[blind[0]]),
             code="OLP561",
         )
 
@@ -300,8 +325,7 @@ def _sizes(deviation: Deviation, how: npt.NDArray[np.uint8], bottom: Index, stro
     take the place of `deviation.path`."""
     size = deviation.path
     feeds = (Counts.FEED,) if len(bottom) else (Counts.FEED, Counts.HOLE)
-    for a in range(0, len(how), _BLOCK):
-        rows = slice(a, a + _BLOCK)
+    for rows in spans(len(how), _BLOCK):
         kind, end, part = how[rows], deviation.waypoint[rows], size[rows]
         # holes without a partner are compared stroke by stroke
         along = is_in(kind, feeds)

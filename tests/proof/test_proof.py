@@ -329,7 +329,7 @@ def test_a_proof_holds_up_to_what_is_allowed(um: float, holds: bool) -> None:
     proof = of_figures((Counts.FEED, 0.0, um), (Counts.RAPID, 90.0, NAN))
     assert proof.allowed_mm == pytest.approx(1.087e-3)
     assert proof.largest_mm == pytest.approx(1e-3 * um)
-    assert proof.size_mm() == pytest.approx([1e-3 * um, 0.0])
+    assert proof.size_mm(slice(None)) == pytest.approx([1e-3 * um, 0.0])
     assert proof.holds is holds
 
 

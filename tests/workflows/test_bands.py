@@ -20,6 +20,7 @@ import olp
 from olp.core import spool
 from olp.core.errors import OlpError, OutsideBox
 from olp.program import bands
+from olp.program.text import columns
 from olp.proof import deviation, kinds, matching, proof
 
 PROGRAMS = Path(__file__).resolve().parents[2] / "programs"
@@ -46,6 +47,8 @@ def corrected(*given: Any, **options: Any) -> tuple[bytes, dict[str, Any]] | str
 def in_sizes(monkeypatch: pytest.MonkeyPatch, sizes: Sequence[int] = SIZES) -> Iterator[int]:
     """Bands and pages of some sizes, one after the other; texts are let go as long ones are."""
     monkeypatch.setattr(spool, "LONG", 1)
+    monkeypatch.setattr(columns, "_FIRST", 8)
+    monkeypatch.setattr(columns, "_MOST", 32)
     for size in sizes:
         monkeypatch.setattr(bands, "SIZE", size)
         # a page holds a window of the search at least

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import tempfile
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from olp.core.spool import unload
 from olp.program.text import columns as module
-from olp.program.text.columns import Columns, Packed, apart
+from olp.program.text.columns import Columns, Packed, apart, spans
 
 
 @pytest.mark.slow
@@ -38,25 +41,45 @@ def test_a_column_is_taken_once_and_read_only() -> None:
     assert columns.take("a", np.int64).tolist() == [7]
 
 
-def test_little_is_reserved_beyond_what_is_there() -> None:
-    columns = Columns()
-    for count in range(1, 200):
-        columns.put("a", np.zeros((1000, 3)), np.float64)
-        column = columns._columns["a"]
-        reserved = sum(map(len, [*column.full, column.block]))
-        assert reserved <= 1000 * count + min(1000 * count + 1024, 1 << 16)
-    assert columns.take("a", np.float64, 3).nbytes == 199 * 1000 * 24
-
-
-def test_a_large_column_has_memory_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What is in it is the same, also where blocks and column are large."""
-    monkeypatch.setattr(module, "_OWN", 1)
-    columns, parts = Columns(), [np.arange(n) for n in (1, 1500, 70, 40_000)]
+def test_a_long_column_is_in_a_file(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is in it is the same, also after it left memory, and it stays when the columns end."""
+    monkeypatch.setattr(module, "_FIRST", 16)
+    monkeypatch.setattr(module, "_MOST", 64)
+    columns, parts = Columns(), [np.arange(n) for n in (1, 150, 70, 400)]
     for part in parts:
         columns.put("a", np.stack((part, -part), axis=1), np.int32)
-    taken = columns.take("a", np.int32, 2)
-    assert taken.tolist() == [[k, -k] for part in parts for k in part.tolist()]
-    assert not taken.flags.owndata and not taken.flags.writeable
+        columns.put("b", part, np.int64)
+    assert len(columns._columns["a"].block) == 64
+    taken, packed = columns.take("a", np.int32, 2), columns.packed("b")
+    del columns
+    expected = [k for part in parts for k in part.tolist()]
+    for _ in range(2):
+        assert taken.tolist() == [[k, -k] for k in expected]
+        assert packed[:].tolist() == expected
+        unload()
+    assert not taken.flags.owndata and not taken.flags.writeable and packed.small.dtype == np.uint16
+
+
+def test_a_long_array_to_be_filled_keeps_what_is_put(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "_MOST", 64)
+    array = apart((1000, 2), np.float32)
+    assert not array.any()
+    for some in spans(1000):
+        array[some] = np.arange(some.start, some.stop)[:, None]
+    assert not array.flags.owndata and array[:, 1].tolist() == list(range(1000))
+
+
+def test_a_column_is_in_memory_where_no_file_has_room(monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(**_: int) -> None:
+        raise OSError
+
+    monkeypatch.setattr(module, "_MOST", 1024)
+    monkeypatch.setattr(tempfile, "TemporaryFile", full)
+    monkeypatch.setattr(module, "room", lambda: 0)
+    columns = Columns()
+    columns.put("a", np.arange(5000), np.int32)
+    assert columns.take("a", np.int32).tolist() == list(range(5000))
+    assert apart((5000,), np.int8).flags.owndata
 
 
 def test_one_number_stands_for_a_column_of_equal_ones() -> None:
