@@ -9,7 +9,7 @@ import numpy as np
 
 from olp.compensation.joints.path import JointPath
 from olp.compensation.joints.planning import JointPlan
-from olp.compensation.joints.sampling import Resolution, spread
+from olp.compensation.joints.sampling import spread
 from olp.core.arrays import Array, Index, Mask
 from olp.core.values import dataclass
 from olp.errormodel.reversal import play_after, play_states
@@ -95,7 +95,7 @@ def visited(
     shares = _shares(nominal, path, (groups, owner), plan, sides, along)
     yield Places(owner[ends], ends, np.ones(len(ends)), shares[1][ends], sides.behind[ends])
     feeds = np.flatnonzero(along)
-    samples = finer * Resolution.of(path.motion).samples(sides.start[feeds], sides.end[feeds]) + 1
+    samples = finer * path.samples(feeds, sides.start[feeds], sides.end[feeds]) + 1
     totals = np.cumsum(samples)
     a = 0
     while a < len(feeds):
@@ -154,6 +154,9 @@ def _places(nominal: JointPath, path: JointPath, move: Index, rows: Index, axes:
     start, way = nominal.start[move], nominal.end[move] - nominal.start[move]
     along = np.einsum("ij,ij->i", path.end[rows] - start, way)
     share = along / np.maximum(np.einsum("ij,ij->i", way, way), 1e-30)
+    arc = np.flatnonzero(nominal.curves.mask[move])
+    if arc.size:
+        share[arc] = nominal.curves.shares(move[arc], path.end[rows[arc]])
     tool, tip, shift = nominal.tool[move], nominal.tip[move], nominal.shift_mm[move]
 
     def pose(at: Array) -> Poses:

@@ -23,6 +23,8 @@ _HALF_DIGITS = 0.5 * np.sqrt(3.0)
 _HALF_TURNS = 0.5 * np.sqrt(2.0)
 #: A move ends where its command is expected within so many digits.
 _NEAR_DIGITS = 4.0
+#: Moves more than planned among which the end of one is looked for at first.
+_NEAR_BY = 64
 #: A waypoint is another one beyond this, mm or deg.
 _FAR = 1.0
 #: Share of waypoints that may be far off before the programs count as different jobs.
@@ -132,7 +134,9 @@ def match(
     near = nominal.directions.widened(nominal.motion, near, expected)
     groups = np.arange(count)
     if other > count:
-        groups = _stretched(expected, corrected.end, near, nominal.feed & ~nominal.holes.whole)
+        parts = np.bincount(plan.move, minlength=count)
+        feed = nominal.feed & ~nominal.holes.whole
+        groups = _stretched(expected, corrected.end, near, np.where(feed, parts, 0), nominal.curves.mask)
     away = np.nanmax(
         np.append(np.abs(corrected.end[groups] - expected), np.zeros((count, 1)), axis=1), axis=1
     )
@@ -148,15 +152,21 @@ def match(
     return groups
 
 
-def _stretched(expected: Array, end: Array, near: Array, feed: Mask) -> Index:
-    """The ends of nominal moves among more moves of the corrected program: each feed move ends with the next
-    one that is where it is expected."""
+def _stretched(expected: Array, end: Array, near: Array, parts: Index, arc: Mask) -> Index:
+    """The ends of nominal moves among more moves of the corrected program: each feed move, which has `parts`
+    (n,) as planned, ends with the next one that is where it is expected. An arc may pass there before, so it
+    ends with the one that comes nearest to its number of parts."""
     spare, groups, j = len(end) - len(expected), [], 0
     expected, end = np.nan_to_num(expected), np.nan_to_num(end)
-    for i, split in enumerate(feed.tolist()):
-        if split and spare:
-            away = (np.abs(end[j : j + spare + 1] - expected[i]) / near[i]).max(axis=1)
-            found = int(np.argmax(away <= 1.0)) if (away <= 1.0).any() else 0
+    for i, count in enumerate(parts.tolist()):
+        if count and spare:
+            wanted, there = count - 1 if arc[i] else 0, np.zeros(0, np.int64)
+            # mostly it is near by
+            for reach in (min(2 * count + _NEAR_BY, spare), spare):
+                if not there.size:
+                    away = (np.abs(end[j : j + reach + 1] - expected[i]) / near[i]).max(axis=1)
+                    there = np.flatnonzero(away <= 1.0)
+            found = int(there[np.argmin(np.abs(there - wanted))]) if there.size else 0
             spare -= found
             j += found
         groups.append(j)

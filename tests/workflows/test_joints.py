@@ -113,7 +113,6 @@ def test_a_touched_offset_moves_the_part(tmp_path: Path) -> None:
 REFUSED = [
     (b"G1 B5 F100\n", "OLP564", 3),
     (b"G92 A0\n", "OLP564", 3),
-    (b"G2 X10 I5 F100\n", "OLP565", 3),
     (b"G1 F100 Z-1\nG81 X1 Z-5 R2\nG80\n", "OLP565", 4),
     (b"G1 A900 F100\n", "OLP567", 3),
     (b"G1 A1 A2 F100\n", "OLP515", 3),

@@ -8,10 +8,12 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
+from olp.compensation.joints.curves import Curves
 from olp.compensation.joints.directed import Directions
 from olp.compensation.joints.drilled import Drilled
 from olp.compensation.joints.motion import Motion
 from olp.compensation.joints.refused import KEPT, refuse_tips, refuse_unread
+from olp.compensation.joints.sampling import Resolution
 from olp.compensation.joints.tilts import (
     found_positions,
     refuse_lengths,
@@ -46,12 +48,12 @@ class JointPath:
     else they are axis values. In `vector` (n,) the direction of the tool goes evenly, else each axis. `slot`
     (n, axes) are their words, -1 where there is none. `tool` is the place of the tool in `motion`, `shift_mm`
     (n, 3) where the part really lies. `offset` (n, axes), `unit` (n,) and, of words without a point, `scale`
-    (axes,) lead from words to coordinates. `feed` are straight moves that cut, `judged` those that the
+    (axes,) lead from words to coordinates. `feed` are moves that cut, `judged` those that the
     proof judges, `kept` moves that stay uncorrected. `held` (n,) are moves whose rotary axes stay as
     programmed: where these stand, tool centre point control begins, a tilted plane is fixed to them, or a
     hole is made. In the last two no word of theirs changes: these moves `stay` (n,). `places` (axes,) are the
     fewest decimals of words in mm and deg. `holes` are those of cycles, `directions` those that words state,
-    `listed` the rows of a list of axis values."""
+    `curves` the arcs, `listed` the rows of a list of axis values."""
 
     program: Program
     motion: Motion
@@ -73,6 +75,7 @@ class JointPath:
     places: Index
     holes: Drilled
     directions: Directions
+    curves: Curves
     listed: AxisList | None = None
 
     def __len__(self) -> int:
@@ -84,7 +87,8 @@ class JointPath:
 
     def at(self, move: Index, share: Array) -> Array:
         """(r, axes) programmed coordinates at shares of moves."""
-        return self.between(self.start[move], self.end[move], share, move)
+        place = self.between(self.start[move], self.end[move], share, move)
+        return self.curves.along(place, move, share)
 
     def between(self, start: Array, end: Array, share: Array, move: Index) -> Array:
         """(r, axes) coordinates at shares of ways from `start` to `end`, led as in moves. Raises ProgramError
@@ -94,6 +98,11 @@ class JointPath:
         except NotInvertible as error:
             assert error.row is not None
             raise unreached(int(self.line[move[error.row]])) from None
+
+    def samples(self, move: Index, begin: Array, end: Array, share: Array | float = 1.0) -> Index:
+        """(r,) how many samples lie on stretches of moves between axis values; they take `share` of these."""
+        straight = Resolution.of(self.motion).samples(begin, end)
+        return np.maximum(straight, self.curves.samples(move, share))
 
     @staticmethod
     def of(
@@ -173,14 +182,17 @@ class JointPath:
         ).reshape(-1, 3)
         tool = tool_of[path.frame]
         kept = (path.flag & KEPT) != 0
-        feed = (path.kind == Kind.LINE) & ~kept
+        arc = np.zeros(len(path), bool)
+        arc[path.arcs.move] = True
+        feed = ((path.kind == Kind.LINE) | arc) & ~kept
         start = _starts(motion, end, tool, tip, np.array(path.start_mm), columns, start_deg, order)
         refuse_off_normal(program, structure, fixed, feed, start, end)
+        curves = Curves.of_program(program, start, end, columns, kept)
         stay = stands_before(fixed | holes.whole, feed, degrees)
         held = np.append(tip[1:] & ~tip[:-1], False)[: len(tip)] | stay
         return JointPath(
             program, motion, start, end, slot, tool, tip, vector, shifts[path.frame], offset, unit, scale,
-            feed, feed, kept, held, stay, _places(structure), holes, directions,
+            feed, feed, kept, held, stay, _places(structure), holes, directions, curves,
         )  # fmt: skip
 
     @staticmethod
@@ -209,7 +221,7 @@ class JointPath:
             np.full((count, axes), -1, np.int32), np.array([places[n] for n in rows.tool.tolist()]),
             none, none, np.zeros((count, 3)), np.zeros((count, axes)), np.ones(count), np.ones(axes),
             feed, ~none, none, none, none, _places(structure), Drilled.none(count),
-            Directions.none(count), rows,
+            Directions.none(count), Curves.none(count), rows,
         )  # fmt: skip
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from olp.compensation.joints.path import JointPath
-from olp.compensation.joints.sampling import Resolution, spread
+from olp.compensation.joints.runs import Runs
+from olp.compensation.joints.sampling import spread
 from olp.core.arrays import Array, Index, Mask, distinct
 from olp.core.errors import NotInvertible, ProgramError
 from olp.core.values import dataclass
@@ -23,8 +24,8 @@ _MOST_ROUNDS = 12
 _MOST_ROWS = 1_000_000
 #: Further rows for each of its moves.
 _ROWS_PER_MOVE = 100
-#: mm or deg that an axis moves by rounding alone: it turns nothing round.
-_STILL = 1e-9
+#: mm or deg below which a command is none: an arc along which there is no other one stays.
+_NOTHING = 1e-9
 #: Rows whose commands are found at a time, so that memory is small.
 _BATCH = 1 << 15
 
@@ -44,7 +45,7 @@ class JointPlan:
     is;
     `axes` the axis values of these and `target` the poses that they bring the tool to. `side` (r, axes) are
     those of the backlash. `left_rad` (r,) are angles that remain, `limited` (r,) rows near a singular
-    posture.
+    posture. Arcs are written as `straight` parts, or all stay as they are.
     """
 
     move: Index
@@ -55,16 +56,18 @@ class JointPlan:
     side: Array
     left_rad: Array
     limited: Mask
+    straight: bool
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Rows:
-    """Rows at shares of moves with their commands, before backlash."""
+    """Rows at shares of moves with their commands, before backlash, on whose `side` they are."""
 
     move: Index
     share: Array
     axes: Array
     target: Poses
+    side: Array
     left_rad: Array
     limited: Mask
 
@@ -72,15 +75,15 @@ class _Rows:
     def join(parts: list[_Rows]) -> _Rows:
         rotation = np.concatenate([part.target.rotation for part in parts])
         position = np.concatenate([part.target.position for part in parts])
-        names = ("move", "share", "axes", "left_rad", "limited")
+        names = ("move", "share", "axes", "side", "left_rad", "limited")
         columns = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
         return _Rows(target=Poses(rotation, position), **columns)
 
     def only(self, rows: Index | Mask) -> _Rows:
         return _Rows(
             self.move[rows], self.share[rows], self.axes[rows],
-            Poses(self.target.rotation[rows], self.target.position[rows]), self.left_rad[rows],
-            self.limited[rows],
+            Poses(self.target.rotation[rows], self.target.position[rows]), self.side[rows],
+            self.left_rad[rows], self.limited[rows],
         )  # fmt: skip
 
 
@@ -90,18 +93,33 @@ def planned(path: JointPath, limits: JointLimits) -> JointPlan:
     known = np.asarray(np.isfinite(path.end).all(axis=1), bool)
     solid = known & ~path.kept
     _refuse_unknown(path, known)
-    side, turned = _sides(path, solid)
-    move = np.flatnonzero(solid)
-    ends = _solved(path, move, np.ones(len(move)), side)
-    whole = path.holes.whole
-    split = np.flatnonzero(solid & path.feed & ~whole & (path.start != path.end).any(axis=1))
-    begins = _solved(path, split, np.zeros(len(split)), side)
-    inner = _split(path, begins, ends.only(np.searchsorted(move, split)), limits, side)
-    rows = _Rows.join([ends, *inner])
-    back = begins.only(turned[split])
-    rows = _Rows.join([rows, back])
+    runs = Runs.of(path, solid)
+    straight = _corrects_arcs(path, runs)
+    feed = path.feed & ~path.holes.whole & (path.start != path.end).any(axis=1)
+    feed = np.where(path.curves.mask, straight, feed)
+    ends = _solved(path, runs.move, runs.end, runs.side)
+    split = np.flatnonzero(feed[runs.move])
+    begins = _solved(path, runs.move[split], runs.begin[split], runs.side[split])
+    inner = _split(path, begins, ends.only(split), limits)
+    back = begins.only(runs.turned[split])
+    rows = _Rows.join([ends, *inner, back])
     order = np.lexsort((rows.share, rows.move))
-    return _finished(path, rows.only(order), side)
+    return _finished(path, rows.only(order), straight)
+
+
+def _corrects_arcs(path: JointPath, runs: Runs) -> bool:
+    """Whether anything is to be corrected along an arc of a path."""
+    of = np.flatnonzero(path.curves.mask[runs.move])
+    if not of.size:
+        return False
+    count = path.curves.samples(runs.move[of], runs.end[of] - runs.begin[of])
+    owner, step = spread(count + 1)
+    run = of[owner]
+    share = runs.begin[run] + step / np.maximum(count[owner], 1) * (runs.end - runs.begin)[run]
+    move, width = runs.move[run], path.motion.width
+    done = _solved(path, move, share, runs.side[run])
+    nominal = path.motion.axes(path.at(move, share), path.tool[move], path.tip[move])
+    return bool(np.abs(done.axes + 0.5 * width * done.side - nominal).max() > _NOTHING)
 
 
 def _refuse_unknown(path: JointPath, known: Mask) -> None:
@@ -120,12 +138,12 @@ def _refuse_unknown(path: JointPath, known: Mask) -> None:
 
 
 def _solved(path: JointPath, move: Index, share: Array, side: Array) -> _Rows:
-    """The commands at shares of moves; `side` (n, axes) of the backlash at their ends."""
+    """The commands at shares of moves; `side` (r, axes) of the backlash there."""
     motion, parts = path.motion, []
     rotary = np.array([unit == "deg" for unit in motion.structure.units])
     for a in range(0, max(len(move), 1), _BATCH):
         some, at = move[a : a + _BATCH], share[a : a + _BATCH]
-        tool, shift = path.tool[some], path.shift_mm[some]
+        tool, shift, own = path.tool[some], path.shift_mm[some], side[a : a + _BATCH]
         axes = motion.axes(path.at(some, at), tool, path.tip[some])
         nominal = motion.nominal(axes, tool)
         done = _commanded(path, some, axes, tool, shift)
@@ -136,12 +154,12 @@ def _solved(path: JointPath, move: Index, share: Array, side: Array) -> _Rows:
             part = Poses(target.rotation[held], target.position[held])
             stands = axes[held]
             # where no word of a rotary axis changes, its backlash stays
-            play = np.where(path.stay[some[held], None] & rotary, 0.5 * motion.width * side[some[held]], 0.0)
+            play = np.where(path.stay[some[held], None] & rotary, 0.5 * motion.width * own[held], 0.0)
             solved = motion.linear(stands - play, tool[held], part)
             done.values[held], done.left_rad[held] = solved.values, solved.left_rad
             done.limited[held] = pole[held]
         left = left_angles(motion.structure, done.left_rad, target)
-        parts.append(_Rows(some, at, done.values, target, left, done.limited))
+        parts.append(_Rows(some, at, done.values, target, own, left, done.limited))
     return _Rows.join(parts)
 
 
@@ -177,22 +195,21 @@ def _commanded(path: JointPath, move: Index, axes: Array, tool: Index, shift: Ar
     return done
 
 
-def _split(path: JointPath, begin: _Rows, end: _Rows, limits: JointLimits, side: Array) -> list[_Rows]:
+def _split(path: JointPath, begin: _Rows, end: _Rows, limits: JointLimits) -> list[_Rows]:
     """Rows between the ends of moves, so that nothing between them leaves the tolerances."""
-    resolution = Resolution.of(path.motion)
     found: list[_Rows] = []
     most = _MOST_ROWS + _ROWS_PER_MOVE * len(path)
     for _ in range(_MOST_ROUNDS):
         if not len(begin.move):
             return found
-        parts = _parts(path, begin, end, limits, resolution)
+        parts = _parts(path, begin, end, limits)
         apart = np.flatnonzero(parts > 1)
         begin, end, parts = begin.only(apart), end.only(apart), parts[apart]
         if parts.sum() + sum(len(rows.move) for rows in found) > most:
             break
         owner, step = spread(parts - 1)
         share = begin.share[owner] + (step + 1) / parts[owner] * (end.share - begin.share)[owner]
-        rows = _solved(path, begin.move[owner], share, side)
+        rows = _solved(path, begin.move[owner], share, end.side[owner])
         found.append(rows)
         key = np.append(owner, np.arange(len(apart))), np.append(share, begin.share)
         order = np.lexsort(key[::-1])
@@ -210,9 +227,10 @@ def _split(path: JointPath, begin: _Rows, end: _Rows, limits: JointLimits, side:
     return found
 
 
-def _parts(path: JointPath, begin: _Rows, end: _Rows, limits: JointLimits, resolution: Resolution) -> Index:
+def _parts(path: JointPath, begin: _Rows, end: _Rows, limits: JointLimits) -> Index:
     """(s,) into how many parts each stretch between two rows has to be split; 1 where it may stay."""
-    count = resolution.samples(begin.axes, end.axes)
+    count = path.samples(end.move, begin.axes, end.axes, end.share - begin.share)
+    chords = path.curves.chords(end.move, end.share - begin.share, _SHARE * limits.tolerance_mm)
     parts = np.ones(len(count), np.int64)
     totals = np.cumsum(count)
     a = 0
@@ -220,6 +238,7 @@ def _parts(path: JointPath, begin: _Rows, end: _Rows, limits: JointLimits, resol
         b = max(int(np.searchsorted(totals, (totals[a - 1] if a else 0) + _BATCH)), a + 1)
         worst = _worst(path, begin.only(np.arange(a, b)), end.only(np.arange(a, b)), limits, count[a:b])
         bends = np.clip(np.ceil(np.sqrt(worst)), 2, _MOST_PARTS).astype(np.int64)
+        bends = np.maximum(bends, chords[a:b])
         parts[a:b] = np.where(worst > 1.0, bends, 1)
         a = b
     return parts
@@ -246,32 +265,11 @@ def _worst(path: JointPath, begin: _Rows, end: _Rows, limits: JointLimits, count
     return worst
 
 
-def _sides(path: JointPath, solid: Mask) -> tuple[Array, Mask]:
-    """(n, axes) on which side of its backlash each axis is at the end of each move, 0 where that is not
-    known, and (n,) feed moves at whose begin an axis turns round."""
-    motion = path.motion
-    side = np.zeros(path.end.shape)
-    if not motion.width.any() or not len(path):
-        return side, np.zeros(len(path), bool)
-    known = solid & np.isfinite(path.start).all(axis=1)
-    rows = np.flatnonzero(known)
-    ends = [motion.axes(place[rows], path.tool[rows], path.tip[rows]) for place in (path.start, path.end)]
-    moved = np.zeros(path.end.shape)
-    moved[rows] = ends[1] - ends[0]
-    moves = np.abs(moved) > _STILL
-    order = np.arange(len(path))[:, None]
-    last = np.maximum.accumulate(np.where(moves, order, -1), axis=0)
-    side = np.where(last >= 0, np.take_along_axis(np.sign(moved), np.maximum(last, 0), axis=0), 0.0)
-    before = np.vstack((np.zeros((1, len(motion.width))), side[:-1]))
-    turned = ((side != before) & (motion.width != 0.0)).any(axis=1) & path.feed & known
-    return side * (motion.width != 0.0), turned
-
-
-def _finished(path: JointPath, rows: _Rows, side: Array) -> JointPlan:
+def _finished(path: JointPath, rows: _Rows, straight: bool) -> JointPlan:
     """The plan of rows in their order, with a row for each move that stays as it is."""
     motion, count = path.motion, len(path)
     still = np.setdiff1d(np.arange(count), distinct(rows.move))
-    own = side[rows.move]
+    own = rows.side
     axes = rows.axes + 0.5 * motion.width * own
     command = motion.programmed(axes, path.tool[rows.move], path.tip[rows.move])
     blank = np.full((len(still), path.end.shape[1]), np.nan)
@@ -285,4 +283,5 @@ def _finished(path: JointPath, rows: _Rows, side: Array) -> JointPlan:
         np.vstack((own, np.zeros(blank.shape)))[order],
         np.append(rows.left_rad, np.zeros(len(still)))[order],
         np.append(rows.limited, np.zeros(len(still), bool))[order],
+        straight,
     )  # fmt: skip

@@ -27,7 +27,7 @@ from olp.core.toolpath import Flag
 from olp.core.units import AXES
 from olp.core.values import dataclass
 from olp.kinematics.poses import Poses
-from olp.program.text.edits import EditList, Edits, Prefixes, splice
+from olp.program.text.edits import BARE, EditList, Edits, Prefixes, splice
 
 Small = npt.NDArray[np.int8]
 
@@ -85,7 +85,13 @@ class JointWriter:
             emitted[:, column] = self._round(column, command[:, column], drilled)
         self._aim(emitted)
         made = self._drill(self._linear(command, emitted))
-        edits = [*self._replaced(), *self._inserted_words(), *self._inserted_blocks(), made]
+        edits = [
+            *self._replaced(),
+            *self._inserted_words(),
+            *self._inserted_blocks(),
+            made,
+            self._straightened(),
+        ]
         edits = [part for part in edits if len(part)]
         tails = self._tails()
         parts = np.bincount(self.plan.move[self.head | tails], minlength=len(self.path))
@@ -255,7 +261,7 @@ class JointWriter:
         rows = np.flatnonzero(missing.any(axis=1))
         if not rows.size:
             return []
-        slot = self.slot[rows]
+        slot = np.hstack((self.slot, self._arc_slots()))[rows]
         ends = np.where(slot >= 0, self.words.end[slot], -1)
         last = np.take_along_axis(slot, ends.argmax(axis=1)[:, None], axis=1)[:, 0]
         place = ends.max(axis=1).astype(np.int64)
@@ -268,6 +274,32 @@ class JointWriter:
                 edits.append(self._edit(rows[some], column, place[some], place[some], prefix, number + 1))
                 self.tally.inserted_words += len(some)
         return edits
+
+    def _arc_slots(self) -> npt.NDArray[np.int32]:
+        """(r, 5) the words of centres, radii and turns of arcs that become straight."""
+        curves, slot = self.path.curves, np.full((len(self.head), 5), -1, np.int32)
+        if self.plan.straight:
+            rows = np.flatnonzero(self.head & curves.mask[self.plan.move])
+            slot[rows] = curves.slot[curves.of[self.plan.move[rows]]]
+        return slot
+
+    def _straightened(self) -> Edits:
+        """What makes blocks of arcs those of straight moves: G1, and no centre, radius or turns."""
+        edits, words, curves = EditList(self.prefixes), self.words, self.path.curves
+        if not self.plan.straight:
+            return edits.done()
+        curves.refuse_kept(self.program)
+        text = self.program.data
+        for i in curves.code[curves.code >= 0].tolist():
+            start, end = int(words.number[i]), int(words.end[i])
+            edits.add(start, end, BARE, 0, text[start : end - 1] + b"1")
+        for i in curves.slot[curves.slot >= 0].tolist():
+            start = int(words.start[i])
+            start -= text[start - 1 : start] in (b" ", b"\t")
+            edits.add(start, int(words.end[i]), BARE, 0)
+        made = edits.done()
+        self.tally.changed_words += len(made)
+        return made
 
     def _inserted_blocks(self) -> list[Edits]:
         tails = np.flatnonzero(self._tails())

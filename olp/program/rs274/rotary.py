@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Array, Index, Mask, distinct, is_in
+from olp.core.arrays import Array, Index, Mask, is_in
 from olp.core.errors import ProgramError
 from olp.core.machine import Machine
 from olp.core.toolpath import Flag
@@ -190,13 +190,5 @@ def _moves(program: Program, index: Index, letter: str) -> Index:
             "axes are read from [work_offsets.NAME] of the machine or job file alone",
             line=int(still[0]),
             code="OLP564",
-        )
-    arcs = path.line[path.arcs.move]
-    turning = line[is_in(line, distinct(arcs))]
-    if turning.size:
-        raise ProgramError(
-            f"an arc turns {letter} too; expected a straight move; post it as straight moves",
-            line=int(turning[0]),
-            code="OLP565",
         )
     return np.asarray(move, np.int64)

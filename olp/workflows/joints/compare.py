@@ -9,7 +9,7 @@ import numpy as np
 
 from olp.comparison.path import Path
 from olp.compensation.joints.path import JointPath
-from olp.compensation.joints.sampling import Resolution, spread
+from olp.compensation.joints.sampling import spread
 from olp.core.arrays import Array, Index
 from olp.core.errors import InputError, UsageError
 from olp.files.point_profile import PointProfile
@@ -82,9 +82,9 @@ def _ground(path: JointPath) -> Ground:
     tool, tip = path.tool[rows], path.tip[rows]
     begin, end = (path.motion.axes(place[rows], tool, tip) for place in (path.start, path.end))
     tips = [path.motion.nominal(axes, tool).position for axes in (begin, end)]
+    way = np.maximum(np.linalg.norm(tips[1] - tips[0], axis=1), path.curves.length_mm(rows))
     count = np.maximum(
-        np.ceil(np.linalg.norm(tips[1] - tips[0], axis=1) / _STEP_MM).astype(np.int64),
-        np.maximum(Resolution.of(path.motion).samples(begin, end), 1),
+        np.ceil(way / _STEP_MM).astype(np.int64), np.maximum(path.samples(rows, begin, end), 1)
     )
     owner, step = spread(count)
     move = rows[owner]

@@ -20,6 +20,8 @@ from olp.findings.catalogue import Finding
 from olp.proof.joints import Deviation, JointProof
 from olp.workflows.joints.loaded import JointRun
 
+#: Kinds of moves that cut.
+_FEED = (Kind.LINE, Kind.ARC_CW, Kind.ARC_CCW)
 #: Lines of the table of worst blocks.
 _WORST = 10
 #: An axis value beyond its calibrated range by less than this is on its end: mm or deg.
@@ -92,7 +94,7 @@ def report_of(
         },
         "largest_correction": _largest(path, plan),
         "moves": {
-            "feed": int((path.program.toolpath.kind == Kind.LINE).sum()),
+            "feed": int(np.isin(path.program.toolpath.kind, _FEED).sum()),
             "rapid": int((path.program.toolpath.kind == Kind.RAPID).sum()),
             "with_tip_control": int(path.tip.sum()),
             "uncorrected": len(kept),

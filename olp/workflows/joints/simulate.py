@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from olp.compensation.joints.sampling import Resolution, spread
+from olp.compensation.joints.sampling import spread
 from olp.core.arrays import Array, Index
 from olp.core.units import RAD_PER_URAD
 from olp.core.values import dataclass
@@ -61,8 +61,9 @@ def simulated(run: JointRun, options: UnrollOptions, step_mm: float) -> JointSim
     way = np.linalg.norm(
         motion.nominal(ends[1], tool).position - motion.nominal(ends[0], tool).position, axis=1
     )
+    way = np.maximum(way, path.curves.length_mm(rows))
     count = np.maximum(np.ceil(way / step_mm).astype(np.int64), 1)
-    count = np.maximum(count, Resolution.of(motion).samples(*ends))
+    count = np.maximum(count, path.samples(rows, *ends))
     owner, step = spread(count)
     move = rows[owner]
     axes = motion.axes(path.at(move, (step + 1) / count[owner]), path.tool[move], path.tip[move])
