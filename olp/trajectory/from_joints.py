@@ -26,8 +26,8 @@ from olp.trajectory.route import AxisLimits, Route
 #: An axis that moves the tip less counts as if it moved it so far: mm per mm, and mm per deg.
 _LEAST_MM = 0.01
 _LEAST_DEG = 0.1
-#: Places of a move at which its curve is looked at, and parts in which its speed is.
-_SHARES = (0.25, 0.5, 0.75)
+#: Parts of a move at least at which its curve is looked at, and those of a chord at which its speed is.
+_FEWEST = 4
 _PARTS = 4
 #: Places at which the ways of the tip are looked at, at most.
 _PLACES = 2000
@@ -185,15 +185,18 @@ def _tips(path: JointPath, move: Index, axes: Array) -> Array:
 
 
 def _chords(path: JointPath, move: Index, sagitta_mm: Array) -> Index:
-    """(m,) into how many straight parts in the axes each move is cut, so that the tip is within (m,) mm."""
-    start, end = _axes(path, move, np.zeros(len(move))), _axes(path, move, np.ones(len(move)))
+    """(m,) into how many straight parts in the axes each move is cut, so that the tip is within (m,) mm, by
+    how much short parts at its begin, its middle and its end bend."""
+    few = np.maximum(path.curves.samples(move, 1.0), _FEWEST)
     away = np.zeros(len(move))
-    for share in _SHARES:
-        straight = start + share * (end - start)
-        place = _axes(path, move, np.full(len(move), share))
-        off = np.linalg.norm(_tips(path, move, straight) - _tips(path, move, place), axis=1)
+    for place in (0.0, 0.5, 1.0):
+        begin = place * (1.0 - 1.0 / few)
+        ends = [_axes(path, move, begin + part / few) for part in (0.0, 1.0)]
+        middle = _axes(path, move, begin + 0.5 / few)
+        straight = 0.5 * (ends[0] + ends[1])
+        off = np.linalg.norm(_tips(path, move, straight) - _tips(path, move, middle), axis=1)
         away = np.maximum(away, off)
-    return np.asarray(np.clip(np.ceil(np.sqrt(away / sagitta_mm)), 1, _MOST), np.int64)
+    return np.asarray(np.clip(np.ceil(few * np.sqrt(away / sagitta_mm)), 1, _MOST), np.int64)
 
 
 def _scale(motion: Motion, axes: Array, tool: Index) -> tuple[Array, float]:

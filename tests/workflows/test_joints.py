@@ -252,7 +252,7 @@ def test_the_verbs_know_such_a_machine(tmp_path: Path) -> None:
     rows = run("simulate", str(part), "-m", machine)[1].splitlines()
     assert rows[1].startswith("X_mm,Y_mm,Z_mm,RX_urad")
     assert run("correct", str(part), "-m", machine, "--split-rapids")[0] == 2
-    assert "not three linear axes alone" in run("retime", str(part), "-m", machine)[1]
+    assert "does not state axes.X.velocity_mm_s" in run("retime", str(part), "-m", machine)[1]
 
 
 def test_poses_are_corrected_in_columns(tmp_path: Path) -> None:

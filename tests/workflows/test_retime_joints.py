@@ -15,7 +15,7 @@ from judge.five_axis import Judge
 from judge.machines import Recipe, zero_machine
 
 import olp
-from olp.core.errors import ConfigError
+from olp.core.errors import ConfigError, ProgramError
 from olp.workflows.joints.loaded import JointRun
 from olp.workflows.joints.retime import JointRetimeOptions, JointRetiming, retimed
 
@@ -87,6 +87,36 @@ def test_the_tip_keeps_feed_and_path() -> None:
     # a wider tolerance is never slower
     wider = retimed(JointRun.of(text, machine), JointRetimeOptions(blend_mm=0.5))
     assert wider.duration_s < result.duration_s
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("turns", [1, 3])
+def test_arcs_are_kept_and_take_their_time(turns: int) -> None:
+    """A helix on a table that turns under it: the tip stays on its cylinder, at its feed."""
+    text = (
+        HEAD
+        + b"G43.4 H1 X20. Y0. Z0. A0. C0.\nG64 P0.02\n"
+        + (
+            f"G3 X20. Y0. Z6. I-20. J0. P{turns} A-20. F1800.\nM30\n".encode()
+            if turns > 1
+            else b"G3 X20. Y0. Z6. I-20. J0. A-20. F1800.\nM30\n"
+        )
+    )
+    machine = TRUNNION.with_name("machine.toml")
+    try:
+        result = retimed(JointRun.of(text, machine), JointRetimeOptions())
+    except ProgramError:
+        assert turns > 1
+        return
+    judge = Judge(machine)
+    length = turns * np.hypot(2 * np.pi * 20.0, 6.0 / turns)
+    (part,) = samples(result, 2e-3)
+    tip = judge.forward(part[1], False)[0]
+    line = part[-1] == 5
+    # work offset Z -140
+    radius = np.hypot(tip[line, 0], tip[line, 1])
+    assert np.abs(radius - 20.0).max() < 0.025
+    assert (part[0][line][-1] - part[0][line][0]) * 30.0 == pytest.approx(length, rel=0.1)
 
 
 @pytest.mark.slow
