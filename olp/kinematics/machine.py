@@ -18,7 +18,9 @@ class JointMachine:
     """A machine file: the structure, the tools, and the path of the calibration, None where it names none.
 
     `control` is what a reader of programs needs to know of it: the linear axes X, Y and Z, work offsets and
-    tools. It is None where the machine has other axes than these three and rotary ones. With `tips_from_zero`
+    tools. It is None where the machine has other axes than these three and rotary ones. `arm` is the same for
+    programs of robots, None where the machine is no arm of six axes whose last three meet in a point. With
+    `tips_from_zero`
     programs with tool centre point control count from the workpiece with its rotary axes at zero, else from
     where these are when it is switched on; None is not stated. `leads` is what this mode leads evenly where
     the program does not say it, empty where the control decides. `swivel_axis` is the axis by whose position
@@ -33,6 +35,7 @@ class JointMachine:
     work_offsets: tuple[str, ...] = ()
     default_tool: int | None = None
     control: Machine | None = None
+    arm: Machine | None = None
     tips_from_zero: bool | None = None
     leads: Interpolated = ""
     swivel_axis: str = ""

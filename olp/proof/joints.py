@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from olp.compensation.joints.arm_path import ArmPath
 from olp.compensation.joints.path import JointPath
 from olp.compensation.joints.planning import JointLimits, JointPlan
 from olp.core.arrays import Array, Index, Mask
@@ -133,7 +134,10 @@ def match(
     near = _NEAR_DIGITS * np.where(rotary, digit_deg, digit_mm)
     near = nominal.directions.widened(nominal.motion, near, expected)
     groups = np.arange(count)
-    if other > count:
+    if isinstance(nominal, ArmPath) and other == len(plan.move):
+        # each row of the plan has a statement
+        groups = last
+    elif other > count:
         parts = np.bincount(plan.move, minlength=count)
         feed = nominal.feed & ~nominal.holes.whole
         groups = _stretched(expected, corrected.end, near, np.where(feed, parts, 0), nominal.curves.mask)

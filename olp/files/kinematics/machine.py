@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from olp.core.errors import ConfigError
 from olp.core.machine import Axis, Machine
 from olp.core.units import AXES
@@ -19,6 +21,7 @@ from olp.files.problems import config_error, validate
 from olp.files.toml_text import read_toml
 from olp.files.write import PathLike, Reader, read_bytes
 from olp.kinematics.machine import JointMachine
+from olp.kinematics.postures import Arm
 from olp.kinematics.structure import Gauge, Joint, Leg, Platform, Structure
 
 
@@ -61,6 +64,7 @@ def load_joint_machine(path: PathLike, read: Reader = read_bytes) -> JointMachin
         work_offsets=tuple(file.work_offsets),
         default_tool=default,
         control=_control(file, structure, path),
+        arm=_arm(file, structure),
         tips_from_zero={"axis-zero": True, "activation": False, None: None}[file.kinematics.tcp_frame_zero],
         leads=file.kinematics.orientation_interpolation or "",
         swivel_axis=_swivel_axis(file.kinematics.swivel_axis, structure, path),
@@ -100,6 +104,23 @@ def _control(file: JointMachineFile, structure: Structure, path: PathLike) -> Ma
         default_tool=file.job_defaults.tool,
         default_work_offset=file.job_defaults.work_offset,
         length_active=file.job_defaults.length_active,
+    )
+
+
+def _arm(file: JointMachineFile, structure: Structure) -> Machine | None:
+    """What a reader of robot programs needs to know of an arm, None where the machine is none."""
+    if Arm.of(structure) is None:
+        return None
+    return Machine(
+        name=file.name,
+        chain=" ".join(structure.chain),
+        controller=file.controller,
+        axes={name: Axis((-np.inf, np.inf), 0.0) for name in AXES},
+        calibration=None,
+        work_offsets=work_offsets_of(file.work_offsets),
+        tools=tools_of(file.tools),
+        default_tool=file.job_defaults.tool,
+        default_work_offset=file.job_defaults.work_offset,
     )
 
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import count
 
+from olp.core.arrays import Array, Mask
 from olp.core.values import dataclass
 from olp.program.dialect import StatementDialect
 from olp.program.program import Program
+from olp.program.robots.poses import Quaternion
 from olp.program.robots.targets import Part, Target, Use
 
 #: Bytes of the text from one position up to another, and what replaces them.
@@ -17,9 +20,15 @@ Replacement = tuple[int, int, bytes]
 class RobotDialect(StatementDialect):
     """A language of robots. `decimals` are the fewest of a number that is changed. With `names_parts` the
     target of a part of a move needs a name. A name has `longest_name` characters at most; None: any number.
-    A statement ends with its line, or where the reader says so."""
+    A statement ends with its line, or where the reader says so. With `for_arms` programs are read on arms,
+    too; `turn_decimals` are the fewest of a number of an orientation, and its unit is `turn_unit_rad`
+    where it has none. In the `rest` of a target external axes begin at `outer_from`."""
 
     decimals: int
+    for_arms: bool = False
+    turn_decimals: int = 6
+    turn_unit_rad: float = 1.0
+    outer_from: int = 0
     names_parts: bool = False
     longest_name: int | None = None
 
@@ -46,6 +55,19 @@ class RobotDialect(StatementDialect):
 
     def clone(self, program: Program, target: Target, name: str, text: bytes) -> Replacement:
         """The declaration of a target again, under another name and with another value."""
+        raise NotImplementedError
+
+    def turn_values(self, turn: Quaternion, near: Quaternion) -> Sequence[float]:
+        """The numbers of an orientation as the language states it, those that are next to another one's."""
+        raise NotImplementedError
+
+    def fitting(self, rest: Array, axes: Array, branches: Array) -> tuple[Array, Mask]:
+        """Which postures (n, 8, 6) are those that the `rest` (n, k) of targets names: (n, 8, 6) their axis
+        values with turns, and (n, 8) whether they are. `branches` are (n, 8, 3) as in `Arm.branches`."""
+        raise NotImplementedError
+
+    def turns_of(self, rest: Sequence[float], nominal: Array, corrected: Array) -> list[int | None]:
+        """The numbers of `Target.turns` for corrected axis values (6,); None for one that stays."""
         raise NotImplementedError
 
     def counted(self, program: Program, blocks: int) -> list[Replacement]:

@@ -77,11 +77,14 @@ class RobotMoves:
     def target(
         self, line: int, value: Span, numbers: tuple[Span, Span, Span], point: Vector, turn: Quaternion,
         rest: tuple[float, ...], name: str = "", declaration: Span = NOWHERE,
+        turned: tuple[Span, ...] = (), turns: tuple[Span, ...] = (),
     ) -> int:  # fmt: skip
         """Add a target that the text states; returns its place."""
         first, second, third = (self.moves.number(*span) for span in numbers)
         slots = (first, second, third)
-        self.targets.append(Target(line, value, numbers, slots, point, turn, rest, name, declaration))
+        self.targets.append(
+            Target(line, value, numbers, slots, point, turn, rest, name, declaration, turned, turns)
+        )
         return len(self.targets) - 1
 
     def move(
@@ -116,7 +119,7 @@ class RobotMoves:
             what = f"the orientation changes, and the vector of the tool {tool.name} does not"
             self.remark("turning", line, what, "turning")
         before = use.turn if self._turn is None else self._turn
-        self.uses.append(replace(use, before=before))
+        self.uses.append(replace(use, before=before, frame=frame.pose, tool=tool.pose, straight=known))
         self.known, self._frame, self._turn, self._rest, self._feed = True, index, use.turn, target.rest, feed
 
     def away(self, line: int) -> None:

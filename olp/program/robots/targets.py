@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from olp.core.machine import ZERO, Vector
 from olp.core.values import dataclass
-from olp.program.robots.poses import NO_TURN, Quaternion
+from olp.program.robots.poses import NO_TURN, Pose, Quaternion
 
 #: Bytes of the text: the first, and the one behind the last.
 Span = tuple[int, int]
@@ -16,7 +16,8 @@ NOWHERE: Span = (-1, -1)
 class Target:
     """A position as it is stated: the `line`, the bytes of its whole `value`, of its three `numbers`, and
     their `slots`. `turn` is its orientation in its frame, and `rest` what else it states: configuration and
-    external axes. One that is declared has a `name`, and `declaration` are the bytes that declare it."""
+    external axes. One that is declared has a `name`, and `declaration` are the bytes that declare it.
+    `turned` are the bytes of the numbers of its orientation, `turns` those that say how far axes turned."""
 
     line: int
     value: Span
@@ -27,6 +28,8 @@ class Target:
     rest: tuple[float, ...] = ()
     name: str = ""
     declaration: Span = NOWHERE
+    turned: tuple[Span, ...] = ()
+    turns: tuple[Span, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +38,10 @@ class Use:
     the move, `place` those that state the target, and `named` those of its name in them. `shift_mm` is how
     far the move goes from the target, along its frame, and `turn` its orientation there. `before` is the
     orientation at the start of the move. `zone` are the bytes that say how the move ends. `offsets` are the
-    bytes of the three numbers of its shift, empty where it has none, along axes turned by `offset_turn`."""
+    bytes of the three numbers of its shift, empty where it has none, along axes turned by `offset_turn`,
+    which are those of the tool where it is `along_tool`. `frame` is the pose of the target's frame in machine
+    coordinates, and `tool` that of the tip at the flange, None where the program does not state it. The
+    robot goes `straight` from a known target, or with any posture that is near where it is `free`."""
 
     target: int
     statement: Span
@@ -47,6 +53,11 @@ class Use:
     zone: Span = NOWHERE
     offsets: tuple[Span, ...] = ()
     offset_turn: Quaternion = NO_TURN
+    along_tool: bool = False
+    frame: Pose = Pose()
+    tool: Pose | None = None
+    straight: bool = False
+    free: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,16 +73,20 @@ class Targets:
 class Part:
     """A part of a move that ends before it: its three `numbers`, and the `share` of the move where it ends.
 
-    `stop`: the robot stops there. `name` is that of its target where the language needs one."""
+    `stop`: the robot stops there. `name` is that of its target where the language needs one. `turned` are
+    the numbers of its orientation where it is corrected, `turns` what replaces those of `Target.turns`."""
 
     numbers: tuple[bytes, bytes, bytes]
     share: float
     stop: bool
     name: str
+    turned: tuple[bytes, ...] = ()
+    turns: tuple[bytes, ...] = ()
 
     def renumbered(self, target: Target) -> list[tuple[int, int, bytes]]:
         """What replaces the numbers of a target, from its first byte on."""
-        start = target.value[0]
-        return [
-            (a - start, b - start, text) for (a, b), text in zip(target.numbers, self.numbers, strict=True)
-        ]
+        start, spans = target.value[0], list(target.numbers)
+        spans += target.turned if self.turned else ()
+        spans += target.turns if self.turns else ()
+        texts = (*self.numbers, *self.turned, *self.turns)
+        return [(a - start, b - start, text) for (a, b), text in zip(spans, texts, strict=True)]

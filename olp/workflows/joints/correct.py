@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import datetime
 import hashlib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
+from olp.compensation.joints.arm_path import ArmPath
+from olp.compensation.joints.arm_writer import write_arm
 from olp.compensation.joints.list_writer import write_list
 from olp.compensation.joints.path import JointPath
 from olp.compensation.joints.planning import JointLimits, JointPlan, planned
+from olp.compensation.joints.writer import WrittenJoints
 from olp.compensation.joints.writing import write_joints
 from olp.compensation.stamp import find_real_time, find_stamp, stamp_line, stamped
 from olp.compensation.tally import Tally
@@ -22,6 +26,8 @@ from olp.files.write import write_bytes
 from olp.findings.catalogue import Finding
 from olp.program.dialect import Dialect
 from olp.program.program import Program
+from olp.program.robots.dialect import RobotDialect
+from olp.program.text.numbers import spliced
 from olp.proof.joints import JointProof, prove_joints
 from olp.workflows import real_time
 from olp.workflows.flatten import UnrollOptions
@@ -130,10 +136,15 @@ def correction_of(run: JointRun, options: JointOptions) -> ProvedJoints:
             plan = planned(nominal, options.limits())
             if options.outside_box == "refuse" and run.calibration is not None:
                 _refuse_outside(nominal, plan, run)
-            write = write_joints if nominal.listed is None else write_list
-            written = write(nominal, plan)
+            written = _written(nominal, plan)
         text = _stamped(run, dialect, nominal.program, written.text)
         return proved(run, source, (nominal, plan), run.again(text, dialect), options, written.tally)
+
+
+def _written(nominal: JointPath, plan: JointPlan) -> WrittenJoints:
+    if isinstance(nominal, ArmPath):
+        return write_arm(nominal, plan)
+    return write_joints(nominal, plan) if nominal.listed is None else write_list(nominal, plan)
 
 
 def _stamped(run: JointRun, dialect: Dialect, nominal: Program, written: bytes | None) -> bytes:
@@ -144,6 +155,9 @@ def _stamped(run: JointRun, dialect: Dialect, nominal: Program, written: bytes |
     if told or not dialect.marks:
         return text
     stamp = stamp_line(run.digest, dialect.comment, real_time=by_control)
+    if isinstance(dialect, RobotDialect):
+        program = replace(nominal, content=text)
+        return spliced(text, [dialect.stamped(program, stamp), *dialect.counted(program, 1)])
     statements = nominal.statements
     if statements is not None and statements.cards:
         stamp = card_stamp(stamp, statements.width)

@@ -8,6 +8,9 @@ from dataclasses import field, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from olp.compensation.joints.arm_path import ArmPath, arm_path
 from olp.compensation.joints.path import JointPath
 from olp.core.errors import ConfigError, ProgramError, UsageError
 from olp.core.machine import ZERO, Job, Setup, WorkOffset
@@ -24,12 +27,15 @@ from olp.program.pointlist.base import PointList
 from olp.program.pointlist.dialect import DIALECT as AXIS_LIST
 from olp.program.program import Program
 from olp.program.registry import Options, dialect_of, find, read
+from olp.program.robots.dialect import RobotDialect
 from olp.program.rs274.profiles.base import Profile
 from olp.program.text.delimited import first_lines
 from olp.workflows import refusals
 from olp.workflows.flatten import UnrollOptions
 from olp.workflows.session import PathLike
 
+#: What is read beside lists on an arm.
+_OF_ROBOTS = ", and RAPID programs"
 #: The axes that turn a work offset about, in the order of its table.
 _TURNS = "ABC"
 
@@ -98,11 +104,16 @@ class JointRun:
 
     def dialect(self, source: Source) -> Dialect:
         """The dialect of a program on this machine. Raises ProgramError where it is not one that is read."""
+        if self.machine.arm is not None and not _names_axes(source.data, self.machine):
+            own = dialect_of(self.job.dialect, AXIS_LIST, source.data, source.name)
+            if isinstance(own, RobotDialect) and own.for_arms:
+                return own
         if self.setup is None:
             if self.job.dialect not in (None, AXIS_LIST.name) or not _names_axes(source.data, self.machine):
                 raise ProgramError(
                     f"on a machine with the chain {' '.join(self.machine.structure.chain)} lists of axis "
-                    f"values are read; expected a table with the columns {', '.join(_columns(self.machine))}",
+                    f"values are read{_OF_ROBOTS if self.machine.arm else ''}; expected a table with the "
+                    f"columns {', '.join(_columns(self.machine))}",
                     code="OLP563",
                 )
             return AXIS_LIST
@@ -128,6 +139,11 @@ class JointRun:
     def read(self, source: Source, unrolling: UnrollOptions) -> tuple[Source, JointPath]:
         """A program and its path. Raises ProgramError with all that is refused."""
         dialect = self.dialect(source)
+        if isinstance(dialect, RobotDialect):
+            setup = self._arm_setup()
+            text, program = refusals.read(self.sources, source, setup, dialect, Options(), unrolling)
+            with program.errors():
+                return text, self._of_arm(program)
         if isinstance(dialect, PointList) or self.setup is None:
             return source, self._listed(source.data)
         text, program = refusals.read(self.sources, source, self.setup, dialect, Options(), unrolling)
@@ -136,6 +152,8 @@ class JointRun:
 
     def again(self, data: bytes, dialect: Dialect) -> JointPath:
         """The path of a text that was written."""
+        if isinstance(dialect, RobotDialect):
+            return self._of_arm(read(data, self._arm_setup(), dialect))
         if isinstance(dialect, PointList) or self.setup is None:
             return self._listed(data)
         return self._path(read(data, self.setup, dialect), self.setup)
@@ -149,6 +167,17 @@ class JointRun:
             tips_from_zero=program.dialect.tips_from_zero if from_zero is None else from_zero,
             swivel_axis=self.machine.swivel_axis,
         )  # fmt: skip
+
+    def _arm_setup(self) -> Setup:
+        """What a reader of robot programs sees."""
+        assert self.machine.arm is not None
+        return Setup(self.machine.arm, self.job)
+
+    def _of_arm(self, program: Program) -> ArmPath:
+        """The path of a robot program."""
+        structure = self.machine.structure
+        start = np.array([self.job.start_deg.get(name, np.nan) for name in structure.order])
+        return arm_path(program, structure, self.errors, start)
 
     def _listed(self, data: bytes) -> JointPath:
         """The path of a list of axis values."""

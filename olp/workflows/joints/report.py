@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from olp.checks.base import finding
+from olp.compensation.joints.arm_path import ArmPath
 from olp.compensation.joints.path import JointPath
 from olp.compensation.joints.planning import JointPlan
 from olp.compensation.style import fewest_decimals
@@ -17,6 +18,7 @@ from olp.core.arrays import Array, Mask
 from olp.core.toolpath import Kind
 from olp.core.units import RAD_PER_URAD, UM_PER_MM
 from olp.findings.catalogue import Finding
+from olp.program.robots.dialect import RobotDialect
 from olp.proof.joints import Deviation, JointProof
 from olp.workflows.joints.loaded import JointRun
 
@@ -44,6 +46,10 @@ _BETWEEN = "the path between the rows: the list does not say how the machine goe
 def last_digits(path: JointPath) -> tuple[float, float]:
     """The coarsest last digits of the corrected program: mm and deg."""
     joints, dialect = path.motion.structure.joints.values(), path.program.dialect
+    if isinstance(dialect, RobotDialect):
+        unit = max((frame.unit_mm for frame in path.program.toolpath.frames), default=1.0)
+        turn = dialect.turn_unit_rad * 10.0**-dialect.turn_decimals
+        return unit * 10.0**-dialect.decimals, float(np.degrees(turn))
     units = {frame.unit_mm for frame in path.program.toolpath.frames} or {1.0}
     in_words = path.listed is None
     linear, rotary = [], []
@@ -94,8 +100,7 @@ def report_of(
         },
         "largest_correction": _largest(path, plan),
         "moves": {
-            "feed": int(np.isin(path.program.toolpath.kind, _FEED).sum()),
-            "rapid": int((path.program.toolpath.kind == Kind.RAPID).sum()),
+            **_kinds(path),
             "with_tip_control": int(path.tip.sum()),
             "uncorrected": len(kept),
             "parts": len(plan.move),
@@ -106,6 +111,14 @@ def report_of(
         "proves": list(_PROVES),
         "does_not_prove": [*_DOES_NOT_PROVE, *([] if path.feed.any() else [_BETWEEN])],
     }
+
+
+def _kinds(path: JointPath) -> dict[str, int]:
+    """Straight moves that cut, and others. An arm turns its tool along straight moves, too."""
+    if isinstance(path, ArmPath):
+        return {"feed": int(path.feed.sum()), "rapid": int((path.judged & ~path.feed).sum())}
+    kind = path.program.toolpath.kind
+    return {"feed": int(np.isin(kind, _FEED).sum()), "rapid": int((kind == Kind.RAPID).sum())}
 
 
 def filed(report: dict[str, Any], name: str, date: datetime.date | None) -> bytes:

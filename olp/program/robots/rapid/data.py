@@ -109,7 +109,7 @@ class Declared:
             stated = target_of(matches[place], data.statement.line)
             known = self._targets[key] = self.moves.target(
                 data.statement.line, key, stated.spans, stated.point, stated.turn, stated.rest, name,
-                (data.statement.begin, data.statement.end),
+                (data.statement.begin, data.statement.end), stated.turned, stated.turns,
             )  # fmt: skip
         return known
 

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from olp.core.arrays import Array, Mask
 from olp.core.patterns import pattern
 from olp.core.values import dataclass
 from olp.program.program import Program
 from olp.program.robots.dialect import Replacement, RobotDialect
-from olp.program.robots.poses import between
+from olp.program.robots.poses import Quaternion, between
+from olp.program.robots.rapid import postures
 from olp.program.robots.rapid.reader import read
 from olp.program.robots.rapid.table import TABLE
 from olp.program.robots.rapid.values import ROBTARGET
@@ -58,12 +62,22 @@ class Rapid(RobotDialect):
         place = int(program.line_end[last])
         return place, place, eol + blanks + lead[1] + name.encode() + b":=" + text + b";"
 
+    def turn_values(self, turn: Quaternion, near: Quaternion) -> Sequence[float]:
+        against = sum(a * b for a, b in zip(turn, near, strict=True)) < 0.0
+        return tuple(-value for value in turn) if against else turn
+
+    def fitting(self, rest: Array, axes: Array, branches: Array) -> tuple[Array, Mask]:
+        return postures.fitting(rest, axes, branches)
+
+    def turns_of(self, rest: Sequence[float], nominal: Array, corrected: Array) -> list[int | None]:
+        return postures.quarters(rest, nominal, corrected)
+
     @staticmethod
     def _value(program: Program, target: Target, part: Part, use: Use) -> bytes:
         """A target with other numbers, and the orientation at the end of a part."""
         data, start = program.data, target.value[0]
         edits = part.renumbered(target)
-        if not (use.before == use.turn == target.turn):
+        if not part.turned and not (use.before == use.turn == target.turn):
             match = ROBTARGET.match(data, *target.value)
             assert match is not None
             turn = between(use.before, use.turn, part.share)
@@ -85,5 +99,9 @@ DIALECT = Rapid(
     languages=frozenset(("ABB RAPID",)),
     table=TABLE,
     decimals=4,
+    for_arms=True,
+    turn_decimals=9,
+    turn_unit_rad=2.0,
+    outer_from=4,
     longest_name=32,
 )

@@ -49,6 +49,8 @@ class _Reader:
         self.tools: dict[tuple[str, str], Tool] = {}
         self.frames: dict[tuple[str, str], Located] = {}
         self.refusals: list[ProgramError] = []
+        #: whether straight moves, and others, take any posture that is near
+        self.free = [False, False]
 
     def run(self, dialect: Dialect, options: Options, *, words: bool) -> Program:
         if self.data[:2] in (b"\xff\xfe", b"\xfe\xff"):
@@ -112,6 +114,8 @@ class _Reader:
             self._call(statement, word)
         elif row[0] is Support.REFUSED:
             raise ProgramError(f"{word.decode('latin-1')} {row[1]}", line=statement.line, code=_NOT_READ)
+        elif word in (b"CONFL", b"CONFJ"):
+            self.free[word == b"CONFJ"] = b"\\OFF" in statement.text.upper().replace(b" ", b"")
 
     def _call(self, statement: Statement, word: bytes) -> None:
         """A call of a routine, which may move the robot."""
@@ -178,7 +182,7 @@ class _Reader:
             raise ProgramError(
                 f"a move with \\{unread[0].decode('latin-1')} is not read", line=line, code=_NOT_READ
             )
-        use = self._use(statement, words)
+        use = self._use(statement, words, straight=straight)
         tool, frame = self._tool(words.tool, line), self._frame(words.frame, line)
         feed = self.declared.speed(words.others.get(b"V", words.speed), self.routine, line)
         self._loop_begins()
@@ -199,7 +203,7 @@ class _Reader:
             self.frames[key] = self.moves.frames.located(name, pose, line)
         return self.frames[key]
 
-    def _use(self, statement: Statement, words: Words) -> Use:
+    def _use(self, statement: Statement, words: Words, *, straight: bool) -> Use:
         """How a move uses its target. Raises ProgramError where the text does not state it with numbers."""
         span, line = words.target, statement.line
         shift, turn = moved(self.data, span), None
@@ -220,6 +224,7 @@ class _Reader:
             target.turn if turn is None else turn, zone=words.zone,
             offsets=() if shift is None else shift.numbers,
             offset_turn=target.turn if shift is not None and shift.tool else NO_TURN,
+            along_tool=shift is not None and shift.tool, free=self.free[not straight],
         )  # fmt: skip
 
     def _target(self, span: Span, line: int) -> tuple[int, Span]:
@@ -227,7 +232,10 @@ class _Reader:
         match = ROBTARGET.match(self.data, *span)
         if match is not None and not self.data[match.end() : span[1]].strip():
             stated, value = target_of(match, line), match.span()
-            place = self.moves.target(line, value, stated.spans, stated.point, stated.turn, stated.rest)
+            place = self.moves.target(
+                line, value, stated.spans, stated.point, stated.turn, stated.rest,
+                turned=stated.turned, turns=stated.turns,
+            )  # fmt: skip
             return place, NOWHERE
         name = name_of(self.data[slice(*span)])
         if name is None:

@@ -50,19 +50,23 @@ def quaternion(numbers: Sequence[float], line: int) -> Quaternion:
 @dataclass(frozen=True, slots=True)
 class Stated:
     """What a robtarget states: the bytes of its position, this, its orientation, and the `rest`:
-    configuration and external axes."""
+    configuration and external axes. `turned` and `turns` are the bytes of the orientation, and of the
+    quarters of axes."""
 
     spans: tuple[Span, Span, Span]
     point: Vector
     turn: Quaternion
     rest: tuple[float, ...]
+    turned: tuple[Span, ...]
+    turns: tuple[Span, ...]
 
 
 def target_of(match: re.Match[bytes], line: int) -> Stated:
     """What a robtarget states. Raises ProgramError where its orientation is none."""
     x, y, z, *others = map(float, match.groups())
     spans = (match.span(1), match.span(2), match.span(3))
-    return Stated(spans, (x, y, z), quaternion(others[:4], line), tuple(others[4:]))
+    turned, turns = (tuple(match.span(k) for k in some) for some in (range(4, 8), range(8, 11)))
+    return Stated(spans, (x, y, z), quaternion(others[:4], line), tuple(others[4:]), turned, turns)
 
 
 def tool_of(text: bytes, name: str, line: int) -> Pose:

@@ -1,0 +1,251 @@
+"""Writes the plan of an arm into the targets of its program: positions and orientations in their own form.
+
+A target whose moves want different numbers is declared again under another name, and each part of a move
+states its own.
+"""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from olp.compensation.joints.arm_path import ArmPath
+from olp.compensation.joints.planning import JointPlan
+from olp.compensation.joints.writer import WrittenJoints
+from olp.compensation.tally import Tally
+from olp.core.arrays import Index
+from olp.core.errors import ProgramError
+from olp.core.values import dataclass
+from olp.kinematics.poses import rotation_vector
+from olp.kinematics.postures import Arm
+from olp.program.robots.dialect import Replacement, RobotDialect
+from olp.program.robots.poses import (
+    Pose,
+    angle_between,
+    inverted,
+    multiplied,
+    of_vector,
+    rotated,
+)
+from olp.program.robots.targets import NOWHERE, Part, Target, Use
+from olp.program.text.numbers import MOST_DECIMALS, number, spliced, written
+
+#: A number that is nearer to what is wanted than this share of its last digit is right.
+_RIGHT = 0.5 + 1e-6
+#: mm and rad by which a pose is off from computing alone
+_COMPUTED = 1e-8
+#: Groups of moves that a move is compared with, where none wants the very same digits.
+_COMPARED = 8
+#: A branch that is nearer to its border than this says nothing, mm or deg.
+_BORDER = 1e-6
+_NAMES = re.compile(rb"[A-Za-z_]\w*")
+
+
+@dataclass(frozen=True, slots=True)
+class _Wanted:
+    """What a row wants of its target: `values` and how they are written (`texts`), how far a digit of each
+    goes, and the numbers of axes' turns."""
+
+    values: tuple[float, ...]
+    digits: tuple[float, ...]
+    texts: tuple[bytes, ...]
+    turns: tuple[bytes, ...]
+
+    def right_for(self, other: _Wanted) -> bool:
+        """Whether the numbers are right for another row to their last digit."""
+        near = all(
+            abs(float(text) - value) <= _RIGHT * digit
+            for text, value, digit in zip(self.texts, other.values, self.digits, strict=True)
+        )
+        return near and self.turns == other.turns
+
+
+def write_arm(path: ArmPath, plan: JointPlan) -> WrittenJoints:
+    """The text of a robot program with its plan. Raises ProgramError where it cannot be written."""
+    return _Writer(path, plan).written()
+
+
+class _Writer:
+    """Writes one program."""
+
+    def __init__(self, path: ArmPath, plan: JointPlan) -> None:
+        program, targets = path.program, path.program.targets
+        arm = Arm.of(path.motion.structure)
+        assert isinstance(program.dialect, RobotDialect)
+        assert targets is not None
+        assert arm is not None
+        self.path, self.plan, self.program, self.targets = path, plan, program, targets
+        self.dialect, self.arm, self.tally = program.dialect, arm, Tally()
+        self.clones = 0
+        self.names: set[str] = set()
+
+    def written(self) -> WrittenJoints:
+        plan = self.plan
+        rows = np.flatnonzero(np.isfinite(plan.command).all(axis=1))
+        last = np.append(plan.move[1:] != plan.move[:-1], True)[: len(plan.move)]
+        tool = self.path.tool[plan.move[rows]]
+        poses = self.path.motion.nominal(plan.command[rows], tool)
+        turns = rotation_vector(poses.rotation)
+        self._keep_branches(rows)
+        by_target: dict[int, list[tuple[int, _Wanted]]] = {}
+        edits: list[Replacement] = []
+        for k, row in enumerate(rows.tolist()):
+            x, y, z = poses.position[k].tolist()
+            tip = Pose((x, y, z), of_vector(turns[k].tolist()))
+            use = self._use(row)
+            tip = Pose(tip.origin_mm, multiplied(tip.turn, (use.tool or Pose()).turn))
+            if last[row]:
+                wanted = self._wanted(row, tip, shifted=True)
+                by_target.setdefault(use.target, []).append((row, wanted))
+            else:
+                edits += self._part(row, self._wanted(row, tip, shifted=False))
+        for place, wants in by_target.items():
+            edits += self._target(self.targets.targets[place], wants)
+        parts = np.bincount(plan.move, minlength=len(self.path))
+        if not edits:
+            return WrittenJoints(None, self.tally, np.ones(len(self.path), np.int64))
+        blocks = self.tally.inserted_blocks - self.clones
+        if blocks:
+            edits += self.dialect.counted(self.program, blocks)
+        return WrittenJoints(spliced(self.program.data, edits), self.tally, parts)
+
+    def _use(self, row: int) -> Use:
+        use = self.targets.uses[int(self.plan.move[row])]
+        assert use is not None
+        return use
+
+    def _keep_branches(self, rows: Index) -> None:
+        """Raises ProgramError where a corrected posture is of another branch than the programmed one."""
+        plan, path = self.plan, self.path
+        nominal = path.at(plan.move[rows], plan.share[rows])
+        before, after = self.arm.branches(nominal), self.arm.branches(plan.command[rows])
+        other = ((before * after < 0.0) & (np.minimum(abs(before), abs(after)) > _BORDER)).any(axis=1)
+        if other.any():
+            raise ProgramError(
+                "the corrected posture is on the other side of a singular one than the programmed one, so "
+                "its configuration changes; move the target",
+                line=int(path.line[plan.move[rows[int(np.argmax(other))]]]),
+                code="OLP566",
+            )
+
+    # -- what is wanted ------------------------------------------------------------------------------
+
+    def _wanted(self, row: int, tip: Pose, *, shifted: bool) -> _Wanted:
+        """The numbers of a target with which a row brings the tip to a pose; without `shifted` those of the
+        pose itself."""
+        move, use = int(self.plan.move[row]), self._use(row)
+        target = self.targets.targets[use.target]
+        back = inverted(use.frame.turn)
+        away = [a - b for a, b in zip(tip.origin_mm, use.frame.origin_mm, strict=True)]
+        place, turn, shift = rotated(back, away), multiplied(back, tip.turn), (0.0, 0.0, 0.0)
+        own = use.turn
+        if shifted:
+            turn = multiplied(turn, multiplied(inverted(use.turn), target.turn))
+            own = target.turn
+            shift = use.shift_mm
+            if use.along_tool:
+                shift = rotated(turn, rotated(inverted(target.turn), shift))
+        unit = self._unit(move)
+        point = [(a - b) / unit for a, b in zip(place, shift, strict=True)]
+        numbers = (*point, *self.dialect.turn_values(turn, own))
+        return self._in_digits(row, target, numbers, angle_between(turn, target.turn))
+
+    def _unit(self, move: int) -> float:
+        toolpath = self.program.toolpath
+        return toolpath.frames[int(toolpath.frame[move])].unit_mm
+
+    def _in_digits(self, row: int, target: Target, numbers: tuple[float, ...], turned_rad: float) -> _Wanted:
+        """Numbers as they are written: those that are right to their last digit keep their bytes."""
+        data, values, digits, texts = self.program.data, [], [], []
+        for k, (span, value) in enumerate(zip((*target.numbers, *target.turned), numbers, strict=True)):
+            text = data[slice(*span)]
+            form = number(text)
+            if form is None or form.letter:
+                form = number(b"0.0")
+                assert form is not None
+            fewest = self.dialect.turn_decimals if k > 2 else self.dialect.decimals
+            decimals = min(max(fewest, form.decimals), MOST_DECIMALS)
+            digit = 10.0**-decimals
+            near = abs(float(text) - value) <= max(_RIGHT * digit, _COMPUTED)
+            if k > 2:
+                unit = self.dialect.turn_unit_rad
+                near = turned_rad <= max(_RIGHT * digit * unit, _COMPUTED)
+            values.append(float(text) if near else value)
+            digits.append(max(digit, _COMPUTED))
+            texts.append(text if near else written(form, value, decimals))
+        return _Wanted(tuple(values), tuple(digits), tuple(texts), self._turns(row, target))
+
+    def _turns(self, row: int, target: Target) -> tuple[bytes, ...]:
+        if not target.turns:
+            return ()
+        move = int(self.plan.move[row])
+        new = self.dialect.turns_of(target.rest, self.path.end[move], self.plan.command[row])
+        return tuple(
+            self.program.data[slice(*span)] if value is None else str(value).encode()
+            for span, value in zip(target.turns, new, strict=True)
+        )
+
+    # -- edits ---------------------------------------------------------------------------------------
+
+    def _target(self, target: Target, wants: list[tuple[int, _Wanted]]) -> list[Replacement]:
+        """New numbers of a target, and declarations of its own for each further group of moves."""
+        groups: list[tuple[_Wanted, list[int]]] = []
+        known: dict[tuple[tuple[bytes, ...], tuple[bytes, ...]], list[int]] = {}
+        for row, wanted in wants:
+            key = wanted.texts, wanted.turns
+            rows = known.get(key) or next(
+                (rows for first, rows in groups[:_COMPARED] if first.right_for(wanted)), None
+            )
+            if rows is None:
+                rows = known[key] = []
+                groups.append((wanted, rows))
+            rows.append(row)
+        groups.sort(key=lambda group: -len(group[1]))
+        edits = self._edited(target, groups[0][0])
+        self.tally.changed_words += len(edits)
+        for wanted, rows in groups[1:]:
+            edits += self._cloned(target, wanted, rows)
+        return edits
+
+    def _edited(self, target: Target, wanted: _Wanted) -> list[Replacement]:
+        spans = (*target.numbers, *target.turned, *target.turns)
+        return [
+            (a, b, text)
+            for (a, b), text in zip(spans, (*wanted.texts, *wanted.turns), strict=True)
+            if text != self.program.data[a:b]
+        ]
+
+    def _cloned(self, target: Target, wanted: _Wanted, rows: list[int]) -> list[Replacement]:
+        start = target.value[0]
+        numbers = [(a - start, b - start, text) for a, b, text in self._edited(target, wanted)]
+        name = self._new_name(target)
+        text = spliced(self.program.data[slice(*target.value)], numbers)
+        edits = [self.dialect.clone(self.program, target, name, text)]
+        for row in rows:
+            named = self._use(row).named
+            assert named != NOWHERE
+            edits.append((*named, name.encode()))
+        self.tally.inserted_blocks += 1
+        self.clones += 1
+        return edits
+
+    def _part(self, row: int, wanted: _Wanted) -> list[Replacement]:
+        """The statement of a part of a move before its end."""
+        move, use = int(self.plan.move[row]), self._use(row)
+        target = self.targets.targets[use.target]
+        x, y, z, *turned = wanted.texts
+        share = float(self.plan.share[row])
+        name = self._new_name(target) if self.dialect.names_parts else ""
+        # a step that takes up backlash has to be reached
+        part = Part((x, y, z), share, share == 0.0, name, tuple(turned), wanted.turns)
+        self.tally.inserted_blocks += 1
+        return self.dialect.part(self.program, move, use, part)
+
+    def _new_name(self, target: Target) -> str:
+        """A name that the text does not have, made from that of a target."""
+        if not self.names:
+            self.names = {word.decode("latin-1").upper() for word in _NAMES.findall(self.program.data)}
+        name = self.dialect.named(self.program, target, self.names)
+        self.names.add(name.upper())
+        return name

@@ -1,0 +1,170 @@
+"""The postures of an arm with a wrist of three axes through one point: all that bring the flange to a pose.
+
+The wrist's centre is reached by three axes, of which the second and the third are parallel; two circles meet
+in two points each time. Nothing here knows a language or a file.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from olp.core.arrays import Array
+from olp.core.values import dataclass
+from olp.kinematics.poses import Poses, axis_rotation, turned
+from olp.kinematics.structure import FRAME, Structure
+
+#: Axes of an arm.
+AXES = 6
+#: Postures that bring the flange to one pose, turns left out.
+POSTURES = 8
+#: Axes of a straight wrist that turn the tool alike.
+_SHARING = (3, 5)
+#: mm; axes of the wrist that pass each other nearer than this meet
+_MEET_MM = 1e-6
+#: Sine of the angle between directions that count as parallel.
+_PARALLEL = 1e-9
+#: Cosines this much above 1 are an arm that is stretched out, and rounding.
+_STRETCHED = 1e-9
+#: Sine of the angle of the wrist below which how two of its axes share a turn is not known.
+_STRAIGHT = 1e-5
+#: mm from the first axis within which its angle is not known.
+_ABOVE_MM = 1e-3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Arm:
+    """Six rotary axes in the order of the chain: `direction` and `point` (6, 3) of each with all at zero, the
+    `columns` (6,) of their values, the centre of the wrist, and the flange at zero."""
+
+    direction: Array
+    point: Array
+    columns: Array
+    wrist: Array
+    flange: Poses
+
+    @staticmethod
+    def of(structure: Structure) -> Arm | None:
+        """The arm of a machine, None where it is no such arm."""
+        names = [name for name in structure.chain if name != FRAME]
+        known = all(name in structure.joints and structure.joints[name].kind == "rotary" for name in names)
+        if len(names) != AXES or not known or structure.chain[0] != FRAME:
+            return None
+        joints = [structure.joints[name] for name in names]
+        direction = np.array([joint.direction for joint in joints])
+        direction /= np.linalg.norm(direction, axis=1)[:, None]
+        point = np.array([joint.point_mm for joint in joints], float)
+        across = np.eye(3) - direction[3:, :, None] * direction[3:, None, :]
+        wrist = np.linalg.lstsq(across.sum(axis=0), np.einsum("kij,kj->i", across, point[3:]), rcond=None)[0]
+        away = np.linalg.norm(turned(across, wrist - point[3:]), axis=1).max()
+        parallel = np.linalg.norm(np.cross(direction[1], direction[2])) < _PARALLEL
+        bent = np.linalg.norm(np.cross(direction[[0, 3, 4]], direction[[1, 4, 5]]), axis=1) > _PARALLEL
+        if away > _MEET_MM or not parallel or not bent.all():
+            return None
+        columns = np.array([structure.order.index(name) for name in names])
+        return Arm(direction, point, columns, wrist, structure.gauge.pose)
+
+    def postures(self, flange: Poses) -> Array:
+        """(n, 8, 6) axis values in degrees within half a turn, in the order of columns, that bring the flange
+        to poses (n). NaN where there is none, and where the wrist is above the first axis; where it is
+        straight, of the fourth and the sixth axis alone, which share a turn."""
+        back = self.flange.inverse()
+        motion = flange @ back
+        centre = motion.at(self.wrist)
+        result = np.full((len(centre), POSTURES, AXES), np.nan)
+        number = 0
+        with np.errstate(invalid="ignore", divide="ignore"):
+            for first in self._first(centre):
+                for second, third in self._shoulder_and_elbow(centre, first):
+                    held = self._turn(0, first) @ self._turn(1, second) @ self._turn(2, third)
+                    rest = np.swapaxes(held, -1, -2) @ motion.rotation
+                    for wrist in self._wrist(rest):
+                        result[:, number] = np.stack((first, second, third, *wrist), axis=1)
+                        number += 1
+        result[np.isnan(np.delete(result, _SHARING, axis=2)).any(axis=2)] = np.nan
+        values = np.empty(result.shape)
+        values[:, :, self.columns] = _wrapped(np.degrees(result))
+        return values
+
+    def branches(self, axes: Array) -> Array:
+        """(..., 3) what tells postures apart, positive where the centre of the wrist is before the first
+        axis, before the lower arm, and where the fifth axis is positive: mm, mm and deg of the bend."""
+        shape = axes.shape[:-1]
+        values = np.radians(axes.reshape(-1, AXES)[:, self.columns])
+        up = self.direction[0]
+        ahead = self.wrist - self.point[0]
+        ahead = ahead - up * (ahead @ up)
+        ahead = ahead / max(float(np.linalg.norm(ahead)), _STRAIGHT)
+        second, third = self._turn(1, values[:, 1]), self._turn(2, values[:, 2])
+        lower = turned(second, self.point[2] - self.point[1])
+        upper = turned(second, turned(third, self.wrist - self.point[2]))
+        place = self.point[1] + lower + upper - self.point[0]
+        size = max(float(np.linalg.norm(self.point[2] - self.point[1])), _STRAIGHT)
+        before = np.cross(lower, upper) @ np.cross(up, ahead) / size
+        return np.stack((place @ ahead, before, np.degrees(values[:, 4])), axis=1).reshape(*shape, 3)
+
+    def _turn(self, axis: int, angle_rad: Array) -> Array:
+        return axis_rotation(self.direction[axis], angle_rad)
+
+    def _first(self, centre: Array) -> list[Array]:
+        """(n,) angles of the first axis."""
+        up, side = self.direction[0], self.direction[1]
+        away = centre - self.point[0]
+        along = (away @ up)[:, None] * up
+        across = away - along
+        want = side @ (self.wrist - self.point[0]) - along @ side
+        found = _met(across @ side, -(np.cross(up, away) @ side), want)
+        near = np.linalg.norm(across, axis=1) < _ABOVE_MM
+        return [np.where(near, np.nan, angle) for angle in found]
+
+    def _shoulder_and_elbow(self, centre: Array, first: Array) -> list[tuple[Array, Array]]:
+        """(n,) angles of the second and the third axis."""
+        side = self.direction[1]
+        place = self.point[0] + turned(self._turn(0, -first), centre - self.point[0])
+        lower, upper = self.point[2] - self.point[1], self.wrist - self.point[2]
+        reach = place - self.point[1]
+        lower, upper, reach = (v - (v @ side)[..., None] * side for v in (lower, upper, reach))
+        want = (np.sum(reach * reach, axis=1) - lower @ lower - upper @ upper) / 2.0
+        pairs = []
+        # the third axis may run against the second
+        for angle in _met(lower @ upper, lower @ np.cross(side, upper), want):
+            third = angle * float(self.direction[2] @ side)
+            tip = lower + turned(axis_rotation(side, angle), upper)
+            pairs.append((_angle(side, tip, reach), third))
+        return pairs
+
+    def _wrist(self, rest: Array) -> list[tuple[Array, Array, Array]]:
+        """(n,) angles of the last three axes, whose rotation is `rest` (n, 3, 3)."""
+        fourth, fifth, sixth = self.direction[3:]
+        along = turned(rest, sixth)
+        inner = fifth * (fifth @ sixth)
+        want = along @ fourth - fourth @ inner
+        found = []
+        for angle in _met(fourth @ (sixth - inner), fourth @ np.cross(fifth, sixth), want):
+            bent = self._turn(4, angle)
+            start = turned(bent, sixth)
+            straight = np.linalg.norm(np.cross(start, fourth), axis=1) < _STRAIGHT
+            turn = np.where(straight, np.nan, _angle(fourth, start, along))
+            left = np.swapaxes(self._turn(3, turn) @ bent, -1, -2) @ rest
+            beside = np.cross(sixth, np.eye(3)[int(np.argmin(np.abs(sixth)))])
+            last = _angle(sixth, beside, turned(left, beside))
+            found.append((turn, angle, last))
+        return found
+
+
+def _met(cosine: Array | float, sine: Array | float, want: Array) -> list[Array]:
+    """(n,) both angles t with cosine * cos t + sine * sin t = want, NaN where there is none."""
+    size, middle = np.hypot(cosine, sine), np.arctan2(sine, cosine)
+    share = want / size
+    share = np.where(np.abs(share) > 1.0 + _STRETCHED, np.nan, np.clip(share, -1.0, 1.0))
+    return [np.asarray(middle + sign * np.arccos(share)) for sign in (1.0, -1.0)]
+
+
+def _angle(axis: Array, start: Array, end: Array) -> Array:
+    """(n,) angles about an axis that turn one vector toward another."""
+    start = start - (start @ axis)[..., None] * axis
+    end = end - (end @ axis)[..., None] * axis
+    return np.asarray(np.arctan2(np.sum(np.cross(start, end) * axis, axis=1), np.sum(start * end, axis=1)))
+
+
+def _wrapped(degrees: Array) -> Array:
+    return np.asarray(180.0 - (180.0 - degrees) % 360.0)
