@@ -84,6 +84,7 @@ def test_tip_and_tool_are_where_the_program_says(seed: int, tmp_path: Path) -> N
     assert report["holds"]
     assert report["before"]["position_max_um"] > 300
     assert olp.verify_joints(text, result.data, machine).report["verdict"]["ok"]
+    assert result.report["moves"] | {"feed": 6, "rapid": 1} == result.report["moves"]
     arm, wanted, found = Arm(machine, ZEROS), rapid.moves(text), rapid.moves(result.data)
     digit, turn_digit = 1e-4, 4e-9
     place, joints, first = 0, near[0], True
@@ -150,6 +151,7 @@ def test_targets_that_moves_share_are_cloned(tmp_path: Path) -> None:
     [
         (lambda text: text.replace(b"[0, 0, 0, 0]", b"[0, 1, 0, 0]"), 5, "configuration names"),
         (lambda text: text.replace(b"[0, 0, 0, 0]", b"[0, 0, 0, 4]"), 5, "configuration names"),
+        (lambda text: text.replace(b"[0, 0, 0, 0]", b"[-4, 0, 0, 0]"), 5, "configuration names"),
         (lambda text: text.replace(b"[9E9,9E9", b"[-250.5,9E9"), 5, "external axis"),
         (lambda text: text.replace(b"PERS tooldata spindle", b"PERS tooldata other"), 5, "spindle"),
         (lambda text: re.sub(rb"MoveJ \[\[[-\d.]+", b"MoveJ [[9000", text), 5, "no posture of this arm"),

@@ -81,7 +81,9 @@ def arm_path(program: Program, structure: Structure, errors: MachineErrors, star
     )  # fmt: skip
     flange = _flange(flange, np.array(levers).reshape(-1, 3))
     end = np.full((count, AXES), np.nan)
-    end[rows] = _Settled(arm, dialect, targets, stated, flange).axes(np.array(line)[rows], rows, start_deg)
+    travel = np.array([joint.travel for joint in structure.joints.values()]).T
+    settled = _Settled(arm, dialect, targets, stated, flange, travel)
+    end[rows] = settled.axes(np.array(line)[rows], rows, start_deg)
     feed = np.array([use is not None and use.straight for use in uses], bool)
     start = np.vstack((np.full((1, AXES), np.nan), end[:-1]))[:count]
     feed &= np.isfinite(start).all(axis=1)
@@ -139,15 +141,18 @@ class _Settled:
     that the words of the target name."""
 
     def __init__(
-        self, arm: Arm, dialect: RobotDialect, targets: Targets, uses: list[Use], flange: Poses
-    ) -> None:
+        self, arm: Arm, dialect: RobotDialect, targets: Targets, uses: list[Use], flange: Poses,
+        travel: Array,
+    ) -> None:  # fmt: skip
         self.arm, self.uses, self.flange = arm, uses, flange
         self.postures = arm.postures(flange)
         self.rest = [targets.targets[use.target].rest for use in uses]
         self.named = np.zeros((0, 8, AXES)), np.zeros((0, 8), bool)
         if uses:
             rest = np.array(self.rest, float)
-            self.named = dialect.fitting(rest, self.postures, arm.branches(self.postures))
+            values, fits = dialect.fitting(rest, self.postures, arm.branches(self.postures))
+            beyond = (values < travel[0]) | (values > travel[1])
+            self.named = values, fits & ~beyond.any(axis=2)
 
     def axes(self, line: Index, rows: Index, start_deg: Array) -> Array:
         """(n, 6) axis values of all targets."""
@@ -199,8 +204,8 @@ class _Settled:
                 found.append(value)
         if not found:
             raise _refused(
-                "no posture that reaches this target is the one that its configuration names; check the "
-                "directions of the axes in the machine file",
+                "no posture that reaches this target within the travel of the axes is the one that its "
+                "configuration names; check the directions of the axes in the machine file",
                 line,
             )
         if len(found) > 1:

@@ -9,10 +9,10 @@ import numpy as np
 from olp.compensation.joints.path import JointPath
 from olp.compensation.stamp import find_stamp
 from olp.core.arrays import Array, Index
-from olp.core.toolpath import Kind
 from olp.kinematics.measures import mobility, travel_left
 from olp.workflows.flatten import UnrollOptions
 from olp.workflows.joints.loaded import JointRun
+from olp.workflows.joints.report import kinds_of
 from olp.workflows.original import placed
 
 #: The mobility is shown with so many decimals.
@@ -29,13 +29,15 @@ def program_summary(run: JointRun, options: UnrollOptions) -> dict[str, Any]:
     tilted = np.array([frame.tip == "fixed" for frame in toolpath.frames], bool)
     rows = np.flatnonzero(np.isfinite(path.end).all(axis=1))
     axes = path.motion.axes(path.end[rows], path.tool[rows], path.tip[rows])
+    kinds = kinds_of(path)
     values: dict[str, Any] = {
         "name": run.program.short,
         "dialect": program.dialect.name,
         "dialect_title": program.dialect.title,
         "lines": program.lines,
         "moves": {
-            **{kind.name.lower(): int((toolpath.kind == kind).sum()) for kind in (Kind.RAPID, Kind.LINE)},
+            "rapid": kinds["rapid"],
+            "line": kinds["feed"],
             "with_tip_control": int(path.tip.sum()),
             "in_tilted_planes": int(tilted[toolpath.frame].sum()),
         },

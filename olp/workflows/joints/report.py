@@ -100,7 +100,7 @@ def report_of(
         },
         "largest_correction": _largest(path, plan),
         "moves": {
-            **_kinds(path),
+            **kinds_of(path),
             "with_tip_control": int(path.tip.sum()),
             "uncorrected": len(kept),
             "parts": len(plan.move),
@@ -113,7 +113,7 @@ def report_of(
     }
 
 
-def _kinds(path: JointPath) -> dict[str, int]:
+def kinds_of(path: JointPath) -> dict[str, int]:
     """Straight moves that cut, and others. An arm turns its tool along straight moves, too."""
     if isinstance(path, ArmPath):
         return {"feed": int(path.feed.sum()), "rapid": int((path.judged & ~path.feed).sum())}
