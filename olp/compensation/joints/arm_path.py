@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from olp.compensation.joints.curves import Curves
 from olp.compensation.joints.directed import Directions
 from olp.compensation.joints.drilled import Drilled
 from olp.compensation.joints.motion import Motion
@@ -92,7 +93,7 @@ def arm_path(program: Program, structure: Structure, errors: MachineErrors, star
         program, Motion.of(structure, errors, [(vector, None) for vector in tools]), start, end,
         np.full((count, AXES), -1, np.int32), tool, none, none, np.zeros((count, 3)),
         np.zeros((count, AXES)), np.ones(count), np.ones(AXES), feed, known, ~known, none, none,
-        np.full(AXES, _DECIMALS), Drilled.none(count), Directions.none(count),
+        np.full(AXES, _DECIMALS), Drilled.none(count), Directions.none(count), Curves.none(count),
     )  # fmt: skip
 
 
