@@ -33,8 +33,8 @@ _ABOVE_MM = 1e-3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Arm:
-    """Six rotary axes in the order of the chain: `direction` and `point` (6, 3) of each with all at zero, the
-    `columns` (6,) of their values, the centre of the wrist, and the flange at zero."""
+    """Six rotary axes in the order of the chain: `direction` and `point` (6, 3) of each with all at zero, and
+    the `columns` (6,) of their values. Also the centre of the wrist, and the flange at zero."""
 
     direction: Array
     point: Array
@@ -86,8 +86,8 @@ class Arm:
         return values
 
     def branches(self, axes: Array) -> Array:
-        """(..., 3) what tells postures apart, positive where the centre of the wrist is before the first
-        axis, before the lower arm, and where the fifth axis is positive: mm, mm and deg of the bend."""
+        """(..., 3) what tells postures apart: mm, mm and deg of the bend. They are positive where the centre of
+        the wrist is before the first axis, before the lower arm, and where the fifth axis is positive."""
         shape = axes.shape[:-1]
         values = np.radians(axes.reshape(-1, AXES)[:, self.columns])
         up = self.direction[0]

@@ -65,7 +65,7 @@ def table_export(
     except ConfigError as error:
         raise error.in_file(str(machine)) from None
     notes = [
-        f"once the control has these vectors, describe it anew (olp init --trafo {target.name}) and fit the "
+        f"once the control has these vectors, describe it once more (olp init --trafo {target.name}) and fit the "
         "calibration again: the present one is relative to the old vectors"
     ]
     notes += [

@@ -71,7 +71,7 @@ def test_the_report_says_what_is_left() -> None:
     # a machine with nothing but errors that vectors hold is left without any
     assert 0.0 < after < 0.5 * before
     assert any("the zero of A is off by 0.002578 deg" in note for note in done.notes)
-    assert any("describe it anew" in note for note in done.notes)
+    assert any("describe it once more" in note for note in done.notes)
 
 
 def test_other_machines_are_refused(tmp_path: Path) -> None:
