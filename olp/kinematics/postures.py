@@ -86,8 +86,8 @@ class Arm:
         return values
 
     def branches(self, axes: Array) -> Array:
-        """(..., 3) what tells postures apart: mm, mm and deg of the bend. They are positive where the centre of
-        the wrist is before the first axis, before the lower arm, and where the fifth axis is positive."""
+        """(..., 3) what tells postures apart: mm, mm and deg of the bend. They are positive where the centre
+        of the wrist is before the first axis, before the lower arm, and where the fifth axis is positive."""
         shape = axes.shape[:-1]
         values = np.radians(axes.reshape(-1, AXES)[:, self.columns])
         up = self.direction[0]

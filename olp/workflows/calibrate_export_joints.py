@@ -65,8 +65,8 @@ def table_export(
     except ConfigError as error:
         raise error.in_file(str(machine)) from None
     notes = [
-        f"once the control has these vectors, describe it once more (olp init --trafo {target.name}) and fit the "
-        "calibration again: the present one is relative to the old vectors"
+        f"once the control has these vectors, describe it once more (olp init --trafo {target.name}) and fit "
+        "the calibration again: the present one is relative to the old vectors"
     ]
     notes += [
         f"the zero of {name} is off by {value:.6f} deg; set it at the reference point, no vector holds it"
