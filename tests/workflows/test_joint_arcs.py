@@ -200,6 +200,25 @@ def test_backlash_is_taken_up_where_an_axis_turns_round(tmp_path: Path) -> None:
     assert 3 <= took_up.sum() <= 6
 
 
+SINUMERIK = [b"I=AC(5.0) J=AC(0)", b"I5 J0", b"CR=5"]
+
+
+def test_the_forms_of_sinumerik_arcs_become_the_same_straight_moves(tmp_path: Path) -> None:
+    head, machine = (
+        b"G90 G54\nG0 X0 Y0 Z0 A0 C0\n",
+        machine_file(tmp_path, "C A Y F X Z", control="sinumerik"),
+    )
+    texts = [
+        olp.correct_joints(head + b"G3 X10 Y0 " + form + b" F100\nM30\n", machine, tolerance_um=200.0).data
+        for form in SINUMERIK
+    ]
+    # digits of words may differ by the last one
+    moves = [[place for _, _, place in Judge(machine).read(text)] for text in texts]
+    for text, places in zip(texts, moves, strict=True):
+        assert not any(word in text.split(b"\n", 1)[1] for word in (b"AC", b"CR", b"I", b"J", b"(", b")"))
+        assert np.array(places) == pytest.approx(np.array(moves[0]), abs=1.1e-3)
+
+
 REFUSED = [
     (b"G1 X5 F100\nG43.4 H1\nG2 X0 Y0 Z0 I-2.5\n", "fanuc", 5),
     (b"G68.2 X0 Y0 Z0 I0. J20. K0.\nG53.1\nG2 X10 I5 F100\n", "fanuc", 5),

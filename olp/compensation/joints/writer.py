@@ -289,14 +289,14 @@ class JointWriter:
         if not self.plan.straight:
             return edits.done()
         curves.refuse_kept(self.program)
-        text = self.program.data
+        text, closings = self.program.data, set(self.program.closings.tolist())
         for i in curves.code[curves.code >= 0].tolist():
             start, end = int(words.number[i]), int(words.end[i])
             edits.add(start, end, BARE, 0, text[start : end - 1] + b"1")
         for i in curves.slot[curves.slot >= 0].tolist():
-            start = int(words.start[i])
+            start, end = int(words.start[i]), int(words.end[i])
             start -= text[start - 1 : start] in (b" ", b"\t")
-            edits.add(start, int(words.end[i]), BARE, 0)
+            edits.add(start, end + (end in closings), BARE, 0)
         made = edits.done()
         self.tally.changed_words += len(made)
         return made
