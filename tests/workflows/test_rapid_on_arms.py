@@ -164,6 +164,25 @@ def test_refused_with_its_line(change: object, line: int, told: str, tmp_path: P
     assert caught.value.line == line
 
 
+def test_without_monitoring_the_posture_is_the_one_near_the_start(tmp_path: Path) -> None:
+    """Only the first target is refused where the start is not known: the others follow from it."""
+    moves = [f"  MoveJ {target(JOINTS + k)}{WORDS}".replace("[0, 0, 0, 0]", "[0, 1, 0, 7]") for k in (0, 1)]
+    text, machine, job = text_of("  ConfJ \\Off;", *moves), arm_files(tmp_path), tmp_path / "job.toml"
+    with pytest.raises(ProgramError, match="state start_deg") as caught:
+        olp.correct_joints(text, machine)
+    assert (caught.value.line, caught.value.others) == (6, ())
+    start = ", ".join(f"J{k + 1} = {value}" for k, value in enumerate((JOINTS + 5).tolist()))
+    job.write_text(f'schema = "olp-job-1"\nstart_deg = {{ {start} }}\n', "utf-8")
+    result = olp.correct_joints(text, machine, job)
+    assert result.report["verdict"]["ok"]
+    # the posture nearest to this one has J3 at 174.9 deg, beyond its travel, and is not taken
+    near = "J1 = -155, J2 = -15, J3 = 158, J4 = -150, J5 = 48, J6 = 56"
+    job.write_text(f'schema = "olp-job-1"\nstart_deg = {{ {near} }}\n', "utf-8")
+    assert olp.correct_joints(text, machine, job).report["verdict"]["ok"]
+    # a configuration that says nothing of the posture is kept
+    assert result.data.count(b"[0, 1, 0, 7]") == 2
+
+
 def test_a_straight_wrist_is_refused(tmp_path: Path) -> None:
     joints = np.array([20.0, 10.0, 20.0, 30.0, 0.0, 50.0])
     with pytest.raises(ProgramError, match="the wrist is straight"):

@@ -145,7 +145,7 @@ class _Settled:
         self, arm: Arm, dialect: RobotDialect, targets: Targets, uses: list[Use], flange: Poses,
         travel: Array,
     ) -> None:  # fmt: skip
-        self.arm, self.uses, self.flange = arm, uses, flange
+        self.arm, self.uses, self.flange, self.travel = arm, uses, flange, travel
         self.postures = arm.postures(flange)
         self.rest = [targets.targets[use.target].rest for use in uses]
         self.named = np.zeros((0, 8, AXES)), np.zeros((0, 8), bool)
@@ -157,17 +157,20 @@ class _Settled:
 
     def axes(self, line: Index, rows: Index, start_deg: Array) -> Array:
         """(n, 6) axis values of all targets."""
-        values, last, before = np.empty((len(self.uses), AXES)), start_deg, -1
+        values, last, before, lost = np.empty((len(self.uses), AXES)), start_deg, -1, False
         refusals: list[ProgramError] = []
         for k, row in enumerate(rows.tolist()):
             if row != before + 1:
-                last = np.full(AXES, np.nan)
+                last, lost = np.full(AXES, np.nan), False
             before = row
             try:
                 last = values[k] = self._of(k, last, int(line[k]))
+                lost = False
             except ProgramError as error:
-                refusals.append(error)
-                last = np.full(AXES, np.nan)
+                # where the posture before is not known, this one is not, too
+                if not (lost and self._follows(k)):
+                    refusals.append(error)
+                last, lost = np.full(AXES, np.nan), True
         if refusals:
             raise ProgramError.together(iter(refusals))
         return values
@@ -175,16 +178,33 @@ class _Settled:
     def _of(self, k: int, last: Array, line: int) -> Array:
         if np.isnan(self.postures[k, :, 0]).all():
             raise _refused("no posture of this arm reaches this target", line)
-        near = (self.uses[k].straight or self.uses[k].free) and np.isfinite(last).all()
-        if near:
-            found: Array = _nearest(last[None], self.postures[k : k + 1])[0]
-            if self.uses[k].straight and np.nanmax(np.abs(found - last)) > _FAR_DEG and k:
+        if self._follows(k) and np.isfinite(last).all():
+            straight, postures = self.uses[k].straight, self.postures[k]
+            if not straight:
+                postures = self._within(postures, last)
+            found: Array = _nearest(last[None], postures[None])[0]
+            if not straight:
+                found = found + 360.0 * ((found < self.travel[0]) * 1.0 - (found > self.travel[1]))
+            if straight and np.nanmax(np.abs(found - last)) > _FAR_DEG and k:
                 found = self._followed(k, last)
         else:
             found = self._named(k, line)
+        if np.isnan(found).all():
+            raise _refused("no posture within the travel of the axes leads on to this target", line)
         if np.isnan(found).any():
             raise _straight_wrist(line)
         return found
+
+    def _follows(self, k: int) -> bool:
+        """Whether a target is reached with a posture near the one before."""
+        return self.uses[k].straight or self.uses[k].free
+
+    def _within(self, postures: Array, last: Array) -> Array:
+        """Those of postures (8, 6) that are within travel, perhaps by a turn; NaN in place of others."""
+        near = last + (postures - last + 180.0) % 360.0 - 180.0
+        near = near + 360.0 * ((near < self.travel[0]) * 1.0 - (near > self.travel[1]))
+        beyond = ((near < self.travel[0]) | (near > self.travel[1])).any(axis=1)
+        return np.where(beyond[:, None], np.nan, postures)
 
     def _followed(self, k: int, last: Array) -> Array:
         """The posture at the end of a long straight move, followed step by step."""
@@ -203,6 +223,12 @@ class _Settled:
         for value in values[fits]:
             if all(np.nanmax(np.abs(value - other)) > _SAME_DEG for other in found):
                 found.append(value)
+        if not found and self.uses[k].free:
+            raise _refused(
+                "no posture of this target is the one that its configuration names, and the control is told "
+                "not to look at that; state start_deg in the job file, where the arm is before it",
+                line,
+            )
         if not found:
             raise _refused(
                 "no posture that reaches this target within the travel of the axes is the one that its "
