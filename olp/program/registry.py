@@ -172,6 +172,9 @@ def dialect_of(name: str | None, control: Dialect, data: bytes, file: str) -> Di
         )
     if names:
         (one,) = names
+        if ending == control.name:
+            # the machine file agrees, and languages of one family share statements
+            return control
         if ending not in (None, one):
             raise ProgramError(
                 f"the ending of the file is that of {ending}, and its text is {one}; name its dialect with "

@@ -13,12 +13,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cases.acceptance import points, unstamped
-from cases.dialects import BLOCKS, CASES, FRAMES, Case
+from cases.acceptance import judged, points, unstamped
+from cases.dialects import BLOCKS, CASES, FRAMES, RS274, Case
 from cases.fast import some_fast
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from judge import machines
+from judge import linuxcnc, machines
 from judge.machines import Recipe
 from judge.model import JudgeModel
 from judge.path import match
@@ -35,6 +35,8 @@ SLACK_MM = 1e-6
 OFFSET = np.array([250.0, 200.0, -300.0])
 LEVER = np.array([0.0, 0.0, -120.0])
 HALF_DIGIT = 0.5e-3 + SLACK_MM
+#: what the strictest control of them (grbl) takes as the difference of two radii of an arc
+RADIUS_MM = 0.005
 
 
 def recipe(case: Case, **more: object) -> Recipe:
@@ -259,6 +261,32 @@ def test_l6_distances_do_not_drift(bent: dict[str, Path], name: str) -> None:
     own = np.cumsum([[float(n) for n in row] for row in rows], axis=0)
     nominal = np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
     assert commanded(nominal, written, bent[name], case, own) <= HALF_DIGIT
+
+
+# -- L5, L7: another interpreter makes the moves that are meant, and arcs are arcs for it ----------------
+
+
+@pytest.mark.slow
+@pytest.mark.oracle
+@pytest.mark.parametrize("name", RS274)
+def test_l5_l7_linuxcnc_makes_the_moves_and_the_arcs(tmp_path: Path, name: str) -> None:
+    """What all controls of this family have in common is in words of LinuxCNC too."""
+    case, profile = CASES[name], RS274[name]
+    head = [*case.head, "G91.1"] if profile.arc_distance is None else case.head
+    arcs = ["G3 X0.000 Y10.000 I-10.000 J0.000", "G2 X-20.000 Y10.000 I-10.000 J0.000"]
+    rows = [case.point((10.0, 0.0, 1.0), 3), *arcs, case.point((-40.0, 30.0, -3.5), 3)]
+    nominal = "\n".join([*head, *rows, *case.tail, ""]).encode()
+    path = machines.random_machine(tmp_path, 11, Recipe(controller=case.controller, off_datum=True))
+    meant = np.array([(10, 0, 1), (0, 10, 1), (-20, 10, 1), (-40, 30, -3.5)]) + OFFSET
+    # for LinuxCNC the G0 with a feed alone at the head of printers is a move to where it stands
+    np.testing.assert_allclose(linuxcnc.interpret(nominal, tmp_path).axis[-4:], meant, atol=1e-9)
+    corrected = olp.correct(nominal, pinned(path, case)).data
+    assert judged(nominal, corrected, tmp_path).max_um <= 1.0 + 0.87
+    moves = linuxcnc.interpret(corrected, tmp_path)
+    rounds = moves.turns != 0
+    assert rounds.sum() >= len(arcs)
+    radii = [np.linalg.norm((at - moves.centre)[rounds, :2], axis=1) for at in (moves.begin, moves.axis)]
+    assert np.abs(radii[1] - radii[0]).max() <= RADIUS_MM
 
 
 # -- L8: every move is accounted for ------------------------------------------------------------------

@@ -186,6 +186,15 @@ def test_endings_of_files(file: str, name: str) -> None:
     assert chosen(None, b"", file) == name
 
 
+def test_an_ending_of_the_control_itself_is_no_contradiction() -> None:
+    """User tasks of Okuma have `X=` as Sinumerik has it."""
+    text, okuma = b"VC1=0\nG0 X=-3-VC1 Y=0\nM2\n", DIALECTS["okuma"]
+    assert dialect_of(None, okuma, text, "PART.MIN").name == "okuma"
+    assert dialect_of(None, okuma, text, "PART.MPF").name == "sinumerik"
+    with pytest.raises(ProgramError, match="is that of okuma, and its text is sinumerik"):
+        dialect_of(None, DIALECTS["haas"], text, "PART.MIN")
+
+
 def test_a_contradiction_has_its_code() -> None:
     with pytest.raises(ProgramError, match="with --dialect, or with the key dialect") as caught:
         chosen(None, b"PARTNO A\n", "a.dmi")
