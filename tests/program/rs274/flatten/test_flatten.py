@@ -204,7 +204,7 @@ def test_haas_local_subprogram() -> None:
         ("O1\nX#500\n", 2, "#500"),
         ("O1\nX#5021\n", 2, "#5021"),
         ("O1\n#3000=1(STOP)\n", 2, "alarm"),
-        ("O1\n#5221=1.\n", 2, "#5221"),
+        ("O1\n#5201=1.\n", 2, "#5201"),
         ("O1\nG66.1 P1\n", 2, "G66.1"),
         ("O1\nG65 P2 X5\nM30\nO2\nM99\n", 2, "decimal point"),
         ("O1\nN1 GOTO1\n", 2, "blocks"),
