@@ -6,7 +6,7 @@ Positions are axis positions in mm; an axis whose position is not known is NaN. 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import field, replace
 from typing import Any
 
@@ -60,6 +60,8 @@ STORES_POSITION = 20
 
 #: What changes or uses offsets beside the move of a block.
 _OFFSET_CODES = LENGTHS | HOMES | SHIFTS | WORK_OFFSETS | FURTHER_OFFSETS | {MACHINE, WRITE_OFFSET}
+#: What turns the frame in force by a work offset, or leaves it for positions of the machine.
+_MAY_TURN = WORK_OFFSETS | FURTHER_OFFSETS | {MACHINE, WRITE_OFFSET}
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,6 +93,8 @@ class AxisState(OffsetState):
     tilts: list[Tilt] = field(default_factory=list)
     #: the frame of the last plain motion, -1 before any
     last_frame: int = -1
+    #: those of lengths, by the tool whose length is active and the work offset
+    length_errors: dict[tuple[int, str], tuple[LengthError, ...]] = field(default_factory=dict)
     #: frames by the values of their fields: to look one up, none is made
     _index: dict[tuple[Any, ...], int] = field(default_factory=dict)
 
@@ -173,9 +177,13 @@ class AxisState(OffsetState):
         """The errors of the active length, and of the length of the tool that touched the offset."""
         if self.length_tool is None:
             return ()
-        name = self.located.get(name, name)
-        work = self._work_offset(name)
-        return length_errors_of(self.setup, self.length_tool, None if work is None else touch_tool_of(work))
+        key = self.length_tool, self.located.get(name, name)
+        known = self.length_errors.get(key)
+        if known is None:
+            work = self._work_offset(key[1])
+            touching = None if work is None else touch_tool_of(work)
+            known = self.length_errors[key] = length_errors_of(self.setup, self.length_tool, touching)
+        return known
 
     # -- events ------------------------------------------------------------------------------------
 
@@ -206,7 +214,8 @@ class AxisState(OffsetState):
             self.spindle = self._integer(by_letter["Q"], line)
         self.forget(self.moved_by(m_codes)[0])
         effect = Effect()
-        angle_deg = self._angle_deg(self.offsets.name, line) if self.profile.turns_offsets else 0.0
+        turning = self.profile.turns_offsets and not _MAY_TURN.isdisjoint(codes)
+        angle_deg = self._angle_deg(self.offsets.name, line) if turning else 0.0
         self.unit = next((code for code in codes if code in UNITS), self.unit)
         self._check_modes(codes, line)
         changes_tool = TOOL_CHANGE in m_codes or (SET_TOOL in m_codes and self.profile.m61_sets_tool)
@@ -215,7 +224,7 @@ class AxisState(OffsetState):
         for code in codes:
             effect = self._event(code, line, by_letter, block.axes, moves, effect)
         check_codes_along(self, block.g_codes, m_codes, line)
-        if self.profile.turns_offsets:
+        if turning:
             self._check_turned(angle_deg, effect, line)
         return effect
 
@@ -269,9 +278,11 @@ class AxisState(OffsetState):
             )
         self.forget()
 
-    def moved_by(self, m_codes: Iterable[int]) -> tuple[tuple[int, ...], Place]:
+    def moved_by(self, m_codes: Collection[int]) -> tuple[tuple[int, ...], Place]:
         """The axes that M codes may move, ten times their numbers, and where these stand then: those of M6,
         and all of codes that are not known to leave the axes."""
+        if not m_codes:
+            return (), UNKNOWN
         moving = {m for m in m_codes if m not in self.profile.still_m}
         if self.profile.m61_sets_tool:
             moving.discard(SET_TOOL)

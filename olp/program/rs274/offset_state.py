@@ -86,6 +86,8 @@ class OffsetState(State):
     length_tool: int | None = None
     spindle: int | None = None
     length_unit: int = METRIC
+    #: those of the setup that were looked up, None where it has none of this name
+    known_offsets: dict[str, WorkOffset | None] = field(default_factory=dict)
     captures: list[Capture] = field(default_factory=list)
     #: index of the first word of the present block in the program's table
     first_word: int = 0
@@ -108,7 +110,10 @@ class OffsetState(State):
         return increment(self.setup.machine, letter, self.unit_mm)
 
     def _work_offset(self, name: str) -> WorkOffset | None:
-        return self.setup.work_offset(name) or self.setup.work_offset(_SPACED.sub(r"\1 \2", name))
+        if name not in self.known_offsets:
+            spaced = _SPACED.sub(r"\1 \2", name)
+            self.known_offsets[name] = self.setup.work_offset(name) or self.setup.work_offset(spaced)
+        return self.known_offsets[name]
 
     def _angle_deg(self, name: str, line: int) -> float:
         """By how much a work offset is turned about Z, as the program has written it, else as the setup has
