@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterator
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -125,13 +126,13 @@ def _of_line(line: Line) -> Iterator[What]:
         letters = [d for d in "ABC" if d != line.component[1]]
         for letter in letters:
             name = f"E{letter}{line.component[2]}"
-            yield ("columns", "", dataclasses.replace(line, component=name))
+            yield ("columns", f"it is {line.component}", dataclasses.replace(line, component=name))
         return
     place = list(line.line_mm)
     place[(line.axis + 1) % 3] += 600.0
-    yield ("place", "", dataclasses.replace(line, line_mm=tuple(place)))
+    yield ("place", "another place", dataclasses.replace(line, line_mm=tuple(place)))
     tool = (line.tool_mm[0] + 150.0, line.tool_mm[1] - 100.0, line.tool_mm[2] + 120.0)
-    yield ("lever", "", dataclasses.replace(line, tool_mm=tool))
+    yield ("lever", "another lever arm", dataclasses.replace(line, tool_mm=tool))
     if line.quantity == "positioning":
         stretched = line.value + 1.1e-5 * 5.0 * (line.target_mm - line.target_mm.min())
         yield ("temperature", "scale", dataclasses.replace(line, value=stretched))
@@ -153,14 +154,14 @@ def _of_points(one: Points) -> Iterator[What]:
     mirrored = one.measured_mm * np.array((1.0, 1.0, -1.0))
     yield ("handedness", "left-handed", dataclasses.replace(one, measured_mm=mirrored))
     scaled = one.measured_mm * (1.0 + 6e-5)
-    yield ("scale", "", dataclasses.replace(one, measured_mm=scaled))
-    yield ("lever", "", dataclasses.replace(one, tool_mm=one.tool_mm[:, [1, 0, 2]]))
+    yield ("scale", "scale of its own", dataclasses.replace(one, measured_mm=scaled))
+    yield ("lever", "tool vectors are swapped", dataclasses.replace(one, tool_mm=one.tool_mm[:, [1, 0, 2]]))
 
 
 def _of_lengths(one: Lengths) -> Iterator[What]:
     scaled = one.length_mm * (1.0 + 6e-5)
-    yield ("scale", "", dataclasses.replace(one, length_mm=scaled))
-    yield ("lever", "", dataclasses.replace(one, tool_mm=one.tool_mm[:, [1, 0, 2]]))
+    yield ("scale", "scale of its own", dataclasses.replace(one, length_mm=scaled))
+    yield ("lever", "tool vectors are swapped", dataclasses.replace(one, tool_mm=one.tool_mm[:, [1, 0, 2]]))
 
 
 def _of_pods(one: Pods) -> Iterator[What]:
@@ -242,6 +243,7 @@ def _shift(clean: Fit, state: State, block: Block, planted: Observation) -> Bloc
     return Block(block.columns, block.precision, chunks)
 
 
+@cache
 def clean_fit(seed: int, family: str, mixture: str) -> tuple[Measurements, FittedCalibration]:
     """Readings without a blunder, and their fit."""
     taken = readings(seed, family, mixture)

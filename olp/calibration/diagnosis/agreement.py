@@ -19,6 +19,7 @@ from olp.calibration.estimator.fitted import Fit
 from olp.calibration.estimator.normal import Normal
 from olp.calibration.observations.base import Alternative, State
 from olp.core.arrays import Array, Index
+from olp.core.errors import CannotCompute
 from olp.core.values import dataclass
 from olp.errormodel.quality import Fitted
 
@@ -32,6 +33,9 @@ _CONFIRMED = math.log(20.0)
 _EXPLAINS = 0.9
 #: Nats by which something is excluded: 100 to 1.
 EXCLUDED = math.log(100.0)
+#: Where values change by a factor, so does the roughness learnt from them, by these shares of it: that of
+#: values below the resolution of readings was learnt larger than it is.
+_SHARES = 1.0, 0.1, 0.01
 #: At most so many sources of a fit are put right, one after the other.
 _MOST = 4
 
@@ -214,35 +218,67 @@ def _agreements(fit: Fit, sources: list[_Source]) -> tuple[Agreement, ...]:
             continue
         # all of a curve, whatever part of it was read: its scale is that of all
         columns = np.union1d(columns, _curve(fit, source))
-        given = _given(total - source.normal.H, right - source.normal.g, columns)
-        alone = _given(prior, means.g, columns)
-        z = given.z(source)
+        rest = total - source.normal.H, right - source.normal.g
+        both = _given(*rest, columns), _given(prior, means.g, columns)
+        z = both[0].z(source)
         misfit = Fitted(source.state.label, float(z @ z), float(len(z)))
-        as_read = given.log_evidence(source) - alone.log_evidence(source)
-        tried = sorted(_tried(fit, prior, given, alone, source, as_read), key=lambda one: -one.log_odds)
+        as_read = both[0].log_evidence(source) - both[1].log_evidence(source)
+        off = misfit.failed and -as_read > NAMED
+        tries = tuple(_alternatives(fit, source, off=off))
+        # another component depends on other unknowns
+        wider = np.union1d(columns, np.flatnonzero(sum(other.normal.H.any(axis=0) for _, other in tries)))
+        if len(wider) > len(columns):
+            both = _given(*rest, wider), _given(prior, means.g, wider)
+        tried = sorted(
+            (_tried(fit, prior, both, source, one, as_read, off=off) for one in tries),
+            key=lambda one: -one.log_odds,
+        )
         label, component = source.state.label, source.state.component
         found.append(Agreement(label, component, misfit, tuple(tried), -as_read))
     return tuple(found)
 
 
-def _tried(
-    fit: Fit, prior: Array, given: _Given, alone: _Given, source: _Source, as_read: float
-) -> Iterator[Tried]:
-    """What may be wrong with a source: how much better the others predict it then. What the prior `alone`
-    makes of its size is taken off."""
+def _alternatives(fit: Fit, source: _Source, *, off: bool) -> Iterator[tuple[Alternative, _Source]]:
+    """What may be wrong with a source, put right; without what cannot be at all. `off` says that it
+    contradicts all others."""
+    tables = fit.parameters.chain.partition("F")[0]
     for alternative in source.state.observation.alternatives():
-        other = _as(fit, alternative)
-        values = []
-        for here in (given, alone):
-            more = 0.0
-            columns = _curve(fit, source)
-            if abs(alternative.factor) != 1.0 and len(columns):
-                # the roughness of a curve was learnt from these readings, and is of another size then
-                part = np.searchsorted(given.columns, columns)
-                here, more = here.scaled(part, prior[np.ix_(columns, columns)], alternative.factor)
-            values.append(here.log_evidence(other) + more)
-        support = values[0] - values[1]
-        yield Tried(alternative.kind, alternative.words, support - as_read, support)
+        if alternative.on_table not in tables or (alternative.where_off and not off):
+            continue
+        try:
+            yield alternative, _as(fit, alternative)
+        except CannotCompute:
+            continue
+
+
+def _tried(
+    fit: Fit,
+    prior: Array,
+    both: tuple[_Given, _Given],
+    source: _Source,
+    alternative: tuple[Alternative, _Source],
+    as_read: float,
+    *,
+    off: bool,
+) -> Tried:
+    """What may be wrong with a source, `off` or not: how much better the others predict it then. `both` are
+    what they and the prior alone say; what the prior makes of its size is taken off."""
+    one, other = alternative
+    columns = _curve(fit, source)
+    values = []
+    for here in both:
+        if abs(one.factor) == 1.0 or not len(columns):
+            values.append(here.log_evidence(other))
+            continue
+        # the roughness of a curve was learnt from these readings, and is of another size then
+        part, own = np.searchsorted(here.columns, columns), prior[np.ix_(columns, columns)]
+        shares = _SHARES if off else _SHARES[:1]
+        sizes = [share * one.factor for share in shares if share == 1.0 or share * abs(one.factor) > 1.0]
+        scaled = [here.scaled(part, own, size) for size in sizes]
+        each = np.array([given.log_evidence(other) + more for given, more in scaled])
+        values.append(float(each.max() + np.log(np.mean(np.exp(each - each.max())))))
+    support = values[0] - values[1]
+    return Tried(one.kind, one.words, support - as_read, support)
 
 
 def _curve(fit: Fit, source: _Source) -> Index:

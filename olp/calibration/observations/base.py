@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, ClassVar, Generic, TypeVar
 
 import numpy as np
@@ -17,13 +17,15 @@ import numpy as np
 from olp.calibration.estimator.normal import Block, Normal, residuals_of
 from olp.calibration.estimator.parameters import Parameters, Unknowns
 from olp.core.arrays import Array, Index
-from olp.core.units import RAD_PER_URAD, UM_PER_MM
+from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM
 from olp.core.values import dataclass
 
 #: A reading is left out where its residual is more than so many standard deviations.
 OUTLIER = 6.0
 #: At most this share of a set is left out.
 SHARE = 0.05
+#: Standard deviation of a scale of its own that readings may have by mistake: 5 K of steel.
+OWN_SCALE = 6e-5
 #: Runs may spread by at most this factor more than stated.
 SCATTER = 1.5
 
@@ -75,12 +77,16 @@ STILL = Advance(np.zeros(0))
 @dataclass(frozen=True, slots=True, eq=False)
 class Alternative:
     """What may be wrong with an observation: its `kind` in a word, in `words`, and the observation put right.
-    `factor` is by how much its values are multiplied for that."""
+    `factor` is by how much its values are multiplied for that. It can be only where the axis `on_table`, if
+    it names one, carries the workpiece. Some are tried only `where_off`: where readings contradict all
+    others, whatever the cause."""
 
     kind: str
     words: str
     observation: Observation
     factor: float = 1.0
+    on_table: str = ""
+    where_off: bool = False
 
 
 class Observation(ABC):
@@ -205,6 +211,18 @@ class Scattered(Observation):
 
     def reach(self, axis: int) -> Array:
         return np.asarray(self.axis_mm[:, axis])
+
+    def swapped(self) -> Iterator[Alternative]:
+        """Swapped columns of axis positions or tool vectors, and tool vectors with the other sign."""
+        for pair in (0, 1), (0, 2), (1, 2):
+            order = [0, 1, 2]
+            order[pair[0]], order[pair[1]] = pair[1], pair[0]
+            letters = f"{AXES[pair[0]]} and {AXES[pair[1]]}"
+            for name, what in (("axis_mm", "axis positions"), ("tool_mm", "tool vectors")):
+                other = dataclasses.replace(self, **{name: getattr(self, name)[:, order]})  # type: ignore[type-var]
+                yield Alternative("columns", f"{letters} of its {what} are swapped", other, where_off=True)
+        turned = dataclasses.replace(self, tool_mm=-self.tool_mm)  # type: ignore[type-var]
+        yield Alternative("tool", "its tool vectors have the other sign", turned, where_off=True)
 
     @abstractmethod
     def start(self, noise: Noise | None = None) -> ScatteredState: ...

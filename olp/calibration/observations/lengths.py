@@ -6,8 +6,9 @@ first guess is the linear solution of 2 Q.S + 2 L d + (d^2 - |S|^2) = |Q|^2 - L^
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
-from dataclasses import field
+from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,9 @@ import numpy as np
 from olp.calibration.estimator.normal import Block, Chunk, residuals_of
 from olp.calibration.estimator.parameters import Unknowns
 from olp.calibration.observations.base import (
+    OWN_SCALE,
     Advance,
+    Alternative,
     Noise,
     Outlier,
     Scattered,
@@ -76,6 +79,12 @@ class Lengths(Scattered):
         for name, column in columns.items():
             column.flags.writeable = False
             object.__setattr__(self, name, column)
+
+    def alternatives(self) -> Sequence[Alternative]:
+        """A scale of its own, and swapped columns."""
+        scaled = replace(self, sigma_scale=math.hypot(self.sigma_scale, OWN_SCALE))
+        words = "it has a scale of its own (temperature, wavelength)"
+        return [Alternative("scale", words, scaled, where_off=True), *self.swapped()]
 
     def start(self, noise: Noise | None = None) -> LengthsState:
         return LengthsState(self, first_station(self))

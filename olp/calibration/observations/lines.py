@@ -11,16 +11,17 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field, replace
 from typing import Any, Literal
 
 import numpy as np
 
 from olp.calibration.estimator.normal import Block, Chunk
-from olp.calibration.estimator.parameters import SHEAR, Parameters, gathered
+from olp.calibration.estimator.parameters import CROSS, SHEAR, Parameters, gathered
 from olp.calibration.observations.base import (
     OUTLIER,
+    OWN_SCALE,
     SHARE,
     Alternative,
     Noise,
@@ -47,8 +48,8 @@ SAME_MM = 0.05
 LEAST = 1e-5, 1e-8
 #: urad per second of arc.
 ARCSEC_URAD = math.pi / 0.648
-#: Standard deviation of a scale of its own that a line may have by mistake: 5 K of steel.
-OWN_SCALE = 6e-5
+#: Standard deviation of a place or lever arm that may be another one, mm.
+OWN_LEVER_MM = 500.0
 _DOUBLE = (
     ("factor 2", 2.0, "its values are half of what they should be"),
     ("factor 2", 0.5, "its values are twice what they should be"),
@@ -93,7 +94,7 @@ class Line(Observation):
     all readings of a line (mm/mm, a laser's wavelength). A sigma of 0 means not known: it then follows from
     the spread of the runs. `source` is the file and `row` (n,) the line of each reading in it.
     `sensors_degC` (n,) are the temperatures of the structure at each reading, by the name of the sensor.
-    Raises ConfigError.
+    `sigma_lever_mm` is the standard uncertainty of its place and lever arm. Raises ConfigError.
     """
 
     component: str
@@ -113,6 +114,7 @@ class Line(Observation):
     straightedge: str | None = None
     turned: bool = False
     sensors_degC: Mapping[str, Array] = field(default_factory=dict)
+    sigma_lever_mm: float = 0.0
 
     def __post_init__(self) -> None:
         if not len(self.row):
@@ -185,7 +187,25 @@ class Line(Observation):
             scaled = replace(self, sigma_scale=math.hypot(self.sigma_scale, OWN_SCALE))
             words = "it has a scale of its own (temperature, expansion, wavelength)"
             found.append(Alternative("scale", words, scaled))
-        return found
+        return [*found, *self._others()]
+
+    def _others(self) -> Iterator[Alternative]:
+        """Another component, another place or lever arm, and another reference."""
+        mine = AXES if self.component[1] in AXES else "ABC"
+        own = (self.component[1], self.component[2] if mine == AXES else "")
+        if self.quantity != "positioning" and self.square is None and self.straightedge is None:
+            for letter in (letter for letter in mine if letter not in own):
+                name = f"E{letter}{self.component[2]}"
+                yield Alternative("columns", f"it is {name}", replace(self, component=name), where_off=True)
+        if self.quantity != "angle":
+            words = "it was read at another place or with another lever arm"
+            other = replace(self, sigma_lever_mm=OWN_LEVER_MM)
+            yield Alternative("place", words, other, where_off=True)
+        if self.quantity == "straightness":
+            seen: Reference = "table" if self.reference == "functional-point" else "functional-point"
+            words = "its reflector was on the table" if seen == "table" else "its reflector was on the tool"
+            other = replace(self, reference=seen)
+            yield Alternative("reference", words, other, on_table=self.component[2], where_off=True)
 
     def start(self, noise: Noise | None = None) -> LineState:
         return LineState(self, noise or noise_of(self))
@@ -216,7 +236,7 @@ class LineState(State):
         return len(self.observation.value)
 
     def block(self, parameters: Parameters, theta: Array) -> Block:
-        return line_block(self.observation, parameters, self.noise)
+        return line_block(self.observation, parameters, self.noise, theta)
 
     def scatter(self) -> str | None:
         return scatter_words(self.label, self.noise, self.observation.sigma, *unit_of(self.component))
@@ -319,8 +339,8 @@ def shared_names(line: Line) -> list[str]:
     return names + (list(form_columns(line.straightedge, line.target_mm)) if line.straightedge else [])
 
 
-def line_block(line: Line, parameters: Parameters, noise: Noise) -> Block:
-    """The readings of one line."""
+def line_block(line: Line, parameters: Parameters, noise: Noise, theta: Array | None = None) -> Block:
+    """The readings of one line; where its lever arm is not known, with the angles of `theta`."""
     n, axis = len(line.value), line.axis
     q = line.target_mm
     side = line.direction.astype(float)
@@ -368,6 +388,12 @@ def line_block(line: Line, parameters: Parameters, noise: Noise) -> Block:
         elif line.sigma_scale > 0.0:
             local.append(from_datum)
             precision.append(1.0 / line.sigma_scale**2)
+    if line.sigma_lever_mm > 0.0 and theta is not None:
+        angles = [f"E{'ABC'[a]}{AXES[axis]}" for i, a, _, _ in CROSS if AXES[i] == line.component[1]]
+        for name in angles:
+            each = [values @ theta[part] for part, values in parameters.curve(name, q, side)]
+            local.append(np.asarray(np.sum(each, axis=0)))
+        precision += [1.0 / line.sigma_lever_mm**2] * len(angles)
     if noise.drift > 0.0:
         ramps = drift_ramps(line)
         local += list(ramps.T)

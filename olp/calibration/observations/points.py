@@ -8,6 +8,7 @@ probed are such points too: commanded is where the machine touched them, measure
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import field, replace
 from typing import Any
@@ -17,6 +18,7 @@ import numpy as np
 from olp.calibration.estimator.normal import Block, Chunk
 from olp.calibration.estimator.parameters import LEVER_ARM_MM, Unknowns, frame_columns
 from olp.calibration.observations.base import (
+    OWN_SCALE,
     Advance,
     Alternative,
     Noise,
@@ -107,12 +109,20 @@ class Points(Scattered):
         return self.known_frame
 
     def alternatives(self) -> Sequence[Alternative]:
-        """A left-handed frame."""
-        mirror = np.array((1.0, 1.0, -1.0))
-        turned = None if self.covariance_mm2 is None else self.covariance_mm2 * np.outer(mirror, mirror)
-        other = replace(self, measured_mm=self.measured_mm * mirror, covariance_mm2=turned)
-        words = "its coordinates are left-handed: one of them has the other sign"
-        return () if self.known_frame else (Alternative("handedness", words, other),)
+        """A left-handed frame, a scale of its own, and swapped columns."""
+        scaled = replace(self, sigma_scale=math.hypot(self.sigma_scale, OWN_SCALE))
+        found = [
+            Alternative(
+                "scale", "it has a scale of its own (temperature, wavelength)", scaled, where_off=True
+            )
+        ]
+        if not self.known_frame:
+            mirror = np.array((1.0, 1.0, -1.0))
+            turned = None if self.covariance_mm2 is None else self.covariance_mm2 * np.outer(mirror, mirror)
+            other = replace(self, measured_mm=self.measured_mm * mirror, covariance_mm2=turned)
+            words = "its coordinates are left-handed: one of them has the other sign"
+            found += [Alternative("handedness", words, other), *self.swapped()]
+        return found
 
     def start(self, noise: Noise | None = None) -> PointsState:
         return PointsState(self)

@@ -108,8 +108,8 @@ RULES = (
         "a source of readings contradicts all others",
         Severity.ERROR,
         "All other readings predict this source, and what it says is far off. No single mistake of sign, "
-        "unit, order or scale explains it. It may be of another machine or day, or read at another place or "
-        "with another reflector. Or the machine bends.",
+        "unit, order, scale, column, place or lever arm explains it. It may be of another machine or day. Or "
+        "the machine bends.",
         "Check place, reflector, machine and date of this file. Fit without it, or with --map where points "
         "show that the machine bends.",
         "A line of Z taken on the sister machine.",

@@ -16,6 +16,12 @@ PLANTED = (
     ("25.4", "circle-xy.csv", "circles"),
     ("handedness", "points.csv", "points"),
     ("another machine", "exx.csv", "points"),
+    ("1000", "exx.csv", "points"),
+    ("columns", "eax.csv", "points"),
+    ("place", "exx.csv", "points"),
+    ("scale", "points.csv", "points"),
+    ("lever", "points.csv", "points"),
+    ("scale", "station-0.csv", "stations"),
 )
 
 
