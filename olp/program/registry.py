@@ -88,7 +88,7 @@ DIALECTS: Mapping[str, Dialect] = _Dialects()
 _VERSION = pattern(r"\.\d+$")
 #: bytes of a text that are searched for signs of a dialect
 _LOOKED_AT = 1 << 16
-_PAYLOAD = pattern(rb"(?im)^[^\r\n]*\bolp[ \t]+payload\b")
+_PAYLOAD = pattern(rb"(?i)\bolp[ \t]+payload\b")
 
 
 def read(
@@ -115,7 +115,8 @@ def _refuse_payloads(data: bytes, setup: Setup, dialect: Dialect) -> None:
         raise ProgramError(
             f"[[payloads]] of the job file: {what}", line=min(setup.job.payloads), code="OLP550"
         )
-    comment = _PAYLOAD.search(data)
+    # a search of a text without the word takes 30 ns a byte
+    comment = _PAYLOAD.search(data) if b"payload" in data.lower() else None
     if comment:
         raise ProgramError(
             f"a comment changes the payload: {what}",

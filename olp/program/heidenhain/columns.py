@@ -67,16 +67,17 @@ _LETTER = _table(b"ABCDEFGHIJKLMNOPQRSTUVWXYZ")
 _NUMERIC = _table(b"+-.0123456789")
 _VALUE = _table(b"+-.0123456789Q")
 _AXIS = _table(b"XYZABCUVW")
-_SKIPPED = _table(bytes(range(33)) + b"0123456789")
-#: the letters that stand for something else here
-_TAKEN = _table(b"DEHTKPOQG")
+#: Bytes by which a line begins behind its number: 1 in a table of all.
+_SOLID = bytes(byte > 32 and byte not in b"0123456789" for byte in range(256))
+#: The same of the letters that stand for something else here, and of brackets.
+_TAKEN = bytes(byte in b"DEHTKPOQG()" for byte in range(256))
+#: The same of the letters in each word of several.
+_SPELLED = bytes(byte in b"RDPIMUF" for byte in range(256))
 #: FAUTO: the feed of the TOOL CALL
 _AUTOMATIC = re.compile(rb"F([ \t]?)AUTO\Z")
 #: The number of a side by its second letter, 255 for none.
 _SIDES = np.full(256, 255, np.uint8)
 _SIDES[list(b"0LR")] = list(b"012")
-_UPPER = np.arange(256, dtype=np.uint8)
-_UPPER[97:123] -= 32
 _STEPS = np.full(256, OTHER_STEP, np.uint8)
 for _axis, _letter in _STEP_OF.items():
     _STEPS[_axis] = _letter
@@ -132,7 +133,7 @@ def _statement_end(data: bytes, position: int) -> int:
 
 def read(text: Bytes, offset: int = 0, first_line: int = 0) -> Blocks:
     """Whole lines; `offset` and `first_line` are where they begin in the text."""
-    work = np.append(_UPPER[text], np.full(4, 10, np.uint8))
+    work = np.frombuffer(bytearray(text.tobytes().upper() + b"\n\n\n\n"), np.uint8)
     newline = np.flatnonzero(text == 10)
     ends = newline if newline.size and newline[-1] == len(text) - 1 else np.append(newline, len(text))
     starts = np.concatenate(([0], ends[:-1] + 1))
@@ -144,8 +145,8 @@ def read(text: Bytes, offset: int = 0, first_line: int = 0) -> Blocks:
     motion = (block >= Block.LINE) & (block <= Block.POLE)
     _blank(work, starts, np.where(motion, content, ends))
     body = work[: len(text)]
-    strange = np.flatnonzero((body == ord("(")) | (body == ord(")")) | _TAKEN[body])
-    strange = strange[~_spelled(body, work)[strange]]
+    strange = _found(body, _TAKEN)
+    strange = strange[~_spelled(work, _found(body, _SPELLED))[strange]]
     words = lex(body, _TEXT, offset, first_line, strange=strange)
     letter = _PLAIN[words.letter]
     step = _IS_STEP[words.letter]
@@ -154,6 +155,11 @@ def read(text: Bytes, offset: int = 0, first_line: int = 0) -> Blocks:
         words.start[step] -= 1
     value = np.asarray(words.mantissa / _POW10[words.decimals], float)
     return Blocks(words, letter, block, value, step)
+
+
+def _found(work: Bytes, table: bytes) -> Index:
+    """Where bytes are that have a 1 in a table."""
+    return np.flatnonzero(np.frombuffer(work.tobytes().translate(table), np.bool_))
 
 
 def _continued(work: Bytes, starts: Index, ends: Index) -> Mask:
@@ -177,25 +183,21 @@ def _comments(work: Bytes, starts: Index, ends: Index) -> tuple[Index, Index]:
 def _without_operands(work: Bytes) -> None:
     """Blank the words that belong to an M function: M118 Z5 is no move, M103 F20 no feed."""
     text = work.tobytes()
-    if any(name in text for name in (b"M101", b"M103", b"M118", b"M120")):
+    if b"M1" in text and any(name in text for name in (b"M101", b"M103", b"M118", b"M120")):
         for match in OPERANDS.finditer(text):
             work[match.start(2) : match.end(2)] = 32
 
 
 def _blank(work: Bytes, begin: Index, end: Index) -> None:
     """Blank stretches that do not overlap."""
-    if not begin.size:
-        return
-    edge = np.zeros(len(work) + 1, np.int8)
-    np.add.at(edge, begin, 1)
-    np.add.at(edge, end, -1)
-    work[np.cumsum(edge[:-1], dtype=np.int8) > 0] = 32
+    length = end - begin
+    shift = begin - (np.cumsum(length) - length)
+    work[np.arange(int(length.sum())) + np.repeat(shift, length)] = 32
 
 
 def _named(work: Bytes, starts: Index, ends: Index) -> tuple[npt.NDArray[np.uint8], Index]:
     """(lines,) what each line is, and where its words begin, behind its number and its name."""
-    solid = np.flatnonzero(~_SKIPPED[work])
-    solid = np.append(solid, len(work) - 1)
+    solid = np.append(_found(work, _SOLID), len(work) - 1)
     head = solid[np.searchsorted(solid, starts)]
     some = head < ends
     head = np.minimum(head, len(work) - 4)
@@ -215,52 +217,59 @@ def _named(work: Bytes, starts: Index, ends: Index) -> tuple[npt.NDArray[np.uint
     return block, head + length
 
 
-def _spelled(body: Bytes, work: Bytes) -> Mask:
-    """Put one letter for each word of several; returns which bytes were understood."""
-    following, third = work[1 : len(body) + 1], work[2 : len(body) + 2]
-    known = np.zeros(len(body), bool)
-    side = np.flatnonzero((body == ord("R")) & (_SIDES[following] < 255))
-    before = body[np.maximum(side - 1, 0)]
-    side = side[~_NUMERIC[third[side]] & ~(_LETTER[before] & (side > 0))]
-    body[side], body[side + 1] = SIDE, _SIDES[following[side]]
-    at = np.flatnonzero((body == ord("D")) & (following == ord("R")) & np.isin(third, (43, 45)))
-    if at.size:
-        known[at] = True
-        body[at], body[at + 1], body[at + 2] = TURN, body[at + 2], ord("1")
-    polar = np.flatnonzero((body == ord("P")) & (following == ord("A")))
-    for i in polar.tolist():
-        stepped = i > 0 and body[i - 1] == ord("I")
-        body[i - stepped : i + 2] = 32
+def _spelled(work: Bytes, at: Index) -> Mask:
+    """Put one letter for each word of several, whose letters are `at` some bytes; returns which bytes were
+    understood."""
+    known = np.zeros(len(work), bool)
+
+    def now(letter: str, following: str = "") -> Index:
+        here: Index = at[work[at] == ord(letter)]
+        for k, other in enumerate(following):
+            here = here[work[here + (k + 1)] == ord(other)]
+        return here
+
+    side = now("R")
+    side = side[(_SIDES[work[side + 1]] < 255) & ~_NUMERIC[work[side + 2]]]
+    side = side[~_LETTER[work[np.maximum(side - 1, 0)]] | (side == 0)]
+    work[side], work[side + 1] = SIDE, _SIDES[work[side + 1]]
+    turn = now("D", "R")
+    turn = turn[(work[turn + 2] == ord("+")) | (work[turn + 2] == ord("-"))]
+    known[turn] = True
+    work[turn], work[turn + 1], work[turn + 2] = TURN, work[turn + 2], ord("1")
+    for i in now("P", "A").tolist():
+        stepped = i > 0 and work[i - 1] == ord("I")
+        work[i - stepped : i + 2] = 32
         known[i] = True
-        body[i + 1] = STEP_ANGLE if stepped else ANGLE
-    step = np.flatnonzero((body == ord("I")) & _AXIS[following])
-    if step.size:
-        body[step + 1] = _STEPS[body[step + 1]]
-        body[step] = 32
-    rapid = np.flatnonzero((body == ord("M")) & (following == ord("A")) & (third == ord("X")))
-    if rapid.size:
-        joined = body[np.maximum(rapid - 1, 0)] == ord("F")
-        spaced = (
-            ~joined & (body[np.maximum(rapid - 1, 0)] <= 32) & (body[np.maximum(rapid - 2, 0)] == ord("F"))
-        )
-        near, far = rapid[joined], rapid[spaced]
-        body[near], body[near + 1], body[near + 2] = list(b"-01")
-        body[far - 2], body[far - 1] = 32, ord("F")
-        body[far], body[far + 1], body[far + 2] = list(b"-01")
-    automatic = np.flatnonzero((body == ord("U")) & (following == ord("T")) & (third == ord("O")))
-    for i in automatic.tolist():
-        match = _AUTOMATIC.search(body[max(i - 4, 0) : i + 3].tobytes())
+        work[i + 1] = STEP_ANGLE if stepped else ANGLE
+    step = now("I")
+    step = step[_AXIS[work[step + 1]]]
+    work[step + 1] = _STEPS[work[step + 1]]
+    work[step] = 32
+    _rapid(work, now("M", "AX"))
+    for i in now("U", "TO").tolist():
+        match = _AUTOMATIC.search(work[max(i - 4, 0) : i + 3].tobytes())
         if match is not None:
             # a feed that only the control knows
-            body[i - 1 - len(match[1]) - 1 : i + 3] = 32
-            body[i + 1 : i + 3] = list(b"Q0")
+            work[i - 1 - len(match[1]) - 1 : i + 3] = 32
+            work[i + 1 : i + 3] = list(b"Q0")
             known[i + 1 : i + 3] = True
-    feed = body == ord("F")
-    near = np.flatnonzero(feed & (following == PARAMETER_FEED))
-    far = np.flatnonzero(feed & (following <= 32) & (third == PARAMETER_FEED))
-    body[near] = body[far] = 32
+    near = now("F", "Q")
+    far = now("F")
+    far = far[(work[far + 1] <= 32) & (work[far + 2] == PARAMETER_FEED)]
+    work[near] = work[far] = 32
     known[near + 1] = known[far + 2] = True
     return known
+
+
+def _rapid(work: Bytes, at: Index) -> None:
+    """Put F-1 for FMAX, whose MAX is `at` some bytes."""
+    before = work[np.maximum(at - 1, 0)]
+    joined = before == ord("F")
+    spaced = (before <= 32) & (work[np.maximum(at - 2, 0)] == ord("F"))
+    near, far = at[joined], at[spaced]
+    work[near], work[near + 1], work[near + 2] = list(b"-01")
+    work[far - 2], work[far - 1] = 32, ord("F")
+    work[far], work[far + 1], work[far + 2] = list(b"-01")
 
 
 __all__ = [

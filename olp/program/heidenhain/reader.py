@@ -29,7 +29,7 @@ from olp.program.heidenhain.statements import Statement, of_lines
 from olp.program.heidenhain.table import UNROLL
 from olp.program.program import Program
 from olp.program.rs274.motion import fill
-from olp.program.text.line_ends import STRAY_CR
+from olp.program.text.line_ends import stray_cr
 from olp.program.tilts import Tilt
 
 _ENDS = (2, 30)
@@ -77,11 +77,11 @@ class _Reader(Arcs):
                 line=1,
                 code="OLP502",
             )
-        stray = STRAY_CR.search(self.data)
-        if stray is not None:
+        stray = stray_cr(self.data)
+        if stray >= 0:
             raise ProgramError(
                 "a carriage return is inside this line; expected plain text; remove it",
-                line=self.data.count(b"\n", 0, stray.start()) + 1,
+                line=self.data.count(b"\n", 0, stray) + 1,
                 code="OLP502",
             )
 

@@ -31,22 +31,24 @@ _DECLARED = re.compile(
 #: Letters of words that mean the same in both languages.
 _PLAIN = b"NGXYZFIJKMSTABCUVW"
 _LETTER = np.isin(np.arange(256), list(string.ascii_letters.encode()))
-#: Bytes that make a line more than words.
-_OTHER = ~np.isin(np.arange(256), list(b"0123456789+-. \t\r\n;/" + _PLAIN + _PLAIN.lower()))
+#: 1 for letters, in a table of all bytes.
+_LETTERS = _LETTER.tobytes()
+#: The same for bytes that make a line more than words.
+_OTHERS = bytes(byte not in b"0123456789+-. \t\r\n;/" + _PLAIN + _PLAIN.lower() for byte in range(256))
 #: Letters of words that take their number with `=` too.
 _WITH_SIGN = np.zeros(256, bool)
 _WITH_SIGN[list(b"XYZIJKFSTABCUVWxyzijkfstabcuvw")] = True
 _NAME = _LETTER.copy()
 _NAME[list(b"0123456789_$[]")] = True
-_NUMBER = np.zeros(256, bool)
-_NUMBER[list(b"0123456789.")] = True
+#: The same table for bytes of numbers.
+_NUMBERS = bytes(byte in b"0123456789." for byte in range(256))
 _BLANK = np.zeros(256, bool)
 _BLANK[list(b" \t")] = True
 #: What may be behind a word.
 _BEHIND = _LETTER.copy()
 _BEHIND[list(b";\r\n")] = True
-#: bytes behind `=` that are looked at: the number, and blanks up to the next word
-_AHEAD = 32
+#: blanks behind a number that are passed over, at most; more make the line one of pieces
+_BLANKS = 30
 #: G and M codes of a plain line, by their number.
 _SAME_G = np.isin(np.arange(100), [0, 1, 2, 3, 9, 17, 18, 19, 40, *range(53, 58), 90, 91, 93, 94, 95, 96, 97])
 _SAME_M = ~np.isin(np.arange(100), [6, 17, 70, 97, 98, 99])
@@ -118,30 +120,41 @@ def _numbers(text: Bytes) -> tuple[Index, Index]:
     signs = signs[(signs >= 1) & (signs < len(text) - 1)]
     if not signs.size:
         return signs, signs
-    before = [np.where(signs >= k, text[np.maximum(signs - k, 0)], ord("\n")) for k in (1, 2, 3)]
-    alone = _WITH_SIGN[before[0]] & ~_NAME[before[1]]
-    radius = ((before[0] | 32) == ord("r")) & ((before[1] | 32) == ord("c")) & ~_NAME[before[2]]
+    last, second, third = (text[signs - k] for k in (1, 2, 3))
+    # an index below zero is one from the end
+    second[signs < 2], third[signs < 3] = ord("\n"), ord("\n")
+    alone = _WITH_SIGN[last] & ~_NAME[second]
+    radius = ((last | 32) == ord("r")) & ((second | 32) == ord("c")) & ~_NAME[third]
     kept = alone | radius
     signs, radius = signs[kept], radius[kept]
-    place = signs[:, None] + 1 + np.arange(_AHEAD)
-    ahead = np.where(place < len(text), text[np.minimum(place, len(text) - 1)], ord("\n"))
-    in_number = _NUMBER[ahead]
-    signed = (ahead[:, 0] == ord("-")) | (ahead[:, 0] == ord("+"))
-    in_number[:, 0] |= signed
-    some = in_number[:, 0] & (in_number[:, 1] | ~signed)
-    over = np.logical_or.accumulate(~in_number, axis=1)
+    number = _marked(text, _NUMBERS)
+    ahead = text[signs + 1]
+    first = signs + 1 + ((ahead == ord("-")) | (ahead == ord("+")))
+    some = (first < len(text)) & number[np.minimum(first, len(text) - 1)]
+    signs, radius, first = signs[some], radius[some], first[some]
+    # the last bytes of numbers
+    stop = np.append(np.flatnonzero(number[:-1] > number[1:]), len(text) - 1)
+    after = stop[np.searchsorted(stop, first)] + 1
     # an expression goes on behind blanks too
-    ends = over & ~_BLANK[ahead]
-    last = ends.argmax(axis=1)
-    good = some & ends.any(axis=1) & _BEHIND[ahead[np.arange(len(signs)), last]]
+    for _ in range(_BLANKS):
+        blank = np.flatnonzero((after < len(text)) & _BLANK[text[np.minimum(after, len(text) - 1)]])
+        if not blank.size:
+            break
+        after[blank] += 1
+    good = (after >= len(text)) | _BEHIND[text[np.minimum(after, len(text) - 1)]]
     return signs[good], signs[good & radius]
+
+
+def _marked(text: Bytes, table: bytes) -> Mask:
+    """(bytes,) the entry of each byte in a table of zeros and ones."""
+    return np.frombuffer(text.tobytes().translate(table), np.bool_)
 
 
 def _special(text: Bytes, starts: Index, signs: Index, radius: Index) -> Index:
     """The lines, from 0, that are more than plain words before their comment, and words with `signs` before
     their numbers."""
-    letter = _LETTER[text]
-    special = _OTHER[text]
+    letter = _marked(text, _LETTERS)
+    special = _marked(text, _OTHERS).copy()
     special[signs] = False
     pairs = letter[:-1] & letter[1:]
     pairs[radius - 2] = False

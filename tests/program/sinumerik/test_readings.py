@@ -356,3 +356,6 @@ def test_numbers_with_a_sign_are_read_in_columns() -> None:
     """No line of them is cut into pieces one by one."""
     text = b"X=5 Y=6.5 F=300\nG2 X1 CR=5\nS=1 T=2 ; CYCLE81(X=5)\n"
     assert translate(text).text == b"X 5 Y 6.5 F 300\nG2 X1 R  5\nS 1 T 2 ; CYCLE81(X=5)\n"
+    # at both ends of a text
+    assert translate(b"X=5 Y=2").text == b"X 5 Y 2"
+    assert translate(b"G2\nX1 CR=2.").text == b"G2\nX1 R  2."

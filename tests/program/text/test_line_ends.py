@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from olp.program.text.line_ends import LINE_END, LINE_END_TEXT, LONE_CR, STRAY_CR, split
+from olp.program.text.line_ends import LINE_END, LINE_END_TEXT, LONE_CR, STRAY_CR, split, stray_cr
 
 
 @pytest.mark.parametrize(
@@ -23,6 +23,21 @@ def test_lines_keep_their_ends(data: bytes, lines: list[bytes]) -> None:
     )
     text = data.decode("latin-1")
     assert [len(part) for part in LINE_END_TEXT.split(text)] == [len(part) for part in LINE_END.split(data)]
+
+
+@pytest.mark.parametrize(
+    ("data", "place"),
+    [
+        (b"a\r\nb\r\r\n", -1),
+        (b"a\r\nb\r", -1),
+        (b"", -1),
+        (b"a\r\nb\rc\r\n", 4),
+        (b"\ra\n", 0),
+        (b"a\r\r", -1),
+    ],
+)
+def test_a_carriage_return_within_a_line_is_found(data: bytes, place: int) -> None:
+    assert stray_cr(data) == place
 
 
 def test_another_line_end_may_be_given() -> None:
