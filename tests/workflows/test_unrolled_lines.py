@@ -497,7 +497,7 @@ def test_the_reasons_of_an_unrolled_program_are_those_of_its_own_lines(
 
 
 def test_a_macro_call_that_is_unrolled_is_no_reason(controls: Mapping[str, Path]) -> None:
-    text = (START + "G65 P1 X5.\nG68 R3.\nG1 X1.\nM30\nO1\nG1 X#24\nM99\n").encode()
+    text = (START + "G65 P1 X5.\nG68 X1. R3.\nG1 X1.\nM30\nO1\nG1 X#24\nM99\n").encode()
     with pytest.raises(ProgramError) as caught:
         olp.correct(text, controls["fanuc"], flatten=True)
     assert (type(caught.value), caught.value.line) == (ProgramError, 4)
