@@ -122,6 +122,7 @@ def _report(fit: JointFit) -> dict[str, Any]:
     report["uncertainty_in_best_frame"] = {
         "tip_mean_um": round(float(place.mean()) * UM_PER_MM, _DECIMALS),
         "tip_largest_um": round(float(place.max()) * UM_PER_MM, _DECIMALS),
+        "tip_with_misfit_um": round(_with_misfit(fit, place) * UM_PER_MM, _DECIMALS),
         "turn_largest_urad": round(float(turn.max()) / RAD_PER_URAD, _DECIMALS),
     }
     report["not_needed"] = ", ".join(unknown.name for unknown in model.dropped)
@@ -137,6 +138,18 @@ def _at_postures(fit: JointFit) -> tuple[Array, Array]:
     ]
     place, turn = (np.concatenate([part[k] for part in parts]) for k in range(2))
     return np.linalg.norm(place, axis=1), np.linalg.norm(turn, axis=1)
+
+
+def _with_misfit(fit: JointFit, place: Array) -> float:
+    """mm by which a tip is expected to be off (rms): (n,) the uncertainties of the unknowns, and what the
+    readings show beyond these and their own noise, which no unknown explains."""
+    rows = [source.off_mm**2 / min(source.residual.shape[1], 3) for source in fit.sources]
+    noise = [
+        np.full(len(part), source.start.reading.sigma**2)
+        for part, source in zip(rows, fit.sources, strict=True)
+    ]
+    beyond = float(np.mean(np.concatenate(rows) - np.concatenate(noise)))
+    return float(np.sqrt(np.mean(place**2) + 3.0 * max(beyond, 0.0)))
 
 
 def _figures(off_mm: Array) -> dict[str, float]:
