@@ -58,6 +58,10 @@ METHODS = ("lines", "targets", "tracker", "lines-and-tracker", "pods", "multilat
     "--box", type=(MM, MM, MM, MM, MM, MM), metavar="X X Y Y Z Z",
     help="Axis positions between which to measure. Default: the travel less 1 % at each end.",
 )  # fmt: skip
+@click.option(
+    "--among", metavar="FILE.csv",
+    help="With rotary joints: postures that the machine can take. Default: random ones within its travel.",
+)  # fmt: skip
 @reflector_option(
     "Vector from the gauge point to a reflector in mm; three that are not on one line suffice.", several=True
 )
@@ -84,6 +88,7 @@ def command(
     calibration: str | None,
     criterion: Literal["A", "D"],
     box: tuple[float, float, float, float, float, float] | None,
+    among: str | None,
     reflector: tuple[tuple[float, float, float], ...],
     sigma_um: float | None,
     period_x: tuple[float, ...],
@@ -109,7 +114,18 @@ def command(
     """
     from pathlib import Path
 
+    from olp.cli import joints
     from olp.files.write import write_files
+
+    if joints.on_joints(machine, None, also=("next_", "criterion", "among", "reflector", "sigma_um")):
+        if next_ is None or len(reflector) > 1:
+            raise UsageError("a machine with rotary joints takes --next N, and one --reflector")
+        poses = joints.plan(machine, next_, output, among, reflector, sigma_um, criterion, force=force)
+        put_result(poses, as_json=as_json, quiet=quiet)
+        return
+    if among is not None:
+        raise UsageError("--among is for machines with rotary joints; leave it out")
+
     from olp.workflows.calibrate_next import NEXT, plan_next
     from olp.workflows.calibrate_plan import INSTRUMENTS, plan_measurements
 

@@ -28,9 +28,11 @@ from olp.cli.common import (
 from olp.core.errors import InputError, UsageError
 
 if TYPE_CHECKING:
+    from olp.calibration.joints.poses import Criterion
     from olp.files.write import Content
     from olp.findings.catalogue import Finding
     from olp.review.job import Review
+    from olp.workflows.calibrate_plan_joints import PlannedPoses
     from olp.workflows.compare import CompareOptions, Comparison
     from olp.workflows.joints.loaded import JointRun
 
@@ -218,6 +220,26 @@ def retime(program: str | None, machine: str | None, job: str | None, words: dic
         put(to_json(result.report))
     elif not words["quiet"]:
         put(result.to_text(), err=output == STREAM)
+
+
+def plan(
+    machine: str, count: int, output: str | None, among: str | None,
+    reflector: tuple[tuple[float, float, float], ...], sigma_um: float | None, criterion: Criterion, *,
+    force: bool,
+) -> PlannedPoses:  # fmt: skip
+    """`olp calibrate plan --next`, written to the file `output`."""
+    from olp.files.write import write_files
+    from olp.workflows.calibrate_plan_joints import SIGMA_UM, plan_poses
+
+    refuse_early(files_of(output), files_of(machine, among), force=force)
+    result = plan_poses(
+        machine, count, reflector_mm=reflector[0] if reflector else (0.0, 0.0, 0.0),
+        sigma_um=SIGMA_UM if sigma_um is None else sigma_um, criterion=criterion, among=among,
+    )  # fmt: skip
+    if output is not None:
+        write_files(result.files(output), force=force, inputs=result.inputs)
+        diagnostic(f"wrote {output}")
+    return result
 
 
 def view(

@@ -1,0 +1,76 @@
+"""Postures to measure: what is stated of them is what an adjustment of such readings finds, and they are
+worth more than random ones."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from calibration.joints.simulated import SIGMA, TOOL, read, true_machine
+from cli.test_cli import run
+
+from olp.calibration.joints.adjustment import fit_joints
+from olp.calibration.joints.poses import Candidates
+from olp.core.errors import ConfigError
+from olp.workflows.calibrate_plan_joints import plan_poses
+
+FOLDER = Path(__file__).resolve().parents[3] / "programs"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["arm_6r_kr6", "xyzac_trunnion"])
+def test_what_is_stated_is_what_an_adjustment_finds(name: str) -> None:
+    model, theta, values = true_machine(name, count=300)
+    candidates = Candidates.of(model, values, TOOL)
+    chosen = candidates.chosen(40, SIGMA, "A")
+    assert len(set(chosen.tolist())) > 20
+    stated, drawn = candidates.tip_mm(chosen, SIGMA), candidates.tip_mm(np.arange(40), SIGMA)
+    assert stated < 0.95 * drawn < candidates.tip_mm(chosen[:4], SIGMA)
+    # the same readings in the adjustment of `fit`; one nest
+    found = []
+    for rows in (chosen, np.arange(40)):
+        pose = model.machine(theta).actual(values[rows])
+        fit = fit_joints(model, [read("points", pose, values[rows], names=1)])
+        spread = fit.sigma_in_best_frame(values, np.array(TOOL))[0] / np.sqrt(
+            max(1.0, fit.chi_square / fit.freedom)
+        )
+        found.append(float(np.sqrt(np.mean(np.sum(spread**2, axis=1)))))
+    assert found == pytest.approx([stated, drawn], rel=0.05)
+
+
+@pytest.mark.slow
+def test_each_criterion_is_best_by_its_own_measure() -> None:
+    model, _, values = true_machine("xyzac_trunnion", count=200)
+    candidates = Candidates.of(model, values, TOOL)
+
+    def volume(rows: np.ndarray) -> float:
+        some = candidates.table[rows].reshape(-1, candidates.table.shape[2])
+        normal = np.linalg.inv(candidates.prior) + some.T @ some / SIGMA**2
+        return float(np.linalg.slogdet(normal)[1])
+
+    by_mean, by_volume = (candidates.chosen(12, SIGMA, criterion) for criterion in ("A", "D"))
+    assert volume(by_volume) > volume(by_mean)
+    assert candidates.tip_mm(by_mean, SIGMA) < candidates.tip_mm(by_volume, SIGMA)
+
+
+@pytest.mark.slow
+def test_the_verb_writes_a_program_of_postures(tmp_path: Path) -> None:
+    machine, out = FOLDER / "arm-payload" / "machine.toml", tmp_path / "poses.csv"
+    words = ["calibrate", "plan", "-m", str(machine), "--next", "12", "--reflector", "0", "0", "150"]
+    done = run(*words, "-o", str(out))
+    assert done.exit_code == 0, done.stderr
+    assert "tip after um" in done.stdout and "tip after random ones um" in done.stdout
+    assert len(out.read_text().splitlines()) == 14
+    assert run("inspect", str(out), "-m", str(machine)).exit_code == 0
+    # of a list that the machine can take, rows of it alone
+    again = tmp_path / "again.csv"
+    done = run(*words[:-6], "--next", "5", "--among", str(out), "-o", str(again))
+    assert done.exit_code == 0, done.stderr
+    assert set(again.read_text().splitlines()[2:]) <= set(out.read_text().splitlines()[2:])
+    assert run(*words[:4]).exit_code == 2
+    plate = str(FOLDER / "gantry-plate" / "machine.toml")
+    done = run("calibrate", "plan", "-m", plate, "--next", "5", "--among", str(out))
+    assert done.exit_code == 2 and "--among is for machines with rotary joints" in done.stderr
+    with pytest.raises(ConfigError, match="not every set of lengths of legs is a posture"):
+        plan_poses(FOLDER / "hexapod" / "machine.toml", 5)
