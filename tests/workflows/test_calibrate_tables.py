@@ -27,6 +27,7 @@ from olp.errormodel.calibration import Calibration, Curve, Cyclic
 from olp.files.calibration.reader import load_calibration
 from olp.files.control_code.registry import CODE
 from olp.files.control_tables.registry import FORMATS
+from olp.files.kinematics.tables import TABLES
 from olp.files.write import write_files
 
 PROGRAMS = Path(__file__).parents[2] / "programs"
@@ -216,7 +217,7 @@ def test_commands(tmp_path: Path) -> None:
     machine = str(PROGRAMS / "gantry-plate" / "machine.toml")
     run = CliRunner()
     listed = run.invoke(main, ["calibrate", "formats", "--json"])
-    assert set(json.loads(listed.stdout)) == {*FORMATS, *CODE}
+    assert set(json.loads(listed.stdout)) == {*FORMATS, *TABLES, *CODE}
     target = str(tmp_path / "t.csv")
     done = run.invoke(main, ["calibrate", "export", "-m", machine, "--format", "isg", "-o", target])
     assert done.exit_code == 0, done.output

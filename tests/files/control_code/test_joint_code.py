@@ -300,9 +300,9 @@ def test_what_is_no_chain_or_leaves_a_choice_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=f"{re.escape(str(platform))}: P: .* no platforms on legs"):
         olp.export_table(platform, "c", tmp_path / "m.c")
     folder = golden_folder("arm_6r_kr6")
-    with pytest.raises(UsageError, match="expected --format c or linuxcnc-kins"):
+    with pytest.raises(UsageError, match=r"expected --format .* or c or linuxcnc-kins"):
         olp.export_table(folder / "machine.toml", "linuxcnc", tmp_path / "x.comp")
-    with pytest.raises(UsageError, match="expected --format c or linuxcnc-kins"):
+    with pytest.raises(UsageError, match=r"expected --format .* or c or linuxcnc-kins"):
         olp.compare_tables(folder / "machine.toml")
     with pytest.raises(UsageError, match="--program is for machines with three linear axes"):
         olp.export_table(folder / "machine.toml", "c", tmp_path / "m.c", program=b"G1 X1\n")
