@@ -19,15 +19,16 @@ from typing import IO
 LONG = 1 << 22
 #: Bytes that are read at once.
 _PART = 1 << 20
-#: Files whose pages are in memory where they were looked at.
-_MAPPED: weakref.WeakSet[mmap.mmap] = weakref.WeakSet()
+#: Files whose pages are in memory where they were looked at; none, of most programs.
+_MAPPED: list[weakref.ref[mmap.mmap]] = []
 
 
 def unload() -> None:
     """Let go the pages of all mapped files; each comes back where it is looked at again."""
-    if sys.platform != "win32":
-        for mapped in tuple(_MAPPED):
-            mapped.madvise(mmap.MADV_DONTNEED)
+    if _MAPPED and sys.platform != "win32":
+        for one in tuple(_MAPPED):
+            if (mapped := one()) is not None:
+                mapped.madvise(mmap.MADV_DONTNEED)
 
 
 def room() -> int:
@@ -95,7 +96,7 @@ class Spool:
             mapped = mmap.mmap(self._file.fileno(), self.size)
         except OSError:
             raise MemoryError from None
-        _MAPPED.add(mapped)
+        _MAPPED.append(weakref.ref(mapped, _MAPPED.remove))
         return mapped
 
     def sha256(self) -> str:

@@ -28,8 +28,6 @@ Single = npt.NDArray[np.float32]
 
 #: A probability from here on is enough: two standard deviations on both sides.
 ENOUGH = 0.95
-#: Moves that are looked at together.
-_BLOCK = 1 << 14
 #: Moves that are looked at for each line that is wanted, and so many times more where they are on few lines.
 _FEW = 16
 #: What the reasons of rows are called.
@@ -196,7 +194,7 @@ class Judgements:
 
     def _judged_rows(self) -> Iterator[Index]:
         """The rows of moves that count, in blocks."""
-        for some in spans(len(self.counts), _BLOCK):
+        for some in spans(len(self.counts)):
             rows = np.flatnonzero(self.counts[some] <= Counts.LEFT)
             if rows.size:
                 yield some.start + rows

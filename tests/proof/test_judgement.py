@@ -12,6 +12,7 @@ from cases.paths import PASS, Known, Move, line, program, rapid, toolpath
 
 from olp.core.toolpath import Frame
 from olp.findings.catalogue import Finding
+from olp.program.text import columns
 from olp.proof import judgement
 from olp.proof.judgement import Judgements
 from olp.proof.measured import ABOVE, SHOWN, WITHIN, Measured
@@ -438,7 +439,7 @@ def test_groups_do_not_depend_on_blocks(seed: int, block: int, monkeypatch: pyte
     judgements, of = drawn_table(seed)
     whole = judgements.groups(of)
     assert len(whole) > 2
-    monkeypatch.setattr(judgement, "_BLOCK", block)
+    monkeypatch.setattr(columns, "_MOST", block)
     assert judgements.groups(of) == whole
 
 

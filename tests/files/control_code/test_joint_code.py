@@ -289,6 +289,10 @@ def test_bounds_hold_in_every_cycle(tmp_path: Path) -> None:
     assert (np.abs(correction).max(axis=0) >= most - 1e-12).any()
 
 
+#: What is offered for a machine with rotary axes.
+EXPECTED = "expected --format siemens-carr or siemens-trafo5 or c or linuxcnc-kins"
+
+
 def test_what_is_no_chain_or_leaves_a_choice_is_refused(tmp_path: Path) -> None:
     for name, says in (("hexapod", "no platforms on legs"), ("arm_7r_on_track", "6 hold the tool")):
         setup = golden(name)[0]
@@ -300,9 +304,9 @@ def test_what_is_no_chain_or_leaves_a_choice_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=f"{re.escape(str(platform))}: P: .* no platforms on legs"):
         olp.export_table(platform, "c", tmp_path / "m.c")
     folder = golden_folder("arm_6r_kr6")
-    with pytest.raises(UsageError, match=r"expected --format .* or c or linuxcnc-kins"):
+    with pytest.raises(UsageError, match=EXPECTED):
         olp.export_table(folder / "machine.toml", "linuxcnc", tmp_path / "x.comp")
-    with pytest.raises(UsageError, match=r"expected --format .* or c or linuxcnc-kins"):
+    with pytest.raises(UsageError, match=EXPECTED):
         olp.compare_tables(folder / "machine.toml")
     with pytest.raises(UsageError, match="--program is for machines with three linear axes"):
         olp.export_table(folder / "machine.toml", "c", tmp_path / "m.c", program=b"G1 X1\n")

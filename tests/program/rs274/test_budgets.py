@@ -252,11 +252,11 @@ CURVES = {
 @pytest.mark.parametrize("name", AT_ONCE)
 def test_holes_and_arcs_are_carried_out_many_at_once(name: str, tmp_path: Path) -> None:
     """With errors that change their words. What is done for each hole or arc alone calls ten functions and
-    more; blocks of points of the error model, bands and spans of columns are few."""
+    more; blocks of points of the error model and bands are few."""
     place = machine(tmp_path, "".join(LEANING.format(a) for a in "xyz"), CURVES, tables=TRUE_ZERO)
     head, lines = AT_ONCE[name]
     few, some, many = (
         head + "".join(lines.format(k=10 + k % 80) for k in range(count)) for count in (9, 300, 900)
     )
     calls(few, place)
-    assert calls(many, place) - calls(some, place) < 4 * (many.count("\n") - some.count("\n"))
+    assert calls(many, place) - calls(some, place) < 3 * (many.count("\n") - some.count("\n"))
