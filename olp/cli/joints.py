@@ -28,7 +28,7 @@ from olp.cli.common import (
 from olp.core.errors import InputError, UsageError
 
 if TYPE_CHECKING:
-    from olp.calibration.joints.poses import Criterion
+    from olp.calibration.design.choosing import Criterion
     from olp.files.write import Content
     from olp.findings.catalogue import Finding
     from olp.review.job import Review

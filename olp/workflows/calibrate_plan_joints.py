@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from olp.calibration.joints.poses import Candidates, Criterion
+from olp.calibration.design.choosing import Criterion
+from olp.calibration.joints.poses import Postures
 from olp.calibration.joints.unknowns import Priors, model_of
 from olp.core.arrays import Array
-from olp.core.errors import ConfigError
+from olp.core.errors import ConfigError, UsageError
 from olp.core.machine import Vector
 from olp.core.units import MM_PER_UM, UM_PER_MM
 from olp.core.values import dataclass
@@ -68,16 +69,17 @@ def plan_poses(
 
     `reflector_mm` is the vector from the gauge point to the reflector, `sigma_um` the uncertainty of a
     coordinate. `among` is a list of postures that the machine can take. Without it they are random ones
-    within the travel of all axes. Raises InputError, ConfigError, CannotCompute.
+    within the travel of all axes. Raises InputError, ConfigError, UsageError, CannotCompute.
     """
     structure = load_joint_machine(machine).structure
     values = _random(structure) if among is None else _listed(among, structure)
     model = model_of(structure, values, Priors.of(structure))
-    candidates = Candidates.of(model, values, reflector_mm)
-    sigma = sigma_um * MM_PER_UM
-    rows = candidates.chosen(count, sigma, criterion)
+    if count > len(values):
+        raise UsageError(f"there are {len(values)} postures to choose {count} from; ask for fewer")
+    postures = Postures.of(model, values, reflector_mm, sigma_um * MM_PER_UM)
+    choice = postures.chosen(count, criterion)
     rng = np.random.default_rng(SEED)
-    drawn = [candidates.tip_mm(rng.integers(0, len(values), count), sigma) for _ in range(_DRAWS)]
+    drawn = [postures.tip_mm(rng.permutation(len(values))[:count]) for _ in range(_DRAWS)]
     report = {
         "schema": "olp-poses-1",
         "machine": structure.name,
@@ -85,12 +87,12 @@ def plan_poses(
         "candidates": len(values),
         "unknowns": len(model.unknowns),
         "sigma_um": sigma_um,
-        "tip_before_um": candidates.tip_mm(rows[:0], sigma) * UM_PER_MM,
-        "tip_after_um": candidates.tip_mm(rows, sigma) * UM_PER_MM,
+        "tip_before_um": float(choice.rms_mm[0]) * UM_PER_MM,
+        "tip_after_um": float(choice.rms_mm[-1]) * UM_PER_MM,
         "tip_after_random_ones_um": float(np.median(drawn)) * UM_PER_MM,
     }
     files = (str(machine), *(() if among is None else (str(among),)))
-    return PlannedPoses(structure, values[rows], report, inputs=files)
+    return PlannedPoses(structure, values[choice.index], report, inputs=files)
 
 
 def _random(structure: Structure) -> Array:

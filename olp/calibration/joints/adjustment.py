@@ -89,29 +89,42 @@ class JointFit:
     def sigma_at(self, values: Array, tool_mm: Array) -> tuple[Array, Array]:
         """(n, 3) mm of a tip and (n, 3) rad of the tool, in workpiece coordinates: what is not known of the
         pose at axis values (n, axes). The tip is at `tool_mm` (3,) of the gauge frame."""
-        return _spreads(self._tables(values, tool_mm), self.covariance)
+        tip, turn, _ = tables_of(self.model, self.theta, values, tool_mm)
+        return _spreads((tip, turn), self.covariance)
 
     def sigma_in_best_frame(self, values: Array, tool_mm: Array) -> tuple[Array, Array]:
         """The same beside one shift and turn of all these poses, which a work offset takes up."""
-        tip, turn = self._tables(values, tool_mm)
-        place = self.model.machine(self.theta).actual(values).at(tool_mm)
-        place = place - place.mean(axis=0)
-        size = max(float(np.abs(place).max()), _LEVER_MM)
-        frame = np.zeros((len(values), 3, 6))
-        frame[:, :, :3] = np.eye(3)
-        for k in range(3):
-            frame[:, :, 3 + k] = np.cross(np.eye(3)[k], place) / size
-        flat = tip.reshape(-1, tip.shape[2])
-        share = np.linalg.lstsq(frame.reshape(-1, 6), flat, rcond=_SHORT)[0]
-        rest = flat - frame.reshape(-1, 6) @ share
-        return _spreads((rest.reshape(tip.shape), turn - share[3:] / size), self.covariance)
+        tip, turn, place = tables_of(self.model, self.theta, values, tool_mm)
+        frame, size = frame_of(place)
+        rest, share = left_of(tip, frame)
+        return _spreads((rest, turn - share[3:] / size), self.covariance)
 
-    def _tables(self, values: Array, tool_mm: Array) -> tuple[Array, Array]:
-        """(n, 3, k) mm of a tip and rad of the tool by each unknown."""
-        twists = self.model.twists(self.theta, values)
-        pose = self.model.machine(self.theta).actual(values)
-        arm = pose.at(tool_mm) - pose.position
-        return twists[:, :3] + np.cross(twists[:, 3:], arm[:, :, None], axis=1), twists[:, 3:]
+
+def tables_of(model: Model, theta: Array, values: Array, tool_mm: Array) -> tuple[Array, Array, Array]:
+    """(n, 3, k) mm of a tip and rad of the tool by each unknown, and (n, 3) mm where the tip is."""
+    twists, pose = model.twists(theta, values), model.machine(theta).actual(values)
+    place = pose.at(tool_mm)
+    arm = place - pose.position
+    return twists[:, :3] + np.cross(twists[:, 3:], arm[:, :, None], axis=1), twists[:, 3:], place
+
+
+def frame_of(place_mm: Array) -> tuple[Array, float]:
+    """(n, 3, 6) mm of places (n, 3) by a shift of all of them, and by a turn times their size, in mm."""
+    place = place_mm - place_mm.mean(axis=0)
+    size = max(float(np.abs(place).max()), _LEVER_MM)
+    frame = np.zeros((len(place), 3, 6))
+    frame[:, :, :3] = np.eye(3)
+    for k in range(3):
+        frame[:, :, 3 + k] = np.cross(np.eye(3)[k], place) / size
+    return frame, size
+
+
+def left_of(table: Array, frame: Array) -> tuple[Array, Array]:
+    """What a frame (n, 3, 6) leaves of a table (n, 3, k), and the shares (6, k) that it takes up."""
+    flat = table.reshape(-1, table.shape[2])
+    share = np.linalg.lstsq(frame.reshape(-1, 6), flat, rcond=_SHORT)[0]
+    rest: Array = flat - frame.reshape(-1, 6) @ share
+    return rest.reshape(len(table), 3, -1), share
 
 
 def _spreads(tables: tuple[Array, Array], covariance: Array) -> tuple[Array, Array]:

@@ -11,7 +11,7 @@ from calibration.joints.simulated import SIGMA, TOOL, read, true_machine
 from cli.test_cli import run
 
 from olp.calibration.joints.adjustment import fit_joints
-from olp.calibration.joints.poses import Candidates
+from olp.calibration.joints.poses import Postures
 from olp.core.errors import ConfigError
 from olp.workflows.calibrate_plan_joints import plan_poses
 
@@ -22,11 +22,13 @@ FOLDER = Path(__file__).resolve().parents[3] / "programs"
 @pytest.mark.parametrize("name", ["arm_6r_kr6", "xyzac_trunnion"])
 def test_what_is_stated_is_what_an_adjustment_finds(name: str) -> None:
     model, theta, values = true_machine(name, count=300)
-    candidates = Candidates.of(model, values, TOOL)
-    chosen = candidates.chosen(40, SIGMA, "A")
+    postures = Postures.of(model, values, TOOL, SIGMA)
+    choice = postures.chosen(40, "A")
+    chosen = choice.index
     assert len(set(chosen.tolist())) > 20
-    stated, drawn = candidates.tip_mm(chosen, SIGMA), candidates.tip_mm(np.arange(40), SIGMA)
-    assert stated < 0.95 * drawn < candidates.tip_mm(chosen[:4], SIGMA)
+    stated, drawn = postures.tip_mm(chosen), postures.tip_mm(np.arange(40))
+    assert stated < 0.95 * drawn < postures.tip_mm(chosen[:4])
+    assert choice.rms_mm[-1] == pytest.approx(stated, rel=1e-6)
     # the same readings in the adjustment of `fit`; one nest
     found = []
     for rows in (chosen, np.arange(40)):
@@ -42,16 +44,18 @@ def test_what_is_stated_is_what_an_adjustment_finds(name: str) -> None:
 @pytest.mark.slow
 def test_each_criterion_is_best_by_its_own_measure() -> None:
     model, _, values = true_machine("xyzac_trunnion", count=200)
-    candidates = Candidates.of(model, values, TOOL)
+    postures = Postures.of(model, values, TOOL, SIGMA)
 
     def volume(rows: np.ndarray) -> float:
-        some = candidates.table[rows].reshape(-1, candidates.table.shape[2])
-        normal = np.linalg.inv(candidates.prior) + some.T @ some / SIGMA**2
-        return float(np.linalg.slogdet(normal)[1])
+        """Of the unknowns beside the place of the tracker, whose prior is 1, as theirs is."""
+        some = postures.candidates.only(rows)
+        table = np.concatenate((some.rows, some.shared), axis=2).reshape(3 * len(rows), -1)
+        covariance = np.linalg.inv(np.eye(table.shape[1]) + table.T @ table)
+        return float(-np.linalg.slogdet(covariance[:-6, :-6])[1])
 
-    by_mean, by_volume = (candidates.chosen(12, SIGMA, criterion) for criterion in ("A", "D"))
+    by_mean, by_volume = (postures.chosen(30, criterion).index for criterion in ("A", "D"))
     assert volume(by_volume) > volume(by_mean)
-    assert candidates.tip_mm(by_mean, SIGMA) < candidates.tip_mm(by_volume, SIGMA)
+    assert postures.tip_mm(by_mean) < postures.tip_mm(by_volume)
 
 
 @pytest.mark.slow
