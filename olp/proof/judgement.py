@@ -270,16 +270,16 @@ def verdict(
     errors = sorted({f.code for f in findings if f.severity >= Severity.ERROR} - _OWN)
     known = None if numerical["unknown"] else True
     sentence = _numerical_sentence(numerical, place)
-    questions = [_question("program", _all((numerical["holds"], known)), sentence)]
+    questions = [question("program", _all((numerical["holds"], known)), sentence)]
     sentences = [sentence]
     if numerical["unknown"]:
         sentences.append(f"{numerical['unknown']} feed moves to unknown positions are not judged.")
     if part is not None:
         sentences.append(_part_sentence(part))
-        questions.append(_question("part", _part_answer(part), sentences[-1]))
+        questions.append(question("part", _part_answer(part), sentences[-1]))
     if errors:
         sentences.append(f"Not to be run as it is: {', '.join(errors)}.")
-    ok = _all((*(question["ok"] for question in questions), not errors))
+    ok = _all((*(one["ok"] for one in questions), not errors))
     return {
         "ok": ok, "numerical": numerical, "part": part, "errors": errors, "sentences": sentences,
         "questions": questions,
@@ -304,7 +304,7 @@ def measured(runs: Sequence[tuple[str, float | None]], tolerance_um: float | Non
         names = f" of {', '.join(missing)}" if missing else ""
         sentences.append(f"Not verified: no measured point{names} counts.")
     ok = None if tolerance_um is None else holds and not missing
-    questions = [_question("measured", ok, " ".join(sentences))]
+    questions = [question("measured", ok, " ".join(sentences))]
     return {"ok": ok, "measured": result, "sentences": sentences, "questions": questions}
 
 
@@ -323,7 +323,8 @@ QUESTIONS = {
 }
 
 
-def _question(name: str, ok: bool | None, sentence: str) -> dict[str, Any]:
+def question(name: str, ok: bool | None, sentence: str) -> dict[str, Any]:
+    """A question of a verdict with its answer."""
     return {"name": name, "question": QUESTIONS[name], "ok": ok, "sentence": sentence}
 
 

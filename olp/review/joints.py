@@ -22,7 +22,7 @@ from olp.core.values import dataclass
 from olp.files.sources import Source
 from olp.kinematics.correction import deviations
 from olp.proof.joint_places import Places, Sides, visited
-from olp.proof.judgement import QUESTIONS, Judgements, groups_of
+from olp.proof.judgement import Judgements, groups_of, question
 from olp.proof.proof import Counts
 from olp.reports.joints import verdict_of
 from olp.review.features.moves import digit_mm
@@ -272,8 +272,9 @@ def _verdict(done: ProvedJoints) -> dict[str, Any]:
     """What the report says, as the answer to the question of the program."""
     ok = done.proof.holds if done.proof.judged.any() else None
     sentence = verdict_of(done.report).replace("\n", " ")
-    question = {"name": "program", "question": QUESTIONS["program"], "ok": ok, "sentence": sentence}
-    return {"ok": ok, "part": None, "questions": [question], "sentences": [sentence]}
+    return {
+        "ok": ok, "part": None, "questions": [question("program", ok, sentence)], "sentences": [sentence]
+    }  # fmt: skip
 
 
 def _tool(run: JointRun, path: JointPath) -> tuple[int, float]:

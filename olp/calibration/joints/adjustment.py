@@ -122,9 +122,8 @@ def frame_of(place_mm: Array) -> tuple[Array, float]:
 def left_of(table: Array, frame: Array) -> tuple[Array, Array]:
     """What a frame (n, 3, 6) leaves of a table (n, 3, k), and the shares (6, k) that it takes up."""
     flat = table.reshape(-1, table.shape[2])
-    share = np.linalg.lstsq(frame.reshape(-1, 6), flat, rcond=_SHORT)[0]
-    rest: Array = flat - frame.reshape(-1, 6) @ share
-    return rest.reshape(len(table), 3, -1), share
+    share = np.asarray(np.linalg.lstsq(frame.reshape(-1, 6), flat, rcond=_SHORT)[0], float)
+    return (flat - frame.reshape(-1, 6) @ share).reshape(table.shape), share
 
 
 def _spreads(tables: tuple[Array, Array], covariance: Array) -> tuple[Array, Array]:
