@@ -80,28 +80,18 @@ METHODS = ("lines", "targets", "tracker", "lines-and-tracker", "pods", "multilat
 @force_option("files in FOLDER")
 def command(
     machine: str,
-    uncertainty_um: float,
-    instrument: str | None,
-    points: int | None,
     next_: int | None,
-    component: tuple[str, ...],
-    calibration: str | None,
-    criterion: Literal["A", "D"],
-    box: tuple[float, float, float, float, float, float] | None,
     among: str | None,
     reflector: tuple[tuple[float, float, float], ...],
     sigma_um: float | None,
-    period_x: tuple[float, ...],
-    period_y: tuple[float, ...],
-    period_z: tuple[float, ...],
-    dwell_s: float | None,
-    settle_s: float,
+    criterion: Literal["A", "D"],
     output: str | None,
     date: datetime.date | None,
     as_json: bool,
     fail_on: str,
     quiet: bool,
     force: bool,
+    **measuring: Any,
 ) -> None:
     """Propose what to measure, before you measure.
 
@@ -125,43 +115,9 @@ def command(
         return
     if among is not None:
         raise UsageError("--among is for machines with rotary joints; leave it out")
-
-    from olp.workflows.calibrate_next import NEXT, plan_next
-    from olp.workflows.calibrate_plan import INSTRUMENTS, plan_measurements
-
     if output is not None and not Path(output).is_dir():
         raise UsageError("is not a folder; create it first", file=output)
-    periods_mm = (period_x, period_y, period_z)
-    shared: dict[str, Any] = {
-        "uncertainty_um": uncertainty_um,
-        "box_mm": None if box is None else (box[0:2], box[2:4], box[4:6]),
-        "tools": reflector,
-        "sigma_um": sigma_um,
-        "dwell_s": dwell_s,
-        "settle_s": settle_s,
-        "points": points,
-    }
-    if next_ is None:
-        if calibration is not None or criterion != "A" or component or instrument == "targets":
-            raise UsageError("--calibration, --criterion, --component and targets are for --next N; add it")
-        known = next((name for name in INSTRUMENTS if name == instrument), None)
-        plan = plan_measurements(machine, instrument=known, periods_mm=periods_mm, **shared)
-    else:
-        if any(periods_mm) or instrument not in (None, *NEXT):
-            raise UsageError(f"--next chooses for {', '.join(NEXT)}, and without --period-x, -y and -z")
-        if component and instrument not in (None, "lines", "targets"):
-            raise UsageError(f"--component is for lines and targets, not for {instrument}")
-        offered = next((name for name in NEXT if name == instrument), None)
-        plan = plan_next(
-            machine,
-            next_,
-            instrument=offered,
-            calibration=calibration,
-            criterion=criterion,
-            components=component,
-            date=date,
-            **shared,
-        )
+    plan = _of_linear_axes(machine, next_, criterion, date, tools=reflector, sigma_um=sigma_um, **measuring)
     if output is not None:
         inputs = (*plan.inputs, *files_of(machine))
         files = plan.files(output, date)
@@ -170,3 +126,32 @@ def command(
         diagnostic(f"wrote {len(files)} files to {output}")
     put_result(plan, as_json=as_json, quiet=quiet)
     exit_for(plan.findings, fail_on)
+
+
+def _of_linear_axes(
+    machine: str, next_: int | None, criterion: Literal["A", "D"], date: datetime.date | None, *,
+    instrument: str | None, calibration: str | None, component: tuple[str, ...],
+    box: tuple[float, float, float, float, float, float] | None,
+    period_x: tuple[float, ...], period_y: tuple[float, ...], period_z: tuple[float, ...], **shared: Any,
+) -> Any:  # fmt: skip
+    """The plan of a machine with three linear axes, or the next readings of it. Raises UsageError for options
+    that do not belong together."""
+    from olp.workflows.calibrate_next import NEXT, plan_next
+    from olp.workflows.calibrate_plan import INSTRUMENTS, plan_measurements
+
+    periods_mm = (period_x, period_y, period_z)
+    shared["box_mm"] = None if box is None else (box[0:2], box[2:4], box[4:6])
+    if next_ is None:
+        if calibration is not None or criterion != "A" or component or instrument == "targets":
+            raise UsageError("--calibration, --criterion, --component and targets are for --next N; add it")
+        known = next((name for name in INSTRUMENTS if name == instrument), None)
+        return plan_measurements(machine, instrument=known, periods_mm=periods_mm, **shared)
+    if any(periods_mm) or instrument not in (None, *NEXT):
+        raise UsageError(f"--next chooses for {', '.join(NEXT)}, and without --period-x, -y and -z")
+    if component and instrument not in (None, "lines", "targets"):
+        raise UsageError(f"--component is for lines and targets, not for {instrument}")
+    offered = next((name for name in NEXT if name == instrument), None)
+    return plan_next(
+        machine, next_, instrument=offered, calibration=calibration, criterion=criterion,
+        components=component, date=date, **shared,
+    )  # fmt: skip
