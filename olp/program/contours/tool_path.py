@@ -83,11 +83,12 @@ class _Beside:
         self.held = np.flatnonzero(on & mine)
         self.of = last[self.held]
         if not rules.returns:
-            self._stay(path, on, last)
+            # a contour without an element has nothing to stay beside
+            self._stay(path, on, last, np.flatnonzero((on & mine)[:-1] & ~on[1:]) + 1)
 
-    def _stay(self, path: Toolpath, on: Mask, last: Index) -> None:
-        """Behind a contour the tool stays beside it until a move goes across the plane."""
-        ends = np.flatnonzero(on[:-1] & ~on[1:]) + 1
+    def _stay(self, path: Toolpath, on: Mask, last: Index, ends: Index) -> None:
+        """Behind contours, at the moves `ends`, the tool stays beside them until a move goes across the
+        plane."""
         held, of = [self.held], [self.of]
         for k in ends.tolist():
             axes = AXES[self.elements.plane[last[k]]][:2]

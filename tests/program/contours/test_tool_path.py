@@ -168,6 +168,15 @@ IN_CONTOUR = {
 }  # fmt: skip
 
 
+def test_a_contour_that_only_goes_along_the_tool_has_nothing_to_stay_beside(tmp_path: Path) -> None:
+    """Neither where it is the first of a program, nor behind another contour."""
+    along = b"G41 D1 G1 Z5\nG40 Z8\nZ9\n"
+    assert moves(program(tmp_path, along, "fanuc"))[1:] == [("LINE", 0, 0, z) for z in (5, 8, 9)]
+    first = b"G41 D1 G1 X0 Y20\nX50\nG40 G1 X60 Y60\n"
+    behind = moves(program(tmp_path, first + along, "fanuc"))
+    assert behind[-4:] == [("LINE", 60, 60, z) for z in (10, 5, 8, 9)]
+
+
 @pytest.mark.parametrize("block", IN_CONTOUR)
 def test_blocks_that_a_control_does_not_take_along_a_contour(tmp_path: Path, block: bytes) -> None:
     line, why = refused(tmp_path, b"G41 D1 G1 X20 Y0\n%s\nX60 Y20\nG40 G1 X90\n" % block)
