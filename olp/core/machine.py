@@ -147,6 +147,7 @@ class Machine:
     read as increments.
     `arc_centres` says what I, J and K are at the start, and `cycle_return` where canned cycles return, to a
     control that has a setting for it.
+    `default_motion` is the motion code in force at the start of a program, where its control does not fix it.
     `still_macros` are the macros of a printer that move no axis and change no mode.
     `real_time` is the beginning of the hash of the calibration that the control itself corrects by in every
     servo cycle, None where it does not.
@@ -172,6 +173,7 @@ class Machine:
     default_tool: int | None = None
     default_work_offset: str = "G54"
     length_active: bool = False
+    default_motion: Literal["G0", "G1"] | None = None
     decimal_point: Literal["increment", "calculator"] | None = None
     arc_centres: Literal["incremental", "absolute"] | None = None
     cycle_return: Literal["initial", "r"] | None = None

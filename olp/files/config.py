@@ -149,6 +149,7 @@ def _read_machine(path: PathLike, read: Reader) -> tuple[Machine, Mapping[Path, 
         default_tool=file.job_defaults.tool,
         default_work_offset=file.job_defaults.work_offset,
         length_active=file.job_defaults.length_active,
+        default_motion=file.job_defaults.motion,
         path_mode=file.path.mode,
         blend_mm=file.path.blend_mm,
         times=ControlTimes(

@@ -262,6 +262,11 @@ class JobDefaultsTable(Table):
         default="G54", description='the work offset that is active at the start, such as "G54"'
     )
     length_active: bool = Field(default=False, description="whether the tool length is active at the start")
+    motion: Literal["G0", "G1"] | None = Field(
+        default=None,
+        description="the motion code in force at the start, G0 or G1, where a setting of the control or the "
+        "program before decides",
+    )
 
 
 class StylusTable(Table):

@@ -104,6 +104,7 @@ def _control(file: JointMachineFile, structure: Structure, path: PathLike) -> Ma
         default_tool=file.job_defaults.tool,
         default_work_offset=file.job_defaults.work_offset,
         length_active=file.job_defaults.length_active,
+        default_motion=file.job_defaults.motion,
     )
 
 

@@ -114,7 +114,8 @@ RULES = (
         "OLP517",
         "no motion code in force",
         why="A block has axis words, and no code says how to move there.",
-        remedy="Give G0, G1, G2 or G3 in the block or before it.",
+        remedy="Give G0, G1, G2 or G3 in the block or before it. Where the setting of the control is known, "
+        "state it as `motion` in `[job_defaults]`.",
         example="`X10 Y10` as the first block, or after G80.",
         follows=True,
     ),

@@ -370,8 +370,9 @@ class _Reader:
         blocks, state = rows.blocks, self.state
         number, kind, frame = rows.number[a:upto], rows.kind[a:upto], rows.frame[a:upto]
         if (kind == 255).any():
-            rows_without = np.flatnonzero(kind == 255).tolist()
-            raise ProgramError.together(_no_motion(int(number[i])) for i in rows_without)
+            rows_without = np.flatnonzero(kind == 255)
+            ended = context.motion[blocks.line[a:upto][rows_without]] >= 0
+            raise ProgramError.together(map(_no_motion, number[rows_without].tolist(), ended.tolist()))
         incremental, flag = rows.incremental[a:upto], rows.flag[a:upto]
         slot, word = blocks.slot[a:upto], rows.word[a:upto]
         check_frames(state, number, incremental, rows.plane[a:upto], frame)
@@ -470,9 +471,11 @@ def _check_centres(context: Context, line: Index, words: Index) -> None:
         )
 
 
-def _no_motion(line: int) -> ProgramError:
+def _no_motion(line: int, ended: bool) -> ProgramError:
+    """Of a block behind G80, where a code `ended`, or before any code."""
+    stated = "" if ended else ' before it, or motion = "G0" or "G1" in [job_defaults] of the machine file'
     return ProgramError(
-        "a block has axis words, but no motion code is in force; expected G0, G1, G2 or G3",
+        f"a block has axis words, but no motion code is in force; expected G0, G1, G2 or G3{stated}",
         line=line,
         code="OLP517",
     )

@@ -4,6 +4,8 @@ where a program ends."""
 from __future__ import annotations
 
 import functools
+from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -256,6 +258,22 @@ def test_a_program_without_a_unit_is_remarked_where_it_first_moves(setups: dict[
 def test_a_control_moves_before_any_code_where_it_begins_in_rapids(setups: dict[str, Setup]) -> None:
     assert program("X1 Y2\n", setups["grbl"], "grbl").toolpath.kind.tolist() == [Kind.RAPID]
     assert refusal("X1\n", setups["linuxcnc"])["code"] == "OLP517"
+
+
+@pytest.mark.parametrize(("code", "kind"), [("G0", Kind.RAPID), ("G1", Kind.LINE)])
+def test_the_machine_file_states_the_motion_code_at_the_start(
+    setups: dict[str, Setup], code: Literal["G0", "G1"], kind: Kind
+) -> None:
+    """Behind G80, too, on controls whose cycles are apart. A control that begins in a code keeps it."""
+
+    def kinds(control: str, text: str) -> list[int]:
+        setup = setups[control]
+        stated = replace(setup, machine=replace(setup.machine, default_motion=code))
+        return program(text, stated, control).toolpath.kind.tolist()
+
+    assert kinds("fanuc", "F60 X1. Y2. Z3.\nG3 X3. R2.\n") == [kind, Kind.ARC_CCW]
+    assert kinds("haas", "F60\nG80\nX1. Y2.\n") == [kind]
+    assert kinds("grbl", "F60\nX1 Y2\n") == [Kind.RAPID]
 
 
 def outcome(text: str, setup: Setup, control: str) -> object:

@@ -73,7 +73,7 @@ class Profile(Dialect):
     - `harmless_m` are the M codes that move no axis; `harmless_m_tenths` those with a decimal, ten times
       their number. `m_refusals`: M codes that are refused, ten times their number, and what they do.
     - `motion`, `initial_retract`: G codes that are in force at the start (None: none, or a setting of the
-      control). `arc_distance`: whether
+      control, which the machine file states as `motion` and `cycle_return`). `arc_distance`: whether
       centres are absolute (901) or distances (911) at the start; None is a setting of the control, which the
       machine file states as `arc_centres`.
     - `increments_without_point`: X100 means 100 least increments, not 100 mm. `feed_without_point`: F100 is
@@ -226,6 +226,8 @@ class Profile(Dialect):
         if stated is not None and self.initial_retract is None and not self.return_modes:
             level = {"initial": RETRACT_TO_INITIAL, "r": RETRACT_TO_R}[stated]
             profile = replace(profile, initial_retract=level)
+        if machine.default_motion is not None and self.motion is None:
+            profile = replace(profile, motion=int(machine.default_motion[1:]))
         if self.language.user_tasks and not self.counts_increments(machine):
             profile = replace(profile, language=replace(self.language, increments_open=False))
         return profile
