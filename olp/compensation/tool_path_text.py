@@ -33,18 +33,22 @@ _ALIKE_MM = 0.05
 _STILL_MM = 1e-9
 
 
-def as_tool_path(program: Program, increments_mm: Vector) -> Unrolled:
-    """The text with the path of the tool. Raises ProgramError for blocks that cannot have it."""
-    return _Text(program, increments_mm).written()
+def as_tool_path(program: Program, increments_mm: Vector) -> tuple[Unrolled, Mask]:
+    """The text with the path of the tool, and (n,) which moves have a block in it. Raises ProgramError for
+    blocks that cannot have it."""
+    text = _Text(program, increments_mm)
+    return text.written(), text.has_block
 
 
-def with_exact_path(written: Program, program: Program) -> Program:
-    """The text as read again, with the path of the tool before its digits were rounded."""
+def with_exact_path(written: Program, program: Program, has_block: Mask) -> Program:
+    """The text as read again, with the path of the tool before its digits were rounded. (n,) `has_block` are
+    the moves of the program that are in the text."""
     path, exact = written.toolpath, program.toolpath
-    alike = len(path) == len(exact) and bool((path.kind == exact.kind).all())
+    end_mm = exact.end_mm[has_block]
+    alike = len(path) == len(end_mm) and bool((path.kind == exact.kind[has_block]).all())
     alike &= len(path.arcs) == len(exact.arcs)
     if alike:
-        ends = np.nan_to_num(path.end_mm - exact.end_mm)
+        ends = np.nan_to_num(path.end_mm - end_mm)
         centres = path.arcs.centre_mm - exact.arcs.centre_mm
         alike = max(np.abs(ends).max(initial=0.0), np.abs(centres).max(initial=0.0)) < _ALIKE_MM
     if not alike:
@@ -54,7 +58,7 @@ def with_exact_path(written: Program, program: Program) -> Program:
         )
     arcs = replace(exact.arcs, move=path.arcs.move)
     remarks = (*written.remarks, ("path", int(exact.line[np.argmax(exact.compensated())]), ""))
-    return replace(written, toolpath=replace(path, end_mm=exact.end_mm, arcs=arcs), remarks=remarks)
+    return replace(written, toolpath=replace(path, end_mm=end_mm, arcs=arcs), remarks=remarks)
 
 
 def _unlike(a: Array, b: Array) -> Mask:
@@ -79,6 +83,8 @@ class _Text:
         self.absolute = self._absolute_centres()
         self.edits: dict[int, list[tuple[int, int, bytes]]] = {}
         self.before: dict[int, list[bytes]] = {}
+        #: the moves that have a block
+        self.has_block = np.ones(len(self.path), bool)
 
     def written(self) -> Unrolled:
         path, on = self.path, self.path.compensated()
@@ -120,7 +126,10 @@ class _Text:
         arc = self.arc.get(move)
         if arc is not None:
             words += self._centre(move, arc, at, frame.unit_mm, frame.offset_mm)
-        if self.corner[path.frame[move]]:
+        if self.corner[path.frame[move]] and not words:
+            # both sides of a right angle are extended to one point
+            self.has_block[move] = False
+        elif self.corner[path.frame[move]]:
             code = _CODE[Kind(int(path.kind[move]))]
             block = b" ".join([code, *(letter + number for letter, _, number in words)])
             self.before.setdefault(line, []).append(block)

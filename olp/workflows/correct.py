@@ -400,7 +400,7 @@ def _as_path(source: Source, program: Program, loaded: Loaded, reading: Options)
     from olp.compensation.tool_path_text import as_tool_path, with_exact_path
 
     with program.errors():
-        text = as_tool_path(program, loaded.setup.machine.least_increment_mm)
+        text, has_block = as_tool_path(program, loaded.setup.machine.least_increment_mm)
         try:
             written = read(text, loaded.setup, loaded.dialect, reading)
         except ProgramError as error:
@@ -408,7 +408,7 @@ def _as_path(source: Source, program: Program, loaded: Loaded, reading: Options)
                 f"the path of the tool cannot be written as blocks of this program: {error.message}"
             )
             raise
-        return source.holding(text), with_exact_path(written, program)
+        return source.holding(text), with_exact_path(written, program, has_block)
 
 
 def _written_report(done: _Rewritten) -> dict[str, Any]:

@@ -132,6 +132,19 @@ def test_a_contour_states_its_radius_and_the_path_what_it_lacks(tmp_path: Path) 
         corrected(tmp_path, RECTANGLE.replace(b"D1", b"D7"))
 
 
+def test_right_angles_that_a_control_extends_become_blocks_of_the_path(tmp_path: Path) -> None:
+    """Both sides of such a corner meet in one point, where no third block goes on."""
+    keys = 'decimal_point = "calculator"\n'
+    path = machine(tmp_path, LEANING, controller="haas", keys=keys, tables=tool(5.0))
+    text = HEAD + b"G41 D1 G1 X20. Y20.\nY60.\nX90.\nY30. Z-1.\nG40 G0 X120.\nM2\n"
+    result = olp.correct(text, path, contour="path")
+    assert result.report["deviation"]["holds"]
+    written = [b"X15.000 Y20.000", b"Y60.000", b"Y65.000", b"X20.000", b"X90.000", b"X95.000", b"Y60.000"]
+    blocks = [line.removeprefix(b"G1 ") for line in body(result)]
+    assert [block for block in blocks if block.strip() in written] == written
+    assert b"" not in blocks
+
+
 def test_points_under_cutcom_get_no_step(tmp_path: Path) -> None:
     path = machine(tmp_path, PLAY, tables=tool(5.0))
     text = b"UNITS/MM\nRAPID\nGOTO/0,0,0\nFEDRAT/600,MMPM\n%sGOTO/50,0,0\nGOTO/20,30,0\n%sGOTO/0,0,0\nFINI\n"
