@@ -60,6 +60,7 @@ from olp.program.rs274.special_blocks import (
     event_block,
     event_words,
 )
+from olp.program.rs274.spindle_words import translate
 from olp.program.rs274.translated import Beside, check_frames
 from olp.program.rs274.translation import Translation
 from olp.program.rs274.turned import Turning, along_words
@@ -136,7 +137,7 @@ class _Reader:
         self.others = OTHER if commands is None else OTHER.replace(commands.extruder.encode(), b"")
         self.extrusion = None if commands is None or not commands.feeds(data) else Extrusion(commands)
         self.feeding = self.whole = np.zeros(0, bool)
-        translator = profile.translator
+        translator = translate if profile.spindle_words else profile.translator
         self.translation = Translation(data) if translator is None else translator(data)
 
     def run(self) -> Program:
@@ -274,7 +275,7 @@ class _Reader:
                 continue
             number = context.number(line)
             own = next(stated)
-            block = event_block(context, own, state.profile, self.known)
+            block = beside.numbered(line, event_block(context, own, state.profile, self.known))
             tool = block.m_codes or "T" in block.by_letter
             if tool or line in self.payloads or not _KEEPS_FRAME.issuperset(block.events):
                 rows.present = None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,10 +11,11 @@ import numpy.typing as npt
 
 from olp.core.arrays import Index, Mask
 from olp.core.errors import ProgramError
-from olp.program.rs274.axis_state import AxisState
+from olp.program.rs274.axis_state import TOOL_CHANGE, AxisState
 from olp.program.rs274.codes import INCREMENTAL
 from olp.program.rs274.flatten.language import UNROLL
 from olp.program.rs274.modes import Context
+from olp.program.rs274.offset_state import EventBlock
 from olp.program.rs274.translation import Drilling, Translation
 
 #: Plane code of the plane across Z.
@@ -28,7 +30,8 @@ class Beside:
         self._translation, self._context, self._state = translation, context, state
         self.lines = np.zeros(len(context.active), bool)
         self.calls = self.lines.copy()
-        if not (translation.refused or translation.actions or translation.drillings or translation.counted):
+        own = translation.drillings or translation.counted or translation.of_spindle
+        if not (translation.refused or translation.actions or own):
             return
         first = context.chunk.first_line
         refused = self._active(translation.refused, first, last)
@@ -37,6 +40,7 @@ class Beside:
         self.lines[self._active(translation.actions, first, last)] = True
         self.calls[self._active(translation.drillings, first, last)] = True
         self.lines |= self.calls
+        self.lines[self._active(translation.of_spindle, first, last)] = True
         self._counted(self._active(translation.counted, first, last).tolist())
 
     def _active(self, table: Mapping[int, Any], first: int, last: int) -> Index:
@@ -52,6 +56,26 @@ class Beside:
         for action in actions:
             action.run(self._state, number)
         return bool(actions)
+
+    def numbered(self, line: int, block: EventBlock) -> EventBlock:
+        """The block of a line with the number of the tool in the spindle in its words for that. Raises
+        ProgramError where it is not known."""
+        number = self._context.number(line)
+        letters = self._translation.of_spindle.get(number, "")
+        if not letters:
+            return block
+        changes, spindle = TOOL_CHANGE in block.m_codes, self._state.spindle
+        if changes or spindle is None:
+            why = "the tool is changed in this block; divide it" if changes else (
+                "this tool is not known; give T and M6 before it, or `tool` in [job_defaults]"
+            )  # fmt: skip
+            raise ProgramError(
+                f"{letters[0]}A is the offset of the tool in the spindle, and {why}",
+                line=number,
+                code="OLP532",
+            )
+        words = [replace(w, value=float(spindle)) if w.letter in letters else w for w in block.words]
+        return EventBlock.of(words, block.events)
 
     def forgets(self, line: int) -> bool:
         """Whether an action of a line lets the control move axes by itself."""

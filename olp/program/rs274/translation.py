@@ -70,7 +70,8 @@ class Translation:
     """The `text` in words. By line, from 1: why lines are `refused`, their `actions`, the cycles that are
     called behind their motion (`drillings`), and the axis letters that are distances and positions whatever
     G90 and G91 say (`counted`). `central` are lines with absolute centres of arcs, sorted. `closings` are
-    bytes of brackets that close behind a number, sorted."""
+    bytes of brackets that close behind a number, sorted. `of_spindle` are the letters whose number is that of
+    the tool in the spindle."""
 
     text: bytes
     refused: Mapping[int, ProgramError] = field(default_factory=dict)
@@ -79,3 +80,4 @@ class Translation:
     counted: Mapping[int, tuple[str, str]] = field(default_factory=dict)
     central: Index = field(default_factory=lambda: _NO_LINES)
     closings: Index = field(default_factory=lambda: _NO_LINES)
+    of_spindle: Mapping[int, str] = field(default_factory=dict)

@@ -88,6 +88,11 @@ READINGS: dict[str, tuple[str, dict[str, Outcome], Any]] = {
         {SIEMENS: (1, 2, 3)},
         {SIEMENS: frozenset()},
     ),
+    "spindle_words": (
+        "T2 M6\nG56 HA\nG0 X0. Y0. Z1.",
+        {OKUMA: (0, 0, 21)},
+        "not",
+    ),
     "tools_in_block": (
         "T1 T2 M6\nG43 H1\nG0 X0. Y0. Z1.",
         {MAZAK: (0, 0, 11)},

@@ -27,6 +27,7 @@ _LABEL = re.compile(r"n(?:\d+|[a-z][a-z0-9]*)(?![=.])")
 _NAME = re.compile(r"[a-z]{2}[a-z0-9]*")
 _TARGET = re.compile(r"v[a-z]+\[|[a-z]{2}[a-z0-9]*=")
 _WORD = re.compile(r"([a-z])(=| ?(?=[-+.\d]))")
+_OF_SPINDLE = re.compile(r"([hd])[abc](?:(?=[hd][abc](?![a-z0-9=\[]))|(?![a-z0-9=\[]))")
 _LITERAL = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)")
 _COMMON = re.compile(r"vc\d+")
 _FUNCTION = re.compile(r"(abs|atan2|atan|cos|fix|fup|mod|round|sin|sqrt|tan)\[")
@@ -164,6 +165,12 @@ class _Task(Reader):
     def _word(self) -> None:
         self.skip()
         start = self.position
+        own = _OF_SPINDLE.match(self.text, start)
+        if own is not None:
+            # its number is that of the tool in the spindle: it stays a letter
+            self.position = own.end()
+            self._put(own[1], 0.0, None, start, start + 1)
+            return
         word = _WORD.match(self.text, start)
         if word is None:
             raise self._odd("a word")

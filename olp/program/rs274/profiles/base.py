@@ -99,8 +99,9 @@ class Profile(Dialect):
       A G0 begins and ends at rest, and M5 and M9 come after the motion of their block.
     - `m61_sets_tool`: M61 Q says which tool is in the spindle. `tools_in_block`: a block may have two T
       words, the tool to change to and the one to make ready. `length_of_spindle_tool`: G43 without H, and
-      with H0, takes the length of that tool. `lengths_along_z`: a tool length counts along Z alone.
-      `lengths_keep_unit`: a change of unit does not convert the length in force.
+      with H0, takes the length of that tool. `spindle_words`: HA and DA name its length and its radius.
+      `lengths_along_z`: a tool length counts along Z alone. `lengths_keep_unit`: a change of unit does not
+      convert the length in force.
     - `feed_words_end`: each G94 and G95 forgets F. `feed_before_unit`: F of a block counts before its G20 or
       G21. `least_inverse_feed`: units per minute, the least feed of a block in G93. `m_with_motion`: M codes
       carried out along with the motion, without a rest.
@@ -168,6 +169,7 @@ class Profile(Dialect):
     m61_sets_tool: bool = False
     tools_in_block: bool = False
     length_of_spindle_tool: bool = False
+    spindle_words: bool = False
     lengths_along_z: bool = False
     lengths_keep_unit: bool = False
     feed_words_end: bool = False

@@ -1,9 +1,10 @@
 """Okuma mills (OSP).
 
-Differs from Fanuc: G15 H selects the work offset, G56 H calls up a tool length along Z and G53 ends it; G54,
-G55 and G57 to G59 are lengths of other axes. G62 mirrors. The time of G4 is F. Canned cycles return to the
-level of G71 with M53, and to R with M54. G284 and G274 are synchronous taps. Parametric programs are user
-tasks: VC1, CALL, RTS, IF, GOTO. Names of programs and labels in letters stay.
+Differs from Fanuc: G15 H selects the work offset, G56 H calls up a tool length along Z and G53 ends it, HA
+and DA name the offsets of the tool in the spindle; G54, G55 and G57 to G59 are lengths of other axes. G62
+mirrors. The time of G4 is F. Canned cycles return to the level of G71 with M53, and to R with M54. G284 and
+G274 are synchronous taps. Parametric programs are user tasks: VC1, CALL, RTS, IF, GOTO. Names of programs
+and labels in letters stay.
 
 Source: programming manuals of OSP-E10M, OSP-E100M and OSP-P200M.
 """
@@ -31,6 +32,7 @@ DIALECT = replace(
     folder_endings=("min", "nc", "tap"),
     signs=OKUMA,
     keeper=None,
+    spindle_words=True,
     codes=g_codes(
         unchanged=set(_UNCHANGED),
         extra={
@@ -65,7 +67,8 @@ DIALECT = replace(
     dwell_words="F",
     g10_stores=False,
     inert=pattern(rb"[ \t]*(?:\$[^()%]*%?|[ON][A-Z][A-Z0-9]*(?:[ \t]*\([^)]*\))?)[ \t]*"),
-    languages=frozenset({"Okuma OSP"}),
+    # its user tasks have `X=` as Sinumerik has it
+    languages=frozenset({"Okuma OSP", "Sinumerik (Siemens)"}),
     program_number=False,
     language=USER_TASKS,
     path_mode="G64 of the control, unless a high-speed function is on",
