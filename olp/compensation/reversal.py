@@ -17,7 +17,7 @@ from olp.compensation.contour import Contour
 from olp.compensation.dead_band import UNKNOWN, Rest, follow
 from olp.compensation.invert import invert
 from olp.compensation.plan import Plan
-from olp.core.arrays import Array, Index, Mask, any_in_row
+from olp.core.arrays import Array, Index, Mask, any_in_row, is_in
 from olp.core.progress import Progress, silent
 from olp.core.toolpath import Flag, Kind, Toolpath
 from olp.core.values import dataclass
@@ -161,8 +161,8 @@ def _still(path: Toolpath, rows: Plan, source: Index | None) -> Index | None:
 
 def _may_turn(path: Toolpath, rows: Plan, command_mm: Array, *, insert: bool) -> Mask:
     """(r,) rows before which a step may be put: feed moves that are corrected and start at a known position,
-    the first one at `command_mm` (3,). Without `insert` not before those that are never split."""
-    may = ~any_in_row(rows.raw) & (path.kind[rows.move] != Kind.RAPID)
+    the first one at `command_mm` (3,). Those that touch have none, as it would touch too. Without `insert` not before those that are never split."""
+    may = ~any_in_row(rows.raw) & ~is_in(path.kind[rows.move], (Kind.RAPID, Kind.PROBE))
     may &= (path.flag[rows.move] & np.uint8(Flag.CYCLE)) == 0
     if not insert:
         may &= (path.flag[rows.move] & np.uint8(Flag.WHOLE)) == 0

@@ -217,21 +217,24 @@ class _Reader(Events):
             value = value @ np.array(frame.turn).T
         relative = self.points.form[part] == INCREMENT
         end = value + np.where(relative[:, None], 0.0, np.array(frame.offset_mm))
-        if relative.any():
-            self._add_up(end, relative, line)
         touch = np.array([n in self.touches for n in line.tolist()])
+        if relative.any():
+            self._add_up(end, relative, touch)
+        lost = np.isnan(end).any(axis=1)
         kind = np.where(touch, np.uint8(Kind.PROBE), np.uint8(Kind.RAPID))
         flag = np.where(touch, np.uint8(Flag.WHOLE), np.uint8(0))
         if self.manual:
             flag |= np.uint8(Flag.PASS)
+        flag[lost] |= np.uint8(Flag.PASS | Flag.CONTROL)
         if not self.unit_stated:
             self.collector.remarks.setdefault("unit", (int(line[0]), "the program states no UNITS"))
-        for row in np.flatnonzero(self.points.form[part]).tolist():
+        for row in np.flatnonzero((self.points.form[part] != 0) & ~lost).tolist():
             self.collector.restated[self.collector.moves + row] = bool(relative[row])
         # where the probe is after a touch, only the control knows
         self.position = [NAN] * 3 if touch[-1] or self.manual else end[-1].tolist()
         self.collector.put_stated_moves(
-            kind, flag, line, np.full(len(line), number), end, self.points.slot[part],
+            kind, flag, line, np.full(len(line), number), end,
+            np.where(lost[:, None], -1, self.points.slot[part]),
             self.points.begin[part], self.points.end[part],
         )  # fmt: skip
 
@@ -248,16 +251,9 @@ class _Reader(Events):
             )
         return cartesian(value, form, self.plane or 0, self.angle_rad)
 
-    def _add_up(self, end: Array, relative: Mask, line: Index) -> None:
-        """Points that count from the one before them, in place."""
-        touch = np.array([n in self.touches for n in line.tolist()])
+    def _add_up(self, end: Array, relative: Mask, touch: Mask) -> None:
+        """Points that count from the one before them, in place; NaN where only the control knows that one, as
+        after a `touch`."""
         for i in np.flatnonzero(relative).tolist():
             before = np.array(self.position) if i == 0 else end[i - 1]
-            if np.isnan(before).any() or self.manual or (i and touch[i - 1]):
-                raise ProgramError(
-                    "GOTO/INCR counts from a position that only the control knows, as after a touch; "
-                    "write it as GOTO/CART, or put a GOTO/CART before it",
-                    line=int(line[i]),
-                    code="OLP524",
-                )
-            end[i] += before
+            end[i] = NAN if np.isnan(before).any() or self.manual or (i and touch[i - 1]) else end[i] + before

@@ -163,7 +163,6 @@ def test_units(zero: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "line", "words"),
     [
-        ("GOTO/INCR,5,0,0,1\n", 5, "counts from a position that only the control knows"),
         ("GOTO/X1,2,3\n", 5, "X1"),
         ("PTMEAS/CART,1,2,3,0,0,1\n", 5, "outside MEAS"),
         ("SNSLCT/S(GONE)\nGOTO/1,2,3\n", 6, "GONE"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -95,6 +96,47 @@ def test_a_changed_point_becomes_cartesian_and_nothing_else_changes(tmp_path: Pa
             assert new == old
     assert b"PTMEAS/CART," in written and b",$\n " in written and b" $$ away\n" in written
     assert b"POL" not in written and b"INCR" not in written
+
+
+@pytest.mark.parametrize(
+    "before",
+    [
+        "",
+        "GOHOME\n",
+        "IF/(A)\n",
+        "MODE/MAN\nGOTO/1,2,3\nMODE/PROG\n",
+        "MEAS/POINT,F(A),1\nPTMEAS/CART,1,2,3\n",
+    ],
+)
+def test_increments_from_a_place_that_only_the_control_knows_stay(before: str, tmp_path: Path) -> None:
+    """Those behind them too, up to the next point that is stated."""
+    path = machines.shift_machine(tmp_path, recipe=RECIPE)
+    stay, closing = "GOTO/INCR,5,0,0,1\nGOTO/INCR,3.0,1,0,0\n", "ENDIF\n" * before.startswith("IF")
+    closing += "ENDMES\n" * before.startswith("MEAS")
+    text = f"UNITS/MM\nRECALL/D(PART)\n{before}{stay}GOTO/10,20,30\nGOTO/INCR,5.0,0,0,1\n{closing}ENDFIL\n"
+    data = text.encode()
+    result = olp.correct(data, path)
+    assert stay.encode() in unstamped(result.data)
+    assert b"GOTO/10,20,30" not in result.data and b"INCR,5.0" not in result.data
+    first = text[: text.index(stay)].count("\n") + 1
+    (left,) = [finding for finding in result.findings if finding.code == "OLP102"]
+    assert {first, first + 1} <= set(left.lines)
+    ends = read(data, load_setup(path), DIALECTS["dmis"]).toolpath
+    known = ends.end_mm[~np.isnan(ends.end_mm).any(axis=1)]
+    assert np.diff(known[-2:], axis=0)[0] == pytest.approx([0, 0, 5])
+    assert olp.verify(data, result.data, path).report["deviation"]["holds"]
+
+
+def test_backlash_adds_no_touch(tmp_path: Path) -> None:
+    """A step that takes it up would touch where nothing is."""
+    path = machines.random_machine(tmp_path, 11, replace(RECIPE, backlash_um=dict.fromkeys("XYZ", 4.0)))
+    data = (
+        b"UNITS/MM,ANGDEC\nMODE/PROG\nRECALL/D(PART)\nGOTO/CART,90,90,50\nGOTO/CART,110,100,-5\n"
+        b"MEAS/CIRCLE,F(C),2\nPTMEAS/POL,20,0,5,-1,0,0\nPTMEAS/CART,50,60,-3,-1,0,0\nENDMES\nENDFIL\n"
+    )
+    result = olp.correct(data, path)
+    assert result.data.count(b"PTMEAS/CART,") == result.data.count(b"PTMEAS") == 2
+    assert olp.verify(data, result.data, path).report["deviation"]["after"]["waypoints"]["max_um"] < 1.0
 
 
 def test_points_that_are_no_round_numbers_are_kept_on_a_machine_without_errors(zero: Path) -> None:
