@@ -55,9 +55,10 @@ class ArcRows:
         )  # fmt: skip
 
 
-def solve(writer: Writer, rows: Rows) -> ArcRows:
+def solve(writer: Writer, rows: Rows, by_angle: Mask | None = None) -> ArcRows:
     """The corrected arcs among rows, with their centres from the emitted end points and the bent path between
-    them. Raises ProgramError where the last digit decides whether an arc is a whole circle."""
+    them. Raises ProgramError where the last digit decides whether an arc is a whole circle, which it does not
+    in the rows (r,) `by_angle`, whose blocks state how far they turn."""
     path, plan = writer.path, writer.plan
     arc_row = np.flatnonzero(rows.arc & ~rows.take_up & ((rows.flag & np.uint8(Flag.PASS)) == 0))
     move = rows.move[arc_row]
@@ -92,8 +93,8 @@ def solve(writer: Writer, rows: Rows) -> ArcRows:
         absolute = writer.program.arc_slots.absolute[arc[part]]
         kept[part] = bend.rigid & alike & (~absolute | (most_in_row(np.abs(shift)) < 1e-9))
     kept &= rows.head[arc_row] & (reach == 1.0)
-    _check_sweep(start, end, centre, sweep, plane, path.line[move])
     solved = ArcRows(arc_row, move.astype(np.int64), path.line[move], start, end, centre, sweep, plane)
+    _check_sweep(solved if by_angle is None else solved.pick(~by_angle[arc_row]))
     return solved.pick(~kept)
 
 
@@ -142,16 +143,10 @@ def _on_bisector(start: Array, end: Array, centre: Array, plane: npt.NDArray[np.
     return moved
 
 
-def _check_sweep(
-    start: Array,
-    end: Array,
-    centre: Array,
-    sweep: Array,
-    plane: npt.NDArray[np.int8],
-    line: npt.NDArray[np.int32],
-) -> None:
+def _check_sweep(arcs: ArcRows) -> None:
     """Raise ProgramError where rounding makes a tiny arc a whole circle, or a whole circle a tiny arc."""
-    (x0, y0), (x1, y1) = arms(start, centre, plane), arms(end, centre, plane)
+    sweep = arcs.sweep
+    (x0, y0), (x1, y1) = (arms(point, arcs.centre, arcs.plane) for point in (arcs.start, arcs.end))
     a0, a1 = np.arctan2(y0, x0), np.arctan2(y1, x1)
     turn = np.where(sweep > 0, a1 - a0, a0 - a1) % (2 * np.pi)
     turn[turn < 1e-9] = 2 * np.pi
@@ -164,6 +159,6 @@ def _check_sweep(
         raise ProgramError(
             "the last digit decides whether this short arc is a whole circle; state more digits "
             "(least_increment_mm) if the control takes them, or write this arc as a line",
-            line=int(line[bad[0]]),
+            line=int(arcs.line[bad[0]]),
             code="OLP561",
         )

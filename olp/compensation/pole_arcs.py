@@ -13,7 +13,7 @@ from olp.compensation.block_writer import BlockWriter
 from olp.compensation.conversational_blocks import ConversationalBlocks
 from olp.compensation.rows import Rows
 from olp.compensation.writer import Task
-from olp.core.arrays import Array, Mask
+from olp.core.arrays import Array, Index, Mask
 from olp.core.geometry import PLANES
 from olp.core.toolpath import Flag
 from olp.core.values import dataclass
@@ -26,6 +26,8 @@ _ANGLE_DECIMALS = 6
 #: of the radius: the chord of a part whose ends do not meet
 _CHORD_SHARE = 0.2
 _NAME = re.compile(rb"[ \t]*\d*[ \t]*(?P<c>C)R?", re.I)
+#: rad; an arc that turns further is a whole circle
+_WHOLE = 2 * math.pi - 1e-9
 #: mm; a pole that is off by less is the same
 _SAME_MM = 1e-9
 
@@ -92,7 +94,8 @@ class PoleArcs:
 
     def lift(self, writer: PoleWriter, rows: Rows) -> None:
         """Find the arcs that need their third axis, of which their blocks say nothing: controls take it in CP
-        alone, so these blocks become CP. Their words are not written."""
+        alone, so these blocks become CP. So do whole circles whose ends are off by a digit from where they
+        begin, which would be tiny arcs. Their words are not written."""
         path = writer.path
         self._lifted = np.zeros(len(rows.move), bool)
         row = np.flatnonzero(rows.arc & ~rows.take_up)
@@ -101,7 +104,8 @@ class PoleArcs:
         arc = np.searchsorted(path.arcs.move, rows.move[row])
         third = np.array(PLANES)[path.arcs.plane[arc], 2]
         silent = writer.program.slot[rows.move[row], third] < 0
-        lifted = row[silent & rows.write[row, third] & (_poles(writer).form[arc] != Block.POLAR)]
+        needed = (silent & rows.write[row, third]) | _torn(writer, rows, row, arc)
+        lifted = row[needed & (_poles(writer).form[arc] != Block.POLAR)]
         self._lifted[lifted] = True
         rows.write[lifted[rows.head[lifted]]] = False
 
@@ -110,7 +114,8 @@ class PoleArcs:
         if not rows.arc.any():
             return []
         edits = EditList(writer.prefixes)
-        for part in _parts(writer, rows, solve(writer, rows), self._lifted):
+        by_angle = self.polar(writer, rows) | self._lifted
+        for part in _parts(writer, rows, solve(writer, rows, by_angle), self._lifted):
             if part.form == Block.RADIUS and part.head and not part.lifted:
                 self._radius(writer, part, edits)
             else:
@@ -247,6 +252,16 @@ class PoleArcs:
         edits.add(name + 1, name + 2, BARE, 0)
         edits.add(int(words.start[word]), int(words.end[word]), BARE, 0)
         writer.tally.inserted_blocks += 1
+
+
+def _torn(writer: PoleWriter, rows: Rows, row: Index, arc: Index) -> Mask:
+    """(k,) whole circles, each in one row, that as written do not end where they begin."""
+    arcs, before = writer.path.arcs, np.maximum(row - 1, 0)
+    start = np.where((row > 0)[:, None], rows.emitted[before], rows.entry)
+    alone = rows.head[row] & np.append(rows.head, True)[row + 1]
+    across = np.array(PLANES)[arcs.plane[arc], :2]
+    off = np.abs(np.take_along_axis(rows.emitted[row] - start, across, axis=1)).max(axis=1)
+    return np.asarray(alone & (np.abs(arcs.sweep_rad[arc]) > _WHOLE) & (off > _SAME_MM), np.bool_)
 
 
 def _poles(writer: PoleWriter) -> Poles:

@@ -138,6 +138,20 @@ def test_r0_fauto_and_joined_words(bent: Path) -> None:
     assert moves.statements.feed_mm_s[[1, 4]] * 60 == pytest.approx(np.array([100, 9]))
 
 
+@pytest.mark.parametrize("circle", ["CP IPA{0}360 DR{0}", "C X{1} Y+50 DR{0}", "C DR{0}"])
+def test_whole_circles_stay_whole_on_a_coarse_machine(tmp_path: Path, circle: str) -> None:
+    """Whatever the digits of their ends, which are not those of where they begin."""
+    recipe = Recipe(controller="heidenhain", increment_mm=0.001, travel=((-3000.0, 3000.0),) * 3)
+    path = machines.random_machine(tmp_path, 1, recipe)
+    text = "BEGIN PGM A MM\nTOOL CALL 1 Z\nL X+50 Y+50 Z+5 R0 FMAX\nCC X+50 Y+50\n"
+    for k in range(1, 5):
+        x, turned = 50 + 4.25 * k, "+-"[k % 2]
+        text += f"L X{x} F800\n{circle.format(turned, x)}\nCP IPA+360 DR+\n"
+    result = olp.correct((text + "END PGM A MM\n").encode(), path)
+    assert result.report["deviation"]["holds"]
+    assert judged(text.encode(), result.data, path).max_um < 1.0 + 1.5
+
+
 def test_a_split_block_calls_its_cycle_once(bent: Path) -> None:
     text = DRILLED.replace(
         "L X-40 Y-30 R0 FMAX M99\nL X+50 FMAX M99", "L X-140 Y-30 R0 F900 M99\nL X+150 M99"
