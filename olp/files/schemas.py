@@ -328,6 +328,11 @@ class MachineFile(Table):
         description="where canned cycles return before any G98 or G99, by a setting of Mach3 and Mach4: to "
         "the level before them, or to R",
     )
+    scaling_axes: Literal["plane", "all"] | None = Field(
+        default=None,
+        description="which axes CYCL DEF 11 of Heidenhain programs scales, by a machine parameter: X and Y, "
+        "or Z too",
+    )
     still_macros: list[Text] = Field(
         default=[],
         description="the macros of a Klipper printer that move no axis and change no mode, by their names",

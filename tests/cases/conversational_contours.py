@@ -13,7 +13,7 @@ def contour(seed: int, count: int = 14) -> bytes:
     lines = ["BEGIN PGM CONTOUR MM", "TOOL CALL 1 Z S2000", "L X+0 Y+0 Z+5 R0 FMAX M3", "L Z-1 F400"]
     here, heading, after_corner = 0j, 1 + 0j, ""
     lines += ["L X+25 Y+0"]
-    here = 25 + 0j
+    here, scaled = 25 + 0j, False
 
     def n(value: float) -> str:
         return f"{value:+.3f}"
@@ -36,9 +36,22 @@ def contour(seed: int, count: int = 14) -> bytes:
                 ["CYCL DEF 10.0 ROTATION", "CYCL DEF 10.1 ROT+0", "CYCL DEF 8.0 MIRROR",
                  f"CYCL DEF 8.1 {draw.choice(('X', 'Y', 'X Y', ''))}"],
             ))  # fmt: skip
+            if draw.random() < 0.5:
+                factor = n(draw.uniform(0.6, 1.8))
+                lines += ["CYCL DEF 26.0 AXIS-SPEC. SCALING", "CYCL DEF 26.1 X+1 Y+1 CCX+0 CCY+0",
+                          "CYCL DEF 11.0 SCALING", "CYCL DEF 11.1 SCL +1"]  # fmt: skip
+                scaled = draw.random() < 0.7
+                if scaled:
+                    cycle = draw.choice((11, 26))
+                    words = f"X{factor} Y{factor} CCX{n(draw.uniform(-9, 9))} CCY{n(draw.uniform(-9, 9))}"
+                    lines += [f"CYCL DEF {cycle}.0 SCALING"]
+                    lines += [f"CYCL DEF {cycle}.1 " + (f"SCL{factor}" if cycle == 11 else words)]
             lines += ["L X+0 Y+0", "L X+25 Y+0"]
             here, heading = 25 + 0j, 1 + 0j
             continue
+        if kind == "appr" and scaled:
+            # whether its radius is scaled is not known
+            kind = "L"
         if kind == "appr" and not corner:
             form = draw.choice(("LT LEN7", "LN LEN6", "CT CCA80 R+5", "CT CCA100 R-4", "LCT R5", "PLCT R5"))
             end = spot(40)

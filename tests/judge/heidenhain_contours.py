@@ -78,6 +78,7 @@ class Contours:
     def __init__(self) -> None:
         self.steps: list[Step] = []
         self.shift, self.turn, self.mirror = 0j, 0.0, ""
+        self.scale, self.tall, self.about = 1.0, 1.0, 0j
         self.here, self.z, self.pole = complex("nan"), math.nan, 0j
         self.corner: tuple[str, float, int] | None = None
         self.approach: tuple[str, dict[str, float], complex, complex, int, int] | None = None
@@ -85,6 +86,7 @@ class Contours:
 
     # the frame
     def outward(self, p: complex) -> complex:
+        p = self.about + (p - self.about) * self.scale
         p *= cmath.exp(1j * math.radians(self.turn))
         x = -p.real if "X" in self.mirror else p.real
         y = -p.imag if "Y" in self.mirror else p.imag
@@ -96,12 +98,12 @@ class Contours:
         for s in self.steps:
             self.out.append(replace(
                 s, start=self.outward(s.start), end=self.outward(s.end), centre=self.outward(s.centre),
-                sweep=s.sweep * sign,
+                sweep=s.sweep * sign, z=s.z * self.tall,
             ))  # fmt: skip
         self.steps = []
 
     def reframed(self, text: str) -> None:
-        here = self.outward(self.here)
+        here, height = self.outward(self.here), self.z * self.tall
         self.flush()
         if match := re.match(rf"CYCL DEF 7\.\d *(I?)([XY]) *({NUMBER})", text):
             unit = 1 if match[2] == "X" else 1j
@@ -111,10 +113,17 @@ class Contours:
             self.turn = float(match[2]) + (self.turn if match[1] else 0.0)
         elif match := re.match(r"CYCL DEF 8\.1 *([XY ]*)$", text):
             self.mirror = match[1].replace(" ", "")
+        elif match := re.match(rf"CYCL DEF 11\.1 *SCL *({NUMBER})", text):
+            self.scale = self.tall = float(match[1])
+        elif match := re.match(
+            rf"CYCL DEF 26\.1 *X *({NUMBER}) *Y *\1 *CCX *({NUMBER}) *CCY *({NUMBER})", text
+        ):
+            self.scale, self.about = float(match[1]), complex(float(match[2]), float(match[3]))
         p = here - self.shift
         x = -p.real if "X" in self.mirror else p.real
         y = -p.imag if "Y" in self.mirror else p.imag
-        self.here = complex(x, y) * cmath.exp(-1j * math.radians(self.turn))
+        inner = complex(x, y) * cmath.exp(-1j * math.radians(self.turn))
+        self.here, self.z = self.about + (inner - self.about) / self.scale, height / self.tall
 
     # moves
     def target(self, text: str) -> tuple[complex, float]:
@@ -249,7 +258,7 @@ def read(data: bytes) -> list[Step]:
         if text.startswith("END PGM"):
             break
         sizes = {k: float(v) for k, v in re.findall(rf"\b(R|LEN|CCA) *({NUMBER})", text.replace(" R0", ""))}
-        if re.match(r"CYCL DEF (7|8|10)\.", text):
+        if re.match(r"CYCL DEF (7|8|10|11|26)\.", text):
             c.reframed(text)
         elif text.startswith("CC"):
             c.pole = c.target(text)[0]

@@ -16,7 +16,7 @@ from olp.program.heidenhain.modes import Modes
 from olp.program.heidenhain.names import name_of, refuse
 from olp.program.heidenhain.planes import Plane, plane_of
 from olp.program.heidenhain.statements import CycleText, Statement, cycle_of, of_lines
-from olp.program.heidenhain.table import TABLE, UNROLL
+from olp.program.heidenhain.table import UNROLL
 
 _NUMBER = rb"[-+]?(?:\d+\.?\d*|\.\d+)"
 _ASSIGN = re.compile(rb"(?:FN[ \t]*0[ \t]*:[ \t]*)?(Q[LR]?\d+)[ \t]*=[ \t]*(.*)", re.I | re.S)
@@ -33,8 +33,16 @@ _LABEL = re.compile(rb'LBL[ \t]*("[^"]*"|\d+)', re.I)
 _SECTION_END = re.compile(rb"(?im)^[ \t]*\d*[ \t]*LBL[ \t]*0(?![\d.])")
 _CALL = re.compile(rb'CALL[ \t]+LBL[ \t]*("[^"]*"|\d+)[ \t]*(REP.*)?\Z', re.I | re.S)
 _ANGLE = re.compile(rb"\bSP([ABC])[ \t]*(" + _NUMBER + rb")", re.I)
-_TURN = re.compile(rb"\b(?:ROT|[ABC])[ \t]*(" + _NUMBER + rb")", re.I)
-_SCALE = re.compile(rb"\b(?:SCL|[XYZ])[ \t]*(" + _NUMBER + rb")", re.I)
+#: What these cycles say where they change nothing.
+_CHANGING_NOTHING = {
+    8: re.compile(rb""),
+    10: re.compile(rb"(?:I?ROT[ \t]*[-+]?0*\.?0*)?", re.I),
+    11: re.compile(rb"(?:SCL[ \t]*\+?0*1(?:\.0*)?)?", re.I),
+    19: re.compile(
+        rb"(?:[ABC][ \t]*[-+]?(?:0+\.?0*|\.0+)[ \t]*)*(?:(?:DIST|ABST|F)[ \t]*(?:MAX|[\d.]+)[ \t]*)*", re.I
+    ),
+    26: re.compile(rb"(?:CC[XYZ][ \t]*" + _NUMBER + rb"[ \t]*|[XYZ][ \t]*\+?0*1(?:\.0*)?[ \t]*)*", re.I),
+}
 _TCPM = re.compile(
     rb"FUNCTION[ \t]+TCPM[ \t]+F[ \t]+(?:TCP|CONT)[ \t]+AXIS[ \t]+POS[ \t]+PATHCTRL[ \t]+(?P<way>AXIS|VECTOR)"
     rb"(?:[ \t]+REFPNT[ \t]+TIP-TIP)?(?:[ \t]+F[ \t]*[\d.]+)?"
@@ -43,12 +51,7 @@ _FUNCTIONS = re.compile(rb"(?:L[ \t]+)?(?:M\d+[ \t]*)+")
 _PRESET = 339
 _MOTION = re.compile(rb"(?:L|CC?|CR|CP)[ \t]|[XYZABC][-+.\d]|I[XYZ]|[MF][ \t]*[-+.\dM]")
 _SHIFT = 7
-_MIRROR = 8
 _DWELL = 9
-_ROTATION = 10
-_SCALING = 11
-_TILT = 19
-_SCALINGS = 26
 _SELECT = 247
 
 
@@ -257,7 +260,9 @@ class Events:
         number, part, rest = text.number, text.part, text.rest
         name = b"CYCL DEF %d" % number
         if number == _SHIFT and part:
-            turned = [n for letter, (_, n) in statement.numbers().items() if letter in b"ABC"]
+            turned = [
+                self.modes.value(v, statement) for axis, _, v in text.shifts(statement) if axis in "ABC"
+            ]
             if self.tips and any(turned):
                 raise ProgramError(
                     "CYCL DEF 7 shifts a rotary axis, which is not read; state the shift in "
@@ -265,7 +270,7 @@ class Events:
                     line=statement.line,
                     code="OLP565",
                 )
-            self.modes.datum_shift(statement)
+            self.modes.datum_shift(text, statement)
         elif number == _SELECT:
             value = text.values.get(_PRESET)
             if value is None:
@@ -274,18 +279,8 @@ class Events:
         elif number == _DWELL and part:
             seconds = re.search(rb"(" + _NUMBER + rb")\s*\Z", rest)
             self.collector.pauses.append((self.collector.moves, float(seconds[1]) if seconds else 0.0))
-        elif part and (
-            (number == _MIRROR and rest)
-            or (
-                number in (_ROTATION, _TILT)
-                and (any(float(v) for v in _TURN.findall(rest)) or b"Q" in rest.upper())
-            )
-            or (
-                number in (_SCALING, _SCALINGS)
-                and (any(float(v) != 1.0 for v in _SCALE.findall(rest)) or b"Q" in rest.upper())
-            )
-        ):
-            refuse(name if name in TABLE else b"CYCL DEF 11", statement)
+        elif part and number in _CHANGING_NOTHING and not _CHANGING_NOTHING[number].fullmatch(rest):
+            refuse(name, statement)
 
     def _cycle_call(self, statement: Statement) -> None:
         rest = statement.upper[len(b"CYCL CALL") :].strip()

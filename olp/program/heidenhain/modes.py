@@ -10,7 +10,7 @@ from olp.core.toolpath import Interpolated
 from olp.core.units import MM_PER_INCH
 from olp.program.frames import FrameTable, Placement, tool_vector_of, turned
 from olp.program.heidenhain.planes import Plane
-from olp.program.heidenhain.statements import Statement
+from olp.program.heidenhain.statements import CycleText, Statement
 from olp.program.heidenhain.table import UNROLL
 
 NAN = float("nan")
@@ -214,18 +214,13 @@ class Modes:
         self.unclear = set()
         self.changed()
 
-    def datum_shift(self, statement: Statement) -> None:
+    def datum_shift(self, cycle: CycleText, statement: Statement) -> None:
         """An axis of CYCL DEF 7: replaces the shift along it, or adds to it with I."""
-        if b"#" in statement.text:
-            raise ProgramError(
-                "CYCL DEF 7 takes its shift from a table of the control; state it with numbers",
-                line=statement.line,
-                code="OLP526",
-            )
         shift = list(self.shift)
-        for letter, (adds, value) in statement.numbers().items():
-            axis = b"XYZ".find(letter)
+        for letter, adds, text in cycle.shifts(statement):
+            axis = "XYZ".find(letter)
             if axis >= 0:
+                value = self.value(text, statement)
                 shift[axis] = value * self.unit_mm + (shift[axis] if adds else 0.0)
                 if not adds and self.plane is None:
                     self.unclear.discard(axis)

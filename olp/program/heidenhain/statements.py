@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import re
 
+from olp.core.errors import ProgramError
 from olp.core.values import dataclass
 
 _NUMBER = re.compile(rb"[ \t]*(?P<mark>/?)[ \t]*\d*[ \t]*(?P<late>/?)[ \t]*")
@@ -17,7 +18,10 @@ OPERANDS = re.compile(
     rb"101(?=[ \t]*BT)))"
     rb"((?:[ \t]*(?:[XYZABCUVWF]|LA|BT)[ \t]*[-+]?(?:Q[LR]?)?[\d.]+)+)"
 )
-_WORD = re.compile(rb"(I?)([XYZABCUVW])[ \t]*([-+]?(?:\d+\.?\d*|\.\d+))", re.I)
+_SHIFT = re.compile(rb"[ \t]*(I?)([XYZABCUVW])[ \t]*([-+]?)[ \t]*(Q[LR]?\d+|\d+\.?\d*|\.\d+)[ \t]*", re.I)
+_TRANS = re.compile(
+    rb"TRANS[ \t]+(DATUM|MIRROR|ROTATION|SCALE)\b(?:[ \t]+AXIS\b)?[ \t]*(.*)", re.I | re.S
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,10 +44,6 @@ class Statement:
         text = self.text.decode("latin-1")
         return text if len(text) <= 40 else text[:37] + "..."
 
-    def numbers(self) -> dict[bytes, tuple[bool, float]]:
-        """The axis words: by letter whether it counts from the value before, and its number."""
-        return {w[2].upper(): (bool(w[1]), float(w[3])) for w in _WORD.finditer(self.text)}
-
 
 @dataclass(frozen=True, slots=True)
 class CycleText:
@@ -54,6 +54,24 @@ class CycleText:
     part: int | None
     rest: bytes
     values: dict[int, bytes]
+
+    def shifts(self, statement: Statement) -> list[tuple[str, bool, bytes]]:
+        """The words of a datum shift: axis, whether it counts from the shift before, and its number or its
+        parameter. Raises ProgramError for what is none."""
+        words, place = [], 0
+        while found := _SHIFT.match(self.rest, place):
+            words.append((found[2].decode().upper(), bool(found[1]), found[3] + found[4]))
+            place = found.end()
+        if place < len(self.rest) or not words:
+            table = self.rest.upper().startswith((b"#", b"TABLE"))
+            raise ProgramError(
+                "the datum shift is taken from a table of the control; state it with numbers"
+                if table
+                else f"{statement.shown} is not understood; expected axes with numbers, such as X+10",
+                line=statement.line,
+                code="OLP526" if table else "OLP510",
+            )
+        return words
 
 
 def of_lines(lines: list[bytes], number: int) -> Statement:
@@ -80,11 +98,27 @@ def without_comment(text: bytes) -> bytes:
     return text if end < 0 else text[:end]
 
 
+#: What a TRANS statement without its values is as a CYCL DEF: its number, and the text that ends it.
+_AS_CYCLE = {
+    b"DATUM": (7, b"X0 Y0 Z0"),
+    b"MIRROR": (8, b""),
+    b"ROTATION": (10, b"ROT 0"),
+    b"SCALE": (11, b"SCL 1"),
+}
+
+
 def cycle_of(statement: Statement) -> CycleText | None:
-    """The parts of a CYCL DEF; None where the statement is none."""
+    """The parts of a CYCL DEF, or of the TRANS that does the same; None where the statement is none."""
     match = _CYCLE.match(statement.text)
     if match is None:
-        return None
+        trans = _TRANS.match(statement.text)
+        return None if trans is None else _of_trans(trans)
     part = None if match[2] is None else int(match[2])
     values = {int(v[1]): v[2] for v in _VALUE.finditer(match[3])}
     return CycleText(int(match[1]), part, match[3].strip(), values)
+
+
+def _of_trans(match: re.Match[bytes]) -> CycleText:
+    number, ended = _AS_CYCLE[match[1].upper()]
+    rest = match[2].strip()
+    return CycleText(number, 1, ended if rest.upper() == b"RESET" else rest, {})

@@ -226,6 +226,36 @@ def test_what_is_refused_and_where(bent: Path, text: str, line: int, words: str)
     refused(HEAD + text, bent, line, words)
 
 
+@pytest.mark.parametrize(
+    ("text", "x"),
+    [
+        ("CYCL DEF 7.1 X+10", 11), ("CYCL DEF 7.1 X10\nCYCL DEF 7.1 IX-4", 7), ("CYCL DEF 7.1 X - 2", -1),
+        ("Q5=8\nCYCL DEF 7.1 X+Q5", 9), ("Q5=8\nCYCL DEF 7.1 X-Q5", -7),
+        ("TRANS DATUM AXIS X+10 Y+1", 11), ("CYCL DEF 7.1 X9\nTRANS DATUM RESET", 1),
+        # what changes nothing is read
+        ("CYCL DEF 10.1 ROT+0\nCYCL DEF 11.1 SCL 1\nCYCL DEF 26.1 X1 CCX5\nCYCL DEF 19.1 A+0 B0\n"
+         "TRANS ROTATION RESET\nTRANS MIRROR RESET", 1),
+    ],
+)  # fmt: skip
+def test_datum_shifts(bent: Path, text: str, x: float) -> None:
+    assert ends(f"{HEAD}{text}\nL X1\n", bent)[-1, 0] == pytest.approx(x)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        # each would leave the words where they are
+        ("CYCL DEF 10.1 IROT+45", "rotates"), ("CYCL DEF 10.1 ROT+Q1", "rotates"),
+        ("CYCL DEF 26.1 X1 Y2", "scales"), ("CYCL DEF 19.1 B+Q1", "tilts"), ("CYCL DEF 8.1 X", "mirrors"),
+        ("CYCL DEF 7.1 X+Q1", "value is not known"), ("CYCL DEF 7.1 Xnan", "is not understood"),
+        ("CYCL DEF 7.1 #5", "from a table"), ("TRANS DATUM TABLE TABLINE5", "from a table"),
+        ("TRANS SCALE SCL0.5", "scales"), ("TRANS DATUM", "is not understood"),
+    ],
+)  # fmt: skip
+def test_frames_that_are_not_read_are_no_silence(bent: Path, text: str, words: str) -> None:
+    refused(f"{HEAD}{text}\nL X1\n", bent, 5, words)
+
+
 def test_planes_that_turn_back_may_move_all_axes(bent: Path) -> None:
     for text, moves in (("PLANE RESET TURN FMAX", 2), ("PLANE SPATIAL SPA+0 SPB+0 SPC+0 TURN FMAX", 2),
                         ("PLANE RESET STAY", 2), ("PLANE RESET MOVE ABST50 FMAX", 3)):  # fmt: skip

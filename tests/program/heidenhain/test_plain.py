@@ -27,7 +27,9 @@ CYCLE = "CYCL DEF 200 DRILL ~\nQ200=2 ~\nQ201=-5 ~\nQ203=+0 ~\nQ204=20\n"
 
 @pytest.fixture(scope="module")
 def bent(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return machines.random_machine(tmp_path_factory.mktemp("bent"), 5, RECIPE)
+    path = machines.random_machine(tmp_path_factory.mktemp("bent"), 5, RECIPE)
+    path.write_text(path.read_text().replace("\ncontroller =", '\nscaling_axes = "all"\ncontroller ='))
+    return path
 
 
 def flat(text: str) -> str:
@@ -39,7 +41,7 @@ def flat(text: str) -> str:
 def test_random_contours_are_what_the_control_makes_of_them(bent: Path, seed: int) -> None:
     data = contour(seed)
     assert DIALECT.unroller is not None
-    text = bytes(DIALECT.unroller(data, DIALECT))
+    text = bytes(DIALECT.unroller(data, DIALECT, setup=load_setup(bent)))
     path = read(text, load_setup(bent), DIALECT, Options()).toolpath
     steps = heidenhain_contours.read(data)
     ends = np.array([[s.end.real, s.end.imag, s.z] for s in steps])
@@ -94,6 +96,18 @@ def test_contours_that_are_written_out_are_corrected(bent: Path, seed: int) -> N
         # in planes with Z, angles count from Y and from Z
         ("CC Z+1 X+2\nLP PR+5 PA+90 F9\nLP PA+180 IY+2\n", "CC Z+1 X+2\nL X+7 Z+1 F9\nL X+2 Y+2 Z-4\n"),
         ("CC Y+0 Z+0\nL Y+3 Z+0\nLP IPA+90\nLP IPR+1\n", "CC Y+0 Z+0\nL Y+3 Z+0\nL Y+0 Z+3\nL Y+0 Z+4\n"),
+        # TRANS is another way to write them
+        ("TRANS ROTATION ROT+90\nL X+10\nTRANS ROTATION RESET\nTRANS MIRROR AXIS X\nL X+3 Y+0\n"
+         "TRANS MIRROR RESET\nTRANS SCALE SCL 2\nL X+2\n", "L X+0 Y+10\nL X-3 Y+0\nL X+4 Y+0\n"),
+        ("TRANS SCALE SCL 2\nL X+10\nRND R1\nL Y+20\n",
+         "L X+18 Y+0\nCC X+18 Y+2\nC X+20 Y+2 DR+\nL X+20 Y+40\n"),
+        # scaled about the datum, or about a centre; the radius too
+        ("CYCL DEF 11.0\nCYCL DEF 11.1 SCL 2\nL X+10 Y+1\nCR X+14 Y+5 R+4 DR+\nCYCL DEF 11.0\n"
+         "CYCL DEF 11.1 SCL 1\nL IX+1\n", "L X+20 Y+2\nCC X+20 Y+10\nC X+28 Y+10 DR+\nL IX+1\n"),
+        ("CYCL DEF 26.0\nCYCL DEF 26.1 X2 Y0.5 Z3 CCX+15 CCZ-2\nL X+10 Y+1\nL Z+1\n", "L X+5 Y+0.5\nL Z+7\n"),
+        # in a plane with Z of a rotated program
+        ("CYCL DEF 10.0\nCYCL DEF 10.1 ROT+90\nCC Z+1 X+2\nLP PR+5 PA+90\nLP PA+0\n",
+         "L X+0 Y+7 Z+1\nL X+0 Y+2 Z+6\n"),
         # modal calls, up to M99
         (CYCLE + "L X+1 FMAX M89\nL X+2 FMAX\nL X+3 M99\nL X+4\n",
          CYCLE + "L X+1 FMAX M99\nL X+2 FMAX M99\nL X+3 M99\nL X+4\n"),
@@ -180,8 +194,17 @@ def test_a_pattern_definition_adds_to_the_surface_and_keeps_the_height() -> None
         ("CYCL DEF 8.0\nCYCL DEF 8.1 Z\n", 4, "another axis"),
         ("APPR LT X+9 Y+9 LEN5 R0\nFLT\n", 4, "free contour"), ("L X+9\nRND R5\nFC DR- R18\n", 5, "free"),
         ("CC Z+0 IX+5\nLP PR+5 PA+0\n", 4, "no pole"),
-        ("CC Z+0 X+5\nCYCL DEF 10.0\nCYCL DEF 10.1 ROT+5\nLP PA+0\n", 6, "a turned program"),
-        ("L M89\nCYCL DEF 11.0\nCYCL DEF 11.1 SCL 2\n", 5, "scales"),
+        ("CC Z+0 X+5\nCYCL DEF 10.0\nCYCL DEF 10.1 ROT+5\nLP PA+0\n", 6, "no pole"),
+        ("CYCL DEF 10.0\nCYCL DEF 10.1 ROT+5\nCC Z+0 X+5\nCP IPA5 DR+\n", 6, "another plane"),
+        ("CYCL DEF 11.0\nCYCL DEF 11.1 SCL 2\nL Z-1\n", 5, "scaling_axes"),
+        ("CYCL DEF 11.0\nCYCL DEF 11.1 SCL 0\n", 4, "above zero"),
+        ("CYCL DEF 11.0\nCYCL DEF 11.1 SCL 2\nCYCL DEF 7.0\nCYCL DEF 7.1 X+5\n", 6, "shift it before"),
+        ("CYCL DEF 11.0\nCYCL DEF 11.1 SCL 2\nL X+1 M99\n", 5, "a cycle is called in a scaled"),
+        ("CYCL DEF 11.0\nCYCL DEF 11.1 SCL 2\nCYCL CALL\n", 5, "a cycle is called in a scaled"),
+        ("CYCL DEF 11.0\nCYCL DEF 11.1 SCL 2\nAPPR LT X+9 Y+9 LEN5 R0\n", 5, "scales its radius"),
+        ("CYCL DEF 11.0\nCYCL DEF 11.1 SCL 2\nCYCL DEF 26.0\nCYCL DEF 26.1 X2\n", 6, "both in force"),
+        ("CYCL DEF 26.0\nCYCL DEF 26.1 X2 Y3\nCR X+1 Y+1 R+5 DR+\n", 5, "different factors"),
+        ("CYCL DEF 26.0\nCYCL DEF 26.1 X2\nCYCL DEF 10.0\nCYCL DEF 10.1 ROT+5\n", 6, "different factors"),
         ("APPR LCT X+1 Y+1 R5 R0\nL X+20\n", 3, "inside the arc"),
         ("APPR LT X+9 Y+9 R0\nL X+20\n", 3, "needs LEN"),
         ("CYCL CALL PAT\nLP\n", 3, "no PATTERN DEF"),

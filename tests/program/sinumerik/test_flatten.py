@@ -107,6 +107,7 @@ WRITTEN = {
     "G91 X=AC(4)\n": "G91 X=4\n",
     "R3=2\nMCALL CYCLE81(5,0,1,-R3)\nX1\nMCALL\n": "MCALL CYCLE81(5,0,1,-2)\nX1\nMCALL\n",
     "SUB1(2)\nL7 P2\n": "X=4\nY1\nY1\n",
+    "R1=1\nL7 P=R1+1\nL7 P=R1-1\n": "Y1\nY1\n",
     # words that are no positions of the program do not count for IC( )
     "X5\nG26 X100\nX=IC(1)\n": "X5\nG26 X100\nX6\n",
     "G58 X100\nX5\nX=IC(1)\n": "G58 X100\nX5\nX6\n",
@@ -189,6 +190,7 @@ REFUSED = {
     "IF R1>1 AND R1<2 GOTOF A": ("put each comparison into brackets", "OLP540"),
     "GOTOF NONE": ("not in its direction", "OLP542"),
     "X=R1/0": ("divides by zero", "OLP540"),
+    "AA: X1\nREPEAT AA P=1.5": ("runs 1.5 times", "OLP542"),
     "REPEAT AA P=3": ("0 times", "OLP542"),
     "ENDIF": ("closes nothing", "OLP542"),
     "AA:\nGOTOB AA": ("endless loop", "OLP543"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from typing import Literal
 
 from olp.core.errors import ProgramError
 from olp.program.heidenhain.cycles import AT_ONCE, BY_HEIGHT, BY_SURFACE
@@ -37,8 +38,8 @@ _M89 = re.compile(rb"(?<![A-Z])M89(?!\d)")
 class Holes(Moves):
     """Calls of cycles. `entries` is the text so far."""
 
-    def __init__(self) -> None:
-        super().__init__()
+    def __init__(self, scaling_axes: Literal["plane", "all"] | None) -> None:
+        super().__init__(scaling_axes)
         self.entries: list[Entry] = []
         self.modal_call = False
         #: the feed in force, as it is written
@@ -66,6 +67,7 @@ class Holes(Moves):
             return True
         if not upper.startswith(b"CYCL CALL"):
             return False
+        self._check_scaling(line)
         rest = upper[len(b"CYCL CALL") :].strip()
         self.modal_call = False
         if rest.startswith(b"PAT"):
@@ -93,17 +95,29 @@ class Holes(Moves):
         called = _CALL in functions
         if self.modal_call and not called and any(a in block.words for a in (b"X", b"Y", b"Z", b"PR", b"PA")):
             entry.rest, entry.changed = b" ".join((*entry.rest.split(), b"M99")), True
+            self._check_scaling(block.line)
             self._restore(entry)
             self._retracted(block.line)
         elif called:
+            self._check_scaling(block.line)
             self.modal_call = False
             self._restore(entry)
             self._retracted(block.line)
+
+    def _check_scaling(self, line: int) -> None:
+        if not self.frame.scaling.off:
+            raise ProgramError(
+                "a cycle is called in a scaled program, and controls differ in which of its depths they "
+                "scale; write its holes without CYCL DEF 11 and 26",
+                line=line,
+                code="OLP512",
+            )
 
     # -- patterns ------------------------------------------------------------------------------------
 
     def _drill_pattern(self, holes: list[Hole], q: dict[int, float], entry: Entry, line: int) -> None:
         """CYCL DEF 220 and 221: the cycle in force at each point, with their clearances and surface."""
+        self._check_scaling(line)
         for key in (_CLEAR, _SURFACE, _SECOND):
             if key not in q:
                 raise ProgramError(f"the pattern has no Q{key}; give it", line=line, code="OLP516")

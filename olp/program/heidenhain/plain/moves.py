@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import field
+from typing import Literal
 
 from olp.core.errors import ProgramError
 from olp.core.values import dataclass
@@ -59,13 +60,13 @@ def unknown(what: str, line: int) -> ProgramError:
 class Moves:
     """The state of the motion: position, pole, transformation."""
 
-    def __init__(self) -> None:
-        self.frame = Transformation()
+    def __init__(self, scaling_axes: Literal["plane", "all"] | None) -> None:
+        self.frame = Transformation(scaling_axes)
         self.at = [NAN, NAN, NAN]
         #: the pole, from the preset; None in other planes than that of X and Y
         self.pole: Point | None = None
-        #: the axes of a pole in a plane with Z, that of angle 0 first, and the pole along them
-        self.upright: tuple[int, int, float, float] | None = None
+        #: the axes of a pole in a plane with Z, that of angle 0 first, and the pole, from the preset
+        self.upright: tuple[int, int, list[float]] | None = None
         #: polar radius and angle of the last LP, in words
         self.angle = NAN
 
@@ -74,7 +75,8 @@ class Moves:
     def words(self) -> tuple[float, float, float]:
         """The present position in words of the program."""
         shift = self.frame.shift
-        return (*self.inward((self.at[0], self.at[1])), self.at[2] - shift[2])
+        z = self.frame.scaling.inward(2, self.at[2] - shift[2])
+        return (*self.inward((self.at[0], self.at[1])), z)
 
     def inward(self, point: Point) -> Point:
         return self.frame.inward(point[0] - self.frame.shift[0], point[1] - self.frame.shift[1])
@@ -83,14 +85,20 @@ class Moves:
         dx, dy = self.frame.outward(x, y)
         return dx + self.frame.shift[0], dy + self.frame.shift[1]
 
-    def end(self, block: Block) -> tuple[Point, float]:
-        """Where the axis words of a block lead: in the plane, and along Z."""
+    def _words_of(self, block: Block) -> list[float]:
+        """The position in words of the program with the axis words of a block."""
         here = list(self.words())
         for axis, letter in enumerate((b"X", b"Y", b"Z")):
             if letter in block.words:
                 step, value = block.words[letter]
                 here[axis] = here[axis] + value if step else value
-        z = here[2] + self.frame.shift[2] if b"Z" in block.words else self.at[2]
+        return here
+
+    def end(self, block: Block) -> tuple[Point, float]:
+        """Where the axis words of a block lead: in the plane, and along Z."""
+        here, z = self._words_of(block), self.at[2]
+        if b"Z" in block.words:
+            z = self.frame.up(here[2], block.line) + self.frame.shift[2]
         if not block.stated(b"XY"):
             return (self.at[0], self.at[1]), z
         return self.outward(here[0], here[1]), z
@@ -117,17 +125,16 @@ class Moves:
         letters = (b"XYZ"[first : first + 1], b"XYZ"[second : second + 1])
         self.upright = None
         if set(block.words) == set(letters) and not any(step for step, _ in block.words.values()):
-            a, b = (block.words[letter][1] + self.frame.shift[axis]
-                    for letter, axis in zip(letters, (first, second), strict=True))  # fmt: skip
-            self.upright = first, second, a, b
+            point, z = self.end(block)
+            self.upright = first, second, [*point, z]
 
     def upright_end(self, block: Block) -> tuple[list[float], bytes]:
         """Where LP leads in a plane with Z, and the axes that it states."""
         assert self.upright is not None
-        first, second, a, b = self.upright
-        point, z = self.end(block)
-        end = [*point, z]
-        dx, dy = self.at[first] - a, self.at[second] - b
+        first, second, (x, y, z) = self.upright
+        pole = [*self.inward((x, y)), self.frame.scaling.inward(2, z - self.frame.shift[2])]
+        here, end = self.words(), self._words_of(block)
+        dx, dy = here[first] - pole[first], here[second] - pole[second]
         radius, angle = math.hypot(dx, dy), math.degrees(math.atan2(dy, dx))
         step, value = block.words.get(b"PR", (True, 0.0))
         radius = radius + value if step else value
@@ -135,9 +142,15 @@ class Moves:
         angle = math.radians(angle + value if step else value)
         if math.isnan(radius) or math.isnan(angle):
             raise unknown("a polar position with PR or PA alone, or with I,", block.line)
-        end[first], end[second] = a + radius * math.cos(angle), b + radius * math.sin(angle)
+        end[first], end[second] = (
+            pole[first] + radius * math.cos(angle), pole[second] + radius * math.sin(angle)
+        )  # fmt: skip
         stated = {first, second} | {k for k in range(3) if b"XYZ"[k : k + 1] in block.words}
-        return end, bytes(b"XYZ"[k] for k in sorted(stated))
+        if self.frame.turned and stated & {0, 1}:
+            stated |= {0, 1}
+        point = self.outward(end[0], end[1])
+        height = self.frame.up(end[2], block.line) + self.frame.shift[2]
+        return [*point, height], bytes(b"XYZ"[k] for k in sorted(stated))
 
     def _pole(self, block: Block) -> Point:
         if self.pole is None:
@@ -157,6 +170,13 @@ class Moves:
             raise unknown("an arc", block.line)
         if not block.turn:
             raise ProgramError("an arc has no DR; give DR+ or DR-", line=block.line, code="OLP516")
+        if math.isnan(self.frame.scaling.size):
+            raise ProgramError(
+                "an arc where X and Y are scaled by different factors (CYCL DEF 26); write it as "
+                "straight moves",
+                line=block.line,
+                code="OLP512",
+            )
         turn = -block.turn if self.frame.flips else block.turn
         if block.name == b"CP":
             return self._polar_arc(block, start, turn)
@@ -191,7 +211,8 @@ class Moves:
         return Piece(start, end, centre, sweep), z
 
     def _by_radius(self, block: Block, start: Point, end: Point, turn: int) -> Piece:
-        radius, chord = block.sizes.get(b"R", 0.0), math.dist(start, end)
+        radius = block.sizes.get(b"R", 0.0) * self.frame.scaling.size
+        chord = math.dist(start, end)
         if not radius or chord < _SAME or chord / 2 > abs(radius) * (1 + 1e-3):
             raise ProgramError(
                 "the radius of CR does not reach from the start of the arc to its end; give the right radius",
@@ -253,7 +274,8 @@ class Text:
         if block is None or not entry.changed:
             self.lines += entry.lines
             self.sources += entry.source
-            if entry.pole is not None:
+            if block is not None and block.name == b"CC":
+                # a pole of another plane is none of arcs in X and Y
                 self._pole = entry.pole
             return
         if entry.pole is not None:

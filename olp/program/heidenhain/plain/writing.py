@@ -16,10 +16,11 @@ from olp.program.heidenhain.cycles import AT_ONCE
 from olp.program.heidenhain.names import refuse_also_unrolled
 from olp.program.heidenhain.plain.approach import approached, departed
 from olp.program.heidenhain.plain.blocks import Block, block_of, line_end
-from olp.program.heidenhain.plain.frame import MIRROR, ROTATION, SCALING, SCALINGS, SHIFT, WRITTEN_OUT
+from olp.program.heidenhain.plain.frame import MIRROR, ROTATION, SHIFT, WRITTEN_OUT
 from olp.program.heidenhain.plain.holes import Holes
 from olp.program.heidenhain.plain.moves import NAN, Entry, Source, Text, flipped, unknown
 from olp.program.heidenhain.plain.path import Piece, chamfered, rounded
+from olp.program.heidenhain.plain.scaling import SCALING, SCALINGS
 from olp.program.heidenhain.plain.sides import beside
 from olp.program.heidenhain.plain.tools import Radius
 from olp.program.heidenhain.statements import Statement, cycle_of, of_lines, without_comment
@@ -32,7 +33,7 @@ _TILTED = frozenset({104, 112, 114, 128, 130})
 #: what is written out
 _WRITTEN_OUT = re.compile(
     rb"(?<![A-Z])(?:LP|R[LR](?![.\d])|CTP?|RND|CHF|APPR|DEP|PATTERN|M89|I[XYZ]|"
-    rb"CYCLE?[ \t]+DEF[ \t]*(?:8|10|22[01])(?!\d)|CYCL[ \t]+CALL[ \t]+P)", re.I,
+    rb"TRANS[ \t]+[MRS]|CYCLE?[ \t]+DEF[ \t]*(?:8|1[01]|26|22[01])(?!\d)|CYCL[ \t]+CALL[ \t]+P)", re.I,
 )  # fmt: skip
 _SIDE = re.compile(rb"(?<![A-Z])(R0|RL|RR)(?![.\d])")
 
@@ -51,7 +52,7 @@ class _Writing(Holes):
     """One text while it is written out."""
 
     def __init__(self, lines: Sequence[bytes], sources: Sequence[Source], setup: Setup | None) -> None:
-        super().__init__()
+        super().__init__(None if setup is None else setup.machine.scaling_axes)
         self.radius = Radius(setup)
         self.given, self.sources = lines, sources
         #: the side of the contour on which the tool is: R0, RL or RR
@@ -93,7 +94,7 @@ class _Writing(Holes):
                 if cycle.part:
                     self.frame.take(cycle, statement)
                     if cycle.number in WRITTEN_OUT:
-                        self.pole = None
+                        self.pole = self.upright = None
                 if cycle.number in WRITTEN_OUT:
                     return
             self.define(cycle, statement, entry)
@@ -111,9 +112,10 @@ class _Writing(Holes):
 
     def _skipped(self, statement: Statement, entry: Entry) -> None:
         """A block under block delete: it may move, or not."""
-        if self.frame.turned:
+        if self.frame.turned or self.frame.lifts:
             raise ProgramError(
-                f"{statement.shown} is under block delete in a rotated or mirrored program; remove the `/`",
+                f"{statement.shown} is under block delete in a rotated, mirrored or scaled program; remove "
+                "the `/`",
                 line=statement.line,
                 code="OLP525",
             )
@@ -188,14 +190,9 @@ class _Writing(Holes):
     def _put_pole(self, block: Block, entry: Entry) -> None:
         if b"Z" in block.words:
             self.pole = None
-            if self.frame.turned:
-                raise ProgramError(
-                    "a pole in another plane than XY is not read in a rotated or mirrored program",
-                    line=block.line,
-                    code="OLP512",
-                )
             self.put_upright_pole(block)
-            self.entries.append(entry)
+            if not (self.frame.turned or self.frame.lifts):
+                self.entries.append(entry)
             return
         self.upright = None
         point, _ = self.end(block)
@@ -217,6 +214,13 @@ class _Writing(Holes):
         if arc and name in (b"C", b"CP") and self.pole is None and not self.frame.turned:
             self._other_plane(block, entry)
             return
+        if arc and self.upright is not None:
+            raise ProgramError(
+                "an arc in another plane than XY is not read in a rotated, mirrored or scaled program; write "
+                "it as straight moves",
+                line=block.line,
+                code="OLP512",
+            )
         start, z0 = (self.at[0], self.at[1]), self.at[2]
         if name in (b"CT", b"CTP"):
             end, z = self.end(block) if name == b"CT" else self.polar_end(block)
@@ -232,6 +236,7 @@ class _Writing(Holes):
         steps = [step for letter, (step, _) in block.words.items() if letter in b"XYZ"]
         mixed = any(steps) and not all(steps)
         entry.changed = mixed or name in (b"LP", b"CT", b"CTP") or (self.frame.turned and across)
+        entry.changed |= self.frame.lifts and b"Z" in block.words
         if not self.frame.turned and name == b"L":
             entry.axes = bytes(a for a in b"XYZ" if bytes([a]) in block.words)
         if self.frame.flips and flipped(entry.rest) != entry.rest:
@@ -258,9 +263,9 @@ class _Writing(Holes):
 
     def _upright_line(self, block: Block, entry: Entry) -> None:
         """LP about a pole of a plane with Z."""
-        if self.side != b"R0" or self.frame.turned:
+        if self.side != b"R0":
             raise ProgramError(
-                "a polar position in another plane than XY is not read in a contour or a turned program",
+                "a polar position in another plane than XY is not read in a contour with RL or RR",
                 line=block.line,
                 code="OLP518",
             )
@@ -275,10 +280,10 @@ class _Writing(Holes):
 
     def _other_plane(self, block: Block, entry: Entry) -> None:
         self._nothing_waits(block.line)
-        if self.side != b"R0":
+        if self.side != b"R0" or self.frame.lifts:
             raise ProgramError(
-                "a contour with RL or RR is in another plane than XY, which is not read; write the path of "
-                "the tool",
+                "a contour with RL or RR, or with Z scaled, is in another plane than XY, which is not read; "
+                "write the path of the tool",
                 line=block.line,
                 code="OLP518",
             )
@@ -328,7 +333,10 @@ class _Writing(Holes):
                 line=block.line,
                 code="OLP512",
             )
-        size, make = block.sizes[b"R"], rounded if block.name == b"RND" else chamfered
+        size, make = (
+            block.sizes[b"R"] * self.frame.scaling.size,
+            rounded if block.name == b"RND" else chamfered,
+        )
         full = abs(before.piece.sweep) > 6.28 or abs(piece.sweep) > 6.28
         made = None if full or not size > 0 else make(before.piece, piece, size)
         if made is None:
@@ -367,7 +375,17 @@ class _Writing(Holes):
             return 1 if self.side == b"RL" else -1
         return 1 if self.frame.flips else -1
 
+    def _check_unscaled(self, block: Block) -> None:
+        if not self.frame.scaling.off:
+            raise ProgramError(
+                f"{block.name.decode()} is in a scaled program, and whether that scales its radius is not "
+                "known here; write its moves",
+                line=block.line,
+                code="OLP512",
+            )
+
     def _begin_approach(self, block: Block, entry: Entry) -> None:
+        self._check_unscaled(block)
         if self.frame.flips:
             entry.rest = flipped(entry.rest)
         self._side_of(block, entry)
@@ -410,6 +428,7 @@ class _Writing(Holes):
         return Entry([], entry.source[:1], bare, piece, entry.z, axes, True, rest, entry.shift, centre=True)
 
     def _depart(self, block: Block, entry: Entry) -> None:
+        self._check_unscaled(block)
         before = None if self.last is None else self.last.piece
         heading = None if before is None else before.heading(last=True)
         form = block.name.split()[1].removeprefix(b"P")

@@ -131,7 +131,7 @@ class Walk:
             name = evaluate(rest, scope)
             if not isinstance(name, str):
                 raise ProgramError(f"{word} needs the name of a subprogram as text", code="OLP540")
-            self._call(_file_name(name), [], 1, line, scope, depth)
+            self._call(_file_name(name), [], "1", line, scope, depth)
         elif word != "ENDIF":
             raise ProgramError(f"{word} is not run; write GOTOF or GOTOB", code="OLP542")
         return index + 1
@@ -141,9 +141,7 @@ class Walk:
         stated = _REPEATED.match(rest)
         if stated is None or (word == "REPEATB" and stated[2]):
             raise ProgramError(f"{word} needs a label, and P= for the number of its runs", code="OLP542")
-        runs = number(stated[3], scope) if stated[3] else 1.0
-        if runs != round(runs) or runs < 0:
-            raise ProgramError(f"{word} runs {runs:g} times; expected an integer", code="OLP542")
+        runs = _runs(word, number(stated[3], scope) if stated[3] else 1.0)
         begin = self._labelled(unit, stated[1])
         if word == "REPEATB":
             stop = begin
@@ -154,7 +152,7 @@ class Walk:
             stop = ends[0] if ends else index - 1
         if stop < begin or begin <= index <= stop or depth >= _DEEPEST:
             raise ProgramError(f"{word} does not end before its own block; write the part out", code="OLP542")
-        for _ in range(round(runs)):
+        for _ in range(runs):
             self._section(unit, begin, stop, scope, depth)
 
     def _section(self, unit: Unit, begin: int, stop: int, scope: Scope, depth: int) -> None:
@@ -259,8 +257,9 @@ class Walk:
 
     # -- subprograms -------------------------------------------------------------------------------
 
-    def _called(self, line: Line, first: Piece) -> tuple[str, list[str], int] | None:
-        """Name, arguments and number of runs of a subprogram that a line calls; None where it calls none."""
+    def _called(self, line: Line, first: Piece) -> tuple[str, list[str], str] | None:
+        """Name, arguments and number of runs of a subprogram that a line calls, the number as written; None
+        where it calls none."""
         assert line.block is not None
         others = line.block.pieces[1:]
         code = line.code
@@ -270,17 +269,15 @@ class Walk:
         if others and others[-1].name == "P" and others[-1].form in (Form.WORD, Form.EQUAL):
             runs = code[others[-1].value : others[-1].value_end]
             others = others[:-1]
-        if not runs.strip().isdecimal():
-            return None
         if first.form is Form.WORD and first.name == "L":
             name = code[first.start : first.end].upper().replace(" ", "")
-            return None if others else (name, [], int(runs))
+            return None if others else (name, [], runs)
         if first.form is not Form.NAME or others or first.name in _KNOWN:
             return None
         given = [a.decode("latin-1") for a in arguments(line.raw, first)]
-        return first.name, given, int(runs)
+        return first.name, given, runs
 
-    def _call(self, name: str, given: list[str], runs: int, line: Line, scope: Scope, depth: int) -> None:
+    def _call(self, name: str, given: list[str], runs: str, line: Line, scope: Scope, depth: int) -> None:
         unit = self._find(name)
         if unit is None:
             raise ProgramError(
@@ -290,7 +287,7 @@ class Walk:
             )
         if depth >= _DEEPEST:
             raise ProgramError(f"subprograms call one another more than {_DEEPEST} deep", code="OLP542")
-        for _ in range(runs):
+        for _ in range(_runs(name, number(runs, scope))):
             own = scope.inner()
             own.bind(_parameters(unit), given, scope)
             self.run(unit, own, depth + 1)
@@ -303,6 +300,13 @@ class Walk:
     def _returns(line: Line) -> bool:
         pieces = line.block.pieces if line.block is not None else ()
         return any(p.name == "M" and line.code[p.value : p.value_end].strip() == "17" for p in pieces)
+
+
+def _runs(name: str, value: float) -> int:
+    """How often something runs. Raises ProgramError for what is no count."""
+    if value != round(value) or value < 0:
+        raise ProgramError(f"{name} runs {value:g} times; expected an integer", code="OLP542")
+    return round(value)
 
 
 def _text(value: Value) -> str:
