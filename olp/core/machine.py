@@ -146,7 +146,8 @@ class Machine:
     (Fanuc, Haas): so many least increments, or whole units as on a pocket calculator. None is not stated, and
     read as increments.
     `arc_centres` says what I, J and K are at the start, and `cycle_return` where canned cycles return, to a
-    control that has a setting for it. `scaling_axes` are those that CYCL DEF 11 of a Heidenhain control scales.
+    control that has a setting for it. `scaling_axes` are those that CYCL DEF 11 of a Heidenhain control
+    scales.
     `default_motion` is the motion code in force at the start of a program, where its control does not fix it.
     `still_macros` are the macros of a printer that move no axis and change no mode.
     `real_time` is the beginning of the hash of the calibration that the control itself corrects by in every

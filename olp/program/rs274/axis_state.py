@@ -60,6 +60,7 @@ STORES_POSITION = 20
 
 #: What changes or uses offsets beside the move of a block.
 _OFFSET_CODES = LENGTHS | HOMES | SHIFTS | WORK_OFFSETS | FURTHER_OFFSETS | {MACHINE, WRITE_OFFSET}
+_UNITS = frozenset(UNITS)
 #: What turns the frame in force by a work offset, or leaves it for positions of the machine.
 _MAY_TURN = WORK_OFFSETS | FURTHER_OFFSETS | {MACHINE, WRITE_OFFSET}
 
@@ -74,6 +75,10 @@ class Effect:
     home: tuple[int, ...] = ()
     home_mm: Place = UNKNOWN
     lost: tuple[int, ...] = ()
+
+
+#: That of a block whose axis words mean what they say everywhere.
+_AS_STATED = Effect()
 
 
 @dataclass(slots=True, kw_only=True)
@@ -97,6 +102,8 @@ class AxisState(OffsetState):
     length_errors: dict[tuple[int, str], tuple[LengthError, ...]] = field(default_factory=dict)
     #: frames by the values of their fields: to look one up, none is made
     _index: dict[tuple[Any, ...], int] = field(default_factory=dict)
+    #: the same by the state that they were made from
+    _seen: dict[tuple[Any, ...], int] = field(default_factory=dict)
 
     @staticmethod
     def at_start(setup: Setup, profile: Profile) -> AxisState:
@@ -122,7 +129,18 @@ class AxisState(OffsetState):
     def frame(self, line: int) -> int:
         """Index of the present frame; a tool or offset that is not defined is refused here, at its first
         use."""
-        name = self.offsets.name
+        offsets, name = self.offsets, self.offsets.name
+        state = (
+            self.unit, self.spindle, self.length_tool, self.payload_kg, self.compensation,
+            self.inherited.get(name, name), self.located.get(name), *offsets.stated(),
+        )  # fmt: skip
+        known = self._seen.get(state)
+        if known is None:
+            known = self._seen[state] = self._frame(name, line)
+        return known
+
+    def _frame(self, name: str, line: int) -> int:
+        """The same, from the state in force with this work offset."""
         work = self._work_offset(name)
         base = self.offsets.written.get(name)
         if base is None:
@@ -212,11 +230,13 @@ class AxisState(OffsetState):
             if "Q" not in by_letter:
                 raise ProgramError("M61 needs a Q word with the tool number", line=line, code="OLP516")
             self.spindle = self._integer(by_letter["Q"], line)
-        self.forget(self.moved_by(m_codes)[0])
-        effect = Effect()
+        if m_codes:
+            self.forget(self.moved_by(m_codes)[0])
+        effect = _AS_STATED
         turning = self.profile.turns_offsets and not _MAY_TURN.isdisjoint(codes)
         angle_deg = self._angle_deg(self.offsets.name, line) if turning else 0.0
-        self.unit = next((code for code in codes if code in UNITS), self.unit)
+        if not _UNITS.isdisjoint(codes):
+            self.unit = next(code for code in codes if code in UNITS)
         self._check_modes(codes, line)
         changes_tool = TOOL_CHANGE in m_codes or (SET_TOOL in m_codes and self.profile.m61_sets_tool)
         check_block(self, codes, line, changes_tool=changes_tool)
@@ -227,6 +247,14 @@ class AxisState(OffsetState):
         if turning:
             self._check_turned(angle_deg, effect, line)
         return effect
+
+    def pause(self, line: int, block: EventBlock) -> None:
+        """Carry out a block that is `quiet`."""
+        for code in block.events:
+            if code == DWELL:
+                self._dwell(line, block.by_letter)
+            else:
+                self._path_mode(code, line, block.by_letter)
 
     def _switch_tips(self, codes: Sequence[int]) -> None:
         """Tool centre point control with axis words or directions, which every other code of tool lengths
@@ -308,7 +336,7 @@ class AxisState(OffsetState):
     ) -> Effect:
         if code == DWELL:
             self._dwell(line, by_letter)
-        if code == LENGTH_FROM_WORDS:
+        elif code == LENGTH_FROM_WORDS:
             values = [(i, self.length_mm(w)) for i, w in axis_words]
             self._set_length(self._merged(self.offsets.length, values))
         elif code in LENGTHS:

@@ -41,6 +41,8 @@ _RANK = {
     for rank, codes in enumerate(((DWELL,), UNITS, LENGTHS, WORK_OFFSETS, PATH_MODES))
     for code in codes
 }
+#: Events that leave frame, tool and position as they are.
+_QUIET = frozenset({DWELL, *PATH_MODES})
 _SPACED = pattern(r"([\d.])([A-Z])")
 
 
@@ -57,7 +59,8 @@ class Word:
 @dataclass(frozen=True, slots=True)
 class EventBlock:
     """The words of a block with an event, also `by_letter`, those of axes with the `axes`, and the codes of G
-    and M, ten times their number. `events` are the G codes that are events, in the order of the control."""
+    and M, ten times their number. `events` are the G codes that are events, in the order of the control. A
+    `quiet` block has dwells and path modes only: the frame and the tool stay."""
 
     words: list[Word]
     by_letter: dict[str, Word]
@@ -65,6 +68,7 @@ class EventBlock:
     g_codes: list[int]
     m_codes: list[int]
     events: list[int]
+    quiet: bool
 
     @staticmethod
     def of(words: list[Word], events: Sequence[int]) -> EventBlock:
@@ -72,7 +76,8 @@ class EventBlock:
         axes = [(i, by_letter[a]) for i, a in enumerate(AXES) if a in by_letter]
         g_codes, m_codes = ([round(w.value * 10) for w in words if w.letter == a] for a in "GM")
         ordered = sorted(events, key=lambda code: _RANK.get(code, len(_RANK)))
-        return EventBlock(words, by_letter, axes, g_codes, m_codes, ordered)
+        quiet = bool(events) and _QUIET.issuperset(g_codes) and not m_codes and "T" not in by_letter
+        return EventBlock(words, by_letter, axes, g_codes, m_codes, ordered, quiet)
 
 
 @dataclass(slots=True, kw_only=True)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import field
+from typing import Any
 
 import numpy as np
 
@@ -58,6 +59,13 @@ class Offsets:
     plane: Placement | None = None
     tip: Interpolated = ""
     directed: bool = False
+
+    def stated(self) -> tuple[Any, ...]:
+        """All that is in force, as a key: where it is equal, so are offsets and turns."""
+        return (
+            self.name, tuple(self.written.get(self.name, ())), self.turned_deg.get(self.name),
+            *self.shift, *self.local, self.length, self.transform, self.plane, self.tip, self.directed,
+        )  # fmt: skip
 
     def turn(self, angle_deg: float) -> Turn | None:
         """How words are turned, with a work offset at this angle; None where they are not."""

@@ -70,8 +70,8 @@ _KIND = np.full(1001, 255, np.uint8)
 _KIND[[0, 10, 20, 30, THREAD]] = (Kind.RAPID, Kind.LINE, Kind.ARC_CW, Kind.ARC_CCW, Kind.LINE)
 _ALONE = np.array(sorted(CYCLES | PROBES))
 _PROBES = np.array(sorted(PROBES))
-#: Events that need the present position
-_APART = HOMES | TRANSFORMS | {MACHINE, PRESET, TILTED, ALIGNED}
+#: Events that go on from the present position, or turn it
+_APART = HOMES | TRANSFORMS | {MACHINE, TILTED, ALIGNED}
 _UNITS = frozenset(UNITS)
 #: Events that change no frame
 _KEEPS_FRAME = frozenset({DWELL, MACHINE, *HOMES, *PATH_MODES})
@@ -112,6 +112,10 @@ class _Rows:
     resolved: int = 0
     present: int | None = None
     own: list[OwnMove] = field(default_factory=list)
+
+    def waiting(self, upto: int) -> int:
+        """How many moves there are up to a row that are not collected yet."""
+        return max(upto - self.resolved, 0) + len(self.own)
 
 
 class _Reader:
@@ -276,6 +280,10 @@ class _Reader:
             number = context.number(line)
             own = next(stated)
             block = beside.numbered(line, event_block(context, own, state.profile, self.known))
+            plain = not (calls or line in self.payloads or line in self.lost or state.compensation)
+            if block.quiet and plain and not (here and alone[upto]):
+                state.pause(number, block)
+                continue
             tool = block.m_codes or "T" in block.by_letter
             if tool or line in self.payloads or not _KEEPS_FRAME.issuperset(block.events):
                 rows.present = None
@@ -285,19 +293,26 @@ class _Reader:
                 moved, place = (0, 1, 2), state.home_of(block.words)
             # where nothing says where the axes stand then, it is found together with the rows around it
             loose = moved == (0, 1, 2) and place == UNKNOWN and not lost
-            if (moved and not loose) or lost or calls or self._needs_position(block):
+            stands = None
+            if (moved and not loose) or lost or calls or self._needs_moves(block):
                 self._resolve(context, rows, upto)
+            elif self._stores_position(block):
+                stands = self._stands(context, rows, upto)
             state.distance, state.plane = distance, plane
             state.payload_kg = self.payloads.get(line, state.payload_kg)
             state.first_word = context.base + own.first
             before = state.position.copy()
-            effect = state.run(number, block, self.collector.moves)
+            if stands is not None:
+                state.position[:] = stands
+            effect = state.run(number, block, self.collector.moves + rows.waiting(upto))
+            if stands is not None:
+                state.position[:] = before
             if loose and rows.resolved < upto:
                 rows.own.append(self.special_blocks.own_move(number, upto, deleted=deleted))
                 state.position[:], moved = before, ()
             if lost:
                 state.lose(number)
-            if beside.act(line):
+            if calls and beside.act(line):
                 rows.present = None
                 if beside.forgets(line):
                     moved, place = (0, 1, 2), UNKNOWN
@@ -317,15 +332,37 @@ class _Reader:
         self._assign(context, rows, len(blocks))
         self._resolve(context, rows, len(blocks))
 
-    def _needs_position(self, block: EventBlock) -> bool:
-        """Whether an event needs the present position, or the numbers before it count by another unit."""
+    def _needs_moves(self, block: EventBlock) -> bool:
+        """Whether the moves before an event have to be there: it goes on from where they end, or the numbers
+        before it count by another unit."""
         codes = block.events
-        if WRITE_OFFSET in codes:
-            stores = any(w.letter == "L" and round(w.value) == STORES_POSITION for w in block.words)
-            return stores and self.state.profile.g10_stores
         if not _APART.isdisjoint(codes):
             return True
         return not _UNITS.isdisjoint(codes) and self.state.bare_increments
+
+    def _stores_position(self, block: EventBlock) -> bool:
+        """Whether an event stores where the axes stand, and leaves them there."""
+        if WRITE_OFFSET in block.events:
+            stores = any(w.letter == "L" and round(w.value) == STORES_POSITION for w in block.words)
+            return stores and self.state.profile.g10_stores
+        return PRESET in block.events
+
+    def _stands(self, context: Context, rows: _Rows, upto: int) -> list[float] | None:
+        """Where the axes stand before row `upto`, which the state says where it is None. Where the row before
+        it says that alone, its moves need not be there."""
+        last, state = upto - 1, self.state
+        if last < rows.resolved:
+            return None
+        slot = rows.blocks.slot[last].tolist()
+        own = bool(rows.own) and rows.own[-1].row == upto
+        if own or self.turn is not None or rows.incremental[last] or min(slot) < 0 or rows.kind[last] == 255:
+            self._resolve(context, rows, upto)
+            return None
+        frame = state.frames[int(rows.frame[last])]
+        value = scaled(context, state, self.collector.remarks)
+        return [
+            float(value[k]) * frame.unit_mm + shift for k, shift in zip(slot, frame.offset_mm, strict=True)
+        ]
 
     def _alone(self, context: Context, rows: _Rows, row: int, effect: Effect) -> None:
         """Carry out one row singly, or a run of canned cycles, after the rows before it."""

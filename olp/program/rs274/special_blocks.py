@@ -42,6 +42,9 @@ from olp.program.rs274.turned import Turning, along_words
 
 #: (1,) the kind of a move that the control makes by itself.
 _RAPID = np.array([Kind.RAPID], np.uint8)
+#: flags of a move that the control makes by itself, and of one under block delete.
+_OWN = int(Flag.PASS | Flag.CONTROL)
+_OWN_DELETED = int(_OWN | Flag.DELETED)
 #: (1,) the flag of a move that ends where the machine file says.
 _STANDS = np.array([Flag.PASS | Flag.CONTROL | Flag.MACHINE], np.uint8)
 #: (1, 3) the words of a move without any.
@@ -228,8 +231,7 @@ class SpecialBlocks:
 
     def own_move(self, line: int, row: int, *, deleted: bool) -> OwnMove:
         """Such a move before a row of a chunk."""
-        flag = Flag.PASS | Flag.CONTROL
-        return OwnMove(row, line, flag | _deleted(deleted), self._loose_frame())
+        return OwnMove(row, line, _OWN_DELETED if deleted else _OWN, self._loose_frame())
 
     def stand(self, line: int, axes: Sequence[int], place: Place, *, deleted: bool) -> None:
         """Where axes stand after such a move, as far as the machine file states it and the words are those of

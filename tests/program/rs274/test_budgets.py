@@ -241,6 +241,8 @@ AT_ONCE = {
     "arcs with a radius": ("G1 X1\n", "G3 X2 R5.{k}\nG2 X1 R-5.{k}\n"),
     "helices": ("G1 X1\n", "G2 X2 Z{k} I0.5\nG2 X1 Z3 I-0.5\n"),
 }
+#: kinds of lines of which every second or so is an event, and how many functions a line may call
+EVENTS = {"switches": 6, "dwells": 16, "shifts": 110, "mixed": 40}
 LEANING = '[[curves]]\nfile = "{}.csv"\ninterpolation = "linear"\n'
 CURVES = {
     f"{a}.csv": f"{a.upper()}_mm,EXX_um\n-1000,-9\n2000,20\n".replace("EXX", f"E{a.upper()}{a.upper()}")
@@ -260,3 +262,13 @@ def test_holes_and_arcs_are_carried_out_many_at_once(name: str, tmp_path: Path) 
     )
     calls(few, place)
     assert calls(many, place) - calls(some, place) < 3 * (many.count("\n") - some.count("\n"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", EVENTS)
+def test_an_event_costs_a_few_calls(kind: str, tmp_path: Path) -> None:
+    """Both readings together. A move that is put into arrays alone calls some seventy functions."""
+    place = machine(tmp_path, "[squareness]\nC0Y_urad = 20.0\n", tables=TABLES)
+    few, some, many = (program(kind, lines) for lines in (40, 400, 1200))
+    calls(few, place)
+    assert calls(many, place) - calls(some, place) < EVENTS[kind] * (many.count("\n") - some.count("\n"))

@@ -162,6 +162,24 @@ def test_a_block_leads_where_the_control_goes(name: str, place: Path) -> None:
     np.testing.assert_allclose(reached(f"{HEAD}{text}\nM2\n", place)[-1], want, atol=1e-9)
 
 
+@pytest.mark.parametrize("modes", ["", "G20\n", "G55\n", "G43 H2\n", "G91\n", "G92 Y1\n"])
+@pytest.mark.parametrize("stores", ["G92 X5 Z1", "G10 L20 P1 X5 Y3"])
+def test_what_is_stored_is_where_the_moves_before_it_lead(modes: str, stores: str, place: Path) -> None:
+    """Whether one block states that place alone, or several do."""
+    ends = [
+        reached(f"{HEAD}{modes}G1 X4 Y5 Z6\n{moves}{stores}\nG90 G0 X1 Y2 Z3\nM2\n", place)[-1]
+        for moves in ("", "X4 Y5 Z6\n" * ("G91" not in modes), "G4 P1\nG64 P0.1\n", "M1\nT1\n")
+    ]
+    np.testing.assert_allclose(ends, [ends[0]] * 4, atol=1e-9)
+    apart = f"{HEAD}{modes}G1 X4\nY5\nZ6\n{stores}\nG90 G0 X1 Y2 Z3\nM2\n"
+    np.testing.assert_allclose(reached(apart, place)[-1], ends[0], atol=1e-9)
+
+
+def test_no_place_is_stored_behind_a_change_that_moves_the_axes(place: Path) -> None:
+    with pytest.raises(ProgramError, match="has not been commanded yet"):
+        reached(f"{HEAD}G0 X1 Y2 Z3\nT2 M6\nG92 X5\nM2\n", place)
+
+
 @pytest.mark.parametrize("text", REFUSED)
 def test_what_the_control_sees_in_another_way_is_refused(text: str, place: Path) -> None:
     with pytest.raises(ProgramError, match=re.escape(REFUSED[text])) as caught:
