@@ -6,11 +6,11 @@ from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 
-from olp.core.arrays import Array, Index, all_in_row, distinct
+from olp.core.arrays import Array, Index, Mask, all_in_row, distinct
 from olp.core.geometry import arc_points
 from olp.core.toolpath import Flag, Toolpath
 from olp.core.values import dataclass
-from olp.program.text.columns import apart, picked, spans
+from olp.program.text.columns import apart, marked, picked, spans
 from olp.proof.deviation import cutting_moves
 
 #: waypoints that are sampled at most
@@ -103,12 +103,21 @@ def _named(pairs: Iterable[tuple[str, Array]]) -> dict[tuple[str, int], Array]:
 
 def _waypoints(path: Toolpath) -> Index:
     """Some moves that end at a known position, evenly among all of them."""
-    known = np.empty(len(path), bool)
-    for some in spans(len(path)):
-        known[some] = all_in_row(np.isfinite(path.end_mm[some]))
-    count = int(np.count_nonzero(known))
+    known = marked(len(path), lambda some: all_in_row(np.isfinite(path.end_mm[some])))
+    count = sum(int(np.count_nonzero(known[some])) for some in spans(len(known)))
     pick = np.linspace(0, count - 1, min(count, _WAYPOINTS)).astype(np.int64)
-    return pick if count == len(path) else np.flatnonzero(known)[pick]
+    return pick if count == len(path) else _ordinal(known, pick)
+
+
+def _ordinal(mask: Mask, pick: Index) -> Index:
+    """(m,) the rows of those true entries of a mask whose numbers (m,), from 0 and rising, are picked."""
+    rows, before = [np.zeros(0, np.int64)], 0
+    for some in spans(len(mask)):
+        own = np.flatnonzero(mask[some])
+        first, last = np.searchsorted(pick, (before, before + len(own)))
+        rows.append(some.start + own[pick[first:last] - before])
+        before += len(own)
+    return np.concatenate(rows)
 
 
 def _lengths(path: Toolpath) -> Array:
@@ -123,9 +132,9 @@ def _lengths(path: Toolpath) -> Array:
         begin[np.arange(len(arcs)), (arcs.plane + 2) % 3] = 0.0
         radius = np.sqrt(np.einsum("ij,ij->i", begin, begin))
         length[arcs.move] = np.maximum(length[arcs.move], radius * np.abs(arcs.sweep_rad))
-    cuts = cutting_moves(path) & ((path.flag & _AWAY) == 0)
     for some in spans(len(path)):
-        length[some] = np.where(cuts[some], np.nan_to_num(length[some]), 0.0)
+        cuts = cutting_moves(path.part(some.start, some.stop)) & ((path.flag[some] & _AWAY) == 0)
+        length[some] = np.where(cuts, np.nan_to_num(length[some]), 0.0)
     return length
 
 
@@ -185,10 +194,9 @@ def _points(path: Toolpath, places: _Places) -> Array:
     points[inside] = start + share[:, None] * (end - start)
     arcs = path.arcs
     if len(arcs):
-        index = np.full(len(path), -1, np.int64)
-        index[arcs.move] = np.arange(len(arcs))
-        curved = np.flatnonzero(index[move] >= 0)
-        which = index[move[curved]]
+        which = np.minimum(np.searchsorted(arcs.move, move), len(arcs) - 1)
+        curved = np.flatnonzero(arcs.move[which] == move)
+        which = which[curved]
         points[inside[curved]] = arc_points(
             start[curved], end[curved], arcs.centre_mm[which], arcs.plane[which], arcs.sweep_rad[which],
             share[curved],

@@ -12,7 +12,7 @@ from olp.checks.along import Along, Figure
 from olp.checks.base import finding, lines_of
 from olp.checks.listed import between_findings as between_findings
 from olp.checks.listed import remark_findings
-from olp.core.arrays import Array, Index
+from olp.core.arrays import Array, Index, Mask, distinct
 from olp.core.machine import Setup
 from olp.core.toolpath import Flag, Kind, Toolpath
 from olp.core.units import UM_PER_MM
@@ -52,16 +52,17 @@ def program_findings(program: Program, setup: Setup) -> list[Finding]:
         elif name in _REMARKS:
             findings.append(finding(_REMARKS[name], text, [line]))
     findings += remark_findings(program)
-    whole = ((path.flag & np.uint8(Flag.WHOLE)) != 0) & (path.kind != Kind.PROBE)
-    if whole.any() and not program.verbatim:
+    count = len(path)
+    whole = found(count, lambda some: _has(path, some, Flag.WHOLE) & (path.kind[some] != Kind.PROBE))
+    if whole.size and not program.verbatim:
         lines = lines_of(path, whole)
         findings.append(
             finding(
                 "OLP104", f"{len(lines)} blocks also move another axis; corrected at their ends only", lines
             )
         )
-    deleted = (path.flag & np.uint8(Flag.DELETED)) != 0
-    if deleted.any():
+    deleted = found(count, lambda some: _has(path, some, Flag.DELETED))
+    if deleted.size:
         lines = lines_of(path, deleted)
         findings.append(
             finding(
@@ -163,19 +164,18 @@ def proof_findings(
         what += f"{place(int(path.line[worst]))}, allowed {proof.allowed_mm * 1e3:.2f} um"
         if path.compensated()[above].any() and proof.written.compensated().any():
             what += "; contours under cutter compensation are among them: correct with --contour path"
-        made = (path.flag & np.uint8(Flag.CYCLE)) != 0
-        made[1:] |= made[:-1].copy()
-        if made[above].any():
+        cycle = np.uint8(Flag.CYCLE)
+        if ((path.flag[above] | path.flag[np.maximum(above - 1, 0)]) & cycle).any():
             what += "; holes of canned cycles, or moves from there, are among them: write these cycles out "
             what += _AS_MOVES[dialect.expands_cycles]
         findings.append(finding("OLP101", what, lines_of(path, above)))
     if not any((proof.counts[some] <= Counts.LEFT).any() for some in spans(count)):
         findings.append(finding("OLP107", "no move of this program could be judged"))
-    untouched = (path.flag & np.uint8(Flag.PASS | Flag.MACHINE)) != 0
-    untouched[uncorrected] = True
-    if untouched.any():
-        lines = lines_of(path, untouched)
-        findings.append(finding("OLP102", f"{int(untouched.sum())} moves were written unchanged", lines))
+    untouched = found(count, lambda some: _has(path, some, Flag.PASS | Flag.MACHINE))
+    untouched = distinct(np.concatenate((untouched, uncorrected)))
+    if untouched.size:
+        what = f"{len(untouched)} moves were written unchanged"
+        findings.append(finding("OLP102", what, lines_of(path, untouched)))
     unknown = found(
         count,
         lambda some: (proof.counts[some] <= Counts.LEFT) & (proof.after.side[some] > proof.tolerance_mm),
@@ -225,10 +225,9 @@ def part_findings(table: Judgements, part_tolerance_um: float | None) -> list[Fi
 
 def sources(along: Along, model: ErrorModel) -> list[dict[str, Any]]:
     """Size of each error source over the nominal path, at waypoints and between them, largest first."""
-    tool = along.path.tool_mm()
 
     def sizes(point: Array, move: Index) -> Iterator[tuple[str, Array]]:
-        for name, part in model.contributions(point, tool if tool.ndim == 1 else tool[move]):
+        for name, part in model.contributions(point, along.path.tool_at(move)):
             yield name, np.sqrt(np.einsum("ij,ij->i", part, part))
 
     rows = [
@@ -242,10 +241,10 @@ def orientation(along: Along, model: ErrorModel) -> dict[str, float]:
     """Largest and rms angle of the tool in urad along the nominal path, which a machine with three linear
     axes cannot correct."""
     path = along.path
-    payload = path.per_frame([(f.payload_kg,) for f in path.frames])[..., 0]
+    payloads = [(f.payload_kg,) for f in path.frames]
 
     def sizes(point: Array, move: Index) -> Iterator[tuple[str, Array]]:
-        turned = model.rotation(point, None, payload if payload.ndim == 0 else payload[move])
+        turned = model.rotation(point, None, path.per_frame_at(payloads, move)[..., 0])
         yield "", np.sqrt(np.einsum("ij,ij->i", turned, turned)) * 1e6
 
     angle = next(iter(along.figures(sizes)), Figure("", 0.0, 0.0))
@@ -270,16 +269,23 @@ def worst_blocks(program: Program, table: Judgements) -> list[dict[str, Any]]:
 
 def tally_moves(path: Toolpath, uncorrected: int, parts: npt.NDArray[np.integer[Any]]) -> dict[str, int]:
     """Every move is corrected, corrected approximately, or left uncorrected; the three add up to all."""
-    untouched = (path.flag & np.uint8(Flag.PASS | Flag.MACHINE | Flag.CONTROL)) != 0
-    rough = ((path.flag & np.uint8(Flag.CYCLE | Flag.WHOLE)) != 0) | (path.kind == Kind.PROBE)
-    rough &= ~untouched
-    total = len(path)
-    skipped = int(untouched.sum()) + uncorrected
+    total, skipped, approximated, split = len(path), uncorrected, 0, 0
+    for some in spans(total):
+        untouched = _has(path, some, Flag.PASS | Flag.MACHINE | Flag.CONTROL)
+        rough = _has(path, some, Flag.CYCLE | Flag.WHOLE) | (path.kind[some] == Kind.PROBE)
+        skipped += int(np.count_nonzero(untouched))
+        approximated += int(np.count_nonzero(rough & ~untouched))
+        split += int(np.count_nonzero(parts[some] > 1))
     return {
         "total": total,
-        "corrected": total - skipped - int(rough.sum()),
-        "approximated": int(rough.sum()),
+        "corrected": total - skipped - approximated,
+        "approximated": approximated,
         "passed": skipped,
         "refused": 0,
-        "split": int((parts > 1).sum()),
+        "split": split,
     }
+
+
+def _has(path: Toolpath, some: slice, flags: Flag) -> Mask:
+    """(m,) which of some moves have one of the flags."""
+    return np.asarray((path.flag[some] & np.uint8(flags)) != 0)

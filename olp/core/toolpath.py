@@ -204,6 +204,9 @@ class Toolpath:
 
     def compensated(self) -> Mask:
         """(n,) moves along a contour that the control offsets by the cutter radius."""
+        if all(f.compensation is None for f in self.frames):
+            # one value stands for all
+            return np.broadcast_to(np.False_, len(self))
         return np.array([f.compensation is not None for f in self.frames], bool)[self.frame]
 
     def offset_by_radius(self) -> bool:
@@ -252,14 +255,26 @@ class Toolpath:
             return [(*f.tool_mm, f.payload_kg) for f in self.frames]
         return [f.tool_mm for f in self.frames]
 
+    def tool_at(self, move: Index) -> Array:
+        """As `tool_mm` of the whole path, at moves (m,) alone."""
+        return self.per_frame_at(self._tools(), move)
+
     def per_frame(self, values: Sequence[Tool], first: int = 0, last: int | None = None) -> Array:
         """One vector per frame, spread over moves: (3,) where it is the same for all of them, else (m, 3)."""
-        if not values:
-            return np.zeros(3)
-        table = np.array(values, float)
-        if len(values) == 1 or (table == table[0]).all():
-            return np.asarray(table[0], float)
-        part = self.frame[first:last]
-        if len(part) and (part == part[0]).all():
-            return np.asarray(table[part[0]], float)
-        return np.asarray(table[part], float)
+        return _spread(values, self.frame[first:last], self.frame[first:last])
+
+    def per_frame_at(self, values: Sequence[Tool], move: Index) -> Array:
+        """As `per_frame` of the whole path, at moves (m,) alone."""
+        return _spread(values, self.frame, self.frame[move])
+
+
+def _spread(values: Sequence[Tool], among: npt.NDArray[np.int32], frame: npt.NDArray[np.int32]) -> Array:
+    """The vectors of some frames; one alone where it is the same for all frames `among` which they are."""
+    if not values:
+        return np.zeros(3)
+    table = np.array(values, float)
+    if len(values) == 1 or (table == table[0]).all():
+        return np.asarray(table[0], float)
+    if len(among) and (among == among[0]).all():
+        return np.asarray(table[among[0]], float)
+    return np.asarray(table[frame], float)

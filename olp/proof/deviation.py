@@ -79,7 +79,7 @@ def measure(
     starts = UnknownStarts(nominal, target_mm, path, groups, model, bend_mm)
     sides = UnknownSides(path, model) if tracer.has_play else None
     # without play one 0 stands for all
-    side = np.broadcast_to(np.float32(0.0), count) if sides is None else np.zeros(count, np.float32)
+    side = np.broadcast_to(np.float32(0.0), count) if sides is None else apart((count,), np.float32)
     a = 0
     while a < count:
         parts = int(groups[a - 1]) + _BLOCK if a else _BLOCK
@@ -123,7 +123,7 @@ class Tracer:
         self.joints = SmoothJoints.of(nominal)
         #: (n, 3) axes that are unknown at the end of a nominal move, None where there are none
         unknown = any(np.isnan(nominal.end_mm[some]).any() for some in spans(len(nominal)))
-        self.blind = np.isnan(nominal.end_mm) if unknown else None
+        self.blind = _unknown(nominal.end_mm) if unknown else None
 
     @staticmethod
     def trace(path: Toolpath, model: ErrorModel, step_mm: float) -> tuple[Array, Index]:
@@ -457,3 +457,11 @@ def _between(start: Array, end: Array, part: Index, share: Array) -> Array:
     point *= share[:, None]
     point += start.take(part, axis=0)
     return np.asarray(point)
+
+
+def _unknown(end_mm: Array) -> Mask:
+    """(n, 3) which axes are unknown at the ends of moves."""
+    unknown = apart(end_mm.shape, np.bool_)
+    for some in spans(len(unknown)):
+        unknown[some] = np.isnan(end_mm[some])
+    return unknown

@@ -20,7 +20,7 @@ from olp.core.units import UM_PER_MM
 from olp.core.values import dataclass
 from olp.findings.catalogue import Finding
 from olp.findings.rule import Severity
-from olp.program.text.columns import Columns, found, spans
+from olp.program.text.columns import Columns, found, marked, spans
 from olp.proof.measured import ABOVE, SHOWN, WITHIN, Measured
 from olp.proof.proof import Counts, Proof
 
@@ -80,11 +80,12 @@ class Judgements:
     @property
     def over(self) -> Mask:
         """(n,) moves that count and are above what is allowed."""
-        over = np.zeros(len(self.counts), bool)
-        for some in spans(len(over)):
+
+        def of(some: slice) -> Mask:
             judged = self.counts[some] <= Counts.LEFT
-            over[some] = judged & (np.nan_to_num(self.corrected[some]) > self.allowed_mm)
-        return over
+            return np.asarray(judged & (np.nan_to_num(self.corrected[some]) > self.allowed_mm))
+
+        return marked(len(self.counts), of)
 
     def largest_mm(self, which: Mask | None = None) -> float:
         """The largest deviation of the corrected program that counts, of all moves or of some."""

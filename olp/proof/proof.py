@@ -19,7 +19,7 @@ from olp.core.units import UM_PER_MM
 from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
 from olp.program.program import Program
-from olp.program.text.columns import Columns, apart, found, spans
+from olp.program.text.columns import Columns, apart, found, marked, spans
 from olp.proof.deviation import Deviation, Single, cutting_moves, measure
 from olp.proof.kinds import check_kinds
 from olp.proof.matching import match
@@ -159,9 +159,15 @@ def _square_sum(values: Single) -> np.float64:
 
 def uncorrected_starts(path: Toolpath, uncorrected: Mask) -> Mask:
     """(n,) feed moves after an uncorrected move or after a canned cycle."""
-    loose = uncorrected | ((path.flag & np.uint8(Flag.PASS | Flag.MACHINE | Flag.CYCLE)) != 0)
-    before = np.concatenate(([False], loose[:-1]))
-    return np.asarray(before & cutting_moves(path))
+    alone = np.uint8(Flag.PASS | Flag.MACHINE | Flag.CYCLE)
+
+    def of(some: slice) -> Mask:
+        loose = uncorrected[some] | ((path.flag[some] & alone) != 0)
+        before = some.start > 0 and (uncorrected[some.start - 1] or (path.flag[some.start - 1] & alone) != 0)
+        behind = np.concatenate(([before], loose[:-1]))
+        return np.asarray(behind & cutting_moves(path.part(some.start, some.stop)))
+
+    return marked(len(path), of)
 
 
 def prove(
@@ -179,19 +185,20 @@ def prove(
     where the control would refuse it."""
     path, written = nominal.toolpath, corrected.toolpath
     target = Targets(path, zero_shifts(path.frames, model))
-    exempt = np.zeros(len(path), bool)
+    exempt = apart((len(path),), np.bool_)
     exempt[uncorrected] = True
     near = _NEAR_DIGITS * digit_mm + _NEAR_SHARE * tolerance_mm
     groups = match(nominal, target, corrected, model, near, part(tell, 0.1, 0.4))
     check_kinds(nominal, corrected, groups, digit_mm)
     bend = tolerance_mm * _BEND_SHARE
     how, counts = apart((len(path),), np.uint8), apart((len(path),), np.uint8)
-    points = nominal.dialect.points or not (path.kind != Kind.RAPID).any()
+    rapids = ((path.kind[some] == Kind.RAPID).all() for some in spans(len(path)))
+    points = nominal.dialect.points or all(rapids)
     for some in spans(len(path)):
         part_of = path.part(some.start, some.stop)
         how[some] = _how(part_of, points)
         counts[some] = _counts(part_of, how[some], exempt[some])
-    feed = np.asarray(counts == Counts.FEED)
+    feed = marked(len(path), lambda some: np.asarray(counts[some] == Counts.FEED))
 
     def side(program: Program, ends: Index, told: Progress) -> _Measured:
         deviation = measure(path, target, program.toolpath, ends, feed, model, bend, told)
@@ -215,8 +222,8 @@ def prove(
         for one in (before, after):
             one.size[some][counts[some] > Counts.LEFT] = np.nan
             one.size[some][shown] = one.waypoint[some][shown]
-    lean = uncorrected_starts(path, exempt)
-    lean &= feed
+    behind = uncorrected_starts(path, exempt)
+    lean = marked(len(path), lambda some: np.asarray(behind[some] & feed[some]))
     return Proof(
         path, written, groups, before.side_of(counts), after.side_of(counts), tolerance_mm, digit_mm, counts,
         before_mm, after_mm, lean,

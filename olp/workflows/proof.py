@@ -31,6 +31,7 @@ from olp.findings.catalogue import Finding
 from olp.program.origin import original_of
 from olp.program.program import Program
 from olp.program.registry import Options, read
+from olp.program.text.columns import found
 from olp.proof.judgement import Judgements, verdict
 from olp.proof.proof import ROUNDING_SHARE, Proof, largest_correction_mm, prove
 from olp.workflows.doubt import accepted_of, doubted
@@ -219,8 +220,8 @@ def _prove_without_deleted(
     """Raise ProgramError where the corrected program is wrong with the block-delete switch on, on lines that
     are right with the switch off, as `table` says."""
     path = pair.nominal.toolpath
-    deleted = (path.flag & np.uint8(Flag.DELETED)) != 0
-    if not deleted.any():
+    deleted = found(len(path), lambda some: np.asarray((path.flag[some] & np.uint8(Flag.DELETED)) != 0))
+    if not deleted.size:
         return
     reading = Options(block_delete=True)
     nominal = read(pair.source.data, loaded.setup, loaded.dialect, reading, words=False)
@@ -240,7 +241,7 @@ def _prove_without_deleted(
             raise ProgramError(
                 "later blocks depend on this block under block delete, so one correction cannot be right for "
                 "both switch positions; remove the `/`, or give every axis in the first block after it",
-                line=int(path.line[deleted][0]),
+                line=int(path.line[deleted[0]]),
                 code="OLP525",
             )
 

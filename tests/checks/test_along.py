@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,11 +10,13 @@ import pytest
 from cases.acceptance import TRUE_ZERO, machine
 
 import olp
+from olp.checks import along as module
 from olp.checks.along import Along
 from olp.checks.correction import orientation, sources
 from olp.core.toolpath import Arcs, Flag, Frame, Kind, Toolpath
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration, Curve, Cyclic
+from olp.program.text import columns
 
 BOX = np.array([[-1000.0, 2000.0]] * 3)
 HEAD = "G21 G90 G54 G64 P0.001 Q0\n"
@@ -141,3 +144,26 @@ def test_a_path_of_which_nothing_is_known_has_no_figures() -> None:
     assert sources(Along.of(nowhere), model) == []
     assert orientation(Along.of(nowhere), model) == {"max_urad": 0.0, "rms_urad": 0.0}
     assert Along.of(nowhere).figures(lambda points, move: []) == []
+
+
+def test_waypoints_of_a_long_path_are_even_among_the_known(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    known = np.random.default_rng(5).random(300) < 0.7
+    ends = np.where(known[:, None], np.arange(300.0)[:, None], np.nan) * [1.0, 0.0, 0.0]
+    path = lines(*(tuple(end) for end in ends))
+    monkeypatch.setattr(columns, "_MOST", 17)
+    monkeypatch.setattr(module, "_WAYPOINTS", 50)
+    rows = np.flatnonzero(known)
+    expected = rows[np.linspace(0, len(rows) - 1, 50).astype(int)]
+    figures = Along.of(path)
+    assert figures._places.move[: len(expected)].tolist() == expected.tolist()
+
+
+def test_tools_at_moves_are_those_of_the_path() -> None:
+    path = lines((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (2.0, 0.0, 0.0))
+    frames = tuple(Frame(tool_mm=(0.0, 0.0, z)) for z in (1.0, 2.0))
+    for frame in ([0, 1, 1], [1, 1, 1]):
+        one = replace(path, frames=frames, frame=np.array(frame, np.int32))
+        tool, move = one.tool_mm(), np.array([2, 0])
+        assert np.array_equal(one.tool_at(move), tool if tool.ndim == 1 else tool[move])

@@ -42,6 +42,14 @@ def found(count: int, of: Callable[[slice], Mask]) -> Index:
     )
 
 
+def marked(count: int, of: Callable[[slice], Mask]) -> Mask:
+    """(count,) what `of` says of the rows of columns of so many entries, where it is asked by spans."""
+    mask = apart((count,), np.bool_)
+    for some in spans(count):
+        mask[some] = of(some)
+    return mask
+
+
 def picked(column: npt.NDArray[Scalar], rows: Index) -> npt.NDArray[Scalar]:
     """(m, ...) the entries of a column at rows (m,) that are far from each other."""
     if len(column) <= _MOST:

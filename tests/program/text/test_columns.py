@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from olp.core.spool import unload
 from olp.program.text import columns as module
-from olp.program.text.columns import Columns, Packed, apart, spans
+from olp.program.text.columns import Columns, Packed, apart, marked, spans
 
 
 @pytest.mark.slow
@@ -121,3 +121,15 @@ def test_packed_numbers_behind_others() -> None:
     assert packed[np.array([2, 0])].tolist() == [2_000_000_255, 11]
     assert int(packed[1]) == 70_000
     assert Packed.of(before, before).small.strides == (0,)
+
+
+def test_a_mask_is_asked_for_by_spans(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "_MOST", 7)
+    asked: list[slice] = []
+
+    def of(some: slice) -> np.ndarray:
+        asked.append(some)
+        return np.arange(some.start, some.stop) % 3 == 1
+
+    assert np.array_equal(marked(20, of), np.arange(20) % 3 == 1)
+    assert [(some.start, some.stop) for some in asked] == [(0, 7), (7, 14), (14, 20)]
