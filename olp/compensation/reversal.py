@@ -161,7 +161,8 @@ def _still(path: Toolpath, rows: Plan, source: Index | None) -> Index | None:
 
 def _may_turn(path: Toolpath, rows: Plan, command_mm: Array, *, insert: bool) -> Mask:
     """(r,) rows before which a step may be put: feed moves that are corrected and start at a known position,
-    the first one at `command_mm` (3,). Those that touch have none, as it would touch too. Without `insert` not before those that are never split."""
+    the first one at `command_mm` (3,). Those that touch have none, as it would touch too. Without `insert`
+    not before those that are never split."""
     may = ~any_in_row(rows.raw) & ~is_in(path.kind[rows.move], (Kind.RAPID, Kind.PROBE))
     may &= (path.flag[rows.move] & np.uint8(Flag.CYCLE)) == 0
     if not insert:

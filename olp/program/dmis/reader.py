@@ -10,7 +10,7 @@ import re
 
 import numpy as np
 
-from olp.core.arrays import Array, Index, Mask
+from olp.core.arrays import Array, Mask, any_in_row
 from olp.core.errors import ProgramError
 from olp.core.machine import Setup
 from olp.core.progress import Progress
@@ -220,7 +220,7 @@ class _Reader(Events):
         touch = np.array([n in self.touches for n in line.tolist()])
         if relative.any():
             self._add_up(end, relative, touch)
-        lost = np.isnan(end).any(axis=1)
+        lost = any_in_row(np.isnan(end))
         kind = np.where(touch, np.uint8(Kind.PROBE), np.uint8(Kind.RAPID))
         flag = np.where(touch, np.uint8(Flag.WHOLE), np.uint8(0))
         if self.manual:

@@ -26,8 +26,8 @@ _JUMP = (
 _SCAN = "scans in a form that is not known; write PTMEAS points, or MEAS with PATH and PAMEAS"
 
 TABLE: Mapping[bytes, tuple[Support, str]] = {
-    b"GOTO": (_C, "x,y,z, CART, POL,r,angle,height, and INCR,distance,i,j,k; POL and INCR become CART. INCR behind a touch or "
-            "another position that only the control knows is left as it is"),
+    b"GOTO": (_C, "x,y,z, CART, POL,r,angle,height, and INCR,distance,i,j,k; POL and INCR become CART. INCR "
+            "behind a touch or another position that only the control knows is left as it is"),
     b"PTMEAS": (_C, "CART,x,y,z or POL,r,angle,height, with or without a direction, inside MEAS or RMEAS"),
     b"PAMEAS": (_R, "scans along a PATH, inside MEAS: the control follows the surface; left uncorrected"),
     b"CALIB": (_R, "CALIB/SENS: as MEAS; others are refused"),
