@@ -244,6 +244,8 @@ class AxisState(OffsetState):
         for code in codes:
             effect = self._event(code, line, by_letter, block.axes, moves, effect)
         check_codes_along(self, block.g_codes, m_codes, line)
+        if self.profile.numbers_hold:
+            self._hold_numbers(block, line)
         if turning:
             self._check_turned(angle_deg, effect, line)
         return effect
@@ -255,6 +257,27 @@ class AxisState(OffsetState):
                 self._dwell(line, block.by_letter)
             else:
                 self._path_mode(code, line, block.by_letter)
+
+    def _hold_numbers(self, block: EventBlock, line: int) -> None:
+        """Keep the D of a block; refuse an H or D alone that may change what is in force."""
+        used = {letter for code in block.events if (letter := self.profile.offset_words.get(code))}
+        used |= {"H"} if not LENGTHS.isdisjoint(block.events) else set()
+        used |= {"D"} if not CUTTER_COMPENSATION.isdisjoint(block.events) else set()
+        radius = None if self.compensation is None else self.radius_number
+        for letter, before in (("H", self.length_number), ("D", radius)):
+            word = block.by_letter.get(letter)
+            if word is None or letter in used:
+                continue
+            if before is not None and word.value != before:
+                code = "G43" if letter == "H" else "G40, and G41 or G42"
+                raise ProgramError(
+                    f"{letter}{word.value:g} alone is in the block while {letter}{before} is in force; "
+                    f"what the control makes of it is not known; give {code} with it",
+                    line=line,
+                    code="OLP518",
+                )
+        if "D" in block.by_letter:
+            self.radius_number = self._integer(block.by_letter["D"], line)
 
     def _switch_tips(self, codes: Sequence[int]) -> None:
         """Tool centre point control with axis words or directions, which every other code of tool lengths

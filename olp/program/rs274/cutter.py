@@ -31,6 +31,7 @@ class _State(Protocol):
     spindle: int | None
     compensation: CutterCompensation | None
     contours: int
+    radius_number: int | None
 
     @property
     def setup(self) -> Setup: ...
@@ -77,6 +78,8 @@ def _radius_mm(state: _State, code: int, line: int, word: Word | None) -> float:
             line=line,
             code="OLP516",
         )
+    if word is None and state.profile.radius_holds:
+        number = state.radius_number
     if state.profile.length_of_spindle_tool:
         number = number or state.spindle
         if number == 0:
@@ -84,9 +87,11 @@ def _radius_mm(state: _State, code: int, line: int, word: Word | None) -> float:
     elif number == 0:
         return 0.0
     if number is None:
+        own = state.profile.length_of_spindle_tool
+        why = "the tool in the spindle is not known; give D, or T and M6 before it"
+        why = why if own else "which radius it takes is not known; give D"
         raise ProgramError(
-            f"G{code / 10:g} has no D word, and the tool in the spindle is not known; give D, or T and M6 "
-            "before it",
+            f"G{code / 10:g} has no D word, and {why}",
             line=line,
             code="OLP513",
         )

@@ -40,6 +40,8 @@ _FLOW = pattern(rb"[#\[=<]|^/?\s*O|^\W*N?\d*\s*(IF|WHILE|GOTO|END|DO|CALL|RTS)",
 _PROGRAM = b":1"
 _POLAR = pattern(rb"[@^]")
 _COMMA = pattern(rb"\d,\d")
+#: D and H
+_NUMBERS = (68, 72)
 _LENGTHS = np.zeros(256, bool)
 _LENGTHS[list(b"XYZIJKRQ")] = True
 
@@ -257,6 +259,8 @@ class Modes:
         m = np.flatnonzero((letter == 77) & usable)
         event[line[m[self._m_event[np.clip(np.rint(value[m] * 10), 0, 10_000).astype(np.int64)]]]] = True
         event[line[(letter == 84) & usable]] = True
+        if self._state.profile.numbers_hold:
+            event[line[is_in(letter, _NUMBERS) & usable]] = True
         # along a contour, these are checked too
         on = self._compensated(codes, len(event))
         if on is not None:

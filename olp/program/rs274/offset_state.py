@@ -89,6 +89,10 @@ class OffsetState(State):
     inherited: dict[str, Touch | None] = field(default_factory=dict)
     located: dict[str, str] = field(default_factory=dict)
     length_tool: int | None = None
+    #: the H of the length in force, 0 for none of its own; None behind G49
+    length_number: int | None = None
+    #: the last D
+    radius_number: int | None = None
     spindle: int | None = None
     length_unit: int = METRIC
     #: those of the setup that were looked up, None where it has none of this name
@@ -162,7 +166,7 @@ class OffsetState(State):
     def _tool_length(self, code: int, line: int, by_letter: dict[str, Word]) -> None:
         if code == 490:
             self._set_length(ZERO)
-            self.length_tool = None
+            self.length_tool = self.length_number = None
             return
         name = f"G{code / 10:g}"
         number = self._integer(by_letter["H"], line) if "H" in by_letter else None
@@ -190,7 +194,7 @@ class OffsetState(State):
         if code == 432:
             vector = self._sum(self.offsets.length, vector)
         self._set_length(vector)
-        self.length_tool = number or None
+        self.length_tool, self.length_number = number or None, number
 
     def _set_length(self, vector: Vector) -> None:
         self.offsets.length, self.length_unit = vector, self.unit or METRIC

@@ -113,7 +113,9 @@ def event_block(context: Context, stated: EventWords, profile: Profile, known: K
     if block is None:
         block = known[key] = _event_block(stated, profile, context.number(stated.line))
     if context.chunk.deleted[stated.line] and (
-        not _DELETED_TOO.issuperset(block.events) or not _TOOL_CODES.isdisjoint(block.m_codes)
+        not _DELETED_TOO.issuperset(block.events)
+        or not _TOOL_CODES.isdisjoint(block.m_codes)
+        or (profile.numbers_hold and not block.by_letter.keys().isdisjoint("DH"))
     ):
         raise ProgramError(
             "a block under block delete changes offsets, units, path mode, the tool or its compensation, "

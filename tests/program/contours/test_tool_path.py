@@ -168,6 +168,20 @@ IN_CONTOUR = {
 }  # fmt: skip
 
 
+@pytest.mark.parametrize("control", ["fanuc", "mazak"])
+def test_a_contour_without_d_takes_the_last_one(tmp_path: Path, control: str) -> None:
+    """In whatever block it is; one that changes within the contour is refused, as is H under a length."""
+    with_d = b"G41 D1 G1 X20. Y0.\nY30.\nX50.\nG40 X60.\n"
+    stated = moves(program(tmp_path, with_d, control))
+    for before in (b"G0 X0. D1\n", b"D9 M8\nF60. D1\n"):
+        text = before + with_d.replace(b" D1", b"")
+        assert moves(program(tmp_path, text, control))[-len(stated) + 1 :] == stated[1:]
+    line, why = refused(tmp_path, with_d.replace(b"X50.", b"X50. D2"), control)
+    assert (line, why[:40]) == (5, "D2 alone is in the block while D1 is in ")
+    assert program(tmp_path, with_d.replace(b"X50.", b"X50. D1"), control)
+    assert refused(tmp_path, b"/X5. D1\n" + with_d, control)[0] == 3
+
+
 def test_a_contour_that_only_goes_along_the_tool_has_nothing_to_stay_beside(tmp_path: Path) -> None:
     """Neither where it is the first of a program, nor behind another contour."""
     along = b"G41 D1 G1 Z5\nG40 Z8\nZ9\n"

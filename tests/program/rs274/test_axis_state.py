@@ -274,13 +274,14 @@ def test_the_contour_is_compensated_by_the_radius(control: str, text: str, setup
 UNKNOWN = "the control makes the path of the tool from the radius of tool {0}, which is not known; give "
 UNKNOWN += "radius_mm, and wear_mm, in [tools.{0}] of the machine or job file"
 NO_D = "G41 has no D word, and the tool in the spindle is not known; give D, or T and M6 before it"
+NO_RADIUS = "G41 has no D word, and which radius it takes is not known; give D"
 IN_COMPENSATION = "in cutter compensation; give G40 before"
 #: Control and blocks behind `HEAD`: line, code and sentence.
 NOT_COMPENSATED: dict[tuple[str, str], tuple[int, str, str]] = {
     ("linuxcnc", "G41 D2\nG1 X5 F60"): (3, "OLP513", UNKNOWN.format(2)),
     ("linuxcnc", "G41 D9\nG1 X5 F60"): (3, "OLP513", UNKNOWN.format(9)),
     ("linuxcnc", "G41\nG1 X5 F60"): (3, "OLP513", NO_D),
-    ("fanuc", "T1 M6\nG41\nG1 X5. Y5. Z5. F60."): (4, "OLP513", NO_D),
+    ("fanuc", "T1 M6\nG41\nG1 X5. Y5. Z5. F60."): (4, "OLP513", NO_RADIUS),
     ("linuxcnc", "G41 D1.5\nG1 X5 F60"): (
         3, "OLP516", "D1.5 is not a number of a table; expected an integer from 0"
     ),

@@ -88,6 +88,17 @@ READINGS: dict[str, tuple[str, dict[str, Outcome], Any]] = {
         {SIEMENS: (1, 2, 3)},
         {SIEMENS: frozenset()},
     ),
+    "numbers_hold": (
+        "G0 X0. Y0.\nG43 H1 Z1.\nH2 Z1.",
+        dict.fromkeys((FANUC, HAAS, MAZAK, SIEMENS, MACH3), "H2 alone is in the block while H1 is in force"),
+        "not",
+    ),
+    "radius_holds": (
+        "G0 X0. Y0. Z1.\nD1\nG41 G1 X5. Y0. F60.\nY9.\nG40 X0.",
+        dict.fromkeys((FANUC, MAZAK), "the radius of tool 1, which is not known")
+        | dict.fromkeys((HAAS, SIEMENS), "G41 has no D word, and which radius it takes"),
+        "not",
+    ),
     "spindle_words": (
         "T2 M6\nG56 HA\nG0 X0. Y0. Z1.",
         {OKUMA: (0, 0, 21)},

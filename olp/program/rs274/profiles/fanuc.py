@@ -21,6 +21,7 @@ DIALECT = replace(
     direction_words=(b"I", b"J", b"K"),
     plane_codes=frozenset({TILTED, ALIGNED}),
     polar=True,
+    radius_holds=True,
     scales_axes=True,
     scales_by_parameter=True,
     refusals={**ISO.refusals, 921: "G92.1 presets offsets that are not known off line"},

@@ -44,6 +44,7 @@ ISO = Profile(
     dwell_words="PXU",
     exact_stop=True,
     lengths_along_z=True,
+    numbers_hold=True,
     text=BlockText(),
     # `:1234` is another way to write the number of a program
     inert=pattern(rb"[ \t]*:[ \t]*\d+[ \t]*(?:\([^)]*\)[ \t]*)?"),

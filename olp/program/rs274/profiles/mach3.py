@@ -53,6 +53,7 @@ DIALECT = Profile(
     g52_is_g92=True,
     g10_adds=None,
     lengths_along_z=True,
+    numbers_hold=True,
     text=BlockText(),
     cycles=CycleRules(
         rises_first=True, feeds_home=True, taps_in_any_plane=True, taps_by_control=True,

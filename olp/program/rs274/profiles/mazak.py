@@ -28,6 +28,7 @@ DIALECT = replace(
     },
     harmless_m=ISO.harmless_m | {10, 11, 50, 51},
     tools_in_block=True,
+    radius_holds=True,
     rules=replace(ISO.rules, several="GMT"),
     # G5 switches the high-speed mode; other numbers call cycles
     still_with={50: ("P", frozenset({0.0, 2.0}))},
