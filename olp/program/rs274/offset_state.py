@@ -43,6 +43,8 @@ _RANK = {
 }
 #: Events that leave frame, tool and position as they are.
 _QUIET = frozenset({DWELL, *PATH_MODES})
+#: Words that number a tool, its length or its radius.
+_NUMBERS = frozenset("THD")
 _SPACED = pattern(r"([\d.])([A-Z])")
 
 
@@ -76,7 +78,7 @@ class EventBlock:
         axes = [(i, by_letter[a]) for i, a in enumerate(AXES) if a in by_letter]
         g_codes, m_codes = ([round(w.value * 10) for w in words if w.letter == a] for a in "GM")
         ordered = sorted(events, key=lambda code: _RANK.get(code, len(_RANK)))
-        quiet = bool(events) and _QUIET.issuperset(g_codes) and not m_codes and "T" not in by_letter
+        quiet = bool(events) and _QUIET.issuperset(g_codes) and not m_codes and _NUMBERS.isdisjoint(by_letter)
         return EventBlock(words, by_letter, axes, g_codes, m_codes, ordered, quiet)
 
 
