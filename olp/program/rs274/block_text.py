@@ -31,7 +31,8 @@ class BlockText:
     - `open_comments`: a comment that is not closed ends with its line. `nested_comments`: `(` may be in one.
     - `brackets`: `(` opens a comment; else a line with one is refused.
     - `marks_in_pairs`: `%` is the first line and the last one, alone in its line, or not there.
-    - `unread`: words that mean nothing for the path and have no letter, such as the number of a spindle.
+    - `unread`: words that mean nothing for the path and have no letter, such as the number of a spindle; its
+      group, where it has one. Each has the byte `unread_mark`.
     - `longest`: bytes of a line at most, without its line feed (None: no limit).
     """
 
@@ -43,6 +44,7 @@ class BlockText:
     brackets: bool = True
     marks_in_pairs: bool = False
     unread: re.Pattern[bytes] | None = None
+    unread_mark: int = 0
     longest: int | None = None
 
     @property

@@ -104,9 +104,9 @@ def lex(
     if not rules.skips_control:
         keep |= (text < 9) | ((text > 10) & (text < 32) & (text != 13))
     keep[newline] = True
-    if rules.unread is not None:
+    if rules.unread is not None and (text == rules.unread_mark).any():
         for match in rules.unread.finditer(text.tobytes()):
-            keep[slice(*match.span())] = False
+            keep[slice(*match.span(rules.unread.groups))] = False
     deleted = np.zeros(lines, bool)
     marks = _line_heads(text, starts, ends, keep, deleted)
     if rules.marks_in_pairs and marks.size:

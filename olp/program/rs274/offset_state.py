@@ -29,6 +29,7 @@ from olp.program.rs274.codes import (
 from olp.program.rs274.offsets import Offsets
 from olp.program.rs274.profiles.base import increment
 from olp.program.rs274.state import KNOWN_BY, NAN, Capture, State
+from olp.program.rs274.tool_tables import check_tool, writes_tool
 from olp.program.rs274.turned import Turning, along_words
 
 #: L of a G10 that stores the present position.
@@ -217,6 +218,9 @@ class OffsetState(State):
         self, line: int, by_letter: dict[str, Word], axis_words: list[tuple[int, Word]], moves: int
     ) -> None:
         kind = round(by_letter["L"].value) if "L" in by_letter else -1
+        if writes_tool(self, kind) and {"P", "R"} <= by_letter.keys():
+            check_tool(self, kind, self._integer(by_letter["P"], line), self.length_mm(by_letter["R"]), line)
+            return
         if kind not in (2, STORES_POSITION):
             what = f"G10 L{kind}" if kind >= 0 else "G10 without L"
             raise ProgramError(

@@ -58,6 +58,11 @@ READINGS: dict[str, tuple[str, dict[str, Outcome], Any]] = {
         dict.fromkeys((FANUC, HAAS, MAZAK, SIEMENS, MACH4), (1, 8, 9)),
         "not",
     ),
+    "g10_tools": (
+        "G90 G10 L10 P2 R20.\nG10 L11 P2 R0.\nG43 H2\nG0 X0. Y0. Z1.",
+        {FANUC: (0, 0, 21), HAAS: (0, 0, 21), MAZAK: "G10 L10 writes tables of the control"},
+        "not",
+    ),
     "offset_words": (
         "G54 P2\nG0 X1. Y2. Z3.",
         {SIEMENS: (8, 10, 12), FANUC: (1, 2, 3)},

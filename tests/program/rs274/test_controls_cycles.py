@@ -117,6 +117,21 @@ def test_synchronous_taps_of_okuma_have_the_strokes_of_its_taps(  # type: ignore
 
 
 @pytest.mark.parametrize(
+    ("synchronous", "mark", "plain"),
+    [("G84.2", "", "G84"), ("G84.3", "", "G74"), ("G84", ",R1", "G84"), ("g 074", " , r 0 (A)", "G74")],
+)
+def test_synchronous_taps_of_mazak_have_the_strokes_of_its_taps(  # type: ignore[no-untyped-def]
+    synchronous: str, mark: str, plain: str, reading
+) -> None:
+    taps = "M3 S500\n{} X10. Y5. R4. Z-8. F1.25{}\nX30.\nG80\n"
+    read = reading(taps.format(synchronous, mark), "mazak")
+    assert path(read) == path(reading(taps.format(plain, ""), "mazak"))
+    for text in ("G1 X5. ,R1 F60.\n", "G84 X5. R4. Z-8. F1. ,R2\n", "(G84) G1 X5. ,R1 F60.\n"):
+        with pytest.raises(ProgramError, match="is not understood"):
+            reading(text, "mazak")
+
+
+@pytest.mark.parametrize(
     ("body", "code", "line", "why"),
     [
         ("G81 X10. R2. Z-5. F100. M53\n", "OLP532", 3, "give G71 with the level"),

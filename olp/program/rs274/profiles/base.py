@@ -80,8 +80,9 @@ class Profile(Dialect):
       100 mm/min all the same.
     - `g52_is_g92`: G52 writes the same offset as G92. `g10_offsets`: the largest P of G10 L2 and L20.
       `g10_adds`: in G91 G10 L2 adds to the offset; None is not known, and refused. `g10_stores`: G10 L20
-      stores the present position, else it writes the offset G54.1 P. `offset_words`: the letter of the number
-      of a work offset beside a code, which the code may go without where it is in `offsets_alone`.
+      stores the present position, else it writes the offset G54.1 P. `g10_tools`: G10 L10 to L13 write the
+      tables of tools. `offset_words`: the letter of the number of a work offset beside a code, which the code
+      may go without where it is in `offsets_alone`.
       `offset_names`: the name of these offsets where it is not that of the code. `turns_offsets`: a work
       offset may be turned about Z, which R of G10 L2 states too. `scales_axes`: G51 takes a factor for each
       axis, too. `scales_by_parameter`: a parameter of the control sets the unit of these factors, which have
@@ -155,6 +156,7 @@ class Profile(Dialect):
     g10_offsets: int = 6
     g10_adds: bool | None = False
     g10_stores: bool = True
+    g10_tools: bool = False
     offset_words: Mapping[int, str] = field(default_factory=lambda: {541: "P", 1540: "P"})
     offset_names: Mapping[int, str] = field(default_factory=dict)
     offsets_alone: frozenset[int] = frozenset()

@@ -20,6 +20,7 @@ DIALECT = replace(
     direction_codes=frozenset({435}),
     direction_words=(b"I", b"J", b"K"),
     plane_codes=frozenset({TILTED, ALIGNED}),
+    g10_tools=True,
     polar=True,
     radius_holds=True,
     scales_axes=True,

@@ -43,6 +43,7 @@ DIALECT = Profile(
         nested_comments=False,
         marks_in_pairs=True,
         unread=pattern(rb"\$[ \t]*-?\d+"),
+        unread_mark=ord("$"),
         longest=252,
     ),
     rules=NGC_RULES,

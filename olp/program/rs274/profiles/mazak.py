@@ -1,7 +1,8 @@
 """Mazak mills, EIA/ISO programs.
 
 Differs from Fanuc: `T1 T2 M6` changes to the first tool and makes the second one ready. G5 is a high-speed
-mode and no spline. G61.1 keeps shapes and does not stop between blocks.
+mode and no spline. G84.2 and G84.3 are synchronous taps, as is G84 with `,R1`. G61.1 keeps shapes and does
+not stop between blocks.
 
 Source: programming manuals "EIA/ISO program" of Mazatrol Matrix and Smooth controls.
 """
@@ -10,9 +11,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from olp.core.patterns import pattern
 from olp.program.rs274.profiles.base import Act, g_codes
 from olp.program.rs274.profiles.iso import ISO, ISO_EXTRA, ISO_UNCHANGED
 
+#: `,R0` and `,R1` of a tap: whether spindle and feed are synchronous.
+_SYNCHRONOUS = pattern(
+    rb"(?im)^[^;(\r\n]*G[ \t]*0*(?:84|74)(?:\.[23])?(?![\d.])[^;(,\r\n]*(,[ \t]*R[ \t]*[01](?![\d.]))"
+)
 #: Scaling and rotation take other words than those of Fanuc.
 _OWN = dict.fromkeys((510, 680), Act.REFUSE) | dict.fromkeys((50, 500, 690), Act.UNCHANGED)
 
@@ -21,6 +27,9 @@ DIALECT = replace(
     name="mazak",
     title="Mazak mills, EIA/ISO programs",
     codes=g_codes(unchanged={*ISO_UNCHANGED, 611}, extra={**ISO_EXTRA, **_OWN}),
+    # synchronous taps
+    aliases={842: 840, 843: 740},
+    text=replace(ISO.text, unread=_SYNCHRONOUS, unread_mark=ord(",")),
     refusals={
         **ISO.refusals,
         921: "G92.1 presets offsets that are not known off line",
