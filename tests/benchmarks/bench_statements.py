@@ -1,4 +1,4 @@
-"""CPU time of `olp correct` on one path as G-code, APT, DMIS, a list and Kawasaki AS, in one run.
+"""CPU time of `olp correct` on one path as G-code and in six other languages, in one run.
 
     python tests/benchmarks/bench_statements.py [points]
 
@@ -40,6 +40,21 @@ def posted(points: np.ndarray, rapid: np.ndarray, dialect: str) -> bytes:
             for (x, y, z), fast in zip(points.tolist(), rapid.tolist(), strict=True)
         ]
         return "\n".join([".PROGRAM raster()", *moves, ".END", ""]).encode()
+    if dialect in ("heidenhain", "sinumerik"):
+        sign, name = ("+", "L ") if dialect == "heidenhain" else ("", "")
+        form = f"{name}X{{:{sign}.4f}} Y{{:{sign}.4f}} Z{{:{sign}.4f}}"
+        form = form if name else form.replace("X", "X=").replace("Y", "Y=").replace("Z", "Z=")
+        moves = [form.format(*point) for point in points.tolist()]
+        changed = np.flatnonzero(np.diff(rapid.astype(int), prepend=2)).tolist()
+        for k in np.flatnonzero(rapid).tolist() if name else ():
+            moves[k] += " R0 FMAX"
+        for k in changed if not name else ():
+            moves[k] = f"G{int(not rapid[k])} {moves[k]}"
+        heads = {
+            "L ": ["BEGIN PGM R MM", "TOOL CALL 1 Z S1", "F1200"],
+            "": ["%_N_R_MPF", "G71 G90 T1 M6", "F1200"],
+        }
+        return "\n".join([*heads[name], *moves, "END PGM R MM" if name else "M30", ""]).encode()
     goto = [f"GOTO/{x:.4f},{y:.4f},{z:.4f}" for x, y, z in points.tolist()]
     if dialect == "dmis":
         return "\n".join(["DMISMN/'BENCH',05.2", "UNITS/MM,ANGDEC", *goto, "ENDFIL", ""]).encode()
@@ -96,7 +111,8 @@ def main() -> None:
         tip = path.end_mm[whole] - np.array([f.length_mm for f in path.frames])[path.frame[whole]]
         rapid = path.kind[whole] == Kind.RAPID
         files = [gcode]
-        for dialect, ending in (("apt", "apt"), ("dmis", "dmi"), ("list", "csv"), ("kawasaki-as", "as")):
+        for dialect, ending in (("apt", "apt"), ("dmis", "dmi"), ("list", "csv"), ("kawasaki-as", "as"),
+                                ("heidenhain", "h"), ("sinumerik", "mpf")):  # fmt: skip
             files.append(folder / f"raster.{ending}")
             files[-1].write_bytes(posted(tip, rapid, dialect))
         first = 0.0
