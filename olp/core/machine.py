@@ -158,7 +158,8 @@ class Machine:
     M6 may move. `home_mm`, `second_home_mm` and `tool_change_mm` are the axis positions where G28, G30 and M6
     leave the axes that they move, None where it is not known. `scaling_unit` is what 1 of a factor of G51 is,
     None where it is not stated. `located` says whether positions in machine coordinates are known; where they
-    are not, only distances are. `assumed`: nothing names the controller.
+    are not, only distances are. `assumed`: nothing names the controller. `arm`: it is an arm, whose programs
+    may state its joints.
     """
 
     name: str
@@ -191,6 +192,7 @@ class Machine:
     sanity: Sanity = Sanity()
     located: bool = True
     assumed: bool = False
+    arm: bool = False
 
     @property
     def least_increment_mm(self) -> Vector:

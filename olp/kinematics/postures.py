@@ -86,8 +86,9 @@ class Arm:
         return values
 
     def branches(self, axes: Array) -> Array:
-        """(..., 3) what tells postures apart: mm, mm and deg of the bend. They are positive where the centre
-        of the wrist is before the first axis, before the lower arm, and where the fifth axis is positive."""
+        """(..., 4) what tells postures apart: mm, mm and twice deg of the bend. They are positive where the
+        centre of the wrist is before the first axis, before the lower arm, where the fifth axis is positive,
+        and where it turns as a positive second axis does."""
         shape = axes.shape[:-1]
         values = np.radians(axes.reshape(-1, AXES)[:, self.columns])
         up = self.direction[0]
@@ -100,7 +101,9 @@ class Arm:
         place = self.point[1] + lower + upper - self.point[0]
         size = max(float(np.linalg.norm(self.point[2] - self.point[1])), _STRAIGHT)
         before = np.cross(lower, upper) @ np.cross(up, ahead) / size
-        return np.stack((place @ ahead, before, np.degrees(values[:, 4])), axis=1).reshape(*shape, 3)
+        bend = np.degrees(values[:, 4])
+        alike = np.where(self.direction[4] @ self.direction[1] < 0.0, -1.0, 1.0)
+        return np.stack((place @ ahead, before, bend, alike * bend), axis=1).reshape(*shape, 4)
 
     def _turn(self, axis: int, angle_rad: Array) -> Array:
         return axis_rotation(self.direction[axis], angle_rad)

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import re
-import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 from judge import rapid
 from judge.arm import Arm, between, quaternion, turned_by
+from judge.arm_files import MACHINE, ZEROS, arm_files
 
 import olp
 from olp.core.errors import ProgramError
 
-MACHINE = Path(__file__).resolve().parents[2] / "programs" / "arm-payload" / "machine.toml"
-ZEROS = (300.0, 420.0, -510.0, 600.0, -380.0, 250.0)
 #: The tool at the flange, and the work object.
 LEVER, TOOL = np.array([10.0, -5.0, 160.0]), [0.996194698, 0, 0.087155743, 0]
 ORIGIN, TURN = np.array([705.0, -94.0, 507.0]), [0.965925826, 0, 0, 0.258819045]
@@ -24,17 +22,6 @@ PERS tooldata spindle:=[TRUE,[{LEVER.tolist()},{TOOL}],[1,[0,0,1],[1,0,0,0],0,0,
 PERS wobjdata part:=[FALSE,TRUE,"",[{ORIGIN.tolist()},{TURN}],[[0,0,0],[1,0,0,0]]];
 """
 WORDS = ",v100,z10,spindle\\WObj:=part;"
-
-
-def arm_files(folder: Path, zeros: tuple[float, ...] = ZEROS) -> Path:
-    """The arm of the shipped job with wrong zeros of its joints alone."""
-    shutil.copy(MACHINE, folder)
-    tables = [f"[location.J{k + 1}]\nzero_urad = {zero}\n" for k, zero in enumerate(zeros)]
-    box = ", ".join(f"J{k}_deg = [-400, 400]" for k in range(1, 7))
-    head = MACHINE.with_name("calibration.toml").read_text("utf-8").partition("box =")[0]
-    text = f"{head}box = {{ {box} }}\n" + "".join(tables)
-    (folder / "calibration.toml").write_text(text, "utf-8")
-    return folder / "machine.toml"
 
 
 def target(joints: np.ndarray, digits: int = 3) -> str:

@@ -2,31 +2,29 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from olp.compensation.joints.arm_postures import Settled, Wanted, led, nearest, straight_wrist
 from olp.compensation.joints.curves import Curves
 from olp.compensation.joints.directed import Directions
 from olp.compensation.joints.drilled import Drilled
 from olp.compensation.joints.motion import Motion
 from olp.compensation.joints.path import JointPath
-from olp.core.arrays import Array, Index
+from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import ProgramError
+from olp.core.machine import Vector
 from olp.core.values import dataclass
 from olp.kinematics.errors import MachineErrors
-from olp.kinematics.poses import Poses, rotation_vector, rotations, turned
-from olp.kinematics.postures import AXES, Arm
+from olp.kinematics.poses import Poses, turned
+from olp.kinematics.postures import AXES, POSTURES, Arm
 from olp.kinematics.structure import Structure
 from olp.program.program import Program
 from olp.program.robots.dialect import RobotDialect
-from olp.program.robots.poses import Pose, matrix
-from olp.program.robots.targets import Targets, Use
+from olp.program.robots.poses import Pose, matrices, matrix
+from olp.program.robots.targets import Target, Use
 
-#: A straight move whose axes turn by more than this is followed in steps, deg.
-_FAR_DEG = 30.0
-#: Steps of such a move.
-_STEPS = 32
-#: deg; postures nearer to each other are one, such as where an arm is stretched out
-_SAME_DEG = 1e-4
 #: Decimals that stand for the axis values, which no text has.
 _DECIMALS = 6
 #: External axes that are not there have at least this.
@@ -48,11 +46,11 @@ class ArmPath(JointPath):
         assert arm is not None
         ends = [self.motion.nominal(axes[rows], tool) for axes in (start, end)]
         levers = np.array([machine.tool_mm for machine in self.motion.machines])[tool]
-        flange = _flange(_led(ends[0], ends[1], share[rows]), levers)
-        found = _nearest(place[rows], arm.postures(flange))
+        flange = _flange(led(ends[0], ends[1], share[rows]), levers)
+        found = nearest(place[rows], arm.postures(flange))
         lost = np.flatnonzero(np.isnan(found).any(axis=1))
         if lost.size:
-            raise _straight_wrist(int(self.line[move[rows[lost[0]]]]))
+            raise straight_wrist(int(self.line[move[rows[lost[0]]]]))
         place[rows] = found
         return place
 
@@ -64,211 +62,120 @@ def arm_path(program: Program, structure: Structure, errors: MachineErrors, star
     assert arm is not None
     assert targets is not None
     assert isinstance(dialect, RobotDialect)
-    count, uses = len(targets.uses), targets.uses
-    line = program.toolpath.line.tolist()
-    _refuse_unread(program, targets, dialect.outer_from, line)
+    count, uses, path = len(targets.uses), targets.uses, program.toolpath
     known = np.array([use is not None for use in uses], bool)
     rows = np.flatnonzero(known)
-    stated = [use for use in uses if use is not None]
-    levers = [(use.tool or Pose()).origin_mm for use in stated]
-    tools = list(dict.fromkeys(levers)) or [(0.0, 0.0, 0.0)]
+    used = Used([use for use in uses if use is not None], targets.targets, path.line[rows].astype(np.int64))
+    touched = np.array([frame.touched is not None for frame in path.frames] or [False])[path.frame[rows]]
+    used.refuse_unread(touched, [path.frames[k].work_offset for k in path.frame[rows].tolist()])
+    levers = [(use.tool or Pose()).origin_mm for use in used.uses]
+    places = {lever: place for place, lever in enumerate(dict.fromkeys([*levers, (0.0, 0.0, 0.0)]))}
     tool = np.zeros(count, np.int64)
-    tool[rows] = [tools.index(lever) for lever in levers]
-    tips = [tip_of(program, targets, int(row)) for row in rows]
-    flange = Poses(
-        np.array([matrix(tip.turn) @ matrix(use.tool.turn).T if use.tool else matrix(tip.turn)
-                  for tip, use in zip(tips, stated, strict=True)]).reshape(-1, 3, 3),
-        np.array([tip.origin_mm for tip in tips]).reshape(-1, 3),
-    )  # fmt: skip
-    flange = _flange(flange, np.array(levers).reshape(-1, 3))
-    end = np.full((count, AXES), np.nan)
+    tool[rows] = [places[lever] for lever in levers]
+    motion = Motion.of(structure, errors, [(lever, None) for lever in places])
+    unit = np.array([frame.unit_mm for frame in path.frames] or [1.0])[path.frame[rows]]
+    joints = used.joints(arm)
+    flange = used.flange(unit, levers)
+    stated = np.isfinite(joints[:, 0])
+    own = motion.nominal(joints[stated], tool[rows][stated])
+    flange.rotation[stated], flange.position[stated] = own.rotation, own.position
+    postures = np.full((len(rows), POSTURES, AXES), np.nan)
+    postures[~stated] = arm.postures(Poses(flange.rotation[~stated], flange.position[~stated]))
     travel = np.array([joint.travel for joint in structure.joints.values()]).T
-    settled = _Settled(arm, dialect, targets, stated, flange, travel)
-    end[rows] = settled.axes(np.array(line)[rows], rows, start_deg)
-    feed = np.array([use is not None and use.straight for use in uses], bool)
+    straight = used.mask("straight")
+    config = used.config()
+    values, fits = dialect.fitting(config, postures, arm.branches(postures))
+    wanted = Wanted(
+        flange, joints, values, fits, straight, used.mask("free"),
+        np.isnan(config).any(axis=1) | (config.shape[1] == 0), rows != np.append(-1, rows[:-1]) + 1,
+        used.line,
+    )  # fmt: skip
+    end = np.full((count, AXES), np.nan)
+    end[rows] = Settled(arm, wanted, postures, travel).axes(start_deg)
+    feed, whole, none = np.zeros(count, bool), np.zeros(count, bool), np.zeros(count, bool)
+    feed[rows], whole[rows] = straight, used.mask("whole")
     start = np.vstack((np.full((1, AXES), np.nan), end[:-1]))[:count]
     feed &= np.isfinite(start).all(axis=1)
-    none = np.zeros(count, bool)
     return ArmPath(
-        program, Motion.of(structure, errors, [(vector, None) for vector in tools]), start, end,
-        np.full((count, AXES), -1, np.int32), tool, none, none, np.zeros((count, 3)),
-        np.zeros((count, AXES)), np.ones(count), np.ones(AXES), feed, known, ~known, none, none,
-        np.full(AXES, _DECIMALS), Drilled.none(count), Directions.none(count), Curves.none(count),
+        program, motion, start, end, np.full((count, AXES), -1, np.int32), tool, none, none,
+        np.zeros((count, 3)), np.zeros((count, AXES)), np.ones(count), np.ones(AXES), feed, known, ~known,
+        none, none, np.full(AXES, _DECIMALS), replace(Drilled.none(count), whole=whole),
+        Directions.none(count), Curves.none(count),
     )  # fmt: skip
 
 
-def tip_of(program: Program, targets: Targets, row: int) -> Pose:
-    """Where a move brings the tip, in machine coordinates."""
-    use = targets.uses[row]
-    assert use is not None
-    unit = program.toolpath.frames[int(program.toolpath.frame[row])].unit_mm
-    point = targets.targets[use.target].point
-    x, y, z = (unit * value + shift for value, shift in zip(point, use.shift_mm, strict=True))
-    return use.frame.then(Pose((x, y, z), use.turn))
+@dataclass(frozen=True, slots=True, eq=False)
+class Used:
+    """Moves (n,) to targets in their order, with their lines, as columns."""
 
+    uses: list[Use]
+    targets: tuple[Target, ...]
+    line: Index
 
-def _refuse_unread(program: Program, targets: Targets, outer_from: int, lines: list[int]) -> None:
-    """Raises ProgramError for tools and frames that do not say where the flange is, and external axes."""
-    frames = program.toolpath.frames
-    for use, line, frame in zip(targets.uses, lines, program.toolpath.frame.tolist(), strict=True):
-        if use is None:
-            continue
-        if use.tool is None:
-            raise ProgramError(
-                "on an arm the tool is a frame with its own directions, and the program does not state it; "
-                "expected a tool with its numbers in the program",
-                line=line,
-                code="OLP521",
-            )
-        if frames[frame].touched is not None:
-            raise ProgramError(
-                f"{frames[frame].work_offset} was set by touching, which is not read on arms; expected "
-                'set_by = "true"',
-                line=line,
-                code="OLP523",
-            )
-        outer = targets.targets[use.target].rest[outer_from:]
-        if any(value != 0.0 and abs(value) < _ABSENT for value in outer):
-            raise ProgramError(
-                "an external axis is not at zero, and the machine file of this arm has none; leave it out, "
-                "or correct the program at zero",
-                line=line,
-                code="OLP563",
-            )
+    def mask(self, name: str) -> Mask:
+        """(n,) a yes or no of each use."""
+        return np.array([getattr(use, name) for use in self.uses], bool)
 
+    def of(self, name: str) -> list[tuple[float, ...]]:
+        """What the targets say, one tuple a move."""
+        return [getattr(self.targets[use.target], name) for use in self.uses]
 
-class _Settled:
-    """Which posture each target is reached with: near the one before where the move is straight, else the one
-    that the words of the target name."""
-
-    def __init__(
-        self, arm: Arm, dialect: RobotDialect, targets: Targets, uses: list[Use], flange: Poses,
-        travel: Array,
-    ) -> None:  # fmt: skip
-        self.arm, self.uses, self.flange, self.travel = arm, uses, flange, travel
-        self.postures = arm.postures(flange)
-        self.rest = [targets.targets[use.target].rest for use in uses]
-        self.named = np.zeros((0, 8, AXES)), np.zeros((0, 8), bool)
-        if uses:
-            rest = np.array(self.rest, float)
-            values, fits = dialect.fitting(rest, self.postures, arm.branches(self.postures))
-            beyond = (values < travel[0]) | (values > travel[1])
-            self.named = values, fits & ~beyond.any(axis=2)
-
-    def axes(self, line: Index, rows: Index, start_deg: Array) -> Array:
-        """(n, 6) axis values of all targets."""
-        values, last, before, lost = np.empty((len(self.uses), AXES)), start_deg, -1, False
-        refusals: list[ProgramError] = []
-        for k, row in enumerate(rows.tolist()):
-            if row != before + 1:
-                last, lost = np.full(AXES, np.nan), False
-            before = row
-            try:
-                last = values[k] = self._of(k, last, int(line[k]))
-                lost = False
-            except ProgramError as error:
-                # where the posture before is not known, this one is not, too
-                if not (lost and self._follows(k)):
-                    refusals.append(error)
-                last, lost = np.full(AXES, np.nan), True
-        if refusals:
-            raise ProgramError.together(iter(refusals))
+    def joints(self, arm: Arm) -> Array:
+        """(n, 6) axis values that targets state, NaN where they state poses."""
+        values = np.full((len(self.uses), AXES), np.nan)
+        for k, stated in enumerate(self.of("joints")):
+            if stated:
+                values[k, arm.columns] = stated
         return values
 
-    def _of(self, k: int, last: Array, line: int) -> Array:
-        if np.isnan(self.postures[k, :, 0]).all():
-            raise _refused("no posture of this arm reaches this target", line)
-        if self._follows(k) and np.isfinite(last).all():
-            straight, postures = self.uses[k].straight, self.postures[k]
-            if not straight:
-                postures = self._within(postures, last)
-            found: Array = _nearest(last[None], postures[None])[0]
-            if not straight:
-                found = found + 360.0 * ((found < self.travel[0]) * 1.0 - (found > self.travel[1]))
-            if straight and np.nanmax(np.abs(found - last)) > _FAR_DEG and k:
-                found = self._followed(k, last)
-        else:
-            found = self._named(k, line)
-        if np.isnan(found).all():
-            raise _refused("no posture within the travel of the axes leads on to this target", line)
-        if np.isnan(found).any():
-            raise _straight_wrist(line)
-        return found
+    def config(self) -> Array:
+        """(n, k) the words that name postures; NaN where one is not stated."""
+        own = self.of("config")
+        width = max((len(words) for words in own), default=0)
+        blank = (np.nan,) * width
+        return np.array([words or blank for words in own], float).reshape(len(own), width)
 
-    def _follows(self, k: int) -> bool:
-        """Whether a target is reached with a posture near the one before."""
-        return self.uses[k].straight or self.uses[k].free
+    def flange(self, unit_mm: Array, levers: list[Vector]) -> Poses:
+        """(n) where the flange is at each target, with `levers` from there to the tips."""
+        uses = self.uses
+        point = np.array(self.of("point")).reshape(-1, 3) * unit_mm[:, None]
+        point += np.array([use.shift_mm for use in uses]).reshape(-1, 3)
+        frames = {use.frame: k for k, use in enumerate(uses)}
+        number = {frame: k for k, frame in enumerate(frames)}
+        of = np.array([number[use.frame] for use in uses], np.int64)
+        turns = np.array([matrix(frame.turn) for frame in frames]).reshape(-1, 3, 3)[of]
+        origin = np.array([frame.origin_mm for frame in frames]).reshape(-1, 3)[of]
+        tools = {use.tool: matrix(use.tool.turn).T for use in uses if use.tool is not None}
+        rotation = turns @ matrices(np.array([use.turn for use in uses]).reshape(-1, 4))
+        held = np.array([tools.get(use.tool, np.eye(3)) for use in uses]).reshape(-1, 3, 3)  # type: ignore[arg-type]
+        tips = Poses(rotation @ held, origin + turned(turns, point))
+        return _flange(tips, np.array(levers).reshape(-1, 3))
 
-    def _within(self, postures: Array, last: Array) -> Array:
-        """Those of postures (8, 6) that are within travel, perhaps by a turn; NaN in place of others."""
-        near = last + (postures - last + 180.0) % 360.0 - 180.0
-        near = near + 360.0 * ((near < self.travel[0]) * 1.0 - (near > self.travel[1]))
-        beyond = ((near < self.travel[0]) | (near > self.travel[1])).any(axis=1)
-        return np.where(beyond[:, None], np.nan, postures)
-
-    def _followed(self, k: int, last: Array) -> Array:
-        """The posture at the end of a long straight move, followed step by step."""
-        share = np.arange(1, _STEPS + 1) / _STEPS
-        ends = [
-            Poses(self.flange.rotation[[j] * _STEPS], self.flange.position[[j] * _STEPS]) for j in (k - 1, k)
-        ]
-        for postures in self.arm.postures(_led(ends[0], ends[1], share)):
-            last = _nearest(last[None], postures[None])[0]
-        return last
-
-    def _named(self, k: int, line: int) -> Array:
-        """The posture that the words of a target name."""
-        values, fits = self.named[0][k], self.named[1][k]
-        found: list[Array] = []
-        for value in values[fits]:
-            if all(np.nanmax(np.abs(value - other)) > _SAME_DEG for other in found):
-                found.append(value)
-        if not found and self.uses[k].free:
-            raise _refused(
-                "no posture of this target is the one that its configuration names, and the control is told "
-                "not to look at that; state start_deg in the job file, where the arm is before it",
-                line,
-            )
-        if not found:
-            raise _refused(
-                "no posture that reaches this target within the travel of the axes is the one that its "
-                "configuration names; check the directions of the axes in the machine file",
-                line,
-            )
-        if len(found) > 1:
-            raise _refused("the configuration of this target names several postures", line)
-        return found[0]
-
-
-def _refused(what: str, line: int) -> ProgramError:
-    return ProgramError(what, line=line, code="OLP566")
-
-
-def _straight_wrist(line: int) -> ProgramError:
-    return _refused(
-        "the wrist is straight here, so how two of its axes share a turn is not stated; move the target, or "
-        "turn it",
-        line,
-    )
-
-
-def _nearest(near: Array, postures: Array) -> Array:
-    """(n, 6) those of postures (n, 8, 6) that are nearest to axis values, with the turns of these."""
-    away = (postures - near[:, None] + 180.0) % 360.0 - 180.0
-    size = np.where(np.isnan(postures[:, :, 0]), np.inf, 0.0)
-    size = size + np.nanmax(np.where(np.isnan(away), 0.0, np.abs(away)), axis=2)
-    best = np.argmin(size, axis=1)
-    row = np.arange(len(near))
-    found = near + away[row, best]
-    found[np.isinf(size[row, best])] = np.nan
-    return np.asarray(found)
-
-
-def _led(begin: Poses, end: Poses, share: Array) -> Poses:
-    """Poses at shares of ways: evenly along lines, and evenly turned."""
-    way = rotation_vector(end.rotation @ np.swapaxes(begin.rotation, -1, -2))
-    turn = rotations(share[:, None] * way)
-    return Poses(turn @ begin.rotation, begin.position + share[:, None] * (end.position - begin.position))
+    def refuse_unread(self, touched: Mask, frames: list[str]) -> None:
+        """Raises ProgramError for tools and frames that do not say where the flange is, and external axes.
+        `touched` (n,) are targets in `frames` that were set by touching."""
+        for k, use in enumerate(self.uses):
+            line, target = int(self.line[k]), self.targets[use.target]
+            if use.tool is None:
+                raise ProgramError(
+                    "on an arm the tool is a frame with its own directions, and the program does not state "
+                    "it; expected a tool with its numbers in the program",
+                    line=line,
+                    code="OLP521",
+                )
+            if touched[k] and not target.joints:
+                raise ProgramError(
+                    f'{frames[k]} was set by touching, which is not read on arms; expected set_by = "true"',
+                    line=line,
+                    code="OLP523",
+                )
+            if any(value != 0.0 and abs(value) < _ABSENT for value in target.outer):
+                raise ProgramError(
+                    "an external axis is not at zero, and the machine file of this arm has none; leave it "
+                    "out, or correct the program at zero",
+                    line=line,
+                    code="OLP563",
+                )
 
 
 def _flange(tips: Poses, levers: Array) -> Poses:

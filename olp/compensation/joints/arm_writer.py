@@ -28,7 +28,7 @@ from olp.program.robots.poses import (
     of_vector,
     rotated,
 )
-from olp.program.robots.targets import NOWHERE, Part, Target, Use
+from olp.program.robots.targets import NOWHERE, Part, Span, Target, Use
 from olp.program.text.numbers import MOST_DECIMALS, number, spliced, written
 
 #: A number that is nearer to what is wanted than this share of its last digit is right.
@@ -87,13 +87,17 @@ class _Writer:
         tool = self.path.tool[plan.move[rows]]
         poses = self.path.motion.nominal(plan.command[rows], tool)
         turns = rotation_vector(poses.rotation)
-        self._keep_branches(rows)
+        in_joints = np.array([bool(self._target_of(row).joints) for row in rows.tolist()], bool)
+        self._keep_branches(rows[~in_joints])
         by_target: dict[int, list[tuple[int, _Wanted]]] = {}
         edits: list[Replacement] = []
         for k, row in enumerate(rows.tolist()):
+            use = self._use(row)
+            if in_joints[k]:
+                by_target.setdefault(use.target, []).append((row, self._wanted_joints(row)))
+                continue
             x, y, z = poses.position[k].tolist()
             tip = Pose((x, y, z), of_vector(turns[k].tolist()))
-            use = self._use(row)
             tip = Pose(tip.origin_mm, multiplied(tip.turn, (use.tool or Pose()).turn))
             if last[row]:
                 wanted = self._wanted(row, tip, shifted=True)
@@ -109,6 +113,9 @@ class _Writer:
         if blocks:
             edits += self.dialect.counted(self.program, blocks)
         return WrittenJoints(spliced(self.program.data, edits), self.tally, parts)
+
+    def _target_of(self, row: int) -> Target:
+        return self.targets.targets[self._use(row).target]
 
     def _use(self, row: int) -> Use:
         use = self.targets.uses[int(self.plan.move[row])]
@@ -139,48 +146,68 @@ class _Writer:
         back = inverted(use.frame.turn)
         away = [a - b for a, b in zip(tip.origin_mm, use.frame.origin_mm, strict=True)]
         place, turn, shift = rotated(back, away), multiplied(back, tip.turn), (0.0, 0.0, 0.0)
-        own = use.turn
         if shifted:
             turn = multiplied(turn, multiplied(inverted(use.turn), target.turn))
-            own = target.turn
             shift = use.shift_mm
             if use.along_tool:
                 shift = rotated(turn, rotated(inverted(target.turn), shift))
         unit = self._unit(move)
         point = [(a - b) / unit for a, b in zip(place, shift, strict=True)]
-        numbers = (*point, *self.dialect.turn_values(turn, own))
+        numbers = (*point, *self.dialect.turn_values(turn, self._numbers(target.turned)))
         return self._in_digits(row, target, numbers, angle_between(turn, target.turn))
+
+    def _numbers(self, spans: tuple[Span, ...]) -> list[float]:
+        return [float(self.program.data[a:b]) for a, b in spans]
 
     def _unit(self, move: int) -> float:
         toolpath = self.program.toolpath
         return toolpath.frames[int(toolpath.frame[move])].unit_mm
 
+    def _wanted_joints(self, row: int) -> _Wanted:
+        """The numbers of a target that states joints."""
+        unit, target = self.dialect.joint_unit_deg, self._target_of(row)
+        numbers = self.plan.command[row][self.arm.columns] / unit
+        made = [
+            self._written(span, value, self.dialect.joint_decimals)
+            for span, value in zip((*target.numbers, *target.turned), numbers.tolist(), strict=True)
+        ]
+        values, digits, texts = zip(*made, strict=True)
+        return _Wanted(values, digits, texts, ())
+
     def _in_digits(self, row: int, target: Target, numbers: tuple[float, ...], turned_rad: float) -> _Wanted:
         """Numbers as they are written: those that are right to their last digit keep their bytes."""
-        data, values, digits, texts = self.program.data, [], [], []
+        dialect, values, digits, texts = self.dialect, [], [], []
         for k, (span, value) in enumerate(zip((*target.numbers, *target.turned), numbers, strict=True)):
-            text = data[slice(*span)]
-            form = number(text)
-            if form is None or form.letter:
-                form = number(b"0.0")
-                assert form is not None
-            fewest = self.dialect.turn_decimals if k > 2 else self.dialect.decimals
-            decimals = min(max(fewest, form.decimals), MOST_DECIMALS)
-            digit = 10.0**-decimals
-            near = abs(float(text) - value) <= max(_RIGHT * digit, _COMPUTED)
-            if k > 2:
-                unit = self.dialect.turn_unit_rad
-                near = turned_rad <= max(_RIGHT * digit * unit, _COMPUTED)
-            values.append(float(text) if near else value)
-            digits.append(max(digit, _COMPUTED))
-            texts.append(text if near else written(form, value, decimals))
+            fewest = dialect.turn_decimals if k > 2 else dialect.decimals
+            off = None if k < 3 else turned_rad / dialect.turn_unit_rad
+            own, digit, text = self._written(span, value, fewest, off)
+            values.append(own)
+            digits.append(digit)
+            texts.append(text)
         return _Wanted(tuple(values), tuple(digits), tuple(texts), self._turns(row, target))
+
+    def _written(
+        self, span: Span, value: float, fewest: int, off: float | None = None
+    ) -> tuple[float, float, bytes]:
+        """The value of a number, its last digit, and how it is written in place of another one, which is
+        `off` by so much."""
+        text = self.program.data[slice(*span)]
+        form = number(text)
+        if form is None or form.letter:
+            form = number(b"0.0")
+            assert form is not None
+        decimals = min(max(fewest, form.decimals), MOST_DECIMALS)
+        digit = 10.0**-decimals
+        off = abs(float(text) - value) if off is None else off
+        if off <= max(_RIGHT * digit, _COMPUTED):
+            return float(text), max(digit, _COMPUTED), text
+        return value, max(digit, _COMPUTED), written(form, value, decimals)
 
     def _turns(self, row: int, target: Target) -> tuple[bytes, ...]:
         if not target.turns:
             return ()
         move = int(self.plan.move[row])
-        new = self.dialect.turns_of(target.rest, self.path.end[move], self.plan.command[row])
+        new = self.dialect.turns_of(target.config, self.path.end[move], self.plan.command[row])
         return tuple(
             self.program.data[slice(*span)] if value is None else str(value).encode()
             for span, value in zip(target.turns, new, strict=True)

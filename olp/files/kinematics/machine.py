@@ -122,6 +122,7 @@ def _arm(file: JointMachineFile, structure: Structure) -> Machine | None:
         tools=tools_of(file.tools),
         default_tool=file.job_defaults.tool,
         default_work_offset=file.job_defaults.work_offset,
+        arm=True,
     )
 
 

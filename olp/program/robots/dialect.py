@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import count
 
+import numpy as np
+
 from olp.core.arrays import Array, Mask
 from olp.core.values import dataclass
 from olp.program.dialect import StatementDialect
@@ -21,14 +23,15 @@ class RobotDialect(StatementDialect):
     """A language of robots. `decimals` are the fewest of a number that is changed. With `names_parts` the
     target of a part of a move needs a name. A name has `longest_name` characters at most; None: any number.
     A statement ends with its line, or where the reader says so. With `for_arms` programs are read on arms,
-    too; `turn_decimals` are the fewest of a number of an orientation, and its unit is `turn_unit_rad`
-    where it has none. In the `rest` of a target external axes begin at `outer_from`."""
+    too; `turn_decimals` are the fewest of a number of an orientation, and its unit is `turn_unit_rad`. Joint
+    values are in units of `joint_unit_deg` and have `joint_decimals` at least."""
 
     decimals: int
     for_arms: bool = False
     turn_decimals: int = 6
     turn_unit_rad: float = 1.0
-    outer_from: int = 0
+    joint_decimals: int = 6
+    joint_unit_deg: float = 1.0
     names_parts: bool = False
     longest_name: int | None = None
 
@@ -57,18 +60,19 @@ class RobotDialect(StatementDialect):
         """The declaration of a target again, under another name and with another value."""
         raise NotImplementedError
 
-    def turn_values(self, turn: Quaternion, near: Quaternion) -> Sequence[float]:
-        """The numbers of an orientation as the language states it, those that are next to another one's."""
+    def turn_values(self, turn: Quaternion, stated: Sequence[float]) -> Sequence[float]:
+        """The numbers of an orientation as the language states it, those that are near `stated` ones."""
         raise NotImplementedError
 
-    def fitting(self, rest: Array, axes: Array, branches: Array) -> tuple[Array, Mask]:
-        """Which postures (n, 8, 6) are those that the `rest` (n, k) of targets names: (n, 8, 6) their axis
-        values with turns, and (n, 8) whether they are. `branches` are (n, 8, 3) as in `Arm.branches`."""
-        raise NotImplementedError
+    def fitting(self, config: Array, axes: Array, branches: Array) -> tuple[Array, Mask]:
+        """Which postures (n, 8, 6) are those that the words (n, k) of targets name: (n, 8, 6) their axis
+        values with turns, and (n, 8) whether they are. A word that is NaN names all. `branches` are
+        (n, 8, 4) as in `Arm.branches`."""
+        return axes, np.isfinite(axes[:, :, 0])
 
-    def turns_of(self, rest: Sequence[float], nominal: Array, corrected: Array) -> list[int | None]:
+    def turns_of(self, config: Sequence[float], nominal: Array, corrected: Array) -> list[int | None]:
         """The numbers of `Target.turns` for corrected axis values (6,); None for one that stays."""
-        raise NotImplementedError
+        return []
 
     def counted(self, program: Program, blocks: int) -> list[Replacement]:
         """Counts of the text, where so many statements were inserted."""

@@ -7,12 +7,12 @@ from dataclasses import replace
 from typing import Any
 
 from olp.core.errors import ProgramError
-from olp.core.machine import Setup, Vector
+from olp.core.machine import ZERO, Setup, Vector
 from olp.core.toolpath import Flag, Kind
 from olp.program.dialect import Dialect, Options
 from olp.program.program import Program
 from olp.program.robots.frames import Located, RobotFrames, Tool
-from olp.program.robots.poses import Quaternion
+from olp.program.robots.poses import NO_TURN, Pose, Quaternion
 from olp.program.robots.targets import NOWHERE, Span, Target, Targets, Use
 from olp.program.verbatim import Moves
 
@@ -52,7 +52,7 @@ class RobotMoves:
     the run of the program."""
 
     def __init__(self, data: bytes, setup: Setup, world: str, unit_mm: float = 1.0) -> None:
-        self.data, self.setup = data, setup
+        self.data, self.setup, self.arm = data, setup, setup.machine.arm
         self.frames = RobotFrames(setup, world, unit_mm)
         self.moves = Moves()
         self.targets: list[Target] = []
@@ -77,14 +77,30 @@ class RobotMoves:
     def target(
         self, line: int, value: Span, numbers: tuple[Span, Span, Span], point: Vector, turn: Quaternion,
         rest: tuple[float, ...], name: str = "", declaration: Span = NOWHERE,
-        turned: tuple[Span, ...] = (), turns: tuple[Span, ...] = (),
+        turned: tuple[Span, ...] = (), turns: tuple[Span, ...] = (), config: tuple[float, ...] = (),
+        outer: tuple[float, ...] = (),
     ) -> int:  # fmt: skip
         """Add a target that the text states; returns its place."""
         first, second, third = (self.moves.number(*span) for span in numbers)
         slots = (first, second, third)
         self.targets.append(
-            Target(line, value, numbers, slots, point, turn, rest, name, declaration, turned, turns)
-        )
+            Target(line, value, numbers, slots, point, turn, rest, name, declaration, turned, turns,
+                   config, outer)
+        )  # fmt: skip
+        return len(self.targets) - 1
+
+    def joint_target(
+        self, line: int, value: Span, numbers: Sequence[Span], degrees: tuple[float, ...],
+        outer: tuple[float, ...] = (), name: str = "", declaration: Span = NOWHERE,
+    ) -> int:  # fmt: skip
+        """Add a target whose six `numbers` are joint values, which `degrees` are; returns its place."""
+        first, second, third, *others = numbers
+        self.targets.append(
+            Target(
+                line, value, (first, second, third), (-1, -1, -1), _NOWHERE, NO_TURN, (), name, declaration,
+                tuple(others), outer=outer, joints=degrees,
+            )
+        )  # fmt: skip
         return len(self.targets) - 1
 
     def move(
@@ -101,7 +117,8 @@ class RobotMoves:
         target = self.targets[use.target]
         end = self.frames.table.frames[index].placed_mm(target.point)
         known = straight and self._turn is not None
-        swings = known and self._swings(index)
+        # an arm is led along the way, however the tool turns
+        swings = known and not self.arm and self._swings(index)
         if swings:
             self.remark("swings", line, "the tool turns on the way: the move is corrected at its end")
         elif straight and not known:
@@ -115,12 +132,33 @@ class RobotMoves:
             slot=target.slots, bounds=use.statement, feed=feed,
         )  # fmt: skip
         first = self._first_turns.setdefault(tool.name, use.turn)
-        if tool.pose is None and first != use.turn:
+        if tool.pose is None and first != use.turn and not self.arm:
             what = f"the orientation changes, and the vector of the tool {tool.name} does not"
             self.remark("turning", line, what, "turning")
         before = use.turn if self._turn is None else self._turn
-        self.uses.append(replace(use, before=before, frame=frame.pose, tool=tool.pose, straight=known))
+        self.uses.append(
+            replace(use, before=before, frame=frame.pose, tool=tool.pose, straight=known, whole=whole)
+        )
         self.known, self._frame, self._turn, self._rest, self._feed = True, index, use.turn, target.rest, feed
+
+    def joint_move(self, line: int, taken: Callable[[], Use | None]) -> None:
+        """Add a move to joint values. Where the machine is no arm, or `taken` finds no numbers in the text,
+        it stays as it is, and where the robot is then is not known."""
+        use = taken() if self.arm else None
+        if use is None:
+            self.known = False
+            self.remark("joints", line, "joint values are kept as written")
+            return
+        if not self.known:
+            self.away(line)
+        flange = Tool("", Pose())
+        self._frame = self.frames.index(self.frames.world, flange, NO_TURN, ZERO, line)
+        self.moves.put(
+            kind=int(Kind.RAPID), flag=int(Flag.CONTROL), line=line, frame=self._frame, end=_NOWHERE,
+            slot=(-1, -1, -1), bounds=NOWHERE, feed=self._feed,
+        )  # fmt: skip
+        self.uses.append(replace(use, tool=flange.pose))
+        self.known, self._turn, self._rest = True, NO_TURN, ()
 
     def away(self, line: int) -> None:
         """The machine may have gone to a position that the text does not state."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import atan2, cos, degrees, hypot, pi, radians, sin
 
 import numpy as np
 
@@ -20,6 +21,8 @@ SAME_TURN = 2e-6
 SAME_PLACE_MM = 1e-6
 #: Two quaternions this near are led from one to the other along a straight line.
 _NEAR = 1.0 - 1e-12
+#: Below this cosine of the second of three angles the first and the third turn alike.
+_UPRIGHT = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,21 +124,47 @@ def of_vector(vector: Sequence[float]) -> Quaternion:
     return (float(np.cos(angle / 2.0)), x * size, y * size, z * size)
 
 
-def vector_of(a: Quaternion) -> Vector:
-    """The vector of a rotation, of half a turn at most."""
+def vector_of(a: Quaternion, near: Vector = ZERO) -> Vector:
+    """The vector of a rotation that is next to another vector."""
     w, x, y, z = a if a[0] >= 0.0 else (-a[0], -a[1], -a[2], -a[3])
     sine = (x * x + y * y + z * z) ** 0.5
-    size = 2.0 if sine == 0.0 else 2.0 * float(np.arctan2(sine, w)) / sine
+    if sine == 0.0:
+        return ZERO if near == ZERO else _whole_turns(near)
+    angle = 2.0 * atan2(sine, w)
+    along = (x * near[0] + y * near[1] + z * near[2]) / sine
+    size = (angle + 2.0 * pi * round((along - angle) / (2.0 * pi))) / sine
     return (x * size, y * size, z * size)
 
 
-def zyx_of(a: Quaternion) -> Vector:
-    """The angles in degrees whose Rz(first) Ry(second) Rx(third) is a rotation."""
-    rows = matrix(a)
-    first, third = np.arctan2(rows[1, 0], rows[0, 0]), np.arctan2(rows[2, 1], rows[2, 2])
-    second = np.arctan2(-rows[2, 0], np.hypot(rows[0, 0], rows[1, 0]))
-    x, y, z = np.degrees([first, second, third]).tolist()
+def _whole_turns(near: Vector) -> Vector:
+    """The vector of no rotation that is next to another vector."""
+    length = sum(v * v for v in near) ** 0.5
+    size = 2.0 * pi * round(length / (2.0 * pi)) / length
+    x, y, z = (v * size for v in near)
     return (x, y, z)
+
+
+def zyx_of(a: Quaternion, first_deg: float = 0.0) -> Vector:
+    """The angles in degrees whose Rz(first) Ry(second) Rx(third) is a rotation. Where the second is a right
+    angle and only two of them are known together, the first is `first_deg`."""
+    (xx, xy, xz), (yx, yy, yz), (zx, _, _) = matrix(a).tolist()
+    first = atan2(yx, xx) if hypot(xx, yx) > _UPRIGHT else radians(first_deg)
+    cosine, sine = cos(first), sin(first)
+    second = atan2(-zx, cosine * xx + sine * yx)
+    # of the rotation that is left, whatever the first angle is
+    third = atan2(sine * xz - cosine * yz, cosine * yy - sine * xy)
+    return (degrees(first), degrees(second), degrees(third))
+
+
+def matrices(turns: Array) -> Array:
+    """(n, 3, 3) rotations (n, 4) as matrices."""
+    w, x, y, z = turns.T
+    rows = (
+        (w * w + x * x - y * y - z * z, 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
+        (2.0 * (x * y + w * z), w * w - x * x + y * y - z * z, 2.0 * (y * z - w * x)),
+        (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w - x * x - y * y + z * z),
+    )
+    return np.moveaxis(np.array(rows), -1, 0)
 
 
 def matrix(a: Quaternion) -> Array:

@@ -17,7 +17,10 @@ class Target:
     """A position as it is stated: the `line`, the bytes of its whole `value`, of its three `numbers`, and
     their `slots`. `turn` is its orientation in its frame, and `rest` what else it states: configuration and
     external axes. One that is declared has a `name`, and `declaration` are the bytes that declare it.
-    `turned` are the bytes of the numbers of its orientation, `turns` those that say how far axes turned."""
+    `turned` are the bytes of the numbers of its orientation, `turns` those that say how far axes turned.
+    `config` are the words that name a posture, NaN where one is not stated, and `outer` the external axes.
+    One in joints has their values in degrees (`joints`), the first three of them in `numbers`, the others in
+    `turned`."""
 
     line: int
     value: Span
@@ -30,6 +33,9 @@ class Target:
     declaration: Span = NOWHERE
     turned: tuple[Span, ...] = ()
     turns: tuple[Span, ...] = ()
+    config: tuple[float, ...] = ()
+    outer: tuple[float, ...] = ()
+    joints: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +47,8 @@ class Use:
     bytes of the three numbers of its shift, empty where it has none, along axes turned by `offset_turn`,
     which are those of the tool where it is `along_tool`. `frame` is the pose of the target's frame in machine
     coordinates, and `tool` that of the tip at the flange, None where the program does not state it. The
-    robot goes `straight` from a known target, or with any posture that is near where it is `free`."""
+    robot goes `straight` from a known target, or with any posture that is near where it is `free`. A move
+    that is `whole` is never split."""
 
     target: int
     statement: Span
@@ -58,6 +65,7 @@ class Use:
     tool: Pose | None = None
     straight: bool = False
     free: bool = False
+    whole: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)

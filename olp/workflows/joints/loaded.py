@@ -35,7 +35,7 @@ from olp.workflows.flatten import UnrollOptions
 from olp.workflows.session import PathLike
 
 #: What is read beside lists on an arm.
-_OF_ROBOTS = ", and RAPID programs"
+_OF_ROBOTS = ", and programs of robots"
 #: The axes that turn a work offset about, in the order of its table.
 _TURNS = "ABC"
 

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from math import radians
+
+from olp.core.arrays import Array, Mask
 from olp.core.errors import ProgramError
 from olp.core.patterns import pattern
 from olp.core.values import dataclass
 from olp.program.program import Program
 from olp.program.robots.dialect import Replacement, RobotDialect
+from olp.program.robots.krl import postures
 from olp.program.robots.krl.data import is_declaration
 from olp.program.robots.krl.reader import read
 from olp.program.robots.krl.table import TABLE
 from olp.program.robots.krl.text import aggregate
-from olp.program.robots.poses import between, zyx_of
+from olp.program.robots.poses import Quaternion, between, zyx_of
 from olp.program.robots.targets import NOWHERE, Part, Target, Use
 from olp.program.text.numbers import spliced
 from olp.program.text.signs import KRL
@@ -19,7 +24,7 @@ from olp.program.text.signs import KRL
 _ROUTINE = pattern(rb"(?im)^[ \t]*(?:GLOBAL[ \t]+)?DEF(?:FCT)?\b[^\r\n]*(?:\r\n|\n|\r|\Z)")
 _HEADER = pattern(rb"(?:\xef\xbb\xbf)?(?:&[^\r\n]*(?:\r\n|\n|\r|\Z))*")
 _WORD = pattern(rb"(?i)(S?)(LIN|PTP)")
-_TYPE = pattern(rb"(?i)((?:(?:GLOBAL|DECL|CONST)\s+)*)(E6POS|E3POS|POS|FRAME)\b")
+_TYPE = pattern(rb"(?i)((?:(?:GLOBAL|DECL|CONST)\s+)*)(E6POS|E3POS|POS|FRAME|E6AXIS|E3AXIS|AXIS)\b")
 #: The words with which a part is passed without a stop.
 _PASSED = {b"LIN": b"C_DIS", b"PTP": b"C_PTP", b"SLIN": b"C_SPL", b"SPTP": b"C_SPL"}
 
@@ -64,13 +69,22 @@ class Krl(RobotDialect):
         place = int(program.line_end[target.line - 1])
         return place, place, program.eol(target.line) + blanks + head[0] + b" " + name.encode() + b"=" + text
 
+    def turn_values(self, turn: Quaternion, stated: Sequence[float]) -> Sequence[float]:
+        return zyx_of(turn, stated[0])
+
+    def fitting(self, config: Array, axes: Array, branches: Array) -> tuple[Array, Mask]:
+        return postures.fitting(config, axes, branches)
+
+    def turns_of(self, config: Sequence[float], nominal: Array, corrected: Array) -> list[int | None]:
+        return postures.turns(config, nominal, corrected)
+
     @staticmethod
     def _value(program: Program, target: Target, part: Part, use: Use) -> bytes:
         """A position with other numbers, and the orientation at the end of a part."""
         start, numbers = target.value[0], aggregate(program.data, target.value)
         assert numbers is not None
         edits = part.renumbered(target)
-        if not (use.before == use.turn == target.turn):
+        if not part.turned and not (use.before == use.turn == target.turn):
             angles = zyx_of(between(use.before, use.turn, part.share))
             for name, angle in zip("ABC", angles, strict=True):
                 a, b = numbers.values[name][0]
@@ -89,5 +103,8 @@ DIALECT = Krl(
     languages=frozenset(("KUKA KRL",)),
     table=TABLE,
     decimals=5,
+    for_arms=True,
+    turn_decimals=6,
+    turn_unit_rad=radians(1.0),
     longest_name=24,
 )

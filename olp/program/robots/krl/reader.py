@@ -19,7 +19,7 @@ from olp.program.robots.krl import flow
 from olp.program.robots.krl.active import Active, State
 from olp.program.robots.krl.data import Declared, assigned, is_declaration, key_of, pose_of
 from olp.program.robots.krl.text import Aggregate, Line, aggregate, lines, parts
-from olp.program.robots.moves import RobotMoves, not_read, take_all
+from olp.program.robots.moves import NAN, RobotMoves, not_read, take_all
 from olp.program.robots.poses import Pose, multiplied, rotated
 from olp.program.robots.targets import NOWHERE, Span, Use
 
@@ -39,6 +39,8 @@ _LEADS = pattern(
 )
 #: Components of a position, and its external axes.
 _PLACE = ("X", "Y", "Z")
+_POSE = (*_PLACE, "A", "B", "C")
+_JOINTS = ("A1", "A2", "A3", "A4", "A5", "A6")
 _OUTER = ("E1", "E2", "E3", "E4", "E5", "E6")
 
 
@@ -190,8 +192,7 @@ class _Reader:
             state = self.active.within(tail[1], tail.start(1), line)
         terms = parts(self.data, target)
         if self._in_joints(terms, line):
-            self.moves.known = False
-            self.moves.remark("joints", line.line, "joint values are kept as written")
+            self.moves.joint_move(line.line, lambda: self._joints(terms[0], tail.span(2), line))
             return
         base = self.active.base(state, line.line)
         use, frame = self._use(line, target, terms, base)
@@ -217,6 +218,28 @@ class _Reader:
             numbers = self._position(name[1], name[2], line)[1]
         return numbers.joints
 
+    def _joints(self, span: Span, zone: Span, line: Line) -> Use | None:
+        """How a move uses joint values; None where the text does not state all six."""
+        numbers, declaration, name = aggregate(self.data, span), line, None
+        if numbers is None:
+            name = _NAME.fullmatch(self.data, *span)
+            assert name is not None
+            if key_of(name[1], name[2]) not in self.declared.values:
+                return None
+            declaration, numbers = self._position(name[1], name[2], line)
+        if not set(_JOINTS) <= set(numbers.values):
+            return None
+        if numbers.span not in self.targets:
+            values = [numbers.values[axis] for axis in _JOINTS]
+            a, b, c, d, e, f = (value for _, value in values)
+            self.targets[numbers.span] = self.moves.joint_target(
+                declaration.line, numbers.span, [own for own, _ in values], (a, b, c, d, e, f),
+                _outer(numbers), "" if name is None else name[1].decode("latin-1"),
+                NOWHERE if name is None else (declaration.begin, declaration.end),
+            )  # fmt: skip
+        named = NOWHERE if name is None else span
+        return Use(self.targets[numbers.span], (line.begin, line.end), span, named, zone=zone)
+
     def _use(self, line: Line, span: Span, terms: list[Span], base: Located) -> tuple[Use, Located]:
         """How a move uses its target, and the frame that this is in. In a product the last term with a name
         is the target; numbers behind it are a shift in it."""
@@ -226,13 +249,13 @@ class _Reader:
         own = terms[-1] if last is None else terms[-2]
         frame = self._frame(base, terms[: terms.index(own)], line)
         index, named = self._target(own, line)
-        turn = self.moves.targets[index].turn
+        turn, place = self.moves.targets[index].turn, (own[0], span[1])
         if last is None:
-            return Use(index, statement, span, named, turn=turn), frame
+            return Use(index, statement, place, named, turn=turn), frame
         x, y, z = (last.values[name][0] for name in _PLACE)
         use = Use(
-            index, statement, span, named, rotated(turn, shift.origin_mm), multiplied(turn, shift.turn),
-            offsets=(x, y, z), offset_turn=turn,
+            index, statement, place, named, rotated(turn, shift.origin_mm), multiplied(turn, shift.turn),
+            offsets=(x, y, z), offset_turn=turn, along_tool=True,
         )  # fmt: skip
         return use, frame
 
@@ -288,12 +311,14 @@ class _Reader:
         if numbers.span not in self.targets:
             what = "the position" if name is None else f"the position {key_of(name[1], name[2])}"
             pose, values = pose_of(numbers, line.line, what), numbers.values
-            x, y, z = (values[axis][0] for axis in _PLACE)
-            outer = tuple(values[axis][1] if axis in values else 0.0 for axis in _OUTER)
+            x, y, z, a, b, c = (values[axis][0] for axis in _POSE)
+            outer = _outer(numbers)
             self.targets[numbers.span] = self.moves.target(
                 declaration.line, numbers.span, (x, y, z), pose.origin_mm, pose.turn, outer,
                 "" if name is None else name[1].decode("latin-1"),
-                NOWHERE if name is None else (declaration.begin, declaration.end),
+                NOWHERE if name is None else (declaration.begin, declaration.end), (a, b, c),
+                (values["T"][0],) if "T" in values else (),
+                tuple(values[word][1] if word in values else NAN for word in "ST"), outer,
             )  # fmt: skip
         return self.targets[numbers.span], NOWHERE if name is None else span
 
@@ -304,3 +329,8 @@ class _Reader:
             line=line.line,
             code="OLP533",
         )
+
+
+def _outer(numbers: Aggregate) -> tuple[float, ...]:
+    """The values of the external axes."""
+    return tuple(numbers.values[axis][1] if axis in numbers.values else 0.0 for axis in _OUTER)

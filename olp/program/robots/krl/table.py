@@ -30,8 +30,9 @@ STILL = frozenset(
 TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"LIN, SLIN": (_C, "a straight move to {...}, a name of one, or a product (:) of them"),
     b"PTP, SPTP": (_C, "corrected at its end; the path of the joints is not judged"),
+    b"S, T": (_C, "on arms: S names the posture, and T is written again where an axis passes zero"),
     b"E6POS, POS, FRAME": (_C, "changed where moves use it, and cloned where they differ"),
-    b"{A1 ...}, E6AXIS": (_R, "joint values, kept as written; the position is unknown until the next target"),
+    b"{A1 ...}, E6AXIS": (_C, "corrected on arms; else kept, and the position behind it is unknown"),
     b"$BASE, $TOOL": (_R, "a number, numbers, $NULLFRAME, or the name of a frame"),
     b"BASE_DATA[n], TOOL_DATA[n]": (_R, "where the text states their numbers; else those of machine or job"),
     b"FDAT_ACT, BAS": (_R, "base and tool of a taught point"),

@@ -109,7 +109,8 @@ class Declared:
             stated = target_of(matches[place], data.statement.line)
             known = self._targets[key] = self.moves.target(
                 data.statement.line, key, stated.spans, stated.point, stated.turn, stated.rest, name,
-                (data.statement.begin, data.statement.end), stated.turned, stated.turns,
+                (data.statement.begin, data.statement.end), stated.turned, stated.turns, stated.config,
+                stated.outer,
             )  # fmt: skip
         return known
 

@@ -62,15 +62,15 @@ class Rapid(RobotDialect):
         place = int(program.line_end[last])
         return place, place, eol + blanks + lead[1] + name.encode() + b":=" + text + b";"
 
-    def turn_values(self, turn: Quaternion, near: Quaternion) -> Sequence[float]:
-        against = sum(a * b for a, b in zip(turn, near, strict=True)) < 0.0
+    def turn_values(self, turn: Quaternion, stated: Sequence[float]) -> Sequence[float]:
+        against = sum(a * b for a, b in zip(turn, stated, strict=True)) < 0.0
         return tuple(-value for value in turn) if against else turn
 
-    def fitting(self, rest: Array, axes: Array, branches: Array) -> tuple[Array, Mask]:
-        return postures.fitting(rest, axes, branches)
+    def fitting(self, config: Array, axes: Array, branches: Array) -> tuple[Array, Mask]:
+        return postures.fitting(config, axes, branches)
 
-    def turns_of(self, rest: Sequence[float], nominal: Array, corrected: Array) -> list[int | None]:
-        return postures.quarters(rest, nominal, corrected)
+    def turns_of(self, config: Sequence[float], nominal: Array, corrected: Array) -> list[int | None]:
+        return postures.quarters(config, nominal, corrected)
 
     @staticmethod
     def _value(program: Program, target: Target, part: Part, use: Use) -> bytes:
@@ -102,6 +102,5 @@ DIALECT = Rapid(
     for_arms=True,
     turn_decimals=9,
     turn_unit_rad=2.0,
-    outer_from=4,
     longest_name=32,
 )

@@ -19,16 +19,16 @@ _BITS = (4, 2, 1)
 _BORDER = 0.01
 
 
-def fitting(rest: Array, axes: Array, branches: Array) -> tuple[Array, Mask]:
+def fitting(config: Array, axes: Array, branches: Array) -> tuple[Array, Mask]:
     """As `RobotDialect.fitting`."""
     values, fits = axes.copy(), np.isfinite(axes[:, :, 0])
     for place, column in enumerate(_STATED):
-        low = _QUARTER_DEG * rest[:, place, None] - _ROUNDING_DEG
+        low = _QUARTER_DEG * config[:, place, None] - _ROUNDING_DEG
         turned = axes[:, :, column] + 360.0 * np.ceil((low - axes[:, :, column]) / 360.0)
         values[:, :, column] = turned
         high = low + _QUARTER_DEG + 2.0 * _ROUNDING_DEG
         fits &= np.isnan(turned) | (turned <= high)
-    number = rest[:, 3].astype(np.int64)
+    number = config[:, 3].astype(np.int64)
     for place, bit in enumerate(_BITS):
         behind = (number & bit != 0)[:, None]
         branch = branches[:, :, place]
@@ -36,11 +36,11 @@ def fitting(rest: Array, axes: Array, branches: Array) -> tuple[Array, Mask]:
     return values, fits
 
 
-def quarters(rest: Sequence[float], nominal: Array, corrected: Array) -> list[int | None]:
+def quarters(config: Sequence[float], nominal: Array, corrected: Array) -> list[int | None]:
     """As `RobotDialect.turns_of`. One that did not say where the axis is stays."""
     found: list[int | None] = []
     for place, column in enumerate(_STATED):
-        own, now = float(rest[place]), float(nominal[column]) / _QUARTER_DEG
+        own, now = float(config[place]), float(nominal[column]) / _QUARTER_DEG
         rounding = _ROUNDING_DEG / _QUARTER_DEG
         says = own - rounding <= now <= own + 1.0 + rounding
         new = int(np.floor(corrected[column] / _QUARTER_DEG))

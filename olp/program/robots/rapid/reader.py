@@ -233,8 +233,8 @@ class _Reader:
         if match is not None and not self.data[match.end() : span[1]].strip():
             stated, value = target_of(match, line), match.span()
             place = self.moves.target(
-                line, value, stated.spans, stated.point, stated.turn, stated.rest,
-                turned=stated.turned, turns=stated.turns,
+                line, value, stated.spans, stated.point, stated.turn, stated.rest, turned=stated.turned,
+                turns=stated.turns, config=stated.config, outer=stated.outer,
             )  # fmt: skip
             return place, NOWHERE
         name = name_of(self.data[slice(*span)])

@@ -60,6 +60,14 @@ class Stated:
     turned: tuple[Span, ...]
     turns: tuple[Span, ...]
 
+    @property
+    def config(self) -> tuple[float, ...]:
+        return self.rest[:4]
+
+    @property
+    def outer(self) -> tuple[float, ...]:
+        return self.rest[4:]
+
 
 def target_of(match: re.Match[bytes], line: int) -> Stated:
     """What a robtarget states. Raises ProgramError where its orientation is none."""

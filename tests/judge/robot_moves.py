@@ -1,0 +1,81 @@
+"""Reads plain programs of robots on arms for tests, by numpy alone: where each move goes, and with which
+words of configuration.
+
+It shares nothing with `olp.program`: one regular expression for a move of each language, and rotations as
+products of turns about single axes (`judge.arm.about`), as the languages define their angles.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from judge.arm import about
+
+X, Y, Z = np.eye(3)
+_NUMBER = re.compile(r"-?\d*\.?\d+(?:[eE][-+]?\d+)?")
+
+
+@dataclass(frozen=True)
+class Move:
+    """A move: straight or not, and the joints in degrees, or the rotation and the place of the tip in the
+    world. `words` are those of the configuration."""
+
+    straight: bool
+    joints: np.ndarray | None
+    turn: np.ndarray = field(default_factory=lambda: np.eye(3))
+    tip: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    words: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Frames:
+    """Frame and tool, as rotations and places: those that the texts of a test state."""
+
+    turn: np.ndarray
+    origin: np.ndarray
+
+    def placed(self, turn: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return self.turn @ turn, self.origin + self.turn @ place
+
+
+def abc(a: float, b: float, c: float) -> np.ndarray:
+    """Turned by A about Z, then by B about the new Y, then by C about the new X."""
+    return about(Z, a) @ about(Y, b) @ about(X, c)
+
+
+def wpr(w: float, p: float, r: float) -> np.ndarray:
+    """Turned by W about the fixed X, then by P about the fixed Y, then by R about the fixed Z."""
+    return about(Z, r) @ about(Y, p) @ about(X, w)
+
+
+def rotvec(vector: np.ndarray) -> np.ndarray:
+    """Turned about the direction of a vector by its length in rad."""
+    size = np.linalg.norm(vector)
+    return np.eye(3) if size == 0 else about(vector / size, np.degrees(size))
+
+
+def _words(text: str) -> dict[str, str]:
+    return dict(re.findall(r"\b([A-Z]\d?) ?=? ?('?[-+.\w]+'?)", text))
+
+
+def krl(text: bytes, frames: Frames) -> list[Move]:
+    """Moves of KRL to positions with names or numbers."""
+    plain = re.sub(r";.*", "", text.decode("latin-1"))
+    named = dict(re.findall(r"(?m)^(?:DECL )?(?:E6POS|E6AXIS) (\w+)=(\{.*\})", plain))
+    found = []
+    for kind, target in re.findall(r"(?m)^\s*(LIN|PTP) ([^{\s]+|\{[^}]*\})", plain):
+        words = _words(named.get(target, target))
+        if "A1" in words:
+            found.append(Move(False, np.array([float(words[f"A{k}"]) for k in range(1, 7)])))
+            continue
+        place = np.array([float(words[name]) for name in "XYZ"])
+        turn, tip = frames.placed(abc(*(float(words[name]) for name in "ABC")), place)
+        found.append(Move(kind == "LIN", None, turn, tip, (words.get("S", ""), words.get("T", ""))))
+    return found
+
+
+READERS: dict[str, Callable[[bytes, Frames], list[Move]]] = {"krl": krl}

@@ -1,0 +1,220 @@
+"""Programs of robots on an arm of six joints, in each language: corrected in position and orientation, as a
+judge of its own says."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from judge.arm import Arm, between, turned_by
+from judge.arm_files import MACHINE, ZEROS, arm_files
+from judge.robot_moves import READERS, Frames, abc
+from scipy.spatial.transform import Rotation
+
+import olp
+from olp.core.errors import ProgramError
+
+#: The tool at the flange, and the frame.
+LEVER, TOOL_DEG = np.array([10.0, -5.0, 160.0]), (0.0, 10.0, 0.0)
+TOOL = abc(*TOOL_DEG)
+FRAME_DEG, ORIGIN = (30.0, 0.0, 0.0), np.array([705.0, -94.0, 507.0])
+FRAMES = Frames(abc(*FRAME_DEG), ORIGIN)
+#: Last digits: mm, and rad.
+DIGITS = {"krl": (1e-5, 2e-8)}
+#: A move: its kind (straight, joints to a pose, joints), and joints in degrees.
+Step = tuple[str, np.ndarray]
+
+
+def local(joints: np.ndarray, digits: int = 4) -> tuple[list[float], np.ndarray]:
+    """Place and rotation of the tip in the frame."""
+    rotation, place = Arm(MACHINE).pose(joints)
+    tip = FRAMES.turn.T @ (place + rotation @ LEVER - ORIGIN)
+    return tip.round(digits).tolist(), FRAMES.turn.T @ rotation @ TOOL
+
+
+def angles(rotation: np.ndarray) -> list[float]:
+    return Rotation.from_matrix(rotation).as_euler("ZYX", degrees=True).round(5).tolist()
+
+
+def krl(steps: list[Step]) -> bytes:
+    """Positions by name and with numbers, one name for two of them, and joints."""
+
+    def pose(joints: np.ndarray) -> str:
+        (x, y, z), (a, b, c) = local(joints)[0], angles(local(joints)[1])
+        turn = sum(1 << k for k in range(6) if joints[k] < 0)
+        return f"{{X {x},Y {y},Z {z},A {a},B {b},C {c},S {2 + 4 * (joints[4] < 0)},T {turn},E1 0.0}}"
+
+    def axes(joints: np.ndarray) -> str:
+        return "{" + ",".join(f"A{k + 1} {value}" for k, value in enumerate(joints.tolist())) + "}"
+
+    head = ["DEF made()", "$TOOL={X 10,Y -5,Z 160,A 0,B 10,C 0}"]
+    head.append("$BASE={X 705,Y -94,Z 507,A 30,B 0,C 0}")
+    body, data = [], ["DEFDAT made"]
+    for k, (kind, joints) in enumerate(steps):
+        target = axes(joints) if kind == "J" else pose(joints)
+        if k % 2:
+            data.append(f"DECL {'E6AXIS' if kind == 'J' else 'E6POS'} XP{k}={target}")
+            target = f"XP{k}"
+        body.append(f"  {'LIN' if kind == 'L' else 'PTP'} {target}{' C_DIS' if k % 3 else ''}")
+    return "\n".join([*head, *body, "END", *data, "ENDDAT", ""]).encode()
+
+
+WRITERS: dict[str, Callable[[list[Step]], bytes]] = {"krl": krl}
+
+
+def steps_of(seed: int, kinds: str = "PLLPLJLL") -> list[Step]:
+    """Moves in a small part of the space, with joints in whole thousandths."""
+    rng = np.random.default_rng(seed)
+    middle = np.array([0, 20, 30, 0, rng.choice([50, -50]), 0]) + rng.uniform(-1, 1, 6) * [
+        *(60, 15, 15, 60, 20, 100)
+    ]
+    return [(kind, (middle + rng.uniform(-1, 1, 6) * 3).round(3)) for kind in kinds]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("language", WRITERS)
+@pytest.mark.parametrize("seed", range(2))
+def test_tip_and_tool_are_where_the_program_says(language: str, seed: int, tmp_path: Path) -> None:
+    """At the ends of moves and along straight ones, from both texts by a reader and an arm of their own."""
+    machine, steps = arm_files(tmp_path), steps_of(seed)
+    text = WRITERS[language](steps)
+    result = olp.correct_joints(text, machine)
+    assert result.report["deviation"]["holds"]
+    assert result.report["deviation"]["before"]["position_max_um"] > 300
+    assert olp.verify_joints(text, result.data, machine).report["verdict"]["ok"]
+    arm, (digit, turn_digit) = Arm(machine, ZEROS), DIGITS[language]
+    wanted, found = READERS[language](text, FRAMES), READERS[language](result.data, FRAMES)
+    assert len(wanted) == len(steps)
+    place, before, begun = 0, None, None
+    for want, (kind, guess) in zip(wanted, steps, strict=True):
+        if want.joints is not None:
+            rotation, flange = arm.pose(want.joints)
+            aim, tip = rotation @ TOOL, flange + rotation @ LEVER
+        else:
+            aim, tip = want.turn, want.tip
+        last = False
+        while not last:
+            move = found[place]
+            joints = move.joints
+            if joints is None:
+                turn = move.turn @ TOOL.T
+                joints = arm.joints(turn, move.tip - turn @ LEVER, guess)
+            rotation, flange = arm.actual(joints)
+            here = flange + rotation @ LEVER
+            last = np.linalg.norm(here - tip) < 1e-3 + digit
+            if last:
+                assert np.linalg.norm(turned_by(rotation @ TOOL, aim)) < 2e-6 + turn_digit
+            if kind == "L" and before is not None:
+                ends = [arm.pose(q) for q in (before, joints)]
+                tips = [p + r @ LEVER for r, p in ends]
+                for share in (0.25, 0.5, 0.75):
+                    led, at = between(ends[0][0], ends[1][0], share), tips[0] + share * (tips[1] - tips[0])
+                    rotation, flange = arm.actual(arm.joints(led, at - led @ LEVER, joints))
+                    here, way = flange + rotation @ LEVER, tip - begun[1]
+                    part = (here - begun[1]) @ way / (way @ way)
+                    assert np.linalg.norm(begun[1] + part * way - here) < 1e-3 + digit
+                    miss = turned_by(rotation @ TOOL, between(begun[0], aim, min(max(part, 0.0), 1.0)))
+                    assert np.linalg.norm(miss) < 1e-5 + 1e-3 / np.linalg.norm(way)
+            before, place = joints, place + 1
+        begun = aim, tip
+    assert place == len(found)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("language", WRITERS)
+def test_a_model_without_errors_changes_no_byte(language: str, tmp_path: Path) -> None:
+    """Also in joints where the wrist is straight, as a home position has it."""
+    machine, home = arm_files(tmp_path, (0.0,) * 6), np.array([0.0, -20.0, 60.0, 0.0, 0.0, 0.0])
+    text = WRITERS[language]([("J", home), *steps_of(7)])
+    assert olp.correct_joints(text, machine).data == text
+
+
+KRL_HEAD = b"DEF made()\n$TOOL={X 10,Y -5,Z 160,A 0,B 10,C 0}\n$BASE={X 705,Y -94,Z 507,A 30,B 0,C 0}\n"
+JOINTS = np.array([20.0, 10.0, 20.0, 30.0, 40.0, 50.0])
+
+
+def krl_of(*moves: str) -> bytes:
+    return KRL_HEAD + "\n".join([*moves, "END", ""]).encode()
+
+
+def position(joints: np.ndarray, words: str) -> str:
+    (x, y, z), (a, b, c) = local(joints)[0], angles(local(joints)[1])
+    return f"{{X {x},Y {y},Z {z},A {a},B {b},C {c}{words}}}"
+
+
+def test_turn_of_krl_follows_the_corrected_joints(tmp_path: Path) -> None:
+    """The fourth axis turns back across zero: its bit is set, and no other word changes."""
+    joints = np.array([20.0, 10.0, 20.0, 0.01, 40.0, 50.0])
+    moves = [f"PTP {position(joints, words)}" for words in (",S 2,T 0", ",S 'B10',T 'B0'", ",S 18,T 64")]
+    data = olp.correct_joints(krl_of(*moves), arm_files(tmp_path)).data
+    assert [line[line.index(b",S") :] for line in data.splitlines()[4:7]] == [
+        b",S 2,T 8}", b",S 'B10',T 8}", b",S 18,T 72}"
+    ]  # fmt: skip
+
+
+def test_without_status_and_turn_the_posture_is_the_one_near_the_move_before(tmp_path: Path) -> None:
+    machine, near = arm_files(tmp_path), f"PTP {position(JOINTS + 1, '')}"
+    data = olp.correct_joints(krl_of(f"PTP {position(JOINTS, ',S 2,T 0')}", near), machine).data
+    turn, tip = (move := READERS["krl"](data, FRAMES)[1]).turn @ TOOL.T, move.tip
+    joints = Arm(machine, ZEROS).joints(turn, tip - turn @ LEVER, JOINTS)
+    assert np.abs(joints + Arm(machine, ZEROS).zeros - (JOINTS + 1)).max() < 1e-4
+    with pytest.raises(ProgramError, match="does not state its configuration, so") as caught:
+        olp.correct_joints(krl_of(near), machine)
+    assert caught.value.line == 4
+    far = position(JOINTS * [1, 1, 1, -3, 1, -1], "")
+    with pytest.raises(ProgramError, match="two postures are about as near"):
+        olp.correct_joints(krl_of(f"PTP {position(JOINTS, ',S 2,T 0')}", f"PTP {far}"), machine)
+
+
+@pytest.mark.parametrize(
+    ("move", "told"),
+    [
+        (position(JOINTS, ",S 6,T 0"), "configuration names"),
+        (position(JOINTS, ",S 0,T 0"), "configuration names"),
+        (position(JOINTS, ",S 3,T 0"), "configuration names"),
+        (position(JOINTS, ",S 2,T 1"), "configuration names"),
+        (position(JOINTS, ",S 2,T 0,E1 12.5"), "external axis"),
+        (position(JOINTS, ",S 2,T 0").replace("X ", "X 9"), "no posture of this arm"),
+        ("{A1 20,A2 10,A3 20,A4 30,A5 40,A6 50,E1 12.5}", "external axis"),
+    ],
+)
+def test_krl_refused_with_its_line(move: str, told: str, tmp_path: Path) -> None:
+    with pytest.raises(ProgramError, match=told) as caught:
+        olp.correct_joints(krl_of(f"PTP {move}"), arm_files(tmp_path))
+    assert caught.value.line == 4
+
+
+def test_products_of_krl_turn_with_their_target(tmp_path: Path) -> None:
+    """A shift behind a position goes along its axes, which the correction turns, and a frame before it
+    stays before the parts of a straight move."""
+    begin, joints = position(JOINTS, ",S 2,T 0"), JOINTS + np.array([15, 2, -3, 5, -4, 6])
+    moves = [
+        f"PTP {begin}",
+        "LIN g : XP1",
+        f"LIN {position(joints, ',S 2,T 0')} : {{X 2,Y -3,Z -40,A 0,B 0,C 10}}",
+    ]
+    moves += ["END", "DEFDAT made", "DECL FRAME g={X 5,Y 0,Z 0,A 0,B 0,C 0}"]
+    moves += [f"DECL E6POS XP1={position(joints, ',S 2,T 0')}", "ENDDAT"]
+    text, machine = krl_of(*moves), arm_files(tmp_path)
+    result = olp.correct_joints(text, machine)
+    assert result.report["verdict"]["ok"]
+    assert result.data.count(b"LIN g : {X") > 1
+
+
+def test_joints_that_the_text_does_not_state_are_kept(tmp_path: Path) -> None:
+    moves = ["PTP XHOME", f"LIN {position(JOINTS, ',S 2,T 0')}", "PTP {A1 5}"]
+    result = olp.correct_joints(krl_of(*moves), arm_files(tmp_path))
+    assert b"PTP XHOME\n" in result.data
+    assert b"PTP {A1 5}\n" in result.data
+    assert result.report["moves"]["feed"] == 0
+
+
+def test_moves_with_an_action_are_not_split(tmp_path: Path) -> None:
+    far = position(JOINTS + np.array([20, 5, -5, 5, -4, 6]), ",S 2,T 0")
+    moves = [f"PTP {position(JOINTS, ',S 2,T 0')}", "TRIGGER WHEN DISTANCE=0 DELAY=0 DO x=1", f"LIN {far}"]
+    data = olp.correct_joints(krl_of(*moves), arm_files(tmp_path)).data
+    assert data.count(b"LIN") == 1
+    moves.pop(1)
+    assert olp.correct_joints(krl_of(*moves), arm_files(tmp_path)).data.count(b"LIN") > 2
