@@ -99,7 +99,9 @@ class Tool:
     length; a negative Z length is a touch-off value and gives no tool vector. `name` is that of programs
     which call tools by name. `set_by` "touch" means that the
     length was set on the uncompensated machine at axis position `touched_at_mm`. Lengths of one `setter` are
-    too long by one constant, `constant_mm` where it is known. `cutting_length_mm` counts from the tip up,
+    too long by one constant, `constant_mm` where it is known. `gauge_to_tip_deg` are A, B, C by which the
+    frame of the tip is turned against the flange of an arm (Rz Ry Rx), None where this is not stated.
+    `cutting_length_mm` counts from the tip up,
     None: all that the holder leaves free. `holder` is stacked upwards and ends at the gauge
     point.
     """
@@ -116,6 +118,7 @@ class Tool:
     cutting_length_mm: float | None = None
     holder: tuple[HolderPart, ...] = ()
     name: str = ""
+    gauge_to_tip_deg: Vector | None = None
 
     @property
     def tool_vector_mm(self) -> Vector | None:
@@ -159,7 +162,8 @@ class Machine:
     leave the axes that they move, None where it is not known. `scaling_unit` is what 1 of a factor of G51 is,
     None where it is not stated. `located` says whether positions in machine coordinates are known; where they
     are not, only distances are. `assumed`: nothing names the controller. `arm`: it is an arm, whose programs
-    may state its joints.
+    may state its joints. `third_level` is whether they count the third of them from the horizontal, None
+    where that is not stated.
     """
 
     name: str
@@ -193,6 +197,7 @@ class Machine:
     located: bool = True
     assumed: bool = False
     arm: bool = False
+    third_level: bool | None = None
 
     @property
     def least_increment_mm(self) -> Vector:

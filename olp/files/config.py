@@ -278,6 +278,7 @@ def tools_of(tables: Tools) -> dict[int, Tool]:
             radius_mm=table.radius_mm,
             wear_mm=table.wear_mm,
             gauge_to_tip_mm=table.gauge_to_tip_mm,
+            gauge_to_tip_deg=table.gauge_to_tip_deg,
             set_by=table.set_by,
             touched_at_mm=table.touched_at_mm.complete if table.touched_at_mm else None,
             setter=table.setter,

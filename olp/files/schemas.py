@@ -121,6 +121,11 @@ class ToolTable(Table):
         default=None,
         description="the vector from gauge point to tip, [X, Y, Z] in mm; [-X, -Y, -Z] if left out",
     )
+    gauge_to_tip_deg: Triple | None = Field(
+        default=None,
+        description="on an arm how the frame of the tip is turned against the flange, [A, B, C] in degrees: "
+        "about Z by C, then about the new Y by B, then about the new X by A",
+    )
     set_by: Literal["touch", "true"] = Field(
         default="true",
         description='"touch" (length set on the uncompensated machine) or "true" (measured by other means)',

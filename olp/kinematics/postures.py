@@ -105,6 +105,20 @@ class Arm:
         alike = np.where(self.direction[4] @ self.direction[1] < 0.0, -1.0, 1.0)
         return np.stack((place @ ahead, before, bend, alike * bend), axis=1).reshape(*shape, 4)
 
+    def from_second(self, axes: Array) -> Array:
+        """(n, 6) axis values, of ones whose third counts from the horizontal and not from the second."""
+        return self._third(axes, -1.0)
+
+    def from_level(self, axes: Array) -> Array:
+        """(n, 6) the other way round."""
+        return self._third(axes, 1.0)
+
+    def _third(self, axes: Array, sign: float) -> Array:
+        values, second, third = axes.copy(), self.columns[1], self.columns[2]
+        alike = 1.0 if self.direction[1] @ self.direction[2] > 0.0 else -1.0
+        values[:, third] += sign * alike * axes[:, second]
+        return values
+
     def _turn(self, axis: int, angle_rad: Array) -> Array:
         return axis_rotation(self.direction[axis], angle_rad)
 

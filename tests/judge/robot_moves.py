@@ -59,7 +59,7 @@ def rotvec(vector: np.ndarray) -> np.ndarray:
 
 
 def _words(text: str) -> dict[str, str]:
-    return dict(re.findall(r"\b([A-Z]\d?) ?=? ?('?[-+.\w]+'?)", text))
+    return dict(re.findall(r"\b([A-Z]\d?)\s*=?\s*('?[-+.\w]+'?)", text))
 
 
 def krl(text: bytes, frames: Frames) -> list[Move]:
@@ -78,4 +78,39 @@ def krl(text: bytes, frames: Frames) -> list[Move]:
     return found
 
 
-READERS: dict[str, Callable[[bytes, Frames], list[Move]]] = {"krl": krl}
+def tp(text: bytes, frames: Frames) -> list[Move]:
+    """Moves of TP programs to positions that the text states."""
+    plain, found = text.decode("latin-1"), []
+    stated = dict(re.findall(r"P\[(\d+)\]\{(.*?)\};", plain, re.S))
+    for kind, number in re.findall(r"(?m)^\s*\d*:([LJ]) P\[(\d+)\]", plain):
+        body = stated[number]
+        config = re.search(r"CONFIG : '(.*?)'", body)
+        words = _words(body[0 if config is None else config.end() :])
+        if config is None:
+            found.append(Move(False, np.array([float(words[f"J{k}"]) for k in range(1, 7)])))
+            continue
+        place = np.array([float(words[name]) for name in "XYZ"])
+        turn, tip = frames.placed(wpr(*(float(words[name]) for name in "WPR")), place)
+        found.append(Move(kind == "L", None, turn, tip, (config[1],)))
+    return found
+
+
+def rapid(text: bytes, frames: Frames) -> list[Move]:
+    """Moves of RAPID to targets with names or numbers."""
+    plain = re.sub(r"!.*", "", text.decode("latin-1"))
+    named = dict(re.findall(r"(?:robtarget|jointtarget) (\w+):=(\[.*\]);", plain))
+    found = []
+    for kind, target in re.findall(r"Move(L|J|AbsJ) (\w+|\[\[.*\]\]),v", plain):
+        numbers = [float(number) for number in _NUMBER.findall(named.get(target, target))]
+        if kind == "AbsJ":
+            found.append(Move(False, np.array(numbers[:6])))
+            continue
+        w, *axis = numbers[3:7]
+        half = np.arctan2(np.linalg.norm(axis), w)
+        own = rotvec(2 * half * np.array(axis) / np.linalg.norm(axis))
+        turn, tip = frames.placed(own, np.array(numbers[:3]))
+        found.append(Move(kind == "L", None, turn, tip, tuple(f"{v:g}" for v in numbers[7:11])))
+    return found
+
+
+READERS: dict[str, Callable[[bytes, Frames], list[Move]]] = {"krl": krl, "tp": tp, "rapid": rapid}

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from judge.arm import Arm, between, turned_by
+from judge.arm import Arm, between, quaternion, turned_by
 from judge.arm_files import MACHINE, ZEROS, arm_files
 from judge.robot_moves import READERS, Frames, abc
 from scipy.spatial.transform import Rotation
@@ -22,7 +22,21 @@ TOOL = abc(*TOOL_DEG)
 FRAME_DEG, ORIGIN = (30.0, 0.0, 0.0), np.array([705.0, -94.0, 507.0])
 FRAMES = Frames(abc(*FRAME_DEG), ORIGIN)
 #: Last digits: mm, and rad.
-DIGITS = {"krl": (1e-5, 2e-8)}
+DIGITS = {"krl": (1e-5, 2e-8), "tp": (1e-3, 2e-8), "rapid": (1e-4, 4e-9)}
+#: What machine and job of TP programs state.
+TP_FILES = """
+[kinematics]
+third_joint_level = true
+[tools.2]
+gauge_to_tip_mm = [10.0, -5.0, 160.0]
+gauge_to_tip_deg = [0.0, 10.0, 0.0]
+[work_offsets.UFRAME3]
+X_mm = 705.0
+Y_mm = -94.0
+Z_mm = 507.0
+C_deg = 30.0
+set_by = \"true\"
+"""
 #: A move: its kind (straight, joints to a pose, joints), and joints in degrees.
 Step = tuple[str, np.ndarray]
 
@@ -61,7 +75,67 @@ def krl(steps: list[Step]) -> bytes:
     return "\n".join([*head, *body, "END", *data, "ENDDAT", ""]).encode()
 
 
-WRITERS: dict[str, Callable[[list[Step]], bytes]] = {"krl": krl}
+def tp(steps: list[Step]) -> bytes:
+    """Positions by number, and joints whose third counts from the horizontal: J3 + J2 on this arm."""
+    lines, positions = ["/PROG  MADE", "/ATTR", "/MN"], ["/POS"]
+    for k, (kind, joints) in enumerate(steps):
+        speed = "250mm/sec" if kind == "L" else "30%"
+        lines.append(f"  {k + 1:2}:{'L' if kind == 'L' else 'J'} P[{k + 1}] {speed} CNT60    ;")
+        if kind == "J":
+            level = joints + np.array([0, 0, joints[1], 0, 0, 0])
+            values = [f"\tJ{j + 1}= {value:9.3f} deg" for j, value in enumerate(level.tolist())]
+            body = "UF : 3, UT : 2,\n" + ",\n".join(values)
+        else:
+            (x, y, z), (r, p, w) = local(joints)[0], angles(local(joints)[1])
+            turns = ", ".join(f"{round(joints[j] / 360)}" for j in (0, 3, 5))
+            body = f"UF : 3, UT : 2,\t\tCONFIG : '{'N' if joints[4] > 0 else 'F'} U T, {turns}',\n"
+            body += f"\tX = {x:9.4f}  mm,\tY = {y:9.4f}  mm,\tZ = {z:9.4f}  mm,\n"
+            body += f"\tW = {w:9.5f} deg,\tP = {p:9.5f} deg,\tR = {r:9.5f} deg"
+        positions.append(f"P[{k + 1}]{{\n   GP1:\n\t{body}\n}};")
+    return "\n".join([*lines, *positions, "/END", ""]).encode()
+
+
+def rapid(steps: list[Step]) -> bytes:
+    """Targets by name and with numbers, and joints likewise."""
+    turn = ",".join(f"{v:.12f}" for v in quaternion(TOOL))
+    head = [
+        "MODULE Made",
+        f"PERS tooldata spindle:=[TRUE,[[10,-5,160],[{turn}]],[1,[0,0,1],[1,0,0,0],0,0,0]];",
+        'PERS wobjdata part:=[FALSE,TRUE,"",[[705,-94,507],[0.965925826289,0,0,0.258819045103]],'
+        "[[0,0,0],[1,0,0,0]]];",
+    ]
+    body = ["PROC main()"]
+    for k, (kind, joints) in enumerate(steps):
+        outer = "[9E9,9E9,9E9,9E9,9E9,9E9]"
+        target = f"[{joints.tolist()},{outer}]"
+        if kind != "J":
+            own = quaternion(local(joints)[1]).round(7).tolist()
+            quarters = [int(np.floor(joints[j] / 90)) for j in (0, 3, 5)]
+            target = f"[{local(joints)[0]},{own},{[*quarters, int(joints[4] < 0)]},{outer}]"
+        if k % 2:
+            head.append(f"CONST {'joint' if kind == 'J' else 'rob'}target p{k}:={target};")
+            target = f"p{k}"
+        word = {"L": "MoveL", "P": "MoveJ", "J": "MoveAbsJ"}[kind]
+        body.append(f"  {word} {target},v100,z10,spindle\\WObj:=part;")
+    return "\n".join([*head, *body, "ENDPROC", "ENDMODULE", ""]).encode()
+
+
+WRITERS: dict[str, Callable[[list[Step]], bytes]] = {"krl": krl, "tp": tp, "rapid": rapid}
+
+
+def stated(machine: Path, language: str) -> Path:
+    """The machine file with what the control of a language keeps to itself."""
+    if language == "tp":
+        text = machine.read_text("utf-8").replace("\n[job_defaults]\ntool = 1\n", "\n")
+        machine.write_text(text + TP_FILES, "utf-8")
+    return machine
+
+
+def read_joints(values: np.ndarray | None, language: str) -> np.ndarray | None:
+    """Joint values as the machine file counts them."""
+    if values is None or language != "tp":
+        return values
+    return values - np.array([0, 0, values[1], 0, 0, 0])
 
 
 def steps_of(seed: int, kinds: str = "PLLPLJLL") -> list[Step]:
@@ -78,7 +152,7 @@ def steps_of(seed: int, kinds: str = "PLLPLJLL") -> list[Step]:
 @pytest.mark.parametrize("seed", range(2))
 def test_tip_and_tool_are_where_the_program_says(language: str, seed: int, tmp_path: Path) -> None:
     """At the ends of moves and along straight ones, from both texts by a reader and an arm of their own."""
-    machine, steps = arm_files(tmp_path), steps_of(seed)
+    machine, steps = stated(arm_files(tmp_path), language), steps_of(seed)
     text = WRITERS[language](steps)
     result = olp.correct_joints(text, machine)
     assert result.report["deviation"]["holds"]
@@ -90,14 +164,14 @@ def test_tip_and_tool_are_where_the_program_says(language: str, seed: int, tmp_p
     place, before, begun = 0, None, None
     for want, (kind, guess) in zip(wanted, steps, strict=True):
         if want.joints is not None:
-            rotation, flange = arm.pose(want.joints)
+            rotation, flange = arm.pose(read_joints(want.joints, language))
             aim, tip = rotation @ TOOL, flange + rotation @ LEVER
         else:
             aim, tip = want.turn, want.tip
         last = False
         while not last:
             move = found[place]
-            joints = move.joints
+            joints = read_joints(move.joints, language)
             if joints is None:
                 turn = move.turn @ TOOL.T
                 joints = arm.joints(turn, move.tip - turn @ LEVER, guess)
@@ -126,7 +200,10 @@ def test_tip_and_tool_are_where_the_program_says(language: str, seed: int, tmp_p
 @pytest.mark.parametrize("language", WRITERS)
 def test_a_model_without_errors_changes_no_byte(language: str, tmp_path: Path) -> None:
     """Also in joints where the wrist is straight, as a home position has it."""
-    machine, home = arm_files(tmp_path, (0.0,) * 6), np.array([0.0, -20.0, 60.0, 0.0, 0.0, 0.0])
+    machine, home = (
+        stated(arm_files(tmp_path, (0.0,) * 6), language),
+        np.array([0.0, -20.0, 60.0, 0.0, 0.0, 0.0]),
+    )
     text = WRITERS[language]([("J", home), *steps_of(7)])
     assert olp.correct_joints(text, machine).data == text
 
@@ -218,3 +295,58 @@ def test_moves_with_an_action_are_not_split(tmp_path: Path) -> None:
     assert data.count(b"LIN") == 1
     moves.pop(1)
     assert olp.correct_joints(krl_of(*moves), arm_files(tmp_path)).data.count(b"LIN") > 2
+
+
+def tp_of(joints: np.ndarray, config: str, kind: str = "P") -> bytes:
+    text = tp([(kind, joints)])
+    start = text.index(b"CONFIG : '") + 10
+    return text[:start] + config.encode() + text[text.index(b"'", start) :]
+
+
+def test_turns_of_tp_programs_follow_the_corrected_joints(tmp_path: Path) -> None:
+    """The fourth axis turns back across half a turn: its turn is another one, and no other word changes."""
+    joints = np.array([20.0, 10.0, 20.0, 180.01, 40.0, 300.0])
+    text, machine = tp_of(joints, "N U T, 0, 1, 1"), stated(arm_files(tmp_path), "tp")
+    data = olp.correct_joints(text, machine).data
+    assert b"CONFIG : 'N U T, 0, 0, 1'" in data
+
+
+@pytest.mark.parametrize(
+    ("config", "told"),
+    [
+        ("F U T, 0, 1, 0", "configuration names"),
+        ("N D T, 0, 0, 0", "configuration names"),
+        ("N U B, 0, 0, 0", "configuration names"),
+        ("N U T, 0, 0, 1", "configuration names"),
+        ("as taught", "does not state its configuration"),
+    ],
+)
+def test_tp_configuration_refused_with_its_line(config: str, told: str, tmp_path: Path) -> None:
+    machine = stated(arm_files(tmp_path), "tp")
+    assert olp.correct_joints(tp_of(JOINTS, "N U T, 0, 0, 0"), machine).report["verdict"]["ok"]
+    with pytest.raises(ProgramError, match=told) as caught:
+        olp.correct_joints(tp_of(JOINTS, config), machine)
+    assert caught.value.line == 4
+
+
+def test_joints_of_tp_programs_need_to_know_how_the_third_counts(tmp_path: Path) -> None:
+    machine, text = stated(arm_files(tmp_path), "tp"), tp([("P", JOINTS), ("J", JOINTS + 1.0)])
+    machine.write_text(machine.read_text("utf-8").replace("third_joint_level = true\n", ""), "utf-8")
+    result = olp.correct_joints(text, machine)
+    assert text[text.index(b"P[2]{") :] in result.data
+
+
+def test_the_tool_of_the_job_has_directions(tmp_path: Path) -> None:
+    """Without them it is refused, and so is one that the program states otherwise."""
+    machine = stated(arm_files(tmp_path), "tp")
+    plain = machine.read_text("utf-8")
+    machine.write_text(plain.replace("gauge_to_tip_deg = [0.0, 10.0, 0.0]\n", ""), "utf-8")
+    with pytest.raises(ProgramError, match="gauge_to_tip_deg"):
+        olp.correct_joints(tp_of(JOINTS, "N U T, 0, 0, 0"), machine)
+    named = plain.replace("[tools.2]", '[tools.2]\nname = "spindle"')
+    machine.write_text(named, "utf-8")
+    text = rapid([("P", JOINTS)])
+    assert olp.correct_joints(text, machine).report["verdict"]["ok"]
+    machine.write_text(named.replace("[0.0, 10.0, 0.0]", "[0.0, 10.5, 0.0]"), "utf-8")
+    with pytest.raises(ProgramError, match="they differ"):
+        olp.correct_joints(text, machine)

@@ -34,7 +34,9 @@ _ABSENT = 9e8
 @dataclass(frozen=True, slots=True, eq=False)
 class ArmPath(JointPath):
     """Moves of an arm by its axis values. Straight moves (`feed`) lead the tip along a line, and turn the
-    tool evenly."""
+    tool evenly. Programs count the third joint `from_level` where the control does."""
+
+    from_level: bool = False
 
     def between(self, start: Array, end: Array, share: Array, move: Index) -> Array:
         place = np.asarray(start + share[:, None] * (end - start))
@@ -55,9 +57,12 @@ class ArmPath(JointPath):
         return place
 
 
-def arm_path(program: Program, structure: Structure, errors: MachineErrors, start_deg: Array) -> ArmPath:
+def arm_path(
+    program: Program, structure: Structure, errors: MachineErrors, start_deg: Array, *, from_level: bool
+) -> ArmPath:  # fmt: skip
     """The path of a robot program. `start_deg` (6,) is where the arm is at first, NaN where that is not
-    stated. Raises ProgramError with all targets that no posture reaches, or that name several."""
+    stated, and `from_level` as in `ArmPath`. Raises ProgramError with all targets that no posture reaches, or
+    that name several."""
     arm, targets, dialect = Arm.of(structure), program.targets, program.dialect
     assert arm is not None
     assert targets is not None
@@ -74,17 +79,20 @@ def arm_path(program: Program, structure: Structure, errors: MachineErrors, star
     tool[rows] = [places[lever] for lever in levers]
     motion = Motion.of(structure, errors, [(lever, None) for lever in places])
     unit = np.array([frame.unit_mm for frame in path.frames] or [1.0])[path.frame[rows]]
-    joints = used.joints(arm)
+    joints = used.joints(arm, from_level=from_level)
     flange = used.flange(unit, levers)
     stated = np.isfinite(joints[:, 0])
-    own = motion.nominal(joints[stated], tool[rows][stated])
-    flange.rotation[stated], flange.position[stated] = own.rotation, own.position
+    reached = motion.nominal(joints[stated], tool[rows][stated])
+    flange.rotation[stated], flange.position[stated] = reached.rotation, reached.position
     postures = np.full((len(rows), POSTURES, AXES), np.nan)
-    postures[~stated] = arm.postures(Poses(flange.rotation[~stated], flange.position[~stated]))
+    posed, config = np.flatnonzero(~stated), used.config()
+    postures[posed] = arm.postures(Poses(flange.rotation[posed], flange.position[posed]))
+    values, fits = postures.copy(), np.zeros(postures.shape[:2], bool)
+    if posed.size:
+        own = postures[posed]
+        values[posed], fits[posed] = dialect.fitting(config[posed], own, arm.branches(own))
     travel = np.array([joint.travel for joint in structure.joints.values()]).T
     straight = used.mask("straight")
-    config = used.config()
-    values, fits = dialect.fitting(config, postures, arm.branches(postures))
     wanted = Wanted(
         flange, joints, values, fits, straight, used.mask("free"),
         np.isnan(config).any(axis=1) | (config.shape[1] == 0), rows != np.append(-1, rows[:-1]) + 1,
@@ -100,7 +108,7 @@ def arm_path(program: Program, structure: Structure, errors: MachineErrors, star
         program, motion, start, end, np.full((count, AXES), -1, np.int32), tool, none, none,
         np.zeros((count, 3)), np.zeros((count, AXES)), np.ones(count), np.ones(AXES), feed, known, ~known,
         none, none, np.full(AXES, _DECIMALS), replace(Drilled.none(count), whole=whole),
-        Directions.none(count), Curves.none(count),
+        Directions.none(count), Curves.none(count), from_level=from_level,
     )  # fmt: skip
 
 
@@ -120,13 +128,11 @@ class Used:
         """What the targets say, one tuple a move."""
         return [getattr(self.targets[use.target], name) for use in self.uses]
 
-    def joints(self, arm: Arm) -> Array:
+    def joints(self, arm: Arm, *, from_level: bool) -> Array:
         """(n, 6) axis values that targets state, NaN where they state poses."""
-        values = np.full((len(self.uses), AXES), np.nan)
-        for k, stated in enumerate(self.of("joints")):
-            if stated:
-                values[k, arm.columns] = stated
-        return values
+        values, blank = np.empty((len(self.uses), AXES)), (np.nan,) * AXES
+        values[:, arm.columns] = np.array([own or blank for own in self.of("joints")]).reshape(-1, AXES)
+        return arm.from_second(values) if from_level else values
 
     def config(self) -> Array:
         """(n, k) the words that name postures; NaN where one is not stated."""
@@ -159,7 +165,8 @@ class Used:
             if use.tool is None:
                 raise ProgramError(
                     "on an arm the tool is a frame with its own directions, and the program does not state "
-                    "it; expected a tool with its numbers in the program",
+                    "it; expected a tool with its numbers in the program, or gauge_to_tip_mm and "
+                    "gauge_to_tip_deg in [tools.N]",
                     line=line,
                     code="OLP521",
                 )

@@ -166,7 +166,9 @@ class _Writer:
     def _wanted_joints(self, row: int) -> _Wanted:
         """The numbers of a target that states joints."""
         unit, target = self.dialect.joint_unit_deg, self._target_of(row)
-        numbers = self.plan.command[row][self.arm.columns] / unit
+        axes = self.plan.command[row : row + 1]
+        axes = self.arm.from_level(axes) if self.path.from_level else axes
+        numbers = axes[0, self.arm.columns] / unit
         made = [
             self._written(span, value, self.dialect.joint_decimals)
             for span, value in zip((*target.numbers, *target.turned), numbers.tolist(), strict=True)

@@ -123,6 +123,7 @@ def _arm(file: JointMachineFile, structure: Structure) -> Machine | None:
         default_tool=file.job_defaults.tool,
         default_work_offset=file.job_defaults.work_offset,
         arm=True,
+        third_level=file.kinematics.third_joint_level,
     )
 
 

@@ -115,6 +115,11 @@ class KinematicsTable(Table):
     gravity: Direction = Field(
         default=(0.0, 0.0, -1.0), description="the direction of gravity, [X, Y, Z] in machine coordinates"
     )
+    third_joint_level: bool | None = Field(
+        default=None,
+        description="whether robot programs count the third joint from the horizontal, as FANUC controls do, "
+        "and not from the second link as the values of this file; travel is that of this file",
+    )
     tool_symmetry: Literal["axis", "none"] | None = Field(
         default=None,
         description='"axis" (the turn about the tool\'s Z is free) or "none"; if left out, "axis" with '

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from olp.core.errors import ProgramError
 from olp.core.machine import ZERO, Setup, Vector, WorkOffset
+from olp.core.machine import Tool as Entry
 from olp.core.values import dataclass
 from olp.program.frames import FrameTable, Placement, tool_vector_of
 from olp.program.robots.poses import Pose, Quaternion, inverted, multiplied, of_zyx, rotated, turn_of
@@ -78,6 +79,8 @@ class RobotFrames:
         """A tool by its name; as `located`."""
         number = self.setup.tool_named(name)
         entry = None if number is None else self.setup.tool(number)
+        if self.setup.machine.arm and (entry is not None or stated is not None):
+            return _at_flange(name, entry, stated, line)
         vector = None if entry is None else entry.tool_vector_mm
         if stated is None and vector is None:
             raise ProgramError(
@@ -90,6 +93,10 @@ class RobotFrames:
 
     def numbered_tool(self, name: str, number: int, stated: Pose | None, line: int) -> Tool:
         """A tool by its number, 0 for none; as `located`."""
+        if self.setup.machine.arm and number:
+            if stated is None:
+                tool_vector_of(self.setup, number, line)
+            return _at_flange(name, self.setup.tool(number), stated, line)
         if number and stated is None:
             return Tool(name, None, tool_vector_of(self.setup, number, line), number)
         entry = self.setup.tool(number) if number else None
@@ -135,6 +142,26 @@ class RobotFrames:
         wanted = name.casefold()
         both = {**self.setup.machine.work_offsets, **self.setup.job.work_offsets}
         return next((work for key, work in both.items() if key.casefold() == wanted), None)
+
+
+def _at_flange(name: str, entry: Entry | None, stated: Pose | None, line: int) -> Tool:
+    """A tool of an arm: a frame of its own at the flange. Its pose is None where its directions are stated
+    nowhere. Raises ProgramError where program and job state it, and differ."""
+    vector = None if entry is None else entry.tool_vector_mm
+    own = None
+    if entry is not None and vector is not None and entry.gauge_to_tip_deg is not None:
+        a, b, c = entry.gauge_to_tip_deg
+        own = Pose(vector, of_zyx((c, b, a)))
+    if entry is not None and vector is not None and stated is not None:
+        other = own or Pose(vector, stated.turn)
+        if not stated.same(other):
+            raise ProgramError(
+                f"the tool {name} is stated by the program and by [tools.{entry.number}], and they differ; "
+                "state it once, or the same",
+                line=line,
+                code="OLP521",
+            )
+    return Tool(name, stated or own, vector or ZERO)
 
 
 def _pose(work: WorkOffset) -> Pose:

@@ -177,7 +177,9 @@ class JointRun:
         """The path of a robot program."""
         structure = self.machine.structure
         start = np.array([self.job.start_deg.get(name, np.nan) for name in structure.order])
-        return arm_path(program, structure, self.errors, start)
+        assert self.machine.arm is not None
+        level = self.machine.arm.third_level is True
+        return arm_path(program, structure, self.errors, start, from_level=level)
 
     def _listed(self, data: bytes) -> JointPath:
         """The path of a list of axis values."""

@@ -6,17 +6,18 @@ A position names its own frame and tool, so it is right wherever the program com
 from __future__ import annotations
 
 from olp.core.errors import ProgramError
-from olp.core.machine import Setup, Vector
+from olp.core.machine import ZERO, Setup, Vector
 from olp.core.patterns import pattern
 from olp.core.values import dataclass
 from olp.program.dialect import Dialect, Options
 from olp.program.program import Program
 from olp.program.robots.frames import Located, Tool
+from olp.program.robots.ls import postures
 from olp.program.robots.ls.registers import Registers
 from olp.program.robots.ls.text import Line, Position, lines, parts, positions
 from olp.program.robots.moves import NAN, RobotMoves, not_read, take_all
 from olp.program.robots.poses import of_zyx, rotated
-from olp.program.robots.targets import Use
+from olp.program.robots.targets import Span, Use
 
 _MOVE = pattern(
     rb"(?i)\s*([LJ])\s+(PR?)\[\s*(\d+)\s*(?::[^\]]*)?\]\s+(?:(\d+\.?\d*)\s*(mm/sec|cm/min|inch/min|%|deg/sec|"
@@ -44,6 +45,8 @@ _STILL = pattern(
 )
 _ENDS = pattern(rb"(?i)\s*(?:END|ABORT|JMP\s+LBL\b[^,]*)\s*")
 _BLOCK = pattern(rb"(?i)\s*(?:(IF\b.*THEN)|(FOR\b.*)|(ELSE)|(ENDIF|ENDFOR))\s*")
+_ALONG_TOOL = pattern(rb"(?i)\b(?:Tool_Offset|WZVersatz)\b")
+_JOINTS = ("J1", "J2", "J3", "J4", "J5", "J6")
 #: mm/s in one unit of a speed
 _SPEEDS = {b"mm/sec": 1.0, b"cm/min": 10.0 / 60.0, b"inch/min": 25.4 / 60.0}
 
@@ -158,20 +161,22 @@ class _Reader:
                 raise not_read(f"this move {why}, which is not read", line.line)
         position = None if move.register else self._position(move.number, line)
         shift = self._shift(move, position)
-        if position is None or "X" not in position.axes or shift is None:
+        begin = self.data.index(b"[", line.first) + 1
+        place = begin, self.data.index(b"]", begin)
+        if position is not None and "X" not in position.axes:
+            self.moves.joint_move(line.line, lambda: self._joints(line, move, position, place))
+            return
+        if position is None or shift is None:
             self.moves.known = False
             what = "left as written: the text does not state where this move goes"
-            if position is not None and "X" not in position.axes:
-                what = "joint values are kept as written"
-            self.moves.remark("left" if position is None else "joints", line.line, what)
+            self.moves.remark("left", line.line, what)
             return
         index = self._target(move.number, position)
         target = self.moves.targets[index]
-        begin = self.data.index(b"[", line.first) + 1
-        end = self.data.index(b"]", begin)
+        along_tool = shift != ZERO and _ALONG_TOOL.search(move.tail) is not None
         use = Use(
-            index, (line.span[0], line.span[1]), (begin, end), (begin, end), shift, target.turn,
-            zone=(line.first, line.span[1]),
+            index, (line.span[0], line.span[1]), place, place, shift, target.turn,
+            zone=(line.first, line.span[1]), along_tool=along_tool,
         )  # fmt: skip
         self.moves.move(
             line.line, use, self._frame(position, line), self._tool(position, line), move.feed,
@@ -179,6 +184,26 @@ class _Reader:
         )  # fmt: skip
         if _SKIP.search(move.tail):
             self.moves.known = False
+
+    def _joints(self, line: Line, move: _Move, position: Position, place: Span) -> Use | None:
+        """How a move uses joint values; None where the text does not state where they lead."""
+        axes = position.axes
+        if not set(_JOINTS) <= set(axes) or _OFFSET.search(move.tail):
+            return None
+        if self.setup.machine.third_level is None:
+            what = (
+                "whether J3 counts from the horizontal is not stated: give third_joint_level in [kinematics]"
+            )
+            self.moves.remark("level", line.line, what)
+            return None
+        index = self.known.get(move.number)
+        if index is None:
+            a, b, c, d, e, f = (axes[name][1] for name in _JOINTS)
+            index = self.known[move.number] = self.moves.joint_target(
+                position.line, position.span, [axes[name][0] for name in _JOINTS], (a, b, c, d, e, f),
+                position.outer, f"P[{move.number}]", position.span,
+            )  # fmt: skip
+        return Use(index, line.span, place, place, zone=(line.first, line.span[1]))
 
     def _shift(self, move: _Move, position: Position | None) -> Vector | None:
         """How far a move goes from its position, along its frame; None where the text does not say it."""
@@ -211,12 +236,13 @@ class _Reader:
         if known is None:
             axes = position.axes
             (x, a), (y, b), (z, c) = (axes[name] for name in "XYZ")
-            rest = tuple(value for name, (_, value) in sorted(axes.items()) if name[0] == "E")
-            key = position.config, position.others
+            key = self.data[slice(*position.config)], position.others
             config = float(self.configs.setdefault(key, len(self.configs)))
+            words, turns = postures.words_of(self.data, position.config)
             known = self.known[number] = self.moves.target(
-                position.line, position.span, (x, y, z), (a, b, c), _turn(position), (config, *rest),
-                f"P[{number}]", position.span,
+                position.line, position.span, (x, y, z), (a, b, c), _turn(position),
+                (config, *position.outer), f"P[{number}]", position.span,
+                (axes["R"][0], axes["P"][0], axes["W"][0]), turns, words, position.outer,
             )  # fmt: skip
         return known
 

@@ -34,8 +34,8 @@ class Line:
 class Position:
     """A position of the first group: its `line`, the bytes of all of it and of its number.
 
-    `frame` and `tool` are -1 for the active one. `axes` are bytes and values by their letters. `config` and
-    `others` are what else it states."""
+    `frame` and `tool` are -1 for the active one. `axes` are bytes and values by their letters. `config` are
+    the bytes of the configuration, and `others` is what else it states."""
 
     line: int
     span: Span
@@ -43,8 +43,13 @@ class Position:
     frame: int
     tool: int
     axes: dict[str, tuple[Span, float]]
-    config: bytes
+    config: Span
     others: bytes
+
+    @property
+    def outer(self) -> tuple[float, ...]:
+        """The values of the external axes."""
+        return tuple(value for name, (_, value) in sorted(self.axes.items()) if name[0] == "E")
 
 
 def parts(data: bytes) -> dict[str, list[Span]]:
@@ -108,6 +113,6 @@ def positions(data: bytes, part: Span, found: dict[int, list[Position]]) -> None
         found.setdefault(int(match[1]), []).append(
             Position(
                 count, match.span(), match.span(1), used[0], used[1], axes,
-                b"" if config is None else config[1], b"".join(others.split()),
+                (span[0], span[0]) if config is None else config.span(1), b"".join(others.split()),
             )
         )  # fmt: skip

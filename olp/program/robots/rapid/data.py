@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+import re
+
 from olp.core.errors import ProgramError
 from olp.core.patterns import pattern
 from olp.core.values import dataclass
 from olp.program.robots.moves import RobotMoves
 from olp.program.robots.poses import Pose
 from olp.program.robots.rapid.text import Statement
-from olp.program.robots.rapid.values import NUMBER, ROBTARGET, frame_of, target_of, tool_of
+from olp.program.robots.rapid.values import (
+    JOINTTARGET,
+    NUMBER,
+    ROBTARGET,
+    frame_of,
+    joints_of,
+    target_of,
+    tool_of,
+)
 from olp.program.robots.targets import Span
 
 _DECLARED = pattern(
@@ -93,26 +103,51 @@ class Declared:
         if data.kind == b"PERS":
             what = f"{name} is PERS: its value in this text is taken as current"
             self.moves.remark("pers", data.statement.line, what)
-        matches = list(ROBTARGET.finditer(self.data, *data.value))
-        wrong = (index > len(matches) or index == 0) if data.array else (len(matches) != 1 or index != 0)
-        place = index - 1 if data.array else 0
-        whole = not wrong and (data.array or matches[0].span() == data.value)
-        if not whole:
+        match = self._element(data, ROBTARGET, index)
+        if match is None:
             raise ProgramError(
                 f"the target {name} is not stated with its numbers in line {data.statement.line}",
                 line=line,
                 code="OLP533",
             )
-        key = matches[place].span()
+        key = match.span()
         known = self._targets.get(key)
         if known is None:
-            stated = target_of(matches[place], data.statement.line)
+            stated = target_of(match, data.statement.line)
             known = self._targets[key] = self.moves.target(
                 data.statement.line, key, stated.spans, stated.point, stated.turn, stated.rest, name,
                 (data.statement.begin, data.statement.end), stated.turned, stated.turns, stated.config,
                 stated.outer,
             )  # fmt: skip
         return known
+
+    def _element(self, data: Data, form: re.Pattern[bytes], index: int) -> re.Match[bytes] | None:
+        """The element `index` of an array, or data that are none where it is 0; None where the text does not
+        state it with numbers."""
+        assert data.value is not None
+        matches = list(form.finditer(self.data, *data.value))
+        if data.array:
+            return matches[index - 1] if 0 < index <= len(matches) else None
+        whole = len(matches) == 1 and index == 0 and matches[0].span() == data.value
+        return matches[0] if whole else None
+
+    def joints(self, name: str, index: int, routine: str, line: int) -> int | None:
+        """The place of declared joint values; None where this text does not state them, or they change."""
+        try:
+            data = self.find(name, b"JOINTTARGET", routine, line)
+        except ProgramError:
+            return None
+        match = None if data is None or data.value is None else self._element(data, JOINTTARGET, index)
+        if data is None or match is None:
+            return None
+        key = match.span()
+        if key not in self._targets:
+            stated = joints_of(match)
+            self._targets[key] = self.moves.joint_target(
+                data.statement.line, key, stated.spans, stated.degrees, stated.outer, name,
+                (data.statement.begin, data.statement.end),
+            )  # fmt: skip
+        return self._targets[key]
 
     def tool(self, name: str, routine: str, line: int) -> Pose | None:
         """The frame of a declared tool."""

@@ -21,7 +21,7 @@ from olp.program.text.numbers import spliced
 from olp.program.text.signs import RAPID
 
 _MODULE = pattern(rb"(?im)^[ \t]*MODULE\s+\w+(?:\s*\([^)]*\))?[^\r\n]*(?:\r\n|\n|\r|\Z)")
-_DECLARED_NAME = pattern(rb"(?is)((?:(?:LOCAL|TASK)\s+)?(?:CONST|PERS|VAR)\s+robtarget\s+)\w+")
+_DECLARED_NAME = pattern(rb"(?is)((?:(?:LOCAL|TASK)\s+)?(?:CONST|PERS|VAR)\s+(?:rob|joint)target\s+)\w+")
 #: A zone through which the robot passes without a stop.
 _PASSED = b"z0"
 #: A zone at which it stops: a step that takes up backlash is smaller than any other.

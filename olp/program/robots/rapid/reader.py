@@ -17,7 +17,7 @@ from olp.program.robots.rapid import flow
 from olp.program.robots.rapid.data import Declared
 from olp.program.robots.rapid.table import TABLE
 from olp.program.robots.rapid.text import Lines, Statement, statements
-from olp.program.robots.rapid.values import ROBTARGET, target_of
+from olp.program.robots.rapid.values import JOINTTARGET, ROBTARGET, joints_of, target_of
 from olp.program.robots.rapid.words import Words, moved, name_of, words_of
 from olp.program.robots.targets import NOWHERE, Span, Use
 
@@ -98,9 +98,7 @@ class _Reader:
             self._move(statement, straight=word == b"MOVEL")
         elif word == b"MOVEABSJ":
             self._loop_begins()
-            self._unknown()
-            what = "joint values are kept as written (MoveAbsJ)"
-            self.moves.remark("joints", statement.line, what)
+            self.moves.joint_move(statement.line, lambda: self._joints(statement))
         elif flow.is_short_if(statement):
             self._short_if(statement)
         elif flow.is_assignment(statement):
@@ -226,6 +224,24 @@ class _Reader:
             offset_turn=target.turn if shift is not None and shift.tool else NO_TURN,
             along_tool=shift is not None and shift.tool, free=self.free[not straight],
         )  # fmt: skip
+
+    def _joints(self, statement: Statement) -> Use | None:
+        """How a move uses joint values; None where the text does not state them."""
+        words = words_of(statement, statement.begin + len(b"MoveAbsJ"), self.data)
+        span, line, named = words.target, statement.line, NOWHERE
+        match = JOINTTARGET.match(self.data, *span)
+        if match is not None and not self.data[match.end() : span[1]].strip():
+            stated = joints_of(match)
+            place: int | None = self.moves.joint_target(
+                line, match.span(), stated.spans, stated.degrees, stated.outer
+            )
+        else:
+            name = name_of(self.data[slice(*span)])
+            named = span
+            place = None if name is None else self.declared.joints(*name, self.routine, line)
+        if place is None:
+            return None
+        return Use(place, (statement.begin, statement.end), span, named, zone=words.zone)
 
     def _target(self, span: Span, line: int) -> tuple[int, Span]:
         """The place of a target, and the bytes of its name, `NOWHERE` where it is stated in the move."""

@@ -21,7 +21,7 @@ _OTHER = "is a second move at the same time; correct each robot by itself"
 TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"MOVEL": (_C, "a straight move to a target with numbers, Offs or RelTool of one, or an array element"),
     b"MOVEJ": (_C, "corrected at its end; the path of the joints is not judged"),
-    b"MOVEABSJ": (_R, "joint values, kept as written; the position is unknown until the next target"),
+    b"MOVEABSJ": (_C, "corrected on arms; else kept, and the position behind it is unknown"),
     b"ROBTARGET": (_C, "a declared target, corrected where moves use it, and cloned where they differ"),
     b"TOOLDATA": (_R, "the tool of moves that name it"),
     b"WOBJDATA": (_R, "the frame of moves that name it"),

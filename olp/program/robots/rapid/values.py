@@ -23,6 +23,8 @@ def _list(count: int) -> bytes:
 _PIECES = (_list(3), _list(4), _list(4), _list(6))
 #: A robtarget with all its numbers, each a group.
 ROBTARGET = pattern(rb"\[\s*" + rb"\s*,\s*".join(_PIECES) + rb"\s*\]")
+#: A jointtarget likewise.
+JOINTTARGET = pattern(rb"\[\s*" + rb"\s*,\s*".join((_list(6), _list(6))) + rb"\s*\]")
 _POSE = rb"\[\s*" + rb"\s*,\s*".join(_PIECES[:2]) + rb"\s*\]"
 #: tooldata: whether the robot holds it, and its frame. The load behind it has no effect on the path.
 _TOOL = pattern(rb"(?i)\[\s*(TRUE|FALSE)\s*,\s*" + _POSE + rb"\s*,.*\]\s*", re.DOTALL)
@@ -75,6 +77,21 @@ def target_of(match: re.Match[bytes], line: int) -> Stated:
     spans = (match.span(1), match.span(2), match.span(3))
     turned, turns = (tuple(match.span(k) for k in some) for some in (range(4, 8), range(8, 11)))
     return Stated(spans, (x, y, z), quaternion(others[:4], line), tuple(others[4:]), turned, turns)
+
+
+@dataclass(frozen=True, slots=True)
+class Joints:
+    """What a jointtarget states: the bytes of its joint values, these in degrees, and the external axes."""
+
+    spans: tuple[Span, ...]
+    degrees: tuple[float, ...]
+    outer: tuple[float, ...]
+
+
+def joints_of(match: re.Match[bytes]) -> Joints:
+    """What a jointtarget states."""
+    numbers = tuple(map(float, match.groups()))
+    return Joints(tuple(match.span(k) for k in range(1, 7)), numbers[:6], numbers[6:])
 
 
 def tool_of(text: bytes, name: str, line: int) -> Pose:

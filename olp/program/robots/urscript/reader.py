@@ -13,7 +13,6 @@ from olp.core.machine import Setup
 from olp.core.patterns import pattern
 from olp.core.values import dataclass
 from olp.program.dialect import Dialect, Options, Support
-from olp.program.frames import tool_vector_of
 from olp.program.program import Program
 from olp.program.robots.frames import Located, Tool
 from olp.program.robots.moves import NAN, RobotMoves, take_all
@@ -321,4 +320,4 @@ class _Reader:
                 line=line.line,
                 code="OLP521",
             )
-        return Tool("tcp", None, tool_vector_of(self.setup, number, line.line), number)
+        return self.moves.frames.numbered_tool("tcp", number, None, line.line)
