@@ -80,6 +80,17 @@ FORMATS = ("csv", "npz", "parquet", "ros", "pvt")
     metavar="PERCENT", help="The override of feeds at the control; rapids keep their speed.",
 )  # fmt: skip
 @click.option("--gains", is_flag=True, help="Also list lines on which more tolerance or feed saves most.")
+@click.option(
+    "--controller", metavar="NAME", help="Also estimate the time on this control: linuxcnc or grbl."
+)
+@click.option(
+    "--setting", "settings", metavar="NAME=VALUE", multiple=True,
+    help="A setting of that control, such as junction_deviation_mm=0.02; may be repeated.",
+)  # fmt: skip
+@click.option(
+    "--log", metavar="run.csv", help="Learn limits and corners from a log of this run on that control."
+)
+@click.option("--log-profile", metavar="NAME|FILE", help="Layout of the log, as --profile of olp compare.")
 @click.option("--nominal", metavar="NOMINAL", help="Compare the times with those of another program.")
 @click.option("--proof", metavar="report.json", help="Also show the error budget of a report of olp correct.")
 @file_option("--lines", "FILE.csv", "Write time, speed and limit of each line.")
@@ -120,7 +131,7 @@ def command(program: str | None, machine: str | None, job: str | None, **words: 
     if call.program == STREAM == nominal:
         raise UsageError("stdin can be one program only; name PROGRAM or NOMINAL as a file")
     _refuse(outputs)
-    inputs = (*call.inputs, *files_of(nominal, proof))
+    inputs = (*call.inputs, *files_of(nominal, proof, words["log"]))
     targets = files_of(
         outputs.output, outputs.lines, outputs.slow, outputs.plot, outputs.write_feed, outputs.report_file
     )
@@ -132,7 +143,10 @@ def command(program: str | None, machine: str | None, job: str | None, **words: 
 
     for target in files_of(outputs.output):
         retime.format_of(target, outputs.kind)
-    options = options_of(retime.RetimeOptions, words | {"study_blend": words["blend_study"]})
+    options = options_of(
+        retime.RetimeOptions,
+        words | {"study_blend": words["blend_study"], "settings": _settings(words["settings"])},
+    )
     sources = call.session.sources
     second = None if nominal is None else source(sources, nominal)
     with progress(outputs.quiet) as show, naming("<stdin>" if STREAM in (call.program, nominal) else ""):
@@ -179,6 +193,18 @@ class _Outputs:
     @property
     def cycle_s(self) -> float:
         return self.cycle_ms * 1e-3
+
+
+def _settings(stated: tuple[str, ...]) -> dict[str, float]:
+    """Settings of a control by name. Raises UsageError for what is no number."""
+    values = {}
+    for item in stated:
+        name, _, value = item.partition("=")
+        try:
+            values[name] = float(value)
+        except ValueError:
+            raise UsageError(f"--setting {item!r} is not NAME=VALUE with a number") from None
+    return values
 
 
 def _refuse(outputs: _Outputs) -> None:

@@ -30,8 +30,9 @@ _NAME = 50
 def to_text(report: Report) -> str:
     """Plain text of at most 100 columns."""
     sections = (
-        _head(report), _control(report), _nominal(report), _gains(report), _blend_study(report),
-        _budget(report), _use(report), _slow(report), _lines(report), _feeds_written(report), _notes(report),
+        _head(report), _control(report), _controller(report), _nominal(report), _gains(report),
+        _blend_study(report), _budget(report), _use(report), _slow(report), _lines(report),
+        _feeds_written(report), _notes(report),
         findings_text(report["findings"]),
     )  # fmt: skip
     return "\n\n".join("\n".join(lines) for lines in map(list, sections) if lines) + "\n"
@@ -82,6 +83,24 @@ def _control(report: Report) -> Iterator[str]:
     if rows:
         yield "Asked of the control, seconds in all by [times] of the machine file"
         yield from table(("", "count", "seconds"), rows)
+
+
+def _controller(report: Report) -> Iterator[str]:
+    own = report.get("controller")
+    if not own:
+        return
+    yield f"On {own['title']}: {clock(float(own['duration_s']))}, estimated by its published planner"
+    rows = [
+        (f"{one['text']} ({one['name']})", f"{one['value']:.4g} {one['unit']}") for one in own["settings"]
+    ]
+    yield from table(("setting", ""), rows)
+    log = own.get("log")
+    if not log:
+        return
+    yield f"Learned from {printable(log['file'])}: {log['duration_s']:.3f} s of motion there"
+    limits = zip("XYZ", log["velocity_mm_s"], log["acceleration_mm_s2"], strict=True)
+    held = [(axis, f"{v:.1f}", f"{a:.0f}") for axis, v, a in limits if axis in log["axes"]]
+    yield from table(("axis", "velocity mm/s", "acceleration mm/s2"), held)
 
 
 def _gains(report: Report) -> Iterator[str]:

@@ -57,20 +57,27 @@ def routes(
     Raises as `olp.program.feeds.timing.timing`.
     """
     path = program.toolpath
-    clock = timing(program, blend_mm=blend_mm, block_delete=block_delete)
+    clock = clock_of(program, blend_mm=blend_mm, block_delete=block_delete, times=times)
     if not len(path):
         return ()
-    waits = None if times is None else actions(program, block_delete=block_delete)
-    if times is not None and waits is not None:
-        wait = waits.waits(path.line.astype(np.int64), times)
-        clock = replace(clock, rest=clock.rest | (wait > 0.0), dwell_s=clock.dwell_s + wait)
-    steps = _Steps.of(path, clock)
+    steps = Steps.of(path, clock)
     tolerance = _tolerances(path, clock, steps)
     return _cut(path, clock, steps, tolerance)
 
 
+def clock_of(program: Program, *, blend_mm: float, block_delete: bool, times: ControlTimes | None) -> Timing:
+    """The timing of a program, with the `times` of what the control does beside motion as dwells. Raises as
+    `routes`."""
+    clock = timing(program, blend_mm=blend_mm, block_delete=block_delete)
+    waits = None if times is None else actions(program, block_delete=block_delete)
+    if times is None or waits is None or not len(program.toolpath):
+        return clock
+    wait = waits.waits(program.toolpath.line.astype(np.int64), times)
+    return replace(clock, rest=clock.rest | (wait > 0.0), dwell_s=clock.dwell_s + wait)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
-class _Steps:
+class Steps:
     """Waypoints and the moves between them, without moves of no length.
 
     Of m waypoints: `waypoint` (m,) index of the point of the path, `rest` and `dwell_s` (m,). Of the m - 1
@@ -86,7 +93,7 @@ class _Steps:
     arc: Index
 
     @staticmethod
-    def of(path: Toolpath, clock: Timing) -> _Steps:
+    def of(path: Toolpath, clock: Timing) -> Steps:
         length = lengths_mm(path)
         # NaN compares as false: a move from or to an unknown point is a step that is not driven
         move = np.flatnonzero(~(length <= SHORTEST_MM))
@@ -98,10 +105,10 @@ class _Steps:
         dwell = np.bincount(owner, weights=clock.dwell_s).astype(np.float64)
         arc = np.full(len(path), -1, np.int64)
         arc[path.arcs.move] = np.arange(len(path.arcs))
-        return _Steps(waypoint, rest | (dwell > 0), dwell, move, np.isfinite(length[move]), arc[move])
+        return Steps(waypoint, rest | (dwell > 0), dwell, move, np.isfinite(length[move]), arc[move])
 
 
-def _tolerances(path: Toolpath, clock: Timing, steps: _Steps) -> Array:
+def _tolerances(path: Toolpath, clock: Timing, steps: Steps) -> Array:
     """(m,) how far from each waypoint the path may pass: what both moves allow; 0 at a rest."""
     tolerance = np.zeros(len(steps.waypoint))
     control = clock.control[steps.move]
@@ -118,15 +125,15 @@ def _tolerances(path: Toolpath, clock: Timing, steps: _Steps) -> Array:
     return tolerance
 
 
-def _smooth(path: Toolpath, steps: _Steps, before: Index) -> Mask:
+def _smooth(path: Toolpath, steps: Steps, before: Index) -> Mask:
     """Whether the joints between steps `before` and the next ones have no corner."""
-    leave = _directions(path, steps, before, 1.0)
-    begin = _directions(path, steps, before + 1, 0.0)
+    leave = directions(path, steps, before, 1.0)
+    begin = directions(path, steps, before + 1, 0.0)
     with np.errstate(invalid="ignore"):
         return np.asarray(np.sqrt(((begin - leave) ** 2).sum(axis=1)) <= TANGENT_RAD)
 
 
-def _directions(path: Toolpath, steps: _Steps, step: Index, share: float) -> Array:
+def directions(path: Toolpath, steps: Steps, step: Index, share: float) -> Array:
     """(k, 3) unit tangents of steps at their start (share 0) or end (1)."""
     move, arc = steps.move[step], steps.arc[step]
     start = path.starts_mm()[move]
@@ -149,7 +156,7 @@ def _directions(path: Toolpath, steps: _Steps, step: Index, share: float) -> Arr
         return np.asarray(direction / np.sqrt((direction * direction).sum(axis=1))[:, None], float)
 
 
-def _chords(path: Toolpath, clock: Timing, steps: _Steps) -> Index:
+def _chords(path: Toolpath, clock: Timing, steps: Steps) -> Index:
     """(m - 1,) how many chords each step has."""
     count = np.ones(len(steps.move), np.int64)
     step = np.flatnonzero((steps.arc >= 0) & steps.driven)
@@ -174,7 +181,7 @@ def _inside(clock: Timing, move: Index) -> Array:
     return np.where(blend, np.maximum(clock.blend_mm[move], _FINEST_MM), EXACT_MM)
 
 
-def _cut(path: Toolpath, clock: Timing, steps: _Steps, tolerance: Array) -> tuple[Route, ...]:
+def _cut(path: Toolpath, clock: Timing, steps: Steps, tolerance: Array) -> tuple[Route, ...]:
     """The routes: chords of all steps at once, then one slice per run of driven steps."""
     count = np.where(steps.driven, _chords(path, clock, steps), 1)
     last = np.concatenate(([0], np.cumsum(count)))

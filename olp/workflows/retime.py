@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -15,6 +15,8 @@ from olp.core.machine import Setup
 from olp.core.progress import Progress, silent
 from olp.core.values import dataclass
 from olp.files import trajectory as files
+from olp.files.point_profile import load_profile
+from olp.files.points import Points, read_points
 from olp.files.sources import Source
 from olp.files.write import write_files
 from olp.findings.catalogue import Finding
@@ -24,6 +26,8 @@ from olp.program.origin import Origin
 from olp.program.registry import Options
 from olp.program.rs274.state import PathMode
 from olp.reports.plots.base import Format as Picture
+from olp.trajectory.controls.base import Control
+from olp.trajectory.controls.registry import control_named
 from olp.trajectory.from_program import axis_limits
 from olp.trajectory.gains import gains
 from olp.trajectory.inertia import compliance_of
@@ -35,6 +39,7 @@ from olp.workflows import refusals
 from olp.workflows.doubt import accepted_of, doubted_motion
 from olp.workflows.flatten import UnrollOptions
 from olp.workflows.original import placed, placed_findings
+from olp.workflows.retime_control import control_time
 from olp.workflows.retime_report import against, proved, report_of
 from olp.workflows.session import PathLike, Session
 from olp.workflows.shown import Shown
@@ -63,6 +68,10 @@ class RetimeOptions(UnrollOptions):
     max_inertial_um: float | None = None
     feed_override: float = 100.0
     gains: bool = False
+    controller: str | None = None
+    settings: Mapping[str, float] = field(default_factory=dict)
+    log: PathLike | None = None
+    log_profile: str | None = None
     block_delete: bool = False
     date: datetime.date | None = None
     accept: tuple[str, ...] = ()
@@ -260,6 +269,10 @@ def retime(
     max_inertial_um: float | None = None,
     feed_override: float = 100.0,
     gains: bool = False,
+    controller: str | None = None,
+    settings: Mapping[str, float] | None = None,
+    log: PathLike | None = None,
+    log_profile: str | None = None,
     block_delete: bool = False,
     flatten: bool = False,
     expand_cycles: bool = False,
@@ -278,6 +291,9 @@ def retime(
     times the path tolerances in use. `max_inertial_um` limits the deviation by accelerations and the
     machine's compliance. `feed_override` is the override of feeds in percent; rapids keep their speed.
     `gains` adds the lines on which more path tolerance or more feed would save most.
+    `controller` adds the time that a control of that kind takes, by what is published of its planner, with
+    `settings` of it by name. `log` is the log of a run of this program on it, from which limits and corners
+    are learned; `log_profile` is its layout, as in `compare`.
     `block_delete` leaves `/` blocks out. `flatten`, `expand_cycles` and
     `peck_clearance_mm` are those of `correct`. Axes commanded beyond their travel are findings (OLP402), and
     planned all the same. `date` and `accept` are those of `correct`, for doubts about
@@ -287,7 +303,8 @@ def retime(
     session = Session.start(machine, job)
     options = RetimeOptions(
         blend_mm=blend_mm, study_blend=study_blend, max_inertial_um=max_inertial_um,
-        feed_override=feed_override, gains=gains, block_delete=block_delete, flatten=flatten,
+        feed_override=feed_override, gains=gains, controller=controller, settings=settings or {}, log=log,
+        log_profile=log_profile, block_delete=block_delete, flatten=flatten,
         expand_cycles=expand_cycles, peck_clearance_mm=peck_clearance_mm, date=date, accept=tuple(accept),
     )  # fmt: skip
     other = None if nominal is None else session.sources.source(nominal)
@@ -311,6 +328,7 @@ def run(
             f"the feed override is {override:g} %; expected more than 0, and at most {MOST_OVERRIDE:g}"
         )
     setup, most_um = session.setup, options.max_inertial_um
+    control, log = _control(session, options)
     stated = None if proof is None else proved(proof, setup)
     tell = progress or silent
     tell("read", 0.0)
@@ -336,6 +354,10 @@ def run(
         report["proof"] = stated | {"at_most_um": stated["path_max_um"] + moving}
     if options.study_blend:
         report["blend_study"] = blend_study(case, plan, FACTORS, tell)
+    if control is not None:
+        bare = options.blend_mm is None and setup.machine.blend_mm is None
+        own = control_time(control, case, limits, options.settings, log, bare=bare)
+        report["controller"] = placed(own, origin)
     if options.gains:
         report |= placed({"gains": gains(case, plan, tell)}, origin)
     # the motion is inside the box of its waypoints, so commands within travel are motion within travel
@@ -345,6 +367,21 @@ def run(
     report["accepted"] = accepted_of(findings)
     report["findings"] = [f.as_dict() for f in findings]
     return Retiming(plan, report, findings, shown)
+
+
+def _control(session: Session, options: RetimeOptions) -> tuple[Control | None, Points | None]:
+    """The profile of the control and the log of a run. Raises UsageError for what needs a control without
+    one, and InputError for a log that cannot be read."""
+    if options.controller is None:
+        if options.log is not None or options.settings:
+            raise UsageError("a log and settings are those of a control; name it with --controller")
+        return None, None
+    control = control_named(options.controller)
+    control.values(options.settings)
+    if options.log is None:
+        return control, None
+    layout = None if options.log_profile is None else load_profile(options.log_profile, session.sources.read)
+    return control, read_points(options.log, layout, session.sources.read)
 
 
 def _case(session: Session, program: Source, options: RetimeOptions) -> Case:

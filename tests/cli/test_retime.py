@@ -719,3 +719,37 @@ def test_the_report_keeps_to_its_width_and_shows_no_small_value_as_none(job: Pat
     assert result.exit_code == 0
     assert max(map(len, result.stdout.splitlines())) <= 100
     assert next(row for row in result.stdout.splitlines() if "by the proof of" in row).split()[-1] == "<0.01"
+
+
+def test_the_time_of_a_control_is_stated_and_learned_from_a_log(job: Path, tmp_path: Path) -> None:
+    """A log of the planned motion itself: the limits that it holds are those of the machine file."""
+    args = (program(tmp_path, "G21 G90 G54\nG0 X90\nG0 X0\nG0 Y90\nG0 Y0\nM2\n"), "-j", job)
+    assert "controller" not in report_of(*args)
+    own = report_of(*args, "--controller", "grbl", "--setting", "junction_deviation_mm=0.05")["controller"]
+    assert [one["stated"] for one in own["settings"]] == [True, False]
+    assert run("retime", *args, "-q", "-o", tmp_path / "run.csv").exit_code == 0
+    plan = report_of(*args, "--controller", "linuxcnc", "--log", tmp_path / "run.csv")
+    log, limits = plan["controller"]["log"], plan["limits"]
+    assert log["axes"] == ["X", "Y"]
+    assert log["velocity_mm_s"] == pytest.approx(limits["velocity_mm_s"], rel=0.01)
+    assert log["duration_s"] == pytest.approx(plan["duration_s"], abs=0.01)
+    text = run("retime", *args, "--controller", "linuxcnc", "--log", tmp_path / "run.csv").stdout
+    assert "On LinuxCNC 2.9: " in text
+    assert "Learned from " in text
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--controller", "fanuk"), "expected one of linuxcnc, grbl"),
+        (("--log", "run.csv"), "--controller"),
+        (("--controller", "grbl", "--setting", "x"), "NAME=VALUE"),
+        (("--controller", "grbl", "--setting", "servo_period_ms=1"), "no setting"),
+    ],
+)
+def test_what_a_control_does_not_have_is_refused(
+    job: Path, tmp_path: Path, options: tuple[str, ...], message: str
+) -> None:
+    result = run("retime", program(tmp_path), "-j", job, *options)
+    assert result.exit_code == 2
+    assert message in result.stderr

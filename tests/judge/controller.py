@@ -90,11 +90,11 @@ class Kinematics:
 
 def run(
     program: bytes, machine: Path, folder: Path, *, limit_s: float = 240.0, tables: Path | None = None,
-    kinematics: Kinematics | None = None,
+    kinematics: Kinematics | None = None, in_step: bool = False,
 ) -> Run:  # fmt: skip
     """Execute a program from axis position 0 with the offsets and tools of a machine folder; `tables` is an
     INI file whose keys of joints are taken over, its files lie beside it. `kinematics` takes the place of the
-    identity; then the control runs in virtual time.
+    identity; then the control runs in virtual time, as it does `in_step`.
 
     Raises RuntimeError where the control reports an error or does not end in time.
     """
@@ -106,8 +106,9 @@ def run(
     env["CONTROLLER_FOLDER"] = str(folder)
     if os.getuid() == 0:  # the realtime part refuses to be root
         env |= {"RTAPI_UID": "65534", "RTAPI_FIFO_PATH": str(folder / ".rtapi_fifo")}
-    if kinematics is not None and not kinematics.built_in:
-        env |= _in_step(folder, kinematics)
+    own = None if kinematics is None or kinematics.built_in else kinematics
+    if in_step or own is not None:
+        env |= _in_step(folder, own)
     lock = Path(tempfile.gettempdir()) / "judge-controller.lock"
     driver_log = folder / "driver.log"
     with lock.open("wb") as one, (folder / "log").open("wb") as log:
@@ -137,17 +138,16 @@ def run(
     return Run(rows[:, :3], rows[:, 3].astype(int), rows[:, 4:7], rows[:, 7:])
 
 
-def _in_step(folder: Path, kinematics: Kinematics) -> dict[str, str]:
+def _in_step(folder: Path, kinematics: Kinematics | None) -> dict[str, str]:
     """The environment that lets each servo cycle wait for the task, and finds the component."""
     library, counters = folder / "lockstep.so", folder / "counters"
     subprocess.run(["gcc", "-shared", "-fPIC", "-O2", "-o", library, _LOCKSTEP], check=True)
     counters.write_bytes(bytes(4096))
     counters.chmod(0o666)
-    module = kinematics.folder / f"{kinematics.name}.so"
-    return {
-        "LD_PRELOAD": str(library), "LOCKSTEP": str(counters), "LOCKSTEP_DT": str(PERIOD_NS),
-        "LOCKSTEP_MODULE": str(module),
-    }  # fmt: skip
+    env = {"LD_PRELOAD": str(library), "LOCKSTEP": str(counters), "LOCKSTEP_DT": str(PERIOD_NS)}
+    if kinematics is not None:
+        env["LOCKSTEP_MODULE"] = str(kinematics.folder / f"{kinematics.name}.so")
+    return env
 
 
 def _open(folder: Path) -> None:

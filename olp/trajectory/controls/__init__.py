@@ -1,0 +1,1 @@
+"""How long controls take for a program, by what is published of their planners."""
