@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable
 
 import numpy as np
 
@@ -46,40 +47,61 @@ def size_doubts(
     path: Toolpath, model: ErrorModel, calibration: Calibration, machine: Machine
 ) -> list[Finding]:
     """Errors too large for this machine at waypoints, else in the box, or too small to be measured."""
-    limit = largest_mm(machine)
-    size = _at_waypoints(path, model)
-    wild = found(len(size), lambda some: size[some] > limit)
-    expected = f"at most {limit * UM_PER_MM:.0f} um are expected of this machine"
-    if wild.size:
-        largest = float(size[wild].max()) * UM_PER_MM
-        what = f"the error is up to {largest:.0f} um at {len(wild)} waypoints; {expected}"
-        return [finding("OLP409", what, lines_of(path, wild))]
-    return box_doubts(model, path.tools_mm(), calibration, machine, _largest(size))
+    limit, tools = largest_mm(machine), path.tools_mm()
+    # far below that everywhere, of most machines, and then no waypoint has to be looked at
+    if not _most_mm(model, tools) <= limit:
+        size = _at_waypoints(path, model)
+        wild = found(len(size), lambda some: size[some] > limit)
+        if wild.size:
+            largest = float(size[wild].max()) * UM_PER_MM
+            expected = f"at most {limit * UM_PER_MM:.0f} um are expected of this machine"
+            what = f"the error is up to {largest:.0f} um at {len(wild)} waypoints; {expected}"
+            return [finding("OLP409", what, lines_of(path, wild))]
+    return box_doubts(model, tools, calibration, machine, lambda: _largest(_at_waypoints(path, model)))
 
 
 def box_doubts(
-    model: ErrorModel, tools_mm: Array, calibration: Calibration, machine: Machine, known_mm: float = 0.0
-) -> list[Finding]:
+    model: ErrorModel, tools_mm: Array, calibration: Calibration, machine: Machine,
+    known_mm: Callable[[], float] = float,
+) -> list[Finding]:  # fmt: skip
     """Errors too large anywhere in the box with one of the tool vectors (k, 3), or too small to be measured
-    where `known_mm`, an error outside of it, is that small too."""
+    where what `known_mm` gives, the largest one that is known beside them, is that small too."""
     limit = largest_mm(machine)
     expected = f"at most {limit * UM_PER_MM:.0f} um are expected of this machine"
-    points = _box_points(model.box_mm)
-    # a program may change between few tools ten thousand times
-    tools = distinct_rows(tools_mm)
-    error = np.nan_to_num(np.stack([model.error(points, tool) for tool in tools]))
-    in_box = np.linalg.norm(error, axis=2).max(axis=0)
+    points, in_box = _in_box(model, tools_mm)
     worst, largest = int(in_box.argmax()), float(in_box.max())
     if largest > limit:
         place = ", ".join(f"{v:g}" for v in points[worst].tolist())
         what = f"calibration: the error is {largest * UM_PER_MM:.0f} um at ({place}) in the box; {expected}"
         return [finding("OLP445", what)]
     span = float(np.linalg.norm(np.ptp(model.box_mm, axis=1)))
-    largest = max(largest, known_mm)
+    if largest < UNMEASURABLE * span:
+        largest = max(largest, known_mm())
     if 0.0 < largest < UNMEASURABLE * span and span > _SHORT_MM and not calibration.thermal:
         what = f"calibration: the error is at most {largest * UM_PER_MM:.2g} um anywhere in the box"
         return [finding("OLP451", f"{what}; expected more than {UNMEASURABLE * span * UM_PER_MM:.2g} um")]
     return []
+
+
+def _in_box(model: ErrorModel, tools_mm: Array) -> tuple[Array, Array]:
+    """(m, 3) positions all over the box, and (m,) the largest error there with one of the tools (k, 3)."""
+    points = _box_points(model.box_mm)
+    # a program may change between few tools ten thousand times
+    tools = distinct_rows(tools_mm)
+    error = np.nan_to_num(np.stack([model.error(points, tool) for tool in tools]))
+    return points, np.asarray(np.linalg.norm(error, axis=2).max(axis=0))
+
+
+def _most_mm(model: ErrorModel, tools_mm: Array) -> float:
+    """A bound of the error anywhere in the box with one of the tools (k, 3); infinite where there is
+    backlash."""
+    points, in_box = _in_box(model, tools_mm)
+    if model.backlash_at(points) is not None:
+        return float("inf")
+    # from the nodes to anywhere: along X on an edge, then along Y on a face, then along Z
+    step = np.diag(np.ptp(model.box_mm, axis=1) / (_NODES - 1))
+    bends = [model.chord_bound(step, tool) for tool in distinct_rows(tools_mm)]
+    return float(in_box.max() + np.sum(bends, axis=1).max())
 
 
 def _at_waypoints(path: Toolpath, model: ErrorModel) -> Array:

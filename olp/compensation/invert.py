@@ -34,33 +34,36 @@ def invert(model: ErrorModel, target_mm: Array, tool_mm: Array, play: Array | No
         tool = tool_mm if tool_mm.ndim == 1 else tool_mm[part]
         state = None if play is None else play[part]
         target = target_mm[part]
-        guess = target
+        row, guess = np.arange(a, a + len(target)), target
         previous, step = np.zeros((1, 3)), np.zeros(len(target))
-        # each point ends with its own last step, whatever the points beside it are
-        good = np.zeros(len(target), bool)
         for i in range(_ITERATIONS):
             e = model.error(guess, tool, state)
             unknown = np.isnan(e)
             if unknown.any():
                 e[unknown] = 0.0
             change = _largest(e - previous)
-            if i:
-                good |= change < TOLERANCE_MM
-                if good.all():
-                    break
+            # each point ends with its own last step, whatever the points beside it are
+            good = change < TOLERANCE_MM if i else np.zeros(len(row), bool)
             guess = np.where(good[:, None], guess, target - e) if good.any() else target - e
             if i:
                 # the next change will be this one times the rate at which the error grows
                 good |= change * np.maximum(_LEAST_RATE * step, 10.0 * change) < TOLERANCE_MM * step
-                if good.all():
-                    break
             previous, step = e, change
+            if good.any():
+                command[row] = guess
+                some = np.flatnonzero(~good)
+                row, target, guess, previous, step = (
+                    row[some], target[some], guess[some], previous[some], step[some]
+                )  # fmt: skip
+                tool = tool if tool.ndim == 1 else tool[some]
+                state = None if state is None else state[some]
+            if not len(row):
+                break
         else:
             raise NotInvertible(
                 f"the error model cannot be inverted to {TOLERANCE_MM:g} mm: its errors grow as fast as the "
                 f"position (the last step was {change.max():.3g} mm); check the values of the calibration"
             )
-        command[part] = guess
     return command
 
 

@@ -31,8 +31,10 @@ from olp.proof.unknown_starts import UnknownStarts
 #: enough for deviations, which are small, and half the memory
 Single = npt.NDArray[np.float32]
 
-#: nominal moves at a time, and moves that they became, so that memory is small
-_BLOCK = 1 << 13
+#: nominal moves at a time, and moves that they became, so that memory is small; down to a quarter of them ...
+_BLOCK = 1 << 15
+#: ... where they would have more samples
+_SAMPLES = 1 << 16
 #: samples of an arc move at the least, and of a move at the most
 _ARC_STEPS = 8
 _MOST_STEPS = 1 << 12
@@ -80,12 +82,14 @@ def measure(
     sides = UnknownSides(path, model) if tracer.has_play else None
     # without play one 0 stands for all
     side = np.broadcast_to(np.float32(0.0), count) if sides is None else apart((count,), np.float32)
-    a = 0
+    a, least = 0, max(_BLOCK // 4, 1)
+    size = least
     while a < count:
-        parts = int(groups[a - 1]) + _BLOCK if a else _BLOCK
-        b = min(max(int(np.searchsorted(groups, parts)), a + 1), a + _BLOCK, count)
+        parts = int(groups[a - 1]) + size if a else size
+        b = min(max(int(np.searchsorted(groups, parts)), a + 1), a + size, count)
         bend = np.zeros(b - a, np.float32)
-        tracer.block(a, b, waypoint[a:b], worst[a:b], bend)
+        samples = tracer.block(a, b, waypoint[a:b], worst[a:b], bend)
+        size = min(max((b - a) * _SAMPLES // max(samples, 1), least), _BLOCK)
         largest = max(largest, float(bend.max(initial=0.0, where=counted[a:b])))
         starts.block(a, b, worst[a:b])
         if sides is not None:
@@ -184,18 +188,18 @@ class Tracer:
         within = (share > 0.0) & (share < 1.0)
         return rows[of[within]], share[within]
 
-    def block(self, a: int, b: int, waypoint: Single, worst: Single, bend: Single) -> None:
-        """Fill the columns of nominal moves a..b."""
+    def block(self, a: int, b: int, waypoint: Single, worst: Single, bend: Single) -> int:
+        """Fill the columns of nominal moves a..b. Returns the number of samples."""
         first = int(self.groups[a - 1]) + 1 if a else 0
         last = int(self.groups[b - 1]) + 1
         ends = self.groups[a:b] - first
         if last == first:
             self._ends(a, b, self.before[None], ends, waypoint)
             worst[:], self.away = waypoint, waypoint[-1]
-            return
+            return 0
         path = self.path
         start, end = path.starts_mm(first, last), path.end_mm[first:last]
-        owner = np.searchsorted(self.groups[a:b], np.arange(first, last))
+        owner = owner_of(self.groups[a:b], first, last)
         tool = path.tool_mm(first, last)
         delta = np.where(np.isnan(end), 0.0, end - start)
         steps = np.ones(len(end), np.int64)
@@ -224,6 +228,7 @@ class Tracer:
             self._bend(a, tips, inner, owner, arc >= 0, bend)
             self._along(a, b, first, owner, inner.with_ends(cuts, reached), worst)
         self._starts(a, b, first, owner, tips, waypoint, worst)
+        return len(end) + len(inner.part)
 
     def _ends(self, a: int, b: int, tips: Array, ends: Index, waypoint: Single) -> None:
         """How far the tip is off at the ends of nominal moves a..b, behind `ends` of the moves that reach
@@ -315,14 +320,16 @@ class Tracer:
         """A cut starts where the moves before it ended, which may be farther off than any of its samples."""
         away = np.concatenate(([self.away], waypoint[:-1]))
         self.before, self.away = tips[-1], waypoint[-1]
-        begin = np.concatenate(([0], self.groups[a : b - 1] + 1 - first))
-        farther = (np.nan_to_num(away, nan=np.inf) > worst) & (self.nominal.kind[a:b] != Kind.RAPID)
-        known = all_in_row(np.isfinite(self._known(a + np.arange(b - a), tips.take(begin, axis=0))))
-        farther &= (begin < len(tips) - 1) & known
+        farther = np.where(np.isnan(away), np.inf, away) > worst
+        farther &= self.nominal.kind[a:b] != Kind.RAPID
         rows = np.flatnonzero(farther)
-        rows = rows[owner[begin[rows]] == rows]
-        if rows.size:
-            starts = _Inner(begin[rows], np.zeros(len(rows)), tips.take(begin[rows], axis=0))
+        begin = np.concatenate(([0], self.groups[a : b - 1] + 1 - first))[rows]
+        tip = tips.take(begin, axis=0)
+        some = (begin < len(tips) - 1) & all_in_row(np.isfinite(self._known(a + rows, tip)))
+        rows, begin, tip = rows[some], begin[some], tip[some]
+        some = owner[begin] == rows
+        if some.any():
+            starts = _Inner(begin[some], np.zeros(int(some.sum())), tip[some])
             self._along(a, b, first, owner, starts, worst)
 
     def _arc_steps(self, arc: Index, start: Array, delta: Array, tool: Array, rows: Index) -> Index:
@@ -433,6 +440,16 @@ class _Inner:
     def with_ends(self, cuts: Index, reached: Array) -> _Inner:
         """These, and the ends of the parts `cuts`."""
         return self.with_more(_Inner(cuts, np.ones(len(cuts)), reached[cuts]))
+
+
+def owner_of(groups: Index, first: int, last: int) -> Index:
+    """(last - first,) the nominal move that each of moves `first`..`last` belongs to; `groups` (n,) are the
+    last ones of nominal moves."""
+    move = np.arange(first, last)
+    # mostly nothing is inserted, and a search takes long
+    if np.array_equal(groups, move):
+        return move - first
+    return np.searchsorted(groups, move)
 
 
 def _kinds(on_arc: Mask, of: Index) -> tuple[Index, Index, Index]:

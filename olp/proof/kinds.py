@@ -14,6 +14,7 @@ from olp.core.errors import ProgramError
 from olp.core.spool import unload
 from olp.core.toolpath import Flag, Kind, Toolpath
 from olp.program.program import Program
+from olp.proof.deviation import owner_of
 
 #: Moves that the program or you leave as they are.
 _AWAY = np.uint8(Flag.PASS | Flag.CONTROL | Flag.MACHINE)
@@ -57,7 +58,7 @@ def _changes(
 ) -> Iterator[tuple[Mask, str]]:
     """(m,) moves `written` that are not allowed, and what is wrong with them. (n,) `drilled` and (m,)
     `in_hole` are moves of holes that are compared as one."""
-    owner = np.searchsorted(groups, np.arange(len(written)))
+    owner = owner_of(groups, 0, len(written))
     of_hole = drilled[owner]
     yield in_hole & ~of_hole, "drills where the nominal program does not"
     rapid, was_rapid = written.kind == Kind.RAPID, path.kind[owner] == Kind.RAPID

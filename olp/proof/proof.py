@@ -20,7 +20,7 @@ from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
 from olp.program.program import Program
 from olp.program.text.columns import Columns, apart, found, marked, spans
-from olp.proof.deviation import Deviation, Single, cutting_moves, measure
+from olp.proof.deviation import Deviation, Single, cutting_moves, measure, owner_of
 from olp.proof.kinds import check_kinds
 from olp.proof.matching import match
 from olp.proof.strokes import strokes_mm
@@ -119,7 +119,9 @@ class Proof:
         """(m,) the nominal line of each move of the corrected program."""
         line = apart((len(self.written),), np.int32)
         for some in spans(len(line), _BLOCK):
-            line[some] = self.nominal.line[np.searchsorted(self.groups, np.arange(some.start, some.stop))]
+            first, last = np.searchsorted(self.groups, (some.start, some.stop - 1)).tolist()
+            owner = owner_of(self.groups[first : last + 1], some.start, some.stop)
+            line[some] = self.nominal.line[first + owner]
         return line
 
     @property

@@ -6,8 +6,9 @@ block is refused here, many lines at a time.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import field
+from functools import cache
 
 import numpy as np
 import numpy.typing as npt
@@ -45,6 +46,7 @@ M = 10_000
 _ARCS = frozenset({20, 30})
 
 
+@cache
 def _bits(letters: str) -> int:
     return sum(1 << (ord(letter) - 65) for letter in letters)
 
@@ -57,10 +59,21 @@ _CENTRE = _bits("IJK")
 _IN_PLANE = {170: _bits("IJ"), 180: _bits("IK"), 190: _bits("JK")}
 #: Words of their ends.
 _ENDS = {170: _bits("XY"), 180: _bits("XZ"), 190: _bits("YZ")}
+#: All words that arcs take beside their ends.
+_OF_ARCS = _CENTRE | _bits("R")
 _MOTION = frozenset({0, 10, THREAD, *_ARCS, *COMMON_CYCLES, *PROBES})
-_MOTIONS = np.array(sorted(_MOTION))
+
+
+def _table(codes: Iterable[int]) -> Mask:
+    """(2 M,) whether a key is one of these codes."""
+    table = np.zeros(2 * M, bool)
+    table[list(codes)] = True
+    return table
+
+
+_MOTIONS = _table(_MOTION)
 #: Codes that take the axis words of their block for something else.
-_STATING = np.array(sorted(AXIS_VALUES | HOMES))
+_STATING = _table(AXIS_VALUES | HOMES)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,19 +109,23 @@ class BlockRules:
         group = np.full(2 * M, -1, np.int8)
         for number, codes in enumerate(self.groups):
             group[sorted(codes)] = number
+        needed = np.zeros(2 * M, np.int32)
+        for code, letters in self.needs.items():
+            needed[code] = _bits(letters)
         positive = np.zeros(256, bool)
         positive[list(self.positive.encode())] = True
-        return _Tables(self, allowed, group, positive, sum(_bits(letter) for letter in self.users))
+        return _Tables(self, allowed, group, needed, positive, sum(_bits(letter) for letter in self.users))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Tables:
-    """`allowed` (2 M,) the letters that a code uses, as bits; `group` of a code or -1; `bound` are the
-    letters that need a user."""
+    """`allowed` (2 M,) the letters that a code uses, as bits; `group` of a code or -1; `needed` (2 M,) the
+    letters of which a code needs one, 0 for none; `bound` are the letters that need a user."""
 
     rules: BlockRules
     allowed: Bits
     group: npt.NDArray[np.int8]
+    needed: Bits
     _positive: Mask
     bound: int
 
@@ -136,17 +153,14 @@ class _Tables:
             raise ProgramError.together(errors.values())
 
     def _twice(self, chunk: WordChunk, active: Mask, present: Bits) -> Iterator[Refusal]:
-        several_of = list(self.rules.several.encode())
-        letters_free = np.zeros(256, bool)
-        letters_free[several_of] = True
-        free = chunk.line[letters_free[chunk.letter]]
-        words = np.diff(chunk.first_word) - np.bincount(free, minlength=len(present))
-        several = active & (np.bitwise_count(present & ~_bits(self.rules.several)) != words)
-        for line in np.flatnonzero(several).tolist():
+        words = np.diff(chunk.first_word)
+        # mostly no line has more words than letters
+        for line in np.flatnonzero(active & (np.bitwise_count(present) != words)).tolist():
             mine = chunk.letter[chunk.first_word[line] : chunk.first_word[line + 1]]
-            letters = [chr(letter) for letter in mine.tolist() if letter not in several_of]
-            letter = next(x for x in letters if letters.count(x) > 1)
-            yield line, f"the word {letter} is twice in this block; expected it once", "OLP515", ""
+            letters = [letter for letter in map(chr, mine.tolist()) if letter not in self.rules.several]
+            letter = next((x for x in letters if letters.count(x) > 1), "")
+            if letter:
+                yield line, f"the word {letter} is twice in this block; expected it once", "OLP515", ""
 
     def _groups(self, codes: tuple[Index, Index]) -> Iterator[Refusal]:
         line, key = codes
@@ -168,22 +182,26 @@ class _Tables:
     def _unused(
         self, active: Mask, codes: tuple[Index, Index], present: Bits, motion: Codes, plane: Codes
     ) -> Iterator[Refusal]:
-        bound = np.where(active, present & self.bound, 0)
-        probes = is_in(motion, sorted(PROBES)) if self.bound else np.zeros(0, bool)
-        if not (bound.any() or probes.any()):
+        if not self.bound:
+            return
+        probes = is_in(motion, PROBES)
+        # most lines have neither a word that needs a user, nor one of an arc
+        some = np.flatnonzero(active & (((present & (self.bound | _OF_ARCS)) != 0) | probes))
+        if not some.size:
             return
         line, key = codes
         allowed = np.zeros(len(present), np.int32)
-        using = self.allowed[key] != 0
-        np.bitwise_or.at(allowed, line[using], self.allowed[key[using]])
-        moves = (present & _AXES) != 0
-        arcs = is_in(motion, sorted(_ARCS))
-        moves |= arcs & ((present & _CENTRE) != 0)
-        moves[line[np.isin(key, _STATING, kind="table")]] = False
+        np.bitwise_or.at(allowed, line, self.allowed[key])
+        stating, moving = (_lines_of(table, codes, len(present))[some] for table in (_STATING, _MOTIONS))
+        allowed, present, probes = allowed[some], present[some], probes[some]
+        motion, plane = motion[some], plane[some]
+        arcs = is_in(motion, _ARCS)
+        moves = ((present & _AXES) != 0) | (arcs & ((present & _CENTRE) != 0))
+        moves &= ~stating
         allowed[moves] |= self.allowed[np.maximum(motion[moves], 0)]
         # a code of this block moves without words, too
-        moves[line[np.isin(key, _MOTIONS, kind="table")]] = True
-        outside = np.zeros(len(present), np.int32)
+        moves |= moving
+        outside = np.zeros(len(some), np.int32)
         radius = (present & _bits("R")) != 0
         for code, letters in _IN_PLANE.items():
             outside[plane == code] = _CENTRE & ~letters
@@ -194,18 +212,22 @@ class _Tables:
         outside[~(moves & arcs)] = 0
         # a probe needs a path of X, Y or Z
         outside[moves & probes & ((present & _bits("XYZ")) == 0)] = _AXES
-        spare = (bound & ~allowed) | (np.where(active, present, 0) & outside)
-        for where in np.flatnonzero(spare).tolist():
-            letter = chr(64 + int(spare[where] & -spare[where]).bit_length())
+        spare = (present & self.bound & ~allowed) | (present & outside)
+        for row in np.flatnonzero(spare).tolist():
+            letter = chr(64 + int(spare[row] & -spare[row]).bit_length())
             why = f"no code of this block uses its word {letter}; remove it, or give the code that does"
-            yield where, why, "OLP519", letter
+            yield int(some[row]), why, "OLP519", letter
 
     def _lacking(self, codes: tuple[Index, Index], present: Bits) -> Iterator[Refusal]:
         line, key = codes
-        has = present[line]
+        has, needed = present[line], self.needed[key]
+        lacking = np.flatnonzero((needed != 0) & ((has & needed) == 0))
+        codes_of = set(key[lacking].tolist())
         for code, letters in self.rules.needs.items():
+            if code not in codes_of:
+                continue
             what = f"one of {', '.join(letters)}" if len(letters) > 1 else letters
-            for where in line[(key == code) & ((has & _bits(letters)) == 0)].tolist():
+            for where in line[lacking[key[lacking] == code]].tolist():
                 yield where, f"{_name(code)} needs {what} in its block", "OLP516", ""
         for code, (one, other) in self.rules.excludes.items():
             both = line[(key == code) & ((has & _bits(one)) != 0) & ((has & _bits(other)) != 0)]
@@ -213,9 +235,7 @@ class _Tables:
                 why = f"{_name(code)} takes {one}, or words of axes; expected one of the two"
                 yield where, why, "OLP518", ""
         if self.rules.one_use_of_axes:
-            stating, moving = np.zeros((2, len(present)), bool)
-            stating[line[np.isin(key, _STATING, kind="table")]] = True
-            moving[line[np.isin(key, _MOTIONS, kind="table")]] = True
+            stating, moving = (_lines_of(table, codes, len(present)) for table in (_STATING, _MOTIONS))
             for where in np.flatnonzero(stating & moving).tolist():
                 why = "two G codes of this block use its axis words; give each its own block"
                 yield where, why, "OLP518", ""
@@ -258,6 +278,14 @@ class _Tables:
             letter = chr(int(chunk.letter[word]))
             why = f"the word {letter} has a fraction; expected an integer"
             yield int(chunk.line[word]), why, "OLP516", letter
+
+
+def _lines_of(table: Mask, codes: tuple[Index, Index], lines: int) -> Mask:
+    """(lines,) whether a line has a code of a `table`, of the lines and keys of codes."""
+    line, key = codes
+    found = np.zeros(lines, bool)
+    found[line[table[key]]] = True
+    return found
 
 
 def _behind_comment(chunk: WordChunk, words: Index) -> Mask:

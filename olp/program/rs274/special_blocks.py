@@ -188,6 +188,8 @@ def check_codes(context: Context, profile: Profile) -> None:
     m = np.flatnonzero((chunk.letter == ord("M")) & context.active[chunk.line])
     m = m[is_in(np.rint(context.value[m] * 10), list(profile.m_refusals))]
     lines = distinct(np.concatenate((codes.line[codes.act == Act.REFUSE], chunk.line[m])))
+    if not lines.size:
+        return
     errors = []
     for stated in event_words(context, lines):
         try:
