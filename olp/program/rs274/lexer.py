@@ -177,7 +177,9 @@ def without_cr(text: Bytes, starts: Index, ends: Index) -> Index:
 
 def blanked(text: Bytes, keep: Mask) -> Bytes:
     """The text with a blank for all that is not kept."""
-    return np.where(keep, text, np.uint8(32))
+    # by bits, which is four times as fast as a choice
+    kept = -keep.view(np.uint8)
+    return (text & kept) | (~kept & np.uint8(32))
 
 
 def runs(text: Bytes) -> tuple[Bytes, Index, Index]:
@@ -278,26 +280,23 @@ def numbers(
     negative = first == 45
     signed = negative | (first == 43)
     digits = begin + signed
-    dots = np.flatnonzero(body == 46)
-    point = stop
-    pointed = np.zeros(count, bool)
-    if dots.size:
-        nearest = np.append(dots, len(body) + 1)[np.searchsorted(dots, begin)]
-        pointed = nearest < stop
-        point = np.where(pointed, nearest, stop)
+    point, pointed, dots = _points(body, begin, stop)
     whole = point - digits
     fraction = np.maximum(stop - point - 1, 0)
     signs = np.count_nonzero((body == 43) | (body == 45))
     suspects = np.zeros(0, np.int64)
-    if np.count_nonzero(pointed) != len(dots) or np.count_nonzero(signed) != signs:
+    if np.count_nonzero(pointed) != dots or np.count_nonzero(signed) != signs:
         suspects = np.arange(count)
     else:
         suspects = np.flatnonzero((whole > 8) | (fraction > 8) | (whole + fraction == 0))
     # window[i] holds the eight bytes before position i of `body`
     window = np.ndarray((len(compact) - 7,), "<u8", compact.data, 0, (1,))
-    value = _eight_digits(window[point], np.minimum(whole, 8))
-    if fraction.any():
-        value = value * _POW10[np.minimum(fraction, 8)] + _eight_digits(window[stop], np.minimum(fraction, 8))
+    value = _seven_digits(window[stop], whole, fraction, pointed)
+    long = np.flatnonzero(whole + fraction > 7)
+    if long.size:
+        places = np.minimum(fraction[long], 8)
+        value[long] = _eight_digits(window[point[long]], np.minimum(whole[long], 8)) * _POW10[places]
+        value[long] += _eight_digits(window[stop[long]], places)
     mantissa = np.where(negative, -value, value)
     decimals = fraction.astype(np.int8)
     malformed = []
@@ -310,9 +309,30 @@ def numbers(
     return mantissa, decimals, pointed, np.array(malformed, np.int64)
 
 
+def _points(body: Bytes, begin: Index, stop: Index) -> tuple[Index, Mask, int]:
+    """(n,) where the first decimal point of each number is, its end where it has none; whether it has one;
+    and the number of points in the text."""
+    is_point, begins = body == 46, np.zeros(len(body), bool)
+    begins[begin] = True
+    # what comes behind a begin is a point, or the next begin
+    marks = np.flatnonzero(is_point | begins)
+    behind = np.append(marks, len(body) + 1)[np.flatnonzero(begins[marks]) + 1]
+    nearest = np.where(is_point[begin], begin, behind)
+    pointed = nearest < stop
+    return np.where(pointed, nearest, stop), pointed, int(np.count_nonzero(is_point))
+
+
+def _seven_digits(window: npt.NDArray[np.uint64], whole: Index, fraction: Index, pointed: Mask) -> Index:
+    """The numbers without their points at the ends of eight-byte windows, of up to seven digits in all."""
+    behind = _HIGH.take(fraction, mode="clip")
+    # the digits before a point go in its place
+    moved = window << (pointed.view(np.uint8).astype(np.uint64) << _U(3))
+    return _eight_digits((window & behind) | (moved & ~behind), whole + fraction)
+
+
 def _eight_digits(window: npt.NDArray[np.uint64], count: Index) -> Index:
     """The last `count` ASCII digits of each eight-byte window as integers, by multiply and shift."""
-    x = (window ^ _U(0x3030303030303030)) & _HIGH[count]
+    x = (window ^ _U(0x3030303030303030)) & _HIGH.take(count, mode="clip")
     x = x * _U(10) + (x >> _U(8))
     low = (x & _U(0x000000FF000000FF)) * _U(0x000F424000000064)
     high = ((x >> _U(16)) & _U(0x000000FF000000FF)) * _U(0x0000271000000001)
