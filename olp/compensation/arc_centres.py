@@ -10,12 +10,9 @@ from olp.compensation.rows import Rows
 from olp.compensation.writer import Writer
 from olp.core.arrays import Array, Index, Mask, most_in_row
 from olp.core.errors import ProgramError
-from olp.core.geometry import PLANES, arms
+from olp.core.geometry import arms, in_planes, put_in_planes
 from olp.core.toolpath import Flag
 from olp.core.values import dataclass
-
-#: (3, 3) axes of each plane: first, second, third.
-_AXES = np.array(PLANES)
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,19 +124,15 @@ def _told(
 
 def _on_bisector(start: Array, end: Array, centre: Array, plane: npt.NDArray[np.int8], short: Mask) -> Array:
     """Centres moved along their chords until both radii are equal, for arcs `short` of half a circle."""
-    rows = np.arange(len(start))
-    first, second = _AXES[plane][:, 0], _AXES[plane][:, 1]
-    d0, d1 = end[rows, first] - start[rows, first], end[rows, second] - start[rows, second]
+    (s0, s1, _), (e0, e1, _), (c0, c1, _) = (in_planes(some, plane) for some in (start, end, centre))
+    d0, d1 = e0 - s0, e1 - s1
     length = np.hypot(d0, d1)
     long = short & (length > 0)
     safe = np.where(long, length, 1.0)
     d0, d1 = d0 / safe, d1 / safe
-    away0 = centre[rows, first] - (start[rows, first] + end[rows, first]) / 2
-    away1 = centre[rows, second] - (start[rows, second] + end[rows, second]) / 2
-    along = np.where(long, away0 * d0 + away1 * d1, 0.0)
+    along = np.where(long, (c0 - (s0 + e0) / 2) * d0 + (c1 - (s1 + e1) / 2) * d1, 0.0)
     moved = centre.copy()
-    moved[rows, first] -= along * d0
-    moved[rows, second] -= along * d1
+    put_in_planes(moved, plane, c0 - along * d0, c1 - along * d1)
     return moved
 
 

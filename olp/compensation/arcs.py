@@ -15,7 +15,16 @@ from olp.compensation.invert import bent
 from olp.compensation.lines import Cuts, no_cuts
 from olp.core.arrays import Array, Index, Mask, distinct, most_in_row
 from olp.core.errors import CannotCompute
-from olp.core.geometry import PLANES, ArcShapes, arc_directions, arc_points, arms
+from olp.core.geometry import (
+    PLANES,
+    ArcShapes,
+    Plane,
+    arc_directions,
+    arc_points,
+    arms,
+    in_planes,
+    put_in_planes,
+)
 from olp.core.toolpath import Toolpath
 from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
@@ -153,13 +162,15 @@ def _divided(pieces: Pieces, count: Index) -> Pieces:
 def _ends(path: Toolpath, target: Array, arc: Index) -> tuple[Array, Array]:
     """Targets at the start and the end of arcs; the start lies in the frame of the arc's own move."""
     move = path.arcs.move[arc]
-    shift = target[move] - path.end_mm[move]
-    return _starts(path, move) + shift, target[move]
+    goal = target.take(move, axis=0)
+    return _starts(path, move) + (goal - path.end_mm.take(move, axis=0)), goal
 
 
 def _starts(path: Toolpath, move: Index) -> Array:
     """(n, 3) where moves begin as the program says."""
-    return np.where((move > 0)[:, None], path.end_mm[np.maximum(move - 1, 0)], np.array(path.start_mm))
+    start = path.end_mm.take(np.maximum(move - 1, 0), axis=0)
+    start[move == 0] = path.start_mm
+    return start
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -183,14 +194,12 @@ def sample_groups(
     missed."""
     arcs = path.arcs
     start, end = _ends(path, target, pieces.arc)
-    axes = _AXES[arcs.plane[pieces.arc]]
-    rows = np.arange(len(pieces))
-    finish = path.end_mm[arcs.move[pieces.arc]]
-    radius = np.hypot(*arms(finish, arcs.centre_mm[pieces.arc], arcs.plane[pieces.arc]))
+    plane, finish = arcs.plane[pieces.arc], path.end_mm.take(arcs.move[pieces.arc], axis=0)
+    radius = np.hypot(*arms(finish, arcs.centre_mm.take(pieces.arc, axis=0), plane))
     share = pieces.end - pieces.begin
     delta = np.abs(end - start) * share[:, None]
-    for i in (0, 1):
-        delta[rows, axes[:, i]] = np.minimum(radius * np.abs(arcs.sweep_rad[pieces.arc]) * share, 2 * radius)
+    reach = np.minimum(radius * np.abs(arcs.sweep_rad[pieces.arc]) * share, 2 * radius)
+    put_in_planes(delta, plane, reach, reach)
     tool = tools if tools.ndim == 1 else tools[arcs.move[pieces.arc]]
     count = steps_needed(model, delta, tool, tolerance / 4, at_least=8, at_most=256)
     for steps in distinct(count).tolist():
@@ -208,14 +217,16 @@ def sampled(
     start, end = _ends(path, target, pieces.arc)
     plane, sweep = arcs.plane[pieces.arc], arcs.sweep_rad[pieces.arc]
     # where the part really lies: the centres are moved with the end points
-    centre = arcs.centre_mm[pieces.arc] + (target[move] - path.end_mm[move])
-    axes, rows = _AXES[plane], np.arange(len(pieces))
+    centre = arcs.centre_mm.take(pieces.arc, axis=0) + (end - path.end_mm.take(move, axis=0))
+    rows = np.arange(len(pieces))
     tool = tools if tools.ndim == 1 else tools[move]
     share = np.linspace(0.0, 1.0, count + 1)
     spread = pieces.begin[:, None] + share * (pieces.end - pieces.begin)[:, None]
-    which = np.repeat(rows, len(share))
     point = ArcShapes.of(start, end, centre, plane, sweep).at(rows[:, None], spread).reshape(-1, 3)
     play = None
+    which = np.zeros(0, np.int64)
+    if model.backlash_at(point[:1]) is not None or tool.ndim > 1:
+        which = np.repeat(rows, len(share))
     if model.backlash_at(point[:1]) is not None:
         play = arc_directions(
             start[which], end[which], centre[which], plane[which], sweep[which], spread.reshape(-1)
@@ -225,9 +236,7 @@ def sampled(
     shape = (len(pieces), len(share), 3)
     point, command = point.reshape(shape), command.reshape(shape)
     away = command - point
-    r0, r1 = (
-        np.hypot(*(point[rows, k, axes[:, i]] - centre[rows, axes[:, i]] for i in (0, 1))) for k in (0, -1)
-    )
+    r0, r1 = (np.hypot(*arms(point[:, k], centre, plane)) for k in (0, -1))
     return Bend(point, command, share, centre, r1 - r0, np.abs(away - away[:, :1]).max(axis=(1, 2)) < 1e-9)
 
 
@@ -258,10 +267,9 @@ def fit(bend: Bend, plane: npt.NDArray[np.int8], start: Array, end: Array, sweep
     where a short chord would swing the far side.
     """
     command, share = bend.command, bend.share
-    axes = _AXES[plane]
-    (q0, q1), (s0, s1), (e0, e1) = (_in_planes(some, axes)[:2] for some in (command, start, end))
+    (q0, q1), (s0, s1), (e0, e1) = (_columns(some, plane)[:2] for some in (command, start, end))
     centre = bend.centre + (command[:, 0] - bend.point[:, 0] + command[:, -1] - bend.point[:, -1]) / 2
-    x, y = _in_planes(centre, axes)[:2]
+    x, y = _columns(centre, plane)[:2]
     x_start, y_start = x, y
     strong = np.where(np.abs(sweep) > WIDE, 1.0, 100.0)[:, None]
     mismatch = bend.mismatch[:, None]
@@ -290,8 +298,7 @@ def fit(bend: Bend, plane: npt.NDArray[np.int8], start: Array, end: Array, sweep
         if max(np.abs(step0).max(initial=0.0), np.abs(step1).max(initial=0.0)) < _STILL_MM:
             break
     x, y = np.where(bend.rigid[:, None], x_start, x), np.where(bend.rigid[:, None], y_start, y)
-    rows = np.arange(len(command))
-    centre[rows, axes[:, 0]], centre[rows, axes[:, 1]] = x[:, 0], y[:, 0]
+    put_in_planes(centre, plane, x[:, 0], y[:, 0])
     return centre
 
 
@@ -299,9 +306,9 @@ def departure(
     bend: Bend, plane: npt.NDArray[np.int8], start: Array, end: Array, sweep: Array, centre: Array
 ) -> Array:
     """(n,) how far the arcs from `start` to `end` about `centre` (n, 3) leave the samples."""
-    share, axes = bend.share, _AXES[plane]
-    (q0, q1, q2), (s0, s1, s2), (e0, e1, e2) = (_in_planes(some, axes) for some in (bend.command, start, end))
-    x, y, _ = _in_planes(centre, axes)
+    share = bend.share
+    (q0, q1, q2), (s0, s1, s2), (e0, e1, e2) = (_columns(some, plane) for some in (bend.command, start, end))
+    x, y, _ = _columns(centre, plane)
     rs, re = np.hypot(s0 - x, s1 - y), np.hypot(e0 - x, e1 - y)
     # the control counts the angle about the new centre, and reaches the end with its own sweep
     begin = np.arctan2(s1 - y, s0 - x)
@@ -314,14 +321,10 @@ def departure(
     return np.asarray(most_in_row(_length(radial, level)))
 
 
-def _in_planes(point: Array, axes: Index) -> tuple[Array, Array, Array]:
-    """(n, s) coordinates of points (n, s, 3) along `axes` (n, 3) of their planes, (n, 1) of points (n, 3)."""
-    if point.ndim == 2:
-        point = point[:, None]
-    first, second, third = (
-        np.take_along_axis(point, axes[:, i][:, None, None], axis=2)[:, :, 0] for i in range(3)
-    )
-    return first, second, third
+def _columns(point: Array, plane: Plane) -> list[Array]:
+    """Coordinates along the axes of their planes: (n, s) of points (n, s, 3), (n, 1) of points (n, 3)."""
+    columns = in_planes(point if point.ndim == 3 else point[:, None], plane)
+    return [np.ascontiguousarray(column) for column in columns]
 
 
 def _length(first: Array, second: Array) -> Array:

@@ -46,8 +46,8 @@ class ArcShapes:
     @staticmethod
     def of(start: Array, end: Array, centre: Array, plane: Plane, sweep: Array) -> ArcShapes:
         """Arcs from `start` (m, 3) to `end` about `centre`."""
-        c0, c1, _ = _in_planes(centre, plane)
-        (s0, s1, s2), (e0, e1, e2) = _in_planes(start, plane), _in_planes(end, plane)
+        c0, c1, _ = in_planes(centre, plane)
+        (s0, s1, s2), (e0, e1, e2) = in_planes(start, plane), in_planes(end, plane)
         s0, s1 = s0 - c0, s1 - c1
         radius = np.hypot(s0, s1)
         wider = np.hypot(e0 - c0, e1 - c1) - radius
@@ -56,12 +56,12 @@ class ArcShapes:
     def at(self, which: Index, share: Array) -> Array:
         """(n, 3) points at shares (n,) of arcs `which` (n,); (n, s, 3) at shares (n, s) of arcs (n, 1)."""
         points = np.empty((*share.shape, 3))
-        rows = max(_POINTS // int(np.prod(share.shape[1:])), 1)
+        rows, planes = max(_POINTS // int(np.prod(share.shape[1:])), 1), distinct(self.plane).tolist()
         for a in range(0, len(share), rows):
-            self._put(points[a : a + rows], which[a : a + rows], share[a : a + rows])
+            self._put(points[a : a + rows], which[a : a + rows], share[a : a + rows], planes)
         return points
 
-    def _put(self, points: Array, which: Index, share: Array) -> None:
+    def _put(self, points: Array, which: Index, share: Array, planes: list[int]) -> None:
         """The same of some, put into `points`."""
         radius = self.radius.take(which) + self.wider.take(which) * share
         angle = self.angle.take(which) + share * self.sweep.take(which)
@@ -70,7 +70,7 @@ class ArcShapes:
             self.centre_second.take(which) + radius * np.sin(angle),
             self.level.take(which) + share * self.rise.take(which),
         )
-        for plane, mine in _by_plane(self.plane, which):
+        for plane, mine in _by_plane(self.plane, which, planes):
             for axis, column in zip(PLANES[plane], columns, strict=True):
                 points[mine, ..., axis] = column[mine]
 
@@ -86,21 +86,21 @@ class ArcShapes:
 
     def _away(self, point: Array, which: Index, near: Array, per_rad: Array) -> Array:
         """The same of some points; `per_rad` (m,) are arcs per radian."""
-        p0, p1, p2 = _in_planes(point, self.plane[which])
-        p0, p1 = p0 - self.centre_first[which], p1 - self.centre_second[which]
-        sweep, level = self.sweep[which], p2 - self.level[which]
+        p0, p1, p2 = in_planes(point, self.plane.take(which))
+        p0, p1 = p0 - self.centre_first.take(which), p1 - self.centre_second.take(which)
+        sweep, level = self.sweep.take(which), p2 - self.level.take(which)
         size = np.abs(sweep)
-        angle = np.arctan2(p1, p0) - self.angle[which]
+        angle = np.arctan2(p1, p0) - self.angle.take(which)
         # the point lies on the turn of share `near`
         angle += _TURN * np.rint((near * sweep - angle) * (1.0 / _TURN))
         turned = np.where(sweep < 0.0, -angle, angle)
         place = np.clip(turned, 0.0, size)
         beyond = _beyond(turned, place, size)
-        wider = (self.wider * per_rad)[which]
-        mean = self.radius[which] + wider * place
+        wider = (self.wider * per_rad).take(which)
+        mean = self.radius.take(which) + wider * place
         across = np.sqrt(p0 * p0 + p1 * p1) - mean
         along = beyond * mean
-        rising = np.flatnonzero(self.rise[which])
+        rising = np.flatnonzero(self.rise.take(which))
         if rising.size:
             of = which[rising]
             lead = self.rise[of] * per_rad[of]
@@ -128,20 +128,27 @@ def _beyond(turned: Array, place: Array, size: Array) -> Array:
     return beyond
 
 
-def _by_plane(plane: Plane, which: Index) -> Iterator[tuple[int, slice | Index]]:
-    """Each plane of arcs `which`, and these; mostly there is one."""
-    present = distinct(plane).tolist()
+def _by_plane(plane: Plane, which: Index, present: list[int]) -> Iterator[tuple[int, slice | Index]]:
+    """Each plane that is present, and its arcs among `which`; mostly there is one."""
     for one in present:
         yield one, slice(None) if len(present) == 1 else np.flatnonzero(plane[which] == one)
 
 
-def _in_planes(point: Array, plane: Plane) -> tuple[Array, Array, Array]:
-    """(m,) coordinates of points (m, 3) along the first, second and third axis of their planes."""
+def in_planes(point: Array, plane: Plane) -> tuple[Array, Array, Array]:
+    """(m,) coordinates of points (m, 3) along the first, second and third axis of their planes; (m, s) of
+    points (m, s, 3)."""
     if len(plane) and (plane == plane[0]).all():
         first, second, third = PLANES[int(plane[0])]
-        return point[:, first], point[:, second], point[:, third]
+        return point[..., first], point[..., second], point[..., third]
     rows, axes = np.arange(len(point)), _AXES[plane]
-    return point[rows, axes[:, 0]], point[rows, axes[:, 1]], point[rows, axes[:, 2]]
+    return point[rows, ..., axes[:, 0]], point[rows, ..., axes[:, 1]], point[rows, ..., axes[:, 2]]
+
+
+def put_in_planes(point: Array, plane: Plane, first: Array, second: Array) -> None:
+    """Put (m,) coordinates along the first and second axis of their planes into points (m, 3)."""
+    for one, mine in _by_plane(plane, np.arange(len(plane)), distinct(plane).tolist()):
+        axes = PLANES[one]
+        point[mine, axes[0]], point[mine, axes[1]] = first[mine], second[mine]
 
 
 def arc_points(start: Array, end: Array, centre: Array, plane: Plane, sweep: Array, share: Array) -> Array:
@@ -151,9 +158,8 @@ def arc_points(start: Array, end: Array, centre: Array, plane: Plane, sweep: Arr
 
 def arms(point: Array, centre: Array, plane: Plane) -> tuple[Array, Array]:
     """(n,) coordinates of points (n, 3) along the first and the second axis of their planes, from centres."""
-    rows = np.arange(len(point))
-    first, second = _AXES[plane][:, 0], _AXES[plane][:, 1]
-    return point[rows, first] - centre[rows, first], point[rows, second] - centre[rows, second]
+    (p0, p1, _), (c0, c1, _) = in_planes(point, plane), in_planes(centre, plane)
+    return p0 - c0, p1 - c1
 
 
 def quarter_shares(start: Array, centre: Array, plane: Plane, sweep: Array, quarter: int) -> Array:

@@ -243,22 +243,25 @@ class Tracer:
         kind: npt.NDArray[np.uint8],
     ) -> tuple[Array, _Inner]:  # fmt: skip
         """Where the tip really is at the end of each part, and at samples inside parts."""
-        long = np.arange(len(end)) if self.has_play else np.flatnonzero(steps > 1)
-        turns = (arc[long] >= 0) & known[long] if self.has_play else None
-        point, part, share = self.points(start[long], end[long], arc[long], steps[long], turns)
-        part = long[part]
-        inside = share < 1.0
         if self.has_play:
             # play depends on all earlier moves, so the samples are taken in order
-            before = self.play
+            point, part, share = self.points(start, end, arc, steps, (arc >= 0) & known)
+            inside, before = share < 1.0, self.play
             actual = self.actual(point, tool if tool.ndim == 1 else tool[part])
             plays = self.plays
             before = plays[0] if before is None else before
             samples = _Inner(part[inside], share[inside], actual[inside])
             taken_up = self._turns(start, end, arc, part, share, np.vstack((before, plays)), tool, kind)
             return actual[~inside], samples.with_more(taken_up)
-        inner = np.flatnonzero(inside)
-        part, share, point = part[inner], share[inner], point.take(inner, axis=0)
+        # those of straight moves, then those of arcs
+        long = [np.flatnonzero((steps > 1) & ((arc >= 0) == curved)) for curved in (False, True)]
+        parts = [_inside(steps.take(rows)) for rows in long]
+        point = np.concatenate([
+            _between(start.take(long[0], axis=0), end.take(long[0], axis=0), *parts[0]),
+            self._shapes(start, end, arc, long[1]).at(*parts[1]),
+        ])  # fmt: skip
+        part = np.concatenate([rows.take(of) for rows, (of, _) in zip(long, parts, strict=True)])
+        share = np.concatenate([share for _, share in parts])
         reached = self.actual(end, tool)
         return reached, _Inner(part, share, self.actual(point, tool if tool.ndim == 1 else tool[part]))
 
@@ -294,10 +297,7 @@ class Tracer:
         rows = np.flatnonzero(arc >= 0)
         if not rows.size:
             return _between(start, end, part, share)
-        arcs, which = self.path.arcs, arc[rows]
-        shapes = ArcShapes.of(
-            start[rows], end[rows], arcs.centre_mm[which], arcs.plane[which], arcs.sweep_rad[which]
-        )
+        shapes = self._shapes(start, end, arc, rows)
         straight, curved, of = _kinds(arc >= 0, part)
         on_arcs = shapes.at(of, share[curved])
         if not straight.size:
@@ -307,6 +307,14 @@ class Tracer:
         for axis in range(3):
             point[curved, axis], point[straight, axis] = on_arcs[:, axis], on_lines[:, axis]
         return point
+
+    def _shapes(self, start: Array, end: Array, arc: Index, rows: Index) -> ArcShapes:
+        """The shapes of the moves `rows`, which are arcs."""
+        arcs, which = self.path.arcs, arc.take(rows)
+        return ArcShapes.of(
+            start.take(rows, axis=0), end.take(rows, axis=0), arcs.centre_mm.take(which, axis=0),
+            arcs.plane.take(which), arcs.sweep_rad.take(which),
+        )  # fmt: skip
 
     def _start(self) -> Array:
         """(3,) where the tip is before the first move."""
@@ -398,6 +406,9 @@ class Tracer:
 
     def _near(self, owner: Index, first: int, part: Index, share: Array, of: Index) -> Array:
         """Roughly where on its nominal arc each sample lies: by the angles of the arcs that it became."""
+        if (owner == np.arange(len(owner))).all():
+            # each move became one
+            return share
         turn = np.zeros(len(owner))
         arc = _arc_index(self.path, first, first + len(owner))
         turn[arc >= 0] = np.abs(self.path.arcs.sweep_rad[arc[arc >= 0]])
@@ -450,6 +461,14 @@ def owner_of(groups: Index, first: int, last: int) -> Index:
     if np.array_equal(groups, move):
         return move - first
     return np.searchsorted(groups, move)
+
+
+def _inside(steps: Index) -> tuple[Index, Array]:
+    """The move of each sample inside moves of so many equal steps, and its share of the move."""
+    count = steps - 1
+    part = np.repeat(np.arange(len(steps)), count)
+    share = np.arange(1, len(part) + 1) - np.repeat(np.cumsum(count) - count, count)
+    return part, share / np.repeat(steps, count)
 
 
 def _kinds(on_arc: Mask, of: Index) -> tuple[Index, Index, Index]:
