@@ -276,7 +276,7 @@ class Program:
     shared: SharedWords = field(default_factory=SharedWords.none)
     closings: Index = field(default_factory=lambda: np.zeros(0, np.int64))
     tilts: tuple[Tilt, ...] = ()
-    levels: tuple[tuple[int, float], ...] = ()
+    levels: tuple[tuple[int, int, float], ...] = ()
     by_original: bool = False
     programmed: Program | None = None
     blocks: Index | None = None

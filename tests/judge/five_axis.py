@@ -140,6 +140,9 @@ class Judge:
         moves = []
         for line in text.decode().splitlines():
             line = line.partition(";")[0]
+            if line.startswith("CC "):
+                # a pole moves nothing
+                continue
             line = re.sub(r"\bL\b|\bR0\b|F ?MAX", lambda m: "G0" if "MAX" in m[0] else "", line)
             if "M12" in line:
                 tips = "M128" in line

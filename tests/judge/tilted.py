@@ -130,7 +130,7 @@ class TiltedJudge(Judge):
         elif "G69" in line:
             self.on, self.below, self.turn = False, np.zeros(3), np.eye(3)
             words.update(dict.fromkeys("XYZ", np.nan))
-        names = ("PLANE", "CYCL", "TOOL", "PGM", "G68", "G53.1", "G69", "G43", "T1", "G54", "D1")
+        names = ("PLANE", "CYCL", "TOOL", "PGM", "G68", "G53.1", "G69", "G43", "T1", "G54", "D1", "CC ")
         return any(name in line for name in names)
 
     def swivel(self, line: str) -> None:

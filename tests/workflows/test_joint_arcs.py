@@ -153,6 +153,37 @@ def test_whole_turns_and_radii(words: dict[str, float], tmp_path: Path) -> None:
     assert last and all(letter not in last[0] for letter in (b"I", b"J", b"R", b"P"))
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("chain", "tips"), [("C A Y F X Z", True), ("C F X Y Z B", False)])
+@pytest.mark.parametrize("form", ["CP", "C"])
+def test_conversational_arcs_are_within_tolerance_of_themselves(
+    chain: str, tips: bool, form: str, tmp_path: Path
+) -> None:
+    """About a pole by an angle, with a step along Z, and to an end."""
+    machine, arc = machine_file(tmp_path, chain, control="heidenhain", seed=5), Arc(chain, seed=3, tips=tips)
+    (begin, end), (x, y) = arc.ends, arc.centre[[arc.names.index(name) for name in "XY"]]
+    third = arc.names.index("Z")
+    if form == "C":
+        begin[third] = end[third]
+    start = " ".join(f"{name}{value:+.3f}" for name, value in zip(arc.names, begin, strict=True))
+    turn, down = "+" if arc.sweep > 0 else "-", f"Z{end[third]:+.3f}"
+    words = f"IPA{np.degrees(arc.sweep):+.6f} {down}"
+    if form == "C":
+        words = f"X{end[arc.names.index('X')]:+.3f} Y{end[arc.names.index('Y')]:+.3f}"
+    zero = " ".join(f"{name}+0" for name in arc.names)
+    lines = [
+        "BEGIN PGM A MM", "TOOL CALL 1 Z", f"L {zero} R0 FMAX", "L M128" if tips else "M8",
+        f"L {start} R0 FMAX", f"CC X{x:+.3f} Y{y:+.3f}", f"{form} {words} DR{turn} F500 ; (arc)",
+        "L Z+150 R0 FMAX", "M129", "END PGM A MM", "",
+    ]  # fmt: skip
+    result = olp.correct_joints("\n".join(lines).encode(), machine, tolerance_urad=2.0)
+    assert result.report["verdict"]["ok"]
+    far, _, gap = judged(Judge(machine), arc, result.data)
+    assert far < 1e-3 + 1e-3 * 3**0.5
+    assert gap < 0.1
+    assert b"\n" + form.encode() + b" " not in result.data and b" DR" not in result.data
+
+
 MODAL = (
     b"G21 G90 G54\nG0 X0 Y0 Z0 A-20 C30\nN10 G02 X10. I5.F500 S9 ; cut\r\nX20 Y10 R10.\n"
     b"G91 X-10 Y10 I-10 J0\nG1 X-10\nG90\nM30\n"

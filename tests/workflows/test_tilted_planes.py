@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import re
+from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
 import pytest
 from cases.joint_machines import machine_file
 from judge.tilted import TiltedJudge
@@ -110,7 +113,8 @@ REFUSED = [
     (["PLANE AXIAL A+45 C+90 STAY"], "", PATH, "AXIAL.* is not read", 8),
     (["PLANE VECTOR BX+1 BY+0 BZ+1 NX+0 NY+0 NZ+1 STAY SEQ+"], "", PATH, "square", 8),
     (FORMS[0][1], "A+Q120 C+Q122", [*PATH[:3], "L A+30 F100"], "turns while", 13),
-    (FORMS[0][1], "A+Q120 C+Q122", [*PATH[:3], "CC X+0 Y+0", "C X+10 Y+20 DR+"], "an arc", 14),
+    (FORMS[0][1], "A+Q120 C+Q122", ["L Z+3 FMAX", "CC X+0 Y+0", "C X+10 Y+20 DR+ F9"], "arc starts", 12),
+    (["CC X+0 Y+9", *FORMS[0][1]], "A+Q120 C+Q122", ["L X+0 Y+0 Z+3 FMAX", "C DR+ F9"], "CC again", 12),
     (FORMS[0][1], "A+Q120 C+Q122", [*PATH[:3], "CYCL DEF 7.1 X+1", "L X+9"], "datum shift was", 14),
     (FORMS[0][1], "A+Q120 C+Q122", PATH[1:4], "X, Y has not been commanded", 11),
 ]
@@ -242,3 +246,50 @@ def test_the_tip_is_led_in_a_plane_as_without_it(tmp_path: Path) -> None:
     plain = head + "M128\nL X+0 Y+0 Z+20 A-10 C+5 R0 FMAX\nL X-10 Y+30 Z+10 A-20 C+15 F500\nL Y-10 F500\n"
     both = [corrected(tmp_path, text.encode()).report["deviation"]["before"] for text in (turned, plain)]
     assert both[0] == pytest.approx(both[1], rel=1e-6)
+
+
+#: By control: half a circle of 10 mm about (20, 20) and a whole one that goes down by 2 mm, in a plane.
+ROUND = {
+    "heidenhain": program(FORMS[0][1], "A+Q120 C+Q122", [
+        "L X+10 Y+20 R0 FMAX M3", "L Z+50 FMAX", "L Z-3 F200", "CC X+20 Y+20", "C X+30 DR+",
+        "CP IPA+360 IZ-2 DR+", "L Z+50 FMAX",
+    ]),
+    "sinumerik": swivelled(path=(
+        "G0 X10 Y20\nZ50\nG1 Z-3 F200\nG3 X30 I10 J0\nG3 X30 Y20 Z-5 I=AC(20) J=AC(20)\nG0 Z50\n"
+    )),
+    "fanuc": tilted(path=(
+        "G43 H1\nG0 X10. Y20.\nZ50.\nG1 Z-3. F200.\nG3 X30. I10. J0.\nG3 X30. Y20. Z-5. I-10. J0.\nG0 Z50.\n"
+    )),
+}  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("control", ROUND)
+def test_arcs_in_a_plane_are_round_there(control: str, tmp_path: Path) -> None:
+    """The tool with its errors, seen along the words of the plane."""
+    extra = '[kinematics]\nswivel_axis = "A"\n' if control == "sinumerik" else ""
+    result = corrected(tmp_path, ROUND[control], control=control, extra=extra)
+    assert result.report["verdict"]["ok"]
+    judge = TiltedJudge(tmp_path / "machine.toml")
+    text = re.split(rb"\n(?:PLANE RESET|CYCLE800\(\)|G69)", result.data)[0] + b"\n"
+    moves = judge.read(text)
+    turn, zero = judge.turn, judge.below + judge.turn @ judge.shift
+    places = np.array([place for _, _, place in moves])
+    first = next(k for k, (cuts, _, _) in enumerate(moves) if cuts)
+    share = np.linspace(0.0, 1.0, 5)[:, None]
+    samples = np.vstack([a + share * (b - a) for a, b in pairwise(places[first:-1])])
+    tip = (judge.forward(judge.axes(samples, True), True)[0] - zero) @ turn
+    turned = np.unwrap(np.arctan2(tip[:, 1] - 20.0, tip[:, 0] - 20.0))
+    turned -= turned[0]
+    assert turned[-1] == pytest.approx(3 * np.pi, abs=1e-3)
+    assert np.hypot(tip[:, 0] - 20.0, tip[:, 1] - 20.0) == pytest.approx(10.0, abs=WITHIN_MM)
+    level = -3.0 - np.clip(turned - np.pi, 0.0, None) / np.pi
+    assert tip[:, 2] == pytest.approx(level, abs=WITHIN_MM)
+    assert result.report["deviation"]["before"]["position_max_um"] > 10.0
+
+
+@pytest.mark.parametrize("control", ROUND)
+def test_arcs_in_a_plane_stay_without_errors(control: str, tmp_path: Path) -> None:
+    extra = '[kinematics]\nswivel_axis = "A"\n' if control == "sinumerik" else ""
+    machine = machine_file(tmp_path, "C A Y F X Z", control=control, errors=False, extra=extra)
+    assert olp.correct_joints(ROUND[control], machine).data == ROUND[control]

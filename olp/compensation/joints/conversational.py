@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -10,9 +11,13 @@ from olp.compensation.conversational_blocks import ConversationalBlocks
 from olp.compensation.joints.path import JointPath
 from olp.compensation.joints.planning import JointPlan
 from olp.compensation.joints.writer import PLACES, JointWriter
-from olp.core.arrays import Index, distinct
+from olp.core.arrays import Index, Mask, distinct
 from olp.program.heidenhain.chunk import LATE_M
 from olp.program.text.edits import BARE, EditList, Edits
+
+_NAME = re.compile(rb"[ \t]*\d*[ \t]*(?P<c>C[RP]?)", re.I)
+#: What comes before the word of an angle, from its end on: the rest of its letters, and a blank.
+_BEFORE = re.compile(rb"(?:PI?)?[ \t]?", re.I)
 
 
 class ConversationalJoints(JointWriter):
@@ -23,6 +28,30 @@ class ConversationalJoints(JointWriter):
         slot = path.slot[path.slot >= 0]
         self._blocks = ConversationalBlocks(self.program)
         self._signed = self._blocks.signed(slot)
+
+    def _stay(self, slot: Index) -> Mask:
+        """Arcs by an angle, where they stay."""
+        if self.plan.straight:
+            return super()._stay(slot)
+        return np.asarray(self.path.curves.mask[self.plan.move] & (slot < 0), bool)
+
+    def _straightened(self) -> Edits:
+        """C, CR and CP become L, and lose what L does not have. Their poles stay, and no block counts from
+        them."""
+        edits, curves, data = EditList(self.prefixes), self.path.curves, self.program.data
+        if not self.plan.straight:
+            return edits.done()
+        for move in np.flatnonzero(curves.mask).tolist():
+            name = _NAME.match(data, int(self.program.line_start[self.path.line[move] - 1]))
+            assert name is not None
+            edits.add(name.start("c"), name.end("c"), BARE, 0, b"L")
+        for i in curves.slot[curves.slot >= 0].tolist():
+            word = _BEFORE.match(data[max(int(self.words.start[i]) - 4, 0) : int(self.words.start[i])][::-1])
+            start = int(self.words.start[i]) - (0 if word is None else len(word[0]))
+            edits.add(start, int(self.words.end[i]), BARE, 0)
+        made = edits.done()
+        self.tally.changed_words += len(made)
+        return made
 
     def _placed(self, edits: list[Edits]) -> list[Edits]:
         """Numbers that stay positive keep their plus, and new ones get one where the program writes it."""

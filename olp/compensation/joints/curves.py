@@ -14,6 +14,7 @@ from olp.core.errors import ProgramError
 from olp.core.geometry import ArcShapes, arms
 from olp.core.turns import turned
 from olp.core.values import dataclass
+from olp.program.heidenhain.columns import ANGLE, STEP_ANGLE, TURN
 from olp.program.program import Program
 
 #: rad of an arc from sample to sample.
@@ -24,6 +25,9 @@ _NEAR_MM = 1e-6
 _TURN = 2.0 * np.pi
 #: Share of a turn that a part may go back, as one does that takes up backlash.
 _BACK = 0.25
+#: Letters of words that conversational blocks of arcs have alone, and of axes.
+_OF_ARCS = (TURN, ord("R"), ANGLE, STEP_ANGLE)
+_AXES = tuple(b"XYZ")
 #: Motion codes of arcs.
 _CODES = (2, 3)
 
@@ -83,8 +87,12 @@ class Curves:
         of = np.full(len(path), -1)
         of[move] = np.arange(len(move))
         shapes = ArcShapes.of(begin, finish, ends[2], path.arcs.plane[some], path.arcs.sweep_rad[some])
-        slot = program.arc_slots.word[some]
-        return Curves(of, shapes, ends[2], np.array(columns), slot, _codes(program, move, slot))
+        if program.arc_slots.poles is not None:
+            slot, code = _own_words(program, move), np.full(len(move), -1, np.int32)
+        else:
+            slot = program.arc_slots.word[some]
+            code = _codes(program, move, slot)
+        return Curves(of, shapes, ends[2], np.array(columns), slot, code)
 
     def along(self, place: Array, move: Index, share: Array) -> Array:
         """(r, axes) `place` at shares of moves, where the linear coordinates of arcs follow these."""
@@ -137,7 +145,23 @@ class Curves:
     def refuse_kept(self, program: Program) -> None:
         """Raise ProgramError for an arc that stays and goes by the G2 or G3 of a block before it."""
         arc = program.toolpath.arcs.move
-        _codes(program, arc[self.of[arc] < 0], None)
+        if program.arc_slots.poles is None:
+            _codes(program, arc[self.of[arc] < 0], None)
+
+
+def _own_words(program: Program, move: Index) -> npt.NDArray[np.int32]:
+    """(m, 5) the words of conversational blocks of arcs that those of straight moves do not have, -1 for
+    further ones: DR, a radius, an angle, and a distance beside it."""
+    words, slot = program.words, np.full((len(move), 5), -1, np.int32)
+    assert words is not None
+    stated = program.slot[move]
+    for row, number in enumerate(program.toolpath.line[move].tolist()):
+        own = [
+            i for i in words.of_line(number)
+            if words.letter[i] in _OF_ARCS or (words.letter[i] in _AXES and i not in stated[row])
+        ]  # fmt: skip
+        slot[row, : len(own)] = own
+    return slot
 
 
 def _codes(program: Program, move: Index, slot: npt.NDArray[np.int32] | None) -> npt.NDArray[np.int32]:

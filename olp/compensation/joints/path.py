@@ -162,11 +162,13 @@ class JointPath:
             offset[:, columns] = turned(inverse, offset[:, columns])
         unit = np.array([frame.unit_mm for frame in path.frames] or [1.0])[path.frame]
         given = slot[:, columns] >= 0
+        for move, axis, _ in program.levels:
+            given[move, axis] = True
         if fixed.any():
             refuse_lengths(program, fixed, given)
             stated = _words(program, slot[:, columns]) * unit[:, None] + offset[:, columns]
-            for move, level_mm in program.levels:
-                stated[move, 2] = level_mm
+            for move, axis, level_mm in program.levels:
+                stated[move, axis] = level_mm
             end[:, columns] = np.where(fixed[:, None], stated, end[:, columns])
         given[holes.strokes, 2] = True
         elsewhere = tip & ((path.flag & np.uint8(Flag.MACHINE)) != 0)

@@ -91,7 +91,9 @@ def refuse_unread(program: Program) -> None:
     note((flag & np.uint8(Flag.DELETED)) != 0, "a block under block delete; remove the / or the block")
     arc = np.zeros(len(path), bool)
     arc[path.arcs.move] = True
-    if program.statements is not None or not isinstance(program.dialect, Profile):
+    if program.arc_slots.poles is None and not (
+        program.statements is None and isinstance(program.dialect, Profile)
+    ):
         note(arc & ((flag & KEPT) == 0), "an arc; post it as straight moves, within your tolerance")
     other = np.array([frame.turn is not None and not _is_rotation(frame.turn) for frame in path.frames], bool)
     if other.any():

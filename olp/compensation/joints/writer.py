@@ -171,14 +171,15 @@ class JointWriter:
         nominal = path.end[plan.move, column]
         own = drilled & (self.order[column] == AXES[2])
         turned = self.led & self.rotary[column]
+        still = self._stay(slot)
         unit = np.ones(len(slot)) if self.rotary[column] else path.unit[plan.move]
         least, usual, finest = self._places(column, unit)
         rows = AxisRows(
             command=command,
             nominal=np.where(own, command, nominal),
             given=given,
-            raw=~self.solid | drilled | turned,
-            reset=self._set_by_control(column, flag, nominal) | own | turned,
+            raw=~self.solid | drilled | turned | still,
+            reset=self._set_by_control(column, flag, nominal) | own | turned | still,
             word=np.where(given, self.words.mantissa[slot], 0),
             decimals=np.where(given, self._own_decimals(column, slot, unit), 0).astype(np.int8),
             offset=path.offset[plan.move, column],
@@ -189,9 +190,13 @@ class JointWriter:
             return command
         first = float(path.start[plan.move[0], column])
         digits: Digits = digits_of(rows, Stretches.of(counting, unit), first, Decimals(least, usual, finest))
-        self.write[:, column] = digits.write & self.solid & ~drilled & ~turned
+        self.write[:, column] = digits.write & self.solid & ~drilled & ~turned & ~still
         self.mantissa[:, column], self.decimals[:, column] = digits.mantissa, digits.decimals
         return digits.emitted
+
+    def _stay(self, slot: Index) -> Mask:
+        """(r,) rows whose `slot` states nothing, and which end where no word says."""
+        return np.zeros(len(slot), bool)
 
     def _set_by_control(self, column: int, flag: npt.NDArray[np.uint8], nominal: Array) -> Mask:
         """(r,) rows at which the control makes an axis unknown, or turns it to where it finds it."""

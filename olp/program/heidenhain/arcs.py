@@ -10,7 +10,8 @@ import numpy.typing as npt
 from olp.core.arrays import Array, Index
 from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES
-from olp.core.toolpath import Flag, Kind
+from olp.core.toolpath import Flag, Frame, Kind
+from olp.core.turns import turned
 from olp.program.dialect import Options
 from olp.program.heidenhain.chunk import AXIS, Chunk, Pole, plane_of, takes_position
 from olp.program.heidenhain.collector import Collected
@@ -45,7 +46,8 @@ class Arcs(Events):
     def set_pole(self, chunk: Chunk, line: int, words: range) -> None:
         """A pole that is not two plain words: the present position, or distances from it."""
         number, blocks = chunk.blocks.number(line), chunk.blocks
-        here, frame = list(self.modes.position), self.modes.table.frames[self.modes.frame(number)]
+        frame = self.modes.table.frames[self.modes.frame(number)]
+        here, offset = self.modes.words_at(frame), along_frame(frame, frame.offset_mm)
         stated = []
         for w in words:
             axis = int(AXIS[blocks.letter[w]])
@@ -57,7 +59,7 @@ class Arcs(Events):
                 )
             stated.append(axis)
             size = float(blocks.value[w]) * frame.unit_mm
-            here[axis] = here[axis] + size if blocks.step[w] else size + frame.offset_mm[axis]
+            here[axis] = here[axis] + size if blocks.step[w] else size + float(offset[axis])
         plane = plane_of(stated)
         if plane is None:
             raise ProgramError(
@@ -72,7 +74,8 @@ class Arcs(Events):
         self.take_feeds(chunk, int(chunk.rows.line[row]) + 1)
         first, stop = blocks.words.first_word[chunk.rows.line[row] : chunk.rows.line[row] + 2].tolist()
         by_letter = {int(blocks.letter[w]): w for w in range(first, stop)}
-        start = np.array(modes.position)
+        frame = modes.table.frames[modes.frame(line)]
+        start, offset = np.array(modes.words_at(frame)), along_frame(frame, frame.offset_mm)
         pole = self.pole_before(chunk, int(chunk.rows.line[row]))
         arc = chunk.rows.arc_slot[int(np.searchsorted(chunk.rows.arc_row, row))]
         if pole is None or not np.isfinite(start).all():
@@ -109,20 +112,25 @@ class Arcs(Events):
         slot = chunk.rows.slot[row]
         if (slot[[a, b]] >= 0).any():
             raise ProgramError("CP states the end of its arc twice", line=line, code="OLP515")
-        frame = modes.table.frames[modes.frame(line)]
         if slot[third] >= 0:
             size = float(blocks.value[slot[third]]) * frame.unit_mm
             step = bool(blocks.step[slot[third]])
-            end[third] = end[third] + size if step else size + frame.offset_mm[third]
+            end[third] = end[third] + size if step else size + offset[third]
+            if step and self.tips:
+                # where words are written again, it is a position
+                slot[third] = -1
         centre = start.copy()
         centre[[a, b]] = pole.point[[a, b]]
-        collector = self.collector
+        collector, matrix = self.collector, np.eye(3) if frame.turn is None else np.array(frame.turn)
+        if self.tips:
+            collector.levels += [(collector.moves, axis, float(end[axis])) for axis in range(3)]
+        words, end, centre = end, *turned(matrix, np.array([end, centre]))
         collector.put_worded_arcs(
             np.array([collector.moves]), centre[None], np.array([pole.plane]), np.array([sweep]),
             np.array([[*pole.words, -1, -1]]), np.array([True]),
         )  # fmt: skip
         collector.put_poles([Block.POLAR], [self._editable(pole)], [pole.taken])
-        modes.position[:] = end.tolist()
+        modes.move_to(frame, end.tolist(), words)
         self.put_row(chunk, row, line, Kind.ARC_CCW if sweep > 0 else Kind.ARC_CW, Flag(0), end.tolist())
         self.pole = pole.used()
 
@@ -136,30 +144,41 @@ class Arcs(Events):
         if k < 0 or chunk.blocks.number(int(chunk.pole_line[k])) <= (
             0 if self.pole is None else self.pole.line
         ):
-            return self.pole
+            return self._of_plane(self.pole, chunk.blocks.number(line))
         number = chunk.blocks.number(int(chunk.pole_line[k]))
         frame = self.modes.table.frames[self.modes.frame(number)]
         slot = chunk.pole_slot[k]
         stated = np.flatnonzero(slot >= 0)
         plane = plane_of(stated.tolist())
         assert plane is not None
-        point = np.full(3, np.nan)
+        point, offset = np.full(3, np.nan), along_frame(frame, frame.offset_mm)
         for axis in stated.tolist():
-            point[axis] = chunk.blocks.value[slot[axis]] * frame.unit_mm + frame.offset_mm[axis]
+            point[axis] = chunk.blocks.value[slot[axis]] * frame.unit_mm + offset[axis]
         words = [int(s) + chunk.base if s >= 0 else -1 for s in slot]
         begin = int(chunk.blocks.words.line_start[chunk.pole_line[k]])
         self.pole = Pole(point, plane, begin, number, (words[0], words[1], words[2]), STATED)
-        return self.pole
+        return self._of_plane(self.pole, chunk.blocks.number(line))
+
+    def _of_plane(self, pole: Pole | None, line: int) -> Pole | None:
+        """A pole, which has to be stated in the plane that is in force."""
+        if pole is not None and pole.line < self.modes.tilted_line:
+            raise ProgramError(
+                "the pole of this arc is stated before a PLANE, and is none in that plane; give CC again",
+                line=line,
+                code="OLP516",
+            )
+        return pole
 
     def arcs(
-        self, chunk: Chunk, arcs: slice, a: int, end: Array, unit_mm: float, number: Index
+        self, chunk: Chunk, arcs: slice, a: int, end: Array, frame: Frame, number: Index
     ) -> npt.NDArray[np.uint8]:
-        """Arcs of a stretch that begins with row `a`; returns their kinds."""
+        """Arcs of a stretch that begins with row `a`, with `end` (n, 3) along the words. Their kinds."""
         blocks, rows = chunk.blocks, chunk.rows
         row = rows.arc_row[arcs] - a
         line, words = rows.line[rows.arc_row[arcs]], rows.arc_slot[arcs]
         form = blocks.block[line]
-        start = np.where(row[:, None] > 0, end[np.maximum(row - 1, 0)], np.array(self.modes.position))
+        first = np.array(self.modes.words_at(frame))
+        start = np.where(row[:, None] > 0, end[np.maximum(row - 1, 0)], first)
         if (words[:, 2] < 0).any():
             bad = int(np.flatnonzero(words[:, 2] < 0)[0])
             raise ProgramError("an arc has no DR; give DR+ or DR-", line=int(number[row[bad]]), code="OLP516")
@@ -169,7 +188,7 @@ class Arcs(Events):
         before = np.where(row > 0, number[np.maximum(row - 1, 0)], self.last_line)
         by_radius = form == Block.RADIUS
         size[by_radius, 3] = np.where(
-            words[by_radius, 3] >= 0, blocks.value[words[by_radius, 3]] * unit_mm, np.nan
+            words[by_radius, 3] >= 0, blocks.value[words[by_radius, 3]] * frame.unit_mm, np.nan
         )
         slots[by_radius, 3] = np.where(words[by_radius, 3] >= 0, words[by_radius, 3] + chunk.base, -1)
         for i in np.flatnonzero(~by_radius).tolist():
@@ -187,6 +206,14 @@ class Arcs(Events):
             absolute=np.ones(len(row), bool), offset=np.zeros((len(row), 3)), line=number[row],
         )  # fmt: skip
         slots[begin < 0, :3] = -1
+        if frame.turn is not None:
+            centre = turned(np.array(frame.turn), centre)
         self.collector.put_worded_arcs(row + self.collector.moves, centre, plane, sweep, slots, ~by_radius)
         self.collector.put_poles(form, begin, taken)
         return np.where(sweep > 0, np.uint8(Kind.ARC_CCW), np.uint8(Kind.ARC_CW))
+
+
+def along_frame(frame: Frame, place: Sequence[float]) -> Array:
+    """(3,) a place of the axes along the words of a frame."""
+    point = np.array(place, float)
+    return point if frame.turn is None else turned(np.array(frame.turn).T, point[None])[0]

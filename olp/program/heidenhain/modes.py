@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
+from olp.core.arrays import Array
 from olp.core.errors import ProgramError
 from olp.core.machine import ZERO, Setup, Vector
-from olp.core.toolpath import Interpolated
+from olp.core.toolpath import Frame, Interpolated
 from olp.core.units import MM_PER_INCH
 from olp.program.frames import FrameTable, Placement, tool_vector_of, turned
 from olp.program.heidenhain.planes import Plane
 from olp.program.heidenhain.statements import CycleText, Statement
 from olp.program.heidenhain.table import UNROLL
+from olp.program.rs274.turned import Along, Turning, along_words
 
 NAN = float("nan")
 TOOL_CALL = re.compile(
@@ -41,6 +44,8 @@ class Modes:
         #: the tilted plane in force, and the last one that was stated
         self.plane: Plane | None = None
         self.stated_plane: Plane | None = None
+        #: the line of the last PLANE
+        self.tilted_line = 0
         #: axes whose datum shift is not known: it was changed while one below a tilted plane was in force
         self.unclear: set[int] = set()
         #: axes whose shift was set to 0 in the plane in force: all three cancel the one below it, too
@@ -52,6 +57,8 @@ class Modes:
         self.remarks: dict[str, tuple[int, str]] = {}
         #: tool centre point control, as in `Frame`
         self.tip: Interpolated = ""
+        #: the position along the words of a tilted plane
+        self.along = Along()
         self._frame: int | None = None
 
     @property
@@ -62,6 +69,18 @@ class Modes:
     def changed(self) -> None:
         """Forget the present frame: what it is made from has changed."""
         self._frame = None
+
+    def words_at(self, frame: Frame) -> list[float]:
+        """The position along the words of a frame, mm, with its offset."""
+        if frame.tip == "fixed":
+            return self.along.of(frame.turn, self.position)
+        return along_words(Turning.of(frame.turn), self.position)
+
+    def move_to(self, frame: Frame, position: Sequence[float], words: Array) -> None:
+        """Take over where a move in a frame ends: the axes, and along the words."""
+        self.position[:] = position
+        if frame.tip == "fixed":
+            self.along.put(frame.turn, self.position, words)
 
     def frame(self, line: int) -> int:
         """Index of the present frame. Raises ProgramError for a tool or a work offset that is not defined."""
@@ -108,6 +127,8 @@ class Modes:
     def tilt(self, plane: Plane, line: int) -> None:
         """PLANE: a shift that is in force before it acts below the plane. Raises ProgramError where no tool
         is known."""
+        self.tilted_line = line
+        self.along.drop()
         if plane.ends:
             if self.plane is not None:
                 if len(self.cancelled) == len(ZERO):

@@ -16,10 +16,10 @@ from olp.core.arrays import Array, Index, Mask, distinct
 from olp.core.errors import ProgramError
 from olp.core.machine import Setup
 from olp.core.progress import Progress
-from olp.core.toolpath import Flag, Frame, Kind
+from olp.core.toolpath import Flag, Kind
 from olp.core.turns import turned
 from olp.program.dialect import Dialect, Options
-from olp.program.heidenhain.arcs import Arcs
+from olp.program.heidenhain.arcs import Arcs, along_frame
 from olp.program.heidenhain.chunk import KNOWN_LETTERS, UNTIPPED, Chunk, apart, columns_of, harmless
 from olp.program.heidenhain.collector import Collected
 from olp.program.heidenhain.columns import PARAMETER_FEED, SIDE, TURN, Block, Blocks, blocks
@@ -231,6 +231,7 @@ class _Reader(Arcs):
         position = self.modes.position
         for axis in axes:
             position[axis] = NAN
+        self.modes.along.drop()
         self.last_line = line
         if not self.collector.moves:
             x, y, z = position
@@ -245,6 +246,7 @@ class _Reader(Arcs):
         collector.tilts.append(tilt)
         if not letters:
             self.modes.position[:] = (NAN, NAN, NAN)
+        self.modes.along.drop()
         flag = Flag.PASS if letters else Flag.PASS | Flag.CONTROL
         collector.put_one(Kind.RAPID, flag, line, self.modes.frame(line), self.modes.position, np.inf)
 
@@ -254,6 +256,7 @@ class _Reader(Arcs):
         slot = chunk.rows.slot[row]
         position = self.modes.position
         located = self.modes.setup.machine.located
+        self.modes.along.drop()
         for axis in range(3):
             if slot[axis] >= 0:
                 if chunk.blocks.step[slot[axis]]:
@@ -320,29 +323,26 @@ class _Reader(Arcs):
         step = chunk.steps[a:upto]
         self._check_steps(blocks, slot, step, number)
         counted = np.asarray(step.any(axis=1))
-        end = _filled(slot, blocks.value, counted if counted.any() else None, frame, modes.position)
+        offset = along_frame(frame, frame.offset_mm)
+        start = modes.words_at(frame)
+        words = fill(slot, blocks.value, counted if counted.any() else None, offset, frame.unit_mm, start)
+        end = words if frame.turn is None else turned(np.array(frame.turn), words)
         flag = np.where(step.any(axis=1), np.uint8(Flag.INCREMENTAL), np.uint8(0))
         flag[rows.other[a:upto]] |= np.uint8(Flag.WHOLE)
         rapid = chunk.rapid[line]
         kind = np.where(rapid, np.uint8(Kind.RAPID), np.uint8(Kind.LINE))
         arcs = slice(*np.searchsorted(rows.arc_row, (a, upto)))
         if arcs.stop > arcs.start:
-            if frame.tip == "fixed":
-                raise ProgramError(
-                    "an arc in a tilted plane is not read; post it as straight moves, within your tolerance",
-                    line=int(number[rows.arc_row[arcs.start] - a]),
-                    code="OLP565",
-                )
-            kind[rows.arc_row[arcs] - a] = self.arcs(chunk, arcs, a, end, frame.unit_mm, number)
+            kind[rows.arc_row[arcs] - a] = self.arcs(chunk, arcs, a, words, frame, number)
         held = np.searchsorted(feed_line, line, "right") - 1
         feed = (
             np.where(held >= 0, feed_value[held], before) if len(feed_value) else np.full(len(line), before)
         )
         feed[rapid] = np.inf
-        words = np.where(slot >= 0, slot + chunk.base, -1)
-        self.collector.put_moves(kind, flag, number, np.full(len(line), index), end, words)
+        own = np.where(slot >= 0, slot + chunk.base, -1)
+        self.collector.put_moves(kind, flag, number, np.full(len(line), index), end, own)
         self.collector.put_feeds(feed)
-        modes.position[:] = end[-1].tolist()
+        modes.move_to(frame, end[-1].tolist(), words[-1])
         self.last_line = int(number[-1])
 
     def _check_steps(self, blocks: Blocks, slot: Index, step: Mask, number: Index) -> None:
@@ -362,31 +362,21 @@ class _Reader(Arcs):
         number = modes.frame(line)
         frame = modes.table.frames[number]
         matrix = np.eye(3) if frame.turn is None else np.array(frame.turn)
-        (x, y, z), offset = turned(matrix.T, np.array([modes.position, frame.offset_mm])).tolist()
-        stroke = self.cycle.stroke(modes, NAN if frame.tip == "fixed" else z, line, offset[2])
+        x, y, z = modes.words_at(frame)
+        offset = along_frame(frame, frame.offset_mm)
+        stroke = self.cycle.stroke(modes, NAN if frame.tip == "fixed" else z, line, float(offset[2]))
         if stroke is None:
             return
         heights = (stroke.approach, stroke.bottom, stroke.retract)
-        ends = turned(matrix, np.array([(x, y, z) for z in heights])).tolist()
+        words = np.array([(x, y, z) for z in heights])
+        ends = turned(matrix, words).tolist()
         for kind, z, end in zip((Kind.RAPID, Kind.LINE, Kind.RAPID), heights, ends, strict=True):
             feed = stroke.feed_mm_s if kind == Kind.LINE else np.inf
             if kind == Kind.LINE and collector.moves > 1:
                 collector.strokes.append((collector.moves - 2, collector.moves))
                 collector.definitions.append(self.cycle.definition(modes, collector.data))
             if frame.tip == "fixed":
-                collector.levels.append((collector.moves, z))
+                collector.levels.append((collector.moves, 2, z))
             collector.put_one(kind, Flag.CYCLE, line, number, end, feed)
-        modes.position[:] = ends[-1]
+        modes.move_to(frame, ends[-1], words[-1])
         self.last_line = line
-
-
-def _filled(
-    slot: Index, value: Array, counted: Mask | None, frame: Frame, position: Sequence[float]
-) -> Array:
-    """(n, 3) axis positions of blocks in one frame, from `position`."""
-    offset = np.array(frame.offset_mm)
-    if frame.turn is None:
-        return fill(slot, value, counted, offset, frame.unit_mm, list(position))
-    matrix = np.array(frame.turn)
-    start, offset = turned(matrix.T, np.array([position, frame.offset_mm]))
-    return turned(matrix, fill(slot, value, counted, offset, frame.unit_mm, start.tolist()))

@@ -6,7 +6,7 @@ Positions are axis positions in mm; an axis whose position is not known is NaN. 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import field, replace
 from typing import Any
 
@@ -48,6 +48,7 @@ from olp.program.rs274.planes import tilted
 from olp.program.rs274.profiles.base import Profile
 from olp.program.rs274.state import NAN, PathMode
 from olp.program.rs274.transforms import change
+from olp.program.rs274.turned import Along
 from olp.program.tilts import Tilt
 
 #: M6, as ten times its number.
@@ -96,6 +97,8 @@ class AxisState(OffsetState):
     frames: list[Frame] = field(default_factory=list)
     path_modes: list[PathMode] = field(default_factory=list)
     tilts: list[Tilt] = field(default_factory=list)
+    #: the position along the words of a tilted plane
+    along: Along = field(default_factory=Along)
     #: the frame of the last plain motion, -1 before any
     last_frame: int = -1
     #: those of lengths, by the tool whose length is active and the work offset
@@ -123,6 +126,10 @@ class AxisState(OffsetState):
             state.length_tool = state.spindle
             state.offsets.length = state._tool(state.spindle, 1, "the tool in the spindle at the start")
         return state
+
+    def forget(self, axes: Iterable[int] = (0, 1, 2)) -> None:
+        OffsetState.forget(self, axes)
+        self.along.drop()
 
     # -- frames ------------------------------------------------------------------------------------
 

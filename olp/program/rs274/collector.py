@@ -38,7 +38,7 @@ class Collector(PathColumns):
         self.word_count = 0
         self.holes: list[Holes] = []
         self.called: list[tuple[int, ...]] = []
-        self.levels: list[tuple[int, float]] = []
+        self.levels: list[tuple[int, int, float]] = []
         self.remarks: dict[str, tuple[int, str]] = {}
 
     def put_words(self, chunk: WordChunk) -> None:

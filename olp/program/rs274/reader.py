@@ -428,7 +428,8 @@ class _Reader:
         offset, unit = self._offsets(frame)
         value = scaled(context, state, self.collector.remarks)
         turning = Turning.of(self.turn)
-        start = along_words(turning, state.position)
+        tilted = state.offsets.plane is not None
+        start = state.along.of(self.turn, state.position) if tilted else along_words(turning, state.position)
         if turning is not None:
             offset = turning.words(offset)
         steps = incremental if incremental.any() else None
@@ -440,10 +441,13 @@ class _Reader:
                 row = blocks.arc_row[arcs] - a
                 row += (lost - np.arange(len(lost))).searchsorted(row, "right")
                 kind = self._arcs(context, rows, arcs, row, kind, point, value, offset, unit)
+        last = end[-1]
         if turning is not None:
             end = turning.axes(end)
         self.collector.put_moves(kind, flag, number, frame, end, word)
         state.position[:] = end[-1].tolist()
+        if tilted:
+            state.along.put(self.turn, state.position, last)
 
     def _arcs(
         self,
@@ -481,7 +485,8 @@ class _Reader:
         )
         turning = Turning.of(self.turn)
         if turning is not None:
-            kind, centre, sweep = turning.arcs(kind, row, centre, sweep, plane, number)
+            tilted = self.state.offsets.plane is not None
+            kind, centre, sweep = turning.arcs(kind, row, centre, sweep, plane, number, tilted=tilted)
         slot = np.where(words >= 0, words + context.base, -1)
         self.collector.put_worded_arcs(row + self.collector.moves, centre, plane, sweep, slot, absolute)
         return kind

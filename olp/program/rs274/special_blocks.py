@@ -252,6 +252,7 @@ class SpecialBlocks:
             return
         for axis in axes:
             state.position[axis] = NAN if (at := place[axis]) is None else at
+        state.along.drop()
         self._collector.put_moves(
             _RAPID, _STANDS, [line], [number], np.array([state.position]), _NO_WORDS,
         )  # fmt: skip
@@ -311,6 +312,7 @@ class SpecialBlocks:
             np.array([frame_index]), end, np.where(slot >= 0, slot + context.base, -1),
         )  # fmt: skip
         state.position[:] = end[0].tolist()
+        state.along.drop()
         if kind == Kind.PROBE:
             # it may stop anywhere on its path
             for i in range(3):
@@ -338,11 +340,13 @@ class SpecialBlocks:
                 code="OLP512",
             )
         matrix = np.array(frame.turn) if fixed and frame.turn is not None else np.eye(3)
-        place, offset = turned(matrix.T, np.array([state.position, frame.offset_mm]))
+        place = np.array(state.along.of(frame.turn, state.position) if fixed else state.position)
+        offset = turned(matrix.T, np.array([frame.offset_mm]))[0]
         kind, end = drilling.moves(state, place, offset, frame.unit_mm)
         count, moves = len(kind), self._collector.moves
         if fixed:
-            self._collector.levels += [(moves + k, float(z)) for k, z in enumerate(end[:, 2])]
+            self._collector.levels += [(moves + k, 2, float(z)) for k, z in enumerate(end[:, 2])]
+        last = end[-1]
         end = turned(matrix, end)
         if moves and drilling.text[0] >= 0:
             bottom = moves + [k for k, _ in drilling.strokes].index(Kind.LINE)
@@ -355,6 +359,8 @@ class SpecialBlocks:
             np.full(count, number), end, np.full((count, 3), -1),
         )  # fmt: skip
         state.position[:] = end[-1].tolist()
+        if fixed:
+            state.along.put(frame.turn, state.position, last)
 
 
 def _deleted(deleted: bool) -> Flag:

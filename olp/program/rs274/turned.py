@@ -43,10 +43,21 @@ class Turning:
         return turned(self.inverse, np.atleast_2d(axes)).reshape(axes.shape)
 
     def arcs(
-        self, kind: npt.NDArray[np.uint8], row: Index, centre: Array, sweep: Array, plane: Index, line: Index
+        self,
+        kind: npt.NDArray[np.uint8],
+        row: Index,
+        centre: Array,
+        sweep: Array,
+        plane: Index,
+        line: Index,
+        *,
+        tilted: bool = False,
     ) -> tuple[npt.NDArray[np.uint8], Array, Array]:
         """Kinds of all moves, and centres (m, 3) and sweeps of the arcs among them, moves `row` (m,), for the
-        axes. Raises ProgramError for arcs that leave their planes, or become ellipses."""
+        axes. In a `tilted` plane they stay those of the words. Raises ProgramError for arcs that leave their
+        planes, or become ellipses."""
+        if tilted:
+            return kind, self.axes(centre), sweep
         mirrored = np.zeros(len(row), bool)
         for one in distinct(plane).tolist():
             mine = np.flatnonzero(plane == one)
@@ -84,6 +95,34 @@ class Turning:
     def _block(self, plane: int) -> Array:
         pair = PLANES[plane][:2]
         return np.asarray(self.matrix[np.ix_(pair, pair)])
+
+
+class Along:
+    """The last position along the words of a tilted plane, which state the tip of the tool there. Positions
+    of the axes do not tell it, nor, where one coordinate is not known, the others."""
+
+    def __init__(self) -> None:
+        self._turn: Turn | None = None
+        self._axes: list[float] = []
+        self._words: list[float] | None = None
+
+    def drop(self) -> None:
+        """Where the tip is is not known from here on."""
+        self._words = None
+
+    def put(self, turn: Turn | None, position: Sequence[float], words: Array) -> None:
+        """Take over a position of the axes with that along the words."""
+        self._turn, self._axes, self._words = turn, list(position), words.tolist()
+
+    def of(self, turn: Turn | None, position: Sequence[float]) -> list[float]:
+        """A position of the axes along the words: what was put, NaN where the axes have moved since."""
+        if self._words is not None and turn == self._turn and _alike(self._axes, position):
+            return list(self._words)
+        return [np.nan] * 3
+
+
+def _alike(one: Sequence[float], other: Sequence[float]) -> bool:
+    return all(a == b or (a != a and b != b) for a, b in zip(one, other, strict=True))
 
 
 def along_words(turning: Turning | None, position: Sequence[float]) -> list[float]:
