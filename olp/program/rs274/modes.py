@@ -40,6 +40,7 @@ _FLOW = pattern(rb"[#\[=<]|^/?\s*O|^\W*N?\d*\s*(IF|WHILE|GOTO|END|DO|CALL|RTS)",
 _PROGRAM = b":1"
 _POLAR = pattern(rb"[@^]")
 _COMMA = pattern(rb"\d,\d")
+_ROUNDED = pattern(rb"(?i),[ \t]*[CR][ \t]*[\d.]")
 #: D and H
 _NUMBERS = (68, 72)
 _LENGTHS = np.zeros(256, bool)
@@ -375,6 +376,8 @@ def _odd(data: bytes, chunk: WordChunk, line: int, profile: Profile, *, words: b
             code="OLP510",
         )
     comma = "; write a decimal point instead of the comma" if _COMMA.search(text) else ""
+    if _ROUNDED.search(text):
+        comma = "; where it rounds or breaks a corner inside the control, post the corner as a move"
     return ProgramError(
         f"`{shown}` is not understood and may move the machine; expected words of a letter and a number"
         f"{comma}",

@@ -35,7 +35,7 @@ from olp.program.rs274.flatten.language import UNROLL
 from olp.program.rs274.modes import Context, scaled
 from olp.program.rs274.motion import fill
 from olp.program.rs274.offset_state import EventBlock, Word
-from olp.program.rs274.profiles.base import Act, Profile
+from olp.program.rs274.profiles.base import Act, Profile, remedied
 from olp.program.rs274.state import NAN
 from olp.program.rs274.translation import Drilling
 from olp.program.rs274.turned import Turning, along_words
@@ -154,8 +154,9 @@ def _checked(stated: EventWords, words: list[Word], profile: Profile, line: int)
             spline = c in SPLINES and profile.language.splines and bool(unroll)
             holes = c in HOLE_PATTERNS and profile.language.hole_patterns
             unrolled = c in MACROS or (c == POLAR and profile.polar) or spline or holes
+            why = why or f"{name} is not known to the {profile.name} profile and may move the machine"
             raise ProgramError(
-                why or f"{name} is not known to the {profile.name} profile and may move the machine",
+                why if unrolled and unroll else remedied(why),
                 line=line,
                 code="OLP511" if unrolled else "OLP512",
                 hint=unroll if unrolled else "",
@@ -165,8 +166,9 @@ def _checked(stated: EventWords, words: list[Word], profile: Profile, line: int)
     for m in [round(word.value * 10) for word in words if word.letter == "M"]:
         if m in profile.m_refusals:
             helps = profile.unrolls_m(m)
+            why = f"M{m / 10:g} {profile.m_refusals[m]}"
             raise ProgramError(
-                f"M{m / 10:g} {profile.m_refusals[m]}",
+                why if helps and unroll else remedied(why),
                 hint=unroll if helps else "",
                 line=line,
                 code="OLP511" if helps else "OLP512",

@@ -443,7 +443,7 @@ CODES: dict[str, dict[Act, str]] = {
         Act.FEED: "G93-G95",
         Act.RETRACT: "G98 G99",
         Act.EVENT: f"{_ISO_EVENTS} G110-G129 G154",
-        Act.REFUSE: f"{_REFUSED} G41.1 G42.1 G5.1 G51.1 G92.1 G70-G72 G87",
+        Act.REFUSE: f"{_REFUSED} G41.1 G42.1 G5.1 G51.1 G92.1 G47 G70-G72 G87 G100 G101 G150",
     },
     GRBL: {
         Act.UNCHANGED: "G40",
@@ -510,10 +510,16 @@ def test_the_table_says_of_every_m_code_what_the_reader_does(
             assert isinstance(got, tuple) and np.isnan(got[0])
 
 
+def test_each_refusal_of_a_code_says_what_to_do() -> None:
+    for profile in PROFILES:
+        for row in profile.rows():
+            assert row.support is not Support.REFUSED or not row.statement.startswith("G") or ";" in row.why
+
+
 def test_a_code_without_a_reason_is_not_of_the_control() -> None:
-    rows = {row.statement: row for row in DIALECTS[GRBL].rows()}
-    assert rows["G61.1"] == Row("G61.1", Support.REFUSED, "is not a code of this control")
-    assert rows["G68"] == Row("G68", Support.REFUSED, "G68 (rotation) is not read")
+    rows, alone = {row.statement: row for row in DIALECTS[GRBL].rows()}, "; post the program without it"
+    assert rows["G61.1"] == Row("G61.1", Support.REFUSED, f"is not a code of this control{alone}")
+    assert rows["G68"] == Row("G68", Support.REFUSED, f"G68 (rotation) is not read{alone}")
     assert rows["G54"] == Row("G54", Support.READ)
 
 
@@ -597,7 +603,8 @@ def test_dwells_without_a_point_are_milliseconds_on_iso_controls() -> None:
     ("line", "straight"),
     [
         (b"G2 X1 Y2 I3 J-4.5 F6", b"G1   X1 Y2     F6"),
-        (b"N5 G03X1Y2R+.5", b"G1 N5  X1Y2 "),
+        (b"N5 G03X1Y2R+.5", b"N5 G1  X1Y2 "),
+        (b"/2 n 10 X1 I2", b"/2 n 10 G1 X1  "),
         (b"X1 Y2 k 3 p2", b"G1 X1 Y2    "),
         (b"g 002 G20 G30 G2.1 G23 X3", b"G1   G20 G30 G2.1 G23 X3"),
         (b"G90 X1 I.5", b"G1 G90 X1  "),

@@ -253,6 +253,8 @@ PERCENT = (
     "`%` is in the middle of the program, or not alone in its line; expected it as the first "
     "line and the last one, or not at all"
 )
+#: what to do where a code has no remedy of its own
+ALONE = "; post the program without it"
 NO_MOTION = "a block has axis words, but no motion code is in force; expected G0, G1, G2 or G3"
 UNKNOWN = f"an arc starts or ends where an axis has not been commanded yet; {KNOWN_BY}"
 #: Control and text behind `HEAD`: the line, the sentence, the code, and what else the refusal names.
@@ -271,6 +273,11 @@ REFUSED: dict[tuple[str, str], dict[str, object]] = {
     ("fanuc", "hello go to"): {"why": unread("hello go to"), "code": "OLP510"},
     ("fanuc", "X1,5 Y2 "): {
         "why": unread("X1,5 Y2") + "; write a decimal point instead of the comma", "code": "OLP510",
+    },
+    ("fanuc", "G1 X1. ,R5."): {
+        "why": unread("G1 X1. ,R5.")
+        + "; where it rounds or breaks a corner inside the control, post the corner as a move",
+        "code": "OLP510",
     },
     ("fanuc", "X1, Y2"): {"why": unread("X1, Y2"), "code": "OLP510"},
     ("fanuc", "?" * 70): {"why": unread("?" * 60), "code": "OLP510"},
@@ -295,19 +302,19 @@ REFUSED: dict[tuple[str, str], dict[str, object]] = {
     ("linuxcnc", "/M61 Q1"): {"why": STATE, "code": "OLP525"},
     ("linuxcnc", "/G61"): {"why": STATE, "code": "OLP525"},
     ("linuxcnc", "%"): {"why": PERCENT, "code": "OLP505"},
-    ("linuxcnc", "G68 X1 R2"): {"why": "G68 (rotation) is not read", "code": "OLP512", "word": "G68"},
+    ("linuxcnc", "G68 X1 R2"): {"why": f"G68 (rotation) is not read{ALONE}", "code": "OLP512", "word": "G68"},
     ("linuxcnc", "G2.5"): {
-        "why": "G2.5 is not known to the linuxcnc profile and may move the machine",
+        "why": f"G2.5 is not known to the linuxcnc profile and may move the machine{ALONE}",
         "code": "OLP512",
         "word": "G2.5",
     },
     ("haas", "X1.\nG777"): {
-        "why": "G777 is not known to the haas profile and may move the machine",
+        "why": f"G777 is not known to the haas profile and may move the machine{ALONE}",
         "code": "OLP512", "word": "G777", "line": 4,
     },
     **{
         ("grbl", f"X1 {code}"): {
-            "why": f"{code} is not known to the grbl profile and may move the machine",
+            "why": f"{code} is not known to the grbl profile and may move the machine{ALONE}",
             "code": "OLP512", "word": code,
         }
         for code in ("G-1", "G5.04", "G0.96", "G0.04", "G199.9", "G200", "G2.12")
@@ -316,7 +323,8 @@ REFUSED: dict[tuple[str, str], dict[str, object]] = {
         "why": f"G65 calls a macro; {UNROLL}", "code": "OLP511", "hint": UNROLL,
     },
     ("fanuc", "G41.1"): {
-        "why": "G41.1 (normal direction control) turns a rotary axis", "code": "OLP512", "word": "G41.1",
+        "why": f"G41.1 (normal direction control) turns a rotary axis{ALONE}",
+        "code": "OLP512", "word": "G41.1",
     },
     ("fanuc", "M98 P1\nM3\nG68.2\nM99"): {
         "why": f"M98 calls a subprogram; {UNROLL}", "code": "OLP511", "hint": UNROLL, "word": "M98",

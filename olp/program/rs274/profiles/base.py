@@ -266,7 +266,9 @@ class Profile(Dialect):
         return split(data, self.text.line_end)
 
     def straightened(self, line: bytes) -> bytes:
-        return b"G1 " + _OF_ARC.sub(b" ", line)
+        number = _NUMBERED.match(line)
+        begin = 0 if number is None else number.end()
+        return line[:begin] + b"G1 " + _OF_ARC.sub(b" ", line[begin:])
 
     def rows(self) -> Sequence[Row]:
         return [*self._g_rows(), *word_rows(self)]
@@ -279,10 +281,15 @@ class Profile(Dialect):
                 there[alias] = (self.codes[code], f"as G{code / 10:g} of other controls")
         for code, (act, why) in sorted(there.items()):
             if act is Act.REFUSE:
-                why = self.refusals.get(code, "is not a code of this control")
+                why = remedied(self.refusals.get(code, "is not a code of this control"))
             elif act is Act.CONTROL:
                 why = "the control moves by itself: no position is known behind it"
             yield Row(f"G{code / 10:g}", _SUPPORT.get(act, Support.READ), why)
+
+
+def remedied(why: str) -> str:
+    """A reason with what to do, where it has none of its own behind a semicolon."""
+    return why if ";" in why else f"{why}; post the program without it"
 
 
 def increment(machine: Machine, letter: str, unit_mm: float) -> float:
@@ -298,6 +305,8 @@ _CALLS = frozenset({970, 980, 990})
 _SAVES = frozenset({700, 710, 720, 730})
 #: G49, as ten times its number.
 _LENGTH_OFF = 490
+#: What a control expects in front of the words of a block.
+_NUMBERED = pattern(rb"(?i)[ \t]*/?\d?[ \t]*(?:N[ \t]*\d+[ \t]*)?")
 #: The words of a block that make its move an arc.
 _OF_ARC = pattern(rb"(?i)G[ \t]*0*[23](?![\d.])|[IJKRP][ \t]*[-+]?[\d.]+")
 

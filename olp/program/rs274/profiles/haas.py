@@ -12,7 +12,8 @@ from olp.program.rs274.profiles.iso import ISO, ISO_EXTRA, ISO_UNCHANGED
 
 _OFFSETS = dict.fromkeys((1540, *range(1100, 1300, 10)), Act.EVENT)
 #: G77 bores from below, and with G87 an operator leaves the bore; G70 to G72 make patterns of holes.
-_CYCLES = {770: Act.MOTION, **dict.fromkeys((700, 710, 720, 870), Act.REFUSE)}
+_INSIDE = {470: "engraves text", 1500: "cuts a pocket", 1000: "mirrors", 1010: "mirrors"}
+_CYCLES = {770: Act.MOTION, **dict.fromkeys((700, 710, 720, 870, *_INSIDE), Act.REFUSE)}
 _AROUND = "makes holes around the present position inside the control"
 _ALONG = "G72 makes holes along a line inside the control; post each hole with its place"
 
@@ -27,6 +28,9 @@ DIALECT = replace(
         870: "G87 waits for the operator inside the cycle",
         **{code: f"G{code // 10} {_AROUND}" for code in HOLE_PATTERNS},
         720: _ALONG,
+        **{
+            code: f"G{code // 10} {what} inside the control; post the moves" for code, what in _INSIDE.items()
+        },
     },
     harmless_m=ISO.harmless_m | {10, 11, 29, 31, 33, 34, 35, 41, 42, 59, 69, 83, 84, 88, 89},
     g10_tools=True,
