@@ -16,9 +16,12 @@ _NO = Support.REFUSED
 
 _CONTOUR = "drives the tool along geometry that only an APT processor resolves; send its output (CLDATA)"
 _LOGIC = "branches or repeats; send the output of the APT processor (CLDATA)"
-_TURNS = "turns the part or the head, and the position of the part afterwards is not known"
+_TURNS = (
+    "turns the part or the head, and the position of the part afterwards is not known; "
+    "send a program for each position of the part"
+)
 _GEOMETRY = "defines geometry; send the output of the APT processor (CLDATA), which has points"
-_CYCLE = "is a path that the control makes itself"
+_CYCLE = "is a path that the control makes itself; have the CAM system write its points"
 
 TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"GOTO": (_C, "points with or without a tool axis"),

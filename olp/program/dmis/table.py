@@ -92,6 +92,7 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
         (b"ASSIGN", b"OBTAIN", b"PROMPT"), (_X, "a motion that uses the value is refused")
     ),
     **dict.fromkeys(
-        (b"ROTSET", b"ROTAB", b"CRSLCT", b"CRMODE", b"THLCHG"), (_NO, "moves an axis that is not read")
+        (b"ROTSET", b"ROTAB", b"CRSLCT", b"CRMODE", b"THLCHG"),
+        (_NO, "moves an axis that is not read; write a program for each of its positions"),
     ),
 }  # fmt: skip

@@ -35,7 +35,8 @@ from olp.program.rs274.flatten.language import UNROLL
 from olp.program.rs274.modes import Context, scaled
 from olp.program.rs274.motion import fill
 from olp.program.rs274.offset_state import EventBlock, Word
-from olp.program.rs274.profiles.base import Act, Profile, remedied
+from olp.program.rs274.profiles.base import Act, Profile
+from olp.program.rs274.profiles.words import remedied
 from olp.program.rs274.state import NAN
 from olp.program.rs274.translation import Drilling
 from olp.program.rs274.turned import Turning, along_words

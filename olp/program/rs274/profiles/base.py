@@ -34,7 +34,7 @@ from olp.program.rs274.codes import (
 from olp.program.rs274.commands import Commands
 from olp.program.rs274.cycle_rules import CycleRules
 from olp.program.rs274.flatten.language import Language
-from olp.program.rs274.profiles.words import word_rows
+from olp.program.rs274.profiles.words import remedied, word_rows
 from olp.program.text.line_ends import split
 
 #: One number, or an array of them.
@@ -285,11 +285,6 @@ class Profile(Dialect):
             elif act is Act.CONTROL:
                 why = "the control moves by itself: no position is known behind it"
             yield Row(f"G{code / 10:g}", _SUPPORT.get(act, Support.READ), why)
-
-
-def remedied(why: str) -> str:
-    """A reason with what to do, where it has none of its own behind a semicolon."""
-    return why if ";" in why else f"{why}; post the program without it"
 
 
 def increment(machine: Machine, letter: str, unit_mm: float) -> float:

@@ -46,7 +46,11 @@ def word_rows(profile: Control) -> Iterator[Row]:
         yield Row("H D", Support.READ, "lengths and radii from [tools.N] of the machine or job file")
     yield Row("(comment) or ;comment" if profile.text.brackets else ";comment", Support.UNCHANGED)
     yield from _lines_of_commands(profile) if profile.commands is not None else _lines(profile)
-    yield Row("any other line", Support.REFUSED, "is not understood and may move the machine")
+    yield Row(
+        "any other line",
+        Support.REFUSED,
+        "is not understood and may move the machine; write words, or a comment",
+    )
 
 
 def _m_codes(profile: Control) -> Iterator[Row]:
@@ -59,9 +63,14 @@ def _m_codes(profile: Control) -> Iterator[Row]:
     if profile.m61_sets_tool:
         yield Row("M61 Q", Support.READ, "Q is the tool in the spindle")
     for m, why in sorted(profile.m_refusals.items()):
-        remedy = f"; {UNROLL}" if profile.unrolls_m(m) else ""
-        yield Row(f"M{m / 10:g}", Support.REFUSED, f"{why}{remedy}")
+        said = f"{why}; {UNROLL}" if profile.unrolls_m(m) else remedied(why)
+        yield Row(f"M{m / 10:g}", Support.REFUSED, said)
     yield Row("any other M", Support.READ, _LOST)
+
+
+def remedied(why: str) -> str:
+    """A reason with what to do, where it has none of its own behind a semicolon."""
+    return why if ";" in why else f"{why}; post the program without it"
 
 
 def _ranges(codes: list[int]) -> str:
