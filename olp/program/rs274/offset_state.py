@@ -241,12 +241,16 @@ class OffsetState(State):
             raise ProgramError(
                 "G10 needs a P word with the number of a work offset, 1 for G54", line=line, code="OLP516"
             )
+        if number == 0 and not self.profile.g10_active:
+            changes = kind != 2 or any(word.value for _, word in axis_words)
+            self._check_common(line, changes=changes)
+            return
+        names = [self.offsets.name]
         if further:
-            name, kind = f"G54.1P{number}", 2
-        elif number == 0:
-            name = self.offsets.name
-        else:
-            name = f"G{53 + number}" if number < 7 else f"G59.{number - 6}"
+            names, kind = self.profile.further_names(number), 2
+        elif number:
+            names = [f"G{53 + number}" if number < 7 else f"G59.{number - 6}"]
+        name = next((name for name in names if self._work_offset(name)), names[0])
         base = self._work_mm(name)
         if kind == 2 and not self.setup.machine.located:
             raise ProgramError(
@@ -282,7 +286,18 @@ class OffsetState(State):
                 self.inherited[name] = self._touch(active, self._work_mm(active), line)
                 self.located[name] = self.located.get(active, active)
                 base[i] = self.offsets.work_at(i, self.position[i], value)
-        self.offsets.written[name] = base
+        self.offsets.written |= dict.fromkeys(names, base)
+
+    def _check_common(self, line: int, *, changes: bool) -> None:
+        """Refuse what `changes` what some controls add to all work offsets: it is 0 here, as the machine file
+        has it in each of them."""
+        if changes or any(self.offsets.local):
+            raise ProgramError(
+                "G10 P0 writes what this control adds to all work offsets, which is not read; add it to each "
+                "work offset of the machine or job file, and take this block out",
+                line=line,
+                code="OLP526",
+            )
 
     def _shift(self, code: int, line: int, axis_words: list[tuple[int, Word]], moves: int) -> None:
         offsets = self.offsets

@@ -58,6 +58,22 @@ READINGS: dict[str, tuple[str, dict[str, Outcome], Any]] = {
         dict.fromkeys((FANUC, HAAS, MAZAK, SIEMENS, MACH4), (1, 8, 9)),
         "not",
     ),
+    "g10_active": (
+        "G0 X1. Y0. Z0.\nG10 L2 P0 X5.\nX1. Y2. Z3.",
+        {LINUXCNC: (6, 2, 3), GRBL: (6, 2, 3)}
+        | dict.fromkeys((FANUC, HAAS, MAZAK, SIEMENS, MACH3), "G10 P0 writes what this control adds to all"),
+        "not",
+    ),
+    "further_offsets": (
+        "G90 G10 L20 P2 X50. Y60. Z70.\nG154 P2\nG0 X1. Y1. Z1.",
+        {HAAS: (51, 61, 71)},
+        {HAAS: ("G54.1",)},
+    ),
+    "first_further": (
+        "G90 G10 L20 P2 X50. Y60. Z70.\nG111\nG0 X1. Y1. Z1.",
+        {HAAS: (51, 61, 71)},
+        {HAAS: 0},
+    ),
     "g10_tools": (
         "G90 G10 L10 P2 R20.\nG10 L11 P2 R0.\nG43 H2\nG0 X0. Y0. Z1.",
         {FANUC: (0, 0, 21), HAAS: (0, 0, 21), MAZAK: "G10 L10 writes tables of the control"},

@@ -81,12 +81,13 @@ class Profile(Dialect):
     - `g52_is_g92`: G52 writes the same offset as G92. `g10_offsets`: the largest P of G10 L2 and L20.
       `g10_adds`: in G91 G10 L2 adds to the offset; None is not known, and refused. `g10_stores`: G10 L20
       stores the present position, else it writes the offset G54.1 P. `g10_tools`: G10 L10 to L13 write the
-      tables of tools. `offset_words`: the letter of the number of a work offset beside a code, which the code
-      may go without where it is in `offsets_alone`.
-      `offset_names`: the name of these offsets where it is not that of the code. `turns_offsets`: a work
-      offset may be turned about Z, which R of G10 L2 states too. `scales_axes`: G51 takes a factor for each
-      axis, too. `scales_by_parameter`: a parameter of the control sets the unit of these factors, which have
-      no point.
+      tables of tools. `g10_active`: P0 is the offset in force, else one that is added to all.
+      `further_offsets` name the offsets that G10 L20 writes, with P; `first_further` is the code of P1,
+      where 20 of them have codes of their own. `offset_words`: the letter of the number of a work offset
+      beside a code, which the code may go without where it is in `offsets_alone`. `offset_names`: the name
+      of these offsets where it is not that of the code. `turns_offsets`: a work offset may be turned about
+      Z, which R of G10 L2 states too. `scales_axes`: G51 takes a factor for each axis, too.
+      `scales_by_parameter`: a parameter of the control sets the unit of these factors, which have no point.
     - `polar`: X and Y between G16 and G15 are radius and angle about program zero, which the unroller writes
       as X and Y.
     - `return_level`: the code whose word of the tool axis states the level that canned cycles return to, 0
@@ -157,6 +158,9 @@ class Profile(Dialect):
     g10_adds: bool | None = False
     g10_stores: bool = True
     g10_tools: bool = False
+    g10_active: bool = False
+    further_offsets: tuple[str, ...] = ("G54.1",)
+    first_further: int = 0
     offset_words: Mapping[int, str] = field(default_factory=lambda: {541: "P", 1540: "P"})
     offset_names: Mapping[int, str] = field(default_factory=dict)
     offsets_alone: frozenset[int] = frozenset()
@@ -206,6 +210,12 @@ class Profile(Dialect):
     def still_m(self) -> frozenset[int]:
         """The M codes that move no axis, ten times their number."""
         return _in_tenths(self.harmless_m, self.harmless_m_tenths)
+
+    def further_names(self, number: int) -> list[str]:
+        """All names of a further work offset."""
+        names = [f"{name}P{number}" for name in self.further_offsets]
+        own = self.first_further and 1 <= number <= _WITH_CODES
+        return [*names, f"G{self.first_further + number - 1}"] if own else names
 
     @property
     def directed(self) -> bool:
@@ -295,6 +305,8 @@ def increment(machine: Machine, letter: str, unit_mm: float) -> float:
     return metric if unit_mm == 1.0 else metric / 10
 
 
+#: Further work offsets that have a code of their own.
+_WITH_CODES = 20
 #: M codes of subprograms, and those that save and restore modes, ten times their numbers.
 _CALLS = frozenset({970, 980, 990})
 _SAVES = frozenset({700, 710, 720, 730})

@@ -30,6 +30,7 @@ DIALECT = Profile(
     harmless_m=ISO_M | {56},
     motion=0,
     initial_retract=990,
+    g10_active=True,
     text=BlockText(odd_bytes=None, cr_ends_line=True, open_comments=True),
     cycles=replace(NGC_CYCLES, exact_corners=False),
     language=PLAIN_NGC,

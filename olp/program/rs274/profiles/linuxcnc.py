@@ -29,6 +29,7 @@ DIALECT = Profile(
     initial_retract=990,
     g52_is_g92=True,
     g10_offsets=9,
+    g10_active=True,
     turns_offsets=True,
     m61_sets_tool=True,
     length_of_spindle_tool=True,
