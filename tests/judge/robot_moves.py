@@ -113,4 +113,20 @@ def rapid(text: bytes, frames: Frames) -> list[Move]:
     return found
 
 
-READERS: dict[str, Callable[[bytes, Frames], list[Move]]] = {"krl": krl, "tp": tp, "rapid": rapid}
+def ur(text: bytes, frames: Frames) -> list[Move]:
+    """Moves of URScript to poses and joints with names or numbers, in m and rad."""
+    plain = re.sub(r"#.*", "", text.decode("latin-1"))
+    named = dict(re.findall(r"(?m)^\s*(\w+)=(p?\[.*\])", plain))
+    found = []
+    for kind, target in re.findall(r"move([lj])\((?:pose_trans\(frame, ?)?(p?\[[^\]]*\]|\w+)", plain):
+        value = named.get(target, target)
+        numbers = np.array([float(number) for number in _NUMBER.findall(value)])
+        if not value.startswith("p"):
+            found.append(Move(False, np.degrees(numbers)))
+            continue
+        turn, tip = frames.placed(rotvec(numbers[3:]), 1000.0 * numbers[:3])
+        found.append(Move(kind == "l", None, turn, tip))
+    return found
+
+
+READERS: dict[str, Callable[[bytes, Frames], list[Move]]] = {"krl": krl, "tp": tp, "rapid": rapid, "ur": ur}

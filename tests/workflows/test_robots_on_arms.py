@@ -22,7 +22,7 @@ TOOL = abc(*TOOL_DEG)
 FRAME_DEG, ORIGIN = (30.0, 0.0, 0.0), np.array([705.0, -94.0, 507.0])
 FRAMES = Frames(abc(*FRAME_DEG), ORIGIN)
 #: Last digits: mm, and rad.
-DIGITS = {"krl": (1e-5, 2e-8), "tp": (1e-3, 2e-8), "rapid": (1e-4, 4e-9)}
+DIGITS = {"krl": (1e-5, 2e-8), "tp": (1e-3, 2e-8), "rapid": (1e-4, 4e-9), "ur": (1e-5, 2e-9)}
 #: What machine and job of TP programs state.
 TP_FILES = """
 [kinematics]
@@ -120,7 +120,26 @@ def rapid(steps: list[Step]) -> bytes:
     return "\n".join([*head, *body, "ENDPROC", "ENDMODULE", ""]).encode()
 
 
-WRITERS: dict[str, Callable[[list[Step]], bytes]] = {"krl": krl, "tp": tp, "rapid": rapid}
+def ur(steps: list[Step]) -> bytes:
+    """Poses in a frame by name and with numbers, and joints likewise, in m and rad."""
+    head = ["def made():", "  set_tcp(p[0.01,-0.005,0.16,0,0.174532925199,0])"]
+    head.append("  frame=p[0.705,-0.094,0.507,0,0,0.523598775598]")
+    body = []
+    for k, (kind, joints) in enumerate(steps):
+        target = f"[{','.join(f'{v:.6f}' for v in np.radians(joints))}]"
+        if kind != "J":
+            place, turn = local(joints)
+            vector = Rotation.from_matrix(turn).as_rotvec()
+            target = f"p[{','.join(f'{v:.7f}' for v in [*np.array(place) / 1000, *vector])}]"
+        if k % 2:
+            head.append(f"  t{k}={target}")
+            target = f"t{k}"
+        target = target if kind == "J" else f"pose_trans(frame, {target})"
+        body.append(f"  move{'l' if kind == 'L' else 'j'}({target}, a=1.2, v=0.25)")
+    return "\n".join([*head, *body, "end", ""]).encode()
+
+
+WRITERS: dict[str, Callable[[list[Step]], bytes]] = {"krl": krl, "tp": tp, "rapid": rapid, "ur": ur}
 
 
 def stated(machine: Path, language: str) -> Path:
@@ -138,7 +157,7 @@ def read_joints(values: np.ndarray | None, language: str) -> np.ndarray | None:
     return values - np.array([0, 0, values[1], 0, 0, 0])
 
 
-def steps_of(seed: int, kinds: str = "PLLPLJLL") -> list[Step]:
+def steps_of(seed: int, kinds: str = "JLLPLPLJLL") -> list[Step]:
     """Moves in a small part of the space, with joints in whole thousandths."""
     rng = np.random.default_rng(seed)
     middle = np.array([0, 20, 30, 0, rng.choice([50, -50]), 0]) + rng.uniform(-1, 1, 6) * [

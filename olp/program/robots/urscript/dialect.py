@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from math import degrees
+
 from olp.core.patterns import pattern
 from olp.core.values import dataclass
 from olp.program.program import Program
 from olp.program.robots.dialect import Replacement, RobotDialect
-from olp.program.robots.poses import between, vector_of
+from olp.program.robots.poses import Quaternion, between, vector_of
 from olp.program.robots.targets import NOWHERE, Part, Target, Use
 from olp.program.robots.urscript.reader import POSE, read
 from olp.program.robots.urscript.table import TABLE
@@ -48,12 +51,16 @@ class UrScript(RobotDialect):
         place = int(program.line_end[target.line - 1])
         return place, place, program.eol(target.line) + blanks + name.encode() + b"=" + text
 
+    def turn_values(self, turn: Quaternion, stated: Sequence[float]) -> Sequence[float]:
+        x, y, z = stated
+        return vector_of(turn, (x, y, z))
+
     @staticmethod
     def _value(program: Program, target: Target, part: Part, use: Use) -> bytes:
         """A pose with other numbers, and the orientation at the end of a part."""
         data, start = program.data, target.value[0]
         edits = part.renumbered(target)
-        if use.before != use.turn:
+        if not part.turned and use.before != use.turn:
             match = POSE.match(data, *target.value)
             assert match is not None
             vector = vector_of(between(use.before, use.turn, part.share))
@@ -73,4 +80,8 @@ DIALECT = UrScript(
     languages=frozenset(("UR script",)),
     table=TABLE,
     decimals=8,
+    for_arms=True,
+    turn_decimals=9,
+    joint_decimals=9,
+    joint_unit_deg=degrees(1.0),
 )

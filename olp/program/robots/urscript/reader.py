@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from math import degrees
 
 from olp.core.errors import ProgramError
 from olp.core.machine import Setup
@@ -24,6 +25,8 @@ from olp.program.text.numbers import LARGEST
 _N = rb"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*"
 #: A pose with all its numbers, each a group.
 POSE = pattern(rb"p\[" + b",".join([_N] * 6) + rb"\]")
+#: Joint values likewise.
+JOINTS = pattern(rb"\[" + b",".join([_N] * 6) + rb"\]")
 _JOINTS = pattern(rb"\s*(?:\[[^\[\]]*\]|get_inverse_kin\(.*\)|d2r\(.*\))\s*")
 _ASSIGNED = pattern(rb"\s*(?:(?:global|local)\s+)?([A-Za-z_]\w*)\s*=(?!=)\s*(.*?)\s*")
 _ELEMENT = pattern(rb"\s*([A-Za-z_]\w*)\s*\[[^\]]*\]\s*=(?!=)")
@@ -51,7 +54,7 @@ class _Line:
 
 @dataclass(frozen=True, slots=True)
 class _Named:
-    """A pose with a name: its line, the bytes of its value and of the whole statement."""
+    """A pose or joint values with a name: the line, the bytes of the value and of the whole statement."""
 
     line: int
     value: Span
@@ -115,7 +118,7 @@ class _Reader:
                 self.poses.pop(name, None)
                 continue
             self.assigned[name] = line.line
-            if POSE.fullmatch(match[2]):
+            if POSE.fullmatch(match[2]) or JOINTS.fullmatch(match[2]):
                 start = line.begin + match.start(1)
                 value = (line.begin + match.start(2), line.begin + match.end(2))
                 self.poses[name] = _Named(line.line, value, (start, line.begin + len(line.text)))
@@ -209,13 +212,14 @@ class _Reader:
             raise ProgramError("the move has no target", line=line.line, code="OLP516")
         begin, target = arguments[0]
         if call[1] == b"movej" and (_JOINTS.fullmatch(target) or self._is_joints(target)):
-            self.moves.remark("joints", line.line, "joint values are kept as written")
-            self.moves.known = False
+            self._begins_in_loop()
+            statement = start, line.begin + len(line.text)
+            rest = self._rest(call[1], arguments[1:])
+            self.moves.joint_move(line.line, lambda: self._joints(line, begin, target, statement, rest))
             return
         index, span, named, frame = self._target(line, begin, target)
         rest = self._rest(call[1], arguments[1:])
-        if any(loop in (b"while", b"for") and before == self.moves.count for loop, before in self.blocks):
-            self.moves.known = False
+        self._begins_in_loop()
         turn = self.moves.targets[index].turn
         use = Use(
             index, (start, line.begin + len(line.text)), span, named, turn=turn,
@@ -227,6 +231,31 @@ class _Reader:
             line.line, use, frame, self._tool(line), speed * _MM_PER_M, straight=call[1] != b"movej",
             whole=timed,
         )  # fmt: skip
+
+    def _begins_in_loop(self) -> None:
+        """The first move in a loop begins where the last one ends, or before the loop."""
+        if any(loop in (b"while", b"for") and before == self.moves.count for loop, before in self.blocks):
+            self.moves.known = False
+
+    def _joints(
+        self, line: _Line, begin: int, text: bytes, statement: Span, rest: dict[str, Span]
+    ) -> Use | None:
+        """How a move uses joint values, in rad; None where the text does not state them with numbers."""
+        named, blank = self.poses.get(text.strip()), len(text) - len(text.lstrip())
+        span = (begin + blank, begin + len(text.rstrip()))
+        match = JOINTS.fullmatch(self.data, *(span if named is None else named.value))
+        if match is None:
+            return None
+        key = match.span()
+        if key not in self.targets:
+            a, b, c, d, e, f = (degrees(float(group)) for group in match.groups())
+            self.targets[key] = self.moves.joint_target(
+                line.line if named is None else named.line, key, [match.span(k) for k in range(1, 7)],
+                (a, b, c, d, e, f), (), "" if named is None else text.strip().decode("latin-1"),
+                NOWHERE if named is None else named.statement,
+            )  # fmt: skip
+        place = NOWHERE if named is None else span
+        return Use(self.targets[key], statement, span, place, zone=rest.get("r", NOWHERE))
 
     def _rest(self, name: bytes, arguments: list[tuple[int, bytes]]) -> dict[str, Span]:
         """The bytes of acceleration, speed, time and radius of a move, by their names."""
@@ -279,6 +308,7 @@ class _Reader:
                 line.line if named is None else named.line, key,
                 (match.span(1), match.span(2), match.span(3)), (numbers[0], numbers[1], numbers[2]),
                 of_vector(numbers[3:]), (), name, NOWHERE if named is None else named.statement,
+                (match.span(4), match.span(5), match.span(6)),
             )  # fmt: skip
         return self.targets[key], span, NOWHERE if named is None else span, frame
 

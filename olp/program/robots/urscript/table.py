@@ -17,7 +17,7 @@ _SENSED = "changes the path while the robot moves; take it into a program of its
 TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"movel": (_C, "a straight move to p[...], a name of one, or pose_trans of two"),
     b"movep": (_C, "as movel"),
-    b"movej": (_C, "to a pose: corrected at its end. Joints are kept as written"),
+    b"movej": (_C, "corrected at its end. Where the machine is no arm, joints are kept as written"),
     b"p[...]": (_C, "changed where moves use it, and cloned where they differ"),
     b"pose_trans": (_R, "of a frame with numbers and a target: the target is corrected"),
     b"set_tcp": (_R, "the tool from here on"),
