@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from olp.core.arrays import Array
+from olp.core.arrays import Array, Index
 from olp.core.values import dataclass
 from olp.kinematics.poses import Poses, axis_rotation, turned
 from olp.kinematics.structure import FRAME, Structure
@@ -38,21 +38,17 @@ class Arm:
 
     direction: Array
     point: Array
-    columns: Array
+    columns: Index
     wrist: Array
     flange: Poses
 
     @staticmethod
     def of(structure: Structure) -> Arm | None:
         """The arm of a machine, None where it is no such arm."""
-        names = [name for name in structure.chain if name != FRAME]
-        known = all(name in structure.joints and structure.joints[name].kind == "rotary" for name in names)
-        if len(names) != AXES or not known or structure.chain[0] != FRAME:
+        lines = rotary_lines(structure)
+        if lines is None:
             return None
-        joints = [structure.joints[name] for name in names]
-        direction = np.array([joint.direction for joint in joints])
-        direction /= np.linalg.norm(direction, axis=1)[:, None]
-        point = np.array([joint.point_mm for joint in joints], float)
+        direction, point, columns = lines
         across = np.eye(3) - direction[3:, :, None] * direction[3:, None, :]
         wrist = np.linalg.lstsq(across.sum(axis=0), np.einsum("kij,kj->i", across, point[3:]), rcond=None)[0]
         away = np.linalg.norm(turned(across, wrist - point[3:]), axis=1).max()
@@ -60,7 +56,6 @@ class Arm:
         bent = np.linalg.norm(np.cross(direction[[0, 3, 4]], direction[[1, 4, 5]]), axis=1) > _PARALLEL
         if away > _MEET_MM or not parallel or not bent.all():
             return None
-        columns = np.array([structure.order.index(name) for name in names])
         return Arm(direction, point, columns, wrist, structure.gauge.pose)
 
     def postures(self, flange: Poses) -> Array:
@@ -82,7 +77,7 @@ class Arm:
                         number += 1
         result[np.isnan(np.delete(result, _SHARING, axis=2)).any(axis=2)] = np.nan
         values = np.empty(result.shape)
-        values[:, :, self.columns] = _wrapped(np.degrees(result))
+        values[:, :, self.columns] = wrapped(np.degrees(result))
         return values
 
     def branches(self, axes: Array) -> Array:
@@ -129,24 +124,28 @@ class Arm:
         along = (away @ up)[:, None] * up
         across = away - along
         want = side @ (self.wrist - self.point[0]) - along @ side
-        found = _met(across @ side, -(np.cross(up, away) @ side), want)
+        found = met(across @ side, -(np.cross(up, away) @ side), want)
         near = np.linalg.norm(across, axis=1) < _ABOVE_MM
         return [np.where(near, np.nan, angle) for angle in found]
 
     def _shoulder_and_elbow(self, centre: Array, first: Array) -> list[tuple[Array, Array]]:
         """(n,) angles of the second and the third axis."""
-        side = self.direction[1]
         place = self.point[0] + turned(self._turn(0, -first), centre - self.point[0])
-        lower, upper = self.point[2] - self.point[1], self.wrist - self.point[2]
+        return self._lower_arm(place, self.wrist)
+
+    def _lower_arm(self, place: Array, end: Array) -> list[tuple[Array, Array]]:
+        """(n,) angles of the second and the third axis that bring the point `end` to places (n, 3)."""
+        side = self.direction[1]
+        lower, upper = self.point[2] - self.point[1], end - self.point[2]
         reach = place - self.point[1]
         lower, upper, reach = (v - (v @ side)[..., None] * side for v in (lower, upper, reach))
         want = (np.sum(reach * reach, axis=1) - lower @ lower - upper @ upper) / 2.0
         pairs = []
         # the third axis may run against the second
-        for angle in _met(lower @ upper, lower @ np.cross(side, upper), want):
+        for angle in met(lower @ upper, lower @ np.cross(side, upper), want):
             third = angle * float(self.direction[2] @ side)
             tip = lower + turned(axis_rotation(side, angle), upper)
-            pairs.append((_angle(side, tip, reach), third))
+            pairs.append((angle_about(side, tip, reach), third))
         return pairs
 
     def _wrist(self, rest: Array) -> list[tuple[Array, Array, Array]]:
@@ -156,19 +155,33 @@ class Arm:
         inner = fifth * (fifth @ sixth)
         want = along @ fourth - fourth @ inner
         found = []
-        for angle in _met(fourth @ (sixth - inner), fourth @ np.cross(fifth, sixth), want):
+        for angle in met(fourth @ (sixth - inner), fourth @ np.cross(fifth, sixth), want):
             bent = self._turn(4, angle)
             start = turned(bent, sixth)
             straight = np.linalg.norm(np.cross(start, fourth), axis=1) < _STRAIGHT
-            turn = np.where(straight, np.nan, _angle(fourth, start, along))
+            turn = np.where(straight, np.nan, angle_about(fourth, start, along))
             left = np.swapaxes(self._turn(3, turn) @ bent, -1, -2) @ rest
             beside = np.cross(sixth, np.eye(3)[int(np.argmin(np.abs(sixth)))])
-            last = _angle(sixth, beside, turned(left, beside))
+            last = angle_about(sixth, beside, turned(left, beside))
             found.append((turn, angle, last))
         return found
 
 
-def _met(cosine: Array | float, sine: Array | float, want: Array) -> list[Array]:
+def rotary_lines(structure: Structure) -> tuple[Array, Array, Index] | None:
+    """(6, 3) directions and points of six rotary axes behind the frame, and the columns of their values; None
+    where a machine has others."""
+    names = [name for name in structure.chain if name != FRAME]
+    known = all(name in structure.joints and structure.joints[name].kind == "rotary" for name in names)
+    if len(names) != AXES or not known or structure.chain[0] != FRAME:
+        return None
+    joints = [structure.joints[name] for name in names]
+    direction = np.array([joint.direction for joint in joints])
+    direction /= np.linalg.norm(direction, axis=1)[:, None]
+    point = np.array([joint.point_mm for joint in joints], float)
+    return direction, point, np.array([structure.order.index(name) for name in names])
+
+
+def met(cosine: Array | float, sine: Array | float, want: Array) -> list[Array]:
     """(n,) both angles t with cosine * cos t + sine * sin t = want, NaN where there is none."""
     size, middle = np.hypot(cosine, sine), np.arctan2(sine, cosine)
     share = want / size
@@ -176,12 +189,13 @@ def _met(cosine: Array | float, sine: Array | float, want: Array) -> list[Array]
     return [np.asarray(middle + sign * np.arccos(share)) for sign in (1.0, -1.0)]
 
 
-def _angle(axis: Array, start: Array, end: Array) -> Array:
+def angle_about(axis: Array, start: Array, end: Array) -> Array:
     """(n,) angles about an axis that turn one vector toward another."""
     start = start - (start @ axis)[..., None] * axis
     end = end - (end @ axis)[..., None] * axis
     return np.asarray(np.arctan2(np.sum(np.cross(start, end) * axis, axis=1), np.sum(start * end, axis=1)))
 
 
-def _wrapped(degrees: Array) -> Array:
+def wrapped(degrees: Array) -> Array:
+    """Angles within half a turn."""
     return np.asarray(180.0 - (180.0 - degrees) % 360.0)

@@ -17,6 +17,7 @@ from olp.core.errors import ProgramError
 from olp.core.machine import Vector
 from olp.core.values import dataclass
 from olp.kinematics.errors import MachineErrors
+from olp.kinematics.parallel_arm import arm_of
 from olp.kinematics.poses import Poses, turned
 from olp.kinematics.postures import AXES, POSTURES, Arm
 from olp.kinematics.structure import Structure
@@ -44,7 +45,7 @@ class ArmPath(JointPath):
         rows = np.flatnonzero(self.feed[move] & (share != 0.0) & (share != 1.0))
         if not rows.size:
             return place
-        arm, tool = Arm.of(self.motion.structure), self.tool[move[rows]]
+        arm, tool = arm_of(self.motion.structure), self.tool[move[rows]]
         assert arm is not None
         ends = [self.motion.nominal(axes[rows], tool) for axes in (start, end)]
         levers = np.array([machine.tool_mm for machine in self.motion.machines])[tool]
@@ -63,7 +64,7 @@ def arm_path(
     """The path of a robot program. `start_deg` (6,) is where the arm is at first, NaN where that is not
     stated, and `from_level` as in `ArmPath`. Raises ProgramError with all targets that no posture reaches, or
     that name several."""
-    arm, targets, dialect = Arm.of(structure), program.targets, program.dialect
+    arm, targets, dialect = arm_of(structure), program.targets, program.dialect
     assert arm is not None
     assert targets is not None
     assert isinstance(dialect, RobotDialect)

@@ -17,8 +17,8 @@ from olp.compensation.tally import Tally
 from olp.core.arrays import Index
 from olp.core.errors import ProgramError
 from olp.core.values import dataclass
+from olp.kinematics.parallel_arm import arm_of
 from olp.kinematics.poses import rotation_vector
-from olp.kinematics.postures import Arm
 from olp.program.robots.dialect import Replacement, RobotDialect
 from olp.program.robots.poses import (
     Pose,
@@ -71,7 +71,7 @@ class _Writer:
 
     def __init__(self, path: ArmPath, plan: JointPlan) -> None:
         program, targets = path.program, path.program.targets
-        arm = Arm.of(path.motion.structure)
+        arm = arm_of(path.motion.structure)
         assert isinstance(program.dialect, RobotDialect)
         assert targets is not None
         assert arm is not None

@@ -21,7 +21,7 @@ from olp.files.problems import config_error, validate
 from olp.files.toml_text import read_toml
 from olp.files.write import PathLike, Reader, read_bytes
 from olp.kinematics.machine import JointMachine
-from olp.kinematics.postures import Arm
+from olp.kinematics.parallel_arm import arm_of
 from olp.kinematics.structure import Gauge, Joint, Leg, Platform, Structure
 
 
@@ -110,7 +110,7 @@ def _control(file: JointMachineFile, structure: Structure, path: PathLike) -> Ma
 
 def _arm(file: JointMachineFile, structure: Structure) -> Machine | None:
     """What a reader of robot programs needs to know of an arm, None where the machine is none."""
-    if Arm.of(structure) is None:
+    if arm_of(structure) is None:
         return None
     return Machine(
         name=file.name,
