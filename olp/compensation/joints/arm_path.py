@@ -147,14 +147,10 @@ class Used:
         uses = self.uses
         point = np.array(self.of("point")).reshape(-1, 3) * unit_mm[:, None]
         point += np.array([use.shift_mm for use in uses]).reshape(-1, 3)
-        frames = {use.frame: k for k, use in enumerate(uses)}
-        number = {frame: k for k, frame in enumerate(frames)}
-        of = np.array([number[use.frame] for use in uses], np.int64)
-        turns = np.array([matrix(frame.turn) for frame in frames]).reshape(-1, 3, 3)[of]
-        origin = np.array([frame.origin_mm for frame in frames]).reshape(-1, 3)[of]
-        tools = {use.tool: matrix(use.tool.turn).T for use in uses if use.tool is not None}
+        frames, tools = ([getattr(use, name) or Pose() for use in uses] for name in ("frame", "tool"))
+        turns, held = _turns(frames), np.swapaxes(_turns(tools), -1, -2)
+        origin = np.array([frame.origin_mm for frame in frames]).reshape(-1, 3)
         rotation = turns @ matrices(np.array([use.turn for use in uses]).reshape(-1, 4))
-        held = np.array([tools.get(use.tool, np.eye(3)) for use in uses]).reshape(-1, 3, 3)  # type: ignore[arg-type]
         tips = Poses(rotation @ held, origin + turned(turns, point))
         return _flange(tips, np.array(levers).reshape(-1, 3))
 
@@ -184,6 +180,14 @@ class Used:
                     line=line,
                     code="OLP563",
                 )
+
+
+def _turns(frames: list[Pose]) -> Array:
+    """(n, 3, 3) the rotations of frames, most of which are the very same."""
+    known = {id(frame): frame for frame in frames}
+    number = {key: place for place, key in enumerate(known)}
+    each = np.array([matrix(frame.turn) for frame in known.values()]).reshape(-1, 3, 3)
+    return each[np.array([number[id(frame)] for frame in frames], np.int64)]
 
 
 def _flange(tips: Poses, levers: Array) -> Poses:

@@ -39,6 +39,8 @@ _COMPUTED = 1e-8
 _COMPARED = 8
 #: A branch that is nearer to its border than this says nothing, mm or deg.
 _BORDER = 1e-6
+#: A number in the usual form, with its decimals.
+_PLAIN = re.compile(rb"-?(?:0|[1-9]\d{0,6})\.(\d{1,12})")
 _NAMES = re.compile(rb"[A-Za-z_]\w*")
 
 
@@ -194,15 +196,20 @@ class _Writer:
         """The value of a number, its last digit, and how it is written in place of another one, which is
         `off` by so much."""
         text = self.program.data[slice(*span)]
-        form = number(text)
-        if form is None or form.letter:
+        plain = _PLAIN.fullmatch(text)
+        form = None if plain else number(text)
+        if plain is None and (form is None or form.letter):
             form = number(b"0.0")
-            assert form is not None
-        decimals = min(max(fewest, form.decimals), MOST_DECIMALS)
+        own = len(plain[1]) if plain else 0 if form is None else form.decimals
+        decimals = min(max(fewest, own), MOST_DECIMALS)
         digit = 10.0**-decimals
         off = abs(float(text) - value) if off is None else off
         if off <= max(_RIGHT * digit, _COMPUTED):
             return float(text), max(digit, _COMPUTED), text
+        if form is None and abs(value) > digit:
+            return value, max(digit, _COMPUTED), b"%.*f" % (decimals, value)
+        form = form or number(text)
+        assert form is not None
         return value, max(digit, _COMPUTED), written(form, value, decimals)
 
     def _turns(self, row: int, target: Target) -> tuple[bytes, ...]:

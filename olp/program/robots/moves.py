@@ -108,10 +108,12 @@ class RobotMoves:
         whole: bool = False,
     ) -> None:  # fmt: skip
         """Add a move to a target; `straight` where its path is a line, `whole` where it is never split."""
-        key = (frame.name, tool.name, use.turn, use.shift_mm)
+        # the joints of an arm turn the tool, so its vector is none of a frame
+        turn = NO_TURN if self.arm else use.turn
+        key = (frame.name, tool.name, turn, use.shift_mm)
         index = self._index.get(key)
         if index is None:
-            index = self._index[key] = self.frames.index(frame, tool, use.turn, use.shift_mm, line)
+            index = self._index[key] = self.frames.index(frame, tool, turn, use.shift_mm, line)
         if not self.known:
             self.away(line)
         target = self.targets[use.target]

@@ -10,7 +10,7 @@ from olp.core.patterns import pattern
 from olp.core.values import dataclass
 from olp.program.robots.frames import Located, RobotFrames, Tool
 from olp.program.robots.krl.data import Declared, Taught, key_of, pose_of
-from olp.program.robots.krl.text import Line, aggregate
+from olp.program.robots.krl.text import Line
 from olp.program.robots.moves import NAN
 from olp.program.robots.poses import Pose
 
@@ -57,6 +57,9 @@ class Active:
         self.feed = NAN
         self._taught: Taught | None = None
         self._places: dict[tuple[str, Place], Located | Tool] = {}
+        #: of the last move what was in force, its base and its tool
+        self._bases: tuple[State, Located] | None = None
+        self._tools: tuple[State, Tool] | None = None
         self.state = State(None, None, "")
 
     def forget(self, why: str) -> None:
@@ -107,7 +110,7 @@ class Active:
             return Place(int(numbered[1]))
         if of_taught is not None:
             return self._of_taught(which, self.declared.taught(key_of(of_taught[1], None)), line)
-        numbers = aggregate(self.data, span)
+        numbers = self.declared.aggregate(span)
         if numbers is not None:
             return Place(0, pose_of(numbers, line.line), f"${which} of line {line.line}")
         name = _NAME.fullmatch(text)
@@ -164,6 +167,8 @@ class Active:
 
     def base(self, state: State, line: int) -> Located:
         """The base of a move. Raises ProgramError where it is not stated."""
+        if self._bases is not None and self._bases[0] is state:
+            return self._bases[1]
         place = state.base
         if place is None:
             place = self._stated("$BASE", state.why, line)
@@ -172,6 +177,7 @@ class Active:
             self._places[key] = self._located(place, line)
         found = self._places[key]
         assert isinstance(found, Located)
+        self._bases = state, found
         return found
 
     def _located(self, place: Place, line: int) -> Located:
@@ -184,6 +190,8 @@ class Active:
 
     def tool(self, state: State, line: int) -> Tool:
         """The tool of a move; as `base`."""
+        if self._tools is not None and self._tools[0] is state:
+            return self._tools[1]
         place = state.tool
         if place is None:
             place = self._stated("$TOOL", state.why, line)
@@ -197,6 +205,7 @@ class Active:
                 self._places[key] = self.frames.numbered_tool(name, place.number, pose, line)
         found = self._places[key]
         assert isinstance(found, Tool)
+        self._tools = state, found
         return found
 
     def _stated(self, what: str, why: str, line: int) -> Place:

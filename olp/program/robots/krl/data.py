@@ -71,6 +71,7 @@ class Declared:
         self.data = data
         self.values: dict[str, list[Value]] = {}
         self.changed: dict[str, int] = {}
+        self._aggregates: dict[Span, Aggregate | None] = {}
         listed = False
         for line in lines:
             section = _SECTION.match(line.text)
@@ -119,7 +120,7 @@ class Declared:
             )
         if not found:
             return None
-        numbers = aggregate(self.data, found[0].span)
+        numbers = self.aggregate(found[0].span)
         if numbers is None:
             raise ProgramError(
                 f"{what} {key} is not stated with its numbers in {place_of(self.data, found[0].line.line)}",
@@ -127,6 +128,12 @@ class Declared:
                 code="OLP533",
             )
         return found[0], numbers
+
+    def aggregate(self, span: Span) -> Aggregate | None:
+        """The aggregate that bytes are (`text.aggregate`), which is read once."""
+        if span not in self._aggregates:
+            self._aggregates[span] = aggregate(self.data, span)
+        return self._aggregates[span]
 
     def frame(self, key: str, line: int) -> Pose | None:
         """The pose of a frame with a name; as `value`."""

@@ -6,8 +6,6 @@ they depend on the run, a move is refused.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from olp.core.errors import ProgramError
 from olp.core.machine import Setup
 from olp.core.patterns import pattern
@@ -18,7 +16,7 @@ from olp.program.robots.frames import Located
 from olp.program.robots.krl import flow
 from olp.program.robots.krl.active import Active, State
 from olp.program.robots.krl.data import Declared, assigned, is_declaration, key_of, pose_of
-from olp.program.robots.krl.text import Aggregate, Line, aggregate, lines, parts
+from olp.program.robots.krl.text import Aggregate, Line, lines, parts
 from olp.program.robots.moves import NAN, RobotMoves, not_read, take_all
 from olp.program.robots.poses import Pose, multiplied, rotated
 from olp.program.robots.targets import NOWHERE, Span, Use
@@ -195,11 +193,11 @@ class _Reader:
             self.moves.joint_move(line.line, lambda: self._joints(terms[0], tail.span(2), line))
             return
         base = self.active.base(state, line.line)
-        use, frame = self._use(line, target, terms, base)
+        use, frame = self._use(line, target, terms, base, tail.span(2))
         tool = self.active.tool(state, line.line)
         self.moves.move(
-            line.line, replace(use, zone=tail.span(2)), frame, tool, self.active.feed,
-            straight=word.endswith(b"LIN"), whole=self.triggered,
+            line.line, use, frame, tool, self.active.feed, straight=word.endswith(b"LIN"),
+            whole=self.triggered,
         )  # fmt: skip
 
     def _in_joints(self, terms: list[Span], line: Line) -> bool:
@@ -207,7 +205,7 @@ class _Reader:
         if len(terms) != 1:
             return False
         text = self.data[slice(*terms[0])]
-        numbers = aggregate(self.data, terms[0])
+        numbers = self.declared.aggregate(terms[0])
         if numbers is None:
             name = _NAME.fullmatch(text)
             if name is None:
@@ -220,7 +218,7 @@ class _Reader:
 
     def _joints(self, span: Span, zone: Span, line: Line) -> Use | None:
         """How a move uses joint values; None where the text does not state all six."""
-        numbers, declaration, name = aggregate(self.data, span), line, None
+        numbers, declaration, name = self.declared.aggregate(span), line, None
         if numbers is None:
             name = _NAME.fullmatch(self.data, *span)
             assert name is not None
@@ -240,22 +238,24 @@ class _Reader:
         named = NOWHERE if name is None else span
         return Use(self.targets[numbers.span], (line.begin, line.end), span, named, zone=zone)
 
-    def _use(self, line: Line, span: Span, terms: list[Span], base: Located) -> tuple[Use, Located]:
+    def _use(
+        self, line: Line, span: Span, terms: list[Span], base: Located, zone: Span
+    ) -> tuple[Use, Located]:
         """How a move uses its target, and the frame that this is in. In a product the last term with a name
         is the target; numbers behind it are a shift in it."""
         statement = (line.begin, line.end)
-        last = aggregate(self.data, terms[-1]) if len(terms) > 1 else None
+        last = self.declared.aggregate(terms[-1]) if len(terms) > 1 else None
         shift = Pose() if last is None else pose_of(last, line.line)
         own = terms[-1] if last is None else terms[-2]
         frame = self._frame(base, terms[: terms.index(own)], line)
         index, named = self._target(own, line)
         turn, place = self.moves.targets[index].turn, (own[0], span[1])
         if last is None:
-            return Use(index, statement, place, named, turn=turn), frame
+            return Use(index, statement, place, named, turn=turn, zone=zone), frame
         x, y, z = (last.values[name][0] for name in _PLACE)
         use = Use(
             index, statement, place, named, rotated(turn, shift.origin_mm), multiplied(turn, shift.turn),
-            offsets=(x, y, z), offset_turn=turn, along_tool=True,
+            zone=zone, offsets=(x, y, z), offset_turn=turn, along_tool=True,
         )  # fmt: skip
         return use, frame
 
@@ -273,7 +273,7 @@ class _Reader:
         return self.bases[key]
 
     def _pose(self, span: Span, line: Line) -> Pose:
-        numbers = aggregate(self.data, span)
+        numbers = self.declared.aggregate(span)
         name = _NAME.fullmatch(self.data, *span)
         if numbers is None and name is not None:
             numbers = self._position(name[1], name[2], line)[1]
@@ -302,7 +302,7 @@ class _Reader:
 
     def _target(self, span: Span, line: Line) -> tuple[int, Span]:
         """The place of a target, and the bytes of its name, `NOWHERE` where it is stated in the move."""
-        numbers, declaration = aggregate(self.data, span), line
+        numbers, declaration = self.declared.aggregate(span), line
         name = _NAME.fullmatch(self.data, *span)
         if numbers is None and name is not None:
             declaration, numbers = self._position(name[1], name[2], line)

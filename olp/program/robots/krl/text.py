@@ -67,9 +67,8 @@ def aggregate(data: bytes, span: Span) -> Aggregate | None:
         return None
     place, end = match.span(2)
     values: dict[str, tuple[Span, float]] = {}
-    while place < end:
-        component = _COMPONENT.match(data, place, end)
-        if component is None:
+    for component in _COMPONENT.finditer(data, place, end):
+        if component.start() != place:
             return None
         name, text = component[1].decode().upper(), component[2].decode()
         value = float(int(text[2:-1], _BASES[text[1].upper()])) if text[0] == "'" else float(text)
@@ -77,6 +76,8 @@ def aggregate(data: bytes, span: Span) -> Aggregate | None:
             return None
         values[name] = component.span(2), value
         place = component.end()
+    if place < end:
+        return None
     kind = (match[1] or b"").upper()
     return Aggregate(match.span(), values, kind.endswith(b"AXIS") or "A1" in values)
 
