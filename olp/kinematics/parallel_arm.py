@@ -6,7 +6,7 @@ import numpy as np
 
 from olp.core.arrays import Array
 from olp.kinematics.poses import Poses, turned
-from olp.kinematics.postures import AXES, POSTURES, Arm, angle_about, met, rotary_lines, wrapped
+from olp.kinematics.postures import AXES, POSTURES, Arm, angle_about, met, nearer, rotary_lines, wrapped
 from olp.kinematics.structure import Structure
 
 #: mm; axes that pass each other nearer than this meet
@@ -45,10 +45,7 @@ class ParallelArm(Arm):
         result, number = np.full((len(centre), POSTURES, AXES), np.nan), 0
         with np.errstate(invalid="ignore", divide="ignore"):
             for first in self._first(centre):
-                held = self._turn(0, -first)
-                rest = Poses(
-                    held @ motion.rotation, self.point[0] + turned(held, motion.position - self.point[0])
-                )
+                rest = self._behind(motion, first)
                 for fifth, sixth in self._wrist_pair(rest.rotation):
                     for middle in self._middle(rest, fifth, sixth):
                         result[:, number] = np.stack((first, *middle, fifth, sixth), axis=1)
@@ -57,6 +54,22 @@ class ParallelArm(Arm):
         values = np.empty(result.shape)
         values[:, :, self.columns] = wrapped(np.degrees(result))
         return values
+
+    def near(self, flange: Poses, axes: Array) -> Array:
+        """As that of other arms."""
+        motion = flange @ self.flange.inverse()
+        own = np.radians(axes[:, self.columns])
+        with np.errstate(invalid="ignore", divide="ignore"):
+            (first,) = nearer([(angle,) for angle in self._first(motion.at(self.wrist))], own[:, 0])
+            rest = self._behind(motion, first)
+            fifth, sixth = nearer(self._wrist_pair(rest.rotation), own[:, 4])
+            middle = nearer(self._middle(rest, fifth, sixth), own[:, 2], 1)
+        return self._beside(axes, (first, *middle, fifth, sixth))
+
+    def _behind(self, motion: Poses, first: Array) -> Poses:
+        """What the axes behind the first do of a motion."""
+        held = self._turn(0, -first)
+        return Poses(held @ motion.rotation, self.point[0] + turned(held, motion.position - self.point[0]))
 
     def branches(self, axes: Array) -> Array:
         """(..., 4) what tells postures apart: mm, mm and twice a share of the bend. They are positive where

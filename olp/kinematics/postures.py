@@ -6,6 +6,8 @@ in two points each time. Nothing here knows a language or a file.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from olp.core.arrays import Array, Index
@@ -79,6 +81,25 @@ class Arm:
         values = np.empty(result.shape)
         values[:, :, self.columns] = wrapped(np.degrees(result))
         return values
+
+    def near(self, flange: Poses, axes: Array) -> Array:
+        """(n, 6) of the postures that bring the flange to poses (n) the one that is chosen axis by axis next
+        to axis values (n, 6), with the turns of these; NaN where there is none. Away from singular postures
+        it is the nearest one."""
+        motion = flange @ self.flange.inverse()
+        centre, own = motion.at(self.wrist), np.radians(axes[:, self.columns])
+        with np.errstate(invalid="ignore", divide="ignore"):
+            (first,) = nearer([(angle,) for angle in self._first(centre)], own[:, 0])
+            second, third = nearer(self._shoulder_and_elbow(centre, first), own[:, 2], 1)
+            held = self._turn(0, first) @ self._turn(1, second) @ self._turn(2, third)
+            wrist = nearer(self._wrist(np.swapaxes(held, -1, -2) @ motion.rotation), own[:, 4], 1)
+        return self._beside(axes, (first, second, third, *wrist))
+
+    def _beside(self, axes: Array, angles: tuple[Array, ...]) -> Array:
+        """(n, 6) `angles` as axis values, with the turns of `axes` (n, 6)."""
+        found = np.empty(axes.shape)
+        found[:, self.columns] = np.degrees(np.stack(angles, axis=1))
+        return np.asarray(axes - wrapped(axes - found))
 
     def branches(self, axes: Array) -> Array:
         """(..., 4) what tells postures apart: mm, mm and twice deg of the bend. They are positive where the
@@ -179,6 +200,13 @@ def rotary_lines(structure: Structure) -> tuple[Array, Array, Index] | None:
     direction /= np.linalg.norm(direction, axis=1)[:, None]
     point = np.array([joint.point_mm for joint in joints], float)
     return direction, point, np.array([structure.order.index(name) for name in names])
+
+
+def nearer(choices: Sequence[tuple[Array, ...]], near: Array, which: int = 0) -> tuple[Array, ...]:
+    """Of two choices of angles (n,) row by row the one whose angle `which` is next to another one."""
+    first, second = (np.abs(np.remainder(own[which] - near + np.pi, 2.0 * np.pi) - np.pi) for own in choices)
+    other = (second < first) | np.isnan(first)
+    return tuple(np.where(other, b, a) for a, b in zip(*choices, strict=True))
 
 
 def met(cosine: Array | float, sine: Array | float, want: Array) -> list[Array]:

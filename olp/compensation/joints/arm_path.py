@@ -28,6 +28,8 @@ from olp.program.robots.targets import Target, Use
 
 #: Decimals that stand for the axis values, which no text has.
 _DECIMALS = 6
+#: Axes of a straight move that are this near to even ones, deg, are those of the nearest posture.
+_NEAR_DEG = 15.0
 #: External axes that are not there have at least this.
 _ABSENT = 9e8
 
@@ -50,7 +52,11 @@ class ArmPath(JointPath):
         ends = [self.motion.nominal(axes[rows], tool) for axes in (start, end)]
         levers = np.array([machine.tool_mm for machine in self.motion.machines])[tool]
         flange = _flange(led(ends[0], ends[1], share[rows]), levers)
-        found = nearest(place[rows], arm.postures(flange))
+        found = arm.near(flange, place[rows])
+        far = np.flatnonzero(~(np.abs(found - place[rows]).max(axis=1) < _NEAR_DEG))
+        found[far] = nearest(
+            place[rows[far]], arm.postures(Poses(flange.rotation[far], flange.position[far]))
+        )
         lost = np.flatnonzero(np.isnan(found).any(axis=1))
         if lost.size:
             raise straight_wrist(int(self.line[move[rows[lost[0]]]]))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import atan2, cos, degrees, hypot, pi, radians, sin
+from math import asin, atan2, cos, degrees, hypot, pi, radians, sin
 
 import numpy as np
 
@@ -79,7 +79,7 @@ def normalised(a: Sequence[float]) -> Quaternion:
 def angle_between(a: Quaternion, b: Quaternion) -> float:
     """rad between two rotations."""
     _, x, y, z = multiplied(inverted(a), b)
-    return 2.0 * float(np.arcsin(min(1.0, (x * x + y * y + z * z) ** 0.5)))
+    return 2.0 * asin(min(1.0, (x * x + y * y + z * z) ** 0.5))
 
 
 def between(a: Quaternion, b: Quaternion, share: float) -> Quaternion:
@@ -105,12 +105,10 @@ def turn_of(a: Quaternion) -> Turn | None:
 
 def of_zyx(angles_deg: Sequence[float]) -> Quaternion:
     """Rz(first) Ry(second) Rx(third), in degrees."""
-    turn = NO_TURN
-    for place, angle in zip((3, 2, 1), angles_deg, strict=True):
-        half = np.radians(angle) / 2.0
-        part = [float(np.cos(half)), 0.0, 0.0, 0.0]
-        part[place] = float(np.sin(half))
-        turn = multiplied(turn, (part[0], part[1], part[2], part[3]))
+    first, second, third = (radians(angle) / 2.0 for angle in angles_deg)
+    a, b, c, d = cos(first), sin(first), cos(second), sin(second)
+    e, f = cos(third), sin(third)
+    turn = (a * c * e + b * d * f, a * c * f - b * d * e, a * d * e + b * c * f, b * c * e - a * d * f)
     return turn if any(angles_deg) else NO_TURN
 
 
@@ -154,6 +152,27 @@ def zyx_of(a: Quaternion, first_deg: float = 0.0) -> Vector:
     # of the rotation that is left, whatever the first angle is
     third = atan2(sine * xz - cosine * yz, cosine * yy - sine * xy)
     return (degrees(first), degrees(second), degrees(third))
+
+
+def products(a: Array, b: Array) -> Array:
+    """(n, 4) the rotations `b` (n, 4), then `a` (n, 4)."""
+    (p, q, r, s), (w, x, y, z) = a.T, b.T
+    return np.stack(
+        (
+            p * w - q * x - r * y - s * z,
+            p * x + q * w + r * z - s * y,
+            p * y - q * z + r * w + s * x,
+            p * z + q * y - r * x + s * w,
+        ),
+        axis=1,
+    )
+
+
+def of_vectors(vectors: Array) -> Array:
+    """(n, 4) the rotations about vectors (n, 3) by their lengths in rad."""
+    angle = np.linalg.norm(vectors, axis=1)
+    size = 0.5 * np.sinc(angle / (2.0 * np.pi))
+    return np.column_stack((np.cos(angle / 2.0), size[:, None] * vectors))
 
 
 def matrices(turns: Array) -> Array:

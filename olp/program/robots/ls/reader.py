@@ -16,7 +16,7 @@ from olp.program.robots.ls import postures
 from olp.program.robots.ls.registers import Registers
 from olp.program.robots.ls.text import Line, Position, lines, parts, positions
 from olp.program.robots.moves import NAN, RobotMoves, not_read, take_all
-from olp.program.robots.poses import of_zyx, rotated
+from olp.program.robots.poses import Pose, of_zyx, rotated
 from olp.program.robots.targets import Span, Use
 
 _MOVE = pattern(
@@ -80,6 +80,8 @@ class _Reader:
         self.registers = Registers()
         self.positions: dict[int, list[Position]] = {}
         self.known: dict[int, int] = {}
+        self.frames: dict[tuple[int, Pose | None], Located] = {}
+        self.tools: dict[tuple[int, Pose | None], Tool] = {}
         #: configurations and other groups by their text
         self.configs: dict[tuple[bytes, bytes], int] = {}
         self.blocks: list[tuple[bool, int]] = []
@@ -239,15 +241,22 @@ class _Reader:
             key = self.data[slice(*position.config)], position.others
             config = float(self.configs.setdefault(key, len(self.configs)))
             words, turns = postures.words_of(self.data, position.config)
+            outer = position.outer
             known = self.known[number] = self.moves.target(
                 position.line, position.span, (x, y, z), (a, b, c), _turn(position),
-                (config, *position.outer), f"P[{number}]", position.span,
-                (axes["R"][0], axes["P"][0], axes["W"][0]), turns, words, position.outer,
+                (config, *outer), f"P[{number}]", position.span,
+                (axes["R"][0], axes["P"][0], axes["W"][0]), turns, words, outer,
             )  # fmt: skip
         return known
 
     def _frame(self, position: Position, line: Line) -> Located:
         number = self.registers.frame if position.frame < 0 else position.frame
+        key = number, self.registers.frames.get(number)
+        if key not in self.frames:
+            self.frames[key] = self._located(number, line)
+        return self.frames[key]
+
+    def _located(self, number: int, line: Line) -> Located:
         if number < 0:
             raise not_read("the frame of this position is the active one, and not known here", line.line)
         if number == 0:
@@ -259,6 +268,12 @@ class _Reader:
 
     def _tool(self, position: Position, line: Line) -> Tool:
         number = self.registers.tool if position.tool < 0 else position.tool
+        key = number, self.registers.tools.get(number)
+        if key not in self.tools:
+            self.tools[key] = self._numbered(number, line)
+        return self.tools[key]
+
+    def _numbered(self, number: int, line: Line) -> Tool:
         if number < 0:
             raise not_read("the tool of this position is the active one, and not known here", line.line)
         pose = self.registers.tools.get(number)

@@ -49,7 +49,8 @@ class Position:
     @property
     def outer(self) -> tuple[float, ...]:
         """The values of the external axes."""
-        return tuple(value for name, (_, value) in sorted(self.axes.items()) if name[0] == "E")
+        names = sorted(name for name in self.axes if name[0] == "E")
+        return tuple(self.axes[name][1] for name in names)
 
 
 def parts(data: bytes) -> dict[str, list[Span]]:
