@@ -75,14 +75,21 @@ class Digits:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Starts:
-    """Where stretches of rows begin: (k,) `first` row, and of each of `count` rows its stretch."""
+    """Where stretches of `count` rows begin: (k,) `first` row of each, and (n,) `begin` of that of each row,
+    0 where there is one stretch."""
 
     first: Index
     count: int
+    begin: Index | int
+
+    @staticmethod
+    def of(first: Index, count: int) -> Starts:
+        begin = np.repeat(first, np.diff(first, append=count)) if len(first) > 1 else 0
+        return Starts(first, count, begin)
 
     @staticmethod
     def one(count: int) -> Starts:
-        return Starts(np.zeros(min(count, 1), np.int64), count)
+        return Starts.of(np.zeros(min(count, 1), np.int64), count)
 
     def spread(self, values: _Value) -> _Value:
         """(n,) per row from (k,) per stretch; one value is that of all."""
@@ -93,14 +100,14 @@ class Starts:
     def last(self, which: Mask) -> Index:
         """(n,) the last row of `which` up to each row in its own stretch; less than its first one, where
         there is none."""
-        rows = np.maximum.accumulate(np.where(which, np.arange(self.count), -1))
-        if len(self.first) > 1:
-            rows = np.maximum(rows, self.spread(self.first) - 1)
-        return np.asarray(rows, np.int64)
+        rows = np.where(which, np.arange(self.count), -1)
+        # nothing is found beyond the begin of the stretch
+        rows[self.first] = np.maximum(rows[self.first], self.first - 1)
+        return np.asarray(np.maximum.accumulate(rows), np.int64)
 
     def has(self, last: Index) -> Mask:
         """(n,) whether `last` found a row."""
-        return np.asarray(last >= (self.spread(self.first) if len(self.first) > 1 else 0), np.bool_)
+        return np.asarray(last >= self.begin, np.bool_)
 
     def previous(self, values: Array, before: Array | float) -> Array:
         """(n,) the value one row before, `before` a stretch begins."""
@@ -112,8 +119,8 @@ class Starts:
 @dataclass(frozen=True, slots=True, eq=False)
 class Absolute:
     """G90, as far as it does not depend on where the axis was: (n,) what would be written at each row. Some
-    rows state a position, others are `fixed` by a changed word, or are `free` to hold or to move on. `half`
-    is half a digit."""
+    rows state a position, others are `fixed` by a changed word, or are `free` to hold or to move on. `source`
+    is the last row up to each that `sets` a position. `half` is half a digit."""
 
     starts: Starts
     decimals: npt.NDArray[np.int64]
@@ -123,6 +130,7 @@ class Absolute:
     stated: Array
     fixed: Mask
     sets: Mask
+    source: Index
     free: Mask
     half: Array
 
@@ -143,15 +151,15 @@ class Absolute:
         sets = rows.given | rows.reset
         return Absolute(
             starts, decimals, np.asarray(scale, float), mantissa, np.asarray(written, float),
-            np.where(fixed, written, rows.nominal), fixed, sets, ~sets & ~rows.raw & ~unknown,
+            np.where(fixed, written, rows.nominal), fixed, sets, starts.last(sets),
+            ~sets & ~rows.raw & ~unknown,
             np.asarray(0.5 * rows.unit / scale * _SLACK, float),
         )  # fmt: skip
 
     def follow(self, rows: AxisRows, before: Array | float) -> tuple[Array, Mask]:
         """(n,) positions as written, and where an omitted axis moves. It holds until its rounded command
         changes; `before` is where it is as a stretch begins."""
-        source = self.starts.last(self.sets)
-        entry = self.starts.spread(before)
+        source, entry = self.source, self.starts.spread(before)
         anchor = np.where(self.starts.has(source), self.stated[source], entry)
         with np.errstate(invalid="ignore"):
             leaves = self.free & (np.abs(rows.command - anchor) > self.half)

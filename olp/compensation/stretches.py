@@ -51,10 +51,10 @@ class Stretches:
         """The rows of some of the stretches, and where each of these begins among them."""
         length = np.diff(self.bounds)
         if which.all():
-            return slice(None), Starts(self.bounds[:-1], int(self.bounds[-1]))
+            return slice(None), Starts.of(self.bounds[:-1], int(self.bounds[-1]))
         chosen = np.flatnonzero(np.repeat(which, length))
         first = np.cumsum(length[which]) - length[which]
-        return chosen, Starts(first, len(chosen))
+        return chosen, Starts.of(first, len(chosen))
 
 
 def digits_of(rows: AxisRows, stretches: Stretches, before: float, decimals: Decimals) -> Digits:
@@ -100,7 +100,7 @@ class _Ends:
         if not len(starts.first):
             return _Ends([], [], [], [], [])
         stop = np.append(starts.first[1:], starts.count) - 1
-        settled = starts.has(starts.last(fixed.sets))[stop]
+        settled = fixed.source[stop] >= starts.first
         last_free = starts.last(free)[stop]
         end = np.where(settled, fixed.follow(rows, np.nan)[0][stop], fixed.written[last_free])
         low = np.minimum.reduceat(np.where(free, rows.command, np.inf), starts.first)

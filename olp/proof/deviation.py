@@ -386,8 +386,9 @@ class Tracer:
         distance = np.empty(len(of))
         every = a + np.arange(b - a)
         ways = self._known(every, begin), self._known(every, goal)
-        some = actual.take(straight, axis=0) if curved.size else actual
-        distance[straight] = segment_distance(some, *ways, line)
+        if straight.size:
+            some = actual.take(straight, axis=0) if curved.size else actual
+            distance[straight] = segment_distance(some, *ways, line)
         if curved.size:
             arcs, move = nominal.arcs, a + rows
             shift = goal[rows] - nominal.end_mm[move]
@@ -409,12 +410,14 @@ class Tracer:
         if (owner == np.arange(len(owner))).all():
             # each move became one
             return share
+        arcs = self.path.arcs.within(first, first + len(owner))
+        size, row = np.abs(self.path.arcs.sweep_rad[arcs]), self.path.arcs.move[arcs] - first
         turn = np.zeros(len(owner))
-        arc = _arc_index(self.path, first, first + len(owner))
-        turn[arc >= 0] = np.abs(self.path.arcs.sweep_rad[arc[arc >= 0]])
-        total = np.bincount(owner, turn)
+        turn[row] = size
         before = np.cumsum(turn) - turn
-        begin = np.cumsum(total) - total
+        total = np.bincount(owner[row], size, minlength=int(owner[-1]) + 1)
+        begin, some = np.zeros(len(total)), np.flatnonzero(total)
+        begin[some] = np.cumsum(total[some]) - total[some]
         place = before[part] - begin[of] + share * turn[part]
         return np.asarray(place / np.maximum(total[of], 1e-12))
 
@@ -425,6 +428,8 @@ class Tracer:
         if curved.any():
             straight = np.flatnonzero(~curved[part])
             part, actual = part[straight], actual.take(straight, axis=0)
+        if not len(part):
+            return
         of = a + owner
         ways = self._known(of, tips[:-1]), self._known(of, tips[1:])
         mine = owner[part]
