@@ -84,6 +84,11 @@ _FLOW = """
 _SHAPES = "CIP CT I1 J1 K1 HOLES1 HOLES2 CYCLE801 AP RP G110 G111 G112 ANG CHF CHR RND RNDM AR"
 #: Statements that need the unroller.
 UNROLLED: Mapping[str, str] = dict.fromkeys((*_FLOW.split(), *_SHAPES.split()), _UNROLLED)
+#: Those of them that are read where they state numbers.
+_IN_PART = {
+    "R": "numbers, and words that take one; an expression goes through --flatten",
+    "DEF": "variables without values or with numbers; others go through --flatten",
+}
 
 _ROTARY = "needs the kinematics of rotary axes, which are not read; post the operation for three axes"
 _THREAD = "cuts a thread, which a correction would distort; leave the thread to an uncorrected program"
@@ -145,4 +150,5 @@ def statements() -> Table:
     table |= dict.fromkeys(DRILLING, (Support.READ, "a cycle behind the motion of a block, left as it is"))
     table |= {name: (Support.REFUSED, why) for name, why in UNROLLED.items()}
     table |= {name: (Support.REFUSED, why) for name, why in REFUSED.items()}
+    table |= {name: (Support.READ, why) for name, why in _IN_PART.items()}
     return dict(sorted(table.items()))

@@ -22,11 +22,11 @@ from olp.program.sinumerik.words import Words
 
 Bytes = npt.NDArray[np.uint8]
 
-_VARIABLE = rb"[A-Z_][A-Z0-9_]*[ \t]*"
-#: variables without values: what uses one is refused where it is
+_VARIABLE = rb"[A-Z_][A-Z0-9_]*[ \t]*(?:=[ \t]*[-+]?(?:\d+\.?\d*|\.\d+)[ \t]*)?"
+#: variables, without values or with numbers
 _DECLARED = re.compile(
-    rb"[ \t]*(?:N\d+)?[ \t]*DEF[ \t]+(?:INT|REAL|BOOL|CHAR|STRING[ \t]*\[\d+\])[ \t]+"
-    + _VARIABLE + rb"(?:,[ \t]*" + _VARIABLE + rb")*\s*", re.IGNORECASE,
+    rb"[ \t]*(?:N\d+)?[ \t]*DEF[ \t]+(INT|REAL|BOOL|CHAR|STRING[ \t]*\[\d+\])[ \t]+"
+    rb"(" + _VARIABLE + rb"(?:,[ \t]*" + _VARIABLE + rb")*)\s*", re.IGNORECASE,
 )  # fmt: skip
 #: Letters of words that mean the same in both languages.
 _PLAIN = b"NGXYZFIJKMSTABCUVW"
@@ -77,7 +77,9 @@ def translate(data: bytes, *, tips: bool = False) -> Translation:
             continue
         number = line + 1
         block: Block | None = None
-        if _DECLARED.fullmatch(code) is not None:
+        declared = _DECLARED.fullmatch(code)
+        if declared is not None:
+            words.constants.declare(declared[1], declared[2])
             out[start : start + len(code)] = b" " * len(code)
             continue
         try:

@@ -19,6 +19,7 @@ from olp.program.sinumerik.actions import (
     Tolerate,
 )
 from olp.program.sinumerik.blocks import NUMBER, Block, Form, Piece, arguments, unknown
+from olp.program.sinumerik.constants import Constants
 from olp.program.sinumerik.frames import STATEMENTS, Parts
 from olp.program.sinumerik.offsets import written_offset
 from olp.program.sinumerik.refusals import refused, statement, unroll
@@ -65,6 +66,7 @@ class Words:
         #: by what it is in, the statement that contours are not read with
         self.ways: dict[str, str] = {}
         self.parts = Parts()
+        self.constants = Constants()
 
     def refuse(self, error: ProgramError, line: int) -> None:
         """Note why a line is refused; the first reason counts."""
@@ -97,6 +99,8 @@ class _Line:
         """Raises ProgramError, without a line, for the first piece that cannot be read."""
         self._head()
         pieces = list(self.block.pieces)
+        if self.words.constants.assigned(self.code, pieces, deleted=self.block.deleted):
+            return
         names = {piece.name for piece in pieces}
         whole = self._whole(pieces, names)
         if not whole:
@@ -436,10 +440,13 @@ class _Line:
 
     def _word(self, piece: Piece, letter: bytes) -> None:
         """A word of one letter with the number of a piece."""
+        text: bytes | None = self.code[piece.value : piece.value_end]
         if NUMBER.fullmatch(self.code, piece.value, piece.value_end) is None:
+            text = self.words.constants.padded(self.code[piece.value : piece.value_end])
+        if text is None:
             raise unroll(f"`{self.code[piece.start : piece.end].decode('latin-1')}`")
         self._write(piece.start, letter)
-        self._write(piece.value, self.code[piece.value : piece.value_end])
+        self._write(piece.value, text)
 
     def _write(self, place: int, text: bytes) -> None:
         self.out[place : place + len(text)] = text
@@ -449,6 +456,7 @@ class _Line:
         if piece.value == piece.value_end:
             return None
         text = self.code[piece.value : piece.value_end].replace(b" ", b"").replace(b"\t", b"")
+        text = self.words.constants.padded(text) or text
         if NUMBER.fullmatch(text) is None:
             raise unroll(f"`{self.code[piece.start : piece.end].decode('latin-1')}`")
         return float(text)

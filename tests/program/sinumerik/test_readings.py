@@ -21,6 +21,7 @@ from olp.program.program import Program
 from olp.program.registry import DIALECTS, dialect_of, read
 from olp.program.rs274 import reader
 from olp.program.rs274.lexer import chunks
+from olp.program.sinumerik.flatten.unroll import flatten
 from olp.program.sinumerik.translate import translate
 
 SINUMERIK = DIALECTS["sinumerik"]
@@ -132,12 +133,18 @@ def test_a_program_ends_where_the_manual_says(text: str, setup: Setup) -> None:
 REFUSED: dict[str, tuple[str, str]] = {
     ZERO + "X=IC(2)": ("X is a distance in G90; unroll", "OLP511"),
     ZERO + "G91\nX=AC(2)": ("X is a position in G91; unroll", "OLP511"),
-    "R1=5": ("--flatten", "OLP511"),
+    "R1=5+1": ("--flatten", "OLP511"),
+    "MYVAR=5": ("--flatten", "OLP511"),
+    "R1=5\nX=R1+1": ("--flatten", "OLP511"),
+    "R1=5\nX=-R1": ("--flatten", "OLP511"),
+    # the number has no room in the place of the name
+    "R1=123.4\nX=R1": ("--flatten", "OLP511"),
+    "/_A=5": ("depend on the switch", "OLP525"),
+    "DEF STRING[9] SS=5\nX=SS": ("--flatten", "OLP511"),
     "X=R1": ("--flatten", "OLP511"),
     "X=2*3": ("--flatten", "OLP511"),
     "IF R1==1 GOTOF A": ("--flatten", "OLP511"),
-    "DEF REAL A, B=1": ("--flatten", "OLP511"),
-    "DEF REAL A\nX=A": ("--flatten", "OLP511"),
+    "DEF REAL A, B=2*3": ("--flatten", "OLP511"),
     "DEF AXIS A": ("--flatten", "OLP511"),
     "MYSUB": ("subprogram or a statement that is not known", "OLP511"),
     "L100 P2": ("`L100` uses", "OLP511"),
@@ -207,8 +214,33 @@ def test_what_is_not_read_is_refused_with_its_line_and_a_way(text: str, setup: S
 
 def test_all_refusals_of_a_text_are_told_together(setup: Setup) -> None:
     with pytest.raises(ProgramError) as caught:
-        program("TRAORI\nX1\nR1=2\nM30\nR3=4", setup)
+        program("TRAORI\nX1\nR1=2*3\nM30\nR3=4", setup)
     assert [e.line for e in (caught.value, *caught.value.others)] == [1, 3]
+
+
+CONSTANT = [
+    "DEF REAL _X_HOME=-12.5, _F_CUT\n_F_CUT=250\nG1 X=_X_HOME Y5 F=_F_CUT\n_X_HOME=3\nX=_X_HOME",
+    "R12=7 R13=-2 R14=3\nTRANS X=R12 Y5\nG1 X1 Y=R13 F100\nG2 X=R12 I=R14",
+    "DEF REAL _ZERO\nG0 X4\nX=_ZERO",
+]
+
+
+@pytest.mark.parametrize("text", CONSTANT)
+def test_variables_that_stand_for_numbers_are_read_as_they_are_unrolled(text: str, setup: Setup) -> None:
+    own = program(ZERO + text, setup)
+    plain = read(bytes(flatten((ZERO + text).encode(), SINUMERIK)), setup, SINUMERIK)
+    assert own.toolpath.end_mm.tolist() == plain.toolpath.end_mm.tolist()
+    assert programmed(own).tolist() == pytest.approx(programmed(plain).tolist(), nan_ok=True)
+
+
+def test_a_number_comes_in_the_place_of_a_variable(tmp_path: Path) -> None:
+    """Where it has to change; the others stay."""
+    path = machine(tmp_path, "[squareness]\nC0Y_urad = 2000.0\n", tables=TRUE_ZERO, controller="sinumerik")
+    text = "G71 G90 G54\nG0 X0 Y0 Z0\n_X_OUT=-10 _F_CUT=250\nG1 X=_X_OUT Y50.0 F=_F_CUT ; X=5\n"
+    text += "SUPA X=_X_OUT\nM30\n"
+    written = olp.correct(text.encode(), load_setup(path)).data
+    assert b"_X_OUT=-10 _F_CUT=250\n" in written
+    assert re.search(rb"\nG1 X=-9\.\d+ Y50\.0 F=_F_CUT ; X=5\nSUPA X=_X_OUT\n", written)
 
 
 def test_a_call_that_is_refused_is_one_reason_with_its_arguments(setup: Setup) -> None:

@@ -1,0 +1,63 @@
+"""Variables of a Sinumerik text that stand for numbers: `_Z_HOME=-10`, and `Z=_Z_HOME` behind it.
+
+A text is read from the top, as flow control is refused where nothing is unrolled. So the last number that was
+assigned counts. Names that DEF defines, R-parameters and names that begin with an underscore are variables;
+another one may be an axis of the machine.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from olp.core.errors import ProgramError
+from olp.program.sinumerik.blocks import NUMBER, Form, Piece
+
+_OWN = re.compile(r"_[A-Z0-9_]*|R\d+")
+#: Digits of a number that the reader of words takes.
+_MOST_DIGITS = 18
+
+
+class Constants:
+    """The numbers of variables, as they are written, by name in capitals."""
+
+    def __init__(self) -> None:
+        self._texts: dict[str, bytes] = {}
+        self._defined: set[str] = set()
+
+    def declare(self, kind: bytes, variables: bytes) -> None:
+        """Take over a DEF: what has no number is 0, and text has none."""
+        for variable in variables.decode("latin-1").upper().split(","):
+            name, _, value = variable.partition("=")
+            self._defined.add(name.strip())
+            if kind.upper() in (b"INT", b"REAL"):
+                self._texts[name.strip()] = value.strip().encode() or b"0"
+
+    def assigned(self, code: bytes, pieces: Sequence[Piece], *, deleted: bool) -> bool:
+        """Whether a block only assigns numbers to variables, which are taken over. Raises ProgramError,
+        without a line, where a switch decides of it."""
+        texts = {}
+        for piece in pieces:
+            own = piece.name in self._defined or _OWN.fullmatch(piece.name)
+            value = code[piece.value : piece.value_end].strip()
+            if piece.form is not Form.EQUAL or not own or not NUMBER.fullmatch(value):
+                return False
+            texts[piece.name] = value
+        if texts and deleted:
+            raise ProgramError(
+                "a block under block delete assigns to variables, so later blocks depend on the switch; "
+                "remove the `/`",
+                code="OLP525",
+            )
+        self._texts |= texts
+        return bool(texts)
+
+    def padded(self, name: bytes) -> bytes | None:
+        """The number of a variable in as many bytes as its name has, with zeros before it, so that it can be
+        read and replaced where the name is; None where there is none, or no room."""
+        text = self._texts.get(name.decode("latin-1").upper(), b"").replace(b" ", b"").removeprefix(b"+")
+        digits, sign = text.removeprefix(b"-"), text[:1] if text.startswith(b"-") else b""
+        missing = len(name) - len(text)
+        if not text or missing < 0 or len(digits) + missing > _MOST_DIGITS:
+            return None
+        return sign + b"0" * missing + digits
