@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 
 from olp.core.errors import ProgramError
 
-_TOKEN = re.compile(rb"\s*(\d+\.?\d*|\.\d+|Q[LR]?\d+|PI|[A-Z]+|[-+*/^()])", re.I)
+_TOKEN = re.compile(rb"\s*(\d+\.?\d*|\.\d+|Q[LR]?\d+|PI|[A-Z]+|[-+*/%^()])", re.I)
 _FN = re.compile(rb"FN[ \t]*(\d+)[ \t]*:[ \t]*(Q[LR]?\d+)[ \t]*=[ \t]*(.*)", re.I | re.S)
 _VALUE = rb"[-+]?[ \t]*(?:\d+\.?\d*|\.\d+|Q[LR]?\d+)"
 _PAIR = re.compile(
@@ -27,6 +27,13 @@ def _radians(function: Callable[[float], float]) -> Callable[[float], float]:
     return lambda value: function(math.radians(value))
 
 
+def _remainder(a: float, b: float) -> float:
+    """Of a division. Raises ValueError for negative numbers, whose sign controls may take otherwise."""
+    if a < 0.0 or b < 0.0:
+        raise ValueError
+    return math.fmod(a, b)
+
+
 FUNCTIONS: Mapping[bytes, Callable[[float], float]] = {
     b"SIN": _radians(math.sin), b"COS": _radians(math.cos), b"TAN": _radians(math.tan),
     b"ASIN": _degrees(math.asin), b"ACOS": _degrees(math.acos), b"ATAN": _degrees(math.atan),
@@ -37,10 +44,10 @@ FUNCTIONS: Mapping[bytes, Callable[[float], float]] = {
 _PAIRS: Mapping[bytes, Callable[[float, float], float]] = {
     b"+": lambda a, b: a + b, b"-": lambda a, b: a - b, b"*": lambda a, b: a * b, b"/": lambda a, b: a / b,
     b"DIV": lambda a, b: a / b, b"^": lambda a, b: float(a**b), b"LEN": math.hypot,
-    b"ANG": lambda a, b: math.degrees(math.atan2(a, b)) % 360.0,
+    b"ANG": lambda a, b: math.degrees(math.atan2(a, b)) % 360.0, b"%": _remainder,
 }  # fmt: skip
 #: the operators of each level, the loosest first
-_LEVELS = ((b"+", b"-"), (b"*", b"/"), (b"^",))
+_LEVELS = ((b"+", b"-"), (b"*", b"/", b"%"), (b"^",))
 
 
 class Parameters(dict[str, float]):

@@ -436,7 +436,7 @@ def test_an_unrolled_program_is_corrected_and_named_by_its_lines(bent: Path) -> 
         ("FN 2: Q1 = +5 - -2", 7), ("FN 3: Q1 = +3 * +3", 9), ("FN 4: Q1 = +4 DIV +8", 0.5),
         ("FN 5: Q1 = SQRT 4", 2), ("FN 6: Q1 = SIN-90", -1), ("FN 7: Q1 = COS+0", 1),
         ("FN 8: Q1 = +3 LEN +4", 5), ("FN 13: Q1 = +10 ANG -10", 135), ("FN0: Q1=.5", 0.5),
-        ("QL1 = 3\nQ1 = QL1 * 2", 6),
+        ("QL1 = 3\nQ1 = QL1 * 2", 6), ("Q1 = 2 + 400.5 % 360", 42.5),
     ],
 )  # fmt: skip
 def test_formulas(formula: str, value: float) -> None:
@@ -447,7 +447,8 @@ def test_formulas(formula: str, value: float) -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("L X+Q5\n", "Q5 is used before"), ("Q1 = 1 / 0\n", "has no value"), ("Q1 = ( 2\n", "not closed"),
+        ("L X+Q5\n", "Q5 is used before"), ("Q1 = 1 / 0\n", "has no value"),
+        ("Q1 = -5 % 3\n", "has no value"), ("Q1 = ( 2\n", "not closed"),
         ("Q1 = FOO 2\n", "not read in formulas"), ("FN 9: IF +1 EQU +1 GOTO LBL 9\n", "no LBL 9"),
         ("CALL PGM TNC:\\\\OTHER.H\n", "no such file"), ("LBL 1\nCALL LBL 1\n", "nested deeper"),
         ("FN 0: Q1=1\nFN 18: SYSREAD Q1 = ID1 NR2\nL X+Q1\n", "Q1 is used before"),

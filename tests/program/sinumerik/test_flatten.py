@@ -166,6 +166,17 @@ def test_subprograms_are_called_by_their_files() -> None:
         assert unrolled(call + "\nM30\n", subprograms=files.get) == "G1 X1\nM30\n"
 
 
+def test_the_header_of_a_file_that_is_called_begins_no_program(setup: Setup) -> None:
+    """Behind it nothing would be read."""
+    sub = b"%_N_SUB_SPF\n;$PATH=/_N_SPF_DIR\n; A\nX1 Y2\nM17\n"
+    head = "%_N_A_MPF\n;$PATH=/_N_A\n" + HEAD
+    text = unrolled(
+        head + "SUB\nX5\nM30\n", subprograms=lambda name: ("SUB.SPF", sub) if name == "SUB" else None
+    )
+    assert text == head + "; A\nX1 Y2\nX5\nM30\n"
+    assert read(text.encode(), setup, SINUMERIK).toolpath.end_mm[-1, :2].tolist() == [5.0, 2.0]
+
+
 def test_arrays_take_the_values_of_their_definition() -> None:
     text = "DEF REAL P[3]=SET(1.5, 2*4)\nX=P[0] Y=P[1] Z=P[2]\n"
     assert unrolled(HEAD + text).endswith("X=1.5 Y=8 Z=0\n")

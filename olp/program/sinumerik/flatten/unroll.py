@@ -31,6 +31,8 @@ from olp.program.sinumerik.table import DRILLING, PATTERNS
 _COMPUTED = DRILLING | PATTERNS
 _LABEL = re.compile(rb"\A([ \t]*/?\d?[ \t]*(?:N\d+[ \t]*)?)(?:[A-Z_][A-Z0-9_]+[ \t]*:[ \t]*)+", re.IGNORECASE)
 _NUMBER = re.compile(rb"\A([ \t]*/?\d?[ \t]*)(?:N|:)[ \t]*\d+[ \t]*", re.IGNORECASE)
+#: What names a program in its file, and where it is.
+_HEADERS = (b"%", b";$PATH")
 #: bytes of visited blocks: of a short program, and for each byte
 UNROLLED_BYTES = 12_000_000
 UNROLLED_PER_BYTE = 80
@@ -120,6 +122,9 @@ class _Writer:
     def visit(self, unit: Unit, line: Line, scope: Scope) -> bool:
         """Write one line; True where the program ends."""
         block = line.block
+        if unit.file is not None and line.raw.lstrip().startswith(_HEADERS):
+            # of a file that is called; in the text it would begin another program
+            return False
         if block is None or not block.pieces:
             if block is None or not block.label:
                 self._put(unit, line, line.raw)
