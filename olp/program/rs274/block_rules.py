@@ -72,6 +72,10 @@ def _table(codes: Iterable[int]) -> Mask:
 
 
 _MOTIONS = _table(_MOTION)
+#: Codes that leave the words beside them to the motion.
+_MODES = _table(
+    {0, 10, *_ARCS, 90, 170, 180, 190, 900, 910, 930, 940, 950, COMPENSATION_OFF, *CUTTER_COMPENSATION}
+)
 #: Codes that take the axis words of their block for something else.
 _STATING = _table(AXIS_VALUES | HOMES)
 
@@ -82,6 +86,8 @@ class BlockRules:
 
     - `users`: the codes that use a letter; beside no such code it is refused. Letters that are not here are
       free. Ten times the number of a G code, `M` plus ten times that of an M code.
+    - `straight`, `round`: letters that a straight move and an arc may not have, unless the block has another
+      code than those of modes, or an M code.
     - `groups`: codes of which a block may have one.
     - `needs`: codes that need one of these letters.
     - `excludes`: codes that take one of two kinds of letters. `positive`: letters without a negative number.
@@ -91,6 +97,8 @@ class BlockRules:
     """
 
     users: Mapping[str, frozenset[int]] = field(default_factory=dict)
+    straight: str = ""
+    round: str = ""
     groups: tuple[frozenset[int], ...] = ()
     needs: Mapping[int, str] = field(default_factory=dict)
     excludes: Mapping[int, tuple[str, str]] = field(default_factory=dict)
@@ -141,6 +149,7 @@ class _Tables:
             self._groups(codes),
             self._lacking(codes, present),
             self._unused(active, codes, present, motion, plane),
+            self._beside_moves(active, codes, present, motion),
             self._negative(chunk, active),
             self._numbers(chunk, active),
             self._alone(chunk, active, present),
@@ -217,6 +226,24 @@ class _Tables:
             letter = chr(64 + int(spare[row] & -spare[row]).bit_length())
             why = f"no code of this block uses its word {letter}; remove it, or give the code that does"
             yield int(some[row]), why, "OLP519", letter
+
+    def _beside_moves(
+        self, active: Mask, codes: tuple[Index, Index], present: Bits, motion: Codes
+    ) -> Iterator[Refusal]:
+        straight, around = _bits(self.rules.straight), _bits(self.rules.round)
+        some = active & ((present & (straight | around)) != 0) & ((present & (_AXES | _CENTRE)) != 0)
+        if not some.any():
+            return
+        line, key = codes
+        some[line[~_MODES[key]]] = False
+        arcs = is_in(motion, sorted(_ARCS))
+        spare = np.where(arcs, around, np.where(is_in(motion, (0, 10)), straight, 0)) & present
+        for where in np.flatnonzero(some & (spare != 0)).tolist():
+            letter, kind = chr(64 + int(spare[where] & -spare[where]).bit_length()), "n arc"
+            if not arcs[where]:
+                kind = " straight move"
+            why = f"what the control makes of {letter} in a{kind} is not known; take it out"
+            yield where, why, "OLP519", letter
 
     def _lacking(self, codes: tuple[Index, Index], present: Bits) -> Iterator[Refusal]:
         line, key = codes
@@ -375,3 +402,5 @@ NGC_RULES = BlockRules(
 )  # fmt: skip
 #: Controls whose rules are not known so well: what is ambiguous on any control.
 OTHER_RULES = BlockRules(groups=_GROUPS)
+#: ISO controls: a vector at the end of a contour, a corner that is rounded without a comma, spirals, turns.
+ISO_RULES = BlockRules(groups=_GROUPS, straight="IJKLR", round="LPQ")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from olp.core.errors import ProgramError
-from olp.program.rs274.block_rules import NGC_RULES, OTHER_RULES, BlockRules, M
+from olp.program.rs274.block_rules import ISO_RULES, NGC_RULES, OTHER_RULES, BlockRules, M
 from olp.program.rs274.block_text import BlockText
 from olp.program.rs274.lexer import lex
 
@@ -194,6 +194,23 @@ def test_codes_that_need_a_letter_have_one_of_them() -> None:
 )  # fmt: skip
 def test_a_motion_in_force_uses_the_words_of_its_moves(block: str, force: dict[str, int], spare: str) -> None:
     assert one(block, **force) == (unused(spare) if spare else None)
+
+
+@pytest.mark.parametrize(
+    ("block", "motion", "spare"),
+    [
+        ("X1 I2", 10, "I"), ("G40 X1 J2", 10, "J"), ("G41 D1 Y1 I2", 0, "I"), ("G90 G1 Z1 R2", 0, "R"),
+        ("A1 K2", 0, "K"), ("X1 L2", 10, "L"), ("I2", 10, "I"), ("X1 I2", 810, ""), ("X1 I2", 20, ""),
+        ("G2 X1 I2 L3", 20, "L"), ("I2 P3", 30, "P"), ("X1 R2 Q3", 20, "Q"), ("X1 R2 K3", 30, ""),
+        ("G68 X1 R2", 10, ""), ("X1 I2 M98 P1", 10, ""), ("G54.1 P2 X1", 20, ""),
+        ("X1 F2 S3 T4 H5 D6", 10, ""),
+    ],
+)  # fmt: skip
+def test_a_move_of_an_iso_control_has_no_word_that_could_change_it(
+    block: str, motion: int, spare: str
+) -> None:
+    said = refused([block], ISO_RULES, motion=motion).get(1)
+    assert (None if said is None else (said.code, said.word)) == (("OLP519", spare) if spare else None)
 
 
 def test_numbers_that_may_not_be_negative() -> None:

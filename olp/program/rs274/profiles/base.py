@@ -231,9 +231,11 @@ class Profile(Dialect):
     def with_tips(self, tips: Interpolated) -> Profile:
         """The same control on a machine with rotary axes. A tip has no length: the codes that switch tool
         centre point control on end the tool length for a reader of linear axes."""
+        rules = replace(self.rules, straight="") if self.direction_codes else self.rules
         return replace(
             self,
             tips=tips,
+            rules=rules,
             codes={**self.codes, **dict.fromkeys(self.tip_codes | self.plane_codes, Act.EVENT)},
             aliases={**self.aliases, **dict.fromkeys(self.tip_codes, _LENGTH_OFF)},
         )

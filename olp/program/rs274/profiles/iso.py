@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from olp.core.patterns import pattern
 from olp.program.contours.rules import ISO_CONTOURS
+from olp.program.rs274.block_rules import ISO_RULES
 from olp.program.rs274.block_text import BlockText
 from olp.program.rs274.cycle_rules import ISO_CYCLES
 from olp.program.rs274.entry import keep_blocks, read_blocks, unroll_blocks
 from olp.program.rs274.flatten.language import MACRO_B
-from olp.program.rs274.profiles.base import ISO_M, REFUSALS, Act, Profile
+from olp.program.rs274.profiles.base import ISO_M, M_REFUSALS, REFUSALS, Act, Profile
 
 #: G codes without effect on the path on these controls.
 ISO_UNCHANGED = frozenset({80, 90, 150, 501, 620, 630, 670, 691, 131, 231, 250})
@@ -34,6 +35,7 @@ ISO = Profile(
         421: "G42.1 (normal direction control) turns a rotary axis",
     },
     harmless_m=ISO_M,
+    m_refusals={**M_REFUSALS, 1980: "calls a subprogram of another store; call it by M98"},
     initial_retract=980,
     increments_without_point=True,
     program_number=True,
@@ -51,6 +53,7 @@ ISO = Profile(
     cycles=ISO_CYCLES,
     contours=ISO_CONTOURS,
     language=MACRO_B,
+    rules=ISO_RULES,
     path_mode="not stated",
     contours_assumed="start-up of type A is assumed, with the tool beside the begin of the second move, and "
     "that outside corners are extended",
