@@ -20,7 +20,7 @@ from olp.program.rs274.collector import Collector
 from olp.program.rs274.cycle_runs import CycleRun, Refused
 from olp.program.rs274.cycles import HOLE_STROKES, LCNC_CLEARANCE_MM, MOST_REPEATS, levels, repeats_error
 from olp.program.rs274.modes import Context, scaled
-from olp.program.rs274.state import BROKEN_SERIES, KNOWN_BY, NAN, OPEN_RETRACT
+from olp.program.rs274.state import BROKEN_SERIES, KNOWN_BY, NAN, OPEN_RETRACT, TURNED_SERIES
 from olp.program.rs274.strokes import Drilling, Step, Strokes, strokes
 from olp.program.rs274.turned import Turning
 
@@ -169,6 +169,7 @@ class CycleBlocks:
         """The numbers of the blocks and those inherited from their series."""
         state, frame, third = self._state, self._state.frames[frame_index], PLANES[run.plane][2]
         depth = "XYZ"[third]
+        self._check_levels(run, depth, refused)
         dwell, pointed = run.number("P"), context.chunk.pointed[run.slot["P"]]
         for bare in (False, True):
             mine = pointed != bare
@@ -198,6 +199,16 @@ class CycleBlocks:
             run.code, run.plane, r, z, q, p, LCNC_CLEARANCE_MM / unit, unit, frame.offset_mm[third],
             state.profile.cycles,
         )  # fmt: skip
+
+    def _check_levels(self, run: CycleRun, depth: str, refused: Refused) -> None:
+        """Refuse levels that the series has of G90 where G91 is in force now, or the other way round."""
+        series, rules = self._state.series, self._state.profile.cycles
+        known = not series.held.keys().isdisjoint(("R", depth))
+        again = run.slot["R"][0] >= 0 and run.slot[depth][0] >= 0
+        if rules.levels_follow_distance and known and series.incremental is not run.incremental and not again:
+            moves = rules.levels_stay and run.incremental
+            refused.all(f"{TURNED_SERIES}{', or have it written with --expand-cycles' * moves}", "OLP518")
+        series.incremental = run.incremental
 
     @property
     def _initial(self) -> float:

@@ -45,6 +45,7 @@ class CycleRules:
       following ones are smaller, which is not followed, and K beside it counts no holes.
     - `new_code_forgets`: another cycle of a series takes no words from the one before.
     - `levels_follow_distance`: after a change between G90 and G91 a series needs R and depth again.
+      `levels_stay`: those of G90 are levels in G91 too, and only plain moves are known to write them.
     - `keeps_numbers`: a series keeps its initial level, R and depth as numbers of the program. Offsets and
       units may change, and G28 may come between. Else it has to end there.
     - `turning`: how the spindle has to turn in these cycles, M3 or M4.
@@ -63,6 +64,7 @@ class CycleRules:
     first_peck: str = ""
     new_code_forgets: bool
     levels_follow_distance: bool
+    levels_stay: bool = False
     keeps_numbers: bool
     exact_corners: bool
     other_axes: bool
@@ -87,4 +89,4 @@ ISO_CYCLES = CycleRules(
     other_axes=True, turning={},
 )  # fmt: skip
 #: Haas counts I, J and K as the first peck, what each is smaller, and the least one (mill operator's manual).
-HAAS_CYCLES = replace(ISO_CYCLES, first_peck="I")
+HAAS_CYCLES = replace(ISO_CYCLES, first_peck="I", levels_stay=True)

@@ -55,6 +55,8 @@ BROKEN_SERIES = (
 )
 
 
+#: Why blocks of a series of cycles are refused.
+TURNED_SERIES = "G90 and G91 change within a series of cycles; give R and the depth again"
 #: Why a cycle is refused where it may end at two levels.
 OPEN_RETRACT = (
     "whether this cycle returns to its initial level or to R is a setting of the control; give G98 or G99 "
@@ -74,14 +76,16 @@ class Series:
     """Canned cycles that follow one another, until another motion code is in force.
 
     `count` is how many series there were, `initial` the program coordinate of the tool axis before this one
-    (None: not needed yet), `held` the words that later blocks inherit, by upper-case letter. All are numbers
-    in program units, as controls keep them. `broken`: an offset, the unit or another move came between, and
-    not every control keeps them then (`CycleRules.keeps_numbers`).
+    (None: not needed yet), `held` the words that later blocks inherit, by upper-case letter. All are
+    numbers in program units, as controls keep them. `incremental`: they are those of G91. `broken`: an
+    offset, the unit or another move came between, and not every control keeps them then
+    (`CycleRules.keeps_numbers`).
     """
 
     count: int = 0
     initial: float | None = None
     held: dict[str, float | None] = field(default_factory=dict)
+    incremental: bool = False
     broken: bool = False
 
     def begin(self, initial: float | None) -> None:

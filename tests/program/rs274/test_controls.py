@@ -254,7 +254,13 @@ CYCLES: dict[str, tuple[str, dict[str, str]]] = {
     ),
     "levels_follow_distance": (
         f"{_SERIES}\nG91\nX2.",
-        {LINUXCNC: "G0 Z12|G0 X3|G1 Z10|"} | dict.fromkeys(_ISO, "give R and the depth again"),
+        {LINUXCNC: "G0 Z12|G0 X3|G1 Z10|", SIEMENS: "give R and the depth again"}
+        | dict.fromkeys((*_ISO, MAZAK), "|G91|G90|G0 X3.|G0 Z3.|G1 Z-2.|G0 Z9.|G91"),
+    ),
+    "levels_stay": (
+        f"{_SERIES}\nG91\nX2.",
+        {SIEMENS: "give R and the depth again"}
+        | dict.fromkeys((*_ISO, MAZAK), "|G91|G90|G0 X3.|G0 Z3.|G1 Z-2.|G0 Z9.|G91"),
     ),
     "keeps_numbers": (
         f"G21\n{_SERIES}\nG20\nX2. Y1.",

@@ -108,6 +108,20 @@ def test_a_later_level_of_okuma_holds_from_its_own_block_on(okuma) -> None:  # t
     assert [row[2] for row in path(program) if row[0] in (10, 20)] == [50, 2, -5, 20, 20, 2, -5, 30]
 
 
+@pytest.mark.parametrize("control", ["fanuc", "haas", "mazak", "siemens-iso", "mach3"])
+def test_levels_of_g90_are_not_taken_for_distances_of_g91(control: str, reading) -> None:  # type: ignore[no-untyped-def]
+    """The usual row of holes: R and depth hold in G91 on these controls, and no word of G91 can say so."""
+    text = "G98 G81 X10. Z-5. R2. F60.\nG91 X5.{} L3\nG90 G80\n"
+    with pytest.raises(ProgramError, match="give R and the depth again") as caught:
+        reading(text.format(""), control)
+    assert ("--expand-cycles" in caught.value.message) == (control in ("fanuc", "haas", "mazak"))
+    with pytest.raises(ProgramError, match="give R and the depth again"):
+        reading(text.format(" Z-7."), control)
+    assert reading(text.format(" Z-7. R-48."), control)
+    with pytest.raises(ProgramError, match=r"give R and the depth again$"):
+        reading("G91 G98 G81 X10. Z-5. R-2. F60.\nG90 X5.\nG80\n", control)
+
+
 @pytest.mark.parametrize(("synchronous", "plain"), [("G284", "G84"), ("G274", "G74")])
 def test_synchronous_taps_of_okuma_have_the_strokes_of_its_taps(  # type: ignore[no-untyped-def]
     synchronous: str, plain: str, okuma

@@ -45,7 +45,7 @@ from olp.program.rs274.cycles import (
 )
 from olp.program.rs274.flatten.expressions import whole
 from olp.program.rs274.profiles.base import Act
-from olp.program.rs274.state import BROKEN_SERIES, NAN, OPEN_RETRACT, State
+from olp.program.rs274.state import BROKEN_SERIES, NAN, OPEN_RETRACT, TURNED_SERIES, State
 
 #: A word with its value; None is a value whose unit is not known (`Language.increments_open`).
 Value = tuple[str, float | None]
@@ -247,11 +247,12 @@ class ProgramState(State):
             raise ProgramError(BROKEN_SERIES, code="OLP518")
         follows = self.profile.cycles.levels_follow_distance
         turned = follows and series.held and self.held_absolute is not self.absolute
-        if turned and not {depth, "R"} <= given.keys():
-            raise ProgramError(
-                "G90 and G91 change within a series of cycles; give R and the depth again", code="OLP518"
-            )
-        self.held_absolute = self.absolute
+        # levels of G90 may stay levels
+        stay = self.profile.cycles.levels_stay and not self.absolute and given.keys().isdisjoint((depth, "R"))
+        if turned and not stay and not {depth, "R"} <= given.keys():
+            raise ProgramError(TURNED_SERIES, code="OLP518")
+        if not turned or not stay:
+            self.held_absolute = self.absolute
         series.hold(given, depth)
         repeats = self._repeats(given)
         if repeats == 0:
@@ -265,7 +266,9 @@ class ProgramState(State):
         xy, step = self._hole_and_step(given, first, second)
         if self.retract < 0:
             raise ProgramError(OPEN_RETRACT, code="OLP532")
-        r, z = levels(self._needed("R"), self._needed(depth), absolute=self.absolute, initial_z=initial)
+        r, z = levels(
+            self._needed("R"), self._needed(depth), absolute=bool(self.held_absolute), initial_z=initial
+        )
         self.position_of(tool)
         strokes = cycle_moves(
             code,

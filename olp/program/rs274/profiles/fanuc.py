@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from olp.program.rs274.codes import ALIGNED, TILTED
+from olp.program.rs274.cycle_rules import ISO_CYCLES
 from olp.program.rs274.profiles.base import Act, g_codes
 from olp.program.rs274.profiles.iso import ISO, ISO_EXTRA, ISO_UNCHANGED
 
@@ -27,6 +28,7 @@ DIALECT = replace(
     scales_by_parameter=True,
     refusals={**ISO.refusals, 921: "G92.1 presets offsets that are not known off line"},
     harmless_m=ISO.harmless_m | {10, 11, 29, 13, 88, 89},
+    cycles=replace(ISO_CYCLES, levels_stay=True),
     feed_without_point=True,
     # G5 switches the high-speed mode; other numbers call cycles
     still_with={50: ("P", frozenset({0.0, 10000.0}))},

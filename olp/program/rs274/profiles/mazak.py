@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from olp.core.patterns import pattern
+from olp.program.rs274.cycle_rules import ISO_CYCLES
 from olp.program.rs274.profiles.base import Act, g_codes
 from olp.program.rs274.profiles.iso import ISO, ISO_EXTRA, ISO_UNCHANGED
 
@@ -36,6 +37,7 @@ DIALECT = replace(
         51: "G5.1 is a spline of this control",
     },
     harmless_m=ISO.harmless_m | {10, 11, 50, 51},
+    cycles=replace(ISO_CYCLES, levels_stay=True),
     tools_in_block=True,
     radius_holds=True,
     rules=replace(ISO.rules, several="GMT"),

@@ -372,7 +372,7 @@ _NO_POINT = (
     [
         *((f"G81 X2. Z-1. R1.\n{between}\nX3. Y3.", "OLP518", _BROKEN)
           for between in ("G92 X7.", "G54", "G20", "G43 H1", "G52 X1.", "G28 Z5.", "G10 L2 P1 X1.")),
-        ("G81 X2. Z-1. R1.\nG91 X1.", "OLP518", _CHANGED),
+        ("G81 X2. Z-1. R1.\nG91 X1. Z-2.", "OLP518", _CHANGED),
         ("G81 X2. Z-1. R1.\nG91 X1. R-4.", "OLP518", _CHANGED),
         ("G81 X2. Z-1. R1.\nG91 X1. Z-4.", "OLP518", _CHANGED),
         ("G81 X2 Z-1. R1.", "OLP541", _NO_POINT.format("X")),
