@@ -81,8 +81,8 @@ READINGS: dict[str, tuple[str, dict[str, Outcome], Any]] = {
     ),
     "offset_words": (
         "G54 P2\nG0 X1. Y2. Z3.",
-        {SIEMENS: (8, 10, 12), FANUC: (1, 2, 3)},
-        {SIEMENS: {}, FANUC: {540: "P"}},
+        {SIEMENS: (8, 10, 12), FANUC: (8, 10, 12), MACH3: (1, 2, 3)},
+        {SIEMENS: {}, FANUC: {}, MACH3: {540: "P"}},
     ),
     "offset_names": (
         "G15 H1\nG0 X1. Y2. Z3.",
@@ -106,8 +106,8 @@ READINGS: dict[str, tuple[str, dict[str, Outcome], Any]] = {
     ),
     "offsets_alone": (
         "G54\nG0 X1. Y2. Z3.",
-        {SIEMENS: (1, 2, 3)},
-        {SIEMENS: frozenset()},
+        dict.fromkeys((SIEMENS, FANUC), (1, 2, 3)),
+        dict.fromkeys((SIEMENS, FANUC), frozenset()),
     ),
     "numbers_hold": (
         "G0 X0. Y0.\nG43 H1 Z1.\nH2 Z1.",

@@ -2,7 +2,8 @@
 
 Differs from LinuxCNC: G70 and G71 are units. Whether I, J and K are positions before G90.1 or G91.1 is a
 setting, as is the return of cycles before G98 or G99. G43 needs H, and its length counts along Z. G28.1
-searches the switches, and G31 probes. G52 writes the offset of G92. M47 runs the program again.
+searches the switches, and G31 probes. G52 writes the offset of G92. G59 P selects further
+work offsets. M47 runs the program again.
 
 Source: "Using Mach3Mill", chapter 10. It does not say what cycles keep when their code, their unit or G90
 and G91 change, nor how G84 taps: this is refused.
@@ -54,6 +55,8 @@ DIALECT = Profile(
     g10_adds=None,
     lengths_along_z=True,
     numbers_hold=True,
+    offset_words={590: "P"},
+    offsets_alone=frozenset({590}),
     text=BlockText(),
     cycles=CycleRules(
         rises_first=True, feeds_home=True, taps_in_any_plane=True, taps_by_control=True,

@@ -27,6 +27,7 @@ DIALECT = replace(
     m_refusals=M_REFUSALS,
     g52_is_g92=False,
     g10_stores=False,
+    offset_words={**MACH3.offset_words, 541: "P"},
     language=replace(
         MACRO_B, modal_variables=False, work_offsets=False, counts_in_p=False, increments_open=False
     ),
