@@ -16,16 +16,20 @@ from olp.compensation.joints.writer import WrittenJoints
 from olp.compensation.tally import Tally
 from olp.core.arrays import Index
 from olp.core.errors import ProgramError
+from olp.core.machine import ZERO, Vector
 from olp.core.values import dataclass
 from olp.kinematics.parallel_arm import arm_of
-from olp.kinematics.poses import rotation_vector
+from olp.kinematics.poses import Poses, rotation_vector, turned
 from olp.program.robots.dialect import Replacement, RobotDialect
 from olp.program.robots.poses import (
     Pose,
+    Quaternion,
     angle_between,
     inverted,
+    matrices,
     multiplied,
-    of_vector,
+    of_vectors,
+    products,
     rotated,
 )
 from olp.program.robots.targets import NOWHERE, Part, Span, Target, Use
@@ -88,7 +92,7 @@ class _Writer:
         last = np.append(plan.move[1:] != plan.move[:-1], True)[: len(plan.move)]
         tool = self.path.tool[plan.move[rows]]
         poses = self.path.motion.nominal(plan.command[rows], tool)
-        turns = rotation_vector(poses.rotation)
+        places, turns = self._in_frames(rows, poses)
         in_joints = np.array([bool(self._target_of(row).joints) for row in rows.tolist()], bool)
         self._keep_branches(rows[~in_joints])
         by_target: dict[int, list[tuple[int, _Wanted]]] = {}
@@ -98,14 +102,11 @@ class _Writer:
             if in_joints[k]:
                 by_target.setdefault(use.target, []).append((row, self._wanted_joints(row)))
                 continue
-            x, y, z = poses.position[k].tolist()
-            tip = Pose((x, y, z), of_vector(turns[k].tolist()))
-            tip = Pose(tip.origin_mm, multiplied(tip.turn, (use.tool or Pose()).turn))
             if last[row]:
-                wanted = self._wanted(row, tip, shifted=True)
+                wanted = self._wanted(row, places[k], turns[k], shifted=True)
                 by_target.setdefault(use.target, []).append((row, wanted))
             else:
-                edits += self._part(row, self._wanted(row, tip, shifted=False))
+                edits += self._part(row, self._wanted(row, places[k], turns[k], shifted=False))
         for place, wants in by_target.items():
             edits += self._target(self.targets.targets[place], wants)
         parts = np.bincount(plan.move, minlength=len(self.path))
@@ -140,16 +141,25 @@ class _Writer:
 
     # -- what is wanted ------------------------------------------------------------------------------
 
-    def _wanted(self, row: int, tip: Pose, *, shifted: bool) -> _Wanted:
-        """The numbers of a target with which a row brings the tip to a pose; without `shifted` those of the
-        pose itself."""
+    def _in_frames(self, rows: Index, poses: Poses) -> tuple[list[Vector], list[Quaternion]]:
+        """Where the tip is at poses of the end of the lever, and how it is turned, in the frames of rows."""
+        uses = [self._use(row) for row in rows.tolist()]
+        frames = np.array([use.frame.turn for use in uses]).reshape(-1, 4)
+        tools = np.array([(use.tool or Pose()).turn for use in uses]).reshape(-1, 4)
+        origin = np.array([use.frame.origin_mm for use in uses]).reshape(-1, 3)
+        back = frames * (1.0, -1.0, -1.0, -1.0)
+        places = turned(matrices(back), poses.position - origin)
+        turns = products(products(back, of_vectors(rotation_vector(poses.rotation))), tools)
+        return places.tolist(), turns.tolist()
+
+    def _wanted(self, row: int, place: Vector, turn: Quaternion, *, shifted: bool) -> _Wanted:
+        """The numbers of a target with which a row brings the tip to a place in its frame, turned so; without
+        `shifted` those of the pose itself."""
         move, use = int(self.plan.move[row]), self._use(row)
-        target = self.targets.targets[use.target]
-        back = inverted(use.frame.turn)
-        away = [a - b for a, b in zip(tip.origin_mm, use.frame.origin_mm, strict=True)]
-        place, turn, shift = rotated(back, away), multiplied(back, tip.turn), (0.0, 0.0, 0.0)
+        target, shift = self.targets.targets[use.target], ZERO
         if shifted:
-            turn = multiplied(turn, multiplied(inverted(use.turn), target.turn))
+            if use.turn != target.turn:
+                turn = multiplied(turn, multiplied(inverted(use.turn), target.turn))
             shift = use.shift_mm
             if use.along_tool:
                 shift = rotated(turn, rotated(inverted(target.turn), shift))

@@ -6,9 +6,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
+from olp.core.arrays import Array
 from olp.core.errors import ProgramError
 from olp.core.machine import ZERO, Setup, Vector
-from olp.core.toolpath import Flag, Kind
+from olp.core.toolpath import Flag, Frame, Kind
 from olp.program.dialect import Dialect, Options
 from olp.program.program import Program
 from olp.program.robots.frames import Located, RobotFrames, Tool
@@ -117,7 +121,6 @@ class RobotMoves:
         if not self.known:
             self.away(line)
         target = self.targets[use.target]
-        end = self.frames.table.frames[index].placed_mm(target.point)
         known = straight and self._turn is not None
         # an arm is led along the way, however the tool turns
         swings = known and not self.arm and self._swings(index)
@@ -130,7 +133,7 @@ class RobotMoves:
         flag = Flag.WHOLE if held else Flag(0)
         kind = Kind.LINE if line_kind else Kind.RAPID
         self.moves.put(
-            kind=int(kind), flag=int(flag), line=line, frame=index, end=end,
+            kind=int(kind), flag=int(flag), line=line, frame=index, end=target.point,
             slot=target.slots, bounds=use.statement, feed=feed,
         )  # fmt: skip
         first = self._first_turns.setdefault(tool.name, use.turn)
@@ -138,9 +141,7 @@ class RobotMoves:
             what = f"the orientation changes, and the vector of the tool {tool.name} does not"
             self.remark("turning", line, what, "turning")
         before = use.turn if self._turn is None else self._turn
-        self.uses.append(
-            replace(use, before=before, frame=frame.pose, tool=tool.pose, straight=known, whole=whole)
-        )
+        self.uses.append(use.begun(before, frame.pose, tool.pose, straight=known, whole=whole))
         self.known, self._frame, self._turn, self._rest, self._feed = True, index, use.turn, target.rest, feed
 
     def joint_move(self, line: int, taken: Callable[[], Use | None]) -> None:
@@ -182,8 +183,22 @@ class RobotMoves:
 
     def program(self, dialect: Dialect, *, words: bool) -> Program:
         """The whole program."""
+        frames = self.frames.table.frames
         program = self.moves.program(
-            self.data, dialect, self.setup, self.frames.table.frames,
-            list(self._remarks.values()), decimal=b".", words=words,
+            self.data, dialect, self.setup, frames, list(self._remarks.values()), decimal=b".", words=words,
         )  # fmt: skip
+        path = program.toolpath
+        path.end_mm[:] = placed_in(frames, path.frame, path.end_mm)
         return replace(program, targets=Targets(tuple(self.targets), tuple(self.uses)))
+
+
+def placed_in(frames: Sequence[Frame], number: npt.NDArray[np.int32], points: Array) -> Array:
+    """(n, 3) axis positions of points (n, 3) in frames by their numbers (n,)."""
+    if not frames:
+        return points
+    unit = np.array([frame.unit_mm for frame in frames])[number]
+    place = points * unit[:, None]
+    turns = np.array([np.eye(3) if frame.turn is None else frame.turn for frame in frames])[number]
+    x, y, z = place.T
+    turned = [row[:, 0] * x + row[:, 1] * y + row[:, 2] * z for row in np.moveaxis(turns, 1, 0)]
+    return np.stack(turned, axis=1) + np.array([frame.offset_mm for frame in frames])[number]

@@ -67,6 +67,15 @@ class Use:
     free: bool = False
     whole: bool = False
 
+    def begun(
+        self, before: Quaternion, frame: Pose, tool: Pose | None, *, straight: bool, whole: bool
+    ) -> Use:
+        """The same with where it begins, in its frame and with its tool."""
+        return Use(
+            self.target, self.statement, self.place, self.named, self.shift_mm, self.turn, before, self.zone,
+            self.offsets, self.offset_turn, self.along_tool, frame, tool, straight, self.free, whole,
+        )  # fmt: skip
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Targets:

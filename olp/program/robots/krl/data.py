@@ -71,6 +71,7 @@ class Declared:
         self.data = data
         self.values: dict[str, list[Value]] = {}
         self.changed: dict[str, int] = {}
+        self._single: dict[str, tuple[Value, Aggregate]] = {}
         self._aggregates: dict[Span, Aggregate | None] = {}
         listed = False
         for line in lines:
@@ -106,6 +107,8 @@ class Declared:
     def value(self, key: str, line: int, what: str) -> tuple[Value, Aggregate] | None:
         """The only value of a name and its numbers, None where the text states none. Raises ProgramError
         where it depends on the run, or is computed."""
+        if key in self._single:
+            return self._single[key]
         found = self.values.get(key, [])
         array = key.partition("[")[0]
         again = self.changed.get(key) or self.changed.get(array)
@@ -127,6 +130,7 @@ class Declared:
                 line=line,
                 code="OLP533",
             )
+        self._single[key] = found[0], numbers
         return found[0], numbers
 
     def aggregate(self, span: Span) -> Aggregate | None:
