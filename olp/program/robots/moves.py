@@ -201,4 +201,4 @@ def placed_in(frames: Sequence[Frame], number: npt.NDArray[np.int32], points: Ar
     turns = np.array([np.eye(3) if frame.turn is None else frame.turn for frame in frames])[number]
     x, y, z = place.T
     turned = [row[:, 0] * x + row[:, 1] * y + row[:, 2] * z for row in np.moveaxis(turns, 1, 0)]
-    return np.stack(turned, axis=1) + np.array([frame.offset_mm for frame in frames])[number]
+    return np.asarray(np.stack(turned, axis=1) + np.array([frame.offset_mm for frame in frames])[number])

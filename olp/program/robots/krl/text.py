@@ -16,6 +16,15 @@ _COMPONENT = pattern(
     rb"(?i)\s*([A-Z]\w*)(?:\s+|(?=[-+.']))"
     rb"([-+]?(?:\d+\.?\d*|\.\d+)(?:E[-+]?\d+)?|'[BH][\dA-F]+')\s*(?:,|$)"
 )
+#: A position in the usual form, as taught points have it: its components in their order.
+_ORDER = ("X", "Y", "Z", "A", "B", "C", "S", "T", "E1", "E2", "E3", "E4", "E5", "E6")
+_N = rb"([-+]?(?:\d+\.?\d*|\.\d+))"
+_USUAL = pattern(
+    rb"\{\s*(?:(?:FRAME|POS|E3POS|E6POS)\s*:\s*)?"
+    + rb"\s*,\s*".join(name.encode() + rb"\s+" + _N for name in _ORDER[:6])
+    + b"".join(rb"(?:\s*,\s*" + name.encode() + rb"\s+" + _N + rb")?" for name in _ORDER[6:])
+    + rb"\s*\}"
+)
 _PART = pattern(rb"\{[^{}]*\}|[^{}:]+")
 #: Bases of bit strings by their letters.
 _BASES = {"B": 2, "H": 16}
@@ -62,11 +71,18 @@ def lines(data: bytes) -> Iterator[Line]:
 
 def aggregate(data: bytes, span: Span) -> Aggregate | None:
     """The aggregate that bytes are; None where they are none, or one of its components is no number."""
+    values: dict[str, tuple[Span, float]] = {}
+    match = _USUAL.fullmatch(data, *span)
+    if match is not None:
+        for k, (name, text) in enumerate(zip(_ORDER, match.groups(), strict=True), 1):
+            if text is not None:
+                values[name] = match.span(k), float(text)
+        large = any(abs(value) >= LARGEST for _, value in values.values())
+        return None if large else Aggregate(match.span(), values, joints=False)
     match = _AGGREGATE.fullmatch(data, *span)
     if match is None:
         return None
     place, end = match.span(2)
-    values: dict[str, tuple[Span, float]] = {}
     for component in _COMPONENT.finditer(data, place, end):
         if component.start() != place:
             return None
