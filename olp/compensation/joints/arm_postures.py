@@ -86,8 +86,9 @@ class Settled:
         rows = rows[rows > 0]
         for a in range(0, len(rows), _BATCH):
             some = rows[a : a + _BATCH]
-            away = self.postures[some][:, None] - self.postures[some - 1][:, :, None]
-            away = np.abs((away + 180.0) % 360.0 - 180.0).max(axis=3)
+            away = np.abs(self.postures[some][:, None] - self.postures[some - 1][:, :, None])
+            # both are within half a turn
+            away = np.minimum(away, 360.0 - away).max(axis=3)
             away[np.isnan(away)] = np.inf
             number[some] = np.argmin(away, axis=2)
             size[some] = np.min(away, axis=2)
