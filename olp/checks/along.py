@@ -68,7 +68,7 @@ class Along:
         between, step_mm = _between(length)
         places = _Places(
             np.concatenate((pick, between.move)), np.concatenate((np.ones(len(pick)), between.share)),
-            np.concatenate((length[pick], between.length)),
+            np.concatenate((picked(length, pick), between.length)),
         )  # fmt: skip
         return Along(path, step_mm, places, _points(path, places))
 
@@ -124,18 +124,22 @@ def _lengths(path: Toolpath) -> Array:
     """(n,) length in mm of each move that cuts, 0 for others."""
     length = apart((len(path),), np.float64)
     for some in spans(len(path), _BLOCK):
-        away = path.end_mm[some] - path.starts_mm(some.start, some.stop)
-        length[some] = np.sqrt(np.einsum("ij,ij->i", away, away))
-    arcs = path.arcs
+        part = path.part(some.start, some.stop)
+        cuts = cutting_moves(part) & ((part.flag & _AWAY) == 0)
+        length[some] = np.where(cuts, np.nan_to_num(_own_lengths(part)), 0.0)
+    return length
+
+
+def _own_lengths(path: Toolpath) -> Array:
+    """(n,) length in mm of each move, NaN where it is not known."""
+    away, arcs = path.end_mm - path.starts_mm(), path.arcs
+    length = np.sqrt(np.einsum("ij,ij->i", away, away))
     if len(arcs):
-        begin = _starts(path, arcs.move) - arcs.centre_mm
+        begin = path.starts_mm()[arcs.move] - arcs.centre_mm
         begin[np.arange(len(arcs)), (arcs.plane + 2) % 3] = 0.0
         radius = np.sqrt(np.einsum("ij,ij->i", begin, begin))
         length[arcs.move] = np.maximum(length[arcs.move], radius * np.abs(arcs.sweep_rad))
-    for some in spans(len(path)):
-        cuts = cutting_moves(path.part(some.start, some.stop)) & ((path.flag[some] & _AWAY) == 0)
-        length[some] = np.where(cuts, np.nan_to_num(length[some]), 0.0)
-    return length
+    return np.asarray(length)
 
 
 def _starts(path: Toolpath, move: Index) -> Array:
@@ -161,8 +165,9 @@ def _between(length: Array) -> tuple[_Places, float]:
         some = slice(done, int(np.searchsorted(place_mm, ends[-1])))
         inside = np.searchsorted(ends, place_mm[some], side="right")
         move[some], end[some], done = a + inside, ends[inside], some.stop
-    share = (place_mm - (end - length[move])) / length[move]
-    return _Places(move, np.clip(share, 0.0, 1.0), length[move]), whole / _BETWEEN
+    own = picked(length, move)
+    share = (place_mm - (end - own)) / own
+    return _Places(move, np.clip(share, 0.0, 1.0), own), whole / _BETWEEN
 
 
 def _ends(length: Array) -> Iterator[tuple[int, Array]]:

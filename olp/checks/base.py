@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from olp.core.arrays import Array, Index, Mask, distinct
 from olp.core.toolpath import Toolpath
 from olp.findings.catalogue import Finding
+from olp.program.text.columns import spans
 
 #: lines that a finding lists
 _LISTED = 20
@@ -24,9 +27,15 @@ def finding(code: str, message: str, lines: Sequence[int] = (), count: int | Non
     )
 
 
-def first_line(path: Toolpath, moves: Mask) -> list[int]:
-    """The first line of moves; none where there is no move."""
-    return [int(path.line[moves].min())] if moves.any() else []
+def first_lines(path: Toolpath) -> dict[int, int]:
+    """The frames of the moves of a path, ascending, each with the first line of those in it."""
+    none = np.iinfo(np.int64).max
+    lines = np.full(len(path.frames), none)
+    for some in spans(len(path)):
+        frame = path.frame[some]
+        runs = np.flatnonzero(np.diff(frame, prepend=-1))
+        np.minimum.at(lines, frame[runs], np.minimum.reduceat(path.line[some], runs))
+    return {number: line for number, line in enumerate(lines.tolist()) if line < none}
 
 
 def lines_of(path: Toolpath, moves: Mask | Array | Index) -> list[int]:

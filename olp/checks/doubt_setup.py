@@ -6,9 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from olp.checks.base import finding, first_line
+from olp.checks.base import finding, first_lines
 from olp.checks.state import tool_findings
-from olp.core.arrays import distinct
 from olp.core.machine import Machine, Setup, Vector
 from olp.core.toolpath import Frame, Toolpath
 from olp.errormodel.calibration import Calibration
@@ -44,12 +43,12 @@ _HEAVY_KG = 20_000.0
 
 def setup_doubts(path: Toolpath, setup: Setup, calibration: Calibration | None) -> list[Finding]:
     """Doubts about the tools and offsets that a path uses, and about what the job states."""
-    used = distinct(path.frame).tolist() if len(path) else []
-    frames = {number: path.frames[number] for number in used}
+    lines = first_lines(path)
+    frames = {number: path.frames[number] for number in lines}
     findings = [*_axes(setup.machine), *_temperatures(setup, calibration), *_start(setup)]
     findings += _payloads(frames, calibration)
-    findings += _tools(path, frames, setup, calibration)
-    findings += _offsets(path, frames, setup)
+    findings += _tools(path, lines, frames, setup, calibration)
+    findings += _offsets(lines, frames, setup)
     return findings
 
 
@@ -58,7 +57,11 @@ def _name(frame: Frame) -> str:
 
 
 def _tools(
-    path: Toolpath, frames: dict[int, Frame], setup: Setup, calibration: Calibration | None
+    path: Toolpath,
+    first: dict[int, int],
+    frames: dict[int, Frame],
+    setup: Setup,
+    calibration: Calibration | None,
 ) -> Iterator[Finding]:
     machine = setup.machine
     known = [] if calibration is None else [c.tool_mm for c in calibration.curves]
@@ -72,7 +75,7 @@ def _tools(
             continue
         seen.add(frame.tool_mm)
         size = float(np.linalg.norm(frame.tool_mm))
-        lines = first_line(path, path.frame == number)
+        lines = [first[number]]
         what = f"{_name(frame)}: its tip is {size:g} mm from the gauge point"
         mirrored = _mirrored(frame, known, setup)
         inches = [tool for tool in known if _in_inches(frame.tool_mm, tool)]
@@ -135,7 +138,7 @@ def _axes(machine: Machine) -> Iterator[Finding]:
             yield finding("OLP465", f"{what}; expected {least:.3g} to {_FAST_MM_S:g} mm/s")
 
 
-def _offsets(path: Toolpath, frames: dict[int, Frame], setup: Setup) -> Iterator[Finding]:
+def _offsets(first: dict[int, int], frames: dict[int, Frame], setup: Setup) -> Iterator[Finding]:
     longest = max((float(np.abs(f.tool_mm).max()) for f in frames.values()), default=0.0)
     seen: set[str] = set()
     for number, frame in frames.items():
@@ -148,7 +151,7 @@ def _offsets(path: Toolpath, frames: dict[int, Frame], setup: Setup) -> Iterator
             slack = _BEYOND * (high - low) + longest
             if not low - slack <= place <= high + slack:
                 what = f"work_offsets.{frame.work_offset}.{axis}_mm = {place:g} is outside the travel"
-                lines = first_line(path, path.frame == number)
+                lines = [first[number]]
                 yield finding("OLP456", f"{what}; expected {low:g} to {high:g} mm", lines)
 
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from olp.checks.base import finding, first_line, lines_of
-from olp.core.arrays import distinct
+from olp.checks.base import finding, first_lines, lines_of
 from olp.core.machine import Sanity
 from olp.core.toolpath import Kind, Toolpath
 from olp.core.units import UM_PER_MM
@@ -49,12 +48,12 @@ def _structure(calibration: Calibration) -> list[Finding]:
 
 def _map_tools(path: Toolpath, calibration: Calibration, sanity: Sanity) -> list[Finding]:
     findings = []
-    numbers = distinct(path.frame).tolist() if calibration.maps else []
+    lines = first_lines(path) if calibration.maps else {}
     for described in calibration.maps:
         within = _SAME_TOOL_MM if described.kind == "total" else sanity.tool_within_mm
         away = {
             number: float(np.linalg.norm(np.subtract(path.frames[number].tool_mm, described.tool_mm)))
-            for number in numbers
+            for number in lines
         }
         far = {number: tool_vector for number, tool_vector in away.items() if tool_vector > within}
         if not far:
@@ -67,16 +66,17 @@ def _map_tools(path: Toolpath, calibration: Calibration, sanity: Sanity) -> list
             f"10 urad of an axis' rotation are {far[worst] * 1e-5 * UM_PER_MM:.3g} um there, which the map "
             "does not include"
         )
-        findings.append(finding("OLP420", what, first_line(path, np.isin(path.frame, list(far)))))
+        findings.append(finding("OLP420", what, [min(lines[number] for number in far)]))
     return findings
 
 
 def _payloads(path: Toolpath, calibration: Calibration) -> list[Finding]:
     if calibration.compliance or calibration.beams or not len(path):
         return []
+    lines = first_lines(path)
     other = {
         number: path.frames[number].payload_kg
-        for number in distinct(path.frame).tolist()
+        for number in lines
         if path.frames[number].payload_kg != calibration.payload_kg
     }
     if not any(other.values()):
@@ -85,7 +85,7 @@ def _payloads(path: Toolpath, calibration: Calibration) -> list[Finding]:
         f"a payload of {max(other.values()):g} kg is stated; the calibration is for "
         f"{calibration.payload_kg:g} kg and has no compliance"
     )
-    return [finding("OLP422", what, first_line(path, np.isin(path.frame, list(other))))]
+    return [finding("OLP422", what, [min(lines[number] for number in other)])]
 
 
 def _jumps(path: Toolpath, model: ErrorModel, tolerance_mm: float) -> list[Finding]:

@@ -6,8 +6,8 @@ import datetime
 
 import numpy as np
 
-from olp.checks.base import finding, first_line, lines_of
-from olp.core.arrays import Array, Index, Mask, any_in_row, distinct
+from olp.checks.base import finding, first_lines, lines_of
+from olp.core.arrays import Array, Index, Mask, any_in_row
 from olp.core.machine import Job, Machine, Sanity, Setup
 from olp.core.toolpath import Flag, Toolpath
 from olp.errormodel.calibration import Calibration
@@ -88,7 +88,7 @@ def tool_findings(path: Toolpath, calibration: Calibration, sanity: Sanity) -> l
         return findings
     allowed = np.where(known.any(axis=1), 1.0, _AT_GAUGE_POINT) * sanity.tool_within_mm
     seen: set[tuple[int | None, tuple[float, float, float]]] = set()
-    for number in distinct(path.frame).tolist():
+    for number, line in first_lines(path).items():
         frame = path.frames[number]
         distance = np.abs(known - np.array(frame.tool_mm)).max(axis=1)
         key = (frame.tool, frame.tool_mm)
@@ -96,11 +96,10 @@ def tool_findings(path: Toolpath, calibration: Calibration, sanity: Sanity) -> l
             continue
         away = float(distance.min())
         seen.add(key)
-        lines = first_line(path, path.frame == number)
         name = "no tool" if frame.tool is None else f"tool {frame.tool}"
         what = f"the tip of {name} is {away:g} mm from that of every tool of the calibration"
         text = f"{what}; expected at most {float(allowed[distance.argmin()]):g} mm"
-        findings.append(finding("OLP406", text, lines))
+        findings.append(finding("OLP406", text, [line]))
     return findings
 
 

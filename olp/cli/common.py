@@ -14,6 +14,7 @@ import click
 
 from olp.core.errors import InputError, OlpError, UsageError
 from olp.core.optional import require_matplotlib
+from olp.core.spool import Text, text_of
 from olp.core.values import dataclass
 from olp.files.write import is_page
 from olp.findings.catalogue import Finding, worst
@@ -130,11 +131,11 @@ def source(sources: Sources, name: str) -> Source:
     return Source.stream(_read_stdin) if name == STREAM else sources.source(name)
 
 
-def _read_stdin() -> bytes:
+def _read_stdin() -> Text:
     if sys.stdin is None:
         raise InputError("is closed; name a file", file="<stdin>")
     try:
-        return sys.stdin.buffer.read()
+        return text_of(sys.stdin.buffer)
     except OSError as error:
         raise InputError(f"cannot be read ({error.strerror})", file="<stdin>") from None
 

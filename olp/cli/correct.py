@@ -41,6 +41,7 @@ from olp.cli.options import (
 )
 from olp.cli.progress import Report, progress
 from olp.core.errors import ProgramError, UsageError
+from olp.core.spool import in_parts
 from olp.core.values import dataclass
 
 if TYPE_CHECKING:
@@ -104,7 +105,7 @@ def command(program: str | None, machine: str | None, job: str | None, **words: 
     with progress(outputs.quiet) as show:
         try:
             result = correct.run(call.session, call.source, options, show)
-            written: dict[Path, Content] = {Path(name): result.data for name in files_of(outputs.output)}
+            written: dict[Path, Content] = {Path(name): result.text for name in files_of(outputs.output)}
             if outputs.review_file is not None:
                 written[Path(outputs.review_file)] = _review(call, result, options, outputs, show)
         except ProgramError as error:
@@ -167,7 +168,7 @@ def _say(call: Given, result: Correction, outputs: _Outputs, written: Iterable[P
 
     on_stderr = outputs.output == STREAM
     if on_stderr:
-        put(result.data)
+        put(in_parts(result.text))
     if outputs.show_diff:
         put(_diff(result, call.setup.machine, on_stderr), err=on_stderr)
     if outputs.as_json:

@@ -10,6 +10,7 @@ import click
 
 from olp.cli.common import STREAM, Given, files_of
 from olp.core.errors import InputError, UsageError
+from olp.core.spool import whole
 
 if TYPE_CHECKING:
     from olp.files.sources import Source, Sources
@@ -46,7 +47,7 @@ def layout_of(
         return None
     if profile:
         return with_options(load_profile(profile, sources.read), columns, unit=unit).layout
-    layout = detected_layout(first_lines(table.data))
+    layout = detected_layout(first_lines(whole(table.data)))
     if layout is None and not columns:
         raise InputError(
             "does not show which columns hold X, Y and Z; give their names with --column X=.. and so on",

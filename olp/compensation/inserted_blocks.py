@@ -182,7 +182,8 @@ def end_word_edits(program: Program, lines: Index, edits: EditList) -> None:
     part = slice(first, last)
     ending = (words.letter[part] == ord("M")) & (words.decimals[part] == 0)
     index = first + np.flatnonzero(ending & is_in(words.mantissa[part], list(_END_M)))
-    line = np.searchsorted(words.first_word, index, "right")
+    # of the same type: another would be that of a copy of the whole column
+    line = np.searchsorted(words.first_word, index.astype(words.first_word.dtype), "right")
     for i, number in zip(index.tolist(), line.tolist(), strict=True):
         if lines[min(np.searchsorted(lines, number), len(lines) - 1)] != number:
             continue

@@ -248,7 +248,7 @@ class PoleArcs:
         lead, eol = writer.blocks.lead(part.line), writer.program.eol(part.line)
         place = int(writer.program.line_start[part.line - 1])
         _put(edits, place, _pole_words(lead[len(eol) :], numbers), eol, part.row * 8 + 21)
-        name = writer.program.data.upper().index(b"CR", place)
+        name = place + writer.program.data[place : int(words.start[word])].upper().index(b"CR")
         edits.add(name + 1, name + 2, BARE, 0)
         edits.add(int(words.start[word]), int(words.end[word]), BARE, 0)
         writer.tally.inserted_blocks += 1

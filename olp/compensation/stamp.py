@@ -10,6 +10,7 @@ import re
 from collections.abc import Sequence
 
 from olp.core.patterns import pattern
+from olp.core.spool import Text, matches
 from olp.core.version import __version__
 
 #: The stamp with the first digits of the hash of the calibration.
@@ -21,14 +22,14 @@ _ACCEPTED = pattern(_STAMP.pattern + rb" olp \S+ accepted((?: OLP[0-9]{3})+)")
 _REAL_TIME = pattern(rb"olp-real-time ([0-9a-f]{12})")
 
 
-def find_real_time(text: bytes) -> re.Match[bytes] | None:
+def find_real_time(text: Text) -> re.Match[bytes] | None:
     """The stamp in a text that needs its corrections from the control."""
-    return _REAL_TIME.search(text)
+    return next(matches(_REAL_TIME, text), None)
 
 
-def find_stamp(text: bytes) -> re.Match[bytes] | None:
+def find_stamp(text: Text) -> re.Match[bytes] | None:
     """The stamp in a text that is corrected already."""
-    return _STAMP.search(text)
+    return next(matches(_STAMP, text), None)
 
 
 def is_of(stamp: re.Match[bytes], digest: str) -> bool:
@@ -36,10 +37,10 @@ def is_of(stamp: re.Match[bytes], digest: str) -> bool:
     return digest.startswith(stamp.group(1).decode())
 
 
-def accepted_in(text: bytes, digest: str | None) -> frozenset[str]:
+def accepted_in(text: Text, digest: str | None) -> frozenset[str]:
     """The codes of doubts that the stamp of a corrected text accepts for the calibration with this hash: they
     were accepted for that one alone. Without a calibration (None) every stamp holds."""
-    stamp = _ACCEPTED.search(text)
+    stamp = next(matches(_ACCEPTED, text), None)
     if stamp is None or not (digest is None or is_of(stamp, digest)):
         return frozenset()
     return frozenset(stamp.group(2).decode().split())

@@ -124,7 +124,8 @@ class Style:
         """The different `block_start` of lines (n,), and (n,) which of them each has."""
         text, program = np.frombuffer(self.program.data, np.uint8), self.program
         begin, end = program.line_start[line - 1], program.line_end[line - 1]
-        gap = np.minimum(np.append(program.line_start, len(text))[line] - end, 7)
+        behind = program.line_start[np.minimum(line, len(program.line_start) - 1)]
+        gap = np.minimum(np.where(line < len(program.line_start), behind, len(text)) - end, 7)
         last = len(text) - 1
         first, ending = (text[np.minimum(place, last)].astype(np.int64) for place in (begin, end))
         # lines that begin and end alike; those that may begin with a blank are looked at one by one
@@ -152,7 +153,9 @@ class Style:
         start = words.start[word]
         before = text[np.maximum(start - 1, 0)]
         space = np.where(before == 32, 1, np.where(before == 9, 2, 0))
-        opens = words.first_word[np.searchsorted(words.first_word, word)] == word
+        # of the same type: another would be that of a copy of the whole column
+        place = np.searchsorted(words.first_word, word.astype(words.first_word.dtype))
+        opens = words.first_word[place] == word
         space = np.where(opens, self.spaced, space)
         lower = (text[start] & 32) != 0
         return np.asarray(space + 3 * lower.astype(np.int64), np.int64)

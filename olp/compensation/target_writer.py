@@ -14,6 +14,7 @@ from olp.compensation.rows import Rows
 from olp.compensation.writer import Task
 from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import ProgramError
+from olp.core.spool import whole
 from olp.core.toolpath import Flag, Kind
 from olp.core.values import dataclass
 from olp.program.robots.dialect import Replacement, RobotDialect
@@ -70,7 +71,7 @@ class TargetWriter(PointWriter):
             blocks += 1
         if blocks:
             edits += self.dialect.counted(self.program, blocks)
-        return spliced(self.program.data, edits) if edits else None
+        return spliced(whole(self.program.data), edits) if edits else None
 
     def _wanted(self, rows: Rows) -> _Wanted:
         """Numbers of all rows as their targets state them, before they move along with their moves."""

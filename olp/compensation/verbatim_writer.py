@@ -13,6 +13,7 @@ from olp.compensation.point_writer import PointWriter
 from olp.compensation.rows import Rows
 from olp.core.arrays import Index
 from olp.core.errors import ProgramError
+from olp.core.spool import whole
 from olp.program.text.numbers import Number, Placing, number, spliced, written
 
 #: Bytes of the text from one position up to another, and what replaces them.
@@ -32,7 +33,7 @@ class VerbatimWriter(PointWriter):
             return None
         self._digits(rows)
         replacements = [*self._changes(rows), *self._insertions(rows)]
-        return spliced(self.program.data, replacements) if replacements else None
+        return spliced(whole(self.program.data), replacements) if replacements else None
 
     def _changes(self, rows: Rows) -> list[Replacement]:
         """Numbers of the statements that are there."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from olp.core.patterns import pattern
+from olp.core.spool import Text
 
 #: Endings of files of data, by those of the statements that use them.
 _DATA = {".src": ".dat"}
@@ -26,16 +27,17 @@ def joined(statements: bytes, data: bytes, name: str) -> bytes:
     return statements + _BETWEEN % name.encode() + data
 
 
-def divided(path: Path, text: bytes) -> dict[Path, bytes]:
+def divided(path: Path, text: Text) -> dict[Path, Text]:
     """The files that a text is written to: two for one that was joined, where `path` ends as such a program
     does."""
-    data, mark = data_beside(path), _MARK.search(text)
+    data = data_beside(path)
+    mark = None if data is None else _MARK.search(text)
     if data is None or mark is None:
         return {path: text}
     return {path: text[: mark.start()], data: text[mark.end() :]}
 
 
-def place_of(text: bytes, line: int) -> str:
+def place_of(text: Text, line: int) -> str:
     """A line of a text in words, with the name of the file of data where it is in that."""
     mark = _MARK.search(text)
     before = 0 if mark is None else len(_LINE_END.findall(text, 0, mark.end()))

@@ -1,6 +1,6 @@
-"""A long text that is made part by part, and waits in a temporary file until it is read.
-
-Columns of numbers wait there as well. Their pages are in memory while they are looked at, until `unload`."""
+"""Texts that may be long. A long one waits in a temporary file, and its pages are in memory while they are
+looked at, until `unload`. Columns of numbers wait there as well.
+"""
 
 from __future__ import annotations
 
@@ -8,12 +8,15 @@ import contextlib
 import hashlib
 import io
 import mmap
+import re
 import shutil
 import sys
 import tempfile
 import weakref
 from collections.abc import Iterator
-from typing import IO
+from typing import IO, TypeVar
+
+_Kind = TypeVar("_Kind", bound=mmap.mmap)
 
 #: Bytes from which a text waits in a file: shorter ones cost less than to read them again.
 LONG = 1 << 22
@@ -39,17 +42,98 @@ def room() -> int:
         return 0
 
 
+class Mapped(mmap.mmap):
+    """A long text in a temporary file, with what is asked of `bytes`. Nothing changes it."""
+
+    def parts(self) -> Iterator[bytes]:
+        """The text in parts."""
+        for first in range(0, len(self), _PART):
+            yield self[first : first + _PART]
+            unload()
+
+    def count(self, sub: bytes, start: int = 0, end: int | None = None) -> int:
+        """As of `bytes`."""
+        count, end = 0, len(self) if end is None else end
+        while start < end:
+            stop = min(start + _PART, end)
+            part = self[start : min(stop + len(sub) - 1, end)]
+            count += part.count(sub)
+            # one that reaches into the next part is not counted again
+            last = part.rfind(sub, max(stop - start - len(sub) + 1, 0))
+            start = stop if last < 0 else max(stop, start + last + len(sub))
+            unload()
+        return count
+
+    def startswith(self, prefix: bytes | tuple[bytes, ...]) -> bool:
+        """As of `bytes`."""
+        return self[:_PART].startswith(prefix)
+
+    def endswith(self, suffix: bytes | tuple[bytes, ...]) -> bool:
+        """As of `bytes`."""
+        return self[-_PART:].endswith(suffix)
+
+    def __contains__(self, sub: object) -> bool:
+        return isinstance(sub, bytes) and self.find(sub, 0) >= 0
+
+
+#: A text in memory, or a long one in a file. Both are sliced, searched and looked at alike.
+Text = bytes | Mapped
+
+
+def whole(text: Text) -> bytes:
+    """A text in memory."""
+    return text if isinstance(text, bytes) else text[:]
+
+
+def in_parts(text: Text) -> Iterator[bytes]:
+    """A text in parts, which are in memory one by one."""
+    return iter((text,) if text else ()) if isinstance(text, bytes) else text.parts()
+
+
+def sha256_of(text: Text) -> str:
+    """The digest of a text."""
+    digest = hashlib.sha256()
+    for part in in_parts(text):
+        digest.update(part)
+    return digest.hexdigest()
+
+
+def matches(pattern: re.Pattern[bytes], text: Text) -> Iterator[re.Match[bytes]]:
+    """The places in a text that a pattern matches, each of which stands on one line."""
+    if isinstance(text, bytes):
+        yield from pattern.finditer(text)
+        return
+    first = 0
+    while first < len(text):
+        last = text.find(b"\n", first + _PART) + 1 or len(text)
+        yield from pattern.finditer(text, first, last)
+        unload()
+        first = last
+
+
+def text_of(file: IO[bytes]) -> Text:
+    """What is left of a stream."""
+    start = file.read(LONG)
+    if len(start) < LONG:
+        return start
+    spool = Spool(start)
+    while part := file.read(_PART):
+        spool.write(part)
+    return spool.text()
+
+
 class Spool:
     """A text that grows at its end; `size` is the number of its bytes. It is in memory while it has fewer
     than `long` bytes, and where the system has no room for a temporary file. The file ends with it."""
 
-    def __init__(self, data: bytes = b"", long: int | None = None) -> None:
+    def __init__(self, text: Text = b"", long: int | None = None) -> None:
         self._long = LONG if long is None else long
         self._file: IO[bytes] = io.BytesIO()
         self._moved = False
+        self._text: Text | None = None
         self.size = 0
-        if data:
-            self.write(data)
+        for part in in_parts(text):
+            self.write(part)
 
     def write(self, data: bytes | memoryview) -> None:
         """Put bytes behind those that are there."""
@@ -87,13 +171,23 @@ class Spool:
         self._file.seek(0)
         return self._file.read()
 
+    def text(self) -> Text:
+        """The whole text; a long one stays in its file. Nothing grows any more."""
+        if self._text is None:
+            short = isinstance(self._file, io.BytesIO)
+            self._text = self.read() if short else self._map(Mapped, mmap.ACCESS_READ)
+        return self._text
+
     def mapped(self) -> mmap.mmap | memoryview:
         """The whole text without reading it, which may be written over; nothing grows any more. It stays when
         the spool ends."""
         if isinstance(self._file, io.BytesIO):
             return self._file.getbuffer()
+        return self._map(mmap.mmap)
+
+    def _map(self, kind: type[_Kind], access: int = mmap.ACCESS_DEFAULT) -> _Kind:
         try:
-            mapped = mmap.mmap(self._file.fileno(), self.size)
+            mapped = kind(self._file.fileno(), self.size, access=access)
         except OSError:
             raise MemoryError from None
         _MAPPED.append(weakref.ref(mapped, _MAPPED.remove))

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from olp.core.errors import OlpError
+from olp.core.spool import Mapped, Text, in_parts
 
 #: characters of the name of a target in that of its temporary file; a character is up to 4 of its 255 bytes
 _NAME_LENGTH = 40
@@ -28,6 +29,13 @@ HELD = frozenset((5, 32, 33))
 _own: set[str] = set()
 
 _Stamp = tuple[int, int, int, int] | None
+#: A whole file, or its parts in order.
+Content = Text | Iterable[bytes]
+
+
+def parts_of(content: Content) -> Iterable[bytes]:
+    """A file in parts."""
+    return in_parts(content) if isinstance(content, bytes | Mapped) else content
 
 
 class Replacement:
@@ -43,11 +51,11 @@ class Replacement:
         token = f"{os.getpid()}-{os.urandom(4).hex()}"
         self._temporary = self.final.with_name(f"{_prefix(self.final)}{token}.tmp")
 
-    def write(self, data: bytes | Iterable[bytes]) -> None:
+    def write(self, data: Content) -> None:
         """Write the new state, with the owner and the mode of the file. Raises OSError, OlpError."""
         _own.add(self._temporary.name)
         with self._temporary.open("xb") as stream:
-            stream.writelines([data] if isinstance(data, bytes) else data)
+            stream.writelines(parts_of(data))
             stream.flush()
             os.fsync(stream.fileno())
         if self._before is not None and hasattr(os, "chown"):

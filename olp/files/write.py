@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import errno
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
 from olp.core.errors import InputError, OlpError, UsageError
 from olp.core.paired import divided
+from olp.core.spool import Mapped, Text, text_of
 from olp.files import names
 from olp.files.names import not_found
-from olp.files.replacing import HELD, Replacement, remove_stale
+from olp.files.replacing import HELD, Replacement, parts_of, remove_stale
+from olp.files.replacing import Content as Content
 
 PathLike = str | os.PathLike[str]
-#: A whole file, or its parts in order.
-Content = bytes | Iterable[bytes]
 #: Reads a whole file, as `read_bytes` does. `Sources.read` keeps the bytes and opens each file once.
 Reader = Callable[[PathLike], bytes]
 
@@ -32,8 +33,20 @@ def is_page(name: PathLike) -> bool:
 
 def read_bytes(path: PathLike) -> bytes:
     """The bytes of a file. Raises InputError where it cannot be read."""
-    try:
+    with _reading(path):
         return Path(path).read_bytes()
+
+
+def read_text(path: PathLike) -> Text:
+    """A copy of a file that may be long. Raises InputError where it cannot be read."""
+    with _reading(path), Path(path).open("rb") as file:
+        return text_of(file)
+
+
+@contextmanager
+def _reading(path: PathLike) -> Iterator[None]:
+    try:
+        yield
     except FileNotFoundError:
         raise InputError(not_found(str(path)), file=str(path)) from None
     except IsADirectoryError:
@@ -71,9 +84,7 @@ def write_files(
     changed it meanwhile.
     """
     files = {
-        part: content
-        for target, whole in files.items()
-        for part, content in (divided(target, whole) if isinstance(whole, bytes) else {target: whole}).items()
+        part: content for target, whole in files.items() for part, content in _divided(target, whole).items()
     }
     check_targets(files, inputs, force=force)
     waiting: list[Replacement] = []
@@ -82,7 +93,7 @@ def write_files(
         for current, data in files.items():
             if current.exists() and not current.is_file():
                 with current.open("wb") as device:
-                    device.writelines([data] if isinstance(data, bytes) else data)
+                    device.writelines(parts_of(data))
                 continue
             waiting.append(Replacement(current))
             waiting[-1].write(data)
@@ -95,6 +106,10 @@ def write_files(
     finally:
         for replacement in waiting:
             replacement.discard()
+
+
+def _divided(target: Path, content: Content) -> Mapping[Path, Content]:
+    return divided(target, content) if isinstance(content, bytes | Mapped) else {target: content}
 
 
 def check_targets(

@@ -64,7 +64,8 @@ class Dialect:
     """A dialect of programs.
 
     `reader` reads a text. Called with data, setup, this dialect, options, and `words` by keyword, it returns
-    a `Program` (`olp.program.registry.read`). `unroller` writes loops, calls and expressions out. It is
+    a `Program` (`olp.program.registry.read`). With `long_texts` it takes a long text as it is in its file.
+    `unroller` writes loops, calls and expressions out. It is
     called with data, this dialect, and by keyword what `olp.program.rs274.flatten.unroll.flatten` takes. It
     is None where the dialect has none. Where the dialect `expands_cycles` it writes canned cycles as plain
     moves. With `unrolls_with_tools` it takes `setup` too: contours beside which
@@ -100,6 +101,7 @@ class Dialect:
     title: str
     path_mode: str
     reader: Callable[..., Any]
+    long_texts: bool = False
     unroller: Callable[..., Unrolled] | None = None
     unrolls_with_tools: bool = False
     expands_cycles: bool = False

@@ -20,6 +20,7 @@ import numpy.typing as npt
 from olp.core.arrays import Mask
 from olp.core.errors import ProgramError
 from olp.core.patterns import pattern
+from olp.core.spool import Text
 from olp.program.rs274.lexer import WordChunk
 from olp.program.text.line_ends import LINE_END
 
@@ -34,7 +35,7 @@ _MARKED = pattern(
 class Directives:
     """What the comments of a text say, as far as it has been read."""
 
-    def __init__(self, data: bytes) -> None:
+    def __init__(self, data: Text) -> None:
         self._data = data
         self._text = np.frombuffer(data, np.uint8)
         self._lines = np.zeros(0, np.int64)
@@ -100,7 +101,7 @@ def _payload(content: str, line: int) -> float | None:
     return float(match[1])
 
 
-def with_payloads(data: bytes, payloads: Mapping[int, float], comment: tuple[bytes, bytes]) -> bytes:
+def with_payloads(data: Text, payloads: Mapping[int, float], comment: tuple[bytes, bytes]) -> Text:
     """The text with a comment at the end of each line of `payloads` (line from 1, kg), where it has none yet;
     no line is added. Raises ProgramError for a line that the text does not have, and where the text states
     payloads of its own."""

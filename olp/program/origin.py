@@ -12,6 +12,7 @@ import numpy as np
 
 from olp.core.arrays import Index
 from olp.core.errors import OlpError, ProgramError
+from olp.core.spool import Text
 from olp.core.values import dataclass
 
 
@@ -135,18 +136,18 @@ class Unrolled(bytes):
         return unrolled
 
 
-def origin_of(data: bytes) -> Origin | None:
+def origin_of(data: Text) -> Origin | None:
     """Where the lines of a text come from; None where it was not unrolled."""
     return data.origin if isinstance(data, Unrolled) else None
 
 
-def original_of(data: bytes) -> bytes:
+def original_of(data: Text) -> Text:
     """The text of the program that a text was unrolled from, or the text itself."""
     origin = origin_of(data)
     return data if origin is None else b"".join(origin.texts[: origin.lines])
 
 
-def in_original(data: bytes) -> contextlib.AbstractContextManager[None]:
+def in_original(data: Text) -> contextlib.AbstractContextManager[None]:
     """Errors with a line of a text get the line of its original, where it was unrolled."""
     origin = origin_of(data)
     return contextlib.nullcontext() if origin is None else origin.errors()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import field, replace
 from typing import TYPE_CHECKING
@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Array, Index, Mask
+from olp.core.spool import Text
 from olp.core.toolpath import Toolpath
 from olp.core.values import dataclass
 from olp.program.dialect import Dialect
@@ -244,12 +245,11 @@ class Towards:
 class Program:
     """A program as read.
 
-    `content` is the text, or what reads it again (`let_go`). `slot` (n, 3): index of the X, Y, Z word of each
-    move, -1 where omitted. `calculator`: lengths without a decimal point are whole units. `statements` is
-    None for blocks of words. `closings` are brackets that close behind a number, sorted. `tilts` are moves by
-    which the control turns rotary axes to a plane. `levels` are moves of cycles in planes, each with its
-    height along the words, mm. `by_original`: lines are those of the text that this one was unrolled from
-    (`in_original`).
+    `data` is the text. `slot` (n, 3): index of the X, Y, Z word of each move, -1 where omitted. `calculator`:
+    lengths without a decimal point are whole units. `statements` is None for blocks of words. `closings` are
+    brackets that close behind a number, sorted. `tilts` are moves by which the control turns rotary axes to a
+    plane. `levels` are moves of cycles in planes, each with its height along the words, mm. `by_original`:
+    lines are those of the text that this one was unrolled from (`in_original`).
 
     Along contours under cutter compensation `toolpath` is that of the tool. `programmed` is then the program
     with the contour in its place, and (n,) `blocks` the move of it that each move belongs to. `targets` are
@@ -257,7 +257,7 @@ class Program:
     rotary axes turn it.
     """
 
-    content: bytes | Callable[[], bytes]
+    data: Text
     dialect: Dialect
     toolpath: Toolpath
     words: Words | None
@@ -284,17 +284,6 @@ class Program:
     towards: Towards | None = None
 
     @property
-    def data(self) -> bytes:
-        """The text."""
-        return self.content if isinstance(self.content, bytes) else self.content()
-
-    def let_go(self, text: bytes, again: Callable[[], bytes]) -> Program:
-        """The same without its text, which `again` reads where it is asked for. One that was unrolled keeps
-        it, and so does one that has another than `text`, such as one with payloads."""
-        kept = self.content is not text or isinstance(text, Unrolled)
-        return self if kept else replace(self, content=again)
-
-    @property
     def in_blocks(self) -> bool:
         """Whether it is written in blocks, whose words may be omitted."""
         return self.statements is None or self.arc_slots.poles is not None
@@ -318,7 +307,7 @@ class Program:
     @property
     def origin(self) -> Origin | None:
         """Where the lines of the text come from; None where it was not unrolled."""
-        return self.content.origin if isinstance(self.content, Unrolled) else None
+        return self.data.origin if isinstance(self.data, Unrolled) else None
 
     def in_original(self) -> Program:
         """The same with the lines of the text that this one was unrolled from, as people are told them. Lines

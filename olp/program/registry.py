@@ -8,11 +8,13 @@ it is asked for: its name and its signs are known without.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from importlib import import_module
 
 from olp.core.errors import ProgramError, UsageError
 from olp.core.machine import Setup
 from olp.core.patterns import pattern
+from olp.core.spool import Text, in_parts, matches, whole
 from olp.core.values import dataclass
 from olp.program.bounds import bounded
 from olp.program.dialect import Dialect
@@ -92,7 +94,7 @@ _PAYLOAD = pattern(rb"(?i)\bolp[ \t]+payload\b")
 
 
 def read(
-    data: bytes, setup: Setup, dialect: Dialect, options: Options | None = None, *, words: bool = True
+    data: Text, setup: Setup, dialect: Dialect, options: Options | None = None, *, words: bool = True
 ) -> Program:
     """Read a whole program. Raises ProgramError with the line of the first statement that cannot be read
     correctly; of an unrolled text with the line, and the file, that it was made from.
@@ -102,11 +104,14 @@ def read(
     with in_original(data):
         if not dialect.payload_comments:
             _refuse_payloads(data, setup, dialect)
-        program: Program = dialect.reader(data, setup, dialect, options or Options(), words=words)
+        text = data if dialect.long_texts else whole(data)
+        program: Program = dialect.reader(text, setup, dialect, options or Options(), words=words)
+        if text is not data and program.data is text:
+            program = replace(program, data=data)
         return bounded(program)
 
 
-def _refuse_payloads(data: bytes, setup: Setup, dialect: Dialect) -> None:
+def _refuse_payloads(data: Text, setup: Setup, dialect: Dialect) -> None:
     """Raises ProgramError where the payload changes inside a program whose language has no such comment."""
     what = (
         f"{dialect.title} programs have one payload; give payload_kg in the job file, and split the program"
@@ -116,7 +121,8 @@ def _refuse_payloads(data: bytes, setup: Setup, dialect: Dialect) -> None:
             f"[[payloads]] of the job file: {what}", line=min(setup.job.payloads), code="OLP550"
         )
     # a search of a text without the word takes 30 ns a byte
-    comment = _PAYLOAD.search(data) if b"payload" in data.lower() else None
+    stated = any(b"payload" in part.lower() for part in in_parts(data))
+    comment = next(matches(_PAYLOAD, data), None) if stated else None
     if comment:
         raise ProgramError(
             f"a comment changes the payload: {what}",
@@ -152,7 +158,7 @@ def ending_of(file: str) -> str:
     return _VERSION.sub("", file).rpartition(".")[2].lower()
 
 
-def dialect_of(name: str | None, control: Dialect, data: bytes, file: str) -> Dialect:
+def dialect_of(name: str | None, control: Dialect, data: Text, file: str) -> Dialect:
     """The dialect of a program: the one that is named, else what its text and the ending of its file show,
     else that of the control. An ending that programs of the control have too shows no other dialect. Raises
     UsageError for an unknown name, ProgramError where text and ending contradict each other or leave several
@@ -193,7 +199,7 @@ def _by_ending(file: str) -> str | None:
     return next((name for name, known in _KNOWN.items() if ending in known.signs.endings), None)
 
 
-def _by_text(data: bytes) -> set[str]:
+def _by_text(data: Text) -> set[str]:
     """The dialects of statements that a text may be written in; none where it has no statements."""
     start = data[:_LOOKED_AT]
     blocks = signs.ASIDE.sub(b"", start) if b"(" in start else start

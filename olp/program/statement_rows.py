@@ -257,7 +257,7 @@ class StatementCollector(PathColumns):
         )  # fmt: skip
         count = len(path.arcs)
         return Program(
-            content=self.data,
+            data=self.data,
             dialect=self.dialect,
             toolpath=path,
             words=self._words() if self.keep_words else None,

@@ -21,6 +21,7 @@ from typing import Any
 from olp.core.errors import ConfigError, ProgramError, Reason, Refused
 from olp.core.machine import ZERO, Setup, Tool, WorkOffset
 from olp.core.patterns import pattern
+from olp.core.spool import Text, whole
 from olp.core.values import dataclass
 from olp.findings.catalogue import RULES
 from olp.program.dialect import Dialect, Options
@@ -76,7 +77,7 @@ def as_it_is(file: str | None, text: bytes) -> bytes:
 
 
 def read_all(
-    data: bytes,
+    data: Text,
     setup: Setup,
     dialect: Dialect,
     options: Options | None = None,
@@ -104,13 +105,13 @@ def read_all(
         from olp.program.foreign import recognised
 
         certain = dialect.signs.own is not None or setup.job.described is not None
-        other = recognised(data, languages=not certain, own=dialect.languages)
+        other = recognised(whole(data), languages=not certain, own=dialect.languages)
         if other is not None:
             raise other from None
         # an unrolled text has no statements of its own
         if error.line is None or isinstance(data, Unrolled):
             raise
-        survey = _Survey(data, setup, dialect, options, unroll)
+        survey = _Survey(whole(data), setup, dialect, options, unroll)
         if survey.ran_long(error):
             raise
         if unroll is not None and not expands:
@@ -123,7 +124,7 @@ def read_all(
         raise survey.error(complete=complete) from None
 
 
-def _refuse_foreign(data: bytes, program: Program) -> None:
+def _refuse_foreign(data: Text, program: Program) -> None:
     """Raise ProgramError for a file of another kind that happens to be readable.
 
     It has no move, as a document that begins with %. Or it has bytes of no text, as UTF-16 without its mark.
@@ -132,7 +133,7 @@ def _refuse_foreign(data: bytes, program: Program) -> None:
     if not len(program.toolpath) or head.count(b"\0") * _ZERO_SHARE > len(head):
         from olp.program.foreign import recognised
 
-        other = recognised(data, languages=False)
+        other = recognised(whole(data), languages=False)
         if other is not None:
             raise other
 

@@ -92,7 +92,7 @@ class Moves:
         x, y, z = (float("nan") if v is None else v for v in setup.job.start_mm)
         count = len(kind)
         return Program(
-            content=data,
+            data=data,
             dialect=dialect,
             toolpath=Toolpath(
                 kind=kind, flag=all_["flag"], line=all_["line"], frame=all_["frame"], end_mm=all_["end"],

@@ -15,6 +15,7 @@ from olp.core.arrays import Array, Index
 from olp.core.errors import naming
 from olp.core.machine import Setup
 from olp.core.progress import Progress, silent
+from olp.core.spool import Text
 from olp.core.units import MM_PER_UM
 from olp.core.values import dataclass
 from olp.errormodel.known import KnownErrors
@@ -206,7 +207,7 @@ class _Shown:
     plan: Retiming | None
 
 
-def _corrected(session: Session, data: bytes, loaded: Loaded, options: ViewOptions, tell: Progress) -> Run:
+def _corrected(session: Session, data: Text, loaded: Loaded, options: ViewOptions, tell: Progress) -> Run:
     correcting = CorrectOptions(**options.proof(), outside_box=options.outside_box)
     return correct_program(session.sources, session.sources.source(data), loaded, correcting, tell)
 

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Index
+from olp.core.spool import whole
 from olp.core.values import dataclass
 from olp.program.program import Program
 from olp.program.text.line_ends import LINE_END_TEXT
@@ -123,7 +124,7 @@ def aligned(nominal: Program, corrected: Program, groups: Index, samples: Sample
     rows = _pairs(nominal, corrected, *_anchors(nominal, corrected, groups))
     last = _last(nominal, nominal.toolpath.line[samples.move])
     last_corrected = _last(corrected, corrected.toolpath.line[samples.part])
-    return Listing(nominal.data, shown(corrected.data), *rows, last, last_corrected)
+    return Listing(whole(nominal.data), shown(whole(corrected.data)), *rows, last, last_corrected)
 
 
 def _last(program: Program, line: Small) -> Small:

@@ -20,6 +20,7 @@ from olp.compensation.stamp import find_stamp, is_of
 from olp.core.errors import ProgramError, UsageError
 from olp.core.machine import Setup
 from olp.core.progress import Progress, silent
+from olp.core.spool import Text
 from olp.core.units import MM_PER_UM, RAD_PER_URAD
 from olp.core.values import dataclass
 from olp.errormodel.known import KnownErrors
@@ -88,7 +89,7 @@ class _Case:
     those of `data`, the given text: the corrected program, or the nominal one that is `corrected_here`."""
 
     name: str
-    data: bytes
+    data: Text
     written: Program
     run: Run | None
     proof: Proof | None
@@ -381,7 +382,7 @@ def _stamps(case: _Case) -> list[Finding]:
     return findings
 
 
-def _line(data: bytes, offset: int) -> int:
+def _line(data: Text, offset: int) -> int:
     return data.count(b"\n", 0, offset) + 1
 
 
@@ -418,7 +419,7 @@ def _report(
     }
 
 
-def _head(name: str, data: bytes, loaded: Loaded, options: CheckOptions) -> dict[str, Any]:
+def _head(name: str, data: Text, loaded: Loaded, options: CheckOptions) -> dict[str, Any]:
     """The parts of a report that a refused program has too."""
     machine, calibration = loaded.setup.machine, loaded.calibration
     return {

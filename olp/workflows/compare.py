@@ -20,6 +20,7 @@ from olp.core.arrays import Array, Index, Mask, read_only
 from olp.core.errors import InputError, UsageError
 from olp.core.machine import Setup
 from olp.core.progress import Progress, silent
+from olp.core.spool import whole
 from olp.core.units import UM_PER_MM
 from olp.core.values import dataclass
 from olp.files.point_profile import PointProfile
@@ -347,7 +348,7 @@ def _with(report: dict[str, Any], findings: Sequence[Finding]) -> dict[str, Any]
 def _nominal_side(nominal: Source, session: Session | None, options: CompareOptions) -> Side:
     """A table of points is a path, or poses; with a machine whose dialect has points, it is a program."""
     nominal.load()
-    name, data = nominal.name, nominal.data
+    name, data = nominal.name, whole(nominal.data)
     points = layout_of(data) is not None
     if session is None and not points:
         raise UsageError(

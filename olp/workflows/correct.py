@@ -21,7 +21,7 @@ from olp.core.arrays import Array, Index, read_only
 from olp.core.errors import AlreadyCorrected, ProgramError, UsageError
 from olp.core.machine import Setup
 from olp.core.progress import Progress, part, silent
-from olp.core.spool import Spool
+from olp.core.spool import Spool, Text, whole
 from olp.core.values import dataclass
 from olp.errormodel.known import KnownErrors
 from olp.files.sources import Source, Sources
@@ -98,17 +98,22 @@ class Correction(Judged):
     @property
     def data(self) -> bytes:
         """The corrected text."""
+        return whole(self.text)
+
+    @property
+    def text(self) -> Text:
+        """The corrected text, which is in a temporary file where it is long."""
         return self._data.data
 
     @property
     def plain(self) -> bytes:
         """The corrected text, unrolled where its loops and subprograms are kept."""
-        return self._plain.data
+        return whole(self._plain.data)
 
     @property
     def nominal(self) -> bytes:
         """The text that was corrected."""
-        return self._nominal.data
+        return whole(self._nominal.data)
 
     def to_text(self) -> str:
         """The report as `olp correct` prints it."""
@@ -120,7 +125,7 @@ class Correction(Judged):
         """Write the corrected program, whole or not at all, also where it is above tolerance: look at
         `report["verdict"]["ok"]` first. An existing file is overwritten with `force` only, an input never.
         Returns the path. Raises as `olp.files.write.write_files`."""
-        write_bytes(path, self.data, force=force, inputs=self.inputs)
+        write_bytes(path, self.text, force=force, inputs=self.inputs)
         return Path(path)
 
 
@@ -214,7 +219,6 @@ def corrected(
     loaded = loaded.reading(program)
     done = _rewritten(sources, program, loaded, options, refuse_doubts, tell)
     digest = digest_of(done.source.data)
-    done.source.let_go()
     tell("prove", 0.7)
     reading = Options(tell=part(tell, 0.7, 0.78, "prove"))
     held = outside if options.outside_box == "hold" else None
@@ -229,7 +233,6 @@ def corrected(
                 raise
             with done.nominal.errors():
                 raise _refused_contour(error, done, text.data) from None
-        second = second.let_go(text.data, lambda: text.data)
         pair = Pair(done.nominal, done.source, digest, second, done.text, done.uncorrected)
         return proved(pair, loaded.held(), options, done.doubts, outside=held, notes=notes, tell=told)
 
@@ -252,7 +255,7 @@ def _as_good(kept: Run, unrolled: Run) -> bool:
     return not unrolled.proof.holds and kept.proof.largest_mm <= unrolled.proof.largest_mm + 2 * digit_mm
 
 
-def _refuse_stamped(data: bytes) -> None:
+def _refuse_stamped(data: Text) -> None:
     stamp = find_stamp(data)
     if stamp:
         raise AlreadyCorrected(
@@ -317,7 +320,7 @@ def _rewritten(
     source, program = read_kept(source.holding(bytes(outer)))
     inner = unrolled_unasked(source, options)
     data = outer if inner is None else through(inner, outer)
-    program = replace(program, content=data)
+    program = replace(program, data=data)
     done = _written(source.holding(data), program, inner, loaded, options, refuse_doubts, tell)
     if done.text is None:
         raise refusal
@@ -363,13 +366,12 @@ def _written(
         if whole is not None and stamp and (kept.changed or always):
             whole = stamped(whole, stamp, program.eol(1), loaded.dialect.first)
         flow, text = Flow(kept), None if whole is None else Spool(whole)
-    nominal = nominal.let_go(source.data, lambda: source.data)
     parts = written.parts if program.blocks is None else Packed.of(written.parts[program.blocks])
     made = None if text is None else Source.made(text)
     return _Rewritten(source, nominal, made, written.uncorrected, parts, written.tally, doubts, flow, flat)
 
 
-def _refused_contour(error: ProgramError, done: _Rewritten, text: bytes) -> ProgramError:
+def _refused_contour(error: ProgramError, done: _Rewritten, text: Text) -> ProgramError:
     """The refusal of a contour that the control would take but for the digits of its correction, from that of
     the corrected `text`."""
     path, line, origin = done.nominal.toolpath, error.line or 1, origin_of(text)

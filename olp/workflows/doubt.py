@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 from olp.checks.doubt import Inputs, doubts
 from olp.compensation.stamp import accepted_in
 from olp.core.errors import Doubtful, InputError, UsageError
+from olp.core.spool import Text
 from olp.findings.catalogue import DOUBTS, RULES, Finding
 from olp.findings.rule import Severity
 from olp.program.origin import Origin
@@ -32,7 +33,7 @@ def doubted(
     date: datetime.date | None,
     *,
     name: str = "",
-    stamped: bytes = b"",
+    stamped: Text = b"",
     refuse: bool = True,
 ) -> tuple[Finding, ...]:
     """The doubts of a run; those that the call or the stamp of the text `stamped` accepts are less severe.

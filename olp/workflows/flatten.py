@@ -11,6 +11,7 @@ from pathlib import Path
 
 from olp.core.errors import ProgramError, UsageError
 from olp.core.machine import Setup
+from olp.core.spool import whole
 from olp.core.values import dataclass
 from olp.files.sources import Source, Sources
 from olp.program.dialect import Dialect
@@ -121,7 +122,7 @@ def unroller(
             given = subprograms(wanted)
             return None if given is None else (given[0], change(*given))
 
-        given = change(None, program.data)
+        given = change(None, whole(program.data))
         text = unrolled(
             with_payloads(given, setup.job.payloads, dialect.comment), dialect.set_as(setup.machine),
             subprograms=changed,

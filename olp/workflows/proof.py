@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime
-import hashlib
 from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +22,7 @@ from olp.core.arrays import Index
 from olp.core.errors import ProgramError, naming
 from olp.core.machine import Setup
 from olp.core.progress import Progress, part, silent
+from olp.core.spool import Text, sha256_of
 from olp.core.toolpath import Flag, Toolpath
 from olp.core.units import MM_PER_UM, UM_PER_MM
 from olp.core.values import dataclass
@@ -154,7 +154,6 @@ def proved(
     correction of the first, or not with the block-delete switch on."""
     tolerance_mm = options.tolerance_um * MM_PER_UM
     written = _written(pair.text.data)
-    pair.text.let_go()
     proof = _prove(
         pair.nominal, pair.corrected, loaded, pair.uncorrected, tolerance_mm,
         last_digit_mm(pair.corrected, loaded.setup), part(tell, 0.0, 0.8),
@@ -188,7 +187,6 @@ def proved(
     )
     source = pair.source.short, pair.sha256
     report = report_of(first, source, loaded, proof, table, findings, options.tolerance_um)
-    pair.source.let_go()
     report["corrected"] = written
     report["largest_correction_um"] = largest_mm * UM_PER_MM
     if assessment:
@@ -342,14 +340,14 @@ def _multiple(length_mm: float, of_mm: float) -> bool:
     return abs(length_mm / of_mm - round(length_mm / of_mm)) < 1e-6 and length_mm > 0.5 * of_mm
 
 
-def _written(text: bytes) -> dict[str, Any]:
+def _written(text: Text) -> dict[str, Any]:
     """What a report says of a corrected text."""
-    return {"sha256": hashlib.sha256(text).hexdigest(), "lines": text.count(b"\n")}
+    return {"sha256": sha256_of(text), "lines": text.count(b"\n")}
 
 
-def digest_of(data: bytes) -> str:
+def digest_of(data: Text) -> str:
     """The digest of a nominal text; of one that was unrolled that of its original."""
-    return hashlib.sha256(original_of(data)).hexdigest()
+    return sha256_of(original_of(data))
 
 
 def last_digit_mm(program: Program, setup: Setup) -> float:

@@ -7,6 +7,7 @@ import re
 from olp.compensation.stamp import find_real_time, find_stamp, is_of
 from olp.core.errors import AlreadyCorrected, ConfigError, ProgramError
 from olp.core.machine import Machine
+from olp.core.spool import Text
 from olp.errormodel.calibration import Calibration
 from olp.files.real_time import refuse_other
 from olp.files.sources import Source
@@ -47,7 +48,7 @@ def refuse_stamped(real_time: str | None, digest: str, program: Source) -> None:
         )
 
 
-def _line(data: bytes, stamp: re.Match[bytes]) -> int:
+def _line(data: Text, stamp: re.Match[bytes]) -> int:
     return data.count(b"\n", 0, stamp.start()) + 1
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from olp.core.errors import ProgramError, Reason, Refused
 from olp.core.machine import Setup
+from olp.core.spool import in_parts
 from olp.files.sources import Source, Sources
 from olp.findings.catalogue import RULES, Finding
 from olp.program.dialect import Dialect, Options
@@ -61,7 +62,7 @@ def read(
             parsed = survey()
     except ProgramError as error:
         raise _with_control(error, dialect) if setup.machine.assumed else error from None
-    if not program.data or program.data.isspace():
+    if all(part.isspace() for part in in_parts(program.data)):
         raise ProgramError("the file is empty; expected a program of at least one block", code="OLP501")
     return program if unroll is None else program.holding(parsed.data), parsed
 

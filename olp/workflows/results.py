@@ -16,7 +16,7 @@ from olp.checks.doubt_size import box_doubts
 from olp.compensation.stamp import find_stamp, stamp_line
 from olp.core.errors import AlreadyCorrected, InputError, UsageError
 from olp.core.machine import Setup
-from olp.core.spool import Spool
+from olp.core.spool import Spool, whole
 from olp.core.units import UM_PER_MM
 from olp.core.values import dataclass
 from olp.files.point_profile import load_profile
@@ -140,7 +140,7 @@ def run(session: Session, results: Source, options: ResultOptions) -> ResultCorr
 def _corrected(
     results: Source, loaded: Loaded, options: ResultOptions, layout: Layout | None
 ) -> ResultCorrection:
-    data = results.data
+    data = whole(results.data)
     stamp = find_stamp(data)
     if stamp:
         raise AlreadyCorrected(

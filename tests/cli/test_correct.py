@@ -31,7 +31,7 @@ class Fake:
     findings: tuple[Finding, ...] = ()
     raises: Exception | None = None
     calls: list[tuple[tuple[Any, ...], dict[str, Any]]] = field(default_factory=list)
-    data: bytes = CORRECTED
+    text: bytes = CORRECTED
     plain: bytes = CORRECTED
     nominal: bytes = b"G21\r\nG1 X1. F100\r\n"
     report: dict[str, Any] = field(default_factory=lambda: dict(REPORT))

@@ -204,55 +204,46 @@ def test_a_stream_is_read_once_and_when_it_is_wanted() -> None:
     assert next(texts, None) is None
 
 
-def test_a_long_file_is_let_go_and_read_again_as_it_was(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_long_file_stays_as_it_was_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(spool, "LONG", 3)
     path = tmp_path / "part.ngc"
     path.write_bytes(b"one")
     files = Sources()
     source = files.source(path)
     source.load()
-    source.let_go()
     path.write_bytes(b"two")
-    assert source.data == b"one", "a short text is kept"
-    monkeypatch.setattr(spool, "LONG", 3)
-    source.let_go()
-    assert files.exists(path)
-    assert files.there() == frozenset()
-    with pytest.raises(InputError, match=r"part\.ngc: was changed by another program during this call"):
-        files.parcel()
-    path.write_bytes(b"one")
-    assert files.parcel() == {str(path): b"one"}
-    assert source.data is files.read(path)
+    assert isinstance(source.data, spool.Mapped) and source.data is files.text(path)
+    assert files.read(path) == spool.whole(source.data) == b"one"
+    assert files.digest(path) == hashlib.sha256(b"one").digest()
+    assert files.parcel() == {str(path): b"one"} and files.there() == frozenset()
+    assert files.source(source.data).data is source.data
 
 
-def test_a_long_stream_is_let_go_and_read_again(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_made_text_is_in_memory_where_it_is_short(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert Source.made(spool.Spool(b"text")).data == b"text"
     monkeypatch.setattr(spool, "LONG", 4)
-    source = Source.stream(lambda: bytes([*b"text"]))
-    first = source.data
-    source.let_go()
-    again = source.data
-    assert again == first
-    assert again is not first
-    assert again is source.data, "it is kept until it is let go again"
-    source.let_go()
-    assert source.data == first
-    assert Source.made(spool.Spool(first)).data == first
+    made = Source.made(spool.Spool(b"text"))
+    assert isinstance(made.data, spool.Mapped) and made.data is made.data and made.data[:] == b"text"
 
 
-def test_a_program_that_changed_since_it_was_corrected_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("name", ["part.ngc", "part.apt"])
+def test_a_correction_keeps_a_long_text_in_a_file(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    texts = {
+        "part.ngc": "G21 G90 G54\nG43 H1\nG0 X0 Y0 Z20\nG1 X100 F600 (olp off)\nY80 Z30\nM2\n",
+        "part.apt": "LOADTL/1\nRAPID\nGOTO/0,0,20\nFEDRAT/600\nGOTO/100,0,20\nGOTO/100,80,30\nFINI\n",
+    }
+    path = tmp_path / name
+    path.write_text(texts[name])
+    short = olp.correct(path, FOLDER / "machine.toml")
     monkeypatch.setattr(spool, "LONG", 1)
-    path = tmp_path / "part.ngc"
-    path.write_text("G21 G90 G54\nG43 H1\nG0 X0 Y0 Z20\nG1 X100 F600\nY80 Z30\nM2\n")
-    done = olp.correct(path, FOLDER / "machine.toml")
-    assert done.nominal == path.read_bytes()
-    assert done.data == done.plain == olp.correct(done.nominal, FOLDER / "machine.toml").data
-    done = olp.correct(path, FOLDER / "machine.toml")
-    path.write_bytes(b"G0 X1\n" + done.data)
-    with pytest.raises(InputError, match="was changed by another program during this call"):
-        _ = done.nominal
+    long = olp.correct(path, FOLDER / "machine.toml")
+    path.write_bytes(b"G0 X1\n")
+    assert all(isinstance(text, spool.Mapped) for text in (long.text, long._nominal.data, long._plain.data))
+    assert (long.data, long.nominal, long.plain) == (short.data, texts[name].encode(), short.plain)
+    assert long.report == short.report
+    assert long.write(tmp_path / "out").read_bytes() == short.data
 
 
 def test_a_missing_file_is_said_when_it_is_wanted(tmp_path: Path) -> None:

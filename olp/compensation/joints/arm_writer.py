@@ -17,6 +17,7 @@ from olp.compensation.tally import Tally
 from olp.core.arrays import Index
 from olp.core.errors import ProgramError
 from olp.core.machine import ZERO, Vector
+from olp.core.spool import whole
 from olp.core.values import dataclass
 from olp.kinematics.parallel_arm import arm_of
 from olp.kinematics.poses import Poses, rotation_vector, turned
@@ -115,7 +116,7 @@ class _Writer:
         blocks = self.tally.inserted_blocks - self.clones
         if blocks:
             edits += self.dialect.counted(self.program, blocks)
-        return WrittenJoints(spliced(self.program.data, edits), self.tally, parts)
+        return WrittenJoints(spliced(whole(self.program.data), edits), self.tally, parts)
 
     def _target_of(self, row: int) -> Target:
         return self.targets.targets[self._use(row).target]

@@ -10,6 +10,7 @@ from olp.compensation.joints.planning import JointPlan
 from olp.compensation.joints.writer import WrittenJoints
 from olp.compensation.tally import Tally
 from olp.core.arrays import Array, Index, Mask
+from olp.core.spool import whole
 from olp.program.pointlist.axis_list import AxisList
 from olp.program.text.numbers import MOST_DECIMALS, number, spliced, written
 
@@ -37,7 +38,7 @@ def write_list(path: JointPath, plan: JointPlan) -> WrittenJoints:
         return WrittenJoints(None, tally, np.ones(len(path), np.int64))
     tally.changed_words = int((change & head[:, None]).sum())
     tally.inserted_blocks = int(insert.sum())
-    text = spliced(path.program.data, edits)
+    text = spliced(whole(path.program.data), edits)
     return WrittenJoints(text, tally, np.bincount(move[head | insert], minlength=len(path)))
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from olp.core.arrays import Array, Index, distinct
 from olp.core.errors import CannotCompute, ProgramError
+from olp.core.spool import whole
 from olp.core.values import dataclass
 from olp.program.feeds.moves import lengths_mm, numbers
 from olp.program.feeds.stated import feed_words, programmed
@@ -71,7 +72,7 @@ def write_feeds(
     governed = feed_words(program, words, block_delete=block_delete)
     word, word_line, move, owner = governed.word, governed.line, governed.move, governed.owner
     if not len(move):
-        return FeedsWritten(program.data, len(word), 0, 0, 0, ())
+        return FeedsWritten(whole(program.data), len(word), 0, 0, 0, ())
     of_move = program.toolpath.line[move].astype(np.int64)
     untimed = np.bincount(owner, np.isnan(lengths_mm(program.toolpath)[move]), len(word)) > 0
     place = np.minimum(np.searchsorted(line, of_move), max(len(line) - 1, 0))

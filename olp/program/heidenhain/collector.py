@@ -97,7 +97,7 @@ class Collected(Collector):
         words = self._words() if self.keep_words else None
         rest, dwell = self._rests(path.line)
         return Program(
-            content=self.data,
+            data=self.data,
             dialect=dialect,
             toolpath=path,
             words=words,

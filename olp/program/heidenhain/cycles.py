@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 
 from olp.core.errors import ProgramError
+from olp.core.spool import Text
 from olp.core.values import dataclass
 from olp.program.heidenhain.modes import NAN, Modes
 from olp.program.heidenhain.statements import CycleText, Statement
@@ -98,7 +99,7 @@ class Cycle:
         text = self.values[number].upper().lstrip(b"+-")
         return not text.startswith(b"Q") or text.decode("latin-1") in modes.parameters
 
-    def definition(self, modes: Modes, data: bytes) -> tuple[int, int, int, int, float]:
+    def definition(self, modes: Modes, data: Text) -> tuple[int, int, int, int, float]:
         """The bytes that define the cycle, those of its surface, and that in numbers of the program. Bytes
         are -1 where none states it, the surface NaN where the cycle has none."""
         if self.number not in BY_SURFACE:

@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Sequence
 
 from olp.core.errors import ProgramError
+from olp.core.spool import whole
 from olp.core.toolpath import Interpolated
 from olp.core.units import MM_PER_INCH
 from olp.program.dialect import Options
@@ -231,7 +232,7 @@ class Events:
 
     def _section(self, label: bytes) -> list[Statement] | None:
         if label not in self.sections:
-            self.sections[label] = section_of(self.collector.data, label)
+            self.sections[label] = section_of(whole(self.collector.data), label)
         return self.sections[label]
 
     # -- cycles --------------------------------------------------------------------------------------

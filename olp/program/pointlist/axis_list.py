@@ -182,7 +182,7 @@ def _program(data: bytes, line: Index, kind: Kind) -> Program:
     lines = len(line_start) - (line_start[-1] == len(data))
     line_start, line_end = line_start[:lines].astype(np.int32), line_end[:lines].astype(np.int32)
     return Program(
-        content=data, dialect=DIALECT,
+        data=data, dialect=DIALECT,
         toolpath=Toolpath(
             kind=np.full(count, kind, np.uint8), flag=np.zeros(count, np.uint8), line=line.astype(np.int32),
             frame=np.zeros(count, np.int32), end_mm=np.full((count, 3), np.nan), frames=(Frame(),),

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import ProgramError
+from olp.core.spool import Text
 from olp.core.toolpath import Toolpath
 from olp.program.holes import Holes
 from olp.program.path_columns import PathColumns
@@ -31,7 +32,7 @@ class Collector(PathColumns):
     move. `remarks` leads from a name to the first line of it and a text.
     """
 
-    def __init__(self, data: bytes, start: tuple[float, float, float], *, keep_words: bool) -> None:
+    def __init__(self, data: Text, start: tuple[float, float, float], *, keep_words: bool) -> None:
         super().__init__(keep_words=keep_words)
         self.data = data
         self.start = start
@@ -75,7 +76,7 @@ class Collector(PathColumns):
         path = self.toolpath(state.frames, self.start)
         line_start, line_end = self._line_bounds()
         return Program(
-            content=self.data,
+            data=self.data,
             dialect=state.profile,
             toolpath=path,
             words=self._words() if self.keep_words else None,

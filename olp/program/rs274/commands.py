@@ -17,6 +17,7 @@ import numpy as np
 from olp.core.arrays import Index, Mask, is_in
 from olp.core.errors import ProgramError
 from olp.core.patterns import pattern
+from olp.core.spool import Text, matches
 from olp.core.values import dataclass
 from olp.program.rs274.lexer import WordChunk
 
@@ -59,10 +60,10 @@ class Commands:
     extruder_follows: bool
     arc_words: str
 
-    def feeds(self, data: bytes) -> bool:
+    def feeds(self, data: Text) -> bool:
         """Whether a text moves the extruder: else its G1 are cuts, and not travels where nothing is fed."""
         move = rb"(?im)^[ \t]*(?:N[ \t]*\d+[ \t]*)?G[ \t]*0*[0-3][ \t]*(?![\d.])[^;\r\n]*"
-        return re.search(move + self.extruder.encode(), data) is not None
+        return next(matches(re.compile(move + self.extruder.encode()), data), None) is not None
 
 
 def own_words(chunk: WordChunk) -> Mask:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from olp.core.arrays import Index
 from olp.core.machine import Setup
+from olp.core.spool import Text
 from olp.program.dialect import Options
 from olp.program.kept import Kept
 from olp.program.origin import Unrolled
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from olp.program.touches import Touches
 
 
-def read_blocks(data: bytes, setup: Setup, profile: Profile, options: Options, *, words: bool) -> Program:
+def read_blocks(data: Text, setup: Setup, profile: Profile, options: Options, *, words: bool) -> Program:
     """`olp.program.rs274.reader.read`, with the path of the tool along contours."""
     from olp.program.contours.program import with_tool_path
     from olp.program.rs274.reader import read

@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from olp.core.arrays import Index, Mask, distinct, is_in
 from olp.core.progress import Progress, silent
+from olp.core.spool import Text, in_parts, matches, unload
 from olp.core.values import dataclass
 from olp.program.rs274.block_text import CONTROL, PLAIN, BlockText
 from olp.program.text.line_ends import LONE_CR
@@ -62,15 +63,15 @@ class WordChunk:
     first_line: int
 
 
-def chunks(data: bytes, rules: BlockText, size: int = CHUNK, tell: Progress = silent) -> Iterator[WordChunk]:
+def chunks(data: Text, rules: BlockText, size: int = CHUNK, tell: Progress = silent) -> Iterator[WordChunk]:
     """Lex a whole text, chunk by chunk, each ending at a line end. Lines that the `rules` refuse are odd."""
-    if rules.cr_ends_line and b"\r" in data:
+    if rules.cr_ends_line and next(matches(LONE_CR, data), None) is not None:
         data = LONE_CR.sub(b"\n", data)
     # in parts, as no copy of the whole is needed
-    plain = not any(data[a : a + CHUNK].translate(None, PLAIN) for a in range(0, len(data), CHUNK))
-    odd = () if plain or rules.odd_bytes is None else rules.odd_bytes.finditer(data)
+    plain = not any(part.translate(None, PLAIN) for part in in_parts(data))
+    odd = () if plain or rules.odd_bytes is None else matches(rules.odd_bytes, data)
     strange = np.array([match.start() for match in odd], np.int64)
-    if not rules.skips_control and (plain or not CONTROL.search(data)):
+    if not rules.skips_control and (plain or next(matches(CONTROL, data), None) is None):
         rules = replace(rules, skips_control=True)
     text = np.frombuffer(data, np.uint8)
     start = line = 0
@@ -84,6 +85,7 @@ def chunks(data: bytes, rules: BlockText, size: int = CHUNK, tell: Progress = si
         line += len(chunk.line_start)
         start = cut
         yield chunk
+        unload()
         tell("read", cut / len(data))
 
 

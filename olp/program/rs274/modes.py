@@ -16,6 +16,7 @@ import numpy.typing as npt
 from olp.core.arrays import Array, Index, Mask, distinct, is_in
 from olp.core.errors import ProgramError
 from olp.core.patterns import pattern
+from olp.core.spool import Text
 from olp.core.values import dataclass
 from olp.program.rs274.axis_state import AxisState
 from olp.program.rs274.block_rules import M
@@ -304,7 +305,7 @@ class Modes:
         return _in_force(chunk, line, code, self._state.motion)
 
 
-def check_odd(data: bytes, chunk: WordChunk, before_end: Mask, active: Mask, state: AxisState) -> list[Odd]:
+def check_odd(data: Text, chunk: WordChunk, before_end: Mask, active: Mask, state: AxisState) -> list[Odd]:
     """Refuse active lines with more than words, all of the chunk at once; of those `before_end` that block
     delete skips the ones whose bytes are refused, as the control reads these all the same. Of commands the
     lines after which no position is known."""
@@ -319,7 +320,7 @@ def check_odd(data: bytes, chunk: WordChunk, before_end: Mask, active: Mask, sta
     return []
 
 
-def _odd_commands(data: bytes, chunk: WordChunk, lines: list[int], state: AxisState) -> list[Odd]:
+def _odd_commands(data: Text, chunk: WordChunk, lines: list[int], state: AxisState) -> list[Odd]:
     """The lines of more than words after which no position is known. Raises ProgramError for all that cannot
     be read correctly."""
     profile, known = state.profile, state.setup.machine.still_macros
@@ -344,7 +345,7 @@ def _odd_commands(data: bytes, chunk: WordChunk, lines: list[int], state: AxisSt
     return moving
 
 
-def _odd(data: bytes, chunk: WordChunk, line: int, profile: Profile, *, words: bool) -> ProgramError | None:
+def _odd(data: Text, chunk: WordChunk, line: int, profile: Profile, *, words: bool) -> ProgramError | None:
     """Why a line with more than words is refused, by its bytes, or by its `words` too."""
     number = chunk.first_line + line + 1
     start = int(chunk.line_start[line])

@@ -16,6 +16,7 @@ import numpy.typing as npt
 from olp.core.arrays import Array, Index, Mask, any_in_row, is_in
 from olp.core.errors import ProgramError
 from olp.core.machine import UNKNOWN, Setup
+from olp.core.spool import Text, whole
 from olp.core.toolpath import Flag, Kind
 from olp.core.turns import Turn
 from olp.core.values import dataclass
@@ -78,7 +79,7 @@ _KEEPS_FRAME = frozenset({DWELL, MACHINE, *HOMES, *PATH_MODES})
 
 
 def read(
-    data: bytes, setup: Setup, profile: Profile, options: Options | None = None, *, words: bool = True
+    data: Text, setup: Setup, profile: Profile, options: Options | None = None, *, words: bool = True
 ) -> Program:
     """Read a whole program. Raises ProgramError with the line of the first statement that cannot be read
     correctly.
@@ -121,7 +122,7 @@ class _Rows:
 class _Reader:
     """Reads one program, chunk by chunk."""
 
-    def __init__(self, data: bytes, setup: Setup, profile: Profile, options: Options, words: bool) -> None:
+    def __init__(self, data: Text, setup: Setup, profile: Profile, options: Options, words: bool) -> None:
         self.data = data = with_payloads(data, setup.job.payloads, profile.comment)
         self.options = options
         self.state = AxisState.at_start(setup, profile)
@@ -142,7 +143,7 @@ class _Reader:
         self.extrusion = None if commands is None or not commands.feeds(data) else Extrusion(commands)
         self.feeding = self.whole = np.zeros(0, bool)
         translator = translate if profile.spindle_words else profile.translator
-        self.translation = Translation(data) if translator is None else translator(data)
+        self.translation = Translation(data) if translator is None else translator(whole(data))
 
     def run(self) -> Program:
         data = self.translation.text

@@ -16,6 +16,7 @@ import numpy.typing as npt
 from olp.core.arrays import Array, Index
 from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES
+from olp.core.spool import Text
 from olp.core.toolpath import Kind
 from olp.core.values import dataclass
 from olp.program.rs274.axis_state import AxisState
@@ -73,7 +74,7 @@ class Translation:
     bytes of brackets that close behind a number, sorted. `of_spindle` are the letters whose number is that of
     the tool in the spindle."""
 
-    text: bytes
+    text: Text
     refused: Mapping[int, ProgramError] = field(default_factory=dict)
     actions: Mapping[int, tuple[Action, ...]] = field(default_factory=dict)
     drillings: Mapping[int, Drilling] = field(default_factory=dict)

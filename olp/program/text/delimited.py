@@ -14,6 +14,7 @@ from typing import Literal
 
 from olp.core.errors import InputError
 from olp.core.patterns import pattern
+from olp.core.spool import Text
 from olp.core.values import dataclass
 
 Delimiter = Literal["comma", "semicolon", "tab", "space"]
@@ -147,7 +148,7 @@ def detected_layout(lines: Sequence[str]) -> Layout | None:
     )
 
 
-def first_lines(data: bytes) -> list[str]:
+def first_lines(data: Text) -> list[str]:
     """The first rows of a text, from which its layout is detected."""
     head = data[:_HEAD].decode("utf-8-sig", "replace").replace("\r\n", "\n").replace("\r", "\n")
     if len(data) > _HEAD:

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from olp.core.arrays import Index, Mask
 from olp.core.patterns import pattern
+from olp.core.spool import Text
 from olp.core.values import dataclass
 
 Spans = npt.NDArray[np.int64] | npt.NDArray[np.int32]
@@ -108,7 +109,7 @@ class Placing:
     any order and shape.
     """
 
-    def __init__(self, data: bytes, start: Spans, end: Spans) -> None:
+    def __init__(self, data: Text, start: Spans, end: Spans) -> None:
         self.text = np.frombuffer(data, np.uint8)
         first: Spans = start.ravel()
         last: Spans = end.ravel()

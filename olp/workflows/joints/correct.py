@@ -156,7 +156,7 @@ def _stamped(run: JointRun, dialect: Dialect, nominal: Program, written: bytes |
         return text
     stamp = stamp_line(run.digest, dialect.comment, real_time=by_control)
     if isinstance(dialect, RobotDialect):
-        program = replace(nominal, content=text)
+        program = replace(nominal, data=text)
         return spliced(text, [dialect.stamped(program, stamp), *dialect.counted(program, 1)])
     statements = nominal.statements
     if statements is not None and statements.cards:

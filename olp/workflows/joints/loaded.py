@@ -14,6 +14,7 @@ from olp.compensation.joints.arm_path import ArmPath, arm_path
 from olp.compensation.joints.path import JointPath
 from olp.core.errors import ConfigError, ProgramError, UsageError
 from olp.core.machine import ZERO, Job, Setup, WorkOffset
+from olp.core.spool import Text, whole
 from olp.core.values import dataclass
 from olp.files.config import load_job
 from olp.files.kinematics.load import load_joint_errors
@@ -145,7 +146,7 @@ class JointRun:
             with program.errors():
                 return text, self._of_arm(program)
         if isinstance(dialect, PointList) or self.setup is None:
-            return source, self._listed(source.data)
+            return source, self._listed(whole(source.data))
         text, program = refusals.read(self.sources, source, self.setup, dialect, Options(), unrolling)
         with program.errors():
             return text, self._path(program, self.setup)
@@ -222,7 +223,7 @@ def _columns(machine: JointMachine) -> list[str]:
     return [f"{name}_{unit}" for name, unit in zip(structure.order, structure.units, strict=True)]
 
 
-def _names_axes(data: bytes, machine: JointMachine) -> bool:
+def _names_axes(data: Text, machine: JointMachine) -> bool:
     """Whether the first line that is no comment names an axis of the machine with its unit, as the header of
     a list does."""
     rows = [line for line in first_lines(data) if line.strip() and not line.lstrip().startswith("#")]

@@ -363,7 +363,7 @@ def test_the_lines_of_a_node_are_those_that_were_written(machine: Path) -> None:
 def test_lines_of_files_of_subprograms_are_named_with_them(machine: Path) -> None:
     scene = scene_of("G1 X10", machine)
     origin = Origin(("/sub/drill.ngc",), np.array([20]), (b"",) * 30, np.array([3, 22, 24, 22, 7]))
-    called = replace(scene, nominal=replace(scene.nominal, content=Unrolled.of(scene.nominal.data, origin)))
+    called = replace(scene, nominal=replace(scene.nominal, data=Unrolled.of(scene.nominal.data, origin)))
     assert called.places(np.array([1, 5])) == "3 to 7"
     assert called.places(np.array([2, 3, 4])) == "2 to 4 of drill.ngc"
     assert called.places(np.array([2, 4])) == "2 of drill.ngc"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from olp.core.patterns import pattern
+from olp.core.spool import Text
 from olp.core.values import dataclass
 from olp.program.robots.targets import Span
 from olp.program.text.line_ends import split
@@ -69,7 +70,7 @@ def lines(data: bytes) -> Iterator[Line]:
         place += len(raw)
 
 
-def aggregate(data: bytes, span: Span) -> Aggregate | None:
+def aggregate(data: Text, span: Span) -> Aggregate | None:
     """The aggregate that bytes are; None where they are none, or one of its components is no number."""
     values: dict[str, tuple[Span, float]] = {}
     match = _USUAL.fullmatch(data, *span)

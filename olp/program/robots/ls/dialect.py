@@ -7,6 +7,7 @@ from math import radians
 
 from olp.core.arrays import Array, Mask
 from olp.core.patterns import pattern
+from olp.core.spool import whole
 from olp.core.values import dataclass
 from olp.program.program import Program
 from olp.program.robots.dialect import Replacement, RobotDialect
@@ -76,9 +77,10 @@ class Ls(RobotDialect):
         return place, place, program.eol(target.line) + _renumbered(text, name)
 
     def counted(self, program: Program, blocks: int) -> list[Replacement]:
-        sections = parts(program.data)
-        stated = line_count(program.data, sections["ATTR"][0]) if "ATTR" in sections else None
-        count = sum(len(lines(program.data, part)) for part in sections["MN"])
+        data = whole(program.data)
+        sections = parts(data)
+        stated = line_count(data, sections["ATTR"][0]) if "ATTR" in sections else None
+        count = sum(len(lines(data, part)) for part in sections["MN"])
         # one that is wrong says nothing, and stays
         if stated is None or stated[1] != count:
             return []

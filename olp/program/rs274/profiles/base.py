@@ -133,6 +133,7 @@ class Profile(Dialect):
     """
 
     first: tuple[bytes, ...] = (b"%", b"O|:")
+    long_texts: bool = True
     payload_comments: bool = True
     unrolls_with_tools: bool = True
     expands_cycles: bool = True
