@@ -20,7 +20,8 @@ Numbers = npt.NDArray[np.signedinteger[Any]]
 
 #: So many values are compared one by one.
 _FEW = 12
-#: In so many values others are looked up by bisection, which loads no masked arrays as `np.isin` may.
+#: In so many values others are looked up by bisection, which loads no masked arrays as `np.isin` may; in more
+#: only where there is no short table of them.
 _SHORT = 1 << 12
 
 Scalar = TypeVar("Scalar", bound=np.generic)
@@ -48,13 +49,16 @@ def distinct(values: npt.NDArray[Scalar]) -> npt.NDArray[Scalar]:
 def is_in(values: npt.NDArray[Scalar], some: Collection[float] | npt.NDArray[Any]) -> Mask:
     """Whether each value, of any shape, is one of `some`, as `np.isin` says."""
     wanted = np.asarray(list(some) if isinstance(some, set | frozenset) else some).ravel()
+    whole = wanted.dtype.kind in "iu"
     if len(wanted) > _FEW:
-        if np.size(values) > _SHORT:
-            return np.isin(values, wanted)
         ordered = np.sort(wanted)
+        near = whole and values.dtype.kind in "iu" and int(ordered[-1]) - int(ordered[0]) <= np.size(values)
+        if near and np.size(values) > _SHORT:
+            return np.isin(values, ordered, kind="table")
         return np.asarray(ordered.take(np.searchsorted(ordered, values), mode="clip") == values)
     found = np.zeros(np.shape(values), bool)
-    for one in wanted:
+    # a number of its own type would make all others as wide
+    for one in wanted.tolist() if whole else wanted:
         found |= values == one
     return found
 

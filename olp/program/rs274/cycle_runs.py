@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Array, Index, Mask, is_in
+from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import ProgramError
 from olp.core.values import dataclass
 from olp.program.rs274.codes import CYCLES, INCREMENTAL, PLANE_OF
@@ -15,18 +15,20 @@ from olp.program.rs274.modes import Context
 from olp.program.rs274.state import NAN
 
 _READ = "XYZRQPLKI"
-_CYCLES = np.array(sorted(CYCLES))
+#: Whether a motion code is that of a cycle; the last entry is for "none yet".
+_CYCLES = np.zeros(1001, bool)
+_CYCLES[list(CYCLES)] = True
 
 
 def runs(context: Context, line: Index) -> dict[int, int]:
     """The runs of blocks of canned cycles that are carried out at once, among blocks on lines (n,) of the
     chunk: from the first block of each to the one behind it. A run has no event, and no change of cycle,
     plane or distance mode."""
-    row = np.flatnonzero(is_in(context.motion[line], _CYCLES))
+    row = np.flatnonzero(_CYCLES[context.motion[line]])
     if not row.size:
         return {}
     line = line[row]
-    breaks = np.cumsum(context.event) + np.cumsum(~is_in(context.motion, _CYCLES))
+    breaks = np.cumsum(context.event) + np.cumsum(~_CYCLES[context.motion])
     same = (breaks[line[1:]] == breaks[line[:-1]]) & ~context.event[line[:-1]]
     for mode in (context.motion, context.plane, context.distance):
         same &= mode[line[1:]] == mode[line[:-1]]

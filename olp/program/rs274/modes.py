@@ -231,7 +231,8 @@ class Modes:
         return Codes(chunk.line[g], code, self._act[code])
 
     def _spindle(self, chunk: WordChunk, value: Array, usable: Mask) -> Modal:
-        m = (chunk.letter == 77) & usable & is_in(value, (3, 4, 5, 6, 19))
+        m = np.flatnonzero((chunk.letter == 77) & usable)
+        m = m[is_in(value[m], (3, 4, 5, 6, 19))]
         line, code = chunk.line[m], value[m]
         # a tool change and an oriented stop end it, the change before its start in one block
         order = np.lexsort((code != 6, line))

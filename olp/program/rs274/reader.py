@@ -69,8 +69,9 @@ from olp.program.rs274.turned import Turning, along_words
 #: motion code to kind of move; 255 where it is not plain motion, the last entry is for "none yet"
 _KIND = np.full(1001, 255, np.uint8)
 _KIND[[0, 10, 20, 30, THREAD]] = (Kind.RAPID, Kind.LINE, Kind.ARC_CW, Kind.ARC_CCW, Kind.LINE)
-_ALONE = np.array(sorted(CYCLES | PROBES))
-_PROBES = np.array(sorted(PROBES))
+_ALONE, _PROBES = np.zeros((2, len(_KIND)), bool)
+_ALONE[list(CYCLES | PROBES)] = True
+_PROBES[list(PROBES)] = True
 #: Events that go on from the present position, or turn it
 _APART = HOMES | TRANSFORMS | {MACHINE, TILTED, ALIGNED}
 _UNITS = frozenset(UNITS)
@@ -260,7 +261,7 @@ class _Reader:
         chunk, state, event = context.chunk, self.state, context.event
         rows = self._rows(context, blocks, beside.calls)
         motion = context.motion[blocks.line]
-        alone, first = is_in(motion, _ALONE), is_in(motion, _PROBES)
+        alone, first = _ALONE[motion], _PROBES[motion]
         first[list(rows.runs)] = True
         special = event | beside.lines
         special[blocks.line[first]] = True

@@ -23,6 +23,8 @@ _POW10 = 10 ** np.arange(19, dtype=np.int64)
 _DIGITS = (
     (np.arange(10_000)[:, None] // [1000, 100, 10, 1] % 10 + ord("0")).astype(np.uint8).view(np.uint32)[:, 0]
 )
+#: Bits of `Edits.order`; those of a position and one more go beside them.
+_ORDER_BITS = 31
 #: mantissa of an edit that has a prefix and no number
 BARE = np.iinfo(np.int64).min
 
@@ -61,9 +63,11 @@ class Edits:
         """All edits in the order of the text."""
         columns = [np.concatenate([getattr(p, name) for p in parts]) for name in Edits.__slots__]
         start, end, order = columns[0], columns[1], columns[5]
-        # what is inserted at a position comes before what is replaced there
-        index = np.lexsort((order, end > start, start))
-        return Edits(*(column[index] for column in columns))
+        # what is inserted at a position comes before what is replaced there. As one number, as the parts are
+        # in order already: that takes a sixth of the time of three keys
+        key = (start << 1) | (end > start)
+        index = np.argsort((key << _ORDER_BITS) | order, kind="stable")
+        return Edits(*(column.take(index) for column in columns))
 
     def __len__(self) -> int:
         return len(self.start)
@@ -174,7 +178,7 @@ def render(edits: Edits, prefixes: Prefixes, *, leading_zero: bool) -> tuple[Byt
     short = whole.astype(np.int32)
     digits = np.ones(len(size), np.int16)
     for n in range(1, 4 * whole_groups):
-        digits += short >= _POW10[n]
+        digits += short >= 10**n
     if not leading_zero:
         digits -= (whole == 0) & (decimals > 0)
     begin = np.int16(point) - digits
@@ -189,8 +193,9 @@ def render(edits: Edits, prefixes: Prefixes, *, leading_zero: bool) -> tuple[Byt
         for i, byte in enumerate(reversed(prefixes.table[which])):
             text[chosen, begin[chosen] - 1 - i] = byte
     begin -= widths[edits.prefix].astype(np.int16)
-    column = np.arange(width, dtype=np.int16)
-    valid = (column >= begin[:, None]) & (column < end[:, None])
+    # columns from `begin` on and before `end`: to look them up is faster than to compare all
+    behind = np.arange(width) >= np.arange(width + 1)[:, None]
+    valid = behind.take(begin, axis=0) & ~behind.take(end, axis=0)
     length = (end - begin).astype(np.int64)
     flat = text[valid]
     if slow.size:
