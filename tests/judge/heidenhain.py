@@ -20,7 +20,9 @@ AXES = "XYZ"
 #: first and second axis of planes XY, YZ, XZ, as canonical moves number them
 PLANES = {(0, 1): 0, (1, 2): 1, (0, 2): 2}
 TURNED = {0: (0, 1), 1: (1, 2), 2: (2, 0)}
-BY_SURFACE = {200, 203, 207, 208, 241}
+BY_SURFACE = {200, 201, 202, 203, 205, 206, 207, 208, 209, 240, 241}
+#: cycles of modes, which leave the one that is called
+MODES = {7, 9, 32, 247}
 
 
 class Reading:
@@ -33,6 +35,7 @@ class Reading:
         self.here = np.full(3, np.nan)
         self.pole = np.full(3, np.nan)
         self.unit = 1.0
+        self.delta = 0.0
         self.cycle: dict[str, float] = {}
         self.moves = Moves()
 
@@ -41,7 +44,7 @@ class Reading:
         return self.origin + self.shift + self.length
 
     def go(self, line: int, kind: int, end: np.ndarray, **arc: object) -> None:
-        vector = np.array([0.0, 0.0, -self.tools.get(self.tool, 0.0)])
+        vector = np.array([0.0, 0.0, -self.tools.get(self.tool, 0.0) - self.delta])
         self.moves.add(line, kind, end, self.length, self.tool, vector, **arc)  # type: ignore[arg-type]
         self.here = end
 
@@ -138,16 +141,24 @@ def read(data: bytes, origin: np.ndarray, tools: Mapping[int, float], *, tool: i
             r.unit = 25.4 if text.endswith("INCH") else 1.0
         elif text.startswith("TOOL CALL"):
             r.tool = int(re.findall(r"\d+", text)[0])
-            r.length = np.array([0.0, 0.0, r.tools[r.tool]])
+            delta = re.search(rf"\bDL *({NUMBER})", text)
+            r.delta = float(delta[1]) * r.unit if delta else 0.0
+            r.length = np.array([0.0, 0.0, r.tools[r.tool] + r.delta])
             r.here = np.full(3, np.nan)
         elif match := re.match(rf"CYCL DEF 7\.[1-9] *(I?)([XYZ]) *({NUMBER})", text):
             axis = AXES.index(match[2])
             r.shift[axis] = float(match[3]) * r.unit + (r.shift[axis] if match[1] else 0.0)
         elif match := re.match(r"CYCL DEF (\d+)\b", text):
             values = re.findall(rf"(Q\d+) *= *({NUMBER})", text)
-            r.cycle = {q: float(v) for q, v in values} if int(match[1]) in BY_SURFACE else r.cycle
-        elif text == "CYCL CALL":
+            known = int(match[1]) in BY_SURFACE
+            r.cycle = {q: float(v) for q, v in values} if known else r.cycle if int(match[1]) in MODES else {}
+        elif re.fullmatch(r"CYCL CALL( M\d+)*", text):
             r.hole(line)
+        elif re.search(r"\bM91\b", text):
+            end = r.here.copy()
+            for _, letter, number in re.findall(rf"\b(I?)([XYZ]) *({NUMBER})", text):
+                end[AXES.index(letter)] = float(number) * r.unit
+            r.go(line, RAPID, end)
         elif re.match(r"CC\b", text):
             words = re.findall(rf"\b(I?)([XYZ]) *({NUMBER})", text)
             place = r.words(text)
@@ -165,6 +176,6 @@ def read(data: bytes, origin: np.ndarray, tools: Mapping[int, float], *, tool: i
                 r.go(line, RAPID if re.search(r"\bF *MAX\b", text) else FEED, r.words(text))
             if "M99" in text.split():
                 r.hole(line)
-        elif not re.match(r"BLK FORM|TOOL DEF|STOP|M\d|F\d|CYCL DEF \d+\.0", text):
+        elif not re.match(r"BLK FORM|TOOL DEF|STOP|M\d|F\d|CYCL DEF \d+\.0|PLANE RESET STAY|LBL 0", text):
             raise ValueError(text)
     return r.moves

@@ -19,8 +19,11 @@ _N = r"[-+]?(?:\d+\.?\d*|\.\d+)"
 _WORD = re.compile(
     rf"([A-Z]+)\s*=\s*(?:(AC|IC)\()?({_N})\)?|([A-Z])\s*({_N})|([A-Z]{{2,}}\d*)(\([^)]*\))?|(T)=\"([^\"]*)\""
 )
-_FRAMES = ("TRANS", "ATRANS", "ROT", "AROT", "MIRROR", "AMIRROR")
-_QUIET = {"MSG", "SOFT", "FFWON", "FNORM", "WORKPIECE"}
+_FRAMES = ("TRANS", "ATRANS", "ROT", "AROT", "MIRROR", "AMIRROR", "SCALE", "ASCALE")
+_QUIET = {"MSG", "SOFT", "FFWON", "FNORM", "WORKPIECE", "COMPCAD", "COMPOF", "TRAFOOF",
+          "CYCLE800", "CYCLE832", "STOPRE", "EXTERN", "SLOT"}  # fmt: skip
+#: cycles that come back at a feed
+_FEED_BACK = {"CYCLE84", "CYCLE840", "CYCLE85", "CYCLE89"}
 
 
 class Reading:
@@ -36,6 +39,7 @@ class Reading:
         self.axis = np.full(3, np.nan)
         self.motion, self.relative, self.unit = 1, False, 1.0
         self.cycle: list[float | None] | None = None
+        self.name = ""
         self.moves = Moves()
 
     @property
@@ -57,8 +61,11 @@ class Reading:
         vector = np.array([values.get(a, 0.0) for a in "XYZ"]) * self.unit
         step = np.eye(3)
         if kind == "ROT":
-            c, s = math.cos(math.radians(values["Z"])), math.sin(math.radians(values["Z"]))
+            angle = math.radians(values.get("Z", values.get("RPL", 0.0)))
+            c, s = math.cos(angle), math.sin(angle)
             step = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+        elif kind == "SCALE":
+            step = np.diag([values.get(a, 1.0) for a in "XYZ"])
         elif kind == "MIRROR":
             step = np.diag([-1.0 if a in values else 1.0 for a in "XYZ"])
         if not adds:
@@ -73,7 +80,10 @@ class Reading:
         rtp, rfp, safe, deep = (value or 0.0 for value in self.cycle[:4])
         if len(self.cycle) > 4 and self.cycle[4]:
             deep = rfp - self.cycle[4]
-        for kind, level in ((RAPID, rfp + safe), (FEED, deep), (RAPID, rtp)):
+        back = [(FEED, rfp + safe)] if self.name in _FEED_BACK else []
+        for kind, level in ((RAPID, rfp + safe), (FEED, deep), *back, (RAPID, rtp)):
+            if back and kind == RAPID and level == rtp == rfp + safe:
+                continue
             axis = self.axis.copy()
             axis[2] = self.zero[2] + level * self.unit
             self.go(line, kind, axis)
@@ -81,7 +91,7 @@ class Reading:
     def block(self, line: int, text: str) -> bool:
         """One block; whether the program ends."""
         values: dict[str, tuple[str, float]] = {}
-        machine, name = False, ""
+        machine, name, alone = False, "", "MCALL" not in text
         for word, how, number, letter, value, call, given, _, tool in _WORD.findall(text):
             if tool or (_ == "T"):
                 self.next = self.names[tool]
@@ -91,7 +101,8 @@ class Reading:
                 name = call
             elif call == "MCALL":
                 self.cycle = None
-            elif call.startswith("CYCLE8"):
+            elif re.fullmatch(r"CYCLE8(\d|40)", call):
+                self.name = call
                 self.cycle = [float(a) if a.strip() else None for a in given[1:-1].split(",")]
             elif call and call not in _QUIET:
                 raise ValueError(text)
@@ -101,16 +112,18 @@ class Reading:
                     self.motion = code
                 elif code in (90, 91):
                     self.relative = code == 91
-                elif code in (70, 71):
-                    self.unit = 25.4 if code == 70 else 1.0
+                elif code in (70, 71, 700, 710):
+                    self.unit = 25.4 if code in (70, 700) else 1.0
+                elif code in (53, 153):
+                    machine = True
                 elif code in (54, 55, 500) or 504 < code < 600:
                     self.offset = f"G{code}"
                 elif code in (58, 59):
                     name = f"G{code}"
-                elif code not in (17, 40, 60, 64, 94, 641, 642):
+                elif code not in (17, 40, 60, 64, 94, 601, 641, 642):
                     raise ValueError(text)
-            elif letter == "T":
-                self.next = int(value)
+            elif "T" in (letter, word):
+                self.next = int(float(value or number))
             elif letter == "M" and int(value) == 6:
                 self.tool, self.length = self.next, self.tools[self.next]
                 self.axis = np.full(3, np.nan)
@@ -128,6 +141,9 @@ class Reading:
             self.shift = self.parts.sum(axis=0)
         elif name:
             self.frame(name, plain)
+        elif alone and self.cycle is not None and "CYCLE8" in text:
+            self.hole(line)
+            self.cycle = None
         elif values.keys() & {*"XYZIJ"}:
             self.move(line, values, machine)
             if self.cycle is not None:
