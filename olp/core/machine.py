@@ -150,7 +150,7 @@ class Machine:
     read as increments.
     `arc_centres` says what I, J and K are at the start, and `cycle_return` where canned cycles return, to a
     control that has a setting for it. `scaling_axes` are those that CYCL DEF 11 of a Heidenhain control
-    scales.
+    scales. `lengths_along_z`: on a Sinumerik, lengths of tools count along Z in every plane.
     `default_motion` is the motion code in force at the start of a program, where its control does not fix it.
     `still_macros` are the macros of a printer that move no axis and change no mode.
     `real_time` is the beginning of the hash of the calibration that the control itself corrects by in every
@@ -184,6 +184,7 @@ class Machine:
     arc_centres: Literal["incremental", "absolute"] | None = None
     cycle_return: Literal["initial", "r"] | None = None
     scaling_axes: Literal["plane", "all"] | None = None
+    lengths_along_z: bool = False
     still_macros: frozenset[str] = frozenset()
     path_mode: Literal["blend", "exact-stop"] = "blend"
     blend_mm: float | None = None

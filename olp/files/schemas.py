@@ -338,6 +338,11 @@ class MachineFile(Table):
         description="which axes CYCL DEF 11 of Heidenhain programs scales, by a machine parameter: X and Y, "
         "or Z too",
     )
+    lengths_along_z: bool = Field(
+        default=False,
+        description="whether lengths of tools count along Z in G18 and G19 too, by a setting of Sinumerik "
+        "controls (SD42940)",
+    )
     still_macros: list[Text] = Field(
         default=[],
         description="the macros of a Klipper printer that move no axis and change no mode, by their names",

@@ -123,13 +123,14 @@ def check_frames(
     """Refuse rows whose meaning depends on machine data of the control, as its profile says. (n,) the lines
     of the rows, whether they are distances, their planes and frames."""
     profile = state.profile
-    if profile.lengths_follow_plane and (plane != _XY).any():
+    follow = profile.lengths_follow_plane and not state.setup.machine.lengths_along_z
+    if follow and (plane != _XY).any():
         long = np.array([any(f.length_mm) for f in state.frames])[frame]
         bad = np.flatnonzero((plane != _XY) & long)
         if bad.size:
             raise ProgramError(
                 "a tool length is in force outside of G17, and machine data say along which axis it counts; "
-                "give the tool Z_mm = 0 with its gauge_to_tip_mm, and put the length into the work offset",
+                "state lengths_along_z = true in the machine file where it is Z",
                 line=int(number[bad[0]]),
                 code="OLP518",
             )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -216,6 +217,13 @@ def test_all_refusals_of_a_text_are_told_together(setup: Setup) -> None:
     with pytest.raises(ProgramError) as caught:
         program("TRAORI\nX1\nR1=2*3\nM30\nR3=4", setup)
     assert [e.line for e in (caught.value, *caught.value.others)] == [1, 3]
+
+
+def test_lengths_may_count_along_z_in_every_plane(setup: Setup) -> None:
+    stated = replace(setup, machine=replace(setup.machine, lengths_along_z=True))
+    path = program("T2 M6\nG0 X0 Y0 Z0\nG18\nG2 X10 Z0 I5 K0 F100", stated).toolpath
+    assert path.end_mm[-1].tolist() == [10.0, 0.0, 20.0]
+    assert path.arcs.centre_mm.tolist() == [[5.0, 0.0, 20.0]]
 
 
 CONSTANT = [
