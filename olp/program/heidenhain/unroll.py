@@ -131,6 +131,8 @@ class _Run:
         self.parameters = Parameters()
         #: those that the job states
         self.stated: Mapping[str, float] = {}
+        #: MM or INCH, as the program says
+        self.unit_name = b"MM"
         self.blocks: list[bytes] = []
         self.units: list[_Unit] = []
         self._sources: list[tuple[int, int]] = []
@@ -204,8 +206,16 @@ class _Run:
                 self._put(unit, known, place)
             return None
         if upper.startswith(b"BEGIN PGM"):
+            unit_name = upper.split()[-1]
             if not main:
+                if unit_name != self.unit_name:
+                    raise ProgramError(
+                        "a program is called whose unit is another one, which is not read; write both in MM "
+                        "or both in INCH",
+                        code="OLP518",
+                    )
                 return place + 1
+            self.unit_name = unit_name
             self.radius.begin(statement)
         jump = _JUMP.match(upper)
         if jump is not None:

@@ -470,6 +470,14 @@ def test_programs_beside_are_called(bent: Path, tmp_path: Path) -> None:
     assert text.split(b"\n")[1:3] == [b"L X+5 Y0 Z0 F50", b"L Y+7"]
 
 
+def test_a_program_of_another_unit_is_not_called(bent: Path, tmp_path: Path) -> None:
+    (tmp_path / "SUB.H").write_text("BEGIN PGM SUB INCH\nL X+1\nEND PGM SUB INCH\n")
+    (tmp_path / "MAIN.H").write_text("BEGIN PGM MAIN MM\nCALL PGM SUB\nEND PGM MAIN MM\n")
+    with pytest.raises(ProgramError, match="unit") as caught:
+        olp.flatten(tmp_path / "MAIN.H", bent)
+    assert caught.value.line == 1
+
+
 def test_a_sign_may_stand_apart_from_its_parameter() -> None:
     assert unrolled("Q1=2.5\nQ2=-4\nL X+ Q1 Y -Q2 Z- Q2\n")[0].split() == ["L", "X+2.5", "Y", "+4", "Z+4"]
 
