@@ -162,8 +162,9 @@ class Machine:
     leave the axes that they move, None where it is not known. `scaling_unit` is what 1 of a factor of G51 is,
     None where it is not stated. `located` says whether positions in machine coordinates are known; where they
     are not, only distances are. `assumed`: nothing names the controller. `arm`: it is an arm, whose programs
-    may state its joints. `third_level` is whether they count the third of them from the horizontal, None
-    where that is not stated.
+    may state its joints. `track` is the way in mm by which one unit of the first external axis carries it,
+    None where it stands still. `third_level` is whether they count the third of them from the horizontal,
+    None where that is not stated.
     """
 
     name: str
@@ -199,6 +200,7 @@ class Machine:
     assumed: bool = False
     arm: bool = False
     third_level: bool | None = None
+    track: Vector | None = None
 
     @property
     def least_increment_mm(self) -> Vector:

@@ -369,3 +369,35 @@ def test_the_tool_of_the_job_has_directions(tmp_path: Path) -> None:
     machine.write_text(named.replace("[0.0, 10.0, 0.0]", "[0.0, 10.5, 0.0]"), "utf-8")
     with pytest.raises(ProgramError, match="they differ"):
         olp.correct_joints(text, machine)
+
+
+def test_an_arm_on_a_track_keeps_its_carriage(tmp_path: Path) -> None:
+    """The first external axis carries the arm: with it, and the target moved along, all is corrected alike.
+    While the carriage goes, a move is not split, and a second external axis is refused."""
+    far = JOINTS + np.array([25, 5, -5, 5, -4, 6])
+
+    def text(along: list[float], more: str = "") -> bytes:
+        moves = []
+        for k, (joints, e1) in enumerate(zip([JOINTS, far], along, strict=True)):
+            (x, y, z), (a, b, c) = local(joints)[0], angles(local(joints)[1])
+            # 30 deg between base and track
+            x, y = x + e1 * np.cos(np.pi / 6), y - e1 * np.sin(np.pi / 6)
+            place = f"X {x:.5f},Y {y:.5f},Z {z},A {a},B {b},C {c},S 2,T 0,E1 {e1}{more}"
+            moves.append(f"{'LIN' if k else 'PTP'} {{{place}}}")
+        return krl_of(*moves)
+
+    machine = arm_files(tmp_path)
+    with pytest.raises(ProgramError, match="state track"):
+        olp.correct_joints(text([1500.0, 1500.0]), machine)
+    plain = olp.correct_joints(text([0.0, 0.0]), machine).data
+    machine.write_text(machine.read_text("utf-8") + "[kinematics]\ntrack = [1.0, 0.0, 0.0]\n", "utf-8")
+    result = olp.correct_joints(text([1500.0, 1500.0]), machine)
+    assert result.report["verdict"]["ok"]
+    moved = READERS["krl"](result.data, FRAMES)
+    for one, other in zip(moved, READERS["krl"](plain, FRAMES), strict=True):
+        assert np.abs(one.tip - other.tip - [1500.0, 0, 0]).max() < 3e-5
+        assert np.abs(one.turn - other.turn).max() < 1e-7
+    assert result.data.count(b"E1 1500.0") == len(moved) > 3
+    assert olp.correct_joints(text([1500.0, 1400.0]), machine).data.count(b"LIN") == 1
+    with pytest.raises(ProgramError, match="external axis"):
+        olp.correct_joints(text([0.0, 0.0], ",E2 3.0"), machine)

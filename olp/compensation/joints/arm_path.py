@@ -24,14 +24,12 @@ from olp.kinematics.structure import Structure
 from olp.program.program import Program
 from olp.program.robots.dialect import RobotDialect
 from olp.program.robots.poses import Pose, matrices, matrix
-from olp.program.robots.targets import Target, Use
+from olp.program.robots.targets import ABSENT, Target, Use
 
 #: Decimals that stand for the axis values, which no text has.
 _DECIMALS = 6
 #: Axes of a straight move that are this near to even ones, deg, are those of the nearest posture.
 _NEAR_DEG = 15.0
-#: External axes that are not there have at least this.
-_ABSENT = 9e8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -179,10 +177,11 @@ class Used:
                     line=line,
                     code="OLP523",
                 )
-            if any(value != 0.0 and abs(value) < _ABSENT for value in target.outer):
+            outer = target.outer[1:] if use.carried else target.outer
+            if any(value != 0.0 and abs(value) < ABSENT for value in outer):
                 raise ProgramError(
-                    "an external axis is not at zero, and the machine file of this arm has none; leave it "
-                    "out, or correct the program at zero",
+                    "an external axis is not at zero, and the machine file does not say what it carries; "
+                    "where the first one carries the arm, state track in [kinematics]",
                     line=line,
                     code="OLP563",
                 )

@@ -124,6 +124,7 @@ def _arm(file: JointMachineFile, structure: Structure) -> Machine | None:
         default_work_offset=file.job_defaults.work_offset,
         arm=True,
         third_level=file.kinematics.third_joint_level,
+        track=file.kinematics.track,
     )
 
 

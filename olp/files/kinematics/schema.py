@@ -115,6 +115,11 @@ class KinematicsTable(Table):
     gravity: Direction = Field(
         default=(0.0, 0.0, -1.0), description="the direction of gravity, [X, Y, Z] in machine coordinates"
     )
+    track: Direction | None = Field(
+        default=None,
+        description="the direction in which the first external axis of robot programs (E1, eax_a) carries "
+        "the arm, in mm, [X, Y, Z] in machine coordinates; the errors are those of the arm on its carriage",
+    )
     third_joint_level: bool | None = Field(
         default=None,
         description="whether robot programs count the third joint from the horizontal, as FANUC controls do, "

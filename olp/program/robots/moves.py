@@ -17,7 +17,7 @@ from olp.program.dialect import Dialect, Options
 from olp.program.program import Program
 from olp.program.robots.frames import Located, RobotFrames, Tool
 from olp.program.robots.poses import NO_TURN, Pose, Quaternion
-from olp.program.robots.targets import NOWHERE, Span, Target, Targets, Use
+from olp.program.robots.targets import ABSENT, NOWHERE, Span, Target, Targets, Use
 from olp.program.verbatim import Moves
 
 NAN = float("nan")
@@ -67,6 +67,9 @@ class RobotMoves:
         self._turn: Quaternion | None = None
         self._rest: tuple[float, ...] = ()
         self._feed = NAN
+        #: where the carriage of an arm is, and frames that count from there
+        self._away: float | None = None
+        self._on_track: dict[tuple[str, float], Pose] = {}
         self._first_turns: dict[str, Quaternion] = {}
         self._index: dict[tuple[str, str, Quaternion, Vector], int] = {}
 
@@ -141,7 +144,12 @@ class RobotMoves:
             what = f"the orientation changes, and the vector of the tool {tool.name} does not"
             self.remark("turning", line, what, "turning")
         before = use.turn if self._turn is None else self._turn
-        self.uses.append(use.begun(before, frame.pose, tool.pose, straight=known, whole=whole))
+        pose, away = self._carried(frame, target)
+        whole |= away != self._away
+        self._away = away
+        self.uses.append(
+            use.begun(before, pose, tool.pose, straight=known, whole=whole, carried=away is not None)
+        )
         self.known, self._frame, self._turn, self._rest, self._feed = True, index, use.turn, target.rest, feed
 
     def joint_move(self, line: int, taken: Callable[[], Use | None]) -> None:
@@ -160,8 +168,22 @@ class RobotMoves:
             kind=int(Kind.RAPID), flag=int(Flag.CONTROL), line=line, frame=self._frame, end=_NOWHERE,
             slot=(-1, -1, -1), bounds=NOWHERE, feed=self._feed,
         )  # fmt: skip
-        self.uses.append(replace(use, tool=flange.pose))
+        self._away = self._carried(self.frames.world, self.targets[use.target])[1]
+        self.uses.append(replace(use, tool=flange.pose, carried=self._away is not None))
         self.known, self._turn, self._rest = True, NO_TURN, ()
+
+    def _carried(self, frame: Located, target: Target) -> tuple[Pose, float | None]:
+        """A frame as it counts from the carriage of an arm on a track, and where that is; None where it
+        stands still."""
+        track = self.setup.machine.track
+        if track is None or not target.outer or abs(target.outer[0]) >= ABSENT:
+            return frame.pose, None
+        along = target.outer[0]
+        key = frame.name, along
+        if key not in self._on_track:
+            x, y, z = (a - along * b for a, b in zip(frame.pose.origin_mm, track, strict=True))
+            self._on_track[key] = Pose((x, y, z), frame.pose.turn)
+        return self._on_track[key], along
 
     def away(self, line: int) -> None:
         """The machine may have gone to a position that the text does not state."""
