@@ -366,6 +366,12 @@ def test_the_tool_of_the_job_has_directions(tmp_path: Path) -> None:
     machine.write_text(named, "utf-8")
     text = rapid([("P", JOINTS)])
     assert olp.correct_joints(text, machine).report["verdict"]["ok"]
+    # A about X, B about Y, C about Z of the flange
+    turns = [",".join(f"{v:.12f}" for v in quaternion(own)).encode() for own in (TOOL, abc(20.0, 10.0, 5.0))]
+    machine.write_text(named.replace("[0.0, 10.0, 0.0]", "[5.0, 10.0, 20.0]"), "utf-8")
+    other = text.replace(*turns)
+    assert other != text
+    assert olp.correct_joints(other, machine).report["verdict"]["ok"]
     machine.write_text(named.replace("[0.0, 10.0, 0.0]", "[0.0, 10.5, 0.0]"), "utf-8")
     with pytest.raises(ProgramError, match="they differ"):
         olp.correct_joints(text, machine)
