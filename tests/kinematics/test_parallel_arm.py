@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from judge.arm import Arm, about, quaternion, turned_by
+from judge.arm_files import MACHINE
 
 import olp
 from olp.core.errors import ProgramError
@@ -60,6 +61,24 @@ def test_each_posture_brings_the_flange_there_and_one_is_the_own(tmp_path: Path)
             assert np.abs(rotation - poses[k][0]).max() < 1e-10
         kinds = {tuple(sign) for sign in signs[k][np.isfinite(found[k, :, 0])].tolist()}
         assert len(kinds) == len(there)
+
+
+@pytest.mark.parametrize("light", [True, False])
+def test_the_posture_next_to_axis_values_is_that_of_these(light: bool, tmp_path: Path) -> None:
+    """With their turns, from values that are some degrees off."""
+    machine, rng = machine_file(tmp_path) if light else MACHINE, np.random.default_rng(2)
+    judge, arm = Arm(machine), arm_of(load_joint_machine(machine).structure)
+    joints = rng.uniform(-300, 300, (40, 6))
+    bent = np.abs(np.sin(np.radians(joints[:, [2, 4]]))).min(axis=1) > 0.4
+    poses = [judge.pose(own) for own in joints]
+    flange = Poses(np.array([r for r, _ in poses]), np.array([p for _, p in poses]))
+    assert arm is not None
+    found = arm.near(flange, joints + rng.uniform(-2, 2, joints.shape))
+    off = np.abs(found - joints).max(axis=1)
+    assert (off[bent] < 1e-6).sum() > 0.9 * bent.sum() > 5
+    for own, (rotation, place) in zip(found, poses, strict=True):
+        assert np.abs(judge.pose(own)[1] - place).max() < 1e-8
+        assert np.abs(judge.pose(own)[0] - rotation).max() < 1e-10
 
 
 def ur_pose(judge: Arm, joints: np.ndarray) -> str:

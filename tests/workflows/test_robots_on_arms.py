@@ -282,6 +282,7 @@ def test_krl_refused_with_its_line(move: str, told: str, tmp_path: Path) -> None
     assert caught.value.line == 4
 
 
+@pytest.mark.slow
 def test_products_of_krl_turn_with_their_target(tmp_path: Path) -> None:
     """A shift behind a position goes along its axes, which the correction turns, and a frame before it
     stays before the parts of a straight move."""
@@ -307,6 +308,7 @@ def test_joints_that_the_text_does_not_state_are_kept(tmp_path: Path) -> None:
     assert result.report["moves"]["feed"] == 0
 
 
+@pytest.mark.slow
 def test_moves_with_an_action_are_not_split(tmp_path: Path) -> None:
     far = position(JOINTS + np.array([20, 5, -5, 5, -4, 6]), ",S 2,T 0")
     moves = [f"PTP {position(JOINTS, ',S 2,T 0')}", "TRIGGER WHEN DISTANCE=0 DELAY=0 DO x=1", f"LIN {far}"]
@@ -377,6 +379,7 @@ def test_the_tool_of_the_job_has_directions(tmp_path: Path) -> None:
         olp.correct_joints(text, machine)
 
 
+@pytest.mark.slow
 def test_an_arm_on_a_track_keeps_its_carriage(tmp_path: Path) -> None:
     """The first external axis carries the arm: with it, and the target moved along, all is corrected alike.
     While the carriage goes, a move is not split, and a second external axis is refused."""

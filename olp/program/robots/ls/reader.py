@@ -106,7 +106,15 @@ class _Reader:
             self._move(line, self._words(move))
             return
         if _OTHER_MOVE.match(text):
-            raise not_read("a move that is not read (an arc, a spline, or words of its own)", line.line)
+            letter = text.split()[0].upper().decode("latin-1")
+            what = (
+                "a spline"
+                if letter == "S"
+                else "an arc"
+                if letter in "CA"
+                else "a move with words of its own"
+            )
+            raise not_read(f"{what} ({letter}), which is not read; post straight moves (L)", line.line)
         if _ASSIGNED.match(text):
             raise not_read("a position gets another value, so its numbers depend on the run", line.line)
         if _MOVING.match(text):
