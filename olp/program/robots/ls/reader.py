@@ -23,6 +23,8 @@ _MOVE = pattern(
     rb"(?i)\s*([LJ])\s+(PR?)\[\s*(\d+)\s*(?::[^\]]*)?\]\s+(?:(\d+\.?\d*)\s*(mm/sec|cm/min|inch/min|%|deg/sec|"
     rb"sec|msec)|(\S+))\s+(FINE|CNT\s*\d+|CNT\s*R\[[^\]]*\]|CD\d+|CR\d+)?(.*)"
 )
+#: Moves that are not read, by their letters.
+_OTHERS = {"C": "an arc", "A": "an arc", "S": "a spline"}
 _OTHER_MOVE = pattern(rb"(?i)\s*[CASLJ]\s+PR?\[")
 _OFFSET = pattern(rb"(?i)\b(Tool_Offset|Offset|WZVersatz|Versatz)\b\s*(?:,\s*PR\[\s*(\d+)[^\]]*\])?")
 _INCREMENT = pattern(rb"(?i)\bINC\b")
@@ -107,13 +109,7 @@ class _Reader:
             return
         if _OTHER_MOVE.match(text):
             letter = text.split()[0].upper().decode("latin-1")
-            what = (
-                "a spline"
-                if letter == "S"
-                else "an arc"
-                if letter in "CA"
-                else "a move with words of its own"
-            )
+            what = _OTHERS.get(letter, "a move with words of its own")
             raise not_read(f"{what} ({letter}), which is not read; post straight moves (L)", line.line)
         if _ASSIGNED.match(text):
             raise not_read("a position gets another value, so its numbers depend on the run", line.line)
