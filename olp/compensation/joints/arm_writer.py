@@ -84,6 +84,7 @@ class _Writer:
         assert arm is not None
         self.path, self.plan, self.program, self.targets = path, plan, program, targets
         self.dialect, self.arm, self.tally = program.dialect, arm, Tally()
+        self.nominal, self.commands = path.end.tolist(), plan.command.tolist()
         self.clones = 0
         self.names: set[str] = set()
 
@@ -227,7 +228,7 @@ class _Writer:
         if not target.turns:
             return ()
         move = int(self.plan.move[row])
-        new = self.dialect.turns_of(target.config, self.path.end[move], self.plan.command[row])
+        new = self.dialect.turns_of(target.config, self.nominal[move], self.commands[row])
         return tuple(
             self.program.data[slice(*span)] if value is None else str(value).encode()
             for span, value in zip(target.turns, new, strict=True)

@@ -70,8 +70,10 @@ class RobotDialect(StatementDialect):
         (n, 8, 4) as in `Arm.branches`."""
         return axes, np.isfinite(axes[:, :, 0])
 
-    def turns_of(self, config: Sequence[float], nominal: Array, corrected: Array) -> list[int | None]:
-        """The numbers of `Target.turns` for corrected axis values (6,); None for one that stays."""
+    def turns_of(
+        self, config: Sequence[float], nominal: Sequence[float], corrected: Sequence[float]
+    ) -> list[int | None]:
+        """The numbers of `Target.turns` for six corrected axis values; None for one that stays."""
         return []
 
     def counted(self, program: Program, blocks: int) -> list[Replacement]:

@@ -75,7 +75,9 @@ class Krl(RobotDialect):
     def fitting(self, config: Array, axes: Array, branches: Array) -> tuple[Array, Mask]:
         return postures.fitting(config, axes, branches)
 
-    def turns_of(self, config: Sequence[float], nominal: Array, corrected: Array) -> list[int | None]:
+    def turns_of(
+        self, config: Sequence[float], nominal: Sequence[float], corrected: Sequence[float]
+    ) -> list[int | None]:
         return postures.turns(config, nominal, corrected)
 
     @staticmethod

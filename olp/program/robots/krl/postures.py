@@ -31,10 +31,9 @@ def fitting(config: Array, axes: Array, branches: Array) -> tuple[Array, Mask]:
     return np.where(stated[:, 1, None, None], turned, axes), fits
 
 
-def turns(config: Sequence[float], nominal: Array, corrected: Array) -> list[int | None]:
+def turns(config: Sequence[float], nominal: Sequence[float], corrected: Sequence[float]) -> list[int | None]:
     """As `RobotDialect.turns_of`. One that did not say where the axes are stays."""
     own = int(config[1])
-    below = np.array([own >> k & 1 != 0 for k in range(_AXES)])
-    says = np.where(below, nominal < _ROUNDING_DEG, nominal > -_ROUNDING_DEG).all()
+    says = all((-value if own >> k & 1 else value) > -_ROUNDING_DEG for k, value in enumerate(nominal))
     new = own & ~((1 << _AXES) - 1) | sum(1 << k for k, value in enumerate(corrected) if value < 0.0)
     return [new if says and new != own else None]

@@ -49,12 +49,12 @@ def fitting(config: Array, axes: Array, branches: Array) -> tuple[Array, Mask]:
     return values, fits
 
 
-def turns(config: Sequence[float], nominal: Array, corrected: Array) -> list[int | None]:
+def turns(config: Sequence[float], nominal: Sequence[float], corrected: Sequence[float]) -> list[int | None]:
     """As `RobotDialect.turns_of`. One that did not say where the axis is stays."""
     found: list[int | None] = []
     for place, column in enumerate(_TURNED):
         own = int(config[3 + place])
         says = abs(nominal[column] - 360.0 * own) <= 180.0 + _ROUNDING_DEG
-        new = int(np.round(corrected[column] / 360.0))
+        new = round(corrected[column] / 360.0)
         found.append(new if says and new != own else None)
     return found

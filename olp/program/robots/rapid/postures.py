@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import floor
 
 import numpy as np
 
@@ -36,13 +37,15 @@ def fitting(config: Array, axes: Array, branches: Array) -> tuple[Array, Mask]:
     return values, fits
 
 
-def quarters(config: Sequence[float], nominal: Array, corrected: Array) -> list[int | None]:
+def quarters(
+    config: Sequence[float], nominal: Sequence[float], corrected: Sequence[float]
+) -> list[int | None]:
     """As `RobotDialect.turns_of`. One that did not say where the axis is stays."""
     found: list[int | None] = []
     for place, column in enumerate(_STATED):
         own, now = float(config[place]), float(nominal[column]) / _QUARTER_DEG
         rounding = _ROUNDING_DEG / _QUARTER_DEG
         says = own - rounding <= now <= own + 1.0 + rounding
-        new = int(np.floor(corrected[column] / _QUARTER_DEG))
+        new = floor(corrected[column] / _QUARTER_DEG)
         found.append(new if says and new != own else None)
     return found
