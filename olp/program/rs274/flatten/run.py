@@ -335,9 +335,16 @@ class Walk(Tasks):
         raise ProgramError(why, code="OLP544")
 
     def _macro(self, line: Line, frame: Frame, *, modal: bool) -> None:
-        number = self._word(line, "p")
+        number, name = self._word(line, "p"), "G66" if modal else "G65"
         if number is None:
-            raise ProgramError(f"{'G66' if modal else 'G65'} has no P word", code="OLP516")
+            raise ProgramError(f"{name} has no P word", code="OLP516")
+        letters = [word.letter for word in line.words if word.letter != "n"]
+        if letters[0] != "g" or letters.count("g") > 1:
+            raise ProgramError(
+                f"{name} is not the first word and only code of its block, and what the control makes of the "
+                "others is not known; give them a block of their own",
+                code="OLP518",
+            )
         count = self._word(line, "l")
         repeats = 1 if count is None else whole(count, "the repeat count L")
         arguments = dict(macro_arguments(line, self.variables))

@@ -216,6 +216,15 @@ def test_the_count_stands_in_p_only_without_l_and_only_on_some_controls() -> Non
         ("G65 P2.5", "OLP540", "the program number P is 2.5; expected an integer"),
         ("G65 P2 L1.5", "OLP540", "the repeat count L is 1.5; expected an integer"),
         ("G66", "OLP516", "G66 has no P word"),
+        *(
+            (
+                block,
+                "OLP518",
+                f"{name} is not the first word and only code of its block, and what the control "
+                "makes of the others is not known; give them a block of their own",
+            )
+            for name, block in (("G65", "G90 G65 P2"), ("G65", "X5. G65 P2"), ("G66", "N7 G66 P2 G91"))
+        ),
         (
             "G66.1 P2",
             "OLP544",
