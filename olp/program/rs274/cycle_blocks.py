@@ -170,6 +170,7 @@ class CycleBlocks:
         state, frame, third = self._state, self._state.frames[frame_index], PLANES[run.plane][2]
         depth = "XYZ"[third]
         self._check_levels(run, depth, refused)
+        series = state.series
         dwell, pointed = run.number("P"), context.chunk.pointed[run.slot["P"]]
         for bare in (False, True):
             mine = pointed != bare
@@ -193,7 +194,7 @@ class CycleBlocks:
                 code="OLP531",
             ),
         )
-        r, z = levels(r, z, absolute=not run.incremental, initial_z=self._initial)
+        r, z = levels(r, z, absolute=not series.incremental, initial_z=self._initial)
         unit = frame.unit_mm
         return Drilling(
             run.code, run.plane, r, z, q, p, LCNC_CLEARANCE_MM / unit, unit, frame.offset_mm[third],
@@ -201,14 +202,19 @@ class CycleBlocks:
         )  # fmt: skip
 
     def _check_levels(self, run: CycleRun, depth: str, refused: Refused) -> None:
-        """Refuse levels that the series has of G90 where G91 is in force now, or the other way round."""
+        """Take over the levels that the series has of G90 where G91 is in force now, or the other way round;
+        refuse them where what they are then is not known."""
         series, rules = self._state.series, self._state.profile.cycles
-        known = not series.held.keys().isdisjoint(("R", depth))
-        again = run.slot["R"][0] >= 0 and run.slot[depth][0] >= 0
-        if rules.levels_follow_distance and known and series.incremental is not run.incremental and not again:
-            moves = rules.levels_stay and run.incremental
-            refused.all(f"{TURNED_SERIES}{', or have it written with --expand-cycles' * moves}", "OLP518")
-        series.incremental = run.incremental
+        held, stated = series.held, [run.slot[letter] >= 0 for letter in ("R", depth)]
+        turned = rules.levels_follow_distance and series.incremental is not run.incremental
+        if not turned or held.keys().isdisjoint(("R", depth)) or (stated[0][0] and stated[1][0]):
+            series.incremental = run.incremental
+        elif not rules.levels_stay or stated[0].any() or stated[1].any():
+            refused.all(TURNED_SERIES, "OLP518")
+        elif series.incremental:
+            r, z = (NAN if (number := held.get(letter)) is None else number for letter in ("R", depth))
+            held["R"], held[depth] = levels(r, z, absolute=False, initial_z=self._initial)
+            series.incremental = False
 
     @property
     def _initial(self) -> float:

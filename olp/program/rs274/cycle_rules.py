@@ -45,7 +45,7 @@ class CycleRules:
       following ones are smaller, which is not followed, and K beside it counts no holes.
     - `new_code_forgets`: another cycle of a series takes no words from the one before.
     - `levels_follow_distance`: after a change between G90 and G91 a series needs R and depth again.
-      `levels_stay`: those of G90 are levels in G91 too, and only plain moves are known to write them.
+      `levels_stay`: blocks without R and depth keep the levels, whatever the mode was that these were in.
     - `keeps_numbers`: a series keeps its initial level, R and depth as numbers of the program. Offsets and
       units may change, and G28 may come between. Else it has to end there.
     - `turning`: how the spindle has to turn in these cycles, M3 or M4.

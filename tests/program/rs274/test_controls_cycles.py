@@ -108,18 +108,30 @@ def test_a_later_level_of_okuma_holds_from_its_own_block_on(okuma) -> None:  # t
     assert [row[2] for row in path(program) if row[0] in (10, 20)] == [50, 2, -5, 20, 20, 2, -5, 30]
 
 
-@pytest.mark.parametrize("control", ["fanuc", "haas", "mazak", "siemens-iso", "mach3"])
-def test_levels_of_g90_are_not_taken_for_distances_of_g91(control: str, reading) -> None:  # type: ignore[no-untyped-def]
-    """The usual row of holes: R and depth hold in G91 on these controls, and no word of G91 can say so."""
-    text = "G98 G81 X10. Z-5. R2. F60.\nG91 X5.{} L3\nG90 G80\n"
-    with pytest.raises(ProgramError, match="give R and the depth again") as caught:
-        reading(text.format(""), control)
-    assert ("--expand-cycles" in caught.value.message) == (control in ("fanuc", "haas", "mazak"))
-    with pytest.raises(ProgramError, match="give R and the depth again"):
-        reading(text.format(" Z-7."), control)
-    assert reading(text.format(" Z-7. R-48."), control)
+@pytest.mark.parametrize("control", ["fanuc", "haas", "mazak"])
+@pytest.mark.parametrize(
+    ("text", "again"),
+    [
+        # the usual row of holes, and a series in G91 that goes on at places
+        ("G98 G81 X10. Z-5. R2. F60.\nG91 X5.{} L3\nG90 X2.{}\nG80\n", (" R-18. Z-7.", " R2. Z-5.")),
+        ("G91 G99 G81 X10. Z-5. R-18. F60.\nX3.\nG90 X5.{}\nG91 Y2.{}\nG80\n", (" R2. Z-3.", " R-18. Z-5.")),
+    ],
+)
+def test_levels_of_a_cycle_stay_where_they_are(  # type: ignore[no-untyped-def]
+    text: str, again: tuple[str, str], control: str, reading
+) -> None:
+    """Between G90 and G91, by the same holes with all words."""
+    kept, stated = reading(text.format("", ""), control), reading(text.format(*again), control)
+    assert path(kept) == path(stated)
+    np.testing.assert_array_equal(kept.holes.z_mm, stated.holes.z_mm)
+
+
+@pytest.mark.parametrize(
+    ("control", "more"), [("siemens-iso", ""), ("mach3", ""), ("fanuc", " Z-7."), ("haas", "\nX5. R-40.")]
+)
+def test_levels_that_are_not_known_to_stay_are_refused(control: str, more: str, reading) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises(ProgramError, match=r"give R and the depth again$"):
-        reading("G91 G98 G81 X10. Z-5. R-2. F60.\nG90 X5.\nG80\n", control)
+        reading(f"G98 G81 X10. Z-5. R2. F60.\nG91 X5.{more}\nG90 G80\n", control)
 
 
 @pytest.mark.parametrize(("synchronous", "plain"), [("G284", "G84"), ("G274", "G74")])

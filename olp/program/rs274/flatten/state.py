@@ -247,8 +247,8 @@ class ProgramState(State):
             raise ProgramError(BROKEN_SERIES, code="OLP518")
         follows = self.profile.cycles.levels_follow_distance
         turned = follows and series.held and self.held_absolute is not self.absolute
-        # levels of G90 may stay levels
-        stay = self.profile.cycles.levels_stay and not self.absolute and given.keys().isdisjoint((depth, "R"))
+        # those of the other mode may stay levels
+        stay = self.profile.cycles.levels_stay and given.keys().isdisjoint((depth, "R"))
         if turned and not stay and not {depth, "R"} <= given.keys():
             raise ProgramError(TURNED_SERIES, code="OLP518")
         if not turned or not stay:
