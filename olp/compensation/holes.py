@@ -38,6 +38,11 @@ class HoleWords:
         for i, j in pairwise(self._pieces(writer, int(begin), int(end))):
             row = a + int(holes.first[i]) - first
             self._enter(writer, rows, i, row)
+            profile = writer.program.rs274
+            self._series.go_on(
+                bool(holes.incremental[i]), "XYZ"[PLANES[holes.plane[i]][2]],
+                levels_stay=profile.cycles.levels_stay,
+            )  # fmt: skip
             if rows.flag[row] & np.uint8(Flag.PASS):
                 self._leave(writer, rows, i, j, row)
             elif holes.incremental[i]:
@@ -100,7 +105,20 @@ class HoleWords:
             "XYZ"[axis]: _digits(writer, some, "XYZ"[axis], axis, middle[:, axis], float(before[axis]))
             for axis in (first, second)
         }
-        for letter, depth in (("R", plan.level_mm), ("XYZ"[third], plan.bottom_mm)):
+        depths = (("R", plan.level_mm), ("XYZ"[third], plan.bottom_mm))
+        if self._series.turned and any(
+            _digits(
+                writer,
+                some,
+                letter,
+                third,
+                depth[some, third],
+                offset + self._series.inherited[letter] * unit,
+            ).write.any()
+            for letter, depth in depths
+        ):
+            self._series.restate()
+        for letter, depth in depths:
             held = offset + self._series.inherited.get(letter, np.nan) * unit
             digits = columns[letter] = _digits(writer, some, letter, third, depth[some, third], held)
             put = np.flatnonzero((holes.word[some, CHANGED.index(letter)] >= 0) | digits.write)

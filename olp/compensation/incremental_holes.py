@@ -21,14 +21,40 @@ from olp.program.holes import Hole
 from olp.program.text.edits import EditList
 
 
+#: a level that no hole has, so that it is written
+_NO_LEVEL = 1e9
+
+
 @dataclass(slots=True)
 class SeriesWords:
     """What blocks of the present series take over as it is written: R and the depth by their letters,
-    `initial`, the program coordinate of the tool axis before the series, and its number."""
+    `initial`, the program coordinate of the tool axis before the series, and its number. `incremental`: the
+    blocks are in G91, None before any. `turned`: R and depth were written in the other mode."""
 
     number: int = -1
     initial: float = 0.0
     inherited: dict[str, float] = field(default_factory=dict)
+    incremental: bool | None = None
+    turned: bool = False
+
+    def go_on(self, incremental: bool, depth: str, *, levels_stay: bool) -> None:
+        """Go on in G91 or G90. Where levels stay, the numbers become those of the new mode."""
+        turns = self.incremental is not None and self.incremental is not incremental
+        self.incremental = incremental
+        if not turns or not levels_stay or not {"R", depth} <= self.inherited.keys():
+            return
+        r, z = self.inherited["R"], self.inherited[depth]
+        if incremental:
+            r, z = r - self.initial, z - r
+        else:
+            r, z = self.initial + r, self.initial + r + z
+        self.inherited |= {"R": r, depth: z}
+        self.turned = not self.turned
+
+    def restate(self) -> None:
+        """R and depth are written together next."""
+        self.inherited = dict.fromkeys(self.inherited, _NO_LEVEL)
+        self.turned = False
 
 
 def incremental_block(
@@ -72,6 +98,8 @@ def _hole(
     step = None if hole.repeat else _shared_step(words, plan, index, before, emitted)
     if not hole.repeat and step is None:
         words.unroll()
+    if series.turned and not _stays(words, series, plan, index, initial):
+        series.restate()
     r_place = _depth(words, series, "R", plan.level_mm[index][third], initial, third)
     _depth(words, series, "XYZ"[third], plan.bottom_mm[index][third], r_place, third)
     words.finish()
@@ -99,6 +127,18 @@ def _shared_step(words: _Words, plan: HolePlan, index: int, before: Array, after
         if np.ptp(depth) > words.half(words.decimals(words.slot(letter), third)):
             return None
     return np.where(np.arange(3) == third, 0.0, step)
+
+
+def _stays(words: _Words, series: SeriesWords, plan: HolePlan, index: int, initial: float) -> bool:
+    """Whether a hole needs no other R and depth than it takes over."""
+    third = PLANES[plan.holes[index].plane][2]
+    base, held = initial, series.inherited
+    for letter, levels in (("R", plan.level_mm), ("XYZ"[third], plan.bottom_mm)):
+        own = held[letter] * words.unit_mm
+        if abs(float(levels[index][third]) - base - own) > words.half(words.decimals(None, third)):
+            return False
+        base += own
+    return True
 
 
 def _depth(words: _Words, series: SeriesWords, letter: str, wanted: float, base: float, axis: int) -> float:
