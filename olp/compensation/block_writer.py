@@ -17,7 +17,6 @@ from olp.compensation.plan import Plan
 from olp.compensation.rows import Rows
 from olp.compensation.shared_words import shared_edits
 from olp.compensation.stretches import Decimals, Stretches, digits_of
-from olp.compensation.style import by_unit
 from olp.compensation.writer import Task, Writer
 from olp.core.arrays import Array, Index, Mask, any_in_row, distinct, most_in_row
 from olp.core.progress import Progress, silent
@@ -51,28 +50,36 @@ class BlockWriter(Writer):
     def _rewritten(self, rows: Rows, begin: int, end: int) -> bytes | None:
         edits: list[Edits] = []
         columns = self._called_holes.middled(self, rows, self._columns(rows))
-        for a, b in pairwise(self._breaks(rows)):
-            if rows.flag[a] & np.uint8(Flag.CYCLE):
-                if len(self.program.called):
+        if len(self.program.holes):
+            for part in self._hole_words.parts(self, rows, self._turns(rows)):
+                if part.first < part.last:
+                    edits += self._hole_words.edits(self, rows, part, columns)
+                else:
+                    self._digits(rows, columns, part.a, part.b)
+        else:
+            for a, b in pairwise(self._breaks(rows)):
+                if rows.flag[a] & np.uint8(Flag.CYCLE):
                     edits.append(self._called_holes.edits(self, rows, a, b))
                 else:
-                    edits += self._hole_words.edits(self, rows, a, b)
-            else:
-                self._digits(rows, columns, a, b)
+                    self._digits(rows, columns, a, b)
         self._after_block_delete(rows)
         edits += [*self._word_edits(rows), *arc_edits(self, rows), *shared_edits(self, rows)]
         edits += self._captures(rows)
         return self._spliced(edits, begin, end)
 
+    def _turns(self, rows: Rows) -> Index:
+        """The rows at which words begin to turn otherwise."""
+        if self.turns is None:
+            return np.zeros(0, np.int64)
+        turn = self.turn_of(rows)
+        return np.flatnonzero(turn[1:] != turn[:-1]) + 1
+
     def _breaks(self, rows: Rows) -> list[int]:
-        """Rows at which the blocks of canned cycles begin and end, and words turn otherwise."""
+        """The rows at which holes that blocks call begin and end, and words turn otherwise."""
         cycle = (rows.flag & np.uint8(Flag.CYCLE)) != 0
-        changed = cycle[1:] != cycle[:-1]
-        if self.turns is not None:
-            turn = self.turn_of(rows)
-            changed |= turn[1:] != turn[:-1]
-        changes = np.flatnonzero(changed) + 1
-        return [0, *changes.tolist(), len(rows.move)]
+        changes = np.flatnonzero(cycle[1:] != cycle[:-1]) + 1
+        every = distinct(np.concatenate((changes, self._turns(rows))))
+        return [0, *every.tolist(), len(rows.move)]
 
     def _columns(self, rows: Rows) -> list[AxisRows]:
         """Per axis of the words, what its digits are made from."""
@@ -127,11 +134,8 @@ class BlockWriter(Writer):
         for axis, column in enumerate(columns):
             before = float(entry[axis])
             part = column.part(slice(a, b))
-            decimals = Decimals(*(
-                by_unit(places, axis, part.unit)
-                for places in (self.style.least, self.style.usual, self.style.grid)
-            ))  # fmt: skip
-            rows.put(a, b, axis, digits_of(part, stretches, before, decimals))
+            digits = digits_of(part, stretches, before, Decimals.of(self.style, axis, part.unit))
+            rows.put(slice(a, b), axis, digits)
         if turn:
             rows.emitted[a:b] = self.along_axes(rows.emitted[a:b], turn)
 

@@ -72,6 +72,10 @@ class Digits:
     decimals: npt.NDArray[np.int8]
     write: Mask
 
+    def part(self, rows: Index) -> Digits:
+        """Those of some rows."""
+        return Digits(self.emitted[rows], self.mantissa[rows], self.decimals[rows], self.write[rows])
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Starts:

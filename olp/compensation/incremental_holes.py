@@ -20,7 +20,6 @@ from olp.core.values import dataclass
 from olp.program.holes import Hole
 from olp.program.text.edits import EditList
 
-
 #: a level that no hole has, so that it is written
 _NO_LEVEL = 1e9
 

@@ -69,9 +69,9 @@ class Rows:
         """Order of a row's words among insertions at one position of the text."""
         return row * 8 + 16
 
-    def put(self, a: int, b: int, axis: int, digits: Digits) -> None:
-        """The digits of one axis for rows a..b."""
-        self.emitted[a:b, axis] = digits.emitted
-        self.write[a:b, axis] = digits.write
-        self.mantissa[a:b, axis] = digits.mantissa
-        self.decimals[a:b, axis] = digits.decimals
+    def put(self, which: slice | Index, axis: int, digits: Digits) -> None:
+        """The digits of one axis for some rows."""
+        self.emitted[which, axis] = digits.emitted
+        self.write[which, axis] = digits.write
+        self.mantissa[which, axis] = digits.mantissa
+        self.decimals[which, axis] = digits.decimals

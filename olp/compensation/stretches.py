@@ -6,13 +6,18 @@ So all stretches of one kind are rounded at once, and one number an axis is carr
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from olp.compensation.digits import POW10, Absolute, AxisRows, Digits, Places, Starts, incremental, part_of
+from olp.compensation.style import Style, by_unit
 from olp.core.arrays import Array, Index, Mask
 from olp.core.values import dataclass
+
+#: Where the axis is as a stretch begins, from its number and where the stretch before it left the axis.
+Enters = Callable[[int, float], float]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,6 +28,12 @@ class Decimals:
     least: Places
     usual: Places
     grid: Places
+
+    @staticmethod
+    def of(style: Style, axis: int, unit: Array | float) -> Decimals:
+        """Those of rows in this unit, one or (n,) of each."""
+        least, usual, grid = (by_unit(p, axis, unit) for p in (style.least, style.usual, style.grid))
+        return Decimals(least, usual, grid)
 
     def part(self, rows: slice | Index) -> Decimals:
         return Decimals(part_of(self.least, rows), part_of(self.usual, rows), part_of(self.grid, rows))
@@ -36,11 +47,14 @@ class Stretches:
     counting: Mask
 
     @staticmethod
-    def of(counting: Mask, unit: Array | float) -> Stretches:
-        """Of rows (n,), at least one, by their mode and their unit."""
+    def of(counting: Mask, unit: Array | float, part: Index | None = None) -> Stretches:
+        """Of rows (n,), at least one, by their mode, their unit, and the `part` of the text that they are
+        in."""
         changes = counting[1:] != counting[:-1]
         if isinstance(unit, np.ndarray):
             changes |= unit[1:] != unit[:-1]
+        if part is not None:
+            changes |= part[1:] != part[:-1]
         bounds = np.concatenate(([0], np.flatnonzero(changes) + 1, [len(counting)]))
         return Stretches(bounds, counting[bounds[:-1]])
 
@@ -57,14 +71,17 @@ class Stretches:
         return chosen, Starts.of(first, len(chosen))
 
 
-def digits_of(rows: AxisRows, stretches: Stretches, before: float, decimals: Decimals) -> Digits:
-    """The digits of consecutive rows; `before` is the position as written on entry."""
+def digits_of(
+    rows: AxisRows, stretches: Stretches, before: float, decimals: Decimals, enters: Enters | None = None
+) -> Digits:
+    """The digits of consecutive rows; `before` is the position as written on entry. Where other blocks move
+    the axis between stretches, `enters` says where it is then."""
     plain, starts = stretches.rows(~stretches.counting)
     part, places = rows.part(plain), decimals.part(plain)
     fixed = Absolute.of(part, starts, places.least, places.usual)
-    if len(stretches) == 1 and not stretches.counting[0]:
+    if len(stretches) == 1 and not stretches.counting[0] and enters is None:
         return fixed.digits(part, before)
-    entry, odd = _entries(rows, stretches, before, decimals, _Ends.of(part, fixed))
+    entry, odd = _entries(rows, stretches, before, decimals, _Ends.of(part, fixed), enters)
     count = len(rows.command)
     result = Digits(
         np.empty(count), np.empty(count, np.int64), np.empty(count, np.int8), np.empty(count, bool)
@@ -116,7 +133,12 @@ class _Ends:
 
 
 def _entries(
-    rows: AxisRows, stretches: Stretches, before: float, decimals: Decimals, ends: _Ends
+    rows: AxisRows,
+    stretches: Stretches,
+    before: float,
+    decimals: Decimals,
+    ends: _Ends,
+    enters: Enters | None,
 ) -> tuple[Array, dict[int, Digits]]:
     """(k,) where the axis is as each stretch begins, and the digits of stretches in G91 that are rounded row
     by row, as words are kept in them or a position is unknown."""
@@ -128,6 +150,8 @@ def _entries(
     scale, command = POW10[grid].tolist(), rows.command[stop].tolist()
     entry, odd, plain = np.empty(len(stretches)), {}, 0
     for k, counting in enumerate(stretches.counting.tolist()):
+        if enters is not None:
+            before = enters(k, before)
         entry[k] = before
         if not counting:
             before = ends.after(plain, before)

@@ -121,6 +121,16 @@ def _machine_positions(rng: random.Random) -> Iterator[str]:
         yield f"G1 {_point(rng)}"
 
 
+def _series(rng: random.Random) -> Iterator[str]:
+    """Short series of holes."""
+    while True:
+        x, y = (f"{rng.uniform(299, 301):.3f}" for _ in range(2))
+        yield f"G99 G8{rng.choice('15')} X{x} Y{y} Z20 R29"
+        yield f"X{rng.uniform(299, 301):.3f}"
+        yield "G80"
+        yield f"G0 {_point(rng)}"
+
+
 def _mixed(rng: random.Random) -> Iterator[str]:
     """One event of a kind that shops mix, then a few moves."""
     while True:
@@ -165,6 +175,7 @@ KINDS: dict[str, Callable[[random.Random], Iterator[str]]] = {
     "dwells": _dwells,
     "path modes": _path_modes,
     "machine positions": _machine_positions,
+    "series": _series,
     "mixed": _mixed,
     "long": _long,
 }
