@@ -17,7 +17,7 @@ from olp.program.holes import CHANGED, Holes
 from olp.program.rs274.axis_state import AxisState
 from olp.program.rs274.codes import CYCLES, INVERSE_TIME, RETRACT_TO_R
 from olp.program.rs274.collector import Collector
-from olp.program.rs274.cycle_runs import CycleRun, Refused
+from olp.program.rs274.cycle_runs import CycleRun, CycleWords, Refused
 from olp.program.rs274.cycles import HOLE_STROKES, LCNC_CLEARANCE_MM, MOST_REPEATS, levels, repeats_error
 from olp.program.rs274.modes import Context, scaled
 from olp.program.rs274.state import BROKEN_SERIES, KNOWN_BY, NAN, OPEN_RETRACT, TURNED_SERIES
@@ -52,11 +52,11 @@ class CycleBlocks:
         first = max(self._line + 1 - context.chunk.first_line, 0)
         return self._line < 0 or not CYCLES.issuperset(context.motion[first:row].tolist())
 
-    def run(self, context: Context, line: Index, frame: int) -> None:
-        """Carry out the blocks on lines (n,) of the chunk, in this frame, which are one run of `runs`. Raises
-        ProgramError for the first that cannot be carried out."""
+    def run(self, context: Context, words: CycleWords, line: Index, frame: int) -> None:
+        """Carry out the blocks on lines (n,) of the chunk, in this frame, which are one run of `runs`, of
+        whose `words` theirs are. Raises ProgramError for the first that cannot be carried out."""
         state, collector = self._state, self._collector
-        run = CycleRun.of(context, line, scaled(context, state, collector.remarks))
+        run = CycleRun.of(context, words, line, scaled(context, state, collector.remarks))
         refused = Refused(context, line)
         self._turning = Turning.of(state.frames[frame].turn)
         self._check_modes(context, run, refused)

@@ -11,6 +11,7 @@ from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import ProgramError
 from olp.core.values import dataclass
 from olp.program.rs274.codes import CYCLES, INCREMENTAL, PLANE_OF
+from olp.program.rs274.lexer import WordChunk
 from olp.program.rs274.modes import Context
 from olp.program.rs274.state import NAN
 
@@ -20,21 +21,51 @@ _CYCLES = np.zeros(1001, bool)
 _CYCLES[list(CYCLES)] = True
 
 
-def runs(context: Context, line: Index) -> dict[int, int]:
+@dataclass(frozen=True, slots=True, eq=False)
+class CycleWords:
+    """The words of blocks of canned cycles (n,) on lines of a chunk. `slot` leads from a letter to the
+    indices (n,) of its words, -1 where omitted; (w,) `letter` and `owner` are all their words and the block
+    of each, and `first` (n + 1,) is where those of each block begin among them."""
+
+    line: Index
+    slot: dict[str, Index]
+    letter: npt.NDArray[np.uint8]
+    owner: Index
+    first: Index
+
+    @staticmethod
+    def of(chunk: WordChunk, line: Index) -> CycleWords:
+        count = chunk.first_word[line + 1] - chunk.first_word[line]
+        first = np.append(0, np.cumsum(count))
+        owner = np.repeat(np.arange(len(line)), count)
+        word = np.arange(len(owner)) + (chunk.first_word[line] - first[:-1])[owner]
+        letter, slot = chunk.letter[word], {}
+        for name in _READ:
+            mine = np.flatnonzero(letter == ord(name))
+            slot[name] = np.full(len(line), -1, np.int64)
+            slot[name][owner[mine]] = word[mine]
+        return CycleWords(line, slot, letter, owner, first)
+
+
+_NO_WORDS = CycleWords(np.zeros(0, np.int64), {}, np.zeros(0, np.uint8), *[np.zeros(0, np.int64)] * 2)
+
+
+def runs(context: Context, line: Index) -> tuple[dict[int, int], CycleWords]:
     """The runs of blocks of canned cycles that are carried out at once, among blocks on lines (n,) of the
-    chunk: from the first block of each to the one behind it. A run has no event, and no change of cycle,
-    plane or distance mode."""
+    chunk: from the first block of each to the one behind it, and the words of all. A run has no event, and no
+    change of cycle, plane or distance mode."""
     row = np.flatnonzero(_CYCLES[context.motion[line]])
-    if not row.size:
-        return {}
     line = line[row]
+    if not row.size:
+        return {}, _NO_WORDS
+    words = CycleWords.of(context.chunk, line)
     breaks = np.cumsum(context.event) + np.cumsum(~_CYCLES[context.motion])
     same = (breaks[line[1:]] == breaks[line[:-1]]) & ~context.event[line[:-1]]
     for mode in (context.motion, context.plane, context.distance):
         same &= mode[line[1:]] == mode[line[:-1]]
     cuts = np.flatnonzero(~same)
     first, last = row[np.append(0, cuts + 1)], row[np.append(cuts, len(row) - 1)]
-    return dict(zip(first.tolist(), (last + 1).tolist(), strict=True))
+    return dict(zip(first.tolist(), (last + 1).tolist(), strict=True)), words
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,20 +84,16 @@ class CycleRun:
     owner: Index
 
     @staticmethod
-    def of(context: Context, line: Index, value: Array) -> CycleRun:
-        chunk, first = context.chunk, int(line[0])
-        begin, count = chunk.first_word[line], chunk.first_word[line + 1] - chunk.first_word[line]
-        owner = np.repeat(np.arange(len(line)), count)
-        word = np.arange(len(owner)) + (begin - np.cumsum(count) + count)[owner]
-        letter = chunk.letter[word]
-        slot = {}
-        for name in _READ:
-            mine = np.flatnonzero(letter == ord(name))
-            slot[name] = np.full(len(line), -1, np.int64)
-            slot[name][owner[mine]] = word[mine]
+    def of(context: Context, words: CycleWords, line: Index, value: Array) -> CycleRun:
+        """The run on these lines, which are one behind the other among those of the words."""
+        first = int(line[0])
+        a = int(words.line.searchsorted(first))
+        some = slice(words.first[a], words.first[a + len(line)])
         return CycleRun(
             line, int(context.motion[first]), PLANE_OF[int(context.plane[first])],
-            bool(context.distance[first] == INCREMENTAL), value, slot, letter, owner,
+            bool(context.distance[first] == INCREMENTAL), value,
+            {name: slot[a : a + len(line)] for name, slot in words.slot.items()},
+            words.letter[some], words.owner[some] - a,
         )  # fmt: skip
 
     def number(self, letter: str) -> Array:

@@ -45,7 +45,7 @@ from olp.program.rs274.codes import (
 from olp.program.rs274.collector import Collector
 from olp.program.rs274.commands import own_words
 from olp.program.rs274.cycle_blocks import CycleBlocks
-from olp.program.rs274.cycle_runs import runs
+from olp.program.rs274.cycle_runs import CycleWords, runs
 from olp.program.rs274.cycles import stroke_budget
 from olp.program.rs274.extrusion import Extrusion
 from olp.program.rs274.lexer import WordChunk, chunks
@@ -95,8 +95,8 @@ def read(
 class _Rows:
     """The motion lines of a chunk (n,) while they are read: how many have a frame, how many a position.
     `present` is the index of the frame in force, None after what may have changed it. `runs` leads from the
-    first row of each run of canned cycles to the row behind it. `own` are the moves that the control makes by
-    itself among the rows that have no position yet.
+    first row of each run of canned cycles to the row behind it, and `cycles` are the words of all. `own` are
+    the moves that the control makes by itself among the rows that have no position yet.
 
     What holds for the rows wherever they start is there at once: line `number`, `plane`, `kind` and `flag` of
     the moves, the `word` (n, 3) of each coordinate, and whether these are `incremental`."""
@@ -104,6 +104,7 @@ class _Rows:
     blocks: Blocks
     frame: npt.NDArray[np.int32]
     runs: dict[int, int]
+    cycles: CycleWords
     number: Index
     plane: npt.NDArray[np.int16]
     kind: npt.NDArray[np.uint8]
@@ -255,7 +256,7 @@ class _Reader:
         if self.collector.keep_words:
             word = np.where(word >= 0, word + context.base, -1)
         frame, plane = np.zeros(len(blocks), np.int32), context.plane[line]
-        return _Rows(blocks, frame, runs(context, line), number, plane, kind, flag, word, incremental)
+        return _Rows(blocks, frame, *runs(context, line), number, plane, kind, flag, word, incremental)
 
     def _stretches(self, context: Context, blocks: Blocks, beside: Beside) -> None:
         chunk, state, event = context.chunk, self.state, context.event
@@ -374,7 +375,7 @@ class _Reader:
         rows.resolved = stop
         line, frame = rows.blocks.line[row:stop], int(rows.frame[row])
         if row in rows.runs and not effect.home and not effect.machine:
-            self.cycle_blocks.run(context, line, frame)
+            self.cycle_blocks.run(context, rows.cycles, line, frame)
         else:
             self.special_blocks.run(context, int(line[0]), rows.blocks.slot[row : row + 1], frame, effect)
 

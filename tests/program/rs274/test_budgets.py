@@ -242,7 +242,7 @@ AT_ONCE = {
     "helices": ("G1 X1\n", "G2 X2 Z{k} I0.5\nG2 X1 Z3 I-0.5\n"),
 }
 #: kinds of lines of which every second or so is an event, and how many functions a line may call
-EVENTS = {"switches": 6, "dwells": 16, "shifts": 110, "mixed": 40, "series": 500}
+EVENTS = {"switches": 6, "dwells": 16, "shifts": 110, "mixed": 40, "series": 400}
 LEANING = '[[curves]]\nfile = "{}.csv"\ninterpolation = "linear"\n'
 CURVES = {
     f"{a}.csv": f"{a.upper()}_mm,EXX_um\n-1000,-9\n2000,20\n".replace("EXX", f"E{a.upper()}{a.upper()}")
