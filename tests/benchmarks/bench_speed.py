@@ -113,7 +113,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--only", nargs="*", default=[""], metavar="WORD", help="rows whose name has a word")
     parser.add_argument("--share", type=float, default=1.0, help="of the lengths")
-    parser.add_argument("--beside", metavar="CHECKOUT", help="another checkout of this project")
+    parser.add_argument(
+        "--beside", metavar="CHECKOUT", type=os.path.abspath, help="another checkout of this project"
+    )
     options = parser.parse_args()
     print("| program | user CPU | beside it | ratio | to reach | peak | to the other checkout |")
     print("|---|---|---|---|---|---|---|")
@@ -135,7 +137,7 @@ def main() -> None:
                 beside, ratio = f"{seconds:.2f} s", f"{cpu / seconds:.2f} x"
             other = "-"
             if options.beside:
-                ENVIRONMENT["PYTHONPATH"] = str(Path(options.beside).resolve())
+                ENVIRONMENT["PYTHONPATH"] = options.beside
                 other = f"{cpu / user_seconds([sys.executable, '-m', 'olp', *row.words], 2)[0]:.2f} x"
                 ENVIRONMENT["PYTHONPATH"] = str(ROOT)
             memory = f"{peak / 1024:.0f} MB"
