@@ -50,6 +50,17 @@ def test_membership_is_that_of_numpy(values: npt.NDArray[np.int64], some: npt.ND
         assert np.array_equal(is_in(values, given_as), judged)
 
 
+@pytest.mark.parametrize("kind", (np.uint8, np.int16, np.int32, np.float32, np.float64))
+@pytest.mark.parametrize("highest", (250, 10**6))
+def test_membership_is_that_of_numpy_in_many_values_of_any_kind(kind: type, highest: int) -> None:
+    rng = np.random.default_rng(3)
+    values = rng.integers(0, 200, 6000).astype(kind)
+    for count in (1, 12, 40, 400):
+        some = rng.integers(-5, highest, count)
+        for given_as in (some, some.astype(float), some + 0.5):
+            assert np.array_equal(is_in(values, given_as), np.isin(values, given_as))
+
+
 @given(rows)
 def test_rows_are_judged_as_numpy_does(values: npt.NDArray[np.float64]) -> None:
     values = np.where(values == 1.0, np.nan, values)
