@@ -28,8 +28,8 @@ VOLUMES = ("points", "stations", "pods")
 
 def told(what: str, total: Scores, rms: str, seconds: float) -> None:
     print(
-        f"{what}: {100 * total.coverage:5.1f} % inside 2 sigma, rms {rms}, stated/rms "
-        f"{total.stated / total.rms:.2f}; {seconds:.1f} s a fit",
+        f"{what}: {100 * total.coverage:5.1f} % inside 2 sigma, rms {rms}, mean sigma/rms "
+        f"{total.mean / total.rms:.2f}; {seconds:.1f} s a fit",
         flush=True,
     )
 

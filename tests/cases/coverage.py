@@ -36,6 +36,11 @@ class Scores:
     def stated(self) -> float:
         return float(np.sqrt(np.mean(self.sigma**2)))
 
+    @property
+    def mean(self) -> float:
+        """Mean stated sigma."""
+        return float(np.mean(self.sigma))
+
     @classmethod
     def of(cls, parts: Sequence[Scores]) -> Scores:
         return cls(*(np.concatenate([getattr(p, name) for p in parts]) for name in ("error", "sigma")))

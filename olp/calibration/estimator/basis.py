@@ -2,8 +2,9 @@
 
 P-splines after P. H. C. Eilers and B. D. Marx (Statist. Sci. 11, 1996): many equally spaced knots, and a
 prior on the coefficients in place of a choice of knots. The prior is a sum of processes: one whose curvature
-wanders, one whose slope wanders, one whose value wanders, and ripple. All have the eigenvectors of the second
-differences, and spectra that fall with the sixth, fourth, second and no power of the frequency.
+wanders, one whose slope wanders, one whose value wanders, ripple, and swings, which hold nothing shorter than
+some waves. All have the eigenvectors of the second differences, and spectra that fall with the sixth, fourth,
+second and no power of the frequency; those of swings fall with the third, and end.
 """
 
 from __future__ import annotations
@@ -55,12 +56,16 @@ class Wave:
 @dataclass(frozen=True, slots=True)
 class Scales:
     """Sizes of the processes that make a curve, mm or rad over the whole length of its axis. `bows` is of the
-    curvature that wanders, `bends` of the slope, `steps` of the value, `ripple` of what has no neighbours."""
+    curvature that wanders, `bends` of the slope, `steps` of the value, `ripple` of what has no neighbours.
+    Swings are smooth, with up to some waves over the axis: `slow`, `middle` and `quick` ones."""
 
     bows: float
     bends: float
     steps: float
     ripple: float
+    slow: float = 0.0
+    middle: float = 0.0
+    quick: float = 0.0
 
     @classmethod
     def of(cls, values: Iterable[float]) -> Scales:
@@ -68,12 +73,23 @@ class Scales:
 
     @property
     def values(self) -> Array:
-        """(4,) all of them."""
-        return np.array((self.bows, self.bends, self.steps, self.ripple))
+        """(7,) all of them."""
+        return np.array((self.bows, self.bends, self.steps, self.ripple, self.slow, self.middle, self.quick))
+
+    def times(self, smooth: float, rough: float) -> Scales:
+        """The same with bows, bends and swings by one factor, steps and ripple by another."""
+        return Scales.of(self.values * (smooth, smooth, rough, rough, smooth, smooth, smooth))
 
 
-#: Powers of the eigenvalues of second differences that are the variances of the processes, times -1.
-POWERS = (1.5, 1.0, 0.5, 0.0)
+#: Powers of the frequency with which the variances of the processes fall, and the half waves over the axis
+#: where they end.
+SPECTRA = (
+    (6.0, np.inf), (4.0, np.inf), (2.0, np.inf), (0.0, np.inf), (3.0, 2.5), (3.0, 4.0), (3.0, 6.5)
+)  # fmt: skip
+#: Row of ripple in a spectrum.
+RIPPLE = 3
+#: Least variance of an eigenvector against the largest: swings end, and a precision is finite.
+_LEAST_SHARE = 1e-12
 #: Eigenvalues of the second differences that are zero: those of a constant and of a straight line.
 STRAIGHT = 2
 
@@ -119,13 +135,15 @@ class Spline:
         return np.asarray(second.T @ second)
 
     def spectrum(self) -> tuple[Array, Array]:
-        """(4, count) variances of the eigenvectors of `roughness` where one process has the size 1, zero of
+        """(7, count) variances of the eigenvectors of `roughness` where one process has the size 1, zero of
         the first two; and the eigenvectors, (count, count), by column."""
         values, vectors = np.linalg.eigh(self.roughness())
-        table = np.zeros((len(POWERS), self.count))
-        for row, power in zip(table, POWERS, strict=True):
+        frequency = (values[STRAIGHT:] * self.cells**4) ** 0.25
+        table = np.zeros((len(SPECTRA), self.count))
+        for row, (power, waves) in zip(table, SPECTRA, strict=True):
             # of a process of length 1: white noise has a variance that does not depend on the cells
-            row[STRAIGHT:] = (values[STRAIGHT:] * self.cells**4) ** -power * (self.cells if power else 1.0)
+            row[STRAIGHT:] = frequency**-power * (self.cells if power else 1.0)
+            row[STRAIGHT:] *= np.exp(-((frequency / (np.pi * waves)) ** 2))
         return table, vectors
 
 
@@ -173,6 +191,7 @@ class CurveSpace:
         coefficients of straight lines and of features."""
         table, vectors = self.spline.spectrum()
         variance = scales.values**2 @ table
+        variance = np.maximum(variance, _LEAST_SHARE * variance.max())
         variance[:STRAIGHT] = amplitude**2
         m = self.spline.count
         full = np.eye(m + len(self.features)) / amplitude**2

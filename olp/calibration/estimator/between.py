@@ -12,7 +12,7 @@ from functools import cache
 
 import numpy as np
 
-from olp.calibration.estimator.basis import STRAIGHT, Scales, Spline, slope_grid, slope_weights
+from olp.calibration.estimator.basis import RIPPLE, STRAIGHT, Scales, Spline, slope_grid, slope_weights
 from olp.calibration.observations.base import Noise
 from olp.calibration.observations.lines import Line, targets_of
 from olp.core.arrays import Array
@@ -84,8 +84,8 @@ def _left(spline: Spline, scales: Scales, amplitude: float, q: Array, read: _Rea
     own = sizes @ table
     grain = 0.0
     if apart:
-        own = sizes[:-1] @ table[:-1]
-        grain = float(sizes[-1] * (spline.values(q) ** 2).sum(axis=1).mean())
+        own = own - sizes[RIPPLE] * table[RIPPLE]
+        grain = float(sizes[RIPPLE] * (spline.values(q) ** 2).sum(axis=1).mean())
     own[:STRAIGHT] = amplitude**2
     root = vectors * np.sqrt(own)
     wanted = (spline.values(q) - spline.values(np.array([read.datum_mm]))) @ root

@@ -3,12 +3,14 @@
 Every combination of scales has a marginal likelihood of the readings of a curve's own lines (D. J. C. MacKay,
 Neural Computation 4, 1992). No combination is chosen: few targets exclude few of them, and what they do not
 exclude may be between the targets. So a curve gets the size of each process that is to be expected, and the
-curves of one machine, which are alike, share what they say.
+curves of one machine, which are alike, share what they say. The smooth part is one of several processes, the
+same one for all curves of a machine. See docs/background/uncertainty.md.
 """
 
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Mapping, Sequence
 from functools import cache
 
@@ -18,22 +20,31 @@ from olp.calibration.estimator.basis import STRAIGHT, Scales, Spline
 from olp.calibration.estimator.normal import Normal
 from olp.core.arrays import Array
 
-#: Candidates for bows of positioning, mm, as all candidates. Lines tell no bends from bows, steps and ripple.
-BOWS = np.geomspace(0.3, 300.0, 10)
+#: Processes that make the smooth part of a curve, as rows of a spectrum: one of them, and no other.
+SMOOTH = (0, 1, 4, 5, 6)
+#: How probable each is before any reading, up to a factor: few targets do not tell them apart.
+SMOOTH_BEFORE = 0.3, 1.0, 0.5, 1.0, 4.0
+#: Candidates for the smooth part of positioning, root mean square over the axis in mm, as all candidates.
+SIZES = np.geomspace(2e-3, 0.512, 9)
 #: Candidates for steps.
-STEPS = np.concatenate([[0.0], np.geomspace(3e-4, 0.1, 7)])
+STEPS = np.concatenate([[0.0], np.geomspace(4e-4, 0.0256, 6)])
 #: Candidates for ripple.
-RIPPLE = np.concatenate([[0.0], np.geomspace(1e-4, 1e-2, 6)])
+RIPPLE = np.concatenate([[0.0], np.geomspace(4e-4, 6.4e-3, 5)])
 #: How large the curves of a class usually are against positioning, in mm or rad.
 USUAL = {"positioning": 1.0, "straightness": 0.4, "angle": 0.6e-3}
-#: How far the scales of curves of one class differ, as a standard deviation in candidates.
-ALIKE = 0.5
+#: How far curves of one class differ, as a standard deviation in candidates: kind of the smooth part, its
+#: size, steps, ripple. Few targets take a wave of a screw for a smooth curve where its period suits them, so
+#: ripple is told by all curves together.
+ALIKE = 0.0, 1.0, 0.5, 0.25
 #: The same of classes, beside what they usually are.
-RELATED = 1.5
+RELATED = 0.0, 1.0, 0.5, 0.5
+#: Before any reading: the probability of no steps, what they are else (mm), and the standard deviation of the
+#: logarithm of that.
+STEPS_BEFORE = 0.9, 1.2e-3, 0.7
+#: The same of ripple.
+RIPPLE_BEFORE = 0.02, 3.2e-3, 0.5
 #: The scale that stands for all probable ones is the mean of this power of them: 2 is the expected variance.
-MOMENT = 1.5
-#: Candidates for steps and ripple are as probable, before any reading, as this power of them.
-LARGER = 0.5
+MOMENT = 2.0
 #: Directions of the unknowns that readings determine less than this, against the best, say nothing.
 _LEAST_SHARE = 1e-13
 
@@ -45,26 +56,33 @@ def class_of(name: str) -> str:
     return "positioning" if name[1] == name[2] else "straightness"
 
 
+@cache
+def _rms() -> Array:
+    """(7,) root mean square over the axis of each process of size 1."""
+    spline = Spline(0.0, 1.0, 240)
+    table, vectors = spline.spectrum()
+    values = spline.values(np.linspace(0.0, 1.0, 721)) @ vectors
+    return np.asarray(np.sqrt(table @ (values**2).mean(axis=0)))
+
+
+@cache
 def _table(every: int) -> Array:
-    """(n, 4) all combinations of every so many candidates, of positioning."""
-    combined = itertools.product(BOWS[::every], STEPS[::every], RIPPLE[::every])
-    return np.array([(bows, 0.0, steps, ripple) for bows, steps, ripple in combined])
-
-
-#: All combinations of candidates (n, 4).
-_ALL = _table(1)
-#: Fewer of them, for comparisons of features.
-_FEWER = _table(2)
+    """(n, 7) all combinations of every so many candidates, of positioning."""
+    combined = itertools.product(SMOOTH[::every], SIZES[::every], STEPS[::every], RIPPLE[::every])
+    table = np.zeros((math.prod(len(grid[::every]) for grid in (SMOOTH, SIZES, STEPS, RIPPLE)), 7))
+    for row, (process, size, steps, ripple) in zip(table, combined, strict=True):
+        row[[process, 2, 3]] = size, steps, ripple
+    return table / _rms()
 
 
 def candidates(kind: str) -> Array:
-    """(n, 4) all combinations of bows, bends, steps and ripple of a class of curves."""
-    return _ALL * USUAL[kind]
+    """(n, 7) all combinations of a smooth part, steps and ripple of a class of curves."""
+    return _table(1) * USUAL[kind]
 
 
 def fewer(kind: str) -> Array:
-    """(n, 4) every other candidate of each, for comparisons of features."""
-    return _FEWER * USUAL[kind]
+    """(n, 7) every other candidate of each, for comparisons of features."""
+    return _table(2) * USUAL[kind]
 
 
 class Evidence:
@@ -88,7 +106,7 @@ class Evidence:
         self.parts = np.stack([(base * variance) @ base.T for variance in table])
 
     def covariance(self, scales: Array, chosen: Sequence[int]) -> Array:
-        """(n, r, r) covariance of the reduced readings for scales (n, 4) and some features."""
+        """(n, r, r) covariance of the reduced readings for scales (n, 7) and some features."""
         own = self.feature * self.rows[:, [self.count + i for i in chosen]]
         return np.asarray(np.tensordot(scales**2, self.parts, 1) + self.fixed + own @ own.T)
 
@@ -142,15 +160,21 @@ def characters(values: Mapping[str, Array]) -> dict[str, Scales]:
     return found
 
 
-#: Candidates of bows, of steps, of ripple.
-_SHAPE = len(BOWS), len(STEPS), len(RIPPLE)
+#: Kinds of smooth parts, sizes of them, steps, ripple.
+_SHAPE = len(SMOOTH), len(SIZES), len(STEPS), len(RIPPLE)
 
 
 def _before() -> Array:
-    """Log probabilities of candidates before any reading: larger steps and ripple are more probable, else the
-    many small candidates, which readings hardly tell apart, would outweigh one that matters."""
-    steps, ripple = (np.log(np.maximum(grid, grid[1]) / grid[-1]) for grid in (STEPS, RIPPLE))
-    return np.asarray(LARGER * (np.zeros(len(BOWS))[:, None, None] + steps[:, None] + ripple))
+    """Log probabilities of candidates before any reading, for all sizes of smooth parts alike."""
+    smooth = np.log(SMOOTH_BEFORE)[:, None, None, None]
+    steps, ripple = _log_normal(STEPS, *STEPS_BEFORE), _log_normal(RIPPLE, *RIPPLE_BEFORE)
+    return np.asarray(smooth + steps[:, None] + ripple + np.zeros(_SHAPE))
+
+
+def _log_normal(grid: Array, none: float, middle: float, spread: float) -> Array:
+    """Log probabilities of candidates, the first of which is zero."""
+    density = np.exp(-0.5 * (np.log(grid[1:] / middle) / spread) ** 2)
+    return np.asarray(np.log(np.append(none, (1.0 - none) * density / density.sum())))
 
 
 def _logarithm(table: Array) -> Array:
@@ -166,15 +190,17 @@ def _normal(values: Array) -> Array:
 @cache
 def _kernel(count: int, differ: float) -> Array:
     """(count, count) how probable a candidate of one curve is, where that of others is another, by column."""
+    if differ == 0.0:
+        return np.eye(count)
     apart = np.subtract.outer(np.arange(count), np.arange(count)) / differ
     table = np.exp(-0.5 * apart**2)
     return np.asarray(table / table.sum(axis=0))
 
 
-def _blurred(table: Array, differ: float) -> Array:
+def _blurred(table: Array, differ: Sequence[float]) -> Array:
     """A table with every axis spread by what curves differ."""
-    for axis, count in enumerate(_SHAPE):
-        table = np.moveaxis(np.tensordot(_kernel(count, differ), table, (1, axis)), 0, axis)
+    for axis, (count, own) in enumerate(zip(_SHAPE, differ, strict=True)):
+        table = np.moveaxis(np.tensordot(_kernel(count, own), table, (1, axis)), 0, axis)
     return table
 
 

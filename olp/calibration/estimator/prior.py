@@ -167,14 +167,14 @@ def _larger(one: Class, factor: float) -> Class:
 
 def _rougher(one: Class, factor: float) -> Class:
     """The smooth parts by a factor, steps and ripple as they are."""
-    return one[0], Scales.of(one[1].values * (factor, factor, 1.0, 1.0))
+    return one[0], one[1].times(factor, 1.0)
 
 
 def _stepped(one: Class, factor: float) -> Class:
     """Steps and ripple by a factor, the smooth parts as they are. They never grow: points and lengths cannot
     tell them from noise and from readings that slipped."""
     less = min(factor, 1.0)
-    return one[0], Scales.of(one[1].values * (1.0, 1.0, less, less))
+    return one[0], one[1].times(1.0, less)
 
 
 def _middle(scales: Sequence[Scales]) -> Scales:

@@ -8,7 +8,7 @@ from cases.coverage import Scores, lines_of
 from cases.fast import some_fast
 from judge import families
 
-from olp.calibration.estimator.basis import CurveSpace, Scales, Spline
+from olp.calibration.estimator.basis import RIPPLE, CurveSpace, Scales, Spline
 from olp.calibration.estimator.character import Evidence, candidates, characters
 from olp.calibration.estimator.normal import Normal
 
@@ -31,16 +31,22 @@ def test_two_sigma_cover_on_the_average_of_families(count: int) -> None:
     assert np.mean([one.rms for one in total]) < 1.25
 
 
-@pytest.mark.parametrize("which", range(4))
+@pytest.mark.parametrize("which", range(7))
 def test_a_process_is_the_same_with_more_cells(which: int) -> None:
     """Variance of the second difference over thirds of the axis; ripple has no length."""
-    scales = Scales.of(np.eye(4)[which])
+    scales = Scales.of(np.eye(7)[which])
     seconds = []
     for cells in (24, 48):
         space = CurveSpace.of(Spline(0.0, 900.0, cells), (), 0.0, "free")
         rows = np.array([1.0, -2.0, 1.0]) @ space.values(np.array([150.0, 450.0, 750.0]))
         seconds.append(rows @ np.linalg.inv(space.process(Scales.of(scales.values + 1e-6), 1.0)) @ rows)
     assert seconds[1] == pytest.approx(seconds[0], rel=0.1)
+
+
+def test_a_curve_of_swings_alone_has_a_finite_precision() -> None:
+    precision = CurveSpace.of(SPLINE, (), 0.0, "free").process(Scales.of(np.eye(7)[4]), 1.0)
+    assert np.isfinite(precision).all()
+    assert np.linalg.cond(precision) < 1e14
 
 
 def test_scales_add_up_as_variances() -> None:
@@ -70,7 +76,10 @@ def test_the_evidence_is_that_of_the_dense_gaussian() -> None:
     at = np.linspace(0.0, 900.0, 9)
     normal = readings(rng, 40.0 * np.sin(at / 150.0), at)
     evidence = Evidence(normal, SPLINE, 50.0, 7.0)
-    scales = np.array([[9.0, 4.0, 3.0, 2.0], [200.0, 1.0, 30.0, 8.0], [0.5, 60.0, 0.5, 0.5]])
+    scales = np.array([
+        [9.0, 4.0, 3.0, 2.0, 0.0, 0.0, 0.0], [200.0, 1.0, 30.0, 8.0, 5.0, 60.0, 2.0],
+        [0.5, 60.0, 0.5, 0.5, 90.0, 0.0, 30.0],
+    ])  # fmt: skip
     rows = SPLINE.values(at)
     # y that the normal equations hold: all of it, as there are fewer readings than unknowns
     full = np.column_stack([rows, at / 900.0])
@@ -88,11 +97,15 @@ def test_the_evidence_is_that_of_the_dense_gaussian() -> None:
     assert gain == pytest.approx(pair[0] - pair[1], abs=1e-8)
 
 
+#: All angles.
+ANGLES = tuple(f"E{kind}{axis}" for kind in "ABC" for axis in "XYZ")
+
+
 def test_curves_that_say_nothing_take_the_character_of_the_others() -> None:
     """Evidence of eight angles for little ripple, and of none: the ninth is expected as the eight."""
     flat = np.zeros(len(candidates("angle")))
     ripple = candidates("angle")[:, 3]
-    quiet = {f"E{kind}{axis}": np.where(ripple < 2e-7, 0.0, -30.0) for kind in "ABC" for axis in "XYZ"}
+    quiet = {name: np.where(ripple < 2e-7, 0.0, -30.0) for name in ANGLES}
     told = characters({**quiet, "ECZ": flat})["ECZ"]
     alone = characters({"ECZ": flat})["ECZ"]
     assert told.ripple < 0.2 * alone.ripple
@@ -100,3 +113,40 @@ def test_curves_that_say_nothing_take_the_character_of_the_others() -> None:
     related = characters({**quiet, "EXX": np.zeros(len(flat))})["EXX"]
     alone = characters({"EXX": np.zeros(len(flat))})["EXX"]
     assert told.ripple / 0.6e-3 < related.ripple < 0.8 * alone.ripple
+
+
+def test_a_wave_that_targets_take_for_a_smooth_curve_stays_in_the_uncertainty() -> None:
+    """Eight angles show ripple, or steps. The ninth denies that much of it, as where the period of its wave
+    suits the targets: it has less of steps then, and ripple all the same."""
+    table = candidates("angle")
+    for row, least, most in ((RIPPLE, 0.9, 1.0), (2, 0.2, 0.7)):
+        size = table[:, row]
+        largest = np.abs(size - size.max()) < 1e-12
+        shown = {name: np.where(largest, 0.0, -30.0) for name in ANGLES if name != "ECZ"}
+        found = characters({**shown, "ECZ": np.where(largest, -6.0, 0.0)})["ECZ"].values[row]
+        assert least * size.max() < found < 1.01 * most * size.max()
+
+
+def test_the_kind_of_the_smooth_part_is_that_of_the_machine() -> None:
+    """Curves of one class show slow swings; those of another, which say nothing, have hardly others."""
+    table = candidates("angle")
+    shown = {name: np.where(table[:, 4] > 0.0, 0.0, -10.0) for name in ANGLES}
+    told = characters({**shown, "EXX": np.zeros(len(table))})["EXX"]
+    assert told.slow > 0.0
+    assert max(told.bows, told.bends, told.middle, told.quick) < 1e-6 * told.slow
+
+
+@pytest.mark.parametrize(("row", "waves"), [(4, 2.5), (5, 4.0), (6, 6.5)])
+def test_swings_hold_nothing_shorter_than_their_waves(row: int, waves: float) -> None:
+    """Two polynomials' degrees for each half wave leave nothing of them; bends go on."""
+    spline = Spline(0.0, 1.0, 96)
+    table, vectors = spline.spectrum()
+    at = np.linspace(0.0, 1.0, 501)
+    low = np.polynomial.chebyshev.chebvander(2.0 * at - 1.0, int(4 + 2.0 * waves))
+    left = []
+    for process in (row, 1):
+        drawn = spline.values(at) @ (vectors * np.sqrt(table[process]))
+        rest = drawn - low @ np.linalg.lstsq(low, drawn)[0]
+        left.append(np.sqrt(np.mean((rest**2).sum(axis=1)) / np.mean((drawn**2).sum(axis=1))))
+    assert left[0] < 0.01
+    assert left[1] > 3.0 * left[0]
