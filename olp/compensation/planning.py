@@ -106,10 +106,11 @@ class Planning:
         if contour is not None:
             whole |= contour.whole
         kinds = (Kind.LINE, Kind.RAPID) if limits.split_rapids else (Kind.LINE,)
-        free = is_in(path.kind, kinds) & ~whole
+        free = ~whole
         # behind a `/` block the start depends on the switch, so no cut can be right for both
         free[1:] &= ~(((path.flag[:-1] & ~path.flag[1:]) & np.uint8(Flag.DELETED)) != 0)
-        cuts_line = subdivide_lines(path, model, begin, target, free, chord)
+        lines = free & is_in(path.kind, kinds)
+        cuts_line = subdivide_lines(path, model, begin, target, lines, chord)
         tell("correct", 0.5)
         chord_arc = max(chord - ARC_DIGIT_SHARE * limits.digit_mm, 0.3 * limits.tolerance_mm)
         turning, band = (None, 0.0) if reversal is None else (reversal.axes, reversal.band_mm)
@@ -122,7 +123,7 @@ class Planning:
         if contour is not None:
             rows = contour.hold(rows)
         if reversal is not None:
-            rows = self._with_play(path, rows, reversal, contour, ahead_mm, part(tell, 0.7, 1.0))
+            rows = self._with_play(path, rows, reversal, contour, free, ahead_mm, part(tell, 0.7, 1.0))
         if limits.refuse_outside:
             _check_box(path, model, rows)
         if len(path):
@@ -130,8 +131,8 @@ class Planning:
         return rows
 
     def _with_play(
-        self, path: Toolpath, rows: Plan, reversal: Reversal, contour: Contour | None, ahead_mm: Array,
-        tell: Progress,
+        self, path: Toolpath, rows: Plan, reversal: Reversal, contour: Contour | None, free: Mask,
+        ahead_mm: Array, tell: Progress,
     ) -> Plan:  # fmt: skip
         """The plan of a band with the rows that take up backlash."""
         limits, steady = self.limits, None if contour is None else contour.steady
@@ -140,7 +141,7 @@ class Planning:
         )  # fmt: skip
         tell("correct", 0.3)
         return carry_play(
-            path, self.model, rows, reversal, contour, self._carried, insert=limits.insert,
+            path, self.model, rows, reversal, contour, self._carried, free=free, limits=limits,
             tell=part(tell, 0.3, 1.0),
         )  # fmt: skip
 

@@ -7,8 +7,8 @@ band keeps it where it is instead.
 
 from __future__ import annotations
 
-from dataclasses import field, replace
-from typing import TypeVar
+from dataclasses import field, fields, replace
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +16,8 @@ import numpy.typing as npt
 from olp.compensation.contour import Contour
 from olp.compensation.dead_band import UNKNOWN, Rest, follow
 from olp.compensation.invert import invert
-from olp.compensation.plan import Plan
+from olp.compensation.plan import Limits, Plan
+from olp.compensation.ramps import Ramps, cuts, ramps
 from olp.core.arrays import Array, Index, Mask, any_in_row, is_in
 from olp.core.progress import Progress, silent
 from olp.core.toolpath import Flag, Kind, Toolpath
@@ -58,13 +59,15 @@ class Reversal:
 @dataclass(slots=True, eq=False)
 class Carried:
     """What a plan with play passes on to the one behind it: where each axis rests in each of the `passes` of
-    the iteration. Of its last row (3,) each: the target, the command, and by how much the load is `held` from
-    the target."""
+    the iteration. Of its last row (3,) each: the target, the command, by how much the load is `held` from the
+    target, and where it should be; and whether the row belongs to a `cut` that a ramp may follow."""
 
     passes: list[tuple[Rest, ...]] = field(default_factory=lambda: [(UNKNOWN,) * 3])
     target_mm: Array = field(default_factory=lambda: np.full(3, np.nan))
     command_mm: Array = field(default_factory=lambda: np.full(3, np.nan))
     held_mm: Array = field(default_factory=lambda: np.zeros(3))
+    load_mm: Array = field(default_factory=lambda: np.full(3, np.nan))
+    cut: bool = False
 
 
 def carry_play(
@@ -75,12 +78,14 @@ def carry_play(
     contour: Contour | None,
     carried: Carried,
     *,
-    insert: bool,
+    free: Mask,
+    limits: Limits,
     tell: Progress = silent,
 ) -> Plan:
     """The plan with play: commands lead by half the backlash. Where an axis turns round in a feed move, a row
-    that only takes it up comes first; without `insert` not before moves that are never split, and never along
-    a `contour` under cutter compensation. `carried` is that of the rows before, and becomes that of these.
+    that only takes it up comes first, or it is taken up on a ramp between moves that are `free` (n,) to be
+    split. Without `limits.insert` no row comes before moves that are never split, and never along a `contour`
+    under cutter compensation. `carried` is that of the rows before, and becomes that of these.
 
     Where one axis turns, the straightness of another may jump with it, so that one turns too. The states are
     iterated until they agree.
@@ -124,14 +129,46 @@ def carry_play(
         if change < _SAME_PLAY and turn + 1 >= len(carried.passes):
             break
     rows = replace(rows, command_mm=command, play=play)
-    may = _may_turn(path, rows, carried.command_mm, insert=insert)
+    may = _may_turn(path, rows, carried.command_mm, insert=limits.insert)
     if contour is not None:
         may &= ~contour.steady[rows.move]
     turns &= may[:, None]
     before, carried.passes = replace(carried), _different(passes)
     carried.target_mm, carried.command_mm = rows.target_mm[-1].copy(), command[-1].copy()
     carried.held_mm = held[-1].copy()
-    return _take_up(model, rows, tool, held, turns, before) if turns.any() else rows
+    carried.load_mm = _wanted(model, command[-1:], play[-1:], held[-1:])[0]
+    # under cutter compensation no move is split for a ramp
+    free = free & (contour is None)
+    carried.cut = bool(cuts(path, free)[rows.move[-1]])
+    if not turns.any():
+        return rows
+    return _taken_up(path, model, rows, tool, held, turns, before, free, limits)
+
+
+def _taken_up(
+    path: Toolpath, model: ErrorModel, rows: Plan, tool: Array, held: Array, turns: Mask, before: Carried,
+    free: Mask, limits: Limits,
+) -> Plan:  # fmt: skip
+    """The plan with the rows that take up backlash: of ramps where there is room, of steps elsewhere."""
+    assert rows.play is not None
+    width = model.backlash_at(rows.command_mm)
+    assert width is not None
+    load = _wanted(model, rows.command_mm, rows.play, held)
+    ahead = before.target_mm, before.load_mm
+    ramp = ramps(path, rows, turns, free, np.nan_to_num(width), load, ahead, limits, cut_before=before.cut)
+    steps = turns.copy()
+    steps[ramp.row] = False
+    new = _Inserted.joined(
+        _steps(model, rows, tool, held, steps, before), *_ends(model, rows, tool, held, ramp, before)
+    )
+    return new.into(_across(model, rows, tool, held, ramp))
+
+
+def _wanted(model: ErrorModel, command: Array, play: Array, held: Array) -> Array:
+    """(r, 3) where loads should be: commands without their leads, and without holds."""
+    width = model.backlash_at(command)
+    assert width is not None
+    return np.asarray(command - np.maximum(np.nan_to_num(width), 0.0) / 2 * play - held)
 
 
 def _different(passes: list[tuple[Rest, ...]]) -> list[tuple[Rest, ...]]:
@@ -179,9 +216,52 @@ def _before(first: Array, rows: Array) -> Array:
     return np.vstack((first, rows[:-1]))
 
 
-def _take_up(model: ErrorModel, rows: Plan, tool: Array, held: Array, turns: Mask, before: Carried) -> Plan:
-    """Insert rows that turn the drive round before the load moves; `before` is of the row before the first
-    one."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _Inserted:
+    """New rows of a plan: (m,) the rows `where` before which they come, and their columns."""
+
+    where: Index
+    move: npt.NDArray[np.int32]
+    target_mm: Array
+    command_mm: Array
+    reach: Array
+    take_up: Mask
+    play: Array
+
+    @staticmethod
+    def joined(*parts: _Inserted) -> _Inserted:
+        """Those of several parts in the order of rows; those of an earlier part come first before one row."""
+        where = np.concatenate([part.where for part in parts])
+        order = np.argsort(where, kind="stable")
+
+        def column(name: str) -> Any:
+            return np.concatenate([getattr(part, name) for part in parts])[order]
+
+        return _Inserted(where[order], *(column(f.name) for f in fields(_Inserted)[1:]))
+
+    def into(self, rows: Plan) -> Plan:
+        """A plan with them."""
+        assert rows.play is not None
+
+        def insert(column: npt.NDArray[_Scalar], new: npt.NDArray[_Scalar]) -> npt.NDArray[_Scalar]:
+            return np.insert(column, self.where, new, axis=0)
+
+        return replace(
+            rows,
+            move=insert(rows.move, self.move),
+            target_mm=insert(rows.target_mm, self.target_mm),
+            command_mm=insert(rows.command_mm, self.command_mm),
+            raw=insert(rows.raw, rows.raw[self.where]),
+            reach=insert(rows.reach, self.reach),
+            take_up=insert(rows.take_up, self.take_up),
+            play=insert(rows.play, self.play),
+        )
+
+
+def _steps(
+    model: ErrorModel, rows: Plan, tool: Array, held: Array, turns: Mask, before: Carried
+) -> _Inserted:
+    """Rows that turn the drive round before the load moves; `before` is of the row before the first one."""
     assert rows.play is not None
     where = np.flatnonzero(any_in_row(turns))
     target = _before(before.target_mm, rows.target_mm)[where]
@@ -193,18 +273,41 @@ def _take_up(model: ErrorModel, rows: Plan, tool: Array, held: Array, turns: Mas
     step = command - start
     stay = ~turns[where] & (step * play < 0)
     command[stay] = start[stay]
-    same = (where > 0) & (rows.move[where] == rows.move[where - 1])
+    reach = np.where(_same(rows, where), rows.reach[where - 1], 0.0)
+    return _Inserted(where, rows.move[where], target, command, reach, np.ones(len(where), bool), play)
 
-    def insert(column: npt.NDArray[_Scalar], new: npt.NDArray[_Scalar]) -> npt.NDArray[_Scalar]:
-        return np.insert(column, where, new, axis=0)
 
-    return replace(
-        rows,
-        move=insert(rows.move, rows.move[where]),
-        target_mm=insert(rows.target_mm, target),
-        command_mm=insert(rows.command_mm, command),
-        raw=insert(rows.raw, rows.raw[where]),
-        reach=insert(rows.reach, np.where(same, rows.reach[where - 1], 0.0)),
-        take_up=insert(rows.take_up, np.ones(len(where), bool)),
-        play=insert(rows.play, play),
-    )
+def _same(rows: Plan, where: Index) -> Mask:
+    """Whether rows belong to the move of the one before them."""
+    return np.asarray((where > 0) & (rows.move[where] == rows.move[where - 1]))
+
+
+def _ends(
+    model: ErrorModel, rows: Plan, tool: Array, held: Array, ramp: Ramps, before: Carried
+) -> tuple[_Inserted, _Inserted]:
+    """The rows at which ramps end, and those at which they begin."""
+    early = ramp.before > 0.0
+    start = _before(before.target_mm, rows.target_mm)
+
+    def at(where: Index, share: Array) -> _Inserted:
+        assert rows.play is not None
+        target = start[where] + share[:, None] * (rows.target_mm[where] - start[where])
+        play = rows.play[where]
+        command = invert(model, target + held[where], tool if tool.ndim == 1 else tool[where], play)
+        first = np.where(_same(rows, where), rows.reach[where - 1], 0.0)
+        reach = first + share * (rows.reach[where] - first)
+        return _Inserted(where, rows.move[where], target, command, reach, np.zeros(len(where), bool), play)
+
+    return at(ramp.row, ramp.behind), at(ramp.row[early] - 1, 1.0 - ramp.before[early])
+
+
+def _across(model: ErrorModel, rows: Plan, tool: Array, held: Array, ramp: Ramps) -> Plan:
+    """The plan with drives amid their backlash where a ramp passes a turn."""
+    assert rows.play is not None
+    passes = ramp.done > 0.0
+    row, done = ramp.row[passes], ramp.done[passes]
+    at = row - 1
+    play, command = rows.play.copy(), rows.command_mm.copy()
+    play[at] += done[:, None] * (rows.play[row] - rows.play[at])
+    command[at] = invert(model, rows.target_mm[at] + held[at], tool if tool.ndim == 1 else tool[at], play[at])
+    return replace(rows, play=play, command_mm=command)

@@ -1,7 +1,8 @@
 """A program in bands: consecutive lines, each band complete in itself, so that working columns are small.
 
-A band ends only at a quiet place, between two plain feed moves that are alike. No rule of a correction looks
-across one. So what is made from the bands is the same as from the whole, whatever their size.
+A band ends only at a quiet place, between two plain feed moves that are alike, and where no axis turns round.
+No rule of a correction looks across one. So what is made from the bands is the same as from the whole,
+whatever their size.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Array, Mask
+from olp.core.arrays import Array, Mask, all_in_row
 from olp.core.spool import unload
 from olp.core.toolpath import Flag, Kind, Toolpath
 from olp.core.values import dataclass
@@ -89,7 +90,18 @@ def _quiet_before(path: Toolpath, a: int, b: int) -> Mask:
     feed = _is_feed(kind[before]) & _is_feed(kind[behind])
     alike = (flag[before] == flag[behind]) & ((flag[behind] & ~_PLAIN) == 0)
     alike &= (path.frame[before] == path.frame[behind]) & (path.line[before] != path.line[behind])
+    ways = directions(path, a - 1, b)
+    curved = (kind[before] != Kind.LINE) | (kind[behind] != Kind.LINE)
+    alike &= curved | all_in_row(ways[:-1] == ways[1:])
     return np.asarray(feed & alike)
+
+
+def directions(path: Toolpath, a: int, b: int) -> Array:
+    """(b - a, 3) the directions in which moves a..b drive each axis: 1, -1, or 0 where it stands still or
+    where its motion is not known."""
+    end = path.end_mm[a:b]
+    start = np.vstack((path.start_mm if a == 0 else path.end_mm[a - 1], end[:-1]))
+    return np.asarray(np.sign(np.nan_to_num(end - start)))
 
 
 def _is_feed(kind: npt.NDArray[np.uint8]) -> Mask:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -69,7 +69,7 @@ class RetimeOptions(UnrollOptions):
     feed_override: float = 100.0
     gains: bool = False
     controller: str | None = None
-    settings: Mapping[str, float] = field(default_factory=dict)
+    settings: Mapping[str, float] | None = None
     log: PathLike | None = None
     log_profile: str | None = None
     block_delete: bool = False
@@ -303,7 +303,7 @@ def retime(
     session = Session.start(machine, job)
     options = RetimeOptions(
         blend_mm=blend_mm, study_blend=study_blend, max_inertial_um=max_inertial_um,
-        feed_override=feed_override, gains=gains, controller=controller, settings=settings or {}, log=log,
+        feed_override=feed_override, gains=gains, controller=controller, settings=settings, log=log,
         log_profile=log_profile, block_delete=block_delete, flatten=flatten,
         expand_cycles=expand_cycles, peck_clearance_mm=peck_clearance_mm, date=date, accept=tuple(accept),
     )  # fmt: skip
@@ -356,7 +356,7 @@ def run(
         report["blend_study"] = blend_study(case, plan, FACTORS, tell)
     if control is not None:
         bare = options.blend_mm is None and setup.machine.blend_mm is None
-        own = control_time(control, case, limits, options.settings, log, bare=bare)
+        own = control_time(control, case, limits, options.settings or {}, log, bare=bare)
         report["controller"] = placed(own, origin)
     if options.gains:
         report |= placed({"gains": gains(case, plan, tell)}, origin)
@@ -377,7 +377,7 @@ def _control(session: Session, options: RetimeOptions) -> tuple[Control | None, 
             raise UsageError("a log and settings are those of a control; name it with --controller")
         return None, None
     control = control_named(options.controller)
-    control.values(options.settings)
+    control.values(options.settings or {})
     if options.log is None:
         return control, None
     layout = None if options.log_profile is None else load_profile(options.log_profile, session.sources.read)
