@@ -65,7 +65,7 @@ def draw(seed: int) -> tuple[Recipe, list[str]]:
     kind = rng.random()
     if kind < 0.25:
         recipe = replace(
-            recipe, backlash_um={a: float(rng.choice([3.0, 6.0])) for a in "XYZ" if rng.random() < 0.6}
+            recipe, backlash_um={a: float(rng.choice([3.0, 15.0])) for a in "XYZ" if rng.random() < 0.6}
         )
     elif kind < 0.35:
         recipe = replace(recipe, directed="".join(a for a in "XYZ" if rng.random() < 0.5))
@@ -120,6 +120,22 @@ def test_the_corrected_path_is_the_nominal_one(tmp_path: Path, seed: int) -> Non
 @pytest.mark.parametrize("seed", range(1200, 1224))
 def test_the_corrected_path_is_the_nominal_one_in_turned_work_offsets(tmp_path: Path, seed: int) -> None:
     check(seed, tmp_path, turn=True)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_backlash_is_taken_up_on_ramps_along_a_contour_of_chords(tmp_path: Path, seed: int) -> None:
+    """25 um in X and Y, taken up where the contour turns round, beside errors of 21 kinds with waves."""
+    recipe = Recipe(backlash_um={"X": 25.0, "Y": 25.0}, waves=4.0, directed="")
+    path = machines.random_machine(tmp_path, seed, recipe)
+    turn = np.linspace(0.0, 2 * np.pi, 241)
+    away = (12.0 + seed) * (1.0 + 0.2 * np.cos(5 * turn + seed))
+    rows = [f"G1 X{x:.4f} Y{y:.4f}" for x, y in zip(away * np.cos(turn), away * np.sin(turn), strict=True)]
+    start = rows[0].replace("G1", "G0")
+    text = "\n".join(["G21 G90 G54 G61", "G0 Z20", start, "G1 Z1 F600", *rows, "G0 Z20", "M2", ""])
+    corrected = olp.correct(text.encode(), path)
+    verdict = judged(text.encode(), corrected.data, tmp_path, kinds=CUTTING)
+    assert verdict.max_um <= allowed_um(text.encode()) + SLACK_UM
+    assert corrected.report["moves"]["inserted_blocks"] > 10
 
 
 @pytest.mark.parametrize("seed", range(1100, 1106))
