@@ -245,6 +245,7 @@ class AxisState(OffsetState):
         if not _UNITS.isdisjoint(codes):
             self.unit = next(code for code in codes if code in UNITS)
         self._check_modes(codes, line)
+        self._check_number(block, line)
         changes_tool = TOOL_CHANGE in m_codes or (SET_TOOL in m_codes and self.profile.m61_sets_tool)
         check_block(self, codes, line, changes_tool=changes_tool)
         self._switch_tips(block.g_codes)

@@ -18,6 +18,7 @@ from olp.core.units import AXES
 from olp.core.values import dataclass
 from olp.program.frames import touch_of
 from olp.program.rs274.codes import (
+    CYCLES,
     DWELL,
     LENGTHS,
     LOCAL_OFFSET,
@@ -25,6 +26,7 @@ from olp.program.rs274.codes import (
     PATH_MODES,
     UNITS,
     WORK_OFFSETS,
+    WRITE_OFFSET,
 )
 from olp.program.rs274.offsets import Offsets
 from olp.program.rs274.profiles.base import increment
@@ -201,6 +203,20 @@ class OffsetState(State):
 
     def _set_length(self, vector: Vector) -> None:
         self.offsets.length, self.length_unit = vector, self.unit or METRIC
+
+    def _check_number(self, block: EventBlock, line: int) -> None:
+        """Refuse a word that may be the number of a work offset, or belong to another code of its block."""
+        offsets = self.profile.offsets_alone.intersection(block.g_codes)
+        others = [code for code in block.g_codes if code in CYCLES or code in (DWELL, WRITE_OFFSET)]
+        for code in offsets:
+            letter, name = self.profile.offset_words.get(code, ""), f"G{code / 10:g}"
+            if others and letter in block.by_letter:
+                raise ProgramError(
+                    f"{letter} may be that of {name} or of G{others[0] / 10:g}; put {name} in a block of its "
+                    "own",
+                    line=line,
+                    code="OLP518",
+                )
 
     def _select_offset(self, code: int, line: int, by_letter: dict[str, Word]) -> None:
         name = f"G{code / 10:g}"

@@ -4,8 +4,9 @@ At each corner the planner takes what is fastest of three. A corner that needs l
 servo cycle is driven as it is. A blend arc touches both moves, takes at most half of each, and stays within
 the path tolerance; half of the acceleration is kept for the speed along it. Or the end of one move overlaps
 the start of the next one; both then have half of the acceleration.
-Source: LinuxCNC's documents "Trajectory Control" and "Simple Tool Offsets and Blend Arcs"; what they leave
-open is from runs of the control itself (tests/trajectory/test_controls_in_linuxcnc.py).
+Source: LinuxCNC's manual, chapter "Trajectory Control", and the rules and constants of its published planner
+(src/emc/tp: tp.c, blendmath.c, tc.c); compared with runs of the control itself
+(tests/trajectory/test_controls_in_linuxcnc.py).
 """
 
 from __future__ import annotations

@@ -445,6 +445,12 @@ REFUSED: dict[tuple[str, str], dict[str, object]] = {
     ("linuxcnc", "G10 L2 P1.5 X5"): {"why": f"P1.5 {TABLE}", "code": "OLP516"},
     ("linuxcnc", "M100\nG92 Y5"): {"why": f"Y {POSITION}", "code": "OLP524", "line": 4},
     ("linuxcnc", "M100\nG10 L20 P1 Z5"): {"why": f"Z {POSITION}", "code": "OLP524", "line": 4},
+    ("fanuc", "G54 G4 P500"): {
+        "why": "P may be that of G54 or of G4; put G54 in a block of its own", "code": "OLP518",
+    },
+    ("fanuc", "G98 G54 G82 X1. Z-5. R2. P300"): {
+        "why": "P may be that of G54 or of G82; put G54 in a block of its own", "code": "OLP518",
+    },
     ("fanuc", "G54.1 X1."): {
         "why": "G54.1 needs a P word with the number of the work offset", "code": "OLP516",
     },
