@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Array
+from olp.core.arrays import Array, Index
 from olp.core.errors import UsageError
 from olp.errormodel.base import ErrorModel
 from olp.errormodel.boxed import as_points
@@ -36,6 +36,17 @@ def play_after(play: Array, moved_mm: Array, backlash_mm: Array | None) -> Array
     gain = 2.0 * moved_mm / np.where(slack, width, 1.0)
     turned = np.where(moved_mm != 0.0, np.sign(moved_mm), play)
     return np.where(slack, np.clip(play + gain, -1.0, 1.0), turned)
+
+
+def taken_up(old: Array, new: Array, moved_mm: Array, backlash_mm: Array) -> tuple[Index, Index, Array]:
+    """Where axes that turned round have taken up all of their backlash inside of motions: (k,) the motion and
+    the axis, and the share of the motion. `old` and `new` are the play before and after motions in one
+    direction each; all are (n, 3)."""
+    needed = np.abs(new - old) / 2 * np.maximum(np.nan_to_num(backlash_mm), 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = needed / np.abs(moved_mm)
+    motion, axis = np.nonzero((new != old) & (share < 1.0))
+    return motion, axis, share[motion, axis]
 
 
 def play_states(axis_mm: Array, backlash_mm: Array, start: Array | None = None) -> Array:

@@ -21,7 +21,7 @@ from olp.core.spool import unload
 from olp.core.toolpath import Flag, Kind, Toolpath
 from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
-from olp.errormodel.reversal import play_after, play_interval
+from olp.errormodel.reversal import play_after, play_interval, taken_up
 from olp.errormodel.sampling import clear_length_mm, longer, steps_needed
 from olp.program.text.columns import apart, spans
 from olp.proof.smooth_joints import SmoothJoints
@@ -281,11 +281,8 @@ class Tracer:
         moved = stop - begin
         width = self.model.backlash_at(begin)
         assert width is not None
-        needed = np.abs(new - old) / 2 * np.maximum(np.nan_to_num(width), 0.0)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            of_span = needed / np.abs(moved)
-        rows, axis = np.nonzero((new != old) & (of_span < 1.0))
-        where = early[rows] + of_span[rows, axis] * span[rows]
+        rows, axis, of_span = taken_up(old, new, moved, width)
+        where = early[rows] + of_span * span[rows]
         point = self._at(start, end, arc, part[rows], where)
         play = play_after(old[rows], point - begin[rows], width[rows])
         play[np.arange(len(rows)), axis] = new[rows, axis]

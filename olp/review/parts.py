@@ -9,7 +9,7 @@ from olp.core.geometry import PLANES, arc_points
 from olp.core.toolpath import Kind, Toolpath
 from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
-from olp.errormodel.reversal import plays
+from olp.errormodel.reversal import plays, taken_up
 from olp.program.feeds.moves import lengths_mm
 from olp.program.program import Program
 
@@ -127,6 +127,40 @@ def _cuts(ends: Ends, other: Ends, owner: Index, groups: Index, shift: Array, mo
         rank = 2.0 * (np.cumsum(np.diff(move, prepend=-1) != 0) - 1)
         cut[rows] = np.clip(np.maximum.accumulate(share + rank) - rank, 0.0, 1.0)
     return cut
+
+
+def with_taken_up(
+    written: Toolpath,
+    model: ErrorModel,
+    move: Index,
+    share: Array,
+    part: Index,
+    within: Array,
+    command: Array,
+) -> tuple[Index, Array, Index, Array] | None:
+    """Samples with those where an axis that turned round has taken up its backlash inside of a cut of the
+    corrected program: from there on the tip is off by all of it. None where there are none more."""
+    play, width = plays(model, command), model.backlash_at(command)
+    if play is None or width is None:
+        return None
+    turned = 1 + np.flatnonzero((play[1:] != play[:-1]).any(axis=1))
+    turned = turned[written.kind[part[turned]] != Kind.RAPID]
+    before = turned - 1
+    rows, _, of_span = taken_up(play[before], play[turned], command[turned] - command[before], width[before])
+    rows, before = turned[rows], before[rows]
+    if not rows.size:
+        return None
+    # a move or a part goes on, or begins at 0
+    early = np.where(move[before] == move[rows], share[before], 0.0)
+    begun = np.where(part[before] == part[rows], within[before], 0.0)
+    order = np.argsort(rows + of_span / 2, kind="stable")
+    rows, early, begun, of_span = rows[order], early[order], begun[order], of_span[order]
+    columns = (
+        (move, move[rows]), (share, early + of_span * (share[rows] - early)),
+        (part, part[rows]), (within, begun + of_span * (within[rows] - begun)),
+    )  # fmt: skip
+    moves, shares, parts, withins = (np.insert(column, rows, values) for column, values in columns)
+    return moves.astype(np.int64), shares.astype(float), parts.astype(np.int64), withins.astype(float)
 
 
 def _arc_share(ends: Ends, move: Index, tip: Array, guess: Array) -> Array:

@@ -25,7 +25,7 @@ from olp.program.program import Program
 from olp.proof.judgement import Judgements
 from olp.proof.proof import Counts
 from olp.proof.smooth_joints import SmoothJoints
-from olp.review.parts import BLOCK, Ends, Parts, error_mm, held_mm, set_beside, set_in_holes
+from olp.review.parts import BLOCK, Ends, Parts, error_mm, held_mm, set_beside, set_in_holes, with_taken_up
 
 Single = npt.NDArray[np.float32]
 
@@ -103,7 +103,12 @@ def sample(
     parts = Parts.of(ends, other, groups, shift, model)
     start = bool(np.isfinite(path.start_mm).all())
     move, share, part, within = _merged(_steps(path, model, step_mm), parts, start=start)
-    axis, command = ends.at(move, share), other.at(part, within)
+    command = other.at(part, within)
+    more = with_taken_up(written, model, move, share, part, within, command)
+    if more is not None:
+        move, share, part, within = more
+        command = other.at(part, within)
+    axis = ends.at(move, share)
     tip = _Tip(model, path, shift)
     play, play_there = plays(model, axis), plays(model, command)
     # deviations in half the memory: that is finer than the page shows

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from olp.core.errors import UsageError
 from olp.errormodel.build import build
 from olp.errormodel.calibration import Calibration, Curve
-from olp.errormodel.reversal import play_after, play_interval, play_states, plays
+from olp.errormodel.reversal import play_after, play_interval, play_states, plays, taken_up
 
 BOX = np.array([[0.0, 100.0]] * 3)
 TOOL = np.zeros(3)
@@ -251,3 +251,27 @@ def test_the_interval_goes_on_from_any_command(seed: int, n: int, cut: int, hole
     k = min(cut, n) - 1
     there = play_interval(command[k:], width[k:], np.stack((low[k], high[k])))
     np.testing.assert_allclose(there, (low[k:], high[k:]), rtol=0, atol=1e-12)
+
+
+def test_backlash_is_taken_up_at_the_share_where_it_is() -> None:
+    rng = np.random.default_rng(4)
+    old, moved, width = (
+        rng.uniform(-1, 1, (200, 3)),
+        rng.normal(0, 0.02, (200, 3)),
+        rng.uniform(0, 0.02, (200, 3)),
+    )
+    new = play_after(old, moved, width)
+    motion, axis, share = taken_up(old, new, moved, width)
+    # a motion inside of the backlash may be among them by rounding: its share is 1
+    assert (np.abs(new[motion, axis]) == 1.0)[share < 1.0 - 1e-9].all()
+    some = share < 1.0 - 1e-9
+    motion, axis, share = motion[some], axis[some], share[some]
+    assert 100 < len(motion) < 600
+    for factor, there in ((1.0 + 1e-9, True), (1.0 - 1e-6, False)):
+        so_far = play_after(old[motion], factor * share[:, None] * moved[motion], width[motion])
+        of_axis = so_far[np.arange(len(motion)), axis]
+        assert (of_axis == new[motion, axis]).all() == there
+    # the others end inside of their backlash
+    inside = np.abs(new) < 1.0
+    inside[motion, axis] = True
+    assert (inside | (new == old)).all()
