@@ -9,7 +9,7 @@ import numpy as np
 
 from olp.compensation.digits import Absolute, AxisRows, Digits, Starts
 from olp.compensation.drilled_rows import DrilledRows, Heights
-from olp.compensation.incremental_holes import SeriesWords, incremental_block
+from olp.compensation.incremental_holes import SeriesWords, incremental_block, restates
 from olp.compensation.rows import Rows
 from olp.compensation.stretches import Decimals, Stretches, digits_of
 from olp.compensation.writer import Writer
@@ -93,6 +93,8 @@ class HoleWords:
         if rows.flag[part.a] & np.uint8(Flag.PASS):
             self._leave(writer, rows, int(i), int(j), part.a)
             return []
+        if self._series.turned and restates(writer, self._series, int(i), int(j)):
+            self._series.restate()
         for k in (i + np.flatnonzero(holes.repeat[i:j] == 0)).tolist():
             row = part.a + int(holes.first[k] - holes.first[i])
             incremental_block(writer, rows, self._series, k, row, one_by_one)
@@ -159,7 +161,8 @@ class HoleWords:
             self._go_on(writer, int(some[0]))
         column = columns[third].part(drilled.items[drilled.place])
         levels, kept = _both_levels(writer, column, drilled, third, before)
-        if before.turned and any(one.write[drilled.run == 0].any() for one in levels.values()):
+        stated = bool((holes.word[some[0], [CHANGED.index(letter) for letter in levels]] >= 0).all())
+        if before.turned and (stated or any(one.write[drilled.run == 0].any() for one in levels.values())):
             before.restate()
             levels, kept = _both_levels(writer, column, drilled, third, before)
         words |= levels

@@ -97,8 +97,6 @@ def _hole(
     step = None if hole.repeat else _shared_step(words, plan, index, before, emitted)
     if not hole.repeat and step is None:
         words.unroll()
-    if series.turned and not _stays(words, series, plan, index, initial):
-        series.restate()
     r_place = _depth(words, series, "R", plan.level_mm[index][third], initial, third)
     _depth(words, series, "XYZ"[third], plan.bottom_mm[index][third], r_place, third)
     words.finish()
@@ -128,16 +126,23 @@ def _shared_step(words: _Words, plan: HolePlan, index: int, before: Array, after
     return np.where(np.arange(3) == third, 0.0, step)
 
 
-def _stays(words: _Words, series: SeriesWords, plan: HolePlan, index: int, initial: float) -> bool:
-    """Whether a hole needs no other R and depth than it takes over."""
-    third = PLANES[plan.holes[index].plane][2]
-    base, held = initial, series.inherited
-    for letter, levels in (("R", plan.level_mm), ("XYZ"[third], plan.bottom_mm)):
-        own = held[letter] * words.unit_mm
-        if abs(float(levels[index][third]) - base - own) > words.half(words.decimals(None, third)):
-            return False
-        base += own
-    return True
+def restates(writer: Writer, series: SeriesWords, i: int, j: int) -> bool:
+    """Whether holes i..j, a run in G91 whose R and depth were written in G90, need others than they take
+    over, or state both themselves."""
+    plan = writer.holes
+    hole = plan.holes[i]
+    third = PLANES[hole.plane][2]
+    frame, depth = writer.frame_of(hole.first), "XYZ"[third]
+    if {"R", depth} <= hole.words.keys():
+        return True
+    unit = frame.unit_mm
+    half = 0.5 * 10.0 ** -writer.style.usual(third, unit) * unit * (1 + 1e-9)
+    base = series.initial * unit + frame.offset_mm[third]
+    for letter, levels in (("R", plan.level_mm), (depth, plan.bottom_mm)):
+        base += series.inherited[letter] * unit
+        if np.abs(levels[i:j, third] - base).max() > half:
+            return True
+    return False
 
 
 def _depth(words: _Words, series: SeriesWords, letter: str, wanted: float, base: float, axis: int) -> float:

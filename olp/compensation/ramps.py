@@ -18,9 +18,10 @@ from olp.core.values import dataclass
 from olp.program.bands import directions
 from olp.program.feeds.timing import BLEND_MM
 
-#: of the tolerance: how far the load may be off at the turn, and behind it
+#: of the tolerance: how far the load may be off at the turn, and behind it; the dead band of two axes comes
+#: on top, 0.35
 AT_TURN = 0.2
-BEHIND = 0.7
+BEHIND = 0.6
 #: of a row, at most, that a ramp takes at either end
 SHARE = 1.0 / 3.0
 #: times the backlash, at either side; a longer ramp is no faster, and its load rests longer than it must
@@ -61,6 +62,8 @@ def ramps(
     cut = cuts(path, free)
     move = np.concatenate(([rows.move[0]], rows.move))
     goes = np.where(row > 0, cut[move[row]], cut_before)
+    # what stands on a line between, such as M0 or a dwell, may be a rest, during which the load may be moved
+    goes &= path.line[rows.move[row]] - path.line[move[row]] <= 1
     row = row[cut[rows.move[row]] & goes]
     ways = directions(path, 0, len(path))
     same = rows.move[row] == move[row]
@@ -87,9 +90,10 @@ def cuts(path: Toolpath, free: Mask) -> Mask:
 
 
 def _reach(step: Array, moved: Array, turning: Mask, most_mm: float) -> tuple[Array, Array]:
-    """(m,) lengths of rows (m, 3), and how far on them no load that turns moves by more than `most_mm`."""
+    """(m,) lengths of rows (m, 3), and how far on them the loads that turn move by no more than `most_mm`,
+    all together."""
     length = np.nan_to_num(np.sqrt((step * step).sum(axis=1)))
-    share = np.abs(moved) / np.maximum(length, _TINY)[:, None]
+    away = np.sqrt(np.where(turning, moved * moved, 0.0).sum(axis=1))
     with np.errstate(divide="ignore"):
-        within = np.where(turning, most_mm / share, np.inf).min(axis=1, initial=np.inf)
+        within = most_mm * np.maximum(length, _TINY) / away
     return length, np.minimum(within, SHARE * length)

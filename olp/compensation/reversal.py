@@ -137,8 +137,8 @@ def carry_play(
     carried.target_mm, carried.command_mm = rows.target_mm[-1].copy(), command[-1].copy()
     carried.held_mm = held[-1].copy()
     carried.load_mm = _wanted(model, command[-1:], play[-1:], held[-1:])[0]
-    # under cutter compensation no move is split for a ramp
-    free = free & (contour is None)
+    # in a program with cutter compensation no move is split for a ramp
+    free = free & all(frame.compensation is None for frame in path.frames)
     carried.cut = bool(cuts(path, free)[rows.move[-1]])
     if not turns.any():
         return rows

@@ -413,8 +413,7 @@ class Tracer:
         turn[row] = size
         before = np.cumsum(turn) - turn
         total = np.bincount(owner[row], size, minlength=int(owner[-1]) + 1)
-        begin, some = np.zeros(len(total)), np.flatnonzero(total)
-        begin[some] = np.cumsum(total[some]) - total[some]
+        begin = np.cumsum(total) - total
         place = before[part] - begin[of] + share * turn[part]
         return np.asarray(place / np.maximum(total[of], 1e-12))
 

@@ -153,7 +153,8 @@ CASES = [
     Case("part outside the box", ("part.nc:7: axis X", "-760 to -2 mm", "--outside-box hold"),
          program(b"X50.", b"X-700.")),
     # machine, calibration, dialect
-    Case("cycle that the control alone knows", ("part.nc:7: G150 cuts a pocket inside the control", "post the moves"),
+    Case("cycle that the control alone knows",
+         ("part.nc:7: G150 cuts a pocket inside the control", "post the moves"),
          program(b"X50.", b"G150 X50. Y3.")),
     Case("tilted plane", ("part.nc:7: G68.2 (tilted plane) is not read", "post the program without it"),
          program(b"X50.", b"G68.2 X50. Y3.")),

@@ -47,3 +47,18 @@ def test_levels_that_change_are_stated_together(row: str, tmp_path: Path) -> Non
     verdict = judge_programs(stated, result.data, path, kinds=("feed",))
     assert verdict.after.judged > 0
     assert verdict.max_um < 1.2
+
+
+@pytest.mark.parametrize("row", [
+    "G99 G81 X20. Z-5. R2.\nG91 X5. Z-7. R-48.\nG90 X30.\nX300. Y200.\nX400. Y20.\n",
+    "G98 G81 X20. Z-5. R2.\nX60.\nG91 X40. L3\nY60.\nX300.\n",
+])  # fmt: skip
+@pytest.mark.parametrize(("seed", "peak_um"), [(2, 1.2), (2, 1.5), (5, 1.5)])
+def test_what_a_program_states_itself_is_no_level_of_the_other_mode(
+    row: str, seed: int, peak_um: float, tmp_path: Path
+) -> None:
+    """Errors of about a digit: some holes need other levels, and others do not."""
+    recipe = Recipe(controller="fanuc", increment_mm=0.001, peak_um=(peak_um, 1.01 * peak_um))
+    path = machines.random_machine(tmp_path, seed, recipe)
+    text = HEAD + row + "G80\nG90 G0 X0. Z60.\nM2\n"
+    assert olp.correct(text.encode(), path).report["deviation"]["holds"]

@@ -590,3 +590,15 @@ def test_a_trace_of_a_helix_is_as_long_as_its_turn_or_its_chord() -> None:
     # sqrt(900 + 32) = 30.53 mm, and 6.28 mm, which is longer than its chord
     assert np.bincount(move).tolist() == [16, 4]
     assert tip[:, 2] == pytest.approx([*(30 * np.arange(1, 17) / 16), *(30 + np.arange(1, 5) / 4)])
+
+
+def test_a_helix_that_became_chords_behind_an_arc_is_met_at_its_own_turn() -> None:
+    """Of the arcs in the corrected path only those of the move itself say where on it a sample lies."""
+    first = arc(10.0, 0.0, 0.0, centre=(5.0, 0.0, 0.0), sweep=-np.pi)
+    helix = arc(30.0, 0.0, -10.0, centre=(25.0, 0.0, 0.0), sweep=-np.pi)
+    nominal = toolpath(line(0.0, 0.0, 0.0), first, line(20.0, 0.0, 0.0), helix)
+    turn = np.pi * np.arange(1, 181) / 180
+    chords = [line(25.0 - 5.0 * np.cos(a), 5.0 * np.sin(a), -10.0 * a / np.pi) for a in turn.tolist()]
+    corrected = toolpath(line(0.0, 0.0, 0.0), first, line(20.0, 0.0, 0.0), *chords)
+    away = of(nominal, Known(), corrected, [0, 1, 2, 182])
+    assert away.worst[3] < 1e-3

@@ -32,7 +32,8 @@ def made(folder: Path, words: dict[str, Any], **more: Any) -> Path:
 
 
 @pytest.mark.parametrize(("text", "controller"), [
-    (TEXT, "linuxcnc"), (TEXT.replace(b"\n", b"\r\n"), "linuxcnc"), (b"%\nO0001\n" + TEXT.replace(b" G64 P0.0001 Q0", b""), "fanuc"),
+    (TEXT, "linuxcnc"), (TEXT.replace(b"\n", b"\r\n"), "linuxcnc"),
+    (b"%\nO0001\n" + TEXT.replace(b" G64 P0.0001 Q0", b""), "fanuc"),
     (LIST, "list"),
     (b"UNITS/MM\nRAPID\nGOTO/-5,-10,0\nFEDRAT/600,MMPM\nGOTO/5,1,0\nFINI\n", "apt"),
 ])  # fmt: skip

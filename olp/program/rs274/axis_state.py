@@ -123,7 +123,7 @@ class AxisState(OffsetState):
         state.spindle = setup.machine.default_tool
         state.payload_kg = setup.job.payload_kg
         if state.spindle is not None and setup.machine.length_active:
-            state.length_tool = state.spindle
+            state.length_tool = state.length_number = state.spindle
             state.offsets.length = state._tool(state.spindle, 1, "the tool in the spindle at the start")
         return state
 

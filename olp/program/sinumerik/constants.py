@@ -24,23 +24,37 @@ class Constants:
     def __init__(self) -> None:
         self._texts: dict[str, bytes] = {}
         self._defined: set[str] = set()
+        #: those that hold whole numbers, and those that hold none, whatever their names are
+        self._whole: set[str] = set()
+        self._other: set[str] = set()
 
     def declare(self, kind: bytes, variables: bytes) -> None:
-        """Take over a DEF: what has no number is 0, and text has none."""
+        """Take over a DEF: what has no number is 0. What INT rounds, and BOOL and text, is not taken over."""
         for variable in variables.decode("latin-1").upper().split(","):
-            name, _, value = variable.partition("=")
-            self._defined.add(name.strip())
-            if kind.upper() in (b"INT", b"REAL"):
-                self._texts[name.strip()] = value.strip().encode() or b"0"
+            text, _, value = variable.partition("=")
+            name, number = text.strip(), value.strip().encode() or b"0"
+            if kind.upper() not in (b"INT", b"REAL"):
+                self._other.add(name)
+                continue
+            self._defined.add(name)
+            if kind.upper() == b"INT":
+                self._whole.add(name)
+            if self._takes(name, number):
+                self._texts[name] = number
+
+    def _takes(self, name: str, number: bytes) -> bool:
+        """Whether a variable keeps a number as it is written."""
+        own = name in self._defined or (name not in self._other and bool(_OWN.fullmatch(name)))
+        return own and not (name in self._whole and b"." in number)
 
     def assigned(self, code: bytes, pieces: Sequence[Piece], *, deleted: bool) -> bool:
         """Whether a block only assigns numbers to variables, which are taken over. Raises ProgramError,
         without a line, where a switch decides of it."""
         texts = {}
         for piece in pieces:
-            own = piece.name in self._defined or _OWN.fullmatch(piece.name)
             value = code[piece.value : piece.value_end].strip()
-            if piece.form is not Form.EQUAL or not own or not NUMBER.fullmatch(value):
+            plain = piece.form is Form.EQUAL and NUMBER.fullmatch(value)
+            if not plain or not self._takes(piece.name, value):
                 return False
             texts[piece.name] = value
         if texts and deleted:

@@ -570,6 +570,10 @@ def test_the_job_states_where_the_axes_and_which_tool_are_at_the_start(
     assert read.toolpath.end_mm[0, 2] == 3.0
     one = frame(read)
     assert (one.tool, one.length_mm, one.payload_kg) == (2, (1.0, 2.0, 60.0), 7.0)
+    fanuc = replace(
+        setups["fanuc"], machine=replace(setups["fanuc"].machine, default_tool=2, length_active=True)
+    )
+    assert refusal("G0 Z1.\nH3\n", fanuc, "fanuc")["code"] == "OLP518"
     without = replace(at, machine=replace(at.machine, length_active=False))
     two = frame(program("G21 G0 X5\nM2\n", without))
     assert (two.tool, two.length_mm, two.offset_mm) == (2, (0.0, 0.0, 0.0), (10.0, 20.0, 30.0))

@@ -135,6 +135,10 @@ REFUSED: dict[str, tuple[str, str]] = {
     ZERO + "X=IC(2)": ("X is a distance in G90; unroll", "OLP511"),
     ZERO + "G91\nX=AC(2)": ("X is a position in G91; unroll", "OLP511"),
     "R1=5+1": ("--flatten", "OLP511"),
+    # the control rounds it, or makes TRUE of it
+    "DEF INT _NNN\n_NNN=2.7": ("--flatten", "OLP511"),
+    ZERO + "DEF INT _NNN=2.7\nX=_NNN": ("--flatten", "OLP511"),
+    "DEF BOOL _FLAG\n_FLAG=5": ("--flatten", "OLP511"),
     "MYVAR=5": ("--flatten", "OLP511"),
     "R1=5\nX=R1+1": ("--flatten", "OLP511"),
     "R1=5\nX=-R1": ("--flatten", "OLP511"),

@@ -30,6 +30,8 @@ class Scope(MutableMapping[str, Value]):
         self._shared: dict[str, Value] = {} if shared is None else shared
         self._own: dict[str, Value] = {}
         self.defined: set[str] = set()
+        #: those of `defined` that are INT or BOOL, and which
+        self._kinds: dict[str, str] = {}
 
     @staticmethod
     def of(parameters: Mapping[str, float] | None) -> Scope:
@@ -62,8 +64,9 @@ class Scope(MutableMapping[str, Value]):
                 raise ProgramError(f"`DEF {text.strip()}` is not understood", code="OLP542")
             own = name[1].upper()
             self.defined.add(own)
+            self._kinds[own] = kind[1].upper()
             if name[2] is None:
-                self._own[own] = empty if name[3] is None else evaluate(name[3], self)
+                self._own[own] = empty if name[3] is None else self._kept(own, evaluate(name[3], self))
                 continue
             sizes = [int(float(evaluate(part, self))) for part in _split(name[2])]
             if min(sizes) <= 0 or math.prod(sizes) > _MOST_ELEMENTS:
@@ -79,7 +82,19 @@ class Scope(MutableMapping[str, Value]):
         given = _SET.fullmatch(text.strip())
         if given is None:
             raise ProgramError(f"the array {name} has values that are not run; write SET( )", code="OLP542")
-        return [evaluate(part, self) for part in _split(given[1])]
+        return [self._kept(name, evaluate(part, self)) for part in _split(given[1])]
+
+    def _kept(self, name: str, value: Value) -> Value:
+        """A value that a variable of its own type keeps. Raises ProgramError for one that it does not."""
+        kind = self._kinds.get(name.partition("[")[0], "")
+        number = 0.0 if isinstance(value, bool | str) else float(value)
+        if (kind == "INT" and number != round(number)) or (kind == "BOOL" and number not in (0.0, 1.0)):
+            way = "ROUND( )" if kind == "INT" else "TRUE or FALSE"
+            raise ProgramError(
+                f"{name} is {kind}, and gets {number:g}, which the control changes; write {way}, or DEF REAL",
+                code="OLP542",
+            )
+        return value
 
     def bind(self, parameters: str, given: list[str], caller: Scope) -> None:
         """Parameters of a subprogram: values by position, or their defaults."""
@@ -99,7 +114,8 @@ class Scope(MutableMapping[str, Value]):
             if i < len(given) and given[i]:
                 name = _NAME.match(text.strip()[kind.end() :])
                 assert name is not None
-                self._own[name[1].upper()] = evaluate(given[i], caller)
+                own = name[1].upper()
+                self._own[own] = self._kept(own, evaluate(given[i], caller))
 
     def name_of(self, name: str) -> str:
         """The name of a variable with its index worked out."""
@@ -114,7 +130,7 @@ class Scope(MutableMapping[str, Value]):
 
     def __setitem__(self, name: str, value: Value) -> None:
         if name in self._own:
-            self._own[name] = value
+            self._own[name] = self._kept(name, value)
         elif _R.fullmatch(name) or name in self._shared:
             self._shared[name] = value
         else:
