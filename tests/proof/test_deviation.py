@@ -601,4 +601,4 @@ def test_a_helix_that_became_chords_behind_an_arc_is_met_at_its_own_turn() -> No
     chords = [line(25.0 - 5.0 * np.cos(a), 5.0 * np.sin(a), -10.0 * a / np.pi) for a in turn.tolist()]
     corrected = toolpath(line(0.0, 0.0, 0.0), first, line(20.0, 0.0, 0.0), *chords)
     away = of(nominal, Known(), corrected, [0, 1, 2, 182])
-    assert away.worst[3] < 1e-3
+    assert away.path[3] < 1e-3
