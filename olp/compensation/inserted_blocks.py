@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from olp.compensation.rows import Rows
 from olp.compensation.writer import Writer
-from olp.core.arrays import Index, Mask, any_in_row, distinct, is_in
+from olp.core.arrays import Array, Index, Mask, any_in_row, distinct, is_in
 from olp.core.errors import ProgramError
 from olp.core.toolpath import Flag, Kind
 from olp.program.program import Program
@@ -29,6 +29,10 @@ from olp.program.text.edits import BARE, EditList, Edits
 _CHANGES = WORK_OFFSETS | FURTHER_OFFSETS | LENGTHS | SHIFTS | {*UNITS, ABSOLUTE, INCREMENTAL}
 #: M words that act when their block has ended
 _END_M = frozenset({0, 1, 2, 5, 9, 30, 60})
+#: G9: an exact stop at the end of its block.
+_STOP = 9
+#: Least share of the time of a block that a part gets.
+_LEAST_SHARE = 1e-6
 
 
 def block_edits(writer: Writer, rows: Rows, tails: Index) -> list[Edits]:
@@ -155,7 +159,9 @@ def _inverse_time(writer: Writer, rows: Rows, tails: Index, edits: EditList) -> 
             )
         value = float(writer.words.mantissa[index]) / 10.0 ** int(writer.words.decimals[index])
         reach = writer.plan.reach[rows.first + part]
-        share = np.maximum(np.diff(reach, prepend=0.0), 1e-6)
+        share = np.diff(reach, prepend=0.0)
+        # what only takes up backlash takes time as its length does
+        share = np.maximum(np.where(share > 0.0, share, _lengths(writer, rows, part)), _LEAST_SHARE)
         decimals = max(int(writer.words.decimals[index]), 4)
         feeds = np.rint(value / share * 10**decimals).astype(np.int64)
         place = int(writer.program.line_end[line - 1])
@@ -171,17 +177,27 @@ def _inverse_time(writer: Writer, rows: Rows, tails: Index, edits: EditList) -> 
             edits.add(start, end, int(feeds[i]), decimals, prefix, order)
 
 
+def _lengths(writer: Writer, rows: Rows, part: Index) -> Array:
+    """(m,) the lengths of parts of one move, as shares of all of them."""
+    command = writer.plan.command_mm[rows.first + part]
+    before = rows.first + int(part[0]) - 1
+    start = writer.plan.command_mm[before] if before >= 0 else np.array(writer.path.start_mm)
+    length = np.nan_to_num(np.linalg.norm(np.diff(np.vstack((start, command)), axis=0), axis=1))
+    return np.asarray(length / max(float(length.sum()), _LEAST_SHARE))
+
+
 def end_word_edits(program: Program, lines: Index, edits: EditList) -> None:
-    """M words that end a block (M0 M5 M9 M30 …) go from the first part to the last, on lines whose moves are
-    split."""
+    """M words that end a block (M0 M5 M9 M30 …), and G9, which stops at its end, go from the first part to
+    the last, on lines whose moves are split."""
     words = program.words
     assert words is not None
     if not lines.size:
         return
     first, last = int(words.first_word[lines[0] - 1]), int(words.first_word[lines[-1]])
     part = slice(first, last)
-    ending = (words.letter[part] == ord("M")) & (words.decimals[part] == 0)
-    index = first + np.flatnonzero(ending & is_in(words.mantissa[part], list(_END_M)))
+    letter, code = words.letter[part], words.mantissa[part]
+    ending = (letter == ord("M")) & is_in(code, list(_END_M)) | (letter == ord("G")) & (code == _STOP)
+    index = first + np.flatnonzero(ending & (words.decimals[part] == 0))
     # of the same type: another would be that of a copy of the whole column
     line = np.searchsorted(words.first_word, index.astype(words.first_word.dtype), "right")
     for i, number in zip(index.tolist(), line.tolist(), strict=True):

@@ -57,3 +57,26 @@ def test_parts_in_g93_share_the_time_of_their_block(tmp_path: Path) -> None:
     x_mm = [0.0, *(float(line.split(b"X")[1].split()[0]) for line in lines)]
     for a, b, feed in zip(x_mm, x_mm[1:], feeds, strict=False):
         assert 1 / feed == pytest.approx(0.8 * (b - a) / 400.0, rel=1e-3)
+
+
+def test_an_exact_stop_is_at_the_end_of_its_block(tmp_path: Path) -> None:
+    """Fanuc: G9 stops behind its own block, so behind the last part of it."""
+    text = b"G21 G90 G54\nG0 X0. Y0. Z0.\nG9 G1 X400. F100.\nG09 X0.\nM2\n"
+    path = machine(
+        tmp_path, CURVE, BEND, controller="fanuc", tables=TRUE_ZERO, keys='decimal_point = "calculator"\n'
+    )
+    lines = unstamped(olp.correct(text, path).data).splitlines()[2:-1]
+    stops = [k for k, line in enumerate(lines) if b"G9" in line or b"G09" in line]
+    assert len(stops) == 2 and stops[1] == len(lines) - 1 and stops[0] > 0
+    assert all(lines[k].split()[-1] in (b"G9", b"G09") for k in stops)
+
+
+def test_a_step_in_g93_takes_time_as_its_length_does(tmp_path: Path) -> None:
+    """Of 25 um beside 100 mm in 0.05 min the step gets 1/4000: F80000, and no million times F20."""
+    backlash = "[backlash]\nX_um = 25.0\n"
+    path = machine(tmp_path, backlash, {}, tables=TRUE_ZERO)
+    text = HEAD + b"G1 X10. F100.\nG93 G1 X110. F20\nX10. F20\nM2\n"
+    lines = unstamped(olp.correct(text, path).data).splitlines()
+    feeds = [float(line.split(b"F")[1].split()[0]) for line in lines if b"F" in line][1:]
+    assert max(feeds) == pytest.approx(80_000.0, rel=0.02)
+    assert sorted(feeds)[:-1] == pytest.approx([20.0] * (len(feeds) - 1))
