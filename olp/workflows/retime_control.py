@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from olp.core.errors import CannotCompute
+from olp.core.errors import CannotCompute, UsageError
+from olp.core.toolpath import Toolpath
+from olp.core.units import AXES
 from olp.files.points import Points
 from olp.trajectory.controls.base import AxisSpeeds, Control, move_seconds
 from olp.trajectory.controls.learning import Learned, learned
@@ -17,6 +19,9 @@ from olp.trajectory.variants import Case
 
 #: lines that a report lists
 _LINES = 10
+#: how far a log may be from its program: so many mm, and a share of the way of each axis, for corners
+_SLACK_MM = 0.5
+_SLACK = 0.02
 
 
 def control_time(
@@ -34,7 +39,7 @@ def control_time(
     parts = _parts(control, case, values, bare=bare)
     fitted = None
     if log is not None:
-        fitted = _fitted(control, parts, speeds, values, log)
+        fitted = _fitted(control, case, parts, speeds, values, log)
         speeds, values = fitted.limits, fitted.values
     times = [move_seconds(control, part, speeds, values) for part in parts]
     by_stretch = [float(time.sum()) + part.dwell_s for time, part in zip(times, parts, strict=True)]
@@ -78,7 +83,12 @@ def _parts(control: Control, case: Case, values: Mapping[str, float], *, bare: b
 
 
 def _fitted(
-    control: Control, parts: tuple[Moves, ...], speeds: AxisSpeeds, values: Mapping[str, float], log: Points
+    control: Control,
+    case: Case,
+    parts: tuple[Moves, ...],
+    speeds: AxisSpeeds,
+    values: Mapping[str, float],
+    log: Points,
 ) -> Learned:
     if len(parts) != 1:
         raise CannotCompute(
@@ -87,7 +97,34 @@ def _fitted(
         )
     if log.time_s is None:
         raise CannotCompute("the log has no column of times; expected one in s", file=log.file)
-    return learned(control, parts, speeds, values, log.time_s, log.points_mm)
+    _refuse_other_run(case.program.toolpath, log)
+    try:
+        return learned(control, parts, speeds, values, log.time_s, log.points_mm)
+    except UsageError as error:
+        raise error.in_file(log.file) from None
+
+
+def _refuse_other_run(path: Toolpath, log: Points) -> None:
+    """Raise CannotCompute where the log goes over other distances than the program, or ends elsewhere. The
+    zero of the log may be any."""
+    points = np.vstack((path.start_mm, path.end_mm))
+    for axis, name in enumerate(AXES):
+        way = points[np.isfinite(points[:, axis]), axis]
+        if not way.size:
+            continue
+        span, own = float(np.ptp(way)), float(np.ptp(log.points_mm[:, axis]))
+        ends = [
+            abs((log.points_mm[-1, axis] - of(log.points_mm[:, axis])) - (way[-1] - of(way)))
+            for of in (min, max)
+        ]
+        slack = _SLACK_MM + _SLACK * span
+        longer = np.isfinite(path.start_mm[axis]) and own > span + slack
+        if own < span - slack or longer or min(ends) > slack:
+            raise CannotCompute(
+                f"the log goes over {own:g} mm of {name} and the program over {span:g}, or they end at other "
+                "places; expected a whole run of this program, with positions in mm",
+                file=log.file,
+            )
 
 
 def _longest(parts: tuple[Moves, ...], times: list[Any]) -> list[dict[str, Any]]:

@@ -7,7 +7,7 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -736,6 +736,32 @@ def test_the_time_of_a_control_is_stated_and_learned_from_a_log(job: Path, tmp_p
     text = run("retime", *args, "--controller", "linuxcnc", "--log", tmp_path / "run.csv").stdout
     assert "On LinuxCNC 2.9: " in text
     assert "Learned from " in text
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda rows: rows[: len(rows) // 2], "a whole run of this program, with positions in mm"),
+        (lambda rows: [[t, *(v / 25.4 for v in p)] for t, *p in rows], "over 3.54331 mm of X and"),
+        (lambda rows: [[1000.0 * t, *p] for t, *p in rows], "with times in s"),
+        (lambda rows: [*rows[:50], *rows[60:]], "its row 51 comes 0.011 s behind"),
+        (lambda rows: rows[:20], "a whole run"),
+    ],
+)  # fmt: skip
+def test_a_log_of_something_else_is_refused(
+    job: Path, tmp_path: Path, change: Callable[[list[list[float]]], list[list[float]]], message: str
+) -> None:
+    """Half of a run, inches, milliseconds, a gap, and few rows."""
+    args = (program(tmp_path, "G21 G90 G54\nG0 X90\nG0 X0\nG0 Y90\nG0 Y0\nM2\n"), "-j", job)
+    run("retime", *args, "-q", "-o", tmp_path / "run.csv")
+    head, *lines = (tmp_path / "run.csv").read_text().splitlines()
+    keep = [head.split(",").index(name) for name in ("t_s", "X_mm", "Y_mm", "Z_mm")]
+    rows = change([[float(line.split(",")[k]) for k in keep] for line in lines])
+    text = "\n".join(["t_s,X_mm,Y_mm,Z_mm", *(",".join(map(repr, row)) for row in rows), ""])
+    (tmp_path / "other.csv").write_text(text)
+    result = run("retime", *args, "--controller", "grbl", "--log", tmp_path / "other.csv")
+    assert result.exit_code in (2, 4)
+    assert message in result.stderr and "other.csv" in result.stderr
 
 
 @pytest.mark.parametrize(

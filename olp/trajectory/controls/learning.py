@@ -31,6 +31,10 @@ RANGE = 1e4
 _HALVINGS = 40
 #: by this share a choice of limits has to be nearer to the time of the log than one before
 BETTER = 0.1
+#: of the time of a log: by so much the time that is computed may miss it
+MISSED = 0.02
+#: times the time with the limits of the machine file, at most, that a run takes
+_TIMES = 20.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,8 +52,11 @@ def learned(
     control: Control, parts: Sequence[Moves], stated: AxisSpeeds, values: Mapping[str, float],
     time_s: Array, point_mm: Array,
 ) -> Learned:  # fmt: skip
-    """From a log (n,), (n, 3) of a whole run, sampled evenly. Raises UsageError for a log without motion, or
-    one that is not even in time."""
+    """From a log (n,), (n, 3) of a whole run, sampled evenly. Raises UsageError for a log without motion, one
+    that is not even in time, or one whose time nothing gives."""
+    if len(time_s) > 2 and 0.0 < time_s[-1] - time_s[-2] < time_s[1] - time_s[0]:
+        # the end of the motion between two samples
+        time_s, point_mm = time_s[:-1], point_mm[:-1]
     step_s = _step(time_s)
     moving = np.flatnonzero((np.abs(np.diff(point_mm, axis=0)) > 0.0).any(axis=1))
     if not moving.size:
@@ -63,6 +70,7 @@ def learned(
     moved = np.ptp(point_mm, axis=0) > STILL_MM
     velocity, acceleration = (_held(rows, HELD * count) for rows in (speed, change))
     seconds = (last - first) * step_s
+    _refuse_time(sum(_seconds(control, part, stated, values) for part in parts), seconds)
     # where corners are learned too, the time alone does not say which limits are meant
     speeds = (velocity,) if control.corners else (np.maximum(velocity, stated.velocity), velocity)
     changes = (
@@ -83,12 +91,30 @@ def learned(
 
 def _step(time_s: Array) -> float:
     steps = np.diff(time_s)
-    if len(steps) < 10 * HELD or not steps.min() > 0.0 or np.ptp(steps) > 0.2 * steps.mean():
+    if len(steps) < 10 * HELD:
+        raise UsageError(f"the log has {len(time_s)} rows of a run; expected more than {10 * HELD}")
+    middle = float(np.median(steps))
+    off = np.flatnonzero(np.abs(steps - middle) > 0.2 * abs(middle))
+    if middle <= 0.0 or off.size:
+        row = int(off[0]) if off.size else 0
         raise UsageError(
-            "the log is not sampled evenly in time; expected a column of times in s with equal steps, and "
-            f"more than {10 * HELD} rows"
+            f"the log is not sampled evenly in time: its row {row + 2} comes {steps[row]:g} s behind the one "
+            f"before, and most others {middle:g} s; expected equal steps"
         )
     return float(steps.mean())
+
+
+def _refuse_time(expected: float, seconds: float) -> None:
+    """Raise UsageError where a log takes quite another time than the limits of the machine file give."""
+    if not expected / _TIMES < seconds < expected * _TIMES:
+        raise UsageError(
+            f"the run in the log takes {seconds:g} s, and with the limits of the machine file it would take "
+            f"{expected:g} s; expected a whole run of this program, with times in s"
+        )
+
+
+def _seconds(control: Control, part: Moves, limits: AxisSpeeds, values: Mapping[str, float]) -> float:
+    return float(move_seconds(control, part, limits, values).sum()) + part.dwell_s
 
 
 def _difference(rows: Array, count: int) -> Array:
@@ -110,12 +136,21 @@ def _corners(
     much longer the time is with them."""
 
     def excess(given: Mapping[str, float]) -> float:
-        time = sum(float(move_seconds(control, part, limits, given).sum()) + part.dwell_s for part in parts)
-        return time - seconds
+        return sum(_seconds(control, part, limits, given) for part in parts) - seconds
 
     best = dict(values)
     if control.corners:
         low, high = values[control.corners] / RANGE, values[control.corners] * RANGE
+        slow, fast = (excess({**values, control.corners: value}) for value in (low, high))
+        if slow < -MISSED * seconds or fast > MISSED * seconds:
+            way = "more than the sharpest corners take" if slow < 0.0 else "less than the widest corners take"
+            raise UsageError(
+                f"the run in the log takes {seconds:g} s, {way}: no {control.corners} gives it; expected a "
+                "whole run of this program on this control, at its programmed feeds"
+            )
+        if slow - fast < MISSED * seconds:
+            # its corners say nothing
+            return best, excess(best)
         for _ in range(_HALVINGS):
             middle = float(np.sqrt(low * high))
             # a larger one is never slower
