@@ -9,6 +9,8 @@ from olp.program.rs274.flatten.language import UNROLL
 from olp.program.sinumerik.blocks import Piece
 from olp.program.sinumerik.table import REFUSED, UNROLLED
 
+#: How positions of rotary axes are approached.
+ROTARY_ONLY = (b"DC", b"ACP", b"ACN")
 _KEYWORD = re.compile(rb"[ \t]*(?:N\d+)?[ \t]*([A-Z]+)", re.IGNORECASE)
 
 
@@ -22,6 +24,17 @@ def unroll(what: str) -> ProgramError:
 def refused(name: str) -> ProgramError:
     """A statement of the table of those that are refused."""
     return ProgramError(f"{name} {REFUSED[name]}", code="OLP512", word=name)
+
+
+def no_number(name: str, value: bytes) -> ProgramError:
+    """A word that counts along a line or about a pole has another value than a number, AC( ) or IC( )."""
+    way = value.partition(b"(")[0].strip().upper()
+    shown = f"`{name}={value.decode('latin-1')}`"
+    if way in ROTARY_ONLY:
+        return ProgramError(
+            f"{shown} is not read: {way.decode()} belongs to rotary axes; write AC( ) or IC( )", code="OLP512"
+        )
+    return ProgramError(f"{shown} is not a number; write a number, AC( ) or IC( )", code="OLP510")
 
 
 def statement(piece: Piece) -> ProgramError:

@@ -22,7 +22,7 @@ from olp.program.sinumerik.blocks import NUMBER, Block, Form, Piece, arguments, 
 from olp.program.sinumerik.constants import Constants
 from olp.program.sinumerik.frames import STATEMENTS, Parts
 from olp.program.sinumerik.offsets import written_offset
-from olp.program.sinumerik.refusals import refused, statement, unroll
+from olp.program.sinumerik.refusals import ROTARY_ONLY, no_number, refused, statement, unroll
 from olp.program.sinumerik.swivel import swivel
 from olp.program.sinumerik.table import (
     CONTOUR_WAYS,
@@ -421,6 +421,9 @@ class _Line:
     def _coordinate(self, piece: Piece) -> None:
         """X to Z and I to K: a number, or one in AC( ) or IC( )."""
         counted = _COUNTED.fullmatch(self.code, piece.value, piece.value_end)
+        value = self.code[piece.value : piece.value_end]
+        if value.partition(b"(")[0].strip().upper() in ROTARY_ONLY:
+            raise no_number(piece.name, value)
         if piece.form is Form.WORD or counted is None:
             self._word(piece, piece.name.encode())
             return

@@ -8,7 +8,8 @@ from collections.abc import Mapping, Sequence
 
 from olp.core.errors import ProgramError
 from olp.core.values import dataclass
-from olp.program.sinumerik.blocks import Piece
+from olp.program.sinumerik.blocks import NUMBER, Piece
+from olp.program.sinumerik.refusals import no_number
 
 AXES = "XYZ"
 CENTRES = "IJK"
@@ -94,6 +95,16 @@ class Element:
         return (turn if self.left else -turn) % (2 * math.pi)
 
 
+def counted(code: bytes, piece: Piece) -> tuple[float, str]:
+    """The number of a piece, and AC, IC or nothing. Raises ProgramError, without a line, for what is none."""
+    text = code[piece.value : piece.value_end].strip()
+    call = _COUNTED.fullmatch(text)
+    number = (call[2] if call else text).strip()
+    if NUMBER.fullmatch(number) is None:
+        raise no_number(piece.name, text)
+    return float(number.replace(b" ", b"").replace(b"\t", b"")), call[1].decode().upper() if call else ""
+
+
 class Words:
     """The numbers of a block, by the names of its words."""
 
@@ -105,10 +116,7 @@ class Words:
         piece = self.pieces.get(name)
         if piece is None:
             return None
-        text = self.code[piece.value : piece.value_end].strip()
-        call = _COUNTED.fullmatch(text)
-        number = (call[2] if call else text).replace(b" ", b"").replace(b"\t", b"")
-        return float(number), call[1].decode().upper() if call else ""
+        return counted(self.code, piece)
 
     def number(self, name: str) -> float | None:
         """The number of a word, however it counts."""

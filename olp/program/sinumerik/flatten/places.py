@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 
 from olp.core.errors import ProgramError
 from olp.core.toolpath import Kind
 from olp.program.sinumerik import cycles, patterns
 from olp.program.sinumerik.blocks import Form, Piece, arguments, block_of, without_comment
-from olp.program.sinumerik.flatten.elements import AXES, CENTRES, Element, Words
+from olp.program.sinumerik.flatten.elements import AXES, CENTRES, Element, Words, counted
 from olp.program.sinumerik.flatten.shapes import Shapes
 from olp.program.sinumerik.flatten.text import shown
 from olp.program.sinumerik.frames import STATEMENTS
 from olp.program.sinumerik.table import DRILLING, HARMLESS_G, PATTERNS, ROUNDING_G
 
-_CALL = re.compile(rb"(AC|IC)[ \t]*\(([^()]*)\)", re.IGNORECASE)
 #: Tapping cannot be written as plain moves.
 _KEPT = frozenset({"CYCLE84", "CYCLE840"})
 _MOVING_G = frozenset(range(4))
@@ -111,10 +109,8 @@ class Places:
         for piece in pieces:
             if piece.name not in AXES or piece.form is Form.NAME:
                 continue
-            call = _CALL.fullmatch(code[piece.value : piece.value_end].strip())
-            text = call[2] if call else code[piece.value : piece.value_end]
-            value = float(text.replace(b" ", b"").replace(b"\t", b""))
-            relative = self._incremental if call is None else call[1].upper() == b"IC"
+            value, how = counted(code, piece)
+            relative = how == "IC" if how else self._incremental
             before = self._position.get(piece.name)
             if relative != self._incremental:
                 if before is None:
