@@ -58,7 +58,7 @@ class Shapes:
         position: Mapping[str, float],
         modes: tuple[int, int, bool],
     ) -> bytes | None:
-        """The block with these pieces in plain words; None for one that only sets the pole. `position` is
+        """The block with these pieces in plain words; None for one that sets the pole alone. `position` is
         that before it, `modes` are motion, plane, and whether words are distances."""
         code = raw  # pieces lie before its comment
         names = {piece.name for piece in pieces}
@@ -70,7 +70,7 @@ class Shapes:
         if numbers & _POLES:
             self._pole = self._new_pole(next(iter(numbers & _POLES)), block)
             self._programmed = True
-            return None
+            return _without_pole(raw, pieces)
         moves = bool(names & {*AXES, "AP", "RP"})
         if not names & _OWN and not (self.special and moves):
             return raw
@@ -281,6 +281,22 @@ def _centre(away: Point, a: str, b: str) -> list[str]:
 def _codes(code: bytes, pieces: Sequence[Piece]) -> set[int]:
     texts = [code[p.value : p.value_end].strip() for p in pieces if p.name == "G" and p.form is Form.WORD]
     return {int(text) for text in texts if text.isdigit()}
+
+
+def _without_pole(raw: bytes, pieces: Sequence[Piece]) -> bytes | None:
+    """The words beside a pole: modes, feeds and M functions; None where there are none."""
+    names = {piece.name for piece in pieces}
+    poles = [p for p in pieces if _codes(raw, [p]) & _POLES]
+    if len(poles) > 1 or (names & {"AP", "RP"} and names & {*AXES}) or len(names & {"AP", "RP"}) == 1:
+        raise refused(
+            "a pole is stated by G110, G111 or G112 and either its coordinates or its AP and RP; a move to "
+            "AP and RP stands in a block of its own"
+        )
+    gone = [p for p in pieces if p in poles or p.name in (*AXES, "AP", "RP")]
+    kept = [p for p in pieces if p not in gone]
+    if any(p.name != "G" and not (p.form is Form.WORD and p.name in "FSM") for p in kept):
+        raise refused("a pole stands beside words that may move an axis; put it into a block of its own")
+    return _with(raw, gone, pieces[-1].end, []) if kept else None
 
 
 def _with(raw: bytes, gone: Sequence[Piece], end: int, added: Sequence[str]) -> bytes:
