@@ -37,6 +37,15 @@ def no_number(name: str, value: bytes) -> ProgramError:
     return ProgramError(f"{shown} is not a number; write a number, AC( ) or IC( )", code="OLP510")
 
 
+def return_elsewhere(what: str) -> ProgramError:
+    """RET with arguments, or beside other words."""
+    return ProgramError(
+        f"`{what.strip()}` may go on at another block or level than behind the call; write RET alone in a "
+        "block, and the jump with GOTOF behind the call",
+        code="OLP542",
+    )
+
+
 def statement(piece: Piece) -> ProgramError:
     """Why a keyword or a call is refused."""
     if piece.name in REFUSED:

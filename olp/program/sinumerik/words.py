@@ -22,7 +22,14 @@ from olp.program.sinumerik.blocks import NUMBER, Block, Form, Piece, arguments, 
 from olp.program.sinumerik.constants import Constants
 from olp.program.sinumerik.frames import STATEMENTS, Parts
 from olp.program.sinumerik.offsets import written_offset
-from olp.program.sinumerik.refusals import ROTARY_ONLY, no_number, refused, statement, unroll
+from olp.program.sinumerik.refusals import (
+    ROTARY_ONLY,
+    no_number,
+    refused,
+    return_elsewhere,
+    statement,
+    unroll,
+)
 from olp.program.sinumerik.swivel import swivel
 from olp.program.sinumerik.table import (
     CONTOUR_WAYS,
@@ -152,7 +159,9 @@ class _Line:
         elif first.name == "PROC":
             if any(piece.called and self.code[piece.value : piece.value_end].strip() for piece in pieces):
                 raise unroll("a subprogram with parameters")
-        elif first.name in ("RET",):
+        elif first.name == "RET":
+            if len(pieces) > 1 or self.code[first.value : first.value_end].strip():
+                raise return_elsewhere(self.code[first.start :].decode("latin-1"))
             self._write(first.start, b"M2")
         elif first.name in UNROLLED and first.form is Form.NAME:
             raise unroll(f"`{first.name}`")
@@ -328,7 +337,7 @@ class _Line:
         elif name in REFUSED:
             raise refused(name)
         elif name == "RET":
-            self._write(piece.start, b"M2")
+            raise return_elsewhere(self.code.decode("latin-1"))
         elif name in CONTOUR_WAYS:
             self._way(name)
         elif name in HARMLESS:

@@ -216,6 +216,8 @@ REFUSED = {
     "CYCLE801(1,2,0,10,5,2,1.5)": ("expected an integer", "OLP531"),
     "HOLES2(1,2,5,90,0,3,1100)": ("argument 7", "OLP544"),
     "SUPA X100\nX=IC(1)": ("program it in G90 first", "OLP524"),
+    'RET("AA")': ("may go on at another block", "OLP542"),
+    "X1 RET": ("write RET alone", "OLP542"),
     "X=DC(R1)": ("DC belongs to rotary axes", "OLP512"),
     "Y=ACP(20)": ("ACP belongs to rotary axes", "OLP512"),
     "AP=ACN(20) RP=3": ("ACN belongs to rotary axes", "OLP512"),

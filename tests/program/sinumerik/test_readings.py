@@ -133,6 +133,8 @@ def test_a_program_ends_where_the_manual_says(text: str, setup: Setup) -> None:
 #: A program whose last line is refused, what is said, and the code.
 REFUSED: dict[str, tuple[str, str]] = {
     ZERO + "X=IC(2)": ("X is a distance in G90; unroll", "OLP511"),
+    'RET("AA",1)': ("may go on at another block", "OLP542"),
+    "X1 RET": ("write RET alone", "OLP542"),
     "X=DC(20)": ("DC belongs to rotary axes", "OLP512"),
     ZERO + "G91\nX=AC(2)": ("X is a position in G91; unroll", "OLP511"),
     "R1=5+1": ("--flatten", "OLP511"),

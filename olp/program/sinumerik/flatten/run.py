@@ -15,6 +15,7 @@ from olp.program.sinumerik.blocks import Form, Piece, arguments
 from olp.program.sinumerik.flatten.expressions import Value, evaluate, number
 from olp.program.sinumerik.flatten.scope import Scope
 from olp.program.sinumerik.flatten.unit import Line, Unit
+from olp.program.sinumerik.refusals import return_elsewhere
 from olp.program.sinumerik.table import DRILLING, HARMLESS, PATTERNS, READ, REFUSED
 
 #: Subprograms inside one another at most.
@@ -93,6 +94,8 @@ class Walk:
         if called is not None:
             self._call(*called, line, scope, depth)
             return index + 1
+        if any(piece.name == "RET" for piece in line.block.pieces):
+            raise return_elsewhere(line.code)
         if depth and self._returns(line):
             return -1
         if self._visit(unit, line, scope):
@@ -110,6 +113,8 @@ class Walk:
         elif word == "PROC":
             pass
         elif word == "RET":
+            if rest.strip().strip("()").strip():
+                raise return_elsewhere(f"RET{rest}")
             if not depth:
                 self._visit(unit, line, scope)
             return -1
