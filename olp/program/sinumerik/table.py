@@ -26,7 +26,7 @@ _WITHOUT_PATH = (
     "OSOF", "OSC", "OSS", "OSSE", "OSD", "OST", "PROC", "SETPIECE", "SPCON", "SPCOF", "ISD", "FENDNORM",
     "FENDOFF", "WALIMON", "WALIMOF", "SBLON", "SBLOF", "PTPG0", "CP", "DYNNORM", "DYNPOS", "DYNROUGH",
     "DYNSEMIFIN", "DYNFINISH", "DYNPREC", "CTOLOF", "RTLION", "RTLIOF", "OVRRAP", "OVR", "SPOS",
-    "SPOSA", "LIMS", "ACC", "FA", "FB", "FL", "FZ", "FD", "SVC", "CTOL", "OTOL", "ATOL", "STOLF",
+    "SPOSA", "LIMS", "ACC", "FA", "FL", "FZ", "FD", "SVC", "CTOL", "OTOL", "ATOL", "STOLF",
     "ACCLIM", "CPRECON", "CPRECOF", "CUTMOD", "NEWCONF", "TANGOF", "WAITM",
     "ORISON", "ORISOF",
 )  # fmt: skip
@@ -124,6 +124,8 @@ REFUSED: Mapping[str, str] = {
     "G291": "switches to ISO mode, another language; name the dialect of that mode with --dialect",
     "POS": "moves a positioning axis on its own; program it as a G0 block",
     "POSA": "moves a positioning axis on its own; program it as a G0 block",
+    "FB": "is a feed of one block, which a block in front of it would take away; give F there, and the feed "
+          "before it in the next block",
     "OEMIPO1": "is a motion of the machine builder",
     "TOFFL": "changes the length of the tool, which is not read; put it into the tool table",
     "TOFFR": "changes the radius of the tool, which is not read; put it into the tool table",

@@ -135,6 +135,7 @@ REFUSED: dict[str, tuple[str, str]] = {
     ZERO + "X=IC(2)": ("X is a distance in G90; unroll", "OLP511"),
     'RET("AA",1)': ("may go on at another block", "OLP542"),
     "X1 RET": ("write RET alone", "OLP542"),
+    "G1 X50 F500\nFB=100 X60": ("give F there", "OLP512"),
     "X=DC(20)": ("DC belongs to rotary axes", "OLP512"),
     ZERO + "G91\nX=AC(2)": ("X is a position in G91; unroll", "OLP511"),
     "R1=5+1": ("--flatten", "OLP511"),
