@@ -21,7 +21,7 @@ _WITHOUT_PATH = (
     "FGROUP", "FGREF", "WORKPIECE", "EXTERN", "GROUP_BEGIN", "GROUP_END", "GROUP_ADDEND", "STARTFIFO",
     "STOPFIFO", "FIFOCTRL", "WAITS", "UPATH", "SPATH", "CFC", "CFTCP", "CFIN",
     "CUT2D", "CUT2DF", "CUT2DD", "CDON", "CDOF", "CDOF2", "DIAMOF",
-    "TOFRAMEOF", "TOROTOF", "PAROTOF", "TCOFR", "DISPLON", "DISPLOF", "ACTBLOCNO", "SAVE",
+    "TOFRAMEOF", "TOROTOF", "PAROTOF", "TCOFR", "DISPLON", "DISPLOF", "ACTBLOCNO",
     "ORIEULER", "ORIRPY", "ORIRPY2", "ORIVIRT1", "ORIVIRT2",
     "OSOF", "OSC", "OSS", "OSSE", "OSD", "OST", "PROC", "SETPIECE", "SPCON", "SPCOF", "ISD", "FENDNORM",
     "FENDOFF", "WALIMON", "WALIMOF", "SBLON", "SBLOF", "PTPG0", "CP", "DYNNORM", "DYNPOS", "DYNROUGH",
@@ -70,6 +70,7 @@ READ: Mapping[str, str] = {
     "G74": "to the reference point: the axes are not known behind it",
     "G75": "to a fixed point: the axes are not known behind it",
     "M17": "the end of the program, as RET",
+    "SAVE": "--flatten writes the G codes of the call again behind the subprogram; frames in it are refused",
     "RET": "the end of the program",
     **dict.fromkeys(("G41", "G42"), "cutter compensation with the radius of the edge in force"),
     **dict.fromkeys(CONTOUR_WAYS, "how contours begin, end and go round corners: G41 and G42 are read with "

@@ -177,6 +177,48 @@ def test_the_header_of_a_file_that_is_called_begins_no_program(setup: Setup) -> 
     assert read(text.encode(), setup, SINUMERIK).toolpath.end_mm[-1, :2].tolist() == [5.0, 2.0]
 
 
+MAIN = "G17 G90 G71 G54 G40 G1 F200\n"
+#: Subprograms with SAVE, and what stands behind the blocks of one, or why it is refused.
+SAVED = {
+    "Z-1": "",
+    "G90 G1 Z-1": "",
+    "G91 X10": "G90\n",
+    "G0 G91 X10\nG1 G18": "G17 G90\n",
+    "G55\nX1\n/G0": "G1 G54\n",
+    "INNER\nG91 X1": "G90\n",
+    "INNER": "",
+    "G41 X1\nG40 X2": "",
+    "G41 X1": "takes the place of G40",
+    "G64": "program it before the call",
+    "TRANS X1": "changes a frame",
+    "G58 X1": "changes a frame",
+    "SOFT": "take SAVE out",
+    "PLAIN": "take SAVE out",
+}
+
+
+@pytest.mark.parametrize("text", SAVED, ids=lambda t: t.replace("\n", " | "))
+@pytest.mark.parametrize("head", ["SUB2 SAVE", "SUB2(REAL A) SBLOF DISPLOF SAVE"])
+def test_save_puts_back_what_was_in_force_at_the_call(head: str, text: str) -> None:
+    subs = {
+        "SUB2": f"PROC {head}\n{text}\nRET\n",
+        "INNER": "PROC INNER SAVE\nG91\nRET\n",
+        "PLAIN": "SOFT\nRET\n",
+    }
+
+    def beside(name: str) -> tuple[str, bytes] | None:
+        return (f"{name}.SPF", subs[name].encode()) if name in subs else None
+
+    if SAVED[text].rstrip("\n") == SAVED[text] != "":
+        with pytest.raises(ProgramError) as caught:
+            unrolled(MAIN + "SUB2\nX50\nM30\n", subprograms=beside)
+        assert SAVED[text] in str(caught.value) and caught.value.code == "OLP544"
+        return
+    got = unrolled(MAIN + "SUB2\nX50\nM30\n", subprograms=beside)
+    inside = text.replace("INNER", "G91\nG90")
+    assert got == f"{MAIN}{inside}\n{SAVED[text]}X50\nM30\n"
+
+
 def test_arrays_take_the_values_of_their_definition() -> None:
     text = "DEF REAL P[3]=SET(1.5, 2*4)\nX=P[0] Y=P[1] Z=P[2]\n"
     assert unrolled(HEAD + text).endswith("X=1.5 Y=8 Z=0\n")

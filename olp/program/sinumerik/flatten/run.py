@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 
 from olp.core.budget import Budget
 from olp.core.errors import ProgramError
@@ -23,6 +24,7 @@ _DEEPEST = 16
 _JUMP = re.compile(r"(.*?)\b(GOTO[FB]?)[ \t]+([A-Z_][A-Z0-9_]*|\d+)[ \t]*$", re.IGNORECASE)
 _RANGE = re.compile(r"([A-Z_][A-Z0-9_\[\]]*)[ \t]*=(.*?)\bTO\b(.*)$", re.IGNORECASE)
 _ARMS = re.compile(r"(.*?)[ \t]+(GOTO[FB]?)[ \t]+([A-Z_][A-Z0-9_]*)[ \t]*", re.IGNORECASE)
+_NAMES = re.compile(r"[A-Z_][A-Z0-9_]*")
 _CASE = re.compile(r"(.*?)\bOF\b(.*)$", re.IGNORECASE)
 _KNOWN = frozenset({*DRILLING, *HARMLESS, *READ, *REFUSED, *PATTERNS, "CYCLE80", "CIP", "CT"})
 _REPEATED = re.compile(
@@ -46,17 +48,20 @@ class Stop(Exception):
 
 
 class Walk:
-    """Runs a program. `visit` writes a line; it is given the unit, the line and the variables in force."""
+    """Runs a program. `visit` writes a line; it is given the unit, the line and the variables in force.
+    `kept` is around a subprogram with SAVE, with the unit and the line that call it."""
 
     def __init__(
         self,
         visit: Callable[[Unit, Line, Scope], bool],
+        kept: Callable[[Unit, Line], AbstractContextManager[None]],
         find: Callable[[str], Unit | None],
         budget: Budget,
         *,
         block_delete: bool | None,
     ) -> None:
-        self._visit, self._find, self._budget, self._block_delete = visit, find, budget, block_delete
+        self._visit, self._kept, self._find = visit, kept, find
+        self._budget, self._block_delete = budget, block_delete
 
     def run(self, unit: Unit, scope: Scope, depth: int = 0) -> None:
         """Run a text to its end, RET or M17. Raises `Stop` at M2 and M30, ProgramError with line and file."""
@@ -92,7 +97,7 @@ class Walk:
         first = line.block.pieces[0]
         called = self._called(line, first)
         if called is not None:
-            self._call(*called, line, scope, depth)
+            self._call(*called, (unit, line), scope, depth)
             return index + 1
         if any(piece.name == "RET" for piece in line.block.pieces):
             raise return_elsewhere(line.code)
@@ -136,7 +141,7 @@ class Walk:
             name = evaluate(rest, scope)
             if not isinstance(name, str):
                 raise ProgramError(f"{word} needs the name of a subprogram as text", code="OLP540")
-            self._call(_file_name(name), [], "1", line, scope, depth)
+            self._call(_file_name(name), [], "1", (unit, line), scope, depth)
         elif word != "ENDIF":
             raise ProgramError(f"{word} is not run; write GOTOF or GOTOB", code="OLP542")
         return index + 1
@@ -282,7 +287,9 @@ class Walk:
         given = [a.decode("latin-1") for a in arguments(line.raw, first)]
         return first.name, given, runs
 
-    def _call(self, name: str, given: list[str], runs: str, line: Line, scope: Scope, depth: int) -> None:
+    def _call(
+        self, name: str, given: list[str], runs: str, place: tuple[Unit, Line], scope: Scope, depth: int
+    ) -> None:
         unit = self._find(name)
         if unit is None:
             raise ProgramError(
@@ -292,10 +299,14 @@ class Walk:
             )
         if depth >= _DEEPEST:
             raise ProgramError(f"subprograms call one another more than {_DEEPEST} deep", code="OLP542")
+        head = _head(unit)
+        parameters = head.partition("(")[2].rpartition(")")[0]
+        saves = "SAVE" in _NAMES.findall(head.upper())[1:]
         for _ in range(_runs(name, number(runs, scope))):
             own = scope.inner()
-            own.bind(_parameters(unit), given, scope)
-            self.run(unit, own, depth + 1)
+            own.bind(parameters, given, scope)
+            with self._kept(*place) if saves else nullcontext():
+                self.run(unit, own, depth + 1)
 
     def _assigns(self, line: Line, scope: Scope) -> bool:
         pieces = line.block.pieces if line.block is not None else ()
@@ -326,13 +337,12 @@ def _file_name(text: str) -> str:
     return re.sub(r"[._]([SM]PF)\Z", "", name)
 
 
-def _parameters(unit: Unit) -> str:
-    """The parameters in the PROC line of a subprogram; empty where it has none."""
+def _head(unit: Unit) -> str:
+    """What stands behind PROC in a subprogram: its name, parameters and attributes; empty without PROC."""
     for index in range(len(unit.texts)):
         line = unit.line(index)
         if line.keyword == "PROC":
-            inside = line.rest.partition("(")[2]
-            return inside.rpartition(")")[0]
+            return line.rest
         if line.block is not None and line.block.pieces:
             break
     return ""

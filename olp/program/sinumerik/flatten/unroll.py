@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import contextlib
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from olp.program.sinumerik.flatten.corners import SIGN, with_corners
 from olp.program.sinumerik.flatten.expressions import evaluate, number
 from olp.program.sinumerik.flatten.places import Places
 from olp.program.sinumerik.flatten.run import Stop, Walk
+from olp.program.sinumerik.flatten.saved import Saved
 from olp.program.sinumerik.flatten.scope import Scope
 from olp.program.sinumerik.flatten.text import shown
 from olp.program.sinumerik.flatten.unit import Line, Unit, programs
@@ -74,7 +76,9 @@ def flatten(
     budget = Budget.of(len(data), least=limit, per_byte=UNROLLED_PER_BYTE, message=_TOO_LONG)
     unit = Unit.of(main, None)
     with contextlib.suppress(Stop):
-        Walk(writer.visit, find, budget, block_delete=block_delete).run(unit, Scope.of(parameters))
+        Walk(writer.visit, writer.kept, find, budget, block_delete=block_delete).run(
+            unit, Scope.of(parameters)
+        )
     writer.finish()
     return Unrolled.of(b"".join(writer.blocks), writer.origin(data, list(known.values())))
 
@@ -88,6 +92,7 @@ class _Writer:
         self._seen: set[tuple[str | None, int]] = set()
         self.corners = False
         self._places = Places(expand_cycles=expand_cycles)
+        self._saved = Saved()
 
     def origin(self, data: bytes, units: list[Unit | None]) -> Origin:
         """The source line of every block."""
@@ -129,6 +134,7 @@ class _Writer:
             if block is None or not block.label:
                 self._put(unit, line, line.raw)
             return False
+        self._saved.follow(line)
         raw, left = self._with_numbers(line, scope)
         if not left:
             return False
@@ -140,6 +146,15 @@ class _Writer:
             and line.code[p.value : p.value_end].strip() in ("2", "02", "30")
             for p in block.pieces
         )
+
+    @contextmanager
+    def kept(self, unit: Unit, line: Line) -> Iterator[None]:
+        """Around a subprogram with SAVE that a line calls: the codes that it puts back are a block."""
+        with self._saved.kept() as again:
+            yield
+        if again:
+            for text in self._places.follow(line.deleted, b" ".join(again)):
+                self._put(unit, line, text)
 
     def _with_numbers(self, line: Line, scope: Scope) -> tuple[bytes, bool]:
         """A line with numbers for its expressions, without its assignments and its label, and whether any of
