@@ -219,6 +219,18 @@ def test_save_puts_back_what_was_in_force_at_the_call(head: str, text: str) -> N
     assert got == f"{MAIN}{inside}\n{SAVED[text]}X50\nM30\n"
 
 
+@pytest.mark.parametrize(
+    ("call", "sub", "why"),
+    [("/SUB", "X1\nRET\n", "both positions of the switch"), ("SUB", "X1 M17\n", "a block of its own")],
+)
+def test_a_call_under_the_switch_and_a_last_block_with_more_words_are_refused(
+    call: str, sub: str, why: str
+) -> None:
+    """The call ran with either position, and the words of the last block were lost."""
+    with pytest.raises(ProgramError, match=why):
+        unrolled(call, subprograms=lambda _: ("SUB.SPF", sub.encode()), block_delete=None)
+
+
 def test_arrays_take_the_values_of_their_definition() -> None:
     text = "DEF REAL P[3]=SET(1.5, 2*4)\nX=P[0] Y=P[1] Z=P[2]\n"
     assert unrolled(HEAD + text).endswith("X=1.5 Y=8 Z=0\n")

@@ -83,7 +83,12 @@ class Walk:
         """Carry out one line; returns the next one, -1 at the end of the text."""
         if line.deleted and self._block_delete:
             return index + 1
-        if line.deleted and self._block_delete is None and (line.keyword or self._assigns(line, scope)):
+        called = None
+        if not line.keyword and line.block is not None and line.block.pieces:
+            called = self._called(line, line.block.pieces[0])
+        if (line.deleted and self._block_delete is None) and (
+            line.keyword or called is not None or self._assigns(line, scope)
+        ):
             raise ProgramError(
                 "a block under block delete controls the run, so both positions of the switch give other "
                 "programs; remove the `/`",
@@ -94,14 +99,17 @@ class Walk:
         if line.block is None or not line.block.pieces:
             self._visit(unit, line, scope)
             return index + 1
-        first = line.block.pieces[0]
-        called = self._called(line, first)
         if called is not None:
             self._call(*called, (unit, line), scope, depth)
             return index + 1
         if any(piece.name == "RET" for piece in line.block.pieces):
             raise return_elsewhere(line.code)
         if depth and self._returns(line):
+            if len(line.block.pieces) > 1:
+                raise ProgramError(
+                    "M17 of a subprogram stands beside other words; put it into a block of its own",
+                    code="OLP542",
+                )
             return -1
         if self._visit(unit, line, scope):
             raise Stop
