@@ -97,8 +97,8 @@ def test_counts_and_lines_stay_right(bent: Path) -> None:
     lines = [
         "J P[1] 50% FINE",
         '  !don\'t; "move"',
-        "L P[2] 200mm/sec CNT50 ACC80 TB .05sec,CALL X",
-        "L P[3] 200mm/sec FINE",
+        "L P[2] 200mm/sec CNT50 ACC80",
+        "L P[3] 200mm/sec FINE TB .05sec,CALL X",
     ]
     points = [position(k, p) for k, p in ((1, [-60, -60, 0]), (2, [60, 60, 20]), (3, [60, -60, 20]))]
     text = olp.correct(text_of(lines, points), bent).data.decode()
@@ -108,8 +108,8 @@ def test_counts_and_lines_stay_right(bent: Path) -> None:
     assert len(main[0].split("!")[1]) <= 33
     parts = [line for line in main if re.match(r" +:L P\[\d+\] 200mm/sec CNT100( ACC80)? ;", line)]
     assert len(parts) == len(main) - 5
-    assert all("TB" not in line for line in parts)
-    assert text.count("TB .05sec,CALL X") == 1
+    # a move with an action stays whole
+    assert re.match(r"(?s).*ACC80 ;$", main[-2]) and main[-1].endswith("TB .05sec,CALL X ;")
     wrong = olp.correct(text_of(lines, points, 77), bent).data
     assert b"LINE_COUNT\t= 77;" in wrong
 
@@ -133,6 +133,9 @@ def test_frames_and_tools_of_registers(tmp_path: Path) -> None:
         ("L P[1] 200mm/sec FINE INC", "INC"),
         ("L P[1] 200mm/sec FINE COORD", "COORD"),
         ("L P[1] 200mm/sec FINE VOFFSET,VR[1]", "sensor"),
+        ("L P[1] 200mm/sec CNT60 ACC80 RTCP", "`RTCP` behind a move is not read: the tool stands still"),
+        ("L P[1] 200mm/sec CNT60 PTH FPLIN(1)", "`FPLIN` behind a move .* post the move without it"),
+        ("L P[3] 200mm/sec FINE", "P.3. of line 19 states `Y = 2.0 inch`; expected mm"),
         ("C P[1]\n    :  P[1] 200mm/sec FINE", "arc"),
         ("  P[1]=LPOS", "another value"),
         ("  OFFSET CONDITION PR[1]", "targets are moved"),
@@ -142,7 +145,8 @@ def test_frames_and_tools_of_registers(tmp_path: Path) -> None:
 def test_what_is_not_certain_is_refused_with_its_line(zero: Path, line: str, why: str) -> None:
     untaught = position(2, [0, 0, 0]).replace("0.0 mm", "******** mm")
     with pytest.raises(OlpError, match=why) as error:
-        olp.correct(text_of([line], [position(1, [0, 0, 0]), untaught]), zero)
+        inch = position(3, [1, 2, 3]).replace("2.0 mm", "2.0 inch")
+        olp.correct(text_of([line], [position(1, [0, 0, 0]), untaught, inch]), zero)
     assert isinstance(error.value, ProgramError)
     assert error.value.line == 5
 
@@ -155,6 +159,18 @@ def test_what_the_text_does_not_state_is_left_and_listed(bent: Path) -> None:
     assert joints.encode() in done.data
     assert b"L PR[3] 200mm/sec FINE ;\n   3:L P[2]" in done.data
     assert any("does not state where this move goes" in finding.message for finding in done.findings)
+
+
+@pytest.mark.parametrize(
+    "tail", ["Skip,LBL[1]", "Skip,LBL[1],PR[2]=LPOS", "TA 0.10sec,DO[1]=ON", "DB 10.0mm,CALL X", "AP_LD10"]
+)
+def test_a_move_with_words_of_its_own_is_corrected_and_stays_whole(bent: Path, tail: str) -> None:
+    points = [position(k, p) for k, p in ((1, [-60, -60, 0]), (2, [60, 60, 20]))]
+    for more, whole in ((tail, True), ("ACC R[1] EV 50% Wjnt", False)):
+        done = olp.correct(text_of(["J P[1] 50% FINE", f"L P[2] 200mm/sec FINE {more}"], points), bent)
+        assert (done.report["moves"]["inserted_blocks"] == 0) == whole
+        assert whole or done.data.count(b":L ") == done.data.count(more.encode())
+        assert b"X = 60.0 mm" not in done.data
 
 
 @pytest.mark.parametrize(

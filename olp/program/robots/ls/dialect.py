@@ -23,7 +23,7 @@ from olp.program.text.signs import LS
 _NUMBERED = pattern(rb"P\[\s*(\d+)")
 _HEAD = pattern(rb"(?m)^([ \t]*)(\d*)([ \t]*:)")
 _MAIN = pattern(rb"(?im)^[ \t]*/MN[^\r\n]*(?:\r\n|\n|\r|\Z)")
-_PLAIN_TAIL = pattern(rb"(?i)\b(?:ACC\s*\d+|PTH|Wjnt)\b")
+_PLAIN_TAIL = pattern(rb"(?i)\b(?:ACC\s*(?:\d+|R\[[^\]]*\])|PTH\b|Wjnt\b|(?:Ind\.)?EV\s*\d+\s*%)")
 _END = pattern(rb"(?i)(\s)(FINE|CNT\s*\d+|CNT\s*R\[[^\]]*\]|CD\d+|CR\d+)?(\s[^;]*)?;")
 _TURN = {name: pattern(rb"\b" + name + rb"\s*=\s*([-+]?(?:\d+\.?\d*|\.\d+))") for name in (b"W", b"P", b"R")}
 #: Characters that a comment may have.

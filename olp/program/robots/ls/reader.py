@@ -30,6 +30,31 @@ _OFFSET = pattern(rb"(?i)\b(Tool_Offset|Offset|WZVersatz|Versatz)\b\s*(?:,\s*PR\
 _INCREMENT = pattern(rb"(?i)\bINC\b")
 _COORD = pattern(rb"(?i)\bCOORD\b")
 _SKIP = pattern(rb"(?i)\bSkip\b")
+_INDEX = rb"\[[^\]]*\]"
+#: Words behind a move that change nothing of its path.
+_PLAIN_TAIL = (
+    rb"ACC\s*(?:\d+|R"
+    + _INDEX
+    + rb")|PTH|(?:Ind\.)?EV\s*\d+\s*%|:?\s*(?:Arc|Weld)\s+(?:Start|End)\s*"
+    + _INDEX
+)
+#: Words that belong to the whole move, or to one of its ends, so that it is never split.
+_WHOLE_TAIL = (
+    rb"Skip\s*,\s*LBL" + _INDEX + rb"(?:\s*,\s*PR" + _INDEX + rb"\s*=\s*[LJ]POS)?|(?:AP|RT)_LD\s*\d+|"
+    rb"(?:TB|TA)\s*\d*\.?\d+\s*sec\s*,.*|DB\s*[-+]?\d*\.?\d+\s*mm\s*,.*"
+)
+_SHIFTED_TAIL = rb"(?:Tool_Offset|Offset|WZVersatz|Versatz)(?:\s*,\s*PR" + _INDEX + rb")?"
+_TAIL = pattern(
+    rb"(?i)(?:\s*(?:" + _PLAIN_TAIL + rb"|" + _WHOLE_TAIL + rb"|" + _SHIFTED_TAIL + rb")(?![\w(\[]))*\s*"
+)
+_HELD = pattern(rb"(?i)(?<![\w.])(?:" + _WHOLE_TAIL + rb")")
+#: Other words of a move, in capitals, and why they are not read.
+_UNREAD = {
+    b"RTCP": "the tool stands still, and the robot moves the part",
+    b"WJNT": "the wrist turns by its joints, and the tool not evenly",
+}
+_WORD = pattern(rb"[\w.]+|\S")
+_WRIST = pattern(rb"(?i)\bWjnt\b")
 #: Words of a move by which a sensor moves its target.
 _SENSED = pattern(rb"(?i)\bVOFFSET\b|\bSearch\[|\bTrack\b")
 #: Statements by which later targets are moved.
@@ -165,6 +190,7 @@ class _Reader:
         ):
             if sign.search(move.tail):
                 raise not_read(f"this move {why}, which is not read", line.line)
+        self._tail(move, line)
         position = None if move.register else self._position(move.number, line)
         shift = self._shift(move, position)
         begin = self.data.index(b"[", line.first) + 1
@@ -186,10 +212,23 @@ class _Reader:
         )  # fmt: skip
         self.moves.move(
             line.line, use, self._frame(position, line), self._tool(position, line), move.feed,
-            straight=move.straight, whole=move.timed,
+            straight=move.straight, whole=move.timed or _HELD.search(move.tail) is not None,
         )  # fmt: skip
         if _SKIP.search(move.tail):
             self.moves.known = False
+
+    def _tail(self, move: _Move, line: Line) -> None:
+        """Raises ProgramError with the first word behind a move whose effect on its path is not known."""
+        # without joints, and behind J, a wrist turns nothing else
+        tail = move.tail if self.moves.arm and move.straight else _WRIST.sub(b"", move.tail)
+        known = _TAIL.match(tail)
+        word = _WORD.search(tail, 0 if known is None else known.end())
+        if word is not None:
+            why = _UNREAD.get(word[0].upper(), "what it does to the path is not known")
+            raise not_read(
+                f"`{word[0].decode('latin-1')}` behind a move is not read: {why}; post the move without it",
+                line.line,
+            )
 
     def _joints(self, line: Line, move: _Move, position: Position, place: Span) -> Use | None:
         """How a move uses joint values; None where the text does not state where they lead."""
@@ -229,6 +268,13 @@ class _Reader:
             what = "is not stated" if not found else "is stated twice"
             raise ProgramError(f"the position P[{number}] {what}", line=line.line, code="OLP533")
         axes = found[0].axes
+        if found[0].foreign:
+            raise ProgramError(
+                f"the position P[{number}] of line {found[0].line} states `{found[0].foreign}`; expected mm "
+                "and deg",
+                line=line.line,
+                code="OLP533",
+            )
         if not any(name[0] in "XJ" for name in axes) or ("X" in axes and not {*"YZWPR"} <= set(axes)):
             raise ProgramError(
                 f"the position P[{number}] of line {found[0].line} is not taught, or in another form",

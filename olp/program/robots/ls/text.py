@@ -15,7 +15,9 @@ _POSITION = pattern(rb"P\[\s*(\d+)\s*(?::[^\]]*)?\]\s*\{([^{}]*)\}\s*;")
 _GROUP = pattern(rb"GP(\d+)\s*:")
 _COUNT = pattern(rb"(?im)^[ \t]*LINE_COUNT[ \t]*=[ \t]*(\d+)")
 _NUMBER = rb"([-+]?(?:\d+\.?\d*|\.\d+))"
-_AXIS = pattern(rb"\b(X|Y|Z|W|P|R|E\d|J\d)\s*=\s*(?:" + _NUMBER + rb"|\*+)\s*(mm|deg)?")
+_AXIS = pattern(rb"\b(X|Y|Z|W|P|R|E\d|J\d)\s*=\s*(?:" + _NUMBER + rb"|\*+)\s*([A-Za-z]+\b(?!\s*=))?")
+#: Units of values by the first letter of their axis; others have either.
+_UNITS = {**dict.fromkeys("XYZ", b"mm"), **dict.fromkeys("WPR", b"deg")}
 _FRAME = pattern(rb"UF\s*:\s*(\d+|F)\s*,\s*UT\s*:\s*(\d+|F)")
 _CONFIG = pattern(rb"CONFIG\s*:\s*'([^']*)'")
 
@@ -35,7 +37,8 @@ class Position:
     """A position of the first group: its `line`, the bytes of all of it and of its number.
 
     `frame` and `tool` are -1 for the active one. `axes` are bytes and values by their letters. `config` are
-    the bytes of the configuration, and `others` is what else it states."""
+    the bytes of the configuration, and `others` is what else it states. `foreign` is the first value in a
+    unit that is not read."""
 
     line: int
     span: Span
@@ -45,6 +48,7 @@ class Position:
     axes: dict[str, tuple[Span, float]]
     config: Span
     others: bytes
+    foreign: str
 
     @property
     def outer(self) -> tuple[float, ...]:
@@ -110,10 +114,17 @@ def positions(data: bytes, part: Span, found: dict[int, list[Position]]) -> None
             for axis in _AXIS.finditer(data, *span)
             if axis[2] is not None and abs(float(axis[2])) < LARGEST
         }
+        units = ((axis[3], _UNITS.get(axis[1].decode()), axis) for axis in _AXIS.finditer(data, *span))
+        foreign = [
+            axis[0].decode("latin-1")
+            for unit, own, axis in units
+            if unit is not None and unit not in ((b"mm", b"deg") if own is None else (own,))
+        ]
         used = [-1 if frame is None or frame[k] == b"F" else int(frame[k]) for k in (1, 2)]
         found.setdefault(int(match[1]), []).append(
             Position(
                 count, match.span(), match.span(1), used[0], used[1], axes,
                 (span[0], span[0]) if config is None else config.span(1), b"".join(others.split()),
+                (*foreign, "")[0],
             )
         )  # fmt: skip
