@@ -306,6 +306,47 @@ def test_joints_that_the_text_does_not_state_are_kept(tmp_path: Path) -> None:
     assert b"PTP XHOME\n" in result.data
     assert b"PTP {A1 5}\n" in result.data
     assert result.report["moves"]["feed"] == 0
+    assert result.report["moves"]["uncorrected"] == 2
+    assert [found.lines for found in result.findings if found.code == "OLP102"] == [(4, 6)]
+
+
+@pytest.mark.parametrize("tail", ["P[2] 250mm/sec CNT60 Offset,PR[3]", "PR[2] 250mm/sec CNT60"])
+def test_moves_of_tp_programs_that_are_left_are_listed(tail: str, tmp_path: Path) -> None:
+    text = tp([("P", JOINTS), ("L", JOINTS + 1.0)]).replace(b"P[2] 250mm/sec CNT60", tail.encode(), 1)
+    result = olp.correct_joints(text, stated(arm_files(tmp_path), "tp"))
+    assert tail.encode() in result.data
+    assert result.report["moves"]["uncorrected"] == 1
+    assert [found.lines for found in result.findings if found.code == "OLP102"] == [(5,)]
+
+
+START = "start_deg = { J1 = 20.0, J2 = 10.0, J3 = 20.0, J4 = 30.0, J5 = 40.0, J6 = 50.0 }"
+
+
+@pytest.mark.parametrize(
+    ("language", "unread"),
+    [
+        ("krl", "PTP XHOME"),
+        ("krl", "PTP {A1 -150}"),
+        ("ur", "movej([d2r(20),0,0,0,0,0])"),
+        ("ur", "movej(get_inverse_kin(frame))"),
+    ],
+)
+def test_where_the_arm_starts_is_not_where_an_unread_move_left_it(
+    language: str, unread: str, tmp_path: Path
+) -> None:
+    """Behind it `start_deg` names no posture any more."""
+    machine, job = arm_files(tmp_path), tmp_path / "job.toml"
+    job.write_text(f'schema = "olp-job-1"\nmachine = "machine.toml"\nprogram = "x"\n{START}\n')
+    text = WRITERS[language]([("L", JOINTS + 1.0)])
+    if language == "krl":
+        text = text.replace(b",S 2,T 0", b"")
+    assert olp.correct_joints(text, machine, job=job).report["verdict"]["ok"]
+    lines = text.decode().splitlines()
+    place = next(k for k, line in enumerate(lines) if line.strip().upper().startswith(("LIN", "MOVEL")))
+    lines.insert(place, unread)
+    with pytest.raises(ProgramError, match=f"the move of line {place + 1} goes is not read") as caught:
+        olp.correct_joints("\n".join([*lines, ""]).encode(), machine, job=job)
+    assert caught.value.line == place + 2
 
 
 @pytest.mark.slow

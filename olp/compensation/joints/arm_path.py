@@ -98,10 +98,11 @@ def arm_path(
         values[posed], fits[posed] = dialect.fitting(config[posed], own, arm.branches(own))
     travel = np.array([joint.travel for joint in structure.joints.values()]).T
     straight = used.mask("straight")
+    begins: Mask = rows != np.append(-1, rows[:-1]) + 1
+    before = path.line[np.maximum(rows - 1, 0)].astype(np.int64)
     wanted = Wanted(
         flange, joints, values, fits, straight, used.mask("free"),
-        np.isnan(config).any(axis=1) | (config.shape[1] == 0), rows != np.append(-1, rows[:-1]) + 1,
-        used.line,
+        np.isnan(config).any(axis=1) | (config.shape[1] == 0), begins, np.where(begins, before, 0), used.line,
     )  # fmt: skip
     end = np.full((count, AXES), np.nan)
     end[rows] = Settled(arm, wanted, postures, travel).axes(start_deg)

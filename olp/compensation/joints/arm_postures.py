@@ -28,7 +28,8 @@ class Wanted:
     """What targets (n,) ask of an arm: `flange` poses, and axis values (n, 6) where they state `joints`, else
     NaN. `values` and `fits` are the postures that their words name (`RobotDialect.fitting`). Moves go
     `straight`, or with any posture near by where they are `free`; `open` ones do not name one posture.
-    `begins` are moves whose start is not known. `line` is that of the move."""
+    `begins` are moves whose start is not known, and `behind` is the line of the move that leaves it open:
+    their own where the run decides it. `line` is that of the move."""
 
     flange: Poses
     joints: Array
@@ -38,6 +39,7 @@ class Wanted:
     free: Mask
     open: Mask
     begins: Mask
+    behind: Index
     line: Index
 
 
@@ -174,6 +176,13 @@ class Settled:
                 found.append(value)
         if len(found) == 1:
             return found[0]
+        behind = int(self.wanted.behind[k])
+        if behind not in (0, line) and (self.wanted.open[k] or (not found and self.wanted.free[k])):
+            raise _refused(
+                "the target is reached from the posture before it, and where the move of line "
+                f"{behind} goes is not read; state the configuration, or the numbers of that move",
+                line,
+            )
         if self.wanted.open[k]:
             raise _refused(
                 "the target does not state its configuration, so it is reached from the posture before it, "

@@ -157,13 +157,13 @@ class RobotMoves:
         it stays as it is, and where the robot is then is not known."""
         use = taken() if self.arm else None
         if use is None:
-            self.known = False
+            self.left(line)
             self.remark("joints", line, "joint values are kept as written")
             return
         if not self.known:
             self.away(line)
         flange = Tool("", Pose())
-        self._frame = self.frames.index(self.frames.world, flange, NO_TURN, ZERO, line)
+        self._frame = self._flange(line)
         self.moves.put(
             kind=int(Kind.RAPID), flag=int(Flag.CONTROL), line=line, frame=self._frame, end=_NOWHERE,
             slot=(-1, -1, -1), bounds=NOWHERE, feed=self._feed,
@@ -188,9 +188,24 @@ class RobotMoves:
     def away(self, line: int) -> None:
         """The machine may have gone to a position that the text does not state."""
         self.known, self._turn, self._rest = True, None, ()
-        if not self.uses:
+        if self.uses:
+            self._open(line, max(self._frame, 0))
+
+    def left(self, line: int) -> None:
+        """A move stays as it is written, and where it goes is not stated. On an arm it is one of the moves,
+        so that it is listed as uncorrected, and nothing before it says where the arm is."""
+        if not self.arm:
+            self.known = False
             return
-        frame = max(self._frame, 0)
+        self.known, self._turn, self._rest = True, None, ()
+        self._open(line, self._flange(line))
+
+    def _flange(self, line: int) -> int:
+        """The number of the world with the tip at the flange."""
+        return self.frames.index(self.frames.world, Tool("", Pose()), NO_TURN, ZERO, line)
+
+    def _open(self, line: int, frame: int) -> None:
+        """A move whose end is not stated."""
         self.moves.put(
             kind=int(Kind.RAPID), flag=int(Flag.CONTROL), line=line, frame=frame, end=_NOWHERE,
             slot=(-1, -1, -1), bounds=NOWHERE, feed=self._feed,

@@ -199,7 +199,7 @@ class _Reader:
             self.moves.joint_move(line.line, lambda: self._joints(line, move, position, place))
             return
         if position is None or shift is None:
-            self.moves.known = False
+            self.moves.left(line.line)
             what = "left as written: the text does not state where this move goes"
             self.moves.remark("left", line.line, what)
             return
