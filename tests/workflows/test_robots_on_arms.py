@@ -349,6 +349,13 @@ def test_where_the_arm_starts_is_not_where_an_unread_move_left_it(
     assert caught.value.line == place + 2
 
 
+def test_a_straight_move_to_joints_is_refused(tmp_path: Path) -> None:
+    text = ur([("J", JOINTS)]).replace(b"movej", b"movel")
+    with pytest.raises(ProgramError, match="joints in a movel are not read; write the pose") as caught:
+        olp.correct_joints(text, arm_files(tmp_path))
+    assert caught.value.line == 4
+
+
 @pytest.mark.slow
 def test_moves_with_an_action_are_not_split(tmp_path: Path) -> None:
     far = position(JOINTS + np.array([20, 5, -5, 5, -4, 6]), ",S 2,T 0")

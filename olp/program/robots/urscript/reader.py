@@ -211,7 +211,11 @@ class _Reader:
         if not arguments:
             raise ProgramError("the move has no target", line=line.line, code="OLP516")
         begin, target = arguments[0]
-        if call[1] == b"movej" and (_JOINTS.fullmatch(target) or self._is_joints(target)):
+        in_joints = _JOINTS.fullmatch(target) is not None or self._is_joints(target)
+        if in_joints and call[1] != b"movej":
+            what = f"joints in a {call[1].decode()} are not read; write the pose"
+            raise ProgramError(what, line=line.line, code="OLP533")
+        if in_joints:
             self._begins_in_loop()
             statement = start, line.begin + len(line.text)
             rest = self._rest(call[1], arguments[1:])
