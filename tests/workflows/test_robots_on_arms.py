@@ -366,6 +366,66 @@ def test_moves_with_an_action_are_not_split(tmp_path: Path) -> None:
     assert olp.correct_joints(krl_of(*moves), arm_files(tmp_path)).data.count(b"LIN") > 2
 
 
+LINE = f"LIN {position(JOINTS + 1, ',S 2,T 0')}"
+SPLINE = "S" + LINE
+HEAD = KRL_HEAD.decode().splitlines()[1:]
+
+
+@pytest.mark.parametrize(
+    ("moves", "line"),
+    [
+        (["$ORI_TYPE=#CONSTANT", LINE], 6),
+        (["$ORI_TYPE = #joint", LINE], 6),
+        (["$ORI_TYPE=#JOINT", "$ORI_TYPE=#VAR", LINE], 0),
+        (["$ORI_TYPE=#CONSTANT", f"{SPLINE} WITH $VEL.CP=0.1, $ORI_TYPE=#VAR C_SPL"], 0),
+        ([f"{SPLINE} WITH $VEL={{CP 0.1,ORI1 100}}, $ORI_TYPE=#CONSTANT C_SPL"], 5),
+        ([f"{SPLINE} WITH $ORI_TYPE=SORI_TYP(LD)", "END", "DECL LDAT LD={VEL 2.0,ORI_TYP #CONSTANT}"], 5),
+        (["LDAT_ACT=LD", "BAS(#CP_PARAMS,2)", *HEAD, LINE, "END", "DECL LDAT LD={ORI_TYP #JOINT}"], 9),
+        (["LDAT_ACT=LD", "BAS(#CP_PARAMS,2)", *HEAD, LINE, "END", "DECL LDAT LD={ORI_TYP #VAR}"], 0),
+        (["IF a THEN", "$ORI_TYPE=#JOINT", "ELSE", "$ORI_TYPE=#VAR", "ENDIF", LINE], 10),
+        (["made2()", LINE, "END", "DEF made2()", "$ORI_TYPE=#JOINT"], 6),
+        ([LINE, "$ORI_TYPE=#JOINT", f"PTP {position(JOINTS, ',S 2,T 0')}"], 0),
+    ],
+)
+def test_a_tool_that_does_not_turn_evenly_is_refused_in_krl(
+    moves: list[str], line: int, tmp_path: Path
+) -> None:
+    begin = f"PTP {position(JOINTS, ',S 2,T 0')}"
+    text, machine = krl_of(begin, *moves), arm_files(tmp_path)
+    if not line:
+        assert olp.correct_joints(text, machine).report["verdict"]["ok"]
+        return
+    with pytest.raises(ProgramError, match=r"set \$ORI_TYPE=#VAR before it") as caught:
+        olp.correct_joints(text, machine)
+    assert caught.value.line == line
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        (["SingArea\\Wrist"], 8),
+        (["SingArea \\LockAxis4"], 8),
+        (["SingArea\\Wrist", "SingArea\\Off"], 0),
+        (["IF a THEN", "SingArea\\Wrist", "ELSE", "SingArea\\Off", "ENDIF"], 12),
+        (["made2", "ENDPROC", "PROC made2()", "SingArea\\Off", "SingArea\\Wrist"], 12),
+    ],
+)
+def test_a_tool_that_does_not_turn_evenly_is_refused_in_rapid(
+    words: list[str], line: int, tmp_path: Path
+) -> None:
+    text = rapid([("P", JOINTS), ("L", JOINTS + 1.0)]).decode()
+    text = text.replace(
+        "  MoveL", "".join(f"{word}{'' if word[0] in 'IEP' else ';'}\n" for word in words) + "  MoveL"
+    )
+    machine = arm_files(tmp_path)
+    if not line:
+        assert olp.correct_joints(text.encode(), machine).report["verdict"]["ok"]
+        return
+    with pytest.raises(ProgramError, match=r"program SingArea\\Off before it") as caught:
+        olp.correct_joints(text.encode(), machine)
+    assert caught.value.line == line
+
+
 def tp_of(joints: np.ndarray, config: str, kind: str = "P") -> bytes:
     text = tp([(kind, joints)])
     start = text.index(b"CONFIG : '") + 10

@@ -17,6 +17,7 @@ from olp.program.robots.krl import flow
 from olp.program.robots.krl.active import Active, State
 from olp.program.robots.krl.data import Declared, assigned, is_declaration, key_of, pose_of
 from olp.program.robots.krl.text import Aggregate, Line, lines, parts
+from olp.program.robots.krl.turning import Turning
 from olp.program.robots.moves import NAN, RobotMoves, not_read, take_all
 from olp.program.robots.poses import Pose, multiplied, rotated
 from olp.program.robots.targets import NOWHERE, Span, Use
@@ -72,6 +73,7 @@ class _Reader:
         self.declared = Declared(data, self.lines)
         self.flow = flow.Flow(self.lines)
         self.active = Active(data, setup, self.declared, self.moves.frames)
+        self.turning = Turning(self.lines)
         self.blocks: list[_Block] = []
         self.targets: dict[Span, int] = {}
         self.bases: dict[tuple[str, str], Located] = {}
@@ -98,10 +100,12 @@ class _Reader:
         text = line.text
         block = flow.BLOCK.match(text)
         if block is not None:
+            self.turning.forget()
             self._block(block.lastgroup or "", line)
             return
         if self.listed or is_declaration(text):
             return
+        self.turning.take(line)
         move = _MOVE.fullmatch(text)
         if move is not None:
             self._move(line, move[1].upper(), line.begin + move.start(2))
@@ -126,6 +130,7 @@ class _Reader:
         for name in flow.calls_in(line.text):
             if name == b"BAS":
                 continue
+            self.turning.forget()
             if self.flow.moves(name):
                 self.moves.known = False
             if self.flow.may_set(name):
@@ -185,6 +190,8 @@ class _Reader:
         if any(block.loop and block.moves == self.moves.count for block in self.blocks):
             # the first move in a loop begins where the last one ends, or before the loop
             self.moves.known = False
+        if self.moves.arm and word.endswith(b"LIN"):
+            self.turning.check(tail[1] or b"", line)
         state = self.active.state
         if tail[1] is not None:
             state = self.active.within(tail[1], tail.start(1), line)

@@ -37,6 +37,8 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"BASE_DATA[n], TOOL_DATA[n]": (_R, "where the text states their numbers; else those of machine or job"),
     b"FDAT_ACT, BAS": (_R, "base and tool of a taught point"),
     b"$VEL.CP": (_R, "the speed from here on"),
+    b"$ORI_TYPE=#VAR": (_R, "tools turn evenly on straight moves from here on"),
+    b"$ORI_TYPE=": (_NO, "on arms, with #CONSTANT or #JOINT before a straight move; set #VAR"),
     b"WITH": (_R, "base and tool of the move"),
     b"IF, SWITCH, FOR, WHILE, REPEAT, LOOP": (
         _R, "behind moves that may not run, the next one is corrected at its end"

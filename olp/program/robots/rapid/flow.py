@@ -20,6 +20,7 @@ _HARMLESS_TAIL = pattern(
     rb"SetDO|SetGO|SetAO|WaitTime)\b.*|[\w.{}]+\s*:=.*)"
 )
 _ASSIGNED = pattern(rb"(?<![\\\w.}])([A-Za-z]\w*)\s*(?:\{[^}]*\})?(?:\.\w+)*\s*:=")
+_AREA = pattern(rb"(?i)\s*SingArea\b[^\\]*\\\s*(Wrist|LockAxis4)")
 #: What a short IF must not hold.
 _MOVES = pattern(rb"(?i)\b(?:Move|Trigg|Search|Arc|PDisp|EOffs)\w*\b")
 
@@ -38,6 +39,12 @@ def word_of(statement: Statement) -> bytes:
 
 def is_short_if(statement: Statement) -> bool:
     return _SHORT_IF.match(statement.text) is not None
+
+
+def area_of(statement: Statement) -> str:
+    """By which switch of `SingArea` the tool does not turn evenly on straight moves; empty for others."""
+    match = _AREA.match(statement.text)
+    return "" if match is None else match[1].decode("latin-1")
 
 
 def may_move(text: bytes) -> bool:

@@ -51,6 +51,8 @@ class _Reader:
         self.refusals: list[ProgramError] = []
         #: whether straight moves, and others, take any posture that is near
         self.free = [False, False]
+        #: the switch of SingArea that may be in force, with its line, and the first one of the text
+        self.area = self.any_area = ("", 0)
 
     def run(self, dialect: Dialect, options: Options, *, words: bool) -> Program:
         if self.data[:2] in (b"\xff\xfe", b"\xfe\xff"):
@@ -58,6 +60,8 @@ class _Reader:
         every = list(statements(self.data, Lines(self.data)))
         rest = self._declare(every)
         self.moving, self.routines = flow.moving_routines(rest)
+        areas = ((flow.area_of(statement), statement.line) for statement in rest)
+        self.any_area = next((area for area in areas if area[0]), self.area)
         take_all(rest, self._statement, self.refusals, options)
         return self.moves.program(dialect, words=words)
 
@@ -112,6 +116,8 @@ class _Reader:
             self._call(statement, word)
         elif row[0] is Support.REFUSED:
             raise ProgramError(f"{word.decode('latin-1')} {row[1]}", line=statement.line, code=_NOT_READ)
+        elif word == b"SINGAREA":
+            self.area = flow.area_of(statement), statement.line
         elif word in (b"CONFL", b"CONFJ"):
             self.free[word == b"CONFJ"] = b"\\OFF" in statement.text.upper().replace(b" ", b"")
 
@@ -122,10 +128,12 @@ class _Reader:
             shown = statement.text.strip()[:60].decode("latin-1")
             raise ProgramError(f"`{shown}` is not a statement of RAPID", line=statement.line, code="OLP510")
         if name in self.routines and name not in self.moving:
+            self.area = self.any_area
             return
         if name not in self.routines:
             what = f"{name or 'a routine'} is in another file: correct that too"
             self.moves.remark("called", statement.line, what)
+        self.area = self.any_area
         self._unknown()
 
     def _short_if(self, statement: Statement) -> None:
@@ -136,11 +144,12 @@ class _Reader:
                 code=_NOT_READ,
             )
         if flow.calls(statement.text):
+            self.area = self.any_area
             self._unknown()
 
     def _block(self, statement: Statement) -> None:
         """Where the flow of the program parts and meets."""
-        block = statement.block
+        block, self.area = statement.block, self.any_area
         if block in ("routine", "label"):
             self._unknown()
             if block == "routine":
@@ -179,6 +188,14 @@ class _Reader:
         if unread:
             raise ProgramError(
                 f"a move with \\{unread[0].decode('latin-1')} is not read", line=line, code=_NOT_READ
+            )
+        if straight and self.moves.arm and self.area[0]:
+            what = f"SingArea\\{self.area[0]} in line {self.area[1]}"
+            raise ProgramError(
+                f"the tool may not turn evenly on this move ({what}), which is not read on arms; program "
+                "SingArea\\Off before it",
+                line=line,
+                code=_NOT_READ,
             )
         use = self._use(statement, words, straight=straight)
         tool, frame = self._tool(words.tool, line), self._frame(words.frame, line)

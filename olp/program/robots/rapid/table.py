@@ -29,6 +29,7 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"JOINTTARGET": (_X, "kept as written"),
     b"CONST": (_X, "other constants and variables"),
     b"MODULE": (_X, ""),
+    b"SINGAREA": (_R, "with Wrist or LockAxis4 a straight move of an arm is refused"),
     b"PROC": (_R, "where its first move comes from is not known: it is corrected at its end"),
     b"IF": (_R, "behind moves that may not run, the next one is corrected at its end"),
     b"CALL": (_R, "behind a routine that may move, the next move is corrected at its end"),
@@ -63,7 +64,7 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     **dict.fromkeys((b"SETDATAVAL", b"SETALLDATAVAL"), (_NO, "gives another value to data that it names")),
     **dict.fromkeys((b"SYNCMOVEON", b"SYNCMOVERESUME"), (_NO, _OTHER)),
     **dict.fromkeys(
-        (b"CONFL", b"CONFJ", b"SINGAREA", b"VELSET", b"ACCSET", b"WORLDACCLIM", b"PATHACCLIM", b"PATHRESOL",
+        (b"CONFL", b"CONFJ", b"VELSET", b"ACCSET", b"WORLDACCLIM", b"PATHACCLIM", b"PATHRESOL",
          b"MOTIONSUP", b"GRIPLOAD", b"MECHUNITLOAD", b"ACTUNIT", b"DEACTUNIT", b"SPEEDREFRESH",
          b"CIRPATHMODE",
          b"WAITTIME", b"WAITDI", b"WAITDO", b"WAITUNTIL", b"WAITGI", b"WAITGO", b"WAITAI", b"WAITAO",
