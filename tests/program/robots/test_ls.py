@@ -162,7 +162,7 @@ def test_what_the_text_does_not_state_is_left_and_listed(bent: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "tail", ["Skip,LBL[1]", "Skip,LBL[1],PR[2]=LPOS", "TA 0.10sec,DO[1]=ON", "DB 10.0mm,CALL X", "AP_LD10"]
+    "tail", ["Skip,LBL[1]", "Skip,LBL[1],PR[2]=LPOS", "TA 0.10sec,DO[1]=ON", "DB R[5]mm,CALL X", "AP_LD10"]
 )
 def test_a_move_with_words_of_its_own_is_corrected_and_stays_whole(bent: Path, tail: str) -> None:
     points = [position(k, p) for k, p in ((1, [-60, -60, 0]), (2, [60, 60, 20]))]
@@ -171,6 +171,17 @@ def test_a_move_with_words_of_its_own_is_corrected_and_stays_whole(bent: Path, t
         assert (done.report["moves"]["inserted_blocks"] == 0) == whole
         assert whole or done.data.count(b":L ") == done.data.count(more.encode())
         assert b"X = 60.0 mm" not in done.data
+
+
+@pytest.mark.parametrize(
+    ("speed", "whole"), [("R[1:fast speed]mm/sec", False), ("R[1:a time]sec", True), ("5.0sec", True)]
+)
+def test_a_speed_of_a_register_stays_and_a_time_is_not_split(bent: Path, speed: str, whole: bool) -> None:
+    points = [position(k, p) for k, p in ((1, [-60, -60, 0]), (2, [60, 60, 20]))]
+    done = olp.correct(text_of(["J P[1] 50% FINE", f"L P[2] {speed} CNT R[2:a b]"], points), bent)
+    assert (done.report["moves"]["inserted_blocks"] == 0) == whole
+    assert done.data.count(b":L ") == done.data.count(speed.encode())
+    assert b"X = 60.0 mm" not in done.data
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ from olp.program.robots.targets import Span, Use
 
 _MOVE = pattern(
     rb"(?i)\s*([LJ])\s+(PR?)\[\s*(\d+)\s*(?::[^\]]*)?\]\s+(?:(\d+\.?\d*)\s*(mm/sec|cm/min|inch/min|%|deg/sec|"
-    rb"sec|msec)|(\S+))\s+(FINE|CNT\s*\d+|CNT\s*R\[[^\]]*\]|CD\d+|CR\d+)?(.*)"
+    rb"sec|msec)|(R\[[^\]]*\]\S*|\S+))\s+(FINE|CNT\s*\d+|CNT\s*R\[[^\]]*\]|CD\d+|CR\d+)?(.*)"
 )
 #: Moves that are not read, by their letters.
 _OTHERS = {"C": "an arc", "A": "an arc", "S": "a spline"}
@@ -31,18 +31,15 @@ _INCREMENT = pattern(rb"(?i)\bINC\b")
 _COORD = pattern(rb"(?i)\bCOORD\b")
 _SKIP = pattern(rb"(?i)\bSkip\b")
 _INDEX = rb"\[[^\]]*\]"
+_VALUE = rb"(?:[-+]?\d*\.?\d+|R" + _INDEX + rb")"
+_SEAM = rb":?\s*(?:Arc|Weld)\s+(?:Start|End)\s*" + _INDEX
 #: Words behind a move that change nothing of its path.
-_PLAIN_TAIL = (
-    rb"ACC\s*(?:\d+|R"
-    + _INDEX
-    + rb")|PTH|(?:Ind\.)?EV\s*\d+\s*%|:?\s*(?:Arc|Weld)\s+(?:Start|End)\s*"
-    + _INDEX
-)
+_PLAIN_TAIL = rb"ACC\s*" + _VALUE + rb"|PTH|(?:Ind\.)?EV\s*\d+\s*%|" + _SEAM
 #: Words that belong to the whole move, or to one of its ends, so that it is never split.
 _WHOLE_TAIL = (
     rb"Skip\s*,\s*LBL" + _INDEX + rb"(?:\s*,\s*PR" + _INDEX + rb"\s*=\s*[LJ]POS)?|(?:AP|RT)_LD\s*\d+|"
-    rb"(?:TB|TA)\s*\d*\.?\d+\s*sec\s*,.*|DB\s*[-+]?\d*\.?\d+\s*mm\s*,.*"
-)
+    rb"T[AB]\s*" + _VALUE + rb"\s*sec\s*,.*|DB\s*" + _VALUE + rb"\s*mm\s*,.*"
+)  # fmt: skip
 _SHIFTED_TAIL = rb"(?:Tool_Offset|Offset|WZVersatz|Versatz)(?:\s*,\s*PR" + _INDEX + rb")?"
 _TAIL = pattern(
     rb"(?i)(?:\s*(?:" + _PLAIN_TAIL + rb"|" + _WHOLE_TAIL + rb"|" + _SHIFTED_TAIL + rb")(?![\w(\[]))*\s*"
@@ -177,7 +174,7 @@ class _Reader:
         feed = float(groups[3]) * _SPEEDS[unit] if unit in _SPEEDS else NAN
         return _Move(
             groups[0].upper() == b"L", groups[1].upper() == b"PR", int(groups[2]), feed,
-            unit in (b"sec", b"msec"), groups[7],
+            unit in (b"sec", b"msec") or groups[5].lower().endswith((b"]sec", b"]msec")), groups[7],
         )  # fmt: skip
 
     def _move(self, line: Line, move: _Move) -> None:
