@@ -64,8 +64,8 @@ def box_doubts(
     model: ErrorModel, tools_mm: Array, calibration: Calibration, machine: Machine,
     known_mm: Callable[[], float] = float,
 ) -> list[Finding]:  # fmt: skip
-    """Errors too large anywhere in the box with one of the tool vectors (k, 3), or too small to be measured
-    where what `known_mm` gives, the largest one that is known beside them, is that small too."""
+    """Errors too large anywhere in the box with one of the tool vectors (k, 3), or too small to be measured.
+    `known_mm` gives the largest one that is known beside them: where it is as small."""
     limit = largest_mm(machine)
     expected = f"at most {limit * UM_PER_MM:.0f} um are expected of this machine"
     points, in_box = _in_box(model, tools_mm)

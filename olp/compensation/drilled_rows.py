@@ -69,9 +69,9 @@ class DrilledRows:
 
 
 class Heights:
-    """Where the tool axis is behind each run, from one to the next: at the R level, (m,) `level` of its
-    blocks as written, or where it was before the series if that is higher and not all return `to_r`. The
-    series in force before has a `number`, and begins at the program coordinate `initial`."""
+    """Where the tool axis is behind each run, from one to the next. It is at the R level, (m,) `level` of its
+    blocks as written. Where not all return `to_r`, it is where it was before the series, if that is higher.
+    The series in force before has a `number`, and begins at the program coordinate `initial`."""
 
     def __init__(
         self, drilled: DrilledRows, holes: Holes, frames: list[Frame], level: Array, to_r: Mask, number: int,

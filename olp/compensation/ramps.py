@@ -13,10 +13,9 @@ import numpy as np
 
 from olp.compensation.plan import Limits, Plan
 from olp.core.arrays import Array, Index, Mask, any_in_row
-from olp.core.toolpath import Kind, Toolpath
+from olp.core.toolpath import BLEND_MM, Kind, Toolpath
 from olp.core.values import dataclass
 from olp.program.bands import directions
-from olp.program.feeds.timing import BLEND_MM
 
 #: of the tolerance: how far the load may be off at the turn, and behind it; the dead band of two axes comes
 #: on top, 0.35

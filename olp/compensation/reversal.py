@@ -60,7 +60,7 @@ class Reversal:
 class Carried:
     """What a plan with play passes on to the one behind it: where each axis rests in each of the `passes` of
     the iteration. Of its last row (3,) each: the target, the command, by how much the load is `held` from the
-    target, and where it should be; and whether the row belongs to a `cut` that a ramp may follow."""
+    target, and where it should be. `cut`: the row belongs to a move that a ramp may follow."""
 
     passes: list[tuple[Rest, ...]] = field(default_factory=lambda: [(UNKNOWN,) * 3])
     target_mm: Array = field(default_factory=lambda: np.full(3, np.nan))

@@ -112,7 +112,7 @@ def matches(pattern: re.Pattern[bytes], text: Text) -> Iterator[re.Match[bytes]]
 
 
 def text_of(file: IO[bytes]) -> Text:
-    """What is left of a stream."""
+    """The rest of a stream."""
     start = file.read(LONG)
     if len(start) < LONG:
         return start

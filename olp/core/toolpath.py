@@ -16,6 +16,9 @@ from olp.core.machine import ZERO, Vector
 from olp.core.turns import Turn, Turns
 from olp.core.values import dataclass
 
+#: How far a control may round corners where a program does not state it, in mm: Grbl's default of $11, and
+#: usual for a finishing cut.
+BLEND_MM = 0.01
 #: A tool vector in mm, and the payload in kg behind it where there is one.
 Tool = tuple[float, ...]
 #: An axis position in mm, and the tool with which it was touched.

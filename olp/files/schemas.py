@@ -123,8 +123,8 @@ class ToolTable(Table):
     )
     gauge_to_tip_deg: Triple | None = Field(
         default=None,
-        description="on an arm how the frame of the tip is turned against the flange, [A, B, C] in degrees: "
-        "about Z by C, then about the new Y by B, then about the new X by A",
+        description="on an arm how the frame of the tip is turned against the flange, [A, B, C] in degrees. "
+        "It turns about Z by C, then about the new Y by B, then about the new X by A",
     )
     set_by: Literal["touch", "true"] = Field(
         default="true",

@@ -15,7 +15,7 @@ from olp.core.errors import InputError, OlpError, naming
 from olp.core.paired import data_beside, joined
 from olp.core.spool import Mapped, Spool, Text, in_parts, whole
 from olp.core.values import dataclass
-from olp.files.write import PathLike, read_bytes, read_text
+from olp.files.write import PathLike, read_bytes, read_long
 
 
 class Sources:
@@ -37,7 +37,7 @@ class Sources:
         key = Path(path)
         if key not in self._texts:
             self._opened[str(Path(path).absolute())] = None
-            self._texts[key] = read_text(path)
+            self._texts[key] = read_long(path)
         return self._texts[key]
 
     def read(self, path: PathLike) -> bytes:

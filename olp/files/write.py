@@ -37,7 +37,7 @@ def read_bytes(path: PathLike) -> bytes:
         return Path(path).read_bytes()
 
 
-def read_text(path: PathLike) -> Text:
+def read_long(path: PathLike) -> Text:
     """A copy of a file that may be long. Raises InputError where it cannot be read."""
     with _reading(path), Path(path).open("rb") as file:
         return text_of(file)

@@ -83,9 +83,9 @@ class Arm:
         return values
 
     def near(self, flange: Poses, axes: Array) -> Array:
-        """(n, 6) of the postures that bring the flange to poses (n) the one that is chosen axis by axis next
-        to axis values (n, 6), with the turns of these; NaN where there is none. Away from singular postures
-        it is the nearest one."""
+        """(n, 6) a posture that brings the flange to poses (n), NaN where there is none. It is chosen axis by
+        axis next to axis values (n, 6), with the turns of these. Away from singular postures it is the
+        nearest one."""
         motion = flange @ self.flange.inverse()
         centre, own = motion.at(self.wrist), np.radians(axes[:, self.columns])
         with np.errstate(invalid="ignore", divide="ignore"):

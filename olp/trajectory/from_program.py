@@ -13,11 +13,11 @@ import numpy as np
 from olp.core.arrays import Array, Index, Mask
 from olp.core.geometry import PLANES, arc_points
 from olp.core.machine import ControlTimes, Machine
-from olp.core.toolpath import Toolpath
+from olp.core.toolpath import BLEND_MM, Toolpath
 from olp.core.values import dataclass
 from olp.program.feeds.actions import actions
 from olp.program.feeds.moves import lengths_mm
-from olp.program.feeds.timing import BLEND_MM, PathControl, Timing, timing
+from olp.program.feeds.timing import PathControl, Timing, timing
 from olp.program.program import Program
 from olp.trajectory.route import AxisLimits, Route
 

@@ -13,6 +13,7 @@ from olp.checks.timed import time_findings
 from olp.core.errors import CannotCompute, UsageError
 from olp.core.machine import Setup
 from olp.core.progress import Progress, silent
+from olp.core.toolpath import BLEND_MM
 from olp.core.values import dataclass
 from olp.files import trajectory as files
 from olp.files.point_profile import load_profile
@@ -20,7 +21,6 @@ from olp.files.points import Points, read_points
 from olp.files.sources import Source
 from olp.files.write import write_files
 from olp.findings.catalogue import Finding
-from olp.program.feeds.timing import BLEND_MM
 from olp.program.feeds.words import Shared
 from olp.program.origin import Origin
 from olp.program.registry import Options

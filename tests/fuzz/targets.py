@@ -169,7 +169,7 @@ def _set_up(source: Path, mutant: Path) -> Callable[[bytes], object]:
         setup = read_setup(source / "machine.toml", job if job.exists() else None, read)
         load_calibration(source / "calibration.toml", setup.machine, read=read)
         session = Session.start(setup)
-        session.sources._bytes[mutant] = data
+        session.sources._texts[mutant] = data
         return session.loaded("hold")
 
     return call

@@ -19,8 +19,8 @@ from workflows.test_programs_folder import FOLDER, JOBS
 import olp
 from olp.core.errors import ProgramError
 from olp.core.machine import Setup
+from olp.core.toolpath import BLEND_MM
 from olp.files.config import load_setup
-from olp.program.feeds.timing import BLEND_MM
 from olp.program.registry import DIALECTS
 from olp.program.rs274.reader import read
 from olp.trajectory.from_program import CHORD_SHARE, EXACT_MM, axis_limits, routes

@@ -15,15 +15,12 @@ import numpy.typing as npt
 
 from olp.core.arrays import Array, Index, Mask, is_in
 from olp.core.errors import ProgramError, UsageError
-from olp.core.toolpath import Kind
+from olp.core.toolpath import BLEND_MM, Kind
 from olp.core.values import dataclass
 from olp.program.feeds.moves import Scan, numbers
 from olp.program.feeds.stated import programmed
 from olp.program.program import Program, Statements
 
-#: How far a control may round corners where a program does not state it, in mm: Grbl's default of $11, and
-#: usual for a finishing cut.
-BLEND_MM = 0.01
 #: M codes that take effect after the motion of their block
 AFTER = (0, 1, 2, 30, 60)
 #: those that do so too on controls with exact stops

@@ -127,8 +127,8 @@ class BlockRules:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Tables:
-    """`allowed` (2 M,) the letters that a code uses, as bits; `group` of a code or -1; `needed` (2 M,) the
-    letters of which a code needs one, 0 for none; `bound` are the letters that need a user."""
+    """`allowed` (2 M,) are the letters that a code uses, as bits; `group` is that of a code, or -1. `needed`
+    (2 M,) are the letters of which a code needs one, 0 for none. `bound` are those that need a user."""
 
     rules: BlockRules
     allowed: Bits

@@ -24,8 +24,8 @@ _CYCLES[list(CYCLES)] = True
 @dataclass(frozen=True, slots=True, eq=False)
 class CycleWords:
     """The words of blocks of canned cycles (n,) on lines of a chunk. `slot` leads from a letter to the
-    indices (n,) of its words, -1 where omitted; (w,) `letter` and `owner` are all their words and the block
-    of each, and `first` (n + 1,) is where those of each block begin among them."""
+    indices (n,) of its words, -1 where omitted. (w,) `letter` and `owner` are all their words and the block
+    of each. `first` (n + 1,) is where those of each block begin among them."""
 
     line: Index
     slot: dict[str, Index]
@@ -52,8 +52,8 @@ _NO_WORDS = CycleWords(np.zeros(0, np.int64), {}, np.zeros(0, np.uint8), *[np.ze
 
 def runs(context: Context, line: Index) -> tuple[dict[int, int], CycleWords]:
     """The runs of blocks of canned cycles that are carried out at once, among blocks on lines (n,) of the
-    chunk: from the first block of each to the one behind it, and the words of all. A run has no event, and no
-    change of cycle, plane or distance mode."""
+    chunk. They go from the first block of each to the one behind it; the words of all come with them. A run
+    has no event, and no change of cycle, plane or distance mode."""
     row = np.flatnonzero(_CYCLES[context.motion[line]])
     line = line[row]
     if not row.size:

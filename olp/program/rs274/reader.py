@@ -61,7 +61,6 @@ from olp.program.rs274.special_blocks import (
     event_block,
     event_words,
 )
-from olp.program.rs274.spindle_words import translate
 from olp.program.rs274.translated import Beside, check_frames
 from olp.program.rs274.translation import Translation
 from olp.program.rs274.turned import Turning, along_words
@@ -69,9 +68,8 @@ from olp.program.rs274.turned import Turning, along_words
 #: motion code to kind of move; 255 where it is not plain motion, the last entry is for "none yet"
 _KIND = np.full(1001, 255, np.uint8)
 _KIND[[0, 10, 20, 30, THREAD]] = (Kind.RAPID, Kind.LINE, Kind.ARC_CW, Kind.ARC_CCW, Kind.LINE)
-_ALONE, _PROBES = np.zeros((2, len(_KIND)), bool)
-_ALONE[list(CYCLES | PROBES)] = True
-_PROBES[list(PROBES)] = True
+_PROBES = np.isin(np.arange(len(_KIND)), list(PROBES))
+_ALONE = np.isin(np.arange(len(_KIND)), list(CYCLES | PROBES))
 #: Events that go on from the present position, or turn it
 _APART = HOMES | TRANSFORMS | {MACHINE, TILTED, ALIGNED}
 _UNITS = frozenset(UNITS)
@@ -144,7 +142,11 @@ class _Reader:
         self.others = OTHER if commands is None else OTHER.replace(commands.extruder.encode(), b"")
         self.extrusion = None if commands is None or not commands.feeds(data) else Extrusion(commands)
         self.feeding = self.whole = np.zeros(0, bool)
-        translator = translate if profile.spindle_words else profile.translator
+        translator = profile.translator
+        if profile.spindle_words:
+            from olp.program.rs274.spindle_words import translate
+
+            translator = translate
         self.translation = Translation(data) if translator is None else translator(whole(data))
 
     def run(self) -> Program:

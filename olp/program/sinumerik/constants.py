@@ -67,8 +67,8 @@ class Constants:
         return bool(texts)
 
     def padded(self, name: bytes) -> bytes | None:
-        """The number of a variable in as many bytes as its name has, with zeros before it, so that it can be
-        read and replaced where the name is; None where there is none, or no room."""
+        """The number of a variable in as many bytes as its name has, with zeros before it. So it can be read
+        and replaced where the name is. None where there is none, or no room."""
         text = self._texts.get(name.decode("latin-1").upper(), b"").replace(b" ", b"").removeprefix(b"+")
         digits, sign = text.removeprefix(b"-"), text[:1] if text.startswith(b"-") else b""
         missing = len(name) - len(text)

@@ -30,8 +30,10 @@ ACROSS = np.sqrt(1.0 - ALONG * ALONG)
 SHARE = 0.5
 #: of the acceleration, at most, in the cycle of a corner that is driven as it is
 KINK = 0.1
-#: of the turn of an arc, at most, that a blend arc before it or behind it takes
-ARC_BEHIND, ARC_BEFORE = 1.0 / 3.0, 2.0 / 3.0
+#: of the turn of an arc, at most, that a blend arc behind it takes
+ARC_BEHIND = 1.0 / 3.0
+#: and one before it
+ARC_BEFORE = 2.0 / 3.0
 #: of the cosine between the normals of two planes that are one
 FLAT = 1e-9
 #: cycles; a piece takes longer than one

@@ -13,10 +13,10 @@ from olp.compensation.joints.path import JointPath
 from olp.core.arrays import Array, Index
 from olp.core.errors import CannotCompute
 from olp.core.progress import Progress, silent
+from olp.core.toolpath import BLEND_MM
 from olp.core.values import dataclass
 from olp.files.write import write_bytes
 from olp.kinematics.structure import Structure
-from olp.program.feeds.timing import BLEND_MM
 from olp.trajectory.from_joints import JointRoute, limits_of, routes_of
 from olp.trajectory.motion import Motion as PlannedMotion
 from olp.trajectory.plan import Trajectory, plan

@@ -1,7 +1,7 @@
 """Okuma mills (OSP).
 
-Differs from Fanuc: G15 H selects the work offset, G56 H calls up a tool length along Z and G53 ends it, HA
-and DA name the offsets of the tool in the spindle; G54, G55 and G57 to G59 are lengths of other axes. G62
+Differs from Fanuc: G15 H selects the work offset, G56 H calls up a tool length along Z and G53 ends it. HA
+and DA name the offsets of the tool in the spindle. G54, G55 and G57 to G59 are lengths of other axes. G62
 mirrors. The time of G4 is F. Canned cycles return to the level of G71 with M53, and to R with M54. G284 and
 G274 are synchronous taps. Parametric programs are user tasks: VC1, CALL, RTS, IF, GOTO. Names of programs
 and labels in letters stay.
