@@ -183,7 +183,12 @@ def _lengths(writer: Writer, rows: Rows, part: Index) -> Array:
     before = rows.first + int(part[0]) - 1
     start = writer.plan.command_mm[before] if before >= 0 else np.array(writer.path.start_mm)
     length = np.nan_to_num(np.linalg.norm(np.diff(np.vstack((start, command)), axis=0), axis=1))
-    return np.asarray(length / max(float(length.sum()), _LEAST_SHARE))
+    arcs, move = writer.path.arcs, int(rows.move[part[0]])
+    arc, turned = int(np.searchsorted(arcs.move, move)), 0.0
+    if arc < len(arcs) and arcs.move[arc] == move:
+        radius = np.sqrt(np.nansum((command[0] - arcs.centre_mm[arc]) ** 2))
+        turned = float(radius * abs(arcs.sweep_rad[arc]))
+    return np.asarray(length / max(float(length.sum()), turned, _LEAST_SHARE))
 
 
 def end_word_edits(program: Program, lines: Index, edits: EditList) -> None:

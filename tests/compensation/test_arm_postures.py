@@ -25,7 +25,7 @@ def test_a_series_of_straight_moves_goes_on_near_by() -> None:
         yes, no = np.ones(count, bool), np.zeros(count, bool)
         wanted = Wanted(
             flange, np.full((count, 6), np.nan), postures, np.isfinite(postures[:, :, 0]), yes, no, no, no,
-            np.arange(1, count + 1),
+            np.zeros(count, np.int64), np.arange(1, count + 1),
         )  # fmt: skip
         found = Settled(arm, wanted, postures, np.array([[-400.0] * 6, [400.0] * 6])).axes(middle)
         last = middle

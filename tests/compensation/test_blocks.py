@@ -302,8 +302,8 @@ TURNS = {
     "times in G93": (
         "X",
         "G93 G1 X20 F2\nX10 F4.5\nX30 F.5\nG94 X0 F100\n",
-        # the step a millionth of the time of its block
-        "G93 G1 X20.003 F2\nX19.997 F4500000.0000\nX9.997 F4.5000\nX10.003 F500000.0000\nX30.003 F0.5000\n"
+        # a step of 6 um has as much of the time as of the length
+        "G93 G1 X20.003 F2\nX19.997 F7504.5000\nX9.997 F4.5000\nX10.003 F1667.1667\nX30.003 F0.5000\n"
         "G94 X29.997 F100\nX-0.003\n",
         (5, 0, 4),
     ),
@@ -316,8 +316,8 @@ TURNS = {
     "the time of a circle in G93": (
         "X",
         "G1 X20 F100\nG93 G3 X20 Y0 I20 J0 F2\nG94 G1 X40 F100\n",
-        # halves of the circle have twice the feed, the step a millionth of the time
-        "G1 X20.003 F100\nG93 G3 X60.003 Y0 I20 J0 F4.0000\nG1 X59.997 F2000000.0000\n"
+        # halves of the circle have twice the feed, the step as much of the time as of the length
+        "G1 X20.003 F100\nG93 G3 X60.003 Y0 I20 J0 F4.0000\nG1 X59.997 F41894.1852\n"
         "G3 X19.997 Y0.000 I-20.0000 J0.0000 F4.0000\nG94 G1 X20.003 F100\nX40.003\n",
         (4, 0, 4),
     ),

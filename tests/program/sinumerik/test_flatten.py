@@ -291,3 +291,12 @@ def test_what_is_not_run_is_refused_with_its_line(text: str) -> None:
 
 def test_values_of_the_control_come_from_the_job() -> None:
     assert unrolled("X=R9\n", parameters={"R9": 2.5}) == "X=2.5\n"
+
+
+@pytest.mark.parametrize("end", ("M30", "M2"))
+def test_the_end_of_the_program_in_a_subprogram_is_refused(end: str) -> None:
+    """It may return as M17 does; in a part of the program itself it ends the run."""
+    with pytest.raises(ProgramError, match="write RET or M17") as caught:
+        unrolled(HEAD + "SUB\nX5\nM30\n", subprograms=lambda _: ("SUB.SPF", f"G1 X1\n{end}\n".encode()))
+    assert caught.value.code == "OLP542"
+    assert "X7" in unrolled(HEAD + f"AA: X7\nBB: {end}\n")

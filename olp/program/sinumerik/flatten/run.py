@@ -62,11 +62,15 @@ class Walk:
     ) -> None:
         self._visit, self._kept, self._find = visit, kept, find
         self._budget, self._block_delete = budget, block_delete
+        #: the program itself, not a subprogram
+        self._main: Unit | None = None
 
     def run(self, unit: Unit, scope: Scope, depth: int = 0) -> None:
         """Run a text to its end, RET or M17. Raises `Stop` at M2 and M30, ProgramError with line and file."""
         loops: list[_Loop] = []
         index = 0
+        if not depth:
+            self._main = unit
         while 0 <= index < len(unit.texts):
             try:
                 line = unit.line(index)
@@ -112,6 +116,12 @@ class Walk:
                 )
             return -1
         if self._visit(unit, line, scope):
+            if unit is not self._main:
+                raise ProgramError(
+                    "M2 or M30 of a subprogram: whether the control goes on behind the call is not known; "
+                    "write RET or M17",
+                    code="OLP542",
+                )
             raise Stop
         return -1 if self._returns(line) else index + 1
 
