@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import datetime
 
-from olp.checks.doubt_assumed import assumption_findings
 from olp.checks.doubt_calibration import calibration_doubts
 from olp.checks.doubt_program import program_doubts
 from olp.checks.doubt_setup import setup_doubts
@@ -39,6 +38,8 @@ def doubts(inputs: Inputs) -> tuple[Finding, ...]:
     setup, path = inputs.setup, inputs.program.toolpath
     findings = [*program_doubts(inputs.program, setup), *setup_doubts(path, setup, inputs.calibration)]
     if inputs.assumed:
+        from olp.checks.doubt_assumed import assumption_findings
+
         assert inputs.calibration is not None
         findings += assumption_findings(path, inputs.assumed, by_height=inputs.by_height)
         findings += calibration_doubts(inputs.calibration, setup.machine, None, made=False)

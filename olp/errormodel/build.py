@@ -13,7 +13,6 @@ from olp.errormodel.base import ErrorModel
 from olp.errormodel.bodies import build_bodies
 from olp.errormodel.calibration import Calibration
 from olp.errormodel.chain import RigidBody
-from olp.errormodel.huddersfield import huddersfield
 from olp.errormodel.total import total
 
 
@@ -41,6 +40,8 @@ def build(
         )
     hold = outside == "hold"
     if calibration.model == "huddersfield":
+        from olp.errormodel.huddersfield import huddersfield
+
         bodies = huddersfield(calibration, chain, hold, skip_components)
     else:
         bodies = RigidBody(calibration.box_mm, hold, build_bodies(calibration, chain, skip_components))

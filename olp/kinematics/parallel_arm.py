@@ -6,7 +6,17 @@ import numpy as np
 
 from olp.core.arrays import Array
 from olp.kinematics.poses import Poses, turned
-from olp.kinematics.postures import AXES, POSTURES, Arm, angle_about, met, nearer, rotary_lines, wrapped
+from olp.kinematics.postures import (
+    AXES,
+    POSTURES,
+    Arm,
+    angle_about,
+    meeting,
+    met,
+    nearer,
+    rotary_lines,
+    wrapped,
+)
 from olp.kinematics.structure import Structure
 
 #: mm; axes that pass each other nearer than this meet
@@ -32,9 +42,8 @@ class ParallelArm(Arm):
         bent = np.linalg.norm(np.cross(direction[[0, 3, 4]], direction[[1, 4, 5]]), axis=1) > _PARALLEL
         if not parallel.all() or not bent.all():
             return None
-        across = np.eye(3) - direction[4:, :, None] * direction[4:, None, :]
-        wrist = np.linalg.solve(across.sum(axis=0), np.einsum("kij,kj->i", across, point[4:]))
-        if np.linalg.norm(turned(across, wrist - point[4:]), axis=1).max() > _MEET_MM:
+        wrist, away = meeting(direction[4:], point[4:])
+        if away > _MEET_MM:
             return None
         return ParallelArm(direction, point, columns, wrist, structure.gauge.pose)
 

@@ -51,9 +51,7 @@ class Arm:
         if lines is None:
             return None
         direction, point, columns = lines
-        across = np.eye(3) - direction[3:, :, None] * direction[3:, None, :]
-        wrist = np.linalg.lstsq(across.sum(axis=0), np.einsum("kij,kj->i", across, point[3:]), rcond=None)[0]
-        away = np.linalg.norm(turned(across, wrist - point[3:]), axis=1).max()
+        wrist, away = meeting(direction[3:], point[3:])
         parallel = np.linalg.norm(np.cross(direction[1], direction[2])) < _PARALLEL
         bent = np.linalg.norm(np.cross(direction[[0, 3, 4]], direction[[1, 4, 5]]), axis=1) > _PARALLEL
         if away > _MEET_MM or not parallel or not bent.all():
@@ -200,6 +198,13 @@ def rotary_lines(structure: Structure) -> tuple[Array, Array, Index] | None:
     direction /= np.linalg.norm(direction, axis=1)[:, None]
     point = np.array([joint.point_mm for joint in joints], float)
     return direction, point, np.array([structure.order.index(name) for name in names])
+
+
+def meeting(direction: Array, point: Array) -> tuple[Array, float]:
+    """(3,) the point that is nearest to lines (k, 3), and its largest distance from one of them."""
+    across = np.eye(3) - direction[:, :, None] * direction[:, None, :]
+    place = np.linalg.lstsq(across.sum(axis=0), np.einsum("kij,kj->i", across, point), rcond=None)[0]
+    return place, float(np.linalg.norm(turned(across, place - point), axis=1).max())
 
 
 def nearer(choices: Sequence[tuple[Array, ...]], near: Array, which: int = 0) -> tuple[Array, ...]:

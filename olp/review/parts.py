@@ -130,19 +130,16 @@ def _cuts(ends: Ends, other: Ends, owner: Index, groups: Index, shift: Array, mo
 
 
 def with_taken_up(
-    written: Toolpath,
-    model: ErrorModel,
-    move: Index,
-    share: Array,
-    part: Index,
-    within: Array,
-    command: Array,
-) -> tuple[Index, Array, Index, Array] | None:
-    """Samples with those where an axis that turned round has taken up its backlash inside of a cut of the
-    corrected program: from there on the tip is off by all of it. None where there are none more."""
-    play, width = plays(model, command), model.backlash_at(command)
+    written: Toolpath, model: ErrorModel, samples: tuple[Index, Array, Index, Array], command: Array,
+    play: Array | None,
+) -> tuple[Index, Array, Index, Array] | None:  # fmt: skip
+    """Samples (moves, shares, parts, shares of these) with those where an axis that turned round has taken up
+    its backlash inside of a cut of the corrected program: from there on the tip is off by all of it. They
+    have commands (n, 3) and their play. None where there are none more."""
+    width = model.backlash_at(command)
     if play is None or width is None:
         return None
+    move, share, part, within = samples
     turned = 1 + np.flatnonzero((play[1:] != play[:-1]).any(axis=1))
     turned = turned[written.kind[part[turned]] != Kind.RAPID]
     before = turned - 1

@@ -104,13 +104,15 @@ def sample(
     start = bool(np.isfinite(path.start_mm).all())
     move, share, part, within = _merged(_steps(path, model, step_mm), parts, start=start)
     command = other.at(part, within)
-    more = with_taken_up(written, model, move, share, part, within, command)
+    play_there = plays(model, command)
+    more = with_taken_up(written, model, (move, share, part, within), command, play_there)
     if more is not None:
         move, share, part, within = more
         command = other.at(part, within)
+        play_there = plays(model, command)
     axis = ends.at(move, share)
     tip = _Tip(model, path, shift)
-    play, play_there = plays(model, axis), plays(model, command)
+    play = plays(model, axis)
     # deviations in half the memory: that is finer than the page shows
     joints = SmoothJoints.of(path)
     result = tip.deviation(move, share, axis, axis, play)

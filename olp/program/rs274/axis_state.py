@@ -47,7 +47,6 @@ from olp.program.rs274.offsets import Offsets
 from olp.program.rs274.planes import tilted
 from olp.program.rs274.profiles.base import Profile
 from olp.program.rs274.state import NAN, PathMode
-from olp.program.rs274.transforms import change
 from olp.program.rs274.turned import Along
 from olp.program.tilts import Tilt
 
@@ -396,6 +395,8 @@ class AxisState(OffsetState):
             self.tilts += found
             return replace(effect, lost=(0, 1, 2)) if found else effect
         elif code in TRANSFORMS:
+            from olp.program.rs274.transforms import change
+
             lost = change(self, code, line, by_letter, axis_words)
             self.forget(lost)
             return replace(effect, lost=lost)

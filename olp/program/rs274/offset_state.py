@@ -31,7 +31,6 @@ from olp.program.rs274.codes import (
 from olp.program.rs274.offsets import Offsets
 from olp.program.rs274.profiles.base import increment
 from olp.program.rs274.state import KNOWN_BY, NAN, Capture, State
-from olp.program.rs274.tool_tables import check_tool, writes_tool
 from olp.program.rs274.turned import Turning, along_words
 
 #: L of a G10 that stores the present position.
@@ -233,6 +232,8 @@ class OffsetState(State):
     def _write_offset(
         self, line: int, by_letter: dict[str, Word], axis_words: list[tuple[int, Word]], moves: int
     ) -> None:
+        from olp.program.rs274.tool_tables import check_tool, writes_tool
+
         kind = round(by_letter["L"].value) if "L" in by_letter else -1
         if writes_tool(self, kind) and {"P", "R"} <= by_letter.keys():
             check_tool(self, kind, self._integer(by_letter["P"], line), self.length_mm(by_letter["R"]), line)
