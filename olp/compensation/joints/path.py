@@ -125,16 +125,8 @@ class JointPath:
             for frame in path.frames
         ]
         offsets = np.array(turns, float).reshape(len(path.frames), len(letters))
-        found = found_positions(program, structure, letters, swivel_axis)
         first = np.array([start_deg.get(letter, np.nan) for letter in letters])
-        degrees = rotary.follow(program, first, offsets, found)
-        directions = Directions.of(program, rotary)
-        directions.refuse_other_axes(program, structure)
-        if directions.stated.any():
-            since = np.vstack((first, degrees))
-            found = directions.positions(program, structure, letters, rotary, found, since)
-            degrees = rotary.follow(program, first, offsets, found)
-        rotary.refuse_ways(program, degrees)
+        degrees, directions = _degrees(program, structure, letters, rotary, first, offsets, swivel_axis)
         modes = [frame.tip for frame in path.frames]
         tip = np.array([mode != "" for mode in modes], bool)[path.frame]
         vector = np.array([mode == "vector" for mode in modes], bool)[path.frame]
@@ -176,12 +168,9 @@ class JointPath:
         fresh = stated_afresh(program, fixed, degrees)
         end[:, columns] = _stated_in_mode(end[:, columns], given, mode, elsewhere, fresh)
         refuse_tips(program, structure, tip & ~fixed, end, offset, tips_from_zero)
-        shifts = np.array(
-            [
-                _shift(structure, errors, frame.touched, row, order, letters)
-                for frame, row in zip(path.frames, offsets, strict=True)
-            ]
-        ).reshape(-1, 3)
+        touched = [_shift(structure, errors, frame.touched, row, order, letters)
+                   for frame, row in zip(path.frames, offsets, strict=True)]  # fmt: skip
+        shifts = np.array(touched).reshape(-1, 3)
         tool = tool_of[path.frame]
         kept = (path.flag & KEPT) != 0
         arc = np.zeros(len(path), bool)
@@ -285,6 +274,24 @@ def _stated_in_mode(end: Array, given: Mask, mode: Index, elsewhere: Mask, fresh
     last = np.take_along_axis(end, np.maximum(stated, 0), axis=0)
     kept = ((stated >= began[:, None]) | first[:, None]) & ~elsewhere[:, None]
     return np.where(kept, np.where(in_plane[:, None], last, end), np.nan)
+
+
+def _degrees(
+    program: Program, structure: Structure, letters: list[str], rotary: RotaryWords, first: Array,
+    offsets: Array, swivel_axis: str,
+) -> tuple[Array, Directions]:  # fmt: skip
+    """(n, letters) the rotary values of all moves, from `first` (letters,) on, and the directions of the tool
+    that the program states. Raises ProgramError for what is not read."""
+    found = found_positions(program, structure, letters, swivel_axis)
+    degrees = rotary.follow(program, first, offsets, found)
+    directions = Directions.of(program, rotary)
+    directions.refuse_other_axes(program, structure)
+    if directions.stated.any():
+        since = np.vstack((first, degrees))
+        found = directions.positions(program, structure, letters, rotary, found, since)
+        degrees = rotary.follow(program, first, offsets, found)
+    rotary.refuse_ways(program, degrees)
+    return degrees, directions
 
 
 def _shift(
