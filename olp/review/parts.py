@@ -134,8 +134,8 @@ def with_taken_up(
     play: Array | None,
 ) -> tuple[Index, Array, Index, Array] | None:  # fmt: skip
     """Samples (moves, shares, parts, shares of these) with those where an axis that turned round has taken up
-    its backlash, inside of a cut of the corrected program. From there on the tip is off by all of it. `command`
-    and `play` (n, 3) are those of the samples. None where there are none more."""
+    its backlash, inside of a cut of the corrected program. From there on the tip is off by all of it.
+    `command` and `play` (n, 3) are those of the samples. None where there are none more."""
     width = model.backlash_at(command)
     if play is None or width is None:
         return None

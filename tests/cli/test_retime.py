@@ -746,12 +746,13 @@ def test_the_time_of_a_control_is_stated_and_learned_from_a_log(job: Path, tmp_p
         (lambda rows: [[1000.0 * t, *p] for t, *p in rows], "with times in s"),
         (lambda rows: [*rows[:50], *rows[60:]], "its row 51 comes 0.011 s behind"),
         (lambda rows: rows[:20], "a whole run"),
+        (lambda rows: rows[: int(0.85 * len(rows))], "end at other places"),
     ],
 )  # fmt: skip
 def test_a_log_of_something_else_is_refused(
     job: Path, tmp_path: Path, change: Callable[[list[list[float]]], list[list[float]]], message: str
 ) -> None:
-    """Half of a run, inches, milliseconds, a gap, and few rows."""
+    """Half of a run, inches, milliseconds, a gap, few rows, and a run without its last way back."""
     args = (program(tmp_path, "G21 G90 G54\nG0 X90\nG0 X0\nG0 Y90\nG0 Y0\nM2\n"), "-j", job)
     run("retime", *args, "-q", "-o", tmp_path / "run.csv")
     head, *lines = (tmp_path / "run.csv").read_text().splitlines()
