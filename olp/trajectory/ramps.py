@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from olp.core.arrays import Array, Index
+from olp.core.arrays import Array
 
 #: share of the speed below which a change of speed is rounding, and is not made
 _NO_CHANGE = 1e-10
@@ -88,41 +88,40 @@ def peak(v0: Array, v1: Array, length: Array, top: Array, acceleration: Array, j
 
 
 def _peak(v0: Array, v1: Array, length: Array, top: Array, acceleration: Array, jerk: Array) -> Array:
-    """Bracketed Newton; the lower bracket is returned, so the ramps always fit."""
-    low = np.maximum(v0, v1)
+    """Bracketed Newton; the lower bracket is returned, so the ramps always fit.
+
+    It looks for y, the root of what the peak is above the larger speed: both lengths rise with y without the
+    infinite slope that they have over the speed where a ramp begins, and bend upwards, so that a few steps
+    from above do."""
+    low, other = np.maximum(v0, v1), np.minimum(v0, v1)
     high = np.maximum(top, low)
-
-    def excess(i: Index, p: Array) -> Array:
-        a, j = acceleration[i], jerk[i]
-        gap: Array = distance(v0[i], p, a, j) + distance(v1[i], p, a, j) - length[i]
-        return gap
-
-    every = np.arange(len(v0))
-    todo = np.flatnonzero(excess(every, high) > 0.0)
+    gap = distance(low, high, acceleration, jerk) + distance(other, high, acceleration, jerk) - length
+    todo = np.flatnonzero(gap > 0.0)
     result = high.copy()
     result[todo] = low[todo]
-    lo, hi = low[todo], high[todo]
-    trial = 0.5 * (lo + hi)
+    trial = np.sqrt(high[todo] - low[todo])
+    lo, hi = np.zeros(todo.size), trial
     for step in range(_FEW * 2):
         if not todo.size:
             break
-        a, j = acceleration[todo], jerk[todo]
-        b, c = v0[todo], v1[todo]
-        t0, t1 = seconds(b, trial, a, j), seconds(c, trial, a, j)
-        f = 0.5 * ((b + trial) * t0 + (c + trial) * t1) - length[todo]
+        b, c, a, j = low[todo], other[todo], acceleration[todo], jerk[todo]
+        peak = b + trial * trial
+        t0, t1 = seconds(b, peak, a, j), seconds(c, peak, a, j)
+        f = 0.5 * ((b + peak) * t0 + (c + peak) * t1) - length[todo]
         fits = f <= 0.0
-        lo = np.where(fits, trial, lo)
-        hi = np.where(fits, hi, trial)
-        result[todo] = lo
+        lo, hi = np.where(fits, trial, lo), np.where(fits, hi, trial)
+        result[todo] = np.where(fits, peak, result[todo])
+        # d/dy of both lengths, with dp/dy = 2 y
         with np.errstate(divide="ignore", invalid="ignore"):
-            s0 = np.where((trial - b) * j <= a * a, 1.0 / np.sqrt(np.maximum(trial - b, 0.0) * j), 1.0 / a)
-            s1 = np.where((trial - c) * j <= a * a, 1.0 / np.sqrt(np.maximum(trial - c, 0.0) * j), 1.0 / a)
-            slope = 0.5 * (t0 + t1 + (b + trial) * s0 + (c + trial) * s1)
+            s0 = np.where(trial * trial * j <= a * a, 2.0 / np.sqrt(j), 2.0 * trial / a)
+            s1 = np.where((peak - c) * j <= a * a, 2.0 * trial / np.sqrt((peak - c) * j), 2.0 * trial / a)
+            s1 = np.where(peak > c, s1, s0)
+            slope = trial * (t0 + t1) + 0.5 * ((b + peak) * s0 + (c + peak) * s1)
             # slightly below the root, so that the bracket closes from the side that fits
-            newton = trial - f / slope - 1e-12 * trial
-        good = (newton > lo) & (newton < hi) & (step % 4 != 3)
+            newton = (trial - f / slope) * (1.0 - 1e-12)
+        good = (newton > lo) & (newton < hi) & (step % 8 != 7)
         trial = np.where(good, newton, 0.5 * (lo + hi))
-        on = (hi - lo > 1e-11 * hi) & ~(fits & (f > -1e-10 * length[todo]))
+        on = (hi * hi - lo * lo > 1e-11 * (b + lo * lo)) & ~(fits & (f > -1e-10 * length[todo]))
         todo, lo, hi, trial = todo[on], lo[on], hi[on], trial[on]
     return result
 
