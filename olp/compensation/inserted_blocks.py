@@ -27,8 +27,6 @@ from olp.program.text.edits import BARE, EditList, Edits
 
 #: Codes that a block must not set together with an arc that a step comes before.
 _CHANGES = WORK_OFFSETS | FURTHER_OFFSETS | LENGTHS | SHIFTS | {*UNITS, ABSOLUTE, INCREMENTAL}
-#: M words that act when their block has ended
-_END_M = frozenset({0, 1, 2, 5, 9, 30, 60})
 #: G9: an exact stop at the end of its block.
 _STOP = 9
 #: Least share of the time of a block that a part gets.
@@ -192,8 +190,8 @@ def _lengths(writer: Writer, rows: Rows, part: Index) -> Array:
 
 
 def end_word_edits(program: Program, lines: Index, edits: EditList) -> None:
-    """M words that end a block (M0 M5 M9 M30 …), and G9, which stops at its end, go from the first part to
-    the last, on lines whose moves are split."""
+    """M words that act after the motion of their block, and G9, which stops at its end, go from the first
+    part to the last, on lines whose moves are split."""
     words = program.words
     assert words is not None
     if not lines.size:
@@ -201,7 +199,8 @@ def end_word_edits(program: Program, lines: Index, edits: EditList) -> None:
     first, last = int(words.first_word[lines[0] - 1]), int(words.first_word[lines[-1]])
     part = slice(first, last)
     letter, code = words.letter[part], words.mantissa[part]
-    ending = (letter == ord("M")) & is_in(code, list(_END_M)) | (letter == ord("G")) & (code == _STOP)
+    late = is_in(code, list(program.rs274.late_m))
+    ending = (letter == ord("M")) & late | (letter == ord("G")) & (code == _STOP)
     index = first + np.flatnonzero(ending & (words.decimals[part] == 0))
     # of the same type: another would be that of a copy of the whole column
     line = np.searchsorted(words.first_word, index.astype(words.first_word.dtype), "right")

@@ -225,11 +225,11 @@ TURNS = {
     ),
     "two turns of a deleted helix": (
         "X",
-        "G1 X20 F100\n/N5 G3 X20 Y0 Z6 I-20 J0 P2 M5 F200\nG1 X40 Y0 Z0\n",
+        "G1 X20 F100\n/N5 G3 X20 Y0 Z6 I-20 J0 P2 M0 F200\nG1 X40 Y0 Z0\n",
         "G1 X20.003 F100\n/G1 X19.997 F200\n/N5 G3 X-20.003 Y0 Z1.500 I-20 J0 P1  F200\n/G1 X-19.997\n"
         "/G3 X20.003 Y0.000 Z3.000 I20.0000 J0.0000\n/G1 X19.997\n"
         "/G3 X-20.003 Y0.000 Z4.500 I-20.0000 J0.0000\n"
-        "/G1 X-19.997\n/G3 X20.003 Y0.000 Z6.000 I20.0000 J0.0000 M5\nG1 X40.003 Y0 Z0\n",
+        "/G1 X-19.997\n/G3 X20.003 Y0.000 Z6.000 I20.0000 J0.0000 M0\nG1 X40.003 Y0 Z0\n",
         (5, 0, 8),
     ),
     "all four quarters": (
@@ -294,9 +294,9 @@ TURNS = {
     ),
     "a circle without an end": (
         "X",
-        "G1 X20 F100\nN3 g3 i-20 j0 m9 (c)\n",
+        "G1 X20 F100\nN3 g3 i-20 j0 m1 (c)\n",
         "G1 X20.003 F100\nG1 X19.997\nN3 g3 i-20 j0  x-20.003 (c)\nG1 X-19.997\n"
-        "G3 X20.003 Y0.000 I20.0000 J0.0000 m9\n",
+        "G3 X20.003 Y0.000 I20.0000 J0.0000 m1\n",
         (2, 1, 4),
     ),
     "times in G93": (
@@ -309,8 +309,8 @@ TURNS = {
     ),
     "distances, and words that end a block": (
         "X",
-        "G91 G1 X20 F100\nX-10 Y1\nX5.000 M5 (there)\nX3 M9 M30\n",
-        "G91 G1 X20 F100\nX-0.006 Y0.000\nX-10.000 Y1.000\nX0.006  (there)\nX5.000 M5\nX3 M9 M30\n",
+        "G91 G1 X20 F100\nX-10 Y1\nX5.000 M1 (there)\nX3 M9 M30\n",
+        "G91 G1 X20 F100\nX-0.006 Y0.000\nX-10.000 Y1.000\nX0.006  (there)\nX5.000 M1\nX3 M9 M30\n",
         (4, 0, 3),
     ),
     "the time of a circle in G93": (

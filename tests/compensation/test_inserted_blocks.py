@@ -15,30 +15,42 @@ CURVE = '[[curves]]\nfile = "x.csv"\ninterpolation = "linear"\n'
 HEAD = b"G21 G90 G54\nG0 X0. Y0. Z0.\n"
 
 
-def parts(folder: Path, block: bytes, head: bytes = HEAD) -> list[bytes]:
-    path = machine(folder, CURVE, BEND, tables=TRUE_ZERO)
+def parts(folder: Path, block: bytes, head: bytes = HEAD, controller: str = "linuxcnc") -> list[bytes]:
+    path = machine(folder, CURVE, BEND, tables=TRUE_ZERO, controller=controller)
     text = unstamped(olp.correct(head + block + b"\nM2\n", path).data)
     lines = text[len(head) :].splitlines()[:-1]
     assert len(lines) >= 3
     return lines
 
 
-@pytest.mark.parametrize("word", (b"M0", b"M1", b"M2", b"M5", b"M9", b"M30"))
-def test_what_ends_a_block_goes_to_its_last_part(tmp_path: Path, word: bytes) -> None:
-    *first, last = parts(tmp_path, b"G1 X400. F100. " + word)
+@pytest.mark.parametrize(
+    ("word", "controller"),
+    [*((word, "linuxcnc") for word in (b"M0", b"M1", b"M2", b"M30")), (b"M5", "mazak"), (b"M9", "mazak")],
+)
+def test_what_ends_a_block_goes_to_its_last_part(tmp_path: Path, word: bytes, controller: str) -> None:
+    *first, last = parts(tmp_path, b"G1 X400. F100. " + word, controller=controller)
     assert last.endswith(b" " + word)
     assert not any(word in line.split() for line in first)
 
 
-@pytest.mark.parametrize("word", (b"M3 S500", b"M4 S500", b"M7", b"M8"))
+@pytest.mark.parametrize("word", (b"M3 S500", b"M4 S500", b"M5", b"M7", b"M8", b"M9"))
 def test_what_begins_a_block_stays_with_its_first_part(tmp_path: Path, word: bytes) -> None:
+    """On LinuxCNC spindle and coolant stop before the motion of their block, too."""
     first, *rest = parts(tmp_path, b"G1 X400. F100. " + word)
     assert first.endswith(word)
     assert not any(b"M" in line for line in rest)
 
 
+@pytest.mark.parametrize("word", (b"M17", b"M017", b"M 17", b"m30"))
+def test_the_end_of_a_sinumerik_program_stays_whole(tmp_path: Path, word: bytes) -> None:
+    """M17 is read as the end of a program: only M1 went to the last part, and the 7 stayed."""
+    *first, last = parts(tmp_path, b"G1 X400. F100. " + word, HEAD.replace(b"G21", b"G71"), "sinumerik")
+    assert last.endswith(b" " + word)
+    assert not any(b"M" in line.upper() or line.split()[-1].isdigit() for line in first)
+
+
 def test_both_keep_their_order(tmp_path: Path) -> None:
-    first, *_, last = parts(tmp_path, b"G1 X400. F100. M48 M5 M9")
+    first, *_, last = parts(tmp_path, b"G1 X400. F100. M48 M5 M9", controller="mazak")
     assert b"M48" in first and b"M5" not in first and b"M9" not in first
     assert last.endswith(b" M5 M9")
 

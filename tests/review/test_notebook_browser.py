@@ -171,7 +171,7 @@ def test_the_motion_plays_in_real_time_and_is_where_the_tip_is(
     ends = NODE.format(["meshcat", "olp", "machine", *order])
 
     def now(page: Any) -> tuple[float, np.ndarray, float]:
-        """Time of the motion [s], place of the tool [mm], and the clock [s], all of one moment of the page."""
+        """Time of the motion in s, place of the tool in mm, and the clock in s, all of one moment."""
         state = f"[viewer.animator.time, {tool}.object.position.toArray(), performance.now()]"
         time, place, clock = page.evaluate(state)
         return time, np.array(place), clock / 1000.0

@@ -15,8 +15,8 @@ from olp.core.machine import ControlTimes
 from olp.core.values import dataclass
 from olp.program.asked import Asked, by_codes
 from olp.program.feeds.moves import Scan, deleted_lines, numbers
-from olp.program.feeds.timing import AFTER, AFTER_EXACT
 from olp.program.program import Program
+from olp.program.rs274.codes import M_AFTER_EXACT, M_ENDS
 
 TOOL_CHANGE = "tool change"
 SPINDLE_START = "spindle start"
@@ -64,10 +64,10 @@ def actions(program: Program, *, block_delete: bool = False) -> Actions | None:
     """The actions of a program that was read with its words, None where its language has none that are
     read."""
     asks = program.dialect.asks
-    late: tuple[int, ...] = AFTER + AFTER_EXACT
+    late = M_ENDS | M_AFTER_EXACT
     if program.statements is None:
         assert program.words is not None
-        late = late if program.rs274.exact_stop else AFTER
+        late = program.rs274.late_m
         out = set(deleted_lines(program).tolist()) if block_delete else set()
         more = () if asks is None else (one for one in asks(program) if one.line not in out)
         of_words = _of_words(Scan.of(program, program.words, block_delete=block_delete))
@@ -79,7 +79,7 @@ def actions(program: Program, *, block_delete: bool = False) -> Actions | None:
     return _actions((one for one in asked if one.line <= program.end_line), late)
 
 
-def _actions(asked: Iterable[Asked], late: tuple[int, ...]) -> Actions:
+def _actions(asked: Iterable[Asked], late: frozenset[int]) -> Actions:
     rows: list[tuple[int, bool, str]] = []
     turn, speed, running = 0, 0.0, (0, 0.0)
     for one in asked:

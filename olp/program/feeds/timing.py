@@ -21,11 +21,6 @@ from olp.program.feeds.moves import Scan, numbers
 from olp.program.feeds.stated import programmed
 from olp.program.program import Program, Statements
 
-#: M codes that take effect after the motion of their block
-AFTER = (0, 1, 2, 30, 60)
-#: those that do so too on controls with exact stops
-AFTER_EXACT = (5, 9)
-
 
 class PathControl(IntEnum):
     """How a control goes from block to block."""
@@ -159,8 +154,7 @@ def _rests(program: Program, scan: Scan) -> tuple[Mask, Array]:
     code = np.rint(numbers(scan.words, word) * 10).astype(np.int64)
     along = is_in(code, [10 * m for m in program.rs274.m_with_motion])
     m_line, code = m_line[~along], code[~along]
-    after = AFTER + AFTER_EXACT if program.rs274.exact_stop else AFTER
-    late = is_in(code, [10 * m for m in after])
+    late = is_in(code, [10 * m for m in program.rs274.late_m])
     rest[np.searchsorted(line, m_line[late], "right")] = True
     rest[np.searchsorted(line, m_line[~late])] = True
     rest[np.searchsorted(line, scan.of_letter(b"S")[1])] = True

@@ -416,7 +416,9 @@ class _Line:
         if code == 6:
             self.acts.append(ChangeTool())
         elif code == 17:
-            self._write(piece.start, b"M2")
+            # as many digits, so that the word ends where its own text does
+            self._write(piece.start, b"M")
+            self._write(piece.value, b"2".rjust(piece.value_end - piece.value, b"0"))
         elif code != 70:
             self._word(piece, b"M")
 

@@ -27,6 +27,8 @@ from olp.program.rs274.codes import (
     COMMON_CYCLES,
     COMPENSATION_OFF,
     CUTTER_COMPENSATION,
+    M_AFTER_EXACT,
+    M_ENDS,
     PROBES,
     RETRACT_TO_INITIAL,
     RETRACT_TO_R,
@@ -206,6 +208,11 @@ class Profile(Dialect):
     contours: ContourRules = NGC_CONTOURS
     cycles: CycleRules
     language: Language
+
+    @property
+    def late_m(self) -> frozenset[int]:
+        """The M codes that act after the motion of their block."""
+        return M_ENDS | M_AFTER_EXACT if self.exact_stop else M_ENDS
 
     @property
     def still_m(self) -> frozenset[int]:
