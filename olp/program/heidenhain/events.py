@@ -54,6 +54,8 @@ _MOTION = re.compile(rb"(?:L|CC?|CR|CP)[ \t]|[XYZABC][-+.\d]|I[XYZ]|[MF][ \t]*[-
 _SHIFT = 7
 _DWELL = 9
 _SELECT = 247
+#: numbers of the touch probe cycles
+_TOUCHES = (range(400, 500), range(1400, 1500))
 
 
 class Events:
@@ -250,9 +252,17 @@ class Events:
             self._at_once(text, statement)
         elif number in PATTERNS:
             refuse(b"CYCL DEF %d" % number, statement)
+        elif not part and any(number in numbers for numbers in _TOUCHES):
+            raise ProgramError(
+                f"CYCL DEF {number} touches the part, and what it finds may move the datum; run it in a "
+                "program of its own, and state the datum in [work_offsets.NAME]",
+                line=statement.line,
+                code="OLP512",
+            )
         elif not part and number > 299:
             raise ProgramError(
-                f"CYCL DEF {number} is a cycle of the builder of the machine, and may move it",
+                f"CYCL DEF {number} is a cycle of the builder of the machine, and may move it; write plain "
+                "moves for it, or run it in a program of its own",
                 line=statement.line,
                 code="OLP512",
             )
