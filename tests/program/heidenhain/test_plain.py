@@ -113,6 +113,9 @@ def test_contours_that_are_written_out_are_corrected(bent: Path, seed: int) -> N
          CYCLE + "L X+1 FMAX M99\nL X+2 FMAX M99\nL X+3 M99\nL X+4\n"),
         (CYCLE + "CYCL CALL POS X+1 Y+2 Z+3 FMAX M8\nL X+9 M99\n",
          CYCLE + CYCLE.replace("Q203=+0", "Q203=+3") + "L X+1 Y+2 R0 FMAX M8 M99\n" + CYCLE + "L X+9 M99\n"),
+        # a feed of its own, and the one in force
+        (CYCLE + "PATTERN DEF POS1 (X+1 Y+2 Z+0)\nCYCL CALL PAT F MAX M3\nCYCL CALL PAT\n",
+         CYCLE + "L Z+20 R0 FMAX\n" + CYCLE + "L X+1 Y+2 R0 F MAX M3 M99\n" + CYCLE + "L X+1 Y+2 R0 M99\n"),
     ],
 )  # fmt: skip
 def test_what_is_written(text: str, plain: str) -> None:
@@ -270,7 +273,7 @@ def test_an_approach_and_a_departure_are_beside_the_contour_too(bent: Path) -> N
     text = "TOOL CALL 1 Z\nL X-20 Y-20 Z+5 R0 FMAX\nAPPR LT X+0 Y+0 LEN15 RR F100\nL X+40\nDEP LT LEN10\n"
     plain = olp.flatten((text + "L Y+50\n").encode(), bent).decode().split("\n")
     assert plain[2:-1] == [
-        "L X-15 Y-5 R0", "L X+0 Y-5 F100", "L X+40 Y-5", "L X+50 Y-5", "L Y+50 R0",
+        "L X-15 Y-5 R0", "L X+0 Y-5 F100", "L X+40 Y-5", "L X+50 Y-5", "L Y+50",
     ]  # fmt: skip
 
 
@@ -283,7 +286,7 @@ def test_arcs_of_approaches_have_the_radius_of_the_tools_centre(bent: Path) -> N
     assert plain[4] == "L X-11.551724 Y-3.961767 R0 F300"
     assert plain[5:-1] == [
         "CC X-11 Y+0", "C X-7 Y+0 DR+ F300", "CC X+50 Y+0", "CP IPA-360 DR-", "CC X-11 Y+0", "C X-11 Y+4 DR+",
-        "L X-40 Y+0 R0",
+        "L X-40 Y+0",
     ]  # fmt: skip
 
 

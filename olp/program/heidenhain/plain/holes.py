@@ -134,8 +134,15 @@ class Holes(Moves):
 
     def _drill_each(self, holes: list[Hole], entry: Entry, line: int, rest: bytes) -> None:
         """CYCL CALL PAT: between its points the tool is at the higher of the present height and Q204."""
-        z, feed = self.words()[2], b" ".join(w for w in rest.split() if not w.startswith(b"M")) or b"FMAX"
-        functions = b" ".join(w for w in rest.split() if w.startswith(b"M"))
+        block, z = block_of(b"L " + rest, line), self.words()[2]
+        assert block is not None
+        functions = [b"M%d" % m for m in block.functions]
+        if block.words:
+            raise ProgramError(
+                "CYCL CALL PAT takes F and M alone; its places are those of PATTERN DEF",
+                line=line,
+                code="OLP516",
+            )
         if math.isnan(z):
             raise unknown("CYCL CALL PAT", line)
         for k, (x, y, up) in enumerate(holes):
@@ -144,8 +151,8 @@ class Holes(Moves):
             if k or height > z:
                 self._go(entry, line, z=height, rest=b"R0 FMAX")
             self._put_definition(entry, line, {_SURFACE: surface})
-            first = functions.split() if k == 0 else ()
-            self._go(entry, line, x, y, rest=b" ".join((b"R0", feed, *first, b"M99")))
+            first = functions if k == 0 else ()
+            self._go(entry, line, x, y, rest=_words(b"R0", block.feed, *first, b"M99"))
             self._retracted(line, {_SURFACE: surface})
 
     def _drill_at(self, block: Block, entry: Entry, line: int) -> None:
@@ -160,10 +167,9 @@ class Holes(Moves):
         if z <= surface:
             self._go(entry, line, z=clear, rest=b"R0 FMAX")
         self._put_definition(entry, line, {_SURFACE: surface})
-        feed = block.feed or b"FMAX"
-        functions = b" ".join(b"M%d" % m for m in block.functions)
-        self._go(entry, line, block.words[b"X"][1], block.words[b"Y"][1],
-                 rest=b" ".join((b"R0", feed, *functions.split(), b"M99")))  # fmt: skip
+        functions = (b"M%d" % m for m in block.functions)
+        rest = _words(b"R0", block.feed, *functions, b"M99")
+        self._go(entry, line, block.words[b"X"][1], block.words[b"Y"][1], rest=rest)
         self._retracted(line, {_SURFACE: surface})
 
     def _retracted(self, line: int, values: dict[int, float] | None = None) -> None:
@@ -242,3 +248,8 @@ def _value(text: bytes, line: int) -> float:
         raise ProgramError(
             f"{text.decode('latin-1')} has no number here; assign it in the program", line=line, code="OLP541"
         ) from None
+
+
+def _words(*words: bytes) -> bytes:
+    """Those that are given: without a feed the last one goes on."""
+    return b" ".join(word for word in words if word)

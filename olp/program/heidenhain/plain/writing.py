@@ -57,7 +57,6 @@ class _Writing(Holes):
         self.given, self.sources = lines, sources
         #: the side of the contour on which the tool is: R0, RL or RR
         self.side = b"R0"
-        self.back_to_r0 = False
         #: a rounding or a chamfer that waits for the move behind it, and the move before it
         self.corner: tuple[Block, Entry, Source] | None = None
         #: an approach that waits for the first move of its contour
@@ -296,13 +295,10 @@ class _Writing(Holes):
         self.call_behind(block, entry)
 
     def _side_of(self, block: Block, entry: Entry) -> None:
-        """Follow R0, RL and RR. Behind DEP the next block says R0."""
+        """Follow R0, RL and RR."""
         match = _SIDE.search(entry.rest)
         if match is not None:
             self.side = match[1]
-        elif self.back_to_r0:
-            entry.rest, entry.changed = (entry.rest + b" R0").strip(), True
-        self.back_to_r0 = False
         self._keep_side(entry, block.line)
 
     def _keep_side(self, entry: Entry, line: int) -> None:
@@ -450,5 +446,4 @@ class _Writing(Holes):
         self.entries += parts
         self.at = [*pieces[-1].end, z]
         self.last = None
-        if self.side != b"R0":
-            self.side, self.back_to_r0 = b"R0", True
+        self.side = b"R0"
