@@ -90,8 +90,8 @@ def peak(v0: Array, v1: Array, length: Array, top: Array, acceleration: Array, j
 def _peak(v0: Array, v1: Array, length: Array, top: Array, acceleration: Array, jerk: Array) -> Array:
     """Bracketed Newton; the lower bracket is returned, so the ramps always fit.
 
-    It looks for y, the root of what the peak is above the larger speed: both lengths rise with y without the
-    infinite slope that they have over the speed where a ramp begins, and bend upwards, so that a few steps
+    It looks for y, the root of what the peak is above the larger speed. Over the speed itself a length has an
+    infinite slope where its ramp begins. Over y both lengths are smooth and bend upwards, so that a few steps
     from above do."""
     low, other = np.maximum(v0, v1), np.minimum(v0, v1)
     high = np.maximum(top, low)
