@@ -202,6 +202,9 @@ def sample_groups(
     put_in_planes(delta, plane, reach, reach)
     tool = tools if tools.ndim == 1 else tools[arcs.move[pieces.arc]]
     count = steps_needed(model, delta, tool, tolerance / 4, at_least=8, at_most=256)
+    # as many for each turn: half turns apart, samples would not say where the centre is
+    turns = np.ceil(np.abs(arcs.sweep_rad[pieces.arc]) * share / (2 * np.pi) - 1e-9)
+    count *= np.maximum(turns, 1.0).astype(np.int64)
     for steps in distinct(count).tolist():
         group = np.flatnonzero(count == steps)
         size = max(1, _BATCH // steps)

@@ -228,7 +228,7 @@ def test_a_piece_has_the_play_of_its_inside_at_its_ends_too() -> None:
 
 
 def test_samples_are_as_many_as_the_error_needs() -> None:
-    """In each plane by the length of the arc and its rise; at least 8, at most 256."""
+    """In each plane by the length of the arc and its rise; at least 8, at most 256 a turn."""
     for plane in PLANES:
         ends = [in_plane(plane, *np.array(p)) for p in ((20.0, 0.0, 0.0), (0.0, 20.0, 60.0))]
         path = toolpath(feed(*ends[0]), arc(*ends[1], centre=(0.0, 0.0, 0.0), degrees=90.0, plane=plane))
@@ -245,7 +245,7 @@ def test_samples_are_as_many_as_the_error_needs() -> None:
         ] == [256]
 
 
-def test_half_a_piece_needs_half_the_samples_and_a_long_one_no_more_than_its_width() -> None:
+def test_half_a_piece_needs_half_the_samples_and_each_turn_has_its_own() -> None:
     circle_ = arc(20.0, 0.0, 0.0, centre=(0.0, 0.0, 0.0), degrees=720.0)
     path = toolpath(
         feed(20.0, 0.0, 0.0), circle_, replace(QUARTER, frame=1), frames=(Frame(), Frame(tool_mm=(0, 0, 9.0)))
@@ -254,7 +254,7 @@ def test_half_a_piece_needs_half_the_samples_and_a_long_one_no_more_than_its_wid
     model = Toy(bound=lambda d, t: d[:, 0] * 0.001 / 4 * 8 / 40.001 * np.where(t[:, 2] > 0, 4.0, 1.0))
     both = pieces((0, 0.0, 1.0), (0, 0.0, 0.5), (1, 0.0, 1.0), (1, 0.0, 0.25))
     groups = list(sample_groups(path, model, path.end_mm, both, path.tool_mm(), 0.001))
-    assert [(part.tolist(), count) for part, count in groups] == [([0, 1, 3], 8), ([2], 32)]
+    assert [(part.tolist(), count) for part, count in groups] == [([1, 3], 8), ([0], 16), ([2], 32)]
 
 
 def test_pieces_are_sampled_in_batches(monkeypatch: pytest.MonkeyPatch) -> None:

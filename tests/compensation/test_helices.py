@@ -17,7 +17,7 @@ PLANES = {"G17": (0, 1, 2), "G18": (0, 2, 1), "G19": (1, 2, 0)}
 
 
 def helix(rng: np.random.Generator, plane: str) -> str:
-    """One helix in G91 with its entry, of up to one turn: a whole one states no end in the plane."""
+    """One helix in G91 with its entry, of up to nine turns: whole ones state no end in the plane."""
     first, second, third = PLANES[plane]
     radius, angle = rng.uniform(5.0, 40.0), rng.uniform(0.0, 2 * math.pi)
     centre = radius * np.array([math.cos(angle), math.sin(angle)])
@@ -27,6 +27,8 @@ def helix(rng: np.random.Generator, plane: str) -> str:
         end = centre - radius * np.array([math.cos(turned), math.sin(turned)])
         words += [f"{'XYZ'[axis]}{value:.4f}" for axis, value in zip((first, second), end, strict=True)]
     words += [f"{'IJK'[axis]}{value:.4f}" for axis, value in zip((first, second), centre, strict=True)]
+    if rng.random() < 0.5:
+        words.append(f"P{rng.integers(2, 10)}")
     place = " ".join(f"{a}{v:.3f}" for a, v in zip("XYZ", rng.uniform(-60.0, 60.0, 3), strict=True))
     return f"G17 G90 G1 {place}\n{plane} G91 {rng.choice(['G2', 'G3'])} {' '.join(words)}\n"
 
