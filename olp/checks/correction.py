@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.checks.along import Along, Figure
-from olp.checks.base import finding, lines_of
+from olp.checks.base import beside_axes, finding, lines_of
 from olp.checks.listed import between_findings as between_findings
 from olp.checks.listed import remark_findings
 from olp.core.arrays import Array, Index, Mask, distinct
@@ -53,7 +53,7 @@ def program_findings(program: Program, setup: Setup) -> list[Finding]:
             findings.append(finding(_REMARKS[name], text, [line]))
     findings += remark_findings(program)
     count = len(path)
-    whole = found(count, lambda some: _has(path, some, Flag.WHOLE) & (path.kind[some] != Kind.PROBE))
+    whole = found(count, lambda some: beside_axes(path, some) & (path.kind[some] != Kind.PROBE))
     if whole.size and not program.verbatim:
         lines = lines_of(path, whole)
         findings.append(

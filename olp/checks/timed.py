@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
-from olp.checks.base import finding, lines_of
-from olp.core.toolpath import Flag, Toolpath
+from olp.checks.base import beside_axes, finding, lines_of
+from olp.core.toolpath import Toolpath
 from olp.findings.catalogue import Finding
 
 
@@ -16,9 +14,9 @@ def time_findings(path: Toolpath, control: Sequence[dict[str, Any]]) -> list[Fin
     """Moves of axes that are not timed, and what the program asks of the control (rows with `what`, `count`
     and `seconds`) without a stated time."""
     findings = []
-    whole = (path.flag & np.uint8(Flag.WHOLE)) != 0
-    if whole.any():
-        lines = lines_of(path, whole)
+    beside = beside_axes(path, slice(0, len(path)))
+    if beside.any():
+        lines = lines_of(path, beside)
         what = f"{len(lines)} blocks also move another axis; only X, Y and Z are timed there"
         findings.append(finding("OLP208", what, lines))
     unknown = [f"{row['count']} x {row['what']}" for row in control if row["seconds"] is None]
