@@ -30,7 +30,8 @@ def test_a_block_that_calls_a_cycle_moves_no_other_axis(size: int) -> None:
     flag = [0, Flag.WHOLE, Flag.CYCLE, Flag.CYCLE, Flag.WHOLE, Flag.CYCLE, Flag.WHOLE]
     line = [1, 2, 2, 2, 3, 4, 5]
     none = np.zeros(7, np.uint8)
-    path = Toolpath(none, np.array(flag, np.uint8), np.array(line), none, np.zeros((7, 3)), (Frame(),))
+    frame = np.zeros(7, np.int32)
+    path = Toolpath(none, np.array(flag, np.uint8), np.array(line), frame, np.zeros((7, 3)), (Frame(),))
     found = [beside_axes(path, slice(a, min(a + size, 7))) for a in range(0, 7, size)]
     # a cycle in the next line is not called by this one
     assert np.flatnonzero(np.concatenate(found)).tolist() == [4, 6]
