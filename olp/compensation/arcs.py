@@ -6,7 +6,7 @@ samples least. Where it leaves them by more than the tolerance, the piece is div
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -68,6 +68,10 @@ class Pieces:
     def pick(self, which: npt.NDArray[np.generic]) -> Pieces:
         return Pieces(self.arc[which], self.begin[which], self.end[which])
 
+    @staticmethod
+    def joined(parts: Sequence[Pieces]) -> Pieces:
+        return Pieces(*(np.concatenate([getattr(p, name) for p in parts]) for name in Pieces.__slots__))
+
 
 def subdivide_arcs(
     path: Toolpath,
@@ -91,8 +95,27 @@ def subdivide_arcs(
         pieces = _at_quadrants(path, pieces, turning, band)
     tools = path.tool_mm()
     done: list[Pieces] = []
+    while len(pieces):
+        fitting = _fitting(path, model, target, pieces, tools, tolerance)
+        whole, pieces = _opened(path, model, target, fitting, tools, digit)
+        done.append(whole)
+    pieces = Pieces.joined(done)
+    inner = pieces.end < 1.0
+    arc, end = pieces.arc[inner], pieces.end[inner]
+    starts, ends = _ends(path, target, arc)
+    centre = arcs.centre_mm[arc] + (ends - path.end_mm[arcs.move[arc]])
+    return arcs.move[arc], end, arc_points(starts, ends, centre, arcs.plane[arc], arcs.sweep_rad[arc], end)
+
+
+def _fitting(
+    path: Toolpath, model: ErrorModel, target: Array, pieces: Pieces, tools: Array, tolerance: float
+) -> Pieces:
+    """The pieces, divided until one arc fits each. Raises CannotCompute as `subdivide_arcs`."""
+    arcs = path.arcs
+    done: list[Pieces] = []
+    most = max(_PIECES, _PIECES_PER_ARC * len(pieces))
     for _ in range(_DEEPEST):
-        if not len(pieces) or len(pieces) > max(_PIECES, _PIECES_PER_ARC * len(arc)):
+        if not len(pieces) or len(pieces) > most:
             break
         away = np.zeros(len(pieces))
         for part, count in sample_groups(path, model, target, pieces, tools, tolerance):
@@ -107,26 +130,20 @@ def subdivide_arcs(
             "this arc exceeds the tolerance however finely it is divided into arcs; raise --tolerance-um",
             line=int(path.line[arcs.move[pieces.arc[0]]]),
         )
-    done = [_opened(path, model, target, p, tools, digit) for p in done]
-    arc = np.concatenate([p.arc for p in done])
-    end = np.concatenate([p.end for p in done])
-    inner = end < 1.0
-    arc, end = arc[inner], end[inner]
-    starts, ends = _ends(path, target, arc)
-    centre = arcs.centre_mm[arc] + (ends - path.end_mm[arcs.move[arc]])
-    return arcs.move[arc], end, arc_points(starts, ends, centre, arcs.plane[arc], arcs.sweep_rad[arc], end)
+    return Pieces.joined(done)
 
 
 def _opened(
     path: Toolpath, model: ErrorModel, target: Array, pieces: Pieces, tools: Array, digit: float
-) -> Pieces:
-    """The same pieces, and half a turn cut off at the end of those that are whole turns, or nearly, and whose
-    commands do not meet. As written they could end before their start or behind it."""
+) -> tuple[Pieces, Pieces]:
+    """Pieces that stay, and both parts of the others: half a turn is cut off at the end of those that are
+    whole turns, or nearly, and whose commands do not meet. As written they could end before their start or
+    behind it. An arc that fits the whole may not fit the parts."""
     arcs = path.arcs
     sweep = np.abs(arcs.sweep_rad[pieces.arc]) * (pieces.end - pieces.begin)
     whole = np.flatnonzero(sweep > _NEARLY_WHOLE)
     if not whole.size:
-        return pieces
+        return pieces, pieces.pick(whole)
     part = pieces.pick(whole)
     bend = sampled(path, model, target, part, tools, 2)
     plane = arcs.plane[part.arc]
@@ -140,12 +157,8 @@ def _opened(
     middle = cut.end - np.pi / np.abs(arcs.sweep_rad[cut.arc])
     kept = np.ones(len(pieces), bool)
     kept[whole[odd]] = False
-    rest = pieces.pick(kept)
-    return Pieces(
-        np.concatenate((rest.arc, cut.arc, cut.arc)),
-        np.concatenate((rest.begin, cut.begin, middle)),
-        np.concatenate((rest.end, middle, cut.end)),
-    )
+    parts = Pieces(cut.arc, cut.begin, middle), Pieces(cut.arc, middle, cut.end)
+    return pieces.pick(kept), Pieces.joined(parts)
 
 
 def _divided(pieces: Pieces, count: Index) -> Pieces:

@@ -342,6 +342,19 @@ def test_a_whole_turn_that_does_not_come_back_is_cut_half_a_turn_before_its_end(
     assert cuts(toolpath(feed(20.0, 0.0, 0.0), most), climb) == {}
 
 
+@pytest.mark.parametrize("turns", (1, 2, 5))
+def test_both_parts_of_a_turn_that_does_not_come_back_fit(turns: int) -> None:
+    """An ellipse that climbs: a circle about the whole may leave it less than those through the ends of its
+    parts."""
+    path = toolpath(feed(20.0, 0.0, 0.0), arc(20.0, 0.0, 10.0, centre=(0.0, 0.0, 0.0), degrees=360.0 * turns))
+    model = linear(np.array([[1e-3, 0.0, 1e-4], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]))
+    tolerance = 1.01 * fit_pieces(path, model, path.end_mm, pieces((0, 0.0, 1.0)), NO_TOOL, 64 * turns)[0]
+    edges = [0.0, *cuts(path, model, tolerance)[1], 1.0]
+    assert len(edges) > 2
+    parts = pieces(*((0, a, b) for a, b in pairwise(edges)))
+    assert fit_pieces(path, model, path.end_mm, parts, NO_TOOL, 64 * turns).max() <= tolerance
+
+
 def test_an_arc_that_stays_an_arc_is_not_cut() -> None:
     path = toolpath(*CIRCLE, QUARTER)
     assert cuts(path, linear(np.diag([1e-3, 1e-3, 5e-3]))) == {}
