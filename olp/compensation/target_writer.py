@@ -11,14 +11,16 @@ import numpy as np
 from olp.compensation.digits import POW10
 from olp.compensation.point_writer import PointWriter
 from olp.compensation.rows import Rows
+from olp.compensation.target_arcs import SHARE, pieces_of, stated
 from olp.compensation.writer import Task
 from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import ProgramError
 from olp.core.spool import whole
 from olp.core.toolpath import Flag, Kind
 from olp.core.values import dataclass
+from olp.program.robots.arcs import Bent
 from olp.program.robots.dialect import Replacement, RobotDialect
-from olp.program.robots.poses import matrix
+from olp.program.robots.poses import NO_TURN, matrix
 from olp.program.robots.targets import NOWHERE, Part, Target, Use
 from olp.program.text.numbers import MOST_DECIMALS, number, spliced, written
 
@@ -63,8 +65,9 @@ class TargetWriter(PointWriter):
     def _rewritten(self, rows: Rows, begin: int, end: int) -> bytes | None:
         last = np.append(rows.move[1:] != rows.move[:-1], True)[: len(rows)]
         wanted = self._wanted(rows)
-        edits = [*self._targets(rows, np.flatnonzero(last & wanted.stated), wanted),
-                 *self._parts(rows, np.flatnonzero(~last & wanted.stated), wanted)]  # fmt: skip
+        arcs, own = self._arcs(rows, wanted)
+        edits = [*arcs, *self._targets(rows, np.flatnonzero(last & wanted.stated & ~own), wanted),
+                 *self._parts(rows, np.flatnonzero(~last & wanted.stated & ~own), wanted)]  # fmt: skip
         blocks = self.tally.inserted_blocks - self._clones
         if self._stamp and (edits or self.stamp_always):
             edits.append(self.dialect.stamped(self.program, self._stamp))
@@ -239,6 +242,51 @@ class TargetWriter(PointWriter):
             edits += self.dialect.part(self.program, move, use, part)
             self.tally.inserted_blocks += 1
         return edits
+
+    # -- arcs ----------------------------------------------------------------------------------------
+
+    def _arcs(self, rows: Rows, wanted: _Wanted) -> tuple[list[Replacement], Mask]:
+        """Arcs in place of one where that would leave the tolerance. Also (r,) the rows that are written by
+        that: of chords, and of via points whose targets stay as they are."""
+        edits: list[Replacement] = []
+        own = np.zeros(len(rows), bool)
+        for arc in self.stated.arcs:
+            first, behind = np.searchsorted(rows.move, (arc.first, arc.last + 1)).tolist()
+            line, middle = int(self.path.line[arc.last]), arc.middle - arc.first
+            if rows.take_up[first:behind].any():
+                raise ProgramError(
+                    "an axis turns round on this arc, and its backlash is taken up by a step, which an arc "
+                    "cannot have; post straight moves",
+                    line=line,
+                    code="OLP561",
+                )
+            # the last row of each chord
+            ends = np.searchsorted(rows.move, np.arange(arc.first, arc.last + 1), "right") - 1
+            command = self.plan.command_mm[rows.first + np.append(first - 1, ends)]
+            rows.emitted[first:behind] = self.plan.command_mm[rows.first + first : rows.first + behind]
+            bent = Bent(command, [NO_TURN], middle + 1, SHARE * self.tolerance_mm, np.nan)
+            pieces = pieces_of(arc, bent, line)
+            own[first : behind - 1] = True
+            own[ends[middle]] = bool(pieces)
+
+            def part(chord: int, of: int, ends: Index = ends) -> Part:
+                return self._on_arc(rows, int(ends[chord]), of, wanted)
+
+            for piece in pieces:
+                edits += stated(self.program, arc, piece, part)
+            self.tally.inserted_blocks += max(len(pieces) - 1, 0)
+        return edits, own
+
+    def _on_arc(self, rows: Rows, row: int, of: int, wanted: _Wanted) -> Part:
+        """A point of an arc with the words of the target of move `of`."""
+        use = self.stated.uses[of]
+        assert use is not None
+        target = self.stated.targets[use.target]
+        shift = np.array(self._use(rows, row).shift_mm) / self.frame_of(of).unit_mm
+        value = (wanted.value[row] + shift).tolist()
+        x, y, z = (self._number(target.numbers[k], value[k], int(wanted.decimals[row, k])) for k in range(3))
+        name = self._new_name(target) if self.dialect.names_parts else ""
+        return Part((x, y, z), 1.0, False, name)
 
     def _use(self, rows: Rows, row: int) -> Use:
         use = self.stated.uses[int(rows.move[row])]

@@ -11,9 +11,10 @@ import re
 import numpy as np
 
 from olp.compensation.joints.arm_path import ArmPath
-from olp.compensation.joints.planning import JointPlan
+from olp.compensation.joints.planning import JointLimits, JointPlan
 from olp.compensation.joints.writer import WrittenJoints
 from olp.compensation.tally import Tally
+from olp.compensation.target_arcs import SHARE, pieces_of, stated
 from olp.core.arrays import Index
 from olp.core.errors import ProgramError
 from olp.core.machine import ZERO, Vector
@@ -21,6 +22,7 @@ from olp.core.spool import whole
 from olp.core.values import dataclass
 from olp.kinematics.parallel_arm import arm_of
 from olp.kinematics.poses import Poses, rotation_vector, turned
+from olp.program.robots.arcs import Bent
 from olp.program.robots.dialect import Replacement, RobotDialect
 from olp.program.robots.poses import (
     Pose,
@@ -68,21 +70,23 @@ class _Wanted:
         return near and self.turns == other.turns
 
 
-def write_arm(path: ArmPath, plan: JointPlan) -> WrittenJoints:
-    """The text of a robot program with its plan. Raises ProgramError where it cannot be written."""
-    return _Writer(path, plan).written()
+def write_arm(path: ArmPath, plan: JointPlan, limits: JointLimits) -> WrittenJoints:
+    """The text of a robot program with its plan, arcs within `limits`. Raises ProgramError where it cannot be
+    written."""
+    return _Writer(path, plan, limits).written()
 
 
 class _Writer:
     """Writes one program."""
 
-    def __init__(self, path: ArmPath, plan: JointPlan) -> None:
+    def __init__(self, path: ArmPath, plan: JointPlan, limits: JointLimits) -> None:
         program, targets = path.program, path.program.targets
         arm = arm_of(path.motion.structure)
         assert isinstance(program.dialect, RobotDialect)
         assert targets is not None
         assert arm is not None
         self.path, self.plan, self.program, self.targets = path, plan, program, targets
+        self.limits = limits
         self.dialect, self.arm, self.tally = program.dialect, arm, Tally()
         self.nominal, self.commands = path.end.tolist(), plan.command.tolist()
         self.clones = 0
@@ -98,9 +102,11 @@ class _Writer:
         in_joints = np.array([bool(self._target_of(row).joints) for row in rows.tolist()], bool)
         self._keep_branches(rows[~in_joints])
         by_target: dict[int, list[tuple[int, _Wanted]]] = {}
-        edits: list[Replacement] = []
+        edits, own = self._arcs(rows, places, turns)
         for k, row in enumerate(rows.tolist()):
             use = self._use(row)
+            if row in own:
+                continue
             if in_joints[k]:
                 by_target.setdefault(use.target, []).append((row, self._wanted_joints(row)))
                 continue
@@ -118,6 +124,57 @@ class _Writer:
         if blocks:
             edits += self.dialect.counted(self.program, blocks)
         return WrittenJoints(spliced(whole(self.program.data), edits), self.tally, parts)
+
+    # -- arcs ----------------------------------------------------------------------------------------
+
+    def _arcs(
+        self, rows: Index, places: list[Vector], turns: list[Quaternion]
+    ) -> tuple[list[Replacement], set[int]]:
+        """Arcs in place of one where that would leave the tolerance. Also the rows of chords, and of via
+        points whose targets stay as they are. `places` and `turns` are those of `rows`."""
+        edits: list[Replacement] = []
+        own: set[int] = set()
+        plan, limits = self.plan, self.limits
+        for arc in self.targets.arcs:
+            first, behind = np.searchsorted(plan.move, (arc.first, arc.last + 1)).tolist()
+            line, middle = int(self.path.line[arc.last]), arc.middle - arc.first
+            side = plan.side[first - 1 : behind]
+            if behind - first != arc.last - arc.first + 1 or (side != side[0]).any():
+                raise ProgramError(
+                    "an axis turns round on this arc, and its backlash is taken up by a step, which an arc "
+                    "cannot have; post straight moves",
+                    line=line,
+                    code="OLP561",
+                )
+            k = int(np.searchsorted(rows, first))
+            points, turned_ = np.array(places[k - 1 : k + behind - first]), turns[k - 1 : k + behind - first]
+            bent = Bent(
+                points, turned_, middle + 1, SHARE * limits.tolerance_mm, SHARE * limits.tolerance_rad
+            )
+            pieces = pieces_of(arc, bent, line)
+            own.update(range(first, behind - 1))
+            if not pieces:
+                own.remove(first + middle)
+
+            def part(chord: int, of: int, first: int = first, k: int = k) -> Part:
+                return self._on_arc(first + chord, of, places[k + chord], turns[k + chord])
+
+            for piece in pieces:
+                edits += stated(self.program, arc, piece, part)
+            self.tally.inserted_blocks += max(len(pieces) - 1, 0)
+        return edits, own
+
+    def _on_arc(self, row: int, of: int, place: Vector, turn: Quaternion) -> Part:
+        """A point of an arc at a place in its frame, with the words of the target of move `of`."""
+        use, unit = self.targets.uses[of], self._unit(of)
+        assert use is not None
+        target = self.targets.targets[use.target]
+        x, y, z = (value / unit for value in place)
+        numbers = (x, y, z, *self.dialect.turn_values(turn, self._numbers(target.turned)))
+        wanted = self._in_digits(row, target, numbers, angle_between(turn, target.turn), of)
+        name = self._new_name(target) if self.dialect.names_parts else ""
+        a, b, c, *turned_ = wanted.texts
+        return Part((a, b, c), 1.0, False, name, tuple(turned_), wanted.turns)
 
     def _target_of(self, row: int) -> Target:
         return self.targets.targets[self._use(row).target]
@@ -168,7 +225,7 @@ class _Writer:
         unit = self._unit(move)
         point = [(a - b) / unit for a, b in zip(place, shift, strict=True)]
         numbers = (*point, *self.dialect.turn_values(turn, self._numbers(target.turned)))
-        return self._in_digits(row, target, numbers, angle_between(turn, target.turn))
+        return self._in_digits(row, target, numbers, angle_between(turn, target.turn), move)
 
     def _numbers(self, spans: tuple[Span, ...]) -> list[float]:
         return [float(self.program.data[a:b]) for a, b in spans]
@@ -190,8 +247,11 @@ class _Writer:
         values, digits, texts = zip(*made, strict=True)
         return _Wanted(values, digits, texts, ())
 
-    def _in_digits(self, row: int, target: Target, numbers: tuple[float, ...], turned_rad: float) -> _Wanted:
-        """Numbers as they are written: those that are right to their last digit keep their bytes."""
+    def _in_digits(
+        self, row: int, target: Target, numbers: tuple[float, ...], turned_rad: float, move: int
+    ) -> _Wanted:
+        """Numbers as they are written: those that are right to their last digit keep their bytes. The words
+        of the target are those of a move."""
         dialect, values, digits, texts = self.dialect, [], [], []
         for k, (span, value) in enumerate(zip((*target.numbers, *target.turned), numbers, strict=True)):
             fewest = dialect.turn_decimals if k > 2 else dialect.decimals
@@ -200,7 +260,7 @@ class _Writer:
             values.append(own)
             digits.append(digit)
             texts.append(text)
-        return _Wanted(tuple(values), tuple(digits), tuple(texts), self._turns(row, target))
+        return _Wanted(tuple(values), tuple(digits), tuple(texts), self._turns(row, target, move))
 
     def _written(
         self, span: Span, value: float, fewest: int, off: float | None = None
@@ -224,10 +284,9 @@ class _Writer:
         assert form is not None
         return value, max(digit, _COMPUTED), written(form, value, decimals)
 
-    def _turns(self, row: int, target: Target) -> tuple[bytes, ...]:
+    def _turns(self, row: int, target: Target, move: int) -> tuple[bytes, ...]:
         if not target.turns:
             return ()
-        move = int(self.plan.move[row])
         new = self.dialect.turns_of(target.config, self.nominal[move], self.commands[row])
         return tuple(
             self.program.data[slice(*span)] if value is None else str(value).encode()

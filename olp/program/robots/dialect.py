@@ -13,6 +13,7 @@ from olp.program.dialect import StatementDialect
 from olp.program.program import Program
 from olp.program.robots.poses import Quaternion
 from olp.program.robots.targets import Part, Target, Use
+from olp.program.text.numbers import spliced
 
 #: Bytes of the text from one position up to another, and what replaces them.
 Replacement = tuple[int, int, bytes]
@@ -56,9 +57,28 @@ class RobotDialect(StatementDialect):
         """What states a part of a move before its end."""
         raise NotImplementedError
 
+    def arc(
+        self, program: Program, move: int, via: tuple[Use, Part], end: tuple[Use, Part] | None
+    ) -> list[Replacement]:
+        """What states a part of an arc before its end, through the via point and to the end that are given;
+        None for the last part, which ends where the statement says."""
+        raise NotImplementedError
+
     def clone(self, program: Program, target: Target, name: str, text: bytes) -> Replacement:
         """The declaration of a target again, under another name and with another value."""
         raise NotImplementedError
+
+    def parted(
+        self, program: Program, move: int, use: Use, edits: list[Replacement], close: bytes = b""
+    ) -> Replacement:
+        """The statement of a move with edits of its text, before the statement itself, where that has its
+        lines to itself. `close` ends it."""
+        data, (begin, end) = program.data, use.statement
+        line = int(program.toolpath.line[move])
+        lead = data[int(program.line_start[line - 1]) : begin]
+        blanks = lead if not lead.strip() else b""
+        own = [(a - begin, b - begin, text) for a, b, text in edits]
+        return begin, begin, spliced(data[begin:end], own) + close + program.eol(line) + blanks
 
     def turn_values(self, turn: Quaternion, stated: Sequence[float]) -> Sequence[float]:
         """The numbers of an orientation as the language states it, those that are near `stated` ones."""

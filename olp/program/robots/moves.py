@@ -15,14 +15,17 @@ from olp.core.machine import ZERO, Setup, Vector
 from olp.core.toolpath import Flag, Frame, Kind
 from olp.program.dialect import Dialect, Options
 from olp.program.program import Program
+from olp.program.robots.arcs import Chords
 from olp.program.robots.frames import Located, RobotFrames, Tool
-from olp.program.robots.poses import NO_TURN, Pose, Quaternion
-from olp.program.robots.targets import ABSENT, NOWHERE, Span, Target, Targets, Use
+from olp.program.robots.poses import NO_TURN, Pose, Quaternion, angle_between
+from olp.program.robots.targets import ABSENT, NOWHERE, Arc, Span, Target, Targets, Use
 from olp.program.verbatim import Moves
 
 NAN = float("nan")
 #: mm; less of a tool vector moves nothing, and comes from the digits of orientations
 _SAME_VECTOR_MM = 1e-4
+#: rad by which a via point may be turned from the even turn along its arc, where both could count
+_SAME_ORIENTATION = 1e-3
 #: Statements between two reports of progress.
 _TOLD = 4096
 _NOWHERE: Vector = (NAN, NAN, NAN)
@@ -61,6 +64,7 @@ class RobotMoves:
         self.moves = Moves()
         self.targets: list[Target] = []
         self.uses: list[Use | None] = []
+        self.arcs: list[Arc] = []
         self._remarks: dict[str, tuple[str, int, str]] = {}
         self.known = True
         self._frame = -1
@@ -69,6 +73,8 @@ class RobotMoves:
         self._feed = NAN
         #: where the carriage of an arm is, and frames that count from there
         self._away: float | None = None
+        #: where the last move ended: its frame, its tool, the place in mm, and the external axes
+        self._at: tuple[Located, Tool, Vector, tuple[float, ...]] | None = None
         self._on_track: dict[tuple[str, float], Pose] = {}
         self._first_turns: dict[str, Quaternion] = {}
         self._index: dict[tuple[str, str, Quaternion, Vector], int] = {}
@@ -112,15 +118,11 @@ class RobotMoves:
 
     def move(
         self, line: int, use: Use, frame: Located, tool: Tool, feed: float, *, straight: bool,
-        whole: bool = False,
+        whole: bool = False, chord: bool = False,
     ) -> None:  # fmt: skip
-        """Add a move to a target; `straight` where its path is a line, `whole` where it is never split."""
-        # the joints of an arm turn the tool, so its vector is none of a frame
-        turn = NO_TURN if self.arm else use.turn
-        key = (frame.name, tool.name, turn, use.shift_mm)
-        index = self._index.get(key)
-        if index is None:
-            index = self._index[key] = self.frames.index(frame, tool, turn, use.shift_mm, line)
+        """Add a move to a target; `straight` where its path is a line, `whole` where it is never split. A
+        `chord` is part of an arc."""
+        index = self._framed(frame, tool, use, line)
         if not self.known:
             self.away(line)
         target = self.targets[use.target]
@@ -132,7 +134,7 @@ class RobotMoves:
         elif straight and not known:
             self.remark("told", line, "where this move begins depends on the run: it is corrected at its end")
         line_kind = known and not swings
-        held = line_kind and (whole or target.rest != self._rest)
+        held = line_kind and not chord and (whole or target.rest != self._rest)
         flag = Flag.WHOLE if held else Flag(0)
         kind = Kind.LINE if line_kind else Kind.RAPID
         self.moves.put(
@@ -145,12 +147,97 @@ class RobotMoves:
             self.remark("turning", line, what, "turning")
         before = use.turn if self._turn is None else self._turn
         pose, away = self._carried(frame, target)
-        whole |= away != self._away
+        whole |= chord or away != self._away
         self._away = away
         self.uses.append(
             use.begun(before, pose, tool.pose, straight=known, whole=whole, carried=away is not None)
         )
         self.known, self._frame, self._turn, self._rest, self._feed = True, index, use.turn, target.rest, feed
+        self._at = frame, tool, self._place(use), target.outer
+
+    def arc(
+        self, line: int, via: Use, end: Use, frame: Located, tool: Tool, feed: float, *, whole: bool = False,
+        turned_by_via: bool = False,
+    ) -> None:  # fmt: skip
+        """Add an arc through a target to another one, as chords. With `turned_by_via` the orientation of the
+        via point has to be the one that the tool has there. Raises ProgramError where it has not, and where
+        the text does not state where the arc begins."""
+        begin = self._at if self.known and self._turn is not None else None
+        targets = [self.targets[use.target] for use in (via, end)]
+        outer = [target.outer for target in targets]
+        if begin is None or self._turn is None or (begin[0].name, begin[1].name) != (frame.name, tool.name):
+            raise not_read(
+                "where this arc begins is not stated, or in another frame or with another tool; program a "
+                "straight move to its start before it, with the frame and the tool of the arc",
+                line,
+            )
+        if any(own != begin[3] for own in outer):
+            raise not_read("an external axis moves along this arc; program straight moves", line)
+        places = [np.array(place) for place in (begin[2], self._place(via), self._place(end))]
+        chords = Chords.of((places[0], places[1], places[2]), (self._turn, end.turn))
+        if chords is None:
+            raise not_read(
+                "the three points of this arc lie on a line, or on a circle too large to be read; program a "
+                "straight move",
+                line,
+            )
+        off = angle_between(via.turn, chords.turns[chords.first - 1])
+        if turned_by_via and off > _SAME_ORIENTATION:
+            raise not_read(
+                f"at the via point the tool is turned by {off * 1e3:.3g} mrad from the even turn between "
+                "start and end of this arc, and which of them counts is not stated; give the via point that "
+                "orientation",
+                line,
+            )
+        if self._turn != end.turn:
+            what = "along arcs the tool is taken to turn evenly from start to end, by the shorter way"
+            self.remark("arcs", line, what)
+        self._chords(line, via, end, frame, tool, feed, chords, whole=whole)
+
+    def _chords(
+        self, line: int, via: Use, end: Use, frame: Located, tool: Tool, feed: float, chords: Chords, *,
+        whole: bool,
+    ) -> None:  # fmt: skip
+        """Add the chords of an arc as moves."""
+        target, first, last = self.targets[end.target], self.count, len(chords.turns) - 1
+        for k, (place, turn) in enumerate(zip(chords.points.tolist(), chords.turns, strict=True)):
+            use = via if k == chords.first - 1 else end
+            if k not in (chords.first - 1, last):
+                a, b, c = (value / self.frames.unit_mm for value in place)
+                self.targets.append(
+                    Target(
+                        line, NOWHERE, (NOWHERE,) * 3, (-1, -1, -1), (a, b, c), turn, target.rest,
+                        config=target.config, outer=target.outer,
+                    )
+                )  # fmt: skip
+                use = Use(len(self.targets) - 1, NOWHERE, NOWHERE, turn=turn)
+            if not self.arm and self._swings(self._framed(frame, tool, use, line)):
+                raise not_read(
+                    "the tool turns on this arc, and its tip swings; keep its orientation, or program "
+                    "straight moves",
+                    line,
+                )
+            # the tool turns evenly, whatever the via point states
+            use = replace(use, turn=turn)
+            self.move(line, use, frame, tool, feed, straight=True, chord=True)
+        self.arcs.append(Arc(first, first + chords.first - 1, first + last, whole))
+
+    def _place(self, use: Use) -> Vector:
+        """Where a move ends in its frame, mm."""
+        unit = self.frames.unit_mm
+        pairs = zip(self.targets[use.target].point, use.shift_mm, strict=True)
+        x, y, z = (a * unit + b for a, b in pairs)
+        return (x, y, z)
+
+    def _framed(self, frame: Located, tool: Tool, use: Use, line: int) -> int:
+        """The number of the frame of a move."""
+        # the joints of an arm turn the tool, so its vector is none of a frame
+        turn = NO_TURN if self.arm else use.turn
+        key = (frame.name, tool.name, turn, use.shift_mm)
+        index = self._index.get(key)
+        if index is None:
+            index = self._index[key] = self.frames.index(frame, tool, turn, use.shift_mm, line)
+        return index
 
     def joint_move(self, line: int, taken: Callable[[], Use | None]) -> None:
         """Add a move to joint values. Where the machine is no arm, or `taken` finds no numbers in the text,
@@ -170,7 +257,7 @@ class RobotMoves:
         )  # fmt: skip
         self._away = self._carried(self.frames.world, self.targets[use.target])[1]
         self.uses.append(replace(use, tool=flange.pose, carried=self._away is not None))
-        self.known, self._turn, self._rest = True, NO_TURN, ()
+        self.known, self._turn, self._rest, self._at = True, NO_TURN, (), None
 
     def _carried(self, frame: Located, target: Target) -> tuple[Pose, float | None]:
         """A frame as it counts from the carriage of an arm on a track, and where that is; None where it
@@ -226,7 +313,7 @@ class RobotMoves:
         )  # fmt: skip
         path = program.toolpath
         path.end_mm[:] = placed_in(frames, path.frame, path.end_mm)
-        return replace(program, targets=Targets(tuple(self.targets), tuple(self.uses)))
+        return replace(program, targets=Targets(tuple(self.targets), tuple(self.uses), tuple(self.arcs)))
 
 
 def placed_in(frames: Sequence[Frame], number: npt.NDArray[np.int32], points: Array) -> Array:

@@ -83,13 +83,26 @@ class Use:
         )  # fmt: skip
 
 
+@dataclass(frozen=True, slots=True)
+class Arc:
+    """An arc that is read as chords (`robots.arcs`): the moves `first`..`last`. Its via point is the end of
+    `middle`, and its end that of `last`; both are stated by one statement. Other chords have targets of their
+    own, which no text states. One that is `whole` is never written as several arcs."""
+
+    first: int
+    middle: int
+    last: int
+    whole: bool = False
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Targets:
     """All targets of a program, and (n,) what each of its moves uses; None for a move that the text does not
-    state as a target."""
+    state as a target. `arcs` are those among the moves, in their order."""
 
     targets: tuple[Target, ...]
     uses: tuple[Use | None, ...]
+    arcs: tuple[Arc, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

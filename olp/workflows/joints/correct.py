@@ -136,14 +136,14 @@ def correction_of(run: JointRun, options: JointOptions) -> ProvedJoints:
             plan = planned(nominal, options.limits())
             if options.outside_box == "refuse" and run.calibration is not None:
                 _refuse_outside(nominal, plan, run)
-            written = _written(nominal, plan)
+            written = _written(nominal, plan, options.limits())
         text = _stamped(run, dialect, nominal.program, written.text)
         return proved(run, source, (nominal, plan), run.again(text, dialect), options, written.tally)
 
 
-def _written(nominal: JointPath, plan: JointPlan) -> WrittenJoints:
+def _written(nominal: JointPath, plan: JointPlan, limits: JointLimits) -> WrittenJoints:
     if isinstance(nominal, ArmPath):
-        return write_arm(nominal, plan)
+        return write_arm(nominal, plan, limits)
     return write_joints(nominal, plan) if nominal.listed is None else write_list(nominal, plan)
 
 

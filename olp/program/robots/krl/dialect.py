@@ -23,10 +23,13 @@ from olp.program.text.signs import KRL
 
 _ROUTINE = pattern(rb"(?im)^[ \t]*(?:GLOBAL[ \t]+)?DEF(?:FCT)?\b[^\r\n]*(?:\r\n|\n|\r|\Z)")
 _HEADER = pattern(rb"(?:\xef\xbb\xbf)?(?:&[^\r\n]*(?:\r\n|\n|\r|\Z))*")
-_WORD = pattern(rb"(?i)(S?)(LIN|PTP)")
+_WORD = pattern(rb"(?i)(S?)(LIN|PTP|CIRC)")
 _TYPE = pattern(rb"(?i)((?:(?:GLOBAL|DECL|CONST)\s+)*)(E6POS|E3POS|POS|FRAME|E6AXIS|E3AXIS|AXIS)\b")
 #: The words with which a part is passed without a stop.
-_PASSED = {b"LIN": b"C_DIS", b"PTP": b"C_PTP", b"SLIN": b"C_SPL", b"SPTP": b"C_SPL"}
+_PASSED = {
+    b"LIN": b"C_DIS", b"PTP": b"C_PTP", b"CIRC": b"C_DIS", b"SLIN": b"C_SPL", b"SPTP": b"C_SPL",
+    b"SCIRC": b"C_SPL",
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,20 +42,26 @@ class Krl(RobotDialect):
         return match.end(), match.end(), stamp + program.eol(1)
 
     def part(self, program: Program, move: int, use: Use, part: Part) -> list[Replacement]:
-        data, targets = program.data, program.targets
-        assert targets is not None
-        target, (begin, end) = targets.targets[use.target], use.statement
-        word = _WORD.match(data, begin)
+        word = _WORD.match(program.data, use.statement[0])
         assert word is not None
-        edits = [(use.place[0] - begin, use.place[1] - begin, self._value(program, target, part, use))]
-        if use.zone != NOWHERE:
-            edits.append((use.zone[0] - begin, use.zone[1] - begin, b""))
-        text = spliced(data[begin:end], edits).rstrip()
-        if not part.stop:
-            text += b" " + _PASSED[word[0].upper()]
-        line = int(program.toolpath.line[move])
-        blanks = data[int(program.line_start[line - 1]) : begin]
-        return [(begin, begin, text + program.eol(line) + blanks)]
+        edits = [(*use.place, self._value(program, part, use))]
+        edits += self._unzoned(program, use)
+        close = b"" if part.stop else b" " + _PASSED[word[0].upper()]
+        return [self.parted(program, move, use, edits, close)]
+
+    def arc(
+        self, program: Program, move: int, via: tuple[Use, Part], end: tuple[Use, Part] | None
+    ) -> list[Replacement]:
+        use, part = via
+        first = (*use.place, self._value(program, part, use))
+        if end is None:
+            return [first]
+        use, part = end
+        word = _WORD.match(program.data, use.statement[0])
+        assert word is not None
+        edits = [first, (*use.place, self._value(program, part, use))]
+        edits += self._unzoned(program, use)
+        return [self.parted(program, move, use, edits, b" " + _PASSED[word[0].upper()])]
 
     def clone(self, program: Program, target: Target, name: str, text: bytes) -> Replacement:
         data, (begin, end) = program.data, target.declaration
@@ -81,8 +90,19 @@ class Krl(RobotDialect):
         return postures.turns(config, nominal, corrected)
 
     @staticmethod
-    def _value(program: Program, target: Target, part: Part, use: Use) -> bytes:
-        """A position with other numbers, and the orientation at the end of a part."""
+    def _unzoned(program: Program, use: Use) -> list[Replacement]:
+        """Takes away what says how a move ends, with the blanks before it."""
+        if use.zone == NOWHERE:
+            return []
+        begin = use.statement[0]
+        place = begin + len(program.data[begin : use.zone[0]].rstrip())
+        return [(place, use.zone[1], b"")]
+
+    @staticmethod
+    def _value(program: Program, part: Part, use: Use) -> bytes:
+        """The position of a move with other numbers, and the orientation at the end of a part."""
+        assert program.targets is not None
+        target = program.targets.targets[use.target]
         start, numbers = target.value[0], aggregate(program.data, target.value)
         assert numbers is not None
         edits = part.renumbered(target)

@@ -22,12 +22,15 @@ from olp.program.robots.moves import NAN, RobotMoves, not_read, take_all
 from olp.program.robots.poses import Pose, multiplied, rotated
 from olp.program.robots.targets import NOWHERE, Span, Use
 
-_MOVE = pattern(rb"(?i)(S?(?:LIN|PTP))\s*(?=[\s{])(.*)")
-_OTHER_MOVE = pattern(rb"(?i)(S?CIRC(?:_REL)?|S?(?:LIN|PTP)_REL|SPLINE|SPL|ASYPTP)\b")
+_MOVE = pattern(rb"(?i)(S?(?:LIN|PTP|CIRC))\s*(?=[\s{])(.*)")
+_OTHER_MOVE = pattern(rb"(?i)(S?(?:LIN|PTP|CIRC)_REL|SPLINE|SPL|ASYPTP)\b")
 _TAIL = pattern(
     rb"(?i)\s*(\bWITH\b.*?)?(?:\s*\b(C_(?:PTP|DIS|VEL|ORI|SPL)(?:\s+C_(?:PTP|DIS|VEL|ORI))?))?\s*"
 )
 _TARGET = pattern(rb"(?i)(?:\{[^{}]*\}|[^{}])*?(?=\s*(?:\bC_(?:PTP|DIS|VEL|ORI|SPL)\b|\bWITH\b|$))")
+#: An argument of an arc, up to its comma.
+_ARGUMENT = pattern(rb"(?:\{[^{}]*\}|\[[^\]]*\]|[^{}\[\],])+")
+_ANGLE = pattern(rb"(?i)\s*CA\b.*")
 _ACTUAL = pattern(rb"(?i)\$(?:POS_ACT|AXIS_ACT)")
 _HOME = pattern(rb"XHOME\d*")
 _NAME = pattern(rb"([A-Za-z_]\w*)\s*(?:\[\s*([^\]]*?)\s*\])?")
@@ -190,11 +193,15 @@ class _Reader:
         if any(block.loop and block.moves == self.moves.count for block in self.blocks):
             # the first move in a loop begins where the last one ends, or before the loop
             self.moves.known = False
-        if self.moves.arm and word.endswith(b"LIN"):
+        arc = word.endswith(b"CIRC")
+        if self.moves.arm and (arc or word.endswith(b"LIN")):
             self.turning.check(tail[1] or b"", line)
         state = self.active.state
         if tail[1] is not None:
             state = self.active.within(tail[1], tail.start(1), line)
+        if arc:
+            self._arc(line, target, state, tail.span(2), by_via=word == b"SCIRC")
+            return
         terms = parts(self.data, target)
         if self._in_joints(terms, line):
             self.moves.joint_move(line.line, lambda: self._joints(terms[0], tail.span(2), line))
@@ -206,6 +213,32 @@ class _Reader:
             line.line, use, frame, tool, self.active.feed, straight=word.endswith(b"LIN"),
             whole=self.triggered,
         )  # fmt: skip
+
+    def _arc(self, line: Line, span: Span, state: State, zone: Span, *, by_via: bool) -> None:
+        """An arc through a position to another one."""
+        stated = list(_ARGUMENT.finditer(self.data, *span))
+        if len(stated) > 2 and _ANGLE.fullmatch(stated[2][0]):
+            what = "CA ends this arc by its angle, elsewhere than its end says; program the end"
+            raise not_read(what, line.line)
+        if len(stated) != 2:
+            raise ProgramError(
+                f"the arc has {len(stated)} positions; expected its via point and its end",
+                line=line.line,
+                code="OLP516",
+            )
+        self.turning.check_arc(line)
+        base, uses = self.active.base(state, line.line), []
+        for match in stated:
+            begin = match.start() + len(match[0]) - len(match[0].lstrip())
+            own = begin, begin + len(match[0].strip())
+            uses.append(self._use(line, own, parts(self.data, own), base, zone))
+        (via, frame), (end, other) = uses
+        if frame.name != other.name:
+            raise not_read("via point and end of this arc are in different frames", line.line)
+        tool = self.active.tool(state, line.line)
+        self.moves.arc(
+            line.line, via, end, frame, tool, self.active.feed, whole=self.triggered, turned_by_via=by_via
+        )
 
     def _in_joints(self, terms: list[Span], line: Line) -> bool:
         """Whether a move states joints, as those of the home position do, which the control knows."""

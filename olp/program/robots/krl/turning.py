@@ -15,6 +15,8 @@ _TAUGHT = pattern(rb"(?i)(\w+)\s*=\s*\{[^{}]*\bORI_TYP\s*#(\w+)")
 _ACTIVE = pattern(rb"(?i)LDAT_ACT\s*=\s*(\w+)")
 _BAS = pattern(rb"(?i)BAS\s*\(\s*#(INITMOV|CP_PARAMS)\b")
 _EVEN = "#VAR"
+#: Arcs along which the tool turns with the path.
+_ALONG = pattern(rb"(?i)\$CIRC_TYPE\s*=(?!=)\s*(?!#BASE\b|SCIRC_TYP)|\bCIRC_TYP\s+#(?!BASE\b)")
 
 
 class Turning:
@@ -35,6 +37,8 @@ class Turning:
             self.take(line)
             self._any = self._any or self._now
         self._now, self._begun = None, False
+        #: the first line that lets tools turn along with arcs, 0 for none
+        self._along = next((line.line for line in lines if _ALONG.search(line.text)), 0)
 
     def forget(self) -> None:
         """What is in force depends on the run from here on. Before the first statement tools turn evenly."""
@@ -51,6 +55,15 @@ class Turning:
             self._active = self._taught.get(active[1].upper(), _EVEN)
         elif call is not None:
             self._put(_EVEN if call[1].upper() == b"INITMOV" else self._active, line)
+
+    def check_arc(self, line: Line) -> None:
+        """Raises ProgramError for an arc along which the tool may turn with the path."""
+        if self._along:
+            raise not_read(
+                f"the tool may turn along with this arc ($CIRC_TYPE or CIRC_TYP in line {self._along}), "
+                "which is not read; set #BASE",
+                line.line,
+            )
 
     def _put(self, value: str, line: Line) -> None:
         self._now = None if value == _EVEN else (value, line.line)

@@ -50,27 +50,44 @@ class Ls(RobotDialect):
         return str(max((int(name) for name in taken if name.isdigit()), default=0) + 1)
 
     def part(self, program: Program, move: int, use: Use, part: Part) -> list[Replacement]:
-        data, targets = program.data, program.targets
-        assert targets is not None
-        target, (begin, end) = targets.targets[use.target], use.statement
-        text = b" ".join(data[begin:end].split(b"\n"))
-        head = _HEAD.match(text)
+        return [self._statement(program, move, use, [(use, part)]), self._declared(program, part, use)]
+
+    def arc(
+        self, program: Program, move: int, via: tuple[Use, Part], end: tuple[Use, Part] | None
+    ) -> list[Replacement]:
+        use, part = via
+        own = self._declared(program, part, use)
+        if end is None:
+            return [(*use.place, part.name.encode()), own]
+        return [
+            self._statement(program, move, end[0], [via, end]),
+            own,
+            self._declared(program, end[1], end[0]),
+        ]
+
+    @staticmethod
+    def _statement(program: Program, move: int, use: Use, ends: list[tuple[Use, Part]]) -> Replacement:
+        """The statement of a move to other positions, which the robot passes."""
+        data, (begin, end) = program.data, use.statement
+        head = _HEAD.match(data[begin:end])
         assert head is not None
-        first = use.place[0] - begin
-        behind = text[use.place[1] - begin :]
-        lead = b" " * (len(head[1]) + len(head[2])) + text[head.end(2) : first]
-        ending = _END.search(behind)
+        edits = [(own.place[0] - begin, own.place[1] - begin, part.name.encode()) for own, part in ends]
+        behind = data[use.place[1] : end]
+        ending = _END.search(b" ".join(behind.split(b"\n")))
         assert ending is not None
         kept = b"".join(b" " + word for word in _PLAIN_TAIL.findall(ending[3] or b""))
-        close = (b"FINE" if part.stop else b"CNT100") + kept
-        statement = lead + part.name.encode() + behind[: ending.end(1)] + close + b" ;"
-        value = _renumbered(self._value(program, target, part, use), part.name)
-        # in the order of the path: before the position where the move ends
+        close = (b"FINE" if ends[-1][1].stop else b"CNT100") + kept
+        lead = spliced(data[begin : use.place[1]], [(0, head.end(2), b" " * head.end(2)), *edits])
+        text = lead + behind[: ending.end(1)] + close + b" ;"
+        return begin, begin, text + program.eol(int(program.toolpath.line[move]))
+
+    def _declared(self, program: Program, part: Part, use: Use) -> Replacement:
+        """The position of a part, in the order of the path: before the one where the move ends."""
+        assert program.targets is not None
+        target = program.targets.targets[use.target]
         place = target.declaration[0]
-        return [
-            (begin, begin, statement + program.eol(int(program.toolpath.line[move]))),
-            (place, place, value + program.eol(target.line)),
-        ]
+        value = _renumbered(self._value(program, target, part, use), part.name)
+        return place, place, value + program.eol(target.line)
 
     def clone(self, program: Program, target: Target, name: str, text: bytes) -> Replacement:
         place = target.declaration[1]
@@ -102,7 +119,7 @@ class Ls(RobotDialect):
         """A position with other numbers, and the orientation at the end of a part."""
         data, start = program.data, target.value[0]
         edits = part.renumbered(target)
-        if not part.turned and use.before != use.turn:
+        if not part.turned and not (use.before == use.turn == target.turn):
             angles = zyx_of(between(use.before, use.turn, part.share))
             for name, angle in zip((b"R", b"P", b"W"), angles, strict=True):
                 match = _TURN[name].search(data, target.numbers[2][1], target.value[1])

@@ -23,8 +23,10 @@ _MOVE = pattern(
     rb"(?i)\s*([LJ])\s+(PR?)\[\s*(\d+)\s*(?::[^\]]*)?\]\s+(?:(\d+\.?\d*)\s*(mm/sec|cm/min|inch/min|%|deg/sec|"
     rb"sec|msec)|(R\[[^\]]*\]\S*|\S+))\s+(FINE|CNT\s*\d+|CNT\s*R\[[^\]]*\]|CD\d+|CR\d+)?(.*)"
 )
+#: The same of an arc, whose via point stands first.
+_ARC = pattern(rb"(?i)(\s*)C\s+P\[\s*(\d+)\s*(?::[^\]]*)?\]\s+(PR?\[.*)")
 #: Moves that are not read, by their letters.
-_OTHERS = {"C": "an arc", "A": "an arc", "S": "a spline"}
+_OTHERS = {"C": "an arc through a register", "A": "an arc of several moves", "S": "a spline"}
 _OTHER_MOVE = pattern(rb"(?i)\s*[CASLJ]\s+PR?\[")
 _OFFSET = pattern(rb"(?i)\b(Tool_Offset|Offset|WZVersatz|Versatz)\b\s*(?:,\s*PR\[\s*(\d+)[^\]]*\])?")
 _INCREMENT = pattern(rb"(?i)\bINC\b")
@@ -129,6 +131,11 @@ class _Reader:
         if move is not None:
             self._move(line, self._words(move))
             return
+        arc = _ARC.fullmatch(text)
+        move = None if arc is None else _MOVE.fullmatch(arc[1] + b"L " + arc[3])
+        if arc is not None and move is not None:
+            self._arc(line, int(arc[2]), self._words(move))
+            return
         if _OTHER_MOVE.match(text):
             letter = text.split()[0].upper().decode("latin-1")
             what = _OTHERS.get(letter, "a move with words of its own")
@@ -178,16 +185,7 @@ class _Reader:
         )  # fmt: skip
 
     def _move(self, line: Line, move: _Move) -> None:
-        if any(loop and before == self.moves.count for loop, before in self.blocks):
-            self.moves.known = False
-        for sign, why in (
-            (_INCREMENT, "is a distance (INC)"),
-            (_COORD, "counts from a positioner (COORD)"),
-            (_SENSED, "goes where a sensor says"),
-        ):
-            if sign.search(move.tail):
-                raise not_read(f"this move {why}, which is not read", line.line)
-        self._tail(move, line)
+        self._begin(line, move)
         position = None if move.register else self._position(move.number, line)
         shift = self._shift(move, position)
         begin = self.data.index(b"[", line.first) + 1
@@ -200,19 +198,59 @@ class _Reader:
             what = "left as written: the text does not state where this move goes"
             self.moves.remark("left", line.line, what)
             return
-        index = self._target(move.number, position)
-        target = self.moves.targets[index]
         along_tool = shift != ZERO and _ALONG_TOOL.search(move.tail) is not None
-        use = Use(
-            index, (line.span[0], line.span[1]), place, place, shift, target.turn,
-            zone=(line.first, line.span[1]), along_tool=along_tool,
-        )  # fmt: skip
+        use = self._use(line, move.number, position, place, shift, along_tool=along_tool)
         self.moves.move(
             line.line, use, self._frame(position, line), self._tool(position, line), move.feed,
             straight=move.straight, whole=move.timed or _HELD.search(move.tail) is not None,
         )  # fmt: skip
         if _SKIP.search(move.tail):
             self.moves.known = False
+
+    def _arc(self, line: Line, number: int, move: _Move) -> None:
+        """An arc through a position to another one."""
+        self._begin(line, move)
+        if move.register or _OFFSET.search(move.tail) or _SKIP.search(move.tail):
+            raise not_read("an arc to a register, with an offset or with Skip is not read", line.line)
+        begin, ends = line.first, []
+        for own in (number, move.number):
+            begin = self.data.index(b"[", begin) + 1
+            position = self._position(own, line)
+            if "X" not in position.axes:
+                raise not_read(f"P[{own}] of this arc is in joints; post it as a position", line.line)
+            span = begin, self.data.index(b"]", begin)
+            use = self._use(line, own, position, span, ZERO)
+            ends.append((use, self._frame(position, line), self._tool(position, line)))
+        (via, *place), (end, frame, tool) = ends
+        if place != [frame, tool]:
+            raise not_read("via point and end of this arc have different frames or tools", line.line)
+        self.moves.arc(
+            line.line, via, end, frame, tool, move.feed, turned_by_via=True,
+            whole=move.timed or _HELD.search(move.tail) is not None,
+        )  # fmt: skip
+
+    def _use(
+        self, line: Line, number: int, position: Position, place: Span, shift: Vector, *,
+        along_tool: bool = False,
+    ) -> Use:  # fmt: skip
+        index = self._target(number, position)
+        return Use(
+            index, (line.span[0], line.span[1]), place, place, shift, self.moves.targets[index].turn,
+            zone=(line.first, line.span[1]), along_tool=along_tool,
+        )  # fmt: skip
+
+    def _begin(self, line: Line, move: _Move) -> None:
+        """What counts for all moves. Raises ProgramError for words of them that are not read."""
+        if any(loop and before == self.moves.count for loop, before in self.blocks):
+            self.moves.known = False
+        for sign, why in (
+            (_INCREMENT, "is a distance (INC)"),
+            (_COORD, "counts from a positioner (COORD)"),
+            (_SENSED, "goes where a sensor says"),
+        ):
+            if sign.search(move.tail):
+                raise not_read(f"this move {why}, which is not read", line.line)
+        self._tail(move, line)
 
     def _tail(self, move: _Move, line: Line) -> None:
         """Raises ProgramError with the first word behind a move whose effect on its path is not known."""

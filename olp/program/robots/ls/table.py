@@ -13,6 +13,7 @@ _NO = Support.REFUSED
 
 TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"L P[n]": (_C, "a straight move"),
+    b"C P[n] P[m]": (_C, "an arc through P[n] to P[m]; several arcs where one would bend"),
     b"J P[n]": (_C, "corrected at its end; the path of the joints is not judged"),
     b"P[n]{...}": (_C, "changed where moves use it, and cloned where they differ"),
     b"L PR[n], J PR[n]": (_R, "left as written: the text does not state the register"),
@@ -34,7 +35,7 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"another word behind a move": (_NO, "its effect on the path is not known; post the move without it"),
     b"any other statement": (_X, "a macro may move: the next move is corrected at its end"),
     b"!": (_X, ""),
-    b"C P[n], A P[n], S P[n]": (_NO, "is an arc or a spline, which is not read yet; post straight moves"),
+    b"A P[n], S P[n]": (_NO, "is an arc of several moves or a spline; post arcs (C) or straight moves"),
     b"INC": (_NO, "is a distance; program the position"),
     b"COORD": (_NO, "counts from a positioner, whose place is not stated; post the program without it"),
     b"P[n]=": (_NO, "gives another value to a position"),

@@ -38,17 +38,20 @@ class Rapid(RobotDialect):
         return place, place, stamp + program.eol(1)
 
     def part(self, program: Program, move: int, use: Use, part: Part) -> list[Replacement]:
-        data, targets = program.data, program.targets
-        assert targets is not None
-        target, (begin, end) = targets.targets[use.target], use.statement
-        value = self._value(program, target, part, use)
-        edits = [(use.place[0] - begin, use.place[1] - begin, value)]
-        edits.append((use.zone[0] - begin, use.zone[1] - begin, _STOP if part.stop else _PASSED))
-        line = int(program.toolpath.line[move])
-        lead = data[int(program.line_start[line - 1]) : begin]
-        blanks = lead if not lead.strip() else b""
-        text = spliced(data[begin:end], edits) + b";" + program.eol(line) + blanks
-        return [(begin, begin, text)]
+        edits = [(*use.place, self._value(program, part, use))]
+        edits.append((*use.zone, _STOP if part.stop else _PASSED))
+        return [self.parted(program, move, use, edits, b";")]
+
+    def arc(
+        self, program: Program, move: int, via: tuple[Use, Part], end: tuple[Use, Part] | None
+    ) -> list[Replacement]:
+        use, part = via
+        first = (*use.place, self._value(program, part, use))
+        if end is None:
+            return [first]
+        use, part = end
+        edits = [first, (*use.place, self._value(program, part, use)), (*use.zone, _PASSED)]
+        return [self.parted(program, move, use, edits, b";")]
 
     def clone(self, program: Program, target: Target, name: str, text: bytes) -> Replacement:
         data = program.data
@@ -75,8 +78,10 @@ class Rapid(RobotDialect):
         return postures.quarters(config, nominal, corrected)
 
     @staticmethod
-    def _value(program: Program, target: Target, part: Part, use: Use) -> bytes:
-        """A target with other numbers, and the orientation at the end of a part."""
+    def _value(program: Program, part: Part, use: Use) -> bytes:
+        """The target of a move with other numbers, and the orientation at the end of a part."""
+        assert program.targets is not None
+        target = program.targets.targets[use.target]
         data, start = program.data, target.value[0]
         edits = part.renumbered(target)
         if not part.turned and not (use.before == use.turn == target.turn):

@@ -21,6 +21,7 @@ _HARMLESS_TAIL = pattern(
 )
 _ASSIGNED = pattern(rb"(?<![\\\w.}])([A-Za-z]\w*)\s*(?:\{[^}]*\})?(?:\.\w+)*\s*:=")
 _AREA = pattern(rb"(?i)\s*SingArea\b[^\\]*\\\s*(Wrist|LockAxis4)")
+_ARC_MODE = pattern(rb"(?i)\s*CirPathMode\b[^\\]*\\\s*(CirPointOri|Wrist\w*)")
 #: What a short IF must not hold.
 _MOVES = pattern(rb"(?i)\b(?:Move|Trigg|Search|Arc|PDisp|EOffs)\w*\b")
 
@@ -44,6 +45,13 @@ def is_short_if(statement: Statement) -> bool:
 def area_of(statement: Statement) -> str:
     """By which switch of `SingArea` the tool does not turn evenly on straight moves; empty for others."""
     match = _AREA.match(statement.text)
+    return "" if match is None else match[1].decode("latin-1")
+
+
+def arc_mode_of(statement: Statement) -> str:
+    """By which switch of `CirPathMode` the tool turns otherwise on arcs than from their start to their end;
+    empty for others."""
+    match = _ARC_MODE.match(statement.text)
     return "" if match is None else match[1].decode("latin-1")
 
 

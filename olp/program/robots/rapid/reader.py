@@ -62,6 +62,8 @@ class _Reader:
         self.moving, self.routines = flow.moving_routines(rest)
         areas = ((flow.area_of(statement), statement.line) for statement in rest)
         self.any_area = next((area for area in areas if area[0]), self.area)
+        modes = ((flow.arc_mode_of(statement), statement.line) for statement in rest)
+        self.arc_mode = next((mode for mode in modes if mode[0]), ("", 0))
         take_all(rest, self._statement, self.refusals, options)
         return self.moves.program(dialect, words=words)
 
@@ -100,6 +102,8 @@ class _Reader:
         word = flow.word_of(statement)
         if word in (b"MOVEL", b"MOVEJ"):
             self._move(statement, straight=word == b"MOVEL")
+        elif word == b"MOVEC":
+            self._arc(statement)
         elif word == b"MOVEABSJ":
             self._loop_begins()
             self.moves.joint_move(statement.line, lambda: self._joints(statement))
@@ -182,14 +186,44 @@ class _Reader:
     # -- moves ---------------------------------------------------------------------------------------
 
     def _move(self, statement: Statement, *, straight: bool) -> None:
-        line = statement.line
         words = words_of(statement, statement.begin + len(b"MoveL"), self.data)
+        self._refuse_words(statement, words, led=straight)
+        line, use = statement.line, self._use(statement, words.target, words.zone, straight=straight)
+        tool, frame = self._tool(words.tool, line), self._frame(words.frame, line)
+        feed = self.declared.speed(words.others.get(b"V", words.speed), self.routine, line)
+        self._loop_begins()
+        whole = b"CONC" in words.others
+        self.moves.move(line, use, frame, tool, feed, straight=straight, whole=whole)
+
+    def _arc(self, statement: Statement) -> None:
+        words = words_of(statement, statement.begin + len(b"MoveC"), self.data, arc=True)
+        self._refuse_words(statement, words, led=True)
+        line = statement.line
+        if self.arc_mode[0]:
+            raise ProgramError(
+                f"how the tool turns on this arc is set by CirPathMode\\{self.arc_mode[0]} in line "
+                f"{self.arc_mode[1]}, which is not read; program CirPathMode\\ObjectFrame, or straight moves",
+                line=line,
+                code=_NOT_READ,
+            )
+        via, end = (
+            self._use(statement, span, words.zone, straight=True) for span in (words.via, words.target)
+        )
+        tool, frame = self._tool(words.tool, line), self._frame(words.frame, line)
+        feed = self.declared.speed(words.others.get(b"V", words.speed), self.routine, line)
+        self._loop_begins()
+        self.moves.arc(line, via, end, frame, tool, feed, whole=b"CONC" in words.others)
+
+    def _refuse_words(self, statement: Statement, words: Words, *, led: bool) -> None:
+        """Raises ProgramError for words of a move that are not read, and where the tool of one that is `led`
+        along a line or an arc may not turn evenly."""
+        line = statement.line
         unread = [name for name in words.others if name not in _KNOWN]
         if unread:
             raise ProgramError(
                 f"a move with \\{unread[0].decode('latin-1')} is not read", line=line, code=_NOT_READ
             )
-        if straight and self.moves.arm and self.area[0]:
+        if led and self.moves.arm and self.area[0]:
             what = f"SingArea\\{self.area[0]} in line {self.area[1]}"
             raise ProgramError(
                 f"the tool may not turn evenly on this move ({what}), which is not read on arms; program "
@@ -197,12 +231,6 @@ class _Reader:
                 line=line,
                 code=_NOT_READ,
             )
-        use = self._use(statement, words, straight=straight)
-        tool, frame = self._tool(words.tool, line), self._frame(words.frame, line)
-        feed = self.declared.speed(words.others.get(b"V", words.speed), self.routine, line)
-        self._loop_begins()
-        whole = b"CONC" in words.others
-        self.moves.move(line, use, frame, tool, feed, straight=straight, whole=whole)
 
     def _tool(self, name: str, line: int) -> Tool:
         key = (self.routine, name)
@@ -218,9 +246,10 @@ class _Reader:
             self.frames[key] = self.moves.frames.located(name, pose, line)
         return self.frames[key]
 
-    def _use(self, statement: Statement, words: Words, *, straight: bool) -> Use:
-        """How a move uses its target. Raises ProgramError where the text does not state it with numbers."""
-        span, line = words.target, statement.line
+    def _use(self, statement: Statement, span: Span, zone: Span, *, straight: bool) -> Use:
+        """How a move uses the target of some bytes. Raises ProgramError where the text does not state it with
+        numbers."""
+        line = statement.line
         shift, turn = moved(self.data, span), None
         inner = span if shift is None else shift.inner
         index, named = self._target(inner, line)
@@ -236,7 +265,7 @@ class _Reader:
                     turn = multiplied(target.turn, inverted(of_zyx((-c, -b, -a))))
         return Use(
             index, (statement.begin, statement.end), span, named, place,
-            target.turn if turn is None else turn, zone=words.zone,
+            target.turn if turn is None else turn, zone=zone,
             offsets=() if shift is None else shift.numbers,
             offset_turn=target.turn if shift is not None and shift.tool else NO_TURN,
             along_tool=shift is not None and shift.tool, free=self.free[not straight],

@@ -22,6 +22,7 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"MOVEL": (_C, "a straight move to a target with numbers, Offs or RelTool of one, or an array element"),
     b"MOVEJ": (_C, "corrected at its end; the path of the joints is not judged"),
     b"MOVEABSJ": (_C, "corrected on arms; else kept, and the position behind it is unknown"),
+    b"MOVEC": (_C, "an arc through a target to another one; several arcs where one would bend"),
     b"ROBTARGET": (_C, "a declared target, corrected where moves use it, and cloned where they differ"),
     b"TOOLDATA": (_R, "the tool of moves that name it"),
     b"WOBJDATA": (_R, "the frame of moves that name it"),
@@ -29,14 +30,15 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"JOINTTARGET": (_X, "kept as written"),
     b"CONST": (_X, "other constants and variables"),
     b"MODULE": (_X, ""),
+    b"CIRPATHMODE": (_R, "with CirPointOri or Wrist45 ... an arc is refused"),
     b"SINGAREA": (_R, "with Wrist or LockAxis4 a straight move of an arm is refused"),
     b"PROC": (_R, "where its first move comes from is not known: it is corrected at its end"),
     b"IF": (_R, "behind moves that may not run, the next one is corrected at its end"),
     b"CALL": (_R, "behind a routine that may move, the next move is corrected at its end"),
     b"ASSIGNMENT": (_X, "unless it changes a target, tool or frame that a move uses: then refused"),
     **dict.fromkeys(
-        (b"MOVEC", b"TRIGGC", b"MOVECDO", b"MOVECAO", b"MOVECGO", b"MOVECSYNC"),
-        (_NO, "is an arc, which is not read yet; post straight moves"),
+        (b"TRIGGC", b"MOVECDO", b"MOVECAO", b"MOVECGO", b"MOVECSYNC"),
+        (_NO, "is an arc with an action; post MoveC and the action by themselves"),
     ),
     **dict.fromkeys(
         (b"MOVELDO", b"MOVEJDO", b"MOVELAO", b"MOVEJAO", b"MOVELGO", b"MOVEJGO", b"MOVELSYNC", b"MOVEJSYNC",
@@ -66,7 +68,6 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     **dict.fromkeys(
         (b"CONFL", b"CONFJ", b"VELSET", b"ACCSET", b"WORLDACCLIM", b"PATHACCLIM", b"PATHRESOL",
          b"MOTIONSUP", b"GRIPLOAD", b"MECHUNITLOAD", b"ACTUNIT", b"DEACTUNIT", b"SPEEDREFRESH",
-         b"CIRPATHMODE",
          b"WAITTIME", b"WAITDI", b"WAITDO", b"WAITUNTIL", b"WAITGI", b"WAITGO", b"WAITAI", b"WAITAO",
          b"WAITROB", b"WAITSYNCTASK", b"SETDO", b"SETGO", b"SETAO", b"SET", b"RESET", b"PULSEDO", b"INVERTDO",
          b"IODISABLE", b"IOENABLE", b"TPWRITE", b"TPERASE", b"TPREADFK", b"TPREADNUM", b"TPSHOW", b"UIMSGBOX",

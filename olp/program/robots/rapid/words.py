@@ -9,7 +9,7 @@ from olp.core.patterns import pattern
 from olp.core.values import dataclass
 from olp.program.robots.rapid.text import Statement
 from olp.program.robots.rapid.values import NUMBER
-from olp.program.robots.targets import Span
+from olp.program.robots.targets import NOWHERE, Span
 
 _NESTED = rb"\[(?:[^\[\]]|\[(?:[^\[\]]|\[[^\[\]]*\])*\])*\]"
 #: An argument up to its comma, brackets whole.
@@ -31,9 +31,10 @@ _TURN = pattern(rb"(?i)R([xyz])\s*:=\s*([-+.\deE]+)")
 
 @dataclass(frozen=True, slots=True)
 class Words:
-    """Bytes of the `target` of a move, `speed`, `zone` with what is said of it, and the names `tool` and
-    `frame`. `others` are further words by their names in capitals."""
+    """Bytes of the `target` of a move and of the `via` point of an arc, `speed`, `zone` with what is said of
+    it, and the names `tool` and `frame`. `others` are further words by their names in capitals."""
 
+    via: Span
     target: Span
     speed: bytes
     zone: Span
@@ -42,12 +43,13 @@ class Words:
     others: dict[bytes, bytes]
 
 
-def words_of(statement: Statement, begin: int, data: bytes) -> Words:
-    """The words of a move whose name ends at byte `begin`. Raises ProgramError where it has others."""
-    plain = _PLAIN.fullmatch(data, begin, statement.end)
+def words_of(statement: Statement, begin: int, data: bytes, *, arc: bool = False) -> Words:
+    """The words of a move whose name ends at byte `begin`, those of an `arc` with a via point. Raises
+    ProgramError where it has others."""
+    plain = None if arc else _PLAIN.fullmatch(data, begin, statement.end)
     if plain is not None:
         tool, frame = plain[4].decode("latin-1"), (plain[5] or b"wobj0").decode("latin-1")
-        return Words(plain.span(1), plain[2], plain.span(3), tool, frame, {})
+        return Words(NOWHERE, plain.span(1), plain[2], plain.span(3), tool, frame, {})
     pieces: list[tuple[Span, bytes]] = []
     others: dict[bytes, bytes] = {}
     for match in _ARGUMENT.finditer(data, begin, statement.end):
@@ -62,16 +64,17 @@ def words_of(statement: Statement, begin: int, data: bytes) -> Words:
             pieces.append(((start, start + len(main.strip())), main.strip()))
             stop = match.end() if mark < len(text) else pieces[-1][0][1]
             pieces[-1] = ((start, stop), main.strip())
-    if len(pieces) != 4:
+    if len(pieces) != 4 + arc:
+        expected = "via point, target" if arc else "target"
         raise ProgramError(
-            f"the move has {len(pieces)} arguments; expected target, speed, zone and tool",
+            f"the move has {len(pieces)} arguments; expected {expected}, speed, zone and tool",
             line=statement.line,
             code="OLP516",
         )
-    target, speed, zone, tool = pieces
+    *through, target, speed, zone, tool = pieces
     first = (target[0][0], target[0][0] + len(target[1]))
     return Words(
-        first, speed[1], zone[0], tool[1].decode("latin-1"),
+        through[0][0] if through else NOWHERE, first, speed[1], zone[0], tool[1].decode("latin-1"),
         others.pop(b"WOBJ", b"wobj0").decode("latin-1"), others,
     )  # fmt: skip
 

@@ -31,19 +31,29 @@ class UrScript(RobotDialect):
         return place, place, (b"" if match is None else b"  ") + stamp + program.eol(1)
 
     def part(self, program: Program, move: int, use: Use, part: Part) -> list[Replacement]:
-        data, targets = program.data, program.targets
-        assert targets is not None
-        target, (begin, end) = targets.targets[use.target], use.statement
-        edits = [(use.place[0] - begin, use.place[1] - begin, self._value(program, target, part, use))]
-        radius = b"0" if part.stop else _PASSED
+        edits = [(*use.place, self._value(program, part, use))]
+        return [self.parted(program, move, use, [*edits, self._blend(program, use, stop=part.stop)])]
+
+    def arc(
+        self, program: Program, move: int, via: tuple[Use, Part], end: tuple[Use, Part] | None
+    ) -> list[Replacement]:
+        use, part = via
+        first = (*use.place, self._value(program, part, use))
+        if end is None:
+            return [first]
+        use, part = end
+        edits = [first, (*use.place, self._value(program, part, use))]
+        return [self.parted(program, move, use, [*edits, self._blend(program, use, stop=False)])]
+
+    @staticmethod
+    def _blend(program: Program, use: Use, *, stop: bool) -> Replacement:
+        """The radius of the blend at the end of a part."""
+        radius = b"0" if stop else _PASSED
         if use.zone != NOWHERE:
-            edits.append((use.zone[0] - begin, use.zone[1] - begin, radius))
-        else:
-            close = data[begin:end].rindex(b")")
-            edits.append((close, close, b", r=" + radius))
-        line = int(program.toolpath.line[move])
-        blanks = data[int(program.line_start[line - 1]) : begin]
-        return [(begin, begin, spliced(data[begin:end], edits) + program.eol(line) + blanks)]
+            return (*use.zone, radius)
+        begin, end = use.statement
+        close = begin + program.data[begin:end].rindex(b")")
+        return close, close, b", r=" + radius
 
     def clone(self, program: Program, target: Target, name: str, text: bytes) -> Replacement:
         data, (begin, _) = program.data, target.declaration
@@ -56,11 +66,13 @@ class UrScript(RobotDialect):
         return vector_of(turn, (x, y, z))
 
     @staticmethod
-    def _value(program: Program, target: Target, part: Part, use: Use) -> bytes:
-        """A pose with other numbers, and the orientation at the end of a part."""
+    def _value(program: Program, part: Part, use: Use) -> bytes:
+        """The pose of a move with other numbers, and the orientation at the end of a part."""
+        assert program.targets is not None
+        target = program.targets.targets[use.target]
         data, start = program.data, target.value[0]
         edits = part.renumbered(target)
-        if not part.turned and use.before != use.turn:
+        if not part.turned and not (use.before == use.turn == target.turn):
             match = POSE.match(data, *target.value)
             assert match is not None
             vector = vector_of(between(use.before, use.turn, part.share))

@@ -37,7 +37,9 @@ _MOVING = pattern(rb"\b(?:opti)?(?:move|servo|speed)[jlpc]\b")
 _CALL = pattern(rb"\s*([A-Za-z_]\w*)\s*\((.*)\)\s*")
 _NAME = pattern(rb"\s*([A-Za-z_]\w*)\s*")
 _ARGUMENT = pattern(rb"(?:[^,\[\]()]|\[[^\[\]]*\]|\((?:[^()]|\([^()]*\))*\))+")
-_NAMED = pattern(rb"\s*([atvr])\s*=(?!=)\s*(.*?)\s*")
+_NAMED = pattern(rb"\s*([atvr]|mode)\s*=(?!=)\s*(.*?)\s*")
+#: Words of moves behind their targets, in their order, where that is not the usual one.
+_ORDERS = {b"movep": ("a", "v", "r"), b"movec": ("a", "v", "r", "mode")}
 _NUMBER = pattern(rb"\s*([-+]?(?:\d+\.?\d*|\.\d+))\s*")
 _TRANSFORMED = pattern(rb"\s*pose_trans\((.*)\)\s*")
 _WORDS = pattern(rb"[A-Za-z_]\w*")
@@ -147,6 +149,8 @@ class _Reader:
             raise ProgramError(f"{word.decode()} {row[1]}", line=line.line, code="OLP512")
         if call is not None and word in (b"movel", b"movep", b"movej"):
             self._move(line, call)
+        elif call is not None and word == b"movec":
+            self._arc(line, call)
         elif call is not None and word == b"set_tcp":
             self._set_tcp(line, call)
         elif match is not None:
@@ -236,6 +240,36 @@ class _Reader:
             whole=timed,
         )  # fmt: skip
 
+    def _arc(self, line: _Line, call: re.Match[bytes]) -> None:
+        """An arc through a pose to another one."""
+        start = line.begin + len(line.text) - len(line.text.lstrip())
+        place = start + call.start(2)
+        arguments = [(place + m.start(), m[0]) for m in _ARGUMENT.finditer(call[2])]
+        if len(arguments) < 2:
+            raise ProgramError("the arc lacks its via point or its end", line=line.line, code="OLP516")
+        if any(_JOINTS.fullmatch(text) or self._is_joints(text) for _, text in arguments[:2]):
+            what = "joints in a movec are not read; write the pose"
+            raise ProgramError(what, line=line.line, code="OLP533")
+        rest = self._rest(call[1], arguments[2:])
+        if "mode" in rest and self._number(rest["mode"]) != 0.0:
+            raise ProgramError(
+                "mode 1 of movec turns the tool along with the arc, which is not read; write mode 0",
+                line=line.line,
+                code="OLP512",
+            )
+        statement, ends = (start, line.begin + len(line.text)), []
+        for begin, text in arguments[:2]:
+            index, span, named, frame = self._target(line, begin, text)
+            turn = self.moves.targets[index].turn
+            ends.append((Use(index, statement, span, named, turn=turn, zone=rest.get("r", NOWHERE)), frame))
+        (via, frame), (end, other) = ends
+        if frame.name != other.name:
+            what = "via point and end of this arc are in different frames"
+            raise ProgramError(what, line=line.line, code="OLP512")
+        speed = self._number(rest["v"]) if "v" in rest else NAN
+        self._begins_in_loop()
+        self.moves.arc(line.line, via, end, frame, self._tool(line), speed * _MM_PER_M)
+
     def _begins_in_loop(self) -> None:
         """The first move in a loop begins where the last one ends, or before the loop."""
         if any(loop in (b"while", b"for") and before == self.moves.count for loop, before in self.blocks):
@@ -263,7 +297,7 @@ class _Reader:
 
     def _rest(self, name: bytes, arguments: list[tuple[int, bytes]]) -> dict[str, Span]:
         """The bytes of acceleration, speed, time and radius of a move, by their names."""
-        order = ("a", "v", "r") if name == b"movep" else ("a", "v", "t", "r")
+        order = _ORDERS.get(name, ("a", "v", "t", "r"))
         found: dict[str, Span] = {}
         for (begin, text), usual in zip(arguments, order, strict=False):
             match = _NAMED.fullmatch(text)

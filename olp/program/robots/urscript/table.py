@@ -17,6 +17,7 @@ _SENSED = "changes the path while the robot moves; take it into a program of its
 TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"movel": (_C, "a straight move to p[...], a name of one, or pose_trans of two"),
     b"movep": (_C, "as movel"),
+    b"movec": (_C, "an arc through a pose to another one; several arcs where one would bend"),
     b"movej": (_C, "corrected at its end. Where the machine is no arm, joints are kept as written"),
     b"p[...]": (_C, "changed where moves use it, and cloned where they differ"),
     b"pose_trans": (_R, "of a frame with numbers and a target: the target is corrected"),
@@ -24,7 +25,6 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"def, thread": (_R, "where its first move comes from is not known: it is corrected at its end"),
     b"if, while, for": (_R, "behind moves that may not run, the next one is corrected at its end"),
     b"a call": (_R, "may move: the next move is corrected at its end"),
-    b"movec": (_NO, "is an arc, which is not read yet; post straight moves"),
     **dict.fromkeys((b"optimovel", b"optimovej"), (_NO, "is not read; post movel or movej")),
     **dict.fromkeys((b"speedl", b"speedj", b"servoj", b"servoc", b"servol"), (_NO, _SPEEDS)),
     **dict.fromkeys(
