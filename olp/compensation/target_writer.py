@@ -60,7 +60,7 @@ class TargetWriter(PointWriter):
         # the writer puts the stamp where the language has it
         self._stamp, self.stamp = self.stamp, b""
         self._names: set[str] = set()
-        self._clones = 0
+        self._clones = self._made = 0
 
     def _rewritten(self, rows: Rows, begin: int, end: int) -> bytes | None:
         last = np.append(rows.move[1:] != rows.move[:-1], True)[: len(rows)]
@@ -74,6 +74,8 @@ class TargetWriter(PointWriter):
             blocks += 1
         if blocks:
             edits += self.dialect.counted(self.program, blocks)
+        if self._made:
+            edits = self.dialect.gathered(self.program, edits, self._made)
         return spliced(whole(self.program.data), edits) if edits else None
 
     def _wanted(self, rows: Rows) -> _Wanted:
@@ -208,6 +210,7 @@ class TargetWriter(PointWriter):
             self._names = {word.decode("latin-1").upper() for word in _NAMES.findall(self.program.data)}
         name = self.dialect.named(self.program, target, self._names)
         self._names.add(name.upper())
+        self._made += 1
         return name
 
     # -- parts ---------------------------------------------------------------------------------------

@@ -201,6 +201,7 @@ class Machine:
     arm: bool = False
     third_level: bool | None = None
     track: Vector | None = None
+    pulses_per_deg: tuple[float, ...] | None = None
 
     @property
     def least_increment_mm(self) -> Vector:

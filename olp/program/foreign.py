@@ -127,8 +127,9 @@ FOREIGN = (
     Foreign(
         "Yaskawa INFORM (JBI)",
         _line(rb"/JOB\b|//(?:NAME|POS|INST)\b|MOV[JLC][ \t]+C\d+"),
-        _ROBOT,
+        _NAME_IT.replace("sinumerik", "yaskawa-inform"),
         language=True,
+        how="and was read as another language",
     ),
     Foreign(
         "Sinumerik (Siemens)",

@@ -54,6 +54,7 @@ _KNOWN = {
     "urscript": Known("olp.program.robots.urscript.dialect", signs.URSCRIPT),
     "abb-rapid": Known("olp.program.robots.rapid.dialect", signs.RAPID),
     "kuka-krl": Known("olp.program.robots.krl.dialect", signs.KRL),
+    "yaskawa-inform": Known("olp.program.robots.inform.dialect", signs.INFORM),
 }
 #: Files of `olp/program/described/shipped` that describe a dialect, without their ending.
 DESCRIBED = ("kawasaki-as", "val2", "karel")

@@ -98,20 +98,31 @@ def _left(plan: JointPlan, count: int) -> Array:
 def _rounding(path: JointPath, plan: JointPlan, digit_mm: float, digit_deg: float) -> tuple[float, float]:
     """mm and rad by which the tip and the tool are off at most because words have a last digit. In G-code the
     linear words take up what the rounding of rotary ones does to the tip, and a tip that is rounded along the
-    path is beside another direction; in lists nothing does."""
+    path is beside another direction. In lists nothing does, nor where robots count steps of motors."""
     if path.listed is None:
         rounded_mm = _HALF_DIGITS * digit_mm
         beside = rounded_mm / (2.0 * ARM_MM)
-        return rounded_mm, _HALF_TURNS * float(np.radians(digit_deg)) + beside
+        rounded_rad = _HALF_TURNS * float(np.radians(digit_deg)) + beside
+        if not isinstance(path, ArmPath) or not path.half_deg.any():
+            return rounded_mm, rounded_rad
+        steps_mm, steps_rad = _steps(path, plan, path.half_deg[plan.move])
+        return max(rounded_mm, steps_mm), max(rounded_rad, steps_rad)
+    return _steps(path, plan, np.tile(0.5 * 10.0 ** -path.places.astype(float), (len(plan.move), 1)))
+
+
+def _steps(path: JointPath, plan: JointPlan, half: Array) -> tuple[float, float]:
+    """mm and rad by which the tip and the tool are off at most where axes are off by `half` (r, axes) mm or
+    deg at the rows of a plan."""
     rotary = np.array([unit == "deg" for unit in path.motion.structure.units])
-    half = 0.5 * 10.0 ** -path.places.astype(float)
-    half[rotary] = np.radians(half[rotary])
+    half = np.where(rotary, np.radians(half), half)
     rows, most = np.flatnonzero(np.isfinite(plan.axes).all(axis=1)), np.zeros(2)
     for a in range(0, len(rows), BATCH):
         some = rows[a : a + BATCH]
         slopes = path.motion.slopes(plan.axes[some], path.tool[plan.move[some]])
-        sizes = np.stack([np.linalg.norm(slopes[:, part], axis=1) @ half for part in _PLACE_AND_TURN])
-        most = np.maximum(most, sizes.max(axis=1))
+        sizes = [
+            (np.linalg.norm(slopes[:, part], axis=1) * half[some]).sum(axis=1) for part in _PLACE_AND_TURN
+        ]
+        most = np.maximum(most, np.max(sizes, axis=1))
     return float(most[0]), float(most[1])
 
 

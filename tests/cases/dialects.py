@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from judge import inform
 
 from olp.program import registry
 from olp.program.rs274.profiles.base import Act, Profile
@@ -23,7 +24,8 @@ Lines = list[str]
 @dataclass(frozen=True)
 class Case:
     """One dialect. `coordinates` finds the numbers of motion statements, its groups the three of them;
-    `support` are the kinds of statements that it has, and its lengths count in `unit_mm`."""
+    `support` are the kinds of statements that it has, and its lengths count in `unit_mm`. `in_order` finds
+    the points in the order of the moves where the text has another one."""
 
     name: str
     controller: str
@@ -39,6 +41,7 @@ class Case:
     keys: str = ""
     support: frozenset[str] = frozenset({"corrected", "read", "carried", "refused"})
     unit_mm: int = 1
+    in_order: Callable[[bytes], np.ndarray] | None = None
 
     def program(self, points: np.ndarray, digits: int) -> bytes:
         rows = [self.point(p, digits) for p in points.tolist()]
@@ -80,6 +83,12 @@ def _ur(values: Sequence[float], digits: int) -> str:
 def _rapid(values: Sequence[float], digits: int) -> str:
     rest = "[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]"
     return f"MoveL [[{_list(values, digits)}],{rest}],v100,fine,rod\\WObj:=G54;"
+
+
+def _inform(values: Sequence[float], digits: int) -> str:
+    """A position, and the move there, in parts of their own."""
+    name = f"C{next(_positions):05d}"
+    return f"//POS\n{name}={_list(values, digits)},0.00,0.00,0.00\n//INST\nMOVL {name} V=100.0"
 
 
 def _krl(values: Sequence[float], digits: int) -> str:
@@ -294,9 +303,28 @@ CASES = {
             b"SLIN XP1 WITH $VEL.CP=1, $BASE=SBASE(FP1.BASE_NO) C_SPL", b"CIRC a,b", b"x[1].X='HFF'",
         ),
     ),
+    "yaskawa-inform": Case(
+        "yaskawa-inform", "yaskawa-inform", "MOVJLCP/=,#*'().+- 0123456789\r\n\tNOIS\x1a",
+        ["/JOB", "//NAME T", "//POS", "///NPOS 0,0,0,0,0,0", "///USER 1", "///TOOL 1", "///POSTYPE USER",
+         "///RECTAN", "///RCONF 0,0,0,0,0,0,0,0", "//INST", "///GROUP1 RB1", "NOP"], ["END"],
+        _inform, None, lambda text: f"'{text}",
+        re.compile(rb"(?m)^C\d+=(" + NUMBER + rb"),(" + NUMBER + rb"),(" + NUMBER + rb"),"),
+        ("inform_jbi/*",),
+        (
+            b"/JOB\r\n//NAME A\r\n//POS\r\n///NPOS 1,0,0,0,0,0\r\n///TOOL 0\r\n///POSTYPE PULSE\r\n"
+            b"///PULSE\r\nC00000=1,2,3,4,5,6\r\n//INST\r\nNOP\r\nMOVL C00000 V=1.0\r\nEND\r\n\x1a",
+            b"//POS\n///TOOL 1\n///POSTYPE BASE\n///RECTAN\nC1=1,2,3,0,0,0\nBC1=5\n//INST\n"
+            b"MOVJ C1 BC1 VJ=5 PL=0 NWAIT UNTIL IN#(1)=ON\nMOVL C1 BC1 V=5\0\0",
+            b"MOVC C1 V=5", b"MOVL C1 V=5 FOO", b"MOVL P[1] V=5", b"MOVL LP001 V=5\nSFTON P1\nMOVL P1\nSFTOF",
+            b"SET P[I1] P2\nMOVL P3 V=1", b"JUMP *A IF B0=1\n*A\nFOR I0=1 TO 3\nNEXT I0\nMSG \"a // b\"",
+            b"C1=1,x,3", b"/JOB\nNOP\nMOVJ C00000 VJ=50\nEND\n",
+            b"//POS\n///POSTYPE MTOOL\nC1=1,2,3,4,5,6\n//INST\nMOVJ C1",
+        ),
+        in_order=lambda text: np.array([move.numbers[:3] for move in inform.moves(text)]),
+    ),
 }  # fmt: skip
 #: Named frames of the test's machines.
 FRAMES = {
     name: {"X_mm": 250.0, "Y_mm": 200.0, "Z_mm": -300.0, "set_by": "true"}
-    for name in ("G54", "MCS", "A", "CSYS2", "CSYS3", "UFRAME1")
+    for name in ("G54", "MCS", "A", "CSYS2", "CSYS3", "UFRAME1", "UF1")
 }

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from judge import inform
 from judge.arm import about
 
 X, Y, Z = np.eye(3)
@@ -129,4 +130,26 @@ def ur(text: bytes, frames: Frames) -> list[Move]:
     return found
 
 
-READERS: dict[str, Callable[[bytes, Frames], list[Move]]] = {"krl": krl, "tp": tp, "rapid": rapid, "ur": ur}
+#: Pulses of each joint in a degree, in tests of jobs of INFORM.
+PULSES_PER_DEG = 1e5
+
+
+def jbi(text: bytes, frames: Frames) -> list[Move]:
+    """Moves of INFORM to taught positions."""
+    found = []
+    for move in inform.moves(text):
+        if move.in_pulses:
+            found.append(Move(move.straight, move.numbers / PULSES_PER_DEG))
+            continue
+        turn, tip = frames.placed(move.turn, move.numbers[:3])
+        found.append(Move(move.straight, None, turn, tip, tuple(str(word) for word in move.posture)))
+    return found
+
+
+READERS: dict[str, Callable[[bytes, Frames], list[Move]]] = {
+    "krl": krl,
+    "tp": tp,
+    "rapid": rapid,
+    "ur": ur,
+    "inform": jbi,
+}

@@ -226,6 +226,8 @@ def commanded(
     # the ram of a measuring machine ends a stylus above the tip, and there its axes count
     up = np.array([0.0, 0.0, 120.0]) if case.name == "dmis" else np.zeros(3)
     want = model.command_for(nominal + OFFSET + up, LEVER) - OFFSET - up
+    if own is None and case.in_order is not None:
+        own = case.in_order(text)
     if own is None:
         own = np.array([[float(g) for g in m.groups()] for m in case.coordinates.finditer(text)])
         own *= case.unit_mm

@@ -11,7 +11,6 @@ from olp.program.foreign import FOREIGN, LOOKED_AT, recognised
 
 MILL = PROGRAMS / "haas-mill"
 TEXTS = {
-    "Yaskawa": (b"/JOB\n//NAME TEST\nNOP\nMOVJ C00000 VJ=50\nEND\n", 1),
     "VAL 3": (b"begin\n  movej(pA,flange,mNomSpeed)\nend\n", 1),
     "Mazatrol": (b"MAZATROL MATRIX\n", 1),
     "Okuma": (b"$PART.MIN%\nG15 H1\nCALL OO88\n", 1),
@@ -106,7 +105,7 @@ SIGNS = {
     ("UR script", NAMED.replace("sinumerik", "urscript"), "OLP501"): (
         b"def a():\n", b"movej(", b" movel (", b"MOVEP(", b"movec(", b"servoj(", b"def a_1():",
     ),
-    ("Yaskawa INFORM (JBI)", ROBOT, "OLP501"): (
+    ("Yaskawa INFORM (JBI)", NAMED.replace("sinumerik", "yaskawa-inform"), "OLP501"): (
         b"/JOB\n", b"//NAME A", b"//pos\n", b"//INST", b"MOVJ C00001", b" MOVL  C1", b"movc\tC2",
     ),
     ("Sinumerik (Siemens)", NAMED, "OLP501"): (
@@ -128,7 +127,10 @@ SIGNS = {
     ),
 }  # fmt: skip
 #: Languages that are read by another dialect.
-READ = ("Sinumerik (Siemens)", "Okuma OSP", "KUKA KRL", "ABB RAPID", "FANUC TP", "UR script")
+READ = (
+    "Sinumerik (Siemens)", "Okuma OSP", "KUKA KRL", "ABB RAPID", "FANUC TP", "UR script",
+    "Yaskawa INFORM (JBI)",
+)  # fmt: skip
 LANGUAGES = (
     "KUKA KRL", "ABB RAPID", "FANUC TP", "Stäubli VAL 3", "Mazatrol",
     "UR script",

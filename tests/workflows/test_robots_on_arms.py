@@ -3,6 +3,7 @@ judge of its own says."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 from judge.arm import Arm, between, quaternion, turned_by
 from judge.arm_files import MACHINE, ZEROS, arm_files
-from judge.robot_moves import READERS, Frames, abc
+from judge.robot_moves import PULSES_PER_DEG, READERS, Frames, abc
 from scipy.spatial.transform import Rotation
 
 import olp
@@ -22,7 +23,13 @@ TOOL = abc(*TOOL_DEG)
 FRAME_DEG, ORIGIN = (30.0, 0.0, 0.0), np.array([705.0, -94.0, 507.0])
 FRAMES = Frames(abc(*FRAME_DEG), ORIGIN)
 #: Last digits: mm, and rad.
-DIGITS = {"krl": (1e-5, 2e-8), "tp": (1e-3, 2e-8), "rapid": (1e-4, 4e-9), "ur": (1e-5, 2e-9)}
+DIGITS = {
+    "krl": (1e-5, 2e-8),
+    "tp": (1e-3, 2e-8),
+    "rapid": (1e-4, 4e-9),
+    "ur": (1e-5, 2e-9),
+    "inform": (1.5e-3, 3e-6),
+}
 #: What machine and job of TP programs state.
 TP_FILES = """
 [kinematics]
@@ -139,11 +146,50 @@ def ur(steps: list[Step]) -> bytes:
     return "\n".join([*head, *body, "end", ""]).encode()
 
 
-WRITERS: dict[str, Callable[[list[Step]], bytes]] = {"krl": krl, "tp": tp, "rapid": rapid, "ur": ur}
+def jbi(steps: list[Step]) -> bytes:
+    """Taught positions and position variables, poses and pulses, straight moves to both."""
+    head = "///USER 3\r\n///TOOL 2\r\n///POSTYPE USER\r\n///RECTAN\r\n///RCONF"
+    positions, moves, taught = [], [], 0
+    for k, (kind, joints) in enumerate(steps):
+        pulses = kind == "J" or k % 5 == 2
+        if pulses:
+            value = ",".join(f"{v:.0f}" for v in joints * PULSES_PER_DEG)
+            own = "///TOOL 2\r\n///POSTYPE PULSE\r\n///PULSE"
+        else:
+            (x, y, z), (c, b, a) = local(joints, 3)[0], angles(local(joints)[1])
+            value = f"{x:.3f},{y:.3f},{z:.3f},{a:.4f},{b:.4f},{c:.4f}"
+            turns = ",".join(str(int(abs(joints[j]) > 180)) for j in (3, 5, 0))
+            own = f"{head} {int(abs(joints[3]) > 90)},0,0,{turns},0,0"
+        name = f"P{k:05d}" if k % 4 == 3 else f"C{taught:05d}"
+        taught += name[0] == "C"
+        positions.append((name[0], f"{own}\r\n{name}={value}"))
+        speed = "V=250.0" if kind == "L" else "VJ=30.00"
+        shown = name if name[0] == "C" else f"P{k:03d}"
+        moves.append(f"MOV{'L' if kind == 'L' else 'J'} {shown} {speed}{' PL=0' if k % 3 else ''}")
+    positions.sort(key=lambda position: position[0])
+    count = f"///NPOS {taught},0,0,{len(steps) - taught},0,0"
+    lines = ["/JOB", "//NAME MADE", "//POS", count, *(position for _, position in positions), "//INST"]
+    return "\r\n".join(
+        [*lines, "///DATE 2026/01/01 00:00", "///GROUP1 RB1", "NOP", *moves, "END", ""]
+    ).encode()
+
+
+WRITERS: dict[str, Callable[[list[Step]], bytes]] = {
+    "krl": krl,
+    "tp": tp,
+    "rapid": rapid,
+    "ur": ur,
+    "inform": jbi,
+}
 
 
 def stated(machine: Path, language: str) -> Path:
     """The machine file with what the control of a language keeps to itself."""
+    if language == "inform":
+        text = machine.read_text("utf-8").replace("\n[job_defaults]\ntool = 1\n", "\n")
+        text = re.sub(r"(?m)^\[axes\..*\]$", rf"\g<0>\npulses_per_deg = {PULSES_PER_DEG:.1f}", text)
+        files = TP_FILES.replace("third_joint_level = true\n", "").replace("UFRAME3", "UF3")
+        machine.write_text(text + files, "utf-8")
     if language == "tp":
         text = machine.read_text("utf-8").replace("\n[job_defaults]\ntool = 1\n", "\n")
         machine.write_text(text + TP_FILES, "utf-8")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import field, replace
 
 import numpy as np
 
@@ -28,6 +28,10 @@ from olp.program.robots.targets import ABSENT, Target, Use
 
 #: Decimals that stand for the axis values, which no text has.
 _DECIMALS = 6
+#: A branch that is nearer to its border than this says nothing, mm or deg.
+_BORDER = 0.01
+#: deg by which a straight move turns an axis at most
+_FURTHEST_DEG = 180.0
 #: Axes of a straight move that are this near to even ones, deg, are those of the nearest posture.
 _NEAR_DEG = 15.0
 
@@ -35,9 +39,11 @@ _NEAR_DEG = 15.0
 @dataclass(frozen=True, slots=True, eq=False)
 class ArmPath(JointPath):
     """Moves of an arm by its axis values. Straight moves (`feed`) lead the tip along a line, and turn the
-    tool evenly. Programs count the third joint `from_level` where the control does."""
+    tool evenly. Programs count the third joint `from_level` where the control does. Where they count steps of
+    motors, `half_deg` (n, axes) are half of one at the ends of moves, 0 elsewhere."""
 
     from_level: bool = False
+    half_deg: Array = field(default_factory=lambda: np.zeros((0, AXES)))
 
     def between(self, start: Array, end: Array, share: Array, move: Index) -> Array:
         place = np.asarray(start + share[:, None] * (end - start))
@@ -109,13 +115,37 @@ def arm_path(
     feed, whole, none = np.zeros(count, bool), np.zeros(count, bool), np.zeros(count, bool)
     feed[rows], whole[rows] = straight, used.mask("whole")
     start = np.vstack((np.full((1, AXES), np.nan), end[:-1]))[:count]
+    _refuse_turns(arm, start[rows], end[rows], straight & stated, used.line)
     feed &= np.isfinite(start).all(axis=1)
     return ArmPath(
         program, motion, start, end, np.full((count, AXES), -1, np.int32), tool, none, none,
         np.zeros((count, 3)), np.zeros((count, AXES)), np.ones(count), np.ones(AXES), feed, known, ~known,
         none, none, np.full(AXES, _DECIMALS), replace(Drilled.none(count), whole=whole),
         Directions.none(count), Curves.none(count), from_level=from_level,
+        half_deg=_filled(rows, used.half_deg(arm), count),
     )  # fmt: skip
+
+
+def _refuse_turns(arm: Arm, start: Array, end: Array, straight: Mask, line: Index) -> None:
+    """Raises ProgramError for a straight move (n,) to joint values in which no straight move ends that begins
+    at axis values (n, 6)."""
+    before, after = arm.branches(start), arm.branches(end)
+    across = ((before * after < 0.0) & (np.minimum(abs(before), abs(after)) > _BORDER)).any(axis=1)
+    lost = straight & (across | (np.abs(end - start).max(axis=1) > _FURTHEST_DEG))
+    if lost.any():
+        raise ProgramError(
+            "this straight move goes to joint values on the other side of a singular posture, or beyond half "
+            "a turn, where it does not lead; move to them by joints",
+            line=int(line[np.argmax(lost)]),
+            code="OLP566",
+        )
+
+
+def _filled(rows: Index, values: Array, count: int) -> Array:
+    """(n, axes) values at rows, 0 elsewhere."""
+    filled = np.zeros((count, AXES))
+    filled[rows] = values
+    return filled
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -139,6 +169,14 @@ class Used:
         values, blank = np.empty((len(self.uses), AXES)), (np.nan,) * AXES
         values[:, arm.columns] = np.array([own or blank for own in self.of("joints")]).reshape(-1, AXES)
         return arm.from_second(values) if from_level else values
+
+    def half_deg(self, arm: Arm) -> Array:
+        """(n, 6) half of a step of the motors, in which targets count joints; 0 where they do not."""
+        values = np.zeros((len(self.uses), AXES))
+        for row, counts in enumerate(self.of("counts")):
+            if counts:
+                values[row, arm.columns] = 0.5 / np.array(counts)
+        return values
 
     def config(self) -> Array:
         """(n, k) the words that name postures; NaN where one is not stated."""

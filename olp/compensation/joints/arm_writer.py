@@ -15,7 +15,7 @@ from olp.compensation.joints.planning import JointLimits, JointPlan
 from olp.compensation.joints.writer import WrittenJoints
 from olp.compensation.tally import Tally
 from olp.compensation.target_arcs import SHARE, pieces_of, stated
-from olp.core.arrays import Index
+from olp.core.arrays import Array, Index
 from olp.core.errors import ProgramError
 from olp.core.machine import ZERO, Vector
 from olp.core.spool import whole
@@ -89,7 +89,7 @@ class _Writer:
         self.limits = limits
         self.dialect, self.arm, self.tally = program.dialect, arm, Tally()
         self.nominal, self.commands = path.end.tolist(), plan.command.tolist()
-        self.clones = 0
+        self.clones = self.made = 0
         self.names: set[str] = set()
 
     def written(self) -> WrittenJoints:
@@ -104,17 +104,16 @@ class _Writer:
         by_target: dict[int, list[tuple[int, _Wanted]]] = {}
         edits, own = self._arcs(rows, places, turns)
         for k, row in enumerate(rows.tolist()):
-            use = self._use(row)
             if row in own:
                 continue
             if in_joints[k]:
-                by_target.setdefault(use.target, []).append((row, self._wanted_joints(row)))
-                continue
-            if last[row]:
-                wanted = self._wanted(row, places[k], turns[k], shifted=True)
-                by_target.setdefault(use.target, []).append((row, wanted))
+                wanted = self._wanted_joints(row)
             else:
-                edits += self._part(row, self._wanted(row, places[k], turns[k], shifted=False))
+                wanted = self._wanted(row, places[k], turns[k], shifted=bool(last[row]))
+            if last[row]:
+                by_target.setdefault(self._use(row).target, []).append((row, wanted))
+            else:
+                edits += self._part(row, wanted)
         for place, wants in by_target.items():
             edits += self._target(self.targets.targets[place], wants)
         parts = np.bincount(plan.move, minlength=len(self.path))
@@ -123,6 +122,8 @@ class _Writer:
         blocks = self.tally.inserted_blocks - self.clones
         if blocks:
             edits += self.dialect.counted(self.program, blocks)
+        if self.made:
+            edits = self.dialect.gathered(self.program, edits, self.made)
         return WrittenJoints(spliced(whole(self.program.data), edits), self.tally, parts)
 
     # -- arcs ----------------------------------------------------------------------------------------
@@ -236,12 +237,17 @@ class _Writer:
 
     def _wanted_joints(self, row: int) -> _Wanted:
         """The numbers of a target that states joints."""
-        unit, target = self.dialect.joint_unit_deg, self._target_of(row)
+        target = self._target_of(row)
+        unit: Array | float = self.dialect.joint_unit_deg
+        decimals = self.dialect.joint_decimals
+        if target.counts:
+            # motors go by whole steps
+            unit, decimals = 1.0 / np.array(target.counts), 0
         axes = self.plan.command[row : row + 1]
         axes = self.arm.from_level(axes) if self.path.from_level else axes
         numbers = axes[0, self.arm.columns] / unit
         made = [
-            self._written(span, value, self.dialect.joint_decimals)
+            self._written(span, value, decimals)
             for span, value in zip((*target.numbers, *target.turned), numbers.tolist(), strict=True)
         ]
         values, digits, texts = zip(*made, strict=True)
@@ -287,11 +293,7 @@ class _Writer:
     def _turns(self, row: int, target: Target, move: int) -> tuple[bytes, ...]:
         if not target.turns:
             return ()
-        new = self.dialect.turns_of(target.config, self.nominal[move], self.commands[row])
-        return tuple(
-            self.program.data[slice(*span)] if value is None else str(value).encode()
-            for span, value in zip(target.turns, new, strict=True)
-        )
+        return self.dialect.turn_texts(self.program, target, self.nominal[move], self.commands[row])
 
     # -- edits ---------------------------------------------------------------------------------------
 
@@ -355,4 +357,5 @@ class _Writer:
             self.names = {word.decode("latin-1").upper() for word in _NAMES.findall(self.program.data)}
         name = self.dialect.named(self.program, target, self.names)
         self.names.add(name.upper())
+        self.made += 1
         return name

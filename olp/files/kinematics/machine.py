@@ -64,7 +64,7 @@ def load_joint_machine(path: PathLike, read: Reader = read_bytes) -> JointMachin
         work_offsets=tuple(file.work_offsets),
         default_tool=default,
         control=_control(file, structure, path),
-        arm=_arm(file, structure),
+        arm=_arm(file, structure, path),
         tips_from_zero={"axis-zero": True, "activation": False, None: None}[file.kinematics.tcp_frame_zero],
         leads=file.kinematics.orientation_interpolation or "",
         swivel_axis=_swivel_axis(file.kinematics.swivel_axis, structure, path),
@@ -108,10 +108,18 @@ def _control(file: JointMachineFile, structure: Structure, path: PathLike) -> Ma
     )
 
 
-def _arm(file: JointMachineFile, structure: Structure) -> Machine | None:
+def _arm(file: JointMachineFile, structure: Structure, path: PathLike) -> Machine | None:
     """What a reader of robot programs needs to know of an arm, None where the machine is none."""
     if arm_of(structure) is None:
         return None
+    names = [name for name in structure.chain if name in file.axes]
+    pulses = tuple(value for name in names if (value := file.axes[name].pulses_per_deg) is not None)
+    if pulses and len(pulses) != len(names):
+        lacking = ", ".join(name for name in names if file.axes[name].pulses_per_deg is None)
+        raise config_error(
+            [(None, f"the axes {lacking} state no pulses_per_deg, and others do; expected it of all six")],
+            str(path),
+        )
     return Machine(
         name=file.name,
         chain=" ".join(structure.chain),
@@ -125,6 +133,7 @@ def _arm(file: JointMachineFile, structure: Structure) -> Machine | None:
         arm=True,
         third_level=file.kinematics.third_joint_level,
         track=file.kinematics.track,
+        pulses_per_deg=pulses or None,
     )
 
 

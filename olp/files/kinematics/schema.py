@@ -14,6 +14,8 @@ from olp.files.schemas import JobDefaultsTable, Tools, WorkOffsets
 LINEAR_NAMES = "XYZUVW"
 #: Rotary axes that programs of words have letters for.
 ROTARY_NAMES = "ABC"
+#: Keys whose unit is not that of the axis.
+_OF_ANY_UNIT = ("point_mm", "pulses_per_deg")
 #: Axes whose directions are known by name.
 OWN_DIRECTIONS = "XYZ"
 
@@ -70,6 +72,11 @@ class JointTable(Table):
     )
     jerk_mm_s3: Positive | None = Field(default=None, description="the largest jerk, in mm/s3")
     jerk_deg_s3: Positive | None = Field(default=None, description="the largest jerk, in deg/s3")
+    pulses_per_deg: Positive | None = Field(
+        default=None,
+        description="the pulses by which INFORM programs of Yaskawa robots count the axis, in one degree; "
+        "all six axes of an arm state it, or none",
+    )
     correct: bool = Field(
         default=True, description="whether a correction may change the axis, false for a clamped one"
     )
@@ -230,7 +237,9 @@ def _joint_wrong(name: str, joint: JointTable) -> str:
     values: dict[str, Any] = vars(joint)
     for key, value in values.items():
         stem = {"velocity": "_s", "acceleration": "_s2", "jerk": "_s3"}.get(key.split("_")[0], "")
-        if value is not None and key.endswith(f"_{other}{stem}") and key != "point_mm":
+        if value is not None and key == "pulses_per_deg" and kind != "rotary":
+            return f"states {key}, but it is {kind}; expected it of rotary axes alone"
+        if value is not None and key.endswith(f"_{other}{stem}") and key not in _OF_ANY_UNIT:
             return f"states {key}, but it is {kind}; expected {key.replace(f'_{other}', f'_{unit}')}"
     missing = [key for key in (f"travel_{unit}", f"least_increment_{unit}") if values[key] is None]
     if kind != "length" and joint.direction is None and name not in tuple(OWN_DIRECTIONS):

@@ -96,6 +96,20 @@ class RobotDialect(StatementDialect):
         """The numbers of `Target.turns` for six corrected axis values; None for one that stays."""
         return []
 
+    def turn_texts(
+        self, program: Program, target: Target, nominal: Sequence[float], corrected: Sequence[float]
+    ) -> tuple[bytes, ...]:
+        """What replaces the bytes of `Target.turns` for six corrected axis values."""
+        new = self.turns_of(target.config, nominal, corrected)
+        return tuple(
+            program.data[slice(*span)] if value is None else str(value).encode()
+            for span, value in zip(target.turns, new, strict=True)
+        )
+
     def counted(self, program: Program, blocks: int) -> list[Replacement]:
         """Counts of the text, where so many statements were inserted."""
         return []
+
+    def gathered(self, program: Program, edits: list[Replacement], targets: int) -> list[Replacement]:
+        """All replacements of a text, where so many targets are declared beside those that it has."""
+        return edits

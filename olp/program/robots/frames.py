@@ -91,15 +91,17 @@ class RobotFrames:
             )
         return Tool(name, stated, vector or ZERO, number if vector is not None else None)
 
-    def numbered_tool(self, name: str, number: int, stated: Pose | None, line: int) -> Tool:
-        """A tool by its number, 0 for none; as `located`."""
-        if self.setup.machine.arm and number:
+    def numbered_tool(
+        self, name: str, number: int, stated: Pose | None, line: int, *, none: int | None = 0
+    ) -> Tool:
+        """A tool by its number, `none` that of no tool; as `located`."""
+        if self.setup.machine.arm and number != none:
             if stated is None:
                 tool_vector_of(self.setup, number, line)
             return _at_flange(name, self.setup.tool(number), stated, line)
-        if number and stated is None:
+        if number != none and stated is None:
             return Tool(name, None, tool_vector_of(self.setup, number, line), number)
-        entry = self.setup.tool(number) if number else None
+        entry = None if number == none else self.setup.tool(number)
         vector = None if entry is None else entry.tool_vector_mm
         own = stated or Pose()
         return Tool(name, own, vector or own.origin_mm, number if vector else None)

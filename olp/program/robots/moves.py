@@ -18,7 +18,17 @@ from olp.program.program import Program
 from olp.program.robots.arcs import Chords
 from olp.program.robots.frames import Located, RobotFrames, Tool
 from olp.program.robots.poses import NO_TURN, Pose, Quaternion, angle_between
-from olp.program.robots.targets import ABSENT, NOWHERE, Arc, Span, Target, Targets, Use
+from olp.program.robots.targets import (
+    ABSENT,
+    NO_COPY,
+    NOWHERE,
+    Arc,
+    Copy,
+    Span,
+    Target,
+    Targets,
+    Use,
+)
 from olp.program.verbatim import Moves
 
 NAN = float("nan")
@@ -29,6 +39,7 @@ _SAME_ORIENTATION = 1e-3
 #: Statements between two reports of progress.
 _TOLD = 4096
 _NOWHERE: Vector = (NAN, NAN, NAN)
+_BEGINS_IN_RUN = "where this move begins depends on the run: it is corrected at its end"
 
 
 def take_all(
@@ -91,27 +102,29 @@ class RobotMoves:
         self, line: int, value: Span, numbers: tuple[Span, Span, Span], point: Vector, turn: Quaternion,
         rest: tuple[float, ...], name: str = "", declaration: Span = NOWHERE,
         turned: tuple[Span, ...] = (), turns: tuple[Span, ...] = (), config: tuple[float, ...] = (),
-        outer: tuple[float, ...] = (),
+        outer: tuple[float, ...] = (), copy: Copy = NO_COPY,
     ) -> int:  # fmt: skip
         """Add a target that the text states; returns its place."""
         first, second, third = (self.moves.number(*span) for span in numbers)
         slots = (first, second, third)
         self.targets.append(
             Target(line, value, numbers, slots, point, turn, rest, name, declaration, turned, turns,
-                   config, outer)
+                   config, outer, copy=copy)
         )  # fmt: skip
         return len(self.targets) - 1
 
     def joint_target(
         self, line: int, value: Span, numbers: Sequence[Span], degrees: tuple[float, ...],
         outer: tuple[float, ...] = (), name: str = "", declaration: Span = NOWHERE,
+        counts: tuple[float, ...] = (), copy: Copy = NO_COPY,
     ) -> int:  # fmt: skip
-        """Add a target whose six `numbers` are joint values, which `degrees` are; returns its place."""
+        """Add a target whose six `numbers` are joint values, which `degrees` are; returns its place. Those of
+        motors are `counts` in a degree."""
         first, second, third, *others = numbers
         self.targets.append(
             Target(
                 line, value, (first, second, third), (-1, -1, -1), _NOWHERE, NO_TURN, (), name, declaration,
-                tuple(others), outer=outer, joints=degrees,
+                tuple(others), outer=outer, joints=degrees, counts=counts, copy=copy,
             )
         )  # fmt: skip
         return len(self.targets) - 1
@@ -132,7 +145,7 @@ class RobotMoves:
         if swings:
             self.remark("swings", line, "the tool turns on the way: the move is corrected at its end")
         elif straight and not known:
-            self.remark("told", line, "where this move begins depends on the run: it is corrected at its end")
+            self.remark("told", line, _BEGINS_IN_RUN)
         line_kind = known and not swings
         held = line_kind and not chord and (whole or target.rest != self._rest)
         flag = Flag.WHOLE if held else Flag(0)
@@ -239,9 +252,13 @@ class RobotMoves:
             index = self._index[key] = self.frames.index(frame, tool, turn, use.shift_mm, line)
         return index
 
-    def joint_move(self, line: int, taken: Callable[[], Use | None]) -> None:
-        """Add a move to joint values. Where the machine is no arm, or `taken` finds no numbers in the text,
-        it stays as it is, and where the robot is then is not known."""
+    def joint_move(
+        self, line: int, taken: Callable[[], Use | None], *, straight: bool = False,
+        tool: Tool | None = None, feed: float = NAN, whole: bool = False,
+    ) -> None:  # fmt: skip
+        """Add a move to joint values; `straight` where it leads the tip of its `tool` along a line, `whole`
+        where that is never split. Where the machine is no arm, or `taken` finds no numbers in the text, it
+        stays as it is, and where the robot is then is not known."""
         use = taken() if self.arm else None
         if use is None:
             self.left(line)
@@ -249,14 +266,20 @@ class RobotMoves:
             return
         if not self.known:
             self.away(line)
-        flange = Tool("", Pose())
+        known = straight and self._turn is not None
+        if straight and not known:
+            self.remark("told", line, _BEGINS_IN_RUN)
         self._frame = self._flange(line)
         self.moves.put(
-            kind=int(Kind.RAPID), flag=int(Flag.CONTROL), line=line, frame=self._frame, end=_NOWHERE,
-            slot=(-1, -1, -1), bounds=NOWHERE, feed=self._feed,
+            kind=int(Kind.LINE if known else Kind.RAPID), flag=int(Flag(0) if known else Flag.CONTROL),
+            line=line, frame=self._frame, end=_NOWHERE, slot=(-1, -1, -1), bounds=NOWHERE,
+            feed=feed if known else self._feed,
         )  # fmt: skip
-        self._away = self._carried(self.frames.world, self.targets[use.target])[1]
-        self.uses.append(replace(use, tool=flange.pose, carried=self._away is not None))
+        away = self._carried(self.frames.world, self.targets[use.target])[1]
+        whole |= away != self._away
+        self._away = away
+        pose = Pose() if tool is None else tool.pose
+        self.uses.append(replace(use, tool=pose, straight=known, whole=whole, carried=away is not None))
         self.known, self._turn, self._rest, self._at = True, NO_TURN, (), None
 
     def _carried(self, frame: Located, target: Target) -> tuple[Pose, float | None]:

@@ -15,6 +15,22 @@ ABSENT = 9e8
 
 
 @dataclass(frozen=True, slots=True)
+class Copy:
+    """Where a language has further declarations like one: the byte, and lines before and behind it there.
+    `beside` are those that belong to it, each with the `text` that declares it."""
+
+    place: int = -1
+    before: bytes = b""
+    behind: bytes = b""
+    text: bytes = b""
+    beside: tuple[Copy, ...] = ()
+
+
+#: A language that has no place for these.
+NO_COPY = Copy()
+
+
+@dataclass(frozen=True, slots=True)
 class Target:
     """A position as it is stated: the `line`, the bytes of its whole `value`, of its three `numbers`, and
     their `slots`. `turn` is its orientation in its frame, and `rest` what else it states: configuration and
@@ -22,7 +38,8 @@ class Target:
     `turned` are the bytes of the numbers of its orientation, `turns` those that say how far axes turned.
     `config` are the words that name a posture, NaN where one is not stated, and `outer` the external axes.
     One in joints has their values in degrees (`joints`), the first three of them in `numbers`, the others in
-    `turned`."""
+    `turned`. Where the text counts steps of motors, `counts` are those of each joint in a degree. `copy` is
+    where another declaration of it goes, in a language that has a place for these."""
 
     line: int
     value: Span
@@ -38,6 +55,8 @@ class Target:
     config: tuple[float, ...] = ()
     outer: tuple[float, ...] = ()
     joints: tuple[float, ...] = ()
+    counts: tuple[float, ...] = ()
+    copy: Copy = NO_COPY
 
 
 @dataclass(frozen=True, slots=True)

@@ -111,3 +111,10 @@ KRL = Signs(
         rb"\$(?:BASE|TOOL)[ \t]*=|BAS[ \t]*\([ \t]*#|(?:GLOBAL[ \t]+)?DECL[ \t]+(?:GLOBAL[ \t]+)?E6POS\b)"
     ),
 )
+INFORM = Signs(
+    ("jbi",),
+    own=pattern(
+        rb"(?im)^[ \t]*(?:/JOB[ \t]*\r?$|//(?:NAME|POS|INST)\b|///(?:NPOS|POSTYPE|RECTAN|RCONF)\b|"
+        rb"MOV[JLCS][ \t]+[CP]\d+)"
+    ),
+)

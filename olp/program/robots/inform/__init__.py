@@ -1,0 +1,1 @@
+"""INFORM, the language of Yaskawa Motoman robots (JBI)."""

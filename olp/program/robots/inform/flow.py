@@ -1,0 +1,83 @@
+"""What the statements of a job do to positions and moves before these are read: where shifts hold, and which
+position variables the run gives other values."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from olp.core.patterns import pattern
+from olp.program.robots.inform.table import ASSIGNING, MOVING, POINTING
+from olp.program.robots.inform.text import Statement
+
+_WORD = pattern(rb"(?i)\*|[A-Z][A-Z0-9$]*")
+_MOVE = pattern(rb"(?i)(?:S|E|EI|I)?MOV[A-Z]?\b")
+_VARIABLE = pattern(rb"(?i)(?<![\w$])P(?:X?)(\d{1,5})(?!\d)")
+#: One that is chosen in the run.
+_CHOSEN = pattern(rb"(?i)(?<![\w$])PX?\[")
+_LABEL = pattern(rb"\*([\w-]+)")
+#: Statements behind which the next one does not follow.
+_ENDS = frozenset((b"RET", b"END", b"ABORT"))
+
+
+def word_of(text: bytes) -> bytes:
+    """The first word of a statement in capitals; `*` for a label."""
+    match = _WORD.match(text)
+    return b"" if match is None else match[0].upper()
+
+
+class Flow:
+    """What is known of a whole job. `assigned` and `used` are lines in which position variables get another
+    value, or give their own to others; `chosen` is a line in which the run decides which one does."""
+
+    def __init__(self, statements: Sequence[Statement]) -> None:
+        self.assigned: dict[int, int] = {}
+        self.used: dict[int, int] = {}
+        self.chosen = 0
+        self._moved: dict[int, str] = {}
+        for statement in statements:
+            self._variables(statement)
+        if any(word_of(statement.text) in MOVING for statement in statements):
+            self._follow(statements)
+
+    def moved(self, statement: Statement) -> str:
+        """What moves the targets of the moves of a statement, empty where nothing does."""
+        return self._moved.get(statement.line, "")
+
+    def _variables(self, statement: Statement) -> None:
+        text = statement.text
+        word = word_of(text)
+        if not word or word in POINTING or _MOVE.match(text):
+            return
+        assigns = word in ASSIGNING
+        if assigns and _CHOSEN.search(text):
+            self.chosen = self.chosen or statement.line
+        for k, match in enumerate(_VARIABLE.finditer(text)):
+            first = assigns and k == 0 and match.start() == len(word) + _blank(text, len(word))
+            table = self.assigned if first else self.used
+            table.setdefault(int(match[1]), statement.line)
+
+    def _follow(self, statements: Sequence[Statement]) -> None:
+        """Which statements a shift reaches, also by jumps. A label has what any way to it has."""
+        labels: dict[bytes, str] = {}
+        size = -1
+        while size != len(labels):
+            size, state = len(labels), ""
+            for statement in statements:
+                word = word_of(statement.text)
+                if word == b"*":
+                    match = _LABEL.match(statement.text)
+                    state = state or labels.get(b"" if match is None else match[1], "")
+                elif word in MOVING:
+                    state = MOVING[word][1]
+                elif any(word == end for end, _ in MOVING.values()):
+                    state = ""
+                if state:
+                    self._moved[statement.line] = state
+                if state and word in (b"JUMP", b"JMP"):
+                    for label in _LABEL.findall(statement.text):
+                        labels.setdefault(label, state)
+                state = "" if word in _ENDS else state
+
+
+def _blank(text: bytes, place: int) -> int:
+    return len(text[place:]) - len(text[place:].lstrip())
