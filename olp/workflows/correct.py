@@ -243,8 +243,10 @@ def corrected(
         with provably_kept():
             text = unrolled_again(sources, program, done.text.data, loaded)
             run = prove(text, findings_of(done.flow))
-            # where the unrolled program is no better, its flow is not the reason
-            if not run.proof.holds and not _as_good(run, prove(done.source.holding(done.unrolled or b""))):
+            # where the unrolled program is no better, its flow is not the reason, nor where none was kept
+            flat = done.unrolled
+            kept = run.proof.holds or flat is None
+            if not kept and not _as_good(run, prove(done.source.holding(flat or b""))):
                 raise ProgramError("it is above the tolerance then", code="OLP511")
     return replace(run, report=run.report | _written_report(done))
 

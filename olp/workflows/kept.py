@@ -108,8 +108,8 @@ def findings_of(flow: Flow) -> tuple[Finding, ...]:
     found: list[Finding] = []
     if flow.calls:
         count = len(flow.calls)
-        which = "a call is" if count == 1 else f"{count} calls are"
-        what = f"{which} written out, as other numbers are needed there than in the other calls"
+        which = "a block is" if count == 1 else f"{count} blocks are"
+        what = f"{which} written out: calls that need other numbers than the others, or moves of the control"
         found.append(Finding("OLP110", what, flow.calls[0], flow.calls[:_LINES], len(flow.calls)))
     if flow.kept is None:
         return tuple(found)

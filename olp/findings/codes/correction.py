@@ -97,11 +97,12 @@ RULES = (
     ),
     _rule(
         "OLP110",
-        "calls written out",
+        "calls and blocks written out",
         Severity.INFO,
-        "The passes of these calls need other numbers than the others. They were written out in the place of "
-        "the call; the other calls keep the subprogram.",
-        "Nothing needs to be done. The written program is longer by the blocks of these calls.",
+        "The passes of these calls need other numbers than the others, or the control makes moves by itself "
+        "there: corners, holes around a centre. They were written out in their place; other calls keep the "
+        "subprogram.",
+        "Nothing needs to be done. The written program is longer by these blocks.",
         "`M98 P1000` in G54 and in G55, where the machine has other errors.",
     ),
     _rule(

@@ -371,6 +371,10 @@ def _odd(data: Text, chunk: WordChunk, line: int, profile: Profile, *, words: bo
         )
     if profile.unroller is not None and profile.language.splines and _POLAR.search(text):
         return ProgramError(f"`{shown}` states a radius or an angle", hint=UNROLL, line=number, code="OLP511")
+    if profile.unroller is not None and profile.language.corners and _ROUNDED.search(text):
+        return ProgramError(
+            f"`{shown}` asks for a corner that the control makes", hint=UNROLL, line=number, code="OLP511"
+        )
     if text.startswith(b":") and inert is not None and inert.fullmatch(_PROGRAM):
         return ProgramError(
             f"`{shown}` begins with a colon, with which a program begins on this control; write N instead",

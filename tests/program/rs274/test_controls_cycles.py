@@ -153,7 +153,7 @@ def test_synchronous_taps_of_mazak_have_the_strokes_of_its_taps(  # type: ignore
     read = reading(taps.format(synchronous, mark), "mazak")
     assert path(read) == path(reading(taps.format(plain, ""), "mazak"))
     for text in ("G1 X5. ,R1 F60.\n", "G84 X5. R4. Z-8. F1. ,R2\n", "(G84) G1 X5. ,R1 F60.\n"):
-        with pytest.raises(ProgramError, match="is not understood"):
+        with pytest.raises(ProgramError, match="asks for a corner"):
             reading(text, "mazak")
 
 

@@ -275,9 +275,8 @@ REFUSED: dict[tuple[str, str], dict[str, object]] = {
         "why": unread("X1,5 Y2") + "; write a decimal point instead of the comma", "code": "OLP510",
     },
     ("fanuc", "G1 X1. ,R5."): {
-        "why": unread("G1 X1. ,R5.")
-        + "; where it rounds or breaks a corner inside the control, post the corner as a move",
-        "code": "OLP510",
+        "why": "`G1 X1. ,R5.` asks for a corner that the control makes; unroll the program with --flatten",
+        "code": "OLP511", "hint": "unroll the program with --flatten",
     },
     ("fanuc", "X1, Y2"): {"why": unread("X1, Y2"), "code": "OLP510"},
     ("fanuc", "?" * 70): {"why": unread("?" * 60), "code": "OLP510"},

@@ -16,7 +16,7 @@ from olp.core.errors import ProgramError
 from olp.program.kept import Difference, Kept
 from olp.program.origin import Unrolled
 from olp.program.rs274.codes import HOLE_PATTERNS, SPLINES
-from olp.program.rs274.flatten.apart import apart, can_be_apart, runs_once
+from olp.program.rs274.flatten.apart import apart, can_be_apart, otherwise, runs_once
 from olp.program.rs274.flatten.centres import LETTERS as CENTRES
 from olp.program.rs274.flatten.lines import Line, Word, compile_line
 from olp.program.rs274.profiles.base import Profile
@@ -70,20 +70,26 @@ def kept(unrolled: Unrolled, corrected: bytes, starts: Index, profile: Profile) 
             repeated.append(line)
     if not differences:
         return Kept(b"".join(lines), (), tuple(changed), tuple(repeated))
-    calls = _calls(unrolled, {d.line: visits[d.line] for d in differences}, profile)
+    calls = _calls(unrolled, {d.line: visits[d.line] for d in differences}, texts, profile)
     program = apart(unrolled, calls, texts) if calls else None
     return Kept(None, tuple(differences), tuple(changed), tuple(repeated), program, tuple(sorted(calls)))
 
 
 def _calls(
-    unrolled: Unrolled, lines: Mapping[int, Mapping[int, Counter[_Visit]]], profile: Profile
+    unrolled: Unrolled,
+    lines: Mapping[int, Mapping[int, Counter[_Visit]]],
+    texts: Sequence[bytes],
+    profile: Profile,
 ) -> frozenset[int]:
-    """The calls to write out, so that all other passes of each of these lines have the same numbers.
+    """The calls and blocks to write out, so that all other passes of each of these lines have the same
+    numbers, and no block needs what unrolling has written otherwise.
 
-    Empty where that does not help. `lines` are the visits of each by the line that they run in."""
-    origin, chosen = unrolled.origin, set[int]()
+    Empty where that does not help. `lines` are the visits of each by the line that they run in, `texts` the
+    lines of the unrolled text."""
+    origin = unrolled.origin
     if not can_be_apart(unrolled):
         return frozenset()
+    chosen = otherwise(unrolled, texts, profile.language)
     for line, runs in lines.items():
         same = Counter[_Visit]()
         for within, counts in runs.items():
@@ -93,7 +99,7 @@ def _calls(
                 _of_visits(origin.texts[line - 1], same + counts, profile)
                 same += counts
             except ProgramError:
-                if within == line:
+                if within == line and line not in chosen:
                     return frozenset()
                 chosen.add(within)
     return frozenset(chosen) if chosen <= runs_once(unrolled) else frozenset()

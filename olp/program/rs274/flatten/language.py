@@ -22,6 +22,7 @@ class Language:
     - `modal_variables`: #4001 to #4010 and #4107 to #4120 have what is in force before a block.
     - `work_offsets`: #5221 and on have the work offsets G54 and on, which a program in Macro B may set.
       `hole_patterns`: G70 and G71 make holes around a centre.
+    - `corners`: what rounds or chamfers a corner between two moves (`,r`, `,c`).
     - `saved_modes`: M70 to M73 save and restore modal codes. `profile_cycles`: G70 to G72 name a subprogram.
     - `splines`: G5 to G5.3 are splines, and `@` and `^` radius and angle.
     - `counts_in_p`: P of M98 has the count in front of four digits of the number. `shared_locals`: M98 keeps
@@ -38,6 +39,7 @@ class Language:
     modal_variables: bool
     work_offsets: bool = False
     hole_patterns: bool = False
+    corners: frozenset[str] = frozenset()
     saved_modes: bool
     profile_cycles: bool
     splines: bool
@@ -62,8 +64,9 @@ MACRO_B = Language(
     arithmetic=expressions.MACRO_B, macro_b=True, work_offsets=True, modal_variables=True, saved_modes=False,
     profile_cycles=False, splines=False, counts_in_p=True, shared_locals=True, calls_none=False,
     increments_open=True, decimals=4, all_digits=False, counts=frozenset("gmnpltdhos"), points=True,
+    corners=frozenset({",r", ",c"}),
 )  # fmt: skip
 USER_TASKS = replace(
     MACRO_B, arithmetic=expressions.USER_TASKS, user_tasks=True, modal_variables=False, work_offsets=False,
-       counts_in_p=False, counts=frozenset("ghmnosdt"),
+       corners=frozenset(), counts_in_p=False, counts=frozenset("ghmnosdt"),
 )  # fmt: skip

@@ -44,6 +44,8 @@ from olp.program.rs274.cycles import (
     levels,
 )
 from olp.program.rs274.flatten.expressions import whole
+from olp.program.rs274.flatten.language import Language
+from olp.program.rs274.flatten.lines import Word
 from olp.program.rs274.profiles.base import Act
 from olp.program.rs274.state import BROKEN_SERIES, NAN, OPEN_RETRACT, TURNED_SERIES, State
 
@@ -69,6 +71,16 @@ NO_AXES = HOMES | {DWELL, WRITE_OFFSET, LOCAL_OFFSET, PRESET, MACHINE, MACRO}
 _STOPS = frozenset({0, 1, 2, 30, 60, 98, 99})
 #: Words that belong to a cycle.
 CYCLE_WORDS = frozenset({"x", "y", "z", "r", "q", "p", "l", "k"})
+
+
+def tracked(word: Word, value: float | None, language: Language) -> float | None:
+    """The value of a word in program units; None where a missing point leaves its unit open."""
+    if word.letter == "p" and word.pointed and "p" in language.counts:
+        # a dwell in seconds; it is written without a point, which counts milliseconds
+        return float(round(1000.0 * word.number))
+    open_unit = language.increments_open and word.value is None and not word.pointed
+    counts = word.letter in language.counts or word.letter in ("f", "k")
+    return None if open_unit and not counts and value != 0 else value
 
 
 @dataclass(slots=True)

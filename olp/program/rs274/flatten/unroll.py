@@ -13,7 +13,8 @@ and refused on a Fanuc (#100 and up keep values of earlier runs).
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 
 import numpy as np
 
@@ -25,13 +26,14 @@ from olp.program.rs274.codes import ABSOLUTE, INCREMENTAL, SHIFTED_BORES, SPLINE
 from olp.program.rs274.cycles import Stroke, stroke_budget
 from olp.program.rs274.flatten import radius_angle
 from olp.program.rs274.flatten.centres import centre
+from olp.program.rs274.flatten.corners import with_corners
 from olp.program.rs274.flatten.expressions import filled, whole
 from olp.program.rs274.flatten.lines import Line, Word, compile_line
 from olp.program.rs274.flatten.patterns import holes, is_pattern
 from olp.program.rs274.flatten.polar import as_xy
 from olp.program.rs274.flatten.run import Walk
 from olp.program.rs274.flatten.splines import SPLINE_WORDS, Splines
-from olp.program.rs274.flatten.state import CYCLE_WORDS, ProgramState, Value
+from olp.program.rs274.flatten.state import CYCLE_WORDS, ProgramState, Value, tracked
 from olp.program.rs274.flatten.unit import Frame, Unit
 from olp.program.rs274.flatten.values import Variables
 from olp.program.rs274.flatten.written import number_text, stroke_blocks
@@ -88,7 +90,8 @@ def flatten(
     Walk(main, writer.variables, subprograms, visit, block_delete=block_delete, budget=budget).run()
     if not writer.moves:
         _refuse_library(main)
-    writer.write_polar(main)
+    writer.write_polar()
+    writer.write_corners()
     return Unrolled.of(writer.text(main), writer.origin(main), writer.within())
 
 
@@ -121,8 +124,8 @@ class _Flattener:
         self.strokes = strokes
         #: whether blocks under block delete may run or not
         self.switch_open = switch_open
-        #: whether a block has words of axes
-        self.moves = False
+        #: whether a block has words of axes, and whether one asks for a corner
+        self.moves = self.corners = False
         self.expand_cycles = expand_cycles
         self.peck_clearance = peck_clearance
         self._seen: set[tuple[int, int]] = set()
@@ -144,11 +147,31 @@ class _Flattener:
             whole_text[: -len(eol)] if self._blocks and not last[1] and not main.ends_with_eol else whole_text
         )
 
-    def write_polar(self, main: Unit) -> None:
+    def write_polar(self) -> None:
         """Write polar positions as X and Y. Raises ProgramError with the line in the source."""
-        profile = self.state.profile
+        with self._errors():
+            self._blocks = as_xy(self._blocks, self.state.profile, self._length)
+
+    def write_corners(self) -> None:
+        """Write corners as moves. Raises ProgramError with the line in the source."""
+        if not self.corners:
+            return
+        with self._errors():
+            placed = with_corners(
+                self._blocks, self.state.profile, self._length, switch=self.switch_open
+            )  # fmt: skip
+        self._blocks = [(raw, eol) for raw, eol, _ in placed]
+        self._sources = [self._sources[k] for _, _, k in placed]
+        self._within = [self._within[k] for _, _, k in placed]
+
+    def _length(self, value: float) -> str:
+        return number_text(value, "x", self.language)
+
+    @contextmanager
+    def _errors(self) -> Iterator[None]:
+        """Errors with a line of the blocks get that of the source."""
         try:
-            self._blocks = as_xy(self._blocks, profile, lambda value: number_text(value, "x", self.language))
+            yield
         except ProgramError as error:
             key, error.line = self._sources[(error.line or 1) - 1]
             error.file = self._units[key].file
@@ -213,7 +236,9 @@ class _Flattener:
         """Write a block and follow it; its words with their values."""
         cut = set(without)
         kept = [i for i in range(len(line.words)) if i not in cut]
-        active: list[Value] = [(values[i][0], self._tracked(line.words[i], values[i][1])) for i in kept]
+        active: list[Value] = [
+            (values[i][0], tracked(line.words[i], values[i][1], self.language)) for i in kept
+        ]
         self.variables.modal.follow(active, switched=line.deleted)
         self.variables.offsets.follow(active)
         before = (self.state.absolute, self.state.path, tuple(self.state.position))
@@ -228,6 +253,7 @@ class _Flattener:
                 self._spline(line, values, active, cut)
                 return active
         self.moves |= any(letter in "xyz" for letter, _ in active)
+        self.corners |= bool(self.language.corners) and any(letter[0] == "," for letter, _ in active)
         strokes: tuple[Stroke, ...] | None = None
         if self.state.is_cycle(active):
             strokes = self._cycle(active)
@@ -332,17 +358,6 @@ class _Flattener:
 
     def _vacant(self, word: Word, value: float | None) -> bool:
         return word.value is not None and value is None
-
-    def _tracked(self, word: Word, value: float | None) -> float | None:
-        """The value in program units; None where a missing point leaves its unit open."""
-        if word.letter == "p" and word.pointed and "p" in self.language.counts:
-            # a dwell in seconds; it is written without a point, which counts milliseconds
-            return float(round(1000.0 * word.number))
-        open_unit = self.language.increments_open and word.value is None and not word.pointed
-        counts = word.letter in self.language.counts or word.letter in ("f", "k")
-        if open_unit and not counts and value != 0:
-            return None
-        return value
 
     def _cycle(self, active: list[Value]) -> tuple[Stroke, ...] | None:
         if not self.expand_cycles:

@@ -33,6 +33,7 @@ DIALECT = replace(
     offset_names={540: "G54.1"},
     offsets_alone=frozenset({540}),
     # which variables have the offsets there is not stated
-    language=replace(MACRO_B, work_offsets=False),
+    # what a chamfer takes there is a setting
+    language=replace(MACRO_B, work_offsets=False, corners=frozenset({",r"})),
     path_mode="G64 of the control, unless a compressor or a smoothing mode is on",
 )

@@ -41,6 +41,9 @@ def word_rows(profile: Control) -> Iterator[Row]:
     yield Row("I J K R", Support.CORRECTED, "centres and radii of arcs; levels of canned cycles")
     yield Row("A B C U V W", Support.UNCHANGED, "other axes: a block that moves one is never split")
     yield Row("F S N", Support.UNCHANGED, "F changes with retime --write-feed alone")
+    corners = [letter.upper() for letter in sorted(profile.language.corners, reverse=True)]
+    if corners:
+        yield Row(" ".join(corners), Support.READ, "corners that the control makes, written out as moves")
     if profile.commands is None:
         yield Row("T", Support.READ, "the tool for M6; give [tools.N] in the machine or job file")
         yield Row("H D", Support.READ, "lengths and radii from [tools.N] of the machine or job file")

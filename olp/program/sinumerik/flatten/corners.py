@@ -6,18 +6,15 @@ Siemens, Programming Manual Fundamentals, section on chamfers and roundings.
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from olp.core.errors import ProgramError
 from olp.core.values import dataclass
-from olp.program.contours.meeting import Carriers, meeting
+from olp.program.contours.corners import Corner, Element, Point, chamfer, rounding, turn_at
 from olp.program.sinumerik.blocks import Form, Piece, block_of, without_comment
-from olp.program.sinumerik.flatten.elements import AXES, CENTRES, PLANES, Element, Point, Words, refused
+from olp.program.sinumerik.flatten.elements import AXES, CENTRES, PLANES, Words, element_of, refused
 from olp.program.sinumerik.flatten.text import shown
 from olp.program.sinumerik.table import CONTOUR_WAYS, HARMLESS, HARMLESS_G, ROUNDING_G
 
@@ -108,7 +105,7 @@ class Corners:
         """A block that moves: the corner before it, and what the one behind it needs."""
         before = dict(self._position)
         self._go(words)
-        element = Element.of(words, before, self._position, self._motion)
+        element = element_of(words, before, self._position, self._motion)
         third = PLANES[self._plane][2]
         if self._motion == 0 or (third in words.pieces and before.get(third) != self._position.get(third)):
             element = None
@@ -141,85 +138,33 @@ class Corners:
 
     def _corner(self, held: _Leg, leg: _Leg, feed: Piece | None, code: bytes) -> _Leg:
         """Put the corner between two legs; the second one, which begins behind it."""
-        first, second = held.element, leg.element
-        a, b = first.direction(first.end), second.direction(second.begin)
-        turn = math.atan2(a[0] * b[1] - a[1] * b[0], a[0] * b[0] + a[1] * b[1])
-        if abs(turn) < _SMOOTH:
+        first, second, name = held.element, leg.element, f"{held.kind}={held.size:g}"
+        if abs(turn_at(first, second)) < _SMOOTH:
             return leg
         if held.kind == "RND":
-            one, other, centre = _rounding(first, second, held.size, left=turn > 0)
+            corner = rounding(first, second, held.size, name)
         else:
-            one, other = _chamfer(first, second, held.size, turn, across=held.kind == "CHF")
-            centre = None
-        if not (first.share(one) > 0.0 and second.share(other) < 1.0):
-            raise refused(f"{held.kind}={held.size:g} does not fit into the blocks beside its corner")
+            corner = chamfer(first, second, held.size, name, across=held.kind == "CHF")
         raw, source = self.written[held.index]
-        self.written[held.index] = (_to(raw, replace(held, element=replace(first, end=one))), source)
-        inserted = _new(held, one, other, centre, left=turn > 0)
+        ended = replace(held, element=replace(first, end=corner.begin))
+        self.written[held.index] = (_to(raw, ended), source)
+        inserted = _new(held, corner)
         if feed is not None:
             inserted += b" " + code[feed.start : feed.end]
         later, mine = self.written[leg.index]
-        leg = replace(leg, index=leg.index + 1, element=replace(second, begin=other))
+        leg = replace(leg, index=leg.index + 1, element=replace(second, begin=corner.end))
         self.written[leg.index - 1 :] = [(inserted, mine), (_to(later, leg, code=True), mine)]
         return leg
 
 
-def _rounding(first: Element, second: Element, size: float, *, left: bool) -> tuple[Point, Point, Point]:
-    """Where a rounding touches both legs, and its centre."""
-    one, other = (_beside(element, size, left=left) for element in (first, second))
-    corner = first.end
-    point = meeting(one, other, np.array([corner]))[0]
-    if np.isnan(point).any():
-        raise refused(f"RND={size:g} does not fit between the blocks beside its corner")
-    centre = (float(point[0]), float(point[1]))
-    return _foot(first, centre), _foot(second, centre), centre
-
-
-def _beside(element: Element, size: float, *, left: bool) -> Carriers:
-    """What lies beside an element, by the radius of a rounding."""
-    d = element.direction(element.end)
-    side = 1.0 if left else -1.0
-    point = (element.end[0] - d[1] * size * side, element.end[1] + d[0] * size * side)
-    if element.centre is None:
-        return Carriers(np.array([False]), np.array([point]), np.array([d]), np.zeros((1, 2)), np.zeros(1))
-    inner = element.left == left
-    radius = element.radius + (-size if inner else size)
-    if radius <= 0:
-        raise refused(f"RND={size:g} is larger than the arc beside its corner")
-    return Carriers(
-        np.array([True]), np.array([point]), np.array([d]), np.array([element.centre]), np.array([radius])
-    )
-
-
-def _foot(element: Element, point: Point) -> Point:
-    """The point of the line or circle of an element that is nearest to another."""
-    if element.centre is None:
-        share = element.share(point)
-        (x, y), (u, v) = element.begin, element.end
-        return x + share * (u - x), y + share * (v - y)
-    c, scale = element.centre, element.radius / math.dist(point, element.centre)
-    return c[0] + (point[0] - c[0]) * scale, c[1] + (point[1] - c[1]) * scale
-
-
-def _chamfer(
-    first: Element, second: Element, size: float, turn: float, *, across: bool
-) -> tuple[Point, Point]:
-    """Ends of a chamfer of two lines. `across`: the size is its length, else what it takes of each."""
-    if first.centre is not None or second.centre is not None:
-        raise refused("a chamfer beside an arc is not written out; post it as G1")
-    leg = size / (2 * math.cos(turn / 2)) if across else size
-    a, b, corner = first.direction(first.end), second.direction(second.begin), first.end
-    return (corner[0] - a[0] * leg, corner[1] - a[1] * leg), (corner[0] + b[0] * leg, corner[1] + b[1] * leg)
-
-
-def _new(leg: _Leg, begin: Point, end: Point, centre: Point | None, *, left: bool) -> bytes:
+def _new(leg: _Leg, corner: Corner) -> bytes:
     """The block of a corner."""
-    base = begin if leg.incremental else (0.0, 0.0)
+    base = corner.begin if leg.incremental else (0.0, 0.0)
     a, b, _ = PLANES[leg.plane]
-    words = ["G1" if centre is None else f"G{3 if left else 2}"]
-    words += [f"{axis}{shown(v - o)}" for axis, v, o in zip((a, b), end, base, strict=True)]
-    if centre is not None:
-        words += [f"{k}{v}" for k, v in _centre(leg, begin, centre).items()]
+    words = ["G1" if corner.centre is None else f"G{3 if corner.left else 2}"]
+    words += [f"{axis}{shown(v - o)}" for axis, v, o in zip((a, b), corner.end, base, strict=True)]
+    if corner.centre is not None:
+        words += [f"{k}{v}" for k, v in _centre(leg, corner.begin, corner.centre).items()]
     return " ".join(words).encode()
 
 

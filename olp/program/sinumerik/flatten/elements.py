@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 
 from olp.core.errors import ProgramError
-from olp.core.values import dataclass
+from olp.program.contours.corners import Element
 from olp.program.sinumerik.blocks import NUMBER, Piece
 from olp.program.sinumerik.refusals import no_number
 
@@ -19,80 +19,28 @@ _COUNTED = re.compile(rb"(AC|IC)[ \t]*\(([^()]*)\)", re.IGNORECASE)
 #: mm below which points are the same
 SAME = 1e-9
 
-Point = tuple[float, float]
 
-
-@dataclass(frozen=True, slots=True)
-class Element:
-    """A line, or a circle where `centre` is given; `left` circles turn to the left. Points are along the
-    first and second axis of the plane, in units of the program."""
-
-    begin: Point
-    end: Point
-    centre: Point | None = None
-    left: bool = False
-
-    @staticmethod
-    def of(
-        words: Words, before: Mapping[str, float], after: Mapping[str, float], motion: int
-    ) -> Element | None:
-        """The element of a block with G0 to G3 between two positions; None where it is not known, or where
-        nothing moves in the plane."""
-        a, b, _ = PLANES[words.plane]
-        if not {a, b} <= set(before) or not {a, b} <= set(after):
+def element_of(
+    words: Words, before: Mapping[str, float], after: Mapping[str, float], motion: int
+) -> Element | None:
+    """The element of a block with G0 to G3 between two positions; None where it is not known, or where
+    nothing moves in the plane."""
+    a, b, _ = PLANES[words.plane]
+    if not {a, b} <= set(before) or not {a, b} <= set(after):
+        return None
+    begin, end = (before[a], before[b]), (after[a], after[b])
+    if motion in (0, 1):
+        return None if math.dist(begin, end) < SAME else Element(begin, end)
+    radius = words.number("CR")
+    if radius is None:
+        i, j = (words.centre(axis, start) for axis, start in ((a, begin[0]), (b, begin[1])))
+        if i is None and j is None:
             return None
-        begin, end = (before[a], before[b]), (after[a], after[b])
-        if motion in (0, 1):
-            return None if math.dist(begin, end) < SAME else Element(begin, end)
-        radius = words.number("CR")
-        if radius is None:
-            i, j = (words.centre(axis, start) for axis, start in ((a, begin[0]), (b, begin[1])))
-            if i is None and j is None:
-                return None
-            centre = (begin[0] if i is None else i, begin[1] if j is None else j)
-            return Element(begin, end, centre, motion == 3)
-        half = math.dist(begin, end) / 2
-        if half < SAME or abs(radius) < half * (1 - 1e-6):
-            return None
-        high = math.sqrt(max(radius * radius - half * half, 0.0)) * (
-            1 if (motion == 3) == (radius > 0) else -1
-        )
-        d = ((end[0] - begin[0]) / (2 * half), (end[1] - begin[1]) / (2 * half))
-        middle = ((begin[0] + end[0]) / 2, (begin[1] + end[1]) / 2)
-        return Element(begin, end, (middle[0] - d[1] * high, middle[1] + d[0] * high), motion == 3)
-
-    def direction(self, point: Point) -> Point:
-        """The direction of travel at a point of the element, of length 1."""
-        if self.centre is None:
-            d = (self.end[0] - self.begin[0], self.end[1] - self.begin[1])
-        else:
-            r = (point[0] - self.centre[0], point[1] - self.centre[1])
-            d = (-r[1], r[0]) if self.left else (r[1], -r[0])
-        size = math.hypot(*d)
-        return d[0] / size, d[1] / size
-
-    @property
-    def radius(self) -> float:
-        assert self.centre is not None
-        return math.dist(self.begin, self.centre)
-
-    def share(self, point: Point) -> float:
-        """How far along the element a point of its line or circle is: 0 at the begin, 1 at the end."""
-        if self.centre is None:
-            d = (self.end[0] - self.begin[0], self.end[1] - self.begin[1])
-            p = (point[0] - self.begin[0], point[1] - self.begin[1])
-            return (p[0] * d[0] + p[1] * d[1]) / (d[0] ** 2 + d[1] ** 2)
-        whole = self._turn(self.end) or 2 * math.pi
-        turn = self._turn(point)
-        # just before the begin is not nearly a whole turn behind it
-        return (turn if turn < math.pi + whole / 2 else turn - 2 * math.pi) / whole
-
-    def _turn(self, point: Point) -> float:
-        assert self.centre is not None
-        c = self.centre
-        first = math.atan2(self.begin[1] - c[1], self.begin[0] - c[0])
-        turn = math.atan2(point[1] - c[1], point[0] - c[0]) - first
-        return (turn if self.left else -turn) % (2 * math.pi)
+        centre = (begin[0] if i is None else i, begin[1] if j is None else j)
+        return Element(begin, end, centre, motion == 3)
+    if math.dist(begin, end) < 2 * SAME:
+        return None
+    return Element.by_radius(begin, end, radius, left=motion == 3)
 
 
 def counted(code: bytes, piece: Piece) -> tuple[float, str]:

@@ -8,7 +8,7 @@ from olp.core.errors import ProgramError
 from olp.core.toolpath import Kind
 from olp.program.sinumerik import cycles, patterns
 from olp.program.sinumerik.blocks import Form, Piece, arguments, block_of, without_comment
-from olp.program.sinumerik.flatten.elements import AXES, CENTRES, Element, Words, counted
+from olp.program.sinumerik.flatten.elements import AXES, CENTRES, Words, counted, element_of
 from olp.program.sinumerik.flatten.shapes import Shapes
 from olp.program.sinumerik.flatten.text import shown
 from olp.program.sinumerik.frames import STATEMENTS
@@ -82,7 +82,7 @@ class Places:
         yield self._placed(raw, code, pieces, deleted)
         if names & {*AXES, *CENTRES}:
             words = Words(code, pieces, self._plane)
-            self._shapes.last = Element.of(words, before, self._position, self._motion)
+            self._shapes.last = element_of(words, before, self._position, self._motion)
         if self._modal is not None and names & {*AXES} and pieces[0].name not in _FRAMES:
             yield from self._hole(*self._modal)
 

@@ -9,14 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+from olp.program.contours.corners import Element, Point
 from olp.program.sinumerik.blocks import Form, Piece
 from olp.program.sinumerik.flatten.elements import (
     AXES,
     CENTRES,
     PLANES,
     SAME,
-    Element,
-    Point,
     Words,
     refused,
     unknown,

@@ -10,7 +10,6 @@ from judge import machines
 from judge.machines import Recipe
 
 import olp
-from olp.core.errors import OlpError
 
 HEAD = "O1\nG21 G17 G90 G54\nG0 X7. Y-3.5 Z9.\n"
 TURNED = "G1 X20. Y4. Z-1. F300.\nX30.\n{}\nG0 X0. Y0. Z9.\nM30\n"
@@ -37,16 +36,18 @@ def test_the_corrected_program_is_that_of_the_stated_centre(
     assert flatten(without, profile=control) == explicit
     assert olp.correct(without, path, flatten=True).data == olp.correct(explicit, path).data
     if block != stated:
-        with pytest.raises(OlpError, match=r":4: .*takes the present position|present position, which"):
-            olp.correct(without, path)
+        # the block is written out unasked
+        done = olp.correct(without, path)
+        assert done.data == olp.correct(explicit, path).data
+        assert [f.lines for f in done.findings if f.code == "OLP110"] == [(4,)]
 
 
 def test_a_loop_with_such_a_block_is_not_kept(tmp_path: Path) -> None:
     path = machines.random_machine(tmp_path, 3, Recipe(controller="fanuc", off_datum=True))
     text = f"{HEAD}M98 P2 L2\nM30\nO2\nG68 R30.\nG1 X20. Y4. Z-1. F300.\nG69\nG0 X7. Y-3.5 Z9.\nM99\n"
-    with pytest.raises(OlpError, match="turns or scales about the present position"):
-        olp.correct(text.encode(), path)
-    assert olp.correct(text.encode(), path, flatten=True).data.count(b"G68 X7. Y-3.5 R30.") == 2
+    for asked in (True, False):
+        done = olp.correct(text.encode(), path, flatten=asked)
+        assert done.data.partition(b"M30")[0].count(b"G68 X7. Y-3.5 R30.") == 2
 
 
 def test_a_position_that_is_not_known_and_increments() -> None:

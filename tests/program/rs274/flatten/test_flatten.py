@@ -22,7 +22,7 @@ from olp.program.rs274.flatten.written import number_text
     ],
 )
 def test_plain_program_is_copied_byte_for_byte(profile: str, eol: str) -> None:
-    lines = ["%", "N10 g0 X 1 2.5 (Gr\xf6\xdfe) Y-.3", "", "  ;  semi", "/G1X1.F100.", "X2. ,R3", "M30", "%"]
+    lines = ["%", "N10 g0 X 1 2.5 (Gr\xf6\xdfe) Y-.3", "", "  ;  semi", "/G1X1.F100.", "X2. ,D3", "M30", "%"]
     data = eol.join(lines).encode("latin-1")
     assert flatten(data, profile=profile) == data
     assert flatten(data + eol.encode(), profile=profile) == data + eol.encode()

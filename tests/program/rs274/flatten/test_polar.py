@@ -13,7 +13,6 @@ from cases.unrolling import fanuc, refusal
 from judge.machines import Recipe, random_machine
 
 import olp
-from olp.core.errors import OlpError
 
 HEAD = "O1\nG21 G17 G90\nG0 X0. Y0. Z9.\n"
 
@@ -75,9 +74,9 @@ def test_a_program_with_polar_positions_is_corrected_where_it_is_unrolled(tmp_pa
     head = "G21 G17 G90 G54\nT1 M6\nG0 X0. Y0. Z50.\nG43 H1 Z20.\n"
     polar = f"{head}G16\nG1 X40. Y30. F500\nY120.\nX20. Z5.\nG15\nM30\n"
     plain = f"{head}G1 X34.641 Y20. F500\nX-20. Y34.641\nX-10. Y17.3205 Z5.\nM30\n"
-    with pytest.raises(OlpError, match="unroll the program with --flatten"):
-        olp.correct(polar.encode(), machine)
     done = olp.correct(polar.encode(), machine, flatten=True)
+    assert b"G16" not in olp.correct(polar.encode(), machine).data
+    assert olp.correct(polar.encode(), machine).data == done.data
     assert done.report["verdict"]["ok"]
     like = olp.correct(plain.encode(), machine)
     ends = [olp.simulate(some.data, machine, step_mm=1e4).points_mm for some in (done, like)]
