@@ -7,7 +7,7 @@ import re
 import numpy as np
 import numpy.typing as npt
 
-from olp.program.heidenhain.columns import SIDE
+from olp.program.heidenhain.columns import NORMAL, SIDE
 from olp.program.program import Program
 
 _NUMBER = re.compile(rb"[ \t]*\d*[ \t]*")
@@ -32,6 +32,13 @@ class ConversationalBlocks:
         number = _NUMBER.match(self._program.data, int(self._program.line_start[line - 1]))
         assert number is not None
         return self._program.eol(line) + number[0].lstrip()
+
+    def normal(self, line: int) -> bytes:
+        """The words of the normal of the surface that a block states, empty where it has none."""
+        words = self._program.words
+        assert words is not None
+        own = [i for i in words.of_line(line) if words.letter[i] == NORMAL]
+        return b"".join(b" " + self._program.data[words.start[i] : words.end[i]] for i in own)
 
     def trail(self, line: int) -> bytes:
         """What comes behind the words of a part of a block: R0 and FMAX where the block has them."""

@@ -234,11 +234,17 @@ class Statements:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Towards:
-    """Directions of the tool in the workpiece that statements of points state: of each move (n, 3) the `slot`
-    of its numbers or -1, and the direction as `stated`, NaN where there is none."""
+    """Directions of the tool in the workpiece that statements state: of each move (n, 3) the `slot` of its
+    numbers or -1, and the direction as `stated`, NaN where there is none. Where they are `lasting`, a move
+    without one has that of the move before; else its rotary axes stay."""
 
     slot: Small
     stated: Array
+    lasting: bool = True
+
+    @staticmethod
+    def none(count: int, *, lasting: bool = True) -> Towards:
+        return Towards(np.full((count, 3), -1, np.int32), np.full((count, 3), np.nan), lasting)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -274,7 +274,7 @@ class StatementCollector(PathColumns):
     def _directions(self, count: int) -> Towards | None:
         if not self._towards:
             return None
-        towards = Towards(np.full((count, 3), -1, np.int32), np.full((count, 3), np.nan))
+        towards = Towards.none(count)
         for first, stated, slot in self._towards:
             towards.stated[first : first + len(stated)] = stated
             towards.slot[first : first + len(slot)] = slot if self.keep_words else -1

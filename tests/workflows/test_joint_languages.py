@@ -152,3 +152,114 @@ def test_a_rotated_frame_turns_with_the_words(tmp_path: Path) -> None:
     ]
     assert both[0]["deviation"]["before"] == pytest.approx(both[1]["deviation"]["before"])
     assert both[0]["verdict"]["ok"] and both[1]["verdict"]["ok"]
+
+
+def vectors(chain: str, folder: Path, *, seed: int = 4, moves: int = 4) -> tuple[bytes, Path]:
+    """A program of LN blocks, with normals here and there, and its machine."""
+    machine = machine_file(folder, chain, control="heidenhain", digit=0.0001)
+    judge, rng = Judge(machine), np.random.default_rng(seed)
+    names = [name for name in judge.order if name not in "XYZ"]
+    axes = np.array([0.0, 0.0, 0.0, *({"A": -25.0, "B": 20.0, "C": 40.0}[name] for name in names)])
+    turns = " ".join(f"{name}{value:+.3f}" for name, value in zip(names, axes[3:], strict=True))
+    lines = ["BEGIN PGM T MM", "TOOL CALL 1 Z S3000", f"L X+0 Y+0 Z+200 {turns} R0 FMAX"]
+    tip = np.array([10.0, -20.0, 40.0])
+    for number in range(moves):
+        tip = tip + rng.uniform(-20, 20, 3)
+        axes[3:] += rng.uniform(-5, 5, len(names))
+        words = [
+            f"{a}{v:+.4f}"
+            for a, v in zip("XYZ", tip, strict=True)
+            if not number or a == "X" or rng.random() < 0.7
+        ]
+        if number % 2:
+            words += [f"N{a}{v:+.7f}" for a, v in zip("XYZ", (0.6, 0.0, 0.8), strict=True)]
+        towards = judge.forward(axes[None], False)[1][0]
+        words += [f"T{a}{v:+.7f}" for a, v in zip("XYZ", towards, strict=True)]
+        lines.append("LN " + " ".join(words) + (" F MAX M128" if not number else " F1200"))
+    lines += ["L Z+150 FMAX M129", "L Z+200 R0 FMAX M30", "END PGM T MM"]
+    return "".join(f"{number} {line}\n" for number, line in enumerate(lines)).encode(), machine
+
+
+def as_judged(text: bytes) -> bytes:
+    """LN blocks in words that the judge reads: its I, J and K are the direction of the tool."""
+    text = re.sub(rb" N[XYZ][-+][\d.]+", b"", text)
+    return re.sub(rb" T([XYZ])", lambda m: b" " + {b"X": b"I", b"Y": b"J", b"Z": b"K"}[m[1]], text).replace(
+        b"LN", b"G1"
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("chain", [CHAINS[0], CHAINS[2], "F X Y Z C A"])
+def test_vectors_of_heidenhain_blocks_are_corrected_as_the_judge_finds(chain: str, tmp_path: Path) -> None:
+    text, machine = vectors(chain, tmp_path)
+    result = olp.correct_joints(text, machine, tolerance_urad=2.0)
+    assert result.report["verdict"]["ok"]
+    distance, angle = Judge(machine).judged(as_judged(text), as_judged(result.data))
+    assert distance <= 1.1e-3 + 0.1 * DIGITS_MM
+    # the nearest pose along the path, which is chosen by the tip as well
+    assert angle <= 4e-6
+    again = olp.verify_joints(text, result.data, machine, tolerance_urad=2.0)
+    assert again.report["verdict"]["ok"]
+
+
+def test_vectors_are_written_as_they_are_programmed(tmp_path: Path) -> None:
+    text, machine = vectors("C A Y F X Z", tmp_path, moves=3)
+    result = olp.correct_joints(text, machine, tolerance_urad=2.0)
+    blocks = [line for line in result.data.decode().splitlines() if " LN " in line]
+    assert len(blocks) > len(re.findall(rb" LN ", text))
+    number = r"[-+]\d+\.\d"
+    direction = rf"( N[XYZ]{number}+){{0,3}} TX({number}{{7}}) TY({number}{{7}}) TZ({number}{{7}})"
+    form = re.compile(rf"\d+ LN( [XYZ]{number}+)+{direction}( F MAX M128| F1200)?")
+    for block in blocks:
+        match = form.fullmatch(block)
+        assert match is not None, block
+        assert abs(np.linalg.norm([float(one) for one in match.groups()[2:5]]) - 1.0) < 2e-7
+    # a later part of a block states all numbers, and the normal of the surface
+    first = {block.split()[0]: block for block in reversed(blocks)}
+    for block in (block for block in blocks if block != first[block.split()[0]]):
+        assert re.match(r"\d+ LN X\S+ Y\S+ Z\S+ [NT]X", block)
+        assert ("NX+0.6000000 NY+0.0000000 NZ+0.8000000 TX" in block) == ("NX" in first[block.split()[0]])
+    # the block behind them turns nothing but for the correction
+    assert re.search(r"\d+ L Z\S+ X\S+ Y\S+ A-2\S+ C\+?\d\S+ FMAX M129", result.data.decode())
+    assert (
+        olp.correct_joints(
+            text, machine_file(tmp_path, "C A Y F X Z", control="heidenhain", errors=False)
+        ).data
+        == text
+    )
+
+
+VECTORS = (
+    H_HEAD + b"M128\nL X+1 Y+1 Z+9 FMAX\nLN X+2 NX+0 NY+0 NZ+1 TX+0.3 TY+0.15 TZ+0.9 F100\nEND PGM A MM\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (b"CALL 1 Z", b"CALL 1 Z DR-0.05", "DL and DR"),
+        (b"CALL 1 Z", b"CALL 1 Z DL+0.1", "DL and DR"),
+        (b"CALL 1 Z", b"CALL 1 Z DR2:+0.1", "DL and DR"),
+        (b" TX+0.3 TY+0.15 TZ+0.9", b"", "TX, TY and TZ"),
+        (b" TZ+0.9", b" TX+0.9", "TX, TY and TZ"),
+        (b" NZ+1", b"", "NX, NY and NZ"),
+        (b"TX+0.3 TY+0.15 TZ+0.9", b"TX+0 TY+0 TZ+0", "no length"),
+        (b"LN X+2", b"LN", "no coordinate"),
+        (b"LN X+2", b"LN X+2 C+3", "beside words of rotary axes"),
+        (b"M128\n", b"", "behind M128"),
+        (b"LN X+2", b"L X+2", "not understood"),
+    ],
+)
+def test_blocks_with_vectors_that_are_not_clear_are_refused(
+    old: bytes, new: bytes, message: str, tmp_path: Path
+) -> None:
+    assert VECTORS.count(old) >= 1
+    with pytest.raises(olp.ProgramError, match=message) as caught:
+        corrected(tmp_path, VECTORS.replace(old, new, 1), "C A Y F X Z", "heidenhain")
+    assert caught.value.line == 6 - (old == b"M128\n")
+
+
+@pytest.mark.parametrize("call", [b"CALL 1 Z DL+0 DR+0.000", b"CALL 1 Z DR2:0"])
+def test_a_call_with_differences_of_zero_is_read(call: bytes, tmp_path: Path) -> None:
+    text = VECTORS.replace(b"CALL 1 Z", call).replace(b"A-20 C+30", b"A-20 C+60")
+    assert corrected(tmp_path, text, "C A Y F X Z", "heidenhain").data.count(b"\nLN ") > 1

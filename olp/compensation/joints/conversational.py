@@ -6,12 +6,14 @@ import re
 from dataclasses import replace
 
 import numpy as np
+import numpy.typing as npt
 
 from olp.compensation.conversational_blocks import ConversationalBlocks
 from olp.compensation.joints.path import JointPath
 from olp.compensation.joints.planning import JointPlan
 from olp.compensation.joints.writer import PLACES, JointWriter
-from olp.core.arrays import Index, Mask, distinct
+from olp.core.arrays import Array, Index, Mask, distinct
+from olp.core.units import AXES
 from olp.program.heidenhain.chunk import LATE_M
 from olp.program.text.edits import BARE, EditList, Edits
 
@@ -68,15 +70,45 @@ class ConversationalJoints(JointWriter):
 
     def _starts(self, line: Index) -> tuple[list[bytes], Index]:
         lines, which = np.unique(line, return_inverse=True)
-        return [self._blocks.lead(n) + b"L " for n in lines.tolist()], np.asarray(which, np.int64)
+        led = distinct(self.path.line[self.plan.move[self.led]]).tolist()
+        names = [b"LN " if n in set(led) else b"L " for n in lines.tolist()]
+        starts = [self._blocks.lead(n) + name for n, name in zip(lines.tolist(), names, strict=True)]
+        return starts, np.asarray(which, np.int64)
+
+    def _leading(self) -> npt.NDArray[np.int32]:
+        # coordinates stand before the components of vectors
+        return self.slot[:, : len(self.order)]
+
+    def _drill(self, command: Array) -> Edits:
+        """A part of a block with vectors states all coordinates and components, as controls ask for it."""
+        made = super()._drill(command)
+        tails = self.led & self._tails()
+        for name in AXES if tails.any() else ():
+            column = self.order.index(name)
+            rows = np.flatnonzero(tails & ~self.write[:, column])
+            move, used = self.plan.move[rows], self.path.slot[:, column]
+            unit = self.path.unit[move]
+            own = self.words.decimals[used[used >= 0]].max(initial=0)
+            decimals = max(
+                int(own), *(self.style.usual(AXES.index(name), u) for u in distinct(unit).tolist()), 0
+            )
+            value = (command[rows, column] - self.path.offset[move, column]) / unit
+            self.mantissa[rows, column] = np.rint(value * 10.0**decimals)
+            self.decimals[rows, column], self.write[rows, column] = decimals, True
+        self.write[tails, len(self.order) :] = True
+        return made
 
     def _ends(self, tails: Index, line: Index, edits: EditList) -> None:
         """R0 and FMAX behind the words of each part; M functions that act at the end go to the last one."""
         words, data = self.words, self.program.data
         for row, number in zip(tails.tolist(), line.tolist(), strict=True):
             text = self._blocks.trail(number)
+            place = int(self.program.line_end[number - 1])
+            normal = self._blocks.normal(number)
+            if normal:
+                # behind X, Y and Z, where the words of rotary axes would be
+                edits.add(place, place, BARE, 0, normal, row * PLACES + PLACES + len(AXES))
             if text:
-                place = int(self.program.line_end[number - 1])
                 edits.add(place, place, BARE, 0, text, row * PLACES + 2 * PLACES - 2)
         for number in distinct(line).tolist():
             for i in words.of_line(number):

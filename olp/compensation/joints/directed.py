@@ -69,7 +69,7 @@ class Directions:
         none, and beside those of rotary axes."""
         path, dialect = program.toolpath, program.dialect
         if program.towards is not None:
-            return Directions._of_points(program, program.towards)
+            return Directions._of_statements(program, program.towards, rotary)
         if not isinstance(dialect, Profile) or not dialect.directed or not len(path):
             return Directions.none(len(path))
         slot = _slots(program)
@@ -94,10 +94,19 @@ class Directions:
         return Directions(slot, _units(program, slot, stated), led & allowed, _decimals(program, slot))
 
     @staticmethod
-    def _of_points(program: Program, towards: Towards) -> Directions:
-        """Those of statements, each of which has a direction or that of the one before."""
+    def _of_statements(program: Program, towards: Towards, rotary: RotaryWords) -> Directions:
+        """Those of statements: of points, and of blocks with vectors."""
         size = np.linalg.norm(towards.stated, axis=1)
-        led = np.logical_or.accumulate(np.isfinite(size))
+        led = np.asarray(np.isfinite(size), bool)
+        both = led & (rotary.slot >= 0).any(axis=1)
+        if both.any():
+            raise ProgramError(
+                "the direction of the tool is beside words of rotary axes; program one of both",
+                line=int(program.toolpath.line[np.argmax(both)]),
+                code="OLP565",
+            )
+        if towards.lasting:
+            led = np.logical_or.accumulate(led)
         unit = towards.stated / size[:, None]
         return Directions(towards.slot, unit, led, _decimals(program, towards.slot))
 
@@ -163,7 +172,7 @@ class Directions:
             towards = motion.nominal(axes[rows], tool).rotation[:, :, 2]
             slopes = motion.slopes(axes[rows], tool)[:, 3:, columns]
             across = np.cross(slopes, towards[:, :, None], axis=1)
-            least = np.linalg.svd(across, compute_uv=False)[:, -1]
+            least = _least(across[:, :, 0], across[:, :, 1])
             wide[np.ix_(rows, np.array(columns))] /= np.maximum(least, _POLE)[:, None]
             wide[rows[along_outer(structure, towards) < _POLE], columns[0]] = np.inf
         return wide
@@ -177,6 +186,13 @@ class Directions:
         # rotations alone are read here, whose inverse is the transpose
         which = matrices.of_frame[path.frame[rows]]
         return turned((matrices.inverse if back else matrices.matrix)[which], directions)
+
+
+def _least(first: Array, second: Array) -> Array:
+    """(n,) the smaller singular values of matrices of two columns (n, 3)."""
+    a, b, c = ((u * v).sum(axis=1) for u, v in ((first, first), (first, second), (second, second)))
+    square = 0.5 * (a + c) - np.hypot(0.5 * (a - c), b)
+    return np.asarray(np.sqrt(np.maximum(square, 0.0)))
 
 
 def refuse_near(structure: Structure, towards: Array, line: npt.NDArray[np.int32]) -> Mask:

@@ -32,6 +32,8 @@ _HALF_DEG = 1e-3
 _FLAT = 1e-6
 #: rad by which a direction may be missed.
 _DIRECTED_RAD = 1e-8
+#: A direction that is missed by less, rad, is met.
+_MET_RAD = 1e-14
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,13 +112,15 @@ class Motion:
         """(r, axes) `place` with the rotary values, in the columns `rotary`, near its own whose tool has the
         directions `target` (r, 3). Raises NotInvertible with one of `rows` (r,) where none does."""
         for _ in range(_STEPS):
+            miss = target - self._axis(place)
+            if np.abs(miss).max(initial=0.0) < _MET_RAD:
+                break
             slopes = np.empty((len(place), 3, len(rotary)))
             for number, column in enumerate(rotary.tolist()):
                 ahead, behind = place.copy(), place.copy()
                 ahead[:, column] += _HALF_DEG
                 behind[:, column] -= _HALF_DEG
                 slopes[:, :, number] = (self._axis(ahead) - self._axis(behind)) / (2.0 * _HALF_DEG)
-            miss = target - self._axis(place)
             place[:, rotary] += (np.linalg.pinv(slopes, rcond=_FLAT) @ miss[..., None])[..., 0]
         away = np.linalg.norm(target - self._axis(place), axis=1)
         if (away > _DIRECTED_RAD).any():

@@ -266,7 +266,7 @@ class JointWriter:
         rows = np.flatnonzero(missing.any(axis=1))
         if not rows.size:
             return []
-        slot = np.hstack((self.slot, self._arc_slots()))[rows]
+        slot = np.hstack((self._leading(), self._arc_slots()))[rows]
         ends = np.where(slot >= 0, self.words.end[slot], -1)
         last = np.take_along_axis(slot, ends.argmax(axis=1)[:, None], axis=1)[:, 0]
         place = ends.max(axis=1).astype(np.int64)
@@ -279,6 +279,10 @@ class JointWriter:
                 edits.append(self._edit(rows[some], column, place[some], place[some], prefix, number + 1))
                 self.tally.inserted_words += len(some)
         return edits
+
+    def _leading(self) -> npt.NDArray[np.int32]:
+        """(r, k) the words behind the last of which inserted ones are put."""
+        return self.slot
 
     def _arc_slots(self) -> npt.NDArray[np.int32]:
         """(r, 5) the words of centres, radii and turns of arcs that become straight."""

@@ -8,10 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from olp.core.arrays import Array, Index, Mask, distinct
+from olp.core.arrays import Array, Index, Mask, distinct, is_in
 from olp.core.geometry import PLANES
 from olp.core.values import dataclass
-from olp.program.heidenhain.columns import PARAMETER_FEED, SIDE, TURN, Block, Blocks
+from olp.program.heidenhain.columns import DIRECTION, NORMAL, PARAMETER_FEED, SIDE, TURN, Block, Blocks
 from olp.program.program import AS_BEFORE
 from olp.program.rs274.motion import Blocks as Rows
 from olp.program.rs274.motion import gather
@@ -30,6 +30,8 @@ UNTIPPED = 129
 IS_HARMLESS = np.isin(np.arange(1000), sorted(_HARMLESS))
 #: Letters of words in motion blocks.
 KNOWN_LETTERS = np.isin(np.arange(256), list(b"XYZABCUVWFMRKPQOTSG"))
+#: Letters of further words in LN.
+IS_DIRECTED = np.isin(np.arange(256), [*DIRECTION, NORMAL])
 #: The axis of a letter, or -1.
 AXIS = np.full(256, -1, np.int8)
 AXIS[list(b"XYZ")] = (0, 1, 2)
@@ -90,7 +92,7 @@ def columns_of(blocks: Blocks, base: int) -> Chunk:
     """The motion rows of a chunk, its poles and its feeds."""
     block, words = blocks.block, blocks.words
     motion = np.where((block >= Block.ARC) & (block <= Block.POLAR), 20, 10).astype(np.int16)
-    consumed = (block < Block.LINE) | (block > Block.POLAR)
+    consumed = ((block < Block.LINE) | (block > Block.POLAR)) & (block != Block.DIRECTED)
     letter = np.where(blocks.letter == ord("T"), np.uint8(ord("A")), blocks.letter)
     rows = gather(replace(words, letter=letter), motion, consumed)
     steps = np.where(rows.slot >= 0, blocks.step[rows.slot], False)
@@ -122,7 +124,8 @@ def apart(blocks: Blocks) -> Index:
         | (code >= len(IS_HARMLESS))
         | ~IS_HARMLESS[np.clip(code, 0, len(IS_HARMLESS) - 1)]
     )
-    unknown = words.line[~KNOWN_LETTERS[blocks.letter]]
+    towards = IS_DIRECTED[blocks.letter] & (block == Block.DIRECTED)[words.line]
+    unknown = words.line[~KNOWN_LETTERS[blocks.letter] & ~towards]
     pole = np.flatnonzero(block == Block.POLE)
     axis = (AXIS[blocks.letter] >= 0) & ~blocks.step
     plain = np.bincount(words.line[axis], minlength=len(block))[pole] == 2
@@ -130,7 +133,7 @@ def apart(blocks: Blocks) -> Index:
     # a side of the contour, and words of arcs in other blocks
     side = (blocks.letter == SIDE) & (blocks.value > 0)
     side |= (blocks.letter == ord("R")) & (block[words.line] != Block.RADIUS)
-    side |= (blocks.letter == TURN) & (block[words.line] == Block.LINE)
+    side |= (blocks.letter == TURN) & is_in(block[words.line], (Block.LINE, Block.DIRECTED))
     statements = np.flatnonzero(block == Block.STATEMENT)
     return distinct(
         np.concatenate(

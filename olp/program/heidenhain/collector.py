@@ -14,7 +14,15 @@ from olp.core.toolpath import Flag, Frame, Kind
 from olp.program.dialect import Dialect
 from olp.program.heidenhain.chunk import LATE_M
 from olp.program.heidenhain.columns import Blocks
-from olp.program.program import ArcSlots, Definitions, Poles, Program, StatedFeeds, Statements
+from olp.program.program import (
+    ArcSlots,
+    Definitions,
+    Poles,
+    Program,
+    StatedFeeds,
+    Statements,
+    Towards,
+)
 from olp.program.rs274.collector import Collector
 from olp.program.tilts import Tilt
 
@@ -56,6 +64,8 @@ class Collected(Collector):
         self.definitions: list[tuple[int, int, int, int, float]] = []
         self.pauses: list[tuple[int, float]] = []
         self.tilts: list[Tilt] = []
+        #: directions of the tool: moves, what they state, and their words
+        self.towards: list[tuple[Index, Array, Index]] = []
 
     def put_blocks(self, blocks: Blocks) -> None:
         words = blocks.words
@@ -111,6 +121,7 @@ class Collected(Collector):
             remarks=tuple((name, line, text) for name, (line, text) in self.remarks.items()),
             end_line=end_line,
             tilts=tuple(self.tilts),
+            towards=self._directions(len(path)),
             levels=tuple(self.levels),
             statements=Statements(
                 begin=line_start[path.line - 1], end=line_end[path.line - 1],
@@ -119,6 +130,15 @@ class Collected(Collector):
                 definitions=Definitions.of(self.definitions),
             ),
         )  # fmt: skip
+
+    def _directions(self, count: int) -> Towards | None:
+        if not self.towards:
+            return None
+        towards = Towards.none(count, lasting=False)
+        for moves, stated, slot in self.towards:
+            towards.stated[moves] = stated
+            towards.slot[moves] = slot if self.keep_words else -1
+        return towards
 
     def _rests(self, line: npt.NDArray[np.int32]) -> tuple[Mask, Array]:
         take = self.columns.take

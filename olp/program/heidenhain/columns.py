@@ -39,6 +39,7 @@ class Block(IntEnum):
     POLE = 5  #: CC
     STATEMENT = 6  #: any other
     MORE = 7  #: goes on with the statement of the line before
+    DIRECTED = 8  #: LN, a straight move with the direction of the tool
 
 
 #: the letters that stand for words of several: incremental X, Y, Z, and an incremental rotary axis
@@ -52,6 +53,10 @@ SIDE = ord("G")
 STEP_ANGLE = ord("P")
 #: The letter of an angle.
 ANGLE = ord("O")
+#: The letters of a direction of the tool: TX, TY, TZ.
+DIRECTION = b"IJL"
+#: The letter of a component of the normal of a surface: NX, NY, NZ.
+NORMAL = ord("N")
 #: The letter of a feed that is a parameter.
 PARAMETER_FEED = ord("Q")
 _LONGEST_NAME = 2
@@ -72,7 +77,7 @@ _SOLID = bytes(byte > 32 and byte not in b"0123456789" for byte in range(256))
 #: The same of the letters that stand for something else here, and of brackets.
 _TAKEN = bytes(byte in b"DEHTKPOQG()" for byte in range(256))
 #: The same of the letters in each word of several.
-_SPELLED = bytes(byte in b"RDPIMUF" for byte in range(256))
+_SPELLED = bytes(byte in b"RDPIMUFTN" for byte in range(256))
 #: FAUTO: the feed of the TOOL CALL
 _AUTOMATIC = re.compile(rb"F([ \t]?)AUTO\Z")
 #: The number of a side by its second letter, 255 for none.
@@ -85,6 +90,7 @@ _PLAIN = np.arange(256, dtype=np.uint8)
 for _axis, _letter in _STEP_OF.items():
     _PLAIN[_letter] = _axis
 _IS_STEP = _table(bytes(_STEP_OF.values()))
+_IS_VECTOR = _table(bytes((*DIRECTION, NORMAL)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,15 +109,16 @@ class Blocks:
         return self.words.first_line + line + 1
 
 
-def blocks(data: bytes, tell: Progress, size: int = CHUNK) -> Iterator[Blocks]:
-    """A whole text, chunk by chunk, each ending at the end of a statement."""
+def blocks(data: bytes, tell: Progress, size: int = CHUNK, *, directed: bool = False) -> Iterator[Blocks]:
+    """A whole text, chunk by chunk, each ending at the end of a statement. LN is a motion block where the
+    tool may be `directed`."""
     text = np.frombuffer(data, np.uint8)
     start = line = 0
     while start < len(data):
         cut = len(data)
         if start + size < len(data):
             cut = _statement_end(data, start + size)
-        chunk = read(text[start:cut], start, line)
+        chunk = read(text[start:cut], start, line, directed=directed)
         line += len(chunk.block)
         start = cut
         yield chunk
@@ -131,8 +138,8 @@ def _statement_end(data: bytes, position: int) -> int:
         begin = newline + 1
 
 
-def read(text: Bytes, offset: int = 0, first_line: int = 0) -> Blocks:
-    """Whole lines; `offset` and `first_line` are where they begin in the text."""
+def read(text: Bytes, offset: int = 0, first_line: int = 0, *, directed: bool = False) -> Blocks:
+    """Whole lines; `offset` and `first_line` are where they begin in the text, `directed` as in `blocks`."""
     work = np.frombuffer(bytearray(text.tobytes().upper() + b"\n\n\n\n"), np.uint8)
     newline = np.flatnonzero(text == 10)
     ends = newline if newline.size and newline[-1] == len(text) - 1 else np.append(newline, len(text))
@@ -140,19 +147,25 @@ def read(text: Bytes, offset: int = 0, first_line: int = 0) -> Blocks:
     goes_on = _continued(work, starts, ends)
     _blank(work, *_comments(work, starts, ends))
     _without_operands(work)
-    block, content = _named(work, starts, ends)
+    block, content = _named(work, starts, ends, directed)
     block[1:][goes_on[:-1]] = Block.MORE
-    motion = (block >= Block.LINE) & (block <= Block.POLE)
+    motion = ((block >= Block.LINE) & (block <= Block.POLE)) | (block == Block.DIRECTED)
     _blank(work, starts, np.where(motion, content, ends))
     body = work[: len(text)]
     strange = _found(body, _TAKEN)
-    strange = strange[~_spelled(work, _found(body, _SPELLED))[strange]]
+    at, towards = _found(body, _SPELLED), block == Block.DIRECTED
+    known = _spelled(work, at)
+    if towards.any():
+        _vectors(work, at[towards[np.searchsorted(ends, at)]], known)
+    strange = strange[~known[strange]]
     words = lex(body, _TEXT, offset, first_line, strange=strange)
     letter = _PLAIN[words.letter]
     step = _IS_STEP[words.letter]
     if step.any():
         # a word of a step begins with its I
         words.start[step] -= 1
+    if towards.any():
+        words.start[_IS_VECTOR[letter]] -= 1
     value = np.asarray(words.mantissa / _POW10[words.decimals], float)
     return Blocks(words, letter, block, value, step)
 
@@ -195,7 +208,7 @@ def _blank(work: Bytes, begin: Index, end: Index) -> None:
     work[np.arange(int(length.sum())) + np.repeat(shift, length)] = 32
 
 
-def _named(work: Bytes, starts: Index, ends: Index) -> tuple[npt.NDArray[np.uint8], Index]:
+def _named(work: Bytes, starts: Index, ends: Index, directed: bool) -> tuple[npt.NDArray[np.uint8], Index]:
     """(lines,) what each line is, and where its words begin, behind its number and its name."""
     solid = np.append(_found(work, _SOLID), len(work) - 1)
     head = solid[np.searchsorted(solid, starts)]
@@ -210,8 +223,9 @@ def _named(work: Bytes, starts: Index, ends: Index) -> tuple[npt.NDArray[np.uint
     for name, kind in ((b"L", Block.LINE), (b"C", Block.ARC)):
         mine = some & (a == name[0]) & (b <= 32)
         block[mine], length[mine] = kind, 1
-    for second, kind in ((b"R", Block.RADIUS), (b"P", Block.POLAR), (b"C", Block.POLE)):
-        mine = some & (a == ord("C")) & (b == second[0]) & ~_LETTER[c]
+    names = [(b"CR", Block.RADIUS), (b"CP", Block.POLAR), (b"CC", Block.POLE)]
+    for name, kind in [*names, (b"LN", Block.DIRECTED)] if directed else names:
+        mine = some & (a == name[0]) & (b == name[1]) & ~_LETTER[c]
         block[mine], length[mine] = kind, _LONGEST_NAME
     block[some & bare] = Block.LINE
     return block, head + length
@@ -261,6 +275,15 @@ def _spelled(work: Bytes, at: Index) -> Mask:
     return known
 
 
+def _vectors(work: Bytes, at: Index, known: Mask) -> None:
+    """Put one letter for TX and such, whose letters are `at` some bytes, and note the bytes as `known`."""
+    for name, letters in ((ord("T"), DIRECTION), (ord("N"), bytes((NORMAL,) * 3))):
+        begin = at[work[at] == name]
+        for axis, letter in zip(b"XYZ", letters, strict=True):
+            own = begin[work[begin + 1] == axis]
+            work[own], work[own + 1], known[own] = 32, letter, True
+
+
 def _rapid(work: Bytes, at: Index) -> None:
     """Put F-1 for FMAX, whose MAX is `at` some bytes."""
     before = work[np.maximum(at - 1, 0)]
@@ -274,6 +297,8 @@ def _rapid(work: Bytes, at: Index) -> None:
 
 __all__ = [
     "ANGLE",
+    "DIRECTION",
+    "NORMAL",
     "OTHER_STEP",
     "PARAMETER_FEED",
     "SIDE",

@@ -61,6 +61,7 @@ DIALECT = Conversational(
     inch_decimals=4,
     leads="axes",
     tips_from_zero=True,
+    direction_words=(b"TX", b"TY", b"TZ"),
     comment=(b"; ", b""),
     first=(b"BEGIN PGM|0 BEGIN PGM|0  BEGIN PGM",),
 )

@@ -50,7 +50,7 @@ _TCPM = re.compile(
 )
 _FUNCTIONS = re.compile(rb"(?:L[ \t]+)?(?:M\d+[ \t]*)+")
 _PRESET = 339
-_MOTION = re.compile(rb"(?:L|CC?|CR|CP)[ \t]|[XYZABC][-+.\d]|I[XYZ]|[MF][ \t]*[-+.\dM]")
+_MOTION = re.compile(rb"(?:LN?|CC?|CR|CP)[ \t]|[XYZABC][-+.\d]|I[XYZ]|[MF][ \t]*[-+.\dM]")
 _SHIFT = 7
 _DWELL = 9
 _SELECT = 247

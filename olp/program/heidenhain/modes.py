@@ -21,6 +21,9 @@ TOOL_CALL = re.compile(
     rb'TOOL[ \t]+CALL(?:[ \t]*(?:"(?P<name>[^"]*)"|(?P<number>\d+)\b(?![.\d]))?)(?P<rest>.*)', re.I | re.S
 )
 _DELTA = re.compile(rb"\bDL[ \t]*=?[ \t]*([-+]?(?:\d+\.?\d*|\.\d+|Q\w*))", re.I)
+#: What makes the tool of a call larger or smaller than that of its table.
+_OVERSIZE = re.compile(rb"\bD(?:L|R2?)[ \t]*[=:]?[ \t]*[-+]?[ \t]*(?:\d+\.?\d*|\.\d+|Q\w*)", re.I)
+_OTHER_THAN_ZERO = re.compile(rb"[1-9Q]", re.I)
 _AXIS = re.compile(rb"^[ \t]*([XYZUVW])\b", re.I)
 #: a Heidenhain control counts feeds of inch programs in tenths of an inch
 _INCH_FEED = MM_PER_INCH / 10.0
@@ -38,6 +41,8 @@ class Modes:
         self.tool = setup.machine.default_tool
         self.length_active = setup.machine.length_active and self.tool is not None
         self.delta_mm = 0.0
+        #: whether DL, DR or DR2 of the last call are not 0
+        self.oversize = False
         #: the datum shift along the words, and in a tilted plane also the one below it
         self.shift: Vector = ZERO
         self.below: Vector = ZERO
@@ -198,6 +203,11 @@ class Modes:
                     code="OLP511",
                 )
             self.delta_mm = float(value) * self.unit_mm
+        stated = _OVERSIZE.findall(match["rest"])
+        if stated or match["name"] or match["number"]:
+            self.oversize = any(
+                _OTHER_THAN_ZERO.search(re.sub(rb"(?i)^DR2", b"", text)[1:]) for text in stated
+            )
         moved = number != self.tool
         self.tool, self.length_active = number, True
         if changes or delta is not None:

@@ -20,19 +20,29 @@ from olp.core.toolpath import Flag, Kind
 from olp.core.turns import turned
 from olp.program.dialect import Dialect, Options
 from olp.program.heidenhain.arcs import Arcs, along_frame
-from olp.program.heidenhain.chunk import KNOWN_LETTERS, UNTIPPED, Chunk, apart, columns_of, harmless
+from olp.program.heidenhain.chunk import (
+    IS_DIRECTED,
+    KNOWN_LETTERS,
+    UNTIPPED,
+    Chunk,
+    apart,
+    columns_of,
+    harmless,
+)
 from olp.program.heidenhain.collector import Collected
 from olp.program.heidenhain.columns import PARAMETER_FEED, SIDE, TURN, Block, Blocks, blocks
 from olp.program.heidenhain.modes import NAN, Modes
 from olp.program.heidenhain.planes import Plane, found_by_control
 from olp.program.heidenhain.statements import Statement, of_lines
 from olp.program.heidenhain.table import UNROLL
+from olp.program.heidenhain.vectors import put_directions, without_position
 from olp.program.program import Program
 from olp.program.rs274.motion import fill
 from olp.program.text.line_ends import stray_cr
 from olp.program.tilts import Tilt
 
 _ENDS = (2, 30)
+_STRAIGHT = (Block.LINE, Block.DIRECTED)
 _MACHINE = 91
 _DATUM = 92
 _CALL = 99
@@ -64,7 +74,7 @@ class _Reader(Arcs):
 
     def run(self, tell: Progress) -> Program:
         self._check_bytes()
-        for chunk in blocks(self.data, tell):
+        for chunk in blocks(self.data, tell, directed=bool(self.tips)):
             self._chunk(chunk)
         self.collector.remarks.update(self.modes.remarks)
         end = self.ended or self.data.count(b"\n") + 1
@@ -94,7 +104,8 @@ class _Reader(Arcs):
             return
         chunk, alone = columns_of(blocks, base), apart(blocks)
         polar = chunk.rows.line[chunk.rows.arc_row]
-        alone = distinct(np.concatenate((alone, polar[blocks.block[polar] == Block.POLAR])))
+        polar = polar[blocks.block[polar] == Block.POLAR]
+        alone = distinct(np.concatenate((alone, polar, without_position(chunk))))
         for line in alone.tolist():
             upto = int(np.searchsorted(chunk.rows.line, line))
             self._resolve(chunk, upto, line)
@@ -128,8 +139,10 @@ class _Reader(Arcs):
         if kind == Block.POLE:
             self.set_pole(chunk, line, words)
             return
-        functions = [round(float(blocks.value[w])) for w in words if blocks.letter[w] == ord("M")]
         here = row < len(chunk.rows) and chunk.rows.line[row] == line
+        if kind == Block.DIRECTED and not here:
+            raise ProgramError("LN has no coordinate; state X, Y and Z", line=number, code="OLP510")
+        functions = [round(float(blocks.value[w])) for w in words if blocks.letter[w] == ord("M")]
         self._functions(functions, number, here=here)
         if here and _MACHINE in functions:
             self._machine(chunk, row, number)
@@ -173,7 +186,7 @@ class _Reader(Arcs):
     def _check_letters(self, blocks: Blocks, words: range, kind: int, line: int) -> None:
         for w in words:
             letter = int(blocks.letter[w])
-            if not KNOWN_LETTERS[letter]:
+            if not KNOWN_LETTERS[letter] and not (kind == Block.DIRECTED and IS_DIRECTED[letter]):
                 raise ProgramError(
                     f"the word {chr(letter)} is not known in this block, and may move the machine",
                     line=line,
@@ -187,7 +200,7 @@ class _Reader(Arcs):
                     code="OLP513",
                     hint=UNROLL,
                 )
-            if (letter == ord("R") and kind != Block.RADIUS) or (letter == TURN and kind == Block.LINE):
+            if (letter == ord("R") and kind != Block.RADIUS) or (letter == TURN and kind in _STRAIGHT):
                 raise ProgramError(
                     f"the word {'R' if letter == ord('R') else 'DR'} is not expected in this block; state "
                     "another block, or take it away",
@@ -340,6 +353,7 @@ class _Reader(Arcs):
         )
         feed[rapid] = np.inf
         own = np.where(slot >= 0, slot + chunk.base, -1)
+        put_directions(modes, self.collector, chunk, line)
         self.collector.put_moves(kind, flag, number, np.full(len(line), index), end, own)
         self.collector.put_feeds(feed)
         modes.move_to(frame, end[-1].tolist(), words[-1])

@@ -89,7 +89,7 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"DEP": (_NO, _PATH),
     b"RL": (_NO, f"the control offsets the contour by the radius of the tool: {UNROLL}"),
     b"RR": (_NO, f"the control offsets the contour by the radius of the tool: {UNROLL}"),
-    b"LN": (_NO, "needs the direction of a surface, and rotary axes"),
+    b"LN": (_NO, "needs the rotary axes of the machine; describe them in the machine file"),
     b"SPL": (_NO, _CONTROL),
     **dict.fromkeys((b"FL", b"FLT", b"FC", b"FCT", b"FPOL", b"FSELECT"), (_NO, _FREE)),
     b"TCH PROBE": (_NO, _KNOWN_AT_RUN),
