@@ -81,7 +81,7 @@ def solve(writer: Writer, rows: Rows, by_angle: Mask | None = None) -> ArcRows:
     for group, count in groups:
         part = free[group]
         bend = sampled(path, writer.model, writer.targets, pieces.pick(part), tools, count)
-        best = fit(bend, plane[part], start[part], end[part], sweep[part])
+        best = fit(bend, plane[part], start[part], end[part], sweep[part], by_angle is not None)
         equal = (np.abs(sweep[part]) <= WIDE) & (np.abs(bend.mismatch) < 1e-6) & ~bend.rigid
         centre[part] = _on_bisector(start[part], end[part], best, plane[part], equal)
         # an arc that is only shifted keeps its words

@@ -82,10 +82,12 @@ def subdivide_arcs(
     turning: Mask | None,
     band: float,
     digit: float = 0.0,
+    one_radius: bool = False,
 ) -> Cuts:
     """Cuts (move, share, target) of the arcs that are `free` to be split and that one arc does not fit within
     `tolerance` mm; where an axis has backlash (`turning`), also where that axis turns round. A whole turn
-    that does not come back to its start is cut too, as its last `digit` (mm) would decide about a turn."""
+    that does not come back to its start is cut too, as its last `digit` (mm) would decide about a turn.
+    With `one_radius` no arc may end on another radius than it begins on."""
     arcs = path.arcs
     arc = np.flatnonzero(free[arcs.move])
     if not arc.size:
@@ -96,7 +98,7 @@ def subdivide_arcs(
     tools = path.tool_mm()
     done: list[Pieces] = []
     while len(pieces):
-        fitting = _fitting(path, model, target, pieces, tools, tolerance)
+        fitting = _fitting(path, model, target, pieces, tools, tolerance, one_radius)
         whole, pieces = _opened(path, model, target, fitting, tools, digit)
         done.append(whole)
     pieces = Pieces.joined(done)
@@ -108,8 +110,9 @@ def subdivide_arcs(
 
 
 def _fitting(
-    path: Toolpath, model: ErrorModel, target: Array, pieces: Pieces, tools: Array, tolerance: float
-) -> Pieces:
+    path: Toolpath, model: ErrorModel, target: Array, pieces: Pieces, tools: Array, tolerance: float,
+    one_radius: bool,
+) -> Pieces:  # fmt: skip
     """The pieces, divided until one arc fits each. Raises CannotCompute as `subdivide_arcs`."""
     arcs = path.arcs
     done: list[Pieces] = []
@@ -119,7 +122,7 @@ def _fitting(
             break
         away = np.zeros(len(pieces))
         for part, count in sample_groups(path, model, target, pieces, tools, tolerance):
-            away[part] = fit_pieces(path, model, target, pieces.pick(part), tools, count)
+            away[part] = fit_pieces(path, model, target, pieces.pick(part), tools, count, one_radius)
         good = away <= tolerance
         done.append(pieces.pick(good))
         # the departure of an arc goes with about the third power of its length
@@ -263,31 +266,34 @@ def _inside(play: Array) -> Array:
 
 
 def fit_pieces(
-    path: Toolpath, model: ErrorModel, target: Array, pieces: Pieces, tools: Array, count: int
-) -> Array:
+    path: Toolpath, model: ErrorModel, target: Array, pieces: Pieces, tools: Array, count: int,
+    one_radius: bool = False,
+) -> Array:  # fmt: skip
     """(n,) how far the best arc leaves the bent path of each piece, in mm, sampled at `count` steps."""
     bend = sampled(path, model, target, pieces, tools, count)
     sweep = path.arcs.sweep_rad[pieces.arc] * (pieces.end - pieces.begin)
     plane = path.arcs.plane[pieces.arc]
     ends = bend.command[:, 0], bend.command[:, -1]
-    away = departure(bend, plane, *ends, sweep, fit(bend, plane, *ends, sweep))
+    away = departure(bend, plane, *ends, sweep, fit(bend, plane, *ends, sweep, one_radius))
     away[bend.rigid] = 0.0
     return away
 
 
-def fit(bend: Bend, plane: npt.NDArray[np.int8], start: Array, end: Array, sweep: Array) -> Array:
+def fit(
+    bend: Bend, plane: npt.NDArray[np.int8], start: Array, end: Array, sweep: Array, one_radius: bool = False
+) -> Array:
     """Centres (n, 3) of the arcs from `start` to `end` that leave the samples least.
 
     Least squares on the radial distance; the radius goes linearly from one end to the other. The nominal
     difference of the radii (mostly 0) has a large weight. The weight is small for more than half a circle,
-    where a short chord would swing the far side.
+    where a short chord would swing the far side, unless the arc has `one_radius`.
     """
     command, share = bend.command, bend.share
     (q0, q1), (s0, s1), (e0, e1) = (_columns(some, plane)[:2] for some in (command, start, end))
     centre = bend.centre + (command[:, 0] - bend.point[:, 0] + command[:, -1] - bend.point[:, -1]) / 2
     x, y = _columns(centre, plane)[:2]
     x_start, y_start = x, y
-    strong = np.where(np.abs(sweep) > WIDE, 1.0, 100.0)[:, None]
+    strong = np.where((np.abs(sweep) > WIDE) & (not one_radius), 1.0, 100.0)[:, None]
     mismatch = bend.mismatch[:, None]
     soft = _STIFFNESS * _STIFFNESS
     for _ in range(4):

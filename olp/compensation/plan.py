@@ -21,13 +21,15 @@ from olp.errormodel.base import ErrorModel
 class Limits:
     """Limits of the plan: the numerical tolerance of model and chords and the last digit written, in mm.
     `split_rapids`: rapids are subdivided too. `refuse_outside`: commands outside the calibrated box are
-    refused. `insert`: a step that takes up backlash may be put before a move that is not split."""
+    refused. `insert`: a step that takes up backlash may be put before a move that is not split. `one_radius`:
+    arcs are written with the radius of their start, and may not end on another one."""
 
     tolerance_mm: float
     digit_mm: float = 0.0
     split_rapids: bool = False
     refuse_outside: bool = True
     insert: bool = True
+    one_radius: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)

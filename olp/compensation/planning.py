@@ -114,7 +114,9 @@ class Planning:
         tell("correct", 0.5)
         chord_arc = max(chord - ARC_DIGIT_SHARE * limits.digit_mm, 0.3 * limits.tolerance_mm)
         turning, band = (None, 0.0) if reversal is None else (reversal.axes, reversal.band_mm)
-        cuts_arc = subdivide_arcs(path, model, target, ~whole, chord_arc, turning, band, limits.digit_mm)
+        cuts_arc = subdivide_arcs(
+            path, model, target, ~whole, chord_arc, turning, band, limits.digit_mm, limits.one_radius
+        )
         tell("correct", 0.7)
         cuts = [cuts_line, cuts_arc]
         if contour is not None:

@@ -141,6 +141,7 @@ def limits_of(
     return Limits(
         options.tolerance_um * MM_PER_UM, digit_mm=last_digit_mm(program, loaded.setup),
         split_rapids=split_rapids, refuse_outside=refuse_outside, insert=not program.verbatim,
+        one_radius=program.arc_slots.poles is not None,
     )  # fmt: skip
 
 

@@ -46,3 +46,28 @@ def test_random_helices_end_within_tolerance(tmp_path: Path, plane: str, seed: i
     text = "G21 G90 G17 G94 G54 F1500\nG0 X0 Y0 Z0\n" + "".join(helix(rng, plane) for _ in range(12)) + "M2\n"
     report = olp.correct(text.encode(), machine).report
     assert report["deviation"]["path_max_um"] <= 1.0 + 0.87 * 0.1
+
+
+@pytest.mark.parametrize("seed", some_fast((16, 19, *range(8)), 5))
+def test_turns_about_a_pole_end_within_tolerance(tmp_path: Path, seed: int) -> None:
+    """CP of Heidenhain keeps its radius, so that a helix of nearly a turn cannot end where it should."""
+    rng = np.random.default_rng(seed)
+    recipe = Recipe(
+        chain=str(rng.choice(CHAINS)), controller="heidenhain", increment_mm=0.0001, waves=6.0,
+        off_datum=True, travel=((-300.0, 300.0), (-250.0, 250.0), (-250.0, 250.0)),
+        work_offsets={"G54": {"X_mm": 0.0, "set_by": "true"}}, tools={1: {"Z_mm": 60.0}},
+    )  # fmt: skip
+    machine = machines.random_machine(tmp_path, seed, recipe)
+    lines = ["BEGIN PGM A MM", "TOOL CALL 1 Z S1000", "L X+0 Y+0 Z+0 R0 FMAX"]
+    for _ in range(12):
+        x, y, z = rng.uniform(-60.0, 60.0, 3)
+        size = rng.choice([4.0, 30.0])
+        turn = rng.choice([rng.uniform(330.0, 390.0), rng.uniform(20.0, 1500.0)])
+        way = rng.choice(["+", "-"])
+        lines += [
+            f"L X{x:+.3f} Y{y:+.3f} Z{z:+.3f} F1500",
+            f"CC X{x + rng.uniform(0.5, size):+.3f} Y{y + rng.uniform(-size, size):+.3f}",
+            f"CP IPA{way}{turn:.3f} IZ{rng.uniform(-25.0, 25.0):+.3f} DR{way}",
+        ]
+    report = olp.correct("\n".join([*lines, "M30", "END PGM A MM\n"]).encode(), machine).report
+    assert report["deviation"]["path_max_um"] <= 1.0 + 0.87 * 0.1
