@@ -19,7 +19,8 @@ class Kept:
     """The corrected program with its flow, None where some lines cannot be kept; these are `differences`.
     `changed` are the lines that were changed, `repeated` those of them that run more than once.
 
-    `apart` is the program with the `calls` in some of its lines written out, where that may help."""
+    `apart` is the program with the `calls` in some of its lines written out, where that may help: those whose
+    passes differ, or all whose passes have the same numbers where none differs."""
 
     text: bytes | None
     differences: tuple[Difference, ...]

@@ -35,6 +35,7 @@ from olp.proof.judgement import Judgements
 from olp.workflows import refusals
 from olp.workflows.doubt import accepted_of, doubted
 from olp.workflows.kept import (
+    NOT_PROVED,
     Flow,
     findings_of,
     provably_kept,
@@ -218,6 +219,22 @@ def corrected(
     _refuse_stamped(program.data)
     loaded = loaded.reading(program)
     done = _rewritten(sources, program, loaded, options, refuse_doubts, tell)
+    try:
+        return _proved(sources, program, loaded, options, tell, outside, done)
+    except ProgramError as error:
+        kept = None if done.flow is None or done.flow.outer is not None else done.flow.kept
+        if error.code != NOT_PROVED or kept is None or kept.apart is None:
+            raise
+        failure = error
+    done = _rewritten(sources, program, loaded, options, refuse_doubts, tell, failure)
+    return _proved(sources, program, loaded, options, tell, outside, done)
+
+
+def _proved(
+    sources: Sources, program: Source, loaded: Loaded, options: CorrectOptions, tell: Progress,
+    outside: str, done: _Rewritten,
+) -> Run:  # fmt: skip
+    """Prove a program that was written with its corrections."""
     digest = digest_of(done.source.data)
     tell("prove", 0.7)
     reading = Options(tell=part(tell, 0.7, 0.78, "prove"))
@@ -247,7 +264,7 @@ def corrected(
             flat = done.unrolled
             kept = run.proof.holds or flat is None
             if not kept and not _as_good(run, prove(done.source.holding(flat or b""))):
-                raise ProgramError("it is above the tolerance then", code="OLP511")
+                raise ProgramError("it is above the tolerance then", code=NOT_PROVED)
     return replace(run, report=run.report | _written_report(done))
 
 
@@ -288,10 +305,11 @@ class _Rewritten:
 
 def _rewritten(
     sources: Sources, source: Source, loaded: Loaded, options: CorrectOptions, refuse_doubts: bool,
-    tell: Progress,
+    tell: Progress, failure: ProgramError | None = None,
 ) -> _Rewritten:  # fmt: skip
     """Read, plan and write. Where a program cannot keep its flow, calls whose passes need other numbers are
-    written out, and it is read again."""
+    written out, and it is read again. So are all of them where `failure` says that it is not proved as it
+    is."""
     read_kept = partial(
         refusals.read, sources, setup=loaded.setup, dialect=loaded.dialect,
         options=Options(tell=part(tell, 0.0, 0.2)), unrolling=options, kept=True,
@@ -309,13 +327,13 @@ def _rewritten(
         source, program = _as_path(source, program, loaded, Options(tell=part(tell, 0.0, 0.2)))
         inner = None
     done = _written(source, program, inner, loaded, options, refuse_doubts, tell)
-    if done.text is not None:
+    if done.text is not None and failure is None:
         return done
     assert inner is not None
     assert done.flow is not None
     first = done.flow.kept
     assert first is not None
-    refusal, outer = refused(first, inner.origin), first.apart
+    refusal, outer = failure or refused(first, inner.origin), first.apart
     if outer is None:
         raise refusal
     del done, program

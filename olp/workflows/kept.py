@@ -26,6 +26,8 @@ _LINES = 10
 #: Characters of a statement that a reason shows.
 _SHOWN = 60
 _UNROLL = "unroll the program with --flatten"
+#: The code of a program that is not proved with its flow kept.
+NOT_PROVED = "OLP511"
 _WAY_ON = f"so its loops and subprograms cannot be kept; {_UNROLL}"
 
 
@@ -95,7 +97,7 @@ def provably_kept() -> Iterator[None]:
         if error.code == "OLP561":
             raise
         why = f"with its loops and subprograms kept the program is not proved ({error.message}); {_UNROLL}"
-        raise ProgramError(why, line=error.line or 1, code="OLP511") from None
+        raise ProgramError(why, line=error.line or 1, code=NOT_PROVED) from None
 
 
 def through(unrolled: Unrolled, outer: Unrolled) -> Unrolled:

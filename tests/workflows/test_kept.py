@@ -284,7 +284,9 @@ def test_a_kept_program_above_tolerance_is_written_where_unrolling_does_not_help
     assert found.message.endswith("loops and subprograms are written out")
 
 
-def test_a_program_that_is_worse_when_kept_is_refused(machine: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_program_that_is_worse_when_kept_has_its_calls_written_out_or_is_refused(
+    machine: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """As a fault in keeping would make it: the numbers of one line are those of the nominal program."""
     from olp.program.rs274.flatten import kept
 
@@ -294,6 +296,10 @@ def test_a_program_that_is_worse_when_kept_is_refused(machine: Path, monkeypatch
         "_of_visits",
         lambda source, *rest: source if source.startswith(b"N20") else of_visits(source, *rest),
     )
+    done = olp.correct(SPRING.encode(), machine)
+    assert done.report["verdict"]["ok"]
+    assert {"OLP110"} <= {finding.code for finding in done.findings} and b"M98" not in done.data
+    monkeypatch.setattr(kept, "can_be_apart", lambda unrolled: False)
     with pytest.raises(ProgramError, match=r"above the tolerance then.*--flatten"):
         olp.correct(SPRING.encode(), machine)
 

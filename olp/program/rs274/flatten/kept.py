@@ -68,11 +68,19 @@ def kept(unrolled: Unrolled, corrected: bytes, starts: Index, profile: Profile) 
         changed.append(line)
         if counts.total() > 1:
             repeated.append(line)
-    if not differences:
-        return Kept(b"".join(lines), (), tuple(changed), tuple(repeated))
-    calls = _calls(unrolled, {d.line: visits[d.line] for d in differences}, texts, profile)
+    if differences:
+        calls = _calls(unrolled, {d.line: visits[d.line] for d in differences}, texts, profile)
+    else:
+        calls = _repeated_calls(unrolled, {line: visits[line] for line in repeated})
     program = apart(unrolled, calls, texts) if calls else None
-    return Kept(None, tuple(differences), tuple(changed), tuple(repeated), program, tuple(sorted(calls)))
+    whole = None if differences else b"".join(lines)
+    return Kept(whole, tuple(differences), tuple(changed), tuple(repeated), program, tuple(sorted(calls)))
+
+
+def _repeated_calls(unrolled: Unrolled, lines: Mapping[int, Mapping[int, Counter[_Visit]]]) -> frozenset[int]:
+    """The calls in which lines run more than once; empty where they cannot be written out."""
+    calls = frozenset(within for line, runs in lines.items() for within in runs if within != line)
+    return calls if calls and can_be_apart(unrolled) and calls <= runs_once(unrolled) else frozenset()
 
 
 def _calls(
