@@ -564,3 +564,26 @@ def test_an_arm_on_a_track_keeps_its_carriage(tmp_path: Path) -> None:
     assert olp.correct_joints(text([1500.0, 1400.0]), machine).data.count(b"LIN") == 1
     with pytest.raises(ProgramError, match="external axis"):
         olp.correct_joints(text([0.0, 0.0], ",E2 3.0"), machine)
+
+
+@pytest.mark.slow
+def test_a_wrist_that_a_straight_move_passes_straight_is_named(tmp_path: Path) -> None:
+    machine = arm_files(tmp_path)
+    begin, end = np.array([20.0, 10, 20, 0.5, 1.3572, 50]), np.array([19.46, 8.422, 20.513, 0.5, -5.664, 50])
+    with pytest.raises(ProgramError, match=r"the wrist is 0\.\d+ deg from straight"):
+        olp.correct_joints(krl([("P", begin), ("L", end)]), machine)
+
+
+@pytest.mark.slow
+def test_moves_behind_a_loop_or_a_call_are_not_listed_as_left(tmp_path: Path) -> None:
+    """They are corrected at their ends, and a finding says so."""
+    machine = arm_files(tmp_path)
+    kinds = enumerate(("PTP", "LIN", "PTP", "LIN"))
+    moves = [f"{kind} {position(JOINTS + k, ',S 2,T 0')}" for k, kind in kinds]
+    frames = KRL_HEAD.decode().split("\n", 1)[1]
+    lines = [moves[0], "FOR i=1 TO 3", moves[2], moves[1], "ENDFOR", "other()", frames, moves[2], moves[3]]
+    report = olp.correct_joints(krl_of(*lines), machine).report
+    codes = [one["code"] for one in report["findings"]]
+    assert "OLP102" not in codes
+    assert "OLP331" in codes
+    assert report["moves"]["uncorrected"] == 0

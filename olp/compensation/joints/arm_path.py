@@ -34,6 +34,10 @@ _BORDER = 0.01
 _FURTHEST_DEG = 180.0
 #: Axes of a straight move that are this near to even ones, deg, are those of the nearest posture.
 _NEAR_DEG = 15.0
+#: The column of the wrist in `Arm.branches`.
+_WRIST = 2
+#: A wrist that is this near to straight is named as a cause, deg.
+_STRAIGHT_DEG = 5.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,6 +48,14 @@ class ArmPath(JointPath):
 
     from_level: bool = False
     half_deg: Array = field(default_factory=lambda: np.zeros((0, AXES)))
+
+    def singular(self, axes: Array) -> str:
+        arm = arm_of(self.motion.structure)
+        assert arm is not None
+        straight = abs(float(arm.branches(axes[None, None])[0, 0, _WRIST]))
+        if straight > _STRAIGHT_DEG:
+            return ""
+        return f": the wrist is {straight:.2g} deg from straight, where two of its axes turn the tool alike"
 
     def between(self, start: Array, end: Array, share: Array, move: Index) -> Array:
         place = np.asarray(start + share[:, None] * (end - start))

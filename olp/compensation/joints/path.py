@@ -99,6 +99,10 @@ class JointPath:
             assert error.row is not None
             raise unreached(int(self.line[move[error.row]])) from None
 
+    def singular(self, axes: Array) -> str:
+        """Words on a singular posture that axis values (axes,) are near; empty where they are near none."""
+        return ""
+
     def samples(self, move: Index, begin: Array, end: Array, share: Array | float = 1.0) -> Index:
         """(r,) how many samples lie on stretches of moves between axis values; they take `share` of these."""
         straight = Resolution.of(self.motion).samples(begin, end)

@@ -170,14 +170,17 @@ def _commanded(path: JointPath, move: Index, axes: Array, tool: Index, shift: Ar
     except NotInvertible as error:
         if not error.rows:
             raise
+        rows = np.array(error.rows)
+        lines, first = np.unique(path.line[move[rows]], return_index=True)
         raise ProgramError.together(
             ProgramError(
-                "no axis values bring the tool to where this move has it; expected a target within reach, "
+                "no axis values bring the tool to where this move has it"
+                f"{path.singular(axes[rows[row]])}; expected a target within reach, "
                 "away from a singular posture",
                 line=line,
                 code="OLP566",
             )
-            for line in distinct(path.line[move[list(error.rows)]]).tolist()
+            for line, row in zip(lines.tolist(), first.tolist(), strict=True)
         ) from None
     out = np.flatnonzero(done.beyond.any(axis=1))
     if out.size:
@@ -218,10 +221,12 @@ def _split(path: JointPath, begin: _Rows, end: _Rows, limits: JointLimits) -> li
         order = np.lexsort(key[::-1])
         begin, end = begins, _Rows.join([rows, end]).only(order)
     if len(begin.move):
+        first = int(np.argmin(path.line[begin.move]))
         raise ProgramError(
-            "between the ends of this move no number of splits keeps the path within tolerance; expected an "
+            "between the ends of this move no number of splits keeps the path within tolerance"
+            f"{path.singular(begin.axes[first])}; expected an "
             "error without steps; raise --tolerance-um or --tolerance-urad",
-            line=int(path.line[begin.move].min()),
+            line=int(path.line[begin.move[first]]),
             code="OLP566",
         )
     return found

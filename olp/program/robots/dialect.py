@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import count
+from typing import Protocol
 
 import numpy as np
 
@@ -11,12 +12,22 @@ from olp.core.arrays import Array, Mask
 from olp.core.values import dataclass
 from olp.program.dialect import StatementDialect
 from olp.program.program import Program
-from olp.program.robots.poses import Quaternion
+from olp.program.robots.poses import Quaternion, zyx_of
 from olp.program.robots.targets import Part, Target, Use
 from olp.program.text.numbers import spliced
 
 #: Bytes of the text from one position up to another, and what replaces them.
 Replacement = tuple[int, int, bytes]
+
+
+class Postures(Protocol):
+    """What words of a language say of postures (`RobotDialect.fitting` and `turns_of`): a module of it."""
+
+    def fitting(self, config: Array, axes: Array, branches: Array, /) -> tuple[Array, Mask]: ...
+
+    def turns(
+        self, config: Sequence[float], nominal: Sequence[float], corrected: Sequence[float], /
+    ) -> list[int | None]: ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,7 +36,8 @@ class RobotDialect(StatementDialect):
     target of a part of a move needs a name. A name has `longest_name` characters at most; None: any number.
     A statement ends with its line, or where the reader says so. With `for_arms` programs are read on arms,
     too; `turn_decimals` are the fewest of a number of an orientation, and its unit is `turn_unit_rad`. Joint
-    values are in units of `joint_unit_deg` and have `joint_decimals` at least."""
+    values are in units of `joint_unit_deg` and have `joint_decimals` at least. `postures` reads its words of
+    postures, None where it has none."""
 
     decimals: int
     for_arms: bool = False
@@ -35,6 +47,7 @@ class RobotDialect(StatementDialect):
     joint_unit_deg: float = 1.0
     names_parts: bool = False
     longest_name: int | None = None
+    postures: Postures | None = None
 
     def continues(self, line: bytes) -> bool:
         return False
@@ -81,20 +94,23 @@ class RobotDialect(StatementDialect):
         return begin, begin, spliced(data[begin:end], own) + close + program.eol(line) + blanks
 
     def turn_values(self, turn: Quaternion, stated: Sequence[float]) -> Sequence[float]:
-        """The numbers of an orientation as the language states it, those that are near `stated` ones."""
-        raise NotImplementedError
+        """The numbers of an orientation as the language states it, those that are near `stated` ones. Where a
+        language says nothing else: angles in degrees about Z, Y and X, each about an axis that is turned."""
+        return zyx_of(turn, stated[0])
 
     def fitting(self, config: Array, axes: Array, branches: Array) -> tuple[Array, Mask]:
         """Which postures (n, 8, 6) are those that the words (n, k) of targets name: (n, 8, 6) their axis
         values with turns, and (n, 8) whether they are. A word that is NaN names all. `branches` are
         (n, 8, 4) as in `Arm.branches`."""
-        return axes, np.isfinite(axes[:, :, 0])
+        if self.postures is None:
+            return axes, np.isfinite(axes[:, :, 0])
+        return self.postures.fitting(config, axes, branches)
 
     def turns_of(
         self, config: Sequence[float], nominal: Sequence[float], corrected: Sequence[float]
     ) -> list[int | None]:
         """The numbers of `Target.turns` for six corrected axis values; None for one that stays."""
-        return []
+        return [] if self.postures is None else self.postures.turns(config, nominal, corrected)
 
     def turn_texts(
         self, program: Program, target: Target, nominal: Sequence[float], corrected: Sequence[float]

@@ -76,6 +76,7 @@ class RobotMoves:
         self.targets: list[Target] = []
         self.uses: list[Use | None] = []
         self.arcs: list[Arc] = []
+        self.gaps: list[int] = []
         self._remarks: dict[str, tuple[str, int, str]] = {}
         self.known = True
         self._frame = -1
@@ -88,7 +89,8 @@ class RobotMoves:
         self._at: tuple[Located, Tool, Vector, tuple[float, ...]] | None = None
         self._on_track: dict[tuple[str, float], Pose] = {}
         self._first_turns: dict[str, Quaternion] = {}
-        self._index: dict[tuple[str, str, Quaternion, Vector], int] = {}
+        #: numbers of frames, with what they are the numbers of: two tools may have the same name
+        self._index: dict[tuple[int, int, Quaternion, Vector], tuple[int, Located, Tool]] = {}
 
     @property
     def count(self) -> int:
@@ -178,7 +180,7 @@ class RobotMoves:
         begin = self._at if self.known and self._turn is not None else None
         targets = [self.targets[use.target] for use in (via, end)]
         outer = [target.outer for target in targets]
-        if begin is None or self._turn is None or (begin[0].name, begin[1].name) != (frame.name, tool.name):
+        if begin is None or self._turn is None or begin[:2] != (frame, tool):
             raise not_read(
                 "where this arc begins is not stated, or in another frame or with another tool; program a "
                 "straight move to its start before it, with the frame and the tool of the arc",
@@ -246,11 +248,12 @@ class RobotMoves:
         """The number of the frame of a move."""
         # the joints of an arm turn the tool, so its vector is none of a frame
         turn = NO_TURN if self.arm else use.turn
-        key = (frame.name, tool.name, turn, use.shift_mm)
-        index = self._index.get(key)
-        if index is None:
-            index = self._index[key] = self.frames.index(frame, tool, turn, use.shift_mm, line)
-        return index
+        key = (id(frame), id(tool), turn, use.shift_mm)
+        known = self._index.get(key)
+        if known is None:
+            index = self.frames.index(frame, tool, turn, use.shift_mm, line)
+            known = self._index[key] = index, frame, tool
+        return known[0]
 
     def joint_move(
         self, line: int, taken: Callable[[], Use | None], *, straight: bool = False,
@@ -289,6 +292,8 @@ class RobotMoves:
         if track is None or not target.outer or abs(target.outer[0]) >= ABSENT:
             return frame.pose, None
         along = target.outer[0]
+        what = "the arm is carried along its track: errors of the track itself are not corrected"
+        self.remark("track", target.line, what)
         key = frame.name, along
         if key not in self._on_track:
             x, y, z = (a - along * b for a, b in zip(frame.pose.origin_mm, track, strict=True))
@@ -299,6 +304,7 @@ class RobotMoves:
         """The machine may have gone to a position that the text does not state."""
         self.known, self._turn, self._rest = True, None, ()
         if self.uses:
+            self.gaps.append(self.count)
             self._open(line, max(self._frame, 0))
 
     def left(self, line: int) -> None:
@@ -336,7 +342,8 @@ class RobotMoves:
         )  # fmt: skip
         path = program.toolpath
         path.end_mm[:] = placed_in(frames, path.frame, path.end_mm)
-        return replace(program, targets=Targets(tuple(self.targets), tuple(self.uses), tuple(self.arcs)))
+        targets = Targets(tuple(self.targets), tuple(self.uses), tuple(self.arcs), tuple(self.gaps))
+        return replace(program, targets=targets)
 
 
 def placed_in(frames: Sequence[Frame], number: npt.NDArray[np.int32], points: Array) -> Array:

@@ -117,11 +117,13 @@ class Arc:
 @dataclass(frozen=True, slots=True, eq=False)
 class Targets:
     """All targets of a program, and (n,) what each of its moves uses; None for a move that the text does not
-    state as a target. `arcs` are those among the moves, in their order."""
+    state as a target. `arcs` are those among the moves, in their order, and `gaps` the moves that no
+    statement makes: before the next one the machine may have gone anywhere."""
 
     targets: tuple[Target, ...]
     uses: tuple[Use | None, ...]
     arcs: tuple[Arc, ...] = ()
+    gaps: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 
 from olp.checks.base import finding
+from olp.checks.listed import remark_findings
 from olp.compensation.joints.arm_path import ArmPath
 from olp.compensation.joints.path import JointPath
 from olp.compensation.joints.planning import JointPlan
 from olp.compensation.style import fewest_decimals
-from olp.core.arrays import Array, Mask
+from olp.core.arrays import Array, Index, Mask
 from olp.core.toolpath import Kind
 from olp.core.units import RAD_PER_URAD, UM_PER_MM
 from olp.findings.catalogue import Finding
@@ -73,8 +74,7 @@ def report_of(
     tolerance: tuple[float, float],
 ) -> dict[str, Any]:  # fmt: skip
     program = path.program
-    solid = np.isfinite(plan.command).all(axis=1)
-    kept = np.setdiff1d(np.arange(len(path)), plan.move[solid])
+    kept = _kept(path, plan)
     return {
         "schema": "olp-joints-1",
         "program": {
@@ -185,6 +185,14 @@ def _worst(path: JointPath, proof: JointProof) -> list[dict[str, Any]]:
     ]
 
 
+def _kept(path: JointPath, plan: JointPlan) -> Index:
+    """The moves that are left uncorrected."""
+    solid = np.isfinite(plan.command).all(axis=1)
+    targets = path.program.targets
+    gaps = () if targets is None else targets.gaps
+    return np.setdiff1d(np.arange(len(path)), np.append(plan.move[solid], np.array(gaps, np.int64)))
+
+
 def findings_of(
     path: JointPath, plan: JointPlan, proof: JointProof, run: JointRun, date: datetime.date | None
 ) -> tuple[Finding, ...]:  # fmt: skip
@@ -198,16 +206,13 @@ def findings_of(
         most_um = float(proof.after.distance_mm[holes].max()) * UM_PER_MM
         what = f"{int(holes.sum())} holes are off by up to {most_um:.2f} um along the stroke"
         found.append(finding("OLP105", what, path.line[holes].tolist()))
-    solid = np.isfinite(plan.command).all(axis=1)
-    kept = np.ones(len(path), bool)
-    kept[plan.move[solid]] = False
-    if kept.any():
-        found.append(
-            finding("OLP102", f"{int(kept.sum())} moves are left uncorrected", path.line[kept].tolist())
-        )
+    kept = _kept(path, plan)
+    if len(kept):
+        found.append(finding("OLP102", f"{len(kept)} moves are left uncorrected", path.line[kept].tolist()))
     if plan.limited.any():
         what = "near a singular posture: the position is met, and a rest of the orientation is left"
         found.append(finding("OLP106", what, path.line[plan.move[plan.limited]].tolist()))
+    found += remark_findings(path.program)
     if not proof.judged.any():
         found.append(finding("OLP107", "no feed move was corrected at a known position"))
     if run.calibration is not None:

@@ -63,7 +63,7 @@ def zero(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize("seed", range(4))
 def test_each_position_is_where_the_judge_wants_it(bent: Path, zero: Path, seed: int) -> None:
     text = program(np.random.default_rng(seed), 30)
-    assert olp.correct(text, zero).data == text
+    assert olp.correct(text, zero, outside_box="hold").data == text
     done = olp.correct(text, bent)
     assert done.report["verdict"]["ok"]
     nominal, written, model = krl.moves(*halves(text)), krl.moves(*halves(done.data)), JudgeModel(bent)
@@ -206,3 +206,11 @@ def test_a_refusal_names_the_file_of_data(zero: Path, tmp_path: Path) -> None:
     (tmp_path / "a.DAT").unlink()
     with pytest.raises(OlpError, match=r"XP1 is not stated in this text; give the \.dat file beside it"):
         olp.correct(tmp_path / "a.SRC", zero)
+
+
+def test_data_of_another_module_are_refused(zero: Path) -> None:
+    text = f"DEF a()\n$TOOL={P}\n$BASE={P}\nPTP XP1\nEND\n".encode() + DAT
+    assert olp.correct(text, zero, outside_box="hold").data == text
+    with pytest.raises(ProgramError, match="those of b, and the program is A") as error:
+        olp.correct(text.replace(b"DEFDAT a", b"DEFDAT b"), zero)
+    assert error.value.line == 6

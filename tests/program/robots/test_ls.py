@@ -195,3 +195,20 @@ def test_behind_what_may_move_only_the_end_is_corrected(bent: Path, between: str
     assert split.report["moves"]["inserted_blocks"] > 0
     assert whole.report["moves"]["inserted_blocks"] == 0
     assert any("where this move begins" in finding.message for finding in whole.findings)
+
+
+def test_what_the_program_says_of_frames_and_tools_is_held_against_the_job(tmp_path: Path) -> None:
+    """Also behind a move for which it said nothing yet."""
+    recipe = replace(RECIPE, tools={1: {"gauge_to_tip_mm": [0.0, 0.0, -120.0]}})
+    path = machines.zero_machine(tmp_path, recipe)
+    words = [f"PR[1,{k}]={v}" for k, v in enumerate((0, 0, -100, 0, 0, 0), 1)]
+    where = [position(1, [1, 2, 3])]
+    for first in ([], ["J P[1] 50% FINE"]):
+        lines = [*first, *words, "UTOOL[1]=PR[1]", "J P[1] 50% FINE"]
+        with pytest.raises(OlpError, match=r"UTOOL1 is stated by the program and by \[tools.1\]"):
+            olp.correct(text_of(lines, where), path)
+    lines = ["UFRAME_NUM=2", "UTOOL_NUM=1", "Weave Sine[1]", "J P[1] 50% FINE", "Weave End[1]"]
+    told = [one["message"] for one in olp.correct(text_of(lines, where), path).report["findings"]]
+    assert "P[1] is in UFRAME 1, and UFRAME_NUM is 2 here: the control stops" in told
+    assert any("the tool weaves from here on" in one for one in told)
+    assert not any("UTOOL" in one for one in told)

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import radians
 
-from olp.core.arrays import Array, Mask
 from olp.core.errors import ProgramError
 from olp.core.patterns import pattern
 from olp.core.values import dataclass
@@ -16,7 +14,7 @@ from olp.program.robots.krl.data import is_declaration
 from olp.program.robots.krl.reader import read
 from olp.program.robots.krl.table import TABLE
 from olp.program.robots.krl.text import aggregate
-from olp.program.robots.poses import Quaternion, between, zyx_of
+from olp.program.robots.poses import between, zyx_of
 from olp.program.robots.targets import NOWHERE, Part, Target, Use
 from olp.program.text.numbers import spliced
 from olp.program.text.signs import KRL
@@ -78,17 +76,6 @@ class Krl(RobotDialect):
         place = int(program.line_end[target.line - 1])
         return place, place, program.eol(target.line) + blanks + head[0] + b" " + name.encode() + b"=" + text
 
-    def turn_values(self, turn: Quaternion, stated: Sequence[float]) -> Sequence[float]:
-        return zyx_of(turn, stated[0])
-
-    def fitting(self, config: Array, axes: Array, branches: Array) -> tuple[Array, Mask]:
-        return postures.fitting(config, axes, branches)
-
-    def turns_of(
-        self, config: Sequence[float], nominal: Sequence[float], corrected: Sequence[float]
-    ) -> list[int | None]:
-        return postures.turns(config, nominal, corrected)
-
     @staticmethod
     def _unzoned(program: Program, use: Use) -> list[Replacement]:
         """Takes away what says how a move ends, with the blanks before it."""
@@ -126,6 +113,7 @@ DIALECT = Krl(
     table=TABLE,
     decimals=5,
     for_arms=True,
+    postures=postures,
     turn_decimals=6,
     turn_unit_rad=radians(1.0),
     longest_name=24,

@@ -36,6 +36,7 @@ _HOME = pattern(rb"XHOME\d*")
 _NAME = pattern(rb"([A-Za-z_]\w*)\s*(?:\[\s*([^\]]*?)\s*\])?")
 _SENSOR = pattern(rb"(?i)(RSI_MOVECORR|RSI_ON)\b")
 _TRIGGER = pattern(rb"(?i)(?:TRIGGER|SYN\s+(?:OUT|PULSE))\b")
+_DATA_OF = pattern(rb"(?i)(?:GLOBAL\s+)?DEFDAT\s+(\w+)")
 _LEADS = pattern(
     rb"(?i)(?:GOTO|EXIT|RETURN|HALT|CONTINUE|WAIT|INTERRUPT|BRAKE|RESUME|ANIN|ANOUT|DIGIN|ENDSPLINE)\b"
 )
@@ -147,6 +148,7 @@ class _Reader:
         """Where the flow of the program parts and meets."""
         if kind == "data":
             self.listed = line.text.upper().find(b"DEFDAT") >= 0
+            self._module(line)
         elif kind in ("routine", "last"):
             self.blocks = []
             self.moves.known = False
@@ -162,6 +164,18 @@ class _Reader:
             self.blocks.append(_Block(kind == "loop", self.moves.count, self.active.state, []))
         elif self.blocks:
             self._branch(kind, line)
+
+    def _module(self, line: Line) -> None:
+        """Raises ProgramError where a list of data is that of another module."""
+        names = (flow.routine_of(every.text) for every in self.lines)
+        data, own = _DATA_OF.match(line.text), next((name for name in names if name), b"")
+        if data is not None and own and data[1].upper() != own:
+            raise ProgramError(
+                f"the data are those of {data[1].decode('latin-1')}, and the program is "
+                f"{own.decode('latin-1')}; give the two files of one module",
+                line=line.line,
+                code="OLP533",
+            )
 
     def _branch(self, kind: str, line: Line) -> None:
         block = self.blocks[-1]

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import radians
 
-from olp.core.arrays import Array, Mask
 from olp.core.patterns import pattern
 from olp.core.spool import whole
 from olp.core.values import dataclass
@@ -15,7 +13,7 @@ from olp.program.robots.ls import postures
 from olp.program.robots.ls.reader import read
 from olp.program.robots.ls.table import TABLE
 from olp.program.robots.ls.text import line_count, lines, parts
-from olp.program.robots.poses import Quaternion, between, zyx_of
+from olp.program.robots.poses import between, zyx_of
 from olp.program.robots.targets import Part, Target, Use
 from olp.program.text.numbers import spliced
 from olp.program.text.signs import LS
@@ -103,17 +101,6 @@ class Ls(RobotDialect):
             return []
         return [(*stated[0], str(stated[1] + blocks).encode())]
 
-    def turn_values(self, turn: Quaternion, stated: Sequence[float]) -> Sequence[float]:
-        return zyx_of(turn, stated[0])
-
-    def fitting(self, config: Array, axes: Array, branches: Array) -> tuple[Array, Mask]:
-        return postures.fitting(config, axes, branches)
-
-    def turns_of(
-        self, config: Sequence[float], nominal: Sequence[float], corrected: Sequence[float]
-    ) -> list[int | None]:
-        return postures.turns(config, nominal, corrected)
-
     @staticmethod
     def _value(program: Program, target: Target, part: Part, use: Use) -> bytes:
         """A position with other numbers, and the orientation at the end of a part."""
@@ -146,6 +133,7 @@ DIALECT = Ls(
     decimals=3,
     names_parts=True,
     for_arms=True,
+    postures=postures,
     turn_decimals=6,
     turn_unit_rad=radians(1.0),
 )

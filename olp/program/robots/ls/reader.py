@@ -61,11 +61,13 @@ _MOVING = pattern(
     rb"(?i)\s*(?:Touch\s+Offset|Search\s+Start|Track\b|VISION\s+.*OFFSET|(?:TOOL_)?OFFSET\s+COND)"
 )
 _ASSIGNED = pattern(rb"(?i)\s*P\[\s*(\d+)[^\]]*\]\s*=")
+#: Statements by which the tool swings about the path from here on.
+_WEAVE = pattern(rb"(?i)\s*Weave\s+(?!End\b).*")
 #: Statements that neither move nor lead elsewhere.
 _STILL = pattern(
     rb"(?i)\s*(?:!.*|//.*|--.*|(?:R|DO|RO|GO|AO|F|SO|SR|UO|TIMER|AR|VR|SI)\[.*|WAIT\b.*|WARTE\b.*|PAYLOAD\b.*|"
     rb"PAUSE|UALM\b.*|OVERRIDE\b.*|\$.*|JMP\s+LBL\b.*|IF\b.*,\s*JMP\s+LBL\b.*|MESSAGE\b.*|"
-    rb"RSR\b.*|COL\s+.*|Arc\s+.*|Weld\s+.*|Weave\s+.*|LOCK\s+.*|UNLOCK\s+.*|COMMENT\b.*|SKIP\s+CONDITION\b.*|"
+    rb"RSR\b.*|COL\s+.*|Arc\s+.*|Weld\s+.*|Weave\s+End\b.*|LOCK\s+.*|UNLOCK\s+.*|COMMENT\b.*|SKIP\s+CONDITION\b.*|"
     rb"MONITOR\b.*|TC_ONLINE\b.*|JOINT_MAX_SPEED\b.*|LINEAR_MAX_SPEED\b.*|POINT_LOGIC\b.*|ACC\b.*|"
     rb"STOP_TRACKING\b.*)?\s*"
 )
@@ -145,6 +147,10 @@ class _Reader:
         if _MOVING.match(text):
             raise not_read("targets are moved by what a sensor or a register says", line.line)
         if self.registers.take(text) or _STILL.fullmatch(text):
+            return
+        if _WEAVE.fullmatch(text):
+            what = "the tool weaves from here on: the path about which it swings is corrected and judged"
+            self.moves.remark("weave", line.line, what)
             return
         block = _BLOCK.fullmatch(text)
         if block is not None:
@@ -234,6 +240,11 @@ class _Reader:
         along_tool: bool = False,
     ) -> Use:  # fmt: skip
         index = self._target(number, position)
+        for name, own, active in (("UFRAME", position.frame, self.registers.frame),
+                                  ("UTOOL", position.tool, self.registers.tool)):  # fmt: skip
+            if min(own, active) >= 0 and own != active:
+                what = f"P[{number}] is in {name} {own}, and {name}_NUM is {active} here: the control stops"
+                self.moves.remark(name, line.line, what)
         return Use(
             index, (line.span[0], line.span[1]), place, place, shift, self.moves.targets[index].turn,
             zone=(line.first, line.span[1]), along_tool=along_tool,

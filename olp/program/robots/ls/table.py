@@ -27,6 +27,7 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"UFRAME_NUM=": (_R, "the frame of positions with UF : F"),
     b"UTOOL_NUM=": (_R, "the tool of positions with UT : F"),
     b"LBL, CALL, IF, FOR": (_R, "where moves depend on the run, the next one is corrected at its end"),
+    b"Weave": (_R, "the path about which the tool swings is corrected, and a finding says so"),
     b"Skip": (_R, "the move is never split, and where the next one begins is not known"),
     b"TB, TA, DB, AP_LD, RT_LD": (_R, "the move is never split"),
     b"ACC, PTH, EV": (_X, ""),

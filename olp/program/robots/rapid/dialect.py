@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from olp.core.arrays import Array, Mask
 from olp.core.patterns import pattern
 from olp.core.values import dataclass
 from olp.program.program import Program
@@ -69,14 +68,6 @@ class Rapid(RobotDialect):
         against = sum(a * b for a, b in zip(turn, stated, strict=True)) < 0.0
         return tuple(-value for value in turn) if against else turn
 
-    def fitting(self, config: Array, axes: Array, branches: Array) -> tuple[Array, Mask]:
-        return postures.fitting(config, axes, branches)
-
-    def turns_of(
-        self, config: Sequence[float], nominal: Sequence[float], corrected: Sequence[float]
-    ) -> list[int | None]:
-        return postures.quarters(config, nominal, corrected)
-
     @staticmethod
     def _value(program: Program, part: Part, use: Use) -> bytes:
         """The target of a move with other numbers, and the orientation at the end of a part."""
@@ -107,6 +98,7 @@ DIALECT = Rapid(
     table=TABLE,
     decimals=4,
     for_arms=True,
+    postures=postures,
     turn_decimals=9,
     turn_unit_rad=2.0,
     longest_name=32,

@@ -37,9 +37,7 @@ def fitting(config: Array, axes: Array, branches: Array) -> tuple[Array, Mask]:
     return values, fits
 
 
-def quarters(
-    config: Sequence[float], nominal: Sequence[float], corrected: Sequence[float]
-) -> list[int | None]:
+def turns(config: Sequence[float], nominal: Sequence[float], corrected: Sequence[float]) -> list[int | None]:
     """As `RobotDialect.turns_of`. One that did not say where the axis is stays."""
     found: list[int | None] = []
     for place, column in enumerate(_STATED):
