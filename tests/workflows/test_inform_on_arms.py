@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from judge import inform
 from judge.arm_files import arm_files
+from judge.robot_moves import PULSES_PER_DEG
 from workflows.test_robots_on_arms import JOINTS, angles, jbi, local, stated
 
 import olp
@@ -78,6 +79,20 @@ def test_posture_refused_with_its_line(words: str, told: str, machine: Path) -> 
     assert caught.value.line == 14
 
 
+@pytest.mark.parametrize("r_deg", [-185.0, 185.0])
+def test_an_axis_beyond_half_a_turn_turns_back_to_there(r_deg: float, machine: Path) -> None:
+    """The word says that it is beyond, the pose on which side: pulses next to it are the proof."""
+    joints = JOINTS.copy()
+    joints[3] = r_deg
+    pulses = ",".join(f"{v * PULSES_PER_DEG:.0f}" for v in joints + 0.5)
+    taught = [
+        f"///RCONF 1,0,0,1,0,0\r\nC00000={pose(joints)}",
+        f"///POSTYPE PULSE\r\n///PULSE\r\nC00001={pulses}",
+    ]
+    result = olp.correct_joints(job(taught, ["MOVJ C00000 VJ=5.00", "MOVL C00001 V=5.0"]), machine)
+    assert result.report["verdict"]["ok"]
+
+
 def test_pulses_need_the_key_of_all_axes(machine: Path) -> None:
     text, own = jbi([("J", JOINTS), ("L", JOINTS + 1.0)]), machine.read_text("utf-8")
     key = "pulses_per_deg = 100000.0\n"
@@ -117,6 +132,22 @@ def test_a_straight_move_to_another_posture_is_refused(machine: Path) -> None:
     assert text.splitlines()[caught.value.line - 1].startswith(b"MOVL")
 
 
+def test_a_positioner_moves_beside_the_robot(machine: Path) -> None:
+    """It carries the arm nowhere, and while it turns a move is not split."""
+    far = JOINTS + np.array([20, 5, -5, 5, -4, 6])
+    stations = "///POSTYPE PULSE\r\n///PULSE\r\nEC00000=5000,-70\r\nEC00001={}"
+    moves = [
+        f"MOV{word} C0000{k} V{speed}  +MOVJ EC0000{k}"
+        for k, (word, speed) in enumerate([("J", "J=5.00"), ("L", "=9.0")])
+    ]
+    taught = [f"C00000={pose(JOINTS)}", f"C00001={pose(far)}"]
+    parts = [
+        olp.correct_joints(job([*taught, stations.format(value)], moves), machine).data.count(b"MOVL")
+        for value in ("5000,-70", "6000,-70")
+    ]
+    assert parts[0] > parts[1] == 1
+
+
 def test_base_axes_carry_the_arm_along_its_track(machine: Path) -> None:
     """Positions in base coordinates count from where the base began, those of the robot from the arm."""
     machine.write_text(
@@ -135,3 +166,13 @@ def test_base_axes_carry_the_arm_along_its_track(machine: Path) -> None:
     assert np.abs(robot.numbers - still.numbers).max() < ZERO_ROUNDING
     with pytest.raises(ProgramError, match="counts from the user frame"):
         olp.correct_joints(text("USER", pose(JOINTS), "800.000"), machine)
+    in_pulses = text("BASE", pose(JOINTS), "0.000").replace(
+        b"BC00000=", b"///POSTYPE PULSE\r\n///PULSE\r\nBC00000=90"
+    )
+    with pytest.raises(ProgramError, match="the base axis of this move is in pulses"):
+        olp.correct_joints(in_pulses, machine)
+    joints = (
+        f"///POSTYPE PULSE\r\n///PULSE\r\nC00000={','.join(str(int(v * PULSES_PER_DEG)) for v in JOINTS)}"
+    )
+    taught = job([f"{joints}\r\nBC00000=878036"], ["MOVJ C00000 BC00000 VJ=5.00"])
+    assert b"BC00000=878036" in olp.correct_joints(taught, machine).data

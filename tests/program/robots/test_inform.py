@@ -142,8 +142,11 @@ def test_axes_beside_the_robot_are_stated_for_each_part(bent: Path) -> None:
         assert c == bc == ec
         assert f"BC{c}=5.000" in text and f"EC{c}=10,20" in text
     assert f"///NPOS {len(written) + 1},{len(written) + 1},{len(written) + 1},0,0,0" in text
-    moved = [positions[0], positions[1], positions[2], "BC00001=6.000", *positions[4:]]
-    assert olp.correct(job(moved, moves), bent).data.count(b"MOVL") == 1
+    for own, other in (("BC00001=5.000", "BC00001=6.000"), ("EC00001=10,20", "EC00001=10,21")):
+        assert (
+            olp.correct(job(positions, moves).replace(own.encode(), other.encode()), bent).data.count(b"MOVL")
+            == 1
+        )
 
 
 def test_counts_that_are_wrong_stay(bent: Path) -> None:

@@ -19,6 +19,8 @@ _IN_FRAMES = (b"BASE", b"ROBOT", b"USER")
 _BASES = (b"BC", b"BP")
 #: A name of an axis beside the robot, and its number.
 Beside = tuple[bytes, int]
+#: The axes beside the robot with which a position is used: those of its base, and of a positioner.
+_Used = tuple[tuple[float, ...], tuple[float, ...]]
 
 
 class Places:
@@ -27,8 +29,9 @@ class Places:
     def __init__(self, data: bytes, moves: RobotMoves, job: Job) -> None:
         self.data, self.moves, self.job = data, moves, job
         self.setup = moves.setup
-        self._targets: dict[int, tuple[int, tuple[float, ...]]] = {}
+        self._targets: dict[int, tuple[int, _Used]] = {}
         self._tools: dict[int, Tool] = {}
+        self._words: dict[bytes, tuple[float, ...]] = {}
         self._frames: dict[tuple[bytes, float], Located] = {}
 
     def in_joints(self, position: Position, line: int) -> bool:
@@ -52,7 +55,8 @@ class Places:
     def target(self, position: Position, beside: Sequence[Beside], line: int) -> int:
         """The place of the target of a pose."""
         outer = self._outer(position, beside, line)
-        known = self._known(position, outer, line)
+        used = outer, self.station(beside, line)
+        known = self._known(position, used, line)
         if known is not None:
             return known
         numbers = position.numbers
@@ -64,7 +68,10 @@ class Places:
                 code="OLP533",
             )
         (x, a), (y, b), (z, c), (rx, i), (ry, j), (rz, k) = numbers[:_NUMBERS]
-        words = postures.words_of(position.header.posture)
+        posture = position.header.posture
+        if posture not in self._words:
+            self._words[posture] = postures.words_of(posture)
+        words = self._words[posture]
         # lines of their own around the position, where the words of its posture change
         begin, end = position.span
         around = ((begin, begin), (end, end)) if words[0] == words[0] else ()
@@ -73,14 +80,15 @@ class Places:
             self._name(position), position.span, (rx, ry, rz), around, words, outer,
             self._copy(position, beside),
         )  # fmt: skip
-        self._targets[position.line] = index, outer
+        self._targets[position.line] = index, used
         return index
 
     def joints(self, position: Position, beside: Sequence[Beside], line: int) -> int | None:
         """The place of the target of joints; None where the text does not state all six. Raises ProgramError
         for pulses where the machine does not state what they are."""
         outer = self._outer(position, beside, line)
-        known = self._known(position, outer, line)
+        used = outer, self.station(beside, line)
+        known = self._known(position, used, line)
         numbers = position.numbers
         if known is not None or numbers is None or len(numbers) < _NUMBERS:
             return known
@@ -102,7 +110,7 @@ class Places:
             position.line, position.span, [span for span, _ in numbers[:_NUMBERS]], (a, b, c, d, e, f), outer,
             self._name(position), position.span, counts, self._copy(position, beside),
         )  # fmt: skip
-        self._targets[position.line] = index, outer
+        self._targets[position.line] = index, used
         return index
 
     def tool(self, position: Position, line: int) -> Tool:
@@ -162,11 +170,11 @@ class Places:
         text = self.data[slice(*position.span)]
         return text[: text.index(b"=")].strip().decode("latin-1")
 
-    def _known(self, position: Position, outer: tuple[float, ...], line: int) -> int | None:
+    def _known(self, position: Position, used: _Used, line: int) -> int | None:
         known = self._targets.get(position.line)
         if known is None:
             return None
-        if known[1] != outer:
+        if known[1] != used:
             raise not_read(
                 f"the position of line {position.line} is used with two positions of the axes beside the "
                 "robot; give each its own",
@@ -174,24 +182,24 @@ class Places:
             )
         return known[0]
 
+    def station(self, beside: Sequence[Beside], line: int) -> tuple[float, ...]:
+        """The values of a positioner, which stands or moves beside the robot."""
+        return tuple(
+            value for kind, number in beside if kind == b"EC"
+            for value in self._values(kind, number, line)[0]
+        )  # fmt: skip
+
     def _outer(self, position: Position, beside: Sequence[Beside], line: int) -> tuple[float, ...]:
-        """The base axes, or one that is not there, and behind them all others."""
+        """The base axes, or one that is not there, and behind them all others of the robot."""
         own = [] if position.numbers is None else [value for _, value in position.numbers[_NUMBERS:]]
         bases: list[float] = []
         for kind, number in beside:
-            found = self.job.positions.get((kind, number), [])
-            numbers = found[0].numbers if len(found) == 1 else None
-            if numbers is None:
-                name = f"{kind.decode()}{number:05d}"
-                raise ProgramError(
-                    f"the position {name} is not stated once with its numbers", line=line, code="OLP533"
-                )
-            values = [value for _, value in numbers]
             if kind not in _BASES:
-                own += values
                 continue
-            counted = found[0].header.form != b"RECTAN"
-            if counted and any(values) and self.setup.machine.track is not None:
+            values, form = self._values(kind, number, line)
+            # joints say where the arm is on its carriage, wherever that is
+            posed = position.header.form == b"RECTAN"
+            if posed and form != b"RECTAN" and any(values) and self.setup.machine.track is not None:
                 raise not_read(
                     "the base axis of this move is in pulses; save the job in base coordinates "
                     "(///POSTYPE BASE), where it is in mm",
@@ -201,6 +209,17 @@ class Places:
         if not bases and not own:
             return ()
         return (*(bases or (ABSENT,)), *own)
+
+    def _values(self, kind: bytes, number: int, line: int) -> tuple[list[float], bytes]:
+        """The values of an axis beside the robot, and their form."""
+        found = self.job.positions.get((kind, number), [])
+        numbers = found[0].numbers if len(found) == 1 else None
+        if numbers is None:
+            name = f"{kind.decode()}{number:05d}"
+            raise ProgramError(
+                f"the position {name} is not stated once with its numbers", line=line, code="OLP533"
+            )
+        return [value for _, value in numbers], found[0].header.form
 
     def _copy(self, position: Position, beside: Sequence[Beside]) -> Copy:
         """Where further positions like this one go, with those of the axes beside the robot."""

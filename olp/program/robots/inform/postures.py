@@ -40,14 +40,10 @@ def fitting(config: Array, axes: Array, branches: Array) -> tuple[Array, Mask]:
         other = np.where(own > 0.0, own - 360.0, own + 360.0)
         values[:, :, column] = np.where(config[:, place, None] == 1.0, other, own)
     unstated = np.isnan(config[:, :1])
-    # at a quarter of a turn both words fit
-    beside = np.abs(np.abs(_wrapped(values[:, :, _R])) - 90.0) < _ROUNDING_DEG
-    fits &= (
-        unstated
-        | beside
-        | (_flipped(values[:, :, _R]) == (config[:, :1] == 0.0))
-        | np.isnan(values[:, :, _R])
-    )
+    # at a quarter of a turn both words fit, and where the wrist is straight
+    r = 180.0 - (180.0 - values[:, :, _R]) % 360.0
+    beside = np.isnan(r) | (np.abs(np.abs(r) - 90.0) < _ROUNDING_DEG)
+    fits &= unstated | beside | (((r > -90.0) & (r <= 90.0)) == (config[:, :1] == 0.0))
     front = np.abs(branches[:, :, 0]) < _BORDER
     fits &= unstated | front | ((branches[:, :, 0] > 0.0) == (config[:, 2:3] == 0.0))
     upper = (np.abs(branches[:, :, 1]) < _BORDER) | (config[:, 2:3] == 1.0)
@@ -60,32 +56,24 @@ def turned(
 ) -> tuple[int, ...] | None:
     """The words of a corrected posture; None where they stay. One that did not say where its axis is stays,
     and so do those that a correction may not change."""
-    if np.isnan(config[0]):
+    if config[0] != config[0]:
         return None
     own = [int(word) for word in config]
     new = list(own)
-    if bool(_flipped(nominal[_R])) == (own[0] == 0) or _at(nominal[_R], 90.0):
-        new[0] = int(not _flipped(corrected[_R]))
+    r = 180.0 - (180.0 - nominal[_R]) % 360.0
+    if _unflipped(r) == own[0] or abs(abs(r) - 90.0) < _ROUNDING_DEG:
+        new[0] = _unflipped(180.0 - (180.0 - corrected[_R]) % 360.0)
     for column, place in _TURNED:
-        if _beyond(nominal[column]) == own[place] or _at(nominal[column], 180.0):
+        if _beyond(nominal[column]) == own[place] or abs(abs(nominal[column]) - 180.0) < _ROUNDING_DEG:
             new[place] = _beyond(corrected[column])
     return None if new == own else tuple(new)
 
 
-def _wrapped(degrees: Array) -> Array:
-    return np.asarray(180.0 - (180.0 - degrees) % 360.0)
-
-
-def _flipped(degrees: Array | float) -> Mask:
-    """Whether an axis is turned by more than -90 deg and up to 90, whole turns left out."""
-    wrapped = _wrapped(np.asarray(degrees, float))
-    return np.asarray((wrapped > -90.0) & (wrapped <= 90.0), bool)
+def _unflipped(degrees: float) -> int:
+    """Whether an axis within half a turn is beyond a quarter."""
+    return int(not -90.0 < degrees <= 90.0)
 
 
 def _beyond(degrees: float) -> int:
+    """Whether an axis is beyond half a turn."""
     return int(not -180.0 < degrees <= 180.0)
-
-
-def _at(degrees: float, border: float) -> bool:
-    """Whether an axis is at a border but for the rounding of the text."""
-    return abs(abs(degrees) - border) < _ROUNDING_DEG

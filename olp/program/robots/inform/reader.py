@@ -15,7 +15,7 @@ from olp.program.program import Program
 from olp.program.robots.frames import Located, Tool
 from olp.program.robots.inform.flow import Flow, word_of
 from olp.program.robots.inform.places import Places
-from olp.program.robots.inform.table import BLOCKS, MOVING, REFUSED, STILL
+from olp.program.robots.inform.table import BLOCKS, MOVING, REFUSED, SETTING, STILL
 from olp.program.robots.inform.text import Position, Statement, job_of
 from olp.program.robots.moves import NAN, RobotMoves, not_read, take_all
 from olp.program.robots.poses import Pose
@@ -43,6 +43,8 @@ _WHOLE = pattern(rb"(?i)(?<!\w)(?:" + _HELD + rb"|(?:BP|EX)\d)")
 _AXES_BESIDE = pattern(rb"(?i)(?<!\w)(BC|EC|BP|EX)(\d+)")
 _UNTIL = pattern(rb"(?i)(?<!\w)UNTIL[ \t]")
 _SPEED = pattern(rb"(?i)(?<!\w)V=(\d+\.?\d*|\.\d+)(?![\w.])")
+#: A move of a positioner alone.
+_STATION_ALONE = pattern(rb"(?i)MOV[JL][ \t]+(?:EC|EX)\d+\b(?!.*\+)")
 _WORD = pattern(rb"[\w.+#=]+|\S")
 #: What leads elsewhere, or ends the job: where the next statement is reached, the robot stays.
 _FLOW = frozenset((b"JUMP", b"JMP", b"RET", b"END", b"ABORT"))
@@ -71,6 +73,7 @@ class _Reader:
         self.job = job_of(data)
         self.flow = Flow(self.job.statements)
         self.places = Places(data, self.moves, self.job)
+        self.station: tuple[float, ...] = ()
         self.blocks: list[_Block] = []
         self.refusals: list[ProgramError] = []
 
@@ -84,12 +87,19 @@ class _Reader:
         word = word_of(statement.text)
         if word in REFUSED:
             raise not_read(f"{word.decode()} {REFUSED[word]}", statement.line)
+        if _STATION_ALONE.match(statement.text):
+            return
         if word in (b"MOVL", b"MOVJ"):
             self._move(statement, straight=word == b"MOVL")
         elif word == b"*":
             self.moves.known = False
         elif word in BLOCKS:
             self._block(BLOCKS[word])
+        elif word in SETTING:
+            shown = statement.text[:40].decode("latin-1")
+            self.moves.remark(
+                "set", statement.line, f"`{shown}` sets numbers that the job file has to state, too"
+            )
         elif not (word in STILL or word in MOVING or word in _FLOW):
             self.moves.known = False
             shown = statement.text[:40].decode("latin-1")
@@ -140,7 +150,10 @@ class _Reader:
         """A move to a position that the text states."""
         line, span = statement.line, statement.span
         beside = [(kind.upper(), int(number)) for kind, number in _AXES_BESIDE.findall(tail)]
-        zone = place[1], span[1]
+        zone, station = (place[1], span[1]), self.places.station(beside, line)
+        # parts would lead a positioner to its end before the move ends
+        whole |= station != self.station
+        self.station = station
         if self.places.in_joints(position, line):
             held: Tool | None = None
             if straight and self.moves.arm:

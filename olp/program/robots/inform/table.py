@@ -42,15 +42,17 @@ ASSIGNING = frozenset(
 )  # fmt: skip
 #: Statements that use a position as a direction alone, so that its last digits do not count.
 POINTING = frozenset((b"REFP",))
+#: Statements that give numbers to frames and tools.
+SETTING = frozenset((b"MFRAME", b"SETTOOL"))
 #: Statements of the control: the robot stays where it is, and the next one follows.
-STILL = ASSIGNING | POINTING | frozenset(
+STILL = ASSIGNING | POINTING | SETTING | frozenset(
     (b"NOP", b"DOUT", b"PULSE", b"AOUT", b"ARATION", b"ARATIOF", b"WAIT", b"TIMER", b"PAUSE", b"AND", b"OR",
      b"NOT", b"XOR", b"GETE", b"SIN", b"COS", b"ATAN", b"SQRT", b"SETFILE", b"GETFILE", b"SETREG", b"GETREG",
-     b"MFRAME", b"SETTOOL", b"MSG", b"CLS", b"COMM", b"DI", b"EI", b"ADVINIT", b"ADVSTOP", b"SPEED",
+     b"MSG", b"CLS", b"COMM", b"DI", b"EI", b"ADVINIT", b"ADVSTOP", b"SPEED",
      b"ARCON", b"ARCOF", b"ARCSET", b"ARCCTS", b"ARCCTE", b"ARCCUR", b"ARCVOL", b"AWELD", b"VWELD", b"WVON",
      b"WVOF", b"CLRSENS", b"SFTOF", b"COMARCOF", b"SYEND", b"SKILLSND", b"TSYNC", b"PSTART", b"PWAIT",
      b"LOGSET", b"CVAR", b"HAND", b"HSEN", b"TOOLON", b"TOOLOF", b"LASERON", b"LASEROF", b"STROBE", b"UNLOCK",
-     b"LOCK", b"VAR$", b"CHR$", b"MID$", b"LEN$", b"VAL", b"ASC", b"CAT$", b"MVAL", b"DIALOG", b"SETPRM")
+     b"LOCK", b"CWAIT", b"VAR$", b"CHR$", b"MID$", b"LEN$", b"VAL", b"ASC", b"CAT$", b"MVAL", b"DIALOG")
 )  # fmt: skip
 
 TABLE: Mapping[bytes, tuple[Support, str]] = {
@@ -65,14 +67,16 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"///TOOL": (_R, "the tool of machine or job file by its number"),
     b"///RCONF": (_R, "on arms: names the posture of MOVJ, and is written again where it changes"),
     b"///NPOS": (_R, "the count of taught positions is raised where it was right"),
-    b"BC00000=, EC00000=": (_R, "kept; a move that states them is never split"),
+    b"BC00000=, EC00000=": (_R, "kept; a move during which one changes is never split"),
     b"V=": (_R, "the speed, in mm/s"),
     b"PL=": (_R, "parts of a move are passed"),
-    b"UNTIL, NWAIT, T=, +MOVJ EC": (_R, "the move is never split"),
+    b"UNTIL, NWAIT, T=": (_R, "the move is never split"),
+    b"+MOVJ EC": (_R, "a positioner moves at the same time; each part states where it is"),
     b"VJ=, VR=, ACC=, DEC=, CR=, CONT": (_X, ""),
     b"SFTON, COMARCON, SYSTART": (_R, "the moves up to SFTOF, COMARCOF, SYEND are left as written"),
     b"SET, SETE, ADD, CNVRT": (_R, "moves to a position that gets another value are left as written"),
     b"MFRAME, SETTOOL": (_R, "give the same frame or tool in the job file"),
+    b"MOVJ EC": (_X, "a positioner moves, and the robot does not"),
     b"CALL, *LABEL, IFTHENEXP": (_R, "where moves depend on the run, the next is corrected at its end"),
     b"REFP, ARCON, DOUT, TIMER": (_X, ""),
     b"any other statement": (_X, "may move: the next move is corrected at its end"),

@@ -30,6 +30,8 @@ _INSTRUCTIONS = b"INST"
 _ARGUMENTS = b"ARGINFO"
 #: What the teach pendant puts at the end of a file.
 _ENDS = b" \t\x00\x1a"
+#: What editors put at the begin of a text in UTF-8.
+_MARK = b"\xef\xbb\xbf"
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +55,8 @@ class Header:
 
     def before(self, other: Header, eol: bytes) -> bytes:
         """The lines that lead from another header to this one."""
+        if other is self:
+            return b""
         own, others = dict(self.lines), dict(other.lines)
         return b"".join(own[key] + eol for key in _ORDER if key in own and own[key] != others.get(key))
 
@@ -101,7 +105,7 @@ def job_of(data: bytes) -> Job:
     first: tuple[int, Header] | None = None
     for number, line in enumerate(_LINE.finditer(data), 1):
         text = line[1]
-        bare = text.strip(_ENDS)
+        bare = text.removeprefix(_MARK).strip(_ENDS) if number == 1 else text.strip(_ENDS)
         if not bare or bare[:1] == b"'":
             continue
         if bare[:1] == b"/":
