@@ -74,8 +74,7 @@ class TargetWriter(PointWriter):
             blocks += 1
         if blocks:
             edits += self.dialect.counted(self.program, blocks)
-        if self._made:
-            edits = self.dialect.gathered(self.program, edits, self._made)
+        edits = self.dialect.completed(self.program, edits, self._made)
         return spliced(whole(self.program.data), edits) if edits else None
 
     def _wanted(self, rows: Rows) -> _Wanted:

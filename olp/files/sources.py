@@ -9,10 +9,12 @@ import hashlib
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
+from dataclasses import replace
 from pathlib import Path
 
-from olp.core.errors import InputError, OlpError, naming
+from olp.core.errors import InputError, OlpError, ProgramError, Reason, Refused, naming
 from olp.core.paired import data_beside, joined
+from olp.core.projects import gathered, holds_several, is_one_of_many, place_of
 from olp.core.spool import Mapped, Spool, Text, in_parts, whole
 from olp.core.values import dataclass
 from olp.files.write import PathLike, read_bytes, read_long
@@ -56,6 +58,10 @@ class Sources:
         (self._there if there else self._absent).add(Path(path))
         return there
 
+    def listed(self, folder: Path, ending: str) -> list[Path]:
+        """The files of a folder that have an ending, by name."""
+        return sorted(path for path in folder.glob("*") if path.suffix.lower() == ending)
+
     def there(self) -> frozenset[str]:
         """The names in a parcel of files that are there and were not read."""
         return frozenset(in_parcel(path) for path in self._there - self._texts.keys())
@@ -82,7 +88,10 @@ class Sources:
         return Source(str(given), functools.partial(self._whole, given))
 
     def _whole(self, path: PathLike) -> Text:
-        """A program with its data, where these are in a file beside it."""
+        """A program with its data, where these are in a file beside it, or with all files of its project."""
+        if is_one_of_many(Path(path)):
+            text = gathered(Path(path), self.exists, self.read, self.listed)
+            return self.text(path) if text is None else text
         data = data_beside(Path(path))
         if data is None or not self.exists(data):
             return self.text(path)
@@ -127,6 +136,10 @@ class Parcel(Sources):
     def exists(self, path: PathLike) -> bool:
         """Whether a file is there. Raises Wanted where that is not known."""
         return in_parcel(path) in self._known or self._look(path) is not None
+
+    def listed(self, folder: Path, ending: str) -> list[Path]:
+        """None: what else is in a folder is not known here."""
+        return []
 
     def _look(self, path: PathLike) -> bytes | None:
         name = in_parcel(path)
@@ -174,8 +187,40 @@ class Source:
 
     def errors(self, role: str | None = None) -> AbstractContextManager[None]:
         """Adds the name of the source to errors that name no file. With `role`, such as "<program>", to all
-        of them, and `role` is the name of bytes. Without it, to those with a line, and bytes have no name."""
-        return naming(self.name) if role is None else _named(self.name or role)
+        of them, and `role` is the name of bytes. Without it, to those with a line, and bytes have no name. A
+        line in one of several files that are read as one text is counted in its own."""
+        own = naming(self.name) if role is None else _named(self.name or role)
+        return _placed(self, own)
+
+
+@contextmanager
+def _placed(source: Source, own: AbstractContextManager[None]) -> Iterator[None]:
+    with own:
+        try:
+            yield
+        except OlpError as error:
+            if holds_several(source.data):
+                for each in (error, *(error.others if isinstance(error, ProgramError) else ())):
+                    each.file, each.line = _own_place(source, each.file, each.line)
+                if isinstance(error, Refused):
+                    error.reasons = tuple(_own_reason(source, reason) for reason in error.reasons)
+            raise
+
+
+def _own_place(source: Source, file: str | None, line: int | None) -> tuple[str | None, int | None]:
+    """The file of a line and its number there; unchanged where it is one of the first file."""
+    if line is None or file is not None:
+        return file, line
+    name, own = place_of(source.data, line)
+    if not name:
+        return file, line
+    return str(Path(source.name).with_name(name)) if source.name else name, own
+
+
+def _own_reason(source: Source, reason: Reason) -> Reason:
+    file, line = _own_place(source, reason.file, reason.line)
+    follows_file, follows = _own_place(source, reason.follows_file, reason.follows)
+    return replace(reason, file=file, line=line, follows_file=follows_file, follows=follows)
 
 
 @contextmanager

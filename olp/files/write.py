@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
+from olp.core import projects
 from olp.core.errors import InputError, OlpError, UsageError
 from olp.core.paired import divided
 from olp.core.spool import Mapped, Text, text_of
@@ -74,7 +75,7 @@ def write_files(
     """Write files, each whole or not at all. Where one cannot be written, no target is replaced.
 
     Contents in parts are written part by part, so that a long file never has to be in memory. A program that
-    was read from two files is written to two (`olp.core.paired`).
+    was read from several files is written to as many (`olp.core.paired`, `olp.core.projects`).
 
     Each file is first written beside its target under a temporary name and synced, with the owner and mode of
     the file that it replaces. Then all replace their targets. Temporary files of killed runs are removed. A
@@ -109,7 +110,9 @@ def write_files(
 
 
 def _divided(target: Path, content: Content) -> Mapping[Path, Content]:
-    return divided(target, content) if isinstance(content, bytes | Mapped) else {target: content}
+    if not isinstance(content, bytes | Mapped):
+        return {target: content}
+    return projects.divided(target, content) if projects.is_one_of_many(target) else divided(target, content)
 
 
 def check_targets(

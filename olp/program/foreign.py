@@ -113,8 +113,9 @@ FOREIGN = (
     Foreign(
         "Stäubli VAL 3",
         re.compile(rb"(?im)<Program[^>]*staubli|^[ \t]*begin[ \t]*\r?\n[ \t]*move[jlc]\("),
-        _ROBOT,
+        _NAME_IT.replace("sinumerik", "staubli-val3"),
         language=True,
+        how="and was read as another language",
     ),
     Foreign("Mazatrol", re.compile(rb"\AMAZATROL|\A\s*UNo\.[ \t]"), _OTHER_POST, language=True),
     Foreign(
@@ -160,10 +161,10 @@ _BINARY = re.compile(rb"[\x00-\x08\x0e-\x10\x15-\x19\x1c-\x1f]")
 
 def recognised(data: bytes, *, languages: bool, own: frozenset[str] = frozenset()) -> ProgramError | None:
     """Why a text is no program that is read, by the name of what it is; None where it is not recognised.
-    With `languages` those of other controls are looked for too, but not the `own` ones of its dialect."""
+    With `languages` those of other controls are looked for too. The `own` ones of its dialect are not."""
     start = data[:LOOKED_AT]
     for kind in FOREIGN:
-        if kind.language and (not languages or kind.name in own):
+        if kind.name in own or (kind.language and not languages):
             continue
         matches = [match for match, _ in zip(kind.sign.finditer(start), range(kind.least), strict=False)]
         if len(matches) == kind.least:

@@ -55,6 +55,7 @@ _KNOWN = {
     "abb-rapid": Known("olp.program.robots.rapid.dialect", signs.RAPID),
     "kuka-krl": Known("olp.program.robots.krl.dialect", signs.KRL),
     "yaskawa-inform": Known("olp.program.robots.inform.dialect", signs.INFORM),
+    "staubli-val3": Known("olp.program.robots.val3.dialect", signs.VAL3),
 }
 #: Files of `olp/program/described/shipped` that describe a dialect, without their ending.
 DESCRIBED = ("kawasaki-as", "val2", "karel")

@@ -55,6 +55,8 @@ _NO_LINE_END = pattern(rb"[^\r\n]")
 #: Most bytes of visited blocks of an unrolling that is tried; a longer one counts as one that helps.
 UNROLLED = 1_000_000
 TOO_LONG = "OLP543"
+#: Nothing behind it can be read.
+BROKEN = "OLP506"
 #: Its repair is a start position.
 UNKNOWN_POSITION = "OLP524"
 #: Its repair is a straight move.
@@ -133,7 +135,7 @@ def _refuse_foreign(data: Text, program: Program) -> None:
     if not len(program.toolpath) or head.count(b"\0") * _ZERO_SHARE > len(head):
         from olp.program.foreign import recognised
 
-        other = recognised(whole(data), languages=False)
+        other = recognised(whole(data), languages=False, own=program.dialect.languages)
         if other is not None:
             raise other
 
@@ -223,8 +225,8 @@ class _Survey:
         return error is None
 
     def ran_long(self, error: ProgramError) -> bool:
-        """Whether unrolling ended at its limit; there is nothing to mend then."""
-        return self.unroll is not None and error.code == TOO_LONG
+        """Whether unrolling ended at its limit, or the text is not whole; there is nothing to mend then."""
+        return error.code == BROKEN or (self.unroll is not None and error.code == TOO_LONG)
 
     def _note(self, error: ProgramError, taken: list[_Place]) -> None:
         """Note a refusal, and mend what is refused. `taken` is where statements were taken out before this

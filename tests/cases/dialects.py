@@ -59,6 +59,11 @@ def _list(values: Sequence[float], digits: int) -> str:
 _positions = itertools.count(1)
 
 
+def _val3(values: Sequence[float], digits: int) -> str:
+    """A straight move to a point in the world."""
+    return f"movel({{{{{_list(values, digits)},0,0,0}},{{ssame,esame,wsame}}}},t,m)"
+
+
 def _karel(values: Sequence[float], digits: int) -> str:
     """A position of its own, and the move there."""
     name = f"p{next(_positions)}"
@@ -322,9 +327,30 @@ CASES = {
         ),
         in_order=lambda text: np.array([move.numbers[:3] for move in inform.moves(text)]),
     ),
+    "staubli-val3": Case(
+        "staubli-val3", "staubli-val3", "movelpjc{},()[]=.<>/!-?CDAT\"' xyz0123456789\r\n\t+-\xe4",
+        ["<?xml version=\"1.0\" encoding=\"utf-8\"?>",
+         "<Programs xmlns=\"http://www.staubli.com/robotics/VAL3/Program/2\">",
+         "<Program name=\"start\"><Code><![CDATA[begin"],
+        ["end]]></Code></Program></Programs>", "<!--olp: file a.dtx-->",
+         "<Database xmlns=\"http://www.staubli.com/robotics/VAL3/Data/2\"><Datas>",
+         "<Data name=\"t\" type=\"tool\" size=\"1\"><Value key=\"0\" z=\"-120\"/></Data>",
+         "</Datas></Database>"],
+        _val3, None, lambda text: f"// {text}",
+        re.compile(rb"(?m)^movel\(\{\{(" + NUMBER + rb"),(" + NUMBER + rb"),(" + NUMBER + rb"),"),
+        ("val3/*.p?x",),
+        (
+            b"<a><Program><Code>begin\nmovel({{1,2,3,0,0,0},{sfree,efree,wfree}},flange,m)\nend</Code></Program></a>",
+            b"<a><b></a></b>", b"<!DOCTYPE a [<!ENTITY b SYSTEM 'c'>]><a>&b;</a>", b"<a>" * 40 + b"</a>" * 40,
+            b"<a><Program name='a'><Code>if a\nwhile b\nendIf</Code></Program></a>",
+            b"<a><Program name='a'><Code>p.trsf.x=1\nmovel(p,t,m)\ncall a()</Code></Program></a>",
+            b"<a/>\n<!--olp: file ../b.dtx-->\n<a><Data name='p' type='pointRx'><Value x='1e99'/></Data></a>",
+            b"\xff\xfe<\0a\0", b"<a b='1", b"<![CDATA[",
+        ),
+    ),
 }  # fmt: skip
 #: Named frames of the test's machines.
 FRAMES = {
     name: {"X_mm": 250.0, "Y_mm": 200.0, "Z_mm": -300.0, "set_by": "true"}
-    for name in ("G54", "MCS", "A", "CSYS2", "CSYS3", "UFRAME1", "UF1")
+    for name in ("G54", "MCS", "A", "CSYS2", "CSYS3", "UFRAME1", "UF1", "world")
 }

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from judge import inform
+from judge import inform, val3
 from judge.arm import about
 
 X, Y, Z = np.eye(3)
@@ -146,10 +146,16 @@ def jbi(text: bytes, frames: Frames) -> list[Move]:
     return found
 
 
+def staubli(text: bytes, frames: Frames) -> list[Move]:
+    """Moves of VAL 3, whose frame and tool are those of its own data."""
+    return [Move(move.straight, move.joints, move.turn, move.tip, move.words) for move in val3.moves(text)]
+
+
 READERS: dict[str, Callable[[bytes, Frames], list[Move]]] = {
     "krl": krl,
     "tp": tp,
     "rapid": rapid,
     "ur": ur,
     "inform": jbi,
+    "val3": staubli,
 }

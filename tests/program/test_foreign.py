@@ -98,7 +98,7 @@ SIGNS = {
     ("FANUC TP", NAMED.replace("sinumerik", "fanuc-tp"), "OLP501"): (
         b"/PROG A", b"/ATTR\n", b"/MN", b"/pos\n", b"1:J P[1]", b"  12: L PR[1]", b":C P[", b"1:\tj  P[2]",
     ),
-    ("Stäubli VAL 3", ROBOT, "OLP501"): (
+    ("Stäubli VAL 3", NAMED.replace("sinumerik", "staubli-val3"), "OLP501"): (
         b"  <program xmlns='STAUBLI'>", b"begin\n movej(a)", b"\tBegin \r\nmovel(b)", b"begin\nmovec(c)",
     ),
     ("Mazatrol", OTHER_POST, "OLP501"): (b"MAZATROL", b"UNo. UNIT", b" \nUNo.\tUNIT"),
@@ -128,7 +128,7 @@ SIGNS = {
 }  # fmt: skip
 #: Languages that are read by another dialect.
 READ = (
-    "Sinumerik (Siemens)", "Okuma OSP", "KUKA KRL", "ABB RAPID", "FANUC TP", "UR script",
+    "Sinumerik (Siemens)", "Okuma OSP", "KUKA KRL", "ABB RAPID", "FANUC TP", "Stäubli VAL 3", "UR script",
     "Yaskawa INFORM (JBI)",
 )  # fmt: skip
 LANGUAGES = (

@@ -206,7 +206,7 @@ def test_what_each_dialect_of_statements_says_of_itself() -> None:
     assert list(DIALECTS) == [
         "linuxcnc", "fanuc", "grbl", "haas", "mach3", "mach4", "mazak", "okuma", "siemens-iso", "marlin",
         "klipper", "sinumerik", "heidenhain", "apt", "dmis", "list", "fanuc-tp", "urscript",
-        "abb-rapid", "kuka-krl", "yaskawa-inform",
+        "abb-rapid", "kuka-krl", "yaskawa-inform", "staubli-val3",
     ]  # fmt: skip
     assert apt.title == "APT and cutter-location data (ISO 4343, ISO 3592)"
     assert dmis.title == "DMIS part programs of coordinate measuring machines (ISO 22093)"

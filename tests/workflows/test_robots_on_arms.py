@@ -29,6 +29,7 @@ DIGITS = {
     "rapid": (1e-4, 4e-9),
     "ur": (1e-5, 2e-9),
     "inform": (1.5e-3, 3e-6),
+    "val3": (1e-6, 2e-8),
 }
 #: What machine and job of TP programs state.
 TP_FILES = """
@@ -174,12 +175,46 @@ def jbi(steps: list[Step]) -> bytes:
     ).encode()
 
 
+def val3(steps: list[Step]) -> bytes:
+    """Points and joints of one array each. A number that is zero is left out."""
+    head = ['<Programs xmlns="http://www.staubli.com/robotics/VAL3/Program/2">']
+    head += ['<Program name="start"><Code><![CDATA[', "begin"]
+    points, joints_, lines = [], [], []
+    for kind, joints in steps:
+        if kind == "J":
+            values = " ".join(f'j{j + 1}="{v}"' for j, v in enumerate(joints.tolist()) if v)
+            joints_.append(f'<Value key="{len(joints_)}" {values}/>')
+            lines.append(f"movej(jJoint[{len(joints_) - 1}],tSpin,mSpeed)")
+            continue
+        (x, y, z), turn = local(joints)[0], Rotation.from_matrix(local(joints)[1])
+        rx, ry, rz = turn.as_euler("XYZ", degrees=True).round(5).tolist()
+        wrist = "wpositive" if joints[4] > 0 else "wnegative"
+        points.append(
+            f'<Value key="{len(points)}" x="{x}" y="{y}" z="{z}" rx="{rx}" ry="{ry}" rz="{rz}" '
+            f'shoulder="lefty" elbow="epositive" wrist="{wrist}" fatherId="fPart[0]" />'
+        )
+        lines.append(f"move{'l' if kind == 'L' else 'j'}(pPoint[{len(points) - 1}],tSpin,mSpeed)")
+    data = [
+        '<Data name="tSpin" type="tool" size="1">',
+        '<Value key="0" x="10" y="-5" z="160" ry="10" fatherId="flange[0]" /></Data>',
+        '<Data name="fPart" type="frame" size="1">',
+        '<Value key="0" x="705" y="-94" z="507" rz="30" fatherId="world[0]" /></Data>',
+        '<Data name="mSpeed" type="mdesc" size="1">',
+        '<Value key="0" tmax="250" blend="off" /></Data>',
+        f'<Data name="pPoint" type="pointRx" size="{len(points)}">', *points, "</Data>",
+        f'<Data name="jJoint" type="jointRx" size="{len(joints_)}">', *joints_, "</Data>",
+    ]  # fmt: skip
+    text = [*head, *lines, "end", "]]></Code></Program></Programs>", "<!--olp: file made.dtx-->"]
+    return "\n".join([*text, "<Database><Datas>", *data, "</Datas></Database>", ""]).encode()
+
+
 WRITERS: dict[str, Callable[[list[Step]], bytes]] = {
     "krl": krl,
     "tp": tp,
     "rapid": rapid,
     "ur": ur,
     "inform": jbi,
+    "val3": val3,
 }
 
 

@@ -64,10 +64,15 @@ class _Wanted:
     def right_for(self, other: _Wanted) -> bool:
         """Whether the numbers are right for another row to their last digit."""
         near = all(
-            abs(float(text) - value) <= _RIGHT * digit
+            abs(_value(text) - value) <= _RIGHT * digit
             for text, value, digit in zip(self.texts, other.values, self.digits, strict=True)
         )
         return near and self.turns == other.turns
+
+
+def _value(text: bytes) -> float:
+    """The value of a number; one that the text leaves out is zero."""
+    return float(text or b"0")
 
 
 def write_arm(path: ArmPath, plan: JointPlan, limits: JointLimits) -> WrittenJoints:
@@ -122,8 +127,7 @@ class _Writer:
         blocks = self.tally.inserted_blocks - self.clones
         if blocks:
             edits += self.dialect.counted(self.program, blocks)
-        if self.made:
-            edits = self.dialect.gathered(self.program, edits, self.made)
+        edits = self.dialect.completed(self.program, edits, self.made)
         return WrittenJoints(spliced(whole(self.program.data), edits), self.tally, parts)
 
     # -- arcs ----------------------------------------------------------------------------------------
@@ -229,7 +233,7 @@ class _Writer:
         return self._in_digits(row, target, numbers, angle_between(turn, target.turn), move)
 
     def _numbers(self, spans: tuple[Span, ...]) -> list[float]:
-        return [float(self.program.data[a:b]) for a, b in spans]
+        return [_value(self.program.data[a:b]) for a, b in spans]
 
     def _unit(self, move: int) -> float:
         toolpath = self.program.toolpath
@@ -281,9 +285,9 @@ class _Writer:
         own = len(plain[1]) if plain else 0 if form is None else form.decimals
         decimals = min(max(fewest, own), MOST_DECIMALS)
         digit = 10.0**-decimals
-        off = abs(float(text) - value) if off is None else off
+        off = abs(_value(text) - value) if off is None else off
         if off <= max(_RIGHT * digit, _COMPUTED):
-            return float(text), max(digit, _COMPUTED), text
+            return _value(text), max(digit, _COMPUTED), text
         if form is None and abs(value) > digit:
             return value, max(digit, _COMPUTED), b"%.*f" % (decimals, value)
         form = form or number(text)

@@ -57,6 +57,14 @@ RULES = (
         example="`X10 N20`: the block number is not the first word.",
     ),
     _rule(
+        "OLP506",
+        "not whole",
+        why="Elements of XML, or blocks of a program in it, do not hold together. So none of its "
+        "statements is known.",
+        remedy="Export the program again, or mend the place that the message names.",
+        example="A `<Value` without its end, or a document type, which could name other files.",
+    ),
+    _rule(
         "OLP510",
         "statement is not understood",
         why="It may move the machine, or change how later statements are read.",

@@ -126,6 +126,8 @@ class RobotDialect(StatementDialect):
         """Counts of the text, where so many statements were inserted."""
         return []
 
-    def gathered(self, program: Program, edits: list[Replacement], targets: int) -> list[Replacement]:
-        """All replacements of a text, where so many targets are declared beside those that it has."""
+    def completed(self, program: Program, edits: list[Replacement], targets: int) -> list[Replacement]:
+        """All edits of a correction, with what the language wants changed along with them. So many `targets`
+        are declared beside those of the text. A number that the text leaves out has an empty span, and gets a
+        text of its own here."""
         return edits

@@ -102,6 +102,14 @@ URSCRIPT = Signs(
         rb"(?:movej|movel|movep|movec|servoj|set_tcp)[ \t]*\([ \t]*(?:p?\[|pose_|get_))"
     ),
 )
+VAL3 = Signs(
+    ("pgx", "pjx"),
+    own=pattern(
+        rb"(?im)^(?:\xef\xbb\xbf)?[ \t]*(?:<\?xml[^>\r\n]*>[ \t]*)?"
+        rb"<(?:Programs?|programList|Project|Database|dataList)\b[^<>]*"
+        rb"(?:/VAL3/(?:Program|Project|Data)/|\"(?:Program|Project|Data)NameSpace\")"
+    ),
+)
 KRL = Signs(
     ("src",),
     own=pattern(

@@ -80,8 +80,10 @@ class Inform(RobotDialect):
     def clone(self, program: Program, target: Target, name: str, text: bytes) -> Replacement:
         return self._declared(program, target, name, text)
 
-    def gathered(self, program: Program, edits: list[Replacement], targets: int) -> list[Replacement]:
+    def completed(self, program: Program, edits: list[Replacement], targets: int) -> list[Replacement]:
         """Further positions follow one another, with a line of a header only where one changes."""
+        if not targets:
+            return edits
         assert program.targets is not None
         copies = [target.copy for target in program.targets.targets]
         added: dict[int, bytes] = dict.fromkeys(

@@ -1,0 +1,165 @@
+"""What the programs of an application may do: which move, which change data, and which are called again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from olp.core.patterns import pattern
+from olp.core.projects import place_of
+from olp.program.robots.val3.code import Line, Routine, lines_in
+from olp.program.robots.val3.files import Application
+from olp.program.robots.val3.table import STILL
+from olp.program.robots.val3.values import REFERENCE, arguments
+
+_MOVES = pattern(rb"(?i)\bmove[ljc]\s*\(")
+_CALLED = pattern(rb"(?is)call\s+([A-Za-z_][\w:]*)\s*\((.*)\)")
+_SET = pattern(rb"([A-Za-z_]\w*)\s*(?:\[[^\[\]]*\])?\s*(?:\.\s*\w+\s*)*=(?!=)")
+_FOR = pattern(rb"(?i)for\s+([A-Za-z_]\w*)\s*(?:\[[^\[\]]*\])?\s*=")
+_LINK = pattern(rb"(?i)link\s*\(\s*([A-Za-z_]\w*)")
+_NAMED = pattern(rb"(?<![\w$:.])([$A-Za-z_]\w*)\s*\(")
+#: Functions and statements that take data and do not change them.
+_READS = STILL | frozenset(
+    (
+        b"if while until call switch case for return movel movej movec appro compose position here herej "
+        b"link abs sqrt sin cos tan asin acos atan atan2 exp log ln power min max round roundup rounddown "
+        b"trunc random limit sel tostring tonum chr asc len left right mid find replace insert delete clock "
+        b"date and or not xor elseif isinrange configofjoint interpolatel interpolatec align band bor bnot "
+        b"bxor getmonitorspeed workingmode estop ispowered iscalibrated getjointforce getlatch fromframe "
+        b"taskcreate taskcreatesync do"
+    ).split()
+)
+
+
+class Reach:
+    """What the programs of an application do, whatever the run. `elsewhere` are data that programs which are
+    not followed give other values, and where."""
+
+    def __init__(self, application: Application, data: bytes) -> None:
+        self.routines = application.routines
+        self._sets: dict[str, set[str]] = {name: set() for name in self.routines}
+        self._moving = dict.fromkeys(self.routines, False)
+        self._calls: dict[str, list[str]] = {}
+        for name, routine in self.routines.items():
+            lines = lines_in(routine.nodes)
+            self._moving[name] = any(_MOVES.search(line.text) for line in lines)
+            self._calls[name] = [called for line in lines if (called := self._called(line)) is not None]
+        self._spread()
+        first = application.first
+        self._count = self._counted(first)
+        self.elsewhere: dict[str, str] = {}
+        for name, routine in self.routines.items():
+            if routine is first or self._count.get(name):
+                continue
+            for line in lines_in(routine.nodes):
+                for own in self._own(line) - set(routine.locals) - {p[0] for p in routine.parameters}:
+                    file, number = place_of(data, line.line)
+                    where = f"line {number} of {file}" if file else f"line {number}"
+                    self.elsewhere.setdefault(
+                        own, f"it gets another value in {where}, which this program does not run"
+                    )
+
+    def _called(self, line: Line) -> str | None:
+        match = _CALLED.fullmatch(line.text)
+        if match is None or (name := match[1].decode("latin-1")) not in self.routines:
+            return None
+        return name
+
+    def _own(self, line: Line) -> set[str]:
+        """The names that a statement gives a value itself."""
+        found = set(self.given(line))
+        for form in (_SET, _FOR, _LINK):
+            match = form.match(line.text)
+            if match is not None:
+                found.add(match[1].decode("latin-1"))
+        return found
+
+    def given(self, line: Line) -> list[str]:
+        """The names that a statement gives to instructions that may change them."""
+        text, found = line.text, []
+        if b"(" not in text:
+            return []
+        for match in _NAMED.finditer(text):
+            if match[1].lower() in _READS or text[: match.start()].rstrip().lower().endswith(b"call"):
+                continue
+            for a, b in arguments(_inside(text, match.end()), 0):
+                argument = REFERENCE.fullmatch(_inside(text, match.end())[a:b])
+                if argument is not None and not argument[3]:
+                    found.append(argument[1].decode("latin-1"))
+        return found
+
+    def _spread(self) -> None:
+        """What a program calls, it does too."""
+        own = {
+            name: {n for line in lines_in(routine.nodes) for n in self._own(line)} - set(routine.locals)
+            for name, routine in self.routines.items()
+        }
+        self._sets = own
+        again = True
+        while again:
+            again = False
+            for name, routine in self.routines.items():
+                before = self._moving[name], len(self._sets[name])
+                for line in lines_in(routine.nodes):
+                    called = self._called(line)
+                    if called is not None:
+                        self._moving[name] |= self._moving[called]
+                        self._sets[name] |= self._through(line, called) - set(routine.locals)
+                again |= before != (self._moving[name], len(self._sets[name]))
+
+    def _through(self, line: Line, called: str) -> set[str]:
+        """The names of the caller that a call gives other values."""
+        parameters = self.routines[called].parameters
+        found = self._sets[called] - {name for name, _, _ in parameters}
+        match = _CALLED.fullmatch(line.text)
+        assert match is not None
+        for (name, _, by_reference), (a, b) in zip(parameters, arguments(match[2], 0), strict=False):
+            argument = REFERENCE.fullmatch(match[2][a:b])
+            if by_reference and name in self._sets[called] and argument is not None:
+                found.add(argument[1].decode("latin-1"))
+        return found
+
+    def _counted(self, first: Routine | None) -> dict[str, int]:
+        """How often each program is called by those that run, 2 for several times."""
+        count: dict[str, int] = {}
+        waiting = [] if first is None else list(self._calls.get(first.name, ()))
+        while waiting:
+            name = waiting.pop()
+            count[name] = count.get(name, 0) + 1
+            if count[name] <= 2:
+                waiting += self._calls[name]
+        return count
+
+    # -- what is asked -------------------------------------------------------------------------------
+
+    def moving(self, routine: Routine) -> bool:
+        return self._moving.get(routine.name, False)
+
+    def moves(self, line: Line) -> bool:
+        """Whether a statement may move the robot."""
+        called = self._called(line)
+        return _MOVES.search(line.text) is not None or (called is not None and self._moving[called])
+
+    def changed(self, lines: Iterable[Line]) -> set[str]:
+        """The names that statements may give other values."""
+        found: set[str] = set()
+        for line in lines:
+            called = self._called(line)
+            found |= self._own(line) if called is None else self._through(line, called)
+        return found
+
+    def repeated(self, routine: Routine) -> bool:
+        """Whether a program is called several times."""
+        return self._count.get(routine.name, 0) > 1
+
+
+def _inside(text: bytes, begin: int) -> bytes:
+    """What stands between a bracket that opens before a byte and the one that closes it."""
+    depth = 1
+    for place in range(begin, len(text)):
+        if text[place] in b"(":
+            depth += 1
+        elif text[place] in b")":
+            depth -= 1
+            if depth == 0:
+                return text[begin:place]
+    return text[begin:]
