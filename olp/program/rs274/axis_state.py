@@ -26,6 +26,7 @@ from olp.program.rs274.codes import (
     FURTHER_OFFSETS,
     HOMES,
     LENGTH_FROM_WORDS,
+    LENGTH_OFF,
     LENGTHS,
     MACHINE,
     METRIC,
@@ -266,7 +267,8 @@ class AxisState(OffsetState):
                 self._path_mode(code, line, block.by_letter)
 
     def _hold_numbers(self, block: EventBlock, line: int) -> None:
-        """Keep the D of a block; refuse an H or D alone that may change what is in force."""
+        """Keep the D of a block, and end the tool length at H0; refuse another H or D alone that may change
+        what is in force."""
         used = {letter for code in block.events if (letter := self.profile.offset_words.get(code))}
         used |= {"H"} if not LENGTHS.isdisjoint(block.events) else set()
         used |= {"D"} if not CUTTER_COMPENSATION.isdisjoint(block.events) else set()
@@ -275,7 +277,10 @@ class AxisState(OffsetState):
             word = block.by_letter.get(letter)
             if word is None or letter in used:
                 continue
-            if before is not None and word.value != before:
+            if letter == "H" and word.value == 0 and self.profile.zero_ends_length and not self.offsets.tip:
+                # as G49 does
+                self._tool_length(LENGTH_OFF, line, block.by_letter)
+            elif before is not None and word.value != before:
                 code = "G43" if letter == "H" else "G40, and G41 or G42"
                 raise ProgramError(
                     f"{letter}{word.value:g} alone is in the block while {letter}{before} is in force; "

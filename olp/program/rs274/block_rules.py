@@ -72,10 +72,11 @@ def _table(codes: Iterable[int]) -> Mask:
 
 
 _MOTIONS = _table(_MOTION)
-#: Codes that leave the words beside them to the motion.
-_MODES = _table(
-    {0, 10, *_ARCS, 90, 170, 180, 190, 900, 910, 930, 940, 950, COMPENSATION_OFF, *CUTTER_COMPENSATION}
-)
+#: Codes that leave the words beside them to the motion: of M those of spindle, coolant and stops.
+_MODES = _table({
+    0, 10, *_ARCS, 90, 170, 180, 190, 900, 910, 930, 940, 950, 430, 440, 490, *UNITS, COMPENSATION_OFF,
+    *CUTTER_COMPENSATION, *(M + 10 * number for number in (0, 1, 3, 4, 5, 7, 8, 9)),
+})  # fmt: skip
 #: Codes that take the axis words of their block for something else.
 _STATING = _table(AXIS_VALUES | HOMES)
 
@@ -87,7 +88,7 @@ class BlockRules:
     - `users`: the codes that use a letter; beside no such code it is refused. Letters that are not here are
       free. Ten times the number of a G code, `M` plus ten times that of an M code.
     - `straight`, `round`: letters that a straight move and an arc may not have, unless the block has another
-      code than those of modes, or an M code.
+      code than those of modes. `in_plane`: then an arc has no centre along the axis across its plane, but 0.
     - `groups`: codes of which a block may have one.
     - `needs`: codes that need one of these letters.
     - `excludes`: codes that take one of two kinds of letters. `positive`: letters without a negative number.
@@ -99,6 +100,7 @@ class BlockRules:
     users: Mapping[str, frozenset[int]] = field(default_factory=dict)
     straight: str = ""
     round: str = ""
+    in_plane: bool = False
     groups: tuple[frozenset[int], ...] = ()
     needs: Mapping[int, str] = field(default_factory=dict)
     excludes: Mapping[int, tuple[str, str]] = field(default_factory=dict)
@@ -150,6 +152,7 @@ class _Tables:
             self._lacking(codes, present),
             self._unused(active, codes, present, motion, plane),
             self._beside_moves(active, codes, present, motion),
+            self._across(chunk, active, codes, motion, plane),
             self._negative(chunk, active),
             self._numbers(chunk, active),
             self._alone(chunk, active, present),
@@ -244,6 +247,25 @@ class _Tables:
                 kind = " straight move"
             why = f"what the control makes of {letter} in a{kind} is not known; take it out"
             yield where, why, "OLP519", letter
+
+    def _across(
+        self, chunk: WordChunk, active: Mask, codes: tuple[Index, Index], motion: Codes, plane: Codes
+    ) -> Iterator[Refusal]:
+        if not self.rules.in_plane:
+            return
+        line, key = codes
+        some = active & is_in(motion, sorted(_ARCS))
+        some[line[~_MODES[key]]] = False
+        words = np.flatnonzero(is_in(chunk.letter, list(b"IJK")) & (chunk.mantissa != 0))
+        words = words[some[chunk.line[words]]]
+        for code, letters in _IN_PLANE.items():
+            mine = words[plane[chunk.line[words]] == code]
+            for word in mine[(_BIT[chunk.letter[mine]] & letters) == 0].tolist():
+                letter = chr(int(chunk.letter[word]))
+                why = (
+                    f"{letter} is across the plane of this arc, and what the control makes of it is not known"
+                )
+                yield int(chunk.line[word]), f"{why}; take it out", "OLP519", letter
 
     def _lacking(self, codes: tuple[Index, Index], present: Bits) -> Iterator[Refusal]:
         line, key = codes
@@ -403,4 +425,4 @@ NGC_RULES = BlockRules(
 #: Controls whose rules are not known so well: what is ambiguous on any control.
 OTHER_RULES = BlockRules(groups=_GROUPS)
 #: ISO controls: a vector at the end of a contour, a corner that is rounded without a comma, spirals, turns.
-ISO_RULES = BlockRules(groups=_GROUPS, straight="IJKLR", round="LPQ")
+ISO_RULES = BlockRules(groups=_GROUPS, straight="IJKLR", round="LPQ", in_plane=True)

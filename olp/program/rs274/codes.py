@@ -109,6 +109,8 @@ TRANSFORMS = frozenset({*UNDOES, *UNDOES.values()})
 #: Their axis words are values, not motion: G10, G52, G92, G43.1, G50.1, G51, G51.1, G68 and G68.2. Beside
 #: G92.1 to G92.3 they are motion.
 AXIS_VALUES = frozenset({WRITE_OFFSET, LOCAL_OFFSET, PRESET, 431, 501, ROTATION, SCALING, MIRROR, TILTED})
+#: G49, which ends a tool length.
+LENGTH_OFF = 490
 #: Tool lengths from the table of tools, and G43.1 and G43.2.
 TABLE_LENGTHS = frozenset({430, 440, 490})
 #: G43.1, a tool length from the words of the block.

@@ -26,6 +26,9 @@ _NUMBERED = pattern(rb"N[ \t]*\d+[ \t]*")
 _CODE = pattern(rb"([GMT])[ \t]*(\d+(?:\.\d+)?)(?![\w.])|([GMT])[ \t]*(\d+(?:\.\d+)?)(?=[A-Z])")
 _NAME = pattern(rb"[A-Z_][A-Z0-9_]+")
 _COMMAND_LETTERS = is_in(np.arange(256), list(b"GMT"))
+#: What is shifted by offsets, and 0 as a number.
+_OFFSETS = (b"X", b"Y", b"Z", b"E")
+_ZERO = pattern(rb"[-+]?(?:0+\.?0*|\.0+)")
 #: Characters of a line that a message shows.
 _SHOWN = 60
 
@@ -45,6 +48,7 @@ class Commands:
     - `text`: M codes whose parameters are any text.
     - `named`: names may be commands. `still` are those that move nothing, `refused` those that change what
       positions mean, and why. Others are macros of the machine.
+      `zeros` are refused unless all their offsets are 0, as those of axes that nothing has shifted are.
     - `still_with`: M codes that move nothing where they have a parameter.
     - `extruder`: the letter of the extruder, which is shared out where a move is split. `extruder_follows`:
       G90 and G91 decide of it as M82 and M83 do; else it is relative in G91, and by M82 and M83 in G90.
@@ -55,6 +59,7 @@ class Commands:
     named: bool = False
     still: frozenset[bytes] = frozenset()
     refused: Mapping[bytes, str] = field(default_factory=dict)
+    zeros: Mapping[bytes, str] = field(default_factory=dict)
     still_with: Mapping[int, str] = field(default_factory=dict)
     extruder: str = "E"
     extruder_follows: bool
@@ -127,16 +132,19 @@ def sorted_line(
             return Reading.STILL if number in still_m else Reading.MOVES
         if letter == b"G" and number in moving | still_g:
             return Reading.MOVES if number in moving else Reading.STILL
-        if b"(" in text:
-            raise ProgramError(
-                f"`{shown}` has brackets, which are no comment on this control; write the comment behind `;`",
-                code="OLP514",
-            )
+    if text.startswith(b"(") or (b"(" in text and code is not None):
+        raise ProgramError(
+            f"`{shown}` has brackets, which are no comment on this control; write the comment behind `;`",
+            code="OLP514",
+        )
     name = _NAME.match(text)
     if commands.named and name is not None and code is None:
-        if name[0] in commands.refused:
-            raise ProgramError(f"`{shown}` {commands.refused[name[0]]}", code="OLP512")
-        if name[0] in commands.still or name[0].decode() in known:
+        why = commands.refused.get(name[0])
+        if name[0] in commands.zeros and not _all_zero(text[name.end() :]):
+            why = commands.zeros[name[0]]
+        if why is not None:
+            raise ProgramError(f"`{shown}` {why}", code="OLP512")
+        if name[0] in commands.still | commands.zeros.keys() or name[0].decode() in known:
             return Reading.STILL
         return Reading.UNKNOWN
     if not text:
@@ -146,6 +154,13 @@ def sorted_line(
         "letter and a number",
         code="OLP510",
     )
+
+
+def _all_zero(parameters: bytes) -> bool:
+    """Whether all offsets among the parameters of a command (`Z=0`, `Z_ADJUST=0.0`) are 0."""
+    pairs = [pair.partition(b"=") for pair in parameters.split()]
+    offsets = [value for name, _, value in pairs if name.partition(b"_")[0] in _OFFSETS]
+    return bool(pairs) and all(_ZERO.fullmatch(value) for value in offsets)
 
 
 def last_of_line(chunk: WordChunk, letter: str, lines: Mask) -> Index:

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import ProgramError
+from olp.core.geometry import PLANES
 from olp.core.values import dataclass
 from olp.program.rs274.codes import CYCLES, INCREMENTAL, PLANE_OF
 from olp.program.rs274.lexer import WordChunk
@@ -53,7 +54,8 @@ _NO_WORDS = CycleWords(np.zeros(0, np.int64), {}, np.zeros(0, np.uint8), *[np.ze
 def runs(context: Context, line: Index) -> tuple[dict[int, int], CycleWords]:
     """The runs of blocks of canned cycles that are carried out at once, among blocks on lines (n,) of the
     chunk. They go from the first block of each to the one behind it; the words of all come with them. A run
-    has no event, and no change of cycle, plane or distance mode."""
+    has no event, and no change of cycle, plane or distance mode. One begins where a block states both levels
+    and the block before does not."""
     row = np.flatnonzero(_CYCLES[context.motion[line]])
     line = line[row]
     if not row.size:
@@ -63,6 +65,11 @@ def runs(context: Context, line: Index) -> tuple[dict[int, int], CycleWords]:
     same = (breaks[line[1:]] == breaks[line[:-1]]) & ~context.event[line[:-1]]
     for mode in (context.motion, context.plane, context.distance):
         same &= mode[line[1:]] == mode[line[:-1]]
+    # levels of G90 and G91 may be in force side by side until a block states both
+    level = words.slot["R"] >= 0
+    for code, plane in PLANE_OF.items():
+        level &= (context.plane[line] != code) | (words.slot["XYZ"[PLANES[plane][2]]] >= 0)
+    same &= ~level[1:] | level[:-1]
     cuts = np.flatnonzero(~same)
     first, last = row[np.append(0, cuts + 1)], row[np.append(cuts, len(row) - 1)]
     return dict(zip(first.tolist(), (last + 1).tolist(), strict=True)), words

@@ -20,10 +20,12 @@ from olp.program.frames import touch_of
 from olp.program.rs274.codes import (
     CYCLES,
     DWELL,
+    LENGTH_OFF,
     LENGTHS,
     LOCAL_OFFSET,
     METRIC,
     PATH_MODES,
+    PLANE_OF,
     UNITS,
     WORK_OFFSETS,
     WRITE_OFFSET,
@@ -43,6 +45,10 @@ _RANK = {
     for rank, codes in enumerate(((DWELL,), UNITS, LENGTHS, WORK_OFFSETS, PATH_MODES))
     for code in codes
 }
+#: Codes that have no P, beside which it may be the number of a work offset.
+_LEAVES_P = frozenset({
+    0, 10, *PLANE_OF, *UNITS, *LENGTHS, *WORK_OFFSETS, 400, 800, 900, 910, 940, 950, 980, 990,
+})  # fmt: skip
 #: Events that leave frame, tool and position as they are.
 _QUIET = frozenset({DWELL, *PATH_MODES})
 #: Words that number a tool, its length or its radius.
@@ -168,7 +174,7 @@ class OffsetState(State):
         return tool.length_mm
 
     def _tool_length(self, code: int, line: int, by_letter: dict[str, Word]) -> None:
-        if code == 490:
+        if code == LENGTH_OFF:
             self._set_length(ZERO)
             self.length_tool = self.length_number = None
             return
@@ -205,6 +211,15 @@ class OffsetState(State):
 
     def _check_number(self, block: EventBlock, line: int) -> None:
         """Refuse a word that may be the number of a work offset, or belong to another code of its block."""
+        worded, further = self.profile.offset_words, self.profile.further_offsets[0]
+        alone = [code for code in block.events if code in WORK_OFFSETS and code not in worded]
+        if alone and "P" in block.by_letter and _LEAVES_P.issuperset(block.g_codes):
+            raise ProgramError(
+                f"what this control makes of P beside G{alone[0] / 10:g} is not known; a further work offset "
+                f"is {further} P",
+                line=line,
+                code="OLP518",
+            )
         offsets = self.profile.offsets_alone.intersection(block.g_codes)
         others = [code for code in block.g_codes if code in CYCLES or code in (DWELL, WRITE_OFFSET)]
         for code in offsets:

@@ -289,7 +289,7 @@ class _Reader:
             if block.quiet and plain and not (here and alone[upto]):
                 state.pause(number, block)
                 continue
-            tool = block.m_codes or "T" in block.by_letter
+            tool = block.m_codes or not block.by_letter.keys().isdisjoint("TH")
             if tool or line in self.payloads or not _KEEPS_FRAME.issuperset(block.events):
                 rows.present = None
             moved, place = state.moved_by(block.m_codes)

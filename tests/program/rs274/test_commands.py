@@ -53,6 +53,9 @@ def test_lines_after_which_no_position_is_known(line: str, control: str, setups:
 
 def test_names_of_klipper(setups: dict[str, Setup]) -> None:
     setup = setups["klipper"]
+    zeros = "SET_GCODE_OFFSET Z_ADJUST=0 MOVE=1", "set_gcode_offset X=0.0 Z=-.0"
+    for still in zeros:
+        assert ends(f"{still}\nG0 Y5\n", setup, "klipper")[-1] == ("RAPID", 1.0, 5.0, 3.0)
     for still in ("SET_VELOCITY_LIMIT ACCEL=500", "EXCLUDE_OBJECT_START NAME=a_1", 'RESPOND MSG="G1 X9"'):
         assert ends(f"{still}\nG0 Y5\n", setup, "klipper")[-1] == ("RAPID", 1.0, 5.0, 3.0)
     read = program(HEAD + "BED_MESH_CALIBRATE\nLIGHTS A=1\nG0 Y5\n", setup, "klipper")
@@ -61,7 +64,8 @@ def test_names_of_klipper(setups: dict[str, Setup]) -> None:
     assert "BED_MESH_CALIBRATE is a macro of the machine" in read.remarks[0][2]
     stated = replace(setup, machine=replace(setup.machine, still_macros=frozenset({"LIGHTS"})))
     assert ends("lights a=1\nG0 Y5\n", stated, "klipper")[-1] == ("RAPID", 1.0, 5.0, 3.0)
-    for name in ("SET_GCODE_OFFSET Z=0.1", "SKEW_PROFILE LOAD=a", "RESTORE_GCODE_STATE NAME=a"):
+    shifts = "SET_GCODE_OFFSET Z=0.1", "SET_GCODE_OFFSET X=0 Z_ADJUST=.05", "SET_GCODE_OFFSET Z={z}"
+    for name in (*shifts, "SKEW_PROFILE LOAD=a", "RESTORE_GCODE_STATE NAME=a"):
         assert refusal(HEAD + name, setup, "klipper")["code"] == "OLP512"
     assert refusal(HEAD + "LIGHTS A=1", setups["marlin"], "marlin")["code"] == "OLP510"
 
@@ -72,6 +76,7 @@ def test_names_of_klipper(setups: dict[str, Setup]) -> None:
     [
         ("X5 Y6", "OLP517", "no code holds from line to line"),
         ("G1 X5 (a) Y7", "OLP514", "brackets, which are no comment"),
+        ("(a note)", "OLP514", "write the comment behind `;`"),
         ("N3 G1 X5*71", "OLP505", "has a checksum"),
         ("G1 X", "OLP510", "is not understood"),
         ("/G1 X5", "OLP505", "not block delete"),

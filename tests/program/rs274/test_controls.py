@@ -81,8 +81,9 @@ READINGS: dict[str, tuple[str, dict[str, Outcome], Any]] = {
     ),
     "offset_words": (
         "G54 P2\nG0 X1. Y2. Z3.",
-        {SIEMENS: (8, 10, 12), FANUC: (8, 10, 12), MACH3: (1, 2, 3)},
-        {SIEMENS: {}, FANUC: {}, MACH3: {540: "P"}},
+        {SIEMENS: (8, 10, 12), FANUC: (8, 10, 12)}
+        | dict.fromkeys((HAAS, MAZAK, MACH3), "of P beside G54 is not known; a further work offset is G"),
+        {SIEMENS: {}, FANUC: {}, HAAS: {540: "P"}, MAZAK: {540: "P"}, MACH3: {540: "P"}},
     ),
     "offset_names": (
         "G15 H1\nG0 X1. Y2. Z3.",
@@ -112,6 +113,11 @@ READINGS: dict[str, tuple[str, dict[str, Outcome], Any]] = {
     "numbers_hold": (
         "G0 X0. Y0.\nG43 H1 Z1.\nH2 Z1.",
         dict.fromkeys((FANUC, HAAS, MAZAK, SIEMENS, MACH3), "H2 alone is in the block while H1 is in force"),
+        "not",
+    ),
+    "zero_ends_length": (
+        "G0 X0. Y0.\nG43 H1 Z1.\nH0\nZ1.",
+        dict.fromkeys((FANUC, HAAS, MAZAK, SIEMENS), (0, 0, 1)) | {MACH3: "H0 alone is in the block while"},
         "not",
     ),
     "radius_holds": (

@@ -201,3 +201,12 @@ def test_bores_and_patterns_that_a_control_makes_otherwise_are_refused(reading) 
     ):
         with pytest.raises(ProgramError, match=why):
             reading(body, "haas")
+
+
+def test_levels_of_g90_last_in_g91_until_a_block_states_both(reading) -> None:  # type: ignore[no-untyped-def]
+    """From Z20: R-18. is at 2, and Z-9. at -7."""
+    turned = reading("G81 X9. Z-5. R2. F100.\nG91 X1.\nX1.\nX1. Z-9. R-18.\nX1.\nG80\nG90\n")
+    stated = reading("G81 X9. Z-5. R2. F100.\nX10.\nX11.\nX12. Z-7.\nX13.\nG80\n")
+    np.testing.assert_allclose(path(turned), path(stated), atol=1e-12)
+    with pytest.raises(ProgramError, match="G90 and G91"):
+        reading("G81 X9. Z-5. R2. F100.\nG91 X1.\nX1. Z-9.\nG80\n")

@@ -104,8 +104,8 @@ class Profile(Dialect):
     - `m61_sets_tool`: M61 Q says which tool is in the spindle. `tools_in_block`: a block may have two T
       words, the tool to change to and the one to make ready. `length_of_spindle_tool`: G43 without H, and
       with H0, takes the length of that tool. `spindle_words`: HA and DA name its length and its radius.
-      `numbers_hold`: H and D alone may change a length and a radius that are in force. `radius_holds`: G41
-      and G42 without D take the D before them.
+      `numbers_hold`: H and D alone may change a length and a radius that are in force. `zero_ends_length`:
+      H0 alone does what G49 does. `radius_holds`: G41 and G42 without D take the D before them.
       `lengths_along_z`: a tool length counts along Z alone. `lengths_keep_unit`: a change of unit does not
       convert the length in force.
     - `feed_words_end`: each G94 and G95 forgets F. `feed_before_unit`: F of a block counts before its G20 or
@@ -182,6 +182,7 @@ class Profile(Dialect):
     length_of_spindle_tool: bool = False
     spindle_words: bool = False
     numbers_hold: bool = False
+    zero_ends_length: bool = False
     radius_holds: bool = False
     lengths_along_z: bool = False
     lengths_keep_unit: bool = False

@@ -47,6 +47,7 @@ ISO = Profile(
     exact_stop=True,
     lengths_along_z=True,
     numbers_hold=True,
+    zero_ends_length=True,
     text=BlockText(),
     # `:1234` is another way to write the number of a program
     inert=pattern(rb"[ \t]*:[ \t]*\d+[ \t]*(?:\([^)]*\)[ \t]*)?"),

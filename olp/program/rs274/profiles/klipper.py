@@ -41,9 +41,9 @@ DIALECT = replace(
     commands=Commands(
         text=TEXTS,
         named=True,
+        zeros={b"SET_GCODE_OFFSET": _ZERO},
         still=_STILL,
         refused={
-            b"SET_GCODE_OFFSET": _ZERO,
             b"SET_KINEMATIC_POSITION": _ZERO,
             b"SET_Z_THERMAL_ADJUST": "moves Z with the temperature; switch it off in the configuration",
             b"FORCE_MOVE": "moves one stepper by itself; take it out of the program",

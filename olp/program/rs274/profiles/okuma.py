@@ -33,6 +33,7 @@ DIALECT = replace(
     signs=OKUMA,
     keeper=None,
     spindle_words=True,
+    zero_ends_length=False,
     radius_holds=True,
     codes=g_codes(
         unchanged=set(_UNCHANGED),

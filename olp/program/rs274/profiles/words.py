@@ -111,5 +111,7 @@ def _lines_of_commands(profile: Control) -> Iterator[Row]:
             yield Row(name.decode(), Support.UNCHANGED, "moves no axis")
         for name, why in sorted(commands.refused.items()):
             yield Row(name.decode(), Support.REFUSED, why)
+        for name, why in sorted(commands.zeros.items()):
+            yield Row(name.decode(), Support.REFUSED, f"{why}; with offsets of 0 it is unchanged")
         why = "a macro of the machine: behind it no position is known, modes hold; or list it in still_macros"
         yield Row("any other name", Support.READ, why)
