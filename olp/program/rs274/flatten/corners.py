@@ -17,7 +17,7 @@ from olp.core.geometry import PLANES
 from olp.core.units import AXES
 from olp.core.values import dataclass
 from olp.program.contours.corners import Corner, Element, Point, chamfer, rounding, turn_at
-from olp.program.rs274.codes import INCH, INVERSE_TIME, PLANE_OF
+from olp.program.rs274.codes import INCH, INVERSE_TIME, PLANE_OF, ROTATION
 from olp.program.rs274.flatten.lines import Line, Word, compile_line
 from olp.program.rs274.flatten.state import ProgramState, tracked
 from olp.program.rs274.profiles.base import Profile
@@ -28,6 +28,8 @@ _CENTRES = "ijk"
 #: Codes beside which a move keeps its meaning: G0 to G3, planes, distances, feeds, exact stops.
 _KEEPS = frozenset({0, 10, 20, 30, 90, 170, 180, 190, 610, 640, 900, 910, 940, 950, 960, 970})
 _PLAIN = frozenset("ngxyzijkrfsmtdh") | _CORNERS
+#: G68 and G69.
+_TURNS = frozenset({ROTATION, 690})
 _MOTIONS = frozenset({10, 20, 30})
 _LEFT = 30
 #: rad of a joint without a corner, and up to where controls make none
@@ -65,11 +67,13 @@ def with_corners(
         try:
             corners.put(raw, eol, index)
         except ProgramError as error:
-            error.line = index + 1
+            # what does not go with a corner is said of the block that asks for it
+            error.line = 1 + (index if corners.held is None else corners.written[corners.held.index][2])
             raise
     if corners.open:
         why = f"behind the corner of {corners.open} the program ends; give the move behind it"
-        raise ProgramError(why, code="OLP544", line=len(blocks))
+        assert corners.held is not None
+        raise ProgramError(why, code="OLP544", line=corners.written[corners.held.index][2] + 1)
     return corners.written
 
 
@@ -78,12 +82,13 @@ class _Corners:
         self.written: list[Placed] = []
         self._profile, self._number, self._switch = profile, number, switch
         self._state = ProgramState(profile)
-        self._held: _Leg | None = None
+        #: the move before, where a corner may be
+        self.held: _Leg | None = None
 
     @property
     def open(self) -> str:
         """The word of a corner whose second move has not come yet, empty for none."""
-        return "" if self._held is None or self._held.size is None else self._held.word
+        return "" if self.held is None or self.held.size is None else self.held.word
 
     def put(self, raw: bytes, eol: bytes, index: int) -> None:
         """The next block."""
@@ -102,23 +107,24 @@ class _Corners:
             corner = []
         motion = self._moves(line, words)
         element = self._element(words, before, motion) if motion else None
-        if element is None and (self.open or corner):
-            raise _no_move(self.open or _shown(corner[0]), behind=bool(self.open), unknown=bool(motion))
-        held, self._held = self._held, None
+        if element is None and self.open:
+            raise _no_move(self.open, behind=True, unknown=bool(motion))
         if corner:
             raw = _changed(raw, line, {}, _CORNERS)
         self.written.append((raw, eol, index))
-        if element is None or motion is None:
-            return
-        leg = _Leg(
-            len(self.written) - 1, element, PLANE_OF[self._state.plane], motion, not self._state.absolute
-        )
-        if held is not None and held.size is not None:
-            leg = self._made(held, held.size, leg)
+        leg = None
+        if element is not None and motion is not None:
+            plane = PLANE_OF[self._state.plane]
+            leg = _Leg(len(self.written) - 1, element, plane, motion, not self._state.absolute)
+            if self.held is not None and self.held.size is not None:
+                leg = self._made(self.held, self.held.size, leg)
+        self.held = None
         if corner:
             word, size = _shown(corner[-1]), _size(corner, self._profile)
+            if leg is None:
+                raise _no_move(word, behind=False, unknown=bool(motion))
             leg = replace(leg, word=word, size=size)
-        self._held = leg
+        self.held = leg
 
     def _follow(self, line: Line) -> bool:
         """Follow a block; whether it makes a canned cycle."""
@@ -137,6 +143,10 @@ class _Corners:
                 state.forget()
         else:
             state.apply(words)
+        if state.codes(words) & _TURNS:
+            # a turned frame turns corners, too; positions are those of the program in it
+            state.forget()
+            state.odd_frame = False
         if line.deleted and self._switch:
             state.forget(axis for axis in range(3) if state.position[axis] != start[axis])
         return cycle

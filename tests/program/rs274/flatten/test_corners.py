@@ -98,19 +98,19 @@ def test_what_stands_beside_a_corner_stays_in_its_block() -> None:
 @pytest.mark.parametrize(
     ("body", "code", "why", "line"),
     [
-        ("G1 X30. F300. ,R5.\nG0 Y40.\n", "OLP544", "no G1, G2 or G3", 4),
-        ("G1 X30. F300. ,R5.\nM8\nY40.\n", "OLP544", "no G1, G2 or G3", 4),
-        ("G1 X30. F300. ,R5.\nY40. A5.\n", "OLP544", "no G1, G2 or G3", 4),
-        ("G1 X30. F300. ,R5.\nY40. Z1.\n", "OLP524", "in its plane alone", 4),
+        ("G1 X30. F300. ,R5.\nG0 Y40.\n", "OLP544", "no G1, G2 or G3", 3),
+        ("G1 X30. F300. ,R5.\nM8\nY40.\n", "OLP544", "no G1, G2 or G3", 3),
+        ("G1 X30. F300. ,R5.\nY40. A5.\n", "OLP544", "no G1, G2 or G3", 3),
+        ("G1 X30. F300. ,R5.\nY40. Z1.\n", "OLP524", "in its plane alone", 3),
         ("G0 X30. ,R5.\nG1 Y40. F300.\n", "OLP544", "no G1, G2 or G3", 3),
         ("G54\nG1 X30. F300. ,R5.\nY40.\n", "OLP524", "begins where no block says", 4),
-        ("G1 X30. F300. ,R5.\n", "OLP544", "no G1, G2 or G3", 4),
-        ("G1 X30. F300. ,R40.\nY40.\n", "OLP544", "does not fit", 4),
+        ("G1 X30. F300. ,R5.\n", "OLP544", "no G1, G2 or G3", 3),
+        ("G1 X30. F300. ,R40.\nY40.\n", "OLP544", "does not fit", 3),
         ("G1 X30. F300. ,R5\nY40.\n", "OLP515", "no decimal point", 3),
         ("G1 X30. F300. ,R-5.\nY40.\n", "OLP516", "no size", 3),
         ("G1 X30. F300. ,R5. ,C2.\nY40.\n", "OLP518", "two corners", 3),
-        ("G1 X30. F300. ,R5.\nX60. Y0.2\n", "OLP544", "less than a degree", 4),
-        ("G1 X30. F300. ,C5.\nG2 X40. Y10. R10.\n", "OLP544", "beside an arc", 4),
+        ("G1 X30. F300. ,R5.\nX60. Y0.2\n", "OLP544", "less than a degree", 3),
+        ("G1 X30. F300. ,C5.\nG2 X40. Y10. R10.\n", "OLP544", "beside an arc", 3),
         ("G81 X30. Z-3. R1. F300. ,R5.\nG80\n", "OLP510", "canned cycle", 3),
     ],
 )  # fmt: skip
@@ -133,3 +133,12 @@ def test_a_plain_program_with_corners_is_corrected_as_it_is(tmp_path: Path) -> N
         assert any(f.code == "OLP110" for f in done.findings)
         ends = [olp.simulate(some.data, path, step_mm=1e4).points_mm for some in (done, asked)]
         np.testing.assert_allclose(ends[0], ends[1], atol=1e-9)
+
+
+def test_a_corner_is_turned_with_its_frame() -> None:
+    body = "G0 X0. Y0.\nG1 X30. F300. ,R5.\nY40.\n"
+    plain, turned = (unrolled(f"{code}\n{body}G69\n") for code in ("G80", "G68 X1. Y2. R30."))
+    assert turned == plain.replace("G80", "G68 X1. Y2. R30.")
+    for code, line in (("G68 X1. Y2. R30.", 4), ("G51 X0. Y0. Z0. P2.\nG0 X0. Y0.", 5)):
+        said, _, at = refused(f"{HEAD}{code}\nG1 X30. F300. ,R5.\nY40.\nM30\n", "fanuc")
+        assert (said, at) == ("OLP524", line)
