@@ -458,14 +458,14 @@ class AxisState(OffsetState):
             raise ProgramError(
                 "offsets, machine coordinates and reference positions are used in a turned, scaled or "
                 "mirrored program, which the control refuses or takes in its own way; give "
-                f"{UNDONE_BY[transform.code]} before",
+                f"{self.profile.name_of(UNDONE_BY[transform.code])} before",
                 line=line,
                 code="OLP518",
             )
         if transform is not None and transform.code != ROTATION and CUTTER_COMPENSATION.intersection(codes):
             raise ProgramError(
                 "cutter compensation changes its side in a mirrored or scaled program, which is not read; "
-                f"give {UNDONE_BY[transform.code]} before",
+                f"give {self.profile.name_of(UNDONE_BY[transform.code])} before",
                 line=line,
                 code="OLP518",
             )

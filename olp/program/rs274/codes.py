@@ -102,8 +102,8 @@ TILTED = 682
 ALIGNED = 531
 #: G69, G50 and G50.1 by what they end.
 UNDOES = {690: ROTATION, 500: SCALING, 501: MIRROR}
-#: The names of the codes that end these.
-UNDONE_BY = {ROTATION: "G69", SCALING: "G50", MIRROR: "G50.1"}
+#: The codes that end these.
+UNDONE_BY = {code: end for end, code in UNDOES.items()}
 #: Every code that changes how a program is turned, scaled or mirrored.
 TRANSFORMS = frozenset({*UNDOES, *UNDOES.values()})
 #: Their axis words are values, not motion: G10, G52, G92, G43.1, G50.1, G51, G51.1, G68 and G68.2. Beside

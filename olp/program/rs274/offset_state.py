@@ -108,6 +108,8 @@ class OffsetState(State):
     #: those of the setup that were looked up, None where it has none of this name
     known_offsets: dict[str, WorkOffset | None] = field(default_factory=dict)
     captures: list[Capture] = field(default_factory=list)
+    #: axes that a probe has moved last: only the control knows where they are
+    touched: set[int] = field(default_factory=set)
     #: index of the first word of the present block in the program's table
     first_word: int = 0
 
@@ -358,6 +360,13 @@ class OffsetState(State):
 
     def _capture(self, axis: int, word: Word, line: int, moves: int, turn: Turn | None = None) -> None:
         if math.isnan(along_words(Turning.of(turn), self.position)[axis]):
+            if axis in self.touched:
+                raise ProgramError(
+                    f"{word.letter} is stored where a probe has touched, which only the control knows; touch "
+                    "before the program, state that place as a work offset, and take both blocks out",
+                    line=line,
+                    code="OLP524",
+                )
             raise ProgramError(
                 f"{word.letter} is stored as the present position, but the axis has not been commanded yet; "
                 f"{KNOWN_BY}",

@@ -321,6 +321,7 @@ class SpecialBlocks:
             for i in range(3):
                 if state.position[i] != before[i]:
                     state.position[i] = NAN
+                    state.touched.add(i)
             self.control_move(line, deleted=deleted)
 
     def drill(self, line: int, drilling: Drilling, *, deleted: bool) -> None:

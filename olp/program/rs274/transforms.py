@@ -50,7 +50,7 @@ def _check(state: OffsetState, code: int, line: int) -> None:
     if now is not None and not now.code == code == MIRROR:
         raise _refusal(
             f"{name} comes in addition to G{now.code / 10:g}, and how they add up is not certain; give "
-            f"{UNDONE_BY[now.code]} before it",
+            f"{state.profile.name_of(UNDONE_BY[now.code])} before it",
             line,
         )
 
@@ -151,8 +151,13 @@ def _mirror(
 ) -> Transform | None:
     """G51.1 X Y Z: mirrored at these coordinates, beside axes that are mirrored already."""
     now = state.offsets.transform
+    at_zero, name = state.profile.mirrors_at_zero, state.profile.name_of(MIRROR)
     if not axis_words:
-        raise _refusal("G51.1 needs X, Y or Z, the coordinate of its mirror", line)
+        raise _refusal(f"{name} needs X, Y or Z, the coordinate of its mirror", line)
+    if at_zero and any(word.value for _, word in axis_words):
+        raise _refusal(f"{name} mirrors at the zero of the work offset; give its axes with 0, as in X0", line)
+    if at_zero and any(state.offsets.local):
+        raise _refusal(f"where {name} mirrors under G52 is not known; give G52 X0 Y0 Z0 before it", line)
     about = [0.0] * 3 if now is None else list(now.about)
     axes = set() if now is None else set(now.axes)
     for axis, word in axis_words:

@@ -17,7 +17,7 @@ from olp.files.sources import Source, Sources
 from olp.program.dialect import Row, Support
 from olp.program.registry import DIALECTS, read
 from olp.program.rs274.cycle_rules import CycleRules
-from olp.program.rs274.profiles.base import Act, Profile, increment
+from olp.program.rs274.profiles.base import NO_CODE, Act, Profile, increment
 from olp.workflows.flatten import UnrollOptions, as_asked
 
 LINUXCNC, FANUC, HAAS, GRBL = CONTROLS = ("linuxcnc", "fanuc", "haas", "grbl")
@@ -113,6 +113,11 @@ READINGS: dict[str, tuple[str, dict[str, Outcome], Any]] = {
     "numbers_hold": (
         "G0 X0. Y0.\nG43 H1 Z1.\nH2 Z1.",
         dict.fromkeys((FANUC, HAAS, MAZAK, SIEMENS, MACH3), "H2 alone is in the block while H1 is in force"),
+        "not",
+    ),
+    "mirrors_at_zero": (
+        "G0 X0. Y0. Z1.\nG101 X5.\nX1. Y2.",
+        {HAAS: "G101 mirrors at the zero of the work offset"},
         "not",
     ),
     "zero_ends_length": (
@@ -466,12 +471,12 @@ CODES: dict[str, dict[Act, str]] = {
         Act.REFUSE: f"{_REFUSED} G41.1 G42.1 G92.1",
     },
     HAAS: {
-        Act.UNCHANGED: f"{_ISO_UNCHANGED} G50.1 G103 G187",
+        Act.UNCHANGED: f"{_ISO_UNCHANGED} G103 G187",
         Act.MOTION: f"{_MILLING} {_DRILLING} G76 G77",
         Act.FEED: "G93-G95",
         Act.RETRACT: "G98 G99",
-        Act.EVENT: f"{_ISO_EVENTS} G110-G129 G154",
-        Act.REFUSE: f"{_REFUSED} G41.1 G42.1 G5.1 G51.1 G92.1 G47 G70-G72 G87 G100 G101 G150",
+        Act.EVENT: f"{_ISO_EVENTS} G50.1 G51.1 G110-G129 G154",
+        Act.REFUSE: f"{_REFUSED} G41.1 G42.1 G5.1 G92.1 G47 G70-G72 G87 G150",
     },
     GRBL: {
         Act.UNCHANGED: "G40",
@@ -505,10 +510,15 @@ def test_what_becomes_of_each_g_code(control: str) -> None:
     assert own == {act: listed_codes(text) for act, text in wanted.items()}
     # the table for people says the same
     rows = [row for row in profile.rows() if re.fullmatch(r"G[\d.]+", row.statement)]
-    assert [round(10 * float(row.statement[1:])) for row in rows] == sorted(profile.codes)
+    here = {code: act for code, act in profile.codes.items() if profile.aliases.get(code) != NO_CODE}
+    also = {alias: profile.codes[code] for alias, code in profile.aliases.items() if code != NO_CODE}
+    assert [round(10 * float(row.statement[1:])) for row in rows] == sorted(here | also)
     support = {Act.UNCHANGED: Support.UNCHANGED, Act.REFUSE: Support.REFUSED, Act.MOTION: Support.CORRECTED}
-    for row, (_, act) in zip(rows, sorted(profile.codes.items()), strict=True):
+    for row, (code, act) in zip(rows, sorted((here | also).items()), strict=True):
         assert row.support == support.get(act, Support.READ)
+        if code in also:
+            assert row.why == f"as G{profile.aliases[code] / 10:g} of other controls"
+            continue
         assert bool(row.why) == (act is Act.REFUSE)
         assert not row.why or row.why.startswith(f"{row.statement} ") or row.statement == "G61.1"
     of_g92_1 = {

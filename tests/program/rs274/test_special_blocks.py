@@ -329,3 +329,12 @@ def test_what_changes_no_frame_makes_none(setup: Setup) -> None:
     got = path("G0 X1 Y2 Z3\nG4 P1\nX2\nG64 P0.01\nX3\nG53 G0 Z1\nX4 Y4 Z4\n", setup)
     assert len(got.frames) == 1
     assert got.line.tolist() == [2, 3, 5, 7, 8, 9]
+
+
+@pytest.mark.parametrize("code", ["G92 Z0", "G10 L20 P1 Z0"])
+def test_a_place_that_a_probe_has_touched_is_not_stored(code: str, setup: Setup) -> None:
+    with pytest.raises(ProgramError, match="a probe has touched, which only the control knows") as caught:
+        path(f"G38.2 Z-50 F60\n{code}\nG0 Z1\n", setup)
+    assert caught.value.code == "OLP524"
+    # X was not moved by it
+    path(f"G38.2 Z-50 F60\n{code.replace('Z', 'X')}\nG0 Z1\n", setup)

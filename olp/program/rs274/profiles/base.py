@@ -90,6 +90,7 @@ class Profile(Dialect):
       of these offsets where it is not that of the code. `turns_offsets`: a work offset may be turned about
       Z, which R of G10 L2 states too. `scales_axes`: G51 takes a factor for each axis, too.
       `scales_by_parameter`: a parameter of the control sets the unit of these factors, which have no point.
+      `mirrors_at_zero`: mirror images are at the zero of the work offset, and their axes have 0.
     - `polar`: X and Y between G16 and G15 are radius and angle about program zero, which the unroller writes
       as X and Y.
     - `return_level`: the code whose word of the tool axis states the level that canned cycles return to, 0
@@ -171,6 +172,7 @@ class Profile(Dialect):
     polar: bool = False
     scales_axes: bool = False
     scales_by_parameter: bool = False
+    mirrors_at_zero: bool = False
     return_level: int = 0
     return_modes: Mapping[int, int] = field(default_factory=dict)
     still_with: Mapping[int, tuple[str, frozenset[float]]] = field(default_factory=dict)
@@ -225,6 +227,11 @@ class Profile(Dialect):
         names = [f"{name}P{number}" for name in self.further_offsets]
         own = self.first_further and 1 <= number <= _WITH_CODES
         return [*names, f"G{self.first_further + number - 1}"] if own else names
+
+    def name_of(self, code: int) -> str:
+        """The name that a G code, ten times its number, has on this control."""
+        own = next((alias for alias, means in self.aliases.items() if means == code), code)
+        return f"G{own / 10:g}"
 
     @property
     def directed(self) -> bool:

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from olp.program.rs274.codes import HOLE_PATTERNS
+from olp.program.rs274.codes import HOLE_PATTERNS, MIRROR
 from olp.program.rs274.cycle_rules import HAAS_CYCLES
 from olp.program.rs274.flatten.language import MACRO_B
-from olp.program.rs274.profiles.base import Act, g_codes
+from olp.program.rs274.profiles.base import NO_CODE, Act, g_codes
 from olp.program.rs274.profiles.iso import ISO, ISO_EXTRA, ISO_UNCHANGED
 
 _OFFSETS = dict.fromkeys((1540, *range(1100, 1300, 10)), Act.EVENT)
 #: G77 bores from below, and with G87 an operator leaves the bore; G70 to G72 make patterns of holes.
-_INSIDE = {470: "engraves text", 1500: "cuts a pocket", 1000: "mirrors", 1010: "mirrors"}
+_INSIDE = {470: "engraves text", 1500: "cuts a pocket"}
+#: G101 and G100 switch mirror images on and off.
+_MIRROR = {MIRROR: Act.EVENT, 501: Act.EVENT}
 _CYCLES = {770: Act.MOTION, **dict.fromkeys((700, 710, 720, 870, *_INSIDE), Act.REFUSE)}
 _AROUND = "makes holes around the present position inside the control"
 _ALONG = "G72 makes holes along a line inside the control; post each hole with its place"
@@ -21,7 +23,11 @@ DIALECT = replace(
     ISO,
     name="haas",
     title="Haas mills",
-    codes=g_codes(unchanged={*ISO_UNCHANGED, 1030, 1870}, extra={**ISO_EXTRA, **_OFFSETS, **_CYCLES}),
+    codes=g_codes(
+        unchanged={*ISO_UNCHANGED, 1030, 1870}, extra={**ISO_EXTRA, **_OFFSETS, **_CYCLES, **_MIRROR}
+    ),
+    aliases={1010: MIRROR, 1000: 501, MIRROR: NO_CODE},
+    mirrors_at_zero=True,
     refusals={
         **ISO.refusals,
         921: "G92.1 is not a code of this control",

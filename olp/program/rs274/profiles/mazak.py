@@ -33,6 +33,7 @@ DIALECT = replace(
     text=replace(ISO.text, unread=_SYNCHRONOUS, unread_mark=ord(",")),
     refusals={
         **ISO.refusals,
+        680: "G68 turns in the plane or in space, by the series of G codes that is set; post the coordinates",
         921: "G92.1 presets offsets that are not known off line",
         51: "G5.1 is a spline of this control",
     },

@@ -40,7 +40,7 @@ DIALECT = replace(
         extra={
             541: Act.EVENT,
             710: Act.EVENT,
-            **dict.fromkeys((*_LENGTHS, 110, 620, 870), Act.REFUSE),
+            **dict.fromkeys((*_LENGTHS, 110, 620, 870, 1160), Act.REFUSE),
         },
         without=_LACKING - set(_LENGTHS),
     )
@@ -52,6 +52,7 @@ DIALECT = replace(
             code: f"G{code // 10} (tool length along another axis than Z) is not read; use G56"
             for code in _LENGTHS
         },
+        1160: "G116 changes the tool by a macro of the machine's builder; post T and M6",
         110: "G11 (shift and rotation of coordinates) is not read; post the coordinates",
         160: "G16 (a work offset for one block) is not read; use G15",
         620: "G62 (mirror image) is not read; post the coordinates",
