@@ -38,10 +38,9 @@ class Val3(RobotDialect):
 
     def named(self, program: Program, target: Target, taken: set[str]) -> str:
         """The next element of a target's data."""
-        datum = writing.declared(whole(program.data)).get(target.name)
-        if datum is None:
+        first = writing.following(whole(program.data)).get(target.name)
+        if first is None:
             return ""
-        first = datum.following(whole(program.data))
         base, span = target.name.upper(), 1
         while f"{base}[{first + span - 1}]" in taken:
             span *= 2

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 from olp.core.errors import ProgramError
 from olp.core.projects import parts
 from olp.core.values import dataclass
@@ -23,8 +25,9 @@ class Application:
     first: Routine | None
 
 
+@functools.lru_cache(maxsize=2)
 def application(data: bytes) -> Application:
-    """Raises ProgramError where the text is no XML of VAL 3."""
+    """The application of a text, which is read once. Raises ProgramError where it is no XML of VAL 3."""
     line_of = Lines(data)
     found: list[Datum] = []
     all_: dict[str, Routine] = {}

@@ -31,8 +31,6 @@ SIGNS = {
     "wnegative": -1.0,
 }
 OPEN = frozenset(("ssame", "sfree", "esame", "efree", "wsame", "wfree"))
-#: mm/s of a motion description that leaves the speed to the joints
-_FREE_SPEED = 9999.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -310,7 +308,7 @@ class Moving:
         if thing is None or thing.why or thing.kind != "mdesc":
             return NAN, NOWHERE, False
         speed = thing.slots.get("tmax")
-        own = speed is not None and speed[0] != NOWHERE and 0.0 < speed[1] < _FREE_SPEED
+        own = speed is not None and speed[0] != NOWHERE and speed[1] > 0.0
         feed = speed[1] if own and speed is not None else NAN
         match = REFERENCE.fullmatch(self.data, *span)
         key = "0" if match is None or match[2] is None else match[2].strip().decode("latin-1")

@@ -31,19 +31,37 @@ def declared(data: bytes) -> Mapping[str, Datum]:
     return {datum.name: datum for datum in application(data).data}
 
 
+@functools.lru_cache(maxsize=2)
+def _entries(data: bytes) -> Mapping[Span, tuple[Datum, Entry]]:
+    """The elements of all data by their bytes."""
+    every = declared(data).values()
+    return {entry.span: (datum, entry) for datum in every for entry in datum.entries.values()}
+
+
+@functools.lru_cache(maxsize=2)
+def _ends(data: bytes) -> Mapping[str, int]:
+    """Where the last element of each datum ends."""
+    return {datum.name: datum.end for datum in declared(data).values() if datum.entries}
+
+
+@functools.lru_cache(maxsize=2)
+def following(data: bytes) -> Mapping[str, int]:
+    """The first index of each datum that no element has."""
+    return {datum.name: datum.following(data) for datum in declared(data).values()}
+
+
 def declared_at(data: bytes, target: Target, *, whole: bool = False) -> tuple[Datum, Entry]:
     """The entry in which a target is declared, `whole` where all its numbers have to be those of it. Raises
     ProgramError where it cannot be declared again."""
-    datum = declared(data).get(target.name)
-    found = [] if datum is None else [e for e in datum.entries.values() if e.span == target.declaration]
-    if datum is None or not found or (whole and found[0].host != target.value):
+    found = _entries(data).get(target.declaration)
+    if found is None or (whole and found[1].host != target.value):
         raise ProgramError(
             "moves to this target want different numbers of it, and it has no element of its own in the data "
             "that could be written again; give each move its own target",
             line=target.line,
             code="OLP561",
         )
-    return datum, found[0]
+    return found
 
 
 def element(data: bytes, datum: Datum, entry: Entry, index: str, texts: Mapping[str, bytes]) -> Replacement:
@@ -57,7 +75,8 @@ def element(data: bytes, datum: Datum, entry: Entry, index: str, texts: Mapping[
         assert tag is not None
         edits.append((tag.end(), tag.end(), b' key="' + index.encode() + b'"'))
     own = spliced(data[begin:end], [(a - begin, b - begin, text) for a, b, text in edits])
-    return datum.end, datum.end, _lead(data, entry) + own
+    place = _ends(data)[datum.name]
+    return place, place, _lead(data, entry) + own
 
 
 def _lead(data: bytes, entry: Entry) -> bytes:
@@ -108,8 +127,8 @@ def completed(data: bytes, edits: list[Replacement]) -> list[Replacement]:
     """As `RobotDialect.completed`: numbers that were left out, motion descriptions of parts, and sizes."""
     edits = _left_out(data, edits)
     edits = _passed(data, edits)
-    known = declared(data).values()
-    ends = {datum.end: datum for datum in known if datum.entries}
+    known = declared(data)
+    ends = {place: known[name] for name, place in _ends(data).items()}
     largest: dict[int, int] = {}
     for a, b, text in edits:
         index = _INDEX.search(text) if a == b and a in ends else None
@@ -143,15 +162,15 @@ def _left_out(data: bytes, edits: list[Replacement]) -> list[Replacement]:
 def _passed(data: bytes, edits: list[Replacement]) -> list[Replacement]:
     """Edits with motion descriptions that let parts pass, each of which is declared once."""
     known, names, added = declared(data), {}, []
-    following: dict[str, int] = {}
+    used: dict[str, int] = {}
     for _, _, text in edits:
         for match in _PASSING.finditer(text):
             name, index = match[1].decode(), match[2].decode()
             if match[0] in names:
                 continue
             datum = known[name]
-            own = following.setdefault(name, datum.following(data))
-            following[name] += 1
+            own = used.get(name, following(data)[name])
+            used[name] = own + 1
             names[match[0]] = f"{name}[{own}]".encode()
             entry = datum.entries[index]
             a, b, made = element(data, datum, entry, str(own), {"leave": _BLEND, "reach": _BLEND})
