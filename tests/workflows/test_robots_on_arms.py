@@ -381,6 +381,35 @@ def test_products_of_krl_turn_with_their_target(tmp_path: Path) -> None:
     assert result.data.count(b"LIN g : {X") > 1
 
 
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ("lefty epositive wpositive", ""),
+        ("sfree efree wfree", ""),
+        ("lefty esame wpositive", ""),
+        ("righty epositive wpositive", "configuration names"),
+        ("lefty enegative wpositive", "configuration names"),
+        ("lefty epositive wup", "no wrist that is read"),
+    ],
+)
+def test_the_configuration_of_val3_names_the_posture(words: str, told: str, tmp_path: Path) -> None:
+    """The fifth axis is positive here, and the third; one that is left open is near the move before."""
+    shoulder, elbow, wrist = words.split()
+    text = val3([("J", JOINTS), ("P", JOINTS + 1)]).decode()
+    text = text.replace(
+        '"lefty" elbow="epositive" wrist="wpositive"', f'"{shoulder}" elbow="{elbow}" wrist="{wrist}"'
+    )
+    if told:
+        with pytest.raises(ProgramError, match=told) as caught:
+            olp.correct_joints(text.encode(), arm_files(tmp_path))
+        assert caught.value.line in (5, 6)
+        return
+    move = READERS["val3"](olp.correct_joints(text.encode(), arm_files(tmp_path)).data, FRAMES)[1]
+    turn = move.turn @ TOOL.T
+    joints = Arm(tmp_path / "machine.toml", ZEROS).joints(turn, move.tip - turn @ LEVER, JOINTS)
+    assert np.abs(joints + Arm(tmp_path / "machine.toml", ZEROS).zeros - (JOINTS + 1)).max() < 1e-4
+
+
 def test_joints_that_the_text_does_not_state_are_kept(tmp_path: Path) -> None:
     moves = ["PTP XHOME", f"LIN {position(JOINTS, ',S 2,T 0')}", "PTP {A1 5}"]
     result = olp.correct_joints(krl_of(*moves), arm_files(tmp_path))
