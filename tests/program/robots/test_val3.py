@@ -24,7 +24,10 @@ FRAMES = (
     '<Value key="0" x="300" y="250" z="-300" rz="30" fatherId="world[0]" />',
     '<Value key="1" x="5" y="6" z="7" rx="170.125" ry="-10.25" fatherId="fPart[0]" />',
 )
-TOOL = '<Value key="0" x="10" y="-5" z="120" ry="10" fatherId="flange[0]" ioLink="valve1" />'
+TOOLS = (
+    '<Value key="0" x="10" y="-5" z="120" ry="10" fatherId="flange[0]" ioLink="valve1" />',
+    '<Value key="1" z="4" rx="20" fatherId="tGrip[0]" />',
+)
 
 
 def datum(name: str, kind: str, *values: str) -> str:
@@ -62,7 +65,7 @@ def text_of(start: str, data: str, *others: str) -> bytes:
 
 
 def made(lines: list[str], points: list[str], *others: str) -> bytes:
-    frames, tool = datum("fPart", "frame", *FRAMES), datum("tGrip", "tool", TOOL)
+    frames, tool = datum("fPart", "frame", *FRAMES), datum("tGrip", "tool", *TOOLS)
     data = dtx(*MOTIONS, frames, datum("pPoint", "pointRx", *points), tool)
     return text_of(pgx("start", *lines), data, *others)
 
@@ -103,7 +106,8 @@ def program(rng: np.random.Generator, count: int) -> bytes:
         motion = rng.choice(["mSlow", "mFast"])
         move = rng.choice(["movel", "movel", "nTraj = movel", "movej"])
         call = f"call MoveLine({x},{y},{z},170.125,-10.25,30.5)"
-        lines.append(f"{move}({target},tGrip,{motion}) // {x}" if target else call)
+        tool = rng.choice(["tGrip", "tGrip", "tGrip[1]"])
+        lines.append(f"{move}({target},{tool},{motion}) // {x}" if target else call)
     made_ = made(lines, points, LINE).decode()
     more = datum("pMove", "pointRx", '<Value key="0" fatherId="fPart[0]" />')
     more += '    <Data name="mMove" access="private" xsi:type="array" type="mdesc" size="1" />\r\n'
@@ -261,6 +265,24 @@ def test_the_older_form_of_data(bent: Path, zero: Path) -> None:
     assert done.count(b"<pFather") == 2
     assert b"&quot;movel(p2, &lt;1&gt;&quot;)" in done
     assert b'<mdescValue accel="100" tmax="99999" blend="joint" leave="0.5" reach="0.5" />' in done
+
+
+def test_one_text_of_several_moves_is_not_changed_for_one_of_them(bent: Path) -> None:
+    """The shift in a program that is called for two points belongs to both."""
+    given = (
+        '<Parameters><Parameter name="x_p" type="pointRx" xsi:type="element" use="reference" /></Parameters>'
+    )
+    moves = ("movel(appro(x_p,{0,0,-20,0,0,0}),tGrip,mFast)", "movel(x_p,tGrip,mFast)")
+    calls = ["call pick(pPoint[0])", "call pick(pPoint[2])"]
+    with pytest.raises(ProgramError, match="moves to this target want different numbers"):
+        corrected(calls, bent, pgx("pick", *moves, parameters=given))
+    lines = corrected(calls, bent, pgx("pick", moves[1], parameters=given))
+    assert sum('key="0" x="9.9' in line or 'key="2" x="-60.0' in line for line in lines) == 2
+
+
+def test_strings_and_comments_say_nothing(zero: Path) -> None:
+    quiet = ['popUpMsg("movel(p \\" // , {")', "// movec(", 'logMsg("a") // "movel(', 'x=asc("a",1)/2']
+    assert len(corrected([*quiet, "movel(pPoint[0],tGrip,mFast)"], zero)) > 10
 
 
 REFUSED = [

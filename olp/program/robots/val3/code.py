@@ -14,8 +14,8 @@ from olp.program.text.line_ends import LINE_END
 _ENTITIES = {b"&lt;": b"<", b"&gt;": b">", b"&amp;": b"&", b"&quot;": b'"', b"&apos;": b"'"}
 _ENTITY = pattern(rb"&(?:lt|gt|amp|quot|apos);")
 _MARKUP = pattern(rb"[^\r\n]")
-_STRING = pattern(rb'"[^"]*"?')
-_CODE = pattern(rb'(?:[^/"]|"[^"]*"?|/(?!/))*')
+_STRING = pattern(rb'"(?:[^"\\]|\\.)*"?')
+_CODE = pattern(rb'(?:[^/"]|"(?:[^"\\]|\\.)*"?|/(?!/))*')
 _OPENS = frozenset(("if", "while", "for", "do", "switch"))
 _PARTS = frozenset(("else", "elseif", "case", "default"))
 _CLOSES = {"endif": "if", "endwhile": "while", "endfor": "for", "endswitch": "switch", "until": "do"}
