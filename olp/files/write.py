@@ -84,9 +84,15 @@ def write_files(
     another. Raises OlpError where the system refuses to write, or where another program holds a target or has
     changed it meanwhile.
     """
-    files = {
-        part: content for target, whole in files.items() for part, content in _divided(target, whole).items()
-    }
+    inputs = list(inputs)
+    written: dict[Path, Content] = {}
+    for target, whole in files.items():
+        own = _divided(target, whole)
+        written |= own
+        # what stood beside a program that was read with it is an input, too
+        many = [Path(source) for source in inputs if projects.is_one_of_many(Path(source))]
+        inputs += [source.with_name(part.name) for source in many for part in own if part != target]
+    files = written
     check_targets(files, inputs, force=force)
     waiting: list[Replacement] = []
     current = Path()
