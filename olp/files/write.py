@@ -89,7 +89,7 @@ def write_files(
     for target, whole in files.items():
         own = _divided(target, whole)
         written |= own
-        # what stood beside a program that was read with it is an input, too
+        # the files that were read with a program are inputs, too
         many = [Path(source) for source in inputs if projects.is_one_of_many(Path(source))]
         inputs += [source.with_name(part.name) for source in many for part in own if part != target]
     files = written
