@@ -15,7 +15,7 @@ from olp.program.program import Program
 from olp.program.robots.frames import Located, Tool
 from olp.program.robots.inform.flow import Flow, word_of
 from olp.program.robots.inform.places import Places
-from olp.program.robots.inform.table import BLOCKS, MOVING, REFUSED, SETTING, STILL
+from olp.program.robots.inform.table import BLOCKS, BY_DISTANCE, MOVING, REFUSED, SETTING, STILL
 from olp.program.robots.inform.text import Position, Statement, job_of
 from olp.program.robots.moves import NAN, RobotMoves, not_read, take_all
 from olp.program.robots.poses import Pose
@@ -26,7 +26,7 @@ _VALUE = rb"(?:\d+\.?\d*|\.\d+|L?[BIDR](?:\d+|\[[^\]]*\]))"
 #: Words behind a move that change nothing of its path, and those that belong to all of it.
 _PLAIN = rb"(?:V[JRE]?|PL|CR|ACC|DEC)=" + _VALUE + rb"|CONT"
 _OUTER = rb"(?:BC|EC|BP|EX)\d+"
-_HELD = rb"NWAIT|T=" + _VALUE + rb"|UNTIL[ \t].*"
+_HELD = rb"NWAIT|T\d+|T=" + _VALUE + rb"|UNTIL[ \t].*"
 _STATION = rb"\+MOV[JL][ \t]+(?:EC|EX)\d+"
 _TAIL = pattern(
     rb"(?i)(?:[ \t]*(?:"
@@ -91,6 +91,10 @@ class _Reader:
             return
         if word in (b"MOVL", b"MOVJ"):
             self._move(statement, straight=word == b"MOVL")
+        elif word in BY_DISTANCE:
+            self.moves.left(statement.line)
+            what = "left as written: it moves by a distance from where the robot is"
+            self.moves.remark("left", statement.line, what)
         elif word == b"*":
             self.moves.known = False
         elif word in BLOCKS:

@@ -15,14 +15,13 @@ _NO = Support.REFUSED
 REFUSED: Mapping[bytes, str] = {
     b"MOVC": "is an arc, which is not read yet; post straight moves (MOVL)",
     b"MOVS": "is a spline, which is not read; post straight moves (MOVL)",
-    b"IMOV": "is a distance; program the position",
-    b"EIMOVL": "is a distance; program the position",
-    b"EIMOVC": "is a distance; program the position",
     **dict.fromkeys(
         (b"SMOVL", b"SMOVC", b"SMOVS", b"EMOVL", b"EMOVC"),
         "counts from a positioner or another robot, whose place is not stated; post the job without it",
     ),
 }
+#: Moves by a distance.
+BY_DISTANCE = frozenset((b"IMOV", b"EIMOVL", b"EIMOVC"))
 #: Statements of blocks.
 BLOCKS: Mapping[bytes, str] = {
     b"IFTHENEXP": "if", b"IFTHEN": "if", b"SWITCH": "if", b"ELSEIFEXP": "else", b"ELSEIF": "else",
@@ -70,7 +69,7 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"BC00000=, EC00000=": (_R, "kept; a move during which one changes is never split"),
     b"V=": (_R, "the speed, in mm/s"),
     b"PL=": (_R, "parts of a move are passed"),
-    b"UNTIL, NWAIT, T=": (_R, "the move is never split"),
+    b"UNTIL, NWAIT, T=, T0000": (_R, "the move is never split"),
     b"+MOVJ EC": (_R, "a positioner moves at the same time; each part states where it is"),
     b"VJ=, VR=, ACC=, DEC=, CR=, CONT": (_X, ""),
     b"SFTON, COMARCON, SYSTART": (_R, "the moves up to SFTOF, COMARCOF, SYEND are left as written"),
@@ -81,6 +80,7 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"REFP, ARCON, DOUT, TIMER": (_X, ""),
     b"any other statement": (_X, "may move: the next move is corrected at its end"),
     b"'": (_X, ""),
+    b"IMOV": (_R, "left as written: a distance from where the robot is"),
     **{name: (_NO, why) for name, why in REFUSED.items()},
     b"another word behind a move": (_NO, "its effect on the path is not known; post the move without it"),
 }  # fmt: skip
