@@ -10,6 +10,14 @@ from olp.core.toolpath import Toolpath
 from olp.findings.catalogue import Finding
 
 
+def control_findings(title: str, beside: Sequence[dict[str, Any]]) -> list[Finding]:
+    """Words of the program (rows with `word` and `line`) that the time on a control leaves out."""
+    lines: dict[str, list[int]] = {}
+    for row in beside:
+        lines.setdefault(row["word"], []).append(row["line"])
+    return [finding("OLP210", f"the time on {title} leaves out {word}", at) for word, at in lines.items()]
+
+
 def time_findings(path: Toolpath, control: Sequence[dict[str, Any]]) -> list[Finding]:
     """Moves of axes that are not timed, and what the program asks of the control (rows with `what`, `count`
     and `seconds`) without a stated time."""

@@ -81,7 +81,9 @@ FORMATS = ("csv", "npz", "parquet", "ros", "pvt")
 )  # fmt: skip
 @click.option("--gains", is_flag=True, help="Also list lines on which more tolerance or feed saves most.")
 @click.option(
-    "--controller", metavar="NAME", help="Also estimate the time on this control: linuxcnc or grbl."
+    "--controller",
+    metavar="NAME",
+    help="Also estimate the time on this control: linuxcnc, grbl, sinumerik, heidenhain or fanuc.",
 )
 @click.option(
     "--setting", "settings", metavar="NAME=VALUE", multiple=True,

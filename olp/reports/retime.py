@@ -89,7 +89,7 @@ def _controller(report: Report) -> Iterator[str]:
     own = report.get("controller")
     if not own:
         return
-    yield f"On {own['title']}: {clock(float(own['duration_s']))}, estimated by its published planner"
+    yield f"On {own['title']}: {clock(float(own['duration_s']))}, estimated by what is published of it"
     rows = [
         (f"{one['text']} ({one['name']})", f"{one['value']:.4g} {one['unit']}") for one in own["settings"]
     ]
@@ -99,8 +99,12 @@ def _controller(report: Report) -> Iterator[str]:
         return
     yield f"Learned from {printable(log['file'])}: {log['duration_s']:.3f} s of motion there"
     limits = zip("XYZ", log["velocity_mm_s"], log["acceleration_mm_s2"], strict=True)
-    held = [(axis, f"{v:.1f}", f"{a:.0f}") for axis, v, a in limits if axis in log["axes"]]
-    yield from table(("axis", "velocity mm/s", "acceleration mm/s2"), held)
+    held = [
+        (axis, f"{v:.1f}", f"{a:.0f}", "not shown" if j is None else f"{j:.0f}")
+        for (axis, v, a), j in zip(limits, log["jerk_mm_s3"], strict=True)
+        if axis in log["axes"]
+    ]
+    yield from table(("axis", "velocity mm/s", "acceleration mm/s2", "jerk mm/s3"), held)
 
 
 def _gains(report: Report) -> Iterator[str]:

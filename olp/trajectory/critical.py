@@ -58,10 +58,14 @@ class Profile:
 
 def speed_profile(path: SmoothPath, limits: AxisLimits, share: Array) -> Profile:
     """The speed profile from rest to rest, within the ceilings of every piece for `share` (k,)."""
-    top, most_a, most_j = ceilings(path, limits, share)
-    x = path.break_mm
+    return profile_within(path.break_mm, path.rest, *ceilings(path, limits, share))
+
+
+def profile_within(x: Array, rest: Index, top: Array, most_a: Array, most_j: Array) -> Profile:
+    """The profile over breaks (k + 1,) in mm, of which those of `rest` are stops, with at most the speed
+    `top`, the acceleration and the jerk (k,) along each piece."""
     ceiling = np.concatenate(([0.0], np.minimum(top[:-1], top[1:]), [0.0]))
-    ceiling[path.rest] = 0.0
+    ceiling[rest] = 0.0
     node = _dips(x, top, ceiling, most_a)
     turn = 0
     while True:
@@ -300,7 +304,7 @@ def _driven(path: SmoothPath, profile: Profile) -> tuple[Array, Array, Index]:
     """Of the pieces (p,) of some spans: seconds until each ends, (p, 4) polynomials, piece of the path."""
     low, high = int(profile.node[0]), int(profile.node[-1])
     x = path.break_mm[low:high]
-    clock = Timeline.of(path, profile)
+    clock = Timeline.of(path.break_mm, profile)
     # breaks of the path inside a phase; those at the start of one are there already
     phase = np.searchsorted(clock.arc_mm, x, side="right") - 1
     inside = np.flatnonzero(clock.arc_mm[phase] != x)
@@ -333,11 +337,11 @@ class Timeline:
     first: Index
 
     @staticmethod
-    def of(path: SmoothPath, profile: Profile) -> Timeline:
+    def of(break_mm: Array, profile: Profile) -> Timeline:
         v0, v1 = profile.speed[:-1], profile.speed[1:]
         peak, a, j = profile.peak, profile.acceleration, profile.jerk
-        begin = path.break_mm[profile.node[:-1]]
-        whole = np.diff(path.break_mm[profile.node])
+        begin = break_mm[profile.node[:-1]]
+        whole = np.diff(break_mm[profile.node])
         up, up_flat = ramps.phases(v0, peak, a, j)
         down, down_flat = ramps.phases(peak, v1, a, j)
         rise, fall = ramps.distance(v0, peak, a, j), ramps.distance(peak, v1, a, j)

@@ -82,7 +82,7 @@ def optimised(path: SmoothPath, limits: AxisLimits, profile: Profile) -> Motion:
 
     Bounds hold at the rows of the search. Between them they may be exceeded slightly, so audit the motion.
     """
-    clock = Timeline.of(path, profile)
+    clock = Timeline.of(path.break_mm, profile)
     cap = speed_caps(path, limits)
     knots = grid(path, limits, profile, cap, clock)
     todo = list(pairwise(_edges(path, profile, knots)))[::-1]

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from olp.checks.state import travel_findings
-from olp.checks.timed import time_findings
+from olp.checks.timed import control_findings, time_findings
 from olp.core.errors import CannotCompute, UsageError
 from olp.core.machine import Setup
 from olp.core.progress import Progress, silent
@@ -354,16 +354,18 @@ def run(
         report["proof"] = stated | {"at_most_um": stated["path_max_um"] + moving}
     if options.study_blend:
         report["blend_study"] = blend_study(case, plan, FACTORS, tell)
+    left_out: list[Finding] = []
     if control is not None:
         bare = options.blend_mm is None and setup.machine.blend_mm is None
         own = control_time(control, case, limits, options.settings or {}, log, bare=bare)
+        left_out = control_findings(control.title, own["beside"])
         report["controller"] = placed(own, origin)
     if options.gains:
         report |= placed({"gains": gains(case, plan, tell)}, origin)
     # the motion is inside the box of its waypoints, so commands within travel are motion within travel
     path = case.program.in_original().toolpath
     untimed = time_findings(path, case.control())
-    findings = placed_findings((*doubts, *travel_findings(path, setup.machine), *untimed), origin)
+    findings = placed_findings((*doubts, *travel_findings(path, setup.machine), *untimed, *left_out), origin)
     report["accepted"] = accepted_of(findings)
     report["findings"] = [f.as_dict() for f in findings]
     return Retiming(plan, report, findings, shown)

@@ -14,6 +14,7 @@ from olp.files.points import Points
 from olp.trajectory.controls.base import AxisSpeeds, Control, move_seconds
 from olp.trajectory.controls.learning import Learned, learned
 from olp.trajectory.controls.moves import Moves, moves
+from olp.trajectory.controls.said import Said
 from olp.trajectory.route import AxisLimits
 from olp.trajectory.variants import Case
 
@@ -35,8 +36,9 @@ def control_time(
     CannotCompute for a log of a program with several stretches.
     """
     values = control.values(stated)
-    speeds = AxisSpeeds(limits.velocity, limits.acceleration)
-    parts = _parts(control, case, values, bare=bare)
+    speeds = AxisSpeeds(limits.velocity, limits.acceleration, limits.jerk)
+    said = None if control.said is None else control.said(case.program)
+    parts = _parts(control, case, values, said, bare=bare)
     fitted = None
     if log is not None:
         fitted = _fitted(control, case, parts, speeds, values, log)
@@ -60,6 +62,7 @@ def control_time(
             for name, one in control.parameters.items()
         ],
         "longest_lines": _longest(parts, times),
+        "beside": [] if said is None else [{"line": line, "word": word} for line, word in said.beside],
     }
     if fitted is not None and log is not None:
         report["log"] = {
@@ -67,18 +70,24 @@ def control_time(
             "duration_s": fitted.seconds,
             "velocity_mm_s": fitted.limits.velocity.tolist(),
             "acceleration_mm_s2": fitted.limits.acceleration.tolist(),
+            "jerk_mm_s3": [
+                value if shown else None
+                for value, shown in zip(fitted.limits.jerk.tolist(), fitted.shown.tolist(), strict=True)
+            ],
             "axes": [name for name, moved in zip("XYZ", fitted.moved, strict=True) if moved],
         }
     return report
 
 
-def _parts(control: Control, case: Case, values: Mapping[str, float], *, bare: bool) -> tuple[Moves, ...]:
+def _parts(
+    control: Control, case: Case, values: Mapping[str, float], said: Said | None, *, bare: bool
+) -> tuple[Moves, ...]:
     program = case.program
     with program.errors():
         return moves(
             program, blend_mm=control.bare_mm if bare and control.bare_mm is not None else case.blend_mm,
             block_delete=case.block_delete, times=case.setup.machine.times, override=case.override,
-            chord_mm=values[control.chord_mm] if control.chord_mm else None,
+            chord_mm=values[control.chord_mm] if control.chord_mm else None, said=said,
         )  # fmt: skip
 
 

@@ -23,7 +23,9 @@ pytestmark = [pytest.mark.oracle, pytest.mark.slow]
 
 START = "start_mm = { X = 0.0, Y = 0.0, Z = 0.0 }"
 TICK_S = controller.PERIOD_NS * 1e-9
-LIMITS = AxisSpeeds(np.full(3, controller.SPEED_MM_S), np.full(3, controller.ACCELERATION_MM_S2))
+LIMITS = AxisSpeeds(
+    np.full(3, controller.SPEED_MM_S), np.full(3, controller.ACCELERATION_MM_S2), np.full(3, np.inf)
+)
 
 
 def square(mode: str) -> list[str]:

@@ -187,7 +187,7 @@ def test_a_short_first_move_of_a_long_path_launches_within_bounds(step_mm: float
     points = [[0, -step_mm, 0], [0, 0, 0], [0, -0.025, -0.3], [0, -0.028, -3.9], [150, -0.028, -3.9]]
     path = smooth(route(np.array(points), np.array([_RAPID, 1.5, 1.5, _RAPID]), 0.01), _ROUTER)
     profile, cap = best_profile(path, _ROUTER), speed_caps(path, _ROUTER)
-    clock = Timeline.of(path, profile)
+    clock = Timeline.of(path.break_mm, profile)
     knots = grid(path, _ROUTER, profile, cap, clock)
     window = optimise._Window.of(path, _ROUTER, profile, clock, cap, knots, 0, 7)
     assert fits(window.rows.rows(), window.spline, optimise._SLOWED**2 * window.start)

@@ -57,6 +57,16 @@ RULES = (
         gate=False,
     ),
     _rule(
+        "OLP210",
+        "word that the time of the control leaves out",
+        Severity.INFO,
+        "The time on this control does not know what this word does to it. The builder of the machine sets "
+        "it, or it changes feeds and corners by rules that are not published.",
+        "Compare with the control, or learn limits and corners from a log of a run with `--log`.",
+        "`CYCL DEF 32.2 HSC-MODE:1` with `--controller heidenhain`.",
+        gate=False,
+    ),
+    _rule(
         "OLP301",
         "units assumed",
         Severity.INFO,

@@ -9,16 +9,20 @@ import numpy as np
 from olp.core.arrays import Array
 from olp.core.errors import UsageError
 from olp.core.values import dataclass
+from olp.program.program import Program
+from olp.trajectory.controls.bells import bell_seconds
 from olp.trajectory.controls.moves import Moves
 from olp.trajectory.controls.planner import Pieces, seconds, speeds
+from olp.trajectory.controls.said import Said
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AxisSpeeds:
-    """(3,) largest velocity mm/s and acceleration mm/s^2 of X, Y and Z."""
+    """(3,) largest velocity mm/s, acceleration mm/s^2 and jerk mm/s^3 of X, Y and Z."""
 
     velocity: Array
     acceleration: Array
+    jerk: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +43,9 @@ class Control:
     many pieces, in cycles of `cycle_s`, of which a stop takes `stop_cycles`. `bare_mm` is its path tolerance
     where a program states none, None for that of `olp`. `chord_mm` names the parameter by which arcs become
     chords, "" for a control that drives arcs. `corners` names the parameter that makes corners faster where
-    it is larger, "" where only the program does. `source` is where all that is published.
+    it is larger, "" where only the program does. `said` finds the words of a program that only this control
+    acts on, None where there are none beside path modes. `bells` says whether jerk is limited, so that speed
+    rises as a bell, not as a trapezoid. `source` is where all that is published.
     """
 
     key: str
@@ -53,6 +59,8 @@ class Control:
     bare_mm: float | None = None
     chord_mm: str = ""
     corners: str = ""
+    said: Callable[[Program], Said] | None = None
+    bells: bool = False
 
     def values(self, stated: Mapping[str, float]) -> dict[str, float]:
         """The parameters, as stated or else by default. Raises UsageError for others, and for values that are
@@ -69,5 +77,8 @@ class Control:
 def move_seconds(control: Control, part: Moves, limits: AxisSpeeds, values: Mapping[str, float]) -> Array:
     """(m,) the time of each move of a stretch."""
     pieces = control.pieces(part, limits, values)
-    time = seconds(pieces, speeds(pieces, control.ahead), control.cycle_s, control.stop_cycles)
+    if control.bells:
+        time = bell_seconds(pieces, control.ahead)
+    else:
+        time = seconds(pieces, speeds(pieces, control.ahead), control.cycle_s, control.stop_cycles)
     return np.bincount(pieces.move, weights=time, minlength=len(part)).astype(np.float64)

@@ -1,10 +1,10 @@
-"""What a logged run tells of a control: velocity and acceleration of each axis, and its corners.
+"""What a logged run tells of a control: velocity, acceleration and jerk of each axis, and its corners.
 
 What the log holds for a while is a limit, or what the program asks for; a single sample may be a corner or
 noise. Velocities and accelerations are each those of the log, or those of the machine file where the log is
 below them: what gives the time of the log best. Where a parameter of corners is learned, they are those of
-the log, and the parameter is the one that gives its time. No control with a profile limits jerk, so none is
-looked for.
+the log, and the parameter is the one that gives its time. Jerk is that of the log for controls that limit
+it, where the digits of the log show it; else that of the machine file.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from itertools import product
 
 import numpy as np
 
-from olp.core.arrays import Array
+from olp.core.arrays import Array, Mask
 from olp.core.errors import UsageError
 from olp.core.values import dataclass
 from olp.trajectory.controls.base import AxisSpeeds, Control, move_seconds
@@ -26,9 +26,13 @@ STEP_S = 4e-3
 HELD = 3
 #: mm; an axis that moves less stands still
 STILL_MM = 1e-3
+#: the same for jerk, in whose differences a corner is longer
+HELD_JERK = 6
 #: how far a parameter of corners may be from its default, as a factor
 RANGE = 1e4
 _HALVINGS = 40
+#: of a jerk, at most, that the last digit of the log may be
+_BY_DIGIT = 0.1
 #: by this share a choice of limits has to be nearer to the time of the log than one before
 BETTER = 0.1
 #: of the time of a log: by so much the time that is computed may miss it
@@ -39,11 +43,12 @@ _TIMES = 20.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Learned:
-    """`limits` of the run, (3,) the axes that `moved`, `seconds` of the motion, and `values` of the
-    parameters."""
+    """`limits` of the run, (3,) the axes that `moved` and those whose jerk was `shown`, `seconds` of the
+    motion, and `values` of the parameters."""
 
     limits: AxisSpeeds
-    moved: Array
+    moved: Mask
+    shown: Mask
     seconds: float
     values: dict[str, float]
 
@@ -69,6 +74,8 @@ def learned(
     change = _difference(speed, count) / width
     moved = np.ptp(point_mm, axis=0) > STILL_MM
     velocity, acceleration = (_held(rows, HELD * count) for rows in (speed, change))
+    jerk, shown = _jerk(control, around, change, count, width)
+    jerk = np.where(shown, jerk, stated.jerk)
     seconds = (last - first) * step_s
     _refuse_time(sum(_seconds(control, part, stated, values) for part in parts), seconds)
     # where corners are learned too, the time alone does not say which limits are meant
@@ -77,7 +84,7 @@ def learned(
         (acceleration,) if control.corners else (np.maximum(acceleration, stated.acceleration), acceleration)
     )
     choices = (
-        AxisSpeeds(np.where(moved, v, stated.velocity), np.where(moved, a, stated.acceleration))
+        AxisSpeeds(np.where(moved, v, stated.velocity), np.where(moved, a, stated.acceleration), jerk)
         for v, a in product(speeds, changes)
     )
     best: tuple[float, AxisSpeeds, dict[str, float]] | None = None
@@ -86,7 +93,7 @@ def learned(
         if best is None or abs(off) < (1.0 - BETTER) * best[0]:
             best = abs(off), limits, fitted
     assert best is not None
-    return Learned(best[1], moved, seconds, best[2])
+    return Learned(best[1], moved, shown, seconds, best[2])
 
 
 def _step(time_s: Array) -> float:
@@ -119,6 +126,17 @@ def _seconds(control: Control, part: Moves, limits: AxisSpeeds, values: Mapping[
 
 def _difference(rows: Array, count: int) -> Array:
     return np.asarray(rows[count:] - rows[:-count])
+
+
+def _jerk(control: Control, point: Array, change: Array, count: int, width: float) -> tuple[Array, Mask]:
+    """(3,) the jerk that is held, and the axes of which the digits of the log show it."""
+    jerk = _held(_difference(change, count) / width, HELD_JERK * count)
+    # a log of few digits has no third difference that is smaller than its last one
+    step = np.abs(np.diff(point, 3, axis=0))
+    digit = np.where(step > 0.0, step, np.inf).min(axis=0)
+    # a third difference has four times the last digit at most
+    noise = 4.0 * np.where(np.isfinite(digit), digit, 0.0) / width**3
+    return jerk, np.asarray(control.bells & (jerk > 0.0) & (noise < _BY_DIGIT * jerk))
 
 
 def _held(rows: Array, count: int) -> Array:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import numpy.typing as npt
 
@@ -12,6 +14,7 @@ from olp.core.toolpath import Toolpath
 from olp.core.values import dataclass
 from olp.program.feeds.timing import PathControl, Timing
 from olp.program.program import Program
+from olp.trajectory.controls.said import Said
 from olp.trajectory.from_program import Steps, clock_of, directions
 
 
@@ -26,7 +29,7 @@ class Moves:
 
     Of the m - 1 joints: `mode` is the stricter one of both sides, `blend_mm` the path tolerance, inf where
     only the moves limit it, and `rest` says whether the motion rests there. `dwell_s` is the time of all
-    dwells.
+    dwells. `said` has columns (m,) by name: what the program says to this control alone.
     """
 
     length_mm: Array
@@ -44,6 +47,7 @@ class Moves:
     blend_mm: Array
     rest: Mask
     dwell_s: float
+    said: Mapping[str, Array]
 
     def __len__(self) -> int:
         return len(self.length_mm)
@@ -56,12 +60,13 @@ class Moves:
 
 def moves(
     program: Program, *, blend_mm: float, block_delete: bool = False, times: ControlTimes | None = None,
-    override: float = 1.0, chord_mm: float | None = None,
+    override: float = 1.0, chord_mm: float | None = None, said: Said | None = None,
 ) -> tuple[Moves, ...]:  # fmt: skip
     """The stretches of a program, as `olp.trajectory.from_program.routes` has them.
 
     `blend_mm` is the path tolerance of a path mode without one, and may be inf; `override` is that of feeds.
-    With `chord_mm` arcs are chords so far from them, as in controls that drive no arcs. Raises as `routes`.
+    With `chord_mm` arcs are chords so far from them, as in controls that drive no arcs. `said` is
+    what the program says to the control alone. Raises as `routes`.
     """
     path = program.toolpath
     clock = clock_of(program, blend_mm=blend_mm, block_delete=block_delete, times=times)
@@ -83,6 +88,7 @@ def moves(
             begin[here], leave[here], most[here], inward[here], normal[here], sweep[here],
             clock.control[move], mode, blend, steps.rest[first + 1 : stop],
             float(steps.dwell_s[first : stop + 1].sum()),
+            {} if said is None else said.columns(path.line[move].astype(np.int64)),
         )  # fmt: skip
         result.append(part if chord_mm is None else _in_chords(path, steps, part, first, chord_mm))
     return tuple(result)
@@ -171,4 +177,5 @@ def _in_chords(path: Toolpath, steps: Steps, part: Moves, first: int, chord_mm: 
         length, np.full(len(length), np.inf), part.feed_mm_s[owner], part.line[owner], unit, unit,
         np.abs(unit), np.zeros((len(length), 2, 3)), np.zeros_like(unit), np.zeros(len(length)),
         part.own_mode[owner], mode, blend, rest, part.dwell_s,
+        {name: column[owner] for name, column in part.said.items()},
     )  # fmt: skip

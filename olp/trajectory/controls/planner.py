@@ -16,7 +16,8 @@ class Pieces:
     move that it counts for. `even` pieces go evenly from the speed at one end to that at the other, and not
     faster in between. (k - 1,) `joint_mm_s` is the largest speed from each piece to the next one, 0 for a
     stop. (k - 1,) `overlap_mm_s` is the speed of the one before at which the next one begins, where two
-    moves overlap: one slows down to rest while the other one starts.
+    moves overlap: one slows down to rest while the other one starts. (k,) `jerk_mm_s3` is the largest along
+    each piece, None for a control that does not limit it.
     """
 
     length_mm: Array
@@ -26,6 +27,7 @@ class Pieces:
     even: Mask
     joint_mm_s: Array
     overlap_mm_s: Array
+    jerk_mm_s3: Array | None = None
 
     def __len__(self) -> int:
         return len(self.length_mm)

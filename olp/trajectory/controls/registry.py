@@ -8,7 +8,7 @@ from olp.core.errors import UsageError
 from olp.trajectory.controls.base import Control
 
 #: The modules of this package that hold a CONTROL, in the order in which they are listed.
-MODULES = ("linuxcnc", "grbl")
+MODULES = ("linuxcnc", "grbl", "sinumerik", "heidenhain", "fanuc")
 
 
 def _control(module: str) -> Control:
