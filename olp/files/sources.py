@@ -199,7 +199,8 @@ def _placed(source: Source, own: AbstractContextManager[None]) -> Iterator[None]
         try:
             yield
         except OlpError as error:
-            if holds_several(source.data):
+            may = not source.name or is_one_of_many(Path(source.name))
+            if may and error.line is not None and holds_several(source.data):
                 for each in (error, *(error.others if isinstance(error, ProgramError) else ())):
                     each.file, each.line = _own_place(source, each.file, each.line)
                 if isinstance(error, Refused):
