@@ -63,7 +63,11 @@ LAST_DIGITS_UM = 10.0
 @outside_box_option("refuse the program", "take the error at the box's face")
 @contour_option
 @click.option("--split-rapids", is_flag=True, help="Split rapids like feed moves.")
-@click.option("--times", is_flag=True, help="Also state how long both programs take, as olp retime plans.")
+@click.option(
+    "--times",
+    is_flag=True,
+    help="State how long both programs take, as olp retime plans; --report always does.",
+)
 @report_option()
 @click.option("--review", "review_file", metavar="review.html", help="Also write the page of olp view.")
 @layout_options("Layout of the columns of a list of positions.", "Unit of X, Y and Z in a list.")
@@ -105,6 +109,8 @@ def command(program: str | None, machine: str | None, job: str | None, **words: 
     with progress(outputs.quiet) as show:
         try:
             result = correct.run(call.session, call.source, options, show)
+            if outputs.report_file is not None:
+                correct.with_time(call.session, call.source, result, options, show)
             written: dict[Path, Content] = {Path(name): result.text for name in files_of(outputs.output)}
             if outputs.review_file is not None:
                 written[Path(outputs.review_file)] = _review(call, result, options, outputs, show)

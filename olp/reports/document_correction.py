@@ -76,7 +76,7 @@ def _applied(report: Report) -> Iterator[Block]:
         ("Largest correction", f"{number(report.get('largest_correction_um'))} um"),
         ("Moves", f"{moves.get('total', 0)}: {', '.join(f'{moves[k]} {w}' for k, w in words if k in moves)}"),
         ("Changes", ", ".join(f"{moves[k]} {w}" for k, w in changes if k in moves)),
-        ("Time, planned", time_text(report)),
+        ("Time", time_text(report)),
         ("Written with", ", ".join(f"{count} decimals in {unit}" for unit, count in digits.items())),
     ])  # fmt: skip
     sources = report.get("sources") or ()

@@ -148,19 +148,22 @@ def _part(report: Report, *keys: str) -> Report:
 
 
 def time_text(report: Report) -> str:
-    """How long both programs take; empty where that was not asked."""
+    """How long both programs take, or why that is not known; empty where that was not asked."""
     time = report.get("time")
     if not time:
         return ""
+    if "unknown" in time:
+        return f"not known: {printable(time['unknown'])}"
     nominal, corrected = float(time["nominal_s"]), float(time["corrected_s"])
     share = f"{100.0 * float(time['share']):+.3f} %"
-    return f"nominal program {nominal:.3f} s, corrected program {corrected:.3f} s ({share})"
+    way = "planned" if time["optimised"] else "planned without optimised speeds, as the program is long"
+    return f"{way}: nominal program {nominal:.3f} s, corrected program {corrected:.3f} s ({share})"
 
 
 def _time(report: Report) -> Iterator[str]:
     text = time_text(report)
     if text:
-        yield f"Time, planned: {text}"
+        yield from textwrap.wrap(f"Time, {text}", WIDTH, subsequent_indent="  ")
 
 
 def _heads(report: Report) -> Iterator[str]:

@@ -18,7 +18,7 @@ from olp.compensation.tally import Tally
 from olp.compensation.writer import Task
 from olp.compensation.writing import write
 from olp.core.arrays import Array, Index, read_only
-from olp.core.errors import AlreadyCorrected, ProgramError, UsageError
+from olp.core.errors import AlreadyCorrected, OlpError, ProgramError, UsageError
 from olp.core.machine import Setup
 from olp.core.progress import Progress, part, silent
 from olp.core.spool import Spool, Text, whole
@@ -52,6 +52,10 @@ from olp.workflows.shown import Judged
 
 if TYPE_CHECKING:
     from olp.uncertainty.spread import Confidence
+
+
+#: Waypoints of a program whose speeds are optimised along dense curves when its time is planned.
+MOST_OPTIMISED = 20_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -157,7 +161,7 @@ def correct(
     written out. `peck_clearance_mm` is the clearance above the last peck, for controls where it is a
     parameter. Under cutter compensation (G41, G42) a contour is written from which the control makes the
     corrected path of the tool; with `contour` "path" that path is written, without compensation. With `times`
-    the report states how long both programs take, as `retime` plans them, which takes as long as twice that.
+    the report states how long both programs take, as `retime` plans them, with a simpler plan of long ones.
 
     Where the calibration states uncertainties, the report gives the probability that the tip is within
     `part_tolerance_um` (default: the job's; without any there is no probability). With
@@ -188,25 +192,35 @@ def run(
     return result
 
 
+def with_time(
+    session: Session, program: Source, result: Correction, options: CorrectOptions, tell: Progress | None
+) -> None:
+    """State in the report how long both programs take, and what the correction adds as a share; or why that
+    is not known. Programs of more than `MOST_OPTIMISED` waypoints are planned
+    without optimised speeds."""
+    if "time" not in result.report:
+        try:
+            result.report["time"] = _times(session, program, result, options, tell)
+        except OlpError as error:
+            result.report["time"] = {"unknown": str(error)}
+
+
 def _times(
     session: Session, program: Source, result: Correction, options: CorrectOptions, tell: Progress | None
-) -> dict[str, float]:
-    """Seconds of the nominal and of the corrected program, and what the correction adds as a share."""
-    from olp.workflows.retime import RetimeOptions
-    from olp.workflows.retime import run as retimed
+) -> dict[str, Any]:
+    from olp.workflows.retime import RetimeOptions, durations
 
     asked = RetimeOptions(
-        date=options.date, accept=options.accept, flatten=options.flatten,
-        expand_cycles=options.expand_cycles, peck_clearance_mm=options.peck_clearance_mm,
+        flatten=options.flatten, expand_cycles=options.expand_cycles,
+        peck_clearance_mm=options.peck_clearance_mm,
     )  # fmt: skip
-    nominal, corrected = (
-        retimed(session, program.holding(data), asked, progress=tell).duration_s
-        for data in (result.nominal, result.plain)
-    )
+    texts = [program.holding(data) for data in (result.nominal, result.plain)]
+    (nominal, corrected), optimised = durations(session, texts, asked, MOST_OPTIMISED, tell or silent)
     return {
         "nominal_s": nominal,
         "corrected_s": corrected,
         "share": corrected / nominal - 1.0 if nominal else 0.0,
+        "optimised": optimised,
     }
 
 

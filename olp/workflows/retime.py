@@ -32,6 +32,7 @@ from olp.trajectory.from_program import axis_limits
 from olp.trajectory.gains import gains
 from olp.trajectory.inertia import compliance_of
 from olp.trajectory.plan import Trajectory
+from olp.trajectory.plan import plan as plan_route
 from olp.trajectory.route import Route
 from olp.trajectory.usage import LineUse, SlowStretches
 from olp.trajectory.variants import Case, Plan, blend_study, planned, with_feeds, within_inertial
@@ -369,6 +370,21 @@ def run(
     report["accepted"] = accepted_of(findings)
     report["findings"] = [f.as_dict() for f in findings]
     return Retiming(plan, report, findings, shown)
+
+
+def durations(
+    session: Session, programs: Sequence[Source], options: RetimeOptions, most: int, tell: Progress
+) -> tuple[list[float], bool]:
+    """Seconds of programs, and whether speeds along dense curves were optimised: they are not where one of
+    them has more than `most` waypoints, so that all are planned alike. Raises as `retime`, but for doubts."""
+    cases = [_case(session, program, options) for program in programs]
+    limits = axis_limits(session.setup.machine)
+    short = max(sum(map(len, case.legs)) for case in cases) <= most
+    every = (leg for case in cases for leg in case.legs)
+    if short:
+        return [planned(case, limits, tell).duration_s for case in cases], True
+    total = iter([plan_route(leg, limits, tell, optimise=False).duration_s for leg in every])
+    return [sum(next(total) for _ in case.legs) for case in cases], False
 
 
 def _control(session: Session, options: RetimeOptions) -> tuple[Control | None, Points | None]:

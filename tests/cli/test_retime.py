@@ -141,17 +141,45 @@ def test_moves_of_other_axes_are_a_finding(job: Path, tmp_path: Path) -> None:
 
 
 def test_a_correction_states_what_it_costs_in_time(tmp_path: Path) -> None:
-    words = ("correct", "-j", PROGRAMS / "nasty" / "job.toml", "-o", tmp_path / "c.ngc", "--times")
+    words = ("correct", "-j", PROGRAMS / "nasty" / "job.toml", "-o", tmp_path / "c.ngc")
     result = run(*words, "--report", tmp_path / "r.json")
     assert result.exit_code == 0
     time = json.loads((tmp_path / "r.json").read_text())["time"]
     report = report_of(tmp_path / "c.ngc", "-m", BED, "--nominal", PROGRAMS / "nasty" / "modal.ngc")
     assert time == {
         "nominal_s": report["nominal"]["duration_s"], "corrected_s": report["duration_s"],
-        "share": report["duration_s"] / report["nominal"]["duration_s"] - 1.0,
+        "share": report["duration_s"] / report["nominal"]["duration_s"] - 1.0, "optimised": True,
     }  # fmt: skip
     assert abs(time["share"]) <= 0.002
     assert f"Time, planned: nominal program {time['nominal_s']:.3f} s" in result.stdout
+
+
+def test_a_long_program_is_planned_more_simply_and_one_without_limits_says_why(
+    job: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("olp.workflows.correct.MOST_OPTIMISED", 3)
+    words = (
+        "correct",
+        program(tmp_path),
+        "-j",
+        job,
+        "-o",
+        tmp_path / "c.ngc",
+        "--force",
+        "--report",
+        tmp_path / "r.json",
+    )
+    result = run(*words)
+    time = json.loads((tmp_path / "r.json").read_text())["time"]
+    assert not time["optimised"] and abs(time["share"]) <= 0.01
+    assert "planned without optimised speeds" in result.stdout
+    file = job.with_name("machine.toml")
+    file.write_text(
+        "".join(line for line in file.read_text().splitlines(True) if not line.startswith("jerk_mm_s3"))
+    )
+    result = run(*words)
+    assert "axes.X.jerk_mm_s3" in json.loads((tmp_path / "r.json").read_text())["time"]["unknown"]
+    assert "Time, not known: " in result.stdout
 
 
 def test_full_circles_are_compared_with_their_quarters_and_not_with_a_jog(job: Path, tmp_path: Path) -> None:
