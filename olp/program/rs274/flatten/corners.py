@@ -204,7 +204,10 @@ class _Corners:
         inserted = self._block(held, corner, size)
         later, eol, mine = self.written[leg.index]
         leg = replace(leg, index=leg.index + 1, element=replace(second, begin=corner.end))
-        self.written[leg.index - 1 :] = [(inserted, eol, mine), (self._to(later, leg, code=True), eol, mine)]
+        self.written[leg.index - 1 :] = [
+            (inserted, eol, source),
+            (self._to(later, leg, code=True), eol, mine),
+        ]
         return leg
 
     def _rounded(self, point: Point) -> Point:
