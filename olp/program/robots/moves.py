@@ -199,9 +199,8 @@ class RobotMoves:
         off = angle_between(via.turn, chords.turns[chords.first - 1])
         if turned_by_via and off > _SAME_ORIENTATION:
             raise not_read(
-                f"at the via point the tool is turned by {off * 1e3:.3g} mrad from the even turn between "
-                "start and end of this arc, and which of them counts is not stated; give the via point that "
-                "orientation",
+                f"at the via point the tool is turned by {off * 1e3:.3g} mrad from the even turn along this "
+                "arc, and which of both counts is not stated; give the via point that orientation",
                 line,
             )
         if self._turn != end.turn:

@@ -1,7 +1,7 @@
 """Laws of corners and curves that several controls have in common.
 
-A turn of the direction by du within a width w to both sides has an acceleration of v^2 du / w and a jerk of
-v^3 du / w^2 at the speed v, and leaves the corner by |du| w / 6. Where points are close, the turns of all
+A turn of the direction by du within a width w to both sides leaves the corner by |du| w / 6. At the speed v it
+has an acceleration of v^2 du / w and a jerk of v^3 du / w^2. Where points are close, the turns of all
 points within the width add up to a curve.
 """
 
@@ -19,8 +19,10 @@ PER_WIDTH = 6.0
 SHARE = 0.5
 #: points to both sides whose turns make a curve
 _NEAR = 16
-#: mm; tolerances at which a fitted curve is looked at, each twice the one before
-_FIRST_MM, _STEPS = 2.5e-4, 14
+#: mm; the first of the tolerances at which a fitted curve is looked at, each twice the one before
+_FIRST_MM = 2.5e-4
+#: how many there are
+_STEPS = 14
 _TINY = 1e-300
 
 

@@ -32,10 +32,14 @@ _PLAIN = frozenset("ngxyzijkrfsmtdh") | _CORNERS
 _TURNS = frozenset({ROTATION, 690})
 _MOTIONS = frozenset({10, 20, 30})
 _LEFT = 30
-#: rad of a joint without a corner, and up to where controls make none
-_SMOOTH, _LEAST = 1e-6, math.radians(1.001)
-#: Decimals of positions in mm and in inches.
-_DECIMALS, _INCH_DECIMALS = 4, 5
+#: rad of a joint without a corner
+_SMOOTH = 1e-6
+#: rad up to where controls make no corner
+_LEAST = math.radians(1.001)
+#: Decimals of positions in mm.
+_DECIMALS = 4
+#: The same in inches.
+_INCH_DECIMALS = 5
 
 #: A block, its line end, and which of the blocks it was made from.
 Placed = tuple[bytes, bytes, int]
