@@ -1,7 +1,7 @@
 """Laws of corners and curves that several controls have in common.
 
-A turn of the direction by du within a width w to both sides leaves the corner by |du| w / 6. At the speed v it
-has an acceleration of v^2 du / w and a jerk of v^3 du / w^2. Where points are close, the turns of all
+A turn of the direction by du within a width w to both sides leaves the corner by |du| w / 6. At the speed v
+it has an acceleration of v^2 du / w and a jerk of v^3 du / w^2. Where points are close, the turns of all
 points within the width add up to a curve.
 """
 
