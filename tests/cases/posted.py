@@ -21,6 +21,7 @@ CONTROLS = {
     "fusion360-haas.nc": "haas",
     "fusion360-mach3.tap": "mach3",
     "fusion360-mpcnc.gcode": "marlin",
+    "haas-corners.nc": "haas",
     "haas-row-of-holes.nc": "haas",
     "hsmworks-okuma.min": "okuma",
     "inventor-haas-inch.nc": "haas",

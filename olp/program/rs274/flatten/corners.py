@@ -17,7 +17,7 @@ from olp.core.geometry import PLANES
 from olp.core.units import AXES
 from olp.core.values import dataclass
 from olp.program.contours.corners import Corner, Element, Point, chamfer, rounding, turn_at
-from olp.program.rs274.codes import INCH, INVERSE_TIME, PLANE_OF, ROTATION
+from olp.program.rs274.codes import INCH, INVERSE_TIME, MIRROR, PLANE_OF, ROTATION, UNDONE_BY
 from olp.program.rs274.flatten.lines import Line, Word, compile_line
 from olp.program.rs274.flatten.state import ProgramState, tracked
 from olp.program.rs274.profiles.base import Profile
@@ -28,8 +28,8 @@ _CENTRES = "ijk"
 #: Codes beside which a move keeps its meaning: G0 to G3, planes, distances, feeds, exact stops.
 _KEEPS = frozenset({0, 10, 20, 30, 90, 170, 180, 190, 610, 640, 900, 910, 940, 950, 960, 970})
 _PLAIN = frozenset("ngxyzijkrfsmtdh") | _CORNERS
-#: G68 and G69.
-_TURNS = frozenset({ROTATION, 690})
+#: Codes of frames that keep all lengths: rotations, mirror images, and what ends them.
+_TURNS = frozenset({ROTATION, MIRROR, UNDONE_BY[ROTATION], UNDONE_BY[MIRROR]})
 _MOTIONS = frozenset({10, 20, 30})
 _LEFT = 30
 #: rad of a joint without a corner
@@ -148,7 +148,7 @@ class _Corners:
         else:
             state.apply(words)
         if state.codes(words) & _TURNS:
-            # a turned frame turns corners, too; positions are those of the program in it
+            # it turns and mirrors corners, too; positions are those of the program in it
             state.forget()
             state.odd_frame = False
         if line.deleted and self._switch:
