@@ -333,7 +333,7 @@ _LENGTH_OFF = 490
 #: What a control expects in front of the words of a block.
 _NUMBERED = pattern(rb"(?i)[ \t]*/?\d?[ \t]*(?:N[ \t]*\d+[ \t]*)?")
 #: The words of a block that make its move an arc, or an arc of its corner.
-_OF_ARC = pattern(rb"(?i)G[ \t]*0*[23](?![\d.])|,?[ \t]*[IJKRP][ \t]*[-+]?[\d.]+")
+_OF_ARC = pattern(rb"(?i)G[ \t]*0*[23](?![\d.])|(?:,[ \t]*)?[IJKRP][ \t]*[-+]?[\d.]+")
 
 #: Why codes are refused, where a control has no other reason.
 REFUSALS: Mapping[int, str] = {
