@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import queue
+from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 from olp.core.errors import CannotCompute, UsageError
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
 _PATIENCE_S = 30.0
 #: s after which it is looked whether there are workers at all
 _LOOK_S = 2.0
+#: times that a task is begun again
+_AGAIN = 3
 #: Tasks for each thread of the workers, so that none waits for the next one.
 _AHEAD = 2
 
@@ -49,7 +52,9 @@ class Cluster:
             ) from None
         self._done: queue.SimpleQueue[int] = queue.SimpleQueue()
         self._futures: dict[int, Future] = {}
-        self._tasks: dict[int, Task] = {}
+        self._tasks: dict[int, tuple[Config, Task]] = {}
+        #: by task, how often it was begun again
+        self._again: Counter[int] = Counter()
         self._configs: dict[str, Future] = {}
         try:
             self._client.wait_for_workers(1, timeout=_PATIENCE_S)
@@ -68,22 +73,38 @@ class Cluster:
         if config.digest not in self._configs:
             self._configs[config.digest] = self._client.submit(_same, config, pure=False)
         future = self._client.submit(perform, self._configs[config.digest], task, pure=False)
-        self._futures[number], self._tasks[number] = future, task
+        self._futures[number], self._tasks[number] = future, (config, task)
         future.add_done_callback(lambda _, number=number: self._done.put(number))
 
     def result(self) -> tuple[int, Outcome]:
         """As `Pool.result`. Raises CannotCompute where the cluster has gone."""
+        while True:
+            number = self._next()
+            future, (config, task) = self._futures.pop(number), self._tasks.pop(number)
+            if not self._begun_again(number, future, config, task):
+                return number, self._outcome(future, task)
+
+    def _next(self) -> int:
+        """The number of the next task that has ended."""
         waited = 0.0
         while True:
             try:
-                number = self._done.get(timeout=_LOOK_S)
-                break
+                return self._done.get(timeout=_LOOK_S)
             except queue.Empty:
                 waited = waited + _LOOK_S if self._without_workers() else 0.0
                 if waited > _PATIENCE_S:
                     raise self._alone() from None
-        future, task = self._futures.pop(number), self._tasks.pop(number)
-        return number, self._outcome(future, task)
+
+    def _begun_again(self, number: int, future: Future, config: Config, task: Task) -> bool:
+        """Begin a task again that ended without an outcome, as what only a lost worker had is cancelled with
+        it. Not where no worker is left, nor more than a few times."""
+        if future.status in {"finished", "error"} or self._again[number] == _AGAIN or self._without_workers():
+            return False
+        self._again[number] += 1
+        if self._configs[config.digest].status not in {"finished", "pending"}:
+            del self._configs[config.digest]
+        self.submit(number, config, task)
+        return True
 
     def close(self) -> None:
         """Give up what is under way, and leave the cluster."""
