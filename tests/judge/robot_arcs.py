@@ -14,6 +14,7 @@ import numpy as np
 
 from judge.arm import between
 from judge.robot_moves import abc, rotvec, wpr
+from judge.val3 import matrix
 
 #: A rotation and a place.
 Pose = tuple[np.ndarray, np.ndarray]
@@ -96,7 +97,30 @@ def ur(text: bytes) -> list[Step]:
     return found
 
 
-READERS: dict[str, Callable[[bytes], list[Step]]] = {"krl": krl, "tp": tp, "rapid": rapid, "ur": ur}
+def val3(text: bytes) -> list[Step]:
+    """Moves of VAL 3 to elements of arrays, in the frame that these have."""
+    plain = re.sub(r"//.*", "", text.decode("latin-1"))
+    stated: dict[str, dict[str, str]] = {}
+    for name, body in re.findall(r'(?s)<Data name="(\w+)"[^>]*>(.*?)</Data>', plain):
+        for own in re.findall(r"<Value ([^>]*)/>", body):
+            words = dict(re.findall(r'(\w+)="([^"]*)"', own))
+            stated[f"{name}[{words['key']}]"] = words
+
+    def pose(name: str) -> Pose:
+        words = stated[name if "[" in name else f"{name}[0]"]
+        found = matrix([float(words.get(key, "0")) for key in ("x", "y", "z", "rx", "ry", "rz")])
+        return found[:3, :3], found[:3, 3]
+
+    found = []
+    for kind, targets in re.findall(r"(?m)^\s*move([ljc])\((.*)\)", plain):
+        own = [name.strip() for name in targets.split(",")[:-2]]
+        found.append(Step({"j": "P"}.get(kind, kind.upper()), tuple(pose(name) for name in own)))
+    return found
+
+
+READERS: dict[str, Callable[[bytes], list[Step]]] = {
+    "krl": krl, "tp": tp, "rapid": rapid, "ur": ur, "val3": val3,
+}  # fmt: skip
 
 
 def along(start: Pose, step: Step, shares: np.ndarray) -> list[Pose]:

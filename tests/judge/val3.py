@@ -19,6 +19,7 @@ X, Y, Z = np.eye(3)
 _MARK = re.compile(rb"\n<!--olp: file [^\n]*-->\n")
 _NAMES = ("x", "y", "z", "rx", "ry", "rz")
 _JOINTS = ("j1", "j2", "j3", "j4", "j5", "j6")
+_PAIRS = ("()", "{}", "[]")
 _WORDS = ("shoulder", "elbow", "wrist")
 _SPEED = ("accel", "vel", "decel", "tmax", "rmax", "blend", "leave", "reach")
 
@@ -26,7 +27,8 @@ _SPEED = ("accel", "vel", "decel", "tmax", "rmax", "blend", "leave", "reach")
 @dataclass(frozen=True)
 class Val3Move:
     """A move: straight or not, joints in degrees or the tip in the world and its rotation. `lever` goes from
-    gauge point to tip in the world, `tool` is the tip at the flange. `motion` says how the move is made."""
+    gauge point to tip in the world, `tool` is the tip at the flange. `motion` says how the move is made. An
+    arc goes by way of the pose `via` (4, 4)."""
 
     straight: bool
     joints: np.ndarray | None
@@ -36,6 +38,7 @@ class Val3Move:
     tool: np.ndarray
     words: tuple[str, ...]
     motion: dict[str, str]
+    via: np.ndarray | None = None
 
 
 def matrix(numbers: list[float]) -> np.ndarray:
@@ -122,11 +125,11 @@ class _Application:
     def run(self, name: str, values: dict[str, str]) -> None:
         for line in self.programs[name][1]:
             text = re.sub(r"//.*", "", line).strip()
-            move = re.fullmatch(r"(?:\w+\s*=\s*)?move([lj])\s*\((.*)\)", text)
+            move = re.fullmatch(r"(?:\w+\s*=\s*)?move([ljc])\s*\((.*)\)", text)
             call = re.fullmatch(r"call (\w+)\((.*)\)", text)
             value = re.fullmatch(r"(\w+(?:\[\d+\])?)((?:\.\w+)+)\s*=\s*(.*)", text)
             if move is not None:
-                self._move(move[1] == "l", *re.fullmatch(r"(.*),([^,{}]*),([^,{}]*)", move[2]).groups())
+                self._move(move[1], *re.fullmatch(r"(.*),([^,{}]*),([^,{}]*)", move[2]).groups())
             elif call is not None:
                 names = self.programs[call[1]][0]
                 self.run(call[1], dict(zip(names, call[2].split(","), strict=True) if names else ()))
@@ -138,7 +141,15 @@ class _Application:
                 else:
                     own[{"tvel": "tmax"}.get(name, name)] = stated
 
-    def _move(self, straight: bool, target: str, tool: str, motion: str) -> None:
+    def _move(self, kind: str, target: str, tool: str, motion: str) -> None:
+        straight, via = kind == "l", None
+        if kind == "c":
+            # the comma outside of all brackets
+            places = [k for k, mark in enumerate(target) if mark == ","]
+            place = next(
+                k for k in places if all(target[:k].count(a) == target[:k].count(b) for a, b in _PAIRS)
+            )
+            via, target = self._target(target[:place])[0], target[place + 1 :]
         at_flange = self._pose(self._key(tool))
         key = self._key(target)
         how = self.data.get(self._key(motion), {})
@@ -151,7 +162,7 @@ class _Application:
         pose, words = self._target(target)
         turn = pose[:3, :3]
         lever = turn @ at_flange[:3, :3].T @ at_flange[:3, 3]
-        self.moves.append(Val3Move(straight, None, pose[:3, 3], turn, lever, at_flange, words, how))
+        self.moves.append(Val3Move(straight, None, pose[:3, 3], turn, lever, at_flange, words, how, via))
 
 
 def moves(text: bytes) -> list[Val3Move]:

@@ -22,8 +22,10 @@ import olp
 #: The tool at the flange, and the frame.
 LEVER, TOOL = np.array([10.0, -5.0, 160.0]), abc(0.0, 10.0, 0.0)
 FRAME, ORIGIN = abc(30.0, 0.0, 0.0), np.array([705.0, -94.0, 507.0])
-DIGITS = {"krl": 1e-5, "tp": 1e-3, "rapid": 1e-4, "ur": 1e-5}
-CONTROLLERS = {"krl": "kuka-krl", "tp": "fanuc-tp", "rapid": "abb-rapid", "ur": "urscript"}
+DIGITS = {"krl": 1e-5, "tp": 1e-3, "rapid": 1e-4, "ur": 1e-5, "val3": 1e-5}
+CONTROLLERS = {
+    "krl": "kuka-krl", "tp": "fanuc-tp", "rapid": "abb-rapid", "ur": "urscript", "val3": "staubli-val3",
+}  # fmt: skip
 GANTRY_FRAME = {"X_mm": 705.0, "Y_mm": -94.0, "Z_mm": 507.0, "C_deg": 30.0, "set_by": "true"}
 TP_FILES = """
 [kinematics]
@@ -120,7 +122,44 @@ def ur(steps: list[Step]) -> bytes:
     return "\n".join([*head, *body, "end", ""]).encode()
 
 
-WRITERS: dict[str, Callable[[list[Step]], bytes]] = {"krl": krl, "tp": tp, "rapid": rapid, "ur": ur}
+def data(name: str, kind: str, values: list[str]) -> str:
+    own = "".join(f'<Value key="{k}" {value}/>\n' for k, value in enumerate(values))
+    head = f'<Data name="{name}" access="public" type="{kind}" size="{len(values)}">'
+    return f"{head}\n{own}</Data>\n"
+
+
+def val3(steps: list[Step]) -> bytes:
+    points: dict[str, list[str]] = {"pEven": [], "pOdd": []}
+    body = []
+    for k, step in enumerate(steps):
+        own, name = [], ("pEven", "pOdd")[k % 2]
+        for turn, place in step.poses:
+            numbers = [*place.round(4).tolist(), *Rotation.from_matrix(turn).as_euler("XYZ", degrees=True)]
+            pairs = zip(("x", "y", "z", "rx", "ry", "rz"), numbers, strict=True)
+            stated = " ".join(f'{key}="{number:.6f}"' for key, number in pairs)
+            own.append(f"{name}[{len(points[name])}]")
+            points[name].append(f'{stated} fatherId="fPart[0]" ')
+        word = step.kind.replace("P", "j").lower()
+        body.append(f"  move{word}({', '.join(own)}, tGrip, {('mStop', 'mPass')[k % 3 > 0]})")
+    every = [
+        data("mStop", "mdesc", ['tmax="100" blend="off" ']),
+        data("mPass", "mdesc", ['tmax="100" blend="joint" leave="5" reach="5" ']),
+        data("fPart", "frame", ['x="705" y="-94" z="507" rz="30" fatherId="world[0]" ']),
+        data("tGrip", "tool", ['x="10" y="-5" z="160" ry="10" fatherId="flange[0]" ']),
+        *(data(name, "pointRx", values) for name, values in points.items()),
+    ]
+    space = 'xmlns="http://www.staubli.com/robotics/VAL3/{}/2"'
+    code = "\n".join(["<![CDATA[begin", *body, "end]]>"])
+    return (
+        f'<Programs {space.format("Program")}>\n<Program name="start">\n<Code>{code}</Code>\n</Program>\n'
+        f"</Programs>\n<!--olp: file made.dtx-->\n<Database {space.format('Data')}>\n<Datas>\n"
+        f"{''.join(every)}</Datas>\n</Database>\n"
+    ).encode()
+
+
+WRITERS: dict[str, Callable[[list[Step]], bytes]] = {
+    "krl": krl, "tp": tp, "rapid": rapid, "ur": ur, "val3": val3,
+}  # fmt: skip
 
 
 def rotation_of(rng: np.random.Generator, size_rad: float) -> np.ndarray:

@@ -157,6 +157,7 @@ def test_each_point_is_where_the_judge_wants_it(bent: Path, zero: Path, seed: in
     assert all(stated in (0, count) or count == 0 for stated, count in val3.sizes(done.data).values())
 
 
+START, WORDS = "movel(pPoint[0],tGrip,mFast)", "lefty,epositive,wpositive"
 POINTS = [
     value(0, [10, 20, 0], 'rx="180" '),
     value(1, [30, 0, 5], 'rx="180" '),
@@ -254,6 +255,79 @@ end
 """.encode()
 
 
+#: Places of a circle, the last of them above the others.
+ROUND = ((40, 0, 0), (0, 40, 0), (-40, 0, 0), (0, -40, 0), (40, 0, 9))
+
+
+def off_circle(a: np.ndarray, b: np.ndarray, c: np.ndarray, tip: np.ndarray) -> float:
+    """How far a tip is from the circle through three points."""
+    normal = np.cross(b - a, c - a)
+    rows = np.array([b - a, c - a, normal])
+    centre = np.linalg.solve(rows, np.array([(b @ b - a @ a) / 2, (c @ c - a @ a) / 2, normal @ a]))
+    height = (tip - centre) @ normal / np.linalg.norm(normal)
+    level = tip - centre - height * normal / np.linalg.norm(normal)
+    return float(np.hypot(height, np.linalg.norm(level) - np.linalg.norm(a - centre)))
+
+
+#: An arc of numbers, one to elements, back to its start, and one that appro moves, each with its start.
+ARCS = [
+    ["movej({0},tGrip,mSlow)", "movec({1}, {2},tGrip, mFast) // {"],
+    ["movel(pPoint[0],tGrip,mFast)", "nId = movec(pPoint[1],pPoint[2],tGrip,mSlow)"],
+    ["movec(pPoint[3],pPoint[0],tGrip,mFast)"],
+    [
+        "movel(appro(pPoint[1],{0,0,-9,0,0,0}),tGrip,mFast)",
+        "movec(pPoint[4],appro(pPoint[3],{0,0,-9,0,0,0}),tGrip,mSlow)",
+    ],
+]
+
+
+def test_arcs_are_several_ones_that_pass(bent: Path, zero: Path) -> None:
+    around = [value(k, [40 + x, y, z], 'rx="180" ') for k, (x, y, z) in enumerate(ROUND)]
+    lines = [line for arc in ARCS for line in arc]
+    for k, (x, y, z) in enumerate(((0, 0, 0), (40, 35, 10), (90, 0, 20))):
+        stated = f"{{{{{x + 300},{y + 250},{z - 300},180,0,0}},{{{WORDS}}}}}"
+        lines = [line.replace(f"{{{k}}}", stated) for line in lines]
+    text = made(lines, around)
+    assert olp.correct(text, zero).data == text
+    done = olp.correct(text, bent)
+    assert olp.verify(text, done.data, bent).report["verdict"]["ok"]
+    nominal, written, model = val3.moves(text), val3.moves(done.data), JudgeModel(bent)
+    place = 0
+    for k, move in enumerate(nominal):
+        want, last = model.command_for(move.tip[None], move.lever)[0], False
+        while not last:
+            part, place = written[place], place + 1
+            last = np.abs(part.tip - want).max() < 4 * DIGIT
+            assert (part.via is None) == (move.via is None)
+            assert part.motion == move.motion if last else part.motion["blend"] == "joint"
+            assert np.abs(part.turn - move.turn).max() < 1e-12
+            for tip in [] if part.via is None else [part.via[:3, 3], part.tip]:
+                reached = tip + model.error_mm(tip[None], move.lever)[0]
+                assert off_circle(nominal[k - 1].tip, move.via[:3, 3], move.tip, reached) < 1e-3 + 4 * DIGIT
+    assert place == len(written) > len(nominal) + 4
+    assert all(stated in (0, count) or count == 0 for stated, count in val3.sizes(done.data).values())
+
+
+def test_one_text_of_several_arcs_is_never_split(bent: Path, zero: Path) -> None:
+    given = "".join(
+        f'<Parameter name="x_{n}" type="pointRx" xsi:type="element" use="reference" />' for n in "pq"
+    )
+    calls = ["call bow(pPoint[1],pPoint[2])", START, "call bow(pPoint[3],pPoint[2])"]
+    others = pgx("bow", "movec(x_p,x_q,tGrip,mFast)", parameters=f"<Parameters>{given}</Parameters>")
+    text = made([START, *calls], [*POINTS, value(3, [-20, 30, 0], 'rx="180" ')], others)
+    assert olp.correct(text, zero).data == text
+    with pytest.raises(ProgramError, match="this arc would be split"):
+        olp.correct(text, bent)
+
+
+def test_an_arc_whose_numbers_a_call_gives_is_refused(zero: Path) -> None:
+    bow = LINE.replace("movel(pMove,", "movec(pPoint[1],pMove,")
+    calls = [START, "call MoveLine(-60,50,9,180,0,0)"]
+    data = datum("pMove", "pointRx", '<Value key="0" fatherId="fPart[0]" />')
+    with pytest.raises(ProgramError, match="a call gives the numbers of this arc"):
+        corrected(calls, zero, bow, data=data)
+
+
 def test_the_older_form_of_data(bent: Path, zero: Path) -> None:
     assert olp.correct(S6, zero).data == S6
     done = olp.correct(S6, bent).data
@@ -288,7 +362,13 @@ def test_strings_and_comments_say_nothing(zero: Path) -> None:
 
 
 REFUSED = [
-    (["movec(pPoint[0],pPoint[1],tGrip,mFast)"], "movec is an arc", 5),
+    (["movec(pPoint[0],pPoint[1],tGrip,mFast)"], "where this arc begins is not stated", 5),
+    ([START, "movec(pPoint[1],pPoint[2],mFast)"], "3 arguments; expected an intermediate point", 6),
+    ([START, "movec(pPoint[1],here(tGrip,fPart),tGrip,mFast)"], "computed, or chosen in the run", 6),
+    ([START, "movec(pPoint[1],pPoint[2],tGrip[1],mFast)"], "with another tool", 6),
+    ([START, f"movec({{{{0,9,9,180,0,0}},{{{WORDS}}}}},pPoint[2],tGrip,mFast)"], "from another frame", 6),
+    ([START, "pPoint[1].trsf.rx = 179", "movec(pPoint[1],pPoint[2],tGrip,mFast)"], "turned by 17.5 mrad", 7),
+    ([START, "movec(pPoint[1],pPoint[0],tGrip,mFast)"], "lie on a line", 6),
     (["movel(pPoint[0],tNone,mFast)"], "does not state the tool tNone", 5),
     (["movel(pPoint[nK],tGrip,mFast)"], "computed, or chosen in the run", 5),
     (["delay(1)", "movel(pGone,tGrip,mFast)"], "pGone is not stated", 6),

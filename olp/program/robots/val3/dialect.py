@@ -51,39 +51,58 @@ class Val3(RobotDialect):
         return f"{target.name}[{high}]"
 
     def part(self, program: Program, move: int, use: Use, part: Part) -> list[Replacement]:
+        value, found = self._stated(program, use, part)
+        return [self._before(program, move, use, [(*use.place, value)], stop=part.stop), *found]
+
+    def arc(
+        self, program: Program, move: int, via: tuple[Use, Part], end: tuple[Use, Part] | None
+    ) -> list[Replacement]:
+        value, found = self._stated(program, *via)
+        first = (*via[0].place, value)
+        if end is None:
+            return [first, *found]
+        value, more = self._stated(program, *end)
+        own = self._before(program, move, end[0], [first, (*end[0].place, value)], stop=False)
+        return [own, *found, *more]
+
+    def _stated(self, program: Program, use: Use, part: Part) -> tuple[bytes, list[Replacement]]:
+        """What states a target of its own in the place of a move, and the edits of the data for it."""
         data, targets = whole(program.data), program.targets
         assert targets is not None
         target, (begin, end) = targets.targets[use.target], use.statement
         texts = [*part.numbers, *self._angles(data, target, use, part)]
-        found: list[Replacement] = []
-        first: list[bytes] = []
         if begin <= target.numbers[0][0] < end:
+            a, b = (begin, end) if use.place == use.statement else target.value
             spans = (*target.numbers, *target.turned)
-            numbers = [(a, b, text) for (a, b), text in zip(spans, texts, strict=True)]
-            place = (begin, end) if use.place == use.statement else target.value
-            own = spliced(data[slice(*place)], [(a - place[0], b - place[0], text) for a, b, text in numbers])
-            edits = [(use.place[0] - begin, use.place[1] - begin, own)]
-        else:
-            datum, entry = writing.declared_at(data, target)
-            named = {name: text for name, text in zip(TRANSFORM, texts, strict=True) if text}
-            index = part.name.partition("[")[2].rstrip("]")
-            found.append(writing.element(data, datum, entry, index, named))
-            edits = [(use.place[0] - begin, use.place[1] - begin, part.name.encode())]
+            numbers = [(c - a, d - a, text) for (c, d), text in zip(spans, texts, strict=True)]
+            return spliced(data[a:b], numbers), []
+        datum, entry = writing.declared_at(data, target)
+        named = {name: text for name, text in zip(TRANSFORM, texts, strict=True) if text}
+        index = part.name.partition("[")[2].rstrip("]")
+        return part.name.encode(), [writing.element(data, datum, entry, index, named)]
+
+    @staticmethod
+    def _before(
+        program: Program, move: int, use: Use, edits: list[Replacement], *, stop: bool
+    ) -> Replacement:  # fmt: skip
+        """The statement of a move again, before it and with edits of its text. Parts pass without a stop."""
+        data, (begin, end) = whole(program.data), use.statement
+        first: list[bytes] = []
         if use.zone != NOWHERE:
             motion = REFERENCE.fullmatch(data, *use.zone)
             assert motion is not None
             index = "0" if motion[2] is None else motion[2].strip().decode()
             passing = writing.passing(motion[1].decode(), index)
-            edits.append((use.zone[0] - begin, use.zone[1] - begin, passing))
+            edits = [*edits, (*use.zone, passing)]
             if writing.is_assigned(data, motion[1]):
                 first = writing.copied(passing, data[slice(*use.zone)])
         line = int(program.toolpath.line[move])
         blanks = data[int(program.line_start[line - 1]) : begin]
         blanks = blanks if not blanks.strip() else b""
         behind = program.eol(line) + blanks
-        last = [b"waitEndMove()"] if part.stop else []
-        lines = [*first, spliced(data[begin:end], edits), *last]
-        return [(begin, begin, b"".join(one + behind for one in lines)), *found]
+        own = spliced(data[begin:end], [(a - begin, b - begin, text) for a, b, text in edits])
+        lines = [*first, own, *([b"waitEndMove()"] if stop else [])]
+        return begin, begin, b"".join(one + behind for one in lines)
 
     @staticmethod
     def _angles(data: bytes, target: Target, use: Use, part: Part) -> list[bytes]:

@@ -8,8 +8,7 @@ from dataclasses import replace
 from olp.core.errors import ProgramError
 from olp.core.patterns import pattern
 from olp.core.values import dataclass
-from olp.program.robots.frames import Tool
-from olp.program.robots.moves import NAN, RobotMoves, not_read
+from olp.program.robots.moves import NAN, RobotMoves
 from olp.program.robots.poses import NO_TURN, Quaternion, inverted, multiplied, rotated
 from olp.program.robots.targets import NOWHERE, Span, Use
 from olp.program.robots.val3.code import Line, Routine, lines_in
@@ -19,6 +18,9 @@ from olp.program.robots.val3.state import Scope, State
 from olp.program.robots.val3.values import CALL, REFERENCE, Thing, pose_of, words_of
 
 _HERE = pattern(rb"(?is)herej?\s*\(.*\)")
+_MOVE = "a target, a tool, a motion description"
+#: What each move is given.
+_ARGUMENTS = {b"movej": _MOVE, b"movel": _MOVE, b"movec": f"an intermediate point, {_MOVE}"}
 _MOVES = pattern(rb"(?i)\bmove[ljc]\s*\(")
 _CALLS = pattern(rb"(?i)call\b")
 #: What each word of a configuration says: the sign of what tells postures apart. Others leave it open.
@@ -68,7 +70,7 @@ class Moving:
         self.data, self.state, self.places, self.moves = data, state, places, moves
         self._targets: dict[tuple[Span, ...], int] = {}
         self._owner: dict[Span, int] = {}
-        self._seen: dict[int, dict[int, tuple[object, ...]]] = {}
+        self._seen: dict[int, dict[tuple[int, ...], tuple[object, ...]]] = {}
         self._sites: list[_Site] = []
 
     def enter(self, line: Line, routine: Routine) -> None:
@@ -85,15 +87,15 @@ class Moving:
     def take(self, line: Line, match: re.Match[bytes], scope: Scope, *, repeated: bool) -> None:
         """A move. Raises ProgramError where the text does not state where it goes."""
         word = match[1].lower()
-        if word == b"movec":
-            raise not_read("movec is an arc, which is not read yet; post straight moves", line.line)
         given = self.state.arguments(line.begin + match.start(2), line.begin + match.end(2))
-        if len(given) != 3:
+        expected = _ARGUMENTS[word]
+        if len(given) != expected.count(",") + 1:
             raise ProgramError(
-                f"the move has {len(given)} arguments; expected a target, a tool and a motion description",
-                line=line.line,
-                code="OLP516",
+                f"the move has {len(given)} arguments; expected {expected}", line=line.line, code="OLP516"
             )
+        if word == b"movec":
+            self._arc(line, given, scope, repeated=repeated)
+            return
         place, tool_span, motion = given
         if _HERE.fullmatch(self.data, *place):
             return
@@ -103,7 +105,7 @@ class Moving:
             goal = replace(goal, offsets=())
         if goal.kind == "joint" and word == b"movel":
             raise ProgramError("joints in a movel are not read; write a point", line=line.line, code="OLP533")
-        feed, zone, passes = self._motion(motion, scope)
+        feed, zone, passes = self.places.motion(motion, scope)
         site = self._site_of(goal)
         statement, number = (line.begin, line.end), line.line
         if site is not None:
@@ -113,14 +115,41 @@ class Moving:
         use = Use(index, statement, place, goal.named if site is None else NOWHERE, zone=zone)
         whole = not passes or (site is None and repeated) or not self._can_grow(goal, site)
         if goal.kind == "joint":
-            if self._first(line, index, (index,)):
+            if self._first(line, (index,), ()):
                 self.moves.joint_move(number, lambda: use)
             return
-        tool = self._tool(tool_span, scope, line)
+        tool = self.places.tool_of(tool_span, scope, line.line)
         frame = self.places.frame(goal.father, line.line)
         use = self._shifted(use, goal, self.moves.targets[index].turn)
-        if self._first(line, index, (index, frame, tool, use.shift_mm, use.turn)):
+        if self._first(line, (index,), (frame, tool, use.shift_mm, use.turn)):
             self.moves.move(number, use, frame, tool, feed, straight=word == b"movel", whole=whole)
+
+    def _arc(self, line: Line, given: list[Span], scope: Scope, *, repeated: bool) -> None:
+        """An arc. Raises ProgramError where the text does not state where it goes."""
+        *ends, tool_span, motion = given
+        goals = [self._goal(place, scope, line) for place in ends]
+        if any(goal.kind == "joint" for goal in goals):
+            raise ProgramError("joints in a movec are not read; write points", line=line.line, code="OLP533")
+        if any(self._site_of(goal) is not None for goal in goals):
+            what = "a call gives the numbers of this arc; state its points in the data, or in the movec"
+            raise ProgramError(what, line=line.line, code="OLP533")
+        frame, other = (self.places.frame(goal.father, line.line) for goal in reversed(goals))
+        if other != frame:
+            what = "the intermediate point of this arc counts from another frame than its end; give both one"
+            raise ProgramError(what, line=line.line, code="OLP533")
+        feed, zone, passes = self.places.motion(motion, scope)
+        tool = self.places.tool_of(tool_span, scope, line.line)
+        whole = not passes or repeated or not all(self._can_grow(goal, None) for goal in goals)
+        uses = []
+        for goal, place in zip(goals, ends, strict=True):
+            index = self._target(goal, line, None, fixed=repeated or not self._grows(goal))
+            use = Use(index, (line.begin, line.end), place, goal.named, zone=zone)
+            own = replace(goal, offsets=()) if repeated else goal
+            uses.append(self._shifted(use, own, self.moves.targets[index].turn))
+        via, end = uses
+        if self._first(line, (via.target, end.target), (frame, tool, via, end)):
+            # the tool turns by way of the intermediate point
+            self.moves.arc(line.line, via, end, frame, tool, feed, whole=whole, turned_by_via=True)
 
     @staticmethod
     def _shifted(use: Use, goal: _Goal, turn: Quaternion) -> Use:
@@ -130,14 +159,14 @@ class Moving:
             offset_turn=axes if goal.offsets else NO_TURN, along_tool=goal.along_tool,
         )  # fmt: skip
 
-    def _first(self, line: Line, index: int, what: tuple[object, ...]) -> bool:
+    def _first(self, line: Line, targets: tuple[int, ...], what: tuple[object, ...]) -> bool:
         """Whether a statement makes a move that it did not make before. Raises ProgramError where it goes to
-        the same target in another way."""
+        the same targets in another way."""
         seen = self._seen.setdefault(line.begin, {})
-        if index not in seen:
-            seen[index] = what
+        if targets not in seen:
+            seen[targets] = what
             return True
-        if seen[index] != what:
+        if seen[targets] != what:
             raise ProgramError(
                 "this move is made again with another frame or tool, so its target means several places; "
                 "give each its own target",
@@ -298,30 +327,3 @@ class Moving:
             and thing.father == entry.father
             and all(thing.words.get(word) == entry.words.get(word) for word in WORDS)
         )
-
-    # -- speed and tool ------------------------------------------------------------------------------
-
-    def _motion(self, span: Span, scope: Scope) -> tuple[float, Span, bool]:
-        """The speed of a motion description, its bytes where parts of a move need another one, and whether
-        parts can pass without a stop."""
-        thing = self.state.thing(span, scope)
-        if thing is None or thing.why or thing.kind != "mdesc":
-            return NAN, NOWHERE, False
-        speed = thing.slots.get("tmax")
-        own = speed is not None and speed[0] != NOWHERE and speed[1] > 0.0
-        feed = speed[1] if own and speed is not None else NAN
-        match = REFERENCE.fullmatch(self.data, *span)
-        key = "0" if match is None or match[2] is None else match[2].strip().decode("latin-1")
-        plain = match is not None and (match[1].decode("latin-1"), key) == (thing.name, thing.key)
-        blends = thing.words.get("blend", "joint") not in ("off", "")
-        if thing.entry is not None and plain and thing.grows and not (thing.version and blends):
-            return feed, span, True
-        return feed, NOWHERE, blends
-
-    def _tool(self, span: Span, scope: Scope, line: Line) -> Tool:
-        thing = self.state.thing(span, scope)
-        match = REFERENCE.fullmatch(self.data, *span)
-        if match is None or match[3]:
-            raise ProgramError("the tool of this move is computed", line=line.line, code="OLP521")
-        key = "0" if match[2] is None else match[2].strip().decode("latin-1")
-        return self.places.tool(thing, (match[1].decode("latin-1"), key), line.line)

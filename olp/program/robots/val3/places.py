@@ -1,4 +1,4 @@
-"""Where points and tools of an application count from: chains of frames and of tools."""
+"""Where points and tools of an application count from: chains of frames and of tools, and how moves go."""
 
 from __future__ import annotations
 
@@ -6,9 +6,11 @@ from dataclasses import replace
 
 from olp.core.errors import ProgramError
 from olp.program.robots.frames import Located, RobotFrames, Tool
+from olp.program.robots.moves import NAN
 from olp.program.robots.poses import Pose
-from olp.program.robots.val3.state import State
-from olp.program.robots.val3.values import Thing
+from olp.program.robots.targets import NOWHERE, Span
+from olp.program.robots.val3.state import Scope, State
+from olp.program.robots.val3.values import REFERENCE, Thing
 
 WORLD = "world"
 FLANGE = "flange"
@@ -62,6 +64,32 @@ class Places:
             found = self.frames.tool(thing.shown, self._at_flange(thing, line, 0), line)
             self._tools[key] = replace(found, name=_versioned(thing))
         return self._tools[key]
+
+    def motion(self, span: Span, scope: Scope) -> tuple[float, Span, bool]:
+        """The speed of a motion description, its bytes where parts of a move need another one, and whether
+        parts can pass without a stop."""
+        thing = self.state.thing(span, scope)
+        if thing is None or thing.why or thing.kind != "mdesc":
+            return NAN, NOWHERE, False
+        speed = thing.slots.get("tmax")
+        own = speed is not None and speed[0] != NOWHERE and speed[1] > 0.0
+        feed = speed[1] if own and speed is not None else NAN
+        match = REFERENCE.fullmatch(self.state.data, *span)
+        key = "0" if match is None or match[2] is None else match[2].strip().decode("latin-1")
+        plain = match is not None and (match[1].decode("latin-1"), key) == (thing.name, thing.key)
+        blends = thing.words.get("blend", "joint") not in ("off", "")
+        if thing.entry is not None and plain and thing.grows and not (thing.version and blends):
+            return feed, span, True
+        return feed, NOWHERE, blends
+
+    def tool_of(self, span: Span, scope: Scope, line: int) -> Tool:
+        """The tool that a move is given. Raises ProgramError where it is computed, or not stated."""
+        thing = self.state.thing(span, scope)
+        match = REFERENCE.fullmatch(self.state.data, *span)
+        if match is None or match[3]:
+            raise ProgramError("the tool of this move is computed", line=line, code="OLP521")
+        key = "0" if match[2] is None else match[2].strip().decode("latin-1")
+        return self.tool(thing, (match[1].decode("latin-1"), key), line)
 
     def _at_flange(self, thing: Thing, line: int, depth: int) -> Pose:
         own = self._pose(thing, "tool", line, depth, "OLP521")

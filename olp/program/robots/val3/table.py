@@ -27,6 +27,7 @@ AWAY = frozenset((b"resetmotion",))
 TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"movel": (_C, "a straight move to a point, its numbers, appro(...) or compose(...)"),
     b"movej": (_C, "corrected at its end; the path of the joints is not judged"),
+    b"movec": (_C, "an arc through a point to another one; several arcs where one would bend"),
     b"point, pointRx": (_C, "changed where moves use it; where they differ it gets a further element"),
     b"joint, jointRx": (_C, "corrected on arms; else kept, and the position behind it is unknown"),
     b"{{...},{...}}": (_C, "a point in the world with its configuration"),
@@ -43,7 +44,6 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"resetMotion": (_R, "the robot may be anywhere behind it"),
     b"here, herej": (_X, "a move there goes nowhere"),
     b"waitEndMove, open, close, delay, wait, popUpMsg": (_X, ""),
-    b"movec": (_NO, "is an arc, which is not read yet; post straight moves"),
     b"alterMovej, alterMovel, alterMovec": (_NO, "is a path that is altered in the run"),
     b"taskCreate": (_NO, "with a program that moves: two tasks would move the robot"),
     b"millimeterUnit": (_NO, "with the value false: lengths in inch"),
