@@ -320,7 +320,8 @@ CASES = {
             b"///PULSE\r\nC00000=1,2,3,4,5,6\r\n//INST\r\nNOP\r\nMOVL C00000 V=1.0\r\nEND\r\n\x1a",
             b"//POS\n///TOOL 1\n///POSTYPE BASE\n///RECTAN\nC1=1,2,3,0,0,0\nBC1=5\n//INST\n"
             b"MOVJ C1 BC1 VJ=5 PL=0 NWAIT UNTIL IN#(1)=ON\nMOVL C1 BC1 V=5\0\0",
-            b"MOVC C1 V=5", b"MOVL C1 V=5 FOO", b"MOVL P[1] V=5", b"MOVL LP001 V=5\nSFTON P1\nMOVL P1\nSFTOF",
+            b"MOVC C1 V=5", b"MOVL C1\nMOVC C1\nMOVC C1\nMOVC C1",
+            b"MOVL C1 V=5 FOO", b"MOVL P[1] V=5", b"MOVL LP001 V=5\nSFTON P1\nMOVL P1\nSFTOF",
             b"SET P[I1] P2\nMOVL P3 V=1", b"JUMP *A IF B0=1\n*A\nFOR I0=1 TO 3\nNEXT I0\nMSG \"a // b\"",
             b"C1=1,x,3", b"/JOB\nNOP\nMOVJ C00000 VJ=50\nEND\n",
             b"//POS\n///POSTYPE MTOOL\nC1=1,2,3,4,5,6\n//INST\nMOVJ C1",

@@ -57,7 +57,7 @@ def moves(text: bytes) -> list[Move]:
             key = name[0], int(name[1:])
             assert key not in stated, f"{name} is stated twice"
             stated[key] = np.array([float(value) for value in values.split(",")]), dict(held)
-        elif line[:4] in ("MOVJ", "MOVL"):
+        elif line[:4] in ("MOVJ", "MOVL", "MOVC"):
             name, _, tail = line[5:].partition(" ")
             if name[1:].isdigit() and (name[0], int(name[1:])) in stated:
                 numbers, header = stated[name[0], int(name[1:])]

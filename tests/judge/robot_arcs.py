@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from judge import inform
 from judge.arm import between
 from judge.robot_moves import abc, rotvec, wpr
 from judge.val3 import matrix
@@ -118,9 +119,31 @@ def val3(text: bytes) -> list[Step]:
     return found
 
 
+def jbi(text: bytes) -> list[Step]:
+    """Moves of INFORM in poses. Of three moves MOVC the second and the third are an arc, and the first one
+    leads straight to it. Moves to where the robot is are left out."""
+    lines, found, points = text.split(b"\n"), [], []
+    here = np.zeros(6)
+    for move in inform.moves(text):
+        pose = move.turn, move.numbers[:3]
+        points = [*points, pose] if lines[move.line - 1].startswith(b"MOVC") else []
+        assert len(points) <= 3, "a run of more than three"
+        if len(points) == 3:
+            found.append(Step("C", tuple(points[1:])))
+        elif len(points) < 2 and not np.array_equal(here, move.numbers):
+            found.append(Step("L" if move.straight else "P", (pose,)))
+        here = move.numbers
+    return found
+
+
 READERS: dict[str, Callable[[bytes], list[Step]]] = {
-    "krl": krl, "tp": tp, "rapid": rapid, "ur": ur, "val3": val3,
-}  # fmt: skip
+    "krl": krl,
+    "tp": tp,
+    "rapid": rapid,
+    "ur": ur,
+    "jbi": jbi,
+    "val3": val3,
+}
 
 
 def along(start: Pose, step: Step, shares: np.ndarray) -> list[Pose]:

@@ -22,18 +22,17 @@ import olp
 #: The tool at the flange, and the frame.
 LEVER, TOOL = np.array([10.0, -5.0, 160.0]), abc(0.0, 10.0, 0.0)
 FRAME, ORIGIN = abc(30.0, 0.0, 0.0), np.array([705.0, -94.0, 507.0])
-DIGITS = {"krl": 1e-5, "tp": 1e-3, "rapid": 1e-4, "ur": 1e-5, "val3": 1e-5}
+DIGITS = {"krl": 1e-5, "tp": 1e-3, "rapid": 1e-4, "ur": 1e-5, "jbi": 1e-3, "val3": 1e-5}
 CONTROLLERS = {
-    "krl": "kuka-krl", "tp": "fanuc-tp", "rapid": "abb-rapid", "ur": "urscript", "val3": "staubli-val3",
+    "krl": "kuka-krl", "tp": "fanuc-tp", "rapid": "abb-rapid", "ur": "urscript", "jbi": "yaskawa-inform",
+    "val3": "staubli-val3",
 }  # fmt: skip
 GANTRY_FRAME = {"X_mm": 705.0, "Y_mm": -94.0, "Z_mm": 507.0, "C_deg": 30.0, "set_by": "true"}
-TP_FILES = """
-[kinematics]
-third_joint_level = true
+NUMBERED = """
 [tools.2]
 gauge_to_tip_mm = [10.0, -5.0, 160.0]
 gauge_to_tip_deg = [0.0, 10.0, 0.0]
-[work_offsets.UFRAME3]
+[work_offsets.{frame}]
 X_mm = 705.0
 Y_mm = -94.0
 Z_mm = 507.0
@@ -157,9 +156,36 @@ def val3(steps: list[Step]) -> bytes:
     ).encode()
 
 
+def jbi(steps: list[Step]) -> bytes:
+    """Each arc as three moves to taught positions, behind a straight move to where it begins."""
+    positions, moves, here = [], [], ""
+    for k, step in enumerate(steps):
+        for turn, place in step.poses:
+            (x, y, z), (c, b, a) = place.round(3).tolist(), angles(turn)
+            positions.append(f"C{len(positions):05d}={x:.3f},{y:.3f},{z:.3f},{a:.4f},{b:.4f},{c:.4f}")
+        names = [own.split("=")[0] for own in positions[-len(step.poses) :]]
+        if step.kind == "C":
+            moves += [f"MOVL {here} V=100.0 PL=1"] if k % 2 else ["DOUT OT#(1) ON"]
+            moves += [f"MOVC {name} V=100.0{' PL=2' if k % 3 else ''}" for name in (here, *names)]
+            moves += [f"MOVL {names[-1]} V=100.0"]
+        else:
+            moves.append(f"MOVJ {names[0]} VJ=30.00" if step.kind == "P" else f"MOVL {names[0]} V=80.0")
+        here = names[-1]
+    head = ["/JOB", "//NAME MADE", "//POS", f"///NPOS {len(positions)},0,0,0,0,0"]
+    head += ["///USER 3", "///TOOL 2", "///POSTYPE USER", "///RECTAN", *positions]
+    return "\r\n".join([*head, "//INST", "///GROUP1 RB1", "NOP", *moves, "END", ""]).encode()
+
+
 WRITERS: dict[str, Callable[[list[Step]], bytes]] = {
-    "krl": krl, "tp": tp, "rapid": rapid, "ur": ur, "val3": val3,
-}  # fmt: skip
+    "krl": krl,
+    "tp": tp,
+    "rapid": rapid,
+    "ur": ur,
+    "jbi": jbi,
+    "val3": val3,
+}
+#: The numbers of frame and tool stand in the machine file.
+NAMED_FRAMES = {"tp": "UFRAME3", "jbi": "UF3"}
 
 
 def rotation_of(rng: np.random.Generator, size_rad: float) -> np.ndarray:
@@ -237,9 +263,10 @@ def test_arcs_of_an_arm_are_led_as_the_program_says(language: str, tmp_path: Pat
     turn, flange = Arm(MACHINE).pose(first)
     begin = FRAME.T @ turn @ TOOL, FRAME.T @ (flange + turn @ LEVER - ORIGIN)
     text = WRITERS[language](steps_of(3, begin, 0.08))
-    if language == "tp":
+    if language in NAMED_FRAMES:
         stated = machine.read_text("utf-8").replace("\n[job_defaults]\ntool = 1\n", "\n")
-        machine.write_text(stated + TP_FILES, "utf-8")
+        stated += "\n[kinematics]\nthird_joint_level = true\n" if language == "tp" else ""
+        machine.write_text(stated + NUMBERED.replace("{frame}", NAMED_FRAMES[language]), "utf-8")
     job = tmp_path / "job.toml"
     start = ", ".join(f"J{k + 1} = {value}" for k, value in enumerate(first.tolist()))
     job.write_text(f'schema = "olp-job-1"\nstart_deg = {{ {start} }}\n', "utf-8")
@@ -267,8 +294,8 @@ def test_arcs_of_a_gantry_are_led_as_the_program_says(language: str, tmp_path: P
     lever = turn @ TOOL.T @ LEVER
     recipe = Recipe(
         controller=CONTROLLERS[language], job_defaults={}, travel=((-900.0, 900.0),) * 3,
-        tools={2: {"gauge_to_tip_mm": lever.tolist()}} if language == "tp" else {},
-        work_offsets={"UFRAME3": GANTRY_FRAME} if language == "tp" else {},
+        tools={2: {"gauge_to_tip_mm": lever.tolist()}} if language in NAMED_FRAMES else {},
+        work_offsets={NAMED_FRAMES[language]: GANTRY_FRAME} if language in NAMED_FRAMES else {},
     )  # fmt: skip
     folders = [tmp_path / "bent", tmp_path / "zero"]
     for folder in folders:

@@ -105,7 +105,8 @@ class Use:
 @dataclass(frozen=True, slots=True)
 class Arc:
     """An arc that is read as chords (`robots.arcs`): the moves `first`..`last`. Its via point is the end of
-    `middle`, and its end that of `last`; both are stated by one statement. Other chords have targets of their
+    `middle`, and its end that of `last`; both are stated by one statement, or by
+    two that follow one another. Other chords have targets of their
     own, which no text states. One that is `whole` is never written as several arcs."""
 
     first: int

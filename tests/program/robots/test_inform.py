@@ -13,7 +13,7 @@ from judge.machines import Recipe
 from judge.model import JudgeModel
 
 import olp
-from olp.core.errors import OlpError, ProgramError
+from olp.core.errors import OlpError, ProgramError, Refused
 
 FRAMES = {1: (300.0, 250.0, -300.0, 25.0), 2: (350.0, 200.0, -250.0, 0.0)}
 RECIPE = Recipe(
@@ -209,7 +209,7 @@ def test_where_moves_begin(zero: Path, statements: list[str], *, told: bool) -> 
     [
         ([], "MOVL C00009 V=5.0", "the position C00009 is not stated"),
         ([P1, P1], "MOVL P001 V=5.0", "the position P001 is stated twice"),
-        ([P1], "MOVC P001 V=5.0", "MOVC is an arc, which is not read yet; post straight moves"),
+        ([P1], "MOVC P001 V=5.0", "MOVC is read in runs of three behind MOVL or MOVJ"),
         ([P1], "MOVS P001 V=5.0", "MOVS is a spline"),
         ([P1], "SMOVL P001 V=5.0", "SMOVL counts from a positioner"),
         ([P1], "MOVL P001 V=5.0 +MOVL P001", "`.MOVL` behind a move is not read"),
@@ -232,6 +232,69 @@ def test_what_is_not_certain_is_refused_with_its_line(
         olp.correct(text, zero)
     assert isinstance(error.value, ProgramError)
     assert error.value.line == text[: text.index(move.encode())].count(b"\n") + 1
+
+
+ARC = [
+    position(f"C{k:05d}", point)
+    for k, point in enumerate([[0.0, 0.0, 0.0], [50.0, 0.0, 0.0], [70.0, 20.0, 5.0], [50.0, 40.0, 0.0]])
+]
+RUN = ["MOVJ C00000 VJ=50.00", "MOVC C00001 V=90.0", "MOVC C00002 V=90.0", "MOVC C00003 V=90.0"]
+
+
+@pytest.mark.parametrize(
+    ("moves", "line", "why"),
+    [
+        (RUN[:3], 1, "in runs of three"),
+        ([*RUN, "DOUT OT#(1) ON", "MOVC C00000 V=90.0"], 1, "in runs of three"),
+        ([RUN[0], "*A", *RUN[1:]], 2, "in runs of three"),
+        ([*RUN[:3], "CALL JOB:X", RUN[3]], 1, "in runs of three"),
+        ([*RUN, "*A", *RUN[1:]], 5, "in runs of three"),
+        (RUN[1:], 0, "in runs of three"),
+        ([*RUN[:3], RUN[3] + " FPT"], 3, "`FPT` behind a move is not read"),
+        ([*RUN[:3], RUN[3] + " UNTIL IN#(1)=ON"], 3, "an arc with UNTIL"),
+        ([*RUN[:2], "MOVC P001 V=90.0", RUN[3]], 2, "the text does not state P001"),
+        ([*RUN[:2], "MOVC C00000 V=90.0", "MOVC C00001 V=90.0"], 2, "lie on a line"),
+    ],
+)
+def test_arcs_that_are_not_certain_are_refused(zero: Path, moves: list[str], line: int, why: str) -> None:
+    with pytest.raises(ProgramError, match=re.escape(why)) as error:
+        olp.correct(job(ARC, moves), zero)
+    begin = job(ARC, moves).partition(b"NOP")[0].count(b"\n") + 2
+    own = error.value
+    told = [(r.line, r.message) for r in own.reasons] if isinstance(own, Refused) else [(own.line, str(own))]
+    assert any(place == begin + line and why in message for place, message in told)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "why"),
+    [
+        ("///USER 1", "///USER 2", "have different frames or tools"),
+        ("///RCONF 1,0,0", "///RCONF 1,0,1", "have different postures"),
+        ("30.0000", "31.0000", "at the via point the tool is turned by 17.5 mrad"),
+    ],
+)
+def test_points_of_an_arc_that_differ_are_refused(zero: Path, old: str, new: str, why: str) -> None:
+    positions = [*ARC[:2], ARC[2].replace(old, new), ARC[3]]
+    with pytest.raises(ProgramError, match=why):
+        olp.correct(job(positions, RUN), zero)
+
+
+def test_what_is_said_at_the_via_point_of_an_arc_is_kept(tmp_path: Path) -> None:
+    """A stop there, another speed, or a statement behind it: the arc is not split. A level at the end is."""
+    bent = machines.random_machine(tmp_path, 7, RECIPE)
+    for via, between in ((" PL=0", []), (" ACC=50", []), ("", ["ARCOF"])):
+        with pytest.raises(ProgramError, match="post it as shorter arcs"):
+            olp.correct(job(ARC, [*RUN[:2], RUN[2] + via, *between, RUN[3]]), bent)
+    moves = [*RUN[:2], "ARCON", RUN[2] + " PL=2", RUN[3] + " PL=0"]
+    text = job([position("C00000", [-60.0, -60.0, -20.0]), *ARC[1:]], moves)
+    data = olp.correct(text, bent).data
+    assert data.index(b"MOVL C00007 V=90.0\r\n") < data.index(b"MOVC"), "the way to the arc is straight"
+    assert inform.counts(data)[0] == inform.counts(data)[1] > 4
+    tails = [move.tail for move in inform.moves(data)][3:]
+    assert len(tails) > 2
+    assert tails == ["V=90.0 PL=2"] * (len(tails) - 1) + ["V=90.0 PL=0"]
+    assert data.index(b"ARCON") < data.index(b"MOVC C00004")
+    assert olp.verify(text, data, bent).report["verdict"]["ok"]
 
 
 def test_ends_of_files_as_pendants_write_them(zero: Path, tmp_path: Path) -> None:

@@ -25,6 +25,8 @@ _NUMBERED = pattern(r"[BE]?C(\d+)")
 _BESIDE = pattern(rb"(?i)(?<!\w)([BE]C)\d+")
 #: The name of a position before its numbers.
 _OWN_NAME = pattern(rb"(?m)^[ \t]*([BE]?C|P)\d+(?=[ \t]*=)")
+#: A move to a point of an arc.
+_POINT = pattern(rb"(?i)(?<!\w)MOVC(?=[ \t])")
 #: The position level: 0 is a stop, as a level that the run decides may be.
 _LEVEL = pattern(rb"(?i)(?<!\w)PL=[^\s]+")
 _PASSED_LEVEL = pattern(rb"(?i)(?<!\w)PL=[1-9]\d*(?!\S)")
@@ -57,9 +59,7 @@ class Inform(RobotDialect):
         return f"C{number:0{digits}d}"
 
     def part(self, program: Program, move: int, use: Use, part: Part) -> list[Replacement]:
-        data, targets = program.data, program.targets
-        assert targets is not None
-        target, (begin, end) = targets.targets[use.target], use.statement
+        data, (begin, end) = program.data, use.statement
         tail = data[use.place[1] : end]
         if part.stop:
             own, plus, station = _LEVEL.sub(b"", tail).partition(b"+")
@@ -67,14 +67,47 @@ class Inform(RobotDialect):
         elif _LEVEL.search(tail) and not _PASSED_LEVEL.search(tail):
             tail = _LEVEL.sub(b"PL=1", tail)
         line = int(program.toolpath.line[move])
-        blanks = data[int(program.line_start[line - 1]) : begin]
-        name, eol = part.name.encode(), program.eol(line)
-        # each part has axes beside the robot of its own, which stand where those of the move do
-        statement = data[begin : use.place[0]] + name + _BESIDE.sub(rb"\g<1>" + name[1:], tail)
+        # the way to the first point of an arc is straight, and its parts are no points of an arc
+        word = _POINT.sub(b"MOVL", data[begin : use.place[0]])
+        statement = self._statement(program, line, begin, [(word, part, tail)])
+        return [statement, *self._stated(program, use, part, program.eol(line))]
+
+    def arc(
+        self, program: Program, move: int, via: tuple[Use, Part], end: tuple[Use, Part] | None
+    ) -> list[Replacement]:
+        """An arc from where the robot is, which the three points of the next one follow: they are read as one
+        run of moves unless another move parts them."""
+        (use, part), line = via, int(program.toolpath.line[move])
+        own = self._stated(program, use, part, program.eol(line))
+        if end is None:
+            return [(*use.place, part.name.encode()), *own]
+        tail = program.data[use.place[1] : use.statement[1]]
+        words = [(b"MOVC ", part, tail), *((word, end[1], tail) for word in (b"MOVC ", b"MOVL ", b"MOVC "))]
         return [
-            (begin, begin, statement + eol + blanks),
+            self._statement(program, line, use.statement[0], words),
+            *own,
+            *self._stated(program, end[0], end[1], program.eol(line)),
+        ]
+
+    @staticmethod
+    def _statement(
+        program: Program, line: int, begin: int, moves: list[tuple[bytes, Part, bytes]]
+    ) -> Replacement:
+        """Moves before the statement of a line: what stands before and behind the position of each."""
+        blanks, text = program.data[int(program.line_start[line - 1]) : begin], b""
+        for word, part, tail in moves:
+            name = part.name.encode()
+            # each part has axes beside the robot of its own, which stand where those of the move do
+            text += word + name + _BESIDE.sub(rb"\g<1>" + name[1:], tail) + program.eol(line) + blanks
+        return begin, begin, text
+
+    def _stated(self, program: Program, use: Use, part: Part, eol: bytes) -> list[Replacement]:
+        """The position of a part, with those of the axes beside the robot."""
+        assert program.targets is not None
+        target, number = program.targets.targets[use.target], part.name[1:].encode()
+        return [
             self._declared(program, target, part.name, self._value(program, target, part, use)),
-            *(_copied(copy, copy.text, name[1:], eol) for copy in target.copy.beside),
+            *(_copied(copy, copy.text, number, eol) for copy in target.copy.beside),
         ]
 
     def clone(self, program: Program, target: Target, name: str, text: bytes) -> Replacement:

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from olp.core.patterns import pattern
-from olp.program.robots.inform.table import ASSIGNING, MOVING, POINTING
+from olp.program.robots.inform.table import ASSIGNING, MOVING, POINTING, STILL
 from olp.program.robots.inform.text import Statement
 
 _WORD = pattern(rb"(?i)\*|[A-Z][A-Z0-9$]*")
@@ -15,6 +15,10 @@ _VARIABLE = pattern(rb"(?i)(?<![\w$])P(?:X?)(\d{1,5})(?!\d)")
 #: One that is chosen in the run.
 _CHOSEN = pattern(rb"(?i)(?<![\w$])PX?\[")
 _LABEL = pattern(rb"\*([\w-]+)")
+#: A move of a positioner alone.
+STATION_ALONE = pattern(rb"(?i)MOV[JL][ \t]+(?:EC|EX)\d+\b(?!.*\+)")
+#: Moves that an arc consists of.
+_POINTS = 3
 #: Statements behind which the next one does not follow.
 _ENDS = frozenset((b"RET", b"END", b"ABORT"))
 
@@ -23,6 +27,41 @@ def word_of(text: bytes) -> bytes:
     """The first word of a statement in capitals; `*` for a label."""
     match = _WORD.match(text)
     return b"" if match is None else match[0].upper()
+
+
+class Arcs:
+    """The arcs of a job: `points` are the three moves (MOVC) of each, by the line of each. Another move of
+    the robot stands before them, and no fourth one behind. Nothing between leads elsewhere. `parting`
+    are the lines of moves that only part an arc from the next one, which begins where it ends."""
+
+    def __init__(self, statements: Sequence[Statement]) -> None:
+        self.points: dict[int, tuple[Statement, ...]] = {}
+        self.parting: set[int] = set()
+        run: list[Statement] = []
+        before: list[Statement] = []
+        led: Statement | None = None
+        for statement in statements:
+            word = word_of(statement.text)
+            if word == b"MOVC":
+                run.append(statement)
+            elif word not in STILL:
+                before = self._closed(before, led, run)
+                moves = word in (b"MOVL", b"MOVJ") and STATION_ALONE.match(statement.text) is None
+                run, led = [], statement if moves else None
+        self._closed(before, led, run)
+
+    def _closed(
+        self, before: list[Statement], led: Statement | None, run: list[Statement]
+    ) -> list[Statement]:
+        """Add a run of moves behind another move, which may be the one that parts it from the run before.
+        Gives the run where it is an arc."""
+        if led is None or len(run) != _POINTS:
+            return []
+        self.points |= {statement.line: tuple(run) for statement in run}
+        first, parting = run[0].text[4:].split(), led.text[4:].split()
+        if before and word_of(led.text) == b"MOVL" and before[-1].text[4:].split()[:1] == first[:1]:
+            self.parting |= {led.line, run[0].line} if first == parting else set()
+        return run
 
 
 class Flow:

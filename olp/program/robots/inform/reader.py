@@ -6,6 +6,8 @@ robot comes from.
 
 from __future__ import annotations
 
+import re
+
 from olp.core.errors import ProgramError
 from olp.core.machine import Setup
 from olp.core.patterns import pattern
@@ -13,7 +15,7 @@ from olp.core.values import dataclass
 from olp.program.dialect import Dialect, Options
 from olp.program.program import Program
 from olp.program.robots.frames import Located, Tool
-from olp.program.robots.inform.flow import Flow, word_of
+from olp.program.robots.inform.flow import STATION_ALONE, Arcs, Flow, word_of
 from olp.program.robots.inform.places import Places
 from olp.program.robots.inform.table import BLOCKS, BY_DISTANCE, MOVING, REFUSED, SETTING, STILL
 from olp.program.robots.inform.text import Position, Statement, job_of
@@ -21,7 +23,7 @@ from olp.program.robots.moves import NAN, RobotMoves, not_read, take_all
 from olp.program.robots.poses import Pose
 from olp.program.robots.targets import Span, Use
 
-_MOVE = pattern(rb"(?i)MOV[LJ][ \t]+((C|P)(\d{1,6})|L?PX?\d+|L?P(?:\[[^\]]*\]|\([^)]*\)))(?![\w\[(])(.*)")
+_MOVE = pattern(rb"(?i)MOV[LJC][ \t]+((C|P)(\d{1,6})|L?PX?\d+|L?P(?:\[[^\]]*\]|\([^)]*\)))(?![\w\[(])(.*)")
 _VALUE = rb"(?:\d+\.?\d*|\.\d+|L?[BIDR](?:\d+|\[[^\]]*\]))"
 #: Words behind a move that change nothing of its path, and those that belong to all of it.
 _PLAIN = rb"(?:V[JRE]?|PL|CR|ACC|DEC)=" + _VALUE + rb"|CONT"
@@ -43,8 +45,11 @@ _WHOLE = pattern(rb"(?i)(?<!\w)(?:" + _HELD + rb"|(?:BP|EX)\d)")
 _AXES_BESIDE = pattern(rb"(?i)(?<!\w)(BC|EC|BP|EX)(\d+)")
 _UNTIL = pattern(rb"(?i)(?<!\w)UNTIL[ \t]")
 _SPEED = pattern(rb"(?i)(?<!\w)V=(\d+\.?\d*|\.\d+)(?![\w.])")
-#: A move of a positioner alone.
-_STATION_ALONE = pattern(rb"(?i)MOV[JL][ \t]+(?:EC|EX)\d+\b(?!.*\+)")
+_LEVEL = pattern(rb"(?i)(?<!\w)PL=\S+")
+#: A stop at a via point, or one that may be, and a rounding, which several arcs do not have.
+_STOPS = pattern(rb"(?i)(?<!\w)(?:PL=(?![1-9]\d*(?!\S))|CR=)")
+#: Words of a posture that are the same all along an arc: those of the arm.
+_ARM = slice(1, 3)
 _WORD = pattern(rb"[\w.+#=]+|\S")
 #: What leads elsewhere, or ends the job: where the next statement is reached, the robot stays.
 _FLOW = frozenset((b"JUMP", b"JMP", b"RET", b"END", b"ABORT"))
@@ -72,6 +77,7 @@ class _Reader:
         self.moves = RobotMoves(data, setup, "BASE")
         self.job = job_of(data)
         self.flow = Flow(self.job.statements)
+        self.arcs = Arcs(self.job.statements)
         self.places = Places(data, self.moves, self.job)
         self.station: tuple[float, ...] = ()
         self.blocks: list[_Block] = []
@@ -87,10 +93,12 @@ class _Reader:
         word = word_of(statement.text)
         if word in REFUSED:
             raise not_read(f"{word.decode()} {REFUSED[word]}", statement.line)
-        if _STATION_ALONE.match(statement.text):
+        if STATION_ALONE.match(statement.text) or statement.line in self.arcs.parting:
             return
         if word in (b"MOVL", b"MOVJ"):
             self._move(statement, straight=word == b"MOVL")
+        elif word == b"MOVC":
+            self._arc(statement)
         elif word in BY_DISTANCE:
             self.moves.left(statement.line)
             what = "left as written: it moves by a distance from where the robot is"
@@ -122,11 +130,8 @@ class _Reader:
     # -- moves ---------------------------------------------------------------------------------------
 
     def _move(self, statement: Statement, *, straight: bool) -> None:
-        move = _MOVE.fullmatch(statement.text)
-        if move is None:
-            raise ProgramError("the words of this move are not read", line=statement.line, code="OLP516")
+        move = self._words(statement)
         tail = move[4]
-        self._known_words(tail, statement)
         if any(block.loop and block.moves == self.moves.count for block in self.blocks):
             # the first move in a loop begins where the last one ends, or before the loop
             self.moves.known = False
@@ -147,13 +152,87 @@ class _Reader:
         if _UNTIL.search(tail):
             self.moves.known = False
 
+    def _arc(self, statement: Statement) -> None:
+        """One of the three moves of an arc, which begins at the first one and is read with the second."""
+        run = self.arcs.points.get(statement.line, ())
+        if not run:
+            raise not_read(
+                "MOVC is read in runs of three behind MOVL or MOVJ, with nothing between that leads "
+                "elsewhere; post each arc as three MOVC, and a MOVL to where it begins before them",
+                statement.line,
+            )
+        if statement is run[0]:
+            self._move(statement, straight=True)
+        elif statement is run[1]:
+            self._bent(run)
+
+    def _bent(self, run: tuple[Statement, ...]) -> None:
+        """An arc from the first of its moves through the second to the third."""
+        (first, *_), (via, *place), (end, frame, tool) = (self._point(own) for own in run)
+        postures = [self.moves.targets[use.target].config for use in (first, via, end)]
+        if len({words[_ARM] for words in postures if words[0] == words[0]}) > 1:
+            raise not_read(
+                "the points of this arc have different postures; post them with the same ///RCONF",
+                run[1].line,
+            )
+        if place != [frame, tool]:
+            raise not_read("via point and end of this arc have different frames or tools", run[1].line)
+        tails = [self.moves.data[slice(*use.zone)] for use in (via, end)]
+        # what is said at the via point alone counts up to there, or belongs there
+        same = len({tuple(_LEVEL.sub(b"", tail).split()) for tail in tails}) == 1
+        whole = not same or run[2].line - run[1].line > 1 or _STOPS.search(tails[0]) is not None
+        speed = _SPEED.search(tails[1])
+        self.moves.arc(
+            run[1].line, via, end, frame, tool, NAN if speed is None else float(speed[1]),
+            turned_by_via=True, whole=whole or _WHOLE.search(tails[1]) is not None,
+        )  # fmt: skip
+
+    def _point(self, statement: Statement) -> tuple[Use, Located, Tool]:
+        """A point of an arc, with its frame and its tool."""
+        move, line, begin = self._words(statement), statement.line, statement.span[0]
+        position, why = self._position(move[2], move[3], statement)
+        if position is None:
+            raise not_read(f"an arc through a point that is left as written: {why}", line)
+        if self.places.in_joints(position, line):
+            raise not_read(
+                "this point of an arc is in pulses or joints; save the job in base coordinates "
+                "(///POSTYPE BASE)",
+                line,
+            )
+        if _UNTIL.search(move[4]) or b"+" in move[4]:
+            raise not_read("an arc with UNTIL, or with a positioner that moves, is not read", line)
+        if move[2].upper() == b"P":
+            what = f"{move[1].decode()} may be used by other jobs, too: correct these with it"
+            self.moves.remark("shared", line, what)
+        beside = self._beside(move[4])
+        index = self.places.target(position, beside, line)
+        if self.places.station(beside, line) != self.station:
+            raise not_read("a positioner moves along this arc; program straight moves", line)
+        target = self.moves.targets[index]
+        place = begin + move.start(1), begin + move.end(1)
+        use = Use(index, statement.span, place, place, turn=target.turn, zone=(place[1], statement.span[1]))
+        return use, self.places.frame(position, target, line), self.places.tool(position, line)
+
+    @staticmethod
+    def _beside(tail: bytes) -> list[tuple[bytes, int]]:
+        """The positions of the axes beside the robot."""
+        return [(kind.upper(), int(number)) for kind, number in _AXES_BESIDE.findall(tail)]
+
+    def _words(self, statement: Statement) -> re.Match[bytes]:
+        """The words of a move. Raises ProgramError where they are not known."""
+        move = _MOVE.fullmatch(statement.text)
+        if move is None:
+            raise ProgramError("the words of this move are not read", line=statement.line, code="OLP516")
+        self._known_words(move[4], statement)
+        return move
+
     def _to(
         self, statement: Statement, position: Position, place: Span, tail: bytes, feed: float, *,
         straight: bool, whole: bool,
     ) -> None:  # fmt: skip
         """A move to a position that the text states."""
         line, span = statement.line, statement.span
-        beside = [(kind.upper(), int(number)) for kind, number in _AXES_BESIDE.findall(tail)]
+        beside = self._beside(tail)
         zone, station = (place[1], span[1]), self.places.station(beside, line)
         # parts would lead a positioner to its end before the move ends
         whole |= station != self.station

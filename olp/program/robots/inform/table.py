@@ -13,7 +13,6 @@ _NO = Support.REFUSED
 
 #: Moves that are not read, and why.
 REFUSED: Mapping[bytes, str] = {
-    b"MOVC": "is an arc, which is not read yet; post straight moves (MOVL)",
     b"MOVS": "is a spline, which is not read; post straight moves (MOVL)",
     **dict.fromkeys(
         (b"SMOVL", b"SMOVC", b"SMOVS", b"EMOVL", b"EMOVC"),
@@ -58,6 +57,7 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"MOVL": (_C, "a straight move to a taught position (C) or a position variable (P)"),
     b"MOVJ": (_C, "corrected at its end; the path of the joints is not judged"),
     b"C00000=, P000=": (_C, "changed where moves use it, and cloned where they differ"),
+    b"MOVC": (_C, "three behind MOVL or MOVJ: straight to the first, an arc through the second to the third"),
     b"///RECTAN": (_R, "positions X, Y, Z, Rx, Ry, Rz in mm and deg"),
     b"///PULSE": (_R, "positions in pulses: corrected on arms that state pulses_per_deg, else kept"),
     b"///ANGLE": (_R, "joints in degrees: corrected on arms, else kept"),
