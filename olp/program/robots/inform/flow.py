@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from olp.core.patterns import pattern
-from olp.program.robots.inform.table import ASSIGNING, MOVING, POINTING, STILL
+from olp.program.robots.inform.table import ASSIGNING, BLOCKS, MOVING, POINTING, STILL
 from olp.program.robots.inform.text import Statement
 
 _WORD = pattern(rb"(?i)\*|[A-Z][A-Z0-9$]*")
@@ -19,8 +19,9 @@ _LABEL = pattern(rb"\*([\w-]+)")
 STATION_ALONE = pattern(rb"(?i)MOV[JL][ \t]+(?:EC|EX)\d+\b(?!.*\+)")
 #: Moves that an arc consists of.
 _POINTS = 3
-#: Statements behind which the next one does not follow.
+#: Statements behind which the next one does not follow, unless they have a condition.
 _ENDS = frozenset((b"RET", b"END", b"ABORT"))
+_CONDITION = pattern(rb"(?i)(?<!\w)IF(?!\w)")
 
 
 def word_of(text: bytes) -> bytes:
@@ -96,26 +97,61 @@ class Flow:
             table.setdefault(int(match[1]), statement.line)
 
     def _follow(self, statements: Sequence[Statement]) -> None:
-        """Which statements a shift reaches, also by jumps. A label has what any way to it has."""
+        """Which statements a shift reaches, also by jumps and loops. A label has what any way to it has."""
         labels: dict[bytes, str] = {}
         size = -1
         while size != len(labels):
-            size, state = len(labels), ""
+            size, way = len(labels), _Way(labels)
             for statement in statements:
-                word = word_of(statement.text)
-                if word == b"*":
-                    match = _LABEL.match(statement.text)
-                    state = state or labels.get(b"" if match is None else match[1], "")
-                elif word in MOVING:
-                    state = MOVING[word][1]
-                elif any(word == end for end, _ in MOVING.values()):
-                    state = ""
-                if state:
-                    self._moved[statement.line] = state
-                if state and word in (b"JUMP", b"JMP"):
-                    for label in _LABEL.findall(statement.text):
-                        labels.setdefault(label, state)
-                state = "" if word in _ENDS else state
+                if way.behind(statement):
+                    self._moved[statement.line] = way.state
+
+
+class _Way:
+    """The way through a job from its first line on: the shift of each place, empty for none. `labels` are
+    those of labels and of the begins of loops that are reached from elsewhere, by their names or lines."""
+
+    def __init__(self, labels: dict[bytes, str]) -> None:
+        self.labels, self.state = labels, ""
+        self._ended = False
+        # of each block: where it begins, the shift there, and that at the ends of its branches
+        self._blocks: list[tuple[bytes, str, list[str]]] = []
+
+    def behind(self, statement: Statement) -> str:
+        """The shift of a statement."""
+        if self._ended:
+            self.state, self._ended = "", False
+        word, text = word_of(statement.text), statement.text
+        if word == b"*":
+            match = _LABEL.match(text)
+            self.state = self.state or self.labels.get(b"" if match is None else match[1], "")
+        elif word in MOVING:
+            self.state = MOVING[word][1]
+        elif any(word == end for end, _ in MOVING.values()):
+            self.state = ""
+        elif word in BLOCKS:
+            self._block(BLOCKS[word], b"*%d" % statement.line)
+        if self.state and word in (b"JUMP", b"JMP"):
+            for label in _LABEL.findall(text):
+                self.labels.setdefault(label, self.state)
+        self._ended = word in _ENDS and _CONDITION.search(text) is None
+        return self.state
+
+    def _block(self, kind: str, begin: bytes) -> None:
+        """Behind a block is what any way through it has, and at the begin of a loop what its end has."""
+        if kind in ("if", "loop"):
+            self.state = self.state or self.labels.get(begin, "")
+            self._blocks.append((begin if kind == "loop" else b"", self.state, []))
+        elif self._blocks:
+            loop, before, ends = self._blocks[-1]
+            ends.append(self.state)
+            if kind == "else":
+                self.state = before
+                return
+            self._blocks.pop()
+            if loop and self.state:
+                self.labels.setdefault(loop, self.state)
+            self.state = next((state for state in (*ends, before) if state), "")
 
 
 def _blank(text: bytes, place: int) -> int:
