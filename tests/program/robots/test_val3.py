@@ -397,6 +397,34 @@ def test_refused_with_its_line(lines: list[str], told: str, line: int, zero: Pat
 
 
 @pytest.mark.parametrize(
+    ("lines", "told"),
+    [
+        (["fPart.trsf.x=nK"], "the frame fPart"),
+        (["tGrip.trsf.z=nK"], "the tool tGrip"),
+        (["movel(appro(pPoint[1],{0,0,nK,0,0,0}),tGrip,mFast)"], "the shift of appro in line 9"),
+        (["delay(nK)"], "nK, which line 9 uses"),
+        (["if nK>100", "endIf"], "nK, which line 9 uses"),
+        (["nK=nK+1"], "nK, which line 9 uses"),
+        (["nK=5", "delay(1) // nK"], ""),
+    ],
+)
+def test_numbers_of_a_target_that_are_needed_as_they_are(
+    bent: Path, zero: Path, lines: list[str], told: str
+) -> None:
+    """A corrected number of one target would move a frame, a tool, or what the run decides by it."""
+    points = [value(k, [10.0 + k, 20.0, 30.0], 'rx="180" ') for k in range(3)]
+    first = ["nK=150", "pPoint[2].trsf.x=nK", "movel(pPoint[1],tGrip,mFast)"]
+    text = made([*first, "movel(pPoint[2],tGrip,mFast)", *lines, "movel(pPoint[0],tGrip,mFast)"], points)
+    more = datum("nK", "num", '<Value key="0" value="1" />').encode()
+    text = text.replace(b"  </Datas>", more + b"  </Datas>")
+    if not told:
+        assert b"nK=150\r" not in olp.correct(text, bent).data
+        return
+    with pytest.raises(ProgramError, match=told):
+        olp.correct(text, zero)
+
+
+@pytest.mark.parametrize(
     ("text", "told"),
     [
         ("<!DOCTYPE a [<!ENTITY b SYSTEM '/etc/hostname'>]><Programs>&b;</Programs>", "document type"),

@@ -71,6 +71,10 @@ class Routine:
     locals: dict[str, str]
     nodes: list[Node]
 
+    def has(self, name: str) -> bool:
+        """Whether a name means data of its own."""
+        return name in self.locals or any(name == own for own, _, _ in self.parameters)
+
 
 def lines_in(nodes: list[Node]) -> list[Line]:
     """All statements of nodes."""

@@ -14,6 +14,7 @@ from olp.program.robots.targets import NOWHERE, Span, Use
 from olp.program.robots.val3.code import Line, Routine, lines_in
 from olp.program.robots.val3.data import TRANSFORM, WORDS, Slot
 from olp.program.robots.val3.places import Places
+from olp.program.robots.val3.reach import Reach
 from olp.program.robots.val3.state import Scope, State
 from olp.program.robots.val3.values import CALL, REFERENCE, Thing, pose_of, words_of
 
@@ -81,6 +82,22 @@ class Moving:
 
     def leave(self) -> None:
         self._sites.pop()
+
+    def check(self, reach: Reach) -> None:
+        """Raises ProgramError where a target has numbers that something else needs as they are."""
+        uses: dict[tuple[str, str], int] = {}
+        for span, index in self._owner.items():
+            what = self.places.held.get(span, "")
+            for name in sorted(self.state.through.get(span, ())):
+                line = uses[name] if name in uses else uses.setdefault(name, reach.used(*name))
+                what = what or (f"{name[1]}, which line {line} uses" if line else "")
+            if what:
+                raise ProgramError(
+                    f"this target has some of its numbers from {what}, so both change together; state them "
+                    "apart",
+                    line=self.moves.targets[index].line,
+                    code="OLP533",
+                )
 
     # -- moves ---------------------------------------------------------------------------------------
 
@@ -235,6 +252,8 @@ class Moving:
         move = pose_of([value for _, value in slots])
         inline = all(given[-1][0] <= a < b <= given[-1][1] for (a, b), _ in slots)
         offsets = tuple(span for span, _ in slots[:3]) if inline else ()
+        if not inline:
+            self.places.hold(f"the shift of {word.decode()} in line {line.line}", slots)
         if word == b"appro":
             return replace(goal, shift=move.origin_mm, turned=move.turn, offsets=offsets, along_tool=True)
         if move.turn != NO_TURN:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 from olp.core.errors import ProgramError
@@ -9,6 +10,7 @@ from olp.program.robots.frames import Located, RobotFrames, Tool
 from olp.program.robots.moves import NAN
 from olp.program.robots.poses import Pose
 from olp.program.robots.targets import NOWHERE, Span
+from olp.program.robots.val3.data import Slot
 from olp.program.robots.val3.state import Scope, State
 from olp.program.robots.val3.values import REFERENCE, Thing
 
@@ -19,12 +21,20 @@ _LONGEST = 32
 
 
 class Places:
-    """The frames and tools of one application."""
+    """The frames and tools of one application. `held` are the bytes of the numbers that moves need as they
+    are, with what has them: a target with the same bytes would change both."""
 
     def __init__(self, state: State, frames: RobotFrames) -> None:
         self.state, self.frames = state, frames
         self._located: dict[tuple[str, str, int], Located] = {}
         self._tools: dict[tuple[str, str, int], Tool] = {}
+        self.held: dict[Span, str] = {}
+
+    def hold(self, what: str, slots: Iterable[Slot | None]) -> None:
+        """Numbers that stay as they are."""
+        for slot in slots:
+            if slot is not None:
+                self.held.setdefault(slot[0], what)
 
     def frame(self, father: tuple[str, str] | None, line: int, depth: int = 0) -> Located:
         """The frame that a point counts from. Raises ProgramError where it is not stated."""
@@ -71,6 +81,8 @@ class Places:
         thing = self.state.thing(span, scope)
         if thing is None or thing.why or thing.kind != "mdesc":
             return NAN, NOWHERE, False
+        if thing.version:
+            self.hold(f"the motion {thing.shown}", thing.slots.values())
         speed = thing.slots.get("tmax")
         own = speed is not None and speed[0] != NOWHERE and speed[1] > 0.0
         feed = speed[1] if own and speed is not None else NAN
@@ -109,6 +121,7 @@ class Places:
         if pose is None or thing.kind != what or depth > _LONGEST:
             why = thing.why or f"it is no {what} whose numbers are stated"
             raise ProgramError(f"the {what} {thing.shown}: {why}", line=line, code=code)
+        self.hold(f"the {what} {thing.shown}", thing.slots.values())
         return pose
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 
 from olp.core.patterns import pattern
@@ -14,6 +15,8 @@ from olp.program.robots.val3.values import REFERENCE, arguments
 _MOVES = pattern(rb"(?i)\bmove[ljc]\s*\(")
 _CALLED = pattern(rb"(?is)call\s+([A-Za-z_][\w:]*)\s*\((.*)\)")
 _SET = pattern(rb"([A-Za-z_]\w*)\s*(?:\[[^\[\]]*\])?\s*(?:\.\s*\w+\s*)*=(?!=)")
+#: What gets a value, with its index.
+_GIVEN = pattern(rb"[A-Za-z_]\w*\s*(?:\[([^\[\]]*)\]\s*)?(?:\.\s*\w+\s*)*=(?!=)")
 _FOR = pattern(rb"(?i)for\s+([A-Za-z_]\w*)\s*(?:\[[^\[\]]*\])?\s*=")
 _LINK = pattern(rb"(?i)link\s*\(\s*([A-Za-z_]\w*)")
 _NAMED = pattern(rb"(?<![\w$:.])([$A-Za-z_]\w*)\s*\(")
@@ -146,6 +149,25 @@ class Reach:
             called = self._called(line)
             found |= self._own(line) if called is None else self._through(line, called)
         return found
+
+    def used(self, program: str, name: str) -> int:
+        """The first line that uses a number otherwise than as one of a target, 0 for none; `program` has it,
+        or the application where that is empty."""
+        mention = re.compile(rb"(?<![\w.:])%s(?!\w)" % re.escape(name.encode("latin-1")))
+        for routine in self.routines.values():
+            if program != (routine.name if routine.has(name) else ""):
+                continue
+            for line in lines_in(routine.nodes):
+                text = line.text
+                if _MOVES.search(text) or self._called(line) is not None:
+                    continue
+                given = _GIVEN.match(text)
+                if given is not None and not (given[1] and mention.search(given[1])):
+                    value = text[given.end() :].strip()
+                    text = b"" if value[:1] == b"{" or REFERENCE.fullmatch(value) else value
+                if mention.search(text):
+                    return line.line
+        return 0
 
     def repeated(self, routine: Routine) -> bool:
         """Whether a program is called several times."""

@@ -73,6 +73,7 @@ class _Reader:
             first_error = self.refusals[0]
             first_error.others = tuple(self.refusals[1:])
             raise first_error
+        self.moving.check(self.reach)
         self._count_files()
         return self.moves.program(dialect, words=words)
 

@@ -24,7 +24,8 @@ class Scope:
 
 class State:
     """The values of all data. `elsewhere` are names that programs give other values that are not followed,
-    and where."""
+    and where. `through` are the names by which numbers were taken, by the bytes of these: each with its
+    program, empty for data of the application."""
 
     def __init__(self, data: bytes, declared: Iterable[Datum], elsewhere: dict[str, str]) -> None:
         self.data, self.elsewhere = data, elsewhere
@@ -35,6 +36,7 @@ class State:
             self.declared[datum.name] = datum
         self.things: dict[tuple[str, str], Thing] = {}
         self.versions = 0
+        self.through: dict[Span, set[tuple[str, str]]] = {}
 
     # -- names ---------------------------------------------------------------------------------------
 
@@ -108,7 +110,11 @@ class State:
             return None
         fields = [part.strip().decode("latin-1").lower() for part in match[3].split(b".") if part.strip()]
         if not fields and thing.kind == "num":
-            fields = ["value"]
+            fields, slot = ["value"], thing.slots["value"]
+            if slot is not None:
+                name = match[1].decode("latin-1")
+                own = scope.routine.name if scope.routine.has(name) else ""
+                self.through.setdefault(slot[0], set()).add((own, name))
         return thing.slots.get(fields[-1]) if fields else None
 
     def numbers(self, parts: Iterable[Span], scope: Scope) -> list[Slot | None]:
