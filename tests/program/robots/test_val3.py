@@ -405,6 +405,8 @@ def test_refused_with_its_line(lines: list[str], told: str, line: int, zero: Pat
         (["delay(nK)"], "nK, which line 9 uses"),
         (["if nK>100", "endIf"], "nK, which line 9 uses"),
         (["nK=nK+1"], "nK, which line 9 uses"),
+        (["nK=7", "call to(nK)", "delay(nK)"], "nK, which line 11 uses"),
+        (["call wait(8)"], "nX, which line 8 of part1.pgx uses"),
         (["nK=5", "delay(1) // nK"], ""),
     ],
 )
@@ -413,8 +415,13 @@ def test_numbers_of_a_target_that_are_needed_as_they_are(
 ) -> None:
     """A corrected number of one target would move a frame, a tool, or what the run decides by it."""
     points = [value(k, [10.0 + k, 20.0, 30.0], 'rx="180" ') for k in range(3)]
-    first = ["nK=150", "pPoint[2].trsf.x=nK", "movel(pPoint[1],tGrip,mFast)"]
-    text = made([*first, "movel(pPoint[2],tGrip,mFast)", *lines, "movel(pPoint[0],tGrip,mFast)"], points)
+    first = ["nK=150", "pPoint[2].trsf.x=nK", "movel(pPoint[0],tGrip,mFast)"]
+    given = '<Parameters><Parameter name="nX" type="num" xsi:type="element" /></Parameters>\r\n'
+    own = ["pPoint[1].trsf.y=nX", "movel(pPoint[1],tGrip,mFast)"]
+    called = {"to": own, "wait": [*own, "delay(nX)"]}
+    others = [pgx(name, *code, parameters=given) for name, code in called.items() if f"{name}(" in str(lines)]
+    first = [*first, "movel(pPoint[2],tGrip,mFast)", *lines, "movel(pPoint[0],tGrip,mFast)"]
+    text = made(first, points, *others)
     more = datum("nK", "num", '<Value key="0" value="1" />').encode()
     text = text.replace(b"  </Datas>", more + b"  </Datas>")
     if not told:

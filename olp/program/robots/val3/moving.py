@@ -85,12 +85,12 @@ class Moving:
 
     def check(self, reach: Reach) -> None:
         """Raises ProgramError where a target has numbers that something else needs as they are."""
-        uses: dict[tuple[str, str], int] = {}
+        uses: dict[tuple[str, str], str] = {}
         for span, index in self._owner.items():
             what = self.places.held.get(span, "")
             for name in sorted(self.state.through.get(span, ())):
                 line = uses[name] if name in uses else uses.setdefault(name, reach.used(*name))
-                what = what or (f"{name[1]}, which line {line} uses" if line else "")
+                what = what or (f"{name[1]}, which {line} uses" if line else "")
             if what:
                 raise ProgramError(
                     f"this target has some of its numbers from {what}, so both change together; state them "

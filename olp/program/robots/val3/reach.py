@@ -38,7 +38,7 @@ class Reach:
     not followed give other values, and where."""
 
     def __init__(self, application: Application, data: bytes) -> None:
-        self.routines = application.routines
+        self.data, self.routines = data, application.routines
         self._sets: dict[str, set[str]] = {name: set() for name in self.routines}
         self._moving = dict.fromkeys(self.routines, False)
         self._calls: dict[str, list[str]] = {}
@@ -55,11 +55,14 @@ class Reach:
                 continue
             for line in lines_in(routine.nodes):
                 for own in self._own(line) - set(routine.locals) - {p[0] for p in routine.parameters}:
-                    file, number = place_of(data, line.line)
-                    where = f"line {number} of {file}" if file else f"line {number}"
+                    where = self._shown(line.line)
                     self.elsewhere.setdefault(
                         own, f"it gets another value in {where}, which this program does not run"
                     )
+
+    def _shown(self, line: int) -> str:
+        file, number = place_of(self.data, line)
+        return f"line {number} of {file}" if file else f"line {number}"
 
     def _called(self, line: Line) -> str | None:
         match = _CALLED.fullmatch(line.text)
@@ -150,9 +153,9 @@ class Reach:
             found |= self._own(line) if called is None else self._through(line, called)
         return found
 
-    def used(self, program: str, name: str) -> int:
-        """The first line that uses a number otherwise than as one of a target, 0 for none; `program` has it,
-        or the application where that is empty."""
+    def used(self, program: str, name: str) -> str:
+        """The first line that uses a number otherwise than as one of a target, empty for none; `program` has
+        it, or the application where that is empty."""
         mention = re.compile(rb"(?<![\w.:])%s(?!\w)" % re.escape(name.encode("latin-1")))
         for routine in self.routines.values():
             if program != (routine.name if routine.has(name) else ""):
@@ -166,8 +169,8 @@ class Reach:
                     value = text[given.end() :].strip()
                     text = b"" if value[:1] == b"{" or REFERENCE.fullmatch(value) else value
                 if mention.search(text):
-                    return line.line
-        return 0
+                    return self._shown(line.line)
+        return ""
 
     def repeated(self, routine: Routine) -> bool:
         """Whether a program is called several times."""

@@ -221,7 +221,7 @@ class _Reader:
                     inner.alias[name] = (thing.name, thing.key)
                 continue
             own = Thing.empty(kind.removesuffix("Rx"), name, "0") if thing is None else thing.copy()
-            if thing is None and kind == "num" and span[0] >= 0:
+            if kind == "num" and span[0] >= 0:
                 own.slots["value"] = self.state.number(span, scope)
             elif thing is None:
                 own.why = "it is given by a call that does not state its numbers"
