@@ -127,6 +127,10 @@ class _Corners:
             word, size = _shown(corner[-1]), _size(corner, self._profile)
             if leg is None:
                 raise _no_move(word, behind=False, unknown=bool(motion))
+            late = [w for w in line.words if w.letter == "m" and w.number in self._profile.late_m]
+            if late:
+                why = f"whether {_shown(late[0])} acts before or behind the corner of {word} is not certain"
+                raise ProgramError(f"{why}; give it a block behind the next move", code="OLP544")
             leg = replace(leg, word=word, size=size)
         self.held = leg
 

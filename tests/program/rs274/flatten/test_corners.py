@@ -111,6 +111,8 @@ def test_what_stands_beside_a_corner_stays_in_its_block() -> None:
         ("G1 X30. F300. ,R5. ,C2.\nY40.\n", "OLP518", "two corners", 3),
         ("G1 X30. F300. ,R5.\nX60. Y0.2\n", "OLP544", "less than a degree", 3),
         ("G1 X30. F300. ,C5.\nG2 X40. Y10. R10.\n", "OLP544", "beside an arc", 3),
+        ("G1 X30. F300. ,R5. M5\nY40.\n", "OLP544", "whether M5 acts before or behind", 3),
+        ("G1 X30. F300. ,R5. M00\nY40.\n", "OLP544", "whether M0 acts before or behind", 3),
         ("G81 X30. Z-3. R1. F300. ,R5.\nG80\n", "OLP510", "canned cycle", 3),
     ],
 )  # fmt: skip
