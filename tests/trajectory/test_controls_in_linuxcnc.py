@@ -113,7 +113,7 @@ def test_limits_are_learned_from_a_log(tmp_path: Path) -> None:
     parts = moves(read(text, load_setup(described, described.with_name("job.toml")), DIALECTS["linuxcnc"]),
                   blend_mm=np.inf)  # fmt: skip
     run = controller.run(text, described, tmp_path / "control", in_step=True)
-    slower = AxisSpeeds(0.5 * LIMITS.velocity, 0.3 * LIMITS.acceleration)
+    slower = AxisSpeeds(0.5 * LIMITS.velocity, 0.3 * LIMITS.acceleration, LIMITS.jerk)
     time_s = np.arange(len(run.axis)) * TICK_S
     log = learned(CONTROL, parts, slower, CONTROL.values({}), time_s, run.axis)
     assert log.limits.velocity == pytest.approx(LIMITS.velocity, rel=0.01)
