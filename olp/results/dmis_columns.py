@@ -49,7 +49,8 @@ class PlainPoints:
 def plain_points(chunk: Chunk) -> PlainPoints:
     """The plain points of a chunk; none where one of them has a number that is not plain."""
     offset, last = int(chunk.line_start[0]), int(chunk.line_end[-1])
-    text = np.frombuffer(chunk.data, np.uint8)[offset:last]
+    # at least the line end of a chunk that has nothing else
+    text = np.frombuffer(chunk.data, np.uint8)[offset : max(last, offset + 1)]
     begin, end = chunk.line_start - offset, chunk.line_end - offset
     closing = _first(text, _CLOSING, begin)
     numbers = closing + len(_FEATURE)

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from judge import cmm
 from judge.machines import Recipe, random_machine
@@ -322,6 +322,8 @@ def test_a_number_written_again_is_the_same_text(text: str) -> None:
 
 @pytest.mark.slow
 @given(st.binary(max_size=300))
+@example(b"\r")
+@example(b"\n\r\n")
 def test_any_bytes_are_read_or_refused(data: bytes) -> None:
     for reader in (read_dmis, lambda d: read_table(d, detected_layout(["X_mm,Y_mm,Z_mm"]))):  # type: ignore[arg-type]
         with contextlib.suppress(InputError):
