@@ -26,6 +26,16 @@ class Piece:
     end: int
 
 
+def stepped(line: int) -> ProgramError:
+    """The refusal of an arc on which backlash is taken up."""
+    return ProgramError(
+        "an axis turns round on this arc, and its backlash is taken up by a step, which an arc cannot have; "
+        "post straight moves",
+        line=line,
+        code="OLP561",
+    )
+
+
 def pieces_of(arc: Arc, bent: Bent, line: int) -> list[Piece]:
     """The arcs in place of one; none where the statement stays with other numbers. Raises ProgramError where
     it may not be split, or no number of arcs keeps to the path."""

@@ -11,7 +11,7 @@ import numpy as np
 from olp.compensation.digits import POW10
 from olp.compensation.point_writer import PointWriter
 from olp.compensation.rows import Rows
-from olp.compensation.target_arcs import SHARE, pieces_of, stated
+from olp.compensation.target_arcs import SHARE, pieces_of, stated, stepped
 from olp.compensation.writer import Task
 from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import ProgramError
@@ -256,12 +256,7 @@ class TargetWriter(PointWriter):
             first, behind = np.searchsorted(rows.move, (arc.first, arc.last + 1)).tolist()
             line, middle = int(self.path.line[arc.last]), arc.middle - arc.first
             if rows.take_up[first:behind].any():
-                raise ProgramError(
-                    "an axis turns round on this arc, and its backlash is taken up by a step, which an arc "
-                    "cannot have; post straight moves",
-                    line=line,
-                    code="OLP561",
-                )
+                raise stepped(line)
             # the last row of each chord
             ends = np.searchsorted(rows.move, np.arange(arc.first, arc.last + 1), "right") - 1
             command = self.plan.command_mm[rows.first + np.append(first - 1, ends)]

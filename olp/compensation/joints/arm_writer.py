@@ -14,7 +14,7 @@ from olp.compensation.joints.arm_path import ArmPath
 from olp.compensation.joints.planning import JointLimits, JointPlan
 from olp.compensation.joints.writer import WrittenJoints
 from olp.compensation.tally import Tally
-from olp.compensation.target_arcs import SHARE, pieces_of, stated
+from olp.compensation.target_arcs import SHARE, pieces_of, stated, stepped
 from olp.core.arrays import Array, Index
 from olp.core.errors import ProgramError
 from olp.core.machine import ZERO, Vector
@@ -145,12 +145,7 @@ class _Writer:
             line, middle = int(self.path.line[arc.last]), arc.middle - arc.first
             side = plan.side[first - 1 : behind]
             if behind - first != arc.last - arc.first + 1 or (side != side[0]).any():
-                raise ProgramError(
-                    "an axis turns round on this arc, and its backlash is taken up by a step, which an arc "
-                    "cannot have; post straight moves",
-                    line=line,
-                    code="OLP561",
-                )
+                raise stepped(line)
             k = int(np.searchsorted(rows, first))
             points, turned_ = np.array(places[k - 1 : k + behind - first]), turns[k - 1 : k + behind - first]
             bent = Bent(

@@ -131,3 +131,31 @@ class RobotDialect(StatementDialect):
         are declared beside those of the text. A number that the text leaves out has an empty span, and gets a
         text of its own here."""
         return edits
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InPlace(RobotDialect):
+    """A language whose moves state their targets in place, so that a part is the statement of its move again,
+    with another value there."""
+
+    def value(self, program: Program, part: Part, use: Use) -> bytes:
+        """What states the target of a move with other numbers, and the orientation at the end of a part."""
+        raise NotImplementedError
+
+    def again(
+        self, program: Program, move: int, use: Use, edits: list[Replacement], *, stop: bool
+    ) -> Replacement:
+        """The statement of a move with edits of its text, before the statement itself. It ends with a `stop`,
+        or is passed."""
+        raise NotImplementedError
+
+    def part(self, program: Program, move: int, use: Use, part: Part) -> list[Replacement]:
+        edits = [(*use.place, self.value(program, part, use))]
+        return [self.again(program, move, use, edits, stop=part.stop)]
+
+    def arc(
+        self, program: Program, move: int, via: tuple[Use, Part], end: tuple[Use, Part] | None
+    ) -> list[Replacement]:
+        points = (via,) if end is None else (via, end)
+        edits = [(*use.place, self.value(program, part, use)) for use, part in points]
+        return edits if end is None else [self.again(program, move, end[0], edits, stop=False)]

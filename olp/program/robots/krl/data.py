@@ -9,7 +9,8 @@ from olp.core.errors import ProgramError
 from olp.core.paired import place_of
 from olp.core.patterns import pattern
 from olp.core.values import dataclass
-from olp.program.robots.krl.text import Aggregate, Line, aggregate
+from olp.program.robots.krl.text import Aggregate, aggregate
+from olp.program.robots.line import Line
 from olp.program.robots.poses import Pose, of_zyx
 from olp.program.robots.targets import Span
 

@@ -8,7 +8,7 @@ from olp.core.errors import ProgramError
 from olp.core.patterns import pattern
 from olp.core.values import dataclass
 from olp.program.program import Program
-from olp.program.robots.dialect import Replacement, RobotDialect
+from olp.program.robots.dialect import InPlace, Replacement
 from olp.program.robots.krl import postures
 from olp.program.robots.krl.data import is_declaration
 from olp.program.robots.krl.reader import read
@@ -31,7 +31,7 @@ _PASSED = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Krl(RobotDialect):
+class Krl(InPlace):
     """KRL programs."""
 
     def stamped(self, program: Program, stamp: bytes) -> Replacement:
@@ -39,27 +39,13 @@ class Krl(RobotDialect):
         assert match is not None
         return match.end(), match.end(), stamp + program.eol(1)
 
-    def part(self, program: Program, move: int, use: Use, part: Part) -> list[Replacement]:
+    def again(
+        self, program: Program, move: int, use: Use, edits: list[Replacement], *, stop: bool
+    ) -> Replacement:
         word = _WORD.match(program.data, use.statement[0])
         assert word is not None
-        edits = [(*use.place, self._value(program, part, use))]
-        edits += self._unzoned(program, use)
-        close = b"" if part.stop else b" " + _PASSED[word[0].upper()]
-        return [self.parted(program, move, use, edits, close)]
-
-    def arc(
-        self, program: Program, move: int, via: tuple[Use, Part], end: tuple[Use, Part] | None
-    ) -> list[Replacement]:
-        use, part = via
-        first = (*use.place, self._value(program, part, use))
-        if end is None:
-            return [first]
-        use, part = end
-        word = _WORD.match(program.data, use.statement[0])
-        assert word is not None
-        edits = [first, (*use.place, self._value(program, part, use))]
-        edits += self._unzoned(program, use)
-        return [self.parted(program, move, use, edits, b" " + _PASSED[word[0].upper()])]
+        close = b"" if stop else b" " + _PASSED[word[0].upper()]
+        return self.parted(program, move, use, [*edits, *self._unzoned(program, use)], close)
 
     def clone(self, program: Program, target: Target, name: str, text: bytes) -> Replacement:
         data, (begin, end) = program.data, target.declaration
@@ -85,8 +71,7 @@ class Krl(RobotDialect):
         place = begin + len(program.data[begin : use.zone[0]].rstrip())
         return [(place, use.zone[1], b"")]
 
-    @staticmethod
-    def _value(program: Program, part: Part, use: Use) -> bytes:
+    def value(self, program: Program, part: Part, use: Use) -> bytes:
         """The position of a move with other numbers, and the orientation at the end of a part."""
         assert program.targets is not None
         target = program.targets.targets[use.target]

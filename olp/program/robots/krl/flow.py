@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from olp.core.patterns import pattern
 from olp.core.values import dataclass
 from olp.program.robots.krl.table import STILL
-from olp.program.robots.krl.text import Line
+from olp.program.robots.line import Line
 
 _ROUTINE = pattern(rb"(?i)(?:GLOBAL\s+)?DEF(?:FCT\s+\w+(?:\s*\[[^\]]*\])?)?\s+(\w+)\s*\(")
 _CALL = pattern(rb"(?i)(?<![#$.\w])([A-Z]\w*)\s*\(")

@@ -16,8 +16,9 @@ from olp.program.robots.frames import Located
 from olp.program.robots.krl import flow
 from olp.program.robots.krl.active import Active, State
 from olp.program.robots.krl.data import Declared, assigned, is_declaration, key_of, pose_of
-from olp.program.robots.krl.text import Aggregate, Line, lines, parts
+from olp.program.robots.krl.text import Aggregate, lines, parts
 from olp.program.robots.krl.turning import Turning
+from olp.program.robots.line import Line
 from olp.program.robots.moves import NAN, RobotMoves, not_read, take_all
 from olp.program.robots.poses import Pose, multiplied, rotated
 from olp.program.robots.targets import NOWHERE, Span, Use

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from olp.core.patterns import pattern
 from olp.core.spool import Text
 from olp.core.values import dataclass
+from olp.program.robots.line import Line
 from olp.program.robots.targets import Span
 from olp.program.text.line_ends import split
 from olp.program.text.numbers import LARGEST
@@ -29,20 +30,6 @@ _USUAL = pattern(
 _PART = pattern(rb"\{[^{}]*\}|[^{}:]+")
 #: Bases of bit strings by their letters.
 _BASES = {"B": 2, "H": 16}
-
-
-@dataclass(frozen=True, slots=True)
-class Line:
-    """A line that says something: its number, its first byte that is not blank, and its `text` without blanks
-    and comments around it."""
-
-    line: int
-    begin: int
-    text: bytes
-
-    @property
-    def end(self) -> int:
-        return self.begin + len(self.text)
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from olp.core.patterns import pattern
-from olp.program.robots.krl.text import Line
+from olp.program.robots.line import Line
 from olp.program.robots.moves import not_read
 
 _SET = pattern(rb"(?i)\$ORI_TYPE\s*=(?!=)\s*(.*)")

@@ -9,7 +9,7 @@ import numpy as np
 from olp.core.patterns import pattern
 from olp.core.values import dataclass
 from olp.program.program import Program
-from olp.program.robots.dialect import Replacement, RobotDialect
+from olp.program.robots.dialect import InPlace, Replacement
 from olp.program.robots.poses import Quaternion, between
 from olp.program.robots.rapid import postures
 from olp.program.robots.rapid.reader import read
@@ -28,7 +28,7 @@ _STOP = b"fine"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Rapid(RobotDialect):
+class Rapid(InPlace):
     """RAPID programs."""
 
     def stamped(self, program: Program, stamp: bytes) -> Replacement:
@@ -36,21 +36,11 @@ class Rapid(RobotDialect):
         place = 0 if match is None else match.end()
         return place, place, stamp + program.eol(1)
 
-    def part(self, program: Program, move: int, use: Use, part: Part) -> list[Replacement]:
-        edits = [(*use.place, self._value(program, part, use))]
-        edits.append((*use.zone, _STOP if part.stop else _PASSED))
-        return [self.parted(program, move, use, edits, b";")]
-
-    def arc(
-        self, program: Program, move: int, via: tuple[Use, Part], end: tuple[Use, Part] | None
-    ) -> list[Replacement]:
-        use, part = via
-        first = (*use.place, self._value(program, part, use))
-        if end is None:
-            return [first]
-        use, part = end
-        edits = [first, (*use.place, self._value(program, part, use)), (*use.zone, _PASSED)]
-        return [self.parted(program, move, use, edits, b";")]
+    def again(
+        self, program: Program, move: int, use: Use, edits: list[Replacement], *, stop: bool
+    ) -> Replacement:
+        edits = [*edits, (*use.zone, _STOP if stop else _PASSED)]
+        return self.parted(program, move, use, edits, b";")
 
     def clone(self, program: Program, target: Target, name: str, text: bytes) -> Replacement:
         data = program.data
@@ -68,8 +58,7 @@ class Rapid(RobotDialect):
         against = sum(a * b for a, b in zip(turn, stated, strict=True)) < 0.0
         return tuple(-value for value in turn) if against else turn
 
-    @staticmethod
-    def _value(program: Program, part: Part, use: Use) -> bytes:
+    def value(self, program: Program, part: Part, use: Use) -> bytes:
         """The target of a move with other numbers, and the orientation at the end of a part."""
         assert program.targets is not None
         target = program.targets.targets[use.target]

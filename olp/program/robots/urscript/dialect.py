@@ -8,7 +8,7 @@ from math import degrees
 from olp.core.patterns import pattern
 from olp.core.values import dataclass
 from olp.program.program import Program
-from olp.program.robots.dialect import Replacement, RobotDialect
+from olp.program.robots.dialect import InPlace, Replacement
 from olp.program.robots.poses import Quaternion, between, vector_of
 from olp.program.robots.targets import NOWHERE, Part, Target, Use
 from olp.program.robots.urscript.reader import POSE, read
@@ -22,7 +22,7 @@ _PASSED = b"0.0005"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class UrScript(RobotDialect):
+class UrScript(InPlace):
     """URScript programs."""
 
     def stamped(self, program: Program, stamp: bytes) -> Replacement:
@@ -30,20 +30,10 @@ class UrScript(RobotDialect):
         place = 0 if match is None else match.end()
         return place, place, (b"" if match is None else b"  ") + stamp + program.eol(1)
 
-    def part(self, program: Program, move: int, use: Use, part: Part) -> list[Replacement]:
-        edits = [(*use.place, self._value(program, part, use))]
-        return [self.parted(program, move, use, [*edits, self._blend(program, use, stop=part.stop)])]
-
-    def arc(
-        self, program: Program, move: int, via: tuple[Use, Part], end: tuple[Use, Part] | None
-    ) -> list[Replacement]:
-        use, part = via
-        first = (*use.place, self._value(program, part, use))
-        if end is None:
-            return [first]
-        use, part = end
-        edits = [first, (*use.place, self._value(program, part, use))]
-        return [self.parted(program, move, use, [*edits, self._blend(program, use, stop=False)])]
+    def again(
+        self, program: Program, move: int, use: Use, edits: list[Replacement], *, stop: bool
+    ) -> Replacement:
+        return self.parted(program, move, use, [*edits, self._blend(program, use, stop=stop)])
 
     @staticmethod
     def _blend(program: Program, use: Use, *, stop: bool) -> Replacement:
@@ -65,8 +55,7 @@ class UrScript(RobotDialect):
         x, y, z = stated
         return vector_of(turn, (x, y, z))
 
-    @staticmethod
-    def _value(program: Program, part: Part, use: Use) -> bytes:
+    def value(self, program: Program, part: Part, use: Use) -> bytes:
         """The pose of a move with other numbers, and the orientation at the end of a part."""
         assert program.targets is not None
         target = program.targets.targets[use.target]

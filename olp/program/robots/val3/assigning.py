@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from olp.core.patterns import pattern
-from olp.program.robots.val3.code import Line
+from olp.program.robots.line import Line
 from olp.program.robots.val3.data import WORDS, Slot
 from olp.program.robots.val3.state import Scope, State
 from olp.program.robots.val3.values import Thing, words_of

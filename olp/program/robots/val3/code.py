@@ -7,6 +7,7 @@ import re
 from olp.core.errors import ProgramError
 from olp.core.patterns import pattern
 from olp.core.values import dataclass
+from olp.program.robots.line import Line
 from olp.program.robots.val3.xml import Element, Lines
 from olp.program.text.line_ends import LINE_END
 
@@ -22,20 +23,6 @@ _CLOSES = {"endif": "if", "endwhile": "while", "endfor": "for", "endswitch": "sw
 _LOOPS = frozenset(("while", "for", "do"))
 #: Blocks are nested so deep at most.
 _DEEPEST = 64
-
-
-@dataclass(frozen=True, slots=True)
-class Line:
-    """A statement: its line, its first byte, and its `text`, without blanks and comments around it and what
-    its strings say."""
-
-    line: int
-    begin: int
-    text: bytes
-
-    @property
-    def end(self) -> int:
-        return self.begin + len(self.text)
 
 
 @dataclass(slots=True, eq=False)

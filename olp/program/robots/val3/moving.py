@@ -8,10 +8,11 @@ from dataclasses import replace
 from olp.core.errors import ProgramError
 from olp.core.patterns import pattern
 from olp.core.values import dataclass
+from olp.program.robots.line import Line
 from olp.program.robots.moves import NAN, RobotMoves
 from olp.program.robots.poses import NO_TURN, Quaternion, inverted, multiplied, rotated
 from olp.program.robots.targets import NOWHERE, Span, Use
-from olp.program.robots.val3.code import Line, Routine, lines_in
+from olp.program.robots.val3.code import Routine, lines_in
 from olp.program.robots.val3.data import TRANSFORM, WORDS, Slot
 from olp.program.robots.val3.places import Places
 from olp.program.robots.val3.reach import Reach

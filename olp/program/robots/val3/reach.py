@@ -7,7 +7,8 @@ from collections.abc import Iterable
 
 from olp.core.patterns import pattern
 from olp.core.projects import place_of
-from olp.program.robots.val3.code import Line, Routine, lines_in
+from olp.program.robots.line import Line
+from olp.program.robots.val3.code import Routine, lines_in
 from olp.program.robots.val3.files import Application
 from olp.program.robots.val3.table import STILL
 from olp.program.robots.val3.values import REFERENCE, arguments

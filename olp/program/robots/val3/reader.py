@@ -14,10 +14,11 @@ from olp.core.patterns import pattern
 from olp.core.projects import parts, place_of
 from olp.program.dialect import Dialect, Options
 from olp.program.program import Program
+from olp.program.robots.line import Line
 from olp.program.robots.moves import RobotMoves, not_read
 from olp.program.robots.val3 import table
 from olp.program.robots.val3.assigning import assign, is_assignment
-from olp.program.robots.val3.code import Block, Line, Node, Routine, lines_in, word_of
+from olp.program.robots.val3.code import Block, Node, Routine, lines_in, word_of
 from olp.program.robots.val3.files import Application, application
 from olp.program.robots.val3.moving import Moving
 from olp.program.robots.val3.places import Places
