@@ -110,7 +110,9 @@ def command(program: str | None, machine: str | None, job: str | None, **words: 
         try:
             result = correct.run(call.session, call.source, options, show)
             if outputs.report_file is not None:
-                correct.with_time(call.session, call.source, result, options, show)
+                from olp.workflows.correct_time import with_time
+
+                with_time(call.session, call.source, result, options, show)
             written: dict[Path, Content] = {Path(name): result.text for name in files_of(outputs.output)}
             if outputs.review_file is not None:
                 written[Path(outputs.review_file)] = _review(call, result, options, outputs, show)

@@ -85,12 +85,12 @@ def write_files(
     changed it meanwhile.
     """
     inputs = list(inputs)
+    many = [Path(source) for source in inputs if projects.is_one_of_many(Path(source))]
     written: dict[Path, Content] = {}
     for target, whole in files.items():
         own = _divided(target, whole)
         written |= own
         # the files that were read with a program are inputs, too
-        many = [Path(source) for source in inputs if projects.is_one_of_many(Path(source))]
         inputs += [source.with_name(part.name) for source in many for part in own if part != target]
     files = written
     check_targets(files, inputs, force=force)

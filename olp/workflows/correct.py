@@ -18,7 +18,7 @@ from olp.compensation.tally import Tally
 from olp.compensation.writer import Task
 from olp.compensation.writing import write
 from olp.core.arrays import Array, Index, read_only
-from olp.core.errors import AlreadyCorrected, OlpError, ProgramError, UsageError
+from olp.core.errors import AlreadyCorrected, ProgramError, UsageError
 from olp.core.machine import Setup
 from olp.core.progress import Progress, part, silent
 from olp.core.spool import Spool, Text, whole
@@ -52,10 +52,6 @@ from olp.workflows.shown import Judged
 
 if TYPE_CHECKING:
     from olp.uncertainty.spread import Confidence
-
-
-#: Waypoints of a program whose speeds are optimised along dense curves when its time is planned.
-MOST_OPTIMISED = 20_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -188,40 +184,10 @@ def run(
         done = corrected(session.sources, program, loaded, options, progress or silent)
     result = Correction.of(done, session.inputs())
     if options.times:
-        result.report["time"] = _times(session, program, result, options, progress)
+        from olp.workflows.correct_time import times
+
+        result.report["time"] = times(session, program, result, options, progress)
     return result
-
-
-def with_time(
-    session: Session, program: Source, result: Correction, options: CorrectOptions, tell: Progress | None
-) -> None:
-    """State in the report how long both programs take, and what the correction adds as a share; or why that
-    is not known. Programs of more than `MOST_OPTIMISED` waypoints are planned
-    without optimised speeds."""
-    if "time" not in result.report:
-        try:
-            result.report["time"] = _times(session, program, result, options, tell)
-        except OlpError as error:
-            result.report["time"] = {"unknown": str(error)}
-
-
-def _times(
-    session: Session, program: Source, result: Correction, options: CorrectOptions, tell: Progress | None
-) -> dict[str, Any]:
-    from olp.workflows.retime import RetimeOptions, durations
-
-    asked = RetimeOptions(
-        flatten=options.flatten, expand_cycles=options.expand_cycles,
-        peck_clearance_mm=options.peck_clearance_mm,
-    )  # fmt: skip
-    texts = [program.holding(data) for data in (result.nominal, result.plain)]
-    (nominal, corrected), optimised = durations(session, texts, asked, MOST_OPTIMISED, tell or silent)
-    return {
-        "nominal_s": nominal,
-        "corrected_s": corrected,
-        "share": corrected / nominal - 1.0 if nominal else 0.0,
-        "optimised": optimised,
-    }
 
 
 def corrected(

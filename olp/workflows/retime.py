@@ -380,11 +380,10 @@ def durations(
     cases = [_case(session, program, options) for program in programs]
     limits = axis_limits(session.setup.machine)
     short = max(sum(map(len, case.legs)) for case in cases) <= most
-    every = (leg for case in cases for leg in case.legs)
     if short:
         return [planned(case, limits, tell).duration_s for case in cases], True
-    total = iter([plan_route(leg, limits, tell, optimise=False).duration_s for leg in every])
-    return [sum(next(total) for _ in case.legs) for case in cases], False
+    plans = [[plan_route(leg, limits, tell, optimise=False) for leg in case.legs] for case in cases]
+    return [sum(plan.duration_s for plan in own) for own in plans], False
 
 
 def _control(session: Session, options: RetimeOptions) -> tuple[Control | None, Points | None]:

@@ -157,7 +157,7 @@ def test_a_correction_states_what_it_costs_in_time(tmp_path: Path) -> None:
 def test_a_long_program_is_planned_more_simply_and_one_without_limits_says_why(
     job: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("olp.workflows.correct.MOST_OPTIMISED", 3)
+    monkeypatch.setattr("olp.workflows.correct_time.MOST_OPTIMISED", 3)
     words = (
         "correct",
         program(tmp_path),
