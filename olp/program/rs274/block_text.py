@@ -18,6 +18,10 @@ PLAIN = b"\t\n" + bytes(range(0x20, 0x7F))
 #: Control characters but tab and those of line ends.
 CONTROL = pattern(rb"[\x00-\x08\x0b\x0c\x0e-\x1f]")
 _COMMENTS = pattern(rb"\([^)]*\)?|;.*", re.DOTALL)
+#: A comment with brackets in it that closes right behind them, as in `(a (b))`: nothing is outside of it,
+#: whether the first `)` ends it or the last.
+CLOSED_TOGETHER = rb"\([^()\r\n]*(?:\([^()\r\n]*\)[ \t]*)+\)"
+_WHOLE = pattern(CLOSED_TOGETHER + b"|" + _COMMENTS.pattern, re.DOTALL)
 _NEWLINE = pattern(rb"\n")
 
 
@@ -29,6 +33,7 @@ class BlockText:
     - `skips_control`: control characters mean nothing, as blanks; else they are refused outside comments.
     - `cr_ends_line`: a lone carriage return ends a line.
     - `open_comments`: a comment that is not closed ends with its line. `nested_comments`: `(` may be in one.
+      `inner_brackets`: brackets may be in one and close right before it, as in `(a (b))`.
     - `brackets`: `(` opens a comment; else a line with one is refused.
     - `marks_in_pairs`: `%` is the first line and the last one, alone in its line, or not there.
     - `unread`: words that mean nothing for the path and have no letter, such as the number of a spindle; its
@@ -41,6 +46,7 @@ class BlockText:
     cr_ends_line: bool = False
     open_comments: bool = False
     nested_comments: bool = True
+    inner_brackets: bool = False
     brackets: bool = True
     marks_in_pairs: bool = False
     unread: re.Pattern[bytes] | None = None
@@ -79,8 +85,9 @@ class BlockText:
     def _comments(self, line: bytes) -> ProgramError | None:
         """Why the comments of a line are refused."""
         # the first `)` ends a comment, so a further one is outside of it
-        behind = b")" in _COMMENTS.sub(b"", line)
-        for comment in _COMMENTS.finditer(line):
+        comments = _WHOLE if self.inner_brackets else _COMMENTS
+        behind = b")" in comments.sub(b"", line)
+        for comment in comments.finditer(line):
             text = comment[0]
             shown = text[:_SHOWN].decode("latin-1").strip()
             if not text.startswith(b"("):

@@ -15,10 +15,11 @@ import numpy as np
 import numpy.typing as npt
 
 from olp.core.arrays import Index, Mask, distinct, is_in
+from olp.core.patterns import pattern
 from olp.core.progress import Progress, silent
 from olp.core.spool import Text, in_parts, matches, unload
 from olp.core.values import dataclass
-from olp.program.rs274.block_text import CONTROL, PLAIN, BlockText
+from olp.program.rs274.block_text import CLOSED_TOGETHER, CONTROL, PLAIN, BlockText
 from olp.program.text.line_ends import LONE_CR
 
 Bytes = npt.NDArray[np.uint8]
@@ -27,6 +28,7 @@ Bytes = npt.NDArray[np.uint8]
 CHUNK = 1 << 18
 
 _U = np.uint64
+_TOGETHER = pattern(CLOSED_TOGETHER)
 #: Bytes before and after the text, so that eight bytes can be read at a time at either end.
 _PAD = 8
 #: Masks of the high bytes of a number of eight bytes, by how many of them are kept.
@@ -233,6 +235,9 @@ def _drop_comments(text: Bytes, ends: Index, keep: Mask, rules: BlockText) -> tu
             if first >= last:
                 real.append(i)
                 last = to
+                if rules.inner_brackets and i + 1 < len(opening) and opening[i + 1] < to:
+                    together = _TOGETHER.match(text[first : line_end[i]].tobytes())
+                    stop[i] = last = to if together is None else first + together.end()
             elif text[opening[real[-1]]] == 40 and text[first] == 40:
                 inner.append(first)
         opening, stop = opening[real], stop[real]

@@ -82,6 +82,13 @@ REFUSALS: list[tuple[bytes, dict[str, Any], tuple[str, str] | None]] = [
     (b"X1 (a (b) c", {}, None),
     (b"(a) b) X1", {}, None),
     (b"(a (b) c)", {"nested_comments": False}, doubly_closed("(a (b) c)")),
+    (b"(a (b))", {}, doubly_closed("(a (b))")),
+    (b"X1 (a (b) (c)\t) Y2 (d (e))", {"inner_brackets": True}, None),
+    (b"(a (b)", {"inner_brackets": True}, None),
+    (b"(a (b) c)", {"inner_brackets": True}, doubly_closed("(a (b) c)")),
+    (b"(a (b) X2 (c))", {"inner_brackets": True}, doubly_closed("(a (b) X2 (c))")),
+    (b"(a (b)))", {"inner_brackets": True}, doubly_closed("(a (b)))")),
+    (b"(a (b)) (c", {"inner_brackets": True}, unclosed("(c")),
 ]  # fmt: skip
 
 

@@ -252,6 +252,15 @@ def test_lines_that_a_control_refuses_are_odd(text: str, rules: dict[str, object
     assert not set(odd) & set(chunk.line.tolist())
 
 
+def test_brackets_in_a_comment_may_close_right_before_it() -> None:
+    text = b"X1 (a (b)) Y2\n(a (b) (X9)\t) X3 (c (X8) )\n(a (b) X4)\n(d) Y5\n"
+    chunk = next(chunks(text, BlockText(inner_brackets=True)))
+    assert chunk.odd.tolist() == [2]
+    words = [(int(n), text[a:b]) for n, a, b in zip(chunk.line, chunk.start, chunk.end, strict=True)]
+    assert words == [(0, b"X1"), (0, b"Y2"), (1, b"X3"), (3, b"Y5")]
+    assert next(chunks(text, BlockText())).odd.tolist() == [0, 1, 2]
+
+
 @pytest.mark.parametrize("code", range(33))
 def test_control_characters_are_blanks_or_odd(code: int) -> None:
     """Tab, line feed, carriage return and space are blanks on any control."""

@@ -11,10 +11,11 @@ from collections.abc import Callable
 
 from olp.core.errors import ProgramError
 from olp.core.values import dataclass
+from olp.program.rs274.block_text import CLOSED_TOGETHER
 from olp.program.rs274.flatten.expressions import Expression, Parameters, Reader, plain_number
 from olp.program.rs274.flatten.language import Language
 
-_SKIP = re.compile(r"\([^)]*\)?|;.*|[\x00-\x20]+")
+_SKIP = re.compile(CLOSED_TOGETHER.decode() + r"|\([^)]*\)?|;.*|[\x00-\x20]+")
 _LETTER = re.compile(r",?[a-z@^$]")
 _LITERAL = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)")
 _PLAIN_END = re.compile(r"[a-z@^$,]|$|#")

@@ -203,6 +203,9 @@ class Walk(Tasks):
             self._files[label] = Unit(data, self.main.profile, name)
         unit = self._files[label]
         start = unit.definition(label, keyword)
+        if start is None and self.language.macro_b and not unit.has_programs:
+            # the control numbers a program without an O word as it is loaded
+            return unit, -1
         if start is None:
             raise ProgramError(f"the file of subprogram {label} does not define it", code="OLP542")
         return unit, start

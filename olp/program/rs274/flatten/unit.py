@@ -79,6 +79,11 @@ class Unit:
                 self._definitions.setdefault((flow.label, flow.keyword), i)
         return self._definitions.get((label, keyword))
 
+    @property
+    def has_programs(self) -> bool:
+        """Whether a line has the number of a program."""
+        return any(flow.keyword == "program" for _, flow in self.flows())
+
     def following(self, index: int, label: str, keywords: frozenset[str]) -> int:
         """Index of the next statement with this label, in the same subprogram; ProgramError if none."""
         key = (index, label, keywords)

@@ -22,6 +22,7 @@ from olp.core.budget import Budget
 from olp.core.errors import ProgramError
 from olp.core.machine import Setup
 from olp.program.origin import Origin, Unrolled, Within
+from olp.program.rs274.block_text import CLOSED_TOGETHER
 from olp.program.rs274.codes import ABSOLUTE, INCREMENTAL, SHIFTED_BORES, SPLINES
 from olp.program.rs274.cycles import Stroke, stroke_budget
 from olp.program.rs274.flatten import radius_angle
@@ -39,7 +40,7 @@ from olp.program.rs274.flatten.values import Variables
 from olp.program.rs274.flatten.written import number_text, stroke_blocks
 from olp.program.rs274.profiles.base import Profile
 
-_COMMENT = re.compile(rb"\([^)]*\)")
+_COMMENT = re.compile(CLOSED_TOGETHER + rb"|\([^)]*\)")
 _ENDS = frozenset({2, 30})
 #: Cycles for which the control turns the spindle in step, or stops it at an angle.
 _BY_CONTROL = SHIFTED_BORES | {740, 840}

@@ -48,7 +48,7 @@ ISO = Profile(
     lengths_along_z=True,
     numbers_hold=True,
     zero_ends_length=True,
-    text=BlockText(),
+    text=BlockText(inner_brackets=True),
     # `:1234` is another way to write the number of a program
     inert=pattern(rb"[ \t]*:[ \t]*\d+[ \t]*(?:\([^)]*\)[ \t]*)?"),
     cycles=ISO_CYCLES,

@@ -57,7 +57,7 @@ DIALECT = Profile(
     numbers_hold=True,
     offset_words={590: "P"},
     offsets_alone=frozenset({590}),
-    text=BlockText(),
+    text=BlockText(inner_brackets=True),
     cycles=CycleRules(
         rises_first=True, feeds_home=True, taps_in_any_plane=True, taps_by_control=True,
         peck_by_parameter=True, repeat_words="L", stores=False, dwells=frozenset({820, 860, 890}),

@@ -157,6 +157,17 @@ def test_a_subprogram_is_searched_near_its_call_then_in_the_program_then_in_its_
     )  # fmt: skip
 
 
+@pytest.mark.parametrize("call", ["M98 P7 L2", "G65 P7 L2"])
+def test_a_file_without_a_program_number_is_the_program_of_its_name(call: str) -> None:
+    def beside(name: str) -> tuple[str, bytes]:
+        return f"{name}.nc", files[name]
+
+    files = {"7": b"(a (b))\n#9=3.\nIF[#9LT0]GOTO5\nX#9\nN5 M99\nX4.\n", "8": b"O7\nX1.\nM99\n"}
+    assert fanuc(f"O1\n{call}\nM30\n", subprograms=beside) == "O1\n" + 2 * "(a (b))\nX3.\n" + "M30\n"
+    # another number in the file is that of another program
+    assert refused("O1\nM98 P8\nM30\n", "fanuc", subprograms=beside)[1].endswith("8 does not define it")
+
+
 def test_the_origin_of_blocks_counts_through_the_files() -> None:
     def beside(name: str) -> tuple[str, bytes]:
         return f"folder/{name}.ngc", b"\no<%s> sub\n\nX1\no<%s> endsub\n" % (name.encode(), name.encode())
