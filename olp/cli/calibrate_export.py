@@ -103,7 +103,7 @@ def command(
 
 def _put(report: dict[str, Any], as_json: bool) -> None:
     from olp.reports.report import table, to_json
-    from olp.workflows.calibrate_export import residual_rows, turns
+    from olp.workflows.calibrate_export import parts_rows, residual_rows, turns
 
     if as_json:
         put(to_json(report))
@@ -117,6 +117,8 @@ def _put(report: dict[str, Any], as_json: bool) -> None:
     over = f"{box['points']} points over the box, {len(box['tools_mm'])} tool(s)"
     lines = [f"{over}; in frame: rms after a best-fit frame"]
     lines += table(header, residual_rows(report))
+    if rows := parts_rows(report):
+        lines += table(["left of each kind by itself", "rms um", "max um", "rms urad", "max urad"], rows)
     if report.get("program", {}).get("refused"):
         lines.append(f"olp correct refuses the program: {report['program']['refused']}")
     for key, form in report.get("formats", {}).items():

@@ -15,7 +15,8 @@ def command(as_json: bool) -> None:
     from olp.files.control_code.base import CodeFormat
     from olp.files.control_code.registry import CODE
     from olp.files.control_tables.registry import FORMATS
-    from olp.files.kinematics.tables import TABLES, KinematicTable
+    from olp.files.kinematics.control_kinematics import KinematicTable
+    from olp.files.kinematics.tables import TABLES
     from olp.reports.report import to_json
 
     if as_json:

@@ -41,9 +41,9 @@ from olp.findings.catalogue import Finding
 from olp.reports.report import number
 from olp.workflows import refusals
 from olp.workflows.calibrate_export_joints import (
+    compare_kinematics,
     given_joints,
     joint_export,
-    refuse_tables,
     table_export,
 )
 from olp.workflows.control_table import given_of
@@ -163,7 +163,9 @@ def compare_tables(
         date=date, accept=tuple(sorted(acceptable(accept))),
     )  # fmt: skip
     if calibration is None and (of_joints := given_joints(machine, job)) is not None:
-        refuse_tables(of_joints)
+        if program is not None:
+            raise UsageError("--program is for machines with three linear axes; leave it out")
+        return compare_kinematics(of_joints, job)
     source = _source(machine, job, calibration, chain)
     controls: dict[str, Control] = {}
     findings: dict[str, list[dict[str, object]]] = {}
@@ -328,6 +330,17 @@ def _along(
 
 def _figures(residuals: Mapping[str, Residual]) -> dict[str, Any]:
     return {name: residual.as_dict() for name, residual in residuals.items()}
+
+
+def parts_rows(report: Mapping[str, Any]) -> Sequence[tuple[str, ...]]:
+    """Rows of figures on which errors a table of a control's kinematics leaves: table and kind of errors, um
+    (rms, max) and urad (rms, max)."""
+    keys = ("rms_um", "max_um", "rms_urad", "max_urad")
+    return [
+        (f"{name}: {kind}", *(number(figures[key]) for key in keys))
+        for name, parts in report["box"].get("parts", {}).items()
+        for kind, figures in parts.items()
+    ]
 
 
 def turns(report: Mapping[str, Any]) -> bool:

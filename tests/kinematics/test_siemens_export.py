@@ -12,8 +12,9 @@ from cli.test_cli import run
 import olp
 from olp.calibration.control_tables.residuals import UNCOMPENSATED
 from olp.core.errors import ConfigError
+from olp.files.kinematics.control_kinematics import as_it_lies
 from olp.files.kinematics.load import load_joint_setup
-from olp.files.kinematics.tables import TABLES, as_it_lies
+from olp.files.kinematics.siemens_vectors import TABLES
 from olp.files.kinematics.trafo import machine_of_trafo
 from olp.kinematics.chain import Kinematics
 
@@ -22,13 +23,14 @@ CHAINS = {"P": "C A Y F X Z", "T": "F X Y Z C A", "M": "C F X Y Z B"}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("key", TABLES)
+@pytest.mark.parametrize("key", [table.key for table in TABLES])
 @pytest.mark.parametrize("kind", CHAINS)
 def test_what_is_read_back_is_where_the_axes_lie(kind: str, key: str, tmp_path: Path) -> None:
     machine = machine_file(tmp_path, CHAINS[kind], control="sinumerik")
     setup = load_joint_setup(machine, None, by_itself=True)
     lies = as_it_lies(setup.kinematics.structure, setup.kinematics.errors)
-    text = TABLES[key].write(lies)
+    table = next(table for table in TABLES if table.key == key)
+    text = table.enter(setup.kinematics.structure, setup.kinematics.errors).data
     assert (f'$TC_CARR23[1]="{kind}"' if key == "siemens-carr" else "$MC_TRAFO_TYPE_1=").encode() in text
     file = tmp_path / "vectors.ini"
     file.write_bytes(text)
@@ -71,7 +73,7 @@ def test_the_report_says_what_is_left() -> None:
     # a machine with nothing but errors that vectors hold is left without any
     assert 0.0 < after < 0.5 * before
     assert any("the zero of A is off by 0.002578 deg" in note for note in done.notes)
-    assert any("describe it once more" in note for note in done.notes)
+    assert any("describe the machine once more" in note for note in done.notes)
 
 
 def test_other_machines_are_refused(tmp_path: Path) -> None:

@@ -5,18 +5,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable
 
 import numpy as np
 
 from olp.core.errors import ConfigError
 from olp.core.machine import ZERO, Vector
+from olp.files.kinematics.control_kinematics import (
+    Entered,
+    KinematicTable,
+    as_it_lies,
+    turning,
+    zero_notes,
+)
 from olp.files.kinematics.families import back
 from olp.files.kinematics.siemens import DATA, NUMBERED, Vectors
-from olp.kinematics.structure import FRAME, Joint, Structure
-
-#: A linear axis is along its own within this.
-_ALONG = 1e-12
+from olp.kinematics.errors import MachineErrors
+from olp.kinematics.structure import Structure
 
 
 def swivel_data(structure: Structure) -> bytes:
@@ -59,62 +64,49 @@ def _number(value: float) -> str:
 
 def _vectors(structure: Structure) -> Vectors:
     """The vectors of a machine with three linear axes and one or two rotary ones."""
-    tables, heads = _turning(structure)
+    tables, heads = turning(structure, "vectors of a Sinumerik control")
     kind = {(0, 1): "T", (0, 2): "T", (1, 0): "P", (2, 0): "P", (1, 1): "M"}[len(tables), len(heads)]
     # the first one is nearer to the frame; of one of each it is the head
-    turning = [*heads, *tables] if kind == "M" else [*heads, *reversed(tables)]
-    first = np.array(turning[0].point_mm)
-    second = np.array(turning[1].point_mm) if len(turning) > 1 else first
+    axes = [*heads, *tables] if kind == "M" else [*heads, *reversed(tables)]
+    first = np.array(axes[0].point_mm)
+    second = np.array(axes[1].point_mm) if len(axes) > 1 else first
     lengths = {
         "T": {"I1": -first, "I2": first - second, "I3": second},
         "P": {"I2": first, "I3": second - first, "I4": -second},
         "M": {"I1": -first, "I2": first, "I3": second, "I4": -second},
     }[kind]
     vectors = {name: _triple(value) for name, value in lengths.items()}
-    for name, joint in zip(("V1", "V2"), turning, strict=False):
+    for name, joint in zip(("V1", "V2"), axes, strict=False):
         vectors[name] = back(joint.direction) if joint in tables else joint.direction
     vectors.setdefault("V2", ZERO)
-    names = (*(joint.name for joint in turning), "")[:2]
-    travels = (*(joint.travel for joint in turning), (0.0, 0.0))[:2]
+    names = (*(joint.name for joint in axes), "")[:2]
+    travels = (*(joint.travel for joint in axes), (0.0, 0.0))[:2]
     return Vectors(kind, vectors, (names[0], names[1]), (travels[0], travels[1]))
-
-
-def _turning(structure: Structure) -> tuple[list[Joint], list[Joint]]:
-    """The rotary axes before and behind the frame, in the order of the chain."""
-    problems = list(_problems(structure))
-    if problems:
-        raise ConfigError(f"vectors of a Sinumerik control cannot hold this machine: {'; '.join(problems)}")
-    frame = structure.chain.index(FRAME)
-    rotary = [
-        (k, structure.joints[name])
-        for k, name in enumerate(structure.chain)
-        if name != FRAME and structure.joints[name].kind == "rotary"
-    ]
-    return [j for k, j in rotary if k < frame], [j for k, j in rotary if k > frame]
-
-
-def _problems(structure: Structure) -> Iterator[str]:
-    if structure.platforms:
-        yield "it has a platform on legs"
-        return
-    linear = {name: joint for name, joint in structure.joints.items() if joint.kind == "linear"}
-    for name, joint in linear.items():
-        if name not in "XYZ" or abs(joint.direction["XYZ".index(name)] - 1.0) > _ALONG:
-            yield f"the linear axis {name} is not along X, Y or Z of the machine"
-    if sorted(linear) != list("XYZ") or not 1 <= len(structure.joints) - 3 <= 2:
-        yield "expected X, Y and Z with one or two rotary axes"
-    sides = ["".join(structure.joints[n].kind[0] for n in side) for side in _sides(structure)]
-    if "lr" in sides[0] or "rl" in sides[1]:
-        yield "a rotary axis carries a linear one; expected them at the workpiece and at the tool"
-    if any(structure.gauge.point_mm) or any(structure.gauge.angles_deg):
-        yield "its gauge frame is not the zero of the machine"
-
-
-def _sides(structure: Structure) -> tuple[list[str], list[str]]:
-    chain, frame = list(structure.chain), structure.chain.index(FRAME)
-    return chain[:frame], chain[frame + 1 :]
 
 
 def _triple(value: np.ndarray) -> Vector:
     x, y, z = value.tolist()
     return x, y, z
+
+
+def _entered(write: Callable[[Structure], bytes]) -> Callable[[Structure, MachineErrors], Entered]:
+    def enter(structure: Structure, errors: MachineErrors) -> Entered:
+        lies = as_it_lies(structure, errors)
+        return Entered(write(lies), lies, errors, zero_notes(structure, errors, "vector"))
+
+    return enter
+
+
+_HOLDS = "directions and centres of one or two rotary axes, as calibrated; no zeros, no linear axes"
+_STATUS = "manuals; read back by `olp init --trafo`"
+_AGAIN = "describe the machine once more (olp init --trafo {file}) and fit the calibration again"
+TABLES = (
+    KinematicTable(
+        "siemens-carr", "Siemens Sinumerik swivel data ($TC_CARR)", ".ini", _STATUS, _HOLDS,
+        _entered(swivel_data), _AGAIN,
+    ),
+    KinematicTable(
+        "siemens-trafo5", "Siemens Sinumerik five-axis transformation ($MC_TRAFO5)", ".ini", _STATUS, _HOLDS,
+        _entered(transformation), _AGAIN,
+    ),
+)  # fmt: skip
