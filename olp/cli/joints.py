@@ -98,6 +98,12 @@ def correct(program: str | None, machine: str | None, job: str | None, words: di
 
     options = options_of(JointOptions, words)
     done = correction_of(run, options)
+    if options.times or report_file is not None:
+        from olp.workflows.joints import correct_time
+
+        if options.times:
+            done.report["time"] = correct_time.times(run, done)
+        correct_time.with_time(run, done)
     result = JointCorrection.of(run, done)
     written: dict[Path, Content] = {Path(file): result.data for file in files_of(output)}
     written |= {Path(file): filed(result.report, file, words["date"]) for file in files_of(report_file)}

@@ -16,7 +16,7 @@ from olp.reports.document_parts import (
     subtitle_of,
 )
 from olp.reports.joints import WORST, axis_changes, verdict_of
-from olp.reports.report import CORRECTED, UNCORRECTED, Report, number
+from olp.reports.report import CORRECTED, UNCORRECTED, Report, number, time_text
 
 
 def correction(report: Report, version: str, date: datetime.date | None) -> Document:
@@ -59,6 +59,7 @@ def _applied(report: Report) -> Iterator[Block]:
         ("Moves", f"{moves['feed']} feed, {moves['rapid']} rapid, {moves['uncorrected']} left uncorrected"),
         ("Tool centre point control", f"{moves['with_tip_control']} moves"),
         ("Changes", ", ".join(f"{count} {key.replace('_', ' ')}" for key, count in written.items())),
+        ("Time", time_text(report)),
     ])  # fmt: skip
     yield Grid(["axis", "largest change"], axis_changes(report))
 

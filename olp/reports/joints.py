@@ -5,7 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from olp.reports.report import CORRECTED, UNCORRECTED, findings_text, number, pairs, sentences, table
+from olp.reports.report import (
+    CORRECTED,
+    UNCORRECTED,
+    findings_text,
+    number,
+    pairs,
+    sentences,
+    table,
+    time_lines,
+)
 
 Report = Mapping[str, Any]
 
@@ -31,6 +40,7 @@ def to_text(report: Report) -> str:
         _heads(report),
         _verdict(report),
         _deviation(report),
+        time_lines(report),
         _corrections(report),
         _worst(report),
         findings_text(report.get("findings") or ()),

@@ -57,7 +57,7 @@ def to_text(report: Report) -> str:
         _deviation(report),
         _budget(report),
         _moves(report),
-        _time(report),
+        time_lines(report),
         _sources(report),
         _worst(report),
         uncertainty_text(report),
@@ -160,7 +160,8 @@ def time_text(report: Report) -> str:
     return f"{way}: nominal program {nominal:.3f} s, corrected program {corrected:.3f} s ({share})"
 
 
-def _time(report: Report) -> Iterator[str]:
+def time_lines(report: Report) -> Iterator[str]:
+    """How long both programs take, in lines; none where that was not asked."""
     text = time_text(report)
     if text:
         yield from textwrap.wrap(f"Time, {text}", WIDTH, subsequent_indent="  ")

@@ -176,6 +176,34 @@ def test_limits_that_are_missing_are_named(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_what_a_correction_costs_in_time_is_that_of_both_texts(tmp_path: Path) -> None:
+    text = HEAD + b"G1 X20. A-20. C30. F900\nX-20.\nM30\n"
+    (tmp_path / "p.nc").write_bytes(text)
+    stated = olp.correct_joints(text, TRUNNION, times=True)
+    time = stated.report["time"]
+    assert time["nominal_s"] == pytest.approx(olp.retime_joints(text, TRUNNION).duration_s, rel=1e-9)
+    again = olp.retime_joints(stated.data, TRUNNION).duration_s
+    assert time["corrected_s"] == pytest.approx(again, rel=1e-9)
+    assert time["share"] == pytest.approx(again / time["nominal_s"] - 1.0) and time["optimised"]
+    plain = olp.correct_joints(text, TRUNNION)
+    assert "time" not in plain.report and plain.data == stated.data
+    report = tmp_path / "r.html"
+    call = ("correct", str(tmp_path / "p.nc"), "-m", str(TRUNNION), "-o", str(tmp_path / "o.nc"), "--force")
+    done = run(*call, "--report", str(report))
+    sentence = f"nominal program {time['nominal_s']:.3f} s, corrected program {again:.3f} s"
+    assert sentence in done.stdout and sentence in report.read_text("utf-8")
+    # a machine without limits of motion: the report says why it is not known
+    bare = tmp_path / "machine.toml"
+    bare.write_text(TRUNNION.read_text("utf-8").replace("jerk_deg_s3 = 6000.0\n", ""), "utf-8")
+    for name in ("calibration.toml", "c.csv"):
+        (tmp_path / name).write_bytes(TRUNNION.with_name(name).read_bytes())
+    call = ("correct", str(tmp_path / "p.nc"), "-m", str(bare), "-o", str(tmp_path / "o.nc"), "--force")
+    done = run(*call, "--report", str(report))
+    assert done.exit_code == 0 and "Time, not known: " in done.stdout and "axes.A.jerk_deg_s3" in done.stdout
+    assert run(*call, "--times").exit_code == 3
+
+
+@pytest.mark.slow
 def test_the_verb_writes_table_and_report(tmp_path: Path) -> None:
     job = str(FOLDER / "gantry-wrist" / "job.toml")
     out, report = tmp_path / "out.csv", tmp_path / "out.json"

@@ -40,12 +40,14 @@ from olp.workflows.shown import Shown
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointOptions(UnrollOptions):
     """The options of verbs that prove a correction on a machine with rotary joints: the numerical tolerances
-    of position and orientation, and the day of the run."""
+    of position and orientation, and the day of the run. With `times` a correction states how long both
+    programs take."""
 
     tolerance_um: float = 1.0
     tolerance_urad: float = 10.0
     outside_box: Outside = "refuse"
     date: datetime.date | None = None
+    times: bool = False
 
     def limits(self) -> JointLimits:
         return JointLimits(self.tolerance_um * MM_PER_UM, self.tolerance_urad * RAD_PER_URAD)
@@ -106,24 +108,32 @@ def correct_joints(
     expand_cycles: bool = False,
     outside_box: Literal["refuse", "hold"] = "refuse",
     date: datetime.date | None = None,
+    times: bool = False,
 ) -> JointCorrection:
     """Correct a program for a machine of any joints, and prove it: G-code for X, Y, Z with rotary axes, or a
     list of axis values of any machine.
 
     The corrected text is in the program's own dialect; only coordinate words differ, and words, blocks and
     rows are inserted. Moves are split where the tip or the tool would leave its tolerance, in um and urad.
+    With `times` the report states how long both programs take, as `retime_joints` plans them.
     Raises InputError (ProgramError with its line, ConfigError) and CannotCompute.
     """
     options = JointOptions(
         tolerance_um=tolerance_um, tolerance_urad=tolerance_urad, flatten=flatten,
         expand_cycles=expand_cycles, outside_box=outside_box, date=date,
+        times=times,
     )  # fmt: skip
     return corrected(JointRun.of(program, machine, job), options)
 
 
 def corrected(run: JointRun, options: JointOptions) -> JointCorrection:
     """As `correct_joints`, for a run that is loaded."""
-    return JointCorrection.of(run, correction_of(run, options))
+    done = correction_of(run, options)
+    if options.times:
+        from olp.workflows.joints.correct_time import times
+
+        done.report["time"] = times(run, done)
+    return JointCorrection.of(run, done)
 
 
 def correction_of(run: JointRun, options: JointOptions) -> ProvedJoints:

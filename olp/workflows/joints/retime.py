@@ -159,9 +159,10 @@ def retimed(run: JointRun, options: JointRetimeOptions, progress: Progress | Non
 
 
 def motion_of(
-    run: JointRun, path: JointPath, options: JointRetimeOptions, progress: Progress | None = None
-) -> JointRetiming:
-    """As `retime_joints`, for a path that was read."""
+    run: JointRun, path: JointPath, options: JointRetimeOptions, progress: Progress | None = None, *,
+    optimise: bool | None = None,
+) -> JointRetiming:  # fmt: skip
+    """As `retime_joints`, for a path that was read. `optimise` is that of `plan`."""
     tell = progress or silent
     structure, control = run.machine.structure, run.machine.control
     limits = limits_of(structure)
@@ -175,7 +176,7 @@ def motion_of(
             "command all axes first",
             file=run.program.name or None,
         )
-    stretches = tuple(_planned(path.motion, route, limits, tell) for route in routes)
+    stretches = tuple(_planned(path.motion, route, limits, optimise, tell) for route in routes)
     timed = np.unique(np.concatenate([one.route.line for one in stretches]))
     # the first row of a list is where the motion begins
     moving = np.isfinite(path.end).all(axis=1) & ~np.isfinite(path.start).all(axis=1)
@@ -192,13 +193,15 @@ def motion_of(
     return JointRetiming(structure, stretches, report)
 
 
-def _planned(motion: Motion, route: JointRoute, limits: AxisLimits, tell: Progress) -> _Stretch:
+def _planned(
+    motion: Motion, route: JointRoute, limits: AxisLimits, optimise: bool | None, tell: Progress
+) -> _Stretch:
     """The motion of a route, again with lower feeds where the tip would be faster than its own."""
     scaled = AxisLimits(
         limits.velocity * route.scale, limits.acceleration * route.scale, limits.jerk * route.scale
     )
     for left in reversed(range(_ROUNDS)):
-        found = plan(route.route, scaled, tell)
+        found = plan(route.route, scaled, tell, optimise=optimise)
         ratio, limit = _used(motion, route, found, scaled)
         factor = np.ones(len(route.line))
         np.maximum.at(factor, found.motion.line, ratio)
