@@ -133,6 +133,18 @@ def test_what_is_not_corrected_is_refused_with_its_line(
     assert (caught.value.code, caught.value.line) == (code, line)
 
 
+@pytest.mark.parametrize("block", ["G91 G28 C0", "G28 C0", "G91 G28 Z0 C0"])
+def test_a_rotary_axis_at_its_reference_position_is_not_known(tmp_path: Path, block: str) -> None:
+    text = b"G90 G54\nG0 X0 Y0 Z0 A0 C30\n" + block.encode() + b"\nG90 Z5\nG1 X10 F100\nM30\n"
+    machine = machine_file(tmp_path, "C A Y F X Z")
+    with pytest.raises(olp.ProgramError, match=" C has not been commanded") as caught:
+        olp.correct_joints(text, machine)
+    assert (caught.value.code, caught.value.line) == ("OLP524", 5)
+    again = olp.correct_joints(text.replace(b"G90 Z5", b"G90 G0 Z5 C30"), machine)
+    assert again.report["deviation"]["holds"]
+    assert block.encode() + b"\n" in again.data
+
+
 def test_a_feed_from_nowhere_is_refused_and_a_start_is_taken(tmp_path: Path) -> None:
     text = b"G90 G54\nG0 X0 Y0 Z0\nG1 X10 F100\nM30\n"
     machine = machine_file(tmp_path, "C A Y F X Z")

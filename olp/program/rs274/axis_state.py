@@ -68,16 +68,18 @@ _MAY_TURN = WORK_OFFSETS | FURTHER_OFFSETS | {MACHINE, WRITE_OFFSET}
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """What the axis words of a block mean after its events: `machine` coordinates (G53), or `home`, the axes
-    that G28/G30 send home after the intermediate point, and `home_mm`, where they stand then. The positions
-    of the axes `lost` are not known any more in the program, as it is turned otherwise."""
+    """What the axis words of a block mean after its events: `machine` coordinates (G53), or `home`, those of
+    X, Y and Z that G28/G30 send home after the intermediate point, and `home_mm`, where they stand then. The
+    positions of the axes `lost` are not known any more in the program, as it is turned otherwise."""
 
     machine: bool = False
-    home: tuple[int, ...] = ()
+    home: tuple[int, ...] | None = None
     home_mm: Place = UNKNOWN
     lost: tuple[int, ...] = ()
 
 
+#: Axes beside X, Y and Z, which G28 and G30 may send home alone.
+_FURTHER_AXES = frozenset("ABCUVW")
 #: That of a block whose axis words mean what they say everywhere.
 _AS_STATED = Effect()
 
@@ -387,7 +389,8 @@ class AxisState(OffsetState):
         elif code == self.profile.return_level:
             self._return_level(line, axis_words)
         elif code in HOMES:
-            home = tuple(i for i, _ in axis_words) or (0, 1, 2)
+            alone = _FURTHER_AXES.isdisjoint(by_letter)
+            home = tuple(i for i, _ in axis_words) or ((0, 1, 2) if alone else ())
             return replace(effect, home=home, home_mm=self._home(code, by_letter))
         elif code == MACHINE:
             return replace(effect, machine=True)

@@ -323,11 +323,11 @@ class _Reader:
                     moved, place = (0, 1, 2), UNKNOWN
             if moved or effect.lost:
                 self.special_blocks.control_move(number, deleted=deleted)
-            if moved and not effect.lost and not effect.home:
+            if moved and not effect.lost and effect.home is None:
                 self.special_blocks.stand(number, moved, place, deleted=deleted)
-            if here and (alone[upto] or effect.home or effect.machine):
+            if here and (alone[upto] or effect.home is not None or effect.machine):
                 self._alone(context, rows, upto, effect)
-            if effect.home:
+            if effect.home is not None:
                 state.forget(effect.home)
                 self.special_blocks.control_move(number, deleted=deleted)
                 if not moved:
@@ -376,7 +376,7 @@ class _Reader:
         self._assign(context, rows, stop)
         rows.resolved = stop
         line, frame = rows.blocks.line[row:stop], int(rows.frame[row])
-        if row in rows.runs and not effect.home and not effect.machine:
+        if row in rows.runs and effect.home is None and not effect.machine:
             self.cycle_blocks.run(context, rows.cycles, line, frame)
         else:
             self.special_blocks.run(context, int(line[0]), rows.blocks.slot[row : row + 1], frame, effect)

@@ -81,7 +81,11 @@ class RotaryWords:
         offset = np.where(machine[:, None], 0.0, offset_deg[path.frame])
         given = self.slot >= 0
         found = np.isfinite(found_deg)
-        lost = control[:, None] & (given | ~_stated_lines(program)[:, None]) & ~found
+        # G28 leaves the axes that its block names where they are not known, behind the moves of its words
+        named = np.zeros((int(path.line.max(initial=0)) + 1, len(self.scale)), bool)
+        row, column_of = np.nonzero(given)
+        named[path.line[row], column_of] = True
+        lost = control[:, None] & (named[path.line] | ~_stated_lines(program)[:, None]) & ~found
         steps = np.where(given & counting[:, None] & ~lost, self.value, 0.0)
         anchor = (given & ~counting[:, None]) | lost | found
         place = np.where(lost, np.nan, np.where(found, found_deg, self.value + offset))

@@ -289,7 +289,7 @@ class SpecialBlocks:
             flag |= Flag.PASS | Flag.MACHINE
             kept = state.profile.machine_moves_keep_length
             offset = np.array(frame.length_mm) if kept else np.zeros_like(offset)
-        elif effect.home:
+        elif effect.home is not None:
             flag |= Flag.PASS
         else:
             kind = Kind.PROBE

@@ -135,6 +135,17 @@ FLAGS: dict[str, list[tuple[str, Flag, tuple[float | None, float | None, float |
         ("RAPID", PASS | CONTROL, (101, None, None)),
     ],
     "G28": [("RAPID", PASS | CONTROL, (None, None, None))],
+    # another axis goes home alone
+    "G1 X1 F60\nG91 G28 B0\nX2": [
+        ("LINE", NONE, (101, 202, 303)),
+        ("RAPID", PASS | INCREMENTAL, (101, 202, 303)),
+        ("RAPID", PASS | CONTROL, (101, 202, 303)),
+        ("LINE", INCREMENTAL, (103, 202, 303)),
+    ],
+    "G30 Z0 C0": [
+        ("RAPID", PASS, (101, 202, 300)),
+        ("RAPID", PASS | CONTROL, (101, 202, None)),
+    ],
     "/G53 G0 X7": [("RAPID", PASS | MACHINE | DELETED, (7, 202, 303))],
     "G1 F60\nG53 X7 Z1": [("LINE", PASS | MACHINE, (7, 202, 1))],
     "G20\nG53 X2": [("RAPID", PASS | MACHINE, (50.8, 202, 303))],
