@@ -40,6 +40,13 @@ def test_a_program_that_is_read_is_read() -> None:
     assert survey.read_all(HEAD, SETUP, named("linuxcnc")).toolpath.line.tolist() == [2]
 
 
+@pytest.mark.parametrize("line", [b"POPEN", b"/N5 DPRNT[X*(A)*#5041[33]] ;a", b"pclos", b"BPRNT [ #1[3] ]"])
+def test_what_a_macro_prints_moves_nothing(line: bytes) -> None:
+    text = HEAD + line + b"\nX5.\n"
+    assert stated(text, "haas") == []
+    assert stated(text, "linuxcnc")[0][0] == 3
+
+
 def test_every_kind_is_listed_with_its_line() -> None:
     text = HEAD + (
         b"(a (b) c)\nG68 R30\nG1 X1,5\n#1=5\nM98 P1\nT77 M6\nG41 D1\nG0 G1 X1.\nX1. X2.\nG58 X3.\nG10 L1 P1\n"

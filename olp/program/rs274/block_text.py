@@ -22,6 +22,11 @@ _COMMENTS = pattern(rb"\([^)]*\)?|;.*", re.DOTALL)
 #: whether the first `)` ends it or the last.
 CLOSED_TOGETHER = rb"\([^()\r\n]*(?:\([^()\r\n]*\)[ \t]*)+\)"
 _WHOLE = pattern(CLOSED_TOGETHER + b"|" + _COMMENTS.pattern, re.DOTALL)
+#: Statements of Macro B that write to a file or a line of the control, with `/` and N.
+PRINTS = (
+    rb"[ \t]*(?:/\d?[ \t]*)?(?:[Nn][ \t]*(?P<n>\d+)[ \t]*)?"
+    rb"(?i:POPEN|PCLOS|[BD]PRNT[ \t]*\[[^\r\n]*\])[ \t]*(?:;[^\r\n]*)?"
+)
 _NEWLINE = pattern(rb"\n")
 
 

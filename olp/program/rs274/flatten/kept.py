@@ -146,6 +146,8 @@ def _restored(line: Line, source: bytes, raw: bytes, written: bytes, profile: Pr
     """What was written for a visit, with the expressions and the words that unrolling left out."""
     if raw == source:
         return written
+    if line.prints:
+        return source
     if line.flow is not None or line.opaque:
         raise _cannot("its flow is in the block that has to change; put it into a block of its own")
     if any(word.letter == "g" and round(10 * word.number) in SPLINES for word in line.words):

@@ -11,11 +11,12 @@ from collections.abc import Callable
 
 from olp.core.errors import ProgramError
 from olp.core.values import dataclass
-from olp.program.rs274.block_text import CLOSED_TOGETHER
+from olp.program.rs274.block_text import CLOSED_TOGETHER, PRINTS
 from olp.program.rs274.flatten.expressions import Expression, Parameters, Reader, plain_number
 from olp.program.rs274.flatten.language import Language
 
 _SKIP = re.compile(CLOSED_TOGETHER.decode() + r"|\([^)]*\)?|;.*|[\x00-\x20]+")
+_PRINTS = re.compile(PRINTS)
 _LETTER = re.compile(r",?[a-z@^$]")
 _LITERAL = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)")
 _PLAIN_END = re.compile(r"[a-z@^$,]|$|#")
@@ -74,7 +75,7 @@ class Flow:
 @dataclass(frozen=True, slots=True)
 class Line:
     """One source line; `number` counts from 1. `opaque` lines hold something that is not understood.
-    `label` is the number or name behind N of a user task."""
+    `label` is the number or name behind N of a user task. One that `prints` writes to a file."""
 
     number: int
     raw: bytes
@@ -82,6 +83,7 @@ class Line:
     percent: bool = False
     deleted: bool = False
     opaque: bool = False
+    prints: bool = False
     words: tuple[Word, ...] = ()
     assignments: tuple[Assignment, ...] = ()
     flow: Flow | None = None
@@ -98,6 +100,11 @@ def compile_line(line: bytes, number: int, language: Language) -> Line:
     """Compile one line with its end. Raises ProgramError (without a line) for a broken expression."""
     raw = line.rstrip(b"\r\n")
     eol = line[len(raw) :]
+    printed = _PRINTS.fullmatch(raw) if language.macro_b else None
+    if printed is not None:
+        start, end = printed.span("n")
+        n = (Word("n", float(printed["n"]), None, False, start - 1, start, end),) if start >= 0 else ()
+        return Line(number, raw, eol, prints=True, words=n)
     text, places, comments = compact(raw)
     if text.startswith("%"):
         return Line(number, raw, eol, percent=True)

@@ -40,6 +40,7 @@ from olp.program.rs274.flatten.values import Variables
 from olp.program.rs274.flatten.written import number_text, stroke_blocks
 from olp.program.rs274.profiles.base import Profile
 
+_INNER = bytes.maketrans(b"()", b"[]")
 _COMMENT = re.compile(CLOSED_TOGETHER + rb"|\([^)]*\)")
 _ENDS = frozenset({2, 30})
 #: Cycles for which the control turns the spindle in step, or stops it at an angle.
@@ -208,6 +209,9 @@ class _Flattener:
         self._units[frame.unit.key] = frame.unit
         seen = self._present in self._seen
         self._seen.add(self._present)
+        if line.prints:
+            self._put(line.raw if self.variables.of_control(line.raw) else _left_out(line.raw), line.eol)
+            return False
         if line.opaque:
             self._put(line.raw, line.eol)
             self.state.forget()
@@ -440,3 +444,8 @@ class _Flattener:
         mark = b"/" if line.deleted else b""
         for text in lines:
             self._put(mark + text.encode(), line.eol)
+
+
+def _left_out(raw: bytes) -> bytes:
+    """The comment in the place of a line that prints what plain blocks do not have."""
+    return b"(" + raw.strip().translate(_INNER) + b" is left out)"

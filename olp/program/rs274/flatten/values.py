@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 
 from olp.core.errors import ProgramError
 from olp.core.machine import Setup
+from olp.core.patterns import pattern
 from olp.program.rs274.codes import INVERSE_TIME, METRIC
 from olp.program.rs274.flatten.expressions import filled
 from olp.program.rs274.flatten.lines import Line
@@ -23,6 +24,7 @@ _NGC_LAST = 5602
 _DEBUG_SWITCH = 5599
 #: largest local variable of Macro B
 _MACRO_B_LOCAL = 33
+_NUMBERED = pattern(rb"#[ \t]*(\d+)")
 #: the present position of Z
 _PRESENT_Z = 5043
 #: common variables are below this
@@ -71,6 +73,13 @@ class Variables:
         #: those of the program itself
         self.locals: dict[int, float | None] = {i: v for i, v in self.given.items() if i <= most}
         self.names = {name: value for name, value in self.given_names.items() if not name.startswith("_")}
+
+    def of_control(self, raw: bytes) -> bool:
+        """Whether all variables of a line are the control's own, so that plain blocks have them too."""
+        numbers = [int(n) for n in _NUMBERED.findall(raw)]
+        return len(numbers) == raw.count(b"#") and not any(
+            n <= _MACRO_B_LOCAL or n in self.common for n in numbers
+        )
 
     def number(self, index: int) -> float | None:
         if self.state.profile.language.macro_b:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from olp.core.patterns import pattern
 from olp.program.contours.rules import ISO_CONTOURS
 from olp.program.rs274.block_rules import ISO_RULES
-from olp.program.rs274.block_text import BlockText
+from olp.program.rs274.block_text import PRINTS, BlockText
 from olp.program.rs274.cycle_rules import ISO_CYCLES
 from olp.program.rs274.entry import keep_blocks, read_blocks, unroll_blocks
 from olp.program.rs274.flatten.language import MACRO_B
@@ -50,7 +50,7 @@ ISO = Profile(
     zero_ends_length=True,
     text=BlockText(inner_brackets=True),
     # `:1234` is another way to write the number of a program
-    inert=pattern(rb"[ \t]*:[ \t]*\d+[ \t]*(?:\([^)]*\)[ \t]*)?"),
+    inert=pattern(rb"[ \t]*:[ \t]*\d+[ \t]*(?:\([^)]*\)[ \t]*)?|" + PRINTS),
     cycles=ISO_CYCLES,
     contours=ISO_CONTOURS,
     language=MACRO_B,

@@ -168,6 +168,27 @@ def test_a_file_without_a_program_number_is_the_program_of_its_name(call: str) -
     assert refused("O1\nM98 P8\nM30\n", "fanuc", subprograms=beside)[1].endswith("8 does not define it")
 
 
+PRINTED = [
+    ("DPRNT[DATE*(A):*#3011*#5041[33]]", "DPRNT[DATE*(A):*#3011*#5041[33]]"),
+    ("/2 N7 popen ; log", "/2 N7 popen ; log"),
+    ("BPRNT[#100[3]]", "BPRNT[#100[3]]"),
+    # what the program sets is not in plain blocks
+    ("N8 DPRNT[(X)#101[53]]", "(N8 DPRNT[[X]#101[53]] is left out)"),
+    ("DPRNT[#9[53]]", "(DPRNT[#9[53]] is left out)"),
+    ("DPRNT[#[99+1][53]]", "(DPRNT[#[99+1][53]] is left out)"),
+]
+
+
+@pytest.mark.parametrize(("line", "expected"), PRINTED)
+def test_what_is_printed_moves_nothing(line: str, expected: str) -> None:
+    source = "O1\n#101=5.\n{}\nX#101\nIF[#101GT9]GOTO7\nPCLOS\nM30\n"
+    assert fanuc(source.format(line)) == f"O1\n{expected}\nX5.\nPCLOS\nM30\n"
+
+
+def test_a_line_that_prints_may_be_jumped_to() -> None:
+    assert fanuc("O1\n#1=2\nGOTO7\nX1.\nN7 DPRNT[A]\nX#1\nM30\n") == "O1\nN7 DPRNT[A]\nX2.\nM30\n"
+
+
 def test_the_origin_of_blocks_counts_through_the_files() -> None:
     def beside(name: str) -> tuple[str, bytes]:
         return f"folder/{name}.ngc", b"\no<%s> sub\n\nX1\no<%s> endsub\n" % (name.encode(), name.encode())
