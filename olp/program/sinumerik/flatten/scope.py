@@ -85,16 +85,14 @@ class Scope(MutableMapping[str, Value]):
         return [self._kept(name, evaluate(part, self)) for part in _split(given[1])]
 
     def _kept(self, name: str, value: Value) -> Value:
-        """A value that a variable of its own type keeps. Raises ProgramError for one that it does not."""
+        """What a variable of its own type keeps of a value: an INT as ROUND( ) has it, of a BOOL whether it
+        is not 0 (type conversion in the manual for job planning)."""
+        if isinstance(value, bool | str):
+            return value
         kind = self._kinds.get(name.partition("[")[0], "")
-        number = 0.0 if isinstance(value, bool | str) else float(value)
-        if (kind == "INT" and number != round(number)) or (kind == "BOOL" and number not in (0.0, 1.0)):
-            way = "ROUND( )" if kind == "INT" else "TRUE or FALSE"
-            raise ProgramError(
-                f"{name} is {kind}, and gets {number:g}, which the control changes; write {way}, or DEF REAL",
-                code="OLP542",
-            )
-        return value
+        if kind == "INT":
+            return float(math.floor(value + 0.5))
+        return value != 0 if kind == "BOOL" else value
 
     def bind(self, parameters: str, given: list[str], caller: Scope) -> None:
         """Parameters of a subprogram: values by position, or their defaults."""
