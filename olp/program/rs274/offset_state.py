@@ -249,11 +249,12 @@ class OffsetState(State):
     def _write_offset(
         self, line: int, by_letter: dict[str, Word], axis_words: list[tuple[int, Word]], moves: int
     ) -> None:
-        from olp.program.rs274.tool_tables import check_tool, writes_tool
+        from olp.program.rs274.tool_tables import check_tool, words_of_tool
 
         kind = round(by_letter["L"].value) if "L" in by_letter else -1
-        if writes_tool(self, kind) and {"P", "R"} <= by_letter.keys():
-            check_tool(self, kind, self._integer(by_letter["P"], line), self.length_mm(by_letter["R"]), line)
+        stated = {a: self.length_mm(by_letter[a]) for a in words_of_tool(self, kind) if a in by_letter}
+        if stated and "P" in by_letter:
+            check_tool(self, kind, self._integer(by_letter["P"], line), stated, line)
             return
         if kind not in (2, STORES_POSITION):
             what = f"G10 L{kind}" if kind >= 0 else "G10 without L"

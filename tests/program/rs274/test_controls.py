@@ -77,7 +77,7 @@ READINGS: dict[str, tuple[str, dict[str, Outcome], Any]] = {
     "g10_tools": (
         "G90 G10 L10 P2 R20.\nG10 L11 P2 R0.\nG43 H2\nG0 X0. Y0. Z1.",
         {FANUC: (0, 0, 21), HAAS: (0, 0, 21), MAZAK: "G10 L10 writes tables of the control"},
-        "not",
+        {FANUC: frozenset(), HAAS: frozenset(), MAZAK: frozenset({10, 11})},
     ),
     "offset_words": (
         "G54 P2\nG0 X1. Y2. Z3.",

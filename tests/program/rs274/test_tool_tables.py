@@ -1,4 +1,4 @@
-"""G10 L10 to L13, beside the tools of the machine file."""
+"""G10 L10 to L13, and L1 of LinuxCNC, beside the tools of the machine file."""
 
 from __future__ import annotations
 
@@ -51,3 +51,25 @@ def test_what_the_file_says_may_be_written_and_nothing_else(
     with pytest.raises(ProgramError, match=why) as caught:
         read(text, load_setup(path), DIALECTS["fanuc"])
     assert (caught.value.code, caught.value.line) == (code, 3)
+
+
+@pytest.mark.parametrize(
+    ("block", "why"),
+    [
+        ("L1 P1 X0 Z80.25 R3.97", ""),  # with the wear, which is in the table there
+        ("G91 L1 P1 Z80.25", ""),
+        ("G20 L1 P1 Z3.1594 R.1563", ""),
+        ("L1 P1 Z80.2 X.5 R4", r"give X_mm, Z_mm, radius_mm in \[tools\.1\] as the program writes it$"),
+        ("L1 P2 Z50 R4", "give radius_mm in"),
+        ("L1 P7 Z0", r"writes lengths or the radius of tool 7, which is not defined; give \[tools\.7\]"),
+        ("L1 P1", "writes tables of the control"),
+        ("L10 P1 R80.25", "writes tables of the control"),
+    ],
+)
+def test_an_entry_of_linuxcnc(path: Path, block: str, why: str) -> None:
+    text = f"G21 G90 G54\nG0 X1. Y2. Z3.\nG10 {block}\nM2\n".encode()
+    if not why:
+        assert read(text, load_setup(path), DIALECTS["linuxcnc"])
+        return
+    with pytest.raises(ProgramError, match=why):
+        read(text, load_setup(path), DIALECTS["linuxcnc"])

@@ -82,8 +82,8 @@ class Profile(Dialect):
       100 mm/min all the same.
     - `g52_is_g92`: G52 writes the same offset as G92. `g10_offsets`: the largest P of G10 L2 and L20.
       `g10_adds`: in G91 G10 L2 adds to the offset; None is not known, and refused. `g10_stores`: G10 L20
-      stores the present position, else it writes the offset G54.1 P. `g10_tools`: G10 L10 to L13 write the
-      tables of tools. `g10_active`: P0 is the offset in force, else one that is added to all.
+      stores the present position, else it writes the offset G54.1 P. `g10_tools`: the L with which G10
+      writes the tables of tools. `g10_active`: P0 is the offset in force, else one that is added to all.
       `further_offsets` name the offsets that G10 L20 writes, with P; `first_further` is the code of P1,
       where 20 of them have codes of their own. `offset_words`: the letter of the number of a work offset
       beside a code, which the code may go without where it is in `offsets_alone`. `offset_names`: the name
@@ -161,7 +161,7 @@ class Profile(Dialect):
     g10_offsets: int = 6
     g10_adds: bool | None = False
     g10_stores: bool = True
-    g10_tools: bool = False
+    g10_tools: frozenset[int] = frozenset()
     g10_active: bool = False
     further_offsets: tuple[str, ...] = ("G54.1",)
     first_further: int = 0

@@ -39,7 +39,7 @@ DIALECT = replace(
         },
     },
     harmless_m=ISO.harmless_m | {10, 11, 29, 31, 33, 34, 35, 41, 42, 59, 69, 83, 84, 88, 89},
-    g10_tools=True,
+    g10_tools=frozenset({10, 11, 12, 13}),
     further_offsets=("G154", "G54.1"),
     first_further=110,
     tip_codes=frozenset({2340}),

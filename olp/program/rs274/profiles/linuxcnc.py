@@ -38,6 +38,7 @@ DIALECT = Profile(
     feed_before_unit=True,
     least_inverse_feed=0.1,
     m_with_motion=frozenset({62, 63, 67}),
+    g10_tools=frozenset({1}),
     text=BlockText(
         odd_bytes=pattern(rb"\x00|" + STRAY_CR.pattern),
         skips_control=False,
