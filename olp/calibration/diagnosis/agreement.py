@@ -43,17 +43,19 @@ _MOST = 4
 @dataclass(frozen=True, slots=True)
 class Tried:
     """Something that may be wrong with a source, its kind and in words, and its log odds (nats) against what
-    was read. `support` are its log odds against a source that says nothing: whether the others confirm it."""
+    was read. `support` are its log odds against a source that says nothing: whether the others confirm it.
+    What is `sought` may be named; the rest is excluded or not."""
 
     kind: str
     words: str
     log_odds: float
     support: float
+    sought: bool = True
 
     @property
     def beyond_doubt(self) -> bool:
         """Whether the readings name it."""
-        return self.log_odds > NAMED and self.support > _CONFIRMED
+        return self.sought and self.log_odds > NAMED and self.support > _CONFIRMED
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -224,7 +226,7 @@ def _agreements(fit: Fit, sources: list[_Source]) -> tuple[Agreement, ...]:
         misfit = Fitted(source.state.label, float(z @ z), float(len(z)))
         as_read = both[0].log_evidence(source) - both[1].log_evidence(source)
         off = misfit.failed and -as_read > NAMED
-        tries = tuple(_alternatives(fit, source, off=off))
+        tries = tuple(_alternatives(fit, source))
         # another component depends on other unknowns
         wider = np.union1d(columns, np.flatnonzero(sum(other.normal.H.any(axis=0) for _, other in tries)))
         if len(wider) > len(columns):
@@ -238,12 +240,11 @@ def _agreements(fit: Fit, sources: list[_Source]) -> tuple[Agreement, ...]:
     return tuple(found)
 
 
-def _alternatives(fit: Fit, source: _Source, *, off: bool) -> Iterator[tuple[Alternative, _Source]]:
-    """What may be wrong with a source, put right; without what cannot be at all. `off` says that it
-    contradicts all others."""
+def _alternatives(fit: Fit, source: _Source) -> Iterator[tuple[Alternative, _Source]]:
+    """What may be wrong with a source, put right; without what cannot be at all."""
     tables = fit.parameters.chain.partition("F")[0]
     for alternative in source.state.observation.alternatives():
-        if alternative.on_table not in tables or (alternative.where_off and not off):
+        if alternative.on_table not in tables:
             continue
         try:
             yield alternative, _as(fit, alternative)
@@ -278,7 +279,7 @@ def _tried(
         each = np.array([given.log_evidence(other) + more for given, more in scaled])
         values.append(float(each.max() + np.log(np.mean(np.exp(each - each.max())))))
     support = values[0] - values[1]
-    return Tried(one.kind, one.words, support - as_read, support)
+    return Tried(one.kind, one.words, support - as_read, support, off or not one.where_off)
 
 
 def _curve(fit: Fit, source: _Source) -> Index:

@@ -78,7 +78,7 @@ STILL = Advance(np.zeros(0))
 class Alternative:
     """What may be wrong with an observation: its `kind` in a word, in `words`, and the observation put right.
     `factor` is by how much its values are multiplied for that. It can be only where the axis `on_table`, if
-    it names one, carries the workpiece. Some are tried only `where_off`: where readings contradict all
+    it names one, carries the workpiece. Some are named only `where_off`: where readings contradict all
     others, whatever the cause."""
 
     kind: str

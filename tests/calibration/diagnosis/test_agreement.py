@@ -10,12 +10,13 @@ import pytest
 from cases.calibration import case, cloud, rays, residual_of
 from judge.simulated import OFFSETS
 
-from olp.calibration.diagnosis.agreement import Compared, compared
+from olp.calibration.diagnosis.agreement import Agreement, Compared, Tried, compared
 from olp.calibration.diagnosis.agreement_report import agreement_findings, agreement_rows
 from olp.calibration.estimator.adjustment import fit
 from olp.calibration.observations.lines import Line
 from olp.calibration.observations.measurements import Measurements
 from olp.core.errors import ConfigError
+from olp.errormodel.quality import Fitted
 from olp.workflows.calibrate_fit import fit_calibration
 
 #: file, factor on its values, part of the words that name the mistake, and machines whose readings tell it
@@ -97,8 +98,21 @@ def test_what_nothing_else_measures_is_said_to_be_unchecked() -> None:
     assert finding.code == "OLP812" and "exx.csv (EXX)" in finding.message
     with_points = {one.label: one.possible for one in found(106, "smooth", "p").sources}
     assert "sign" not in with_points["exx.csv"]
+    # an angle cannot be another one, where points tell; lever arms that are off by little never show
+    assert "columns" not in with_points["eax.csv"]
+    assert "place" in with_points["eyx.csv"]
     rows = {row["file"]: row for row in agreement_rows(outcome)}
     assert "sign" in rows["exx.csv"]["not_excluded"]
+
+
+def test_a_cause_that_is_not_sought_is_listed_and_never_named() -> None:
+    """As where another place explains a source a little better that agrees with all others."""
+    sought = Tried("place", "it was read at another place", 40.0, 40.0)
+    only_listed = dataclasses.replace(sought, sought=False)
+    for tried, named in ((sought, sought), (only_listed, None)):
+        one = Agreement("eyx.csv", "EYX", Fitted("eyx.csv", 8.0, 8.0), (tried,), 0.0)
+        assert one.named is named
+        assert one.possible == ("place",)
 
 
 @pytest.mark.slow
