@@ -19,8 +19,10 @@ from olp.cli.common import (
     exit_for,
     files_of,
     options_of,
+    plot_ending,
     put,
     refuse_early,
+    refuse_stream,
     refuse_twice,
     source,
     sources_of_call,
@@ -40,6 +42,10 @@ if TYPE_CHECKING:
 _ALWAYS = ("program", "programs", "nominal", "corrected", "machine", "job", "dialect", "flatten",
            "expand_cycles", "peck_clearance_mm", "output", "tolerance_um", "tolerance_urad", "outside_box",
            "date", "fail_on", "as_json", "quiet", "force", "step_mm")  # fmt: skip
+
+
+#: What `olp retime` takes beside these.
+RETIME = ("cycle_ms", "blend_mm", "report_file", "feed_override", "gains", "plot", "plot_span", "stretch")
 
 
 def on_joints(machine: str | None, job: str | None, also: Collection[str] = ()) -> bool:
@@ -203,9 +209,15 @@ def retime(program: str | None, machine: str | None, job: str | None, words: dic
             raise UsageError(
                 f"the trajectory {file!r} of a machine with rotary joints is a table; expected .csv"
             )
+    plot, span = words["plot"], words["plot_span"]
+    refuse_stream(plot=plot, report=report_file)
+    if plot is not None:
+        plot_ending(plot)
+    elif span is not None or words["stretch"] is not None:
+        raise UsageError("--plot-span and --stretch are for --plot; name a file with --plot")
     run = run_of(program, machine, job)
-    refuse_twice(files_of(output, report_file))
-    refuse_early(files_of(output, report_file), run.files, force=words["force"])
+    refuse_twice(files_of(output, report_file, plot))
+    refuse_early(files_of(output, report_file, plot), run.files, force=words["force"])
 
     from olp.files.write import write_files
     from olp.reports.report import to_json
@@ -216,6 +228,9 @@ def retime(program: str | None, machine: str | None, job: str | None, words: dic
         cycle_s = words["cycle_ms"] * 1e-3
         written: dict[Path, Content] = {Path(file): result.to_csv(cycle_s) for file in files_of(output)}
         written |= {Path(file): to_json(result.report) for file in files_of(report_file)}
+        if plot is not None:
+            start, end = span or (0.0, None)
+            written |= result.plots(plot, stretch=words["stretch"], from_s=start, to_s=end)
         write_files(written, force=words["force"], inputs=run.files)
     if output == STREAM:
         put(result.to_csv(cycle_s))

@@ -125,7 +125,7 @@ def command(program: str | None, machine: str | None, job: str | None, **words: 
     """
     from olp.cli import joints
 
-    if joints.on_joints(machine, job, also=("cycle_ms", "blend_mm", "report_file")):
+    if joints.on_joints(machine, job, also=joints.RETIME):
         joints.retime(program, machine, job, words)
         return
     call, outputs = given(program, machine, job), options_of(_Outputs, words)

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from olp.reports.report import Report, pairs, sentences, table
-from olp.reports.retime import clock
+from olp.reports.retime import clock, gains_text
 
 
 def to_text(report: Report) -> str:
     """Plain text of at most 100 columns."""
-    sections = (_head(report), _limits(report), _lines(report), _notes(report))
+    sections = (_head(report), gains_text(report), _limits(report), _lines(report), _notes(report))
     return "\n\n".join("\n".join(lines) for lines in map(list, sections) if lines) + "\n"
 
 
@@ -20,11 +20,12 @@ def _head(report: Report) -> Iterator[str]:
     share = report["largest_share_of_limit"]
     kept = ", ".join(f"{name} {100.0 * part:.2f} %" for name, part in share.items())
     time = clock(float(report["duration_s"]))
-    stretches = len(report["stretches"])
+    stretches, override = len(report["stretches"]), float(report["feed_override"])
     yield from pairs(
         [
             ("Program", f"{report['program'] or 'bytes'}, {report['waypoints']} waypoints"),
             ("Machine", f"{machine['name']}, chain {machine['chain']}"),
+            ("Override", "" if override == 1.0 else f"{100.0 * override:.0f} % of the programmed feed"),
             ("Time", time + (f", {dwell:.2f} s of it dwells" if dwell else "")),
             ("Limits", f"used at most: {kept}"),
             ("Path", f"corners within {report['blend_mm']:g} mm where the program names no tolerance"),

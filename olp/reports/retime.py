@@ -30,7 +30,7 @@ _NAME = 50
 def to_text(report: Report) -> str:
     """Plain text of at most 100 columns."""
     sections = (
-        _head(report), _control(report), _controller(report), _nominal(report), _gains(report),
+        _head(report), _control(report), _controller(report), _nominal(report), gains_text(report),
         _blend_study(report), _budget(report), _use(report), _slow(report), _lines(report),
         _feeds_written(report), _notes(report),
         findings_text(report["findings"]),
@@ -107,7 +107,8 @@ def _controller(report: Report) -> Iterator[str]:
     yield from table(("axis", "velocity mm/s", "acceleration mm/s2", "jerk mm/s3"), held)
 
 
-def _gains(report: Report) -> Iterator[str]:
+def gains_text(report: Report) -> Iterator[str]:
+    """What would gain most, in lines; none where that was not asked."""
     if "gains" not in report:
         return
     yield "What would gain most"

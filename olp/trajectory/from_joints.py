@@ -99,11 +99,18 @@ def limits_of(structure: Structure) -> AxisLimits:
     return AxisLimits(velocity, acceleration, jerk)
 
 
-def routes_of(path: JointPath, blend_mm: float) -> tuple[JointRoute, ...]:
-    """The routes of a program, in order: a new one begins where the position is not known. `blend_mm` is the
-    tolerance of a path mode without one, and of lists. Raises ProgramError as
-    `olp.program.feeds.timing.timing`."""
-    clock = _of_program(path, blend_mm) if path.listed is None else _of_list(path, blend_mm)
+def clock_of(path: JointPath, blend_mm: float) -> Timing:
+    """Feeds, path tolerances and rests of a program; `blend_mm` is the tolerance of a path mode without one,
+    and of lists. Raises ProgramError as `olp.program.feeds.timing.timing`."""
+    return _of_program(path, blend_mm) if path.listed is None else _of_list(path, blend_mm)
+
+
+def routes_of(
+    path: JointPath, clock: Timing, tolerance: float = 1.0, feed: float = 1.0
+) -> tuple[JointRoute, ...]:
+    """The routes of a program, in order: a new one begins where the position is not known. Path tolerances
+    and feeds of the clock count times these factors; rapids have no feed."""
+    clock = replace(clock, blend_mm=tolerance * clock.blend_mm, feed_mm_s=feed * clock.feed_mm_s)
     known = np.isfinite(path.start).all(axis=1) & np.isfinite(path.end).all(axis=1)
     motion, moved = path.motion, np.zeros(len(path), bool)
     rows = np.flatnonzero(known)

@@ -48,11 +48,17 @@ def gains(case: Case, base: Plan, tell: Progress) -> list[dict[str, Any]]:
 
 def _rows(base: LineUse, other: LineUse, change: str, now: Array, then: Array) -> list[dict[str, Any]]:
     known, place = _places(other.line, base.line)
-    gained = np.where(known & np.isfinite(now) & (now > 0.0), base.seconds, 0.0)
-    gained[gained > 0.0] -= other.seconds[place[gained > 0.0]]
+    gained = np.where(known, base.seconds - other.seconds[place], 0.0)
+    return worth(base.line, gained, change, now, then)
+
+
+def worth(line: Index, gained_s: Array, change: str, now: Array, then: Array) -> list[dict[str, Any]]:
+    """The lines that gain most of (m,) `line`, which gain (m,) s, where `now` (m,) is a value that can be
+    changed."""
+    gained = np.where(np.isfinite(now) & (now > 0.0), gained_s, 0.0)
     return [
         {
-            "line": int(base.line[i]), "seconds": float(gained[i]), "change": change, "now": float(now[i]),
+            "line": int(line[i]), "seconds": float(gained[i]), "change": change, "now": float(now[i]),
             "then": float(then[i]),
         }
         for i in np.argsort(-gained, kind="stable")[:MOST].tolist()

@@ -202,9 +202,7 @@ class Retiming(Shown):
         from olp.reports.plots.time import motion_plot
 
         target = Path(path)
-        kind = PICTURES.get(target.suffix.lower())
-        if kind is None:
-            raise UsageError(f"the plot {str(path)!r} ends in no known format; expected .svg or .png")
+        kind = picture_of(target)
         self._any()
         count = len(self.trajectories)
         numbers = [stretch] if stretch is not None else list(range(1, count + 1))
@@ -251,6 +249,22 @@ def format_of(target: PathLike, kind: Format | None) -> Format:
             "name the format"
         )
     return chosen
+
+
+def picture_of(target: Path) -> Picture:
+    """The format of a plot. Raises UsageError for an ending that names none."""
+    kind = PICTURES.get(target.suffix.lower())
+    if kind is None:
+        raise UsageError(f"the plot {str(target)!r} ends in no known format; expected .svg or .png")
+    return kind
+
+
+def check_override(percent: float) -> None:
+    """Raises UsageError for an override of feeds that no control has."""
+    if not 0.0 < percent <= MOST_OVERRIDE:
+        raise UsageError(
+            f"the feed override is {percent:g} %; expected more than 0, and at most {MOST_OVERRIDE:g}"
+        )
 
 
 def numbered(target: Path, number: int) -> Path:
@@ -323,11 +337,7 @@ def run(
     progress: Progress | None = None,
 ) -> Retiming:
     """As `retime`, in a session."""
-    override = options.feed_override
-    if not 0.0 < override <= MOST_OVERRIDE:
-        raise UsageError(
-            f"the feed override is {override:g} %; expected more than 0, and at most {MOST_OVERRIDE:g}"
-        )
+    check_override(options.feed_override)
     setup, most_um = session.setup, options.max_inertial_um
     control, log = _control(session, options)
     stated = None if proof is None else proved(proof, setup)

@@ -15,7 +15,7 @@ from judge.five_axis import Judge
 from judge.machines import Recipe, zero_machine
 
 import olp
-from olp.core.errors import ConfigError, ProgramError
+from olp.core.errors import ConfigError, ProgramError, UsageError
 from olp.workflows.joints.loaded import JointRun
 from olp.workflows.joints.retime import JointRetimeOptions, JointRetiming, retimed
 
@@ -216,5 +216,43 @@ def test_the_verb_writes_table_and_report(tmp_path: Path) -> None:
     assert '"schema": "olp-joint-retime-1"' in report.read_text()
     done = run("retime", "-j", job, "-o", str(tmp_path / "x.npz"))
     assert done.exit_code == 2 and "expected .csv" in done.stderr
-    done = run("retime", "-j", job, "--gains")
-    assert done.exit_code == 2 and "--gains does not go with machines with rotary joints" in done.stderr
+    done = run("retime", "-j", job, "--blend-study")
+    assert done.exit_code == 2 and "--blend-study does not go with machines with rotary joints" in done.stderr
+    done = run("retime", "-j", job, "--plot-span", "0", "1")
+    assert done.exit_code == 2 and "name a file with --plot" in done.stderr
+
+
+@pytest.mark.slow
+def test_gains_are_what_a_program_with_these_values_saves(tmp_path: Path) -> None:
+    text = HEAD + b"G1 X20. A-9. F2400\nX-20. C9.\nA0. Y9.\nM30\n"
+    base = olp.retime_joints(text, TRUNNION, gains=True, blend_mm=0.1)
+    rows = base.report["gains"]
+    others = {"tolerance": (text, 0.4), "feed": (text.replace(b"F2400", b"F3000"), 0.1)}
+    for change, (other, blend_mm) in others.items():
+        result = olp.retime_joints(other, TRUNNION, blend_mm=blend_mm)
+        assert result.duration_s < base.duration_s
+        before, after = (
+            {row["line"]: row["seconds"] for row in one.report["longest_lines"]} for one in (base, result)
+        )
+        mine = [row for row in rows if row["change"] == change]
+        # lines that gain less than 1 ms are left out
+        expected = {k: before[k] - after[k] for k in (3, 4, 5) if before[k] - after[k] > 1e-3}
+        assert {row["line"]: row["seconds"] for row in mine} == pytest.approx(expected) and mine
+        assert [row["seconds"] for row in mine] == sorted((row["seconds"] for row in mine), reverse=True)
+    assert {(row["now"], row["then"]) for row in rows} == {(100.0, 400.0), (2400.0, 3000.0)}
+    # an override is a feed
+    (tmp_path / "p.nc").write_bytes(text)
+    pictures = [tmp_path / name for name in ("one.svg", "two.svg", "part.png")]
+    call = ("retime", str(tmp_path / "p.nc"), "-m", str(TRUNNION), "--feed-override", "125", "--plot")
+    done = run(*call, str(pictures[0]), "--gains")
+    assert "What would gain most" in done.stdout and "125 % of the programmed feed" in done.stdout
+    quicker = olp.retime_joints(text.replace(b"F2400", b"F3000"), TRUNNION)
+    assert olp.retime_joints(text, TRUNNION, feed_override=125.0).duration_s == quicker.duration_s
+    run(*call, str(pictures[1]))
+    run(*call, str(pictures[2]), "--plot-span", "0.5", "1")
+    picture = pictures[0].read_bytes()
+    assert picture == pictures[1].read_bytes() and pictures[2].read_bytes()[:4] == b"\x89PNG"
+    assert all(f">{name}</text>".encode() in picture for name in "XYZAC")
+    assert b"velocity, % of limit" in picture and b"p.nc on trunnion-500" in picture
+    with pytest.raises(UsageError, match="no motion to draw"):
+        base.plots(pictures[1], from_s=99.0)

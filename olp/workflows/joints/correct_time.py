@@ -2,18 +2,30 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Protocol
 
 from olp.compensation.joints.path import JointPath
 from olp.core.errors import OlpError
 from olp.core.progress import Progress, silent
 from olp.workflows.correct_time import MOST_OPTIMISED
-from olp.workflows.joints.correct import ProvedJoints
 from olp.workflows.joints.loaded import JointRun
 from olp.workflows.joints.retime import JointRetimeOptions, motion_of
 
 
-def with_time(run: JointRun, done: ProvedJoints, tell: Progress | None = None) -> None:
+class Both(Protocol):
+    """A correction: both paths, and its report."""
+
+    @property
+    def nominal(self) -> JointPath: ...
+
+    @property
+    def corrected(self) -> JointPath: ...
+
+    @property
+    def report(self) -> dict[str, Any]: ...
+
+
+def with_time(run: JointRun, done: Both, tell: Progress | None = None) -> None:
     """State `times` in the report of a correction, or why they are not known."""
     if "time" not in done.report:
         try:
@@ -22,7 +34,7 @@ def with_time(run: JointRun, done: ProvedJoints, tell: Progress | None = None) -
             done.report["time"] = {"unknown": str(error)}
 
 
-def times(run: JointRun, done: ProvedJoints, tell: Progress | None = None) -> dict[str, Any]:
+def times(run: JointRun, done: Both, tell: Progress | None = None) -> dict[str, Any]:
     """Seconds of the nominal and the corrected program, and what the correction adds as a share. Programs of
     more than `MOST_OPTIMISED` moves are planned without optimised speeds. Raises as `retime_joints`."""
     both = (done.nominal, done.corrected)

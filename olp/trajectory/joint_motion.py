@@ -1,0 +1,97 @@
+"""The motion along the routes of a machine with rotary joints: planned, and what it uses of its limits."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from olp.compensation.joints.motion import Motion
+from olp.core.arrays import Array, Index
+from olp.core.progress import Progress
+from olp.core.values import dataclass
+from olp.trajectory.from_joints import JointRoute
+from olp.trajectory.plan import Trajectory, plan
+from olp.trajectory.route import AxisLimits
+
+#: Rounds in which feeds are lowered where the tip is faster than its feed.
+_ROUNDS = 5
+#: The tip may be faster than its feed by this share of it.
+_FASTER = 1e-3
+#: Samples of a piece of the motion at which the tip is looked at, as shares of its time.
+_SHARES = (0.0, 0.25, 0.5, 0.75)
+#: Pieces that are looked at together.
+_BLOCK = 1 << 14
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stretch:
+    """A motion between rests at unknown positions. By piece (p,): `ratio` is the speed of the tip to its feed
+    at most. `limit` is the limit that it is nearest to: three of each axis, -1 is the feed."""
+
+    motion: Motion
+    route: JointRoute
+    trajectory: Trajectory
+    ratio: Array
+    limit: Index
+
+    def tip_speed(self, position: Array, velocity: Array, segment: Index) -> Array:
+        """(n,) mm/s of the tip in the workpiece at (n, axes) positions and velocities in the space of the
+        route, on segments (n,)."""
+        return _tip_speed(self.motion, self.route, position, velocity, segment)
+
+
+def planned(
+    motion: Motion, route: JointRoute, limits: AxisLimits, tell: Progress, optimise: bool | None = None
+) -> Stretch:
+    """The motion of a route, again with lower feeds where the tip would be faster than its own. `limits` are
+    those of the axes in mm and deg, `optimise` is that of `plan`."""
+    scaled = AxisLimits(
+        limits.velocity * route.scale, limits.acceleration * route.scale, limits.jerk * route.scale
+    )
+    for left in reversed(range(_ROUNDS)):
+        found = plan(route.route, scaled, tell, optimise=optimise)
+        ratio, limit = _used(motion, route, found, scaled)
+        factor = np.ones(len(route.line))
+        np.maximum.at(factor, found.motion.line, ratio)
+        if left == 0 or not (factor > 1.0 + _FASTER).any():
+            return Stretch(motion, route, found, ratio, limit)
+        route = route.slower(factor)
+    raise AssertionError("the last round returns")
+
+
+def _used(motion: Motion, route: JointRoute, found: Trajectory, limits: AxisLimits) -> tuple[Array, Index]:
+    """`ratio` and `limit` of a stretch. The limits of an axis are velocity, acceleration and jerk."""
+    pieces = found.motion
+    count, seconds = len(pieces), np.diff(pieces.start_s)
+    ratio, most = np.zeros(count), np.zeros((count, 3 * len(limits.velocity)))
+    bounds = (limits.velocity, limits.acceleration, limits.jerk)
+    for a in range(0, count, _BLOCK):
+        piece = np.arange(a, min(a + _BLOCK, count))
+        segment = pieces.line[piece]
+        for share in _SHARES:
+            position, *rates = pieces.of(piece, share * seconds[piece])
+            for k, (rate, bound) in enumerate(zip(rates, bounds, strict=True)):
+                most[piece, k::3] = np.maximum(most[piece, k::3], np.abs(rate) / bound)
+            speed = _tip_speed(motion, route, position, rates[0], segment)
+            ratio[piece] = np.maximum(ratio[piece], speed / route.feed_mm_s[segment])
+    nearest = most.argmax(axis=1)
+    return ratio, np.where(ratio >= most.max(axis=1), -1, nearest)
+
+
+def _tip_speed(
+    motion: Motion, route: JointRoute, position: Array, velocity: Array, segment: Index
+) -> Array:  # fmt: skip
+    slopes = motion.slopes(position / route.scale, route.tool[segment])[:, :3]
+    rotary = np.array([unit == "deg" for unit in motion.structure.units])
+    rate = velocity / route.scale
+    tip = np.einsum("nij,nj->ni", slopes, np.where(rotary, np.radians(rate), rate))
+    return np.asarray(np.linalg.norm(tip, axis=1))
+
+
+def seconds_by_line(stretches: tuple[Stretch, ...], lines: Index) -> Array:
+    """(m,) seconds that the motion takes on lines (m,), which rise."""
+    seconds = np.zeros(len(lines))
+    for one in stretches:
+        pieces = one.trajectory.motion
+        row = np.searchsorted(lines, one.route.line[pieces.line])
+        np.add.at(seconds, row, np.diff(pieces.start_s))
+    return seconds
