@@ -28,6 +28,7 @@ from olp.reports.joints import verdict_of
 from olp.review.features.moves import digit_mm
 from olp.review.job import Review
 from olp.review.joint_machine import drawn
+from olp.review.joint_motion import joint_limits, joint_table
 from olp.review.listing import aligned
 from olp.review.meshes import of_job
 from olp.review.motion import by_feed, feed_seconds, filled
@@ -112,8 +113,10 @@ def page_of(
         machine.structure, path.motion, seen.axes, tool, (origin, float(np.ptp(position, axis=0).max()))
     )
     planned = time and not missing_limits(machine.structure)
+    motion = None
     if planned:
-        moment = filled(motion_of(run, second, JointRetimeOptions()).seconds(samples.part, samples.within))
+        timing = motion_of(run, second, JointRetimeOptions())
+        moment, motion = filled(timing.seconds(samples.part, samples.within)), joint_table(timing.stretches)
     else:
         moment = by_feed(_seconds(run, nominal, samples), samples)
     table = _table(done, options)
@@ -131,9 +134,9 @@ def page_of(
             axes=axes,
             drawn_at=drawn_at,
             nodes=nodes,
-            limits={},
+            limits={} if motion is None else joint_limits(machine.structure),
             time_s=moment,
-            motion=None,
+            motion=motion,
             duration_s=float(moment[-1]),
             sources=(),
             listing=aligned(nominal, second.program, done.proof.groups, samples),
@@ -147,6 +150,7 @@ def page_of(
             tool_radii_mm={},
             digit_mm=digit_mm(path.program),
             turn_urad={name: angle / RAD_PER_URAD for name, angle in seen.off_rad.items()},
+            units=dict(zip(machine.structure.order, machine.structure.units, strict=True)),
             straight=False,
             planned=planned,
         )

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from olp.core.arrays import Array
 from olp.core.toolpath import Kind
-from olp.core.units import AXES, UM_PER_MM
+from olp.core.units import UM_PER_MM
 from olp.findings.catalogue import RULES
 from olp.proof.judgement import QUESTIONS
 from olp.proof.proof import Counts
@@ -239,11 +239,11 @@ def _motion(scene: Scene, arrays: Arrays) -> dict[str, Any] | None:
         return arrays.quantised(f"m_{name}", values, step)
 
     axes = []
-    for i, axis in enumerate(AXES):
-        most_velocity, most_acceleration, most_jerk = scene.limits[axis]
+    for i, (axis, (most_velocity, most_acceleration, most_jerk)) in enumerate(scene.limits.items()):
         axes.append(
             {
                 "name": axis,
+                "unit": scene.units.get(axis, "mm"),
                 "position": arrays.quantised(f"m_{axis}", table.position_mm[:, i], ARC_MM),
                 "velocity": column(f"V{axis}", table.velocity[:, i]),
                 "acceleration": column(f"A{axis}", table.acceleration[:, i]),

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 MOST_ROWS = 20_000
 #: Pieces that are thinned at once, to bound memory.
 _BLOCK = 1 << 16
+#: Columns of a row of motion before those of the axes.
+_STATED = 4
 #: Difference of shares of a run that are equal but for rounding.
 _ROUNDING = 1e-9
 #: Sampled instants of a piece, as shares of its time: its peaks are at or near one of them.
@@ -39,8 +41,8 @@ _INSTANTS = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionTable:
     """Of m times in order: (m,) `time_s`, `line` of the corrected program, `speed_mm_s`, and `feed_mm_s`, NaN
-    in rapids; (m, 3) axis positions mm, velocities mm/s, accelerations mm/s2 and jerks mm/s3. In each column,
-    values that are left out are between those of the rows beside them."""
+    in rapids; (m, axes) positions, velocities, accelerations and jerks of the axes, in mm or deg and s. In
+    each column, values that are left out are between those of the rows beside them."""
 
     time_s: Array
     line: Index
@@ -230,13 +232,13 @@ def table(trajectories: Sequence[Trajectory], routes: Sequence[Route]) -> Motion
         room = max(MOST_ROWS * len(motion) // total, 200)
         for a, b in pairwise([*range(0, len(motion), _BLOCK), len(motion)]):
             rows = _rows(motion, a, b, begin, feed)
-            parts.append(_thinned(rows, max(room * (b - a) // len(motion), 100)))
+            parts.append(thinned(rows, max(room * (b - a) // len(motion), 100)))
         begin += trajectory.duration_s
     if not parts:
-        return _split(np.zeros((0, 16)))
+        return split(np.zeros((0, _STATED + 4 * len(AXES))))
     rows = np.concatenate(parts)
     rows[:, 0] = np.maximum.accumulate(rows[:, 0])
-    return _split(rows)
+    return split(rows)
 
 
 def _feeds(route: Route) -> tuple[Index, Array]:
@@ -248,10 +250,7 @@ def _feeds(route: Route) -> tuple[Index, Array]:
 
 def _rows(motion: Motion, a: int, b: int, begin: float, feed: tuple[Index, Array]) -> Array:
     """Rows of pieces a..b: time, line, speed, feed, and the axes' positions and their three derivatives."""
-    count = len(_INSTANTS)
-    piece = np.repeat(np.arange(a, b), count)
-    seconds = np.diff(motion.start_s[a : b + 1])
-    u = (seconds[:, None] * _INSTANTS).ravel()
+    piece, u = instants(motion, a, b)
     position, velocity, acceleration, jerk = motion.of(piece, u)
     line = motion.line[piece]
     row = np.minimum(np.searchsorted(feed[0], line), len(feed[0]) - 1)
@@ -261,9 +260,15 @@ def _rows(motion: Motion, a: int, b: int, begin: float, feed: tuple[Index, Array
     return np.column_stack((*columns, position, velocity, acceleration, jerk))
 
 
-def _thinned(rows: Array, most: int) -> Array:
+def instants(motion: Motion, a: int, b: int) -> tuple[Index, Array]:
+    """Pieces a..b, each as often as it is looked at, and the seconds since its begin."""
+    seconds = np.diff(motion.start_s[a : b + 1])
+    return np.repeat(np.arange(a, b), len(_INSTANTS)), (seconds[:, None] * _INSTANTS).ravel()
+
+
+def thinned(rows: Array, most: int) -> Array:
     """Of blocks of rows those where a column has its least or largest value, and the first and last."""
-    watched = (2, *range(7, rows.shape[1]))
+    watched = (2, *range(_STATED + (rows.shape[1] - _STATED) // 4, rows.shape[1]))
     blocks = max(most // (2 * len(watched) + 2), 1)
     wide = -(-len(rows) // blocks)
     if wide <= 2 * len(watched) + 2:
@@ -278,8 +283,7 @@ def _thinned(rows: Array, most: int) -> Array:
     return np.asarray(rows[index])
 
 
-def _split(rows: npt.NDArray[np.float64]) -> MotionTable:
-    return MotionTable(
-        rows[:, 0], rows[:, 1].astype(np.int64), rows[:, 2], rows[:, 3], rows[:, 4:7], rows[:, 7:10],
-        rows[:, 10:13], rows[:, 13:16],
-    )  # fmt: skip
+def split(rows: npt.NDArray[np.float64]) -> MotionTable:
+    """The table of rows (m, 4 + 4 axes): time, line, speed, feed, and four states of the axes."""
+    states = np.split(rows[:, _STATED:], 4, axis=1)
+    return MotionTable(rows[:, 0], rows[:, 1].astype(np.int64), rows[:, 2], rows[:, 3], *states)

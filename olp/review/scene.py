@@ -77,13 +77,13 @@ class Figures:
 class Scene:
     """`position_mm` (n, 3) are the samples in `frame`; `waypoint` (n,) are those which count by their
     distance from the nominal point. `axes` (n, k) are axis values, less which bodies are drawn `drawn_at`
-    (k,), `limits` the limits of motion by axis. `time_s` (n,) are times on the motion, where it is `planned`,
-    else at the feed. `sources` are (name, (n,) um) by size; `report` is that of the correction or
-    verification, `figures` what it says by layer, `table` its judgements with lines of the nominal text as
-    shown. `turn_urad` are (n,) angles of the tool by layer, where they are corrected. Where moves are
-    `straight` in the frame, features are found in them. `digit_mm` is the last digit of coordinates.
-    `tool_radii_mm` has the tools of the program that have a radius; `uncertainty` is None where the
-    calibration states none."""
+    (k,), `limits` the limits of motion by axis, whose `units` are mm where none are given. `time_s` (n,) are
+    times on the motion, where it is `planned`, else at the feed. `sources` are (name, (n,) um) by size;
+    `report` is that of the correction or verification, `figures` what it says by layer, `table` judgements
+    with lines of the nominal text as shown. `turn_urad` are (n,) angles of the tool by layer, where they are
+    corrected. Where moves are `straight` in the frame, features are found in them. `digit_mm` is the last
+    digit of coordinates. `tool_radii_mm` has the tools of the program that have a radius; `uncertainty` is
+    None where the calibration states none."""
 
     name: str
     corrected_name: str
@@ -114,6 +114,7 @@ class Scene:
     digit_mm: float
     uncertainty: TipUncertainty | None = None
     turn_urad: Mapping[str, Array] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
     straight: bool = True
     planned: bool = False
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from olp.core.errors import ConfigError, ProgramError
 from olp.proof.proof import Counts
 from olp.review.job import Review
 from olp.review.scene import Scene
+from olp.workflows.joints.retime import JointRetiming
 
 FOLDER = Path(__file__).resolve().parents[2] / "programs"
 
@@ -112,6 +114,26 @@ def test_tips_and_errors_are_those_of_the_judge(tmp_path: Path) -> None:
     np.testing.assert_allclose(scene.turn_urad["uncorrected"], turn, atol=1e-3)
 
 
+def charts_are_those_of(page: Page, motion: JointRetiming, machine: Path) -> None:
+    """The axes of the charts go as the planned motion, in mm and deg, and reach what it reaches."""
+    shown, stated = page.manifest["motion"], tomllib.loads(machine.read_text("utf-8"))["axes"]
+    assert [axis["name"] for axis in shown["axes"]] == list(motion.structure.order)
+    time = np.array(page.array(shown["time"]))
+    at = motion.at(0, np.clip(time, 0.0, motion.duration_s))
+    for column, axis in enumerate(shown["axes"]):
+        unit = motion.structure.units[column]
+        assert axis["unit"] == unit
+        for key, power in (("velocity", "s"), ("acceleration", "s2"), ("jerk", "s3")):
+            limit = stated[axis["name"]][f"{key}_{unit}_{power}"]
+            assert axis[f"{key}_limit"] == limit
+            assert np.abs(page.array(axis[key])).max() <= limit * (1.0 + 1e-3)
+        most = np.abs(motion.at(0, np.arange(0.0, motion.duration_s, 1e-2))[1][:, column]).max()
+        assert np.abs(page.array(axis["velocity"])).max() >= most * (1.0 - 1e-3) - 1e-3
+        np.testing.assert_allclose(page.array(axis["position"]), at[0][:, column], atol=2e-2 + 1e-4 * most)
+    line = np.array(page.array(shown["line"]))
+    assert (np.diff(line) >= 0).all() and np.array(page.array(shown["speed"])).max() > 1.0
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", JOINT_JOBS)
 def test_times_are_those_of_the_planned_motion(name: str, reviews: dict[str, Review]) -> None:
@@ -133,8 +155,9 @@ def test_times_are_those_of_the_planned_motion(name: str, reviews: dict[str, Rev
     cuts = scene.table.judged[scene.samples.move]
     assert np.median(away[cuts]) < 0.6 and away[cuts].max() < 1.5
     assert away[scene.samples.joined].max() < 0.05 * np.ptp(scene.position_mm, axis=0).max() + 1.5
+    charts_are_those_of(Page(reviews[name].html()), motion, machine)
     feed = olp.view_joints(file, machine, file.with_name("job.toml"), time=False).scene
-    assert not feed.planned and feed.duration_s != scene.duration_s
+    assert feed.motion is None and not feed.planned and feed.duration_s != scene.duration_s
 
 
 @pytest.mark.slow
@@ -197,6 +220,13 @@ def test_the_machine_moves_in_the_browser(
     place = f"olp.app.scene.viewer.scene_tree.find({path}).object"
     (tool,) = [body for body in scene.bodies if body.role == "tool"]
     with browser.opened(chromium, file) as page:
+        # axes in mm and in deg have lanes of their own, and so has each of more than three
+        page.select_option("#motion", "velocity")
+        lanes = page.evaluate("olp.app.plots.movement.lanes.map(l => [l.title, l.series.length, l.unit])")
+        if name == "trunnion-mill":
+            assert lanes == [["X, Y, Z in mm/s", 3, "mm/s"], ["A, C in °/s", 2, "°/s"]]
+        else:
+            assert lanes == [[f"L{k}", 1, "mm/s"] for k in range(1, 7)]
         origin = np.array(Page(reviews[name].html()).manifest["origin_mm"])
         zero = page.evaluate("olp.app.scene.viewer.scene_tree.find(['olp']).object.matrixWorld.elements")
         for share in (0.0, 0.31, 0.77):

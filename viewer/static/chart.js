@@ -262,13 +262,17 @@
         plain = c.font;
       Object.assign(c, {textAlign: "left", textBaseline: "middle", fillStyle: this.look.ink, font: "600 " + plain});
       const name = this.lanes.length > 1 ? this.title : first.title,
-        titles = [name, name.split(",")[0]].map(text => (first.unit ? `${text}, ${first.unit}` : text)),
+        unit = this.lanes.every(lane => lane.unit === first.unit) && first.unit,
+        titles = [name, name.split(",")[0]].map(text => (unit ? `${text}, ${unit}` : text)),
         title = OLP.fitted(c, titles.find(text => c.measureText(text).width <= room - 10) ?? titles[1], room - 10);
       c.fillText(title, 10, 11);
       let x = Math.ceil(10 + c.measureText(title).width) + 14;
       c.font = plain;
-      if (first.series.length < 2) return;
-      for (const {label, dashes} of first.series) {
+      // where each lane is one curve, its title names it
+      const curves = this.lanes.reduce((most, lane) => (lane.series.length > most.length ? lane.series : most), []);
+      if (curves.length < 2) return;
+      c.lineWidth = 1.25;
+      for (const {label, dashes} of curves) {
         const wide = c.measureText(label).width;
         if (x + wide + 30 > room) break;
         c.strokeStyle = this.look.ink;

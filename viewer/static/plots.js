@@ -8,14 +8,15 @@
     ["axes", ["x", "y", "z"], "X, Y, Z"],
     ["pictures", null, "size, by picture"],
   ];
-  // [name, title, unit, text of the choice]
+  // [name, title, unit behind that of an axis or of the path, text of the choice]
   const MOTIONS = [
-    ["speed", "Speed", "mm/s", "speed"],
-    ["velocity", "Velocity", "mm/s", "velocity"],
-    ["acceleration", "Acceleration", "mm/s²", "acceleration"],
-    ["jerk", "Jerk", "mm/s³", "jerk"],
+    ["speed", "Speed", "/s", "speed"],
+    ["velocity", "Velocity", "/s", "velocity"],
+    ["acceleration", "Acceleration", "/s²", "acceleration"],
+    ["jerk", "Jerk", "/s³", "jerk"],
     ["share", "Use of limits", "%", "use of limits"],
   ];
+  const UNITS = {mm: "mm", deg: "°"};
   const DASHES = [
     [1, 0],
     [8, 3],
@@ -172,27 +173,43 @@
         } = this.app,
         kind = this.motion;
       const x = this.motion_axis;
-      let series,
-        limits = [];
+      const [, title, rate] = MOTIONS.find(m => m[0] === kind);
+      let lanes;
       if (kind === "speed") {
-        series = [{label: "path", dashes: DASHES[0], x, y: arrays.get(motion.speed)}];
+        const series = [{label: "path", dashes: DASHES[0], x, y: arrays.get(motion.speed)}];
         if (motion.feed) series.push({label: "programmed", dashes: DASHES[1], x, y: arrays.get(motion.feed)});
-      } else if (kind === "share") {
-        series = motion.axes.map((axis, i) => ({
-          label: axis.name,
-          dashes: DASHES[i % 3],
-          x,
-          y: this.cached("share " + axis.name, () => this.share(axis)),
-        }));
-        limits = [{value: 100}];
-      } else {
-        series = motion.axes.map((axis, i) => ({label: axis.name, dashes: DASHES[i % 3], x, y: arrays.get(axis[kind])}));
-        limits = motion.axes
-          .flatMap(axis => [1, -1].map(sign => ({value: sign * axis[kind + "_limit"]})))
-          .filter(l => Number.isFinite(l.value));
-      }
-      const [, title, unit] = MOTIONS.find(m => m[0] === kind);
-      this.movement.set({extent: this.extent, x_label: this.x_label, lanes: [{title, unit, series, limits, include: true}]});
+        lanes = [{title, unit: "mm" + rate, series, limits: []}];
+      } else lanes = this.states(kind, title, rate, x);
+      this.movement.title = title;
+      this.movement.set({extent: this.extent, x_label: this.x_label, lanes: lanes.map(lane => ({...lane, include: true}))});
+    }
+
+    // Lanes of a state of the axes, or of their use of limits: up to three axes of one unit share one.
+    states(kind, title, rate, x) {
+      const {axes} = this.app.manifest.motion,
+        used = kind === "share",
+        units = [...new Set(axes.map(axis => (used ? "" : axis.unit)))],
+        groups = units.flatMap(unit => {
+          const own = axes.filter(axis => used || axis.unit === unit);
+          return own.length > DASHES.length ? own.map(axis => [axis]) : [own];
+        });
+      return groups.map(own => {
+        const unit = used ? rate : UNITS[own[0].unit] + rate,
+          names = own.map(axis => axis.name).join(", "),
+          series = own.map((axis, i) => ({
+            label: axis.name,
+            dashes: DASHES[i],
+            x,
+            y: used ? this.cached("share " + axis.name, () => this.share(axis)) : this.app.arrays.get(axis[kind]),
+          })),
+          limits = used ? [{value: 100}] : own.flatMap(axis => [1, -1].map(sign => ({value: sign * axis[kind + "_limit"]})));
+        return {
+          title: groups.length === 1 ? title : units.length > 1 ? `${names} in ${unit}` : names,
+          unit,
+          series,
+          limits: limits.filter(l => Number.isFinite(l.value)),
+        };
+      });
     }
 
     // Largest of velocity, acceleration and jerk of an axis as a share of its limits, %.
