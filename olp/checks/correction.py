@@ -56,11 +56,10 @@ def program_findings(program: Program, setup: Setup) -> list[Finding]:
     whole = found(count, lambda some: beside_axes(path, some) & (path.kind[some] != Kind.PROBE))
     if whole.size and not program.verbatim:
         lines = lines_of(path, whole)
-        findings.append(
-            finding(
-                "OLP104", f"{len(lines)} blocks also move another axis; corrected at their ends only", lines
-            )
-        )
+        what = "blocks also move another axis"
+        if program.targets is not None:
+            what = "moves have words of their own end, or move another axis"
+        findings.append(finding("OLP104", f"{len(lines)} {what}; corrected at their ends only", lines))
     deleted = found(count, lambda some: _has(path, some, Flag.DELETED))
     if deleted.size:
         lines = lines_of(path, deleted)

@@ -107,27 +107,30 @@ class TargetWriter(PointWriter):
             target = self.stated.targets[place]
             groups = self._groups(rows, own, wanted)
             for k, group in enumerate(groups):
+                first = k == 0 and not target.held
                 # the shift of a move is its own, and takes up what the target does not
-                shifted = [row for row in group if k and self._use(rows, row).offsets]
+                shifted = [row for row in group if not first and self._use(rows, row).offsets]
                 for row in shifted:
-                    edits += self._shifted(rows, row, target, groups[0][0], wanted)
-                fixed = [row for row in group if not (k and self._use(rows, row).offsets)]
+                    base = None if target.held else groups[0][0]
+                    edits += self._shifted(rows, row, target, base, wanted)
+                fixed = [row for row in group if first or not self._use(rows, row).offsets]
                 for row in fixed:
                     rows.emitted[row] = self._reached(rows, row, target, group[0], wanted)
-                if k == 0:
+                if first:
                     edits += self._renumbered(target, group[0], wanted)
-                elif fixed:
+                elif fixed and not (target.held and self._kept(target, group[0], wanted)):
                     edits += self._cloned(rows, target, fixed, wanted)
         return edits
 
     def _shifted(
-        self, rows: Rows, row: int, target: Target, first: int, wanted: _Wanted
+        self, rows: Rows, row: int, target: Target, first: int | None, wanted: _Wanted
     ) -> list[Replacement]:
-        """New numbers of the shift of a row, whose target has the numbers that row `first` gives it."""
+        """New numbers of the shift of a row, whose target has the numbers that row `first` gives it, or those
+        of the text where that is None."""
         use, move = self._use(rows, row), int(rows.move[row])
         decimals = int(wanted.decimals[row].max())
         base = np.array(target.point)
-        if not self._kept(target, first, wanted):
+        if first is not None and not self._kept(target, first, wanted):
             base = wanted.mantissa[first] / POW10[wanted.decimals[first]]
         turn, shift = matrix(use.offset_turn), np.array(use.shift_mm) / self.frame_of(move).unit_mm
         new = np.round(turn.T @ (shift + wanted.value[row] - base), decimals)

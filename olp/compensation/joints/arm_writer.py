@@ -310,10 +310,13 @@ class _Writer:
                 groups.append((wanted, rows))
             rows.append(row)
         groups.sort(key=lambda group: -len(group[1]))
-        edits = self._edited(target, groups[0][0])
-        self.tally.changed_words += len(edits)
-        for wanted, rows in groups[1:]:
-            edits += self._cloned(target, wanted, rows)
+        edits: list[Replacement] = []
+        if not target.held:
+            edits = self._edited(target, groups.pop(0)[0])
+            self.tally.changed_words += len(edits)
+        for wanted, rows in groups:
+            if not target.held or self._edited(target, wanted):
+                edits += self._cloned(target, wanted, rows)
         return edits
 
     def _edited(self, target: Target, wanted: _Wanted) -> list[Replacement]:

@@ -45,7 +45,8 @@ RULES = (
         "block moves another axis",
         Severity.INFO,
         "A block that also moves a rotary or other axis is corrected at its end only and never split. The "
-        "words of the other axis are kept as written.",
+        "words of the other axis are kept as written. So is a move of a robot with a word that belongs to "
+        "its end or to its time, such as `UNTIL` or `Skip`.",
         "Split the block in the source where the path between its ends matters.",
         "`G1 X10 Y20 A90` in a long block.",
     ),

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from bisect import bisect_left
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -12,6 +13,7 @@ import numpy.typing as npt
 from olp.core.arrays import Array
 from olp.core.errors import ProgramError
 from olp.core.machine import ZERO, Setup, Vector
+from olp.core.patterns import pattern
 from olp.core.toolpath import Flag, Frame, Kind
 from olp.program.dialect import Dialect, Options
 from olp.program.program import Program
@@ -39,25 +41,33 @@ _SAME_ORIENTATION = 1e-3
 #: Statements between two reports of progress.
 _TOLD = 4096
 _NOWHERE: Vector = (NAN, NAN, NAN)
+_WORDS = pattern(rb"[A-Za-z_]\w*")
 _BEGINS_IN_RUN = "where this move begins depends on the run: it is corrected at its end"
 
 
 def take_all(
-    statements: Sequence[Any], take: Callable[[Any], None], refusals: list[ProgramError], options: Options
-) -> None:
-    """Takes every statement, and tells how far that is. Raises the first of `refusals`, which statements add
-    to, with the others."""
+    statements: Sequence[Any], take: Callable[[Any], None], moves: RobotMoves, refusals: list[ProgramError],
+    options: Options,
+) -> None:  # fmt: skip
+    """Takes every statement, and tells how far that is. Moves about which the run decides are left. Raises
+    the first of `refusals`, which statements add to, with the others."""
     for k, statement in enumerate(statements):
         if k % _TOLD == 0:
             options.tell("read", k / len(statements))
         try:
             take(statement)
+        except DecidedInRun as error:
+            moves.decided(error)
         except ProgramError as error:
             refusals.append(error)
     if refusals:
         first = refusals[0]
         first.others = tuple(refusals[1:])
         raise first
+
+
+class DecidedInRun(ProgramError):
+    """The run of a program decides where a move goes, in which frame or with which tool."""
 
 
 def not_read(what: str, line: int) -> ProgramError:
@@ -77,6 +87,9 @@ class RobotMoves:
         self.uses: list[Use | None] = []
         self.arcs: list[Arc] = []
         self.gaps: list[int] = []
+        #: why moves are left as they are written, and names whose numbers something else needs, in capitals
+        self._left: list[DecidedInRun] = []
+        self._held: set[str] = set()
         self._remarks: dict[str, tuple[str, int, str]] = {}
         self.known = True
         self._frame = -1
@@ -315,6 +328,32 @@ class RobotMoves:
         self.known, self._turn, self._rest = True, None, ()
         self._open(line, self._flange(line))
 
+    def decided(self, error: DecidedInRun) -> None:
+        """A move is left as it is written, as the run decides about it."""
+        assert error.line is not None
+        self.left(error.line)
+        self._left.append(error)
+        self.remark(f"left: {error.message}", error.line, f"left as written: {error.message}")
+
+    def hold(self, names: Iterable[str]) -> None:
+        """Targets of these names keep their numbers, as something else than corrected moves has them."""
+        self._held.update(name.upper() for name in names)
+
+    def hold_mentioned(self, statements: Iterable[Span]) -> None:
+        """Where moves are left, hold what statements mention: they may go there. Moves that are corrected and
+        statements that state targets do not count. Raises ProgramError where no move is corrected."""
+        if not self._left:
+            return
+        uses = [use for use in self.uses if use is not None]
+        if not uses:
+            raise ProgramError.together(self._left)
+        own = {use.named[0] for use in uses}
+        stated = sorted({self.targets[use.target].value[0] for use in uses})
+        for span in statements:
+            if bisect_left(stated, span[0]) == bisect_left(stated, span[1]):
+                words = _WORDS.finditer(self.data, *span)
+                self.hold(word[0].decode("latin-1") for word in words if word.start() not in own)
+
     def _flange(self, line: int) -> int:
         """The number of the world with the tip at the flange."""
         return self.frames.index(self.frames.world, Tool("", Pose()), NO_TURN, ZERO, line)
@@ -341,7 +380,13 @@ class RobotMoves:
         )  # fmt: skip
         path = program.toolpath
         path.end_mm[:] = placed_in(frames, path.frame, path.end_mm)
-        targets = Targets(tuple(self.targets), tuple(self.uses), tuple(self.arcs), tuple(self.gaps))
+        own = [
+            replace(target, held=True)
+            if {target.name.upper(), target.name.upper().partition("[")[0]} & self._held
+            else target
+            for target in self.targets
+        ]
+        targets = Targets(tuple(own), tuple(self.uses), tuple(self.arcs), tuple(self.gaps))
         return replace(program, targets=targets)
 
 

@@ -39,7 +39,8 @@ class Target:
     `config` are the words that name a posture, NaN where one is not stated, and `outer` the external axes.
     One in joints has their values in degrees (`joints`), the first three of them in `numbers`, the others in
     `turned`. Where the text counts steps of motors, `counts` are those of each joint in a degree. `copy` is
-    where another declaration of it goes, in a language that has a place for these."""
+    where another declaration of it goes, in a language that has a place for these. One that is `held` keeps
+    its numbers, as something else than corrected moves has them from it: moves go to clones of it."""
 
     line: int
     value: Span
@@ -57,6 +58,7 @@ class Target:
     joints: tuple[float, ...] = ()
     counts: tuple[float, ...] = ()
     copy: Copy = NO_COPY
+    held: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,6 +26,7 @@ FRAMES = (
     '<Value key="0" x="300" y="250" z="-300" rz="30" fatherId="world[0]" />',
     '<Value key="1" x="5" y="6" z="7" rx="170.125" ry="-10.25" fatherId="fPart[0]" />',
 )
+FATHER = '<Value key="0" fatherId="fPart[0]" />'
 TOOLS = (
     '<Value key="0" x="10" y="-5" z="120" ry="10" fatherId="flange[0]" ioLink="valve1" />',
     '<Value key="1" z="4" rx="20" fatherId="tGrip[0]" />',
@@ -361,10 +362,19 @@ def test_strings_and_comments_say_nothing(zero: Path) -> None:
     assert len(corrected([*quiet, "movel(pPoint[0],tGrip,mFast)"], zero)) > 10
 
 
+def test_what_a_left_move_goes_by_keeps_its_numbers(bent: Path) -> None:
+    moves = ["movel(pPoint[0],tGrip,mFast)", "pAway = pPoint[0]", "pAway.trsf.z = pAway.trsf.z + nK"]
+    lines = corrected([*moves, "movel(pAway,tGrip,mFast)"], bent, data=datum("pAway", "pointRx", FATHER))
+    assert [line.strip() for line in lines if "movel" in line] == [
+        "movel(pPoint[3],tGrip,mFast)", "movel(pAway,tGrip,mFast)",
+    ]  # fmt: skip
+    assert sum(POINTS[0] in line for line in lines) == 1
+
+
 REFUSED = [
     (["movec(pPoint[0],pPoint[1],tGrip,mFast)"], "where this arc begins is not stated", 5),
     ([START, "movec(pPoint[1],pPoint[2],mFast)"], "3 arguments; expected an intermediate point", 6),
-    ([START, "movec(pPoint[1],here(tGrip,fPart),tGrip,mFast)"], "computed, or chosen in the run", 6),
+    (["movec(pPoint[1],here(tGrip,fPart),tGrip,mFast)"], "computed, or chosen in the run", 5),
     ([START, "movec(pPoint[1],pPoint[2],tGrip[1],mFast)"], "with another tool", 6),
     ([START, f"movec({{{{0,9,9,180,0,0}},{{{WORDS}}}}},pPoint[2],tGrip,mFast)"], "from another frame", 6),
     ([START, "pPoint[1].trsf.rx = 179", "movec(pPoint[1],pPoint[2],tGrip,mFast)"], "turned by 17.5 mrad", 7),

@@ -84,7 +84,7 @@ class _Reader:
         self.refusals: list[ProgramError] = []
 
     def run(self, dialect: Dialect, options: Options, *, words: bool) -> Program:
-        take_all(self.job.statements, self._statement, self.refusals, options)
+        take_all(self.job.statements, self._statement, self.moves, self.refusals, options)
         return self.moves.program(dialect, words=words)
 
     # -- statements ----------------------------------------------------------------------------------

@@ -11,7 +11,7 @@ from olp.core.values import dataclass
 from olp.program.robots.frames import Located, RobotFrames, Tool
 from olp.program.robots.krl.data import Declared, Taught, key_of, pose_of
 from olp.program.robots.line import Line
-from olp.program.robots.moves import NAN
+from olp.program.robots.moves import NAN, DecidedInRun
 from olp.program.robots.poses import Pose
 
 _SET = pattern(rb"(?i)\$(BASE|TOOL)\s*(\.\s*\w+)?\s*=(?!=)\s*(.*)")
@@ -61,6 +61,8 @@ class Active:
         self._bases: tuple[State, Located] | None = None
         self._tools: tuple[State, Tool] | None = None
         self.state = State(None, None, "")
+        #: names of values that are set as a base or tool
+        self.named: set[str] = set()
 
     def forget(self, why: str) -> None:
         """What is in force depends on the run from here on."""
@@ -117,7 +119,11 @@ class Active:
         if name is None:
             return None
         key = key_of(name[1], name[2])
-        pose = self.declared.frame(key, line.line)
+        try:
+            pose = self.declared.frame(key, line.line)
+        except DecidedInRun:
+            return None
+        self.named.add(name[1].decode("latin-1"))
         return None if pose is None else Place(0, pose, key)
 
     @staticmethod
@@ -132,7 +138,7 @@ class Active:
     def _bas(self, command: bytes, value: bytes, line: Line) -> None:
         """A call of BAS, by which inline forms set what is in force."""
         speed = float(value) * _MM_PER_M if _NUMBER.fullmatch(value) else NAN
-        if command in (b"PTP_PARAMS", b"CP_PARAMS"):
+        if command in (b"PTP_PARAMS", b"CP_PARAMS", b"FRAMES"):
             for which in ("BASE", "TOOL"):
                 self._set(which, self._of_taught(which, self._taught, line), line)
             if command == b"CP_PARAMS":
@@ -216,7 +222,9 @@ class Active:
         work = machine.default_work_offset
         if not why and what == "$BASE" and work in {**machine.work_offsets, **self.setup.job.work_offsets}:
             return Place(name=work)
-        raise ProgramError(
+        # without a reason machine and job may state it
+        refusal = DecidedInRun if why else ProgramError
+        raise refusal(
             f"which {what} is in force here is not stated"
             + (f": {why}" if why else "")
             + f"; set {what} before this move, by its number or with its numbers",

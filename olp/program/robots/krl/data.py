@@ -11,6 +11,7 @@ from olp.core.patterns import pattern
 from olp.core.values import dataclass
 from olp.program.robots.krl.text import Aggregate, aggregate
 from olp.program.robots.line import Line
+from olp.program.robots.moves import DecidedInRun
 from olp.program.robots.poses import Pose, of_zyx
 from olp.program.robots.targets import Span
 
@@ -116,7 +117,7 @@ class Declared:
         if len({self.data[slice(*value.span)] for value in found}) > 1:
             again = found[1].line.line
         if again is not None:
-            raise ProgramError(
+            raise DecidedInRun(
                 f"{what} {key} gets another value in {place_of(self.data, again)}, so its value here depends "
                 "on the run; state it once, with its numbers",
                 line=line,
@@ -126,7 +127,7 @@ class Declared:
             return None
         numbers = self.aggregate(found[0].span)
         if numbers is None:
-            raise ProgramError(
+            raise DecidedInRun(
                 f"{what} {key} is not stated with its numbers in {place_of(self.data, found[0].line.line)}",
                 line=line,
                 code="OLP533",

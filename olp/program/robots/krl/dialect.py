@@ -51,8 +51,8 @@ class Krl(InPlace):
         data, (begin, end) = program.data, target.declaration
         if not is_declaration(data[begin:end]):
             raise ProgramError(
-                f"moves to {target.name} want different numbers of it, and it is assigned by a statement; "
-                "give each move its own position",
+                f"{target.name} is assigned by a statement, and its moves want different numbers of it, or a "
+                "base or another move needs it as it is; give each move its own position",
                 line=target.line,
                 code="OLP561",
             )

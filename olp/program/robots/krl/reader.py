@@ -19,12 +19,13 @@ from olp.program.robots.krl.data import Declared, assigned, is_declaration, key_
 from olp.program.robots.krl.text import Aggregate, lines, parts
 from olp.program.robots.krl.turning import Turning
 from olp.program.robots.line import Line
-from olp.program.robots.moves import NAN, RobotMoves, not_read, take_all
+from olp.program.robots.moves import NAN, DecidedInRun, RobotMoves, not_read, take_all
 from olp.program.robots.poses import Pose, multiplied, rotated
 from olp.program.robots.targets import NOWHERE, Span, Use
 
 _MOVE = pattern(rb"(?i)(S?(?:LIN|PTP|CIRC))\s*(?=[\s{])(.*)")
-_OTHER_MOVE = pattern(rb"(?i)(S?(?:LIN|PTP|CIRC)_REL|SPLINE|SPL|ASYPTP)\b")
+_DISTANCE = pattern(rb"(?i)(S?(?:LIN|PTP|CIRC)_REL)\b")
+_OTHER_MOVE = pattern(rb"(?i)(SPLINE|SPL|ASYPTP)\b")
 _TAIL = pattern(
     rb"(?i)\s*(\bWITH\b.*?)?(?:\s*\b(C_(?:PTP|DIS|VEL|ORI|SPL)(?:\s+C_(?:PTP|DIS|VEL|ORI))?))?\s*"
 )
@@ -88,7 +89,11 @@ class _Reader:
     def run(self, dialect: Dialect, options: Options, *, words: bool) -> Program:
         for line in self.lines:
             self._mentioned(line)
-        take_all(self.lines, self._statement, self.refusals, options)
+        take_all(self.lines, self._statement, self.moves, self.refusals, options)
+        self.moves.hold(self.active.named)
+        self.moves.hold_mentioned(
+            (line.begin, line.end) for line in self.lines if not is_declaration(line.text)
+        )
         return self.moves.program(dialect, words=words)
 
     def _mentioned(self, line: Line) -> None:
@@ -113,9 +118,15 @@ class _Reader:
         self.turning.take(line)
         move = _MOVE.fullmatch(text)
         if move is not None:
-            self._move(line, move[1].upper(), line.begin + move.start(2))
-            self.triggered = False
+            try:
+                self._move(line, move[1].upper(), line.begin + move.start(2))
+            finally:
+                self.triggered = False
             return
+        distance = _DISTANCE.match(text)
+        if distance is not None:
+            what = f"{distance[1].decode().upper()} goes a distance from where the robot is"
+            raise DecidedInRun(what, line=line.line, code="OLP533")
         other = _OTHER_MOVE.match(text)
         if other is not None:
             what = f"{other[1].decode().upper()} is not read; post straight moves to positions"
@@ -332,6 +343,7 @@ class _Reader:
         name = _NAME.fullmatch(self.data, *span)
         if numbers is None and name is not None:
             numbers = self._position(name[1], name[2], line)[1]
+            self.moves.hold([name[1].decode("latin-1")])
         if numbers is None:
             raise self._computed(span, line)
         return pose_of(numbers, line.line)
@@ -340,14 +352,14 @@ class _Reader:
         """A position with a name. Raises ProgramError where the text does not state it with its numbers."""
         key = key_of(name, index)
         if index is not None and not index.strip().isdigit():
-            raise ProgramError(
+            raise DecidedInRun(
                 f"the position {key} is chosen in the run; program it with its number",
                 line=line.line,
                 code="OLP533",
             )
         found = self.declared.value(key, line.line, "the position")
         if found is None:
-            raise ProgramError(
+            raise DecidedInRun(
                 f"the position {key} is not stated in this text; give the .dat file beside it, or declare it "
                 "with its numbers",
                 line=line.line,
@@ -377,9 +389,9 @@ class _Reader:
             )  # fmt: skip
         return self.targets[numbers.span], NOWHERE if name is None else span
 
-    def _computed(self, span: Span, line: Line) -> ProgramError:
+    def _computed(self, span: Span, line: Line) -> DecidedInRun:
         shown = self.data[slice(*span)][:60].decode("latin-1")
-        return ProgramError(
+        return DecidedInRun(
             f"the target `{shown}` is computed, or lacks numbers; program it with its numbers",
             line=line.line,
             code="OLP533",

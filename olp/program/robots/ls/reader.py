@@ -20,7 +20,7 @@ from olp.program.robots.poses import Pose, of_zyx, rotated
 from olp.program.robots.targets import Span, Use
 
 _MOVE = pattern(
-    rb"(?i)\s*([LJ])\s+(PR?)\[\s*(\d+)\s*(?::[^\]]*)?\]\s+(?:(\d+\.?\d*)\s*(mm/sec|cm/min|inch/min|%|deg/sec|"
+    rb"(?i)\s*([LJ])\s+(PR?)\[\s*(\d+|R\[[^\]]*\])\s*(?::[^\]]*)?\]\s+(?:(\d+\.?\d*)\s*(mm/sec|cm/min|inch/min|%|deg/sec|"
     rb"sec|msec)|(R\[[^\]]*\]\S*|\S+))\s+(FINE|CNT\s*\d+|CNT\s*R\[[^\]]*\]|CD\d+|CR\d+)?(.*)"
 )
 #: The same of an arc, whose via point stands first.
@@ -31,7 +31,7 @@ _OTHER_MOVE = pattern(rb"(?i)\s*[CASLJ]\s+PR?\[")
 _OFFSET = pattern(rb"(?i)\b(Tool_Offset|Offset|WZVersatz|Versatz)\b\s*(?:,\s*PR\[\s*(\d+)[^\]]*\])?")
 _INCREMENT = pattern(rb"(?i)\bINC\b")
 _COORD = pattern(rb"(?i)\bCOORD\b")
-_SKIP = pattern(rb"(?i)\bSkip\b")
+_SKIP = pattern(rb"(?i)\bSkip(?:Jump)?\b")
 _INDEX = rb"\[[^\]]*\]"
 _VALUE = rb"(?:[-+]?\d*\.?\d+|R" + _INDEX + rb")"
 _SEAM = rb":?\s*(?:Arc|Weld)\s+(?:Start|End)\s*" + _INDEX
@@ -39,8 +39,8 @@ _SEAM = rb":?\s*(?:Arc|Weld)\s+(?:Start|End)\s*" + _INDEX
 _PLAIN_TAIL = rb"ACC\s*" + _VALUE + rb"|PTH|(?:Ind\.)?EV\s*\d+\s*%|" + _SEAM
 #: Words that belong to the whole move, or to one of its ends, so that it is never split.
 _WHOLE_TAIL = (
-    rb"Skip\s*,\s*LBL" + _INDEX + rb"(?:\s*,\s*PR" + _INDEX + rb"\s*=\s*[LJ]POS)?|(?:AP|RT)_LD\s*\d+|"
-    rb"T[AB]\s*" + _VALUE + rb"\s*sec\s*,.*|DB\s*" + _VALUE + rb"\s*mm\s*,.*"
+    rb"Skip(?:Jump)?\s*,\s*LBL" + _INDEX + rb"(?:\s*,\s*PR" + _INDEX + rb"\s*=\s*[LJ]POS)?|"
+    rb"(?:AP|RT)_LD\s*\d+|T[AB]\s*" + _VALUE + rb"\s*sec\s*,.*|DB\s*" + _VALUE + rb"\s*mm\s*,.*"
 )  # fmt: skip
 _SHIFTED_TAIL = rb"(?:Tool_Offset|Offset|WZVersatz|Versatz)(?:\s*,\s*PR" + _INDEX + rb")?"
 _TAIL = pattern(
@@ -60,6 +60,10 @@ _SENSED = pattern(rb"(?i)\bVOFFSET\b|\bSearch\[|\bTrack\b")
 _MOVING = pattern(
     rb"(?i)\s*(?:Touch\s+Offset|Search\s+Start|Track\b|VISION\s+.*OFFSET|(?:TOOL_)?OFFSET\s+COND)"
 )
+#: The number of a position or register that a register chooses.
+_CHOSEN = -1
+_COPIED = pattern(rb"(?i)\s*PR\[[^\]]*\]\s*=(.*)")
+_NUMBERED = pattern(rb"(?i)(?<!\w)P\[\s*(\d+)")
 _ASSIGNED = pattern(rb"(?i)\s*P\[\s*(\d+)[^\]]*\]\s*=")
 #: Statements by which the tool swings about the path from here on.
 _WEAVE = pattern(rb"(?i)\s*Weave\s+(?!End\b).*")
@@ -108,6 +112,8 @@ class _Reader:
         self.registers = Registers()
         self.positions: dict[int, list[Position]] = {}
         self.known: dict[int, int] = {}
+        #: positions that registers get the numbers of
+        self.copied: list[str] = []
         self.frames: dict[tuple[int, Pose | None], Located] = {}
         self.tools: dict[tuple[int, Pose | None], Tool] = {}
         #: configurations and other groups by their text
@@ -122,7 +128,10 @@ class _Reader:
         for part in sections.get("POS", []):
             positions(self.data, part, self.positions)
         every = [line for part in sections["MN"] for line in lines(self.data, part)]
-        take_all(every, self._statement, self.refusals, options)
+        for line in every:
+            copied = _COPIED.match(line.text)
+            self.copied += [] if copied is None else [f"P[{int(n)}]" for n in _NUMBERED.findall(copied[1])]
+        take_all(every, self._statement, self.moves, self.refusals, options)
         return self.moves.program(dialect, words=words)
 
     # -- statements ----------------------------------------------------------------------------------
@@ -186,7 +195,8 @@ class _Reader:
         unit = groups[4].lower()
         feed = float(groups[3]) * _SPEEDS[unit] if unit in _SPEEDS else NAN
         return _Move(
-            groups[0].upper() == b"L", groups[1].upper() == b"PR", int(groups[2]), feed,
+            groups[0].upper() == b"L", groups[1].upper() == b"PR",
+            int(groups[2]) if groups[2].isdigit() else _CHOSEN, feed,
             unit in (b"sec", b"msec") or groups[5].lower().endswith((b"]sec", b"]msec")), groups[7],
         )  # fmt: skip
 
@@ -203,6 +213,8 @@ class _Reader:
             self.moves.left(line.line)
             what = "left as written: the text does not state where this move goes"
             self.moves.remark("left", line.line, what)
+            # it may go to a position itself, or to a register that got the numbers of one
+            self.moves.hold(self.copied if position is None else [f"P[{move.number}]"])
             return
         along_tool = shift != ZERO and _ALONG_TOOL.search(move.tail) is not None
         use = self._use(line, move.number, position, place, shift, along_tool=along_tool)
@@ -261,6 +273,9 @@ class _Reader:
         ):
             if sign.search(move.tail):
                 raise not_read(f"this move {why}, which is not read", line.line)
+        if move.number == _CHOSEN and not move.register:
+            what = "which position this move goes to is chosen in the run; program it with its number"
+            raise not_read(what, line.line)
         self._tail(move, line)
 
     def _tail(self, move: _Move, line: Line) -> None:

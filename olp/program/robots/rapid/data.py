@@ -7,7 +7,7 @@ import re
 from olp.core.errors import ProgramError
 from olp.core.patterns import pattern
 from olp.core.values import dataclass
-from olp.program.robots.moves import RobotMoves
+from olp.program.robots.moves import DecidedInRun, RobotMoves
 from olp.program.robots.poses import Pose
 from olp.program.robots.rapid.text import Statement
 from olp.program.robots.rapid.values import (
@@ -41,12 +41,13 @@ class Data:
 
 class Declared:
     """All data of a text by routine ("" for those of modules) and name in capitals. `assigned` are the lines
-    where a name gets another value."""
+    where a name gets another value, and `parameters` the names by routine that callers give values to."""
 
     def __init__(self, data: bytes, moves: RobotMoves) -> None:
         self.data, self.moves = data, moves
         self._data: dict[tuple[str, str], list[Data]] = {}
         self.assigned: dict[str, int] = {}
+        self.parameters: dict[str, list[str]] = {}
         self._targets: dict[tuple[int, int], int] = {}
 
     def declare(self, statement: Statement, routine: str) -> bool:
@@ -65,6 +66,8 @@ class Declared:
         """The data of a name and a type, None where the text declares none. Raises ProgramError where a move
         cannot rely on its value."""
         key = name.upper()
+        if key in self.parameters.get(routine, ()):
+            raise DecidedInRun(f"the caller gives {name}", line=line, code="OLP533")
         data = self._data.get((routine, key)) or self._data.get(("", key))
         if data is None:
             return None
@@ -82,7 +85,7 @@ class Declared:
                 code="OLP533",
             )
         if key in self.assigned:
-            raise ProgramError(
+            raise DecidedInRun(
                 f"{name} gets another value in line {self.assigned[key]}, so its value here depends on the "
                 "run; state it once, with its numbers",
                 line=line,
@@ -94,7 +97,7 @@ class Declared:
         """The place of a declared target. Raises ProgramError where the text does not state it."""
         data = self.find(name, b"ROBTARGET", routine, line)
         if data is None or data.value is None:
-            raise ProgramError(
+            raise DecidedInRun(
                 f"the target {name} is not stated in this text; declare it here with its numbers, or correct "
                 "the module that declares it",
                 line=line,
@@ -105,7 +108,7 @@ class Declared:
             self.moves.remark("pers", data.statement.line, what)
         match = self._element(data, ROBTARGET, index)
         if match is None:
-            raise ProgramError(
+            raise DecidedInRun(
                 f"the target {name} is not stated with its numbers in line {data.statement.line}",
                 line=line,
                 code="OLP533",

@@ -13,6 +13,7 @@ from olp.program.robots.rapid.text import Statement
 
 _ROUTINE = pattern(rb"(?i)(?:LOCAL\s+|TASK\s+)?(PROC|FUNC|TRAP|RECORD)\s+(?:\w+\s+)?(\w+)")
 _PROC = pattern(rb"(?i)(?:LOCAL\s+)?(?:PROC|TRAP)\s+(\w+)")
+_PARAMETER = pattern(rb"(\w+)\s*(?:\{[^}]*\}\s*)?(?=[,|)])")
 _WORD = pattern(rb"\s*([A-Za-z]\w*)")
 _SHORT_IF = pattern(rb"(?is)\s*IF\b")
 _HARMLESS_TAIL = pattern(
@@ -36,6 +37,12 @@ def word_of(statement: Statement) -> bytes:
     """The first word of a statement in capitals; empty where it has none."""
     match = _WORD.match(statement.text)
     return b"" if match is None else match[1].upper()
+
+
+def parameters_of(statement: Statement) -> list[str]:
+    """The names that callers give values to, in capitals, of the routine that a statement begins."""
+    given = statement.text.partition(b"(")[2]
+    return [name.decode("latin-1").upper() for name in _PARAMETER.findall(given)]
 
 
 def is_short_if(statement: Statement) -> bool:

@@ -11,11 +11,11 @@ from olp.core.machine import Setup
 from olp.program.dialect import Dialect, Options, Support
 from olp.program.program import Program
 from olp.program.robots.frames import Located, Tool
-from olp.program.robots.moves import RobotMoves, take_all
+from olp.program.robots.moves import DecidedInRun, RobotMoves, take_all
 from olp.program.robots.poses import NO_TURN, inverted, multiplied, of_zyx, rotated
 from olp.program.robots.rapid import flow
 from olp.program.robots.rapid.data import Declared
-from olp.program.robots.rapid.table import TABLE
+from olp.program.robots.rapid.table import SIGNALLED, TABLE
 from olp.program.robots.rapid.text import Lines, Statement, statements
 from olp.program.robots.rapid.values import JOINTTARGET, ROBTARGET, joints_of, target_of
 from olp.program.robots.rapid.words import Words, moved, name_of, words_of
@@ -26,6 +26,8 @@ _KNOWN = frozenset((b"V", b"Z", b"INPOS", b"CONC", b"TLOAD", b"NOEOFFS"))
 #: What ends a routine, or a record, behind END.
 _ROUTINES = frozenset((b"PROC", b"FUNC", b"TRAP", b"RECORD"))
 _NOT_READ = "OLP512"
+#: What moves the values of external axes alone, which carry the robot where it is on a track.
+_OUTER = (b"EOFFSON", b"EOFFSSET")
 
 
 def read(
@@ -64,7 +66,8 @@ class _Reader:
         self.any_area = next((area for area in areas if area[0]), self.area)
         modes = ((flow.arc_mode_of(statement), statement.line) for statement in rest)
         self.arc_mode = next((mode for mode in modes if mode[0]), ("", 0))
-        take_all(rest, self._statement, self.refusals, options)
+        take_all(rest, self._statement, self.moves, self.refusals, options)
+        self.moves.hold_mentioned((statement.begin, statement.end) for statement in every)
         return self.moves.program(dialect, words=words)
 
     def _declare(self, every: list[Statement]) -> list[Statement]:
@@ -73,6 +76,7 @@ class _Reader:
         for statement in every:
             if statement.block == "routine":
                 routine = flow.routine_of(statement)
+                self.declared.parameters[routine] = flow.parameters_of(statement)
                 inside = statement.text.upper().split()[-2:-1] == [b"RECORD"]
             elif statement.block == "end":
                 inside = False
@@ -101,7 +105,9 @@ class _Reader:
             return
         word = flow.word_of(statement)
         if word in (b"MOVEL", b"MOVEJ"):
-            self._move(statement, straight=word == b"MOVEL")
+            self._move(statement, word)
+        elif word in SIGNALLED:
+            self._move(statement, word, signal=SIGNALLED[word])
         elif word == b"MOVEC":
             self._arc(statement)
         elif word == b"MOVEABSJ":
@@ -118,8 +124,12 @@ class _Reader:
         row = TABLE.get(word)
         if row is None:
             self._call(statement, word)
+        elif word in _OUTER and self.moves.setup.machine.track is None:
+            return
         elif row[0] is Support.REFUSED:
             raise ProgramError(f"{word.decode('latin-1')} {row[1]}", line=statement.line, code=_NOT_READ)
+        elif word == b"SOFTACT":
+            self.moves.remark("soft", statement.line, row[1])
         elif word == b"SINGAREA":
             self.area = flow.area_of(statement), statement.line
         elif word in (b"CONFL", b"CONFJ"):
@@ -185,14 +195,16 @@ class _Reader:
 
     # -- moves ---------------------------------------------------------------------------------------
 
-    def _move(self, statement: Statement, *, straight: bool) -> None:
-        words = words_of(statement, statement.begin + len(b"MoveL"), self.data)
+    def _move(self, statement: Statement, word: bytes, *, signal: int = 0) -> None:
+        """A move. One with so many arguments of a `signal`, which belongs to its end, is never split."""
+        straight = word.startswith(b"MOVEL")
+        words = words_of(statement, statement.begin + len(word), self.data, signal=signal)
         self._refuse_words(statement, words, led=straight)
         line, use = statement.line, self._use(statement, words.target, words.zone, straight=straight)
         tool, frame = self._tool(words.tool, line), self._frame(words.frame, line)
         feed = self.declared.speed(words.others.get(b"V", words.speed), self.routine, line)
         self._loop_begins()
-        whole = b"CONC" in words.others
+        whole = signal > 0 or b"CONC" in words.others
         self.moves.move(line, use, frame, tool, feed, straight=straight, whole=whole)
 
     def _arc(self, statement: Statement) -> None:
@@ -302,7 +314,7 @@ class _Reader:
         name = name_of(self.data[slice(*span)])
         if name is None:
             shown = self.data[slice(*span)].decode("latin-1").strip()[:60]
-            raise ProgramError(
+            raise DecidedInRun(
                 f"the target `{shown}` is computed; program it with its numbers", line=line, code="OLP533"
             )
         return self.declared.target(*name, self.routine, line), span

@@ -18,6 +18,18 @@ _APPLICATION = "is a move of an application package with words of its own; post 
 _AXES = "moves single axes past the targets"
 _OTHER = "is a second move at the same time; correct each robot by itself"
 
+#: Moves with an action at their end, and how many arguments that has.
+SIGNALLED: Mapping[bytes, int] = {
+    b"MOVELDO": 2,
+    b"MOVEJDO": 2,
+    b"MOVELAO": 2,
+    b"MOVEJAO": 2,
+    b"MOVELGO": 2,
+    b"MOVEJGO": 2,
+    b"MOVELSYNC": 1,
+    b"MOVEJSYNC": 1,
+}
+
 TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"MOVEL": (_C, "a straight move to a target with numbers, Offs or RelTool of one, or an array element"),
     b"MOVEJ": (_C, "corrected at its end; the path of the joints is not judged"),
@@ -31,25 +43,27 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"CONST": (_X, "other constants and variables"),
     b"MODULE": (_X, ""),
     b"CIRPATHMODE": (_R, "with CirPointOri or Wrist45 ... an arc is refused"),
+    b"SOFTACT": (_R, "the axes are soft from here on: what the load does to the path is not corrected"),
     b"SINGAREA": (_R, "with Wrist or LockAxis4 a straight move of an arm is refused"),
     b"PROC": (_R, "where its first move comes from is not known: it is corrected at its end"),
     b"IF": (_R, "behind moves that may not run, the next one is corrected at its end"),
     b"CALL": (_R, "behind a routine that may move, the next move is corrected at its end"),
-    b"ASSIGNMENT": (_X, "unless it changes a target, tool or frame that a move uses: then refused"),
+    b"ASSIGNMENT": (_X, "moves to what it changes, or with such a tool or frame, are left as written"),
     **dict.fromkeys(
         (b"TRIGGC", b"MOVECDO", b"MOVECAO", b"MOVECGO", b"MOVECSYNC"),
         (_NO, "is an arc with an action; post MoveC and the action by themselves"),
     ),
     **dict.fromkeys(
-        (b"MOVELDO", b"MOVEJDO", b"MOVELAO", b"MOVEJAO", b"MOVELGO", b"MOVEJGO", b"MOVELSYNC", b"MOVEJSYNC",
-         b"TRIGGL", b"TRIGGJ", b"TRIGGLIOS", b"TRIGGABSJ"),
+        (b"TRIGGL", b"TRIGGJ", b"TRIGGLIOS", b"TRIGGABSJ"),
         (_NO, "is a move with an action on the way, which is not read yet"),
     ),
     **dict.fromkeys((b"SEARCHL", b"SEARCHC", b"SEARCHJ", b"CONTACTL"), (_NO, _COMPUTED)),
-    **dict.fromkeys((b"PDISPON", b"PDISPSET", b"EOFFSON", b"EOFFSSET"), (_NO, _MOVED)),
+    **dict.fromkeys((b"PDISPON", b"PDISPSET"), (_NO, _MOVED)),
+    **dict.fromkeys((b"EOFFSON", b"EOFFSSET"), (_NO, "moves an arm along its track; elsewhere it is kept")),
+    **dict.fromkeys(SIGNALLED, (_C, "as MoveL or MoveJ; never split, as the action belongs to its end")),
     **dict.fromkeys(
         (b"CORRCON", b"CORRWRITE", b"EGMACTPOSE", b"EGMACTJOINT", b"EGMACTMOVE", b"EGMRUNPOSE",
-         b"EGMRUNJOINT", b"EGMMOVEL", b"EGMMOVEC", b"EGMSTREAMSTART", b"SOFTACT", b"CONTACTL"),
+         b"EGMRUNJOINT", b"EGMMOVEL", b"EGMMOVEC", b"EGMSTREAMSTART", b"CONTACTL"),
         (_NO, _PATH),
     ),
     **dict.fromkeys(

@@ -12,8 +12,11 @@ from olp.program.robots.rapid.values import NUMBER
 from olp.program.robots.targets import NOWHERE, Span
 
 _NESTED = rb"\[(?:[^\[\]]|\[(?:[^\[\]]|\[[^\[\]]*\])*\])*\]"
+#: What may stand in parentheses, which hold further ones.
+_INNER = rb"[^()\[\]]|" + _NESTED
+_PARENS = rb"\((?:" + _INNER + rb"|\((?:" + _INNER + rb"|\((?:" + _INNER + rb")*\))*\))*\)"
 #: An argument up to its comma, brackets whole.
-_ARGUMENT = pattern(rb"(?:[^,\[\](){}]|" + _NESTED + rb"|\((?:[^()\[\]]|" + _NESTED + rb")*\)|\{[^{}]*\})+")
+_ARGUMENT = pattern(rb"(?:[^,\[\](){}]|" + _NESTED + rb"|" + _PARENS + rb"|\{[^{}]*\})+")
 #: A move without further words.
 _PLAIN = pattern(
     rb"(?i)\s*(\w+|\[[^;()\\]*?\]\s*\])\s*,\s*(\w+)\s*,\s*(\w+)\s*,\s*(\w+)\s*(?:\\WObj\s*:=\s*(\w+)\s*)?"
@@ -43,10 +46,10 @@ class Words:
     others: dict[bytes, bytes]
 
 
-def words_of(statement: Statement, begin: int, data: bytes, *, arc: bool = False) -> Words:
-    """The words of a move whose name ends at byte `begin`, those of an `arc` with a via point. Raises
-    ProgramError where it has others."""
-    plain = None if arc else _PLAIN.fullmatch(data, begin, statement.end)
+def words_of(statement: Statement, begin: int, data: bytes, *, arc: bool = False, signal: int = 0) -> Words:
+    """The words of a move whose name ends at byte `begin`, those of an `arc` with a via point. At the
+    end may stand arguments of a `signal`. Raises ProgramError where it has others."""
+    plain = None if arc or signal else _PLAIN.fullmatch(data, begin, statement.end)
     if plain is not None:
         tool, frame = plain[4].decode("latin-1"), (plain[5] or b"wobj0").decode("latin-1")
         return Words(NOWHERE, plain.span(1), plain[2], plain.span(3), tool, frame, {})
@@ -64,14 +67,14 @@ def words_of(statement: Statement, begin: int, data: bytes, *, arc: bool = False
             pieces.append(((start, start + len(main.strip())), main.strip()))
             stop = match.end() if mark < len(text) else pieces[-1][0][1]
             pieces[-1] = ((start, stop), main.strip())
-    if len(pieces) != 4 + arc:
+    if len(pieces) != 4 + arc + signal:
         expected = "via point, target" if arc else "target"
         raise ProgramError(
             f"the move has {len(pieces)} arguments; expected {expected}, speed, zone and tool",
             line=statement.line,
             code="OLP516",
         )
-    *through, target, speed, zone, tool = pieces
+    *through, target, speed, zone, tool = pieces[: 4 + arc]
     first = (target[0][0], target[0][0] + len(target[1]))
     return Words(
         through[0][0] if through else NOWHERE, first, speed[1], zone[0], tool[1].decode("latin-1"),

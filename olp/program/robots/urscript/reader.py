@@ -16,7 +16,7 @@ from olp.core.values import dataclass
 from olp.program.dialect import Dialect, Options, Support
 from olp.program.program import Program
 from olp.program.robots.frames import Located, Tool
-from olp.program.robots.moves import NAN, RobotMoves, take_all
+from olp.program.robots.moves import NAN, DecidedInRun, RobotMoves, take_all
 from olp.program.robots.poses import Pose, of_vector
 from olp.program.robots.targets import NOWHERE, Span, Use
 from olp.program.robots.urscript.table import TABLE
@@ -103,8 +103,16 @@ class _Reader:
     def run(self, dialect: Dialect, options: Options, *, words: bool) -> Program:
         every = [line for line in _lines(self.data) if line.text.strip()]
         self._assignments(every)
-        take_all(every, self._statement, self.refusals, options)
+        take_all(every, self._statement, self.moves, self.refusals, options)
+        self.moves.hold_mentioned(self._statements(every))
         return self.moves.program(dialect, words=words)
+
+    def _statements(self, every: list[_Line]) -> Iterator[Span]:
+        """The bytes of all lines but those that state poses with a name."""
+        stated = {named.line for named in self.poses.values()}
+        for line in every:
+            if line.line not in stated:
+                yield line.begin, line.begin + len(line.text)
 
     def _assignments(self, every: list[_Line]) -> None:
         """Keep poses with a name, and the names that get several values."""
@@ -350,9 +358,9 @@ class _Reader:
             )  # fmt: skip
         return self.targets[key], span, NOWHERE if named is None else span, frame
 
-    def _computed(self, line: _Line, text: bytes) -> ProgramError:
+    def _computed(self, line: _Line, text: bytes) -> DecidedInRun:
         shown = text.strip()[:60].decode("latin-1")
-        return ProgramError(
+        return DecidedInRun(
             f"the target `{shown}` is computed, or gets several values; program it with its numbers",
             line=line.line,
             code="OLP533",

@@ -9,7 +9,7 @@ from olp.core.errors import ProgramError
 from olp.core.patterns import pattern
 from olp.core.values import dataclass
 from olp.program.robots.line import Line
-from olp.program.robots.moves import NAN, RobotMoves
+from olp.program.robots.moves import NAN, DecidedInRun, RobotMoves
 from olp.program.robots.poses import NO_TURN, Quaternion, inverted, multiplied, rotated
 from olp.program.robots.targets import NOWHERE, Span, Use
 from olp.program.robots.val3.code import Routine, lines_in
@@ -223,13 +223,14 @@ class Moving:
         match = REFERENCE.fullmatch(text)
         if match is not None and not self.state.knows(match[1].decode("latin-1"), scope):
             what = f"the target {shown} is not stated; give the data (.dtx) and project (.pjx) beside it"
-        raise ProgramError(what, line=line.line, code="OLP533")
+        raise DecidedInRun(what, line=line.line, code="OLP533")
 
     def _of_thing(self, thing: Thing, span: Span, line: Line) -> _Goal:
         slots = thing.known()
         if slots is None or any(own == NOWHERE for own, _ in slots):
             why = thing.why or "the text does not state all its numbers here"
-            raise ProgramError(f"the target {thing.shown}: {why}", line=line.line, code="OLP533")
+            refusal = DecidedInRun if thing.why or thing.version else ProgramError
+            raise refusal(f"the target {thing.shown}: {why}", line=line.line, code="OLP533")
         return _Goal(thing.kind, slots, dict(thing.words), thing.father, thing, span)
 
     def _moved(self, begin: int, end: int, word: bytes, scope: Scope, line: Line) -> _Goal:
@@ -245,7 +246,7 @@ class Moving:
             or goal.shift != (0.0, 0.0, 0.0)
             or goal.axes != NO_TURN
         ):
-            raise ProgramError(
+            raise DecidedInRun(
                 f"{word.decode()} is read of a point and numbers, and not of another one",
                 line=line.line,
                 code="OLP533",

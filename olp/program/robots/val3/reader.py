@@ -15,7 +15,7 @@ from olp.core.projects import parts, place_of
 from olp.program.dialect import Dialect, Options
 from olp.program.program import Program
 from olp.program.robots.line import Line
-from olp.program.robots.moves import RobotMoves, not_read
+from olp.program.robots.moves import DecidedInRun, RobotMoves, not_read
 from olp.program.robots.val3 import table
 from olp.program.robots.val3.assigning import assign, is_assignment
 from olp.program.robots.val3.code import Block, Node, Routine, lines_in, word_of
@@ -75,6 +75,9 @@ class _Reader:
             first_error.others = tuple(self.refusals[1:])
             raise first_error
         self.moving.check(self.reach)
+        routines = self.application.routines.values()
+        lines = [line for routine in routines for line in lines_in(routine.nodes)]
+        self.moves.hold_mentioned((line.begin, line.end) for line in lines)
         self._count_files()
         return self.moves.program(dialect, words=words)
 
@@ -100,6 +103,8 @@ class _Reader:
                 return False
             try:
                 self._statement(node, scope, depth)
+            except DecidedInRun as error:
+                self.moves.decided(error)
             except ProgramError as error:
                 self.refusals.append(error)
                 self.moves.known = False

@@ -1,0 +1,161 @@
+"""Moves about which the run decides are left as written, and so is what they go by."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from judge import machines
+from judge.arm import Arm, quaternion
+from judge.arm_files import MACHINE, arm_files
+from judge.machines import Recipe
+
+import olp
+from olp.core.errors import ProgramError
+
+QUIET: dict[str, dict[str, object]] = {"tools": {}, "job_defaults": {}, "work_offsets": {}}
+POSE = "[[250,200,-100],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
+RAPID = f"""MODULE Made
+  CONST robtarget p10:={POSE};
+  CONST robtarget p20:=[[350,200,-100],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];
+  VAR num deep;
+  PROC main()
+    MoveL p10,v100,fine,tool0;
+    MoveL Offs(p10,0,0,10*(deep+(1))),v100,fine,tool0;
+    MoveL p20,v100,fine,tool0;
+  ENDPROC
+ENDMODULE
+"""
+KRL = """DEF made()
+  $BASE=$NULLFRAME
+  $TOOL=$NULLFRAME
+  LIN XP1
+  XP3=XP1
+  XP3.Z=XP3.Z+10
+  LIN XP3
+  LIN XP2
+END
+DEFDAT made
+DECL E6POS XP1={X 250,Y 200,Z -100,A 0,B 0,C 0}
+DECL E6POS XP2={X 350,Y 200,Z -100,A 0,B 0,C 0}
+DECL E6POS XP3
+ENDDAT
+"""
+SCRIPT = """def made():
+  set_tcp(p[0,0,0,0,0,0])
+  P1=p[0.25,0.2,-0.1,0,0,0]
+  P2=p[0.35,0.2,-0.1,0,0,0]
+  movel(P1,a=1,v=0.1)
+  movel(pose_add(P1,shift),a=1,v=0.1)
+  movel(P2,a=1,v=0.1)
+end
+"""
+PLACE = "X = {} mm, Y = 200.0 mm, Z = -100.0 mm,\n\tW = 0.0 deg, P = 0.0 deg, R = 0.0 deg"
+TP = "/PROG MADE\n/MN\n"
+for _number, _move in enumerate(("P[1]", "PR[3]", "P[2]", "PR[R[4]]"), 1):
+    TP += f"  {_number}:L {_move} 100mm/sec FINE ;\n"
+TP += "  5:  PR[3]=P[1] ;\n/POS\n"
+for _number in (1, 2):
+    TP += f"P[{_number}]{{\n GP1:\n\tUF : 0, UT : 0, CONFIG : 'N U T, 0, 0, 0',\n"
+    TP += f"\t{PLACE.format(150.0 + 100 * _number)}\n}};\n"
+TP += "/END\n"
+#: By language: the control, the text, and the line whose target a left move goes by.
+TEXTS = {
+    "rapid": ("abb-rapid", RAPID, "CONST robtarget p10:="),
+    "krl": ("kuka-krl", KRL, "DECL E6POS XP1="),
+    "ur": ("urscript", SCRIPT, "P1=p["),
+    "tp": ("fanuc-tp", TP, "P[1]{"),
+}
+
+
+@pytest.fixture(scope="module")
+def bent(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    folder = tmp_path_factory.mktemp("bent")
+    return {
+        key: machines.random_machine(folder / key, 7, Recipe(controller=name, **QUIET))
+        for key, (name, *_) in TEXTS.items()
+    }
+
+
+@pytest.mark.parametrize("key", TEXTS)
+def test_what_a_left_move_goes_by_keeps_its_bytes(bent: dict[str, Path], key: str) -> None:
+    _, text, head = TEXTS[key]
+    done = olp.correct(text.encode(), bent[key])
+    written = done.data.decode()
+    told = [finding["message"] for finding in done.report["findings"]]
+    assert any("left as written" in message for message in told)
+    begin = text.index(head)
+    whole = text[begin : text.index("};" if key == "tp" else "\n", begin)]
+    assert whole in written, "what is copied or shifted in the run stays as it is"
+    missing = [line for line in text.splitlines() if line not in written.splitlines()]
+    assert len(missing) >= 2, "the move to it goes to a clone, and the other target is corrected"
+    assert done.report["verdict"]["ok"]
+
+
+def test_a_program_of_left_moves_alone_is_refused(bent: dict[str, Path]) -> None:
+    text = RAPID.replace("MoveL p10,", "MoveL Offs(p10,deep,0,0),").replace("MoveL p20", "MoveL pElse")
+    with pytest.raises(ProgramError, match="is computed") as caught:
+        olp.correct(text.encode(), bent["rapid"])
+    assert (caught.value.code, caught.value.line) == ("OLP533", 6)
+
+
+def test_a_parameter_hides_a_target_of_its_name(bent: dict[str, Path]) -> None:
+    routine = "  PROC go(robtarget p10,num n)\n    MoveL p10,v100,fine,tool0;\n  ENDPROC\nENDMODULE\n"
+    text = RAPID.replace("ENDMODULE\n", routine)
+    done = olp.correct(text.encode(), bent["rapid"])
+    assert routine in done.data.decode(), "the caller gives where this move goes"
+
+
+def test_on_an_arm_too(tmp_path: Path) -> None:
+    joints, outer = [5.0, 10.0, 20.0, 5.0, 60.0, 0.0], [9e9] * 6
+    begin = f"MoveAbsJ {[joints, outer]},v100,fine,tool0;"
+    text = RAPID.replace("MoveL p10,", f"{begin} MoveL p10,")
+    for (x, y, z), k in (((250, 200, -100), 0), ((350, 200, -100), 1)):
+        rotation, place = Arm(MACHINE).pose(np.array(joints) + 2 * k)
+        own = [place.round(3).tolist(), quaternion(rotation).round(9).tolist()]
+        text = text.replace(f"[[{x},{y},{z}],[1,0,0,0]", str(own)[:-1].replace(" ", ""))
+    done = olp.correct_joints(text.encode(), arm_files(tmp_path))
+    written, head = done.data.decode(), "  CONST robtarget {}:="
+    lines = {name: next(x for x in text.splitlines() if head.format(name) in x) for name in ("p10", "p20")}
+    assert lines["p10"] in written
+    assert "MoveL p10_olp1," in written
+    assert lines["p20"] not in written
+
+
+def test_a_frame_that_is_a_target_too_stays(bent: dict[str, Path]) -> None:
+    text = KRL.replace("  XP3=XP1\n  XP3.Z=XP3.Z+10\n  LIN XP3\n", "  $BASE=XP1\n").replace(
+        "X 350,Y 200,Z -100", "X 50,Y 10,Z 5"
+    )
+    done = olp.correct(text.encode(), bent["krl"])
+    assert done.report["verdict"]["ok"]
+    assert "DECL E6POS XP1={X 250,Y 200,Z -100,A 0,B 0,C 0}" in done.data.decode()
+    assert "LIN XP1_olp1" in done.data.decode()
+
+
+def test_older_inline_forms_set_base_and_tool(bent: dict[str, Path]) -> None:
+    """BAS(#FRAMES) takes both from FDAT_ACT, whatever was in force before."""
+    text = KRL.replace("  $TOOL=$NULLFRAME\n", "  $TOOL=$NULLFRAME\n  FDAT_ACT=FP1\n  BAS(#FRAMES)\n")
+    text = text.replace(
+        "DECL E6POS XP2", "DECL FDAT FP1={TOOL_NO 0,BASE_NO 3,IPO_FRAME #BASE}\nDECL E6POS XP2"
+    )
+    with pytest.raises(ProgramError, match="BASE3"):
+        olp.correct(text.encode(), bent["krl"])
+
+
+@pytest.mark.parametrize("word", ["MoveLDO", "MoveLSync"])
+def test_an_action_at_the_end_keeps_a_move_whole(bent: dict[str, Path], word: str) -> None:
+    action = "do1,1" if word == "MoveLDO" else '"shoot"'
+    start = "    MoveL [[20,20,-300],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;\n"
+    text = RAPID.replace("    MoveL p10,v100,fine,tool0;\n", start)
+    text = text.replace("    MoveL p20,v100,fine,tool0;", f"    {word} p20,v100,fine,tool0,{action};")
+    text = text.replace("    MoveL Offs(p10,0,0,10*(deep+(1))),v100,fine,tool0;\n", "")
+    written = olp.correct(text.encode(), bent["rapid"], tolerance_um=300.0).data.decode()
+    assert written.count(f"{word} p20,v100,fine,tool0,{action};") == 1
+    assert "[350,200,-100]" not in written
+
+
+def test_a_jump_leaves_where_a_move_ends_open(bent: dict[str, Path]) -> None:
+    text = TP.replace("L P[1] 100mm/sec FINE ;", "L P[1] 100mm/sec FINE SkipJump,LBL[3] ;")
+    told = olp.correct(text.encode(), bent["tp"]).report["findings"]
+    assert any("SkipJump" not in f["message"] and f["line"] == 3 for f in told)
