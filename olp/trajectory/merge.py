@@ -75,11 +75,20 @@ def merged(route: Route, *, pairs: bool = False) -> Route | None:
 def shared(motion: Motion) -> Motion:
     """A motion of overlapped moves, where a corner belongs to the later move. Where steps were left out, its
     first half goes to the move before it: there the later move is far behind the next step of the program."""
-    corner = 1 + np.flatnonzero(np.diff(motion.line) > 1)
-    corner = corner[motion.path[motion.shape[corner], 2:].any(axis=(1, 2))]
+    bent = np.asarray(motion.path[motion.shape, 2:].any(axis=(1, 2)))
+    first = 1 + np.flatnonzero(np.diff(motion.line) > 1)
+    first = first[bent[first]]
+    # an overlap of several parts has a part that ends in its middle
+    change = 1 + np.flatnonzero((np.diff(motion.line) != 0) | np.diff(bent))
+    last = np.append(change, len(motion))[np.searchsorted(change, first, side="right")]
+    middle = 0.5 * (motion.start_s[first] + motion.start_s[last])
+    line = motion.line.copy()
+    for a, b, at_s in zip(first.tolist(), last.tolist(), middle.tolist(), strict=True):
+        if b > a + 1:
+            line[a : a + int(np.abs(motion.start_s[a : b + 1] - at_s).argmin())] = line[a - 1]
+    corner, middle = first[last == first + 1], middle[last == first + 1]
     begin = motion.start_s[corner]
-    middle = begin + 0.5 * (motion.start_s[corner + 1] - begin)
-    half, line = motion.time[corner], motion.line.copy()
+    half = motion.time[corner]
     half[:, 0] += (middle - begin) * half[:, 1]
     line[corner] = line[corner - 1]
     return Motion(

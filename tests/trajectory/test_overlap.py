@@ -83,14 +83,16 @@ def corners(route: Route, parts) -> None:
         tolerance = route.tolerance_mm[group == i].min()
         first = int(np.searchsorted(parts.segment, k, side="left"))
         begin = np.array([first])
-        length = motion.start_s[first + 1] - motion.start_s[first]
+        # an overlap has more parts than one where the jerk of a move changes within it
+        bent = motion.path[motion.shape[first:], 2:].any(axis=(1, 2)) & (parts.segment[first:] == k)
+        end = first + max(int(np.argmin(np.append(bent, False))), 1)
         if tolerance <= 0.0:
             position, velocity, acceleration, _ = motion.of(begin, np.zeros(1))
             assert np.abs(position[0] - route.point_mm[k]).max() <= 1e-9 + 1e-14 * size
             assert np.abs(velocity).max() <= 1e-9 and np.abs(acceleration).max() <= 1e-6
         else:
-            u = np.linspace(0.0, length, 33)
-            near = np.sqrt(((motion.of(np.full(33, first), u)[0] - route.point_mm[k]) ** 2).sum(axis=1))
+            t = np.linspace(motion.start_s[first], motion.start_s[end], 33)
+            near = np.sqrt(((motion.at(t)[0] - route.point_mm[k]) ** 2).sum(axis=1))
             assert near.min() <= tolerance * (1 + 1e-6) + 1e-9 + 1e-14 * size
 
 
@@ -165,6 +167,30 @@ def test_an_overlap_saves_time():
     still = overlap(route_of(points, tolerance=0.0), LIMITS).duration_s
     times = [overlap(route_of(points, tolerance=t), LIMITS).duration_s for t in (1e-3, 1e-2, 1e-1)]
     assert still > times[0] > times[1] > times[2]
+
+
+def longest(points, tolerance):
+    """Seconds that the moves to and from the second of three points overlap."""
+    stops, cut = (overlap(route_of(points, tolerance=t), LIMITS).duration_s for t in (0.0, tolerance))
+    return stops - cut
+
+
+def test_a_corner_uses_the_tolerance_on_both_sides():
+    """With one side, equal moves at right angles overlap for (48 tolerance / (sqrt(2) jerk))^(1/3)."""
+    for tolerance in (0.002, 0.02):
+        one_side = np.cbrt(48.0 * tolerance / (np.sqrt(2.0) * 1e5))
+        saved = longest([[0, 0, 0], [20, 0, 0], [20, 20, 0]], tolerance)
+        # the path may be 1 + sqrt(2) times as far from the corner of its lines
+        assert saved == pytest.approx(one_side * np.cbrt(1.0 + np.sqrt(2.0)), rel=0.02)
+
+
+def test_moves_overlap_for_nearly_all_of_their_ramps():
+    """At 100 mm/s a ramp takes 2 sqrt(100 / 1e5) s, a jerk phase half of it."""
+    ramp = 2.0 * np.sqrt(100.0 / 1e5)
+    saved = longest([[0, 0, 0], [50, 0, 0], [50, 50, 0]], 0.5)
+    assert 0.9 * ramp < saved < ramp
+    parts = check(route_of([[0, 0, 0], [50, 0, 0], [50, 50, 0]], tolerance=0.5))
+    assert (parts.motion.path[parts.motion.shape, 2:].any(axis=(1, 2))).sum() >= 3
 
 
 def test_no_motion():
