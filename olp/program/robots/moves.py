@@ -98,8 +98,8 @@ class RobotMoves:
         self._feed = NAN
         #: where the carriage of an arm is, and frames that count from there
         self._away: float | None = None
-        #: where the last move ended: its frame, its tool, the place in mm, and the external axes
-        self._at: tuple[Located, Tool, Vector, tuple[float, ...]] | None = None
+        #: the frame and the tool of the last move, and how it uses its target
+        self._at: tuple[Located, Tool, Use] | None = None
         self._on_track: dict[tuple[str, float], Pose] = {}
         self._first_turns: dict[str, Quaternion] = {}
         #: numbers of frames, with what they are the numbers of: two tools may have the same name
@@ -181,7 +181,7 @@ class RobotMoves:
             use.begun(before, pose, tool.pose, straight=known, whole=whole, carried=away is not None)
         )
         self.known, self._frame, self._turn, self._rest, self._feed = True, index, use.turn, target.rest, feed
-        self._at = frame, tool, self._place(use), target.outer
+        self._at = frame, tool, use
 
     def arc(
         self, line: int, via: Use, end: Use, frame: Located, tool: Tool, feed: float, *, whole: bool = False,
@@ -199,9 +199,9 @@ class RobotMoves:
                 "straight move to its start before it, with the frame and the tool of the arc",
                 line,
             )
-        if any(own != begin[3] for own in outer):
+        if any(own != self.targets[begin[2].target].outer for own in outer):
             raise not_read("an external axis moves along this arc; program straight moves", line)
-        places = [np.array(place) for place in (begin[2], self._place(via), self._place(end))]
+        places = [np.array(place) for place in map(self._place, (begin[2], via, end))]
         chords = Chords.of((places[0], places[1], places[2]), (self._turn, end.turn))
         if chords is None:
             raise not_read(

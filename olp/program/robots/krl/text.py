@@ -60,12 +60,13 @@ def lines(data: bytes) -> Iterator[Line]:
 def aggregate(data: Text, span: Span) -> Aggregate | None:
     """The aggregate that bytes are; None where they are none, or one of its components is no number."""
     values: dict[str, tuple[Span, float]] = {}
+    if data[span[0] : span[0] + 1] != b"{":
+        return None
     match = _USUAL.fullmatch(data, *span)
     if match is not None:
-        for k, (name, text) in enumerate(zip(_ORDER, match.groups(), strict=True), 1):
-            if text is not None:
-                values[name] = match.span(k), float(text)
-        large = any(abs(value) >= LARGEST for _, value in values.values())
+        numbers = [(k, float(text)) for k, text in enumerate(match.groups(), 1) if text is not None]
+        values = {_ORDER[k - 1]: (match.span(k), value) for k, value in numbers}
+        large = max(abs(value) for _, value in numbers) >= LARGEST
         return None if large else Aggregate(match.span(), values, joints=False)
     match = _AGGREGATE.fullmatch(data, *span)
     if match is None:

@@ -14,6 +14,8 @@ _OF_TAUGHT = pattern(rb"(?i)SORI_TYP\s*\(\s*(\w+)\s*\)\s*")
 _TAUGHT = pattern(rb"(?i)(\w+)\s*=\s*\{[^{}]*\bORI_TYP\s*#(\w+)")
 _ACTIVE = pattern(rb"(?i)LDAT_ACT\s*=\s*(\w+)")
 _BAS = pattern(rb"(?i)BAS\s*\(\s*#(INITMOV|CP_PARAMS)\b")
+#: How statements begin that any of these say.
+_ANY = pattern(rb"(?i)\$ORI_TYPE|LDAT_ACT|BAS\b")
 _EVEN = "#VAR"
 #: Arcs along which the tool turns with the path.
 _ALONG = pattern(rb"(?i)\$CIRC_TYPE\s*=(?!=)\s*(?!#BASE\b|SCIRC_TYP)|\bCIRC_TYP\s+#(?!BASE\b)")
@@ -26,7 +28,8 @@ class Turning:
     def __init__(self, lines: Sequence[Line]) -> None:
         self._taught: dict[bytes, str] = {}
         for line in lines:
-            taught = _TAUGHT.search(line.text)
+            # most lines are positions and moves
+            taught = _TAUGHT.search(line.text) if b"#" in line.text else None
             if taught is not None:
                 self._taught[taught[1].upper()] = "#" + taught[2].decode("latin-1").upper()
         self._active = _EVEN
@@ -38,7 +41,7 @@ class Turning:
             self._any = self._any or self._now
         self._now, self._begun = None, False
         #: the first line that lets tools turn along with arcs, 0 for none
-        self._along = next((line.line for line in lines if _ALONG.search(line.text)), 0)
+        self._along = next((n.line for n in lines if b"#" in n.text and _ALONG.search(n.text)), 0)
 
     def forget(self) -> None:
         """What is in force depends on the run from here on. Before the first statement tools turn evenly."""
@@ -48,6 +51,8 @@ class Turning:
     def take(self, line: Line) -> None:
         """Follow a statement."""
         self._begun = True
+        if _ANY.match(line.text) is None:
+            return
         stated, active, call = (form.match(line.text) for form in (_SET, _ACTIVE, _BAS))
         if stated is not None:
             self._put(self._value(stated[1]), line)

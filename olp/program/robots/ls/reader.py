@@ -252,15 +252,20 @@ class _Reader:
         along_tool: bool = False,
     ) -> Use:  # fmt: skip
         index = self._target(number, position)
-        for name, own, active in (("UFRAME", position.frame, self.registers.frame),
-                                  ("UTOOL", position.tool, self.registers.tool)):  # fmt: skip
-            if min(own, active) >= 0 and own != active:
-                what = f"P[{number}] is in {name} {own}, and {name}_NUM is {active} here: the control stops"
-                self.moves.remark(name, line.line, what)
+        active = self.registers.frame, self.registers.tool
+        if active != (-1, -1):
+            self._tell_other(line, number, (position.frame, position.tool), active)
         return Use(
             index, (line.span[0], line.span[1]), place, place, shift, self.moves.targets[index].turn,
             zone=(line.first, line.span[1]), along_tool=along_tool,
         )  # fmt: skip
+
+    def _tell_other(self, line: Line, number: int, used: tuple[int, int], active: tuple[int, int]) -> None:
+        """Tell a frame or a tool of a position that is not the active one."""
+        for name, own, other in zip(("UFRAME", "UTOOL"), used, active, strict=True):
+            if own != other and own >= 0 and other >= 0:
+                what = f"P[{number}] is in {name} {own}, and {name}_NUM is {other} here: the control stops"
+                self.moves.remark(name, line.line, what)
 
     def _begin(self, line: Line, move: _Move) -> None:
         """What counts for all moves. Raises ProgramError for words of them that are not read."""

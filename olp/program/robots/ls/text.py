@@ -16,8 +16,9 @@ _GROUP = pattern(rb"GP(\d+)\s*:")
 _COUNT = pattern(rb"(?im)^[ \t]*LINE_COUNT[ \t]*=[ \t]*(\d+)")
 _NUMBER = rb"([-+]?(?:\d+\.?\d*|\.\d+))"
 _AXIS = pattern(rb"\b(X|Y|Z|W|P|R|E\d|J\d)\s*=\s*(?:" + _NUMBER + rb"|\*+)\s*([A-Za-z]+\b(?!\s*=))?")
-#: Units of values by the first letter of their axis; others have either.
-_UNITS = {**dict.fromkeys("XYZ", b"mm"), **dict.fromkeys("WPR", b"deg")}
+#: Units of values by their axis; others have either.
+_UNITS = {**dict.fromkeys("XYZ", (b"mm",)), **dict.fromkeys("WPR", (b"deg",))}
+_EITHER = (b"mm", b"deg")
 _FRAME = pattern(rb"UF\s*:\s*(\d+|F)\s*,\s*UT\s*:\s*(\d+|F)")
 _CONFIG = pattern(rb"CONFIG\s*:\s*'([^']*)'")
 
@@ -109,22 +110,20 @@ def positions(data: bytes, part: Span, found: dict[int, list[Position]]) -> None
             else:
                 others += data[group.start() : end]
         frame, config = _FRAME.search(data, *span), _CONFIG.search(data, *span)
-        axes = {
-            axis[1].decode(): (axis.span(2), float(axis[2]))
-            for axis in _AXIS.finditer(data, *span)
-            if axis[2] is not None and abs(float(axis[2])) < LARGEST
-        }
-        units = ((axis[3], _UNITS.get(axis[1].decode()), axis) for axis in _AXIS.finditer(data, *span))
-        foreign = [
-            axis[0].decode("latin-1")
-            for unit, own, axis in units
-            if unit is not None and unit not in ((b"mm", b"deg") if own is None else (own,))
-        ]
+        axes: dict[str, tuple[Span, float]] = {}
+        foreign = ""
+        for axis in _AXIS.finditer(data, *span):
+            letter, stated, unit = axis.groups()
+            name = letter.decode()
+            if stated is not None and abs(value := float(stated)) < LARGEST:
+                axes[name] = axis.span(2), value
+            if unit is not None and not foreign and unit not in _UNITS.get(name, _EITHER):
+                foreign = axis[0].decode("latin-1")
         used = [-1 if frame is None or frame[k] == b"F" else int(frame[k]) for k in (1, 2)]
         found.setdefault(int(match[1]), []).append(
             Position(
                 count, match.span(), match.span(1), used[0], used[1], axes,
                 (span[0], span[0]) if config is None else config.span(1), b"".join(others.split()),
-                (*foreign, "")[0],
+                foreign,
             )
         )  # fmt: skip
