@@ -11,6 +11,7 @@ from olp.program.program import Program
 from olp.program.robots.dialect import InPlace, Replacement
 from olp.program.robots.poses import Quaternion, between, vector_of
 from olp.program.robots.targets import NOWHERE, Part, Target, Use
+from olp.program.robots.urscript import postures
 from olp.program.robots.urscript.reader import POSE, read
 from olp.program.robots.urscript.table import TABLE
 from olp.program.text.numbers import spliced
@@ -82,6 +83,7 @@ DIALECT = UrScript(
     table=TABLE,
     decimals=8,
     for_arms=True,
+    postures=postures,
     turn_decimals=9,
     joint_decimals=9,
     joint_unit_deg=degrees(1.0),

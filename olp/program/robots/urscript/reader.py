@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from math import degrees
 
 from olp.core.errors import ProgramError
@@ -27,7 +28,10 @@ _N = rb"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*"
 POSE = pattern(rb"p\[" + b",".join([_N] * 6) + rb"\]")
 #: Joint values likewise.
 JOINTS = pattern(rb"\[" + b",".join([_N] * 6) + rb"\]")
-_JOINTS = pattern(rb"\s*(?:\[[^\[\]]*\]|get_inverse_kin\(.*\)|d2r\(.*\))\s*")
+_JOINTS = pattern(rb"\s*(?:\[[^\[\]]*\]|d2r\(.*\))\s*")
+#: A pose that is reached near given joints.
+_INVERSE = pattern(rb"\s*get_inverse_kin\((.*)\)\s*")
+_NEAR = pattern(rb"\s*(?:qnear\s*=(?!=))?\s*(.*?)\s*")
 _ASSIGNED = pattern(rb"\s*(?:(?:global|local)\s+)?([A-Za-z_]\w*)\s*=(?!=)\s*(.*?)\s*")
 _ELEMENT = pattern(rb"\s*([A-Za-z_]\w*)\s*\[[^\]]*\]\s*=(?!=)")
 _DEFINED = pattern(rb"(?m)^[ \t]*(?:def|thread)[ \t]+(\w+)")
@@ -91,6 +95,8 @@ class _Reader:
         self.poses: dict[bytes, _Named] = {}
         self.assigned: dict[bytes, int] = {}
         self.targets: dict[Span, int] = {}
+        #: joints near which poses are reached by a movej, by the places of these
+        self.near: dict[int, tuple[float, ...]] = {}
         self.tool: Tool | None = None
         #: functions of the text, the one that is read, those with moves, and the tools that are set
         self.defined = set(_DEFINED.findall(data))
@@ -137,6 +143,9 @@ class _Reader:
 
     def _statement(self, line: _Line) -> None:
         text = line.text.strip()
+        if text[:1] == b"$":
+            # the number of a node in the tree of the pendant
+            return
         first = _WORDS.match(text)
         word = b"" if first is None else first[0]
         if text.count(b"(") != text.count(b")") or text.count(b"[") != text.count(b"]"):
@@ -223,6 +232,12 @@ class _Reader:
         if not arguments:
             raise ProgramError("the move has no target", line=line.line, code="OLP516")
         begin, target = arguments[0]
+        inverse = _INVERSE.fullmatch(target) if call[1] == b"movej" else None
+        near: tuple[float, ...] = ()
+        if inverse is not None:
+            parts = list(_ARGUMENT.finditer(inverse[1]))
+            near = self._near(line, target, [part[0] for part in parts[1:]])
+            begin, target = begin + inverse.start(1) + parts[0].start(), parts[0][0]
         in_joints = _JOINTS.fullmatch(target) is not None or self._is_joints(target)
         if in_joints and call[1] != b"movej":
             what = f"joints in a {call[1].decode()} are not read; write the pose"
@@ -234,6 +249,8 @@ class _Reader:
             self.moves.joint_move(line.line, lambda: self._joints(line, begin, target, statement, rest))
             return
         index, span, named, frame = self._target(line, begin, target)
+        if call[1] == b"movej":
+            self._reached_near(line, index, near)
         rest = self._rest(call[1], arguments[1:])
         self._begins_in_loop()
         turn = self.moves.targets[index].turn
@@ -247,6 +264,27 @@ class _Reader:
             line.line, use, frame, self._tool(line), speed * _MM_PER_M, straight=call[1] != b"movej",
             whole=timed,
         )  # fmt: skip
+
+    def _near(self, line: _Line, target: bytes, given: list[bytes]) -> tuple[float, ...]:
+        """The joints in degrees near which a pose is reached; none where the robot is. Raises ProgramError
+        where an arm needs them, and the text does not state them."""
+        match = _NEAR.fullmatch(given[0]) if given else None
+        named = None if match is None else self.poses.get(match[1])
+        value = b"" if match is None else match[1]
+        stated = JOINTS.fullmatch(value if named is None else self.data[slice(*named.value)])
+        if len(given) > 1 or (given and stated is None and self.moves.arm):
+            raise self._computed(line, target)
+        return () if stated is None else tuple(degrees(float(group)) for group in stated.groups())
+
+    def _reached_near(self, line: _Line, index: int, near: tuple[float, ...]) -> None:
+        """Raises ProgramError where a pose is reached near other joints by another move."""
+        if self.moves.arm and self.near.setdefault(index, near) != near:
+            raise ProgramError(
+                "this pose is reached near other joints by another movej; give each its own",
+                line=line.line,
+                code="OLP533",
+            )
+        self.moves.targets[index] = replace(self.moves.targets[index], config=near)
 
     def _arc(self, line: _Line, call: re.Match[bytes]) -> None:
         """An arc through a pose to another one."""
