@@ -19,7 +19,7 @@ def fitting(config: Array, axes: Array, branches: Array) -> tuple[Array, Mask]:
     fits = np.isfinite(axes[:, :, 0])
     if config.shape[1] == 0:
         return axes, fits
-    stated: Mask = np.isfinite(config).all(axis=1, keepdims=True)
+    stated = np.asarray(np.isfinite(config).all(axis=1))[:, None]
     near = np.nan_to_num(config)[:, None, :]
     turned = axes + 360.0 * np.rint((near - axes) / 360.0)
     away = np.where(fits, np.abs(turned - near).max(axis=2), np.inf)
