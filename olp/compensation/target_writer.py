@@ -108,17 +108,18 @@ class TargetWriter(PointWriter):
             groups = self._groups(rows, own, wanted)
             for k, group in enumerate(groups):
                 first = k == 0 and not target.held
+                kept = target.held and self._kept(target, group[0], wanted)
                 # the shift of a move is its own, and takes up what the target does not
-                shifted = [row for row in group if not first and self._use(rows, row).offsets]
+                shifted = [row for row in group if not (first or kept) and self._use(rows, row).offsets]
                 for row in shifted:
                     base = None if target.held else groups[0][0]
                     edits += self._shifted(rows, row, target, base, wanted)
-                fixed = [row for row in group if first or not self._use(rows, row).offsets]
+                fixed = [row for row in group if first or kept or not self._use(rows, row).offsets]
                 for row in fixed:
                     rows.emitted[row] = self._reached(rows, row, target, group[0], wanted)
                 if first:
                     edits += self._renumbered(target, group[0], wanted)
-                elif fixed and not (target.held and self._kept(target, group[0], wanted)):
+                elif fixed and not kept:
                     edits += self._cloned(rows, target, fixed, wanted)
         return edits
 

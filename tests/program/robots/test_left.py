@@ -93,6 +93,14 @@ def test_what_a_left_move_goes_by_keeps_its_bytes(bent: dict[str, Path], key: st
     assert done.report["verdict"]["ok"]
 
 
+@pytest.mark.parametrize("key", TEXTS)
+def test_without_errors_all_bytes_stay(key: str, tmp_path: Path) -> None:
+    name, text, _ = TEXTS[key]
+    text = text.replace("MoveL p20", "MoveL Offs(p10,100,0,0)")
+    zero = machines.zero_machine(tmp_path / key, Recipe(controller=name, **QUIET))
+    assert olp.correct(text.encode(), zero).data == text.encode()
+
+
 def test_a_program_of_left_moves_alone_is_refused(bent: dict[str, Path]) -> None:
     text = RAPID.replace("MoveL p10,", "MoveL Offs(p10,deep,0,0),").replace("MoveL p20", "MoveL pElse")
     with pytest.raises(ProgramError, match="is computed") as caught:
