@@ -68,9 +68,11 @@ _MAY_TURN = WORK_OFFSETS | FURTHER_OFFSETS | {MACHINE, WRITE_OFFSET}
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """What the axis words of a block mean after its events: `machine` coordinates (G53), or `home`, those of
-    X, Y and Z that G28/G30 send home after the intermediate point, and `home_mm`, where they stand then. The
-    positions of the axes `lost` are not known any more in the program, as it is turned otherwise."""
+    """What the axis words of a block mean after its events: `machine` coordinates (G53), or `home`.
+
+    These are the axes of X, Y and Z that G28/G30 send home after the intermediate point, None of other
+    blocks; `home_mm` is where they stand then. The positions of the axes `lost` are not known any more in the
+    program, as it is turned otherwise."""
 
     machine: bool = False
     home: tuple[int, ...] | None = None
