@@ -7,19 +7,22 @@ from typing import Literal
 
 import numpy as np
 
-from olp.comparison.path import Path
-from olp.compensation.plan import targets, zero_shifts
+from olp.comparison.path import Path, PathParts
+from olp.compensation.plan import Targets, zero_shifts
 from olp.core.arrays import Array, Index, Mask
 from olp.core.geometry import arc_points
 from olp.core.toolpath import Flag, Kind, Toolpath
 from olp.core.values import dataclass
 from olp.errormodel.base import ErrorModel
+from olp.program.text.columns import apart, spans
 from olp.proof.deviation import cutting_moves
 
 #: mm; how far chords may be from their arcs.
 CHORD_MM = 2e-5
 #: Chords of an arc at most.
 _MOST_CHORDS = 20_000
+#: Moves at a time where there are arcs, which may have hundreds of chords each.
+_MOVES = 1 << 10
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,20 +47,31 @@ def nominal_of(
     shift = np.zeros((len(toolpath.frames), 3))
     if model is not None:
         shift = zero_shifts(toolpath.frames, model)
-    end = targets(toolpath, shift)
-    place, move = _chords(toolpath, end)
-    if positions == "tip" and len(toolpath):
-        first = int(toolpath.frame[0])
-        home = toolpath.frames[first]
-        lengths = toolpath.per_frame([f.length_mm for f in toolpath.frames])
-        place = home.tip_mm(place - shift[first] - (lengths if lengths.ndim == 1 else lengths[move]))
-    known = np.isfinite(place).all(axis=1)
-    place, move = place[known], move[known]
+    target = Targets(toolpath, shift)
     along, at_end = counting(toolpath, points=points)
-    path = Path.through(place, move, along[move], at_end[move])
-    line = toolpath.line.astype(np.int64)
-    stops = replace(path.stops, line=line[path.stops.line])
-    return Nominal(replace(path, line=line[path.line], stops=stops), path.line, path.stops.line)
+    of_frames = [f.length_mm for f in toolpath.frames]
+    parts = PathParts()
+    for some in spans(len(toolpath), _MOVES if len(toolpath.arcs) else None):
+        place, move = _chords(toolpath.part(some.start, some.stop), target[some])
+        if positions == "tip":
+            first = int(toolpath.frame[0])
+            lengths = toolpath.per_frame(of_frames, some.start, some.stop)
+            lengths = lengths if lengths.ndim == 1 else lengths[move]
+            place = toolpath.frames[first].tip_mm(place - shift[first] - lengths)
+        known = np.isfinite(place).all(axis=1)
+        place, move = place[known], some.start + move[known]
+        parts.put(place, move, along[move], at_end[move])
+    path = parts.path()
+    stops = replace(path.stops, line=_lines(toolpath, path.stops.line))
+    return Nominal(replace(path, line=_lines(toolpath, path.line), stops=stops), path.line, path.stops.line)
+
+
+def _lines(toolpath: Toolpath, move: Index) -> Index:
+    """(n,) the lines of moves (n,)."""
+    line = apart((len(move),), np.int64)
+    for some in spans(len(line)):
+        line[some] = toolpath.line[move[some]]
+    return line
 
 
 def counting(toolpath: Toolpath, *, points: bool) -> tuple[Mask, Mask]:

@@ -7,6 +7,7 @@ import numpy as np
 from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import CannotCompute
 from olp.core.values import dataclass
+from olp.program.text.columns import Columns
 
 #: Above this share of Z in its direction, a segment counts as upright: it has no left and right.
 _UPRIGHT = 0.999
@@ -47,17 +48,9 @@ class Path:
         points = np.asarray(points_mm, float)
         line = np.arange(1, len(points) + 1) if line is None else np.asarray(line, np.int64)
         cutting = np.ones(len(points), bool) if cutting is None else np.asarray(cutting, bool)
-        counts = np.flatnonzero(np.zeros(len(points), bool) if stop is None else stop)
-        length = np.sqrt((np.diff(points, axis=0) ** 2).sum(axis=1))
-        kept = np.append(True, length > 0.0) if len(points) else np.zeros(0, bool)
-        stops = Stops((np.cumsum(kept) - 1)[counts], line[counts])
-        points, line, cutting = points[kept], line[kept], cutting[kept]
-        if len(points) < 2:
-            raise CannotCompute(
-                "the nominal path has fewer than two different points, so there is nothing to compare with"
-            )
-        s = np.append(0.0, np.cumsum(length[length > 0.0]))
-        return Path(points, line[1:], cutting[1:], s, stops)
+        parts = PathParts()
+        parts.put(points, line, cutting, np.zeros(len(points), bool) if stop is None else stop)
+        return parts.path()
 
     def __len__(self) -> int:
         """Number of segments."""
@@ -99,6 +92,47 @@ class Path:
             normal[upright] = np.array((0.0, 1.0, 0.0)) - t[:, 1:2] * t
         normal /= np.sqrt((normal * normal).sum(axis=1))[:, None]
         return along, normal, np.cross(along, normal)
+
+
+class PathParts:
+    """A path through points that come part by part; in memory is what is looked at."""
+
+    def __init__(self) -> None:
+        self._columns = Columns()
+        self._last = np.zeros((0, 3))
+        self._vertices, self._s_mm = 0, 0.0
+
+    def put(self, points: Array, line: Index, cutting: Mask, stop: Mask) -> None:
+        """Go on through points (n, 3); the others (n,) as of `Path.through`."""
+        if not len(points):
+            return
+        columns, begins = self._columns, not len(self._last)
+        step = np.diff(np.concatenate((self._last, points)), axis=0)
+        length = np.sqrt((step**2).sum(axis=1))
+        kept = np.append(True, length > 0.0) if begins else length > 0.0
+        counts = np.flatnonzero(stop)
+        columns.put("stop", (self._vertices + np.cumsum(kept) - 1)[counts], np.int64)
+        columns.put("stop line", line[counts], np.int64)
+        columns.put("vertex", points[kept], np.float64)
+        # from the arc length before on, so that the sum is that of all at once
+        s_mm = np.cumsum(np.append(self._s_mm, length[length > 0.0]))
+        columns.put("s", s_mm if begins else s_mm[1:], np.float64)
+        kept[0] &= not begins
+        columns.put("line", line[kept], np.int64)
+        columns.put("cutting", cutting[kept], np.bool_)
+        self._last, self._s_mm = points[-1:], s_mm[-1]
+        self._vertices += int(kept.sum()) + begins
+
+    def path(self) -> Path:
+        """The whole path. Raises CannotCompute for fewer than two different points."""
+        if self._vertices < 2:
+            raise CannotCompute(
+                "the nominal path has fewer than two different points, so there is nothing to compare with"
+            )
+        take = self._columns.take
+        stops = Stops(take("stop", np.int64), take("stop line", np.int64))
+        line, cutting = take("line", np.int64), take("cutting", np.bool_)
+        return Path(take("vertex", np.float64, 3), line, cutting, take("s", np.float64), stops)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -141,19 +141,21 @@ class Tracer:
     def traced(path: Toolpath, model: ErrorModel, step_mm: float) -> Iterator[tuple[Array, Index]]:
         """The same in parts of whole moves, so that memory is small."""
         tracer = Tracer(path, path.end_mm, path, np.arange(len(path)), model, 1.0)
-        start, arc = path.starts_mm(), _arc_index(path, 0, len(path))
-        length = np.nan_to_num(np.sqrt(((path.end_mm - start) ** 2).sum(axis=1)))
-        rows = np.flatnonzero(arc >= 0)
-        if rows.size:
-            radius = np.sqrt(np.nansum((start[rows] - path.arcs.centre_mm) ** 2, axis=1))
-            length[rows] = np.maximum(length[rows], radius * np.abs(path.arcs.sweep_rad))
-        steps = np.maximum(np.ceil(length / step_mm), 1).astype(np.int64)
-        # every part has the moves whose last sample is in the next _BLOCK ones
-        parts = np.flatnonzero(np.diff(np.cumsum(steps) // _BLOCK, prepend=-1))
-        for a, b in pairwise((*parts.tolist(), len(path))):
-            point, part, _ = tracer.points(start[a:b], path.end_mm[a:b], arc[a:b], steps[a:b])
+        steps, samples = apart((len(path),), np.int64), 0
+        parts: list[int] = []
+        for some in spans(len(path)):
+            steps[some] = _equal_steps(path.part(some.start, some.stop), step_mm)
+            # every part has the moves whose last sample is in the next _BLOCK ones
+            ends = samples + np.cumsum(steps[some])
+            begins = np.diff(ends // _BLOCK, prepend=samples // _BLOCK if parts else -1)
+            parts.extend((some.start + np.flatnonzero(begins)).tolist())
+            samples = int(ends[-1])
+        for a, b in pairwise((*parts, len(path))):
+            start, end, arc = path.starts_mm(a, b), path.end_mm[a:b], _arc_index(path, a, b)
+            point, part, _ = tracer.points(start, end, arc, steps[a:b])
             tool = path.tool_mm(a, b)
             yield tracer.actual(point, tool if tool.ndim == 1 else tool[part]), part + a
+            unload()
 
     def points(
         self, start: Array, end: Array, arc: Index, steps: Index, turns: Mask | None = None
@@ -478,6 +480,16 @@ def _kinds(on_arc: Mask, of: Index) -> tuple[Index, Index, Index]:
     mine = on_arc[of]
     curved = np.flatnonzero(mine)
     return np.flatnonzero(~mine), curved, (np.cumsum(on_arc) - 1)[of[curved]]
+
+
+def _equal_steps(path: Toolpath, step_mm: float) -> Index:
+    """(n,) into how many equal steps of `step_mm` at most each move is divided."""
+    start, arcs = path.starts_mm(), path.arcs
+    length = np.nan_to_num(np.sqrt(((path.end_mm - start) ** 2).sum(axis=1)))
+    if len(arcs):
+        radius = np.sqrt(np.nansum((start[arcs.move] - arcs.centre_mm) ** 2, axis=1))
+        length[arcs.move] = np.maximum(length[arcs.move], radius * np.abs(arcs.sweep_rad))
+    return np.asarray(np.maximum(np.ceil(length / step_mm), 1), np.int64)
 
 
 def _arc_index(path: Toolpath, first: int, last: int) -> Index:

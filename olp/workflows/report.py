@@ -144,7 +144,7 @@ def _predicted_plots(
     along, at_end = counting(program.toolpath, points=program.dialect.points)
     counts, canvas, groups = along | at_end, Canvas(way.path), {}
     for side, path, last in (
-        ("before", program.toolpath, np.arange(len(program.toolpath))),
+        ("before", program.toolpath, None),
         ("after", corrected.toolpath, result.groups),
     ):
         groups[side] = Thinned(way.path, canvas)
@@ -156,16 +156,17 @@ def _predicted_plots(
 
 
 def _runs(
-    nominal: Nominal, counts: Mask, path: Toolpath, last: Index, model: ErrorModel, reach_mm: float
+    nominal: Nominal, counts: Mask, path: Toolpath, last: Index | None, model: ErrorModel, reach_mm: float
 ) -> Iterator[Run]:
     """Where the tip goes along a path, part by part, set beside the nominal one, on nominal moves that count
-    (n,). `last` (n,) is the last move of the path that belongs to each of them."""
+    (n,). `last` (n,) is the last move of the path that belongs to each of them, None where each is its own.
+    """
     way = nominal.path
-    owner = np.minimum(np.searchsorted(last, np.arange(len(path))), len(last) - 1)
     step_mm = max(_STEP_MM, way.length_mm / _POINTS)
     for points, move in tips(path, model, step_mm):
-        rows = np.flatnonzero(counts[owner[move]] & np.isfinite(points).all(axis=1))
-        points, of = points[rows], owner[move[rows]]
+        of = move if last is None else np.minimum(np.searchsorted(last, move), len(last) - 1)
+        rows = np.flatnonzero(counts[of] & np.isfinite(points).all(axis=1))
+        points, of = points[rows], of[rows]
         # of several chords of an arc the one that is as far along as the point
         first, behind = (np.searchsorted(nominal.move, of, side) for side in ("left", "right"))
         begin = np.maximum.accumulate(np.where(np.diff(of, prepend=-1) != 0, np.arange(len(of)), 0))

@@ -387,13 +387,17 @@ def durations(
 ) -> tuple[list[float], bool]:
     """Seconds of programs, and whether speeds along dense curves were optimised: they are not where one of
     them has more than `most` waypoints, so that all are planned alike. Raises as `retime`, but for doubts."""
-    cases = [_case(session, program, options) for program in programs]
     limits = axis_limits(session.setup.machine)
+    cases = [_case(session, program, options) for program in programs]
     short = max(sum(map(len, case.legs)) for case in cases) <= most
     if short:
         return [planned(case, limits, tell).duration_s for case in cases], True
-    plans = [[plan_route(leg, limits, tell, optimise=False) for leg in case.legs] for case in cases]
-    return [sum(plan.duration_s for plan in own) for own in plans], False
+    seconds = []
+    while cases:
+        # the plan of a long program is large: no two are in memory at once
+        legs = cases.pop(0).legs
+        seconds.append(sum(plan_route(leg, limits, tell, optimise=False).duration_s for leg in legs))
+    return seconds, False
 
 
 def _control(session: Session, options: RetimeOptions) -> tuple[Control | None, Points | None]:

@@ -143,10 +143,11 @@ def tips(path: Toolpath, model: ErrorModel, step_mm: float) -> Iterator[tuple[Ar
     from olp.proof.deviation import Tracer
 
     shift = zero_shifts(path.frames, model)
-    lengths = path.per_frame([f.length_mm for f in path.frames])
+    lengths = [f.length_mm for f in path.frames]
     for actual, move in Tracer.traced(path, model, step_mm):
         first = int(path.frame[0])
-        tip = actual - shift[first] - (lengths if lengths.ndim == 1 else lengths[move])
+        length = path.per_frame(lengths, begin := int(move[0]), int(move[-1]) + 1)
+        tip = actual - shift[first] - (length if length.ndim == 1 else length[move - begin])
         yield path.frames[first].tip_mm(tip), move
 
 

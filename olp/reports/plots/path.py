@@ -61,7 +61,7 @@ def picture(path: Path, groups: Groups, sides: Mapping[str, str]) -> bytes:
         bar.set_label("distance from the nominal path in um")
         _plain_decades(bar.ax.yaxis)
 
-    span = np.ptp(path.vertex_mm[:, :2], axis=0)
+    span = next(iter(groups.values())).canvas.span_mm
     height = (6.0 / len(groups)) * float(span[1] / max(span[0], 1e-9)) + 0.7
     return drawn("picture", (_WIDTH, min(max(height, 1.8), 5.0)), draw, edges=(0.55, 0.4, 0.85, 0.25))
 

@@ -13,6 +13,7 @@ from olp.comparison.figures import Run
 from olp.comparison.path import Path
 from olp.core.arrays import Array, Index, Mask
 from olp.core.units import UM_PER_MM
+from olp.program.text.columns import spans
 
 #: Smallest deviation that a logarithmic axis shows, in um.
 FLOOR_UM = 1e-2
@@ -30,8 +31,6 @@ _PIXELS = 420
 _HALF = 2
 #: Pixels around a path.
 _MARGIN = 4
-#: Lines that are painted at once.
-_BLOCK = 1 << 16
 #: Points farther apart than so many usual ones are not joined.
 _GAP = 12.0
 
@@ -40,11 +39,12 @@ class Canvas:
     """Pixels of a path in plan view, `shape` rows by columns; `low_mm` is the corner of the first."""
 
     def __init__(self, path: Path) -> None:
-        xy = path.vertex_mm[:, :2]
-        span = np.ptp(xy, axis=0)
-        self.size_mm = max(float(span.max()), 1e-6) / _PIXELS
-        self.low_mm = xy.min(axis=0) - _MARGIN * self.size_mm
-        columns, rows = (np.floor(span / self.size_mm).astype(int) + 1 + 2 * _MARGIN).tolist()
+        parts = [path.vertex_mm[some, :2] for some in spans(len(path.vertex_mm))]
+        low = np.min([xy.min(axis=0) for xy in parts], axis=0)
+        self.span_mm = np.max([xy.max(axis=0) for xy in parts], axis=0) - low
+        self.size_mm = max(float(self.span_mm.max()), 1e-6) / _PIXELS
+        self.low_mm = low - _MARGIN * self.size_mm
+        columns, rows = (np.floor(self.span_mm / self.size_mm).astype(int) + 1 + 2 * _MARGIN).tolist()
         self.shape = (rows, columns)
 
     @property
@@ -128,9 +128,8 @@ def painted(path: Path, canvas: Canvas) -> npt.NDArray[np.bool_]:
     """The pixels of the cutting moves of a path."""
     pixels = np.zeros(canvas.shape, bool)
     xy = path.vertex_mm[:, :2]
-    kept = np.flatnonzero(path.cutting)
-    for a in range(0, len(kept), _BLOCK):
-        rows = kept[a : a + _BLOCK]
+    for some in spans(len(path)):
+        rows = some.start + np.flatnonzero(path.cutting[some])
         pixels.reshape(-1)[canvas.lines(xy[rows], xy[rows + 1])[0]] = True
     return widened(pixels)
 
