@@ -143,19 +143,18 @@ def _of_joints(
     """The calibration of a machine of any joints. Raises UsageError and as `fit_joint_calibration`."""
     if len(data) != 1:
         raise UsageError("the readings of a machine of any joints are in one plan; name it as DATA")
-    if report_file is not None and not report_file.endswith(".json"):
-        raise UsageError("the report of a machine of any joints is JSON; expected a name in .json")
     refuse_early(files_of(output, report_file), (*data, *files_of(machine)), force=force)
 
     from olp.files.write import write_files
-    from olp.reports.report import to_json
     from olp.workflows.calibrate_joints import fit_joint_calibration
 
     with progress(quiet):
         fitted = fit_joint_calibration(data[0], machine, valid_until=valid_until)
     files: dict[Path, bytes] = {} if output is None else fitted.files(output)
     if report_file is not None:
-        files[Path(report_file)] = to_json(fitted.full_report())
+        from olp.workflows.calibrate_report import joint_fit
+
+        files[Path(report_file)] = joint_fit(fitted, report_file, None)
     write_files(files, force=force, inputs=fitted.inputs)
     for path in files:
         diagnostic(f"wrote {path}")

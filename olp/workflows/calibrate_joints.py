@@ -30,13 +30,15 @@ class FittedJoints(Filed):
     """A calibration of a machine of any joints with what it was made from.
 
     `fit` holds all unknowns with their covariance (`fit.sigma_at(values, tool_mm)` is the uncertainty of a
-    pose anywhere), `report` the results as a mapping ("olp-joint-fit-1"), `findings` what to know about
-    them. `inputs` are the files that were read, which `write` never overwrites.
+    pose anywhere), `report` the results as a mapping ("olp-joint-fit-1"), `unseen` the distances (n,) in mm
+    of held-out readings before and after, None where they are too few, `findings` what to know about them.
+    `inputs` are the files that were read, which `write` never overwrites.
     """
 
     fit: JointFit
     campaign: Campaign
     report: dict[str, Any]
+    unseen: tuple[Array, Array] | None
     findings: tuple[Finding, ...]
     valid_until: datetime.date | None
     inputs: tuple[str, ...] = ()
@@ -70,7 +72,9 @@ def fit_joint_calibration(
     model = model_of(structure, values, campaign.priors, yielding=campaign.yielding, masses=campaign.masses)
     fit = fit_or_refuse(model, campaign.readings)
     findings = joint_findings(fit, campaign.readings)
-    return FittedJoints(fit, campaign, _report(fit), findings, valid_until, (str(machine), *campaign.files))
+    unseen = held_out(fit)
+    files = (str(machine), *campaign.files)
+    return FittedJoints(fit, campaign, _report(fit, unseen), unseen, findings, valid_until, files)
 
 
 def _box(fit: JointFit) -> dict[str, tuple[float, float]]:
@@ -82,7 +86,7 @@ def _box(fit: JointFit) -> dict[str, tuple[float, float]]:
     }
 
 
-def _report(fit: JointFit) -> dict[str, Any]:
+def _report(fit: JointFit, unseen: tuple[Array, Array] | None) -> dict[str, Any]:
     model = fit.model
     report: dict[str, Any] = {
         "schema": "olp-joint-fit-1",
@@ -102,7 +106,6 @@ def _report(fit: JointFit) -> dict[str, Any]:
             for source in fit.sources
         ],
     }
-    unseen = held_out(fit)
     if unseen is not None:
         before, after = unseen
         report["held_out"] = [

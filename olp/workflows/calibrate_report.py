@@ -11,10 +11,12 @@ from olp.core.optional import takes_plots
 from olp.core.version import __version__
 from olp.reports import calibration as report_calibration
 from olp.reports import evaluation as report_evaluation
+from olp.reports import joint_fit as report_joint_fit
 from olp.reports.calibration import FitSummary
 from olp.reports.document import in_form
 from olp.reports.report import to_json
 from olp.workflows.calibrate_fit import FittedCalibration
+from olp.workflows.calibrate_joints import FittedJoints
 
 
 def evaluation(evaluated: Evaluated, name: str, date: datetime.date | None) -> bytes:
@@ -24,6 +26,26 @@ def evaluation(evaluated: Evaluated, name: str, date: datetime.date | None) -> b
         return to_json(evaluated.as_dict())
     plots = report_evaluation.plots_of(evaluated) if takes_plots(name) else {}
     return in_form(report_evaluation.evaluation(evaluated, plots, __version__, date), name)
+
+
+def joint_fit(fitted: FittedJoints, name: str, date: datetime.date | None) -> bytes:
+    """The report of `olp calibrate fit` on a machine of any joints in the form that `name` ends in."""
+    report = fitted.full_report()
+    if FilePath(name).suffix.lower() == ".json":
+        return to_json(report)
+    plots: dict[str, bytes] = {}
+    if takes_plots(name):
+        from olp.reports.plots.joint_fit import held_out_plot, unknowns_plot
+
+        rows = [
+            (row["name"], row["value"], row["sigma"])
+            for row in report["unknowns"]
+            if row["name"].endswith(("_um", "_urad")) and not report_joint_fit.is_held(row)
+        ]
+        plots = {"unknowns": unknowns_plot(rows)} if rows else {}
+        if fitted.unseen is not None:
+            plots["held_out"] = held_out_plot(*fitted.unseen)
+    return in_form(report_joint_fit.joint_fit(report, plots, __version__, date), name)
 
 
 def fit(fitted: FittedCalibration, name: str, date: datetime.date | None) -> bytes:

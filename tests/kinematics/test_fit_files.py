@@ -56,12 +56,21 @@ def test_a_plan_becomes_a_calibration_that_predicts_the_machine(tmp_path: Path) 
     plan, values, true = arm(tmp_path)
     machine = machine_in(tmp_path, "arm_6r_kr6", "calibration.toml")
     target = tmp_path / "calibration.toml"
-    code, said = run("calibrate", "fit", tmp_path, "-m", machine, "-o", target, "--json")
+    page = tmp_path / "report.html"
+    call = ("calibrate", "fit", tmp_path, "-m", machine, "-o", target, "--json", "--report", page)
+    code, said = run(*call)
     assert code == 0, said
     report = json.loads(said[said.index("{") : said.rindex("}") + 1])
     assert (report["unknowns_kept"], report["unknowns_determined"]) == (24, 24)
     assert report["held_out"][1]["rms_um"] < 60.0 < 1000.0 < report["held_out"][0]["rms_um"]
     assert "J1.zero_urad" in report["not_needed"]
+    shown = page.read_text("utf-8")
+    before, after = report["held_out"]
+    assert f"was off by {before['mean_um']:.2f} um before and {after['mean_um']:.2f} um after (mean)" in shown
+    assert "held by what is usual" not in shown and all(
+        f">{row['name']}<" in shown for row in report["unknowns"]
+    )
+    assert shown.count("<svg") == 2 and "held-out reading, ordered by its distance before" in shown
     found = olp.load_kinematics(machine).actual(values).at(np.array(TOOL) - (0.0, 0.0, 150.0))
     stated = report["uncertainty_in_best_frame"]["tip_largest_um"]
     assert np.linalg.norm(fit_points(found, true)(found) - true, axis=1).max() < 3e-3 * stated
@@ -178,7 +187,7 @@ def test_wrong_rows_are_refused_with_their_line(tmp_path: Path) -> None:
 def test_options_of_linear_axes_are_refused(tmp_path: Path) -> None:
     plan, _, _ = arm(tmp_path)
     machine = machine_in(tmp_path, "arm_6r_kr6")
-    for words in (("--map",), ("--datum", "0", "0", "0"), ("--report", tmp_path / "r.html"), (plan,)):
+    for words in (("--map",), ("--datum", "0", "0", "0"), (plan,)):
         assert run("calibrate", "fit", plan, "-m", machine, *words)[0] == 2
     assert run("calibrate", "fit", plan, "-m", machine, "-q", "--report", tmp_path / "r.json")[0] == 0
     assert json.loads((tmp_path / "r.json").read_text())["schema"] == "olp-joint-fit-1"
