@@ -54,8 +54,12 @@ def table_export(
 
 def compare_kinematics(machine: PathLike, job: PathLike | None) -> dict[str, Any]:
     """What each table of a control's kinematics leaves ("olp-tables-1"). Nothing is written; tables that
-    cannot hold the machine say why (OLP871)."""
+    cannot hold the machine say why (OLP871). Raises ConfigError for a platform on legs."""
     setup = _calibrated(machine, job)
+    if setup.machine.structure.platforms:
+        raise ConfigError(
+            "no table of a control holds a platform on legs; correct the programs instead", file=str(machine)
+        )
     report = report_of(setup, TABLES)
     report["formats"] = {}
     for key, form in TABLES.items():

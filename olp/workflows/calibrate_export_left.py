@@ -35,10 +35,13 @@ def report_of(setup: JointSetup, tables: Mapping[str, KinematicTable]) -> dict[s
     assert setup.calibration is not None
     structure, box = setup.machine.structure, setup.calibration.box
     low, high = np.array([box[name] for name in structure.order], float).T
-    values = np.random.default_rng(SEED).uniform(low, high, (POINTS, len(low)))
+    random = np.random.default_rng(SEED)
+    values = random.uniform(low, high, (POINTS, len(low)))
+    # an axis with play was moved to its value from either side
+    sides = random.choice((-1.0, 1.0), values.shape)
     solved, rows = reached(setup.kinematics, values)
-    values = values[rows]
-    shift, turn = setup.kinematics.deviation(values)
+    values, sides = values[rows], sides[rows]
+    shift, turn = setup.kinematics.deviation(values, sides)
     target = setup.kinematics.nominal(values)
     # an axis with backlash turns only where it would be off by more
     plays = any(errors.backlash for errors in setup.kinematics.errors.joints.values())
@@ -50,10 +53,10 @@ def report_of(setup: JointSetup, tables: Mapping[str, KinematicTable]) -> dict[s
     parts = {}
     for name, form in tables.items():
         try:
-            left[name] = _figures(*_left(setup.kinematics, setup.kinematics.errors, form, values))
+            left[name] = _figures(*_left(setup.kinematics, setup.kinematics.errors, form, (values, sides)))
         except ConfigError:
             continue
-        parts[name] = _parts(setup.kinematics, form, values)
+        parts[name] = _parts(setup.kinematics, form, (values, sides))
     units = {name: f"{name}_{unit}" for name, unit in zip(structure.order, structure.units, strict=True)}
     return {
         "schema": "olp-tables-1",
@@ -70,27 +73,28 @@ def report_of(setup: JointSetup, tables: Mapping[str, KinematicTable]) -> dict[s
 
 
 def _left(
-    kinematics: Kinematics, errors: MachineErrors, form: KinematicTable, values: Array
+    kinematics: Kinematics, errors: MachineErrors, form: KinematicTable, postures: tuple[Array, Array]
 ) -> tuple[Array, Array]:
-    """Distances in mm and angles in rad that errors leave with a table. Raises ConfigError where it cannot
+    """Distances in mm and angles in rad that errors leave with a table at `postures`: axis values, and the
+    sides of their play. Raises ConfigError where it cannot
     hold them."""
-    return _between(kinematics, form.enter(kinematics.structure, errors), values)
+    return _between(kinematics, form.enter(kinematics.structure, errors), postures)
 
 
-def _between(kinematics: Kinematics, entered: Entered, values: Array) -> tuple[Array, Array]:
-    known = Kinematics(entered.known, tool_mm=kinematics.tool_mm).nominal(values)
-    actual = replace(kinematics, errors=entered.left).actual(values)
+def _between(kinematics: Kinematics, entered: Entered, postures: tuple[Array, Array]) -> tuple[Array, Array]:
+    known = Kinematics(entered.known, tool_mm=kinematics.tool_mm).nominal(postures[0])
+    actual = replace(kinematics, errors=entered.left).actual(*postures)
     return deviations(kinematics.structure, actual, known)
 
 
-def _parts(kinematics: Kinematics, form: KinematicTable, values: Array) -> dict[str, Any]:
+def _parts(kinematics: Kinematics, form: KinematicTable, postures: tuple[Array, Array]) -> dict[str, Any]:
     parts = {}
     for name, errors in _kinds(kinematics.structure, kinematics.errors).items():
         try:
-            sizes = _left(kinematics, errors, form, values)
+            sizes = _left(kinematics, errors, form, postures)
         except ConfigError:
             # a table that has no place for this kind alone leaves all of it
-            sizes = _between(kinematics, Entered(b"", kinematics.structure, errors), values)
+            sizes = _between(kinematics, Entered(b"", kinematics.structure, errors), postures)
         if any(size.max(initial=0.0) > least for size, least in zip(sizes, _NOTHING, strict=True)):
             parts[name] = _figures(*sizes)
     return parts

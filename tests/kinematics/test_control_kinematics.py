@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cases.joint_machines import STRUCTURES, machine_file
+from cli.test_cli import run
 
 import olp
 from olp.core.errors import ConfigError
@@ -244,6 +245,34 @@ def test_an_arm_as_rows_of_denavit_and_hartenberg(tmp_path: Path) -> None:
     known = Kinematics(done.known, tool_mm=TOOL).nominal(values)
     rest = Kinematics(setup.kinematics.structure, done.left, TOOL).actual(values)
     np.testing.assert_allclose(rest.position, known.position, atol=1e-9)
+
+
+@pytest.mark.slow
+def test_all_tables_are_compared_and_say_what_they_leave(tmp_path: Path) -> None:
+    """Play alone: no table holds it, and all leave it. A name of the machine need not be ASCII."""
+    text = "[location.C]\nX_um = 20.0\n[backlash]\nC_urad = 30.0\n"
+    file = machine_file(tmp_path, "C A Y F X Z", errors=False, calibration=text)
+    for name in ("machine.toml", "calibration.toml"):
+        stated = (tmp_path / name).read_text("utf-8").replace('"m"', '"Fräse"')
+        (tmp_path / name).write_text(stated, "utf-8")
+    report = olp.compare_tables(file)
+    left, parts = report["box"]["left"], report["box"]["parts"]
+    assert set(parts) == set(TABLES) - {"dh", "mastering"}
+    refused = {key: form["findings"] for key, form in report["formats"].items() if form["findings"]}
+    assert {key: [one["code"] for one in found] for key, found in refused.items()} == {
+        "dh": ["OLP871"], "mastering": ["OLP871"],
+    }  # fmt: skip
+    # half of the play, either way
+    for key, kinds in parts.items():
+        assert list(kinds) == ["backlash"], key
+        assert left[key]["max_um"] == pytest.approx(kinds["backlash"]["max_um"], abs=0.6)
+        assert 0.0 < left[key]["rms_um"] < left["as it is"]["rms_um"]
+    done = run("calibrate", "export", "-m", str(file), "--compare")
+    assert done.exit_code == 0 and "isg-universal: backlash" in done.stdout
+    assert "dh: rows of Denavit and Hartenberg cannot hold this machine" in done.stdout
+    hexapod = PROGRAMS / "hexapod" / "machine.toml"
+    with pytest.raises(ConfigError, match="holds a platform on legs"):
+        olp.compare_tables(hexapod)
 
 
 def test_machines_that_a_table_cannot_hold(tmp_path: Path) -> None:

@@ -35,7 +35,7 @@ def swivel_data(structure: Structure) -> bytes:
     lines.append(f'$TC_CARR23[1]="{vectors.kind}"')
     for k, (low, high) in enumerate(vectors.travels):
         lines += [f"$TC_CARR{30 + k}[1]={_number(low)}", f"$TC_CARR{32 + k}[1]={_number(high)}"]
-    return ("\n".join(lines) + "\n").encode("ascii")
+    return ("\n".join(lines) + "\n").encode("ascii", "replace")
 
 
 def transformation(structure: Structure) -> bytes:
@@ -55,7 +55,7 @@ def transformation(structure: Structure) -> bytes:
     named = {vector: f"TRAFO5_{name}_1" for vector, name in names.items()}
     for vector, name in {**named, "V1": "TRAFO5_AXIS1_1", "V2": "TRAFO5_AXIS2_1"}.items():
         lines += [f"$MC_{name}[{k}]={_number(v)}" for k, v in enumerate(vectors.of[vector])]
-    return ("\n".join(lines) + "\n").encode("ascii")
+    return ("\n".join(lines) + "\n").encode("ascii", "replace")
 
 
 def _number(value: float) -> str:
