@@ -30,8 +30,8 @@ class FittedJoints(Filed):
     """A calibration of a machine of any joints with what it was made from.
 
     `fit` holds all unknowns with their covariance (`fit.sigma_at(values, tool_mm)` is the uncertainty of a
-    pose anywhere), `report` the results as a mapping ("olp-joint-fit-1"), `unseen` the distances (n,) in mm
-    of held-out readings before and after, None where they are too few, `findings` what to know about them.
+    pose anywhere), `report` the results as a mapping ("olp-joint-fit-1"), `findings` what to know about them.
+    `unseen` are the distances (n,) in mm of held-out readings before and after, None where they are too few.
     `inputs` are the files that were read, which `write` never overwrites.
     """
 
