@@ -17,6 +17,8 @@ from olp.kinematics.poses import Poses, rotation_vector
 
 #: The arm in mm at which a turn counts as much as a shift, where a place on a move is found.
 ARM_MM = 100.0
+#: rad; where no command turns the tool nearer than this, a place on a move is where it was planned.
+_TURNED_RAD = 1e-6
 #: Steps by which a place on a move is found.
 _STEPS = 3
 #: Places at a time, so that memory is small.
@@ -129,18 +131,20 @@ def _shares(
 ) -> tuple[Array, Array]:  # fmt: skip
     """(m,) at which shares of its nominal move each move begins and ends. `pairs` are the last part of each
     nominal move, and the nominal move of each part. A part ends where the pose is nearest, as words are
-    rounded along the path, too. In lists it ends as planned, where there are as many parts: the nearest
-    pose is another one where the machine cannot turn the tool."""
+    rounded along the path, too. In lists, and where the machine cannot turn the tool, the nearest pose is
+    another one: there it ends as planned, where there are as many parts."""
     groups, owner = pairs
     end, number = np.ones(len(path)), np.arange(len(path))
     first = np.append(-1, groups[:-1]) + 1
     begins = np.searchsorted(plan.move, np.arange(len(nominal)))
     parts = np.append(begins[1:], len(plan.move)) - begins
-    planned = (groups - first + 1 == parts)[owner] & (path.listed is not None)
     inner = along & (groups[owner] != number)
-    row = np.flatnonzero(inner & planned)
-    end[row] = plan.share[begins[owner[row]] + row - first[owner[row]]]
-    row = np.flatnonzero(inner & ~planned)
+    row = np.flatnonzero(inner & (groups - first + 1 == parts)[owner])
+    of = begins[owner[row]] + row - first[owner[row]]
+    row, of = (rows[(path.listed is not None) | (plan.left_rad[of] > _TURNED_RAD)] for rows in (row, of))
+    end[row] = plan.share[of]
+    inner[row] = False
+    row = np.flatnonzero(inner)
     if row.size:
         end[row] = _places(nominal, path, owner[row], row, sides.end[row], sides.behind[row])
     begin = np.append(0.0, np.where(owner[1:] == owner[:-1], end[:-1], 0.0))[: len(path)]

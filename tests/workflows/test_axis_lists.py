@@ -161,6 +161,7 @@ def test_points_and_times_get_no_rows(tmp_path: Path) -> None:
 REFUSED = [
     (b"J1_deg,J2_deg,J3_mm\n1,2,3\n", "missing or twice: J4_deg", 1),
     (b"J1_deg,J2_deg,J3_mm,J4_rad\n1,2,3,4\n", "missing or twice: J4_deg", 1),
+    (b"J1_deg,J2_deg,J3_mm,J4_deg,B_deg\n1,2,3,4,5\n", "B_deg, and the machine has no such axis", 1),
     (b"J1_deg,J2_deg,J3_mm,J4_deg\n1,2,3,4\n1,x,3,4\n", 'column 2 is "x"', 3),
     (b"J1_deg,J2_deg,J3_mm,J4_deg\n1,2,3\n", "3 columns", 2),
     (b"J1_deg,J2_deg,J3_mm,J4_deg\n", "no rows", 1),

@@ -202,6 +202,31 @@ def test_vectors_of_heidenhain_blocks_are_corrected_as_the_judge_finds(chain: st
     assert again.report["verdict"]["ok"]
 
 
+def test_a_tool_that_cannot_turn_is_proved_where_its_parts_are_planned(tmp_path: Path) -> None:
+    """Beside the outer axis the rotary axes stay as programmed, and the tip is met all the same: the pose of
+    the path that is nearest in place and angle is another one, microns away."""
+    machine = machine_file(tmp_path, "F X Y Z C B", control="heidenhain", seed=2, digit=0.0001)
+    directions = ["-0.0052579 TY-0.0031095", "-0.0012970 TY-0.0011679", "+0.0000000 TY+0.0069813"]
+    lines = ["TOOL CALL 1 Z S3000", "L X+0 Y+0 Z+200 B+4 C+30 R0 FMAX"]
+    for number, (words, z) in enumerate(zip(directions, (0.9999813, 0.9999985, 0.9999756), strict=True)):
+        place = f"LN X{25 + 5 * number:+.4f} Y{3 * number - 11:+.4f} Z{43 + number:+.4f} TX{words} TZ+{z}"
+        lines.append(place + (" F1200" if number else " F MAX M128"))
+    text = "\n".join(["BEGIN PGM T MM", *lines, "END PGM T MM", ""]).encode()
+    report = olp.correct_joints(text, machine, tolerance_urad=2.0).report
+    assert report["orientation"]["near_singular"]
+    assert report["deviation"]["after"]["position_max_um"] < 1.0
+    assert report["deviation"]["after"]["orientation_max_urad"] > 100.0
+
+
+def test_angles_of_rapids_are_no_uncorrectable_ones(tmp_path: Path) -> None:
+    """A rapid before tool centre point control keeps its rotary words; what cuts is turned."""
+    text = b"0 BEGIN PGM A MM\n1 TOOL CALL 1 Z S1000\n2 L X+0 Y+0 Z+200 B+20 C+30 R0 FMAX\n"
+    text += b"3 L X+0 Y+0 Z+40 B+20 C+30 R0 FMAX M128\n4 L X+10 F1000\n5 L M129\n6 END PGM A MM\n"
+    report = corrected(tmp_path, text, "F X Y Z C B", "heidenhain").report
+    assert report["deviation"]["before"]["orientation_max_urad"] > 20.0
+    assert report["orientation"]["uncorrectable_urad"] < 0.1
+
+
 def test_vectors_are_written_as_they_are_programmed(tmp_path: Path) -> None:
     text, machine = vectors("C A Y F X Z", tmp_path, moves=3)
     result = olp.correct_joints(text, machine, tolerance_urad=2.0)

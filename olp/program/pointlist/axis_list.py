@@ -27,6 +27,8 @@ from olp.program.text.rows import Cells
 _JOINED = re.compile(r"#\s*joined\s*=\s*(\S+)")
 #: Names of a column of time, with or without its unit.
 _TIME = re.compile(r"(?i)(?:t|time)(?:[ _]*[\[(]?(?:s|ms|us)[\])]?)?")
+#: Names of columns of axis values.
+_OF_AXIS = re.compile(r"[A-Z]\d?_(?:mm|deg)")
 _COMMA_NUMBER = re.compile(r"[-+]?\d+,\d+")
 
 
@@ -102,7 +104,8 @@ def _layout(lines: Sequence[str]) -> Layout:
 
 
 def _places(cells: Cells, order: Sequence[str], units: Sequence[str]) -> list[int]:
-    """The columns of all axes. Raises InputError where the header does not name each once, with its unit."""
+    """The columns of all axes. Raises InputError where the header does not name each once, with its unit, or
+    names further axes: such values are those of another machine, or poses."""
     wanted = [f"{name}_{unit}" for name, unit in zip(order, units, strict=True)]
     wrong = [name for name in wanted if cells.header.count(name) != 1]
     if wrong:
@@ -110,6 +113,14 @@ def _places(cells: Cells, order: Sequence[str], units: Sequence[str]) -> list[in
         raise InputError(
             f"the header names {known}; expected one column for each of {', '.join(wanted)} (missing or "
             f"twice: {', '.join(wrong)})",
+            line=cells.header_line or 1,
+        )
+    others = [name for name in cells.header if _OF_AXIS.fullmatch(name) and name not in wanted]
+    if others:
+        raise InputError(
+            f"the header names {', '.join(others)}, and the machine has no such axis; expected the values of "
+            f"{', '.join(wanted)}; give other columns other names, and compute the axis values of poses "
+            "before (olp.kinematics.inverse)",
             line=cells.header_line or 1,
         )
     return [cells.header.index(name) for name in wanted]

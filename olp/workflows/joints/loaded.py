@@ -114,7 +114,8 @@ class JointRun:
                 raise ProgramError(
                     f"on a machine with the chain {' '.join(self.machine.structure.chain)} lists of axis "
                     f"values are read{_OF_ROBOTS if self.machine.arm else ''}; expected a table with the "
-                    f"columns {', '.join(_columns(self.machine))}",
+                    f"columns {', '.join(_columns(self.machine))}; the axis values of poses come from "
+                    "olp.kinematics.inverse",
                     code="OLP563",
                 )
             return AXIS_LIST

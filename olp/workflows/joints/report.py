@@ -95,7 +95,7 @@ def report_of(
             "holds": proof.holds,
         },
         "orientation": {
-            "uncorrectable_urad": float(np.max(proof.left_rad, initial=0.0)) / RAD_PER_URAD,
+            "uncorrectable_urad": float(np.max(proof.left_rad[proof.judged], initial=0.0)) / RAD_PER_URAD,
             "near_singular": int(plan.limited.sum()),
         },
         "largest_correction": _largest(path, plan),
