@@ -191,8 +191,9 @@ MODAL = (
 
 
 def test_what_is_written_are_straight_moves_in_the_words_of_the_program(tmp_path: Path) -> None:
-    text = olp.correct_joints(MODAL, machine_file(tmp_path, "C A Y F X Z")).data
-    lines = text.splitlines(keepends=True)
+    result = olp.correct_joints(MODAL, machine_file(tmp_path, "C A Y F X Z"))
+    lines = result.data.splitlines(keepends=True)
+    assert "OLP111" in [one.code for one in result.findings]
     heads = [line for line in lines if line.startswith((b"N10", b"G91", b"G1"))]
     assert heads[0].startswith(b"N10 G01 X") and heads[0].endswith(b"F500 S9 ; cut\r\n")
     assert not any(
@@ -205,7 +206,8 @@ def test_what_is_written_are_straight_moves_in_the_words_of_the_program(tmp_path
 def test_without_errors_arcs_stay(tips: bool, tmp_path: Path) -> None:
     machine = machine_file(tmp_path, "C A Y F X Z", control="fanuc" if tips else "linuxcnc", errors=False)
     text = Arc("C A Y F X Z", 3, tips=tips, turns=1.0).text()
-    assert olp.correct_joints(text, machine).data == text
+    result = olp.correct_joints(text, machine)
+    assert result.data == text and not result.findings
     assert tips or olp.correct_joints(MODAL, machine).data == MODAL
 
 

@@ -107,6 +107,16 @@ RULES = (
         "`M98 P1000` in G54 and in G55, where the machine has other errors.",
     ),
     _rule(
+        "OLP111",
+        "arcs written as straight moves",
+        Severity.INFO,
+        "With rotary axes no arc of a control has the corrected path. So these arcs became straight moves, "
+        "each within the tolerance of its part of the arc.",
+        "Nothing needs to be done. A wider --tolerance-um gives fewer moves.",
+        "`G2 X40. I20.` behind G43.4 on a machine whose table turns askew.",
+        gate=False,
+    ),
+    _rule(
         "OLP401",
         "calibration expired",
         Severity.ERROR,

@@ -212,6 +212,10 @@ def findings_of(
     if plan.limited.any():
         what = "near a singular posture: the position is met, and a rest of the orientation is left"
         found.append(finding("OLP106", what, path.line[plan.move[plan.limited]].tolist()))
+    arcs = np.flatnonzero(path.curves.mask & plan.straight)
+    if len(arcs):
+        what = f"{len(arcs)} arcs are written as straight moves within the tolerance"
+        found.append(finding("OLP111", what, path.line[arcs].tolist()))
     found += remark_findings(path.program)
     if not proof.judged.any():
         found.append(finding("OLP107", "no feed move was corrected at a known position"))
