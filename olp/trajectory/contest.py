@@ -16,6 +16,7 @@ from olp.core.arrays import Array, Index
 from olp.core.errors import CannotCompute
 from olp.core.values import dataclass
 from olp.trajectory.audit import Ratios, ratios, slowing
+from olp.trajectory.bends import levelled, outward
 from olp.trajectory.critical import seconds
 from olp.trajectory.deviation import deviation_bound
 from olp.trajectory.merge import shared, variants
@@ -60,10 +61,12 @@ def fastest(run: Run, candidates: tuple[Candidate, ...], optimise: bool) -> Solu
     solvers are tried in order; exact stops come last, as they are never the fastest."""
     best: Solution | None = None
     smooth: list[Run] = []
-    for own, candidate in _entries(run, candidates, optimise):
+    entries, lines = _entries(run, candidates, optimise)
+    for own, candidate in entries:
         if best is None or candidate.least_s < best.duration_s:
             best = _better(run, candidate.solver, best, own)
-            if candidate.solver.bends:
+            # a path over lines instead of curves has tight bends between them, which speeds make no better
+            if candidate.solver.bends and own not in lines:
                 smooth.append(own)
     if optimise and best is not None and any(candidate.solver.bends for candidate in candidates):
         # optimising takes most of the time: only along the path that is fastest in closed form
@@ -75,18 +78,25 @@ def fastest(run: Run, candidates: tuple[Candidate, ...], optimise: bool) -> Solu
     return best
 
 
-def _entries(run: Run, candidates: tuple[Candidate, ...], optimise: bool) -> list[tuple[Run, Candidate]]:
-    """The solvers with the runs that they drive: the run itself, and its variants without short steps."""
+def _entries(
+    run: Run, candidates: tuple[Candidate, ...], optimise: bool
+) -> tuple[list[tuple[Run, Candidate]], list[Run]]:
+    """The solvers with the runs that they drive: the run itself, and its variants without short steps, with
+    corners moved outward, or over lines instead of noise; and the last ones."""
     entries = [(run, candidate) for candidate in candidates]
+    lines: list[Run] = []
     if len(run.route) <= _LONG or optimise:
-        for route in variants(run.route):
-            own = Run(route, run.limits)
-            entries += [
-                (own, Candidate(solver, float(solver.least_s(route, run.limits).sum()))) for solver in SOLVERS
-            ]
+        bending = tuple(solver for solver in SOLVERS if solver.bends)
+        own = [(solver, Run(route, run.limits)) for route in variants(run.route) for solver in SOLVERS]
+        level, moved = levelled(run.route), outward(run.route)
+        lines += [] if level is None else [Run(level, run.limits)]
+        bent = [*lines, *([] if moved is None else [Run(moved, run.limits)])]
+        own += [(solver, some) for some in bent for solver in bending]
+        for solver, some in own:
+            entries.append((some, Candidate(solver, float(solver.least_s(some.route, run.limits).sum()))))
         # the most promising first, as it may spare the others
         entries.sort(key=lambda entry: entry[1].least_s)
-    return entries
+    return entries, lines
 
 
 def contest(run: Run, candidates: tuple[Candidate, ...]) -> list[tuple[int, int, Solution]]:

@@ -32,6 +32,8 @@ _LEVEL = 1.02
 _BINDS = 1e-6
 #: share above a ceiling beyond which a profile is too fast; less is rounding
 _TOO_FAST = 1e-8
+#: share by which ceilings differ that are equal but for rounding
+_EVEN = 1e-9
 #: turns after which every piece that is too fast becomes a node, not only the worst ones
 _PATIENT = 40
 #: pieces of the path per block
@@ -94,8 +96,18 @@ def _dips(x: Array, top: Array, ceiling: Array, acceleration: Array) -> Mask:
     free = free_speeds(x, ceiling, acceleration)
     before = np.concatenate(([np.inf], top[:-1]))
     behind = np.concatenate((top[1:], [np.inf]))
-    dip = (top <= before) & (top <= behind) & ((top < before) | (top < behind))
+    level = top * (1.0 - _EVEN)
+    dip = (
+        (level <= before)
+        & (level <= behind)
+        & ((top < before * (1.0 - _EVEN)) | (top < behind * (1.0 - _EVEN)))
+    )
     dip &= np.maximum(free[:-1], free[1:]) >= top * (1.0 - _BINDS)
+    if len(top) > 1:
+        # an end that goes on as it begins is none
+        for end, beside in ((0, 1), (-1, -2)):
+            same = np.allclose((top[end], acceleration[end]), (top[beside], acceleration[beside]), _EVEN, 0.0)
+            dip[end] &= not same
     node[:-1] |= dip
     node[1:] |= dip
     return node

@@ -18,7 +18,7 @@ _CRUISE = 20.0
 #: least time of a cell, as a share of the shortest cells beside it
 _LEAST = 0.4
 #: least number of cells of a path
-_OF_PATH = 60.0
+_OF_PATH = 480.0
 #: least number of cells of a ramp that changes the speed by more than the share _LEVEL
 _OF_RAMP = 6
 #: share of the speed by which a ramp changes it at least

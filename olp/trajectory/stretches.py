@@ -14,7 +14,7 @@ from olp.trajectory.solvers import SOLVERS, Candidate
 from olp.trajectory.speedgrid import CELL_S
 
 #: runs with no more segments than this are planned by the overlapping solver only
-_FEW_SEGMENTS = 2
+_FEW_SEGMENTS = 1
 #: a solver whose least time is below this share of all others' wins without a contest
 _CLEAR_WIN = 0.8
 #: pieces per waypoint

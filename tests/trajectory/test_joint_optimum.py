@@ -67,7 +67,7 @@ def test_the_reference_comes_to_stops_where_the_tolerance_is_none() -> None:
 
 
 #: times of the planner over those of the joint optimum, at most: the largest measured, and 5e-3 more
-WORST = {"corner": 1.013, "jog": 1.051}
+WORST = {"corner": 1.013, "jog": 1.043}
 
 
 @pytest.mark.slow
