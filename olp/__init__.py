@@ -72,6 +72,10 @@ if TYPE_CHECKING:
     from olp.workflows.inspect import inspect as inspect
     from olp.workflows.joints.correct import JointCorrection as JointCorrection
     from olp.workflows.joints.correct import correct_joints as correct_joints
+    from olp.workflows.joints.doctor import DiagnosedJoints as DiagnosedJoints
+    from olp.workflows.joints.doctor import diagnose_joint_calibration as diagnose_joint_calibration
+    from olp.workflows.joints.refine import RefinedJoints as RefinedJoints
+    from olp.workflows.joints.refine import refine_joint_calibration as refine_joint_calibration
     from olp.workflows.joints.retime import JointRetiming as JointRetiming
     from olp.workflows.joints.retime import retime_joints as retime_joints
     from olp.workflows.joints.simulate import JointSimulation as JointSimulation
@@ -101,6 +105,10 @@ _HOME = {
     "fit_calibration": "olp.workflows.calibrate_fit",
     "FittedJoints": "olp.workflows.calibrate_joints",
     "fit_joint_calibration": "olp.workflows.calibrate_joints",
+    "DiagnosedJoints": "olp.workflows.joints.doctor",
+    "diagnose_joint_calibration": "olp.workflows.joints.doctor",
+    "RefinedJoints": "olp.workflows.joints.refine",
+    "refine_joint_calibration": "olp.workflows.joints.refine",
     "CalibrationDiagnosis": "olp.workflows.calibrate_doctor",
     "compare_methods": "olp.workflows.calibrate_compare_methods",
     "ComparedMethods": "olp.workflows.calibrate_compare_methods",

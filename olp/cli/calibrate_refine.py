@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from olp.cli.common import STREAM, diagnostic, exit_for, files_of, put_result, refuse_early
+from olp.cli.joints import on_joints
 from olp.cli.options import (
     Length,
     day_option,
@@ -38,8 +39,9 @@ from olp.core.errors import UsageError
     help="What is known fades by this share a year until the day of the run. Default: the calibration's.",
 )  # fmt: skip
 @click.option(
-    "--uncertainty-um", type=Length(), default=5.0, show_default=True,
-    help="Measure again when the uncertainty in the box (rms length, best-fit frame) is more.",
+    "--uncertainty-um", type=Length(),
+    help="Measure again when the uncertainty in the box (rms length, best-fit frame) is more. Default: 5 um; "
+    "none for a machine of any joints.",
 )  # fmt: skip
 @json_option()
 @units_option
@@ -57,7 +59,7 @@ def command(
     reflector: tuple[float, float, float] | None,
     date: datetime.date | None,
     growth_per_year: float | None,
-    uncertainty_um: float,
+    uncertainty_um: float | None,
     as_json: bool,
     fail_on: str,
     quiet: bool,
@@ -68,12 +70,19 @@ def command(
 
     MEASURED.csv holds commanded axis positions and measured positions of the reflector, in an unknown
     instrument frame. Every number of the calibration changes as far as its uncertainty allows and the run
-    asks for. What the run does not determine stays unchanged.
+    asks for. What the run does not determine stays unchanged. For a machine of any joints MEASURED.csv is a
+    plan of new readings, as for a fit.
     """
     if STREAM in (output, calibration, measured):
         raise UsageError("a calibration is several files and cannot be -; name files")
     if machine is None:
         raise UsageError("no machine file is given; name it with -m")
+    if on_joints(machine, job, also=("calibration", "measured", "growth_per_year", "uncertainty_um")):
+        _of_joints(
+            calibration, measured, machine, output, date, growth_per_year, uncertainty_um,
+            as_json=as_json, fail_on=fail_on, quiet=quiet, force=force,
+        )  # fmt: skip
+        return
     from olp.files.calibration.reader import files_beside
     from olp.files.measurements.reader import files_of_measurements
 
@@ -87,12 +96,43 @@ def command(
     from olp.files.write import write_files
     from olp.workflows.calibrate_refine import refine_calibration
 
+    wanted: dict[str, Any] = {} if uncertainty_um is None else {"uncertainty_um": uncertainty_um}
     refined = refine_calibration(
         calibration, measured, machine, job, program=program, sigma_um=sigma_um, tool_mm=reflector,
-        date=date, growth_per_year=growth_per_year, uncertainty_um=uncertainty_um, **unrolling,
+        date=date, growth_per_year=growth_per_year, **wanted, **unrolling,
     )  # fmt: skip
     files = refined.files(output)
     write_files(files, force=force, inputs=inputs)
     diagnostic(f"wrote {output} and {len(files) - 1} files beside it")
+    put_result(refined, as_json=as_json, quiet=quiet)
+    exit_for(refined.findings, fail_on)
+
+
+def _of_joints(
+    calibration: str,
+    data: str,
+    machine: str,
+    output: str,
+    date: datetime.date | None,
+    growth_per_year: float | None,
+    uncertainty_um: float | None,
+    *,
+    as_json: bool,
+    fail_on: str,
+    quiet: bool,
+    force: bool,
+) -> None:
+    """The refinement of a calibration of any joints."""
+    from olp.files.write import write_files
+    from olp.workflows.joints.refine import refine_joint_calibration
+
+    refuse_early(files_of(output), (calibration, data, *files_of(machine)), force=force)
+    refined = refine_joint_calibration(
+        calibration, data, machine, date=date, growth_per_year=growth_per_year, uncertainty_um=uncertainty_um
+    )
+    files = refined.files(output)
+    write_files(files, force=force, inputs=refined.inputs)
+    for path in files:
+        diagnostic(f"wrote {path}")
     put_result(refined, as_json=as_json, quiet=quiet)
     exit_for(refined.findings, fail_on)

@@ -6,7 +6,7 @@ import datetime
 from collections.abc import Mapping
 from dataclasses import field
 
-from olp.core.machine import Machine, Tool
+from olp.core.machine import ZERO, Machine, Tool, Vector
 from olp.core.toolpath import Interpolated
 from olp.core.values import dataclass
 from olp.kinematics.errors import MachineErrors
@@ -44,10 +44,13 @@ class JointMachine:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointCalibration:
-    """A calibration file: the errors, and the calibrated values of each axis in mm or deg."""
+    """A calibration file: the errors, and the calibrated values of each axis in mm or deg. Its standard
+    uncertainties grow by `growth_per_year`, a share."""
 
     errors: MachineErrors
     box: Mapping[str, tuple[float, float]]
     measured: datetime.date
     valid_until: datetime.date | None
     temperature_degC: float
+    datum_mm: Vector = ZERO
+    growth_per_year: float = 0.0

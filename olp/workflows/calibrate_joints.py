@@ -14,9 +14,10 @@ from olp.calibration.joints.unknowns import model_of
 from olp.core.arrays import Array
 from olp.core.units import RAD_PER_URAD, UM_PER_MM
 from olp.core.values import dataclass
+from olp.files.kinematics.covariance import JointCovariance, lines_of
 from olp.files.kinematics.machine import load_joint_machine
 from olp.files.kinematics.plan import Campaign, load_campaign
-from olp.files.kinematics.writer import joint_calibration_file
+from olp.files.kinematics.writer import fitted_values, joint_calibration_files
 from olp.findings.catalogue import Finding
 from olp.workflows.session import PathLike
 from olp.workflows.shown import Filed
@@ -44,17 +45,18 @@ class FittedJoints(Filed):
     inputs: tuple[str, ...] = ()
 
     def files(self, target: PathLike) -> dict[Path, bytes]:
-        """The bytes of the calibration file `target`."""
+        """The bytes of the calibration file `target` and of its covariance beside it."""
         notes = [f"{finding.code}: {finding.message}" for finding in self.findings]
-        data = joint_calibration_file(
+        values = fitted_values(
             self.fit,
             _box(self.fit),
             self.campaign.measured,
             self.valid_until,
             self.campaign.temperature_degC,
-            notes,
         )
-        return {Path(target): data}
+        model = self.fit.model
+        known = JointCovariance(model.unknowns, self.fit.covariance, lines_of(model.structure))
+        return joint_calibration_files(target, values, known, notes=notes)
 
 
 def fit_joint_calibration(

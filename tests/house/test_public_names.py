@@ -22,6 +22,7 @@ PUBLIC = {
     *("diagnose_calibration", "CalibrationDiagnosis", "plan_measurements", "MeasurementPlan"),
     *("plan_next", "probe_artefact", "ProbedArtefact"),
     *("compare_methods", "ComparedMethods", "fit_joint_calibration", "FittedJoints"),
+    *("diagnose_joint_calibration", "DiagnosedJoints", "refine_joint_calibration", "RefinedJoints"),
     *("refine_calibration", "RefinedCalibration", "batch", "Batch"),
     *("import_table", "export_table", "compare_tables", "TableImport", "TableExport"),
     *("evaluate_lines", "fit_ballbar", "fit_diagonals", "fit_postures", "go_return"),

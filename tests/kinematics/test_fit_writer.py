@@ -12,7 +12,7 @@ from calibration.joints.simulated import true_machine
 from olp.calibration.joints.adjustment import JointFit
 from olp.calibration.joints.unknowns import Priors, model_of
 from olp.files.kinematics.calibration import load_joint_calibration
-from olp.files.kinematics.writer import joint_calibration_file
+from olp.files.kinematics.writer import fitted_values, joint_calibration_text
 from olp.kinematics.chain import Kinematics
 from olp.kinematics.errors import Mass
 
@@ -31,7 +31,7 @@ def test_a_file_reads_back_as_the_fit(name: str, tmp_path: Path) -> None:
     }
     day = datetime.date(2026, 11, 20)
     file = tmp_path / "calibration.toml"
-    file.write_bytes(joint_calibration_file(fit, box, day, None, 20.0, ["A note."]))
+    file.write_bytes(joint_calibration_text(fitted_values(fit, box, day, None, 20.0), ["A note."]))
     read = load_joint_calibration(file, model.structure)
     theirs = Kinematics(model.structure, read.errors).actual(values)
     ours = model.machine(theta).actual(values)

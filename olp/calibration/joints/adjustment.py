@@ -186,14 +186,14 @@ def adjusted(model: Model, starts: Sequence[Start], most: int = _STEPS) -> Joint
     """One fit of all readings in at most so many steps. Raises CannotCompute where it does not settle."""
     theta = np.zeros(len(model.unknowns))
     owns = [np.zeros(len(start.prior)) for start in starts]
-    precision = np.diag(1.0 / model.prior**2) if len(theta) else np.zeros((0, 0))
+    precision = model.precision
     before, longest = np.inf, _LONGEST * model.prior
     for _ in range(most):
-        blocks = [_block(model, theta, start, own) for start, own in zip(starts, owns, strict=True)]
+        blocks = [block_of(model, theta, start, own) for start, own in zip(starts, owns, strict=True)]
         normal = Normal.of(len(theta))
-        for block in blocks:
-            normal.add(block)
         try:
+            for block in blocks:
+                normal.add(block)
             solved = solve(normal, precision) if len(theta) else None
         except np.linalg.LinAlgError:
             raise _unsettled(model) from None
@@ -239,7 +239,7 @@ def _unsettled(model: Model) -> CannotCompute:
     )
 
 
-def _block(model: Model, theta: Array, start: Start, own: Array) -> Block:
+def block_of(model: Model, theta: Array, start: Start, own: Array) -> Block:
     """The rows of one instrument, linear about theta and its own unknowns."""
     reading = start.reading
     pose = model.machine(theta, reading.payload).actual(reading.values)

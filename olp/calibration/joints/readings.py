@@ -34,7 +34,9 @@ class Reading(ABC):
     """Readings of one instrument in one set-up at commanded axis values (n, axes), mm and deg. `row` (n,) are
     lines of the file. `tool_mm` runs from the gauge point to what is read, in the gauge frame; it is known
     within `tool_sigma` (mm, of each coordinate, the same error in all rows). `which` (n,) is the index of a
-    nest, ball, centre, plane or point in `names`. `columns` are more fields with a row for each reading.
+    nest, ball, centre, plane or point in `names`. `read_back` (n, axes) is what the control showed there,
+    None where it was not noted: it has no part in a fit. `columns` are more fields with a row for each
+    reading.
     """
 
     kind: ClassVar[str] = ""
@@ -48,6 +50,7 @@ class Reading(ABC):
     which: Index
     tool_sigma: float = 0.0
     payload: Payload = Payload()
+    read_back: Array | None = None
 
     @property
     def count(self) -> int:
@@ -86,6 +89,8 @@ class Start(ABC):
         """The same instrument with some of its readings."""
         reading = self.reading
         taken = {name: getattr(reading, name)[rows] for name in ("values", "row", "which", *reading.columns)}
+        if reading.read_back is not None:
+            taken["read_back"] = reading.read_back[rows]
         own = {name: getattr(self, name)[rows] for name in ("measured", *self.columns)}
         return dataclasses.replace(self, reading=dataclasses.replace(reading, **taken), **own)
 

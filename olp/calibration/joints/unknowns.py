@@ -82,13 +82,24 @@ class Unknown:
 @dataclass(frozen=True, slots=True, eq=False)
 class Model:
     """A machine with its unknowns, the weights on its bodies, and `datum_mm`, where tilted linear lines have
-    no shift."""
+    no shift. Unknowns are added to `base`, what a calibration states already. `known` (k, k) is the
+    covariance of them before the readings, in mm and rad; without it they are as their priors say."""
 
     structure: Structure
     unknowns: tuple[Unknown, ...]
     masses: tuple[Mass, ...] = ()
     datum_mm: Vector = ZERO
     dropped: tuple[Unknown, ...] = field(default=())
+    base: MachineErrors = field(default_factory=MachineErrors)
+    known: Array | None = None
+
+    @property
+    def precision(self) -> Array:
+        """(k, k) inverse covariance of the unknowns before the readings."""
+        if self.known is None:
+            return np.diag(1.0 / self.prior**2)
+        scale = np.sqrt(np.diag(self.known))
+        return np.asarray(np.linalg.inv(self.known / np.outer(scale, scale)) / np.outer(scale, scale))
 
     @property
     def prior(self) -> Array:
@@ -102,27 +113,33 @@ class Model:
             stem = unknown.key.rpartition("_")[0] if unknown.table != "elasticity" else "yield"
             what, place = _place(stem)
             vectors.setdefault((unknown.part, unknown.leg, what), np.zeros(3))[place] += value
+        base = self.base
         joints = {
             name: self._joint(joint, {what: v for (part, _, what), v in vectors.items() if part == name})
             for name, joint in self.structure.joints.items()
         }
-        legs = {}
+        legs = dict(base.legs)
         for part, leg, _ in vectors:
             if leg:
                 own = {what: v for (p, number, what), v in vectors.items() if (p, number) == (part, leg)}
-                base, platform = (_vector(own.get(what, np.zeros(3))) for what in ("base", "platform"))
-                legs[part, leg - 1] = LegErrors(base, platform, float(own.get("length", np.zeros(3))[0]))
+                old = base.legs.get((part, leg - 1), LegErrors())
+                legs[part, leg - 1] = LegErrors(
+                    _sum(old.base_mm, own.get("base")),
+                    _sum(old.platform_mm, own.get("platform")),
+                    old.length_mm + float(own.get("length", np.zeros(3))[0]),
+                )
         gauge = {what: v for (part, _, what), v in vectors.items() if part == "gauge"}
+        yields = dict(base.yields)
+        for (part, _, what), value in vectors.items():
+            if what == "yield":
+                stiff = yields.get(part, Yield())
+                yields[part] = replace(stiff, own=stiff.own + float(value[0]))
         return MachineErrors(
             joints=joints,
-            gauge_shift_mm=_vector(gauge.get("shift", np.zeros(3))),
-            gauge_tilt_rad=_vector(gauge.get("tilt", np.zeros(3))),
+            gauge_shift_mm=_sum(base.gauge_shift_mm, gauge.get("shift")),
+            gauge_tilt_rad=_sum(base.gauge_tilt_rad, gauge.get("tilt")),
             legs=legs,
-            yields={
-                part: Yield(own=float(value[0]))
-                for (part, _, what), value in vectors.items()
-                if what == "yield"
-            },
+            yields=yields,
             masses=self.masses,
             payload=payload,
         )
@@ -130,12 +147,13 @@ class Model:
     def _joint(self, joint: Joint, own: dict[str, Array]) -> JointErrors:
         direction = np.array(joint.direction)
         tilt = own.get("tilt", np.zeros(3))
-        return JointErrors(
-            point_mm=joint.point_mm,
-            shift_mm=_vector(own.get("shift", np.zeros(3))),
-            tilt_rad=_vector(tilt - direction * (direction @ tilt)),
-            zero=float(own.get("zero", np.zeros(3))[0]),
-            datum=float(direction @ np.array(self.datum_mm)),
+        datum = float(direction @ np.array(self.datum_mm))
+        old = self.base.joints.get(joint.name, JointErrors(point_mm=joint.point_mm, datum=datum))
+        return replace(
+            old,
+            shift_mm=_sum(old.shift_mm, own.get("shift")),
+            tilt_rad=_sum(old.tilt_rad, tilt - direction * (direction @ tilt)),
+            zero=old.zero + float(own.get("zero", np.zeros(3))[0]),
         )
 
     def machine(self, theta: Array, payload: Payload = NO_PAYLOAD) -> Kinematics:
@@ -306,6 +324,6 @@ def _place(stem: str) -> tuple[str, int]:
     return end, _SHIFTS.index(letter)
 
 
-def _vector(values: Array) -> Vector:
-    x, y, z = (float(value) for value in values)
+def _sum(old: Vector, more: Array | None) -> Vector:
+    x, y, z = (float(value) for value in np.array(old) + (0.0 if more is None else more))
     return (x, y, z)

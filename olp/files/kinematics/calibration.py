@@ -56,7 +56,15 @@ def load_joint_calibration(
     reading = _Reading(structure, file, path, lines, read)
     errors = reading.errors(payload)
     reading.finish()
-    return JointCalibration(errors, reading.box(), file.measured, file.valid_until, file.temperature_degC)
+    return JointCalibration(
+        errors,
+        reading.box(),
+        file.measured,
+        file.valid_until,
+        file.temperature_degC,
+        file.datum_mm,
+        file.covariance.growth_per_year,
+    )
 
 
 class _Reading:

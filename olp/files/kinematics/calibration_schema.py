@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 from typing import ClassVar, Literal
 
-from olp.core.schema import Interval, Positive, Table, Text, Triple
+from olp.core.schema import Interval, NotNegative, Positive, Table, Text, Triple
 from olp.core.schema_keys import Field, Known, refusal, rule
 from olp.files.fields import Sign
 from olp.files.kinematics.schema import none_named
@@ -18,7 +18,6 @@ _NOT_BUILT = {
     "thermal": "expansion",
     "structure": "thermal structures",
     "gravity": "weight with unknown masses",
-    "covariance": "uncertainty",
     "quality": "the quality of a fit",
     "prior": "priors of a fit",
 }
@@ -114,6 +113,19 @@ class JointSquarenessTable(Table):
     A0Z_urad: float | None = Field(default=None, description="the tilt of Z about X, in urad")
 
 
+class JointCovarianceTable(Table):
+    file: Text | None = Field(
+        default=None,
+        description="the path of the covariance of all numbers, as olp calibrate fit writes it, relative to "
+        "this file",
+    )
+    growth_per_year: NotNegative = Field(
+        default=0.0,
+        description="the growth of standard uncertainties per year after measured, as a share: 0.5 makes "
+        "them half as large again",
+    )
+
+
 class JointCalibrationFile(Table):
     """olp-calibration-1 of any joints: the measured errors of one machine, actual minus commanded."""
 
@@ -159,6 +171,11 @@ class JointCalibrationFile(Table):
     )
     masses: list[MassTable] = Field(default=[], description="tables [[masses]]: weights on the bodies")
     legs: list[LegErrorTable] = Field(default=[], description="tables [[legs]]: errors of legs of platforms")
+    covariance: JointCovarianceTable = Field(
+        default_factory=JointCovarianceTable,
+        description="the table [covariance]: how well the numbers are known; olp calibrate doctor and refine "
+        "use it",
+    )
 
     @rule("active_during_measurement")
     @staticmethod

@@ -1,7 +1,8 @@
 """Reads a plan of measurements of a machine of any joints, and the readings that it names.
 
 A row of a file holds the commanded values of all axes and what the instrument said. A column `nest`, `ball`,
-`centre`, `plane` or `point` names which one it was; without it there is one.
+`centre`, `plane` or `point` names which one it was; without it there is one. Columns such as
+`read_back_J1_deg` hold what the control showed there.
 """
 
 from __future__ import annotations
@@ -44,6 +45,8 @@ MEASURED = tuple(f"measured_{axis}_mm" for axis in "XYZ")
 TURNED = tuple(f"measured_{axis}_deg" for axis in "ABC")
 #: Columns of a ball.
 AWAY = tuple(f"d{axis}_um" for axis in "XYZ")
+#: What columns of values that the control showed begin with.
+READ_BACK = "read_back_"
 #: Columns of a bar.
 LENGTH = ("length_mm",)
 #: By kind its columns, and the column that names what was read.
@@ -74,10 +77,11 @@ class Campaign:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Rows:
-    """A file of readings: axis values (n, axes), the columns of the instrument (n, m), the lines (n,), and
-    which nest, ball or the like (n,) of `names`."""
+    """A file of readings: commanded axis values (n, axes), those read back or None, the columns of the
+    instrument (n, m), the lines (n,), and which nest, ball or the like (n,) of `names`."""
 
     values: Array
+    read_back: Array | None
     read: Array
     row: Index
     which: Index
@@ -158,14 +162,15 @@ def _rows(path: FilePath, kind: str, structure: Structure, read: Reader) -> _Row
     """The rows of a file. Raises InputError, and ConfigError with every problem."""
     columns, which = KINDS[kind]
     axes = tuple(f"{joint.name}_{joint.unit}" for joint in structure.joints.values())
+    shown = tuple(f"{READ_BACK}{name}" for name in axes)
     wanted = (*axes, *columns)
     found: dict[str, int] = {}
 
     def header(line: int, given: Sequence[str]) -> list[Problem]:
-        known = (*wanted, which)
+        known = (*wanted, which, *shown)
         return [
             *names(line, given, lambda _, name: unknown(name, known)),
-            *missing(line, given, wanted),
+            *missing(line, given, (*wanted, *shown) if set(shown) & set(given) else wanted),
         ]
 
     def number(name: str, cell: str) -> tuple[float, str | None]:
@@ -189,8 +194,13 @@ def _rows(path: FilePath, kind: str, structure: Structure, read: Reader) -> _Row
         return np.asarray(table[:, [sheet.header.index(name) for name in group]])
 
     return _Rows(
-        take(axes), take(columns), sheet.lines, index.astype(np.int64), tuple(found) or ("1",)
-    )  # fmt: skip
+        take(axes),
+        take(shown) if shown[0] in sheet.header else None,
+        take(columns),
+        sheet.lines,
+        index.astype(np.int64),
+        tuple(found) or ("1",),
+    )
 
 
 def _reading(kind: str, table: Any, rows: _Rows, source: str) -> Reading:
@@ -241,6 +251,7 @@ def _common(table: ReadingTable, rows: _Rows, source: str) -> dict[str, Any]:
         "names": rows.names,
         "which": rows.which,
         "tool_sigma": table.tool_sigma_um * MM_PER_UM,
+        "read_back": rows.read_back,
         "payload": Payload(table.payload_kg, table.payload_centre_mm),
     }
 

@@ -16,7 +16,7 @@ class ReadingTable(Table):
 
     file: Text = Field(
         description="the path of a CSV file: a column of commanded values for each axis, such as C_deg, and "
-        "those of the instrument"
+        "those of the instrument; columns such as read_back_C_deg may hold what the control showed"
     )
     sigma_um: Positive = Field(description="the standard uncertainty of a reading (a coordinate), in um")
     tool_mm: Triple = Field(

@@ -1,30 +1,37 @@
-"""The calibration file of a machine of any joints, from the unknowns of a fit."""
+"""The calibration file of a machine of any joints, from the unknowns of a fit, and with some changed."""
 
 from __future__ import annotations
 
+import copy
 import datetime
-from collections.abc import Mapping, Sequence
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
 
 from olp.calibration.joints.adjustment import JointFit
+from olp.calibration.joints.unknowns import Unknown
 from olp.files.fields import SIGN
+from olp.files.kinematics.covariance import JointCovariance, joint_covariance_bytes
+from olp.files.kinematics.numbers import number_of, put_number
 from olp.files.toml_text import comment, toml_document, toml_key, toml_lines
+from olp.files.write import PathLike
 
-#: Decimals of um and urad: a thousandth of a digit of any control.
-_DECIMALS = 4
+#: A table of numbers by name of the axis: a value of the file, no table.
+_INLINE = "box"
 
 
-def joint_calibration_file(
+def fitted_values(
     fit: JointFit,
     box: Mapping[str, tuple[float, float]],
     measured: datetime.date,
     valid_until: datetime.date | None,
     temperature_degC: float,
-    notes: Sequence[str] = (),
-) -> bytes:
-    """The bytes of an olp-calibration-1 file. `box` are the calibrated values by name of the axis with its
-    unit, notes become comments."""
+) -> dict[str, Any]:
+    """The keys of the calibration of a fit. `box` are the calibrated values by name of the axis with its
+    unit."""
     model = fit.model
-    head = {
+    values: dict[str, Any] = {
         "schema": "olp-calibration-1",
         "machine": model.structure.name,
         "measured": measured,
@@ -35,34 +42,74 @@ def joint_calibration_file(
         "datum_mm": list(model.datum_mm),
         "box": {name: list(ends) for name, ends in box.items()},
     }
-    tables: dict[str, dict[str, object]] = {}
-    legs: dict[tuple[str, int], dict[str, object]] = {}
-    for unknown, value in zip(model.unknowns, fit.theta.tolist(), strict=True):
-        number = round(value / unknown.scale, _DECIMALS) + 0.0
-        if unknown.leg:
-            leg = legs.setdefault((unknown.part, unknown.leg), {"platform": unknown.part, "leg": unknown.leg})
-            _put(leg, unknown.key, number)
+    for unknown, number in zip(model.unknowns, fit.theta.tolist(), strict=True):
+        put_number(values, unknown, number)
+    if model.masses:
+        values["masses"] = [
+            {"on": mass.on, "kg": mass.kg, "centre_mm": list(mass.centre_mm)} for mass in model.masses
+        ]
+    return values
+
+
+def changed_values(
+    values: Mapping[str, Any],
+    changes: Iterable[tuple[Unknown, float]],
+    measured: datetime.date,
+    moved: tuple[PathLike, PathLike],
+) -> dict[str, Any]:
+    """The keys of a calibration with changes of unknowns, in mm and rad, added to what it states. Files that
+    it names are named from where the new file will be: `moved` are the old file and the new one."""
+    old, new = (Path(path).resolve().parent for path in moved)
+    changed = copy.deepcopy({key: value for key, value in values.items() if key != "covariance"})
+    changed["measured"] = measured
+    for unknown, change in changes:
+        put_number(changed, unknown, number_of(changed, unknown) + change)
+    for curve in changed.get("curves", ()):
+        curve["file"] = Path(os.path.relpath(old / curve["file"], new)).as_posix()
+    return changed
+
+
+def named_by(calibration: PathLike, values: Mapping[str, Any]) -> list[Path]:
+    """The files that a calibration with these keys names."""
+    tables = (*values.get("curves", ()), values.get("covariance", {}))
+    return [Path(calibration).parent / table["file"] for table in tables if "file" in table]
+
+
+def joint_calibration_files(
+    target: PathLike,
+    values: Mapping[str, Any],
+    known: JointCovariance | None,
+    growth_per_year: float = 0.0,
+    notes: Sequence[str] = (),
+) -> dict[Path, bytes]:
+    """The bytes of an olp-calibration-1 file and of its covariance beside it; notes become comments."""
+    path = Path(target)
+    if known is None:
+        return {path: joint_calibration_text(values, notes)}
+    archive = path.with_name(f"{path.stem}-covariance.npz")
+    stated: dict[str, Any] = {"file": archive.name}
+    if growth_per_year:
+        stated["growth_per_year"] = growth_per_year
+    text = joint_calibration_text({**values, "covariance": stated}, notes)
+    return {path: text, archive: joint_covariance_bytes(known, values)}
+
+
+def joint_calibration_text(values: Mapping[str, Any], notes: Sequence[str] = ()) -> bytes:
+    """The bytes of a calibration file of these keys."""
+    head: dict[str, object] = {}
+    tables: dict[str, Mapping[str, object]] = {}
+    many: list[tuple[str, Mapping[str, object]]] = []
+    for key, value in values.items():
+        if isinstance(value, dict) and key != _INLINE:
+            parts = {name: part for name, part in value.items() if isinstance(part, dict)}
+            tables |= {f"[{key}.{toml_key(name)}]": part for name, part in parts.items()}
+            if len(parts) < len(value):
+                tables[f"[{key}]"] = {name: part for name, part in value.items() if name not in parts}
+        elif isinstance(value, list) and value and isinstance(value[0], dict):
+            many += [(f"[[{key}]]", row) for row in value]
         else:
-            header = f"[{unknown.table}.{toml_key(unknown.part)}]"
-            tables.setdefault(header, {})[unknown.key] = number
-    rows: list[tuple[str, Mapping[str, object]]] = [
-        *sorted(tables.items()),
-        *(("[[legs]]", leg) for leg in legs.values()),
-    ]
-    rows += [
-        ("[[masses]]", {"on": mass.on, "kg": mass.kg, "centre_mm": list(mass.centre_mm)})
-        for mass in model.masses
-    ]
+            head[key] = value
     above = [line for note in notes for line in comment(note)]
-    return ("\n".join([*above, *toml_lines(head)]) + "\n" + toml_document(rows)).encode()
-
-
-def _put(leg: dict[str, object], key: str, number: float) -> None:
-    """An error of a leg: its length, or one coordinate of an end such as base_X_um."""
-    end, letter, _ = key.split("_") if key.count("_") == 2 else ("", "", "")
-    if not end:
-        leg[key] = number
-        return
-    vector = leg.setdefault(f"{end}_um", [0.0, 0.0, 0.0])
-    assert isinstance(vector, list)
-    vector["XYZ".index(letter)] = number
+    return (
+        "\n".join([*above, *toml_lines(head)]) + "\n" + toml_document([*sorted(tables.items()), *many])
+    ).encode()

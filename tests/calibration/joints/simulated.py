@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from kinematics.cases import golden, random_values
 
+from olp.calibration.joints.adjustment import JointFit, fit_joints
 from olp.calibration.joints.readings import Lengths, Points, Reading, SixD
 from olp.calibration.joints.unknowns import Model, Priors, model_of
 from olp.core.arrays import Array
@@ -29,6 +30,14 @@ def true_machine(name: str, seed: int = 0, count: int = 60, size: float = 1.0) -
     values = random_values(golden(name)[0], count, seed)
     model = model_of(structure, values, Priors.of(structure))
     return model, size * np.random.default_rng(seed + 1).normal(0.0, model.prior), values
+
+
+def known_machine(name: str, seed: int = 0, kind: str = "points") -> tuple[Model, JointFit, Array, Array]:
+    """The model of a golden structure, a fit of 50 readings of a true machine, its unknowns, and 40 other
+    postures."""
+    model, theta, values = true_machine(name, seed, 50)
+    fit = fit_joints(model, [read(kind, model.machine(theta).actual(values), values, seed)])
+    return model, fit, theta, random_values(golden(name)[0], 40, seed + 1000)
 
 
 def read(kind: str, pose: Poses, values: Array, seed: int = 0, names: int = 3, noise: float = 1.0) -> Reading:

@@ -1,0 +1,163 @@
+"""What may be wrong with readings of a machine of any joints: each mistake in words, and the readings put
+right."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import PurePath
+
+import numpy as np
+
+from olp.calibration.joints.adjustment import OUTLIER, JointFit, starts_of
+from olp.calibration.joints.readings import Ball, Lengths, Points, Reading, SixD, Start
+from olp.core.arrays import Array
+from olp.kinematics.poses import Poses
+from olp.kinematics.structure import Structure
+
+#: What is wrong, the readings put right, and the share of chi-square that may then be left.
+Mended = tuple[str, list[Reading], float]
+#: Readings put right have at most this share of chi-square.
+RIGHT = 0.05
+#: Of two values that are both stated, those with less than this share of chi-square are the commanded ones.
+_EITHER = 0.5
+#: Values that may be radians are at most this large: two turns and a half.
+_RADIANS = 16.0
+#: mm in an inch.
+_INCH = 25.4
+#: um in a mm.
+_UM = 1000.0
+#: A mirror: together with the unknown frame it stands for all of them.
+_MIRROR = np.diag((1.0, 1.0, -1.0))
+_LEFT_HANDED = "the frame of the tracker is left-handed: one of its axes is reversed"
+#: At most so many readings that were left out are paired.
+_PAIRED = 8
+
+
+def mistakes(structure: Structure, readings: Sequence[Reading]) -> Iterator[Mended]:
+    """One mistake each."""
+    for words, changed in _of_axes(structure, readings):
+        yield words, changed, RIGHT
+    if any(one.read_back is not None for one in readings):
+        yield "commanded values and those read back are in each other's columns", shown(readings), _EITHER
+    for index, reading in enumerate(readings):
+        name = PurePath(reading.source).name
+        for words, mended in (*_of_rows(reading), *_of_names(reading), *_of_instrument(reading)):
+            yield f"{name}: {words}", [*readings[:index], mended, *readings[index + 1 :]], RIGHT
+
+
+def shown(readings: Sequence[Reading]) -> list[Reading]:
+    """The readings with the values that the control showed, where these were noted."""
+    return [
+        one if one.read_back is None else replace(one, values=one.read_back, read_back=one.values)
+        for one in readings
+    ]
+
+
+def _of_axes(structure: Structure, readings: Sequence[Reading]) -> Iterator[tuple[str, list[Reading]]]:
+    largest = np.max([np.abs(reading.values).max(axis=0) for reading in readings], axis=0)
+    radians = list[str]()
+    for name, joint, most in zip(structure.joints, structure.joints.values(), largest, strict=True):
+        yield f"axis {name} runs the other way in these readings", _scaled(structure, readings, [name], -1.0)
+        if joint.kind != "rotary":
+            words = f"axis {name} is in inches in these readings"
+            yield words, _scaled(structure, readings, [name], _INCH)
+        elif most < _RADIANS:
+            radians.append(name)
+    for names in dict.fromkeys((*((name,) for name in radians), tuple(radians))):
+        what = f"axis {names[0]} is" if len(names) == 1 else f"axes {', '.join(names)} are"
+        if names:
+            mended = _scaled(structure, readings, names, float(np.degrees(1.0)))
+            yield f"{what} in radians in these readings", mended
+
+
+def _scaled(
+    structure: Structure, readings: Sequence[Reading], names: Sequence[str], factor: float
+) -> list[Reading]:
+    """Readings with the values of some axes times a factor."""
+    scale = np.where(np.isin(structure.order, names), factor, 1.0)
+    return [replace(reading, values=reading.values * scale) for reading in readings]
+
+
+def _of_rows(reading: Reading) -> Iterator[tuple[str, Reading]]:
+    for step, words in ((1, "later"), (-1, "earlier")):
+        moved = np.roll(reading.values, -step, axis=0)
+        yield f"each reading belongs one posture {words}", replace(reading, values=moved)
+
+
+def _of_names(reading: Reading) -> Iterator[tuple[str, Reading]]:
+    which = reading.which
+    for k in range(len(reading.names)):
+        for other in range(k):
+            swapped = np.where(which == k, other, np.where(which == other, k, which))
+            yield (
+                f"{reading.names[k]} and {reading.names[other]} are swapped",
+                replace(reading, which=swapped),
+            )
+
+
+def _of_instrument(reading: Reading) -> Iterator[tuple[str, Reading]]:
+    """A frame that is mirrored, another unit, another sign."""
+    changes: list[tuple[str, Callable[[Array], Array]]] = []
+    if isinstance(reading, Points | SixD):
+        changes += [
+            (_LEFT_HANDED, lambda m: m @ _MIRROR),
+            ("positions are in inches", lambda m: m * _INCH),
+            ("positions are in m", lambda m: m * _UM),
+        ]
+    if isinstance(reading, Lengths):
+        changes += [("lengths are in inches", lambda m: m * _INCH), ("lengths are in m", lambda m: m * _UM)]
+    if isinstance(reading, Ball) and np.any(reading.measured_mm):
+        changes += [
+            ("readings are of the other sign: ball against tip", lambda m: -m),
+            ("readings are in mm, not um", lambda m: m * _UM),
+        ]
+        words = "workpiece" if reading.in_machine else "machine"
+        yield (
+            f"readings are along the axes of the {words}",
+            replace(reading, in_machine=not reading.in_machine),
+        )
+    for words, change in changes:
+        assert isinstance(reading, Points | SixD | Lengths | Ball)
+        mended = replace(reading, measured_mm=change(reading.measured_mm))
+        if isinstance(mended, SixD) and words == _LEFT_HANDED:
+            mended = replace(mended, measured_turn=_MIRROR @ mended.measured_turn @ _MIRROR)
+        yield words, mended
+
+
+def row_mistakes(fit: JointFit, readings: Sequence[Reading]) -> Iterator[str]:
+    """What readings that a fit left out are, where that is plain: two exchanged ones, or one of another nest,
+    ball or centre."""
+    starts = starts_of(fit.model, readings)
+    near = OUTLIER * max(1.0, float(np.sqrt(fit.chi_square / fit.freedom)))
+    for start, source in zip(starts, fit.sources, strict=True):
+        reading = start.reading
+        name = PurePath(reading.source).name
+        lines = [one.row for one in fit.left_out if one.source == reading.source][:_PAIRED]
+        rows = np.flatnonzero(np.isin(reading.row, lines))
+        pose = fit.model.machine(fit.theta, reading.payload).actual(reading.values)
+
+        def away(one: Start, pose: Poses = pose, own: Array = source.own) -> Array:
+            return np.asarray(one.predicted(pose, own)[:, :3])
+
+        sigma, read, predicted = start.sigma[:3], start.measured[:, :3], away(start)
+        for k, a in enumerate(rows):
+            for b in rows[:k]:
+                both, lines_of_both = [a, b], f"of lines {reading.row[b]} and {reading.row[a]} are exchanged"
+                if np.any(read) and (np.abs(read[both] - predicted[both[::-1]]) / sigma).max() < near:
+                    yield f"{name}: the readings {lines_of_both}"
+                    continue
+                order = np.arange(reading.count)
+                order[both] = both[::-1]
+                other = replace(start, **{column: getattr(start, column)[order] for column in start.columns})
+                swapped = away(other, Poses(pose.rotation[order], pose.position[order]))
+                if (np.abs(read[both] - swapped[both]) / sigma).max() < near:
+                    yield f"{name}: the postures {lines_of_both}"
+            for index in range(len(reading.names)):
+                which = np.where(np.arange(reading.count) == a, index, reading.which)
+                moved = away(replace(start, reading=replace(reading, which=which)))
+                if index != reading.which[a] and (np.abs(read[a] - moved[a]) / sigma).max() < near:
+                    yield (
+                        f"{name}: line {reading.row[a]} is of {reading.names[index]}, not of "
+                        f"{reading.names[reading.which[a]]}"
+                    )
