@@ -438,7 +438,6 @@ START = "start_deg = { J1 = 20.0, J2 = 10.0, J3 = 20.0, J4 = 30.0, J5 = 40.0, J6
         ("krl", "PTP XHOME"),
         ("krl", "PTP {A1 -150}"),
         ("ur", "movej([d2r(20),0,0,0,0,0])"),
-        ("ur", "movej(get_inverse_kin(frame))"),
     ],
 )
 def test_where_the_arm_starts_is_not_where_an_unread_move_left_it(
