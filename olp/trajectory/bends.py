@@ -4,7 +4,8 @@ A kernel leaves the polyline to the inside of a corner only. So a corner far fro
 until its segments are the tolerance away from those of the route. Its kernel may then be as much wider. Where
 the path turns by more than a right angle, less gains more: the corner is sharper from farther away.
 
-Where a path turns to and fro inside the tolerance, as noise of a measured or rounded path does, it is a line.
+Where a path turns left and right inside the tolerance, as noise of a measured or rounded path does, it is a
+line.
 """
 
 from __future__ import annotations
@@ -63,8 +64,9 @@ def outward(route: Route) -> Route | None:
 
 
 def levelled(route: Route) -> Route | None:
-    """The route with waypoints moved onto lines where it turns to and fro, and the tolerance that remains;
-    None where it does not. Waypoints keep their order, so that segments keep their feeds and lines."""
+    """The route with waypoints moved onto lines where it turns left and right, and the tolerance that
+    remains; None where it does not. Waypoints keep their order, so that segments keep their feeds and
+    lines."""
     u, length = _directions(route.point_mm)
     if len(length) < _FEWEST + 1 or not (length > 0.0).all():
         return None

@@ -25,8 +25,10 @@ _ALONG = 1e-12
 _INSIDE = 1.0 - 1e-8
 #: share of a jerk phase, or of two, that an overlap may take, so that the middle of a move keeps a rest of it
 _ROOM = 0.98
-#: a corner is moved by at most so many tolerances, and by this share of the shorter move beside it
-_FARTHEST, _OF_LENGTH = 3.0, 0.1
+#: a corner is moved by at most so many tolerances
+_FARTHEST = 3.0
+#: and by this share of the shorter move beside it
+_OF_LENGTH = 0.1
 #: share of the tolerance that a moved corner uses
 _USED = 1.0 - 1e-6
 #: by this factor a move may reduce its acceleration and jerk for overlaps beyond its first phase
@@ -158,7 +160,8 @@ def _room(moves: Moves, feed: Array, tolerance: Array, limits: AxisLimits) -> _R
 
 def _eased(moves: Moves, tolerance: Array, limits: AxisLimits) -> Array:
     """(n,) by how much moves have to reduce their acceleration and jerk, so that the sums of two are within
-    the limits beyond their first phases, too: 1 where no overlap is as long, or where it is by too much."""
+    the limits beyond their first phases, too. It is 1 where no overlap is as long, or where it is by too
+    much."""
     u1, u2 = moves.along[:-1], moves.along[1:]
     push1, push2 = u1 * moves.jerk[:-1, None], u2 * moves.jerk[1:, None]
     phase = np.minimum(moves.phase_s[:-1], moves.phase_s[1:])
@@ -174,7 +177,7 @@ def _eased(moves: Moves, tolerance: Array, limits: AxisLimits) -> Array:
 
 
 def _whole(share: Array, tolerance: Array) -> Mask:
-    """(n - 1,) where neither a corner nor those beside it drive with less than the whole jerk: only then does
+    """(n - 1,) where neither a corner nor those beside it drive with less than the whole jerk. Only then does
     a second phase lead to the speed that the move would have without an overlap."""
     full = np.concatenate(([True], (share >= 1.0) | (tolerance <= 0.0), [True]))
     return np.asarray(full[:-2] & full[1:-1] & full[2:] & (tolerance > 0.0))

@@ -13,6 +13,9 @@ from olp.workflows.session import Session
 
 #: Waypoints of a program whose speeds are optimised along dense curves.
 MOST_OPTIMISED = 20_000
+#: Moves of a program that is timed without being asked: more take longer to plan than to correct.
+MOST_UNASKED = 50_000
+LONG = f"a program of more than {MOST_UNASKED} moves is timed with --times alone"
 
 
 class Both(Protocol):
@@ -31,8 +34,11 @@ class Both(Protocol):
 def with_time(
     session: Session, program: Source, result: Both, options: UnrollOptions, tell: Progress | None
 ) -> None:
-    """State `times` in the report of a correction, or why they are not known."""
-    if "time" not in result.report:
+    """State `times` in the report of a correction, or why they are not known: those of long programs are not,
+    unless they are there."""
+    if "time" not in result.report and result.report["moves"]["total"] > MOST_UNASKED:
+        result.report["time"] = {"unknown": LONG}
+    elif "time" not in result.report:
         try:
             result.report["time"] = times(session, program, result, options, tell)
         except OlpError as error:

@@ -189,7 +189,7 @@ def test_a_short_first_move_of_a_long_path_launches_within_bounds(step_mm: float
     profile, cap = best_profile(path, _ROUTER), speed_caps(path, _ROUTER)
     clock = Timeline.of(path.break_mm, profile)
     knots = grid(path, _ROUTER, profile, cap, clock)
-    window = optimise._Window.of(path, _ROUTER, profile, clock, cap, knots, 0, 7)
+    window = optimise._Window.of(path, _ROUTER, profile, clock, cap, knots, 0, len(profile.node) - 1)
     assert fits(window.rows.rows(), window.spline, optimise._SLOWED**2 * window.start)
 
 

@@ -7,7 +7,7 @@ from typing import Any, Protocol
 from olp.compensation.joints.path import JointPath
 from olp.core.errors import OlpError
 from olp.core.progress import Progress, silent
-from olp.workflows.correct_time import MOST_OPTIMISED
+from olp.workflows.correct_time import LONG, MOST_OPTIMISED, MOST_UNASKED
 from olp.workflows.joints.loaded import JointRun
 from olp.workflows.joints.retime import JointRetimeOptions, motion_of
 
@@ -27,7 +27,9 @@ class Both(Protocol):
 
 def with_time(run: JointRun, done: Both, tell: Progress | None = None) -> None:
     """State `times` in the report of a correction, or why they are not known."""
-    if "time" not in done.report:
+    if "time" not in done.report and len(done.nominal) > MOST_UNASKED:
+        done.report["time"] = {"unknown": LONG}
+    elif "time" not in done.report:
         try:
             done.report["time"] = times(run, done, tell)
         except OlpError as error:
