@@ -306,8 +306,6 @@ def test_what_is_no_chain_or_leaves_a_choice_is_refused(tmp_path: Path) -> None:
     folder = golden_folder("arm_6r_kr6")
     with pytest.raises(UsageError, match=EXPECTED):
         olp.export_table(folder / "machine.toml", "linuxcnc", tmp_path / "x.comp")
-    with pytest.raises(UsageError, match=EXPECTED):
-        olp.compare_tables(folder / "machine.toml")
     with pytest.raises(UsageError, match="--program is for machines with three linear axes"):
         olp.export_table(folder / "machine.toml", "c", tmp_path / "m.c", program=b"G1 X1\n")
     assert not list(tmp_path.iterdir())
