@@ -87,15 +87,12 @@ def _of_joints(
     force: bool,
 ) -> None:
     """The check of a calibration of any joints."""
-    from olp.files.write import write_files
     from olp.workflows.joints.doctor import diagnose_joint_calibration
 
     refuse_early(files_of(output), (calibration, data, *files_of(machine)), force=force)
     diagnosed = diagnose_joint_calibration(calibration, data, machine)
     if output is not None:
-        files = diagnosed.files(output)
-        write_files(files, force=force, inputs=diagnosed.inputs)
-        for path in files:
+        for path in diagnosed.write(output, force=force):
             diagnostic(f"wrote {path}")
     put_result(diagnosed, as_json=as_json, quiet=quiet)
     exit_for(diagnosed.findings, fail_on)

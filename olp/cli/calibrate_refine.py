@@ -123,16 +123,13 @@ def _of_joints(
     force: bool,
 ) -> None:
     """The refinement of a calibration of any joints."""
-    from olp.files.write import write_files
     from olp.workflows.joints.refine import refine_joint_calibration
 
     refuse_early(files_of(output), (calibration, data, *files_of(machine)), force=force)
     refined = refine_joint_calibration(
         calibration, data, machine, date=date, growth_per_year=growth_per_year, uncertainty_um=uncertainty_um
     )
-    files = refined.files(output)
-    write_files(files, force=force, inputs=refined.inputs)
-    for path in files:
+    for path in refined.write(output, force=force):
         diagnostic(f"wrote {path}")
     put_result(refined, as_json=as_json, quiet=quiet)
     exit_for(refined.findings, fail_on)

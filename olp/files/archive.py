@@ -11,11 +11,13 @@ import math
 import struct
 import zipfile
 import zlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+
+from olp.core.errors import ConfigError
 
 #: bytes that an archive may unpack to: a small one, and for each byte of a large one; arrays of measured
 #: numbers shrink to a half or a tenth
@@ -42,6 +44,35 @@ def read_arrays(data: bytes, names: Iterable[str]) -> dict[str, npt.NDArray[Any]
         raise ValueError(str(error)) from None
     except _DAMAGED:
         raise ValueError("it is damaged, or no NumPy archive") from None
+
+
+def wanted_of(schema: str) -> str:
+    """What a covariance of a schema has to be, for messages."""
+    return f'expected a file "{schema}" as olp calibrate fit writes it'
+
+
+def read_covariance_arrays(
+    data: bytes, kinds: Mapping[str, str], schema: str, file: str
+) -> dict[str, npt.NDArray[Any]]:
+    """The arrays of the covariance of a calibration, each of its kind of type. Raises ConfigError for bytes
+    that are none, and for an array that is missing or of another type."""
+    wanted = wanted_of(schema)
+    try:
+        arrays = read_arrays(data, kinds)
+    except ValueError as error:
+        raise ConfigError(f"is not a covariance of a calibration: {error}; {wanted}", file=file) from None
+    lacking = [name for name, kind in kinds.items() if name not in arrays or arrays[name].dtype.kind != kind]
+    if lacking or str(arrays["schema"]) != schema:
+        what = f"array {lacking[0]} is missing or of another type" if lacking else "has another schema"
+        raise ConfigError(f"{what}; {wanted}", file=file)
+    return arrays
+
+
+def archive_bytes(arrays: Mapping[str, npt.NDArray[Any]]) -> bytes:
+    """The bytes of an archive. The same arrays give the same bytes."""
+    archive = io.BytesIO()
+    np.savez_compressed(archive, allow_pickle=False, **arrays)
+    return archive.getvalue()
 
 
 class _Refused(Exception):

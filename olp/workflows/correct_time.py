@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Protocol
 
 from olp.core.errors import OlpError
@@ -34,15 +35,27 @@ class Both(Protocol):
 def with_time(
     session: Session, program: Source, result: Both, options: UnrollOptions, tell: Progress | None
 ) -> None:
-    """State `times` in the report of a correction, or why they are not known: those of long programs are not,
-    unless they are there."""
-    if "time" not in result.report and result.report["moves"]["total"] > MOST_UNASKED:
-        result.report["time"] = {"unknown": LONG}
-    elif "time" not in result.report:
+    """State `times` in the report of a correction, or why they are not known."""
+    total = result.report["moves"]["total"]
+    state(result.report, total, lambda: times(session, program, result, options, tell))
+
+
+def state(report: dict[str, Any], moves: int, timed: Callable[[], dict[str, Any]]) -> None:
+    """State times in the report of a program of so many moves, or why they are not known: those of long
+    programs are not, unless they are there."""
+    if "time" not in report and moves > MOST_UNASKED:
+        report["time"] = {"unknown": LONG}
+    elif "time" not in report:
         try:
-            result.report["time"] = times(session, program, result, options, tell)
+            report["time"] = timed()
         except OlpError as error:
-            result.report["time"] = {"unknown": str(error)}
+            report["time"] = {"unknown": str(error)}
+
+
+def cost(nominal_s: float, corrected_s: float, optimised: bool) -> dict[str, Any]:
+    """The times of both programs, and what the correction adds as a share."""
+    share = corrected_s / nominal_s - 1.0 if nominal_s else 0.0
+    return {"nominal_s": nominal_s, "corrected_s": corrected_s, "share": share, "optimised": optimised}
 
 
 def times(
@@ -57,9 +70,4 @@ def times(
     )  # fmt: skip
     texts = [program.holding(text) for text in (result.nominal, result.plain)]
     (nominal, corrected), optimised = durations(session, texts, asked, MOST_OPTIMISED, tell or silent)
-    return {
-        "nominal_s": nominal,
-        "corrected_s": corrected,
-        "share": corrected / nominal - 1.0 if nominal else 0.0,
-        "optimised": optimised,
-    }
+    return cost(nominal, corrected, optimised)

@@ -8,7 +8,6 @@ is the share of a variance that the factor leaves out.
 
 from __future__ import annotations
 
-import io
 from dataclasses import replace
 from pathlib import Path as FilePath
 
@@ -89,6 +88,8 @@ def load_known(
 
 def covariance_bytes(uncertainty: Uncertainty) -> bytes:
     """The bytes of an "olp-covariance-1" file. The same numbers give the same bytes."""
+    from olp.files.archive import archive_bytes
+
     entries = uncertainty.entries
     positions = [e.position_mm if len(e.position_mm) else np.zeros(len(e.rest)) for e in entries]
     arrays = {
@@ -104,26 +105,14 @@ def covariance_bytes(uncertainty: Uncertainty) -> bytes:
         "factor": np.concatenate([e.factor for e in entries]).astype(np.float32),
         "rest": np.concatenate([e.rest for e in entries]),
     }
-    archive = io.BytesIO()
-    np.savez_compressed(archive, allow_pickle=False, **arrays)
-    return archive.getvalue()
+    return archive_bytes(arrays)
 
 
 def parse_covariance(data: bytes, file: str) -> Uncertainty:
     """As written by `covariance_bytes`. Raises ConfigError."""
-    from olp.files.archive import read_arrays
+    from olp.files.archive import read_covariance_arrays, wanted_of
 
-    wanted = f'expected a file "{SCHEMA}" as olp calibrate fit writes it'
-    try:
-        arrays = read_arrays(data, _ARRAYS)
-    except ValueError as error:
-        raise ConfigError(f"is not a covariance of a calibration: {error}; {wanted}", file=file) from None
-    lacking = [
-        name for name, kind in _ARRAYS.items() if name not in arrays or arrays[name].dtype.kind != kind
-    ]
-    if lacking or str(arrays["schema"]) != SCHEMA:
-        what = f"array {lacking[0]} is missing or of another type" if lacking else "has another schema"
-        raise ConfigError(f"{what}; {wanted}", file=file)
+    arrays, wanted = read_covariance_arrays(data, _ARRAYS, SCHEMA, file), wanted_of(SCHEMA)
     count = arrays["count"]
     whole = count.ndim == 1 and count.size and (count > 0).all() and (count <= arrays["rest"].size).all()
     total = int(count.sum()) if whole else -1

@@ -8,7 +8,6 @@ well that is known, in mm and rad. `lines` is the hash of the nominal machine th
 from __future__ import annotations
 
 import hashlib
-import io
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -52,6 +51,8 @@ def lines_of(structure: Structure) -> str:
 
 def joint_covariance_bytes(known: JointCovariance, values: Mapping[str, Any]) -> bytes:
     """The bytes of the covariance of a calibration with these keys. The same numbers give the same bytes."""
+    from olp.files.archive import archive_bytes
+
     unknowns = known.unknowns
     arrays = {
         "schema": np.array(SCHEMA),
@@ -64,9 +65,7 @@ def joint_covariance_bytes(known: JointCovariance, values: Mapping[str, Any]) ->
         "number": np.array([number_of(values, unknown) for unknown in unknowns], float),
         "covariance": known.covariance,
     }
-    archive = io.BytesIO()
-    np.savez_compressed(archive, allow_pickle=False, **arrays)
-    return archive.getvalue()
+    return archive_bytes(arrays)
 
 
 def load_joint_covariance(
@@ -105,19 +104,9 @@ def load_joint_covariance(
 
 def _arrays(data: bytes, file: str) -> dict[str, Any]:
     """The arrays of an archive. Raises ConfigError."""
-    from olp.files.archive import read_arrays
+    from olp.files.archive import read_covariance_arrays, wanted_of
 
-    wanted = f'expected a file "{SCHEMA}" as olp calibrate fit writes it'
-    try:
-        arrays = read_arrays(data, _ARRAYS)
-    except ValueError as error:
-        raise ConfigError(f"is not a covariance of a calibration: {error}; {wanted}", file=file) from None
-    lacking = [
-        name for name, kind in _ARRAYS.items() if name not in arrays or arrays[name].dtype.kind != kind
-    ]
-    if lacking or str(arrays["schema"]) != SCHEMA:
-        what = f"array {lacking[0]} is missing or of another type" if lacking else "has another schema"
-        raise ConfigError(f"{what}; {wanted}", file=file)
+    arrays, wanted = read_covariance_arrays(data, _ARRAYS, SCHEMA, file), wanted_of(SCHEMA)
     count = len(np.atleast_1d(arrays["key"]))
     rows = all(
         arrays[name].shape == (count,) for name in _ARRAYS if name not in ("schema", "lines", "covariance")

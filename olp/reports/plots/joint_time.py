@@ -3,15 +3,14 @@ and its feed, and what each axis uses of its limits."""
 
 from __future__ import annotations
 
-import io
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from olp.core.arrays import Array, Index
-from olp.core.errors import UsageError
-from olp.core.optional import require_matplotlib
 from olp.reports.plots.base import Format
+from olp.reports.plots.motion import end_of, motion_picture
 from olp.trajectory.joint_motion import Stretch
 
 if TYPE_CHECKING:
@@ -33,21 +32,11 @@ def joint_motion_plot(
 
     The same stretch gives the same bytes.
     """
-    require_matplotlib()
-    import matplotlib
-    from matplotlib.figure import Figure
-
-    whole = stretch.trajectory.duration_s
-    end = whole if to_s is None else min(to_s, whole)
-    if not 0.0 <= from_s < end:
-        raise UsageError(
-            f"there is no motion to draw from {from_s:g} to {end:g} s; the trajectory takes {whole:.3f} s"
-        )
+    end = end_of(stretch.trajectory.duration_s, from_s, to_s)
     names = stretch.motion.structure.order
     time, low, high, feed = _ranges(stretch, from_s, end)
-    with matplotlib.rc_context({"svg.hashsalt": "olp", "svg.fonttype": "none", "font.size": 8.0}):
-        figure = Figure(figsize=(11.0, 8.0), layout="constrained")
-        plots = figure.subplots(4, 1, sharex=True)
+
+    def draw(plots: Sequence[Axes]) -> None:
         _draw(plots[0], time, low[:, 0], high[:, 0], "0.2", "tip")
         if np.isfinite(feed).any():
             plots[0].plot(time, feed, color="tab:red", linewidth=0.8, label="feed")
@@ -60,20 +49,8 @@ def joint_motion_plot(
             for limit in (100.0, -100.0):
                 plot.axhline(limit, color="0.4", linewidth=0.7, linestyle=(0, (4, 3)))
             plot.set_ylabel(f"{quantity}, % of limit")
-        for plot in plots:
-            plot.grid(color="0.9", linewidth=0.5)
-            plot.set_axisbelow(True)
-            plot.margins(x=0.0)
-        for plot in plots[:2]:
-            plot.legend(frameon=False, ncols=8, loc="lower right", bbox_to_anchor=(1.0, 0.98))
-        plots[3].set_xlabel("time in s")
-        plots[3].set_xlim(from_s, end)
-        # a name may hold a $
-        figure.suptitle(title, parse_math=False)
-        buffer = io.BytesIO()
-        metadata = {"Date": None} if kind == "svg" else {"Software": None}
-        figure.savefig(buffer, format=kind, dpi=130, metadata=metadata)
-    return buffer.getvalue()
+
+    return motion_picture(title, (from_s, end), kind, draw, names=8)
 
 
 def _draw(plot: Axes, time: Array, low: Array, high: Array, colour: str, label: str) -> None:

@@ -3,16 +3,15 @@ limits, as SVG or PNG bytes."""
 
 from __future__ import annotations
 
-import io
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from olp.core.arrays import Array, Index
-from olp.core.errors import UsageError
-from olp.core.optional import require_matplotlib
 from olp.core.units import AXES
 from olp.reports.plots.base import Format
+from olp.reports.plots.motion import end_of, motion_picture
 from olp.trajectory.plan import Trajectory
 from olp.trajectory.route import Route
 from olp.trajectory.usage import feeds_of_pieces
@@ -42,23 +41,13 @@ def motion_plot(
 
     The same trajectory gives the same bytes.
     """
-    require_matplotlib()
-    import matplotlib
-    from matplotlib.figure import Figure
-
-    end = trajectory.duration_s if to_s is None else min(to_s, trajectory.duration_s)
-    if not 0.0 <= from_s < end:
-        raise UsageError(
-            f"there is no motion to draw from {from_s:g} to {end:g} s; the trajectory takes "
-            f"{trajectory.duration_s:.3f} s"
-        )
+    end = end_of(trajectory.duration_s, from_s, to_s)
     motion, limits = trajectory.motion, trajectory.limits
     first, last = (int(motion.piece_at(np.array([t]))[0]) for t in (from_s, end))
     pieces = np.arange(first, last + 1)
     feed = feeds_of_pieces(motion, route)[pieces]
-    with matplotlib.rc_context({"svg.hashsalt": "olp", "svg.fonttype": "none", "font.size": 8.0}):
-        figure = Figure(figsize=(11.0, 8.0), layout="constrained")
-        plots = figure.subplots(4, 1, sharex=True)
+
+    def draw(plots: Sequence[Axes]) -> None:
         bands = _lines if len(pieces) <= _FEW else _bands
         drawn = bands(trajectory, pieces, from_s, end)
         time, speed = drawn[0], drawn[1]
@@ -76,20 +65,8 @@ def motion_plot(
                     plot.axhline(limit, color=colour, linewidth=0.7, linestyle=(0, (4, 3)))
             plot.set_ylabel(f"{name} in {unit}")
         plots[1].plot([], [], color="0.4", linewidth=0.7, linestyle=(0, (4, 3)), label="limit of the axis")
-        for plot in plots:
-            plot.grid(color="0.9", linewidth=0.5)
-            plot.set_axisbelow(True)
-            plot.margins(x=0.0)
-        for plot in plots[:2]:
-            plot.legend(frameon=False, ncols=4, loc="lower right", bbox_to_anchor=(1.0, 0.98))
-        plots[3].set_xlabel("time in s")
-        plots[3].set_xlim(from_s, end)
-        # a name may hold a $
-        figure.suptitle(title, parse_math=False)
-        buffer = io.BytesIO()
-        metadata = {"Date": None} if kind == "svg" else {"Software": None}
-        figure.savefig(buffer, format=kind, dpi=130, metadata=metadata)
-    return buffer.getvalue()
+
+    return motion_picture(title, (from_s, end), kind, draw, names=4)
 
 
 def _draw(plot: Axes, time: Array, state: Array, colour: str, label: str) -> None:

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Any, Protocol
 
 from olp.compensation.joints.path import JointPath
-from olp.core.errors import OlpError
 from olp.core.progress import Progress, silent
-from olp.workflows.correct_time import LONG, MOST_OPTIMISED, MOST_UNASKED
+from olp.workflows.correct_time import MOST_OPTIMISED, cost, state
 from olp.workflows.joints.loaded import JointRun
 from olp.workflows.joints.retime import JointRetimeOptions, motion_of
 
@@ -27,29 +26,16 @@ class Both(Protocol):
 
 def with_time(run: JointRun, done: Both, tell: Progress | None = None) -> None:
     """State `times` in the report of a correction, or why they are not known."""
-    if "time" not in done.report and len(done.nominal) > MOST_UNASKED:
-        done.report["time"] = {"unknown": LONG}
-    elif "time" not in done.report:
-        try:
-            done.report["time"] = times(run, done, tell)
-        except OlpError as error:
-            done.report["time"] = {"unknown": str(error)}
+    state(done.report, len(done.nominal), lambda: times(run, done, tell))
 
 
 def times(run: JointRun, done: Both, tell: Progress | None = None) -> dict[str, Any]:
     """Seconds of the nominal and the corrected program, and what the correction adds as a share. Programs of
     more than `MOST_OPTIMISED` moves are planned without optimised speeds. Raises as `retime_joints`."""
-    both = (done.nominal, done.corrected)
-    optimised = max(map(len, both)) <= MOST_OPTIMISED
+    optimised = max(len(done.nominal), len(done.corrected)) <= MOST_OPTIMISED
 
     def seconds(path: JointPath) -> float:
         options = JointRetimeOptions()
         return motion_of(run, path, options, tell or silent, optimise=None if optimised else False).duration_s
 
-    nominal, corrected = map(seconds, both)
-    return {
-        "nominal_s": nominal,
-        "corrected_s": corrected,
-        "share": corrected / nominal - 1.0 if nominal else 0.0,
-        "optimised": optimised,
-    }
+    return cost(seconds(done.nominal), seconds(done.corrected), optimised)
