@@ -9,7 +9,10 @@ import pytest
 from hypothesis import settings
 from judge import linuxcnc
 
-settings.register_profile("olp", deadline=None, print_blob=True)
+# The same examples in each run, so that a change is judged by what it changes; `--hypothesis-profile=new`
+# looks at others.
+settings.register_profile("olp", deadline=None, print_blob=True, derandomize=True)
+settings.register_profile("new", deadline=None, print_blob=True)
 settings.load_profile("olp")
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"

@@ -2,8 +2,9 @@
 
 Every piece has ceilings of the speed, acceleration and jerk along it (olp.trajectory.ceilings). The profile
 runs from node to node, where its acceleration is zero, by a ramp up, a stretch at one speed and a ramp down.
-Nodes are the rests, and the dips of the speed's ceiling that bind even where jerk is free. Where a profile is
-too fast, the worst piece becomes a node; this is repeated until none is too fast.
+Nodes are the rests, and the dips of the speed's ceiling that bind even where jerk is free, and bends that
+leave hardly any acceleration. Where a profile is too fast, the worst piece becomes a node; this is repeated
+until none is too fast.
 Source: bidirectional scan with jerk, Dong, Ferreira, Stori 2007; pruned to the critical points as in VPOp.
 """
 
@@ -34,6 +35,8 @@ _BINDS = 1e-6
 _TOO_FAST = 1e-8
 #: share by which ceilings differ that are equal but for rounding
 _EVEN = 1e-9
+#: a piece that allows less than this share of the acceleration beside it is a node where the speed is held
+_WEAK = 0.1
 #: turns after which every piece that is too fast becomes a node, not only the worst ones
 _PATIENT = 40
 #: pieces of the path per block
@@ -89,8 +92,8 @@ def profile_within(x: Array, rest: Index, top: Array, most_a: Array, most_j: Arr
 def _dips(x: Array, top: Array, ceiling: Array, acceleration: Array) -> Mask:
     """(k + 1,) the rests, and both ends of the pieces whose ceiling is a dip that binds.
 
-    A dip is lower than a neighbour and higher than none. It binds where a profile without a jerk limit
-    reaches it; no jerk-bounded profile is faster than that."""
+    A dip is lower than a neighbour and higher than none, or allows far less acceleration. It binds where a
+    profile without a jerk limit reaches it; no jerk-bounded profile is faster than that."""
     node = np.zeros(len(x), bool)
     node[ceiling == 0.0] = True
     free = free_speeds(x, ceiling, acceleration)
@@ -103,6 +106,11 @@ def _dips(x: Array, top: Array, ceiling: Array, acceleration: Array) -> Mask:
         & ((top < before * (1.0 - _EVEN)) | (top < behind * (1.0 - _EVEN)))
     )
     dip &= np.maximum(free[:-1], free[1:]) >= top * (1.0 - _BINDS)
+    # a bend that the feed takes with hardly any acceleration left would slow the ramps beside it
+    weak = np.zeros(len(top), bool)
+    weak[1:] |= acceleration[1:] < _WEAK * acceleration[:-1]
+    weak[:-1] |= acceleration[:-1] < _WEAK * acceleration[1:]
+    dip |= weak & (np.minimum(free[:-1], free[1:]) >= top * (1.0 - _BINDS))
     if len(top) > 1:
         # an end that goes on as it begins is none
         for end, beside in ((0, 1), (-1, -2)):

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from cases.trajectory import CASES, LIMITS, critical, excess, random_route, route
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from olp.trajectory import ramps
@@ -74,6 +74,9 @@ def test_one_line_takes_the_least_time() -> None:
     assert len(motion) == 7
 
 
+# at the feed, bends of these have hardly any acceleration left
+@example(20457)
+@example(22428)
 @settings(max_examples=60, deadline=None)
 @given(st.integers(0, 2**32 - 1))
 def test_lone_corners_take_what_is_forecast(seed: int) -> None:
@@ -82,7 +85,7 @@ def test_lone_corners_take_what_is_forecast(seed: int) -> None:
     step *= (r.uniform(20.0, 60.0, 6) / np.linalg.norm(step, axis=1))[:, None]
     given_route = route(np.cumsum(step, axis=0), 10.0 ** r.uniform(0.5, 2.5), 10.0 ** r.uniform(-3, -1))
     taken = critical(smooth(given_route, LIMITS), LIMITS).duration_s
-    assert 0.85 * taken <= expected_s(given_route, LIMITS).sum() <= 1.01 * taken
+    assert 0.93 * taken <= expected_s(given_route, LIMITS).sum() <= 1.01 * taken
 
 
 def test_between_rests_the_profile_is_that_of_the_run_alone() -> None:

@@ -84,7 +84,9 @@ def corners(route: Route, parts) -> None:
         first = int(np.searchsorted(parts.segment, k, side="left"))
         begin = np.array([first])
         # an overlap has more parts than one where the jerk of a move changes within it
-        bent = motion.path[motion.shape[first:], 2:].any(axis=(1, 2)) & (parts.segment[first:] == k)
+        bent = motion.path[motion.shape[first:], 2:].any(axis=(1, 2)) & (
+            parts.segment[first:] == parts.segment[first]
+        )
         end = first + max(int(np.argmin(np.append(bent, False))), 1)
         if tolerance <= 0.0:
             position, velocity, acceleration, _ = motion.of(begin, np.zeros(1))
