@@ -141,7 +141,7 @@ def match(
         )
     last = np.flatnonzero(np.append(plan.move[1:] != plan.move[:-1], True)[: len(plan.move)])
     expected = np.where(np.isnan(plan.command[last]), nominal.end, plan.command[last])
-    rotary = np.array([unit == "deg" for unit in nominal.motion.structure.units])
+    rotary = nominal.coordinates.rotary
     near = _NEAR_DIGITS * np.where(rotary, digit_deg, digit_mm)
     near = nominal.directions.widened(nominal.motion, near, expected)
     groups = np.arange(count)

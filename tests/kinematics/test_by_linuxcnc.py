@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from judge import kinematics as judge
 
 from olp.kinematics.chain import Kinematics
+from olp.kinematics.coordinates import axes_of_poses
 from olp.kinematics.inverse import inverse
 from olp.kinematics.poses import STILL, Poses, axis_rotation, shift
 from olp.kinematics.structure import Gauge, Joint, Leg, Platform, Structure
@@ -32,6 +35,12 @@ LINEAR = {name: joint(name, "linear", direction) for name, direction in zip("XYZ
 def back(direction: Vector) -> Vector:
     x, y, z = direction
     return (0.0 - x, 0.0 - y, 0.0 - z)
+
+
+def from_words(structure: Structure, low: float, high: float, words: np.ndarray) -> np.ndarray:
+    """Axis values within a travel of programmed poses."""
+    joints = {name: replace(one, travel=(low, high)) for name, one in structure.joints.items()}
+    return axes_of_poses(Kinematics(replace(structure, joints=joints)), words)
 
 
 def angles_deg(rotation: np.ndarray) -> np.ndarray:
@@ -122,6 +131,7 @@ def test_tripod() -> None:
     values = RNG.uniform(800.0, 1100.0, (40, 3))
     theirs = judge.forward("tripodkins", {"Bx": 900.0, "Cx": 430.0, "Cy": 780.0}, values)
     assert np.abs(Kinematics(structure).nominal(values).position - theirs[:, :3]).max() < AGREES
+    assert np.abs(from_words(structure, 800.0, 1100.0, theirs[:, :3]) - values).max() < AGREES
 
 
 def test_hexapod() -> None:
@@ -140,6 +150,7 @@ def test_hexapod() -> None:
     ours = hexapod.nominal(lengths)
     assert np.abs(ours.position - poses[:, :3]).max() < AGREES
     assert np.abs(angles_deg(ours.rotation) - poses[:, 3:]).max() < AGREES
+    assert np.abs(axes_of_poses(hexapod, poses) - lengths).max() < AGREES
 
 
 def test_deltas() -> None:
@@ -155,6 +166,7 @@ def test_deltas() -> None:
     values = RNG.uniform(400.0, 600.0, (40, 3))
     theirs = judge.forward("lineardeltakins", {"R": 250.0, "L": 520.0}, values)
     assert np.abs(Kinematics(structure).nominal(values).position - theirs[:, :3]).max() < AGREES
+    assert np.abs(from_words(structure, 350.0, 650.0, theirs[:, :3]) - values).max() < AGREES
 
 
 def test_rotary_delta() -> None:
@@ -174,3 +186,4 @@ def test_rotary_delta() -> None:
     assert np.abs(ours.position - theirs[:, :3]).max() < AGREES
     solved = inverse(machine, ours, values + 2.0, nominal=True).values
     assert np.abs(solved - values).max() < AGREES
+    assert np.abs(from_words(structure, -45.0, 45.0, theirs[:, :3]) - values).max() < AGREES

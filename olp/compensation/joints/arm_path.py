@@ -16,6 +16,7 @@ from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import ProgramError
 from olp.core.machine import Vector
 from olp.core.values import dataclass
+from olp.kinematics.coordinates import Coordinates
 from olp.kinematics.errors import MachineErrors
 from olp.kinematics.parallel_arm import arm_of
 from olp.kinematics.poses import Poses, turned
@@ -130,7 +131,8 @@ def arm_path(
     _refuse_turns(arm, start[rows], end[rows], straight & stated, used.line)
     feed &= np.isfinite(start).all(axis=1)
     return ArmPath(
-        program, motion, start, end, np.full((count, AXES), -1, np.int32), tool, none, none,
+        program, motion, Coordinates.of_axes(structure), start, end,
+        np.full((count, AXES), -1, np.int32), tool, none, none,
         np.zeros((count, 3)), np.zeros((count, AXES)), np.ones(count), np.ones(AXES), feed, known, ~known,
         none, none, np.full(AXES, _DECIMALS), replace(Drilled.none(count), whole=whole),
         Directions.none(count), Curves.none(count), from_level=from_level,

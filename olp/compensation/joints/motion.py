@@ -11,9 +11,9 @@ from olp.core.arrays import Array, Index, Mask, distinct
 from olp.core.errors import NotInvertible
 from olp.core.machine import Vector
 from olp.core.turns import Turn, turned
-from olp.core.units import AXES
 from olp.core.values import dataclass
 from olp.kinematics.chain import Kinematics
+from olp.kinematics.coordinates import Coordinates, axes_of_poses, poses_of_axes, stated_poses, states_poses
 from olp.kinematics.correction import CorrectedPoses, beyond_travel, correct_poses, meet_positions
 from olp.kinematics.errors import MachineErrors
 from olp.kinematics.poses import Poses
@@ -69,8 +69,10 @@ class Motion:
         )
 
     def axes(self, programmed: Array, tool: Index, tip: Mask) -> Array:
-        """(n, axes) axis values of programmed coordinates, which state the `tip` in some rows."""
-        return self._by_tool(self._turned(programmed, tool, back=False), tool, tip, axes_of_tips)
+        """(n, axes) axis values of programmed coordinates, which state the `tip` in some rows. Raises
+        NotInvertible with rows whose poses are out of reach."""
+        change = axes_of_poses if states_poses(self.structure) else axes_of_tips
+        return self._by_tool(self._turned(programmed, tool, back=False), tool, tip, change)
 
     def targets(self, programmed: Array, tool: Index, tip: Mask) -> Poses:
         """(n) poses of the nominal machine at programmed coordinates, which state the `tip` in some rows:
@@ -78,7 +80,10 @@ class Motion:
         values = self._turned(programmed, tool, back=False)
 
         def pose(machine: Kinematics, rows: Rows) -> Poses:
-            poses, stated = machine.nominal(values[rows]), tip[rows]
+            stated = tip[rows]
+            if states_poses(self.structure) and stated.all():
+                return stated_poses(self.structure, values[rows])
+            poses = machine.nominal(values[rows])
             if stated.any():
                 poses.position[stated] = stated_tips(machine, values[rows][stated])
             return poses
@@ -87,7 +92,8 @@ class Motion:
 
     def programmed(self, axes: Array, tool: Index, tip: Mask) -> Array:
         """(n, axes) the other way round."""
-        return self._turned(self._by_tool(axes, tool, tip, tips_of_axes), tool, back=True)
+        change = poses_of_axes if states_poses(self.structure) else tips_of_axes
+        return self._turned(self._by_tool(axes, tool, tip, change), tool, back=True)
 
     def between(self, start: Array, end: Array, share: Array, tool: Index, vector: Mask) -> Array:
         """(n, axes) programmed coordinates at shares of moves. In `vector` rows the direction of the tool
@@ -133,7 +139,7 @@ class Motion:
         """Linear coordinates along the words turned into those along the axes, or back."""
         if not any(self.turns):
             return values
-        columns, result = np.array([self.structure.order.index(name) for name in AXES]), values.copy()
+        columns, result = Coordinates.of_words(self.structure).linear, values.copy()
         for which in distinct(tool).tolist():
             turn = self.turns[which]
             if turn is not None:

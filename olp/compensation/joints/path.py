@@ -23,12 +23,13 @@ from olp.compensation.joints.tilts import (
 )
 from olp.compensation.style import fewest_decimals
 from olp.core.arrays import Array, Index, Mask
-from olp.core.errors import NotInvertible, ProgramError
+from olp.core.errors import ConfigError, NotInvertible, ProgramError
 from olp.core.machine import ZERO, Machine, Vector
 from olp.core.toolpath import Flag, Kind, Touch
 from olp.core.turns import turned
 from olp.core.units import AXES
 from olp.core.values import dataclass
+from olp.kinematics.coordinates import FARTHEST_DEG, Coordinates
 from olp.kinematics.errors import MachineErrors
 from olp.kinematics.structure import Structure
 from olp.program.pointlist.axis_list import AxisList
@@ -43,20 +44,21 @@ _UNSTATED_DECIMALS = 6
 class JointPath:
     """The moves of a program in all axes, columns by move.
 
-    (n, axes) `start` and `end` are programmed coordinates in the order of the structure, mm and deg, NaN
-    where unknown. In a turned frame they are along its words. The linear ones state the tip where `tip` (n,),
-    else they are axis values. In `vector` (n,) the direction of the tool goes evenly, else each axis. `slot`
-    (n, axes) are their words, -1 where there is none. `tool` is the place of the tool in `motion`, `shift_mm`
-    (n, 3) where the part really lies. `offset` (n, axes), `unit` (n,) and, of words without a point, `scale`
-    (axes,) lead from words to coordinates. `feed` are moves that cut, `judged` those that the
-    proof judges, `kept` moves that stay uncorrected. `held` (n,) are moves whose rotary axes stay as
-    programmed: where these stand, tool centre point control begins, a tilted plane is fixed to them, or a
-    hole is made. In the last two no word of theirs changes: these moves `stay` (n,). `places` (axes,) are the
-    fewest decimals of words in mm and deg. `holes` are those of cycles, `directions` those that words state,
-    `curves` the arcs, `listed` the rows of a list of axis values."""
+    (n, axes) `start` and `end` are programmed `coordinates`, mm and deg, NaN where unknown. In a turned frame
+    they are along its words. The linear ones state the tip where `tip` (n,), else they are axis values. In
+    `vector` (n,) the direction of the tool goes evenly, else each axis. `slot` (n, axes) are their words, -1
+    where there is none. `tool` is the place of the tool in `motion`, `shift_mm` (n, 3) where the part really
+    lies. `offset` (n, axes), `unit` (n,) and, of words without a point, `scale` (axes,) lead from words to
+    coordinates. `feed` are moves that cut, `judged` those that the proof judges, `kept` moves that stay
+    uncorrected. `held` (n,) are moves whose rotary axes stay as programmed: where these stand, tool centre
+    point control begins, a tilted plane is fixed to them, or a hole is made. In the last two no word of
+    theirs changes: these moves `stay` (n,). `places` (axes,) are the fewest decimals of words in mm and deg.
+    `holes` are those of cycles, `directions` those that words state, `curves` the arcs, `listed` the rows of
+    a list of axis values."""
 
     program: Program
     motion: Motion
+    coordinates: Coordinates
     start: Array
     end: Array
     slot: npt.NDArray[np.int32]
@@ -119,8 +121,9 @@ class JointPath:
         Raises ProgramError for what is not read on such a machine."""
         refuse_unread(program)
         path, holes = program.toolpath, Drilled.of(program)
-        order = structure.order
-        letters = [name for name in order if structure.joints[name].kind == "rotary"]
+        words = Coordinates.of_words(structure)
+        order = words.names
+        letters = [name for name, unit in zip(order, words.units, strict=True) if unit == "deg"]
         rotary = RotaryWords.none(len(path), len(letters))
         if program.in_blocks:
             rotary = RotaryWords.of(program, letters, machine)
@@ -132,7 +135,7 @@ class JointPath:
         first = np.array([start_deg.get(letter, np.nan) for letter in letters])
         degrees, directions = _degrees(program, structure, letters, rotary, first, offsets, swivel_axis)
         modes = [frame.tip for frame in path.frames]
-        tip = np.array([mode != "" for mode in modes], bool)[path.frame]
+        tip = np.array([words.poses or mode != "" for mode in modes], bool)[path.frame]
         vector = np.array([mode == "vector" for mode in modes], bool)[path.frame]
         fixed = np.array([mode == "fixed" for mode in modes], bool)[path.frame]
         end, slot = np.empty((len(path), len(order))), np.full((len(path), len(order)), -1, np.int32)
@@ -147,7 +150,7 @@ class JointPath:
                 own = AXES.index(name)
                 end[:, column], slot[:, column] = path.end_mm[:, own], program.slot[:, own]
                 offset[:, column] = linear[:, own]
-        columns = [order.index(name) for name in AXES]
+        columns = words.linear.tolist()
         tools = list(dict.fromkeys((frame.tool_mm, frame.turn) for frame in path.frames)) or [(ZERO, None)]
         motion = Motion.of(structure, errors, tools)
         tool_of = np.array([tools.index((frame.tool_mm, frame.turn)) for frame in path.frames] or [0])
@@ -171,11 +174,13 @@ class JointPath:
         mode = tip + 2 * elsewhere + 4 * fixed
         fresh = stated_afresh(program, fixed, degrees)
         end[:, columns] = _stated_in_mode(end[:, columns], given, mode, elsewhere, fresh)
-        refuse_tips(program, structure, tip & ~fixed, end, offset, tips_from_zero)
-        touched = [_shift(structure, errors, frame.touched, row, order, letters)
+        refuse_tips(program, structure, tip & ~fixed & (not words.poses), end, offset, tips_from_zero)
+        touched = [_shift(structure, errors, frame.touched, row, words)
                    for frame, row in zip(path.frames, offsets, strict=True)]  # fmt: skip
         shifts = np.array(touched).reshape(-1, 3)
         tool = tool_of[path.frame]
+        if words.poses:
+            _refuse_poses(program, motion, end, tool, holes)
         kept = (path.flag & KEPT) != 0
         arc = np.zeros(len(path), bool)
         arc[path.arcs.move] = True
@@ -186,8 +191,8 @@ class JointPath:
         stay = stands_before(fixed | holes.whole, feed, degrees)
         held = np.append(tip[1:] & ~tip[:-1], False)[: len(tip)] | stay
         return JointPath(
-            program, motion, start, end, slot, tool, tip, vector, shifts[path.frame], offset, unit, scale,
-            feed, feed, kept, held, stay, _places(structure), holes, directions, curves,
+            program, motion, words, start, end, slot, tool, tip, vector, shifts[path.frame], offset, unit,
+            scale, feed, feed, kept, held, stay, _places(words), holes, directions, curves,
         )  # fmt: skip
 
     @staticmethod
@@ -207,33 +212,71 @@ class JointPath:
                     code="OLP504",
                 )
         motion = Motion.of(structure, errors, [(vector, None) for vector in tools.values()])
+        columns = Coordinates.of_axes(structure)
         places = {number: place for place, number in enumerate(tools)}
         feed = np.full(count, rows.joined)
         feed[:1] = False
         none = np.zeros(count, bool)
         return JointPath(
-            rows.program, motion, np.vstack((np.full((1, axes), np.nan), rows.values[:-1])), rows.values,
+            rows.program, motion, columns,
+            np.vstack((np.full((1, axes), np.nan), rows.values[:-1])), rows.values,
             np.full((count, axes), -1, np.int32), np.array([places[n] for n in rows.tool.tolist()]),
             none, none, np.zeros((count, 3)), np.zeros((count, axes)), np.ones(count), np.ones(axes),
-            feed, ~none, none, none, none, _places(structure), Drilled.none(count),
+            feed, ~none, none, none, none, _places(columns), Drilled.none(count),
             Directions.none(count), Curves.none(count), rows,
         )  # fmt: skip
+
+
+def _refuse_poses(program: Program, motion: Motion, end: Array, tool: Index, holes: Drilled) -> None:
+    """Raise ProgramError for stated poses that legs do not reach, turns that are nearly stated by other
+    numbers, and cycles."""
+    line = program.toolpath.line
+    if holes.strokes.any():
+        raise ProgramError(
+            "where words state poses this is not corrected: a canned cycle; give --expand-cycles, which "
+            "writes it out as moves",
+            line=int(line[holes.strokes].min()),
+            code="OLP565",
+        )
+    turns = np.abs(end[:, len(AXES) :])
+    far = (turns > FARTHEST_DEG[: turns.shape[1]]).any(axis=1)
+    if far.any():
+        most = ", ".join(f"{most:g}" for most in FARTHEST_DEG)
+        raise ProgramError(
+            f"A, B or C turns the tool beyond {most} deg, where other numbers state nearly the same turn; "
+            "clamp the part in another way",
+            line=int(line[np.argmax(far)]),
+            code="OLP565",
+        )
+    try:
+        motion.axes(end, tool, np.ones(len(end), bool))
+    except NotInvertible as error:
+        raise ProgramError.together(
+            ProgramError(
+                "no axis values bring the tool to this pose; expected one within reach, with the work offset "
+                "and the tool of the machine file",
+                line=int(line[row]),
+                code="OLP566",
+            )
+            for row in error.rows
+        ) from None
 
 
 def unreached(line: int) -> ProgramError:
     """Why a move is refused along which directions of the tool are not reached."""
     return ProgramError(
-        "along this move the tool has directions that no rotary axis values near by give; split it, or lead "
-        "it by the axes",
+        "along this move the tool has places or directions that no axis values near by give; split it, or "
+        "lead it by the axes",
         line=line,
         code="OLP566",
     )
 
 
-def _places(structure: Structure) -> Index:
+def _places(words: Coordinates) -> Index:
     """(axes,) the fewest decimals of words: those of the least increments, where they are stated."""
-    steps = [joint.least_increment for joint in structure.joints.values()]
-    return np.array([fewest_decimals(step, 1.0, 0) if step > 0.0 else _UNSTATED_DECIMALS for step in steps])
+    return np.array(
+        [fewest_decimals(step, 1.0, 0) if step > 0.0 else _UNSTATED_DECIMALS for step in words.steps]
+    )
 
 
 def _starts(
@@ -299,18 +342,21 @@ def _degrees(
 
 
 def _shift(
-    structure: Structure, errors: MachineErrors, touched: Touch | None, turned: Array, order: tuple[str, ...],
-    letters: list[str],
-) -> Vector:  # fmt: skip
+    structure: Structure, errors: MachineErrors, touched: Touch | None, turned: Array, words: Coordinates
+) -> Vector:
     """Where the part lies from where its offset says, in workpiece coordinates."""
     if touched is None:
         return (0.0, 0.0, 0.0)
     position, tool = touched
-    values = np.zeros((1, len(order)))
-    for name, value in zip(AXES, position, strict=True):
-        values[0, order.index(name)] = value
-    for letter, value in zip(letters, turned.tolist(), strict=True):
-        values[0, order.index(letter)] = value
+    values = np.zeros((1, len(words.names)))
+    values[0, words.linear], values[0, words.rotary] = position, turned
     motion = Motion.of(structure, errors, [((tool[0], tool[1], tool[2]), None)])
-    x, y, z = motion.machines[0].deviation(values)[0][0].tolist()
+    try:
+        axes = motion.axes(values, np.zeros(1, np.int64), np.array([words.poses]))
+    except NotInvertible:
+        raise ConfigError(
+            "a work offset was set by touching where no axis values bring the tool to; expected "
+            'set_by = "true" in its table, or the machine position where the tool touched'
+        ) from None
+    x, y, z = motion.machines[0].deviation(axes)[0][0].tolist()
     return (x, y, z)

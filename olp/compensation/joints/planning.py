@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from olp.compensation.joints.path import JointPath
+from olp.compensation.joints.path import JointPath, unreached
 from olp.compensation.joints.runs import Runs
 from olp.compensation.joints.sampling import spread
 from olp.core.arrays import Array, Index, Mask, distinct
@@ -127,7 +127,7 @@ def _refuse_unknown(path: JointPath, known: Mask) -> None:
     if wrong.size:
         first = int(wrong[0])
         nowhere = np.isnan(path.end[first]) | np.isnan(path.start[first])
-        order = path.motion.structure.order
+        order = path.coordinates.names
         names = ", ".join(name for name, missing in zip(order, nowhere.tolist(), strict=True) if missing)
         raise ProgramError(
             f"a feed move begins or ends where {names} has not been commanded; command all axes before "
@@ -144,7 +144,10 @@ def _solved(path: JointPath, move: Index, share: Array, side: Array) -> _Rows:
     for a in range(0, max(len(move), 1), _BATCH):
         some, at = move[a : a + _BATCH], share[a : a + _BATCH]
         tool, shift, own = path.tool[some], path.shift_mm[some], side[a : a + _BATCH]
-        axes = motion.axes(path.at(some, at), tool, path.tip[some])
+        try:
+            axes = motion.axes(path.at(some, at), tool, path.tip[some])
+        except NotInvertible as error:
+            raise unreached(int(path.line[some[error.rows[0]]])) from None
         nominal = motion.nominal(axes, tool)
         done = _commanded(path, some, axes, tool, shift)
         target = Poses(nominal.rotation, nominal.position + shift)

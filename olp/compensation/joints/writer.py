@@ -17,7 +17,7 @@ from olp.compensation.joints.drilled import lifted, middled
 from olp.compensation.joints.path import JointPath
 from olp.compensation.joints.planning import JointPlan
 from olp.compensation.stretches import Decimals, Stretches, digits_of
-from olp.compensation.style import Style, fewest_decimals
+from olp.compensation.style import Style
 from olp.compensation.tally import Tally
 from olp.compensation.writer import outside
 from olp.core.arrays import Array, Index, Mask, distinct, is_in
@@ -56,11 +56,10 @@ class JointWriter:
         program = path.program
         assert program.words is not None
         self.path, self.plan, self.program, self.words = path, plan, program, program.words
-        structure = path.motion.structure
-        self.structure, self.order = structure, structure.order
-        self.rotary = np.array([unit == "deg" for unit in structure.units])
-        steps = [structure.joints[name].least_increment for name in AXES]
-        increments: Vector = (steps[0], steps[1], steps[2])
+        words = path.coordinates
+        self.order, self.rotary = words.names, words.rotary
+        x, y, z = words.linear.tolist()
+        increments: Vector = (words.steps[x], words.steps[y], words.steps[z])
         self.style = Style.of(program, increments)
         self.prefixes, self.tally = Prefixes(), Tally()
         self.head = np.append(True, plan.move[1:] != plan.move[:-1])[: len(plan.move)]
@@ -120,6 +119,9 @@ class JointWriter:
     def _linear(self, command: Array, emitted: Array) -> Array:
         """Commands whose linear axes meet the position with the rotary ones as written."""
         rows = np.flatnonzero(self.solid)
+        if self.path.coordinates.poses:
+            # the linear words state the tip, however the tool is turned
+            return command
         motion, move = self.path.motion, self.plan.move[rows]
         play = 0.5 * motion.width * self.plan.side[rows]
         axes = self.plan.axes[rows] - play
@@ -145,7 +147,7 @@ class JointWriter:
     def _drill(self, command: Array) -> Edits:
         """The digits of linear axes; returns the edits of cycles, whose strokes have no words."""
         path, plan, holes = self.path, self.plan, self.path.holes
-        columns, made = [self.order.index(name) for name in AXES], EditList(self.prefixes)
+        columns, made = self.path.coordinates.linear.tolist(), EditList(self.prefixes)
         drilled = holes.strokes[plan.move]
         if len(holes):
             row_of = np.searchsorted(plan.move, np.arange(len(path)), "right") - 1
@@ -227,7 +229,7 @@ class JointWriter:
             which = np.searchsorted(distinct(unit), unit)
             least, usual, finest = (table[which].astype(np.int8) for table in tables)
             return least, usual, finest
-        fewest = max(fewest_decimals(self.structure.joints[name].least_increment, 1.0, 0), 1)
+        fewest = max(int(self.path.places[column]), 1)
         used = self.path.slot[:, column]
         own = self._own_decimals(column, used[used >= 0].astype(np.int64), unit)
         common = int(np.bincount(own).argmax()) if own.size else 0

@@ -20,6 +20,7 @@ from olp.files.kinematics.schema import (
 from olp.files.problems import config_error, validate
 from olp.files.toml_text import read_toml
 from olp.files.write import PathLike, Reader, read_bytes
+from olp.kinematics.coordinates import Coordinates, states_poses
 from olp.kinematics.machine import JointMachine
 from olp.kinematics.parallel_arm import arm_of
 from olp.kinematics.structure import Gauge, Joint, Leg, Platform, Structure
@@ -82,15 +83,25 @@ def _swivel_axis(name: str | None, structure: Structure, path: PathLike) -> str:
 
 
 def _control(file: JointMachineFile, structure: Structure, path: PathLike) -> Machine | None:
-    """What a reader of programs needs to know of a machine, None where its axes are no X, Y, Z with rotary
-    axes named A, B or C."""
+    """What a reader of programs needs to know of a machine. None where its axes are no X, Y, Z with rotary
+    axes named A, B or C, and words do not state poses, either."""
     kinds = {name: joint.kind for name, joint in structure.joints.items()}
     linear = {name for name, kind in kinds.items() if kind == "linear"}
-    if structure.platforms or linear != set(AXES) or not kinds.keys() - linear <= set(ROTARY_NAMES):
+    if file.kinematics.program_words == "pose":
+        if not states_poses(structure):
+            raise config_error(
+                [(None, 'kinematics.program_words = "pose" is read where one platform carries the tool, '
+                        f"with all axes in its legs; the chain is {' '.join(structure.chain)}")],
+                str(path),
+            )  # fmt: skip
+        x, y, z = Coordinates.of_words(structure).steps[: len(AXES)]
+        axes = {name: Axis((-np.inf, np.inf), step) for name, step in zip(AXES, (x, y, z), strict=True)}
+    elif structure.platforms or linear != set(AXES) or not kinds.keys() - linear <= set(ROTARY_NAMES):
         return None
-    axes = {
-        name: Axis(structure.joints[name].travel, structure.joints[name].least_increment) for name in AXES
-    }
+    else:
+        axes = {
+            name: Axis(structure.joints[name].travel, structure.joints[name].least_increment) for name in AXES
+        }
     return Machine(
         name=file.name,
         chain=" ".join(structure.chain),

@@ -149,6 +149,12 @@ class KinematicsTable(Table):
         'it: each rotary axis ("axes"), or the direction of the tool, along a great circle ("vector"). If '
         'left out, it is "vector" for Sinumerik controls (ORIWKS), "axes" for others',
     )
+    program_words: Literal["pose"] | None = Field(
+        default=None,
+        description='"pose" where the control of a platform on legs computes the axes: X, Y and Z of '
+        "programs are the tip in machine coordinates. A, B and C of a platform that turns are then Rz Ry Rx "
+        "of fixed axes from the gauge as it is stated. If left out, lists of axis values are read alone",
+    )
     swivel_axis: Text | None = Field(
         default=None,
         description="the rotary axis that the swivel data of a Sinumerik control have as reference of the "

@@ -57,10 +57,17 @@ def machine_file(parts: Parts, name: str, controller: str | None, notes: Sequenc
         tables += [(f"[[platforms.{toml_key(platform)}.legs]]", leg) for leg in legs]
     if parts.gauge:
         tables.append(("[gauge]", parts.gauge))
+    if parts.platforms and parts.chain == ("F", *parts.platforms):
+        tables.append(("[kinematics]", {"program_words": "pose"}))
     said = [
         *notes,
         "The file names no calibration, so the machine has no errors: add calibration where it was measured",
     ]
+    if parts.platforms:
+        said.append(
+            "X, Y and Z of programs are taken for the tip, as with the kinematics modules of LinuxCNC: leave "
+            "program_words out where the control is commanded in axis values alone"
+        )
     if controller is None:
         said.append('No control is stated; controller = "linuxcnc" is written: name yours with --controller')
     return Written(toml_document(tables).encode(), tuple(said))

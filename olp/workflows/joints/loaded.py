@@ -20,6 +20,7 @@ from olp.files.config import load_job
 from olp.files.kinematics.load import load_joint_errors
 from olp.files.kinematics.machine import load_joint_machine
 from olp.files.sources import Source, Sources
+from olp.kinematics.coordinates import Coordinates, states_poses
 from olp.kinematics.errors import MachineErrors, Payload
 from olp.kinematics.machine import JointCalibration, JointMachine
 from olp.program.dialect import Dialect
@@ -110,11 +111,14 @@ class JointRun:
             if isinstance(own, RobotDialect) and own.for_arms:
                 return own
         if self.setup is None:
+            how = ""
+            if states_poses(self.machine.structure):
+                how = ', or program_words = "pose" in [kinematics] where X, Y and Z of programs are the tip'
             if self.job.dialect not in (None, AXIS_LIST.name) or not _names_axes(source.data, self.machine):
                 raise ProgramError(
                     f"on a machine with the chain {' '.join(self.machine.structure.chain)} lists of axis "
                     f"values are read{_OF_ROBOTS if self.machine.arm else ''}; expected a table with the "
-                    f"columns {', '.join(_columns(self.machine))}; the axis values of poses come from "
+                    f"columns {', '.join(_columns(self.machine))}{how}; the axis values of poses come from "
                     "olp.kinematics.inverse",
                     code="OLP563",
                 )
@@ -136,6 +140,8 @@ class JointRun:
                 "Heidenhain program, or a list of axis values",
                 code="OLP563",
             )
+        if states_poses(self.machine.structure):
+            return dialect
         return dialect.with_tips(self.machine.leads or dialect.leads)
 
     def read(self, source: Source, unrolling: UnrollOptions) -> tuple[Source, JointPath]:
@@ -239,7 +245,7 @@ def _unturned(offsets: Mapping[str, WorkOffset]) -> dict[str, WorkOffset]:
 
 def _refuse_undefined(setup: Setup, machine: JointMachine, file: str) -> None:
     """Raise ConfigError for names that neither file defines, and positions of axes that do not exist."""
-    default, order = setup.machine.default_tool, machine.structure.order
+    default, order = setup.machine.default_tool, Coordinates.of_words(machine.structure).names
     if default is not None and setup.tool(default) is None:
         raise ConfigError(
             f"job_defaults.tool = {default} is not defined; expected a table [tools.N]", file=file

@@ -46,19 +46,18 @@ _BETWEEN = "the path between the rows: the list does not say how the machine goe
 
 def last_digits(path: JointPath) -> tuple[float, float]:
     """The coarsest last digits of the corrected program: mm and deg."""
-    joints, dialect = path.motion.structure.joints.values(), path.program.dialect
+    words, dialect = path.coordinates, path.program.dialect
     if isinstance(dialect, RobotDialect):
-        unit = max((frame.unit_mm for frame in path.program.toolpath.frames), default=1.0)
+        scale = max((frame.unit_mm for frame in path.program.toolpath.frames), default=1.0)
         turn = dialect.turn_unit_rad * 10.0**-dialect.turn_decimals
-        return unit * 10.0**-dialect.decimals, float(np.degrees(turn))
+        return scale * 10.0**-dialect.decimals, float(np.degrees(turn))
     units = {frame.unit_mm for frame in path.program.toolpath.frames} or {1.0}
     in_words = path.listed is None
     linear, rotary = [], []
-    for joint, places in zip(joints, path.places.tolist(), strict=True):
-        if joint.unit == "deg":
+    for unit, step, places in zip(words.units, words.steps, path.places.tolist(), strict=True):
+        if unit == "deg":
             rotary.append(10.0 ** -(max(places, 1) if in_words else places))
         elif in_words:
-            step = joint.least_increment
             linear += [10.0 ** -fewest_decimals(step, u, dialect.inch_decimals) * u for u in units]
         else:
             linear.append(10.0**-places)
@@ -157,12 +156,12 @@ def _largest(path: JointPath, plan: JointPlan) -> dict[str, float]:
     with np.errstate(invalid="ignore"):
         change = np.abs(plan.command - path.at(plan.move, plan.share))
     largest = np.nanmax(np.append(change, np.zeros((1, change.shape[1])), axis=0), axis=0)
-    structure = path.motion.structure
+    words = path.coordinates
     return {
         f"{name}_urad" if unit == "deg" else f"{name}_um": float(
             np.radians(value) / RAD_PER_URAD if unit == "deg" else value * UM_PER_MM
         )
-        for name, unit, value in zip(structure.order, structure.units, largest.tolist(), strict=True)
+        for name, unit, value in zip(words.names, words.units, largest.tolist(), strict=True)
     }
 
 

@@ -1,0 +1,158 @@
+"""Programs whose words state poses, on random platforms with wrong legs: judged by a reader, an inverse and a
+forward computation of their own, at and between the written waypoints."""
+
+from __future__ import annotations
+
+import re
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from judge.any_joints import AnyJoints, moved, rpy
+from scipy.optimize import fsolve
+from workflows.test_any_joints import legged
+
+import olp
+from olp.core.errors import ProgramError
+
+OFFSET = (5.0, -3.0, 2.0)
+FRAME = '\n[work_offsets.G54]\nset_by = "true"\nX_mm = 5.0\nY_mm = -3.0\nZ_mm = 2.0\n'
+HEAD = "G21 G90 G17 G54 G64 P0.01\nT1 M6\nG43 H1\n"
+
+
+def machine_of(folder: Path, name: str, seed: int) -> Path:
+    machine, _ = legged(folder, name, np.random.default_rng(seed))
+    text = machine.read_text().replace("[kinematics]\n", '[kinematics]\nprogram_words = "pose"\n')
+    machine.write_text(text + FRAME)
+    return machine
+
+
+def program_of(name: str) -> str:
+    high, turns = 240.0, ("", "", "")
+    if name == "hexapod":
+        high, turns = 430.0, (" A0. B0. C0.", " A1.5 B-2. C1.", " A2. C4.")
+    return (
+        f"{HEAD}G0 X0. Y0. Z{high}{turns[0]}\nG1 X20. Y10. F900 (first)\n"
+        f"X45.5 Y-12.25 Z{high + 6}{turns[1]}\nG91 X-10. Y-5.\nG90 G2 X15.5 Y-17.25 I-10. J0.\n"
+        f"G1 X-30. Y2.{turns[2]}\nG0 Z{high + 20}\nM30\n"
+    )
+
+
+def read(text: str, columns: int) -> list[np.ndarray]:
+    """The stated poses of straight feed moves behind the first rapid, by an own reader; arcs end there."""
+    place, counts, feeds = np.full(columns, np.nan), False, []
+    for line in text.splitlines():
+        words = re.findall(r"([A-Z])(-?[\d.]+)", re.sub(r"\(.*?\)", "", line))
+        for letter, number in words:
+            counts = {"G90": False, "G91": True}.get(letter + number, counts)
+        given = [(w, float(v)) for w, v in words if w in "XYZABC"[:columns]]
+        if given:
+            place = place.copy()
+            for letter, number in given:
+                column = "XYZABC".index(letter)
+                offset = OFFSET[column] if column < 3 else 0.0
+                place[column] = place[column] + number if counts else number + offset
+            feeds.append(place)
+    return feeds
+
+
+class Posed:
+    """The judge, commanded in poses."""
+
+    def __init__(self, machine: Path) -> None:
+        self.judge, self.near = AnyJoints(machine), np.zeros(0)
+
+    def stated(self, words: np.ndarray) -> np.ndarray:
+        turn = rpy("xyz", np.radians(words[3:])) if len(words) > 3 else np.eye(3)
+        return moved(words[:3], turn)
+
+    def actual(self, words: np.ndarray) -> np.ndarray:
+        """(4, 4) where the machine with its errors has the tool."""
+        wanted = self.stated(words)
+        count = len(self.judge.order)
+
+        def miss(values: np.ndarray) -> np.ndarray:
+            there = self.judge.pose(values, False)
+            turn = there[:3, :3] @ wanted[:3, :3].T
+            skew = [100.0 * (turn[k, i] - turn[i, k]) for i, k in ((1, 2), (2, 0), (0, 1))]
+            return np.array([*(there[:3, 3] - wanted[:3, 3]), *skew])[:count]
+
+        start = np.full(count, 500.0 if count == 3 else 480.0) if not len(self.near) else self.near
+        self.near = fsolve(miss, start, xtol=1e-13)
+        assert np.abs(miss(self.near)).max() < 1e-8
+        return self.judge.pose(self.near, True)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["hexapod", "delta"])
+def test_the_tool_is_where_the_program_says(name: str, tmp_path: Path) -> None:
+    machine, text = machine_of(tmp_path, name, 11), program_of(name)
+    result = olp.correct_joints(text.encode(), machine, tolerance_urad=2.0)
+    assert result.report["verdict"]["ok"]
+    columns, posed = (6 if name == "hexapod" else 3), Posed(machine)
+    nominal, written = read(text, columns), read(result.data.decode(), columns)
+    assert len(written) > len(nominal)
+    far = []
+    for before, after in [*[*pairwise(written[1:-1])][::4], (written[-3], written[-2])]:
+        for share in (0.5, 1.0):
+            tool = posed.actual(before + share * (after - before))
+            far.append(nearest(posed, nominal, tool, turns=columns == 6))
+    worst = np.max(far, axis=0)
+    assert worst[0] < 1.05e-3
+    assert worst[1] < 2.2e-6
+    uncorrected = posed.actual(nominal[2])[:3, 3] - posed.stated(nominal[2])[:3, 3]
+    assert np.linalg.norm(uncorrected) > 0.02
+
+
+def nearest(posed: Posed, nominal: list[np.ndarray], tool: np.ndarray, *, turns: bool) -> tuple[float, float]:
+    """mm and rad of a pose from the nearest one of the program: straight moves, and half a circle behind."""
+    begin, places = nominal[3], []
+    for a, b in [*pairwise(nominal[:4]), (nominal[4], nominal[5])]:
+        way = (b - a)[:3]
+        places.append(a + np.clip((tool[:3, 3] - a[:3]) @ way / (way @ way), 0.0, 1.0) * (b - a))
+    x, y = tool[:2, 3] - begin[:2] + (10.0, 0.0)
+    angle, round_ = np.arctan2(y, x), begin.copy()
+    round_[:2] += (10.0 * np.cos(angle) - 10.0, 10.0 * np.sin(angle))
+    best = (np.inf, np.inf)
+    for place in [*places, round_] if y < 1e-3 else places:
+        there = posed.stated(place)
+        off = float(np.linalg.norm(tool[:3, 3] - there[:3, 3]))
+        turned = sum(np.cross(there[:3, k], tool[:3, k]) for k in range(3)) / 2.0
+        best = min(best, (off, float(np.linalg.norm(turned)) if turns else 0.0))
+    return best
+
+
+@pytest.mark.parametrize("name", ["hexapod", "delta"])
+def test_a_machine_without_errors_changes_nothing(name: str, tmp_path: Path) -> None:
+    machine, text = machine_of(tmp_path, name, 3), program_of(name)
+    kept = machine.read_text().replace('calibration = "calibration.toml"\n', "")
+    machine.write_text(kept)
+    result = olp.correct_joints(text.encode(), machine)
+    assert result.data.decode().replace("\r\n", "\n").endswith(text)
+
+
+@pytest.mark.parametrize(
+    ("blocks", "why"),
+    [
+        ("G0 X0 Y0 Z430 A0 B0 C0\nG1 X900. F100\n", "out of its travel 100 to 900"),
+        ("G0 X0 Y0 Z430 A0 B0 C0\nG1 B95. F100\n", "beyond 179, 89, 179 deg"),
+        ("G0 X0 Y0 Z430 A0 B0 C0\nG81 X1. Z420 R425 F100\nG80\n", "--expand-cycles"),
+        ("G0 X0 Y0 Z430\nG1 X10. F100\n", "A, B, C has not been commanded"),
+    ],
+)
+def test_what_is_not_corrected_is_refused_with_its_line(blocks: str, why: str, tmp_path: Path) -> None:
+    machine = machine_of(tmp_path, "hexapod", 3)
+    with pytest.raises(ProgramError, match=re.escape(why)) as refused:
+        olp.correct_joints((HEAD + blocks + "M30\n").encode(), machine)
+    assert refused.value.line == 5
+
+
+@pytest.mark.parametrize(
+    ("words", "why"), [("X0 A1.", "moves A, which is no axis"), ("X900.", "within reach")]
+)
+def test_poses_of_a_delta_that_do_not_exist_are_refused(words: str, why: str, tmp_path: Path) -> None:
+    machine = machine_of(tmp_path, "delta", 3)
+    with pytest.raises(ProgramError, match=why) as refused:
+        olp.correct_joints(f"{HEAD}G0 {words} Y0 Z240\nM30\n".encode(), machine)
+    assert refused.value.line == 4
