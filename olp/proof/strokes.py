@@ -78,7 +78,9 @@ def _axes(path: Toolpath, target: TargetRows, holes: Holes) -> tuple[Index, Arra
     side = np.where(holes.r_mm >= holes.z_mm, 1.0, -1.0)
     highest = side * (bottom[row, axis] + holes.r_mm - holes.z_mm)
     of = hole[feed]
-    np.fmax.at(highest, of, side[of] * target[move[feed]][np.arange(len(of)), axis[of]])
+    # a peck shorter than the clearance begins above R
+    for rows in (move[feed], np.maximum(move[feed] - 1, 0)):
+        np.fmax.at(highest, of, side[of] * target[rows][np.arange(len(of)), axis[of]])
     top[row, axis] = side * highest
     return reached, top, bottom
 

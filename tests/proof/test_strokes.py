@@ -72,6 +72,15 @@ def test_a_right_hole_is_not_off() -> None:
     assert stated(PECKS, Known(), drilled(-5.0, -10.0)) == (6, 0.0)
 
 
+def test_pecks_shorter_than_the_clearance_begin_above_r() -> None:
+    """With Q 0.2 the return to 0.254 above the peck ends 0.054 above R: that is no deviation."""
+    turned = [rapid(0.0, 0.0, 5.054, flag=CYCLE), line(0.0, 0.0, -10.0, flag=CYCLE)]
+    short = [*drilled(4.8), *turned]
+    assert stated(short, Known())[1] < 1e-9
+    # across the axis it counts there as well
+    assert stated(short, off(0.003, 0.0, 0.0, between=(5.01, 6.0)))[1] == pytest.approx(3.0, abs=1e-4)
+
+
 @pytest.mark.parametrize("plane", (0, 1, 2))
 @pytest.mark.parametrize("turned", (1.0, -1.0))
 def test_across_its_axis_and_at_its_bottom(plane: int, turned: float) -> None:
@@ -118,11 +127,13 @@ def test_a_stroke_that_begins_before_its_hole_counts(error_um: float, um: float,
     assert stated(moves, model, r=level, z=-10.0 * turned)[1] == pytest.approx(um, abs=1e-5)
 
 
-def test_the_hole_begins_at_its_level_or_where_its_first_stroke_ends() -> None:
+def test_the_hole_begins_at_its_level_or_where_its_strokes_are() -> None:
     """Strokes from 8 mm on, above the level of 5 mm; with one to 9 mm, nothing below that is before it."""
     high = off(0.0, 0.0, 0.006, between=(7.9, 8.1))
-    # the strokes begin 3 mm above the hole
-    assert stated(drilled(-10.0, r=8.0), high)[1] == pytest.approx(3006.0, abs=1e-2)
+    # of the corrected hole alone: they begin 3 mm above the nominal one
+    assert stated(drilled(-10.0), high, drilled(-10.0, r=8.0))[1] == pytest.approx(3006.0, abs=1e-2)
+    # of both
+    assert stated(drilled(-10.0, r=8.0), high)[1] == pytest.approx(6.0, abs=1e-2)
     assert stated(drilled(9.0, -10.0, r=8.0), high)[1] == pytest.approx(0.0, abs=1e-5)
 
 

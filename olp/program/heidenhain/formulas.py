@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping
+from functools import reduce
 
 from olp.core.errors import ProgramError
 
@@ -46,7 +47,8 @@ _PAIRS: Mapping[bytes, Callable[[float, float], float]] = {
     b"DIV": lambda a, b: a / b, b"^": lambda a, b: float(a**b), b"LEN": math.hypot,
     b"ANG": lambda a, b: math.degrees(math.atan2(a, b)) % 360.0, b"%": _remainder,
 }  # fmt: skip
-#: the operators of each level, the loosest first
+#: The operators of each level, the loosest first. A sign counts before all of them, and functions behind it;
+#: powers are taken from right to left, and others from left to right (TNC7 user's manual, rules for formulas).
 _LEVELS = ((b"+", b"-"), (b"*", b"/", b"%"), (b"^",))
 
 
@@ -107,11 +109,16 @@ class _Formula:
     def level(self, level: int) -> float:
         if level == len(_LEVELS):
             return self.operand()
-        value = self.level(level + 1)
+        values, operators = [self.level(level + 1)], list[bytes]()
         while self.place < len(self.tokens) and self.tokens[self.place] in _LEVELS[level]:
-            operator = self.tokens[self.place]
+            operators.append(self.tokens[self.place])
             self.place += 1
-            value = _PAIRS[operator](value, self.level(level + 1))
+            values.append(self.level(level + 1))
+        if b"^" in operators:
+            return reduce(lambda power, base: _PAIRS[b"^"](base, power), reversed(values))
+        value = values[0]
+        for operator, operand in zip(operators, values[1:], strict=True):
+            value = _PAIRS[operator](value, operand)
         return value
 
     def operand(self) -> float:

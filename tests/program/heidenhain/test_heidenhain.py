@@ -432,6 +432,7 @@ def test_an_unrolled_program_is_corrected_and_named_by_its_lines(bent: Path) -> 
     ("formula", "value"),
     [
         ("Q1 = 2 + 3 * 4", 14), ("Q1 = ( 2 + 3 ) * 4", 20), ("Q1 = -2 ^ 2", 4), ("Q1 = 7 / 2 - 1", 2.5),
+        ("Q1 = 2 ^ 3 ^ 2", 512), ("Q1 = SQ 2 ^ 3", 64), ("Q1 = 8 / 4 / 2", 1), ("Q1 = 2 - 3 - 4 * 2 ^ 2", -17),
         ("Q1 = SIN 30 + SQ 3", 9.5), ("Q1 = INT -2.7", -2), ("Q1 = FRAC 2.5", 0.5), ("Q1 = SGN -4", -1),
         ("Q1 = ATAN 1", 45), ("Q1 = ABS NEG 3", 3), ("Q1 = PI", np.pi), ("FN 1: Q1 = -2 + -5", -7),
         ("FN 2: Q1 = +5 - -2", 7), ("FN 3: Q1 = +3 * +3", 9), ("FN 4: Q1 = +4 DIV +8", 0.5),
