@@ -48,7 +48,7 @@ _PAIRS: Mapping[bytes, Callable[[float, float], float]] = {
     b"ANG": lambda a, b: math.degrees(math.atan2(a, b)) % 360.0, b"%": _remainder,
 }  # fmt: skip
 #: The operators of each level, the loosest first. A sign counts before all of them, and functions behind it;
-#: powers are taken from right to left, and others from left to right (TNC7 user's manual, rules for formulas).
+#: powers are taken from right to left, and others from left to right (user's manual of the TNC7).
 _LEVELS = ((b"+", b"-"), (b"*", b"/", b"%"), (b"^",))
 
 

@@ -191,6 +191,9 @@ class OffsetState(State):
                     line=line,
                     code="OLP532",
                 )
+        if number is None and code == 430 and self.spindle in (None, self.length_number):
+            # the last H and the tool in the spindle are the same, whichever the control takes
+            number = self.length_number or None
         if number is None:
             raise ProgramError(
                 f"{name} needs an H word with the number of the tool length", line=line, code="OLP516"

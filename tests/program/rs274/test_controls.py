@@ -388,6 +388,29 @@ def test_where_cycles_return_may_be_stated_where_it_is_a_setting(
             assert end == outcome(text, given, profile)
 
 
+@pytest.mark.parametrize("line", ["$G ; state", "$$", "?", "~", "$X (unlock)"])
+def test_what_grbl_answers_moves_nothing(line: str, setups: dict[str, Setup]) -> None:
+    text = f"G0 X1. Y2. Z3.\n{line}\nG91\nX1."
+    assert outcome(text, setups[GRBL], DIALECTS[GRBL]) == (2, 2, 3)
+    source = Source("", f"#1=1\n{text}".encode)
+    unrolled = as_asked(Sources(), source, setups[GRBL], DIALECTS[GRBL], UnrollOptions(flatten=True))
+    assert line.encode() in unrolled.data
+    for moves in ("$H", "$J=G91 X5 F100", "$100=80"):
+        assert f"`{moves}`" in str(outcome(text.replace(line, moves), setups[GRBL], DIALECTS[GRBL]))
+
+
+def test_a_length_without_h_is_the_one_in_force(setups: dict[str, Setup]) -> None:
+    """Only where the last H and the tool in the spindle are the same; behind G49 there is none."""
+    again = "G43 H1\nG43\nG0 X0. Y0. Z10."
+    for text, control, got in (
+        (f"T1 M6\n{again}", FANUC, (0, 0, 20)), (again, HAAS, (0, 0, 20)), (again, MACH3, (0, 0, 20)),
+        (f"T2 M6\n{again}", FANUC, "G43 needs an H word"), (f"T1 M6\n{again}", LINUXCNC, (1, 0, 20)),
+        (again.replace("\n", "\nG49\n", 1), HAAS, "G43 needs an H word"),
+        (again.replace("\n", "\nT2 M6\n", 1), FANUC, "G43 needs an H word"),
+    ):  # fmt: skip
+        assert is_it(outcome(text, setups[control], DIALECTS[control]), got), (text, control)
+
+
 @pytest.mark.parametrize("control", _ISO)
 def test_k_counts_holes(control: str, setups: dict[str, Setup]) -> None:
     profile = DIALECTS[control]

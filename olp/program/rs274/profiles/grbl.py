@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from olp.core.patterns import pattern
 from olp.program.rs274.block_text import BlockText
 from olp.program.rs274.codes import CYCLES
 from olp.program.rs274.cycle_rules import NGC_CYCLES
@@ -16,6 +17,8 @@ _LACKING = {
     *(281, 300, 301, 330, 331, 410, 411, 420, 421, 430, 520, 640, 760, 870, 880, 950, 960, 970, 980, 990),
     *CYCLES,
 }
+#: What the control answers or unlocks, and the start after a hold: senders keep such lines in files.
+_ASKS = pattern(rb"[ \t]*(?:\$[$#GINX]?|[?~])[ \t]*(?:;[^\r\n]*|\([^)\r\n]*\)[ \t]*)?")
 
 DIALECT = Profile(
     name="grbl",
@@ -33,6 +36,7 @@ DIALECT = Profile(
     g10_active=True,
     text=BlockText(odd_bytes=None, cr_ends_line=True, open_comments=True),
     cycles=replace(NGC_CYCLES, exact_corners=False),
+    inert=_ASKS,
     language=PLAIN_NGC,
     path_mode="junction deviation of the control ($11)",
 )

@@ -91,7 +91,7 @@ def _lines(profile: Control) -> Iterator[Row]:
     yield Row("/ (block delete)", Support.READ, "counts as carried out; proved with it and without")
     yield Row("% and O with a number", Support.UNCHANGED)
     if profile.inert is not None:
-        yield Row("names of programs, labels alone in a line", Support.UNCHANGED)
+        yield Row("names of programs, labels, prints and questions alone in a line", Support.UNCHANGED)
     tasks = profile.language.user_tasks
     flow = "= [ ] IF GOTO CALL RTS" if tasks else "# [ ] IF WHILE GOTO O-words"
     yield Row(flow, Support.REFUSED, f"parameters and flow; {UNROLL}")
