@@ -26,7 +26,7 @@ class Cluster:
 
 @contextlib.contextmanager
 def cluster(folder: Path, *, workers: int) -> Iterator[Cluster]:
-    """A scheduler with so many workers, which work in empty folders of their own and end at the end."""
+    """A scheduler with so many workers, which work in empty folders of their own and are killed at the end."""
     folder.mkdir(parents=True, exist_ok=True)
     processes: list[subprocess.Popen[bytes]] = []
 
@@ -47,14 +47,10 @@ def cluster(folder: Path, *, workers: int) -> Iterator[Cluster]:
             _found(start(name, address, *words), r"Registered to:\s+(\S+)", processes)
         yield Cluster(address, processes[1:])
     finally:
-        for process in reversed(processes):
-            process.terminate()
+        # nothing is to be saved, and after a worker was killed the others took a minute to end by themselves
         for process in processes:
-            try:
-                process.wait(PATIENCE_S)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
+            process.kill()
+            process.wait()
 
 
 def _found(log: Path, pattern: str, processes: list[subprocess.Popen[bytes]]) -> str:
