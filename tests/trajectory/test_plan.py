@@ -22,12 +22,8 @@ from olp.trajectory.route import AxisLimits, Route
 
 LIMITS = AxisLimits(np.array([500.0, 400.0, 300.0]), np.array([5e3, 4e3, 3e3]), np.array([1e5, 8e4, 6e4]))
 PROGRAMS = Path(__file__).resolve().parents[2] / "programs"
-JOBS = (
-    pytest.param("gantry-plate", marks=pytest.mark.slow),
-    pytest.param("bridge-cmm", marks=pytest.mark.slow),
-    pytest.param("table-router", marks=pytest.mark.slow),
-    "haas-mill",
-)
+#: The others are judged in tests/workflows/test_retime_random_programs.py.
+JOBS = ("haas-mill", "bridge-cmm")
 
 
 def route_of(points: np.ndarray, feed: float = 100.0, tolerance: float = 0.01) -> Route:

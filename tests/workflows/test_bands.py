@@ -70,7 +70,9 @@ def test_any_size_of_bands_gives_the_same_of_what_is_shipped(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = PROGRAMS / name
-    check(monkeypatch, path, path.with_name("machine.toml"), path.with_name(SHIPPED[name]))
+    # a long one has many bands of any size
+    sizes = SIZES if name.startswith("nasty/") else SIZES[-1:]
+    check(monkeypatch, path, path.with_name("machine.toml"), path.with_name(SHIPPED[name]), sizes=sizes)
 
 
 @pytest.fixture(scope="module", params=[{}, BACKLASH], ids=["without backlash", "with backlash"])

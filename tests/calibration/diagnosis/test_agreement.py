@@ -19,16 +19,20 @@ from olp.core.errors import ConfigError
 from olp.errormodel.quality import Fitted
 from olp.workflows.calibrate_fit import fit_calibration
 
-#: file, factor on its values, part of the words that name the mistake, and machines whose readings tell it
+#: machine whose readings tell it, file, factor on its values, part of the words that name the mistake
 PLANTED = (
-    ("ezz.csv", -1.0, "sign", (103, 107)),
-    ("eyx.csv", 0.5, "half of what", (107, 109)),
-    ("exz.csv", 2.0, "twice what", (103, 109)),
-    ("exx.csv", 1 / 25.4, "thousandths of an inch, taken as 0.001 mm", (103, 107)),
-    ("ebx.csv", -1.0, "sign", (109,)),
-    ("ecx.csv", 4.8481368, "urad, taken as arcsec", (107,)),
+    (107, "ezz.csv", -1.0, "sign"),
+    (109, "eyx.csv", 0.5, "half of what"),
+    (103, "exz.csv", 2.0, "twice what"),
+    (103, "exx.csv", 1 / 25.4, "thousandths of an inch, taken as 0.001 mm"),
+    (109, "ebx.csv", -1.0, "sign"),
+    (107, "ecx.csv", 4.8481368, "urad, taken as arcsec"),
 )
-CASES = [(seed, *planted[:3]) for planted in PLANTED for seed in planted[3]]
+#: Machines without a mistake, and what their lines are measured with.
+SOUND = (
+    *(("rough", seed, "") for seed in range(205, 209)), ("smooth", 209, ""), ("rough", 206, "p"),
+    ("rough", 208, "p"), ("smooth", 209, "p"), ("rough", 207, "r"), ("smooth", 209, "r"),
+)  # fmt: skip
 
 
 def measured(
@@ -54,15 +58,14 @@ def times(file: str, factor: float) -> Callable[[Line], Line]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kinds", ["", "p", "r"], ids=["lines", "with points", "with stations"])
-@pytest.mark.parametrize(("family", "seed"), [*(("rough", k) for k in range(205, 209)), ("smooth", 209)])
+@pytest.mark.parametrize(("family", "seed", "kinds"), SOUND)
 def test_without_a_mistake_nothing_is_found(family: str, seed: int, kinds: str) -> None:
     outcome = found(seed, family, kinds)
     assert not outcome.wrong and not outcome.unlike
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("seed", "file", "factor", "words"), CASES)
+@pytest.mark.parametrize(("seed", "file", "factor", "words"), PLANTED)
 def test_a_planted_mistake_is_named(seed: int, file: str, factor: float, words: str) -> None:
     outcome = found(seed, "rough", "p", times(file, factor))
     assert [one.label for one in outcome.wrong] == [file]
