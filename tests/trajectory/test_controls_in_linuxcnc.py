@@ -92,7 +92,7 @@ def test_the_time_of_linuxcnc_is_predicted_within_two_percent(
                     blend_mm=np.inf)  # fmt: skip
     # the largest speed along the path is a key of its own there
     part = replace(part, feed_mm_s=np.minimum(part.feed_mm_s, controller.SPEED_MM_S))
-    run = controller.run(text, described, tmp_path / "control", in_step=True)
+    run = controller.run(text, described, tmp_path / "control")
     moving = np.flatnonzero((np.diff(run.axis, axis=0) != 0.0).any(axis=1))
     theirs = float(moving[-1] - moving[0] + 1) * TICK_S
     ours = float(move_seconds(CONTROL, part, LIMITS, CONTROL.values({})).sum())
@@ -112,7 +112,7 @@ def test_limits_are_learned_from_a_log(tmp_path: Path) -> None:
     described = machine(tmp_path / "machine", tables=TRUE_ZERO, job=START)
     parts = moves(read(text, load_setup(described, described.with_name("job.toml")), DIALECTS["linuxcnc"]),
                   blend_mm=np.inf)  # fmt: skip
-    run = controller.run(text, described, tmp_path / "control", in_step=True)
+    run = controller.run(text, described, tmp_path / "control")
     slower = AxisSpeeds(0.5 * LIMITS.velocity, 0.3 * LIMITS.acceleration, LIMITS.jerk)
     time_s = np.arange(len(run.axis)) * TICK_S
     log = learned(CONTROL, parts, slower, CONTROL.values({}), time_s, run.axis)
