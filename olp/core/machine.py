@@ -248,9 +248,10 @@ class Job:
     override the machine's, one by one. `start_deg` are positions of rotary axes, of machines that have any.
     `payload_centre_mm` counts from the gauge point. `payloads` leads from
     a line of the program, counted from 1, to the payload from there on. `parameters` are values of parameters
-    of the program, by names such as "#100". Temperatures of the structure's sensors come from `sensors_degC`,
-    settled, or from `sensor_log` at a time in it. `dialect` is that of the program; None: it is detected from
-    the text and the ending of the file. `described` is a dialect that a file describes
+    of the program, by names such as "#100". `block_delete` is the position of that switch for programs that
+    are unrolled, None where both have to be right. Temperatures of the structure's sensors come from
+    `sensors_degC`, settled, or from `sensor_log` at a time in it. `dialect` is that of the program; None: it
+    is detected from the text and the ending of the file. `described` is a dialect that a file describes
     (`olp.program.dialect.Dialect`)."""
 
     program: str | None = None
@@ -262,6 +263,7 @@ class Job:
     payload_centre_mm: Vector = ZERO
     payloads: Mapping[int, float] = field(default_factory=dict)
     parameters: Mapping[str, float] = field(default_factory=dict)
+    block_delete: Literal["on", "off"] | None = None
     temperatures_degC: Mapping[str, float] = field(default_factory=dict)
     sensors_degC: Mapping[str, float] | None = None
     sensor_log: str | None = None

@@ -237,6 +237,7 @@ def _read_job(path: PathLike, read: Reader, exists: Exists = _is_file) -> tuple[
         payload_centre_mm=file.payload_centre_mm,
         payloads={entry.line: entry.payload_kg for entry in file.payloads},
         parameters=file.parameters,
+        block_delete=file.block_delete,
         temperatures_degC={
             name: value
             for name, value in stated_values(file.temperatures_degC).items()

@@ -477,6 +477,11 @@ class JobFile(Table):
         description="the table [parameters]: values that parameters of the program have in the control, such "
         'as "#100" = 5.0, "#<depth>" = 2.5, Q13 = 1.0 or R1 = 3.0, wherever the program does not set them',
     )
+    block_delete: Literal["on", "off"] | None = Field(
+        default=None,
+        description='the position of that switch for programs that are unrolled: "on" leaves `/` blocks out, '
+        '"off" takes their `/` away. If left out, both positions have to give the same program',
+    )
     temperatures_degC: TemperaturesTable = Field(
         default_factory=TemperaturesTable, description="the table [temperatures_degC], in degC"
     )

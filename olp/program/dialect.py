@@ -9,12 +9,14 @@ Programs of blocks of words (RS-274) and of whole statements (APT, DMIS, lists) 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import field, replace
 from enum import Enum
 from typing import Any
 
 from olp.core.machine import Machine
+from olp.core.patterns import pattern
 from olp.core.progress import Progress, silent
 from olp.core.toolpath import Interpolated
 from olp.core.values import dataclass
@@ -22,6 +24,9 @@ from olp.program.kept import Kept
 from olp.program.origin import Unrolled
 from olp.program.text.line_ends import split
 from olp.program.text.signs import NO_SIGNS, Signs
+
+#: Block delete as controls have it: `/` where the line begins, or `/1` to `/9` for one of several switches.
+SKIP_MARK = pattern(rb"[ \t]*/\d?[ \t]*")
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,8 +84,9 @@ class Dialect:
     `path_mode` is how the control goes from move to move where a program does not say it. `inch_decimals` are
     the decimals of inch programs for a least increment of 0.001 mm, `free_digits` those that centres of arcs
     may have beyond those of positions. `marks`: a corrected program says so in a comment. `comment` are the
-    marks around a comment. `first` are the beginnings of lines, in capitals, that stay before all others, in
-    this order; `|` separates alternatives.
+    marks around a comment. `skip_mark` is what block delete looks for where a line begins, None where the job
+    file cannot state its switch. `first` are the beginnings of lines, in capitals, that stay before all
+    others, in this order; `|` separates alternatives.
 
     `signs` are what shows the dialect of a text or a file. `folder_endings` are endings by which a file in a
     folder is known as a program, also where several dialects have them. `languages` are those of
@@ -118,6 +124,7 @@ class Dialect:
     inch_decimals: int = 5
     free_digits: int = 1
     comment: tuple[bytes, bytes] = (b"(", b")")
+    skip_mark: re.Pattern[bytes] | None = None
     first: tuple[bytes, ...] = ()
     marks: bool = True
     contours_assumed: str = ""

@@ -120,9 +120,9 @@ def unroller(
     def unroll(change: Change, limit: int | None) -> Unrolled:
         def changed(wanted: str) -> tuple[str, bytes] | None:
             given = subprograms(wanted)
-            return None if given is None else (given[0], change(*given))
+            return None if given is None else (given[0], _switched(change(*given), setup, dialect))
 
-        given = change(None, whole(program.data))
+        given = _switched(change(None, whole(program.data)), setup, dialect)
         text = unrolled(
             with_payloads(given, setup.job.payloads, dialect.comment), dialect.set_as(setup.machine),
             subprograms=changed,
@@ -139,6 +139,24 @@ def unroller(
         return text
 
     return unroll
+
+
+def _switched(text: bytes, setup: Setup, dialect: Dialect) -> bytes:
+    """A text as the control runs it with the stated switch of block delete; its lines stay in their places.
+    Raises UsageError for dialects in which that is not looked for."""
+    if setup.job.block_delete is None:
+        return text
+    if dialect.skip_mark is None:
+        raise UsageError(
+            f"block_delete of the job file is not read for {dialect.title}; leave it out, and take the / out"
+        )
+    left = setup.job.block_delete == "off"
+    lines = dialect.lines(text)
+    for number, line in enumerate(lines):
+        mark = dialect.skip_mark.match(line)
+        if mark is not None:
+            lines[number] = line[mark.end() :] if left else line[len(line.rstrip(b"\r\n")) :]
+    return b"".join(lines)
 
 
 def beside(sources: Sources, program: Source) -> Callable[[str], tuple[str, bytes] | None]:

@@ -188,7 +188,9 @@ RULES = (
         "OLP525",
         "later blocks depend on block delete",
         why="One corrected program cannot be right for both positions of the switch.",
-        remedy="Take the `/` out, or restate the code or the axes in the next block without `/`.",
+        remedy="Take the `/` out, or restate the code or the axes in the next block without `/`. Or state "
+        "`block_delete` in the job file and unroll the program with --flatten: then it is right for that "
+        "position alone.",
         example="`/G91` before `G1 X10`.",
     ),
     _rule(

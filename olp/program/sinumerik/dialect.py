@@ -10,7 +10,7 @@ from types import MappingProxyType
 from olp.core.toolpath import Interpolated
 from olp.core.values import dataclass
 from olp.program.contours.rules import SINUMERIK_CONTOURS
-from olp.program.dialect import Row, Support
+from olp.program.dialect import SKIP_MARK, Row, Support
 from olp.program.rs274.block_text import BlockText
 from olp.program.rs274.codes import CUTTER_COMPENSATION
 from olp.program.rs274.cycle_rules import ISO_CYCLES
@@ -70,6 +70,7 @@ DIALECT = Sinumerik(
     signs=SINUMERIK,
     folder_endings=("mpf", "spf", "arc"),
     comment=(b"; ", b""),
+    skip_mark=SKIP_MARK,
     first=(b"%_N_", b";$PATH"),
     metric="G71",
     cleared="G40 D0",

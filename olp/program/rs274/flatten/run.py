@@ -41,7 +41,7 @@ def _refuse_by_switch(line: Line) -> None:
     if line.flow is not None or line.assignments or codes & _CALLS:
         raise ProgramError(
             "this block under block delete changes a parameter or the flow, so the unrolled program differs "
-            "for each position of the switch; remove the `/`, or the block",
+            "for each position of the switch; state block_delete in the job file, or remove the `/`",
             code="OLP525",
         )
 

@@ -20,7 +20,7 @@ from olp.core.toolpath import Interpolated
 from olp.core.units import AXES
 from olp.core.values import dataclass
 from olp.program.contours.rules import NGC_CONTOURS, ContourRules
-from olp.program.dialect import Dialect, Row, Support
+from olp.program.dialect import SKIP_MARK, Dialect, Row, Support
 from olp.program.rs274.block_rules import OTHER_RULES, BlockRules
 from olp.program.rs274.block_text import BlockText
 from olp.program.rs274.codes import (
@@ -200,6 +200,7 @@ class Profile(Dialect):
     leads: Interpolated = "axes"
     commands: Commands | None = None
     inert: re.Pattern[bytes] | None = None
+    skip_mark: re.Pattern[bytes] | None = SKIP_MARK
     translator: Callable[[bytes], Any] | None = None
     machine_moves_keep_length: bool = False
     increments_take_offsets: bool = False

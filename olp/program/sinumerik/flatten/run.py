@@ -95,7 +95,7 @@ class Walk:
         ):
             raise ProgramError(
                 "a block under block delete controls the run, so both positions of the switch give other "
-                "programs; remove the `/`",
+                "programs; state block_delete in the job file, or remove the `/`",
                 code="OLP525",
             )
         if line.keyword:

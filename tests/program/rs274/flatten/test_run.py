@@ -422,7 +422,7 @@ def test_a_block_of_flow_under_block_delete_needs_the_switch(block: str) -> None
     code, message, line = refused(f"O1\nX1.\n/{block}\n", profile, block_delete=None)
     assert (code, line) == ("OLP525", 3)
     assert message.startswith("this block under block delete changes a parameter or the flow")
-    assert message.endswith("remove the `/`, or the block")
+    assert message.endswith("state block_delete in the job file, or remove the `/`")
     assert fanuc(f"O1\nX1.\n/{block}\nM30\n", block_delete=True) == "O1\nX1.\nM30\n"
 
 
