@@ -202,8 +202,8 @@ def test_feeds_of_all_sizes(decade: int) -> None:
 
 
 @pytest.mark.slow
-def test_a_hundred_thousand_points() -> None:
-    angle = np.linspace(0.0, 400 * np.pi, 100_001)
+def test_forty_thousand_points() -> None:
+    angle = np.linspace(0.0, 250 * np.pi, 40_001)
     curve = np.column_stack((angle * np.cos(angle), angle * np.sin(angle), np.sin(angle))) * 0.05
     given = route(np.round(curve, 3), 150.0, 0.005)
     trajectory = plan(given, LIMITS)
