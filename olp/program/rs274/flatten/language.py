@@ -26,7 +26,8 @@ class Language:
     - `saved_modes`: M70 to M73 save and restore modal codes. `profile_cycles`: G70 to G72 name a subprogram.
     - `splines`: G5 to G5.3 are splines, and `@` and `^` radius and angle.
     - `counts_in_p`: P of M98 has the count in front of four digits of the number. `shared_locals`: M98 keeps
-      the local variables of its caller. `calls_none`: L0 of M98 calls nothing.
+      the local variables of its caller. `calls_none`: L0 of M98 calls nothing. `calls_at_q`: Q of M98 is the
+      block at which the subprogram begins, in the same program without P.
     - `increments_open`: the unit of a number without a point is not known off line, nor what ROUND in a word
       rounds to.
     - Numbers are written with at most `decimals`, or with `all_digits` where that is needed; `counts` are
@@ -46,6 +47,7 @@ class Language:
     counts_in_p: bool
     shared_locals: bool
     calls_none: bool
+    calls_at_q: bool = False
     increments_open: bool
     decimals: int
     all_digits: bool

@@ -269,7 +269,13 @@ class Walk(Tasks):
         return None
 
     def _call_m98(self, line: Line, frame: Frame, index: int, *, local: bool) -> None:
-        target = self._word(line, "p")
+        target, block = self._word(line, "p"), self._word(line, "q")
+        if block is not None and (local or not self.language.calls_at_q):
+            raise ProgramError(
+                "what this control makes of Q in a subprogram call is not known; take Q out", code="OLP516"
+            )
+        if target is None and block is not None:
+            target, block, local = block, None, True
         if target is None:
             raise ProgramError("a subprogram call has no P word", code="OLP516")
         number = whole(target, "the program number P")
@@ -283,7 +289,7 @@ class Walk(Tasks):
         without = frozenset(
             i
             for i, w in enumerate(line.words)
-            if w.letter in ("p", "l") or (w.letter == "m" and w.number in (97, 98))
+            if w.letter in "plq" or (w.letter == "m" and w.number in (97, 98))
         )
         self.write(line, frame, without)
         if none:
@@ -292,6 +298,8 @@ class Walk(Tasks):
             unit, start = frame.unit, frame.unit.block_number(number, index) - 1
         else:
             unit, start = self._find(str(number), "program", frame.unit)
+            if block is not None:
+                start = unit.block_number(whole(block, "the block number Q"), start + 1) - 1
         keep = self.language.shared_locals
         self._enter(
             Frame(

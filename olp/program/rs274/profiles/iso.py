@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from olp.core.patterns import pattern
 from olp.program.contours.rules import ISO_CONTOURS
 from olp.program.rs274.block_rules import ISO_RULES
@@ -53,7 +55,7 @@ ISO = Profile(
     inert=pattern(rb"[ \t]*:[ \t]*\d+[ \t]*(?:\([^)]*\)[ \t]*)?|" + PRINTS),
     cycles=ISO_CYCLES,
     contours=ISO_CONTOURS,
-    language=MACRO_B,
+    language=replace(MACRO_B, calls_at_q=True),
     rules=ISO_RULES,
     path_mode="not stated",
     contours_assumed="start-up of type A is assumed, with the tool beside the begin of the second move, and "

@@ -234,6 +234,27 @@ def test_the_count_stands_in_p_only_without_l_and_only_on_some_controls() -> Non
 
 
 @pytest.mark.parametrize(
+    ("call", "body"),
+    [
+        ("M98 P20 Q5", "N5 X3.\n"), ("M98 P20 Q5 L2", "N5 X3.\nX3.\n"), ("M98 P20 Q4", "N4 X2.\nN5 X3.\n"),
+        # of this program itself
+        ("M98 Q5", "N5 X7.\n"), ("M98 Q[#1] L2", "N5 X7.\nX7.\n"),
+    ],
+)  # fmt: skip
+def test_a_subprogram_begins_at_the_block_that_q_names(call: str, body: str) -> None:
+    text = f"O1\n#1=5\n{call}\nM30\nN5 X7.\nM99\nO20\nX1.\nN4 X2.\nN5 X3.\nM99\n"
+    for profile in ("fanuc", "mazak"):
+        assert flatten(text.encode(), profile=profile).decode() == f"O1\n{body}M30\n"
+    for profile in ("haas", "siemens-iso", "mach4"):
+        code, message, line = refused(text, profile)
+        assert (code, line) == ("OLP516", 3)
+        assert message == "what this control makes of Q in a subprogram call is not known; take Q out"
+    # nor in another call of the same program
+    assert refused("O1\nM97 P5 Q2\nM30\nN5 X7.\nM99\n", "fanuc")[0] == "OLP516"
+    assert refused(text.replace("Q5", "Q8").replace("Q[", "Q[3+").replace("Q4", "Q8"), "fanuc")[0] == "OLP542"
+
+
+@pytest.mark.parametrize(
     ("block", "code", "message"),
     [
         ("M98", "OLP516", "a subprogram call has no P word"),
