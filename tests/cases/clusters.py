@@ -26,7 +26,7 @@ class Cluster:
 
 @contextlib.contextmanager
 def cluster(folder: Path, *, workers: int) -> Iterator[Cluster]:
-    """A scheduler with so many workers, which work in empty folders of their own and are killed at the end."""
+    """A scheduler and its workers, which work in empty folders of their own; all are killed at the end."""
     folder.mkdir(parents=True, exist_ok=True)
     processes: list[subprocess.Popen[bytes]] = []
 
