@@ -86,8 +86,8 @@ class Scope(MutableMapping[str, Value]):
 
     def _kept(self, name: str, value: Value) -> Value:
         """What a variable of its own type keeps of a value: an INT as ROUND( ) has it, of a BOOL whether it
-        is not 0 (type conversion in the programming manual for job planning, 6FC5398-2BP40-0BA0). A half
-        becomes the next higher integer (function manual for synchronized actions, 6FC5397-5BP40-3BA0)."""
+        is not 0. Type conversion is in the manual for job planning, 6FC5398-2BP40-0BA0. A half becomes the
+        next higher integer (function manual for synchronized actions, 6FC5397-5BP40-3BA0)."""
         if isinstance(value, bool | str):
             return value
         kind = self._kinds.get(name.partition("[")[0], "")
