@@ -200,13 +200,13 @@ def noncentrality(clean: Fit, index: int, taken: Observation, planted: Observati
     state = _started(taken, clean.results[index].state)
     total = clean.prior.precision()[0]
     own = Normal.of(size)
-    own.add(state.block(clean.parameters, clean.theta))
+    own.add(clean.block(state))
     for k, result in enumerate(clean.results):
         if k != index:
             one = Normal.of(size)
-            one.add(result.state.block(clean.parameters, clean.theta))
+            one.add(clean.block(result.state))
             total = total + one.H
-    block = state.block(clean.parameters, clean.theta)
+    block = clean.block(state)
     shifted = Normal.of(size)
     shifted.add(_shift(clean, state, block, planted))
     columns = np.flatnonzero(own.H.any(axis=0))
@@ -231,7 +231,7 @@ def _shift(clean: Fit, state: State, block: Block, planted: Observation) -> Bloc
     """The rows of a source with the change of its residuals by the blunder as readings."""
     other = _started(planted, state)
     theta = clean.theta
-    wrong = other.block(clean.parameters, theta)
+    wrong = clean.block(other)
 
     def residuals(of: Block) -> list[np.ndarray]:
         return [chunk.y - chunk.rows @ theta[of.columns] for chunk in of.chunks()]

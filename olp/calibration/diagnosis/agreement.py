@@ -96,7 +96,7 @@ class _Source:
     @staticmethod
     def of(state: State, fit: Fit) -> _Source:
         normal = Normal.of(fit.parameters.size)
-        normal.add(state.block(fit.parameters, fit.theta))
+        normal.add(fit.block(state))
         return _Source(state, normal)
 
 

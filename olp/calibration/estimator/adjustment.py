@@ -12,6 +12,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from olp.calibration.estimator.basis import Wave
+from olp.calibration.estimator.beside import block_of
 from olp.calibration.estimator.fitted import Fit
 from olp.calibration.estimator.model import MOST, Model, artefacts_of
 from olp.calibration.estimator.normal import Block, Normal, Solved, solve
@@ -124,7 +125,7 @@ def _iterate(start: _Start, tell: Progress) -> _Settled:
         if learnt is not None:
             prior.classes = learnt
         theta = theta if len(theta) == parameters.size else np.zeros(parameters.size)
-        blocks = [state.block(parameters, theta) for state in states]
+        blocks = [block_of(state, theta, parameters, start.model.shapes) for state in states]
         tell("adjustment", 0.5)
         normal, solved = _adjusted(blocks, prior, learnt is None)
         learnt, theta = prior.classes, solved.theta

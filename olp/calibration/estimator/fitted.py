@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 
 from olp.calibration.estimator.basis import Step
+from olp.calibration.estimator.beside import block_of
+from olp.calibration.estimator.normal import Block
 from olp.calibration.estimator.parameters import CROSS, LEVER_ARM_MM, Parameters, frame_columns, turned_by
 from olp.calibration.estimator.prior import Prior
 from olp.calibration.iso230.conventions import AXES_OF, LEAN
-from olp.calibration.observations.base import Outlier, Result, S, ScatteredState
+from olp.calibration.observations.base import Outlier, Result, S, ScatteredState, State
 from olp.calibration.observations.measurements import Measurements
 from olp.core.arrays import Array
 from olp.core.units import AXES
@@ -67,6 +69,10 @@ class Fit:
             sums[result.state.label] = (chi_square + result.chi_square, freedom + result.freedom)
         sources = (Fitted(label, *figures) for label, figures in sums.items() if label)
         return Quality(Fitted("all readings", self.chi_square, self.freedom), tuple(sources))
+
+    def block(self, state: State) -> Block:
+        """The readings of a state at the solution. Raises ConfigError or CannotCompute."""
+        return block_of(state, self.theta, self.parameters, self.prior.shapes)
 
     def design(self, axis_mm: Array, tool_mm: Array, play: Array | None = None) -> Array:
         """(n, 3, size) dependence of the error on theta. It is in the frame of the machine where some points

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from olp.calibration.estimator.beside import block_of
 from olp.calibration.estimator.field import Modes
 from olp.calibration.estimator.fitted import Fit
 from olp.calibration.estimator.normal import Block, Chunk, Normal
@@ -87,7 +88,9 @@ class Adjustment:
         self.size, self.own = fit.parameters.size, 3 * modes.size
         both = Both(fit.parameters, modes)
         theta = np.concatenate([fit.theta, np.zeros(self.own)])
-        sets = [(r.state, r.state.block(both, theta)) for r in fit.scattered]
+        sets = [
+            (r.state, block_of(r.state, theta, fit.parameters, fit.prior.shapes, both)) for r in fit.scattered
+        ]
         self.blocks = [block for _, block in sets]
         local = [len(block.precision) for block in self.blocks]
         self.total = both.size + sum(local)
@@ -197,7 +200,7 @@ class Adjustment:
         """The blocks of the observations that do not depend on the field."""
         fit = self.fit
         states = [r.state for r in fit.results if not isinstance(r.state, ScatteredState)]
-        return [state.block(fit.parameters, fit.theta) for state in states]
+        return [fit.block(state) for state in states]
 
 
 def _table(chunk: Chunk, use: np.ndarray) -> Array:
