@@ -80,6 +80,73 @@ FAMILIES: dict[str, Draw] = {
 }  # fmt: skip
 
 
+def _bowed(
+    rng: np.random.Generator, low: float, span: float, size: float, own: bool, joints: np.ndarray
+) -> Curve:
+    """A guide that heat bows: a parabola and a third power, and next to nothing else."""
+    bow, twist, lean = size * rng.normal(size=3) * (1.6, 0.8, 0.7 * own)
+    fine = _waves(rng, low, span, 0.03 * size, False)
+
+    def curve(q: np.ndarray) -> np.ndarray:
+        u = (np.asarray(q, float) - low) / span - 0.5
+        return lean * u + bow * u**2 + twist * u**3 + fine(q)
+
+    return curve
+
+
+def _railed(
+    rng: np.random.Generator, low: float, span: float, size: float, own: bool, joints: np.ndarray
+) -> Curve:
+    """Rails in pieces of equal length, each straight, with a step and a kink at every joint."""
+    count = rng.integers(2, 5)
+    ends = low + span * np.arange(1, count) / count
+    jumps, slopes = 0.15 * size * rng.normal(size=count - 1), size * rng.normal(size=count)
+    base = _waves(rng, low, span, 0.3 * size, own)
+
+    def curve(q: np.ndarray) -> np.ndarray:
+        q = np.asarray(q, float)
+        nodes = np.linspace(low, low + span, count + 1)
+        heights = np.concatenate([[0.0], np.cumsum(slopes) / count])
+        return base(q) + np.interp(q, nodes, heights) + (jumps * (q[..., None] > ends)).sum(axis=-1)
+
+    return curve
+
+
+def _racked(
+    rng: np.random.Generator, low: float, span: float, size: float, own: bool, joints: np.ndarray
+) -> Curve:
+    """Racks in pieces of 250 to 500 mm whose pitch is off: a sawtooth, under a smooth curve."""
+    piece, height, start = rng.uniform(250.0, 500.0), 0.15 * size * rng.normal(), rng.uniform()
+    base = _waves(rng, low, span, 0.6 * size, own)
+
+    def curve(q: np.ndarray) -> np.ndarray:
+        q = np.asarray(q, float)
+        return base(q) + height * (((q - low) / piece + start) % 1.0)
+
+    return curve
+
+
+def _worn(
+    rng: np.random.Generator, low: float, span: float, size: float, own: bool, joints: np.ndarray
+) -> Curve:
+    """A guide worn where parts are usually clamped, with soft edges."""
+    a, b = np.sort(rng.uniform(0.15, 0.85, 2))
+    depth, edge = 0.6 * size * rng.normal(), rng.uniform(0.02, 0.08)
+    base = _waves(rng, low, span, 0.4 * size, own)
+
+    def curve(q: np.ndarray) -> np.ndarray:
+        u = (np.asarray(q, float) - low) / span
+        return base(q) + 0.5 * depth * (np.tanh((u - a) / edge) - np.tanh((u - b) / edge))
+
+    return curve
+
+
+#: Families on which nothing was tuned.
+UNTUNED: dict[str, Draw] = {"bows": _bowed, "rails": _railed, "racks": _racked, "wear": _worn}
+#: All of them.
+DRAWS = FAMILIES | UNTUNED
+
+
 def class_of(name: str) -> str:
     """angle, positioning or straightness."""
     return "angle" if name[1] in "ABC" else "positioning" if name[1] == name[2] else "straightness"
@@ -88,7 +155,7 @@ def class_of(name: str) -> str:
 def _curve(rng: np.random.Generator, family: str, name: str, joints: np.ndarray) -> Curve:
     low, high = BOX[AXES.index(name[2])]
     kind = class_of(name)
-    raw = FAMILIES[family](rng, low, high - low, SIZE[kind], kind == "positioning", joints)
+    raw = DRAWS[family](rng, low, high - low, SIZE[kind], kind == "positioning", joints)
     return _normal(raw, low, high, 0.0, kind == "straightness")
 
 
@@ -101,7 +168,7 @@ def _joints(rng: np.random.Generator, axis: int) -> np.ndarray:
 def machine(seed: int, family: str, chain: str = "FXYZ") -> Machine:
     """A random machine of a family over `simulated.BOX`, datum zero; its joints are those of all six errors
     of an axis."""
-    rng = np.random.default_rng([seed, list(FAMILIES).index(family), 31])
+    rng = np.random.default_rng([seed, list(DRAWS).index(family), 31])
     curves: dict[str, Curve] = {}
     for axis, letter in enumerate(AXES):
         joints = _joints(rng, axis)

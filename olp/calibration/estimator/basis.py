@@ -10,6 +10,7 @@ second and no power of the frequency; those of swings fall with the third, and e
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import cache
 
 import numpy as np
 
@@ -86,6 +87,8 @@ class Scales:
 SPECTRA = (
     (6.0, np.inf), (4.0, np.inf), (2.0, np.inf), (0.0, np.inf), (3.0, 2.5), (3.0, 4.0), (3.0, 6.5)
 )  # fmt: skip
+#: Swings are those of an axis so many times as long, of which the curve is the middle: its ends are no ends.
+LONGER = 3
 #: Row of ripple in a spectrum.
 RIPPLE = 3
 #: Least variance of an eigenvector against the largest: swings end, and a precision is finite.
@@ -134,17 +137,43 @@ class Spline:
         second = np.diff(np.eye(self.count), 2, axis=0)
         return np.asarray(second.T @ second)
 
-    def spectrum(self) -> tuple[Array, Array]:
-        """(7, count) variances of the eigenvectors of `roughness` where one process has the size 1, zero of
-        the first two; and the eigenvectors, (count, count), by column."""
-        values, vectors = np.linalg.eigh(self.roughness())
-        frequency = (values[STRAIGHT:] * self.cells**4) ** 0.25
-        table = np.zeros((len(SPECTRA), self.count))
-        for row, (power, waves) in zip(table, SPECTRA, strict=True):
-            # of a process of length 1: white noise has a variance that does not depend on the cells
-            row[STRAIGHT:] = frequency**-power * (self.cells if power else 1.0)
-            row[STRAIGHT:] *= np.exp(-((frequency / (np.pi * waves)) ** 2))
-        return table, vectors
+    def processes(self) -> Array:
+        """(7, count, count) covariances of the coefficients where one process has the size 1, without their
+        straight lines."""
+        return _processes(self.cells)
+
+    def lines(self) -> Array:
+        """(count, 2) orthonormal coefficients of a constant and of a straight line, mixed."""
+        return _modes(self.cells)[1][:, :STRAIGHT]
+
+    def bent(self) -> Array:
+        """(count, count - 2) orthonormal coefficients of all else."""
+        return _modes(self.cells)[1][:, STRAIGHT:]
+
+
+@cache
+def _modes(cells: int) -> tuple[Array, Array]:
+    """(count,) eigenvalues of the second differences of so many cells, and (count, count) eigenvectors."""
+    values, vectors = np.linalg.eigh(Spline(0.0, 1.0, cells).roughness())
+    return np.asarray(values), np.asarray(vectors)
+
+
+@cache
+def _processes(cells: int) -> Array:
+    parts = []
+    for power, waves in SPECTRA:
+        times = 1 if np.isinf(waves) else LONGER
+        values, vectors = _modes(times * cells)
+        frequency = (values[STRAIGHT:] * cells**4) ** 0.25
+        # of a process of length 1: white noise has a variance that does not depend on the cells
+        variance = frequency**-power * (cells if power else 1.0)
+        variance *= np.exp(-((frequency / (np.pi * waves)) ** 2))
+        first = (times - 1) // 2 * cells
+        middle = vectors[first : first + cells + 3, STRAIGHT:]
+        parts.append((middle * variance) @ middle.T)
+    lines = _modes(cells)[1][:, :STRAIGHT]
+    keep = np.eye(cells + 3) - lines @ lines.T
+    return np.asarray(keep @ np.stack(parts) @ keep)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -189,13 +218,14 @@ class CurveSpace:
     def process(self, scales: Scales, amplitude: float) -> Array:
         """(size, size) precision of the sum of the processes; `amplitude` is the standard deviation of the
         coefficients of straight lines and of features."""
-        table, vectors = self.spline.spectrum()
-        variance = scales.values**2 @ table
-        variance = np.maximum(variance, _LEAST_SHARE * variance.max())
-        variance[:STRAIGHT] = amplitude**2
+        lines, bent = self.spline.lines(), self.spline.bent()
+        covariance = bent.T @ np.tensordot(scales.values**2, self.spline.processes(), 1) @ bent
+        values, vectors = np.linalg.eigh(covariance)
+        turned = bent @ vectors
+        rough = (turned / np.maximum(values, _LEAST_SHARE * values[-1])) @ turned.T
         m = self.spline.count
         full = np.eye(m + len(self.features)) / amplitude**2
-        full[:m, :m] = (vectors / variance) @ vectors.T
+        full[:m, :m] = rough + lines @ lines.T / amplitude**2
         return np.asarray(self.gauge.T @ full @ self.gauge)
 
     def prior(self, roughness: float, amplitude: float) -> Array:

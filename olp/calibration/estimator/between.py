@@ -8,11 +8,10 @@ ripple that readings show at targets is another one right beside them, and targe
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache
 
 import numpy as np
 
-from olp.calibration.estimator.basis import RIPPLE, STRAIGHT, Scales, Spline, slope_grid, slope_weights
+from olp.calibration.estimator.basis import RIPPLE, Scales, Spline, slope_grid, slope_weights
 from olp.calibration.observations.base import Noise
 from olp.calibration.observations.lines import Line, targets_of
 from olp.core.arrays import Array
@@ -79,27 +78,20 @@ class _Read:
 def _left(spline: Spline, scales: Scales, amplitude: float, q: Array, read: _Read, *, apart: bool) -> Array:
     """(n,) variance at q of a curve that is known at targets up to its level. Where `apart`, ripple at one
     place says nothing of the place beside it."""
-    table, vectors = _spectrum(spline)
-    sizes = scales.values**2
-    own = sizes @ table
+    processes, sizes = spline.processes(), scales.values**2
+    own = np.tensordot(sizes, processes, 1) + amplitude**2 * spline.lines() @ spline.lines().T
     grain = 0.0
     if apart:
-        own = own - sizes[RIPPLE] * table[RIPPLE]
+        own -= sizes[RIPPLE] * processes[RIPPLE]
         grain = float(sizes[RIPPLE] * (spline.values(q) ** 2).sum(axis=1).mean())
-    own[:STRAIGHT] = amplitude**2
-    root = vectors * np.sqrt(own)
-    wanted = (spline.values(q) - spline.values(np.array([read.datum_mm]))) @ root
+    wanted = spline.values(q) - spline.values(np.array([read.datum_mm]))
     if read.straight:
-        slope = slope_weights(spline) @ spline.values(slope_grid(spline)) @ root
+        slope = slope_weights(spline) @ spline.values(slope_grid(spline))
         wanted = wanted - (q - read.datum_mm)[:, None] * slope
-    seen = spline.values(read.targets) @ root
+    seen = own @ spline.values(read.targets).T
     same = np.equal.outer(read.targets, read.targets)
-    inner = seen @ seen.T + np.diag(read.variance) + grain * same
-    across = wanted @ seen.T - grain * (read.targets == read.datum_mm)
+    inner = spline.values(read.targets) @ seen + np.diag(read.variance) + grain * same
+    across = wanted @ seen - grain * (read.targets == read.datum_mm)
     explained = np.einsum("ij,ji->i", across, np.linalg.solve(inner, across.T))
-    return np.asarray((wanted**2).sum(axis=1) + 2.0 * grain * (q != read.datum_mm) - explained)
-
-
-@cache
-def _spectrum(spline: Spline) -> tuple[Array, Array]:
-    return spline.spectrum()
+    whole = np.einsum("ij,ij->i", wanted @ own, wanted)
+    return np.asarray(whole + 2.0 * grain * (q != read.datum_mm) - explained)

@@ -16,7 +16,7 @@ from functools import cache
 
 import numpy as np
 
-from olp.calibration.estimator.basis import STRAIGHT, Scales, Spline
+from olp.calibration.estimator.basis import Scales, Spline
 from olp.calibration.estimator.normal import Normal
 from olp.core.arrays import Array
 
@@ -42,7 +42,7 @@ RELATED = 0.0, 1.0, 0.5, 0.5
 #: logarithm of that.
 STEPS_BEFORE = 0.9, 1.2e-3, 0.7
 #: The same of ripple.
-RIPPLE_BEFORE = 0.02, 3.2e-3, 0.5
+RIPPLE_BEFORE = 0.02, 2.4e-3, 0.35
 #: The scale that stands for all probable ones is the mean of this power of them: 2 is the expected variance.
 MOMENT = 2.0
 #: Directions of the unknowns that readings determine less than this, against the best, say nothing.
@@ -59,10 +59,10 @@ def class_of(name: str) -> str:
 @cache
 def _rms() -> Array:
     """(7,) root mean square over the axis of each process of size 1."""
-    spline = Spline(0.0, 1.0, 240)
-    table, vectors = spline.spectrum()
-    values = spline.values(np.linspace(0.0, 1.0, 721)) @ vectors
-    return np.asarray(np.sqrt(table @ (values**2).mean(axis=0)))
+    spline = Spline(0.0, 1.0, 120)
+    values = spline.values(np.linspace(0.0, 1.0, 721))
+    mean = values.T @ values / len(values)
+    return np.asarray(np.sqrt((spline.processes() * mean).sum(axis=(1, 2))))
 
 
 @cache
@@ -99,11 +99,10 @@ class Evidence:
         root = np.sqrt(values[use])
         self.rows = (vectors[:, use] * root).T
         self.z = np.asarray(normal.g @ vectors[:, use] / root)
-        table, turned = spline.spectrum()
-        base = self.rows[:, : spline.count] @ turned
-        straight = amplitude * base[:, :STRAIGHT]
+        base = self.rows[:, : spline.count]
+        straight = amplitude * base @ spline.lines()
         self.fixed = np.eye(len(root)) + straight @ straight.T
-        self.parts = np.stack([(base * variance) @ base.T for variance in table])
+        self.parts = base @ spline.processes() @ base.T
 
     def covariance(self, scales: Array, chosen: Sequence[int]) -> Array:
         """(n, r, r) covariance of the reduced readings for scales (n, 7) and some features."""

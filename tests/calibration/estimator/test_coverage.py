@@ -138,15 +138,28 @@ def test_the_kind_of_the_smooth_part_is_that_of_the_machine() -> None:
 
 @pytest.mark.parametrize(("row", "waves"), [(4, 2.5), (5, 4.0), (6, 6.5)])
 def test_swings_hold_nothing_shorter_than_their_waves(row: int, waves: float) -> None:
-    """Two polynomials' degrees for each half wave leave nothing of them; bends go on."""
+    """Two polynomials' degrees for each half wave, and six, leave nothing of them; bends go on."""
     spline = Spline(0.0, 1.0, 96)
-    table, vectors = spline.spectrum()
     at = np.linspace(0.0, 1.0, 501)
-    low = np.polynomial.chebyshev.chebvander(2.0 * at - 1.0, int(4 + 2.0 * waves))
+    low = np.polynomial.chebyshev.chebvander(2.0 * at - 1.0, int(6 + 2.0 * waves))
     left = []
     for process in (row, 1):
-        drawn = spline.values(at) @ (vectors * np.sqrt(table[process]))
+        values, vectors = np.linalg.eigh(spline.processes()[process])
+        drawn = spline.values(at) @ (vectors * np.sqrt(np.maximum(values, 0.0)))
         rest = drawn - low @ np.linalg.lstsq(low, drawn)[0]
         left.append(np.sqrt(np.mean((rest**2).sum(axis=1)) / np.mean((drawn**2).sum(axis=1))))
     assert left[0] < 0.01
     assert left[1] > 3.0 * left[0]
+
+
+@pytest.mark.parametrize("row", [4, 5, 6])
+def test_swings_bend_at_the_ends_of_an_axis_as_in_its_middle(row: int) -> None:
+    """Its ends are no ends of what bends it: the second difference has the same variance everywhere."""
+    spline = Spline(0.0, 1.0, 48)
+    apart = 0.04
+    rows = [
+        np.array([1.0, -2.0, 1.0]) @ spline.values(middle + np.array([-apart, 0.0, apart]))
+        for middle in (apart, 0.5, 1.0 - apart)
+    ]
+    seconds = [one @ spline.processes()[row] @ one for one in rows]
+    assert seconds == pytest.approx([seconds[1]] * 3, rel=0.15)
