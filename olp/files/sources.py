@@ -90,7 +90,7 @@ class Sources:
     def _whole(self, path: PathLike) -> Text:
         """A program with its data, where these are in a file beside it, or with all files of its project."""
         if is_one_of_many(Path(path)):
-            text = gathered(Path(path), self.exists, self.read, self.listed)
+            text = gathered(Path(path), self)
             return self.text(path) if text is None else text
         data = data_beside(Path(path))
         if data is None or not self.exists(data):
@@ -138,8 +138,12 @@ class Parcel(Sources):
         return in_parcel(path) in self._known or self._look(path) is not None
 
     def listed(self, folder: Path, ending: str) -> list[Path]:
-        """None: what else is in a folder is not known here."""
-        return []
+        """Those that are in the parcel."""
+        known = (Path(name) for name, data in self._files.items() if data is not None)
+        there = in_parcel(folder)
+        return sorted(
+            path for path in known if in_parcel(path.parent) == there and path.suffix.lower() == ending
+        )
 
     def _look(self, path: PathLike) -> bytes | None:
         name = in_parcel(path)

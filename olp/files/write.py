@@ -89,7 +89,8 @@ def write_files(
     written: dict[Path, Content] = {}
     for target, whole in files.items():
         own = _divided(target, whole)
-        written |= own
+        # a further file that is there and stays as it is has not to be written
+        written |= {part: data for part, data in own.items() if part == target or not _holds(part, data)}
         # the files that were read with a program are inputs, too
         inputs += [source.with_name(part.name) for source in many for part in own if part != target]
     files = written
@@ -119,6 +120,12 @@ def _divided(target: Path, content: Content) -> Mapping[Path, Content]:
     if not isinstance(content, bytes | Mapped):
         return {target: content}
     return projects.divided(target, content) if projects.is_one_of_many(target) else divided(target, content)
+
+
+def _holds(file: Path, data: Content) -> bool:
+    """Whether a file is there and has these bytes."""
+    size = len(data) if isinstance(data, bytes | Mapped) else -1
+    return file.is_file() and file.stat().st_size == size and read_bytes(file) == data
 
 
 def check_targets(

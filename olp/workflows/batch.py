@@ -16,8 +16,8 @@ from olp.core.version import __version__
 from olp.errormodel.known import KnownErrors
 from olp.files.folders import digest_of
 from olp.files.history import History, Record, writing
-from olp.files.sources import in_parcel
-from olp.files.write import make_folder, read_bytes, write_files
+from olp.files.sources import Sources
+from olp.files.write import make_folder, write_files
 from olp.findings.rule import Severity
 from olp.workflows.batch_find import Case, Found, Where, find
 from olp.workflows.batch_pool import Opener, Pool, opened
@@ -354,12 +354,12 @@ class _Plant:
         if isinstance(config, OlpError):
             return replace(refused(config), lasting=False)
         try:
-            data = read_bytes(case.program)
+            files = _program_files(case.program)
         except InputError as error:
             return replace(refused(error), lasting=False)
         output, report, _ = self._targets(case)
         return config, Task(
-            case.program, {in_parcel(case.program): data}, self._options.correct, Path(output).name,
+            case.program, files, self._options.correct, Path(output).name,
             Path(report).name if report else "", self._options.plots, self._options.page,
         )  # fmt: skip
 
@@ -373,6 +373,13 @@ class _Plant:
             except OlpError as error:
                 self._configs[key] = error
         return self._configs[key]
+
+
+def _program_files(program: str) -> Files:
+    """The bytes of a program, and those of the files beside it that decide what belongs to it."""
+    sources = Sources()
+    sources.source(program).load()
+    return sources.parcel()
 
 
 def _exit_code(findings: Sequence[Mapping[str, Any]], fail_on: str) -> int:

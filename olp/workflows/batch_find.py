@@ -6,15 +6,18 @@ import fnmatch
 import os
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path, PurePath
 
 from olp.compensation.stamp import find_stamp
 from olp.core.errors import InputError, UsageError
+from olp.core.projects import files_of, is_one_of_many
 from olp.core.values import dataclass
 from olp.errormodel.known import KnownErrors
 from olp.files.config import beside
 from olp.files.folders import files_below, from_root, identity, inside
+from olp.files.sources import Sources
 from olp.files.toml_text import read_toml
 from olp.files.write import is_page, read_bytes
 from olp.program.registry import ending_of, folder_endings
@@ -96,8 +99,33 @@ def find(where: Where) -> Found:
             cases.append(Case(str(file), where.machine, where.job, root.place(file)))
     if not (cases or where.may_be_empty):
         _refuse_empty(where, skipped)
+    cases, others = _whole_programs(cases)
+    skipped += others
     done = sorted(_apart(cases), key=lambda case: case.output)
     return Found(tuple(done), tuple(skipped), tuple(file for _, file in files))
+
+
+def _whole_programs(cases: Sequence[Case]) -> tuple[list[Case], list[Skipped]]:
+    """The cases without those of files that are read with another one, which has most of them."""
+    sources = Sources()
+    read_with: dict[str, str] = {}
+    files: dict[int, list[Path]] = {}
+    for k, case in enumerate(cases):
+        path = Path(case.program)
+        if not case.problem and is_one_of_many(path):
+            with suppress(InputError):
+                files[k] = files_of(path, sources)
+    kept: set[int] = set()
+    for k in sorted(files, key=lambda k: (-len(files[k]), cases[k].program)):
+        if identity(cases[k].program) not in read_with:
+            kept.add(k)
+            read_with |= {identity(file): cases[k].program for file in files[k][1:]}
+    skipped = [
+        Skipped(cases[k].program, f"it is read with {read_with[identity(cases[k].program)]}")
+        for k in files
+        if k not in kept
+    ]
+    return [case for k, case in enumerate(cases) if k in kept or k not in files], skipped
 
 
 def looked(where: Where) -> list[Path]:

@@ -162,7 +162,7 @@ class RobotMoves:
         elif straight and not known:
             self.remark("told", line, _BEGINS_IN_RUN)
         line_kind = known and not swings
-        held = line_kind and not chord and (whole or target.rest != self._rest)
+        held = not chord and (whole or (line_kind and target.rest != self._rest))
         flag = Flag.WHOLE if held else Flag(0)
         kind = Kind.LINE if line_kind else Kind.RAPID
         self.moves.put(

@@ -81,7 +81,7 @@ DMIS = Signs(
     shared=_POINTS_BY_SLASH,
 )
 RAPID = Signs(
-    ("mod", "modx", "prg", "sysx"),
+    ("mod", "modx", "prg", "sysx", "pgf"),
     own=pattern(
         rb"(?im)^[ \t]*(?:%%%\s*VERSION|MODULE[ \t]+\w+[ \t]*(?:\(|\r?$)|"
         # not the types of Sinumerik's own PROC

@@ -128,15 +128,17 @@ REFUSED = {
     "MoveL p,v100,fine,tool0\\WObj:=lost;": "lost",
     "MoveL p,v100,fine,still;": "stands still",
     "MoveL p,v100,fine,tool0\\WObj:=held;": "moves",
-    "MoveL p,v100\\T:=2,fine,tool0;": "T",
     "MoveC p,p,v100,fine,tool0;": "where this arc begins is not stated",
     "MoveL p,v100,fine,tool0;MoveC p,p,v100,fine,tool0;": "lie on a line",
     "MoveL p,v100,fine,tool0;MoveC p,v100,fine,tool0;": "expected via point",
     "CirPathMode\\CirPointOri;MoveL p,v1,fine,tool0;MoveC p,p,v1,fine,tool0;": "CirPathMode.CirPointOri",
-    "MoveCDO p,p,v100,fine,tool0,do1,1;": "MOVECDO",
-    "SearchL x,p,p,v100,tool0;": "SEARCHL",
+    "SearchL x,p,p,v100,tool0;": "p gets another value in line 6",
+    "MoveL\\ID:=10,p,v100,fine,tool0;": "another robot moves at the same time",
+    "ArcL p,v100,s1,w1,fine,tool0\\Track:=t1;": "a sensor leads the robot",
+    "SpotL p,v100,fine,tool0;": "expected target, speed, data of the process, data of the process, tool",
+    "NutL p,v100,n1,fine,tool0;": "application package",
     "PDispSet frame1;": "PDISPSET",
-    "IF x=1 MoveL p,v100,fine,tool0;": "IF without THEN",
+    "IF x=1 PDispOn p,tool0;": "IF without THEN",
     "MoveL p,v100,fine,tool0": "semicolon",
     "MoveL [[0,0,0],[1,1,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;": "quaternion",
 }
@@ -190,3 +192,52 @@ def test_behind_moves_that_may_not_run_only_the_end_is_corrected(bent: Path) -> 
     assert lines[second + 2] == "IF x=1 THEN"
     assert lines[second + 5].startswith("MoveL")
     assert not lines[second + 5].startswith("MoveL [[-60.0"), "the last move is split"
+
+
+#: moves as plain ones, and as those of a process or a signal: same numbers, and data that stay
+PROCESSES = [
+    (r"MoveL (.*?), v100,z10,(.*?);", r"ArcL \1, v100,seam1,weld1\\Weave:=wv1,z10,\2;"),
+    (r"MoveL (.*?), v100,z10,(.*?);", r"ArcL \1, v100,seam1,weld1,wv1,z10,\2;"),
+    (r"MoveL (.*?), v100,z10,(.*?);", r"DispL \1, v100,bead1,z10,\2;"),
+    (r"MoveL (.*?), v100,z10,(.*?);", r"PaintL \1, v100,z10,\2;"),
+    (r"MoveL (.*?), v100,z10,(.*?);", r"CapL \1, v100,c1,ws1,wv1,z10,\2;"),
+    (r"MoveL (.*?), v100,z10,(.*?);", r"ArcMoveL \1, v100,z10,\2;"),
+    (r"MoveLSync (.*?), v100,z10,(.*?),\"none\";", r"TriggL \1, v100,trig1\\T2:=trig2,z10,\2;"),
+    (r"MoveLSync (.*?), v100,z10,(.*?),\"none\";", r"ArcLStart \1, v100,seam1,weld1\\Weave:=w,z10,\2;"),
+    (r"MoveLSync (.*?), v100,z10,(.*?),\"none\";", r"SpotL \1, v100,gun1,spot1,\2;"),
+    (r"MoveLSync (.*?), v100,z10,(.*?),\"none\";", r"MoveL \1, v100\\T:=3,z10,\2;"),
+    (r"MoveJSync (.*?), v100,z10,(.*?),\"none\";", r"SpotJ \1, v100,gun1,spot1,\2;"),
+]
+
+
+@pytest.mark.parametrize(("plain", "process"), PROCESSES)
+def test_moves_of_processes_are_corrected_as_plain_ones(bent: Path, plain: str, process: str) -> None:
+    move = plain.split()[0]
+    sync = ',"none"' if move.endswith("Sync") else ""
+    text = HEAD + f"CONST robtarget p:=[[20,30,-5],{TAIL};\nPROC main()\n"
+    targets = (f"[[-50,10,0],{TAIL}", "Offs(p,5,6,7)", "p")
+    text += "".join(f"  {move} {target}, v100,z10,grip\\WObj:=part{sync};\n" for target in targets)
+    text += MACHINE_TAIL.decode()
+    as_process, count = re.subn(plain, process, text)
+    assert count == len(targets)
+    wanted = olp.correct(text.encode(), bent).data.decode()
+    written = olp.correct(as_process.encode(), bent).data.decode()
+    again = re.sub(r"v100,z0,grip", "v100,z10,grip", wanted)
+    ours = re.sub(r",z0,grip", ",z10,grip", written)
+    skip = re.compile(r"! olp-corrected.*")
+    assert skip.sub("", re.sub(plain, process, again)) == skip.sub("", ours)
+    assert written != as_process
+
+
+def test_a_move_in_a_short_if_is_one_move(bent: Path) -> None:
+    """Parts of it would run in any case."""
+    text = (
+        HEAD
+        + f"CONST robtarget p:=[[-300,0,0],{TAIL};\nCONST robtarget q:=[[300,50,0],{TAIL};\nPROC main()\n"
+    )
+    text += "  MoveL p,v100,fine,grip\\WObj:=part;\n  IF di1=1 MoveL q,v100,fine,grip\\WObj:=part;\n"
+    text += "  MoveL p,v100,fine,grip\\WObj:=part;\n"
+    done = olp.correct(text.encode() + MACHINE_TAIL, bent)
+    assert done.data.count(b"MoveL") == 3
+    assert rb"IF di1=1 MoveL q,v100" in done.data
+    assert b"q:=[[300,50,0]" not in done.data

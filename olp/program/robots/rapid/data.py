@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
+from typing import NamedTuple
 
 from olp.core.errors import ProgramError
 from olp.core.patterns import pattern
+from olp.core.projects import place_of
 from olp.core.values import dataclass
 from olp.program.robots.moves import DecidedInRun, RobotMoves
 from olp.program.robots.poses import Pose
@@ -28,11 +30,34 @@ _SPEED = pattern(rb"\[\s*" + NUMBER + rb"\s*,.*\]\s*")
 _FIRST_SPEED = pattern(rb"(?i)v(\d+)")
 
 
+class Scope(NamedTuple):
+    """A routine of a module by its name in capitals, "" for the module itself; modules by their order."""
+
+    module: int
+    routine: str
+
+    def next_module(self) -> Scope:
+        return Scope(self.module + 1, "")
+
+    def of(self, routine: str) -> Scope:
+        """A routine of the same module."""
+        return Scope(self.module, routine)
+
+
+#: Before the first module.
+NO_MODULE = Scope(0, "")
+#: What all modules see.
+_GLOBAL = Scope(-1, "")
+
+
 @dataclass(frozen=True, slots=True)
 class Data:
-    """Declared data: where, its kind and its type in capitals, and the bytes of its value, None without."""
+    """Declared data: where, its kind and its type in capitals, and the bytes of its value, None without.
+    Other modules do not see one that is `local`, nor one of a routine."""
 
     statement: Statement
+    scope: Scope
+    local: bool
     kind: bytes
     type: bytes
     array: bool
@@ -40,17 +65,18 @@ class Data:
 
 
 class Declared:
-    """All data of a text by routine ("" for those of modules) and name in capitals. `assigned` are the lines
-    where a name gets another value, and `parameters` the names by routine that callers give values to."""
+    """All data of a text by scope and name in capitals, and `parameters`: the names by routine that callers
+    give values to."""
 
     def __init__(self, data: bytes, moves: RobotMoves) -> None:
         self.data, self.moves = data, moves
-        self._data: dict[tuple[str, str], list[Data]] = {}
-        self.assigned: dict[str, int] = {}
-        self.parameters: dict[str, list[str]] = {}
+        self._data: dict[tuple[Scope, str], list[Data]] = {}
+        #: by name: the modules in which it may get another value, each with the line
+        self._given: dict[str, dict[int, int]] = {}
+        self.parameters: dict[Scope, list[str]] = {}
         self._targets: dict[tuple[int, int], int] = {}
 
-    def declare(self, statement: Statement, routine: str) -> bool:
+    def declare(self, statement: Statement, scope: Scope) -> bool:
         """Whether a statement declares data, which are kept."""
         match = _DECLARED.fullmatch(statement.text)
         if match is None:
@@ -58,22 +84,56 @@ class Declared:
         start = statement.begin
         value = None if match[5] is None else (start + match.start(5), start + match.end(5))
         name = match[3].decode("latin-1").upper()
-        found = Data(statement, match[1].upper(), match[2].upper(), match[4] is not None, value)
-        self._data.setdefault((routine, name), []).append(found)
+        local = bool(scope.routine) or match[0][:5].upper() == b"LOCAL"
+        found = Data(
+            statement, scope, local, match[1].upper(), match[2].upper(), match[4] is not None, value
+        )  # fmt: skip
+        self._data.setdefault((scope, name), []).append(found)
+        if not local:
+            self._data.setdefault((_GLOBAL, name), []).append(found)
         return True
 
-    def find(self, name: str, kind: bytes, routine: str, line: int) -> Data | None:
+    def give(self, name: str, scope: Scope, line: int) -> None:
+        """A name, in capitals, may get another value."""
+        self._given.setdefault(name, {}).setdefault(scope.module, line)
+
+    def _seen(self, name: str, scope: Scope) -> list[Data]:
+        """The data that a name means in a routine; empty where the text declares none."""
+        for place in (scope, scope.of(""), _GLOBAL):
+            data = self._data.get((place, name))
+            if data is not None:
+                return data
+        return []
+
+    def _changed(self, name: str, data: Data) -> int | None:
+        """The line where data get another value, None where nothing gives them one."""
+        for module, line in self._given.get(name, {}).items():
+            own = module == data.scope.module
+            if own or (not data.local and (Scope(module, ""), name) not in self._data):
+                return line
+        return None
+
+    def _line(self, line: int) -> str:
+        """A line in words, with its file where the text holds several."""
+        file, own = place_of(self.data, line)
+        return f"line {own} of {file}" if file else f"line {own}"
+
+    def _place(self, data: Data) -> str:
+        return self._line(data.statement.line)
+
+    def find(self, name: str, kind: bytes, routine: Scope, line: int) -> Data | None:
         """The data of a name and a type, None where the text declares none. Raises ProgramError where a move
         cannot rely on its value."""
         key = name.upper()
         if key in self.parameters.get(routine, ()):
             raise DecidedInRun(f"the caller gives {name}", line=line, code="OLP533")
-        data = self._data.get((routine, key)) or self._data.get(("", key))
-        if data is None:
+        data = self._seen(key, routine)
+        if not data:
             return None
-        if len({None if d.value is None else self.data[slice(*d.value)] for d in data}) > 1:
+        values = {None if d.value is None else self.data[slice(*d.value)] for d in data}
+        if len(values) > 1 or len({d.scope for d in data}) > 1:
             raise ProgramError(
-                f"{name} is declared twice, in lines {data[0].statement.line} and {data[1].statement.line}; "
+                f"{name} is declared twice, in {self._place(data[0])} and {self._place(data[1])}; "
                 "give each its own name",
                 line=line,
                 code="OLP533",
@@ -84,16 +144,17 @@ class Declared:
                 line=line,
                 code="OLP533",
             )
-        if key in self.assigned:
+        changed = self._changed(key, data[0])
+        if changed is not None:
             raise DecidedInRun(
-                f"{name} gets another value in line {self.assigned[key]}, so its value here depends on the "
+                f"{name} gets another value in {self._line(changed)}, so its value here depends on the "
                 "run; state it once, with its numbers",
                 line=line,
                 code="OLP533",
             )
         return data[0]
 
-    def target(self, name: str, index: int, routine: str, line: int) -> int:
+    def target(self, name: str, index: int, routine: Scope, line: int) -> int:
         """The place of a declared target. Raises ProgramError where the text does not state it."""
         data = self.find(name, b"ROBTARGET", routine, line)
         if data is None or data.value is None:
@@ -109,7 +170,7 @@ class Declared:
         match = self._element(data, ROBTARGET, index)
         if match is None:
             raise DecidedInRun(
-                f"the target {name} is not stated with its numbers in line {data.statement.line}",
+                f"the target {name} is not stated with its numbers in {self._place(data)}",
                 line=line,
                 code="OLP533",
             )
@@ -134,7 +195,7 @@ class Declared:
         whole = len(matches) == 1 and index == 0 and matches[0].span() == data.value
         return matches[0] if whole else None
 
-    def joints(self, name: str, index: int, routine: str, line: int) -> int | None:
+    def joints(self, name: str, index: int, routine: Scope, line: int) -> int | None:
         """The place of declared joint values; None where this text does not state them, or they change."""
         try:
             data = self.find(name, b"JOINTTARGET", routine, line)
@@ -152,7 +213,7 @@ class Declared:
             )  # fmt: skip
         return self._targets[key]
 
-    def tool(self, name: str, routine: str, line: int) -> Pose | None:
+    def tool(self, name: str, routine: Scope, line: int) -> Pose | None:
         """The frame of a declared tool."""
         if name.lower() == "tool0":
             return Pose()
@@ -161,20 +222,20 @@ class Declared:
             return None
         return tool_of(self.data[slice(*data.value)], name, data.statement.line)
 
-    def frame(self, name: str, routine: str, line: int) -> Pose | None:
+    def frame(self, name: str, routine: Scope, line: int) -> Pose | None:
         """The pose of a declared work object."""
         data = self.find(name, b"WOBJDATA", routine, line)
         if data is None or data.value is None:
             return None
         return frame_of(self.data[slice(*data.value)], name, data.statement.line)
 
-    def speed(self, text: bytes, routine: str, line: int) -> float:
+    def speed(self, text: bytes, routine: Scope, line: int) -> float:
         """A speed in mm/s, NaN where the text does not state it."""
         match = _SPEED.fullmatch(text)
         if match is None:
             name = text.decode("latin-1")
-            data = self._data.get((routine, name.upper())) or self._data.get(("", name.upper()))
-            if data is not None and data[0].value is not None and name.upper() not in self.assigned:
+            data = self._seen(name.upper(), routine)
+            if data and data[0].value is not None and self._changed(name.upper(), data[0]) is None:
                 match = _SPEED.fullmatch(self.data[slice(*data[0].value)])
         first = _FIRST_SPEED.fullmatch(text)
         if match is None:

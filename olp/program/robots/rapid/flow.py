@@ -2,29 +2,34 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
+from dataclasses import replace
 
 from olp.core.patterns import pattern
 from olp.core.values import dataclass
 from olp.program.dialect import Support
+from olp.program.robots.rapid.forms import FORMS
 from olp.program.robots.rapid.table import TABLE
 from olp.program.robots.rapid.text import Statement
 
 _ROUTINE = pattern(rb"(?i)(?:LOCAL\s+|TASK\s+)?(PROC|FUNC|TRAP|RECORD)\s+(?:\w+\s+)?(\w+)")
 _PROC = pattern(rb"(?i)(?:LOCAL\s+)?(?:PROC|TRAP)\s+(\w+)")
 _PARAMETER = pattern(rb"(\w+)\s*(?:\{[^}]*\}\s*)?(?=[,|)])")
-_WORD = pattern(rb"\s*([A-Za-z]\w*)")
+_WORD = pattern(rb"\s*(?<!\w)([A-Za-z]\w*)")
 _SHORT_IF = pattern(rb"(?is)\s*IF\b")
 _HARMLESS_TAIL = pattern(
     rb"(?is).*[\s)](?:GOTO\s+\w+|RETURN\b.*|EXIT|EXITCYCLE|STOP|BREAK|(?:Set|Reset|Wait|TPWrite|Incr|Decr|"
     rb"SetDO|SetGO|SetAO|WaitTime)\b.*|[\w.{}]+\s*:=.*)"
 )
 _ASSIGNED = pattern(rb"(?<![\\\w.}])([A-Za-z]\w*)\s*(?:\{[^}]*\})?(?:\.\w+)*\s*:=")
+#: Names that stand alone as arguments.
+_MENTIONED = pattern(rb"(?:^|[\s,(])([A-Za-z]\w*)\s*(?=,|$)")
+#: The second argument of a search: where it writes what it has found.
+_FOUND = pattern(rb"\A[^,]*(?:,\s*\\[^,]*)*,\s*([A-Za-z]\w*)")
 _AREA = pattern(rb"(?i)\s*SingArea\b[^\\]*\\\s*(Wrist|LockAxis4)")
 _ARC_MODE = pattern(rb"(?i)\s*CirPathMode\b[^\\]*\\\s*(CirPointOri|Wrist\w*)")
 #: What a short IF must not hold.
-_MOVES = pattern(rb"(?i)\b(?:Move|Trigg|Search|Arc|PDisp|EOffs)\w*\b")
+_MOVES = pattern(rb"(?i)(?<!GOTO )\b(?:Move|Trigg|Search|Arc|PDisp|EOffs)\w*\b")
 
 
 def routine_of(statement: Statement) -> str:
@@ -64,7 +69,17 @@ def arc_mode_of(statement: Statement) -> str:
 
 def may_move(text: bytes) -> bool:
     """Whether a short IF holds an instruction that moves."""
-    return _MOVES.search(text) is not None
+    return _MOVES.search(b" ".join(text.split())) is not None
+
+
+def inner_move(statement: Statement) -> Statement | None:
+    """The move in a short IF, None where that holds none."""
+    for match in _WORD.finditer(statement.text):
+        word = match[1].upper()
+        if word in FORMS or word == b"MOVEABSJ":
+            begin = statement.begin + match.start(1)
+            return replace(statement, begin=begin, text=statement.text[match.start(1) :])
+    return None
 
 
 def calls(text: bytes) -> bool:
@@ -77,9 +92,23 @@ def is_assignment(statement: Statement) -> bool:
     return match is not None
 
 
-def assigned_in(statement: Statement) -> list[str]:
-    """The names that get another value in a statement, in capitals."""
-    return [name.decode("latin-1").upper() for name in _ASSIGNED.findall(statement.text)]
+def given_in(statement: Statement) -> list[str]:
+    """The names that may get another value in a statement, in capitals: those that it assigns, and what it
+    gives to a routine or an instruction. A move changes no data but the point that a search has found."""
+    text = statement.text
+    word = word_of(statement)
+    inner = inner_move(statement) if is_short_if(statement) else None
+    if inner is not None:
+        return given_in(inner)
+    if is_assignment(statement):
+        names = _ASSIGNED.findall(text)
+    elif word in FORMS:
+        names = _FOUND.findall(text) if FORMS[word].stopped else []
+    elif word.startswith(b"MOVE"):
+        names = []
+    else:
+        names = [*_ASSIGNED.findall(text), *_MENTIONED.findall(text.partition(b" ")[2])]
+    return [name.decode("latin-1").upper() for name in names]
 
 
 @dataclass(slots=True)
@@ -119,11 +148,3 @@ def moving_routines(statements: Sequence[Statement]) -> tuple[set[str], set[str]
         if not more:
             return moving, set(routines)
         moving |= more
-
-
-def mentioned(text: bytes) -> list[str]:
-    """Names that stand alone as arguments, in capitals."""
-    return [
-        name.decode("latin-1").upper()
-        for name in re.findall(rb"(?:^|[\s,(])([A-Za-z]\w*)\s*(?=,|$)", text.partition(b" ")[2])
-    ]

@@ -14,15 +14,29 @@ from olp.program.robots.frames import Located, Tool
 from olp.program.robots.moves import DecidedInRun, RobotMoves, take_all
 from olp.program.robots.poses import NO_TURN, inverted, multiplied, of_zyx, rotated
 from olp.program.robots.rapid import flow
-from olp.program.robots.rapid.data import Declared
-from olp.program.robots.rapid.table import SIGNALLED, TABLE
+from olp.program.robots.rapid.data import NO_MODULE, Declared, Scope
+from olp.program.robots.rapid.forms import FORMS, Form
+from olp.program.robots.rapid.table import TABLE
 from olp.program.robots.rapid.text import Lines, Statement, statements
 from olp.program.robots.rapid.values import JOINTTARGET, ROBTARGET, joints_of, target_of
 from olp.program.robots.rapid.words import Words, moved, name_of, words_of
 from olp.program.robots.targets import NOWHERE, Span, Use
 
-#: Words of moves that are read, in capitals.
-_KNOWN = frozenset((b"V", b"Z", b"INPOS", b"CONC", b"TLOAD", b"NOEOFFS"))
+#: Words of moves that are read, in capitals; those of processes and signals change no path.
+_KNOWN = frozenset(
+    (b"V", b"T", b"Z", b"INPOS", b"CONC", b"TLOAD", b"NOEOFFS", b"ON", b"OFF", b"WEAVE", b"SEAMNAME",
+     b"RETRACT", b"NOCONC", b"QUICK", b"OPENHLIFT", b"CLOSEHLIFT", b"T2", b"T3", b"T4", b"T5", b"T6", b"T7",
+     b"T8", b"TRIGGDATA1", b"TRIGGDATA2", b"TRIGGDATA3", b"DODATA", b"AODATA", b"GODATA", b"DISP", b"ONDIST",
+     b"OFFDIST", b"MOVESTARTTIMER", b"TIME")
+)  # fmt: skip
+#: Words that belong to the whole of a move, which is not split.
+_PATHS = frozenset((b"CONC", b"T", b"ON", b"OFF", b"ONDIST", b"OFFDIST", b"MOVESTARTTIMER"))
+#: Words of moves whose path is decided while the robot moves.
+_LEFT = {
+    b"ID": "another robot moves at the same time",
+    b"CORR": "a sensor leads the robot along this move",
+    b"TRACK": "a sensor leads the robot along this move",
+}
 #: What ends a routine, or a record, behind END.
 _ROUTINES = frozenset((b"PROC", b"FUNC", b"TRAP", b"RECORD"))
 _NOT_READ = "OLP512"
@@ -45,11 +59,11 @@ class _Reader:
         self.data = data
         self.moves = RobotMoves(data, setup, "wobj0")
         self.declared = Declared(data, self.moves)
-        self.routine = ""
+        self.routine = NO_MODULE
         #: of open blocks: whether it is a loop, and the moves before it
         self.blocks: list[tuple[bool, int]] = []
-        self.tools: dict[tuple[str, str], Tool] = {}
-        self.frames: dict[tuple[str, str], Located] = {}
+        self.tools: dict[tuple[Scope, str], Tool] = {}
+        self.frames: dict[tuple[Scope, str], Located] = {}
         self.refusals: list[ProgramError] = []
         #: whether straight moves, and others, take any posture that is near
         self.free = [False, False]
@@ -72,10 +86,12 @@ class _Reader:
 
     def _declare(self, every: list[Statement]) -> list[Statement]:
         """Keep the data, and what changes them; returns the other statements."""
-        routine, inside, rest = "", False, []
+        routine, inside, rest = NO_MODULE, False, []
         for statement in every:
+            if statement.block == "module":
+                routine = routine.next_module()
             if statement.block == "routine":
-                routine = flow.routine_of(statement)
+                routine = routine.of(flow.routine_of(statement))
                 self.declared.parameters[routine] = flow.parameters_of(statement)
                 inside = statement.text.upper().split()[-2:-1] == [b"RECORD"]
             elif statement.block == "end":
@@ -83,15 +99,12 @@ class _Reader:
             if inside and statement.block != "routine":
                 continue
             if statement.block == "end" and statement.text.upper()[3:] in _ROUTINES:
-                routine = ""
+                routine = routine.of("")
             if not statement.block and self.declared.declare(statement, routine):
                 continue
-            if not statement.block and not flow.word_of(statement).startswith(b"MOVE"):
-                for name in flow.assigned_in(statement):
-                    self.declared.assigned.setdefault(name, statement.line)
-                if not flow.is_assignment(statement):
-                    for name in flow.mentioned(statement.text):
-                        self.declared.assigned.setdefault(name, statement.line)
+            if not statement.block:
+                for name in flow.given_in(statement):
+                    self.declared.give(name, routine, statement.line)
             rest.append(statement)
         return rest
 
@@ -104,21 +117,21 @@ class _Reader:
         if not statement.text.strip():
             return
         word = flow.word_of(statement)
-        if word in (b"MOVEL", b"MOVEJ"):
-            self._move(statement, word)
-        elif word in SIGNALLED:
-            self._move(statement, word, signal=SIGNALLED[word])
-        elif word == b"MOVEC":
-            self._arc(statement)
-        elif word == b"MOVEABSJ":
-            self._loop_begins()
-            self.moves.joint_move(statement.line, lambda: self._joints(statement))
+        if word in FORMS or word == b"MOVEABSJ":
+            self._any_move(statement, word)
         elif flow.is_short_if(statement):
             self._short_if(statement)
         elif flow.is_assignment(statement):
             return
         else:
             self._instruction(statement, word)
+
+    def _any_move(self, statement: Statement, word: bytes, *, whole: bool = False) -> None:
+        if word in FORMS:
+            self._move(statement, word, FORMS[word], whole=whole)
+        else:
+            self._loop_begins()
+            self.moves.joint_move(statement.line, lambda: self._joints(statement))
 
     def _instruction(self, statement: Statement, word: bytes) -> None:
         row = TABLE.get(word)
@@ -151,23 +164,30 @@ class _Reader:
         self._unknown()
 
     def _short_if(self, statement: Statement) -> None:
-        if flow.may_move(statement.text):
+        move = flow.inner_move(statement)
+        if move is not None:
+            # parts of it would stand before the IF
+            self._any_move(move, flow.word_of(move), whole=True)
+            self._unknown()
+        elif flow.may_move(statement.text):
             raise ProgramError(
-                "a move in an IF without THEN is not read; write IF, THEN and ENDIF",
+                "this IF without THEN is not read; write IF, THEN and ENDIF",
                 line=statement.line,
                 code=_NOT_READ,
             )
-        if flow.calls(statement.text):
+        elif flow.calls(statement.text):
             self.area = self.any_area
             self._unknown()
 
     def _block(self, statement: Statement) -> None:
         """Where the flow of the program parts and meets."""
         block, self.area = statement.block, self.any_area
-        if block in ("routine", "label"):
+        if block in ("routine", "label", "module"):
             self._unknown()
-            if block == "routine":
-                self.routine, self.blocks = flow.routine_of(statement), []
+            if block == "module":
+                self.routine = self.routine.next_module()
+            if block != "label":
+                self.routine, self.blocks = self.routine.of(flow.routine_of(statement)), []
         elif block in ("if", "loop", "test"):
             self.blocks.append((block == "loop", self.moves.count))
         elif block in ("elseif", "case", "part"):
@@ -182,7 +202,7 @@ class _Reader:
                 if self.blocks.pop()[1] != self.moves.count:
                     self._unknown()
             elif what in _ROUTINES:
-                self.routine, self.blocks = "", []
+                self.routine, self.blocks = self.routine.of(""), []
                 self._unknown()
 
     def _unknown(self) -> None:
@@ -195,47 +215,45 @@ class _Reader:
 
     # -- moves ---------------------------------------------------------------------------------------
 
-    def _move(self, statement: Statement, word: bytes, *, signal: int = 0) -> None:
-        """A move. One with so many arguments of a `signal`, which belongs to its end, is never split."""
-        straight = word.startswith(b"MOVEL")
-        words = words_of(statement, statement.begin + len(word), self.data, signal=signal)
-        self._refuse_words(statement, words, led=straight)
-        line, use = statement.line, self._use(statement, words.target, words.zone, straight=straight)
-        tool, frame = self._tool(words.tool, line), self._frame(words.frame, line)
-        feed = self.declared.speed(words.others.get(b"V", words.speed), self.routine, line)
-        self._loop_begins()
-        whole = signal > 0 or b"CONC" in words.others
-        self.moves.move(line, use, frame, tool, feed, straight=straight, whole=whole)
-
-    def _arc(self, statement: Statement) -> None:
-        words = words_of(statement, statement.begin + len(b"MoveC"), self.data, arc=True)
-        self._refuse_words(statement, words, led=True)
+    def _move(self, statement: Statement, word: bytes, form: Form, *, whole: bool) -> None:
+        """A move, or an arc."""
+        words = words_of(statement, statement.begin + len(word), self.data, form)
         line = statement.line
-        if self.arc_mode[0]:
+        self._refuse_words(statement, words, form)
+        if form.arc and self.arc_mode[0]:
             raise ProgramError(
                 f"how the tool turns on this arc is set by CirPathMode\\{self.arc_mode[0]} in line "
                 f"{self.arc_mode[1]}, which is not read; program CirPathMode\\ObjectFrame, or straight moves",
                 line=line,
                 code=_NOT_READ,
             )
-        via, end = (
-            self._use(statement, span, words.zone, straight=True) for span in (words.via, words.target)
-        )
+        spans = (words.via, words.target) if form.arc else (words.target,)
+        uses = [self._use(statement, span, words.zone, straight=form.straight) for span in spans]
         tool, frame = self._tool(words.tool, line), self._frame(words.frame, line)
-        feed = self.declared.speed(words.others.get(b"V", words.speed), self.routine, line)
+        stated = b"" if b"T" in words.others else words.others.get(b"V", words.speed)
+        feed = self.declared.speed(stated, self.routine, line)
         self._loop_begins()
-        self.moves.arc(line, via, end, frame, tool, feed, whole=b"CONC" in words.others)
+        whole |= form.whole or not _PATHS.isdisjoint(words.others)
+        if form.arc:
+            self.moves.arc(line, uses[0], uses[1], frame, tool, feed, whole=whole)
+        else:
+            self.moves.move(line, uses[0], frame, tool, feed, straight=form.straight, whole=whole)
+        if form.stopped:
+            self._unknown()
 
-    def _refuse_words(self, statement: Statement, words: Words, *, led: bool) -> None:
-        """Raises ProgramError for words of a move that are not read, and where the tool of one that is `led`
-        along a line or an arc may not turn evenly."""
+    def _refuse_words(self, statement: Statement, words: Words, form: Form) -> None:
+        """Raises ProgramError for words of a move that are not read, and where the tool of one along a line
+        or an arc may not turn evenly. The words of a search say what it looks for."""
         line = statement.line
+        for name, why in _LEFT.items():
+            if name in words.others:
+                raise DecidedInRun(f"{why} (\\{name.decode()})", line=line, code="OLP533")
         unread = [name for name in words.others if name not in _KNOWN]
-        if unread:
+        if unread and not form.stopped:
             raise ProgramError(
                 f"a move with \\{unread[0].decode('latin-1')} is not read", line=line, code=_NOT_READ
             )
-        if led and self.moves.arm and self.area[0]:
+        if form.straight and self.moves.arm and self.area[0]:
             what = f"SingArea\\{self.area[0]} in line {self.area[1]}"
             raise ProgramError(
                 f"the tool may not turn evenly on this move ({what}), which is not read on arms; program "
@@ -285,7 +303,7 @@ class _Reader:
 
     def _joints(self, statement: Statement) -> Use | None:
         """How a move uses joint values; None where the text does not state them."""
-        words = words_of(statement, statement.begin + len(b"MoveAbsJ"), self.data)
+        words = words_of(statement, statement.begin + len(b"MoveAbsJ"), self.data, FORMS[b"MOVEJ"])
         span, line, named = words.target, statement.line, NOWHERE
         match = JOINTTARGET.match(self.data, *span)
         if match is not None and not self.data[match.end() : span[1]].strip():

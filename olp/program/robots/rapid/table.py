@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from olp.program.dialect import Support
+from olp.program.robots.rapid.forms import FORMS
 
 _C = Support.CORRECTED
 _R = Support.READ
@@ -16,21 +17,14 @@ _MOVED = "moves all later targets by an amount that the text does not state; pro
 _PATH = "changes the path while the robot moves; take it into a program of its own"
 _APPLICATION = "is a move of an application package with words of its own; post it as MoveL"
 _AXES = "moves single axes past the targets"
-_OTHER = "is a second move at the same time; correct each robot by itself"
-
-#: Moves with an action at their end, and how many arguments that has.
-SIGNALLED: Mapping[bytes, int] = {
-    b"MOVELDO": 2,
-    b"MOVEJDO": 2,
-    b"MOVELAO": 2,
-    b"MOVEJAO": 2,
-    b"MOVELGO": 2,
-    b"MOVEJGO": 2,
-    b"MOVELSYNC": 1,
-    b"MOVEJSYNC": 1,
-}
+_OTHER = "robots move at the same time: moves with an ID are left as written"
+_WHOLE = "as MoveL, MoveJ or MoveC; never split, as an action belongs to its end or its way"
+_PROCESS = "as MoveL, MoveJ or MoveC; the data of its process stay as they are"
 
 TABLE: Mapping[bytes, tuple[Support, str]] = {
+    **dict.fromkeys((word for word, form in FORMS.items() if form.whole), (_C, _WHOLE)),
+    **dict.fromkeys((word for word, form in FORMS.items() if not form.whole), (_C, _PROCESS)),
+    **dict.fromkeys((b"SEARCHL", b"SEARCHC"), (_C, "corrected at its end; where it stops is not known")),
     b"MOVEL": (_C, "a straight move to a target with numbers, Offs or RelTool of one, or an array element"),
     b"MOVEJ": (_C, "corrected at its end; the path of the joints is not judged"),
     b"MOVEABSJ": (_C, "corrected on arms; else kept, and the position behind it is unknown"),
@@ -49,27 +43,18 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"IF": (_R, "behind moves that may not run, the next one is corrected at its end"),
     b"CALL": (_R, "behind a routine that may move, the next move is corrected at its end"),
     b"ASSIGNMENT": (_X, "moves to what it changes, or with such a tool or frame, are left as written"),
-    **dict.fromkeys(
-        (b"TRIGGC", b"MOVECDO", b"MOVECAO", b"MOVECGO", b"MOVECSYNC"),
-        (_NO, "is an arc with an action; post MoveC and the action by themselves"),
-    ),
-    **dict.fromkeys(
-        (b"TRIGGL", b"TRIGGJ", b"TRIGGLIOS", b"TRIGGABSJ"),
-        (_NO, "is a move with an action on the way, which is not read yet"),
-    ),
-    **dict.fromkeys((b"SEARCHL", b"SEARCHC", b"SEARCHJ", b"CONTACTL"), (_NO, _COMPUTED)),
+    **dict.fromkeys((b"SEARCHJ", b"CONTACTL"), (_NO, _COMPUTED)),
+    b"TRIGGABSJ": (_NO, "is a move with an action on the way, which is not read yet"),
     **dict.fromkeys((b"PDISPON", b"PDISPSET"), (_NO, _MOVED)),
     **dict.fromkeys((b"EOFFSON", b"EOFFSSET"), (_NO, "moves an arm along its track; elsewhere it is kept")),
-    **dict.fromkeys(SIGNALLED, (_C, "as MoveL or MoveJ; never split, as the action belongs to its end")),
     **dict.fromkeys(
         (b"CORRCON", b"CORRWRITE", b"EGMACTPOSE", b"EGMACTJOINT", b"EGMACTMOVE", b"EGMRUNPOSE",
          b"EGMRUNJOINT", b"EGMMOVEL", b"EGMMOVEC", b"EGMSTREAMSTART", b"CONTACTL"),
         (_NO, _PATH),
     ),
     **dict.fromkeys(
-        (b"ARCL", b"ARCC", b"ARCLSTART", b"ARCLEND", b"ARCCSTART", b"ARCCEND", b"ARCMOVEJ", b"CAPL", b"CAPC",
-         b"DISPL", b"DISPC", b"PAINTL", b"PAINTC", b"SPOTL", b"SPOTJ", b"SPOTML", b"SPOTMJ", b"NUTL",
-         b"NUTJ", b"LASERL", b"LASERC", b"CALIBL", b"CALIBJ", b"CALIBC", b"FCPRESSL", b"FCPRESSC"),
+        (b"SPOTML", b"SPOTMJ", b"NUTL", b"NUTJ", b"LASERL", b"LASERC", b"CALIBL", b"CALIBJ", b"CALIBC",
+         b"FCPRESSL", b"FCPRESSC"),
         (_NO, _APPLICATION),
     ),
     **dict.fromkeys(
@@ -78,7 +63,7 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
         (_NO, _AXES),
     ),
     **dict.fromkeys((b"SETDATAVAL", b"SETALLDATAVAL"), (_NO, "gives another value to data that it names")),
-    **dict.fromkeys((b"SYNCMOVEON", b"SYNCMOVERESUME"), (_NO, _OTHER)),
+    **dict.fromkeys((b"SYNCMOVEON", b"SYNCMOVERESUME"), (_R, _OTHER)),
     **dict.fromkeys(
         (b"CONFL", b"CONFJ", b"VELSET", b"ACCSET", b"WORLDACCLIM", b"PATHACCLIM", b"PATHRESOL",
          b"MOTIONSUP", b"GRIPLOAD", b"MECHUNITLOAD", b"ACTUNIT", b"DEACTUNIT", b"SPEEDREFRESH",

@@ -10,8 +10,11 @@ from olp.core.errors import ProgramError
 from olp.core.patterns import pattern
 from olp.core.values import dataclass
 
-#: Blanks and comments between statements, and the header of a file.
-_ASIDE = pattern(rb"(?:\s+|!@?[^\r\n]*|%%%[^%]*%%%)*")
+#: Blanks and comments between statements, the header of a file, and what names the modules of a program.
+_ASIDE = pattern(
+    rb"(?:\s+|!@?[^\r\n]*|%%%[^%]*%%%|\xef\xbb\xbf|<\?[^<>]*>|"
+    rb"<(?i:program)[^<>]*>[^<>]*(?:<(?i:module)>[^<>]*</(?i:module)>[^<>]*)*</(?i:program)>)*"
+)
 #: Statements that end without a semicolon.
 _BLOCK = pattern(
     rb"(?i)(?:(?P<routine>(?:LOCAL\s+|TASK\s+)?(?:PROC|FUNC|TRAP|RECORD)\b)[^\r\n!;]*|"
@@ -54,7 +57,7 @@ class Lines:
 
 def statements(data: bytes, lines: Lines) -> Iterator[Statement]:
     """All statements in order. Raises ProgramError with the line of one that has no end."""
-    place = 3 if data[:3] == b"\xef\xbb\xbf" else 0
+    place = 0
     while True:
         aside = _ASIDE.match(data, place)
         assert aside is not None

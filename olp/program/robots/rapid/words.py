@@ -7,6 +7,7 @@ import re
 from olp.core.errors import ProgramError
 from olp.core.patterns import pattern
 from olp.core.values import dataclass
+from olp.program.robots.rapid.forms import Form
 from olp.program.robots.rapid.text import Statement
 from olp.program.robots.rapid.values import NUMBER
 from olp.program.robots.targets import NOWHERE, Span
@@ -15,8 +16,19 @@ _NESTED = rb"\[(?:[^\[\]]|\[(?:[^\[\]]|\[[^\[\]]*\])*\])*\]"
 #: What may stand in parentheses, which hold further ones.
 _INNER = rb"[^()\[\]]|" + _NESTED
 _PARENS = rb"\((?:" + _INNER + rb"|\((?:" + _INNER + rb"|\((?:" + _INNER + rb")*\))*\))*\)"
+_BRACES = rb"\{(?:[^{}]|\{[^{}]*\})*\}"
 #: An argument up to its comma, brackets whole.
-_ARGUMENT = pattern(rb"(?:[^,\[\](){}]|" + _NESTED + rb"|" + _PARENS + rb"|\{[^{}]*\})+")
+_ARGUMENT = pattern(rb"(?:[^,\[\](){}]|" + _NESTED + rb"|" + _PARENS + rb"|" + _BRACES + rb")+")
+#: What the letters of a layout are.
+_ARGUMENTS = {
+    "c": "via point",
+    "t": "target",
+    "v": "speed",
+    "z": "zone",
+    "w": "tool",
+    ".": "data of the process",
+}
+_PLAIN_LAYOUTS = ("tvzw",)
 #: A move without further words.
 _PLAIN = pattern(
     rb"(?i)\s*(\w+|\[[^;()\\]*?\]\s*\])\s*,\s*(\w+)\s*,\s*(\w+)\s*,\s*(\w+)\s*(?:\\WObj\s*:=\s*(\w+)\s*)?"
@@ -46,10 +58,9 @@ class Words:
     others: dict[bytes, bytes]
 
 
-def words_of(statement: Statement, begin: int, data: bytes, *, arc: bool = False, signal: int = 0) -> Words:
-    """The words of a move whose name ends at byte `begin`, those of an `arc` with a via point. At the
-    end may stand arguments of a `signal`. Raises ProgramError where it has others."""
-    plain = None if arc or signal else _PLAIN.fullmatch(data, begin, statement.end)
+def words_of(statement: Statement, begin: int, data: bytes, form: Form) -> Words:
+    """The words of a move whose name ends at byte `begin`. Raises ProgramError where it has others."""
+    plain = _PLAIN.fullmatch(data, begin, statement.end) if form.layouts == _PLAIN_LAYOUTS else None
     if plain is not None:
         tool, frame = plain[4].decode("latin-1"), (plain[5] or b"wobj0").decode("latin-1")
         return Words(NOWHERE, plain.span(1), plain[2], plain.span(3), tool, frame, {})
@@ -67,17 +78,20 @@ def words_of(statement: Statement, begin: int, data: bytes, *, arc: bool = False
             pieces.append(((start, start + len(main.strip())), main.strip()))
             stop = match.end() if mark < len(text) else pieces[-1][0][1]
             pieces[-1] = ((start, stop), main.strip())
-    if len(pieces) != 4 + arc + signal:
-        expected = "via point, target" if arc else "target"
+    layout = form.layout(len(pieces))
+    if layout is None:
+        expected = " or ".join(", ".join(_ARGUMENTS[letter] for letter in layout) for layout in form.layouts)
         raise ProgramError(
-            f"the move has {len(pieces)} arguments; expected {expected}, speed, zone and tool",
+            f"the move has {len(pieces)} arguments; expected {expected}",
             line=statement.line,
             code="OLP516",
         )
-    *through, target, speed, zone, tool = pieces[: 4 + arc]
-    first = (target[0][0], target[0][0] + len(target[1]))
+    own = {letter: piece for letter, piece in zip(layout, pieces, strict=True) if letter != "."}
+    (start, _), target = own["t"]
+    via = own["c"][0] if "c" in own else NOWHERE
+    zone = own["z"][0] if "z" in own else NOWHERE
     return Words(
-        through[0][0] if through else NOWHERE, first, speed[1], zone[0], tool[1].decode("latin-1"),
+        via, (start, start + len(target)), own["v"][1], zone, own["w"][1].decode("latin-1"),
         others.pop(b"WOBJ", b"wobj0").decode("latin-1"), others,
     )  # fmt: skip
 
