@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -110,3 +111,20 @@ def test_the_tool_of_the_job_holds_without_set_tcp(tmp_path: Path) -> None:
     path = machines.shift_machine(tmp_path, (100.0, 0.0, 0.0), recipe=recipe)
     text = olp.correct(b"def a():\n  movej(p[0.1,0.2,-0.3,0,0,0])\nend\n", path).data
     assert b"movej(p[0.09990000,0.2,-0.3,0,0,0])" in text
+
+
+def test_a_statement_goes_on_until_its_brackets_are_closed(bent: Path) -> None:
+    """Also over comments; its bytes stay as they are."""
+    lines = (
+        "def a():\n  set_tcp(p[0,0,0,0,0,0])\n  while (not get_x() and  # (a\n    n > 0):\n    sleep(0.1)\n"
+        "  end\n  movel(p[0.2,0.25,-0.1,0,0,0],1.2,0.1)\n  movel(p[0.3,\r\n   0.25,-0.1,0,0,0], # first\n"
+        " 1.2,0.1)\nend\n"
+    )
+    done = olp.correct(lines.encode(), bent).data.decode()
+    plain = lines.replace("\r\n   ", "").replace(" # first\n 1.2", "1.2").replace("  # (a\n    n", " n")
+    wanted = olp.correct(plain.encode(), bent).data.decode()
+    numbers = re.findall(r"0\.\d{6,}|-0\.\d{6,}", done)
+    assert numbers == re.findall(r"0\.\d{6,}|-0\.\d{6,}", wanted)
+    assert len(numbers) >= 6
+    assert "], # first\n 1.2" in done
+    assert "and  # (a\n    n > 0):" in done

@@ -21,6 +21,7 @@ from olp.program.robots.moves import NAN, DecidedInRun, RobotMoves, take_all
 from olp.program.robots.poses import Pose, of_vector
 from olp.program.robots.targets import NOWHERE, Span, Use
 from olp.program.robots.urscript.table import TABLE
+from olp.program.robots.urscript.text import Line, lines_of
 from olp.program.text.numbers import LARGEST
 
 _N = rb"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*"
@@ -52,13 +53,6 @@ _MM_PER_M = 1000.0
 
 
 @dataclass(frozen=True, slots=True)
-class _Line:
-    line: int
-    begin: int
-    text: bytes
-
-
-@dataclass(frozen=True, slots=True)
 class _Named:
     """A pose or joint values with a name: the line, the bytes of the value and of the whole statement."""
 
@@ -73,17 +67,6 @@ def read(
     """Read a whole program. Raises ProgramError with the line of the first statement that cannot be read
     correctly."""
     return _Reader(data, setup).run(dialect, options or Options(), words=words)
-
-
-def _lines(data: bytes) -> Iterator[_Line]:
-    """The lines of a text without their comments."""
-    place = 3 if data[:3] == b"\xef\xbb\xbf" else 0
-    for number, raw in enumerate(data[place:].splitlines(keepends=True), 1):
-        text = raw.rstrip(b"\r\n")
-        bare = re.sub(rb"\"[^\"]*\"|'[^']*'", lambda hit: b"_" * len(hit[0]), text)
-        text = bare[: bare.find(b"#")] if b"#" in bare else bare
-        yield _Line(number, place, text.rstrip())
-        place += len(raw)
 
 
 class _Reader:
@@ -107,20 +90,20 @@ class _Reader:
         self.refusals: list[ProgramError] = []
 
     def run(self, dialect: Dialect, options: Options, *, words: bool) -> Program:
-        every = [line for line in _lines(self.data) if line.text.strip()]
+        every = [line for line in lines_of(self.data) if line.text.strip()]
         self._assignments(every)
         take_all(every, self._statement, self.moves, self.refusals, options)
         self.moves.hold_mentioned(self._statements(every))
         return self.moves.program(dialect, words=words)
 
-    def _statements(self, every: list[_Line]) -> Iterator[Span]:
+    def _statements(self, every: list[Line]) -> Iterator[Span]:
         """The bytes of all lines but those that state poses with a name."""
         stated = {named.line for named in self.poses.values()}
         for line in every:
             if line.line not in stated:
                 yield line.begin, line.begin + len(line.text)
 
-    def _assignments(self, every: list[_Line]) -> None:
+    def _assignments(self, every: list[Line]) -> None:
         """Keep poses with a name, and the names that get several values."""
         for line in every:
             match, element = _ASSIGNED.fullmatch(line.text), _ELEMENT.match(line.text)
@@ -141,7 +124,7 @@ class _Reader:
 
     # -- statements ----------------------------------------------------------------------------------
 
-    def _statement(self, line: _Line) -> None:
+    def _statement(self, line: Line) -> None:
         text = line.text.strip()
         if text[:1] == b"$":
             # the number of a node in the tree of the pendant
@@ -175,7 +158,7 @@ class _Reader:
         elif row is None or row[0] is not Support.UNCHANGED:
             self._call(line)
 
-    def _value(self, line: _Line, value: bytes) -> None:
+    def _value(self, line: Line, value: bytes) -> None:
         """A value that a function gives may come with moves."""
         for name in _WORDS.findall(value):
             row = TABLE.get(name)
@@ -184,7 +167,7 @@ class _Reader:
         if b"(" in value and not re.match(rb"\s*(?:pose_\w+|get_\w+|read_\w+|d2r|r2d|floor|sqrt)\(", value):
             self._call(line)
 
-    def _call(self, line: _Line) -> None:
+    def _call(self, line: Line) -> None:
         name = _WORDS.search(line.text)
         if name is None or name[0] not in self.defined:
             shown = line.text.strip()[:40].decode("latin-1")
@@ -206,7 +189,7 @@ class _Reader:
                 self.moves.known = False
                 self.function += 1
 
-    def _set_tcp(self, line: _Line, call: re.Match[bytes]) -> None:
+    def _set_tcp(self, line: Line, call: re.Match[bytes]) -> None:
         """The tool from here on. Raises ProgramError where it depends on the run, or is not stated."""
         if any(kind not in (b"def",) for kind, _ in self.blocks) or len(self.blocks) > 1:
             raise ProgramError(
@@ -224,7 +207,7 @@ class _Reader:
 
     # -- moves ---------------------------------------------------------------------------------------
 
-    def _move(self, line: _Line, call: re.Match[bytes]) -> None:
+    def _move(self, line: Line, call: re.Match[bytes]) -> None:
         lead = len(line.text) - len(line.text.lstrip())
         start = line.begin + lead
         place = start + call.start(2)
@@ -265,7 +248,7 @@ class _Reader:
             whole=timed,
         )  # fmt: skip
 
-    def _near(self, line: _Line, target: bytes, given: list[bytes]) -> tuple[float, ...]:
+    def _near(self, line: Line, target: bytes, given: list[bytes]) -> tuple[float, ...]:
         """The joints in degrees near which a pose is reached; none where the robot is. Raises ProgramError
         where an arm needs them, and the text does not state them."""
         match = _NEAR.fullmatch(given[0]) if given else None
@@ -276,7 +259,7 @@ class _Reader:
             raise self._computed(line, target)
         return () if stated is None else tuple(degrees(float(group)) for group in stated.groups())
 
-    def _reached_near(self, line: _Line, index: int, near: tuple[float, ...]) -> None:
+    def _reached_near(self, line: Line, index: int, near: tuple[float, ...]) -> None:
         """Raises ProgramError where a pose is reached near other joints by another move."""
         if self.moves.arm and self.near.setdefault(index, near) != near:
             raise ProgramError(
@@ -286,7 +269,7 @@ class _Reader:
             )
         self.moves.targets[index] = replace(self.moves.targets[index], config=near)
 
-    def _arc(self, line: _Line, call: re.Match[bytes]) -> None:
+    def _arc(self, line: Line, call: re.Match[bytes]) -> None:
         """An arc through a pose to another one."""
         start = line.begin + len(line.text) - len(line.text.lstrip())
         place = start + call.start(2)
@@ -322,7 +305,7 @@ class _Reader:
             self.moves.known = False
 
     def _joints(
-        self, line: _Line, begin: int, text: bytes, statement: Span, rest: dict[str, Span]
+        self, line: Line, begin: int, text: bytes, statement: Span, rest: dict[str, Span]
     ) -> Use | None:
         """How a move uses joint values, in rad; None where the text does not state them with numbers."""
         named, blank = self.poses.get(text.strip()), len(text) - len(text.lstrip())
@@ -365,7 +348,7 @@ class _Reader:
             is not None
         )
 
-    def _target(self, line: _Line, begin: int, text: bytes) -> tuple[int, Span, Span, Located]:
+    def _target(self, line: Line, begin: int, text: bytes) -> tuple[int, Span, Span, Located]:
         """The place of a target, its bytes, those of its name, and the frame that it is in."""
         frame, stated = self.moves.frames.world, _TRANSFORMED.fullmatch(text)
         if stated is not None:
@@ -396,7 +379,7 @@ class _Reader:
             )  # fmt: skip
         return self.targets[key], span, NOWHERE if named is None else span, frame
 
-    def _computed(self, line: _Line, text: bytes) -> DecidedInRun:
+    def _computed(self, line: Line, text: bytes) -> DecidedInRun:
         shown = text.strip()[:60].decode("latin-1")
         return DecidedInRun(
             f"the target `{shown}` is computed, or gets several values; program it with its numbers",
@@ -414,7 +397,7 @@ class _Reader:
         x, y, z, *turn = (float(group) for group in match.groups())
         return Pose((x * _MM_PER_M, y * _MM_PER_M, z * _MM_PER_M), of_vector(turn))
 
-    def _tool(self, line: _Line) -> Tool:
+    def _tool(self, line: Line) -> Tool:
         """The tool of a move: that of `set_tcp`, else the one of machine or job."""
         self.moving.add(self.function)
         set_later = self.tool is None and _TCP.search(self.data) is not None
