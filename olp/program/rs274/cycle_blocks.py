@@ -24,8 +24,8 @@ from olp.program.rs274.state import BROKEN_SERIES, KNOWN_BY, NAN, OPEN_RETRACT, 
 from olp.program.rs274.strokes import Drilling, Step, Strokes, strokes
 from olp.program.rs274.turned import Turning
 
-#: Words of a further axis.
-_OTHERS = np.frombuffer(b"ABCUVW", np.uint8)
+#: Kinds of the moves of a hole, and steps that are moves.
+_RAPID, _LINE, _FEED = np.uint8(Kind.RAPID), np.uint8(Kind.LINE), np.uint8(Step.FEED)
 
 
 class CycleBlocks:
@@ -62,7 +62,8 @@ class CycleBlocks:
         self._check_modes(context, run, refused)
         self._begin(context, run, frame, refused)
         drilling = self._drilling(context, run, frame, refused)
-        times = self._times(context, run, refused)
+        counter = self._counter(run)
+        times = self._times(context, run, counter, refused)
         if self._wanting(run):
             refused.all(
                 f"a canned cycle starts where an axis has not been commanded yet; {KNOWN_BY}",
@@ -75,7 +76,8 @@ class CycleBlocks:
         of = np.repeat(np.arange(count), times[:count])
         of = of[: self._affordable(HOLE_STROKES + drilling.pecks[of])] if refused.row else of[:0]
         place = self._places(run, frame, of)
-        made = self._strokes(context, run, drilling.pick(of), place, of) if of.size else None
+        holes = drilling.pick(of)
+        made = self._strokes(context, run, holes, place, of) if of.size else None
         if made is not None:
             self._spend(made, of, refused)
         refused.raise_first()
@@ -83,7 +85,7 @@ class CycleBlocks:
             # zero repeats: the words are kept for the blocks that follow
             self._moves = collector.moves
             return
-        self._put(context, run, frame, drilling.pick(of), place, of, times, made)
+        self._put(context, run, frame, holes, place, of, times, counter, made)
 
     def _wanting(self, run: CycleRun) -> bool:
         """Whether a position is not known and the first block does not state it: in G90 it may state a place
@@ -99,19 +101,16 @@ class CycleBlocks:
         """Refuse modes in which the control makes no cycle."""
         state, code, line = self._state, run.code, run.line
         turning = state.profile.cycles.turning.get(code)
-        other = np.zeros(len(line), np.uint8)
+        name, other = f"the cycle G{code / 10:g}", run.other
         if not state.profile.cycles.other_axes:
-            mine = np.flatnonzero(is_in(run.letter, _OTHERS))[::-1]
-            other[run.owner[mine]] = 255
-            np.minimum.at(other, run.owner[mine], run.letter[mine])
-        name = f"the cycle G{code / 10:g}"
-        refused.where(
-            other > 0,
-            lambda i: ProgramError(
-                f"{name} moves {chr(other[i])} too, which the control refuses; move it in a block of its own",
-                code="OLP518",
-            ),
-        )
+            refused.where(
+                other > 0,
+                lambda i: ProgramError(
+                    f"{name} moves {chr(other[i])} too, which the control refuses; move it in a block of its "
+                    "own",
+                    code="OLP518",
+                ),
+            )
         inverse = np.asarray(context.feed_mode[line] == INVERSE_TIME)
         refused.where(inverse, f"{name} is in inverse time (G93); give G94 before it", "OLP518")
         if state.compensation is not None:
@@ -171,10 +170,11 @@ class CycleBlocks:
         depth = "XYZ"[third]
         self._check_levels(run, depth, refused)
         series = state.series
-        dwell, pointed = run.number("P"), context.chunk.pointed[run.slot["P"]]
-        for bare in (False, True):
-            mine = pointed != bare
-            dwell[mine] = state.profile.dwell_s(dwell[mine], pointed=not bare)
+        dwell = run.number("P")
+        if (run.slot["P"] >= 0).any():
+            bare = state.profile.dwell_s(dwell, pointed=False)
+            pointed = context.chunk.pointed[run.slot["P"]]
+            dwell = np.where(pointed, state.profile.dwell_s(dwell, pointed=True), bare)
         peck = run.number("Q")
         if letter := state.profile.cycles.first_peck:
             peck = np.where(np.isnan(peck), run.number(letter), peck)
@@ -187,7 +187,7 @@ class CycleBlocks:
         )  # fmt: skip
         lacking = [("R", np.isnan(r)), (depth, np.isnan(z))]
         refused.where(
-            np.isnan(r) | np.isnan(z),
+            lacking[0][1] | lacking[1][1],
             lambda i: ProgramError(
                 f"the cycle G{run.code / 10:g} has no "
                 f"{' and no '.join(letter for letter, lacks in lacking if lacks[i])} word",
@@ -225,17 +225,20 @@ class CycleBlocks:
     def _inherited(self, letter: str, given: Array) -> Array:
         """(n,) the numbers of a word, those of the blocks before where a block has none; NaN where none."""
         held = self._state.series.held
-        source = np.maximum.accumulate(np.where(np.isnan(given), -1, np.arange(len(given))))
-        before = held.get(letter)
-        number = np.where(source >= 0, given[source], NAN if before is None else before)
-        if source[-1] >= 0:
-            held[letter] = float(number[-1])
+        before, missing = held.get(letter), np.isnan(given)
+        inherited = NAN if before is None else before
+        if missing.all():
+            return np.full(len(given), inherited)
+        source = np.maximum.accumulate(np.where(missing, -1, np.arange(len(given))))
+        number = np.where(source >= 0, given[source], inherited)
+        held[letter] = float(number[-1])
         return number
 
-    def _times(self, context: Context, run: CycleRun, refused: Refused) -> Index:
+    def _times(self, context: Context, run: CycleRun, counter: Index, refused: Refused) -> Index:
         """(n,) how many holes each block makes: its L word, or K on ISO controls."""
-        slot = self._counter(run)
-        times = np.where(slot >= 0, np.rint(context.value[slot]), 1.0)
+        if counter.max() < 0:
+            return np.ones(len(counter), np.int64)
+        times = np.where(counter >= 0, np.rint(context.value[counter]), 1.0)
         if self._state.profile.cycles.stores:
             first, second, _ = PLANES[run.plane]
             placed = np.maximum(run.slot["XYZ"[first]], run.slot["XYZ"[second]]) >= 0
@@ -256,6 +259,8 @@ class CycleBlocks:
         rules = self._state.profile.cycles
         for letter in reversed(rules.repeat_words):
             counts = run.slot[letter] >= 0
+            if not counts.any():
+                continue
             if rules.first_peck and letter == "K":
                 counts &= run.slot[rules.first_peck] < 0
             slot = np.where(counts, run.slot[letter], slot)
@@ -312,11 +317,11 @@ class CycleBlocks:
 
     def _put(
         self, context: Context, run: CycleRun, frame: int, drilling: Drilling, place: Array, of: Index,
-        times: Index, made: Strokes,
+        times: Index, counter: Index, made: Strokes,
     ) -> None:  # fmt: skip
         """Put the moves and the holes into the collector, and take over the position behind them."""
         collector, line = self._collector, context.chunk.first_line + 1 + run.line
-        moving, point = made.step <= Step.FEED, made.point
+        moving, point = made.step <= _FEED, made.point
         if self._turning is not None:
             point = self._turning.axes(point)
             there = np.zeros((len(place), 3))
@@ -330,7 +335,7 @@ class CycleBlocks:
         last = collector.moves + np.cumsum(moves)
         rest = np.flatnonzero(~moving)
         word = np.stack([run.slot[letter][of] for letter in CHANGED], axis=1)
-        counter = self._counter(run)[of]
+        counter = counter[of]
         ones = np.ones(len(of), np.int32)
         begin = np.cumsum(times) - times
         collector.holes.append(
@@ -358,7 +363,7 @@ class CycleBlocks:
         )
         count = len(hole)
         collector.put_moves(
-            np.where(made.step[moving] == Step.FEED, Kind.LINE, Kind.RAPID).astype(np.uint8),
+            np.where(made.step[moving] == _FEED, _LINE, _RAPID),
             flag[of][hole], line[of][hole], np.full(count, frame), point[moving],
             np.full((count, 3), -1),
         )  # fmt: skip

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import field
 
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Array, Index, Mask
+from olp.core.arrays import Array, Index, Mask, is_in
 from olp.core.errors import ProgramError
 from olp.core.geometry import PLANES
 from olp.core.values import dataclass
@@ -17,6 +18,8 @@ from olp.program.rs274.modes import Context
 from olp.program.rs274.state import NAN
 
 _READ = "XYZRQPLKI"
+#: Words of a further axis.
+_OTHERS = np.frombuffer(b"ABCUVW", np.uint8)
 #: Whether a motion code is that of a cycle; the last entry is for "none yet".
 _CYCLES = np.zeros(1001, bool)
 _CYCLES[list(CYCLES)] = True
@@ -25,14 +28,14 @@ _CYCLES[list(CYCLES)] = True
 @dataclass(frozen=True, slots=True, eq=False)
 class CycleWords:
     """The words of blocks of canned cycles (n,) on lines of a chunk. `slot` leads from a letter to the
-    indices (n,) of its words, -1 where omitted. (w,) `letter` and `owner` are all their words and the block
-    of each. `first` (n + 1,) is where those of each block begin among them."""
+    indices (n,) of its words, -1 where omitted. `other` (n,) is the least letter of a further axis that a
+    block moves, 0 where none. `stated` are numbers (n,) that were asked for, with the numbers of the chunk
+    that they were taken from."""
 
     line: Index
     slot: dict[str, Index]
-    letter: npt.NDArray[np.uint8]
-    owner: Index
-    first: Index
+    other: npt.NDArray[np.uint8]
+    stated: dict[str, tuple[Array, Array]] = field(default_factory=dict)
 
     @staticmethod
     def of(chunk: WordChunk, line: Index) -> CycleWords:
@@ -45,10 +48,23 @@ class CycleWords:
             mine = np.flatnonzero(letter == ord(name))
             slot[name] = np.full(len(line), -1, np.int64)
             slot[name][owner[mine]] = word[mine]
-        return CycleWords(line, slot, letter, owner, first)
+        other = np.zeros(len(line), np.uint8)
+        further = np.flatnonzero(is_in(letter, _OTHERS))
+        other[owner[further]] = 255
+        np.minimum.at(other, owner[further], letter[further])
+        return CycleWords(line, slot, other)
+
+    def numbers(self, letter: str, value: Array) -> Array:
+        """(n,) the number of a word in each block, of the numbers `value` of the chunk; NaN where it has
+        none."""
+        known = self.stated.get(letter)
+        if known is None or known[0] is not value:
+            slot = self.slot[letter]
+            known = self.stated[letter] = (value, np.where(slot >= 0, value[slot], NAN))
+        return known[1]
 
 
-_NO_WORDS = CycleWords(np.zeros(0, np.int64), {}, np.zeros(0, np.uint8), *[np.zeros(0, np.int64)] * 2)
+_NO_WORDS = CycleWords(np.zeros(0, np.int64), {}, np.zeros(0, np.uint8))
 
 
 def runs(context: Context, line: Index) -> tuple[dict[int, int], CycleWords]:
@@ -77,9 +93,8 @@ def runs(context: Context, line: Index) -> tuple[dict[int, int], CycleWords]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CycleRun:
-    """A run: blocks (n,) on lines of a chunk in the same modes. `slot` leads from a letter to the indices
-    (n,) of its words, -1 where omitted; (w,) `letter` and `owner` are all their words and the block of
-    each."""
+    """A run: blocks (n,) on lines of a chunk in the same modes, `some` of those of the `words`. `slot` leads
+    from a letter to the indices (n,) of its words, -1 where omitted."""
 
     line: Index
     code: int
@@ -87,26 +102,29 @@ class CycleRun:
     incremental: bool
     value: Array
     slot: dict[str, Index]
-    letter: npt.NDArray[np.uint8]
-    owner: Index
+    words: CycleWords
+    some: slice
 
     @staticmethod
     def of(context: Context, words: CycleWords, line: Index, value: Array) -> CycleRun:
         """The run on these lines, which are one behind the other among those of the words."""
         first = int(line[0])
         a = int(words.line.searchsorted(first))
-        some = slice(words.first[a], words.first[a + len(line)])
+        some = slice(a, a + len(line))
         return CycleRun(
             line, int(context.motion[first]), PLANE_OF[int(context.plane[first])],
             bool(context.distance[first] == INCREMENTAL), value,
-            {name: slot[a : a + len(line)] for name, slot in words.slot.items()},
-            words.letter[some], words.owner[some] - a,
+            {name: slot[some] for name, slot in words.slot.items()}, words, some,
         )  # fmt: skip
 
     def number(self, letter: str) -> Array:
         """(n,) the number of a word in each block, NaN where it has none."""
-        slot = self.slot[letter]
-        return np.where(slot >= 0, self.value[slot], NAN)
+        return self.words.numbers(letter, self.value)[self.some]
+
+    @property
+    def other(self) -> npt.NDArray[np.uint8]:
+        """(n,) the least letter of a further axis that a block moves, 0 where none."""
+        return self.words.other[self.some]
 
 
 class Refused:
@@ -119,9 +137,9 @@ class Refused:
 
     def where(self, bad: Mask, why: str | Callable[[int], ProgramError], code: str = "") -> None:
         """Refuse blocks (n,) that are `bad`, unless one before them is refused."""
-        rows = np.flatnonzero(bad[: self.row])
-        if rows.size:
-            self.row = int(rows[0])
+        bad = bad[: self.row]
+        if bad.any():
+            self.row = int(bad.argmax())
             self._error = ProgramError(why, code=code) if isinstance(why, str) else why(self.row)
 
     def all(self, why: str, code: str) -> None:

@@ -216,16 +216,19 @@ class OffsetState(State):
 
     def _check_number(self, block: EventBlock, line: int) -> None:
         """Refuse a word that may be the number of a work offset, or belong to another code of its block."""
-        worded, further = self.profile.offset_words, self.profile.further_offsets[0]
-        alone = [code for code in block.events if code in WORK_OFFSETS and code not in worded]
-        if alone and "P" in block.by_letter and _LEAVES_P.issuperset(block.g_codes):
-            raise ProgramError(
-                f"what this control makes of P beside G{alone[0] / 10:g} is not known; a further work offset "
-                f"is {further} P",
-                line=line,
-                code="OLP518",
-            )
+        if "P" in block.by_letter and _LEAVES_P.issuperset(block.g_codes):
+            worded, further = self.profile.offset_words, self.profile.further_offsets[0]
+            alone = [code for code in block.events if code in WORK_OFFSETS and code not in worded]
+            if alone:
+                raise ProgramError(
+                    f"what this control makes of P beside G{alone[0] / 10:g} is not known; a further work "
+                    f"offset is {further} P",
+                    line=line,
+                    code="OLP518",
+                )
         offsets = self.profile.offsets_alone.intersection(block.g_codes)
+        if not offsets:
+            return
         others = [code for code in block.g_codes if code in CYCLES or code in (DWELL, WRITE_OFFSET)]
         for code in offsets:
             letter, name = self.profile.offset_words.get(code, ""), f"G{code / 10:g}"

@@ -393,16 +393,16 @@ class _Reader:
     def _assign(self, context: Context, rows: _Rows, upto: int) -> None:
         """Give the present frame to the rows since the last event."""
         if upto > rows.assigned:
-            line = context.number(int(rows.blocks.line[rows.assigned]))
+            first = rows.blocks.line[rows.assigned]
             if rows.present is None:
-                rows.present = self.state.frame(line)
+                rows.present = self.state.frame(context.number(int(first)))
                 if self.state.frames[rows.present].turn != self.turn:
                     # what is resolved at once has one turn
                     self._resolve(context, rows, rows.assigned)
                     self.turn = self.state.frames[rows.present].turn
             rows.frame[rows.assigned : upto] = rows.present
             if self.state.unit is None:
-                self.collector.remarks.setdefault("unit", (line, "mm"))
+                self.collector.remarks.setdefault("unit", (context.number(int(first)), "mm"))
             rows.assigned = upto
 
     def _resolve(self, context: Context, rows: _Rows, upto: int) -> None:

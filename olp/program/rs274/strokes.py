@@ -37,6 +37,9 @@ class Step(IntEnum):
     RESTORE = 5
 
 
+#: The same as numbers: to read a member of an enumeration takes as long as a step on a short array.
+_RAPID, _FEED, _DWELL = np.uint8(Step.RAPID), np.uint8(Step.FEED), np.uint8(Step.DWELL)
+
 _Recipe = tuple[tuple[Step, str], ...]
 _DRILL: _Recipe = ((Step.FEED, "z"), (Step.RAPID, "clear"))
 _DRILL_DWELL: _Recipe = ((Step.FEED, "z"), (Step.DWELL, "z"), (Step.RAPID, "clear"))
@@ -220,15 +223,16 @@ def strokes(
         np.where(below, r, before), np.where(rises, clear, before), r,
     )  # fmt: skip
     peck = begin[owner] + 3 + width * (np.arange(len(owner)) - (np.cumsum(count) - count)[owner])
-    step[peck], level[peck] = Step.FEED, drilling.level(depth)
-    if full:
-        level[peck + 1] = r[owner]
-    level[peck + width - 1] = drilling.level(depth + drilling.clearance)
+    if peck.size:
+        step[peck], level[peck] = _FEED, drilling.level(depth)
+        if full:
+            level[peck + 1] = r[owner]
+        level[peck + width - 1] = drilling.level(depth + drilling.clearance)
     ends = {"z": z, "r": r, "clear": clear, "home": clear if rules.feeds_home else r}
     for i, (what, where) in enumerate(recipe):
         step[stop - len(recipe) + i], level[stop - len(recipe) + i] = what, ends[where]
     came = np.vstack(([start[first], start[second]], place[:-1]))
-    keep = (step != Step.RAPID) | (level != np.concatenate(([start[third]], level[:-1])))
+    keep = (step != _RAPID) | (level != np.concatenate(([start[third]], level[:-1])))
     keep[begin + 1] |= any_in_row(place != came)
     keep[begin[:1] + 1] |= beside & ~below[:1]
     point = np.empty((len(hole), 3))
@@ -236,7 +240,8 @@ def strokes(
         point[:, axis] = there[hole]
         point[begin, axis] = here
     point[:, third] = level
-    seconds = np.where(step == Step.DWELL, np.nan_to_num(drilling.p)[hole], 0.0)
+    rests = step == _DWELL
+    seconds = np.where(rests, np.nan_to_num(drilling.p)[hole], 0.0) if rests.any() else np.zeros(len(hole))
     return Strokes(hole[keep], step[keep], point[keep], seconds[keep])
 
 
