@@ -172,15 +172,15 @@ def _report(call: Given, result: Correction, options: CorrectOptions, name: str)
 
 def _say(call: Given, result: Correction, outputs: _Outputs, written: Iterable[Path]) -> None:
     """Write to stdout and stderr."""
-    from olp.reports import report
-
     on_stderr = outputs.output == STREAM
     if on_stderr:
         put(in_parts(result.text))
     if outputs.show_diff:
         put(_diff(result, call.setup.machine, on_stderr), err=on_stderr)
     if outputs.as_json:
-        put(report.to_json(result.report))
+        from olp.reports.report import to_json
+
+        put(to_json(result.report))
     elif not outputs.quiet:
         put(result.to_text(), err=on_stderr)
     if not outputs.quiet:

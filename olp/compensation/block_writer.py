@@ -4,6 +4,7 @@ nothing else."""
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -11,7 +12,6 @@ import numpy.typing as npt
 from olp.compensation.block_arcs import arc_edits
 from olp.compensation.called_holes import CalledHoles, joined
 from olp.compensation.digits import AxisRows, part_of
-from olp.compensation.holes import HoleWords
 from olp.compensation.inserted_blocks import block_edits
 from olp.compensation.plan import Plan
 from olp.compensation.rows import Rows
@@ -24,6 +24,9 @@ from olp.core.toolpath import Flag
 from olp.core.turns import Turns
 from olp.program.bands import Band
 from olp.program.text.edits import EditList, Edits
+
+if TYPE_CHECKING:
+    from olp.compensation.holes import HoleWords
 
 #: Moves whose words are not those of their end point.
 _BYPASS = np.uint8(Flag.CYCLE | Flag.CONTROL)
@@ -38,19 +41,24 @@ class BlockWriter(Writer):
     def __init__(self, task: Task) -> None:
         super().__init__(task)
         self._called_holes = CalledHoles()
+        self._hole_words: HoleWords | None = None
 
     def _spans(self) -> list[tuple[int, int]]:
         return joined(self.program.called, self.plan.move, super()._spans())
 
     def add(self, band: Band, plan: Plan, tell: Progress = silent) -> None:
-        self._hole_words = HoleWords(band.program.holes)
+        self._hole_words = None
+        if len(band.program.holes):
+            from olp.compensation.holes import HoleWords
+
+            self._hole_words = HoleWords(band.program.holes)
         self._next_capture = 0
         super().add(band, plan, tell)
 
     def _rewritten(self, rows: Rows, begin: int, end: int) -> bytes | None:
         edits: list[Edits] = []
         columns = self._called_holes.middled(self, rows, self._columns(rows))
-        if len(self.program.holes):
+        if self._hole_words is not None:
             for part in self._hole_words.parts(self, rows, self._turns(rows)):
                 if part.first < part.last:
                     edits += self._hole_words.edits(self, rows, part, columns)

@@ -9,9 +9,7 @@ import hashlib
 import io
 import mmap
 import re
-import shutil
 import sys
-import tempfile
 import weakref
 from collections.abc import Iterator
 from typing import IO, TypeVar
@@ -36,6 +34,9 @@ def unload() -> None:
 
 def room() -> int:
     """The bytes that there is room for in temporary files."""
+    import shutil
+    import tempfile
+
     try:
         return shutil.disk_usage(tempfile.gettempdir()).free
     except OSError:
@@ -138,6 +139,8 @@ class Spool:
     def write(self, data: bytes | memoryview) -> None:
         """Put bytes behind those that are there."""
         if not self._moved and self.size + len(data) >= self._long:
+            import tempfile
+
             self._moved = True
             with contextlib.suppress(OSError), contextlib.ExitStack() as unless:
                 self._move(unless.enter_context(tempfile.TemporaryFile(buffering=0)))

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from olp.core.arrays import Array
+from olp.core.arrays import Array, Index
 from olp.core.interpolation import Interpolant
 from olp.core.values import dataclass
 from olp.errormodel.sources.cyclic import Cyclic
@@ -83,20 +83,24 @@ class Variation:
         return cls(peak, slope, curvature, smooth, np.zeros(_COUNT), np.minimum(slope, 2.0 * peak / LOWER_MM))
 
     @classmethod
-    def of_curve(cls, curve: Interpolant, column: int, cell_mm: float) -> Variation:
-        """Of a column of an interpolant that is resampled in cells of `cell_mm`, whose kinks count too."""
-        y = curve.y[:, column]
-        span = float(y.max() - y.min())
-        slope = float(curve.max_slope()[column])
-        curvature = float(curve.max_curvature()[column])
+    def of_curve(cls, curve: Interpolant, cell_mm: float) -> list[Variation]:
+        """Of each column of an interpolant that is resampled in cells of `cell_mm`, whose kinks count too."""
+        zeros = np.zeros(_COUNT)
+        span = np.ptp(curve.y, axis=0)[:, None]
+        slope, curvature = curve.max_slope()[:, None], curve.max_curvature()[:, None]
         change = np.minimum(slope, span / LOWER_MM)
-        peak = float(np.abs(y).max())
+        peak = np.abs(curve.y).max(axis=0).tolist()
         if curve.kind == "linear":
-            return cls(peak, slope, 0.0, np.zeros(_COUNT), 0.25 * _kink_windows(curve, column), change)
-        resampled = 0.25 * curvature * cell_mm**2
-        smooth = np.minimum(curvature / 8.0 * UPPER_MM**2, 0.25 * UPPER_MM * _smooth_windows(curve, column))
-        smooth = np.minimum(smooth, span) + resampled
-        return cls(peak, slope, curvature, smooth, np.zeros(_COUNT), change)
+            kinks = 0.25 * _kink_windows(curve)
+            bent = [(0.0, zeros, kink) for kink in kinks]
+        else:
+            smooth = np.minimum(curvature / 8.0 * UPPER_MM**2, 0.25 * UPPER_MM * _smooth_windows(curve))
+            smooth = np.minimum(smooth, span) + 0.25 * curvature * cell_mm**2
+            bent = [(float(most), one, zeros) for most, one in zip(curvature[:, 0], smooth, strict=True)]
+        return [
+            cls(peak[k], float(slope[k, 0]), most, one, kink, change[k])
+            for k, (most, one, kink) in enumerate(bent)
+        ]
 
 
 def distinct_bins(ends_mm: Array) -> slice:
@@ -116,30 +120,39 @@ def in_all_bins(values: Array, of: slice) -> Array:
     return np.asarray(values[np.clip(np.arange(_COUNT), of.start, of.stop - 1) - of.start])
 
 
-def _kink_windows(curve: Interpolant, column: int) -> Array:
-    """(bins,) largest sum of |jumps of slope| that a window of a bin's upper length can hold."""
-    jumps = np.abs(np.diff(np.diff(curve.y[:, column]) / np.diff(curve.x)))
+def _kink_windows(curve: Interpolant) -> Array:
+    """(m, bins) largest sum of |jumps of slope| that a window of a bin's upper length can hold."""
+    jumps = np.abs(np.diff(np.diff(curve.y, axis=0) / np.diff(curve.x)[:, None], axis=0))
     if not len(jumps):
-        return np.zeros(_COUNT)
-    kinks_mm, total = curve.x[1:-1], np.concatenate([[0.0], np.cumsum(jumps)])
+        return np.zeros((curve.y.shape[1], _COUNT))
+    kinks_mm, total = curve.x[1:-1], _sums(jumps)
     some = distinct_bins(kinks_mm)
     last = np.searchsorted(kinks_mm, kinks_mm[:, None] + UPPER_MM[some], side="right")
-    return in_all_bins((total[last] - total[:-1, None]).max(axis=0), some)
+    return in_all_bins(_most(total, last), some).T
 
 
-def _smooth_windows(curve: Interpolant, column: int) -> Array:
-    """(bins,) bound of the variation of f' in a window of a bin's upper length.
+def _smooth_windows(curve: Interpolant) -> Array:
+    """(m, bins) bound of the variation of f' in a window of a bin's upper length.
 
     f'' is linear in each piece, so the trapezoid of |f''| over a sub-piece is no less than its integral; a
     window is widened to whole sub-pieces.
     """
-    start, end = (d[:, column] for d in curve.second_derivatives())
-    share = np.arange(_WINDOWS + 1) / _WINDOWS
+    start, end = curve.second_derivatives()
+    share = (np.arange(_WINDOWS + 1) / _WINDOWS)[:, None]
     second = np.abs(start[:, None] + (end - start)[:, None] * share)
     width = np.diff(curve.x)[:, None] / _WINDOWS
-    pieces = (0.5 * width * (second[:, :-1] + second[:, 1:])).ravel()
+    pieces = (0.5 * width[:, None] * (second[:, :-1] + second[:, 1:])).reshape(-1, curve.y.shape[1])
     position_mm = np.concatenate([(curve.x[:-1, None] + width * np.arange(_WINDOWS)).ravel(), curve.x[-1:]])
-    total = np.concatenate([[0.0], np.cumsum(pieces)])
     some = distinct_bins(position_mm)
     ends = np.searchsorted(position_mm, position_mm[1:, None] + UPPER_MM[some], side="left")
-    return in_all_bins((total[np.minimum(ends, len(pieces))] - total[:-1, None]).max(axis=0), some)
+    return in_all_bins(_most(_sums(pieces), np.minimum(ends, len(pieces))), some).T
+
+
+def _sums(pieces: Array) -> Array:
+    """(n + 1, m) sums of the pieces (n, m) before each, and of all."""
+    return np.concatenate([np.zeros((1, pieces.shape[1])), np.cumsum(pieces, axis=0)])
+
+
+def _most(total: Array, end: Index) -> Array:
+    """(bins, m) the largest sum from piece i up to `end` (n, bins), of sums `total` (n + 1, m)."""
+    return np.stack([(column[end] - column[:-1, None]).max(axis=0) for column in total.T], axis=-1)

@@ -89,11 +89,12 @@ class AxisComponents:
         columns = AxisColumns(calibration, axis, skip)
         mean, half = columns.slots("mean"), columns.slots("half")
         table = columns.table()
+        bounds = columns.variations(table)
         low, high = (float(face) for face in calibration.box_mm[j])
         waves = [wave for acting in cyclic for wave in acting.variations(low, high)]
         variation, varies = [], []
         for d in range(len(DIRECTIONS)):
-            parts = [columns.variation(slot, table) for slot in (mean[d], half[d]) if slot is not None]
+            parts = [bounds[slot] for slot in (mean[d], half[d]) if slot is not None]
             repeating = [wave for i, wave in waves if i == d]
             varies.append(bool(repeating) or any(p.varies for p in parts))
             variation.append(Variation.total([*parts, *repeating]) if parts or repeating else None)
@@ -194,9 +195,9 @@ class AxisColumns:
 
         return dense_table(self.knots(), evaluate, curvature.tolist(), tolerance)
 
-    def variation(self, slot: int, table: DenseTable) -> Variation:
-        which, column = self.of_column[slot]
-        return Variation.of_curve(self.interpolants[which], column, table.step)
+    def variations(self, table: DenseTable) -> list[Variation]:
+        """Bounds of each column."""
+        return [each for f in self.interpolants for each in Variation.of_curve(f, table.step)]
 
 
 def _plus(a: Column | None, b: Column) -> Column:

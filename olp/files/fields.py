@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime
-import json
 import math
 import re
 from collections.abc import Iterable
@@ -25,6 +24,8 @@ ISO_NAMES = COMPONENTS + SQUARENESS
 #: The one sign convention of calibration files.
 SIGN = "actual-minus-commanded"
 
+#: Work offsets that most machines have.
+_USUAL = frozenset(f"G{number}" for number in range(54, 60))
 _TOOL_NUMBER = "(0|[1-9][0-9]*)"
 # Frames of other languages may have any name, but no program would ever select a misspelt G-code.
 _G_OFFSET = pattern(r"G(5[4-9](\.\d)?|1[12]\d|154)( ?P\d{1,3})?|G15 ?H\d{1,3}|G50[05-9]|G5[1-9]\d")
@@ -33,6 +34,8 @@ _G_OFFSET = pattern(r"G(5[4-9](\.\d)?|1[12]\d|154)( ?P\d{1,3})?|G15 ?H\d{1,3}|G5
 def shown(value: object) -> str:
     """A value as TOML, cut where it is long."""
     if isinstance(value, str):
+        import json
+
         text = json.dumps(value, ensure_ascii=False)
     elif isinstance(value, bool):
         text = str(value).lower()
@@ -122,7 +125,7 @@ def _compliance(value: object) -> float | tuple[float, float, float]:
 
 
 def _offset_name(name: str) -> str:
-    if re.match(r"[Gg]\d", name) and not _G_OFFSET.fullmatch(name):
+    if name not in _USUAL and re.match(r"[Gg]\d", name) and not _G_OFFSET.fullmatch(name):
         raise refusal('is not a work offset; expected G54 to G59, "G59.1" (in quotes), "G54.1 P1" ...')
     return name
 

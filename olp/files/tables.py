@@ -127,23 +127,44 @@ def _column_problem(number: int, name: str, axis: str) -> str | None:
 
 
 def _number(name: str, cell: str) -> tuple[float, str | None]:
-    number, wrong = _stated(name, cell)
+    kind = _kind_of(name)
+    try:
+        # by its digits, as `shifted`
+        number = float(cell + kind.power) if "_" not in cell else math.nan
+    except ValueError:
+        number = math.nan
+    if kind.allows(number):
+        return number, None
+    number, wrong = _stated(name, cell, kind.unit)
     return number, f"{name} {wrong}" if wrong else None
 
 
+@dataclass(frozen=True, slots=True)
+class _Kind:
+    """The unit in which the name of a column ends, its power of ten as numbers have it, and whether a finite
+    number is all that a cell may be."""
+
+    unit: str
+    power: str
+    any_number: bool
+
+    def allows(self, number: float) -> bool:
+        return self.any_number and math.isfinite(number)
+
+
 @cache
-def _unit_of(name: str) -> tuple[str, int]:
-    """The unit in which the name of a column ends, and its power of ten."""
+def _kind_of(name: str) -> _Kind:
     unit = "/".join(name.split("_")[-2:]) if name.endswith("_kg") else name.rpartition("_")[2]
-    return unit, _POWER.get(unit, 0)
+    power = _POWER.get(unit, 0)
+    any_number = name != "direction" and not name.startswith("sigma_")
+    return _Kind(unit, f"e{power}" if power else "", any_number)
 
 
-def _stated(name: str, cell: str) -> tuple[float, str | None]:
-    unit, power = _unit_of(name)
+def _stated(name: str, cell: str, unit: str) -> tuple[float, str | None]:
     if not cell:
         return 0.0, f"is empty; expected a number in {unit}"
     try:
-        number = shifted(cell, power) if "_" not in cell else math.nan
+        number = shifted(cell, _POWER.get(unit, 0)) if "_" not in cell else math.nan
     except ValueError:
         if re.fullmatch(r"[-+]?\d*,\d+", cell):
             return 0.0, f"= {cell} has a decimal comma; expected a decimal point"

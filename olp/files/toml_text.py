@@ -7,7 +7,8 @@ import datetime
 import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
-from functools import cached_property
+from functools import cached_property, lru_cache
+from typing import Any
 
 from olp.core.errors import ConfigError
 from olp.core.patterns import pattern
@@ -54,13 +55,26 @@ def read_toml(data: bytes, file: str) -> tuple[dict[str, object], Mapping[Path, 
             f"line {line}: a key has more than {_DEEPEST} parts; correct it", file=file, line=line
         )
     try:
-        values = tomllib.loads(text)
+        values = _own(_parsed(text))
     except tomllib.TOMLDecodeError as error:
         raise _syntax_error(str(error), text, file) from None
     except (ValueError, RecursionError):
         problem = "has a number with thousands of digits, or brackets nested too deeply; correct it"
         raise ConfigError(problem, file=file) from None
     return values, _KeyLines(text)
+
+
+@lru_cache(maxsize=8)
+def _parsed(text: str) -> dict[str, object]:
+    """The values of a text: several readers look at one file, and a run parses it once."""
+    return tomllib.loads(text)
+
+
+def _own(value: Any) -> Any:
+    """A value whose tables and lists are the caller's own."""
+    if isinstance(value, dict):
+        return {key: _own(inner) for key, inner in value.items()}
+    return [_own(inner) for inner in value] if isinstance(value, list) else value
 
 
 class _KeyLines(Mapping[Path, int]):

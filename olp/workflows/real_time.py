@@ -9,13 +9,14 @@ from olp.core.errors import AlreadyCorrected, ConfigError, ProgramError
 from olp.core.machine import Machine
 from olp.core.spool import Text
 from olp.errormodel.calibration import Calibration
-from olp.files.real_time import refuse_other
 from olp.files.sources import Source
 
 
 def corrected(machine: Machine, calibration: Calibration, digest: str) -> Calibration:
     """What remains of a calibration whose errors the control takes off in every servo cycle: its box. Raises
     ConfigError where the control does so by another calibration."""
+    from olp.files.real_time import refuse_other
+
     assert machine.real_time is not None
     refuse_other(machine.real_time, digest, machine.calibration)
     return Calibration(

@@ -202,7 +202,7 @@ def test_a_polyline_bends_at_its_kinks() -> None:
     """A quarter of the jumps that one window of the length can hold, ends included, times the length."""
     other = np.zeros(6)
     curve = Interpolant.through(KNOTS, np.stack([other, VALUES], axis=1), "linear")
-    bent = Variation.of_curve(curve, 1, 0.5)
+    bent = Variation.of_curve(curve, 0.5)[1]
     # from -5 to 14.6: the largest value, the range, and the steepest piece
     assert (bent.peak, bent.slope, bent.curvature) == pytest.approx((14.6, 0.3, 0.0))
     assert not bent.smooth.any() and bent.smooth.shape == (320,)
@@ -218,9 +218,9 @@ def test_a_polyline_bends_at_its_kinks() -> None:
     held_by = {14.9: 0.4, 15.1: 0.7, 63.0: 0.7, 65.0: 0.7, 79.0: 1.0, 81.0: 1.0}
     for length, jump in held_by.items():
         assert at(bent.kinks, length) == pytest.approx(0.25 * jump), length
-    straight = Variation.of_curve(curve, 0, 0.5)
+    straight = Variation.of_curve(curve, 0.5)[0]
     assert not straight.varies and not straight.kinks.any() and straight.peak == 0.0
-    line = Variation.of_curve(Interpolant.through(KNOTS[:2], VALUES[:2, None], "linear"), 0, 0.5)
+    line = Variation.of_curve(Interpolant.through(KNOTS[:2], VALUES[:2, None], "linear"), 0.5)[0]
     assert line.varies and not line.kinks.any() and line.kinks.shape == (320,)
 
 
@@ -229,7 +229,7 @@ def test_a_smooth_curve_bends_by_its_curvature_its_change_of_slope_or_its_range(
     the square of the cell of the table."""
     spline, cell = PchipInterpolator(KNOTS, VALUES), 0.5
     curve = Interpolant.through(KNOTS, np.stack([np.zeros(6), VALUES], axis=1), "pchip")
-    bent = Variation.of_curve(curve, 1, cell)
+    bent = Variation.of_curve(curve, cell)[1]
     dense = np.linspace(0.0, 100.0, 200001)
     assert bent.peak == pytest.approx(14.6)
     assert bent.slope == pytest.approx(np.abs(spline(dense, 1)).max(), rel=1e-6)
@@ -256,7 +256,7 @@ def test_a_smooth_curve_bends_by_its_curvature_its_change_of_slope_or_its_range(
 
 def test_bounds_of_a_sum_add() -> None:
     one = Variation.of_cyclic(Cyclic("EXX", 10.0, 3e-3))
-    two = Variation.of_curve(Interpolant.through(KNOTS, VALUES[:, None], "linear"), 0, 0.5)
+    two = Variation.of_curve(Interpolant.through(KNOTS, VALUES[:, None], "linear"), 0.5)[0]
     both = Variation.total([one, two, two])
     for name in ("peak", "slope", "curvature", "smooth", "kinks", "change"):
         expected = getattr(one, name) + 2.0 * getattr(two, name)

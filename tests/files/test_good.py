@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import datetime
 import shutil
+import tomllib
+from decimal import Decimal
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -161,6 +164,35 @@ def test_columns_of_a_table_with_directions_are_their_mean() -> None:
     np.testing.assert_allclose(table.columns["EXX"], [0.003, 0.002], rtol=1e-12)
     assert table.forward is not None
     np.testing.assert_allclose(table.forward["EXX"], [0.002, 0.006], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "cell", ["0.1", "-12.305", "+7", ".5", "5.", "1e-1", "2.5E3", "-0.0", "1234567.890123456789"]
+)
+def test_a_cell_is_the_double_of_its_digits_in_base_units(cell: str) -> None:
+    table = parse_curves(
+        f"X_mm,EXX_um,sigma_EXX_um,EBX_urad\n0,{cell},0.3,{cell}\n5,0,1e0,0\n".encode(), "x.csv"
+    )
+    written = Decimal(cell)
+    assert table.columns["EXX"][0] == float(written.scaleb(-3))
+    assert table.columns["EBX"][0] == float(written.scaleb(-6))
+    assert table.sigma["EXX"].tolist() == [3e-4, 1e-3]
+
+
+def test_a_text_is_parsed_once_and_each_reader_has_values_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    data, loads = b"a = [1, [2]]\n[b]\nc = 0.25 # once\n", tomllib.loads
+    parsed: list[str] = []
+
+    def counted(text: str) -> dict[str, Any]:
+        parsed.append(text)
+        return loads(text)
+
+    monkeypatch.setattr(tomllib, "loads", counted)
+    first: dict[str, Any] = read_toml(data, "a.toml")[0]
+    first["b"].clear()
+    first["a"][1].clear()
+    assert read_toml(data, "b.toml")[0] == {"a": [1, [2]], "b": {"c": 0.25}}
+    assert len(parsed) == 1
 
 
 def test_toml_may_come_from_a_windows_editor(tmp_path: Path) -> None:

@@ -96,12 +96,13 @@ NEEDLESS = (
     "olp.program.pointlist.reader", "olp.program.statement_rows", "olp.program.verbatim",
     "olp.program.rs274.flatten.run", "olp.program.rs274.flatten.unroll", "olp.reports.document",
     "olp.reports.plots",
-    "fractions", "decimal", "traceback",
+    "fractions", "decimal", "traceback", "random", "shutil", "tempfile",
     "olp.compensation.programmed", "olp.compensation.tool_path_text", "olp.core.quantities",
-    "olp.errormodel.grid_errors", "olp.program.contours.tool_path", "olp.program.sinumerik",
+    "olp.errormodel.grid_errors", "olp.files.real_time", "olp.program.contours.tool_path",
+    "olp.program.sinumerik",
 )  # fmt: skip
 #: modules of `olp` that it imports, at most
-MOST_MODULES = 232
+MOST_MODULES = 231
 #: prints what compiles a pattern while it is imported
 WATCHED = """import re, sys
 compiled = re.compile

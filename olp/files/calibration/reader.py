@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path as FilePath
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -32,13 +31,14 @@ V = TypeVar("V")
 def files_beside(path: PathLike, read: Reader = read_bytes) -> list[FilePath]:
     """The files that a calibration file names, none where it cannot be read: its loader reports what is
     wrong."""
+    data = read(path)
     try:
-        values = tomllib.loads(read(path).decode("utf-8-sig"))
+        values: Any = read_toml(data, str(path))[0]
         names = [name for source in SOURCES for name in source.named(values)]
         covariance = values.get("covariance", {}).get("file")
         names += [covariance] if covariance else []
         return [FilePath(path).parent / name for name in names]
-    except (ValueError, TypeError, KeyError, AttributeError):
+    except (ConfigError, TypeError, KeyError, AttributeError):
         return []
 
 
