@@ -14,8 +14,12 @@ from olp.core.values import dataclass
 from olp.kinematics.chain import Kinematics
 from olp.kinematics.inverse import LARGEST_TURN_DEG, Solved, inverse
 from olp.kinematics.poses import Poses, rotation_vector, turned
-from olp.kinematics.structure import Structure
+from olp.kinematics.structure import REFERENCE_RADIUS_MM, Structure
 
+#: Below this share of the largest slope a motion of the axes does not move the tip.
+_MOVES = 1e-7
+#: Below this a motion of the axes turns the tool too little: a tilt of 1 mrad costs 20 mrad of an axis.
+_MOVES_WELL = 0.05
 #: A linear axis beyond its travel by less than this is on its end: mm or deg.
 _AT_END = 1e-9
 
@@ -73,6 +77,29 @@ def left_angles(structure: Structure, left_rad: Array, target: Poses) -> Array:
     if not structure.symmetric_tool:
         return np.asarray(np.linalg.norm(left_rad, axis=1))
     return np.asarray(np.linalg.norm(np.cross(left_rad, target.rotation[:, :, 2]), axis=1))
+
+
+def correctable_angles(machine: Kinematics, values: Array, actual: Poses, target: Poses) -> Array:
+    """(n,) the angles in rad of turns from `target` to `actual` that the axes could take back from `values`
+    (n, axes) while the tip stays where it is. A turn that they reach by a motion many times as large does not
+    count, nor does that of a symmetric tool about its axis."""
+    structure = machine.structure
+    free = [axis for axis, joint in enumerate(structure.joints.values()) if joint.correct]
+    slopes = machine.nominal_and_slopes(values, free)[1]
+    rotary = np.array([structure.joints[structure.order[axis]].unit == "deg" for axis in free])
+    # mm of the tip and of arcs at the reference radius, by mm of axes and such arcs
+    slopes = slopes / np.where(rotary, REFERENCE_RADIUS_MM, 1.0)
+    slopes[:, 3:] *= REFERENCE_RADIUS_MM
+    turn = rotation_vector(actual.rotation @ np.swapaxes(target.rotation, -1, -2))
+    if structure.symmetric_tool:
+        axis = target.rotation[:, :, 2]
+        across = np.eye(3) - axis[:, :, None] * axis[:, None, :]
+        slopes[:, 3:] = across @ slopes[:, 3:]
+    place, turns = slopes[:, :3], slopes[:, 3:]
+    still = np.eye(len(free)) - np.linalg.pinv(place, rcond=_MOVES) @ place
+    sides, sizes, _ = np.linalg.svd(turns @ still, full_matrices=False)
+    parts = np.einsum("nik,ni->nk", sides, turn) * (sizes > _MOVES_WELL)
+    return np.asarray(np.linalg.norm(parts, axis=1))
 
 
 def beyond_travel(structure: Structure, values: Array) -> Mask:

@@ -87,9 +87,12 @@ class _Task:
     moves: float = _MOVES
 
     def only(self, rows: Index | Mask) -> _Task:
-        target = Poses(self.target.rotation[rows], self.target.position[rows])
         return replace(
-            self, target=target, near=self.near[rows], free=self.free[rows], asked=self.asked[rows]
+            self,
+            target=self.target.only(rows),
+            near=self.near[rows],
+            free=self.free[rows],
+            asked=self.asked[rows],
         )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from olp.core.arrays import Array, read_only
+from olp.core.arrays import Array, Index, Mask, read_only
 from olp.core.values import dataclass
 
 #: Below this angle the sine over the angle is taken from its series, whose rest is then below 1e-17. Radians.
@@ -45,6 +45,10 @@ class Poses:
         """The same with a row for each of `count`."""
         rotation = np.broadcast_to(self.rotation, (count, 3, 3))
         return Poses(rotation, np.broadcast_to(self.position, (count, 3)))
+
+    def only(self, rows: Index | Mask | slice) -> Poses:
+        """Some of (n) motions."""
+        return Poses(self.rotation[rows], self.position[rows])
 
 
 #: Nothing moves.

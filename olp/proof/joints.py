@@ -11,7 +11,7 @@ import numpy as np
 
 from olp.compensation.joints.arm_path import ArmPath
 from olp.compensation.joints.path import JointPath
-from olp.compensation.joints.planning import JointLimits, JointPlan
+from olp.compensation.joints.planning import LITTLE_LEFT, JointLimits, JointPlan
 from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import ProgramError
 from olp.core.values import dataclass
@@ -40,10 +40,12 @@ _PLACE_AND_TURN = (slice(0, 3), slice(3, 6))
 @dataclass(frozen=True, slots=True, eq=False)
 class Deviation:
     """By nominal move (n,): the largest distance of the tip in mm and angle of the tool in rad, NaN where
-    none is known. Their squares are summed over `samples` (n,) places."""
+    none is known. `correctable_rad` (n,) are the parts of such angles that the axes could take back, where
+    others remain. Squares are summed over `samples` (n,) places."""
 
     distance_mm: Array
     angle_rad: Array
+    correctable_rad: Array
     square_mm2: Array
     square_rad2: Array
     samples: Index
@@ -52,13 +54,15 @@ class Deviation:
 @dataclass(frozen=True, slots=True, eq=False)
 class JointProof:
     """The proof of two programs. `groups` (n,) is the last corrected move of each nominal one. `left_rad`
-    (n,) are angles that no command corrects. `judged` (n,) are the feed moves. `allowed_mm`, `allowed_rad`:
-    the tolerances with what rounding to the last digit explains. `over` (n,) are moves beyond these."""
+    (n,) are angles that no command corrects, `over_rad` what is beyond them. `judged` (n,) are the feed
+    moves. `allowed_mm`, `allowed_rad`: the tolerances with what rounding to the last digit explains. `over`
+    (n,) are moves beyond these."""
 
     groups: Index
     before: Deviation
     after: Deviation
     left_rad: Array
+    over_rad: Array
     judged: Mask
     allowed_mm: float
     allowed_rad: float
@@ -76,15 +80,17 @@ def prove_joints(
     """The proof of `corrected`, with the plan of the nominal program; digits are the coarsest last ones.
     Raises ProgramError where it is no correction of the nominal program."""
     groups = match(nominal, corrected, plan, digit_mm, digit_deg)
-    after = _deviation(nominal, corrected, groups, plan)
-    before = _deviation(nominal, nominal, np.arange(len(nominal)), plan)
     left = _left(plan, len(nominal))
+    partly = _partly(nominal, plan, left > LITTLE_LEFT * limits.tolerance_rad)
+    after = _deviation(nominal, corrected, groups, plan, partly)
+    before = _deviation(nominal, nominal, np.arange(len(nominal)), plan, np.zeros(len(nominal), bool))
     rounded_mm, rounded_rad = _rounding(nominal, plan, digit_mm, digit_deg)
     allowed_mm = limits.tolerance_mm + rounded_mm
     allowed_rad = limits.tolerance_rad + rounded_rad
     judged = nominal.judged & np.isfinite(after.distance_mm)
-    over = judged & ((after.distance_mm > allowed_mm) | (after.angle_rad - left > allowed_rad))
-    return JointProof(groups, before, after, left, judged, allowed_mm, allowed_rad, over)
+    over_rad = np.fmax(after.angle_rad - left, after.correctable_rad)
+    over = judged & ((after.distance_mm > allowed_mm) | (over_rad > allowed_rad))
+    return JointProof(groups, before, after, left, over_rad, judged, allowed_mm, allowed_rad, over)
 
 
 def _left(plan: JointPlan, count: int) -> Array:
@@ -93,6 +99,14 @@ def _left(plan: JointPlan, count: int) -> Array:
     np.maximum.at(left, plan.move, plan.left_rad)
     ends[plan.move] = plan.left_rad
     return np.asarray(np.maximum(left, np.append(0.0, ends[:-1])[:count]))
+
+
+def _partly(path: JointPath, plan: JointPlan, left: Mask) -> Mask:
+    """(n,) moves of which a part of the orientation is corrected, and another is `left` (n,)."""
+    bounded = np.zeros(len(path), bool)
+    bounded[plan.move[plan.limited]] = True
+    bounded[1:] |= bounded[:-1]
+    return np.asarray(left & ~bounded & ~path.held & path.judged, bool)
 
 
 def _rounding(path: JointPath, plan: JointPlan, digit_mm: float, digit_deg: float) -> tuple[float, float]:
@@ -190,9 +204,12 @@ def _stretched(expected: Array, end: Array, near: Array, parts: Index, arc: Mask
     return np.array(groups)
 
 
-def _deviation(nominal: JointPath, path: JointPath, groups: Index, plan: JointPlan) -> Deviation:
-    """The deviation of the machine that runs `path` from the nominal poses, by nominal move."""
-    result = _Sums(len(nominal))
+def _deviation(
+    nominal: JointPath, path: JointPath, groups: Index, plan: JointPlan, partly: Mask
+) -> Deviation:
+    """The deviation of the machine that runs `path` from the nominal poses, by nominal move. Of moves
+    `partly` (n,) the orientation is corrected in part."""
+    result = _Sums(partly)
     finer = 1 if path is nominal else _FINER
     for places in visited(nominal, path, groups, plan, ~nominal.kept, nominal.feed, finer):
         result.add(nominal, path, places)
@@ -202,7 +219,9 @@ def _deviation(nominal: JointPath, path: JointPath, groups: Index, plan: JointPl
 class _Sums:
     """Deviations while they are collected."""
 
-    def __init__(self, count: int) -> None:
+    def __init__(self, partly: Mask) -> None:
+        count = len(partly)
+        self.partly, self.correctable = partly, np.zeros(count)
         self.largest = np.full((count, 2), -np.inf)
         self.square = np.zeros((count, 2))
         self.samples = np.zeros(count, np.int64)
@@ -210,8 +229,13 @@ class _Sums:
     def add(self, nominal: JointPath, path: JointPath, places: Places) -> None:
         if not len(places.rows):
             return
-        actual, target = places.poses(path)[1], places.targets(nominal)
+        (axes, actual), target = places.poses(path), places.targets(nominal)
         both = np.stack(deviations(path.motion.structure, actual, target), axis=1)
+        rows = np.flatnonzero(self.partly[places.move])
+        if rows.size:
+            tool, poses = path.tool[places.rows[rows]], (actual.only(rows), target.only(rows))
+            angle = path.motion.correctable(axes[rows], tool, *poses)
+            np.maximum.at(self.correctable, places.move[rows], angle)
         np.maximum.at(self.largest, places.move, both)
         np.add.at(self.square, places.move, both * both)
         np.add.at(self.samples, places.move, 1)
@@ -219,4 +243,6 @@ class _Sums:
     def done(self) -> Deviation:
         known = self.samples > 0
         largest = np.where(known[:, None], self.largest, np.nan)
-        return Deviation(largest[:, 0], largest[:, 1], self.square[:, 0], self.square[:, 1], self.samples)
+        return Deviation(
+            largest[:, 0], largest[:, 1], self.correctable, self.square[:, 0], self.square[:, 1], self.samples
+        )

@@ -14,7 +14,13 @@ from olp.core.turns import Turn, turned
 from olp.core.values import dataclass
 from olp.kinematics.chain import Kinematics
 from olp.kinematics.coordinates import Coordinates, axes_of_poses, poses_of_axes, stated_poses, states_poses
-from olp.kinematics.correction import CorrectedPoses, beyond_travel, correct_poses, meet_positions
+from olp.kinematics.correction import (
+    CorrectedPoses,
+    beyond_travel,
+    correct_poses,
+    correctable_angles,
+    meet_positions,
+)
 from olp.kinematics.errors import MachineErrors
 from olp.kinematics.poses import Poses
 from olp.kinematics.programmed import axes_of_tips, stated_tips, tips_of_axes
@@ -161,11 +167,17 @@ class Motion:
         """Axis values whose linear axes alone bring the tip to its target. Raises NotInvertible."""
         values, left, limited = axes.copy(), np.zeros((len(axes), 3)), np.zeros(len(axes), bool)
         for machine, rows in self._groups(tool):
-            part = Poses(target.rotation[rows], target.position[rows])
             with _of_rows(rows):
-                solved = meet_positions(machine, part, axes[rows])
+                solved = meet_positions(machine, target.only(rows), axes[rows])
             values[rows], left[rows] = solved.values, solved.left_rad
         return CorrectedPoses(values, left, limited, beyond_travel(self.structure, values))
+
+    def correctable(self, axes: Array, tool: Index, actual: Poses, target: Poses) -> Array:
+        """(n,) as `correctable_angles` of poses at axis values."""
+        angles = np.empty(len(axes))
+        for machine, rows in self._groups(tool):
+            angles[rows] = correctable_angles(machine, axes[rows], actual.only(rows), target.only(rows))
+        return angles
 
     def slopes(self, axes: Array, tool: Index) -> Array:
         """(n, 6, axes) as `Kinematics.jacobian`."""

@@ -26,6 +26,8 @@ _MOST_ROWS = 1_000_000
 _ROWS_PER_MOVE = 100
 #: mm or deg below which a command is none: an arc along which there is no other one stays.
 _NOTHING = 1e-9
+#: Of angles that remain by less than this share of the tolerance, all counts as correctable.
+LITTLE_LEFT = 0.05
 #: Rows whose commands are found at a time, so that memory is small.
 _BATCH = 1 << 15
 
@@ -82,7 +84,7 @@ class _Rows:
     def only(self, rows: Index | Mask) -> _Rows:
         return _Rows(
             self.move[rows], self.share[rows], self.axes[rows],
-            Poses(self.target.rotation[rows], self.target.position[rows]), self.side[rows],
+            self.target.only(rows), self.side[rows],
             self.left_rad[rows], self.limited[rows],
         )  # fmt: skip
 
@@ -154,11 +156,10 @@ def _solved(path: JointPath, move: Index, share: Array, side: Array) -> _Rows:
         pole = path.directions.keep(motion.structure, some, nominal.rotation[:, :, 2])
         held = np.flatnonzero(path.held[some] | pole)
         if held.size:
-            part = Poses(target.rotation[held], target.position[held])
             stands = axes[held]
             # where no word of a rotary axis changes, its backlash stays
             play = np.where(path.stay[some[held], None] & rotary, 0.5 * motion.width * own[held], 0.0)
-            solved = motion.linear(stands - play, tool[held], part)
+            solved = motion.linear(stands - play, tool[held], target.only(held))
             done.values[held], done.left_rad[held] = solved.values, solved.left_rad
             done.limited[held] = pole[held]
         left = left_angles(motion.structure, done.left_rad, target)
@@ -264,10 +265,19 @@ def _worst(path: JointPath, begin: _Rows, end: _Rows, limits: JointLimits, count
     share = begin.share[owner] + part * (end.share - begin.share)[owner]
     nominal = motion.targets(path.at(move, share), tool, tip)
     target = Poses(nominal.rotation, nominal.position + path.shift_mm[move])
-    actual = motion.actual(motion.axes(written, tool, tip), tool)
+    axes = motion.axes(written, tool, tip)
+    actual = motion.actual(axes, tool)
     distance, angle = deviations(motion.structure, actual, target)
     left = np.maximum(begin.left_rad, end.left_rad)
-    over = np.maximum(distance / limits.tolerance_mm, (angle - left[owner]) / limits.tolerance_rad) / _SHARE
+    angle -= left[owner]
+    whole = ~(begin.limited | end.limited | path.held[begin.move]) & (
+        left > LITTLE_LEFT * limits.tolerance_rad
+    )
+    rows = np.flatnonzero(whole[owner])
+    angle[rows] = np.maximum(
+        angle[rows], motion.correctable(axes[rows], tool[rows], actual.only(rows), target.only(rows))
+    )
+    over = np.maximum(distance / limits.tolerance_mm, angle / limits.tolerance_rad) / _SHARE
     worst = np.zeros(len(count))
     np.maximum.at(worst, owner, over)
     return worst

@@ -168,7 +168,7 @@ def _largest(path: JointPath, plan: JointPlan) -> dict[str, float]:
 def _worst(path: JointPath, proof: JointProof) -> list[dict[str, Any]]:
     over = np.maximum(
         proof.after.distance_mm / proof.allowed_mm,
-        (proof.after.angle_rad - proof.left_rad) / proof.allowed_rad,
+        proof.over_rad / proof.allowed_rad,
     )
     over = np.where(proof.judged, over, -np.inf)
     rows = [row for row in np.argsort(-over, kind="stable")[:_WORST].tolist() if np.isfinite(over[row])]

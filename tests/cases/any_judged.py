@@ -1,0 +1,106 @@
+"""One random machine with a random program for it: corrected, and judged by a computation of its own."""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from cases.any_machines import KINDS, five, wrist, write_machine
+from cases.any_programs import (
+    DIRECTED,
+    FORMS,
+    PLANES,
+    VECTOR,
+    listed,
+    plane,
+    program,
+    read_by_judge,
+    waypoints,
+)
+from judge.whole_path import Whole, WholeTilted
+
+import olp
+from olp.core.errors import OlpError
+
+#: Tolerances in mm and rad.
+WITHIN = (1e-3, 2e-6)
+LIST = "list"
+DIGITS = (1e-3, 1e-4, 1e-6)
+
+
+@dataclass(frozen=True)
+class Told:
+    """What came of one program: "right", "wrong", "said" or "refused", and the residual in tolerances."""
+
+    what: str
+    cost: float
+    words: str
+
+
+def forms_of(kind: str) -> list[str]:
+    return [LIST, *FORMS, *PLANES] if KINDS[kind] in (five, wrist) else [LIST]
+
+
+def last_digit(judge: Whole, place: np.ndarray, digit: float) -> tuple[float, float]:
+    """mm and rad that half a last digit of every axis moves the tool."""
+    moved = np.zeros(2)
+    here = judge.poses(place[None], False)
+    for column in range(len(place)):
+        ahead = place.copy()
+        ahead[column] += 0.01
+        there = judge.poses(ahead[None], False)
+        turned = np.linalg.norm(there[1] - here[1]) / np.sqrt(2.0)
+        moved += np.array([np.linalg.norm(there[0] - here[0]), turned]) * (0.5 * digit / 0.01)
+    return float(moved[0]), float(moved[1])
+
+
+def judged(kind: str, form: str, seed: int, *, play: bool) -> Told:
+    """One machine and one program for it."""
+    rng = np.random.default_rng([seed, 5])
+    digit = float(rng.choice(DIGITS)) if form != LIST or seed % 3 == 0 else 1e-6
+    control = {**FORMS, **PLANES}.get(form, "linuxcnc")
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        made, payload = write_machine(folder, kind, seed, control=control, digit=digit, play=play)
+        judge = Whole(folder / "machine.toml", payload, made.counts)
+        rows = waypoints(made, rng, 5, judge if made.counts == "axis" else None)
+        job = folder / "job.toml"
+        if form in PLANES:
+            text = plane(form, judge, rows[3:4], rng)
+        elif form == LIST:
+            text = listed(made, rows)
+        else:
+            text, stated = program(form, judge, rows, rng)
+            job.write_text(job.read_text("utf-8") + stated, "utf-8")
+        try:
+            done = olp.correct_joints(text, folder / "machine.toml", job, tolerance_urad=2.0)
+        except OlpError as error:
+            return Told("refused", 0.0, str(error)[:180])
+        mm, rad = last_digit(judge, rows[3], digit)
+        if form != LIST:
+            # rotary words are rounded first, and the linear ones meet the tip
+            mm = digit * 0.5 * 3**0.5
+            rad = 1e-7 if form in DIRECTED else rad
+        within = (WITHIN[0] + mm, WITHIN[1] + rad)
+        after = done.report["deviation"]["after"]
+        said = f"stated {after['position_max_um']:.3f} um {after['orientation_max_urad']:.3f} urad"
+        if form in PLANES:
+            tilted = WholeTilted(folder / "machine.toml", payload)
+            distance = tilted.judged(text, done.data)[0]
+            found = (distance, 0.0, distance / within[0])
+        else:
+            judge.vector = form in VECTOR
+            read = judge.values if form == LIST else judge.read
+            texts = (text, done.data)
+            if form != LIST:
+                texts = tuple(read_by_judge(form, one, judge, rows[0]) for one in texts)
+            found = judge.whole_judged(read(texts[0]), read(texts[1]), within, 3)
+    words = f"{found[0] * 1e3:.3f} um {found[1] * 1e6:.3f} urad, {said}, digit {digit:g}"
+    if found[2] <= 1.1 and done.report["verdict"]["ok"]:
+        return Told("right", found[2], words)
+    bounded = done.report["orientation"]["near_singular"] and found[0] <= 1.1 * within[0]
+    stated_all = after["position_max_um"] >= 0.9e3 * found[0] and not done.report["verdict"]["ok"]
+    stated_all |= bool(bounded) and after["orientation_max_urad"] >= 0.9e6 * found[1]
+    return Told("said" if stated_all else "wrong", found[2], words)
