@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from olp.core.arrays import Array, Index, Mask
-from olp.core.errors import ConfigError, NotInvertible
+from olp.core.errors import NotInvertible
 from olp.core.units import AXES
 from olp.core.values import dataclass
 from olp.kinematics.chain import Kinematics
@@ -100,8 +100,7 @@ def poses_of_axes(machine: Kinematics, values: Array) -> Array:
 
 def axes_of_poses(machine: Kinematics, values: Array) -> Array:
     """(n, axes) axis values of the nominal machine at coordinates (n, axes) that state poses, NaN where these
-    are unknown. Raises NotInvertible with the rows of poses that no legs reach, and ConfigError where an axis
-    has two values within its travel."""
+    are unknown. Raises NotInvertible with the rows of poses that no legs reach."""
     structure = machine.structure
     (platform,) = structure.platforms.values()
     pose, found = stated_poses(structure, values), np.full(values.shape, np.nan)
@@ -112,7 +111,9 @@ def axes_of_poses(machine: Kinematics, values: Array) -> Array:
         column = structure.order.index(name)
         # a second rod of a carriage is parallel to the first
         if np.isnan(found[:, column]).all():
-            found[:, column] = _leg_values(structure.joints[name], leg, held.at(np.array(leg.platform_mm)))
+            own = np.array(leg.platform_mm)
+            start = np.array(platform.start_mm) + own
+            found[:, column] = _leg_values(structure.joints[name], leg, held.at(own), start)
     known = np.isfinite(values).all(axis=1)
     found[~known] = np.nan
     lost = np.isnan(found).any(axis=1) & known
@@ -130,37 +131,37 @@ def axes_of_poses(machine: Kinematics, values: Array) -> Array:
     return found
 
 
-def _leg_values(joint: Joint, leg: Leg, end: Array) -> Array:
-    """(n,) values of the axis of a leg whose rod ends at points (n, 3), NaN where there is none. Raises
-    ConfigError where two are within the travel."""
+def _leg_values(joint: Joint, leg: Leg, end: Array, start: Array) -> Array:
+    """(n,) values of the axis of a leg whose rod ends at points (n, 3), NaN where there is none. Of two
+    within the travel it is the one on the side of axis zero, where the rod ends near `start` (3,)."""
     base = np.array(leg.base_mm)
     if leg.carriage is None:
         return np.asarray(np.linalg.norm(end - base, axis=1) - leg.length_mm)
-    direction = np.array(joint.direction)
+    both, at_zero = _both_values(joint, leg, end), _both_values(joint, leg, start[None])[0]
+    low, high = joint.travel
+    # beyond the travel it is the nearer one, so that it can be told
+    beyond = np.maximum(np.maximum(low - both, both - high), _AT_END)
+    beyond = np.where(np.isnan(beyond), np.inf, beyond)
+    side = int(np.argmin(np.where(np.isnan(at_zero), np.inf, np.abs(at_zero))))
+    chosen = np.where(beyond[:, 0] == beyond[:, 1], side, np.argmin(beyond, axis=1))
+    return np.asarray(both[np.arange(len(both)), chosen])
+
+
+def _both_values(joint: Joint, leg: Leg, end: Array) -> Array:
+    """(n, 2) values of a carriage at which its rod has its length, NaN where there are none."""
+    base, direction = np.array(leg.base_mm), np.array(joint.direction)
     with np.errstate(invalid="ignore"):
         if joint.kind == "linear":
             along = (end - base) @ direction
             off = np.linalg.norm(end - base - along[:, None] * direction, axis=1)
             half = np.sqrt(leg.length_mm**2 - off**2)
-        else:
-            # the base goes round: A cos q + B sin q = K, where the rod has its length
-            arm, far = base - np.array(joint.point_mm), end - np.array(joint.point_mm)
-            axial = (arm @ direction) * direction
-            first, second = far @ (arm - axial), far @ np.cross(direction, arm)
-            size = 0.5 * (arm @ arm + (far * far).sum(axis=1) - leg.length_mm**2) - far @ axial
-            along = np.degrees(np.arctan2(second, first))
-            half = np.degrees(np.arccos(size / np.hypot(first, second)))
-    both = np.stack((along - half, along + half), axis=1)
-    if joint.kind == "rotary":
-        both = (both + 180.0) % 360.0 - 180.0
-    low, high = joint.travel
-    inside = (both >= low - _AT_END) & (both <= high + _AT_END)
-    if inside.all(axis=1).any():
-        raise ConfigError(
-            f"axes.{joint.name} has two values within its travel {low:g} to {high:g} {joint.unit} for the "
-            "same pose; narrow the travel in the machine file to the posture that the machine takes"
-        )
-    # beyond the travel it is the nearer one, so that it can be told
-    beyond = np.maximum(low - both, both - high)
-    nearest = np.nanargmin(np.where(np.isnan(beyond), np.inf, beyond), axis=1)
-    return np.asarray(both[np.arange(len(both)), nearest])
+            return np.stack((along - half, along + half), axis=1)
+        # the base goes round: A cos q + B sin q = K
+        arm, far = base - np.array(joint.point_mm), end - np.array(joint.point_mm)
+        axial = (arm @ direction) * direction
+        first, second = far @ (arm - axial), far @ np.cross(direction, arm)
+        size = 0.5 * (arm @ arm + (far * far).sum(axis=1) - leg.length_mm**2) - far @ axial
+        along = np.arctan2(second, first)
+        half = np.arccos(size / np.hypot(first, second))
+    both = np.degrees(np.stack((along - half, along + half), axis=1))
+    return np.asarray((both + 180.0) % 360.0 - 180.0)

@@ -9,9 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from judge.any_joints import AnyJoints, moved, rpy
-from scipy.optimize import fsolve
-from workflows.test_any_joints import legged
+from cases.any_machines import Made, write_machine
+from judge.whole_machine import WholeMachine, small
 
 import olp
 from olp.core.errors import ProgramError
@@ -19,23 +18,24 @@ from olp.core.errors import ProgramError
 OFFSET = (5.0, -3.0, 2.0)
 FRAME = '\n[work_offsets.G54]\nset_by = "true"\nX_mm = 5.0\nY_mm = -3.0\nZ_mm = 2.0\n'
 HEAD = "G21 G90 G17 G54 G64 P0.01\nT1 M6\nG43 H1\n"
+KINDS = ("hexapod", "tripod", "linear delta", "rotary delta")
 
 
-def machine_of(folder: Path, name: str, seed: int) -> Path:
-    machine, _ = legged(folder, name, np.random.default_rng(seed))
+def machine_of(folder: Path, kind: str, seed: int) -> tuple[Path, Made]:
+    made, _ = write_machine(folder, kind, seed)
+    machine = folder / "machine.toml"
     text = machine.read_text().replace("[kinematics]\n", '[kinematics]\nprogram_words = "pose"\n')
     machine.write_text(text + FRAME)
-    return machine
+    return machine, made
 
 
-def program_of(name: str) -> str:
-    high, turns = 240.0, ("", "", "")
-    if name == "hexapod":
-        high, turns = 430.0, (" A0. B0. C0.", " A1.5 B-2. C1.", " A2. C4.")
+def program_of(kind: str, made: Made) -> str:
+    high = round(made.start[2] + made.tip[2])
+    turns = (" A0. B0. C0.", " A1.5 B-2. C1.", " A2. C4.") if kind == "hexapod" else ("", "", "")
     return (
         f"{HEAD}G0 X0. Y0. Z{high}{turns[0]}\nG1 X20. Y10. F900 (first)\n"
         f"X45.5 Y-12.25 Z{high + 6}{turns[1]}\nG91 X-10. Y-5.\nG90 G2 X15.5 Y-17.25 I-10. J0.\n"
-        f"G1 X-30. Y2.{turns[2]}\nG0 Z{high + 20}\nM30\n"
+        f"G1 X-30. Y2.{turns[2]}\nG0 Z{high + 5}\nM30\n"
     )
 
 
@@ -60,47 +60,44 @@ def read(text: str, columns: int) -> list[np.ndarray]:
 class Posed:
     """The judge, commanded in poses."""
 
-    def __init__(self, machine: Path) -> None:
-        self.judge, self.near = AnyJoints(machine), np.zeros(0)
+    def __init__(self, machine: Path, made: Made) -> None:
+        self.judge, self.made = WholeMachine(machine, (0.0, (0.0, 0.0, 0.0))), made
 
     def stated(self, words: np.ndarray) -> np.ndarray:
-        turn = rpy("xyz", np.radians(words[3:])) if len(words) > 3 else np.eye(3)
-        return moved(words[:3], turn)
+        """(4, 4) the pose that words state."""
+        pose = np.eye(4)
+        pose[:3, 3] = words[:3]
+        if len(words) > 3:
+            pose[:3, :3] = small("xyz", np.radians(words[3:]))[0]
+        return pose
 
     def actual(self, words: np.ndarray) -> np.ndarray:
         """(4, 4) where the machine with its errors has the tool."""
         wanted = self.stated(words)
-        count = len(self.judge.order)
-
-        def miss(values: np.ndarray) -> np.ndarray:
-            there = self.judge.pose(values, False)
-            turn = there[:3, :3] @ wanted[:3, :3].T
-            skew = [100.0 * (turn[k, i] - turn[i, k]) for i, k in ((1, 2), (2, 0), (0, 1))]
-            return np.array([*(there[:3, 3] - wanted[:3, 3]), *skew])[:count]
-
-        start = np.full(count, 500.0 if count == 3 else 480.0) if not len(self.near) else self.near
-        self.near = fsolve(miss, start, xtol=1e-13)
-        assert np.abs(miss(self.near)).max() < 1e-8
-        return self.judge.pose(self.near, True)
+        turn = wanted[:3, :3]
+        assert self.made.legs is not None
+        axes = self.made.legs(wanted[:3, 3] - turn @ np.array(self.made.tip), turn)
+        return np.asarray(self.judge.pose(axes[None], True)[0])
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["hexapod", "delta"])
-def test_the_tool_is_where_the_program_says(name: str, tmp_path: Path) -> None:
-    machine, text = machine_of(tmp_path, name, 11), program_of(name)
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_tool_is_where_the_program_says(kind: str, tmp_path: Path) -> None:
+    machine, made = machine_of(tmp_path, kind, 11)
+    text, turns = program_of(kind, made), kind == "hexapod"
     result = olp.correct_joints(text.encode(), machine, tolerance_urad=2.0)
     assert result.report["verdict"]["ok"]
-    columns, posed = (6 if name == "hexapod" else 3), Posed(machine)
+    columns, posed = (6 if turns else 3), Posed(machine, made)
     nominal, written = read(text, columns), read(result.data.decode(), columns)
     assert len(written) > len(nominal)
     far = []
-    for before, after in [*[*pairwise(written[1:-1])][::4], (written[-3], written[-2])]:
+    for before, after in pairwise(written[1:-1]):
         for share in (0.5, 1.0):
             tool = posed.actual(before + share * (after - before))
-            far.append(nearest(posed, nominal, tool, turns=columns == 6))
+            far.append(nearest(posed, nominal, tool, turns=turns))
     worst = np.max(far, axis=0)
-    assert worst[0] < 1.05e-3
-    assert worst[1] < 2.2e-6
+    assert worst[0] < 1.02e-3
+    assert worst[1] < 2.1e-6
     uncorrected = posed.actual(nominal[2])[:3, 3] - posed.stated(nominal[2])[:3, 3]
     assert np.linalg.norm(uncorrected) > 0.02
 
@@ -123,36 +120,38 @@ def nearest(posed: Posed, nominal: list[np.ndarray], tool: np.ndarray, *, turns:
     return best
 
 
-@pytest.mark.parametrize("name", ["hexapod", "delta"])
-def test_a_machine_without_errors_changes_nothing(name: str, tmp_path: Path) -> None:
-    machine, text = machine_of(tmp_path, name, 3), program_of(name)
-    kept = machine.read_text().replace('calibration = "calibration.toml"\n', "")
-    machine.write_text(kept)
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_machine_without_errors_changes_nothing(kind: str, tmp_path: Path) -> None:
+    machine, made = machine_of(tmp_path, kind, 3)
+    text = program_of(kind, made)
+    machine.write_text(machine.read_text().replace('calibration = "calibration.toml"\n', ""))
     result = olp.correct_joints(text.encode(), machine)
-    assert result.data.decode().replace("\r\n", "\n").endswith(text)
+    assert result.data.decode().endswith(text)
 
 
 @pytest.mark.parametrize(
     ("blocks", "why"),
     [
-        ("G0 X0 Y0 Z430 A0 B0 C0\nG1 X900. F100\n", "out of its travel 100 to 900"),
-        ("G0 X0 Y0 Z430 A0 B0 C0\nG1 B95. F100\n", "beyond 179, 89, 179 deg"),
-        ("G0 X0 Y0 Z430 A0 B0 C0\nG81 X1. Z420 R425 F100\nG80\n", "--expand-cycles"),
-        ("G0 X0 Y0 Z430\nG1 X10. F100\n", "A, B, C has not been commanded"),
+        ("G1 X1900. F100\n", "out of its travel 50 to 1500"),
+        ("G1 B95. F100\n", "beyond 179, 89, 179 deg"),
+        ("G81 X1. Z420 R425 F100\nG80\n", "--expand-cycles"),
+        ("G92 X0\n", "stores the present position"),
     ],
 )
 def test_what_is_not_corrected_is_refused_with_its_line(blocks: str, why: str, tmp_path: Path) -> None:
-    machine = machine_of(tmp_path, "hexapod", 3)
+    machine, made = machine_of(tmp_path, "hexapod", 3)
+    start = f"G0 X0 Y0 Z{made.start[2] + 60:.3f} A0 B0 C0\n"
     with pytest.raises(ProgramError, match=re.escape(why)) as refused:
-        olp.correct_joints((HEAD + blocks + "M30\n").encode(), machine)
+        olp.correct_joints((HEAD + start + blocks + "M30\n").encode(), machine)
     assert refused.value.line == 5
 
 
 @pytest.mark.parametrize(
-    ("words", "why"), [("X0 A1.", "moves A, which is no axis"), ("X900.", "within reach")]
+    ("words", "why"),
+    [("X0 A1.", "moves A, which is no axis"), ("X900.", "within reach")],
 )
 def test_poses_of_a_delta_that_do_not_exist_are_refused(words: str, why: str, tmp_path: Path) -> None:
-    machine = machine_of(tmp_path, "delta", 3)
+    machine, made = machine_of(tmp_path, "linear delta", 3)
     with pytest.raises(ProgramError, match=why) as refused:
-        olp.correct_joints(f"{HEAD}G0 {words} Y0 Z240\nM30\n".encode(), machine)
+        olp.correct_joints(f"{HEAD}G0 {words} Y0 Z{made.start[2] + 60:.3f}\nM30\n".encode(), machine)
     assert refused.value.line == 4
