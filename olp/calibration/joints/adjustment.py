@@ -172,7 +172,7 @@ def held_out(fit: JointFit) -> tuple[Array, Array] | None:
     if not sum(start.reading.count for start in test):
         return None
     offs = []
-    for one in (replace(model, unknowns=()), model):
+    for one in (replace(model, unknowns=(), known=None), model):
         part = adjusted(one, train)
         off = []
         for start, source in zip(test, part.sources, strict=True):
@@ -289,7 +289,7 @@ def _rank(blocks: Sequence[Block], model: Model) -> int:
     tables = []
     for block in blocks:
         (chunk,) = block.chunks()
-        rows = chunk.rows * model.prior / chunk.sigma[:, None]
+        rows = chunk.rows @ model.root / chunk.sigma[:, None]
         local = chunk.local[:, block.precision <= _LOOSE] / chunk.sigma[:, None]
         local = local / np.maximum(np.linalg.norm(local, axis=0), 1e-300)
         inner = np.linalg.qr(local)[0]

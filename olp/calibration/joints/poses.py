@@ -34,8 +34,8 @@ class Postures:
         frame, _ = frame_of(place)
         rest, _ = left_of(tip, frame)
         return Postures(
-            Candidates(tip * model.prior / sigma_mm, frame * (_ANYWHERE_MM / sigma_mm)),
-            (rest * model.prior).reshape(1, -1, rest.shape[2]),
+            Candidates(tip @ model.root / sigma_mm, frame * (_ANYWHERE_MM / sigma_mm)),
+            (rest @ model.root).reshape(1, -1, rest.shape[2]),
         )
 
     def chosen(self, count: int, criterion: Criterion) -> Choice:

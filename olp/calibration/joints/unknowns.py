@@ -83,7 +83,7 @@ class Unknown:
 class Model:
     """A machine with its unknowns, the weights on its bodies, and `datum_mm`, where tilted linear lines have
     no shift. Unknowns are added to `base`, what a calibration states already. `known` (k, k) is the
-    covariance of them before the readings, in mm and rad; without it they are as their priors say."""
+    covariance of them before the readings, in mm and rad; without it each is as its prior says."""
 
     structure: Structure
     unknowns: tuple[Unknown, ...]
@@ -100,6 +100,11 @@ class Model:
             return np.diag(1.0 / self.prior**2)
         scale = np.sqrt(np.diag(self.known))
         return np.asarray(np.linalg.inv(self.known / np.outer(scale, scale)) / np.outer(scale, scale))
+
+    @property
+    def root(self) -> Array:
+        """(k, k) what independent numbers of size 1 are times to be as likely as the unknowns are."""
+        return np.asarray(np.diag(self.prior) if self.known is None else np.linalg.cholesky(self.known))
 
     @property
     def prior(self) -> Array:
@@ -185,16 +190,21 @@ def model_of(
     datum_mm: Vector = ZERO,
 ) -> Model:
     """The model with the unknowns that the structure can show by poses of its tool in an unknown frame. All
-    others would change no pose: they are 0. `values` (n, axes) are postures of the readings."""
+    others would change no pose: they are 0. Those that are kept stand for them, so that they may be as large
+    as all of these together. `values` (n, axes) are postures of the readings."""
     listed = tuple(_listed(structure, priors))
     full = Model(structure, listed, (), datum_mm)
-    kept = _kept(full, _postures(structure, values))
+    kept, usual = _kept(full, _postures(structure, values))
     elastic = tuple(Unknown("elasticity", name, "own_urad_Nm", priors.yield_rad_Nm) for name in yielding)
+    known = np.diag([priors.yield_rad_Nm**2] * (len(kept) + len(elastic)))
+    known[: len(kept), : len(kept)] = usual
+    sizes = np.sqrt(np.diag(usual)).tolist()
     return replace(
         full,
-        unknowns=(*(listed[k] for k in kept), *elastic),
+        unknowns=(*(replace(listed[k], prior=size) for k, size in zip(kept, sizes, strict=True)), *elastic),
         masses=masses,
         dropped=tuple(unknown for k, unknown in enumerate(listed) if k not in kept),
+        known=known,
     )
 
 
@@ -281,9 +291,10 @@ def _postures(structure: Structure, values: Array) -> Array:
     return np.asarray(share * values[first] + (1.0 - share) * values[second])
 
 
-def _kept(model: Model, values: Array) -> list[int]:
-    """The candidates whose effect on poses is not that of an instrument frame and those before them. Raises
-    CannotCompute where a platform does not close."""
+def _kept(model: Model, values: Array) -> tuple[list[int], Array]:
+    """The candidates whose effect on poses is not that of an instrument frame and those before them, and the
+    covariance (kept, kept) of what they are together with all that look like them. Raises CannotCompute where
+    a platform does not close."""
     prior = model.prior
     twists = model.twists(np.zeros(len(prior)), values) * prior
     position = model.machine(np.zeros(len(prior))).actual(values).position
@@ -311,7 +322,10 @@ def _kept(model: Model, values: Array) -> list[int]:
                 kept.append(column - 6)
     if not kept:
         raise CannotCompute("no unknown of this machine changes a pose of its tool; check its chain")
-    return kept
+    others = [6 + k for k in range(len(prior)) if k not in kept]
+    same = np.linalg.lstsq(table[:, [*range(6), *(6 + k for k in kept)]], table[:, others])[0][6:]
+    scale = prior[kept]
+    return kept, (np.eye(len(kept)) + same @ same.T) * np.outer(scale, scale)
 
 
 def _place(stem: str) -> tuple[str, int]:

@@ -25,11 +25,11 @@ TURN, SHIFT = rotation_of(np.array((0.3, 1.0, -2.0))), np.array((3000.0, -500.0,
 
 
 def true_machine(name: str, seed: int = 0, count: int = 60, size: float = 1.0) -> tuple[Model, Array, Array]:
-    """The model of a golden structure, unknowns as its priors have them, and postures."""
+    """The model of a golden structure, unknowns as they are usual before measuring, and postures."""
     structure = golden(name)[0].machine.structure
     values = random_values(golden(name)[0], count, seed)
     model = model_of(structure, values, Priors.of(structure))
-    return model, size * np.random.default_rng(seed + 1).normal(0.0, model.prior), values
+    return model, size * model.root @ np.random.default_rng(seed + 1).normal(size=len(model.unknowns)), values
 
 
 def known_machine(name: str, seed: int = 0, kind: str = "points") -> tuple[Model, JointFit, Array, Array]:

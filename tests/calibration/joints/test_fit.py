@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from calibration.joints.simulated import SIGMA, TOOL, read, true_machine
+from cases.joint_campaigns import Campaign
 
 from olp.calibration.joints.adjustment import JointFit, fit_joints, held_out
 from olp.calibration.joints.findings import fit_or_refuse, joint_findings
@@ -46,9 +48,9 @@ def test_what_is_measured_is_found(name: str, kind: str) -> None:
     model, theta, values = true_machine(name)
     pose = model.machine(theta).actual(values)
     exact = fit_joints(model, [read(kind, pose, values, noise=0.0)])
-    pull = exact.covariance @ (theta / model.prior**2)
+    pull = exact.covariance @ model.precision @ theta
     assert np.abs((exact.theta - (theta - pull)) / exact.sigma).max() < 0.05
-    assert exact.chi_square < 0.25 * np.sum((theta / model.prior) ** 2)
+    assert exact.chi_square < 0.25 * theta @ model.precision @ theta
     fit = fit_joints(model, [read(kind, pose, values)])
     assert 0.6 < fit.chi_square / fit.freedom < 1.4
     unseen = held_out(fit)
@@ -77,7 +79,7 @@ def coverage(name: str, kind: str, runs: int, count: int = 60) -> tuple[float, f
     ("name", "kind", "runs"),
     [
         ("arm_6r_kr6", "points", 12), ("xyzac_trunnion", "points", 15), ("gantry_wrist", "lengths", 15),
-        ("scara", "points", 15), ("polar_rppr", "lengths", 15), ("tripod", "points", 25),
+        ("polar_rppr", "lengths", 15), ("tripod", "points", 25),
     ],
 )  # fmt: skip
 def test_the_fit_is_as_good_as_the_readings_allow(name: str, kind: str, runs: int) -> None:
@@ -86,6 +88,16 @@ def test_the_fit_is_as_good_as_the_readings_allow(name: str, kind: str, runs: in
     ratio, covered = coverage(name, kind, runs)
     assert 0.85 < ratio < 1.15
     assert 0.92 <= covered <= 0.98
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("structure", "instrument"), [("trunnion-ac", "R-test"), ("scara", "6D")])
+def test_stated_uncertainty_is_the_information_limit(structure: str, instrument: str, tmp_path: Path) -> None:
+    """Also of what the readings do not show: there all errors of a machine count, not those alone that are
+    kept. Of the limit the judge knows the size of these errors, and the fit the noise."""
+    score = Campaign(tmp_path / structure, structure, instrument, 0).score()
+    assert 0.93 < score.stated_um / score.limit_um < 1.15
+    assert score.off_um < 3.0 * score.limit_um
 
 
 def test_a_few_campaigns_are_as_good_as_stated() -> None:
