@@ -319,7 +319,10 @@ class _Flattener:
         if absolute or count is None or not self.state.is_cycle([*active, ("x", 0.0)]):
             return 1
         cut.add(count)
-        return whole(filled(values[count][1]), "the repeat count L")
+        repeats = whole(filled(values[count][1]), "the repeat count L")
+        if repeats < 1:
+            raise ProgramError(f"a cycle is repeated {repeats} times; expected one or more", code="OLP516")
+        return repeats
 
     def _as_xy(
         self, kept: list[int], active: list[Value], cut: set[int]

@@ -170,3 +170,13 @@ def test_without_unrolling_the_way_on_is_named(body: str, tmp_path: Path) -> Non
     with pytest.raises(ProgramError, match="--flatten") as caught:
         read(f"{HEAD}{body}\nM2\n".encode(), setup, DIALECTS["linuxcnc"])
     assert (caught.value.code, caught.value.line) == ("OLP511", 3)
+
+
+@pytest.mark.parametrize("count", (0, -1))
+def test_a_row_of_holes_in_radius_and_angle_has_one_at_least(count: int) -> None:
+    text = f"G21 G17 G90\nG0 X0 Y0 Z9\nG91 G98 G81 R-1 Z-2 ^30 L{count} F9\nG80\nM2\n"
+    assert refused(text, "linuxcnc") == (
+        "OLP516",
+        f"a cycle is repeated {count} times; expected one or more",
+        3,
+    )
