@@ -89,10 +89,13 @@ def write_files(
     written: dict[Path, Content] = {}
     for target, whole in files.items():
         own = _divided(target, whole)
-        # a further file that is there and stays as it is has not to be written
-        written |= {part: data for part, data in own.items() if part == target or not _holds(part, data)}
         # the files that were read with a program are inputs, too
-        inputs += [source.with_name(part.name) for source in many for part in own if part != target]
+        read = [source.with_name(part.name) for source in many for part in own if part != target]
+        inputs += read
+        # one of them that stays as it is has not to be written
+        written |= {
+            part: data for part, data in own.items() if not (_is_one(part, read) and _holds(part, data))
+        }
     files = written
     check_targets(files, inputs, force=force)
     waiting: list[Replacement] = []
@@ -122,10 +125,14 @@ def _divided(target: Path, content: Content) -> Mapping[Path, Content]:
     return projects.divided(target, content) if projects.is_one_of_many(target) else divided(target, content)
 
 
+def _is_one(file: Path, others: Iterable[Path]) -> bool:
+    return file.is_file() and any(other.is_file() and file.samefile(other) for other in others)
+
+
 def _holds(file: Path, data: Content) -> bool:
-    """Whether a file is there and has these bytes."""
+    """Whether a file has these bytes."""
     size = len(data) if isinstance(data, bytes | Mapped) else -1
-    return file.is_file() and file.stat().st_size == size and read_bytes(file) == data
+    return file.stat().st_size == size and read_bytes(file) == data
 
 
 def check_targets(

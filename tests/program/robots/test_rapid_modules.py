@@ -121,6 +121,14 @@ def test_another_module_that_changes_a_target_counts(bent: Path, cell: Path) -> 
     assert b"p10:=[[20,30,-5]" in done.data
 
 
+def test_another_module_that_changes_a_tool_counts(bent: Path, cell: Path) -> None:
+    (cell / "Teach.mod").write_text(
+        "MODULE Teach\nPROC teach()\ngrip.tframe.trans.z:=3;\nENDPROC\nENDMODULE\n"
+    )
+    with pytest.raises(ProgramError, match=r"grip gets another value in line 3 of Teach\.mod"):
+        olp.correct(cell / "Main.mod", bent)
+
+
 def test_a_target_that_two_other_modules_declare_is_refused(bent: Path, cell: Path) -> None:
     (cell / "Copy.mod").write_text(POINTS.replace("MODULE Points", "MODULE Copy"))
     only = MAIN.replace("MoveL p20,v100,fine,grip\\WObj:=part;", "")
