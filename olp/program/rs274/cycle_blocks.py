@@ -25,7 +25,9 @@ from olp.program.rs274.strokes import Drilling, Step, Strokes, strokes
 from olp.program.rs274.turned import Turning
 
 #: Kinds of the moves of a hole, and steps that are moves.
-_RAPID, _LINE, _FEED = np.uint8(Kind.RAPID), np.uint8(Kind.LINE), np.uint8(Step.FEED)
+_RAPID = np.uint8(Kind.RAPID)
+_LINE = np.uint8(Kind.LINE)
+_FEED = np.uint8(Step.FEED)
 
 
 class CycleBlocks:

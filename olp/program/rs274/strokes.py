@@ -38,7 +38,9 @@ class Step(IntEnum):
 
 
 #: The same as numbers: to read a member of an enumeration takes as long as a step on a short array.
-_RAPID, _FEED, _DWELL = np.uint8(Step.RAPID), np.uint8(Step.FEED), np.uint8(Step.DWELL)
+_RAPID = np.uint8(Step.RAPID)
+_FEED = np.uint8(Step.FEED)
+_DWELL = np.uint8(Step.DWELL)
 
 _Recipe = tuple[tuple[Step, str], ...]
 _DRILL: _Recipe = ((Step.FEED, "z"), (Step.RAPID, "clear"))
