@@ -35,6 +35,9 @@ def campaign(kinds: list[str], forms: list[str], seeds: range, *, play: bool) ->
                     continue
                 if not forms and form not in (LIST, *rotating(forms_of(kind), seed)):
                     continue
+                if play and form in PLANES:
+                    # its judge follows no play
+                    continue
                 told = judged(kind, form, seed, play=play)
                 counts[told.what] += 1
                 worst = max(worst, told.cost if told.what == "right" else 0.0)
