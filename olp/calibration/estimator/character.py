@@ -42,7 +42,7 @@ RELATED = 0.0, 1.0, 0.5, 0.5
 #: logarithm of that.
 STEPS_BEFORE = 0.9, 1.2e-3, 0.7
 #: The same of ripple.
-RIPPLE_BEFORE = 0.02, 2.4e-3, 0.35
+RIPPLE_BEFORE = 0.02, 3.2e-3, 0.5
 #: The scale that stands for all probable ones is the mean of this power of them: 2 is the expected variance.
 MOMENT = 2.0
 #: Directions of the unknowns that readings determine less than this, against the best, say nothing.
