@@ -147,5 +147,6 @@ def test_a_batch_corrects_what_belongs_together_once(bent: Path, cell: Path) -> 
         main, ["batch", str(cell), "-m", str(bent), "-o", str(out), "--fail-on", "never"]
     )
     assert call.exit_code == 0, call.output
-    assert "it is read with" in call.output
+    # a long path breaks the line
+    assert "it is read with" in " ".join(call.output.split())
     assert {path.name for path in out.glob("*.mod")} == {"Calib.mod", "Main.mod", "Points.mod", "Other.mod"}
