@@ -28,6 +28,7 @@ class Sources:
         self._opened: dict[str, None] = {}
         self._there: set[Path] = set()
         self._absent: set[Path] = set()
+        self._programs: dict[str, bytes | None] = {}
 
     @property
     def files(self) -> tuple[str, ...]:
@@ -90,7 +91,10 @@ class Sources:
     def _whole(self, path: PathLike) -> Text:
         """A program with its data, where these are in a file beside it, or with all files of its project."""
         if is_one_of_many(Path(path)):
-            text = gathered(Path(path), self)
+            name = in_parcel(path)
+            if name not in self._programs:
+                self._programs[name] = gathered(Path(path), self)
+            text = self._programs[name]
             return self.text(path) if text is None else text
         data = data_beside(Path(path))
         if data is None or not self.exists(data):
@@ -204,27 +208,31 @@ def _placed(source: Source, own: AbstractContextManager[None]) -> Iterator[None]
             yield
         except OlpError as error:
             may = not source.name or is_one_of_many(Path(source.name))
-            if may and error.line is not None and holds_several(source.data):
+            # gathered once: an error may have thousands of reasons
+            text = source.data if may and error.line is not None else b""
+            if holds_several(text):
                 for each in (error, *(error.others if isinstance(error, ProgramError) else ())):
-                    each.file, each.line = _own_place(source, each.file, each.line)
+                    each.file, each.line = _own_place(source, text, each.file, each.line)
                 if isinstance(error, Refused):
-                    error.reasons = tuple(_own_reason(source, reason) for reason in error.reasons)
+                    error.reasons = tuple(_own_reason(source, text, reason) for reason in error.reasons)
             raise
 
 
-def _own_place(source: Source, file: str | None, line: int | None) -> tuple[str | None, int | None]:
-    """The file of a line and its number there; unchanged where it is one of the first file."""
+def _own_place(
+    source: Source, text: Text, file: str | None, line: int | None
+) -> tuple[str | None, int | None]:
+    """The file of a line of a text and its number there; unchanged where it is one of the first file."""
     if line is None or file is not None:
         return file, line
-    name, own = place_of(source.data, line)
+    name, own = place_of(text, line)
     if not name:
         return file, line
     return str(Path(source.name).with_name(name)) if source.name else name, own
 
 
-def _own_reason(source: Source, reason: Reason) -> Reason:
-    file, line = _own_place(source, reason.file, reason.line)
-    follows_file, follows = _own_place(source, reason.follows_file, reason.follows)
+def _own_reason(source: Source, text: Text, reason: Reason) -> Reason:
+    file, line = _own_place(source, text, reason.file, reason.line)
+    follows_file, follows = _own_place(source, text, reason.follows_file, reason.follows)
     return replace(reason, file=file, line=line, follows_file=follows_file, follows=follows)
 
 

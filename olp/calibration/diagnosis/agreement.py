@@ -304,6 +304,8 @@ def _given(precision: Array, right: Array, columns: Index) -> _Given:
 
 def _root(covariance: Array) -> Array:
     """A factor of a covariance, which may be singular to rounding."""
-    scale = np.sqrt(np.diag(covariance))
+    variance = np.diag(covariance)
+    # below zero by rounding: nothing is left to know of it
+    scale = np.sqrt(np.maximum(variance, np.finfo(float).eps * variance.max()))
     values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
     return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
