@@ -25,7 +25,8 @@ _DECLARED = pattern(
     rb"\s+(\w+)"
 )
 _WORD = pattern(rb"[A-Za-z]\w*")
-_GIVEN = pattern(rb"(?<![\\\w.}])([A-Za-z]\w*)\s*(?:\{[^}]*\})?(?:\.\w+)*\s*:=")
+#: A name that gets a value.
+GIVEN = pattern(rb"(?<![\\\w.}])([A-Za-z]\w*)\s*(?:\{[^}]*\})?(?:\.\w+)*\s*:=")
 _TARGETS = frozenset((b"ROBTARGET", b"JOINTTARGET"))
 
 
@@ -84,7 +85,7 @@ def _module(data: bytes) -> _Module:
         name.upper(): type_.upper() for local, type_, name in declared if (local or b"").upper() != b"LOCAL"
     }
     words = frozenset(word.upper() for word in set(_WORD.findall(text)))
-    given = frozenset(word.upper() for word in set(_GIVEN.findall(text)))
+    given = frozenset(word.upper() for word in set(GIVEN.findall(text)))
     return _Module(offered, words - own, given - own)
 
 

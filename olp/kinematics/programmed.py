@@ -1,7 +1,8 @@
-"""Programmed coordinates of machines with three linear axes, and the axis values that they stand for.
+"""Programmed coordinates that state the tip, and the axis values that they stand for.
 
 In axis words the numbers are axis values. With tool centre point control the linear ones state the tip in the
-workpiece, as the axis values that would bring a tool without length there with all rotary axes at zero.
+workpiece, as the axis values that would bring a tool without length there with all rotary axes at zero. Where
+a platform carries the tool, all of them state its pose (`olp.kinematics.coordinates`).
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ from olp.core.errors import ConfigError
 from olp.core.machine import ZERO
 from olp.kinematics.chain import Kinematics
 from olp.kinematics.columns import cross, dot, triple
+from olp.kinematics.coordinates import axes_of_poses, poses_of_axes, stated_poses, states_poses
+from olp.kinematics.poses import Poses
 from olp.kinematics.structure import Structure
 
 #: Below this share of a unit volume three linear axes do not reach every point of space.
@@ -38,7 +41,9 @@ def linear_columns(structure: Structure) -> list[int]:
 
 def axes_of_tips(machine: Kinematics, values: Array) -> Array:
     """(n, axes) axis values of the nominal machine at programmed tips (n, axes): rotary columns as they are,
-    linear ones such that the tip is there."""
+    linear ones such that the tip is there. Raises NotInvertible with rows whose poses are out of reach."""
+    if states_poses(machine.structure):
+        return axes_of_poses(machine, values)
     columns = linear_columns(machine.structure)
     still = values.copy()
     still[:, columns] = 0.0
@@ -54,12 +59,23 @@ def axes_of_tips(machine: Kinematics, values: Array) -> Array:
 
 def stated_tips(machine: Kinematics, values: Array) -> Array:
     """(n, 3) tips in workpiece coordinates of programmed coordinates (n, axes), which state the tip."""
+    if states_poses(machine.structure):
+        return stated_poses(machine.structure, values).position
     origin, slopes = _workpiece(machine)
     return np.asarray(origin + values[:, linear_columns(machine.structure)] @ slopes.T)
 
 
+def stated_targets(machine: Kinematics, values: Array) -> Poses:
+    """(n) poses of the nominal tool at programmed coordinates (n, axes), which state the tip."""
+    if states_poses(machine.structure):
+        return stated_poses(machine.structure, values)
+    return Poses(machine.nominal(values).rotation, stated_tips(machine, values))
+
+
 def tips_of_axes(machine: Kinematics, values: Array) -> Array:
-    """(n, axes) the other way round."""
+    """(n, axes) the other way round from axis values (n, axes)."""
+    if states_poses(machine.structure):
+        return poses_of_axes(machine, values)
     columns = linear_columns(machine.structure)
     origin, slopes = _workpiece(machine)
     tips = values.copy()

@@ -215,18 +215,21 @@ class Judge:
         if not self.vector or (begin[turning] == end[turning]).all():
             return place
         first, last = (self.forward(row[None], False)[1][0] for row in (begin, end))
-        turn = Rotation.align_vectors([last], [first])[0].as_rotvec()
-        turn -= first * (turn @ first)
+        normal = np.cross(first, last)
+        size = np.linalg.norm(normal)
+        turn = normal / max(size, 1e-300) * np.arctan2(size, first @ last)
         wanted = Rotation.from_rotvec(share * turn).apply(first)
-        for _ in range(5):
+        for _ in range(8):
             along = self.forward(place, False)[1]
             slopes = np.empty((len(place), 3, len(turning)))
             for number, column in enumerate(turning):
-                ahead = place.copy()
-                ahead[:, column] += 1e-4
-                slopes[:, :, number] = (self.forward(ahead, False)[1] - along) / 1e-4
-            step = [np.linalg.lstsq(a, b, rcond=1e-6)[0] for a, b in zip(slopes, wanted - along, strict=True)]
-            place[:, turning] += np.array(step)
+                ahead, behind = place.copy(), place.copy()
+                ahead[:, column] += 1e-3
+                behind[:, column] -= 1e-3
+                difference = self.forward(ahead, False)[1] - self.forward(behind, False)[1]
+                slopes[:, :, number] = difference / 2e-3
+            step = (np.linalg.pinv(slopes, rcond=1e-6) @ (wanted - along)[..., None])[..., 0]
+            place[:, turning] += step
         return place
 
     def _move(

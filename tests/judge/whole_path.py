@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from judge.five_axis import OWN, Judge, ends
+from judge.five_axis import Judge, ends
 from judge.tilted import TiltedJudge
-from judge.whole_machine import NONE, WholeMachine, turns
+from judge.whole_machine import NONE, WholeMachine
 
 #: A move: whether it cuts, whether its words state the tip, and its coordinates.
 Row = tuple[bool, bool, np.ndarray]
@@ -45,30 +45,6 @@ class Whole(Judge):
         """The rows of a list of axis values."""
         rows = [line for line in text.decode().splitlines() if line[:1] in tuple("-.0123456789")]
         return [(True, False, np.array([float(cell) for cell in row.split(",")])) for row in rows]
-
-    def _between(self, begin: np.ndarray, end: np.ndarray, share: np.ndarray) -> np.ndarray:
-        place = begin + share * (end - begin)
-        turning = [column for column, name in enumerate(self.order) if name not in OWN]
-        if not self.vector or (begin[turning] == end[turning]).all():
-            return place
-        first, last = (self.forward(row[None], False)[1][0] for row in (begin, end))
-        normal = np.cross(first, last)
-        size = np.linalg.norm(normal)
-        angle = np.arctan2(size, first @ last)
-        turn = normal / max(size, 1e-300) * angle
-        wanted = (turns(share * turn) @ first[:, None])[..., 0]
-        for _ in range(8):
-            along = self.forward(place, False)[1]
-            slopes = np.empty((len(place), 3, len(turning)))
-            for number, column in enumerate(turning):
-                ahead, behind = place.copy(), place.copy()
-                ahead[:, column] += 1e-3
-                behind[:, column] -= 1e-3
-                difference = self.forward(ahead, False)[1] - self.forward(behind, False)[1]
-                slopes[:, :, number] = difference / 2e-3
-            step = (np.linalg.pinv(slopes, rcond=1e-6) @ (wanted - along)[..., None])[..., 0]
-            place[:, turning] += step
-        return place
 
     def whole_judged(
         self, first: list[Row], second: list[Row], within: tuple[float, float], skip: int = 0

@@ -3,6 +3,7 @@ forward computation of their own, at and between the written waypoints."""
 
 from __future__ import annotations
 
+import json
 import re
 from itertools import pairwise
 from pathlib import Path
@@ -10,9 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cases.any_machines import Made, write_machine
+from click.testing import CliRunner
 from judge.whole_machine import WholeMachine, small
 
 import olp
+from olp.cli import main
 from olp.core.errors import ProgramError
 
 OFFSET = (5.0, -3.0, 2.0)
@@ -155,3 +158,16 @@ def test_poses_of_a_delta_that_do_not_exist_are_refused(words: str, why: str, tm
     with pytest.raises(ProgramError, match=why) as refused:
         olp.correct_joints(f"{HEAD}G0 {words} Y0 Z{made.start[2] + 60:.3f}\nM30\n".encode(), machine)
     assert refused.value.line == 4
+
+
+def test_points_measured_in_a_work_offset_are_compared(tmp_path: Path) -> None:
+    machine, made = machine_of(tmp_path, "hexapod", 3)
+    high = round(made.start[2] + made.tip[2])
+    (tmp_path / "m.csv").write_text(f"# frame=G54\nx_mm,y_mm,z_mm\n5.0,2.5,{high + 0.02}\n10,5,{high}\n")
+    program = tmp_path / "p.ngc"
+    program.write_text(program_of("hexapod", made))
+    out = tmp_path / "report.json"
+    words = ["compare", program, tmp_path / "m.csv", "-m", machine, "--report", out]
+    call = CliRunner().invoke(main, [str(word) for word in words])
+    assert call.exit_code == 0, call.output
+    assert json.loads(out.read_text())["after"]["across_um"]["max"] == pytest.approx(20.0, abs=0.01)

@@ -13,7 +13,7 @@ from olp.core.machine import Vector
 from olp.core.turns import Turn, turned
 from olp.core.values import dataclass
 from olp.kinematics.chain import Kinematics
-from olp.kinematics.coordinates import Coordinates, axes_of_poses, poses_of_axes, stated_poses, states_poses
+from olp.kinematics.coordinates import Coordinates
 from olp.kinematics.correction import (
     CorrectedPoses,
     beyond_travel,
@@ -23,7 +23,7 @@ from olp.kinematics.correction import (
 )
 from olp.kinematics.errors import MachineErrors
 from olp.kinematics.poses import Poses
-from olp.kinematics.programmed import axes_of_tips, stated_tips, tips_of_axes
+from olp.kinematics.programmed import axes_of_tips, stated_targets, stated_tips, tips_of_axes
 from olp.kinematics.structure import Structure
 
 #: A tool vector, and how words are turned.
@@ -77,8 +77,7 @@ class Motion:
     def axes(self, programmed: Array, tool: Index, tip: Mask) -> Array:
         """(n, axes) axis values of programmed coordinates, which state the `tip` in some rows. Raises
         NotInvertible with rows whose poses are out of reach."""
-        change = axes_of_poses if states_poses(self.structure) else axes_of_tips
-        return self._by_tool(self._turned(programmed, tool, back=False), tool, tip, change)
+        return self._by_tool(self._turned(programmed, tool, back=False), tool, tip, axes_of_tips)
 
     def targets(self, programmed: Array, tool: Index, tip: Mask) -> Poses:
         """(n) poses of the nominal machine at programmed coordinates, which state the `tip` in some rows:
@@ -87,8 +86,8 @@ class Motion:
 
         def pose(machine: Kinematics, rows: Rows) -> Poses:
             stated = tip[rows]
-            if states_poses(self.structure) and stated.all():
-                return stated_poses(self.structure, values[rows])
+            if stated.all():
+                return stated_targets(machine, values[rows])
             poses = machine.nominal(values[rows])
             if stated.any():
                 poses.position[stated] = stated_tips(machine, values[rows][stated])
@@ -98,8 +97,7 @@ class Motion:
 
     def programmed(self, axes: Array, tool: Index, tip: Mask) -> Array:
         """(n, axes) the other way round."""
-        change = poses_of_axes if states_poses(self.structure) else tips_of_axes
-        return self._turned(self._by_tool(axes, tool, tip, change), tool, back=True)
+        return self._turned(self._by_tool(axes, tool, tip, tips_of_axes), tool, back=True)
 
     def between(self, start: Array, end: Array, share: Array, tool: Index, vector: Mask) -> Array:
         """(n, axes) programmed coordinates at shares of moves. In `vector` rows the direction of the tool

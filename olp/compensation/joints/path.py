@@ -175,12 +175,10 @@ class JointPath:
         fresh = stated_afresh(program, fixed, degrees)
         end[:, columns] = _stated_in_mode(end[:, columns], given, mode, elsewhere, fresh)
         refuse_tips(program, structure, tip & ~fixed & (not words.poses), end, offset, tips_from_zero)
-        touched = [_shift(structure, errors, frame.touched, row, words)
-                   for frame, row in zip(path.frames, offsets, strict=True)]  # fmt: skip
-        shifts = np.array(touched).reshape(-1, 3)
+        pairs = zip(path.frames, offsets, strict=True)
+        shifts = [_shift(structure, errors, frame.touched, row, words) for frame, row in pairs]
         tool = tool_of[path.frame]
-        if words.poses:
-            _refuse_poses(program, motion, end, tool, holes)
+        _refuse_poses(program, words, motion, end, tool, holes)
         kept = (path.flag & KEPT) != 0
         arc = np.zeros(len(path), bool)
         arc[path.arcs.move] = True
@@ -191,8 +189,9 @@ class JointPath:
         stay = stands_before(fixed | holes.whole, feed, degrees)
         held = np.append(tip[1:] & ~tip[:-1], False)[: len(tip)] | stay
         return JointPath(
-            program, motion, words, start, end, slot, tool, tip, vector, shifts[path.frame], offset, unit,
-            scale, feed, feed, kept, held, stay, _places(words), holes, directions, curves,
+            program, motion, words, start, end, slot, tool, tip, vector,
+            np.array(shifts).reshape(-1, 3)[path.frame], offset, unit, scale, feed, feed, kept, held, stay,
+            _places(words), holes, directions, curves,
         )  # fmt: skip
 
     @staticmethod
@@ -227,9 +226,13 @@ class JointPath:
         )  # fmt: skip
 
 
-def _refuse_poses(program: Program, motion: Motion, end: Array, tool: Index, holes: Drilled) -> None:
-    """Raise ProgramError for stated poses that legs do not reach, turns that are nearly stated by other
-    numbers, and cycles."""
+def _refuse_poses(
+    program: Program, words: Coordinates, motion: Motion, end: Array, tool: Index, holes: Drilled
+) -> None:
+    """Where words state poses, raise ProgramError for those that legs do not reach, turns that are nearly
+    stated by other numbers, and cycles."""
+    if not words.poses:
+        return
     line = program.toolpath.line
     if holes.strokes.any():
         raise ProgramError(

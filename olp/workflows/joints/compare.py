@@ -14,6 +14,7 @@ from olp.core.arrays import Array, Index
 from olp.core.errors import InputError, UsageError
 from olp.files.point_profile import PointProfile
 from olp.files.points import Points, read_points
+from olp.kinematics.coordinates import Coordinates
 from olp.kinematics.poses import Poses
 from olp.kinematics.programmed import stated_tips
 from olp.program.pointlist.axis_list import names_of
@@ -109,7 +110,7 @@ def _in_workpiece(points: Points, run: JointRun, path: JointPath) -> Points:
             f"expected {_WORKPIECE} or such an offset",
             file=points.file,
         )
-    structure = path.motion.structure
-    values = np.zeros((len(points), len(structure.order)))
-    values[:, [structure.order.index(axis) for axis in "XYZ"]] = points.points_mm + np.array(offset.offset_mm)
+    words = Coordinates.of_words(path.motion.structure)
+    values = np.zeros((len(points), len(words.names)))
+    values[:, words.linear] = points.points_mm + np.array(offset.offset_mm)
     return replace(points, points_mm=stated_tips(path.motion.machines[0], values), frame=_WORKPIECE)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from olp.core.patterns import pattern
+from olp.core.rapid_modules import GIVEN
 from olp.core.values import dataclass
 from olp.program.dialect import Support
 from olp.program.robots.rapid.forms import FORMS
@@ -21,7 +22,6 @@ _HARMLESS_TAIL = pattern(
     rb"(?is).*[\s)](?:GOTO\s+\w+|RETURN\b.*|EXIT|EXITCYCLE|STOP|BREAK|(?:Set|Reset|Wait|TPWrite|Incr|Decr|"
     rb"SetDO|SetGO|SetAO|WaitTime)\b.*|[\w.{}]+\s*:=.*)"
 )
-_ASSIGNED = pattern(rb"(?<![\\\w.}])([A-Za-z]\w*)\s*(?:\{[^}]*\})?(?:\.\w+)*\s*:=")
 #: Names that stand alone as arguments.
 _MENTIONED = pattern(rb"(?:^|[\s,(])([A-Za-z]\w*)\s*(?=,|$)")
 #: The second argument of a search: where it writes what it has found.
@@ -88,7 +88,7 @@ def calls(text: bytes) -> bool:
 
 
 def is_assignment(statement: Statement) -> bool:
-    match = _ASSIGNED.match(statement.text.lstrip())
+    match = GIVEN.match(statement.text.lstrip())
     return match is not None
 
 
@@ -101,13 +101,13 @@ def given_in(statement: Statement) -> list[str]:
     if inner is not None:
         return given_in(inner)
     if is_assignment(statement):
-        names = _ASSIGNED.findall(text)
+        names = GIVEN.findall(text)
     elif word in FORMS:
         names = _FOUND.findall(text) if FORMS[word].stopped else []
     elif word.startswith(b"MOVE"):
         names = []
     else:
-        names = [*_ASSIGNED.findall(text), *_MENTIONED.findall(text.partition(b" ")[2])]
+        names = [*GIVEN.findall(text), *_MENTIONED.findall(text.partition(b" ")[2])]
     return [name.decode("latin-1").upper() for name in names]
 
 
