@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from olp.compensation.joints.motion import Motion
@@ -14,10 +16,11 @@ from olp.trajectory.route import AxisLimits
 
 #: Rounds in which feeds are lowered where the tip is faster than its feed.
 _ROUNDS = 5
-#: The tip may be faster than its feed by this share of it.
+#: Where the tip is faster than its feed by more than this share of it, feeds are lowered; where by less, the
+#: motion between two rests is slowed down.
 _FASTER = 1e-3
 #: Samples of a piece of the motion at which the tip is looked at, as shares of its time.
-_SHARES = (0.0, 0.25, 0.5, 0.75)
+_SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
 #: Pieces that are looked at together.
 _BLOCK = 1 << 14
 
@@ -42,8 +45,8 @@ class Stretch:
 def planned(
     motion: Motion, route: JointRoute, limits: AxisLimits, tell: Progress, optimise: bool | None = None
 ) -> Stretch:
-    """The motion of a route, again with lower feeds where the tip would be faster than its own. `limits` are
-    those of the axes in mm and deg, `optimise` is that of `plan`."""
+    """The motion of a route, again with lower feeds where the tip would be faster than its own, and at last
+    slower. `limits` are those of the axes in mm and deg, `optimise` is that of `plan`."""
     scaled = AxisLimits(
         limits.velocity * route.scale, limits.acceleration * route.scale, limits.jerk * route.scale
     )
@@ -53,9 +56,30 @@ def planned(
         factor = np.ones(len(route.line))
         np.maximum.at(factor, found.motion.line, ratio)
         if left == 0 or not (factor > 1.0 + _FASTER).any():
-            return Stretch(motion, route, found, ratio, limit)
+            return _eased(Stretch(motion, route, found, ratio, limit))
         route = route.slower(factor)
     raise AssertionError("the last round returns")
+
+
+def _eased(stretch: Stretch) -> Stretch:
+    """The same with each leg as much slower as the tip is faster than its feed: nothing is faster then."""
+    found = stretch.trajectory
+    pieces, moves = found.motion, (found.motion.time[:, 1:] != 0.0).any(axis=1)
+    factor, legs = np.ones(len(pieces)), []
+    width = np.diff(pieces.start_s)
+    for leg in found.legs:
+        some = slice(*np.searchsorted(pieces.line, (leg.first, leg.last)).tolist())
+        most = float(stretch.ratio[some].max(initial=1.0))
+        factor[some] = np.where(moves[some], most, 1.0)
+        more = float((factor[some] - 1.0) @ width[some])
+        legs.append(replace(leg, duration_s=leg.duration_s + more, factor=leg.factor * most))
+    if not (factor > 1.0).any():
+        return stretch
+    start = np.concatenate((pieces.start_s[:1], pieces.start_s[0] + np.cumsum(width * factor)))
+    time = pieces.time * factor[:, None] ** -np.arange(float(pieces.time.shape[1]))
+    slower = replace(pieces, start_s=start, time=time)
+    trajectory = replace(found, motion=slower, legs=tuple(legs))
+    return replace(stretch, trajectory=trajectory, ratio=stretch.ratio / factor)
 
 
 def _used(motion: Motion, route: JointRoute, found: Trajectory, limits: AxisLimits) -> tuple[Array, Index]:
@@ -66,15 +90,25 @@ def _used(motion: Motion, route: JointRoute, found: Trajectory, limits: AxisLimi
     bounds = (limits.velocity, limits.acceleration, limits.jerk)
     for a in range(0, count, _BLOCK):
         piece = np.arange(a, min(a + _BLOCK, count))
-        segment = pieces.line[piece]
-        for share in _SHARES:
+        segment, speeds = pieces.line[piece], np.empty((len(_SHARES), len(piece)))
+        for sample, share in enumerate(_SHARES):
             position, *rates = pieces.of(piece, share * seconds[piece])
             for k, (rate, bound) in enumerate(zip(rates, bounds, strict=True)):
                 most[piece, k::3] = np.maximum(most[piece, k::3], np.abs(rate) / bound)
-            speed = _tip_speed(motion, route, position, rates[0], segment)
-            ratio[piece] = np.maximum(ratio[piece], speed / route.feed_mm_s[segment])
+            speeds[sample] = _tip_speed(motion, route, position, rates[0], segment)
+        ratio[piece] = _highest(speeds) / route.feed_mm_s[segment]
     nearest = most.argmax(axis=1)
     return ratio, np.where(ratio >= most.max(axis=1), -1, nearest)
+
+
+def _highest(samples: Array) -> Array:
+    """(n,) the largest values of curves by (k, n) samples, between them by parabolas through three."""
+    left, middle, right = samples[:-2], samples[1:-1], samples[2:]
+    slope, bend = (right - left) / 2.0, right - 2.0 * middle + left
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inside = (bend < 0.0) & (np.abs(slope) < -bend)
+        top = np.where(inside, middle - slope * slope / (2.0 * bend), 0.0)
+    return np.asarray(np.maximum(samples.max(axis=0), top.max(axis=0)), float)
 
 
 def _tip_speed(
