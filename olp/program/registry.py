@@ -41,6 +41,7 @@ _KNOWN = {
     "mach3": Known("olp.program.rs274.profiles.mach3"),
     "mach4": Known("olp.program.rs274.profiles.mach4"),
     "mazak": Known("olp.program.rs274.profiles.mazak"),
+    "centroid": Known("olp.program.rs274.profiles.centroid"),
     "okuma": Known("olp.program.rs274.profiles.okuma", signs.OKUMA),
     "siemens-iso": Known("olp.program.rs274.profiles.siemens_iso"),
     "marlin": Known("olp.program.rs274.profiles.marlin", signs.PRINTER),

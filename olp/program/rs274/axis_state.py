@@ -140,6 +140,13 @@ class AxisState(OffsetState):
     def frame(self, line: int) -> int:
         """Index of the present frame; a tool or offset that is not defined is refused here, at its first
         use."""
+        if self.awaiting_number:
+            raise ProgramError(
+                f"G{self.awaiting_number / 10:g} has no H word, and no block up to this move has one; give H "
+                "with the number of the tool length",
+                line=line,
+                code="OLP516",
+            )
         offsets, name = self.offsets, self.offsets.name
         state = (
             self.unit, self.spindle, self.length_tool, self.payload_kg, self.compensation,
@@ -281,7 +288,9 @@ class AxisState(OffsetState):
             word = block.by_letter.get(letter)
             if word is None or letter in used:
                 continue
-            if letter == "H" and word.value == 0 and self.profile.zero_ends_length and not self.offsets.tip:
+            if letter == "H" and word.value and self.awaiting_number:
+                self._tool_length(self.awaiting_number, line, block.by_letter)
+            elif letter == "H" and word.value == 0 and self.profile.zero_ends_length and not self.offsets.tip:
                 # as G49 does
                 self._tool_length(LENGTH_OFF, line, block.by_letter)
             elif before is not None and word.value != before:
@@ -353,9 +362,11 @@ class AxisState(OffsetState):
         moving = {m for m in m_codes if m not in self.profile.still_m}
         if self.profile.m61_sets_tool:
             moving.discard(SET_TOOL)
+        machine = self.setup.machine
+        if moving and moving <= self.profile.home_m:
+            return (2,), machine.home_mm
         if moving != {TOOL_CHANGE}:
             return (0, 1, 2) if moving else (), UNKNOWN
-        machine = self.setup.machine
         axes = (i for i, a in enumerate(AXES) if a in machine.tool_change_moves)
         return tuple(axes), machine.tool_change_mm
 

@@ -101,6 +101,8 @@ class OffsetState(State):
     length_tool: int | None = None
     #: the H of the length in force, 0 for none of its own; None behind G49
     length_number: int | None = None
+    #: the code of a length whose H a later block states, 0 for none
+    awaiting_number: int = 0
     #: the last D
     radius_number: int | None = None
     spindle: int | None = None
@@ -176,6 +178,7 @@ class OffsetState(State):
         return tool.length_mm
 
     def _tool_length(self, code: int, line: int, by_letter: dict[str, Word]) -> None:
+        self.awaiting_number = 0
         if code == LENGTH_OFF:
             self._set_length(ZERO)
             self.length_tool = self.length_number = None
@@ -194,6 +197,11 @@ class OffsetState(State):
         if number is None and code == 430 and self.spindle in (None, self.length_number):
             # the last H and the tool in the spindle are the same, whichever the control takes
             number = self.length_number or None
+        if number is None and self.profile.length_awaits_number:
+            self._set_length(ZERO)
+            self.length_tool = self.length_number = None
+            self.awaiting_number = code
+            return
         if number is None:
             raise ProgramError(
                 f"{name} needs an H word with the number of the tool length", line=line, code="OLP516"
@@ -257,6 +265,8 @@ class OffsetState(State):
     ) -> None:
         from olp.program.rs274.tool_tables import check_tool, words_of_tool
 
+        if "L" not in by_letter and "P" in by_letter and by_letter["P"].value in self.profile.g10_clearances:
+            return
         kind = round(by_letter["L"].value) if "L" in by_letter else -1
         stated = {a: self.length_mm(by_letter[a]) for a in words_of_tool(self, kind) if a in by_letter}
         if stated and "P" in by_letter:

@@ -22,6 +22,7 @@ from olp.workflows.flatten import UnrollOptions, as_asked
 
 LINUXCNC, FANUC, HAAS, GRBL = CONTROLS = ("linuxcnc", "fanuc", "haas", "grbl")
 MACH3, MACH4, MAZAK, OKUMA, SIEMENS = FURTHER = ("mach3", "mach4", "mazak", "okuma", "siemens-iso")
+CENTROID = "centroid"
 MARLIN, KLIPPER = PRINTERS = ("marlin", "klipper")
 #: Each tool has a length along X, too.
 TOOLS = "".join(
@@ -52,6 +53,21 @@ READINGS: dict[str, tuple[str, dict[str, Outcome], Any]] = {
         "G70 G0 X1. Y0. Z0.",
         {MACH3: (25.4, 0, 0)} | dict.fromkeys((MACH4, FANUC, MAZAK), "G70 is not known to the"),
         {MACH3: {}, MACH4: {700: 200}, FANUC: {700: 200}, MAZAK: {700: 200}},
+    ),
+    "home_m": (
+        "G0 X1. Y2. Z3.\nM25\nG0 X5. Z4.",
+        {CENTROID: (5, 2, 4)},
+        {CENTROID: frozenset()},
+    ),
+    "length_awaits_number": (
+        "G0 X0. Y0. Z99.\nG43\nG0 Z5. H2",
+        {CENTROID: (0, 0, 25), FANUC: "G43 needs an H word", HAAS: "G43 needs an H word"},
+        "not",
+    ),
+    "g10_clearances": (
+        "G0 X1. Y2. Z3.\nG10 P73 R0.5\nX5.",
+        {CENTROID: (5, 2, 3), FANUC: "G10 without L writes tables"},
+        {CENTROID: frozenset(), FANUC: frozenset({73})},
     ),
     "g10_stores": (
         "G54.1 P1\nG0 X1. Y2. Z3.\nG10 L20 P2 X0.\nG54.1 P2 X1. Y0. Z0.",
@@ -285,7 +301,7 @@ CYCLES: dict[str, tuple[str, dict[str, str]]] = {
 #: What these decide is a matter of time: feeds and rests by hand stand in `tests/program/feeds`.
 OF_TIME = {
     "feed_without_point", "exact_stop", "feed_words_end", "feed_before_unit", "least_inverse_feed",
-    "m_with_motion", "dwell_ms", "dwell_words",
+    "m_with_motion", "dwell_ms", "dwell_words", "dwell_in_seconds",
 }  # fmt: skip
 #: Tables and texts, which have tests of their own.
 TABLES = {"codes", "refusals", "harmless_m", "text", "rules", "cycles", "contours", "language",
@@ -598,6 +614,7 @@ def test_how_programs_of_a_control_are_written() -> None:
     }
     assert written == {
         LINUXCNC: ("ngc", 5, 1, True, 0.1, False),
+        CENTROID: ("nc", 4, 0, False, 0.0, False),
         FANUC: ("nc", 4, 0, False, 0.0, True),
         HAAS: ("nc", 4, 0, False, 0.0, True),
         GRBL: ("nc", 5, 1, False, 0.0, False),
@@ -613,7 +630,7 @@ def test_how_programs_of_a_control_are_written() -> None:
         assert profile.title.startswith({GRBL: "Grbl 1.1 and", HAAS: "Haas mills"}.get(profile.name, ""))
         assert profile.first == (b"%", b"O|:") or profile.commands is not None
         assert profile.payload_comments
-        assert (profile.unroller is None) == (profile.name in PRINTERS)
+        assert (profile.unroller is None) == (profile.name in (*PRINTERS, CENTROID))
         # outputs that are switched along with a motion
         along = frozenset({62, 63, 67}) if profile.name == LINUXCNC else frozenset()
         assert profile.m_with_motion == along or {104, 106, 204} < profile.m_with_motion

@@ -113,7 +113,11 @@ class Profile(Dialect):
       G21. `least_inverse_feed`: units per minute, the least feed of a block in G93. `m_with_motion`: M codes
       carried out along with the motion, without a rest.
     - `dwell_words`: the letters that state the time of G4. `dwell_ms`: P counts milliseconds, whatever its
-      form.
+      form, `dwell_in_seconds`: seconds.
+    - `home_m`: the M codes that move the tool axis Z to the first reference position, ten times their number.
+    - `length_awaits_number`: G43 without H takes the length of the H that a later block states, and no
+      move may come before it.
+    - `g10_clearances`: the P with which G10 without L states by R how far pecks rise, which moves no point.
     - `tip_codes`: codes that switch tool centre point control on, where a machine has rotary axes: words
       state the tip then, until a code of tool lengths. Behind `direction_codes`, which are some of them,
       words state the direction of the tool, and none a rotary axis.
@@ -193,6 +197,10 @@ class Profile(Dialect):
     least_inverse_feed: float = 0.0
     m_with_motion: frozenset[int] = frozenset()
     dwell_ms: bool = False
+    dwell_in_seconds: bool = False
+    home_m: frozenset[int] = frozenset()
+    length_awaits_number: bool = False
+    g10_clearances: frozenset[int] = frozenset()
     dwell_words: str = "P"
     tip_codes: frozenset[int] = frozenset()
     direction_codes: frozenset[int] = frozenset()
@@ -279,7 +287,8 @@ class Profile(Dialect):
     def dwell_s(self, number: Number, *, pointed: bool) -> Number:
         """Seconds of P words; Fanuc and Haas count milliseconds where it has no decimal point, printers
         always."""
-        in_ms = self.dwell_ms or (self.increments_without_point and not pointed)
+        counts = self.increments_without_point and not self.dwell_in_seconds
+        in_ms = self.dwell_ms or (counts and not pointed)
         return number / 1000.0 if in_ms else number
 
     def counts_increments(self, machine: Machine) -> bool:
