@@ -29,7 +29,7 @@ from olp.kinematics.motion import actual_motion, nominal_motion
 from olp.kinematics.platforms import held, rods_of, swings
 from olp.kinematics.poses import Poses, relative
 from olp.kinematics.structure import FRAME, Platform, Structure
-from olp.kinematics.weight import yields_of
+from olp.kinematics.weight import gravity_problems, yields_of
 
 #: Axis values (n,) by name.
 Values = Mapping[str, Array]
@@ -171,7 +171,7 @@ class Kinematics:
         structure, errors, count = self.structure, self.errors, columns.shape[1]
         values, sides = self._named(columns), self._named(side_columns)
         nominal = self._nominal_motions(values, count) if structure.platforms or errors.yields else {}
-        yields = yields_of(structure, errors, nominal)
+        yields = yields_of(structure, errors, values, nominal)
         motions = {}
         for name, joint in structure.joints.items():
             if joint.kind != "length":
@@ -239,6 +239,7 @@ def _unknown_parts(structure: Structure, errors: MachineErrors) -> list[str]:
     ]
     if structure.platforms and any(gives != Yield() for gives in errors.yields.values()):
         problems.append("elasticity of a machine with platforms is not modelled; leave [elasticity] out")
+    problems += [sentence for _, sentence in gravity_problems(structure, errors)]
     off_chain = sorted(errors.yields.keys() & structure.joints.keys() - set(structure.chain))
     problems += [f"elasticity of {name}, which is out of the chain, is not modelled" for name in off_chain]
     return problems

@@ -90,6 +90,18 @@ class Yield:
 
 
 @dataclass(frozen=True, slots=True)
+class Gravity:
+    """The own turn of a rotary joint under unknown weights: sine * sin(s) + cosine * cos(s) in rad. s is the
+    sum of the values of the joints `angles`, each with the sign of its turn about the direction of `joint`.
+    """
+
+    joint: str
+    angles: tuple[str, ...]
+    sine: float = 0.0
+    cosine: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class Mass:
     """A weight on the body that joint `on` moves, with its centre at axis zero."""
 
@@ -118,3 +130,4 @@ class MachineErrors:
     yields: Mapping[str, Yield] = field(default_factory=dict)
     masses: tuple[Mass, ...] = ()
     payload: Payload = Payload()
+    gravity: tuple[Gravity, ...] = ()

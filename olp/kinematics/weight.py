@@ -1,11 +1,32 @@
-"""How joints give way under the weight of all that they carry, at the nominal posture."""
+"""How joints give way under the weight of all that they carry, at the nominal posture.
+
+The weights are stated as masses, or what they do is stated by sums of angles.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
-from olp.kinematics.columns import STILL, Columns, Triple, add, cross, dot, scaled, subtract, times, triple
-from olp.kinematics.errors import MachineErrors
+import numpy as np
+
+from olp.core.arrays import Array
+from olp.core.errors import ConfigError
+from olp.core.machine import ZERO, Vector
+from olp.kinematics.columns import (
+    STILL,
+    Columns,
+    Triple,
+    add,
+    cross,
+    dot,
+    plus,
+    scaled,
+    subtract,
+    times,
+    triple,
+)
+from olp.kinematics.errors import MachineErrors, Yield
 from olp.kinematics.motion import Yielded
 from olp.kinematics.structure import FRAME, Structure
 
@@ -13,14 +34,111 @@ from olp.kinematics.structure import FRAME, Structure
 FREE_FALL_M_S2 = 9.80665
 #: mm per m, for torques in Nm of arms in mm.
 _MM_PER_M = 1e3
+#: Directions whose product differs from 1 by less are parallel.
+_PARALLEL = 1e-9
+#: A joint that gives way by nothing.
+_UNMOVED = Yielded(0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
 def yields_of(
+    structure: Structure, errors: MachineErrors, values: Mapping[str, Array], motions: Mapping[str, Columns]
+) -> dict[str, Yielded]:
+    """By joint what it gives way, from axis `values` (n,) and nominal `motions` by name."""
+    gone = _under_masses(structure, errors, motions) if errors.yields else {}
+    for term in errors.gravity:
+        about = structure.joints[term.joint].direction
+        turn = sum(np.radians(values[name]) * sign_about(structure, name, about) for name in term.angles)
+        own = term.sine * np.sin(turn) + term.cosine * np.cos(turn)
+        old = gone.get(term.joint, _UNMOVED)
+        gone[term.joint] = replace(old, own=plus(old.own, own))
+    return gone
+
+
+def sign_about(structure: Structure, name: str, direction: Vector) -> float:
+    """1 where a rotary joint turns about a direction, -1 where about the opposite one, 0 elsewhere."""
+    joint = structure.joints.get(name)
+    if joint is None or joint.kind != "rotary":
+        return 0.0
+    along = float(np.dot(joint.direction, direction))
+    return float(np.sign(along)) if abs(along) > 1.0 - _PARALLEL else 0.0
+
+
+def turning_together(structure: Structure, joint: str) -> tuple[str, ...]:
+    """The rotary joints of the chain about a rotary joint that are parallel to it at every posture, in the
+    order of the chain: none between them turns about another direction. Empty where the joint is no part of
+    the chain."""
+    groups: list[list[str]] = [[]]
+    for name in structure.chain:
+        part = structure.joints.get(name)
+        turns = part is not None and part.kind == "rotary"
+        if part is None or (turns and not sign_about(structure, name, _of(structure, groups))):
+            groups.append([])
+        if turns:
+            groups[-1].append(name)
+    return next((tuple(group) for group in groups if joint in group), ())
+
+
+def sums_of_angles(structure: Structure, joint: str) -> tuple[tuple[str, ...], ...]:
+    """By each body that a rotary joint carries and that turns parallel to it, the joints whose values sum up
+    to how it lies against gravity. Raises ConfigError where no sum of angles says that."""
+    together = turning_together(structure, joint)
+    for on_workpiece, names in _sides(structure):
+        if not together or together[0] not in names:
+            continue
+        outward = together[::-1] if on_workpiece else together
+        before = names[: names.index(outward[0])]
+        tilting = [name for name in before if structure.joints[name].kind == "rotary"
+                   and not sign_about(structure, name, structure.gravity)]  # fmt: skip
+        if sign_about(structure, joint, structure.gravity):
+            raise ConfigError(f"{joint} turns about the vertical, where no weight turns it")
+        if tilting:
+            raise ConfigError(
+                f"how the weight on {joint} lies is no sum of angles, as {', '.join(tilting)} turn before it "
+                "about other directions; state payload_kg and name it in elasticity"
+            )
+        first = outward.index(joint)
+        return tuple(outward[: k + 1] for k in range(first, len(outward)))
+    raise ConfigError(f"{joint} is no rotary axis of the chain, so that no weight turns it")
+
+
+def _of(structure: Structure, groups: Sequence[Sequence[str]]) -> Vector:
+    """The direction of the last group; that of no joint where it is empty."""
+    return structure.joints[groups[-1][0]].direction if groups[-1] else ZERO
+
+
+def gravity_problems(structure: Structure, errors: MachineErrors) -> Iterator[tuple[int, str]]:
+    """What is wrong with terms of gravity: the place of each among them, and a sentence."""
+    for place, term in enumerate(errors.gravity):
+        if structure.platforms:
+            yield place, "gravity of a machine with platforms is not modelled; leave [[gravity]] out"
+            continue
+        together = turning_together(structure, term.joint)
+        if not together:
+            yield place, f"gravity of {term.joint}, which is no rotary axis of the chain"
+        elif not term.angles or len(set(term.angles)) < len(term.angles) or set(term.angles) - {*together}:
+            yield (
+                place,
+                f"gravity of {term.joint} by the angles {', '.join(term.angles) or 'of no axis'}; expected "
+                f"axes that stay parallel to {term.joint}, each once: {', '.join(together)}",
+            )
+        own = errors.yields.get(term.joint, Yield()).own
+        if own and any(carries(structure, term.joint, mass.on) for mass in errors.masses):
+            yield (
+                place,
+                f"gravity of {term.joint} beside its elasticity and [[masses]] that it carries: these count "
+                "twice; state one of the two",
+            )
+
+
+def carries(structure: Structure, joint: str, other: str) -> bool:
+    """Whether a joint carries the body of another one, or its own."""
+    return any(joint in names and other in names[names.index(joint) :] for _, names in _sides(structure))
+
+
+def _under_masses(
     structure: Structure, errors: MachineErrors, motions: Mapping[str, Columns]
 ) -> dict[str, Yielded]:
-    """By joint what it gives way, from its nominal `motions` by name."""
-    if not errors.yields:
-        return {}
+    """By joint what it gives way under the masses and the payload."""
     gravity: Triple = scaled(triple(structure.gravity), FREE_FALL_M_S2)
     gone: dict[str, Yielded] = {}
     for on_workpiece, names in _sides(structure):

@@ -122,7 +122,9 @@ def _kinds(structure: Structure, errors: MachineErrors) -> dict[str, MachineErro
             gauge_shift_mm=errors.gauge_shift_mm, gauge_tilt_rad=errors.gauge_tilt_rad
         ),
         "legs": MachineErrors(legs=errors.legs),
-        "weight": MachineErrors(yields=errors.yields, masses=errors.masses, payload=errors.payload),
+        "weight": MachineErrors(
+            yields=errors.yields, masses=errors.masses, payload=errors.payload, gravity=errors.gravity
+        ),
     }
 
 

@@ -71,7 +71,14 @@ def fit_joint_calibration(
     structure = load_joint_machine(machine).structure
     campaign = load_campaign(data, structure)
     values = np.concatenate([reading.values for reading in campaign.readings])
-    model = model_of(structure, values, campaign.priors, yielding=campaign.yielding, masses=campaign.masses)
+    model = model_of(
+        structure,
+        values,
+        campaign.priors,
+        yielding=campaign.yielding,
+        sagging=campaign.sagging,
+        masses=campaign.masses,
+    )
     fit = fit_or_refuse(model, campaign.readings)
     findings = joint_findings(fit, campaign.readings)
     unseen = held_out(fit)

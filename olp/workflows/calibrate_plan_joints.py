@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from olp.calibration.design.choosing import Criterion
+from olp.calibration.joints.candidates import Priors
 from olp.calibration.joints.poses import Postures
-from olp.calibration.joints.unknowns import Priors, model_of
+from olp.calibration.joints.unknowns import model_of
 from olp.core.arrays import Array
 from olp.core.errors import ConfigError, UsageError
 from olp.core.machine import Vector

@@ -46,6 +46,7 @@ def joint_summary(machine: PathLike, job: PathLike | None = None) -> dict[str, A
             "valid_until": calibration.valid_until,
             "temperature_degC": calibration.temperature_degC,
             "masses": len(calibration.errors.masses),
+            "gravity": len(calibration.errors.gravity),
             "payload_kg": calibration.errors.payload.kg,
         }
     summary["axes"] = {name: _axis(setup, joint) for name, joint in structure.joints.items()}

@@ -10,7 +10,8 @@ import pytest
 from calibration.joints.simulated import true_machine
 
 from olp.calibration.joints.adjustment import JointFit
-from olp.calibration.joints.unknowns import Priors, model_of
+from olp.calibration.joints.candidates import Priors
+from olp.calibration.joints.unknowns import model_of
 from olp.files.kinematics.calibration import load_joint_calibration
 from olp.files.kinematics.writer import fitted_values, joint_calibration_text
 from olp.kinematics.chain import Kinematics

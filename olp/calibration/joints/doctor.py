@@ -16,11 +16,12 @@ import numpy as np
 from olp.calibration.diagnosis.factors import ARCSEC
 from olp.calibration.estimator.normal import Normal
 from olp.calibration.joints.adjustment import adjusted, block_of, starts_of
+from olp.calibration.joints.candidates import Unknown
 from olp.calibration.joints.findings import without_worst
 from olp.calibration.joints.mistakes import RIGHT, mistakes, row_mistakes, shown
 from olp.calibration.joints.readings import Reading
 from olp.calibration.joints.refinement import AGREES, spare_of
-from olp.calibration.joints.unknowns import Model, Unknown
+from olp.calibration.joints.unknowns import Model
 from olp.core.arrays import Array
 from olp.core.errors import CannotCompute, ConfigError
 from olp.core.values import dataclass

@@ -1,33 +1,26 @@
 """The unknowns of a machine of any joints: where its lines, legs and gauge really are, and what gives way.
 
-Unknowns are listed in the order in which they are kept: the first of those that look alike stays, the others
-are 0. Machine tools keep squareness and the lines of rotary axes, arms the zeros that can be entered.
+Of candidates that look alike the first one stays, the others are 0.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import field, replace
 
 import numpy as np
 
+from olp.calibration.joints.candidates import SHIFTS, TILTS, Priors, Unknown, listed
+from olp.calibration.joints.weights import TABLES, of_weight, with_weight
 from olp.core.arrays import Array
 from olp.core.errors import CannotCompute
 from olp.core.machine import ZERO, Vector
 from olp.core.values import dataclass
 from olp.kinematics.chain import Kinematics
-from olp.kinematics.errors import JointErrors, LegErrors, MachineErrors, Mass, Payload, Yield
+from olp.kinematics.errors import JointErrors, LegErrors, MachineErrors, Mass, Payload
 from olp.kinematics.poses import rotation_vector
-from olp.kinematics.structure import FRAME, Joint, Structure
+from olp.kinematics.structure import Joint, Structure
 
-#: With so many linear axes in its chain a machine is a machine tool.
-_MACHINE_TOOL = 3
-#: Letters of shifts.
-_SHIFTS = "XYZ"
-#: Letters of tilts.
-_TILTS = "ABC"
-#: A direction this close to an axis of the machine is that axis.
-_ALONG = 1e-9
 #: Steps of differences as a share of the prior: 10 um of a shift of 1 mm.
 _STEP = 1e-2
 #: An unknown whose effect is this small beside the ones kept before it looks like them.
@@ -38,45 +31,6 @@ _POSTURES = 40
 _BLENDED = 120
 #: Nothing is held.
 NO_PAYLOAD = Payload()
-
-
-@dataclass(frozen=True, slots=True)
-class Priors:
-    """Standard deviations of unknowns before any reading: mm, rad, rad per Nm."""
-
-    shift_mm: float
-    tilt_rad: float
-    zero_rad: float
-    yield_rad_Nm: float = 1e-5
-
-    @staticmethod
-    def of(structure: Structure) -> Priors:
-        """Those of an arm of 1 to 3 m reach, or a platform; smaller ones of a machine tool."""
-        if is_machine_tool(structure):
-            return Priors(0.2, 5e-4, 1e-3)
-        return Priors(1.0, 3e-3, 3e-3)
-
-
-@dataclass(frozen=True, slots=True)
-class Unknown:
-    """One number: the table of a calibration file, the part (an axis, "gauge", a leg as platform and number),
-    and its key there with its unit. `prior` is its standard deviation in mm, rad or rad per Nm."""
-
-    table: str
-    part: str
-    key: str
-    prior: float
-    leg: int = 0
-
-    @property
-    def name(self) -> str:
-        """Such as J2.zero_urad, gauge.X_um or P leg 3 length_um."""
-        return f"{self.part} leg {self.leg} {self.key}" if self.leg else f"{self.part}.{self.key}"
-
-    @property
-    def scale(self) -> float:
-        """mm or rad (per Nm) of the unit of the key."""
-        return 1e-6 if "urad" in self.key else 1e-3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -114,9 +68,11 @@ class Model:
     def errors(self, theta: Array, payload: Payload = NO_PAYLOAD) -> MachineErrors:
         """The errors of a machine whose unknowns are theta (k,)."""
         vectors: dict[tuple[str, int, str], Array] = {}
-        for unknown, value in zip(self.unknowns, theta, strict=True):
-            stem = unknown.key.rpartition("_")[0] if unknown.table != "elasticity" else "yield"
-            what, place = _place(stem)
+        numbers = list(zip(self.unknowns, np.asarray(theta, float).tolist(), strict=True))
+        for unknown, value in numbers:
+            if unknown.table in TABLES:
+                continue
+            what, place = _place(unknown.key.rpartition("_")[0])
             vectors.setdefault((unknown.part, unknown.leg, what), np.zeros(3))[place] += value
         base = self.base
         joints = {
@@ -134,20 +90,17 @@ class Model:
                     old.length_mm + float(own.get("length", np.zeros(3))[0]),
                 )
         gauge = {what: v for (part, _, what), v in vectors.items() if part == "gauge"}
-        yields = dict(base.yields)
-        for (part, _, what), value in vectors.items():
-            if what == "yield":
-                stiff = yields.get(part, Yield())
-                yields[part] = replace(stiff, own=stiff.own + float(value[0]))
-        return MachineErrors(
+        errors = MachineErrors(
             joints=joints,
             gauge_shift_mm=_sum(base.gauge_shift_mm, gauge.get("shift")),
             gauge_tilt_rad=_sum(base.gauge_tilt_rad, gauge.get("tilt")),
             legs=legs,
-            yields=yields,
+            yields=base.yields,
             masses=self.masses,
             payload=payload,
+            gravity=base.gravity,
         )
+        return with_weight(errors, numbers)
 
     def _joint(self, joint: Joint, own: dict[str, Array]) -> JointErrors:
         direction = np.array(joint.direction)
@@ -186,97 +139,32 @@ def model_of(
     priors: Priors,
     *,
     yielding: Sequence[str] = (),
+    sagging: Sequence[str] = (),
     masses: tuple[Mass, ...] = (),
     datum_mm: Vector = ZERO,
 ) -> Model:
     """The model with the unknowns that the structure can show by poses of its tool in an unknown frame. All
     others would change no pose: they are 0. Those that are kept stand for them, so that they may be as large
-    as all of these together. `values` (n, axes) are postures of the readings."""
-    listed = tuple(_listed(structure, priors))
-    full = Model(structure, listed, (), datum_mm)
+    as all of these together. `values` (n, axes) are postures of the readings. `yielding` and `sagging` are
+    the rotary joints that give way under known and unknown weights. Raises ConfigError where the latter
+    follows no sum of angles."""
+    candidates = tuple(listed(structure, priors))
+    full = Model(structure, candidates, (), datum_mm)
     kept, usual = _kept(full, _postures(structure, values))
-    elastic = tuple(Unknown("elasticity", name, "own_urad_Nm", priors.yield_rad_Nm) for name in yielding)
-    known = np.diag([priors.yield_rad_Nm**2] * (len(kept) + len(elastic)))
+    elastic = tuple(of_weight(structure, priors, yielding, sagging))
+    known = np.diag([*np.zeros(len(kept)), *(unknown.prior**2 for unknown in elastic)])
     known[: len(kept), : len(kept)] = usual
     sizes = np.sqrt(np.diag(usual)).tolist()
     return replace(
         full,
-        unknowns=(*(replace(listed[k], prior=size) for k, size in zip(kept, sizes, strict=True)), *elastic),
+        unknowns=(
+            *(replace(candidates[k], prior=size) for k, size in zip(kept, sizes, strict=True)),
+            *elastic,
+        ),
         masses=masses,
-        dropped=tuple(unknown for k, unknown in enumerate(listed) if k not in kept),
+        dropped=tuple(unknown for k, unknown in enumerate(candidates) if k not in kept),
         known=known,
     )
-
-
-def is_machine_tool(structure: Structure) -> bool:
-    """Whether three linear axes or more are in the chain."""
-    kinds = [structure.joints[name].kind for name in structure.chain if name in structure.joints]
-    return kinds.count("linear") >= _MACHINE_TOOL
-
-
-def _listed(structure: Structure, priors: Priors) -> Iterator[Unknown]:
-    """All candidates, in the order in which they are kept."""
-    joints = structure.joints
-    outward = [name for name in _outward(structure) if name in joints]
-    outward += [name for name, joint in joints.items() if name not in outward and joint.kind != "length"]
-    rotary = [name for name in outward if joints[name].kind == "rotary"]
-    slides = [name for name in outward if joints[name].kind == "linear"]
-
-    def zeros(names: Sequence[str]) -> Iterator[Unknown]:
-        for name in names:
-            turns = joints[name].kind == "rotary"
-            key, prior = ("zero_urad", priors.zero_rad) if turns else ("zero_um", priors.shift_mm)
-            yield Unknown("location", name, key, prior)
-
-    def shifts(names: Sequence[str]) -> Iterator[Unknown]:
-        for name in names:
-            for k, letter in enumerate(_SHIFTS):
-                if abs(joints[name].direction[k]) < 1.0 - _ALONG:
-                    yield Unknown("location", name, f"{letter}_um", priors.shift_mm)
-
-    def tilts(names: Sequence[str]) -> Iterator[Unknown]:
-        for name in names:
-            for k, letter in enumerate(_TILTS):
-                if abs(joints[name].direction[k]) < 1.0 - _ALONG:
-                    yield Unknown("location", name, f"{letter}_urad", priors.tilt_rad)
-
-    gauge = [Unknown("location", "gauge", f"{letter}_um", priors.shift_mm) for letter in _SHIFTS]
-    gauge += [Unknown("location", "gauge", f"{letter}_urad", priors.tilt_rad) for letter in _TILTS]
-    if is_machine_tool(structure):
-        square = [("Y", "C_urad"), ("Z", "B_urad"), ("Z", "A_urad")]
-        first = [unknown for unknown in tilts(slides) if (unknown.part, unknown.key) in square]
-        yield from sorted(first, key=lambda unknown: square.index((unknown.part, unknown.key)))
-        for name in rotary:
-            yield from (*shifts([name]), *tilts([name]), *zeros([name]))
-        yield from gauge
-        yield from zeros(slides)
-        yield from (unknown for unknown in tilts(slides) if unknown not in first)
-        return
-    yield from zeros(rotary)
-    yield from shifts(rotary)
-    yield from tilts(rotary)
-    yield from _of_legs(structure, priors)
-    yield from zeros(slides)
-    yield from tilts(slides)
-    yield from gauge
-
-
-def _of_legs(structure: Structure, priors: Priors) -> Iterator[Unknown]:
-    for platform in structure.platforms.values():
-        numbers = range(1, len(platform.legs) + 1)
-        for number in numbers:
-            yield Unknown("legs", platform.name, "length_um", priors.shift_mm, number)
-        for end in ("base", "platform"):
-            for number in numbers:
-                for letter in _SHIFTS:
-                    yield Unknown("legs", platform.name, f"{end}_{letter}_um", priors.shift_mm, number)
-
-
-def _outward(structure: Structure) -> list[str]:
-    """The parts of the chain, the ones next to the frame first: on the side of the workpiece, then the
-    tool."""
-    frame = structure.chain.index(FRAME)
-    return [*structure.chain[:frame][::-1], *structure.chain[frame + 1 :]]
 
 
 def _postures(structure: Structure, values: Array) -> Array:
@@ -330,12 +218,12 @@ def _kept(model: Model, values: Array) -> tuple[list[int], Array]:
 
 def _place(stem: str) -> tuple[str, int]:
     """What a key states, and the place in its vector."""
-    if stem in ("zero", "length", "yield"):
+    if stem in ("zero", "length"):
         return stem, 0
     if len(stem) == 1:
-        return ("shift", _SHIFTS.index(stem)) if stem in _SHIFTS else ("tilt", _TILTS.index(stem))
+        return ("shift", SHIFTS.index(stem)) if stem in SHIFTS else ("tilt", TILTS.index(stem))
     end, letter = stem.split("_")
-    return end, _SHIFTS.index(letter)
+    return end, SHIFTS.index(letter)
 
 
 def _sum(old: Vector, more: Array | None) -> Vector:

@@ -218,13 +218,18 @@ static void olp_weights(const double kg[], double centre[][3], int from, int las
     }
 }
 
-/* What each joint gives way at the nominal posture. */
-static void olp_yields(const olp_pose motions[], const olp_state *state, olp_gives gives[])
+/* What each joint gives way at the nominal posture: by sums of angles, and under stated weights. */
+static void olp_yields(const double value[], const olp_pose motions[], const olp_state *state, olp_gives gives[])
 {
     olp_pose body[OLP_AXES];
     double kg[OLP_MASSES + 1], centre[OLP_MASSES + 1][3];
     int side, k, i;
     memset(gives, 0, OLP_AXES * sizeof *gives);
+    for (k = 0; k < OLP_SAGS; k++) {
+        double turn = 0.0;
+        for (i = 0; i < OLP_AXES; i++) turn += olp_sag_list[k].turn[i] * value[i];
+        gives[olp_sag_list[k].joint].own += olp_sag_list[k].sine * sin(turn) + olp_sag_list[k].cosine * cos(turn);
+    }
     if (!OLP_YIELDS) return;
     for (k = 0; k < OLP_MASSES; k++) kg[k] = olp_mass_list[k].kg;
     kg[OLP_MASSES] = OLP_FRAME < OLP_AXES ? state->payload_kg : 0.0;
@@ -261,7 +266,7 @@ static void olp_yields(const olp_pose motions[], const olp_state *state, olp_giv
                 gives[k].tilt[i] = joint->tilt[i] * torque[i];
                 gives[k].give[i] = joint->give[i] * force[i];
             }
-            gives[k].own = joint->own * along;
+            gives[k].own += joint->own * along;
         }
     }
 }
@@ -275,7 +280,7 @@ void olp_tool(const double value[], const olp_state *state, int actual, olp_pose
         olp_nominal_motion(olp_joint_list + j, value[olp_joint_list[j].axis], motion + j);
     if (actual) {
         olp_gives gives[OLP_AXES];
-        olp_yields(motion, state, gives);
+        olp_yields(value, motion, state, gives);
         for (j = 0; j < OLP_AXES; j++) {
             const olp_joint *joint = olp_joint_list + j;
             olp_actual_motion(joint, value[joint->axis], state->play[joint->axis], gives + j, motion + j);

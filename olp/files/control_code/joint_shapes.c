@@ -22,6 +22,11 @@ typedef struct {            /* a weight on what a joint moves, with its centre a
     int joint;
     double kg, centre[3];
 } olp_mass;
+typedef struct {            /* the own turn of a joint under gravity; `turn` are the angles of its sum per axis value */
+    int joint;
+    double sine, cosine;
+    const double *turn;
+} olp_sag;
 typedef struct {            /* a rigid motion p -> turn p + shift */
     double turn[3][3], shift[3];
 } olp_pose;

@@ -12,11 +12,11 @@ from olp.files.control_code.tables import NONE, Data, curve, defines, pair, real
 from olp.kinematics.chain import Kinematics
 from olp.kinematics.columns import Columns, about, tilted
 from olp.kinematics.columns import triple as columns_of
-from olp.kinematics.errors import OWN, JointErrors, MotionCurve, Yield
+from olp.kinematics.errors import OWN, Gravity, JointErrors, MotionCurve, Yield
 from olp.kinematics.inverse import LARGEST_TURN_DEG
 from olp.kinematics.programmed import linear_columns
-from olp.kinematics.structure import FRAME, REFERENCE_RADIUS_MM
-from olp.kinematics.weight import FREE_FALL_M_S2
+from olp.kinematics.structure import FRAME, REFERENCE_RADIUS_MM, Structure
+from olp.kinematics.weight import FREE_FALL_M_S2, sign_about
 
 #: Axes beyond those that hold the tip and the axis of a tool.
 _SYMMETRIC = 5
@@ -50,6 +50,8 @@ def joint_tables(machine: Kinematics, box: Mapping[str, tuple[float, float]]) ->
         f"{{{order.index(mass.on)}, {real(mass.kg)}, {triple(mass.centre_mm)}}}" for mass in errors.masses
     ]
     data.array("olp_mass_list", "olp_mass", masses)
+    sags = [_sag(data, structure, order, term) for term in errors.gravity]
+    data.array("olp_sag_list", "olp_sag", sags)
     wrong = about(
         columns_of(structure.gauge.point_mm),
         tilted(columns_of(errors.gauge_tilt_rad)),
@@ -61,6 +63,7 @@ def joint_tables(machine: Kinematics, box: Mapping[str, tuple[float, float]]) ->
         "OLP_AXES": len(order),
         "OLP_FRAME": structure.chain.index(FRAME),
         "OLP_MASSES": len(masses),
+        "OLP_SAGS": len(sags),
         "OLP_YIELDS": int(bool(errors.yields)),
         "OLP_SYMMETRIC": int(structure.symmetric_tool),
         "OLP_RADIUS": real(REFERENCE_RADIUS_MM),
@@ -82,6 +85,16 @@ def joint_tables(machine: Kinematics, box: Mapping[str, tuple[float, float]]) ->
         _flags("olp_corrects", [joint.correct for joint in joints]),
         _flags("olp_directed", [one is not None and one.backlash != 0.0 for one in own]),
     ]
+
+
+def _sag(data: Data, structure: Structure, order: list[str], term: Gravity) -> str:
+    direction = structure.joints[term.joint].direction
+    turns = [
+        math.radians(sign_about(structure, name, direction)) if name in term.angles else 0.0
+        for name in structure.order
+    ]
+    own = f"{real(term.sine)}, {real(term.cosine)}"
+    return f"{{{order.index(term.joint)}, {own}, {data.numbers(turns)}}}"
 
 
 def has_tips(machine: Kinematics) -> bool:

@@ -24,6 +24,8 @@ from olp.files.problems import Problem, config_error, validate
 from olp.files.toml_text import Path, line_of, read_toml
 from olp.files.write import PathLike, Reader, read_bytes
 from olp.kinematics.errors import (
+    OWN,
+    Gravity,
     Harmonic,
     JointErrors,
     LegErrors,
@@ -35,6 +37,7 @@ from olp.kinematics.errors import (
 )
 from olp.kinematics.machine import JointCalibration
 from olp.kinematics.structure import FRAME, Joint, Structure
+from olp.kinematics.weight import gravity_problems
 
 #: Squareness errors by the name of ISO 230-1: the axis that they tilt, and the key of its location.
 _SQUARE = {"C0Y": ("Y", "C_urad"), "B0Z": ("Z", "B_urad"), "A0Z": ("Z", "A_urad")}
@@ -125,7 +128,7 @@ class _Reading:
             legs[leg.platform, leg.leg - 1] = LegErrors(
                 _mm(leg.base_um), _mm(leg.platform_um), shifted(leg.length_um, -3)
             )
-        return MachineErrors(
+        errors = MachineErrors(
             joints=joints,
             gauge_shift_mm=_shift(gauge),
             gauge_tilt_rad=_tilt(gauge),
@@ -133,7 +136,11 @@ class _Reading:
             yields=dict(self._yields()),
             masses=tuple(self._masses()),
             payload=payload,
+            gravity=tuple(self._gravity()),
         )
+        for index, sentence in gravity_problems(structure, errors):
+            self._wrong(("gravity", index, "angles"), sentence)
+        return errors
 
     def _located(self, name: str, joint: Joint) -> JointErrors:
         """Where the line of an axis really is."""
@@ -269,6 +276,23 @@ class _Reading:
                 wanted = "own_urad_Nm" if rotary else "own_um_kN"
                 self._wrong(("elasticity", name), f"elasticity.{name}: expected {wanted} of this axis")
             yield name, _yield(table, rotary)
+
+    def _gravity(self) -> Iterator[Gravity]:
+        for index, table in enumerate(self._file.gravity):
+            owner = [
+                name
+                for name, joint in self._structure.joints.items()
+                if joint.kind == "rotary" and component_of(table.component, joint) == OWN
+            ]
+            if not owner:
+                self._wrong(
+                    ("gravity", index, "component"),
+                    f'gravity[{index}].component = "{table.component}"; expected the own turn of a rotary '
+                    'axis, such as "EJ2J2"',
+                )
+                continue
+            sine, cosine = shifted(table.sin_urad, -6), shifted(table.cos_urad, -6)
+            yield Gravity(owner[0], tuple(table.angles), sine, cosine)
 
     def _masses(self) -> Iterator[Mass]:
         for index, table in enumerate(self._file.masses):

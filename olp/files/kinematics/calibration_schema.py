@@ -17,7 +17,6 @@ _NOT_BUILT = {
     "beams": "bending of beams",
     "thermal": "expansion",
     "structure": "thermal structures",
-    "gravity": "weight with unknown masses",
     "quality": "the quality of a fit",
     "prior": "priors of a fit",
 }
@@ -87,6 +86,16 @@ class ElasticityTable(Table):
     X_um_kN: float = Field(default=0.0, description="the shift in X under force in X, in um per kN")
     Y_um_kN: float = Field(default=0.0, description="the shift in Y under force in Y, in um per kN")
     Z_um_kN: float = Field(default=0.0, description="the shift in Z under force in Z, in um per kN")
+
+
+class GravityTable(Table):
+    component: Text = Field(description='the own turn of a rotary axis, such as "EJ2J2"')
+    angles: list[Text] = Field(
+        description='the axes whose values are summed, such as ["J2", "J3"], each with the sign of its turn '
+        "about the direction of the axis of component"
+    )
+    sin_urad: float = Field(default=0.0, description="the turn by the sine of that sum, in urad")
+    cos_urad: float = Field(default=0.0, description="the turn by the cosine of that sum, in urad")
 
 
 class MassTable(Table):
@@ -170,6 +179,10 @@ class JointCalibrationFile(Table):
         default={}, description="tables [elasticity.NAME]: how an axis gives way under weight"
     )
     masses: list[MassTable] = Field(default=[], description="tables [[masses]]: weights on the bodies")
+    gravity: list[GravityTable] = Field(
+        default=[],
+        description="tables [[gravity]]: how a rotary axis gives way under weights that are not known",
+    )
     legs: list[LegErrorTable] = Field(default=[], description="tables [[legs]]: errors of legs of platforms")
     covariance: JointCovarianceTable = Field(
         default_factory=JointCovarianceTable,

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from olp.calibration.joints.unknowns import Unknown
+from olp.calibration.joints.candidates import Unknown
 from olp.core.arrays import Array
 from olp.core.errors import ConfigError
 from olp.core.values import dataclass

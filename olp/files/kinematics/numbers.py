@@ -6,7 +6,7 @@ import copy
 from collections.abc import Mapping
 from typing import Any
 
-from olp.calibration.joints.unknowns import Unknown
+from olp.calibration.joints.candidates import Unknown
 
 #: Decimals of um and urad: a thousandth of a digit of any control.
 _DECIMALS = 4
@@ -46,6 +46,15 @@ def _place(values: dict[str, Any], unknown: Unknown) -> tuple[dict[str, Any], st
             if end != "length"
             else (same[-1], unknown.key, None)
         )
+    if unknown.table == "gravity":
+        key, *angles = unknown.key.split()
+        terms: list[dict[str, Any]] = values.setdefault("gravity", [])
+        names = [f"E{letter}{unknown.part}" for letter in (unknown.part, *"ABC")]
+        like = [term for term in terms if term["component"] in names and term["angles"] == angles]
+        if not like:
+            like = [{"component": names[0], "angles": angles}]
+            terms += like
+        return like[-1], key, None
     square = _SQUARE.get((unknown.part, unknown.key))
     if square is not None and square in values.get("squareness", {}):
         return values["squareness"], square, None

@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import datetime
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
 
+from olp.calibration.joints.candidates import Priors
 from olp.calibration.joints.readings import Ball, Lengths, Planes, Points, Reading, SixD
-from olp.calibration.joints.unknowns import Priors
 from olp.core.arrays import Array, Index
 from olp.core.errors import ConfigError, InputError
 from olp.core.geometry import rotation_matrix
@@ -36,6 +36,7 @@ from olp.files.toml_text import Path, line_of, read_toml
 from olp.files.write import PathLike, Reader, read_bytes
 from olp.kinematics.errors import Mass, Payload
 from olp.kinematics.structure import Structure
+from olp.kinematics.weight import carries, sums_of_angles
 
 #: The plan in a folder.
 PLAN = "measurements.toml"
@@ -62,8 +63,8 @@ KINDS: Mapping[str, tuple[tuple[str, ...], str]] = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Campaign:
-    """All readings of one calibration, what was usual before them, the weights on the bodies and the axes
-    whose yield is fitted. `files` are those that were read."""
+    """All readings of one calibration, what was usual before them, the weights on the bodies, the axes whose
+    yield is fitted, and those that give way under unknown weights. `files` are those that were read."""
 
     machine: str
     measured: datetime.date
@@ -72,6 +73,7 @@ class Campaign:
     priors: Priors
     masses: tuple[Mass, ...]
     yielding: tuple[str, ...]
+    sagging: tuple[str, ...]
     files: tuple[str, ...]
 
 
@@ -134,6 +136,7 @@ def load_campaign(path: PathLike, structure: Structure, read: Reader = read_byte
         problems.append(
             (line_of(("elasticity",), lines), "elasticity needs weights; expected [[masses]] or payload_kg")
         )
+    problems += [(line_of(("gravity",), lines), text) for text in _of_gravity(file, structure)]
     if problems:
         raise config_error(problems, str(plan))
     return Campaign(
@@ -144,8 +147,25 @@ def load_campaign(path: PathLike, structure: Structure, read: Reader = read_byte
         _priors(file, structure),
         tuple(Mass(mass.on, mass.kg, mass.centre_mm) for mass in file.masses),
         tuple(file.elasticity),
+        tuple(file.gravity),
         tuple(files),
     )
+
+
+def _of_gravity(file: JointPlanFile, structure: Structure) -> Iterator[str]:
+    """What is wrong with the axes that give way under unknown weights."""
+    for name in file.gravity:
+        try:
+            sums_of_angles(structure, name)
+        except ConfigError as error:
+            yield f"gravity of {name}: {error.message}"
+            continue
+        twice = [mass.on for mass in file.masses if carries(structure, name, mass.on)]
+        if twice and name in file.elasticity:
+            yield (
+                f"gravity names {name}, whose elasticity is fitted with [[masses]] on {', '.join(twice)}: "
+                "the same twice; leave one of the two out"
+            )
 
 
 def _priors(file: JointPlanFile, structure: Structure) -> Priors:
@@ -155,6 +175,7 @@ def _priors(file: JointPlanFile, structure: Structure) -> Priors:
         usual.tilt_rad if stated.tilt_urad is None else stated.tilt_urad * RAD_PER_URAD,
         usual.zero_rad if stated.zero_urad is None else stated.zero_urad * RAD_PER_URAD,
         usual.yield_rad_Nm if stated.yield_urad_Nm is None else stated.yield_urad_Nm * RAD_PER_URAD,
+        usual.gravity_rad if stated.gravity_urad is None else stated.gravity_urad * RAD_PER_URAD,
     )
 
 

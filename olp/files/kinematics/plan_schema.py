@@ -85,6 +85,10 @@ class JointPriorTable(Table):
     yield_urad_Nm: Positive | None = Field(
         default=None, description="the standard deviation of yields before measuring, in urad per Nm"
     )
+    gravity_urad: Positive | None = Field(
+        default=None,
+        description="the standard deviation of the turn of an axis in gravity before measuring, in urad",
+    )
 
 
 class JointPlanFile(Table):
@@ -104,6 +108,11 @@ class JointPlanFile(Table):
     )
     elasticity: list[Text] = Field(
         default=[], description="the rotary axes whose own turn under torque is fitted; needs weights"
+    )
+    gravity: list[Text] = Field(
+        default=[],
+        description="the rotary axes whose own turn under weights that are not known is fitted, by sines and "
+        "cosines of sums of angles",
     )
     masses: list[MassTable] = Field(default=[], description="tables [[masses]]: weights on the bodies")
     points: list[TrackerPointsTable] = Field(

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from olp.calibration.joints.adjustment import JointFit
-from olp.calibration.joints.unknowns import Unknown
+from olp.calibration.joints.candidates import Unknown
 from olp.files.fields import SIGN
 from olp.files.kinematics.covariance import JointCovariance, joint_covariance_bytes
 from olp.files.kinematics.numbers import number_of, put_number

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from olp.files.kinematics.writer import changed_values, joint_calibration_files,
 from olp.files.toml_text import read_toml
 from olp.files.write import read_bytes
 from olp.findings.catalogue import Finding
+from olp.kinematics.errors import MachineErrors
 from olp.kinematics.machine import JointCalibration
 from olp.kinematics.structure import Structure
 from olp.workflows.session import PathLike
@@ -120,6 +122,9 @@ def _models(
     reached = np.concatenate([reading.values for reading in campaign.readings])
     masses = stated.errors.masses
     usual = model_of(structure, reached, campaign.priors, masses=masses, datum_mm=stated.datum_mm)
+    # another machine of this structure gives way as this one does
+    weighed = MachineErrors(yields=stated.errors.yields, gravity=stated.errors.gravity)
+    usual = replace(usual, base=weighed)
     if known is None:
         more = [unknown for unknown in usual.dropped if number_of(values, unknown)]
         unknowns = (*usual.unknowns, *more)

@@ -127,10 +127,16 @@ def refine_joint_calibration(
 
 def _refuse_yields(campaign: Campaign, known: JointCovariance, data: PathLike) -> None:
     """Raises ConfigError where a plan asks for unknowns that the calibration does not have."""
-    fitted = {unknown.part for unknown in known.unknowns if unknown.table == "elasticity"}
-    more = [name for name in campaign.yielding if name not in fitted]
+    fitted = {(unknown.table, unknown.part) for unknown in known.unknowns}
+    asked = {"elasticity": campaign.yielding, "gravity": campaign.sagging}
+    more = [
+        f"{table} of {name}"
+        for table, names in asked.items()
+        for name in names
+        if (table, name) not in fitted
+    ]
     if more or campaign.masses:
-        what = f"elasticity of {', '.join(more)}" if more else "masses"
+        what = ", ".join(more) or "masses"
         raise ConfigError(
             f"the plan states {what}, and a refinement takes both from the calibration; fit all readings "
             "together to find them",

@@ -8,8 +8,9 @@ import numpy as np
 from kinematics.cases import golden, random_values
 
 from olp.calibration.joints.adjustment import JointFit, fit_joints
+from olp.calibration.joints.candidates import Priors
 from olp.calibration.joints.readings import Lengths, Points, Reading, SixD
-from olp.calibration.joints.unknowns import Model, Priors, model_of
+from olp.calibration.joints.unknowns import Model, model_of
 from olp.core.arrays import Array
 from olp.core.rigid_fit import rotation_of
 from olp.files.toml_text import toml_lines

@@ -11,9 +11,10 @@ from calibration.joints.simulated import SIGMA, TOOL, read, true_machine
 from cases.joint_campaigns import Campaign
 
 from olp.calibration.joints.adjustment import JointFit, fit_joints, held_out
+from olp.calibration.joints.candidates import Priors
 from olp.calibration.joints.findings import fit_or_refuse, joint_findings
 from olp.calibration.joints.readings import Points
-from olp.calibration.joints.unknowns import Priors, model_of
+from olp.calibration.joints.unknowns import model_of
 from olp.core.arrays import Array
 from olp.core.errors import ConfigError
 from olp.core.rigid_fit import fit_points

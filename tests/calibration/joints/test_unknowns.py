@@ -9,8 +9,9 @@ import pytest
 from calibration.joints.simulated import SIGMA, TOOL, read, true_machine
 
 from olp.calibration.joints.adjustment import fit_joints
+from olp.calibration.joints.candidates import Priors
 from olp.calibration.joints.readings import FREE, Ball, Planes, Reading
-from olp.calibration.joints.unknowns import Model, Priors, model_of
+from olp.calibration.joints.unknowns import Model, model_of
 from olp.core.arrays import Array
 from olp.kinematics.chain import Kinematics
 from olp.kinematics.poses import Poses

@@ -24,6 +24,7 @@ from olp.files.control_code.registry import CODE, write_code
 from olp.kinematics.chain import Kinematics
 from olp.kinematics.correction import correct_poses
 from olp.kinematics.errors import (
+    Gravity,
     Harmonic,
     JointErrors,
     MachineErrors,
@@ -33,6 +34,7 @@ from olp.kinematics.errors import (
     Yield,
 )
 from olp.kinematics.measures import mobility
+from olp.kinematics.weight import turning_together
 
 pytestmark = pytest.mark.slow
 
@@ -150,9 +152,22 @@ def rich(machine: Kinematics, seed: int = 3) -> Kinematics:
         )  # fmt: skip
         yields[name] = Yield(1e-7, three(1e-7), three(1e-6))
     order = machine.structure.order
+    # beside stated masses a joint may only yield across itself
+    sagging = [name for name in order if machine.structure.joints[name].kind == "rotary"]
+    gravity = tuple(
+        Gravity(name, turning_together(machine.structure, name), 3e-5, -2e-5) for name in sagging[::2]
+    )
+    yields |= {term.joint: replace(yields[term.joint], own=0.0) for term in gravity}
     masses = tuple(Mass(name, 20.0, three(150.0)) for name in (order[0], order[-1]))
     errors = MachineErrors(
-        joints, three(0.02), three(1e-4), {}, yields, masses, Payload(6.0, (30.0, -20.0, 50.0))
+        joints,
+        three(0.02),
+        three(1e-4),
+        {},
+        yields,
+        masses,
+        Payload(6.0, (30.0, -20.0, 50.0)),
+        gravity,
     )
     return replace(machine, errors=errors, tool_mm=(12.0, -7.0, 140.0))
 
