@@ -19,10 +19,8 @@ from olp.cli.common import (
     exit_for,
     files_of,
     options_of,
-    plot_ending,
     put,
     refuse_early,
-    refuse_stream,
     refuse_twice,
     source,
     sources_of_call,
@@ -31,12 +29,14 @@ from olp.core.errors import InputError, UsageError
 
 if TYPE_CHECKING:
     from olp.calibration.design.choosing import Criterion
+    from olp.core.progress import Progress
     from olp.files.write import Content
     from olp.findings.catalogue import Finding
     from olp.review.job import Review
     from olp.workflows.calibrate_plan_joints import PlannedPoses
     from olp.workflows.compare import CompareOptions, Comparison
     from olp.workflows.joints.loaded import JointRun
+    from olp.workflows.joints.retime import JointRetiming
 
 #: Words of a call that every verb takes on such a machine.
 _ALWAYS = ("program", "programs", "nominal", "corrected", "machine", "job", "dialect", "flatten",
@@ -45,7 +45,10 @@ _ALWAYS = ("program", "programs", "nominal", "corrected", "machine", "job", "dia
 
 
 #: What `olp retime` takes beside these.
-RETIME = ("cycle_ms", "blend_mm", "report_file", "feed_override", "gains", "plot", "plot_span", "stretch")
+RETIME = (
+    "kind", "cycle_ms", "blend_mm", "blend_study", "report_file", "feed_override", "gains", "plot",
+    "plot_span", "stretch", "lines", "slow", "write_feed", "shared_feed", "block_delete",
+)  # fmt: skip
 
 
 def on_joints(machine: str | None, job: str | None, also: Collection[str] = ()) -> bool:
@@ -197,50 +200,21 @@ def simulate(
         put(result.to_csv())
 
 
-def retime(program: str | None, machine: str | None, job: str | None, words: dict[str, Any]) -> None:
-    """`olp retime`."""
-    from olp.cli.progress import progress
-
-    output, report_file = words["output"], words["report_file"]
-    if output == STREAM and words["as_json"]:
-        raise UsageError("stdout takes one result; write the others to files (-o, --report)")
-    for file in files_of(output):
-        if Path(file).suffix.lower() != ".csv":
-            raise UsageError(
-                f"the trajectory {file!r} of a machine with rotary joints is a table; expected .csv"
-            )
-    plot, span = words["plot"], words["plot_span"]
-    refuse_stream(plot=plot, report=report_file)
-    if plot is not None:
-        plot_ending(plot)
-    elif span is not None or words["stretch"] is not None:
-        raise UsageError("--plot-span and --stretch are for --plot; name a file with --plot")
+def retime(
+    program: str | None, machine: str | None, job: str | None, words: dict[str, Any]
+) -> tuple[Callable[[Progress | None], JointRetiming], tuple[str, ...]]:
+    """`olp retime`: what plans the motion, and the files that it reads."""
     run = run_of(program, machine, job)
-    refuse_twice(files_of(output, report_file, plot))
-    refuse_early(files_of(output, report_file, plot), run.files, force=words["force"])
+    nominal = words["nominal"]
 
-    from olp.files.write import write_files
-    from olp.reports.report import to_json
-    from olp.workflows.joints.retime import JointRetimeOptions, retimed
+    def make(show: Progress | None) -> JointRetiming:
+        from olp.workflows.joints.retime import JointRetimeOptions, retimed
 
-    with progress(words["quiet"]) as show:
-        result = retimed(run, options_of(JointRetimeOptions, words), show)
-        cycle_s = words["cycle_ms"] * 1e-3
-        written: dict[Path, Content] = {Path(file): result.to_csv(cycle_s) for file in files_of(output)}
-        written |= {Path(file): to_json(result.report) for file in files_of(report_file)}
-        if plot is not None:
-            start, end = span or (0.0, None)
-            written |= result.plots(plot, stretch=words["stretch"], from_s=start, to_s=end)
-        write_files(written, force=words["force"], inputs=run.files)
-    if output == STREAM:
-        put(result.to_csv(cycle_s))
-    if not words["quiet"]:
-        for path in written:
-            diagnostic(f"wrote {path}")
-    if words["as_json"]:
-        put(to_json(result.report))
-    elif not words["quiet"]:
-        put(result.to_text(), err=output == STREAM)
+        options = options_of(JointRetimeOptions, words | {"study_blend": words["blend_study"]})
+        other = None if nominal is None else source(run.sources, nominal)
+        return retimed(run, options, show, other)
+
+    return make, (*run.files, *files_of(nominal))
 
 
 def plan(

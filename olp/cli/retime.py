@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -47,7 +47,11 @@ if TYPE_CHECKING:
     from olp.files.sources import Sources
     from olp.files.write import Content
     from olp.program.feeds.words import Shared
-    from olp.workflows.retime import Format, Retiming
+    from olp.workflows.joints.retime import JointRetiming
+    from olp.workflows.retime import Retiming
+    from olp.workflows.retime_files import Format
+
+    Planned = Retiming | JointRetiming
 
 #: Formats of a trajectory.
 FORMATS = ("csv", "npz", "parquet", "ros", "pvt")
@@ -125,15 +129,13 @@ def command(program: str | None, machine: str | None, job: str | None, **words: 
     """
     from olp.cli import joints
 
-    if joints.on_joints(machine, job, also=joints.RETIME):
-        joints.retime(program, machine, job, words)
-        return
-    call, outputs = given(program, machine, job), options_of(_Outputs, words)
-    nominal, proof = words["nominal"], words["proof"]
-    if call.program == STREAM == nominal:
+    outputs, nominal = options_of(_Outputs, words), words["nominal"]
+    of_joints = joints.on_joints(machine, job, also=joints.RETIME)
+    if program == STREAM == nominal:
         raise UsageError("stdin can be one program only; name PROGRAM or NOMINAL as a file")
     _refuse(outputs)
-    inputs = (*call.inputs, *files_of(nominal, proof, words["log"]))
+    make: Callable[[Report | None], Planned]
+    make, inputs = (joints.retime if of_joints else _of_three)(program, machine, job, words)
     targets = files_of(
         outputs.output, outputs.lines, outputs.slow, outputs.plot, outputs.write_feed, outputs.report_file
     )
@@ -141,21 +143,12 @@ def command(program: str | None, machine: str | None, job: str | None, **words: 
     refuse_twice(targets)
 
     from olp.files.write import write_files
-    from olp.workflows import retime
+    from olp.workflows.retime_files import format_of
 
     for target in files_of(outputs.output):
-        retime.format_of(target, outputs.kind)
-    options = options_of(
-        retime.RetimeOptions,
-        words | {"study_blend": words["blend_study"], "settings": _settings(words["settings"])},
-    )
-    sources = call.session.sources
-    second = None if nominal is None else source(sources, nominal)
-    with progress(outputs.quiet) as show, naming("<stdin>" if STREAM in (call.program, nominal) else ""):
-        result = retime.run(
-            call.session, call.source, options, nominal=second,
-            proof=None if proof is None else _json(proof, sources), progress=show,
-        )  # fmt: skip
+        format_of(target, outputs.kind)
+    with progress(outputs.quiet) as show, naming("<stdin>" if STREAM in (program, nominal) else ""):
+        result = make(show)
         feeds = None if outputs.write_feed is None else result.with_feeds(outputs.shared_feed, show)
         written = _files(result, outputs, feeds, show)
         streamed = _of_one(result, outputs) if outputs.output == STREAM else ()
@@ -166,6 +159,26 @@ def command(program: str | None, machine: str | None, job: str | None, **words: 
         put(streamed)
     _say(result, outputs, written)
     exit_for(result.findings, outputs.fail_on)
+
+
+def _of_three(
+    program: str | None, machine: str | None, job: str | None, words: dict[str, Any]
+) -> tuple[Callable[[Report | None], Retiming], tuple[str, ...]]:
+    """What plans the motion of three linear axes, and the files that it reads."""
+    call, nominal, proof = given(program, machine, job), words["nominal"], words["proof"]
+    sources = call.session.sources
+
+    def make(show: Report | None) -> Retiming:
+        from olp.workflows import retime
+
+        stated = {"study_blend": words["blend_study"], "settings": _settings(words["settings"])}
+        second = None if nominal is None else source(sources, nominal)
+        return retime.run(
+            call.session, call.source, options_of(retime.RetimeOptions, words | stated), nominal=second,
+            proof=None if proof is None else _json(proof, sources), progress=show,
+        )  # fmt: skip
+
+    return make, (*call.inputs, *files_of(nominal, proof, words["log"]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,7 +236,7 @@ def _refuse(outputs: _Outputs) -> None:
 
 
 def _files(
-    result: Retiming, outputs: _Outputs, feeds: bytes | None, show: Report | None
+    result: Planned, outputs: _Outputs, feeds: bytes | None, show: Report | None
 ) -> dict[Path, Content]:
     """What the call writes to files, by path."""
     from olp.files import trajectory as tables
@@ -232,17 +245,18 @@ def _files(
     written: dict[Path, Content] = {}
     if outputs.output is not None and outputs.output != STREAM:
         written |= result.files(outputs.output, outputs.kind, outputs.cycle_s, outputs.stretch, show)
-    written |= {Path(name): tables.lines_csv(result.lines, result.origin) for name in files_of(outputs.lines)}
+    of_lines, of_slow = files_of(outputs.lines), files_of(outputs.slow)
+    written |= {Path(n): tables.lines_csv(result.lines, result.origin, result.limits) for n in of_lines}
     if feeds is not None:
         written |= {Path(name): feeds for name in files_of(outputs.write_feed)}
-    written |= {Path(name): tables.slow_csv(result.slow, result.origin) for name in files_of(outputs.slow)}
+    written |= {Path(n): tables.slow_csv(result.slow, result.origin, result.limits) for n in of_slow}
     if outputs.plot is not None:
         start, end = outputs.plot_span or (0.0, None)
         written |= result.plots(outputs.plot, outputs.stretch, from_s=start, to_s=end)
     return written | {Path(name): report.to_json(result.report) for name in files_of(outputs.report_file)}
 
 
-def _say(result: Retiming, outputs: _Outputs, written: Iterable[Path]) -> None:
+def _say(result: Planned, outputs: _Outputs, written: Iterable[Path]) -> None:
     from olp.reports import report
 
     if not outputs.quiet:
@@ -265,7 +279,7 @@ def _json(name: str, sources: Sources) -> dict[str, Any]:
     return values if isinstance(values, dict) else {}
 
 
-def _of_one(result: Retiming, outputs: _Outputs) -> Iterable[bytes]:
+def _of_one(result: Planned, outputs: _Outputs) -> Iterable[bytes]:
     if outputs.stretch is None and len(result.trajectories) > 1:
         raise UsageError(
             f"the program has {len(result.trajectories)} stretches, and stdout takes one; choose it with "

@@ -11,23 +11,42 @@ import json
 import math
 import zipfile
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 
 from olp.core.errors import ConfigError, UsageError
 from olp.core.units import AXES
+from olp.core.values import dataclass
 from olp.program.origin import Files, Origin
 from olp.trajectory.plan import Trajectory
 from olp.trajectory.usage import LIMITS, LineUse, SlowStretches
 
-COLUMNS = (
-    "t_s",
-    *(f"{a}_mm" for a in AXES),
-    *(f"V{a}_mm_s" for a in AXES),
-    *(f"A{a}_mm_s2" for a in AXES),
-    "line",
-)
+
+@dataclass(frozen=True, slots=True)
+class Columns:
+    """The axes of a trajectory in order, and the unit of each, "mm" or "deg"."""
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+
+    @property
+    def of_place(self) -> list[str]:
+        return [f"{name}_{unit}" for name, unit in zip(self.names, self.units, strict=True)]
+
+    @property
+    def of_speed(self) -> list[str]:
+        return [f"V{column}_s" for column in self.of_place]
+
+    @property
+    def all(self) -> tuple[str, ...]:
+        """The columns of the samples."""
+        return ("t_s", *self.of_place, *self.of_speed, *(f"A{c}_s2" for c in self.of_place), "line")
+
+
+LINEAR = Columns(tuple(AXES), ("mm",) * len(AXES))
+COLUMNS = LINEAR.all
 LINE_COLUMNS = (
     "line", "seconds", "dwell_s", "length_mm", "feed_mm_s", "achieved_mm_s", "fastest_mm_s", "lost_s",
     "limit", "at_limit_s",
@@ -61,8 +80,8 @@ def _times(trajectory: Trajectory, cycle_s: float) -> np.ndarray:
 
 
 def rows(trajectory: Trajectory, cycle_s: float) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """(numbers (n, 10), lines (n,)) of the samples at the control's cycle, a block at a time. Raises as
-    `check_cycle`."""
+    """(numbers (n, 1 + 3 axes), lines (n,)) of the samples at the control's cycle, a block at a time.
+    Raises as `check_cycle`."""
     times = _times(trajectory, cycle_s)
     for a in range(0, len(times), ROWS):
         t = times[a : a + ROWS]
@@ -70,9 +89,9 @@ def rows(trajectory: Trajectory, cycle_s: float) -> Iterator[tuple[np.ndarray, n
         yield np.column_stack((t, position, velocity, acceleration)), line
 
 
-def csv(trajectory: Trajectory, cycle_s: float) -> Iterator[bytes]:
+def csv(trajectory: Trajectory, cycle_s: float, columns: Columns = LINEAR) -> Iterator[bytes]:
     """The samples as CSV. Every number has the digits that read back exactly."""
-    yield (",".join(COLUMNS) + "\n").encode()
+    yield (",".join(columns.all) + "\n").encode()
     for numbers, lines in rows(trajectory, cycle_s):
         # adding 0.0 makes 0 of -0
         text = (
@@ -101,25 +120,32 @@ class _Parts(io.RawIOBase):
         return done
 
 
-def npz(trajectory: Trajectory, cycle_s: float) -> Iterator[bytes]:
+def npz(trajectory: Trajectory, cycle_s: float, columns: Columns = LINEAR) -> Iterator[bytes]:
     """The samples, and the pieces of motion that they come from (see `olp.trajectory.motion.Motion`)."""
-    motion = trajectory.motion
+    motion, axes = trajectory.motion, len(columns.names)
     count = len(_times(trajectory, cycle_s))
 
-    def columns(a: int, b: int | None) -> Iterator[np.ndarray]:
+    def part(a: int, b: int | None) -> Iterator[np.ndarray]:
         return (n[:, a] if b is None else n[:, a:b] for n, _ in rows(trajectory, cycle_s))
 
+    # axes of several units have their names and units beside them
+    names = ("position_mm", "velocity_mm_s", "acceleration_mm_s2")
+    if columns is not LINEAR:
+        names = ("position", "velocity", "acceleration")
     sampled: dict[str, tuple[tuple[int, ...], npt.DTypeLike, Callable[[], Iterator[np.ndarray]]]] = {
-        "t_s": ((count,), np.float64, lambda: columns(0, None)),
-        "position_mm": ((count, 3), np.float64, lambda: columns(1, 4)),
-        "velocity_mm_s": ((count, 3), np.float64, lambda: columns(4, 7)),
-        "acceleration_mm_s2": ((count, 3), np.float64, lambda: columns(7, 10)),
+        "t_s": ((count,), np.float64, lambda: part(0, None)),
+        **{
+            name: ((count, axes), np.float64, partial(part, 1 + k * axes, 1 + (k + 1) * axes))
+            for k, name in enumerate(names)
+        },
         "line": ((count,), np.int64, lambda: (lines for _, lines in rows(trajectory, cycle_s))),
     }
     pieces = {
         "piece_start_s": motion.start_s, "piece_time": motion.time, "piece_path": motion.path,
         "piece_shape": motion.shape, "piece_line": motion.line,
     }  # fmt: skip
+    if columns is not LINEAR:
+        pieces |= {"axes": np.array(columns.names), "units": np.array(columns.units)}
     sink = _Parts()
     with zipfile.ZipFile(sink, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
         for name, (shape, kind, blocks) in sampled.items():
@@ -145,7 +171,7 @@ def _member(
             yield sink.take()
 
 
-def parquet(trajectory: Trajectory, cycle_s: float) -> Iterator[bytes]:
+def parquet(trajectory: Trajectory, cycle_s: float, columns: Columns = LINEAR) -> Iterator[bytes]:
     """The columns of the CSV. Raises ConfigError where pyarrow is not installed."""
     try:
         import pyarrow as pa
@@ -153,18 +179,24 @@ def parquet(trajectory: Trajectory, cycle_s: float) -> Iterator[bytes]:
     except ImportError:
         raise ConfigError("Parquet needs pyarrow, which is not installed; install it or write CSV") from None
     sink = _Parts()
-    schema = pa.schema([(name, pa.int64() if name == "line" else pa.float64()) for name in COLUMNS])
+    schema = pa.schema([(name, pa.int64() if name == "line" else pa.float64()) for name in columns.all])
     with pq.ParquetWriter(sink, schema) as writer:
         for numbers, lines in rows(trajectory, cycle_s):
-            columns = [*numbers.T, lines]
-            writer.write_table(pa.table(dict(zip(COLUMNS, columns, strict=True)), schema=schema))
+            table = dict(zip(columns.all, [*numbers.T, lines], strict=True))
+            writer.write_table(pa.table(table, schema=schema))
             yield sink.take()
     yield sink.take()
 
 
-def ros(trajectory: Trajectory, cycle_s: float) -> Iterator[bytes]:
-    """A trajectory_msgs/JointTrajectory in JSON: metres, and times from the start."""
-    before = '{"joint_names": ' + json.dumps(list(AXES)) + ', "points": [\n'
+def ros(trajectory: Trajectory, cycle_s: float, columns: Columns = LINEAR) -> Iterator[bytes]:
+    """A trajectory_msgs/JointTrajectory in JSON: metres and radians, and times from the start."""
+    before = '{"joint_names": ' + json.dumps(list(columns.names)) + ', "points": [\n'
+    axes = len(columns.names)
+    factor = [1e-3 if unit == "mm" else math.pi / 180.0 for unit in columns.units]
+
+    def scaled(values: list[float]) -> list[float]:
+        return [value * one for value, one in zip(values, factor, strict=True)]
+
     for numbers, _ in rows(trajectory, cycle_s):
         points = []
         for row in (numbers + 0.0).tolist():
@@ -172,9 +204,9 @@ def ros(trajectory: Trajectory, cycle_s: float) -> Iterator[bytes]:
             points.append(
                 json.dumps(
                     {
-                        "positions": [v * 1e-3 for v in row[1:4]],
-                        "velocities": [v * 1e-3 for v in row[4:7]],
-                        "accelerations": [v * 1e-3 for v in row[7:10]],
+                        "positions": scaled(row[1 : 1 + axes]),
+                        "velocities": scaled(row[1 + axes : 1 + 2 * axes]),
+                        "accelerations": scaled(row[1 + 2 * axes :]),
                         "time_from_start": {"sec": seconds, "nanosec": nanosec},
                     }
                 )
@@ -184,15 +216,17 @@ def ros(trajectory: Trajectory, cycle_s: float) -> Iterator[bytes]:
     yield b"\n]}\n"
 
 
-def pvt(trajectory: Trajectory, cycle_s: float) -> Iterator[bytes]:
+def pvt(trajectory: Trajectory, cycle_s: float, columns: Columns = LINEAR) -> Iterator[bytes]:
     """Position, velocity and time of each cycle, as PVT controls take them: times count from the point
     before."""
-    yield b"dt_s,X_mm,VX_mm_s,Y_mm,VY_mm_s,Z_mm,VZ_mm_s\n"
-    before = 0.0
+    pairs = zip(columns.of_place, columns.of_speed, strict=True)
+    yield (",".join(("dt_s", *(name for pair in pairs for name in pair))) + "\n").encode()
+    axes, before = len(columns.names), 0.0
     for numbers, _ in rows(trajectory, cycle_s):
         lines = []
-        for t, x, y, z, vx, vy, vz, *_rest in (numbers + 0.0).tolist():
-            lines.append(f"{t - before!r},{x!r},{vx!r},{y!r},{vy!r},{z!r},{vz!r}\n")
+        for t, *row in (numbers + 0.0).tolist():
+            both = zip(row[:axes], row[axes : 2 * axes], strict=True)
+            lines.append(",".join(map(repr, (t - before, *(v for pair in both for v in pair)))) + "\n")
             before = t
         yield "".join(lines).encode()
 
@@ -203,9 +237,9 @@ def _head(columns: Sequence[str], origin: Origin | None) -> bytes:
     return (",".join(names) + "\n").encode()
 
 
-def lines_csv(use: LineUse, origin: Origin | None = None) -> Iterator[bytes]:
+def lines_csv(use: LineUse, origin: Origin | None = None, limits: Sequence[str] = LIMITS) -> Iterator[bytes]:
     """One row per line that moves, with its file where `origin` has several. The feed of a line with rapids
-    only is empty."""
+    only is empty. `limits` are the names of the limits of the motion."""
     yield _head(LINE_COLUMNS, origin)
     files = Files(origin)
     limit = use.limit()
@@ -221,14 +255,16 @@ def lines_csv(use: LineUse, origin: Origin | None = None) -> Iterator[bytes]:
             shown = f"{feed:.6g}" if np.isfinite(feed) else ""
             texts.append(
                 f"{files.cells(line)},{seconds:.9f},{dwell:.9g},{length:.6f},{shown},{achieved:.6g},{fastest:.6g},"
-                f"{lost:.9f},{LIMITS[which]},{at_limit:.9f}\n"
+                f"{lost:.9f},{limits[which]},{at_limit:.9f}\n"
             )
         yield "".join(texts).encode()
 
 
-def slow_csv(parts: Sequence[SlowStretches], origin: Origin | None = None) -> Iterator[bytes]:
+def slow_csv(
+    parts: Sequence[SlowStretches], origin: Origin | None = None, limits: Sequence[str] = LIMITS
+) -> Iterator[bytes]:
     """One row per section below half the feed, with its file where `origin` has several. Times count from the
-    start of its stretch."""
+    start of its stretch. `limits` are the names of the limits of the motion."""
     yield _head(SLOW_COLUMNS, origin)
     files = Files(origin)
     for stretch, slow in enumerate(parts, 1):
@@ -238,5 +274,5 @@ def slow_csv(parts: Sequence[SlowStretches], origin: Origin | None = None) -> It
             yield (
                 f"{stretch},{slow.start_s[i]:.6f},{slow.seconds[i]:.6f},{slow.lost_s[i]:.6f},{line},"
                 f"{x:.6f},{y:.6f},{z:.6f},{slow.slowest_mm_s[i]:.6g},{slow.feed_mm_s[i]:.6g},"
-                f"{LIMITS[int(slow.limit[i])]}\n"
+                f"{limits[int(slow.limit[i])]}\n"
             ).encode()

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from olp.reports.report import Report, pairs, sentences, table
-from olp.reports.retime import clock, gains_text
+from olp.reports.report import Report, pairs, place, sentences, table
+from olp.reports.retime import against_text, clock, feeds_text, gains_text, study_text
 
 
 def to_text(report: Report) -> str:
     """Plain text of at most 100 columns."""
-    sections = (_head(report), gains_text(report), _limits(report), _lines(report), _notes(report))
+    sections = (
+        _head(report), against_text(report), gains_text(report), study_text(report), _limits(report),
+        _lines(report), feeds_text(report), _notes(report),
+    )  # fmt: skip
+
     return "\n\n".join("\n".join(lines) for lines in map(list, sections) if lines) + "\n"
 
 
@@ -46,7 +50,7 @@ def _limits(report: Report) -> Iterator[str]:
 
 def _lines(report: Report) -> Iterator[str]:
     yield "Longest lines"
-    rows = [[str(row["line"]), f"{row['seconds']:.3f}", row["limit"]] for row in report["longest_lines"]]
+    rows = [[place(row), f"{row['seconds']:.3f}", row["limit"]] for row in report["longest_lines"]]
     yield from table(["line", "seconds", "nearest limit"], rows)
 
 

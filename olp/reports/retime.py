@@ -30,9 +30,9 @@ _NAME = 50
 def to_text(report: Report) -> str:
     """Plain text of at most 100 columns."""
     sections = (
-        _head(report), _control(report), _controller(report), _nominal(report), gains_text(report),
-        _blend_study(report), _budget(report), _use(report), _slow(report), _lines(report),
-        _feeds_written(report), _notes(report),
+        _head(report), _control(report), _controller(report), against_text(report), gains_text(report),
+        study_text(report), _budget(report), _use(report), _slow(report), _lines(report),
+        feeds_text(report), _notes(report),
         findings_text(report["findings"]),
     )  # fmt: skip
     return "\n\n".join("\n".join(lines) for lines in map(list, sections) if lines) + "\n"
@@ -122,7 +122,7 @@ def gains_text(report: Report) -> Iterator[str]:
         yield "  No line gains from four times the path tolerance, or from a quarter more feed."
 
 
-def _nominal(report: Report) -> Iterator[str]:
+def against_text(report: Report) -> Iterator[str]:
     nominal = report.get("nominal")
     if not nominal:
         return
@@ -145,7 +145,7 @@ def _nominal(report: Report) -> Iterator[str]:
         yield from table(("line", "there", "here", "change"), rows)
 
 
-def _blend_study(report: Report) -> Iterator[str]:
+def study_text(report: Report) -> Iterator[str]:
     study = report.get("blend_study")
     if not study:
         return
@@ -250,7 +250,7 @@ def _lines(report: Report) -> Iterator[str]:
         yield from table(("line", "seconds", "feed mm/min", "achieved mm/min", "limit"), rows)
 
 
-def _feeds_written(report: Report) -> Iterator[str]:
+def feeds_text(report: Report) -> Iterator[str]:
     written = report.get("write_feed")
     if not written:
         return

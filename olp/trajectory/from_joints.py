@@ -45,7 +45,8 @@ _SHORTEST_MM = 1e-9
 class JointRoute:
     """A route from rest to rest: `point_mm` of the route are axis values times `scale` (axes,), in mm per mm
     or deg. The route's lines number its segments: (m,) `line` of the program, `tool` in the motion, and
-    `feed_mm_s` at the tip (inf: none). A segment ends at a `share` (m,) of its `move` (m,)."""
+    `feed_mm_s` at the tip (inf: none). A segment ends at a `share` (m,) of its `move` (m,). The tip is off by
+    at most `widest` times what the motion is off in this space."""
 
     route: Route
     scale: Array
@@ -54,6 +55,7 @@ class JointRoute:
     feed_mm_s: Array
     move: Index
     share: Array
+    widest: float
 
     def slower(self, factor: Array) -> JointRoute:
         """The same with the feeds of segments divided by (m,)."""
@@ -99,10 +101,13 @@ def limits_of(structure: Structure) -> AxisLimits:
     return AxisLimits(velocity, acceleration, jerk)
 
 
-def clock_of(path: JointPath, blend_mm: float) -> Timing:
+def clock_of(path: JointPath, blend_mm: float, *, block_delete: bool = False) -> Timing:
     """Feeds, path tolerances and rests of a program; `blend_mm` is the tolerance of a path mode without one,
-    and of lists. Raises ProgramError as `olp.program.feeds.timing.timing`."""
-    return _of_program(path, blend_mm) if path.listed is None else _of_list(path, blend_mm)
+    and of lists, `block_delete` as in the reading. Raises ProgramError as
+    `olp.program.feeds.timing.timing`."""
+    if path.listed is not None:
+        return _of_list(path, blend_mm)
+    return _of_program(path, blend_mm, block_delete=block_delete)
 
 
 def routes_of(
@@ -125,14 +130,14 @@ def routes_of(
     return tuple(routes)
 
 
-def _of_program(path: JointPath, blend_mm: float) -> Timing:
+def _of_program(path: JointPath, blend_mm: float, *, block_delete: bool) -> Timing:
     """The timing of a program as if each move were 1 mm long, so that a time of a move (G93) is one over its
     feed, also where the rotary axes move alone."""
     toolpath = path.program.toolpath
     end = np.zeros((len(path), 3))
     end[:, 0] = np.arange(1.0, len(path) + 1.0)
     even = replace(toolpath, end_mm=end, start_mm=(0.0, 0.0, 0.0), arcs=Arcs.none())
-    return timing(replace(path.program, toolpath=even), blend_mm=blend_mm)
+    return timing(replace(path.program, toolpath=even), blend_mm=blend_mm, block_delete=block_delete)
 
 
 def _of_list(path: JointPath, blend_mm: float) -> Timing:
@@ -179,7 +184,7 @@ def _route(path: JointPath, clock: Timing, steps: _Steps) -> JointRoute:
     stated = np.where(path.program.toolpath.kind[move] == Kind.RAPID, np.inf, clock.feed_mm_s[move])
     timed = (path.program.toolpath.flag[move] & np.uint8(Flag.INVERSE_TIME)) != 0
     line, feed = path.line[move].astype(np.int64), np.where(timed, np.inf, stated)
-    return JointRoute(route, scale, line, tool, feed, move, share)
+    return JointRoute(route, scale, line, tool, feed, move, share, widest)
 
 
 def _axes(path: JointPath, move: Index, share: Array) -> Array:

@@ -36,6 +36,14 @@ class Stretch:
     ratio: Array
     limit: Index
 
+    def in_axes(self) -> Trajectory:
+        """The same in mm and deg of the axes, with the lines of the program."""
+        found, scale = self.trajectory, self.route.scale
+        pieces, limits = found.motion, found.limits
+        motion = replace(pieces, path=pieces.path / scale, line=self.route.line[pieces.line])
+        bounds = AxisLimits(limits.velocity / scale, limits.acceleration / scale, limits.jerk / scale)
+        return replace(found, motion=motion, limits=bounds)
+
     def tip_speed(self, position: Array, velocity: Array, segment: Index) -> Array:
         """(n,) mm/s of the tip in the workpiece at (n, axes) positions and velocities in the space of the
         route, on segments (n,)."""

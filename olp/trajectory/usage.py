@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import fields, replace
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -31,6 +32,22 @@ _WEIGHT = np.array([0.25, 0.5, 0.25])
 _BLOCK = 1 << 13
 
 
+class Tip(Protocol):
+    """Where a feed is the speed of a tip that other axes move: of segments (m,) the ways `way_mm` and feeds
+    `feed_mm_s` of the tip. The lines of the motion number its segments."""
+
+    @property
+    def way_mm(self) -> Array: ...
+
+    @property
+    def feed_mm_s(self) -> Array: ...
+
+    def seen(self, position: Array, velocity: Array, segment: Index) -> tuple[Array, Array]:
+        """Positions (n, 3) mm and speeds (n,) mm/s of the tip at (n, axes) positions and velocities of the
+        motion."""
+        ...
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class LineUse:
     """Of the m lines that move: (m,) `line`; `seconds` without dwells, and `dwell_s`; `length_mm` of the
@@ -38,7 +55,8 @@ class LineUse:
 
     Of their feed moves only: `feed_seconds`, `feed_length_mm` and `feed_mm_s`, the programmed feed, averaged
     over the length where there are several (inf where all are rapids). `fastest_mm_s` is the top speed,
-    `at_limit_s` (m, 10) the time at each of `LIMITS`, and `most` (m, 10) the largest use of it."""
+    `at_limit_s` (m, 10) the time at each of `LIMITS`, and `most` (m, 10) the largest use of it; with other
+    axes these are three times as many limits in the same order, and the feed."""
 
     line: Index
     seconds: Array
@@ -122,31 +140,35 @@ class SlowStretches:
         return len(self.line)
 
 
-def usage(trajectory: Trajectory, route: Route) -> tuple[LineUse, SlowStretches]:
-    """How the motion along a route uses its limits, by line and in slow stretches."""
+def usage(trajectory: Trajectory, route: Route, tip: Tip | None = None) -> tuple[LineUse, SlowStretches]:
+    """How the motion along a route uses its limits, by line and in slow stretches. Lengths, speeds and feeds
+    are those of the `tip` where it is given."""
     motion, limits = trajectory.motion, trajectory.limits
     line, row = np.unique(motion.line, return_inverse=True)
-    count = len(line)
-    feed = feeds_of_pieces(motion, route)
+    count, axes = len(line), motion.axes
+    wide = 3 * axes + 1
+    feed = feeds_of_pieces(motion, route) if tip is None else tip.feed_mm_s[motion.line]
     bounds = (limits.velocity, limits.acceleration, limits.jerk)
     still: Mask = np.logical_not(motion.time[:, 1:].any(axis=1))
-    at_limit, most = np.zeros((count, len(LIMITS))), np.zeros((count, len(LIMITS)))
+    at_limit, most = np.zeros((count, wide)), np.zeros((count, wide))
     fastest = np.zeros(count)
-    stretches = _StretchCollector()
+    stretches = _StretchCollector(wide)
     for a in range(0, len(motion), _BLOCK):
         piece = np.arange(a, min(a + _BLOCK, len(motion)))
         width = motion.start_s[piece + 1] - motion.start_s[piece]
         # sample by sample, all pieces each time: sums over the few samples are then sums of long rows
-        shape = (len(_SHARE), len(piece), 3)
-        states = [
-            state.reshape(shape)
-            for state in motion.of(np.tile(piece, len(_SHARE)), (_SHARE[:, None] * width).ravel())
-        ]
-        speed = np.sqrt((states[1] * states[1]).sum(axis=2))
-        use = np.empty((*shape[:2], len(LIMITS)))
+        shape, tiled = (len(_SHARE), len(piece), axes), np.tile(piece, len(_SHARE))
+        flat = motion.of(tiled, (_SHARE[:, None] * width).ravel())
+        states = [state.reshape(shape) for state in flat]
+        if tip is None:
+            place, speed = states[0], np.sqrt((states[1] * states[1]).sum(axis=2))
+        else:
+            at, fast = tip.seen(flat[0], flat[1], motion.line[tiled])
+            place, speed = at.reshape(*shape[:2], 3), fast.reshape(shape[:2])
+        use = np.empty((*shape[:2], wide))
         for i, bound in enumerate(bounds):
-            np.abs(states[i + 1] / bound, out=use[:, :, 3 * i : 3 * i + 3])
-        use[:, :, 9] = speed / feed[piece]
+            np.abs(states[i + 1] / bound, out=use[:, :, axes * i : axes * (i + 1)])
+        use[:, :, -1] = speed / feed[piece]
         weight = _WEIGHT[:, None] * width
         held = weight[:, :, None] * (use >= AT_LIMIT)
         first = np.flatnonzero(np.diff(row[piece], prepend=-1))
@@ -158,11 +180,15 @@ def usage(trajectory: Trajectory, route: Route) -> tuple[LineUse, SlowStretches]
         moving = np.flatnonzero(~still[piece])
         stretches.add(
             time[:, moving], speed[:, moving], feed[piece[moving]], motion.line[piece[moving]],
-            states[0][:, moving], held[:, moving], use[:, moving],
+            place[:, moving], held[:, moving], use[:, moving],
         )  # fmt: skip
     width = np.diff(motion.start_s)
     cutting = np.isfinite(feed) & ~still
-    length, feed_length, nominal = _lengths(route, line)
+    if tip is None:
+        way = np.sqrt((np.diff(route.point_mm, axis=0) ** 2).sum(axis=1))
+        length, feed_length, nominal = _lengths(way, route.feed_mm_s, route.line, line)
+    else:
+        length, feed_length, nominal = _lengths(tip.way_mm, tip.feed_mm_s, route.line, line)
     return (
         LineUse(
             line.astype(np.int64), _sums(row, width * ~still, count),
@@ -174,16 +200,16 @@ def usage(trajectory: Trajectory, route: Route) -> tuple[LineUse, SlowStretches]
     )  # fmt: skip
 
 
-def _lengths(route: Route, line: Index) -> tuple[Array, Array, Array]:
-    """Of each line (m,): the length of its moves, that of its feed moves, and their time at their feed.
+def _lengths(way_mm: Array, feed_mm_s: Array, moved: Index, line: Index) -> tuple[Array, Array, Array]:
+    """Of each line (m,): the length of its moves, that of its feed moves, and their time at their feed. The
+    lines of the moves are `moved`.
 
     Lines whose moves are too short for pieces of their own are left out.
     """
-    step = np.sqrt((np.diff(route.point_mm, axis=0) ** 2).sum(axis=1))
-    index = np.minimum(np.searchsorted(line, route.line), len(line) - 1)
-    own = line[index] == route.line
-    fed = np.where(np.isfinite(route.feed_mm_s), step, 0.0)
-    columns = (step, fed, fed / route.feed_mm_s)
+    index = np.minimum(np.searchsorted(line, moved), len(line) - 1)
+    own = line[index] == moved
+    fed = np.where(np.isfinite(feed_mm_s), way_mm, 0.0)
+    columns = (way_mm, fed, fed / feed_mm_s)
     length, feed_length, nominal = (_sums(index[own], column[own], len(line)) for column in columns)
     return length, feed_length, nominal
 
@@ -227,7 +253,8 @@ def feeds_of_pieces(motion: Motion, route: Route) -> Array:
 class _StretchCollector:
     """Collects slow stretches, which may begin in one block of pieces and end in a later one."""
 
-    def __init__(self) -> None:
+    def __init__(self, wide: int) -> None:
+        self._wide = wide
         self._count = 0
         self._slow = False
         self._rows: list[tuple[Array, ...]] = []
@@ -235,7 +262,7 @@ class _StretchCollector:
     def add(
         self, time: Array, speed: Array, feed: Array, line: Index, position: Array, held: Array, use: Array
     ) -> None:
-        """Add k samples (k, n) of n pieces: positions (k, n, 3), time at limits and use of them (k, n, 10);
+        """Add k samples (k, n) of n pieces: positions (k, n, 3), time at limits and use of them (k, n, wide);
         feed and line (n,) of each piece."""
         flat = ((speed < SLOW * feed) & np.isfinite(feed)).T.ravel()
         if not flat.size:
@@ -257,7 +284,7 @@ class _StretchCollector:
         self._rows.append(_reduced(columns))
 
     def gathered(self) -> SlowStretches:
-        empty = tuple(np.zeros(0) for _ in range(10 + 2 * len(LIMITS)))
+        empty = tuple(np.zeros(0) for _ in range(10 + 2 * self._wide))
         rows = self._rows or [empty]
         columns = _reduced(tuple(np.concatenate(c) for c in zip(*rows, strict=True)))
         _, time, weight, lost, speed, feed, line, x, y, z = columns[:10]
@@ -300,7 +327,7 @@ def _reduced(columns: tuple[Array, ...]) -> tuple[Array, ...]:
         return columns
     first = np.flatnonzero(np.diff(number, prepend=-1.0))
     slowest = np.lexsort((speed, number))[first]
-    half = 5 + len(LIMITS)
+    half = 5 + (len(rest) - 5) // 2
     held = [np.add.reduceat(column, first) for column in rest[5:half]]
     held += [np.maximum.reduceat(column, first) for column in rest[half:]]
     return (

@@ -17,7 +17,7 @@ from olp.core.values import dataclass
 from olp.program.feeds.actions import actions
 from olp.program.feeds.moves import lengths_mm
 from olp.program.feeds.timing import PathControl, path_modes
-from olp.program.feeds.words import Shared, check_feeds, write_feeds
+from olp.program.feeds.words import FeedsWritten, Shared, check_feeds, write_feeds
 from olp.program.program import Program
 from olp.program.registry import Options, read
 from olp.trajectory.from_program import CHORD_SHARE, EXACT_MM, routes
@@ -198,29 +198,43 @@ def with_feeds(base: Plan, shared: Shared, tell: Progress) -> tuple[bytes, dict[
 
     Raises ProgramError for a feed that cannot be written, CannotCompute where it does not read back.
     """
-    case, lines = base.case, base.lines
-    fed = np.flatnonzero((lines.feed_length_mm > 0.0) & (lines.feed_seconds > 0.0))
-    planned_s = lines.feed_seconds[fed]
+    case = base.case
     try:
-        with case.program.errors():
-            written = write_feeds(
-                case.program, lines.line[fed], planned_s, planned_s - lines.lost_s()[fed], shared=shared,
-                block_delete=case.block_delete,
-            )  # fmt: skip
+        written, kept = written_feeds(case.program, base.lines, shared, block_delete=case.block_delete)
     except OlpError as error:
         raise (error.in_file(case.name) if case.name else error) from None
     # the written text has lines of its own
     other = case.rewritten(bytes(written.data))
     check_feeds(case.program, other.program, block_delete=case.block_delete)
     again = planned(other, base.limits, tell, "feeds")
-    return written.data, {
+    return written.data, feeds_report(written, kept, shared, again.duration_s)
+
+
+def written_feeds(
+    program: Program, lines: LineUse, shared: Shared, *, block_delete: bool
+) -> tuple[FeedsWritten, list[int]]:
+    """The text of a program with the planned feeds of its lines in the F words, and the lines that keep
+    theirs. Raises ProgramError for a feed that cannot be written."""
+    fed = np.flatnonzero((lines.feed_length_mm > 0.0) & (lines.feed_seconds > 0.0))
+    planned_s = lines.feed_seconds[fed]
+    with program.errors():
+        written = write_feeds(
+            program, lines.line[fed], planned_s, planned_s - lines.lost_s()[fed], shared=shared,
+            block_delete=block_delete,
+        )  # fmt: skip
+    return written, np.unique(program.original_lines(written.kept)).tolist()
+
+
+def feeds_report(written: FeedsWritten, kept: list[int], shared: Shared, duration_s: float) -> dict[str, Any]:
+    """What a report says of written feeds; the text with them takes `duration_s`."""
+    return {
         "words": written.words,
         "changed": written.changed,
         "shared": written.shared,
         "rule": shared,
         "slower_lines": written.slower,
-        "kept_lines": np.unique(case.program.original_lines(written.kept)).tolist(),
-        "duration_s": again.duration_s,
+        "kept_lines": kept,
+        "duration_s": duration_s,
     }
 
 

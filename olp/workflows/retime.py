@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import datetime
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from olp.checks.state import travel_findings
 from olp.checks.timed import control_findings, time_findings
@@ -15,17 +15,14 @@ from olp.core.machine import Setup
 from olp.core.progress import Progress, silent
 from olp.core.toolpath import BLEND_MM
 from olp.core.values import dataclass
-from olp.files import trajectory as files
 from olp.files.point_profile import load_profile
 from olp.files.points import Points, read_points
 from olp.files.sources import Source
-from olp.files.write import write_files
 from olp.findings.catalogue import Finding
 from olp.program.feeds.words import Shared
 from olp.program.origin import Origin
 from olp.program.registry import Options
 from olp.program.rs274.state import PathMode
-from olp.reports.plots.base import Format as Picture
 from olp.trajectory.controls.base import Control
 from olp.trajectory.controls.registry import control_named
 from olp.trajectory.from_program import axis_limits
@@ -34,26 +31,17 @@ from olp.trajectory.inertia import compliance_of
 from olp.trajectory.plan import Trajectory
 from olp.trajectory.plan import plan as plan_route
 from olp.trajectory.route import Route
-from olp.trajectory.usage import LineUse, SlowStretches
+from olp.trajectory.usage import LIMITS, LineUse, SlowStretches
 from olp.trajectory.variants import Case, Plan, blend_study, planned, with_feeds, within_inertial
 from olp.workflows import refusals
 from olp.workflows.doubt import accepted_of, doubted_motion
 from olp.workflows.flatten import UnrollOptions
 from olp.workflows.original import placed, placed_findings
 from olp.workflows.retime_control import control_time
-from olp.workflows.retime_report import against, proved, report_of
+from olp.workflows.retime_files import StretchFiles, numbered, picture_of
+from olp.workflows.retime_report import Legs, against, proved, report_of
 from olp.workflows.session import PathLike, Session
-from olp.workflows.shown import Shown
 
-Format = Literal["csv", "npz", "parquet", "ros", "pvt"]
-#: Format of a trajectory, by suffix.
-_SUFFIX: Mapping[str, Format] = {".csv": "csv", ".npz": "npz", ".parquet": "parquet", ".json": "ros"}
-
-#: Format of a plot, by suffix.
-PICTURES: Mapping[str, Picture] = {".svg": "svg", ".png": "png"}
-
-#: Default time between samples: a common servo cycle of controls.
-CYCLE_S = 1e-3
 #: Largest override of feeds in percent: that of common switches.
 MOST_OVERRIDE = 200.0
 #: Multiples of the path tolerances of the program that `blend_study` tries.
@@ -79,7 +67,7 @@ class RetimeOptions(UnrollOptions):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Retiming(Shown):
+class Retiming(StretchFiles):
     """A trajectory for each stretch of the program between moves of the control itself, as `plan`; the report
     ("olp-retime-1"), and the findings: doubts about the inputs, and axes
     commanded beyond their travel. `by_original` is the plan with the lines of the text that the program was
@@ -116,6 +104,11 @@ class Retiming(Shown):
         return self.by_original.lines
 
     @property
+    def limits(self) -> tuple[str, ...]:
+        """The limits of the motion, in the order of the columns of `lines`."""
+        return LIMITS
+
+    @property
     def slow(self) -> tuple[SlowStretches, ...]:
         """Of each stretch, where the speed is below half the feed."""
         return self.by_original.slow
@@ -129,56 +122,7 @@ class Retiming(Shown):
     def trajectory(self) -> Trajectory:
         """The one trajectory of a program without moves of the control itself. Raises CannotCompute where
         there are several."""
-        return self._stretch(None)
-
-    def _stretch(self, number: int | None) -> Trajectory:
-        count = len(self.trajectories)
-        if number is None and count != 1:
-            raise CannotCompute(
-                f"the program has {count} stretches, between which the control moves by itself (tool "
-                "changes, G28 and similar, probing), so there is no one trajectory; take them one by one"
-            )
-        if number is not None and not 1 <= number <= count:
-            raise UsageError(f"there is no stretch {number}; the program has {count}, counted from 1")
-        return self.trajectories[(number or 1) - 1]
-
-    def parts(
-        self, kind: Format = "csv", cycle_s: float = CYCLE_S, stretch: int | None = None
-    ) -> Iterator[bytes]:
-        """The samples of every `cycle_s` as a file of a format, part by part; of one stretch, counted from
-        1, where there are several.
-
-        Raises CannotCompute as `trajectory` does, UsageError for an impossible stretch or cycle, and
-        ConfigError for Parquet without pyarrow.
-        """
-        trajectory = self._stretch(stretch)
-        files.check_cycle(trajectory, cycle_s)
-        return _WRITERS[kind](trajectory, cycle_s)
-
-    def files(
-        self, path: PathLike, kind: Format | None = None, cycle_s: float = CYCLE_S,
-        stretch: int | None = None, progress: Progress | None = None,
-    ) -> dict[Path, Iterator[bytes]]:  # fmt: skip
-        """The files of `write`, by path: one file, or `name-1.csv`, `name-2.csv` ... of several stretches."""
-        target = Path(path)
-        chosen = format_of(target, kind)
-        if stretch is not None or len(self.trajectories) == 1:
-            return {target: self._counted(chosen, cycle_s, stretch, progress)}
-        self._any()
-        return {
-            numbered(target, number): self._counted(chosen, cycle_s, number, progress)
-            for number in range(1, len(self.trajectories) + 1)
-        }
-
-    def _counted(
-        self, kind: Format, cycle_s: float, stretch: int | None, progress: Progress | None
-    ) -> Iterator[bytes]:
-        parts = self.parts(kind, cycle_s, stretch)
-        whole = max(self._stretch(stretch).duration_s / cycle_s / files.ROWS, 1.0)
-        for done, part in enumerate(parts):
-            yield part
-            if progress is not None:
-                progress("write", min(done / whole, 1.0))
+        return self.stretch(None)
 
     def with_feeds(self, shared: Shared = "mean", progress: Progress | None = None) -> bytes:
         """The text of the program with the mean planned feed of each block in its F words, never above the
@@ -203,12 +147,12 @@ class Retiming(Shown):
 
         target = Path(path)
         kind = picture_of(target)
-        self._any()
+        self.any_stretch()
         count = len(self.trajectories)
         numbers = [stretch] if stretch is not None else list(range(1, count + 1))
         pictures = {}
         for number in numbers:
-            trajectory = self._stretch(number)
+            trajectory = self.stretch(number)
             route = self.routes[number - 1]
             name = f"{self.report['program'] or 'program'} on {self.report['machine']}"
             place = str if self.origin is None else self.origin.place
@@ -218,46 +162,6 @@ class Retiming(Shown):
             pictures[where] = motion_plot(trajectory, route, title, kind, from_s=from_s, to_s=to_s)
         return pictures
 
-    def _any(self) -> None:
-        if not self.trajectories:
-            raise CannotCompute("the program has no moves, so there is no trajectory")
-
-    def write(
-        self, path: PathLike, kind: Format | None = None, cycle_s: float = CYCLE_S,
-        stretch: int | None = None, *, force: bool = False,
-    ) -> list[Path]:  # fmt: skip
-        """Write the samples; the format is that of the suffix (.csv, .npz, .parquet, .json for ROS) unless
-        given. All files or none. Raises as `parts`, `format_of` and `olp.files.write.write_files` do."""
-        written = self.files(path, kind, cycle_s, stretch)
-        write_files(written, force=force)
-        return list(written)
-
-
-_WRITERS: Mapping[Format, Callable[[Trajectory, float], Iterator[bytes]]] = {
-    "csv": files.csv, "npz": files.npz, "parquet": files.parquet, "ros": files.ros, "pvt": files.pvt,
-}  # fmt: skip
-
-
-def format_of(target: PathLike, kind: Format | None) -> Format:
-    """The format of a trajectory: `kind`, else that of the ending of the file. Raises UsageError for an
-    ending that names none."""
-    chosen = kind or _SUFFIX.get(Path(target).suffix.lower())
-    if chosen is None:
-        endings = ", ".join(_SUFFIX)
-        raise UsageError(
-            f"the trajectory {str(target)!r} ends in no known format; expected {endings} (.json for ROS), or "
-            "name the format"
-        )
-    return chosen
-
-
-def picture_of(target: Path) -> Picture:
-    """The format of a plot. Raises UsageError for an ending that names none."""
-    kind = PICTURES.get(target.suffix.lower())
-    if kind is None:
-        raise UsageError(f"the plot {str(target)!r} ends in no known format; expected .svg or .png")
-    return kind
-
 
 def check_override(percent: float) -> None:
     """Raises UsageError for an override of feeds that no control has."""
@@ -265,11 +169,6 @@ def check_override(percent: float) -> None:
         raise UsageError(
             f"the feed override is {percent:g} %; expected more than 0, and at most {MOST_OVERRIDE:g}"
         )
-
-
-def numbered(target: Path, number: int) -> Path:
-    """The file of a stretch, counted from 1, where there are several."""
-    return target.with_name(f"{target.stem}-{number}{target.suffix}")
 
 
 def retime(
@@ -358,7 +257,8 @@ def run(
     if origin is not None and origin.files:
         report["files"] = list(origin.counted())
     if other is not None:
-        versus = against(plan, planned(other, plan.limits, tell, "nominal"), other)
+        there = planned(other, plan.limits, tell, "nominal")
+        versus = against(other.name, *(_compared(one) for one in (there, plan)))
         report["nominal"] = placed(versus, other.program.origin)
     if stated is not None:
         moving = sum(report["budget_um"].values())
@@ -380,6 +280,10 @@ def run(
     report["accepted"] = accepted_of(findings)
     report["findings"] = [f.as_dict() for f in findings]
     return Retiming(plan, report, findings, shown)
+
+
+def _compared(plan: Plan) -> Legs:
+    return Legs(plan.case.legs, plan.lines, plan.duration_s, plan.case.program)
 
 
 def durations(

@@ -8,18 +8,31 @@ from typing import Any
 
 from olp.core.errors import UsageError
 from olp.core.machine import Setup
+from olp.core.values import dataclass
 from olp.program.program import Program
 from olp.trajectory.inertia import Inertial
+from olp.trajectory.route import Route
 from olp.trajectory.summary import MOST, compare, summary
+from olp.trajectory.usage import LineUse
 from olp.trajectory.variants import Case, Plan
 
 
-def against(plan: Plan, nominal: Plan, other: Case) -> dict[str, Any]:
-    """The times of the nominal program, in all and by line."""
-    rows = compare((nominal.case.legs, nominal.lines), (plan.case.legs, plan.lines))
-    rows = None if rows is None else _by_original(rows, other.program)
+@dataclass(frozen=True, slots=True, eq=False)
+class Legs:
+    """A planned program to compare: its routes, the use of its lines, and its time."""
+
+    routes: tuple[Route, ...]
+    use: LineUse
+    duration_s: float
+    program: Program
+
+
+def against(name: str, nominal: Legs, planned: Legs) -> dict[str, Any]:
+    """The times of the nominal program `name`, in all and by line."""
+    rows = compare((nominal.routes, nominal.use), (planned.routes, planned.use))
+    rows = None if rows is None else _by_original(rows, nominal.program)
     return {
-        "program": other.name,
+        "program": name,
         "duration_s": nominal.duration_s,
         "lines_correspond": rows is not None,
         "differences": []

@@ -21,7 +21,8 @@ from olp.cli import main
 from olp.core.errors import UsageError
 from olp.files.trajectory import COLUMNS, LINE_COLUMNS, SLOW_COLUMNS
 from olp.trajectory.usage import LIMITS
-from olp.workflows.retime import Format, Retiming
+from olp.workflows.retime import Retiming
+from olp.workflows.retime_files import Format
 
 PROGRAMS = Path(__file__).resolve().parents[2] / "programs"
 BED = PROGRAMS / "nasty" / "machine.toml"

@@ -214,10 +214,10 @@ def test_the_verb_writes_table_and_report(tmp_path: Path) -> None:
     assert head.startswith("t_s,X_mm,Y_mm,Z_mm,C_deg,B_deg,VX_mm_s") and head.endswith(",AB_deg_s2,line")
     assert len(rows) == pytest.approx(5752, abs=5)
     assert '"schema": "olp-joint-retime-1"' in report.read_text()
-    done = run("retime", "-j", job, "-o", str(tmp_path / "x.npz"))
-    assert done.exit_code == 2 and "expected .csv" in done.stderr
-    done = run("retime", "-j", job, "--blend-study")
-    assert done.exit_code == 2 and "--blend-study does not go with machines with rotary joints" in done.stderr
+    done = run("retime", "-j", job, "-o", str(tmp_path / "x.txt"))
+    assert done.exit_code == 2 and "ends in no known format" in done.stderr
+    done = run("retime", "-j", job, "--controller", "fanuc")
+    assert done.exit_code == 2 and "--controller does not go with machines with rotary joints" in done.stderr
     done = run("retime", "-j", job, "--plot-span", "0", "1")
     assert done.exit_code == 2 and "name a file with --plot" in done.stderr
 

@@ -144,27 +144,36 @@ class JointRun:
             return dialect
         return dialect.with_tips(self.machine.leads or dialect.leads)
 
-    def read(self, source: Source, unrolling: UnrollOptions) -> tuple[Source, JointPath]:
-        """A program and its path. Raises ProgramError with all that is refused."""
-        dialect = self.dialect(source)
+    def read(
+        self, source: Source, unrolling: UnrollOptions, *, block_delete: bool = False
+    ) -> tuple[Source, JointPath]:
+        """A program and its path; `block_delete` leaves `/` blocks out. Raises ProgramError with all that is
+        refused."""
+        dialect, options = self.dialect(source), Options(block_delete=block_delete)
+        switch = block_delete or None
         if isinstance(dialect, RobotDialect):
             setup = self._arm_setup()
-            text, program = refusals.read(self.sources, source, setup, dialect, Options(), unrolling)
+            text, program = refusals.read(
+                self.sources, source, setup, dialect, options, unrolling, block_delete=switch
+            )
             with program.errors():
                 return text, self._of_arm(program)
         if isinstance(dialect, PointList) or self.setup is None:
             return source, self._listed(whole(source.data))
-        text, program = refusals.read(self.sources, source, self.setup, dialect, Options(), unrolling)
+        text, program = refusals.read(
+            self.sources, source, self.setup, dialect, options, unrolling, block_delete=switch
+        )
         with program.errors():
             return text, self._path(program, self.setup)
 
-    def again(self, data: bytes, dialect: Dialect) -> JointPath:
+    def again(self, data: bytes, dialect: Dialect, *, block_delete: bool = False) -> JointPath:
         """The path of a text that was written."""
+        options = Options(block_delete=block_delete)
         if isinstance(dialect, RobotDialect):
-            return self._of_arm(read(data, self._arm_setup(), dialect))
+            return self._of_arm(read(data, self._arm_setup(), dialect, options))
         if isinstance(dialect, PointList) or self.setup is None:
             return self._listed(data)
-        return self._path(read(data, self.setup, dialect), self.setup)
+        return self._path(read(data, self.setup, dialect, options), self.setup)
 
     def _path(self, program: Program, setup: Setup) -> JointPath:
         """The path of a program that was read with its words."""

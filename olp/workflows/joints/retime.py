@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,23 +14,30 @@ from olp.core.errors import CannotCompute, UsageError
 from olp.core.progress import Progress, silent
 from olp.core.toolpath import BLEND_MM
 from olp.core.values import dataclass
-from olp.files.write import write_bytes
+from olp.files.sources import Source
+from olp.files.trajectory import Columns
 from olp.kinematics.structure import Structure
+from olp.program.feeds.words import Shared, check_feeds
+from olp.program.origin import Origin
 from olp.trajectory.from_joints import clock_of, limits_of, routes_of
 from olp.trajectory.joint_gains import joint_gains
 from olp.trajectory.joint_motion import Stretch, planned
+from olp.trajectory.joint_usage import joint_usage, limit_names
 from olp.trajectory.motion import Motion as PlannedMotion
+from olp.trajectory.plan import Trajectory
+from olp.trajectory.usage import LineUse, SlowStretches
+from olp.trajectory.variants import feeds_report, written_feeds
 from olp.workflows.flatten import UnrollOptions
 from olp.workflows.joints.loaded import JointRun
-from olp.workflows.joints.retime_report import LONGEST, summary
-from olp.workflows.retime import check_override, numbered, picture_of
+from olp.workflows.joints.retime_report import LONGEST, blend_row, summary
+from olp.workflows.original import placed
+from olp.workflows.retime import FACTORS, check_override
+from olp.workflows.retime_files import StretchFiles, numbered, picture_of
+from olp.workflows.retime_report import Legs, against
 from olp.workflows.session import PathLike
-from olp.workflows.shown import Shown
 
 #: Places of a piece of the motion between which its way is about straight.
 _STEPS = 9
-#: Rows of a file at a time.
-_ROWS = 1 << 14
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,23 +45,82 @@ class JointRetimeOptions(UnrollOptions):
     """The options of `retime` on such machines."""
 
     blend_mm: float | None = None
+    study_blend: bool = False
     feed_override: float = 100.0
     gains: bool = False
+    block_delete: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class JointRetiming(Shown):
-    """The motion of a program: `trajectories` in the space of their routes, which `at` turns into axis
-    values; the report ("olp-joint-retime-1")."""
+class JointRetiming(StretchFiles):
+    """The motion of a program: `stretches` in the space of their routes, which `at` turns into axis values,
+    with the lines of the text that the program was unrolled from; the report ("olp-joint-retime-1").
+    `driven` has the lines of the text that was planned, and `path` its moves."""
 
-    structure: Structure
+    run: JointRun
+    options: JointRetimeOptions
+    path: JointPath
+    driven: tuple[Stretch, ...]
     stretches: tuple[Stretch, ...]
     report: dict[str, Any]
     findings: tuple[()] = ()
 
     @property
+    def structure(self) -> Structure:
+        return self.run.machine.structure
+
+    @property
     def duration_s(self) -> float:
         return float(sum(s.trajectory.duration_s for s in self.stretches))
+
+    @property
+    def trajectories(self) -> tuple[Trajectory, ...]:
+        """The motion of each stretch in mm and deg of the axes."""
+        return tuple(one.in_axes() for one in self.stretches)
+
+    @property
+    def columns(self) -> Columns:
+        return Columns(tuple(self.structure.order), tuple(self.structure.units))
+
+    @property
+    def origin(self) -> Origin | None:
+        """Where the lines come from; None where the program was not unrolled."""
+        return self.path.program.origin
+
+    @property
+    def limits(self) -> tuple[str, ...]:
+        """The limits of the motion, in the order of the columns of `lines`."""
+        return limit_names(self.structure)
+
+    @property
+    def lines(self) -> LineUse:
+        """Time, speed of the tip and limit of each line."""
+        return LineUse.joined([joint_usage(one)[0] for one in self.stretches])
+
+    @property
+    def slow(self) -> tuple[SlowStretches, ...]:
+        """Of each stretch, where the tip is slower than half the feed."""
+        return tuple(joint_usage(one)[1] for one in self.stretches)
+
+    def with_feeds(self, shared: Shared = "mean", progress: Progress | None = None) -> bytes:
+        """As `olp.workflows.retime.Retiming.with_feeds`: the feeds are those of the tip. Raises UsageError
+        for programs without F words, and with a feed override."""
+        program = self.path.program
+        if self.options.feed_override != 100.0:
+            raise UsageError("planned feeds count at an override of 100 %; leave the feed override out")
+        if program.words is None:
+            raise UsageError(
+                "the program states no feed in F words, so planned feeds cannot be written; the motion "
+                "itself is a table (-o)"
+            )
+        use = LineUse.joined([joint_usage(one)[0] for one in self.driven])
+        written, kept = written_feeds(program, use, shared, block_delete=self.options.block_delete)
+        other = self.run.again(written.data, program.dialect, block_delete=self.options.block_delete)
+        check_feeds(program, other.program, block_delete=self.options.block_delete)
+        options = replace(self.options, gains=False, study_blend=False)
+        seconds = motion_of(self.run, other, options, progress).duration_s
+        self.report["write_feed"] = placed(feeds_report(written, kept, shared, seconds), self.origin)
+        return bytes(written.data)
 
     def seconds(self, move: Index, share: Array) -> Array:
         """(n,) s at which the motion is about at shares of moves, NaN where none is planned."""
@@ -87,7 +153,7 @@ class JointRetiming(Shown):
         return to_text(self.report)
 
     def plots(
-        self, path: PathLike, *, stretch: int | None = None, from_s: float = 0.0, to_s: float | None = None
+        self, path: PathLike, stretch: int | None = None, *, from_s: float = 0.0, to_s: float | None = None
     ) -> dict[Path, bytes]:
         """Pictures of the tip's speed and of what each axis uses of its limits over time, by path: one file
         (.svg or .png), or one per stretch. Raises UsageError for another suffix, an impossible stretch, and
@@ -110,39 +176,18 @@ class JointRetiming(Shown):
             pictures[where] = joint_motion_plot(one, title, kind, from_s=from_s, to_s=to_s)
         return pictures
 
-    def to_csv(self, cycle_s: float = 1e-3) -> Iterator[bytes]:
-        """Axis values, velocities and accelerations at the cycles of the control, and the line. Stretches
-        follow one another."""
-        units = [
-            f"{name}_{unit}" for name, unit in zip(self.structure.order, self.structure.units, strict=True)
-        ]
-        head = ["t_s", *units, *(f"V{u}_s" for u in units), *(f"A{u}_s2" for u in units), "line"]
-        yield (",".join(head) + "\n").encode()
-        begin = 0.0
-        for number, one in enumerate(self.stretches):
-            times = one.trajectory.sample_times(cycle_s)
-            for a in range(0, len(times), _ROWS):
-                some = times[a : a + _ROWS]
-                position, velocity, acceleration, _, line = self.at(number, some)
-                table = np.column_stack((begin + some, position, velocity, acceleration)) + 0.0
-                rows = zip(table.tolist(), line.tolist(), strict=True)
-                yield "".join(f"{','.join(f'{v:.9g}' for v in row)},{n}\n" for row, n in rows).encode()
-            begin += one.trajectory.duration_s
-
-    def write(self, path: PathLike, cycle_s: float = 1e-3, *, force: bool = False) -> Path:
-        """Write the samples as CSV, whole or not at all."""
-        write_bytes(path, self.to_csv(cycle_s), force=force)
-        return Path(path)
-
 
 def retime_joints(
     program: PathLike | bytes,
     machine: PathLike,
     job: PathLike | None = None,
     *,
+    nominal: PathLike | bytes | None = None,
     blend_mm: float | None = None,
+    study_blend: bool = False,
     feed_override: float = 100.0,
     gains: bool = False,
+    block_delete: bool = False,
     flatten: bool = False,
     expand_cycles: bool = False,
     progress: Progress | None = None,
@@ -150,25 +195,54 @@ def retime_joints(
     """The fastest motion found along a program that keeps every axis inside its limits of velocity,
     acceleration and jerk, the tip inside its feed, and within the path tolerance.
 
+    `nominal` is another program, such as the uncorrected one, to compare times with, line by line.
     `blend_mm` is the path tolerance where the program names none; it has priority over the machine file.
+    `study_blend` adds times and deviations at a quarter to four times the path tolerances in use.
     `feed_override` is the override of feeds in percent; rapids keep their speed. `gains` adds the lines on
-    which more path tolerance or more feed would save most.
+    which more path tolerance or more feed would save most. `block_delete` leaves `/` blocks out.
     Raises as `correct_joints`, and ConfigError where the machine file leaves a limit out.
     """
     options = JointRetimeOptions(
-        blend_mm=blend_mm, feed_override=feed_override, gains=gains, flatten=flatten,
-        expand_cycles=expand_cycles,
+        blend_mm=blend_mm, study_blend=study_blend, feed_override=feed_override, gains=gains,
+        block_delete=block_delete, flatten=flatten, expand_cycles=expand_cycles,
     )  # fmt: skip
-    return retimed(JointRun.of(program, machine, job), options, progress)
+    run = JointRun.of(program, machine, job)
+    other = None if nominal is None else run.sources.source(nominal)
+    return retimed(run, options, progress, other)
 
 
-def retimed(run: JointRun, options: JointRetimeOptions, progress: Progress | None = None) -> JointRetiming:
+def retimed(
+    run: JointRun,
+    options: JointRetimeOptions,
+    progress: Progress | None = None,
+    nominal: Source | None = None,
+) -> JointRetiming:
     """As `retime_joints`, for a run that is loaded."""
     check_override(options.feed_override)
     limits_of(run.machine.structure)
-    with run.program.errors():
-        _, path = run.read(run.program, options)
-    return motion_of(run, path, options, progress)
+
+    def read(source: Source) -> JointPath:
+        with source.errors():
+            return run.read(source, options, block_delete=options.block_delete)[1]
+
+    path, other = read(run.program), None if nominal is None else read(nominal)
+    result = motion_of(run, path, options, progress)
+    if other is not None and nominal is not None:
+        plain = replace(options, gains=False, study_blend=False)
+        there = motion_of(run, other, plain, progress)
+        versus = against(nominal.short, *(_legs(one) for one in (there, result)))
+        result.report["nominal"] = placed(versus, other.program.origin)
+    return result
+
+
+def _legs(result: JointRetiming) -> Legs:
+    """The routes of a motion in mm and deg, and the use of its lines."""
+    legs = [
+        replace(one.route.route, point_mm=one.route.route.point_mm / one.route.scale, line=one.route.line)
+        for one in result.driven
+    ]
+    use = LineUse.joined([joint_usage(one)[0] for one in result.driven])
+    return Legs(tuple(legs), use, result.duration_s, result.path.program)
 
 
 def motion_of(
@@ -181,22 +255,29 @@ def motion_of(
     limits = limits_of(structure)
     stated = (options.blend_mm, None if control is None else control.blend_mm, BLEND_MM)
     blend_mm = next(value for value in stated if value is not None)
-    with path.program.errors():
-        clock = clock_of(path, blend_mm)
+    program = path.program
+    with program.errors():
+        clock = clock_of(path, blend_mm, block_delete=options.block_delete)
 
     def again(tolerance: float, feed: float) -> tuple[Stretch, ...]:
         factor = feed * options.feed_override / 100.0
         routes = routes_of(path, clock, tolerance, factor)
         return tuple(planned(path.motion, route, limits, tell, optimise) for route in routes)
 
-    stretches = again(1.0, 1.0)
-    if not stretches:
+    def shown(motion: tuple[Stretch, ...]) -> tuple[Stretch, ...]:
+        line_of = program.original_lines
+        return tuple(replace(one, route=replace(one.route, line=line_of(one.route.line))) for one in motion)
+
+    driven = again(1.0, 1.0)
+    if not driven:
         raise CannotCompute(
             "no move of the program begins and ends at known positions of all axes, so nothing can be timed; "
             "command all axes first",
             file=run.program.name or None,
         )
+    stretches = shown(driven)
     timed = np.unique(np.concatenate([one.route.line for one in stretches]))
+    line = program.original_lines(path.line)
     # the first row of a list is where the motion begins
     moving = np.isfinite(path.end).all(axis=1) & ~np.isfinite(path.start).all(axis=1)
     moving &= path.listed is None
@@ -207,19 +288,26 @@ def motion_of(
         "blend_mm": blend_mm,
         "feed_override": options.feed_override / 100.0,
         "waypoints": int(sum(len(one.route.route) for one in stretches)),
-        "untimed": {"moves": int(moving.sum()), "lines": np.unique(path.line[moving])[:LONGEST].tolist()},
+        "untimed": {"moves": int(moving.sum()), "lines": np.unique(line[moving])[:LONGEST].tolist()},
         **summary(structure, stretches, timed),
     }
+    if options.study_blend:
+        report["blend_study"] = [
+            blend_row(factor, clock, driven if factor == 1.0 else again(factor, 1.0)) for factor in FACTORS
+        ]
     if options.gains:
 
         def tolerances(lines: Index) -> Array:
             largest = np.zeros(len(lines))
-            row = np.flatnonzero(np.isin(path.line, lines))
-            np.maximum.at(largest, np.searchsorted(lines, path.line[row]), clock.blend_mm[row])
+            row = np.flatnonzero(np.isin(line, lines))
+            np.maximum.at(largest, np.searchsorted(lines, line[row]), clock.blend_mm[row])
             return largest
 
-        report["gains"] = joint_gains(stretches, timed, tolerances, again)
-    return JointRetiming(structure, stretches, report)
+        report["gains"] = joint_gains(
+            stretches, timed, tolerances, lambda tolerance, feed: shown(again(tolerance, feed))
+        )
+    report = placed(report, program.origin)
+    return JointRetiming(run, options, path, driven, stretches, report)
 
 
 def _ways(motion: PlannedMotion) -> tuple[Array, Array]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from olp.core.arrays import Index
 from olp.kinematics.structure import Structure
+from olp.program.feeds.timing import PathControl, Timing
 from olp.trajectory.joint_motion import Stretch
 
 #: Lines of the table of those that take longest.
@@ -17,6 +18,21 @@ _WORDS = ("velocity", "acceleration", "jerk")
 
 def _names(structure: Structure) -> list[str]:
     return [f"{name} {word}" for name in structure.order for word in _WORDS]
+
+
+def blend_row(factor: float, clock: Timing, stretches: tuple[Stretch, ...]) -> dict[str, Any]:
+    """Time and deviation at the path tolerances in use times a factor. The deviation is a bound: what the
+    axes are off, each in mm of the way that it moves the tip."""
+    off_mm = [
+        leg.deviation_mm * one.route.widest for one in stretches for leg in one.trajectory.legs
+    ]  # fmt: skip
+    used = np.unique(clock.blend_mm[clock.control == PathControl.BLEND])
+    return {
+        "factor": factor,
+        "tolerance_um": (used[used > 0.0] * factor * 1e3).tolist(),
+        "duration_s": sum(one.trajectory.duration_s for one in stretches),
+        "deviation_um": max(off_mm, default=0.0) * 1e3,
+    }
 
 
 def summary(structure: Structure, stretches: tuple[Stretch, ...], lines: Index) -> dict[str, Any]:
