@@ -152,7 +152,8 @@ class Machine:
     control that has a setting for it. `scaling_axes` are those that CYCL DEF 11 of a Heidenhain control
     scales. `lengths_along_z`: on a Sinumerik, lengths of tools count along Z in every plane.
     `default_motion` is the motion code in force at the start of a program, where its control does not fix it.
-    `still_macros` are the macros of a printer that move no axis and change no mode.
+    `still_macros` are the macros of a printer that move no axis and change no mode. `bracket_comments`:
+    to its firmware (a) is a comment.
     `real_time` is the beginning of the hash of the calibration that the control itself corrects by in every
     servo cycle, None where it does not.
     `styli` are end of the ram to centre of the tip of sensors by label.
@@ -187,6 +188,7 @@ class Machine:
     scaling_axes: Literal["plane", "all"] | None = None
     lengths_along_z: bool = False
     still_macros: frozenset[str] = frozenset()
+    bracket_comments: bool = False
     path_mode: Literal["blend", "exact-stop"] = "blend"
     blend_mm: float | None = None
     tool_change_moves: frozenset[str] = frozenset("XYZ")

@@ -338,6 +338,10 @@ class MachineFile(Table):
         description="which axes CYCL DEF 11 of Heidenhain programs scales, by a machine parameter: X and Y, "
         "or Z too",
     )
+    bracket_comments: bool = Field(
+        default=False,
+        description="whether (text) is a comment to Marlin, by an option of its firmware (PAREN_COMMENTS)",
+    )
     lengths_along_z: bool = Field(
         default=False,
         description="whether lengths of tools count along Z in G18 and G19 too, by a setting of Sinumerik "

@@ -22,6 +22,7 @@ from olp.core.values import dataclass
 from olp.program.rs274.lexer import WordChunk
 
 _COMMENT = pattern(rb";.*", re.DOTALL)
+_COMMENTS = pattern(rb"\([^)]*\)?|;.*", re.DOTALL)
 _NUMBERED = pattern(rb"N[ \t]*\d+[ \t]*")
 _CODE = pattern(rb"([GMT])[ \t]*(\d+(?:\.\d+)?)(?![\w.])|([GMT])[ \t]*(\d+(?:\.\d+)?)(?=[A-Z])")
 _NAME = pattern(rb"[A-Z_][A-Z0-9_]+")
@@ -65,9 +66,11 @@ class Commands:
     extruder_follows: bool
     arc_words: str
 
-    def feeds(self, data: Text) -> bool:
-        """Whether a text moves the extruder: else its G1 are cuts, and not travels where nothing is fed."""
-        move = rb"(?im)^[ \t]*(?:N[ \t]*\d+[ \t]*)?G[ \t]*0*[0-3][ \t]*(?![\d.])[^;\r\n]*"
+    def feeds(self, data: Text, *, brackets: bool) -> bool:
+        """Whether a text moves the extruder: else its G1 are cuts, and not travels where nothing is fed.
+        With `brackets` (a) is a comment."""
+        move = rb"(?im)^[ \t]*(?:N[ \t]*\d+[ \t]*)?G[ \t]*0*[0-3][ \t]*(?![\d.])"
+        move += rb"(?:\([^)\r\n]*\)|[^;(\r\n])*" if brackets else rb"[^;\r\n]*"
         return next(matches(re.compile(move + self.extruder.encode()), data), None) is not None
 
 
@@ -108,12 +111,13 @@ def check_lines(chunk: WordChunk, own: Mask, active: Mask, arcs: Mask, commands:
 
 def sorted_line(
     line: bytes, commands: Commands, still_m: frozenset[int], moving: frozenset[int], still_g: frozenset[int],
-    known: frozenset[str],
+    known: frozenset[str], *, brackets: bool = False, by_option: bool = False,
 ) -> Reading:  # fmt: skip
     """What a line of more than words does. `still_m` and `still_g` are codes, ten times their number, that
     move no axis; after `moving` no position is known. `known` are macros that the machine file states as
-    still. Raises ProgramError, without a line, for what cannot be read correctly."""
-    text = _COMMENT.sub(b"", line).strip().upper()
+    still. `brackets`: (a) is a comment, else `by_option` says whether the machine file may state that.
+    Raises ProgramError, without a line, for what cannot be read correctly."""
+    text = (_COMMENTS if brackets else _COMMENT).sub(b" ", line).strip().upper()
     numbered = _NUMBERED.match(text)
     text = text[numbered.end() :] if numbered else text
     shown = line.strip()[:_SHOWN].decode("latin-1")
@@ -133,8 +137,10 @@ def sorted_line(
         if letter == b"G" and number in moving | still_g:
             return Reading.MOVES if number in moving else Reading.STILL
     if text.startswith(b"(") or (b"(" in text and code is not None):
+        option = ", or state bracket_comments = true in the machine file where its firmware has that option"
         raise ProgramError(
-            f"`{shown}` has brackets, which are no comment on this control; write the comment behind `;`",
+            f"`{shown}` has brackets, which are no comment on this control; write the comment behind `;`"
+            f"{option if by_option else ''}",
             code="OLP514",
         )
     name = _NAME.match(text)

@@ -333,6 +333,7 @@ def _odd_commands(data: Text, chunk: WordChunk, lines: list[int], state: AxisSta
             reading = sorted_line(
                 text, profile.commands, profile.still_m, profile.codes_of(Act.CONTROL),
                 profile.codes_of(Act.UNCHANGED), known,
+                brackets=profile.text.brackets, by_option=profile.brackets_by_option,
             )  # fmt: skip
         except ProgramError as error:
             error.line = chunk.first_line + line + 1

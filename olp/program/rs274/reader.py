@@ -140,7 +140,9 @@ class _Reader:
         self.lost: set[int] = set()
         commands = profile.commands
         self.others = OTHER if commands is None else OTHER.replace(commands.extruder.encode(), b"")
-        self.extrusion = None if commands is None or not commands.feeds(data) else Extrusion(commands)
+        brackets = self.state.profile.text.brackets
+        feeds = commands is not None and commands.feeds(data, brackets=brackets)
+        self.extrusion = Extrusion(commands) if commands is not None and feeds else None
         self.feeding = self.whole = np.zeros(0, bool)
         translator = profile.translator
         if profile.spindle_words:

@@ -51,6 +51,26 @@ def test_lines_after_which_no_position_is_known(line: str, control: str, setups:
     assert ends(f"{line}\nG0 Y5\n", setups[control], control)[-1] == ("RAPID", None, 5.0, None)
 
 
+@pytest.mark.parametrize("control", PRINTERS)
+def test_brackets_are_comments_where_the_machine_file_says_so(control: str, setups: dict[str, Setup]) -> None:
+    """An option of Marlin's firmware, which Klipper does not have; the plain text is the judge."""
+    setup = setups[control]
+    stated = replace(setup, machine=replace(setup.machine, bracket_comments=True))
+    plain = "G21 ; (x\nG1 Y5 F600\nG28 X\nG0 X4 Y2\nG1 Z2 F60\n"
+    text = (
+        "(a ; G1 X99)\nG21 (all in mm)\nG1 (to) Y5 F600(Penetrate)\nG28 X (home\n"
+        "G0 X4 Y2 ; (x\nG1 Z2 F60 (end\n"
+    )
+    if control == "marlin":
+        assert ends(text, stated, control) == ends(plain, setup, control)
+        assert refusal(f"{HEAD}(a (b) c)\n", stated, control)["line"] == 4
+        assert "bracket_comments = true" in str(refusal(HEAD + text, setup, control)["why"])
+    else:
+        why = str(refusal(HEAD + text, stated, control)["why"])
+        assert "brackets, which are no comment" in why
+        assert "bracket_comments" not in why
+
+
 def test_names_of_klipper(setups: dict[str, Setup]) -> None:
     setup = setups["klipper"]
     zeros = "SET_GCODE_OFFSET Z_ADJUST=0 MOVE=1", "set_gcode_offset X=0.0 Z=-.0"

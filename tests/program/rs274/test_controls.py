@@ -306,7 +306,7 @@ OF_TIME = {
 #: Tables and texts, which have tests of their own.
 TABLES = {"codes", "refusals", "harmless_m", "text", "rules", "cycles", "contours", "language",
           "written_ending", "program_number", "tip_codes", "direction_codes", "plane_codes",
-          "touch_log"}  # fmt: skip
+          "touch_log", "brackets_by_option"}  # fmt: skip
 #: What controls with statements of their own do, which `tests/program/sinumerik` reads.
 OF_STATEMENTS = {"translator", "machine_moves_keep_length", "increments_take_offsets", "lengths_follow_plane",
                  "further_turns", "absolute_centre", "metric", "cleared", "dwell"}  # fmt: skip

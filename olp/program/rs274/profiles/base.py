@@ -124,6 +124,8 @@ class Profile(Dialect):
     - `plane_codes`: codes of tilted planes, which are read there, too.
     - `commands`: each line is a command with parameters, and no code holds for the next line. None: lines are
       blocks of words.
+    - `brackets_by_option`: whether (a) is a comment is an option of the firmware, which the machine file
+      states as `bracket_comments`.
     - `inert`: whole lines that are no words and move nothing, such as names of programs and labels.
     - `translator` turns a text with statements of its own into words of this family (`translation`).
       `machine_moves_keep_length`: the tool length counts in G53 too. `increments_take_offsets`: an increment
@@ -207,6 +209,7 @@ class Profile(Dialect):
     plane_codes: frozenset[int] = frozenset()
     leads: Interpolated = "axes"
     commands: Commands | None = None
+    brackets_by_option: bool = False
     inert: re.Pattern[bytes] | None = None
     skip_mark: re.Pattern[bytes] | None = SKIP_MARK
     translator: Callable[[bytes], Any] | None = None
@@ -273,6 +276,8 @@ class Profile(Dialect):
             profile = replace(profile, initial_retract=level)
         if machine.default_motion is not None and self.motion is None:
             profile = replace(profile, motion=int(machine.default_motion[1:]))
+        if machine.bracket_comments and self.brackets_by_option:
+            profile = replace(profile, text=replace(self.text, brackets=True))
         if self.language.user_tasks and not self.counts_increments(machine):
             profile = replace(profile, language=replace(self.language, increments_open=False))
         return profile

@@ -17,6 +17,7 @@ _MOVING = (120, 260, 270, 310, 320, 330, 340, 350, 420, 610, 760)
 DIALECT = replace(
     PRINTER,
     name="marlin",
+    brackets_by_option=True,
     title="Marlin 2",
     codes={
         **PRINTER_CODES, **dict.fromkeys(_MOVING, Act.CONTROL), 180: Act.PLANE, 190: Act.PLANE,
