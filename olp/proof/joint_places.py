@@ -12,8 +12,8 @@ from olp.compensation.joints.planning import JointPlan
 from olp.compensation.joints.sampling import spread
 from olp.core.arrays import Array, Index, Mask
 from olp.core.values import dataclass
-from olp.errormodel.reversal import play_after, play_states
 from olp.kinematics.poses import Poses, rotation_vector
+from olp.proof.joint_sides import Sides
 
 #: The arm in mm at which a turn counts as much as a shift, where a place on a move is found.
 ARM_MM = 100.0
@@ -26,48 +26,17 @@ BATCH = 1 << 15
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sides:
-    """(m, axes) axis values of a path at the `start` and `end` of its moves, NaN where unknown, and on which
-    side of its backlash each axis is `before` a move and `behind` it."""
-
-    path: JointPath
-    start: Array
-    end: Array
-    before: Array
-    behind: Array
-
-    @staticmethod
-    def of(path: JointPath) -> Sides:
-        motion, ends = path.motion, []
-        for programmed in (path.start, path.end):
-            known = np.isfinite(programmed).all(axis=1)
-            axes = np.full(programmed.shape, np.nan)
-            axes[known] = motion.axes(programmed[known], path.tool[known], path.tip[known])
-            ends.append(axes)
-        behind = _plays(ends[1], motion.width)
-        before = np.vstack((np.zeros((1, len(motion.width))), behind[:-1])) if len(behind) else behind
-        return Sides(path, ends[0], ends[1], before, behind)
-
-    def along(self, rows: Index, part: Array) -> Array:
-        """(r, axes) the sides at shares of moves."""
-        path, motion = self.path, self.path.motion
-        side = self.before[rows]
-        if motion.width.any():
-            here = motion.axes(path.at(rows, part), path.tool[rows], path.tip[rows])
-            side = play_after(side, here - self.start[rows], np.broadcast_to(motion.width, here.shape))
-        return side
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class Places:
     """Places (r,) at `part` of the moves `rows` of a path, which are at `share` of the nominal moves `move`.
-    `side` (r, axes) is that of the backlash."""
+    `side` (r, axes) is that of the backlash, in the middle of what is possible, `unknown` (r, axes) half of
+    the range of what is."""
 
     move: Index
     rows: Index
     part: Array
     share: Array
     side: Array
+    unknown: Array
 
     def poses(self, path: JointPath) -> tuple[Array, Poses]:
         """(r, axes) commanded axis values there, and the poses of the machine with its errors."""
@@ -92,37 +61,28 @@ def visited(
     sides = Sides.of(path)
     known = np.isfinite(sides.end).all(axis=1) & np.isfinite(nominal.end[owner]).all(axis=1)
     begun = np.isfinite(sides.start).all(axis=1) & np.isfinite(nominal.start[owner]).all(axis=1)
-    ends = np.flatnonzero(known & at[owner])
+    # the end of a move that does not cut is that of its last part: one goes past it before
+    ends = np.flatnonzero(known & at[owner] & (between[owner] | (groups[owner] == np.arange(len(path)))))
     along = known & begun & between[owner]
     shares = _shares(nominal, path, (groups, owner), plan, sides, along)
-    yield Places(owner[ends], ends, np.ones(len(ends)), shares[1][ends], sides.behind[ends])
+
+    def places(rows: Index, part: Array) -> Places:
+        share = shares[0][rows] + part * (shares[1] - shares[0])[rows]
+        return Places(owner[rows], rows, part, share, *sides.at(rows, part))
+
+    yield places(ends, np.ones(len(ends)))
     feeds = np.flatnonzero(along)
     samples = finer * path.samples(feeds, sides.start[feeds], sides.end[feeds]) + 1
     totals = np.cumsum(samples)
     a = 0
     while a < len(feeds):
         b = max(int(np.searchsorted(totals, (totals[a - 1] if a else 0) + BATCH)), a + 1)
-        mine, step = spread(samples[a:b])
-        rows = feeds[a:b][mine]
-        part = step / samples[a:b][mine]
-        share = shares[0][rows] + part * (shares[1] - shares[0])[rows]
-        yield Places(owner[rows], rows, part, share, sides.along(rows, part))
+        mine, step = spread(samples[a:b] + 1)
+        rows, part = feeds[a:b][mine], step / samples[a:b][mine]
+        inner = part < 1.0
+        yield places(rows[inner], part[inner])
+        yield places(*sides.taken_up(rows, part))
         a = b
-
-
-def _plays(axes: Array, width: Array) -> Array:
-    """(m, axes) the side of the backlash of each axis behind each move."""
-    play = np.zeros(axes.shape)
-    if width.any():
-        for first in range(0, axes.shape[1], 3):
-            columns = np.full((len(axes), 3), 0.0)
-            part = axes[:, first : first + 3]
-            columns[:, : part.shape[1]] = part
-            widths = np.zeros(3)
-            widths[: part.shape[1]] = width[first : first + 3]
-            play[:, first : first + 3] = play_states(columns, widths)[:, : part.shape[1]]
-        play[:, width == 0.0] = 0.0
-    return play
 
 
 def _shares(
@@ -146,7 +106,9 @@ def _shares(
     inner[row] = False
     row = np.flatnonzero(inner)
     if row.size:
-        end[row] = _places(nominal, path, owner[row], row, sides.end[row], sides.behind[row])
+        end[row] = _places(
+            nominal, path, owner[row], row, sides.end[row], sides.at(row, np.ones(len(row)))[0]
+        )
     begin = np.append(0.0, np.where(owner[1:] == owner[:-1], end[:-1], 0.0))[: len(path)]
     return begin, np.maximum(end, begin)
 

@@ -41,10 +41,14 @@ _PLACE_AND_TURN = (slice(0, 3), slice(3, 6))
 class Deviation:
     """By nominal move (n,): the largest distance of the tip in mm and angle of the tool in rad, NaN where
     none is known. `correctable_rad` (n,) are the parts of such angles that the axes could take back, where
-    others remain. Squares are summed over `samples` (n,) places."""
+    others remain. `unknown_mm` and `unknown_rad` (n,) are parts of all three, by which a deviation may be
+    larger because the side of the backlash is not known yet. Squares are summed over `samples` (n,)
+    places."""
 
     distance_mm: Array
     angle_rad: Array
+    unknown_mm: Array
+    unknown_rad: Array
     correctable_rad: Array
     square_mm2: Array
     square_rad2: Array
@@ -127,17 +131,22 @@ def _rounding(path: JointPath, plan: JointPlan, digit_mm: float, digit_deg: floa
 def _steps(path: JointPath, plan: JointPlan, half: Array) -> tuple[float, float]:
     """mm and rad by which the tip and the tool are off at most where axes are off by `half` (r, axes) mm or
     deg at the rows of a plan."""
-    rotary = np.array([unit == "deg" for unit in path.motion.structure.units])
-    half = np.where(rotary, np.radians(half), half)
     rows, most = np.flatnonzero(np.isfinite(plan.axes).all(axis=1)), np.zeros(2)
     for a in range(0, len(rows), BATCH):
         some = rows[a : a + BATCH]
-        slopes = path.motion.slopes(plan.axes[some], path.tool[plan.move[some]])
-        sizes = [
-            (np.linalg.norm(slopes[:, part], axis=1) * half[some]).sum(axis=1) for part in _PLACE_AND_TURN
-        ]
+        sizes = _moved(path, plan.axes[some], path.tool[plan.move[some]], half[some])
         most = np.maximum(most, np.max(sizes, axis=1))
     return float(most[0]), float(most[1])
+
+
+def _moved(path: JointPath, axes: Array, tool: Index, half: Array) -> tuple[Array, Array]:
+    """(r,) mm and (r,) rad by which the tip and the tool are off at most where axes are off by `half`
+    (r, axes) mm or deg."""
+    rotary = np.array([unit == "deg" for unit in path.motion.structure.units])
+    size = np.where(rotary, np.radians(half), half)
+    slopes = path.motion.slopes(axes, tool)
+    place, turn = ((np.linalg.norm(slopes[:, part], axis=1) * size).sum(axis=1) for part in _PLACE_AND_TURN)
+    return place, turn
 
 
 def match(
@@ -165,7 +174,9 @@ def match(
     elif other > count:
         parts = np.bincount(plan.move, minlength=count)
         feed = nominal.feed & ~nominal.holes.whole
-        groups = _stretched(expected, corrected.end, near, np.where(feed, parts, 0), nominal.curves.mask)
+        # one that does not cut is gone past at most
+        parts = np.where(feed | (parts > 1), parts, 0)
+        groups = _stretched(expected, corrected.end, near, parts, nominal.curves.mask | ~feed)
     away = np.nanmax(
         np.append(np.abs(corrected.end[groups] - expected), np.zeros((count, 1)), axis=1), axis=1
     )
@@ -181,15 +192,15 @@ def match(
     return groups
 
 
-def _stretched(expected: Array, end: Array, near: Array, parts: Index, arc: Mask) -> Index:
-    """The ends of nominal moves among more moves of the corrected program: each feed move, which has `parts`
-    (n,) as planned, ends with the next one that is where it is expected. An arc may pass there before, so it
-    ends with the one that comes nearest to its number of parts."""
+def _stretched(expected: Array, end: Array, near: Array, parts: Index, twice: Mask) -> Index:
+    """The ends of nominal moves among more moves of the corrected program: each that has `parts` (n,) as
+    planned ends with the next one that is where it is expected. One that may pass there `twice` (n,), as an
+    arc does, ends with the one that comes nearest to its number of parts."""
     spare, groups, j = len(end) - len(expected), [], 0
     expected, end = np.nan_to_num(expected), np.nan_to_num(end)
     for i, count in enumerate(parts.tolist()):
         if count and spare:
-            wanted, there = count - 1 if arc[i] else 0, np.zeros(0, np.int64)
+            wanted, there = count - 1 if twice[i] else 0, np.zeros(0, np.int64)
             # mostly it is near by
             for reach in (min(2 * count + _NEAR_BY, spare), spare):
                 if not there.size:
@@ -223,18 +234,20 @@ class _Sums:
         count = len(partly)
         self.partly, self.correctable = partly, np.zeros(count)
         self.largest = np.full((count, 2), -np.inf)
-        self.square = np.zeros((count, 2))
+        self.unknown, self.square = np.zeros((count, 2)), np.zeros((count, 2))
         self.samples = np.zeros(count, np.int64)
 
     def add(self, nominal: JointPath, path: JointPath, places: Places) -> None:
         if not len(places.rows):
             return
         (axes, actual), target = places.poses(path), places.targets(nominal)
-        both = np.stack(deviations(path.motion.structure, actual, target), axis=1)
+        unknown = _unknown(path, places, axes)
+        both = np.stack(deviations(path.motion.structure, actual, target), axis=1) + unknown
+        np.maximum.at(self.unknown, places.move, unknown)
         rows = np.flatnonzero(self.partly[places.move])
         if rows.size:
             tool, poses = path.tool[places.rows[rows]], (actual.only(rows), target.only(rows))
-            angle = path.motion.correctable(axes[rows], tool, *poses)
+            angle = path.motion.correctable(axes[rows], tool, *poses) + unknown[rows, 1]
             np.maximum.at(self.correctable, places.move[rows], angle)
         np.maximum.at(self.largest, places.move, both)
         np.add.at(self.square, places.move, both * both)
@@ -244,5 +257,16 @@ class _Sums:
         known = self.samples > 0
         largest = np.where(known[:, None], self.largest, np.nan)
         return Deviation(
-            largest[:, 0], largest[:, 1], self.correctable, self.square[:, 0], self.square[:, 1], self.samples
-        )
+            largest[:, 0], largest[:, 1], self.unknown[:, 0], self.unknown[:, 1], self.correctable,
+            self.square[:, 0], self.square[:, 1], self.samples,
+        )  # fmt: skip
+
+
+def _unknown(path: JointPath, places: Places, axes: Array) -> Array:
+    """(r, 2) mm and rad by which the tip and the tool may be off at most, at axis values (r, axes), because
+    the side of the backlash is not known."""
+    most, rows = np.zeros((len(axes), 2)), np.flatnonzero(places.unknown.any(axis=1))
+    if rows.size:
+        half = 0.5 * np.abs(path.motion.width) * places.unknown[rows]
+        most[rows] = np.stack(_moved(path, axes[rows], path.tool[places.rows[rows]], half), axis=1)
+    return most

@@ -21,7 +21,8 @@ from olp.core.units import AXES, MM_PER_UM, RAD_PER_URAD
 from olp.core.values import dataclass
 from olp.files.sources import Source
 from olp.kinematics.correction import deviations
-from olp.proof.joint_places import Places, Sides, visited
+from olp.proof.joint_places import Places, visited
+from olp.proof.joint_sides import Sides
 from olp.proof.judgement import Judgements, groups_of, question
 from olp.proof.proof import Counts
 from olp.reports.joints import verdict_of
@@ -171,10 +172,10 @@ def _seen(done: ProvedJoints) -> _Seen:
             "no position of the program is known, so there is nothing to show; command all axes first"
         )
     move, rows, part, share = (column[order] for column in columns)
-    side = np.concatenate([p.side for p in parts])[order]
-    places = Places(move, rows, part, share, side)
+    side, unknown = (np.concatenate([getattr(p, name) for p in parts])[order] for name in ("side", "unknown"))
+    places = Places(move, rows, part, share, side, unknown)
     target = places.targets(path)
-    own = Places(move, move, share, share, _own_sides(path, move, share))
+    own = Places(move, move, share, share, *_own_sides(path, move, share))
     axes, before = own.poses(path)
     commanded, after = places.poses(second)
     command = second.motion.nominal(commanded, second.tool[rows])
@@ -186,13 +187,10 @@ def _seen(done: ProvedJoints) -> _Seen:
     )  # fmt: skip
 
 
-def _own_sides(path: JointPath, move: Index, share: Array) -> Array:
-    """(n, axes) the sides of the backlash of the uncorrected program."""
+def _own_sides(path: JointPath, move: Index, share: Array) -> tuple[Array, Array]:
+    """(n, axes) the sides of the backlash of the uncorrected program, as `Sides.at`."""
     sides = Sides.of(path)
-    result = sides.behind[move]
-    inner = np.flatnonzero((share < 1.0) & np.isfinite(sides.start[move]).all(axis=1))
-    result[inner] = sides.along(move[inner], share[inner])
-    return result
+    return sides.at(move, np.where(np.isfinite(sides.start[move]).all(axis=1), share, 1.0))
 
 
 def _frame(path: JointPath, seen: _Seen) -> Frame:

@@ -72,6 +72,9 @@ def test_rotary_axes_stand_in_a_plane(tmp_path: Path) -> None:
 def test_backlash_of_a_rotary_axis_stays_and_the_tip_is_right(tmp_path: Path) -> None:
     calibration = "[backlash]\nC_urad = 60.0\nX_um = 8.0\n"
     text = program(FORMS[0][1], "A+Q120 C+Q122")
+    unknown = corrected(tmp_path, text, calibration=calibration)
+    assert not unknown.report["verdict"]["ok"] and "OLP103" in [one.code for one in unknown.findings]
+    text = text.replace(b" Z+200 R0", b" Z+200 A+0 C+0 R0", 1)
     result = corrected(tmp_path, text, calibration=calibration)
     assert result.report["verdict"]["ok"]
     assert result.report["deviation"]["after"]["position_max_um"] < 1.9

@@ -91,7 +91,7 @@ class _Writer:
         assert targets is not None
         assert arm is not None
         self.path, self.plan, self.program, self.targets = path, plan, program, targets
-        self.limits = limits
+        self.limits, self.stands = limits, plan.stands
         self.dialect, self.arm, self.tally = program.dialect, arm, Tally()
         self.nominal, self.commands = path.end.tolist(), plan.command.tolist()
         self.clones = self.made = 0
@@ -349,7 +349,7 @@ class _Writer:
         share = float(self.plan.share[row])
         name = self._new_name(target) if self.dialect.names_parts else ""
         # a step that takes up backlash has to be reached
-        part = Part((x, y, z), share, share == 0.0, name, tuple(turned), wanted.turns)
+        part = Part((x, y, z), share, bool(self.stands[row]), name, tuple(turned), wanted.turns)
         self.tally.inserted_blocks += 1
         return self.dialect.part(self.program, move, use, part)
 

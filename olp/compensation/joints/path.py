@@ -92,6 +92,17 @@ class JointPath:
         place = self.between(self.start[move], self.end[move], share, move)
         return self.curves.along(place, move, share)
 
+    def axes(self, move: Index, programmed: Array) -> Array:
+        """(r, axes) axis values of coordinates of moves, NaN where unknown. Where not all coordinates are
+        known, words of rotary axes state theirs all the same."""
+        known = np.isfinite(programmed).all(axis=1)
+        axes = np.full((len(move), len(self.motion.structure.order)), np.nan)
+        axes[known] = self.motion.axes(programmed[known], self.tool[move[known]], self.tip[move[known]])
+        if not self.coordinates.poses:
+            alone = np.ix_(~known, self.coordinates.rotary)
+            axes[alone] = programmed[alone]
+        return axes
+
     def between(self, start: Array, end: Array, share: Array, move: Index) -> Array:
         """(r, axes) coordinates at shares of ways from `start` to `end`, led as in moves. Raises ProgramError
         where the tool has directions there that are not reached."""

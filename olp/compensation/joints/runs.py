@@ -19,14 +19,12 @@ _EDGE = 1e-3
 class Runs:
     """(t,) runs in their order: `begin` and `end` are shares of `move`. An arc has a run for each stretch
     between places where an axis with backlash turns round, another move has one. `side` (t, axes) is on which
-    side of its backlash each axis is there, 0 where that is not known; where `turned`, one turns round at the
-    begin of a feed move."""
+    side of its backlash each axis would be there without correction, 0 where that is not known."""
 
     move: Index
     begin: Array
     end: Array
     side: Array
-    turned: Mask
 
     @staticmethod
     def of(path: JointPath, solid: Mask) -> Runs:
@@ -34,24 +32,21 @@ class Runs:
         width = path.motion.width
         move = np.flatnonzero(solid)
         begin, end = np.zeros(len(move)), np.ones(len(move))
-        side, turned = np.zeros((len(move), len(width))), np.zeros(len(move), bool)
+        side = np.zeros((len(move), len(width)))
         if not width.any() or not len(move):
-            return Runs(move, begin, end, side, turned)
+            return Runs(move, begin, end, side)
         cut, share = _turning(path, move[path.curves.mask[move]])
         move, begin = np.append(move, cut), np.append(begin, share)
         order = np.lexsort((begin, move))
         move, begin = move[order], begin[order]
         end = np.append(np.where(move[1:] == move[:-1], begin[1:], 1.0), 1.0)
-        known = np.isfinite(path.start[move]).all(axis=1)
-        rows = np.flatnonzero(known)
+        rows = np.flatnonzero(np.isfinite(path.start[move]).all(axis=1))
         moved = np.zeros((len(move), len(width)))
         moved[rows] = _axes(path, move[rows], end[rows]) - _axes(path, move[rows], begin[rows])
         moves = np.abs(moved) > _STILL
         last = np.maximum.accumulate(np.where(moves, np.arange(len(move))[:, None], -1), axis=0)
         side = np.where(last >= 0, np.take_along_axis(np.sign(moved), np.maximum(last, 0), axis=0), 0.0)
-        before = np.vstack((np.zeros((1, len(width))), side[:-1]))
-        turned = ((side != before) & (width != 0.0)).any(axis=1) & path.feed[move] & known
-        return Runs(move, begin, end, side * (width != 0.0), turned)
+        return Runs(move, begin, end, side * (width != 0.0))
 
 
 def _axes(path: JointPath, move: Index, share: Array) -> Array:

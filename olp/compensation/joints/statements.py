@@ -10,6 +10,7 @@ import numpy as np
 from olp.compensation.joints.writer import PLACES, JointWriter, WrittenJoints
 from olp.compensation.wrapping import carded, wrapped
 from olp.core.arrays import Array
+from olp.core.toolpath import Kind
 from olp.core.units import AXES
 from olp.program.text.edits import BARE, EditList, Edits
 
@@ -64,7 +65,11 @@ class StatementJoints(JointWriter):
         for row in np.flatnonzero(self._tails()).tolist():
             move = int(self.plan.move[row])
             place = int(statements.end[move])
-            lead = program.eol(int(path.line[move])) + b"GOTO/"
+            eol = program.eol(int(path.line[move]))
+            lead = eol + b"GOTO/"
+            if program.toolpath.kind[move] == Kind.RAPID:
+                # it holds for one point
+                lead = eol + statements.rapid + lead
             for number, (mantissa, decimals) in enumerate(self._numbers(row, move)):
                 edits.add(place, place, mantissa, decimals, b"," if number else lead, row * PLACES + number)
             edits.add(place, place, BARE, 0, b"", row * PLACES + PLACES - 1)

@@ -182,9 +182,10 @@ def proved(
     path, plan = nominal
     digit_mm, digit_deg = last_digits(path)
     proof = prove_joints(path, corrected, plan, options.limits(), digit_mm=digit_mm, digit_deg=digit_deg)
-    findings = findings_of(path, plan, proof, run, options.date)
+    tolerance = options.tolerance_um, options.tolerance_urad
+    findings = findings_of(path, plan, proof, run, options.date, tolerance)
     text = bytes(corrected.program.data)
-    report = report_of(run, path, plan, proof, findings, (options.tolerance_um, options.tolerance_urad))
+    report = report_of(run, path, plan, proof, findings, tolerance)
     report["corrected"] = {"sha256": hashlib.sha256(text).hexdigest(), "lines": text.count(b"\n")}
     if tally is not None:
         report["written"] = {

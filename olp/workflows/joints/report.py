@@ -17,7 +17,7 @@ from olp.compensation.joints.planning import JointPlan
 from olp.compensation.style import fewest_decimals
 from olp.core.arrays import Array, Index, Mask
 from olp.core.toolpath import Kind
-from olp.core.units import RAD_PER_URAD, UM_PER_MM
+from olp.core.units import MM_PER_UM, RAD_PER_URAD, UM_PER_MM
 from olp.findings.catalogue import Finding
 from olp.program.robots.dialect import RobotDialect
 from olp.proof.joints import Deviation, JointProof
@@ -193,13 +193,27 @@ def _kept(path: JointPath, plan: JointPlan) -> Index:
 
 
 def findings_of(
-    path: JointPath, plan: JointPlan, proof: JointProof, run: JointRun, date: datetime.date | None
+    path: JointPath, plan: JointPlan, proof: JointProof, run: JointRun, date: datetime.date | None,
+    tolerance: tuple[float, float],
 ) -> tuple[Finding, ...]:  # fmt: skip
-    """What a person should know of a correction."""
+    """What a person should know of a correction with its tolerances in um and urad."""
     found = []
     if proof.over.any():
         lines = path.line[proof.over].tolist()
         found.append(finding("OLP101", "the corrected path leaves its tolerance at these lines", lines))
+    after = proof.after
+    unknown = (after.unknown_mm > tolerance[0] * MM_PER_UM) | (
+        after.unknown_rad > tolerance[1] * RAD_PER_URAD
+    )
+    unknown &= proof.judged
+    if unknown.any():
+        what = (
+            f"in {int(unknown.sum())} moves the side of an axis' backlash is unknown; up to "
+            f"{after.unknown_mm[unknown].max() * UM_PER_MM:.1f} um and "
+            f"{after.unknown_rad[unknown].max() / RAD_PER_URAD:.1f} urad of the deviation come from that; "
+            "move each axis by more than its backlash before"
+        )
+        found.append(finding("OLP103", what, path.line[unknown].tolist()))
     holes = path.holes.strokes & proof.judged & (proof.after.distance_mm > proof.allowed_mm)
     if holes.any():
         most_um = float(proof.after.distance_mm[holes].max()) * UM_PER_MM
