@@ -50,6 +50,9 @@ RETIME = (
     "plot_span", "stretch", "lines", "slow", "write_feed", "shared_feed", "block_delete",
 )  # fmt: skip
 
+#: What `olp view` takes.
+VIEW = ("live", "port", "no_time", "measured", "part_tolerance_um")
+
 
 def on_joints(machine: str | None, job: str | None, also: Collection[str] = ()) -> bool:
     """Whether the machine of a call has rotary joints. Raises UsageError for --tolerance-urad elsewhere, and
@@ -238,24 +241,25 @@ def plan(
 
 
 def view(
-    program: str | None, machine: str | None, job: str | None, corrected: str | None, words: dict[str, Any],
-    *, time: bool,
+    program: str | None, machine: str | None, job: str | None, corrected: str | None,
+    measured: Sequence[str], words: dict[str, Any], *, time: bool,
 ) -> tuple[Callable[[], Review], tuple[str, ...], str]:  # fmt: skip
     """`olp view`: what makes the page, its inputs, and the name of the program."""
     runs = [run_of(program, machine, job)]
     first = runs[0]
 
     def make() -> Review:
-        from olp.review.joints import reviewed
+        from olp.review.joints import Runs, reviewed
         from olp.workflows.joints.correct import JointOptions
 
         # files may have changed since the last call
         run = runs.pop() if runs else run_of(program, machine, job)
         second = None if corrected is None else source(run.sources, corrected)
-        return reviewed(run, options_of(JointOptions, words), second, time=time)
+        shown = Runs(tuple(measured), words["part_tolerance_um"])
+        return reviewed(run, options_of(JointOptions, words), second, shown, time=time)
 
     meshes = [mesh.file for mesh in first.job.meshes]
-    return make, (*first.files, *files_of(corrected), *meshes), program or first.program.name
+    return make, (*first.files, *files_of(corrected, *measured), *meshes), program or first.program.name
 
 
 def compare(

@@ -78,8 +78,8 @@ def command(
         raise UsageError("--port is for --live; add --live")
     if STREAM in (corrected, *measured):
         raise UsageError("stdin can be PROGRAM only; name the corrected program and measurements as files")
-    if joints.on_joints(machine, job, also=("live", "port", "no_time")):
-        make, inputs, name = joints.view(program, machine, job, corrected, words, time=not no_time)
+    if joints.on_joints(machine, job, also=joints.VIEW):
+        make, inputs, name = joints.view(program, machine, job, corrected, measured, words, time=not no_time)
     else:
         make, inputs, name = _viewed(program, machine, job, corrected, measured, words, no_time, quiet)
     if live and (output is not None or name == STREAM):

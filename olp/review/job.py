@@ -29,7 +29,7 @@ from olp.proof.proof import Counts
 from olp.review.features.moves import digit_mm
 from olp.review.listing import aligned
 from olp.review.manifest import curve_um, manifest_of
-from olp.review.measured import Matched, Matcher, refuse_unplaced, with_measured
+from olp.review.measured import Matched, Matcher, from_frames, refuse_unplaced, with_measured
 from olp.review.meshes import Body, nodes, of_job, of_machine
 from olp.review.motion import by_feed, feed_seconds, retimed
 from olp.review.motion import table as motion_table
@@ -274,7 +274,7 @@ def _scene(
         how = How(part_tolerance_um=part_um)
         done = judged(ground, files, how)
         refuse_unplaced(files, done.placed, how.reach_mm)
-        matcher = Matcher(ground, samples, setup, np.array(frame.origin_mm))
+        matcher = Matcher(ground, samples, from_frames(ground, setup, np.array(frame.origin_mm)))
         runs = zip(done.placed.runs, done.placed.orders, strict=True)
         shown_runs = tuple(matcher.match(run, order) for run, order in runs)
         layer = done.layers["after"]

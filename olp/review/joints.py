@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import datetime
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
@@ -19,6 +19,7 @@ from olp.core.machine import ZERO
 from olp.core.toolpath import Arcs, Kind, Toolpath
 from olp.core.units import AXES, MM_PER_UM, RAD_PER_URAD
 from olp.core.values import dataclass
+from olp.files.points import Points
 from olp.files.sources import Source
 from olp.kinematics.correction import deviations
 from olp.proof.joint_places import Places, visited
@@ -31,11 +32,14 @@ from olp.review.job import Review
 from olp.review.joint_machine import drawn
 from olp.review.joint_motion import joint_limits, joint_table
 from olp.review.listing import aligned
+from olp.review.measured import Matched, Matcher, refuse_unplaced, with_measured
 from olp.review.meshes import of_job
 from olp.review.motion import by_feed, feed_seconds, filled
 from olp.review.samples import Samples
 from olp.review.scene import Figures, Frame, Scene
 from olp.trajectory.from_joints import missing_limits
+from olp.workflows.compare_runs import How, judged
+from olp.workflows.joints.compare import ground_of, measured_points
 from olp.workflows.joints.correct import JointOptions, ProvedJoints, correction_of
 from olp.workflows.joints.loaded import JointRun
 from olp.workflows.joints.retime import JointRetimeOptions, motion_of
@@ -76,31 +80,48 @@ def view_joints(
     outside_box: Literal["refuse", "hold"] = "refuse",
     date: datetime.date | None = None,
     time: bool = True,
+    measured: Sequence[PathLike] = (),
+    part_tolerance_um: float | None = None,
 ) -> Review:
     """A program of a machine with rotary joints and its correction, for a browser.
 
     `corrected` is the corrected program, which is proved as in `verify_joints`. Without it the program is
     corrected as in `correct_joints`. Without `time`, or without limits of motion in the machine file, the
-    motion is not planned: times are those of the programmed feed. Raises as these.
+    motion is not planned: times are those of the programmed feed. `measured` are files of measured tips, one
+    run each, as `compare` takes them; `part_tolerance_um` is what these are judged by, that of the job where
+    it is None. Raises as these, and InputError for points that are not on the path.
     """
     options = JointOptions(
         tolerance_um=tolerance_um, tolerance_urad=tolerance_urad, flatten=flatten,
         expand_cycles=expand_cycles, outside_box=outside_box, date=date,
     )  # fmt: skip
     run = JointRun.of(program, machine, job)
-    return reviewed(run, options, None if corrected is None else run.sources.source(corrected), time=time)
+    runs = Runs(tuple(measured), part_tolerance_um)
+    second = None if corrected is None else run.sources.source(corrected)
+    return reviewed(run, options, second, runs, time=time)
 
 
-def reviewed(run: JointRun, options: JointOptions, corrected: Source | None, *, time: bool) -> Review:
+@dataclass(frozen=True, slots=True)
+class Runs:
+    """Files of measured runs, and the part tolerance by which the call has them judged."""
+
+    measured: tuple[PathLike, ...] = ()
+    part_tolerance_um: float | None = None
+
+
+def reviewed(
+    run: JointRun, options: JointOptions, corrected: Source | None, runs: Runs, *, time: bool
+) -> Review:
     """As `view_joints`, for a run that is loaded."""
     if corrected is None:
-        return page_of(run, correction_of(run, options), options, "", time=time)
-    return page_of(run, verification_of(run, corrected, options), options, corrected.name, time=time)
+        return page_of(run, correction_of(run, options), options, "", runs, time=time)
+    return page_of(run, verification_of(run, corrected, options), options, corrected.name, runs, time=time)
 
 
 def page_of(
-    run: JointRun, done: ProvedJoints, options: JointOptions, corrected_name: str, *, time: bool
-) -> Review:
+    run: JointRun, done: ProvedJoints, options: JointOptions, corrected_name: str,
+    runs: Runs | None = None, *, time: bool,
+) -> Review:  # fmt: skip
     """The review of two programs that are proved. Raises CannotCompute where no position is known."""
     path, second = done.nominal, done.corrected
     seen = _seen(done)
@@ -120,12 +141,18 @@ def page_of(
         moment, motion = filled(timing.seconds(samples.part, samples.within)), joint_table(timing.stretches)
     else:
         moment = by_feed(_seconds(run, nominal, samples), samples)
-    table = _table(done, options)
+    table, report = _table(done, options), done.report | {"verdict": _verdict(done)}
+    matched: tuple[Matched, ...] = ()
+    digests: tuple[str, ...] = ()
+    if runs is not None and runs.measured:
+        files = [measured_points(name, run, path) for name in runs.measured]
+        matched, table, report = _with_runs(run, path, samples, origin, files, runs, (table, report))
+        digests = tuple(points.sha256 for points in files)
     return Review(
         Scene(
             name=done.source.short or "program",
             corrected_name=Path(corrected_name).name,
-            digest=_digest(run, done),
+            digest=_digest(run, done, digests),
             machine=machine.structure.name,
             nominal=nominal,
             frame=frame,
@@ -142,8 +169,8 @@ def page_of(
             sources=(),
             listing=aligned(nominal, second.program, done.proof.groups, samples),
             bodies=(*of_job(run.job, run.setup, origin, run.sources.read), *bodies),
-            measured=(),
-            report=done.report | {"verdict": _verdict(done)},
+            measured=matched,
+            report=report,
             figures=_figures(done),
             table=table,
             tolerance_um=done.report["deviation"]["allowed_um"],
@@ -156,6 +183,25 @@ def page_of(
             planned=planned,
         )
     )
+
+
+def _with_runs(
+    run: JointRun, path: JointPath, samples: Samples, origin: Array, files: Sequence[Points], runs: Runs,
+    shown: tuple[Judgements, dict[str, Any]],
+) -> tuple[tuple[Matched, ...], Judgements, dict[str, Any]]:  # fmt: skip
+    """Measured runs among the samples, and the table and the report with them."""
+    table, report = shown
+    stated_um = runs.part_tolerance_um
+    part_um = run.job.part_tolerance_um if stated_um is None else stated_um
+    ground, how = ground_of(path), How(part_tolerance_um=part_um)
+    done = judged(ground, files, how)
+    refuse_unplaced(files, done.placed, how.reach_mm)
+    matcher = Matcher(ground, samples, lambda points, _: points - origin)
+    matched = tuple(
+        matcher.match(one, order) for one, order in zip(done.placed.runs, done.placed.orders, strict=True)
+    )
+    table = table.with_measured(replace(done.layers["after"], line=table.line))
+    return matched, table, with_measured(report, table, done)
 
 
 def _seen(done: ProvedJoints) -> _Seen:
@@ -288,12 +334,18 @@ def _tool(run: JointRun, path: JointPath) -> tuple[int, float]:
     return int(used[0]), max(radii, default=0.0) if len(used) == 1 else 0.0
 
 
-def _digest(run: JointRun, done: ProvedJoints) -> str:
-    """12 digits that change with every input of the page."""
+def _digest(run: JointRun, done: ProvedJoints, measured: Sequence[str]) -> str:
+    """12 digits that change with every input of the page; `measured` are the digests of those files."""
     combined = hashlib.sha256(done.nominal.program.data)
-    for part in (done.corrected.program.data, run.digest.encode(), repr((run.machine, run.job)).encode()):
+    for part in (
+        done.corrected.program.data,
+        run.digest.encode(),
+        repr((run.machine, run.job, measured)).encode(),
+    ):
         combined.update(b"\0")
         combined.update(part)
     for mesh in run.job.meshes:
         combined.update(run.sources.digest(mesh.file))
+    for digest in measured:
+        combined.update(digest.encode())
     return combined.hexdigest()[:12]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -34,15 +34,28 @@ class Matched:
     counted: Mask
 
 
-class Matcher:
-    """Puts measured runs, placed on the path of a program, among its samples, which are shown about
-    `origin_mm`: the axis position, without tool lengths, of the zero of the page."""
+#: Positions (n, 3) on the page of points (n, 3) in the frame of a nominal path, which belong to moves (n,).
+Placing = Callable[[Array, Index], Array]
 
-    def __init__(self, ground: Ground, samples: Samples, setup: Setup, origin_mm: Array) -> None:
-        assert ground.program is not None and ground.loaded is not None
-        self._path, self._ground = ground.program.toolpath, ground
-        self._frames = Frames.of(self._path, ground.loaded.model, setup)
-        self._origin = origin_mm
+
+def from_frames(ground: Ground, setup: Setup, origin_mm: Array) -> Placing:
+    """Where a page shows points on three linear axes: about `origin_mm`, the axis position, without tool
+    lengths, of its zero. It shows the program's own positions, without the errors of touched zeros."""
+    assert ground.program is not None and ground.loaded is not None
+    path = ground.program.toolpath
+    frames, first = Frames.of(path, ground.loaded.model, setup), int(path.frame[0])
+
+    def place(points: Array, move: Index) -> Array:
+        return np.asarray(frames.on_machine(points, first) - frames.shift_mm[path.frame[move]] - origin_mm)
+
+    return place
+
+
+class Matcher:
+    """Puts measured runs, placed on the path of a program, among its samples, where `place` shows them."""
+
+    def __init__(self, ground: Ground, samples: Samples, place: Placing) -> None:
+        self._ground, self._place = ground, place
         self._samples, self._arc_mm = samples, _arc_lengths(ground, samples)
 
     def match(self, run: Run, order: Order) -> Matched:
@@ -53,11 +66,8 @@ class Matcher:
         elif order == "free":
             rows = rows[np.argsort(run.pairing.s_mm[rows], kind="stable")]
         move = self._ground.row(run)[rows]
-        # the page shows the program's own positions, without the errors of touched zeros
-        first = int(self._path.frame[0])
-        nominal = self._frames.on_machine(run.nominal_mm[rows], first)
-        base = nominal - self._frames.shift_mm[self._path.frame[move]] - self._origin
-        delta = self._frames.on_machine(run.points_mm[rows], first) - nominal
+        base = self._place(run.nominal_mm[rows], move)
+        delta = self._place(run.points_mm[rows], move) - base
         index = np.maximum.accumulate(self._nearest(run.pairing.s_mm[rows], move))
         return Matched(run.name, base, delta, index, run.counted[rows])
 

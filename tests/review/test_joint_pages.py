@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 import tomllib
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -240,3 +241,28 @@ def test_the_machine_moves_in_the_browser(
             seen = [(world @ np.append(end - origin, 1.0))[:3] + origin for end in ends]
             at = np.array([np.interp(share * scene.time_s[-1], scene.time_s, c) for c in scene.position_mm.T])
             assert min(np.linalg.norm(one - at) for one in seen) < 0.3
+
+
+def test_measured_runs_are_shown_where_they_were_measured(tmp_path: Path) -> None:
+    """Tips of a run, 8 um off along Z from half of it on; positions by an own forward."""
+    machine = FOLDER / "trunnion-mill" / "machine.toml"
+    text = b"G21 G90 G17 G94 G54 G49\nG0 X0. Y0. Z150. A0. C0.\nG1 X9. A-9. C20. F900\nX-9. C40.\nM30\n"
+    ends = np.array([[0, 0, 10, 0, 0], [9, 0, 10, -9, 20], [-9, 0, 10, -9, 40]], float)
+    axes = np.vstack([a + np.linspace(0.0, 1.0, 21)[:, None] * (b - a) for a, b in pairwise(ends)])
+    tips = Judge(machine).forward(axes, False)[0]
+    off = np.where(np.arange(len(tips)) < 21, 0.0, 0.008)
+    rows = "".join(f"{x:.6f},{y:.6f},{z:.6f}\n" for x, y, z in tips + off[:, None] * [0.0, 0.0, 1.0])
+    (tmp_path / "run.csv").write_text("# frame=workpiece\nx_mm,y_mm,z_mm\n" + rows)
+    page = olp.view_joints(text, machine, measured=[tmp_path / "run.csv"], part_tolerance_um=5.0, time=False)
+    verdict = page.scene.report["verdict"]
+    assert {one["name"]: one["ok"] for one in verdict["questions"]} == {"program": True, "measured": False}
+    assert verdict["ok"] is False
+    (shown,) = page.scene.measured
+    origin = np.array(page.scene.frame.origin_mm)
+    assert shown.base_mm + shown.delta_mm + origin == pytest.approx(tips + off[:, None] * [0, 0, 1], abs=2e-6)
+    assert np.linalg.norm(shown.delta_mm, axis=1).max() == pytest.approx(0.008, abs=2e-4)
+    # the sample next to a point is near it
+    beside = page.scene.position_mm[shown.index]
+    assert np.linalg.norm(beside - shown.base_mm, axis=1).max() < 1.5
+    stated = page.scene.table.measured.by_line()
+    assert stated["line"].tolist() == [3, 4] and stated["measured_um"][1] == pytest.approx(8.0, abs=0.2)

@@ -38,18 +38,13 @@ def compare_with(run: JointRun, measured: Sequence[PathLike], options: CompareOp
     with run.program.errors():
         _, path = run.read(run.program, options)
     sets = [
-        [
-            _in_workpiece(
-                read_points(name, options.profile, run.sources.read_last, oriented=options.poses), run, path
-            )
-            for name in names
-        ]
+        [measured_points(name, run, path, options.profile, oriented=options.poses) for name in names]
         for names in (measured, options.before)
     ]
     side = Side(
         run.program, _poses(path, run.program.short) if options.poses else None,
         None if options.poses else path.program.in_original(), None,
-        None if options.poses else _ground(path), run.heads(), run.machine.structure.symmetric_tool,
+        None if options.poses else ground_of(path), run.heads(), run.machine.structure.symmetric_tool,
     )  # fmt: skip
     done = compared(side, sets, options)
     return replace(done, inputs=(*run.files, *run.sources.files))
@@ -76,8 +71,8 @@ def _poses(path: JointPath, file: str) -> Points:
     )  # fmt: skip
 
 
-def _ground(path: JointPath) -> Ground:
-    """The path of the nominal tip, by chords."""
+def ground_of(path: JointPath) -> Ground:
+    """The path of the nominal tip in workpiece coordinates, by chords."""
     rows = _known(path)
     rows = rows[np.isfinite(path.start[rows]).all(axis=1)]
     tool, tip = path.tool[rows], path.tip[rows]
@@ -97,6 +92,14 @@ def _ground(path: JointPath) -> Ground:
     numbers, operation = groups_of(path.program.toolpath)
     none = np.zeros(0, np.int64)
     return Ground(replace(through, line=line[through.line]), through.line, none, line, numbers, operation)
+
+
+def measured_points(
+    name: PathLike, run: JointRun, path: JointPath, profile: PointProfile | None = None, *,
+    oriented: bool = False,
+) -> Points:  # fmt: skip
+    """The points of a file in workpiece coordinates; poses where they are `oriented`. Raises InputError."""
+    return _in_workpiece(read_points(name, profile, run.sources.read_last, oriented=oriented), run, path)
 
 
 def _in_workpiece(points: Points, run: JointRun, path: JointPath) -> Points:
