@@ -13,7 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from olp.core.errors import InputError, OlpError, ProgramError, Reason, Refused, naming
-from olp.core.paired import data_beside, joined
+from olp.core.paired import data_beside, joined, system_of, system_part, with_system
 from olp.core.projects import gathered, holds_several, is_one_of_many, place_of
 from olp.core.spool import Mapped, Spool, Text, in_parts, whole
 from olp.core.values import dataclass
@@ -80,15 +80,19 @@ class Sources:
             digest.update(part)
         return digest.digest()
 
-    def source(self, given: PathLike | Text | Source) -> Source:
-        """A source from what the caller gave. A file is opened when its bytes are first needed."""
+    def source(
+        self, given: PathLike | Text | Source, made_from: PathLike | Text | Source | None = None
+    ) -> Source:
+        """A source from what the caller gave. A file is opened when its bytes are first needed. One that was
+        `made_from` another program runs with the data of the same control, wherever it lies."""
         if isinstance(given, Source):
             return given
         if isinstance(given, bytes | Mapped):
             return Source("", lambda: given)
-        return Source(str(given), functools.partial(self._whole, given))
+        other = None if made_from is None else self.source(made_from)
+        return Source(str(given), functools.partial(self._whole, given, other))
 
-    def _whole(self, path: PathLike) -> Text:
+    def _whole(self, path: PathLike, made_from: Source | None = None) -> Text:
         """A program with its data, where these are in a file beside it, or with all files of its project."""
         if is_one_of_many(Path(path)):
             name = in_parcel(path)
@@ -97,9 +101,15 @@ class Sources:
             text = self._programs[name]
             return self.text(path) if text is None else text
         data = data_beside(Path(path))
-        if data is None or not self.exists(data):
+        if data is None:
             return self.text(path)
-        return joined(self.read(path), self.read(data), data.name)
+        there = self.exists(data)
+        own = joined(self.read(path), self.read(data), data.name) if there else self.text(path)
+        system = system_of(Path(path), self.listed)
+        if system is not None:
+            return with_system(whole(own), self.read(system), system.name)
+        further = b"" if made_from is None else system_part(made_from.data)
+        return whole(own) + further if further else own
 
 
 def in_parcel(path: PathLike) -> str:

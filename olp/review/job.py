@@ -129,7 +129,7 @@ def view(
         only_sure_components=only_sure_components, date=date, accept=tuple(accept), time=time,
         step_mm=step_mm,
     )  # fmt: skip
-    second = None if corrected is None else session.sources.source(corrected)
+    second = None if corrected is None else session.sources.source(corrected, program)
     return run(
         session, source, options, corrected=second, correction=correction, corrected_name=corrected_name,
         measured=measured, progress=progress,

@@ -97,7 +97,7 @@ def view_joints(
     )  # fmt: skip
     run = JointRun.of(program, machine, job)
     runs = Runs(tuple(measured), part_tolerance_um)
-    second = None if corrected is None else run.sources.source(corrected)
+    second = None if corrected is None else run.sources.source(corrected, program)
     return reviewed(run, options, second, runs, time=time)
 
 

@@ -24,7 +24,7 @@ def outcome(config: Config, parcel: Parcel, task: Task) -> Outcome:
         parcel.source(task.program), config.machine, config.job, config.dialect, parcel, config.calibration
     )
     if task.released is not None:
-        return Outcome(_row(verified(run, parcel.source(task.released), options)))
+        return Outcome(_row(verified(run, parcel.source(task.released, task.program), options)))
     result = corrected(run, options)
     report = filed(result.report, task.report, options.date) if task.report else None
     return Outcome(_row(result), result.data, report)

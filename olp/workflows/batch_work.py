@@ -58,7 +58,7 @@ def _outcome(config: Config, parcel: Parcel, task: Task) -> Outcome:
     session = config.session().reading_from(parcel)
     source = session.sources.source(task.program)
     if task.released is not None:
-        return _judged(session, source, task, session.sources.source(task.released))
+        return _judged(session, source, task, session.sources.source(task.released, source))
     return _corrected(session, source, task)
 
 

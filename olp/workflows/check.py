@@ -156,7 +156,7 @@ def check(
     chosen(options)
     session = Session.start(machine, job)
     other = None if nominal is None else session.sources.source(nominal)
-    return run(session, session.sources.source(program), options, nominal=other, progress=progress)
+    return run(session, session.sources.source(program, nominal), options, nominal=other, progress=progress)
 
 
 def run(

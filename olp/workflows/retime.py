@@ -222,7 +222,7 @@ def retime(
         expand_cycles=expand_cycles, peck_clearance_mm=peck_clearance_mm, date=date, accept=tuple(accept),
     )  # fmt: skip
     other = None if nominal is None else session.sources.source(nominal)
-    source = session.sources.source(program)
+    source = session.sources.source(program, nominal)
     return run(session, source, options, nominal=other, proof=proof, progress=progress)
 
 

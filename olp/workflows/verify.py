@@ -84,7 +84,7 @@ def verify(
         part_tolerance_um=part_tolerance_um, only_sure_components=only_sure_components, date=date,
         accept=tuple(accept),
     )  # fmt: skip
-    texts = session.sources.source(nominal), session.sources.source(corrected)
+    texts = session.sources.source(nominal), session.sources.source(corrected, nominal)
     return run(session, *texts, options, progress)
 
 

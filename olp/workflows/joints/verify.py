@@ -54,7 +54,7 @@ def verify_joints(
         expand_cycles=expand_cycles, date=date,
     )  # fmt: skip
     run = JointRun.of(nominal, machine, job)
-    return verified(run, run.sources.source(corrected), options)
+    return verified(run, run.sources.source(corrected, nominal), options)
 
 
 def verified(run: JointRun, corrected: Source, options: JointOptions) -> JointVerification:

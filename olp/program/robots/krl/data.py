@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable
 
 from olp.core.errors import ProgramError
-from olp.core.paired import place_of
+from olp.core.paired import own_end, place_of
 from olp.core.patterns import pattern
 from olp.core.values import dataclass
 from olp.program.robots.krl.text import Aggregate, aggregate
@@ -67,12 +67,16 @@ def key_of(name: bytes, index: bytes | None) -> str:
 
 class Declared:
     """All values of a text by their names (`key_of`), and the lines where a name gets a part of a value, or
-    one that is computed."""
+    one that is computed. What the control's own data state counts where the program states nothing: `taken`
+    are the names of those that were asked for, each with the line that does, and where it is stated."""
 
     def __init__(self, data: bytes, lines: Iterable[Line]) -> None:
         self.data = data
         self.values: dict[str, list[Value]] = {}
         self.changed: dict[str, int] = {}
+        self.taken: dict[str, tuple[int, str]] = {}
+        self._system: dict[str, list[Value]] = {}
+        self._own_end = own_end(data)
         self._single: dict[str, tuple[Value, Aggregate]] = {}
         self._aggregates: dict[Span, Aggregate | None] = {}
         listed = False
@@ -97,7 +101,8 @@ class Declared:
             self.changed.setdefault(key, line.line)
             return
         own = (line.begin + span[0], line.begin + span[1])
-        self.values.setdefault(key, []).append(Value(line, own, listed))
+        values = self.values if line.begin < self._own_end else self._system
+        values.setdefault(key, []).append(Value(line, own, listed))
         if match[2] is not None and not match[2].strip().isdigit():
             # any element of the array
             self.changed.setdefault(key_of(match[1], None), line.line)
@@ -112,6 +117,9 @@ class Declared:
         if key in self._single:
             return self._single[key]
         found = self.values.get(key, [])
+        if not found and key in self._system:
+            found = self._system[key]
+            self.taken.setdefault(key, (line, place_of(self.data, found[0].line.line)))
         array = key.partition("[")[0]
         again = self.changed.get(key) or self.changed.get(array)
         if len({self.data[slice(*value.span)] for value in found}) > 1:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from olp.core.errors import ProgramError
 from olp.core.machine import Setup
+from olp.core.paired import own_end
 from olp.core.patterns import pattern
 from olp.core.values import dataclass
 from olp.program.dialect import Dialect, Options
@@ -40,7 +41,8 @@ _SENSOR = pattern(rb"(?i)(RSI_MOVECORR|RSI_ON)\b")
 _TRIGGER = pattern(rb"(?i)(?:TRIGGER|SYN\s+(?:OUT|PULSE))\b")
 _DATA_OF = pattern(rb"(?i)(?:GLOBAL\s+)?DEFDAT\s+(\w+)")
 _LEADS = pattern(
-    rb"(?i)(?:GOTO|EXIT|RETURN|HALT|CONTINUE|WAIT|INTERRUPT|BRAKE|RESUME|ANIN|ANOUT|DIGIN|ENDSPLINE)\b"
+    rb"(?i)(?:GOTO|EXIT|RETURN|HALT|CONTINUE|WAIT|INTERRUPT|BRAKE|RESUME|ANIN|ANOUT|DIGIN|ENDSPLINE|"
+    rb"ON_ERROR_PROCEED)\b"
 )
 #: Components of a position, and its external axes.
 _PLACE = ("X", "Y", "Z")
@@ -75,8 +77,9 @@ class _Reader:
     def __init__(self, data: bytes, setup: Setup) -> None:
         self.data = data
         self.moves = RobotMoves(data, setup, "BASE0")
-        self.lines = list(lines(data))
-        self.declared = Declared(data, self.lines)
+        every = list(lines(data))
+        self.declared = Declared(data, every)
+        self.lines = [line for line in every if line.begin < own_end(data)]
         self.flow = flow.Flow(self.lines)
         self.active = Active(data, setup, self.declared, self.moves.frames)
         self.turning = Turning(self.lines)
@@ -91,10 +94,17 @@ class _Reader:
             self._mentioned(line)
         take_all(self.lines, self._statement, self.moves, self.refusals, options)
         self.moves.hold(self.active.named)
+        self._taken()
         self.moves.hold_mentioned(
             (line.begin, line.end) for line in self.lines if not is_declaration(line.text)
         )
         return self.moves.program(dialect, words=words)
+
+    def _taken(self) -> None:
+        """Tools and bases of the control's own data, which stay as they are."""
+        for name, (line, place) in self.declared.taken.items():
+            self.moves.remark(f"taken: {name}", line, f"{name} is taken as in {place}")
+        self.moves.hold(self.declared.taken)
 
     def _mentioned(self, line: Line) -> None:
         """A routine may give its arguments other values."""

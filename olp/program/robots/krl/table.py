@@ -34,7 +34,9 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"E6POS, POS, FRAME": (_C, "changed where moves use it, and cloned where they differ"),
     b"{A1 ...}, E6AXIS": (_C, "corrected on arms; else kept, and the position behind it is unknown"),
     b"$BASE, $TOOL": (_R, "a number, numbers, $NULLFRAME, or the name of a frame"),
-    b"BASE_DATA[n], TOOL_DATA[n]": (_R, "where the text states their numbers; else those of machine or job"),
+    b"BASE_DATA[n], TOOL_DATA[n]": (
+        _R, "where the text states their numbers, or `$config.dat`; else those of machine or job"
+    ),
     b"FDAT_ACT, BAS": (_R, "base and tool of a taught point"),
     b"$VEL.CP": (_R, "the speed from here on"),
     b"$ORI_TYPE=#VAR": (_R, "tools turn evenly on straight moves from here on"),
@@ -47,7 +49,7 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"TRIGGER": (_R, "the move behind it is never split"),
     b"$POS_ACT, $AXIS_ACT": (_X, "a move to them goes nowhere"),
     b"XHOME": (_X, "joint values of the control's own data"),
-    b"WAIT, $OUT, HALT, INTERRUPT": (_X, ""),
+    b"WAIT, $OUT, HALT, INTERRUPT, ON_ERROR_PROCEED": (_X, ""),
     b"other assignments": (_X, "unless they change a position or frame that a move uses: then refused"),
     b"CIRC, SCIRC": (_C, "an arc through a position to another one; several arcs where one would bend"),
     b"CIRC_REL, SCIRC_REL": (_R, "left as written: a distance from where the robot is"),
