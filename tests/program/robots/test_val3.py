@@ -561,3 +561,22 @@ def test_frames_and_tools_of_the_job(tmp_path: Path, zero: Path) -> None:
     corrected(["movel(pOwn,tJob,mFast)"], machine, data=own)
     with pytest.raises(ProgramError, match="fCell"):
         corrected(["movel(pOwn,tGrip,mFast)"], zero, data=own)
+
+
+def test_points_of_a_scara_are_as_those_of_an_arm(bent: Path, zero: Path) -> None:
+    text = program(np.random.default_rng(5), 12)
+    other = text.replace(b"pointRx", b"pointRs")
+    assert olp.correct(other, zero).data == other
+    assert olp.correct(other, bent).data == olp.correct(text, bent).data.replace(b"pointRx", b"pointRs")
+
+
+def test_joints_that_are_not_corrected_stay_as_they_are(bent: Path) -> None:
+    """Four of a SCARA, and some that the data leave open: the moves behind them are corrected."""
+    scara = '<Value key="0" j1="10" j2="20" j3="30" j4="40" />'
+    data = datum("jHome", "jointRs", scara) + '<Data name="jOpen" xsi:type="array" type="jointRx" size="1" />'
+    moves = ["movej(jHome,tGrip,mFast)", "movej(jOpen,tGrip,mFast)", "movel(pPoint[1],tGrip,mFast)"]
+    lines = corrected(moves, bent, data=data)
+    assert sum(scara in line for line in lines) == 1
+    assert any('key="1" x="29.9' in line for line in lines)
+    with pytest.raises(ProgramError, match="the target jOpen: the text does not state all its numbers"):
+        corrected(moves[1:2], bent, data=data)

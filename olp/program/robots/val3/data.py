@@ -18,12 +18,13 @@ JOINTS = ("j1", "j2", "j3", "j4", "j5", "j6")
 WORDS = ("shoulder", "elbow", "wrist")
 #: Types of data that say where the robot is or goes, and the names of their numbers.
 NUMBERS = {
-    "point": TRANSFORM, "pointRx": TRANSFORM, "frame": TRANSFORM, "tool": TRANSFORM, "trsf": TRANSFORM,
-    "joint": JOINTS, "jointRx": JOINTS, "mdesc": ("accel", "vel", "decel", "tmax", "rmax", "leave", "reach"),
+    "point": TRANSFORM, "pointRx": TRANSFORM, "pointRs": TRANSFORM, "frame": TRANSFORM, "tool": TRANSFORM,
+    "trsf": TRANSFORM, "joint": JOINTS, "jointRx": JOINTS, "jointRs": JOINTS[:4],
+    "mdesc": ("accel", "vel", "decel", "tmax", "rmax", "leave", "reach"),
     "num": ("value",),
 }  # fmt: skip
 #: What each type of point and joint is called here.
-KINDS = {"pointRx": "point", "jointRx": "joint"}
+KINDS = {"pointRx": "point", "pointRs": "point", "jointRx": "joint", "jointRs": "joint"}
 _NUMBER = pattern(rb"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*")
 _FATHER = pattern(rb"\s*([\w:]+)\s*(?:\[\s*(\d+)\s*\])?\s*")
 _ARRAY = ("array", "")
@@ -51,8 +52,8 @@ class Entry:
 
 @dataclass(frozen=True, slots=True)
 class Datum:
-    """Data of one name: its `kind` without Rx, its line, its entries by their index, the bytes of its stated
-    `size` (None where it states none), and whether it can get further entries."""
+    """Data of one name: its `kind` without Rx or Rs, its line, its entries by their index, the bytes of its
+    stated `size` (None where it states none), and whether it can get further entries."""
 
     name: str
     kind: str

@@ -13,7 +13,7 @@ from olp.program.robots.moves import NAN, DecidedInRun, RobotMoves
 from olp.program.robots.poses import NO_TURN, Quaternion, inverted, multiplied, rotated
 from olp.program.robots.targets import NOWHERE, Span, Use
 from olp.program.robots.val3.code import Routine, lines_in
-from olp.program.robots.val3.data import TRANSFORM, WORDS, Slot
+from olp.program.robots.val3.data import JOINTS, TRANSFORM, WORDS, Slot
 from olp.program.robots.val3.places import Places
 from olp.program.robots.val3.reach import Reach
 from olp.program.robots.val3.state import Scope, State
@@ -229,7 +229,9 @@ class Moving:
         slots = thing.known()
         if slots is None or any(own == NOWHERE for own, _ in slots):
             why = thing.why or "the text does not state all its numbers here"
-            refusal = DecidedInRun if thing.why or thing.version else ProgramError
+            # joints that are not stated are left, as on machines without joints
+            left = thing.why or thing.version or thing.kind == "joint"
+            refusal = DecidedInRun if left else ProgramError
             raise refusal(f"the target {thing.shown}: {why}", line=line.line, code="OLP533")
         return _Goal(thing.kind, slots, dict(thing.words), thing.father, thing, span)
 
@@ -303,8 +305,10 @@ class Moving:
                 number, value = entry.line, entry.host
         values = [value for _, value in goal.slots]
         if goal.kind == "joint":
-            a, b, c, d, e, f = values
-            return self.moves.joint_target(number, value, spans, (a, b, c, d, e, f), (), name, declaration)
+            if self.moves.arm and len(values) != len(JOINTS):
+                what = f"the target has {len(values)} joints; expected the {len(JOINTS)} of this arm"
+                raise ProgramError(what, line=line.line, code="OLP516")
+            return self.moves.joint_target(number, value, spans, tuple(values), (), name, declaration)
         pose = pose_of(values)
         x, y, z, *turned = spans
         return self.moves.target(

@@ -28,8 +28,10 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"movel": (_C, "a straight move to a point, its numbers, appro(...) or compose(...)"),
     b"movej": (_C, "corrected at its end; the path of the joints is not judged"),
     b"movec": (_C, "an arc through a point to another one; several arcs where one would bend"),
-    b"point, pointRx": (_C, "changed where moves use it; where they differ it gets a further element"),
-    b"joint, jointRx": (_C, "corrected on arms; else kept, and the position behind it is unknown"),
+    b"point, pointRx, pointRs": (
+        _C, "changed where moves use it; where they differ it gets a further element"
+    ),
+    b"joint, jointRx, jointRs": (_C, "corrected on arms; else kept, and the position behind it is unknown"),
     b"{{...},{...}}": (_C, "a point in the world with its configuration"),
     b"p.trsf = {...}, p.trsf.x =": (_C, "numbers in an assignment, and those that a call gives"),
     b"shoulder, elbow, wrist": (_R, "on arms these words name the posture"),
