@@ -115,3 +115,33 @@ def test_waypoints_on_a_line_cost_no_time() -> None:
     x = np.linspace(0.0, 40.0, 21)[:, None] * np.array([[0.6, 0.8, 0.0]])
     one = closed_s(route(x[[0, -1]], 100.0, 0.01))
     assert closed_s(route(x, 100.0, 0.01)) == pytest.approx(one, rel=1e-9)
+
+
+def test_waypoints_on_lines_are_those_that_division_one_by_one_finds() -> None:
+    """A stretch is divided at the waypoint farthest beyond its share, until no other is left."""
+    rng = np.random.default_rng(7)
+    for noise_mm in (0.002, 0.004, 0.008):
+        steps = np.column_stack((rng.uniform(0.1, 1.0, 2000), rng.normal(0.0, noise_mm, (2000, 2))))
+        own = route(np.cumsum(steps, axis=0), 100.0, 0.02)
+        line = levelled(own)
+        assert line is not None
+        moved = (line.point_mm != own.point_mm).any(axis=1)
+        fixed = np.zeros(len(own), bool)
+        todo = [(0, len(own) - 1)]
+        while todo:
+            a, b = todo.pop()
+            fixed[[a, b]] = True
+            along = (own.point_mm[b] - own.point_mm[a]) / np.linalg.norm(own.point_mm[b] - own.point_mm[a])
+            away = np.linalg.norm(np.cross(own.point_mm[a + 1 : b] - own.point_mm[a], along), axis=1)
+            if (away > 0.6 * own.tolerance_mm[a + 1 : b]).any():
+                middle = a + 1 + int(np.argmax(away - 0.6 * own.tolerance_mm[a + 1 : b]))
+                todo += [(a, middle), (middle, b)]
+        assert moved.any()
+        assert not (moved & fixed).any()
+        # what is moved lies on the line of the fixed ones around it
+        ends = np.flatnonzero(fixed)
+        for k in np.flatnonzero(moved).tolist():
+            a, b = ends[np.searchsorted(ends, k) - 1], ends[np.searchsorted(ends, k)]
+            along = line.point_mm[b] - line.point_mm[a]
+            off = np.cross(line.point_mm[k] - line.point_mm[a], along / np.linalg.norm(along))
+            assert np.linalg.norm(off) < 1e-9
