@@ -15,7 +15,7 @@ from olp.reports.document_parts import (
     notice_blocks,
     subtitle_of,
 )
-from olp.reports.joints import WORST, axis_changes, verdict_of
+from olp.reports.joints import WORST, axis_changes, uncertainty_rows, verdict_of
 from olp.reports.report import CORRECTED, UNCORRECTED, Report, number, time_text
 
 
@@ -27,6 +27,7 @@ def correction(report: Report, version: str, date: datetime.date | None) -> Docu
         Section("Determination of the errors", calibration_blocks(report, date)),
         Section("Compensation applied", list(_applied(report))),
         Section("Validation", list(_validation(report))),
+        Section("Uncertainty", list(_uncertainty(report))),
         Section("Findings and limits", [*_limits(report), *notice_blocks(report)]),
         Section("Documentation", list(documentation_blocks(report, version, date))),
     ]
@@ -74,6 +75,16 @@ def _validation(report: Report) -> Iterator[Block]:
         yield Paragraph("Worst blocks, corrected and uncorrected:")
         rows = [[str(row["line"]), *(number(row[key]) for key in WORST)] for row in report["worst"]]
         yield Grid(["line", *WORST.values()], rows)
+
+
+def _uncertainty(report: Report) -> Iterator[Block]:
+    part = report.get("uncertainty")
+    if not part:
+        return
+    yield Pairs(uncertainty_rows(report))
+    yield Paragraph(f"Not included: {'; '.join(part['not_included'])}.")
+    rows = [[str(row["line"]), number(row["band_um"]), number(row["band_urad"])] for row in part["lines"]]
+    yield Grid(["line", "expanded um", "expanded urad"], rows)
 
 
 def _limits(report: Report) -> Iterator[Block]:

@@ -40,6 +40,7 @@ def to_text(report: Report) -> str:
         _heads(report),
         _verdict(report),
         _deviation(report),
+        _uncertainty(report),
         time_lines(report),
         _corrections(report),
         _worst(report),
@@ -112,6 +113,34 @@ def _deviation(report: Report) -> Iterator[str]:
     left = report["orientation"]["uncorrectable_urad"]
     if left:
         yield f"Orientation that no command corrects: {number(left)} urad at most."
+
+
+def _uncertainty(report: Report) -> Iterator[str]:
+    if "uncertainty" in report:
+        yield "Uncertainty of the poses, from the calibration"
+        yield from pairs([(f"  {name}", value) for name, value in uncertainty_rows(report)])
+
+
+def uncertainty_rows(report: Report) -> list[tuple[str, str]]:
+    """What is not known of the poses, in words."""
+    part = report["uncertainty"]
+    tip, turn, expected = part["band_um"], part["band_urad"], part["expected"]
+    return [
+        (
+            "Tip",
+            f"+-{number(tip['median_um'])} um median, {number(tip['max_um'])} um largest (expanded, "
+            f"k = {part['coverage_factor']:g}, in the worst direction)",
+        ),
+        ("Tool", f"+-{number(turn['median_urad'])} urad median, {number(turn['max_urad'])} urad largest"),
+        (
+            "Deviation",
+            f"expected {number(expected['before_rms_um'])} um rms uncorrected, "
+            f"{number(expected['after_rms_um'])} um corrected",
+        ),
+        ("Frame", "beside one shift and turn of all poses, which the work offset takes up"),
+        ("From", f"{part['source']}, at {part['waypoints']} waypoints"),
+        ("Age", "" if part["growth_by_age"] == 1.0 else f"times {part['growth_by_age']:.3g}"),
+    ]
 
 
 def _corrections(report: Report) -> Iterator[str]:

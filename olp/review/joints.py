@@ -36,13 +36,16 @@ from olp.review.measured import Matched, Matcher, refuse_unplaced, with_measured
 from olp.review.meshes import of_job
 from olp.review.motion import by_feed, feed_seconds, filled
 from olp.review.samples import Samples
-from olp.review.scene import Figures, Frame, Scene
+from olp.review.scene import Figures, Frame, Scene, TipUncertainty
 from olp.trajectory.from_joints import missing_limits
+from olp.uncertainty.probability import within
+from olp.uncertainty.spread import bands
 from olp.workflows.compare_runs import How, judged
 from olp.workflows.joints.compare import ground_of, measured_points
 from olp.workflows.joints.correct import JointOptions, ProvedJoints, correction_of
 from olp.workflows.joints.loaded import JointRun
 from olp.workflows.joints.retime import JointRetimeOptions, motion_of
+from olp.workflows.joints.uncertain import Known, known_of
 from olp.workflows.joints.verify import verification_of
 from olp.workflows.session import PathLike
 
@@ -141,6 +144,7 @@ def page_of(
         moment, motion = filled(timing.seconds(samples.part, samples.within)), joint_table(timing.stretches)
     else:
         moment = by_feed(_seconds(run, nominal, samples), samples)
+    known = known_of(run, options.date)
     table, report = _table(done, options), done.report | {"verdict": _verdict(done)}
     matched: tuple[Matched, ...] = ()
     digests: tuple[str, ...] = ()
@@ -180,9 +184,31 @@ def page_of(
             turn_urad={name: angle / RAD_PER_URAD for name, angle in seen.off_rad.items()},
             units=dict(zip(machine.structure.order, machine.structure.units, strict=True)),
             straight=False,
+            uncertainty=None if known is None else _uncertainty(run, path, seen, known, runs),
             planned=planned,
         )
     )
+
+
+def _uncertainty(
+    run: JointRun, path: JointPath, seen: _Seen, known: Known, runs: Runs | None
+) -> TipUncertainty:
+    """Bands of tips at the samples and, where a part tolerance is stated, probabilities of being beyond."""
+    covariance = known.spread(run, path, seen.axes, path.tool[seen.places.move]).tip
+    band, part_um = bands(covariance).astype(np.float32), _part_tolerance_um(run, runs)
+    if part_um is None:
+        return TipUncertainty(None, band, {})
+    radius = part_um * MM_PER_UM
+    beyond = {
+        name: np.asarray(1.0 - within(covariance, seen.off_mm[name], radius), np.float32)
+        for name in ("uncorrected", "corrected")
+    }
+    return TipUncertainty(radius, band, beyond)
+
+
+def _part_tolerance_um(run: JointRun, runs: Runs | None) -> float | None:
+    stated = None if runs is None else runs.part_tolerance_um
+    return run.job.part_tolerance_um if stated is None else stated
 
 
 def _with_runs(
@@ -191,9 +217,7 @@ def _with_runs(
 ) -> tuple[tuple[Matched, ...], Judgements, dict[str, Any]]:  # fmt: skip
     """Measured runs among the samples, and the table and the report with them."""
     table, report = shown
-    stated_um = runs.part_tolerance_um
-    part_um = run.job.part_tolerance_um if stated_um is None else stated_um
-    ground, how = ground_of(path), How(part_tolerance_um=part_um)
+    ground, how = ground_of(path), How(part_tolerance_um=_part_tolerance_um(run, runs))
     done = judged(ground, files, how)
     refuse_unplaced(files, done.placed, how.reach_mm)
     matcher = Matcher(ground, samples, lambda points, _: points - origin)

@@ -12,10 +12,11 @@ import numpy as np
 
 from olp.calibration.estimator.normal import Block, Chunk, Normal, residuals_of, solve
 from olp.calibration.joints.readings import Reading, Start
-from olp.calibration.joints.unknowns import Model
+from olp.calibration.joints.unknowns import NO_PAYLOAD, Model
 from olp.core.arrays import Array
 from olp.core.errors import CannotCompute
 from olp.core.values import dataclass
+from olp.kinematics.errors import Payload
 from olp.kinematics.poses import Poses, shift, tilts
 
 #: Most steps of Gauss-Newton; from the nominal machine four suffice.
@@ -100,9 +101,11 @@ class JointFit:
         return _spreads((rest, turn - share[3:] / size), self.covariance)
 
 
-def tables_of(model: Model, theta: Array, values: Array, tool_mm: Array) -> tuple[Array, Array, Array]:
+def tables_of(
+    model: Model, theta: Array, values: Array, tool_mm: Array, payload: Payload = NO_PAYLOAD
+) -> tuple[Array, Array, Array]:
     """(n, 3, k) mm of a tip and rad of the tool by each unknown, and (n, 3) mm where the tip is."""
-    twists, pose = model.twists(theta, values), model.machine(theta).actual(values)
+    twists, pose = model.twists(theta, values, payload), model.machine(theta, payload).actual(values)
     place = pose.at(tool_mm)
     arm = place - pose.position
     return twists[:, :3] + np.cross(twists[:, 3:], arm[:, :, None], axis=1), twists[:, 3:], place

@@ -33,6 +33,7 @@ from olp.workflows import real_time
 from olp.workflows.flatten import UnrollOptions
 from olp.workflows.joints.loaded import JointRun
 from olp.workflows.joints.report import findings_of, last_digits, outside_box, report_of
+from olp.workflows.joints.uncertain import uncertainty_of
 from olp.workflows.session import Outside, PathLike
 from olp.workflows.shown import Shown
 
@@ -186,6 +187,9 @@ def proved(
     findings = findings_of(path, plan, proof, run, options.date, tolerance)
     text = bytes(corrected.program.data)
     report = report_of(run, path, plan, proof, findings, tolerance)
+    known = uncertainty_of(run, path, proof, options.date)
+    if known is not None:
+        report["uncertainty"] = known
     report["corrected"] = {"sha256": hashlib.sha256(text).hexdigest(), "lines": text.count(b"\n")}
     if tally is not None:
         report["written"] = {

@@ -1,0 +1,150 @@
+"""The uncertainty of poses that a report states: judged by machines drawn from the covariance, each loaded
+from a calibration file of its own."""
+
+from __future__ import annotations
+
+import datetime
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import olp
+from olp.calibration.joints.unknowns import Unknown
+from olp.core.errors import ConfigError
+from olp.files.kinematics.covariance import JointCovariance, joint_covariance_bytes, lines_of
+
+TRUNNION = Path(__file__).resolve().parents[2] / "programs" / "trunnion-mill" / "machine.toml"
+NAMES = (("A", "Y_um", 18.0), ("A", "C_urad", -21.0), ("A", "zero_urad", 45.0), ("C", "X_um", 14.0),
+         ("C", "B_urad", -27.0))  # fmt: skip
+#: um and urad
+SIGMA = np.array([4.0, 9.0, 12.0, 5.0, 8.0])
+LIST = (
+    "# joined=points\nX_mm,Y_mm,Z_mm,A_deg,C_deg\n0,0,60,0,0\n40,10,20,-20,30\n60,-20,25,-45,75\n"
+    "-30,-20,5,-80,200\n10,50,0,10,-90\n"
+)
+HEAD = """schema = "olp-calibration-1"
+machine = "trunnion-500"
+measured = 2026-01-01
+temperature_degC = 20.0
+sign = "actual-minus-commanded"
+model = "rigid-body"
+box = { X_mm = [-290, 290], Y_mm = [-290, 290], Z_mm = [-290, 290], A_deg = [-115, 25], C_deg = [-400, 400] }
+"""
+
+
+def calibration(numbers: np.ndarray, covariance: str = "") -> str:
+    tables = {"A": "", "C": ""}
+    for (part, key, _), value in zip(NAMES, numbers.tolist(), strict=True):
+        tables[part] += f"{key} = {value!r}\n"
+    return HEAD + covariance + "".join(f"[location.{part}]\n{lines}" for part, lines in tables.items())
+
+
+def machine_of(folder: Path, numbers: np.ndarray, covariance: str = "") -> Path:
+    (folder / "calibration.toml").write_text(calibration(numbers, covariance))
+    path = folder / "machine.toml"
+    path.write_bytes(TRUNNION.read_bytes())
+    return path
+
+
+@pytest.fixture(scope="module")
+def known(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, np.ndarray, np.ndarray]:
+    """A machine with a covariance beside its calibration: its file, the numbers and their covariance."""
+    folder = tmp_path_factory.mktemp("known")
+    numbers = np.array([value for *_, value in NAMES])
+    mixed = np.random.default_rng(5).normal(size=(5, 5)) * 0.4 + np.eye(5)
+    correlation = mixed @ mixed.T
+    size = SIGMA / np.sqrt(np.diag(correlation))
+    covariance = correlation * np.outer(size, size)
+    stated = '[covariance]\nfile = "c.npz"\ngrowth_per_year = 0.5\n'
+    machine = machine_of(folder, numbers, stated)
+    scale = np.array([1e-6 if "urad" in key else 1e-3 for _, key, _ in NAMES])
+    unknowns = tuple(Unknown("location", part, key, 1.0) for part, key, _ in NAMES)
+    lines = lines_of(olp.load_kinematics(machine_of(_folder(folder), numbers)).structure)
+    table = JointCovariance(unknowns, covariance * np.outer(scale, scale), lines)
+    values = tomllib.loads(calibration(numbers, stated))
+    (folder / "c.npz").write_bytes(joint_covariance_bytes(table, values))
+    return machine, numbers, covariance
+
+
+def _folder(parent: Path) -> Path:
+    (parent / "bare").mkdir(exist_ok=True)
+    return parent / "bare"
+
+
+def drawn_spread(known: tuple[Path, np.ndarray, np.ndarray], folder: Path) -> tuple[np.ndarray, np.ndarray]:
+    """(n,) mm and rad: standard deviations in the worst direction of tips, and of tool directions, of drawn
+    machines, each moved as one onto the first."""
+    _, numbers, covariance = known
+    values = np.loadtxt(LIST.splitlines()[2:], delimiter=",")
+    rng, tips, tools = np.random.default_rng(2), [], []
+    for _ in range(160):
+        own = machine_of(folder, rng.multivariate_normal(numbers, covariance))
+        pose = olp.load_kinematics(own).actual(values)
+        tips.append(pose.position)
+        tools.append(pose.rotation[:, :, 2])
+    mean = np.mean(tips, axis=0)
+    for k, tip in enumerate(tips):
+        # the best turn by singular values
+        a, b = tip - tip.mean(axis=0), mean - mean.mean(axis=0)
+        u, _, vt = np.linalg.svd(a.T @ b)
+        turn = vt.T @ u.T
+        tips[k], tools[k] = a @ turn.T, tools[k] @ turn.T
+    return _worst(np.array(tips)), _worst(np.array(tools))
+
+
+def _worst(drawn: np.ndarray) -> np.ndarray:
+    """(n,) standard deviations in the direction where they are largest, of draws (draws, n, 3)."""
+    spread = (np.cov(drawn[:, n].T) for n in range(drawn.shape[1]))
+    return np.array([np.sqrt(np.linalg.eigvalsh(one)[-1]) for one in spread])
+
+
+@pytest.mark.slow
+def test_what_is_stated_is_what_drawn_machines_do(
+    known: tuple[Path, np.ndarray, np.ndarray], tmp_path: Path
+) -> None:
+    report = olp.correct_joints(LIST.encode(), known[0]).report
+    stated = report["uncertainty"]
+    tip, turn = drawn_spread(known, tmp_path)
+    assert stated["waypoints"] == 5 and stated["growth_by_age"] == 1.0
+    assert {row["line"] for row in stated["lines"]} == {3, 4, 5, 6, 7}
+    by_line = sorted(stated["lines"], key=lambda row: row["line"])
+    assert [row["band_um"] for row in by_line] == pytest.approx(2e3 * tip, rel=0.25)
+    assert [row["band_urad"] for row in by_line] == pytest.approx(2e6 * turn, rel=0.25)
+    mean = np.mean([row["band_um"] for row in by_line] / (2e3 * tip))
+    assert mean == pytest.approx(1.0, abs=0.1)
+    assert stated["expected"]["after_rms_um"] > report["deviation"]["after"]["position_rms_um"]
+    text = olp.correct_joints(LIST.encode(), known[0]).to_text()
+    assert "Uncertainty of the poses, from the calibration" in text and "c.npz, at 5 waypoints" in text
+
+
+def test_it_grows_with_age_and_without_covariance_nothing_is_said(
+    known: tuple[Path, np.ndarray, np.ndarray], tmp_path: Path
+) -> None:
+    now, later = (
+        olp.correct_joints(LIST.encode(), known[0], date=day).report["uncertainty"]
+        for day in (datetime.date(2026, 1, 1), datetime.date(2028, 1, 1))
+    )
+    assert later["band_um"]["max_um"] == pytest.approx(now["band_um"]["max_um"] * 2.0, rel=1e-3)
+    bare = olp.correct_joints(LIST.encode(), machine_of(tmp_path, known[1]))
+    assert "uncertainty" not in bare.report and "Uncertainty" not in bare.to_text()
+
+
+@pytest.mark.slow
+def test_the_page_has_the_bands(known: tuple[Path, np.ndarray, np.ndarray]) -> None:
+    shown = olp.view_joints(LIST.encode(), known[0], part_tolerance_um=5.0, time=False).scene.uncertainty
+    assert shown is not None and shown.within_mm == 0.005
+    assert 0.002 < shown.band_mm.max() < 0.05
+    beyond = {name: float(np.median(value)) for name, value in shown.beyond.items()}
+    assert 0.0 < beyond["corrected"] < beyond["uncorrected"] <= 1.0
+
+
+def test_a_calibration_that_was_changed_is_refused(
+    known: tuple[Path, np.ndarray, np.ndarray], tmp_path: Path
+) -> None:
+    stated = '[covariance]\nfile = "c.npz"\n'
+    machine = machine_of(tmp_path, known[1] + 1.0, stated)
+    (tmp_path / "c.npz").write_bytes((known[0].parent / "c.npz").read_bytes())
+    with pytest.raises(ConfigError, match="numbers have changed since"):
+        olp.correct_joints(LIST.encode(), machine)
