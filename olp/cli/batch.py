@@ -161,7 +161,7 @@ def _correct(
     if call.pages:
         from olp.review import batch as review
 
-        page = review.page
+        page = review.Pages()
     options = BatchOptions(
         correct=options_of(CorrectOptions, words), dialect=dialect,
         reports="" if call.reports == "none" else call.reports, plots=call.plots, page=page,

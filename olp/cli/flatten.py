@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import click
@@ -30,17 +31,35 @@ def command(
 
     It is the text that --flatten of the other verbs reads. Nothing is corrected.
     """
-    call = given(program, machine, job)
-    refuse_early(files_of(output), call.inputs, force=force)
+    from olp.cli import joints
+
+    words |= {"flatten": True}
+    if joints.on_joints(machine, job):
+        make, inputs = joints.flatten(program, machine, job, words)
+    else:
+        make, inputs = _of_three(program, machine, job, words)
+    refuse_early(files_of(output), inputs, force=force)
 
     from olp.files.write import write_bytes
-    from olp.workflows import flatten
 
-    options = options_of(flatten.UnrollOptions, words | {"flatten": True})
-    text = flatten.run(call.session, call.source, options)
+    text = make()
     if output == STREAM:
         put(text)
         return
-    write_bytes(output, text, force=force, inputs=call.inputs)
+    write_bytes(output, text, force=force, inputs=inputs)
     if not quiet:
         diagnostic(f"wrote {output}: {len(text.splitlines())} lines")
+
+
+def _of_three(
+    program: str | None, machine: str | None, job: str | None, words: dict[str, Any]
+) -> tuple[Callable[[], bytes], tuple[str, ...]]:
+    """What unrolls a program for three linear axes, and the files that it reads."""
+    call = given(program, machine, job)
+
+    def make() -> bytes:
+        from olp.workflows import flatten
+
+        return flatten.run(call.session, call.source, options_of(flatten.UnrollOptions, words))
+
+    return make, call.inputs

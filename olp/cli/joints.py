@@ -220,6 +220,20 @@ def retime(
     return make, (*run.files, *files_of(nominal))
 
 
+def flatten(
+    program: str | None, machine: str | None, job: str | None, words: dict[str, Any]
+) -> tuple[Callable[[], bytes], tuple[str, ...]]:
+    """`olp flatten`: what unrolls the program, and the files that it reads."""
+    run = run_of(program, machine, job)
+
+    def make() -> bytes:
+        from olp.workflows.flatten import UnrollOptions
+
+        return run.unrolled(run.program, options_of(UnrollOptions, words))
+
+    return make, run.files
+
+
 def plan(
     machine: str, count: int, output: str | None, among: str | None,
     reflector: tuple[tuple[float, float, float], ...], sigma_um: float | None, criterion: Criterion, *,

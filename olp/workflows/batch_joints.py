@@ -10,7 +10,7 @@ from olp.core.errors import UsageError
 from olp.files.sources import Parcel
 from olp.workflows.batch_task import Config, Outcome, Task, counts, heading
 from olp.workflows.correct import CorrectOptions
-from olp.workflows.joints.correct import JointCorrection, JointOptions, corrected
+from olp.workflows.joints.correct import JointCorrection, JointOptions, correction_of
 from olp.workflows.joints.loaded import JointRun
 from olp.workflows.joints.report import filed
 from olp.workflows.joints.verify import JointVerification, verified
@@ -25,9 +25,11 @@ def outcome(config: Config, parcel: Parcel, task: Task) -> Outcome:
     )
     if task.released is not None:
         return Outcome(_row(verified(run, parcel.source(task.released, task.program), options)))
-    result = corrected(run, options)
+    done = correction_of(run, options)
+    result = JointCorrection.of(run, done)
     report = filed(result.report, task.report, options.date) if task.report else None
-    return Outcome(_row(result), result.data, report)
+    page = None if task.page is None else task.page.of_joints(run, options, done, task.output)
+    return Outcome(_row(result), result.data, report, page)
 
 
 def _options(task: Task) -> JointOptions:
@@ -35,8 +37,6 @@ def _options(task: Task) -> JointOptions:
     own = {field.name for field in fields(JointOptions)}
     values = {field.name: getattr(given, field.name) for field in fields(CorrectOptions)}
     other = [name for name, value in values.items() if name not in own and value != getattr(usual, name)]
-    if task.page is not None:
-        other.append("pages")
     if other:
         raise UsageError(
             f"--{other[0].replace('_', '-')} does not go with machines with rotary joints yet; correct this "

@@ -6,9 +6,9 @@ Nothing here reads or writes a file, and a task is the same wherever it is done.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from olp.core.values import dataclass
 from olp.core.version import __version__
@@ -18,8 +18,27 @@ from olp.findings.catalogue import Finding
 from olp.workflows.correct import Correction, CorrectOptions
 from olp.workflows.session import Session
 
-#: Makes the review page of a correction: session, nominal program, options, correction, name of the output.
-Page = Callable[[Session, Source, CorrectOptions, Correction, str], bytes]
+if TYPE_CHECKING:
+    from olp.workflows.joints.correct import JointOptions, ProvedJoints
+    from olp.workflows.joints.loaded import JointRun
+
+
+class Page(Protocol):
+    """Makes the review pages of corrections; `corrected_name` is the name of the output."""
+
+    def of_three(
+        self, session: Session, source: Source, options: CorrectOptions, correction: Correction,
+        corrected_name: str,
+    ) -> bytes:  # fmt: skip
+        """On three linear axes."""
+        ...
+
+    def of_joints(
+        self, run: JointRun, options: JointOptions, done: ProvedJoints, corrected_name: str
+    ) -> bytes:
+        """On a machine of any joints."""
+        ...
+
 
 #: Setups that a worker keeps.
 _KEPT = 16

@@ -89,7 +89,7 @@ def _corrected(session: Session, source: Source, task: Task) -> Outcome:
         nominal = source.holding(result.nominal)
         filed = report.correction(result, nominal, session, options, task.report, plots=task.plots)
     if task.page is not None:
-        page = task.page(session, source, options, result, task.output)
+        page = task.page.of_three(session, source, options, result, task.output)
     return Outcome(_row(result.report, result.findings), result.data, filed, page)
 
 

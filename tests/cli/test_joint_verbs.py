@@ -69,3 +69,24 @@ def test_the_report_of_a_correction_is_a_file(ending: str, tmp_path: Path) -> No
         assert words in text
     again = run("correct", "-j", hexapod, "-o", tmp_path / "p.csv", "--report", tmp_path / "p.csv")
     assert again.exit_code != 0
+
+
+def test_loops_are_written_out_for_such_a_machine(tmp_path: Path) -> None:
+    """The text that --flatten of the other verbs reads; a list has nothing to unroll."""
+    mill = Path(__file__).resolve().parents[2] / "programs" / "trunnion-mill" / "machine.toml"
+    (tmp_path / "p.nc").write_text(
+        "G21 G90 G17 G94 G54 G49\nG0 X0. Y0. Z150. A0. C0.\n#1=1\nWHILE [#1 LE 3] DO1\n"
+        "G1 X[#1*2.] C[#1*5.] F900\n#1=#1+1\nEND1\nM30\n"
+    )
+    done = run("flatten", str(tmp_path / "p.nc"), "-m", str(mill), "-o", str(tmp_path / "flat.nc"))
+    assert done.exit_code == 0, done.stderr
+    flat = (tmp_path / "flat.nc").read_text()
+    assert "WHILE" not in flat and all(f"X{2 * k}" in flat and f"C{5 * k}" in flat for k in (1, 2, 3))
+    whole = run("simulate", str(tmp_path / "p.nc"), "-m", str(mill), "--flatten", "--step-mm", "5")
+    assert whole.exit_code == 0
+    assert (
+        run("simulate", str(tmp_path / "flat.nc"), "-m", str(mill), "--step-mm", "5").stdout == whole.stdout
+    )
+    (tmp_path / "l.csv").write_text("X_mm,Y_mm,Z_mm,A_deg,C_deg\n0,0,50,0,0\n1,0,50,0,0\n")
+    done = run("flatten", str(tmp_path / "l.csv"), "-m", str(mill))
+    assert done.exit_code == 2 and "cannot be unrolled" in done.stderr

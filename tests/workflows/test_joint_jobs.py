@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from cases.joint_jobs import JOINT_JOBS
+from cli.test_cli import run
 from judge.five_axis import Judge
 
 import olp
@@ -74,6 +75,9 @@ def test_a_batch_takes_machines_of_all_kinds(tmp_path: Path) -> None:
     assert {row["program"]: row["state"] for row in again.report["programs"]} == {
         row["program"]: "written" if row is mill else "unchanged" for row in done.report["programs"]
     }
+    paged = run("batch", str(tmp_path / "arm"), "-o", str(tmp_path / "c"), "--pages", "--workers", "1")
+    assert paged.exit_code == 0, paged.stderr
+    assert b"deburr.csv" in (tmp_path / "c" / "deburr.csv.review.html").read_bytes()
     options = CorrectOptions(part_tolerance_um=5.0)
     other = olp.batch([tmp_path / "arm"], output=tmp_path / "b", options=options, workers=1)
     assert other.exit_code == 2 and "--part-tolerance-um" in other.report["programs"][0]["message"]

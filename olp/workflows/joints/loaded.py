@@ -33,7 +33,7 @@ from olp.program.robots.dialect import RobotDialect
 from olp.program.rs274.profiles.base import Profile
 from olp.program.text.delimited import first_lines
 from olp.workflows import refusals
-from olp.workflows.flatten import UnrollOptions
+from olp.workflows.flatten import UnrollOptions, as_asked
 from olp.workflows.session import PathLike
 
 #: What is read beside lists on an arm.
@@ -165,6 +165,15 @@ class JointRun:
         )
         with program.errors():
             return text, self._path(program, self.setup)
+
+    def unrolled(self, source: Source, options: UnrollOptions) -> bytes:
+        """The text of a program, unrolled. Raises as `olp.workflows.flatten.run`."""
+        dialect = self.dialect(source)
+        setup = self._arm_setup() if isinstance(dialect, RobotDialect) else self.setup
+        if setup is None:
+            raise UsageError(f"{dialect.title} cannot be unrolled: each of its rows states all that it moves")
+        with source.errors():
+            return bytes(as_asked(self.sources, source, setup, dialect, options).data)
 
     def again(self, data: bytes, dialect: Dialect, *, block_delete: bool = False) -> JointPath:
         """The path of a text that was written."""
