@@ -154,6 +154,7 @@ class Machine:
     `default_motion` is the motion code in force at the start of a program, where its control does not fix it.
     `still_macros` are the macros of a printer that move no axis and change no mode. `bracket_comments`:
     to its firmware (a) is a comment.
+    `still_m_codes` are M codes of the machine's builder that move no axis.
     `real_time` is the beginning of the hash of the calibration that the control itself corrects by in every
     servo cycle, None where it does not.
     `styli` are end of the ram to centre of the tip of sensors by label.
@@ -189,6 +190,7 @@ class Machine:
     lengths_along_z: bool = False
     still_macros: frozenset[str] = frozenset()
     bracket_comments: bool = False
+    still_m_codes: frozenset[int] = frozenset()
     path_mode: Literal["blend", "exact-stop"] = "blend"
     blend_mm: float | None = None
     tool_change_moves: frozenset[str] = frozenset("XYZ")

@@ -124,6 +124,12 @@ def _compliance(value: object) -> float | tuple[float, float, float]:
     return numbers[0] if one else (numbers[0], numbers[1], numbers[2])
 
 
+def _still_m(number: int) -> int:
+    if number == 6:
+        raise refusal("has 6; what a tool change moves is stated by tool_change_moves")
+    return number
+
+
 def _offset_name(name: str) -> str:
     if name not in _USUAL and re.match(r"[Gg]\d", name) and not _G_OFFSET.fullmatch(name):
         raise refusal('is not a work offset; expected G54 to G59, "G59.1" (in quotes), "G54.1 P1" ...')
@@ -157,6 +163,8 @@ IsoNames = Annotated[
     ),
 ]
 ToolNumber = Annotated[str, After(_tool_number), Shown({"type": "string", "pattern": f"^{_TOOL_NUMBER}$"})]
+#: The number of an M code that moves no axis.
+StillM = Annotated[int, Field(ge=0, le=9999), After(_still_m)]
 OffsetName = Annotated[str, Field(min_length=1), After(_offset_name)]
 Chain = Annotated[str, Before(_chain), Field(shown={"enum": sorted(CHAINS)})]
 Controller = Annotated[str, Before(_controller), Field(shown={"enum": [*CONTROLLER_NAMES]})]

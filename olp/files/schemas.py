@@ -21,6 +21,7 @@ from olp.files.fields import (
     IsoNames,
     OffsetName,
     ProgramDialect,
+    StillM,
     ToolNumber,
 )
 
@@ -337,6 +338,11 @@ class MachineFile(Table):
         default=None,
         description="which axes CYCL DEF 11 of Heidenhain programs scales, by a machine parameter: X and Y, "
         "or Z too",
+    )
+    still_m_codes: list[StillM] = Field(
+        default=[],
+        description="the M codes of the machine's builder that move no axis, by their numbers, such as "
+        "[65, 81]; behind other codes that are not known no position is known",
     )
     bracket_comments: bool = Field(
         default=False,

@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from olp.core.schema import Interval, Positive, Table, Text, Triple
 from olp.core.schema_keys import After, Field, Known, refusal, rule
-from olp.files.fields import CONTROLLERS, Controller
+from olp.files.fields import CONTROLLERS, Controller, StillM
 from olp.files.schemas import JobDefaultsTable, Tools, WorkOffsets
 
 #: Axes that are linear where their table does not say.
@@ -190,6 +190,11 @@ class JointMachineFile(Table):
     tool_change_moves: bool = Field(
         default=True,
         description="whether M6 may move the axes; if not, their positions are known after it",
+    )
+    still_m_codes: list[StillM] = Field(
+        default=[],
+        description="the M codes of the machine's builder that move no axis, by their numbers, such as "
+        "[65, 81]; behind other codes that are not known no position is known",
     )
     calibration: Text | None = Field(
         default=None, description="the path of the calibration file, relative to this file"

@@ -31,9 +31,11 @@ TEXTS = (
 )
 
 
-def corrected(folder: Path, text: str, *, keys: str = "", controller: str = "linuxcnc") -> str:
+def corrected(
+    folder: Path, text: str, *, keys: str = "", controller: str = "linuxcnc", head: str = HEAD
+) -> str:
     path = machine(folder, SQUARE, controller=controller, keys=keys, tables=TOOL)
-    return unstamped(olp.correct((HEAD + text).encode(), path).data)[len(HEAD) :].decode()
+    return unstamped(olp.correct((head + text).encode(), path).data)[len(head) :].decode()
 
 
 @pytest.mark.slow
@@ -114,3 +116,29 @@ def test_printers_stand_where_g28_leaves_them(
 def test_an_unread_value_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="tool_change_moves"):
         corrected(tmp_path, "M2", keys='tool_change_moves = ["A"]\n')
+
+
+BUILDERS = "G0 X10. Y10. Z9.\nM81\nG1 X30. F100\nG2 X30. Y30. I0. J10.\nM5 M110\nG1 Z1.\n"
+
+
+@pytest.mark.parametrize("controller", ["linuxcnc", "fanuc", "mach3", "sinumerik"])
+def test_codes_of_the_builder_that_move_nothing_are_stated(tmp_path: Path, controller: str) -> None:
+    """The program without these codes is the judge."""
+    head = "G71\nG90\n" if controller == "sinumerik" else HEAD
+    points = POINTS if controller == "fanuc" else ""
+
+    def of(name: str, text: str, keys: str = "") -> str:
+        keys += points + 'arc_centres = "incremental"\n'
+        return corrected(tmp_path / name, text, keys=keys, controller=controller, head=head)
+
+    with pytest.raises(ProgramError, match="which other M codes move no axis by still_m_codes") as caught:
+        of("unknown", BUILDERS)
+    assert (caught.value.line, caught.value.code) == (6, "OLP524")
+    stated = of("stated", BUILDERS, "still_m_codes = [110, 81]\n")
+    plain = BUILDERS.replace("M81\n", "").replace(" M110", "")
+    assert stated.replace("M81\n", "").replace(" M110", "") == of("plain", plain) != plain
+
+
+def test_a_tool_change_is_no_such_code(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="what a tool change moves is stated by tool_change_moves"):
+        corrected(tmp_path, "G0 X1. Y1. Z1.\n", keys="still_m_codes = [81, 6]\n")

@@ -276,6 +276,8 @@ class Profile(Dialect):
             profile = replace(profile, initial_retract=level)
         if machine.default_motion is not None and self.motion is None:
             profile = replace(profile, motion=int(machine.default_motion[1:]))
+        if machine.still_m_codes:
+            profile = replace(profile, harmless_m=self.harmless_m | machine.still_m_codes)
         if machine.bracket_comments and self.brackets_by_option:
             profile = replace(profile, text=replace(self.text, brackets=True))
         if self.language.user_tasks and not self.counts_increments(machine):
