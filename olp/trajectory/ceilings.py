@@ -36,23 +36,27 @@ def ceilings(path: SmoothPath, limits: AxisLimits, share: Array) -> tuple[Array,
     return result[0], result[1], result[2]
 
 
-def _ceilings(length: Array, shape: Array, feed: Array, limits: AxisLimits, share: Array) -> Array:
-    h = length[:, None]
-    first, second, third = shape[:, 1], 2.0 * shape[:, 2], 6.0 * shape[:, 3]
+def _ceilings(h: Array, shape: Array, feed: Array, limits: AxisLimits, share: Array) -> Array:
+    """As `ceilings`. A row of each array is an axis: to take the least of three in a row takes NumPy long."""
+    velocity, acceleration, jerk = (
+        most[:, None] for most in (limits.velocity, limits.acceleration, limits.jerk)
+    )
+    first, second, third = np.ascontiguousarray(shape[:, 1:].transpose(1, 2, 0))
+    second, third = 2.0 * second, 6.0 * third
     # q' is a parabola in the hull of its three control points; q'' is linear
     middle, last = first + 0.5 * h * second, first + h * (second + 0.5 * h * third)
     m1 = np.maximum(np.maximum(np.abs(first), np.abs(last)), np.abs(middle))
     m2 = np.maximum(np.abs(second), np.abs(second + h * third))
     m3 = np.abs(third)
-    size = np.sqrt(np.maximum.reduce([(e * e).sum(axis=1) for e in (first, middle, last)]))
+    size = np.sqrt(np.maximum.reduce([(e * e).sum(axis=0) for e in (first, middle, last)]))
     m1, m2, m3 = (np.maximum(e, _TINY) for e in (m1, m2, m3))
     with np.errstate(over="ignore"):
-        v = np.minimum((limits.velocity / m1).min(axis=1), feed / np.maximum(size, _TINY))
-        v = np.minimum(v, np.sqrt(share * (limits.acceleration / m2).min(axis=1)))
-        v = np.minimum(v, np.cbrt(share * (limits.jerk / m3).min(axis=1)))
-        cross = 3.0 * m2 * v[:, None]
-        spare_jerk = limits.jerk - m3 * (v**3)[:, None]
-        a = ((limits.acceleration - m2 * (v**2)[:, None]) / m1).min(axis=1)
-        a = np.minimum(a, (_BY_CROSS * spare_jerk / np.maximum(cross, _TINY)).min(axis=1))
-        j = ((spare_jerk - cross * a[:, None]) / m1).min(axis=1)
+        v = np.minimum((velocity / m1).min(axis=0), feed / np.maximum(size, _TINY))
+        v = np.minimum(v, np.sqrt(share * (acceleration / m2).min(axis=0)))
+        v = np.minimum(v, np.cbrt(share * (jerk / m3).min(axis=0)))
+        cross = 3.0 * m2 * v
+        spare_jerk = jerk - m3 * v**3
+        a = ((acceleration - m2 * v**2) / m1).min(axis=0)
+        a = np.minimum(a, (_BY_CROSS * spare_jerk / np.maximum(cross, _TINY)).min(axis=0))
+        j = ((spare_jerk - cross * a) / m1).min(axis=0)
     return np.stack((v, a, j))
