@@ -49,7 +49,7 @@ from olp.workflows.proof import ProofOptions, Run, verify_programs
 from olp.workflows.session import Loaded, Outside, PathLike, Session, opened
 
 if TYPE_CHECKING:
-    from olp.workflows.retime import Retiming
+    from olp.trajectory.variants import Plan
 
 #: Shortest rest at a sample that counts, in s.
 _REST_S = 1e-3
@@ -204,7 +204,7 @@ class _Shown:
 
     samples: Samples
     moment: Array
-    plan: Retiming | None
+    plan: Plan | None
 
 
 def _corrected(session: Session, data: Text, loaded: Loaded, options: ViewOptions, tell: Progress) -> Run:
@@ -243,13 +243,14 @@ def _shown(
     samples = with_starts(samples, texts.nominal, texts.table)
     if seconds is not None:
         return _Shown(samples, by_feed(seconds, samples), None)
-    from olp.workflows import retime
+    from olp.workflows.retime import RetimeOptions
+    from olp.workflows.retime_motion import motion
 
     other = session.sources.source(texts.second.data)
     # what the proof accepts holds for the motion, also where its stamp is that of sure components alone
     accept = tuple(texts.report["accepted"])
-    timing = retime.RetimeOptions(date=options.date, accept=accept)
-    plan = retime.run(session.of(loaded.setup), other, timing, progress=progress)
+    timing = RetimeOptions(date=options.date, accept=accept)
+    plan = motion(session.of(loaded.setup), other, timing, progress)
     samples, moment = _resting(samples, *retimed(texts.second.toolpath, samples, plan.trajectories))
     return _Shown(samples, moment, plan)
 
@@ -299,7 +300,7 @@ def _scene(
         limits={} if plan is None else machine.motion_limits(),
         time_s=moment,
         planned=plan is not None,
-        motion=None if plan is None else motion_table(plan.trajectories, plan.routes),
+        motion=None if plan is None else motion_table(plan.trajectories, plan.case.legs),
         duration_s=float(moment[-1]) if plan is None else plan.duration_s,
         sources=tuple(
             (name, curve_um(size)) for name, size in by_source(nominal.toolpath, samples, loaded.model)

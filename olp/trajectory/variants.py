@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import field, replace
 from itertools import pairwise
 from typing import Any
 
@@ -112,13 +112,31 @@ class Case:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Plan:
-    """A case planned within limits: one trajectory per route, and how they use the limits."""
+    """A case planned within limits: one trajectory per route. How they use the limits is found when it is
+    asked for: plans of which only the time counts need it not."""
 
     case: Case
     limits: AxisLimits
     trajectories: tuple[Trajectory, ...]
-    lines: LineUse
-    slow: tuple[SlowStretches, ...]
+    _used: list[tuple[LineUse, tuple[SlowStretches, ...]]] = field(
+        default_factory=list, init=False, repr=False
+    )
+
+    @property
+    def lines(self) -> LineUse:
+        """Time, speed and limit of each line."""
+        return self._usage()[0]
+
+    @property
+    def slow(self) -> tuple[SlowStretches, ...]:
+        """Of each route, where the speed is below half the feed."""
+        return self._usage()[1]
+
+    def _usage(self) -> tuple[LineUse, tuple[SlowStretches, ...]]:
+        if not self._used:
+            used = [usage(t, leg) for t, leg in zip(self.trajectories, self.case.legs, strict=True)]
+            self._used.append((LineUse.joined([lines for lines, _ in used]), tuple(slow for _, slow in used)))
+        return self._used[0]
 
     @property
     def duration_s(self) -> float:
@@ -137,21 +155,20 @@ class Plan:
         line_of = program.original_lines
         legs = tuple(replace(leg, line=line_of(leg.line)) for leg in self.case.legs)
         motions = (replace(t.motion, line=line_of(t.motion.line)) for t in self.trajectories)
-        return Plan(
+        numbered = Plan(
             replace(self.case, legs=legs), self.limits,
             tuple(replace(t, motion=m) for t, m in zip(self.trajectories, motions, strict=True)),
-            self.lines.numbered(line_of(self.lines.line)),
-            tuple(replace(slow, line=line_of(slow.line)) for slow in self.slow),
         )  # fmt: skip
+        slow = tuple(replace(slow, line=line_of(slow.line)) for slow in self.slow)
+        numbered._used.append((self.lines.numbered(line_of(self.lines.line)), slow))
+        return numbered
 
 
 def planned(case: Case, limits: AxisLimits, tell: Progress, what: str = "plan") -> Plan:
     """Plan every route of a case. Raises CannotCompute as `olp.trajectory.plan.plan`."""
     with case.program.errors():
         trajectories = _motions(case.legs, limits, tell, what)
-    used = [usage(t, leg) for t, leg in zip(trajectories, case.legs, strict=True)]
-    lines = LineUse.joined([lines for lines, _ in used])
-    return Plan(case, limits, trajectories, lines, tuple(slow for _, slow in used))
+    return Plan(case, limits, trajectories)
 
 
 def _motions(legs: Sequence[Route], limits: AxisLimits, tell: Progress, what: str) -> tuple[Trajectory, ...]:

@@ -242,9 +242,9 @@ def run(
     stated = None if proof is None else proved(proof, setup)
     tell = progress or silent
     tell("read", 0.0)
-    case = _case(session, program, options)
+    case = case_of(session, program, options)
     doubts = doubted_motion(case.program, session.of(case.setup), options.accept, options.date, program.name)
-    other = None if nominal is None else _case(session, nominal, options)
+    other = None if nominal is None else case_of(session, nominal, options)
     compliance = compliance_of(setup.machine)
     limits = axis_limits(setup.machine)
     with program.errors():
@@ -292,7 +292,7 @@ def durations(
     """Seconds of programs, and whether speeds along dense curves were optimised: they are not where one of
     them has more than `most` waypoints, so that all are planned alike. Raises as `retime`, but for doubts."""
     limits = axis_limits(session.setup.machine)
-    cases = [_case(session, program, options) for program in programs]
+    cases = [case_of(session, program, options) for program in programs]
     short = max(sum(map(len, case.legs)) for case in cases) <= most
     if short:
         return [planned(case, limits, tell).duration_s for case in cases], True
@@ -319,7 +319,7 @@ def _control(session: Session, options: RetimeOptions) -> tuple[Control | None, 
     return control, read_points(options.log, layout, session.sources.read)
 
 
-def _case(session: Session, program: Source, options: RetimeOptions) -> Case:
+def case_of(session: Session, program: Source, options: RetimeOptions) -> Case:
     """A program ready for planning. Raises ProgramError with its file and line; CannotCompute where no move
     can be timed."""
     blend_mm, stated = options.blend_mm, session.setup.machine.blend_mm
