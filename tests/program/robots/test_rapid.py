@@ -241,3 +241,59 @@ def test_a_move_in_a_short_if_is_one_move(bent: Path) -> None:
     assert done.data.count(b"MoveL") == 3
     assert rb"IF di1=1 MoveL q,v100" in done.data
     assert b"q:=[[300,50,0]" not in done.data
+
+
+PART = HEAD.splitlines()[2].partition(":=")[2]
+#: `grip`, `part` and a target are declared without a value, and get one where the program begins
+LATER = "PERS tooldata now;\nPERS wobjdata there;\nVAR robtarget a;\nVAR robtarget b;\n"
+GIVEN = f"now:=grip;\nthere:={PART}\na:=p;\nb:=[[-9,8,7],{TAIL};\n"
+MOVES = "MoveL p,v100,fine,grip\\WObj:=part;\nMoveJ q,v100,z10,grip\\WObj:=part;\n"
+
+
+def test_data_that_get_their_only_value_later_have_that(bent: Path, zero: Path) -> None:
+    stated = f"CONST robtarget p:=[[20,30,-5],{TAIL};\n"
+    plain = HEAD + stated + f"CONST robtarget q:=[[-9,8,7],{TAIL};\nPROC main()\n" + MOVES
+    moves = MOVES.replace("p,", "a,").replace("q,", "b,").replace("grip", "now").replace("=part", "=there")
+    later = (HEAD + LATER + stated + "PROC main()\n" + GIVEN + moves).encode() + MACHINE_TAIL
+    assert olp.correct(later, zero).data == later
+    want = olp.correct(plain.encode() + MACHINE_TAIL, bent).data.decode()
+    done = olp.correct(later, bent).data.decode()
+    for own, other in ((r" p:=(.*);", r" p:=(.*);"), (r"\nb:=(.*);", r" q:=(.*);")):
+        assert re.findall(own, done) == re.findall(other, want) != re.findall(own, later.decode())
+    assert [line for line in done.splitlines() if line.startswith("Move")] == moves.splitlines()
+
+
+@pytest.mark.parametrize(
+    ("declared", "given", "moved"),
+    [
+        (f"VAR robtarget a:=[[1,2,3],{TAIL};", "a:=p;", "a"),
+        ("VAR robtarget a;", "a:=p;\na:=q;", "a"),
+        ("VAR robtarget a;", "a:=Offs(p,1,2,3);", "a"),
+        ("VAR robtarget a;\nVAR robtarget b;", "a:=b;\nb:=a;", "a"),
+        ("VAR robtarget a;", "a:=p;\na.trans.z:=3;", "a"),
+    ],
+)  # fmt: skip
+def test_data_that_may_have_another_value_are_refused(
+    zero: Path, declared: str, given: str, moved: str
+) -> None:
+    text = f"{HEAD}{declared}\nCONST robtarget p:=[[1,2,3],{TAIL};\nCONST robtarget q:=[[4,5,6],{TAIL};\n"
+    text += f"PROC main()\n{given}\nMoveJ {moved},v100,fine,tool0;\n"
+    with pytest.raises(ProgramError, match="gets another value in line"):
+        olp.correct(text.encode() + MACHINE_TAIL, zero)
+
+
+def test_a_target_of_another_routine_is_not_named_where_nothing_sees_it(zero: Path) -> None:
+    text = f"{HEAD}VAR robtarget a;\nPROC set()\nVAR robtarget p:=[[1,2,3],{TAIL};\na:=p;\nENDPROC\n"
+    text += "PROC main()\nset;\nMoveJ a,v100,fine,tool0;\n"
+    with pytest.raises(ProgramError, match="a gets another value in line 7"):
+        olp.correct(text.encode() + MACHINE_TAIL, zero)
+
+
+def test_places_for_statements_move_nothing(bent: Path) -> None:
+    text = HEAD + f"CONST robtarget p:=[[20,30,-5],{TAIL};\n%sPROC main()\n{MOVES.splitlines()[0]}\n%s"
+    full, bare = (
+        olp.correct((text % own).encode() + MACHINE_TAIL, bent).data
+        for own in (("<DDN>\n", "  <SMT>\n"), ("", ""))
+    )
+    skip = re.compile(rb"! olp-corrected.*")
+    assert skip.sub(b"", full.replace(b"<DDN>\n", b"").replace(b"  <SMT>\n", b"")) == skip.sub(b"", bare)

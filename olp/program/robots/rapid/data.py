@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from typing import NamedTuple
 
 from olp.core.errors import ProgramError
@@ -27,6 +28,9 @@ _DECLARED = pattern(
     rb"(?is)(?:(?:LOCAL|TASK)\s+)?(CONST|PERS|VAR)\s+(\w+)\s+(\w+)\s*(\{[^}]*\})?\s*(?::=\s*(.*?))?\s*"
 )
 _SPEED = pattern(rb"\[\s*" + NUMBER + rb"\s*,.*\]\s*")
+_NAME = pattern(rb"[A-Za-z]\w*")
+#: Data that are given to others in turn.
+_DEEPEST = 8
 _FIRST_SPEED = pattern(rb"(?i)v(\d+)")
 
 
@@ -64,6 +68,16 @@ class Data:
     value: Span | None
 
 
+@dataclass(frozen=True, slots=True)
+class Given:
+    """A statement that gives data another value, its routine, and the bytes of that value, None where it
+    does not give them a whole one."""
+
+    statement: Statement
+    scope: Scope
+    value: Span | None
+
+
 class Declared:
     """All data of a text by scope and name in capitals, and `parameters`: the names by routine that callers
     give values to."""
@@ -71,8 +85,8 @@ class Declared:
     def __init__(self, data: bytes, moves: RobotMoves) -> None:
         self.data, self.moves = data, moves
         self._data: dict[tuple[Scope, str], list[Data]] = {}
-        #: by name: the modules in which it may get another value, each with the line
-        self._given: dict[str, dict[int, int]] = {}
+        #: by name: where it may get another value
+        self._given: dict[str, list[Given]] = {}
         self.parameters: dict[Scope, list[str]] = {}
         self._targets: dict[tuple[int, int], int] = {}
 
@@ -93,9 +107,9 @@ class Declared:
             self._data.setdefault((_GLOBAL, name), []).append(found)
         return True
 
-    def give(self, name: str, scope: Scope, line: int) -> None:
+    def give(self, name: str, given: Given) -> None:
         """A name, in capitals, may get another value."""
-        self._given.setdefault(name, {}).setdefault(scope.module, line)
+        self._given.setdefault(name, []).append(given)
 
     def _seen(self, name: str, scope: Scope) -> list[Data]:
         """The data that a name means in a routine; empty where the text declares none."""
@@ -105,12 +119,13 @@ class Declared:
                 return data
         return []
 
-    def _changed(self, name: str, data: Data) -> int | None:
-        """The line where data get another value, None where nothing gives them one."""
-        for module, line in self._given.get(name, {}).items():
+    def _changed(self, name: str, data: Data) -> Given | None:
+        """Where data first get another value, None where nothing gives them one."""
+        for given in self._given.get(name, ()):
+            module = given.scope.module
             own = module == data.scope.module
             if own or (not data.local and (Scope(module, ""), name) not in self._data):
-                return line
+                return given
         return None
 
     def _line(self, line: int) -> str:
@@ -121,7 +136,7 @@ class Declared:
     def _place(self, data: Data) -> str:
         return self._line(data.statement.line)
 
-    def find(self, name: str, kind: bytes, routine: Scope, line: int) -> Data | None:
+    def find(self, name: str, kind: bytes, routine: Scope, line: int, depth: int = 0) -> Data | None:
         """The data of a name and a type, None where the text declares none. Raises ProgramError where a move
         cannot rely on its value."""
         key = name.upper()
@@ -145,14 +160,34 @@ class Declared:
                 code="OLP533",
             )
         changed = self._changed(key, data[0])
-        if changed is not None:
-            raise DecidedInRun(
-                f"{name} gets another value in {self._line(changed)}, so its value here depends on the "
-                "run; state it once, with its numbers",
-                line=line,
-                code="OLP533",
-            )
-        return data[0]
+        if changed is None:
+            return data[0]
+        value = b"" if changed.value is None else self.data[slice(*changed.value)]
+        if self._only(key, data[0], changed):
+            if value[:1] == b"[":
+                return replace(data[0], statement=changed.statement, value=changed.value)
+            # another datum, which may be one of these in turn
+            if _NAME.fullmatch(value) and depth < _DEEPEST:
+                other = self.find(value.decode(), kind, changed.scope, line, depth + 1)
+                if other is not None and self._names(other, routine):
+                    return other
+        raise DecidedInRun(
+            f"{name} gets another value in {self._line(changed.statement.line)}, so its value here depends "
+            "on the run; state it once, with its numbers",
+            line=line,
+            code="OLP533",
+        )
+
+    @staticmethod
+    def _names(data: Data, scope: Scope) -> bool:
+        """Whether a move of a routine could name data, or a clone beside them."""
+        return not data.local or data.scope in (scope, scope.of(""))
+
+    def _only(self, name: str, data: Data, given: Given) -> bool:
+        """Whether what a statement gives to data that are declared without a value is the only value that
+        they ever have: before it a move to them, or with them, stops the control."""
+        alone = len(self._given[name]) == 1 and given.value is not None and data.value is None
+        return alone and not data.array and any(seen is data for seen in self._seen(name, given.scope))
 
     def target(self, name: str, index: int, routine: Scope, line: int) -> int:
         """The place of a declared target. Raises ProgramError where the text does not state it."""

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from olp.core.errors import ProgramError
 from olp.core.patterns import pattern
 from olp.core.values import dataclass
 from olp.program.program import Program
@@ -46,7 +47,13 @@ class Rapid(InPlace):
         data = program.data
         begin, end = target.declaration
         lead = _DECLARED_NAME.match(data, begin, end)
-        assert lead is not None
+        if lead is None:
+            raise ProgramError(
+                f"{target.name} is assigned by a statement, and its moves want different numbers of it; give "
+                "each move its own target",
+                line=target.line,
+                code="OLP561",
+            )
         line = int(program.line_start[target.line - 1])
         blanks = data[line:begin] if not data[line:begin].strip() else b""
         # the line of the semicolon

@@ -12,6 +12,7 @@ from olp.program.dialect import Support
 from olp.program.robots.rapid.forms import FORMS
 from olp.program.robots.rapid.table import TABLE
 from olp.program.robots.rapid.text import Statement
+from olp.program.robots.targets import Span
 
 _ROUTINE = pattern(rb"(?i)(?:LOCAL\s+|TASK\s+)?(PROC|FUNC|TRAP|RECORD)\s+(?:\w+\s+)?(\w+)")
 _PROC = pattern(rb"(?i)(?:LOCAL\s+)?(?:PROC|TRAP)\s+(\w+)")
@@ -26,6 +27,8 @@ _HARMLESS_TAIL = pattern(
 _MENTIONED = pattern(rb"(?:^|[\s,(])([A-Za-z]\w*)\s*(?=,|$)")
 #: The second argument of a search: where it writes what it has found.
 _FOUND = pattern(rb"\A[^,]*(?:,\s*\\[^,]*)*,\s*([A-Za-z]\w*)")
+#: An assignment to a whole datum.
+_WHOLE = pattern(rb"(?s)\s*[A-Za-z]\w*\s*:=\s*(.*?)\s*")
 _AREA = pattern(rb"(?i)\s*SingArea\b[^\\]*\\\s*(Wrist|LockAxis4)")
 _ARC_MODE = pattern(rb"(?i)\s*CirPathMode\b[^\\]*\\\s*(CirPointOri|Wrist\w*)")
 #: What a short IF must not hold.
@@ -90,6 +93,12 @@ def calls(text: bytes) -> bool:
 def is_assignment(statement: Statement) -> bool:
     match = GIVEN.match(statement.text.lstrip())
     return match is not None
+
+
+def value_in(statement: Statement) -> Span | None:
+    """The bytes of what a statement gives to a whole datum; None for others."""
+    match = _WHOLE.fullmatch(statement.text)
+    return None if match is None else (statement.begin + match.start(1), statement.begin + match.end(1))
 
 
 def given_in(statement: Statement) -> list[str]:

@@ -14,7 +14,7 @@ from olp.program.robots.frames import Located, Tool
 from olp.program.robots.moves import DecidedInRun, RobotMoves, take_all
 from olp.program.robots.poses import NO_TURN, inverted, multiplied, of_zyx, rotated
 from olp.program.robots.rapid import flow
-from olp.program.robots.rapid.data import NO_MODULE, Declared, Scope
+from olp.program.robots.rapid.data import NO_MODULE, Declared, Given, Scope
 from olp.program.robots.rapid.forms import FORMS, Form
 from olp.program.robots.rapid.table import TABLE
 from olp.program.robots.rapid.text import Lines, Statement, statements
@@ -103,8 +103,9 @@ class _Reader:
             if not statement.block and self.declared.declare(statement, routine):
                 continue
             if not statement.block:
+                value = flow.value_in(statement)
                 for name in flow.given_in(statement):
-                    self.declared.give(name, routine, statement.line)
+                    self.declared.give(name, Given(statement, routine, value))
             rest.append(statement)
         return rest
 

@@ -10,10 +10,11 @@ from olp.core.errors import ProgramError
 from olp.core.patterns import pattern
 from olp.core.values import dataclass
 
-#: Blanks and comments between statements, the header of a file, and what names the modules of a program.
+#: Blanks and comments between statements, the header of a file, what names the modules of a program, and
+#: places where statements are still to be programmed: the control stops there.
 _ASIDE = pattern(
     rb"(?:\s+|!@?[^\r\n]*|%%%[^%]*%%%|\xef\xbb\xbf|<\?[^<>]*>|"
-    rb"<(?i:program)[^<>]*>[^<>]*(?:<(?i:module)>[^<>]*</(?i:module)>[^<>]*)*</(?i:program)>)*"
+    rb"<(?i:SMT|DDN|RDN|TDN)>|<(?i:program)[^<>]*>[^<>]*(?:<(?i:module)>[^<>]*</(?i:module)>[^<>]*)*</(?i:program)>)*"
 )
 #: Statements that end without a semicolon.
 _BLOCK = pattern(
