@@ -125,7 +125,7 @@ def _near_lines(route: Route, edges: Index) -> tuple[Index, Index]:
 def _winding(bend: Array, first: Index, last: Index) -> Iterator[tuple[int, int]]:
     """The stretches in which turns are nearly as large in sum as those of noise, or larger."""
     size = np.concatenate(([0.0], np.cumsum(np.sqrt((bend * bend).sum(axis=1)))))
-    turn = np.concatenate((np.zeros((1, 3)), np.cumsum(bend, axis=0)))
+    turn = np.concatenate((np.zeros((1, bend.shape[1])), np.cumsum(bend, axis=0)))
     sizes, whole = size[last - 1] - size[first], turn[last - 1] - turn[first]
     wound = sizes > _NEARLY * _NOISE * np.sqrt((whole * whole).sum(axis=1))
     return zip(first[wound].tolist(), last[wound].tolist(), strict=True)
