@@ -16,7 +16,7 @@ import olp
 CASES = [
     ("arm 6 with offsets", 1, LIST), ("scara", 0, LIST), ("polar", 0, LIST), ("hexapod", 0, LIST),
     ("table/head", 1, "G43.4"), ("table/head", 3, "APT"), ("nutating head", 2, "M128"),
-    ("head/head", 0, "axis words, linuxcnc"),
+    ("head/head", 0, "axis words, linuxcnc"), ("nutating table", 4, "axis words, fanuc"),
 ]  # fmt: skip
 
 

@@ -17,6 +17,8 @@ from olp.kinematics.poses import Poses
 
 #: The share of a tolerance that a split leaves to what lies between its samples.
 _SHARE = 0.7
+#: The same where axes have backlash, and dead bands.
+_SHARE_WITH_PLAY = 0.55
 #: A move is split into at most so many parts at a time.
 _MOST_PARTS = 64
 #: Rounds of splitting; each leaves less than half of a deviation.
@@ -161,13 +163,16 @@ def _split(path: JointPath, begin: Rows, end: Rows, limits: JointLimits) -> list
 def _parts(path: JointPath, begin: Rows, end: Rows, limits: JointLimits) -> Index:
     """(s,) into how many parts each stretch between two rows has to be split; 1 where it may stay."""
     count = path.samples(end.move, begin.axes, end.axes, end.share - begin.share)
-    chords = path.curves.chords(end.move, end.share - begin.share, _SHARE * limits.tolerance_mm)
+    share = _SHARE_WITH_PLAY if path.motion.width.any() else _SHARE
+    chords = path.curves.chords(end.move, end.share - begin.share, share * limits.tolerance_mm)
     parts = np.ones(len(count), np.int64)
     totals = np.cumsum(count)
     a = 0
     while a < len(count):
         b = max(int(np.searchsorted(totals, (totals[a - 1] if a else 0) + _BATCH)), a + 1)
-        worst = _worst(path, begin.only(np.arange(a, b)), end.only(np.arange(a, b)), limits, count[a:b])
+        worst = (
+            _worst(path, begin.only(np.arange(a, b)), end.only(np.arange(a, b)), limits, count[a:b]) / share
+        )
         bends = np.clip(np.ceil(np.sqrt(worst)), 2, _MOST_PARTS).astype(np.int64)
         bends = np.maximum(bends, chords[a:b])
         parts[a:b] = np.where(worst > 1.0, bends, 1)
@@ -176,7 +181,7 @@ def _parts(path: JointPath, begin: Rows, end: Rows, limits: JointLimits) -> Inde
 
 
 def _worst(path: JointPath, begin: Rows, end: Rows, limits: JointLimits, count: Index) -> Array:
-    """(s,) the largest deviation in each stretch over what may be."""
+    """(s,) the largest deviation in each stretch in tolerances."""
     motion = path.motion
     owner, step = spread(count)
     part = (step + 1) / (count[owner] + 1)
@@ -197,7 +202,7 @@ def _worst(path: JointPath, begin: Rows, end: Rows, limits: JointLimits, count: 
     angle[rows] = np.maximum(
         angle[rows], motion.correctable(axes[rows], tool[rows], actual.only(rows), target.only(rows))
     )
-    over = np.maximum(distance / limits.tolerance_mm, angle / limits.tolerance_rad) / _SHARE
+    over = np.maximum(distance / limits.tolerance_mm, angle / limits.tolerance_rad)
     worst = np.zeros(len(count))
     np.maximum.at(worst, owner, over)
     return worst

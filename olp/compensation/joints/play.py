@@ -21,7 +21,7 @@ from olp.core.toolpath import Flag
 from olp.core.values import dataclass
 
 #: The share of a tolerance that the dead bands of all axes take together.
-BAND_SHARE = 0.2
+BAND_SHARE = 0.3
 #: Rounds in which moves are split where an axis turns round inside of them.
 _ROUNDS = 8
 #: A move is split inside of a stretch only, and not this near to its ends.
@@ -39,11 +39,15 @@ _TINY = 1e-12
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Play:
-    """(axes,) the backlash of each axis, and by how much its load may be off rather than turn round, in mm
-    or deg."""
+    """(axes,) the `width` of the backlash of each axis, by how much its load may be off rather than turn
+    round (`band`), and by how much more than its backlash it goes `past` an end, in mm or deg. `travel`
+    (2, axes) are its ends. What is not `free` is not corrected."""
 
     width: Array
     band: Array
+    past: Array
+    travel: Array
+    free: Mask
 
     @staticmethod
     def of(path: JointPath, rows: Rows, tolerance_mm: float, tolerance_rad: float) -> Play:
@@ -61,7 +65,27 @@ class Play:
             most = np.maximum(most, sizes)
         band = np.minimum(tolerance_mm / most[0], tolerance_rad / most[1])
         band *= BAND_SHARE / max(int((width != 0.0).sum()), 1)
-        return Play(width, np.where(_rotary(path), np.degrees(band), band))
+        joints, units = motion.structure.joints.values(), motion.structure.units
+        digits = dict.fromkeys(units, 0.0)
+        for unit, places in zip(path.coordinates.units, path.places.tolist(), strict=True):
+            digits[unit] = max(digits.get(unit, 0.0), 10.0**-places)
+        return Play(
+            width, np.where(_rotary(path), np.degrees(band), band),
+            _PAST * np.array([digits[unit] for unit in units]) + _PAST_SHARE * width,
+            np.array([joint.travel for joint in joints]).T, np.array([joint.correct for joint in joints]),
+        )  # fmt: skip
+
+    def way(self, axis: int, start: float, ahead: Array) -> float:
+        """The side on which a load is to rest at `start`: that of its next motion, to one of the positions
+        `ahead`, or the other one where it cannot be approached inside of the travel. 0: the axis is clamped,
+        and stays."""
+        moved = np.flatnonzero(np.abs(ahead - start) > self.band[axis])
+        if not moved.size and not self.free[axis]:
+            return 0.0
+        way = float(np.sign(ahead[moved[0]] - start)) if moved.size else 1.0
+        low, high = self.travel[:, axis]
+        beyond = start - way * (0.5 * self.width[axis] + self.past[axis])
+        return way if low <= beyond <= high else -way
 
 
 def with_play(path: JointPath, rows: Rows, begins: Rows, play: Play) -> Rows:
@@ -109,15 +133,10 @@ def _approaches(path: JointPath, rows: Rows, found: _Followed, play: Play) -> tu
     """Rows past the ends of moves that do not cut, from where an axis comes back by more than its backlash,
     and the rows (k,) before which they come."""
     where = np.flatnonzero(found.approaches.any(axis=1))
-    words, motion = path.coordinates, path.motion
-    digits = dict.fromkeys(motion.structure.units, 0.0)
-    for unit, places in zip(words.units, path.places.tolist(), strict=True):
-        digits[unit] = max(digits.get(unit, 0.0), 10.0**-places)
-    past = _PAST * np.array([digits[unit] for unit in motion.structure.units]) + _PAST_SHARE * play.width
-    step = np.where(found.approaches, rows.side * (play.width + past), 0.0)[where]
+    step = np.where(found.approaches, rows.side * (play.width + play.past), 0.0)[where]
     begin = rows.only(where)
     axes = begin.axes - step
-    return replace(begin, axes=axes, target=motion.actual(axes, path.tool[begin.move])), where
+    return replace(begin, axes=axes, target=path.motion.actual(axes, path.tool[begin.move])), where
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -230,7 +249,7 @@ def _followed(path: JointPath, rows: Rows, begins: Rows, play: Play) -> _Followe
     side, turns = np.zeros(rows.axes.shape), np.zeros(rows.axes.shape, bool)
     approaches = turns.copy()
     for axis in np.flatnonzero(play.width).tolist():
-        column = _Column(position[:, axis], float(play.width[axis]), float(play.band[axis]), may)
+        column = _Column(position[:, axis], play, axis, may)
         side[:, axis], turns[:, axis] = column.side[where], column.turns[where]
         approaches[:, axis] = column.approaches[where]
     return _Followed(side, turns & ~stays, approaches & ~stays)
@@ -240,8 +259,8 @@ class _Column:
     """One axis along all `position`s (n,), which are not known in places. Where it would be unknown on which
     side it is, and a row `may` (n,) come before, its side is that of the next motion."""
 
-    def __init__(self, position: Array, width: float, band: float, may: Mask) -> None:
-        self.width, self.band, count = width, band, len(position)
+    def __init__(self, position: Array, play: Play, axis: int, may: Mask) -> None:
+        self.width, self.band, count = float(play.width[axis]), float(play.band[axis]), len(position)
         self.side, self.turns = np.zeros(count), np.zeros(count, bool)
         self.approaches = np.zeros(count, bool)
         known = np.isfinite(position)
@@ -251,10 +270,11 @@ class _Column:
             open_ = np.flatnonzero(may[a:b] & (np.abs(self.side[a:b]) < 1.0))
             if open_.size:
                 row = a + int(open_[0])
-                moved = np.flatnonzero(np.abs(position[row:b] - position[row]) > band)
-                way = np.sign(position[row + moved[0]] - position[row]) if moved.size else 1.0
-                self._follow(row, position[row:b], Rest(float(position[row]), float(position[row]), way, 2.0))
-                self.approaches[row] = True
+                start = float(position[row])
+                way = play.way(axis, start, position[row:b])
+                if way:
+                    self._follow(row, position[row:b], Rest(start, start, way, 2.0))
+                    self.approaches[row] = True
 
     def _follow(self, begin: int, position: Array, rest: Rest) -> None:
         width = np.full(len(position), self.width)

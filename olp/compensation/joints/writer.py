@@ -16,6 +16,7 @@ from olp.compensation.joints.direction_words import DirectionWords
 from olp.compensation.joints.drilled import lifted, middled
 from olp.compensation.joints.path import JointPath
 from olp.compensation.joints.planning import JointPlan
+from olp.compensation.joints.rounded_play import loads
 from olp.compensation.stretches import Decimals, Stretches, digits_of
 from olp.compensation.style import Style
 from olp.compensation.tally import Tally
@@ -26,7 +27,6 @@ from olp.core.machine import Vector
 from olp.core.toolpath import Flag
 from olp.core.units import AXES
 from olp.core.values import dataclass
-from olp.kinematics.poses import Poses
 from olp.program.text.edits import BARE, EditList, Edits, Prefixes, splice
 
 Small = npt.NDArray[np.int8]
@@ -78,12 +78,7 @@ class JointWriter:
         return self.program.dialect.direction_words
 
     def written(self) -> WrittenJoints:
-        command = self.plan.command.copy()
-        emitted, drilled = np.full(command.shape, np.nan), self.path.holes.strokes[self.plan.move]
-        for column in np.flatnonzero(self.rotary).tolist():
-            emitted[:, column] = self._round(column, command[:, column], drilled)
-        self._aim(emitted)
-        made = self._drill(self._linear(command, emitted))
+        made = self._drill(self._linear(self.plan.command.copy(), self.rotary_words()))
         edits = [
             *self._replaced(),
             *self._inserted_words(),
@@ -102,6 +97,15 @@ class JointWriter:
             leading_zero=self.style.leading_zero,
         ).tobytes()  # fmt: skip
         return WrittenJoints(text, self.tally, parts)
+
+    def rotary_words(self) -> Array:
+        """(r, axes) the rotary values as they are written, NaN in the other columns."""
+        command, drilled = self.plan.command, self.path.holes.strokes[self.plan.move]
+        emitted = np.full(command.shape, np.nan)
+        for column in np.flatnonzero(self.rotary).tolist():
+            emitted[:, column] = self._round(column, command[:, column], drilled)
+        self._aim(emitted)
+        return emitted
 
     def _placed(self, edits: list[Edits]) -> list[Edits]:
         """The edits as they are made, beside the marks of the language."""
@@ -123,12 +127,10 @@ class JointWriter:
             # the linear words state the tip, however the tool is turned
             return command
         motion, move = self.path.motion, self.plan.move[rows]
-        play = 0.5 * motion.width * self.plan.side[rows]
-        axes = self.plan.axes[rows] - play
-        axes[:, self.rotary] = (emitted[rows] - play)[:, self.rotary]
-        target = Poses(self.plan.target.rotation[rows], self.plan.target.position[rows])
+        axes = loads(self.path, self.plan, emitted)[rows]
+        axes += 0.5 * motion.width * self.plan.side[rows]
+        axes[:, self.rotary] = emitted[rows][:, self.rotary]
         tool = self.path.tool[move]
-        axes = motion.linear(axes, tool, target).values + play
         command[rows] = motion.programmed(axes, tool, self.path.tip[move])
         return command
 

@@ -12,9 +12,9 @@ from olp.compensation.joints.arm_path import ArmPath
 from olp.compensation.joints.arm_writer import write_arm
 from olp.compensation.joints.list_writer import write_list
 from olp.compensation.joints.path import JointPath
-from olp.compensation.joints.planning import JointLimits, JointPlan, planned
+from olp.compensation.joints.planning import JointLimits, JointPlan
 from olp.compensation.joints.writer import WrittenJoints
-from olp.compensation.joints.writing import write_joints
+from olp.compensation.joints.writing import planned_words, write_joints
 from olp.compensation.stamp import find_real_time, find_stamp, stamp_line, stamped
 from olp.compensation.tally import Tally
 from olp.compensation.wrapping import card_stamp
@@ -144,7 +144,7 @@ def correction_of(run: JointRun, options: JointOptions) -> ProvedJoints:
         source, nominal = run.read(run.program, options)
         dialect = run.dialect(run.program)
         with nominal.program.errors():
-            plan = planned(nominal, options.limits())
+            plan = planned_words(nominal, options.limits())
             if options.outside_box == "refuse" and run.calibration is not None:
                 _refuse_outside(nominal, plan, run)
             written = _written(nominal, plan, options.limits())

@@ -244,9 +244,11 @@ def outside_box(path: JointPath, plan: JointPlan, run: JointRun) -> list[tuple[i
     """Lines whose commands leave the calibrated values of an axis, each with a sentence."""
     assert run.calibration is not None
     structure, found = path.motion.structure, []
+    # what only goes past an end brings the tool nowhere
+    ends = ~(plan.stands & (plan.share == 1.0))
     for column, name in enumerate(structure.order):
         low, high = run.calibration.box[name]
-        value = plan.axes[:, column]
+        value = np.where(ends, plan.axes[:, column], np.nan)
         with np.errstate(invalid="ignore"):
             out = np.flatnonzero((value < low - _AT_END) | (value > high + _AT_END))
         unit = structure.units[column]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 from typing import Any
 
-from olp.compensation.joints.planning import planned
+from olp.compensation.joints.writing import planned_words
 from olp.compensation.stamp import find_stamp
 from olp.core.errors import ProgramError
 from olp.core.values import dataclass
@@ -74,7 +74,7 @@ def verification_of(run: JointRun, corrected: Source, options: JointOptions) -> 
             )
         source, nominal = run.read(run.program, options)
         with nominal.program.errors():
-            plan = planned(nominal, options.limits())
+            plan = planned_words(nominal, options.limits())
     with corrected.errors():
         _, written = run.read(corrected, AS_IT_IS)
     with run.program.errors():
