@@ -52,7 +52,8 @@ JUDGED = 60
 @dataclass(frozen=True)
 class Run:
     """Readings of one set-up: the commanded values (n, k), what is read as a function of errors and own
-    unknowns (l,), how well in mm or rad (m,), and their table and file."""
+    unknowns (l,), how well in mm or rad (m,), and their table and file. `shown` (n, k) is what the control
+    showed, where the file has columns of it."""
 
     values: Array
     predict: Callable[[dict[Name, float], Array], Array]
@@ -62,6 +63,7 @@ class Run:
     columns: tuple[str, ...]
     read: Array
     which: tuple[str, Sequence[str]] | None
+    shown: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -314,9 +316,13 @@ class Campaign:
         for run in self.runs:
             units = ["deg" if self.machine.kind(n) == "rotary" else "mm" for n in self.machine.order]
             names = [f"{n}_{unit}" for n, unit in zip(self.machine.order, units, strict=True)]
+            read = run.read
+            if run.shown is not None:
+                names += [f"read_back_{name}" for name in names]
+                read = np.concatenate((run.shown, run.read), 1)
             lines = [",".join([*names, *run.columns, *([run.which[0]] if run.which else [])])]
-            for k, (value, read) in enumerate(zip(run.values.tolist(), run.read.tolist(), strict=True)):
-                cells = [f"{number:.9g}" for number in (*value, *read)]
+            for k, row in enumerate(np.concatenate((run.values, read), 1).tolist()):
+                cells = [f"{number:.9g}" for number in row]
                 lines.append(",".join([*cells, *([run.which[1][k]] if run.which else [])]))
             file = run.table.split('"')[1]
             (self.folder / file).write_text("\n".join(lines) + "\n")
@@ -345,16 +351,29 @@ class Campaign:
             before += run.own
         return limit(np.concatenate(rows), np.concatenate(owns), self.spread)
 
-    def score(self) -> Score:
-        """The calibration of `olp calibrate fit` at other postures with a longer tool."""
-        fitted = olp.fit_joint_calibration(self.written(), self.folder / "machine.toml")
+    def judged(self) -> tuple[Array, Array, Any]:
+        """Other postures, a longer tool, and what it holds."""
+        return (
+            self.random_values(JUDGED),
+            self.tool * (1.0, 1.0, 1.6),
+            HELD if self.instrument == "payload" else None,
+        )
+
+    def off(self, fitted: olp.FittedJoints, values: Array, tool: Array, payload: Any) -> tuple[Array, Array]:
+        """(n, 3) mm by which the tip of a calibration is off in the best frame, and what it states."""
         target = self.folder / "calibration.toml"
         for path, data in fitted.files(target).items():
             path.write_bytes(data)
-        values, tool = self.random_values(JUDGED), self.tool * (1.0, 1.0, 1.6)
-        payload = HELD if self.instrument == "payload" else None
         true = self.tips(values, self.errors(self.theta), tool, payload)
         off = laid(self.tips(values, errors_of(target), tool, payload), true) - true
+        return off, fitted.fit.sigma_in_best_frame(values, tool)[0]
+
+    def score(self) -> Score:
+        """The calibration of `olp calibrate fit` at other postures with a longer tool."""
+        fitted = olp.fit_joint_calibration(self.written(), self.folder / "machine.toml")
+        values, tool, payload = self.judged()
+        true = self.tips(values, self.errors(self.theta), tool, payload)
+        off, stated = self.off(fitted, values, tool, payload)
 
         def tip(theta: Array) -> Array:
             return self.tips(values, self.errors(theta), tool, payload)
@@ -362,7 +381,6 @@ class Campaign:
         table = slopes(tip, self.theta, 0.01 * self.spread).reshape(JUDGED, 3, -1)
         table = without_frame(table, true)
         least = np.einsum("nik,kl,nil->ni", table, self.least(), table)
-        stated = fitted.fit.sigma_in_best_frame(values, tool)[0]
         return Score(
             1e3 * float(np.sqrt(np.mean(off**2))), 1e3 * float(np.sqrt(np.mean(least))),
             1e3 * float(np.sqrt(np.mean(stated**2))), float(np.sum(np.abs(off) < 2.0 * stated)), off.size,

@@ -17,19 +17,16 @@ from olp.calibration.diagnosis.factors import ARCSEC
 from olp.calibration.estimator.normal import Normal
 from olp.calibration.joints.adjustment import adjusted, block_of, starts_of
 from olp.calibration.joints.candidates import Unknown
+from olp.calibration.joints.deciding import AGREES, DECIDED, UNLIKELY, log_odds
 from olp.calibration.joints.findings import without_worst
 from olp.calibration.joints.mistakes import RIGHT, mistakes, row_mistakes, shown
 from olp.calibration.joints.readings import Reading
-from olp.calibration.joints.refinement import AGREES, spare_of
+from olp.calibration.joints.refinement import spare_of
 from olp.calibration.joints.unknowns import Model
 from olp.core.arrays import Array
 from olp.core.errors import CannotCompute, ConfigError
 from olp.core.values import dataclass
 
-#: Log of the odds at which something is decided.
-DECIDED = math.log(2000.0)
-#: Log of the prior odds of any one mistake.
-UNLIKELY = math.log(0.01)
 #: At most so many mistakes of numbers are put right.
 _MOST = 6
 #: Reduced chi-square of readings that a mistake explains.
@@ -121,7 +118,7 @@ def diagnose_joints(model: Model, stated: Array, readings: Sequence[Reading], us
         _about(model, readings)
     after = search.reduced
     count = len(chosen) + (told is not None)
-    odds = 0.5 * (first - search.score) / max(1.0, after) + UNLIKELY * count if count else 0.0
+    odds = log_odds(first, search.score, after, count) if count else 0.0
     return Diagnosis(
         tuple(search.numbers(chosen, max(1.0, after))),
         tuple(chosen),
@@ -178,7 +175,7 @@ def _of_readings(model: Model, readings: Sequence[Reading], first: float) -> _Me
     score, spare = _score(model, left)
     if (best is not None and best.reduced <= score / spare) or score > max(_EXPLAINED * spare, RIGHT * first):
         return best
-    named = ", ".join(row_mistakes(rows, readings))
+    named = ", ".join(words for words, _ in row_mistakes(rows, readings))
     lines = ", ".join(str(one.row) for one in sorted(rows.left_out, key=lambda one: one.row))
     words = named or f"single readings do not belong to their postures: lines {lines}"
     return _Mended(words, left, score, spare, not named)
@@ -280,7 +277,7 @@ class _Search:
             before, factors = self.score, self.factors.copy()
             self.factors[list(best.rows)] = best.factor
             self._look()
-            if 0.5 * (before - self.score) / max(1.0, self.reduced) + UNLIKELY < DECIDED:
+            if log_odds(before, self.score, self.reduced) < DECIDED:
                 self.factors = factors
                 self._look()
                 break

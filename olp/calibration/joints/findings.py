@@ -9,10 +9,12 @@ from pathlib import PurePath
 import numpy as np
 
 from olp.calibration.joints.adjustment import JointFit, LeftOut, adjusted, fit_joints, starts_of
+from olp.calibration.joints.deciding import AGREES, DECIDED, log_odds, odds_in_words
 from olp.calibration.joints.mistakes import RIGHT, mistakes, row_mistakes
 from olp.calibration.joints.readings import Reading
 from olp.calibration.joints.unknowns import Model
 from olp.core.errors import CannotCompute, ConfigError
+from olp.core.values import dataclass
 from olp.findings.catalogue import Finding
 
 #: Reduced chi-square above which the readings are not those of the machine.
@@ -44,17 +46,17 @@ def fit_or_refuse(model: Model, readings: Sequence[Reading]) -> JointFit:
     try:
         fit = fit_joints(model, readings)
     except CannotCompute as error:
-        causes = [words for words, _ in _mistake(model, readings, None)]
-        if not causes:
+        cause = _cause(model, readings, None)
+        if cause is None:
             raise
-        raise ConfigError(f"these readings are not those of this machine: {causes[0]}") from error
+        raise ConfigError(f"these readings are not those of this machine: {cause}") from error
     reduced = fit.chi_square / fit.freedom
     if reduced <= ABSURD:
         return fit
-    causes = [words for words, _ in _mistake(model, readings, reduced)]
+    cause = _cause(model, readings, fit)
     raise ConfigError(
         f"these readings are not those of this machine: reduced chi-square is {reduced:.3g}; expected about "
-        "1. " + (causes[0] if causes else "Check units, signs, directions of axes and tool vectors")
+        f"1. {cause or 'Check units, signs, directions of axes and tool vectors'}"
     )
 
 
@@ -73,19 +75,20 @@ def left_out_findings(fit: JointFit, code: str) -> Iterator[Finding]:
 
 def _findings(fit: JointFit, readings: Sequence[Reading]) -> Iterator[Finding]:
     yield from left_out_findings(fit, "OLP802")
-    for words in row_mistakes(fit, readings) if fit.left_out else ():
-        yield Finding("OLP810", words)
+    for words, odds in row_mistakes(fit, readings) if fit.left_out else ():
+        yield Finding("OLP810", f"{words} ({odds_in_words(odds)})")
     reduced = fit.chi_square / fit.freedom
-    if reduced > 1.0 + _MISFIT * np.sqrt(2.0 / fit.freedom):
+    misfit = reduced > 1.0 + _MISFIT * np.sqrt(2.0 / fit.freedom)
+    if misfit:
         yield Finding(
             "OLP808",
             f"reduced chi-square is {reduced:.3g}; expected about 1: the stated uncertainty covers this by a "
             f"factor of {np.sqrt(reduced):.3g}",
         )
-        for words, then in _mistake(fit.model, readings, reduced):
-            yield Finding(
-                "OLP810", f"{words}: then reduced chi-square is {then:.3g} instead of {reduced:.3g}"
-            )
+    if misfit or _strained(fit):
+        cause = _cause(fit.model, readings, fit)
+        if cause is not None:
+            yield Finding("OLP810", str(cause))
     held = [
         (unknown.name, sigma / unknown.prior)
         for unknown, sigma in zip(fit.model.unknowns, fit.sigma.tolist(), strict=True)
@@ -101,13 +104,43 @@ def _findings(fit: JointFit, readings: Sequence[Reading]) -> Iterator[Finding]:
         )
 
 
-def _mistake(model: Model, readings: Sequence[Reading], reduced: float | None) -> list[tuple[str, float]]:
-    """The one mistake with which the readings fit best, and reduced chi-square then; none where that stays
-    too large beside `reduced`, that of the readings as they are (None where they do not settle)."""
-    found = list[tuple[str, float]]()
+@dataclass(frozen=True, slots=True)
+class _Cause:
+    """A mistake that explains readings: reduced chi-square as they are (infinite where they do not settle)
+    and with it put right, and the log of its odds."""
+
+    words: str
+    before: float
+    after: float
+    odds: float
+
+    def __str__(self) -> str:
+        then = f"reduced chi-square {self.after:.3g}"
+        then += f" instead of {self.before:.3g}" if np.isfinite(self.before) else ""
+        return f"{self.words} ({odds_in_words(self.odds)}: {then})"
+
+
+def _score(fit: JointFit) -> float:
+    """Chi-square of readings and unknowns together."""
+    return fit.chi_square + float(fit.theta @ fit.model.precision @ fit.theta)
+
+
+def _strained(fit: JointFit) -> bool:
+    """Whether the unknowns are farther from what is usual than machines are."""
+    count = len(fit.theta)
+    return _score(fit) - fit.chi_square > count + _MISFIT * float(np.sqrt(2.0 * count))
+
+
+def _cause(model: Model, readings: Sequence[Reading], fit: JointFit | None) -> _Cause | None:
+    """The one mistake with which the readings fit best; none where that stays too large beside `fit`, that of
+    the readings as they are (None where they do not settle), or where its odds do not decide."""
+    before = np.inf if fit is None else fit.chi_square / fit.freedom
+    # with the rows that a fit leaves out put back, as those of a mistake are all used
+    stated = np.inf if fit is None else _score(fit) + sum(out.deviations**2 for out in fit.left_out)
+    found = list[_Cause]()
     # errors of a machine are small beside most mistakes: what is far from the nominal one is not the cause
     worst = _WORSE * _nominal(model, readings)
-    for what, mended, share in mistakes(model.structure, readings):
+    for words, mended, share in mistakes(model.structure, readings):
         if _nominal(model, mended) > worst:
             continue
         try:
@@ -115,11 +148,13 @@ def _mistake(model: Model, readings: Sequence[Reading], reduced: float | None) -
         except (CannotCompute, ConfigError):
             continue
         then = other.chi_square / other.freedom
-        if then < (_PLAUSIBLE if reduced is None else share * reduced):
-            found.append((what, then))
+        odds = log_odds(stated, _score(other), then)
+        explains = then < (_PLAUSIBLE if fit is None else max(AGREES, share * before))
+        if explains and odds > DECIDED:
+            found.append(_Cause(words, before, then, odds))
     if found:
-        return [min(found, key=lambda one: one[1])]
-    return list(_worst_rows(model, readings, _PLAUSIBLE if reduced is None else RIGHT * reduced))
+        return min(found, key=lambda one: one.after)
+    return _worst_rows(model, readings, before, stated)
 
 
 def _nominal(model: Model, readings: Sequence[Reading]) -> float:
@@ -130,18 +165,18 @@ def _nominal(model: Model, readings: Sequence[Reading]) -> float:
         return np.inf
 
 
-def _worst_rows(model: Model, readings: Sequence[Reading], below: float) -> Iterator[tuple[str, float]]:
-    """Single readings without which the others fit: what they are, and reduced chi-square without them."""
-    fit = without_worst(model, readings, below)
+def _worst_rows(model: Model, readings: Sequence[Reading], before: float, stated: float) -> _Cause | None:
+    """Single readings without which the others fit: what they are, and reduced chi-square without them.
+    `before` and `stated` are reduced chi-square and the score with them."""
+    fit = without_worst(model, readings, RIGHT * before if np.isfinite(before) else _PLAUSIBLE)
     if fit is None:
-        return
-    reduced = fit.chi_square / fit.freedom
-    told = list(row_mistakes(fit, readings))
-    if told:
-        yield ", ".join(told[:_NAMED]), reduced
-        return
+        return None
+    told = [words for words, _ in row_mistakes(fit, readings)]
     lines = ", ".join(f"{PurePath(one.source).name} line {one.row}" for one in fit.left_out)
-    yield f"single readings do not belong to their postures: {lines}", reduced
+    words = ", ".join(told[:_NAMED]) or f"single readings do not belong to their postures: {lines}"
+    reduced = fit.chi_square / fit.freedom
+    odds = log_odds(stated, _score(fit), reduced, len(fit.left_out))
+    return _Cause(words, before, reduced, odds) if odds > DECIDED else None
 
 
 def without_worst(model: Model, readings: Sequence[Reading], below: float) -> JointFit | None:

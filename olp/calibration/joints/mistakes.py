@@ -10,8 +10,10 @@ from pathlib import PurePath
 import numpy as np
 
 from olp.calibration.joints.adjustment import OUTLIER, JointFit, starts_of
+from olp.calibration.joints.deciding import log_odds
 from olp.calibration.joints.readings import Ball, Lengths, Points, Reading, SixD, Start
 from olp.core.arrays import Array
+from olp.kinematics.errors import Payload
 from olp.kinematics.poses import Poses
 from olp.kinematics.structure import Structure
 
@@ -40,10 +42,26 @@ def mistakes(structure: Structure, readings: Sequence[Reading]) -> Iterator[Mend
         yield words, changed, RIGHT
     if any(one.read_back is not None for one in readings):
         yield "commanded values and those read back are in each other's columns", shown(readings), _EITHER
+    yield from _of_payload(readings)
     for index, reading in enumerate(readings):
         name = PurePath(reading.source).name
         for words, mended in (*_of_rows(reading), *_of_names(reading), *_of_instrument(reading)):
             yield f"{name}: {words}", [*readings[:index], mended, *readings[index + 1 :]], RIGHT
+
+
+def _of_payload(readings: Sequence[Reading]) -> Iterator[Mended]:
+    """A payload that a plan forgets, states where it was not, or takes for that of other readings."""
+    held = {one.payload: PurePath(one.source).name for one in reversed(readings) if one.payload.kg}
+    for index, reading in enumerate(readings):
+        name, own = PurePath(reading.source).name, reading.payload
+        others = [(f"the payload of {other} was on in these readings", load) for load, other in held.items()]
+        if own.kg:
+            others = [(f"the payload was that of {other}", load) for load, other in held.items()]
+            others.append((f"the payload of {own.kg:g} kg was not on in these readings", Payload()))
+        for words, load in others:
+            if load != own:
+                mended = replace(reading, payload=load)
+                yield f"{name}: {words}", [*readings[:index], mended, *readings[index + 1 :]], RIGHT
 
 
 def shown(readings: Sequence[Reading]) -> list[Reading]:
@@ -125,39 +143,56 @@ def _of_instrument(reading: Reading) -> Iterator[tuple[str, Reading]]:
         yield words, mended
 
 
-def row_mistakes(fit: JointFit, readings: Sequence[Reading]) -> Iterator[str]:
-    """What readings that a fit left out are, where that is plain: two exchanged ones, or one of another nest,
-    ball or centre."""
-    starts = starts_of(fit.model, readings)
-    near = OUTLIER * max(1.0, float(np.sqrt(fit.chi_square / fit.freedom)))
+def row_mistakes(fit: JointFit, readings: Sequence[Reading]) -> Iterator[tuple[str, float]]:
+    """What readings that a fit left out are, where that is plain, with the log of its odds: two exchanged
+    ones, or one of another nest, ball or centre."""
+    starts, reduced = starts_of(fit.model, readings), fit.chi_square / fit.freedom
+    near = OUTLIER * max(1.0, float(np.sqrt(reduced)))
     for start, source in zip(starts, fit.sources, strict=True):
         reading = start.reading
         name = PurePath(reading.source).name
         lines = [one.row for one in fit.left_out if one.source == reading.source][:_PAIRED]
-        rows = np.flatnonzero(np.isin(reading.row, lines))
+        rows: list[int] = np.flatnonzero(np.isin(reading.row, lines)).tolist()
         pose = fit.model.machine(fit.theta, reading.payload).actual(reading.values)
 
         def away(one: Start, pose: Poses = pose, own: Array = source.own) -> Array:
             return np.asarray(one.predicted(pose, own)[:, :3])
 
         sigma, read, predicted = start.sigma[:3], start.measured[:, :3], away(start)
+
+        def better(
+            rows: list[int],
+            other: Array,
+            sigma: Array = sigma,
+            read: Array = read,
+            predicted: Array = predicted,
+        ) -> float | None:
+            """The log of the odds that rows are read as predicted otherwise; None where they are not."""
+            then = (read[rows] - other[rows]) / sigma
+            if np.abs(then).max() >= near:
+                return None
+            now = (read[rows] - predicted[rows]) / sigma
+            return log_odds(float(np.sum(now**2)), float(np.sum(then**2)), reduced)
+
         for k, a in enumerate(rows):
             for b in rows[:k]:
                 both, lines_of_both = [a, b], f"of lines {reading.row[b]} and {reading.row[a]} are exchanged"
-                if np.any(read) and (np.abs(read[both] - predicted[both[::-1]]) / sigma).max() < near:
-                    yield f"{name}: the readings {lines_of_both}"
-                    continue
                 order = np.arange(reading.count)
                 order[both] = both[::-1]
+                odds = better(both, predicted[order]) if np.any(read) else None
+                if odds is not None:
+                    yield f"{name}: the readings {lines_of_both}", odds
+                    continue
                 other = replace(start, **{column: getattr(start, column)[order] for column in start.columns})
-                swapped = away(other, Poses(pose.rotation[order], pose.position[order]))
-                if (np.abs(read[both] - swapped[both]) / sigma).max() < near:
-                    yield f"{name}: the postures {lines_of_both}"
+                odds = better(both, away(other, Poses(pose.rotation[order], pose.position[order])))
+                if odds is not None:
+                    yield f"{name}: the postures {lines_of_both}", odds
             for index in range(len(reading.names)):
                 which = np.where(np.arange(reading.count) == a, index, reading.which)
-                moved = away(replace(start, reading=replace(reading, which=which)))
-                if index != reading.which[a] and (np.abs(read[a] - moved[a]) / sigma).max() < near:
+                odds = better([a], away(replace(start, reading=replace(reading, which=which))))
+                if index != reading.which[a] and odds is not None:
                     yield (
                         f"{name}: line {reading.row[a]} is of {reading.names[index]}, not of "
-                        f"{reading.names[reading.which[a]]}"
+                        f"{reading.names[reading.which[a]]}",
+                        odds,
                     )

@@ -15,8 +15,6 @@ from olp.core.arrays import Array
 from olp.core.errors import CannotCompute
 from olp.core.values import dataclass
 
-#: New readings agree with a calibration where their reduced chi-square is at most this.
-AGREES = 1.5
 #: Years ahead that are looked at most.
 MOST_YEARS = 100.0
 

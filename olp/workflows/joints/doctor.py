@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from olp.calibration.diagnosis.factors import CHANGE
+from olp.calibration.joints.deciding import odds_in_words
 from olp.calibration.joints.doctor import Diagnosis, Sign, diagnose_joints
 from olp.calibration.joints.unknowns import Model, model_of
 from olp.core.errors import ConfigError
@@ -37,8 +38,6 @@ _SHARE = 0.02
 _DECIMALS = 3
 #: Reduced chi-square above which nothing explains the readings.
 _MISFIT = 4.0
-#: Powers of ten above which odds are not stated.
-_BEYOND = 300
 #: At most so many names are listed.
 _NAMED = 6
 #: The code of a decided mistake by what it is.
@@ -175,11 +174,10 @@ def _rounded(value: float) -> float | None:
 
 
 def _findings(diagnosis: Diagnosis) -> Iterator[Finding]:
-    power = diagnosis.odds / math.log(10.0)
-    odds = f"odds 10^{power:.0f} to 1" if power < _BEYOND else f"odds above 10^{_BEYOND} to 1"
-    then = f"reduced chi-square {diagnosis.after:.3g} instead of {diagnosis.before:.3g}"
-    if math.isinf(diagnosis.before):
-        odds, then = "as stated the readings settle nowhere", f"reduced chi-square {diagnosis.after:.3g}"
+    odds = odds_in_words(math.inf if math.isinf(diagnosis.before) else diagnosis.odds)
+    then = f"reduced chi-square {diagnosis.after:.3g}"
+    if math.isfinite(diagnosis.before):
+        then += f" instead of {diagnosis.before:.3g}"
     for mistake in diagnosis.mistakes:
         yield Finding(_CODES[mistake.sign], f"{mistake.words} ({odds}: {then})")
     if diagnosis.of_readings:

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from olp.calibration.joints.adjustment import JointFit
+from olp.calibration.joints.deciding import AGREES
 from olp.calibration.joints.findings import left_out_findings
-from olp.calibration.joints.refinement import AGREES, Refined, refine_joints, years_until
+from olp.calibration.joints.refinement import Refined, refine_joints, years_until
 from olp.calibration.joints.unknowns import Model
 from olp.core.arrays import Array
 from olp.core.errors import ConfigError

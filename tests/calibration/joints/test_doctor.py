@@ -11,7 +11,8 @@ import pytest
 from calibration.joints.simulated import known_machine, read
 
 from olp.calibration.joints.adjustment import JointFit
-from olp.calibration.joints.doctor import DECIDED, Diagnosis, diagnose_joints
+from olp.calibration.joints.deciding import DECIDED
+from olp.calibration.joints.doctor import Diagnosis, diagnose_joints
 from olp.calibration.joints.findings import fit_or_refuse, joint_findings
 from olp.calibration.joints.readings import Points, Reading
 from olp.calibration.joints.unknowns import Model

@@ -7,7 +7,8 @@ import pytest
 from calibration.joints.simulated import known_machine, read, true_machine
 
 from olp.calibration.joints.adjustment import JointFit, fit_joints
-from olp.calibration.joints.refinement import AGREES, refine_joints, years_until
+from olp.calibration.joints.deciding import AGREES
+from olp.calibration.joints.refinement import refine_joints, years_until
 from olp.calibration.joints.unknowns import Model
 from olp.core.arrays import Array
 from olp.core.errors import CannotCompute

@@ -15,6 +15,7 @@ from kinematics.cases import GOLDEN, golden, need_golden, random_values
 from olp.calibration.joints.adjustment import JointFit, fit_joints
 from olp.calibration.joints.candidates import Priors
 from olp.calibration.joints.findings import joint_findings
+from olp.calibration.joints.mistakes import mistakes
 from olp.calibration.joints.readings import Points
 from olp.calibration.joints.unknowns import model_of
 from olp.core.arrays import Array
@@ -103,6 +104,39 @@ def test_with_noise_the_stated_uncertainty_covers_and_what_is_open_is_named() ->
     assert len(named) == 1
     assert "J2.own_urad_Nm" in named[0]
     assert "J3.own_urad_Nm" in named[0]
+
+
+@pytest.mark.slow
+def test_a_payload_that_the_plan_forgets_is_told_with_odds() -> None:
+    structure, values = arm(), random_values(golden("arm_6r_kr6")[0], 40, 5)
+    model = model_of(structure, values, Priors.of(structure), yielding=["J2", "J3"])
+    stated = replace(model, base=MachineErrors(gravity=(Gravity("J2", ("J2",), 1e-4, 2e-4),)))
+    pose = stated.machine(np.append(np.zeros(len(model.unknowns) - 2), (2e-6, 4e-6)), LOAD).actual(values)
+    at = pose.at(np.array(TOOL)) @ TURN.T + SHIFT
+    at = at + SIGMA * np.random.default_rng(2).normal(size=at.shape)
+    right = replace(readings(structure, values, LOAD, 0.0), measured_mm=at, which=np.zeros(40, int))
+    order = np.arange(40) % 2 == 1
+    parts = [replace(right, **{k: getattr(right, k)[rows] for k in ("values", "row", "which", "measured_mm")})
+             for rows in (order, ~order)]  # fmt: skip
+    forgotten = replace(parts[1], source="other.csv", payload=Payload())
+    wrong = [parts[0], forgotten]
+    told = [one for one in joint_findings(fit_joints(stated, wrong), wrong) if one.code == "OLP810"]
+    assert len(told) == 1
+    words = "other.csv: the payload of 6 kg.csv was on in these readings (odds 10^"
+    assert told[0].message.startswith(words)
+    assert not [one for one in joint_findings(fit_joints(stated, parts), parts) if one.code == "OLP810"]
+
+
+def test_payloads_may_be_those_of_other_readings_or_none() -> None:
+    values = np.zeros((4, 6))
+    same = {"values": values, "row": np.arange(4), "tool_mm": TOOL, "sigma": SIGMA, "names": ("1",)}
+    two = [Points("a.csv", **same, which=np.zeros(4, int), payload=load) for load in (LOAD, Payload(2.0))]
+    said = {words: [one.payload for one in mended] for words, mended, _ in mistakes(arm(), two)}
+    assert said["a.csv: the payload of 6 kg was not on in these readings"] == [Payload(), Payload(2.0)]
+    assert said["a.csv: the payload of 2 kg was not on in these readings"] == [LOAD, Payload()]
+    assert not any(
+        "payload" in words for words, _, _ in mistakes(arm(), [replace(two[0], payload=Payload())])
+    )
 
 
 def test_gravity_of_known_masses_is_their_elasticity() -> None:
