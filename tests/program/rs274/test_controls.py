@@ -460,6 +460,21 @@ def test_calls_and_saved_modes_say_how_to_unroll_them(word: str, why: str, setup
     assert f"{word} {why}" in got
 
 
+@pytest.mark.parametrize("control", [MACH4, FANUC, HAAS, MAZAK, SIEMENS])
+def test_codes_that_save_modes_on_linuxcnc_are_those_of_the_builder(
+    control: str, setups: dict[str, Setup]
+) -> None:
+    """No position is known behind them, unless the machine file states that they move no axis."""
+    setup, profile = setups[control], DIALECTS[control]
+    assert isinstance(profile, Profile)
+    for word in ("M70", "M71", "M72", "M73"):
+        text = f"G0 X1. Y2. Z3.\n{word}\nG0 X5."
+        x, y, z = outcome(text, setup, profile)
+        assert (x, y == y, z == z) == (5.0, False, False)
+        machine_ = replace(setup.machine, still_m_codes=frozenset({int(word[1:])}))
+        assert outcome(text, replace(setup, machine=machine_), profile) == (5, 2, 3)
+
+
 #: M codes that move no axis, by the manuals of the controls.
 HARMLESS = {
     LINUXCNC: "0-5 7-9 19 30 48-53 62-68",

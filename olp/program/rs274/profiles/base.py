@@ -404,9 +404,13 @@ def g_codes(*, unchanged: set[int], extra: dict[int, Act], without: Set[int] = f
 
 #: M codes that are refused, ten times their number, and what they do.
 M_REFUSALS: Mapping[int, str] = {
-    700: "saves modal codes", 710: "forgets saved modal codes", 720: "restores modal codes",
-    730: "saves modal codes", 960: "branches", 970: "calls a subprogram", 980: "calls a subprogram",
+    960: "branches", 970: "calls a subprogram", 980: "calls a subprogram",
     990: "repeats the program, which M30 would end",
+}  # fmt: skip
+#: The same of controls that save modes; elsewhere these codes are those of the machine's builder.
+NGC_M_REFUSALS: Mapping[int, str] = {
+    **M_REFUSALS, 700: "saves modal codes", 710: "forgets saved modal codes", 720: "restores modal codes",
+    730: "saves modal codes",
 }  # fmt: skip
 #: What an alias leads to where the control does not have the code.
 NO_CODE = -1

@@ -10,7 +10,7 @@ from olp.program.rs274.codes import CYCLES
 from olp.program.rs274.cycle_rules import NGC_CYCLES
 from olp.program.rs274.entry import keep_blocks, read_blocks, touching_blocks, unroll_blocks
 from olp.program.rs274.flatten.language import PLAIN_NGC
-from olp.program.rs274.profiles.base import ISO_M, REFUSALS, Act, Profile, g_codes
+from olp.program.rs274.profiles.base import ISO_M, NGC_M_REFUSALS, REFUSALS, Act, Profile, g_codes
 
 _EXTRA = {400: Act.UNCHANGED, 431: Act.EVENT, 911: Act.ARC_DISTANCE, 921: Act.EVENT, 611: Act.REFUSE}
 _LACKING = {
@@ -31,6 +31,7 @@ DIALECT = Profile(
     codes=g_codes(unchanged=set(), extra=_EXTRA, without=_LACKING),
     refusals=REFUSALS,
     harmless_m=ISO_M | {56},
+    m_refusals=NGC_M_REFUSALS,
     motion=0,
     initial_retract=990,
     g10_active=True,

@@ -9,7 +9,15 @@ from olp.program.rs274.codes import THREAD
 from olp.program.rs274.cycle_rules import NGC_CYCLES
 from olp.program.rs274.entry import keep_blocks, read_blocks, touching_blocks, unroll_blocks
 from olp.program.rs274.flatten.language import NGC
-from olp.program.rs274.profiles.base import ARC_DISTANCE, ISO_M, REFUSALS, Act, Profile, g_codes
+from olp.program.rs274.profiles.base import (
+    ARC_DISTANCE,
+    ISO_M,
+    NGC_M_REFUSALS,
+    REFUSALS,
+    Act,
+    Profile,
+    g_codes,
+)
 from olp.program.text.line_ends import STRAY_CR
 
 _EVENTS = dict.fromkeys((431, 432, 591, 592, 593, 611, 921, 922, 923), Act.EVENT)
@@ -26,6 +34,7 @@ DIALECT = Profile(
     codes=g_codes(unchanged={80}, extra={**_EVENTS, **ARC_DISTANCE, THREAD: Act.MOTION}),
     refusals=REFUSALS,
     harmless_m=ISO_M | {50, 51, 52, 53} | frozenset(range(62, 69)),
+    m_refusals=NGC_M_REFUSALS,
     initial_retract=990,
     g52_is_g92=True,
     g10_offsets=9,
