@@ -58,7 +58,7 @@ def check_tool(state: _State, kind: int, number: int, stated: Mapping[str, float
         a for a, mm in stated.items() if not any(abs(mm - own) < _SAME_MM for own in _own(tool, kind, a))
     ]
     if wrong or not (entry or state.absolute):
-        keys = ", ".join("radius_mm" if a == "R" else f"{a}_mm" for a in wrong) if entry else _KEYS[kind]
+        keys = ", ".join(_entry(tool, a, stated[a]) for a in wrong) if entry else _KEYS[kind]
         raise ProgramError(
             f"G10 L{kind} writes {_WRITTEN[kind]} of tool {number} that is not the one of the machine file; "
             f"give {keys} in [tools.{number}] as the program writes it"
@@ -67,6 +67,12 @@ def check_tool(state: _State, kind: int, number: int, stated: Mapping[str, float
             line=line,
             code="OLP526",
         )
+
+
+def _entry(tool: Tool, letter: str, mm: float) -> str:
+    """The key of the tool's table that a word writes, with the value that it writes."""
+    key, value = ("radius_mm", mm - tool.wear_mm) if letter == "R" else (f"{letter}_mm", mm)
+    return f"{key} = {round(value, 9):.9g}"
 
 
 def _own(tool: Tool, kind: int, letter: str) -> list[float]:

@@ -423,7 +423,7 @@ REFUSED: dict[tuple[str, str], dict[str, object]] = {
     ("linuxcnc", "G43 H1\nG20\nG10 L2 P1 X1"): {"why": MIXED, "code": "OLP518", "line": 5},
     ("linuxcnc", "G10 L1 P1 X5"): {
         "why": "G10 L1 writes lengths or the radius of tool 1 that is not the one of the machine file; give "
-        "X_mm in [tools.1] as the program writes it",
+        "X_mm = 5 in [tools.1] as the program writes it",
         "code": "OLP526",
     },
     ("linuxcnc", "G10 P1 X5"): {
