@@ -34,7 +34,7 @@ Travel = tuple[tuple[str, float, float], ...]
 @click.option(
     "--trafo",
     metavar="FILE",
-    help="Kinematics of a control: a HAL file of LinuxCNC, or vectors of a Sinumerik ($TC_CARR or "
+    help="Kinematics of a control: a HAL or INI file of LinuxCNC, or vectors of a Sinumerik ($TC_CARR or "
     "$MC_TRAFO5). Write the machine file alone.",
 )
 @click.option("--name", help="Name of the machine. Default: that in FILE, or the folder's name.")

@@ -159,6 +159,16 @@ REFUSED = [
     ("m.hal", "loadrt 5axiskins\n", "sets no 5axiskins.pivot-length"),
     ("m.hal", "setp 5axiskins.pivot-length [KINS]PIVOT\n", "expected a number"),
     ("m.hal", "loadrt genhexkins\nsetp genhexkins.screw-lead 2\n", "screw-lead"),
+    ("m.hal", "loadrt xyzac-trt-kins\nsetp xyzac-trt-kins.conventional-directions 1\n", "which is not read"),
+    ("m.hal", "loadrt xyzac-trt-kins\nnet :y  table.y => xyzac-trt-kins.y-offset\n", "follows the signal :y"),
+    ("m.hal", "[KINS]\nKINEMATICS = pumakins\n[TRAJ]\nLINEAR_UNITS = inch\n", "LINEAR_UNITS = inch"),
+    ("m.hal", "[KINS]\nKINEMATICS = pumakins\n[HAL]\nHALFILE = more.tcl\n", "runs more.tcl"),
+    ("m.hal", "[KINS]\nKINEMATICS = pumakins\n[HAL]\nHALFILE = more.hal\n", "no such file"),
+    (
+        "m.hal",
+        "[KINS]\nKINEMATICS = 5axiskins\n[HAL]\nHALCMD = setp 5axiskins.pivot-length [A]P\n",
+        "does not state",
+    ),
     ("m.csv", "a_mm,alpha_deg,d_mm\n0,0,0\n", "the column theta0_deg is missing"),
     ("m.csv", "a_mm,alpha_deg,d_mm,theta0_deg\n0,x,0,0\n", 'alpha_deg = "x"'),
     ("m.csv", "a_mm,alpha_deg,d_mm,theta0_deg\n", "holds no joints"),
@@ -174,6 +184,31 @@ def test_what_is_refused(file: str, text: str, words: str, tmp_path: Path) -> No
     assert code == 3
     assert words in said
     assert not (tmp_path / "m").exists()
+
+
+def test_an_ini_file_becomes_the_machine_of_its_hal_files(tmp_path: Path) -> None:
+    """The same numbers by setp in one HAL file, and as configurations of LinuxCNC have them: by signals, by
+    names of the INI file, and in another file."""
+    (tmp_path / "one.hal").write_text(
+        "loadrt xyzac-trt-kins\nsetp xyzac-trt-kins.y-offset 20\nsetp xyzac-trt-kins.z-offset 10\n"
+        "setp xyzac-trt-kins.x-rot-point -3.5\n"
+    )
+    (tmp_path / "more.hal").write_text(
+        "# geometry\nsetp xyzac-trt-kins.x-rot-point [TABLE]X_ROT  # beside\nsets :z 10\n"
+    )
+    (tmp_path / "mill.ini").write_text(
+        "[KINS]\n  KINEMATICS = xyzac-trt-kins sparm=identityfirst\n JOINTS = 5\n[TABLE]\nX_ROT = -3.5 ; mm\n"
+        "[HAL]\nHALFILE = LIB:basic_sim.tcl\n#HALFILE = none.hal\nHALFILE = more.hal\n"
+        "HALCMD = net :y xyzac-trt-kins.y-offset gui.y\nHALCMD = net :z gui.z => xyzac-trt-kins.z-offset\n"
+        "HALCMD = net :tool motion.tooloffset.z xyzac-trt-kins.tool-offset\nHALCMD = sets :y 20\n"
+        "[TRAJ]\nLINEAR_UNITS = mm\n"
+    )
+    made = []
+    for file in ("one.hal", "mill.ini"):
+        code, said = run("init", tmp_path / "mill", "--trafo", tmp_path / file, "--force")
+        assert code == 0, said
+        made.append((tmp_path / "mill" / "machine.toml").read_text())
+    assert made[0] == made[1] and "point_mm = [-3.5, 20.0, 10.0]" in made[0]
 
 
 def test_one_description_is_wanted(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""A machine file from a HAL file of LinuxCNC: the kinematics module that it loads, and its parameters.
+"""A machine file from a HAL or INI file of LinuxCNC: the kinematics module that it loads, and its parameters.
 
 Source: the man pages kins(9), genhexkins(9) and others of LinuxCNC 2.9, and its modules, which judge this.
 Lengths are in machine units, taken as mm.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
 
 from olp.core.errors import InputError
@@ -26,13 +26,19 @@ from olp.files.kinematics.families import (
     scara,
     with_turns,
 )
+from olp.files.kinematics.hal_commands import Command, hal_commands
 from olp.files.kinematics.written import WIDE_DEG, WIDE_MM, Parts, Written, machine_file
-from olp.files.write import PathLike, read_bytes
+from olp.files.write import PathLike
 
 #: Whole lengths of legs that are taken as travel where nothing states it, mm.
 _LEG_MM = (1.0, 1e4)
 #: The foot of rods from the centre of the platform: lineardeltakins knows the difference of radii alone, mm.
 _FOOT_MM = 60.0
+
+#: Pins that are no dimension of a machine: the tool, and how a pose is computed.
+_IDLE = {
+    "tool-offset", "convergence-criterion", "limit-iterations", "max-error", "max-iterations",
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,9 +48,11 @@ class Pins:
     file: str
     module: str
     values: Mapping[str, tuple[float, int]] = field(default_factory=dict)
+    asked: set[str] = field(default_factory=set)
 
     def __call__(self, pin: str, default: float | None = None) -> float:
         """The value of a pin. Raises InputError where the file does not set it."""
+        self.asked.add(pin)
         if pin in self.values:
             return self.values[pin][0]
         if default is None:
@@ -54,6 +62,17 @@ class Pins:
                 file=self.file,
             )
         return default
+
+    def refuse_unread(self) -> None:
+        """Raises InputError for a pin that is set and has no part in the machine file, unless it is 0: it may
+        turn an axis round, or move one."""
+        for pin, (value, line) in self.values.items():
+            if value and pin not in self.asked and pin not in _IDLE:
+                raise InputError(
+                    f"sets {self.module}.{pin} = {value:g}, which is not read; describe the machine by hand "
+                    "where it matters, or leave it out",
+                    file=self.file, line=line,
+                )  # fmt: skip
 
     def vector(self, stem: str) -> Vector:
         return (self(f"{stem}.x"), self(f"{stem}.y"), self(f"{stem}.z"))
@@ -131,30 +150,49 @@ MODULES: Mapping[str, Callable[[Pins], Parts]] = {
 
 
 def machine_of_hal(path: PathLike, name: str, controller: str | None = None) -> Written:
-    """The machine file of the kinematics that a HAL file loads and sets. Raises InputError where the file
-    cannot be read, loads none that is known, or leaves a dimension out."""
-    pins = _read(read_bytes(path).decode("utf-8", "replace"), str(path))
+    """The machine file of the kinematics that a HAL file, or an INI file with the HAL files that it names,
+    loads and sets. Raises InputError where a file cannot be read, none that is known is loaded, a dimension
+    is left out, or a pin is set that is not read."""
+    pins = _read(hal_commands(path), str(path))
     parts = MODULES[pins.module](pins)
+    pins.refuse_unread()
     notes = [
         f"{pins.module}: lengths are taken as mm",
-        f"A HAL file states no travel; {WIDE_MM[0]:g} to {WIDE_MM[1]:g} mm and {WIDE_DEG[0]:g} to "
+        f"Travel is not read; {WIDE_MM[0]:g} to {WIDE_MM[1]:g} mm and {WIDE_DEG[0]:g} to "
         f"{WIDE_DEG[1]:g} deg or wider are written: put those of the INI file there",
     ]
     return machine_file(parts, name, controller or "linuxcnc", notes)
 
 
-def _read(text: str, file: str) -> Pins:
-    loaded: dict[str, int] = {}
+def _read(commands: Sequence[Command], file: str) -> Pins:
+    loaded: dict[str, None] = {}
     values: dict[str, dict[str, tuple[float, int]]] = {module: {} for module in MODULES}
-    for line, statement in enumerate(text.splitlines(), 1):
-        words = statement.partition("#")[0].split()
+    signals: dict[str, Command] = {}
+    wired: dict[tuple[str, str], Command] = {}
+    for command in commands:
+        words = command.words
         if len(words) >= 2 and words[0] == "loadrt" and words[1] in MODULES:
-            loaded.setdefault(words[1], line)
-        if len(words) < 3 or words[0] != "setp":
-            continue
-        module, _, pin = words[1].partition(".")
-        if module in MODULES:
-            values[module][pin] = (_number(words[1], words[2], file, line), line)
+            loaded[words[1]] = None
+        elif len(words) >= 3 and words[0] == "sets":
+            signals[words[1]] = command
+        elif len(words) >= 3 and words[0] == "net":
+            for module, pin in (word.split(".", 1) for word in words[2:] if "." in word):
+                if module in MODULES:
+                    wired[module, pin] = command
+        elif len(words) >= 3 and words[0] == "setp":
+            module, _, pin = words[1].partition(".")
+            if module in MODULES:
+                values[module][pin] = (_number(words[1], words[2], command), command.line)
+    for (module, pin), command in wired.items():
+        signal = signals.get(command.words[1])
+        if signal is not None:
+            values[module][pin] = (_number(command.words[1], signal.words[2], signal), signal.line)
+        elif pin not in _IDLE:
+            raise InputError(
+                f"{module}.{pin} follows the signal {command.words[1]}, whose value is not stated; state it "
+                "with sets or setp",
+                file=command.file, line=command.line,
+            )  # fmt: skip
     named = list(dict.fromkeys([*loaded, *(module for module, pins in values.items() if pins)]))
     if len(named) != 1:
         found = f"loads {len(named)} of them ({', '.join(named)})" if named else "loads none of them"
@@ -162,13 +200,14 @@ def _read(text: str, file: str) -> Pins:
     return Pins(file, named[0], values[named[0]])
 
 
-def _number(pin: str, text: str, file: str, line: int) -> float:
+def _number(pin: str, text: str, command: Command) -> float:
     try:
         value = float(text) if not re.search(r"[^-+.\deE]", text) else math.nan
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
         raise InputError(
-            f"setp {pin} {text}: expected a number; put the value there that it has", file=file, line=line
-        )
+            f"{command.words[0]} {pin} {text}: expected a number; put the value there that it has",
+            file=command.file, line=command.line,
+        )  # fmt: skip
     return value
