@@ -267,6 +267,13 @@ class OffsetState(State):
 
         if "L" not in by_letter and "P" in by_letter and by_letter["P"].value in self.profile.g10_clearances:
             return
+        if not self.profile.g10_offsets:
+            raise ProgramError(
+                "G10 writes tables of the control, which is not read; give what it writes in the machine or "
+                "job file, and take it out",
+                line=line,
+                code="OLP526",
+            )
         kind = round(by_letter["L"].value) if "L" in by_letter else -1
         stated = {a: self.length_mm(by_letter[a]) for a in words_of_tool(self, kind) if a in by_letter}
         if stated and "P" in by_letter:

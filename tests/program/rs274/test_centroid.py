@@ -117,7 +117,8 @@ def test_m25_leaves_z_at_home_and_the_others_where_they_are(setup: Setup) -> Non
 @pytest.mark.parametrize(
     "block",
     ["G92 X0.", "G41 D1 X5.", "G51 X0. Y0. P3", "G68 R45.", "G65 P1 A2.", "M98 P9100", "G29", "M26",
-     "G10 P81 R39"],
+     "G10 P81 R39",
+     "G10 L2 P1 X1.", "G10 L20 P1 X0.", "G10 H5 R1.", "G54 P1"],
 )  # fmt: skip
 def test_what_the_manual_leaves_open_is_refused_with_its_line(setup: Setup, block: str) -> None:
     line, message = refusal(f"G21 G90\nG0 X0. Y0. Z50.\n{block}\nM30\n", setup)

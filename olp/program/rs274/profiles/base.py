@@ -80,8 +80,9 @@ class Profile(Dialect):
       machine file states as `arc_centres`.
     - `increments_without_point`: X100 means 100 least increments, not 100 mm. `feed_without_point`: F100 is
       100 mm/min all the same.
-    - `g52_is_g92`: G52 writes the same offset as G92. `g10_offsets`: the largest P of G10 L2 and L20.
-      `g10_adds`: in G91 G10 L2 adds to the offset; None is not known, and refused. `g10_stores`: G10 L20
+    - `g52_is_g92`: G52 writes the same offset as G92. `g10_offsets`: the largest P of G10 L2 and L20, 0 where
+      it writes no work offset. `g10_adds`: in G91 G10 L2 adds to the offset; None is not known, and refused.
+      `g10_stores`: G10 L20
       stores the present position, else it writes the offset G54.1 P. `g10_tools`: the L with which G10
       writes the tables of tools. `g10_active`: P0 is the offset in force, else one that is added to all.
       `further_offsets` name the offsets that G10 L20 writes, with P; `first_further` is the code of P1,

@@ -60,8 +60,8 @@ DIALECT = replace(
     dwell_words="PX",
     length_awaits_number=True,
     g10_clearances=frozenset({73, 83}),
+    g10_offsets=0,
     offset_words={},
-    further_offsets=(),
     # a comment that is shown begins with a colon
     inert=pattern(rb"[ \t]*:[^\r\n]*"),
     cycles=replace(ISO_CYCLES, repeat_words="", stores=False, new_code_forgets=True),
