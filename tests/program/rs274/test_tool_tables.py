@@ -59,7 +59,7 @@ def test_what_the_file_says_may_be_written_and_nothing_else(
         ("L1 P1 X0 Z80.25 R3.97", ""),  # with the wear, which is in the table there
         ("G91 L1 P1 Z80.25", ""),
         ("G20 L1 P1 Z3.1594 R.1563", ""),
-        ("L1 P1 Z80.2 X.5 R4", r"give X_mm = 0\.5, Z_mm = 80\.2, radius_mm = 4\.03 in \[tools\.1\] as the program writes it$"),
+        ("L1 P1 Z80.2 X.5 R4", r"give X_mm = 0\.5, Z_mm = 80\.2, radius_mm = 4\.03 in \[tools\.1\] as the"),
         ("L1 P2 Z50 R4", "give radius_mm = 4 in"),
         ("L1 P7 Z0", r"writes lengths or the radius of tool 7, which is not defined; give \[tools\.7\]"),
         ("L1 P1", "writes tables of the control"),
