@@ -87,6 +87,11 @@ class JointFit:
         """(k,) standard deviations of the unknowns."""
         return np.sqrt(np.diag(self.covariance))
 
+    @property
+    def score(self) -> float:
+        """Chi-square of readings and unknowns together."""
+        return self.chi_square + float(self.theta @ self.model.precision @ self.theta)
+
     def sigma_at(self, values: Array, tool_mm: Array) -> tuple[Array, Array]:
         """(n, 3) mm of a tip and (n, 3) rad of the tool, in workpiece coordinates: what is not known of the
         pose at axis values (n, axes). The tip is at `tool_mm` (3,) of the gauge frame."""

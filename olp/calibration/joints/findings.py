@@ -11,6 +11,7 @@ import numpy as np
 from olp.calibration.joints.adjustment import JointFit, LeftOut, adjusted, fit_joints, starts_of
 from olp.calibration.joints.deciding import AGREES, DECIDED, log_odds, odds_in_words
 from olp.calibration.joints.mistakes import RIGHT, mistakes, row_mistakes
+from olp.calibration.joints.payloads import unstated_payloads
 from olp.calibration.joints.readings import Reading
 from olp.calibration.joints.unknowns import Model
 from olp.core.errors import CannotCompute, ConfigError
@@ -21,6 +22,8 @@ from olp.findings.catalogue import Finding
 ABSURD = 1e3
 #: Chi-square is more than so many standard deviations above its expectation.
 _MISFIT = 5.0
+#: Above so many a mistake is looked for; it is named where its odds decide.
+_SUSPECT = 2.0
 #: An unknown whose uncertainty is above this share of its prior is held by the prior.
 _HELD = 0.5
 #: Reduced chi-square of readings that may be those of the machine.
@@ -85,7 +88,7 @@ def _findings(fit: JointFit, readings: Sequence[Reading]) -> Iterator[Finding]:
             f"reduced chi-square is {reduced:.3g}; expected about 1: the stated uncertainty covers this by a "
             f"factor of {np.sqrt(reduced):.3g}",
         )
-    if misfit or _strained(fit):
+    if reduced > 1.0 + _SUSPECT * np.sqrt(2.0 / fit.freedom) or _strained(fit):
         cause = _cause(fit.model, readings, fit)
         if cause is not None:
             yield Finding("OLP810", str(cause))
@@ -120,15 +123,10 @@ class _Cause:
         return f"{self.words} ({odds_in_words(self.odds)}: {then})"
 
 
-def _score(fit: JointFit) -> float:
-    """Chi-square of readings and unknowns together."""
-    return fit.chi_square + float(fit.theta @ fit.model.precision @ fit.theta)
-
-
 def _strained(fit: JointFit) -> bool:
     """Whether the unknowns are farther from what is usual than machines are."""
     count = len(fit.theta)
-    return _score(fit) - fit.chi_square > count + _MISFIT * float(np.sqrt(2.0 * count))
+    return fit.score - fit.chi_square > count + _MISFIT * float(np.sqrt(2.0 * count))
 
 
 def _cause(model: Model, readings: Sequence[Reading], fit: JointFit | None) -> _Cause | None:
@@ -136,11 +134,11 @@ def _cause(model: Model, readings: Sequence[Reading], fit: JointFit | None) -> _
     the readings as they are (None where they do not settle), or where its odds do not decide."""
     before = np.inf if fit is None else fit.chi_square / fit.freedom
     # with the rows that a fit leaves out put back, as those of a mistake are all used
-    stated = np.inf if fit is None else _score(fit) + sum(out.deviations**2 for out in fit.left_out)
+    stated = np.inf if fit is None else fit.score + sum(out.deviations**2 for out in fit.left_out)
     found = list[_Cause]()
     # errors of a machine are small beside most mistakes: what is far from the nominal one is not the cause
     worst = _WORSE * _nominal(model, readings)
-    for words, mended, share in mistakes(model.structure, readings):
+    for words, mended, share in (*mistakes(model.structure, readings), *unstated_payloads(model, readings)):
         if _nominal(model, mended) > worst:
             continue
         try:
@@ -148,7 +146,7 @@ def _cause(model: Model, readings: Sequence[Reading], fit: JointFit | None) -> _
         except (CannotCompute, ConfigError):
             continue
         then = other.chi_square / other.freedom
-        odds = log_odds(stated, _score(other), then)
+        odds = log_odds(stated, other.score, then)
         explains = then < (_PLAUSIBLE if fit is None else max(AGREES, share * before))
         if explains and odds > DECIDED:
             found.append(_Cause(words, before, then, odds))
@@ -175,7 +173,7 @@ def _worst_rows(model: Model, readings: Sequence[Reading], before: float, stated
     lines = ", ".join(f"{PurePath(one.source).name} line {one.row}" for one in fit.left_out)
     words = ", ".join(told[:_NAMED]) or f"single readings do not belong to their postures: {lines}"
     reduced = fit.chi_square / fit.freedom
-    odds = log_odds(stated, _score(fit), reduced, len(fit.left_out))
+    odds = log_odds(stated, fit.score, reduced, len(fit.left_out))
     return _Cause(words, before, reduced, odds) if odds > DECIDED else None
 
 

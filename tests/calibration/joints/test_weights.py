@@ -16,6 +16,7 @@ from olp.calibration.joints.adjustment import JointFit, fit_joints
 from olp.calibration.joints.candidates import Priors
 from olp.calibration.joints.findings import joint_findings
 from olp.calibration.joints.mistakes import mistakes
+from olp.calibration.joints.payloads import unstated_payloads
 from olp.calibration.joints.readings import Points
 from olp.calibration.joints.unknowns import model_of
 from olp.core.arrays import Array
@@ -125,6 +126,13 @@ def test_a_payload_that_the_plan_forgets_is_told_with_odds() -> None:
     words = "other.csv: the payload of 6 kg.csv was on in these readings (odds 10^"
     assert told[0].message.startswith(words)
     assert not [one for one in joint_findings(fit_joints(stated, parts), parts) if one.code == "OLP810"]
+    # stated nowhere it is told all the same, and how heavy it was where the yields are known
+    base = replace(stated.base, yields={"J2": Yield(own=2e-6), "J3": Yield(own=4e-6)})
+    pinned = replace(stated, base=base, unknowns=(), known=None)
+    for model, words in ((pinned, "a payload of about 6"), (stated, "a payload was on")):
+        found = [said for said, _, _ in unstated_payloads(model, [forgotten])]
+        assert len(found) == 1
+        assert found[0].startswith(f"other.csv: {words}")
 
 
 def test_payloads_may_be_those_of_other_readings_or_none() -> None:
