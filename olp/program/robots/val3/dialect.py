@@ -77,7 +77,8 @@ class Val3(RobotDialect):
             numbers = [(c - a, d - a, text) for (c, d), text in zip(spans, texts, strict=True)]
             return spliced(data[a:b], numbers), []
         datum, entry = writing.declared_at(data, target)
-        named = {name: text for name, text in zip(TRANSFORM, texts, strict=True) if text}
+        names = tuple(entry.slots) if target.joints else TRANSFORM
+        named = {name: text for name, text in zip(names, texts, strict=True) if text}
         index = part.name.partition("[")[2].rstrip("]")
         return part.name.encode(), [writing.element(data, datum, entry, index, named)]
 
