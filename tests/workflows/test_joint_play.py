@@ -60,6 +60,17 @@ def test_a_side_that_is_not_known_is_said(tmp_path: Path) -> None:
     assert x_mm[0] < -0.01 and x_mm[1:] == pytest.approx([0.01, 10.01, 9.99, 4.99])
 
 
+def test_no_drive_leaves_its_travel_for_its_backlash(tmp_path: Path) -> None:
+    """At an end of the travel an axis comes from the other side, and no drive leads beyond it."""
+    machine = machine_file(tmp_path, "C F X Y Z B", errors=False, calibration=PLAY)
+    result = olp.correct_joints(listed(-899.99, -890.0, -899.98), machine)
+    assert result.report["verdict"]["ok"]
+    x_mm = [float(line.split(b",")[0]) for line in result.data.splitlines()[2:]]
+    assert min(x_mm) >= -900.0
+    with pytest.raises(olp.InputError, match=r"X is -900\.005 mm, out of its travel"):
+        olp.correct_joints(listed(-890.0, -880.0, -899.995), machine)
+
+
 def test_an_axis_that_the_program_leaves_turns_round_for_its_correction_alone(tmp_path: Path) -> None:
     """Y rises and falls by 10 um: Z stands, and its correction falls and rises."""
     curve = tmp_path / "y.csv"

@@ -86,7 +86,6 @@ def led(path: JointPath, begin: Rows, end: Rows, owner: Index, part: Array) -> A
 
 
 def _commanded(path: JointPath, move: Index, axes: Array, tool: Index, shift: Array) -> CorrectedPoses:
-    structure = path.motion.structure
     try:
         done = path.motion.command(axes, tool, shift)
     except NotInvertible as error:
@@ -104,17 +103,23 @@ def _commanded(path: JointPath, move: Index, axes: Array, tool: Index, shift: Ar
             )
             for line, row in zip(lines.tolist(), first.tolist(), strict=True)
         ) from None
-    out = np.flatnonzero(done.beyond.any(axis=1))
+    refuse_beyond(path, move, done.values, done.beyond)
+    return done
+
+
+def refuse_beyond(path: JointPath, move: Index, values: Array, beyond: Mask) -> None:
+    """Raises ProgramError with the first line whose command (r, axes) is `beyond` (r, axes) the travel."""
+    structure = path.motion.structure
+    out = np.flatnonzero(beyond.any(axis=1))
     if out.size:
         row = int(out[np.argmin(path.line[move[out]])])
-        column = int(np.argmax(done.beyond[row]))
+        column = int(np.argmax(beyond[row]))
         name = structure.order[column]
         low, high = structure.joints[name].travel
         raise ProgramError(
             f"the corrected command of {name} "
-            f"is {done.values[row, column]:.6g} {structure.units[column]}, out "
+            f"is {values[row, column]:.6g} {structure.units[column]}, out "
             f"of its travel {low:g} to {high:g}; move the part, or state the travel in the machine file",
             line=int(path.line[move[row]]),
             code="OLP567",
         )
-    return done

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from olp.compensation.joints.commanded import Rows, led, solved
+from olp.compensation.joints.commanded import Rows, led, refuse_beyond, solved
 from olp.compensation.joints.path import JointPath
 from olp.compensation.joints.play import Play, with_play
 from olp.compensation.joints.runs import Runs
@@ -12,7 +12,7 @@ from olp.compensation.joints.sampling import spread
 from olp.core.arrays import Array, Index, Mask, distinct
 from olp.core.errors import ProgramError
 from olp.core.values import dataclass
-from olp.kinematics.correction import deviations
+from olp.kinematics.correction import beyond_travel, deviations
 from olp.kinematics.poses import Poses
 
 #: The share of a tolerance that a split leaves to what lies between its samples.
@@ -214,6 +214,9 @@ def _finished(path: JointPath, rows: Rows, straight: bool) -> JointPlan:
     still = np.setdiff1d(np.arange(count), distinct(rows.move))
     own = rows.side
     axes = rows.axes + 0.5 * motion.width * own
+    if motion.width.any():
+        # a drive leads its load
+        refuse_beyond(path, rows.move, axes, beyond_travel(motion.structure, axes))
     command = motion.programmed(axes, path.tool[rows.move], path.tip[rows.move])
     blank = np.full((len(still), path.end.shape[1]), np.nan)
     move, share = np.append(rows.move, still), np.append(rows.share, np.ones(len(still)))
