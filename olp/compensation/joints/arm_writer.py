@@ -47,7 +47,7 @@ _COMPARED = 8
 #: A branch that is nearer to its border than this says nothing, mm or deg.
 _BORDER = 1e-6
 #: A number in the usual form, with its decimals.
-_PLAIN = re.compile(rb"-?(?:0|[1-9]\d{0,6})\.(\d{1,12})")
+_PLAIN = re.compile(rb"-?(?:0|[1-9]\d{0,6})(?:\.(\d{1,12}))?")
 _NAMES = re.compile(rb"[A-Za-z_]\w*")
 
 
@@ -277,7 +277,7 @@ class _Writer:
         form = None if plain else number(text)
         if plain is None and (form is None or form.letter):
             form = number(b"0.0")
-        own = len(plain[1]) if plain else 0 if form is None else form.decimals
+        own = len(plain[1] or b"") if plain else 0 if form is None else form.decimals
         decimals = min(max(fewest, own), MOST_DECIMALS)
         digit = 10.0**-decimals
         off = abs(_value(text) - value) if off is None else off

@@ -89,6 +89,7 @@ class Declared:
         self._given: dict[str, list[Given]] = {}
         self.parameters: dict[Scope, list[str]] = {}
         self._targets: dict[tuple[int, int], int] = {}
+        self._speeds: dict[tuple[bytes, Scope], float] = {}
 
     def declare(self, statement: Statement, scope: Scope) -> bool:
         """Whether a statement declares data, which are kept."""
@@ -264,8 +265,14 @@ class Declared:
             return None
         return frame_of(self.data[slice(*data.value)], name, data.statement.line)
 
-    def speed(self, text: bytes, routine: Scope, line: int) -> float:
+    def speed(self, text: bytes, routine: Scope) -> float:
         """A speed in mm/s, NaN where the text does not state it."""
+        key = text, routine
+        if key not in self._speeds:
+            self._speeds[key] = self._speed(text, routine)
+        return self._speeds[key]
+
+    def _speed(self, text: bytes, routine: Scope) -> float:
         match = _SPEED.fullmatch(text)
         if match is None:
             name = text.decode("latin-1")

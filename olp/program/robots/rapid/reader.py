@@ -232,7 +232,7 @@ class _Reader:
         uses = [self._use(statement, span, words.zone, straight=form.straight) for span in spans]
         tool, frame = self._tool(words.tool, line), self._frame(words.frame, line)
         stated = b"" if b"T" in words.others else words.others.get(b"V", words.speed)
-        feed = self.declared.speed(stated, self.routine, line)
+        feed = self.declared.speed(stated, self.routine)
         self._loop_begins()
         whole |= form.whole or not _PATHS.isdisjoint(words.others)
         if form.arc:

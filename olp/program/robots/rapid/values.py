@@ -9,7 +9,7 @@ from olp.core.errors import ProgramError
 from olp.core.machine import Vector
 from olp.core.patterns import pattern
 from olp.core.values import dataclass
-from olp.program.robots.poses import Pose, Quaternion, normalised
+from olp.program.robots.poses import Pose, Quaternion
 from olp.program.robots.targets import Span
 
 _N = rb"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*"
@@ -39,14 +39,15 @@ _UNIT = 1e-3
 
 def quaternion(numbers: Sequence[float], line: int) -> Quaternion:
     """A rotation of RAPID, w first. Raises ProgramError where it is none."""
-    size = sum(v * v for v in numbers) ** 0.5
+    w, x, y, z = numbers
+    size = (w * w + x * x + y * y + z * z) ** 0.5
     if not abs(size - 1.0) < _UNIT:
         raise ProgramError(
             f"the orientation has length {size:.6g}; expected a quaternion of length 1",
             line=line,
             code="OLP516",
         )
-    return normalised(numbers)
+    return (w / size, x / size, y / size, z / size)
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,9 +75,9 @@ class Stated:
 def target_of(match: re.Match[bytes], line: int) -> Stated:
     """What a robtarget states. Raises ProgramError where its orientation is none."""
     x, y, z, *others = map(float, match.groups())
-    spans = (match.span(1), match.span(2), match.span(3))
-    turned, turns = (tuple(match.span(k) for k in some) for some in (range(4, 8), range(8, 11)))
-    return Stated(spans, (x, y, z), quaternion(others[:4], line), tuple(others[4:]), turned, turns)
+    regs = match.regs
+    spans = (regs[1], regs[2], regs[3])
+    return Stated(spans, (x, y, z), quaternion(others[:4], line), tuple(others[4:]), regs[4:8], regs[8:11])
 
 
 @dataclass(frozen=True, slots=True)
