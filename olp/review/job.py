@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import datetime
 import hashlib
+import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import field, fields, is_dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -372,7 +373,7 @@ def _resting(samples: Samples, arrival: Array, leaving: Array) -> tuple[Samples,
 def _digest(texts: _Texts, loaded: Loaded, measured: Sequence[str], sources: Sources) -> str:
     """12 digits that change with every input of the page; `measured` are the digests of those files."""
     combined = hashlib.sha256(texts.nominal.data)
-    for part in (texts.second.data, loaded.digest.encode(), repr(loaded.setup).encode()):
+    for part in (texts.second.data, loaded.digest.encode(), _stated(loaded.setup).encode()):
         combined.update(b"\0")
         combined.update(part)
     for digest in measured:
@@ -380,6 +381,17 @@ def _digest(texts: _Texts, loaded: Loaded, measured: Sequence[str], sources: Sou
     for mesh in loaded.setup.job.meshes:
         combined.update(sources.digest(mesh.file))
     return combined.hexdigest()[:12]
+
+
+def _stated(setup: Setup) -> str:
+    """All that a setup states, the same in every process: the order of sets is not, as `repr` has them."""
+
+    def plain(some: Any) -> Any:
+        if isinstance(some, frozenset):
+            return sorted(some)
+        return {f.name: getattr(some, f.name) for f in fields(some)} if is_dataclass(some) else repr(some)
+
+    return json.dumps(setup, default=plain)
 
 
 def _bodies(

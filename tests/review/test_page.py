@@ -5,7 +5,10 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
+import os
 import re
+import subprocess
+import sys
 import zlib
 from pathlib import Path
 from typing import Any
@@ -132,6 +135,21 @@ def test_only_a_live_page_may_ask_and_only_its_own_server(machine: Path) -> None
 
 def test_the_same_job_gives_the_same_page(machine: Path, html: bytes) -> None:
     assert olp.view(TEXT, machine).html() == html
+
+
+def test_a_setup_is_stated_alike_in_every_process(machine: Path) -> None:
+    """The order of sets hangs on the seed of their hashes, which each process draws."""
+    call = "import sys; from olp.review.job import _stated; from olp.workflows.session import Session; "
+    call += "print(_stated(Session.start(sys.argv[1], None).setup))"
+    stated = {
+        subprocess.run(
+            [sys.executable, "-c", call, str(machine)], check=True, capture_output=True, text=True,
+            env={**os.environ, "PYTHONHASHSEED": seed},
+        ).stdout
+        for seed in ("1", "2")
+    }  # fmt: skip
+    assert len(stated) == 1
+    assert "tool_change_moves" in stated.pop()
 
 
 def test_a_digest_changes_with_what_the_page_shows(machine: Path) -> None:
