@@ -132,7 +132,8 @@ def fit_calibration(
         *findings_of(fitted, tool_vectors, travel), *agreement_findings(found, fitted, tool_vectors)
     )  # fmt: skip
     _refuse_absurd(fitted, findings)
-    report = summary(fitted, calibration, tool_vectors) | {"agreement": agreement_rows(found)}
+    report = summary(fitted, calibration, tool_vectors)
+    report["agreement"] = agreement_rows(found, fitted, tool_vectors)
     if beyond is not None:
         report["map"] = map_summary(beyond, mapped)
         findings = (*findings, *map_findings(beyond, mapped))

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import field
 
 import numpy as np
 
@@ -25,6 +26,8 @@ from olp.errormodel.quality import Fitted
 
 #: Directions count in which a source says at least this share of what all others say.
 _LEAST_SHARE = 1e-3
+#: Directions of the unknowns of which a source says less than this, against the best, count for nothing.
+_NOTHING = 1e-13
 #: Nats by which something is named as wrong with a source: a difference of six standard deviations.
 NAMED = 0.5 * 6.0**2
 #: Nats by which the others have to confirm what is named: 20 to 1.
@@ -33,24 +36,25 @@ _CONFIRMED = math.log(20.0)
 _EXPLAINS = 0.9
 #: Nats by which something is excluded: 100 to 1.
 EXCLUDED = math.log(100.0)
-#: Where values change by a factor, so does the roughness learnt from them, by these shares of it: that of
-#: values below the resolution of readings was learnt larger than it is.
-_SHARES = 1.0, 0.1, 0.01
+#: Curves of two sizes for which evidence is taken differ by this factor at most.
+_APART = 10.0
 #: At most so many sources of a fit are put right, one after the other.
 _MOST = 4
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Tried:
     """Something that may be wrong with a source, its kind and in words, and its log odds (nats) against what
     was read. `support` are its log odds against a source that says nothing: whether the others confirm it.
-    What is `sought` may be named; the rest is excluded or not."""
+    What is `sought` may be named; the rest is excluded or not. `change` (size,) is by how much the unknowns
+    are others if it is so."""
 
     kind: str
     words: str
     log_odds: float
     support: float
     sought: bool = True
+    change: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def beyond_doubt(self) -> bool:
@@ -81,70 +85,89 @@ class Agreement:
         return self.misfit.failed and self.against > NAMED
 
     @property
+    def open(self) -> tuple[Tried, ...]:
+        """What may be wrong with it without notice, as the readings do not exclude it."""
+        return tuple(tried for tried in self.tried if tried.log_odds > -EXCLUDED)
+
+    @property
     def possible(self) -> tuple[str, ...]:
-        """The kinds of what may be wrong with it without notice, as the readings do not exclude it."""
-        return tuple(sorted({tried.kind for tried in self.tried if tried.log_odds > -EXCLUDED}))
+        """The kinds of what is open."""
+        return tuple(sorted({tried.kind for tried in self.open}))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Source:
-    """A result of the fit as normal equations."""
+    """A result of the fit as normal equations, and as few readings with a noise of 1 that say the same: `y`
+    (r,) of `rows` (r, k) of the unknowns `columns` (k,). `left` is the square of what no unknown explains."""
 
     state: State
     normal: Normal
+    columns: Index
+    rows: Array
+    y: Array
+    left: float
 
     @staticmethod
-    def of(state: State, fit: Fit) -> _Source:
+    def of(state: State, normal: Normal) -> _Source:
+        columns = np.flatnonzero(normal.H.any(axis=0))
+        values, vectors = np.linalg.eigh(normal.H[np.ix_(columns, columns)])
+        some = values > _NOTHING * max(values.max(initial=0.0), _NOTHING)
+        root = np.sqrt(values[some])
+        rows = (vectors[:, some] * root).T
+        y = normal.g[columns] @ vectors[:, some] / root
+        return _Source(state, normal, columns, rows, y, normal.square - float(y @ y))
+
+    @staticmethod
+    def read(state: State, fit: Fit) -> _Source:
         normal = Normal.of(fit.parameters.size)
         normal.add(fit.block(state))
-        return _Source(state, normal)
+        return _Source.of(state, normal)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Given:
-    """What all other readings and the prior say of the unknowns `columns` (k,) of a source: `mean` (k,) and
-    `covariance` (k, k)."""
+    """What all other readings and the prior say of the unknowns `columns` (k,) of a source: `mean` (k,), and
+    `root` (k, k), a factor of the covariance."""
 
     columns: Index
     mean: Array
-    covariance: Array
+    root: Array
 
-    def log_evidence(self, source: _Source) -> float:
-        """The log probability of the readings of a source, up to a constant."""
-        H, g = self._of(source)
-        away = g - H @ self.mean
-        root = _root(self.covariance)
-        inner = np.eye(len(g)) + root.T @ H @ root
-        solved = np.linalg.solve(inner, root.T @ away)
-        square = source.normal.square - 2.0 * self.mean @ g + self.mean @ H @ self.mean
-        explained = float((root.T @ away) @ solved)
-        return -0.5 * (float(square) - explained + float(np.linalg.slogdet(inner)[1]))
+    def told(self, source: _Source) -> tuple[float, Array]:
+        """The log probability of the readings of a source, up to a constant, and (k,) the mean with them."""
+        away, seen = self._away(source)
+        inner = np.eye(len(away)) + seen @ seen.T
+        solved = np.linalg.solve(inner, away)
+        log = -0.5 * (source.left + float(away @ solved) + float(np.linalg.slogdet(inner)[1]))
+        return log, self.mean + self.root @ (solved @ seen)
 
     def z(self, source: _Source) -> Array:
         """(m,) differences of source and prediction in the directions that it measures."""
-        H, g = self._of(source)
-        root = _root(self.covariance)
-        share, directions = np.linalg.eigh(root.T @ H @ root)
-        away = directions.T @ (root.T @ (g - H @ self.mean))
-        some = share > _LEAST_SHARE
-        return np.asarray(away[some] / np.sqrt(share[some] * (1.0 + share[some])))
+        away, seen = self._away(source)
+        directions, size, _ = np.linalg.svd(seen, full_matrices=False)
+        some = size**2 > _LEAST_SHARE
+        return np.asarray((away @ directions)[some] / np.sqrt(1.0 + size[some] ** 2))
+
+    def _away(self, source: _Source) -> tuple[Array, Array]:
+        """(r,) readings of a source less their prediction, and (r, k) how the roots act on them."""
+        own = np.searchsorted(self.columns, source.columns)
+        return source.y - source.rows @ self.mean[own], source.rows @ self.root[own]
 
     def scaled(self, part: Index, precision: Array, factor: float) -> tuple[_Given, float]:
         """The same where the prior of some unknowns, `part` of `columns`, is of curves `factor` times as
         large, and the log evidence of the others that this adds."""
-        change = np.zeros_like(self.covariance)
-        change[np.ix_(part, part)] = (factor**-2 - 1.0) * precision
-        inverse = np.linalg.inv(self.covariance)
-        eta = inverse @ self.mean
-        covariance = np.linalg.inv(inverse + change)
-        covariance = 0.5 * (covariance + covariance.T)
-        mean = covariance @ eta
-        more = 0.5 * (np.linalg.slogdet(covariance)[1] - np.linalg.slogdet(self.covariance)[1])
-        more += 0.5 * float(eta @ mean - eta @ self.mean) - len(part) * math.log(abs(factor))
-        return _Given(self.columns, mean, covariance), float(more)
-
-    def _of(self, source: _Source) -> tuple[Array, Array]:
-        return source.normal.H[np.ix_(self.columns, self.columns)], source.normal.g[self.columns]
+        if factor == 1.0:
+            return self, 0.0
+        change = (factor**-2 - 1.0) * precision
+        own = self.root[part]
+        values, vectors = np.linalg.eigh(np.eye(own.shape[1]) + own.T @ change @ own)
+        # what they are at least, but for rounding
+        values = np.maximum(values, min(1.0, factor**-2))
+        root = self.root @ (vectors / np.sqrt(values))
+        mean = self.mean - root @ (root[part].T @ (change @ self.mean[part]))
+        more = -0.5 * float(np.log(values).sum()) - len(part) * math.log(factor)
+        more -= 0.5 * float(self.mean[part] @ change @ mean[part])
+        return _Given(self.columns, mean, root), more
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -161,7 +184,7 @@ class Compared:
 def compared(fit: Fit, states: Sequence[State] | None = None) -> Compared:
     """Compare each source of a fit, or each of these `states` of it, with all others."""
     states = [result.state for result in fit.results] if states is None else states
-    sources = [_Source.of(state, fit) for state in states]
+    sources = [_Source.read(state, fit) for state in states]
     first = now = _agreements(fit, sources)
     wrong: list[Agreement] = []
     unlike: list[Agreement] = []
@@ -173,7 +196,7 @@ def compared(fit: Fit, states: Sequence[State] | None = None) -> Compared:
         left.discard(index)
         if found is None:
             unlike.append(now[index])
-            sources[index] = _Source(sources[index].state, Normal.of(fit.parameters.size))
+            sources[index] = _Source.of(sources[index].state, Normal.of(fit.parameters.size))
         else:
             wrong.append(now[index])
             sources[index] = _put_right(fit, sources[index], found.words)
@@ -200,43 +223,44 @@ def _put_right(fit: Fit, source: _Source, words: str) -> _Source:
 
 def _as(fit: Fit, alternative: Alternative) -> _Source:
     state = alternative.observation.start(alternative.observation.screened().noise)
-    return _Source.of(state, fit)
+    return _Source.read(state, fit)
 
 
 def _agreements(fit: Fit, sources: list[_Source]) -> tuple[Agreement, ...]:
     # a curve that is rougher between its targets than was expected contradicts nothing
-    prior, _ = fit.prior.rougher().precision()
+    priors = [prior.precision()[0] for prior in (fit.prior.rougher(), fit.prior)]
     means = Normal.of(fit.parameters.size)
     fit.prior.push(means)
-    total = prior + sum(source.normal.H for source in sources)
+    heard = sum(source.normal.H for source in sources)
     right = means.g + sum(source.normal.g for source in sources)
+
+    def given(source: _Source, columns: Index) -> list[_Views]:
+        rest = heard - source.normal.H, right - source.normal.g
+        return [
+            _Views(prior, _given(prior + rest[0], rest[1], columns), _given(prior, means.g, columns))
+            for prior in priors
+        ]
+
     found = []
     for source in sources:
-        columns = np.flatnonzero(source.normal.H.any(axis=0))
-        if not len(columns):
+        label, component = source.state.label, source.state.component
+        if not len(source.columns):
             # it was left out
-            label = source.state.label
-            found.append(Agreement(label, source.state.component, Fitted(label, 0.0, 0.0), (), 0.0))
+            found.append(Agreement(label, component, Fitted(label, 0.0, 0.0), (), 0.0))
             continue
-        # all of a curve, whatever part of it was read: its scale is that of all
-        columns = np.union1d(columns, _curve(fit, source))
-        rest = total - source.normal.H, right - source.normal.g
-        both = _given(*rest, columns), _given(prior, means.g, columns)
-        z = both[0].z(source)
-        misfit = Fitted(source.state.label, float(z @ z), float(len(z)))
-        as_read = both[0].log_evidence(source) - both[1].log_evidence(source)
-        off = misfit.failed and -as_read > NAMED
         tries = tuple(_alternatives(fit, source))
-        # another component depends on other unknowns
-        wider = np.union1d(columns, np.flatnonzero(sum(other.normal.H.any(axis=0) for _, other in tries)))
-        if len(wider) > len(columns):
-            both = _given(*rest, wider), _given(prior, means.g, wider)
+        # another component depends on other unknowns; and all of a curve, whatever part of it was read: its
+        # scale is that of all
+        read = [source.columns, *(other.columns for _, other in tries), _curve(fit, source)]
+        views = given(source, np.unique(np.concatenate(read)))
+        z = views[0].others.z(source)
+        misfit = Fitted(label, float(z @ z), float(len(z)))
+        as_read = _heard(views, source, _ALIKE, np.zeros(0, np.int64))
         tried = sorted(
-            (_tried(fit, prior, both, source, one, as_read, off=off) for one in tries),
+            (_tried(fit, views, one, as_read, _curve(fit, source), off=misfit.failed) for one in tries),
             key=lambda one: -one.log_odds,
         )
-        label, component = source.state.label, source.state.component
-        found.append(Agreement(label, component, misfit, tuple(tried), -as_read))
+        found.append(Agreement(label, component, misfit, tuple(tried), -as_read.support))
     return tuple(found)
 
 
@@ -252,34 +276,73 @@ def _alternatives(fit: Fit, source: _Source) -> Iterator[tuple[Alternative, _Sou
             continue
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Views:
+    """What all others and the prior, and what the prior alone say of a source, where curves are as rough as
+    a prior precision says."""
+
+    prior: Array
+    others: _Given
+    alone: _Given
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Heard:
+    """The log evidence of a source by what the others say of it, less that by the prior alone; and (k,) the
+    mean of the unknowns with it."""
+
+    support: float
+    mean: Array
+
+
+def _heard(views: Sequence[_Views], source: _Source, sizes: Sequence[float], part: Index) -> _Heard:
+    """The readings of a source by all views, where the curve with the unknowns `part` of theta may be of
+    several sizes."""
+    logs: tuple[list[float], list[float]] = ([], [])
+    means = []
+    for view in views:
+        place, own = np.searchsorted(view.others.columns, part), view.prior[np.ix_(part, part)]
+        for size in sizes:
+            for log, here in zip(logs, (view.others, view.alone), strict=True):
+                given, more = here.scaled(place, own, size)
+                value, mean = given.told(source)
+                log.append(value + more)
+                if here is view.others:
+                    means.append(mean)
+    others, alone = (float(np.logaddexp.reduce(log)) for log in logs)
+    return _Heard(others - alone, means[int(np.argmax(logs[0]))])
+
+
+#: The curve is of the size that was learnt.
+_ALIKE = (1.0,)
+
+
+def _sizes(factor: float) -> tuple[float, ...]:
+    """By how much a curve is larger than was learnt from values that a factor puts right: by all of it
+    where they alone told its size, not at all where other curves did."""
+    apart = abs(math.log(abs(factor)))
+    if not apart:
+        return _ALIKE
+    return tuple(np.geomspace(1.0, abs(factor), 2 + int(apart / math.log(_APART))).tolist())
+
+
 def _tried(
     fit: Fit,
-    prior: Array,
-    both: tuple[_Given, _Given],
-    source: _Source,
+    views: Sequence[_Views],
     alternative: tuple[Alternative, _Source],
-    as_read: float,
+    as_read: _Heard,
+    curve: Index,
     *,
     off: bool,
 ) -> Tried:
-    """What may be wrong with a source, `off` or not: how much better the others predict it then. `both` are
-    what they and the prior alone say; what the prior makes of its size is taken off."""
+    """What may be wrong with a source, `off` or not: how much better the others predict it then. What the
+    prior makes of its size is taken off. `curve` are the unknowns of the curve that it reads."""
     one, other = alternative
-    columns = _curve(fit, source)
-    values = []
-    for here in both:
-        if abs(one.factor) == 1.0 or not len(columns):
-            values.append(here.log_evidence(other))
-            continue
-        # the roughness of a curve was learnt from these readings, and is of another size then
-        part, own = np.searchsorted(here.columns, columns), prior[np.ix_(columns, columns)]
-        shares = _SHARES if off else _SHARES[:1]
-        sizes = [share * one.factor for share in shares if share == 1.0 or share * abs(one.factor) > 1.0]
-        scaled = [here.scaled(part, own, size) for size in sizes]
-        each = np.array([given.log_evidence(other) + more for given, more in scaled])
-        values.append(float(each.max() + np.log(np.mean(np.exp(each - each.max())))))
-    support = values[0] - values[1]
-    return Tried(one.kind, one.words, support - as_read, support, off or not one.where_off)
+    heard = _heard(views, other, _sizes(one.factor) if len(curve) else _ALIKE, curve)
+    change = np.zeros(fit.parameters.size)
+    change[views[0].others.columns] = heard.mean - as_read.mean
+    log_odds = heard.support - as_read.support
+    return Tried(one.kind, one.words, log_odds, heard.support, off or not one.where_off, change)
 
 
 def _curve(fit: Fit, source: _Source) -> Index:
@@ -299,7 +362,7 @@ def _given(precision: Array, right: Array, columns: Index) -> _Given:
     unit[columns, np.arange(len(columns))] = 1.0
     covariance = cho_solve(factor, unit)[columns] / np.outer(scale[columns], scale[columns])
     mean = (cho_solve(factor, right / scale) / scale)[columns]
-    return _Given(columns, mean, 0.5 * (covariance + covariance.T))
+    return _Given(columns, mean, _root(0.5 * (covariance + covariance.T)))
 
 
 def _root(covariance: Array) -> Array:

@@ -8,16 +8,20 @@ from typing import Any
 
 import numpy as np
 
-from olp.calibration.diagnosis.agreement import Agreement, Compared
+from olp.calibration.diagnosis.agreement import Agreement, Compared, Tried
+from olp.calibration.estimator.character import class_of, largest
 from olp.calibration.estimator.fitted import Fit
-from olp.calibration.estimator.summary import cost_um, grid_of
-from olp.core.machine import Vector
+from olp.calibration.estimator.summary import grid_of
+from olp.core.machine import ZERO, Vector
+from olp.core.units import UM_PER_MM
 from olp.findings.catalogue import Finding
 
 #: um; smaller harm is not listed.
 _LEAST_UM = 0.1
 #: Files that one finding lists, at most.
 _LISTED = 8
+#: Positions along each axis where harm is looked for.
+_PLACES = 5
 
 
 def agreement_findings(found: Compared, fit: Fit, tools: Sequence[Vector]) -> Iterator[Finding]:
@@ -35,17 +39,18 @@ def agreement_findings(found: Compared, fit: Fit, tools: Sequence[Vector]) -> It
             f"{_name(one)}: it differs from what all other readings say by "
             f"{math.sqrt(one.misfit.reduced):.1f} times what both uncertainties explain",
         )
-    open_ones = [one for one in found.sources if "sign" in one.possible]
-    costs = sorted(((_harm_um(one, fit, tools), _name(one)) for one in open_ones), reverse=True)
+    costs = sorted(
+        ((harm, _name(one), kind) for one, (harm, kind) in _harms(found, fit, tools)), reverse=True
+    )
     costs = [cost for cost in costs if cost[0] > _LEAST_UM]
     if costs:
-        words = ", ".join(f"{name} {harm:.3g} um" for harm, name in costs[:_LISTED])
+        words = ", ".join(f"{name} {harm:.3g} um ({kind})" for harm, name, kind in costs[:_LISTED])
         more = f" and {len(costs) - _LISTED} more" if len(costs) > _LISTED else ""
         yield Finding("OLP812", f"{len(costs)} of {len(found.sources)} sources: {words}{more}")
 
 
-def agreement_rows(found: Compared) -> list[dict[str, Any]]:
-    """One row a source: how it agrees with the others, and what they do not exclude."""
+def agreement_rows(found: Compared, fit: Fit, tools: Sequence[Vector]) -> list[dict[str, Any]]:
+    """One row a source: how it agrees with the others, what they do not exclude, and what that could cost."""
     wrong = {id(one.misfit): one for one in found.wrong}
     return [
         {
@@ -55,8 +60,9 @@ def agreement_rows(found: Compared) -> list[dict[str, Any]]:
             "chi_square_per_direction": one.misfit.reduced,
             "wrong": one.named.words if id(one.misfit) in wrong and one.named is not None else "",
             "not_excluded": ", ".join(one.possible),
+            "hidden_harm_um": harm,
         }
-        for one in found.sources
+        for one, (harm, _) in _harms(found, fit, tools)
     ]
 
 
@@ -64,9 +70,27 @@ def _name(one: Agreement) -> str:
     return f"{one.label} ({one.component})" if one.component and one.component != one.label else one.label
 
 
-def _harm_um(one: Agreement, fit: Fit, tools: Sequence[Vector]) -> float:
-    """The error in um where the sign of a source is wrong: twice what it says, at the longest lever arm."""
-    if not one.component:
-        return 0.0
-    values = fit.curve(one.component, grid_of(fit, one.component)) @ fit.theta
-    return 2.0 * cost_um(fit, one.component, float(np.ptp(values)), tools)
+def _harms(
+    found: Compared, fit: Fit, tools: Sequence[Vector]
+) -> Iterator[tuple[Agreement, tuple[float, str]]]:
+    """What of each source is not excluded and changes the errors most: by how much in um, and its kind. It is
+    taken over the box with all tools."""
+    sides = [np.linspace(low, high, _PLACES) for low, high in fit.box_mm.tolist()]
+    position = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 3)
+    rows = np.stack([fit.design(position, np.array(tool)) for tool in tools or [ZERO]])
+    for one in found.sources:
+        harms = [(0.0, "")]
+        for tried in one.open:
+            if len(tried.change) and _plausible(one.component, tried, fit):
+                error = rows @ tried.change
+                harms.append((float(np.linalg.norm(error, axis=-1).max()) * UM_PER_MM, tried.kind))
+        yield one, max(harms)
+
+
+def _plausible(name: str, tried: Tried, fit: Fit) -> bool:
+    """Whether a curve that was read is no larger, if it is so, than those of machines are."""
+    if name not in fit.prior.shapes:
+        return True
+    rows = fit.curve(name, grid_of(fit, name))
+    before, after = (float(np.sqrt(np.mean((rows @ x) ** 2))) for x in (fit.theta, fit.theta + tried.change))
+    return after <= max(before, largest(class_of(name)))

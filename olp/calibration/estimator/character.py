@@ -85,6 +85,11 @@ def fewer(kind: str) -> Array:
     return _table(2) * USUAL[kind]
 
 
+def largest(kind: str) -> float:
+    """The root mean square over the axis above which no curve of a class is expected, mm or rad."""
+    return float(SIZES[-1]) * USUAL[kind]
+
+
 class Evidence:
     """Log evidence of readings under a curve of some scales and features, up to a constant.
 

@@ -116,10 +116,11 @@ RULES = (
     ),
     _rule(
         "OLP812",
-        "no other reading checks the sign of a source",
+        "no other reading excludes a mistake of a source",
         Severity.INFO,
-        "If the sign of such a source is wrong, the fit is as good, and programs get worse by the stated "
-        "amount. It is twice what the source says, at the longest lever arm in the box.",
+        "If such a source has this mistake, such as a wrong sign, unit or place, no reading shows it. Then "
+        "the errors are others by up to the stated amount, in the box and with the tools of the machine. Of "
+        "all mistakes that are not excluded, the one with the largest harm is stated.",
         "Measure some points or diagonals that depend on it, or check the sign once with a measured program.",
         "A laser line along X, and no other reading that shows the scale of X.",
     ),

@@ -104,8 +104,13 @@ def test_what_nothing_else_measures_is_said_to_be_unchecked() -> None:
     # an angle cannot be another one, where points tell; lever arms that are off by little never show
     assert "columns" not in with_points["eax.csv"]
     assert "place" in with_points["eyx.csv"]
-    rows = {row["file"]: row for row in agreement_rows(outcome)}
+    rows = {row["file"]: row for row in agreement_rows(outcome, fitted, [])}
     assert "sign" in rows["exx.csv"]["not_excluded"]
+    # a wrong sign is twice what the line says
+    low, high = fitted.box_mm[0].tolist()
+    q = np.linspace(low, high, 5)
+    most = 2000.0 * np.abs(fitted.curve("EXX", q) @ fitted.theta).max()
+    assert rows["exx.csv"]["hidden_harm_um"] > 0.99 * most
 
 
 def test_a_cause_that_is_not_sought_is_listed_and_never_named() -> None:

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from cases.blunders import ALARMS, LOUD, Blunder, blunders, clean_fit, noncentrality, outcome, readings
 
+from olp.calibration.diagnosis.agreement import compared
+from olp.calibration.diagnosis.agreement_report import agreement_rows
+from olp.calibration.estimator.adjustment import fit
 from olp.calibration.observations.circles import Circles
 from olp.calibration.observations.diagonals import Diagonal
 
@@ -40,6 +45,54 @@ def test_no_loud_blunder_is_silent(kind: str, source: str, mixture: str) -> None
     assert said.noncentrality >= LOUD
     assert said.alarms
     assert said.named or not one.words
+
+
+#: Blunders that once passed in silence: seed, family and mixture of the machine, kind, file.
+ONCE_SILENT = (
+    (105, "smooth", "stations", "lever", "ezx.csv"),
+    (49, "tables", "stations", "1000", "ebx.csv"),
+)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("seed", "family", "mixture", "kind", "source"), ONCE_SILENT)
+def test_what_once_was_silent_is_named(seed: int, family: str, mixture: str, kind: str, source: str) -> None:
+    """A lever arm beside a misfit just below what speaks against the line, and values below all noise."""
+    whole = readings(seed, family, mixture)
+    one = next(
+        one for one in blunders(seed, family, mixture) if (one.kind, one.planted.source) == (kind, source)
+    )
+    taken = [*whole.observations]
+    taken[one.index] = one.planted
+    assert whole.chain is not None
+    found = compared(fit(dataclasses.replace(whole, observations=tuple(taken)), whole.chain))
+    named = {wrong.label: wrong.named.words for wrong in found.wrong if wrong.named is not None}
+    assert list(named) == [source]
+    assert one.words in named[source]
+    assert not found.unlike
+
+
+@pytest.mark.slow
+def test_what_is_not_named_is_told_beforehand() -> None:
+    """The sign of an angle that little checks: the report states at least half of what it does."""
+    whole = readings(84, "tables", "points")
+    assert whole.chain is not None
+    one = next(
+        one
+        for one in blunders(84, "tables", "points")
+        if (one.kind, one.planted.source) == ("sign", "eby.csv")
+    )
+    taken = [*whole.observations]
+    taken[one.index] = one.planted
+    clean, bad = (
+        fit(dataclasses.replace(whole, observations=tuple(some)), whole.chain)
+        for some in (whole.observations, taken)
+    )
+    place, tool = np.random.default_rng(3).uniform(*bad.box_mm.T, (60, 3)), np.zeros(3)
+    harm = 1e3 * np.linalg.norm(bad.error(place, tool) - clean.error(place, tool), axis=1).max()
+    rows = {row["file"]: row for row in agreement_rows(compared(bad), bad, [])}
+    assert "sign" in rows["eby.csv"]["not_excluded"]
+    assert rows["eby.csv"]["hidden_harm_um"] > 0.5 * harm
 
 
 @pytest.mark.slow
