@@ -25,7 +25,7 @@ from olp.compensation.style import fewest_decimals
 from olp.core.arrays import Array, Index, Mask
 from olp.core.errors import ConfigError, NotInvertible, ProgramError
 from olp.core.machine import ZERO, Machine, Vector
-from olp.core.toolpath import Flag, Kind, Touch
+from olp.core.toolpath import Flag, Kind, Toolpath, Touch
 from olp.core.turns import turned
 from olp.core.units import AXES
 from olp.core.values import dataclass
@@ -145,10 +145,7 @@ class JointPath:
         offsets = np.array(turns, float).reshape(len(path.frames), len(letters))
         first = np.array([start_deg.get(letter, np.nan) for letter in letters])
         degrees, directions = _degrees(program, structure, letters, rotary, first, offsets, swivel_axis)
-        modes = [frame.tip for frame in path.frames]
-        tip = np.array([words.poses or mode != "" for mode in modes], bool)[path.frame]
-        vector = np.array([mode == "vector" for mode in modes], bool)[path.frame]
-        fixed = np.array([mode == "fixed" for mode in modes], bool)[path.frame]
+        tip, vector, fixed = _modes(path, words)
         end, slot = np.empty((len(path), len(order))), np.full((len(path), len(order)), -1, np.int32)
         offset, scale = np.zeros(end.shape), np.ones(len(order))
         linear = np.array([frame.offset_mm for frame in path.frames]).reshape(-1, 3)[path.frame]
@@ -335,6 +332,17 @@ def _stated_in_mode(end: Array, given: Mask, mode: Index, elsewhere: Mask, fresh
     last = np.take_along_axis(end, np.maximum(stated, 0), axis=0)
     kept = ((stated >= began[:, None]) | first[:, None]) & ~elsewhere[:, None]
     return np.where(kept, np.where(in_plane[:, None], last, end), np.nan)
+
+
+def _modes(path: Toolpath, words: Coordinates) -> tuple[Mask, Mask, Mask]:
+    """(n,) moves whose words state the tip, along which the tool turns as a vector, and that are in a
+    tilted plane."""
+    modes = [frame.tip for frame in path.frames]
+    tip = np.array([words.poses or mode != "" for mode in modes], bool)[path.frame]
+    vector, fixed = (
+        np.array([mode == one for mode in modes], bool)[path.frame] for one in ("vector", "fixed")
+    )
+    return tip, vector, fixed
 
 
 def _degrees(

@@ -263,42 +263,10 @@ class OffsetState(State):
     def _write_offset(
         self, line: int, by_letter: dict[str, Word], axis_words: list[tuple[int, Word]], moves: int
     ) -> None:
-        from olp.program.rs274.tool_tables import check_tool, words_of_tool
-
-        if "L" not in by_letter and "P" in by_letter and by_letter["P"].value in self.profile.g10_clearances:
+        stated = self._stated_offset(line, by_letter)
+        if stated is None:
             return
-        if not self.profile.g10_offsets:
-            raise ProgramError(
-                "G10 writes tables of the control, which is not read; give what it writes in the machine or "
-                "job file, and take it out",
-                line=line,
-                code="OLP526",
-            )
-        kind = round(by_letter["L"].value) if "L" in by_letter else -1
-        stated = {a: self.length_mm(by_letter[a]) for a in words_of_tool(self, kind) if a in by_letter}
-        if stated and "P" in by_letter:
-            check_tool(self, kind, self._integer(by_letter["P"], line), stated, line)
-            return
-        if kind not in (2, STORES_POSITION):
-            what = f"G10 L{kind}" if kind >= 0 else "G10 without L"
-            raise ProgramError(
-                f"{what} writes tables of the control, which is not read; expected L2 or L20",
-                line=line,
-                code="OLP526",
-            )
-        turns = self.profile.turns_offsets and kind == 2
-        if "R" in by_letter and not turns and (kind == STORES_POSITION or by_letter["R"].value != 0):
-            raise ProgramError(
-                "G10 R turns the work offset, which this control does not do here; leave R out",
-                line=line,
-                code="OLP526",
-            )
-        number = self._integer(by_letter["P"], line) if "P" in by_letter else -1
-        further = kind == STORES_POSITION and not self.profile.g10_stores
-        if not further <= number <= (_FURTHER if further else self.profile.g10_offsets):
-            raise ProgramError(
-                "G10 needs a P word with the number of a work offset, 1 for G54", line=line, code="OLP516"
-            )
+        kind, number, further = stated
         if number == 0 and not self.profile.g10_active:
             changes = kind != 2 or any(word.value for _, word in axis_words)
             self._check_common(line, changes=changes)
@@ -324,7 +292,7 @@ class OffsetState(State):
                 line=line,
                 code="OLP526",
             )
-        if "R" in by_letter and turns:
+        if "R" in by_letter and kind == 2 and self.profile.turns_offsets:
             self.offsets.turned_deg[name] = by_letter["R"].value
         for i, word in axis_words:
             value = self.length_mm(word)
@@ -345,6 +313,47 @@ class OffsetState(State):
                 self.located[name] = self.located.get(active, active)
                 base[i] = self.offsets.work_at(i, self.position[i], value)
         self.offsets.written |= dict.fromkeys(names, base)
+
+    def _stated_offset(self, line: int, by_letter: dict[str, Word]) -> tuple[int, int, bool] | None:
+        """The L and P of a block with G10, and whether P is that of a further offset; None where the block
+        writes no work offset. Raises ProgramError for what is not read."""
+        from olp.program.rs274.tool_tables import check_tool, words_of_tool
+
+        if "L" not in by_letter and "P" in by_letter and by_letter["P"].value in self.profile.g10_clearances:
+            return None
+        if not self.profile.g10_offsets:
+            raise ProgramError(
+                "G10 writes tables of the control, which is not read; give what it writes in the machine or "
+                "job file, and take it out",
+                line=line,
+                code="OLP526",
+            )
+        kind = round(by_letter["L"].value) if "L" in by_letter else -1
+        stated = {a: self.length_mm(by_letter[a]) for a in words_of_tool(self, kind) if a in by_letter}
+        if stated and "P" in by_letter:
+            check_tool(self, kind, self._integer(by_letter["P"], line), stated, line)
+            return None
+        if kind not in (2, STORES_POSITION):
+            what = f"G10 L{kind}" if kind >= 0 else "G10 without L"
+            raise ProgramError(
+                f"{what} writes tables of the control, which is not read; expected L2 or L20",
+                line=line,
+                code="OLP526",
+            )
+        turns = self.profile.turns_offsets and kind == 2
+        if "R" in by_letter and not turns and (kind == STORES_POSITION or by_letter["R"].value != 0):
+            raise ProgramError(
+                "G10 R turns the work offset, which this control does not do here; leave R out",
+                line=line,
+                code="OLP526",
+            )
+        number = self._integer(by_letter["P"], line) if "P" in by_letter else -1
+        further = kind == STORES_POSITION and not self.profile.g10_stores
+        if not further <= number <= (_FURTHER if further else self.profile.g10_offsets):
+            raise ProgramError(
+                "G10 needs a P word with the number of a work offset, 1 for G54", line=line, code="OLP516"
+            )
+        return kind, number, further
 
     def _check_common(self, line: int, *, changes: bool) -> None:
         """Refuse what `changes` what some controls add to all work offsets: it is 0 here, as the machine file
