@@ -23,8 +23,9 @@ from olp.trajectory.merge import shared, variants
 from olp.trajectory.motion import Motion
 from olp.trajectory.optimise import optimised
 from olp.trajectory.route import Route
-from olp.trajectory.solvers import LAST, OPTIMISED, SOLVERS, Candidate, Run, Solver
+from olp.trajectory.solvers import LAST, OPTIMISED, SOLVERS, TUBE, Candidate, Run, Solver
 from olp.trajectory.speedgrid import bound_s
+from olp.trajectory.tube import in_tube
 
 #: a limit may be reached; this share above it is rounding
 _ROUNDING = 1e-9
@@ -76,6 +77,13 @@ def fastest(run: Run, candidates: tuple[Candidate, ...], optimise: bool) -> Solu
         if best is None and solver not in asked:
             best = _better(run, solver, best)
     return best
+
+
+def improved(run: Run, best: Solution) -> Solution:
+    """The motion of a run whose path and speed are planned together from the best one, where it is faster."""
+    motion = best.driven()
+    solver = Solver(TUBE, lambda run: in_tube(run.route, run.limits, motion), LAST.least_s, bends=True)
+    return _better(run, solver, best) or best
 
 
 def _entries(

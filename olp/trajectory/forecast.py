@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from olp.core.arrays import Array
+from olp.core.arrays import Array, Index
 from olp.trajectory import ramps
 from olp.trajectory.critical import BY_BEND
 from olp.trajectory.route import AxisLimits, Route
+from olp.trajectory.scurve import rest_to_rest_s
 from olp.trajectory.smooth import MOST_WIDTH
 
+#: segments per block
+_BLOCK = 1 << 15
 #: against division by zero
 _TINY = 1e-300
 #: components of a direction below this do not limit a move
@@ -56,3 +59,23 @@ def expected_s(route: Route, limits: AxisLimits) -> Array:
         used = 2.0 * ramps.distance(end, peak, *along)
         total += ramps.seconds(end, peak, *along) + 0.5 * np.maximum(between - used, 0.0) / peak
     return np.asarray(total)
+
+
+def straight(route: Route, limits: AxisLimits, stops: Index) -> tuple[Array, Array]:
+    """Seconds of each segment (n - 1,) at its feed, and about the least of each run (r,) from one of the
+    `stops` to the next: that of a straight move as long, along which all axes push."""
+    seconds, length = np.empty(len(route) - 1), np.empty(len(route) - 1)
+    for a in range(0, len(length), _BLOCK):
+        part = slice(a, min(a + _BLOCK, len(length)))
+        delta = np.abs(np.diff(route.point_mm[part.start : part.stop + 1], axis=0))
+        length[part] = np.sqrt((delta * delta).sum(axis=1))
+        seconds[part] = np.maximum(
+            (delta / limits.velocity).max(axis=1), length[part] / route.feed_mm_s[part]
+        )
+    begin = stops[:-1]
+    whole = np.add.reduceat(length, begin)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        fastest = np.fmax.reduceat(length / seconds, begin)
+    push, jerk = (np.sqrt((limit * limit).sum()) for limit in (limits.acceleration, limits.jerk))
+    ramps_s = rest_to_rest_s(whole, np.fmax(fastest, _TINY), push, jerk)
+    return seconds, np.maximum(np.add.reduceat(seconds, begin), ramps_s)

@@ -59,7 +59,8 @@ def planned(
         limits.velocity * route.scale, limits.acceleration * route.scale, limits.jerk * route.scale
     )
     for left in reversed(range(_ROUNDS)):
-        found = plan(route.route, scaled, tell, optimise=optimise)
+        # the bound of the tip holds for paths along the route, and rounds with lower feeds for one path
+        found = plan(route.route, scaled, tell, optimise=optimise, tubes=False)
         ratio, limit = _used(motion, route, found, scaled)
         factor = np.ones(len(route.line))
         np.maximum.at(factor, found.motion.line, ratio)

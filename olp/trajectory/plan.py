@@ -19,7 +19,7 @@ from olp.core.errors import CannotCompute
 from olp.core.progress import Progress
 from olp.core.values import dataclass
 from olp.trajectory.audit import Audit, Ratios, with_jumps
-from olp.trajectory.contest import contest, fastest, stops_of
+from olp.trajectory.contest import contest, fastest, improved, stops_of
 from olp.trajectory.motion import Motion
 from olp.trajectory.route import AxisLimits, Route
 from olp.trajectory.smooth import needs_stop
@@ -66,11 +66,13 @@ class Trajectory:
 
 
 def plan(
-    route: Route, limits: AxisLimits, tell: Progress | None = None, *, optimise: bool | None = None
-) -> Trajectory:
+    route: Route, limits: AxisLimits, tell: Progress | None = None, *, optimise: bool | None = None,
+    tubes: bool = True,
+) -> Trajectory:  # fmt: skip
     """The motion of a route that begins and ends at rest.
 
     `optimise`: whether speeds along dense curves are optimised; None: unless that would take minutes.
+    `tubes`: whether path and speed may be planned together where that gains most.
     Raises CannotCompute for a route that is not finite.
     """
     _check(route, limits)
@@ -80,7 +82,7 @@ def plan(
     used = [Ratios(none, none, none, 0.0)]
 
     def parts() -> Iterator[Motion]:
-        runs = runs_of(route, limits)
+        runs = runs_of(route, limits, tubes=tubes and optimise is not False)
         least = least_to_optimise(runs) if optimise is None else (0 if optimise else len(route))
         for stretch in together(runs, least):
             for motion, some, ratio in _legs(route, limits, stretch, least):
@@ -140,6 +142,8 @@ def _legs(
     )  # fmt: skip
     if stretch.runs == 1 or len(stretch.candidates) == 1:
         solution = fastest(run, stretch.candidates, stretch.segments >= least and stretch.runs == 1)
+        if solution is not None and stretch.tube:
+            solution = improved(run, solution)
         chosen = [] if solution is None else [(0, last - first, solution)]
     else:
         chosen = contest(run, stretch.candidates)

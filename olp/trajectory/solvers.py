@@ -21,6 +21,7 @@ OVERLAP = "overlapped moves"
 CRITICAL = "critical points"
 EXACT_STOP = "exact stops"
 OPTIMISED = "optimised speed"
+TUBE = "path and speed together"
 #: share of the expected time that critical points take at least
 _AT_BEST = 0.9
 

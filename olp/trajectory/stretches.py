@@ -6,12 +6,14 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from olp.core.arrays import Array, Index
+from olp.core.arrays import Array, Index, Mask
 from olp.core.values import dataclass
 from olp.trajectory.contest import stops_of
+from olp.trajectory.forecast import straight
 from olp.trajectory.route import AxisLimits, Route
 from olp.trajectory.solvers import SOLVERS, Candidate
 from olp.trajectory.speedgrid import CELL_S
+from olp.trajectory.tube import MOST_CELLS, cells_of
 
 #: runs with no more segments than this are planned by the overlapping solver only
 _FEW_SEGMENTS = 1
@@ -29,17 +31,20 @@ _CALL = 500
 _BLOCK = 1 << 15
 #: waypoints of runs that are planned together, as a call costs more than a move
 _TOGETHER = 1 << 15
+#: cells of tubes at most, about 10 s, and those that take as long as the fixed cost of one
+_CELLS, _OF_TUBE = 4000, 30
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stretch:
     """`runs` that are planned together, from waypoint `first` to `last` (both at rest), and the solvers that
-    may win there, the most promising first."""
+    may win there, the most promising first. In a `tube` path and speed are planned together after them."""
 
     first: int
     last: int
     candidates: tuple[Candidate, ...]
     runs: int = 1
+    tube: bool = False
 
     @property
     def segments(self) -> int:
@@ -57,8 +62,9 @@ class Stretch:
         return _CALL + _PIECES * self.segments + seconds / CELL_S
 
 
-def runs_of(route: Route, limits: AxisLimits) -> list[Stretch]:
-    """The runs from each stop to the next, and the solvers that may win, the most promising first."""
+def runs_of(route: Route, limits: AxisLimits, *, tubes: bool = False) -> list[Stretch]:
+    """The runs from each stop to the next, and the solvers that may win, the most promising first. With
+    `tubes` those that lose most time are planned in them."""
     stops = stops_of(route)
     if len(stops) < 2:
         return []
@@ -70,16 +76,17 @@ def runs_of(route: Route, limits: AxisLimits) -> list[Stretch]:
     keep = least_s <= np.where(bends, np.inf, first / _CLEAR_WIN)
     # a program of exact stops has as many runs as waypoints
     alone = [(Candidate(solver, 0.0),) for solver in SOLVERS]
+    tubed = _tubed(route, limits, stops, first) if tubes else np.zeros(len(first), bool)
     runs = []
-    for begin, end, ranks, fits, some in zip(
+    for begin, end, ranks, fits, some, tube in zip(
         stops[:-1].tolist(), stops[1:].tolist(), order.T.tolist(), keep.T.tolist(), least_s.T.tolist(),
-        strict=True,
+        tubed.tolist(), strict=True,
     ):  # fmt: skip
         if sum(fits) == 1:
             candidates = alone[ranks[0]]
         else:
             candidates = tuple(Candidate(SOLVERS[i], some[i]) for i in ranks if fits[i])
-        runs.append(Stretch(begin, end, candidates))
+        runs.append(Stretch(begin, end, candidates, tube=tube))
     return runs
 
 
@@ -93,12 +100,13 @@ def least_to_optimise(runs: list[Stretch]) -> int:
 
 
 def together(runs: list[Stretch], least: int) -> Iterator[Stretch]:
-    """The runs; straight ones, and short ones that are not optimised, are joined, as they may be many."""
+    """The runs; straight ones, and short ones that are not optimised, are joined, as they may be many. Those
+    in tubes are not."""
     short = min(least, _SHORT + 1)
     begin = 0
     group: list[Stretch] = []
     for run in [*runs, None]:
-        small = run is not None and (run.segments < short or not run.bends)
+        small = run is not None and not run.tube and (run.segments < short or not run.bends)
         if group and (run is None or not small or run.last - begin > _TOGETHER):
             candidates = max((some.candidates for some in group), key=len)
             yield Stretch(begin, group[-1].last, candidates, len(group))
@@ -129,3 +137,17 @@ def _forecast(route: Route, limits: AxisLimits, stops: Index) -> Array:
     few = np.diff(stops) <= _FEW_SEGMENTS
     seconds[[solver.bends for solver in SOLVERS]] += np.where(few, np.inf, 0.0)
     return seconds
+
+
+def _tubed(route: Route, limits: AxisLimits, stops: Index, least_s: Array) -> Mask:
+    """(r,) the runs that are planned in tubes: those that lose most time beside a straight move for each
+    cell, as many as are affordable. `least_s` (r,) are about the seconds of each run."""
+    segment_s, straight_s = straight(route, limits, stops)
+    cells = cells_of(segment_s, route.tolerance_mm, limits)
+    count = np.maximum(np.add.reduceat(cells, stops[:-1]), 1.0)
+    order = np.argsort((straight_s - least_s) / count, kind="stable")
+    fits = (np.diff(stops) > 1) & (count <= MOST_CELLS)
+    order = order[fits[order]]
+    tubed = np.zeros(len(least_s), bool)
+    tubed[order[np.cumsum(_OF_TUBE + count[order]) <= _CELLS]] = True
+    return tubed

@@ -1,0 +1,194 @@
+"""The least time of a spline of time inside bounds that its nodes share with few others.
+
+A primal-dual interior method. Every step of it stays strictly within all bounds. Lengths of cells make the
+bounds other than convex: a ridge on their change, which grows where steps have to be cut, holds them back.
+Source: Boyd and Vandenberghe, Convex Optimization, 11.7; Levenberg-Marquardt for the ridge.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.linalg import LinAlgError, solveh_banded
+
+from olp.core.arrays import Array, Index
+from olp.core.values import dataclass
+from olp.trajectory.timespline import NODES, TimeSpline
+
+#: first and least barrier, all of it over the time
+_FIRST, _LEAST = 0.05, 3e-4
+#: (length, factor): the factor by which the barrier falls after a step longer than that
+_FALL = ((0.8, 0.5), (0.4, 0.7), (0.2, 0.9), (-1.0, 1.0))
+#: share of the distance to the boundary that a step may take, and of its slack that it leaves to each row
+_NEAR, _LEAVE = 0.95, 0.02
+#: factor by which a step is cut, and how often at most
+_BACK, _TRIES = 0.6, 12
+#: ridge on changes of lengths, relative, at first and its least and most; factors after short and long steps
+_RIDGE, _RIDGES, _STIFFER, _SOFTER = 1e-2, (1e-6, 1e3), 4.0, 0.3
+#: steps shorter and longer than these
+_SHORT, _LONG = 0.3, 0.7
+#: addition to the diagonal, relative, and where there is none
+_ROUNDING, _NOTHING = 1e-9, 1e-12
+#: multipliers are at most so much above or below those of the barrier
+_APART = 1e3
+#: steps at most, and how many may be none
+_STEPS, _STUCK = 80, 4
+#: change of the time, relative, below which it counts as still, below so large a barrier
+_DONE, _BARRIER = 1e-4, 2e-3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Group:
+    """Bounds: `value` (r, k) is at most 1, and with both `sides` at least -1.
+
+    `slope` (r, k, 5, axes + 1) is its change by the five nodes from `base` (r,) on, which is -1 or more.
+    `curve` (r, c, 5, axes + 1) are rows whose squares are half its curvature. Both are empty where only
+    values are asked for."""
+
+    base: Index
+    value: Array
+    sides: bool
+    slope: Array
+    curve: Array | None = None
+
+    def slack(self) -> Array:
+        """(1 or 2, r, k) what is left below 1, and above -1."""
+        above = 1.0 - self.value
+        return np.stack((above, 1.0 + self.value)) if self.sides else above[None]
+
+    def signs(self) -> Array:
+        return np.array([1.0, -1.0] if self.sides else [1.0])[:, None, None]
+
+    def change(self, step: Array) -> Array:
+        """(1 or 2, r, k) by which a `step` of the padded nodes changes the slack."""
+        near = step[self.base[:, None] + 1 + np.arange(NODES)]
+        return np.asarray(-self.signs() * np.einsum("rkqb,rqb->rk", self.slope, near))
+
+
+#: all bounds of a spline, with or without slopes
+Bounds = Callable[[TimeSpline, bool], list[Group]]
+
+
+def least_time(spline: TimeSpline, bounds: Bounds, size_mm: float) -> TimeSpline:
+    """The spline of least time, from one strictly within the bounds. The first three and the last three
+    coefficients are kept; others move by about `size_mm`."""
+    groups = bounds(spline, True)
+    whole = spline.duration_s
+    count = sum(group.value.size * (1 + group.sides) for group in groups)
+    mu = _FIRST / count
+    duals = [mu / group.slack() for group in groups]
+    ridge, calm, stuck = _RIDGE, 0, 0
+    for _ in range(_STEPS):
+        try:
+            step = _newton(spline, groups, duals, mu, whole, size_mm, ridge)
+        except LinAlgError:
+            break
+        changes = [group.change(step) for group in groups]
+        there, length = _toward(spline, groups, changes, bounds, step)
+        if length < _SHORT or length > _LONG:
+            ridge = min(max(ridge * (_STIFFER if length < _SHORT else _SOFTER), _RIDGES[0]), _RIDGES[1])
+        if not length:
+            stuck += 1
+            if stuck == _STUCK:
+                break
+            continue
+        before, spline = spline.duration_s, there
+        dual_length = _advance(groups, duals, changes, mu)
+        groups = bounds(spline, True)
+        for dual, group in zip(duals, groups, strict=True):
+            central = mu / group.slack()
+            np.clip(dual, central / _APART, central * _APART, out=dual)
+        mu *= next(fall for least, fall in _FALL if min(length, dual_length) > least)
+        mu = max(mu, _LEAST / count)
+        still = before - spline.duration_s < _DONE * before and mu * count < _BARRIER and length > _SHORT
+        calm = calm + 1 if still else 0
+        if calm == 2:
+            break
+    return spline
+
+
+def _newton(
+    spline: TimeSpline, groups: list[Group], duals: list[Array], mu: float, whole: float, size_mm: float,
+    ridge: float,
+) -> Array:  # fmt: skip
+    """Newton's step of the nodes, padded by one before and two behind (m + 6, axes + 1)."""
+    m, axes = len(spline), spline.coefficient.shape[1]
+    wide = axes + 1
+    gradient = np.zeros((m + 6, wide))
+    gradient[2 : m + 2, axes] = 1.0 / whole
+    blocks = np.zeros((m + 2, NODES * wide, NODES * wide))
+    for group, dual in zip(groups, duals, strict=True):
+        if not len(group.base):
+            continue
+        rows, slack = group.slope.reshape(*group.value.shape, -1), group.slack()
+        weight = (dual / slack).sum(axis=0)
+        block = rows.transpose(0, 2, 1) @ (weight[:, :, None] * rows)
+        if group.curve is not None:
+            curve = group.curve.reshape(*group.curve.shape[:2], -1)
+            block += dual[0, :, :, None] * (curve.transpose(0, 2, 1) @ curve)
+        pull = (mu * group.signs() / slack).sum(axis=0)
+        pulled = (pull[:, None, :] @ rows).reshape(-1, NODES, wide)
+        np.add.at(blocks, group.base + 1, block)
+        for k in range(NODES):
+            np.add.at(gradient, group.base + 1 + k, pulled[:, k])
+    scale = np.full((m + 6, wide), size_mm)
+    scale[2 : m + 2, axes] = spline.cell_s
+    free = np.zeros((m + 6, wide), bool)
+    free[4 : m + 1, :axes] = True
+    free[2 : m + 2, axes] = True
+    stiff = np.zeros((m + 6, wide))
+    stiff[2 : m + 2, axes] = ridge
+    step = _solved(blocks, gradient.ravel(), scale.ravel(), free.ravel(), stiff.ravel(), wide)
+    return step.reshape(m + 6, wide)
+
+
+def _solved(blocks: Array, gradient: Array, scale: Array, free: Array, stiff: Array, wide: int) -> Array:
+    """The step of the free unknowns from blocks of the matrix that begin at each node, in scaled unknowns."""
+    size, width = len(gradient), NODES * wide
+    band = np.zeros((width, size))
+    reach = len(blocks) * wide
+    for p in range(width):
+        for q in range(p, width):
+            band[width - 1 - (q - p), q : q + reach : wide] += blocks[:, p, q]
+    used = np.where(free, scale, 0.0)
+    for k in range(width):
+        band[width - 1 - k, k:] *= used[k:] * used[: size - k]
+        band[width - 1 - k, :k] = 0.0
+    diagonal = band[-1]
+    diagonal += np.where(free, _ROUNDING * diagonal + _NOTHING + stiff, 1.0)
+    return np.asarray(-used * solveh_banded(band, used * gradient, overwrite_ab=True, check_finite=False))
+
+
+def _toward(
+    spline: TimeSpline, groups: list[Group], changes: list[Array], bounds: Bounds, step: Array
+) -> tuple[TimeSpline, float]:
+    """The spline after a part of a step that leaves each row some of its slack, and that part; 0: none."""
+    m, axes = len(spline), spline.coefficient.shape[1]
+    slacks = [group.slack() for group in groups]
+    fall = max(
+        float((-change / slack).max(initial=0.0)) for change, slack in zip(changes, slacks, strict=True)
+    )
+    length = min(1.0, _NEAR / fall) if fall > 0.0 else 1.0
+    for _ in range(_TRIES):
+        part = length * step
+        there = spline.moved(part[1 : m + 4, :axes], part[2 : m + 2, axes])
+        if (there.cell_s > 0.0).all():
+            left = [group.slack() for group in bounds(there, False)]
+            if all((some > _LEAVE * slack).all() for some, slack in zip(left, slacks, strict=True)):
+                return there, length
+        length *= _BACK
+    return spline, 0.0
+
+
+def _advance(groups: list[Group], duals: list[Array], changes: list[Array], mu: float) -> float:
+    """Step along Newton's direction of the multipliers while all stay positive; the length of the step."""
+    moves = [
+        (mu - dual * change) / group.slack() - dual
+        for group, dual, change in zip(groups, duals, changes, strict=True)
+    ]
+    fall = max(float((-move / dual).max(initial=0.0)) for move, dual in zip(moves, duals, strict=True))
+    length = min(1.0, _NEAR / fall) if fall > 0.0 else 1.0
+    for dual, move in zip(duals, moves, strict=True):
+        dual += length * move
+    return length

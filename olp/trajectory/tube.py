@@ -1,0 +1,296 @@
+"""Path and speed together: the fastest motion inside the tolerance tube, from one that others have planned.
+
+The axes are cubic splines of time with free knots. Each cell has its segment of the route: both inner control
+points of its cubic are as near to that segment as the path tolerance allows, and where a cell has another
+segment than the one before, the motion is as near to the waypoint between them. So the whole motion is inside
+the tube, and passes the waypoints in order. Limits hold for control points of the velocity, for accelerations
+at knots and the jerks of cells, which is everywhere. `olp.trajectory.descent` finds the least time.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+
+from olp.core.arrays import Array, Index
+from olp.core.errors import CannotCompute
+from olp.core.values import dataclass
+from olp.trajectory.descent import Group, least_time
+from olp.trajectory.forecast import straight
+from olp.trajectory.motion import Motion
+from olp.trajectory.passing import passing_s
+from olp.trajectory.route import AxisLimits, Route
+from olp.trajectory.timespline import NODES, TimeSpline
+
+#: cells of a segment, and of the whole, at least where they are no shorter than ...
+_OF_SEGMENT, _OF_WHOLE = 16, 48
+#: ... this share of the time in which the jerk moves an axis by the tolerance
+_FINEST = 1.4
+#: knots of the motion closer than this share of a cell are one
+_SAME = 0.25
+#: cells at most: a run that needs more is left as it is
+MOST_CELLS = 400
+#: share of the time of a straight move that a motion takes longer, where a faster one is sought
+_GAIN = 3e-3
+#: share of the tolerance within which the search begins
+_BEGIN = 0.985
+#: share of the tolerance by which the search begins beyond a waypoint where the feed changes
+_ACROSS = 0.04
+#: share by which the tolerance may be used, and by which a control point may be out of it while it is pulled
+_USED, _OUTSIDE = 1.0 - 1e-6, 0.99
+#: turns of pulling control points inside
+_PULLS = 30
+#: factor by which the search begins slower than the limits allow
+_SLOWED = 1.1
+#: a cell may become so much shorter and longer
+_SHORTEST, _LONGEST = 0.1, 5.0
+#: s; a segment that is passed in less has no cell of its own
+_LEAST_S = 1e-7
+#: share of the speed by which the motion may turn back along its segment, as rounding
+_BACK = 1e-9
+_TINY = 1e-300
+
+
+def in_tube(route: Route, limits: AxisLimits, motion: Motion) -> Motion:
+    """A faster motion of a run than `motion`, whose lines are segments of the route, as those of the result.
+
+    Raises CannotCompute where none is found.
+    """
+    least_s = straight(route, limits, np.array([0, len(route) - 1]))[1][0]
+    if motion.duration_s <= (1.0 + _GAIN) * least_s:
+        raise CannotCompute("there is hardly any time to gain")
+    moves = np.flatnonzero(np.ptp(route.point_mm, axis=0) > 0.0)
+    own = Route(route.point_mm[:, moves], route.feed_mm_s, route.line, route.tolerance_mm, route.dwell_s)
+    some = AxisLimits(*(limit[moves] for limit in (limits.velocity, limits.acceleration, limits.jerk)))
+    flat = Motion(motion.start_s, motion.time, motion.path[:, :, moves], motion.shape, motion.line)
+    knot_s, segment = _knots(own, some, flat)
+    tube = _Tube.of(own, some, segment)
+    spline = tube.inside(TimeSpline.through(flat, knot_s))
+    spline = spline.slowed(_SLOWED * tube.excess(spline))
+    tube = tube.from_here(spline)
+    found = least_time(spline, tube.bounds, float(own.tolerance_mm[1:-1].min()))
+    if found.duration_s >= motion.duration_s or not tube.forward(found):
+        raise CannotCompute("no faster motion is found inside the tube")
+    planned = found.motion(segment)
+    path = np.zeros((len(planned.path), 4, route.point_mm.shape[1]))
+    path[:, 0] = route.point_mm[0]
+    path[:, :, moves] = planned.path
+    return Motion(planned.start_s, planned.time, path, planned.shape, planned.line)
+
+
+def cells_of(lasts: Array, tolerance_mm: Array, limits: AxisLimits) -> Array:
+    """(n - 1,) about the cells of segments that last so long between waypoints of tolerances (n,)."""
+    return np.ceil(np.minimum(lasts / _finest_s(tolerance_mm, limits), _OF_SEGMENT))
+
+
+def _finest_s(tolerance_mm: Array, limits: AxisLimits) -> Array:
+    """(n - 1,) the shortest cells of segments between waypoints of tolerances (n,)."""
+    wide = np.maximum(tolerance_mm[:-1], tolerance_mm[1:])
+    return np.asarray(np.maximum(_FINEST * np.cbrt(wide / limits.jerk.max()), _LEAST_S))
+
+
+def _knots(route: Route, limits: AxisLimits, motion: Motion) -> tuple[Array, Index]:
+    """Knots (m + 1,) s, and the segment (m,) of each cell: where the motion passes waypoints, and where its
+    own cubics meet, and between so many that no cell is too long."""
+    passed = passing_s(route, motion)
+    lasts = np.diff(passed)
+    most = np.minimum(lasts / _OF_SEGMENT, passed[-1] / _OF_WHOLE)
+    most = np.maximum(most, _finest_s(route.tolerance_mm, limits))
+    if np.ceil(lasts / most).sum() > MOST_CELLS:
+        raise CannotCompute("the run is too long")
+    # only cubics of time meet at knots of a spline
+    own = motion.start_s if motion.time.shape[1] == 4 else passed
+    knots, segment = [0.0], []
+    for k in np.flatnonzero(lasts > _LEAST_S).tolist():
+        begin, end, gap = float(passed[k]), float(passed[k + 1]), _SAME * float(most[k])
+        edges = [begin]
+        for time in own[np.searchsorted(own, begin + gap) : np.searchsorted(own, end - gap)].tolist():
+            if time - edges[-1] > gap:
+                edges.append(time)
+        edges.append(end)
+        for a, b in pairwise(edges):
+            count = max(math.ceil((b - a) / most[k] - 1e-9), 1)
+            knots += [a + (b - a) * i / count for i in range(1, count)] + [b]
+            segment += [k] * count
+    if len(segment) > 2 * MOST_CELLS:
+        raise CannotCompute("the run is too long")
+    knots[0], knots[-1] = 0.0, float(passed[-1])
+    return np.array(knots), np.array(segment, np.int64)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Tube:
+    """What bounds a spline whose cells have segments from `begin` (m, axes) along `unit` (m, axes) for
+    `length` (m,), within `wide` (m,) mm. It passes inner knots `knot` (w,) within `ball` (w,) mm of the
+    waypoints `centre` (w, axes), and on that `side` (w, axes) of them, over mm, where the faster of two
+    segments is. `feed` (m - 2,) is that of d1[2:m], `cell_s` (m,) are the first lengths."""
+
+    limits: AxisLimits
+    begin: Array
+    unit: Array
+    length: Array
+    wide: Array
+    knot: Index
+    centre: Array
+    ball: Array
+    side: Array
+    feed: Array
+    cell_s: Array
+
+    @staticmethod
+    def of(route: Route, limits: AxisLimits, segment: Index) -> _Tube:
+        begin = route.point_mm[segment]
+        delta = route.point_mm[segment + 1] - begin
+        length = np.sqrt((delta * delta).sum(axis=1))
+        tolerance = route.tolerance_mm
+        change = 1 + np.flatnonzero(np.diff(segment))
+        skipped = np.diff(segment)[change - 1]
+        knot = np.repeat(change, skipped)
+        waypoint = segment[knot] - (np.repeat(np.cumsum(skipped), skipped) - np.arange(len(knot)) - 1)
+        feed = route.feed_mm_s[segment]
+        # d1[j + 1] is in the middle of cell j, and is a part of both its neighbours
+        least = np.minimum(np.minimum(feed[:-2], feed[1:-1]), feed[2:])
+        return _Tube(
+            limits, begin, delta / np.maximum(length, _TINY)[:, None], length,
+            np.maximum(tolerance[segment], tolerance[segment + 1]), knot, route.point_mm[waypoint],
+            tolerance[waypoint], _sides(route, waypoint), least, np.ones(len(segment)),
+        )  # fmt: skip
+
+    def from_here(self, spline: TimeSpline) -> _Tube:
+        """The same for lengths of cells near those of a spline."""
+        return _Tube(
+            self.limits, self.begin, self.unit, self.length, self.wide, self.knot, self.centre, self.ball,
+            self.side, self.feed, spline.cell_s,
+        )  # fmt: skip
+
+    def bounds(self, spline: TimeSpline, slopes: bool) -> list[Group]:
+        """All bounds."""
+        m, axes = len(spline), spline.coefficient.shape[1]
+        rates = spline.rates()
+        none = np.zeros((0, axes, NODES, axes + 1))
+        by1, by2, by3 = rates.slopes() if slopes else (none, none, none)
+        first = np.arange(-1, m)
+        groups = []
+        for own, value, slope, most in (
+            (slice(0, m), rates.d3, by3, self.limits.jerk),
+            (slice(1, m), rates.d2, by2, self.limits.acceleration),
+            (slice(2, m), rates.d1, by1, self.limits.velocity),
+        ):
+            groups.append(Group(first[own], value[own] / most, True, slope[own] / most[:, None, None]))
+        groups.append(_round(first[2:m], rates.d1[2:m], self.feed, by1[2:m]))
+        for place in spline.controls():
+            off, across = self._off(place.point())
+            slope = across @ place.slope().reshape(m, axes, -1) if slopes else none
+            groups.append(_round(np.arange(m), off, _USED * self.wide, slope.reshape(-1, *none.shape[1:])))
+        place_mm, by_c, by_h = spline.at_knots(self.knot)
+        slope = np.zeros((len(self.knot) if slopes else 0, *none.shape[1:]))
+        if slopes:
+            for i in range(axes):
+                slope[:, i, 1:4, i] = by_c
+            slope[:, :, :4, axes] = by_h.transpose(0, 2, 1)
+        off = place_mm - self.centre
+        groups.append(_round(self.knot - 1, off, _USED * self.ball, slope))
+        some = np.flatnonzero(self.side.any(axis=1))
+        beyond = 1.0 - (off[some] * self.side[some]).sum(axis=1)
+        along = none[:, :1]
+        if slopes:
+            along = -np.einsum("ri,riqb->rqb", self.side[some], slope[some])[:, None]
+        groups.append(Group(self.knot[some] - 1, beyond[:, None], False, along))
+        middle, half = 0.5 * (_LONGEST + _SHORTEST), 0.5 * (_LONGEST - _SHORTEST)
+        slope = np.zeros((m if slopes else 0, 1, NODES, axes + 1))
+        if slopes:
+            slope[:, 0, 1, axes] = 1.0 / self.cell_s / half
+        share = (spline.cell_s / self.cell_s - middle) / half
+        return [*groups, Group(np.arange(m), share[:, None], True, slope)]
+
+    def _off(self, point: Array) -> tuple[Array, Array]:
+        """(m, axes) from the nearest places of their segments to points (m, axes), and the matrices
+        (m, axes, axes) of its change."""
+        gone = point - self.begin
+        along = (gone * self.unit).sum(axis=1)
+        beside = (along > 0.0) & (along < self.length)
+        off = gone - np.clip(along, 0.0, self.length)[:, None] * self.unit
+        own = np.where(beside[:, None], self.unit, 0.0)
+        return off, np.eye(point.shape[1]) - own[:, :, None] * own[:, None, :]
+
+    def inside(self, spline: TimeSpline) -> TimeSpline:
+        """The spline with coefficients pulled until all is in the tube. Raises CannotCompute."""
+        c = spline.coefficient.copy()
+        cell = np.arange(len(spline))
+        for _ in range(_PULLS):
+            here = TimeSpline(c, spline.cell_s)
+            move, count = np.zeros_like(c), np.zeros(len(c))
+            rows = [(cell + 1, self._off(place.point())[0], self.wide, 2) for place in here.controls()]
+            rows.append((self.knot, here.at_knots(self.knot)[0] - self.centre, self.ball, 3))
+            for node, off, wide, nodes in rows:
+                far = np.sqrt((off * off).sum(axis=1))
+                out = np.flatnonzero(far > _OUTSIDE * wide)
+                back = off[out] * (1.0 - _BEGIN * wide[out] / far[out])[:, None]
+                for k in range(nodes):
+                    np.add.at(move, node[out] + k, back)
+                    np.add.at(count, node[out] + k, 1.0)
+            # across the waypoints where the feed changes, if not yet
+            size = np.maximum((self.side * self.side).sum(axis=1), _TINY)
+            short = _ACROSS - (rows[-1][1] * self.side).sum(axis=1)
+            out = np.flatnonzero(self.side.any(axis=1) & (short > 0.5 * _ACROSS))
+            across = -(short[out] / size[out])[:, None] * self.side[out]
+            for k in range(3):
+                np.add.at(move, self.knot[out] + k, across)
+                np.add.at(count, self.knot[out] + k, 1.0)
+            if not count.any():
+                return here
+            c[3:-3] -= (move / np.maximum(count, 1.0)[:, None])[3:-3]
+        raise CannotCompute("the motion is not inside the tube")
+
+    def excess(self, spline: TimeSpline) -> float:
+        """The factor by which a spline has to be slower to keep all limits."""
+        rates = spline.rates()
+        speed = np.sqrt((rates.d1 * rates.d1).sum(axis=1))[2 : len(spline)]
+        return max(
+            float((np.abs(rates.d1) / self.limits.velocity).max()),
+            float((speed / self.feed).max(initial=0.0)),
+            float(np.sqrt((np.abs(rates.d2) / self.limits.acceleration).max())),
+            float(np.cbrt((np.abs(rates.d3) / self.limits.jerk).max())),
+        )
+
+    def forward(self, spline: TimeSpline) -> bool:
+        """Whether the motion nowhere turns back: every cell moves along its segment or one beside it."""
+        rates, h, m = spline.rates(), spline.lengths(), len(spline)
+        knot = np.arange(m + 1)
+        both = h[knot + 1] + h[knot + 2]
+        share = (h[knot + 1] / both)[:, None]
+        at_knot = rates.d1[knot] + share * (rates.d1[knot + 1] - rates.d1[knot])
+        controls = (at_knot[:-1], rates.d1[1:-1], at_knot[1:])
+        fastest = max(float(np.abs(rates.d1).max()), _TINY)
+        good = np.zeros(m, bool)
+        change = np.flatnonzero((np.diff(self.begin, axis=0) != 0.0).any(axis=1))
+        of = np.concatenate(([0], change + 1))
+        own = np.searchsorted(of, np.arange(m), side="right") - 1
+        for step in (-1, 0, 1):
+            unit = self.unit[of[np.clip(own + step, 0, len(of) - 1)]]
+            good |= np.min([(e * unit).sum(axis=1) for e in controls], axis=0) >= -_BACK * fastest
+        return bool(good.all())
+
+
+def _round(base: Index, value: Array, most: Array, slope: Array) -> Group:
+    """Bounds of the length of vectors `value` (r, axes), which change by `slope`."""
+    over = 1.0 / most
+    share = value * over[:, None]
+    rows = slope * over[: len(slope), None, None, None]
+    along = 2.0 * np.einsum("ri,riqb->rqb", share[: len(slope)], rows)
+    return Group(base, (share * share).sum(axis=1)[:, None], False, along[:, None], np.sqrt(2.0) * rows)
+
+
+def _sides(route: Route, waypoint: Index) -> Array:
+    """(w, axes) over the tolerance, the direction in which waypoints are passed before the motion goes over
+    to a segment with more feed, and against which to one with less; 0 where both have the same."""
+    point = route.point_mm
+    delta = np.diff(point, axis=0)
+    unit = delta / np.maximum(np.sqrt((delta * delta).sum(axis=1)), _TINY)[:, None]
+    both = unit[waypoint - 1] + unit[waypoint]
+    both /= np.maximum(np.sqrt((both * both).sum(axis=1)), _TINY)[:, None]
+    before, behind = route.feed_mm_s[waypoint - 1], route.feed_mm_s[waypoint]
+    sign = (behind > before).astype(float) - (behind < before)
+    return np.asarray(both * (sign / route.tolerance_mm[waypoint])[:, None])
