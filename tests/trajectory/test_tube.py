@@ -55,7 +55,14 @@ def test_more_feed_holds_behind_the_waypoint_and_not_within_the_tolerance_of_it(
 ) -> None:
     """A path may pass a waypoint by the tolerance before it; feeds once changed there."""
     flat = np.array([[0.0, 0.0], [4.0, 0.0], [8.0, bend], [8.0, 3.0]])
-    tubes_of(route_of(flat, 0.05, np.array([*feeds, 80.0])))
+    route = route_of(flat, 0.05, np.array([*feeds, 80.0]))
+    tubes_of(route)
+    motion = plan(route, LIMITS).motion
+    place, velocity = motion.at(np.linspace(0.0, motion.duration_s, 20_000)[1:-1])[:2]
+    slow = (place[:, 0] < 4.0 - 1e-6) if feeds[0] < feeds[1] else (place[:, 0] > 4.0 + 1e-6)
+    slow &= place[:, 0] < 7.0
+    assert slow.sum() > 1000
+    assert np.sqrt((velocity[slow] ** 2).sum(axis=1)).max() <= 20.0 * (1.0 + 1e-9)
 
 
 def test_points_that_are_one_and_rapids_are_driven() -> None:
