@@ -44,7 +44,7 @@ def positions_program(
             lines.append(f"G53 G0 {' '.join(words)}")
         before = words
         if wait > 0.0:
-            count = profile.increments_without_point
+            count = profile.dwell_s(1000.0, pointed=False) == 1.0
             lines.append(f"G4 {profile.dwell}" + (f"{round(1000.0 * wait)}" if count else f"{wait:.3f}"))
     lines.append("M30")
     return ("\n".join(lines) + "\n").encode()
