@@ -156,26 +156,34 @@ def check(
     programs: Iterable[str | None], machine: str | None, job: str | None, words: dict[str, Any]
 ) -> None:
     """`olp check`: the program is corrected in memory, or proved against its nominal one."""
+    from olp.files.write import write_files
     from olp.reports.report import to_json
     from olp.workflows.joints.correct import JointOptions, corrected
     from olp.workflows.joints.verify import verified
 
     options = options_of(JointOptions, words)
+    programs, output = list(programs), words["output"]
+    if len(programs) > 1 and output != STREAM:
+        raise UsageError(f"-o is for one program, and {len(programs)} are named; check them one by one")
     found: list[Finding] = []
     for program in programs:
         nominal = words["nominal"]
         run = run_of(program if nominal is None else nominal, machine, job)
+        refuse_early(files_of(output), run.files, force=words["force"])
         result = (
             corrected(run, options)
             if nominal is None
             else verified(run, source(run.sources, program or STREAM), options)
         )
         found += result.findings
-        if words["as_json"]:
-            put(to_json(result.report))
-        elif not words["quiet"]:
-            go = "Go" if result.report["verdict"]["ok"] else "NO GO"
-            put(f"{go}: {program or run.program.name}\n\n{result.to_text()}")
+        go = "Go" if result.report["verdict"]["ok"] else "NO GO"
+        text = f"{go}: {program or run.program.name}\n\n{result.to_text()}"
+        told = to_json(result.report) if words["as_json"] else text.encode()
+        write_files({Path(name): told for name in files_of(output)}, force=words["force"], inputs=run.files)
+        if output == STREAM and (words["as_json"] or not words["quiet"]):
+            put(told if words["as_json"] else text)
+        elif output != STREAM and not words["quiet"]:
+            diagnostic(f"wrote {output}")
     exit_for(tuple(found), words["fail_on"])
 
 

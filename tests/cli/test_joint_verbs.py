@@ -1,4 +1,4 @@
-"""`inspect` of programs and report files on machines with rotary joints."""
+"""Verbs and report files on machines with rotary joints."""
 
 from __future__ import annotations
 
@@ -50,6 +50,19 @@ def test_a_program_is_inspected(tmp_path: Path) -> None:
     assert "nearest to singular" in run("inspect", program, "-m", machine).stdout.lower()
     refused = run("inspect", program, "-m", machine, "--at", "0", "0", "0")
     assert "--at does not go with machines with rotary joints" in refused.output
+
+
+def test_findings_of_a_list_go_into_a_file(tmp_path: Path) -> None:
+    job, output = ARM / "job.toml", tmp_path / "found.json"
+    shown = run("check", "-j", job, "--json")
+    told = run("check", "-j", job, "--json", "-o", output)
+    assert (told.exit_code, told.stdout) == (shown.exit_code, "")
+    assert output.read_text() == shown.stdout
+    again = run("check", "-j", job, "-o", output)
+    assert again.exit_code == 2
+    assert "exists already" in again.stderr
+    two = run("check", ARM / "deburr.csv", ARM / "deburr.csv", "-j", job, "-o", tmp_path / "two.txt")
+    assert "-o is for one program" in two.stderr
 
 
 @pytest.mark.parametrize("ending", ["md", "html", "json"])
