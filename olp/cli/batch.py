@@ -52,6 +52,9 @@ if TYPE_CHECKING:
 @confidence_options
 @outside_box_option("refuse the program", "take the error at the box's face")
 @click.option("--split-rapids", is_flag=True, help="Split rapids like feed moves.")
+@click.option(
+    "--times", is_flag=True, help="State how long the programs take, each and all, as olp retime plans."
+)
 @click.option("--include", multiple=True, metavar="PATTERN", help="Also files of such names, such as 'O*'.")
 @click.option("--exclude", multiple=True, metavar="PATTERN", help="No files of such names or paths.")
 @click.option("--keep-going", is_flag=True, help="Go on after a program that is refused.")

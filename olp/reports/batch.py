@@ -92,12 +92,14 @@ def _result(report: Report) -> list[tuple[str, str]]:
         ("Programs", str(len(report["programs"]))),
         *failed,
         ("Left out", str(len(report["skipped"]))),
+        *([("Time", _whole_time(report))] if report["time"] else []),
         ("Exit code", f"{report['exit_code']} (findings count from {report['fail_on']} on)"),
         ("History", report["history"]),
     ]
 
 
 def _cells(row: Report) -> list[str]:
+    """The cells of `_HEAD`."""
     return [
         str(row.get("moves", "-")),
         number(row.get("uncorrected_um")),
@@ -108,7 +110,33 @@ def _cells(row: Report) -> list[str]:
     ]
 
 
+_TIME = "time, s"
 _HEAD = ("moves", UNCORRECTED, CORRECTED, "verdict", "findings", "exit")
+
+
+def _timed(rows: Sequence[Report]) -> bool:
+    """Whether rows have a column of times."""
+    return any("time" in row for row in rows)
+
+
+def _seconds(row: Report) -> str:
+    """How long the corrected program takes."""
+    time = row.get("time") or {}
+    return f"{time['corrected_s']:.2f}" if "corrected_s" in time else "-"
+
+
+def _whole_time(report: Report) -> str:
+    """How long all programs take; empty where that was not asked."""
+    time = report["time"]
+    if not time:
+        return ""
+    way = "planned" if time["optimised"] else "planned, long ones without optimised speeds"
+    share = f"{100.0 * float(time['share']):+.3f} %"
+    unknown = f"; {time['unknown']} not known" if time["unknown"] else ""
+    return (
+        f"{time['corrected_s']:.2f} s for {time['programs']} corrected programs, {time['nominal_s']:.2f} s "
+        f"for the nominal ones ({share}), {way}{unknown}"
+    )
 
 
 def verdict_word(row: Report) -> str:
@@ -133,8 +161,17 @@ def _table(rows: Sequence[Report]) -> Iterator[str]:
         return
     yield "Largest deviation from the nominal path in um, the worst programs first"
     shown = rows[:MAX_ROWS]
-    cells = ([shortened(printable(row["program"]), _NAME), *_cells(row), row["state"]] for row in shown)
-    yield from table(["program", *_HEAD, "state"], cells)
+    timed = _timed(rows)
+    cells = (
+        [
+            shortened(printable(row["program"]), _NAME),
+            *_cells(row),
+            *map(_seconds, [row] * timed),
+            row["state"],
+        ]
+        for row in shown
+    )
+    yield from table(["program", *_HEAD, *[_TIME] * timed, "state"], cells)
     if len(rows) > MAX_ROWS:
         yield f"  and {len(rows) - MAX_ROWS} better ones; --report and --json list all"
 
@@ -176,20 +213,25 @@ def _skipped(skipped: Sequence[Report]) -> Iterator[str]:
 def _end(report: Report) -> Iterator[str]:
     if report["index"] is None:
         yield "index.html in the output folder is not of olp batch, and is left; --force overwrites it"
+    if report["time"]:
+        yield from textwrap.wrap(f"Time: {_whole_time(report)}.", WIDTH, subsequent_indent="  ")
     yield from textwrap.wrap(_sentence(report), WIDTH)
 
 
 def _grid(rows: Sequence[Report], place: Place) -> Grid:
     """One row per program, which leads to the corrected program, its report and its review page."""
     asked = [key for key in ("report", "page", "released") if any(row.get(key) for row in rows)]
+    timed = _timed(rows)
     body: list[list[str | Link]] = []
     for row in rows:
         moves, before, after, verdict, found, code = _cells(row)
         written = row["state"] in ("written", "unchanged", "not in this call") and not row.get("message")
         name: str | Link = Link(row["program"], place(row["program"])) if written else row["program"]
         more = [row.get(key) or "" if key == "released" else _link(row, key, place) for key in asked]
-        body.append([name, str(row.get("machine", "")), verdict, *more, found, moves, before, after, code])
-    header = ["program", "machine", "verdict", *asked, "findings", "moves", UNCORRECTED, CORRECTED, "exit"]
+        figures = [moves, before, after, *map(_seconds, [row] * timed), code]
+        body.append([name, str(row.get("machine", "")), verdict, *more, found, *figures])
+    figures = ["moves", UNCORRECTED, CORRECTED, *[_TIME] * timed, "exit"]
+    header = ["program", "machine", "verdict", *asked, "findings", *figures]
     return Grid(header, body, 4 + len(asked))
 
 

@@ -247,6 +247,7 @@ class _Plant:
             "others": sorted(map(self._judged, others), key=_rank),
             "skipped": [{"file": one.file, "why": one.why} for one in self._found.skipped],
             "counts": {state: states.count(state) for state in dict.fromkeys(states)},
+            "time": _time(rows),
             "fail_on": self._options.fail_on,
             "exit_code": max((row["exit_code"] for row in rows), default=0),
         }
@@ -380,6 +381,19 @@ def _program_files(program: str) -> Files:
     sources = Sources()
     sources.source(program).load()
     return sources.parcel()
+
+
+def _time(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any] | None:
+    """How long all programs take together, and of how many that is not known; None where none was timed."""
+    timed = [row["time"] for row in rows if "time" in row]
+    if not timed:
+        return None
+    from olp.workflows.correct_time import cost
+
+    known = [time for time in timed if "unknown" not in time]
+    nominal_s, corrected_s = (sum(time[key] for time in known) for key in ("nominal_s", "corrected_s"))
+    whole = cost(nominal_s, corrected_s, all(time["optimised"] for time in known))
+    return whole | {"programs": len(known), "unknown": len(timed) - len(known)}
 
 
 def _exit_code(findings: Sequence[Mapping[str, Any]], fail_on: str) -> int:

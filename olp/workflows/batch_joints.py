@@ -26,6 +26,10 @@ def outcome(config: Config, parcel: Parcel, task: Task) -> Outcome:
     if task.released is not None:
         return Outcome(_row(verified(run, parcel.source(task.released, task.program), options)))
     done = correction_of(run, options)
+    if options.times:
+        from olp.workflows.joints.correct_time import with_time
+
+        with_time(run, done, asked=True)
     result = JointCorrection.of(run, done)
     report = filed(result.report, task.report, options.date) if task.report else None
     page = None if task.page is None else task.page.of_joints(run, options, done, task.output)

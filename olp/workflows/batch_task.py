@@ -124,7 +124,8 @@ def counts(findings: Iterable[Finding]) -> list[dict[str, Any]]:
 
 
 def heading(stated: Mapping[str, Any]) -> dict[str, Any]:
-    """What a row tells of a report before its figures: the program, the machine and its calibration."""
+    """What a row tells of a report before its figures: the program, the machine and its calibration, and how
+    long both programs take where that was asked."""
     program, calibration = stated["program"], stated.get("calibration", {})
     measured = calibration.get("measured")
     return {
@@ -136,4 +137,5 @@ def heading(stated: Mapping[str, Any]) -> dict[str, Any]:
             "measured": None if measured is None else measured.isoformat(),
             "sha256": calibration.get("sha256"),
         },
+        **({"time": stated["time"]} if "time" in stated else {}),
     }

@@ -81,7 +81,12 @@ def _failed(
 
 def _corrected(session: Session, source: Source, task: Task) -> Outcome:
     options = task.options
-    result = correct.run(session, source, options)
+    # a program that cannot be timed is corrected all the same
+    result = correct.run(session, source, replace(options, times=False))
+    if options.times:
+        from olp.workflows.correct_time import with_time
+
+        with_time(session, source, result, options, None, asked=True)
     filed = page = None
     if task.report:
         from olp.workflows import report

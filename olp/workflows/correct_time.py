@@ -33,17 +33,20 @@ class Both(Protocol):
 
 
 def with_time(
-    session: Session, program: Source, result: Both, options: UnrollOptions, tell: Progress | None
-) -> None:
-    """State `times` in the report of a correction, or why they are not known."""
+    session: Session, program: Source, result: Both, options: UnrollOptions, tell: Progress | None,
+    *, asked: bool = False,
+) -> None:  # fmt: skip
+    """State `times` in the report of a correction, or why they are not known; `asked` as in `state`."""
     total = result.report["moves"]["total"]
-    state(result.report, total, lambda: times(session, program, result, options, tell))
+    state(result.report, total, lambda: times(session, program, result, options, tell), asked=asked)
 
 
-def state(report: dict[str, Any], moves: int, timed: Callable[[], dict[str, Any]]) -> None:
+def state(
+    report: dict[str, Any], moves: int, timed: Callable[[], dict[str, Any]], *, asked: bool = False
+) -> None:
     """State times in the report of a program of so many moves, or why they are not known: those of long
-    programs are not, unless they are there."""
-    if "time" not in report and moves > MOST_UNASKED:
+    programs are not, unless they are there or a call has `asked` for them."""
+    if "time" not in report and moves > MOST_UNASKED and not asked:
         report["time"] = {"unknown": LONG}
     elif "time" not in report:
         try:

@@ -13,6 +13,7 @@ import pytest
 from cases.plants import contents, plant, program
 from cli.test_cli import run
 
+import olp
 from olp.cli import common
 
 
@@ -35,6 +36,28 @@ def test_a_summary_and_a_page_of_the_plant(folder: Path) -> None:
     assert lines[-1] == "3 written. No program of 3 has a finding that fails it."
     again = run(*CALL)
     assert again.stdout.splitlines()[-1] == "3 unchanged. No program of 3 has a finding that fails it."
+
+
+def test_times_of_programs_and_of_all_together(folder: Path) -> None:
+    """Those of a machine without limits are not known, which fails nothing."""
+    machine, router = (folder / name / "machine.toml" for name in ("mill", "router"))
+    router.write_text(router.read_text().replace("jerk_mm_s3 = 20000.0\n", ""))
+    stated = json.loads(run(*CALL, "--times", "--json").stdout)
+    rows = {row["program"]: row["time"] for row in stated["programs"]}
+    assert "jerk" in rows.pop("brackets/board.nc")["unknown"]
+    for name, time in rows.items():
+        for key, text in (("nominal_s", folder / "parts" / name), ("corrected_s", folder / "out" / name)):
+            assert time[key] == olp.retime(text, machine).duration_s
+    whole = stated["time"]
+    assert (whole["programs"], whole["unknown"]) == (2, 1)
+    for key in ("nominal_s", "corrected_s"):
+        assert whole[key] == pytest.approx(sum(time[key] for time in rows.values()), rel=1e-12)
+    again = run(*CALL, "--times").stdout
+    assert f"Time: {whole['corrected_s']:.2f} s for 2 corrected programs, " in again
+    assert "; 1 not known." in again.replace("\n  ", " ")
+    assert f"{whole['corrected_s']:.2f} s for 2" in (folder / "out" / "index.html").read_text()
+    # without them nothing is timed
+    assert json.loads(run(*CALL, "--json").stdout)["time"] is None
 
 
 def test_the_page_leads_to_files_that_are_there(folder: Path) -> None:

@@ -24,9 +24,9 @@ class Both(Protocol):
     def report(self) -> dict[str, Any]: ...
 
 
-def with_time(run: JointRun, done: Both, tell: Progress | None = None) -> None:
-    """State `times` in the report of a correction, or why they are not known."""
-    state(done.report, len(done.nominal), lambda: times(run, done, tell))
+def with_time(run: JointRun, done: Both, tell: Progress | None = None, *, asked: bool = False) -> None:
+    """State `times` in the report of a correction, or why they are not known; `asked` as in `state`."""
+    state(done.report, len(done.nominal), lambda: times(run, done, tell), asked=asked)
 
 
 def times(run: JointRun, done: Both, tell: Progress | None = None) -> dict[str, Any]:
