@@ -14,8 +14,12 @@ from olp.core.spool import Text
 
 #: Endings of files of data, by those of the statements that use them.
 _DATA = {".src": ".dat"}
-#: The folder of programs of a control, that of its system beside it, and the file of its own data there.
-_PROGRAMS, _SYSTEM, _OWN = "program", ("System", "SYSTEM", "system"), "$config.dat"
+#: The folder of programs of a control.
+_PROGRAMS = "program"
+#: The folder of its system beside it.
+_SYSTEM = ("System", "SYSTEM", "system")
+#: The file of the data of a control there.
+_OWN = "$config.dat"
 #: What stands between the files in one text, comments of their language.
 _BETWEEN = b"\n;olp: data of %b\n"
 _RUN = b"\n;olp: system data of %b from line %d\n"

@@ -91,9 +91,10 @@ class Yield:
 
 @dataclass(frozen=True, slots=True)
 class Gravity:
-    """The own turn of a rotary joint under unknown weights: sine * sin(s) + cosine * cos(s) in rad. s is the
-    sum of the values of the joints `angles`, each with the sign of its turn about the direction of `joint`.
-    """
+    """The own turn of a rotary joint under unknown weights in rad: sine * sin(s) + cosine * cos(s).
+
+    s is the sum of the values of the joints `angles`, each with the sign of its turn about the direction of
+    `joint`."""
 
     joint: str
     angles: tuple[str, ...]

@@ -16,26 +16,46 @@ from olp.core.arrays import Array, Index
 from olp.core.values import dataclass
 from olp.trajectory.timespline import NODES, TimeSpline
 
-#: first and least barrier, all of it over the time
-_FIRST, _LEAST = 0.05, 3e-4
+#: first barrier, all of it over the time
+_FIRST = 0.05
+#: least barrier
+_LEAST = 3e-4
 #: (length, factor): the factor by which the barrier falls after a step longer than that
 _FALL = ((0.8, 0.5), (0.4, 0.7), (0.2, 0.9), (-1.0, 1.0))
-#: share of the distance to the boundary that a step may take, and of its slack that it leaves to each row
-_NEAR, _LEAVE = 0.95, 0.02
-#: factor by which a step is cut, and how often at most
-_BACK, _TRIES = 0.6, 12
-#: ridge on changes of lengths, relative, at first and its least and most; factors after short and long steps
-_RIDGE, _RIDGES, _STIFFER, _SOFTER = 1e-2, (1e-6, 1e3), 4.0, 0.3
-#: steps shorter and longer than these
-_SHORT, _LONG = 0.3, 0.7
-#: addition to the diagonal, relative, and where there is none
-_ROUNDING, _NOTHING = 1e-9, 1e-12
+#: share of the distance to the boundary that a step may take
+_NEAR = 0.95
+#: share of its slack that a step leaves to each row
+_LEAVE = 0.02
+#: factor by which a step is cut
+_BACK = 0.6
+#: how often a step is cut at most
+_TRIES = 12
+#: ridge on changes of lengths, relative, at first
+_RIDGE = 1e-2
+#: the least and the largest ridge
+_RIDGES = (1e-6, 1e3)
+#: factor of the ridge after a short step
+_STIFFER = 4.0
+#: factor of the ridge after a long step
+_SOFTER = 0.3
+#: a step is short below this
+_SHORT = 0.3
+#: a step is long above this
+_LONG = 0.7
+#: addition to the diagonal, relative
+_ROUNDING = 1e-9
+#: addition where the diagonal is 0
+_NOTHING = 1e-12
 #: multipliers are at most so much above or below those of the barrier
 _APART = 1e3
-#: steps at most, and how many may be none
-_STEPS, _STUCK = 80, 4
-#: change of the time, relative, below which it counts as still, below so large a barrier
-_DONE, _BARRIER = 1e-4, 2e-3
+#: steps at most
+_STEPS = 80
+#: steps of no length at most
+_STUCK = 4
+#: change of the time, relative, below which it counts as still ...
+_DONE = 1e-4
+#: ... where the barrier is below this
+_BARRIER = 2e-3
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -63,7 +63,7 @@ def expected_s(route: Route, limits: AxisLimits) -> Array:
 
 def straight(route: Route, limits: AxisLimits, stops: Index) -> tuple[Array, Array]:
     """Seconds of each segment (n - 1,) at its feed, and about the least of each run (r,) from one of the
-    `stops` to the next: that of a straight move as long, along which all axes push."""
+    `stops` to the next. That is the time of a straight move as long, along which all axes push."""
     seconds, length = np.empty(len(route) - 1), np.empty(len(route) - 1)
     for a in range(0, len(length), _BLOCK):
         part = slice(a, min(a + _BLOCK, len(length)))

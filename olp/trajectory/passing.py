@@ -10,10 +10,14 @@ from olp.trajectory.route import Route
 
 #: places in each piece that are looked at
 _PLACES = 8
-#: segments before and behind that of a piece whose ends it may pass
-_BEFORE, _BEHIND = 1, 2
-#: steps to the nearest place, and s of each at most
-_STEPS, _STEP_S = 4, 1e-3
+#: segments before that of a piece whose ends it may pass
+_BEFORE = 1
+#: segments behind it
+_BEHIND = 2
+#: steps to the nearest place
+_STEPS = 4
+#: s of a step at most
+_STEP_S = 1e-3
 _TINY = 1e-300
 
 

@@ -31,8 +31,10 @@ _CALL = 500
 _BLOCK = 1 << 15
 #: waypoints of runs that are planned together, as a call costs more than a move
 _TOGETHER = 1 << 15
-#: cells of tubes at most, about 10 s, and those that take as long as the fixed cost of one
-_CELLS, _OF_TUBE = 4000, 30
+#: cells of tubes at most, about 8 s
+_CELLS = 4000
+#: cells that take as long as the fixed cost of a tube
+_OF_TUBE = 30
 
 
 @dataclass(frozen=True, slots=True, eq=False)

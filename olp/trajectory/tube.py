@@ -1,10 +1,10 @@
 """Path and speed together: the fastest motion inside the tolerance tube, from one that others have planned.
 
-The axes are cubic splines of time with free knots. Each cell has its segment of the route: both inner control
-points of its cubic are as near to that segment as the path tolerance allows, and where a cell has another
-segment than the one before, the motion is as near to the waypoint between them. So the whole motion is inside
-the tube, and passes the waypoints in order. Limits hold for control points of the velocity, for accelerations
-at knots and the jerks of cells, which is everywhere. `olp.trajectory.descent` finds the least time.
+The axes are cubic splines of time with free knots. Each cell has its segment of the route. Both inner
+control points of its cubic are within the path tolerance of that segment. Where a cell has another segment
+than the one before, the motion is as near to the waypoint between them. So the whole motion is inside the
+tube, and passes the waypoints in order. Limits hold for control points of the velocity, for accelerations at
+knots and the jerks of cells, which is everywhere. `olp.trajectory.descent` finds the least time.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ from olp.trajectory.route import AxisLimits, Route
 from olp.trajectory.timespline import NODES, TimeSpline
 
 #: cells of a segment, and of the whole, at least where they are no shorter than ...
-_OF_SEGMENT, _OF_WHOLE = 16, 48
+_OF_SEGMENT = 16
+_OF_WHOLE = 48
 #: ... this share of the time in which the jerk moves an axis by the tolerance
 _FINEST = 1.4
 #: knots of the motion closer than this share of a cell are one
@@ -38,14 +39,18 @@ _GAIN = 3e-3
 _BEGIN = 0.985
 #: share of the tolerance by which the search begins beyond a waypoint where the feed changes
 _ACROSS = 0.04
-#: share by which the tolerance may be used, and by which a control point may be out of it while it is pulled
-_USED, _OUTSIDE = 1.0 - 1e-6, 0.99
+#: share of the tolerance that may be used
+_USED = 1.0 - 1e-6
+#: share of it beyond which a control point is pulled inside
+_OUTSIDE = 0.99
 #: turns of pulling control points inside
 _PULLS = 30
 #: factor by which the search begins slower than the limits allow
 _SLOWED = 1.1
-#: a cell may become so much shorter and longer
-_SHORTEST, _LONGEST = 0.1, 5.0
+#: a cell may become so much shorter ...
+_SHORTEST = 0.1
+#: ... and longer
+_LONGEST = 5.0
 #: s; a segment that is passed in less has no cell of its own
 _LEAST_S = 1e-7
 #: share of the speed by which the motion may turn back along its segment, as rounding
@@ -284,8 +289,8 @@ def _round(base: Index, value: Array, most: Array, slope: Array) -> Group:
 
 
 def _sides(route: Route, waypoint: Index) -> Array:
-    """(w, axes) over the tolerance, the direction in which waypoints are passed before the motion goes over
-    to a segment with more feed, and against which to one with less; 0 where both have the same."""
+    """(w, axes) the direction of the path at waypoints, over the tolerance, where the segment behind has more
+    feed. Against that direction where it has less, 0 where both have the same."""
     point = route.point_mm
     delta = np.diff(point, axis=0)
     unit = delta / np.maximum(np.sqrt((delta * delta).sum(axis=1)), _TINY)[:, None]

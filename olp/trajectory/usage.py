@@ -55,7 +55,7 @@ class LineUse:
 
     Of their feed moves only: `feed_seconds`, `feed_length_mm` and `feed_mm_s`, the programmed feed, averaged
     over the length where there are several (inf where all are rapids). `fastest_mm_s` is the top speed,
-    `at_limit_s` (m, 10) the time at each of `LIMITS`, and `most` (m, 10) the largest use of it; with other
+    `at_limit_s` (m, 10) the time at each of `LIMITS`, and `most` (m, 10) the largest use of it. With other
     axes these are three times as many limits in the same order, and the feed."""
 
     line: Index

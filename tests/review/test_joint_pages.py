@@ -206,7 +206,7 @@ def test_the_verbs_write_it(tmp_path: Path) -> None:
     one, other = (Page(Path(name).read_bytes()).manifest for name in (page, again))
     assert one["statistics"] == other["statistics"] and one["digest"] == other["digest"]
     done = run("view", "-j", job, "--measured", "x.csv", "-o", again, "--force")
-    assert done.exit_code == 2 and "--measured does not go with machines with rotary joints" in done.stderr
+    assert done.exit_code == 3 and "x.csv: no such file" in done.stderr
 
 
 @pytest.mark.slow

@@ -130,8 +130,9 @@ def _strained(fit: JointFit) -> bool:
 
 
 def _cause(model: Model, readings: Sequence[Reading], fit: JointFit | None) -> _Cause | None:
-    """The one mistake with which the readings fit best; none where that stays too large beside `fit`, that of
-    the readings as they are (None where they do not settle), or where its odds do not decide."""
+    """The one mistake with which the readings fit best. None where chi-square stays too large beside that of
+    `fit`, or where the odds do not decide. `fit` is that of the readings as they are, None where they do not
+    settle."""
     before = np.inf if fit is None else fit.chi_square / fit.freedom
     # with the rows that a fit leaves out put back, as those of a mistake are all used
     stated = np.inf if fit is None else fit.score + sum(out.deviations**2 for out in fit.left_out)

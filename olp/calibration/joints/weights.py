@@ -13,7 +13,8 @@ from olp.kinematics.weight import sums_of_angles
 #: Tables of the calibration file whose numbers are unknowns of weight.
 TABLES = ("elasticity", "gravity")
 #: Keys of a term of gravity.
-_SINE, _COSINE = "sin_urad", "cos_urad"
+_SINE = "sin_urad"
+_COSINE = "cos_urad"
 
 
 def of_weight(

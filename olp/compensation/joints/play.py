@@ -39,8 +39,8 @@ _TINY = 1e-12
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Play:
-    """(axes,) the `width` of the backlash of each axis, by how much its load may be off rather than turn
-    round (`band`), and by how much more than its backlash it goes `past` an end, in mm or deg. `travel`
+    """(axes,) of each axis in mm or deg: the `width` of its backlash, and by how much its load may be off
+    rather than turn round (`band`). It goes `past` an end by so much more than its backlash. `travel`
     (2, axes) are its ends. What is not `free` is not corrected."""
 
     width: Array
