@@ -112,6 +112,7 @@ def test_an_override_changes_feeds_and_no_rapids(job: Path, tmp_path: Path) -> N
         olp.retime(part, job.with_name("machine.toml"), job, feed_override=0.0)
 
 
+@pytest.mark.slow
 def test_gains_are_those_of_the_program_with_more_tolerance_or_feed(job: Path, tmp_path: Path) -> None:
     lines = "\n".join(f"X{x} Y{x % 2}" for x in range(1, 20))
     text = "G64 P{p}\nG1 F6000\n" + lines + "\nG1 X60 F{f}\nM2\n"
