@@ -119,10 +119,10 @@ def _timed(rows: Sequence[Report]) -> bool:
     return any("time" in row for row in rows)
 
 
-def _seconds(row: Report) -> str:
-    """How long the corrected program takes."""
-    time = row.get("time") or {}
-    return f"{time['corrected_s']:.2f}" if "corrected_s" in time else "-"
+def _seconds(row: Report, timed: bool) -> list[str]:
+    """The cell that says how long the corrected program takes; none where rows have no such column."""
+    time = row.get("time", {})
+    return [f"{time['corrected_s']:.2f}" if "corrected_s" in time else "-"] if timed else []
 
 
 def _whole_time(report: Report) -> str:
@@ -166,7 +166,7 @@ def _table(rows: Sequence[Report]) -> Iterator[str]:
         [
             shortened(printable(row["program"]), _NAME),
             *_cells(row),
-            *map(_seconds, [row] * timed),
+            *_seconds(row, timed),
             row["state"],
         ]
         for row in shown
@@ -228,7 +228,7 @@ def _grid(rows: Sequence[Report], place: Place) -> Grid:
         written = row["state"] in ("written", "unchanged", "not in this call") and not row.get("message")
         name: str | Link = Link(row["program"], place(row["program"])) if written else row["program"]
         more = [row.get(key) or "" if key == "released" else _link(row, key, place) for key in asked]
-        figures = [moves, before, after, *map(_seconds, [row] * timed), code]
+        figures = [moves, before, after, *_seconds(row, timed), code]
         body.append([name, str(row.get("machine", "")), verdict, *more, found, *figures])
     figures = ["moves", UNCORRECTED, CORRECTED, *[_TIME] * timed, "exit"]
     header = ["program", "machine", "verdict", *asked, "findings", *figures]

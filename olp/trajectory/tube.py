@@ -10,6 +10,7 @@ knots and the jerks of cells, which is everywhere. `olp.trajectory.descent` find
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -165,10 +166,7 @@ class _Tube:
 
     def from_here(self, spline: TimeSpline) -> _Tube:
         """The same for lengths of cells near those of a spline."""
-        return _Tube(
-            self.limits, self.begin, self.unit, self.length, self.wide, self.knot, self.centre, self.ball,
-            self.side, self.feed, spline.cell_s,
-        )  # fmt: skip
+        return replace(self, cell_s=spline.cell_s)
 
     def bounds(self, spline: TimeSpline, slopes: bool) -> list[Group]:
         """All bounds."""
