@@ -24,8 +24,8 @@ DMIS = b"DMISMN/'CHECK',05.2\nUNITS/MM,ANGDEC\n"
 MCS = '[work_offsets.MCS]\nset_by = "true"\n'
 PROBED = b"GOTO/10,10,10\nMEAS/POINT,F(A),1\nPTMEAS/CART,10,10,0,0,0,1\nENDMES\nENDFIL\n"
 APT = b"UNITS/MM\nRAPID\nGOTO/-5,-10,0\nFEDRAT/600,MMPM\n"
-#: an arc of NX that begins upwards in Y
-TURN = b"GOTO/10,0,0\nCIRCLE/0,0,0,0,0,1,10,0.06,0.5,10,0\nGOTO/0,10,0\nFINI\n"
+#: an arc of a form that is not known, which begins upwards in Y
+TURN = b"GOTO/10,0,0\nCIRCLE/0,0,0,0,0,1,10,0.06\nGOTO/0,10,0\nFINI\n"
 HEIDENHAIN = b"BEGIN PGM A MM\n"
 PRESET = b"CYCL DEF 247 Q339=1\nL X+0 Y+0 Z+0 FMAX\nL X+100 F600\nEND PGM A MM\n"
 #: the preset 1 is stated

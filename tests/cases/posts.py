@@ -116,7 +116,7 @@ def _arc(step: Step, here: np.ndarray, flavour: str, say: object) -> str:
         position = text.rindex(",", 0, text.rindex(",", 0, text.rindex(",", 0, text.rindex(",")))) + 1
         return f"{text[:position]}  $\n{text[position:].lstrip()}"
     if flavour == "nx":
-        return str(say("CIRCLE", x, y, z, 0.0, 0.0, sign, radius, 0.06, 0.5, 10.0, 0.0))
+        return str(say("CIRCLE", x, y, z, 0.0, 0.0, -sign, radius, 0.06, 0.5, 10.0, 0.0))
     if flavour == "solidworks":
         return str(say("CIRCLE", x, y, z, 0, 0, "1." if sign > 0 else "-1."))
     if flavour == "autodesk":

@@ -105,9 +105,9 @@ CASES = {
     "a circle of NX": (
         "plays",
         "apt",
-        THERE + "CIRCLE/30,20,0,0,0,1,20.00000000000,0.06,0.5,10,0\nGOTO/30,40,0\nFINI\n",
-        TAKEN + f"CIRCLE/{CENTRE},0,0,1,20.00000000000,0.06,0.5,10,0\nGOTO/50.003,20.002,0\n"
-        f"GOTO/49.997,20.002,0.000\nCIRCLE/{LATER},0,0,1,20.0000000000,0.06,0.5,10,0\nGOTO/29.997,40.002,0.000\nFINI\n",
+        THERE + "CIRCLE/30,20,0,0,0,-1,20.00000000000,0.06,0.5,10,0\nGOTO/30,40,0\nFINI\n",
+        TAKEN + f"CIRCLE/{CENTRE},0,0,-1,20.00000000000,0.06,0.5,10,0\nGOTO/50.003,20.002,0\n"
+        f"GOTO/49.997,20.002,0.000\nCIRCLE/{LATER},0,0,-1,20.0000000000,0.06,0.5,10,0\nGOTO/29.997,40.002,0.000\nFINI\n",
         (8, 0, 3),
     ),
     "an arc that meets its line the second time": (

@@ -158,7 +158,9 @@ def read_apt(
             rapid, arc = False, None
         elif major in ("CIRCLE", "MOVARC"):
             times = re.search(r"TIMES\s*,\s*(\d+)", text)
-            arc = (at(frame, value[:3], unit, np.zeros(3)), rotation @ np.array(value[3:6]),
+            # eleven numbers are those of NX, whose vector has arcs turn clockwise about it
+            side = -1 if len(value) - bool(times) == 11 else 1
+            arc = (at(frame, value[:3], unit, np.zeros(3)), rotation @ np.array(value[3:6]) * side,
                    int(times[1]) if times else 1)  # fmt: skip
         elif major == "INDIRV":
             direction = rotation @ np.array(value)

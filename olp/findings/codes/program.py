@@ -195,10 +195,11 @@ RULES = (
         "OLP413",
         "direction of arcs assumed",
         Severity.WARNING,
-        "CIRCLE statements of this form (NX) are read as right-handed about their normal, and nothing in "
-        "the program confirms it. Along the other part of the circle the errors differ.",
+        "CIRCLE statements of a form that is not that of Creo, NX or SolidWorks CAM are read as right-handed "
+        "about their normal, and nothing in the program confirms it. Or an arc turns back where it should go "
+        "on. Along the other part of the circle the errors differ.",
         "Compare one arc with the simulation of the CAM system (olp view), or have it write GOTOs for arcs.",
-        "`CIRCLE/0,0,0,0,0,-1,5,0.06,0.5,10,0` behind a corner.",
+        "`CIRCLE/0,0,0,0,0,-1,5,0.06` behind a corner.",
     ),
     _rule(
         "OLP414",

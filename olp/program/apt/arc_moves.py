@@ -130,11 +130,11 @@ class ArcMoves(Events):
         """Refuse a program whose arcs turn back where they should go on; remark one that shows neither."""
         if len(self.back) >= _SEVERAL and len(self.back) > 2 * self.onward:
             raise ProgramError(
-                "the arc begins in the direction opposite to the move before it: its normal seems to be "
-                "left-handed, which is not read",
+                "the arc begins in the direction opposite to the move before it: arcs seem to turn the other "
+                "way about their normals than in programs of this form; have the CAM system write points",
                 line=self.back[0],
                 code="OLP530",
             )
         doubt = self.unconfirmed if self.unconfirmed is not None else next(iter(self.back), None)
         if doubt is not None and not self.onward:
-            self.collector.remarks["arcs"] = (doubt, "arcs are taken as right-handed about their normals")
+            self.collector.remarks["arcs"] = (doubt, "nothing shows which way arcs turn about their normals")

@@ -1,8 +1,9 @@
 """The five forms of arcs in cutter-location data.
 
-Creo and NX write `CIRCLE/centre,normal,radius…`, SolidWorks CAM `CIRCLE/centre,normal`, Autodesk
+Creo writes `CIRCLE/centre,normal,radius`, SolidWorks CAM `CIRCLE/centre,normal`, Autodesk
 `MOVARC/centre,normal,radius,ANGLE,degrees`. The end is the next GOTO, and the turn is right-handed about the
-normal. One GOTO ends a CIRCLE: where a chord separates two arcs of a circle, Creo states the CIRCLE again.
+normal. NX writes four numbers behind the radius, and its arcs turn clockwise about the vector (its manual).
+One GOTO ends a CIRCLE: where a chord separates two arcs of a circle, Creo states the CIRCLE again.
 CATIA writes `INDIRV/direction` and `TLON,GOFWD/(CIRCLE/centre,radius),ON,(LINE/centre,end)`, or CYLNDR with a
 normal. The tool goes forward along the circle until it meets the line, with `2,INTOF` until the second time.
 """
@@ -35,6 +36,10 @@ _N = rb"\s*([+-]?(?:\d{1,12}\.?\d{0,12}|\.\d{1,12}))\s*"
 _PLAIN = re.compile(
     rb"(?i)\s*CIRCLE\s*/" + rb",".join([_N] * 6) + rb"(?:," + _N + rb"((?:,[-+.\d\s]+)*))?,?\s*\Z"
 )
+#: numbers of a CIRCLE of NX: centre, vector, radius, tolerance, its inner share, diameter, corner radius
+_NX_NUMBERS = 11
+#: a CIRCLE with more numbers than this is not that of Creo or SolidWorks CAM
+_KNOWN_NUMBERS = 7
 #: a joint is tangent where the cosine between both directions is above this
 _TANGENT = 1.0 - 1e-6
 #: a stated angle may differ by this from the one that the points give, and by what 0.01 mm subtends
@@ -100,9 +105,19 @@ def circle(statement: Statement, collector: StatementCollector) -> ArcForm:
         statement.begin, statement.end, ((a, b, c),), collector.word(fields[6]) if has_radius else -1
     )
     return ArcForm(
-        text, statement.line, tuple(values[:3]), tuple(values[3:6]), values[6] if has_radius else None,
-        turns=turns, confirmed=len(values) < 8,
+        text, statement.line, tuple(values[:3]), _normal(values[3:6], len(values)),
+        values[6] if has_radius else None, turns=turns, confirmed=_confirmed(len(values)),
     )  # fmt: skip
+
+
+def _normal(vector: Sequence[float], count: int) -> tuple[float, ...]:
+    """About which a CIRCLE of `count` numbers turns right-handed."""
+    return tuple(-v for v in vector) if count == _NX_NUMBERS else tuple(vector)
+
+
+def _confirmed(count: int) -> bool:
+    """Whether it is known how a CIRCLE of `count` numbers turns."""
+    return count <= _KNOWN_NUMBERS or count == _NX_NUMBERS
 
 
 def _plain_circle(statement: Statement, match: re.Match[bytes], collector: StatementCollector) -> ArcForm:
@@ -118,9 +133,10 @@ def _plain_circle(statement: Statement, match: re.Match[bytes], collector: State
     text = ArcText(
         statement.begin, statement.end, ((words[0], words[1], words[2]),), words[3] if radius else -1
     )
+    count = _KNOWN_NUMBERS + (groups[7] or b"").count(b",")
     return ArcForm(
-        text, statement.line, tuple(values[:3]), tuple(values[3:]), None if radius is None else float(radius),
-        confirmed=not groups[7],
+        text, statement.line, tuple(values[:3]), _normal(values[3:], count),
+        None if radius is None else float(radius), confirmed=_confirmed(count),
     )  # fmt: skip
 
 

@@ -319,7 +319,7 @@ def test_tools_frames_and_offsets_have_to_be_defined(zero: Path) -> None:
         (
             "UNITS/MM\n" + "GOTO/10,10,0\nGOTO/10,0,0\nCIRCLE/0,0,0,0,0,1,10\nGOTO/0,10,0\n" * 3,
             4,
-            "left-handed",
+            "arcs seem to turn the other way",
         ),
         ("TRACUT/M1\n", 1, "TRACUT"),
         ("UNITS/FURLONG\n", 1, "UNITS"),

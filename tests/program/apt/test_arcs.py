@@ -36,7 +36,7 @@ def sweeps(text: str, setup: Setup) -> list[float]:
 
 
 QUARTERS = {
-    "NX and Creo": "GOTO/10,0,5\nCIRCLE/0,0,5,0,0,{n},10\nGOTO/0,10,5\n",
+    "Creo": "GOTO/10,0,5\nCIRCLE/0,0,5,0,0,{n},10\nGOTO/0,10,5\n",
     "more numbers": "GOTO/10,0,5\nCIRCLE/0,0,5,0,0,{n},10,1,2,3\nGOTO/0,10,5\n",
     "over two cards": "GOTO/10,0,5\nCIRCLE/0,0,5,$\n0,0,{n},10\nGOTO/0,10,5\n",
     "SolidWorks": "GOTO/10,0,5\nCIRCLE/0,0,5,0,0,{n}\nGOTO/0,10,5\n",
@@ -57,6 +57,26 @@ def test_a_circle_turns_right_handed_about_its_normal(form: str, setup: Setup) -
         arcs = program(text, setup).toolpath.arcs
         assert arcs.centre_mm.tolist() == [[100.0, 0.0, 5.0]]
         assert arcs.plane.tolist() == [0]
+
+
+@pytest.mark.parametrize(
+    ("circle", "sweep"),
+    [("0,0,1,10,.06,.5,10,0", -1.5), ("0,0,-1,10,.06,.5,10,0", 0.5), ("0,0,1,10,.06,.5,10,0,TIMES,1", -1.5),
+     ("$\n0,0,1,10,.06,.5,10,0", -1.5), ("0,0,1,10,.06,.5,10", 0.5), ("0,0,1,10,.06,.5,10,0,1", 0.5)],
+)  # fmt: skip
+def test_a_circle_of_nx_turns_clockwise_about_its_vector(circle: str, sweep: float, setup: Setup) -> None:
+    """Its documentation of CLSF says so, and 149 of 149 joints of public programs."""
+    text = f"GOTO/10,0,5\nCIRCLE/0,0,5,{circle}\nGOTO/0,10,5\n"
+    read_back = program(text, setup)
+    assert (read_back.toolpath.arcs.sweep_rad / HALF).tolist() == pytest.approx([sweep])
+    assert bool(read_back.remarks) == (circle.count(",") not in (7, 9))
+
+
+def test_the_form_of_nx_is_judged_by_its_joints_too(setup: Setup) -> None:
+    text = "GOTO/10,{y},5\nGOTO/10,0,5\nCIRCLE/0,0,5,0,0,1,10,.06,.5,10,0\nGOTO/0,10,5\n"
+    assert sweeps(text.format(y=10) * 3, setup) == pytest.approx([-1.5] * 3)
+    with pytest.raises(ProgramError, match="arcs seem to turn the other way"):
+        program(text.format(y=-10) * 3, setup)
 
 
 @pytest.mark.parametrize(
@@ -198,7 +218,7 @@ def test_several_arcs_that_turn_back_are_left_handed(
     if not refused:
         assert len(program(text, setup).toolpath.arcs) == onward + back
         return
-    with pytest.raises(ProgramError, match="its normal seems to be left-handed") as caught:
+    with pytest.raises(ProgramError, match="arcs seem to turn the other way") as caught:
         program(text, setup)
     assert caught.value.line == 2 + 4 * onward + 3
 
@@ -263,7 +283,7 @@ def test_a_point_may_end_with_one_comma(setup: Setup) -> None:
         ("GOTO/10,0,5\nCIRCLE/0,0,5,0,0,1E0,11\nGOTO/0,10,5", 4, "OLP530", r"states a radius of 11\.0000 mm"),
         ("GOTO/10,0,5\nMOVARC/0,0,5,0,0,1,10,ANGLE,80\nGOTO/0,10,5", 4, "OLP530",
          r"states an angle of 80\.0000 degrees, and its points give 90\.0000"),
-        (BACK * 3, 5, "OLP530", "its normal seems to be left-handed"),
+        (BACK * 3, 5, "OLP530", "arcs seem to turn the other way"),
     ],
 )  # fmt: skip
 def test_a_refusal_has_its_line_its_code_and_its_sentence(
@@ -393,7 +413,7 @@ def test_arcs_turn_with_their_frame(tmp_path: Path) -> None:
     tables = '[work_offsets.G54]\nset_by = "true"\nX_mm = 100.0\nB_deg = 90.0\n'
     setup = load_setup(machine(tmp_path, tables=tables))
     catia = "GOTO/10,0,5\nINDIRV/0,1,0\nTLON,GOFWD/(CIRCLE/0,0,5,10),ON,(LINE/0,0,5,0,10,5)\n"
-    for text in (QUARTERS["NX and Creo"].format(n=1), catia):
+    for text in (QUARTERS["Creo"].format(n=1), catia):
         path = program(text, setup).toolpath
         assert path.end_mm == pytest.approx(np.array([[105.0, 0, -10], [105, 10, 0]]))
         assert path.arcs.plane.tolist() == [2]
@@ -434,7 +454,7 @@ def test_only_straight_moves_before_an_arc_show_its_direction(text: str, refused
     if not refused:
         assert len(program(text, setup).toolpath.arcs) in (3, 6)
         return
-    with pytest.raises(ProgramError, match="its normal seems to be left-handed"):
+    with pytest.raises(ProgramError, match="arcs seem to turn the other way"):
         program(text, setup)
 
 
@@ -451,7 +471,7 @@ def test_arcs_that_state_their_direction_show_nothing(setup: Setup) -> None:
 
 def test_what_is_remarked_of_arcs_is_the_first_line_of_doubt(setup: Setup) -> None:
     corner = ONWARD.replace("GOTO/10,-10,5", "GOTO/20,-10,5")
-    words = "arcs are taken as right-handed about their normals"
+    words = "nothing shows which way arcs turn about their normals"
     longer = corner.replace("{more}", ",1,2")
     assert program(longer + longer, setup).remarks == (("arcs", 5, words),)
     assert program((BACK + BACK).format(more=""), setup).remarks == (("arcs", 5, words),)
