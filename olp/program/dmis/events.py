@@ -45,6 +45,8 @@ class Events:
         self.position = list(self.start)
         self.datum = MACHINE_FRAME
         self.sensor: str | None = None
+        #: the sensor of a RECALL, and its line, until SNSLCT selects one
+        self.recalled: tuple[str, int] | None = None
         self.defined: dict[str, Vector | None] = {}
         self.manual = False
         self.feature: tuple[int, bool] | None = None
@@ -72,6 +74,13 @@ class Events:
         }  # fmt: skip
 
     def _frame(self, line: int) -> int:
+        if self.recalled is not None and self.recalled[0] != self.sensor:
+            raise ProgramError(
+                f"RECALL brings the sensor {self.recalled[0]} back, and whether it selects it too is not "
+                "known; put SNSLCT behind it",
+                line=self.recalled[1],
+                code="OLP542",
+            )
         what = "the frame of the machine" if self.datum == MACHINE_FRAME else f"the datum D({self.datum})"
         name = next(
             (n for n in (*self.setup.job.work_offsets, *self.setup.machine.work_offsets)
@@ -169,11 +178,14 @@ class Events:
             raise ProgramError(
                 "SNSLCT names no sensor; expected S() or SA()", line=statement.line, code="OLP516"
             )
-        if name == self.sensor:
+        if name == self.sensor and self.recalled is None:
             return
         self._settled(statement)
-        self._unknown(statement, row)
-        self.sensor = name
+        if name == self.sensor:
+            self._resolve(row)
+        else:
+            self._unknown(statement, row)
+        self.sensor, self.recalled = name, None
 
     def _datum(self, statement: Statement, label: bytes, row: int) -> None:
         name = _name(label)
@@ -190,15 +202,21 @@ class Events:
     def _recall(self, statement: Statement, label: bytes, row: int) -> None:
         fields = statement.fields()
         match = _LABEL.match(fields[0].text) if fields else None
-        if match is None or match[1] not in (b"D", b"DA"):
-            if match is not None and match[1] in (b"S", b"SA", b"RT"):
-                raise ProgramError(
-                    "RECALL is read for datums only: D() or DA()", line=statement.line, code="OLP542"
-                )
+        if match is None or match[1] == b"RT":
+            raise ProgramError(
+                "RECALL is read for datums, sensors and features only: D(), DA(), S(), SA(), F() or FA()",
+                line=statement.line,
+                code="OLP542",
+            )
+        kind, name = match[1], match[2].decode("latin-1")
+        if kind not in (b"D", b"DA", b"S", b"SA"):
             return
         self._settled(statement)
         self._resolve(row)
-        self.datum = match[2].decode("latin-1")
+        if kind in (b"D", b"DA"):
+            self.datum = name
+        else:
+            self.recalled = name, statement.line
 
     def _mode(self, statement: Statement, label: bytes, row: int) -> None:
         fields = statement.fields()

@@ -54,7 +54,7 @@ class _Reader(Events):
         collector.begin(chunk)
         events: list[Statement] = []
         alone: list[Point] = []
-        for item in () if self.ended else chunk.statements(_NO_TEXT):
+        for item in () if self.ended else chunk.statements(_NO_TEXT, _goes_on):
             if isinstance(item, Comment):
                 self._check_comment(chunk, item)
                 continue
@@ -97,18 +97,17 @@ class _Reader(Events):
         return was or self.header
 
     def _check_comment(self, chunk: Chunk, comment: Comment) -> None:
-        """Refuse a line after a comment that ends with `$`, unless it is a comment too: it may belong to
-        it."""
+        """Refuse a statement after a comment that ends with `$`: it may belong to it."""
         if not comment.text.rstrip().endswith(b"$") or comment.text.strip() == b"$$":
             return
-        line = comment.line - chunk.first_line
+        line = comment.line + comment.text.count(b"\n") - chunk.first_line
         if line < len(chunk.line_start):
             after = chunk.raw(line).strip()
             if after and not after.startswith(b"$$"):
                 raise ProgramError(
                     "the comment before ends with `$`, so this line may belong to it; "
                     "take that `$` away, or put `$$` before this line",
-                    line=comment.line + 1,
+                    line=chunk.first_line + line + 1,
                     code="OLP510",
                 )
 
@@ -116,7 +115,7 @@ class _Reader(Events):
         label, major = statement.head()
         if major.startswith(b"(") and major.endswith(b")"):
             return
-        first = major.split(b" ")[0].split(b"(")[0] if major[:3] in (b"IF ", b"IF(") else major
+        first = _word(major)
         handler = self._handlers.get(first)
         if handler is not None:
             handler(statement, label, row)
@@ -145,7 +144,7 @@ class _Reader(Events):
         label, major = statement.head()
         text = statement.text.strip()
         bracketed = major.startswith(b"(") and major.endswith(b")")
-        first = major.split(b" ")[0].split(b"(")[0] if major[:3] in (b"IF ", b"IF(") else major
+        first = _word(major)
         if not text or bracketed:
             return None
         if label and b"/" not in statement.text:
@@ -155,7 +154,7 @@ class _Reader(Events):
         )
         if support is not Support.REFUSED:
             return None
-        return ProgramError(f"{shown(first)} {why}", line=statement.line, code=NOT_READ)
+        return ProgramError(f"{shown(first) or 'a slash'} {why}", line=statement.line, code=NOT_READ)
 
     # -- points --------------------------------------------------------------------------------------
 
@@ -257,3 +256,22 @@ class _Reader(Events):
         for i in np.flatnonzero(relative).tolist():
             before = np.array(self.position) if i == 0 else end[i - 1]
             end[i] = NAN if np.isnan(before).any() or self.manual or (i and touch[i - 1]) else end[i] + before
+
+
+def _word(major: bytes) -> bytes:
+    """The word of a major part: IF may have its condition behind it without a slash."""
+    return major.split(b" ")[0].split(b"(")[0] if major[:3] in (b"IF ", b"IF(") else major
+
+
+def _goes_on(raw: bytes) -> bool:
+    """Whether a line behind a comment that ends with `$` goes on with it: no control runs it as a
+    statement."""
+    if raw.lstrip()[:2] == b"$$" or not raw.strip():
+        return False
+    label, major = Statement(0, 0, len(raw), raw).head()
+    if label or major.startswith(b"("):
+        return False
+    if major.endswith(b"$"):
+        # its word may be parted over both lines
+        return not any(word.startswith(major[:-1].rstrip()) for word in TABLE)
+    return _word(major) not in TABLE

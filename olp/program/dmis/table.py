@@ -45,7 +45,8 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"TRANS": (_R, "D() = …: a frame of the job, under the label of the datum"),
     b"ROTATE": (_R, "D() = …: a frame of the job, under the label of the datum"),
     b"DATSET": (_R, "D() = …: a frame of the job, under the label of the datum"),
-    b"RECALL": (_R, "D(): a frame of the job, under the label of the datum"),
+    b"RECALL": (_R, "D(): a frame of the job, under the label of the datum; of a sensor S() or SA(), which "
+               "SNSLCT has to select"),
     b"MODE": (_R, "points under MODE/MAN are left uncorrected: the operator moves the machine"),
     b"TECOMP": (_R, "thermal compensation is detected, with a warning"),
     b"TEMPR": (_R, "thermal compensation is detected, with a warning"),

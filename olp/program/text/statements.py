@@ -8,7 +8,7 @@ others become `Statement`s, one by one.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -194,9 +194,12 @@ class Chunk:
         """The bytes of a line, without its end."""
         return self.data[int(self.line_start[line]) : int(self.line_end[line])]
 
-    def statements(self, free: re.Pattern[bytes]) -> Iterator[Statement | Comment]:
+    def statements(
+        self, free: re.Pattern[bytes], goes_on: Callable[[bytes], bool] | None = None
+    ) -> Iterator[Statement | Comment]:
         """The statements and comments of the lines that are not plain points, in order. What begins as
-        `free` says takes the rest of its line as text. Raises ProgramError for a `$` inside a statement."""
+        `free` says takes the rest of its line as text. A comment that ends with `$` has the next line too,
+        where `goes_on` says so of it. Raises ProgramError for a `$` inside a statement."""
         lines = self.others.tolist()
         taken = -1
         for line in lines:
@@ -207,8 +210,9 @@ class Chunk:
             number = self.first_line + line + 1
             begin = int(self.line_start[line])
             if bare[:2] == b"$$":
-                taken = line
-                yield Comment(number, begin, begin + len(raw), raw)
+                taken = line if goes_on is None else self._commented(line, goes_on)
+                end = int(self.line_end[taken])
+                yield Comment(number, begin, end, self.data[begin:end])
             elif b"$" not in raw or free.match(bare):
                 taken = line
                 yield Statement(number, begin, begin + len(raw), raw)
@@ -216,6 +220,16 @@ class Chunk:
                 statement = self._joined(line)
                 taken = line + statement.lines - 1
                 yield statement
+
+    def _commented(self, line: int, goes_on: Callable[[bytes], bool]) -> int:
+        """The last line of a comment."""
+        while (
+            self.raw(line).rstrip()[-1:] == b"$"
+            and line + 1 < len(self.line_start)
+            and goes_on(self.raw(line + 1))
+        ):
+            line += 1
+        return line
 
     def _joined(self, line: int) -> Statement:
         """A statement with its comment cut off and its further lines joined on."""
@@ -254,7 +268,7 @@ class Chunk:
 
 @dataclass(frozen=True, slots=True)
 class Comment:
-    """A line that is a comment from its `$$` on."""
+    """A line that is a comment from its `$$` on, and the lines that go on with it."""
 
     line: int
     begin: int

@@ -94,7 +94,49 @@ def test_a_datum_is_a_frame_by_its_label(word: str, setup: Setup) -> None:
     text = f"D(MCS)={word}\nGOTO/1,2,3\nRECALL/D(part)\nGOTO/1,2,3\nRECALL/DA(MCS)\nGOTO/1,2,3\n"
     assert [row and row[0] for row in ends(text, setup)] == [1.0, 101.0, 1.0]
     assert refused(f"{word}\n", setup, "has no label, so its frame has no name") == 3
-    assert refused("RECALL/S(LONG)\n", setup, "RECALL is read for datums only") == 3
+    assert refused("RECALL/RT(1)\n", setup, "RECALL is read for datums, sensors and features only") == 3
+
+
+def test_a_sensor_that_is_recalled_has_to_be_selected(setup: Setup) -> None:
+    """Whether RECALL selects it too, the controls do not agree; LK writes both."""
+    point = [[100.0, 0.0, 53.0]]
+    for word in ("S", "SA"):
+        assert ends(f"RECALL/{word}(LONG)\nSNSLCT/S(LONG)\nGOTO/1,2,3\n", setup) == point
+        assert ends(f"SNSLCT/S(LONG)\nRECALL/{word}(LONG)\nGOTO/1,2,3\n", setup) == point
+        assert ends(f"RECALL/{word}(OWN)\nSNSLCT/{word}(LONG)\nGOTO/1,2,3\n", setup) == point
+        words = "RECALL brings the sensor OWN back, .*; put SNSLCT behind it"
+        assert refused(f"SNSLCT/S(LONG)\nRECALL/{word}(OWN)\nGOTO/1,2,3\n", setup, words) == 4
+    again = "SNSLCT/S(LONG)\nGOTO/1,2,3\nRECALL/S(OWN)\nSNSLCT/S(LONG)\nGOTO/2,2,3\n"
+    assert ends(again, setup) == [*point, [101.0, 0.0, 53.0]]
+    assert refused("SNSLCT/S(LONG)\nRECALL/S(OWN)\nGOTO/1,2,3\nSNSLCT/S(LONG)\n", setup, "OWN back") == 4
+
+
+@pytest.mark.parametrize(
+    "comment",
+    [
+        "$$<CONSTRUCT_PLANE name = 'PLN: PNT1 $\n- PNT2- PNT3'>\n",
+        "$$CONST/PLANE,F(P),BF,FA(A)$\n,FA(B),FA(C)\n",
+        "$$ a $\n F2 - A $- B $\n  F3'>\n",
+        "$$CALL/EXTERN,DMIS,'C:\\Sous$\nprg.dmi',A\n",
+        "$$ a $\n$$ b\n",
+        "$$ a $\n\n",
+    ],
+)
+def test_a_comment_goes_on_where_its_next_line_is_no_statement(comment: str, setup: Setup) -> None:
+    """As LK writes them; with the line as a statement of its own no control runs the program."""
+    path = program(f"{comment}GOTO/1,2,3\n", setup).toolpath
+    assert path.end_mm.tolist() == [[101.0, 2.0, 3.0]]
+    assert path.line.tolist() == [3 + comment.count("\n")]
+
+
+@pytest.mark.parametrize(
+    "after",
+    ["goto/1,2,3", "PTMEAS/CART,1,2,3", "A=5", "F(A)=FEAT/POINT", "ELSE", "(A B)", "GO$\nTO/1,2,3", "IF (A)"],
+)
+def test_what_may_be_a_statement_behind_an_open_comment_is_refused(after: str, setup: Setup) -> None:
+    words = "the comment before ends with `\\$`"
+    assert refused(f"$$ a $\n{after}\n", setup, words) == 4
+    assert refused(f"$$ a $\n- b $\n{after}\n", setup, words) == 5
 
 
 def test_points_in_manual_mode_are_left_alone(setup: Setup) -> None:
@@ -220,9 +262,11 @@ FIXED = "PROBE,FIXED,CART,0,4,-20"
         ("SNSLCT/LONG", 3, "OLP516", "SNSLCT names no sensor"),
         ("SNSLCT/S(NONE)\nGOTO/1,2,3", 4, "OLP522", r'the stylus NONE is selected, .* \[styli\."NONE"\]'),
         ("TRANS/XORIG,1", 3, "OLP516", "TRANS has no label"),
-        ("RECALL/RT(1)", 3, "OLP542", "RECALL is read for datums only"),
-        ("RECALL/S(LONG)", 3, "OLP542", "RECALL is read for datums only"),
-        ("RECALL/SA(LONG)", 3, "OLP542", "RECALL is read for datums only"),
+        ("RECALL/RT(1)", 3, "OLP542", "RECALL is read for datums, sensors and features only"),
+        ("RECALL", 3, "OLP542", "RECALL is read for datums, sensors and features only"),
+        ("RECALL/ALIGN,'P'", 3, "OLP542", "RECALL is read for datums, sensors and features only"),
+        ("RECALL/S(A)\nGOTO/1,2,3", 3, "OLP542", "RECALL brings the sensor A back"),
+        ("///", 3, "OLP512", "a slash is not a statement that olp knows in DMIS"),
         ("RECALL/D(OTHER)\nGOTO/1,2,3", 4, "OLP520", r"the datum D\(OTHER\) needs the frame OTHER"),
         ("MEAS/POINT,F(A),1\nRMEAS/POINT,F(A),1", 4, "OLP532", "MEAS is inside MEAS"),
         ("ENDMES", 3, "OLP532", "ENDMES has no MEAS before it"),
@@ -357,7 +401,7 @@ def test_the_last_definition_of_a_stylus_holds(setup: Setup) -> None:
 
 
 def test_what_is_recalled_and_is_no_datum_changes_nothing(setup: Setup) -> None:
-    for text in ("RECALL/F(A)", "RECALL", "RECALL/LONG", "MODE", "MODE/AUTO,MAN", "FROM/9,9,9", "RAPID/ON",
+    for text in ("RECALL/F(A)", "RECALL/FA(A)", "MODE", "MODE/AUTO,MAN", "FROM/9,9,9", "RAPID/ON",
     "DECL/A",
                  "ENDMAC", "MACRO/1", "(A B)", "( C )", "FEDRAT/MESVEL", "ASSIGN/A", "TEXT/MAN",
                  "$\n"):  # fmt: skip
