@@ -123,12 +123,12 @@ def _rounding(path: JointPath, plan: JointPlan, digit_mm: float, digit_deg: floa
         rounded_rad = _HALF_TURNS * float(np.radians(digit_deg)) + beside
         if not isinstance(path, ArmPath) or not path.half_deg.any():
             return rounded_mm, rounded_rad
-        steps_mm, steps_rad = _steps(path, plan, path.half_deg[plan.move])
+        steps_mm, steps_rad = largest_steps(path, plan, path.half_deg[plan.move])
         return max(rounded_mm, steps_mm), max(rounded_rad, steps_rad)
-    return _steps(path, plan, np.tile(0.5 * 10.0 ** -path.places.astype(float), (len(plan.move), 1)))
+    return largest_steps(path, plan, np.tile(0.5 * 10.0 ** -path.places.astype(float), (len(plan.move), 1)))
 
 
-def _steps(path: JointPath, plan: JointPlan, half: Array) -> tuple[float, float]:
+def largest_steps(path: JointPath, plan: JointPlan, half: Array) -> tuple[float, float]:
     """mm and rad by which the tip and the tool are off at most where axes are off by `half` (r, axes) mm or
     deg at the rows of a plan."""
     rows, most = np.flatnonzero(np.isfinite(plan.axes).all(axis=1)), np.zeros(2)

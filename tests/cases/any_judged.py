@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from cases.any_machines import KINDS, five, wrist, write_machine
@@ -56,26 +57,51 @@ def last_digit(judge: Whole, place: np.ndarray, digit: float) -> tuple[float, fl
     return float(moved[0]), float(moved[1])
 
 
-def judged(kind: str, form: str, seed: int, *, play: bool) -> Told:
+@dataclass(frozen=True)
+class Case:
+    """A random machine in a folder, whose last digits are `digit`, with a `text` that goes to `rows` of axis
+    values, and the `judge` of both."""
+
+    folder: Path
+    judge: Whole
+    payload: tuple[float, Any]
+    rows: np.ndarray
+    text: bytes
+    digit: float
+
+    def corrected(self) -> olp.JointCorrection:
+        return olp.correct_joints(
+            self.text, self.folder / "machine.toml", self.folder / "job.toml", tolerance_urad=2.0
+        )
+
+
+def case_of(folder: Path, kind: str, form: str, seed: int, *, play: bool, digit: float | None = None) -> Case:
     """One machine and one program for it."""
     rng = np.random.default_rng([seed, 5])
-    digit = float(rng.choice(DIGITS)) if form != LIST or seed % 3 == 0 else 1e-6
+    drawn = float(rng.choice(DIGITS)) if form != LIST or seed % 3 == 0 else 1e-6
+    digit = drawn if digit is None else digit
     control = {**FORMS, **PLANES}.get(form, "linuxcnc")
+    made, payload = write_machine(folder, kind, seed, control=control, digit=digit, play=play)
+    judge = Whole(folder / "machine.toml", payload, made.counts)
+    rows = waypoints(made, rng, 5, judge if made.counts == "axis" else None)
+    job = folder / "job.toml"
+    if form in PLANES:
+        text = plane(form, judge, rows[3:4], rng)
+    elif form == LIST:
+        text = listed(made, rows)
+    else:
+        text, stated = program(form, judge, rows, rng)
+        job.write_text(job.read_text("utf-8") + stated, "utf-8")
+    return Case(folder, judge, payload, rows, text, digit)
+
+
+def judged(kind: str, form: str, seed: int, *, play: bool) -> Told:
+    """What comes of one machine and one program for it."""
     with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        made, payload = write_machine(folder, kind, seed, control=control, digit=digit, play=play)
-        judge = Whole(folder / "machine.toml", payload, made.counts)
-        rows = waypoints(made, rng, 5, judge if made.counts == "axis" else None)
-        job = folder / "job.toml"
-        if form in PLANES:
-            text = plane(form, judge, rows[3:4], rng)
-        elif form == LIST:
-            text = listed(made, rows)
-        else:
-            text, stated = program(form, judge, rows, rng)
-            job.write_text(job.read_text("utf-8") + stated, "utf-8")
+        case = case_of(Path(name), kind, form, seed, play=play)
+        folder, judge, rows, text, digit = case.folder, case.judge, case.rows, case.text, case.digit
         try:
-            done = olp.correct_joints(text, folder / "machine.toml", job, tolerance_urad=2.0)
+            done = case.corrected()
         except OlpError as error:
             return Told("refused", 0.0, str(error)[:180])
         mm, rad = last_digit(judge, rows[3], digit)
@@ -87,7 +113,7 @@ def judged(kind: str, form: str, seed: int, *, play: bool) -> Told:
         after = done.report["deviation"]["after"]
         said = f"stated {after['position_max_um']:.3f} um {after['orientation_max_urad']:.3f} urad"
         if form in PLANES:
-            tilted = WholeTilted(folder / "machine.toml", payload)
+            tilted = WholeTilted(folder / "machine.toml", case.payload)
             distance = tilted.judged(text, done.data)[0]
             found = (distance, 0.0, distance / within[0])
         else:

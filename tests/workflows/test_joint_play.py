@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 
 import pytest
-from cases.any_judged import LIST, judged
+from cases.any_judged import LIST, case_of, judged
 from cases.joint_machines import machine_file
 
 import olp
@@ -24,6 +24,20 @@ CASES = [
 def test_a_program_is_within_tolerance_where_every_axis_has_play(kind: str, seed: int, form: str) -> None:
     told = judged(kind, form, seed, play=True)
     assert told.what == "right" and told.cost < 0.8, told.words
+
+
+@pytest.mark.slow
+def test_digits_that_are_coarse_beside_a_backlash_are_named_with_those_that_do(tmp_path: Path) -> None:
+    """0.001 deg are 17.5 urad: a step by one digit goes beyond a backlash of 4.1 urad."""
+    words = ("table/head", "axis words, fanuc", 4)
+    coarse = case_of(tmp_path, *words, play=True, digit=1e-3).corrected()
+    told = next(one.message for one in coarse.findings if one.code == "OLP101")
+    assert "C (digits of 0.001 deg, 17.5 urad; backlash 4.1 urad) and B" in told
+    assert "state least_increment_deg = 0.0001 if" in told
+    assert case_of(tmp_path, *words, play=True, digit=1e-4).corrected().report["verdict"]["ok"]
+    machine, job = tmp_path / "machine.toml", tmp_path / "job.toml"
+    other = olp.verify_joints(coarse.nominal, coarse.nominal, machine, job)
+    assert "last digit" not in next(one.message for one in other.findings if one.code == "OLP101")
 
 
 HEAD = "X_mm,Y_mm,Z_mm,B_deg,C_deg"

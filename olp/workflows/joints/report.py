@@ -20,7 +20,7 @@ from olp.core.toolpath import Kind
 from olp.core.units import MM_PER_UM, RAD_PER_URAD, UM_PER_MM
 from olp.findings.catalogue import Finding
 from olp.program.robots.dialect import RobotDialect
-from olp.proof.joints import Deviation, JointProof
+from olp.proof.joints import Deviation, JointProof, largest_steps
 from olp.workflows.joints.loaded import JointRun
 
 #: Kinds of moves that cut.
@@ -29,6 +29,8 @@ _FEED = (Kind.LINE, Kind.ARC_CW, Kind.ARC_CCW)
 _WORST = 10
 #: An axis value beyond its calibrated range by less than this is on its end: mm or deg.
 _AT_END = 1e-6
+#: A backlash of fewer last digits is not taken up well by words.
+_FINE_DIGITS = 2.0
 
 _PROVES = (
     "the written text, read back from its bytes, commands what was computed (syntax, digits, modal words)",
@@ -199,8 +201,8 @@ def findings_of(
     """What a person should know of a correction with its tolerances in um and urad."""
     found = []
     if proof.over.any():
-        lines = path.line[proof.over].tolist()
-        found.append(finding("OLP101", "the corrected path leaves its tolerance at these lines", lines))
+        what = "the corrected path leaves its tolerance at these lines" + _coarse_digits(path, plan, proof)
+        found.append(finding("OLP101", what, path.line[proof.over].tolist()))
     after = proof.after
     unknown = (after.unknown_mm > tolerance[0] * MM_PER_UM) | (
         after.unknown_rad > tolerance[1] * RAD_PER_URAD
@@ -238,6 +240,35 @@ def findings_of(
         if until is not None and date is not None and date > until:
             found.append(finding("OLP401", f"the calibration was valid until {until}"))
     return tuple(found)
+
+
+def _coarse_digits(path: JointPath, plan: JointPlan, proof: JointProof) -> str:
+    """Words on rotary axes whose last digit is coarse beside their backlash, and a digit that is not: empty
+    where that does not explain what is over. A step by one digit takes up a part of such a backlash only, or
+    turns the axis round inside of a move."""
+    words, width = path.coordinates, np.abs(path.motion.width)
+    if words.poses or isinstance(path, ArmPath) or path.directions.led.any():
+        return ""
+    digit = 10.0 ** -path.places.astype(float)
+    coarse = words.rotary & (width > 0.0) & (width < _FINE_DIGITS * digit)
+    if not coarse.any():
+        return ""
+    most_mm, most_rad = largest_steps(path, plan, np.tile(np.where(coarse, width, 0.0), (len(plan.move), 1)))
+    over_mm, over_rad = proof.after.distance_mm[proof.over].max(), proof.over_rad[proof.over].max()
+    if over_mm > proof.allowed_mm + most_mm or over_rad > proof.allowed_rad + most_rad:
+        return ""
+    urad = np.radians(np.stack((digit, width))) / RAD_PER_URAD
+    shown = " and ".join(
+        f"{words.names[axis]} (digits of {digit[axis]:g} deg, {urad[0, axis]:.1f} urad; backlash "
+        f"{urad[1, axis]:.1f} urad)"
+        for axis in np.flatnonzero(coarse).tolist()
+    )
+    finest = min(10.0 ** np.floor(np.log10(width[coarse].min())), digit[coarse].min() / 10.0)
+    fine = np.format_float_positional(finest, trim="-")
+    return (
+        f"; the last digit is too coarse for the backlash of {shown}; state least_increment_deg = {fine} if "
+        "the control reads such words, or give larger tolerances"
+    )
 
 
 def outside_box(path: JointPath, plan: JointPlan, run: JointRun) -> list[tuple[int, str]]:
