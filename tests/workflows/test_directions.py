@@ -167,10 +167,15 @@ REFUSED = [
     ("fanuc", F_HEAD + b"G1 X5. I0.00001 J0. K1. F100.\n", "nearly along the axis of C", 4),
     ("fanuc", F_HEAD.replace(b"G43.5", b"G43.4") + b"G1 X5. I0. J0. K1. F100.\n", "no mode", 4),
     ("fanuc", F_HEAD + b"G1 X5. I0. J0. K1. F100.\nI0.3 J-0.2 K0.9\n", "about as far", 5),
+    # C by 100 deg and A by none, or C by 80 deg and A by 170: a control may count the way of C alone
+    (
+        "fanuc", F_HEAD.replace(b"A-20. C30.", b"A-85. C0.") + b"G1 X5. I-0.98106 J0.17299 K0.08716 F100.\n",
+        "nearer one by another axis", 4,
+    ),
     ("sinumerik", S_HEAD + b"G1 A=5 A3=0 B3=0 C3=1 F100\n", "beside words", 7),
     ("sinumerik", S_HEAD + b"TRAFOOF\nG1 A3=0 B3=0 C3=1 F100\n", "no mode", 8),
     ("sinumerik", S_HEAD + b"G1 A3=R1 B3=0 C3=1 F100\n", "--flatten", 7),
-]
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("control", "text", "message", "line"), REFUSED)

@@ -283,20 +283,16 @@ def _nearest(
 ) -> list[float]:
     """The position to which the control turns the two axes from `before`; where the outer one is `free` it
     stays."""
-    best, way, next_way = before, np.inf, np.inf
+    places: list[tuple[tuple[float, float, float], list[float]]] = []
     for values in both:
         outer = before[0] if free else _turn_of(pair[0], before[0], values[0])
         inner = _turn_of(pair[1], before[1], values[1])
-        if outer != outer or inner != inner:
-            continue
-        own = max(abs(outer - before[0]), abs(inner - before[1]))
-        if way < np.inf and abs(outer - best[0]) + abs(inner - best[1]) < _AT_END:
-            continue
-        if own < way:
-            best, way, next_way = [outer, inner], own, way
-        else:
-            next_way = own
-    if way == np.inf:
+        ways = abs(outer - before[0]), abs(inner - before[1])
+        if outer == outer and inner == inner:
+            # the longer of both ways, that of the outer axis, and their sum: which one counts is the control's
+            places.append(((max(ways), ways[0], sum(ways)), [outer, inner]))
+    places.sort()
+    if not places:
         known = before[0] == before[0] and before[1] == before[1]
         why = (
             "no positions of the rotary axes within their travel give the tool this direction"
@@ -305,13 +301,17 @@ def _nearest(
             "are before is not known; command them before, or state start_deg in the job file"
         )
         raise ProgramError(why, line=line, code="OLP566")
-    if next_way <= _FARTHER * way + _FARTHER_DEG:
-        raise ProgramError(
-            "two positions of the rotary axes give the tool this direction, and both are about as far; "
-            "program a direction between",
-            line=line,
-            code="OLP566",
-        )
+    (way, best), *others = places
+    for next_way, other in others:
+        same = abs(other[0] - best[0]) + abs(other[1] - best[1]) < _AT_END
+        clear = next_way[0] > _FARTHER * way[0] + _FARTHER_DEG and next_way[2] > way[2]
+        if not same and not (clear and next_way[1] >= way[1]):
+            raise ProgramError(
+                "two positions of the rotary axes give the tool this direction, and both are about as far, or "
+                "each is the nearer one by another axis; program a direction between",
+                line=line,
+                code="OLP566",
+            )
     return best
 
 
