@@ -70,6 +70,8 @@ if TYPE_CHECKING:
     from olp.workflows.flatten import flatten as flatten
     from olp.workflows.inspect import error_at as error_at
     from olp.workflows.inspect import inspect as inspect
+    from olp.workflows.joints.check import JointCheck as JointCheck
+    from olp.workflows.joints.check import check_joints as check_joints
     from olp.workflows.joints.correct import JointCorrection as JointCorrection
     from olp.workflows.joints.correct import correct_joints as correct_joints
     from olp.workflows.joints.doctor import DiagnosedJoints as DiagnosedJoints
@@ -141,6 +143,8 @@ _HOME = {
     "CorrectedPoses": "olp.kinematics.correction",
     "correct_poses": "olp.kinematics.correction",
     "view_joints": "olp.review.joints",
+    "JointCheck": "olp.workflows.joints.check",
+    "check_joints": "olp.workflows.joints.check",
     "JointCorrection": "olp.workflows.joints.correct",
     "correct_joints": "olp.workflows.joints.correct",
     "JointRetiming": "olp.workflows.joints.retime",

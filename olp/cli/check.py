@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -84,27 +84,33 @@ def command(programs: tuple[str, ...], machine: str | None, job: str | None, **w
     words |= {"form": form}
     from olp.cli import joints
 
-    if joints.on_joints(machine, job):
-        joints.check(programs or (None,), machine, job, words | {"as_json": form == "json"})
-        return
+    if joints.on_joints(machine, job, also=joints.CHECK):
+
+        def one(program: str | None) -> None:
+            joints.check(program, machine, job, words)
+    else:
+
+        def one(program: str | None) -> None:
+            _one(given(program, machine, job), **words)
+
     if len(programs) < 2:
-        _one(given(programs[0] if programs else None, machine, job), **words)
+        one(programs[0] if programs else None)
         return
     alone = {"-o": words["output"] != STREAM, "--clearances": words["clearances"], "--nominal":
              words["nominal"], f"--format {form}": form != "text", "-": STREAM in programs}  # fmt: skip
     for name in (name for name, is_given in alone.items() if is_given):
         raise UsageError(f"{name} is for one program, and {len(programs)} are named; check them one by one")
-    _several(programs, machine, job, words)
+    _several(programs, one, quiet=words["quiet"])
 
 
-def _several(programs: Sequence[str], machine: str | None, job: str | None, words: Mapping[str, Any]) -> None:
-    """Check all, also after one that is refused, and end with the worst exit code."""
+def _several(programs: Sequence[str], one: Callable[[str], None], *, quiet: bool) -> None:
+    """Check all with `one`, also after one that is refused, and end with the worst exit code."""
     worst = 0
     for number, program in enumerate(programs):
-        if number and not words["quiet"]:
+        if number and not quiet:
             put("\n")
         try:
-            _one(given(program, machine, job), **words)
+            one(program)
         except OlpError as error:
             show_error(str(error))
             worst = max(worst, error.exit_code)

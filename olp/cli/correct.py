@@ -89,7 +89,7 @@ def command(program: str | None, machine: str | None, job: str | None, **words: 
     """
     from olp.cli import joints
 
-    if joints.on_joints(machine, job, also=("report_file", "review_file", "times")):
+    if joints.on_joints(machine, job, also=joints.CORRECT):
         joints.correct(program, machine, job, words)
         return
     layout = (words["profile"], words["columns"], words["unit"])

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from olp.core.units import AXES
 from olp.core.values import dataclass
@@ -219,22 +219,36 @@ def render(
         (_StatementReader() if statements else _Reader(bare_mm)).read(data)
         for data in (nominal_data, corrected_data)
     )
+
+    def changes(i: int, j: int) -> str:
+        return "  ".join(_changes(nominal[i], corrected[j], near_um))
+
+    texts = [line.text for line in nominal], [line.text for line in corrected]
+    return listed(*texts, align(nominal, corrected, near_um), changes, place=place, colour=colour)
+
+
+def listed(
+    nominal: Sequence[str], corrected: Sequence[str], pairs: Iterable[Pair],
+    changes: Callable[[int, int], str], *, place: Callable[[int], str] = str, colour: bool = False,
+    unit: str = "um",
+) -> str:  # fmt: skip
+    """The partners among lines of two texts whose text differs, and lines without partner, as a table.
+    `changes` puts into words what differs between two partners, in a `unit`."""
     rows: list[tuple[str, str, str, str]] = []
     counts = {"changed": 0, "inserted": 0, "left out": 0}
-    for i, j in align(nominal, corrected, near_um):
+    for i, j in pairs:
         if i is None:
             if j is not None:
                 counts["inserted"] += 1
-                rows.append(("+", "", corrected[j].text, ""))
+                rows.append(("+", "", corrected[j], ""))
         elif j is None:
             counts["left out"] += 1
-            rows.append((f"- {place(i + 1)}", nominal[i].text, "", ""))
-        elif nominal[i].text != corrected[j].text:
+            rows.append((f"- {place(i + 1)}", nominal[i], "", ""))
+        elif nominal[i] != corrected[j]:
             counts["changed"] += 1
-            changes = "  ".join(_changes(nominal[i], corrected[j], near_um))
-            rows.append((place(i + 1), nominal[i].text, corrected[j].text, changes))
+            rows.append((place(i + 1), nominal[i], corrected[j], changes(i, j)))
     total = ", ".join(f"{count} {what}" for what, count in counts.items())
-    return "".join(_table(rows, colour)) + f"lines: {total}\n"
+    return "".join(_table(rows, colour, unit)) + f"lines: {total}\n"
 
 
 def _changes(nominal: Line, corrected: Line, near_um: float) -> Iterator[str]:
@@ -252,14 +266,15 @@ def _changes(nominal: Line, corrected: Line, near_um: float) -> Iterator[str]:
         yield f"{letter} new" if math.isnan(change) else f"{letter}{change:+.1f}"
 
 
-def _table(rows: list[tuple[str, str, str, str]], colour: bool) -> Iterator[str]:
+def _table(rows: list[tuple[str, str, str, str]], colour: bool, unit: str) -> Iterator[str]:
     if not rows:
         return
     number = max(4, max(len(row[0]) for row in rows))
     nominal_width, corrected_width = (
         min(MAX_COLUMN, max(9, max(len(row[k]) for row in rows))) for k in (1, 2)
     )
-    yield f"{'line':>{number}}  {'nominal':{nominal_width}}  {'corrected':{corrected_width}}  change in um\n"
+    heads = f"{'line':>{number}}  {'nominal':{nominal_width}}  {'corrected':{corrected_width}}"
+    yield f"{heads}  change in {unit}\n"
     for mark, nominal, corrected, changes in rows:
         nominal = shortened(printable(nominal), nominal_width).ljust(nominal_width)
         corrected = shortened(printable(corrected), corrected_width)

@@ -21,9 +21,11 @@ from olp.cli.common import (
 )
 from olp.cli.options import MM, Integer, force_option, json_option, plot_option, program_options, units_option
 from olp.core.errors import UsageError
+from olp.core.values import dataclass
 
 if TYPE_CHECKING:
     from olp.errormodel.calibration import Calibration
+    from olp.reports.plots.base import Format
     from olp.workflows.flatten import UnrollOptions
     from olp.workflows.session import Session
 
@@ -70,9 +72,9 @@ def command(
         file, machine = None, file
     elif file is None and machine is None:
         ask_program = at is None and plot is None
-    other = at is not None or plot is not None
     about_machine = file is None and machine is not None
-    if about_machine and _of_joints(machine or "", job, axes, tool, as_json=as_json, other=other):
+    asked = _Asked(axes, tool, plot, as_json=as_json, force=force)
+    if about_machine and _of_joints(machine or "", job, asked, at):
         return
     if axes:
         raise UsageError("--axes is for machine files with rotary joints; give the axis position with --at")
@@ -113,26 +115,57 @@ def command(
     put(to_json(values) if as_json else outline(shown))
 
 
-def _of_joints(
-    machine: str, job: str | None, axes: Sequence[str], tool: int | None, *, as_json: bool, other: bool
-) -> bool:
-    """Show a machine with other joints than three linear axes; False where the file is of no such machine.
-    `other` says that an option for three linear axes is given."""
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """What a call asks of a machine with rotary joints."""
+
+    axes: tuple[str, ...]
+    tool: int | None
+    plot: str | None
+    as_json: bool
+    force: bool
+
+
+def _of_joints(machine: str, job: str | None, asked: _Asked, at: tuple[float, float, float] | None) -> bool:
+    """Show a machine with other joints than three linear axes; False where the file is of no such machine."""
     from olp.files.kinematics.load import is_of_joints
 
     if not is_of_joints(machine):
         return False
-    if other:
-        raise UsageError("--at and --plot are for three linear axes; give axis values such as --axes C=30")
-    if tool is not None and not axes:
+    if at is not None:
+        raise UsageError("--at is for three linear axes; give axis values such as --axes C=30")
+    if asked.tool is not None and not asked.axes:
         raise UsageError("--tool belongs to --axes; give axis values such as --axes C=30")
+    if asked.plot is not None:
+        _plot_joints(machine, job, asked.plot, force=asked.force)
+        if not asked.axes:
+            return True
     from olp.reports.outline import outline
     from olp.reports.report import plain, to_json
     from olp.workflows.inspect_joints import joint_error_at, joint_summary
 
-    values = joint_error_at(machine, _values(axes), job, tool) if axes else joint_summary(machine, job)
-    put(to_json(values) if as_json else outline(plain(values)))
+    axes = asked.axes
+    values = joint_error_at(machine, _values(axes), job, asked.tool) if axes else joint_summary(machine, job)
+    put(to_json(values) if asked.as_json else outline(plain(values)))
     return True
+
+
+def _plot_joints(machine: str, job: str | None, name: str, *, force: bool) -> None:
+    plot_ending(name)
+    from olp.files.calibration.reader import files_beside
+    from olp.files.kinematics.load import load_joint_setup
+    from olp.files.write import write_bytes
+    from olp.reports.plots.joint_curves import joint_curves
+
+    setup = load_joint_setup(machine, job)
+    own = setup.machine.calibration
+    if setup.calibration is None or own is None:
+        raise UsageError("names no calibration; set the key calibration in it", file=machine)
+    inputs = (*files_of(machine, job, own), *map(str, files_beside(own)))
+    refuse_early(files_of(name), inputs, force=force)
+    data = joint_curves(setup.machine.structure, setup.calibration, _kind_of(name))
+    write_bytes(name, data, force=force, inputs=inputs)
+    diagnostic(f"wrote {name}")
 
 
 def _values(stated: Sequence[str]) -> dict[str, float]:
@@ -165,9 +198,14 @@ def _plot(session: Session, name: str, inputs: Sequence[str], force: bool) -> No
     from olp.files.write import write_bytes
     from olp.reports.plots.base import calibration_curves
 
-    data = calibration_curves(_calibration(session), "png" if Path(name).suffix.lower() == ".png" else "svg")
+    data = calibration_curves(_calibration(session), _kind_of(name))
     write_bytes(name, data, force=force, inputs=inputs)
     diagnostic(f"wrote {name}")
+
+
+def _kind_of(picture: str) -> Format:
+    """The format that the name of a picture ends in."""
+    return "png" if Path(picture).suffix.lower() == ".png" else "svg"
 
 
 def _by_support(matrix: Sequence[Mapping[str, str]]) -> dict[str, str]:

@@ -3,7 +3,8 @@ it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+import sys
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +25,7 @@ from olp.cli.common import (
     refuse_twice,
     source,
     sources_of_call,
+    takes_colour,
 )
 from olp.core.errors import InputError, UsageError
 
@@ -31,7 +33,6 @@ if TYPE_CHECKING:
     from olp.calibration.design.choosing import Criterion
     from olp.core.progress import Progress
     from olp.files.write import Content
-    from olp.findings.catalogue import Finding
     from olp.review.job import Review
     from olp.workflows.calibrate_plan_joints import PlannedPoses
     from olp.workflows.compare import CompareOptions, Comparison
@@ -39,10 +40,16 @@ if TYPE_CHECKING:
     from olp.workflows.joints.retime import JointRetiming
 
 #: Words of a call that every verb takes on such a machine.
-_ALWAYS = ("program", "programs", "nominal", "corrected", "machine", "job", "dialect", "flatten",
+ALWAYS = ("program", "programs", "nominal", "corrected", "machine", "job", "dialect", "flatten",
            "expand_cycles", "peck_clearance_mm", "output", "tolerance_um", "tolerance_urad", "outside_box",
            "date", "fail_on", "as_json", "quiet", "force", "step_mm")  # fmt: skip
 
+
+#: What `olp correct` takes beside these.
+CORRECT = ("report_file", "review_file", "times", "show_diff")
+
+#: What `olp check` takes beside these.
+CHECK = ("select", "ignore", "form")
 
 #: What `olp retime` takes beside these.
 RETIME = (
@@ -52,6 +59,59 @@ RETIME = (
 
 #: What `olp view` takes.
 VIEW = ("live", "port", "no_time", "measured", "part_tolerance_um")
+
+
+#: Why an option is not for such machines, and how to go on, by its word.
+WHY_NOT = {
+    "accept": "no doubts about the inputs are found there, so none is accepted; leave it out",
+    "add_errors": (
+        "the errors count along the chain; correct the program, and compare the run with the corrected one"
+    ),
+    "at": "their position is more than X, Y and Z; show a place of the machine file with --axes, such as "
+          "--axes C=30",
+    "axes": "a program has many positions; name the machine file alone, as in "
+            "olp inspect machine.toml --axes C=30",
+    "clearances": "clearances are those of three linear axes; a simulation of the cell checks collisions",
+    "columns": "a list names its columns in its first line, as axes with units, such as X_mm,C_deg",
+    "contour": "there the path of a contour is not known; program the path of the tool without G41 and G42",
+    "controller": (
+        "the planners that are known are those of three linear axes; the report has the time at the limits "
+        "of the axes"
+    ),
+    "frame_name": "work offsets turn with the table there; set the frame at the control",
+    "log": "controls are timed for three linear axes; leave it out",
+    "log_profile": "controls are timed for three linear axes; leave it out",
+    "max_inertial_um": (
+        "compliance to accelerations is stated for three linear axes; lower the accelerations in the machine "
+        "file"
+    ),
+    "only_sure_components": (
+        "their calibration is one fit, whose errors belong together; the report states what is not known "
+        "as an uncertainty of poses"
+    ),
+    "part_frame": "work offsets turn with the table there; set the frame at the control",
+    "part_tolerance_um": (
+        "no verdict on a part is given there; compare the uncertainty in the report with the tolerance"
+    ),
+    "plot": "the curves are those of the machine; name the machine file alone, as in "
+            "olp inspect machine.toml --plot curves.svg",
+    "positions": (
+        "a log of axis values is a program there: olp simulate LOG makes poses of it, which olp compare takes"
+    ),
+    "program": "readings are a plan, not a run of a program; leave it out",
+    "profile": "a list names its columns in its first line, as axes with units, such as X_mm,C_deg",
+    "proof": "the budget of accelerations is that of three linear axes; leave it out",
+    "reflector": "the plan of readings states where reflectors sit; leave it out",
+    "settings": "controls are timed for three linear axes; leave it out",
+    "sigma_um": "the plan of readings states its sigma_um; leave it out",
+    "split_rapids": "rapids are driven from end to end; program a feed move where the way counts",
+    "tool": "a program states its tools; name the machine file alone, with --axes",
+    "unit": "a list names its columns in its first line with units, such as X_mm,C_deg",
+}  # fmt: skip
+
+
+#: Said of the options of other verbs.
+_OTHER = "it is about three linear axes; leave it out"
 
 
 def on_joints(machine: str | None, job: str | None, also: Collection[str] = ()) -> bool:
@@ -65,10 +125,12 @@ def on_joints(machine: str | None, job: str | None, also: Collection[str] = ()) 
         if "tolerance_urad" in given:
             raise UsageError("--tolerance-urad is for machines with rotary joints; leave it out")
         return False
-    wrong = [name for name in given if name not in _ALWAYS and name not in also]
+    wrong = [name for name in given if name not in ALWAYS and name not in also]
     if wrong:
         option = next(p for p in context.command.params if p.name == wrong[0])
-        raise UsageError(f"{option.opts[0]} does not go with machines with rotary joints yet; leave it out")
+        raise UsageError(
+            f"{option.opts[0]} is not for machines with rotary joints: {WHY_NOT.get(wrong[0], _OTHER)}"
+        )
     return True
 
 
@@ -95,8 +157,8 @@ def correct(program: str | None, machine: str | None, job: str | None, words: di
     run = run_of(program, machine, job)
     name = program or run.program.name
     output = words["output"] or default_output(name)
-    if words["as_json"] and output == STREAM:
-        raise UsageError("JSON on stdout excludes -o -; name a file with -o")
+    if words["as_json"] and (output == STREAM or words["show_diff"]):
+        raise UsageError("JSON on stdout excludes -o - and --diff; write the report to a file with --report")
     report_file, review_file = words["report_file"], words["review_file"]
     if review_file == STREAM:
         raise UsageError("--review writes a file and cannot be -; name a file, or use olp view -o -")
@@ -126,6 +188,11 @@ def correct(program: str | None, machine: str | None, job: str | None, words: di
     write_files(written, force=words["force"], inputs=run.files)
     if output == STREAM:
         put(result.data)
+    if words["show_diff"]:
+        from olp.cli.joint_diff import render
+
+        colour = takes_colour(sys.stderr if output == STREAM else sys.stdout)
+        put(render(done, colour=colour), err=output == STREAM)
     if words["as_json"] or report_file == STREAM:
         put(to_json(result.report))
     elif not words["quiet"]:
@@ -152,39 +219,34 @@ def verify(nominal: str, corrected: str, machine: str | None, job: str | None, w
     exit_for(result.findings, words["fail_on"])
 
 
-def check(
-    programs: Iterable[str | None], machine: str | None, job: str | None, words: dict[str, Any]
-) -> None:
-    """`olp check`: the program is corrected in memory, or proved against its nominal one."""
-    from olp.files.write import write_files
-    from olp.reports.report import to_json
-    from olp.workflows.joints.correct import JointOptions, corrected
-    from olp.workflows.joints.verify import verified
+def check(program: str | None, machine: str | None, job: str | None, words: dict[str, Any]) -> None:
+    """`olp check` of one program: it is corrected in memory, or proved against its nominal one."""
+    nominal, output, form = words["nominal"], words["output"], words["form"]
+    if nominal is not None and program is None:
+        raise UsageError("--nominal goes with the corrected program; name that too")
+    run = run_of(program if nominal is None else nominal, machine, job)
+    inputs = (*run.files, *files_of(program))
+    refuse_early(files_of(output), inputs, force=words["force"])
 
-    options = options_of(JointOptions, words)
-    programs, output = list(programs), words["output"]
-    if len(programs) > 1 and output != STREAM:
-        raise UsageError(f"-o is for one program, and {len(programs)} are named; check them one by one")
-    found: list[Finding] = []
-    for program in programs:
-        nominal = words["nominal"]
-        run = run_of(program if nominal is None else nominal, machine, job)
-        refuse_early(files_of(output), run.files, force=words["force"])
-        result = (
-            corrected(run, options)
-            if nominal is None
-            else verified(run, source(run.sources, program or STREAM), options)
+    from olp.files.write import write_files
+    from olp.reports.check import FORMATS
+    from olp.workflows import refusals
+    from olp.workflows.joints.check import JointCheckOptions, examined
+
+    corrected = None if nominal is None or program is None else source(run.sources, program)
+    result = examined(run, corrected, options_of(JointCheckOptions, words))
+    text = FORMATS[form](result.report, words["fail_on"])
+    write_files({Path(name): text.encode() for name in files_of(output)}, force=words["force"], inputs=inputs)
+    if output == STREAM and not (words["quiet"] and form == "text"):
+        # text for people is in the coding of the console, the other formats in their own
+        put(text if form == "text" else text.encode())
+    elif output != STREAM and not words["quiet"]:
+        diagnostic(f"wrote {output}")
+    if result.refused is not None:
+        raise refusals.short(result.refused).in_file(
+            "<stdin>" if STREAM in (program, nominal) else run.program.name
         )
-        found += result.findings
-        go = "Go" if result.report["verdict"]["ok"] else "NO GO"
-        text = f"{go}: {program or run.program.name}\n\n{result.to_text()}"
-        told = to_json(result.report) if words["as_json"] else text.encode()
-        write_files({Path(name): told for name in files_of(output)}, force=words["force"], inputs=run.files)
-        if output == STREAM and (words["as_json"] or not words["quiet"]):
-            put(told if words["as_json"] else text)
-        elif output != STREAM and not words["quiet"]:
-            diagnostic(f"wrote {output}")
-    exit_for(tuple(found), words["fail_on"])
+    exit_for(result.findings, words["fail_on"])
 
 
 def simulate(

@@ -16,7 +16,7 @@ from olp.core.errors import InputError
 from olp.core.version import __version__
 from olp.findings.catalogue import GATE_CODES, RULES
 from olp.findings.rule import Rule, Severity
-from olp.reports import shown
+from olp.reports import joints, shown
 from olp.reports.refusals import refusals_text
 from olp.reports.report import (
     Report,
@@ -43,6 +43,7 @@ def to_text(report: Report, fail_on: str) -> str:
     sections = (
         _heads(report),
         _clearance(report),
+        *(() if report.get("proof") is None else joints.proof_lines(report["proof"])),
         _findings(report),
         _verdict(report, fail_on),
     )

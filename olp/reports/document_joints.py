@@ -16,7 +16,7 @@ from olp.reports.document_parts import (
     subtitle_of,
 )
 from olp.reports.joints import WORST, axis_changes, uncertainty_rows, verdict_of
-from olp.reports.report import CORRECTED, UNCORRECTED, Report, number, time_text
+from olp.reports.report import CORRECTED, UNCORRECTED, Report, number, place, time_text
 
 
 def correction(report: Report, version: str, date: datetime.date | None) -> Document:
@@ -73,7 +73,7 @@ def _validation(report: Report) -> Iterator[Block]:
     ])  # fmt: skip
     if report["worst"]:
         yield Paragraph("Worst blocks, corrected and uncorrected:")
-        rows = [[str(row["line"]), *(number(row[key]) for key in WORST)] for row in report["worst"]]
+        rows = [[place(row), *(number(row[key]) for key in WORST)] for row in report["worst"]]
         yield Grid(["line", *WORST.values()], rows)
 
 

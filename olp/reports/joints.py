@@ -11,6 +11,7 @@ from olp.reports.report import (
     findings_text,
     number,
     pairs,
+    place,
     sentences,
     table,
     time_lines,
@@ -39,16 +40,23 @@ def to_text(report: Report) -> str:
     sections = (
         _heads(report),
         _verdict(report),
-        _deviation(report),
-        _uncertainty(report),
-        time_lines(report),
-        _corrections(report),
-        _worst(report),
+        *proof_lines(report),
         findings_text(report.get("findings") or ()),
         sentences("What this proves", report.get("proves") or ()),
         sentences("What it does not prove", report.get("does_not_prove") or ()),
     )
     return "\n\n".join("\n".join(lines) for lines in map(list, sections) if lines) + "\n"
+
+
+def proof_lines(report: Report) -> tuple[Iterator[str], ...]:
+    """The sections on the proof, in lines; the verdict is not among them."""
+    return (
+        _deviation(report),
+        _uncertainty(report),
+        time_lines(report),
+        _corrections(report),
+        _worst(report),
+    )
 
 
 def _heads(report: Report) -> Iterator[str]:
@@ -161,5 +169,5 @@ def _worst(report: Report) -> Iterator[str]:
     if not report["worst"]:
         return
     yield "Worst blocks, corrected and uncorrected"
-    rows = [[str(row["line"]), *(number(row[key]) for key in WORST)] for row in report["worst"]]
+    rows = [[place(row), *(number(row[key]) for key in WORST)] for row in report["worst"]]
     yield from table(["line", *WORST.values()], rows)

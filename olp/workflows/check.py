@@ -16,8 +16,9 @@ from olp.checks.along import Along
 from olp.checks.base import finding
 from olp.checks.clearance import Clearances, Solid, clearances
 from olp.checks.model import model_findings
-from olp.compensation.stamp import find_stamp, is_of
-from olp.core.errors import ProgramError, UsageError
+from olp.checks.stamps import stamp_findings
+from olp.compensation.stamp import find_stamp
+from olp.core.errors import ProgramError
 from olp.core.machine import Setup
 from olp.core.progress import Progress, silent
 from olp.core.spool import Text
@@ -26,7 +27,8 @@ from olp.core.values import dataclass
 from olp.errormodel.known import KnownErrors
 from olp.files.meshes import read_mesh
 from olp.files.sources import Source, Sources
-from olp.findings.catalogue import GATE_CODES, RULES, Finding
+from olp.findings.catalogue import RULES, Finding
+from olp.findings.choice import chosen
 from olp.findings.rule import Severity
 from olp.program.origin import Origin
 from olp.program.program import Program
@@ -153,7 +155,7 @@ def check(
         part_tolerance_um=part_tolerance_um, only_sure_components=only_sure_components,
         date=date, accept=tuple(accept), select=tuple(select), ignore=tuple(ignore),
     )  # fmt: skip
-    chosen(options)
+    chosen(options.select, options.ignore)
     session = Session.start(machine, job)
     other = None if nominal is None else session.sources.source(nominal)
     return run(session, session.sources.source(program, nominal), options, nominal=other, progress=progress)
@@ -183,7 +185,7 @@ def examined(
     progress: Progress | None = None,
 ) -> Check:
     """As `run`. A program that is refused gives its reasons as findings, and the error."""
-    codes = chosen(options)
+    codes = chosen(options.select, options.ignore)
     tell = progress or silent
     setup = session.setup
     everything = "all" in setup.machine.compensated_by_controller
@@ -230,20 +232,6 @@ def _refused(
         **refusals.parts_of(error, name),
     }
     return Check(refusals.findings_of(error, name), report, refused=error)
-
-
-def chosen(options: CheckOptions) -> list[str]:
-    """The codes that begin with one of `select`, or all, less those that begin with one of `ignore`. Raises
-    UsageError for text that begins no code."""
-    select, ignore = options.select, options.ignore
-    for prefix in (*select, *ignore):
-        if not any(code.startswith(prefix.upper()) for code in GATE_CODES):
-            raise UsageError(
-                f"{prefix!r} is not the code of a finding or the beginning of one; olp explain lists them all"
-            )
-    wanted, unwanted = (tuple(prefix.upper() for prefix in prefixes) for prefixes in (select, ignore))
-    codes = [code for code in GATE_CODES if not wanted or code.startswith(wanted)]
-    return [code for code in codes if not (unwanted and code.startswith(unwanted))]
 
 
 def _case(
@@ -367,23 +355,8 @@ def _clearances(case: _Case, codes: list[str], sources: Sources, tell: Progress)
 
 def _stamps(case: _Case) -> list[Finding]:
     """Findings where the program is corrected twice, or with another calibration."""
-    findings = []
-    first = find_stamp(case.data)
-    if first is not None and find_stamp(case.data[first.end() :]) is not None:
-        findings.append(
-            finding("OLP311", "the program has two stamps of a correction", [_line(case.data, first.start())])
-        )
-    if case.run is not None and not case.corrected_here and find_stamp(case.run.nominal.data) is not None:
-        findings.append(finding("OLP311", "the program given as nominal has the stamp of a correction"))
-    if first is not None and not is_of(first, case.loaded.digest):
-        what = f"the program says `{first.group().decode()}`, the calibration in use is "
-        what += case.loaded.digest[:12]
-        findings.append(finding("OLP312", what, [_line(case.data, first.start())]))
-    return findings
-
-
-def _line(data: Text, offset: int) -> int:
-    return data.count(b"\n", 0, offset) + 1
+    nominal = None if case.run is None or case.corrected_here else case.run.nominal.data
+    return stamp_findings(case.data, nominal, case.loaded.digest)
 
 
 def _verdict(

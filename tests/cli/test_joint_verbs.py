@@ -3,16 +3,31 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
+from xml.etree import ElementTree
 
+import click
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
-from olp.cli import main
+from olp.cli import joints, main
+from olp.cli.compare import _ON_JOINTS
+from olp.workflows.joints.check import CODES
 
 FOLDER = Path(__file__).resolve().parents[2] / "programs"
 ARM = FOLDER / "arm-payload"
+#: A part with four moves.
+PART = (
+    "G21 G90 G54\nG0 X0 Y0 Z50 A0 C0\nG1 X9 Y0 Z20 A0 C0 F900\nG1 X5 Y5 Z20 A-10 C40\n"
+    "G1 X0 Y0 Z20 A0 C0\nM30\n"
+)
+#: A line in a loop that ends beyond the calibrated values of X.
+LOOP = (
+    "G21 G90 G17 G94 G54 G49\nG0 X0. Y0. Z150. A0. C0.\n#1=1\nWHILE [#1 LE 3] DO1\n"
+    "G1 X[#1*97.+2.] C[#1*5.] F900\n#1=#1+1\nEND1\nM30\n"
+)
 
 
 def run(*words: object) -> Result:
@@ -49,7 +64,7 @@ def test_a_program_is_inspected(tmp_path: Path) -> None:
     assert values["tip_range_mm"]["Z"] == pytest.approx([-210.0, -120.0], abs=1e-9)
     assert "nearest to singular" in run("inspect", program, "-m", machine).stdout.lower()
     refused = run("inspect", program, "-m", machine, "--at", "0", "0", "0")
-    assert "--at does not go with machines with rotary joints" in refused.output
+    assert "--at is not for machines with rotary joints" in refused.output
 
 
 def test_findings_of_a_list_go_into_a_file(tmp_path: Path) -> None:
@@ -103,3 +118,111 @@ def test_loops_are_written_out_for_such_a_machine(tmp_path: Path) -> None:
     (tmp_path / "l.csv").write_text("X_mm,Y_mm,Z_mm,A_deg,C_deg\n0,0,50,0,0\n1,0,50,0,0\n")
     done = run("flatten", str(tmp_path / "l.csv"), "-m", str(mill))
     assert done.exit_code == 2 and "cannot be unrolled" in done.stderr
+
+
+def test_a_gate_speaks_the_forms_of_pipelines(tmp_path: Path) -> None:
+    """Codes are those that are looked for, and what is left out does not count."""
+    (tmp_path / "part.nc").write_text(PART)
+    job = (tmp_path / "part.nc", "-m", FOLDER / "trunnion-mill" / "machine.toml")
+    late = ("--date", "2099-01-01")
+    report = json.loads(run("check", *job, *late, "--format", "json").stdout)
+    assert (report["schema"], report["rules"], report["verdict"]["ok"]) == ("olp-check-1", [*CODES], False)
+    assert "OLP401" in [one["code"] for one in report["findings"]]
+    assert report["proof"]["deviation"]["holds"]
+    log = json.loads(run("check", *job, *late, "--format", "sarif").stdout)["runs"][0]
+    assert [rule["id"] for rule in log["tool"]["driver"]["rules"]] == [*CODES]
+    assert [one["ruleId"] for one in log["results"]] == [one["code"] for one in report["findings"]]
+    suite = ElementTree.fromstring(run("check", *job, *late, "--format", "junit").stdout)[0]
+    assert (suite.get("tests"), suite.get("failures")) == (str(len(CODES)), "1")
+    assert run("check", *job, *late).exit_code == 1
+    assert run("check", *job, *late, "--ignore", "OLP401").stdout.splitlines()[-1].startswith("Go: ")
+    assert run("check", *job, *late, "--select", "OLP1", "-q").exit_code == 0
+    refused = run("check", *job, "--select", "OLP701")
+    assert refused.exit_code == 2 and "OLP701 is not looked for" in refused.stderr
+    assert run("check", *job, "--select", "OLP9999").exit_code == 2
+
+
+def test_lines_of_a_gate_are_those_of_the_program_that_is_checked(tmp_path: Path) -> None:
+    machine = ("-m", FOLDER / "trunnion-mill" / "machine.toml")
+    nominal, corrected = tmp_path / "part.nc", tmp_path / "corrected.nc"
+    nominal.write_text(PART)
+    assert run("correct", nominal, *machine, "-o", corrected, "-q").exit_code == 0
+    lines = corrected.read_text().splitlines()
+    far = next(k for k, line in enumerate(lines) if "A-10" in line)
+    lines[far] += " (nudged)"
+    lines[far] = re.sub(r"X(\S+)", lambda word: f"X{float(word[1]) + 0.004:.3f}", lines[far])
+    corrected.write_text("\n".join(lines))
+    done = run("check", corrected, *machine, "--nominal", nominal, "--json")
+    found = {one["code"]: one for one in json.loads(done.stdout)["findings"]}
+    # the line behind begins where this one ends
+    assert far + 1 in found["OLP101"]["lines"] and found["OLP101"]["line"] >= far + 1
+    assert done.exit_code == 1
+    alone = run("check", corrected, *machine)
+    assert alone.exit_code == 3 and "--nominal" in alone.stderr
+    nominal.write_text(PART.replace("X9", "X295"))
+    outside = run("check", nominal, *machine, "--json")
+    (finding,) = (one for one in json.loads(outside.stdout)["findings"] if one["code"] == "OLP405")
+    assert outside.exit_code == 1 and finding["line"] == 3
+    held = run("check", nominal, *machine, "--json", "--outside-box", "hold")
+    assert "OLP403" in held.stdout and held.exit_code == 0
+
+
+def test_lines_of_an_unrolled_program_are_those_that_were_written(tmp_path: Path) -> None:
+    (tmp_path / "loop.nc").write_text(LOOP)
+    words = (tmp_path / "loop.nc", "-m", FOLDER / "trunnion-mill" / "machine.toml", "--flatten")
+    done = run("correct", *words, "-o", tmp_path / "o.nc", "--json", "--outside-box", "hold")
+    report = json.loads(done.stdout)
+    assert {row["line"] for row in report["worst"]} == {5}
+    (outside,) = (one for one in report["findings"] if one["code"] == "OLP403")
+    assert (outside["line"], outside["lines"]) == (5, [5])
+
+
+def test_changes_are_shown_line_by_line(tmp_path: Path) -> None:
+    """Partners are the moves that belong together, and changes are corrected minus nominal command."""
+    (tmp_path / "loop.nc").write_text(LOOP.replace("97.+2.", "2."))
+    mill = ("-m", FOLDER / "trunnion-mill" / "machine.toml")
+    done = run("correct", tmp_path / "loop.nc", *mill, "--flatten", "-o", tmp_path / "o.nc", "-q", "--diff")
+    rows = [row.split() for row in done.stdout.splitlines()[1:-1]]
+    # three passes of the line in the loop, which the stamp and the rapid precede
+    assert [row[0] for row in rows] == ["+", "2", "5", "5", "5"]
+    for row in rows[2:]:
+        x = [float(word[1:]) for word in row if word.startswith("X") and "." in word]
+        assert x[2] == pytest.approx((x[1] - x[0]) * 1e3, abs=0.06)
+    listed = run("correct", "-j", ARM / "job.toml", "-o", tmp_path / "o.csv", "-q", "--diff").stdout
+    texts = (ARM / "deburr.csv").read_text(), (tmp_path / "o.csv").read_text()
+    counts = [len(text.splitlines()) for text in texts]
+    assert listed.splitlines()[-1] == (
+        f"lines: {counts[0] - 1} changed, {counts[1] - counts[0]} inserted, 0 left out"
+    )
+    second = listed.splitlines()[2].split()
+    turned = np.array(
+        [float(row.split(",")[0]) for row in (texts[0].splitlines()[1], texts[1].splitlines()[2])]
+    )
+    assert f"J1{np.radians(np.diff(turned))[0] * 1e6:+.1f}" in second
+
+
+@pytest.mark.slow
+def test_curves_of_joints_are_drawn(tmp_path: Path) -> None:
+    drawn = run("inspect", FOLDER / "trunnion-mill" / "machine.toml", "--plot", tmp_path / "c.svg")
+    assert drawn.exit_code == 0 and drawn.stdout == ""
+    text = (tmp_path / "c.svg").read_text()
+    assert all(f">{name}<" in text for name in ("axis A", "axis C", "EXC", "EBC", "ECC", "EAA"))
+    assert "axis X" not in text
+    none = run("inspect", FOLDER / "hexapod" / "machine.toml", "--plot", tmp_path / "h.svg")
+    assert none.exit_code == 2 and "no curves" in none.stderr
+
+
+def test_a_refused_option_says_why_and_how_to_go_on() -> None:
+    """Every option of the verbs for programs is taken, or a sentence of its own refuses it."""
+    taken = {
+        "retime": joints.RETIME, "view": joints.VIEW, "check": joints.CHECK, "correct": joints.CORRECT,
+        "inspect": ("file",), "compare": _ON_JOINTS, "verify": (), "simulate": (), "flatten": (),
+    }  # fmt: skip
+    for verb, also in taken.items():
+        command = main.get_command(click.Context(main), verb)
+        assert command is not None
+        for option in command.params:
+            known = option.name in (*joints.ALWAYS, *also, *joints.WHY_NOT)
+            assert known or not option.expose_value, f"{verb} {option.name}"
+    said = run("retime", "-j", ARM / "job.toml", "--max-inertial-um", "3")
+    assert "compliance to accelerations is stated for three linear axes" in said.stderr

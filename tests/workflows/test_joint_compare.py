@@ -131,4 +131,4 @@ def test_the_path_of_the_tip_and_its_frames(tmp_path: Path) -> None:
     assert refused.exit_code == 3
     assert "G59" in refused.output
     refused = run(program, measured, "-m", machine, "--add-errors")
-    assert "does not go with machines with rotary joints" in refused.output
+    assert "is not for machines with rotary joints" in refused.output

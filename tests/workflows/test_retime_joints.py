@@ -217,7 +217,7 @@ def test_the_verb_writes_table_and_report(tmp_path: Path) -> None:
     done = run("retime", "-j", job, "-o", str(tmp_path / "x.txt"))
     assert done.exit_code == 2 and "ends in no known format" in done.stderr
     done = run("retime", "-j", job, "--controller", "fanuc")
-    assert done.exit_code == 2 and "--controller does not go with machines with rotary joints" in done.stderr
+    assert done.exit_code == 2 and "--controller is not for machines with rotary joints" in done.stderr
     done = run("retime", "-j", job, "--plot-span", "0", "1")
     assert done.exit_code == 2 and "name a file with --plot" in done.stderr
 

@@ -34,6 +34,7 @@ from olp.workflows.flatten import UnrollOptions
 from olp.workflows.joints.loaded import JointRun
 from olp.workflows.joints.report import findings_of, last_digits, outside_box, report_of
 from olp.workflows.joints.uncertain import uncertainty_of
+from olp.workflows.original import placed, placed_findings
 from olp.workflows.session import Outside, PathLike
 from olp.workflows.shown import Shown
 
@@ -184,9 +185,11 @@ def proved(
     digit_mm, digit_deg = last_digits(path)
     proof = prove_joints(path, corrected, plan, options.limits(), digit_mm=digit_mm, digit_deg=digit_deg)
     tolerance = options.tolerance_um, options.tolerance_urad
-    findings = findings_of(path, plan, proof, run, options.date, tolerance)
+    origin = path.program.origin
+    findings = placed_findings(findings_of(path, plan, proof, run, options.date, tolerance), origin)
     text = bytes(corrected.program.data)
     report = report_of(run, path, plan, proof, findings, tolerance)
+    report["worst"] = [placed(row, origin) for row in report["worst"]]
     known = uncertainty_of(run, path, proof, options.date)
     if known is not None:
         report["uncertainty"] = known

@@ -172,11 +172,11 @@ def _worst(path: JointPath, proof: JointProof) -> list[dict[str, Any]]:
         proof.after.distance_mm / proof.allowed_mm,
         proof.over_rad / proof.allowed_rad,
     )
-    over = np.where(proof.judged, over, -np.inf)
+    over, line = np.where(proof.judged, over, -np.inf), path.program.original_lines(path.line)
     rows = [row for row in np.argsort(-over, kind="stable")[:_WORST].tolist() if np.isfinite(over[row])]
     return [
         {
-            "line": int(path.line[row]),
+            "line": int(line[row]),
             "position_um": float(proof.after.distance_mm[row]) * UM_PER_MM,
             "orientation_urad": float(proof.after.angle_rad[row]) / RAD_PER_URAD,
             "uncorrected_um": float(proof.before.distance_mm[row]) * UM_PER_MM,
@@ -199,10 +199,10 @@ def findings_of(
     tolerance: tuple[float, float],
 ) -> tuple[Finding, ...]:  # fmt: skip
     """What a person should know of a correction with its tolerances in um and urad."""
-    found = []
+    found, line = [], path.program.original_lines(path.line)
     if proof.over.any():
         what = "the corrected path leaves its tolerance at these lines" + _coarse_digits(path, plan, proof)
-        found.append(finding("OLP101", what, path.line[proof.over].tolist()))
+        found.append(finding("OLP101", what, line[proof.over].tolist()))
     after = proof.after
     unknown = (after.unknown_mm > tolerance[0] * MM_PER_UM) | (
         after.unknown_rad > tolerance[1] * RAD_PER_URAD
@@ -215,23 +215,23 @@ def findings_of(
             f"{after.unknown_rad[unknown].max() / RAD_PER_URAD:.1f} urad of the deviation come from that; "
             "move each axis by more than its backlash before"
         )
-        found.append(finding("OLP103", what, path.line[unknown].tolist()))
+        found.append(finding("OLP103", what, line[unknown].tolist()))
     holes = path.holes.strokes & proof.judged & (proof.after.distance_mm > proof.allowed_mm)
     if holes.any():
         most_um = float(proof.after.distance_mm[holes].max()) * UM_PER_MM
         what = f"{int(holes.sum())} holes are off by up to {most_um:.2f} um along the stroke"
-        found.append(finding("OLP105", what, path.line[holes].tolist()))
+        found.append(finding("OLP105", what, line[holes].tolist()))
     kept = _kept(path, plan)
     if len(kept):
-        found.append(finding("OLP102", f"{len(kept)} moves are left uncorrected", path.line[kept].tolist()))
+        found.append(finding("OLP102", f"{len(kept)} moves are left uncorrected", line[kept].tolist()))
     if plan.limited.any():
         what = "near a singular posture: the position is met, and a rest of the orientation is left"
-        found.append(finding("OLP106", what, path.line[plan.move[plan.limited]].tolist()))
+        found.append(finding("OLP106", what, line[plan.move[plan.limited]].tolist()))
     arcs = np.flatnonzero(path.curves.mask & plan.straight)
     if len(arcs):
         what = f"{len(arcs)} arcs are written as straight moves within the tolerance"
-        found.append(finding("OLP111", what, path.line[arcs].tolist()))
-    found += remark_findings(path.program)
+        found.append(finding("OLP111", what, line[arcs].tolist()))
+    found += remark_findings(path.program.in_original())
     if not proof.judged.any():
         found.append(finding("OLP107", "no feed move was corrected at a known position"))
     if run.calibration is not None:
@@ -297,6 +297,5 @@ def _outside(path: JointPath, plan: JointPlan, run: JointRun) -> list[Finding]:
     out = outside_box(path, plan, run)
     if not out:
         return []
-    return [
-        finding("OLP403", f"{out[0][1]}; its error is that at the nearest end", [line for line, _ in out])
-    ]
+    lines = path.program.original_lines([line for line, _ in out]).tolist()
+    return [finding("OLP403", f"{out[0][1]}; its error is that at the nearest end", lines)]
