@@ -9,7 +9,7 @@ from dataclasses import field
 from olp.core.machine import ZERO, Machine, Tool, Vector
 from olp.core.toolpath import Interpolated
 from olp.core.values import dataclass
-from olp.kinematics.errors import MachineErrors
+from olp.kinematics.errors import MachineErrors, Payload
 from olp.kinematics.structure import Structure
 
 
@@ -45,7 +45,8 @@ class JointMachine:
 @dataclass(frozen=True, slots=True, eq=False)
 class JointCalibration:
     """A calibration file: the errors, and the calibrated values of each axis in mm or deg. Its standard
-    uncertainties grow by `growth_per_year`, a share."""
+    uncertainties grow by `growth_per_year`, a share. `payload` was on while measuring, where the errors do
+    not say what a payload bends."""
 
     errors: MachineErrors
     box: Mapping[str, tuple[float, float]]
@@ -54,3 +55,4 @@ class JointCalibration:
     temperature_degC: float
     datum_mm: Vector = ZERO
     growth_per_year: float = 0.0
+    payload: Payload = Payload()

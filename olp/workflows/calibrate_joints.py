@@ -10,6 +10,7 @@ import numpy as np
 
 from olp.calibration.joints.adjustment import JointFit, held_out
 from olp.calibration.joints.findings import fit_or_refuse, joint_findings
+from olp.calibration.joints.payloads import refuse_other_payloads
 from olp.calibration.joints.unknowns import model_of
 from olp.core.arrays import Array
 from olp.core.units import RAD_PER_URAD, UM_PER_MM
@@ -79,6 +80,7 @@ def fit_joint_calibration(
         sagging=campaign.sagging,
         masses=campaign.masses,
     )
+    refuse_other_payloads(model, campaign.readings, str(data))
     fit = fit_or_refuse(model, campaign.readings)
     findings = joint_findings(fit, campaign.readings)
     unseen = held_out(fit)

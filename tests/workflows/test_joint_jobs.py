@@ -105,3 +105,34 @@ def test_a_new_calibration_says_of_a_release_what_verify_says(tmp_path: Path, sq
     assert row["outside"] is not deviation["holds"]
     assert row["outside"] is (squareness_urad > 16.0)
     assert report["exit_code"] == int(row["outside"])
+
+
+def test_a_payload_that_nothing_weighs_is_named(tmp_path: Path) -> None:
+    """Where no [elasticity] says what a payload bends, one that was not on while measuring is a finding."""
+    shutil.copytree(FOLDER / "arm-payload", tmp_path / "job")
+    job, calibration = tmp_path / "job" / "job.toml", tmp_path / "job" / "calibration.toml"
+    (tmp_path / "job" / "deburr.csv").write_text(
+        "\n".join((FOLDER / "arm-payload" / "deburr.csv").read_text().splitlines()[:4]) + "\n"
+    )
+    text = calibration.read_text("utf-8")
+    bare = text.partition("[elasticity.J2]")[0]
+    sagging = bare + '[[gravity]]\ncomponent = "EJ2J2"\nangles = ["J2"]\nsin_urad = 300.0\n'
+
+    def named(stated: str) -> list[str]:
+        calibration.write_text(stated, "utf-8")
+        done = olp.correct_joints(tmp_path / "job" / "deburr.csv", tmp_path / "job" / "machine.toml", job)
+        return [one.message for one in done.findings if one.code == "OLP422"]
+
+    def held(kg: float, centre: str) -> str:
+        return sagging.replace("box =", f"payload_kg = {kg}\npayload_centre_mm = {centre}\nbox =", 1)
+
+    assert named(text) == []
+    (message,) = named(sagging)
+    assert "of the job is 6.5 kg, that of the calibration none" in message
+    assert named(held(6.5, "[15.0, 0.0, 90.0]")) == []
+    assert "centre at" in named(held(6.5, "[15.0, 0.0, 140.0]"))[0]
+    job.write_text(job.read_text().replace("payload_kg = 6.5\n", "").replace("payload_centre_mm", "# "))
+    assert "of the job is none, that of the calibration 4 kg" in named(held(4.0, "[0.0, 0.0, 0.0]"))[0]
+    assert named(sagging) == []
+    with pytest.raises(olp.ConfigError, match="payload_kg stands beside"):
+        named(text.replace("box =", "payload_kg = 2.0\nbox =", 1))

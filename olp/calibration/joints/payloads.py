@@ -10,7 +10,7 @@ from olp.calibration.joints.adjustment import adjusted, starts_of
 from olp.calibration.joints.mistakes import RIGHT, Mended
 from olp.calibration.joints.readings import Reading
 from olp.calibration.joints.unknowns import Model
-from olp.core.errors import CannotCompute
+from olp.core.errors import CannotCompute, ConfigError
 from olp.kinematics.errors import Payload
 
 #: kg: weights at which the readings are looked at; what fits best lies on the parabola through these.
@@ -21,11 +21,31 @@ _KNOWN = 100.0
 _QUICK = 7
 
 
+def refuse_other_payloads(
+    model: Model, readings: Sequence[Reading], file: str, stated: Payload | None = None
+) -> None:
+    """Raises ConfigError where nothing says what a payload bends, and readings state another one than other
+    readings, or than a calibration was `stated` with."""
+    if model.yields:
+        return
+    expected = readings[0].payload if stated is None else stated
+    other = next((one for one in readings if one.payload != expected), None)
+    if other is None:
+        return
+    sizes = [f"{one.kg:g} kg at {list(one.centre_mm)} mm" for one in (expected, other.payload)]
+    where = "other readings" if stated is None else "the calibration"
+    raise ConfigError(
+        f"{PurePath(other.source).name} states a payload of {sizes[1]}, and {where} one of {sizes[0]}; "
+        "nothing says what a payload bends: fit all readings together, and name the joints that give way in "
+        "elasticity",
+        file=file,
+    )
+
+
 def unstated_payloads(model: Model, readings: Sequence[Reading]) -> Iterator[Mended]:
     """By each source of readings without a payload the one that it may have had, where joints yield to it."""
-    yielding = model.base.yields or any(unknown.table == "elasticity" for unknown in model.unknowns)
     for index, reading in enumerate(readings):
-        if not yielding or reading.payload.kg:
+        if not model.yields or reading.payload.kg:
             continue
 
         def held(kg: float, index: int = index, reading: Reading = reading) -> list[Reading]:

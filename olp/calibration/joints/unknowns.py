@@ -114,6 +114,11 @@ class Model:
             zero=old.zero + float(own.get("zero", np.zeros(3))[0]),
         )
 
+    @property
+    def yields(self) -> bool:
+        """Whether joints give way to a payload."""
+        return bool(self.base.yields) or any(unknown.table == "elasticity" for unknown in self.unknowns)
+
     def machine(self, theta: Array, payload: Payload = NO_PAYLOAD) -> Kinematics:
         """The machine to its gauge frame."""
         return Kinematics(self.structure, self.errors(theta, payload))

@@ -67,6 +67,7 @@ def load_joint_calibration(
         file.temperature_degC,
         file.datum_mm,
         file.covariance.growth_per_year,
+        Payload(file.payload_kg, file.payload_centre_mm),
     )
 
 
@@ -138,6 +139,11 @@ class _Reading:
             payload=payload,
             gravity=tuple(self._gravity()),
         )
+        if file.payload_kg and errors.yields:
+            self._wrong(
+                ("payload_kg",),
+                "payload_kg stands beside [elasticity], by which each payload acts in full; leave it out",
+            )
         for index, sentence in gravity_problems(structure, errors):
             self._wrong(("gravity", index, "angles"), sentence)
         return errors

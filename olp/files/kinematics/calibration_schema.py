@@ -158,6 +158,15 @@ class JointCalibrationFile(Table):
     box: dict[Text, Interval] = Field(
         description="the calibrated axis positions, { X_mm = [min, max], C_deg = [min, max] }"
     )
+    payload_kg: NotNegative = Field(
+        default=0.0,
+        description="the payload while measuring, in kg, where no [elasticity] says what it bends; 0 if left "
+        "out",
+    )
+    payload_centre_mm: Triple = Field(
+        default=(0.0, 0.0, 0.0),
+        description="the centre of this payload from the gauge point, in the gauge frame, [X, Y, Z] in mm",
+    )
     active_during_measurement: list[Text] = Field(
         default=[], description="the errors that the control corrected then; none can be named here yet"
     )

@@ -44,11 +44,21 @@ def fitted_values(
     }
     for unknown, number in zip(model.unknowns, fit.theta.tolist(), strict=True):
         put_number(values, unknown, number)
+    values |= _held(fit)
     if model.masses:
         values["masses"] = [
             {"on": mass.on, "kg": mass.kg, "centre_mm": list(mass.centre_mm)} for mass in model.masses
         ]
     return values
+
+
+def _held(fit: JointFit) -> dict[str, Any]:
+    """The payload of all readings, where the fit does not say what a payload bends."""
+    loads = {source.start.reading.payload for source in fit.sources}
+    if fit.model.yields or len(loads) != 1:
+        return {}
+    (held,) = loads
+    return {"payload_kg": held.kg, "payload_centre_mm": list(held.centre_mm)} if held.kg else {}
 
 
 def changed_values(

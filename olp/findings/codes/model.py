@@ -34,8 +34,10 @@ RULES = (
         "payload without compliance",
         Severity.WARNING,
         "The job or the program states another payload than the calibration, and the calibration has no "
-        "[[compliance]]. The bending by the payload stays uncorrected.",
-        "Measure the errors with a load, or give the beam in [[compliance_beam]]. Leave the payload out "
+        "[[compliance]]. The bending by the payload stays uncorrected. On machines of joints that is "
+        "[elasticity].",
+        "Measure the errors with a load, or give the beam in [[compliance_beam]]. Machines of joints: read "
+        "postures with and without the payload, and name the joints in elasticity. Leave the payload out "
         "where the machine is stiff enough.",
         "payload_kg = 30 in the job file, and a calibration of curves alone.",
     ),

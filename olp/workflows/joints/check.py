@@ -29,7 +29,7 @@ from olp.workflows.shown import Shown
 #: What is looked for on such a machine, in the order of codes.
 CODES = (
     "OLP101", "OLP102", "OLP103", "OLP105", "OLP106", "OLP107", "OLP111", "OLP311", "OLP312", "OLP331",
-    "OLP332", "OLP401", "OLP403", "OLP405", "OLP408",
+    "OLP332", "OLP401", "OLP403", "OLP405", "OLP408", "OLP422",
 )  # fmt: skip
 
 

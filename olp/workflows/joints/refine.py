@@ -12,6 +12,7 @@ import numpy as np
 from olp.calibration.joints.adjustment import JointFit
 from olp.calibration.joints.deciding import AGREES
 from olp.calibration.joints.findings import left_out_findings
+from olp.calibration.joints.payloads import refuse_other_payloads
 from olp.calibration.joints.refinement import Refined, refine_joints, years_until
 from olp.calibration.joints.unknowns import Model
 from olp.core.arrays import Array
@@ -112,6 +113,7 @@ def refine_joint_calibration(
         base=stated.errors,
         known=known.covariance * factor**2,
     )
+    refuse_other_payloads(model, campaign.readings, str(data), stated.payload)
     refined = refine_joints(model, campaign.readings)
     tip = _tip_mm(refined.fit, stated, campaign.readings[0].tool_mm)
     report = _report(refined, structure.name, factor)

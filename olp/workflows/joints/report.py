@@ -19,6 +19,7 @@ from olp.core.arrays import Array, Index, Mask
 from olp.core.toolpath import Kind
 from olp.core.units import MM_PER_UM, RAD_PER_URAD, UM_PER_MM
 from olp.findings.catalogue import Finding
+from olp.kinematics.machine import JointCalibration
 from olp.program.robots.dialect import RobotDialect
 from olp.proof.joints import Deviation, JointProof, largest_steps
 from olp.workflows.joints.loaded import JointRun
@@ -236,6 +237,7 @@ def findings_of(
         found.append(finding("OLP107", "no feed move was corrected at a known position"))
     if run.calibration is not None:
         found += _outside(path, plan, run)
+        found += [] if run.machine.real_time is not None else _held(run.calibration)
         until = run.calibration.valid_until
         if until is not None and date is not None and date > until:
             found.append(finding("OLP401", f"the calibration was valid until {until}"))
@@ -269,6 +271,21 @@ def _coarse_digits(path: JointPath, plan: JointPlan, proof: JointProof) -> str:
         f"; the last digit is too coarse for the backlash of {shown}; state least_increment_deg = {fine} if "
         "the control reads such words, or give larger tolerances"
     )
+
+
+def _held(calibration: JointCalibration) -> list[Finding]:
+    """Another payload than that of the readings, where nothing says what it bends."""
+    own, job = calibration.payload, calibration.errors.payload
+    if calibration.errors.yields or own == job:
+        return []
+    there, here = (f"{one.kg:g} kg" if one.kg else "none" for one in (own, job))
+    if own.kg == job.kg:
+        there, here = (f"{one.kg:g} kg with its centre at {list(one.centre_mm)} mm" for one in (own, job))
+    what = (
+        f"the payload of the job is {here}, that of the calibration {there}; the calibration has no "
+        "[elasticity], so what the difference bends is not corrected"
+    )
+    return [finding("OLP422", what)]
 
 
 def outside_box(path: JointPath, plan: JointPlan, run: JointRun) -> list[tuple[int, str]]:

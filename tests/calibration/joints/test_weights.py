@@ -12,11 +12,11 @@ from calibration.joints.simulated import NESTS, SHIFT, SIGMA, TOOL, TURN, as_csv
 from judge.springs import at_rest
 from kinematics.cases import GOLDEN, golden, need_golden, random_values
 
-from olp.calibration.joints.adjustment import JointFit, fit_joints
+from olp.calibration.joints.adjustment import JointFit, Source, fit_joints, starts_of
 from olp.calibration.joints.candidates import Priors
 from olp.calibration.joints.findings import joint_findings
 from olp.calibration.joints.mistakes import mistakes
-from olp.calibration.joints.payloads import unstated_payloads
+from olp.calibration.joints.payloads import refuse_other_payloads, unstated_payloads
 from olp.calibration.joints.readings import Points
 from olp.calibration.joints.unknowns import model_of
 from olp.core.arrays import Array
@@ -242,3 +242,27 @@ def test_a_plan_asks_for_gravity(tmp_path: Path) -> None:
             load_campaign(plan, structure)
         plan.write_text(plan.read_text().replace(wrong, head))
     assert GOLDEN.is_dir()
+
+
+def test_a_payload_without_elasticity_is_stated_once_and_kept(tmp_path: Path) -> None:
+    """What nothing weighs is part of the errors: all readings had it, and the calibration says so."""
+    model, _, values = true_machine("arm_6r_kr6", count=20)
+    structure = model.structure
+    none, some = (readings(structure, values, payload, 1.0) for payload in (Payload(), LOAD))
+    refuse_other_payloads(model, [some, some], "plan.toml")
+    refuse_other_payloads(model, [some], "plan.toml", LOAD)
+    with pytest.raises(ConfigError, match=r"6 kg.csv states a payload of 6 kg .*other readings.*elasticity"):
+        refuse_other_payloads(model, [none, some], "plan.toml")
+    with pytest.raises(ConfigError, match=r"6 kg.csv .*the calibration one of 0 kg"):
+        refuse_other_payloads(model, [some], "plan.toml", Payload())
+    yielding = model_of(structure, values, Priors.of(structure), yielding=["J2"])
+    refuse_other_payloads(yielding, [none, some], "plan.toml")
+    box = {f"{name}_deg": (-10.0, 10.0) for name in structure.joints}
+    zero, covariance = np.zeros(len(model.unknowns)), np.diag(model.prior**2)
+    for reading, kept in ((some, LOAD), (none, Payload())):
+        (start,) = starts_of(model, [reading])
+        source = Source(start, np.zeros((20, 3)), np.zeros(6))
+        fit = JointFit(model, zero, covariance, (source,), (), 1.0, 1.0, len(zero))
+        text = joint_calibration_text(fitted_values(fit, box, datetime.date(2026, 11, 20), None, 20.0))
+        (tmp_path / "c.toml").write_bytes(text)
+        assert load_joint_calibration(tmp_path / "c.toml", structure).payload == kept
