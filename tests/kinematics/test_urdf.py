@@ -108,6 +108,11 @@ REFUSED = [
     (robot([moving(0, "F", "0 0 0", "0 0 1")], 2), "another"),
     (robot([moving(0, "j", "0 0 0", "0 0 1"), moving(1, "k", "0 0 0", "0 0 1"), BRANCH], 4), "--tip"),
     (robot([], 1), "no joint that moves"),
+    (robot([], 2), "ends in 2 links (l0, l1)"),
+    (robot([moving(0, "j", "0 0 0", "0 0 1"), BRANCH, BRANCH.replace('"b"', '"c"')], 4),
+     "the joints b and c hold the same link l3"),
+    (robot([moving(0, "j", "0 0 0", "0 0 1"), *(BRANCH.replace("l3", f"l{k}") for k in range(2, 22))], 22),
+     "l13 and 8 more"),
 ]  # fmt: skip
 
 
@@ -117,6 +122,15 @@ def test_what_is_refused(tmp_path: Path, text: str, words: str) -> None:
     assert code == 3
     assert words in said
     assert not (tmp_path / "arm").exists()
+
+
+def test_a_frame_that_stands_still_is_no_tool(tmp_path: Path) -> None:
+    """Industrial arms have the frames base and tool0: the first is fixed to the root."""
+    base = '<joint name="b" type="fixed"><parent link="l0"/><child link="l2"/></joint>'
+    code, said = made(tmp_path, robot([base, moving(0, "j", "0 0 0.1", "0 0 1")], 3))
+    assert code == 0 and "The tool sits on the link l1: name another one with --tip" in said
+    machine = olp.load_kinematics(tmp_path / "arm" / "machine.toml")
+    assert (machine.structure.order, machine.structure.gauge.point_mm) == (("j",), (0.0, 0.0, 100.0))
 
 
 def test_a_tip_selects_the_chain(tmp_path: Path) -> None:

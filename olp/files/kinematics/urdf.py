@@ -24,6 +24,8 @@ from olp.kinematics.poses import STILL, Poses
 _MM_PER_M = 1e3
 #: Kinds of joints that move, and the kinds of ours.
 _MOVING = {"revolute": "rotary", "continuous": "rotary", "prismatic": "linear"}
+#: Links that a message names at most.
+_NAMED = 12
 #: Travel of a joint without ends, in degrees.
 _TURNING_DEG = 360.0
 
@@ -32,21 +34,32 @@ def machine_of_urdf(
     path: PathLike, tip: str | None = None, name: str | None = None, controller: str | None = None
 ) -> Written:
     """The machine file of a robot that a URDF file describes, from its root to the link `tip` (default: its
-    only last link). It names no calibration. Raises InputError where the file cannot be
+    only last link that moves). It names no calibration. Raises InputError where the file cannot be
     read, or has joints that are not supported."""
     robot = _robot(path)
     joints = robot.findall("joint")
     links = [link.get("name", "") for link in robot.findall("link")]
-    by_child = {_linked(joint, "child", path): joint for joint in joints}
-    chain = _chain(by_child, _tip(joints, links, tip, path), path)
+    by_child = _by_child(joints, path)
+    ends = [tip] if tip is not None else _ends(by_child, links, path)
+    last = ends[0] if len(ends) == 1 else _tip(by_child, ends, path)
+    if last not in links:
+        raise InputError(f"has no link {last}; expected one of {_some(links)}", file=str(path))
+    chain = _chain(by_child, last, path)
     axes, gauge = _lines(chain, path)
     if not axes:
-        raise InputError("has no joint that moves between its root and its tip", file=str(path))
+        raise InputError(
+            f"has no joint that moves between its root and its tip {last}; name the link of the tool with "
+            "--tip",
+            file=str(path),
+        )
+    notes = [f"URDF states no least increments; {STEP:g} mm and deg are written: give those of the control"]
+    if len(ends) > 1:
+        notes.append(f"The tool sits on the link {last}: name another one with --tip")
     return machine_file(
         Parts(("F", *axes), axes, gauge),
         name or robot.get("name") or "robot",
         controller,
-        [f"URDF states no least increments; {STEP:g} mm and deg are written: give those of the control"],
+        notes,
     )
 
 
@@ -61,7 +74,9 @@ def _robot(path: PathLike) -> ET.Element:
     if robot.tag != "robot":
         raise InputError(f"has the root <{robot.tag}>; expected <robot> of URDF", file=str(path))
     if any("xacro" in element.tag for element in robot.iter()):
-        raise InputError("holds macros of xacro; expected what xacro writes from them", file=str(path))
+        raise InputError(
+            "holds macros of xacro; run xacro on it, and give the URDF that it writes", file=str(path)
+        )
     return robot
 
 
@@ -73,19 +88,39 @@ def _linked(joint: ET.Element, which: str, path: PathLike) -> str:
     return link
 
 
-def _tip(joints: list[ET.Element], links: list[str], tip: str | None, path: PathLike) -> str:
-    """The last link of the chain."""
-    if tip is not None:
-        if tip not in links:
-            raise InputError(f"has no link {tip}; expected one of {', '.join(links)}", file=str(path))
-        return tip
-    parents = {_linked(joint, "parent", path) for joint in joints}
-    last = [link for link in links if link not in parents]
-    if len(last) != 1:
+def _by_child(joints: list[ET.Element], path: PathLike) -> dict[str, ET.Element]:
+    """The joint that holds each link."""
+    by_child: dict[str, ET.Element] = {}
+    for joint in joints:
+        link = _linked(joint, "child", path)
+        if link in by_child:
+            both = f"{by_child[link].get('name')} and {joint.get('name')}"
+            raise InputError(f"the joints {both} hold the same link {link}; expected one", file=str(path))
+        by_child[link] = joint
+    return by_child
+
+
+def _ends(by_child: Mapping[str, ET.Element], links: list[str], path: PathLike) -> list[str]:
+    """The links that hold no other."""
+    parents = {_linked(joint, "parent", path) for joint in by_child.values()}
+    return [link for link in links if link not in parents]
+
+
+def _tip(by_child: Mapping[str, ET.Element], ends: list[str], path: PathLike) -> str:
+    """The only one of several last links that joints move: others stand still, as the base of a robot."""
+    moving = [link for link in ends if any(j.get("type") != "fixed" for j in _chain(by_child, link, path))]
+    if len(moving) != 1:
+        named = moving or ends
         raise InputError(
-            f"ends in {len(last)} links ({', '.join(last)}); name that of the tool with --tip", file=str(path)
+            f"ends in {len(named)} links ({_some(named)}); name that of the tool with --tip", file=str(path)
         )
-    return last[0]
+    return moving[0]
+
+
+def _some(names: list[str]) -> str:
+    """The first names, and how many more there are."""
+    more = len(names) - _NAMED
+    return ", ".join(names[:_NAMED]) + (f" and {more} more" if more > 0 else "")
 
 
 def _chain(by_child: Mapping[str, ET.Element], tip: str, path: PathLike) -> list[ET.Element]:
@@ -120,7 +155,11 @@ def _lines(chain: list[ET.Element], path: PathLike) -> tuple[dict[str, dict[str,
                 file=str(path),
             )
         if joint.find("mimic") is not None:
-            raise InputError(f"joint {name} follows another one (mimic), which is not built", file=str(path))
+            raise InputError(
+                f"joint {name} follows another one (mimic), which is not built; name a link before it with "
+                "--tip, or write its file by hand",
+                file=str(path),
+            )
         if name in ("", "F", "gauge") or name in axes:
             raise InputError(f'the name "{name}" of a joint cannot be used; give it another', file=str(path))
         axes[name] = dict(_axis(joint, _MOVING[kind], pose, path))
