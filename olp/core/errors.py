@@ -89,7 +89,8 @@ class ProgramError(InputError):
 
     `code` says why, as a row of `olp.findings.codes.refusal`. `others` are refusals of other lines that were
     found at the same time. `missing` is the table and the name of what machine and job do not define, such
-    as ("tools", "7"). `hint` is the end of the message: what to do, where that may not help.
+    as ("tools", "7"). `hint` is the end of the message: what to do, where that may not help; `instead` is
+    what to do where it does not.
     `word` is the word of a block that is refused, such as "G68", where the rest of the block could be read;
     of other words than G and M the letter.
     """
@@ -104,6 +105,7 @@ class ProgramError(InputError):
         others: tuple[ProgramError, ...] = (),
         missing: tuple[str, str] | None = None,
         hint: str = "",
+        instead: str = "",
         word: str = "",
     ) -> None:
         super().__init__(f"{message}; {hint}" if hint else message, file=file, line=line)
@@ -111,6 +113,7 @@ class ProgramError(InputError):
         self.others = others
         self.missing = missing
         self.hint = hint
+        self.instead = instead
         self.word = word
 
     @property

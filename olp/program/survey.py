@@ -64,7 +64,9 @@ ARC = "OLP530"
 #: What is taken out with it states nothing.
 COMMENT = "OLP514"
 #: Instead of the hint to unroll, of a word that an unrolled program still has.
-_KEPT = "--flatten does not unroll it; write plain blocks"
+_KEPT = "--flatten does not unroll it"
+#: What to do about such a word, where nothing else is known of it.
+_PLAIN_BLOCKS = "write plain blocks"
 
 
 #: Bytes of a file that show whether it is a text.
@@ -236,7 +238,7 @@ class _Survey:
         again = key in self.errors
         follows = RULES[error.code].follows
         if self.unroll is not None and error.hint:
-            _without_hint(error, _KEPT)
+            _without_hint(error, _kept(error))
         # the rest of a block without its refused word is refused only because of that
         if not again and not (follows and place in taken):
             before = bisect_left(taken, place) if follows else 0
@@ -305,7 +307,7 @@ class _Survey:
             if each.word and any(
                 line == each.line and _form(each.word).search(block) for line, block in kept
             ):
-                _without_hint(each, _KEPT)
+                _without_hint(each, _kept(each))
 
     def error(self, *, complete: bool) -> ProgramError:
         """What was refused, in the order of lines; a single refusal as it is."""
@@ -339,6 +341,10 @@ def _form(word: str) -> re.Pattern[bytes]:
     """How a word is written, such as G068 for G68; of a letter alone with any number."""
     number = rb"0*" + re.escape(word[1:].encode()) + rb"(?![\d.])" + _BEHIND
     return re.compile(rb"(?i)" + word[:1].encode() + (number if word[1:] else _NUMBER))
+
+
+def _kept(error: ProgramError) -> str:
+    return f"{_KEPT}; {error.instead or _PLAIN_BLOCKS}"
 
 
 def _without_hint(error: ProgramError, instead: str) -> None:

@@ -117,6 +117,11 @@ def test_a_hint_to_unroll_is_given_where_that_helps() -> None:
 def test_a_hint_to_unroll_is_not_given_for_what_an_unrolled_program_still_has() -> None:
     (saved,) = reasons(HEAD + b"M70\n")
     assert saved.message == "M70 saves modal codes; --flatten does not unroll it; write plain blocks"
+    (repeated,) = reasons(HEAD + b"M99\n", "fanuc")
+    assert repeated.message == (
+        "M99 repeats the program; --flatten does not unroll it; "
+        "write M30 in its place where it ends a main program"
+    )
     (called,) = reasons(HEAD + b"M98 P1\nM2\nO1\nG1 X1.\nM99\n", "fanuc")[:1]
     assert called.message.endswith("unroll the program with --flatten")
     (macro,) = reasons(HEAD + b"G65 P1 X5.\nM2\nO1\nG1 X#24\nM99\n", "fanuc")[:1]

@@ -166,14 +166,24 @@ def _checked(stated: EventWords, words: list[Word], profile: Profile, line: int)
             )
     for m in [round(word.value * 10) for word in words if word.letter == "M"]:
         if m in profile.m_refusals:
-            helps = profile.unrolls_m(m)
+            helps, instead = profile.unrolls_m(m), profile.m_instead.get(m, "")
             why = f"M{m / 10:g} {profile.m_refusals[m]}"
             raise ProgramError(
-                why if helps and unroll else remedied(why),
+                why if helps and unroll else remedied(f"{why}; {instead}" if instead else why),
                 hint=unroll if helps else "",
+                instead=instead,
                 line=line,
                 code="OLP511" if helps else "OLP512",
                 word=f"M{m / 10:g}",
+            )
+    for (c, _), number in zip(codes, numbers, strict=True):
+        letter, why = profile.lathe_words.get(c, ("", ""))
+        if letter and any(word.letter == letter for word in words):
+            raise ProgramError(
+                f"G{number:g} {letter} {why} of a lathe, whose X states diameters; "
+                "give the program of a mill",
+                line=line,
+                code="OLP512",
             )
     return [c for c, a in codes if a == Act.EVENT]
 

@@ -111,6 +111,16 @@ READINGS: dict[str, tuple[str, dict[str, Outcome], Any]] = {
         {FANUC: (1, 2, 0), HAAS: "high-speed mode"},
         {FANUC: {}, HAAS: {50: ("P", frozenset({0.0, 10000.0}))}},
     ),
+    "lathe_words": (
+        "G0 X1. Y0. Z0.\nG50 S6000",
+        dict.fromkeys((FANUC, HAAS), "G50 S limits the spindle of a lathe, whose X states diameters; give"),
+        {FANUC: {}, HAAS: {}},
+    ),
+    "m_instead": (
+        "G0 X1. Y0. Z0.\nM99",
+        {OKUMA: "M99 repeats the program; write M30 in its place where it ends a main program"},
+        {OKUMA: {}},
+    ),
     "return_level": (
         "G0 X0. Y0. Z9.\nG80\nG71 Z7.\nG81 X1. R3. Z-2. F60. M53",
         {OKUMA: (1, 0, 7)},

@@ -73,7 +73,8 @@ class Profile(Dialect):
     - `codes` and `refusals`: what becomes of each G code, and why it is refused. `aliases`: codes that do
       here what another code does elsewhere; one that leads to `NO_CODE` is none of this control.
     - `harmless_m` are the M codes that move no axis; `harmless_m_tenths` those with a decimal, ten times
-      their number. `m_refusals`: M codes that are refused, ten times their number, and what they do.
+      their number. `m_refusals`: M codes that are refused, ten times their number, and what they do, and
+      `m_instead` what to do about them where unrolling does not help.
     - `motion`, `initial_retract`: G codes that are in force at the start (None: none, or a setting of the
       control, which the machine file states as `motion` and `cycle_return`). `arc_distance`: whether
       centres are absolute (901) or distances (911) at the start; None is a setting of the control, which the
@@ -99,6 +100,7 @@ class Profile(Dialect):
       level and R, and the G codes that do the same elsewhere.
     - `still_with`: codes that are refused but for a block of their own with this letter and one of its
       numbers, where they change nothing of the path.
+    - `lathe_words`: letters beside codes that show a program of a lathe, and what they do there.
     - `cycles_apart`: canned cycles and G80 are a separate modal group.
     - `axis_dwell`: G4 takes its time from X and U, too, and counts milliseconds where it has no point.
     - `exact_stop`: G61 stops at the end of each block, as G9 does in one, and G62 and G63 end it as G64 does.
@@ -159,6 +161,7 @@ class Profile(Dialect):
     harmless_m: frozenset[int]
     harmless_m_tenths: frozenset[int] = frozenset()
     m_refusals: Mapping[int, str] = field(default_factory=lambda: M_REFUSALS)
+    m_instead: Mapping[int, str] = field(default_factory=lambda: M_INSTEAD)
     motion: int | None = None
     initial_retract: int | None
     arc_distance: int | None = 911
@@ -183,6 +186,7 @@ class Profile(Dialect):
     return_level: int = 0
     return_modes: Mapping[int, int] = field(default_factory=dict)
     still_with: Mapping[int, tuple[str, frozenset[float]]] = field(default_factory=dict)
+    lathe_words: Mapping[int, tuple[str, str]] = field(default_factory=dict)
     cycles_apart: bool = False
     axis_dwell: bool = False
     exact_stop: bool = False
@@ -406,8 +410,10 @@ def g_codes(*, unchanged: set[int], extra: dict[int, Act], without: Set[int] = f
 #: M codes that are refused, ten times their number, and what they do.
 M_REFUSALS: Mapping[int, str] = {
     960: "branches", 970: "calls a subprogram", 980: "calls a subprogram",
-    990: "repeats the program, which M30 would end",
+    990: "repeats the program",
 }  # fmt: skip
+#: What to do about those that unrolling leaves.
+M_INSTEAD: Mapping[int, str] = {990: "write M30 in its place where it ends a main program"}
 #: The same of controls that save modes; elsewhere these codes are those of the machine's builder.
 NGC_M_REFUSALS: Mapping[int, str] = {
     **M_REFUSALS, 700: "saves modal codes", 710: "forgets saved modal codes", 720: "restores modal codes",

@@ -21,6 +21,9 @@ class Control(Protocol):
     def still_m(self) -> frozenset[int]: ...
     @property
     def m_refusals(self) -> Mapping[int, str]: ...
+
+    @property
+    def m_instead(self) -> Mapping[int, str]: ...
     @property
     def m61_sets_tool(self) -> bool: ...
     @property
@@ -66,7 +69,10 @@ def _m_codes(profile: Control) -> Iterator[Row]:
     if profile.m61_sets_tool:
         yield Row("M61 Q", Support.READ, "Q is the tool in the spindle")
     for m, why in sorted(profile.m_refusals.items()):
-        said = f"{why}; {UNROLL}" if profile.unrolls_m(m) else remedied(why)
+        instead = profile.m_instead.get(m)
+        said = (
+            f"{why}; {UNROLL}" if profile.unrolls_m(m) else remedied(f"{why}; {instead}" if instead else why)
+        )
         yield Row(f"M{m / 10:g}", Support.REFUSED, said)
     yield Row("any other M", Support.READ, _LOST)
 
