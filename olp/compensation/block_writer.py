@@ -3,6 +3,7 @@ nothing else."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -18,7 +19,7 @@ from olp.compensation.rows import Rows
 from olp.compensation.shared_words import shared_edits
 from olp.compensation.stretches import Decimals, Stretches, digits_of
 from olp.compensation.writer import Task, Writer
-from olp.core.arrays import Array, Index, Mask, any_in_row, distinct, most_in_row
+from olp.core.arrays import Index, Mask, any_in_row, distinct, most_in_row
 from olp.core.progress import Progress, silent
 from olp.core.toolpath import Flag
 from olp.core.turns import Turns
@@ -27,6 +28,7 @@ from olp.program.text.edits import EditList, Edits
 
 if TYPE_CHECKING:
     from olp.compensation.holes import HoleWords
+    from olp.program.rs274.state import Capture
 
 #: Moves whose words are not those of their end point.
 _BYPASS = np.uint8(Flag.CYCLE | Flag.CONTROL)
@@ -253,30 +255,42 @@ class BlockWriter(Writer):
     def _captures(self, rows: Rows) -> list[Edits]:
         """Words that store the present position (G92, G10 L20) move with the correction of that position."""
         edits = EditList(self.prefixes)
-        captures = self.program.captures
+        captures, begin = self.program.captures, self._next_capture
         final = rows.first + len(rows.move) == len(self.plan)
         while self._next_capture < len(captures):
-            capture = captures[self._next_capture]
-            if capture.moves > int(rows.move[-1]) + 1 and not final:
+            if captures[self._next_capture].moves > int(rows.move[-1]) + 1 and not final:
                 break
             self._next_capture += 1
-            nominal = self.path.end_mm[capture.moves - 1] if capture.moves else None
-            row = int(np.searchsorted(rows.move, capture.moves, "left")) - 1
-            emitted = rows.emitted[row] if row >= 0 else rows.entry
-            delta = 0.0
-            if nominal is not None:
-                away: Array = np.asarray(emitted - nominal, float)
-                turns = Turns.of([capture.turn])
-                if turns is not None:
-                    away = turns.words(away[None], 1)[0]
-                delta = float(away[capture.axis]) / capture.unit_mm
+        chosen = captures[begin : self._next_capture]
+        word = np.array([capture.word for capture in chosen], np.int64)
+        columns = (self.words.number[word], self.words.end[word], self.words.mantissa[word])
+        away_mm = self._moved_mm(rows, chosen)
+        for k, (start, end, own) in enumerate(zip(*(column.tolist() for column in columns), strict=True)):
+            capture = chosen[k]
             grid = self.style.grid(capture.axis, capture.unit_mm)
             written = self.style.decimals_of(capture.word, capture.axis, capture.unit_mm)
             digits = max(grid, written)
-            own = int(self.words.mantissa[capture.word]) * 10 ** (digits - written)
-            new = own + round(delta * 10**digits)
-            if new != own:
-                start, end = int(self.words.number[capture.word]), int(self.words.end[capture.word])
+            before = own * 10 ** (digits - written)
+            new = before + round(away_mm[k] / capture.unit_mm * 10**digits)
+            if new != before:
                 edits.add(start, end, new, digits)
                 self.tally.changed_words += 1
         return [edits.done()]
+
+    def _moved_mm(self, rows: Rows, captures: Sequence[Capture]) -> list[float]:
+        """By how much the written position is off the nominal one where each word stores it, along its
+        axis."""
+        moves = np.array([capture.moves for capture in captures], np.int64)
+        row = rows.move.searchsorted(moves)
+        away = np.vstack((rows.entry, rows.emitted)).take(row, axis=0)
+        # before the first move nothing is corrected
+        away[moves == 0] = 0.0
+        away[moves > 0] -= self.path.end_mm[moves[moves > 0] - 1]
+        for k, capture in enumerate(captures):
+            if capture.turn is not None:
+                turns = Turns.of([capture.turn])
+                assert turns is not None
+                away[k] = turns.words(away[k][None], 1)[0]
+        axis = np.array([capture.axis for capture in captures], np.int64)
+        moved: list[float] = away[np.arange(len(axis)), axis].tolist()
+        return moved

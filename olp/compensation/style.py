@@ -89,7 +89,10 @@ class Style:
 
     def decimals_of(self, slot: int, axis: int, unit_mm: float) -> int:
         """The same for one word."""
-        return int(self.decimals(np.array([slot]), axis, unit_mm)[0])
+        words = self.program.words
+        assert words is not None
+        hidden = not self.program.calculator and not words.pointed[slot]
+        return self.bare_decimals[axis] + (unit_mm != 1.0) if hidden else int(words.decimals[slot])
 
     def lead(self, word: int) -> bytes:
         """The space before a word; of a first word, the usual one."""

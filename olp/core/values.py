@@ -60,7 +60,8 @@ def _declared(cls: type) -> dict[str, tuple[Any, Any, bool, bool]]:
 
 def _constructor(cls: type) -> Callable[..., None]:
     """The `__init__` of a class: defaults, factories, then `__post_init__`."""
-    known: dict[str, Any] = {"_set": object.__setattr__, "_MADE": dataclasses.MISSING}
+    known: dict[str, Any] = {"_MADE": dataclasses.MISSING}
+    plain = not any("__setattr__" in vars(base) for base in cls.__mro__[:-1])
     positional: list[str] = []
     named: list[str] = []
     lines: list[str] = []
@@ -76,7 +77,9 @@ def _constructor(cls: type) -> Callable[..., None]:
         if init:
             (named if kw_only else positional).append(parameter)
         if init or parameter != name:
-            lines.append(f"    _set(self, {name!r}, {value})")
+            # into its slot, where the class refuses an assignment
+            known[f"_set_{name}"] = getattr(cls, name).__set__
+            lines.append(f"    self.{name} = {value}" if plain else f"    _set_{name}(self, {value})")
     if hasattr(cls, "__post_init__"):
         lines.append("    self.__post_init__()")
     parameters = ", ".join(("self", *positional, *(["*", *named] if named else [])))

@@ -180,18 +180,18 @@ class Judgements:
             top = size == largest[group]
             np.minimum.at(worst, group[top], rows[top])
             over[group[size > self.allowed_mm]] = True
-        return [
-            {
-                "first_line": int(first[k]),
-                "last_line": int(last[k]),
-                "tool": int(self.tool[worst[k]]) if self.tool[worst[k]] >= 0 else None,
-                "uncorrected_um": float(uncorrected[k]) * UM_PER_MM,
-                "corrected_um": float(np.nan_to_num(self.corrected[worst[k]])) * UM_PER_MM,
-                "worst_line": int(self.line[worst[k]]),
-                "holds": not over[k],
-            }
-            for k in np.argsort(begin).tolist()
-        ]
+        order = np.argsort(begin)
+        tool, line, corrected = (column[worst[order]] for column in (self.tool, self.line, self.corrected))
+        columns = {
+            "first_line": first[order].tolist(),
+            "last_line": last[order].tolist(),
+            "tool": [number if number >= 0 else None for number in tool.tolist()],
+            "uncorrected_um": (uncorrected[order] * UM_PER_MM).tolist(),
+            "corrected_um": [size * UM_PER_MM for size in np.nan_to_num(corrected).tolist()],
+            "worst_line": line.tolist(),
+            "holds": (~over[order]).tolist(),
+        }
+        return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
     def _judged_rows(self) -> Iterator[Index]:
         """The rows of moves that count, in blocks."""

@@ -111,6 +111,8 @@ class AxisState(OffsetState):
     _index: dict[tuple[Any, ...], int] = field(default_factory=dict)
     #: the same by the state that they were made from
     _seen: dict[tuple[Any, ...], int] = field(default_factory=dict)
+    #: what `moved_by` said of M codes
+    _moved: dict[tuple[int, ...], tuple[tuple[int, ...], Place]] = field(default_factory=dict)
 
     @staticmethod
     def at_start(setup: Setup, profile: Profile) -> AxisState:
@@ -229,6 +231,36 @@ class AxisState(OffsetState):
         by_letter, codes, m_codes = block.by_letter, block.events, block.m_codes
         if "T" in by_letter:
             self._select_tool(line, [w for w in block.words if w.letter == "T"])
+        if m_codes:
+            self._change_tool(block, line)
+        effect = _AS_STATED
+        turning = self.profile.turns_offsets and not _MAY_TURN.isdisjoint(codes)
+        angle_deg = self._angle_deg(self.offsets.name, line) if turning else 0.0
+        if not _UNITS.isdisjoint(codes):
+            self.unit = next(code for code in codes if code in UNITS)
+        self._check_modes(codes, line)
+        if "P" in by_letter or self.profile.offsets_alone:
+            self._check_number(block, line)
+        if self.compensation is not None:
+            check_block(self, codes, line, changes_tool=self._changes_tool(m_codes))
+        if self.profile.tip_codes:
+            self._switch_tips(block.g_codes)
+        for code in codes:
+            effect = self._event(code, line, by_letter, block.axes, moves, effect)
+        if self.compensation is not None:
+            check_codes_along(self, block.g_codes, m_codes, line)
+        if self.profile.numbers_hold:
+            self._hold_numbers(block, line)
+        if turning:
+            self._check_turned(angle_deg, effect, line)
+        return effect
+
+    def _changes_tool(self, m_codes: Collection[int]) -> bool:
+        return TOOL_CHANGE in m_codes or (SET_TOOL in m_codes and self.profile.m61_sets_tool)
+
+    def _change_tool(self, block: EventBlock, line: int) -> None:
+        """What the M codes of a block make of the tool in the spindle, and of where the axes stand."""
+        by_letter, m_codes = block.by_letter, block.m_codes
         if TOOL_CHANGE in m_codes:
             if self.selected is None:
                 raise ProgramError(
@@ -236,7 +268,7 @@ class AxisState(OffsetState):
                 )
             self.spindle = self.selected
             self._tool(self.spindle, line, "M6")
-            lengths = {430, 432}.intersection(codes) and self.profile.length_of_spindle_tool
+            lengths = {430, 432}.intersection(block.events) and self.profile.length_of_spindle_tool
             if lengths and not (by_letter["H"].value if "H" in by_letter else self.spindle):
                 raise ProgramError(
                     "a tool length beside M6 is that of the tool before the change; put it into the next "
@@ -248,26 +280,7 @@ class AxisState(OffsetState):
             if "Q" not in by_letter:
                 raise ProgramError("M61 needs a Q word with the tool number", line=line, code="OLP516")
             self.spindle = self._integer(by_letter["Q"], line)
-        if m_codes:
-            self.forget(self.moved_by(m_codes)[0])
-        effect = _AS_STATED
-        turning = self.profile.turns_offsets and not _MAY_TURN.isdisjoint(codes)
-        angle_deg = self._angle_deg(self.offsets.name, line) if turning else 0.0
-        if not _UNITS.isdisjoint(codes):
-            self.unit = next(code for code in codes if code in UNITS)
-        self._check_modes(codes, line)
-        self._check_number(block, line)
-        changes_tool = TOOL_CHANGE in m_codes or (SET_TOOL in m_codes and self.profile.m61_sets_tool)
-        check_block(self, codes, line, changes_tool=changes_tool)
-        self._switch_tips(block.g_codes)
-        for code in codes:
-            effect = self._event(code, line, by_letter, block.axes, moves, effect)
-        check_codes_along(self, block.g_codes, m_codes, line)
-        if self.profile.numbers_hold:
-            self._hold_numbers(block, line)
-        if turning:
-            self._check_turned(angle_deg, effect, line)
-        return effect
+        self.forget(self.moved_by(m_codes)[0])
 
     def pause(self, line: int, block: EventBlock) -> None:
         """Carry out a block that is `quiet`."""
@@ -354,12 +367,18 @@ class AxisState(OffsetState):
             )
         self.forget()
 
-    def moved_by(self, m_codes: Collection[int]) -> tuple[tuple[int, ...], Place]:
+    def moved_by(self, m_codes: Sequence[int]) -> tuple[tuple[int, ...], Place]:
         """The axes that M codes may move, ten times their numbers, and where these stand then: those of M6,
         and all of codes that are not known to leave the axes."""
         if not m_codes:
             return (), UNKNOWN
-        moving = {m for m in m_codes if m not in self.profile.still_m}
+        known = self._moved.get(key := tuple(m_codes))
+        if known is None:
+            known = self._moved[key] = self._moved_by(set(m_codes) - self.profile.still_m)
+        return known
+
+    def _moved_by(self, moving: set[int]) -> tuple[tuple[int, ...], Place]:
+        """The same of codes that are not known to move no axis."""
         if self.profile.m61_sets_tool:
             moving.discard(SET_TOOL)
         machine = self.setup.machine

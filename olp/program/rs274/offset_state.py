@@ -18,14 +18,20 @@ from olp.core.units import AXES
 from olp.core.values import dataclass
 from olp.program.frames import touch_of
 from olp.program.rs274.codes import (
+    ALIGNED,
     CYCLES,
     DWELL,
+    HOMES,
     LENGTH_OFF,
     LENGTHS,
     LOCAL_OFFSET,
+    MACHINE,
     METRIC,
     PATH_MODES,
     PLANE_OF,
+    PRESET,
+    TILTED,
+    TRANSFORMS,
     UNITS,
     WORK_OFFSETS,
     WRITE_OFFSET,
@@ -51,6 +57,12 @@ _LEAVES_P = frozenset({
 })  # fmt: skip
 #: Events that leave frame, tool and position as they are.
 _QUIET = frozenset({DWELL, *PATH_MODES})
+#: Events that change no frame
+_KEEPS_FRAME = frozenset({*_QUIET, MACHINE, *HOMES})
+#: Events that go on from the present position, or turn it
+APART = HOMES | TRANSFORMS | {MACHINE, TILTED, ALIGNED}
+#: Events that may need it, or numbers by another unit before it
+_OF_PLACE = APART | {PRESET, WRITE_OFFSET, *UNITS}
 #: Words that number a tool, its length or its radius.
 _NUMBERS = frozenset("THD")
 _SPACED = pattern(r"([\d.])([A-Z])")
@@ -70,7 +82,9 @@ class Word:
 class EventBlock:
     """The words of a block with an event, also `by_letter`, those of axes with the `axes`, and the codes of G
     and M, ten times their number. `events` are the G codes that are events, in the order of the control. A
-    `quiet` block has dwells and path modes only: the frame and the tool stay."""
+    `quiet` block has dwells and path modes only: the frame and the tool stay. Others may move, and yet change
+    no tool, and no frame: one that `keeps_frame`. One `of_place` may go on from the present position or store
+    it, or count by another unit."""
 
     words: list[Word]
     by_letter: dict[str, Word]
@@ -79,6 +93,8 @@ class EventBlock:
     m_codes: list[int]
     events: list[int]
     quiet: bool
+    keeps_frame: bool
+    of_place: bool
 
     @staticmethod
     def of(words: list[Word], events: Sequence[int]) -> EventBlock:
@@ -86,8 +102,11 @@ class EventBlock:
         axes = [(i, by_letter[a]) for i, a in enumerate(AXES) if a in by_letter]
         g_codes, m_codes = ([round(w.value * 10) for w in words if w.letter == a] for a in "GM")
         ordered = sorted(events, key=lambda code: _RANK.get(code, len(_RANK)))
-        quiet = bool(events) and _QUIET.issuperset(g_codes) and not m_codes and _NUMBERS.isdisjoint(by_letter)
-        return EventBlock(words, by_letter, axes, g_codes, m_codes, ordered, quiet)
+        keeps = not m_codes and _NUMBERS.isdisjoint(by_letter)
+        quiet = bool(events) and keeps and _QUIET.issuperset(g_codes)
+        keeps = keeps and _KEEPS_FRAME.issuperset(events)
+        of_place = not _OF_PLACE.isdisjoint(events)
+        return EventBlock(words, by_letter, axes, g_codes, m_codes, ordered, quiet, keeps, of_place)
 
 
 @dataclass(slots=True, kw_only=True)

@@ -25,20 +25,13 @@ from olp.program.directives import Directives, with_payloads
 from olp.program.program import Program
 from olp.program.rs274.axis_state import AxisState, Effect
 from olp.program.rs274.codes import (
-    ALIGNED,
     CYCLES,
-    DWELL,
-    HOMES,
     INCREMENTAL,
     INVERSE_TIME,
-    MACHINE,
-    PATH_MODES,
     PLANE_OF,
     PRESET,
     PROBES,
     THREAD,
-    TILTED,
-    TRANSFORMS,
     UNITS,
     WRITE_OFFSET,
 )
@@ -51,7 +44,7 @@ from olp.program.rs274.extrusion import Extrusion
 from olp.program.rs274.lexer import WordChunk, chunks
 from olp.program.rs274.modes import Context, Modes, Odd, check_odd, scaled
 from olp.program.rs274.motion import OTHER, Blocks, arc_geometry, fill, gather
-from olp.program.rs274.offset_state import STORES_POSITION, EventBlock
+from olp.program.rs274.offset_state import APART, STORES_POSITION, EventBlock
 from olp.program.rs274.profiles.base import Act, Profile
 from olp.program.rs274.special_blocks import (
     KnownBlocks,
@@ -70,11 +63,7 @@ _KIND = np.full(1001, 255, np.uint8)
 _KIND[[0, 10, 20, 30, THREAD]] = (Kind.RAPID, Kind.LINE, Kind.ARC_CW, Kind.ARC_CCW, Kind.LINE)
 _PROBES = np.isin(np.arange(len(_KIND)), list(PROBES))
 _ALONE = np.isin(np.arange(len(_KIND)), list(CYCLES | PROBES))
-#: Events that go on from the present position, or turn it
-_APART = HOMES | TRANSFORMS | {MACHINE, TILTED, ALIGNED}
 _UNITS = frozenset(UNITS)
-#: Events that change no frame
-_KEEPS_FRAME = frozenset({DWELL, MACHINE, *HOMES, *PATH_MODES})
 
 
 def read(
@@ -275,39 +264,42 @@ class _Reader:
         first_row, behind = (blocks.line.searchsorted(lines, side) for side in ("left", "right"))
         columns = (
             lines, first_row, behind > first_row, event[lines] | beside.lines[lines], beside.lines[lines],
-            chunk.deleted[lines], context.distance[lines], context.plane[lines],
+            chunk.deleted[lines], context.distance[lines], context.plane[lines], chunk.first_word[lines],
         )  # fmt: skip
-        for line, upto, here, changes, calls, deleted, distance, plane in zip(
+        for line, upto, here, changes, calls, deleted, distance, plane, word in zip(
             *(column.tolist() for column in columns), strict=True
         ):
-            self._assign(context, rows, upto)
+            if upto > rows.assigned:
+                self._assign(context, rows, upto)
             if not changes:
                 self._alone(context, rows, upto, Effect())
                 continue
-            number = context.number(line)
-            own = next(stated)
-            block = beside.numbered(line, event_block(context, own, state.profile, self.known))
-            plain = not (calls or line in self.payloads or line in self.lost or state.compensation)
+            number = chunk.first_line + line + 1
+            block = event_block(next(stated), number, state.profile, self.known, deleted=deleted)
+            if calls:
+                block = beside.numbered(number, block)
+            lost, payload = line in self.lost, line in self.payloads
+            plain = not (calls or payload or lost or state.compensation)
             if block.quiet and plain and not (here and alone[upto]):
                 state.pause(number, block)
                 continue
-            tool = block.m_codes or not block.by_letter.keys().isdisjoint("TH")
-            if tool or line in self.payloads or not _KEEPS_FRAME.issuperset(block.events):
+            if payload or not block.keeps_frame:
                 rows.present = None
             moved, place = state.moved_by(block.m_codes)
-            lost = line in self.lost or state.changes_nozzle(block.words)
+            lost = lost or state.changes_nozzle(block.words)
             if lost:
                 moved, place = (0, 1, 2), state.home_of(block.words)
             # where nothing says where the axes stand then, it is found together with the rows around it
             loose = moved == (0, 1, 2) and place == UNKNOWN and not lost
             stands = None
-            if (moved and not loose) or lost or calls or self._needs_moves(block):
+            if (moved and not loose) or lost or calls or (block.of_place and self._needs_moves(block)):
                 self._resolve(context, rows, upto)
-            elif self._stores_position(block):
+            elif block.of_place and self._stores_position(block):
                 stands = self._stands(context, rows, upto)
             state.distance, state.plane = distance, plane
-            state.payload_kg = self.payloads.get(line, state.payload_kg)
-            state.first_word = context.base + own.first
+            if payload:
+                state.payload_kg = self.payloads[line]
+            state.first_word = context.base + word
             before = state.position.copy()
             if stands is not None:
                 state.position[:] = stands
@@ -336,14 +328,15 @@ class _Reader:
                     self.special_blocks.stand(number, effect.home, effect.home_mm, deleted=deleted)
             if calls:
                 self._call(context, rows, upto + here, beside, line)
-        self._assign(context, rows, len(blocks))
+        if len(blocks) > rows.assigned:
+            self._assign(context, rows, len(blocks))
         self._resolve(context, rows, len(blocks))
 
     def _needs_moves(self, block: EventBlock) -> bool:
         """Whether the moves before an event have to be there: it goes on from where they end, or the numbers
         before it count by another unit."""
         codes = block.events
-        if not _APART.isdisjoint(codes):
+        if not APART.isdisjoint(codes):
             return True
         return not _UNITS.isdisjoint(codes) and self.state.bare_increments
 
@@ -395,16 +388,16 @@ class _Reader:
     def _assign(self, context: Context, rows: _Rows, upto: int) -> None:
         """Give the present frame to the rows since the last event."""
         if upto > rows.assigned:
-            first = rows.blocks.line[rows.assigned]
+            first = int(rows.blocks.line[rows.assigned])
             if rows.present is None:
-                rows.present = self.state.frame(context.number(int(first)))
+                rows.present = self.state.frame(context.number(first))
                 if self.state.frames[rows.present].turn != self.turn:
                     # what is resolved at once has one turn
                     self._resolve(context, rows, rows.assigned)
                     self.turn = self.state.frames[rows.present].turn
             rows.frame[rows.assigned : upto] = rows.present
             if self.state.unit is None:
-                self.collector.remarks.setdefault("unit", (context.number(int(first)), "mm"))
+                self.collector.remarks.setdefault("unit", (context.number(first), "mm"))
             rows.assigned = upto
 
     def _resolve(self, context: Context, rows: _Rows, upto: int) -> None:

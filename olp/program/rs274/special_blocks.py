@@ -7,6 +7,7 @@ What an event does to frames and tools is in `axis_state`, blocks of canned cycl
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from struct import Struct
 from typing import Any
 
 import numpy as np
@@ -54,41 +55,30 @@ _NO_WORDS = np.full((1, 3), -1)
 _DELETED_TOO = frozenset({DWELL, *HOMES, MACHINE})
 #: M6 and M61, ten times their number
 _TOOL_CODES = frozenset({60, 610})
-#: blocks by what they say
-KnownBlocks = dict[tuple[bytes, bytes], EventBlock]
-
-
-#: A word of a line as bytes, then a G code with what it does.
+#: A word of a line as bytes, then a G code with what it does; and how these are taken apart.
 _WORD = np.dtype([("letter", np.uint8), ("value", np.float64), ("pointed", np.bool_)])
 _CODE = np.dtype([("code", np.int64), ("act", np.int64)])
+_WORD_PARTS, _CODE_PARTS = Struct("=Bd?"), Struct("=qq")
 
 
-@dataclass(frozen=True, slots=True)
-class EventWords:
-    """The words of a line of the chunk and its G codes with what each does, as bytes. They are the same in
-    lines that say the same. `first` is the index of the first word in the chunk."""
-
-    line: int
-    first: int
-    words: bytes
-    codes: bytes
+#: The words of a line of the chunk and its G codes with what each does, as bytes. They are the same in lines
+#: that say the same.
+EventWords = tuple[bytes, bytes]
+#: blocks by what they say
+KnownBlocks = dict[EventWords, EventBlock]
 
 
 def event_words(context: Context, lines: Index) -> Iterator[EventWords]:
     """What lines of the chunk say. Their words are taken out of the columns together."""
     chunk, codes = context.chunk, context.codes
-    begin = chunk.first_word[lines]
-    word, ends = _within(begin, chunk.first_word[lines + 1])
+    word, ends = _within(chunk.first_word[lines], chunk.first_word[lines + 1])
     words = _rows(_WORD, chunk.letter[word], context.value[word], chunk.pointed[word])
     first, last = (codes.line.searchsorted(lines, side) for side in ("left", "right"))
     code, code_ends = _within(first, last)
     acts = _rows(_CODE, codes.code[code], codes.act[code])
     a = c = 0
-    for line, one, b, d in zip(lines.tolist(), begin.tolist(), ends, code_ends, strict=True):
-        yield EventWords(
-            line, one, words[a * _WORD.itemsize : b * _WORD.itemsize],
-            acts[c * _CODE.itemsize : d * _CODE.itemsize],
-        )  # fmt: skip
+    for b, d in zip((ends * _WORD.itemsize).tolist(), (code_ends * _CODE.itemsize).tolist(), strict=True):
+        yield words[a:b], acts[c:d]
         a, c = b, d
 
 
@@ -99,21 +89,22 @@ def _rows(kind: np.dtype[Any], *columns: npt.NDArray[Any]) -> bytes:
     return rows.tobytes()
 
 
-def _within(first: Index, last: Index) -> tuple[Index, list[int]]:
+def _within(first: Index, last: Index) -> tuple[Index, Index]:
     """All indices from each `first` up to its `last`, and where those of each end among them."""
     count = last - first
     ends = np.cumsum(count)
-    return np.repeat(first - (ends - count), count) + np.arange(int(count.sum())), ends.tolist()
+    return np.repeat(first - (ends - count), count) + np.arange(int(count.sum())), ends
 
 
-def event_block(context: Context, stated: EventWords, profile: Profile, known: KnownBlocks) -> EventBlock:
-    """The words and event codes of a line of the chunk; refuses what cannot be read correctly. Blocks that
-    are `known` of this profile are not looked at again."""
-    key = stated.words, stated.codes
-    block = known.get(key)
+def event_block(
+    stated: EventWords, line: int, profile: Profile, known: KnownBlocks, *, deleted: bool
+) -> EventBlock:
+    """The words and event codes of a line by its number, which is `deleted` under block delete; refuses what
+    cannot be read correctly. Blocks that are `known` of this profile are not looked at again."""
+    block = known.get(stated)
     if block is None:
-        block = known[key] = _event_block(stated, profile, context.number(stated.line))
-    if context.chunk.deleted[stated.line] and (
+        block = known[stated] = _event_block(stated, profile, line)
+    if deleted and (
         not _DELETED_TOO.issuperset(block.events)
         or not _TOOL_CODES.isdisjoint(block.m_codes)
         or (profile.numbers_hold and not block.by_letter.keys().isdisjoint("DH"))
@@ -121,7 +112,7 @@ def event_block(context: Context, stated: EventWords, profile: Profile, known: K
         raise ProgramError(
             "a block under block delete changes offsets, units, path mode, the tool or its compensation, "
             "so later blocks depend on the switch; remove the `/`",
-            line=context.number(stated.line),
+            line=line,
             code="OLP525",
         )
     return block
@@ -130,7 +121,7 @@ def event_block(context: Context, stated: EventWords, profile: Profile, known: K
 def _event_block(stated: EventWords, profile: Profile, number: int) -> EventBlock:
     words = [
         Word(chr(letter), value, place, pointed)
-        for place, (letter, value, pointed) in enumerate(np.frombuffer(stated.words, _WORD).tolist())
+        for place, (letter, value, pointed) in enumerate(_WORD_PARTS.iter_unpack(stated[0]))
     ]
     if profile.commands is not None:
         # letters behind a command are its parameters
@@ -147,7 +138,7 @@ def _checked(stated: EventWords, words: list[Word], profile: Profile, line: int)
     """The event codes of a block; refuses those that cannot be read correctly."""
     unroll = UNROLL if profile.unroller is not None else ""
     numbers = [word.value for word in words if word.letter == "G"]
-    codes: list[tuple[int, int]] = np.frombuffer(stated.codes, _CODE).tolist()
+    codes: list[tuple[int, int]] = list(_CODE_PARTS.iter_unpack(stated[1]))
     for (c, a), number in zip(codes, numbers, strict=True):
         if a == Act.REFUSE and not _still(c, words, profile):
             why = profile.refusals.get(c)
@@ -204,9 +195,9 @@ def check_codes(context: Context, profile: Profile) -> None:
     if not lines.size:
         return
     errors = []
-    for stated in event_words(context, lines):
+    for line, stated in zip(lines.tolist(), event_words(context, lines), strict=True):
         try:
-            event_block(context, stated, profile, {})
+            event_block(stated, context.number(line), profile, {}, deleted=bool(chunk.deleted[line]))
         except ProgramError as error:
             errors.append(error)
     if errors:
@@ -273,8 +264,10 @@ class SpecialBlocks:
     def _loose_frame(self) -> int:
         """The last frame without cutter compensation, which is of no contour."""
         frames = self._state.frames
-        loose = (i for i in range(len(frames) - 1, -1, -1) if frames[i].compensation is None)
-        return next(loose, len(frames) - 1)
+        for i in range(len(frames) - 1, -1, -1):
+            if frames[i].compensation is None:
+                return i
+        return len(frames) - 1
 
     def run(self, context: Context, row: int, slot: Index, frame_index: int, effect: Effect) -> None:
         """Carry out a probe, a G53 move or the move to the intermediate point of G28 on line `row` of the

@@ -57,10 +57,9 @@ class Beside:
             action.run(self._state, number)
         return bool(actions)
 
-    def numbered(self, line: int, block: EventBlock) -> EventBlock:
-        """The block of a line with the number of the tool in the spindle in its words for that. Raises
+    def numbered(self, number: int, block: EventBlock) -> EventBlock:
+        """The block of a line by its number, with the tool in the spindle in its words for that. Raises
         ProgramError where it is not known."""
-        number = self._context.number(line)
         letters = self._translation.of_spindle.get(number, "")
         if not letters:
             return block
