@@ -289,7 +289,7 @@ def _nearest(
         inner = _turn_of(pair[1], before[1], values[1])
         ways = abs(outer - before[0]), abs(inner - before[1])
         if outer == outer and inner == inner:
-            # the longer of both ways, that of the outer axis, and their sum: which one counts is the control's
+            # the longer of both ways, that of the outer axis, and their sum: which counts is the control's
             places.append(((max(ways), ways[0], sum(ways)), [outer, inner]))
     places.sort()
     if not places:
@@ -307,8 +307,8 @@ def _nearest(
         clear = next_way[0] > _FARTHER * way[0] + _FARTHER_DEG and next_way[2] > way[2]
         if not same and not (clear and next_way[1] >= way[1]):
             raise ProgramError(
-                "two positions of the rotary axes give the tool this direction, and both are about as far, or "
-                "each is the nearer one by another axis; program a direction between",
+                "two positions of the rotary axes give the tool this direction, and both are about as far, "
+                "or each is the nearer one by another axis; program a direction between",
                 line=line,
                 code="OLP566",
             )
