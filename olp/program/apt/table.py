@@ -30,6 +30,7 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"MOVARC": (_C, "arc to the next GOTO: centre, normal, radius, ANGLE (Autodesk)"),
     b"TLON": (_C, "arc of CATIA: INDIRV, TLON,GOFWD/(CIRCLE…),ON,(LINE…)"),
     b"INDIRV": (_R, "the direction in which the next TLON begins"),
+    b"AUTOPS": (_R, "CATIA writes it before INDIRV and TLON: the arc is at the level of the tool"),
     b"FROM": (_R, "where the tool is; left uncorrected"),
     b"GOHOME": (_R, "goes to its own point or to that of FROM; left uncorrected"),
     b"RAPID": (_R, "for the next GOTO only"),
@@ -82,7 +83,7 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     ),
     **dict.fromkeys(
         (b"GOLFT", b"GORGT", b"GOFWD", b"GOBACK", b"GOUP", b"GODOWN", b"GO", b"TLLFT", b"TLRGT", b"TLNDON",
-         b"TLOFPS", b"TLONPS", b"INDIRP", b"AUTOPS", b"CONTUR", b"PROFIL", b"POCKET", b"SCURV", b"NOPS"),
+         b"TLOFPS", b"TLONPS", b"INDIRP", b"CONTUR", b"PROFIL", b"POCKET", b"SCURV", b"NOPS"),
         (_NO, _CONTOUR),
     ),
     **dict.fromkeys(
@@ -97,6 +98,9 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     ),
     **dict.fromkeys((b"TILT", b"PALLET", b"HEAD"), (_NO, _TURNS)),
     **dict.fromkeys((b"THREAD", b"NURBS", b"SPLINE", b"BSPLIN", b"POLYLN", b"PIERCE"), (_NO, _CYCLE)),
+    b"SWITCH": (_NO, "states the output point of a turning tool, and lathes are not corrected; send the "
+               "program of a mill"),
+    b"SYN": (_NO, "gives words another meaning in the post-processor; write the statements without it"),
     b"MIRROR": (_NO, "mirrors coordinates in the post-processor; have the CAM system write the moved points"),
 }  # fmt: skip
 

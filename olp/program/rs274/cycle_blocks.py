@@ -192,7 +192,7 @@ class CycleBlocks:
             lacking[0][1] | lacking[1][1],
             lambda i: ProgramError(
                 f"the cycle G{run.code / 10:g} has no "
-                f"{' and no '.join(letter for letter, lacks in lacking if lacks[i])} word",
+                f"{' and no '.join(letter for letter, lacks in lacking if lacks[i])} word; give it",
                 code="OLP531",
             ),
         )

@@ -422,6 +422,21 @@ def test_arcs_turn_with_their_frame(tmp_path: Path) -> None:
         assert path.arcs.sweep_rad == pytest.approx([HALF / 2])
 
 
+def test_catia_writes_autops_before_each_arc(setup: Setup) -> None:
+    """As in public programs of CATIA V5, with its blanks."""
+    text = (
+        "GOTO  /   10.00000,    0.00000,    5.00000\nINTOL /    0.02500\nOUTTOL/    0.00000\nAUTOPS\n"
+        "INDIRV/    0.00000,    1.00000,    0.00000\n"
+        "TLON,GOFWD/      (CIRCLE/      0.00000,      0.00000,      5.00000,$\n"
+        "      10.00000),ON,(LINE/      0.00000,      0.00000,      5.00000,$\n"
+        "                               0.00000,     10.00000,      5.00000)\n"
+    )
+    assert sweeps(text, setup) == pytest.approx([0.5])
+    assert sweeps(text.replace("AUTOPS\n", ""), setup) == pytest.approx([0.5])
+    with pytest.raises(ProgramError, match="GOLFT drives the tool along geometry"):
+        program("GOTO/10,0,5\nAUTOPS\nINDIRV/0,1,0\nGOLFT/1\n", setup)
+
+
 def test_a_direction_holds_for_one_arc(setup: Setup) -> None:
     text = CATIA.format(v="0,1", c=ROUND, again="", end="0,10,5")
     again = "TLON,GOFWD/(CIRCLE/0,0,5,10),ON,(LINE/0,0,5,-10,0,5)\n"
