@@ -367,8 +367,8 @@ REFUSED: dict[tuple[str, str], dict[str, object]] = {
     ("linuxcnc", "G86 X1 R2 Z1 P1"): {
         "why": "the cycle G86 needs a turning spindle; give M3 or M4 before it", "code": "OLP518",
     },
-    ("linuxcnc", "G81 X1 Z1"): {"why": "the cycle G81 has no R word", "code": "OLP531"},
-    ("linuxcnc", "G81 X1 R1"): {"why": "the cycle G81 has no Z word", "code": "OLP531"},
+    ("linuxcnc", "G81 X1 Z1"): {"why": "the cycle G81 has no R word; give it", "code": "OLP531"},
+    ("linuxcnc", "G81 X1 R1"): {"why": "the cycle G81 has no Z word; give it", "code": "OLP531"},
     ("linuxcnc", "G18 G81 X1 Z1"): {"why": "the cycle G81 has no R and no Y word", "code": "OLP531"},
     ("linuxcnc", "G81 X1 Z1 R2 L0"): {
         "why": "a canned cycle has zero repeats; give one or more",
