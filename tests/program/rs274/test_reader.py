@@ -369,7 +369,7 @@ REFUSED: dict[tuple[str, str], dict[str, object]] = {
     },
     ("linuxcnc", "G81 X1 Z1"): {"why": "the cycle G81 has no R word; give it", "code": "OLP531"},
     ("linuxcnc", "G81 X1 R1"): {"why": "the cycle G81 has no Z word; give it", "code": "OLP531"},
-    ("linuxcnc", "G18 G81 X1 Z1"): {"why": "the cycle G81 has no R and no Y word", "code": "OLP531"},
+    ("linuxcnc", "G18 G81 X1 Z1"): {"why": "the cycle G81 has no R and no Y word; give it", "code": "OLP531"},
     ("linuxcnc", "G81 X1 Z1 R2 L0"): {
         "why": "a canned cycle has zero repeats; give one or more",
         "code": "OLP531",
