@@ -280,10 +280,11 @@ class SpecialBlocks:
         kind = Kind.RAPID
         offset = np.array(frame.offset_mm)
         if effect.machine:
-            if incremental:
+            if incremental and not state.profile.machine_moves_absolute:
                 raise ProgramError(
                     "G53 takes axis positions, and the block is in G91; give G90", line=line, code="OLP518"
                 )
+            incremental = False
             if motion not in (0, 10):
                 raise ProgramError(
                     "G53 takes G0 or G1 only; give one of them in the block", line=line, code="OLP518"

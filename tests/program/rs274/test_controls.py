@@ -111,6 +111,12 @@ READINGS: dict[str, tuple[str, dict[str, Outcome], Any]] = {
         {FANUC: (1, 2, 0), HAAS: "high-speed mode"},
         {FANUC: {}, HAAS: {50: ("P", frozenset({0.0, 10000.0}))}},
     ),
+    "machine_moves_absolute": (
+        "G0 X1. Y2. Z3.\nG91\nG53 G0 X5.\nG0 X1.",
+        {GRBL: (6, 2, 3)}
+        | dict.fromkeys((LINUXCNC, FANUC), "G53 takes axis positions, and the block is in G91; give G90"),
+        {GRBL: False, LINUXCNC: True, FANUC: True},
+    ),
     "lathe_words": (
         "G0 X1. Y0. Z0.\nG50 S6000",
         dict.fromkeys((FANUC, HAAS), "G50 S limits the spindle of a lathe, whose X states diameters; give"),

@@ -131,7 +131,8 @@ class Profile(Dialect):
       states as `bracket_comments`.
     - `inert`: whole lines that are no words and move nothing, such as names of programs and labels.
     - `translator` turns a text with statements of its own into words of this family (`translation`).
-      `machine_moves_keep_length`: the tool length counts in G53 too. `increments_take_offsets`: an increment
+      `machine_moves_keep_length`: the tool length counts in G53 too. `machine_moves_absolute`: its words are
+      axis positions in G91 too. `increments_take_offsets`: an increment
       behind a change of offsets moves by that change as well. `lengths_follow_plane`: lengths count along the
       tool axis of the plane. `further_turns` is the word of the turns of an arc beyond its first part, where
       P does not count them all, `absolute_centre` the function around an absolute coordinate of a centre.
@@ -219,6 +220,7 @@ class Profile(Dialect):
     skip_mark: re.Pattern[bytes] | None = SKIP_MARK
     translator: Callable[[bytes], Any] | None = None
     machine_moves_keep_length: bool = False
+    machine_moves_absolute: bool = False
     increments_take_offsets: bool = False
     lengths_follow_plane: bool = False
     further_turns: bytes = b""

@@ -35,6 +35,7 @@ DIALECT = Profile(
     motion=0,
     initial_retract=990,
     g10_active=True,
+    machine_moves_absolute=True,
     text=BlockText(odd_bytes=None, cr_ends_line=True, open_comments=True),
     cycles=replace(NGC_CYCLES, exact_corners=False),
     inert=_ASKS,
