@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterator
-from functools import cache
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -35,6 +35,12 @@ MIXTURES = ("points", "stations", "pods", "circles")
 ALARMS = ("OLP808", "OLP810", "OLP811")
 #: Non-centrality from which no blunder may pass in silence.
 LOUD = 7.0
+#: A report that says beforehand what may stay hidden states at least this share of the harm.
+TOLD = 0.5
+#: um; a change of errors that is no harm.
+NO_HARM_UM = 1.0
+#: Places in the box where harm is looked for.
+PLACES = 200
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,16 +55,39 @@ class Blunder:
 
 
 @dataclasses.dataclass(frozen=True)
-class Outcome:
-    """What a fit says of a blunder: `alarms` are the codes of findings, or "refused"."""
+class Size:
+    """How large a blunder is against what all others say: `noncentrality` by both uncertainties, `redundancy`
+    the share of its square by the noise of the source alone that remains."""
 
     noncentrality: float
+    redundancy: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Outcome:
+    """What a fit says of a blunder: `alarms` are the codes of findings, or "refused". `harm_um` is what it
+    does to errors in the box, `stated_um` what the report says that the source may hide."""
+
+    noncentrality: float
+    redundancy: float
     alarms: tuple[str, ...]
     named: bool
+    harm_um: float = 0.0
+    stated_um: float = 0.0
+
+    @property
+    def loud(self) -> bool:
+        """Whether it may not pass in silence."""
+        return self.noncentrality >= LOUD
 
     @property
     def silent(self) -> bool:
-        return not self.alarms and self.noncentrality >= LOUD
+        return not self.alarms and self.loud
+
+    @property
+    def told(self) -> bool:
+        """Whether the report says beforehand that the source may hide what it did, or nothing was done."""
+        return self.stated_um > TOLD * self.harm_um or self.harm_um < NO_HARM_UM
 
 
 def readings(seed: int, family: str, mixture: str) -> Measurements:
@@ -181,44 +210,88 @@ def outcome(taken: Measurements, clean: FittedCalibration, blunder: Blunder) -> 
     """What the fit of the readings with a blunder says."""
     changed = list(taken.observations)
     changed[blunder.index] = blunder.planted
+    size = size_of(taken, clean.fit, blunder)
     try:
-        size = noncentrality(clean.fit, blunder.index, taken.observations[blunder.index], blunder.planted)
         fitted = fit_calibration(dataclasses.replace(taken, observations=tuple(changed)))
     except OlpError as error:
-        return Outcome(np.inf, ("refused",), bool(blunder.words) and blunder.words in str(error))
+        named = bool(blunder.words) and blunder.words in str(error)
+        return Outcome(size.noncentrality, size.redundancy, ("refused",), named)
     alarms = tuple(sorted({one.code for one in fitted.findings if one.code in ALARMS}))
     words = [one.message for one in fitted.findings if one.code == "OLP810"]
-    named = any(one.startswith(blunder.planted.source) and blunder.words in one for one in words)
-    return Outcome(size, alarms, named)
+    source = blunder.planted.source
+    named = any(one.startswith(source) and blunder.words in one for one in words)
+    stated = max(row["hidden_harm_um"] for row in fitted.report["agreement"] if row["file"] == source)
+    harm = harm_of(taken, clean.fit, fitted.fit)
+    return Outcome(size.noncentrality, size.redundancy, alarms, named, harm, stated)
 
 
-def noncentrality(clean: Fit, index: int, taken: Observation, planted: Observation) -> float:
+def harm_of(taken: Measurements, clean: Fit, bad: Fit) -> float:
+    """The largest change of errors in the box, in um, with the tools of the readings."""
+    place = np.random.default_rng(3).uniform(*bad.box_mm.T, (PLACES, 3))
+    tools = np.unique(np.concatenate([np.atleast_2d(one.tool_mm) for one in taken.observations]), axis=0)
+    off = [bad.error(place, tool) - clean.error(place, tool) for tool in tools]
+    return float(1e3 * np.linalg.norm(off, axis=-1).max())
+
+
+def size_of(taken: Measurements, clean: Fit, blunder: Blunder) -> Size:
+    """The size of a blunder; infinite where its readings cannot be used at all."""
+    try:
+        return size(clean, blunder.index, taken.observations[blunder.index], blunder.planted)
+    except OlpError:
+        return Size(np.inf, 1.0)
+
+
+def size(clean: Fit, index: int, taken: Observation, planted: Observation) -> Size:
     """By how many standard deviations a blunder moves what a source says of the unknowns, against what all
-    other readings and the prior predict, with the uncertainty of both."""
-    size = clean.parameters.size
+    other readings and the prior predict."""
     # with all its readings, also those that the fit left out
     state = _started(taken, clean.results[index].state)
-    total = clean.prior.precision()[0]
-    own = Normal.of(size)
-    own.add(clean.block(state))
-    for k, result in enumerate(clean.results):
-        if k != index:
-            one = Normal.of(size)
-            one.add(clean.block(result.state))
-            total = total + one.H
-    block = clean.block(state)
-    shifted = Normal.of(size)
-    shifted.add(_shift(clean, state, block, planted))
-    columns = np.flatnonzero(own.H.any(axis=0))
+    against = _against(clean, index)
+    shifted = Normal.of(clean.parameters.size)
+    shifted.add(_shift(clean, state, clean.block(state), planted))
+    away = against.turn @ shifted.g[against.columns]
+    some = against.share > 1e-3
+    alone = away[some] ** 2 / against.share[some]
+    both = float(np.sum(alone / (1.0 + against.share[some])))
+    return Size(float(np.sqrt(both)), both / max(float(np.sum(alone)), 1e-300))
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Against:
+    """A source against all others, in directions of its unknowns `columns` (k,): what others say has a
+    standard deviation of 1 in each, and the source `share` (r,) of their precision. `turn` (r, k) is to
+    them."""
+
+    columns: np.ndarray
+    turn: np.ndarray
+    share: np.ndarray
+
+
+@lru_cache(maxsize=64)
+def _against(clean: Fit, index: int) -> _Against:
+    of = _precisions(clean)
+    size = clean.parameters.size
+    total = clean.prior.precision()[0] + sum(one for k, one in enumerate(of) if k != index)
+    own = of[index]
+    columns = np.flatnonzero(own.any(axis=0))
     scale = np.sqrt(np.diag(total))
     covariance = np.linalg.inv(total / np.outer(scale, scale) + 1e-13 * np.eye(size))
     covariance = (covariance / np.outer(scale, scale))[np.ix_(columns, columns)]
     variance, vectors = np.linalg.eigh(covariance)
     root = vectors * np.sqrt(np.maximum(variance, 0.0))
-    share, directions = np.linalg.eigh(root.T @ own.H[np.ix_(columns, columns)] @ root)
-    away = directions.T @ (root.T @ shifted.g[columns])
-    some = share > 1e-3
-    return float(np.sqrt(np.sum(away[some] ** 2 / (share[some] * (1.0 + share[some])))))
+    share, directions = np.linalg.eigh(root.T @ own[np.ix_(columns, columns)] @ root)
+    return _Against(columns, directions.T @ root.T, share)
+
+
+@lru_cache(maxsize=2)
+def _precisions(clean: Fit) -> list[np.ndarray]:
+    """What every source says of the unknowns."""
+    every = []
+    for result in clean.results:
+        one = Normal.of(clean.parameters.size)
+        one.add(clean.block(result.state))
+        every.append(one.H)
+    return every
 
 
 def _started(observation: Observation, like: State) -> State:
@@ -243,7 +316,7 @@ def _shift(clean: Fit, state: State, block: Block, planted: Observation) -> Bloc
     return Block(block.columns, block.precision, chunks)
 
 
-@cache
+@lru_cache(maxsize=4)
 def clean_fit(seed: int, family: str, mixture: str) -> tuple[Measurements, FittedCalibration]:
     """Readings without a blunder, and their fit."""
     taken = readings(seed, family, mixture)

@@ -12,7 +12,7 @@ from olp.calibration.diagnosis.agreement import Agreement, Compared, Tried
 from olp.calibration.estimator.character import class_of, largest
 from olp.calibration.estimator.fitted import Fit
 from olp.calibration.estimator.summary import grid_of
-from olp.core.machine import ZERO, Vector
+from olp.core.machine import Vector
 from olp.core.units import UM_PER_MM
 from olp.findings.catalogue import Finding
 
@@ -59,6 +59,7 @@ def agreement_rows(found: Compared, fit: Fit, tools: Sequence[Vector]) -> list[d
             "directions": int(one.misfit.freedom),
             "chi_square_per_direction": one.misfit.reduced,
             "wrong": one.named.words if id(one.misfit) in wrong and one.named is not None else "",
+            "log10_odds_of_a_mistake": one.doubt / math.log(10.0) if np.isfinite(one.doubt) else None,
             "not_excluded": ", ".join(one.possible),
             "hidden_harm_um": harm,
         }
@@ -74,10 +75,10 @@ def _harms(
     found: Compared, fit: Fit, tools: Sequence[Vector]
 ) -> Iterator[tuple[Agreement, tuple[float, str]]]:
     """What of each source is not excluded and changes the errors most: by how much in um, and its kind. It is
-    taken over the box with all tools."""
+    taken over the box with all tools, those of the readings where none are known."""
     sides = [np.linspace(low, high, _PLACES) for low, high in fit.box_mm.tolist()]
     position = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 3)
-    rows = np.stack([fit.design(position, np.array(tool)) for tool in tools or [ZERO]])
+    rows = np.stack([fit.design(position, np.array(tool)) for tool in tools or _read_with(fit)])
     for one in found.sources:
         harms = [(0.0, "")]
         for tried in one.open:
@@ -85,6 +86,13 @@ def _harms(
                 error = rows @ tried.change
                 harms.append((float(np.linalg.norm(error, axis=-1).max()) * UM_PER_MM, tried.kind))
         yield one, max(harms)
+
+
+def _read_with(fit: Fit) -> list[Vector]:
+    """The outermost tool vectors of the readings: harm grows with the lever arm, so no other does more."""
+    every = np.concatenate([np.atleast_2d(result.state.observation.tool_mm) for result in fit.results])
+    outer = np.unique(every[np.concatenate([every.argmin(axis=0), every.argmax(axis=0)])], axis=0)
+    return [(x, y, z) for x, y, z in outer.tolist()]
 
 
 def _plausible(name: str, tried: Tried, fit: Fit) -> bool:

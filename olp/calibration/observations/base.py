@@ -17,6 +17,7 @@ import numpy as np
 from olp.calibration.estimator.normal import Block, Normal, residuals_of
 from olp.calibration.estimator.parameters import Parameters, Unknowns
 from olp.core.arrays import Array, Index
+from olp.core.machine import Vector
 from olp.core.units import AXES, RAD_PER_URAD, UM_PER_MM
 from olp.core.values import dataclass
 
@@ -90,10 +91,12 @@ class Alternative:
 
 
 class Observation(ABC):
-    """Readings of one instrument in one set-up. A frozen value with the file that it came from."""
+    """Readings of one instrument in one set-up. A frozen value with the file that it came from, and the tool
+    vectors (3,) or (n, 3) in mm that it was read with."""
 
     __slots__ = ()
     source: str
+    tool_mm: Vector | Array
 
     @property
     def framed(self) -> bool:

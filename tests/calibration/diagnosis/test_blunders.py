@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from cases.blunders import ALARMS, LOUD, Blunder, blunders, clean_fit, noncentrality, outcome, readings
+from cases.blunders import ALARMS, LOUD, Blunder, blunders, clean_fit, outcome, readings, size
 
 from olp.calibration.diagnosis.agreement import compared
 from olp.calibration.diagnosis.agreement_report import agreement_rows
@@ -51,6 +51,8 @@ def test_no_loud_blunder_is_silent(kind: str, source: str, mixture: str) -> None
 ONCE_SILENT = (
     (105, "smooth", "stations", "lever", "ezx.csv"),
     (49, "tables", "stations", "1000", "ebx.csv"),
+    # what speaks for it is below a difference of six standard deviations
+    (200, "smooth", "points", "4.848", "eay.csv"),
 )
 
 
@@ -96,11 +98,23 @@ def test_what_is_not_named_is_told_beforehand() -> None:
 
 
 @pytest.mark.slow
+def test_what_only_tools_beside_an_axis_show_is_told() -> None:
+    """An angle in the wrong unit, which acts on such tools alone. Only its size speaks against it."""
+    taken, clean = clean_fit(70, "smooth", "pods")
+    every = blunders(70, "smooth", "pods")
+    one = next(one for one in every if (one.kind, one.planted.source) == ("4.848", "ecy.csv"))
+    said = outcome(taken, clean, one)
+    assert not said.alarms and said.redundancy < 0.1
+    assert said.harm_um > 10.0
+    assert said.told
+
+
+@pytest.mark.slow
 def test_a_blunder_that_changes_nothing_has_no_size() -> None:
     taken, clean = clean_fit(14, "smooth", "points")
     for index in (0, len(taken.observations) - 1):
         one = taken.observations[index]
-        assert noncentrality(clean.fit, index, one, one) < 1e-6
+        assert size(clean.fit, index, one, one).noncentrality < 1e-6
 
 
 @pytest.mark.slow
