@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from olp.cli.common import STREAM, diagnostic, exit_for, files_of, put_result, refuse_early
+from olp.cli.common import STREAM, diagnostic, exit_for, files_of, note_of_use, put_result, refuse_early
 from olp.cli.options import (
     MM,
     day_option,
@@ -116,6 +116,8 @@ def command(
     if output is not None:
         kinds = "curves, map and covariance" if fitted.calibration.maps else "curves and covariance"
         diagnostic(f"wrote {output} and {curves} files of {kinds} beside it")
+        if machine is not None and not quiet:
+            note_of_use(machine, output)
     if report_file is not None:
         diagnostic(f"wrote {report_file}")
     put_result(fitted, as_json=as_json, quiet=quiet)
@@ -158,6 +160,8 @@ def _of_joints(
     write_files(files, force=force, inputs=fitted.inputs)
     for path in files:
         diagnostic(f"wrote {path}")
+    if output is not None and not quiet:
+        note_of_use(machine, output)
     put_result(fitted, as_json=as_json, quiet=quiet)
     exit_for(fitted.findings, fail_on)
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from olp.cli.common import STREAM, diagnostic, exit_for, files_of, put_result, refuse_early
+from olp.cli.common import STREAM, diagnostic, exit_for, files_of, note_of_use, put_result, refuse_early
 from olp.cli.joints import on_joints
 from olp.cli.options import (
     Length,
@@ -104,6 +104,8 @@ def command(
     files = refined.files(output)
     write_files(files, force=force, inputs=inputs)
     diagnostic(f"wrote {output} and {len(files) - 1} files beside it")
+    if not quiet:
+        note_of_use(machine, output)
     put_result(refined, as_json=as_json, quiet=quiet)
     exit_for(refined.findings, fail_on)
 
@@ -131,5 +133,7 @@ def _of_joints(
     )
     for path in refined.write(output, force=force):
         diagnostic(f"wrote {path}")
+    if not quiet:
+        note_of_use(machine, output)
     put_result(refined, as_json=as_json, quiet=quiet)
     exit_for(refined.findings, fail_on)

@@ -265,6 +265,25 @@ def silence(stream: TextIO | None) -> None:
         os.close(devnull)
 
 
+def note_of_use(machine: str, calibration: str) -> None:
+    """Say what puts a calibration that was written into use, where the machine file does not name it."""
+    from olp.files.toml_text import read_toml
+    from olp.files.write import read_bytes
+
+    stated = read_toml(read_bytes(machine), machine)[0].get("calibration")
+    folder = Path(machine).resolve().parent
+    if isinstance(stated, str) and (folder / stated).resolve() == Path(calibration).resolve():
+        return
+    try:
+        name = Path(os.path.relpath(Path(calibration).resolve(), folder)).as_posix()
+    except ValueError:
+        # another drive
+        name = Path(calibration).resolve().as_posix()
+    names = "names no calibration" if stated is None else f'names calibration = "{stated}"'
+    how = "add before its first table" if stated is None else "write there instead"
+    diagnostic(f'note: {machine} {names}; to use {calibration}, {how} the line calibration = "{name}"')
+
+
 def put_result(result: Shown, *, as_json: bool, quiet: bool) -> None:
     """Write the report of a result to stdout: as JSON, else as text unless `quiet`."""
     if as_json:

@@ -16,6 +16,7 @@ import olp
 from olp.calibration.iso230.evaluation import evaluate_all
 from olp.calibration.observations.squareness import SquarenessReading
 from olp.cli import main
+from olp.cli.common import note_of_use
 from olp.core.errors import ConfigError
 from olp.files.measurements.reader import load_measurements
 from olp.findings.catalogue import RULES
@@ -303,3 +304,19 @@ def test_public_functions_take_files(tmp_path: Path) -> None:
 @pytest.mark.parametrize("code", [f"OLP{n}" for n in range(851, 860)])
 def test_every_code_is_explained(code: str) -> None:
     assert RULES[code].why and RULES[code].remedy and RULES[code].example
+
+
+@pytest.mark.parametrize(("stated", "said"), [
+    ("", 'no calibration; to use {new}, add before its first table the line calibration = "../new.toml"'),
+    ('calibration = "old.toml"', 'names calibration = "old.toml"; to use {new}, write there instead'),
+    ('calibration = "../new.toml"', ""),
+])  # fmt: skip
+def test_what_puts_a_calibration_into_use_is_said(
+    tmp_path: Path, stated: str, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    machine, new = tmp_path / "mill" / "machine.toml", tmp_path / "new.toml"
+    machine.parent.mkdir()
+    machine.write_text(f'name = "mill"\n{stated}\n[axes.X]\n')
+    note_of_use(str(machine), str(new))
+    told = capsys.readouterr().err
+    assert said.format(new=new) in told and bool(told) == bool(said)
