@@ -51,6 +51,10 @@ _MOVES = 1e-7
 #: Below this a direction is left out where the exact solution is not found: a tilt of 1 mrad then costs at
 #: most 20 mrad of an axis.
 _MOVES_WELL = 0.05
+#: A turn that is left at a singular posture is said from this on, rad.
+_LEFT_RAD = 1e-7
+#: A posture beside another one is by so much from it, and up to twice as much, deg.
+_BESIDE_DEG = 3.0
 #: A command turns no axis by more than so many times the largest turn that the orientation may need: what the
 #: position needs comes on top of that.
 _FARTHEST = 2.0
@@ -248,12 +252,26 @@ def _bounded(
     motions = long[..., None] * right
     turn = np.max(np.abs(np.where(rotary, motions / task.scale, 0.0)), axis=2)
     far = turn > largest_deg
+    # at a singular posture itself that motion does not turn the tool at all, however long it is
+    given = np.linalg.norm(np.where(size > task.moves, 0.0, share[..., 0]), axis=1)
+    lost = np.count_nonzero(size > task.moves, axis=1) < _turns_elsewhere(task, forward, slopes, rotary)
+    at_it = lost & (given > _LEFT_RAD * task.radius_mm)
     less = np.where(far, largest_deg / np.maximum(turn, largest_deg), 0.0) ** 2
     near = task.near + np.sum(less[..., None] * motions, axis=1) / task.scale
     held, given_up = np.where(far[..., None], right, 0.0), np.where(far[:, None, :], left, 0.0)
     free = task.free - np.swapaxes(held, -1, -2) @ held
     asked = task.asked - given_up @ np.swapaxes(given_up, -1, -2)
-    return replace(task, near=near, free=free, asked=asked), np.asarray(far.any(axis=1))
+    return replace(task, near=near, free=free, asked=asked), np.asarray(far.any(axis=1) | at_it)
+
+
+def _turns_elsewhere(task: _Task, forward: Forward, slopes: Slopes, rotary: Mask) -> int:
+    """How many turns of the tool the axes make while the tip stays: at a posture beside the first one, where
+    no chance makes it singular."""
+    one = task.only(np.arange(1))
+    beside = one.near + np.where(rotary, _BESIDE_DEG * (1.0 + np.arange(len(rotary)) / len(rotary)), 0.0)
+    there = replace(one, target=forward(beside))
+    size = np.linalg.svd(_of_still_tips(*_parts_of(there, slopes(beside))), compute_uv=False)
+    return int(np.count_nonzero(size > task.moves))
 
 
 def _newton(task: _Task, forward: Forward, slopes: Slopes) -> tuple[Array, Mask]:

@@ -1,11 +1,13 @@
 """Random machines of every structure with errors of all sources, and random programs: corrected, and judged
 by a computation of its own.
 
-    python tests/benchmarks/bench_structures.py [MACHINES] [--kind KIND] [--form FORM] [--play] [--seed FIRST]
+    python tests/benchmarks/bench_structures.py [MACHINES] [--kind KIND] [--form FORM] [--seed FIRST]
+        [--play] [--singular]
 
 By structure: programs that are right, refused ones, and the largest residual in tolerances of 1 um and 2 urad
 plus the last digit, at and between waypoints. With --play every axis has backlash; then a program whose
-report says that it does not hold is counted as said.
+report says that it does not hold is counted as said. With --singular programs pass near singular postures and
+borders of reach: what the report states as left there is counted as said, too.
 """
 
 from __future__ import annotations
@@ -24,7 +26,9 @@ from cases.any_programs import FORMS, PLANES
 MACHINES = 10
 
 
-def campaign(kinds: list[str], forms: list[str], seeds: range, *, play: bool) -> Iterator[str]:
+def campaign(
+    kinds: list[str], forms: list[str], seeds: range, *, play: bool, singular: bool
+) -> Iterator[str]:
     """The table, line by line; what is not right is named."""
     for kind in kinds:
         counts: Counter[str] = Counter()
@@ -38,7 +42,7 @@ def campaign(kinds: list[str], forms: list[str], seeds: range, *, play: bool) ->
                 if play and form in PLANES:
                     # its judge follows no play
                     continue
-                told = judged(kind, form, seed, play=play)
+                told = judged(kind, form, seed, play=play, singular=singular)
                 counts[told.what] += 1
                 worst = max(worst, told.cost if told.what == "right" else 0.0)
                 if told.what != "right":
@@ -58,10 +62,13 @@ def main() -> None:
     parser.add_argument("--kind", action="append", choices=KINDS)
     parser.add_argument("--form", action="append", choices=[LIST, *FORMS, *PLANES])
     parser.add_argument("--play", action="store_true")
+    parser.add_argument("--singular", action="store_true")
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
     seeds = range(options.seed, options.seed + options.machines)
-    for line in campaign(options.kind or list(KINDS), options.form or [], seeds, play=options.play):
+    for line in campaign(
+        options.kind or list(KINDS), options.form or [], seeds, play=options.play, singular=options.singular
+    ):
         print(line, flush=True)
 
 

@@ -20,6 +20,7 @@ from cases.any_programs import (
     read_by_judge,
     waypoints,
 )
+from cases.singular import near
 from judge.whole_path import Whole, WholeTilted
 
 import olp
@@ -75,8 +76,11 @@ class Case:
         )
 
 
-def case_of(folder: Path, kind: str, form: str, seed: int, *, play: bool, digit: float | None = None) -> Case:
-    """One machine and one program for it."""
+def case_of(
+    folder: Path, kind: str, form: str, seed: int, *, play: bool, digit: float | None = None,
+    singular: bool = False,
+) -> Case:  # fmt: skip
+    """One machine and one program for it, which passes near a `singular` posture where there is one."""
     rng = np.random.default_rng([seed, 5])
     drawn = float(rng.choice(DIGITS)) if form != LIST or seed % 3 == 0 else 1e-6
     digit = drawn if digit is None else digit
@@ -84,6 +88,8 @@ def case_of(folder: Path, kind: str, form: str, seed: int, *, play: bool, digit:
     made, payload = write_machine(folder, kind, seed, control=control, digit=digit, play=play)
     judge = Whole(folder / "machine.toml", payload, made.counts)
     rows = waypoints(made, rng, 5, judge if made.counts == "axis" else None)
+    beside = near(made, judge, np.random.default_rng([seed, 7]), 6) if singular else None
+    rows = rows if beside is None else beside
     job = folder / "job.toml"
     if form in PLANES:
         text = plane(form, judge, rows[3:4], rng)
@@ -95,10 +101,10 @@ def case_of(folder: Path, kind: str, form: str, seed: int, *, play: bool, digit:
     return Case(folder, judge, payload, rows, text, digit)
 
 
-def judged(kind: str, form: str, seed: int, *, play: bool) -> Told:
+def judged(kind: str, form: str, seed: int, *, play: bool, singular: bool = False) -> Told:
     """What comes of one machine and one program for it."""
     with tempfile.TemporaryDirectory() as name:
-        case = case_of(Path(name), kind, form, seed, play=play)
+        case = case_of(Path(name), kind, form, seed, play=play, singular=singular)
         folder, judge, rows, text, digit = case.folder, case.judge, case.rows, case.text, case.digit
         try:
             done = case.corrected()
@@ -122,7 +128,12 @@ def judged(kind: str, form: str, seed: int, *, play: bool) -> Told:
             texts = (text, done.data)
             if form != LIST:
                 texts = tuple(read_by_judge(form, one, judge, rows[0]) for one in texts)
-            found = judge.whole_judged(read(texts[0]), read(texts[1]), within, 3)
+            first, second = (read(one) for one in texts)
+            found = judge.whole_judged(first, second, within, 3)
+            if found[2] > 1.1 and done.report["orientation"]["near_singular"]:
+                # where a rest of the orientation is left, the nearest place is another one
+                judge.counts = "tip"
+                found = (judge.whole_judged(first, second, within, 3)[0], *found[1:])
     words = f"{found[0] * 1e3:.3f} um {found[1] * 1e6:.3f} urad, {said}, digit {digit:g}"
     if found[2] <= 1.1 and done.report["verdict"]["ok"]:
         return Told("right", found[2], words)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from judge.five_axis import Judge, ends
+from judge.five_axis import ARM, Judge, ends
 from judge.tilted import TiltedJudge
 from judge.whole_machine import NONE, WholeMachine
 
@@ -53,7 +53,7 @@ class Whole(Judge):
         self.side = np.zeros(len(self.order))
         self.before: np.ndarray | None = None
         worst, j = np.zeros(3), 0
-        chosen = ends([row[2] for row in first], [row[2] for row in second])
+        chosen = ends(self._places(first, actual=False), self._places(second, actual=True))
         for i, last in enumerate(chosen):
             cuts, tips, end = first[i]
             group = [row[2] for row in second[j : last + 1]]
@@ -65,6 +65,19 @@ class Whole(Judge):
                 worst = np.maximum(worst, found)
             j = last + 1
         return float(worst[0]), float(worst[1]), float(worst[2])
+
+    def _places(self, rows: list[Row], *, actual: bool) -> list[np.ndarray]:
+        """By row where the tool is, mm, and its directions as arcs; near a singular posture commands are
+        far from what they correct. NaN where it is not known."""
+        found = []
+        for _, tips, place in rows:
+            where = np.full(12, np.nan)
+            if np.isfinite(place).all():
+                pose = self.whole.pose(self.axes(place[None], tips), actual)[0, :3]
+                turn = {"tip": 0.0, "turn": 0.0, "axis": np.array([0.0, 0.0, ARM])}.get(self.counts, ARM)
+                where = np.append(pose[:, 3], (pose[:, :3] * turn).ravel())
+            found.append(where)
+        return found
 
     def _samples(self, places: list[np.ndarray], tips: bool) -> np.ndarray:
         """Axis values along a broken line of coordinates."""

@@ -48,3 +48,19 @@ def test_what_four_axes_can_turn_is_within_tolerance_beside_what_they_cannot() -
     53 urad of tilt hid 5 urad of it."""
     told = judged("scara", LIST, 5, play=False)
     assert told.what == "right" and told.cost < 0.8, told.words
+
+
+#: Programs near singular postures, and what comes of them: a stretched SCARA does not reach farther.
+SINGULAR = [
+    ("table/table", 2, LIST, "said"), ("head/head", 2, "G43.4", "said"), ("arm 6", 0, LIST, "said"),
+    ("scara", 1, LIST, "refused"),
+]  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("kind", "seed", "form", "what"), SINGULAR)
+def test_near_singular_postures_the_tip_is_met_and_what_is_left_is_said(
+    kind: str, seed: int, form: str, what: str
+) -> None:
+    told = judged(kind, form, seed, play=False, singular=True)
+    assert told.what == what, told.words

@@ -289,7 +289,7 @@ def _nearest(
         inner = _turn_of(pair[1], before[1], values[1])
         ways = abs(outer - before[0]), abs(inner - before[1])
         if outer == outer and inner == inner:
-            # the longer of both ways, that of the outer axis, and their sum: which counts is the control's
+            # the longer way, that of the outer axis, and the sum of both: the control's own rule is not known
             places.append(((max(ways), ways[0], sum(ways)), [outer, inner]))
     places.sort()
     if not places:
