@@ -6,6 +6,7 @@ Which files of the folder these are, a rule for each ending says: the project of
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable, Iterator
 from importlib import import_module
 from pathlib import Path
@@ -105,13 +106,18 @@ def divided(path: Path, text: Text) -> dict[Path, Text]:
     return files
 
 
-def place_of(text: Text, line: int) -> tuple[str, int]:
-    """The file of a line of a text, "" for the first one, and its number there."""
-    found = "", line
-    for part in parts(text):
-        if part.lines < line:
-            found = part.name, line - part.lines
-    return found
+class FileLines:
+    """Where the lines of a text are in its files. The text is divided once, when the first place is asked."""
+
+    def __init__(self, text: Text) -> None:
+        self._text = text
+        self._parts: list[Part] = []
+
+    def of(self, line: int) -> tuple[str, int]:
+        """The file of a line, "" for the first one, and its number there."""
+        self._parts = self._parts or list(parts(self._text))
+        part = self._parts[max(bisect_left(self._parts, line, key=lambda part: part.lines) - 1, 0)]
+        return part.name, line - part.lines
 
 
 def is_plain(name: str) -> bool:

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from olp.core.errors import InputError, OlpError, ProgramError, Reason, Refused, naming
 from olp.core.paired import data_beside, joined, system_of, system_part, with_system
-from olp.core.projects import gathered, holds_several, is_one_of_many, place_of
+from olp.core.projects import FileLines, gathered, holds_several, is_one_of_many
 from olp.core.spool import Mapped, Spool, Text, in_parts, whole
 from olp.core.values import dataclass
 from olp.files.write import PathLike, read_bytes, read_long
@@ -221,28 +221,29 @@ def _placed(source: Source, own: AbstractContextManager[None]) -> Iterator[None]
             # gathered once: an error may have thousands of reasons
             text = source.data if may and error.line is not None else b""
             if holds_several(text):
+                places = FileLines(text)
                 for each in (error, *(error.others if isinstance(error, ProgramError) else ())):
-                    each.file, each.line = _own_place(source, text, each.file, each.line)
+                    each.file, each.line = _own_place(source, places, each.file, each.line)
                 if isinstance(error, Refused):
-                    error.reasons = tuple(_own_reason(source, text, reason) for reason in error.reasons)
+                    error.reasons = tuple(_own_reason(source, places, reason) for reason in error.reasons)
             raise
 
 
 def _own_place(
-    source: Source, text: Text, file: str | None, line: int | None
+    source: Source, places: FileLines, file: str | None, line: int | None
 ) -> tuple[str | None, int | None]:
     """The file of a line of a text and its number there; unchanged where it is one of the first file."""
     if line is None or file is not None:
         return file, line
-    name, own = place_of(text, line)
+    name, own = places.of(line)
     if not name:
         return file, line
     return str(Path(source.name).with_name(name)) if source.name else name, own
 
 
-def _own_reason(source: Source, text: Text, reason: Reason) -> Reason:
-    file, line = _own_place(source, text, reason.file, reason.line)
-    follows_file, follows = _own_place(source, text, reason.follows_file, reason.follows)
+def _own_reason(source: Source, places: FileLines, reason: Reason) -> Reason:
+    file, line = _own_place(source, places, reason.file, reason.line)
+    follows_file, follows = _own_place(source, places, reason.follows_file, reason.follows)
     return replace(reason, file=file, line=line, follows_file=follows_file, follows=follows)
 
 

@@ -187,28 +187,28 @@ class RobotMoves:
         self, line: int, via: Use, end: Use, frame: Located, tool: Tool, feed: float, *, whole: bool = False,
         turned_by_via: bool = False,
     ) -> None:  # fmt: skip
-        """Add an arc through a target to another one, as chords. With `turned_by_via` the orientation of the
-        via point has to be the one that the tool has there. Raises ProgramError where it has not, and where
-        the text does not state where the arc begins."""
+        """Add an arc through a target to another one, as chords. Where it cannot be read so, both targets are
+        corrected. With `turned_by_via` the orientation of the via point has to be the one that the tool has
+        there. Raises ProgramError where it has not."""
         begin = self._at if self.known and self._turn is not None else None
-        targets = [self.targets[use.target] for use in (via, end)]
-        outer = [target.outer for target in targets]
-        if begin is None or self._turn is None or begin[:2] != (frame, tool):
-            raise not_read(
-                "where this arc begins is not stated, or in another frame or with another tool; program a "
-                "straight move to its start before it, with the frame and the tool of the arc",
-                line,
-            )
-        if any(own != self.targets[begin[2].target].outer for own in outer):
-            raise not_read("an external axis moves along this arc; program straight moves", line)
+        if begin is None or begin[:2] != (frame, tool):
+            self._at_points(line, (via, end), frame, tool, feed, "where this arc begins is not stated")
+            return
+        outer = self.targets[begin[2].target].outer
+        if any(self.targets[use.target].outer != outer for use in (via, end)):
+            self._at_points(line, (via, end), frame, tool, feed, "an external axis moves along this arc")
+            return
         places = [np.array(place) for place in map(self._place, (begin[2], via, end))]
+        assert self._turn is not None
         chords = Chords.of((places[0], places[1], places[2]), (self._turn, end.turn))
         if chords is None:
-            raise not_read(
-                "the three points of this arc lie on a line, or on a circle too large to be read; program a "
-                "straight move",
-                line,
-            )
+            why = "the three points of this arc lie on a line, or on a circle too large to be read"
+            self._at_points(line, (via, end), frame, tool, feed, why)
+            return
+        turned = (replace(end, turn=turn) for turn in (chords.turns[len(chords.turns) // 2], end.turn))
+        if not self.arm and any(self._swings(self._framed(frame, tool, use, line)) for use in turned):
+            self._at_points(line, (via, end), frame, tool, feed, "the tool turns on this arc")
+            return
         off = angle_between(via.turn, chords.turns[chords.first - 1])
         if turned_by_via and off > _SAME_ORIENTATION:
             raise not_read(
@@ -220,6 +220,14 @@ class RobotMoves:
             what = "along arcs the tool is taken to turn evenly from start to end, by the shorter way"
             self.remark("arcs", line, what)
         self._chords(line, via, end, frame, tool, feed, chords, whole=whole)
+
+    def _at_points(
+        self, line: int, uses: tuple[Use, Use], frame: Located, tool: Tool, feed: float, why: str
+    ) -> None:
+        """Add an arc as its via point and its end, as its path is not known."""
+        self.remark(f"points: {why}", line, f"{why}: it is corrected at its via point and at its end")
+        for use in uses:
+            self.move(line, use, frame, tool, feed, straight=False, whole=True)
 
     def _chords(
         self, line: int, via: Use, end: Use, frame: Located, tool: Tool, feed: float, chords: Chords, *,
@@ -238,12 +246,6 @@ class RobotMoves:
                     )
                 )  # fmt: skip
                 use = Use(len(self.targets) - 1, NOWHERE, NOWHERE, turn=turn)
-            if not self.arm and self._swings(self._framed(frame, tool, use, line)):
-                raise not_read(
-                    "the tool turns on this arc, and its tip swings; keep its orientation, or program "
-                    "straight moves",
-                    line,
-                )
             # the tool turns evenly, whatever the via point states
             use = replace(use, turn=turn)
             self.move(line, use, frame, tool, feed, straight=True, chord=True)

@@ -259,7 +259,6 @@ RUN = ["MOVJ C00000 VJ=50.00", "MOVC C00001 V=90.0", "MOVC C00002 V=90.0", "MOVC
         ([*RUN[:3], RUN[3] + " FPT"], 3, "`FPT` behind a move is not read"),
         ([*RUN[:3], RUN[3] + " UNTIL IN#(1)=ON"], 3, "an arc with UNTIL"),
         ([*RUN[:2], "MOVC P001 V=90.0", RUN[3]], 2, "the text does not state P001"),
-        ([*RUN[:2], "MOVC C00000 V=90.0", "MOVC C00001 V=90.0"], 2, "lie on a line"),
     ],
 )
 def test_arcs_that_are_not_certain_are_refused(zero: Path, moves: list[str], line: int, why: str) -> None:

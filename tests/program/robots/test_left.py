@@ -167,3 +167,65 @@ def test_a_jump_leaves_where_a_move_ends_open(bent: dict[str, Path]) -> None:
     text = TP.replace("L P[1] 100mm/sec FINE ;", "L P[1] 100mm/sec FINE SkipJump,LBL[3] ;")
     told = olp.correct(text.encode(), bent["tp"]).report["findings"]
     assert any("SkipJump" not in f["message"] and f["line"] == 3 for f in told)
+
+
+ARC = """DEF made()
+  $BASE=$NULLFRAME
+  $TOOL={X 0,Y 0,Z 100,A 0,B 0,C 0}
+  LOOP
+    CIRC XP1,XP2
+    LIN XP3
+    CIRC XP1,XP2
+    CIRC XP2,XP3
+  ENDLOOP
+END
+DEFDAT made
+DECL E6POS XP1={X 250,Y 200,Z -100,A 0,B 0,C 0}
+DECL E6POS XP2={X 300,Y 250,Z -100,A 0,B 0,C 0}
+DECL E6POS XP3={X 350,Y 200,Z -100,A 0,B 30,C 0}
+ENDDAT
+"""
+
+
+def test_an_arc_whose_path_is_not_known_is_corrected_at_its_points(tmp_path: Path) -> None:
+    """It begins where the loop does, or its tool swings, or its points are on a line."""
+    recipe = Recipe(controller="kuka-krl", travel=((-900.0, 900.0),) * 3, **QUIET)
+    path = machines.shift_machine(tmp_path, (100.0, 50.0, 20.0), recipe=recipe)
+    result = olp.correct(ARC.encode(), path)
+    text = result.data.decode()
+    for x, y in ((250, 200), (300, 250), (350, 200)):
+        assert f"={{X {x - 0.1:.5f},Y {y - 0.05:.5f},Z -100.02000," in text
+    assert text.count("CIRC XP1,XP2") == 2, "no arc is split"
+    told = [f.message for f in result.findings if "at its via point and at its end" in f.message]
+    assert [what.partition(":")[0] for what in told] == [
+        "where this arc begins is not stated", "the tool turns on this arc",
+        "the three points of this arc lie on a line, or on a circle too large to be read",
+    ]  # fmt: skip
+
+
+STILL = """DEF made()
+  $BASE=$NULLFRAME
+  $TOOL=$NULLFRAME
+  LIN XP1
+  IF x THEN
+    $IPO_MODE=#TCP
+    LIN XP2
+    $IPO_MODE=#BASE
+    LIN XP3
+  ENDIF
+  LIN XP4
+  IF x THEN
+    $IPO_MODE=#TCP
+  ENDIF
+  LIN XP5
+END
+DEFDAT made
+"""
+
+
+def test_moves_with_a_tool_that_stands_still_are_left(tmp_path: Path) -> None:
+    recipe = Recipe(controller="kuka-krl", travel=((-900.0, 900.0),) * 3, **QUIET)
+    path = machines.shift_machine(tmp_path, (100.0, 0.0, 0.0), recipe=recipe)
+    points = [f"DECL E6POS XP{k}={{X {100 * k},Y 200,Z -100,A 0,B 0,C 0}}\n" for k in range(1, 6)]
+    text = olp.correct((STILL + "".join(points) + "ENDDAT\n").encode(), path).data.decode()
+    assert [f"XP{k}={{X {100 * k - 0.1:.5f}" in text for k in range(1, 6)] == [True, False, True, True, False]

@@ -136,7 +136,6 @@ def test_frames_and_tools_of_registers(tmp_path: Path) -> None:
         ("L P[1] 200mm/sec CNT60 ACC80 RTCP", "`RTCP` behind a move is not read: the tool stands still"),
         ("L P[1] 200mm/sec CNT60 PTH FPLIN(1)", "`FPLIN` behind a move .* post the move without it"),
         ("L P[3] 200mm/sec FINE", "P.3. of line 19 states `Y = 2.0 inch`; expected mm"),
-        ("C P[1]\n    :  P[1] 200mm/sec FINE", "arc"),
         ("  P[1]=LPOS", "another value"),
         ("  OFFSET CONDITION PR[1]", "targets are moved"),
         ("L P[2] 200mm/sec FINE", "not taught"),

@@ -128,8 +128,6 @@ REFUSED = {
     "MoveL p,v100,fine,tool0\\WObj:=lost;": "lost",
     "MoveL p,v100,fine,still;": "stands still",
     "MoveL p,v100,fine,tool0\\WObj:=held;": "moves",
-    "MoveC p,p,v100,fine,tool0;": "where this arc begins is not stated",
-    "MoveL p,v100,fine,tool0;MoveC p,p,v100,fine,tool0;": "lie on a line",
     "MoveL p,v100,fine,tool0;MoveC p,v100,fine,tool0;": "expected via point",
     "CirPathMode\\CirPointOri;MoveL p,v1,fine,tool0;MoveC p,p,v1,fine,tool0;": "CirPathMode.CirPointOri",
     "SearchL x,p,p,v100,tool0;": "p gets another value in line 6",
@@ -297,3 +295,13 @@ def test_places_for_statements_move_nothing(bent: Path) -> None:
     )
     skip = re.compile(rb"! olp-corrected.*")
     assert skip.sub(b"", full.replace(b"<DDN>\n", b"").replace(b"  <SMT>\n", b"")) == skip.sub(b"", bare)
+
+
+def test_strings_in_the_lines_of_blocks_hold_anything(tmp_path: Path) -> None:
+    path = machines.shift_machine(tmp_path, (100.0, 0.0, 0.0), recipe=RECIPE)
+    body = (
+        'TEST c\nCASE ";","!":\nMoveJ p,v100,fine,tool0;\nCASE ":":\nStop;\nENDTEST\n'
+        'IF c="x" THEN\nELSEIF c=";" THEN\nStop;\nENDIF\nWHILE c<>"DO ;" DO\nENDWHILE\n'
+    )
+    text = f"MODULE m\nCONST robtarget p:=[[10,20,-30],{TAIL};\nPROC main()\n{body}"
+    assert b"p:=[[9.9000,20,-30]" in olp.correct(text.encode() + MACHINE_TAIL, path).data

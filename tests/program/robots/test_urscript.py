@@ -89,11 +89,12 @@ def test_parts_of_a_move_blend(bent: Path) -> None:
     [
         ("set_tcp(p[0,0,0,0,0,0])\nq=p[0,0,0,0,0,0]\nq[2]=0.1\nmovel(q)", "several values"),
         ("set_tcp(p[0,0,0,0,0,0])\nmovel(pose_add(q,q))", "computed"),
-        ("set_tcp(p[0,0,0,0,0,0])\nmovec(p[0,0,0,0,0,0],p[0,0,0,0,0,0])", "arc"),
+        ("set_tcp(p[0,0,0,0,0,0])\nmovec(p[0,0,0,0,0,0])", "the arc lacks"),
         ("set_tcp(p[0,0,0,0,0,0])\nspeedl([0,0,0,0,0,0],1,1)", "speeds"),
         ("movel(p[0,0,0,0,0,0])", "no set_tcp"),
         ("movel(p[0,0,0,0,0,0])\nset_tcp(p[0,0,0,0,0,0])", "depends on the run"),
-        ("if x:\nset_tcp(p[0,0,0,0,0,0])\nend", "depends on the run"),
+        ("if x:\nset_tcp(p[0,0,0,0,0,0])\nend\nmovel(p[0,0,0,0,0,0])", "the block up to line 4 sets another"),
+        ("set_tcp(p[0,0,0,0,0,0])\nx=movel(p[0,0,0,0,0,0])", "movel in a value"),
         ("if movel(p[0,0,0,0,0,0]):", "line of its own"),
         ("movel(p[0,0,0,0,0,0]", "bracket"),
     ],
@@ -128,3 +129,34 @@ def test_a_statement_goes_on_until_its_brackets_are_closed(bent: Path) -> None:
     assert len(numbers) >= 6
     assert "], # first\n 1.2" in done
     assert "and  # (a\n    n > 0):" in done
+
+
+SET = "set_tcp(p[0,0,0.1,0,0,0])\n"
+MOVE = "movel(p[0.1,0.2,-0.3,0,0,0])\n"
+
+
+@pytest.mark.parametrize(
+    ("lines", "moved"),
+    [
+        # before any tool, and behind one
+        (f"def a():\n{MOVE}{SET}{MOVE}end\n", "01"),
+        # with a name of the tool, and in a function that is called behind it
+        (f'def a():\nset_tcp(p[0,0,0.1,0,0,0], "T")\ndef f():\n{MOVE}end\nf()\n{MOVE}end\n', "11"),
+        (f"def f():\n{MOVE}end\ndef a():\n{SET}f()\nend\n", "1"),
+        (f"def f():\n{MOVE}end\ndef a():\nf()\n{SET}f()\n{MOVE}end\n", "01"),
+        # functions with tools of their own
+        (f"def f():\n{SET}{MOVE}end\ndef a():\nset_tcp(p[0,0,0.2,0,0,0])\n{MOVE}f()\n{MOVE}end\n", "110"),
+        # in branches and loops
+        (f"def a():\n{SET}if x:\n{SET}end\n{MOVE}end\n", "1"),
+        (f"def a():\n{SET}if x:\nset_tcp(p[0,0,0.2,0,0,0])\n{MOVE}else:\n{MOVE}end\n{MOVE}end\n", "110"),
+        (f"def a():\n{SET}while x:\n{MOVE}set_tcp(p[0,0,0.2,0,0,0])\n{MOVE}end\n{MOVE}end\n", "010"),
+        # moves that no target states, and a value that is none
+        (f"def a():\n{SET}q=get_inverse_kin(p[0,0,0,0,0,0])\nservoj(q)\nforce_mode(q)\n{MOVE}end\n", "1"),
+    ],
+)
+def test_moves_whose_tool_the_run_decides_are_left(lines: str, moved: str, tmp_path: Path) -> None:
+    recipe = Recipe(controller="urscript", tools={}, job_defaults={}, work_offsets={})
+    path = machines.shift_machine(tmp_path, (100.0, 0.0, 0.0), recipe=recipe)
+    text = olp.correct(lines.encode(), path).data.decode()
+    own = [line for line in text.splitlines() if line.startswith("movel")]
+    assert [str(int("0.09990000" in line)) for line in own] == list(moved)

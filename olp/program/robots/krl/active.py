@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import replace
 
 from olp.core.errors import ProgramError
@@ -19,7 +20,9 @@ _BAS = pattern(rb"(?i)BAS\s*\(\s*#(\w+)\s*(?:,\s*(.*?)\s*)?\)")
 _TAUGHT = pattern(rb"(?i)FDAT_ACT\s*=\s*(\w+)")
 _SPEED = pattern(rb"(?i)\$VEL\.CP\s*=\s*([+-]?(?:\d+\.?\d*|\.\d+))")
 _ANY_SPEED = pattern(rb"(?i)\$VEL(?:\.CP)?\s*=")
-_FIXED_TOOL = pattern(rb"(?i)\$IPO_MODE\s*=\s*#TCP")
+_MODE = pattern(rb"(?i)\$IPO_MODE\s*=\s*(.*?)\s*")
+_ANY_STILL = pattern(rb"(?i)\$IPO_MODE\s*=\s*#TCP\b")
+_ANY_TAUGHT = pattern(rb"(?i)FDAT_ACT\s*=\s*(\w+)")
 _WORLD = pattern(rb"(?i)\$(?:NULLFRAME|WORLD)")
 _NUMBERED = pattern(rb"(?i)(?:BASE|TOOL)_DATA\s*\[\s*(\d+)\s*\]")
 #: Functions of inline forms that give the tool or the base of a taught point.
@@ -42,11 +45,13 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """What is in force; None where the text does not say it. `why` is what the run decides it by."""
+    """What is in force; None where the text does not say it. `why` is what the run decides it by. `still`:
+    the tool may stand still, and the robot move the part."""
 
     base: Place | None
     tool: Place | None
     why: str
+    still: bool = False
 
 
 class Active:
@@ -64,9 +69,17 @@ class Active:
         #: names of values that are set as a base or tool
         self.named: set[str] = set()
 
-    def forget(self, why: str) -> None:
-        """What is in force depends on the run from here on."""
-        self.state, self._taught = State(None, None, why), None
+    @functools.cached_property
+    def _any_still(self) -> bool:
+        """Whether the text may set a tool that stands still."""
+        points = set(_ANY_TAUGHT.findall(self.data)) if b"#TCP" in self.data.upper() else ()
+        taught = (self.declared.taught(key_of(name, None)) for name in points)
+        return _ANY_STILL.search(self.data) is not None or any(own and own.fixed for own in taught)
+
+    def forget(self, why: str, *, begun: bool = True) -> None:
+        """What is in force depends on the run from here on. Where none has `begun`, no statement of this text
+        has set a tool that stands still."""
+        self.state, self._taught = State(None, None, why, begun and self._any_still), None
 
     def take(self, line: Line) -> bool:
         """Whether a statement is about base, tool or speed; it is followed."""
@@ -85,8 +98,10 @@ class Active:
         if taught is not None:
             self._taught = self.declared.taught(key_of(taught[1], None))
             return True
-        if _FIXED_TOOL.match(text):
-            raise _fixed(line)
+        mode = _MODE.fullmatch(text)
+        if mode is not None:
+            self.state = replace(self.state, still=self._any_still and mode[1].upper() != b"#BASE")
+            return True
         if _ANY_SPEED.match(text):
             speed = _SPEED.fullmatch(text)
             self.feed = NAN if speed is None else float(speed[1]) * _MM_PER_M
@@ -111,7 +126,7 @@ class Active:
         if numbered is not None:
             return Place(int(numbered[1]))
         if of_taught is not None:
-            return self._of_taught(which, self.declared.taught(key_of(of_taught[1], None)), line)
+            return self._of_taught(which, self.declared.taught(key_of(of_taught[1], None)))
         numbers = self.declared.aggregate(span)
         if numbers is not None:
             return Place(0, pose_of(numbers, line.line), f"${which} of line {line.line}")
@@ -127,11 +142,9 @@ class Active:
         return None if pose is None else Place(0, pose, key)
 
     @staticmethod
-    def _of_taught(which: str, taught: Taught | None, line: Line) -> Place | None:
+    def _of_taught(which: str, taught: Taught | None) -> Place | None:
         if taught is None:
             return None
-        if taught.fixed:
-            raise _fixed(line)
         number = taught.base if which == "BASE" else taught.tool
         return None if number is None else Place(number)
 
@@ -140,7 +153,9 @@ class Active:
         speed = float(value) * _MM_PER_M if _NUMBER.fullmatch(value) else NAN
         if command in (b"PTP_PARAMS", b"CP_PARAMS", b"FRAMES"):
             for which in ("BASE", "TOOL"):
-                self._set(which, self._of_taught(which, self._taught, line), line)
+                self._set(which, self._of_taught(which, self._taught), line)
+            still = self._any_still if self._taught is None else self._taught.fixed
+            self.state = replace(self.state, still=still)
             if command == b"CP_PARAMS":
                 self.feed = speed
         elif command in (b"BASE", b"TOOL"):
@@ -159,8 +174,8 @@ class Active:
             if which == "IPO_MODE":
                 taught = _OF_MODE.match(match[2])
                 fixed = taught is not None and self.declared.taught(key_of(taught[1], None))
-                if match[2].strip().upper() == b"#TCP" or (fixed and fixed.fixed):
-                    raise _fixed(line)
+                still = match[2].strip().upper() == b"#TCP" or bool(fixed and fixed.fixed)
+                state = replace(state, still=still)
                 continue
             place = self._place(which, (begin + match.start(2), begin + match.end(2)), line)
             why = f"the value of ${which} behind WITH is not stated in this text"
@@ -173,6 +188,12 @@ class Active:
 
     def base(self, state: State, line: int) -> Located:
         """The base of a move. Raises ProgramError where it is not stated."""
+        if state.still:
+            raise DecidedInRun(
+                "the tool may stand still (#TCP), and the robot move the part, which is not read",
+                line=line,
+                code="OLP512",
+            )
         if self._bases is not None and self._bases[0] is state:
             return self._bases[1]
         place = state.base
@@ -231,9 +252,3 @@ class Active:
             line=line,
             code="OLP523" if what == "$BASE" else "OLP521",
         )
-
-
-def _fixed(line: Line) -> ProgramError:
-    return ProgramError(
-        "the tool stands still (#TCP), and the robot moves the part: not read", line=line.line, code="OLP512"
-    )

@@ -13,7 +13,7 @@ _ROUTINE = pattern(rb"(?i)(?:GLOBAL\s+)?DEF(?:FCT\s+\w+(?:\s*\[[^\]]*\])?)?\s+(\
 _CALL = pattern(rb"(?i)(?<![#$.\w])([A-Z]\w*)\s*\(")
 _MOVES = pattern(rb"(?i)(?:S?LIN|S?PTP|S?CIRC)(?:_REL)?\b|SPLINE\b|SPL\b|ASYPTP\b")
 _SETS = pattern(
-    rb"(?i)\$(?:BASE|TOOL)\b[^=]*=(?!=)|BAS\s*\(\s*#(?:PTP_PARAMS|CP_PARAMS|FRAMES|BASE|TOOL|INITMOV|EX_BASE)\b"
+    rb"(?i)\$(?:BASE|TOOL|IPO_MODE)\b[^=]*=(?!=)|BAS\s*\(\s*#(?:PTP_PARAMS|CP_PARAMS|FRAMES|BASE|TOOL|INITMOV|EX_BASE)\b"
 )
 #: The first word of a statement of a block, and what it does.
 BLOCK = pattern(
@@ -44,7 +44,7 @@ def is_move(text: bytes) -> bool:
 
 
 def sets_frames(text: bytes) -> bool:
-    """Whether a statement sets base or tool."""
+    """Whether a statement sets base or tool, or whether the tool stands still."""
     return _SETS.match(text) is not None
 
 

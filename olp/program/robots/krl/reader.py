@@ -84,6 +84,8 @@ class _Reader:
         self.active = Active(data, setup, self.declared, self.moves.frames)
         self.turning = Turning(self.lines)
         self.blocks: list[_Block] = []
+        #: whether a routine has begun
+        self.begun = False
         self.targets: dict[Span, int] = {}
         self.bases: dict[tuple[str, str], Located] = {}
         self.listed = self.triggered = False
@@ -174,7 +176,9 @@ class _Reader:
         elif kind in ("routine", "last"):
             self.blocks = []
             self.moves.known = False
-            self.active.forget("this routine does not set it" if self.flow.sets else "")
+            why = "this routine does not set it" if self.flow.sets else ""
+            self.active.forget(why, begun=self.begun)
+            self.begun = True
         elif kind == "label":
             self.moves.known = False
             if self.flow.sets:
@@ -210,9 +214,9 @@ class _Reader:
             return
         self._calls(line)
         self.blocks.pop()
-        ends = {(state.base, state.tool) for state in block.ends}
+        ends = {(state.base, state.tool, state.still) for state in block.ends}
         if not (block.whole or line.text.upper().startswith((b"UNTIL", b"ENDLOOP"))):
-            ends.add((block.begin.base, block.begin.tool))
+            ends.add((block.begin.base, block.begin.tool, block.begin.still))
         if len(ends) > 1:
             self.active.forget(f"the branches up to line {line.line} set it differently")
 

@@ -58,6 +58,6 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"SPLINE": (_NO, "is a spline; post straight moves"),
     b"LIN_REL, PTP_REL": (_R, "left as written: a distance from where the robot is"),
     b"ASYPTP": (_NO, "moves external axes past the targets"),
-    b"#TCP": (_NO, "the tool stands still, and the robot moves the part"),
+    b"#TCP": (_R, "the tool stands still, and the robot moves the part: moves are left as written"),
     b"RSI_MOVECORR, RSI_ON": (_NO, "moves targets by what a sensor says"),
 }  # fmt: skip

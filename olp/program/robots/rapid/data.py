@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from olp.core.errors import ProgramError
 from olp.core.patterns import pattern
-from olp.core.projects import place_of
+from olp.core.projects import FileLines
 from olp.core.values import dataclass
 from olp.program.robots.moves import DecidedInRun, RobotMoves
 from olp.program.robots.poses import Pose
@@ -83,7 +83,7 @@ class Declared:
     give values to."""
 
     def __init__(self, data: bytes, moves: RobotMoves) -> None:
-        self.data, self.moves = data, moves
+        self.data, self.moves, self._files = data, moves, FileLines(data)
         self._data: dict[tuple[Scope, str], list[Data]] = {}
         #: by name: where it may get another value
         self._given: dict[str, list[Given]] = {}
@@ -131,7 +131,7 @@ class Declared:
 
     def _line(self, line: int) -> str:
         """A line in words, with its file where the text holds several."""
-        file, own = place_of(self.data, line)
+        file, own = self._files.of(line)
         return f"line {own} of {file}" if file else f"line {own}"
 
     def _place(self, data: Data) -> str:

@@ -22,10 +22,10 @@ _BLOCK = pattern(
     rb"(?P<module>MODULE\s+\w+(?:\s*\([^)]*\))?)|"
     rb"(?P<end>END(?:MODULE|PROC|FUNC|TRAP|RECORD|IF|FOR|WHILE|TEST)\b)|"
     rb"(?P<part>(?:ERROR|UNDO|BACKWARD|ELSE|DEFAULT\s*:)(?![\w:]))|"
-    rb"(?P<elseif>ELSEIF\b[^;!]*?\bTHEN\b)|"
-    rb"(?P<case>CASE\b[^;!]*?:(?!=))|"
+    rb"(?P<elseif>ELSEIF\b(?:[^;!\"]|\"[^\"\r\n]*\")*?\bTHEN\b)|"
+    rb"(?P<case>CASE\b(?:[^;!\"]|\"[^\"\r\n]*\")*?:(?!=))|"
     rb"(?P<if>IF\b(?:[^;!\"]|\"[^\"\r\n]*\")*?\bTHEN\b)|"
-    rb"(?P<loop>(?:FOR|WHILE)\b[^;!]*?\bDO\b)|"
+    rb"(?P<loop>(?:FOR|WHILE)\b(?:[^;!\"]|\"[^\"\r\n]*\")*?\bDO\b)|"
     rb"(?P<test>TEST\b[^\r\n!;]*)|"
     rb"(?P<label>[A-Za-z]\w*\s*:(?!=)))"
 )

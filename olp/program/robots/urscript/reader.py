@@ -20,8 +20,9 @@ from olp.program.robots.frames import Located, Tool
 from olp.program.robots.moves import NAN, DecidedInRun, RobotMoves, take_all
 from olp.program.robots.poses import Pose, of_vector
 from olp.program.robots.targets import NOWHERE, Span, Use
-from olp.program.robots.urscript.table import TABLE
+from olp.program.robots.urscript.table import LEFT, TABLE
 from olp.program.robots.urscript.text import Line, lines_of
+from olp.program.robots.urscript.tools import Tools
 from olp.program.text.numbers import LARGEST
 
 _N = rb"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*"
@@ -36,7 +37,6 @@ _NEAR = pattern(rb"\s*(?:qnear\s*=(?!=))?\s*(.*?)\s*")
 _ASSIGNED = pattern(rb"\s*(?:(?:global|local)\s+)?([A-Za-z_]\w*)\s*=(?!=)\s*(.*?)\s*")
 _ELEMENT = pattern(rb"\s*([A-Za-z_]\w*)\s*\[[^\]]*\]\s*=(?!=)")
 _DEFINED = pattern(rb"(?m)^[ \t]*(?:def|thread)[ \t]+(\w+)")
-_TCP = pattern(rb"(?m)^[ \t]*set_tcp[ \t]*\(")
 #: Words of moves, which a line that begins a block must not have.
 _MOVING = pattern(rb"\b(?:opti)?(?:move|servo|speed)[jlpc]\b")
 _CALL = pattern(rb"\s*([A-Za-z_]\w*)\s*\((.*)\)\s*")
@@ -80,18 +80,17 @@ class _Reader:
         self.targets: dict[Span, int] = {}
         #: joints near which poses are reached by a movej, by the places of these
         self.near: dict[int, tuple[float, ...]] = {}
-        self.tool: Tool | None = None
-        #: functions of the text, the one that is read, those with moves, and the tools that are set
+        #: names of joint values
+        self.joints: set[bytes] = set()
+        #: functions of the text
         self.defined = set(_DEFINED.findall(data))
-        self.function = 0
-        self.moving: set[int] = set()
-        self.tools: list[Pose] = []
         self.blocks: list[tuple[bytes, int]] = []
         self.refusals: list[ProgramError] = []
 
     def run(self, dialect: Dialect, options: Options, *, words: bool) -> Program:
         every = [line for line in lines_of(self.data) if line.text.strip()]
         self._assignments(every)
+        self.tools = Tools(every, self._tcp)
         take_all(every, self._statement, self.moves, self.refusals, options)
         self.moves.hold_mentioned(self._statements(every))
         return self.moves.program(dialect, words=words)
@@ -113,6 +112,8 @@ class _Reader:
             if match is None:
                 continue
             name = match[1]
+            if match[2][:1] == b"[":
+                self.joints.add(name)
             if name in self.assigned:
                 self.poses.pop(name, None)
                 continue
@@ -140,11 +141,13 @@ class _Reader:
                     line=line.line,
                     code="OLP512",
                 )
-            self._block(word)
+            self._block(line, word)
             return
         match = _ASSIGNED.fullmatch(text)
         call = _CALL.fullmatch(text)
         row = TABLE.get(word)
+        if word in LEFT:
+            raise DecidedInRun(f"{word.decode()} {LEFT[word]}", line=line.line, code="OLP512")
         if row is not None and row[0] is Support.REFUSED:
             raise ProgramError(f"{word.decode()} {row[1]}", line=line.line, code="OLP512")
         if call is not None and word in (b"movel", b"movep", b"movej"):
@@ -152,7 +155,7 @@ class _Reader:
         elif call is not None and word == b"movec":
             self._arc(line, call)
         elif call is not None and word == b"set_tcp":
-            self._set_tcp(line, call)
+            self.tools.set(line, self._tcp(call[2]))
         elif match is not None:
             self._value(line, match[2])
         elif row is None or row[0] is not Support.UNCHANGED:
@@ -160,10 +163,10 @@ class _Reader:
 
     def _value(self, line: Line, value: bytes) -> None:
         """A value that a function gives may come with moves."""
-        for name in _WORDS.findall(value):
-            row = TABLE.get(name)
-            if row is not None and row[0] in (Support.REFUSED, Support.CORRECTED):
-                raise ProgramError(f"{name.decode()} in a value is not read", line=line.line, code="OLP512")
+        moving = _MOVING.search(value)
+        if moving is not None:
+            what = f"{moving[0].decode()} in a value is not read; write the move in a line of its own"
+            raise DecidedInRun(what, line=line.line, code="OLP512")
         if b"(" in value and not re.match(rb"\s*(?:pose_\w+|get_\w+|read_\w+|d2r|r2d|floor|sqrt)\(", value):
             self._call(line)
 
@@ -173,9 +176,17 @@ class _Reader:
             shown = line.text.strip()[:40].decode("latin-1")
             what = f"`{shown}` may move: the next move is corrected at its end"
             self.moves.remark("called", line.line, what)
+        if name is not None and name[0] == b"force_mode":
+            what = "from here on forces lead the robot along some axes, which no target states"
+            self.moves.remark("force", line.line, what)
+        self.tools.called(line.text)
         self.moves.known = False
 
-    def _block(self, word: bytes) -> None:
+    def _block(self, line: Line, word: bytes) -> None:
+        if word not in (b"def", b"thread") and self.defined & set(_WORDS.findall(line.text)):
+            self.tools.called(line.text)
+            self.moves.known = False
+        self.tools.block(line, word)
         if word in (b"elif", b"else", b"end"):
             moved = bool(self.blocks) and self.blocks[-1][1] != self.moves.count
             kind = self.blocks[-1][0] if self.blocks else b""
@@ -187,23 +198,11 @@ class _Reader:
             self.blocks.append((word, self.moves.count))
             if word in (b"def", b"thread"):
                 self.moves.known = False
-                self.function += 1
 
-    def _set_tcp(self, line: Line, call: re.Match[bytes]) -> None:
-        """The tool from here on. Raises ProgramError where it depends on the run, or is not stated."""
-        if any(kind not in (b"def",) for kind, _ in self.blocks) or len(self.blocks) > 1:
-            raise ProgramError(
-                "set_tcp in a branch, a loop or a function within another depends on the run",
-                line=line.line,
-                code="OLP521",
-            )
-        stated = self._pose(call[2])
-        if stated is None:
-            raise ProgramError("set_tcp is not stated with numbers", line=line.line, code="OLP521")
-        if all(not known.same(stated) for known in self.tools):
-            self.tools.append(stated)
-        # a tool for each statement: a later one has another vector
-        self.tool = Tool(f"tcp{line.line}", stated)
+    def _tcp(self, text: bytes) -> Pose | None:
+        """The pose that the words of a `set_tcp` state; None where they state none with numbers."""
+        first = _ARGUMENT.match(text)
+        return None if first is None else self._pose(first[0])
 
     # -- moves ---------------------------------------------------------------------------------------
 
@@ -222,31 +221,30 @@ class _Reader:
             near = self._near(line, target, [part[0] for part in parts[1:]])
             begin, target = begin + inverse.start(1) + parts[0].start(), parts[0][0]
         in_joints = _JOINTS.fullmatch(target) is not None or self._is_joints(target)
-        if in_joints and call[1] != b"movej":
-            what = f"joints in a {call[1].decode()} are not read; write the pose"
-            raise ProgramError(what, line=line.line, code="OLP533")
+        rest = self._rest(call[1], arguments[1:])
+        timed = "t" in rest and self._number(rest["t"]) != 0.0
+        feed = _MM_PER_M * (self._number(rest["v"]) if "v" in rest else NAN)
         if in_joints:
             self._begins_in_loop()
-            statement = start, line.begin + len(line.text)
-            rest = self._rest(call[1], arguments[1:])
-            self.moves.joint_move(line.line, lambda: self._joints(line, begin, target, statement, rest))
+            statement, straight = (start, line.begin + len(line.text)), call[1] != b"movej"
+            self.moves.joint_move(
+                line.line, lambda: self._joints(line, begin, target, statement, rest), straight=straight,
+                tool=self._tool(line) if straight and self.moves.arm else None,
+                feed=feed if straight else NAN, whole=timed,
+            )  # fmt: skip
             return
         index, span, named, frame = self._target(line, begin, target)
         if call[1] == b"movej":
             self._reached_near(line, index, near)
-        rest = self._rest(call[1], arguments[1:])
         self._begins_in_loop()
         turn = self.moves.targets[index].turn
         use = Use(
             index, (start, line.begin + len(line.text)), span, named, turn=turn,
             zone=rest.get("r", NOWHERE),
         )  # fmt: skip
-        timed = "t" in rest and self._number(rest["t"]) != 0.0
-        speed = self._number(rest["v"]) if "v" in rest else NAN
         self.moves.move(
-            line.line, use, frame, self._tool(line), speed * _MM_PER_M, straight=call[1] != b"movej",
-            whole=timed,
-        )  # fmt: skip
+            line.line, use, frame, self._tool(line), feed, straight=call[1] != b"movej", whole=timed
+        )
 
     def _near(self, line: Line, target: bytes, given: list[bytes]) -> tuple[float, ...]:
         """The joints in degrees near which a pose is reached; none where the robot is. Raises ProgramError
@@ -262,7 +260,7 @@ class _Reader:
     def _reached_near(self, line: Line, index: int, near: tuple[float, ...]) -> None:
         """Raises ProgramError where a pose is reached near other joints by another move."""
         if self.moves.arm and self.near.setdefault(index, near) != near:
-            raise ProgramError(
+            raise DecidedInRun(
                 "this pose is reached near other joints by another movej; give each its own",
                 line=line.line,
                 code="OLP533",
@@ -278,10 +276,10 @@ class _Reader:
             raise ProgramError("the arc lacks its via point or its end", line=line.line, code="OLP516")
         if any(_JOINTS.fullmatch(text) or self._is_joints(text) for _, text in arguments[:2]):
             what = "joints in a movec are not read; write the pose"
-            raise ProgramError(what, line=line.line, code="OLP533")
+            raise DecidedInRun(what, line=line.line, code="OLP533")
         rest = self._rest(call[1], arguments[2:])
         if "mode" in rest and self._number(rest["mode"]) != 0.0:
-            raise ProgramError(
+            raise DecidedInRun(
                 "mode 1 of movec turns the tool along with the arc, which is not read; write mode 0",
                 line=line.line,
                 code="OLP512",
@@ -294,7 +292,7 @@ class _Reader:
         (via, frame), (end, other) = ends
         if frame.name != other.name:
             what = "via point and end of this arc are in different frames"
-            raise ProgramError(what, line=line.line, code="OLP512")
+            raise DecidedInRun(what, line=line.line, code="OLP512")
         speed = self._number(rest["v"]) if "v" in rest else NAN
         self._begins_in_loop()
         self.moves.arc(line.line, via, end, frame, self._tool(line), speed * _MM_PER_M)
@@ -341,12 +339,7 @@ class _Reader:
 
     def _is_joints(self, text: bytes) -> bool:
         """Whether a name stands for joint values with numbers."""
-        match = _NAME.fullmatch(text)
-        return (
-            match is not None
-            and re.search(rb"(?m)^\s*(?:global\s+|local\s+)?" + match[1] + rb"\s*=\s*\[", self.data)
-            is not None
-        )
+        return text.strip() in self.joints
 
     def _target(self, line: Line, begin: int, text: bytes) -> tuple[int, Span, Span, Located]:
         """The place of a target, its bytes, those of its name, and the frame that it is in."""
@@ -399,17 +392,16 @@ class _Reader:
 
     def _tool(self, line: Line) -> Tool:
         """The tool of a move: that of `set_tcp`, else the one of machine or job."""
-        self.moving.add(self.function)
-        set_later = self.tool is None and _TCP.search(self.data) is not None
-        if set_later or (len(self.moving) > 1 and len(self.tools) > 1):
-            raise ProgramError(
-                "which set_tcp holds for this move depends on the run; set one tool, before all moves",
+        if self.tools.tool is not None:
+            return self.tools.tool
+        if self.tools.why:
+            raise DecidedInRun(
+                f"the tool of this move is not stated: {self.tools.why}; call set_tcp in the function of the "
+                "move, before it",
                 line=line.line,
                 code="OLP521",
             )
         number = self.setup.machine.default_tool
-        if self.tool is not None:
-            return self.tool
         if not number:
             raise ProgramError(
                 "no set_tcp states the tool; state it, or the tool of the installation with "

@@ -11,26 +11,34 @@ _R = Support.READ
 _X = Support.UNCHANGED
 _NO = Support.REFUSED
 
-_SPEEDS = "moves by speeds or by what a sensor says; program the targets"
+_SPEEDS = "moves by speeds or by what a sensor says"
+_BY_HAND = "the robot is led by hand: the next move is corrected at its end"
 _SENSED = "changes the path while the robot moves; take it into a program of its own"
+
+#: Moves that are left as written.
+LEFT: Mapping[bytes, str] = {
+    **dict.fromkeys((b"speedl", b"speedj", b"servoj", b"servoc", b"servol"), _SPEEDS),
+    **dict.fromkeys((b"optimovel", b"optimovej"), "is not read; post movel or movej"),
+}
 
 TABLE: Mapping[bytes, tuple[Support, str]] = {
     b"movel": (_C, "a straight move to p[...], a name of one, or pose_trans of two"),
     b"movep": (_C, "as movel"),
     b"movec": (_C, "an arc through a pose to another one; several arcs where one would bend"),
-    b"movej": (_C, "corrected at its end. Where the machine is no arm, joints are kept as written"),
+    b"movej": (_C, "corrected at its end. Where the machine is no arm, joints of moves are kept as written"),
     b"get_inverse_kin": (_C, "in a movej: its pose, reached near the joints that it states"),
     b"p[...]": (_C, "changed where moves use it, and cloned where they differ"),
     b"pose_trans": (_R, "of a frame with numbers and a target: the target is corrected"),
-    b"set_tcp": (_R, "the tool from here on"),
+    b"set_tcp": (_R, "the tool from here on; moves whose tool depends on the run are left as written"),
     b"def, thread": (_R, "where its first move comes from is not known: it is corrected at its end"),
     b"if, while, for": (_R, "behind moves that may not run, the next one is corrected at its end"),
     b"a call": (_R, "may move: the next move is corrected at its end"),
-    **dict.fromkeys((b"optimovel", b"optimovej"), (_NO, "is not read; post movel or movej")),
-    **dict.fromkeys((b"speedl", b"speedj", b"servoj", b"servoc", b"servol"), (_NO, _SPEEDS)),
+    **{word: (_R, f"left as written, as it {why}") for word, why in LEFT.items()},
+    b"force_mode": (_R, "targets behind it are corrected; forces lead the robot along some axes"),
+    **dict.fromkeys((b"teach_mode", b"freedrive_mode"), (_R, _BY_HAND)),
     **dict.fromkeys(
-        (b"force_mode", b"path_offset_enable", b"path_offset_set", b"conveyor_tracking",
-         b"track_conveyor_linear", b"track_conveyor_circular", b"teach_mode", b"freedrive_mode"),
+        (b"path_offset_enable", b"path_offset_set", b"conveyor_tracking",
+         b"track_conveyor_linear", b"track_conveyor_circular"),
         (_NO, _SENSED),
     ),
     **dict.fromkeys(

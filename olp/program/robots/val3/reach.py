@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable
 
 from olp.core.patterns import pattern
-from olp.core.projects import place_of
+from olp.core.projects import FileLines
 from olp.program.robots.line import Line
 from olp.program.robots.val3.code import Routine, lines_in
 from olp.program.robots.val3.files import Application
@@ -39,7 +39,7 @@ class Reach:
     not followed give other values, and where."""
 
     def __init__(self, application: Application, data: bytes) -> None:
-        self.data, self.routines = data, application.routines
+        self._files, self.routines = FileLines(data), application.routines
         self._sets: dict[str, set[str]] = {name: set() for name in self.routines}
         self._moving = dict.fromkeys(self.routines, False)
         self._calls: dict[str, list[str]] = {}
@@ -62,7 +62,7 @@ class Reach:
                     )
 
     def _shown(self, line: int) -> str:
-        file, number = place_of(self.data, line)
+        file, number = self._files.of(line)
         return f"line {number} of {file}" if file else f"line {number}"
 
     def _called(self, line: Line) -> str | None:

@@ -11,7 +11,7 @@ from bisect import bisect_right
 from olp.core.errors import ProgramError
 from olp.core.machine import Setup
 from olp.core.patterns import pattern
-from olp.core.projects import parts, place_of
+from olp.core.projects import FileLines, parts
 from olp.program.dialect import Dialect, Options
 from olp.program.program import Program
 from olp.program.robots.line import Line
@@ -49,7 +49,7 @@ class _Reader:
     """Reads one application."""
 
     def __init__(self, data: bytes, setup: Setup) -> None:
-        self.data = data
+        self.data, self._files = data, FileLines(data)
         self.application: Application = application(data)
         self.reach = Reach(self.application, data)
         self.state = State(data, self.application.data, self.reach.elsewhere)
@@ -139,7 +139,7 @@ class _Reader:
         self.state.forget(changed, why, scope)
 
     def _shown(self, line: int) -> str:
-        name, number = place_of(self.data, line)
+        name, number = self._files.of(line)
         return f"{number} of {name}" if name else str(number)
 
     # -- statements ----------------------------------------------------------------------------------
