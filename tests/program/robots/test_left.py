@@ -229,3 +229,36 @@ def test_moves_with_a_tool_that_stands_still_are_left(tmp_path: Path) -> None:
     points = [f"DECL E6POS XP{k}={{X {100 * k},Y 200,Z -100,A 0,B 0,C 0}}\n" for k in range(1, 6)]
     text = olp.correct((STILL + "".join(points) + "ENDDAT\n").encode(), path).data.decode()
     assert [f"XP{k}={{X {100 * k - 0.1:.5f}" in text for k in range(1, 6)] == [True, False, True, True, False]
+
+
+GIVEN = """MODULE made
+  CONST robtarget p10:=[[100,200,-100],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];
+  CONST robtarget p20:=[[200,200,-100],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];
+  VAR robtarget p30:=[[300,200,-100],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];
+  VAR robtarget p40:=[[400,200,-100],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];
+  PROC pick(robtarget p,num n{*},\\switch s|robtarget t,INOUT robtarget other)
+  ENDPROC
+  PROC main()
+    MoveL p10,v100,fine,tool0;
+    MoveL p20,v100,fine,tool0;
+    MoveL p30,v100,fine,tool0;
+    MoveL p40,v100,fine,tool0;
+    pick p10,[1,2],p30;
+    pick p20,n\\t:=p40,p30;
+    ArcMoveAbsJ [[0,0,0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;
+    MoveL p10,v100,fine,tool0;
+  ENDPROC
+ENDMODULE
+"""
+
+
+def test_a_routine_changes_what_it_is_given_to_change(tmp_path: Path) -> None:
+    """Parameters of RAPID are copies unless the routine says otherwise."""
+    recipe = Recipe(controller="abb-rapid", travel=((-900.0, 900.0),) * 3, **QUIET)
+    path = machines.shift_machine(tmp_path, (100.0, 0.0, 0.0), recipe=recipe)
+    result = olp.correct(GIVEN.encode(), path)
+    numbers = [line.partition("[[")[2].partition(",")[0] for line in result.data.decode().splitlines()]
+    # the call needs the numbers of p10 and p20: moves go to clones of them
+    assert [number for number in numbers if number][:6] == ["100", "99.9000", "200", "199.9000", "300", "400"]
+    told = [f.message for f in result.findings if "left as written" in f.message]
+    assert [what.split(" gets")[0] for what in told] == ["left as written: p30", "left as written: p40"]

@@ -577,3 +577,23 @@ def test_joints_that_are_not_corrected_stay_as_they_are(bent: Path) -> None:
     assert any('key="1" x="29.9' in line for line in lines)
     with pytest.raises(ProgramError, match="the target jOpen: the text does not state all its numbers"):
         corrected(moves[1:2], bent, data=data)
+
+
+TASK = pgx("cycle", "movel(pPoint[1],tGrip,mFast)")
+STILL_TASK = pgx("watch", "delay(1)")
+
+
+def test_a_task_that_moves_is_corrected_by_itself(bent: Path) -> None:
+    """Moves beside it are corrected at their ends, and one that only watches changes nothing."""
+    move = "movel(pPoint[0],tGrip,mFast)"
+    plain = ["movej(pPoint[2],tGrip,mFast)", 'taskCreate "w",10,watch()', move]
+    text = made(plain, POINTS, TASK, STILL_TASK)
+    assert not any("begins depends" in f.message for f in olp.correct(text, bent).findings)
+    text = made([plain[0], "taskCreateSync sName,0.1,bLate,cycle()", move], POINTS, TASK, STILL_TASK)
+    result = olp.correct(text, bent)
+    told = [f.message for f in result.findings]
+    assert any("cycle is a task of its own" in what and "with cycle.pgx in place" in what for what in told)
+    assert any("begins depends on the run" in what for what in told)
+    assert result.report["moves"]["corrected"] == 2
+    with pytest.raises(ProgramError, match="correct it by itself"):
+        olp.correct(made(['taskCreate "c",10,cycle()'], POINTS, TASK), bent)

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from itertools import zip_longest
 
 from olp.core.patterns import pattern
 from olp.core.rapid_modules import GIVEN
 from olp.core.values import dataclass
 from olp.program.dialect import Support
-from olp.program.robots.rapid.forms import FORMS
+from olp.program.robots.rapid.forms import FORMS, JOINT_MOVES
 from olp.program.robots.rapid.table import TABLE
 from olp.program.robots.rapid.text import Statement
 from olp.program.robots.targets import Span
@@ -17,12 +18,18 @@ from olp.program.robots.targets import Span
 _ROUTINE = pattern(rb"(?i)(?:LOCAL\s+|TASK\s+)?(PROC|FUNC|TRAP|RECORD)\s+(?:\w+\s+)?(\w+)")
 _PROC = pattern(rb"(?i)(?:LOCAL\s+)?(?:PROC|TRAP)\s+(\w+)")
 _PARAMETER = pattern(rb"(\w+)\s*(?:\{[^}]*\}\s*)?(?=[,|)])")
+#: A parameter through which a routine may change what its caller gives, and any.
+_CHANGING = pattern(rb"(?i)\s*(?:INOUT|VAR|PERS|REF)\s")
+_PART = pattern(
+    rb"(?:[^,()\[\]{}]|\([^()]*(?:\([^()]*\)[^()]*)*\)|\[[^\[\]]*(?:\[[^\[\]]*\][^\[\]]*)*\]|\{[^{}]*\})+"
+)
 _WORD = pattern(rb"\s*(?<!\w)([A-Za-z]\w*)")
 _SHORT_IF = pattern(rb"(?is)\s*IF\b")
 _HARMLESS_TAIL = pattern(
     rb"(?is).*[\s)](?:GOTO\s+\w+|RETURN\b.*|EXIT|EXITCYCLE|STOP|BREAK|(?:Set|Reset|Wait|TPWrite|Incr|Decr|"
     rb"SetDO|SetGO|SetAO|WaitTime)\b.*|[\w.{}]+\s*:=.*)"
 )
+_NAMES = pattern(rb"[A-Za-z]\w*")
 #: Names that stand alone as arguments.
 _MENTIONED = pattern(rb"(?:^|[\s,(])([A-Za-z]\w*)\s*(?=,|$)")
 #: The second argument of a search: where it writes what it has found.
@@ -53,6 +60,36 @@ def parameters_of(statement: Statement) -> list[str]:
     return [name.decode("latin-1").upper() for name in _PARAMETER.findall(given)]
 
 
+def changing_parameters(statements: Iterable[Statement]) -> dict[bytes, list[bool]]:
+    """Of each routine by its name in capitals, whether it may change what it is given for each parameter that
+    is not optional, in any of its declarations."""
+    found: dict[bytes, list[bool]] = {}
+    for statement in statements:
+        match = _PROC.match(statement.text) if statement.block == "routine" else None
+        if match is None:
+            continue
+        parts = _PART.findall(statement.text.partition(b"(")[2].rpartition(b")")[0])
+        own = [_CHANGING.match(part) is not None for part in parts if part.strip()[:1] != b"\\"]
+        known = found.setdefault(match[1].upper(), own)
+        if known is not own:
+            both = zip_longest(known, own, fillvalue=True)
+            found[match[1].upper()] = [a or b for a, b in both]
+    return found
+
+
+def _arguments(text: bytes, changing: list[bool]) -> list[bytes]:
+    """The names that a call gives to parameters which may change them, and to optional ones."""
+    names, place = [], 0
+    for part in _PART.findall(text):
+        own, _, optional = part.partition(b"\\")
+        names += _NAMES.findall(optional)
+        if own.strip():
+            if place >= len(changing) or changing[place]:
+                names += _NAMES.findall(own)
+            place += 1
+    return names
+
+
 def is_short_if(statement: Statement) -> bool:
     return _SHORT_IF.match(statement.text) is not None
 
@@ -79,7 +116,7 @@ def inner_move(statement: Statement) -> Statement | None:
     """The move in a short IF, None where that holds none."""
     for match in _WORD.finditer(statement.text):
         word = match[1].upper()
-        if word in FORMS or word == b"MOVEABSJ":
+        if word in FORMS or word in JOINT_MOVES:
             begin = statement.begin + match.start(1)
             return replace(statement, begin=begin, text=statement.text[match.start(1) :])
     return None
@@ -101,20 +138,23 @@ def value_in(statement: Statement) -> Span | None:
     return None if match is None else (statement.begin + match.start(1), statement.begin + match.end(1))
 
 
-def given_in(statement: Statement) -> list[str]:
+def given_in(statement: Statement, changing: Mapping[bytes, list[bool]]) -> list[str]:
     """The names that may get another value in a statement, in capitals: those that it assigns, and what it
-    gives to a routine or an instruction. A move changes no data but the point that a search has found."""
+    gives to a routine or an instruction. A move changes no data but the point that a search has found.
+    `changing` are routines of the text, as `changing_parameters` has them."""
     text = statement.text
     word = word_of(statement)
     inner = inner_move(statement) if is_short_if(statement) else None
     if inner is not None:
-        return given_in(inner)
+        return given_in(inner, changing)
     if is_assignment(statement):
         names = GIVEN.findall(text)
     elif word in FORMS:
         names = _FOUND.findall(text) if FORMS[word].stopped else []
-    elif word.startswith(b"MOVE"):
+    elif word in JOINT_MOVES or word.startswith(b"MOVE"):
         names = []
+    elif word in changing:
+        names = _arguments(text.lstrip()[len(word) :], changing[word])
     else:
         names = [*GIVEN.findall(text), *_MENTIONED.findall(text.partition(b" ")[2])]
     return [name.decode("latin-1").upper() for name in names]
@@ -141,7 +181,6 @@ def moving_routines(statements: Sequence[Statement]) -> tuple[set[str], set[str]
         if (
             (is_short_if(statement) and calls(statement.text))
             or (row is not None and row[0] in (Support.CORRECTED, Support.REFUSED))
-            or word == b"MOVEABSJ"
             or statement.text.lstrip()[:1] == b"%"
         ):
             current.moves = True

@@ -42,6 +42,9 @@ def _three(
             yield (f"{name}{letter}{end}".upper().encode(), Form(own, letter != "J", whole))
 
 
+#: Moves to joint values by their names in capitals.
+JOINT_MOVES = frozenset((b"MOVEABSJ", b"ARCMOVEABSJ"))
+
 #: Moves by their names in capitals.
 FORMS: Mapping[bytes, Form] = {
     **dict(_three("Move", "tvzw")),

@@ -15,7 +15,7 @@ from olp.program.robots.moves import DecidedInRun, RobotMoves, take_all
 from olp.program.robots.poses import NO_TURN, inverted, multiplied, of_zyx, rotated
 from olp.program.robots.rapid import flow
 from olp.program.robots.rapid.data import NO_MODULE, Declared, Given, Scope
-from olp.program.robots.rapid.forms import FORMS, Form
+from olp.program.robots.rapid.forms import FORMS, JOINT_MOVES, Form
 from olp.program.robots.rapid.table import TABLE
 from olp.program.robots.rapid.text import Lines, Statement, statements
 from olp.program.robots.rapid.values import JOINTTARGET, ROBTARGET, joints_of, target_of
@@ -87,6 +87,7 @@ class _Reader:
     def _declare(self, every: list[Statement]) -> list[Statement]:
         """Keep the data, and what changes them; returns the other statements."""
         routine, inside, rest = NO_MODULE, False, []
+        changing = flow.changing_parameters(every)
         for statement in every:
             if statement.block == "module":
                 routine = routine.next_module()
@@ -104,7 +105,7 @@ class _Reader:
                 continue
             if not statement.block:
                 value = flow.value_in(statement)
-                for name in flow.given_in(statement):
+                for name in flow.given_in(statement, changing):
                     self.declared.give(name, Given(statement, routine, value))
             rest.append(statement)
         return rest
@@ -118,7 +119,7 @@ class _Reader:
         if not statement.text.strip():
             return
         word = flow.word_of(statement)
-        if word in FORMS or word == b"MOVEABSJ":
+        if word in FORMS or word in JOINT_MOVES:
             self._any_move(statement, word)
         elif flow.is_short_if(statement):
             self._short_if(statement)
@@ -132,7 +133,7 @@ class _Reader:
             self._move(statement, word, FORMS[word], whole=whole)
         else:
             self._loop_begins()
-            self.moves.joint_move(statement.line, lambda: self._joints(statement))
+            self.moves.joint_move(statement.line, lambda: self._joints(statement, word))
 
     def _instruction(self, statement: Statement, word: bytes) -> None:
         row = TABLE.get(word)
@@ -302,9 +303,9 @@ class _Reader:
             along_tool=shift is not None and shift.tool, free=self.free[not straight],
         )  # fmt: skip
 
-    def _joints(self, statement: Statement) -> Use | None:
+    def _joints(self, statement: Statement, word: bytes) -> Use | None:
         """How a move uses joint values; None where the text does not state them."""
-        words = words_of(statement, statement.begin + len(b"MoveAbsJ"), self.data, FORMS[b"MOVEJ"])
+        words = words_of(statement, statement.begin + len(word), self.data, FORMS[b"MOVEJ"])
         span, line, named = words.target, statement.line, NOWHERE
         match = JOINTTARGET.match(self.data, *span)
         if match is not None and not self.data[match.end() : span[1]].strip():

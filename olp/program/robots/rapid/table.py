@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from olp.program.dialect import Support
-from olp.program.robots.rapid.forms import FORMS
+from olp.program.robots.rapid.forms import FORMS, JOINT_MOVES
 
 _C = Support.CORRECTED
 _R = Support.READ
@@ -27,7 +27,7 @@ TABLE: Mapping[bytes, tuple[Support, str]] = {
     **dict.fromkeys((b"SEARCHL", b"SEARCHC"), (_C, "corrected at its end; where it stops is not known")),
     b"MOVEL": (_C, "a straight move to a target with numbers, Offs or RelTool of one, or an array element"),
     b"MOVEJ": (_C, "corrected at its end; the path of the joints is not judged"),
-    b"MOVEABSJ": (_C, "corrected on arms; else kept, and the position behind it is unknown"),
+    **dict.fromkeys(sorted(JOINT_MOVES), (_C, "corrected on arms; else kept, and where it ends unknown")),
     b"MOVEC": (_C, "an arc through a target to another one; several arcs where one would bend"),
     b"ROBTARGET": (_C, "a declared target, corrected where moves use it, and cloned where they differ"),
     b"TOOLDATA": (_R, "the tool of moves that name it"),

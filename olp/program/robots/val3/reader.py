@@ -29,7 +29,7 @@ from olp.program.robots.val3.values import CALL, Thing, balanced
 MOVE = pattern(rb"(?is)(?:[A-Za-z_][^={}()\"]*=\s*)?(move[ljc])\s*\((.*)\)")
 _HAS_MOVE = pattern(rb"(?i)\bmove[ljc]\s*\(")
 _CALLED = pattern(rb"(?is)call\s+([A-Za-z_][\w:]*)\s*\((.*)\)")
-_TASK = pattern(rb"(?is)taskCreate(?:Sync)?\s*\"[^\"]*\".*?,\s*([A-Za-z_][\w:]*)\s*\([^()]*\)")
+_TASK = pattern(rb"(?is)taskCreate(?:Sync)?\b[^,]*,.*?,\s*([A-Za-z_][\w:]*)\s*\(.*\)")
 _LINK = pattern(rb"(?is)link\s*\((.*)\)")
 _LEADS = pattern(rb"(?i)(?:break|continue|wait|exit)\b")
 _ALTERED = pattern(rb"(?i)alter(?!\w*[ \t]*=)\w*\s*\(")
@@ -59,6 +59,8 @@ class _Reader:
         self.refusals: list[ProgramError] = []
         self.tell = Options().tell
         self.count, self.taken = 1, 0
+        #: whether no other task moves the robot
+        self.alone = True
 
     def run(self, dialect: Dialect, options: Options, *, words: bool) -> Program:
         self.tell = options.tell
@@ -69,6 +71,10 @@ class _Reader:
                 scope.own[name] = Thing.empty(kind, name, "0")
                 scope.own[name].why = "the caller gives it; correct the program that calls this one"
             self.count = max(len(lines_in(first.nodes)), 1)
+            others = (r for r in self.application.routines.values() if r is not first)
+            self.alone = not any(
+                map(self._moves_beside, (line for r in others for line in lines_in(r.nodes)))
+            )
             self._nodes(first.nodes, scope, 0)
         if self.refusals:
             first_error = self.refusals[0]
@@ -118,6 +124,7 @@ class _Reader:
         lines = block.lines()
         changed = self.reach.changed(lines)
         moving = any(self.reach.moves(line) for line in lines)
+        self.alone &= not any(map(self._moves_beside, lines))
         begin = block.branches[0][0]
         why = (
             f"it gets another value in the block of line {self._shown(begin.line)}, so it depends on the run"
@@ -150,6 +157,7 @@ class _Reader:
             raise ProgramError("a bracket is not closed in this line", line=line.line, code="OLP510")
         move, call = MOVE.fullmatch(text), _CALLED.fullmatch(text)
         if move is not None and not _HAS_MOVE.search(move[2]):
+            self.moves.known &= self.alone
             self.moving.take(line, move, scope, repeated=self.reach.repeated(scope.routine))
         elif _HAS_MOVE.search(text):
             raise not_read("a move within a value is not read; write it in a line of its own", line.line)
@@ -178,11 +186,29 @@ class _Reader:
         if match is not None and match[1].lower() in table.AWAY:
             self.moves.known = False
 
-    def _task(self, line: Line) -> None:
+    def _moves_beside(self, line: Line) -> bool:
+        """Whether a statement begins a task that may move the robot."""
+        if not word_of(line.text).startswith("taskcreate"):
+            return False
+        routine = self._task_of(line)
+        return routine is None or self.reach.moving(routine)
+
+    def _task_of(self, line: Line) -> Routine | None:
+        """The program that a task runs; None for one that is not in this application."""
         match = _TASK.fullmatch(line.text)
-        routine = None if match is None else self.application.routines.get(match[1].decode("latin-1"))
-        if routine is None or self.reach.moving(routine):
-            raise not_read("another task may move the robot at the same time", line.line)
+        return None if match is None else self.application.routines.get(match[1].decode("latin-1"))
+
+    def _task(self, line: Line) -> None:
+        if not self._moves_beside(line):
+            return
+        self.alone, routine = False, self._task_of(line)
+        what = "another task may move the robot at the same time"
+        if routine is not None:
+            what = (
+                f"{routine.name} is a task of its own, which moves the robot; correct it by itself, with "
+                f"{routine.name}.pgx in place of this program"
+            )
+        raise DecidedInRun(what, line=line.line, code="OLP512")
 
     def _link(self, line: Line, scope: Scope) -> None:
         """The frame that a point counts from, from here on."""
