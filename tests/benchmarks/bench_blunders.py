@@ -39,6 +39,8 @@ NEAR = 20.0
 #: Redundancy below which the report has to say beforehand what may stay hidden.
 CHECKED = 0.1
 
+_GROUPS = ((0.0, LOUD), (LOUD, NEAR), (NEAR, np.inf))
+
 
 def main(machines: int = 20, each: int = 6, first: int = 0) -> None:
     begin = time.process_time()
@@ -59,6 +61,8 @@ def main(machines: int = 20, each: int = 6, first: int = 0) -> None:
             print(f"  FALSE {where}: {', '.join(false)}", flush=True)
         every = blunders(seed, family, mixture) if each else []
         sizes = [size_of(taken, clean.fit, one) for one in every]
+        count = [int(np.sum([low <= one.noncentrality < high for one in sizes])) for low, high in _GROUPS]
+        print(f"  {where}: odds 10^{odds[-1]:.1f}; blunders quiet, just loud, louder: {count}", flush=True)
         for k in _drawn(rng, sizes, each):
             said = outcome(taken, clean, every[k])
             for what in _counted(every[k], said):

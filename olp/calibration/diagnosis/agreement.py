@@ -51,8 +51,8 @@ _MOST = 4
 class Tried:
     """Something that may be wrong with a source, its kind and in words, and its log odds (nats) against what
     was read. `support` are its log odds against a source that says nothing: whether the others confirm it.
-    What is `sought` may be named; the rest is excluded or not. `change` (size,) is by how much the unknowns
-    are others if it is so."""
+    What is `sought` may be named by itself; the rest is excluded or not. `change` (size,) is by how much the
+    unknowns are others if it is so."""
 
     kind: str
     words: str
@@ -62,14 +62,14 @@ class Tried:
     change: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
-    def counts(self) -> bool:
-        """Whether the readings may name it."""
-        return self.sought and self.support > _CONFIRMED
+    def confirmed(self) -> bool:
+        """Whether the others confirm it."""
+        return self.support > _CONFIRMED
 
     @property
     def beyond_doubt(self) -> bool:
-        """Whether the readings name it."""
-        return self.counts and self.log_odds > NAMED
+        """Whether what was read is beyond doubt not so, and this explains it."""
+        return self.confirmed and self.log_odds > NAMED
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,8 +86,19 @@ class Agreement:
 
     @property
     def named(self) -> Tried | None:
-        """What is wrong with it beyond doubt."""
-        return next((tried for tried in self.tried if tried.beyond_doubt), None)
+        """What is wrong with it beyond doubt. Where something that is sought is, so is something else that
+        explains it better."""
+        found = [tried for tried in self.tried if tried.beyond_doubt]
+        return found[0] if any(tried.sought for tried in found) else None
+
+    @property
+    def causes(self) -> str:
+        """What is wrong with it in words, with all that is not excluded against what is most probable."""
+        best = self.named
+        if best is None:
+            return ""
+        near = [one for one in self.tried if one.beyond_doubt and one.log_odds > best.log_odds - EXCLUDED]
+        return ", or ".join(tried.words for tried in near)
 
     @property
     def contradicts(self) -> bool:
@@ -97,7 +108,7 @@ class Agreement:
     @property
     def doubt(self) -> float:
         """The largest log odds (nats) that something is wrong with it; above `NAMED` it is told."""
-        odds = [tried.log_odds for tried in self.tried if tried.counts]
+        odds = [tried.log_odds for tried in self.tried if tried.sought and tried.confirmed]
         return max([*odds, self.against if self.misfit.failed else -np.inf])
 
     @property

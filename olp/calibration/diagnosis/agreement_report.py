@@ -30,7 +30,7 @@ def agreement_findings(found: Compared, fit: Fit, tools: Sequence[Vector]) -> It
         assert one.named is not None
         yield Finding(
             "OLP810",
-            f"{_name(one)}: {one.named.words}; so it agrees with all other readings, with odds of "
+            f"{_name(one)}: {one.causes}; so it agrees with all other readings, with odds of "
             f"10^{one.named.log_odds / math.log(10.0):.0f} to 1",
         )
     for one in found.unlike:
@@ -58,7 +58,7 @@ def agreement_rows(found: Compared, fit: Fit, tools: Sequence[Vector]) -> list[d
             "name": one.component,
             "directions": int(one.misfit.freedom),
             "chi_square_per_direction": one.misfit.reduced,
-            "wrong": one.named.words if id(one.misfit) in wrong and one.named is not None else "",
+            "wrong": one.causes if id(one.misfit) in wrong else "",
             "log10_odds_of_a_mistake": one.doubt / math.log(10.0) if np.isfinite(one.doubt) else None,
             "not_excluded": ", ".join(one.possible),
             "hidden_harm_um": harm,
